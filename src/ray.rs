@@ -46,6 +46,8 @@ pub struct RayPacket {
     pub(crate) direction: [[f32; PACKET_SIZE]; 3],
     pub(crate) t_min: [f32; PACKET_SIZE],
     pub(crate) t_max: [f32; PACKET_SIZE],
+    /// Time of each ray: -1/2 when the shutter opens, 1/2 when it closes.
+    pub(crate) time: [f32; PACKET_SIZE],
     len: usize,
 }
 
@@ -56,13 +58,14 @@ impl Default for RayPacket {
             direction: [[0.0; PACKET_SIZE]; 3],
             t_min: [0.0; PACKET_SIZE],
             t_max: [0.0; PACKET_SIZE],
+            time: [0.0; PACKET_SIZE],
             len: 0,
         }
     }
 }
 
 impl RayPacket {
-    /// Adds a ray.
+    /// Adds a ray in the middle of the exposure.
     ///
     /// # Panics
     /// If the packet is full.
@@ -76,6 +79,7 @@ impl RayPacket {
         }
         self.t_min[lane] = ray.t_min;
         self.t_max[lane] = ray.t_max;
+        self.time[lane] = 0.0;
         self.len += 1;
     }
 

@@ -25,6 +25,7 @@ mod environment;
 mod ground;
 mod lights;
 mod meshes;
+mod shutter;
 mod surface;
 
 pub use camera::check_views;
@@ -154,6 +155,7 @@ pub fn setup(
     let path = camera::path(manifest, &bounds, up, aspect)?;
     let camera = camera::at_start(&path, aspect, survey.origin)?;
     let lens = camera::lens(manifest, &path, aspect)?;
+    let shutter = shutter::shutter(manifest, survey)?;
     // Set up lights and ground
     let environment = environment::environment(manifest, map, &path.start(), up)?;
     let mut lights = match (manifest.lights.is_empty(), manifest.integrator()) {
@@ -183,6 +185,7 @@ pub fn setup(
         environment,
         is_environment_visible: manifest.environment.visible,
         next_frame: None,
+        exposure: None,
     };
     // Collect the settings of the images
     let output = &manifest.output;
@@ -219,6 +222,7 @@ pub fn setup(
         color,
         path,
         lens,
+        shutter,
         aspect,
         scene,
         meshes: Vec::new(),

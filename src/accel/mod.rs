@@ -23,6 +23,7 @@ mod lbvh;
 mod leaves;
 mod levels;
 mod linked;
+pub mod moving;
 mod neighbours;
 mod pack_leaves;
 mod packet;

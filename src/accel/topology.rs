@@ -18,7 +18,7 @@ pub(super) enum NodeRef<N> {
 }
 
 /// The topology of a tree.
-pub(super) trait Topology<'a>: Copy {
+pub(super) trait Topology<'a>: Copy + Sync {
     /// The children of a node, before one of them is chosen.
     type Children: Copy;
 

@@ -63,6 +63,17 @@ section! {
         ///
         /// auto focuses on the target point of the camera. A particle is followed by its id through all frames.
         focus: FocusSetting = FocusSetting::Auto;
+        /// Motion blur: how long the shutter is open, as a fraction of the time between frames; 0 is none
+        ///
+        /// 0.5 is a film camera with a shutter of 180 degrees. Particles move with their velocities, or, if they have
+        /// ids but no velocities, to their places in the next frame. output.frame_time is the time between frames.
+        shutter: f64 = 0.0, from(0), to(1), zero("no motion blur");
+        /// When the shutter opens, as a fraction of the time between frames, before (negative) or after the frame
+        shutter_offset: Option<f64> = None, from(-1), to(1), example("0.0"), unset("the frame in the middle");
+        /// Number of steps in which a union or a smooth surface moves while the shutter is open
+        ///
+        /// Each has a structure of its own, in time and memory. Spheres move continuously.
+        shutter_slices: u32 = 8, from(1), to(64);
         @
         /// `[[camera.key]]`, ascending by frame
         keys: Vec<CameraKey>;

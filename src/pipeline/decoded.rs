@@ -31,7 +31,7 @@ pub struct DecodedShading {
     pub colors: Vec<Vec3>,
     /// Values for the `id` channel; None if the index of the particle is used.
     pub ids: Option<Vec<u32>>,
-    /// Velocities for the channels `V` and `motion`.
+    /// Velocities for the channels `V` and `motion`, and for motion blur until the tree is built.
     pub velocities: Option<Vec<Vec3>>,
     /// The attribute that divides particles into parts, and their parts, for Cryptomatte.
     pub parts: Option<(String, Vec<i32>)>,
@@ -70,11 +70,17 @@ impl DecodedFrame {
         } else {
             None
         };
-        let velocities = if channels.needs_velocities() {
-            velocity_of(&frame.attributes).map(vectors)
-        } else {
-            None
+        let shutter = setup.picture.shutter.as_ref();
+        let is_moved = shutter.is_some_and(|shutter| shutter.has_velocities);
+        let velocities = match channels.needs_velocities() || is_moved {
+            true => velocity_of(&frame.attributes).map(vectors),
+            false => None,
         };
+        if is_moved && velocities.is_none() && !frame.is_empty() {
+            let has = frame.attributes.iter().map(|a| a.name.as_str());
+            let purpose = "motion blur, which camera.shutter = 0 turns off";
+            return Err(missing("velocity", purpose, file, has));
+        }
         let parts = match channels.needs_parts() {
             true => part_of(&frame.attributes).and_then(parts),
             false => None,
@@ -267,7 +273,7 @@ fn component(attribute: Option<&Attribute>, c: usize) -> Vec<f32> {
 }
 
 /// The ids of the particles, or their positions in the file if particles between them were dropped.
-fn ids(frame: &ParticleFrame) -> Option<Vec<u32>> {
+pub(super) fn ids(frame: &ParticleFrame) -> Option<Vec<u32>> {
     let ids = id_of(&frame.attributes).and_then(|ids| low_bits(&ids.data));
     ids.or_else(|| frame.file_index.clone())
 }

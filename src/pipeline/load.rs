@@ -12,6 +12,7 @@ use super::decoded::{DecodedFrame, particle_with_id};
 use super::in_place::{Opened, StoredFrame};
 use super::load_error::LoadError;
 use super::meshes::meshes_of;
+use super::motion::velocities_to_next;
 use super::predict::{FrameSize, MemoryModel};
 use super::setup::Setup;
 use crate::metrics::memory::{available, process_room};
@@ -117,7 +118,16 @@ fn decode(
     let (time, dropped) = (frame.time, frame.dropped);
     let file = first_file(sequence, task);
     let focus = focus_point(setup, &frame, &file)?;
-    let (decoded, clamped_radii) = DecodedFrame::of(setup, frame, &file)?;
+    let moving = match setup.picture.shutter {
+        Some(shutter) if !shutter.has_velocities => {
+            Some(velocities_to_next(setup, shutter, sequence, task, &frame)?)
+        }
+        _ => None,
+    };
+    let (mut decoded, clamped_radii) = DecodedFrame::of(setup, frame, &file)?;
+    if moving.is_some() {
+        decoded.shading.velocities = moving;
+    }
     Ok(LoadedFrame {
         task: task.clone(),
         notes,

@@ -13,6 +13,7 @@ mod load_error;
 mod mattes;
 mod memory_limit;
 mod meshes;
+mod motion;
 mod predict;
 mod probe;
 mod rays;
@@ -38,7 +39,9 @@ pub use predict::{FrameSize, MemoryModel, MemoryNeed};
 pub use probe::{Probe, ProbeError, probe};
 pub use renderer::{BuiltFrame, FrameRenderer, TraceError, TracedFrame};
 pub use schedule::{Overlap, Schedule};
-pub use setup::{AttributeChannel, ColorRule, FrameStep, Picture, RadiusRule, RunSettings, Setup};
+pub use setup::{
+    AttributeChannel, ColorRule, FrameStep, Picture, RadiusRule, RunSettings, Setup, Shutter,
+};
 pub use single::{PictureKind, make_image, make_picture};
 pub use trace::{CpuRenderer, renderer_of};
 pub use work::RenderWork;

@@ -17,6 +17,7 @@ use spherule_formats::sequence::Sequence;
 use super::read_threads::needs_many;
 use super::setup::{RadiusRule, Setup};
 use super::{ImageTask, mattes};
+use crate::accel::moving::MovingTree;
 use crate::accel::{BuildBytes, BuildSettings, Structure, predicted_bytes, predicted_stored_bytes};
 use crate::denoise;
 use crate::metrics::Bytes;
@@ -283,7 +284,12 @@ impl<'a> MemoryModel<'a> {
         let shared = if frame.is_shared { frame.content } else { 0 };
         // One byte per particle marks which are finite.
         let keeping = attributes + self.kept(frame) + n;
-        (files + frame.raw).max(shared + rounding.max(keeping))
+        let reading = (files + frame.raw).max(shared + rounding.max(keeping));
+        match self.setup.moves_to_next_frame() {
+            // The next frame is read beside it, and its ids are sorted
+            true => frame.raw + 12 * n + reading + 16 * n,
+            false => reading,
+        }
     }
 
     /// Memory that the allocator retains after the buffers for reading a frame are freed: all of it, if there are
@@ -302,7 +308,9 @@ impl<'a> MemoryModel<'a> {
             return self.held_file(frame);
         }
         let radii = if self.own_radii { 4 } else { 0 };
-        frame.particles * (12 + radii) + self.shading(frame)
+        // Velocities become displacements, and stay only for channels
+        let motion = if self.setup.has_motion() { 12 } else { 0 };
+        frame.particles * (12 + radii + motion) + self.shading(frame)
     }
 
     /// Memory of its attributes during tracing.
@@ -330,15 +338,12 @@ impl<'a> MemoryModel<'a> {
         if self.in_place {
             return predicted_stored_bytes(frame.particles);
         }
-        let values = self.setup.picture.color.is_by_particle();
-        // A smooth surface needs no tree over particles.
-        let particles = match self.setup.picture.surface.kind {
-            SurfaceKind::Smooth => 0,
-            SurfaceKind::Spheres | SurfaceKind::Union => frame.particles,
+        // A smooth surface needs no tree over particles, and a union in motion has its own trees.
+        let particles = match (self.setup.picture.surface.kind, self.setup.has_motion()) {
+            (SurfaceKind::Smooth, _) | (SurfaceKind::Union, true) => 0,
+            (SurfaceKind::Spheres, _) | (SurfaceKind::Union, false) => frame.particles,
         };
-        let count = usize::try_from(particles).unwrap_or(usize::MAX);
-        let settings = self.setup.build_settings(count, values);
-        let build = predicted_bytes(&settings, particles, self.own_radii);
+        let build = self.body_tree(particles);
         if !self.setup.picture.surface.spray {
             return build;
         }
@@ -350,26 +355,61 @@ impl<'a> MemoryModel<'a> {
         }
     }
 
+    /// The tree of a body.
+    fn body_tree(&self, particles: u64) -> BuildBytes {
+        let values = self.setup.picture.color.is_by_particle();
+        let count = usize::try_from(particles).unwrap_or(usize::MAX);
+        let settings = self.setup.build_settings(count, values);
+        predicted_bytes(&settings, particles, self.own_radii)
+    }
+
     /// The tree that is fastest to build.
     fn plain_tree(&self, particles: u64) -> BuildBytes {
         let settings = BuildSettings::new(Structure::Lbvh);
         predicted_bytes(&settings, particles, self.own_radii)
     }
 
-    /// Memory of the surface of a frame: normals need none, spray has a tree, and a smooth surface has its grid.
+    /// Memory of the surface of a frame: normals need none, spray has a tree, and a smooth surface has its grid. With
+    /// motion blur, spheres have a tree that moves, and other surfaces are there several times.
     fn surface(&self, frame: &FrameSize) -> SurfaceBytes {
-        let spray = if self.setup.picture.surface.spray {
-            self.plain_tree(frame.particles / PARTICLES_PER_DROP).tree
-        } else {
-            0
+        let (surface, n) = (&self.setup.picture.surface, frame.particles);
+        let slices = self
+            .setup
+            .picture
+            .shutter
+            .map_or(1, |shutter| u64::from(shutter.slices));
+        let moving = |particles: u64| match self.setup.has_motion() {
+            true => MovingTree::predicted_bytes(particles),
+            false => 0,
         };
-        let smooth = match self.setup.picture.surface.kind {
-            SurfaceKind::Smooth => smooth_bytes(self.setup, frame.particles),
-            SurfaceKind::Spheres | SurfaceKind::Union => SurfaceBytes::default(),
+        let drops = n / PARTICLES_PER_DROP;
+        let spray = match surface.spray {
+            true => self.plain_tree(drops).tree + moving(drops),
+            false => 0,
+        };
+        let body = match surface.kind {
+            SurfaceKind::Smooth => {
+                let one = smooth_bytes(self.setup, n);
+                SurfaceBytes {
+                    building: (slices - 1) * one.kept + one.building,
+                    kept: slices * one.kept,
+                }
+            }
+            SurfaceKind::Union if self.setup.has_motion() => {
+                let one = self.body_tree(n);
+                SurfaceBytes {
+                    building: slices * one.tree + one.scratch,
+                    kept: slices * one.tree,
+                }
+            }
+            SurfaceKind::Spheres | SurfaceKind::Union => SurfaceBytes {
+                building: moving(n),
+                kept: moving(n),
+            },
         };
         SurfaceBytes {
-            building: spray + smooth.building,
-            kept: spray + smooth.kept,
+            building: spray + body.building,
+            kept: spray + body.kept,
         }
     }
 

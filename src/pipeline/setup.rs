@@ -87,6 +87,21 @@ pub struct FrameStep {
     pub numbers: i64,
 }
 
+/// Motion blur: when the shutter is open, and how the particles move.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shutter {
+    /// When it opens, relative to the time of the frame, as a fraction of the step.
+    pub open: f64,
+    /// When it closes.
+    pub close: f64,
+    /// From one frame to the next.
+    pub step: FrameStep,
+    /// Whether the velocities are those in the files. Otherwise, particles move to their places in the next frame.
+    pub has_velocities: bool,
+    /// Number of slices of the exposure in which surfaces other than spheres do not change.
+    pub slices: u32,
+}
+
 /// The settings of a job: its pictures, and the execution of a run.
 #[derive(Debug, Clone)]
 pub struct Setup {
@@ -111,6 +126,8 @@ pub struct Picture {
     pub path: CameraPath,
     /// The lens of the camera; without one, it is a pinhole.
     pub lens: Option<LensSettings>,
+    /// Motion blur, if there is any.
+    pub shutter: Option<Shutter>,
     /// Width of the images divided by their height; also used if fewer pixels are traced in a trial.
     pub aspect: f64,
     /// Lights, material, background, ground; with the camera at the start of the path. [`Setup::scene_at`] returns
@@ -195,8 +212,30 @@ impl Setup {
         Ok(Scene {
             camera,
             next_frame,
+            exposure: self.exposure(frame, &camera),
             ..self.picture.scene.clone()
         })
+    }
+
+    /// The cameras of `frame` when the shutter opens and when it closes. `camera` is that of the frame, with its lens.
+    fn exposure(&self, frame: i64, camera: &Camera) -> Option<[Camera; 2]> {
+        let picture = &self.picture;
+        let shutter = picture.shutter?;
+        #[expect(
+            clippy::cast_precision_loss,
+            reason = "frame numbers of neighbours differ little"
+        )]
+        let numbers = shutter.step.numbers as f64;
+        let at = |part: f64| {
+            let view = picture.path.view_between(frame, part * numbers);
+            let moved = Camera::new(&view, picture.aspect, picture.origin);
+            // Only views of frames are checked in advance
+            moved.map_or(*camera, |moved| match camera.lens() {
+                Some(lens) => moved.with_lens(lens),
+                None => moved,
+            })
+        };
+        Some([at(shutter.open), at(shutter.close)])
     }
 
     /// Options for the PNG of an image from `camera`: a film without background gets one.
@@ -211,9 +250,13 @@ impl Setup {
     /// Settings for the tree of a frame with `particles`, with or without values for colours.
     pub fn build_settings(&self, particles: usize, has_values: bool) -> BuildSettings {
         let channels = self.picture.render.channels;
-        let structure = self.structure_for(particles);
+        let structure = match (self.structure_for(particles), self.has_motion()) {
+            // A moving sphere must not be stored twice
+            (Structure::Sbvh, true) => Structure::Bvh,
+            (structure, _) => structure,
+        };
         BuildSettings {
-            keep_indices: channels.needs_particles() || has_values,
+            keep_indices: channels.needs_particles() || has_values || self.has_motion(),
             bvh: self.run.bvh,
             sbvh: self.run.sbvh,
             ..BuildSettings::new(structure)
@@ -234,6 +277,11 @@ impl Setup {
                 "{structure} builds over a copy of them, 12 bytes per particle and more; lbvh and kdtree do not"
             ));
         }
+        if self.has_motion() {
+            return Some(
+                "motion blur moves a copy of them, 40 bytes per particle and more".to_owned(),
+            );
+        }
         if self.focused_particle().is_some() {
             return Some("camera.focus searches for a particle in a copy of them".to_owned());
         }
@@ -248,6 +296,18 @@ impl Setup {
             _ => return None,
         };
         Some(why.to_owned())
+    }
+
+    /// Whether there is motion blur.
+    pub(super) const fn has_motion(&self) -> bool {
+        self.picture.shutter.is_some()
+    }
+
+    /// Whether particles move to their places in the next frame, which is read too.
+    pub(super) fn moves_to_next_frame(&self) -> bool {
+        self.picture
+            .shutter
+            .is_some_and(|shutter| !shutter.has_velocities)
     }
 
     /// The id of the particle in focus.

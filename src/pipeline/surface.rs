@@ -4,11 +4,14 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use glam::Vec3;
 use spherule_formats::Radius;
 
 use super::decoded::DecodedFrame;
 use super::meshes::PictureMesh;
+use super::motion::expose;
 use super::setup::Setup;
+use crate::accel::moving::MovingTree;
 use crate::accel::view::TreeView;
 use crate::accel::{BuildReport, BuildSettings, SphereRadius, Spheres, Structure, TreeBuilder};
 use crate::metrics::MemoryUse;
@@ -17,13 +20,21 @@ use crate::render::{Film, RayCounts, RenderError, ShadeSource, Stop, render_into
 use crate::report::FrameReport;
 use crate::scene::Scene;
 use crate::surface::mesh::{MeshSurface, MeshTree};
-use crate::surface::smooth::{SmoothError, SmoothGrid, SmoothReport};
+use crate::surface::moving::MovingSpheres;
+use crate::surface::slices::SlicedSurface;
+use crate::surface::smooth::{SmoothError, SmoothGrid, SmoothReport, SmoothSurface};
 use crate::surface::spheres::SphereSurface;
 use crate::surface::spray::{DROP_RADIUS, spray_of};
 use crate::surface::union::UnionSurface;
 use crate::surface::{
     GradientNormals, MaterialId, NormalKind, PcaNormals, ShadingNormals, Shape, SurfaceKind,
     SurfaceSettings,
+};
+
+/// Input for a tree without spheres.
+const NOTHING: Spheres<'_> = Spheres {
+    centers: &[],
+    radius: SphereRadius::Common(1.0),
 };
 
 /// Radii with a smaller relative difference count as equal.
@@ -36,13 +47,20 @@ pub(super) struct SurfaceBuilder {
     spray: TreeBuilder,
     /// Number of particles in the body; those of the spray follow.
     body: u32,
-    smooth: SmoothGrid,
+    /// A smooth surface, for each slice of the exposure.
+    smooth: Vec<SmoothGrid>,
+    /// Trees of a union, for each slice of the exposure; empty without motion blur.
+    unions: Vec<TreeBuilder>,
+    /// By how far the spheres of the body move, until their moving tree is built.
+    displacements: Vec<Vec3>,
+    /// The spheres of the body and of the spray, with motion blur.
+    moving: [MovingTree; 2],
 }
 
 impl SurfaceBuilder {
     /// Builds the structures that `setup` requires before the tree of a frame is built, and adds their cost to
     /// `report`. Spray is removed from the body: its particles are moved to the end of the frame. The tree will be
-    /// built in `trees`. A smooth surface needs no tree, so no particles remain for one.
+    /// built in `trees`. Surfaces that need no tree leave no particles for one.
     ///
     /// # Errors
     /// [`SmoothError`] if a smooth surface does not fit.
@@ -55,28 +73,87 @@ impl SurfaceBuilder {
     ) -> Result<Vec<String>, SmoothError> {
         let start = Instant::now();
         self.clear();
-        // Separate the spray
-        if setup.picture.surface.spray {
-            let built = self.separate_spray(setup, frame, trees);
-            report.bytes.surface = built.position_bytes + built.structure_bytes;
+        // Separate the spray, and put all particles in the middle of the exposure
+        let has_spray = setup.picture.surface.spray;
+        if has_spray {
+            self.find_spray(setup, frame, trees);
         }
-        // Build the grid of a smooth surface
+        if let Some(shutter) = setup.picture.shutter {
+            self.displacements = expose(setup, shutter, frame);
+        }
+        if has_spray {
+            let built = self.build_spray(frame);
+            report.bytes.surface = built.position_bytes + built.structure_bytes;
+            report.bytes.surface += self.moving[1].byte_len();
+        }
+        // Build a surface that is not made of single spheres
         let mut notes = Vec::new();
-        if setup.picture.surface.kind == SurfaceKind::Smooth {
+        let kind = setup.picture.surface.kind;
+        if kind == SurfaceKind::Smooth {
             let made = self.build_smooth(setup, frame, &mut notes)?;
             report.bytes.surface += made.bytes;
             report.bytes.surface_peak = report.bytes.surface + made.peak_bytes - made.bytes;
+        }
+        let has_unions = kind == SurfaceKind::Union && setup.has_motion();
+        if has_unions {
+            report.bytes.surface += self.build_unions(setup, frame);
+        }
+        if kind == SurfaceKind::Smooth || has_unions {
             frame.centers = Vec::new();
             frame.radius = Radius::Common(setup.picture.least_radius);
+            self.displacements = Vec::new();
         }
         report.seconds.surface = start.elapsed().as_secs_f64();
         Ok(notes)
     }
 
+    /// Replaces the tree of the body, which was just built in `trees`, by one whose spheres move, with motion blur.
+    pub(super) fn set_in_motion(&mut self, trees: &mut TreeBuilder, report: &mut FrameReport) {
+        if self.displacements.is_empty() {
+            return;
+        }
+        let start = Instant::now();
+        self.moving[0].build(&trees.tree().view(), &self.displacements);
+        self.displacements = Vec::new();
+        *trees = TreeBuilder::new();
+        report.bytes.surface += self.moving[0].byte_len();
+        report.seconds.surface += start.elapsed().as_secs_f64();
+    }
+
+    /// The centres of the body at the middle of each slice of the exposure; without motion blur, as they are.
+    fn slices(&self, setup: &Setup) -> Vec<f32> {
+        match setup.picture.shutter {
+            Some(shutter) => SlicedSurface::<SmoothSurface<'_>>::times(shutter.slices).collect(),
+            None => vec![0.0],
+        }
+    }
+
+    /// Moves the particles of `frame` from the time `from` of the exposure to the time `to`.
+    fn move_body(&self, frame: &mut DecodedFrame, from: f32, to: f32) {
+        for (center, displacement) in frame.centers.iter_mut().zip(&self.displacements) {
+            *center += (to - from) * *displacement;
+        }
+    }
+
+    /// Builds a tree for each slice of the exposure, and returns their memory in bytes.
+    fn build_unions(&mut self, setup: &Setup, frame: &mut DecodedFrame) -> u64 {
+        let settings = setup.build_settings(frame.centers.len(), frame.shading.has_colors());
+        let (mut bytes, mut now) = (0, 0.0);
+        for time in self.slices(setup) {
+            self.move_body(frame, now, time);
+            now = time;
+            let mut trees = TreeBuilder::new();
+            let built = trees.build(&spheres(frame), &settings);
+            bytes += built.position_bytes + built.structure_bytes;
+            self.unions.push(trees);
+        }
+        bytes
+    }
+
     fn build_smooth(
         &mut self,
         setup: &Setup,
-        frame: &DecodedFrame,
+        frame: &mut DecodedFrame,
         notes: &mut Vec<String>,
     ) -> Result<SmoothReport, SmoothError> {
         let radius = match &frame.radius {
@@ -87,10 +164,23 @@ impl SurfaceBuilder {
         let is_colored = setup.picture.color.is_by_particle();
         // Keep the particles if attributes are looked up at points of the surface
         let keep = channels.needs_particles() || is_colored;
-        let left = memory_left(setup.run.memory_limit);
-        let made = self
-            .smooth
-            .build(&frame.centers, radius, &setup.picture.surface, keep, left)?;
+        let settings = &setup.picture.surface;
+        let mut sum = SmoothReport::default();
+        let mut now = 0.0;
+        for time in self.slices(setup) {
+            self.move_body(frame, now, time);
+            now = time;
+            let mut grid = SmoothGrid::default();
+            let left = memory_left(setup.run.memory_limit);
+            let made = grid.build(&frame.centers, radius, settings, keep, left)?;
+            self.smooth.push(grid);
+            sum = SmoothReport {
+                bytes: sum.bytes + made.bytes,
+                peak_bytes: sum.peak_bytes.max(sum.bytes + made.peak_bytes),
+                ..made
+            };
+        }
+        let made = sum;
         // Note what the user may not expect
         if made.left_out > 0 {
             notes.push(format!(
@@ -110,27 +200,26 @@ impl SurfaceBuilder {
 
     /// Releases everything of the previous frame.
     pub(super) fn clear(&mut self) {
-        let nothing = Spheres {
-            centers: &[],
-            radius: SphereRadius::Common(1.0),
+        self.spray.build(&NOTHING, &BuildSettings::default());
+        *self = Self {
+            spray: std::mem::take(&mut self.spray),
+            body: u32::MAX,
+            ..Self::default()
         };
-        self.spray.build(&nothing, &BuildSettings::default());
-        self.body = u32::MAX;
-        self.smooth = SmoothGrid::default();
     }
 
-    fn separate_spray(
-        &mut self,
-        setup: &Setup,
-        frame: &mut DecodedFrame,
-        trees: &mut TreeBuilder,
-    ) -> BuildReport {
-        // Find the spray in the tree that is fastest to build; the result does not depend on the structure
+    /// Moves the particles of the spray behind those of the body.
+    fn find_spray(&mut self, setup: &Setup, frame: &mut DecodedFrame, trees: &mut TreeBuilder) {
+        // Use the tree that is fastest to build; the result does not depend on the structure
         trees.build(&spheres(frame), &BuildSettings::new(Structure::Lbvh));
         let spray = spray_of(&trees.tree().view(), support(&setup.picture.surface));
         let body = frame.move_to_end(&spray, setup.picture.render.channels.needs_ids());
         self.body = u32::try_from(body).unwrap_or(u32::MAX);
-        // Build the tree of the drops
+    }
+
+    /// Builds the tree of the drops, and leaves only the body in `frame`.
+    fn build_spray(&mut self, frame: &mut DecodedFrame) -> BuildReport {
+        let body = frame.centers.len().min(self.body as usize);
         let drops = match &frame.radius {
             Radius::Common(radius) => Radius::Common(DROP_RADIUS * radius),
             Radius::PerParticle(radii) => {
@@ -141,9 +230,17 @@ impl SurfaceBuilder {
             centers: &frame.centers[body..],
             radius: radius_of(&drops),
         };
-        let built = self.spray.build(&built, &BuildSettings::default());
-        // Keep only the body in the frame
+        let is_moving = !self.displacements.is_empty();
+        let settings = BuildSettings {
+            keep_indices: is_moving,
+            ..BuildSettings::default()
+        };
+        let built = self.spray.build(&built, &settings);
+        if is_moving {
+            self.moving[1].build(&self.spray.tree().view(), &self.displacements[body..]);
+        }
         frame.centers.truncate(body);
+        self.displacements.truncate(body);
         if let Radius::PerParticle(radii) = &mut frame.radius {
             radii.truncate(body);
         }
@@ -168,20 +265,45 @@ impl SurfaceBuilder {
         film: &mut Film,
         stop: &dyn Stop,
     ) -> Result<RayCounts, RenderError> {
-        let normals = shading_normals(&setup.picture.surface);
-        let body: Box<dyn Shape + '_> = match setup.picture.surface.kind {
-            SurfaceKind::Spheres => Box::new(SphereSurface::new(tree).with_normals(normals)),
-            SurfaceKind::Union => Box::new(UnionSurface::new(tree).with_normals(normals)),
-            SurfaceKind::Smooth => Box::new(self.smooth.surface()),
+        let body = self.body(setup, tree);
+        let spray: Box<dyn Shape> = match setup.has_motion() {
+            true => Box::new(MovingSpheres::new(&self.moving[1]).of(MaterialId::SPRAY, self.body)),
+            false => {
+                let spray = SphereSurface::new(self.spray.tree().view());
+                Box::new(spray.of(MaterialId::SPRAY, self.body))
+            }
         };
-        let spray = SphereSurface::new(self.spray.tree().view()).of(MaterialId::SPRAY, self.body);
         let mut shapes: Vec<&dyn Shape> = vec![&*body];
         if !self.spray.tree().view().is_empty() {
-            shapes.push(&spray);
+            shapes.push(&*spray);
         }
         let meshes: Vec<MeshSurface<'_>> = mesh_surfaces(&setup.picture.meshes, meshes).collect();
         shapes.extend(meshes.iter().map(|mesh| mesh as &dyn Shape));
         render_into(film, &shapes, scene, source, &setup.picture.render, stop)
+    }
+}
+
+impl SurfaceBuilder {
+    /// The surface of the body, over the spheres of `tree` unless it has its own structures.
+    fn body<'a>(&'a self, setup: &Setup, tree: TreeView<'a>) -> Box<dyn Shape + 'a> {
+        let normals = shading_normals(&setup.picture.surface);
+        let union = |tree| UnionSurface::new(tree).with_normals(normals);
+        match (setup.picture.surface.kind, setup.has_motion()) {
+            (SurfaceKind::Spheres, false) => {
+                Box::new(SphereSurface::new(tree).with_normals(normals))
+            }
+            (SurfaceKind::Spheres, true) => Box::new(MovingSpheres::new(&self.moving[0])),
+            (SurfaceKind::Union, false) => Box::new(union(tree)),
+            (SurfaceKind::Union, true) => {
+                let trees = self.unions.iter().map(|trees| union(trees.tree().view()));
+                Box::new(SlicedSurface::new(trees.collect(), false))
+            }
+            (SurfaceKind::Smooth, false) => Box::new(self.smooth[0].surface()),
+            (SurfaceKind::Smooth, true) => {
+                let surfaces = self.smooth.iter().map(SmoothGrid::surface);
+                Box::new(SlicedSurface::new(surfaces.collect(), true))
+            }
+        }
     }
 }
 

@@ -52,6 +52,7 @@ impl FrameRenderer for CpuRenderer {
                     .surface
                     .build(setup, &mut decoded, &mut self.builder, &mut report)?;
                 report.set_build(&self.build_copy(setup, &decoded));
+                self.surface.set_in_motion(&mut self.builder, &mut report);
                 report.bytes.attributes = decoded.shading.byte_len();
                 BuiltParticles::Decoded(decoded.shading)
             }

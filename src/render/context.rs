@@ -35,6 +35,8 @@ pub(super) struct RenderContext<'a> {
     pub(super) camera: CameraLanes,
     /// The camera of the next frame, and the time until then.
     pub(super) next_frame: Option<(CameraLanes, f32)>,
+    /// The camera when the shutter opens and when it closes, with motion blur.
+    pub(super) exposure: Option<[CameraLanes; 2]>,
     pub(super) background: BackgroundLanes,
     pub(super) lights: Vec<Box<dyn Light>>,
     /// Base colour of all particles, if they share one.
@@ -110,6 +112,8 @@ impl<'a> RenderContext<'a> {
             camera: CameraLanes::new(&scene.camera, width, height),
             next_frame: (scene.next_frame.as_ref())
                 .map(|next| (CameraLanes::new(&next.camera, width, height), next.time)),
+            exposure: (scene.exposure)
+                .map(|cameras| cameras.map(|camera| CameraLanes::new(&camera, width, height))),
             background: BackgroundLanes::from(&scene.background),
             lights: scene.lights.iter().map(light_of).collect(),
             color: source.constant_color(),
@@ -137,11 +141,11 @@ impl<'a> RenderContext<'a> {
         ground.is_some_and(|ground| ground.shadow_catcher.is_some())
     }
 
-    /// The coherence of a packet at `depth`. Camera rays from a lens have no common origin, so beams around them are
-    /// wide.
+    /// The coherence of a packet at `depth`. Camera rays from a lens or from a camera in motion have no common origin,
+    /// so beams around them are wide.
     pub(super) const fn coherence(&self, depth: u32) -> Coherence {
         match depth {
-            1 if !self.camera.has_lens() => Coherence::Coherent,
+            1 if !self.camera.has_lens() && self.exposure.is_none() => Coherence::Coherent,
             _ => Coherence::Incoherent,
         }
     }

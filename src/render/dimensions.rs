@@ -17,5 +17,6 @@ pub(super) const LIGHTS: u32 = 4;
 
 /// Dimension of a path segment: the choice between passing panes and being reflected. It is beyond those of lights.
 pub(super) const PANE: u32 = u32::MAX;
-/// Dimensions of a camera ray: its point on the lens.
+/// Dimensions of a camera ray: its point on the lens, and its time.
 pub(super) const LENS: u32 = 0;
+pub(super) const TIME: u32 = 1;

@@ -3,12 +3,12 @@
 use super::{
     aov::DataSample,
     context::{Interior, RenderContext},
-    dimensions::{CAMERA, LENS},
+    dimensions::{CAMERA, LENS, TIME},
     film::FilmTile,
-    sampler::{PathSeed, get_2d_lanes},
+    sampler::{PathSeed, get_1d_lanes, get_2d_lanes},
     scratch::{Pixel, SampleGroup},
     settings::RenderSettings,
-    shading::{camera_rays, lens_rays},
+    shading::{camera_rays, lens_rays, moving_camera_rays},
     stream::SegmentPacket,
     tile::mosaic_start,
 };
@@ -69,13 +69,20 @@ impl RenderContext<'_> {
     ) {
         // Generate the rays
         let [x, y] = &group.film[number];
-        camera_rays(self.simd, &self.camera, x, y, &mut segments.rays);
         let first = number * LANES;
         let len = LANES.min(group.len - first);
-        segments.rays.set_len(len);
+        let (simd, rays) = (self.simd, &mut segments.rays);
+        match &self.exposure {
+            None => camera_rays(simd, &self.camera, x, y, rays),
+            Some([open, close]) => {
+                self.sample_times(group, first, len, &mut rays.time);
+                moving_camera_rays(simd, open, close, x, y, rays);
+            }
+        }
+        rays.set_len(len);
         if self.camera.has_lens() {
             let u = self.lens_samples(group, first, len);
-            lens_rays(self.simd, &self.camera, &u, &mut segments.rays);
+            lens_rays(simd, &self.camera, &u, rays);
         }
         // Initialise their path state
         segments.throughput = [splat(1.0); 3];
@@ -95,6 +102,29 @@ impl RenderContext<'_> {
 
     /// Points in the unit square for the lens, of the `len` samples of `group` from `first` on.
     fn lens_samples(&self, group: &SampleGroup, first: usize, len: usize) -> [Lanes; 2] {
+        let (seeds, sample) = self.camera_seeds(group, first, len);
+        let mut u = [splat(0.0); 2];
+        get_2d_lanes(self.simd, &seeds, LENS, &sample, &mut u);
+        u
+    }
+
+    /// Times of the `len` samples of `group` from `first` on, while the shutter is open.
+    fn sample_times(&self, group: &SampleGroup, first: usize, len: usize, time: &mut Lanes) {
+        let (seeds, sample) = self.camera_seeds(group, first, len);
+        get_1d_lanes(self.simd, &seeds, TIME, &sample, time);
+        for time in time {
+            *time -= 0.5;
+        }
+    }
+
+    /// Seeds of the random numbers of camera rays, and the numbers of their samples in the pixels, for the `len`
+    /// samples of `group` from `first` on.
+    fn camera_seeds(
+        &self,
+        group: &SampleGroup,
+        first: usize,
+        len: usize,
+    ) -> ([PathSeed; LANES], [u32; LANES]) {
         let samples = self.settings.samples as usize;
         let (mut seeds, mut sample) = ([PathSeed::default(); LANES], [0; LANES]);
         for lane in 0..len {
@@ -104,9 +134,7 @@ impl RenderContext<'_> {
             let index = (number % samples) as u32;
             sample[lane] = index;
         }
-        let mut u = [splat(0.0); 2];
-        get_2d_lanes(self.simd, &seeds, LENS, &sample, &mut u);
-        u
+        (seeds, sample)
     }
 
     /// Lanes of the camera rays that start inside a connected body.

@@ -65,6 +65,8 @@ mod image_tests;
 #[cfg(test)]
 mod lens_tests;
 #[cfg(test)]
+mod motion_tests;
+#[cfg(test)]
 mod panes_tests;
 #[cfg(test)]
 mod path_tests;

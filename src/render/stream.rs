@@ -140,6 +140,7 @@ impl RayStream {
                 segment.rays.direction[axis][to] = rays.direction[axis][lane];
                 segment.throughput[axis][to] = rays.throughput[axis][lane];
             }
+            segment.rays.time[to] = parents.rays.time[lane];
             segment.pdf[to] = rays.pdf[lane];
             segment.bounces[to] = parents.bounces[lane] + u32::from(branch == BOUNCED);
             segment.sample[to] = parents.sample[lane];

@@ -36,6 +36,7 @@ impl RenderContext<'_> {
         counts: &mut RayCounts,
     ) -> u32 {
         samples.rays.set_len(segments.rays.len());
+        samples.rays.time = segments.rays.time;
         counts.shadow += u64::from(samples.lanes.count_ones());
         let coherence = self.coherence(depth);
 
@@ -89,6 +90,7 @@ impl RenderContext<'_> {
         counts: &mut RayCounts,
     ) -> u32 {
         samples.rays.set_len(segments.rays.len());
+        samples.rays.time = segments.rays.time;
         counts.shadow += u64::from(samples.lanes.count_ones());
         self.occlude(self.coherence(depth), samples, |_| true);
         self.attenuate_by_panes(samples);

@@ -94,29 +94,38 @@ pub(super) fn frame_step(
         return Ok(None);
     }
     let unsupported = |what: String| ResolveError::Unsupported { key: KEY, what };
-    let is_velocity = |(name, components): (&String, &usize)| {
-        *components == 3
-            && names::VELOCITY
-                .iter()
-                .any(|known| name.eq_ignore_ascii_case(known))
-    };
-    let mut attributes = survey.attributes.iter().zip(&survey.components);
-    if survey.most_particles > 0 && !attributes.any(is_velocity) {
+    if survey.most_particles > 0 && !has_velocities(survey) {
         return Err(unsupported(format!(
             "motion needs velocities, and the sampled frames have none; available: {}",
             attribute_list(survey.attributes.iter().map(String::as_str))
         )));
     }
+    let step = step_to_next(output, survey);
+    let step = step.ok_or_else(|| unsupported(format!("motion needs {UNKNOWN_STEP}")))?;
+    Ok(Some(step))
+}
+
+/// What is needed if the step to the next frame is unknown.
+pub(super) const UNKNOWN_STEP: &str =
+    "the time between frames, which the files do not contain; set output.frame_time";
+
+/// The step to the next frame, if the time until then is known.
+pub(super) fn step_to_next(output: &Output, survey: &Survey) -> Option<FrameStep> {
     let time = output.frame_time.or(survey.frame_time);
-    let Some(time) = time.or_else(|| output.fps.map(f64::recip)) else {
-        return Err(unsupported(
-            "motion needs the time between frames, which the files do not contain; set output.frame_time".to_owned(),
-        ));
-    };
-    Ok(Some(FrameStep {
+    let time = time.or_else(|| output.fps.map(f64::recip))?;
+    Some(FrameStep {
         time: narrow(time),
         numbers: survey.frame_numbers.unwrap_or(1),
-    }))
+    })
+}
+
+/// Whether the frames have velocities.
+pub(super) fn has_velocities(survey: &Survey) -> bool {
+    let mut attributes = survey.attributes.iter().zip(&survey.components);
+    attributes.any(|(name, components)| {
+        let is_velocity = |known: &&str| name.eq_ignore_ascii_case(known);
+        *components == 3 && names::VELOCITY.iter().any(|known| is_velocity(&known))
+    })
 }
 
 /// The names of the planes of `attributes` in a file.

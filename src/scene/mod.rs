@@ -94,6 +94,8 @@ pub struct Scene {
     pub is_environment_visible: bool,
     /// The next frame, for motion on the film.
     pub next_frame: Option<NextFrame>,
+    /// The camera when the shutter opens and when it closes, with motion blur.
+    pub exposure: Option<[Camera; 2]>,
 }
 
 /// Where things are in the next frame.
@@ -120,6 +122,7 @@ impl Scene {
             environment: None,
             is_environment_visible: false,
             next_frame: None,
+            exposure: None,
         }
     }
 }

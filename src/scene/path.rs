@@ -58,10 +58,15 @@ impl CameraPath {
     /// The view at `frame`. It may be invalid (up parallel to the view, for example), which [`super::Camera::new`]
     /// reports.
     pub fn view(&self, frame: i64) -> CameraView {
+        self.view_between(frame, 0.0)
+    }
+
+    /// The view `after` frames after `frame`; `after` is a fraction of a frame, or negative.
+    pub fn view_between(&self, frame: i64, after: f64) -> CameraView {
         match self {
             Self::Still(view) => *view,
-            Self::Turntable(turntable) => turntable.view(frame),
-            Self::Keys(keys) => keys.view(frame),
+            Self::Turntable(turntable) => turntable.view(frame, after),
+            Self::Keys(keys) => keys.view(frame, after),
         }
     }
 
@@ -70,7 +75,7 @@ impl CameraPath {
     pub fn start(&self) -> CameraView {
         match self {
             Self::Still(view) => *view,
-            Self::Turntable(turntable) => turntable.view(0),
+            Self::Turntable(turntable) => turntable.view(0, 0.0),
             Self::Keys(keys) => keys.keys()[0].view,
         }
     }

@@ -249,7 +249,7 @@ fn intersections_body(
 }
 
 lane_kernel! {
-    fn intersections(
+    pub(super) fn intersections(
         rays: &RayPacket,
         t: &Lanes,
         centers: &Lanes3,

@@ -5,7 +5,7 @@ use std::fs;
 use glam::{DVec3, Mat4, Vec3};
 use serde_json::{Value, json};
 
-use crate::harness::{SMALL, Workshop, images, npy};
+use crate::harness::{SMALL, Workshop, dam_break, images, npy};
 use crate::picture::{Picture, world_to_camera};
 
 /// Keys out of order, for frames 2 to 6: up by 8, with the sight narrowing.
@@ -311,4 +311,124 @@ fn focus_follows_a_particle_through_the_frames() {
     let ran = render("none", "{ particle = 3 }").expect(1);
     let errors = ran.errors();
     assert!(errors.contains("no particle has the id 3"), "{errors}");
+}
+
+#[test]
+fn motion_blur_moves_particles_with_their_velocities() {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 3..=4);
+    let blur = [
+        "--set",
+        "camera.shutter=0.5",
+        "--set",
+        "output.frame_time=0.1",
+    ];
+    let render = |out: &str, options: &[&str]| {
+        let output = format!("{out}/f.####.exr");
+        let all = [
+            &["render", "in", "-o", output.as_str()][..],
+            &SMALL,
+            options,
+        ];
+        workshop.run(&all.concat()).expect(0);
+        fs::read(workshop.join(out).join(image(3))).expect("an image")
+    };
+    for surface in ["spheres", "union", "smooth"] {
+        let name = |what: &str| format!("{surface}-{what}");
+        let of_surface = ["--surface", surface, "--set", "camera.shutter_slices=3"];
+        let sharp = render(&name("sharp"), &of_surface);
+        let blur = [&blur[..], &of_surface].concat();
+        let blurred = render(&name("blurred"), &[&blur[..], &["--threads", "1"]].concat());
+        assert_ne!(sharp, blurred, "{surface}");
+        let options = ["--threads", "3", "--accelerator", "sbvh"];
+        let other = render(&name("threads"), &[&blur[..], &options].concat());
+        assert!(blurred == other, "{surface}");
+        // The shutter may be open before or after the frame
+        let after = ["--set", "camera.shutter_offset=0"];
+        assert_ne!(
+            blurred,
+            render(&name("after"), &[&blur[..], &after].concat())
+        );
+    }
+    // Spray moves, too
+    let spray = ["--surface", "smooth", "--spray"];
+    let moving = render("spray-blurred", &[&blur[..], &spray].concat());
+    assert_ne!(moving, render("spray-sharp", &spray));
+}
+
+#[test]
+fn motion_blur_without_velocities_takes_the_next_frame() {
+    let workshop = Workshop::new();
+    // A ball moves by 0.4 to the right, another one returns on the other side of a periodic box
+    let frames = [("-0.2", "0.95"), ("0.2", "-0.95")];
+    for (number, (x, periodic)) in (1..).zip(frames) {
+        let rows = [format!("7 {x} 0 0"), format!("8 {periodic} 0.5 0")];
+        let rows = if number == 1 {
+            rows
+        } else {
+            [rows[1].clone(), rows[0].clone()]
+        };
+        let text = format!("2\nProperties=id:I:1:pos:R:3\n{}\n", rows.join("\n"));
+        fs::write(workshop.join(format!("f_{number}.xyz")), text).expect("a file");
+    }
+    let camera = [
+        "--set",
+        "camera.eye=[0,0,2]",
+        "--set",
+        "camera.look_at=[0,0,0]",
+        "--set",
+        "camera.up=[0,1,0]",
+        "--radius",
+        "0.1",
+        "--ground=none",
+        "--set",
+        "output.transparent=true",
+    ];
+    let shutter = [
+        "--set",
+        "camera.shutter=1",
+        "--set",
+        "camera.shutter_offset=0",
+    ];
+    let output = ["render", "f_*.xyz", "-o", "out/f.####.exr"];
+    let all = [&output[..], &SMALL, &camera, &shutter];
+    workshop.run(&all.concat()).expect(0);
+    // Both images show the same way, once from its start and once to its end and beyond
+    let alpha = |number: usize| {
+        let picture = Picture::open(&workshop.join("out").join(image(number)));
+        let [width, height] = [picture.width, picture.height];
+        let plane = picture.floats("A").to_vec();
+        let row = |y: usize| plane[y * width..][..width].to_vec();
+        (row(height / 2), width)
+    };
+    let (first, width) = alpha(1);
+    let (second, _) = alpha(2);
+    let covered = |row: &[f32]| row.iter().filter(|a| **a > 0.05).count();
+    let center = |row: &[f32]| {
+        let sum: f32 = row.iter().sum();
+        let moment: f32 = (0..).zip(row).map(|(x, a)| x as f32 * a).sum();
+        moment / sum
+    };
+    assert!(covered(&first) > width / 20, "{first:?}");
+    // From -0.2 to 0.2 the middle is 0, from 0.2 to 0.6 it is 0.4
+    assert!((center(&first) - 0.5 * width as f32).abs() < 1.5);
+    assert!(center(&second) > center(&first) + 2.0);
+    // There must be ids or velocities
+    npy(&workshop.join("still/f_1.npy"), 200, 1, Vec3::ZERO);
+    let checks: [(&[&str], &str); 3] = [
+        (&["check", "still"], "motion blur needs velocities, or ids"),
+        (
+            &["check", "f_*.xyz", "--set", "job.follow=true"],
+            "job.follow",
+        ),
+        (
+            &["check", "f_*.xyz", "--set", "render.normals=\"pca\""],
+            "render.normals",
+        ),
+    ];
+    for (arguments, what) in checks {
+        let ran = workshop.run(&[arguments, &shutter].concat());
+        let errors = ran.expect(2).errors();
+        assert!(errors.contains(what), "{errors}");
+    }
 }

@@ -102,6 +102,47 @@ lane_kernel! {
     pub(in crate::render) fn camera_rays(camera: &CameraLanes, x: &Lanes, y: &Lanes, rays: &mut RayPacket) = camera_rays_body;
 }
 
+/// [`camera_rays`] of a camera that moves from `open`, at time -1/2, to `close`, at time 1/2: linearly, each ray at its
+/// own time.
+#[inline(always)]
+fn moving_camera_rays_body(
+    open: &CameraLanes,
+    close: &CameraLanes,
+    x: &Lanes,
+    y: &Lanes,
+    rays: &mut RayPacket,
+) {
+    for l in 0..LANES {
+        let end = rays.time[l] + 0.5;
+        let mut d = [0.0; 3];
+        for (camera, part) in [(open, 1.0 - end), (close, end)] {
+            let (r, u, f) = (camera.right, camera.up, camera.forward);
+            let a = (2.0 * (x[l] / camera.size[0]) - 1.0) * camera.half_extent[0];
+            let b = (1.0 - 2.0 * (y[l] / camera.size[1])) * camera.half_extent[1];
+            for axis in 0..3 {
+                d[axis] += part * (f[axis] + a * r[axis] + b * u[axis]);
+            }
+        }
+        let inverse = 1.0 / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+        for axis in 0..3 {
+            rays.direction[axis][l] = d[axis] * inverse;
+            rays.origin[axis][l] = open.eye[axis] + end * (close.eye[axis] - open.eye[axis]);
+        }
+        rays.t_min[l] = 0.0;
+        rays.t_max[l] = f32::INFINITY;
+    }
+}
+
+lane_kernel! {
+    pub(in crate::render) fn moving_camera_rays(
+        open: &CameraLanes,
+        close: &CameraLanes,
+        x: &Lanes,
+        y: &Lanes,
+        rays: &mut RayPacket,
+    ) = moving_camera_rays_body;
+}
+
 /// Moves the origins of `rays`, camera rays through the centre of the lens, to the points of the lens that `u` in the
 /// unit square chooses. The rays still pass through the same points of the plane in focus.
 #[inline(always)]

@@ -67,12 +67,19 @@ impl KeyedPath {
         Some([from.frame, self.keys.get(next)?.frame])
     }
 
-    pub(super) fn view(&self, frame: i64) -> CameraView {
+    /// The view `after` frames after `frame`.
+    pub(super) fn view(&self, frame: i64, after: f64) -> CameraView {
+        // Divide the time into a frame and a fraction of the time to the next one
+        let whole = after.floor();
+        #[expect(clippy::cast_possible_truncation, reason = "the conversion saturates")]
+        let frame = frame.saturating_add(whole as i64);
+        let part = after - whole;
         match self.find(frame) {
-            Ok(at) => self.keys[at].view,
+            Ok(at) if part == 0.0 || at + 1 == self.keys.len() => self.keys[at].view,
+            Ok(at) => Segment::new(&self.keys, at).view(frame, part),
             Err(0) => self.keys[0].view,
             Err(end) if end == self.keys.len() => self.keys[end - 1].view,
-            Err(next) => Segment::new(&self.keys, next - 1).view(frame),
+            Err(next) => Segment::new(&self.keys, next - 1).view(frame, part),
         }
     }
 
@@ -116,8 +123,10 @@ impl<'a> Segment<'a> {
         }
     }
 
-    fn view(&self, frame: i64) -> CameraView {
-        let t = gap(self.from.frame, frame) / gap(self.from.frame, self.to.frame);
+    /// The view a `part` of a frame after `frame`.
+    fn view(&self, frame: i64, part: f64) -> CameraView {
+        let since = gap(self.from.frame, frame) + part;
+        let t = since / gap(self.from.frame, self.to.frame);
         let point = |of: fn(&CameraView) -> DVec3| {
             DVec3::new(
                 self.value(t, |view| of(view).x),

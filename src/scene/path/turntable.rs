@@ -32,9 +32,11 @@ impl Turntable {
         }
     }
 
-    pub(super) fn view(&self, frame: i64) -> CameraView {
+    /// The view `after` frames after `frame`.
+    pub(super) fn view(&self, frame: i64, after: f64) -> CameraView {
         let Framing { up, elevation, .. } = self.framing;
-        let azimuth = self.framing.azimuth + rotation_at(self.degrees_per_frame, frame);
+        let rotation = rotation_at(self.degrees_per_frame, frame) + self.degrees_per_frame * after;
+        let azimuth = self.framing.azimuth + rotation;
         CameraView {
             eye: self.look_at - self.distance * view_direction(up, azimuth, elevation),
             look_at: self.look_at,

@@ -1,0 +1,138 @@
+//! The motion of particles while the shutter is open: from their velocities, or from their places in the next frame.
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+use spherule_formats::ParticleFrame;
+use spherule_formats::order::index_u32;
+use spherule_formats::sequence::Sequence;
+
+use super::ImageTask;
+use super::decoded::{DecodedFrame, ids};
+use super::load_error::{LoadError, missing};
+use super::setup::{Setup, Shutter};
+use crate::accel::moving::bounded;
+
+/// Moves the particles of `frame` to their places in the middle of the exposure. Returns by how far each of them moves
+/// from the opening of the shutter to its closing. Takes the velocities of the frame unless a channel needs them.
+pub(super) fn expose(setup: &Setup, shutter: Shutter, frame: &mut DecodedFrame) -> Vec<Vec3> {
+    let velocities = match setup.picture.render.channels.needs_velocities() {
+        true => frame.shading.velocities.clone(),
+        false => frame.shading.velocities.take(),
+    };
+    // An empty frame has none
+    let mut displacements = velocities.unwrap_or_default();
+    displacements.resize(frame.centers.len(), Vec3::ZERO);
+    let time = f64::from(shutter.step.time);
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "lengths of a scene are f32"
+    )]
+    let [middle, length] = [
+        (0.5 * (shutter.open + shutter.close) * time) as f32,
+        ((shutter.close - shutter.open) * time) as f32,
+    ];
+    let centers = frame.centers.par_iter_mut();
+    centers
+        .zip(displacements.par_iter_mut())
+        .for_each(|(center, velocity)| {
+            *center += bounded(middle * *velocity);
+            *velocity = bounded(length * *velocity);
+        });
+    displacements
+}
+
+/// The velocities that take the particles of `frame`, which was read for `task`, to their places in the next frame;
+/// in the last frame, from their places in the one before. Particles that are only in one of the frames, and those that
+/// leave a periodic box on one side and return on the other, have none.
+///
+/// # Errors
+/// The other frame cannot be read, or one of them has no ids.
+pub(super) fn velocities_to_next(
+    setup: &Setup,
+    shutter: Shutter,
+    sequence: &Sequence,
+    task: &ImageTask,
+    frame: &ParticleFrame,
+) -> Result<Vec<Vec3>, LoadError> {
+    // Read the other frame
+    let is_last = task.index + 1 >= sequence.frames().len();
+    let other_index = match (is_last, task.index) {
+        (false, index) => index + 1,
+        (true, 0) => return Ok(vec![Vec3::ZERO; frame.positions.len()]),
+        (true, index) => index - 1,
+    };
+    let loaded = sequence.load_measured(other_index);
+    let loaded = loaded.map_err(LoadError::Frame)?;
+    let other = ParticleFrame::from_raw(loaded.particles, setup.picture.origin);
+    // Determine the time between the frames; files know it best
+    let known = frame.time.zip(other.time).map(|(a, b)| b - a);
+    let usual = match is_last {
+        true => -f64::from(shutter.step.time),
+        false => f64::from(shutter.step.time),
+    };
+    let time = known.filter(|time| *time != 0.0).unwrap_or(usual);
+    // Find each particle there
+    let ids_of = |frame: &ParticleFrame, index: usize| match ids(frame) {
+        None if !frame.is_empty() => {
+            let inputs = sequence.inputs(index);
+            let file = inputs
+                .first()
+                .map_or_else(String::new, |p| p.display().to_string());
+            let has = frame.attributes.iter().map(|a| a.name.as_str());
+            Err(missing("id", "motion blur without velocities", &file, has))
+        }
+        ids => Ok(ids.unwrap_or_default()),
+    };
+    let (own, others) = (ids_of(frame, task.index)?, ids_of(&other, other_index)?);
+    let places = Places::new(&others);
+    let half_extent = 0.5 * extent(&frame.positions);
+    let velocity = |(place, id): (usize, &u32)| {
+        let Some(at) = places.find(place, *id) else {
+            return Vec3::ZERO;
+        };
+        let way = other.positions[at].as_dvec3() - frame.positions[place].as_dvec3();
+        match way.abs().cmple(half_extent).all() {
+            true => (way / time).as_vec3(),
+            false => Vec3::ZERO,
+        }
+    };
+    Ok(own.par_iter().enumerate().map(velocity).collect())
+}
+
+/// Size of the box around `positions`; infinite along axes without extent.
+fn extent(positions: &[Vec3]) -> DVec3 {
+    let ends = positions.par_iter().map(|p| [*p, *p]).reduce(
+        || [Vec3::INFINITY, Vec3::NEG_INFINITY],
+        |a, b| [a[0].min(b[0]), a[1].max(b[1])],
+    );
+    let size = (ends[1] - ends[0]).as_dvec3();
+    DVec3::select(size.cmpgt(DVec3::ZERO), size, DVec3::INFINITY)
+}
+
+/// The places of particles by their ids.
+struct Places<'a> {
+    ids: &'a [u32],
+    /// Ids with their places, ascending.
+    sorted: Vec<(u32, u32)>,
+}
+
+impl<'a> Places<'a> {
+    fn new(ids: &'a [u32]) -> Self {
+        let mut sorted: Vec<(u32, u32)> = (0..index_u32(ids.len()))
+            .zip(ids)
+            .map(|(place, id)| (*id, place))
+            .collect();
+        sorted.par_sort_unstable();
+        Self { ids, sorted }
+    }
+
+    /// The place of the particle `id`; the first of several. Most files have the same order, so `guess` is tried first.
+    fn find(&self, guess: usize, id: u32) -> Option<usize> {
+        if self.ids.get(guess) == Some(&id) {
+            return Some(guess);
+        }
+        let first = self.sorted.partition_point(|(other, _)| *other < id);
+        let (found, place) = self.sorted.get(first)?;
+        (*found == id).then_some(*place as usize)
+    }
+}

@@ -1,0 +1,72 @@
+//! Motion blur: when the shutter is open, and where the motion of the particles comes from.
+
+use spherule_formats::names;
+
+use super::ResolveError;
+use super::channels::{UNKNOWN_STEP, has_velocities, step_to_next};
+use crate::manifest::Manifest;
+use crate::pipeline::{FrameStep, Shutter, attribute_list};
+use crate::surface::{NormalKind, SurfaceKind};
+use crate::survey::Survey;
+
+/// The shutter, if there is motion blur.
+///
+/// # Errors
+/// There are neither velocities nor ids, or the time between frames is unknown, or spheres have other normals than
+/// their own.
+pub(super) fn shutter(
+    manifest: &Manifest,
+    survey: &Survey,
+) -> Result<Option<Shutter>, ResolveError> {
+    let camera = &manifest.camera;
+    if camera.shutter == 0.0 {
+        return Ok(None);
+    }
+    let unsupported = |what: String| ResolveError::Unsupported {
+        key: "camera.shutter",
+        what,
+    };
+    let surface = &manifest.surface;
+    let has_own_normals = matches!(surface.normals, NormalKind::Auto | NormalKind::Sphere);
+    if surface.kind == SurfaceKind::Spheres && !has_own_normals {
+        return Err(unsupported(
+            "motion blur of spheres needs surface.normals = \"sphere\"".to_owned(),
+        ));
+    }
+    // Determine where the motion comes from
+    let is_id = |name: &String| {
+        names::ID
+            .iter()
+            .any(|known| name.eq_ignore_ascii_case(known))
+    };
+    let has_velocities = has_velocities(survey);
+    if survey.most_particles > 0 && !has_velocities && !survey.attributes.iter().any(is_id) {
+        return Err(unsupported(format!(
+            "motion blur needs velocities, or ids to find the particles in the next frame, and the sampled frames \
+             have neither; available: {}",
+            attribute_list(survey.attributes.iter().map(String::as_str))
+        )));
+    }
+    if manifest.job.follow && !has_velocities {
+        return Err(unsupported(
+            "motion blur without velocities needs the next frame, which is not there yet when job.follow is set; \
+             render the sequence when it is complete"
+                .to_owned(),
+        ));
+    }
+    // Without velocities, particles move from one frame to the next whatever the time is
+    let without_time = (!has_velocities).then(|| FrameStep {
+        time: 1.0,
+        numbers: survey.frame_numbers.unwrap_or(1),
+    });
+    let step = step_to_next(&manifest.output, survey).or(without_time);
+    let step = step.ok_or_else(|| unsupported(format!("motion blur needs {UNKNOWN_STEP}")))?;
+    let open = camera.shutter_offset.unwrap_or(-0.5 * camera.shutter);
+    Ok(Some(Shutter {
+        open,
+        close: open + camera.shutter,
+        step,
+        has_velocities,
+        slices: camera.shutter_slices,
+    }))
+}

@@ -1,0 +1,145 @@
+//! A surface that changes while the shutter is open, as one surface for each slice of the exposure.
+
+use super::shape::crossing_of_packet;
+use super::{Intersection, Intersections, Shape, Side};
+use crate::accel::Coherence;
+use crate::math::{first_lanes, lanes_in};
+use crate::ray::{Ray, RayPacket};
+
+/// Surfaces at the middles of equal slices of the exposure. A ray sees the surface of the slice that its time is in.
+#[derive(Debug, Clone)]
+pub struct SlicedSurface<S> {
+    slices: Vec<S>,
+    /// Whether the particle of an intersection has to be searched in its slice. It then has the number of the slice
+    /// in place of the particle.
+    is_searched: bool,
+}
+
+impl<S: Shape> SlicedSurface<S> {
+    /// One surface for each slice, in the order of time. `is_searched`: the surfaces have a [`Shape::particle_at`] and
+    /// a [`Shape::blend`] of their own.
+    ///
+    /// # Panics
+    /// If there are no slices.
+    pub fn new(slices: Vec<S>, is_searched: bool) -> Self {
+        assert!(!slices.is_empty(), "an exposure has at least one slice");
+        Self {
+            slices,
+            is_searched,
+        }
+    }
+
+    /// The times at the middles of `count` slices, from -1/2 to 1/2.
+    pub fn times(count: u32) -> impl Iterator<Item = f32> {
+        (0..count).map(move |slice| (slice as f32 + 0.5) / count as f32 - 0.5)
+    }
+
+    fn middle(&self) -> &S {
+        &self.slices[self.slice_at(0.0)]
+    }
+
+    /// The surface to search for the particle of `hit`, and the intersection with it.
+    fn searched(&self, hit: &Intersection) -> Option<(&S, Intersection)> {
+        let slice = self.slices.get(hit.particle as usize)?;
+        self.is_searched.then_some((
+            slice,
+            Intersection {
+                particle: 0,
+                ..*hit
+            },
+        ))
+    }
+
+    /// The slice at `time`.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "conversions of numbers beyond the range saturate"
+    )]
+    fn slice_at(&self, time: f32) -> usize {
+        let slice = ((time + 0.5) * self.slices.len() as f32) as usize;
+        slice.min(self.slices.len() - 1)
+    }
+
+    /// Calls `each` for each slice with the rays of `lanes` in it.
+    fn for_slices(&self, rays: &RayPacket, lanes: u32, mut each: impl FnMut(usize, u32)) {
+        let mut left = lanes;
+        while let Some(first) = lanes_in(left).next() {
+            let slice = self.slice_at(rays.time[first]);
+            let is_same = |lane: &usize| self.slice_at(rays.time[*lane]) == slice;
+            let same = lanes_in(left)
+                .filter(is_same)
+                .fold(0, |lanes, lane| lanes | 1 << lane);
+            each(slice, same);
+            left &= !same;
+        }
+    }
+}
+
+/// `rays` with all rays but those of `lanes` disabled: rays that end before they start hit nothing.
+fn only(rays: &RayPacket, lanes: u32) -> RayPacket {
+    let mut rest = *rays;
+    for lane in lanes_in(!lanes & first_lanes(rays.len())) {
+        rest.t_max[lane] = -1.0;
+    }
+    rest
+}
+
+impl<S: Shape> Shape for SlicedSurface<S> {
+    /// The intersection in the middle of the exposure.
+    fn crossing(&self, ray: &Ray, side: Side) -> Option<Intersection> {
+        crossing_of_packet(self, ray, side)
+    }
+
+    fn is_connected(&self) -> bool {
+        self.middle().is_connected()
+    }
+
+    fn side_of(&self, point: glam::Vec3) -> Side {
+        self.middle().side_of(point)
+    }
+
+    fn intersect(
+        &self,
+        rays: &mut RayPacket,
+        coherence: Coherence,
+        inside: u32,
+        hits: &mut Intersections,
+    ) {
+        let all = *rays;
+        self.for_slices(&all, first_lanes(all.len()), |slice, lanes| {
+            let mut own = only(&all, lanes);
+            let mut found = Intersections::default();
+            self.slices[slice].intersect(&mut own, coherence, inside & lanes, &mut found);
+            for lane in lanes_in(found.mask & lanes) {
+                let mut hit = found.get(lane);
+                if self.is_searched {
+                    hit.particle = spherule_formats::order::index_u32(slice);
+                }
+                hits.end_ray(rays, lane, &hit, found.material[lane]);
+            }
+        });
+    }
+
+    fn occluded(&self, rays: &RayPacket, coherence: Coherence, lanes: u32) -> u32 {
+        let mut occluded = 0;
+        self.for_slices(rays, lanes, |slice, lanes| {
+            occluded |= self.slices[slice].occluded(rays, coherence, lanes);
+        });
+        occluded
+    }
+
+    fn particle_at(&self, hit: &Intersection) -> u32 {
+        match self.searched(hit) {
+            Some((slice, hit)) => slice.particle_at(&hit),
+            None => hit.particle,
+        }
+    }
+
+    fn blend(&self, hit: &Intersection, each: &mut dyn FnMut(u32, f32)) {
+        match self.searched(hit) {
+            Some((slice, hit)) => slice.blend(&hit, each),
+            None => each(hit.particle, 1.0),
+        }
+    }
+}
