@@ -123,8 +123,8 @@ pub(super) fn step_to_next(output: &Output, survey: &Survey) -> Option<FrameStep
 pub(super) fn has_velocities(survey: &Survey) -> bool {
     let mut attributes = survey.attributes.iter().zip(&survey.components);
     attributes.any(|(name, components)| {
-        let is_velocity = |known: &&str| name.eq_ignore_ascii_case(known);
-        *components == 3 && names::VELOCITY.iter().any(|known| is_velocity(&known))
+        let is_name = |known: &&str| name.eq_ignore_ascii_case(known);
+        *components == 3 && names::VELOCITY.iter().any(is_name)
     })
 }
 

@@ -2,6 +2,11 @@
 //! them enter it, and a subtree that few rays enter is traversed by each of them alone. Spheres are always tested with
 //! single rays, so each ray finds what it would find alone, to the bit.
 
+#![expect(
+    clippy::needless_range_loop,
+    reason = "one index for the lanes of many arrays"
+)]
+
 use super::super::simd::lanes_entering;
 use super::node::{BLOCK, MovingBlock, MovingNode};
 use super::single::{ROUNDING, RayInTime, RayStack, STACK_SIZE, inverse, walk_blocks};

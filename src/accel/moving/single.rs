@@ -1,5 +1,10 @@
 //! Traversal by one ray, and its tests of boxes and spheres.
 
+#![expect(
+    clippy::needless_range_loop,
+    reason = "one index for the lanes of many arrays"
+)]
+
 use super::super::levels::MAX_LEVELS;
 use super::node::{BLOCK, MovingBlock, MovingNode};
 use crate::math::{larger, smaller};
