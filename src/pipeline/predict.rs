@@ -373,11 +373,7 @@ impl<'a> MemoryModel<'a> {
     /// motion blur, spheres have a tree that moves, and other surfaces are there several times.
     fn surface(&self, frame: &FrameSize) -> SurfaceBytes {
         let (surface, n) = (&self.setup.picture.surface, frame.particles);
-        let slices = self
-            .setup
-            .picture
-            .shutter
-            .map_or(1, |shutter| u64::from(shutter.slices));
+        let slices = u64::from(self.slices());
         let moving = |particles: u64| match self.setup.has_motion() {
             true => MovingTree::predicted_bytes(particles),
             false => 0,
@@ -511,7 +507,16 @@ impl<'a> MemoryModel<'a> {
             &self.setup.picture.render,
             &self.setup.picture.scene.material,
             is_body,
+            self.slices(),
         )
+    }
+
+    /// Number of slices of the exposure in which surfaces differ.
+    fn slices(&self) -> u32 {
+        match (self.setup.picture.surface.kind, self.setup.picture.shutter) {
+            (SurfaceKind::Union | SurfaceKind::Smooth, Some(shutter)) => shutter.slices,
+            _ => 1,
+        }
     }
 
     /// Memory for encoding an image, without its planes: the bands that are being compressed or wait to be written;

@@ -9,7 +9,9 @@ use crate::accel::{BuildSettings, BvhSettings, SbvhSettings, Structure, choose};
 use crate::denoise::DenoiseSettings;
 use crate::output::{ExrOptions, PreviewOptions};
 use crate::render::{RenderSettings, RendererKind};
-use crate::scene::{Camera, CameraError, CameraPath, ColorMap, LensSettings, NextFrame, Scene};
+use crate::scene::{
+    Camera, CameraError, CameraPath, ColorMap, Exposure, LensSettings, NextFrame, Scene,
+};
 use crate::surface::{SurfaceKind, SurfaceSettings};
 use crate::survey::FrameWeight;
 
@@ -217,8 +219,8 @@ impl Setup {
         })
     }
 
-    /// The cameras of `frame` when the shutter opens and when it closes. `camera` is that of the frame, with its lens.
-    fn exposure(&self, frame: i64, camera: &Camera) -> Option<[Camera; 2]> {
+    /// The exposure of `frame`. `camera` is that of the frame, with its lens.
+    fn exposure(&self, frame: i64, camera: &Camera) -> Option<Exposure> {
         let picture = &self.picture;
         let shutter = picture.shutter?;
         #[expect(
@@ -235,7 +237,13 @@ impl Setup {
                 None => moved,
             })
         };
-        Some([at(shutter.open), at(shutter.close)])
+        Some(Exposure {
+            cameras: [at(shutter.open), at(shutter.close)],
+            slices: match picture.surface.kind {
+                SurfaceKind::Spheres => 1,
+                SurfaceKind::Union | SurfaceKind::Smooth => shutter.slices,
+            },
+        })
     }
 
     /// Options for the PNG of an image from `camera`: a film without background gets one.

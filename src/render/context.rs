@@ -112,8 +112,10 @@ impl<'a> RenderContext<'a> {
             camera: CameraLanes::new(&scene.camera, width, height),
             next_frame: (scene.next_frame.as_ref())
                 .map(|next| (CameraLanes::new(&next.camera, width, height), next.time)),
-            exposure: (scene.exposure)
-                .map(|cameras| cameras.map(|camera| CameraLanes::new(&camera, width, height))),
+            exposure: (scene.exposure.as_ref()).map(|e| {
+                e.cameras
+                    .map(|camera| CameraLanes::new(&camera, width, height))
+            }),
             background: BackgroundLanes::from(&scene.background),
             lights: scene.lights.iter().map(light_of).collect(),
             color: source.constant_color(),

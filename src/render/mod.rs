@@ -115,8 +115,13 @@ impl RendererKind {
 }
 
 /// Upper bound of the memory that each thread needs during rendering, without the film, in bytes. `is_body`: the
-/// particles form one connected body.
-pub fn scratch_bytes(settings: &RenderSettings, material: &Material, is_body: bool) -> u64 {
+/// particles form one connected body. `slices`: number of slices of the exposure in which surfaces differ.
+pub fn scratch_bytes(
+    settings: &RenderSettings,
+    material: &Material,
+    is_body: bool,
+    slices: u32,
+) -> u64 {
     let max_paths = integrator::max_paths(settings, Interior::of(material, is_body));
     let max_depth = integrator::max_depth(settings);
     scratch::scratch_bytes(
@@ -124,7 +129,7 @@ pub fn scratch_bytes(settings: &RenderSettings, material: &Material, is_body: bo
         max_depth,
         max_paths,
         &settings.channels.layers,
-    )
+    ) + stream::bytes_of_slices(slices)
 }
 
 /// Upper bound of the memory for the light on the ground around transmissive particles, in bytes.

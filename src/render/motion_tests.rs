@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 use super::*;
 use crate::accel::moving::MovingTree;
 use crate::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder};
-use crate::scene::{Background, Camera, CameraView, Light, Material};
+use crate::scene::{Background, Camera, CameraView, Exposure, Light, Material};
 use crate::surface::moving::MovingSpheres;
 use crate::surface::slices::SlicedSurface;
 use crate::surface::spheres::SphereSurface;
@@ -42,6 +42,11 @@ fn scene_from(x: f32) -> Scene {
         },
         ..Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).unwrap())
     }
+}
+
+#[expect(clippy::unnecessary_wraps, reason = "a field of a scene")]
+fn exposure(cameras: [Camera; 2], slices: u32) -> Option<Exposure> {
+    Some(Exposure { cameras, slices })
 }
 
 /// Spheres in a static tree.
@@ -128,7 +133,7 @@ fn a_moving_ball_covers_the_way_of_its_disc() {
     let displacement = Vec3::new(LENGTH * PIXEL, 0.0, 0.0);
     let moving = moving(&[CENTER], &[RADIUS * PIXEL], displacement);
     let mut scene = scene();
-    scene.exposure = Some([scene.camera; 2]);
+    scene.exposure = exposure([scene.camera; 2], 1);
     for integrator in [IntegratorKind::Whitted, IntegratorKind::Path] {
         let film = film(&MovingSpheres::new(&moving), &scene, integrator);
         check_coverage(&film, RADIUS, START, LENGTH);
@@ -141,7 +146,7 @@ fn a_moving_camera_blurs_what_is_still() {
     let mut scene = scene();
     // The camera moves the other way
     let close = scene_from(-LENGTH * PIXEL).camera;
-    scene.exposure = Some([scene.camera, close]);
+    scene.exposure = exposure([scene.camera, close], 1);
     let film = film(
         &SphereSurface::new(tree.tree().view()),
         &scene,
@@ -159,7 +164,7 @@ fn slices_are_seen_at_their_times() {
         .map(|trees| SphereSurface::new(trees.tree().view()));
     let sliced = SlicedSurface::new(surfaces.collect(), false);
     let mut scene = scene();
-    scene.exposure = Some([scene.camera; 2]);
+    scene.exposure = exposure([scene.camera; 2], 2);
     scene
         .lights
         .push(Light::directional(Vec3::Y, Vec3::ONE).unwrap());
@@ -180,7 +185,7 @@ fn shadows_move_with_their_spheres() {
     let centers = [Vec3::new(-1.5, 0.0, -1.5), Vec3::new(0.5, 0.0, -1.5)];
     let moving = moving(&centers, &[0.5, 0.4], Vec3::new(0.0, 0.0, 3.0));
     let mut scene = scene();
-    scene.exposure = Some([scene.camera; 2]);
+    scene.exposure = exposure([scene.camera; 2], 1);
     scene
         .lights
         .push(Light::directional(Vec3::X, Vec3::ONE).unwrap());

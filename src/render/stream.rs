@@ -5,6 +5,7 @@ use super::light_split::FirstInteraction;
 use super::sampler::PathSeed;
 use crate::math::{LANES, Lanes, Lanes3, first_lanes, lanes_in, splat};
 use crate::ray::RayPacket;
+use crate::surface::slices::slice_at;
 
 /// Number of packets by which a stream grows.
 const GROWTH: usize = 32;
@@ -80,32 +81,46 @@ impl Default for ScatteredRays {
     }
 }
 
-/// Path segments of one depth, stored without gaps. Its memory is kept when it is cleared.
-#[derive(Debug, Default)]
+/// Path segments of one depth. Those in the same slice of the exposure are stored together without gaps, because
+/// surfaces differ between slices. Memory is kept when the stream is cleared.
+#[derive(Debug)]
 pub(super) struct RayStream {
-    packets: Vec<SegmentPacket>,
-    len: usize,
+    /// A run for each slice.
+    runs: Vec<SegmentRun>,
+}
+
+impl Default for RayStream {
+    fn default() -> Self {
+        Self {
+            runs: vec![SegmentRun::default()],
+        }
+    }
 }
 
 impl RayStream {
     /// Removes all segments.
     pub(super) fn clear(&mut self) {
-        self.len = 0;
+        for run in &mut self.runs {
+            run.len = 0;
+        }
     }
 
     /// Number of segments in the stream.
     pub(super) fn len(&self) -> usize {
-        self.len
+        self.runs.iter().map(|run| run.len).sum()
     }
 
-    /// All packets; the last may have fewer rays than lanes.
+    /// All packets; the last of a slice may have fewer rays than lanes.
     #[cfg(test)]
-    pub(super) fn packets(&self) -> &[SegmentPacket] {
-        &self.packets[..self.len.div_ceil(LANES)]
+    pub(super) fn packets(&self) -> Vec<&SegmentPacket> {
+        let runs = self.runs.iter();
+        runs.flat_map(|run| &run.packets[..run.len.div_ceil(LANES)])
+            .collect()
     }
 
-    fn packets_mut(&mut self) -> &mut [SegmentPacket] {
-        &mut self.packets[..self.len.div_ceil(LANES)]
+    fn packets_mut(&mut self) -> impl Iterator<Item = &mut SegmentPacket> {
+        let runs = self.runs.iter_mut();
+        runs.flat_map(|run| run.packets[..run.len.div_ceil(LANES)].iter_mut())
     }
 
     /// Appends the rays in `lanes`, in order, which leave the intersections of `parents`; those in `inside` start
@@ -119,11 +134,41 @@ impl RayStream {
         inside: u32,
         branch: u32,
     ) {
+        let growth = GROWTH.div_ceil(self.runs.len());
+        if let [run] = &mut self.runs[..] {
+            return run.push(lanes, rays, parents, inside, branch, growth);
+        }
+        let count = self.runs.len();
+        for lane in lanes_in(lanes) {
+            let slice = slice_at(parents.rays.time[lane], count);
+            self.runs[slice].push(1 << lane, rays, parents, inside, branch, growth);
+        }
+    }
+}
+
+/// Path segments stored without gaps.
+#[derive(Debug, Default)]
+struct SegmentRun {
+    packets: Vec<SegmentPacket>,
+    len: usize,
+}
+
+impl SegmentRun {
+    /// [`RayStream::push`]; memory grows by `growth` packets.
+    fn push(
+        &mut self,
+        lanes: u32,
+        rays: &ScatteredRays,
+        parents: &SegmentPacket,
+        inside: u32,
+        branch: u32,
+        growth: usize,
+    ) {
         // Grow if there is no space for another whole packet
         let needed = (self.len + LANES).div_ceil(LANES) + 1;
         if self.packets.len() < needed {
             // Grow by a constant and not by doubling, because streams are most of the memory of a thread.
-            let capacity = needed.next_multiple_of(GROWTH);
+            let capacity = needed.next_multiple_of(growth);
             self.packets.reserve_exact(capacity - self.packets.len());
             self.packets.resize_with(capacity, SegmentPacket::default);
         }
@@ -153,6 +198,13 @@ impl RayStream {
     }
 }
 
+/// Memory of the unused ends of the runs of two depths, if there are several slices.
+pub(super) fn bytes_of_slices(count: u32) -> u64 {
+    let count = u64::from(count.saturating_sub(1));
+    let streams = 4 * (GROWTH as u64 + 2 * count);
+    count.min(1) * streams * size_of::<SegmentPacket>() as u64
+}
+
 /// The rays of one depth, separated into reflected and refracted ones.
 #[derive(Debug, Default)]
 pub(super) struct RayStreams {
@@ -161,6 +213,14 @@ pub(super) struct RayStreams {
 }
 
 impl RayStreams {
+    /// Divides the segments by `count` slices of the exposure from now on. Removes all segments.
+    pub(super) fn set_slices(&mut self, count: u32) {
+        for stream in [&mut self.reflected, &mut self.refracted] {
+            stream.runs.resize_with(count as usize, SegmentRun::default);
+        }
+        self.clear();
+    }
+
     /// Removes all segments.
     pub(super) fn clear(&mut self) {
         self.reflected.clear();
@@ -174,8 +234,8 @@ impl RayStreams {
 
     /// All packets, reflected rays first.
     pub(super) fn packets_mut(&mut self) -> impl Iterator<Item = &mut SegmentPacket> {
-        let refracted = self.refracted.packets_mut().iter_mut();
-        self.reflected.packets_mut().iter_mut().chain(refracted)
+        let refracted = self.refracted.packets_mut();
+        self.reflected.packets_mut().chain(refracted)
     }
 }
 

@@ -94,8 +94,17 @@ pub struct Scene {
     pub is_environment_visible: bool,
     /// The next frame, for motion on the film.
     pub next_frame: Option<NextFrame>,
-    /// The camera when the shutter opens and when it closes, with motion blur.
-    pub exposure: Option<[Camera; 2]>,
+    /// What changes while the shutter is open, with motion blur.
+    pub exposure: Option<Exposure>,
+}
+
+/// What changes in a scene while the shutter is open, apart from the particles.
+#[derive(Debug, Clone, Copy)]
+pub struct Exposure {
+    /// The camera when the shutter opens and when it closes.
+    pub cameras: [Camera; 2],
+    /// Number of equal parts of the exposure in which surfaces do not change; 1 if they change continuously.
+    pub slices: u32,
 }
 
 /// Where things are in the next frame.

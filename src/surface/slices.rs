@@ -50,15 +50,8 @@ impl<S: Shape> SlicedSurface<S> {
         ))
     }
 
-    /// The slice at `time`.
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "conversions of numbers beyond the range saturate"
-    )]
     fn slice_at(&self, time: f32) -> usize {
-        let slice = ((time + 0.5) * self.slices.len() as f32) as usize;
-        slice.min(self.slices.len() - 1)
+        slice_at(time, self.slices.len())
     }
 
     /// Calls `each` for each slice with the rays of `lanes` in it.
@@ -74,6 +67,18 @@ impl<S: Shape> SlicedSurface<S> {
             left &= !same;
         }
     }
+}
+
+/// The slice at `time`, of `count` slices.
+#[inline]
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "conversions of numbers beyond the range saturate"
+)]
+pub(crate) fn slice_at(time: f32, count: usize) -> usize {
+    let slice = ((time + 0.5) * count as f32) as usize;
+    slice.min(count.saturating_sub(1))
 }
 
 /// `rays` with all rays but those of `lanes` disabled: rays that end before they start hit nothing.
@@ -106,19 +111,20 @@ impl<S: Shape> Shape for SlicedSurface<S> {
         inside: u32,
         hits: &mut Intersections,
     ) {
-        let all = *rays;
-        self.for_slices(&all, first_lanes(all.len()), |slice, lanes| {
-            let mut own = only(&all, lanes);
-            let mut found = Intersections::default();
-            self.slices[slice].intersect(&mut own, coherence, inside & lanes, &mut found);
-            for lane in lanes_in(found.mask & lanes) {
-                let mut hit = found.get(lane);
-                if self.is_searched {
-                    hit.particle = spherule_formats::order::index_u32(slice);
+        let ends = rays.t_max;
+        let all = first_lanes(rays.len());
+        let mut found = *rays;
+        self.for_slices(rays, all, |slice, lanes| {
+            let mut own = only(rays, lanes);
+            self.slices[slice].intersect(&mut own, coherence, inside & lanes, hits);
+            for lane in lanes_in(lanes) {
+                found.t_max[lane] = own.t_max[lane];
+                if self.is_searched && own.t_max[lane] < ends[lane] {
+                    hits.particle[lane] = spherule_formats::order::index_u32(slice);
                 }
-                hits.end_ray(rays, lane, &hit, found.material[lane]);
             }
         });
+        rays.t_max = found.t_max;
     }
 
     fn occluded(&self, rays: &RayPacket, coherence: Coherence, lanes: u32) -> u32 {
