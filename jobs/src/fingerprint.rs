@@ -70,6 +70,19 @@ impl Fingerprint {
     }
 }
 
+/// BLAKE3 of the length (little-endian u64) and all contents of the file at `path`, in hex; for files that are read as a
+/// whole anyway. Up to 128 KiB, it is that of the fingerprint.
+///
+/// # Errors
+/// The file cannot be opened or read.
+pub fn contents_hash(path: &Path) -> io::Result<String> {
+    let (file, metadata) = open_regular(path)?;
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(&metadata.len().to_le_bytes());
+    hasher.update_reader(file)?;
+    Ok(hasher.finalize().to_hex().to_string())
+}
+
 /// Saturates in the year 2262; 0 where the file system keeps no times.
 fn modified_ns(metadata: &std::fs::Metadata) -> i64 {
     let Ok(time) = metadata.modified() else {
@@ -137,6 +150,24 @@ mod tests {
             .set_modified(time)
             .unwrap();
         Fingerprint::of_file(path).unwrap()
+    }
+
+    #[test]
+    fn all_contents_count_in_a_hash_of_contents() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a");
+        for length in [0, 1000, 100_000, 128 * 1024] {
+            fs::write(&path, vec![7; length]).unwrap();
+            let fingerprint = Fingerprint::of_file(&path).unwrap();
+            assert_eq!(contents_hash(&path).unwrap(), fingerprint.blake3);
+        }
+        let mut contents = vec![7; 1 << 20];
+        fs::write(&path, &contents).unwrap();
+        let before = contents_hash(&path).unwrap();
+        contents[1 << 19] = 8;
+        fs::write(&path, &contents).unwrap();
+        assert_ne!(contents_hash(&path).unwrap(), before);
+        assert!(contents_hash(&dir.path().join("none")).is_err());
     }
 
     #[test]

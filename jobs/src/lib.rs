@@ -48,7 +48,7 @@ pub use claims::FrameClaims;
 pub use error::{EntryError, JobError, PlanError};
 pub use failure::{FailureKind, FrameFailure};
 pub use file_error::FileError;
-pub use fingerprint::{Fingerprint, compare_settings, settings_hash, text_hash};
+pub use fingerprint::{Fingerprint, compare_settings, contents_hash, settings_hash, text_hash};
 pub use interrupt::{Interrupt, InterruptLevel};
 pub use job::{DryRun, Job};
 pub use ledger::{Details, EntryStatus, Ledger, LedgerEntry, OutputFile};

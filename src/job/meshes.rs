@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use glam::DVec3;
 use spherule_formats::FrameError;
-use spherule_jobs::Fingerprint;
+use spherule_jobs::contents_hash;
 
 use super::RunError;
 use super::manifest_file::reading_budget;
@@ -97,7 +97,7 @@ pub(super) fn frame_files(manifest: &Manifest, dir: &Path, frame: i64) -> Vec<Pa
         .collect()
 }
 
-/// Fingerprints of the meshes that all images share, by the keys of their paths. Those of a frame are among its inputs.
+/// Hashes of the meshes that all images share, by the keys of their paths. Those of a frame are among its inputs.
 pub(super) fn identities(
     manifest: &Manifest,
     dir: &Path,
@@ -115,7 +115,7 @@ pub(super) fn identities(
     Ok(identities)
 }
 
-/// The fingerprint of a file in the settings of a job.
+/// What stands for a file in the settings of a job.
 pub(super) fn identity(path: &Path) -> io::Result<String> {
-    Ok(format!("blake3 {}", Fingerprint::of_file(path)?.blake3))
+    Ok(format!("blake3 {}", contents_hash(path)?))
 }
