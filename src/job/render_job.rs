@@ -15,7 +15,7 @@ use super::{RunError, Shard, in_thread};
 use crate::hdr::{HdrError, read_radiance_map};
 use crate::manifest::{Manifest, named_place};
 use crate::metrics::memory::available;
-use crate::pipeline::{FrameSize, ImageTask, MemoryModel, Schedule, Setup};
+use crate::pipeline::{FrameSize, ImageTask, MemoryModel, NextMeshes, Schedule, Setup};
 use crate::report::job::{HTML_FILE, JSON_FILE};
 use crate::resolve::{self, add_meshes, check_views, needs_environment_image, question};
 use crate::scene::RadianceMap;
@@ -212,6 +212,22 @@ impl RenderJob {
         meshes::frame_files(&self.manifest, self.dir(), frame)
     }
 
+    /// The meshes that those of the frame with `index` move to, with motion blur.
+    fn next_meshes(&self, sequence: &Sequence, index: usize) -> Option<NextMeshes> {
+        if self.manifest.camera.shutter == 0.0 {
+            return None;
+        }
+        let frames = sequence.frames();
+        let (other, steps) = match frames.get(index + 1) {
+            Some(next) => (next, 1),
+            None => (frames.get(index.checked_sub(1)?)?, -1),
+        };
+        Some(NextMeshes {
+            files: self.mesh_files(other.number),
+            steps,
+        })
+    }
+
     /// The frames of the job: all of the sequence, or the selected one if the output has no number.
     fn frames_of_job(&self, mut all: Vec<FrameRequest>) -> Vec<FrameRequest> {
         let range = self.manifest.input.frames.as_ref();
@@ -336,6 +352,7 @@ impl RenderJob {
                 image: self.image(frame),
                 preview: self.preview(frame),
                 meshes: self.mesh_files(frame),
+                next_meshes: self.next_meshes(sequence, index),
                 refused: None,
             })
             .collect()

@@ -1,6 +1,5 @@
 //! First stage: reads the files of a frame into the form that tree and shading need.
 
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use glam::Vec3;
@@ -11,12 +10,11 @@ use super::ImageTask;
 use super::decoded::{DecodedFrame, particle_with_id};
 use super::in_place::{Opened, StoredFrame};
 use super::load_error::LoadError;
-use super::meshes::meshes_of;
+use super::meshes::{MeshSlices, meshes_of};
 use super::motion::velocities_to_next;
 use super::predict::{FrameSize, MemoryModel};
 use super::setup::Setup;
 use crate::metrics::memory::{available, process_room};
-use crate::surface::mesh::MeshTree;
 
 /// A frame before its tree is built.
 #[derive(Debug)]
@@ -28,7 +26,7 @@ pub struct LoadedFrame {
     /// The particles.
     pub particles: LoadedParticles,
     /// The meshes of the image, one for each of the setup.
-    pub meshes: Vec<Arc<MeshTree>>,
+    pub meshes: Vec<MeshSlices>,
     /// Simulation time, if known.
     pub time: Option<f64>,
     /// Position of the particle in focus, relative to the origin, if the camera follows one.
@@ -98,7 +96,7 @@ pub fn load_frame(
         loaded.clamped_radii,
         "radii raised: too small to be seen, or no number",
     );
-    loaded.meshes = meshes_of(&setup.picture.meshes, task, &mut loaded.notes)?;
+    loaded.meshes = meshes_of(setup, task, &mut loaded.notes)?;
     loaded.read_time = start.elapsed();
     Ok(loaded)
 }

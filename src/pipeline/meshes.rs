@@ -10,6 +10,7 @@ use spherule_formats::mesh::read_mesh;
 use spherule_formats::{FrameError, MemoryBudget};
 
 use super::ImageTask;
+use super::setup::Setup;
 use crate::surface::mesh::{MeshError, MeshNormals, MeshTree, TriangleMesh, VisibleFaces};
 
 /// How many times a mesh may be larger or smaller than the particles before that is noted. A tank in millimetres around
@@ -92,17 +93,49 @@ pub enum MeshLoadError {
     },
 }
 
+/// The vertices of a file relative to the origin, and its triangles.
+struct RawMesh {
+    vertices: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl RawMesh {
+    fn read(path: &Path, settings: &MeshSettings) -> Result<Self, MeshLoadError> {
+        let file = read_mesh(path, settings.budget)?;
+        let vertex = |v: [f64; 3]| {
+            (DVec3::from_array(v) * settings.scale + settings.translate - settings.origin).as_vec3()
+        };
+        Ok(Self {
+            vertices: file.vertices.into_iter().map(vertex).collect(),
+            triangles: file.triangles,
+        })
+    }
+
+    /// The mesh on its way to `other`, which has the same triangles: there at 1, beyond it above.
+    fn towards(&self, other: &Self, part: f32) -> Self {
+        let vertices = self.vertices.iter().zip(&other.vertices);
+        Self {
+            vertices: vertices.map(|(a, b)| *a + part * (*b - *a)).collect(),
+            triangles: self.triangles.clone(),
+        }
+    }
+}
+
 /// Reads the mesh in the file at `path`.
 ///
 /// # Errors
 /// See [`MeshLoadError`].
 pub fn load_mesh(path: &Path, settings: &MeshSettings) -> Result<LoadedMesh, MeshLoadError> {
-    let file = read_mesh(path, settings.budget)?;
-    // Round the vertices relative to the origin
-    let vertex = |v: [f64; 3]| {
-        (DVec3::from_array(v) * settings.scale + settings.translate - settings.origin).as_vec3()
-    };
-    let vertices: Vec<Vec3> = file.vertices.into_iter().map(vertex).collect();
+    build_mesh(path, RawMesh::read(path, settings)?, settings)
+}
+
+/// Builds the mesh of the file at `path`.
+fn build_mesh(
+    path: &Path,
+    file: RawMesh,
+    settings: &MeshSettings,
+) -> Result<LoadedMesh, MeshLoadError> {
+    let vertices = file.vertices;
     // Count the triangles that cannot be seen
     let is_finite = |corners: &[u32; 3]| {
         let mut corners = corners.iter().map(|v| vertices.get(*v as usize));
@@ -163,27 +196,71 @@ fn ratio_note(path: &Path, tree: &MeshTree, particles: f64) -> Option<String> {
     ))
 }
 
-/// The trees of `meshes` for the image of `task`: those of all pictures, and its own. Passes notes to `notes`.
+/// A mesh in each slice of the exposure; one tree if it does not move.
+pub type MeshSlices = Vec<Arc<MeshTree>>;
+
+/// The meshes of the setup for the image of `task`: those of all pictures, and its own, which move to those of the
+/// next frame while the shutter is open. Passes notes to `notes`.
 ///
 /// # Errors
 /// One of its own cannot be read.
 pub(super) fn meshes_of(
-    meshes: &[PictureMesh],
+    setup: &Setup,
     task: &ImageTask,
     notes: &mut Vec<String>,
-) -> Result<Vec<Arc<MeshTree>>, MeshLoadError> {
-    let mut own = task.meshes.iter();
-    let mut trees = Vec::with_capacity(meshes.len());
+) -> Result<Vec<MeshSlices>, MeshLoadError> {
+    let (mut own, meshes) = ((0..).zip(&task.meshes), &setup.picture.meshes);
+    let mut all = Vec::with_capacity(meshes.len());
     for mesh in meshes {
         if let Some(tree) = &mesh.tree {
-            trees.push(Arc::clone(tree));
-        } else if let Some(path) = own.next() {
-            let loaded = load_mesh(path, &mesh.settings).map_err(|e| missing(e, path))?;
-            notes.extend(loaded.notes);
-            trees.push(loaded.tree);
+            all.push(vec![Arc::clone(tree)]);
+        } else if let Some((number, path)) = own.next() {
+            let next = task.next_meshes.as_ref().zip(setup.picture.shutter);
+            let slices = match next.and_then(|(next, s)| Some((next.files.get(number)?, next, s))) {
+                Some((file, next, shutter)) => {
+                    let times = shutter
+                        .slice_times()
+                        .map(|time| time / f64::from(next.steps))
+                        .collect();
+                    moving_mesh(path, file, times, &mesh.settings, notes)
+                }
+                None => load_mesh(path, &mesh.settings).map(|mesh| vec![mesh]),
+            };
+            let slices = slices.map_err(|e| missing(e, path))?;
+            notes.extend(slices[0].notes.iter().cloned());
+            all.push(slices.into_iter().map(|mesh| mesh.tree).collect());
         }
     }
-    Ok(trees)
+    Ok(all)
+}
+
+/// The mesh at `path` at each of `times` on its way to the one at `next`, at time 1. It does not move if that one has
+/// other triangles, or cannot be read.
+fn moving_mesh(
+    path: &Path,
+    next: &Path,
+    times: Vec<f64>,
+    settings: &MeshSettings,
+    notes: &mut Vec<String>,
+) -> Result<Vec<LoadedMesh>, MeshLoadError> {
+    let file = RawMesh::read(path, settings)?;
+    let not_blurred = match RawMesh::read(next, settings) {
+        Ok(other) if other.triangles == file.triangles => {
+            #[expect(clippy::cast_possible_truncation, reason = "fractions of a step")]
+            let slices = times
+                .into_iter()
+                .map(|time| file.towards(&other, time as f32));
+            let slices = slices.map(|slice| build_mesh(path, slice, settings));
+            return slices.collect();
+        }
+        Ok(_) => format!("{} has other triangles", next.display()),
+        Err(error) => error.to_string(),
+    };
+    notes.push(format!(
+        "{}: not blurred by motion: {not_blurred}",
+        path.display()
+    ));
+    Ok(vec![build_mesh(path, file, settings)?])
 }
 
 fn missing(error: MeshLoadError, path: &Path) -> MeshLoadError {

@@ -34,7 +34,7 @@ pub use load::{LoadedFrame, LoadedParticles, load_frame};
 pub use load_error::LoadError;
 pub(crate) use load_error::attribute_list;
 pub use memory_limit::{MemoryLimitError, MemoryRemedy};
-pub use meshes::{LoadedMesh, MeshLoadError, MeshSettings, PictureMesh, load_mesh};
+pub use meshes::{LoadedMesh, MeshLoadError, MeshSettings, MeshSlices, PictureMesh, load_mesh};
 pub use predict::{FrameSize, MemoryModel, MemoryNeed};
 pub use probe::{Probe, ProbeError, probe};
 pub use renderer::{BuiltFrame, FrameRenderer, TraceError, TracedFrame};
@@ -59,8 +59,19 @@ pub struct ImageTask {
     pub preview: Option<PathBuf>,
     /// The files of the meshes that each frame has for itself, in the order of [`Picture::meshes`].
     pub meshes: Vec<PathBuf>,
+    /// The meshes that those of the frame move to, with motion blur.
+    pub next_meshes: Option<NextMeshes>,
     /// Why it cannot be rendered, if that is known in advance.
     pub refused: Option<MemoryLimitError>,
+}
+
+/// The meshes of a neighbouring frame.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NextMeshes {
+    /// Their files, like [`ImageTask::meshes`].
+    pub files: Vec<PathBuf>,
+    /// Number of steps to that frame: 1, or -1 for the one before.
+    pub steps: i8,
 }
 
 impl ImageTask {

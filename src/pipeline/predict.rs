@@ -254,7 +254,13 @@ impl<'a> MemoryModel<'a> {
         match frame.meshes {
             0 => self.reading(frame),
             bytes => {
-                let meshes = self.kept(frame) + READ_PER_MESH_BYTE.saturating_mul(bytes);
+                // Those of the next frame are read beside them
+                let slices = u64::from(self.setup.slices());
+                let slices = match slices {
+                    1 => 0,
+                    _ => (slices * KEPT_PER_MESH_BYTE + READ_PER_MESH_BYTE).saturating_mul(bytes),
+                };
+                let meshes = self.kept(frame) + READ_PER_MESH_BYTE.saturating_mul(bytes) + slices;
                 self.reading(frame).max(meshes)
             }
         }
@@ -373,7 +379,7 @@ impl<'a> MemoryModel<'a> {
     /// motion blur, spheres have a tree that moves, and other surfaces are there several times.
     fn surface(&self, frame: &FrameSize) -> SurfaceBytes {
         let (surface, n) = (&self.setup.picture.surface, frame.particles);
-        let slices = u64::from(self.slices());
+        let slices = u64::from(self.setup.slices());
         let moving = |particles: u64| match self.setup.has_motion() {
             true => MovingTree::predicted_bytes(particles),
             false => 0,
@@ -452,7 +458,8 @@ impl<'a> MemoryModel<'a> {
         // Add up each phase: reading, building, tracing, encoding
         let kept = self.kept(frame);
         let surface = self.surface(frame);
-        let meshes = self.meshes + KEPT_PER_MESH_BYTE * frame.meshes;
+        let meshes =
+            self.meshes + KEPT_PER_MESH_BYTE * frame.meshes * u64::from(self.setup.slices());
         let names = mattes::predicted_bytes(self.setup, frame.particles);
         let first_read = MemoryNeed {
             reading: self.reading_with_meshes(frame),
@@ -507,16 +514,8 @@ impl<'a> MemoryModel<'a> {
             &self.setup.picture.render,
             &self.setup.picture.scene.material,
             is_body,
-            self.slices(),
+            self.setup.slices(),
         )
-    }
-
-    /// Number of slices of the exposure in which surfaces differ.
-    fn slices(&self) -> u32 {
-        match (self.setup.picture.surface.kind, self.setup.picture.shutter) {
-            (SurfaceKind::Union | SurfaceKind::Smooth, Some(shutter)) => shutter.slices,
-            _ => 1,
-        }
     }
 
     /// Memory for encoding an image, without its planes: the bands that are being compressed or wait to be written;

@@ -321,6 +321,7 @@ mod tests {
             image: PathBuf::new(),
             preview: None,
             meshes: Vec::new(),
+            next_meshes: None,
             refused: None,
         };
         let cut_off =

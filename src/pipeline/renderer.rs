@@ -1,7 +1,6 @@
 //! The interface between the stages of a run and the renderer.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use glam::Vec3;
 use spherule_formats::FrameError;
@@ -10,6 +9,7 @@ use super::ImageTask;
 use super::decoded::DecodedShading;
 use super::in_place::StoredFrame;
 use super::load::LoadedFrame;
+use super::meshes::MeshSlices;
 use super::setup::Setup;
 use crate::accel::stored::StoredFault;
 use crate::denoise::DenoiseError;
@@ -18,7 +18,6 @@ use crate::output::TextAttribute;
 use crate::render::{Film, RayCounts, RenderError, Stop};
 use crate::report::FrameReport;
 use crate::scene::{Camera, CameraError};
-use crate::surface::mesh::MeshTree;
 use crate::surface::smooth::SmoothError;
 
 /// Reasons why there is no image of a frame that was read.
@@ -73,7 +72,7 @@ pub struct TracedFrame {
 pub struct BuiltFrame {
     pub(super) task: ImageTask,
     pub(super) particles: BuiltParticles,
-    pub(super) meshes: Vec<Arc<MeshTree>>,
+    pub(super) meshes: Vec<MeshSlices>,
     pub(super) time: Option<f64>,
     /// Position of the particle in focus.
     pub(super) focus: Option<Vec3>,

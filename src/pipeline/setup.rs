@@ -12,6 +12,7 @@ use crate::render::{RenderSettings, RendererKind};
 use crate::scene::{
     Camera, CameraError, CameraPath, ColorMap, Exposure, LensSettings, NextFrame, Scene,
 };
+use crate::surface::slices::slice_times;
 use crate::surface::{SurfaceKind, SurfaceSettings};
 use crate::survey::FrameWeight;
 
@@ -102,6 +103,14 @@ pub struct Shutter {
     pub has_velocities: bool,
     /// Number of slices of the exposure in which surfaces other than spheres do not change.
     pub slices: u32,
+}
+
+impl Shutter {
+    /// The middles of the slices, as fractions of the step from the time of the frame.
+    pub(super) fn slice_times(&self) -> impl Iterator<Item = f64> + use<> {
+        let (middle, length) = (0.5 * (self.open + self.close), self.close - self.open);
+        slice_times(self.slices).map(move |time| middle + length * f64::from(time))
+    }
 }
 
 /// The settings of a job: its pictures, and the execution of a run.
@@ -239,10 +248,7 @@ impl Setup {
         };
         Some(Exposure {
             cameras: [at(shutter.open), at(shutter.close)],
-            slices: match picture.surface.kind {
-                SurfaceKind::Spheres => 1,
-                SurfaceKind::Union | SurfaceKind::Smooth => shutter.slices,
-            },
+            slices: self.slices(),
         })
     }
 
@@ -304,6 +310,16 @@ impl Setup {
             _ => return None,
         };
         Some(why.to_owned())
+    }
+
+    /// Number of slices of the exposure in which surfaces differ.
+    pub(super) fn slices(&self) -> u32 {
+        let has_moving_meshes = self.picture.meshes.iter().any(|mesh| mesh.tree.is_none());
+        let is_continuous = self.picture.surface.kind == SurfaceKind::Spheres && !has_moving_meshes;
+        match self.picture.shutter {
+            Some(shutter) if !is_continuous => shutter.slices,
+            _ => 1,
+        }
     }
 
     /// Whether there is motion blur.

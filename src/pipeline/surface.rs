@@ -8,7 +8,7 @@ use glam::Vec3;
 use spherule_formats::Radius;
 
 use super::decoded::DecodedFrame;
-use super::meshes::PictureMesh;
+use super::meshes::{MeshSlices, PictureMesh};
 use super::motion::expose;
 use super::setup::Setup;
 use crate::accel::moving::MovingTree;
@@ -21,8 +21,8 @@ use crate::report::FrameReport;
 use crate::scene::Scene;
 use crate::surface::mesh::{MeshSurface, MeshTree};
 use crate::surface::moving::MovingSpheres;
-use crate::surface::slices::SlicedSurface;
-use crate::surface::smooth::{SmoothError, SmoothGrid, SmoothReport, SmoothSurface};
+use crate::surface::slices::{SlicedSurface, slice_times};
+use crate::surface::smooth::{SmoothError, SmoothGrid, SmoothReport};
 use crate::surface::spheres::SphereSurface;
 use crate::surface::spray::{DROP_RADIUS, spray_of};
 use crate::surface::union::UnionSurface;
@@ -123,7 +123,7 @@ impl SurfaceBuilder {
     /// The centres of the body at the middle of each slice of the exposure; without motion blur, as they are.
     fn slices(&self, setup: &Setup) -> Vec<f32> {
         match setup.picture.shutter {
-            Some(shutter) => SlicedSurface::<SmoothSurface<'_>>::times(shutter.slices).collect(),
+            Some(shutter) => slice_times(shutter.slices).collect(),
             None => vec![0.0],
         }
     }
@@ -259,7 +259,7 @@ impl SurfaceBuilder {
         &self,
         setup: &Setup,
         tree: TreeView<'_>,
-        meshes: &[Arc<MeshTree>],
+        meshes: &[MeshSlices],
         scene: &Scene,
         source: &dyn ShadeSource,
         film: &mut Film,
@@ -277,8 +277,8 @@ impl SurfaceBuilder {
         if !self.spray.tree().view().is_empty() {
             shapes.push(&*spray);
         }
-        let meshes: Vec<MeshSurface<'_>> = mesh_surfaces(&setup.picture.meshes, meshes).collect();
-        shapes.extend(meshes.iter().map(|mesh| mesh as &dyn Shape));
+        let meshes: Vec<_> = mesh_surfaces(&setup.picture.meshes, meshes).collect();
+        shapes.extend(meshes.iter().map(|mesh| &**mesh));
         render_into(film, &shapes, scene, source, &setup.picture.render, stop)
     }
 }
@@ -310,12 +310,20 @@ impl SurfaceBuilder {
 /// The shapes of `trees`, which are `meshes` of a picture.
 fn mesh_surfaces<'a>(
     meshes: &'a [PictureMesh],
-    trees: &'a [Arc<MeshTree>],
-) -> impl Iterator<Item = MeshSurface<'a>> {
+    trees: &'a [MeshSlices],
+) -> impl Iterator<Item = Box<dyn Shape + 'a>> {
     let meshes = meshes.iter().zip(trees).enumerate();
-    meshes.filter_map(|(index, (mesh, tree))| {
+    meshes.filter_map(|(index, (mesh, slices))| {
         let material = MaterialId::of_mesh(index)?;
-        Some(MeshSurface::new(tree, mesh.settings.faces, material))
+        let faces = mesh.settings.faces;
+        let surface = |tree: &'a Arc<MeshTree>| MeshSurface::new(tree, faces, material);
+        Some(match &slices[..] {
+            [tree] => Box::new(surface(tree)) as Box<dyn Shape>,
+            _ => Box::new(SlicedSurface::new(
+                slices.iter().map(surface).collect(),
+                false,
+            )),
+        })
     })
 }
 

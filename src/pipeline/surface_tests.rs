@@ -60,6 +60,7 @@ fn drawn(setup: &Setup, sequence: &Sequence, tracer: &mut CpuRenderer) -> Drawn 
         image: PathBuf::new(),
         preview: None,
         meshes: Vec::new(),
+        next_meshes: None,
         refused: None,
     };
     let loaded = load_frame(setup, sequence, &task).expect("readable");

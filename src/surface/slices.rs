@@ -1,7 +1,7 @@
 //! A surface that changes while the shutter is open, as one surface for each slice of the exposure.
 
 use super::shape::crossing_of_packet;
-use super::{Intersection, Intersections, Shape, Side};
+use super::{Intersection, Intersections, MaterialId, Shape, Side};
 use crate::accel::Coherence;
 use crate::math::{first_lanes, lanes_in};
 use crate::ray::{Ray, RayPacket};
@@ -27,11 +27,6 @@ impl<S: Shape> SlicedSurface<S> {
             slices,
             is_searched,
         }
-    }
-
-    /// The times at the middles of `count` slices, from -1/2 to 1/2.
-    pub fn times(count: u32) -> impl Iterator<Item = f32> {
-        (0..count).map(move |slice| (slice as f32 + 0.5) / count as f32 - 0.5)
     }
 
     fn middle(&self) -> &S {
@@ -69,6 +64,11 @@ impl<S: Shape> SlicedSurface<S> {
     }
 }
 
+/// The times at the middles of `count` slices, from -1/2 to 1/2.
+pub fn slice_times(count: u32) -> impl Iterator<Item = f32> {
+    (0..count).map(move |slice| (slice as f32 + 0.5) / count as f32 - 0.5)
+}
+
 /// The slice at `time`, of `count` slices.
 #[inline]
 #[expect(
@@ -94,6 +94,10 @@ impl<S: Shape> Shape for SlicedSurface<S> {
     /// The intersection in the middle of the exposure.
     fn crossing(&self, ray: &Ray, side: Side) -> Option<Intersection> {
         crossing_of_packet(self, ray, side)
+    }
+
+    fn material(&self) -> MaterialId {
+        self.middle().material()
     }
 
     fn is_connected(&self) -> bool {

@@ -359,3 +359,60 @@ fn images_depend_on_neither_threads_nor_structures() {
     let image = fs::read(workshop.join("a.exr")).expect("an image");
     assert!(image == all[0]["f.1.exr"]);
 }
+
+#[test]
+fn meshes_move_to_those_of_the_next_frame() {
+    let workshop = Workshop::new();
+    fs::create_dir_all(workshop.join("in")).expect("a directory");
+    for frame in 1..=3 {
+        let text = "1\nProperties=pos:R:3:velo:R:3\n0 0 30 0 0 0\n";
+        fs::write(workshop.join(format!("in/f_{frame}.xyz")), text).expect("a file");
+        // The edge of the wall moves by 1 to the right
+        let corner = Vec3::new(frame as f32 - 11.0, 0.0, -9.0);
+        let path = workshop.join(format!("wall_{frame}.stl"));
+        stl(&path, &side(corner, 9.0 * Vec3::X, 18.0 * Vec3::Z));
+    }
+    let options = [
+        "--mesh",
+        "wall_%d.stl",
+        "--ground=none",
+        "--set",
+        "output.transparent=true",
+        "--set",
+        "output.frame_time=1",
+        "--set",
+        "camera.shutter=1",
+        "--set",
+        "camera.shutter_offset=0",
+    ];
+    // More samples
+    let view = VIEW.map(|argument| if argument == "1" { "64" } else { argument });
+    let render = |out: &str| {
+        let pattern = format!("{out}/f.#.exr");
+        let command = ["render", "in", "-o", pattern.as_str()];
+        workshop.run(&[&command[..], &view, &options].concat())
+    };
+    let ran = render("out");
+    let told = ran.expect(0).errors();
+    assert!(!told.contains("not blurred"), "{told}");
+    // The part of the time for which the wall covers each pixel of the middle row, whose height is 2 tan(22.5 deg) 6
+    let pixel = 12.0 * 22.5_f32.to_radians().tan() / 36.0;
+    for frame in 1..=3 {
+        let picture = Picture::open(&workshop.join(format!("out/f.{frame}.exr")));
+        let row = &picture.floats("A")[18 * 64..][..64];
+        for (x, found) in (0_u8..).zip(row) {
+            let at = (f32::from(x) + 0.5 - 32.0) * pixel;
+            let edge = frame as f32 - 2.0;
+            let expected = (edge + 1.0 - at).clamp(0.0, 1.0);
+            assert!(
+                (found - expected).abs() < 0.1,
+                "{frame} {x}: {found} {expected}"
+            );
+        }
+    }
+    // Meshes with other triangles stay where they are
+    tank(&workshop.join("wall_2.stl"));
+    let ran = render("other");
+    let told = ran.expect(0).errors();
+    assert!(told.contains("wall_2.stl has other triangles"), "{told}");
+}
