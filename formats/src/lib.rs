@@ -8,12 +8,11 @@
 
 mod attribute;
 mod budget;
+mod compression;
 mod decode;
-mod decompress;
 mod error;
 mod format;
 mod frame;
-mod gzip;
 mod message;
 mod origin;
 mod reader;

@@ -15,8 +15,8 @@ mod xml;
 use std::ffi::OsStr;
 use std::path::Path;
 
+use crate::compression::strip_extension;
 use crate::detect::Format;
-use crate::registry::strip_gz;
 
 pub(super) use expand::{Expansion, ListedFiles, expand};
 #[doc(hidden)]
@@ -78,7 +78,7 @@ pub(super) fn has_list_name(path: &Path) -> bool {
 fn has_extension(path: &Path, known: &[&str]) -> bool {
     let name = path.file_name().map(OsStr::to_string_lossy);
     let name = name.unwrap_or_default().to_ascii_lowercase();
-    let extension = strip_gz(&name).rsplit_once('.');
+    let extension = strip_extension(&name).rsplit_once('.');
     extension.is_some_and(|(_, extension)| known.contains(&extension))
 }
 
