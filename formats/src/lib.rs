@@ -8,12 +8,11 @@
 
 mod attribute;
 mod budget;
+mod compression;
 mod decode;
-mod decompress;
 mod error;
 mod format;
 mod frame;
-mod gzip;
 mod message;
 mod origin;
 mod reader;
@@ -45,5 +44,5 @@ pub use message::{escape_controls, is_control};
 pub use open::FrameFile;
 pub use origin::choose_origin;
 pub use scalar::{Endian, ScalarType};
-pub use sequence::{Sequence, SequenceError, SequenceFrame, SequenceInput};
+pub use sequence::{Sequence, SequenceError, SequenceFrame, SequenceInput, SequenceSettings};
 pub use value_error::ValueError;

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::compression::strip_extension;
 use crate::format::Format;
 use crate::native;
 use crate::read::{bgeo, csv, gsd, lammps, npy, ply, vtk, vtk_xml, xyz};
@@ -27,18 +28,13 @@ impl Format {
         FORMATS
     }
 
-    /// The format that the name of the file suggests, without `.gz`; `None` for other names.
+    /// The format that the name of the file suggests, without the extension of a compression; `None` for other names.
     pub fn by_name(path: &Path) -> Option<Self> {
         let name = path.file_name()?.to_string_lossy().to_ascii_lowercase();
-        let (stem, extension) = strip_gz(&name).rsplit_once('.')?;
+        let (stem, extension) = strip_extension(&name).rsplit_once('.')?;
         let matches = |format: &&Self| format.reader().matches_name(stem, extension);
         FORMATS.iter().find(matches).copied()
     }
-}
-
-/// `name` without a final `.gz`; `name` must be in lower case.
-pub(crate) fn strip_gz(name: &str) -> &str {
-    name.strip_suffix(".gz").unwrap_or(name)
 }
 
 #[cfg(test)]
@@ -63,6 +59,8 @@ mod tests {
     fn names_suggest_formats() {
         let by_name = |name: &str| Format::by_name(Path::new(name));
         assert_eq!(by_name("x/dump.drop.1200.lammps.gz"), Some(lammps::FORMAT));
+        assert_eq!(by_name("a_7.vtu.zst"), Some(vtk_xml::FORMAT));
+        assert_eq!(by_name("a_7.zip"), None);
         assert_eq!(by_name("dump.250"), Some(lammps::FORMAT));
         assert_eq!(by_name("A_7.VTK"), Some(vtk::FORMAT));
         assert_eq!(by_name("notes.12"), None);

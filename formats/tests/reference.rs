@@ -166,3 +166,8 @@ fn compare(name: &str) -> usize {
 fn gsd_is_what_the_reference_reader_gives() {
     assert_eq!(compare("gsd"), 111);
 }
+
+#[test]
+fn collections_are_what_the_reference_readers_give() {
+    assert_eq!(compare("collections"), 54);
+}

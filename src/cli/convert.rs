@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use spherule_formats::detect::Format;
 use spherule_formats::native::{Bound, Encoding, FORMAT};
 use spherule_formats::sequence::Sequence;
-use spherule_formats::{MemoryBudget, SequenceInput};
+use spherule_formats::{MemoryBudget, SequenceInput, SequenceSettings};
 use spherule_jobs::FrameRange;
 
 use super::job::{FinishedRun, JobArgs, report_kept, use_threads};
@@ -47,6 +47,9 @@ pub(super) struct ConvertArgs {
         help_heading = "Input"
     )]
     frames: Option<FrameRange>,
+    /// Read files outside the directory of a list of files, such as a .pvd, that names them.
+    #[arg(long, help_heading = "Input")]
+    follow_links: bool,
     /// Radius of all particles [default: from the files, else half the typical distance of neighbours]
     #[arg(long, value_parser = positive, help_heading = "Input")]
     radius: Option<f32>,
@@ -113,8 +116,11 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, CliError> {
     use_threads(args.threads)?;
     let input = SequenceInput::from_paths(args.input.clone());
     let limit = |memory: Bytes| MemoryBudget::new(memory.0, MEMORY_REMEDY);
-    let budget = conversion_budget(args.memory.map(limit));
-    let sequence = in_thread(|| Sequence::open_within(&input, budget))?;
+    let settings = SequenceSettings {
+        budget: conversion_budget(args.memory.map(limit)),
+        follow_links: args.follow_links,
+    };
+    let sequence = in_thread(|| Sequence::open_with(&input, settings))?;
     for note in sequence.notes() {
         note!("{note}");
     }

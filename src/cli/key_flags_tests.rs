@@ -41,6 +41,7 @@ const FLAGS: [(&str, &str); 34] = [
     ("--exact-surface", "surface.exact = true"),
     ("--spray", "surface.spray = true"),
     ("--no-mmap", "input.mmap = false"),
+    ("--follow-links", "input.follow_links = true"),
     ("--parts a,b", "input.parts = [\"a\", \"b\"]"),
     ("--accelerator bvh", "render.accelerator = \"bvh\""),
     ("--memory-limit 4GiB", "render.memory_limit = \"4GiB\""),

@@ -58,7 +58,10 @@ pub fn convert_frame(
 ) -> Result<ConvertedFrame, ConvertError> {
     let start = Instant::now();
     let convert = |source: &dyn ParticleSource, notes: Vec<String>| {
-        let settings = conversion.engine_settings(source);
+        let settings = convert::ConvertSettings {
+            time: sequence.listed_time(task.index),
+            ..conversion.engine_settings(source)
+        };
         let report = convert(source, &task.output, &settings, progress)?;
         Ok(ConvertedFrame::new(&report, start, notes))
     };
@@ -109,6 +112,7 @@ impl Conversion {
             other_attributes: AttributeChoice::AsIs,
             attributes: source.attributes().iter().map(choice).collect(),
             keep_ids: settings.keep_ids,
+            time: None,
             scratch_dir: None,
         }
     }

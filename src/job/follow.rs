@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use spherule_formats::{Sequence, SequenceError};
+use spherule_formats::{FrameError, Sequence, SequenceError};
 use spherule_jobs::Interrupt;
 
 use super::complete_frames::CompleteFrames;
@@ -156,11 +156,12 @@ impl<'a> Follower<'a> {
     }
 }
 
-/// Whether the error is expected before a simulation has written its first frame.
+/// Whether the error is expected before a simulation has written its first frame, or while it writes a list of files.
 fn is_not_written_yet(error: &SequenceError) -> bool {
     matches!(
         error,
-        SequenceError::Missing { .. }
+        SequenceError::List(FrameError::Malformed { .. })
+            | SequenceError::Missing { .. }
             | SequenceError::NoFrames { .. }
             | SequenceError::NoMatch { .. }
     )

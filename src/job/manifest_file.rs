@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 use spherule_formats::MemoryBudget;
-use spherule_formats::sequence::{Sequence, SequenceInput};
+use spherule_formats::sequence::{Sequence, SequenceInput, SequenceSettings};
 use spherule_jobs::{publish, read_regular_text};
 
 use super::{RunError, in_thread};
@@ -56,9 +56,12 @@ impl JobManifest {
     pub fn open_sequence(&self) -> Result<Sequence, RunError> {
         let input = &self.manifest.input;
         let paths = input.path.iter().map(|p| self.base.join(p)).collect();
-        let budget = reading_budget(&self.manifest);
+        let settings = SequenceSettings {
+            budget: reading_budget(&self.manifest),
+            follow_links: input.follow_links,
+        };
         let paths = SequenceInput::from_paths(paths);
-        let mut sequence = in_thread(|| Sequence::open_within(&paths, budget))?;
+        let mut sequence = in_thread(|| Sequence::open_with(&paths, settings))?;
         if let Some(parts) = &input.parts {
             sequence.keep_parts(parts)?;
         }

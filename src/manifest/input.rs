@@ -70,6 +70,10 @@ section! {
         ///
         /// Case does not matter, and a fragment of a name is enough.
         parts: Option<Vec<String>> = None, example("[\"fluid\"]"), unset("all"), flag("parts", "LIST", "Input");
+        /// Read files outside the directory of a list of files, such as a .pvd, that names them
+        ///
+        /// Without it, a list may only name files in its own directory and in those below.
+        follow_links: bool = false, affects(Affects::Nothing), flag("follow-links", "", "Input");
         /// Particle radius: a length, auto, or { attribute = "radius", scale = 1.0 }
         ///
         /// `auto` takes the radius from the files. Without one, it is half the typical distance between neighbours

@@ -73,7 +73,7 @@ pub fn load_frame(
     let opened = StoredFrame::open(setup, sequence, task.index);
     let mut loaded = match opened.map_err(|e| newest(e, sequence, task))? {
         Opened::InPlace(frame, clamped_radii) => LoadedFrame {
-            time: frame.time(),
+            time: sequence.listed_time(task.index).or(frame.time()),
             task: task.clone(),
             notes,
             focus: None,

@@ -42,6 +42,17 @@ impl FrameSample {
         index: usize,
         question: RadiusQuestion,
     ) -> Result<Self, FrameError> {
+        let mut sample = Self::of_source(sequence, index, question)?;
+        let time = &mut sample.particles.time;
+        *time = sequence.listed_time(index).or(*time);
+        Ok(sample)
+    }
+
+    fn of_source(
+        sequence: &Sequence,
+        index: usize,
+        question: RadiusQuestion,
+    ) -> Result<Self, FrameError> {
         match sequence.native_file(index) {
             Some(path) => {
                 let file = NativeFile::open(path, Access::Map)?;

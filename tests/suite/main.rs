@@ -9,6 +9,7 @@ mod arithmetic;
 mod bad_input;
 mod camera;
 mod channels;
+mod collections;
 mod colors;
 mod convert;
 mod corpus;

@@ -121,7 +121,7 @@ impl<'a> FrameOutput<'a> {
             attributes: attributes
                 .map(|(column, error)| column.spec(*error))
                 .collect(),
-            time: source.time(),
+            time: settings.time.or(source.time()),
             step: source.step(),
             dropped: source.count() - self.survey.count,
         };

@@ -31,6 +31,8 @@ pub struct ConvertSettings {
     pub attributes: Vec<(String, AttributeChoice)>,
     /// Whether to store each particle's index in the source, as an attribute `id` if the source has none.
     pub keep_ids: bool,
+    /// Simulation time of the frame; `None` takes that of the source.
+    pub time: Option<f64>,
     /// The directory of the unnamed scratch file for data that does not fit into memory; `None` is the
     /// directory of the frame.
     pub scratch_dir: Option<PathBuf>,
@@ -55,6 +57,7 @@ impl Default for ConvertSettings {
             other_attributes: AttributeChoice::AsIs,
             attributes: Vec::new(),
             keep_ids: false,
+            time: None,
             scratch_dir: None,
         }
     }

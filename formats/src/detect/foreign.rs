@@ -41,23 +41,27 @@ const MAGICS: &[(&[u8], &str)] = &[
     ),
     (
         b"\x28\xb5\x2f\xfd",
-        "zstd-compressed, which is not read; unpack with `zstd -d`, or use gzip",
+        "zstd inside another compression, which is not read; unpack it once",
     ),
     (
         b"\xfd7zXZ\0",
-        "xz-compressed, which is not read; unpack with `xz -d`, or use gzip",
+        "xz inside another compression, which is not read; unpack it once",
     ),
     (
         b"BZh",
-        "bzip2-compressed, which is not read; unpack with `bzip2 -d`, or use gzip",
+        "bzip2 inside another compression, which is not read; unpack it once",
     ),
     (
         b"\x04\x22\x4d\x18",
-        "lz4-compressed, which is not read; unpack with `lz4 -d`, or use gzip",
+        "LZ4 inside another compression, which is not read; unpack it once",
     ),
     (
         b"\x1f\x8b",
-        "gzip inside gzip, which is not read; unpack it once",
+        "gzip inside gzip or another compression, which is not read; unpack it once",
+    ),
+    (
+        b"\x02\x21\x4c\x18",
+        "the older LZ4 format, which is not read; compress with another version of `lz4`, or without -l",
     ),
     (
         b" BDV",

@@ -3,7 +3,7 @@
 //! Extensions lie (`.vtk` is text or binary, `.xyz` is three unrelated things, partio gzips
 //! `.bgeo`), so signatures decide and the name only breaks ties. Files that are known but not
 //! read get an error that says what to do instead (`foreign.rs`). [`crate::open`] decompresses
-//! gzip before; the readers themselves are in [`crate::read`].
+//! files before; the readers themselves are in [`crate::read`].
 
 use std::path::Path;
 
@@ -167,16 +167,16 @@ mod tests {
     #[test]
     fn known_unsupported_formats_have_a_remedy() {
         let collection = b"<VTKFile type=\"Collection\" version=\"0.1\">";
-        refused("a.pvd", collection, "give those files");
+        refused("a.pvd", collection, "give one of the files");
         refused(
             "a.pvtu",
             b"<VTKFile type='PUnstructuredGrid'>",
-            "give the pieces",
+            "lists other files",
         );
         refused(
             "a.vtm",
             b"<VTKFile type=\"vtkMultiBlockDataSet\">",
-            "give the blocks",
+            "lists other files",
         );
         refused("a.vti", b"<VTKFile type=\"ImageData\">", "ImageData");
         let odd = b"<VTKFile type=\"a\n\x1b[2J\">";

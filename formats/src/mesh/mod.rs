@@ -14,12 +14,13 @@ use std::path::Path;
 
 pub use builder::Mesh;
 
+use crate::compression::strip_extension;
 use crate::open::read_whole;
 use crate::read::{ply, vtk, vtk_xml};
 use crate::reader::{Confidence, HEAD_LEN};
 use crate::{FrameError, MemoryBudget, ParseError};
 
-/// Reads the mesh in the file at `path`, gzipped or not: STL, OBJ, PLY, legacy VTK or VTK XML.
+/// Reads the mesh in the file at `path`, compressed or not: STL, OBJ, PLY, legacy VTK or VTK XML.
 ///
 /// Polygons are split into fans around their first corner. Of volumes (tetrahedra and the like), only the surface is
 /// read. A vertex may be NaN or infinite.
@@ -71,11 +72,9 @@ pub fn parse_mesh(bytes: &[u8], path: &Path, budget: MemoryBudget) -> Result<Mes
     }
 }
 
-/// Whether the file name ends with `extension`, which may be followed by `.gz`.
+/// Whether the file name ends with `extension`, which may be followed by that of a compression.
 fn is_named(path: &Path, extension: &str) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let name = name.to_ascii_lowercase();
-    name.strip_suffix(".gz")
-        .unwrap_or(&name)
-        .ends_with(extension)
+    strip_extension(&name).ends_with(extension)
 }

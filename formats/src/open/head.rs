@@ -4,17 +4,16 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-use flate2::bufread::GzDecoder;
-
-use crate::FrameError;
+use super::streamed::decompressor;
+use crate::compression::{ByteStream, StreamError, is_compressed};
 use crate::detect::Format;
-use crate::gzip::is_gzip;
 use crate::message::one_line;
 use crate::native::{self, MappedFile};
 use crate::reader::HEAD_LEN;
 use crate::regular::regular_len;
+use crate::{FrameError, MemoryBudget};
 
-/// Whether the file at `path` begins as a native frame, without gzip around it.
+/// Whether the file at `path` begins as a native frame, without compression around it.
 ///
 /// # Errors
 /// [`FrameError`] if the file cannot be read, or is not a regular file.
@@ -29,7 +28,8 @@ pub fn is_native(path: &Path) -> Result<bool, FrameError> {
     }
 }
 
-/// The format of the file at `path` by its first bytes, gzip or not. Reads a few KiB at most.
+/// The format of the file at `path` by its first bytes, compressed or not. Reads a few KiB, or one block of
+/// bzip2 or LZ4.
 ///
 /// # Errors
 /// As [`super::FrameFile::open`], as far as the first bytes decide.
@@ -49,7 +49,7 @@ pub fn remarks(path: &Path) -> Vec<String> {
             return Ok(reader.remarks(&head));
         }
         let map = MappedFile::open(path)?;
-        if is_gzip(map.bytes()) {
+        if is_compressed(map.bytes()) {
             return Ok(reader.remarks(&head));
         }
         let remarks = reader.remarks(map.bytes());
@@ -60,21 +60,18 @@ pub fn remarks(path: &Path) -> Vec<String> {
     remarks.map(one_line).collect()
 }
 
-/// The first bytes of the file at `path`, decompressed if it is gzip.
+/// The first bytes of the file at `path`, decompressed. Damage that comes later, or that lets some bytes pass, is no
+/// error here.
 pub(crate) fn head(path: &Path) -> Result<Vec<u8>, FrameError> {
-    let io = |e| FrameError::io(path, e);
     regular_len(path)?;
-    let mut stored = Vec::new();
-    File::open(path)
-        .and_then(|f| f.take(4 * HEAD_LEN as u64).read_to_end(&mut stored))
-        .map_err(io)?;
-    if !is_gzip(&stored) {
-        return Ok(stored);
-    }
+    let mut stream = decompressor(path, MemoryBudget::UNLIMITED)?;
+    let most = match stream.is_compressed() {
+        true => HEAD_LEN,
+        false => 4 * HEAD_LEN,
+    };
     let mut head = Vec::new();
-    // The end is cut off on purpose, so an early end is not a fault here.
-    let _ = GzDecoder::new(stored.as_slice())
-        .take(HEAD_LEN as u64)
-        .read_to_end(&mut head);
-    Ok(head)
+    match stream.fill(&mut head, most) {
+        Err(StreamError::Io(error)) => Err(FrameError::io(path, error)),
+        Ok(_) | Err(StreamError::Bytes(_)) => Ok(head),
+    }
 }

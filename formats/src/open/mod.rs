@@ -1,4 +1,4 @@
-//! Opens one particle file: reads it, decompresses gzip, finds the format and the steps inside.
+//! Opens one particle file: reads it, decompresses it, finds the format and the steps inside.
 //!
 //! The only place that reads foreign files; the readers see bytes. Text is read in pieces from the disk,
 //! files of several steps are mapped step by step, other files are read as a whole, all within a [`MemoryBudget`]. A
@@ -10,9 +10,8 @@ use std::path::{Path, PathBuf};
 
 use rkyv::util::AlignedVec;
 
-use crate::decompress::{ByteStream, Decompressor, StreamError};
+use crate::compression::{ByteStream, Decompressor, StreamError};
 use crate::detect::Format;
-use crate::gzip::is_gzip;
 use crate::native;
 use crate::read::{ByteSource, Step};
 use crate::reader::FileExtent;
@@ -24,7 +23,7 @@ mod mapped;
 mod streamed;
 mod whole;
 
-pub use crate::gzip::unpacked_len;
+pub use crate::compression::unpacked_len;
 pub(crate) use head::head;
 pub use head::{detect_file, is_native, remarks};
 pub(crate) use whole::read_whole;
@@ -76,7 +75,7 @@ impl Content {
     fn held_len(&self, format: Format) -> u64 {
         let held = self.head().len() as u64;
         match self {
-            Self::Streamed(file) => held + format.stream_bytes(file.head()),
+            Self::Streamed(file) => held + format.stream_bytes(file.head()) + file.decoder_len(),
             Self::Whole(_) | Self::Aligned(_) | Self::Stepped(_) => held,
         }
     }
@@ -120,7 +119,7 @@ impl FrameFile {
     ) -> Result<(Content, FileStamp, Vec<String>), FrameError> {
         let in_file = |e: StreamError| e.in_file(path);
         let stamp = FileStamp::of(path)?;
-        let mut stream = decompressor(path)?;
+        let mut stream = decompressor(path, budget)?;
         let is_compressed = stream.is_compressed();
         let mut bytes = Vec::new();
         if !is_compressed {
@@ -134,7 +133,8 @@ impl FrameFile {
             return Ok((Content::Whole(bytes), stamp, stream.into_notes()));
         }
         if format.is_streamed(&bytes) {
-            let file = StreamedFile::new(bytes, is_compressed, stamp);
+            let decoder_len = is_compressed.then(|| stream.decoder_len());
+            let file = StreamedFile::new(bytes, decoder_len, stamp);
             return Ok((Content::Streamed(Box::new(file)), stamp, Vec::new()));
         }
         if !is_compressed && format.may_hold_many_steps() {
@@ -176,16 +176,17 @@ impl FrameFile {
         let stored_len = bytes.len() as u64;
         let in_file = |e: StreamError| e.in_file(path);
         let mut notes = Vec::new();
-        let bytes = if is_gzip(&bytes) {
-            let mut unpacked = Vec::new();
-            let source = Decompressor::new(Cursor::new(bytes)).map_err(StreamError::Io);
-            let source = source.map_err(in_file)?;
-            let left = source.finish(&mut unpacked, budget.for_content());
-            notes.extend(left.map_err(in_file)?);
-            unpacked
-        } else {
-            bytes
+        let stream = Decompressor::new(Cursor::new(&bytes), budget).map_err(in_file)?;
+        let unpacked = match stream.is_compressed() {
+            true => {
+                let mut unpacked = Vec::new();
+                let left = stream.finish(&mut unpacked, budget.for_content());
+                notes.extend(left.map_err(in_file)?);
+                Some(unpacked)
+            }
+            false => None,
         };
+        let bytes = unpacked.unwrap_or(bytes);
         Self::new(path, Content::Whole(bytes), stored_len, notes, budget)
     }
 

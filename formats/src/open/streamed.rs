@@ -5,9 +5,8 @@ use std::io::BufReader;
 use std::path::Path;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use crate::decompress::Decompressor;
+use crate::compression::{Decompressor, unpacked_len};
 use crate::detect::Format;
-use crate::gzip::unpacked_len;
 use crate::read::{ByteSource, Step, TextInput};
 use crate::regular::FileStamp;
 use crate::{FrameError, MemoryBudget, ParseError, RawParticles};
@@ -17,7 +16,8 @@ use crate::{FrameError, MemoryBudget, ParseError, RawParticles};
 pub(super) struct StreamedFile {
     /// Its beginning, decompressed.
     head: Arc<[u8]>,
-    is_compressed: bool,
+    /// Bytes that the decoder holds beside its output; `None` for a file that is not compressed.
+    decoder_len: Option<u64>,
     /// The file when it was opened.
     stamp: FileStamp,
     /// Known once the file has been read to its end.
@@ -36,11 +36,12 @@ struct StreamEnd {
 }
 
 impl StreamedFile {
-    /// The file that had `stamp` and begins with `head`.
-    pub(super) fn new(head: Vec<u8>, is_compressed: bool, stamp: FileStamp) -> Self {
+    /// The file that had `stamp` and begins with `head`. `decoder_len` are the bytes that its decoder holds, if it is
+    /// compressed.
+    pub(super) fn new(head: Vec<u8>, decoder_len: Option<u64>, stamp: FileStamp) -> Self {
         Self {
             head: head.into(),
-            is_compressed,
+            decoder_len,
             stamp,
             end: OnceLock::new(),
             parked: Mutex::new(None),
@@ -51,11 +52,20 @@ impl StreamedFile {
         &self.head
     }
 
+    const fn is_compressed(&self) -> bool {
+        self.decoder_len.is_some()
+    }
+
+    /// Bytes that the decoder holds beside its output.
+    pub(super) fn decoder_len(&self) -> u64 {
+        self.decoder_len.unwrap_or(0)
+    }
+
     /// Bytes of the file, decompressed. An estimate for a compressed file that has not been read to its end.
     pub(super) fn unpacked_len(&self, path: &Path) -> u64 {
         match self.end.get() {
             Some(end) => end.len,
-            None if !self.is_compressed => self.stamp.len,
+            None if !self.is_compressed() => self.stamp.len,
             None => unpacked_len(path).unwrap_or(self.stamp.len),
         }
     }
@@ -95,7 +105,7 @@ impl StreamedFile {
         };
         let particles = format.read_within(&mut source, step, budget);
         // Only the end of a compressed file shows whether all of it is sound.
-        if self.is_compressed && self.end.get().is_none() && particles.is_ok() {
+        if self.is_compressed() && self.end.get().is_none() && particles.is_ok() {
             source.text().finish();
         }
         let particles = self.checked(path, &mut source, particles)?;
@@ -108,12 +118,12 @@ impl StreamedFile {
 
     /// The file at `path` from its beginning.
     fn source(&self, path: &Path, budget: MemoryBudget) -> Result<ByteSource<'static>, FrameError> {
-        let stream = Box::new(decompressor(path)?);
+        let stream = Box::new(decompressor(path, budget)?);
         let about = unpacked_len(path).unwrap_or(self.stamp.len);
         let about = usize::try_from(about).unwrap_or(usize::MAX);
         let len = match self.end.get() {
             Some(end) => usize::try_from(end.len).ok(),
-            None => (!self.is_compressed).then_some(about),
+            None => (!self.is_compressed()).then_some(about),
         };
         let head = Arc::clone(&self.head);
         let lens = (len, len.unwrap_or(about));
@@ -141,12 +151,15 @@ impl StreamedFile {
     }
 }
 
-/// The content of the file at `path`, decompressed, from its beginning.
+/// The content of the file at `path`, decompressed, from its beginning. The decoder holds no more than `budget`.
 ///
 /// # Errors
-/// [`FrameError::Io`].
-pub(super) fn decompressor(path: &Path) -> Result<Decompressor<BufReader<File>>, FrameError> {
+/// [`FrameError`] if it cannot be read, or is compressed in a way that is not read.
+pub(super) fn decompressor(
+    path: &Path,
+    budget: MemoryBudget,
+) -> Result<Decompressor<BufReader<File>>, FrameError> {
     let file = File::open(path).map(|file| BufReader::with_capacity(1 << 16, file));
-    let stream = file.and_then(Decompressor::new);
-    stream.map_err(|e| FrameError::io(path, e))
+    let file = file.map_err(|e| FrameError::io(path, e))?;
+    Decompressor::new(file, budget).map_err(|e| e.in_file(path))
 }

@@ -3,17 +3,17 @@
 use std::path::Path;
 
 use super::streamed::decompressor;
-use crate::gzip::unpacked_len;
+use crate::compression::unpacked_len;
 use crate::regular::FileStamp;
 use crate::{FrameError, MemoryBudget};
 
-/// All bytes of the regular file at `path`, decompressed if it is gzip.
+/// All bytes of the regular file at `path`, decompressed.
 ///
 /// # Errors
 /// [`FrameError`]; [`FrameError::TooLarge`] if there are more bytes than `budget` allows.
 pub(crate) fn read_whole(path: &Path, budget: MemoryBudget) -> Result<Vec<u8>, FrameError> {
     let stamp = FileStamp::of(path)?;
-    let stream = decompressor(path)?;
+    let stream = decompressor(path, budget)?;
     let mut len = stamp.len;
     if stream.is_compressed() {
         len = unpacked_len(path).unwrap_or(len);

@@ -4,8 +4,10 @@ use std::fmt::Write as _;
 use std::io;
 use std::path::PathBuf;
 
+use crate::{FrameError, escape_controls};
+
 /// Why no sequence could be made of an input. None of these is about the content of a frame:
-/// damaged files are reported when they are loaded.
+/// damaged files are reported when they are loaded, except lists of files.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SequenceError {
@@ -72,6 +74,35 @@ pub enum SequenceError {
         name: String,
         /// What there is.
         known: Vec<String>,
+    },
+    /// A list of files, such as a `.pvd`, that cannot be used.
+    #[error(transparent)]
+    List(FrameError),
+    /// A list names a file outside its directory.
+    #[error(
+        "{}: line {line}: `{}` is outside the directory of the list; allow it with --follow-links \
+         (input.follow_links = true), or copy the file there",
+        list.display(), escape_controls(file)
+    )]
+    Outside {
+        /// The list.
+        list: PathBuf,
+        /// Line in the list, from 1.
+        line: u32,
+        /// The name in the list.
+        file: String,
+    },
+    /// One of several lists has several time steps.
+    #[error(
+        "{}: {steps} time steps in one of several lists of files; give one such list at a time, or one list that names \
+         all parts",
+        path.display()
+    )]
+    SeveralLists {
+        /// The list.
+        path: PathBuf,
+        /// How many steps it has.
+        steps: usize,
     },
     /// The operating system refused to list a directory.
     #[error("{}: {source}", path.display())]

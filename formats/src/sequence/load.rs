@@ -1,6 +1,7 @@
 //! Reads frames of a sequence and merges their parts.
 
 use std::fs;
+use std::io;
 use std::path::Path;
 use std::sync::{Arc, PoisonError};
 use std::time::SystemTime;
@@ -9,7 +10,7 @@ use glam::DVec3;
 
 use super::{PartFile, Sequence, merge};
 use crate::open::FrameFile;
-use crate::{FrameError, ParseError, ParticleFrame, RawParticles};
+use crate::{FrameError, MemoryBudget, ParseError, ParticleFrame, RawParticles, escape_controls};
 
 /// A frame as it is in its files, and the memory that reading it took.
 #[derive(Debug)]
@@ -66,21 +67,29 @@ impl Sequence {
         let mut notes = Vec::new();
         let (mut all_bytes, mut content_bytes) = (0, 0);
         let mut parts = Vec::with_capacity(frame.parts.len());
+        let mut read_bytes = 0;
         for part in &frame.parts {
-            let (file, step) = self.file_of(part)?;
+            // A list can name any number of files for one step
+            let budget = match part.listed {
+                Some(_) => self.budget.less(read_bytes),
+                None => self.budget,
+            };
+            let (file, step) = self.file_of(part, budget)?;
             let particles = file.read(step)?;
+            read_bytes += particles.byte_len();
             notes.extend_from_slice(file.notes());
             all_bytes += file.unpacked_len();
             let held = file.held_len() + file.unpacked_arrays_len(&particles);
             content_bytes = content_bytes.max(held);
             parts.push((part.part, particles));
         }
-        let only = if self.parts.len() < 2 {
+        let only = if self.parts.len() < 2 && parts.len() == 1 {
             parts.pop().map(|(_, only)| only)
         } else {
             None
         };
-        let particles = only.unwrap_or_else(|| merge(parts, &mut notes));
+        let mut particles = only.unwrap_or_else(|| merge(parts, &mut notes));
+        particles.time = self.listed_time(index).or(particles.time);
         Ok(Loaded {
             particles,
             notes,
@@ -96,9 +105,14 @@ impl Sequence {
     }
 
     /// The opened file of `part` and the step in it.
-    fn file_of(&self, part: &PartFile) -> Result<(Arc<FrameFile>, usize), FrameError> {
+    fn file_of(
+        &self,
+        part: &PartFile,
+        budget: MemoryBudget,
+    ) -> Result<(Arc<FrameFile>, usize), FrameError> {
         let Some(step) = part.step else {
-            let file = FrameFile::open_within(&part.path, self.budget)?;
+            self.check_listed(part)?;
+            let file = FrameFile::open_within(&part.path, budget)?;
             return match file.steps() {
                 [_, second, ..] => {
                     let what = format!(
@@ -120,12 +134,37 @@ impl Sequence {
         }
         // Drop the old one first: two large files need not be in memory at once.
         *lock() = None;
-        let file = Arc::new(FrameFile::open_within(&part.path, self.budget)?);
+        let file = Arc::new(FrameFile::open_within(&part.path, budget)?);
         *lock() = Some(CachedFile {
             file: Arc::clone(&file),
             stamp,
         });
         Ok((file, step))
+    }
+}
+
+impl Sequence {
+    /// Checks that a file that a list names is there, and is no list that cannot be used.
+    ///
+    /// # Errors
+    /// [`FrameError`] that names the list and the place in it.
+    pub fn check_listed(&self, part: &PartFile) -> Result<(), FrameError> {
+        let faults = self.lists.as_ref().map(|lists| &lists.faults);
+        if let Some(fault) = faults.and_then(|faults| faults.get(&part.path)) {
+            return Err(fault.clone().in_file(&part.path));
+        }
+        match &part.listed {
+            Some(place) if !part.path.exists() => {
+                let what = format!(
+                    "line {}: it lists {}, which does not exist; copy the file there, or remove the entry",
+                    place.line,
+                    escape_controls(&part.path.to_string_lossy())
+                );
+                let source = io::Error::new(io::ErrorKind::NotFound, what);
+                Err(FrameError::io(&place.list, source))
+            }
+            _ => Ok(()),
+        }
     }
 }
 

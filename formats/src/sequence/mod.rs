@@ -3,7 +3,8 @@
 //!
 //! Grouping looks at names only (`group.rs` has the rules); contents are looked at where a format
 //! may hold several steps. What a file holds is checked when its frame is loaded, so one damaged
-//! file costs one frame and not the sequence.
+//! file costs one frame and not the sequence. Lists of files (ParaView collections and the like) are
+//! followed to the files of particles first (`collection`).
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -14,6 +15,7 @@ use crate::detect::Format;
 use crate::native::layout::UP_Y;
 use crate::native::{self, Access, NativeFile};
 
+mod collection;
 mod error;
 mod from_names;
 mod group;
@@ -25,6 +27,9 @@ mod notes;
 mod pattern;
 mod scan;
 
+#[doc(hidden)]
+pub use collection::lists_of;
+pub use collection::{ListSummary, is_list};
 pub use error::{GroupSummary, SequenceError};
 #[doc(hidden)]
 pub use from_names::{frames_of_list, frames_of_names};
@@ -32,6 +37,7 @@ pub use input::SequenceInput;
 pub use load::Loaded;
 pub use merge::{PART_ATTRIBUTE, merge};
 
+use collection::{Expansion, ListedFiles};
 use group::FileGroup;
 use input::listed_names;
 use load::{CachedFile, stamp};
@@ -48,6 +54,33 @@ pub struct PartFile {
     pub part: u32,
     /// Which step of the file; `None` for a file that is one step.
     pub step: Option<usize>,
+    /// Where a list of files names this one; `None` if the input does.
+    pub listed: Option<ListPlace>,
+}
+
+/// A place in a list of files, such as a `.pvd`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ListPlace {
+    /// The list.
+    pub list: Arc<Path>,
+    /// Line, from 1.
+    pub line: u32,
+}
+
+/// A file of the sequence with the number of one of its steps.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct NumberedStep {
+    number: i64,
+    file: PartFile,
+}
+
+/// How the files of a sequence are found and read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct SequenceSettings {
+    /// Memory for reading one file, and for the names in a list of files.
+    pub budget: MemoryBudget,
+    /// Whether lists of files may name files outside their directory.
+    pub follow_links: bool,
 }
 
 /// One time step: its number in the simulation and the files it is made of.
@@ -67,6 +100,8 @@ pub struct Sequence {
     notes: Vec<String>,
     cache: Mutex<Option<CachedFile>>,
     budget: MemoryBudget,
+    /// The lists that the frames come from, if there are some.
+    lists: Option<ListedFiles>,
 }
 
 impl Sequence {
@@ -78,11 +113,27 @@ impl Sequence {
         Self::open_within(input, MemoryBudget::UNLIMITED)
     }
 
-    /// Finds the frames of `input`. Each file is read within `budget`.
+    /// [`Self::open_with`] without files outside the directories of lists. Each file is read within `budget`.
     ///
     /// # Errors
-    /// [`SequenceError`] if there is nothing, or nothing shows which files belong together.
+    /// As [`Self::open_with`].
     pub fn open_within(input: &SequenceInput, budget: MemoryBudget) -> Result<Self, SequenceError> {
+        let settings = SequenceSettings {
+            budget,
+            ..SequenceSettings::default()
+        };
+        Self::open_with(input, settings)
+    }
+
+    /// Finds the frames of `input`.
+    ///
+    /// # Errors
+    /// [`SequenceError`] if there is nothing, or nothing shows which files belong together, or a list of files cannot
+    /// be followed.
+    pub fn open_with(
+        input: &SequenceInput,
+        settings: SequenceSettings,
+    ) -> Result<Self, SequenceError> {
         let mut notes = Vec::new();
         let group = match input {
             SequenceInput::Directory(path) => {
@@ -95,19 +146,33 @@ impl Sequence {
             }
             SequenceInput::Files(paths) => group::listed(listed_names(paths)?, &mut notes)?,
         };
-        Ok(Self::from_group(group, notes, budget))
+        if group
+            .files
+            .iter()
+            .any(|file| collection::is_list(&file.path))
+        {
+            let expansion = collection::expand(&group, settings, &mut notes)?;
+            return Ok(Self::from_expansion(expansion, notes, settings.budget));
+        }
+        Ok(Self::from_group(group, notes, settings.budget))
+    }
+
+    fn from_expansion(expansion: Expansion, mut notes: Vec<String>, budget: MemoryBudget) -> Self {
+        let frames = frames_of(expansion.steps);
+        note_missing_parts(&frames, &expansion.parts, &mut notes);
+        Self {
+            frames,
+            parts: expansion.parts,
+            notes,
+            cache: Mutex::new(None),
+            budget,
+            lists: Some(expansion.lists),
+        }
     }
 
     fn from_group(group: FileGroup, mut notes: Vec<String>, budget: MemoryBudget) -> Self {
         let (numbered, last) = scan::number_steps(group.files, budget, &mut notes);
-        let mut by_number = BTreeMap::<i64, Vec<PartFile>>::new();
-        for entry in numbered {
-            by_number.entry(entry.number).or_default().push(entry.file);
-        }
-        let frames: Vec<SequenceFrame> = by_number
-            .into_iter()
-            .map(|(number, parts)| SequenceFrame { number, parts })
-            .collect();
+        let frames = frames_of(numbered);
         note_gaps(&frames, &mut notes);
         note_missing_parts(&frames, &group.parts, &mut notes);
         let cache = last.filter(|f| f.steps().len() > 1).map(|file| CachedFile {
@@ -120,7 +185,24 @@ impl Sequence {
             notes,
             cache: Mutex::new(cache),
             budget,
+            lists: None,
         }
+    }
+
+    /// The lists of files that the frames come from; `None` if the input names the files of particles.
+    pub fn list_summary(&self) -> Option<&ListSummary> {
+        self.lists.as_ref().map(|lists| &lists.summary)
+    }
+
+    /// The lists of files that the frames come from, lists in lists included.
+    pub fn list_paths(&self) -> &[PathBuf] {
+        self.lists.as_ref().map_or(&[], |lists| &lists.paths)
+    }
+
+    /// The simulation time of frame `index` that a list of files states. It goes before that in the files.
+    pub fn listed_time(&self, index: usize) -> Option<f64> {
+        let number = self.frames.get(index)?.number;
+        self.lists.as_ref()?.times.get(&number).copied()
     }
 
     /// The frames, by number.
@@ -221,6 +303,18 @@ impl Sequence {
         let is_alone = self.parts.len() < 2 && part.step.is_none();
         is_alone.then_some(&part.path)
     }
+}
+
+/// The frames that `steps` make, by number.
+fn frames_of(steps: Vec<NumberedStep>) -> Vec<SequenceFrame> {
+    let mut by_number = BTreeMap::<i64, Vec<PartFile>>::new();
+    for entry in steps {
+        by_number.entry(entry.number).or_default().push(entry.file);
+    }
+    let frames = by_number.into_iter();
+    frames
+        .map(|(number, parts)| SequenceFrame { number, parts })
+        .collect()
 }
 
 /// Indices of the `parts` that match `name`, see [`Sequence::keep_parts`].

@@ -6,8 +6,8 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use crate::compression::strip_extension;
 use crate::read::sniff::is_digits;
-use crate::registry::strip_gz;
 
 /// A file name, split so that names of one sequence differ in `numbers` only.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -22,9 +22,9 @@ pub(super) struct FileName {
     digits: Vec<String>,
     /// Which of `numbers` a pattern's `#` stands for.
     pub frame_column: Option<usize>,
-    /// Lower case, without dot and `.gz`; empty if there is none.
+    /// Lower case, without dot and the extension of a compression; empty if there is none.
     pub extension: String,
-    /// As written, dot and `.gz` included.
+    /// As written, dot and the extension of a compression included.
     suffix: String,
 }
 
@@ -34,7 +34,7 @@ impl FileName {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let stem_len = stem_len(&name);
         let (stem, suffix) = name.split_at(stem_len);
-        let extension = strip_gz(&suffix.to_ascii_lowercase())
+        let extension = strip_extension(&suffix.to_ascii_lowercase())
             .trim_start_matches('.')
             .to_owned();
         let mut parts = Splitter::default();
@@ -93,10 +93,10 @@ impl FileName {
     }
 }
 
-/// Length of a file name without its extension and `.gz`. Digits are no extension (`dump.250`).
+/// Length of a file name without its extension and that of a compression. Digits are no extension (`dump.250`).
 fn stem_len(name: &str) -> usize {
     let lower = name.to_ascii_lowercase();
-    let plain = strip_gz(&lower);
+    let plain = strip_extension(&lower);
     match plain.rsplit_once('.') {
         Some((stem, extension)) if !stem.is_empty() && !is_digits(extension) => stem.len(),
         _ => plain.len(),

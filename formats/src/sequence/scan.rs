@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::collection::{has_list_name, has_timed_name};
 use super::group::GroupFile;
 use super::name::FileName;
 use super::pattern::Pattern;
-use super::{PartFile, SequenceError};
+use super::{NumberedStep, PartFile, SequenceError};
 use crate::MemoryBudget;
 use crate::detect::Format;
 use crate::open::{FrameFile, detect_file};
@@ -19,6 +20,9 @@ pub(super) fn directory(path: &Path) -> Result<Vec<FileName>, SequenceError> {
     let files = list(path)?;
     let known = files.iter().filter(|f| Format::by_name(f).is_some());
     let mut names: Vec<FileName> = known.map(|f| FileName::parse(f, None)).collect();
+    if names.is_empty() {
+        names = lists_among(&files);
+    }
     let mut refusal = None;
     if names.is_empty() {
         for file in &files {
@@ -38,6 +42,19 @@ pub(super) fn directory(path: &Path) -> Result<Vec<FileName>, SequenceError> {
         });
     }
     Ok(names)
+}
+
+/// The lists of files in a directory without particle files: the only one with times, else all.
+fn lists_among(files: &[PathBuf]) -> Vec<FileName> {
+    let timed: Vec<&PathBuf> = files.iter().filter(|f| has_timed_name(f)).collect();
+    let lists = match timed.as_slice() {
+        [only] => vec![*only],
+        _ => files.iter().filter(|f| has_list_name(f)).collect(),
+    };
+    lists
+        .into_iter()
+        .map(|f| FileName::parse(f, None))
+        .collect()
 }
 
 /// The files that fit `pattern`; those with a known name if any has one.
@@ -171,13 +188,6 @@ fn closest(missing: &Path, directory: &Path, files: &[PathBuf]) -> String {
     )
 }
 
-/// A file of the sequence with the number of one of its steps.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct NumberedStep {
-    pub number: i64,
-    pub file: PartFile,
-}
-
 /// Opens files that may hold several steps and numbers every step: by the number written in the
 /// file where all have one, else by counting from 0 in the order of the files.
 ///
@@ -208,6 +218,7 @@ pub(super) fn number_steps(
                 path: f.path.clone(),
                 part: f.part,
                 step: None,
+                listed: None,
             },
         });
         return (numbered.collect(), scan.last);
@@ -219,6 +230,7 @@ pub(super) fn number_steps(
                 path: file.path.clone(),
                 part: file.part,
                 step: Some(at),
+                listed: None,
             };
             entries.push((step.number, part_file));
         }
@@ -311,6 +323,7 @@ mod tests {
                 path,
                 part: 0,
                 step: Some(step),
+                listed: None,
             },
         )
     }

@@ -6,22 +6,24 @@ use spherule_formats::stats::FrameStats;
 use spherule_formats::{ParseError, ParticleFrame, RawParticles, choose_origin};
 
 mod convert;
+mod lists;
 mod mesh;
 mod names;
 mod native;
 mod packed;
 
 pub use convert::convert;
+pub use lists::lists;
 pub use mesh::mesh;
 pub use names::names;
 pub use native::native;
-pub use packed::{npz, open};
+pub use packed::{compressed, npz, open};
 
 /// A target: takes any bytes, panics where a promise is broken, returns the steps that were read.
 pub type Target = fn(&[u8]) -> usize;
 
 /// Every target by the name of its folder in `corpus`.
-pub const TARGETS: [(&str, Target); 15] = [
+pub const TARGETS: [(&str, Target); 17] = [
     ("vtk", vtk),
     ("vtk_xml", vtk_xml),
     ("bgeo", bgeo),
@@ -33,6 +35,8 @@ pub const TARGETS: [(&str, Target); 15] = [
     ("csv", csv),
     ("gsd", gsd),
     ("open", open),
+    ("compressed", compressed),
+    ("lists", lists),
     ("native", native),
     ("convert", convert),
     ("names", names),

@@ -7,7 +7,7 @@ use std::path::Path;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use spherule_formats::read;
-use spherule_formats::{FrameError, FrameFile};
+use spherule_formats::{FrameError, FrameFile, MemoryBudget};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
@@ -61,6 +61,44 @@ const NAMES: [&str; 12] = [
     "a.spf", "a.bin",
 ];
 
+/// Compressed files: the first byte picks a format and says whether a signature goes before the rest, so that most inputs
+/// reach a decoder. What can be decompressed is detected and read.
+pub fn compressed(bytes: &[u8]) -> usize {
+    let Some((choice, bytes)) = bytes.split_first() else {
+        return 0;
+    };
+    let signature = SIGNATURES[usize::from(choice >> 1) % SIGNATURES.len()];
+    let bytes = match choice & 1 {
+        0 => bytes.to_vec(),
+        _ => [signature, bytes].concat(),
+    };
+    let budget = MemoryBudget::new(DECOMPRESSED, "get more");
+    match FrameFile::from_bytes_within(Path::new("a.xyz"), bytes, budget) {
+        Ok(file) => {
+            assert!(file.bytes().len() as u64 <= DECOMPRESSED);
+            file.notes().iter().for_each(|note| check_message(note));
+            usize::from(file.read(0).is_ok())
+        }
+        Err(error) => {
+            check_message(&error.to_string());
+            0
+        }
+    }
+}
+
+/// Beginnings of compressed files.
+const SIGNATURES: [&[u8]; 6] = [
+    b"\x1f\x8b\x08\0",
+    b"\x28\xb5\x2f\xfd",
+    b"BZh91AY&SY",
+    b"\xfd7zXZ\0",
+    b"\x04\x22\x4d\x18",
+    b"PK\x03\x04",
+];
+
+/// Most bytes that an input may become.
+const DECOMPRESSED: u64 = 32 << 20;
+
 /// Detection and gzip: the first byte picks a name, the others are the file. The same bytes in gzip
 /// must be understood alike.
 pub fn open(bytes: &[u8]) -> usize {
@@ -69,7 +107,12 @@ pub fn open(bytes: &[u8]) -> usize {
     };
     let path = Path::new(NAMES[usize::from(*name) % NAMES.len()]);
     let plain = opened(path, bytes.to_vec());
-    if !bytes.starts_with(&[0x1f, 0x8b]) {
+    // What is compressed already would be compressed twice
+    if !SIGNATURES
+        .iter()
+        .any(|signature| bytes.starts_with(&signature[..2]))
+        && !is_skippable(bytes)
+    {
         match (&plain, &opened(path, gzip(bytes))) {
             (Ok(a), Ok(b)) => {
                 assert_eq!(a.bytes(), b.bytes());
@@ -80,6 +123,11 @@ pub fn open(bytes: &[u8]) -> usize {
         }
     }
     plain.map_or(0, |file| usize::from(read_first(&file)))
+}
+
+/// Whether `bytes` begin with a frame that zstd and LZ4 skip.
+fn is_skippable(bytes: &[u8]) -> bool {
+    bytes.get(1..4) == Some(b"\x2a\x4d\x18")
 }
 
 fn opened(path: &Path, bytes: Vec<u8>) -> Result<FrameFile, FrameError> {

@@ -122,7 +122,11 @@ impl ExportJob {
             note!("{note}");
         }
         let inputs = (0..sequence.frames().len()).flat_map(|index| sequence.inputs(index));
-        let inputs: Vec<PathBuf> = inputs.map(absolute).collect::<Result<_, _>>()?;
+        let lists = sequence.list_paths().iter().map(PathBuf::as_path);
+        let inputs: Vec<PathBuf> = inputs
+            .chain(lists)
+            .map(absolute)
+            .collect::<Result<_, _>>()?;
         let out = requested
             .absolute_base()?
             .join(requested.manifest.output.path.dir());

@@ -7,7 +7,7 @@ use clap::Args;
 use serde_json::json;
 use spherule_formats::native::{FORMAT, layout, verify};
 use spherule_formats::open::{is_native, remarks};
-use spherule_formats::sequence::lone_frame_number;
+use spherule_formats::sequence::{ListSummary, SequenceSettings, is_list, lone_frame_number};
 use spherule_formats::stats::FrameStats;
 use spherule_formats::{FrameError, FrameFile, Positions, Sequence, SequenceInput};
 
@@ -27,6 +27,8 @@ Examples:
       Counts, bounds and attributes of one file
   spherule inspect --json run1
       The same for all frames of a directory, as JSON
+  spherule inspect run1.pvd
+      Steps, parts and times of a ParaView collection, and its files
   spherule inspect --verify run1-native
       Check all frames for damage";
 
@@ -39,6 +41,9 @@ pub(super) struct InspectArgs {
     /// One JSON object per frame, one per line.
     #[arg(long)]
     json: bool,
+    /// Read files outside the directory of a list of files, such as a .pvd, that names them.
+    #[arg(long)]
+    follow_links: bool,
     /// Check everything: all sections of native frames, every number of other files.
     #[arg(long)]
     verify: bool,
@@ -65,10 +70,11 @@ struct Inspected<'a> {
 
 pub(super) fn run(args: &InspectArgs) -> Result<Outcome, CliError> {
     let mut outcome = Outcome::Done;
-    for meant in expand(&args.files) {
+    for meant in expand(args) {
         let inspected = match meant {
-            Meant::File(file, number) => {
-                inspect(&file, number, args).map_err(|e| (file, e.to_string()))
+            Meant::List(list) => Ok(list.print(args.json)),
+            Meant::File(file, place) => {
+                inspect(&file, place, args).map_err(|e| (file, e.to_string()))
             }
             Meant::Nothing(argument, why) => Err((argument, why)),
         };
@@ -94,37 +100,93 @@ pub(super) fn run(args: &InspectArgs) -> Result<Outcome, CliError> {
 
 /// The file that an argument refers to.
 enum Meant {
-    /// A file, with the frame number from its name if it belongs to a sequence.
-    File(PathBuf, Option<i64>),
+    /// A list of files.
+    List(InspectedList),
+    /// A file, with its frame.
+    File(PathBuf, FramePlace),
     /// An error.
     Nothing(PathBuf, String),
 }
 
+/// The frame of a file, as far as it is known without reading the file.
+#[derive(Debug, Clone, Copy)]
+struct FramePlace {
+    /// The number in the name if the file belongs to a sequence.
+    number: Option<i64>,
+    /// The simulation time that a list of files states.
+    time: Option<f64>,
+}
+
+/// A list of files, such as a `.pvd`.
+struct InspectedList {
+    path: PathBuf,
+    summary: ListSummary,
+    parts: Vec<String>,
+    /// Simulation time of each step.
+    times: Vec<Option<f64>>,
+}
+
+impl InspectedList {
+    /// The list at `path`, which `sequence` was made of; `None` if it was made of files of particles.
+    fn of(path: &Path, sequence: &Sequence) -> Option<Self> {
+        let steps = 0..sequence.frames().len();
+        let parts = sequence.part_names();
+        Some(Self {
+            path: path.to_owned(),
+            summary: sequence.list_summary()?.clone(),
+            parts: parts
+                .iter()
+                .filter(|part| !part.is_empty())
+                .cloned()
+                .collect(),
+            times: steps.map(|index| sequence.listed_time(index)).collect(),
+        })
+    }
+}
+
 /// The files of all arguments. An invalid argument does not affect the others.
-fn expand(arguments: &[PathBuf]) -> Vec<Meant> {
+fn expand(args: &InspectArgs) -> Vec<Meant> {
     let mut all = Vec::new();
     let mut known = HashSet::new();
-    for argument in arguments {
+    let settings = SequenceSettings {
+        budget: read_budget(None, None),
+        follow_links: args.follow_links,
+    };
+    for argument in &args.files {
         match SequenceInput::from_path(argument) {
-            SequenceInput::Files(listed) => {
+            SequenceInput::Files(listed) if !listed.iter().any(|file| is_list(file)) => {
                 for file in listed {
-                    let number = lone_frame_number(&file);
+                    let place = FramePlace {
+                        number: lone_frame_number(&file),
+                        time: None,
+                    };
                     known.insert(file.clone());
-                    all.push(Meant::File(file, number));
+                    all.push(Meant::File(file, place));
                 }
             }
-            input => match Sequence::open_within(&input, read_budget(None, None)) {
+            input => match Sequence::open_with(&input, settings) {
                 Err(error) => all.push(Meant::Nothing(argument.clone(), error.to_string())),
                 Ok(sequence) => {
-                    if let Some(parts) = parts_text(&sequence) {
+                    if let Some(list) = InspectedList::of(argument, &sequence) {
+                        all.push(Meant::List(list));
+                    } else if let Some(parts) = parts_text(&sequence) {
                         message!("{}: {parts}", argument.display());
                     }
-                    for frame in sequence.frames() {
+                    for (index, frame) in sequence.frames().iter().enumerate() {
+                        let place = FramePlace {
+                            number: Some(frame.number),
+                            time: sequence.listed_time(index),
+                        };
                         // A file with many steps is in many frames.
                         for part in &frame.parts {
-                            if known.insert(part.path.clone()) {
-                                all.push(Meant::File(part.path.clone(), Some(frame.number)));
+                            if !known.insert(part.path.clone()) {
+                                continue;
                             }
+                            let path = part.path.clone();
+                            all.push(match sequence.check_listed(part) {
+                                Ok(()) => Meant::File(path, place),
+                                Err(error) => Meant::Nothing(path, error.to_string()),
+                            });
                         }
                     }
                 }
@@ -137,18 +199,20 @@ fn expand(arguments: &[PathBuf]) -> Vec<Meant> {
 /// Inspects one file. The outer error is of the file, the inner one of the output.
 fn inspect(
     path: &Path,
-    number: Option<i64>,
+    place: FramePlace,
     args: &InspectArgs,
 ) -> Result<Result<Reader, CliError>, FrameError> {
     if is_native(path)? {
-        let inspected = native::inspect(path, number, args.verify)?;
+        let mut inspected = native::inspect(path, place.number, args.verify)?;
+        inspected.time = place.time.or(inspected.time);
         return Ok(inspected.print(args.json));
     }
     let file = FrameFile::open_within(path, read_budget(None, None))?;
     // For several steps, the metadata come from the first one.
     let mut remarks = remarks(path);
     for index in 0..file.steps().len() {
-        let mut inspected = read(&file, index, number)?;
+        let mut inspected = read(&file, index, place.number)?;
+        inspected.time = place.time.or(inspected.time);
         inspected.notes = std::mem::take(&mut remarks);
         if args.verify && inspected.native.is_some() {
             verify(file.bytes()).map_err(|e| e.in_file(path))?;

@@ -3,9 +3,34 @@
 use serde_json::{Value, json};
 use spherule_formats::stats::{AttributeStats, Number};
 
-use super::Inspected;
+use super::{Inspected, InspectedList};
 use crate::cli::CliError;
 use crate::cli::print::{self, Reader};
+
+impl InspectedList {
+    /// Prints one line of JSON, or several for people.
+    pub(super) fn print(&self, as_json: bool) -> Result<Reader, CliError> {
+        if as_json {
+            let summary = &self.summary;
+            return print::json(&json!({
+                "file": self.path.display().to_string(),
+                "list": summary.kind,
+                "steps": summary.step_count,
+                "files": summary.file_count,
+                "parts": self.parts,
+                "times": self.times,
+            }));
+        }
+        let mut lines = vec![
+            self.path.display().to_string(),
+            format!("  {}", self.summary),
+        ];
+        if !self.parts.is_empty() {
+            lines.push(format!("  parts {}", self.parts.join(", ")));
+        }
+        print::lines(lines)
+    }
+}
 
 impl Inspected<'_> {
     /// Prints one line of JSON, or several for people.

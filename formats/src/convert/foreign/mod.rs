@@ -6,8 +6,8 @@
 use std::path::Path;
 
 use super::ParticleSource;
+use crate::compression::is_compressed;
 use crate::detect::Format;
-use crate::gzip::is_gzip;
 use crate::native::MappedFile;
 use crate::read::columns::ParticleLayout;
 use crate::regular::regular_len;
@@ -25,7 +25,7 @@ use columns::ColumnSource;
 pub fn open_source(path: &Path) -> Result<Option<Box<dyn ParticleSource>>, FrameError> {
     regular_len(path)?;
     let file = MappedFile::open(path)?;
-    if is_gzip(file.bytes()) {
+    if is_compressed(file.bytes()) {
         return Ok(None);
     }
     let layout = layout_of(file.bytes(), path);

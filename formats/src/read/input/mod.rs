@@ -11,7 +11,7 @@ mod lines;
 mod pieces;
 
 use crate::MemoryBudget;
-use crate::decompress::{ByteStream, StreamError};
+use crate::compression::{ByteStream, StreamError};
 
 pub(super) use pieces::LinePiece;
 use pieces::PIECE;

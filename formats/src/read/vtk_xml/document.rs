@@ -13,6 +13,7 @@ use quick_xml::reader::Reader;
 use super::blocks::{ArrayEncoding, HeaderType};
 use super::compressor::Compressor;
 use super::short;
+use super::sniff::GIVE_LIST;
 use crate::{Endian, MemoryBudget, ParseError};
 
 /// The parsed XML.
@@ -320,19 +321,15 @@ fn root(start: &BytesStart<'_>, at: usize) -> Result<ArrayEncoding, ParseError> 
     let kind = attribute(start, at, "type")?.unwrap_or_default();
     match kind.as_str() {
         "UnstructuredGrid" | "PolyData" => {}
-        "PUnstructuredGrid" | "PPolyData" => {
-            return Err(ParseError::unsupported(format!(
-                "{kind} only lists the pieces of a time step; give the .vtu or .vtp files instead"
-            )));
-        }
-        "Collection"
+        "PUnstructuredGrid"
+        | "PPolyData"
+        | "Collection"
         | "vtkMultiBlockDataSet"
         | "vtkPartitionedDataSet"
         | "vtkPartitionedDataSetCollection"
         | "vtkHierarchicalBoxDataSet" => {
-            return Err(ParseError::unsupported(format!(
-                "{kind} only lists other files; give the .vtu or .vtp files instead"
-            )));
+            let what = format!("{kind} lists other files: {GIVE_LIST}");
+            return Err(ParseError::unsupported(what));
         }
         _ => {
             return Err(ParseError::unsupported(format!(
@@ -393,7 +390,15 @@ fn array<'a>(start: &BytesStart<'_>, at: usize) -> Result<DataArray<'a>, ParseEr
     })
 }
 
-fn attribute(start: &BytesStart<'_>, at: usize, name: &str) -> Result<Option<String>, ParseError> {
+/// The value of the attribute `name`, without white space around it.
+///
+/// # Errors
+/// [`ParseError`] at byte `at` if the attributes or the value are not XML.
+pub(crate) fn attribute(
+    start: &BytesStart<'_>,
+    at: usize,
+    name: &str,
+) -> Result<Option<String>, ParseError> {
     let found = start.try_get_attribute(name);
     let Some(found) = found.map_err(|error| bad_xml(at, &error))? else {
         return Ok(None);

@@ -2,8 +2,8 @@
 //! data, from any number of pieces, in every encoding that VTK, meshio and pyvisfile write.
 //!
 //! `document` reads the XML, `appended` finds the blob after it, `blocks` gets the bytes of
-//! an array out of either, `compressor` unpacks them, `merge` puts pieces together, `mesh` reads cells. Files that
-//! only list other files (`.pvtu`, `.vtm`, `.pvd`) and grids are refused by name. Layout after "VTK
+//! an array out of either, `compressor` unpacks them, `merge` puts pieces together, `mesh` reads cells. Lists
+//! of files (`.pvtu`, `.vtm`, `.pvd`) are left to [`crate::sequence`]; grids are refused by name. Layout after "VTK
 //! File Formats" (the VTK user's guide) and after files of VTK 9, ParaView, meshio and PySPH.
 
 mod appended;
@@ -16,7 +16,9 @@ mod sniff;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use document::attribute;
 pub(crate) use mesh::read_mesh;
+pub(crate) use sniff::root_type;
 
 use std::cell::Cell;
 
@@ -335,7 +337,7 @@ fn value_count(
 }
 
 /// A name from the file, short enough for a message.
-fn short(name: &str) -> String {
+pub(crate) fn short(name: &str) -> String {
     name.chars()
         .take(40)
         .flat_map(char::escape_default)

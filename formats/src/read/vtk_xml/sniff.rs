@@ -1,39 +1,48 @@
-//! Particle files among XML VTK files, by the `type` of the root element.
+//! Particle files and lists of files among XML VTK files, by the `type` of the root element.
 
 use crate::ParseError;
 use crate::reader::Confidence;
 
 /// See [`crate::reader::Reader::sniff`].
 pub(super) fn sniff(head: &[u8]) -> Result<Confidence, ParseError> {
+    let Some(kind) = root_type(head) else {
+        return Ok(Confidence::No);
+    };
+    let list = match kind.as_str() {
+        // The reader says what is wrong with a root element without a type.
+        "UnstructuredGrid" | "PolyData" | "" => return Ok(Confidence::Signature),
+        "Collection" => "a ParaView collection (.pvd)",
+        "PUnstructuredGrid" | "PPolyData" => "a parallel VTK index (.pvtu, .pvtp)",
+        kind if kind.contains("MultiBlock") || kind.contains("PartitionedDataSet") => {
+            "a multi-block VTK index (.vtm)"
+        }
+        kind => {
+            let what = format!(
+                "a VTK file of type {kind} is not read; save as UnstructuredGrid or PolyData"
+            );
+            return Err(ParseError::unsupported(what));
+        }
+    };
+    Err(ParseError::unsupported(format!(
+        "{list}, which lists other files: {GIVE_LIST}"
+    )))
+}
+
+/// What to do with a list where one file of particles was expected.
+pub(super) const GIVE_LIST: &str =
+    "give it as the input of render, convert or inspect, or give one of the files in it";
+
+/// The type of the root element of an XML VTK file that begins with `head`, empty if it has none; `None` for other
+/// files.
+pub(crate) fn root_type(head: &[u8]) -> Option<String> {
     let head = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head);
     if !head.trim_ascii_start().starts_with(b"<") {
-        return Ok(Confidence::No);
+        return None;
     }
     let head = String::from_utf8_lossy(head);
-    let Some((_, root)) = head.split_once("<VTKFile") else {
-        return Ok(Confidence::No);
-    };
+    let (_, root) = head.split_once("<VTKFile")?;
     let root = root.split_once('>').map_or(root, |(root, _)| root);
-    let what = match type_attribute(root) {
-        // The reader says what is wrong with a root element without a type.
-        Some("UnstructuredGrid" | "PolyData") | None => return Ok(Confidence::Signature),
-        Some("Collection") => {
-            "a ParaView collection (.pvd), which only lists other files; give those files"
-                .to_owned()
-        }
-        Some("PUnstructuredGrid" | "PPolyData") => {
-            "a parallel VTK index (.pvtu, .pvtp), which only lists its pieces; give the pieces"
-                .to_owned()
-        }
-        Some(kind) if kind.contains("MultiBlock") || kind.contains("PartitionedDataSet") => {
-            "a VTK multi-block index (.vtm), which only lists its blocks; give the blocks"
-                .to_owned()
-        }
-        Some(kind) => {
-            format!("a VTK file of type {kind} is not read; save as UnstructuredGrid or PolyData")
-        }
-    };
-    Err(ParseError::unsupported(what))
+    Some(type_attribute(root).unwrap_or_default().to_owned())
 }
 
 /// The attribute `type` of an element with the attributes `root`.

@@ -100,10 +100,10 @@ fn one_double_piece_makes_all_double() {
 #[test]
 fn lists_and_grids_are_rejected_with_a_remedy() {
     for (kind, remedy) in [
-        ("PUnstructuredGrid", ".vtu"),
-        ("PPolyData", ".vtp"),
-        ("Collection", ".vtu"),
-        ("vtkMultiBlockDataSet", ".vtu"),
+        ("PUnstructuredGrid", "as the input"),
+        ("PPolyData", "as the input"),
+        ("Collection", "as the input"),
+        ("vtkMultiBlockDataSet", "as the input"),
         ("ImageData", "PolyData"),
         ("RectilinearGrid", "PolyData"),
         ("StructuredGrid", "PolyData"),

@@ -1,0 +1,55 @@
+//! Signatures. `formats/tests/compression.rs` reads files.
+
+use std::io::Cursor;
+
+use super::*;
+
+#[test]
+fn signatures_decide() {
+    for (head, format) in [
+        (&b"\x1f\x8b\x08\0"[..], Some(StreamFormat::Gzip)),
+        (b"\x1f\x8b\x08\xe0", None),
+        (b"\x28\xb5\x2f\xfd\x04", Some(StreamFormat::Zstd)),
+        (b"\xfd7zXZ\0\0\x04", Some(StreamFormat::Xz)),
+        (b"\x04\x22\x4d\x18\x64", Some(StreamFormat::Lz4)),
+        (b"BZh91AY&SY", Some(StreamFormat::Bzip2)),
+        (b"BZh9\x17\x72\x45\x38\x50\x90", Some(StreamFormat::Bzip2)),
+        (b"BZh01AY&SY", None),
+        (b"BZhello you", None),
+        (
+            b"\x5a\x2a\x4d\x18\x02\0\0\0xx\x28\xb5\x2f\xfd",
+            Some(StreamFormat::Zstd),
+        ),
+        (
+            b"\x50\x2a\x4d\x18\0\0\0\0\x04\x22\x4d\x18",
+            Some(StreamFormat::Lz4),
+        ),
+        (b"\x50\x2a\x4d\x18\xff\xff\xff\xff\x04\x22\x4d\x18", None),
+        (b"", None),
+    ] {
+        assert_eq!(StreamFormat::of(head), format, "{head:x?}");
+        let found = Compression::detect(&mut Cursor::new(head)).expect("readable");
+        assert_eq!(found.is_some(), format.is_some());
+    }
+}
+
+#[test]
+fn extensions_are_stripped() {
+    for (name, stripped) in [
+        ("a_7.vtk.gz", "a_7.vtk"),
+        ("a_7.vtk.zst", "a_7.vtk"),
+        ("a.zip", "a"),
+        ("a.npz", "a.npz"),
+        ("a.gz.xz", "a.gz"),
+    ] {
+        assert_eq!(strip_extension(name), stripped);
+    }
+}
+
+#[test]
+fn damaged_archives_are_left_to_the_readers() {
+    let damaged = b"PK\x03\x04 and no directory";
+    let found = Compression::detect(&mut Cursor::new(damaged));
+    assert!(matches!(found, Ok(None)));
+    assert!(!is_compressed(damaged));
+}
