@@ -104,6 +104,34 @@ def add_environment(path, intensity):
     bpy.context.scene.world = world
 
 
+def add_light(light):
+    """A light of a manifest of spherule. Blender's unit is watts, or watts per square metre for suns."""
+    kind, intensity = light["type"], light["intensity"]
+    data = bpy.data.lights.new(kind, {"rect": "AREA", "disc": "AREA", "sun": "SUN"}.get(kind, "POINT"))
+    data.color = light["color"]
+    if kind == "rect":
+        data.shape, data.size, data.size_y = "RECTANGLE", light["width"], light["height"]
+        data.energy = math.pi * light["width"] * light["height"] * intensity
+    elif kind == "disc":
+        data.shape, data.size = "DISK", 2.0 * light["radius"]
+        data.energy = math.pi**2 * light["radius"] ** 2 * intensity
+    elif kind == "sun":
+        data.angle, data.energy = math.radians(light["size"]), intensity
+    else:
+        radius = light.get("radius", 0.0)
+        data.shadow_soft_size, data.use_soft_falloff = radius, False
+        # Radiance of a sphere, or intensity of a point
+        data.energy = 4.0 * math.pi * intensity * (math.pi * radius**2 if radius > 0.0 else 1.0)
+    lamp = bpy.data.objects.new(kind, data)
+    lamp.visible_camera = False
+    back = -Vector(light.get("direction", (0.0, 0.0, -1.0))).normalized()
+    right = Vector((0.0, 0.0, 1.0)).cross(back) if abs(back.z) < 1.0 else Vector((1.0, 0.0, 0.0))
+    right.normalize()
+    axes = Matrix((right, back.cross(right), back)).transposed()
+    lamp.matrix_world = Matrix.Translation(light.get("position", (0.0, 0.0, 0.0))) @ axes.to_4x4()
+    bpy.context.collection.objects.link(lamp)
+
+
 def settle(scene):
     target = bpy.context.scene
     target.render.engine = "CYCLES"
@@ -144,6 +172,8 @@ def main():
         add_spheres(scene)
     add_ground(scene["ground"])
     add_environment(scene["environment"], scene["intensity"])
+    for light in scene.get("lights", []):
+        add_light(light)
     add_camera(Camera(scene))
     settle(scene)
     user, wall = user_seconds(), time.perf_counter()

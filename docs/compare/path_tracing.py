@@ -91,6 +91,18 @@ def write_ground(path, ground):
     path.write_text("\n".join(lines) + "\n")
 
 
+# In the terms of spherule's manifest
+LIGHTS = [
+    {"type": "rect", "position": [-2.5, -2.5, 3.0], "direction": [2.5, 2.5, -2.2], "width": 2.0, "height": 0.6,
+     "color": [1.0, 0.8, 0.6], "intensity": 6.0},
+    {"type": "disc", "position": [3.0, -1.0, 2.5], "direction": [-3.0, 1.0, -1.5], "radius": 0.6,
+     "color": [0.5, 0.7, 1.0], "intensity": 8.0},
+    {"type": "sphere", "position": [-2.0, 1.5, 1.0], "radius": 0.3, "color": [1.0, 0.4, 0.3], "intensity": 8.0},
+    {"type": "point", "falloff": "inverse-square", "position": [1.8, -1.8, 0.5], "color": [0.3, 1.0, 0.4],
+     "intensity": 0.5},
+    {"type": "sun", "direction": [0.2, 0.6, -1.0], "size": 4.0, "color": [1.0, 1.0, 0.9], "intensity": 0.8},
+]  # fmt: skip
+
 SCENES = {
     # Matte spheres on a matte ground
     "spheres": {"material": "matte", "color": [0.30, 0.45, 0.65], "ground": 0.4, "intensity": 1.0, "bounces": 6},
@@ -99,8 +111,15 @@ SCENES = {
     # Microfacets
     "metal": {"material": "metal", "color": [0.95, 0.79, 0.55], "roughness": 0.4, "ground": 0.4, "intensity": 1.0,
               "bounces": 6},
+    # A light of each kind: do units and sizes agree?
+    "lights": {"material": "matte", "color": [0.8, 0.8, 0.8], "ground": 0.4, "intensity": 0.1, "bounces": 3,
+               "lights": LIGHTS},
     # Clear water, from different surfaces
-    "water": {"material": "water", "ior": 1.333, "ground": 0.4, "intensity": 1.0, "bounces": 6, "crossings": 16},
+    "water": {"material": "water", "ior": 1.333, "ground": 0.4, "intensity": 1.0, "bounces": 6, "crossings": 16,
+              "programs": ["spherule", "spherule-maps", "cycles"]},
+    # Caustics of a sun so large that paths find it, too
+    "caustics": {"material": "water", "ior": 1.333, "ground": 0.4, "intensity": 0.4, "bounces": 6, "crossings": 16,
+                 "lights": [{**LIGHTS[-1], "size": 6.0, "intensity": 2.0}], "programs": ["spherule-maps", "cycles"]},
 }  # fmt: skip
 
 
@@ -184,10 +203,17 @@ def spherule_with(ground, options, scene, samples, image, seed):
         "--samples", samples, "--width", width + 2 * shift, "--height", height,
         "--crop", f"{shift},0,{width + shift},{height}",
     ]  # fmt: skip
+    if "lights" in scene:
+        settings["light"] = "[" + ",".join(inline_table(light) for light in scene["lights"]) + "]"
     for key, value in settings.items():
         text = value if isinstance(value, str) else json.dumps(value)
         command += ["--set", f"{key}={text}"]
     return command
+
+
+def inline_table(values):
+    """A table of a manifest."""
+    return "{" + ",".join(f"{key}={json.dumps(value)}" for key, value in values.items()) + "}"
 
 
 def cycles(options, scene, samples, image, seed=0):
@@ -270,10 +296,8 @@ PROGRAMS = {"spherule": spherule, "spherule-maps": spherule_maps, "cycles": cycl
 
 
 def compare(name, scene, options, out):
-    programs = dict(PROGRAMS)
-    if scene["material"] != "water":
-        # Only light below water is in maps
-        del programs["spherule-maps"]
+    # Only light below water is in maps
+    programs = {program: PROGRAMS[program] for program in scene.get("programs", ["spherule", "cycles"])}
     converged = {}
     for program, command in programs.items():
         image = out / f"{name}-{program}-{options.reference}.exr"
