@@ -70,6 +70,14 @@ fn blocks(film: &Film) -> Vec<f32> {
     (0..64).map(mean).collect()
 }
 
+/// The pixels in the middle.
+fn middle(film: &Film) -> Vec<Vec3> {
+    (0..1024)
+        .filter(|i| (12..20).contains(&(i % 32)) && (12..20).contains(&(i / 32)))
+        .map(|i| Vec3::from_slice(&film.color[i][..3]))
+        .collect()
+}
+
 #[test]
 fn the_caustic_of_a_glass_ball_is_that_of_path_tracing() {
     // A large sun at the zenith, as an environment that paths find, and as a light
@@ -121,12 +129,25 @@ fn light_below_a_slab_is_what_it_transmits() {
     );
     // Of repeated reflections between both surfaces remains (1 - r) / (1 + r), and again from the floor to the camera
     let transmitted = 0.96 / 1.04_f32;
-    let middle: Vec<Vec3> = (0..1024)
-        .filter(|i| (12..20).contains(&(i % 32)) && (12..20).contains(&(i / 32)))
-        .map(|i| Vec3::from_slice(&film.color[i][..3]))
-        .collect();
-    let (mean, deviation) = statistics(&middle);
+    let (mean, deviation) = statistics(&middle(&film));
     let expected = transmitted * transmitted;
+    assert!((mean / expected - 1.0).abs() < 0.01, "{mean} {expected}");
+    assert!(deviation < 0.05 * mean, "{deviation}");
+}
+
+#[test]
+fn a_floor_inside_a_slab_is_darker_by_the_square_of_the_index() {
+    let mut scene = floor(dark());
+    scene.lights = vec![sun(0.01, Vec3::splat(PI))];
+    let film = image(
+        &Solid::slab(-0.5, 0.7),
+        &scene,
+        Vec3::ONE,
+        &with_photons(400_000, 256),
+    );
+    // The light enters the slab once and leaves it once, into a larger solid angle
+    let expected = 0.96 * 0.96 / (GLASS.ior * GLASS.ior);
+    let (mean, deviation) = statistics(&middle(&film));
     assert!((mean / expected - 1.0).abs() < 0.01, "{mean} {expected}");
     assert!(deviation < 0.05 * mean, "{deviation}");
 }

@@ -177,6 +177,9 @@ fn trace(
             &mut next,
         );
     }
+    // Light that enters a body has the square of its index times the radiance. Paths of the camera leave this factor
+    // out, but the density of photons inside the body contains it
+    let ior = integrator.context.scene.material.ior;
     // Follow them through the particles
     for depth in FIRST_DEPTH + 1.. {
         std::mem::swap(&mut current, &mut next);
@@ -191,9 +194,14 @@ fn trace(
                 return None;
             }
             let lanes = step(integrator, segments, depth, &mut packet, &mut next);
+            let index = |lane: usize| match segments.inside >> lane & 1 {
+                0 => 1.0,
+                _ => ior,
+            };
             landed.extend(lanes_in(lanes).map(|lane| Landed {
                 position: square.position(lane3(&packet.hits.point, lane)),
-                flux: lane3(&packet.throughput, lane) * packet.hits.opacity[lane],
+                flux: lane3(&packet.throughput, lane)
+                    * (packet.hits.opacity[lane] / (index(lane) * index(lane))),
             }));
         }
     }
