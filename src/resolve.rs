@@ -6,7 +6,7 @@ use spherule_formats::native::Access;
 use crate::accel::{BvhSettings, SbvhSettings};
 use crate::manifest::{ColorSetting, DEFAULT_MAP, Manifest, MapName, RadiusSetting, nearest};
 use crate::metrics::memory::available;
-use crate::output::{ExrOptions, PreviewOptions};
+use crate::output::{ExrOptions, PlaneNames, PreviewOptions};
 use crate::pipeline::{
     ColorRule, FrameSize, MemoryModel, Picture, RadiusRule, RunSettings, Setup, attribute_list,
 };
@@ -182,11 +182,12 @@ pub fn setup(
         meshes: Vec::new(),
         environment,
         is_environment_visible: manifest.environment.visible,
+        environment_group: lights::group_index(manifest, manifest.environment.group.as_ref()),
         next_frame: None,
     };
     // Collect the settings of the images
     let output = &manifest.output;
-    let (channels, attributes) = channels::channels(output, survey)?;
+    let (channels, attributes) = channels::channels(manifest, survey)?;
     let step = channels::frame_step(&channels, output, survey)?;
     // Manifests that were not read from a file are not checked
     let [width, height] = image.data_size().ok_or_else(|| ResolveError::Unsupported {
@@ -227,7 +228,14 @@ pub fn setup(
         denoise,
         surface,
         exr: ExrOptions {
-            attribute_planes: channels::attribute_planes(&attributes),
+            names: PlaneNames {
+                attributes: channels::attribute_planes(&attributes),
+                light_groups: manifest
+                    .light_groups()
+                    .into_iter()
+                    .map(str::to_owned)
+                    .collect(),
+            },
             compression: output.compression,
             window,
             frames_per_second: output.fps.map(fps),

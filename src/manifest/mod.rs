@@ -35,6 +35,7 @@ mod input;
 mod key;
 mod keys;
 mod light;
+mod light_group;
 mod list;
 #[cfg(test)]
 mod manual;
@@ -89,6 +90,10 @@ pub use sun::Sun;
 pub use tree::{Override, OverrideError};
 pub use value::FlagKind;
 pub use work::{MAX_THREADS, ProgressMode, STOP_FILE, Work};
+
+/// Name of a light group.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LightGroup(String);
 
 /// The settings of a job.
 #[derive(Debug, Clone, PartialEq)]
@@ -294,6 +299,10 @@ impl Manifest {
             Affects::Bodies => self.surface.kind != SurfaceKind::Spheres,
             Affects::BranchingSpheres => self.branches_at_spheres(),
             Affects::PathTracing => self.integrator() == IntegratorKind::Path,
+            Affects::LightGroups => {
+                let channel = Channel::Named(NamedChannel::LightGroups);
+                self.output.channels.contains(&channel)
+            }
         }
     }
 

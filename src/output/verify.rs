@@ -12,7 +12,7 @@ use exr::meta::attribute::{ChannelDescription, SampleType};
 use exr::meta::header::Header;
 use thiserror::Error;
 
-use super::exr::planes::{attribute_planes, planes};
+use super::exr::planes::{PlaneNames, attribute_planes, planes};
 use crate::render::layers::MAX_ATTRIBUTE_FLOATS;
 use crate::render::{Channels, DataWindow};
 
@@ -29,6 +29,8 @@ pub struct ImageShape {
     pub channels: Channels,
     /// Names of the attributes with channels; their number of components is not known.
     pub attributes: Vec<String>,
+    /// Names of the light groups with layers.
+    pub light_groups: Vec<String>,
 }
 
 /// What is wrong with an image.
@@ -120,7 +122,11 @@ fn check_header(header: &Header, expected: &ImageShape) -> Result<(), ImageFault
     let mut channels = expected.channels;
     let attributes = attributes(&found, &expected.attributes);
     channels.layers.attributes = u8::try_from(attributes.len()).unwrap_or(u8::MAX);
-    let planes = planes(channels, &attributes).into_iter();
+    let names = PlaneNames {
+        attributes,
+        light_groups: expected.light_groups.clone(),
+    };
+    let planes = planes(channels, &names).into_iter();
     let planes: Vec<_> = planes
         .map(|plane| (plane.name.to_string(), plane.sample_type()))
         .collect();

@@ -32,6 +32,7 @@ const fn shape(channels: Channels) -> ImageShape {
         window: DataWindow::whole(40, 37),
         channels,
         attributes: Vec::new(),
+        light_groups: Vec::new(),
     }
 }
 

@@ -29,6 +29,7 @@ mod generate;
 mod integrator;
 mod intersect;
 pub mod layers;
+mod light_groups;
 mod light_split;
 mod lights;
 mod materials;
@@ -64,6 +65,8 @@ mod floor_tests;
 mod image_tests;
 #[cfg(test)]
 mod lens_tests;
+#[cfg(test)]
+mod light_groups_tests;
 #[cfg(test)]
 mod panes_tests;
 #[cfg(test)]
@@ -165,6 +168,7 @@ pub fn render_into(
 ) -> Result<RayCounts, RenderError> {
     // Check the settings
     settings.validate()?;
+    settings.validate_light_groups(scene)?;
     scene.material.validate()?;
     if !shapes.iter().any(|shape| shape.is_connected()) {
         settings.validate_branches(&scene.material)?;

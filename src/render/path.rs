@@ -21,7 +21,7 @@ use super::{
     sampler::{get_1d_lanes, get_2d_lanes},
     scratch::PacketScratch,
     shading::{add, product, scale},
-    specular::SpecularHits,
+    specular::{Escape, SpecularHits},
     stream::{RayStreams, SegmentPacket},
 };
 use crate::math::{LANES, Lanes3, lane3, lanes_in, set_lane3, splat};
@@ -239,17 +239,24 @@ impl PathIntegrator<'_> {
             return;
         };
         self.reflect_environment(environment, surface, lanes, packet);
-        self.add_direct(Occlusion::Opaque, surface, packet);
+        let group = self.context.environment_group();
+        self.add_direct(Occlusion::Opaque, group, surface, packet);
     }
 
-    /// Adds the light of the light samples as direct light, also to the channels for light and shadow.
-    fn add_direct(&self, occlusion: Occlusion, surface: &Surface<'_>, packet: &mut PacketScratch) {
+    /// Adds the light of the light samples, which is of a light group, as direct light, also to the channels for light and shadow.
+    fn add_direct(
+        &self,
+        occlusion: Occlusion,
+        group: usize,
+        surface: &Surface<'_>,
+        packet: &mut PacketScratch,
+    ) {
         if packet.light.lanes == 0 {
             return;
         }
         self.divide_samples(surface, packet);
         let unoccluded = packet.unoccluded();
-        let visible = self.add_visible(occlusion, surface, packet);
+        let visible = self.add_visible(occlusion, group, surface, packet);
         let PacketScratch {
             split,
             light,
@@ -266,6 +273,7 @@ impl PathIntegrator<'_> {
     fn add_visible(
         &self,
         occlusion: Occlusion,
+        group: usize,
         surface: &Surface<'_>,
         packet: &mut PacketScratch,
     ) -> u32 {
@@ -275,6 +283,7 @@ impl PathIntegrator<'_> {
             crossings,
             counts,
             radiance,
+            groups,
             ..
         } = packet;
         let visible = match occlusion {
@@ -286,6 +295,7 @@ impl PathIntegrator<'_> {
         };
         let simd = context.simd;
         add(simd, &samples.radiance, &Vec3::ONE, visible, radiance);
+        groups.add(simd, group, &samples.radiance, visible);
         visible
     }
 
@@ -314,7 +324,8 @@ impl PathIntegrator<'_> {
         for (index, light) in context.lights.iter().enumerate() {
             let competes = light.has_extent() && self.rays_hit_lights();
             self.reflect_light(index, competes, surface, packet);
-            self.add_direct(Occlusion::of(&**light), surface, packet);
+            let group = context.light_group(index);
+            self.add_direct(Occlusion::of(&**light), group, surface, packet);
         }
     }
 
@@ -402,7 +413,8 @@ impl PathIntegrator<'_> {
         if let Some(environment) = self.environment {
             self.aim_at_environment(environment, lanes, packet);
             if packet.light.lanes != 0 {
-                self.add_visible(Occlusion::Opaque, surface, packet);
+                let group = self.context.environment_group();
+                self.add_visible(Occlusion::Opaque, group, surface, packet);
             }
         }
     }
@@ -472,13 +484,17 @@ impl PathIntegrator<'_> {
         let last = lanes & self.last_specular(segments, depth);
         (self.context).reflect_at_panes(segments, lanes, last, packet, next);
         if last != 0 {
-            let rays = &packet.points.reflected;
-            self.add_seen(
-                &rays.direction,
-                &rays.throughput,
-                last,
-                &mut packet.radiance,
-            );
+            let PacketScratch {
+                points,
+                radiance,
+                groups,
+                ..
+            } = &mut *packet;
+            let rays = &points.reflected;
+            let group = groups.of_mut(self.context.environment_group());
+            for sum in [Some(radiance), group].into_iter().flatten() {
+                self.add_seen(&rays.direction, &rays.throughput, last, sum);
+            }
             packet.take_light(LightClass::Reflection);
         }
     }
@@ -503,14 +519,11 @@ impl PathIntegrator<'_> {
             last: lanes & self.last_specular(segments, depth),
         };
         let constants = interface.constants();
-        context.scatter(
-            constants,
-            &self.split,
-            hits,
-            packet,
-            next,
-            &|along, weight, lanes, sum| self.add_seen(along, weight, lanes, sum),
-        );
+        let escape = Escape {
+            add: &|along, weight, lanes, sum| self.add_seen(along, weight, lanes, sum),
+            group: context.environment_group(),
+        };
+        context.scatter(constants, &self.split, hits, packet, next, escape);
     }
 
     /// The lanes of rays that are not traced further at a specular surface: they see the environment.

@@ -79,7 +79,7 @@ pub(super) fn statistics(pixels: &[Vec3]) -> (f32, f32) {
 }
 
 /// A heap of balls that touch and overlap.
-fn heap() -> Balls {
+pub(super) fn heap() -> Balls {
     let ball = |i: u16| Ball {
         center: Vec3::new(
             f32::from(i % 4) - 1.5,
@@ -310,6 +310,7 @@ fn the_same_bits_on_any_threads_and_instructions() {
             radiance: Vec3::ONE,
             casts_shadow: true,
             is_visible: true,
+            group: 0,
         }];
         if let Some(ground) = &mut scene.ground {
             ground.shadow_catcher = shadow_catcher;

@@ -5,7 +5,7 @@ use thiserror::Error;
 use super::film::Channels;
 use super::sampler::{MAX_FILTER_WIDTH, PixelFilter};
 use super::window::DataWindow;
-use crate::scene::{Material, MaterialError};
+use crate::scene::{Material, MaterialError, Scene};
 
 /// Maximum number of samples per pixel: more than any picture needs, and few enough for counts in f32.
 pub const MAX_SAMPLES: u32 = 4096;
@@ -157,6 +157,17 @@ impl RenderSettings {
         Ok(())
     }
 
+    /// Checks that each light group of `scene` has a layer, if there are layers for light groups.
+    pub(super) fn validate_light_groups(&self, scene: &Scene) -> Result<(), RenderError> {
+        let count = self.channels.layers.light_groups;
+        let lights = scene.lights.iter().map(|light| light.group);
+        let group = lights.fold(scene.environment_group, u8::max);
+        if count > 0 && group >= count {
+            return Err(RenderError::LightGroup { group, count });
+        }
+        Ok(())
+    }
+
     /// Checks that the number of rays at spheres of `material` does not double for too many levels.
     pub(super) fn validate_branches(&self, material: &Material) -> Result<(), RenderError> {
         let max_depth = self.max_depth;
@@ -196,6 +207,14 @@ pub enum RenderError {
     /// `bounces` is out of range.
     #[error("bounces = {0} is out of range, it must be at most {MAX_BOUNCES}")]
     TooManyBounces(u32),
+    /// A light is in a group without a layer.
+    #[error("a light is in light group {group}, but there are only {count} light groups")]
+    LightGroup {
+        /// The group.
+        group: u8,
+        /// Number of groups with layers.
+        count: u8,
+    },
     /// `min_weight` is out of range.
     #[error("min_weight = {0} is out of range; it must be 0, or from {low:e} to {high}", low = MIN_WEIGHTS.start(), high = MIN_WEIGHTS.end())]
     MinWeight(f32),

@@ -92,6 +92,8 @@ pub struct Scene {
     pub environment: Option<Arc<Environment>>,
     /// Whether camera rays without an intersection see the environment instead of the background.
     pub is_environment_visible: bool,
+    /// Index of the light group of the environment; 0 is that of light without a group.
+    pub environment_group: u8,
     /// The next frame, for motion on the film.
     pub next_frame: Option<NextFrame>,
 }
@@ -119,6 +121,7 @@ impl Scene {
             meshes: Vec::new(),
             environment: None,
             is_environment_visible: false,
+            environment_group: 0,
             next_frame: None,
         }
     }

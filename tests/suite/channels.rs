@@ -2,4 +2,5 @@
 
 mod cryptomatte;
 mod data;
+mod light_groups;
 mod lights;

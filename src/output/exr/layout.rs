@@ -36,7 +36,7 @@ impl ExrLayout {
         channels: Channels,
         options: &ExrOptions,
     ) -> Result<Self, OutputError> {
-        let planes = planes_in_file(channels, &options.attribute_planes);
+        let planes = planes_in_file(channels, &options.names);
         // Describe the channels; the header needs only names and types, so the samples may be empty
         let described = planes.iter().map(|plane| {
             let samples = match plane.sample_type() {

@@ -25,7 +25,7 @@ pub(super) mod planes;
 pub use blocks::write_blocks;
 pub use layout::ExrLayout;
 pub use pack::{PackBuffers, PackedBlock, pack_block};
-pub use planes::{ambiguous_name, attribute_planes};
+pub use planes::{DEFAULT_LIGHT_GROUP, PlaneNames, ambiguous_name, attribute_planes};
 
 /// Maximum length of an attribute name in the format, bytes.
 const NAME_MAX: usize = 255;
@@ -82,8 +82,8 @@ pub struct ExrOptions {
     pub custom: Option<CustomAttribute>,
     /// Further attributes, in the order of the file.
     pub texts: Vec<TextAttribute>,
-    /// Names of the planes of attribute channels, as many as the film has.
-    pub attribute_planes: Vec<String>,
+    /// Names of planes that depend on the job.
+    pub names: PlaneNames,
 }
 
 /// An encoded image.

@@ -9,7 +9,7 @@ use exr::prelude::{
 };
 use glam::Vec3;
 
-use super::super::planes::{Source, planes_in_file};
+use super::super::planes::{PlaneNames, Source, planes_in_file};
 use super::super::tests::COMPRESSIONS;
 use super::super::{ExrOptions, attributes, encode_exr, write_blocks, write_exr};
 use super::*;
@@ -114,7 +114,7 @@ fn bits(samples: &FlatSamples) -> Vec<u32> {
 /// The file that the crate `exr` writes on its own.
 fn written_by_exr(film: &Film, options: &ExrOptions) -> Vec<u8> {
     let size = (film.width as usize, film.height as usize);
-    let planes = planes_in_file(film.channels(), &[]).into_iter();
+    let planes = planes_in_file(film.channels(), &PlaneNames::default()).into_iter();
     let list = planes.map(|plane| AnyChannel::new(&*plane.name, samples(film, plane.source)));
     let encoding = Encoding {
         compression: options.compression.codec(),
@@ -156,7 +156,7 @@ fn check(film: &Film, compression: Compression) {
     if !matches!(compression, Compression::Zip | Compression::Zips) {
         assert!(file == reference, "{compression:?} {size:?}");
     }
-    let expected: Vec<_> = planes_in_file(film.channels(), &[])
+    let expected: Vec<_> = planes_in_file(film.channels(), &PlaneNames::default())
         .iter()
         .map(|plane| (plane.name.to_string(), bits(&samples(film, plane.source))))
         .collect();
