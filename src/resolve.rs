@@ -4,13 +4,15 @@ use glam::{DVec3, Vec3};
 use spherule_formats::native::Access;
 
 use crate::accel::{BvhSettings, SbvhSettings};
-use crate::manifest::{ColorSetting, DEFAULT_MAP, Manifest, MapName, RadiusSetting, nearest};
+use crate::manifest::{
+    ColorSetting, DEFAULT_MAP, IndirectSetting, Manifest, MapName, RadiusSetting, nearest,
+};
 use crate::metrics::memory::available;
 use crate::output::{ExrOptions, PlaneNames, PreviewOptions};
 use crate::pipeline::{
     ColorRule, FrameSize, MemoryModel, Picture, RadiusRule, RunSettings, Setup, attribute_list,
 };
-use crate::render::{IntegratorKind, PixelFilter, RenderSettings};
+use crate::render::{IndirectLight, IntegratorKind, PixelFilter, RenderSettings};
 use crate::scene::{
     Background, Bounds, CameraError, ColorMap, PathError, RadianceMap, Scene, default_lights,
     material,
@@ -206,6 +208,12 @@ pub fn setup(
     };
     render.integrator = manifest.integrator();
     render.bounces = manifest.render.bounces;
+    render.indirect = match manifest.render.indirect {
+        IndirectSetting::Traced => IndirectLight::Traced,
+        IndirectSetting::Ambient => IndirectLight::Ambient {
+            radius: narrow(reach.x),
+        },
+    };
     render.photons = manifest.render.caustics.photons;
     render.max_depth = manifest.render.max_depth;
     render.min_weight = manifest.render.min_weight;

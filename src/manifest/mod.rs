@@ -80,11 +80,11 @@ pub use mesh::{Mesh, MeshMaterial, MeshPath, MeshShading};
 pub(crate) use nearest::nearest;
 pub use output::Output;
 pub use pattern::{FramePattern, OutputPattern};
-pub use preset::Look;
+pub use preset::{Look, draft};
 #[cfg(feature = "cli")]
 pub(crate) use rebase::without_dots;
 pub use rebase::{RebaseError, named_place, real_dir};
-pub use render::{GroundPattern, Image, Render};
+pub use render::{GroundPattern, Image, IndirectSetting, Render};
 pub use schema::{SCHEMA_FILE, job_schema};
 pub use sun::Sun;
 pub use tree::{Override, OverrideError};

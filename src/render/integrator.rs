@@ -87,7 +87,7 @@ pub(super) fn max_paths(settings: &RenderSettings, interior: Interior) -> usize 
 pub(super) fn max_depth(settings: &RenderSettings) -> u32 {
     match settings.integrator {
         IntegratorKind::Whitted => settings.max_depth,
-        IntegratorKind::Path => settings.max_depth + settings.bounces + 1,
+        IntegratorKind::Path => settings.max_depth + settings.traced_bounces() + 1,
     }
 }
 

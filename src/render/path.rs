@@ -29,11 +29,13 @@ use crate::scene::Environment;
 use crate::surface::MaterialId;
 use glam::Vec3;
 
+mod ambient;
 mod catcher;
 mod emission;
 pub(super) mod floor;
 mod light_channels;
 
+use ambient::AmbientLight;
 use catcher::Catcher;
 use floor::FloorLight;
 
@@ -55,6 +57,8 @@ pub(super) struct PathIntegrator<'a> {
     /// Whether rays can hit a light.
     has_extents: bool,
     catcher: Option<Catcher>,
+    /// The light of second surfaces, if paths end there.
+    ambient: Option<AmbientLight>,
     /// The light on the ground, if paths end there.
     floor: Option<FloorLight>,
 }
@@ -64,8 +68,10 @@ impl<'a> PathIntegrator<'a> {
         let is_connected = context.connected_particles().is_some();
         let interface = materials_of(context.scene, is_connected).swap_remove(0);
         let environment = context.scene.environment.as_deref();
+        let environment = environment.filter(|environment| !environment.is_black());
         Self {
-            environment: environment.filter(|environment| !environment.is_black()),
+            ambient: AmbientLight::of(context.settings, environment),
+            environment,
             bsdfs: bsdfs_of(context.scene.material.finish, &context.scene.meshes),
             interface,
             split: SplitRule::new(context.settings, context.interior),
@@ -128,7 +134,14 @@ impl Integrator for PathIntegrator<'_> {
         };
         let max = self.context.settings.bounces;
         let others = packet.hits.mask & !(clear | panes | held_out | ended);
-        let opaque = others & lanes_where(|l| segments.bounces[l] <= max);
+        let mut opaque = others & lanes_where(|l| segments.bounces[l] <= max);
+        if let Some(ambient) = &self.ambient {
+            let second = opaque & lanes_where(|l| segments.bounces[l] > 0);
+            if second != 0 {
+                self.shade_ambient(ambient, &self.surface(segments, depth, second), packet);
+            }
+            opaque &= !second;
+        }
         if opaque != 0 {
             self.shade_opaque(&self.surface(segments, depth, opaque), packet, next);
         }
@@ -243,7 +256,7 @@ impl PathIntegrator<'_> {
         self.add_direct(Occlusion::Opaque, group, surface, packet);
     }
 
-    /// Adds the light of the light samples, which is of a light group, as direct light, also to the channels for light and shadow.
+    /// Adds the light of the light samples, which are of a light `group`, also to the channels for light and shadow.
     fn add_direct(
         &self,
         occlusion: Occlusion,

@@ -48,6 +48,19 @@ pub enum IntegratorKind {
     Path,
 }
 
+/// Light that surfaces receive from other surfaces, in path tracing.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum IndirectLight {
+    /// Paths follow it.
+    #[default]
+    Traced,
+    /// Paths end at the second opaque surface, with an estimate of its light.
+    Ambient {
+        /// Radius of a particle, scene units.
+        radius: f32,
+    },
+}
+
 /// Settings of an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RenderSettings {
@@ -63,6 +76,8 @@ pub struct RenderSettings {
     pub integrator: IntegratorKind,
     /// Path tracing: maximum number of diffuse reflections before the last one; 0 is direct light only.
     pub bounces: u32,
+    /// Path tracing: light from other surfaces.
+    pub indirect: IndirectLight,
     /// Path tracing: number of photons for caustics on the ground; 0 follows paths from the ground instead.
     pub photons: u32,
     /// Maximum depth: 1 is direct light only; each further level adds one level of reflections and refractions. Rays
@@ -97,6 +112,7 @@ impl RenderSettings {
             filter: PixelFilter::BOX,
             integrator: IntegratorKind::Whitted,
             bounces: DEFAULT_BOUNCES,
+            indirect: IndirectLight::Traced,
             photons: 0,
             max_depth: 3,
             min_weight: DEFAULT_MIN_WEIGHT,
@@ -105,6 +121,14 @@ impl RenderSettings {
             has_features: false,
             window: None,
             mosaic_of: None,
+        }
+    }
+
+    /// Maximum number of diffuse reflections before the last one that paths follow.
+    pub(crate) const fn traced_bounces(&self) -> u32 {
+        match (self.indirect, self.bounces) {
+            (IndirectLight::Ambient { .. }, 1..) => 1,
+            (_, bounces) => bounces,
         }
     }
 

@@ -24,7 +24,7 @@ pub mod rgb;
 pub use background::Background;
 pub use camera::{Camera, CameraError, CameraView, Framing, Lens};
 pub use colormap::{ColorMap, UnknownColorMap};
-pub use environment::{Environment, EnvironmentAxes, RadianceMap};
+pub use environment::{Environment, EnvironmentAxes, IrradianceHarmonics, RadianceMap};
 pub use ground::Ground;
 pub use lens::{Aperture, Focus, LensSettings};
 pub use light::{Falloff, Light, LightKind, default_lights};
