@@ -245,6 +245,7 @@ pub fn setup(
                     .collect(),
             },
             compression: output.compression,
+            data_compression: output.data_compression,
             window,
             frames_per_second: output.fps.map(fps),
             world_to_camera: None,

@@ -8,7 +8,7 @@ mod verify;
 pub mod view;
 
 pub use exr::{
-    Compression, CustomAttribute, DEFAULT_LIGHT_GROUP, EncodedExr, ExrLayout, ExrOptions,
+    Compression, CustomAttribute, DEFAULT_LIGHT_GROUP, EncodedExr, ExrBlock, ExrLayout, ExrOptions,
     OutputError, PackBuffers, PackedBlock, PlaneNames, TextAttribute, ambiguous_name,
     attribute_planes, encode_exr, pack_block, write_blocks, write_exr,
 };

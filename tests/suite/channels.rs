@@ -4,3 +4,4 @@ mod cryptomatte;
 mod data;
 mod light_groups;
 mod lights;
+mod parts;

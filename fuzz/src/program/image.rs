@@ -21,6 +21,7 @@ const fn shape(width: u32, height: u32, channels: Channels) -> ImageShape {
         channels,
         attributes: Vec::new(),
         light_groups: Vec::new(),
+        has_data_part: false,
     }
 }
 

@@ -105,6 +105,8 @@ impl ExpectedOutput {
             channels,
             attributes,
             light_groups,
+            has_data_part: find("output.data_compression")
+                .is_some_and(|data| find("output.compression") != Some(data)),
         }))
     }
 }
@@ -130,6 +132,7 @@ mod tests {
             channels: Channels::from_names(["Z", "N", "id"]).unwrap(),
             attributes: Vec::new(),
             light_groups: Vec::new(),
+            has_data_part: false,
         };
         assert_eq!(
             ExpectedOutput::of_settings(&settings),

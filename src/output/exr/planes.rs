@@ -117,6 +117,16 @@ pub(in crate::output) fn planes(channels: Channels, names: &PlaneNames) -> Vec<P
     all
 }
 
+/// Divides the planes of a file between its parts: all in one, or colours and data apart. Without data, there is one
+/// part.
+pub(in crate::output) fn parts(planes: Vec<Plane>, has_data_part: bool) -> Vec<Vec<Plane>> {
+    let is_first = |plane: &Plane| !has_data_part || plane.kind() == PlaneKind::Color;
+    let (first, data): (Vec<_>, Vec<_>) = planes.into_iter().partition(is_first);
+    let mut all = vec![first, data];
+    all.retain(|planes| !planes.is_empty());
+    all
+}
+
 /// The planes of layers.
 fn layers(layers: &Layers, names: &PlaneNames) -> Vec<Plane> {
     let mut all = Vec::new();
