@@ -4,13 +4,15 @@ use glam::{DVec3, Vec3};
 use spherule_formats::native::Access;
 
 use crate::accel::{BvhSettings, SbvhSettings};
-use crate::manifest::{ColorSetting, DEFAULT_MAP, Manifest, MapName, RadiusSetting, nearest};
+use crate::manifest::{
+    ColorSetting, DEFAULT_MAP, IndirectSetting, Manifest, MapName, RadiusSetting, nearest,
+};
 use crate::metrics::memory::available;
-use crate::output::{ExrOptions, PreviewOptions};
+use crate::output::{ExrOptions, PlaneNames, PreviewOptions};
 use crate::pipeline::{
     ColorRule, FrameSize, MemoryModel, Picture, RadiusRule, RunSettings, Setup, attribute_list,
 };
-use crate::render::{IntegratorKind, PixelFilter, RenderSettings};
+use crate::render::{IndirectLight, IntegratorKind, PixelFilter, RenderSettings};
 use crate::scene::{
     Background, Bounds, CameraError, ColorMap, PathError, RadianceMap, Scene, default_lights,
     material,
@@ -184,12 +186,13 @@ pub fn setup(
         meshes: Vec::new(),
         environment,
         is_environment_visible: manifest.environment.visible,
+        environment_group: lights::group_index(manifest, manifest.environment.group.as_ref()),
         next_frame: None,
         exposure: None,
     };
     // Collect the settings of the images
     let output = &manifest.output;
-    let (channels, attributes) = channels::channels(output, survey)?;
+    let (channels, attributes) = channels::channels(manifest, survey)?;
     let step = channels::frame_step(&channels, output, survey)?;
     // Manifests that were not read from a file are not checked
     let [width, height] = image.data_size().ok_or_else(|| ResolveError::Unsupported {
@@ -208,6 +211,12 @@ pub fn setup(
     };
     render.integrator = manifest.integrator();
     render.bounces = manifest.render.bounces;
+    render.indirect = match manifest.render.indirect {
+        IndirectSetting::Traced => IndirectLight::Traced,
+        IndirectSetting::Ambient => IndirectLight::Ambient {
+            radius: narrow(reach.x),
+        },
+    };
     render.photons = manifest.render.caustics.photons;
     render.max_depth = manifest.render.max_depth;
     render.min_weight = manifest.render.min_weight;
@@ -231,8 +240,16 @@ pub fn setup(
         denoise,
         surface,
         exr: ExrOptions {
-            attribute_planes: channels::attribute_planes(&attributes),
+            names: PlaneNames {
+                attributes: channels::attribute_planes(&attributes),
+                light_groups: manifest
+                    .light_groups()
+                    .into_iter()
+                    .map(str::to_owned)
+                    .collect(),
+            },
             compression: output.compression,
+            data_compression: output.data_compression,
             window,
             frames_per_second: output.fps.map(fps),
             world_to_camera: None,

@@ -14,7 +14,7 @@ const ACTIONS: [&str; 6] = ["input", "set", "look", "force", "keep_done", "shard
 const COLORS: [&str; 3] = ["color_by", "map", "range"];
 
 /// Other options with a value that is not the default, and the key that it is laid over.
-const FLAGS: [(&str, &str); 34] = [
+const FLAGS: [(&str, &str); 35] = [
     ("--output x.####.exr", "output.path = \"x.####.exr\""),
     ("--frames 3-4", "input.frames = \"3-4\""),
     ("--width 7", "image.width = 7"),

@@ -11,7 +11,7 @@ use super::key_flags::{KeyFlags, over};
 use super::numbers::number;
 use super::paths::{path_as_typed, text};
 use crate::job::JobManifest;
-use crate::manifest::{self, Look, Manifest, Override};
+use crate::manifest::{self, Look, Manifest, Override, draft};
 
 /// Options that set keys of the manifest: `--set` for any key, and options for common keys.
 #[derive(Debug, Args)]
@@ -26,6 +26,12 @@ pub(super) struct ManifestArgs {
     /// Preset for all settings that are not given explicitly: water, studio or paper.
     #[arg(long, value_name = "NAME", help_heading = "Look", display_order = 0)]
     pub(super) look: Option<String>,
+    /// Quick preview: 4 samples per pixel, ambient light instead of light between surfaces
+    ///
+    /// Sets image.samples = 4, render.indirect = "ambient" and render.denoise = "auto", whatever the manifest says; other
+    /// options override them.
+    #[arg(long, help_heading = "Look", display_order = 0)]
+    pub(super) draft: bool,
     /// Attribute to colour by [default: velocity, else the particles' own colours]
     ///
     /// Colours (Cd, color, rgb, bytes) are used unchanged unless --map or --range is given. Vectors are mapped by
@@ -126,6 +132,9 @@ impl ManifestArgs {
     }
 
     fn add_overrides(&self, list: &mut Vec<Override>, from_file: bool) -> Result<(), CliError> {
+        if self.draft {
+            list.extend(draft("--draft"));
+        }
         self.keys.add_overrides(list, from_file)?;
         if let Some(attribute) = &self.color_by {
             let mut table = toml::Table::new();

@@ -42,6 +42,8 @@ named! {
         Emission = "emission",
         /// The background that the camera sees.
         Background = "background",
+        /// Light by its light group.
+        LightGroups = "light_groups",
         /// Colour before denoising.
         Noisy = "noisy",
         /// Fraction of direct light that arrives.

@@ -3,6 +3,7 @@
 use glam::Vec3;
 use serde_json::{Value as Json, json};
 
+use super::LightGroup;
 use super::key::{Affects, Key};
 use super::keys::{Keys, keys};
 use super::reader::Section;
@@ -45,6 +46,8 @@ pub struct Environment {
     pub rotation: f64,
     /// Whether camera rays see the environment instead of the background.
     pub visible: bool,
+    /// Its light group.
+    pub group: Option<LightGroup>,
 }
 
 impl Default for Environment {
@@ -57,6 +60,7 @@ impl Default for Environment {
             intensity: 1.0,
             rotation: 0.0,
             visible: false,
+            group: None,
         }
     }
 }
@@ -85,6 +89,9 @@ impl Environment {
             rotation => self.rotation, unit("degrees"), affects(Affects::PathTracing);
             /// Whether the camera sees the environment instead of render.background
             visible => self.visible, affects(Affects::PathTracing);
+            /// Light group, for the channel light_groups; the sun of a sky belongs to it
+            group => self.group, example("\"sky\""), unset("light_default, the layer of light without a group"),
+                affects(Affects::LightGroups);
         );
         if let Some(section) = keys.reading() {
             self.check(section);

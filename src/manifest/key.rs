@@ -13,6 +13,8 @@ pub(super) enum Affects {
     BranchingSpheres,
     /// The path integrator.
     PathTracing,
+    /// The channel for light groups.
+    LightGroups,
 }
 
 impl Affects {
@@ -26,6 +28,7 @@ impl Affects {
             Self::Bodies => "Changes images of unions and smooth surfaces.",
             Self::BranchingSpheres => "Changes images of spheres that reflect and transmit.",
             Self::PathTracing => "Changes images of `integrator = \"path\"`.",
+            Self::LightGroups => "Changes images with the channel `light_groups`.",
         }
     }
 }

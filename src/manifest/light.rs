@@ -2,7 +2,8 @@
 
 use glam::{DVec3, Vec3};
 
-use super::key::Key;
+use super::LightGroup;
+use super::key::{Affects, Key};
 use super::keys::{Keys, keys};
 use super::value::{Named, named};
 use crate::scene::Falloff;
@@ -98,6 +99,8 @@ pub struct Light {
     pub intensity: f32,
     /// Whether the camera sees a light with an extent.
     pub visible: bool,
+    /// Its light group.
+    pub group: Option<LightGroup>,
 }
 
 impl Default for Light {
@@ -107,6 +110,7 @@ impl Default for Light {
             color: Vec3::ONE,
             intensity: 1.0,
             visible: false,
+            group: None,
         }
     }
 }
@@ -254,6 +258,11 @@ impl Light {
             /// in W/m2 on surfaces that face it of a point light without falloff, a directional light and a sun, and
             /// the radiance in W/(m2 sr) of a sphere, rectangle or disc.
             intensity => self.intensity, from(0);
+            /// Light group, for the channel light_groups
+            ///
+            /// Several lights may be in a group.
+            group => self.group, example("\"key\""), unset("light_default, the layer of light without a group"),
+                affects(Affects::LightGroups);
         );
         if !matches!(
             self.kind,

@@ -35,6 +35,7 @@ mod input;
 mod key;
 mod keys;
 mod light;
+mod light_group;
 mod list;
 #[cfg(test)]
 mod manual;
@@ -79,16 +80,20 @@ pub use mesh::{Mesh, MeshMaterial, MeshPath, MeshShading};
 pub(crate) use nearest::nearest;
 pub use output::Output;
 pub use pattern::{FramePattern, OutputPattern};
-pub use preset::Look;
+pub use preset::{Look, draft};
 #[cfg(feature = "cli")]
 pub(crate) use rebase::without_dots;
 pub use rebase::{RebaseError, named_place, real_dir};
-pub use render::{GroundPattern, Image, Render};
+pub use render::{GroundPattern, Image, IndirectSetting, Render};
 pub use schema::{SCHEMA_FILE, job_schema};
 pub use sun::Sun;
 pub use tree::{Override, OverrideError};
 pub use value::FlagKind;
 pub use work::{MAX_THREADS, ProgressMode, STOP_FILE, Work};
+
+/// Name of a light group.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LightGroup(String);
 
 /// The settings of a job.
 #[derive(Debug, Clone, PartialEq)]
@@ -294,6 +299,10 @@ impl Manifest {
             Affects::Bodies => self.surface.kind != SurfaceKind::Spheres,
             Affects::BranchingSpheres => self.branches_at_spheres(),
             Affects::PathTracing => self.integrator() == IntegratorKind::Path,
+            Affects::LightGroups => {
+                let channel = Channel::Named(NamedChannel::LightGroups);
+                self.output.channels.contains(&channel)
+            }
         }
     }
 

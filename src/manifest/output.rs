@@ -30,17 +30,23 @@ section! {
         /// Images to write; #### or %04d is the frame number, with at least that many digits
         path: OutputPattern = OutputPattern::parse(DEFAULT_PATH).expect("a good pattern"),
             flag("output", "PATTERN", "Output");
-        /// Channels of the images: RGBA,Z,N,id,P,V,albedo,lights,shadow,motion,cryptomatte,attribute:NAME
+        /// Channels: RGBA,Z,N,id,P,V,albedo,lights,light_groups,shadow,motion,cryptomatte,attribute:NAME
         ///
         /// RGBA is always included. `lights` stands for the light channels diffuse, specular, reflection, refraction,
-        /// emission and background, whose sum is `noisy`, the colour before denoising. `cryptomatte` stands for
-        /// crypto_particle, crypto_material and crypto_part. `attribute:density` is the attribute `density`.
+        /// emission and background, whose sum is `noisy`, the colour before denoising. `light_groups` has a layer for
+        /// each `group` of lights, with the same sum. `cryptomatte` stands for crypto_particle, crypto_material and
+        /// crypto_part. `attribute:density` is the attribute `density`.
         channels: Vec<Channel> = DEFAULT_CHANNELS.map(Channel::Named).to_vec(),
             example("[\"RGBA\", \"Z\"]"), flag("channels", "LIST", "Output");
         /// Maximum number of objects in a pixel of each Cryptomatte layer, rounded up to an even number
         cryptomatte_levels: u32 = u32::from(Mattes::DEFAULT_LEVELS), from(2), to(Mattes::MAX_LEVELS);
         /// Lossless compression of the EXR: none | rle | zip | zips | piz
         compression: Compression = Compression::Zip;
+        /// Lossless compression of channels that are no colours: none | rle | zip | zips | piz
+        ///
+        /// If it differs from `compression`, the EXR has two parts: `color` (RGBA, light channels, light groups, noisy)
+        /// and `data` (all other channels).
+        data_compression: Option<Compression> = None, example("\"zips\""), unset("the same as compression");
         /// Write a PNG next to each image
         preview: bool = true;
         /// Exposure of the PNG, stops

@@ -63,6 +63,34 @@ render.integrator = "whitted"
 render.ground = false
 "#;
 
+/// A quick preview: few samples, and paths that end at the second surface. [`draft`] lays it over a manifest.
+const DRAFT: &str = r#"
+image.samples = 4
+render.indirect = "ambient"
+render.denoise = "auto"
+"#;
+
+/// The settings of a quick preview, whatever a manifest says. `shown` is the name of their origin in messages.
+pub fn draft(shown: &str) -> Vec<Override> {
+    settings(DRAFT, shown).collect()
+}
+
+/// The settings in `text`.
+fn settings(text: &str, shown: &str) -> impl Iterator<Item = Override> {
+    let sections: toml::Table = text.parse().expect("built-in settings are valid TOML");
+    let key = |(section, keys): (String, Value)| match keys {
+        Value::Table(keys) => keys
+            .into_iter()
+            .map(|(key, value)| (format!("{section}.{key}"), value))
+            .collect(),
+        value => vec![(section, value)],
+    };
+    let set = move |(key, value): (String, Value)| {
+        Override::new(&key, value, shown).expect("built-in keys have names")
+    };
+    sections.into_iter().flat_map(key).map(set)
+}
+
 impl Look {
     /// All looks with their names.
     pub const ALL: &[(Self, &'static str)] = &[
@@ -92,19 +120,7 @@ impl Look {
             Self::Paper => PAPER,
             Self::Whitted => WHITTED,
         };
-        let sections: toml::Table = text.parse().expect("built-in looks are valid TOML");
-        let key = |(section, keys): (String, Value)| match keys {
-            Value::Table(keys) => keys
-                .into_iter()
-                .map(|(key, value)| (format!("{section}.{key}"), value))
-                .collect(),
-            value => vec![(section, value)],
-        };
-        let set = |(key, value): (String, Value)| {
-            let set = Override::new(&key, value, shown);
-            set.expect("its keys have names").under()
-        };
-        sections.into_iter().flat_map(key).map(set).collect()
+        settings(text, shown).map(Override::under).collect()
     }
 }
 

@@ -125,6 +125,16 @@ named! {
     }
 }
 
+named! {
+    /// Light from other surfaces.
+    IndirectSetting {
+        /// Paths follow it.
+        Traced = "traced",
+        /// Paths end at the second surface, with an estimate of its light.
+        Ambient = "ambient",
+    }
+}
+
 section! {
     /// Settings of the renderer
     Render {
@@ -154,6 +164,11 @@ section! {
         /// Diffuse reflections that light may take before its last one; 0 is direct light only
         bounces: u32 = DEFAULT_BOUNCES, from(0), to(MAX_BOUNCES), affects(Affects::PathTracing),
             flag("bounces", "COUNT", "Look");
+        /// Light that surfaces receive from other surfaces: traced | ambient
+        ///
+        /// traced follows it up to `bounces`. ambient ends paths at the second surface and estimates the light there:
+        /// it is faster and has less noise, but gaps between particles are too pale. It is for previews (--draft).
+        indirect: IndirectSetting = IndirectSetting::Traced, affects(Affects::PathTracing);
         /// Light on the ground through transmissive particles: number of photons; 0 is none
         ///
         /// With photons, paths end at the ground, whose light is computed once for each image. It is that of the

@@ -101,6 +101,7 @@ fn example_manifest_is_valid() {
         color: Vec3::ONE,
         intensity: 1.0,
         visible: false,
+        group: None,
     }];
     assert_eq!(manifest, expected);
 }
@@ -617,6 +618,7 @@ proptest! {
             color: Vec3::splat(narrow),
             intensity: narrow,
             visible: false,
+            group: None,
         }];
         manifest.material.color = ColorSetting::Rgb(Vec3::splat(narrow));
         prop_assert_eq!(&parse(&manifest.to_commented_toml()), &manifest);

@@ -12,7 +12,7 @@ use exr::meta::attribute::{ChannelDescription, SampleType};
 use exr::meta::header::Header;
 use thiserror::Error;
 
-use super::exr::planes::{attribute_planes, planes};
+use super::exr::planes::{Plane, PlaneNames, attribute_planes, parts, planes};
 use crate::render::layers::MAX_ATTRIBUTE_FLOATS;
 use crate::render::{Channels, DataWindow};
 
@@ -29,6 +29,10 @@ pub struct ImageShape {
     pub channels: Channels,
     /// Names of the attributes with channels; their number of components is not known.
     pub attributes: Vec<String>,
+    /// Names of the light groups with layers.
+    pub light_groups: Vec<String>,
+    /// Whether channels that are no colours are in a part of their own.
+    pub has_data_part: bool,
 }
 
 /// What is wrong with an image.
@@ -82,46 +86,70 @@ impl From<png::DecodingError> for ImageFault {
 pub fn verify_exr(file: impl Read + Seek, expected: &ImageShape) -> Result<(), ImageFault> {
     let reader = exr::block::read(file, true)?;
     let meta = reader.meta_data().clone();
-    let [header] = &meta.headers[..] else {
-        let count = meta.headers.len();
-        return Err(ImageFault::Damaged(format!("has {count} parts, not one")));
-    };
+    let parts = expected_parts(&meta.headers, expected);
+    if meta.headers.len() != parts.len() {
+        let (found, expected) = (meta.headers.len(), parts.len());
+        let what = format!("the number of its parts is {found}, not {expected}");
+        return Err(ImageFault::Damaged(what));
+    }
     // Check the size before memory is allocated for the size in the header
-    check_header(header, expected)?;
+    for (header, planes) in meta.headers.iter().zip(&parts) {
+        check_header(header, planes, expected)?;
+    }
     // Decode the blocks at the offsets in the file, like viewers do
-    let mut rows = 0;
+    let mut all_rows = vec![0; parts.len()];
     for chunk in reader.filter_chunks(true, |_, _, _| true)? {
         let block = UncompressedBlock::decompress_chunk(chunk?, &meta, true)?;
         let (at, size) = (block.index.pixel_position, block.index.pixel_size);
+        let (header, rows) = (
+            &meta.headers[block.index.layer],
+            &mut all_rows[block.index.layer],
+        );
         let bytes = size.area() * header.channels.bytes_per_pixel;
-        if (at.x(), at.y(), size.x()) != (0, rows, header.layer_size.x())
+        if (at.x(), at.y(), size.x()) != (0, *rows, header.layer_size.x())
             || block.data.len() != bytes
         {
             let what = format!("row {rows} is not where it must be");
             return Err(ImageFault::Damaged(what));
         }
-        rows += size.y();
+        *rows += size.y();
     }
-    if rows == header.layer_size.y() {
-        Ok(())
-    } else {
-        let what = format!("has {rows} of {} rows", header.layer_size.y());
-        Err(ImageFault::Damaged(what))
+    for (header, rows) in meta.headers.iter().zip(all_rows) {
+        if rows != header.layer_size.y() {
+            let what = format!("has {rows} of {} rows", header.layer_size.y());
+            return Err(ImageFault::Damaged(what));
+        }
     }
+    Ok(())
 }
 
-fn check_header(header: &Header, expected: &ImageShape) -> Result<(), ImageFault> {
+/// The planes of each part of the file with `headers`, as they are expected.
+fn expected_parts(headers: &[Header], expected: &ImageShape) -> Vec<Vec<Plane>> {
+    let channels = headers.iter().flat_map(|header| &header.channels.list);
+    let found: Vec<String> = channels.map(|channel| channel.name.to_string()).collect();
+    let mut channels = expected.channels;
+    let attributes = attributes(&found, &expected.attributes);
+    channels.layers.attributes = u8::try_from(attributes.len()).unwrap_or(u8::MAX);
+    let names = PlaneNames {
+        attributes,
+        light_groups: expected.light_groups.clone(),
+    };
+    parts(planes(channels, &names), expected.has_data_part)
+}
+
+fn check_header(
+    header: &Header,
+    planes: &[Plane],
+    expected: &ImageShape,
+) -> Result<(), ImageFault> {
     let size = (header.layer_size.x(), header.layer_size.y());
     check_size(size, expected)?;
     check_window(header, &expected.window)?;
     let found = header.channels.list.iter();
     let found = found.map(|c| (c.name.to_string(), c.sample_type));
     let found: Vec<(String, SampleType)> = found.collect();
-    let mut channels = expected.channels;
-    let attributes = attributes(&found, &expected.attributes);
-    channels.layers.attributes = u8::try_from(attributes.len()).unwrap_or(u8::MAX);
-    let planes = planes(channels, &attributes).into_iter();
     let planes: Vec<_> = planes
+        .iter()
         .map(|plane| (plane.name.to_string(), plane.sample_type()))
         .collect();
     let has_all_pixels = |c: &ChannelDescription| c.sampling.x() == 1 && c.sampling.y() == 1;
@@ -137,8 +165,8 @@ fn check_header(header: &Header, expected: &ImageShape) -> Result<(), ImageFault
 
 /// The names of the planes of attributes `names`, with the number of components that each has among the channels
 /// `found`.
-fn attributes(found: &[(String, SampleType)], names: &[String]) -> Vec<String> {
-    let is_found = |plane: &String| found.iter().any(|(name, _)| name == plane);
+fn attributes(found: &[String], names: &[String]) -> Vec<String> {
+    let is_found = |plane: &String| found.contains(plane);
     let planes = |name: &String| {
         let counts = (1..=MAX_ATTRIBUTE_FLOATS).rev();
         let mut all = counts.map(|count| attribute_planes(name, count));

@@ -32,6 +32,8 @@ const fn shape(channels: Channels) -> ImageShape {
         window: DataWindow::whole(40, 37),
         channels,
         attributes: Vec::new(),
+        light_groups: Vec::new(),
+        has_data_part: false,
     }
 }
 
@@ -97,6 +99,44 @@ fn written_files_verify() {
         let bytes = exr(&film(40, 37, Channels::ALL), compression);
         let verdict = verify(&bytes, &shape(Channels::ALL));
         assert_eq!(verdict, Ok(()), "{compression:?}");
+    }
+}
+
+/// Colours and data in parts of their own.
+fn in_parts(channels: Channels) -> (Vec<u8>, ImageShape) {
+    let options = ExrOptions {
+        compression: Compression::Piz,
+        data_compression: Some(Compression::Zip),
+        ..ExrOptions::default()
+    };
+    let bytes = encode_exr(&film(40, 37, channels), &options).unwrap().bytes;
+    let expected = ImageShape {
+        has_data_part: true,
+        ..shape(channels)
+    };
+    (bytes, expected)
+}
+
+#[test]
+fn parts_are_verified() {
+    for channels in channel_sets() {
+        let (bytes, expected) = in_parts(channels);
+        assert_eq!(verify(&bytes, &expected), Ok(()), "{channels:?}");
+    }
+    let (bytes, expected) = in_parts(Channels::ALL);
+    let fault = verify(&bytes, &shape(Channels::ALL)).unwrap_err();
+    assert_eq!(fault, "the number of its parts is 2, not 1");
+    let single = exr(&film(40, 37, Channels::ALL), Compression::Zip);
+    let fault = verify(&single, &expected).unwrap_err();
+    assert_eq!(fault, "the number of its parts is 1, not 2");
+    for length in (0..bytes.len()).step_by(7) {
+        assert!(verify(&bytes[..length], &expected).is_err());
+    }
+    // Damage at the end is in the part of data, whose blocks have checksums
+    for at in bytes.len() - 40..bytes.len() {
+        let mut damaged = bytes.clone();
+        damaged[at] ^= 4;
+        assert!(verify(&damaged, &expected).is_err(), "{at}");
     }
 }
 

@@ -127,3 +127,13 @@ fn frames_are_judged_by_the_length_of_their_files() {
     let huge = FrameSize::estimate(u64::MAX, false, Some(&known));
     assert_eq!(huge.raw, u64::MAX);
 }
+
+#[test]
+fn light_groups_have_planes() {
+    let mut setup = setup();
+    let images = |setup: &Setup| MemoryModel::new(setup).alone(&plain(1000)).images;
+    let none = images(&setup);
+    setup.picture.render.channels.layers.light_groups = 4;
+    let pixels = u64::from(setup.picture.render.width) * u64::from(setup.picture.render.height);
+    assert!(images(&setup) >= none + 4 * 12 * pixels);
+}

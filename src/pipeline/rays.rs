@@ -15,7 +15,7 @@ pub(super) fn expected_rays(image: &RenderSettings, scene: &Scene) -> f64 {
     let paths = f64::from(image.width) * f64::from(image.height) * f64::from(image.samples);
     if image.integrator == IntegratorKind::Path {
         let lights = scene.lights.len() + usize::from(scene.environment.is_some());
-        return paths * rays_per_path(lights, 1, 1 + image.bounces.min(MOST_BOUNCES));
+        return paths * rays_per_path(lights, 1, 1 + image.traced_bounces().min(MOST_BOUNCES));
     }
     let material = &scene.material;
     let branches = [material.reflection, material.transmission]

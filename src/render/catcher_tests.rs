@@ -54,6 +54,7 @@ fn sun(irradiance: Vec3) -> Light {
         radiance: irradiance,
         casts_shadow: true,
         is_visible: false,
+        group: 0,
     }
 }
 
@@ -238,6 +239,7 @@ fn a_light_with_an_extent_lights_a_floor() {
             radiance: Vec3::splat(4.0),
             casts_shadow: true,
             is_visible: false,
+            group: 0,
         }];
         for bounces in [0, 3] {
             let film = image(&nothing(), &scene, &settings(4, 256, bounces));
@@ -264,6 +266,7 @@ fn the_camera_sees_visible_lights_only() {
             radiance: Vec3::splat(5.0),
             casts_shadow: true,
             is_visible,
+            group: 0,
         }];
         let film = image(&nothing(), &scene, &settings(9, 1, 0));
         assert_eq!(film.color[40], wanted);

@@ -30,7 +30,7 @@ pub struct Channels {
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error(
     "no channel is called {name:?}, the known ones are RGBA, Z, N, P, V, albedo, id, lights, diffuse, specular, \
-     reflection, refraction, emission, background, noisy, shadow, motion, cryptomatte, crypto_particle, \
+     reflection, refraction, emission, background, light_groups, noisy, shadow, motion, cryptomatte, crypto_particle, \
      crypto_material and crypto_part"
 )]
 pub struct UnknownChannel {

@@ -49,6 +49,7 @@ fn sun(half_angle: f64, irradiance: Vec3) -> Light {
         radiance: irradiance,
         casts_shadow: true,
         is_visible: false,
+        group: 0,
     }
 }
 

@@ -26,6 +26,7 @@ impl RenderContext<'_> {
     ) {
         group.clear();
         group.layers.layers = self.settings.channels.layers;
+        group.layers.background_group = self.background_group();
         let [left, top] = self.first_pixel(tile);
         for (column, row) in pixels {
             let (x, y) = (left + column.cast_signed(), top + row.cast_signed());

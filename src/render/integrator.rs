@@ -93,7 +93,7 @@ pub(super) fn max_paths(settings: &RenderSettings, interior: Interior) -> usize 
 pub(super) fn max_depth(settings: &RenderSettings) -> u32 {
     match settings.integrator {
         IntegratorKind::Whitted => settings.max_depth,
-        IntegratorKind::Path => settings.max_depth + settings.bounces + 1,
+        IntegratorKind::Path => settings.max_depth + settings.traced_bounces() + 1,
     }
 }
 
@@ -157,7 +157,7 @@ fn trace_camera_rays<I: Integrator + ?Sized>(
         // The data of reflections at panes are of what is behind
         context.restore_behind(packet);
         context.gather_data(&segments.rays, number * LANES, packet, &mut group.pixels);
-        group.layers.store(number, &packet.split);
+        group.layers.store(number, &packet.split, &packet.groups);
         context.gather_objects(&packet.hits, number, &mut group.layers);
     }
     Some(())
@@ -178,7 +178,9 @@ fn trace_depth<I: Integrator + ?Sized>(
     for segments in current.packets_mut() {
         trace_packet(integrator, segments, depth, stop, packet, next)?;
         scratch.group.add(segments, &packet.radiance);
-        scratch.group.layers.add(segments, &packet.radiance);
+        let layers = &mut scratch.group.layers;
+        layers.add(segments, &packet.radiance);
+        layers.add_groups(segments, &packet.groups);
     }
     Some(())
 }
@@ -200,6 +202,7 @@ fn trace_packet<I: Integrator + ?Sized>(
     packet.coverage = splat(0.0);
     let layers = &integrator.context().settings.channels.layers;
     packet.split.start(layers, depth);
+    packet.groups.start(layers);
     integrator.shade(segments, depth, packet, next);
     Some(())
 }

@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use super::{
     context::{Interior, RenderContext},
+    light_groups::NO_GROUP,
     materials::{attenuate, leaving},
     scratch::PacketScratch,
     shading::{add_backdrop, add_background, scale},
@@ -85,19 +86,16 @@ impl RenderContext<'_> {
             &background_part,
             &mut packet.weight,
         );
-        let rays = &segments.rays;
-        let (weight, radiance) = (&packet.weight, &mut packet.radiance);
-        if depth == 1 && matches!(self.scene.background, Background::Studio { .. }) {
-            add_backdrop(self.simd, &self.camera, rays, weight, lanes, radiance);
-            return;
+        let (rays, weight) = (&segments.rays, &packet.weight);
+        let is_backdrop = depth == 1 && matches!(self.scene.background, Background::Studio { .. });
+        let group = packet.groups.of_mut(NO_GROUP);
+        for radiance in [Some(&mut packet.radiance), group].into_iter().flatten() {
+            if is_backdrop {
+                add_backdrop(self.simd, &self.camera, rays, weight, lanes, radiance);
+                continue;
+            }
+            let (background, direction) = (&self.background, &rays.direction);
+            add_background(self.simd, background, direction, weight, lanes, radiance);
         }
-        add_background(
-            self.simd,
-            &self.background,
-            &rays.direction,
-            weight,
-            lanes,
-            radiance,
-        );
     }
 }

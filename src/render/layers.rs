@@ -6,6 +6,9 @@ use std::ops::Range;
 /// Maximum number of floats of attribute channels in a pixel.
 pub const MAX_ATTRIBUTE_FLOATS: usize = 64;
 
+/// Maximum number of light groups, with that of light without a group.
+pub const MAX_LIGHT_GROUPS: usize = 64;
+
 /// Classes of light by the first interaction of its path, seen from the camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LightClass {
@@ -171,6 +174,9 @@ impl Default for Mattes {
 pub struct Layers {
     /// Light by its first interaction, linear RGB; the sum of all classes is the colour before denoising.
     pub lights: LightClasses,
+    /// Number of light groups with layers: light by its source, linear RGB; the sum of all groups is the colour before
+    /// denoising. Group 0 is that of light without a group. 0 if there are no such layers.
+    pub light_groups: u8,
     /// `noisy`: the colour before denoising, linear RGB.
     pub noisy: bool,
     /// `shadow`: the fraction of direct light that arrives, 0 to 1.
@@ -187,6 +193,7 @@ impl Layers {
     /// No layers.
     pub const NONE: Self = Self {
         lights: LightClasses::NONE,
+        light_groups: 0,
         noisy: false,
         shadow: false,
         motion: false,
@@ -198,6 +205,8 @@ impl Layers {
     pub fn insert(&mut self, name: &str) -> Option<()> {
         match name {
             "lights" => self.lights = LightClasses::ALL,
+            // The number of groups is that of the scene
+            "light_groups" => self.light_groups = 1,
             "noisy" => self.noisy = true,
             "shadow" => self.shadow = true,
             "motion" => self.motion = true,
@@ -213,6 +222,14 @@ impl Layers {
             }
         }
         Some(())
+    }
+
+    /// Sets the number of light groups, if there are layers for them: groups with `names`, and that of light without a
+    /// group.
+    pub fn set_light_groups(&mut self, names: usize) {
+        if self.light_groups > 0 {
+            self.light_groups = u8::try_from(1 + names).unwrap_or(u8::MAX);
+        }
     }
 
     /// Number of floats of a pixel.
@@ -231,9 +248,15 @@ impl Layers {
         Some(3 * index..3 * index + 3)
     }
 
+    /// Place of the light of group `group` in the floats of a pixel: R, G and B.
+    pub fn light_group_at(&self, group: usize) -> Range<usize> {
+        let start = 3 * (self.lights.iter().count() + group);
+        start..start + 3
+    }
+
     /// Place of the colour before denoising.
     pub fn noisy_at(&self) -> Range<usize> {
-        let start = 3 * self.lights.iter().count();
+        let start = self.light_group_at(usize::from(self.light_groups)).start;
         start..start + if self.noisy { 3 } else { 0 }
     }
 
@@ -279,6 +302,7 @@ mod tests {
             shadow: true,
             motion: true,
             attributes: 4,
+            light_groups: 2,
             ..Layers::NONE
         };
         layers.lights.insert(LightClass::Refraction);
@@ -288,6 +312,8 @@ mod tests {
         let ranges = [
             layers.light_at(LightClass::Diffuse).unwrap(),
             layers.light_at(LightClass::Refraction).unwrap(),
+            layers.light_group_at(0),
+            layers.light_group_at(1),
             layers.noisy_at(),
             layers.shadow_at(),
             layers.motion_at(),
@@ -296,7 +322,7 @@ mod tests {
             layers.matte_at(MatteKind::Part).unwrap(),
         ];
         let mut end = 0;
-        for (range, len) in ranges.into_iter().zip([3, 3, 3, 1, 2, 4, 12, 12]) {
+        for (range, len) in ranges.into_iter().zip([3, 3, 3, 3, 3, 1, 2, 4, 12, 12]) {
             assert_eq!((range.start, range.len()), (end, len));
             end = range.end;
         }

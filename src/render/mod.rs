@@ -29,6 +29,7 @@ mod generate;
 mod integrator;
 mod intersect;
 pub mod layers;
+mod light_groups;
 mod light_split;
 mod lights;
 mod materials;
@@ -65,6 +66,8 @@ mod image_tests;
 #[cfg(test)]
 mod lens_tests;
 #[cfg(test)]
+mod light_groups_tests;
+#[cfg(test)]
 mod motion_tests;
 #[cfg(test)]
 mod panes_tests;
@@ -83,9 +86,9 @@ pub use film_rows::FilmRows;
 pub use ray_counts::RayCounts;
 pub use sampler::{FilmSampler, FilterKind, MAX_FILTER_WIDTH, MultiJitter, PathSeed, PixelFilter};
 pub use settings::{
-    DEFAULT_BOUNCES, DEFAULT_MIN_WEIGHT, DEFAULT_PHOTONS, IntegratorKind, MAX_BOUNCES, MAX_DEPTH,
-    MAX_LITERAL_DEPTH, MAX_PHOTONS, MAX_SAMPLES, MAX_SIDE, MIN_WEIGHTS, RenderError,
-    RenderSettings,
+    DEFAULT_BOUNCES, DEFAULT_MIN_WEIGHT, DEFAULT_PHOTONS, IndirectLight, IntegratorKind,
+    MAX_BOUNCES, MAX_DEPTH, MAX_LITERAL_DEPTH, MAX_PHOTONS, MAX_SAMPLES, MAX_SIDE, MIN_WEIGHTS,
+    RenderError, RenderSettings,
 };
 pub(crate) use source::mean;
 pub use source::{Colors, ParticleShading, ShadeSource};
@@ -172,6 +175,7 @@ pub fn render_into(
 ) -> Result<RayCounts, RenderError> {
     // Check the settings
     settings.validate()?;
+    settings.validate_light_groups(scene)?;
     scene.material.validate()?;
     if !shapes.iter().any(|shape| shape.is_connected()) {
         settings.validate_branches(&scene.material)?;

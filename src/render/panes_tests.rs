@@ -198,6 +198,7 @@ fn lit(meshes: &[MeshMaterial]) -> Scene {
         radiance: Vec3::ONE,
         casts_shadow: true,
         is_visible: false,
+        group: 0,
     }];
     scene
 }

@@ -21,7 +21,7 @@ use super::{
     sampler::{get_1d_lanes, get_2d_lanes},
     scratch::PacketScratch,
     shading::{add, product, scale},
-    specular::SpecularHits,
+    specular::{Escape, SpecularHits},
     stream::{RayStreams, SegmentPacket},
 };
 use crate::math::{LANES, Lanes3, lane3, lanes_in, set_lane3, splat};
@@ -29,11 +29,13 @@ use crate::scene::Environment;
 use crate::surface::MaterialId;
 use glam::Vec3;
 
+mod ambient;
 mod catcher;
 mod emission;
 pub(super) mod floor;
 mod light_channels;
 
+use ambient::AmbientLight;
 use catcher::Catcher;
 use floor::FloorLight;
 
@@ -55,6 +57,8 @@ pub(super) struct PathIntegrator<'a> {
     /// Whether rays can hit a light.
     has_extents: bool,
     catcher: Option<Catcher>,
+    /// The light of second surfaces, if paths end there.
+    ambient: Option<AmbientLight>,
     /// The light on the ground, if paths end there.
     floor: Option<FloorLight>,
 }
@@ -64,8 +68,10 @@ impl<'a> PathIntegrator<'a> {
         let is_connected = context.connected_particles().is_some();
         let interface = materials_of(context.scene, is_connected).swap_remove(0);
         let environment = context.scene.environment.as_deref();
+        let environment = environment.filter(|environment| !environment.is_black());
         Self {
-            environment: environment.filter(|environment| !environment.is_black()),
+            ambient: AmbientLight::of(context.settings, environment),
+            environment,
             bsdfs: bsdfs_of(context.scene.material.finish, &context.scene.meshes),
             interface,
             split: SplitRule::new(context.settings, context.interior),
@@ -128,7 +134,14 @@ impl Integrator for PathIntegrator<'_> {
         };
         let max = self.context.settings.bounces;
         let others = packet.hits.mask & !(clear | panes | held_out | ended);
-        let opaque = others & lanes_where(|l| segments.bounces[l] <= max);
+        let mut opaque = others & lanes_where(|l| segments.bounces[l] <= max);
+        if let Some(ambient) = &self.ambient {
+            let second = opaque & lanes_where(|l| segments.bounces[l] > 0);
+            if second != 0 {
+                self.shade_ambient(ambient, &self.surface(segments, depth, second), packet);
+            }
+            opaque &= !second;
+        }
         if opaque != 0 {
             self.shade_opaque(&self.surface(segments, depth, opaque), packet, next);
         }
@@ -239,17 +252,24 @@ impl PathIntegrator<'_> {
             return;
         };
         self.reflect_environment(environment, surface, lanes, packet);
-        self.add_direct(Occlusion::Opaque, surface, packet);
+        let group = self.context.environment_group();
+        self.add_direct(Occlusion::Opaque, group, surface, packet);
     }
 
-    /// Adds the light of the light samples as direct light, also to the channels for light and shadow.
-    fn add_direct(&self, occlusion: Occlusion, surface: &Surface<'_>, packet: &mut PacketScratch) {
+    /// Adds the light of the light samples, which are of a light `group`, also to the channels for light and shadow.
+    fn add_direct(
+        &self,
+        occlusion: Occlusion,
+        group: usize,
+        surface: &Surface<'_>,
+        packet: &mut PacketScratch,
+    ) {
         if packet.light.lanes == 0 {
             return;
         }
         self.divide_samples(surface, packet);
         let unoccluded = packet.unoccluded();
-        let visible = self.add_visible(occlusion, surface, packet);
+        let visible = self.add_visible(occlusion, group, surface, packet);
         let PacketScratch {
             split,
             light,
@@ -266,6 +286,7 @@ impl PathIntegrator<'_> {
     fn add_visible(
         &self,
         occlusion: Occlusion,
+        group: usize,
         surface: &Surface<'_>,
         packet: &mut PacketScratch,
     ) -> u32 {
@@ -275,6 +296,7 @@ impl PathIntegrator<'_> {
             crossings,
             counts,
             radiance,
+            groups,
             ..
         } = packet;
         let visible = match occlusion {
@@ -286,6 +308,7 @@ impl PathIntegrator<'_> {
         };
         let simd = context.simd;
         add(simd, &samples.radiance, &Vec3::ONE, visible, radiance);
+        groups.add(simd, group, &samples.radiance, visible);
         visible
     }
 
@@ -314,7 +337,8 @@ impl PathIntegrator<'_> {
         for (index, light) in context.lights.iter().enumerate() {
             let competes = light.has_extent() && self.rays_hit_lights();
             self.reflect_light(index, competes, surface, packet);
-            self.add_direct(Occlusion::of(&**light), surface, packet);
+            let group = context.light_group(index);
+            self.add_direct(Occlusion::of(&**light), group, surface, packet);
         }
     }
 
@@ -402,7 +426,8 @@ impl PathIntegrator<'_> {
         if let Some(environment) = self.environment {
             self.aim_at_environment(environment, lanes, packet);
             if packet.light.lanes != 0 {
-                self.add_visible(Occlusion::Opaque, surface, packet);
+                let group = self.context.environment_group();
+                self.add_visible(Occlusion::Opaque, group, surface, packet);
             }
         }
     }
@@ -472,13 +497,17 @@ impl PathIntegrator<'_> {
         let last = lanes & self.last_specular(segments, depth);
         (self.context).reflect_at_panes(segments, lanes, last, packet, next);
         if last != 0 {
-            let rays = &packet.points.reflected;
-            self.add_seen(
-                &rays.direction,
-                &rays.throughput,
-                last,
-                &mut packet.radiance,
-            );
+            let PacketScratch {
+                points,
+                radiance,
+                groups,
+                ..
+            } = &mut *packet;
+            let rays = &points.reflected;
+            let group = groups.of_mut(self.context.environment_group());
+            for sum in [Some(radiance), group].into_iter().flatten() {
+                self.add_seen(&rays.direction, &rays.throughput, last, sum);
+            }
             packet.take_light(LightClass::Reflection);
         }
     }
@@ -503,14 +532,11 @@ impl PathIntegrator<'_> {
             last: lanes & self.last_specular(segments, depth),
         };
         let constants = interface.constants();
-        context.scatter(
-            constants,
-            &self.split,
-            hits,
-            packet,
-            next,
-            &|along, weight, lanes, sum| self.add_seen(along, weight, lanes, sum),
-        );
+        let escape = Escape {
+            add: &|along, weight, lanes, sum| self.add_seen(along, weight, lanes, sum),
+            group: context.environment_group(),
+        };
+        context.scatter(constants, &self.split, hits, packet, next, escape);
     }
 
     /// The lanes of rays that are not traced further at a specular surface: they see the environment.

@@ -79,7 +79,7 @@ pub(super) fn statistics(pixels: &[Vec3]) -> (f32, f32) {
 }
 
 /// A heap of balls that touch and overlap.
-fn heap() -> Balls {
+pub(super) fn heap() -> Balls {
     let ball = |i: u16| Ball {
         center: Vec3::new(
             f32::from(i % 4) - 1.5,
@@ -310,6 +310,7 @@ fn the_same_bits_on_any_threads_and_instructions() {
             radiance: Vec3::ONE,
             casts_shadow: true,
             is_visible: true,
+            group: 0,
         }];
         if let Some(ground) = &mut scene.ground {
             ground.shadow_catcher = shadow_catcher;
@@ -345,6 +346,109 @@ fn the_same_bits_on_any_threads_and_instructions() {
         for level in [SimdLevel::Avx2, SimdLevel::Avx512, SimdLevel::Neon] {
             assert!(by(level) == portable, "{level:?}");
         }
+    }
+}
+
+fn with_ambient(settings: RenderSettings) -> RenderSettings {
+    RenderSettings {
+        indirect: IndirectLight::Ambient { radius: 0.3 },
+        ..settings
+    }
+}
+
+#[test]
+fn ambient_light_creates_none() {
+    let ball = Balls::one(Vec3::ZERO, 1.0);
+    let settings = with_ambient(settings(24, 64, 6));
+    let film = image(&ball, &scene(white()), Vec3::ONE, &settings);
+    let (mean, deviation) = statistics(&covered(&film));
+    assert!((mean - 1.0).abs() < 1.5e-3 && deviation < 0.03, "{mean}");
+    // White bodies in white surroundings would be white
+    let film = image(&heap(), &scene(white()), Vec3::ONE, &settings);
+    let pixels = covered(&film);
+    let (mean, _) = statistics(&pixels);
+    assert!(mean > 0.75 && mean < 1.0, "{mean}");
+    let brightest = pixels
+        .iter()
+        .fold(0.0_f32, |most, p| most.max(p.max_element()));
+    // But for noise
+    assert!(brightest < 1.05, "{brightest}");
+}
+
+#[test]
+fn ambient_light_needs_fewer_rays() {
+    let (heap, source) = (heap(), ParticleShading::constant(Vec3::splat(0.8)));
+    let axes = EnvironmentAxes::of_view(DVec3::Y, DVec3::Z, 0.0);
+    let mut scene = scene(studio(axes, Vec3::ONE));
+    let sun = Light::directional(Vec3::new(0.3, 0.5, -1.0), Vec3::ONE).unwrap();
+    scene.lights = vec![sun];
+    let traced = |settings: RenderSettings| {
+        let never = AtomicBool::new(false);
+        let (film, counts) = render(&[&heap], &scene, &source, &settings, &never).unwrap();
+        (film.color, counts)
+    };
+    let (_, full) = traced(settings(24, 16, 6));
+    let (ambient, counts) = traced(with_ambient(settings(24, 16, 6)));
+    assert_eq!(counts.primary, full.primary);
+    assert!(counts.shadow < 4 * full.shadow / 5, "{counts:?} {full:?}");
+    assert!(
+        counts.reflection < 4 * full.reflection / 5,
+        "{counts:?} {full:?}"
+    );
+    // No path has more than one diffuse reflection
+    assert_eq!((ambient, counts), traced(with_ambient(settings(24, 16, 1))));
+    // Direct light needs no estimate
+    assert_eq!(
+        traced(settings(24, 16, 0)),
+        traced(with_ambient(settings(24, 16, 0)))
+    );
+}
+
+#[test]
+fn ambient_light_is_that_of_every_source() {
+    let heap = heap();
+    let mut lit = scene(Environment::constant(Vec3::ZERO));
+    lit.lights = vec![Light::directional(Vec3::new(0.3, 0.5, -1.0), Vec3::ONE).unwrap()];
+    for scene in [lit, scene(white())] {
+        let mean = |settings: &RenderSettings| {
+            let film = image(&heap, &scene, Vec3::splat(0.8), settings);
+            statistics(&covered(&film)).0
+        };
+        let direct = mean(&settings(24, 64, 0));
+        let (full, ambient) = (
+            mean(&settings(24, 64, 6)),
+            mean(&with_ambient(settings(24, 64, 6))),
+        );
+        assert!(full > 1.05 * direct, "{direct} {full}");
+        assert!(ambient > 1.05 * direct, "{direct} {ambient}");
+        assert!((ambient / full - 1.0).abs() < 0.25, "{full} {ambient}");
+    }
+}
+
+#[test]
+fn ambient_light_is_the_same_on_any_threads_and_instructions() {
+    let (heap, source) = (heap(), ParticleShading::constant(Vec3::new(0.8, 0.6, 0.3)));
+    let axes = EnvironmentAxes::of_view(DVec3::Y, DVec3::Z, 0.0);
+    let scene = floor_from_above(studio(axes, Vec3::ONE), Vec3::splat(0.5));
+    let settings = with_ambient(settings(33, 5, 4));
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        let never = AtomicBool::new(false);
+        let draw = || render(&[&heap], &scene, &source, &settings, &never).unwrap();
+        pool.build().unwrap().install(draw)
+    };
+    assert_eq!(on(1), on(4));
+    let films: Vec<Vec2> = (0..48_u8)
+        .map(|i| Vec2::new(f32::from(i % 7) / 7.0, f32::from(i) / 48.0))
+        .collect();
+    let by = |level: SimdLevel| {
+        let mut context = RenderContext::new(vec![&heap], &scene, &source, &settings);
+        context.simd = Supported::or_best(level);
+        testing::radiance_at(&PathIntegrator::new(context), &films)
+    };
+    let portable = by(SimdLevel::Portable);
+    for level in [SimdLevel::Avx2, SimdLevel::Avx512, SimdLevel::Neon] {
+        assert!(by(level) == portable, "{level:?}");
     }
 }
 

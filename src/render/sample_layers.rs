@@ -4,18 +4,24 @@ use std::ops::Range;
 
 use super::cryptomatte::rank;
 use super::layers::{Layers, LightClass, MatteKind};
+use super::light_groups::GroupLight;
 use super::light_split::LightSplit;
 use super::stream::SegmentPacket;
-use crate::math::{LANES, Lanes, Lanes3, lanes_in, splat};
+use crate::math::{LANES, Lanes, Lanes3, lane3, lanes_in, splat};
+use glam::Vec3;
 
 /// Contributions of samples to layers, packet by packet. Vectors of layers that the film does not have are empty.
 #[derive(Default)]
 pub(super) struct SampleLayers {
     pub(super) layers: Layers,
+    /// The light group of the background.
+    pub(super) background_group: usize,
     /// The object of each sample, of each kind; 0 for none.
     objects: [Vec<[u32; LANES]>; MatteKind::ALL.len()],
     /// Radiance of each sample by class.
     lights: Vec<[Lanes3; LightClass::COUNT]>,
+    /// Radiance of each sample by light group: all groups of a packet, then those of the next.
+    groups: Vec<Lanes3>,
     /// The diffuse part of the reflection at the first surface.
     diffuse: Vec<Lanes3>,
     /// Luminance of direct light: if nothing is in the way, and what arrives.
@@ -33,6 +39,7 @@ impl SampleLayers {
     pub(super) fn clear(&mut self) {
         self.objects.iter_mut().for_each(Vec::clear);
         self.lights.clear();
+        self.groups.clear();
         self.diffuse.clear();
         self.direct.clear();
     }
@@ -46,6 +53,8 @@ impl SampleLayers {
             self.lights.push([[splat(0.0); 3]; LightClass::COUNT]);
             self.diffuse.push([splat(0.0); 3]);
         }
+        let groups = self.groups.len() + usize::from(self.layers.light_groups);
+        self.groups.resize(groups, [splat(0.0); 3]);
         if self.layers.shadow {
             self.direct.push([splat(0.0); 2]);
         }
@@ -58,17 +67,20 @@ impl SampleLayers {
             true => 0,
             false => (LightClass::COUNT + 1) * size_of::<Lanes3>(),
         };
+        let groups = usize::from(layers.light_groups) * size_of::<Lanes3>();
         let direct = if layers.shadow {
             size_of::<[Lanes; 2]>()
         } else {
             0
         };
         // Vectors grow by doubling
-        2 * samples.div_ceil(LANES) * (objects + lights + direct)
+        2 * samples.div_ceil(LANES) * (objects + lights + groups + direct)
     }
 
     /// Stores the light that camera rays of packet `number` see.
-    pub(super) fn store(&mut self, number: usize, split: &LightSplit) {
+    pub(super) fn store(&mut self, number: usize, split: &LightSplit, groups: &GroupLight) {
+        let all = groups.all();
+        self.groups[number * all.len()..(number + 1) * all.len()].copy_from_slice(all);
         if split.is_active {
             self.lights[number] = split.lights;
             self.diffuse[number] = split.diffuse;
@@ -98,6 +110,27 @@ impl SampleLayers {
                 lights[LightClass::Specular as usize][axis][to] += added - diffuse;
             }
         }
+    }
+
+    /// Adds the light of `groups` along the rays of `segments`, which are not camera rays, to the groups of their
+    /// samples.
+    pub(super) fn add_groups(&mut self, segments: &SegmentPacket, groups: &GroupLight) {
+        let count = groups.all().len();
+        for (group, radiance) in groups.all().iter().enumerate() {
+            for lane in lanes_in(segments.lanes()) {
+                let sample = segments.sample[lane] as usize;
+                let sum = &mut self.groups[sample / LANES * count + group];
+                for (sum, radiance) in sum.iter_mut().zip(radiance) {
+                    sum[sample % LANES] += radiance[lane];
+                }
+            }
+        }
+    }
+
+    /// The light of `group` at a sample, linear RGB.
+    pub(super) fn light_of_group(&self, group: usize, sample: usize) -> Vec3 {
+        let count = usize::from(self.layers.light_groups);
+        lane3(&self.groups[sample / LANES * count + group], sample % LANES)
     }
 
     /// Stores the object of `kind` of the sample in `lane` of `packet`.
@@ -131,6 +164,15 @@ impl SampleLayers {
                 };
                 *light = sum * share + limited;
             }
+        }
+        for group in 0..usize::from(layers.light_groups) {
+            let samples = range.clone().map(|s| self.light_of_group(group, s));
+            let limited = match group == self.background_group {
+                true => Vec3::from_slice(&color) - Vec3::from_slice(&mean),
+                false => Vec3::ZERO,
+            };
+            let light = samples.sum::<Vec3>() * share + limited;
+            floats[layers.light_group_at(group)].copy_from_slice(&light.to_array());
         }
         if layers.shadow {
             let sum = |part: usize| -> f32 {

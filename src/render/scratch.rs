@@ -5,6 +5,7 @@ use super::{
     aov::DataSample,
     bsdf::{BsdfSamples, BsdfValues, SurfacePoints},
     layers::{Layers, LightClass},
+    light_groups::GroupLight,
     light_split::LightSplit,
     lights::LightSamples,
     materials::ShadingPoints,
@@ -89,6 +90,8 @@ pub(super) struct PacketScratch {
     pub(super) blend: Vec<(u32, f32)>,
     /// Light by its first interaction.
     pub(super) split: LightSplit,
+    /// Light by its source.
+    pub(super) groups: GroupLight,
     /// Rays traced for the tile.
     pub(super) counts: RayCounts,
 }

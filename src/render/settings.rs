@@ -5,7 +5,7 @@ use thiserror::Error;
 use super::film::Channels;
 use super::sampler::{MAX_FILTER_WIDTH, PixelFilter};
 use super::window::DataWindow;
-use crate::scene::{Material, MaterialError};
+use crate::scene::{Material, MaterialError, Scene};
 
 /// Maximum number of samples per pixel: more than any picture needs, and few enough for counts in f32.
 pub const MAX_SAMPLES: u32 = 4096;
@@ -48,6 +48,19 @@ pub enum IntegratorKind {
     Path,
 }
 
+/// Light that surfaces receive from other surfaces, in path tracing.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum IndirectLight {
+    /// Paths follow it.
+    #[default]
+    Traced,
+    /// Paths end at the second opaque surface, with an estimate of its light.
+    Ambient {
+        /// Radius of a particle, scene units.
+        radius: f32,
+    },
+}
+
 /// Settings of an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RenderSettings {
@@ -63,6 +76,8 @@ pub struct RenderSettings {
     pub integrator: IntegratorKind,
     /// Path tracing: maximum number of diffuse reflections before the last one; 0 is direct light only.
     pub bounces: u32,
+    /// Path tracing: light from other surfaces.
+    pub indirect: IndirectLight,
     /// Path tracing: number of photons for caustics on the ground; 0 follows paths from the ground instead.
     pub photons: u32,
     /// Maximum depth: 1 is direct light only; each further level adds one level of reflections and refractions. Rays
@@ -97,6 +112,7 @@ impl RenderSettings {
             filter: PixelFilter::BOX,
             integrator: IntegratorKind::Whitted,
             bounces: DEFAULT_BOUNCES,
+            indirect: IndirectLight::Traced,
             photons: 0,
             max_depth: 3,
             min_weight: DEFAULT_MIN_WEIGHT,
@@ -105,6 +121,14 @@ impl RenderSettings {
             has_features: false,
             window: None,
             mosaic_of: None,
+        }
+    }
+
+    /// Maximum number of diffuse reflections before the last one that paths follow.
+    pub(crate) const fn traced_bounces(&self) -> u32 {
+        match (self.indirect, self.bounces) {
+            (IndirectLight::Ambient { .. }, 1..) => 1,
+            (_, bounces) => bounces,
         }
     }
 
@@ -157,6 +181,17 @@ impl RenderSettings {
         Ok(())
     }
 
+    /// Checks that each light group of `scene` has a layer, if there are layers for light groups.
+    pub(super) fn validate_light_groups(&self, scene: &Scene) -> Result<(), RenderError> {
+        let count = self.channels.layers.light_groups;
+        let lights = scene.lights.iter().map(|light| light.group);
+        let group = lights.fold(scene.environment_group, u8::max);
+        if count > 0 && group >= count {
+            return Err(RenderError::LightGroup { group, count });
+        }
+        Ok(())
+    }
+
     /// Checks that the number of rays at spheres of `material` does not double for too many levels.
     pub(super) fn validate_branches(&self, material: &Material) -> Result<(), RenderError> {
         let max_depth = self.max_depth;
@@ -196,6 +231,14 @@ pub enum RenderError {
     /// `bounces` is out of range.
     #[error("bounces = {0} is out of range, it must be at most {MAX_BOUNCES}")]
     TooManyBounces(u32),
+    /// A light is in a group without a layer.
+    #[error("a light is in light group {group}, but there are only {count} light groups")]
+    LightGroup {
+        /// The group.
+        group: u8,
+        /// Number of groups with layers.
+        count: u8,
+    },
     /// `min_weight` is out of range.
     #[error("min_weight = {0} is out of range; it must be 0, or from {low:e} to {high}", low = MIN_WEIGHTS.start(), high = MIN_WEIGHTS.end())]
     MinWeight(f32),

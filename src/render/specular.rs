@@ -24,8 +24,14 @@ pub(super) struct SpecularHits<'a> {
     pub(super) last: u32,
 }
 
-/// Adds the radiance that rays in a direction with a throughput see infinitely far away, only for lanes in a mask.
-pub(super) type Escape<'a> = &'a dyn Fn(&Lanes3, &Lanes3, u32, &mut Lanes3);
+/// What rays that are not traced further see infinitely far away.
+#[derive(Clone, Copy)]
+pub(super) struct Escape<'a> {
+    /// Adds the radiance for rays in a direction with a throughput, only for lanes in a mask.
+    pub(super) add: &'a dyn Fn(&Lanes3, &Lanes3, u32, &mut Lanes3),
+    /// The light group of the radiance.
+    pub(super) group: usize,
+}
 
 impl RenderContext<'_> {
     /// Appends the rays that leave the shading points of `hits` to `next`.
@@ -48,6 +54,7 @@ impl RenderContext<'_> {
             throughput,
             radiance,
             split: lights,
+            groups,
             ..
         } = packet;
         // Describe both rays: weight, stream, side and branch of the path
@@ -78,7 +85,10 @@ impl RenderContext<'_> {
             let lanes = lanes_in(hits.lanes).fold(0, |lanes, lane| lanes | has_weight(lane));
             scale(self.simd, throughput, &rays.weight, &mut rays.throughput);
             if lanes & last != 0 {
-                escape(&rays.direction, &rays.throughput, lanes & last, radiance);
+                let group = groups.of_mut(escape.group);
+                for sum in [Some(&mut *radiance), group].into_iter().flatten() {
+                    (escape.add)(&rays.direction, &rays.throughput, lanes & last, sum);
+                }
                 lights.take(class, radiance);
             }
             if lanes & !last != 0 {

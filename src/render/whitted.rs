@@ -10,12 +10,13 @@ use super::{
     context::{Interior, RenderContext},
     integrator::Integrator,
     layers::LightClass,
+    light_groups::NO_GROUP,
     light_split::ratio,
     materials::{Material, WhittedMaterial, materials_of, reflect_lights},
     roulette::SplitRule,
     scratch::PacketScratch,
     shading::{add, add_background, product, scale},
-    specular::SpecularHits,
+    specular::{Escape, SpecularHits},
     stream::{RayStreams, SegmentPacket},
 };
 use crate::math::splat;
@@ -94,23 +95,14 @@ impl Integrator for WhittedIntegrator<'_> {
                     last: if is_last { lanes } else { 0 },
                 };
                 let (constants, split) = (material.constants(), &self.split);
-                context.scatter(
-                    constants,
-                    split,
-                    hits,
-                    packet,
-                    next,
-                    &|along, weight, lanes, sum| {
-                        add_background(
-                            context.simd,
-                            &context.background,
-                            along,
-                            weight,
-                            lanes,
-                            sum,
-                        );
+                let (simd, background) = (context.simd, &context.background);
+                let escape = Escape {
+                    add: &|along, weight, lanes, sum| {
+                        add_background(simd, background, along, weight, lanes, sum);
                     },
-                );
+                    group: NO_GROUP,
+                };
+                context.scatter(constants, split, hits, packet, next, escape);
             }
         }
     }
@@ -141,6 +133,7 @@ impl WhittedIntegrator<'_> {
             weight,
             counts,
             split,
+            groups,
             ..
         } = packet;
 
@@ -149,13 +142,16 @@ impl WhittedIntegrator<'_> {
         let mut colored = [splat(0.0); 3];
         product(simd, base, weight, &mut colored);
         add(simd, &colored, &constants.ambient, lanes, radiance);
+        if let Some(group) = groups.of_mut(NO_GROUP) {
+            add(simd, &colored, &constants.ambient, lanes, group);
+        }
         split.take(LightClass::Diffuse, radiance);
 
         // Add the light of each visible light source
         if !constants.scatters() {
             return;
         }
-        for light in &self.context.lights {
+        for (index, light) in self.context.lights.iter().enumerate() {
             light.sample_li(simd, &points.start, &[splat(0.0); 2], samples);
             let rays = &segments.rays;
             let arriving = split.is_active.then(|| samples.clone());
@@ -184,6 +180,8 @@ impl WhittedIntegrator<'_> {
                 samples.lanes
             };
             add(simd, &samples.radiance, &Vec3::ONE, visible, radiance);
+            let group = self.context.light_group(index);
+            groups.add(simd, group, &samples.radiance, visible);
             split.take_reflected(radiance);
             if let Some((lanes, unoccluded)) = unoccluded {
                 split.add_direct(lanes, &unoccluded, visible, &samples.radiance);

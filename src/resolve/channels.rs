@@ -3,11 +3,11 @@
 use spherule_formats::names;
 
 use super::{ResolveError, narrow, require_attribute};
-use crate::manifest::{Channel, Output};
-use crate::output::attribute_planes as planes_of;
+use crate::manifest::{Channel, Manifest, Output};
+use crate::output::{PlaneNames, attribute_planes as planes_of};
 use crate::pipeline::{AttributeChannel, FrameStep, attribute_list};
 use crate::render::Channels;
-use crate::render::layers::MAX_ATTRIBUTE_FLOATS;
+use crate::render::layers::{MAX_ATTRIBUTE_FLOATS, MAX_LIGHT_GROUPS};
 use crate::survey::Survey;
 
 const KEY: &str = "output.channels";
@@ -15,14 +15,15 @@ const KEY: &str = "output.channels";
 /// The longest name of an attribute with a channel, bytes.
 const MAX_NAME: usize = 200;
 
-/// The channels of `output`, and the attributes with channels.
+/// The channels of the images, and the attributes with channels.
 ///
 /// # Errors
-/// An attribute does not exist or cannot be a channel, or there are no velocities for `motion`.
+/// An attribute does not exist or cannot be a channel, or there are too many light groups.
 pub(super) fn channels(
-    output: &Output,
+    manifest: &Manifest,
     survey: &Survey,
 ) -> Result<(Channels, Vec<AttributeChannel>), ResolveError> {
+    let output = &manifest.output;
     let unsupported = |what: String| ResolveError::Unsupported { key: KEY, what };
     // Find the channels with fixed names
     let is_named = |channel: &&Channel| matches!(channel, Channel::Named(_));
@@ -35,6 +36,16 @@ pub(super) fn channels(
     let channels = Channels::from_names(names.iter().map(|name| &**name));
     let mut channels = channels.map_err(|e| unsupported(e.to_string()))?;
     channels.layers.mattes.set_levels(output.cryptomatte_levels);
+    // Find the light groups
+    let light_groups = manifest.light_groups();
+    channels.layers.set_light_groups(light_groups.len());
+    if channels.layers.light_groups > 0 && light_groups.len() >= MAX_LIGHT_GROUPS {
+        return Err(unsupported(format!(
+            "light_groups: the lights have {} groups, but at most {} are possible; use fewer names",
+            light_groups.len(),
+            MAX_LIGHT_GROUPS - 1
+        )));
+    }
     // Find the attributes
     let mut attributes = Vec::new();
     for channel in &output.channels {
@@ -49,6 +60,10 @@ pub(super) fn channels(
         )));
     }
     channels.layers.attributes = u8::try_from(names.len()).unwrap_or(u8::MAX);
+    let names = PlaneNames {
+        attributes: names,
+        light_groups: light_groups.into_iter().map(str::to_owned).collect(),
+    };
     if let Some(name) = crate::output::ambiguous_name(channels, &names) {
         return Err(unsupported(format!(
             "two channels of the file would be called {name}; leave one of them out"

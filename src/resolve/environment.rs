@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 
 use super::ResolveError;
+use super::lights::group_index;
 use crate::manifest::{EnvironmentKind, Manifest};
 use crate::render::IntegratorKind;
 use crate::scene::camera::view_direction;
@@ -69,6 +70,7 @@ pub(super) fn sun(manifest: &Manifest, view: &CameraView, up: DVec3) -> Option<L
             radiance: std::f32::consts::PI * SUN * settings.intensity * settings.color,
             casts_shadow: true,
             is_visible: settings.visible,
+            group: group_index(manifest, settings.group.as_ref()),
         }
     })
 }

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::{ResolveError, narrow};
-use crate::manifest::{self, LightKind, Manifest};
+use crate::manifest::{self, LightGroup, LightKind, Manifest};
 use crate::render::IntegratorKind;
 use crate::scene::{self, Light};
 
@@ -18,9 +18,10 @@ pub(super) fn lights(
 ) -> Result<Vec<Light>, ResolveError> {
     let mut lights = Vec::new();
     for light in &manifest.lights {
-        let Some(found) = light_of(light, origin, up) else {
+        let Some(mut found) = light_of(light, origin, up) else {
             continue;
         };
+        found.group = group_index(manifest, light.group.as_ref());
         if found.kind.has_extent() && manifest.integrator() == IntegratorKind::Whitted {
             return Err(ResolveError::Unsupported {
                 key: "light.type",
@@ -34,6 +35,13 @@ pub(super) fn lights(
         lights.push(found);
     }
     Ok(lights)
+}
+
+/// Index of `group` among the light groups; 0 for light without a group, and if there are no layers for groups.
+pub(super) fn group_index(manifest: &Manifest, group: Option<&LightGroup>) -> u8 {
+    let names = manifest.light_groups();
+    let index = group.and_then(|group| names.iter().position(|name| *name == group.as_str()));
+    index.map_or(0, |index| u8::try_from(1 + index).unwrap_or(0))
 }
 
 fn light_of(light: &manifest::Light, origin: DVec3, up: DVec3) -> Option<Light> {
@@ -79,6 +87,7 @@ fn light_of(light: &manifest::Light, origin: DVec3, up: DVec3) -> Option<Light> 
         radiance,
         casts_shadow: true,
         is_visible: light.visible,
+        group: 0,
     })
 }
 

@@ -97,6 +97,8 @@ pub struct Light {
     pub casts_shadow: bool,
     /// Whether the camera sees a light with an extent.
     pub is_visible: bool,
+    /// Index of its light group; 0 is that of light without a group.
+    pub group: u8,
 }
 
 impl Light {
@@ -115,6 +117,7 @@ impl Light {
             radiance,
             casts_shadow: true,
             is_visible: false,
+            group: 0,
         }
     }
 
@@ -127,6 +130,7 @@ impl Light {
             radiance,
             casts_shadow: true,
             is_visible: false,
+            group: 0,
         })
     }
 }
@@ -171,6 +175,7 @@ impl LightKind {
             radiance,
             casts_shadow: true,
             is_visible: false,
+            group: 0,
         }
     }
 }

@@ -24,7 +24,7 @@ pub mod rgb;
 pub use background::Background;
 pub use camera::{Camera, CameraError, CameraView, Framing, Lens};
 pub use colormap::{ColorMap, UnknownColorMap};
-pub use environment::{Environment, EnvironmentAxes, RadianceMap};
+pub use environment::{Environment, EnvironmentAxes, IrradianceHarmonics, RadianceMap};
 pub use ground::Ground;
 pub use lens::{Aperture, Focus, LensSettings};
 pub use light::{Falloff, Light, LightKind, default_lights};
@@ -92,6 +92,8 @@ pub struct Scene {
     pub environment: Option<Arc<Environment>>,
     /// Whether camera rays without an intersection see the environment instead of the background.
     pub is_environment_visible: bool,
+    /// Index of the light group of the environment; 0 is that of light without a group.
+    pub environment_group: u8,
     /// The next frame, for motion on the film.
     pub next_frame: Option<NextFrame>,
     /// What changes while the shutter is open, with motion blur.
@@ -130,6 +132,7 @@ impl Scene {
             meshes: Vec::new(),
             environment: None,
             is_environment_visible: false,
+            environment_group: 0,
             next_frame: None,
             exposure: None,
         }

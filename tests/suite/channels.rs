@@ -2,4 +2,6 @@
 
 mod cryptomatte;
 mod data;
+mod light_groups;
 mod lights;
+mod parts;

@@ -16,6 +16,7 @@ mod corpus;
 mod crop;
 mod damaged;
 mod denoise;
+mod draft;
 mod export;
 mod golden;
 mod help;

@@ -49,19 +49,22 @@ impl Picture {
             .no_deep_data()
             .largest_resolution_level()
             .all_channels()
-            .first_valid_layer()
+            .all_layers()
             .all_attributes()
             .from_buffered(Cursor::new(bytes))
             .expect("an EXR image");
-        let layer = image.layer_data;
-        let facts = layer.attributes.other.iter().find_map(|(name, value)| {
+        let parts = image.layer_data;
+        let size = parts[0].size;
+        assert!(parts.iter().all(|part| part.size == size));
+        let facts = parts[0].attributes.other.iter().find_map(|(name, value)| {
             let AttributeValue::Text(text) = value else {
                 return None;
             };
             let is_ours = *name == *"spherule";
             is_ours.then(|| serde_json::from_str(&text.to_string()).expect("JSON"))
         });
-        let planes = layer.channel_data.list.into_iter().map(|channel| {
+        let channels = parts.into_iter().flat_map(|part| part.channel_data.list);
+        let planes = channels.map(|channel| {
             let plane = match channel.sample_data {
                 FlatSamples::F16(v) => Plane::Float(v.into_iter().map(f32::from).collect()),
                 FlatSamples::F32(v) => Plane::Float(v),
@@ -70,8 +73,8 @@ impl Picture {
             (channel.name.to_string(), plane)
         });
         Self {
-            width: layer.size.width(),
-            height: layer.size.height(),
+            width: size.width(),
+            height: size.height(),
             planes: planes.collect(),
             facts,
         }

@@ -20,6 +20,8 @@ const fn shape(width: u32, height: u32, channels: Channels) -> ImageShape {
         window: DataWindow::whole(width, height),
         channels,
         attributes: Vec::new(),
+        light_groups: Vec::new(),
+        has_data_part: false,
     }
 }
 

@@ -1,5 +1,7 @@
 //! The expected outputs of a job, from the settings in its plan.
 
+use std::collections::BTreeSet;
+
 use spherule_jobs::Plan;
 
 use crate::job::KIND;
@@ -62,7 +64,18 @@ impl ExpectedOutput {
                 let levels = u32::try_from(levels.as_integer()?).ok()?;
                 channels.layers.mattes.set_levels(levels);
             }
-            Some((channels, attributes))
+            // Settings have the groups only if there are layers for them
+            let is_group = |key: &str| {
+                let light = key
+                    .strip_prefix("light.")
+                    .and_then(|key| key.split_once('.'));
+                key == "environment.group" || light.is_some_and(|(_, name)| name == "group")
+            };
+            let keys = settings.iter().filter(|(key, _)| is_group(key));
+            let names = keys.map(|(key, _)| Some(value(key)?.as_str()?.to_owned()));
+            let groups = names.collect::<Option<BTreeSet<String>>>()?;
+            channels.layers.set_light_groups(groups.len());
+            Some((channels, attributes, groups.into_iter().collect()))
         };
         // Plans of older versions have neither crop nor overscan
         let crop = find("image.crop").map(|_| {
@@ -83,13 +96,17 @@ impl ExpectedOutput {
             ..Image::default()
         };
         let [width, height] = image.data_size().ok_or_else(|| wrong("image.crop"))?;
-        let (channels, attributes) = channels().ok_or_else(|| wrong("output.channels"))?;
+        let (channels, attributes, light_groups) =
+            channels().ok_or_else(|| wrong("output.channels"))?;
         Ok(Self::Images(ImageShape {
             width,
             height,
             window: image.data_window(),
             channels,
             attributes,
+            light_groups,
+            has_data_part: find("output.data_compression")
+                .is_some_and(|data| find("output.compression") != Some(data)),
         }))
     }
 }
@@ -114,6 +131,8 @@ mod tests {
             window: DataWindow::whole(1920, 1080),
             channels: Channels::from_names(["Z", "N", "id"]).unwrap(),
             attributes: Vec::new(),
+            light_groups: Vec::new(),
+            has_data_part: false,
         };
         assert_eq!(
             ExpectedOutput::of_settings(&settings),

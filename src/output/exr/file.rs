@@ -1,4 +1,4 @@
-//! Writes the parts of a file with scanlines: magic number, version, header, offsets of the blocks, blocks.
+//! Writes a file with scanlines: magic number, version, the header of each part, offsets of the blocks, blocks.
 
 use std::io::{Seek, SeekFrom, Write};
 
@@ -6,7 +6,7 @@ use exr::error::Error;
 use exr::meta::attribute;
 use exr::prelude::{AttributeValue, Text};
 
-use super::layout::ExrLayout;
+use super::layout::{ExrLayout, ExrPart};
 use super::pack::PackedBlock;
 use super::{OutputError, TextAttribute};
 
@@ -17,6 +17,9 @@ const VERSION: u32 = 2;
 /// Flag of a file with names of more than 31 bytes.
 const LONG_NAMES: u32 = 1 << 10;
 
+/// Flag of a file with several parts.
+const MULTI_PART: u32 = 1 << 12;
+
 /// A file that is being written, block by block.
 pub(super) struct ScanLineFile<'a, W> {
     file: &'a mut W,
@@ -24,19 +27,30 @@ pub(super) struct ScanLineFile<'a, W> {
     offsets_at: u64,
     /// Place of the next block, bytes.
     end: u64,
-    /// Places of the blocks so far.
+    parts: Vec<PartBlocks>,
+}
+
+/// The blocks of a part so far.
+struct PartBlocks {
+    /// Their places.
     offsets: Vec<u64>,
-    /// Number of blocks of the whole file.
+    /// Number of blocks of the whole part.
     count: usize,
-    /// First row of the file.
+    /// First row of the part.
     top: i32,
 }
 
 impl<'a, W: Write + Seek> ScanLineFile<'a, W> {
     /// Writes everything before the blocks, with zeros for the offsets.
     pub(super) fn start(file: &'a mut W, layout: &ExrLayout) -> Result<Self, OutputError> {
-        let mut start = header(layout).map_err(OutputError::Exr)?;
-        let count = layout.header.chunk_count;
+        let mut start = headers(layout).map_err(OutputError::Exr)?;
+        let blocks = |part: &ExrPart| PartBlocks {
+            offsets: Vec::with_capacity(part.header.chunk_count),
+            count: part.header.chunk_count,
+            top: part.top(),
+        };
+        let parts: Vec<PartBlocks> = layout.parts.iter().map(blocks).collect();
+        let count: usize = parts.iter().map(|part| part.count).sum();
         let offsets_at = start.len() as u64;
         start.resize(start.len() + 8 * count, 0);
         file.write_all(&start).map_err(io_error)?;
@@ -44,35 +58,38 @@ impl<'a, W: Write + Seek> ScanLineFile<'a, W> {
             file,
             offsets_at,
             end: start.len() as u64,
-            offsets: Vec::with_capacity(count),
-            count,
-            top: layout.top(),
+            parts,
         })
     }
 
-    /// Writes the next block.
+    /// Writes the next block of a part.
     pub(super) fn write(&mut self, block: PackedBlock) -> Result<(), OutputError> {
-        if self.offsets.len() == self.count {
-            return Err(invalid("there are more blocks than in the layout"));
-        }
-        self.offsets.push(self.end);
+        let has_parts = self.parts.len() > 1;
+        let part = self.parts.get_mut(block.part);
+        let part = part.filter(|part| part.offsets.len() < part.count);
+        let part = part.ok_or_else(|| invalid("there are more blocks than in the layout"))?;
+        part.offsets.push(self.end);
+        // In a file with several parts, a block begins with the number of its part
         let long = |_| invalid("a block is too long");
-        let row = self.top + i32::try_from(block.y).map_err(long)?;
+        let number = i32::try_from(block.part).map_err(long)?;
+        let row = part.top + i32::try_from(block.y).map_err(long)?;
         let len = i32::try_from(block.bytes.len()).map_err(long)?;
-        self.file.write_all(&row.to_le_bytes()).map_err(io_error)?;
-        self.file.write_all(&len.to_le_bytes()).map_err(io_error)?;
+        let start = [number, row, len].map(i32::to_le_bytes);
+        let start = start[usize::from(!has_parts)..].concat();
+        self.file.write_all(&start).map_err(io_error)?;
         self.file.write_all(&block.bytes).map_err(io_error)?;
-        self.end += 8 + block.bytes.len() as u64;
+        self.end += (start.len() + block.bytes.len()) as u64;
         Ok(())
     }
 
     /// Writes the offsets after the last block.
     pub(super) fn finish(self) -> Result<(), OutputError> {
-        if self.offsets.len() < self.count {
+        let is_complete = |part: &PartBlocks| part.offsets.len() == part.count;
+        if !self.parts.iter().all(is_complete) {
             return Err(invalid("some blocks are missing"));
         }
-        let offsets = self.offsets.iter().flat_map(|offset| offset.to_le_bytes());
-        let offsets: Vec<u8> = offsets.collect();
+        let offsets = self.parts.iter().flat_map(|part| &part.offsets);
+        let offsets: Vec<u8> = offsets.flat_map(|offset| offset.to_le_bytes()).collect();
         let to = SeekFrom::Start(self.offsets_at);
         self.file.seek(to).map_err(io_error)?;
         self.file.write_all(&offsets).map_err(io_error)?;
@@ -81,19 +98,31 @@ impl<'a, W: Write + Seek> ScanLineFile<'a, W> {
 }
 
 /// The bytes before the offsets.
-fn header(layout: &ExrLayout) -> Result<Vec<u8>, Error> {
+fn headers(layout: &ExrLayout) -> Result<Vec<u8>, Error> {
+    let has_parts = layout.parts.len() > 1;
     let mut has_long_names = false;
-    layout.header.validate(false, &mut has_long_names, true)?;
-    let flags = if has_long_names { LONG_NAMES } else { 0 };
-    let mut bytes = [MAGIC.to_le_bytes(), (VERSION | flags).to_le_bytes()].concat();
-    layout.header.write(&mut bytes)?;
-    // A zero ends the header; further attributes come before it
-    let end = bytes.pop();
-    for TextAttribute { name, text } in &layout.texts {
-        let value = AttributeValue::Text(Text::from_slice_unchecked(text.as_bytes()));
-        attribute::write(name.as_bytes(), &value, &mut bytes)?;
+    for part in &layout.parts {
+        part.header.validate(has_parts, &mut has_long_names, true)?;
     }
-    bytes.extend(end);
+    let mut version = VERSION;
+    for (flag, is_set) in [(LONG_NAMES, has_long_names), (MULTI_PART, has_parts)] {
+        version |= if is_set { flag } else { 0 };
+    }
+    let mut bytes = [MAGIC.to_le_bytes(), version.to_le_bytes()].concat();
+    for part in &layout.parts {
+        part.header.write(&mut bytes)?;
+        // A zero ends a header; further attributes come before it
+        let end = bytes.pop();
+        for TextAttribute { name, text } in &part.texts {
+            let value = AttributeValue::Text(Text::from_slice_unchecked(text.as_bytes()));
+            attribute::write(name.as_bytes(), &value, &mut bytes)?;
+        }
+        bytes.extend(end);
+    }
+    // An empty header ends the list of several headers
+    if has_parts {
+        bytes.push(0);
+    }
     Ok(bytes)
 }
 

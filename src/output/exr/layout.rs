@@ -1,28 +1,45 @@
-//! The layout of an image in its file: header, planes, and blocks of rows.
+//! The layout of an image in its file: parts with their headers, planes, and blocks of rows.
 
 use exr::image::write::layers::WritableLayers;
 use exr::meta::header::Header;
 use exr::prelude::{
     AnyChannel, AnyChannels, Blocks, Compression as Codec, Encoding, FlatSamples, ImageAttributes,
-    IntegerBounds, Layer, LineOrder, SampleType, Vec2,
+    IntegerBounds, Layer, LayerAttributes, LineOrder, SampleType, Text, Vec2,
 };
 
-use super::planes::{Plane, planes_in_file};
+use super::planes::{Plane, parts, planes_in_file};
 use super::{Compression, ExrOptions, OutputError, TextAttribute, attributes};
 use crate::render::{Channels, DataWindow, Film, FilmRows};
 
 /// Minimum number of rows in a band: the height of the renderer's tiles.
 const BAND_ROWS: u32 = 16;
 
+/// Names of the parts of a file with several ones: of colours, and of data.
+const PART_NAMES: [&str; 2] = ["color", "data"];
+
 /// The layout of an image file, which all of its blocks share.
 #[derive(Debug, Clone)]
 pub struct ExrLayout {
+    pub(super) parts: Vec<ExrPart>,
+}
+
+/// The layout of a part of an image file: some of its planes.
+#[derive(Debug, Clone)]
+pub(super) struct ExrPart {
     pub(super) header: Header,
     pub(super) compression: Compression,
     /// The planes in the order of the file.
     pub(super) planes: Vec<Plane>,
     /// Attributes after those of `header`, in the order of the file.
     pub(super) texts: Vec<TextAttribute>,
+}
+
+/// A block of rows in a part of an image.
+#[derive(Debug, Clone, Copy)]
+pub struct ExrBlock<'a> {
+    /// Index of the part.
+    pub(super) part: usize,
+    pub(super) rows: FilmRows<'a>,
 }
 
 impl ExrLayout {
@@ -36,39 +53,27 @@ impl ExrLayout {
         channels: Channels,
         options: &ExrOptions,
     ) -> Result<Self, OutputError> {
-        let planes = planes_in_file(channels, &options.attribute_planes);
-        // Describe the channels; the header needs only names and types, so the samples may be empty
-        let described = planes.iter().map(|plane| {
-            let samples = match plane.sample_type() {
-                SampleType::F16 => FlatSamples::F16(Vec::new()),
-                SampleType::F32 => FlatSamples::F32(Vec::new()),
-                SampleType::U32 => FlatSamples::U32(Vec::new()),
-            };
-            AnyChannel::new(&*plane.name, samples)
-        });
-        // Make the header
-        let encoding = Encoding {
-            compression: options.compression.codec(),
-            blocks: Blocks::ScanLines,
-            line_order: LineOrder::Increasing,
-        };
-        let size = (width as usize, height as usize);
-        let described = AnyChannels::sort(described.collect());
-        // Place it in the image
-        let DataWindow { left, top, image } =
-            options.window.unwrap_or(DataWindow::whole(width, height));
-        let mut attributes = attributes(options)?;
-        attributes.layer_position = Vec2(left, top);
-        let layer = Layer::new(size, attributes, encoding, described);
-        let display = IntegerBounds::from_dimensions((image[0] as usize, image[1] as usize));
-        let image = ImageAttributes::new(display);
-        let header = layer.infer_headers(&image).remove(0);
-        Ok(Self {
-            header,
-            compression: options.compression,
-            planes,
-            texts: options.texts.clone(),
-        })
+        let planes = planes_in_file(channels, &options.names);
+        let planes = parts(planes, options.has_data_part());
+        let count = planes.len();
+        let data = options.data_compression.unwrap_or(options.compression);
+        let names = PART_NAMES.into_iter().zip([options.compression, data]);
+        let mut all = Vec::new();
+        for (planes, (name, compression)) in planes.into_iter().zip(names) {
+            let mut attributes = attributes(options)?;
+            attributes.layer_name = (count > 1).then(|| Text::from(name));
+            all.push(ExrPart {
+                header: header(width, height, &planes, compression, attributes, options),
+                compression,
+                planes,
+                texts: Vec::new(),
+            });
+        }
+        // They describe data
+        if let Some(last) = all.last_mut() {
+            last.texts.clone_from(&options.texts);
+        }
+        Ok(Self { parts: all })
     }
 
     /// The layout of images with the size and the channels of `film`.
@@ -79,27 +84,70 @@ impl ExrLayout {
         Self::new(film.width, film.height, film.channels(), options)
     }
 
+    /// Number of rows in a band, the unit of work of a thread: one or more whole blocks of each part.
+    pub fn rows_per_band(&self) -> u32 {
+        let rows = self.parts.iter().map(ExrPart::rows_per_block);
+        rows.fold(BAND_ROWS, u32::max)
+    }
+
+    /// The blocks of `band`, part by part. It must begin and end at the border of a block.
+    pub fn blocks<'a>(&self, band: FilmRows<'a>) -> impl Iterator<Item = ExrBlock<'a>> + use<'a> {
+        let rows: Vec<u32> = self.parts.iter().map(ExrPart::rows_per_block).collect();
+        rows.into_iter().enumerate().flat_map(move |(part, rows)| {
+            let tops = (band.top..band.top + band.height).step_by(rows as usize);
+            tops.map(move |top| ExrBlock {
+                part,
+                rows: band.part(top, rows),
+            })
+        })
+    }
+}
+
+/// The header of a part.
+fn header(
+    width: u32,
+    height: u32,
+    planes: &[Plane],
+    compression: Compression,
+    mut attributes: LayerAttributes,
+    options: &ExrOptions,
+) -> Header {
+    // Describe the channels; the header needs only names and types, so the samples may be empty
+    let described = planes.iter().map(|plane| {
+        let samples = match plane.sample_type() {
+            SampleType::F16 => FlatSamples::F16(Vec::new()),
+            SampleType::F32 => FlatSamples::F32(Vec::new()),
+            SampleType::U32 => FlatSamples::U32(Vec::new()),
+        };
+        AnyChannel::new(&*plane.name, samples)
+    });
+    let encoding = Encoding {
+        compression: compression.codec(),
+        blocks: Blocks::ScanLines,
+        line_order: LineOrder::Increasing,
+    };
+    let size = (width as usize, height as usize);
+    let described = AnyChannels::sort(described.collect());
+    // Place it in the image
+    let DataWindow { left, top, image } =
+        options.window.unwrap_or(DataWindow::whole(width, height));
+    attributes.layer_position = Vec2(left, top);
+    let layer = Layer::new(size, attributes, encoding, described);
+    let display = IntegerBounds::from_dimensions((image[0] as usize, image[1] as usize));
+    let image = ImageAttributes::new(display);
+    layer.infer_headers(&image).remove(0)
+}
+
+impl ExrPart {
     /// Row of the image in which the film begins.
     pub(super) fn top(&self) -> i32 {
         self.header.own_attributes.layer_position.y()
     }
 
     /// Number of rows in a block: 1, 16 or 32. The last block of an image may have fewer.
-    pub fn rows_per_block(&self) -> u32 {
+    fn rows_per_block(&self) -> u32 {
         let rows = self.compression.codec().scan_lines_per_block();
         u32::try_from(rows).expect("blocks have at most 256 rows")
-    }
-
-    /// Number of rows in a band, the unit of work of a thread: one or more whole blocks.
-    pub fn rows_per_band(&self) -> u32 {
-        self.rows_per_block().max(BAND_ROWS)
-    }
-
-    /// The blocks of `band`, which must begin and end at the border of a block.
-    pub fn blocks<'a>(&self, band: FilmRows<'a>) -> impl Iterator<Item = FilmRows<'a>> + use<'a> {
-        let rows = self.rows_per_block();
-        let tops = (band.top..band.top + band.height).step_by(rows as usize);
-        tops.map(move |top| band.part(top, rows))
     }
 
     /// Number of bytes of all samples in `rows` rows.

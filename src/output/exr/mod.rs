@@ -1,4 +1,4 @@
-//! OpenEXR files: one part, planar channels, scanlines.
+//! OpenEXR files: planar channels, scanlines; one part, or two parts if colours and data have different compressions.
 //!
 //! Colours are half-floats, the data channels are floats, `id.I` is uint. This module packs blocks of rows (see
 //! [`pack_block`]), and writes the file with attributes from the crate `exr`. A film always gives the same bytes,
@@ -23,9 +23,9 @@ mod pack;
 pub(super) mod planes;
 
 pub use blocks::write_blocks;
-pub use layout::ExrLayout;
+pub use layout::{ExrBlock, ExrLayout};
 pub use pack::{PackBuffers, PackedBlock, pack_block};
-pub use planes::{ambiguous_name, attribute_planes};
+pub use planes::{DEFAULT_LIGHT_GROUP, PlaneNames, ambiguous_name, attribute_planes};
 
 /// Maximum length of an attribute name in the format, bytes.
 const NAME_MAX: usize = 255;
@@ -68,8 +68,10 @@ pub struct TextAttribute {
 /// Settings of an EXR file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ExrOptions {
-    /// Compression of all channels.
+    /// Compression of all channels, or of colours.
     pub compression: Compression,
+    /// Compression of channels that are no colours. If it is another one, they are in a part of their own.
+    pub data_compression: Option<Compression>,
     /// Data window and display window; by default both are the size of the film.
     pub window: Option<DataWindow>,
     /// Attribute `framesPerSecond`, as numerator and denominator.
@@ -80,10 +82,18 @@ pub struct ExrOptions {
     pub comments: Option<String>,
     /// A custom attribute.
     pub custom: Option<CustomAttribute>,
-    /// Further attributes, in the order of the file.
+    /// Further attributes, in the order of the file; in the part of data, if there is one.
     pub texts: Vec<TextAttribute>,
-    /// Names of the planes of attribute channels, as many as the film has.
-    pub attribute_planes: Vec<String>,
+    /// Names of planes that depend on the job.
+    pub names: PlaneNames,
+}
+
+impl ExrOptions {
+    /// Whether data channels are in a part of their own.
+    pub(super) fn has_data_part(&self) -> bool {
+        self.data_compression
+            .is_some_and(|data| data != self.compression)
+    }
 }
 
 /// An encoded image.

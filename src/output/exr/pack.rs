@@ -8,7 +8,7 @@ use exr::prelude::IntegerBounds;
 
 use super::deflate::{Deflater, Piece, WINDOW};
 use super::differences::Differences;
-use super::layout::ExrLayout;
+use super::layout::{ExrBlock, ExrLayout, ExrPart};
 use super::lines::LineBuffer;
 use super::planes::PlaneKind;
 use super::{Compression, OutputError};
@@ -18,6 +18,8 @@ use crate::render::FilmRows;
 /// A block in the form in which it is written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PackedBlock {
+    /// Index of its part in the layout.
+    pub part: usize,
     /// First row.
     pub y: u32,
     /// The compressed bytes, or the uncompressed bytes if compression does not shorten them.
@@ -41,18 +43,19 @@ impl PackBuffers {
     }
 }
 
-/// Packs the block `rows`, one of [`ExrLayout::blocks`].
+/// Packs `block`, one of [`ExrLayout::blocks`].
 ///
 /// # Errors
 /// If the codec of the crate `exr` fails.
 ///
 /// # Panics
-/// If the film of `rows` lacks planes of `layout`.
+/// If the film of `block` lacks planes of `layout`.
 pub fn pack_block(
-    rows: &FilmRows,
+    block: &ExrBlock<'_>,
     layout: &ExrLayout,
     buffers: &mut PackBuffers,
 ) -> Result<PackedBlock, OutputError> {
+    let (rows, layout) = (&block.rows, &layout.parts[block.part]);
     buffers.line.clamped = 0;
     let bytes = match layout.compression {
         Compression::None => plain(rows, layout, &mut buffers.line),
@@ -67,6 +70,7 @@ pub fn pack_block(
         Compression::Rle | Compression::Piz => compress_with_exr(rows, layout, &mut buffers.line)?,
     };
     Ok(PackedBlock {
+        part: block.part,
         y: rows.top,
         bytes,
         clamped: buffers.line.clamped,
@@ -77,7 +81,7 @@ pub fn pack_block(
 /// line in the block, the bytes of the line, and the number of bytes per sample.
 fn for_each_line(
     rows: &FilmRows,
-    layout: &ExrLayout,
+    layout: &ExrPart,
     buffer: &mut LineBuffer,
     mut visit: impl FnMut(usize, &[u8], usize),
 ) {
@@ -92,7 +96,7 @@ fn for_each_line(
 }
 
 /// The uncompressed samples, little-endian.
-fn plain(rows: &FilmRows, layout: &ExrLayout, buffer: &mut LineBuffer) -> Vec<u8> {
+fn plain(rows: &FilmRows, layout: &ExrPart, buffer: &mut LineBuffer) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(layout.bytes(rows.height));
     for_each_line(rows, layout, buffer, |_, line, _| {
         bytes.extend_from_slice(line);
@@ -103,7 +107,7 @@ fn plain(rows: &FilmRows, layout: &ExrLayout, buffer: &mut LineBuffer) -> Vec<u8
 /// Compresses a block with the crate `exr`, which expects samples in the byte order of the machine.
 fn compress_with_exr(
     rows: &FilmRows,
-    layout: &ExrLayout,
+    layout: &ExrPart,
     buffer: &mut LineBuffer,
 ) -> Result<Vec<u8>, OutputError> {
     let mut bytes = Vec::with_capacity(layout.bytes(rows.height));
@@ -125,7 +129,7 @@ fn compress_with_exr(
 }
 
 /// The zlib stream of `rows`, or None if it is no shorter than the samples.
-fn zip<'b>(rows: &FilmRows, layout: &ExrLayout, buffers: &'b mut PackBuffers) -> Option<&'b [u8]> {
+fn zip<'b>(rows: &FilmRows, layout: &ExrPart, buffers: &'b mut PackBuffers) -> Option<&'b [u8]> {
     let PackBuffers {
         line,
         differences,
@@ -138,7 +142,7 @@ fn zip<'b>(rows: &FilmRows, layout: &ExrLayout, buffers: &'b mut PackBuffers) ->
     deflater.compress(differences, layout.pieces(rows.height))
 }
 
-impl ExrLayout {
+impl ExrPart {
     /// The pieces of the differences of a block of `rows` rows: stretches of similar planes, first of the bytes at even
     /// positions, then of those at odd positions.
     fn pieces(&self, rows: u32) -> impl Iterator<Item = Piece> {

@@ -9,9 +9,9 @@ use exr::prelude::{
 };
 use glam::Vec3;
 
-use super::super::planes::{Source, planes_in_file};
+use super::super::planes::{PlaneNames, Source, planes_in_file};
 use super::super::tests::COMPRESSIONS;
-use super::super::{ExrOptions, attributes, encode_exr, write_blocks, write_exr};
+use super::super::{ExrOptions, TextAttribute, attributes, encode_exr, write_blocks, write_exr};
 use super::*;
 use crate::render::{Channels, Film};
 
@@ -114,7 +114,7 @@ fn bits(samples: &FlatSamples) -> Vec<u32> {
 /// The file that the crate `exr` writes on its own.
 fn written_by_exr(film: &Film, options: &ExrOptions) -> Vec<u8> {
     let size = (film.width as usize, film.height as usize);
-    let planes = planes_in_file(film.channels(), &[]).into_iter();
+    let planes = planes_in_file(film.channels(), &PlaneNames::default()).into_iter();
     let list = planes.map(|plane| AnyChannel::new(&*plane.name, samples(film, plane.source)));
     let encoding = Encoding {
         compression: options.compression.codec(),
@@ -156,7 +156,7 @@ fn check(film: &Film, compression: Compression) {
     if !matches!(compression, Compression::Zip | Compression::Zips) {
         assert!(file == reference, "{compression:?} {size:?}");
     }
-    let expected: Vec<_> = planes_in_file(film.channels(), &[])
+    let expected: Vec<_> = planes_in_file(film.channels(), &PlaneNames::default())
         .iter()
         .map(|plane| (plane.name.to_string(), bits(&samples(film, plane.source))))
         .collect();
@@ -196,6 +196,91 @@ fn layers_round_trip() {
     }
 }
 
+/// The names of the parts of a file, and the samples of all channels.
+fn decoded_parts(file: &[u8]) -> (Vec<String>, Vec<(String, Vec<u32>)>) {
+    let image = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .all_layers()
+        .all_attributes()
+        .from_buffered(Cursor::new(file))
+        .unwrap();
+    let (mut names, mut channels) = (Vec::new(), Vec::new());
+    for part in image.layer_data {
+        names.extend(part.attributes.layer_name.map(|name| name.to_string()));
+        for channel in part.channel_data.list {
+            channels.push((channel.name.to_string(), bits(&channel.sample_data)));
+        }
+    }
+    channels.sort();
+    (names, channels)
+}
+
+#[test]
+fn colours_and_data_have_compressions_of_their_own() {
+    let version = |file: &[u8]| u32::from_le_bytes(file[4..8].try_into().unwrap());
+    for (width, height) in [(1, 1), (17, 33), (40, 16), (31, 65)] {
+        let film = wild_film(width, height, Channels::ALL);
+        for compression in COMPRESSIONS {
+            let plain = ExrOptions {
+                compression,
+                ..ExrOptions::default()
+            };
+            let single = encode_exr(&film, &plain).unwrap();
+            let (names, expected) = decoded_parts(&single.bytes);
+            assert!(names.is_empty() && version(&single.bytes) & 1 << 12 == 0);
+            for data in COMPRESSIONS {
+                let options = ExrOptions {
+                    data_compression: Some(data),
+                    ..plain.clone()
+                };
+                let file = encode_exr(&film, &options).unwrap();
+                assert_eq!(file.clamped, single.clamped);
+                if data == compression {
+                    assert!(file == single);
+                    continue;
+                }
+                let (names, found) = decoded_parts(&file.bytes);
+                assert_eq!(names, ["color", "data"]);
+                assert!(found == expected, "{compression:?} {data:?}");
+                assert_eq!(version(&file.bytes), 2 | 1 << 12);
+            }
+        }
+        // Without data, there is one part
+        let options = ExrOptions {
+            data_compression: Some(Compression::None),
+            ..ExrOptions::default()
+        };
+        let film = wild_film(width, height, Channels::COLOR);
+        let [with, without] = [options, ExrOptions::default()];
+        assert!(encode_exr(&film, &with).unwrap() == encode_exr(&film, &without).unwrap());
+    }
+}
+
+#[test]
+fn attributes_of_data_are_in_their_part() {
+    let film = wild_film(5, 4, Channels::ALL);
+    let options = ExrOptions {
+        data_compression: Some(Compression::None),
+        world_to_camera: Some([1.0; 16]),
+        texts: vec![TextAttribute {
+            name: "cryptomatte/1234567/name".to_owned(),
+            text: "crypto_part".to_owned(),
+        }],
+        ..ExrOptions::default()
+    };
+    let file = encode_exr(&film, &options).unwrap().bytes;
+    let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(file), true).unwrap();
+    let [color, data] = &meta.headers[..] else {
+        panic!("{} parts", meta.headers.len());
+    };
+    let count = |header: &exr::meta::header::Header| header.own_attributes.other.len();
+    assert_eq!((count(color), count(data)), (0, 1));
+    assert_eq!(color.own_attributes.world_to_camera, Some([1.0; 16]));
+    assert_eq!(data.own_attributes.world_to_camera, Some([1.0; 16]));
+}
+
 #[test]
 fn wide_rows_round_trip() {
     check(&wild_film(3000, 17, Channels::ALL), Compression::Zip);
@@ -207,7 +292,7 @@ fn pieces_follow_the_kinds_of_planes() {
     let layout =
         |width, channels| ExrLayout::new(width, 40, channels, &ExrOptions::default()).unwrap();
     let lengths = |layout: &ExrLayout, rows| -> Vec<(usize, bool)> {
-        let pieces = layout.pieces(rows);
+        let pieces = layout.parts[0].pieces(rows);
         pieces
             .map(|piece| (piece.length, piece.is_searched))
             .collect()
@@ -232,7 +317,7 @@ fn pieces_follow_the_kinds_of_planes() {
         row(true, true),
     ];
     assert_eq!(lengths(&all, 2), rows.concat());
-    assert_eq!(4 * 320, all.bytes(2));
+    assert_eq!(4 * 320, all.parts[0].bytes(2));
     // A block of one row has no row above
     assert_eq!(
         lengths(&all, 1),
@@ -241,7 +326,7 @@ fn pieces_follow_the_kinds_of_planes() {
     assert_eq!(lengths(&layout(10, Channels::COLOR), 1), [(40, false); 2]);
     // In wide images, the row above is out of reach
     let wide = layout(1025, Channels::ALL);
-    assert!(wide.bytes(1) / 2 > WINDOW);
+    assert!(wide.parts[0].bytes(1) / 2 > WINDOW);
     assert!(!lengths(&wide, 2)[6].1);
     assert!(lengths(&layout(1024, Channels::ALL), 2)[6].1);
 }
@@ -266,8 +351,8 @@ fn blocks_that_do_not_shrink_are_stored_plain() {
         .collect();
     let tops: Vec<u32> = blocks.iter().map(|block| block.y).collect();
     assert_eq!(tops, [0, 16]);
-    assert!(blocks[0].bytes.len() < layout.bytes(16) / 10);
-    assert_eq!(blocks[1].bytes.len(), layout.bytes(16));
+    assert!(blocks[0].bytes.len() < layout.parts[0].bytes(16) / 10);
+    assert_eq!(blocks[1].bytes.len(), layout.parts[0].bytes(16));
     assert_eq!((blocks[0].clamped, blocks[1].clamped), (0, 3));
     check(&film, Compression::Zip);
 }

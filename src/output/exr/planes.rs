@@ -1,11 +1,27 @@
 //! The planes of a file, and the location of their samples in a film.
 
 use std::borrow::Cow;
+use std::iter;
 
 use exr::meta::attribute::SampleType;
 
 use crate::render::Channels;
 use crate::render::layers::Layers;
+
+/// Start of the names of the layers of light groups. No other layer begins with it.
+const LIGHT_GROUP: &str = "light_";
+
+/// Name of the group of light without a group.
+pub const DEFAULT_LIGHT_GROUP: &str = "default";
+
+/// Names of planes that depend on the job.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct PlaneNames {
+    /// The planes of attribute channels, as many as the film has.
+    pub attributes: Vec<String>,
+    /// The light groups from number 1 on, as many as the film has. Number 0 is [`DEFAULT_LIGHT_GROUP`].
+    pub light_groups: Vec<String>,
+}
 
 /// One channel of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -75,9 +91,8 @@ impl Plane {
     }
 }
 
-/// The planes of a file with `channels`, in the order of the channel names in the manual. `attributes`: the names of
-/// the planes of attributes.
-pub(in crate::output) fn planes(channels: Channels, attributes: &[String]) -> Vec<Plane> {
+/// The planes of a file with `channels`, in the order of the channel names in the manual.
+pub(in crate::output) fn planes(channels: Channels, names: &PlaneNames) -> Vec<Plane> {
     let color = vectors(["R", "G", "B", "A"], Source::Color);
     let mut all = color.to_vec();
     all.extend(channels.depth.then(|| Plane::new("Z", Source::Depth)));
@@ -98,12 +113,22 @@ pub(in crate::output) fn planes(channels: Channels, attributes: &[String]) -> Ve
     all.extend(axes(channels.velocity, v, Source::Velocity));
     all.extend(axes(channels.albedo, albedo, Source::Albedo));
     all.extend(channels.id.then(|| Plane::new("id.I", Source::Id)));
-    all.extend(layers(&channels.layers, attributes));
+    all.extend(layers(&channels.layers, names));
+    all
+}
+
+/// Divides the planes of a file between its parts: all in one, or colours and data apart. Without data, there is one
+/// part.
+pub(in crate::output) fn parts(planes: Vec<Plane>, has_data_part: bool) -> Vec<Vec<Plane>> {
+    let is_first = |plane: &Plane| !has_data_part || plane.kind() == PlaneKind::Color;
+    let (first, data): (Vec<_>, Vec<_>) = planes.into_iter().partition(is_first);
+    let mut all = vec![first, data];
+    all.retain(|planes| !planes.is_empty());
     all
 }
 
 /// The planes of layers.
-fn layers(layers: &Layers, attributes: &[String]) -> Vec<Plane> {
+fn layers(layers: &Layers, names: &PlaneNames) -> Vec<Plane> {
     let mut all = Vec::new();
     // Colours
     let lights = layers.lights.iter();
@@ -114,6 +139,14 @@ fn layers(layers: &Layers, attributes: &[String]) -> Vec<Plane> {
             planes.map(|(i, axis)| Plane::new(format!("{name}.{axis}"), Source::LayerColor(i))),
         );
     }
+    let named = names.light_groups.iter().map(String::as_str);
+    let groups = iter::once(DEFAULT_LIGHT_GROUP).chain(named);
+    for (group, name) in (0..usize::from(layers.light_groups)).zip(groups) {
+        let planes = layers.light_group_at(group).zip(["R", "G", "B"]);
+        all.extend(planes.map(|(i, axis)| {
+            Plane::new(format!("{LIGHT_GROUP}{name}.{axis}"), Source::LayerColor(i))
+        }));
+    }
     // Data of surfaces and particles
     all.extend(
         layers
@@ -122,7 +155,7 @@ fn layers(layers: &Layers, attributes: &[String]) -> Vec<Plane> {
     );
     let motion = layers.motion_at().zip(["motion.U", "motion.V"]);
     all.extend(motion.map(|(i, name)| Plane::new(name, Source::Layer(i))));
-    let named = layers.attributes_at().zip(attributes);
+    let named = layers.attributes_at().zip(&names.attributes);
     all.extend(named.map(|(i, name)| Plane::new(name.clone(), Source::ParticleLayer(i))));
     // Cryptomatte: two objects with their coverage in each layer of four channels
     for kind in layers.mattes.iter() {
@@ -155,16 +188,16 @@ fn vectors<const N: usize>(names: [&'static str; N], source: fn(usize) -> Source
 }
 
 /// A name that several planes of a file with `channels` have.
-pub fn ambiguous_name(channels: Channels, attributes: &[String]) -> Option<String> {
-    let all = planes_in_file(channels, attributes);
+pub fn ambiguous_name(channels: Channels, names: &PlaneNames) -> Option<String> {
+    let all = planes_in_file(channels, names);
     let mut pairs = all.windows(2);
     let found = pairs.find(|pair| pair[0].name == pair[1].name)?;
     Some(found[0].name.to_string())
 }
 
 /// The planes of a file with `channels`, in the order of the file: by name, compared byte by byte.
-pub(super) fn planes_in_file(channels: Channels, attributes: &[String]) -> Vec<Plane> {
-    let mut all = planes(channels, attributes);
+pub(super) fn planes_in_file(channels: Channels, names: &PlaneNames) -> Vec<Plane> {
+    let mut all = planes(channels, names);
     all.sort_unstable_by(|a, b| a.name.cmp(&b.name));
     all
 }

@@ -16,6 +16,7 @@ fn light(kind: LightKind) -> Box<dyn Light> {
         radiance: Vec3::splat(LIGHT),
         casts_shadow: true,
         is_visible: true,
+        group: 0,
     })
 }
 

@@ -5,6 +5,7 @@ use glam::Vec3;
 use super::{PathIntegrator, lanes_where};
 use crate::math::{LANES, Lanes, lane3, lanes_in, set_lane3, splat};
 use crate::render::{
+    light_groups::NO_GROUP,
     lights::{Emission, environment_along},
     scratch::PacketScratch,
     shading::{add, scale},
@@ -25,13 +26,10 @@ impl PathIntegrator<'_> {
         };
         let seen = segments.lanes() & lanes_where(|l| segments.bounces[l] == 0);
         let mut emission = Emission::default();
-        let (mut nearest, mut color) = ([None; LANES], [Vec3::ZERO; LANES]);
-        for light in self
-            .context
-            .lights
-            .iter()
-            .filter(|light| light.has_extent())
-        {
+        let (mut nearest, mut color) = ([None; LANES], [(Vec3::ZERO, NO_GROUP); LANES]);
+        let lights = self.context.lights.iter().enumerate();
+        for (index, light) in lights.filter(|(_, light)| light.has_extent()) {
+            let group = self.context.light_group(index);
             // Find the rays that hit the light before a surface
             let lanes = sampled | if light.is_visible() { seen } else { 0 };
             if lanes == 0 {
@@ -54,9 +52,10 @@ impl PathIntegrator<'_> {
                     let arriving = along * (weight * emission.radiance);
                     let sum = lane3(&packet.radiance, lane) + arriving;
                     set_lane3(&mut packet.radiance, lane, sum);
+                    packet.groups.add_lane(group, lane, arriving);
                 } else if nearest[lane].is_none_or(|t| emission.t[lane] < t) {
                     nearest[lane] = Some(emission.t[lane]);
-                    color[lane] = along * emission.radiance;
+                    color[lane] = (along * emission.radiance, group);
                 }
             }
         }
@@ -64,8 +63,10 @@ impl PathIntegrator<'_> {
         let ended = lanes_where(|l| nearest[l].is_some());
         for lane in lanes_in(ended) {
             packet.coverage[lane] = 1.0;
-            let sum = lane3(&packet.radiance, lane) + color[lane];
+            let (color, group) = color[lane];
+            let sum = lane3(&packet.radiance, lane) + color;
             set_lane3(&mut packet.radiance, lane, sum);
+            packet.groups.add_lane(group, lane, color);
         }
         ended
     }
@@ -113,6 +114,7 @@ impl PathIntegrator<'_> {
             throughput,
             radiance,
             weight,
+            groups,
             ..
         } = packet;
         let lanes = lanes & (!hits.mask | hits.lanes_of(MaterialId::GROUND));
@@ -140,5 +142,6 @@ impl PathIntegrator<'_> {
             &mut seen,
         );
         add(context.simd, &seen, &Vec3::ONE, lanes, radiance);
+        groups.add(context.simd, context.environment_group(), &seen, lanes);
     }
 }

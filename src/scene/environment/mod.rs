@@ -15,6 +15,7 @@ use glam::{DVec3, Vec3};
 use crate::math::functions::{acos, atan2, sin_cos};
 
 mod distribution;
+mod irradiance;
 mod map;
 mod sky;
 mod studio;
@@ -22,6 +23,7 @@ mod studio;
 mod tests;
 
 use distribution::{Cell, Distribution};
+pub use irradiance::IrradianceHarmonics;
 pub use map::{MAX_MAP_PIXELS, MapError, RadianceMap};
 pub use sky::{sky, sky_direction};
 pub use studio::studio;
@@ -278,6 +280,12 @@ impl Environment {
     /// The radiance of each texel times the cosine between its centre and a unit `normal`, 0 behind it.
     fn lit_texels(&self, normal: Vec3) -> Vec<Vec3> {
         let own = self.axes.own(normal);
+        self.weighted_texels(|direction| direction.dot(own).max(0.0))
+    }
+
+    /// The radiance of each texel times a weight of the direction of its centre, in the axes of the environment.
+    fn weighted_texels(&self, weight: impl Fn(Vec3) -> f32) -> Vec<Vec3> {
+        let weight = &weight;
         let longitudes: Vec<[f64; 2]> = (0..COLUMNS).map(|x| longitude(x, 0.5)).collect();
         let rows = self.texels.chunks(COLUMNS).enumerate();
         let lit = rows.flat_map(|(row, texels)| {
@@ -286,8 +294,7 @@ impl Environment {
                 .iter()
                 .zip(&longitudes)
                 .map(move |([r, g, b, _], longitude)| {
-                    let cosine = direction_at(polar, *longitude).dot(own);
-                    cosine.max(0.0) * Vec3::new(*r, *g, *b)
+                    weight(direction_at(polar, *longitude)) * Vec3::new(*r, *g, *b)
                 })
         });
         lit.collect()

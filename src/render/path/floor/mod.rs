@@ -7,6 +7,7 @@
 //! What arrives straight from light sources is sampled at each point of the ground as on other surfaces.
 
 use std::f32::consts::FRAC_1_PI;
+use std::sync::Arc;
 
 use glam::Vec3;
 
@@ -33,9 +34,19 @@ const BORDER: f32 = 0.1;
 #[derive(Debug, Clone)]
 pub(super) struct FloorLight {
     square: Square,
-    caustics: Map,
+    caustics: Arc<Map>,
     sky: Map,
     /// Light of the environment without particles.
+    open: Vec3,
+    /// The same light by light group; empty if the film has no layers for groups.
+    groups: Vec<GroupMaps>,
+}
+
+/// The light of a light group in the maps.
+#[derive(Debug, Clone, Default)]
+struct GroupMaps {
+    caustics: Option<Arc<Map>>,
+    sky: Option<Map>,
     open: Vec3,
 }
 
@@ -130,7 +141,14 @@ fn has_maps(scene: &Scene, settings: &RenderSettings) -> bool {
 /// Upper bound of the memory for the maps of a scene while they are computed, in bytes.
 pub(in crate::render) fn bytes(scene: &Scene, settings: &RenderSettings) -> u64 {
     match has_maps(scene, settings) {
-        true => density::BYTES + photons::BYTES + sky::BYTES,
+        true => {
+            let groups = u64::from(settings.channels.layers.light_groups);
+            let own_maps = match photons::groups(scene).len() as u64 {
+                0 | 1 => 0,
+                several => several.min(groups),
+            };
+            (1 + own_maps) * density::BYTES + photons::BYTES + (1 + groups) * sky::BYTES
+        }
         false => 0,
     }
 }
@@ -156,11 +174,27 @@ impl<'a> PathIntegrator<'a> {
         let open = self
             .environment
             .map(|e| e.irradiance(ground.up) * FRAC_1_PI);
+        let open = open.unwrap_or_default();
+        // Put the light of each group together
+        let maps = |sky| GroupMaps {
+            sky: Some(sky),
+            ..GroupMaps::default()
+        };
+        let mut groups: Vec<GroupMaps> = sky.groups.into_iter().map(maps).collect();
+        for (group, map) in caustics.groups {
+            if let Some(maps) = groups.get_mut(group) {
+                maps.caustics = Some(map);
+            }
+        }
+        if let Some(maps) = groups.get_mut(self.context.environment_group()) {
+            maps.open = open;
+        }
         self.floor = Some(FloorLight {
             square,
-            caustics,
-            sky,
-            open: open.unwrap_or_default(),
+            caustics: caustics.all,
+            sky: sky.all,
+            open,
+            groups,
         });
         Some((self, of_photons + of_sky))
     }
@@ -183,6 +217,14 @@ impl<'a> PathIntegrator<'a> {
         let (simd, radiance) = (self.context.simd, &mut packet.radiance);
         add(simd, &reflected, &Vec3::ONE, surface.lanes, radiance);
         packet.take_light(LightClass::Diffuse);
+        for group in 0..floor.groups.len() {
+            for lane in lanes_in(surface.lanes) {
+                let point = lane3(&packet.hits.point, lane);
+                let weight = lane3(&packet.weight, lane) * lane3(&packet.surface.albedo, lane);
+                let light = weight * floor.white_of_group(group, point);
+                packet.groups.add_lane(group, lane, light);
+            }
+        }
         self.add_straight_light(surface, packet);
     }
 
@@ -195,7 +237,8 @@ impl<'a> PathIntegrator<'a> {
                 Some(_) => Occlusion::Opaque,
                 None => Occlusion::of(&**light),
             };
-            self.add_direct(occlusion, surface, packet);
+            let group = context.light_group(index);
+            self.add_direct(occlusion, group, surface, packet);
         }
     }
 }
@@ -210,5 +253,18 @@ impl FloorLight {
         }
         let caustics = self.caustics.at(position);
         self.open.lerp(self.sky.at(position), weight) + weight * caustics
+    }
+
+    /// The part of that radiance that is of a light group.
+    fn white_of_group(&self, group: usize, point: Vec3) -> Vec3 {
+        let position = self.square.position(point);
+        let weight = Square::weight(position);
+        let maps = &self.groups[group];
+        if weight <= 0.0 {
+            return maps.open;
+        }
+        let at = |map: Option<&Map>| map.map_or(Vec3::ZERO, |map| map.at(position));
+        let caustics = at(maps.caustics.as_deref());
+        maps.open.lerp(at(maps.sky.as_ref()), weight) + weight * caustics
     }
 }

@@ -4,6 +4,9 @@
 //! Photons have fixed numbers and random numbers, and their flux is added in their order: the map does not depend on
 //! threads.
 
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -13,7 +16,7 @@ use super::{Map, Square};
 use crate::math::{LANES, lane3, lanes_in, splat, splat3};
 use crate::ray::Ray;
 use crate::render::{
-    lights::Beam,
+    lights::{Beam, light_of},
     ray_counts::RayCounts,
     sampler::PathSeed,
     scratch::PacketScratch,
@@ -21,6 +24,7 @@ use crate::render::{
     stop::Stop,
     stream::{RayStreams, SegmentPacket},
 };
+use crate::scene::Scene;
 use crate::surface::MaterialId;
 
 /// Photons that are traced as one task.
@@ -63,22 +67,68 @@ struct Emitter {
     seed: PathSeed,
 }
 
+/// The radiance of a white ground in the light of photons.
+pub(super) struct CausticMaps {
+    pub(super) all: Arc<Map>,
+    /// Of each light group with photons; empty if the film has no layers for groups.
+    pub(super) groups: Vec<(usize, Arc<Map>)>,
+}
+
+/// The light groups of `scene` that have photons, each once.
+pub(super) fn groups(scene: &Scene) -> BTreeSet<usize> {
+    let lights = scene.lights.iter();
+    let lights = lights.filter(|light| light_of(light).beam().is_some());
+    lights.map(|light| usize::from(light.group)).collect()
+}
+
 /// The radiance of a white ground in the light of the photons of all lights.
 pub(super) fn caustics(
     integrator: &PathIntegrator<'_>,
     square: &Square,
     stop: &dyn Stop,
-) -> Option<(Map, RayCounts)> {
-    let lights = integrator.context.lights.iter();
-    let beams: Vec<Beam> = lights.filter_map(|light| light.beam()).collect();
+) -> Option<(CausticMaps, RayCounts)> {
+    let context = &integrator.context;
+    let lights = context.lights.iter().enumerate();
+    let beams =
+        lights.filter_map(|(index, light)| Some((context.light_group(index), light.beam()?)));
+    let beams: Vec<(usize, Beam)> = beams.collect();
     let (mut cells, mut counts) = (Cells::new(), RayCounts::default());
+    // A single group has the light of all photons
+    let groups = match context.settings.channels.layers.light_groups {
+        0 => BTreeSet::new(),
+        _ => groups(context.scene),
+    };
+    let mut of_groups: Vec<(usize, Cells)> = match groups.len() {
+        0 | 1 => Vec::new(),
+        _ => groups.iter().map(|group| (*group, Cells::new())).collect(),
+    };
     let lights = u32::try_from(beams.len()).unwrap_or(u32::MAX).max(1);
-    let photons = integrator.context.settings.photons.div_ceil(lights);
-    for (number, beam) in (0..).zip(beams) {
+    let photons = context.settings.photons.div_ceil(lights);
+    for (number, (group, beam)) in (0..).zip(beams) {
         let emitter = Emitter::new(beam, square.particles, photons, number);
-        counts = counts + emitter.emit(integrator, square, &mut cells, stop)?;
+        let mut land = |photon: &Landed| {
+            cells.add(photon.position, photon.flux);
+            for (other, cells) in &mut of_groups {
+                // The filters of a group are those of all photons
+                let flux = if *other == group {
+                    photon.flux
+                } else {
+                    Vec3::ZERO
+                };
+                cells.add(photon.position, flux);
+            }
+        };
+        counts = counts + emitter.emit(integrator, square, &mut land, stop)?;
     }
-    Some((cells.radiance(square), counts))
+    let all = Arc::new(cells.radiance(square));
+    let mut maps: Vec<(usize, Arc<Map>)> = Vec::new();
+    for (group, cells) in of_groups {
+        maps.push((group, Arc::new(cells.radiance(square))));
+    }
+    if let (true, Some(group)) = (maps.is_empty(), groups.first()) {
+        maps.push((*group, Arc::clone(&all)));
+    }
+    Some((CausticMaps { all, groups: maps }, counts))
 }
 
 impl Emitter {
@@ -103,12 +153,12 @@ impl Emitter {
         }
     }
 
-    /// Traces all photons and adds them to `cells`. `None` if `stop` is raised.
+    /// Traces all photons, and calls `land` for those that reach the ground. `None` if `stop` is raised.
     fn emit(
         &self,
         integrator: &PathIntegrator<'_>,
         square: &Square,
-        cells: &mut Cells,
+        land: &mut dyn FnMut(&Landed),
         stop: &dyn Stop,
     ) -> Option<RayCounts> {
         let mut counts = RayCounts::default();
@@ -121,9 +171,7 @@ impl Emitter {
             let landed: Option<Vec<_>> = round.par_iter().map(trace).collect();
             for (photons, of_task) in landed? {
                 counts = counts + of_task;
-                for photon in photons {
-                    cells.add(photon.position, photon.flux);
-                }
+                photons.iter().for_each(&mut *land);
             }
         }
         Some(counts)

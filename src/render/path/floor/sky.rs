@@ -10,6 +10,7 @@ use crate::ray::Ray;
 use crate::render::{
     bsdf::surface_points,
     integrator::trace_batches,
+    layers::Layers,
     ray_counts::RayCounts,
     sampler::PathSeed,
     scratch::{PacketScratch, Scratch},
@@ -33,23 +34,42 @@ pub(super) const BYTES: u64 = (SIDE * (4 * SIDE + 64 * PATHS) * size_of::<Vec3>(
 /// Random numbers of texels; no pixel has these rows.
 const TEXELS: u32 = u32::MAX - 1;
 
+/// The radiance of a white ground.
+pub(super) struct SkyMaps {
+    pub(super) all: Map,
+    /// By light group; empty if the film has no layers for groups.
+    pub(super) groups: Vec<Map>,
+}
+
+/// Texels of a map, and of the map of each light group.
+type Texels = (Vec<Vec3>, Vec<Vec<Vec3>>);
+
 /// The radiance of a white ground in the light of the environment.
 pub(super) fn sky(
     integrator: &PathIntegrator<'_>,
     square: &Square,
     stop: &dyn Stop,
-) -> Option<(Map, RayCounts)> {
+) -> Option<(SkyMaps, RayCounts)> {
     let rows: Option<Vec<_>> = (0..SIDE)
         .into_par_iter()
         .map(|row| trace_row(integrator, square, row, stop))
         .collect();
     let (mut texels, mut counts) = (Vec::with_capacity(SIDE * SIDE), RayCounts::default());
-    for (row, of_row) in rows? {
+    let count = usize::from(integrator.context.settings.channels.layers.light_groups);
+    let mut groups = vec![Vec::with_capacity(SIDE * SIDE); count];
+    for ((row, row_of_groups), of_row) in rows? {
         texels.extend(row);
+        for (texels, row) in groups.iter_mut().zip(row_of_groups) {
+            texels.extend(row);
+        }
         counts = counts + of_row;
     }
-    let map = Map { side: SIDE, texels };
-    Some((smoothed(&map), counts))
+    let map = |texels| smoothed(&Map { side: SIDE, texels });
+    let maps = SkyMaps {
+        all: map(texels),
+        groups: groups.into_iter().map(map).collect(),
+    };
+    Some((maps, counts))
 }
 
 /// The texels of a row. `None` if `stop` is raised.
@@ -58,8 +78,13 @@ fn trace_row(
     square: &Square,
     row: usize,
     stop: &dyn Stop,
-) -> Option<(Vec<Vec3>, RayCounts)> {
+) -> Option<(Texels, RayCounts)> {
     let mut scratch = Scratch::default();
+    let layers = Layers {
+        light_groups: integrator.context.settings.channels.layers.light_groups,
+        ..Layers::NONE
+    };
+    scratch.group.layers.layers = layers;
     for _ in 0..SIDE * PATHS {
         scratch.group.push(0.0, 0.0);
     }
@@ -67,18 +92,28 @@ fn trace_row(
         for number in packets {
             let (packet, segments) = (&mut *scratch.packet, &mut *scratch.camera);
             aim(integrator, square, row, number, segments);
+            packet.groups.start(&layers);
             reflect(integrator, segments, packet, &mut scratch.next);
             scratch.group.radiance[number] = packet.radiance;
+            let (split, groups) = (&packet.split, &packet.groups);
+            scratch.group.layers.store(number, split, groups);
         }
         Some(())
     })?;
     let radiance = |i: usize| lane3(&scratch.group.radiance[i / LANES], i % LANES);
+    let texels = means(&radiance);
+    let of_group = |group| means(&|path| scratch.group.layers.light_of_group(group, path));
+    let groups = (0..usize::from(layers.light_groups)).map(of_group);
+    Some(((texels, groups.collect()), scratch.packet.counts))
+}
+
+/// The mean radiance of the paths of each texel of a row.
+fn means(radiance: &dyn Fn(usize) -> Vec3) -> Vec<Vec3> {
     let texel = |texel: usize| {
         let paths = texel * PATHS..(texel + 1) * PATHS;
         paths.map(radiance).sum::<Vec3>() / PATHS as f32
     };
-    let counts = scratch.packet.counts;
-    Some(((0..SIDE).map(texel).collect(), counts))
+    (0..SIDE).map(texel).collect()
 }
 
 /// Short rays straight down to the texel of packet `number` of a row.
