@@ -25,6 +25,7 @@ mod environment;
 mod ground;
 mod lights;
 mod meshes;
+mod parts;
 mod surface;
 
 pub use camera::check_views;
@@ -177,6 +178,7 @@ pub fn setup(
         lights,
         ambient_light: crate::scene::DEFAULT_AMBIENT_LIGHT,
         material: surface::material(manifest, &bounds),
+        parts: parts::parts(manifest, survey)?,
         background: background(manifest, up.as_vec3()),
         ground,
         meshes: Vec::new(),

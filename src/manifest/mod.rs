@@ -42,6 +42,7 @@ mod material;
 mod mesh;
 mod nearest;
 mod output;
+mod part;
 mod pattern;
 #[cfg(test)]
 mod places_tests;
@@ -78,6 +79,7 @@ pub use material::{Material, MaterialKind};
 pub use mesh::{Mesh, MeshMaterial, MeshPath, MeshShading};
 pub(crate) use nearest::nearest;
 pub use output::Output;
+pub use part::{Part, PartKind};
 pub use pattern::{FramePattern, OutputPattern};
 pub use preset::Look;
 #[cfg(feature = "cli")]
@@ -229,7 +231,9 @@ impl Manifest {
         keys.section("surface", surface::ABOUT, |keys| {
             surface::all_keys(&mut self.surface, keys);
         });
-        keys.section("material", material::ABOUT, |keys| self.material.keys(keys));
+        keys.section("material", material::ABOUT, |keys| {
+            self.material.all_keys(keys);
+        });
         keys.section("environment", environment::ABOUT, |keys| {
             self.environment.keys(keys);
         });
@@ -338,6 +342,7 @@ impl Manifest {
         let examples = Self::examples().entries();
         for (list, comment, is_empty) in [
             ("camera.key", NO_KEYS, self.camera.keys.is_empty()),
+            ("material.part", NO_PARTS, self.material.parts.is_empty()),
             ("light", AUTO_LIGHTS, self.lights.is_empty()),
             ("mesh", NO_MESHES, self.meshes.is_empty()),
         ] {
@@ -360,6 +365,7 @@ impl Manifest {
     fn examples() -> Self {
         let mut manifest = Self::new("");
         manifest.camera.keys = vec![CameraKey::default()];
+        manifest.material.parts = vec![Part::default()];
         manifest.lights = Light::examples();
         manifest.meshes = vec![Mesh::default()];
         manifest
@@ -374,6 +380,9 @@ const NEEDS_NUMBER: &str =
 
 const NO_KEYS: &str = "In mode \"keys\" the camera moves smoothly through these views, and stands still before the \
                        first and after the last.";
+
+const NO_PARTS: &str =
+    "Parts of the particles (attribute part, type or phase) may have materials of their own.";
 
 const AUTO_LIGHTS: &str = "Without [[light]], a key light and a soft fill light are placed relative to the camera. A \
                            directional light has a direction instead of position and falloff.";

@@ -319,7 +319,7 @@ impl<'a> MemoryModel<'a> {
             (ids, 4),
             (channels.needs_velocities() && self.has_velocities, 12),
             // Whether there are parts is not known in advance
-            (channels.needs_parts(), 4),
+            (self.setup.needs_parts(), 4),
             (true, 4 * u64::from(channels.layers.attributes)),
         ];
         let each: u64 = each.iter().filter(|(has, _)| *has).map(|(_, b)| b).sum();

@@ -63,10 +63,14 @@ impl RenderContext<'_> {
         self.source.blended_color(blend)
     }
 
-    /// Base colour of the ground, of a mesh or of spray.
+    /// Base colour of a part of the particles, of the ground, of a mesh or of spray.
     fn fixed_color(&self, hits: &Intersections, lane: usize) -> Vec3 {
         if let Some(mesh) = self.mesh(hits.material[lane]) {
             return mesh.color;
+        }
+        if let Some(part) = self.part(hits.material[lane]) {
+            let of_particle = || self.source.color(hits.particle[lane]);
+            return part.color.unwrap_or_else(of_particle);
         }
         match (hits.material[lane], &self.scene.ground) {
             (MaterialId::GROUND, Some(ground)) => ground.color_at(lane3(&hits.point, lane)),
@@ -173,7 +177,11 @@ impl RenderContext<'_> {
                         object(ObjectName::of_part(name, value))
                     });
                 }
-                MatteKind::Material => {}
+                MatteKind::Material => {
+                    if let Some(index) = material.part_index() {
+                        return object(ObjectName::of_material(index));
+                    }
+                }
             }
         }
         object_of_name(match material {

@@ -9,13 +9,13 @@ use super::{
     materials::Dielectric,
     sampler::FilmSampler,
     scratch::SEGMENTS,
-    settings::RenderSettings,
+    settings::{IntegratorKind, RenderSettings},
     shading::{BackgroundLanes, CameraLanes},
     source::ShadeSource,
 };
 use crate::accel::Coherence;
 use crate::math::Supported;
-use crate::scene::{self, MeshMaterial, Scene};
+use crate::scene::{self, MeshMaterial, PartMaterial, PartMaterials, Scene};
 use crate::surface::{MaterialId, Shape, Side};
 
 /// A scene ready to be rendered.
@@ -24,6 +24,10 @@ pub(super) struct RenderContext<'a> {
     pub(super) shapes: Vec<&'a dyn Shape>,
     /// Meshes that rays pass.
     pub(super) panes: Vec<&'a dyn Shape>,
+    /// The materials of opaque surfaces.
+    pub(super) materials: Vec<MaterialId>,
+    /// Materials of parts of the particles, if these are separate spheres and paths are traced.
+    pub(super) parts: Option<&'a PartMaterials>,
     /// Whether there are meshes that only hide what is behind them.
     pub(super) has_holdouts: bool,
     /// The particles, opaque or transmissive; all other shapes are opaque.
@@ -101,6 +105,10 @@ impl<'a> RenderContext<'a> {
             is_camera_inside: interior == Interior::Body && particles.is_some_and(contains_eye),
             shapes,
             panes,
+            materials: MaterialId::all(scene.meshes.len(), scene.parts.materials().len()),
+            parts: Some(&scene.parts)
+                .filter(|parts| !parts.is_empty() && !is_connected)
+                .filter(|_| settings.integrator == IntegratorKind::Path),
             has_holdouts: scene.meshes.iter().any(|mesh| mesh.is_holdout),
             particles,
             source,
@@ -124,6 +132,22 @@ impl<'a> RenderContext<'a> {
     #[inline(always)]
     pub(super) fn mesh(&self, material: MaterialId) -> Option<&MeshMaterial> {
         self.scene.meshes.get(material.mesh_index()?)
+    }
+
+    /// The material of the part of the particles that `material` belongs to.
+    #[inline(always)]
+    pub(super) fn part(&self, material: MaterialId) -> Option<&PartMaterial> {
+        self.parts?.materials().get(material.part_index()?)
+    }
+
+    /// The material of `particle`.
+    #[inline]
+    pub(super) fn material_of(&self, parts: &PartMaterials, particle: u32) -> MaterialId {
+        let part = self.source.part(particle);
+        let index = part.and_then(|(_, part)| parts.index_of(part));
+        index
+            .and_then(MaterialId::of_part)
+            .unwrap_or(MaterialId::PARTICLES)
     }
 
     /// The particles, if they bound one connected body.

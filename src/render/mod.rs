@@ -67,6 +67,8 @@ mod lens_tests;
 #[cfg(test)]
 mod panes_tests;
 #[cfg(test)]
+mod part_tests;
+#[cfg(test)]
 mod path_tests;
 #[cfg(test)]
 mod poison_tests;

@@ -47,7 +47,7 @@ const MAX_CONTINUATION: f32 = 0.95;
 pub(super) struct PathIntegrator<'a> {
     context: RenderContext<'a>,
     environment: Option<&'a Environment>,
-    /// Opaque surfaces by [`MaterialId`].
+    /// Opaque surfaces, in the order of [`RenderContext::materials`].
     bsdfs: Vec<Box<dyn Bsdf>>,
     /// The specular surface of transmissive particles.
     interface: Box<dyn Material>,
@@ -66,7 +66,11 @@ impl<'a> PathIntegrator<'a> {
         let environment = context.scene.environment.as_deref();
         Self {
             environment: environment.filter(|environment| !environment.is_black()),
-            bsdfs: bsdfs_of(context.scene.material.finish, &context.scene.meshes),
+            bsdfs: bsdfs_of(
+                context.scene.material.finish,
+                &context.scene.meshes,
+                context.scene.parts.materials(),
+            ),
             interface,
             split: SplitRule::new(context.settings, context.interior),
             catcher: Catcher::of(context.scene),
@@ -221,8 +225,8 @@ impl PathIntegrator<'_> {
 
     /// Evaluates the BSDFs for the directions of the light samples.
     fn eval(&self, surface: &Surface<'_>, packet: &mut PacketScratch) {
-        for (number, bsdf) in (0..).zip(&self.bsdfs) {
-            let lanes = surface.lanes & packet.hits.lanes_of(MaterialId(number));
+        for (material, bsdf) in self.context.materials.iter().zip(&self.bsdfs) {
+            let lanes = surface.lanes & packet.hits.lanes_of(*material);
             if lanes != 0 {
                 let (rays, direction) = (&surface.segments.rays, &packet.light.rays.direction);
                 let (points, values) = (&packet.surface, &mut packet.bsdf);
@@ -373,8 +377,8 @@ impl PathIntegrator<'_> {
         let (segments, simd) = (surface.segments, self.context.simd);
         let mut u = [splat(0.0); 2];
         get_2d_lanes(simd, &segments.path, BSDF, &surface.sample, &mut u);
-        for (number, bsdf) in (0..).zip(&self.bsdfs) {
-            let lanes = surface.lanes & packet.hits.lanes_of(MaterialId(number));
+        for (material, bsdf) in self.context.materials.iter().zip(&self.bsdfs) {
+            let lanes = surface.lanes & packet.hits.lanes_of(*material);
             if lanes != 0 {
                 let (points, samples) = (&packet.surface, &mut packet.bounce);
                 bsdf.sample(simd, &segments.rays, points, &u, lanes, samples);

@@ -18,6 +18,7 @@ pub mod lens;
 pub mod light;
 pub mod material;
 pub mod mesh;
+pub mod part;
 pub mod path;
 pub mod rgb;
 
@@ -30,6 +31,7 @@ pub use lens::{Aperture, Focus, LensSettings};
 pub use light::{Falloff, Light, LightKind, default_lights};
 pub use material::{Finish, Fresnel, Material, MaterialError};
 pub use mesh::{MeshFinish, MeshMaterial};
+pub use part::{PartMaterial, PartMaterials};
 pub use path::{CameraKey, CameraPath, KeyedPath, PathError, Turntable};
 pub use rgb::{RgbEncoding, is_rgb};
 
@@ -80,8 +82,10 @@ pub struct Scene {
     pub lights: Vec<Light>,
     /// Ambient light (`ambient` of eq. 4.1).
     pub ambient_light: Vec3,
-    /// The material of all particles; their colours are attributes.
+    /// The material of the particles; their colours are attributes.
     pub material: Material,
+    /// Materials of parts of the particles in place of [`Self::material`], for path tracing of separate spheres.
+    pub parts: PartMaterials,
     /// Background for rays without an intersection.
     pub background: Background,
     /// Optional ground.
@@ -107,13 +111,14 @@ pub struct NextFrame {
 
 impl Scene {
     /// Nothing but the default material and white ambient light, in front of black, at the origin of the world.
-    pub const fn new(camera: Camera) -> Self {
+    pub fn new(camera: Camera) -> Self {
         Self {
             origin: DVec3::ZERO,
             camera,
             lights: Vec::new(),
             ambient_light: Vec3::ONE,
             material: Material::DEFAULT,
+            parts: PartMaterials::default(),
             background: Background::Constant(Vec3::ZERO),
             ground: None,
             meshes: Vec::new(),

@@ -21,6 +21,7 @@ mod help;
 mod in_place;
 mod memory;
 mod meshes;
+mod parts;
 mod printing;
 mod progress;
 mod resume;
