@@ -58,7 +58,7 @@ fn job(workshop: &Workshop, text: &str) {
 fn render(workshop: &Workshop, input: &str, out: &str, options: &[&str]) -> Ran {
     let pattern = format!("{out}/f.####.exr");
     let path = format!("input.path={input:?}");
-    let command = ["render", "-m", "job.toml", "-o", &pattern, "--set", &path];
+    let command = ["render", "job.toml", "-o", &pattern, "--set", &path];
     workshop.run(&[&command[..], &SMALL, options].concat())
 }
 
