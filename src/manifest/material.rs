@@ -53,7 +53,7 @@ pub(super) const ROUGHNESS: f32 = 0.55;
 pub struct Material {
     /// Kind of material; by default that of the terms in [`Self::constants`].
     pub kind: Option<MaterialKind>,
-    /// Roughness of plastic and metal, 0 to 1.
+    /// Roughness, 0 to 1. Glass and water are smooth at the default.
     pub roughness: f32,
     /// Source of the colours.
     pub color: ColorSetting,
@@ -117,6 +117,11 @@ impl Material {
                 false => self.constants.ior,
             },
             fresnel: Fresnel::Exact,
+            // Glass and water of manifests that name every key with its default stay smooth
+            interface_roughness: match roughness == ROUGHNESS {
+                true => 0.0,
+                false => roughness,
+            },
             ..self.constants
         };
         let usual = scene::Material {
@@ -160,7 +165,9 @@ impl Material {
         let key = Key::new("type", &[TYPE, "", KINDS[0], KINDS[1], KINDS[2]]).or("auto");
         keys.key(key, &mut self.kind);
         keys!(keys:
-            /// Roughness of plastic and metal, 0 (a mirror) to 1
+            /// Roughness of plastic, metal, glass and water, 0 (smooth) to 1
+            ///
+            /// Glass and water are smooth unless it has another value than 0.55.
             roughness => self.roughness, from(0), to(1), affects(Affects::PathTracing);
             /// Colour: auto (by speed), linear RGB, or { attribute = "velocity", map = "viridis", range = [0.0, 4.0] }
             color => self.color;

@@ -330,6 +330,11 @@ impl Manifest {
         let mut settings = self.entries().settings(|affects| self.depends_on(affects));
         let renderer = format!("{:?}", RendererKind::default().name());
         settings.push((same::RENDERER.to_owned(), renderer));
+        // Versions without rough interfaces had the same keys, and other images
+        let is_rough = self.material.resolved(Fresnel::Exact).interface_roughness > 0.0;
+        if is_rough && self.integrator() == IntegratorKind::Path {
+            settings.push((same::ROUGH_INTERFACE.to_owned(), "true".to_owned()));
+        }
         settings
     }
 

@@ -21,6 +21,8 @@ const SURFACE: &str = "render.surface";
 const UNION: [&str; 2] = ["\"medium\"", "\"union\""];
 /// The renderer; not a key of manifests as long as there is only one.
 pub(super) const RENDERER: &str = "renderer";
+/// Whether glass or water is rough; not a key of manifests.
+pub(super) const ROUGH_INTERFACE: &str = "material.rough_interface";
 
 impl Manifest {
     /// Gives automatic settings the defaults of the version that made a plan with the settings `planned`, so that a job

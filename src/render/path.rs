@@ -4,7 +4,9 @@
 //! At each point of an opaque surface, a direction is sampled from the environment and one from the BSDF, weighted by
 //! the balance heuristic (Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997), and each light
 //! source is sampled. The path continues in the direction of the BSDF; from the third reflection on it ends at random
-//! (Russian roulette). Surfaces of transmissive particles are specular: their rays split as in Whitted's model.
+//! (Russian roulette). Surfaces of transmissive particles are specular, or reflect and refract at single microfacets
+//! of a rough one: their rays split as in Whitted's model. Light is not sampled there: the environment and visible
+//! lights are found by the scattered rays alone.
 //!
 //! Shadow rays to the environment end at transmissive surfaces, because the paths of the BSDF find its light behind
 //! them. Shadow rays to light sources pass straight through: paths cannot find a light without extent.
@@ -16,7 +18,7 @@ use super::{
     integrator::Integrator,
     layers::LightClass,
     lights::{Light, environment_along, sample_environment},
-    materials::{Material, materials_of},
+    materials::{Material, RoughInterface, materials_of},
     roulette::SplitRule,
     sampler::{get_1d_lanes, get_2d_lanes},
     scratch::PacketScratch,
@@ -51,6 +53,8 @@ pub(super) struct PathIntegrator<'a> {
     bsdfs: Vec<Box<dyn Bsdf>>,
     /// The specular surface of transmissive particles.
     interface: Box<dyn Material>,
+    /// Replaces it if the particles are rough.
+    rough: Option<RoughInterface>,
     split: SplitRule,
     /// Whether rays can hit a light.
     has_extents: bool,
@@ -63,6 +67,8 @@ impl<'a> PathIntegrator<'a> {
     pub(super) fn new(context: RenderContext<'a>) -> Self {
         let is_connected = context.connected_particles().is_some();
         let interface = materials_of(context.scene, is_connected).swap_remove(0);
+        let material = &context.scene.material;
+        let rough = RoughInterface::of(material, interface.constants(), is_connected);
         let environment = context.scene.environment.as_deref();
         Self {
             environment: environment.filter(|environment| !environment.is_black()),
@@ -72,6 +78,7 @@ impl<'a> PathIntegrator<'a> {
                 context.scene.parts.materials(),
             ),
             interface,
+            rough,
             split: SplitRule::new(context.settings, context.interior),
             catcher: Catcher::of(context.scene),
             floor: None,
@@ -499,7 +506,16 @@ impl PathIntegrator<'_> {
         let context = &self.context;
         let (rays, hits, inside) = (&segments.rays, &packet.hits, segments.inside);
         let interface = &self.interface;
-        interface.shading_points(context.simd, rays, hits, inside, &mut packet.points);
+        let (simd, points) = (context.simd, &mut packet.points);
+        match &self.rough {
+            None => interface.shading_points(simd, rays, hits, inside, points),
+            Some(rough) => {
+                let sample = segments.sample.map(|s| s % context.settings.samples);
+                let mut u = [splat(0.0); 2];
+                get_2d_lanes(simd, &segments.path, BSDF, &sample, &mut u);
+                rough.sample_rays(simd, rays, hits, inside, &u, points);
+            }
+        }
         let hits = SpecularHits {
             segments,
             depth,

@@ -25,6 +25,7 @@ mod parts;
 mod printing;
 mod progress;
 mod resume;
+mod rough_glass;
 mod samples;
 mod scale;
 mod schema;

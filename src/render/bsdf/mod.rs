@@ -21,7 +21,7 @@ mod finish_tests;
 mod local;
 mod matte;
 mod metal;
-mod microfacet;
+pub(super) mod microfacet;
 mod plastic;
 #[cfg(test)]
 mod tests;
