@@ -30,6 +30,7 @@ mod surface;
 
 pub use camera::check_views;
 use ground::Floor;
+pub use ground::add_ground_image;
 pub use meshes::{add_meshes, mesh_settings};
 
 /// Minimum radius as a fraction of the diagonal of the bounds; smaller ones would be invisible in f32.

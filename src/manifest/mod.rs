@@ -71,7 +71,7 @@ pub use environment::{Environment, EnvironmentKind};
 pub use file::{is_marked, marked, read_manifest};
 pub use flags::{KeyFlag, key_flags};
 pub use focus::FocusSetting;
-pub use ground::{GroundKind, GroundSetting};
+pub use ground::{GroundImage, GroundKind, GroundSetting};
 pub use input::{Input, Paths, RadiusSetting, UpAxis};
 pub use key::Flag;
 pub use light::{Light, LightKind};
@@ -278,6 +278,11 @@ impl Manifest {
         }
     }
 
+    /// The picture on the ground.
+    pub fn ground_image(&self) -> Option<&GroundImage> {
+        self.render.ground.as_ref()?.image.as_ref()
+    }
+
     /// The integrator of the images.
     pub fn integrator(&self) -> IntegratorKind {
         self.render.integrator.unwrap_or(IntegratorKind::Path)
@@ -330,6 +335,9 @@ impl Manifest {
         let mut settings = self.entries().settings(|affects| self.depends_on(affects));
         let renderer = format!("{:?}", RendererKind::default().name());
         settings.push((same::RENDERER.to_owned(), renderer));
+        if let Some(image) = self.ground_image() {
+            settings.push((GROUND_IMAGE.to_owned(), format!("{:?}", image.path)));
+        }
         // Versions without rough interfaces had the same keys, and other images
         let is_rough = self.material.resolved(Fresnel::Exact).interface_roughness > 0.0;
         if is_rough && self.integrator() == IntegratorKind::Path {
@@ -376,6 +384,9 @@ impl Manifest {
         manifest
     }
 }
+
+/// The key of the picture on the ground in the settings that images depend on.
+pub const GROUND_IMAGE: &str = "render.ground.image";
 
 /// Description of a manifest.
 const ABOUT: &str = "A spherule job. Paths are relative to this file; lengths are in the unit of the particle files.";

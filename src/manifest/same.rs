@@ -37,7 +37,7 @@ impl Manifest {
             render.integrator = Some(IntegratorKind::Whitted);
         }
         if render.ground.is_none() && is_old(GROUND, OLD_GROUND) {
-            render.ground = Some(GroundSetting(GroundKind::None));
+            render.ground = Some(GroundSetting::of(GroundKind::None));
         }
     }
 
@@ -153,7 +153,7 @@ mod tests {
     #[test]
     fn jobs_of_older_versions_keep_their_integrator_and_ground() {
         let (mut old, mut current) = (manifest("render.integrator = \"whitted\""), manifest(""));
-        old.render.ground = Some(GroundSetting(GroundKind::None));
+        old.render.ground = Some(GroundSetting::of(GroundKind::None));
         // Plans of versions with and without the keys
         let with = old.settings();
         let without = rewritten(&old, INTEGRATOR, None);

@@ -18,6 +18,9 @@ use crate::math::Supported;
 use crate::scene::{self, MeshMaterial, PartMaterial, PartMaterials, Scene};
 use crate::surface::{MaterialId, Shape, Side};
 
+/// Least width of a sample for filtering pictures, in pixels: the noise of many samples is low anyway.
+const MIN_SAMPLE_WIDTH: f32 = 0.125;
+
 /// A scene ready to be rendered.
 pub(super) struct RenderContext<'a> {
     /// All shapes but panes; the ground comes first, because it is the cheapest.
@@ -49,6 +52,8 @@ pub(super) struct RenderContext<'a> {
     /// Whether the camera is inside a connected body.
     pub(super) is_camera_inside: bool,
     pub(super) sampler: FilmSampler,
+    /// Width of a sample of a pixel, in pixels.
+    pub(super) sample_width: f32,
     /// Maximum number of path segments of one depth, see [`SEGMENTS`].
     pub(super) max_segments: usize,
 }
@@ -123,6 +128,10 @@ impl<'a> RenderContext<'a> {
             color: source.constant_color(),
             interior,
             boundary: Dielectric::new(&scene.material),
+            sample_width: (settings.samples as f32)
+                .sqrt()
+                .recip()
+                .max(MIN_SAMPLE_WIDTH),
             sampler: FilmSampler::with_filter(settings.samples, settings.filter),
             max_segments: SEGMENTS,
         }

@@ -223,7 +223,11 @@ impl PathIntegrator<'_> {
     fn prepare_surface(&self, surface: &Surface<'_>, packet: &mut PacketScratch) {
         let (context, simd) = (&self.context, self.context.simd);
         // Transmissive particles have no colour
-        context.base_colors(context.interior == Interior::Opaque, packet);
+        context.base_colors(
+            surface.segments,
+            context.interior == Interior::Opaque,
+            packet,
+        );
         let (rays, points) = (&surface.segments.rays, &mut packet.surface);
         surface_points(simd, rays, &packet.hits, &packet.base, points);
         let opacity = &packet.hits.opacity;

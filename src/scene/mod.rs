@@ -21,6 +21,7 @@ pub mod mesh;
 pub mod part;
 pub mod path;
 pub mod rgb;
+pub mod texture;
 
 pub use background::Background;
 pub use camera::{Camera, CameraError, CameraView, Framing, Lens};
@@ -34,6 +35,7 @@ pub use mesh::{MeshFinish, MeshMaterial};
 pub use part::{PartMaterial, PartMaterials};
 pub use path::{CameraKey, CameraPath, KeyedPath, PathError, Turntable};
 pub use rgb::{RgbEncoding, is_rgb};
+pub use texture::Texture;
 
 /// An axis-aligned box in world units; includes the spheres.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -17,6 +17,7 @@ mod damaged;
 mod denoise;
 mod export;
 mod golden;
+mod ground_image;
 mod help;
 mod in_place;
 mod memory;
