@@ -27,11 +27,13 @@ mod environment;
 mod ground;
 mod lights;
 mod meshes;
+mod parts;
 mod shutter;
 mod surface;
 
 pub use camera::check_views;
 use ground::Floor;
+pub use ground::add_ground_image;
 pub use meshes::{add_meshes, mesh_settings};
 
 /// Minimum radius as a fraction of the diagonal of the bounds; smaller ones would be invisible in f32.
@@ -181,6 +183,7 @@ pub fn setup(
         lights,
         ambient_light: crate::scene::DEFAULT_AMBIENT_LIGHT,
         material: surface::material(manifest, &bounds),
+        parts: parts::parts(manifest, survey)?,
         background: background(manifest, up.as_vec3()),
         ground,
         meshes: Vec::new(),

@@ -1,4 +1,5 @@
-//! Equirectangular images for environments: OpenEXR and Radiance (`.hdr`) files, decoded to linear RGB.
+//! Images as input, decoded to linear RGB: equirectangular ones for environments from OpenEXR and Radiance (`.hdr`)
+//! files, and pictures on the ground from these and PNG files.
 //!
 //! Sizes are checked before memory for pixels is allocated. The content decides on the format, not the name.
 
@@ -6,13 +7,16 @@ use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
+use glam::Vec3;
 use thiserror::Error;
 
-use crate::scene::RadianceMap;
 use crate::scene::environment::MapError;
+use crate::scene::texture::TextureError;
+use crate::scene::{RadianceMap, Texture};
 use spherule_jobs::{Panic, catch_panic};
 
 mod openexr;
+mod png;
 mod radiance;
 #[cfg(test)]
 mod tests;
@@ -23,7 +27,10 @@ const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 /// First bytes of Radiance files.
 const RADIANCE_MAGIC: [u8; 2] = *b"#?";
 
-/// Reasons why a file is not an environment.
+/// First bytes of PNG files.
+const PNG_MAGIC: [u8; 4] = *b"\x89PNG";
+
+/// Reasons why a file is not an image that can be used.
 #[derive(Debug, Error)]
 pub enum HdrError {
     /// It cannot be read.
@@ -51,15 +58,55 @@ enum Fault {
     Io(#[from] io::Error),
     #[error(transparent)]
     Map(#[from] MapError),
+    #[error(transparent)]
+    Texture(#[from] TextureError),
     #[error("{0}")]
     Other(String),
 }
 
-/// Reads the image at `path`.
+/// Decoded pixels, row by row from the top, linear RGB.
+struct Pixels {
+    width: usize,
+    height: usize,
+    pixels: Vec<Vec3>,
+}
+
+/// Checks a width and a height before memory for pixels is allocated.
+type Check = fn(usize, usize) -> Result<(), Fault>;
+
+/// Reads the equirectangular image at `path`.
 ///
 /// # Errors
 /// See [`HdrError`]; messages begin with the path.
 pub fn read_radiance_map(path: &Path) -> Result<RadianceMap, HdrError> {
+    read(path, |file| {
+        let image = decode_radiance(file, |width, height| {
+            Ok(RadianceMap::check_size(width, height)?)
+        })?;
+        Ok(RadianceMap::new(image.width, image.height, image.pixels)?)
+    })
+}
+
+/// Reads the picture at `path`, for base colours. Transparent pixels of a PNG file show the colour `behind`.
+///
+/// # Errors
+/// See [`HdrError`]; messages begin with the path.
+pub fn read_texture(path: &Path, behind: Vec3) -> Result<Texture, HdrError> {
+    read(path, |mut file| {
+        let check = |width, height| Ok(Texture::check_size(width, height)?);
+        let image = match first_bytes(&mut file)?[..] == PNG_MAGIC {
+            true => png::decode(file, check, behind)?,
+            false => decode_radiance(file, check)?,
+        };
+        Ok(Texture::new(image.width, image.height, &image.pixels)?)
+    })
+}
+
+/// Reads the image at `path` by `decode`.
+fn read<T>(
+    path: &Path,
+    decode: impl FnOnce(BufReader<File>) -> Result<T, Fault> + std::panic::UnwindSafe,
+) -> Result<T, HdrError> {
     let unusable = |what: String| HdrError::Unusable {
         path: path.to_owned(),
         what,
@@ -70,7 +117,7 @@ pub fn read_radiance_map(path: &Path) -> Result<RadianceMap, HdrError> {
     })?;
     // Decoders of files from elsewhere may panic
     match catch_panic(|| Ok::<_, Panic>(decode(BufReader::new(file.0)))) {
-        Ok(Ok(map)) => Ok(map),
+        Ok(Ok(image)) => Ok(image),
         Ok(Err(Fault::Io(source))) => Err(HdrError::Io {
             path: path.to_owned(),
             source,
@@ -80,14 +127,20 @@ pub fn read_radiance_map(path: &Path) -> Result<RadianceMap, HdrError> {
     }
 }
 
-fn decode(mut file: BufReader<File>) -> Result<RadianceMap, Fault> {
+/// The first four bytes, or fewer.
+fn first_bytes(file: &mut BufReader<File>) -> Result<Vec<u8>, Fault> {
     let mut start = Vec::new();
     file.by_ref().take(4).read_to_end(&mut start)?;
     file.seek(SeekFrom::Start(0))?;
+    Ok(start)
+}
+
+fn decode_radiance(mut file: BufReader<File>, check: Check) -> Result<Pixels, Fault> {
+    let start = first_bytes(&mut file)?;
     if start == EXR_MAGIC {
-        openexr::decode(file)
+        openexr::decode(file, check)
     } else if start.starts_with(&RADIANCE_MAGIC) {
-        radiance::decode(file)
+        radiance::decode(file, check)
     } else {
         Err(Fault::Other(
             "is neither an OpenEXR nor a Radiance HDR image; convert it to one of them".to_owned(),

@@ -8,8 +8,7 @@ use exr::meta::attribute::{ChannelDescription, SampleType};
 use exr::meta::header::Header;
 use glam::Vec3;
 
-use super::Fault;
-use crate::scene::RadianceMap;
+use super::{Check, Fault, Pixels};
 
 /// Maximum size of an uncompressed block, bytes.
 const MAX_BLOCK_BYTES: u64 = 1 << 28;
@@ -27,7 +26,7 @@ impl From<exr::error::Error> for Fault {
 }
 
 /// Decodes the first part of a file with the channels R, G and B, in full resolution.
-pub(super) fn decode(file: impl Read + Seek) -> Result<RadianceMap, Fault> {
+pub(super) fn decode(file: impl Read + Seek, check_size: Check) -> Result<Pixels, Fault> {
     let reader = exr::block::read(file, false)?;
     let meta = reader.meta_data().clone();
     // Find the part and its channels, and check their size
@@ -38,7 +37,7 @@ pub(super) fn decode(file: impl Read + Seek) -> Result<RadianceMap, Fault> {
             "has no part with the channels R, G and B".to_owned(),
         ));
     };
-    check(header)?;
+    check(header, check_size)?;
     let [width, height] = [header.layer_size.x(), header.layer_size.y()];
     // Decode the blocks of the part
     let mut pixels = vec![Vec3::ZERO; width * height];
@@ -61,7 +60,11 @@ pub(super) fn decode(file: impl Read + Seek) -> Result<RadianceMap, Fault> {
             }
         }
     }
-    Ok(RadianceMap::new(width, height, pixels)?)
+    Ok(Pixels {
+        width,
+        height,
+        pixels,
+    })
 }
 
 /// Indices of the channels R, G and B, if the part has all of them.
@@ -74,8 +77,8 @@ fn components(header: &Header) -> Option<[usize; 3]> {
     Some([r?, g?, b?])
 }
 
-fn check(header: &Header) -> Result<(), Fault> {
-    RadianceMap::check_size(header.layer_size.x(), header.layer_size.y())?;
+fn check(header: &Header, check_size: Check) -> Result<(), Fault> {
+    check_size(header.layer_size.x(), header.layer_size.y())?;
     let is_whole = |c: &ChannelDescription| c.sampling.x() == 1 && c.sampling.y() == 1;
     if header.deep || !header.channels.list.iter().all(is_whole) {
         return Err(Fault::Other(

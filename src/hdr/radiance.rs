@@ -6,8 +6,7 @@ use glam::Vec3;
 use image::codecs::hdr::HdrDecoder;
 use image::{ImageDecoder, ImageError};
 
-use super::Fault;
-use crate::scene::RadianceMap;
+use super::{Check, Fault, Pixels};
 
 impl From<ImageError> for Fault {
     fn from(error: ImageError) -> Self {
@@ -19,14 +18,18 @@ impl From<ImageError> for Fault {
 }
 
 /// Decodes a file.
-pub(super) fn decode(file: impl BufRead) -> Result<RadianceMap, Fault> {
+pub(super) fn decode(file: impl BufRead, check_size: Check) -> Result<Pixels, Fault> {
     let decoder = HdrDecoder::new(file)?;
     let (width, height) = decoder.dimensions();
     let (width, height) = (width as usize, height as usize);
-    RadianceMap::check_size(width, height)?;
+    check_size(width, height)?;
     let mut values = vec![0.0_f32; 3 * width * height];
     decoder.read_image(bytemuck::cast_slice_mut(&mut values))?;
     let (pixels, _) = values.as_chunks::<3>();
     let pixels = pixels.iter().map(|pixel| Vec3::from_array(*pixel));
-    Ok(RadianceMap::new(width, height, pixels.collect())?)
+    Ok(Pixels {
+        width,
+        height,
+        pixels: pixels.collect(),
+    })
 }

@@ -35,6 +35,9 @@ pub enum RunError {
     /// The image of the environment cannot be read.
     #[error("environment.image: {0}")]
     Environment(#[from] HdrError),
+    /// The picture on the ground cannot be read.
+    #[error("render.ground.image: {0}")]
+    GroundImage(HdrError),
     /// A mesh cannot be read.
     #[error("mesh.{index}.path: {source}")]
     Mesh {

@@ -1,7 +1,7 @@
 //! A render job before anything is written: manifest, directory, frames, and the setup of its images.
 
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use serde_json::Value;
 use spherule_formats::Sequence;
@@ -12,13 +12,15 @@ use super::meshes::{self, JobMeshes, identity};
 use super::selection::{frame_requests, frames_in, indices, select};
 use super::target::{check_output_dir, stored_survey};
 use super::{RunError, Shard, in_thread};
-use crate::hdr::{HdrError, read_radiance_map};
-use crate::manifest::{Manifest, named_place};
+use crate::hdr::{HdrError, read_radiance_map, read_texture};
+use crate::manifest::{GROUND_IMAGE, Manifest, named_place};
 use crate::metrics::memory::available;
 use crate::pipeline::{FrameSize, ImageTask, MemoryModel, NextMeshes, Schedule, Setup};
 use crate::report::job::{HTML_FILE, JSON_FILE};
-use crate::resolve::{self, add_meshes, check_views, needs_environment_image, question};
-use crate::scene::RadianceMap;
+use crate::resolve::{
+    self, add_ground_image, add_meshes, check_views, needs_environment_image, question,
+};
+use crate::scene::{RadianceMap, Texture};
 use crate::survey::Survey;
 
 /// A render job before anything is written.
@@ -32,6 +34,8 @@ pub struct RenderJob {
     shard: Option<Shard>,
     /// See [`RenderJob::environment_image`].
     environment_image: OnceLock<Option<RadianceMap>>,
+    /// See [`RenderJob::ground_image`].
+    ground_image: OnceLock<Option<Arc<Texture>>>,
     meshes: JobMeshes,
 }
 
@@ -55,6 +59,7 @@ impl RenderJob {
             shown_output,
             shard,
             environment_image: OnceLock::new(),
+            ground_image: OnceLock::new(),
             meshes: JobMeshes::default(),
         })
     }
@@ -204,6 +209,12 @@ impl RenderJob {
             let found = identity(&path).map_err(|source| HdrError::Io { path, source })?;
             identities.push(("environment.image".to_owned(), found));
         }
+        if let Some(path) = self.ground_path() {
+            let found = identity(&path);
+            let found =
+                found.map_err(|source| RunError::GroundImage(HdrError::Io { path, source }))?;
+            identities.push((GROUND_IMAGE.to_owned(), found));
+        }
         Ok(identities)
     }
 
@@ -287,6 +298,9 @@ impl RenderJob {
         let frames = sequence.frames().iter().map(|frame| frame.number);
         let map = self.environment_image()?;
         let mut setup = resolve::setup(&self.manifest, survey, map)?;
+        if let Some(texture) = self.ground_image()? {
+            add_ground_image(&mut setup, &self.manifest, texture);
+        }
         let meshes = self.meshes.get(&self.manifest, self.dir(), survey)?;
         add_meshes(&mut setup, &self.manifest, meshes);
         check_views(&setup, frames)?;
@@ -309,6 +323,23 @@ impl RenderJob {
         let map = path.map(|path| read_radiance_map(&path)).transpose()?;
         let reduced = map.map(|map| map.reduced());
         Ok(self.environment_image.get_or_init(|| reduced).as_ref())
+    }
+
+    /// The path of the picture on the ground, if there is one.
+    fn ground_path(&self) -> Option<PathBuf> {
+        let image = self.manifest.ground_image()?;
+        Some(named_place(&self.dir().join(&image.path)))
+    }
+
+    /// The picture on the ground, if there is one. Its file is read once.
+    fn ground_image(&self) -> Result<Option<&Arc<Texture>>, RunError> {
+        if let Some(texture) = self.ground_image.get() {
+            return Ok(texture.as_ref());
+        }
+        let behind = self.manifest.render.ground_color;
+        let read = |path: PathBuf| read_texture(&path, behind).map_err(RunError::GroundImage);
+        let texture = self.ground_path().map(read).transpose()?.map(Arc::new);
+        Ok(self.ground_image.get_or_init(|| texture).as_ref())
     }
 
     /// Notes for the user on the image of the environment, and on meshes that have been read for a setup.

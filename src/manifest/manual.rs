@@ -44,8 +44,8 @@ fn title(table: &[Entry]) -> String {
         return format!("`[{}]`", table[0].section);
     };
     match table.iter().find(|entry| entry.name() == "type") {
-        Some(kind) => format!("`[[{list}]]` with `type = {}`", kind.sample()),
-        None => format!("`[[{list}]]`"),
+        Some(kind) if list == "light" => format!("`[[{list}]]` with `type = {}`", kind.sample()),
+        _ => format!("`[[{list}]]`"),
     }
 }
 

@@ -1,12 +1,16 @@
 //! `[material]`: the material of the particles.
 
+use std::collections::BTreeMap;
+
 use glam::Vec3;
 
 use super::color::ColorSetting;
 use super::key::{Affects, Key};
 use super::keys::{Keys, keys};
+use super::part::{self, Part};
 use super::value::named;
 use crate::scene::{self, Finish, Fresnel};
+use crate::surface::MaterialId;
 
 named!(Fresnel: Schlick = "schlick", Exact = "exact");
 
@@ -42,14 +46,14 @@ const KINDS: [&str; 3] = [
 ];
 
 /// Default roughness: satin plastic, and a brushed metal.
-const ROUGHNESS: f32 = 0.55;
+pub(super) const ROUGHNESS: f32 = 0.55;
 
 /// `[material]`, the terms of the thesis's equations 4.1 to 4.3.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Material {
     /// Kind of material; by default that of the terms in [`Self::constants`].
     pub kind: Option<MaterialKind>,
-    /// Roughness of plastic and metal, 0 to 1.
+    /// Roughness, 0 to 1. Glass and water are smooth at the default.
     pub roughness: f32,
     /// Source of the colours.
     pub color: ColorSetting,
@@ -62,6 +66,8 @@ pub struct Material {
     pub absorption: Vec3,
     /// The length for `absorption`; by default it depends on the extent of the particles.
     pub absorption_length: Option<f64>,
+    /// Materials of parts of the particles.
+    pub parts: Vec<Part>,
 }
 
 /// Terms of the thesis's model. All but `transmission` have no effect on opaque surfaces in path tracing.
@@ -84,6 +90,7 @@ impl Default for Material {
             fresnel: None,
             absorption: Vec3::ONE,
             absorption_length: None,
+            parts: Vec::new(),
         }
     }
 }
@@ -110,6 +117,11 @@ impl Material {
                 false => self.constants.ior,
             },
             fresnel: Fresnel::Exact,
+            // Glass and water of manifests that name every key with its default stay smooth
+            interface_roughness: match roughness == ROUGHNESS {
+                true => 0.0,
+                false => roughness,
+            },
             ..self.constants
         };
         let usual = scene::Material {
@@ -130,12 +142,32 @@ impl Material {
         }
     }
 
-    pub(super) fn keys(&mut self, keys: &mut Keys<'_>) {
+    /// All keys, including those of `[[material.part]]`.
+    pub(super) fn all_keys(&mut self, keys: &mut Keys<'_>) {
+        self.keys(keys);
+        let (items, mut named, mut index) = (&mut self.parts, BTreeMap::new(), 0);
+        keys.list("part", "material.part", part::ABOUT, items, |part, keys| {
+            part.keys(keys, &mut named, index);
+            index += 1;
+        });
+        let max = MaterialId::MAX_PARTS;
+        if let Some(section) = keys.reading()
+            && self.parts.len() > max
+        {
+            let count = self.parts.len();
+            let what = format!("{count} materials, but at most {max} are possible");
+            section.wrong("part", &what);
+        }
+    }
+
+    fn keys(&mut self, keys: &mut Keys<'_>) {
         let constants = &mut self.constants;
         let key = Key::new("type", &[TYPE, "", KINDS[0], KINDS[1], KINDS[2]]).or("auto");
         keys.key(key, &mut self.kind);
         keys!(keys:
-            /// Roughness of plastic and metal, 0 (a mirror) to 1
+            /// Roughness of plastic, metal, glass and water, 0 (smooth) to 1
+            ///
+            /// Glass and water are smooth unless it has another value than 0.55.
             roughness => self.roughness, from(0), to(1), affects(Affects::PathTracing);
             /// Colour: auto (by speed), linear RGB, or { attribute = "velocity", map = "viridis", range = [0.0, 4.0] }
             color => self.color;

@@ -43,6 +43,7 @@ mod material;
 mod mesh;
 mod nearest;
 mod output;
+mod part;
 mod pattern;
 #[cfg(test)]
 mod places_tests;
@@ -71,7 +72,7 @@ pub use environment::{Environment, EnvironmentKind};
 pub use file::{is_marked, marked, read_manifest};
 pub use flags::{KeyFlag, key_flags};
 pub use focus::FocusSetting;
-pub use ground::{GroundKind, GroundSetting};
+pub use ground::{GroundImage, GroundKind, GroundSetting};
 pub use input::{Input, Paths, RadiusSetting, UpAxis};
 pub use key::Flag;
 pub use light::{Light, LightKind};
@@ -79,6 +80,7 @@ pub use material::{Material, MaterialKind};
 pub use mesh::{Mesh, MeshMaterial, MeshPath, MeshShading};
 pub(crate) use nearest::nearest;
 pub use output::Output;
+pub use part::{Part, PartKind};
 pub use pattern::{FramePattern, OutputPattern};
 pub use preset::{Look, draft};
 #[cfg(feature = "cli")]
@@ -234,7 +236,9 @@ impl Manifest {
         keys.section("surface", surface::ABOUT, |keys| {
             surface::all_keys(&mut self.surface, keys);
         });
-        keys.section("material", material::ABOUT, |keys| self.material.keys(keys));
+        keys.section("material", material::ABOUT, |keys| {
+            self.material.all_keys(keys);
+        });
         keys.section("environment", environment::ABOUT, |keys| {
             self.environment.keys(keys);
         });
@@ -277,6 +281,11 @@ impl Manifest {
                 ),
             );
         }
+    }
+
+    /// The picture on the ground.
+    pub fn ground_image(&self) -> Option<&GroundImage> {
+        self.render.ground.as_ref()?.image.as_ref()
     }
 
     /// The integrator of the images.
@@ -335,6 +344,14 @@ impl Manifest {
         let mut settings = self.entries().settings(|affects| self.depends_on(affects));
         let renderer = format!("{:?}", RendererKind::default().name());
         settings.push((same::RENDERER.to_owned(), renderer));
+        if let Some(image) = self.ground_image() {
+            settings.push((GROUND_IMAGE.to_owned(), format!("{:?}", image.path)));
+        }
+        // Versions without rough interfaces had the same keys, and other images
+        let is_rough = self.material.resolved(Fresnel::Exact).interface_roughness > 0.0;
+        if is_rough && self.integrator() == IntegratorKind::Path {
+            settings.push((same::ROUGH_INTERFACE.to_owned(), "true".to_owned()));
+        }
         settings
     }
 
@@ -347,6 +364,7 @@ impl Manifest {
         let examples = Self::examples().entries();
         for (list, comment, is_empty) in [
             ("camera.key", NO_KEYS, self.camera.keys.is_empty()),
+            ("material.part", NO_PARTS, self.material.parts.is_empty()),
             ("light", AUTO_LIGHTS, self.lights.is_empty()),
             ("mesh", NO_MESHES, self.meshes.is_empty()),
         ] {
@@ -369,11 +387,15 @@ impl Manifest {
     fn examples() -> Self {
         let mut manifest = Self::new("");
         manifest.camera.keys = vec![CameraKey::default()];
+        manifest.material.parts = vec![Part::default()];
         manifest.lights = Light::examples();
         manifest.meshes = vec![Mesh::default()];
         manifest
     }
 }
+
+/// The key of the picture on the ground in the settings that images depend on.
+pub const GROUND_IMAGE: &str = "render.ground.image";
 
 /// Description of a manifest.
 const ABOUT: &str = "A spherule job. Paths are relative to this file; lengths are in the unit of the particle files.";
@@ -383,6 +405,9 @@ const NEEDS_NUMBER: &str =
 
 const NO_KEYS: &str = "In mode \"keys\" the camera moves smoothly through these views, and stands still before the \
                        first and after the last.";
+
+const NO_PARTS: &str =
+    "Parts of the particles (attribute part, type or phase) may have materials of their own.";
 
 const AUTO_LIGHTS: &str = "Without [[light]], a key light and a soft fill light are placed relative to the camera. A \
                            directional light has a direction instead of position and falloff.";

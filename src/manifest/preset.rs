@@ -167,7 +167,7 @@ mod tests {
         assert_eq!(plain.render.ground_pattern, GroundPattern::Sand);
         assert_eq!(plain.material.constants.transmission, 1.0);
         assert!(
-            plain.render.ground == Some(GroundSetting(GroundKind::Plain))
+            plain.render.ground == Some(GroundSetting::of(GroundKind::Plain))
                 && plain.material.absorption[0] < 1.0
         );
     }
@@ -184,7 +184,10 @@ mod tests {
         ] {
             let plain = look(name, "").render;
             assert_eq!(plain.integrator, Some(IntegratorKind::Path));
-            assert_eq!(plain.ground, Some(GroundSetting(GroundKind::ShadowCatcher)));
+            assert_eq!(
+                plain.ground,
+                Some(GroundSetting::of(GroundKind::ShadowCatcher))
+            );
             assert_eq!(plain.background, Some(background));
             // A source of light of the manifest's own
             look(name, "environment.image = \"hall.exr\"");
@@ -194,7 +197,7 @@ mod tests {
             "render.integrator = \"whitted\"\nrender.ground = false",
         );
         assert_eq!(own.integrator(), IntegratorKind::Whitted);
-        assert_eq!(own.render.ground, Some(GroundSetting(GroundKind::None)));
+        assert_eq!(own.render.ground, Some(GroundSetting::of(GroundKind::None)));
     }
 
     #[test]
@@ -209,7 +212,10 @@ mod tests {
         assert_eq!(mixed.material.absorption, Vec3::ONE);
         assert_eq!(mixed.surface.kind, SurfaceKind::Spheres);
         assert_eq!(mixed.render.background, Some(Background::Constant(Vec3::X)));
-        assert_eq!(mixed.render.ground, Some(GroundSetting(GroundKind::Plain)));
+        assert_eq!(
+            mixed.render.ground,
+            Some(GroundSetting::of(GroundKind::Plain))
+        );
         // An error in the file is reported once, with its position.
         let wrong = "input.path = \"data\"\nrender = 3";
         let error = Manifest::parse_with(

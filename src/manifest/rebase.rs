@@ -62,6 +62,10 @@ impl Manifest {
         if let Some(path) = &mut self.environment.image {
             *path = rebased(path, from, to)?;
         }
+        let ground = self.render.ground.as_mut();
+        if let Some(image) = ground.and_then(|ground| ground.image.as_mut()) {
+            image.path = rebased(&image.path, from, to)?;
+        }
         for mesh in &mut self.meshes {
             let path = rebased(mesh.path.as_str(), from, to)?;
             mesh.path =

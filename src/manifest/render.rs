@@ -190,12 +190,15 @@ section! {
         /// studio is a grey gradient over the image with darker corners. It does not move with the camera. auto is
         /// studio with path, and a darker gradient along the up axis with whitted.
         background: Option<Background> = None, or("auto");
-        /// Ground under the particles: auto | false | true (plain) | checker | shadow_catcher
+        /// Ground under the particles: auto | false | true (plain) | checker | shadow_catcher | image
         ///
         /// A shadow catcher is invisible: it shows the background, darker where particles take light away. It needs
         /// integrator = "path" and has no colour. auto is a shadow catcher with path if particles lie on the floor of
         /// their domain at some time, otherwise false. `[render.ground]` with `type = "checker"` is the same as
-        /// ground = "checker".
+        /// ground = "checker". `type = "image"` needs `image`, a PNG, OpenEXR or Radiance HDR file of base colours;
+        /// `width` (by default about the diagonal of the box of the particles), `center` (a point above the centre of
+        /// the image), `rotation` (counterclockwise from above, degrees) and `repeat` (true; otherwise ground_color is
+        /// around it) place it.
         ground: Option<GroundSetting> = None, or("auto"), flag("ground", "KIND", "Look");
         /// Height of the ground along input.up, or auto
         ground_height: Option<f64> = None, or("auto"), unit("a height");

@@ -21,6 +21,8 @@ const SURFACE: &str = "render.surface";
 const UNION: [&str; 2] = ["\"medium\"", "\"union\""];
 /// The renderer; not a key of manifests as long as there is only one.
 pub(super) const RENDERER: &str = "renderer";
+/// Whether glass or water is rough; not a key of manifests.
+pub(super) const ROUGH_INTERFACE: &str = "material.rough_interface";
 
 impl Manifest {
     /// Gives automatic settings the defaults of the version that made a plan with the settings `planned`, so that a job
@@ -35,7 +37,7 @@ impl Manifest {
             render.integrator = Some(IntegratorKind::Whitted);
         }
         if render.ground.is_none() && is_old(GROUND, OLD_GROUND) {
-            render.ground = Some(GroundSetting(GroundKind::None));
+            render.ground = Some(GroundSetting::of(GroundKind::None));
         }
     }
 
@@ -151,7 +153,7 @@ mod tests {
     #[test]
     fn jobs_of_older_versions_keep_their_integrator_and_ground() {
         let (mut old, mut current) = (manifest("render.integrator = \"whitted\""), manifest(""));
-        old.render.ground = Some(GroundSetting(GroundKind::None));
+        old.render.ground = Some(GroundSetting::of(GroundKind::None));
         // Plans of versions with and without the keys
         let with = old.settings();
         let without = rewritten(&old, INTEGRATOR, None);

@@ -90,7 +90,7 @@ fn example_manifest_is_valid() {
     expected.camera.look_at = Some(DVec3::new(5.0, 5.0, 0.0));
     expected.camera.up = Some(DVec3::Z);
     expected.render.integrator = Some(IntegratorKind::Whitted);
-    expected.render.ground = Some(GroundSetting(GroundKind::None));
+    expected.render.ground = Some(GroundSetting::of(GroundKind::None));
     expected.render.background = Some(Background::Constant(Vec3::new(0.05, 0.06, 0.08)));
     expected.material.color = ColorSetting::Rgb(Vec3::new(0.6, 0.7, 0.9));
     expected.lights = vec![Light {
@@ -162,7 +162,7 @@ fn wrong_types_name_the_expected_type() {
     refused(
         "[render]\nground = 1",
         &[
-            "render.ground: expected true, false or one of none, plain, checker, shadow_catcher or \"auto\", found 1",
+            "render.ground: expected true, false or one of none, plain, checker, shadow_catcher, image or \"auto\", found 1",
         ],
     );
     refused(

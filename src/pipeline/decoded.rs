@@ -5,9 +5,9 @@ use rayon::prelude::*;
 use spherule_formats::order::index_u32;
 use spherule_formats::{Attribute, AttributeData, ParticleFrame, Radius, is_radius};
 
-use super::load_error::{LoadError, missing};
+use super::load_error::{LoadError, missing, no_parts};
 use super::setup::{ColorRule, RadiusRule, Setup};
-use crate::scene::RgbEncoding;
+use crate::scene::{PartMaterials, RgbEncoding};
 use crate::survey::{id_of, part_of, velocity_of};
 
 /// A frame in memory, before the tree is built.
@@ -33,7 +33,7 @@ pub struct DecodedShading {
     pub ids: Option<Vec<u32>>,
     /// Velocities for the channels `V` and `motion`, and for motion blur until the tree is built.
     pub velocities: Option<Vec<Vec3>>,
-    /// The attribute that divides particles into parts, and their parts, for Cryptomatte.
+    /// The attribute that divides particles into parts, and their parts, for Cryptomatte and for materials.
     pub parts: Option<(String, Vec<i32>)>,
     /// The floats of attribute channels, one plane for each.
     pub attributes: Vec<Vec<f32>>,
@@ -81,10 +81,14 @@ impl DecodedFrame {
             let purpose = "motion blur, which camera.shutter = 0 turns off";
             return Err(missing("velocity", purpose, file, has));
         }
-        let parts = match channels.needs_parts() {
+        let parts = match setup.needs_parts() {
             true => part_of(&frame.attributes).and_then(parts),
             false => None,
         };
+        if parts.is_none() && !setup.picture.scene.parts.is_empty() && !frame.is_empty() {
+            let has = frame.attributes.iter().map(|a| a.name.as_str());
+            return Err(no_parts(file, has));
+        }
         let mut planes = Vec::new();
         for channel in &setup.picture.attributes {
             let found = attribute(&frame, &channel.name, "a channel", file)?;
@@ -156,6 +160,12 @@ fn move_to_end<T: Copy>(items: &mut [T], chosen: &[u32]) {
 }
 
 impl DecodedShading {
+    /// Parts among `known` that no particle has.
+    pub(super) fn absent_parts(&self, known: &PartMaterials) -> Vec<(i32, usize)> {
+        let parts = self.parts.iter();
+        known.absent(parts.flat_map(|(_, parts)| parts.iter().copied()))
+    }
+
     /// Whether particles have individual colours.
     pub fn has_colors(&self) -> bool {
         !self.values.is_empty() || !self.colors.is_empty()

@@ -9,16 +9,19 @@ use spherule_formats::native::{AttributeView, FrameIndex, NativeFile, NativeFram
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{FrameError, ScalarType, is_radius};
 
-use super::load_error::{LoadError, missing};
+use super::load_error::{LoadError, missing, no_parts};
 use super::setup::{ColorRule, RadiusRule, Setup};
 use crate::accel::Structure;
 use crate::render::{NO_ID, ShadeSource, mean};
-use crate::scene::{ColorMap, RgbEncoding};
+use crate::scene::{ColorMap, PartMaterials, RgbEncoding};
 use crate::survey::{Named, id_of, part_of, velocity_of};
 
 /// In frames up to this size (bytes), all data in use are verified with their checksums before tracing. In larger
 /// frames only the nodes are, which are read anyway; rays touch little of the rest.
 const MAX_VERIFIED: u64 = 1 << 30;
+
+/// Parts are searched in frames of up to so many particles.
+const MAX_SEARCHED: usize = 1 << 26;
 
 /// An open native frame.
 #[derive(Debug)]
@@ -109,8 +112,7 @@ impl StoredFrame {
 
     /// Whether attributes are looked up by particle.
     pub fn needs_indices(&self, setup: &Setup) -> bool {
-        let channels = setup.picture.render.channels;
-        channels.needs_particles() || self.names.values.is_some()
+        setup.needs_particles() || self.names.values.is_some()
     }
 
     /// The particles in place.
@@ -146,6 +148,22 @@ impl StoredFrame {
                 .map(|(name, components)| (view(name), *components))
                 .collect(),
         }
+    }
+
+    /// Parts among `known` that no particle has. They are not searched in large frames, most of which is not read
+    /// otherwise.
+    pub(super) fn absent_parts(&self, known: &PartMaterials) -> Vec<(i32, usize)> {
+        let frame = self.frame();
+        let name = self.names.parts.as_deref();
+        let Some(parts) = name.and_then(|name| frame.attribute(name)) else {
+            return Vec::new();
+        };
+        let count = usize::try_from(self.particles()).unwrap_or(usize::MAX);
+        if count > MAX_SEARCHED {
+            return Vec::new();
+        }
+        let parts = (0..count).map_while(|index| parts.low_bits(index));
+        known.absent(parts.map(u32::cast_signed))
     }
 
     /// Whether the file is mapped and not read.
@@ -231,10 +249,28 @@ impl Names {
                 id_of(&attributes).filter(|a| channels.needs_ids() && a.low_bits(0).is_some()),
             ),
             velocities: name(velocity_of(&attributes).filter(|_| channels.needs_velocities())),
-            parts: name(part_of(&attributes).filter(|_| channels.needs_parts())),
+            parts: parts_for(setup, &attributes, file)?,
             channels: with_channels,
         })
     }
+}
+
+/// The attribute with the parts of particles, if it is needed.
+fn parts_for(
+    setup: &Setup,
+    attributes: &[AttributeView<'_>],
+    file: &NativeFile,
+) -> Result<Option<String>, LoadError> {
+    if !setup.needs_parts() {
+        return Ok(None);
+    }
+    let found = part_of(attributes).map(|a| a.name().to_owned());
+    let is_required = !setup.picture.scene.parts.is_empty() && file.index().count > 0;
+    if found.is_none() && is_required {
+        let path = file.path().display().to_string();
+        return Err(no_parts(&path, attributes.iter().map(Named::name)));
+    }
+    Ok(found)
 }
 
 /// Radii of a frame that is traced in place.

@@ -96,6 +96,7 @@ pub fn load_frame(
         loaded.clamped_radii,
         "radii raised: too small to be seen, or no number",
     );
+    loaded.note_absent_parts(setup);
     loaded.meshes = meshes_of(setup, task, &mut loaded.notes)?;
     loaded.read_time = start.elapsed();
     Ok(loaded)
@@ -158,6 +159,22 @@ fn focus_point(
 }
 
 impl LoadedFrame {
+    /// Notes parts with a material of their own that no particle has.
+    fn note_absent_parts(&mut self, setup: &Setup) {
+        let known = &setup.picture.scene.parts;
+        let absent = match &self.particles {
+            _ if known.is_empty() || self.particles.count() == 0 => return,
+            LoadedParticles::Decoded(frame) => frame.shading.absent_parts(known),
+            LoadedParticles::Stored(frame) => frame.absent_parts(known),
+        };
+        for (part, index) in absent {
+            self.notes.push(format!(
+                "frame {}: no particle is of part {part}, which material.part.{index} names",
+                self.task.frame
+            ));
+        }
+    }
+
     fn note_count(&mut self, count: u64, what: &str) {
         if count > 0 {
             let note = format!("frame {}: {count} {what}", self.task.frame);

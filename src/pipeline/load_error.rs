@@ -40,6 +40,17 @@ pub enum LoadError {
         /// The attributes of the frame.
         has: String,
     },
+    /// It lacks the parts that materials are for.
+    #[error(
+        "{file}: no attribute with the parts of particles for material.part: it needs integers called `part`, \
+         `type` or `phase`; it has {has}"
+    )]
+    NoParts {
+        /// The frame's first file.
+        file: String,
+        /// The attributes of the frame.
+        has: String,
+    },
     /// The camera focuses on a particle that it does not have.
     #[error(
         "{file}: no particle has the id {id}, which camera.focus follows; choose another one, or a distance"
@@ -63,6 +74,14 @@ pub(super) fn missing<'a>(
         file: file.to_owned(),
         name: name.to_owned(),
         purpose,
+        has: attribute_list(has),
+    }
+}
+
+/// The error for a frame that `has` only attributes that are no parts.
+pub(super) fn no_parts<'a>(file: &str, has: impl Iterator<Item = &'a str>) -> LoadError {
+    LoadError::NoParts {
+        file: file.to_owned(),
         has: attribute_list(has),
     }
 }

@@ -69,6 +69,9 @@ fn manifest(
         MatteKind::Material => {
             add(PARTICLES.as_bytes());
             add(SPRAY.as_bytes());
+            for index in 0..setup.picture.scene.parts.materials().len() {
+                add(ObjectName::of_material(index).as_bytes());
+            }
         }
         MatteKind::Particle => {
             if count as usize > MAX_NAMES {

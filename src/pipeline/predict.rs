@@ -23,7 +23,8 @@ use crate::denoise;
 use crate::metrics::Bytes;
 use crate::output::PackBuffers;
 use crate::render::{Film, floor_light_bytes, scratch_bytes};
-use crate::scene::Environment;
+use crate::scene::ground::Pattern;
+use crate::scene::{Environment, Ground};
 use crate::surface::SurfaceKind;
 use crate::survey::FrameWeight;
 
@@ -333,7 +334,7 @@ impl<'a> MemoryModel<'a> {
             (ids, 4),
             (channels.needs_velocities() && self.has_velocities, 12),
             // Whether there are parts is not known in advance
-            (channels.needs_parts(), 4),
+            (self.setup.needs_parts(), 4),
             (true, 4 * u64::from(channels.layers.attributes)),
         ];
         let each: u64 = each.iter().filter(|(has, _)| *has).map(|(_, b)| b).sum();
@@ -441,10 +442,16 @@ impl<'a> MemoryModel<'a> {
         let shared = if frame.is_shared { frame.content } else { 0 };
         let scene = &self.setup.picture.scene;
         // A shadow catcher has a table of its own
-        let tables = 1 + u64::from(scene.ground.is_some_and(|g| g.shadow_catcher.is_some()));
+        let tables = 1 + u64::from(
+            scene
+                .ground
+                .as_ref()
+                .is_some_and(|g| g.shadow_catcher.is_some()),
+        );
         let environment = scene.environment.as_deref();
         let environment = tables * environment.map_or(0, Environment::byte_len);
-        let light = environment + floor_light_bytes(scene, render);
+        let picture = scene.ground.as_ref().map_or(0, ground_image_bytes);
+        let light = environment + picture + floor_light_bytes(scene, render);
         // Count the threads, including those for reading
         let has_read_pool = [Some(frame), after]
             .into_iter()
@@ -538,6 +545,14 @@ impl<'a> MemoryModel<'a> {
 const KEPT_PER_MESH_BYTE: u64 = 5;
 /// The same while it is read and its hierarchy is built.
 const READ_PER_MESH_BYTE: u64 = 16;
+
+/// Memory of the picture on the ground.
+fn ground_image_bytes(ground: &Ground) -> u64 {
+    match &ground.pattern {
+        Pattern::Image(image) => image.texture.byte_len(),
+        Pattern::Plain | Pattern::Checker { .. } | Pattern::Sand { .. } => 0,
+    }
+}
 
 /// Memory of the meshes that all frames share.
 fn shared_meshes(setup: &Setup) -> u64 {

@@ -263,18 +263,27 @@ impl Setup {
 
     /// Settings for the tree of a frame with `particles`, with or without values for colours.
     pub fn build_settings(&self, particles: usize, has_values: bool) -> BuildSettings {
-        let channels = self.picture.render.channels;
         let structure = match (self.structure_for(particles), self.has_motion()) {
             // A moving sphere must not be stored twice
             (Structure::Sbvh, true) => Structure::Bvh,
             (structure, _) => structure,
         };
         BuildSettings {
-            keep_indices: channels.needs_particles() || has_values || self.has_motion(),
+            keep_indices: self.needs_particles() || has_values || self.has_motion(),
             bvh: self.run.bvh,
             sbvh: self.run.sbvh,
             ..BuildSettings::new(structure)
         }
+    }
+
+    /// Whether the parts of particles are needed, for channels or for their materials.
+    pub(super) fn needs_parts(&self) -> bool {
+        self.picture.render.channels.needs_parts() || !self.picture.scene.parts.is_empty()
+    }
+
+    /// Whether the indices of particles at intersections are needed, apart from their colours.
+    pub(super) fn needs_particles(&self) -> bool {
+        self.picture.render.channels.needs_particles() || self.needs_parts()
     }
 
     /// Whether native frames relative to [`Picture::origin`] are traced in place.

@@ -13,17 +13,28 @@ use super::{
     sample_layers::SampleLayers,
     scratch::{PacketScratch, Pixel},
     shading::depths,
+    stream::SegmentPacket,
 };
 use crate::math::{Lanes, lane3, lanes_in, set_lane3, splat, splat3};
 use crate::ray::RayPacket;
+use crate::scene::ground::GroundSample;
 use crate::surface::{Intersections, MaterialId};
 
 /// Colour of foam and spray, linear RGB.
 const SPRAY: Vec3 = Vec3::splat(0.9);
 
+/// Width of a diffusely reflected ray as a fraction of its length. Such rays sample a hemisphere, so each may stand for
+/// a part of it.
+const BOUNCED_SPREAD: f32 = 0.1;
+
 impl RenderContext<'_> {
     /// Looks up the base colours at the intersections of a packet; colours of particles only if `has_color`.
-    pub(super) fn base_colors(&self, has_color: bool, packet: &mut PacketScratch) {
+    pub(super) fn base_colors(
+        &self,
+        segments: &SegmentPacket,
+        has_color: bool,
+        packet: &mut PacketScratch,
+    ) {
         let PacketScratch {
             hits, base, blend, ..
         } = packet;
@@ -38,7 +49,8 @@ impl RenderContext<'_> {
         }
         // Look up the colours of all other surfaces
         for lane in lanes_in(hits.mask & !particles) {
-            let color = self.fixed_color(hits, lane);
+            let ray = (&segments.rays, segments.bounces[lane]);
+            let color = self.fixed_color(ray, hits, lane);
             set_lane3(base, lane, color);
         }
     }
@@ -63,13 +75,29 @@ impl RenderContext<'_> {
         self.source.blended_color(blend)
     }
 
-    /// Base colour of the ground, of a mesh or of spray.
-    fn fixed_color(&self, hits: &Intersections, lane: usize) -> Vec3 {
+    /// Base colour of a part of the particles, of the ground, of a mesh or of spray, as a ray sees it after a number of
+    /// diffuse reflections.
+    fn fixed_color(&self, ray: (&RayPacket, u32), hits: &Intersections, lane: usize) -> Vec3 {
         if let Some(mesh) = self.mesh(hits.material[lane]) {
             return mesh.color;
         }
+        if let Some(part) = self.part(hits.material[lane]) {
+            let of_particle = || self.source.color(hits.particle[lane]);
+            return part.color.unwrap_or_else(of_particle);
+        }
         match (hits.material[lane], &self.scene.ground) {
-            (MaterialId::GROUND, Some(ground)) => ground.color_at(lane3(&hits.point, lane)),
+            (MaterialId::GROUND, Some(ground)) => {
+                let (rays, bounces) = ray;
+                let point = lane3(&hits.point, lane);
+                ground.color(&GroundSample {
+                    point,
+                    direction: lane3(&rays.direction, lane),
+                    width: match bounces {
+                        0 => self.camera.pixel_width(point) * self.sample_width,
+                        _ => BOUNCED_SPREAD * hits.t[lane],
+                    },
+                })
+            }
             _ => SPRAY,
         }
     }
@@ -173,7 +201,11 @@ impl RenderContext<'_> {
                         object(ObjectName::of_part(name, value))
                     });
                 }
-                MatteKind::Material => {}
+                MatteKind::Material => {
+                    if let Some(index) = material.part_index() {
+                        return object(ObjectName::of_material(index));
+                    }
+                }
             }
         }
         object_of_name(match material {
@@ -230,7 +262,7 @@ impl RenderContext<'_> {
         let direction = lane3(&rays.direction, lane);
         let albedo = |blend: &mut Vec<(u32, f32)>| match hits.material[lane] {
             MaterialId::PARTICLES => self.particle_color(hits, lane, blend),
-            _ => self.fixed_color(hits, lane),
+            _ => self.fixed_color((rays, 0), hits, lane),
         };
         let point = lane3(&hits.point, lane);
         let velocity = particle.map_or(Vec3::ZERO, |particle| self.source.velocity(particle));

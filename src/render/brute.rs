@@ -78,7 +78,7 @@ impl Shape for Balls {
         &self,
         rays: &RayPacket,
         lanes: u32,
-        fresnel_transmittance: &dyn Fn(f32) -> f32,
+        fresnel_transmittance: &dyn Fn(f32, u32) -> f32,
         transmittance: &mut Lanes,
     ) {
         for lane in lanes_in(lanes) {
@@ -86,7 +86,7 @@ impl Shape for Balls {
             let cosine = |hit: Intersection| hit.normal.dot(ray.direction).abs();
             transmittance[lane] = self
                 .all(&ray)
-                .map(|hit| fresnel_transmittance(cosine(hit)))
+                .map(|hit| fresnel_transmittance(cosine(hit), hit.particle))
                 .product();
         }
     }

@@ -9,14 +9,17 @@ use super::{
     materials::Dielectric,
     sampler::FilmSampler,
     scratch::SEGMENTS,
-    settings::RenderSettings,
+    settings::{IntegratorKind, RenderSettings},
     shading::{BackgroundLanes, CameraLanes},
     source::ShadeSource,
 };
 use crate::accel::Coherence;
 use crate::math::Supported;
-use crate::scene::{self, MeshMaterial, Scene};
+use crate::scene::{self, MeshMaterial, PartMaterial, PartMaterials, Scene};
 use crate::surface::{MaterialId, Shape, Side};
+
+/// Least width of a sample for filtering pictures, in pixels: the noise of many samples is low anyway.
+const MIN_SAMPLE_WIDTH: f32 = 0.125;
 
 /// A scene ready to be rendered.
 pub(super) struct RenderContext<'a> {
@@ -24,6 +27,10 @@ pub(super) struct RenderContext<'a> {
     pub(super) shapes: Vec<&'a dyn Shape>,
     /// Meshes that rays pass.
     pub(super) panes: Vec<&'a dyn Shape>,
+    /// The materials of opaque surfaces.
+    pub(super) materials: Vec<MaterialId>,
+    /// Materials of parts of the particles, if these are separate spheres and paths are traced.
+    pub(super) parts: Option<&'a PartMaterials>,
     /// Whether there are meshes that only hide what is behind them.
     pub(super) has_holdouts: bool,
     /// The particles, opaque or transmissive; all other shapes are opaque.
@@ -47,6 +54,8 @@ pub(super) struct RenderContext<'a> {
     /// Whether the camera is inside a connected body.
     pub(super) is_camera_inside: bool,
     pub(super) sampler: FilmSampler,
+    /// Width of a sample of a pixel, in pixels.
+    pub(super) sample_width: f32,
     /// Maximum number of path segments of one depth, see [`SEGMENTS`].
     pub(super) max_segments: usize,
 }
@@ -103,6 +112,10 @@ impl<'a> RenderContext<'a> {
             is_camera_inside: interior == Interior::Body && particles.is_some_and(contains_eye),
             shapes,
             panes,
+            materials: MaterialId::all(scene.meshes.len(), scene.parts.materials().len()),
+            parts: Some(&scene.parts)
+                .filter(|parts| !parts.is_empty() && !is_connected)
+                .filter(|_| settings.integrator == IntegratorKind::Path),
             has_holdouts: scene.meshes.iter().any(|mesh| mesh.is_holdout),
             particles,
             source,
@@ -121,6 +134,10 @@ impl<'a> RenderContext<'a> {
             color: source.constant_color(),
             interior,
             boundary: Dielectric::new(&scene.material),
+            sample_width: (settings.samples as f32)
+                .sqrt()
+                .recip()
+                .max(MIN_SAMPLE_WIDTH),
             sampler: FilmSampler::with_filter(settings.samples, settings.filter),
             max_segments: SEGMENTS,
         }
@@ -130,6 +147,22 @@ impl<'a> RenderContext<'a> {
     #[inline(always)]
     pub(super) fn mesh(&self, material: MaterialId) -> Option<&MeshMaterial> {
         self.scene.meshes.get(material.mesh_index()?)
+    }
+
+    /// The material of the part of the particles that `material` belongs to.
+    #[inline(always)]
+    pub(super) fn part(&self, material: MaterialId) -> Option<&PartMaterial> {
+        self.parts?.materials().get(material.part_index()?)
+    }
+
+    /// The material of `particle`.
+    #[inline]
+    pub(super) fn material_of(&self, parts: &PartMaterials, particle: u32) -> MaterialId {
+        let part = self.source.part(particle);
+        let index = part.and_then(|(_, part)| parts.index_of(part));
+        index
+            .and_then(MaterialId::of_part)
+            .unwrap_or(MaterialId::PARTICLES)
     }
 
     /// The particles, if they bound one connected body.

@@ -77,6 +77,11 @@ impl ObjectName {
         Self::of(format_args!("mesh{index}"))
     }
 
+    /// The name of a material of parts of the particles, numbered in the order of the manifest from 0: `material0`.
+    pub fn of_material(index: usize) -> Self {
+        Self::of(format_args!("material{index}"))
+    }
+
     /// Longer names are cut.
     fn of(text: std::fmt::Arguments<'_>) -> Self {
         let mut bytes = [0; 32];

@@ -353,7 +353,7 @@ impl Shape for OneByOne<'_> {
         &self,
         rays: &RayPacket,
         lanes: u32,
-        passed: &dyn Fn(f32) -> f32,
+        passed: &dyn Fn(f32, u32) -> f32,
         kept: &mut Lanes,
     ) {
         for lane in lanes_in(lanes) {

@@ -10,6 +10,7 @@ use super::{
     shading::{add_backdrop, add_background, scale},
     stream::SegmentPacket,
 };
+use crate::math::lanes_in;
 use crate::scene::Background;
 use crate::surface::MaterialId;
 
@@ -27,9 +28,21 @@ impl RenderContext<'_> {
         for shape in &self.shapes {
             shape.intersect(&mut segments.rays, coherence, inside, &mut packet.hits);
         }
+        self.assign_parts(packet);
         packet.throughput = segments.throughput;
         self.pass_panes(segments, packet);
         self.absorb(segments, packet);
+    }
+
+    /// Replaces the material of particles by that of their part.
+    fn assign_parts(&self, packet: &mut PacketScratch) {
+        let Some(parts) = self.parts else {
+            return;
+        };
+        let hits = &mut packet.hits;
+        for lane in lanes_in(hits.lanes_of(MaterialId::PARTICLES)) {
+            hits.material[lane] = self.material_of(parts, hits.particle[lane]);
+        }
     }
 
     /// Multiplies the throughput by the transmittance of the medium between the origins of the rays and their

@@ -72,6 +72,8 @@ mod motion_tests;
 #[cfg(test)]
 mod panes_tests;
 #[cfg(test)]
+mod part_tests;
+#[cfg(test)]
 mod path_tests;
 #[cfg(test)]
 mod poison_tests;

@@ -4,7 +4,9 @@
 //! At each point of an opaque surface, a direction is sampled from the environment and one from the BSDF, weighted by
 //! the balance heuristic (Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997), and each light
 //! source is sampled. The path continues in the direction of the BSDF; from the third reflection on it ends at random
-//! (Russian roulette). Surfaces of transmissive particles are specular: their rays split as in Whitted's model.
+//! (Russian roulette). Surfaces of transmissive particles are specular, or reflect and refract at single microfacets
+//! of a rough one: their rays split as in Whitted's model. Light is not sampled there: the environment and visible
+//! lights are found by the scattered rays alone.
 //!
 //! Shadow rays to the environment end at transmissive surfaces, because the paths of the BSDF find its light behind
 //! them. Shadow rays to light sources pass straight through: paths cannot find a light without extent.
@@ -16,7 +18,7 @@ use super::{
     integrator::Integrator,
     layers::LightClass,
     lights::{Light, environment_along, sample_environment},
-    materials::{Material, materials_of},
+    materials::{Material, RoughInterface, materials_of},
     roulette::SplitRule,
     sampler::{get_1d_lanes, get_2d_lanes},
     scratch::PacketScratch,
@@ -49,10 +51,12 @@ const MAX_CONTINUATION: f32 = 0.95;
 pub(super) struct PathIntegrator<'a> {
     context: RenderContext<'a>,
     environment: Option<&'a Environment>,
-    /// Opaque surfaces by [`MaterialId`].
+    /// Opaque surfaces, in the order of [`RenderContext::materials`].
     bsdfs: Vec<Box<dyn Bsdf>>,
     /// The specular surface of transmissive particles.
     interface: Box<dyn Material>,
+    /// Replaces it if the particles are rough.
+    rough: Option<RoughInterface>,
     split: SplitRule,
     /// Whether rays can hit a light.
     has_extents: bool,
@@ -67,13 +71,20 @@ impl<'a> PathIntegrator<'a> {
     pub(super) fn new(context: RenderContext<'a>) -> Self {
         let is_connected = context.connected_particles().is_some();
         let interface = materials_of(context.scene, is_connected).swap_remove(0);
+        let material = &context.scene.material;
+        let rough = RoughInterface::of(material, interface.constants(), is_connected);
         let environment = context.scene.environment.as_deref();
         let environment = environment.filter(|environment| !environment.is_black());
         Self {
             ambient: AmbientLight::of(context.settings, environment),
             environment,
-            bsdfs: bsdfs_of(context.scene.material.finish, &context.scene.meshes),
+            bsdfs: bsdfs_of(
+                context.scene.material.finish,
+                &context.scene.meshes,
+                context.scene.parts.materials(),
+            ),
             interface,
+            rough,
             split: SplitRule::new(context.settings, context.interior),
             catcher: Catcher::of(context.scene),
             floor: None,
@@ -225,7 +236,11 @@ impl PathIntegrator<'_> {
     fn prepare_surface(&self, surface: &Surface<'_>, packet: &mut PacketScratch) {
         let (context, simd) = (&self.context, self.context.simd);
         // Transmissive particles have no colour
-        context.base_colors(context.interior == Interior::Opaque, packet);
+        context.base_colors(
+            surface.segments,
+            context.interior == Interior::Opaque,
+            packet,
+        );
         let (rays, points) = (&surface.segments.rays, &mut packet.surface);
         surface_points(simd, rays, &packet.hits, &packet.base, points);
         let opacity = &packet.hits.opacity;
@@ -234,8 +249,8 @@ impl PathIntegrator<'_> {
 
     /// Evaluates the BSDFs for the directions of the light samples.
     fn eval(&self, surface: &Surface<'_>, packet: &mut PacketScratch) {
-        for (number, bsdf) in (0..).zip(&self.bsdfs) {
-            let lanes = surface.lanes & packet.hits.lanes_of(MaterialId(number));
+        for (material, bsdf) in self.context.materials.iter().zip(&self.bsdfs) {
+            let lanes = surface.lanes & packet.hits.lanes_of(*material);
             if lanes != 0 {
                 let (rays, direction) = (&surface.segments.rays, &packet.light.rays.direction);
                 let (points, values) = (&packet.surface, &mut packet.bsdf);
@@ -397,8 +412,8 @@ impl PathIntegrator<'_> {
         let (segments, simd) = (surface.segments, self.context.simd);
         let mut u = [splat(0.0); 2];
         get_2d_lanes(simd, &segments.path, BSDF, &surface.sample, &mut u);
-        for (number, bsdf) in (0..).zip(&self.bsdfs) {
-            let lanes = surface.lanes & packet.hits.lanes_of(MaterialId(number));
+        for (material, bsdf) in self.context.materials.iter().zip(&self.bsdfs) {
+            let lanes = surface.lanes & packet.hits.lanes_of(*material);
             if lanes != 0 {
                 let (points, samples) = (&packet.surface, &mut packet.bounce);
                 bsdf.sample(simd, &segments.rays, points, &u, lanes, samples);
@@ -524,7 +539,16 @@ impl PathIntegrator<'_> {
         let context = &self.context;
         let (rays, hits, inside) = (&segments.rays, &packet.hits, segments.inside);
         let interface = &self.interface;
-        interface.shading_points(context.simd, rays, hits, inside, &mut packet.points);
+        let (simd, points) = (context.simd, &mut packet.points);
+        match &self.rough {
+            None => interface.shading_points(simd, rays, hits, inside, points),
+            Some(rough) => {
+                let sample = segments.sample.map(|s| s % context.settings.samples);
+                let mut u = [splat(0.0); 2];
+                get_2d_lanes(simd, &segments.path, BSDF, &sample, &mut u);
+                rough.sample_rays(simd, rays, hits, inside, &u, points);
+            }
+        }
         let hits = SpecularHits {
             segments,
             depth,

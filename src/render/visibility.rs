@@ -111,14 +111,21 @@ impl RenderContext<'_> {
         }
     }
 
-    /// The transmittance of spheres that are separate bodies. Returns the lanes in which it is not 0.
+    /// The transmittance of spheres that are separate bodies, some of which may be opaque. Returns the lanes in which it is not 0.
     fn cross_spheres(
         &self,
         spheres: &dyn Shape,
         samples: &LightSamples,
         transmittance: &mut Lanes3,
     ) -> u32 {
-        let fresnel_transmittance = |cosine: f32| self.boundary.straight_transmittance(cosine);
+        let is_opaque = |particle: u32| {
+            let material = self.parts.map(|parts| self.material_of(parts, particle));
+            material.is_some_and(|material| material != MaterialId::PARTICLES)
+        };
+        let fresnel_transmittance = |cosine: f32, particle: u32| match is_opaque(particle) {
+            true => 0.0,
+            false => self.boundary.straight_transmittance(cosine),
+        };
         spheres.transmittance(
             &samples.rays,
             samples.lanes,

@@ -73,7 +73,7 @@ impl Integrator for WhittedIntegrator<'_> {
         if packet.hits.mask & !held_out == 0 {
             return;
         }
-        context.base_colors(self.particle_constants().has_color(), packet);
+        context.base_colors(segments, self.particle_constants().has_color(), packet);
         // Shade the intersections of each material
         for (number, material) in (0..).zip(&self.materials) {
             let id = MaterialId(number);

@@ -1,12 +1,15 @@
 //! The ground under the particles.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use super::{ResolveError, narrow, surface};
 use crate::manifest::{GroundKind, GroundPattern, Manifest};
+use crate::pipeline::Setup;
 use crate::render::IntegratorKind;
-use crate::scene::ground::Pattern;
-use crate::scene::{Bounds, Ground};
+use crate::scene::ground::{GroundImage, Pattern};
+use crate::scene::{Bounds, Ground, Texture};
 use crate::surface::SurfaceKind;
 
 /// Default edge of a square on the ground as a fraction of the diagonal of the bounds: some squares can be counted
@@ -36,8 +39,8 @@ pub(super) fn ground(
 ) -> Result<Option<Ground>, ResolveError> {
     let render = &manifest.render;
     let integrator = manifest.integrator();
-    let kind = match render.ground {
-        Some(ground) => ground.0,
+    let kind = match &render.ground {
+        Some(ground) => ground.kind,
         // Without a floor, a shadow would fall on nothing
         None if integrator == IntegratorKind::Path && floor.has_layer => GroundKind::ShadowCatcher,
         None => GroundKind::None,
@@ -80,11 +83,34 @@ pub(super) fn ground(
         None => surface::round(bounds.diagonal() * TILE),
     };
     ground.pattern = match (kind, render.ground_pattern) {
+        // `add_image` adds the picture
+        (GroundKind::Image, _) => Pattern::Plain,
         (GroundKind::Checker, _) | (_, GroundPattern::Checker) => Pattern::Checker { tile: tile() },
         (_, GroundPattern::Sand) => Pattern::Sand { tile: tile() },
         (_, GroundPattern::Plain) => Pattern::Plain,
     };
     Ok(Some(ground))
+}
+
+/// Lays `texture` on the ground of `setup`, if `manifest` says so.
+pub fn add_ground_image(setup: &mut Setup, manifest: &Manifest, texture: &Arc<Texture>) {
+    let scene = &mut setup.picture.scene;
+    let (Some(image), Some(ground)) = (manifest.ground_image(), &mut scene.ground) else {
+        return;
+    };
+    let [min, max] = ground.particles;
+    let width = match image.width {
+        Some(width) => narrow(width),
+        None => surface::round(f64::from((max - min).length())),
+    };
+    let center = image.center.map(|center| (center - scene.origin).as_vec3());
+    ground.pattern = Pattern::Image(GroundImage {
+        texture: Arc::clone(texture),
+        width,
+        center: center.unwrap_or(ground.center),
+        rotation: narrow(image.rotation.to_radians()),
+        repeats: image.repeats,
+    });
 }
 
 #[cfg(test)]
@@ -102,7 +128,7 @@ mod tests {
         change: impl Fn(&mut Manifest),
     ) -> Result<Option<Ground>, ResolveError> {
         let mut manifest = Manifest::new("in");
-        manifest.render.ground = Some(GroundSetting(kind));
+        manifest.render.ground = Some(GroundSetting::of(kind));
         change(&mut manifest);
         ground(&manifest, &floor(true))
     }

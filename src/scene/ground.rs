@@ -3,9 +3,12 @@
 //!
 //! It is visible and casts shadows from above only: a camera below it sees through it.
 
-use glam::Vec3;
+use std::sync::Arc;
+
+use glam::{Vec2, Vec3};
 
 use super::Bounds;
+use super::texture::{Beyond, Footprint, Texture};
 
 /// Default colour of the ground (linear RGB): a dark grey that shows shadows and does not distract from the particles.
 pub const DEFAULT_COLOR: Vec3 = Vec3::new(0.135, 0.140, 0.150);
@@ -38,11 +41,14 @@ const FADE_END: f32 = 6.0;
 /// The same two distances for a shadow catcher, whose horizon is not visible.
 const CATCHER_FADE: [f32; 2] = [2.0, 8.0];
 
+/// Least cosine between a ray and the normal for the length of its cut with the ground.
+const MIN_COSINE: f32 = 1e-3;
+
 /// Colour in which a shadow catcher reflects light to the particles.
 const CATCHER_COLOR: Vec3 = Vec3::splat(0.55);
 
 /// A plane `dot(up, x) = height`.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Ground {
     /// Unit normal.
     pub up: Vec3,
@@ -66,7 +72,7 @@ pub struct Ground {
 }
 
 /// A pattern on the ground. Lengths are positive.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Pattern {
     /// One colour.
     Plain,
@@ -80,6 +86,35 @@ pub enum Pattern {
         /// Distance between the largest spots.
         tile: f32,
     },
+    /// A picture.
+    Image(GroundImage),
+}
+
+/// A picture on the ground. Seen from above, it is not mirrored: without a rotation, its rows run along the first of
+/// [`Ground::axes`], and its columns, from the bottom up, along the second.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GroundImage {
+    /// Its colours.
+    pub texture: Arc<Texture>,
+    /// Its width; the height follows from the shape of its pixels.
+    pub width: f32,
+    /// A point above its centre.
+    pub center: Vec3,
+    /// Rotation, counterclockwise as seen from above, radians.
+    pub rotation: f32,
+    /// Whether it is repeated; otherwise the plain colour of the ground is around it.
+    pub repeats: bool,
+}
+
+/// What a ray sees of a ground: a point, and the part of the ground around it that it stands for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GroundSample {
+    /// The point.
+    pub point: Vec3,
+    /// Unit direction of the ray.
+    pub direction: Vec3,
+    /// Width of the ray at the point.
+    pub width: f32,
 }
 
 impl Ground {
@@ -122,23 +157,59 @@ impl Ground {
     }
 
     /// The colour at a `point` of the ground.
-    #[inline]
     pub fn color_at(&self, point: Vec3) -> Vec3 {
+        let (direction, width) = (-self.up, 0.0);
+        self.color(&GroundSample {
+            point,
+            direction,
+            width,
+        })
+    }
+
+    /// The colour that a ray sees; only pictures are filtered.
+    #[inline]
+    pub fn color(&self, sample: &GroundSample) -> Vec3 {
+        let point = sample.point;
         let place = |tile: f32| {
             let from_middle = (point - self.center) / tile;
             self.axes().map(|axis| from_middle.dot(axis))
         };
-        match self.pattern {
+        match &self.pattern {
+            Pattern::Image(image) => self.image_color(image, sample),
             Pattern::Plain => self.color,
             Pattern::Checker { tile } => {
-                let [x, y] = place(tile).map(floor);
+                let [x, y] = place(*tile).map(floor);
                 match (x ^ y) & 1 {
                     0 => self.color,
                     _ => DARKER_PART * self.color,
                 }
             }
-            Pattern::Sand { tile } => (1.0 + SAND_CONTRAST * sand(place(tile))) * self.color,
+            Pattern::Sand { tile } => (1.0 + SAND_CONTRAST * sand(place(*tile))) * self.color,
         }
+    }
+
+    /// The colour of a picture on the ground.
+    fn image_color(&self, image: &GroundImage, sample: &GroundSample) -> Vec3 {
+        let [across, along] = self.axes();
+        let (sin, cos) = (libm::sinf(image.rotation), libm::cosf(image.rotation));
+        let [across, along] = [cos * across + sin * along, cos * along - sin * across];
+        // In widths and heights from the top left corner
+        let aspect = image.texture.aspect();
+        let on_image = |v: Vec3| Vec2::new(v.dot(across), -v.dot(along) / aspect) / image.width;
+        let position = on_image(sample.point - image.center) + 0.5;
+        // The ground cuts a slanted ray at a greater length
+        let cosine = sample.direction.dot(self.up);
+        let forward = (sample.direction - cosine * self.up).normalize_or_zero();
+        let length = sample.width / cosine.abs().max(MIN_COSINE);
+        let footprint = Footprint {
+            long: on_image(length * forward),
+            short: sample.width / image.width,
+        };
+        let beyond = match image.repeats {
+            true => Beyond::Repeat,
+            false => Beyond::Plain(self.color),
+        };
+        image.texture.color(position, &footprint, beyond)
     }
 
     /// Two perpendicular directions of the plane; coordinate axes if `up` is one.
@@ -260,6 +331,79 @@ mod tests {
         assert!(far.is_finite());
         assert!(
             (shade(0, 0) - ground.color_at(ground.center + 1e-5).x / ground.color.x).abs() < 1e-2
+        );
+    }
+
+    /// A picture of 2 by 2 texels: red and green above blue and white.
+    fn picture(repeats: bool, rotation: f32) -> Pattern {
+        let pixels = [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE];
+        Pattern::Image(GroundImage {
+            texture: Arc::new(Texture::new(2, 2, &pixels).unwrap()),
+            width: 4.0,
+            center: floor().center + Vec3::new(1.0, 0.0, 7.0),
+            rotation,
+            repeats,
+        })
+    }
+
+    #[test]
+    fn pictures_lie_on_the_ground_as_seen_from_above() {
+        // x to the right and y up, as seen from above
+        let right_angle = std::f32::consts::FRAC_PI_2;
+        for (rotation, corners) in [
+            (0.0, [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE]),
+            // The top left corner turns to the bottom left
+            (right_angle, [Vec3::Y, Vec3::ONE, Vec3::X, Vec3::Z]),
+        ] {
+            let ground = Ground {
+                pattern: picture(false, rotation),
+                ..floor()
+            };
+            assert_eq!(ground.axes(), [Vec3::X, Vec3::Y]);
+            let at = |x: f32, y: f32| ground.color_at(ground.center + Vec3::new(1.0 + x, y, 0.0));
+            let found = [at(-1.0, 1.0), at(1.0, 1.0), at(-1.0, -1.0), at(1.0, -1.0)];
+            for (found, wanted) in found.iter().zip(corners) {
+                assert!(
+                    (found - wanted).length() < 1e-5,
+                    "{rotation}: {found} {wanted}"
+                );
+            }
+            assert_eq!(at(0.0, 2.5), ground.color);
+            assert_eq!(at(-2.5, 0.0), ground.color);
+        }
+        let ground = Ground {
+            pattern: picture(true, 0.0),
+            ..floor()
+        };
+        let at = |x: f32, y: f32| ground.color_at(ground.center + Vec3::new(1.0 + x, y, 0.0));
+        for tile in [-4.0, 0.0, 8.0] {
+            assert!((at(tile - 1.0, 1.0 - tile) - Vec3::X).length() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn distant_pictures_are_blurred_along_the_ray() {
+        let ground = Ground {
+            pattern: picture(true, 0.0),
+            ..floor()
+        };
+        let color = |direction: Vec3, width: f32| {
+            let point = ground.center + Vec3::new(0.0, 1.0, 0.0);
+            let direction = direction.normalize();
+            ground.color(&GroundSample {
+                point,
+                direction,
+                width,
+            })
+        };
+        assert!((color(Vec3::NEG_Z, 0.0) - Vec3::X).length() < 1e-5);
+        let mean = Vec3::splat(0.5);
+        assert!((color(Vec3::NEG_Z, 50.0) - mean).length() < 1e-2);
+        // A slanted ray along x sees the upper row only, both of its texels
+        let slanted = color(Vec3::new(1.0, 0.0, -0.01), 0.04);
+        assert!(
+            (slanted - Vec3::new(0.5, 0.5, 0.0)).length() < 0.1,
+            "{slanted}"
         );
     }
 

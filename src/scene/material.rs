@@ -36,6 +36,8 @@ pub struct Material {
     pub extinction: Vec3,
     /// The opaque surface for path tracing.
     pub finish: Finish,
+    /// Roughness of the surface of transmissive particles for path tracing, 0 (smooth) to 1.
+    pub interface_roughness: f32,
 }
 
 /// How path tracing reflects light at opaque particles. The base colour is that of the particle.
@@ -81,6 +83,7 @@ impl Material {
         fresnel: Fresnel::Schlick,
         extinction: Vec3::ZERO,
         finish: Finish::Matte,
+        interface_roughness: 0.0,
     };
 
     /// Whether two rays leave a surface: reflected and refracted.
@@ -101,6 +104,7 @@ impl Material {
             ("shininess", self.shininess, f32::MAX),
             ("reflection", self.reflection, 1.0),
             ("transmission", self.transmission, 1.0),
+            ("interface_roughness", self.interface_roughness, 1.0),
         ];
         for (name, value, max) in weights {
             if !(0.0..=max).contains(&value) {

@@ -18,8 +18,10 @@ pub mod lens;
 pub mod light;
 pub mod material;
 pub mod mesh;
+pub mod part;
 pub mod path;
 pub mod rgb;
+pub mod texture;
 
 pub use background::Background;
 pub use camera::{Camera, CameraError, CameraView, Framing, Lens};
@@ -30,8 +32,10 @@ pub use lens::{Aperture, Focus, LensSettings};
 pub use light::{Falloff, Light, LightKind, default_lights};
 pub use material::{Finish, Fresnel, Material, MaterialError};
 pub use mesh::{MeshFinish, MeshMaterial};
+pub use part::{PartMaterial, PartMaterials};
 pub use path::{CameraKey, CameraPath, KeyedPath, PathError, Turntable};
 pub use rgb::{RgbEncoding, is_rgb};
+pub use texture::Texture;
 
 /// An axis-aligned box in world units; includes the spheres.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -80,8 +84,10 @@ pub struct Scene {
     pub lights: Vec<Light>,
     /// Ambient light (`ambient` of eq. 4.1).
     pub ambient_light: Vec3,
-    /// The material of all particles; their colours are attributes.
+    /// The material of the particles; their colours are attributes.
     pub material: Material,
+    /// Materials of parts of the particles in place of [`Self::material`], for path tracing of separate spheres.
+    pub parts: PartMaterials,
     /// Background for rays without an intersection.
     pub background: Background,
     /// Optional ground.
@@ -120,13 +126,14 @@ pub struct NextFrame {
 
 impl Scene {
     /// Nothing but the default material and white ambient light, in front of black, at the origin of the world.
-    pub const fn new(camera: Camera) -> Self {
+    pub fn new(camera: Camera) -> Self {
         Self {
             origin: DVec3::ZERO,
             camera,
             lights: Vec::new(),
             ambient_light: Vec3::ONE,
             material: Material::DEFAULT,
+            parts: PartMaterials::default(),
             background: Background::Constant(Vec3::ZERO),
             ground: None,
             meshes: Vec::new(),

@@ -20,6 +20,8 @@ impl MaterialId {
     const FIXED: u8 = 3;
     /// Greatest number of meshes.
     pub const MAX_MESHES: usize = 200;
+    /// Greatest number of materials of parts of the particles.
+    pub const MAX_PARTS: usize = 50;
 
     /// The material of the mesh `index`; None from [`Self::MAX_MESHES`] on.
     pub fn of_mesh(index: usize) -> Option<Self> {
@@ -32,12 +34,37 @@ impl MaterialId {
     /// The index of the mesh that has this material.
     #[inline(always)]
     pub fn mesh_index(self) -> Option<usize> {
-        self.0.checked_sub(Self::FIXED).map(usize::from)
+        let index = usize::from(self.0.checked_sub(Self::FIXED)?);
+        (index < Self::MAX_MESHES).then_some(index)
+    }
+
+    /// The material `index` of parts of the particles; None from [`Self::MAX_PARTS`] on. Their numbers follow those of
+    /// meshes.
+    pub fn of_part(index: usize) -> Option<Self> {
+        let index = Some(index).filter(|i| *i < Self::MAX_PARTS)?;
+        u8::try_from(usize::from(Self::FIXED) + Self::MAX_MESHES + index)
+            .ok()
+            .map(Self)
+    }
+
+    /// The index of the material of a part.
+    #[inline(always)]
+    pub fn part_index(self) -> Option<usize> {
+        usize::from(self.0).checked_sub(usize::from(Self::FIXED) + Self::MAX_MESHES)
+    }
+
+    /// The materials of the opaque surfaces of a scene with so many meshes and materials of parts, in the order of the
+    /// BSDFs of the path integrator.
+    pub(crate) fn all(meshes: usize, parts: usize) -> Vec<Self> {
+        let fixed = [Self::PARTICLES, Self::SPRAY, Self::GROUND];
+        let meshes = (0..meshes).map_while(Self::of_mesh);
+        let parts = (0..parts).map_while(Self::of_part);
+        fixed.into_iter().chain(meshes).chain(parts).collect()
     }
 
     /// Whether surfaces of this material belong to particles, which have attributes.
     pub fn is_of_particles(self) -> bool {
-        matches!(self, Self::PARTICLES | Self::SPRAY)
+        matches!(self, Self::PARTICLES | Self::SPRAY) || self.part_index().is_some()
     }
 }
 

@@ -92,18 +92,20 @@ impl Shape for MovingSpheres<'_> {
         &self,
         rays: &RayPacket,
         lanes: u32,
-        fresnel_transmittance: &dyn Fn(f32) -> f32,
+        fresnel_transmittance: &dyn Fn(f32, u32) -> f32,
         transmittance: &mut Lanes,
     ) {
         for lane in lanes_in(lanes) {
             let mut product = TransmittanceProduct::default();
             let is_within = |t: &f32| *t >= rays.t_min[lane] && *t < rays.t_max[lane];
-            self.tree.visit_chords(rays, lane, |radius, ends| {
-                let part = fresnel_transmittance(0.5 * (ends[1] - ends[0]) / radius);
-                ends.iter()
-                    .filter(|t| is_within(t))
-                    .all(|_| product.multiply(part))
-            });
+            self.tree
+                .visit_chords(rays, lane, |particle, radius, ends| {
+                    let cosine = 0.5 * (ends[1] - ends[0]) / radius;
+                    let part = fresnel_transmittance(cosine, self.first + particle);
+                    ends.iter()
+                        .filter(|t| is_within(t))
+                        .all(|_| product.multiply(part))
+                });
             transmittance[lane] = product.value();
         }
     }

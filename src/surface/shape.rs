@@ -90,14 +90,14 @@ pub trait Shape: Sync {
         })
     }
 
-    /// Transmittance along the rays of `lanes` through bodies that are not connected: the product of `fresnel_transmittance` over
-    /// all crossings between their ends, entering and leaving. `fresnel_transmittance` gets the absolute cosine between ray and
-    /// normal.
+    /// Transmittance along the rays of `lanes` through bodies that are not connected: the product of
+    /// `fresnel_transmittance` over all crossings between their ends, entering and leaving. `fresnel_transmittance` gets
+    /// the absolute cosine between ray and normal, and the particle.
     fn transmittance(
         &self,
         rays: &RayPacket,
         lanes: u32,
-        fresnel_transmittance: &dyn Fn(f32) -> f32,
+        fresnel_transmittance: &dyn Fn(f32, u32) -> f32,
         transmittance: &mut Lanes,
     ) {
         for lane in lanes_in(lanes) {
@@ -105,7 +105,8 @@ pub trait Shape: Sync {
             let mut product = TransmittanceProduct::default();
             let mut rest = rays.ray(lane);
             while let Some(hit) = self.crossing(&rest, Side::Outside) {
-                if !product.multiply(fresnel_transmittance(hit.normal.dot(rest.direction).abs())) {
+                let cosine = hit.normal.dot(rest.direction).abs();
+                if !product.multiply(fresnel_transmittance(cosine, hit.particle)) {
                     break;
                 }
                 rest.t_min = hit.t + hit.offset;

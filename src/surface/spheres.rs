@@ -161,7 +161,7 @@ impl Shape for SphereSurface<'_> {
         &self,
         rays: &RayPacket,
         lanes: u32,
-        fresnel_transmittance: &dyn Fn(f32) -> f32,
+        fresnel_transmittance: &dyn Fn(f32, u32) -> f32,
         transmittance: &mut Lanes,
     ) {
         let mut product = [TransmittanceProduct::default(); LANES];
@@ -170,13 +170,18 @@ impl Shape for SphereSurface<'_> {
             for lane in lanes_in(lanes) {
                 self.each_crossing_once(&rays.ray(lane), |crossing| {
                     let radius = self.tree.sphere(crossing.slot).1;
-                    product[lane].multiply(fresnel_transmittance(crossing.half_chord / radius))
+                    let particle = self.first + self.tree.particle(crossing.slot);
+                    product[lane].multiply(fresnel_transmittance(
+                        crossing.half_chord / radius,
+                        particle,
+                    ))
                 });
             }
         } else {
             self.tree.visit_chords(rays, lanes, |lane, chord| {
                 let radius = self.tree.sphere(chord.slot).1;
-                let part = fresnel_transmittance(chord.half() / radius);
+                let particle = self.first + self.tree.particle(chord.slot);
+                let part = fresnel_transmittance(chord.half() / radius, particle);
                 let is_within = |t: &f32| *t >= rays.t_min[lane] && *t < rays.t_max[lane];
                 chord
                     .ends

@@ -64,7 +64,7 @@ pub fn id_of<A: Named>(attributes: &[A]) -> Option<&A> {
 }
 
 /// Names of attributes that divide particles into parts, the most specific first.
-const PART_NAMES: [&str; 3] = ["part", "type", "phase"];
+pub const PART_NAMES: [&str; 3] = ["part", "type", "phase"];
 
 /// The attribute that divides particles into parts, if there is one. Only integers do.
 pub fn part_of<A: Named>(attributes: &[A]) -> Option<&A> {

@@ -20,7 +20,7 @@ mod robust;
 mod sample;
 mod stream;
 
-pub use attributes::{Named, id_of, part_of, velocity_of};
+pub use attributes::{Named, PART_NAMES, id_of, part_of, velocity_of};
 use moments::Moments;
 use packing::Spacing;
 use packing::narrow;

@@ -57,12 +57,12 @@ impl MovingTree {
     }
 
     /// Calls `visit` with each sphere that the line of the ray in `lane` passes through and that may begin before the
-    /// end of the ray: its radius, and the distances of both intersections; until it returns false.
+    /// end of the ray: its particle, its radius, and the distances of both intersections; until it returns false.
     pub(crate) fn visit_chords(
         &self,
         rays: &RayPacket,
         lane: usize,
-        mut visit: impl FnMut(f32, [f32; 2]) -> bool,
+        mut visit: impl FnMut(u32, f32, [f32; 2]) -> bool,
     ) {
         if self.lanes_entering(rays) >> lane & 1 == 0 {
             return;
@@ -77,7 +77,7 @@ impl MovingTree {
                 // Padding repeats the last particle of a block
                 let is_new = i == 0 || particles[i] != particles[i - 1];
                 let is_hit = near[i] < limit && far[i] >= ray.t_min;
-                if is_new && is_hit && !visit(block.radius[i], [near[i], far[i]]) {
+                if is_new && is_hit && !visit(particles[i], block.radius[i], [near[i], far[i]]) {
                     return -1.0;
                 }
             }

@@ -186,7 +186,8 @@ fn chords_are_visited_once() {
             let rays = packet(number);
             for lane in 0..16 {
                 let mut found = Vec::new();
-                tree.visit_chords(&rays, lane, |radius, ends| {
+                tree.visit_chords(&rays, lane, |particle, radius, ends| {
+                    assert_eq!(radius, swarm.radii[particle as usize]);
                     found.push((ends[0], radius));
                     true
                 });

@@ -100,9 +100,11 @@ fn table(entries: &Entries, section: &str) -> Value {
 }
 
 fn property(entry: &Entry) -> Value {
-    // The type of an item of a list determines its keys.
+    // The type of a light determines its keys.
     let mut schema = match entry.name() {
-        "type" if entry.section.contains('.') => json!({ "const": json_of(entry.sample()) }),
+        "type" if entry.section.starts_with("light.") => {
+            json!({ "const": json_of(entry.sample()) })
+        }
         _ => entry.schema.clone(),
     };
     schema["description"] = json!(entry.comment());

@@ -83,7 +83,7 @@ fn written_manifests_are_valid() {
 }
 
 /// Every table of the schema, with a manifest that ends in this table, so that a line can be appended to it.
-const TABLES: [(&str, &str); 25] = [
+const TABLES: [(&str, &str); 26] = [
     ("", ""),
     ("/properties/input", "[input]\n"),
     ("/properties/camera", "[camera]\n"),
@@ -120,6 +120,10 @@ const TABLES: [(&str, &str); 25] = [
         "[[light]]\ntype = \"disc\"\n",
     ),
     ("/properties/mesh/items", "[[mesh]]\npath = \"a.stl\"\n"),
+    (
+        "/properties/material/properties/part/items",
+        "[[material.part]]\nparts = [1]\n",
+    ),
     ("/properties/environment", "[environment]\n"),
     ("/properties/output", "[output]\n"),
     ("/properties/job", "[job]\n"),

@@ -18,7 +18,7 @@ const MIN_ALPHA: f32 = 2e-3;
 
 /// The GGX distribution of microfacet normals.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Ggx {
+pub(in crate::render) struct Ggx {
     alpha2: f32,
     alpha: f32,
 }
@@ -26,12 +26,18 @@ pub(super) struct Ggx {
 impl Ggx {
     /// The distribution of surfaces with a `roughness` of 0 to 1, whose square is the width `alpha`, so that equal
     /// steps look equal (Burley, "Physically-Based Shading at Disney", 2012).
-    pub(super) fn new(roughness: f32) -> Self {
+    pub(in crate::render) fn new(roughness: f32) -> Self {
         let alpha = larger(roughness * roughness, MIN_ALPHA);
         Self {
             alpha2: alpha * alpha,
             alpha,
         }
+    }
+
+    /// The width of the distribution.
+    #[cfg(test)]
+    pub(in crate::render) fn width(&self) -> f32 {
+        self.alpha
     }
 
     /// The density of microfacets whose normal has this `cosine` with that of the surface.
@@ -51,20 +57,20 @@ impl Ggx {
 
     /// The fraction of microfacets that is visible from a direction.
     #[inline(always)]
-    pub(super) fn masking(&self, cosine: f32) -> f32 {
+    pub(in crate::render) fn masking(&self, cosine: f32) -> f32 {
         1.0 / (1.0 + self.lambda(cosine))
     }
 
     /// The fraction of microfacets that is visible from two directions.
     #[inline(always)]
-    pub(super) fn shadowing(&self, a: f32, b: f32) -> f32 {
+    pub(in crate::render) fn shadowing(&self, a: f32, b: f32) -> f32 {
         1.0 / (1.0 + self.lambda(a) + self.lambda(b))
     }
 
     /// A visible microfacet normal in the frame of the surface, for light that leaves in direction `out`. `u` is
     /// uniform in the unit square.
     #[inline(always)]
-    pub(super) fn sample_normal(&self, out: [f32; 3], u: [f32; 2]) -> [f32; 3] {
+    pub(in crate::render) fn sample_normal(&self, out: [f32; 3], u: [f32; 2]) -> [f32; 3] {
         // Stretch the surface, so that its microfacets are a hemisphere
         let v = normalized([out[0] * self.alpha, out[1] * self.alpha, out[2]]);
         // Sample the cap of directions that mirror to above the surface
@@ -85,19 +91,19 @@ impl Ggx {
 }
 
 #[inline(always)]
-pub(super) fn normalized(v: [f32; 3]) -> [f32; 3] {
+pub(in crate::render) fn normalized(v: [f32; 3]) -> [f32; 3] {
     let scale = 1.0 / dot(v, v).sqrt();
     [v[0] * scale, v[1] * scale, v[2] * scale]
 }
 
 #[inline(always)]
-pub(super) fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+pub(in crate::render) fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// The direction that mirrors `out` at a microfacet with unit normal `h`.
 #[inline(always)]
-pub(super) fn mirror(out: [f32; 3], h: [f32; 3]) -> [f32; 3] {
+pub(in crate::render) fn mirror(out: [f32; 3], h: [f32; 3]) -> [f32; 3] {
     let twice = 2.0 * dot(out, h);
     [
         twice * h[0] - out[0],
@@ -157,7 +163,7 @@ const SAMPLES: u32 = 512;
 /// direction. For a reflectance of `f0` at normal incidence, it is `f0 * scale + bias` (Karis, "Real Shading in
 /// Unreal Engine 4", 2013).
 #[derive(Debug, Clone)]
-pub(super) struct Albedo {
+pub(in crate::render) struct Albedo {
     /// The number of values is a power of two, so that indices need no check; the last ones are not used.
     values: [f32; 2 * CELLS],
     /// Mean over the cosine-weighted hemisphere.
@@ -167,9 +173,14 @@ pub(super) struct Albedo {
 impl Albedo {
     /// The fraction that leaves a surface of `ggx` with reflectance `f0`.
     pub(super) fn new(ggx: &Ggx, f0: f32) -> Self {
+        Self::tabulated(|cosine| albedo(ggx, f0, cosine))
+    }
+
+    /// The fraction that `leaving` computes from the cosine, above 0, of the outgoing direction.
+    pub(in crate::render) fn tabulated(leaving: impl Fn(f32) -> f32) -> Self {
         let mut values = [0.0; 2 * CELLS];
         for (cell, value) in values.iter_mut().enumerate().take(CELLS + 1) {
-            *value = albedo(ggx, f0, larger(cell as f32 / CELLS as f32, 1e-3));
+            *value = leaving(larger(cell as f32 / CELLS as f32, 1e-3));
         }
         values[CELLS + 1] = values[CELLS];
         // Integrate 2 E(c) c dc exactly for the interpolated table
@@ -185,7 +196,7 @@ impl Albedo {
 
     /// The fraction for an outgoing direction with this cosine.
     #[inline(always)]
-    pub(super) fn at(&self, cosine: f32) -> f32 {
+    pub(in crate::render) fn at(&self, cosine: f32) -> f32 {
         let x = smaller(larger(cosine, 0.0), 1.0) * CELLS as f32;
         let rounded = (x - 0.5) + ROUND;
         let cell = rounded.to_bits().wrapping_sub(ROUND.to_bits()) as usize;
@@ -195,19 +206,31 @@ impl Albedo {
     }
 }
 
-/// The fraction of light that leaves with this `cosine`, from samples that fill the square evenly (Hammersley).
-fn albedo(ggx: &Ggx, f0: f32, cosine: f32) -> f32 {
-    let out = [larger(1.0 - cosine * cosine, 0.0).sqrt(), 0.0, cosine];
+/// The mean of `value` over points that fill the unit square evenly (Hammersley).
+pub(in crate::render) fn mean_over_square(value: impl Fn([f32; 2]) -> f32) -> f32 {
     let sum = (0..SAMPLES).map(|i| {
         let across = (i as f32 + 0.5) / SAMPLES as f32;
         let down = (i.reverse_bits() >> 8) as f32 / (1 << 24) as f32;
-        let h = ggx.sample_normal(out, [across, down]);
+        value([across, down])
+    });
+    sum.sum::<f32>() / SAMPLES as f32
+}
+
+/// The direction with this cosine.
+pub(in crate::render) fn direction_at(cosine: f32) -> [f32; 3] {
+    [larger(1.0 - cosine * cosine, 0.0).sqrt(), 0.0, cosine]
+}
+
+/// The fraction of light that leaves with this `cosine`.
+fn albedo(ggx: &Ggx, f0: f32, cosine: f32) -> f32 {
+    let out = direction_at(cosine);
+    mean_over_square(|u| {
+        let h = ggx.sample_normal(out, u);
         let direction = mirror(out, h);
         if direction[2] <= 0.0 {
             return 0.0;
         }
         let fresnel = f0 + (1.0 - f0) * schlick_rise(dot(out, h));
         fresnel * ggx.shadowing(cosine, direction[2]) / ggx.masking(cosine)
-    });
-    sum.sum::<f32>() / SAMPLES as f32
+    })
 }

@@ -13,7 +13,7 @@ use glam::Vec3;
 use crate::math::{LANES, Lanes, Lanes3, Supported, lane_kernel, lanes_in, set_lane3};
 use crate::ray::RayPacket;
 use crate::render::lights::LightSamples;
-use crate::scene::{Finish, MeshFinish, MeshMaterial};
+use crate::scene::{Finish, MeshFinish, MeshMaterial, PartMaterial};
 use crate::surface::Intersections;
 
 #[cfg(test)]
@@ -21,7 +21,7 @@ mod finish_tests;
 mod local;
 mod matte;
 mod metal;
-mod microfacet;
+pub(super) mod microfacet;
 mod plastic;
 #[cfg(test)]
 mod tests;
@@ -107,16 +107,22 @@ pub(super) trait Bsdf: Sync {
     }
 }
 
-/// The BSDFs of opaque surfaces by [`MaterialId`](crate::surface::MaterialId). `particles`: the finish of the
-/// particles.
-pub(super) fn bsdfs_of(particles: Finish, meshes: &[MeshMaterial]) -> Vec<Box<dyn Bsdf>> {
+/// The BSDFs of opaque surfaces in the order of [`MaterialId::all`](crate::surface::MaterialId). `particles`: the
+/// finish of the particles; `parts`: the materials of parts of them.
+pub(super) fn bsdfs_of(
+    particles: Finish,
+    meshes: &[MeshMaterial],
+    parts: &[PartMaterial],
+) -> Vec<Box<dyn Bsdf>> {
     let meshes = meshes.iter().map(|mesh| match mesh.finish {
         MeshFinish::Opaque(finish) => finish,
         // Panes are no opaque surfaces; the BSDF only keeps their place
         MeshFinish::Pane => Finish::Matte,
     });
     let fixed = [particles, Finish::Matte, Finish::Matte];
-    fixed.into_iter().chain(meshes).map(bsdf_of).collect()
+    let parts = parts.iter().map(|part| part.finish);
+    let all = fixed.into_iter().chain(meshes).chain(parts);
+    all.map(bsdf_of).collect()
 }
 
 fn bsdf_of(finish: Finish) -> Box<dyn Bsdf> {

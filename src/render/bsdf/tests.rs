@@ -84,7 +84,7 @@ fn cases() -> [[Vec3; 2]; 3] {
 
 #[test]
 fn densities_integrate_to_one_and_no_light_is_created() {
-    for (bsdf, [normal, outgoing]) in bsdfs_of(Finish::Matte, &[]).iter().zip(cases()) {
+    for (bsdf, [normal, outgoing]) in bsdfs_of(Finish::Matte, &[], &[]).iter().zip(cases()) {
         let (mut random, packets) = (Random(7), 20_000_u16);
         let (mut density, mut reflected) = (0.0, Vec3::ZERO);
         for _ in 0..packets {
@@ -109,7 +109,7 @@ fn densities_integrate_to_one_and_no_light_is_created() {
 #[test]
 fn reflection_is_reciprocal() {
     let mut random = Random(99);
-    for (bsdf, [normal, _]) in bsdfs_of(Finish::Matte, &[]).iter().zip(cases()) {
+    for (bsdf, [normal, _]) in bsdfs_of(Finish::Matte, &[], &[]).iter().zip(cases()) {
         let above = |random: &mut Random| {
             let direction = random.direction();
             direction * direction.dot(normal).signum()
@@ -145,7 +145,7 @@ fn bin_of(direction: Vec3, normal: Vec3) -> Option<usize> {
 
 #[test]
 fn samples_have_their_density() {
-    for (bsdf, [normal, outgoing]) in bsdfs_of(Finish::Matte, &[]).iter().zip(cases()) {
+    for (bsdf, [normal, outgoing]) in bsdfs_of(Finish::Matte, &[], &[]).iter().zip(cases()) {
         let (points, packets) = (points(normal, normal), 8192_u16);
         let mut random = Random(3);
         // Count samples, and check each against the values for its direction
@@ -204,7 +204,7 @@ fn nothing_is_reflected_below_the_surface() {
     let (normal, geometric) = (Vec3::new(0.8, 0.0, 0.6), Vec3::Z);
     let below = Vec3::new(0.9, 0.0, -0.2).normalize();
     let (mut random, mut samples) = (Random(5), BsdfSamples::default());
-    for bsdf in bsdfs_of(Finish::Matte, &[]) {
+    for bsdf in bsdfs_of(Finish::Matte, &[], &[]) {
         let points = points(normal, geometric);
         let values = eval(&*bsdf, &points, normal, &[below; LANES]);
         assert_eq!((values.pdf[0], lane3(&values.value, 0)), (0.0, Vec3::ZERO));

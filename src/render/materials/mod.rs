@@ -9,6 +9,7 @@ mod dielectric;
 mod interface;
 mod material;
 mod points;
+mod rough;
 mod two_sided;
 mod whitted;
 
@@ -17,6 +18,7 @@ pub(super) use dielectric::{Dielectric, attenuate, cross_straight, leaving};
 use interface::Interface;
 pub(super) use material::Material;
 pub(super) use points::ShadingPoints;
+pub(super) use rough::RoughInterface;
 use two_sided::TwoSided;
 pub(super) use whitted::WhittedMaterial;
 

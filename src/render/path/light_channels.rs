@@ -3,7 +3,6 @@
 use super::{PathIntegrator, Surface};
 use crate::math::Lanes3;
 use crate::render::scratch::PacketScratch;
-use crate::surface::MaterialId;
 
 impl PathIntegrator<'_> {
     /// Finds the diffuse part of the reflection of `packet.light`.
@@ -21,8 +20,8 @@ impl PathIntegrator<'_> {
         direction: &Lanes3,
         packet: &mut PacketScratch,
     ) {
-        for (number, bsdf) in (0..).zip(&self.bsdfs) {
-            let lanes = surface.lanes & packet.hits.lanes_of(MaterialId(number));
+        for (material, bsdf) in self.context.materials.iter().zip(&self.bsdfs) {
+            let lanes = surface.lanes & packet.hits.lanes_of(*material);
             if lanes != 0 {
                 let (rays, diffuse) = (&surface.segments.rays, &mut packet.split.diffuse);
                 bsdf.diffuse_part(rays, &packet.surface, direction, lanes, diffuse);

@@ -46,6 +46,11 @@ impl CameraLanes {
         self.lens.is_some()
     }
 
+    /// Width of a pixel at the distance of `point` from the eye.
+    pub(in crate::render) fn pixel_width(&self, point: Vec3) -> f32 {
+        2.0 * self.half_extent[1] / self.size[1] * (point - self.eye).length()
+    }
+
     /// The position of `point` on the film in pixels from its top left corner; None behind the camera.
     pub(in crate::render) fn pixel_of(&self, point: Vec3) -> Option<[f32; 2]> {
         let direction = point - self.eye;

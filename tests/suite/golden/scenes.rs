@@ -42,6 +42,7 @@ const MATT: Material = Material {
     fresnel: Fresnel::Schlick,
     extinction: Vec3::ZERO,
     finish: spherule::scene::Finish::Matte,
+    interface_roughness: 0.0,
 };
 
 /// Each particle a ball of its own; a smooth surface has voxels of a particle radius. Spelled out, too.

@@ -164,11 +164,12 @@ impl<'a> PathIntegrator<'a> {
             .context
             .scene
             .ground
+            .as_ref()
             .filter(|_| has_maps(self.context.scene, self.context.settings))
         else {
             return Some((self, RayCounts::default()));
         };
-        let square = Square::of(&ground);
+        let square = Square::of(ground);
         let (caustics, of_photons) = photons::caustics(&self, &square, stop)?;
         let (sky, of_sky) = sky::sky(&self, &square, stop)?;
         let open = self
