@@ -86,7 +86,7 @@ fn images_do_not_depend_on_how_particles_are_traced() {
             let ran = render(&workshop, input, &out, way).expect(0);
             assert!(!ran.errors().contains("no particle is of part"));
             let made = images(&workshop.join(&out));
-            assert_eq!(made.len(), 1);
+            assert!(!made.is_empty());
             let made: Vec<_> = made.into_values().collect();
             let expected = first.entry(source).or_insert_with(|| made.clone());
             assert!(*expected == made, "{input} {way:?}");
