@@ -180,6 +180,7 @@ pub fn setup(
         background: background(manifest, up.as_vec3()),
         ground,
         meshes: Vec::new(),
+        particles: [bounds.min, bounds.max].map(|corner| (corner - survey.origin).as_vec3()),
         environment,
         is_environment_visible: manifest.environment.visible,
         next_frame: None,

@@ -154,11 +154,11 @@ section! {
         /// Diffuse reflections that light may take before its last one; 0 is direct light only
         bounces: u32 = DEFAULT_BOUNCES, from(0), to(MAX_BOUNCES), affects(Affects::PathTracing),
             flag("bounces", "COUNT", "Look");
-        /// Light on the ground through transmissive particles: number of photons; 0 is none
+        /// Light on ground and meshes through transmissive particles: number of photons; 0 is none
         ///
-        /// With photons, paths end at the ground, whose light is computed once for each image. It is that of the
-        /// environment and of suns and directional lights; of other lights there are no caustics. Without photons,
-        /// paths go on from the ground, and find a sun only where nothing refracts its light.
+        /// With photons, paths end at the ground, whose light is computed once for each image. Without photons, paths
+        /// go on from the ground, and light of `[[light]]` passes particles in a straight line. Lights without shadows
+        /// and point lights with `falloff = "none"` emit no photons.
         caustics: Caustics = Caustics::DEFAULT, affects(Affects::PathTracing);
         /// Removes noise from R, G and B: auto | true | false; auto is true with path
         ///

@@ -57,6 +57,8 @@ mod branch_tests;
 #[cfg(test)]
 mod catcher_tests;
 #[cfg(test)]
+mod caustics_tests;
+#[cfg(test)]
 mod filter_tests;
 #[cfg(test)]
 mod floor_tests;
@@ -125,7 +127,7 @@ pub fn scratch_bytes(settings: &RenderSettings, material: &Material, is_body: bo
     )
 }
 
-/// Upper bound of the memory for the light on the ground around transmissive particles, in bytes.
+/// Upper bound of the memory for the light of photons and on the ground around transmissive particles, in bytes.
 pub fn floor_light_bytes(scene: &Scene, settings: &RenderSettings) -> u64 {
     path::floor::bytes(scene, settings)
 }
@@ -186,7 +188,7 @@ pub fn render_into(
     let integrator: Box<dyn Integrator> = match settings.integrator {
         IntegratorKind::Whitted => Box::new(WhittedIntegrator::new(context)),
         IntegratorKind::Path => {
-            let integrator = PathIntegrator::new(context).with_floor_light(stop);
+            let integrator = PathIntegrator::new(context).with_photons(stop);
             let (integrator, traced) = integrator.ok_or(RenderError::Interrupted)?;
             before = traced;
             Box::new(integrator)

@@ -7,7 +7,8 @@
 //! (Russian roulette). Surfaces of transmissive particles are specular: their rays split as in Whitted's model.
 //!
 //! Shadow rays to the environment end at transmissive surfaces, because the paths of the BSDF find its light behind
-//! them. Shadow rays to light sources pass straight through: paths cannot find a light without extent.
+//! them. Shadow rays to light sources pass straight through: paths cannot find a light without extent. Where photons
+//! bring the light of a source through transmissive surfaces (`path/caustics.rs`), its shadow rays end there.
 
 use super::{
     bsdf::{Bsdf, bsdfs_of, reflect_samples, surface_points},
@@ -30,12 +31,13 @@ use crate::surface::MaterialId;
 use glam::Vec3;
 
 mod catcher;
+pub(super) mod caustics;
 mod emission;
 pub(super) mod floor;
 mod light_channels;
 
 use catcher::Catcher;
-use floor::FloorLight;
+use floor::{Caustics, FloorLight};
 
 /// Number of diffuse reflections from which on paths end at random.
 const ROULETTE_START: u32 = 2;
@@ -57,6 +59,8 @@ pub(super) struct PathIntegrator<'a> {
     catcher: Option<Catcher>,
     /// The light on the ground, if paths end there.
     floor: Option<FloorLight>,
+    /// The light of photons on other surfaces.
+    caustics: Caustics,
 }
 
 impl<'a> PathIntegrator<'a> {
@@ -71,6 +75,7 @@ impl<'a> PathIntegrator<'a> {
             split: SplitRule::new(context.settings, context.interior),
             catcher: Catcher::of(context.scene),
             floor: None,
+            caustics: Caustics::default(),
             has_extents: context.lights.iter().any(|light| light.has_extent()),
             context,
         }
@@ -140,6 +145,7 @@ impl Integrator for PathIntegrator<'_> {
 }
 
 /// Path segments that end at opaque surfaces.
+#[derive(Clone, Copy)]
 struct Surface<'a> {
     segments: &'a SegmentPacket,
     depth: u32,
@@ -308,13 +314,28 @@ impl PathIntegrator<'_> {
         reflect_samples(simd, values, weight, true, lanes, &mut packet.light);
     }
 
-    /// Adds the light of each light source.
+    /// Adds the light of each light source, and of photons.
     fn add_lights(&self, surface: &Surface<'_>, packet: &mut PacketScratch) {
-        let context = &self.context;
-        for (index, light) in context.lights.iter().enumerate() {
+        let with_photons = surface.lanes & self.photon_lanes(&packet.hits);
+        for (index, light) in self.context.lights.iter().enumerate() {
             let competes = light.has_extent() && self.rays_hit_lights();
-            self.reflect_light(index, competes, surface, packet);
-            self.add_direct(Occlusion::of(&**light), surface, packet);
+            let opaque = match light.photon_source() {
+                Some(_) => with_photons,
+                None => 0,
+            };
+            for (lanes, occlusion) in [
+                (surface.lanes & !opaque, Occlusion::of(&**light)),
+                (opaque, Occlusion::Opaque),
+            ] {
+                if lanes != 0 {
+                    let surface = &Surface { lanes, ..*surface };
+                    self.reflect_light(index, competes, surface, packet);
+                    self.add_direct(occlusion, surface, packet);
+                }
+            }
+        }
+        if with_photons != 0 {
+            self.add_caustics(with_photons, surface, packet);
         }
     }
 

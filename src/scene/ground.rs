@@ -50,8 +50,6 @@ pub struct Ground {
     pub height: f32,
     /// Diffuse colour, linear RGB.
     pub color: Vec3,
-    /// Corners of the box of the particles of all frames.
-    pub particles: [Vec3; 2],
     /// Centre of the fading.
     pub center: Vec3,
     /// Distance from `center` up to which the ground is opaque.
@@ -97,7 +95,6 @@ impl Ground {
             up,
             height,
             color: DEFAULT_COLOR,
-            particles: [bounds.min, bounds.max].map(|corner| (corner - origin).as_vec3()),
             center: center + (height - center.dot(up)) * up,
             fade_start: FADE_START * diagonal,
             fade_end: FADE_END * diagonal,

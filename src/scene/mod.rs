@@ -88,6 +88,8 @@ pub struct Scene {
     pub ground: Option<Ground>,
     /// The materials of meshes, by the index of each mesh.
     pub meshes: Vec<MeshMaterial>,
+    /// Corners of the box of the particles of all frames: the target of photons.
+    pub particles: [Vec3; 2],
     /// Light from infinitely far away, for path tracing.
     pub environment: Option<Arc<Environment>>,
     /// Whether camera rays without an intersection see the environment instead of the background.
@@ -117,6 +119,7 @@ impl Scene {
             background: Background::Constant(Vec3::ZERO),
             ground: None,
             meshes: Vec::new(),
+            particles: [Vec3::ZERO; 2],
             environment: None,
             is_environment_visible: false,
             next_frame: None,

@@ -255,7 +255,6 @@ fn floor(height: f32) -> Ground {
         fade_start: 4.0,
         fade_end: 12.0,
         pattern: spherule::scene::ground::Pattern::Plain,
-        particles: [Vec3::splat(-2.0), Vec3::splat(2.0)],
         shadow_catcher: None,
     }
 }

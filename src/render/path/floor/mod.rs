@@ -1,10 +1,13 @@
 //! Light on the ground around transmissive particles, computed once for each image. Paths that find light only through
 //! refracting surfaces are noise in a picture, so they end at the ground, where two maps have their light:
 //!
-//! - caustics: photons of the sun that pass through particles (`photons.rs`, `density.rs`)
+//! - caustics: photons of lights that pass through particles (`emitter.rs`, `photons.rs`, `density.rs`)
 //! - the light of the environment, which varies slowly (`sky.rs`)
 //!
 //! What arrives straight from light sources is sampled at each point of the ground as on other surfaces.
+//!
+//! A shadow catcher has the caustics only. The photons of meshes are stored one by one (`photon_map.rs`), and
+//! `caustics.rs` adds their light.
 
 use std::f32::consts::FRAC_1_PI;
 
@@ -12,6 +15,7 @@ use glam::Vec3;
 
 use super::{Occlusion, PathIntegrator, Surface};
 use crate::math::{lane3, lanes_in, set_lane3, splat3};
+use crate::render::lights::PhotonSource;
 use crate::render::{
     layers::LightClass,
     ray_counts::RayCounts,
@@ -23,17 +27,26 @@ use crate::render::{
 use crate::scene::{Ground, Scene};
 
 mod density;
+mod emitter;
+mod photon_map;
 mod photons;
 mod sky;
 
 /// Width of the border of the maps over which they fade to the light without particles, as a fraction of their edge.
 const BORDER: f32 = 0.1;
 
+pub(super) use photon_map::PhotonMap;
+pub(in crate::render) use photon_map::{NEIGHBOURS, Neighbour};
+
+use density::Cells;
+use emitter::Emitter;
+use photon_map::Collector;
+use photons::{Targets, trace_photons};
+
 /// See the module. All maps contain the radiance of a white ground.
 #[derive(Debug, Clone)]
 pub(super) struct FloorLight {
-    square: Square,
-    caustics: Map,
+    caustics: CausticMap,
     sky: Map,
     /// Light of the environment without particles.
     open: Vec3,
@@ -47,8 +60,6 @@ struct Square {
     axes: [Vec3; 2],
     normal: Vec3,
     edge: f32,
-    /// Corners of the box of the particles.
-    particles: [Vec3; 2],
 }
 
 impl Square {
@@ -58,7 +69,6 @@ impl Square {
             axes: ground.axes(),
             normal: ground.up,
             edge: ground.fade_start,
-            particles: ground.particles,
         }
     }
 
@@ -118,51 +128,129 @@ fn corners(side: usize, position: [f32; 2]) -> [(usize, f32); 4] {
     ]
 }
 
-/// Whether the ground of a scene gets maps.
-fn has_maps(scene: &Scene, settings: &RenderSettings) -> bool {
-    let ground = scene.ground.as_ref();
+/// Light of photons on the ground.
+#[derive(Debug, Clone)]
+pub(super) struct CausticMap {
+    square: Square,
+    map: Map,
+}
+
+impl CausticMap {
+    /// Radiance of a white ground at `point`.
+    pub(super) fn white(&self, point: Vec3) -> Vec3 {
+        let position = self.square.position(point);
+        match Square::weight(position) {
+            weight if weight > 0.0 => weight * self.map.at(position),
+            _ => Vec3::ZERO,
+        }
+    }
+}
+
+/// Light of photons beside that on a visible ground.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Caustics {
+    /// On a shadow catcher.
+    pub(super) catcher: Option<CausticMap>,
+    /// On meshes.
+    pub(super) meshes: Option<PhotonMap>,
+}
+
+/// Whether particles focus light in pictures with these settings.
+fn has_photons(scene: &Scene, settings: &RenderSettings) -> bool {
     settings.integrator == IntegratorKind::Path
         && settings.photons > 0
         && scene.material.transmission > 0.0
-        && ground.is_some_and(|ground| ground.shadow_catcher.is_none())
 }
 
-/// Upper bound of the memory for the maps of a scene while they are computed, in bytes.
+fn is_catcher(ground: &Ground) -> bool {
+    ground.shadow_catcher.is_some()
+}
+
+/// Upper bound of the memory for the light of photons and of the sky while it is computed, in bytes.
 pub(in crate::render) fn bytes(scene: &Scene, settings: &RenderSettings) -> u64 {
-    match has_maps(scene, settings) {
-        true => density::BYTES + photons::BYTES + sky::BYTES,
+    if !has_photons(scene, settings) {
+        return 0;
+    }
+    let emits = !scene.lights.is_empty();
+    let of_ground = match &scene.ground {
+        Some(ground) if !is_catcher(ground) => density::BYTES + sky::BYTES,
+        Some(_) if emits => density::BYTES,
+        _ => 0,
+    };
+    let has_meshes = emits && scene.meshes.iter().any(|mesh| !mesh.is_pane());
+    let of_meshes = match has_meshes {
+        true => photon_map::bytes(settings.photons),
         false => 0,
+    };
+    match of_ground + of_meshes {
+        0 => 0,
+        stored => stored + photons::bytes(has_meshes),
     }
 }
 
 impl<'a> PathIntegrator<'a> {
-    /// The integrator with maps of the light on the ground, if the scene needs them, and the rays that were traced for
-    /// them. `None` if `stop` is raised.
-    pub(in crate::render) fn with_floor_light(
-        mut self,
-        stop: &dyn Stop,
-    ) -> Option<(Self, RayCounts)> {
-        let Some(ground) = self
-            .context
-            .scene
-            .ground
-            .filter(|_| has_maps(self.context.scene, self.context.settings))
-        else {
+    /// The integrator with the light of photons, and maps of the light on the ground, if the scene needs them; and the
+    /// rays that were traced for them. `None` if `stop` is raised.
+    pub(in crate::render) fn with_photons(mut self, stop: &dyn Stop) -> Option<(Self, RayCounts)> {
+        let (scene, settings) = (self.context.scene, self.context.settings);
+        if !has_photons(scene, settings) {
             return Some((self, RayCounts::default()));
-        };
-        let square = Square::of(&ground);
-        let (caustics, of_photons) = photons::caustics(&self, &square, stop)?;
-        let (sky, of_sky) = sky::sky(&self, &square, stop)?;
-        let open = self
-            .environment
-            .map(|e| e.irradiance(ground.up) * FRAC_1_PI);
-        self.floor = Some(FloorLight {
+        }
+        let sources = self.photon_sources();
+        let floor = scene.ground.filter(|ground| !is_catcher(ground));
+        let catcher = scene
+            .ground
+            .filter(|g| is_catcher(g) && !sources.is_empty());
+        let has_meshes = !sources.is_empty() && self.has_opaque_meshes();
+        // Trace the photons
+        let square = floor.or(catcher).as_ref().map(Square::of);
+        let mut cells = square.map(|_| Cells::new());
+        let mut collector = has_meshes.then(Collector::new);
+        let mut counts = RayCounts::default();
+        if square.is_some() || has_meshes {
+            let emitters = Emitter::of(&sources, scene.particles, settings.photons);
+            let mut targets = Targets {
+                ground: square.as_ref().zip(cells.as_mut()),
+                meshes: collector.as_mut(),
+            };
+            counts = trace_photons(&self, &emitters, &mut targets, stop)?;
+        }
+        // Make maps of them
+        let [min, max] = scene.particles;
+        self.caustics.meshes = collector.map(|photons| photons.into_map((max - min).length()));
+        let caustics = square.zip(cells).map(|(square, cells)| CausticMap {
+            map: cells.radiance(&square),
             square,
-            caustics,
-            sky,
-            open: open.unwrap_or_default(),
         });
-        Some((self, of_photons + of_sky))
+        if catcher.is_some() {
+            self.caustics.catcher = caustics;
+            return Some((self, counts));
+        }
+        // Add the light of the environment on a visible ground
+        if let (Some(ground), Some(caustics)) = (floor, caustics) {
+            let (sky, of_sky) = sky::sky(&self, &caustics.square, stop)?;
+            counts = counts + of_sky;
+            let open = self
+                .environment
+                .map(|e| e.irradiance(ground.up) * FRAC_1_PI);
+            self.floor = Some(FloorLight {
+                caustics,
+                sky,
+                open: open.unwrap_or_default(),
+            });
+        }
+        Some((self, counts))
+    }
+
+    /// The lights that emit photons.
+    fn photon_sources(&self) -> Vec<PhotonSource> {
+        let lights = self.context.lights.iter();
+        lights.filter_map(|light| light.photon_source()).collect()
+    }
+
+    fn has_opaque_meshes(&self) -> bool {
+        let mut shapes = self.context.shapes.iter();
+        shapes.any(|shape| shape.material().mesh_index().is_some())
     }
 
     /// Adds the light that the ground reflects, where the paths of `surface` end.
@@ -191,7 +279,7 @@ impl<'a> PathIntegrator<'a> {
         let context = &self.context;
         for (index, light) in context.lights.iter().enumerate() {
             self.reflect_light(index, false, surface, packet);
-            let occlusion = match light.beam() {
+            let occlusion = match light.photon_source() {
                 Some(_) => Occlusion::Opaque,
                 None => Occlusion::of(&**light),
             };
@@ -203,12 +291,12 @@ impl<'a> PathIntegrator<'a> {
 impl FloorLight {
     /// Radiance of a white ground at `point`.
     fn white(&self, point: Vec3) -> Vec3 {
-        let position = self.square.position(point);
+        let position = self.caustics.square.position(point);
         let weight = Square::weight(position);
         if weight <= 0.0 {
             return self.open;
         }
-        let caustics = self.caustics.at(position);
+        let caustics = self.caustics.map.at(position);
         self.open.lerp(self.sky.at(position), weight) + weight * caustics
     }
 }
