@@ -24,6 +24,7 @@ use crate::output::PackBuffers;
 use crate::render::{Film, floor_light_bytes, scratch_bytes};
 use crate::scene::Environment;
 use crate::surface::SurfaceKind;
+use crate::surface::spray::SOFT_DROPS;
 use crate::survey::FrameWeight;
 
 /// Estimated size of a frame before it is read; everything except counts in bytes.
@@ -313,7 +314,8 @@ impl<'a> MemoryModel<'a> {
         let channels = self.setup.picture.render.channels;
         let color = self.setup.picture.color.bytes();
         // Particles that are moved need an explicit id.
-        let ids = channels.needs_ids() && (self.has_ids || self.setup.picture.surface.spray);
+        let picture = &self.setup.picture;
+        let ids = picture.needs_ids() && (self.has_ids || picture.surface.spray);
         let each = [
             (true, color),
             (ids, 4),
@@ -356,10 +358,19 @@ impl<'a> MemoryModel<'a> {
         predicted_bytes(&settings, particles, self.own_radii)
     }
 
+    /// Memory of the tree of `particles` particles of spray. Soft ones have several drops, with radii of their own.
+    fn spray_tree(&self, particles: u64) -> u64 {
+        if !self.setup.picture.scene.is_spray_soft {
+            return self.plain_tree(particles).tree;
+        }
+        let settings = BuildSettings::new(Structure::Lbvh);
+        predicted_bytes(&settings, u64::from(SOFT_DROPS) * particles, true).tree
+    }
+
     /// Memory of the surface of a frame: normals need none, spray has a tree, and a smooth surface has its grid.
     fn surface(&self, frame: &FrameSize) -> SurfaceBytes {
         let spray = if self.setup.picture.surface.spray {
-            self.plain_tree(frame.particles / PARTICLES_PER_DROP).tree
+            self.spray_tree(frame.particles / PARTICLES_PER_DROP)
         } else {
             0
         };

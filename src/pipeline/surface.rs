@@ -4,6 +4,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use glam::Vec3;
 use spherule_formats::Radius;
 
 use super::decoded::DecodedFrame;
@@ -19,7 +20,7 @@ use crate::scene::Scene;
 use crate::surface::mesh::{MeshSurface, MeshTree};
 use crate::surface::smooth::{SmoothError, SmoothGrid, SmoothReport};
 use crate::surface::spheres::SphereSurface;
-use crate::surface::spray::{DROP_RADIUS, spray_of};
+use crate::surface::spray::{DROP_RADIUS, SOFT_DROPS, soft_drop, spray_of};
 use crate::surface::union::UnionSurface;
 use crate::surface::{
     GradientNormals, MaterialId, NormalKind, PcaNormals, ShadingNormals, Shape, SurfaceKind,
@@ -36,6 +37,8 @@ pub(super) struct SurfaceBuilder {
     spray: TreeBuilder,
     /// Number of particles in the body; those of the spray follow.
     body: u32,
+    /// Number of drops of each particle of the spray.
+    drops_per_particle: u32,
     smooth: SmoothGrid,
 }
 
@@ -128,18 +131,28 @@ impl SurfaceBuilder {
         // Find the spray in the tree that is fastest to build; the result does not depend on the structure
         trees.build(&spheres(frame), &BuildSettings::new(Structure::Lbvh));
         let spray = spray_of(&trees.tree().view(), support(&setup.picture.surface));
-        let body = frame.move_to_end(&spray, setup.picture.render.channels.needs_ids());
+        let body = frame.move_to_end(&spray, setup.picture.needs_ids());
         self.body = u32::try_from(body).unwrap_or(u32::MAX);
         // Build the tree of the drops
-        let drops = match &frame.radius {
+        let is_soft = setup.picture.scene.is_spray_soft;
+        let ids = frame.shading.ids.as_deref().filter(|_| is_soft);
+        let plain = match &frame.radius {
             Radius::Common(radius) => Radius::Common(DROP_RADIUS * radius),
             Radius::PerParticle(radii) => {
                 Radius::PerParticle(radii[body..].iter().map(|r| DROP_RADIUS * r).collect())
             }
         };
-        let built = Spheres {
-            centers: &frame.centers[body..],
-            radius: radius_of(&drops),
+        self.drops_per_particle = if is_soft { SOFT_DROPS } else { 1 };
+        let drops = ids.map(|ids| soft_drops(&frame.centers, &frame.radius, body, ids));
+        let built = match &drops {
+            Some((centers, radii)) => Spheres {
+                centers,
+                radius: SphereRadius::Each(radii),
+            },
+            None => Spheres {
+                centers: &frame.centers[body..],
+                radius: radius_of(&plain),
+            },
         };
         let built = self.spray.build(&built, &BuildSettings::default());
         // Keep only the body in the frame
@@ -174,7 +187,9 @@ impl SurfaceBuilder {
             SurfaceKind::Union => Box::new(UnionSurface::new(tree).with_normals(normals)),
             SurfaceKind::Smooth => Box::new(self.smooth.surface()),
         };
-        let spray = SphereSurface::new(self.spray.tree().view()).of(MaterialId::SPRAY, self.body);
+        let spray = SphereSurface::new(self.spray.tree().view())
+            .of(MaterialId::SPRAY, self.body)
+            .of_particles_with(self.drops_per_particle);
         let mut shapes: Vec<&dyn Shape> = vec![&*body];
         if !self.spray.tree().view().is_empty() {
             shapes.push(&spray);
@@ -183,6 +198,27 @@ impl SurfaceBuilder {
         shapes.extend(meshes.iter().map(|mesh| mesh as &dyn Shape));
         render_into(film, &shapes, scene, source, &setup.picture.render, stop)
     }
+}
+
+/// Centres and radii of the soft drops of the particles from number `body` on.
+fn soft_drops(
+    centers: &[Vec3],
+    radius: &Radius,
+    body: usize,
+    ids: &[u32],
+) -> (Vec<Vec3>, Vec<f32>) {
+    let radius_of = |particle: usize| match radius {
+        Radius::Common(radius) => *radius,
+        Radius::PerParticle(radii) => radii[particle],
+    };
+    let drops = (body..centers.len()).flat_map(|particle| {
+        let (center, radius) = (centers[particle], radius_of(particle));
+        (0..SOFT_DROPS).map(move |number| {
+            let drop = soft_drop(ids[particle], number);
+            (center + radius * drop.offset, radius * drop.radius)
+        })
+    });
+    drops.unzip()
 }
 
 /// The shapes of `trees`, which are `meshes` of a picture.

@@ -12,6 +12,7 @@ use super::{
     settings::RenderSettings,
     shading::{BackgroundLanes, CameraLanes},
     source::ShadeSource,
+    spray::is_soft,
 };
 use crate::accel::Coherence;
 use crate::math::Supported;
@@ -20,10 +21,12 @@ use crate::surface::{MaterialId, Shape, Side};
 
 /// A scene ready to be rendered.
 pub(super) struct RenderContext<'a> {
-    /// All shapes but panes; the ground comes first, because it is the cheapest.
+    /// All shapes but panes and soft spray; the ground comes first, because it is the cheapest.
     pub(super) shapes: Vec<&'a dyn Shape>,
     /// Meshes that rays pass.
     pub(super) panes: Vec<&'a dyn Shape>,
+    /// Spray whose drops fade out; opaque spray is one of the shapes.
+    pub(super) soft_spray: Option<&'a dyn Shape>,
     /// Whether there are meshes that only hide what is behind them.
     pub(super) has_holdouts: bool,
     /// The particles, opaque or transmissive; all other shapes are opaque.
@@ -86,6 +89,8 @@ impl<'a> RenderContext<'a> {
         source: &'a dyn ShadeSource,
         settings: &'a RenderSettings,
     ) -> Self {
+        let is_soft = |shape: &&dyn Shape| is_soft(scene, settings.integrator, *shape);
+        let (spray, shapes): (Vec<_>, Vec<_>) = shapes.into_iter().partition(is_soft);
         let is_opaque = |shape: &&dyn Shape| !is_pane(scene, *shape);
         let (shapes, panes): (Vec<_>, Vec<_>) = shapes.into_iter().partition(is_opaque);
         // Find the particles and the kind of their interior
@@ -101,6 +106,7 @@ impl<'a> RenderContext<'a> {
             is_camera_inside: interior == Interior::Body && particles.is_some_and(contains_eye),
             shapes,
             panes,
+            soft_spray: spray.first().copied(),
             has_holdouts: scene.meshes.iter().any(|mesh| mesh.is_holdout),
             particles,
             source,

@@ -26,6 +26,7 @@ impl RenderContext<'_> {
         for shape in &self.shapes {
             shape.intersect(&mut segments.rays, coherence, inside, &mut packet.hits);
         }
+        self.meet_spray(segments, coherence, packet);
         packet.throughput = segments.throughput;
         self.pass_panes(segments, packet);
         self.absorb(segments, packet);

@@ -43,6 +43,7 @@ mod settings;
 mod shading;
 mod source;
 mod specular;
+mod spray;
 mod stop;
 mod stream;
 mod tile;
@@ -74,6 +75,8 @@ mod path_tests;
 mod poison_tests;
 #[cfg(test)]
 pub(crate) mod solid;
+#[cfg(test)]
+mod spray_tests;
 #[cfg(test)]
 mod whitted_tests;
 

@@ -11,7 +11,7 @@
 //! bring the light of a source through transmissive surfaces (`path/caustics.rs`), its shadow rays end there.
 
 use super::{
-    bsdf::{Bsdf, bsdfs_of, reflect_samples, surface_points},
+    bsdf::{Bsdf, Foam, bsdfs_of, reflect_samples, surface_points},
     context::{Interior, RenderContext},
     dimensions::{BOUNCED, BSDF, CONTINUATION, ENVIRONMENT, LIGHTS},
     integrator::Integrator,
@@ -68,9 +68,13 @@ impl<'a> PathIntegrator<'a> {
         let is_connected = context.connected_particles().is_some();
         let interface = materials_of(context.scene, is_connected).swap_remove(0);
         let environment = context.scene.environment.as_deref();
+        let mut bsdfs = bsdfs_of(context.scene.material.finish, &context.scene.meshes);
+        if context.soft_spray.is_some() {
+            bsdfs[usize::from(MaterialId::SPRAY.0)] = Box::new(Foam);
+        }
         Self {
             environment: environment.filter(|environment| !environment.is_black()),
-            bsdfs: bsdfs_of(context.scene.material.finish, &context.scene.meshes),
+            bsdfs,
             interface,
             split: SplitRule::new(context.settings, context.interior),
             catcher: Catcher::of(context.scene),
@@ -221,6 +225,17 @@ impl PathIntegrator<'_> {
         context.base_colors(context.interior == Interior::Opaque, packet);
         let (rays, points) = (&surface.segments.rays, &mut packet.surface);
         surface_points(simd, rays, &packet.hits, &packet.base, points);
+        if context.soft_spray.is_some() {
+            // Light that foam scatters leaves from inside its drop, in all directions
+            for lane in lanes_in(packet.hits.lanes_of(MaterialId::SPRAY)) {
+                let inwards = -packet.hits.offset[lane] * lane3(&points.geometric, lane);
+                set_lane3(
+                    &mut points.start,
+                    lane,
+                    lane3(&packet.hits.anchor, lane) + inwards,
+                );
+            }
+        }
         let opacity = &packet.hits.opacity;
         scale(simd, &packet.throughput, opacity, &mut packet.weight);
     }

@@ -6,7 +6,7 @@ use super::{ResolveError, narrow, surface};
 use crate::manifest::{GroundKind, GroundPattern, Manifest};
 use crate::render::IntegratorKind;
 use crate::scene::ground::Pattern;
-use crate::scene::{Bounds, Ground};
+use crate::scene::{Bounds, Ground, WetGround};
 use crate::surface::SurfaceKind;
 
 /// Default edge of a square on the ground as a fraction of the diagonal of the bounds: some squares can be counted
@@ -85,6 +85,14 @@ pub(super) fn ground(
         (_, GroundPattern::Plain) => Pattern::Plain,
     };
     Ok(Some(ground))
+}
+
+/// How the liquid wets the ground; shadow catchers stay dry.
+pub(super) fn wet_ground(manifest: &Manifest, floor: &Floor<'_>) -> Option<WetGround> {
+    let (strength, margin) = (manifest.render.ground_wetness, narrow(floor.reach));
+    let has_margin = margin > 0.0 && margin.is_finite();
+    let is_wet = strength > 0.0 && has_margin && manifest.has_path_traced_body();
+    is_wet.then_some(WetGround { strength, margin })
 }
 
 #[cfg(test)]

@@ -80,6 +80,15 @@ pub enum Pattern {
     },
 }
 
+/// Ground that fluid makes darker and glossy.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WetGround {
+    /// 0 is dry, 1 is physical.
+    pub strength: f32,
+    /// Distance from the fluid within which the ground is wet, about the radius of a particle. Positive.
+    pub margin: f32,
+}
+
 impl Ground {
     /// A ground just below `bounds`, relative to `origin`.
     pub fn under(bounds: &Bounds, up: Vec3, origin: glam::DVec3) -> Self {

@@ -54,6 +54,7 @@ const SPHERES: SurfaceSettings = SurfaceSettings {
     smoothing_length: 2.0,
     threshold: 0.6,
     spray: false,
+    spray_style: spherule::surface::SprayStyle::Spheres,
 };
 
 /// Owned colours.

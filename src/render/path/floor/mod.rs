@@ -4,6 +4,8 @@
 //! - caustics: photons of lights that pass through particles (`emitter.rs`, `photons.rs`, `density.rs`)
 //! - the light of the environment, which varies slowly (`sky.rs`)
 //!
+//! A third map shows where the ground is wet (`wet.rs`).
+//!
 //! What arrives straight from light sources is sampled at each point of the ground as on other surfaces.
 //!
 //! A shadow catcher has the caustics only. The photons of meshes are stored one by one (`photon_map.rs`), and
@@ -31,6 +33,7 @@ mod emitter;
 mod photon_map;
 mod photons;
 mod sky;
+mod wet;
 
 /// Width of the border of the maps over which they fade to the light without particles, as a fraction of their edge.
 const BORDER: f32 = 0.1;
@@ -42,12 +45,14 @@ use density::Cells;
 use emitter::Emitter;
 use photon_map::Collector;
 use photons::{Targets, trace_photons};
+use wet::{WetMap, WetScene};
 
 /// See the module. All maps contain the radiance of a white ground.
 #[derive(Debug, Clone)]
 pub(super) struct FloorLight {
     caustics: CausticMap,
     sky: Map,
+    wet: Option<WetMap>,
     /// Light of the environment without particles.
     open: Vec3,
 }
@@ -173,7 +178,7 @@ pub(in crate::render) fn bytes(scene: &Scene, settings: &RenderSettings) -> u64 
     }
     let emits = !scene.lights.is_empty();
     let of_ground = match &scene.ground {
-        Some(ground) if !is_catcher(ground) => density::BYTES + sky::BYTES,
+        Some(ground) if !is_catcher(ground) => density::BYTES + sky::BYTES + wet::BYTES,
         Some(_) if emits => density::BYTES,
         _ => 0,
     };
@@ -233,13 +238,30 @@ impl<'a> PathIntegrator<'a> {
             let open = self
                 .environment
                 .map(|e| e.irradiance(ground.up) * FRAC_1_PI);
+            let wet = match self.wet_scene(&caustics.square) {
+                Some(wet) => Some(wet.map(stop)?),
+                None => None,
+            };
             self.floor = Some(FloorLight {
                 caustics,
                 sky,
+                wet,
                 open: open.unwrap_or_default(),
             });
         }
         Some((self, counts))
+    }
+
+    /// What wets the ground, if something does.
+    fn wet_scene<'s>(&'s self, square: &'s Square) -> Option<WetScene<'s>> {
+        let scene = self.context.scene;
+        Some(WetScene {
+            body: self.context.connected_particles()?,
+            wet: scene.wet_ground.as_ref()?,
+            square,
+            particles: scene.particles,
+            ior: scene.material.ior,
+        })
     }
 
     /// The lights that emit photons.
@@ -261,6 +283,9 @@ impl<'a> PathIntegrator<'a> {
         packet: &mut PacketScratch,
     ) {
         self.prepare_surface(surface, packet);
+        if let Some(wet) = &floor.wet {
+            wet.darken(surface, packet);
+        }
         // Add the light of the maps
         let mut reflected = splat3(Vec3::ZERO);
         for lane in lanes_in(surface.lanes) {
@@ -271,6 +296,9 @@ impl<'a> PathIntegrator<'a> {
         let (simd, radiance) = (self.context.simd, &mut packet.radiance);
         add(simd, &reflected, &Vec3::ONE, surface.lanes, radiance);
         packet.take_light(LightClass::Diffuse);
+        if let Some(wet) = &floor.wet {
+            self.add_gloss(wet, surface, packet);
+        }
         self.add_straight_light(surface, packet);
     }
 
