@@ -177,6 +177,7 @@ pub fn setup(
         has_layer: survey.rests_on_floor(up),
     };
     let ground = ground::ground(manifest, &floor)?;
+    let wet_ground = ground::wet_ground(manifest, &floor);
     let scene = Scene {
         origin: survey.origin,
         camera,
@@ -186,7 +187,10 @@ pub fn setup(
         parts: parts::parts(manifest, survey)?,
         background: background(manifest, up.as_vec3()),
         ground,
+        wet_ground,
         meshes: Vec::new(),
+        particles: [bounds.min, bounds.max].map(|corner| (corner - survey.origin).as_vec3()),
+        is_spray_soft: manifest.draws_soft_spray(),
         environment,
         is_environment_visible: manifest.environment.visible,
         environment_group: lights::group_index(manifest, manifest.environment.group.as_ref()),

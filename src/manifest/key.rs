@@ -9,6 +9,10 @@ pub(super) enum Affects {
     SmoothSurfaces,
     /// Unions and smooth surfaces.
     Bodies,
+    /// Unions and smooth surfaces with path tracing.
+    PathTracedBodies,
+    /// Spray with path tracing.
+    Spray,
     /// Spheres that reflect and refract.
     BranchingSpheres,
     /// The path integrator.
@@ -26,6 +30,10 @@ impl Affects {
             Self::Nothing => "Does not change images.",
             Self::SmoothSurfaces => "Changes images of smooth surfaces.",
             Self::Bodies => "Changes images of unions and smooth surfaces.",
+            Self::PathTracedBodies => {
+                "Changes images of unions and smooth surfaces with `integrator = \"path\"`."
+            }
+            Self::Spray => "Changes images of `integrator = \"path\"` with `spray = true`.",
             Self::BranchingSpheres => "Changes images of spheres that reflect and transmit.",
             Self::PathTracing => "Changes images of `integrator = \"path\"`.",
             Self::LightGroups => "Changes images with the channel `light_groups`.",

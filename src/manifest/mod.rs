@@ -11,7 +11,7 @@ use spherule_jobs::FrameRange;
 
 use crate::render::{IntegratorKind, MAX_LITERAL_DEPTH, RendererKind};
 use crate::scene::Fresnel;
-use crate::surface::{MaterialId, SurfaceKind, SurfaceSettings};
+use crate::surface::{MaterialId, SprayStyle, SurfaceKind, SurfaceSettings};
 
 use key::Affects;
 use keys::Keys;
@@ -299,6 +299,21 @@ impl Manifest {
             && self.material.resolved(Fresnel::Schlick).branches()
     }
 
+    /// Whether a union or a smooth surface is path traced.
+    pub fn has_path_traced_body(&self) -> bool {
+        self.surface.kind != SurfaceKind::Spheres && self.integrator() == IntegratorKind::Path
+    }
+
+    /// Whether foam and spray are path traced.
+    fn has_path_traced_spray(&self) -> bool {
+        self.surface.spray && self.has_path_traced_body()
+    }
+
+    /// Whether foam and spray are drops that fade out.
+    pub fn draws_soft_spray(&self) -> bool {
+        self.has_path_traced_spray() && self.surface.spray_style == SprayStyle::Soft
+    }
+
     /// Whether images of this manifest depend on keys with this `affects`.
     fn depends_on(&self, affects: Affects) -> bool {
         match affects {
@@ -306,6 +321,8 @@ impl Manifest {
             Affects::Nothing => false,
             Affects::SmoothSurfaces => self.surface.kind == SurfaceKind::Smooth,
             Affects::Bodies => self.surface.kind != SurfaceKind::Spheres,
+            Affects::PathTracedBodies => self.has_path_traced_body(),
+            Affects::Spray => self.has_path_traced_spray(),
             Affects::BranchingSpheres => self.branches_at_spheres(),
             Affects::PathTracing => self.integrator() == IntegratorKind::Path,
             Affects::LightGroups => {

@@ -169,11 +169,11 @@ section! {
         /// traced follows it up to `bounces`. ambient ends paths at the second surface and estimates the light there:
         /// it is faster and has less noise, but gaps between particles are too pale. It is for previews (--draft).
         indirect: IndirectSetting = IndirectSetting::Traced, affects(Affects::PathTracing);
-        /// Light on the ground through transmissive particles: number of photons; 0 is none
+        /// Light on ground and meshes through transmissive particles: number of photons; 0 is none
         ///
-        /// With photons, paths end at the ground, whose light is computed once for each image. It is that of the
-        /// environment and of suns and directional lights; of other lights there are no caustics. Without photons,
-        /// paths go on from the ground, and find a sun only where nothing refracts its light.
+        /// With photons, paths end at the ground, whose light is computed once for each image. Without photons, paths
+        /// go on from the ground, and light of `[[light]]` passes particles in a straight line. Lights without shadows
+        /// and point lights with `falloff = "none"` emit no photons.
         caustics: Caustics = Caustics::DEFAULT, affects(Affects::PathTracing);
         /// Removes noise from R, G and B: auto | true | false; auto is true with path
         ///
@@ -208,6 +208,11 @@ section! {
         ground_pattern: GroundPattern = GroundPattern::Plain;
         /// Strength of the shadows on a shadow catcher; 1 is physical
         ground_shadow: f32 = 1.0, from(0), to(1), affects(Affects::PathTracing);
+        /// How much darker and glossier a ground is where water wets it; 1 is physical, 0 is dry
+        ///
+        /// The ground is wet under the liquid and up to about a particle radius beside it. It needs a transparent union
+        /// or smooth surface, photons, and a ground that is no shadow catcher.
+        ground_wetness: f32 = 1.0, from(0), to(1), affects(Affects::PathTracedBodies);
         /// Edge length of the squares of the pattern, or of its largest spots, or auto
         ground_tile: Option<f64> = None, or("auto"), unit("a length"), above(0), single();
         /// Maximum memory to use: 4GiB, 512MiB; frames that need more fail

@@ -6,16 +6,26 @@
 use super::value::Value;
 use super::{ColorSetting, DEFAULT_MAP, GroundKind, GroundSetting, Manifest};
 use crate::render::IntegratorKind;
+use crate::surface::SprayStyle;
 
 const MIN_WEIGHT: &str = "render.min_weight";
 const COLOR: &str = "material.color";
 const INTEGRATOR: &str = "render.integrator";
 const GROUND: &str = "render.ground";
+const GROUND_WETNESS: &str = "render.ground_wetness";
+const SPRAY_STYLE: &str = "surface.spray_style";
 /// The defaults of older versions.
 const OLD_INTEGRATOR: &str = "\"whitted\"";
 const OLD_GROUND: &str = "false";
+const OLD_GROUND_WETNESS: &str = "0.0";
+const OLD_SPRAY_STYLE: &str = "\"spheres\"";
 /// Keys whose defaults have changed.
-const CHANGED_DEFAULTS: [(&str, &str); 2] = [(INTEGRATOR, OLD_INTEGRATOR), (GROUND, OLD_GROUND)];
+const CHANGED_DEFAULTS: [(&str, &str); 4] = [
+    (INTEGRATOR, OLD_INTEGRATOR),
+    (GROUND, OLD_GROUND),
+    (GROUND_WETNESS, OLD_GROUND_WETNESS),
+    (SPRAY_STYLE, OLD_SPRAY_STYLE),
+];
 const SURFACE: &str = "render.surface";
 /// The value of [`SURFACE`] in older versions, and the equivalent current one.
 const UNION: [&str; 2] = ["\"medium\"", "\"union\""];
@@ -38,6 +48,14 @@ impl Manifest {
         }
         if render.ground.is_none() && is_old(GROUND, OLD_GROUND) {
             render.ground = Some(GroundSetting::of(GroundKind::None));
+        }
+        // Versions without these keys had dry ground, and spray of spheres
+        let has = |name: &str| planned.iter().any(|(key, _)| key == name);
+        if self.has_path_traced_body() && !has(GROUND_WETNESS) {
+            self.render.ground_wetness = 0.0;
+        }
+        if self.has_path_traced_spray() && !has(SPRAY_STYLE) {
+            self.surface.spray_style = SprayStyle::Spheres;
         }
     }
 
@@ -173,6 +191,50 @@ mod tests {
         assert_eq!(changes(&current, &named.settings(), false), [""; 0]);
         let whitted = manifest("render.integrator = \"whitted\"");
         assert_ne!(changes(&whitted, &planned, false), [""; 0]);
+    }
+
+    #[test]
+    fn jobs_of_older_versions_keep_their_spray() {
+        let spray = "render.surface = \"smooth\"\nsurface.spray = true\n";
+        let current = manifest(spray);
+        let planned = rewritten(&current, SPRAY_STYLE, None);
+        assert_eq!(
+            changes(&current, &planned, false),
+            ["surface.spray_style: (not set) -> \"soft\""]
+        );
+        let mut adopted = current.clone();
+        adopted.adopt_old_defaults(&planned);
+        assert!(!adopted.draws_soft_spray() && current.draws_soft_spray());
+        assert_eq!(changes(&adopted, &planned, false), [""; 0]);
+        let mut same = current.clone();
+        same.adopt_old_defaults(&current.settings());
+        assert_eq!(same, current);
+        // Nothing else depends on it
+        for rest in [
+            "",
+            "render.surface = \"smooth\"",
+            "render.integrator = \"whitted\"",
+        ] {
+            let settings = manifest(rest).settings();
+            assert!(settings.iter().all(|(key, _)| key != SPRAY_STYLE), "{rest}");
+        }
+    }
+
+    #[test]
+    fn jobs_of_older_versions_keep_their_dry_ground() {
+        let current = manifest("render.surface = \"smooth\"");
+        let planned = rewritten(&current, GROUND_WETNESS, None);
+        assert_eq!(
+            changes(&current, &planned, false),
+            ["render.ground_wetness: (not set) -> 1.0"]
+        );
+        let mut adopted = current.clone();
+        adopted.adopt_old_defaults(&planned);
+        assert_eq!(adopted.render.ground_wetness, 0.0);
+        assert_eq!(changes(&adopted, &planned, false), [""; 0]);
+        let mut same = current.clone();
+        same.adopt_old_defaults(&current.settings());
+        assert_eq!(same, current);
     }
 
     #[test]

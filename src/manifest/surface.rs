@@ -3,7 +3,7 @@
 use super::key::Affects;
 use super::keys::{Keys, keys};
 use super::value::named;
-use crate::surface::{NormalKind, SurfaceKind, SurfaceSettings};
+use crate::surface::{NormalKind, SprayStyle, SurfaceKind, SurfaceSettings};
 
 /// Edge of a voxel, in particle radii: the memory of finer voxels grows with the third power, and coarser ones lose
 /// drops.
@@ -17,6 +17,7 @@ const SMOOTHING_LENGTHS: [f32; 2] = [1.0, 8.0];
 const MAX_THRESHOLD: f32 = 4.0;
 
 named!(SurfaceKind: Spheres = "spheres", Union = "union", Smooth = "smooth");
+named!(SprayStyle: Soft = "soft", Spheres = "spheres");
 named!(NormalKind: Auto = "auto", Sphere = "sphere", Field = "field", Pca = "pca");
 
 pub(super) const ABOUT: &[&str] =
@@ -49,7 +50,11 @@ pub(super) fn all_keys(settings: &mut SurfaceSettings, keys: &mut Keys<'_>) {
             unit("a number of particle radii"), affects(Affects::Bodies);
         /// Value of the field at the surface, like splashsurf's -t; a larger value makes the body thinner
         threshold => settings.threshold, above(0), to(MAX_THRESHOLD), affects(Affects::SmoothSurfaces);
-        /// Particles with few neighbours become small white spheres outside the surface
+        /// Particles with few neighbours become foam and spray outside the surface
         spray => settings.spray, affects(Affects::Bodies), flag("spray", "", "Look");
+        /// Foam and spray: soft (clusters of white drops that fade out) | spheres
+        ///
+        /// whitted draws spheres only.
+        spray_style => settings.spray_style, affects(Affects::Spray);
     );
 }

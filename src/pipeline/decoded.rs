@@ -65,7 +65,7 @@ impl DecodedFrame {
         };
         // Extract ids and velocities for the channels
         let channels = setup.picture.render.channels;
-        let ids = if channels.needs_ids() {
+        let ids = if setup.picture.needs_ids() {
             ids(&frame)
         } else {
             None

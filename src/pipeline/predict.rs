@@ -26,6 +26,7 @@ use crate::render::{Film, floor_light_bytes, scratch_bytes};
 use crate::scene::ground::Pattern;
 use crate::scene::{Environment, Ground};
 use crate::surface::SurfaceKind;
+use crate::surface::spray::SOFT_DROPS;
 use crate::survey::FrameWeight;
 
 /// Estimated size of a frame before it is read; everything except counts in bytes.
@@ -328,7 +329,8 @@ impl<'a> MemoryModel<'a> {
         let channels = self.setup.picture.render.channels;
         let color = self.setup.picture.color.bytes();
         // Particles that are moved need an explicit id.
-        let ids = channels.needs_ids() && (self.has_ids || self.setup.picture.surface.spray);
+        let picture = &self.setup.picture;
+        let ids = picture.needs_ids() && (self.has_ids || picture.surface.spray);
         let each = [
             (true, color),
             (ids, 4),
@@ -376,18 +378,33 @@ impl<'a> MemoryModel<'a> {
         predicted_bytes(&settings, particles, self.own_radii)
     }
 
+    /// Memory of the tree of `particles` particles of spray. Soft ones have several drops, with radii of their own.
+    fn spray_tree(&self, particles: u64) -> u64 {
+        let is_soft = self.setup.picture.scene.is_spray_soft;
+        let drops = particles * if is_soft { u64::from(SOFT_DROPS) } else { 1 };
+        let still = match is_soft {
+            true => predicted_bytes(&BuildSettings::new(Structure::Lbvh), drops, true).tree,
+            false => self.plain_tree(drops).tree,
+        };
+        still + self.moving_tree(drops)
+    }
+
+    /// Memory of a tree of moving spheres; none without motion blur.
+    fn moving_tree(&self, particles: u64) -> u64 {
+        match self.setup.has_motion() {
+            true => MovingTree::predicted_bytes(particles),
+            false => 0,
+        }
+    }
+
     /// Memory of the surface of a frame: normals need none, spray has a tree, and a smooth surface has its grid. With
     /// motion blur, spheres have a tree that moves, and other surfaces are there several times.
     fn surface(&self, frame: &FrameSize) -> SurfaceBytes {
         let (surface, n) = (&self.setup.picture.surface, frame.particles);
         let slices = u64::from(self.setup.slices());
-        let moving = |particles: u64| match self.setup.has_motion() {
-            true => MovingTree::predicted_bytes(particles),
-            false => 0,
-        };
-        let drops = n / PARTICLES_PER_DROP;
+        let moving = self.moving_tree(n);
         let spray = match surface.spray {
-            true => self.plain_tree(drops).tree + moving(drops),
+            true => self.spray_tree(n / PARTICLES_PER_DROP),
             false => 0,
         };
         let body = match surface.kind {
@@ -406,8 +423,8 @@ impl<'a> MemoryModel<'a> {
                 }
             }
             SurfaceKind::Spheres | SurfaceKind::Union => SurfaceBytes {
-                building: moving(n),
-                kept: moving(n),
+                building: moving,
+                kept: moving,
             },
         };
         SurfaceBytes {

@@ -184,6 +184,13 @@ pub struct RunSettings {
     pub weight: Option<FrameWeight>,
 }
 
+impl Picture {
+    /// Whether ids of particles are needed: for channels, or for the sizes of soft drops.
+    pub(super) fn needs_ids(&self) -> bool {
+        self.render.channels.needs_ids() || self.scene.is_spray_soft
+    }
+}
+
 impl Setup {
     /// The camera of `frame`, without its lens.
     ///

@@ -24,7 +24,7 @@ use crate::surface::moving::MovingSpheres;
 use crate::surface::slices::{SlicedSurface, slice_times};
 use crate::surface::smooth::{SmoothError, SmoothGrid, SmoothReport};
 use crate::surface::spheres::SphereSurface;
-use crate::surface::spray::{DROP_RADIUS, spray_of};
+use crate::surface::spray::{DROP_RADIUS, SOFT_DROPS, soft_drop, spray_of};
 use crate::surface::union::UnionSurface;
 use crate::surface::{
     GradientNormals, MaterialId, NormalKind, PcaNormals, ShadingNormals, Shape, SurfaceKind,
@@ -47,6 +47,8 @@ pub(super) struct SurfaceBuilder {
     spray: TreeBuilder,
     /// Number of particles in the body; those of the spray follow.
     body: u32,
+    /// Number of drops of each particle of the spray.
+    drops_per_particle: u32,
     /// A smooth surface, for each slice of the exposure.
     smooth: Vec<SmoothGrid>,
     /// Trees of a union, for each slice of the exposure; empty without motion blur.
@@ -82,7 +84,7 @@ impl SurfaceBuilder {
             self.displacements = expose(setup, shutter, frame);
         }
         if has_spray {
-            let built = self.build_spray(frame);
+            let built = self.build_spray(setup, frame);
             report.bytes.surface = built.position_bytes + built.structure_bytes;
             report.bytes.surface += self.moving[1].byte_len();
         }
@@ -213,22 +215,32 @@ impl SurfaceBuilder {
         // Use the tree that is fastest to build; the result does not depend on the structure
         trees.build(&spheres(frame), &BuildSettings::new(Structure::Lbvh));
         let spray = spray_of(&trees.tree().view(), support(&setup.picture.surface));
-        let body = frame.move_to_end(&spray, setup.picture.render.channels.needs_ids());
+        let body = frame.move_to_end(&spray, setup.picture.needs_ids());
         self.body = u32::try_from(body).unwrap_or(u32::MAX);
     }
 
     /// Builds the tree of the drops, and leaves only the body in `frame`.
-    fn build_spray(&mut self, frame: &mut DecodedFrame) -> BuildReport {
+    fn build_spray(&mut self, setup: &Setup, frame: &mut DecodedFrame) -> BuildReport {
         let body = frame.centers.len().min(self.body as usize);
-        let drops = match &frame.radius {
+        let is_soft = setup.picture.scene.is_spray_soft;
+        let ids = frame.shading.ids.as_deref().filter(|_| is_soft);
+        let plain = match &frame.radius {
             Radius::Common(radius) => Radius::Common(DROP_RADIUS * radius),
             Radius::PerParticle(radii) => {
                 Radius::PerParticle(radii[body..].iter().map(|r| DROP_RADIUS * r).collect())
             }
         };
-        let built = Spheres {
-            centers: &frame.centers[body..],
-            radius: radius_of(&drops),
+        self.drops_per_particle = if is_soft { SOFT_DROPS } else { 1 };
+        let drops = ids.map(|ids| soft_drops(&frame.centers, &frame.radius, body, ids));
+        let built = match &drops {
+            Some((centers, radii)) => Spheres {
+                centers,
+                radius: SphereRadius::Each(radii),
+            },
+            None => Spheres {
+                centers: &frame.centers[body..],
+                radius: radius_of(&plain),
+            },
         };
         let is_moving = !self.displacements.is_empty();
         let settings = BuildSettings {
@@ -237,7 +249,12 @@ impl SurfaceBuilder {
         };
         let built = self.spray.build(&built, &settings);
         if is_moving {
-            self.moving[1].build(&self.spray.tree().view(), &self.displacements[body..]);
+            let count = self.drops_per_particle as usize;
+            let of_spray = self.displacements[body..].iter();
+            let of_drops: Vec<Vec3> = of_spray
+                .flat_map(|displacement| std::iter::repeat_n(*displacement, count))
+                .collect();
+            self.moving[1].build(&self.spray.tree().view(), &of_drops);
         }
         frame.centers.truncate(body);
         self.displacements.truncate(body);
@@ -267,11 +284,16 @@ impl SurfaceBuilder {
     ) -> Result<RayCounts, RenderError> {
         let body = self.body(setup, tree);
         let spray: Box<dyn Shape> = match setup.has_motion() {
-            true => Box::new(MovingSpheres::new(&self.moving[1]).of(MaterialId::SPRAY, self.body)),
-            false => {
-                let spray = SphereSurface::new(self.spray.tree().view());
-                Box::new(spray.of(MaterialId::SPRAY, self.body))
-            }
+            true => Box::new(
+                MovingSpheres::new(&self.moving[1])
+                    .of(MaterialId::SPRAY, self.body)
+                    .of_particles_with(self.drops_per_particle),
+            ),
+            false => Box::new(
+                SphereSurface::new(self.spray.tree().view())
+                    .of(MaterialId::SPRAY, self.body)
+                    .of_particles_with(self.drops_per_particle),
+            ),
         };
         let mut shapes: Vec<&dyn Shape> = vec![&*body];
         if !self.spray.tree().view().is_empty() {
@@ -305,6 +327,27 @@ impl SurfaceBuilder {
             }
         }
     }
+}
+
+/// Centres and radii of the soft drops of the particles from number `body` on.
+fn soft_drops(
+    centers: &[Vec3],
+    radius: &Radius,
+    body: usize,
+    ids: &[u32],
+) -> (Vec<Vec3>, Vec<f32>) {
+    let radius_of = |particle: usize| match radius {
+        Radius::Common(radius) => *radius,
+        Radius::PerParticle(radii) => radii[particle],
+    };
+    let drops = (body..centers.len()).flat_map(|particle| {
+        let (center, radius) = (centers[particle], radius_of(particle));
+        (0..SOFT_DROPS).map(move |number| {
+            let drop = soft_drop(ids[particle], number);
+            (center + radius * drop.offset, radius * drop.radius)
+        })
+    });
+    drops.unzip()
 }
 
 /// The shapes of `trees`, which are `meshes` of a picture.

@@ -129,6 +129,43 @@ fn every_structure_draws_every_surface_alike() {
 }
 
 #[test]
+fn soft_drops_belong_to_particles() {
+    let centers = [Vec3::ZERO, Vec3::X, Vec3::Y, 5.0 * Vec3::X];
+    let ids = [7, 3, 9, 3];
+    let count = SOFT_DROPS as usize;
+    let (drops, radii) = soft_drops(&centers, &Radius::Common(0.5), 1, &ids);
+    assert_eq!([drops.len(), radii.len()], [3 * count; 2]);
+    // Particles with the same id have the same drops
+    for i in 0..count {
+        assert!((drops[i] - drops[2 * count + i] + 4.0 * Vec3::X).length() < 1e-5);
+        assert_eq!(radii[i], radii[2 * count + i]);
+        assert!(drops[i].distance(Vec3::X) < 1.0);
+    }
+    let own = Radius::PerParticle(vec![1.0, 2.0, 1.0, 4.0]);
+    let (_, radii) = soft_drops(&centers, &own, 1, &ids);
+    assert_eq!(radii[2 * count], 2.0 * radii[0]);
+    // They are drawn, and differ from spheres
+    let directory = tempfile::tempdir().expect("a directory");
+    let file = directory.path().join("f_1.npy");
+    spherule_formats::write::npy::write(&file, &particles()).expect("a file");
+    let (mut setup, sequence) = opened(&file);
+    setup.picture.surface.kind = SurfaceKind::Union;
+    setup.picture.surface.spray = true;
+    setup.picture.render.integrator = IntegratorKind::Path;
+    let images = [false, true].map(|is_soft| {
+        setup.picture.scene.is_spray_soft = is_soft;
+        Structure::ALL.map(|structure| {
+            setup.run.accelerator = Some(structure);
+            drawn(&setup, &sequence, &mut CpuRenderer::default()).film
+        })
+    });
+    for structures in &images {
+        assert!(structures.iter().all(|film| *film == structures[0]));
+    }
+    assert!(images[0][0] != images[1][0]);
+}
+
+#[test]
 fn compact_frames_in_place_have_every_surface() {
     let directory = tempfile::tempdir().expect("a directory");
     let file = directory.path().join("f_1.spf");

@@ -9,7 +9,7 @@ use crate::math::{LANES, Lanes, Lanes3, fold, lane3};
 
 impl SampleGroup {
     /// Stores the mean of the `samples` of each pixel, and the data of the pixel. `is_bounded`: samples may have
-    /// negative radiance or a coverage above 1, but pixels may not.
+    /// negative radiance, or a coverage outside 0 to 1, but pixels may not.
     pub(super) fn accumulate(&mut self, samples: u32, is_bounded: bool, tile: &mut FilmTile<'_>) {
         let (share, samples) = (1.0 / samples as f32, samples as usize);
         let mut layers = std::mem::take(&mut self.layers);
@@ -19,7 +19,7 @@ impl SampleGroup {
             let mean = sum.map(|v| v * share);
             let [r, g, b, a] = mean;
             let color = match is_bounded {
-                true => [r.max(0.0), g.max(0.0), b.max(0.0), a.min(1.0)],
+                true => [r.max(0.0), g.max(0.0), b.max(0.0), a.clamp(0.0, 1.0)],
                 false => [r, g, b, a],
             };
             tile.set_color(pixel.column, pixel.row, color);

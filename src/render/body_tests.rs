@@ -71,7 +71,6 @@ fn floor(height: f32) -> Ground {
         fade_start: 1e4,
         fade_end: 2e4,
         pattern: ground::Pattern::Plain,
-        particles: [Vec3::splat(-2.0), Vec3::splat(2.0)],
         shadow_catcher: None,
     }
 }
@@ -312,7 +311,6 @@ fn ground_is_refracted_through_a_slab() {
     for (tile, is_light) in [(0.54, true), (0.53, false)] {
         scene.ground = Some(Ground {
             pattern: ground::Pattern::Checker { tile },
-            particles: [Vec3::splat(-2.0), Vec3::splat(2.0)],
             shadow_catcher: None,
             // The corner of four squares; the camera looks along y.
             center: Vec3::new(-0.1, 0.0, 0.0),

@@ -29,10 +29,10 @@ fn scene(environment: Environment) -> Scene {
             fade_start: 1e3,
             fade_end: 2e3,
             pattern: crate::scene::ground::Pattern::Plain,
-            particles: [Vec3::splat(-2.0), Vec3::splat(2.0)],
             shadow_catcher: None,
         }),
         environment: Some(Arc::new(environment)),
+        particles: [Vec3::splat(-2.0), Vec3::splat(2.0)],
         ..Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).unwrap())
     }
 }

@@ -12,6 +12,7 @@ use super::{
     settings::{IntegratorKind, RenderSettings},
     shading::{BackgroundLanes, CameraLanes},
     source::ShadeSource,
+    spray::is_soft,
 };
 use crate::accel::Coherence;
 use crate::math::Supported;
@@ -23,7 +24,7 @@ const MIN_SAMPLE_WIDTH: f32 = 0.125;
 
 /// A scene ready to be rendered.
 pub(super) struct RenderContext<'a> {
-    /// All shapes but panes; the ground comes first, because it is the cheapest.
+    /// All shapes but panes and soft spray; the ground comes first, because it is the cheapest.
     pub(super) shapes: Vec<&'a dyn Shape>,
     /// Meshes that rays pass.
     pub(super) panes: Vec<&'a dyn Shape>,
@@ -31,6 +32,8 @@ pub(super) struct RenderContext<'a> {
     pub(super) materials: Vec<MaterialId>,
     /// Materials of parts of the particles, if these are separate spheres and paths are traced.
     pub(super) parts: Option<&'a PartMaterials>,
+    /// Spray whose drops fade out; opaque spray is one of the shapes.
+    pub(super) soft_spray: Option<&'a dyn Shape>,
     /// Whether there are meshes that only hide what is behind them.
     pub(super) has_holdouts: bool,
     /// The particles, opaque or transmissive; all other shapes are opaque.
@@ -97,6 +100,8 @@ impl<'a> RenderContext<'a> {
         source: &'a dyn ShadeSource,
         settings: &'a RenderSettings,
     ) -> Self {
+        let is_soft = |shape: &&dyn Shape| is_soft(scene, settings.integrator, *shape);
+        let (spray, shapes): (Vec<_>, Vec<_>) = shapes.into_iter().partition(is_soft);
         let is_opaque = |shape: &&dyn Shape| !is_pane(scene, *shape);
         let (shapes, panes): (Vec<_>, Vec<_>) = shapes.into_iter().partition(is_opaque);
         // Find the particles and the kind of their interior
@@ -116,6 +121,7 @@ impl<'a> RenderContext<'a> {
             parts: Some(&scene.parts)
                 .filter(|parts| !parts.is_empty() && !is_connected)
                 .filter(|_| settings.integrator == IntegratorKind::Path),
+            soft_spray: spray.first().copied(),
             has_holdouts: scene.meshes.iter().any(|mesh| mesh.is_holdout),
             particles,
             source,

@@ -17,6 +17,10 @@ pub(super) const LIGHTS: u32 = 4;
 
 /// Dimension of a path segment: the choice between passing panes and being reflected. It is beyond those of lights.
 pub(super) const PANE: u32 = u32::MAX;
+/// Dimension of a path segment: where it ends in soft spray.
+pub(super) const SPRAY: u32 = u32::MAX - 1;
+/// Dimension of a point of wet ground: the direction of its reflection.
+pub(super) const WET: u32 = u32::MAX - 2;
 /// Dimensions of a camera ray: its point on the lens, and its time.
 pub(super) const LENS: u32 = 0;
 pub(super) const TIME: u32 = 1;

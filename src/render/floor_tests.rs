@@ -14,6 +14,7 @@ use super::{
 };
 use crate::scene::{
     Camera, CameraView, Environment, EnvironmentAxes, Ground, Light, LightKind, RadianceMap,
+    WetGround,
 };
 
 /// Rows of the bright cap around the zenith, of 256.
@@ -231,4 +232,55 @@ fn photons_are_the_same_on_any_number_of_threads_and_can_be_stopped() {
         .color
     };
     assert_eq!(light(10), light(20_000));
+}
+
+/// The floor around a ball of water that it cuts in the middle, with an albedo, and a strength of its wetness.
+fn around_water(environment: Environment, albedo: f32, strength: f32) -> Film {
+    let mut scene = floor(environment);
+    scene.material.ior = 1.333;
+    scene.lights = vec![sun(0.01, Vec3::splat(PI))];
+    if let Some(ground) = &mut scene.ground {
+        ground.color = Vec3::splat(albedo);
+    }
+    scene.wet_ground = Some(WetGround {
+        strength,
+        margin: 0.4,
+    });
+    let ball = Solid::ball_at(Vec3::ZERO, 1.0);
+    image(&ball, &scene, Vec3::ONE, &with_photons(20_000, 16))
+}
+
+#[test]
+fn water_darkens_the_floor_below_and_beside_it() {
+    let [wet, half, dry] = [1.0, 0.5, 0.0].map(|strength| around_water(dark(), 0.36, strength));
+    // Pixels of 0.156 units, in a row from the middle
+    let ratio = |film: &Film, distance: usize| {
+        let pixel = 32 * 16 + 16 + distance;
+        film.color[pixel][0] / dry.color[pixel][0]
+    };
+    // By hand: see the tests of the film
+    for covered in [0, 2, 4] {
+        assert!((ratio(&wet, covered) - 0.556).abs() < 0.01, "{covered}");
+        assert!((ratio(&half, covered) - 0.778).abs() < 0.01, "{covered}");
+    }
+    assert!((ratio(&wet, 7) - 0.556).abs() < 0.03, "{}", ratio(&wet, 7));
+    let edge = ratio(&wet, 8);
+    assert!(edge > 0.56 && edge < 0.95, "{edge}");
+    for far in [11, 13, 15] {
+        assert_eq!(ratio(&wet, far), 1.0, "{far}");
+    }
+}
+
+#[test]
+fn a_wet_floor_beside_water_reflects_the_sky() {
+    let mut lights = [0.0, 1.0].map(|strength| {
+        let film = around_water(white(), 0.0, strength);
+        [0, 7, 15].map(|distance| film.color[32 * 16 + 16 + distance][0])
+    });
+    let ([dry, wet], expected) = (&mut lights, (0.333_f32 / 2.333).powi(2));
+    assert_eq!(dry[1], 0.0);
+    assert!((wet[1] - expected).abs() < 0.2 * expected, "{}", wet[1]);
+    // But not under water, or far from it
+    assert_eq!(wet[0], dry[0]);
+    assert_eq!(wet[2], 0.0);
 }

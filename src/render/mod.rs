@@ -44,6 +44,7 @@ mod settings;
 mod shading;
 mod source;
 mod specular;
+mod spray;
 mod stop;
 mod stream;
 mod tile;
@@ -57,6 +58,8 @@ mod body_tests;
 mod branch_tests;
 #[cfg(test)]
 mod catcher_tests;
+#[cfg(test)]
+mod caustics_tests;
 #[cfg(test)]
 mod filter_tests;
 #[cfg(test)]
@@ -79,6 +82,8 @@ mod path_tests;
 mod poison_tests;
 #[cfg(test)]
 pub(crate) mod solid;
+#[cfg(test)]
+mod spray_tests;
 #[cfg(test)]
 mod whitted_tests;
 
@@ -137,7 +142,7 @@ pub fn scratch_bytes(
     ) + stream::bytes_of_slices(slices)
 }
 
-/// Upper bound of the memory for the light on the ground around transmissive particles, in bytes.
+/// Upper bound of the memory for the light of photons and on the ground around transmissive particles, in bytes.
 pub fn floor_light_bytes(scene: &Scene, settings: &RenderSettings) -> u64 {
     path::floor::bytes(scene, settings)
 }
@@ -199,7 +204,7 @@ pub fn render_into(
     let integrator: Box<dyn Integrator> = match settings.integrator {
         IntegratorKind::Whitted => Box::new(WhittedIntegrator::new(context)),
         IntegratorKind::Path => {
-            let integrator = PathIntegrator::new(context).with_floor_light(stop);
+            let integrator = PathIntegrator::new(context).with_photons(stop);
             let (integrator, traced) = integrator.ok_or(RenderError::Interrupted)?;
             before = traced;
             Box::new(integrator)

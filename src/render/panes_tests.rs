@@ -279,7 +279,6 @@ fn a_shadow_catcher_is_seen_through_panes() {
         fade_start: 1e3,
         fade_end: 2e3,
         pattern: crate::scene::ground::Pattern::Plain,
-        particles: [Vec3::splat(-2.0), Vec3::splat(2.0)],
         shadow_catcher: Some(1.0),
     };
     let mut scene = scene(Vec3::ONE, Vec3::ZERO, &[CLEAR]);

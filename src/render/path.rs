@@ -9,10 +9,11 @@
 //! lights are found by the scattered rays alone.
 //!
 //! Shadow rays to the environment end at transmissive surfaces, because the paths of the BSDF find its light behind
-//! them. Shadow rays to light sources pass straight through: paths cannot find a light without extent.
+//! them. Shadow rays to light sources pass straight through: paths cannot find a light without extent. Where photons
+//! bring the light of a source through transmissive surfaces (`path/caustics.rs`), its shadow rays end there.
 
 use super::{
-    bsdf::{Bsdf, bsdfs_of, reflect_samples, surface_points},
+    bsdf::{Bsdf, Foam, bsdfs_of, reflect_samples, surface_points},
     context::{Interior, RenderContext},
     dimensions::{BOUNCED, BSDF, CONTINUATION, ENVIRONMENT, LIGHTS},
     integrator::Integrator,
@@ -33,13 +34,14 @@ use glam::Vec3;
 
 mod ambient;
 mod catcher;
+pub(super) mod caustics;
 mod emission;
 pub(super) mod floor;
 mod light_channels;
 
 use ambient::AmbientLight;
 use catcher::Catcher;
-use floor::FloorLight;
+use floor::{Caustics, FloorLight};
 
 /// Number of diffuse reflections from which on paths end at random.
 const ROULETTE_START: u32 = 2;
@@ -65,6 +67,8 @@ pub(super) struct PathIntegrator<'a> {
     ambient: Option<AmbientLight>,
     /// The light on the ground, if paths end there.
     floor: Option<FloorLight>,
+    /// The light of photons on other surfaces.
+    caustics: Caustics,
 }
 
 impl<'a> PathIntegrator<'a> {
@@ -75,19 +79,24 @@ impl<'a> PathIntegrator<'a> {
         let rough = RoughInterface::of(material, interface.constants(), is_connected);
         let environment = context.scene.environment.as_deref();
         let environment = environment.filter(|environment| !environment.is_black());
+        let mut bsdfs = bsdfs_of(
+            context.scene.material.finish,
+            &context.scene.meshes,
+            context.scene.parts.materials(),
+        );
+        if context.soft_spray.is_some() {
+            bsdfs[usize::from(MaterialId::SPRAY.0)] = Box::new(Foam);
+        }
         Self {
             ambient: AmbientLight::of(context.settings, environment),
             environment,
-            bsdfs: bsdfs_of(
-                context.scene.material.finish,
-                &context.scene.meshes,
-                context.scene.parts.materials(),
-            ),
+            bsdfs,
             interface,
             rough,
             split: SplitRule::new(context.settings, context.interior),
             catcher: Catcher::of(context.scene),
             floor: None,
+            caustics: Caustics::default(),
             has_extents: context.lights.iter().any(|light| light.has_extent()),
             context,
         }
@@ -164,6 +173,7 @@ impl Integrator for PathIntegrator<'_> {
 }
 
 /// Path segments that end at opaque surfaces.
+#[derive(Clone, Copy)]
 struct Surface<'a> {
     segments: &'a SegmentPacket,
     depth: u32,
@@ -243,6 +253,17 @@ impl PathIntegrator<'_> {
         );
         let (rays, points) = (&surface.segments.rays, &mut packet.surface);
         surface_points(simd, rays, &packet.hits, &packet.base, points);
+        if context.soft_spray.is_some() {
+            // Light that foam scatters leaves from inside its drop, in all directions
+            for lane in lanes_in(packet.hits.lanes_of(MaterialId::SPRAY)) {
+                let inwards = -packet.hits.offset[lane] * lane3(&points.geometric, lane);
+                set_lane3(
+                    &mut points.start,
+                    lane,
+                    lane3(&packet.hits.anchor, lane) + inwards,
+                );
+            }
+        }
         let opacity = &packet.hits.opacity;
         scale(simd, &packet.throughput, opacity, &mut packet.weight);
     }
@@ -346,14 +367,29 @@ impl PathIntegrator<'_> {
         reflect_samples(simd, values, weight, true, lanes, &mut packet.light);
     }
 
-    /// Adds the light of each light source.
+    /// Adds the light of each light source, and of photons.
     fn add_lights(&self, surface: &Surface<'_>, packet: &mut PacketScratch) {
-        let context = &self.context;
-        for (index, light) in context.lights.iter().enumerate() {
+        let with_photons = surface.lanes & self.photon_lanes(&packet.hits);
+        for (index, light) in self.context.lights.iter().enumerate() {
             let competes = light.has_extent() && self.rays_hit_lights();
-            self.reflect_light(index, competes, surface, packet);
-            let group = context.light_group(index);
-            self.add_direct(Occlusion::of(&**light), group, surface, packet);
+            let group = self.context.light_group(index);
+            let opaque = match light.photon_source() {
+                Some(_) => with_photons,
+                None => 0,
+            };
+            for (lanes, occlusion) in [
+                (surface.lanes & !opaque, Occlusion::of(&**light)),
+                (opaque, Occlusion::Opaque),
+            ] {
+                if lanes != 0 {
+                    let surface = &Surface { lanes, ..*surface };
+                    self.reflect_light(index, competes, surface, packet);
+                    self.add_direct(occlusion, group, surface, packet);
+                }
+            }
+        }
+        if with_photons != 0 {
+            self.add_caustics(with_photons, surface, packet);
         }
     }
 

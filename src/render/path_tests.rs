@@ -177,9 +177,9 @@ pub(super) fn floor_from_above(environment: Environment, color: Vec3) -> Scene {
             fade_start: 1e4,
             fade_end: 2e4,
             pattern: crate::scene::ground::Pattern::Plain,
-            particles: [Vec3::splat(-2.0), Vec3::splat(2.0)],
             shadow_catcher: None,
         }),
+        particles: [Vec3::splat(-2.0), Vec3::splat(2.0)],
         ..scene(environment)
     }
 }

@@ -9,12 +9,18 @@ use super::{
     light_split::LightSplit,
     lights::LightSamples,
     materials::ShadingPoints,
+    path::{
+        caustics::NearPhotons,
+        floor::{NEIGHBOURS, Neighbour},
+    },
     ray_counts::RayCounts,
     sample_layers::SampleLayers,
     sampler::PathSeed,
     stream::{RayStreams, SegmentPacket},
     tile::SIDE,
 };
+use glam::Vec3;
+
 use crate::math::{LANES, Lanes, Lanes3, lanes_in, splat};
 use crate::surface::Intersections;
 
@@ -88,6 +94,10 @@ pub(super) struct PacketScratch {
     pub(super) coverage: Lanes,
     /// Particles that contribute to the colour of a point, with weights.
     pub(super) blend: Vec<(u32, f32)>,
+    /// Photons near the point in each lane.
+    pub(super) near: [NearPhotons; LANES],
+    /// Memory for the search for them.
+    pub(super) found: Vec<Neighbour>,
     /// Light by its first interaction.
     pub(super) split: LightSplit,
     /// Light by its source.
@@ -193,7 +203,9 @@ pub(super) fn scratch_bytes(
     };
     let samples = sample_count.div_ceil(LANES) * 6 * size_of::<Lanes>();
     let segments = (rays.div_ceil(LANES) + 4) * 2 * size_of::<SegmentPacket>();
-    let packet = size_of::<PacketScratch>() + size_of::<SegmentPacket>();
+    // Vectors of photons grow by doubling
+    let near = LANES * 2 * NEIGHBOURS * size_of::<(Vec3, Vec3)>();
+    let packet = size_of::<PacketScratch>() + size_of::<SegmentPacket>() + near;
     let layers = SampleLayers::bytes(layers, sample_count);
     (samples + segments + packet + layers) as u64 + 32_768
 }

@@ -3,7 +3,7 @@
 //! Shadow rays pass straight through transmissive bodies, so there are no caustics. Each crossing of a surface
 //! multiplies their transmittance by `transmission*(1-r)`. `r` is for the angle outside on both sides of the surface
 //! (a refracted ray would have come from such an angle, and is never totally reflected). The medium of a connected
-//! body attenuates them as well. Panes attenuate all shadow rays (`panes.rs`).
+//! body attenuates them as well. Panes (`panes.rs`) and soft spray (`spray.rs`) attenuate all shadow rays.
 
 use super::{
     context::{Interior, RenderContext},
@@ -45,6 +45,7 @@ impl RenderContext<'_> {
             self.interior == Interior::Opaque || shape.material() != MaterialId::PARTICLES
         });
         self.attenuate_by_panes(samples);
+        self.attenuate_by_spray(samples, coherence);
         let Some(particles) = self.particles.filter(|_| self.interior != Interior::Opaque) else {
             return samples.lanes;
         };
@@ -80,8 +81,8 @@ impl RenderContext<'_> {
         reached
     }
 
-    /// Traces shadow rays that no shape but a pane lets through, not even a transmissive one. Multiplies the radiance
-    /// of `samples` by the transmittance of panes. Returns the lanes that arrive.
+    /// Traces shadow rays that no shape but panes and soft spray lets through, not even a transmissive one. Multiplies
+    /// the radiance of `samples` by the transmittance of these. Returns the lanes that arrive.
     pub(super) fn unoccluded(
         &self,
         segments: &SegmentPacket,
@@ -92,8 +93,10 @@ impl RenderContext<'_> {
         samples.rays.set_len(segments.rays.len());
         samples.rays.time = segments.rays.time;
         counts.shadow += u64::from(samples.lanes.count_ones());
-        self.occlude(self.coherence(depth), samples, |_| true);
+        let coherence = self.coherence(depth);
+        self.occlude(coherence, samples, |_| true);
         self.attenuate_by_panes(samples);
+        self.attenuate_by_spray(samples, coherence);
         samples.lanes
     }
 

@@ -399,7 +399,6 @@ fn ground_receives_shadows_and_blocks_light_from_below() {
         fade_start: 100.0,
         fade_end: 200.0,
         pattern: crate::scene::ground::Pattern::Plain,
-        particles: [Vec3::splat(-2.0), Vec3::splat(2.0)],
         shadow_catcher: None,
     });
     scene.lights = vec![Light::directional(Vec3::NEG_Z, Vec3::ONE).unwrap()];

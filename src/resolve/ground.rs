@@ -9,7 +9,7 @@ use crate::manifest::{GroundKind, GroundPattern, Manifest};
 use crate::pipeline::Setup;
 use crate::render::IntegratorKind;
 use crate::scene::ground::{GroundImage, Pattern};
-use crate::scene::{Bounds, Ground, Texture};
+use crate::scene::{Bounds, Ground, Texture, WetGround};
 use crate::surface::SurfaceKind;
 
 /// Default edge of a square on the ground as a fraction of the diagonal of the bounds: some squares can be counted
@@ -98,7 +98,7 @@ pub fn add_ground_image(setup: &mut Setup, manifest: &Manifest, texture: &Arc<Te
     let (Some(image), Some(ground)) = (manifest.ground_image(), &mut scene.ground) else {
         return;
     };
-    let [min, max] = ground.particles;
+    let [min, max] = scene.particles;
     let width = match image.width {
         Some(width) => narrow(width),
         None => surface::round(f64::from((max - min).length())),
@@ -111,6 +111,14 @@ pub fn add_ground_image(setup: &mut Setup, manifest: &Manifest, texture: &Arc<Te
         rotation: narrow(image.rotation.to_radians()),
         repeats: image.repeats,
     });
+}
+
+/// How the liquid wets the ground; shadow catchers stay dry.
+pub(super) fn wet_ground(manifest: &Manifest, floor: &Floor<'_>) -> Option<WetGround> {
+    let (strength, margin) = (manifest.render.ground_wetness, narrow(floor.reach));
+    let has_margin = margin > 0.0 && margin.is_finite();
+    let is_wet = strength > 0.0 && has_margin && manifest.has_path_traced_body();
+    is_wet.then_some(WetGround { strength, margin })
 }
 
 #[cfg(test)]

@@ -56,8 +56,6 @@ pub struct Ground {
     pub height: f32,
     /// Diffuse colour, linear RGB.
     pub color: Vec3,
-    /// Corners of the box of the particles of all frames.
-    pub particles: [Vec3; 2],
     /// Centre of the fading.
     pub center: Vec3,
     /// Distance from `center` up to which the ground is opaque.
@@ -117,6 +115,15 @@ pub struct GroundSample {
     pub width: f32,
 }
 
+/// Ground that fluid makes darker and glossy.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WetGround {
+    /// 0 is dry, 1 is physical.
+    pub strength: f32,
+    /// Distance from the fluid within which the ground is wet, about the radius of a particle. Positive.
+    pub margin: f32,
+}
+
 impl Ground {
     /// A ground just below `bounds`, relative to `origin`.
     pub fn under(bounds: &Bounds, up: Vec3, origin: glam::DVec3) -> Self {
@@ -132,7 +139,6 @@ impl Ground {
             up,
             height,
             color: DEFAULT_COLOR,
-            particles: [bounds.min, bounds.max].map(|corner| (corner - origin).as_vec3()),
             center: center + (height - center.dot(up)) * up,
             fade_start: FADE_START * diagonal,
             fade_end: FADE_END * diagonal,

@@ -27,7 +27,7 @@ pub use background::Background;
 pub use camera::{Camera, CameraError, CameraView, Framing, Lens};
 pub use colormap::{ColorMap, UnknownColorMap};
 pub use environment::{Environment, EnvironmentAxes, IrradianceHarmonics, RadianceMap};
-pub use ground::Ground;
+pub use ground::{Ground, WetGround};
 pub use lens::{Aperture, Focus, LensSettings};
 pub use light::{Falloff, Light, LightKind, default_lights};
 pub use material::{Finish, Fresnel, Material, MaterialError};
@@ -92,8 +92,14 @@ pub struct Scene {
     pub background: Background,
     /// Optional ground.
     pub ground: Option<Ground>,
+    /// How the fluid wets a visible ground, with path tracing.
+    pub wet_ground: Option<WetGround>,
     /// The materials of meshes, by the index of each mesh.
     pub meshes: Vec<MeshMaterial>,
+    /// Corners of the box of the particles of all frames: the target of photons.
+    pub particles: [Vec3; 2],
+    /// Whether spray is drawn as drops that fade out, with path tracing; otherwise it is matte spheres.
+    pub is_spray_soft: bool,
     /// Light from infinitely far away, for path tracing.
     pub environment: Option<Arc<Environment>>,
     /// Whether camera rays without an intersection see the environment instead of the background.
@@ -136,7 +142,10 @@ impl Scene {
             parts: PartMaterials::default(),
             background: Background::Constant(Vec3::ZERO),
             ground: None,
+            wet_ground: None,
             meshes: Vec::new(),
+            particles: [Vec3::ZERO; 2],
+            is_spray_soft: false,
             environment: None,
             is_environment_visible: false,
             environment_group: 0,

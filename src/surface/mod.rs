@@ -24,6 +24,6 @@ pub use intersections::{Intersection, Intersections, MaterialId};
 pub use normals::ShadingNormals;
 pub use pca::PcaNormals;
 pub use plane::Plane;
-pub use settings::{NormalKind, SurfaceKind, SurfaceSettings};
+pub use settings::{NormalKind, SprayStyle, SurfaceKind, SurfaceSettings};
 pub use shape::{Shape, Side};
 pub(crate) use transmittance::TransmittanceProduct;

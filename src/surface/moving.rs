@@ -17,6 +17,8 @@ pub struct MovingSpheres<'a> {
     material: MaterialId,
     /// Index in the frame of the tree's particle 0.
     first: u32,
+    /// Number of spheres of each particle.
+    spheres: u32,
     simd: Supported,
 }
 
@@ -27,6 +29,7 @@ impl<'a> MovingSpheres<'a> {
             tree,
             material: MaterialId::PARTICLES,
             first: 0,
+            spheres: 1,
             simd: Supported::default(),
         }
     }
@@ -39,6 +42,20 @@ impl<'a> MovingSpheres<'a> {
             first,
             ..self
         }
+    }
+
+    /// Sets the number of spheres of each particle, one or more, which follow each other in the tree's numbers.
+    #[must_use]
+    pub fn of_particles_with(self, spheres: u32) -> Self {
+        Self {
+            spheres: spheres.max(1),
+            ..self
+        }
+    }
+
+    /// Index in the frame of the particle of a sphere of the tree.
+    fn particle_of(&self, sphere: u32) -> u32 {
+        self.first + sphere / self.spheres
     }
 }
 
@@ -78,7 +95,7 @@ impl Shape for MovingSpheres<'_> {
         for lane in lanes_in(hit_lanes) {
             debug_assert_ne!(found.slot[lane], MovingHits::NO_SLOT);
             rays.t_max[lane] = found.t[lane];
-            hits.particle[lane] = self.first + self.tree.particle(found.slot[lane]);
+            hits.particle[lane] = self.particle_of(self.tree.particle(found.slot[lane]));
             hits.material[lane] = self.material;
         }
         hits.mask |= hit_lanes;
@@ -101,7 +118,7 @@ impl Shape for MovingSpheres<'_> {
             self.tree
                 .visit_chords(rays, lane, |particle, radius, ends| {
                     let cosine = 0.5 * (ends[1] - ends[0]) / radius;
-                    let part = fresnel_transmittance(cosine, self.first + particle);
+                    let part = fresnel_transmittance(cosine, self.particle_of(particle));
                     ends.iter()
                         .filter(|t| is_within(t))
                         .all(|_| product.multiply(part))

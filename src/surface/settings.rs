@@ -26,6 +26,16 @@ pub enum NormalKind {
     Pca,
 }
 
+/// How foam and spray are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SprayStyle {
+    /// Drops of different sizes that fade out towards their silhouettes.
+    #[default]
+    Soft,
+    /// White spheres.
+    Spheres,
+}
+
 /// Everything that defines a surface apart from particles and radii. Lengths are in particle radii, as in splashsurf,
 /// so that its parameters can be used here.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,8 +54,10 @@ pub struct SurfaceSettings {
     pub smoothing_length: f32,
     /// Value of the colour field at the surface; inside it is about 1.
     pub threshold: f32,
-    /// Draw particles with few neighbours as white spheres that are not part of the surface.
+    /// Draw particles with few neighbours as white drops that are not part of the surface.
     pub spray: bool,
+    /// How these are drawn.
+    pub spray_style: SprayStyle,
 }
 
 impl SurfaceSettings {
@@ -59,6 +71,7 @@ impl SurfaceSettings {
         smoothing_length: 2.0,
         threshold: 0.6,
         spray: false,
+        spray_style: SprayStyle::Soft,
     };
 }
 

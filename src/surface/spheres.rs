@@ -27,6 +27,8 @@ pub struct SphereSurface<'a> {
     material: MaterialId,
     /// Index in the frame of the tree's particle 0.
     first: u32,
+    /// Number of spheres of each particle, one after the other.
+    spheres: u32,
     simd: Supported,
 }
 
@@ -38,6 +40,7 @@ impl<'a> SphereSurface<'a> {
             normals: ShadingNormals::Sphere,
             material: MaterialId::PARTICLES,
             first: 0,
+            spheres: 1,
             simd: Supported::or_best(tree.simd()),
         }
     }
@@ -56,6 +59,21 @@ impl<'a> SphereSurface<'a> {
             first,
             ..self
         }
+    }
+
+    /// Sets the number of spheres of each particle, one or more, which follow each other in the tree's numbers.
+    #[must_use]
+    pub fn of_particles_with(self, spheres: u32) -> Self {
+        Self {
+            spheres: spheres.max(1),
+            ..self
+        }
+    }
+
+    /// Index in the frame of the particle of a sphere of the tree.
+    #[inline(always)]
+    fn particle_of(&self, sphere: u32) -> u32 {
+        self.first + sphere / self.spheres
     }
 }
 
@@ -94,7 +112,7 @@ impl Shape for SphereSurface<'_> {
         let hit = self.tree.nearest(ray)?;
         let hit = sphere_hit(&self.tree, ray, hit, &self.normals);
         Some(Intersection {
-            particle: self.first + hit.particle,
+            particle: self.particle_of(hit.particle),
             ..hit
         })
     }
@@ -129,7 +147,7 @@ impl Shape for SphereSurface<'_> {
         // End the rays at their hits
         for lane in lanes_in(hit_lanes) {
             rays.t_max[lane] = found.t[lane];
-            hits.particle[lane] = self.first + self.tree.particle(found.slot[lane]);
+            hits.particle[lane] = self.particle_of(self.tree.particle(found.slot[lane]));
             hits.material[lane] = self.material;
         }
         hits.mask |= hit_lanes;
@@ -170,7 +188,7 @@ impl Shape for SphereSurface<'_> {
             for lane in lanes_in(lanes) {
                 self.each_crossing_once(&rays.ray(lane), |crossing| {
                     let radius = self.tree.sphere(crossing.slot).1;
-                    let particle = self.first + self.tree.particle(crossing.slot);
+                    let particle = self.particle_of(self.tree.particle(crossing.slot));
                     product[lane].multiply(fresnel_transmittance(
                         crossing.half_chord / radius,
                         particle,
@@ -180,7 +198,7 @@ impl Shape for SphereSurface<'_> {
         } else {
             self.tree.visit_chords(rays, lanes, |lane, chord| {
                 let radius = self.tree.sphere(chord.slot).1;
-                let particle = self.first + self.tree.particle(chord.slot);
+                let particle = self.particle_of(self.tree.particle(chord.slot));
                 let part = fresnel_transmittance(chord.half() / radius, particle);
                 let is_within = |t: &f32| *t >= rays.t_min[lane] && *t < rays.t_max[lane];
                 chord

@@ -68,6 +68,49 @@ fn spray_has_few_neighbours_in_every_structure() {
 }
 
 #[test]
+fn a_particle_has_many_soft_drops_of_different_sizes() {
+    let drops = (0..500).flat_map(|id| (0..SOFT_DROPS).map(move |number| soft_drop(id, number)));
+    let drops: Vec<SoftDrop> = drops.collect();
+    let count = drops.len() as f32;
+    let in_range = |drop: &SoftDrop| {
+        drop.offset.length() <= SOFT_SPREAD + 1e-5
+            && (SOFT_RADII[0]..SOFT_RADII[1]).contains(&drop.radius)
+    };
+    assert!(drops.iter().all(in_range));
+    // Around the particle, and a third of the way between the sizes, because of the square
+    let middle = drops.iter().map(|drop| drop.offset).sum::<Vec3>() / count;
+    assert!(middle.length() < 0.05, "{middle}");
+    let radius = drops.iter().map(|drop| drop.radius).sum::<f32>() / count;
+    let expected = SOFT_RADII[0] + (SOFT_RADII[1] - SOFT_RADII[0]) / 3.0;
+    assert!((radius - expected).abs() < 0.01, "{radius}");
+    let near = drops
+        .iter()
+        .filter(|drop| drop.offset.length() < 0.5 * SOFT_SPREAD);
+    assert!(near.count() as f32 > 0.25 * count);
+    for pair in drops.windows(2) {
+        assert_ne!(pair[0], pair[1]);
+    }
+    assert_eq!(soft_drop(7, 3), soft_drop(7, 3));
+}
+
+#[test]
+fn all_spheres_of_a_particle_have_its_index() {
+    let centers: Vec<Vec3> = (0..6_u8).map(|i| f32::from(i) * 3.0 * Vec3::X).collect();
+    let tree = built(&centers, 1.0, &BuildSettings::default());
+    let spheres = SphereSurface::new(tree.tree().view()).of(MaterialId::SPRAY, 10);
+    let spheres = spheres.of_particles_with(3);
+    let mut rays = RayPacket::default();
+    for center in &centers {
+        rays.push(&Ray::new(*center - 5.0 * Vec3::Z, Vec3::Z));
+    }
+    let mut hits = Intersections::default();
+    spheres.intersect(&mut rays, Coherence::Coherent, 0, &mut hits);
+    assert_eq!(hits.particle[..6], [10, 10, 10, 11, 11, 11]);
+    let single = spheres.nearest(&Ray::new(centers[5] - 5.0 * Vec3::Z, Vec3::Z));
+    assert_eq!(single.map(|hit| hit.particle), Some(11));
+}
+
+#[test]
 fn spray_is_hit_beside_and_before_a_body() {
     let body = built(&[Vec3::ZERO, Vec3::X], 1.0, &BuildSettings::default());
     let drops = [

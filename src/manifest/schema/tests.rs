@@ -15,7 +15,7 @@ const EVERYTHING: &str = r#"
 input = { path = ["a", "b"], frames = 7, radius = { attribute = "d", scale = 0.5 }, up = "-y", verify = true }
 camera = { mode = "keys", key = [{ frame = 9, eye = [1, 2, 3], look_at = [0, 0, 0], fov = 30 }] }
 render = { surface = "smooth", integrator = "path", bounces = 0, ground_pattern = "checker", ground_tile = 0.5, background = { bottom = [0, 0, 0], top = [1, 1, 1] }, ground = true, ground_height = -2, memory_limit = "1.5GiB" }
-surface = { normals = "field", smoothing = 1, exact = true, voxel = 0.5, smoothing_length = 2.5, threshold = 0.55, spray = true }
+surface = { normals = "field", smoothing = 1, exact = true, voxel = 0.5, smoothing_length = 2.5, threshold = 0.55, spray = true, spray_style = "spheres" }
 material = { color = { attribute = "velocity", map = "red-blue", range = [-1, 1] }, absorption = [0.5, 1, 0], absorption_length = 3, fresnel = "exact" }
 light = [{ type = "directional", direction = [0, 0, -2] }, { type = "point", position = [1, 1, 1], falloff = "inverse-square" }, { type = "sun", direction = [0, 0, -2], size = 2 }, { type = "sphere", position = [1, 1, 1], radius = 2, visible = true }, { type = "rect", position = [1, 1, 1], direction = [0, 1, 0], width = 2, height = 3 }, { type = "disc", position = [1, 1, 1], direction = [0, 1, 0], radius = 2 }]
 mesh = [{ path = "tank.stl" }, { path = "w.##.ply", material = "glass", color = [1, 1, 0.5], roughness = 0, normals = "flat", faces = "back", scale = 0.001, translate = [1, 0, 0] }, { path = "b", holdout = true }]

@@ -18,6 +18,7 @@ use crate::surface::Intersections;
 
 #[cfg(test)]
 mod finish_tests;
+mod foam;
 mod local;
 mod matte;
 mod metal;
@@ -26,6 +27,7 @@ mod plastic;
 #[cfg(test)]
 mod tests;
 
+pub(super) use foam::Foam;
 use matte::Matte;
 use metal::Metal;
 use plastic::Plastic;
@@ -65,7 +67,7 @@ pub(super) struct BsdfSamples {
     pub(super) pdf: Lanes,
 }
 
-/// Reflection at an opaque surface. Directions below the geometric surface have no weight.
+/// Reflection at an opaque surface. Directions below the geometric surface have no weight, except for foam.
 pub(super) trait Bsdf: Sync {
     /// Stores the values for light from unit `direction` that leaves against `rays`, only for `lanes`.
     fn eval(

@@ -72,6 +72,13 @@ impl Random {
     }
 }
 
+/// Matte surfaces and foam.
+fn bsdfs() -> Vec<Box<dyn Bsdf>> {
+    let mut bsdfs = bsdfs_of(Finish::Matte, &[], &[]);
+    bsdfs[1] = Box::new(Foam);
+    bsdfs
+}
+
 /// Normals, and a direction in which light leaves.
 fn cases() -> [[Vec3; 2]; 3] {
     let normals = [
@@ -84,7 +91,7 @@ fn cases() -> [[Vec3; 2]; 3] {
 
 #[test]
 fn densities_integrate_to_one_and_no_light_is_created() {
-    for (bsdf, [normal, outgoing]) in bsdfs_of(Finish::Matte, &[], &[]).iter().zip(cases()) {
+    for (bsdf, [normal, outgoing]) in bsdfs().iter().zip(cases()) {
         let (mut random, packets) = (Random(7), 20_000_u16);
         let (mut density, mut reflected) = (0.0, Vec3::ZERO);
         for _ in 0..packets {
@@ -145,7 +152,7 @@ fn bin_of(direction: Vec3, normal: Vec3) -> Option<usize> {
 
 #[test]
 fn samples_have_their_density() {
-    for (bsdf, [normal, outgoing]) in bsdfs_of(Finish::Matte, &[], &[]).iter().zip(cases()) {
+    for (bsdf, [normal, outgoing]) in bsdfs().iter().zip(cases()) {
         let (points, packets) = (points(normal, normal), 8192_u16);
         let mut random = Random(3);
         // Count samples, and check each against the values for its direction

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::light::{Beam, Light, LightSamples};
+use super::light::{Beam, Light, LightSamples, PhotonSource};
 use crate::math::{Lanes, Lanes3, Supported, splat, splat3};
 
 /// A light with parallel rays.
@@ -35,11 +35,12 @@ impl Light for DirectionalLight {
         self.casts_shadow
     }
 
-    fn beam(&self) -> Option<Beam> {
-        self.casts_shadow.then_some(Beam {
+    fn photon_source(&self) -> Option<PhotonSource> {
+        let beam = Beam {
             to_light: self.to_light,
             cap: 0.0,
             irradiance: self.irradiance,
-        })
+        };
+        self.casts_shadow.then_some(PhotonSource::Distant(beam))
     }
 }

@@ -28,8 +28,8 @@ pub(in crate::render) trait Light: Sync {
         false
     }
 
-    /// The light as parallel rays, if it is infinitely far away and casts shadows: it emits photons.
-    fn beam(&self) -> Option<Beam> {
+    /// Where the photons of the light come from. `None` if it emits none: it casts no shadows, or is not physical.
+    fn photon_source(&self) -> Option<PhotonSource> {
         None
     }
 
@@ -43,6 +43,33 @@ pub(in crate::render) trait Light: Sync {
         let _ = (simd, rays);
         emission.lanes = 0;
     }
+}
+
+/// The origin of photons.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::render) enum PhotonSource {
+    /// Infinitely far away.
+    Distant(Beam),
+    /// A point, with its radiant intensity, linear RGB.
+    Point { position: Vec3, intensity: Vec3 },
+    /// The outside of a sphere, with its radiance, linear RGB.
+    Sphere {
+        center: Vec3,
+        radius: f32,
+        radiance: Vec3,
+    },
+    /// One side of a rectangle or an ellipse.
+    Panel {
+        center: Vec3,
+        /// Unit vectors along the width and the height, and in the direction that the light shines.
+        axes: [Vec3; 3],
+        /// Half the width and half the height.
+        half: [f32; 2],
+        is_ellipse: bool,
+        area: f32,
+        /// Linear RGB.
+        radiance: Vec3,
+    },
 }
 
 /// Light from infinitely far away.

@@ -19,7 +19,7 @@ mod tests;
 
 use directional::DirectionalLight;
 pub(super) use environment::{environment_along, sample_directions, sample_environment};
-pub(super) use light::{Beam, Emission, Light, LightSamples};
+pub(super) use light::{Beam, Emission, Light, LightSamples, PhotonSource};
 use panel::{Outline, PanelLight};
 use point::PointLight;
 use sphere::SphereLight;

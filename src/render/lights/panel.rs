@@ -12,7 +12,7 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 
-use super::light::{Emission, Light, LightSamples};
+use super::light::{Emission, Light, LightSamples, PhotonSource};
 use crate::math::functions::{acos, sin_cos};
 use crate::math::{LANES, Lanes, Lanes3, Supported, lane_kernel};
 use crate::ray::RayPacket;
@@ -76,6 +76,17 @@ impl Light for PanelLight {
 
     fn has_extent(&self) -> bool {
         true
+    }
+
+    fn photon_source(&self) -> Option<PhotonSource> {
+        Some(PhotonSource::Panel {
+            center: self.center,
+            axes: self.axes,
+            half: self.half,
+            is_ellipse: self.outline == Outline::Ellipse,
+            area: self.area(),
+            radiance: self.radiance,
+        })
     }
 
     fn is_visible(&self) -> bool {

@@ -7,7 +7,7 @@
 
 use glam::Vec3;
 
-use super::light::{Light, LightSamples};
+use super::light::{Light, LightSamples, PhotonSource};
 use crate::math::{LANES, Lanes, Lanes3, Supported, lane_kernel};
 use crate::scene::Falloff;
 
@@ -33,6 +33,15 @@ impl Light for PointLight {
 
     fn casts_shadow(&self) -> bool {
         self.casts_shadow
+    }
+
+    fn photon_source(&self) -> Option<PhotonSource> {
+        // Light that does not fall off with distance has no flux that is conserved
+        let is_physical = self.falloff == Falloff::InverseSquare;
+        (self.casts_shadow && is_physical).then_some(PhotonSource::Point {
+            position: self.position,
+            intensity: self.intensity,
+        })
     }
 }
 

@@ -9,7 +9,7 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 
-use super::light::{Emission, Light, LightSamples};
+use super::light::{Emission, Light, LightSamples, PhotonSource};
 use crate::math::{LANES, Lanes, Lanes3, Supported, lane_kernel};
 use crate::ray::RayPacket;
 use crate::render::shading::in_cone;
@@ -36,6 +36,14 @@ impl Light for SphereLight {
 
     fn has_extent(&self) -> bool {
         true
+    }
+
+    fn photon_source(&self) -> Option<PhotonSource> {
+        Some(PhotonSource::Sphere {
+            center: self.center,
+            radius: self.radius,
+            radiance: self.radiance,
+        })
     }
 
     fn is_visible(&self) -> bool {

@@ -4,7 +4,7 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 
-use super::light::{Beam, Emission, Light, LightSamples};
+use super::light::{Beam, Emission, Light, LightSamples, PhotonSource};
 use crate::math::{LANES, Lanes, Lanes3, Supported, lane_kernel};
 use crate::ray::RayPacket;
 use crate::render::shading::in_cone;
@@ -53,12 +53,12 @@ impl Light for SunLight {
         true
     }
 
-    fn beam(&self) -> Option<Beam> {
-        Some(Beam {
+    fn photon_source(&self) -> Option<PhotonSource> {
+        Some(PhotonSource::Distant(Beam {
             to_light: self.to_light,
             cap: self.cap,
             irradiance: self.irradiance,
-        })
+        }))
     }
 
     fn is_visible(&self) -> bool {

@@ -4,14 +4,15 @@
 //! is coverage by black.
 //!
 //! The fraction from a single sample may exceed 1, but not its mean; `accumulate` bounds pixels. Transmissive particles
-//! attenuate light in a straight line. Light that particles reflect to the ground is left out. All other rays see a
-//! matte ground.
+//! attenuate light in a straight line. The light of sources that emit photons ends at them instead, and caustics are a
+//! negative loss: they brighten the background, but add no coverage to transparent images. Light that opaque particles
+//! reflect to the ground is left out. All other rays see a matte ground.
 
 use std::f32::consts::FRAC_1_PI;
 
 use glam::Vec3;
 
-use super::{PathIntegrator, Surface, lanes_where};
+use super::{Occlusion, PathIntegrator, Surface, lanes_where};
 use crate::math::{Lanes3, lane3, lanes_in, set_lane3, splat, splat3};
 use crate::ray::RayPacket;
 use crate::render::{
@@ -78,6 +79,13 @@ impl PathIntegrator<'_> {
             self.lose_environment(environment, surface, packet, &mut light);
         }
         self.lose_lights(surface, packet, &mut light);
+        if let Some(caustics) = &self.caustics.catcher {
+            for lane in lanes_in(surface.lanes) {
+                let caustics = caustics.white(lane3(&packet.hits.point, lane));
+                let lost = lane3(&light.lost, lane) - caustics;
+                set_lane3(&mut light.lost, lane, lost);
+            }
+        }
         // Darken the background by the lost fraction
         let is_transparent = self.context.settings.transparent_background;
         for lane in lanes_in(surface.lanes) {
@@ -160,14 +168,24 @@ impl PathIntegrator<'_> {
                 let sum = lane3(&light.whole, lane) + lane3(&packet.light.radiance, lane);
                 set_lane3(&mut light.whole, lane, sum);
             }
-            if self.context.lights[index].casts_shadow() {
-                self.add_lost(surface, packet, light);
-            }
+            let source = &self.context.lights[index];
+            let is_focused = self.caustics.catcher.is_some() && source.photon_source().is_some();
+            let occlusion = match is_focused {
+                true => Occlusion::Opaque,
+                false => Occlusion::of(&**source),
+            };
+            self.add_lost(occlusion, surface, packet, light);
         }
     }
 
     /// Traces the shadow rays of `packet.light`, and adds what does not arrive.
-    fn add_lost(&self, surface: &Surface<'_>, packet: &mut PacketScratch, light: &mut CaughtLight) {
+    fn add_lost(
+        &self,
+        occlusion: Occlusion,
+        surface: &Surface<'_>,
+        packet: &mut PacketScratch,
+        light: &mut CaughtLight,
+    ) {
         let PacketScratch {
             light: samples,
             crossings,
@@ -178,8 +196,14 @@ impl PathIntegrator<'_> {
         if lanes == 0 {
             return;
         }
-        let (segments, depth) = (surface.segments, surface.depth);
-        let visible = (self.context).trace_shadow_rays(segments, depth, samples, crossings, counts);
+        let (context, segments, depth) = (&self.context, surface.segments, surface.depth);
+        let visible = match occlusion {
+            Occlusion::None => return,
+            Occlusion::Straight => {
+                context.trace_shadow_rays(segments, depth, samples, crossings, counts)
+            }
+            Occlusion::Opaque => context.unoccluded(segments, depth, samples, counts),
+        };
         for lane in lanes_in(lanes) {
             let arriving = match visible >> lane & 1 {
                 0 => Vec3::ZERO,

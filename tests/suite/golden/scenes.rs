@@ -55,6 +55,7 @@ const SPHERES: SurfaceSettings = SurfaceSettings {
     smoothing_length: 2.0,
     threshold: 0.6,
     spray: false,
+    spray_style: spherule::surface::SprayStyle::Spheres,
 };
 
 /// Owned colours.
@@ -256,7 +257,6 @@ fn floor(height: f32) -> Ground {
         fade_start: 4.0,
         fade_end: 12.0,
         pattern: spherule::scene::ground::Pattern::Plain,
-        particles: [Vec3::splat(-2.0), Vec3::splat(2.0)],
         shadow_catcher: None,
     }
 }

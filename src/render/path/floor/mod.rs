@@ -1,11 +1,17 @@
 //! Light on the ground around transmissive particles, computed once for each image. Paths that find light only through
 //! refracting surfaces are noise in a picture, so they end at the ground, where two maps have their light:
 //!
-//! - caustics: photons of the sun that pass through particles (`photons.rs`, `density.rs`)
+//! - caustics: photons of lights that pass through particles (`emitter.rs`, `photons.rs`, `density.rs`)
 //! - the light of the environment, which varies slowly (`sky.rs`)
 //!
+//! A third map shows where the ground is wet (`wet.rs`).
+//!
 //! What arrives straight from light sources is sampled at each point of the ground as on other surfaces.
+//!
+//! A shadow catcher has the caustics only. The photons of meshes are stored one by one (`photon_map.rs`), and
+//! `caustics.rs` adds their light.
 
+use std::collections::BTreeSet;
 use std::f32::consts::FRAC_1_PI;
 use std::sync::Arc;
 
@@ -13,6 +19,7 @@ use glam::Vec3;
 
 use super::{Occlusion, PathIntegrator, Surface};
 use crate::math::{lane3, lanes_in, set_lane3, splat3};
+use crate::render::lights::PhotonSource;
 use crate::render::{
     layers::LightClass,
     ray_counts::RayCounts,
@@ -24,29 +31,39 @@ use crate::render::{
 use crate::scene::{Ground, Scene};
 
 mod density;
+mod emitter;
+mod photon_map;
 mod photons;
 mod sky;
+mod wet;
 
 /// Width of the border of the maps over which they fade to the light without particles, as a fraction of their edge.
 const BORDER: f32 = 0.1;
 
+pub(super) use photon_map::PhotonMap;
+pub(in crate::render) use photon_map::{NEIGHBOURS, Neighbour};
+
+use emitter::Emitter;
+use photon_map::Collector;
+use photons::{GroundCells, Targets, trace_photons};
+use wet::{WetMap, WetScene};
+
 /// See the module. All maps contain the radiance of a white ground.
 #[derive(Debug, Clone)]
 pub(super) struct FloorLight {
-    square: Square,
-    caustics: Arc<Map>,
+    caustics: CausticMap,
     sky: Map,
+    wet: Option<WetMap>,
     /// Light of the environment without particles.
     open: Vec3,
-    /// The same light by light group; empty if the film has no layers for groups.
-    groups: Vec<GroupMaps>,
+    /// The light of the sky by light group; empty if the film has no layers for groups.
+    groups: Vec<GroupSky>,
 }
 
-/// The light of a light group in the maps.
-#[derive(Debug, Clone, Default)]
-struct GroupMaps {
-    caustics: Option<Arc<Map>>,
-    sky: Option<Map>,
+/// The light of a light group from the environment.
+#[derive(Debug, Clone)]
+struct GroupSky {
+    sky: Map,
     open: Vec3,
 }
 
@@ -58,8 +75,6 @@ struct Square {
     axes: [Vec3; 2],
     normal: Vec3,
     edge: f32,
-    /// Corners of the box of the particles.
-    particles: [Vec3; 2],
 }
 
 impl Square {
@@ -69,7 +84,6 @@ impl Square {
             axes: ground.axes(),
             normal: ground.up,
             edge: ground.fade_start,
-            particles: ground.particles,
         }
     }
 
@@ -129,75 +143,181 @@ fn corners(side: usize, position: [f32; 2]) -> [(usize, f32); 4] {
     ]
 }
 
-/// Whether the ground of a scene gets maps.
-fn has_maps(scene: &Scene, settings: &RenderSettings) -> bool {
-    let ground = scene.ground.as_ref();
+/// Light of photons on the ground.
+#[derive(Debug, Clone)]
+pub(super) struct CausticMap {
+    square: Square,
+    map: Arc<Map>,
+    /// The same light by light group.
+    groups: Vec<(usize, Arc<Map>)>,
+}
+
+impl CausticMap {
+    /// Radiance of a white ground at `point`.
+    pub(super) fn white(&self, point: Vec3) -> Vec3 {
+        self.weighted(&self.map, point)
+    }
+
+    /// The same of each light group.
+    pub(super) fn white_of_groups(&self, point: Vec3) -> impl Iterator<Item = (usize, Vec3)> {
+        let groups = self.groups.iter();
+        groups.map(move |(group, map)| (*group, self.weighted(map, point)))
+    }
+
+    fn weighted(&self, map: &Map, point: Vec3) -> Vec3 {
+        let position = self.square.position(point);
+        match Square::weight(position) {
+            weight if weight > 0.0 => weight * map.at(position),
+            _ => Vec3::ZERO,
+        }
+    }
+}
+
+/// Light of photons beside that on a visible ground.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Caustics {
+    /// On a shadow catcher.
+    pub(super) catcher: Option<CausticMap>,
+    /// On meshes.
+    pub(super) meshes: Option<PhotonMap>,
+}
+
+/// Whether particles focus light in pictures with these settings.
+fn has_photons(scene: &Scene, settings: &RenderSettings) -> bool {
     settings.integrator == IntegratorKind::Path
         && settings.photons > 0
         && scene.material.transmission > 0.0
-        && ground.is_some_and(|ground| ground.shadow_catcher.is_none())
 }
 
-/// Upper bound of the memory for the maps of a scene while they are computed, in bytes.
+fn is_catcher(ground: &Ground) -> bool {
+    ground.shadow_catcher.is_some()
+}
+
+/// Upper bound of the memory for the light of photons and of the sky while it is computed, in bytes.
 pub(in crate::render) fn bytes(scene: &Scene, settings: &RenderSettings) -> u64 {
-    match has_maps(scene, settings) {
-        true => {
-            let groups = u64::from(settings.channels.layers.light_groups);
-            let own_maps = match photons::groups(scene).len() as u64 {
-                0 | 1 => 0,
-                several => several.min(groups),
-            };
-            (1 + own_maps) * density::BYTES + photons::BYTES + (1 + groups) * sky::BYTES
-        }
+    if !has_photons(scene, settings) {
+        return 0;
+    }
+    let emits = !scene.lights.is_empty();
+    // Layers of light groups have maps of their own
+    let groups = u64::from(settings.channels.layers.light_groups);
+    let of_lights: BTreeSet<u8> = scene.lights.iter().map(|light| light.group).collect();
+    let caustics = match of_lights.len() as u64 {
+        0 | 1 => density::BYTES,
+        several => (1 + several.min(groups)) * density::BYTES,
+    };
+    let of_ground = match &scene.ground {
+        Some(ground) if !is_catcher(ground) => caustics + (1 + groups) * sky::BYTES + wet::BYTES,
+        Some(_) if emits => caustics,
+        _ => 0,
+    };
+    let has_meshes = emits && scene.meshes.iter().any(|mesh| !mesh.is_pane());
+    let of_meshes = match has_meshes {
+        true => photon_map::bytes(settings.photons),
         false => 0,
+    };
+    match of_ground + of_meshes {
+        0 => 0,
+        stored => stored + photons::bytes(has_meshes),
     }
 }
 
 impl<'a> PathIntegrator<'a> {
-    /// The integrator with maps of the light on the ground, if the scene needs them, and the rays that were traced for
-    /// them. `None` if `stop` is raised.
-    pub(in crate::render) fn with_floor_light(
-        mut self,
-        stop: &dyn Stop,
-    ) -> Option<(Self, RayCounts)> {
-        let Some(ground) = self
-            .context
-            .scene
-            .ground
-            .as_ref()
-            .filter(|_| has_maps(self.context.scene, self.context.settings))
-        else {
+    /// The integrator with the light of photons, and maps of the light on the ground, if the scene needs them; and the
+    /// rays that were traced for them. `None` if `stop` is raised.
+    pub(in crate::render) fn with_photons(mut self, stop: &dyn Stop) -> Option<(Self, RayCounts)> {
+        let (scene, settings) = (self.context.scene, self.context.settings);
+        if !has_photons(scene, settings) {
             return Some((self, RayCounts::default()));
-        };
-        let square = Square::of(ground);
-        let (caustics, of_photons) = photons::caustics(&self, &square, stop)?;
-        let (sky, of_sky) = sky::sky(&self, &square, stop)?;
-        let open = self
-            .environment
-            .map(|e| e.irradiance(ground.up) * FRAC_1_PI);
-        let open = open.unwrap_or_default();
-        // Put the light of each group together
-        let maps = |sky| GroupMaps {
-            sky: Some(sky),
-            ..GroupMaps::default()
-        };
-        let mut groups: Vec<GroupMaps> = sky.groups.into_iter().map(maps).collect();
-        for (group, map) in caustics.groups {
-            if let Some(maps) = groups.get_mut(group) {
-                maps.caustics = Some(map);
-            }
         }
-        if let Some(maps) = groups.get_mut(self.context.environment_group()) {
-            maps.open = open;
+        let sources = self.photon_sources();
+        let ground = scene.ground.as_ref();
+        let floor = ground.filter(|ground| !is_catcher(ground));
+        let catcher = ground.filter(|g| is_catcher(g) && !sources.is_empty());
+        let has_meshes = !sources.is_empty() && self.has_opaque_meshes();
+        // Trace the photons
+        let square = floor.or(catcher).map(Square::of);
+        let groups: BTreeSet<usize> = match settings.channels.layers.light_groups {
+            0 => BTreeSet::new(),
+            _ => sources.iter().map(|(group, _)| *group).collect(),
+        };
+        let mut cells = square.map(|_| GroundCells::new(&groups));
+        let mut collector = has_meshes.then(Collector::new);
+        let mut counts = RayCounts::default();
+        if square.is_some() || has_meshes {
+            let emitters = Emitter::of(&sources, scene.particles, settings.photons);
+            let mut targets = Targets {
+                ground: square.as_ref().zip(cells.as_mut()),
+                meshes: collector.as_mut(),
+            };
+            counts = trace_photons(&self, &emitters, &mut targets, stop)?;
         }
-        self.floor = Some(FloorLight {
+        // Make maps of them
+        let [min, max] = scene.particles;
+        self.caustics.meshes = collector.map(|photons| photons.into_map((max - min).length()));
+        let caustics = square
+            .zip(cells)
+            .map(|(square, cells)| cells.into_map(square));
+        if catcher.is_some() {
+            self.caustics.catcher = caustics;
+            return Some((self, counts));
+        }
+        // Add the light of the environment on a visible ground
+        if let (Some(ground), Some(caustics)) = (floor, caustics) {
+            let (sky, of_sky) = sky::sky(&self, &caustics.square, stop)?;
+            counts = counts + of_sky;
+            let open = self
+                .environment
+                .map(|e| e.irradiance(ground.up) * FRAC_1_PI)
+                .unwrap_or_default();
+            let wet = match self.wet_scene(&caustics.square) {
+                Some(wet) => Some(wet.map(stop)?),
+                None => None,
+            };
+            let of_environment = self.context.environment_group();
+            let group = |(number, sky)| GroupSky {
+                sky,
+                open: match number == of_environment {
+                    true => open,
+                    false => Vec3::ZERO,
+                },
+            };
+            self.floor = Some(FloorLight {
+                caustics,
+                sky: sky.all,
+                wet,
+                open,
+                groups: sky.groups.into_iter().enumerate().map(group).collect(),
+            });
+        }
+        Some((self, counts))
+    }
+
+    /// What wets the ground, if something does.
+    fn wet_scene<'s>(&'s self, square: &'s Square) -> Option<WetScene<'s>> {
+        let scene = self.context.scene;
+        Some(WetScene {
+            body: self.context.connected_particles()?,
+            wet: scene.wet_ground.as_ref()?,
             square,
-            caustics: caustics.all,
-            sky: sky.all,
-            open,
-            groups,
-        });
-        Some((self, of_photons + of_sky))
+            particles: scene.particles,
+            ior: scene.material.ior,
+        })
+    }
+
+    /// The lights that emit photons, each with its light group.
+    fn photon_sources(&self) -> Vec<(usize, PhotonSource)> {
+        let lights = self.context.lights.iter().enumerate();
+        lights
+            .filter_map(|(index, light)| {
+                Some((self.context.light_group(index), light.photon_source()?))
+            })
+            .collect()
+    }
+
+    fn has_opaque_meshes(&self) -> bool {
+        let mut shapes = self.context.shapes.iter();
+        shapes.any(|shape| shape.material().mesh_index().is_some())
     }
 
     /// Adds the light that the ground reflects, where the paths of `surface` end.
@@ -208,23 +328,24 @@ impl<'a> PathIntegrator<'a> {
         packet: &mut PacketScratch,
     ) {
         self.prepare_surface(surface, packet);
+        if let Some(wet) = &floor.wet {
+            wet.darken(surface, packet);
+        }
         // Add the light of the maps
         let mut reflected = splat3(Vec3::ZERO);
         for lane in lanes_in(surface.lanes) {
             let point = lane3(&packet.hits.point, lane);
             let weight = lane3(&packet.weight, lane) * lane3(&packet.surface.albedo, lane);
             set_lane3(&mut reflected, lane, weight * floor.white(point));
+            floor.each_group(point, |group, white| {
+                packet.groups.add_lane(group, lane, weight * white);
+            });
         }
         let (simd, radiance) = (self.context.simd, &mut packet.radiance);
         add(simd, &reflected, &Vec3::ONE, surface.lanes, radiance);
         packet.take_light(LightClass::Diffuse);
-        for group in 0..floor.groups.len() {
-            for lane in lanes_in(surface.lanes) {
-                let point = lane3(&packet.hits.point, lane);
-                let weight = lane3(&packet.weight, lane) * lane3(&packet.surface.albedo, lane);
-                let light = weight * floor.white_of_group(group, point);
-                packet.groups.add_lane(group, lane, light);
-            }
+        if let Some(wet) = &floor.wet {
+            self.add_gloss(wet, surface, packet);
         }
         self.add_straight_light(surface, packet);
     }
@@ -234,12 +355,11 @@ impl<'a> PathIntegrator<'a> {
         let context = &self.context;
         for (index, light) in context.lights.iter().enumerate() {
             self.reflect_light(index, false, surface, packet);
-            let occlusion = match light.beam() {
+            let occlusion = match light.photon_source() {
                 Some(_) => Occlusion::Opaque,
                 None => Occlusion::of(&**light),
             };
-            let group = context.light_group(index);
-            self.add_direct(occlusion, group, surface, packet);
+            self.add_direct(occlusion, context.light_group(index), surface, packet);
         }
     }
 }
@@ -247,25 +367,33 @@ impl<'a> PathIntegrator<'a> {
 impl FloorLight {
     /// Radiance of a white ground at `point`.
     fn white(&self, point: Vec3) -> Vec3 {
-        let position = self.square.position(point);
+        let position = self.caustics.square.position(point);
         let weight = Square::weight(position);
         if weight <= 0.0 {
             return self.open;
         }
-        let caustics = self.caustics.at(position);
+        let caustics = self.caustics.map.at(position);
         self.open.lerp(self.sky.at(position), weight) + weight * caustics
     }
 
-    /// The part of that radiance that is of a light group.
-    fn white_of_group(&self, group: usize, point: Vec3) -> Vec3 {
-        let position = self.square.position(point);
-        let weight = Square::weight(position);
-        let maps = &self.groups[group];
-        if weight <= 0.0 {
-            return maps.open;
+    /// Calls `each` with parts of the same radiance and their light groups.
+    fn each_group(&self, point: Vec3, mut each: impl FnMut(usize, Vec3)) {
+        if self.groups.is_empty() {
+            return;
         }
-        let at = |map: Option<&Map>| map.map_or(Vec3::ZERO, |map| map.at(position));
-        let caustics = at(maps.caustics.as_deref());
-        maps.open.lerp(at(maps.sky.as_ref()), weight) + weight * caustics
+        let position = self.caustics.square.position(point);
+        let weight = Square::weight(position);
+        for (number, group) in self.groups.iter().enumerate() {
+            each(
+                number,
+                match weight > 0.0 {
+                    true => group.open.lerp(group.sky.at(position), weight),
+                    false => group.open,
+                },
+            );
+        }
+        for (group, white) in self.caustics.white_of_groups(point) {
+            each(group, white);
+        }
     }
 }

@@ -1,8 +1,7 @@
-//! Traces photons of distant lights through transmissive particles to the ground (Jensen, "Global illumination using
-//! photon maps", 1996). Photons that reach the ground without passing a particle are left out.
+//! Traces photons of lights through transmissive particles to the ground and to meshes (Jensen, "Global illumination
+//! using photon maps", 1996). Photons that get there without passing a particle are left out.
 //!
-//! Photons have fixed numbers and random numbers, and their flux is added in their order: the map does not depend on
-//! threads.
+//! Photons have fixed numbers and random numbers, and are stored in their order: the maps do not depend on threads.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -12,39 +11,36 @@ use rayon::prelude::*;
 
 use super::super::PathIntegrator;
 use super::density::Cells;
-use super::{Map, Square};
-use crate::math::{LANES, lane3, lanes_in, splat, splat3};
-use crate::ray::Ray;
+use super::emitter::Emitter;
+use super::photon_map::{Collector, Photon};
+use super::{CausticMap, Map, Square};
+use crate::math::{LANES, lane3, lanes_in, set_lane3, splat};
 use crate::render::{
-    lights::{Beam, light_of},
     ray_counts::RayCounts,
-    sampler::PathSeed,
     scratch::PacketScratch,
-    shading::tangents,
     stop::Stop,
     stream::{RayStreams, SegmentPacket},
 };
-use crate::scene::Scene;
 use crate::surface::MaterialId;
 
 /// Photons that are traced as one task.
 const TASK: u32 = 4096;
 
-/// Tasks whose photons are kept until they are added to the map.
+/// Tasks whose photons are kept until they are added to the maps.
 const ROUND: usize = 64;
 
 /// Depth of the photons of a light. They count as reflected once, so that none splits at the first surface.
 const FIRST_DEPTH: u32 = 2;
 
-/// Dimensions of the random numbers of all photons: position and direction.
-const POSITION: u32 = 0;
-const DIRECTION: u32 = 1;
-
-/// Random numbers of photons; no pixel has this row.
-const PHOTONS: u32 = u32::MAX;
-
-/// Memory for photons on the ground, with space to grow.
-pub(super) const BYTES: u64 = 2 * TASK as u64 * (ROUND * size_of::<Landed>()) as u64;
+/// Memory for photons on surfaces before they are in the maps, with space to grow.
+pub(super) const fn bytes(has_meshes: bool) -> u64 {
+    let each = if has_meshes {
+        size_of::<Photon>()
+    } else {
+        size_of::<Landed>()
+    };
+    2 * TASK as u64 * (ROUND * each) as u64
+}
 
 /// A photon on the ground.
 struct Landed {
@@ -52,223 +48,226 @@ struct Landed {
     flux: Vec3,
 }
 
-/// Parallel light that covers the particles.
-struct Emitter {
-    beam: Beam,
-    /// Centre of the particles.
-    center: Vec3,
-    /// Half the edges of a rectangle that faces the light and covers the particles.
-    sides: [Vec3; 2],
-    /// Distance between that rectangle and the origin of the photons.
-    distance: f32,
-    photons: u32,
-    /// Flux of each photon.
-    flux: Vec3,
-    seed: PathSeed,
+/// Photons of a task.
+#[derive(Default)]
+struct Arrivals {
+    ground: Vec<Landed>,
+    meshes: Vec<Photon>,
 }
 
-/// The radiance of a white ground in the light of photons.
-pub(super) struct CausticMaps {
-    pub(super) all: Arc<Map>,
-    /// Of each light group with photons; empty if the film has no layers for groups.
-    pub(super) groups: Vec<(usize, Arc<Map>)>,
+/// Where photons are stored.
+pub(super) struct Targets<'a> {
+    /// The ground and its map.
+    pub(super) ground: Option<(&'a Square, &'a mut GroundCells)>,
+    pub(super) meshes: Option<&'a mut Collector>,
 }
 
-/// The light groups of `scene` that have photons, each once.
-pub(super) fn groups(scene: &Scene) -> BTreeSet<usize> {
-    let lights = scene.lights.iter();
-    let lights = lights.filter(|light| light_of(light).beam().is_some());
-    lights.map(|light| usize::from(light.group)).collect()
+/// Photons on the ground.
+pub(super) struct GroundCells {
+    all: Cells,
+    /// By light group; empty if the film has no layers for groups, or all photons are of one group.
+    groups: Vec<(usize, Cells)>,
+    /// The group of all photons, if the film has layers for groups and there is only one.
+    only_group: Option<usize>,
 }
 
-/// The radiance of a white ground in the light of the photons of all lights.
-pub(super) fn caustics(
-    integrator: &PathIntegrator<'_>,
-    square: &Square,
-    stop: &dyn Stop,
-) -> Option<(CausticMaps, RayCounts)> {
-    let context = &integrator.context;
-    let lights = context.lights.iter().enumerate();
-    let beams =
-        lights.filter_map(|(index, light)| Some((context.light_group(index), light.beam()?)));
-    let beams: Vec<(usize, Beam)> = beams.collect();
-    let (mut cells, mut counts) = (Cells::new(), RayCounts::default());
-    // A single group has the light of all photons
-    let groups = match context.settings.channels.layers.light_groups {
-        0 => BTreeSet::new(),
-        _ => groups(context.scene),
-    };
-    let mut of_groups: Vec<(usize, Cells)> = match groups.len() {
-        0 | 1 => Vec::new(),
-        _ => groups.iter().map(|group| (*group, Cells::new())).collect(),
-    };
-    let lights = u32::try_from(beams.len()).unwrap_or(u32::MAX).max(1);
-    let photons = context.settings.photons.div_ceil(lights);
-    for (number, (group, beam)) in (0..).zip(beams) {
-        let emitter = Emitter::new(beam, square.particles, photons, number);
-        let mut land = |photon: &Landed| {
-            cells.add(photon.position, photon.flux);
-            for (other, cells) in &mut of_groups {
-                // The filters of a group are those of all photons
-                let flux = if *other == group {
-                    photon.flux
-                } else {
-                    Vec3::ZERO
-                };
-                cells.add(photon.position, flux);
-            }
-        };
-        counts = counts + emitter.emit(integrator, square, &mut land, stop)?;
-    }
-    let all = Arc::new(cells.radiance(square));
-    let mut maps: Vec<(usize, Arc<Map>)> = Vec::new();
-    for (group, cells) in of_groups {
-        maps.push((group, Arc::new(cells.radiance(square))));
-    }
-    if let (true, Some(group)) = (maps.is_empty(), groups.first()) {
-        maps.push((*group, Arc::clone(&all)));
-    }
-    Some((CausticMaps { all, groups: maps }, counts))
-}
-
-impl Emitter {
-    /// The emitter number `number`, of `photons` photons, for particles in the box with these corners.
-    fn new(beam: Beam, [min, max]: [Vec3; 2], photons: u32, number: u32) -> Self {
-        let (center, half) = (0.5 * (min + max), 0.5 * (max - min));
-        let distance = 2.0 * half.length();
-        let spread = distance * beam.spread();
-        // A box reaches as far along an axis as its half edges do together
-        let reach = |axis: Vec3| axis.abs().dot(half) + spread;
-        let sides = tangents(beam.to_light.to_array()).map(Vec3::from_array);
-        let sides = sides.map(|axis| reach(axis) * axis);
-        let area = 4.0 * sides[0].length() * sides[1].length();
+impl GroundCells {
+    /// For photons of light groups, each once, if the film has layers for them.
+    pub(super) fn new(groups: &BTreeSet<usize>) -> Self {
+        let several = groups.iter().filter(|_| groups.len() > 1);
         Self {
-            flux: beam.irradiance * (area / photons as f32),
-            beam,
-            center,
-            sides,
-            distance,
-            photons,
-            seed: PathSeed::of_pixel(number, PHOTONS),
+            all: Cells::new(),
+            groups: several.map(|group| (*group, Cells::new())).collect(),
+            only_group: groups.first().copied().filter(|_| groups.len() == 1),
         }
     }
 
-    /// Traces all photons, and calls `land` for those that reach the ground. `None` if `stop` is raised.
-    fn emit(
-        &self,
-        integrator: &PathIntegrator<'_>,
-        square: &Square,
-        land: &mut dyn FnMut(&Landed),
-        stop: &dyn Stop,
-    ) -> Option<RayCounts> {
-        let mut counts = RayCounts::default();
-        let tasks: Vec<u32> = (0..self.photons).step_by(TASK as usize).collect();
-        for round in tasks.chunks(ROUND) {
-            let trace = |first: &u32| {
-                let last = self.photons.min(first + TASK);
-                trace(integrator, self, *first..last, square, stop)
+    fn add(&mut self, photon: &Landed, group: usize) {
+        self.all.add(photon.position, photon.flux);
+        for (other, cells) in &mut self.groups {
+            // The filters of a group are those of all photons
+            let flux = match *other == group {
+                true => photon.flux,
+                false => Vec3::ZERO,
             };
-            let landed: Option<Vec<_>> = round.par_iter().map(trace).collect();
-            for (photons, of_task) in landed? {
-                counts = counts + of_task;
-                photons.iter().for_each(&mut *land);
-            }
+            cells.add(photon.position, flux);
         }
-        Some(counts)
     }
 
-    /// The ray of a photon.
-    fn ray(&self, photon: u32) -> Ray {
-        let [x, y] = self.seed.get_2d(POSITION, photon).map(|u| 2.0 * u - 1.0);
-        let to_light = self.beam.direction(self.seed.get_2d(DIRECTION, photon));
-        let target = self.center + x * self.sides[0] + y * self.sides[1];
-        Ray::new(target + self.distance * to_light, -to_light)
-    }
-
-    /// A packet of photons from number `first` on.
-    fn packet(&self, first: u32, end: u32, segments: &mut SegmentPacket) {
-        segments.rays.reset();
-        for photon in (first..end).take(LANES) {
-            let lane = segments.rays.len();
-            segments.rays.push(&self.ray(photon));
-            segments.path[lane] = self.seed.child(photon);
+    /// The radiance of a white ground in the light of the photons.
+    pub(super) fn into_map(self, square: Square) -> CausticMap {
+        let all = Arc::new(self.all.radiance(&square));
+        let of_groups = self.groups.into_iter();
+        let mut groups: Vec<(usize, Arc<Map>)> = of_groups
+            .map(|(group, cells)| (group, Arc::new(cells.radiance(&square))))
+            .collect();
+        groups.extend(self.only_group.map(|group| (group, Arc::clone(&all))));
+        CausticMap {
+            square,
+            map: all,
+            groups,
         }
-        segments.throughput = splat3(self.flux);
-        segments.pdf = splat(f32::INFINITY);
-        segments.bounces = [1; LANES];
-        segments.sample = [0; LANES];
-        segments.inside = 0;
     }
 }
 
-/// Traces the photons in `range`. `None` if `stop` is raised.
-fn trace(
+/// Traces the photons of all emitters. `None` if `stop` is raised.
+pub(super) fn trace_photons(
     integrator: &PathIntegrator<'_>,
-    emitter: &Emitter,
-    range: std::ops::Range<u32>,
-    square: &Square,
+    emitters: &[Emitter],
+    targets: &mut Targets<'_>,
     stop: &dyn Stop,
-) -> Option<(Vec<Landed>, RayCounts)> {
-    let mut landed = Vec::new();
-    let mut packet = Box::<PacketScratch>::default();
-    let (mut current, mut next) = (RayStreams::default(), RayStreams::default());
-    // Emit the photons
-    let mut segments = Box::<SegmentPacket>::default();
-    for first in range.clone().step_by(LANES) {
-        emitter.packet(first, range.end, &mut segments);
-        packet.counts.shadow += segments.rays.len() as u64;
-        step(
-            integrator,
-            &mut segments,
-            FIRST_DEPTH,
-            &mut packet,
-            &mut next,
-        );
-    }
-    // Light that enters a body has the square of its index times the radiance. Paths of the camera leave this factor
-    // out, but the density of photons inside the body contains it
-    let ior = integrator.context.scene.material.ior;
-    // Follow them through the particles
-    for depth in FIRST_DEPTH + 1.. {
-        std::mem::swap(&mut current, &mut next);
-        if current.is_empty() {
-            break;
-        }
-        next.clear();
-        packet.counts.reflection += current.reflected.len() as u64;
-        packet.counts.refraction += current.refracted.len() as u64;
-        for segments in current.packets_mut() {
-            if stop.is_raised() {
-                return None;
-            }
-            let lanes = step(integrator, segments, depth, &mut packet, &mut next);
-            let index = |lane: usize| match segments.inside >> lane & 1 {
-                0 => 1.0,
-                _ => ior,
+) -> Option<RayCounts> {
+    let mut counts = RayCounts::default();
+    for emitter in emitters {
+        let tasks: Vec<u32> = (0..emitter.photons).step_by(TASK as usize).collect();
+        for round in tasks.chunks(ROUND) {
+            let square = targets.ground.as_ref().map(|(square, _)| *square);
+            let has_meshes = targets.meshes.is_some();
+            let trace = |first: &u32| {
+                let last = emitter.photons.min(first + TASK);
+                let task = Task {
+                    integrator,
+                    emitter,
+                    square,
+                    has_meshes,
+                };
+                task.trace(*first..last, stop)
             };
-            landed.extend(lanes_in(lanes).map(|lane| Landed {
-                position: square.position(lane3(&packet.hits.point, lane)),
-                flux: lane3(&packet.throughput, lane)
-                    * (packet.hits.opacity[lane] / (index(lane) * index(lane))),
-            }));
+            let arrived: Option<Vec<_>> = round.par_iter().map(trace).collect();
+            for (arrivals, of_task) in arrived? {
+                counts = counts + of_task;
+                targets.store(&arrivals, emitter.group);
+            }
         }
     }
-    Some((landed, packet.counts))
+    Some(counts)
 }
 
-/// Moves photons to the next surface, and reflects or refracts those that hit particles. Returns those that hit the
-/// ground.
-fn step(
-    integrator: &PathIntegrator<'_>,
-    segments: &mut SegmentPacket,
-    depth: u32,
-    packet: &mut PacketScratch,
-    next: &mut RayStreams,
-) -> u32 {
-    integrator.context.intersect(segments, depth, packet);
-    let particles = packet.hits.lanes_of(MaterialId::PARTICLES);
-    if particles != 0 {
-        integrator.shade_transmissive(segments, depth, particles, packet, next);
+impl Targets<'_> {
+    /// Stores photons of a light group.
+    fn store(&mut self, arrivals: &Arrivals, group: usize) {
+        if let Some((_, cells)) = &mut self.ground {
+            for photon in &arrivals.ground {
+                cells.add(photon, group);
+            }
+        }
+        if let Some(collector) = &mut self.meshes {
+            for photon in &arrivals.meshes {
+                collector.add(photon);
+            }
+        }
     }
-    packet.hits.lanes_of(MaterialId::GROUND)
+}
+
+/// A packet of photons from number `first` on.
+fn emit(emitter: &Emitter, first: u32, end: u32, segments: &mut SegmentPacket) {
+    segments.rays.reset();
+    for photon in (first..end).take(LANES) {
+        if let Some((ray, flux)) = emitter.photon(photon) {
+            let lane = segments.rays.len();
+            segments.rays.push(&ray);
+            segments.path[lane] = emitter.seed.child(photon);
+            set_lane3(&mut segments.throughput, lane, flux);
+        }
+    }
+    segments.pdf = splat(f32::INFINITY);
+    segments.bounces = [1; LANES];
+    segments.sample = [0; LANES];
+    segments.inside = 0;
+}
+
+/// Photons that are traced together.
+struct Task<'a> {
+    integrator: &'a PathIntegrator<'a>,
+    emitter: &'a Emitter,
+    square: Option<&'a Square>,
+    has_meshes: bool,
+}
+
+impl Task<'_> {
+    /// Traces the photons in `range`. `None` if `stop` is raised.
+    fn trace(&self, range: std::ops::Range<u32>, stop: &dyn Stop) -> Option<(Arrivals, RayCounts)> {
+        let mut arrivals = Arrivals::default();
+        let mut packet = Box::<PacketScratch>::default();
+        let (mut current, mut next) = (RayStreams::default(), RayStreams::default());
+        // Emit the photons
+        let mut segments = Box::<SegmentPacket>::default();
+        for first in range.clone().step_by(LANES) {
+            emit(self.emitter, first, range.end, &mut segments);
+            packet.counts.shadow += segments.rays.len() as u64;
+            self.step(&mut segments, FIRST_DEPTH, &mut packet, &mut next);
+        }
+        // Follow them through the particles
+        for depth in FIRST_DEPTH + 1.. {
+            std::mem::swap(&mut current, &mut next);
+            if current.is_empty() {
+                break;
+            }
+            next.clear();
+            packet.counts.reflection += current.reflected.len() as u64;
+            packet.counts.refraction += current.refracted.len() as u64;
+            for segments in current.packets_mut() {
+                if stop.is_raised() {
+                    return None;
+                }
+                self.step(segments, depth, &mut packet, &mut next);
+                self.store(segments, &packet, &mut arrivals);
+            }
+        }
+        Some((arrivals, packet.counts))
+    }
+
+    /// Moves photons to the next surface, and reflects or refracts those that hit particles.
+    fn step(
+        &self,
+        segments: &mut SegmentPacket,
+        depth: u32,
+        packet: &mut PacketScratch,
+        next: &mut RayStreams,
+    ) {
+        self.integrator.context.intersect(segments, depth, packet);
+        let particles = packet.hits.lanes_of(MaterialId::PARTICLES);
+        if particles != 0 {
+            (self.integrator).shade_transmissive(segments, depth, particles, packet, next);
+        }
+    }
+
+    /// Stores the photons that have arrived at the ground or at meshes.
+    fn store(&self, segments: &SegmentPacket, packet: &PacketScratch, arrivals: &mut Arrivals) {
+        let (hits, throughput) = (&packet.hits, &packet.throughput);
+        // Light that enters a body has the square of its index times the radiance. Paths of the camera leave this
+        // factor out, but the density of photons inside the body contains it
+        let ior = self.integrator.context.scene.material.ior;
+        let flux = |lane: usize| match segments.inside >> lane & 1 {
+            0 => lane3(throughput, lane),
+            _ => lane3(throughput, lane) / (ior * ior),
+        };
+        if let Some(square) = self.square {
+            let landed = |lane: usize| Landed {
+                position: square.position(lane3(&hits.point, lane)),
+                flux: flux(lane) * hits.opacity[lane],
+            };
+            let lanes = lanes_in(hits.lanes_of(MaterialId::GROUND));
+            arrivals.ground.extend(lanes.map(landed));
+        }
+        if !self.has_meshes {
+            return;
+        }
+        let panes = self.integrator.context.pane_lanes(hits);
+        for lane in lanes_in(hits.mask & !panes) {
+            if hits.material[lane].mesh_index().is_none() {
+                continue;
+            }
+            let direction = lane3(&segments.rays.direction, lane);
+            let normal = lane3(&hits.normal, lane);
+            let against = normal.dot(direction) < 0.0;
+            arrivals.meshes.push(Photon {
+                point: lane3(&hits.point, lane),
+                normal: if against { normal } else { -normal },
+                to_light: -direction,
+                flux: flux(lane),
+                group: u8::try_from(self.emitter.group).unwrap_or_default(),
+            });
+        }
+    }
 }

@@ -36,7 +36,6 @@ pub(in super::super) fn union() -> Shot {
     shot.scene.background = SUNSET;
     shot.scene.ground = Some(Ground {
         pattern: Pattern::Checker { tile: 1.0 },
-        particles: [Vec3::splat(-2.0), Vec3::splat(2.0)],
         shadow_catcher: None,
         ..floor(0.0)
     });
