@@ -8,6 +8,11 @@
 //! (Turquin, "Practical Multiple Scattering Compensation for Microfacet Models", 2019). That loses no light, but is
 //! only reciprocal without it.
 
+#![expect(
+    clippy::needless_range_loop,
+    reason = "one index for the lanes of many arrays"
+)]
+
 use super::points::ShadingPoints;
 use super::whitted::WhittedMaterial;
 use crate::math::{LANES, Lanes, Supported, lane_kernel, larger};
