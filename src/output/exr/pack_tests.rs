@@ -11,9 +11,7 @@ use glam::Vec3;
 
 use super::super::planes::{PlaneNames, Source, planes_in_file};
 use super::super::tests::COMPRESSIONS;
-use super::super::{
-    ExrOptions, TextAttribute, attributes, encode_exr, write_blocks, write_exr,
-};
+use super::super::{ExrOptions, TextAttribute, attributes, encode_exr, write_blocks, write_exr};
 use super::*;
 use crate::render::{Channels, Film};
 
