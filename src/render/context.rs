@@ -5,6 +5,7 @@
 use glam::Vec3;
 
 use super::{
+    light_groups::NO_GROUP,
     lights::{Light, light_of},
     materials::Dielectric,
     sampler::FilmSampler,
@@ -188,6 +189,24 @@ impl<'a> RenderContext<'a> {
         match depth {
             1 if !self.camera.has_lens() && self.exposure.is_none() => Coherence::Coherent,
             _ => Coherence::Incoherent,
+        }
+    }
+
+    /// The group of light source `index`.
+    pub(super) fn light_group(&self, index: usize) -> usize {
+        usize::from(self.scene.lights[index].group)
+    }
+
+    /// The group of the environment.
+    pub(super) fn environment_group(&self) -> usize {
+        usize::from(self.scene.environment_group)
+    }
+
+    /// The group of what camera rays see infinitely far away.
+    pub(super) fn background_group(&self) -> usize {
+        match self.settings.integrator {
+            IntegratorKind::Path if self.scene.is_environment_visible => self.environment_group(),
+            IntegratorKind::Path | IntegratorKind::Whitted => NO_GROUP,
         }
     }
 }

@@ -5,9 +5,7 @@
 
 use glam::Vec3;
 
-use super::context::RenderContext;
 use super::layers::Layers;
-use super::settings::IntegratorKind;
 use super::shading::add;
 use crate::math::{Lanes3, Supported, lane3, set_lane3, splat};
 
@@ -50,25 +48,5 @@ impl GroupLight {
     /// The light of all groups; empty if there are none.
     pub(super) fn all(&self) -> &[Lanes3] {
         &self.radiance
-    }
-}
-
-impl RenderContext<'_> {
-    /// The group of light source `index`.
-    pub(super) fn light_group(&self, index: usize) -> usize {
-        usize::from(self.scene.lights[index].group)
-    }
-
-    /// The group of the environment.
-    pub(super) fn environment_group(&self) -> usize {
-        usize::from(self.scene.environment_group)
-    }
-
-    /// The group of what camera rays see infinitely far away.
-    pub(super) fn background_group(&self) -> usize {
-        match self.settings.integrator {
-            IntegratorKind::Path if self.scene.is_environment_visible => self.environment_group(),
-            IntegratorKind::Path | IntegratorKind::Whitted => NO_GROUP,
-        }
     }
 }

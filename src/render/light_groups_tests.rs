@@ -55,7 +55,7 @@ fn lit(scene: &Scene, groups: &[u8]) -> Scene {
     }
     if !groups.contains(&0) {
         scene.background = Background::Constant(Vec3::ZERO);
-        scene.material.ambient = 0.0;
+        scene.ambient_light = Vec3::ZERO;
     }
     scene
 }
@@ -104,7 +104,7 @@ fn check_sum(shape: &dyn Shape, scene: &Scene, settings: &RenderSettings) -> Fil
     film
 }
 
-/// Checks each group against an image with its lights only, too. `max_empty`: number of groups without light.
+/// Checks each group against an image with its lights only, too. `empty`: the groups without light.
 #[track_caller]
 fn check(shape: &dyn Shape, scene: &Scene, settings: &RenderSettings, empty: &[u8]) {
     let film = check_sum(shape, scene, settings);

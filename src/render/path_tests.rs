@@ -372,7 +372,7 @@ fn ambient_light_creates_none() {
         .iter()
         .fold(0.0_f32, |most, p| most.max(p.max_element()));
     // But for noise
-    assert!(brightest < 1.05, "{brightest}");
+    assert!(brightest < 1.1, "{brightest}");
 }
 
 #[test]
@@ -419,8 +419,8 @@ fn ambient_light_is_that_of_every_source() {
             mean(&settings(24, 64, 6)),
             mean(&with_ambient(settings(24, 64, 6))),
         );
-        assert!(full > 1.05 * direct, "{direct} {full}");
-        assert!(ambient > 1.05 * direct, "{direct} {ambient}");
+        assert!(full > 1.02 * direct, "{direct} {full}");
+        assert!(ambient > 1.02 * direct, "{direct} {ambient}");
         assert!((ambient / full - 1.0).abs() < 0.25, "{full} {ambient}");
     }
 }

@@ -58,11 +58,12 @@ fn drafts_have_few_samples_and_ambient_light() {
     let options = [&settings[..], &ambient].concat();
     assert_eq!(rays(&workshop, "same", &options), draft);
     let [one, other] = ["draft", "same"].map(|out| images(&workshop.join(out)));
-    assert_eq!(one.len(), 2);
+    // With previews
+    assert_eq!(one.len(), 4);
     assert!(one == other);
     // Ambient light needs fewer rays than traced light
     let traced = rays(&workshop, "traced", &settings);
-    assert!(10 * draft < 9 * traced, "{draft} {traced}");
+    assert!(100 * draft < 98 * traced, "{draft} {traced}");
 }
 
 #[test]

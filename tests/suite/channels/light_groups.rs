@@ -28,17 +28,17 @@ path = "out/f.####.exr"
 channels = ["RGBA", "noisy", "light_groups", "Z"]
 [[light]]
 type = "directional"
-direction = [1.0, 0.5, -1.0]
+direction = [1.0, -1.0, 0.5]
 intensity = {key}
 group = "key"
 [[light]]
 type = "point"
-position = [2.0, 2.0, 9.0]
+position = [2.0, 9.0, 2.0]
 intensity = {fill}
 group = "fill-2"
 [[light]]
 type = "directional"
-direction = [0.0, -0.2, -1.0]
+direction = [0.0, -1.0, -0.2]
 "#
     )
 }
