@@ -119,13 +119,16 @@ impl PartTable {
     }
 }
 
+/// The words that name a part.
+type WordsOf<'a> = &'a dyn Fn(&PartKey) -> Vec<String>;
+
 /// Names of parts: the shortest of what is known that is different for all.
 fn names(parts: &[PartKey], groups: &[String]) -> Vec<String> {
     if parts.len() < 2 {
         return vec![String::new(); parts.len()];
     }
     let group = |key: &PartKey| groups.get(key.group as usize).cloned().unwrap_or_default();
-    let schemes: [&dyn Fn(&PartKey) -> Vec<String>; 6] = [
+    let schemes: [WordsOf<'_>; 6] = [
         &|key| {
             key.piece
                 .map(|piece| format!("piece {piece}"))
