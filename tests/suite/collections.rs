@@ -15,7 +15,9 @@ fn copy(from: &Path, to: &Path) {
         let target = to.join(path.file_name().expect("a name"));
         match path.is_dir() {
             true => copy(&path, &target),
-            false => drop(fs::copy(&path, &target).expect("a copy")),
+            false => {
+                fs::copy(&path, &target).expect("a copy");
+            }
         }
     }
 }

@@ -17,8 +17,8 @@ const SAMPLE_BUFFER: usize = 4 << 10;
 
 /// The decompressed length of the file at `path`.
 ///
-/// It is an estimate for compressed files. gzip states the length of its last member modulo 4 GiB (RFC 1952), zip that of
-/// its file, zstd and LZ4 often that of the first frame. Of other files the beginning is decompressed and taken as
+/// It is an estimate for compressed files. gzip states the length of its last member modulo 4 GiB (RFC 1952), zip that
+/// of its file, zstd and LZ4 often that of the first frame. Of other files the beginning is decompressed and taken as
 /// typical.
 ///
 /// # Errors

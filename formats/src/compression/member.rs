@@ -14,8 +14,8 @@ use super::zip::{ZipReader, ZippedFile};
 use super::{StreamFormat, xz};
 use crate::MemoryBudget;
 
-/// Most bytes that a decoder may hold beside its output, whatever the budget: the window of zstd's `--long` has 128 MiB,
-/// the largest preset of xz 64 MiB.
+/// Most bytes that a decoder may hold beside its output, whatever the budget: the window of zstd's `--long` has
+/// 128 MiB, the largest preset of xz 64 MiB.
 const MOST_DECODER: u64 = 130 << 20;
 
 /// Bytes that a decoder of bzip2 holds.

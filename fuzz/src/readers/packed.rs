@@ -61,8 +61,8 @@ const NAMES: [&str; 12] = [
     "a.spf", "a.bin",
 ];
 
-/// Compressed files: the first byte picks a format and says whether a signature goes before the rest, so that most inputs
-/// reach a decoder. What can be decompressed is detected and read.
+/// Compressed files: the first byte picks a format and says whether a signature goes before the rest, so that most
+/// inputs reach a decoder. What can be decompressed is detected and read.
 pub fn compressed(bytes: &[u8]) -> usize {
     let Some((choice, bytes)) = bytes.split_first() else {
         return 0;

@@ -119,8 +119,8 @@ impl PartTable {
     }
 }
 
-/// Words of a name, from what is known of a part.
-type NamingScheme<'a> = &'a dyn Fn(&PartKey) -> Vec<String>;
+/// The words that name a part.
+type WordsOf<'a> = &'a dyn Fn(&PartKey) -> Vec<String>;
 
 /// Names of parts: the shortest of what is known that is different for all.
 fn names(parts: &[PartKey], groups: &[String]) -> Vec<String> {
@@ -128,7 +128,7 @@ fn names(parts: &[PartKey], groups: &[String]) -> Vec<String> {
         return vec![String::new(); parts.len()];
     }
     let group = |key: &PartKey| groups.get(key.group as usize).cloned().unwrap_or_default();
-    let schemes: [NamingScheme<'_>; 6] = [
+    let schemes: [WordsOf<'_>; 6] = [
         &|key| {
             key.piece
                 .map(|piece| format!("piece {piece}"))

@@ -374,7 +374,7 @@ fn damaged_lists_name_the_place() {
         (
             "time.pvd",
             pvd(&[("0", "file=\"a.csv\""), ("soon", "file=\"a.csv\"")]),
-            "byte 83: line 4: timestep=\"soon\" is not a number",
+            "byte 78: line 4: timestep=\"soon\" is not a number",
         ),
         (
             "some.pvd",
