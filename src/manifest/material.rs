@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::color::ColorSetting;
 use super::key::{Affects, Key};
 use super::keys::{Keys, keys};
-use super::part::{self, Part};
+use super::part::{self, Part, ROUGHNESS};
 use super::value::named;
 use crate::scene::{self, Finish, Fresnel};
 use crate::surface::MaterialId;
@@ -44,9 +44,6 @@ const KINDS: [&str; 3] = [
     "reflection and transmission to 1 and use the exact Fresnel equations; the index of refraction of glass is 1.5 and",
     "that of water 1.333, unless ior has another value than 1.33.",
 ];
-
-/// Default roughness: satin plastic, and a brushed metal.
-pub(super) const ROUGHNESS: f32 = 0.55;
 
 /// `[material]`, the terms of the thesis's equations 4.1 to 4.3.
 #[derive(Debug, Clone, PartialEq)]

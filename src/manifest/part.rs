@@ -8,7 +8,6 @@ use serde_json::{Value as Json, json};
 use super::field::Field;
 use super::key::{Affects, Key};
 use super::keys::{Keys, keys};
-use super::material::ROUGHNESS;
 use super::value::{Fault, FlagKind, Value, list, named};
 use crate::scene::{Finish, PartMaterial};
 
@@ -28,6 +27,9 @@ named! {
         Metal = "metal",
     }
 }
+
+/// Default roughness, also of `[material]`: satin plastic, and a brushed metal.
+pub(super) const ROUGHNESS: f32 = 0.55;
 
 /// The remedy for transmissive parts.
 const TRANSMISSIVE: &str = "parts are opaque; for spheres of glass or water among others, make [material] glass or \
