@@ -83,7 +83,6 @@ fn a_rough_ball_in_white_surroundings_is_nearly_white() {
             assert!((least..=most).contains(&mean), "{found:#?}");
         }
     }
-    println!("{found:#?}");
 }
 
 #[test]
