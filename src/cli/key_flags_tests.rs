@@ -8,7 +8,15 @@ use crate::manifest::Manifest;
 
 /// Options that are no property of a job: where it is, any key, many keys, and what one run does with what is
 /// there.
-const ACTIONS: [&str; 6] = ["input", "set", "look", "force", "keep_done", "shard"];
+const ACTIONS: [&str; 7] = [
+    "input",
+    "set",
+    "look",
+    "draft",
+    "force",
+    "keep_done",
+    "shard",
+];
 
 /// Options for parts of `material.color`.
 const COLORS: [&str; 3] = ["color_by", "map", "range"];

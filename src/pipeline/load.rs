@@ -97,7 +97,12 @@ pub fn load_frame(
         "radii raised: too small to be seen, or no number",
     );
     loaded.note_absent_parts(setup);
-    loaded.meshes = meshes_of(setup, task, &mut loaded.notes)?;
+    loaded.meshes = meshes_of(
+        &setup.picture.meshes,
+        setup.picture.shutter,
+        task,
+        &mut loaded.notes,
+    )?;
     loaded.read_time = start.elapsed();
     Ok(loaded)
 }

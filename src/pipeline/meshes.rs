@@ -10,7 +10,7 @@ use spherule_formats::mesh::read_mesh;
 use spherule_formats::{FrameError, MemoryBudget};
 
 use super::ImageTask;
-use super::setup::Setup;
+use super::shutter::Shutter;
 use crate::surface::mesh::{MeshError, MeshNormals, MeshTree, TriangleMesh, VisibleFaces};
 
 /// How many times a mesh may be larger or smaller than the particles before that is noted. A tank in millimetres around
@@ -199,23 +199,24 @@ fn ratio_note(path: &Path, tree: &MeshTree, particles: f64) -> Option<String> {
 /// A mesh in each slice of the exposure; one tree if it does not move.
 pub type MeshSlices = Vec<Arc<MeshTree>>;
 
-/// The meshes of the setup for the image of `task`: those of all pictures, and its own, which move to those of the
+/// The `meshes` of a picture for the image of `task`: those of all pictures, and its own, which move to those of the
 /// next frame while the shutter is open. Passes notes to `notes`.
 ///
 /// # Errors
 /// One of its own cannot be read.
 pub(super) fn meshes_of(
-    setup: &Setup,
+    meshes: &[PictureMesh],
+    shutter: Option<Shutter>,
     task: &ImageTask,
     notes: &mut Vec<String>,
 ) -> Result<Vec<MeshSlices>, MeshLoadError> {
-    let (mut own, meshes) = ((0..).zip(&task.meshes), &setup.picture.meshes);
+    let mut own = (0..).zip(&task.meshes);
     let mut all = Vec::with_capacity(meshes.len());
     for mesh in meshes {
         if let Some(tree) = &mesh.tree {
             all.push(vec![Arc::clone(tree)]);
         } else if let Some((number, path)) = own.next() {
-            let next = task.next_meshes.as_ref().zip(setup.picture.shutter);
+            let next = task.next_meshes.as_ref().zip(shutter);
             let slices = match next.and_then(|(next, s)| Some((next.files.get(number)?, next, s))) {
                 Some((file, next, shutter)) => {
                     let times = shutter

@@ -21,6 +21,7 @@ mod read_threads;
 mod renderer;
 mod schedule;
 mod setup;
+mod shutter;
 mod single;
 mod stages;
 mod surface;
@@ -39,9 +40,8 @@ pub use predict::{FrameSize, MemoryModel, MemoryNeed};
 pub use probe::{Probe, ProbeError, probe};
 pub use renderer::{BuiltFrame, FrameRenderer, TraceError, TracedFrame};
 pub use schedule::{Overlap, Schedule};
-pub use setup::{
-    AttributeChannel, ColorRule, FrameStep, Picture, RadiusRule, RunSettings, Setup, Shutter,
-};
+pub use setup::{AttributeChannel, ColorRule, Picture, RadiusRule, RunSettings, Setup};
+pub use shutter::{FrameStep, Shutter};
 pub use single::{PictureKind, make_image, make_picture};
 pub use trace::{CpuRenderer, renderer_of};
 pub use work::RenderWork;

@@ -9,7 +9,8 @@ use spherule_formats::sequence::Sequence;
 use super::ImageTask;
 use super::decoded::{DecodedFrame, ids};
 use super::load_error::{LoadError, missing};
-use super::setup::{Setup, Shutter};
+use super::setup::Setup;
+use super::shutter::Shutter;
 use crate::accel::moving::bounded;
 
 /// Moves the particles of `frame` to their places in the middle of the exposure. Returns by how far each of them moves

@@ -5,6 +5,7 @@ use spherule_formats::native::Access;
 
 use super::meshes::PictureMesh;
 use super::rays::expected_rays;
+use super::shutter::{FrameStep, Shutter};
 use crate::accel::{BuildSettings, BvhSettings, SbvhSettings, Structure, choose};
 use crate::denoise::DenoiseSettings;
 use crate::output::{ExrOptions, PreviewOptions};
@@ -12,7 +13,6 @@ use crate::render::{RenderSettings, RendererKind};
 use crate::scene::{
     Camera, CameraError, CameraPath, ColorMap, Exposure, LensSettings, NextFrame, Scene,
 };
-use crate::surface::slices::slice_times;
 use crate::surface::{SurfaceKind, SurfaceSettings};
 use crate::survey::FrameWeight;
 
@@ -79,38 +79,6 @@ pub struct AttributeChannel {
     pub name: String,
     /// Components per particle.
     pub components: usize,
-}
-
-/// From one frame to the next, for motion on the film.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FrameStep {
-    /// Time, in the unit of the velocities.
-    pub time: f32,
-    /// Difference of the frame numbers.
-    pub numbers: i64,
-}
-
-/// Motion blur: when the shutter is open, and how the particles move.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Shutter {
-    /// When it opens, relative to the time of the frame, as a fraction of the step.
-    pub open: f64,
-    /// When it closes.
-    pub close: f64,
-    /// From one frame to the next.
-    pub step: FrameStep,
-    /// Whether the velocities are those in the files. Otherwise, particles move to their places in the next frame.
-    pub has_velocities: bool,
-    /// Number of slices of the exposure in which surfaces other than spheres do not change.
-    pub slices: u32,
-}
-
-impl Shutter {
-    /// The middles of the slices, as fractions of the step from the time of the frame.
-    pub(super) fn slice_times(&self) -> impl Iterator<Item = f64> + use<> {
-        let (middle, length) = (0.5 * (self.open + self.close), self.close - self.open);
-        slice_times(self.slices).map(move |time| middle + length * f64::from(time))
-    }
 }
 
 /// The settings of a job: its pictures, and the execution of a run.

@@ -13,7 +13,6 @@ use super::{
     settings::{IntegratorKind, RenderSettings},
     shading::{BackgroundLanes, CameraLanes},
     source::ShadeSource,
-    spray::is_soft,
 };
 use crate::accel::Coherence;
 use crate::math::Supported;
@@ -92,6 +91,13 @@ fn is_pane(scene: &Scene, shape: &dyn Shape) -> bool {
     let mesh = shape.material().mesh_index();
     mesh.and_then(|index| scene.meshes.get(index))
         .is_some_and(MeshMaterial::is_pane)
+}
+
+/// Whether `shape` is soft spray in pictures with these settings.
+fn is_soft(scene: &Scene, integrator: IntegratorKind, shape: &dyn Shape) -> bool {
+    scene.is_spray_soft
+        && integrator == IntegratorKind::Path
+        && shape.material() == MaterialId::SPRAY
 }
 
 impl<'a> RenderContext<'a> {

@@ -112,7 +112,20 @@ fn check(shape: &dyn Shape, scene: &Scene, settings: &RenderSettings, empty: &[u
         let found = of_group(&film, group);
         let only = lit(scene, &[group]);
         let expected = image(shape, &only, Vec3::new(0.8, 0.6, 0.3), settings);
-        assert_eq!(found, colors(&expected), "group {group}");
+        let expected = colors(&expected);
+        match settings.photons {
+            0 => assert_eq!(found, expected, "group {group}"),
+            // Lights share the photons, so that each has fewer and wider ones than alone
+            _ => {
+                let sum = |light: &[Vec3]| light.iter().map(|l| l.element_sum()).sum::<f32>();
+                let (found, expected) = (sum(&found), sum(&expected));
+                let error = (found - expected).abs();
+                assert!(
+                    error <= 0.15 * expected,
+                    "group {group}: {found} {expected}"
+                );
+            }
+        }
         let is_empty = found.iter().all(|light| *light == Vec3::ZERO);
         assert_eq!(is_empty, empty.contains(&group), "group {group}");
     }

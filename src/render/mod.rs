@@ -33,6 +33,7 @@ mod light_groups;
 mod light_split;
 mod lights;
 mod materials;
+mod near_photons;
 mod panes;
 mod path;
 mod ray_counts;

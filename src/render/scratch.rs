@@ -9,17 +9,13 @@ use super::{
     light_split::LightSplit,
     lights::LightSamples,
     materials::ShadingPoints,
-    path::{
-        caustics::NearPhotons,
-        floor::{NEIGHBOURS, Neighbour},
-    },
+    near_photons::{NEIGHBOURS, NearPhoton, NearPhotons, Neighbour},
     ray_counts::RayCounts,
     sample_layers::SampleLayers,
     sampler::PathSeed,
     stream::{RayStreams, SegmentPacket},
     tile::SIDE,
 };
-use glam::Vec3;
 
 use crate::math::{LANES, Lanes, Lanes3, lanes_in, splat};
 use crate::surface::Intersections;
@@ -204,7 +200,7 @@ pub(super) fn scratch_bytes(
     let samples = sample_count.div_ceil(LANES) * 6 * size_of::<Lanes>();
     let segments = (rays.div_ceil(LANES) + 4) * 2 * size_of::<SegmentPacket>();
     // Vectors of photons grow by doubling
-    let near = LANES * 2 * NEIGHBOURS * size_of::<(Vec3, Vec3)>();
+    let near = LANES * 2 * NEIGHBOURS * size_of::<NearPhoton>();
     let packet = size_of::<PacketScratch>() + size_of::<SegmentPacket>() + near;
     let layers = SampleLayers::bytes(layers, sample_count);
     (samples + segments + packet + layers) as u64 + 32_768

@@ -7,13 +7,12 @@
 
 use super::{
     context::RenderContext, dimensions::SPRAY, lights::LightSamples, sampler::get_1d_lanes,
-    scratch::PacketScratch, settings::IntegratorKind, stream::SegmentPacket,
+    scratch::PacketScratch, stream::SegmentPacket,
 };
 use crate::accel::Coherence;
 use crate::math::functions::exp;
 use crate::math::{lane3, lanes_in, set_lane3, splat};
 use crate::ray::Ray;
-use crate::scene::Scene;
 use crate::surface::{Intersection, MaterialId, Shape};
 
 /// Maximum number of drops along a ray; further ones are not there.
@@ -24,13 +23,6 @@ const OPTICAL_DEPTH: f32 = 2.5;
 
 /// Transmittance below which a shadow ray ends.
 const MIN_TRANSMITTANCE: f32 = 1.0 / 4096.0;
-
-/// Whether `shape` is soft spray in pictures with these settings.
-pub(super) fn is_soft(scene: &Scene, integrator: IntegratorKind, shape: &dyn Shape) -> bool {
-    scene.is_spray_soft
-        && integrator == IntegratorKind::Path
-        && shape.material() == MaterialId::SPRAY
-}
 
 /// The part of the light that a drop takes away from a ray that enters it at this absolute `cosine` to the normal. The
 /// extinction falls off from the centre like `1 - (distance / radius)^2`, so the optical depth along a chord grows with

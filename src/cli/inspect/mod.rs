@@ -27,8 +27,6 @@ Examples:
       Counts, bounds and attributes of one file
   spherule inspect --json run1
       The same for all frames of a directory, as JSON
-  spherule inspect run1.pvd
-      Steps, parts and times of a ParaView collection, and its files
   spherule inspect --verify run1-native
       Check all frames for damage";
 

@@ -6,25 +6,13 @@ use glam::Vec3;
 use super::floor::PhotonMap;
 use super::{PathIntegrator, Surface};
 use crate::math::{LANES, Lanes3, lane3, lanes_in, set_lane3, splat};
+use crate::render::near_photons::NearPhoton;
 use crate::render::scratch::PacketScratch;
 use crate::surface::{Intersections, MaterialId};
 
 /// Least cosine between the light of a photon and the geometric normal. The flux of photons at grazing angles is spread
 /// over the geometric surface, and the BSDF expects the shading normal.
 const MIN_COSINE: f32 = 0.1;
-
-/// A photon near a point.
-#[derive(Debug, Clone, Copy)]
-pub(in crate::render) struct NearPhoton {
-    /// Unit vector to where its light comes from.
-    pub(in crate::render) to_light: Vec3,
-    pub(in crate::render) irradiance: Vec3,
-    /// Its light group.
-    pub(in crate::render) group: usize,
-}
-
-/// The photons near a point.
-pub(in crate::render) type NearPhotons = Vec<NearPhoton>;
 
 impl PathIntegrator<'_> {
     /// The lanes of surfaces that photons light.

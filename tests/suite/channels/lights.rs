@@ -114,7 +114,14 @@ fn light_channels_of_path_add_up() {
     ];
     check(&workshop, &[&studio[..], &metal].concat(), &["specular"]);
     let water = ["--look", "water"];
-    let clear = ["diffuse", "reflection", "refraction", "background"];
+    // Wet ground is glossy
+    let clear = [
+        "diffuse",
+        "specular",
+        "reflection",
+        "refraction",
+        "background",
+    ];
     check(&workshop, &[&water[..], &PATH].concat(), &clear);
     // The last ray of a path leaves a pane, and sees the environment
     let ball = concat!(

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::super::group::{FileGroup, GroupFile};
 use super::super::{ListPlace, NumberedStep, PartFile, SequenceError, SequenceSettings};
-use super::list::{List, ListEntry, ListKind, label};
+use super::entry::{List, ListEntry, ListKind, label};
 use super::parts::{PartKey, PartTable, stem_of};
 use super::paths::ListRoot;
 use super::{ListSummary, is_list};

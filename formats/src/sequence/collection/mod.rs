@@ -3,6 +3,7 @@
 //! `list` reads one such file, `expand` follows the files that it lists and makes time steps of them. What the
 //! particle files hold is looked at when a frame is loaded, like everywhere in a sequence.
 
+mod entry;
 mod expand;
 mod list;
 mod parts;
@@ -22,7 +23,7 @@ pub(super) use expand::{Expansion, ListedFiles, expand};
 #[doc(hidden)]
 pub use list::lists_of;
 
-use list::ListKind;
+use entry::ListKind;
 
 /// Extensions of lists with times, in lower case.
 const TIMED_EXTENSIONS: [&str; 2] = ["pvd", "series"];

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use super::super::name::FileName;
-use super::list::PartLabel;
+use super::entry::PartLabel;
 
 /// Characters that names do not begin or end with.
 const SEPARATORS: [char; 5] = ['_', '-', '.', ' ', '#'];

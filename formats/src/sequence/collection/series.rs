@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use serde_json::value::RawValue;
 
-use super::list::{LineCounter, ListEntry, PartLabel};
+use super::entry::{LineCounter, ListEntry, PartLabel};
 use crate::ParseError;
 
 /// The key that says what the JSON is.

@@ -3,7 +3,7 @@
 use quick_xml::events::{BytesStart, Event};
 use quick_xml::reader::Reader;
 
-use super::list::{LineCounter, List, ListEntry, ListKind, PartLabel, TextPlace, label};
+use super::entry::{LineCounter, List, ListEntry, ListKind, PartLabel, TextPlace, label};
 use crate::ParseError;
 use crate::read::vtk_xml::{attribute, short};
 

@@ -41,7 +41,6 @@ mod wet;
 const BORDER: f32 = 0.1;
 
 pub(super) use photon_map::PhotonMap;
-pub(in crate::render) use photon_map::{NEIGHBOURS, Neighbour};
 
 use emitter::Emitter;
 use photon_map::Collector;

@@ -6,10 +6,7 @@
 
 use glam::Vec3;
 
-use super::super::caustics::NearPhoton;
-
-/// Photons of an estimate.
-pub(in crate::render) const NEIGHBOURS: usize = 48;
+use crate::render::near_photons::{NEIGHBOURS, NearPhoton, Neighbour};
 
 /// Photons in a leaf of the tree.
 const LEAF: usize = 8;
@@ -105,9 +102,6 @@ pub(in crate::render) struct PhotonMap {
     axes: Vec<u8>,
     max_distance: f32,
 }
-
-/// A photon in an estimate: the square of its distance, and its index.
-pub(in crate::render) type Neighbour = (f32, u32);
 
 impl PhotonMap {
     fn new(mut photons: Vec<Photon>, max_distance: f32) -> Self {
