@@ -208,11 +208,12 @@ section! {
         ground_pattern: GroundPattern = GroundPattern::Plain;
         /// Strength of the shadows on a shadow catcher; 1 is physical
         ground_shadow: f32 = 1.0, from(0), to(1), affects(Affects::PathTracing);
-        /// How much darker and glossier a ground is where water wets it; 1 is physical, 0 is dry
+        /// How much darker and glossier a ground is where water wets it; 1 is a thin film of water, 0 is dry
         ///
+        /// Under deep water, its surface already throws light back to the ground, so that 1 is too dark there.
         /// The ground is wet under the liquid and up to about a particle radius beside it. It needs a transparent union
         /// or smooth surface, photons, and a ground that is no shadow catcher.
-        ground_wetness: f32 = 1.0, from(0), to(1), affects(Affects::PathTracedBodies);
+        ground_wetness: f32 = 0.5, from(0), to(1), affects(Affects::PathTracedBodies);
         /// Edge length of the squares of the pattern, or of its largest spots, or auto
         ground_tile: Option<f64> = None, or("auto"), unit("a length"), above(0), single();
         /// Maximum memory to use: 4GiB, 512MiB; frames that need more fail

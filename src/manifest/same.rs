@@ -226,7 +226,7 @@ mod tests {
         let planned = rewritten(&current, GROUND_WETNESS, None);
         assert_eq!(
             changes(&current, &planned, false),
-            ["render.ground_wetness: (not set) -> 1.0"]
+            ["render.ground_wetness: (not set) -> 0.5"]
         );
         let mut adopted = current.clone();
         adopted.adopt_old_defaults(&planned);
