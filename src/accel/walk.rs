@@ -13,18 +13,19 @@ pub(super) const STACK_SIZE: usize = MAX_LEVELS * (WIDTH - 1) + 1;
 
 /// A node or block still to be visited, as one word so that it is stored and loaded at once. The upper half has the
 /// bits of the distance at which the ray enters its box (rounded down), the lower half its code.
-#[derive(Clone, Copy, Default)]
-struct Pending(u64);
+#[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Pending(u64);
 
 impl Pending {
+    /// `key` has the bits of the distance; its lowest three bits do not count.
     #[inline(always)]
-    fn new(key: u32, code: u32) -> Self {
+    pub(super) fn new(key: u32, code: u32) -> Self {
         Self((u64::from(key & !7) << 32) | u64::from(code))
     }
 
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "the two halves")]
-    fn split(self) -> (f32, u32) {
+    pub(super) fn split(self) -> (f32, u32) {
         (f32::from_bits((self.0 >> 32) as u32), self.0 as u32)
     }
 }

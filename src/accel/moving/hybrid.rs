@@ -7,10 +7,11 @@
     reason = "one index for the lanes of many arrays"
 )]
 
+use super::super::hits::TreeHits;
 use super::super::simd::lanes_entering;
+use super::MovingTree;
 use super::node::{BLOCK, MovingBlock, MovingNode};
 use super::single::{ROUNDING, RayInTime, RayStack, STACK_SIZE, inverse, walk_blocks};
-use super::{MovingHits, MovingTree};
 use crate::math::{LANES, Lanes, Lanes3, first_lanes, lane_kernel, lanes_in, larger, smaller};
 use crate::ray::RayPacket;
 use spherule_formats::blocks::{BLOCK_SIZE, WIDTH};
@@ -20,10 +21,10 @@ const MAX_SINGLE_RAYS: u32 = 5;
 
 impl MovingTree {
     /// The first intersections of the rays in `lanes` between their ends. Particles with a lower index win ties.
-    pub fn nearest(&self, rays: &RayPacket, lanes: u32) -> MovingHits {
-        let mut hits = MovingHits {
+    pub fn nearest(&self, rays: &RayPacket, lanes: u32) -> TreeHits {
+        let mut hits = TreeHits {
             t: rays.t_max,
-            slot: [MovingHits::NO_SLOT; LANES],
+            slot: [TreeHits::NO_SLOT; LANES],
         };
         let lanes = lanes & self.lanes_entering(rays);
         if lanes != 0 {
@@ -99,7 +100,7 @@ trait Query {
 struct Nearest<'a> {
     blocks: &'a [MovingBlock],
     indices: &'a [u32],
-    hits: &'a mut MovingHits,
+    hits: &'a mut TreeHits,
 }
 
 impl Query for Nearest<'_> {
@@ -124,7 +125,7 @@ impl Query for Nearest<'_> {
             let is_nearer = t[i] < limit;
             // At the same distance, the lower index wins; the end of a ray is exclusive
             let wins = is_nearer
-                || (found != MovingHits::NO_SLOT
+                || (found != TreeHits::NO_SLOT
                     && self.indices[slot as usize] < self.indices[found as usize]);
             if wins {
                 (limit, found) = (t[i], slot);
@@ -171,7 +172,7 @@ fn nearest_body(
     indices: &[u32],
     rays: &RayPacket,
     lanes: u32,
-    hits: &mut MovingHits,
+    hits: &mut TreeHits,
 ) {
     let mut query = Nearest {
         blocks,
@@ -188,7 +189,7 @@ lane_kernel! {
         indices: &[u32],
         rays: &RayPacket,
         lanes: u32,
-        hits: &mut MovingHits,
+        hits: &mut TreeHits,
     ) = nearest_body;
 }
 

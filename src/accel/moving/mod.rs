@@ -11,7 +11,6 @@ use rayon::prelude::*;
 use super::Aabb;
 use super::view::TreeView;
 use crate::math::Supported;
-use crate::ray::PACKET_SIZE;
 use spherule_formats::blocks::BLOCK_SIZE;
 
 mod hybrid;
@@ -26,28 +25,6 @@ use node::{MovingBlock, MovingNode};
 /// Largest distance by which a sphere may move during an exposure, scene units. Those that would move farther, and
 /// those whose motion is not a number, do not move.
 const MAX_DISPLACEMENT: f32 = 1e15;
-
-/// The first hits of the rays of a packet with moving spheres.
-#[derive(Debug, Clone, Copy)]
-pub struct MovingHits {
-    /// Distance of each hit, and of the ends of rays without one.
-    pub t: [f32; PACKET_SIZE],
-    /// Slot of the particle of each hit, or [`Self::NO_SLOT`].
-    pub slot: [u32; PACKET_SIZE],
-}
-
-impl MovingHits {
-    /// The slot of a ray without a hit.
-    pub const NO_SLOT: u32 = u32::MAX;
-
-    /// Bit mask of the lanes with a hit.
-    pub fn mask(&self) -> u32 {
-        let slots = self.slot.iter().enumerate();
-        slots.fold(0, |mask, (lane, slot)| {
-            mask | u32::from(*slot != Self::NO_SLOT) << lane
-        })
-    }
-}
 
 /// The tree, see the module. Times are from -1/2, when the shutter opens, to 1/2, when it closes.
 #[derive(Debug, Default)]

@@ -6,6 +6,7 @@
 )]
 
 use super::super::levels::MAX_LEVELS;
+use super::super::walk::Pending;
 use super::node::{BLOCK, MovingBlock, MovingNode};
 use crate::math::{larger, smaller};
 use crate::ray::RayPacket;
@@ -116,24 +117,6 @@ impl RayInTime {
     }
 }
 
-/// A node or block still to be visited: the bits of its entry distance in the upper half, its code in the lower one.
-#[derive(Clone, Copy, Default)]
-struct Pending(u64);
-
-impl Pending {
-    #[inline(always)]
-    fn new(enter: f32, code: u32) -> Self {
-        // Bits of numbers that are not negative order like the numbers
-        Self(u64::from(larger(enter, 0.0).to_bits()) << 32 | u64::from(code))
-    }
-
-    #[inline(always)]
-    #[expect(clippy::cast_possible_truncation, reason = "the two halves")]
-    fn split(self) -> (f32, u32) {
-        (f32::from_bits((self.0 >> 32) as u32), self.0 as u32)
-    }
-}
-
 /// Memory of a traversal, which can be used for one after another.
 pub(super) struct RayStack([Pending; STACK_SIZE]);
 
@@ -171,9 +154,9 @@ pub(super) fn walk_blocks(
             let first = depth;
             for i in 0..WIDTH {
                 if enter[i] < f32::INFINITY {
-                    let pending = Pending::new(enter[i], node.children[i]);
+                    let pending = Pending::new(larger(enter[i], 0.0).to_bits(), node.children[i]);
                     let mut place = depth;
-                    while place > first && stack[place - 1].0 < pending.0 {
+                    while place > first && stack[place - 1] < pending {
                         stack[place] = stack[place - 1];
                         place -= 1;
                     }

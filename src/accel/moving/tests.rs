@@ -2,7 +2,8 @@
 
 use glam::{DVec3, Vec3};
 
-use super::{MovingHits, MovingTree, bounded};
+use super::{MovingTree, bounded};
+use crate::accel::TreeHits;
 use crate::accel::simd::SimdLevel;
 use crate::accel::{BuildSettings, SphereRadius, Spheres, Structure, TreeBuilder};
 use crate::ray::{Ray, RayPacket};
@@ -122,7 +123,7 @@ fn rays_find_the_spheres_at_their_time() {
         for lane in 0..16 {
             let (ray, time) = (rays.ray(lane), rays.time[lane]);
             let found = match hits.slot[lane] {
-                MovingHits::NO_SLOT => None,
+                TreeHits::NO_SLOT => None,
                 slot => Some(slot),
             };
             match (swarm.nearest(&ray, time), found) {
@@ -155,9 +156,9 @@ fn structures_instruction_sets_and_packets_agree_to_the_bit() {
                 for number in 0..40 {
                     let rays = packet(number);
                     let (a, b) = (expected.nearest(&rays, 0xffff), tree.nearest(&rays, 0xffff));
-                    let particles = |tree: &MovingTree, hits: &MovingHits| {
+                    let particles = |tree: &MovingTree, hits: &TreeHits| {
                         hits.slot.map(|slot| match slot {
-                            MovingHits::NO_SLOT => None,
+                            TreeHits::NO_SLOT => None,
                             slot => Some(tree.particle(slot)),
                         })
                     };
