@@ -9,7 +9,7 @@ use spherule_formats::{FrameError, ParticleFrame};
 use super::ImageTask;
 use super::decoded::{DecodedFrame, particle_with_id};
 use super::in_place::{Opened, StoredFrame};
-use super::load_error::LoadError;
+use super::load_error::{LoadError, first_file};
 use super::meshes::{MeshSlices, meshes_of};
 use super::motion::velocities_to_next;
 use super::predict::{FrameSize, MemoryModel};
@@ -120,7 +120,7 @@ fn decode(
     notes.extend(loaded.notes);
     let frame = ParticleFrame::from_raw(loaded.particles, setup.picture.origin);
     let (time, dropped) = (frame.time, frame.dropped);
-    let file = first_file(sequence, task);
+    let file = first_file(sequence, task.index);
     let focus = focus_point(setup, &frame, &file)?;
     let moving = match setup.picture.shutter {
         Some(shutter) if !shutter.has_velocities => {
@@ -200,20 +200,13 @@ fn newest(error: LoadError, sequence: &Sequence, task: &ImageTask) -> LoadError 
     }
 }
 
-fn first_file(sequence: &Sequence, task: &ImageTask) -> String {
-    let inputs = sequence.inputs(task.index);
-    inputs
-        .first()
-        .map_or_else(String::new, |p| p.display().to_string())
-}
-
 /// Rejects a frame that cannot fit into memory, before the system kills the whole job.
 fn check_memory(setup: &Setup, sequence: &Sequence, task: &ImageTask) -> Result<(), LoadError> {
     let size = FrameSize::of_task(sequence, task, setup);
     let need = MemoryModel::new(setup).decoding(&size);
     match available().into_iter().chain(process_room()).min() {
         Some(available) if need > available => Err(LoadError::TooLarge {
-            file: first_file(sequence, task),
+            file: first_file(sequence, task.index),
             need: need >> 20,
             available: available >> 20,
         }),

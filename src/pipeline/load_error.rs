@@ -1,6 +1,7 @@
 //! Errors when reading frames.
 
 use spherule_formats::FrameError;
+use spherule_formats::sequence::Sequence;
 
 use super::meshes::MeshLoadError;
 
@@ -61,6 +62,14 @@ pub enum LoadError {
         /// The id.
         id: u32,
     },
+}
+
+/// The first file of the frame with `index`, for messages.
+pub(super) fn first_file(sequence: &Sequence, index: usize) -> String {
+    let inputs = sequence.inputs(index);
+    inputs
+        .first()
+        .map_or_else(String::new, |p| p.display().to_string())
 }
 
 /// The error for an attribute that is not among those that the file `has`.

@@ -8,7 +8,7 @@ use spherule_formats::sequence::Sequence;
 
 use super::ImageTask;
 use super::decoded::{DecodedFrame, ids};
-use super::load_error::{LoadError, missing};
+use super::load_error::{LoadError, first_file, missing};
 use super::setup::Setup;
 use super::shutter::Shutter;
 use crate::accel::moving::bounded;
@@ -75,17 +75,14 @@ pub(super) fn velocities_to_next(
     // Find each particle there
     let ids_of = |frame: &ParticleFrame, index: usize| match ids(frame) {
         None if !frame.is_empty() => {
-            let inputs = sequence.inputs(index);
-            let file = inputs
-                .first()
-                .map_or_else(String::new, |p| p.display().to_string());
+            let file = first_file(sequence, index);
             let has = frame.attributes.iter().map(|a| a.name.as_str());
             Err(missing("id", "motion blur without velocities", &file, has))
         }
         ids => Ok(ids.unwrap_or_default()),
     };
     let (own, others) = (ids_of(frame, task.index)?, ids_of(&other, other_index)?);
-    let places = Places::new(&others);
+    let places = Places::new(&others, &own);
     let half_extent = 0.5 * extent(&frame.positions);
     let velocity = |(place, id): (usize, &u32)| {
         let Some(at) = places.find(place, *id) else {
@@ -113,12 +110,18 @@ fn extent(positions: &[Vec3]) -> DVec3 {
 /// The places of particles by their ids.
 struct Places<'a> {
     ids: &'a [u32],
-    /// Ids with their places, ascending.
+    /// Ids with their places, ascending; empty if they are not needed.
     sorted: Vec<(u32, u32)>,
 }
 
 impl<'a> Places<'a> {
-    fn new(ids: &'a [u32]) -> Self {
+    /// The places in `ids` of the particles with ids `wanted`.
+    fn new(ids: &'a [u32], wanted: &[u32]) -> Self {
+        // Most files have the same order
+        if ids.starts_with(wanted) {
+            let sorted = Vec::new();
+            return Self { ids, sorted };
+        }
         let mut sorted: Vec<(u32, u32)> = (0..index_u32(ids.len()))
             .zip(ids)
             .map(|(place, id)| (*id, place))
@@ -127,7 +130,7 @@ impl<'a> Places<'a> {
         Self { ids, sorted }
     }
 
-    /// The place of the particle `id`; the first of several. Most files have the same order, so `guess` is tried first.
+    /// The place of the particle `id`; `guess` if it is there, else the first of several.
     fn find(&self, guess: usize, id: u32) -> Option<usize> {
         if self.ids.get(guess) == Some(&id) {
             return Some(guess);

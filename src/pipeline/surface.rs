@@ -27,8 +27,8 @@ use crate::surface::spheres::SphereSurface;
 use crate::surface::spray::{DROP_RADIUS, SOFT_DROPS, soft_drop, spray_of};
 use crate::surface::union::UnionSurface;
 use crate::surface::{
-    GradientNormals, MaterialId, NormalKind, PcaNormals, ShadingNormals, Shape, SurfaceKind,
-    SurfaceSettings,
+    GradientNormals, MaterialId, NormalKind, PcaNormals, ShadingNormals, Shape, SphereOwners,
+    SurfaceKind, SurfaceSettings,
 };
 
 /// Input for a tree without spheres.
@@ -98,7 +98,7 @@ impl SurfaceBuilder {
         }
         let has_unions = kind == SurfaceKind::Union && setup.has_motion();
         if has_unions {
-            report.bytes.surface += self.build_unions(setup, frame);
+            report.bytes.surface += self.build_unions(setup, frame)?;
         }
         if kind == SurfaceKind::Smooth || has_unions {
             frame.centers = Vec::new();
@@ -122,34 +122,44 @@ impl SurfaceBuilder {
         report.seconds.surface += start.elapsed().as_secs_f64();
     }
 
-    /// The centres of the body at the middle of each slice of the exposure; without motion blur, as they are.
-    fn slices(&self, setup: &Setup) -> Vec<f32> {
-        match setup.picture.shutter {
+    /// Calls `build` with the body at the middle of each slice of the exposure; without motion blur, as it is.
+    fn build_slices(
+        &mut self,
+        setup: &Setup,
+        frame: &mut DecodedFrame,
+        mut build: impl FnMut(&mut Self, &DecodedFrame) -> Result<(), SmoothError>,
+    ) -> Result<(), SmoothError> {
+        let times = match setup.picture.shutter {
             Some(shutter) => slice_times(shutter.slices).collect(),
             None => vec![0.0],
+        };
+        let mut now = 0.0;
+        for time in times {
+            for (center, displacement) in frame.centers.iter_mut().zip(&self.displacements) {
+                *center += (time - now) * *displacement;
+            }
+            now = time;
+            build(self, frame)?;
         }
-    }
-
-    /// Moves the particles of `frame` from the time `from` of the exposure to the time `to`.
-    fn move_body(&self, frame: &mut DecodedFrame, from: f32, to: f32) {
-        for (center, displacement) in frame.centers.iter_mut().zip(&self.displacements) {
-            *center += (to - from) * *displacement;
-        }
+        Ok(())
     }
 
     /// Builds a tree for each slice of the exposure, and returns their memory in bytes.
-    fn build_unions(&mut self, setup: &Setup, frame: &mut DecodedFrame) -> u64 {
+    fn build_unions(
+        &mut self,
+        setup: &Setup,
+        frame: &mut DecodedFrame,
+    ) -> Result<u64, SmoothError> {
         let settings = setup.build_settings(frame.centers.len(), frame.shading.has_colors());
-        let (mut bytes, mut now) = (0, 0.0);
-        for time in self.slices(setup) {
-            self.move_body(frame, now, time);
-            now = time;
+        let mut bytes = 0;
+        self.build_slices(setup, frame, |this, frame| {
             let mut trees = TreeBuilder::new();
             let built = trees.build(&spheres(frame), &settings);
             bytes += built.position_bytes + built.structure_bytes;
-            self.unions.push(trees);
-        }
-        bytes
+            this.unions.push(trees);
+            Ok(())
+        })?;
+        Ok(bytes)
     }
 
     fn build_smooth(
@@ -167,22 +177,19 @@ impl SurfaceBuilder {
         // Keep the particles if attributes are looked up at points of the surface
         let keep = channels.needs_particles() || is_colored;
         let settings = &setup.picture.surface;
-        let mut sum = SmoothReport::default();
-        let mut now = 0.0;
-        for time in self.slices(setup) {
-            self.move_body(frame, now, time);
-            now = time;
+        let mut made = SmoothReport::default();
+        self.build_slices(setup, frame, |this, frame| {
             let mut grid = SmoothGrid::default();
             let left = memory_left(setup.run.memory_limit);
-            let made = grid.build(&frame.centers, radius, settings, keep, left)?;
-            self.smooth.push(grid);
-            sum = SmoothReport {
-                bytes: sum.bytes + made.bytes,
-                peak_bytes: sum.peak_bytes.max(sum.bytes + made.peak_bytes),
-                ..made
+            let one = grid.build(&frame.centers, radius, settings, keep, left)?;
+            this.smooth.push(grid);
+            made = SmoothReport {
+                bytes: made.bytes + one.bytes,
+                peak_bytes: made.peak_bytes.max(made.bytes + one.peak_bytes),
+                ..one
             };
-        }
-        let made = sum;
+            Ok(())
+        })?;
         // Note what the user may not expect
         if made.left_out > 0 {
             notes.push(format!(
@@ -283,17 +290,11 @@ impl SurfaceBuilder {
         stop: &dyn Stop,
     ) -> Result<RayCounts, RenderError> {
         let body = self.body(setup, tree);
+        let owners =
+            SphereOwners::new(MaterialId::SPRAY, self.body).with_spheres(self.drops_per_particle);
         let spray: Box<dyn Shape> = match setup.has_motion() {
-            true => Box::new(
-                MovingSpheres::new(&self.moving[1])
-                    .of(MaterialId::SPRAY, self.body)
-                    .of_particles_with(self.drops_per_particle),
-            ),
-            false => Box::new(
-                SphereSurface::new(self.spray.tree().view())
-                    .of(MaterialId::SPRAY, self.body)
-                    .of_particles_with(self.drops_per_particle),
-            ),
+            true => Box::new(MovingSpheres::new(&self.moving[1]).of(owners)),
+            false => Box::new(SphereSurface::new(self.spray.tree().view()).of(owners)),
         };
         let mut shapes: Vec<&dyn Shape> = vec![&*body];
         if !self.spray.tree().view().is_empty() {

@@ -1,12 +1,11 @@
 //! Spheres that move while the shutter is open, each a separate body, in a [`MovingTree`].
 
-use glam::Vec3;
-
+use super::owners::{SphereOwners, cross_chord};
 use super::shape::crossing_of_packet;
 use super::spheres::intersections;
 use super::{Intersection, Intersections, MaterialId, Shape, Side, TransmittanceProduct};
 use crate::accel::Coherence;
-use crate::accel::moving::{MovingHits, MovingTree};
+use crate::accel::moving::MovingTree;
 use crate::math::{LANES, Lanes, Supported, first_lanes, lanes_in, set_lane3};
 use crate::ray::{Ray, RayPacket};
 
@@ -14,11 +13,7 @@ use crate::ray::{Ray, RayPacket};
 #[derive(Debug, Clone, Copy)]
 pub struct MovingSpheres<'a> {
     tree: &'a MovingTree,
-    material: MaterialId,
-    /// Index in the frame of the tree's particle 0.
-    first: u32,
-    /// Number of spheres of each particle.
-    spheres: u32,
+    owners: SphereOwners,
     simd: Supported,
 }
 
@@ -27,35 +22,15 @@ impl<'a> MovingSpheres<'a> {
     pub fn new(tree: &'a MovingTree) -> Self {
         Self {
             tree,
-            material: MaterialId::PARTICLES,
-            first: 0,
-            spheres: 1,
+            owners: SphereOwners::PARTICLES,
             simd: Supported::default(),
         }
     }
 
-    /// Sets the material, and the index in the frame of the tree's first particle.
+    /// Sets what the spheres belong to.
     #[must_use]
-    pub fn of(self, material: MaterialId, first: u32) -> Self {
-        Self {
-            material,
-            first,
-            ..self
-        }
-    }
-
-    /// Sets the number of spheres of each particle, one or more, which follow each other in the tree's numbers.
-    #[must_use]
-    pub fn of_particles_with(self, spheres: u32) -> Self {
-        Self {
-            spheres: spheres.max(1),
-            ..self
-        }
-    }
-
-    /// Index in the frame of the particle of a sphere of the tree.
-    fn particle_of(&self, sphere: u32) -> u32 {
-        self.first + sphere / self.spheres
+    pub fn of(self, owners: SphereOwners) -> Self {
+        Self { owners, ..self }
     }
 }
 
@@ -66,7 +41,7 @@ impl Shape for MovingSpheres<'_> {
     }
 
     fn material(&self) -> MaterialId {
-        self.material
+        self.owners.material
     }
 
     fn intersect(
@@ -86,17 +61,15 @@ impl Shape for MovingSpheres<'_> {
         let mut centers = [[0.0; LANES]; 3];
         let mut radii = [1.0; LANES];
         for lane in lanes_in(hit_lanes) {
-            let (center, radius): (Vec3, f32) = self.tree.sphere(found.slot[lane], rays.time[lane]);
+            let (center, radius) = self.tree.sphere(found.slot[lane], rays.time[lane]);
             set_lane3(&mut centers, lane, center);
             radii[lane] = radius;
         }
         intersections(self.simd, rays, &found.t, &centers, &radii, hit_lanes, hits);
         // End the rays at their hits
         for lane in lanes_in(hit_lanes) {
-            debug_assert_ne!(found.slot[lane], MovingHits::NO_SLOT);
-            rays.t_max[lane] = found.t[lane];
-            hits.particle[lane] = self.particle_of(self.tree.particle(found.slot[lane]));
-            hits.material[lane] = self.material;
+            let sphere = self.tree.particle(found.slot[lane]);
+            (self.owners).end_ray(rays, lane, (found.t[lane], sphere), hits);
         }
         hits.mask |= hit_lanes;
     }
@@ -114,15 +87,11 @@ impl Shape for MovingSpheres<'_> {
     ) {
         for lane in lanes_in(lanes) {
             let mut product = TransmittanceProduct::default();
-            let is_within = |t: &f32| *t >= rays.t_min[lane] && *t < rays.t_max[lane];
-            self.tree
-                .visit_chords(rays, lane, |particle, radius, ends| {
-                    let cosine = 0.5 * (ends[1] - ends[0]) / radius;
-                    let part = fresnel_transmittance(cosine, self.particle_of(particle));
-                    ends.iter()
-                        .filter(|t| is_within(t))
-                        .all(|_| product.multiply(part))
-                });
+            self.tree.visit_chords(rays, lane, |sphere, radius, ends| {
+                let cosine = 0.5 * (ends[1] - ends[0]) / radius;
+                let part = fresnel_transmittance(cosine, self.owners.particle_of(sphere));
+                cross_chord(&mut product, part, ends, rays, lane)
+            });
             transmittance[lane] = product.value();
         }
     }

@@ -4,6 +4,7 @@ use std::cell::RefCell;
 
 use glam::Vec3;
 
+use super::owners::{SphereOwners, cross_chord};
 use super::{
     Intersection, Intersections, MaterialId, ShadingNormals, Shape, Side, TransmittanceProduct,
 };
@@ -24,11 +25,7 @@ const OFFSET_OF_ROUNDING: f32 = 8.0 * f32::EPSILON;
 pub struct SphereSurface<'a> {
     tree: TreeView<'a>,
     normals: ShadingNormals,
-    material: MaterialId,
-    /// Index in the frame of the tree's particle 0.
-    first: u32,
-    /// Number of spheres of each particle, one after the other.
-    spheres: u32,
+    owners: SphereOwners,
     simd: Supported,
 }
 
@@ -38,9 +35,7 @@ impl<'a> SphereSurface<'a> {
         Self {
             tree,
             normals: ShadingNormals::Sphere,
-            material: MaterialId::PARTICLES,
-            first: 0,
-            spheres: 1,
+            owners: SphereOwners::PARTICLES,
             simd: Supported::or_best(tree.simd()),
         }
     }
@@ -51,29 +46,10 @@ impl<'a> SphereSurface<'a> {
         Self { normals, ..self }
     }
 
-    /// Sets the material, and the index in the frame of the tree's first particle.
+    /// Sets what the spheres belong to.
     #[must_use]
-    pub fn of(self, material: MaterialId, first: u32) -> Self {
-        Self {
-            material,
-            first,
-            ..self
-        }
-    }
-
-    /// Sets the number of spheres of each particle, one or more, which follow each other in the tree's numbers.
-    #[must_use]
-    pub fn of_particles_with(self, spheres: u32) -> Self {
-        Self {
-            spheres: spheres.max(1),
-            ..self
-        }
-    }
-
-    /// Index in the frame of the particle of a sphere of the tree.
-    #[inline(always)]
-    fn particle_of(&self, sphere: u32) -> u32 {
-        self.first + sphere / self.spheres
+    pub fn of(self, owners: SphereOwners) -> Self {
+        Self { owners, ..self }
     }
 }
 
@@ -112,13 +88,13 @@ impl Shape for SphereSurface<'_> {
         let hit = self.tree.nearest(ray)?;
         let hit = sphere_hit(&self.tree, ray, hit, &self.normals);
         Some(Intersection {
-            particle: self.particle_of(hit.particle),
+            particle: self.owners.particle_of(hit.particle),
             ..hit
         })
     }
 
     fn material(&self) -> MaterialId {
-        self.material
+        self.owners.material
     }
 
     fn intersect(
@@ -146,9 +122,8 @@ impl Shape for SphereSurface<'_> {
         intersections(self.simd, rays, &found.t, &centers, &radii, hit_lanes, hits);
         // End the rays at their hits
         for lane in lanes_in(hit_lanes) {
-            rays.t_max[lane] = found.t[lane];
-            hits.particle[lane] = self.particle_of(self.tree.particle(found.slot[lane]));
-            hits.material[lane] = self.material;
+            let sphere = self.tree.particle(found.slot[lane]);
+            (self.owners).end_ray(rays, lane, (found.t[lane], sphere), hits);
         }
         hits.mask |= hit_lanes;
         // Replace the shading normals, hit by hit
@@ -158,7 +133,7 @@ impl Shape for SphereSurface<'_> {
                 let hit = self
                     .normals
                     .shade(&self.tree, &ray, hits.get(lane), radii[lane]);
-                hits.set(lane, &hit, self.material);
+                hits.set(lane, &hit, self.owners.material);
             }
         }
     }
@@ -188,7 +163,7 @@ impl Shape for SphereSurface<'_> {
             for lane in lanes_in(lanes) {
                 self.each_crossing_once(&rays.ray(lane), |crossing| {
                     let radius = self.tree.sphere(crossing.slot).1;
-                    let particle = self.particle_of(self.tree.particle(crossing.slot));
+                    let particle = self.owners.particle_of(self.tree.particle(crossing.slot));
                     product[lane].multiply(fresnel_transmittance(
                         crossing.half_chord / radius,
                         particle,
@@ -198,14 +173,9 @@ impl Shape for SphereSurface<'_> {
         } else {
             self.tree.visit_chords(rays, lanes, |lane, chord| {
                 let radius = self.tree.sphere(chord.slot).1;
-                let particle = self.particle_of(self.tree.particle(chord.slot));
+                let particle = self.owners.particle_of(self.tree.particle(chord.slot));
                 let part = fresnel_transmittance(chord.half() / radius, particle);
-                let is_within = |t: &f32| *t >= rays.t_min[lane] && *t < rays.t_max[lane];
-                chord
-                    .ends
-                    .iter()
-                    .filter(|t| is_within(t))
-                    .all(|_| product[lane].multiply(part))
+                cross_chord(&mut product[lane], part, chord.ends, rays, lane)
             });
         }
         for lane in lanes_in(lanes) {

@@ -6,7 +6,7 @@ use crate::accel::{BuildSettings, SbvhSettings, SphereRadius, Spheres, Structure
 use crate::ray::{Ray, RayPacket};
 use crate::surface::spheres::SphereSurface;
 use crate::surface::union::UnionSurface;
-use crate::surface::{Intersections, MaterialId, Shape, Side};
+use crate::surface::{Intersections, MaterialId, Shape, Side, SphereOwners};
 
 fn built(centers: &[Vec3], radius: f32, settings: &BuildSettings) -> TreeBuilder {
     let mut builder = TreeBuilder::new();
@@ -97,8 +97,9 @@ fn a_particle_has_many_soft_drops_of_different_sizes() {
 fn all_spheres_of_a_particle_have_its_index() {
     let centers: Vec<Vec3> = (0..6_u8).map(|i| f32::from(i) * 3.0 * Vec3::X).collect();
     let tree = built(&centers, 1.0, &BuildSettings::default());
-    let spheres = SphereSurface::new(tree.tree().view()).of(MaterialId::SPRAY, 10);
-    let spheres = spheres.of_particles_with(3);
+    let spheres =
+        SphereSurface::new(tree.tree().view())
+            .of(SphereOwners::new(MaterialId::SPRAY, 10).with_spheres(3));
     let mut rays = RayPacket::default();
     for center in &centers {
         rays.push(&Ray::new(*center - 5.0 * Vec3::Z, Vec3::Z));
@@ -120,7 +121,7 @@ fn spray_is_hit_beside_and_before_a_body() {
     ];
     let spray = built(&drops, 0.25, &BuildSettings::default());
     let medium = UnionSurface::new(body.tree().view());
-    let drops = SphereSurface::new(spray.tree().view()).of(MaterialId::SPRAY, 2);
+    let drops = SphereSurface::new(spray.tree().view()).of(SphereOwners::new(MaterialId::SPRAY, 2));
     let shapes: [&dyn Shape; 2] = [&medium, &drops];
     let along = |y: f32| Ray::new(Vec3::new(-10.0, y, 0.0), Vec3::X);
     let inside = Ray::new(Vec3::ZERO, Vec3::X);
