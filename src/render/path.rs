@@ -201,6 +201,14 @@ impl Occlusion {
             false => Self::None,
         }
     }
+
+    /// The same where photons bring the light that transmissive surfaces focus.
+    fn beside_photons(light: &dyn Light) -> Self {
+        match light.photon_source() {
+            Some(_) => Self::Opaque,
+            None => Self::of(light),
+        }
+    }
 }
 
 /// Bit mask of the lanes for which `holds`.
@@ -326,26 +334,41 @@ impl PathIntegrator<'_> {
         surface: &Surface<'_>,
         packet: &mut PacketScratch,
     ) -> u32 {
+        let visible = self.trace_samples(occlusion, surface, packet);
+        let PacketScratch {
+            light: samples,
+            radiance,
+            groups,
+            ..
+        } = packet;
+        let simd = self.context.simd;
+        add(simd, &samples.radiance, &Vec3::ONE, visible, radiance);
+        groups.add(simd, group, &samples.radiance, visible);
+        visible
+    }
+
+    /// Traces the shadow rays of the light samples, and multiplies their radiance by the transmittance. Returns the lanes
+    /// in which the light arrives.
+    fn trace_samples(
+        &self,
+        occlusion: Occlusion,
+        surface: &Surface<'_>,
+        packet: &mut PacketScratch,
+    ) -> u32 {
         let (context, segments, depth) = (&self.context, surface.segments, surface.depth);
         let PacketScratch {
             light: samples,
             crossings,
             counts,
-            radiance,
-            groups,
             ..
         } = packet;
-        let visible = match occlusion {
+        match occlusion {
             Occlusion::None => samples.lanes,
             Occlusion::Straight => {
                 context.trace_shadow_rays(segments, depth, samples, crossings, counts)
             }
             Occlusion::Opaque => context.unoccluded(segments, depth, samples, counts),
-        };
-        let simd = context.simd;
-        add(simd, &samples.radiance, &Vec3::ONE, visible, radiance);
-        groups.add(simd, group, &samples.radiance, visible);
-        visible
+        }
     }
 
     /// Samples a direction from the environment, and the light from there that `lanes` reflect: `packet.light`.

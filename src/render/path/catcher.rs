@@ -169,12 +169,13 @@ impl PathIntegrator<'_> {
                 set_lane3(&mut light.whole, lane, sum);
             }
             let source = &self.context.lights[index];
-            let is_focused = self.caustics.catcher.is_some() && source.photon_source().is_some();
-            let occlusion = match is_focused {
-                true => Occlusion::Opaque,
-                false => Occlusion::of(&**source),
+            let occlusion = match self.caustics.catcher {
+                Some(_) => Occlusion::beside_photons(&**source),
+                None => Occlusion::of(&**source),
             };
-            self.add_lost(occlusion, surface, packet, light);
+            if !matches!(occlusion, Occlusion::None) {
+                self.add_lost(occlusion, surface, packet, light);
+            }
         }
     }
 
@@ -186,28 +187,15 @@ impl PathIntegrator<'_> {
         packet: &mut PacketScratch,
         light: &mut CaughtLight,
     ) {
-        let PacketScratch {
-            light: samples,
-            crossings,
-            counts,
-            ..
-        } = packet;
-        let (lanes, unoccluded) = (samples.lanes, samples.radiance);
+        let (lanes, unoccluded) = (packet.light.lanes, packet.light.radiance);
         if lanes == 0 {
             return;
         }
-        let (context, segments, depth) = (&self.context, surface.segments, surface.depth);
-        let visible = match occlusion {
-            Occlusion::None => return,
-            Occlusion::Straight => {
-                context.trace_shadow_rays(segments, depth, samples, crossings, counts)
-            }
-            Occlusion::Opaque => context.unoccluded(segments, depth, samples, counts),
-        };
+        let visible = self.trace_samples(occlusion, surface, packet);
         for lane in lanes_in(lanes) {
             let arriving = match visible >> lane & 1 {
                 0 => Vec3::ZERO,
-                _ => lane3(&samples.radiance, lane),
+                _ => lane3(&packet.light.radiance, lane),
             };
             let lost = lane3(&unoccluded, lane) - arriving;
             let sum = lane3(&light.lost, lane) + lost;

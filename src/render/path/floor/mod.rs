@@ -18,7 +18,7 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::{Occlusion, PathIntegrator, Surface};
-use crate::math::{lane3, lanes_in, set_lane3, splat3};
+use crate::math::{lane3, lanes_in, set_lane3, splat, splat3};
 use crate::render::lights::PhotonSource;
 use crate::render::{
     layers::LightClass,
@@ -96,10 +96,12 @@ impl Square {
         self.center + self.edge * ((x - 0.5) * across + (y - 0.5) * along)
     }
 
-    /// Weight of the maps at a position: 1 inside, 0 at the edge and outside.
-    fn weight([x, y]: [f32; 2]) -> f32 {
+    /// The position of `point` with the weight of the maps there: 1 inside, falling to 0 at the edge; `None` outside.
+    fn place(&self, point: Vec3) -> Option<([f32; 2], f32)> {
+        let [x, y] = self.position(point);
         let inside = x.min(1.0 - x).min(y).min(1.0 - y);
-        (inside / BORDER).clamp(0.0, 1.0)
+        let weight = (inside / BORDER).clamp(0.0, 1.0);
+        (weight > 0.0).then_some(([x, y], weight))
     }
 }
 
@@ -164,11 +166,8 @@ impl CausticMap {
     }
 
     fn weighted(&self, map: &Map, point: Vec3) -> Vec3 {
-        let position = self.square.position(point);
-        match Square::weight(position) {
-            weight if weight > 0.0 => weight * map.at(position),
-            _ => Vec3::ZERO,
-        }
+        let place = self.square.place(point);
+        place.map_or(Vec3::ZERO, |(position, weight)| weight * map.at(position))
     }
 }
 
@@ -327,9 +326,10 @@ impl<'a> PathIntegrator<'a> {
         packet: &mut PacketScratch,
     ) {
         self.prepare_surface(surface, packet);
-        if let Some(wet) = &floor.wet {
-            wet.darken(surface, packet);
-        }
+        let gloss = match &floor.wet {
+            Some(wet) => wet.darken(surface, packet),
+            None => splat(0.0),
+        };
         // Add the light of the maps
         let mut reflected = splat3(Vec3::ZERO);
         for lane in lanes_in(surface.lanes) {
@@ -344,7 +344,7 @@ impl<'a> PathIntegrator<'a> {
         add(simd, &reflected, &Vec3::ONE, surface.lanes, radiance);
         packet.take_light(LightClass::Diffuse);
         if let Some(wet) = &floor.wet {
-            self.add_gloss(wet, surface, packet);
+            self.add_gloss(wet, &gloss, surface, packet);
         }
         self.add_straight_light(surface, packet);
     }
@@ -354,10 +354,7 @@ impl<'a> PathIntegrator<'a> {
         let context = &self.context;
         for (index, light) in context.lights.iter().enumerate() {
             self.reflect_light(index, false, surface, packet);
-            let occlusion = match light.photon_source() {
-                Some(_) => Occlusion::Opaque,
-                None => Occlusion::of(&**light),
-            };
+            let occlusion = Occlusion::beside_photons(&**light);
             self.add_direct(occlusion, context.light_group(index), surface, packet);
         }
     }
@@ -366,11 +363,9 @@ impl<'a> PathIntegrator<'a> {
 impl FloorLight {
     /// Radiance of a white ground at `point`.
     fn white(&self, point: Vec3) -> Vec3 {
-        let position = self.caustics.square.position(point);
-        let weight = Square::weight(position);
-        if weight <= 0.0 {
+        let Some((position, weight)) = self.caustics.square.place(point) else {
             return self.open;
-        }
+        };
         let caustics = self.caustics.map.at(position);
         self.open.lerp(self.sky.at(position), weight) + weight * caustics
     }
@@ -380,16 +375,12 @@ impl FloorLight {
         if self.groups.is_empty() {
             return;
         }
-        let position = self.caustics.square.position(point);
-        let weight = Square::weight(position);
+        let place = self.caustics.square.place(point);
         for (number, group) in self.groups.iter().enumerate() {
-            each(
-                number,
-                match weight > 0.0 {
-                    true => group.open.lerp(group.sky.at(position), weight),
-                    false => group.open,
-                },
-            );
+            let sky = place.map_or(group.open, |(position, weight)| {
+                group.open.lerp(group.sky.at(position), weight)
+            });
+            each(number, sky);
         }
         for (group, white) in self.caustics.white_of_groups(point) {
             each(group, white);

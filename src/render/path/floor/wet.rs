@@ -8,9 +8,9 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::super::{Occlusion, PathIntegrator, Surface};
+use super::super::{Occlusion, PathIntegrator, Surface, lanes_where};
 use super::{Map, Square};
-use crate::math::{lane3, lanes_in, set_lane3, splat};
+use crate::math::{Lanes, lane3, lanes_in, set_lane3, splat};
 use crate::ray::Ray;
 use crate::render::{
     dimensions::WET, layers::LightClass, sampler::get_2d_lanes, scratch::PacketScratch,
@@ -207,8 +207,28 @@ fn widened(values: &[f32], [inner, outer]: [f32; 2]) -> Vec<f32> {
             }
         }
     }
+    // Only texels near those with a value get one
+    let margin = reach.unsigned_abs();
+    let places = (0_usize..).zip(values).filter(|(_, value)| **value > 0.0);
+    let bounds = places.fold([[SIDE, 0]; 2], |bounds, (place, _)| {
+        let place: [usize; 2] = [place % SIDE, place / SIDE];
+        [0, 1].map(|axis| {
+            let [first, last] = bounds[axis];
+            [place[axis].min(first), place[axis].max(last)]
+        })
+    });
+    let is_near = |at: usize, [first, last]: [usize; 2]| {
+        first <= last && at + margin >= first && at <= last + margin
+    };
     let row = |y: usize| {
         let greatest = |x: usize| {
+            if !is_near(x, bounds[0]) || !is_near(y, bounds[1]) {
+                return 0.0;
+            }
+            // No value is above 1, and the weight of the texel itself is 1
+            if values[y * SIDE + x] >= 1.0 {
+                return 1.0;
+            }
             offsets.iter().fold(0.0_f32, |most, (dx, dy, weight)| {
                 match (x.checked_add_signed(*dx), y.checked_add_signed(*dy)) {
                     (Some(x), Some(y)) if x < SIDE && y < SIDE => {
@@ -227,32 +247,35 @@ fn widened(values: &[f32], [inner, outer]: [f32; 2]) -> Vec<f32> {
 impl WetMap {
     /// Wetness at a point of the ground from 0 to 1, and the part of it that is not under fluid.
     fn at(&self, point: Vec3) -> [f32; 2] {
-        let position = self.square.position(point);
-        if Square::weight(position) <= 0.0 {
+        let Some((position, _)) = self.square.place(point) else {
             return [0.0; 2];
-        }
+        };
         let texel = self.map.at(position);
         [texel.x, texel.y]
     }
 
-    /// Darkens the albedo of the points of a `surface` of the ground where it is wet.
-    pub(super) fn darken(&self, surface: &Surface<'_>, packet: &mut PacketScratch) {
+    /// Darkens the albedo of the points of a `surface` of the ground where it is wet. Returns the gloss of each point.
+    pub(super) fn darken(&self, surface: &Surface<'_>, packet: &mut PacketScratch) -> Lanes {
+        let mut gloss = splat(0.0);
         for lane in lanes_in(surface.lanes) {
-            let [wetness, _] = self.at(lane3(&packet.hits.point, lane));
+            let [wetness, uncovered] = self.at(lane3(&packet.hits.point, lane));
+            gloss[lane] = self.film.strength * uncovered;
             if wetness > 0.0 {
                 let dry = lane3(&packet.surface.albedo, lane);
                 let wet = self.film.albedo(dry, wetness);
                 set_lane3(&mut packet.surface.albedo, lane, wet);
             }
         }
+        gloss
     }
 }
 
 impl PathIntegrator<'_> {
-    /// Adds the light of the environment that water between the grains of a wet ground reflects.
+    /// Adds the light of the environment that water between the grains of a wet ground reflects, by its `gloss`.
     pub(super) fn add_gloss(
         &self,
         map: &WetMap,
+        gloss: &Lanes,
         surface: &Surface<'_>,
         packet: &mut PacketScratch,
     ) {
@@ -260,12 +283,8 @@ impl PathIntegrator<'_> {
             return;
         };
         // Find the wet points that are not under water
-        let mut gloss = splat(0.0);
-        let mut lanes = 0;
-        for lane in lanes_in(surface.lanes & !surface.segments.inside) {
-            gloss[lane] = map.film.strength * map.at(lane3(&packet.hits.point, lane))[1];
-            lanes |= u32::from(gloss[lane] > MIN_GLOSS) << lane;
-        }
+        let is_glossy = |lane: usize| gloss[lane] > MIN_GLOSS;
+        let lanes = surface.lanes & !surface.segments.inside & lanes_where(is_glossy);
         if lanes == 0 {
             return;
         }
