@@ -195,6 +195,31 @@ fn a_slope_in_water_has_the_irradiance_of_refracted_light() {
 }
 
 #[test]
+fn light_that_enters_water_straight_has_the_irradiance_of_refracted_light() {
+    // Without photons. A flat interface keeps the flux through each horizontal area
+    for sun_angle in [0.0_f32, 0.7, 1.2] {
+        let to_sun = Vec3::new(sun_angle.sin(), 0.0, sun_angle.cos());
+        let scene = {
+            let (eye, lights) = (DVec3::new(0.0, 0.0, 0.7), vec![sun(to_sun, 1e-4, 3.0)]);
+            let mut scene = scene(eye, DVec3::ZERO, lights);
+            scene.ground = None;
+            scene.meshes = vec![matte(0.5)];
+            scene
+        };
+        let bottom = square(Vec3::ZERO, 2.0 * Vec3::X, 2.0 * Vec3::Y);
+        let water = Solid::slab(-50.0, 1.0);
+        let film = image(&water, &[bottom], &scene, &with_photons(0, 4, 0));
+        let reflected = crate::scene::material::dielectric(sun_angle.cos(), 1.0 / GLASS.ior);
+        let irradiance = 3.0 * sun_angle.cos() * (1.0 - reflected);
+        let expected = 0.5 * irradiance / (PI * GLASS.ior * GLASS.ior);
+        for pixel in &film.color {
+            let error = pixel[0] / expected - 1.0;
+            assert!(error.abs() < 1e-3, "{sun_angle}: {error}");
+        }
+    }
+}
+
+#[test]
 fn a_mesh_has_the_caustic_of_a_floor() {
     let ball = Solid::ball_at(0.7 * Vec3::Z, 0.6);
     let lights = || vec![sun(Vec3::new(1.0, 0.0, 0.8), 0.05, PI)];

@@ -311,6 +311,7 @@ impl PathIntegrator<'_> {
         if packet.light.lanes == 0 {
             return;
         }
+        self.scale_inside(surface, packet);
         self.divide_samples(surface, packet);
         let unoccluded = packet.unoccluded();
         let visible = self.add_visible(occlusion, group, surface, packet);
@@ -323,6 +324,17 @@ impl PathIntegrator<'_> {
         split.take_reflected(radiance);
         if let Some((lanes, unoccluded)) = unoccluded {
             split.add_direct(lanes, &unoccluded, visible, &light.radiance);
+        }
+    }
+
+    /// Divides light that has entered a body straight by the square of its index. Radiance rises by this factor where
+    /// light enters the body and falls by it where light leaves, and paths leave out both. Light that enters straight
+    /// has not risen: its irradiance behind a flat interface is that in front of it.
+    fn scale_inside(&self, surface: &Surface<'_>, packet: &mut PacketScratch) {
+        let ior = self.context.scene.material.ior;
+        for lane in lanes_in(surface.segments.inside & packet.light.lanes) {
+            let leaving = lane3(&packet.light.radiance, lane) / (ior * ior);
+            set_lane3(&mut packet.light.radiance, lane, leaving);
         }
     }
 
