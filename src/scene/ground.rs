@@ -7,8 +7,10 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 
-use super::Bounds;
+use super::sand::Lattice;
 use super::texture::{Beyond, Footprint, Texture};
+use super::{Bounds, sand};
+use crate::math::{Lanes3, Supported, lanes_in, set_lane3, splat};
 
 /// Default colour of the ground (linear RGB): a dark grey that shows shadows and does not distract from the particles.
 pub const DEFAULT_COLOR: Vec3 = Vec3::new(0.135, 0.140, 0.150);
@@ -22,15 +24,6 @@ pub const DIFFUSE: f32 = 0.7;
 
 /// Colour of the darker squares of a checkerboard, as a fraction of the colour of the ground.
 const DARKER_PART: f32 = 0.35;
-
-/// Greatest difference of the colour of sand from its mean, as a fraction of that.
-const SAND_CONTRAST: f32 = 0.4;
-
-/// Number of sizes of spots in sand; each is half of the one before.
-const SAND_SIZES: u32 = 8;
-
-/// Contrast of spots as a fraction of that of spots of twice the size.
-const SAND_GAIN: f32 = 0.85;
 
 /// Default distance from the centre at which the ground starts to fade, in diagonals of the bounds.
 const FADE_START: f32 = 1.5;
@@ -190,8 +183,34 @@ impl Ground {
                     _ => DARKER_PART * self.color,
                 }
             }
-            Pattern::Sand { tile } => (1.0 + SAND_CONTRAST * sand(place(*tile))) * self.color,
+            Pattern::Sand { tile } => sand::shade(place(*tile)) * self.color,
         }
+    }
+
+    /// Sets the `colors` of `lanes` at the `points` of a ground of sand. Returns whether it is one.
+    pub(crate) fn sand_colors(
+        &self,
+        simd: Supported,
+        points: &Lanes3,
+        lanes: u32,
+        colors: &mut Lanes3,
+    ) -> bool {
+        let Pattern::Sand { tile } = self.pattern else {
+            return false;
+        };
+        let [across, along] = self.axes();
+        let lattice = Lattice {
+            center: self.center,
+            tile,
+            across,
+            along,
+        };
+        let mut shades = splat(0.0);
+        sand::shades(simd, &lattice, points, &mut shades);
+        for lane in lanes_in(lanes) {
+            set_lane3(colors, lane, shades[lane] * self.color);
+        }
+        true
     }
 
     /// The colour of a picture on the ground.
@@ -239,48 +258,6 @@ impl Ground {
     }
 }
 
-/// Noise from -1 to 1 with spots of many sizes: a sum of value noises (Perlin and Hoffert, "Hypertexture", 1989).
-fn sand([mut x, mut y]: [f32; 2]) -> f32 {
-    let (mut sum, mut whole, mut part) = (0.0, 0.0, 1.0);
-    for _ in 0..SAND_SIZES {
-        sum += part * value_noise(x, y);
-        whole += part;
-        part *= SAND_GAIN;
-        // Turned by 37 degrees, so that the lattices do not coincide
-        (x, y) = (
-            2.0 * (0.8 * x - 0.6 * y) + 0.37,
-            2.0 * (0.6 * x + 0.8 * y) + 0.71,
-        );
-    }
-    sum / whole
-}
-
-/// Random values from -1 to 1 at integers, interpolated smoothly.
-fn value_noise(x: f32, y: f32) -> f32 {
-    let (left, below) = (floor(x), floor(y));
-    let smooth = |t: f32| t * t * (3.0 - 2.0 * t);
-    let (u, v) = (
-        smooth((x - left as f32).clamp(0.0, 1.0)),
-        smooth((y - below as f32).clamp(0.0, 1.0)),
-    );
-    let row = |row: i32| {
-        let ends = [left, left.wrapping_add(1)].map(|column| lattice_value(column, row));
-        ends[0] + u * (ends[1] - ends[0])
-    };
-    let (low, high) = (row(below), row(below.wrapping_add(1)));
-    low + v * (high - low)
-}
-
-/// A random value from -1 to 1 for a point with integer coordinates (hash by Wellons, "lowbias32", 2018).
-fn lattice_value(x: i32, y: i32) -> f32 {
-    let mut bits =
-        x.cast_unsigned().wrapping_mul(0x9e37_79b9) ^ y.cast_unsigned().wrapping_mul(0x85eb_ca6b);
-    bits = (bits ^ bits >> 16).wrapping_mul(0x7feb_352d);
-    bits = (bits ^ bits >> 15).wrapping_mul(0x846c_a68b);
-    bits ^= bits >> 16;
-    (bits >> 8) as f32 / (1 << 23) as f32 - 1.0
-}
-
 /// The largest integer not above `value`; saturates. It avoids the function call that `floor` needs on machines
 /// without such an instruction.
 #[expect(
@@ -297,6 +274,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
+    use crate::math::{LANES, SimdLevel, lane3, splat3};
 
     fn floor() -> Ground {
         let bounds = Bounds {
@@ -331,7 +309,19 @@ mod tests {
             .iter()
             .fold(0.0_f32, |most, shade| most.max((shade - 1.0).abs()));
         assert!((mean - 1.0).abs() < 0.05, "{mean}");
-        assert!((0.05..=SAND_CONTRAST).contains(&largest), "{largest}");
+        assert!((0.05..=sand::CONTRAST).contains(&largest), "{largest}");
+        // A packet has the same shades, to the bit
+        let points: [Vec3; LANES] = std::array::from_fn(|i| {
+            ground.center + Vec3::new(0.31 * i as f32 - 2.0, 0.17 * i as f32, 0.0)
+        });
+        let lanes = [0, 1, 2].map(|axis| points.map(|point| point[axis]));
+        for level in SimdLevel::ALL {
+            let mut colors = splat3(Vec3::ZERO);
+            assert!(ground.sand_colors(Supported::or_best(level), &lanes, 0xffff, &mut colors));
+            for (lane, point) in points.iter().enumerate() {
+                assert_eq!(lane3(&colors, lane), ground.color_at(*point));
+            }
+        }
         // Neighbours are alike, even far from the centre
         let far = ground.color_at(ground.center + 1e7 * Vec3::X);
         assert!(far.is_finite());

@@ -21,6 +21,7 @@ pub mod mesh;
 pub mod part;
 pub mod path;
 pub mod rgb;
+mod sand;
 pub mod texture;
 
 pub use background::Background;
