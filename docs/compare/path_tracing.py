@@ -168,6 +168,7 @@ def spherule_maps(options, scene, samples, image, seed=0):
     """The same with the ground of spherule, on which paths below water end: maps have its light."""
     settings = {
         "render.ground": "plain",
+        "render.ground_wetness": 0.0,
         "render.ground_color": scene["ground"]["color"],
         "render.ground_height": scene["ground"]["height"],
     }
