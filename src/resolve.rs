@@ -156,7 +156,8 @@ pub fn setup(
     // Place the camera
     let image = &manifest.image;
     let aspect = f64::from(image.width) / f64::from(image.height);
-    let path = camera::path(manifest, &bounds, up, aspect)?;
+    let framed = camera::framed(survey, &bounds, reach.x);
+    let path = camera::path(manifest, &framed, up, aspect)?;
     let camera = camera::at_start(&path, aspect, survey.origin)?;
     let lens = camera::lens(manifest, &path, aspect)?;
     let shutter = shutter::shutter(manifest, survey)?;
@@ -237,6 +238,7 @@ pub fn setup(
         radius,
         color,
         path,
+        unframed: camera::unframed(manifest, survey),
         lens,
         shutter,
         aspect,

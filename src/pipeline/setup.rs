@@ -103,6 +103,8 @@ pub struct Picture {
     pub color: ColorRule,
     /// The camera path, in world units.
     pub path: CameraPath,
+    /// Number of particles of a frame, about, that are far from the others and that an automatic camera may leave out.
+    pub unframed: u64,
     /// The lens of the camera; without one, it is a pinhole.
     pub lens: Option<LensSettings>,
     /// Motion blur, if there is any.

@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 use super::super::brute::Balls;
 use super::super::{IntegratorKind, ParticleShading, RenderSettings, render_into};
 use super::{Channels, Film};
-use crate::scene::{Background, Bounds, Camera, Framing, Ground, Scene, default_lights};
+use crate::scene::{Background, Bounds, Camera, Framed, Framing, Ground, Scene, default_lights};
 
 /// Bits that no renderer makes: of a float, a NaN with a payload.
 const POISON: u32 = 0x7fad_beef;
@@ -58,7 +58,7 @@ fn scene(has_ground: bool) -> Scene {
         min: DVec3::NEG_ONE,
         max: DVec3::ONE,
     };
-    let view = Camera::framing(&bounds, &Framing::three_quarter(DVec3::Z, 1.5));
+    let view = Framed::corners(&bounds).view(&Framing::three_quarter(DVec3::Z, 1.5));
     Scene {
         lights: default_lights(&bounds, DVec3::Z, &view),
         background: Background::default_for(Vec3::Z),

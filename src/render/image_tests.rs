@@ -12,7 +12,7 @@ use crate::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder};
 use crate::math::{Lanes, lanes_in};
 use crate::ray::{Ray, RayPacket};
 use crate::scene::{
-    Background, Bounds, Camera, CameraView, Framing, Ground, Material, default_lights,
+    Background, Bounds, Camera, CameraView, Framed, Framing, Ground, Material, default_lights,
 };
 use crate::surface::{Intersection, Side, spheres::SphereSurface};
 
@@ -36,7 +36,7 @@ fn heap_scene(transmission: f32) -> Scene {
         max: DVec3::splat(4.4),
     };
     let framing = Framing::three_quarter(DVec3::Z, 1.5);
-    let view = Camera::framing(&bounds, &framing);
+    let view = Framed::corners(&bounds).view(&framing);
     Scene {
         lights: default_lights(&bounds, DVec3::Z, &view),
         material: Material {

@@ -5,16 +5,17 @@ use glam::DVec3;
 use super::ResolveError;
 use crate::manifest::{self, CameraMode, FocusSetting, Manifest};
 use crate::pipeline::Setup;
-use crate::scene::camera::{DEFAULT_AZIMUTH, DEFAULT_ELEVATION};
+use crate::scene::framing::{DEFAULT_AZIMUTH, DEFAULT_ELEVATION};
 use crate::scene::{
-    Aperture, Bounds, Camera, CameraKey, CameraPath, CameraView, Focus, Framing, KeyedPath,
+    Aperture, Bounds, Camera, CameraKey, CameraPath, CameraView, Focus, Framed, Framing, KeyedPath,
     LensSettings,
 };
+use crate::survey::Survey;
 
 /// The path that the manifest describes; `up` is the default upward direction.
 pub(super) fn path(
     manifest: &Manifest,
-    bounds: &Bounds,
+    framed: &Framed,
     up: DVec3,
     aspect: f64,
 ) -> Result<CameraPath, ResolveError> {
@@ -28,19 +29,35 @@ pub(super) fn path(
         aspect,
     };
     Ok(match camera.mode {
-        CameraMode::Auto => CameraPath::Still(Camera::framing(bounds, &framing)),
+        CameraMode::Auto => CameraPath::Still(framed.view(&framing)),
         CameraMode::Fixed => CameraPath::Still(CameraView {
             eye: camera.eye.unwrap_or_default(),
             look_at: camera.look_at.unwrap_or_default(),
             up,
             fov: camera.fov,
         }),
-        CameraMode::Turntable => CameraPath::turntable(bounds, &framing, camera.degrees_per_frame),
+        CameraMode::Turntable => CameraPath::turntable(framed, &framing, camera.degrees_per_frame),
         CameraMode::Keys => {
             let keys = camera.keys.iter().map(|key| keyed(key, up, camera.fov));
             CameraPath::through(keys.collect())?
         }
     })
+}
+
+/// What an automatic camera shows: the outermost particles of `survey`, or in jobs of earlier versions their `bounds`.
+pub(super) fn framed(survey: &Survey, bounds: &Bounds, reach: f64) -> Framed {
+    match &survey.outline {
+        Some(outline) => Framed::spheres(outline.points.clone(), reach),
+        None => Framed::corners(bounds),
+    }
+}
+
+/// Number of particles of a frame that an automatic camera may leave out.
+pub(super) fn unframed(manifest: &Manifest, survey: &Survey) -> u64 {
+    match (manifest.camera.mode, &survey.outline) {
+        (CameraMode::Auto | CameraMode::Turntable, Some(outline)) => outline.outliers,
+        _ => 0,
+    }
 }
 
 /// Converts `key`, with defaults for the missing values.

@@ -10,6 +10,7 @@ pub(in crate::resolve) fn survey() -> Survey {
         min: DVec3::splat(-1.0),
         max: DVec3::splat(1.0),
         layers: None,
+        outline: None,
         radius: None,
         packed_radius: None,
         has_radii: false,

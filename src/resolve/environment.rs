@@ -8,8 +8,8 @@ use super::ResolveError;
 use super::lights::group_index;
 use crate::manifest::{EnvironmentKind, Manifest};
 use crate::render::IntegratorKind;
-use crate::scene::camera::view_direction;
 use crate::scene::environment::{sky, sky_direction, studio};
+use crate::scene::framing::view_direction;
 use crate::scene::{self, CameraView, Environment, EnvironmentAxes, Light, RadianceMap};
 
 /// Whether the environment is an image.

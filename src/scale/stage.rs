@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use super::Motion;
 use crate::scene::{
-    Background, Bounds, Camera, CameraError, CameraView, DEFAULT_AMBIENT_LIGHT, Framing, Light,
-    Scene, camera, default_lights,
+    Background, Bounds, Camera, CameraError, CameraView, DEFAULT_AMBIENT_LIGHT, Framed, Framing,
+    Light, Scene, camera, default_lights,
 };
 
 /// The bounds that the camera moves around, and its still view.
@@ -54,7 +54,7 @@ impl Stage {
     pub fn framing(bounds: Bounds, up: DVec3, aspect: f64, origin: DVec3) -> Self {
         Self {
             bounds,
-            view: Camera::framing(&bounds, &Framing::three_quarter(up, aspect)),
+            view: Framed::corners(&bounds).view(&Framing::three_quarter(up, aspect)),
             origin,
             lighting: Lighting::Studio,
         }

@@ -2,27 +2,17 @@
 //! the eye.
 //!
 //! It is set up in f64 world coordinates, and used in f32 relative to the origin of the sequence. Row 0 of the image
-//! is its top. [`super::path`] moves cameras. [`super::lens`] adds depth of field.
+//! is its top. [`super::path`] moves cameras, [`super::framing`] places them. [`super::lens`] adds depth of field.
 
 use glam::{DMat4, DVec2, DVec3, DVec4, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::Bounds;
 use crate::ray::Ray;
 
 /// Default vertical field of view in degrees: that of a 29 mm lens for a film still (24 mm high), wide enough for a
 /// sense of depth, and narrow enough for spheres to look round at the border.
 pub const DEFAULT_FOV: f64 = 45.0;
-
-/// Margin around a framed box as a fraction of half the width and height of the image.
-pub const FRAMING_MARGIN: f64 = 0.08;
-
-/// Azimuth of the default view in degrees: shows two sides of a box in unequal proportions.
-pub const DEFAULT_AZIMUTH: f64 = 30.0;
-
-/// Elevation of the default view in degrees: high enough to show the top of the material.
-pub const DEFAULT_ELEVATION: f64 = 20.0;
 
 /// Position and orientation of a camera in world units, as in a manifest.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -35,34 +25,6 @@ pub struct CameraView {
     pub up: DVec3,
     /// Vertical field of view in degrees, above 0 and below 180.
     pub fov: f64,
-}
-
-/// Parameters of [`Camera::framing`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Framing {
-    /// The up direction of the world.
-    pub up: DVec3,
-    /// Rotation about `up` in degrees; 0 looks along +y if `up` is z, along -z if `up` is y.
-    pub azimuth: f64,
-    /// Elevation above the horizon in degrees; a positive one looks down.
-    pub elevation: f64,
-    /// Vertical field of view in degrees.
-    pub fov: f64,
-    /// Width of the image divided by its height.
-    pub aspect: f64,
-}
-
-impl Framing {
-    /// The default three-quarter view.
-    pub const fn three_quarter(up: DVec3, aspect: f64) -> Self {
-        Self {
-            up,
-            azimuth: DEFAULT_AZIMUTH,
-            elevation: DEFAULT_ELEVATION,
-            fov: DEFAULT_FOV,
-            aspect,
-        }
-    }
 }
 
 /// Reasons why a camera cannot be set up.
@@ -174,35 +136,6 @@ impl Camera {
         Self { lens, ..self }
     }
 
-    /// The nearest view in the given direction with all corners of `bounds` in the image, with a margin of
-    /// [`FRAMING_MARGIN`]. Also works for an empty or flat box.
-    ///
-    /// The side planes of the view frustum must touch the box on both sides. Let `x` and `d` be the position of a
-    /// corner across and along the view, and `t` the half extent. Then `|x - c| <= t (D + d)` for all corners has its
-    /// minimum `D` at `c` midway between the outermost `x - t d` and `x + t d`.
-    pub fn framing(bounds: &Bounds, framing: &Framing) -> CameraView {
-        // Find the axes of the view
-        let up = framing.up.try_normalize().unwrap_or(DVec3::Z);
-        let direction = view_direction(up, framing.azimuth, framing.elevation);
-        let right = direction.cross(up).try_normalize().unwrap_or(DVec3::X);
-        let screen_up = right.cross(direction);
-        let half = half_extent(framing);
-
-        // Fit the box horizontally and vertically, and use the larger distance
-        let center = bounds.center();
-        let relative = bounds.corners().map(|corner| corner - center);
-        let (x, distance_x) = fit(&relative, direction, right, half.x);
-        let (y, distance_y) = fit(&relative, direction, screen_up, half.y);
-        let distance = distance_x.max(distance_y).max(min_distance(bounds));
-        let look_at = center + x * right + y * screen_up;
-        CameraView {
-            eye: look_at - distance * direction,
-            look_at,
-            up,
-            fov: framing.fov,
-        }
-    }
-
     /// The ray through the eye and through `film`, in units of the image: (0, 0) is the top left corner, (1, 1) the bottom right one.
     pub fn ray(&self, film: Vec2) -> Ray {
         let d = Vec2::new(2.0 * film.x - 1.0, 1.0 - 2.0 * film.y) * self.half_extent;
@@ -252,46 +185,6 @@ fn camera_from_world(eye: DVec3, right: DVec3, up: DVec3, forward: DVec3) -> DMa
         column(DVec3::Z),
         DVec4::new(-right.dot(eye), -up.dot(eye), -forward.dot(eye), 1.0),
     )
-}
-
-/// Half the extent of the image at distance 1, horizontally and vertically, without the margin.
-pub(super) fn half_extent(framing: &Framing) -> DVec2 {
-    let half_height = libm::tan(0.5 * framing.fov.to_radians()) * (1.0 - FRAMING_MARGIN);
-    DVec2::new(half_height * framing.aspect, half_height)
-}
-
-/// Minimum distance for `bounds` without extent, which would otherwise be fitted at distance 0.
-pub(super) fn min_distance(bounds: &Bounds) -> f64 {
-    // A single point has no scale except that of its coordinates.
-    if bounds.diagonal() > 0.0 {
-        0.0
-    } else {
-        (1e-3 * bounds.center().length()).max(1.0)
-    }
-}
-
-/// View direction of a camera at `azimuth` and `elevation` (degrees) about `up`.
-pub(crate) fn view_direction(up: DVec3, azimuth: f64, elevation: f64) -> DVec3 {
-    // The up direction is undefined for a view straight down; one degree makes no visible difference.
-    let elevation = elevation.clamp(-89.0, 89.0).to_radians();
-    let azimuth = azimuth.to_radians();
-    let hint = if up.x.abs() < 0.9 { DVec3::X } else { DVec3::Y };
-    let right = (hint - hint.dot(up) * up).normalize();
-    let front = right.cross(up);
-    let level = libm::cos(azimuth) * front + libm::sin(azimuth) * right;
-    -(libm::cos(elevation) * level + libm::sin(elevation) * up)
-}
-
-/// Shift along `axis` and distance along `direction` at which all `corners` lie within `half_extent`.
-fn fit(corners: &[DVec3; 8], direction: DVec3, axis: DVec3, half_extent: f64) -> (f64, f64) {
-    let mut high = f64::NEG_INFINITY;
-    let mut low = f64::INFINITY;
-    for corner in corners {
-        let (x, d) = (corner.dot(axis), corner.dot(direction));
-        high = high.max(x - half_extent * d);
-        low = low.min(x + half_extent * d);
-    }
-    (0.5 * (high + low), 0.5 * (high - low) / half_extent)
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 
 use thiserror::Error;
 
-use super::{Bounds, CameraView, Framing};
+use super::{CameraView, Framed, Framing};
 
 mod curve;
 mod keys;
@@ -41,10 +41,10 @@ pub enum PathError {
 }
 
 impl CameraPath {
-    /// A rotation around `bounds`, with `framing` at frame 0 and by `degrees_per_frame` per frame about its up
+    /// A rotation around `framed`, with `framing` at frame 0 and by `degrees_per_frame` per frame about its up
     /// vector; see [`Turntable`].
-    pub fn turntable(bounds: &Bounds, framing: &Framing, degrees_per_frame: f64) -> Self {
-        Self::Turntable(Turntable::new(bounds, framing, degrees_per_frame))
+    pub fn turntable(framed: &Framed, framing: &Framing, degrees_per_frame: f64) -> Self {
+        Self::Turntable(Turntable::new(framed, framing, degrees_per_frame))
     }
 
     /// An interpolation of `keys`, sorted by frame; see [`KeyedPath`].

@@ -15,6 +15,7 @@ use crate::scene::{RgbEncoding, is_rgb};
 
 mod attributes;
 mod moments;
+mod outline;
 mod packing;
 mod robust;
 mod sample;
@@ -22,6 +23,8 @@ mod stream;
 
 pub use attributes::{Named, PART_NAMES, id_of, part_of, velocity_of};
 use moments::Moments;
+use outline::Outermost;
+pub use outline::Outline;
 use packing::Spacing;
 use packing::narrow;
 use robust::{
@@ -45,6 +48,9 @@ pub struct Survey {
     /// them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub layers: Option<(DVec3, DVec3)>,
+    /// The outermost particles, for the camera. Jobs of earlier versions lack them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub outline: Option<Outline>,
     /// Radius for frames without radii: half the median distance of neighbours.
     pub radius: Option<f32>,
     /// The same for the particles of one body: half the edge of the cube that each particle occupies inside, slightly
@@ -188,6 +194,7 @@ pub enum ColorQuestion<'a> {
 /// Running totals over the frames.
 struct Totals {
     bounds: Option<RobustBounds>,
+    outermost: Outermost,
     radius: Option<(usize, Spacing)>,
     has_radii: bool,
     reach: f32,
@@ -260,6 +267,7 @@ impl Survey {
     ) -> Result<Self, FrameError> {
         let mut totals = Totals {
             bounds: None,
+            outermost: Outermost::default(),
             radius: None,
             has_radii: false,
             reach: 0.0,
@@ -341,6 +349,7 @@ impl Totals {
             (Some(before), Some(found)) => Some(before.and(found)),
             (before, found) => before.or(found),
         };
+        self.outermost.add(&raw.positions, count);
         // Find velocity and colours
         if self.velocity.is_none() {
             self.velocity = velocity_of(&raw.attributes).map(|a| a.name.clone());
@@ -454,6 +463,7 @@ impl Totals {
             min,
             max,
             layers: self.bounds.map(|bounds| bounds.layers),
+            outline: self.outermost.outline(),
             radius: self.radius.map(|(_, spacing)| spacing.touching),
             packed_radius: self.radius.and_then(|(_, spacing)| spacing.packed),
             has_radii: self.has_radii,

@@ -7,9 +7,9 @@ use spherule_formats::{Attribute, Positions};
 use super::packing;
 
 /// Number of particles of a frame from which percentiles are computed.
-const SAMPLE: usize = 20_000;
+pub(super) const SAMPLE: usize = 20_000;
 /// Minimum number of particles for which a single one may be treated as an outlier.
-const ESCAPE_MIN: usize = 16;
+pub(super) const ESCAPE_MIN: usize = 16;
 /// Number of nearest-neighbour distances from which the radius is estimated.
 pub(super) const NEIGHBOUR_QUERIES: usize = 512;
 /// Maximum number of distance computations of the estimate: half a second for a frame of 1e7.

@@ -8,7 +8,7 @@ use super::{Check, whole};
 use crate::accel::Structure;
 use crate::cli::job::list;
 use crate::cli::progress::duration;
-use crate::cli::render::radius_text;
+use crate::cli::render::{radius_text, unframed_text};
 use crate::manifest::Channel;
 use crate::metrics::Bytes;
 use crate::pipeline::{Overlap, Probe, RadiusRule, Setup};
@@ -109,6 +109,7 @@ impl Check<'_> {
                 radius_text(setup, survey)
             ));
             lines.extend(self.camera(setup).to_lines());
+            lines.extend(unframed_text(setup).map(|text| format!("           {text}")));
             lines.push(format!("structure  {}", structure(survey, setup)));
         }
         lines.extend(self.memory_lines());

@@ -13,7 +13,7 @@ mod run;
 mod summary;
 
 use run::Run;
-pub(super) use summary::{parts_text, print_summary, radius_text};
+pub(super) use summary::{parts_text, print_summary, radius_text, unframed_text};
 
 const EXAMPLES: &str = "\
 Examples:

@@ -44,6 +44,9 @@ pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup:
         return;
     }
     message!("{}", radius_text(setup, survey));
+    if let Some(text) = unframed_text(setup) {
+        message!("{text}");
+    }
     if let pipeline::ColorRule::Attribute { name, .. } = &setup.picture.color
         && let Some(color) = &survey.color
     {
@@ -96,6 +99,18 @@ pub(in crate::cli) fn radius_text(setup: &Setup, survey: &Survey) -> String {
         }
         RadiusRule::Attribute { name, scale } => format!("radius {scale} x attribute `{name}`"),
     }
+}
+
+/// Says how many particles the camera may leave out, if there are any.
+pub(in crate::cli) fn unframed_text(setup: &Setup) -> Option<String> {
+    let particles = match setup.picture.unframed {
+        0 => return None,
+        1 => "1 particle is".to_owned(),
+        some => format!("up to {some} particles of a frame are"),
+    };
+    Some(format!(
+        "{particles} far from the others and may be outside of the picture (camera.mode = \"fixed\" places the camera)"
+    ))
 }
 
 /// Rounds to four digits.

@@ -2,14 +2,14 @@
 
 use glam::DVec3;
 
-use crate::scene::camera::{half_extent, min_distance, view_direction};
-use crate::scene::{Bounds, CameraView, Framing};
+use crate::scene::framing::{half_extent, view_direction};
+use crate::scene::{CameraView, Framed, Framing};
 
-/// A camera that rotates around a box about the axis through its centre, at constant height and distance, and always
+/// A camera that rotates around particles about the axis through the centre of their box, at constant height and distance, and always
 /// looks at the same point of the axis.
 ///
-/// It is as near as possible with the whole box in the picture from all sides: the distance is computed for the
-/// circles of the corners, so it does not depend on the frames.
+/// It is as near as possible with all particles in the picture from all sides: the distance is computed for the circles
+/// on which they rotate, so it does not depend on the frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Turntable {
     look_at: DVec3,
@@ -20,12 +20,12 @@ pub struct Turntable {
 }
 
 impl Turntable {
-    pub(super) fn new(bounds: &Bounds, framing: &Framing, degrees_per_frame: f64) -> Self {
+    pub(super) fn new(framed: &Framed, framing: &Framing, degrees_per_frame: f64) -> Self {
         let up = framing.up.try_normalize().unwrap_or(DVec3::Z);
         let framing = Framing { up, ..*framing };
-        let (shift, distance) = fit(bounds, &framing);
+        let (shift, distance) = fit(framed, &framing);
         Self {
-            look_at: bounds.center() + shift * up,
+            look_at: framed.bounds().center() + shift * up,
             distance,
             framing,
             degrees_per_frame,
@@ -55,14 +55,14 @@ impl Turntable {
     }
 }
 
-/// Height of the target point above the centre of `bounds`, and its distance.
+/// Height of the target point above the centre of `framed`, and its distance.
 ///
-/// Derived like [`crate::scene::Camera::framing`], for the circles on which the corners rotate. Let `r` and `h` be
-/// the position of a corner from the axis and along it, and `e` the elevation. During the rotation it appears at `x =
+/// Derived like the view of [`crate::scene::framing`], for the circles on which the points rotate. Let `r` and `h` be
+/// the position of a point from the axis and along it, and `e` the elevation. During the rotation it appears at `x =
 /// r sin a`, `y = h cos e - r cos a sin e` and depth `d = -(h sin e + r cos a cos e)`. The largest `D` that `|x| <= t
 /// (D + d)` requires is `h sin e + r sqrt(1/t^2 + cos^2 e)`, and the extremes of `y -+ t d` are in front of the axis
 /// or behind it.
-fn fit(bounds: &Bounds, framing: &Framing) -> (f64, f64) {
+fn fit(framed: &Framed, framing: &Framing) -> (f64, f64) {
     // Find the view, and the half extent of the image
     let direction = view_direction(framing.up, 0.0, framing.elevation);
     let (sin, cos) = (
@@ -70,14 +70,16 @@ fn fit(bounds: &Bounds, framing: &Framing) -> (f64, f64) {
         direction.cross(framing.up).length(),
     );
     let half = half_extent(framing);
-    let center = bounds.center();
-    let mut distance = min_distance(bounds);
+    let bounds = framed.bounds();
+    let mut distance = framed.min_distance();
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    for corner in bounds.corners().map(|corner| corner - center) {
-        // Fit the circle of the corner horizontally
-        let height = corner.dot(framing.up);
-        let radius = corner.cross(framing.up).length();
-        distance = distance.max(height * sin + radius * libm::hypot(cos, 1.0 / half.x));
+    for point in framed.points() {
+        // Fit the circle of the point horizontally
+        let relative = *point - bounds.center();
+        let height = relative.dot(framing.up);
+        let radius = relative.cross(framing.up).length();
+        let across = radius * libm::hypot(cos, 1.0 / half.x) + framed.margin(half.x) / half.x;
+        distance = distance.max(height * sin + across);
         // Fit it vertically, at its front and back
         for front in [radius, -radius] {
             let (y, d) = (height * cos - front * sin, -(height * sin + front * cos));
@@ -85,7 +87,7 @@ fn fit(bounds: &Bounds, framing: &Framing) -> (f64, f64) {
             low = low.min(y + half.y * d);
         }
     }
-    distance = distance.max(0.5 * (high - low) / half.y);
+    distance = distance.max((0.5 * (high - low) + framed.margin(half.y)) / half.y);
     // Split the shift in the image plane into a shift along the axis and one along the view
     let shift = 0.5 * (high + low) / cos;
     // A line along the axis could be viewed from its own end, where the view direction is undefined.

@@ -2,8 +2,8 @@ use glam::{DVec2, DVec3};
 use proptest::prelude::*;
 
 use super::*;
-use crate::scene::camera::FRAMING_MARGIN;
-use crate::scene::{Camera, CameraPath};
+use crate::scene::framing::FRAMING_MARGIN;
+use crate::scene::{Bounds, Camera, CameraPath};
 
 const BOX: Bounds = Bounds {
     min: DVec3::new(3.0, 5.0, -2.0),
@@ -17,7 +17,7 @@ fn frame_0_of_a_turntable_is_at_its_azimuth() {
         elevation: 0.0,
         ..Framing::three_quarter(DVec3::Z, 1.0)
     };
-    let path = CameraPath::turntable(&BOX, &framing, 90.0);
+    let path = CameraPath::turntable(&Framed::corners(&BOX), &framing, 90.0);
     let toward = |frame| {
         let view = path.view(frame);
         assert_eq!(view.look_at, DVec3::new(5.0, 6.5, 0.0));
@@ -33,33 +33,30 @@ fn frame_0_of_a_turntable_is_at_its_azimuth() {
     near(toward(i64::MIN), DVec3::Y);
     assert_eq!(path.start(), path.view(0));
     // Equal to the automatic camera with that azimuth.
-    let auto = Camera::framing(
-        &BOX,
-        &Framing {
-            azimuth: 90.0,
-            ..framing
-        },
-    );
+    let auto = Framed::corners(&BOX).view(&Framing {
+        azimuth: 90.0,
+        ..framing
+    });
     near(toward(1), (auto.look_at - auto.eye).normalize());
 }
 
 #[test]
 fn distant_frame_numbers_rotate_alike() {
     let framing = Framing::three_quarter(DVec3::Y, 1.5);
-    let path = CameraPath::turntable(&BOX, &framing, 0.703125);
+    let path = CameraPath::turntable(&Framed::corners(&BOX), &framing, 0.703125);
     for frame in [0, 1, -77, 300] {
         // 512 frames are a turn, exactly.
         let far = frame + 512 * (1 << 53);
         assert_eq!(path.view(far), path.view(frame), "{frame}");
     }
     for degrees in [1e300, -1e300, 1e-300, 359.999] {
-        let path = CameraPath::turntable(&BOX, &framing, degrees);
+        let path = CameraPath::turntable(&Framed::corners(&BOX), &framing, degrees);
         for frame in [i64::MIN, -1, 1, i64::MAX] {
             assert!(path.view(frame).eye.is_finite(), "{degrees} {frame}");
         }
     }
     assert!(
-        CameraPath::turntable(&BOX, &framing, -720.0)
+        CameraPath::turntable(&Framed::corners(&BOX), &framing, -720.0)
             .moving()
             .is_empty()
     );
@@ -97,7 +94,7 @@ fn turntable_distance_is_minimal() {
                 elevation,
                 ..Framing::three_quarter(up, aspect)
             };
-            let path = CameraPath::turntable(&BOX, &framing, 0.25);
+            let path = CameraPath::turntable(&Framed::corners(&BOX), &framing, 0.25);
             let most = outermost(&path, &BOX, aspect, 1440);
             let limit = 1.0 - FRAMING_MARGIN;
             assert!((most - limit).abs() < 1e-4, "{most} {framing:?}");
@@ -119,7 +116,7 @@ fn turntable_around_a_point_or_a_line_is_valid() {
                 elevation,
                 ..Framing::three_quarter(DVec3::Z, 1.0)
             };
-            let path = CameraPath::turntable(&bounds, &framing, 10.0);
+            let path = CameraPath::turntable(&Framed::corners(&bounds), &framing, 10.0);
             for frame in 0..36 {
                 let camera = Camera::new(&path.view(frame), 1.0, min);
                 assert!(camera.is_ok(), "{bounds:?} {elevation}");
@@ -145,7 +142,7 @@ proptest! {
         let up = DVec3::from_array(up);
         prop_assume!(up.length() > 1e-3 && bounds.diagonal() > 1e-3);
         let framing = Framing { up, azimuth, elevation, fov, aspect };
-        let path = CameraPath::turntable(&bounds, &framing, degrees);
+        let path = CameraPath::turntable(&Framed::corners(&bounds), &framing, degrees);
         let start = path.start();
         let distance = start.eye.distance(start.look_at);
         for frame in frames {

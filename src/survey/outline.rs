@@ -1,0 +1,250 @@
+//! The particles at the outside of a sequence, for cameras that show all of it.
+
+use glam::DVec3;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use spherule_formats::Positions;
+
+use super::robust::{ESCAPE_MIN, SAMPLE};
+
+/// Number of axes along which the outermost particles are found, in both directions.
+const AXES: usize = 96;
+
+/// One particle of this many may be an outlier on each side of an axis.
+const OUTSIDE: usize = 1000;
+
+/// Distance from the other particles beyond which these are outliers, as a fraction of the extent of the others.
+const MARGIN: f64 = 0.25;
+
+/// Below this number, a particle may be as far from the others as their extent.
+const FEW: usize = 100;
+
+/// The outermost particles over a sequence.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Outline {
+    /// Positions of particles, world units. A view of all of them shows the others as well, except outliers.
+    pub points: Vec<DVec3>,
+    /// Number of outliers in the frame with the most, about, as frames may be sampled.
+    pub outliers: u64,
+}
+
+/// The outermost particles of the frames so far.
+#[derive(Default)]
+pub(super) struct Outermost {
+    /// The outermost particle at the lower end of each axis and at the upper one, with its distance along the axis.
+    ends: Vec<[End; 2]>,
+    outliers: u64,
+}
+
+#[derive(Clone, Copy)]
+struct End {
+    along: f64,
+    point: DVec3,
+}
+
+impl Outermost {
+    /// Adds a frame of `count` particles, of which `positions` may be an even selection.
+    pub(super) fn add(&mut self, positions: &Positions, count: usize) {
+        let stride = positions.len().div_ceil(SAMPLE).max(1);
+        let sample: Vec<DVec3> = (0..positions.len())
+            .step_by(stride)
+            .map(|i| positions.get(i))
+            .filter(|p| p.is_finite())
+            .collect();
+        if sample.is_empty() {
+            return;
+        }
+        let extent = |axis: &DVec3| {
+            let [low, high] = layers(&sample, *axis);
+            high - low
+        };
+        let longest = DVec3::AXES.iter().map(extent).fold(0.0, f64::max);
+        // A particle that is far from the others along one axis is an outlier on all
+        let axes = || (0..AXES).into_par_iter().map(axis);
+        let mut outliers: Vec<usize> = axes()
+            .flat_map_iter(|axis| beyond(&sample, axis, longest))
+            .collect();
+        outliers.sort_unstable();
+        outliers.dedup();
+        let each = count.div_ceil(sample.len()).max(1);
+        self.outliers = self.outliers.max((outliers.len() * each) as u64);
+        let mut sample = sample;
+        for index in outliers.into_iter().rev() {
+            sample.swap_remove(index);
+        }
+        // Join the ends with those of the frames before
+        let found: Vec<[End; 2]> = axes()
+            .filter_map(|axis| ends_along(&sample, axis))
+            .collect();
+        if self.ends.is_empty() {
+            self.ends.clone_from(&found);
+        }
+        for (known, [low, high]) in self.ends.iter_mut().zip(found) {
+            if low.along < known[0].along {
+                known[0] = low;
+            }
+            if high.along > known[1].along {
+                known[1] = high;
+            }
+        }
+    }
+
+    /// The outline; `None` without a particle.
+    pub(super) fn outline(self) -> Option<Outline> {
+        let mut points: Vec<DVec3> = Vec::new();
+        for end in self.ends.into_iter().flatten() {
+            if !points.contains(&end.point) {
+                points.push(end.point);
+            }
+        }
+        let outliers = self.outliers;
+        (!points.is_empty()).then_some(Outline { points, outliers })
+    }
+}
+
+/// Positions along `axis` of the layers beyond which are only the outermost particles of a `sample`.
+fn layers(sample: &[DVec3], axis: DVec3) -> [f64; 2] {
+    let outside = match sample.len() / OUTSIDE {
+        0 => usize::from(sample.len() >= ESCAPE_MIN),
+        some => some,
+    };
+    let mut along: Vec<f64> = sample.iter().map(|p| p.dot(axis)).collect();
+    let last = along.len() - 1;
+    [outside, last - outside].map(|place| *along.select_nth_unstable_by(place, f64::total_cmp).1)
+}
+
+/// Indices of the particles of a `sample` that are far from the others along `axis`. `longest` is the longest side of
+/// the box of the others.
+fn beyond(sample: &[DVec3], axis: DVec3, longest: f64) -> Vec<usize> {
+    let [low, high] = layers(sample, axis);
+    let margin = match sample.len() < FEW {
+        true => longest,
+        false => MARGIN * (high - low),
+    };
+    let is_far = |p: &DVec3| {
+        let along = p.dot(axis);
+        along < low - margin || along > high + margin
+    };
+    let places = sample.iter().enumerate();
+    places
+        .filter(|(_, p)| is_far(p))
+        .map(|(index, _)| index)
+        .collect()
+}
+
+/// The lowest and the highest particle of a `sample` along `axis`, the first in a tie; `None` without particles.
+fn ends_along(sample: &[DVec3], axis: DVec3) -> Option<[End; 2]> {
+    let ends = sample.iter().map(|point| End {
+        along: point.dot(axis),
+        point: *point,
+    });
+    ends.map(|end| [end; 2]).reduce(|[low, high], [end, _]| {
+        [
+            if end.along < low.along { end } else { low },
+            if end.along > high.along { end } else { high },
+        ]
+    })
+}
+
+/// Unit vector of an axis: the coordinate axes, and then points of a half sphere, evenly on a spiral (Gonzalez,
+/// "Measurement of areas on a sphere using Fibonacci and latitude-longitude lattices", 2010).
+fn axis(number: usize) -> DVec3 {
+    if let Some(axis) = DVec3::AXES.get(number) {
+        return *axis;
+    }
+    let place = (number - DVec3::AXES.len()) as f64 + 0.5;
+    let z = place / (AXES - DVec3::AXES.len()) as f64;
+    let radius = (1.0 - z * z).sqrt();
+    let golden_angle = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+    let angle = golden_angle * place;
+    DVec3::new(radius * libm::cos(angle), radius * libm::sin(angle), z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn outline(frames: &[&[DVec3]]) -> Outline {
+        let mut outermost = Outermost::default();
+        for frame in frames {
+            outermost.add(&Positions::F64(frame.to_vec()), frame.len());
+        }
+        outermost.outline().unwrap()
+    }
+
+    /// `count` points of a ball of radius 1.
+    fn ball(count: usize) -> Vec<DVec3> {
+        let mut state = 1_u64;
+        let mut uniform = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 40) as f64 / f64::from(1 << 23) - 1.0
+        };
+        let mut points = Vec::new();
+        while points.len() < count {
+            let point = DVec3::new(uniform(), uniform(), uniform());
+            if point.length() <= 1.0 {
+                points.push(point);
+            }
+        }
+        points
+    }
+
+    #[test]
+    fn an_outline_reaches_nearly_as_far_as_all_particles_in_each_direction() {
+        let points = ball(15_000);
+        let outline = outline(&[&points]);
+        assert!(outline.points.len() <= 2 * AXES);
+        for direction in ball(200) {
+            let direction = direction.normalize();
+            let most = |points: &[DVec3]| {
+                let along = points.iter().map(|p| p.dot(direction));
+                along.fold(f64::NEG_INFINITY, f64::max)
+            };
+            let missing = most(&points) - most(&outline.points);
+            assert!((0.0..0.05).contains(&missing), "{missing}");
+        }
+        assert_eq!(outline.outliers, 0);
+    }
+
+    #[test]
+    fn corners_of_a_box_and_all_frames_are_in_an_outline() {
+        let corners = |at: DVec3| -> Vec<DVec3> {
+            let side = |bit: usize| if bit == 0 { 0.0 } else { 1.0 };
+            (0..8)
+                .map(|i| at + DVec3::new(side(i & 1), side(i & 2), side(i & 4)))
+                .collect()
+        };
+        let (first, second) = (corners(DVec3::ZERO), corners(5.0 * DVec3::X));
+        let outline = outline(&[&first, &second]);
+        for corner in [first[0], first[6], second[1], second[7]] {
+            assert!(outline.points.contains(&corner), "{corner}");
+        }
+        assert!(!outline.points.contains(&second[0]));
+    }
+
+    #[test]
+    fn an_outlier_is_counted_and_left_out() {
+        for count in [50, 3000] {
+            let mut points = ball(count);
+            points.push(DVec3::new(0.0, 900.0, 30.0));
+            let outline = outline(&[&points, &ball(20)]);
+            assert!(outline.points.iter().all(|p| p.length() <= 1.0));
+            assert_eq!(outline.outliers, 1);
+        }
+        // One of a few that are in a plane belongs to them
+        let mut plane: Vec<DVec3> = (0..25)
+            .map(|i| DVec3::new(f64::from(i % 5), f64::from(i / 5), 0.0))
+            .collect();
+        plane.push(DVec3::new(2.0, 2.0, 3.5));
+        assert!(outline(&[&plane]).points.contains(&plane[25]));
+    }
+
+    #[test]
+    fn no_particles_have_no_outline() {
+        let mut outermost = Outermost::default();
+        outermost.add(&Positions::F64(vec![DVec3::NAN]), 1);
+        assert_eq!(outermost.outline(), None);
+    }
+}
