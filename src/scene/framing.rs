@@ -10,8 +10,11 @@ use glam::{DVec2, DVec3};
 use super::Bounds;
 use super::camera::{CameraView, DEFAULT_FOV};
 
-/// Margin around what is framed as a fraction of half the width and height of the image.
-pub const FRAMING_MARGIN: f64 = 0.08;
+/// Margin around a box as a fraction of half the width and height of the image.
+pub const BOX_MARGIN: f64 = 0.08;
+
+/// Margin around spheres, the same: 6.5 % of the width or the height.
+pub const SPHERES_MARGIN: f64 = 0.13;
 
 /// Azimuth of the default view in degrees: shows two sides of a box in unequal proportions.
 pub const DEFAULT_AZIMUTH: f64 = 30.0;
@@ -89,11 +92,11 @@ impl Framed {
     }
 
     /// What a sphere needs more than its centre across the view, for a half extent of `t`.
-    pub(super) fn margin(&self, t: f64) -> f64 {
+    pub(super) fn reach(&self, t: f64) -> f64 {
         self.radius * libm::hypot(1.0, t)
     }
 
-    /// The nearest view with all spheres in the image, with a margin of [`FRAMING_MARGIN`]. Also works for a single
+    /// The nearest view with all spheres in the image, with a margin of [`BOX_MARGIN`] or [`SPHERES_MARGIN`]. Also works for a single
     /// point, and for points in a plane.
     pub fn view(&self, framing: &Framing) -> CameraView {
         // Find the axes of the view
@@ -101,7 +104,7 @@ impl Framed {
         let direction = view_direction(up, framing.azimuth, framing.elevation);
         let right = direction.cross(up).try_normalize().unwrap_or(DVec3::X);
         let screen_up = right.cross(direction);
-        let half = half_extent(framing);
+        let half = self.half_extent(framing);
 
         // Fit the spheres horizontally and vertically, and use the larger distance
         let bounds = self.bounds();
@@ -113,12 +116,12 @@ impl Framed {
         let sides = [(along(right), half.x), (along(screen_up), half.y)];
         let fits = sides
             .each_ref()
-            .map(|(places, t)| fit(places, self.margin(*t), *t));
+            .map(|(places, t)| fit(places, self.reach(*t), *t));
         let distance = fits[0].1.max(fits[1].1).max(self.min_distance());
         let mut shift = fits.map(|(shift, _)| shift);
         if self.is_centred {
             for (shift, (places, t)) in shift.iter_mut().zip(&sides) {
-                *shift = centred(places, self.margin(*t), distance, *shift);
+                *shift = centred(places, self.reach(*t), distance, *shift);
             }
         }
         let look_at = center + shift[0] * right + shift[1] * screen_up;
@@ -128,6 +131,16 @@ impl Framed {
             up,
             fov: framing.fov,
         }
+    }
+
+    /// Half the extent of the image at distance 1, horizontally and vertically, without the margin.
+    pub(super) fn half_extent(&self, framing: &Framing) -> DVec2 {
+        let margin = match self.is_centred {
+            true => SPHERES_MARGIN,
+            false => BOX_MARGIN,
+        };
+        let half_height = libm::tan(0.5 * framing.fov.to_radians()) * (1.0 - margin);
+        DVec2::new(half_height * framing.aspect, half_height)
     }
 
     /// Minimum distance for a single point, which would otherwise be fitted at distance 0.
@@ -142,16 +155,16 @@ impl Framed {
     }
 }
 
-/// Shift across the view and distance along it at which all `places` lie within the half extent `t`, with a `margin`.
-/// Places are positions across and along the view.
-fn fit(places: &[[f64; 2]], margin: f64, t: f64) -> (f64, f64) {
+/// Shift across the view and distance along it at which all `places` lie within the half extent `t`, with spheres that need `reach`
+/// more. Places are positions across and along the view.
+fn fit(places: &[[f64; 2]], reach: f64, t: f64) -> (f64, f64) {
     let mut high = f64::NEG_INFINITY;
     let mut low = f64::INFINITY;
     for [x, d] in places {
         high = high.max(x - t * d);
         low = low.min(x + t * d);
     }
-    (0.5 * (high + low), (0.5 * (high - low) + margin) / t)
+    (0.5 * (high + low), (0.5 * (high - low) + reach) / t)
 }
 
 /// Number of halvings of an interval: more than the bits of a number.
@@ -159,12 +172,12 @@ const HALVINGS: usize = 64;
 
 /// Shift across the view at which the image has equal margins on both sides, from a `distance`. `start` is a shift at
 /// which all places are in the image.
-fn centred(places: &[[f64; 2]], margin: f64, distance: f64, start: f64) -> f64 {
+fn centred(places: &[[f64; 2]], reach: f64, distance: f64, start: f64) -> f64 {
     // The difference of the image's outermost places falls with the shift
     let difference = |shift: f64| {
         let ends = places.iter().map(|[x, d]| {
             let depth = distance + d;
-            [(x - margin - shift) / depth, (x + margin - shift) / depth]
+            [(x - reach - shift) / depth, (x + reach - shift) / depth]
         });
         let [low, high] = ends.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], end| {
             [low.min(end[0]), high.max(end[1])]
@@ -173,7 +186,7 @@ fn centred(places: &[[f64; 2]], margin: f64, distance: f64, start: f64) -> f64 {
     };
     let xs = places.iter().map(|[x, _]| *x);
     let (mut low, mut high) = xs.fold((start, start), |(low, high), x| {
-        (low.min(x - margin), high.max(x + margin))
+        (low.min(x - reach), high.max(x + reach))
     });
     for _ in 0..HALVINGS {
         let middle = 0.5 * (low + high);
@@ -183,12 +196,6 @@ fn centred(places: &[[f64; 2]], margin: f64, distance: f64, start: f64) -> f64 {
         }
     }
     0.5 * (low + high)
-}
-
-/// Half the extent of the image at distance 1, horizontally and vertically, without the margin.
-pub(super) fn half_extent(framing: &Framing) -> DVec2 {
-    let half_height = libm::tan(0.5 * framing.fov.to_radians()) * (1.0 - FRAMING_MARGIN);
-    DVec2::new(half_height * framing.aspect, half_height)
 }
 
 /// View direction of a camera at `azimuth` and `elevation` (degrees) about `up`.

@@ -36,7 +36,7 @@ fn framing_fits_every_corner_and_wastes_nothing() {
                     let view = Framed::corners(&bounds).view(&framing);
                     let projected = bounds.corners().map(|c| project(&view, aspect, c).abs());
                     let far = projected.iter().fold(DVec2::ZERO, |a, b| a.max(*b));
-                    let limit = 1.0 - FRAMING_MARGIN;
+                    let limit = 1.0 - BOX_MARGIN;
                     assert!(
                         (far.max_element() - limit).abs() < 1e-4,
                         "{far} {framing:?}"
@@ -107,7 +107,7 @@ fn spheres_fit_and_their_image_is_centred() {
             };
             points.iter().map(seen).fold(-9.0, f64::max)
         });
-        let limit = 1.0 - FRAMING_MARGIN;
+        let limit = 1.0 - SPHERES_MARGIN;
         let most = sides.iter().copied().fold(0.0, f64::max);
         assert!((most - limit).abs() < 1e-3, "{radius} {aspect}: {sides:?}");
         // The margins are those of the centres with the radius added, which is all but the same

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::scene::framing::{half_extent, view_direction};
+use crate::scene::framing::view_direction;
 use crate::scene::{CameraView, Framed, Framing};
 
 /// A camera that rotates around particles about the axis through the centre of their box, at constant height and distance, and always
@@ -69,7 +69,7 @@ fn fit(framed: &Framed, framing: &Framing) -> (f64, f64) {
         -direction.dot(framing.up),
         direction.cross(framing.up).length(),
     );
-    let half = half_extent(framing);
+    let half = framed.half_extent(framing);
     let bounds = framed.bounds();
     let mut distance = framed.min_distance();
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -78,7 +78,7 @@ fn fit(framed: &Framed, framing: &Framing) -> (f64, f64) {
         let relative = *point - bounds.center();
         let height = relative.dot(framing.up);
         let radius = relative.cross(framing.up).length();
-        let across = radius * libm::hypot(cos, 1.0 / half.x) + framed.margin(half.x) / half.x;
+        let across = radius * libm::hypot(cos, 1.0 / half.x) + framed.reach(half.x) / half.x;
         distance = distance.max(height * sin + across);
         // Fit it vertically, at its front and back
         for front in [radius, -radius] {
@@ -87,7 +87,7 @@ fn fit(framed: &Framed, framing: &Framing) -> (f64, f64) {
             low = low.min(y + half.y * d);
         }
     }
-    distance = distance.max((0.5 * (high - low) + framed.margin(half.y)) / half.y);
+    distance = distance.max((0.5 * (high - low) + framed.reach(half.y)) / half.y);
     // Split the shift in the image plane into a shift along the axis and one along the view
     let shift = 0.5 * (high + low) / cos;
     // A line along the axis could be viewed from its own end, where the view direction is undefined.

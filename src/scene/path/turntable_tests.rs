@@ -2,7 +2,7 @@ use glam::{DVec2, DVec3};
 use proptest::prelude::*;
 
 use super::*;
-use crate::scene::framing::FRAMING_MARGIN;
+use crate::scene::framing::BOX_MARGIN;
 use crate::scene::{Bounds, Camera, CameraPath};
 
 const BOX: Bounds = Bounds {
@@ -96,7 +96,7 @@ fn turntable_distance_is_minimal() {
             };
             let path = CameraPath::turntable(&Framed::corners(&BOX), &framing, 0.25);
             let most = outermost(&path, &BOX, aspect, 1440);
-            let limit = 1.0 - FRAMING_MARGIN;
+            let limit = 1.0 - BOX_MARGIN;
             assert!((most - limit).abs() < 1e-4, "{most} {framing:?}");
         }
     }
@@ -152,7 +152,7 @@ proptest! {
             prop_assert!(moved <= 1e-12 * (distance + view.eye.length()));
             for corner in bounds.corners() {
                 let at = project(&view, aspect, corner).abs().max_element();
-                prop_assert!(at <= 1.0 - FRAMING_MARGIN + 1e-9, "{at}");
+                prop_assert!(at <= 1.0 - BOX_MARGIN + 1e-9, "{at}");
             }
         }
     }
