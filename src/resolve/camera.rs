@@ -47,7 +47,10 @@ pub(super) fn path(
 /// What an automatic camera shows: the outermost particles of `survey`, or in jobs of earlier versions their `bounds`.
 pub(super) fn framed(survey: &Survey, bounds: &Bounds, reach: f64) -> Framed {
     match &survey.outline {
-        Some(outline) => Framed::spheres(outline.points.clone(), reach),
+        Some(outline) => {
+            let points = outline.points.iter().map(|p| p.as_dvec3() + survey.origin);
+            Framed::spheres(points.collect(), reach)
+        }
         None => Framed::corners(bounds),
     }
 }

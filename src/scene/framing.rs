@@ -96,8 +96,8 @@ impl Framed {
         self.radius * libm::hypot(1.0, t)
     }
 
-    /// The nearest view with all spheres in the image, with a margin of [`BOX_MARGIN`] or [`SPHERES_MARGIN`]. Also works for a single
-    /// point, and for points in a plane.
+    /// The nearest view with all spheres in the image, with a margin of [`BOX_MARGIN`] or [`SPHERES_MARGIN`]. Also works
+    /// for a single point, and for points in a plane.
     pub fn view(&self, framing: &Framing) -> CameraView {
         // Find the axes of the view
         let up = framing.up.try_normalize().unwrap_or(DVec3::Z);

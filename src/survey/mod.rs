@@ -463,7 +463,7 @@ impl Totals {
             min,
             max,
             layers: self.bounds.map(|bounds| bounds.layers),
-            outline: self.outermost.outline(),
+            outline: self.outermost.outline(origin),
             radius: self.radius.map(|(_, spacing)| spacing.touching),
             packed_radius: self.radius.and_then(|(_, spacing)| spacing.packed),
             has_radii: self.has_radii,

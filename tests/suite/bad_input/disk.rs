@@ -52,7 +52,7 @@ fn full_disk_is_reported_without_partial_files() {
         ("8k", 2),
         ("16k", 2),
         ("24k", 2),
-        ("28k", 1),
+        ("28k", 2),
         ("32k", 1),
         ("48k", 1),
         ("68k", 1),
