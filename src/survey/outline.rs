@@ -10,6 +10,9 @@ use super::robust::{ESCAPE_MIN, SAMPLE};
 /// Number of axes along which the outermost particles are found, in both directions.
 const AXES: usize = 64;
 
+/// Number of particles of a frame from which the layers next to the outermost particles are found.
+const LAYER_SAMPLE: usize = 2000;
+
 /// One particle of this many may be an outlier on each side of an axis.
 const OUTSIDE: usize = 1000;
 
@@ -106,11 +109,13 @@ impl Outermost {
 
 /// Positions along `axis` of the layers beyond which are only the outermost particles of a `sample`.
 fn layers(sample: &[DVec3], axis: DVec3) -> [f64; 2] {
-    let outside = match sample.len() / OUTSIDE {
-        0 => usize::from(sample.len() >= ESCAPE_MIN),
+    let stride = sample.len().div_ceil(LAYER_SAMPLE).max(1);
+    let sample = sample.iter().step_by(stride);
+    let mut along: Vec<f64> = sample.map(|p| p.dot(axis)).collect();
+    let outside = match along.len() / OUTSIDE {
+        0 => usize::from(along.len() >= ESCAPE_MIN),
         some => some,
     };
-    let mut along: Vec<f64> = sample.iter().map(|p| p.dot(axis)).collect();
     let last = along.len() - 1;
     [outside, last - outside].map(|place| *along.select_nth_unstable_by(place, f64::total_cmp).1)
 }
