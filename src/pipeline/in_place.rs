@@ -150,8 +150,8 @@ impl StoredFrame {
         }
     }
 
-    /// Parts among `known` that no particle has. They are not searched in large frames, most of which is not read
-    /// otherwise.
+    /// Parts among `known` that no particle has. Empty for large frames: the search reads all particles, and rendering
+    /// reads only those that are visible.
     pub(super) fn absent_parts(&self, known: &PartMaterials) -> Vec<(i32, usize)> {
         let frame = self.frame();
         let name = self.names.parts.as_deref();

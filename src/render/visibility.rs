@@ -114,7 +114,7 @@ impl RenderContext<'_> {
         }
     }
 
-    /// The transmittance of spheres that are separate bodies, some of which may be opaque. Returns the lanes in which it is not 0.
+    /// Computes the transmittance of separate spheres; some may be opaque. Returns the lanes in which it is not 0.
     fn cross_spheres(
         &self,
         spheres: &dyn Shape,

@@ -75,7 +75,7 @@ impl PartTable {
             .collect();
         keys.sort_unstable_by_key(|(number, _)| *number);
         let keys: Vec<PartKey> = keys.into_iter().map(|(_, key)| key).collect();
-        // Find plain keys of which one step has several files with different names
+        // Find the plain keys that are ambiguous: in some step, files with different names have the same one
         let plain: Vec<PartKey> = keys.iter().map(PartKey::plain).collect();
         let mut stems: BTreeMap<(i64, &PartKey), &str> = BTreeMap::new();
         let mut shared = BTreeSet::new();
