@@ -4,7 +4,7 @@ use spherule_formats::names;
 
 use super::ResolveError;
 use super::channels::{UNKNOWN_STEP, has_velocities, step_to_next};
-use crate::manifest::Manifest;
+use crate::manifest::{CameraMode, Manifest};
 use crate::pipeline::{FrameStep, Shutter, attribute_list};
 use crate::surface::{NormalKind, SurfaceKind};
 use crate::survey::Survey;
@@ -12,8 +12,8 @@ use crate::survey::Survey;
 /// The shutter, if there is motion blur.
 ///
 /// # Errors
-/// There are neither velocities nor ids, or the time between frames is unknown, or spheres have other normals than
-/// their own.
+/// There are neither velocities nor ids with another frame, or the time between frames is unknown, or spheres have
+/// other normals than their own.
 pub(super) fn shutter(
     manifest: &Manifest,
     survey: &Survey,
@@ -46,6 +46,12 @@ pub(super) fn shutter(
              have neither; available: {}",
             attribute_list(survey.attributes.iter().map(String::as_str))
         )));
+    }
+    let is_camera_still = matches!(camera.mode, CameraMode::Auto | CameraMode::Fixed);
+    if survey.frames == 1 && survey.frame_numbers.is_none() && !has_velocities && is_camera_still {
+        return Err(unsupported(
+            "motion blur without velocities needs another frame, and there is only one".to_owned(),
+        ));
     }
     if manifest.job.follow && !has_velocities {
         return Err(unsupported(

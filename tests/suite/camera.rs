@@ -415,7 +415,8 @@ fn motion_blur_without_velocities_takes_the_next_frame() {
     assert!(center(&second) > center(&first) + 2.0);
     // There must be ids or velocities
     npy(&workshop.join("still/f_1.npy"), 200, 1, Vec3::ZERO);
-    let checks: [(&[&str], &str); 3] = [
+    let checks: [(&[&str], &str); 4] = [
+        (&["check", "f_1.xyz"], "needs another frame"),
         (&["check", "still"], "motion blur needs velocities, or ids"),
         (
             &["check", "f_*.xyz", "--set", "job.follow=true"],
