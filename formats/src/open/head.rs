@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
+use std::sync::Arc;
 
 use super::streamed::decompressor;
 use crate::compression::{ByteStream, StreamError, is_compressed};
@@ -11,6 +12,7 @@ use crate::message::one_line;
 use crate::native::{self, MappedFile};
 use crate::reader::HEAD_LEN;
 use crate::regular::regular_len;
+use crate::shared::SharedBytes;
 use crate::{FrameError, MemoryBudget};
 
 /// Whether the file at `path` begins as a native frame, without compression around it.
@@ -48,11 +50,11 @@ pub fn remarks(path: &Path) -> Vec<String> {
         if !reader.remarks_need_whole_file() {
             return Ok(reader.remarks(&head));
         }
-        let map = MappedFile::open(path)?;
+        let map = Arc::new(MappedFile::open(path)?);
         if is_compressed(map.bytes()) {
             return Ok(reader.remarks(&head));
         }
-        let remarks = reader.remarks(map.bytes());
+        let remarks = reader.remarks_of_file(&SharedBytes::new(map.clone()));
         map.check()?;
         Ok(remarks)
     });

@@ -122,47 +122,16 @@ fn by_kind(part: &mut RawParticles) -> ByKind {
 
 fn join(first: AttributeData, others: Vec<AttributeData>) -> AttributeData {
     let kind = others.iter().fold(first.scalar_type(), |kind, other| {
-        common_type(kind, other.scalar_type())
+        kind.common_with(other.scalar_type())
     });
     others.into_iter().fold(convert(first, kind), |all, other| {
         append(all, convert(other, kind))
     })
 }
 
-/// The smallest type that holds both exactly, and f64 where none does.
-fn common_type(a: ScalarType, b: ScalarType) -> ScalarType {
-    use ScalarType::{F32, F64, I16, I32, I64};
-    let signed = |t| {
-        matches!(
-            t,
-            ScalarType::I8 | ScalarType::I16 | ScalarType::I32 | ScalarType::I64
-        )
-    };
-    let float = |t| matches!(t, F32 | F64);
-    if a == b {
-        return a;
-    }
-    if float(a) || float(b) {
-        // Integers of up to 16 bits fit into f32.
-        let small = |t: ScalarType| t == F32 || (!float(t) && t.size() <= 2);
-        return if small(a) && small(b) { F32 } else { F64 };
-    }
-    let (large, small) = if a.size() >= b.size() { (a, b) } else { (b, a) };
-    match (signed(large), signed(small)) {
-        (true, true) | (false, false) => large,
-        (true, false) if large.size() > small.size() => large,
-        _ => match large.size() {
-            1 => I16,
-            2 => I32,
-            4 => I64,
-            _ => F64,
-        },
-    }
-}
-
 #[expect(
     clippy::cast_possible_truncation,
-    reason = "common_type only widens; integers beyond 2^53 round where it says f64"
+    reason = "`ScalarType::common_with` only widens; integers beyond 2^53 round where it says f64"
 )]
 fn convert(data: AttributeData, kind: ScalarType) -> AttributeData {
     if data.scalar_type() == kind {
