@@ -162,6 +162,11 @@ pub(crate) trait Reader: Sync {
         self.remarks(file)
     }
 
+    /// Number of files that the step in `file` is divided among.
+    fn piece_count(&self, _file: &SharedBytes) -> u64 {
+        1
+    }
+
     /// True if users of the program that wrote the file expect y to point up.
     fn is_y_up(&self, _head: &[u8]) -> bool {
         false

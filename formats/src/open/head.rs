@@ -62,6 +62,16 @@ pub fn remarks(path: &Path) -> Vec<String> {
     remarks.map(one_line).collect()
 }
 
+/// Number of files that the step in the file at `path` is divided among, as the file states; 1 if it does not.
+pub(crate) fn piece_count(path: &Path) -> u64 {
+    let count = || {
+        let map = Arc::new(MappedFile::open(path).ok()?);
+        let format = Format::detect(map.bytes(), path).ok()?;
+        Some(format.reader().piece_count(&SharedBytes::new(map)))
+    };
+    count().unwrap_or(1)
+}
+
 /// The first bytes of the file at `path`, decompressed. Damage that comes later, or that lets some bytes pass, is no
 /// error here.
 pub(crate) fn head(path: &Path) -> Result<Vec<u8>, FrameError> {

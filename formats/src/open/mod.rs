@@ -26,8 +26,8 @@ mod streamed;
 mod whole;
 
 pub use crate::compression::unpacked_len;
-pub(crate) use head::head;
 pub use head::{detect_file, is_native, remarks};
+pub(crate) use head::{head, piece_count};
 pub(crate) use whole::read_whole;
 
 use mapped::SteppedFile;

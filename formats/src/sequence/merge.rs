@@ -12,12 +12,14 @@ use crate::{Attribute, AttributeData, Positions, RawParticles, ScalarType};
 pub const PART_ATTRIBUTE: &str = "part";
 
 /// Puts `parts` (index of the part, its particles) after one another and adds the attribute
-/// `part`.
+/// `part`. If all have the same index and an attribute of this name, they keep it.
 ///
 /// Attributes that all parts with particles have in the same number of components are kept, in
 /// a type that holds them all; a part without particles takes none away, because writers drop
 /// the attributes then. `notes` reports what is lost.
 pub fn merge(parts: Vec<(u32, RawParticles)>, notes: &mut Vec<String>) -> RawParticles {
+    // Pieces of one part may have parts of their own.
+    let is_one = parts.windows(2).all(|pair| pair[0].0 == pair[1].0);
     let count = parts.iter().map(|(_, p)| p.positions.len()).sum();
     let mut part = Vec::with_capacity(count);
     for (index, particles) in &parts {
@@ -27,12 +29,15 @@ pub fn merge(parts: Vec<(u32, RawParticles)>, notes: &mut Vec<String>) -> RawPar
     let time = particles.iter().find_map(|p| p.time);
     let step = particles.iter().find_map(|p| p.step);
     let mut attributes = merge_attributes(&mut particles, notes);
-    attributes.retain(|a| a.name != PART_ATTRIBUTE);
-    attributes.push(Attribute {
-        name: PART_ATTRIBUTE.to_owned(),
-        components: 1,
-        data: AttributeData::U32(part),
-    });
+    let has_own = attributes.iter().any(|a| a.name == PART_ATTRIBUTE);
+    if !(is_one && has_own) {
+        attributes.retain(|a| a.name != PART_ATTRIBUTE);
+        attributes.push(Attribute {
+            name: PART_ATTRIBUTE.to_owned(),
+            components: 1,
+            data: AttributeData::U32(part),
+        });
+    }
     RawParticles {
         positions: merge_positions(particles.into_iter().map(|p| p.positions).collect()),
         attributes,
@@ -256,8 +261,8 @@ mod tests {
             (F32, I32, F64),
             (F32, F64, F64),
         ] {
-            assert_eq!(common_type(a, b), wide, "{a:?} {b:?}");
-            assert_eq!(common_type(b, a), wide, "{b:?} {a:?}");
+            assert_eq!(a.common_with(b), wide, "{a:?} {b:?}");
+            assert_eq!(b.common_with(a), wide, "{b:?} {a:?}");
         }
     }
 

@@ -119,6 +119,26 @@ def swift():
     expect("swift.hdf5", 0, None, 0.0125, joined(gadget_parts("swift.hdf5"), ("Density",)))
 
 
+# Snapshots of two files each
+def snapshots():
+    for index, number in enumerate([3, 4]):
+        parts = []
+        for piece in range(2):
+            name = f"snap_{number:03}.{piece}.hdf5"
+            with h5py.File(HERE / name, "w") as file:
+                header = file.create_group("Header")
+                counts = [20 + number, 6 * piece]
+                header.attrs["NumPart_ThisFile"] = numpy.array(counts, "u4")
+                header.attrs["NumFilesPerSnapshot"], header.attrs["Time"] = 2, 0.5 * number
+                for kind, count in enumerate(counts):
+                    if count:
+                        gadget_type(file.create_group(f"PartType{kind}"), count, ["Coordinates", "ParticleIDs"], "f4",
+                                    100 * piece + kind)
+            parts.append(joined(gadget_parts(name)))
+        expect("snap_#.*.hdf5", index, number, 0.5 * number,
+               {name: numpy.concatenate([part[name] for part in parts]) for name in parts[0]})
+
+
 # PySPH: the layout of its output, arrays with other properties, vectors with a stride
 def pysph():
     with h5py.File(HERE / "pysph_250.hdf5", "w", libver="earliest") as file:
@@ -139,24 +159,30 @@ def pysph():
                 dataset.attrs["stored"] = True
             if name == "boundary":
                 for key in "uvw":
-                    arrays.create_dataset(key, data=numpy.zeros(0, "f4")).attrs["stored"] = False
+                    attrs = arrays.create_dataset(key, data=numpy.zeros(0, "f4")).attrs
+                    attrs["stored"], attrs["default"] = False, 0.5
+            # PySPH gives what is not stored its default
+            velocity = [data.get(k, numpy.full(count, 0.5)) for k in "uvw"]
             parts.append((value, {"positions": numpy.stack([data[k] for k in "xyz"], 1), "rho": data["rho"],
-                                  "gid": data["gid"], "A": data["A"].reshape(count, 4)}))
+                                  "velocity": numpy.stack(velocity, 1), "gid": data["gid"], "A": data["A"].reshape(count, 4)}))
     expect("pysph_250.hdf5", 0, 250, 0.125, joined(parts))
 
 
 def real_pysph():
     name = "../pysph/dam_break_3d_00100_gzip.hdf5"
     with h5py.File(HERE / name) as file:
+        arrays = [group["arrays"] for group in file["particles"].values()]
+        stored = {k for group in arrays for k, v in group.items() if v.shape != (0,)}
         parts = []
         for value, (_, group) in enumerate(sorted(file["particles"].items())):
-            arrays = {k: v for k, v in group["arrays"].items() if v.shape != (0,)}
-            own = {k: v[()] for k, v in arrays.items() if k not in "xyzuvw"}
-            own["positions"] = numpy.stack([arrays[k][()] for k in "xyz"], 1)
-            if all(k in arrays for k in "uvw"):
-                own["velocity"] = numpy.stack([arrays[k][()] for k in "uvw"], 1)
-            else:
-                own.update({k: arrays[k][()] for k in "uvw" if k in arrays})
+            arrays = {k: v for k, v in group["arrays"].items() if k in stored}
+            count = len(arrays["x"])
+            # PySPH gives what is not stored its default
+            data = {k: v[()] if v.shape != (0,) else numpy.full(count, float(v.attrs["default"]))
+                    for k, v in arrays.items()}
+            own = {k: v for k, v in data.items() if k not in "xyzuvw"}
+            own["positions"] = numpy.stack([data[k] for k in "xyz"], 1)
+            own["velocity"] = numpy.stack([data[k] for k in "uvw"], 1)
             parts.append((value, own))
         solver = file["solver_data"].attrs
         floats = {k for _, arrays in parts for k, v in arrays.items() if v.dtype.kind == "f" and v.ndim == 1}
@@ -399,6 +425,7 @@ def plain():
 
 gadget()
 swift()
+snapshots()
 pysph()
 real_pysph()
 h5part()

@@ -37,6 +37,16 @@ pub(super) struct Snapshot {
     without: Vec<String>,
 }
 
+/// Number of files that a snapshot is divided among.
+pub(super) fn file_count(root: &Node) -> u64 {
+    let header = root.group("Header").ok().flatten();
+    let count = header.and_then(|header| header.number("NumFilesPerSnapshot"));
+    let count = count.and_then(integer);
+    count
+        .and_then(|count| u64::try_from(count).ok())
+        .unwrap_or(1)
+}
+
 impl Snapshot {
     /// The snapshot in the file; `None` if it has another layout.
     ///
@@ -241,12 +251,11 @@ impl Dialect for Snapshot {
         if !self.without.is_empty() {
             remarks.push(format!("without {COORDINATES}: {}", listed(&self.without)));
         }
-        if let Some(files) = self
-            .header_number("NumFilesPerSnapshot")
-            .filter(|n| *n > 1.0)
-        {
+        let files = file_count(&self.root);
+        if files > 1 {
             remarks.push(format!(
-                "the snapshot has {files} files, which are read together"
+                "one of {files} files of a snapshot; give their directory, or a pattern such as snap_010.*.hdf5, to read \
+                 them together"
             ));
         }
         remarks.extend(units(&self.units()));

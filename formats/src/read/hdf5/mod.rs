@@ -120,6 +120,11 @@ impl Reader for Hdf5 {
         }
     }
 
+    fn piece_count(&self, file: &SharedBytes) -> u64 {
+        let root = H5File::open(file).and_then(|file| file.root());
+        root.map_or(1, |root| gadget::file_count(&root))
+    }
+
     fn remarks_need_whole_file(&self) -> bool {
         true
     }

@@ -17,8 +17,8 @@ use crate::{MemoryBudget, ParseError};
 const DEPTH: usize = 4;
 /// Most groups that are looked at.
 const MOST_GROUPS: usize = 1 << 10;
-/// Most time steps without particles: nothing else bounds their number.
-const MOST_EMPTY_STEPS: u64 = 1 << 16;
+/// Most time steps of a file that has fewer bytes.
+const MOST_STEPS: u64 = 1 << 16;
 /// Separators between the stem of a name and its axis.
 const SEPARATORS: [&str; 4] = ["", "_", ".", "-"];
 
@@ -66,11 +66,10 @@ impl PlainFile {
             );
             return Err(ParseError::unsupported(what));
         }
-        let count = groups
-            .first()
-            .map_or(0, |group| group.count(frames.is_some()));
-        if let Some(frames) = frames.filter(|frames| count == 0 && *frames > MOST_EMPTY_STEPS) {
-            let what = format!("{frames} time steps without particles");
+        // Steps without particles take no bytes, so nothing else bounds their number
+        let most = MOST_STEPS.max(root.file().bytes().len() as u64);
+        if let Some(frames) = frames.filter(|frames| *frames > most) {
+            let what = format!("{frames} time steps, at most {most} are read");
             return Err(groups[0].positions[0].stored.bad(what));
         }
         Ok(Self { groups, frames })
@@ -210,7 +209,7 @@ impl PositionGroup {
         // One data set with all axes
         for known in POSITION_ARRAYS {
             for name in names.iter().filter(|name| name.eq_ignore_ascii_case(known)) {
-                let stored = open(node, name)?;
+                let stored = Stored::open(node, name)?.map(Arc::new);
                 if let Some(stored) = stored.filter(|stored| is_position_shape(stored)) {
                     let data = PositionData {
                         stored,

@@ -1,13 +1,18 @@
 //! Output of PySPH: `/particles/<array>/arrays/<property>`, and the time in `/solver_data`.
 
+use std::collections::BTreeSet;
+
+use hdf5_reader::Dataset;
+
 use super::dialect::{Dialect, StepInfo, integer, listed, part_names};
 use super::file::{Node, dataset_number};
 use super::piece::Piece;
 use super::properties::{PropertyFinder, values};
-use super::stored::Stored;
 use super::table::{Part, ParticleTable};
 use super::values::Slice;
-use crate::{MemoryBudget, ParseError};
+use crate::{MemoryBudget, ParseError, ScalarType};
+
+const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// A file with particle arrays.
 pub(super) struct ParticleArrays {
@@ -55,35 +60,54 @@ impl ParticleArrays {
         self.solver.number("count").and_then(integer)
     }
 
-    /// The particles of one array.
-    fn part(&self, value: u32, node: &Node, budget: MemoryBudget) -> Result<Part, ParseError> {
+    /// Names of properties that some array stores.
+    fn stored_names(&self) -> Result<BTreeSet<String>, ParseError> {
+        let mut names = BTreeSet::new();
+        for (_, node) in &self.arrays {
+            for name in node.members()?.1 {
+                let dataset = node.dataset(&name)?;
+                if dataset.is_some_and(|dataset| is_stored(&dataset)) {
+                    names.insert(name);
+                }
+            }
+        }
+        Ok(names)
+    }
+
+    /// The particles of one array. `names` are those of properties that some array stores.
+    fn part(
+        &self,
+        value: u32,
+        node: &Node,
+        names: &BTreeSet<String>,
+        budget: MemoryBudget,
+    ) -> Result<Part, ParseError> {
         let mut positions = Vec::new();
-        let mut count = None;
         let mut finder = PropertyFinder::new(0, budget);
-        for name in ["x", "y", "z"] {
-            let Some(axis) = values(node, name, &Slice::ALL, budget)? else {
-                if name == "z" {
+        for (index, name) in AXES.into_iter().enumerate() {
+            let axis = values(node, name, &Slice::ALL, budget)?;
+            let Some(axis) = axis.filter(|axis| index < 2 || axis.count() > 0) else {
+                if index == 2 {
                     continue;
                 }
                 let what = format!("{} has no numbers {name}", node.path());
                 return Err(ParseError::malformed(0, what));
             };
-            let stored = axis.stored();
-            let expected = *count.get_or_insert(axis.count());
-            // A property that PySPH does not store is empty; then it has its default, 0.
-            if name == "z" && axis.count() == 0 {
-                continue;
+            if index == 0 {
+                finder.count = axis.count();
             }
-            if axis.count() != expected || axis.components() != 1 {
-                let shape = &stored.shape;
-                return Err(stored.bad(format!("shape {shape:?} for {expected} particles")));
+            if axis.count() != finder.count || axis.components() != 1 {
+                let (shape, count) = (&axis.stored().shape, finder.count);
+                let what = format!("shape {shape:?} for {count} particles");
+                return Err(axis.stored().bad(what));
             }
-            finder.exclude(stored);
+            finder.exclude(axis.stored());
             positions.push(Piece::Stored(axis));
         }
-        finder.count = count.unwrap_or(0);
         for name in node.members()?.1 {
-            add_property(&mut finder, node, &name)?;
+            if names.contains(&name) && !AXES.contains(&name.as_str()) {
+                add_property(&mut finder, node, &name)?;
+            }
         }
         finder.join("velocity", &["u", "v", "w"]);
         Ok(Part {
@@ -95,22 +119,33 @@ impl ParticleArrays {
     }
 }
 
-/// Adds the property `name` if it is stored. Vectors are flat, with the number of their components in `stride`.
+/// Whether the property has values in the file.
+fn is_stored(dataset: &Dataset) -> bool {
+    dataset.shape() != [0] && dataset_number(dataset, "stored") != Some(0.0)
+}
+
+/// Adds the property `name`. Vectors are flat, with the number of their components in `stride`. A scalar that is not
+/// stored has its default for all particles.
 fn add_property(finder: &mut PropertyFinder, node: &Node, name: &str) -> Result<(), ParseError> {
     let Some(dataset) = node.dataset(name)? else {
         return Ok(());
     };
-    if dataset.shape() == [0] || dataset_number(&dataset, "stored") == Some(0.0) {
-        return Ok(());
-    }
     let stride = dataset_number(&dataset, "stride").and_then(integer);
     let stride = stride.and_then(|stride| u64::try_from(stride).ok());
-    let slice = Slice {
-        stride: stride.filter(|stride| *stride > 1),
-        ..Slice::ALL
-    };
-    let stored = Stored::of(node, name, &dataset)?;
-    if stored.shape.len() == 1 {
+    let stride = stride.filter(|stride| *stride > 1);
+    if !is_stored(&dataset) {
+        if stride.is_none() && finder.count > 0 {
+            let default = dataset_number(&dataset, "default").unwrap_or(0.0);
+            let piece = Piece::Constant(default, ScalarType::F64);
+            finder.found.push((name.to_owned(), vec![piece]));
+        }
+        return Ok(());
+    }
+    if dataset.shape().len() == 1 {
+        let slice = Slice {
+            stride,
+            ..Slice::ALL
+        };
         finder.add(node, name, name, &slice)?;
     }
     Ok(())
@@ -126,8 +161,9 @@ impl Dialect for ParticleArrays {
 
     fn table(&self, _step: usize, budget: MemoryBudget) -> Result<ParticleTable, ParseError> {
         let mut parts = Vec::new();
+        let names = self.stored_names()?;
         for (value, (_, node)) in (0..).zip(&self.arrays) {
-            parts.push(self.part(value, node, budget)?);
+            parts.push(self.part(value, node, &names, budget)?);
         }
         let is_divided = self.arrays.len() > 1;
         Ok(ParticleTable::new(parts, is_divided).at(self.time(), self.step()))
