@@ -21,8 +21,6 @@ mod pysph;
 mod ranges;
 mod stored;
 mod table;
-#[cfg(test)]
-mod tests;
 mod types;
 mod values;
 mod vtkhdf;

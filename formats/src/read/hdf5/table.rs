@@ -143,9 +143,11 @@ impl ParticleTable {
 
     /// Whether positions are stored as integers.
     pub(super) fn has_integer_positions(&self) -> bool {
-        let pieces = self.positions.cells.iter().flatten();
-        let mut stored = pieces.flat_map(Piece::stored);
-        stored.any(|values| !matches!(values.scalar(), ScalarType::F32 | ScalarType::F64))
+        let mut pieces = self.positions.cells.iter().flatten();
+        pieces.any(|piece| {
+            let is_stored = !piece.stored().is_empty();
+            is_stored && !matches!(piece.scalar(), ScalarType::F32 | ScalarType::F64)
+        })
     }
 
     /// Bytes of positions of one particle in memory.
