@@ -15,6 +15,7 @@ impl SharedBytes {
     }
 
     /// A copy of `bytes`.
+    #[cfg(feature = "hdf5")]
     pub(crate) fn copy(bytes: &[u8]) -> Self {
         Self(Arc::new(bytes.to_vec()))
     }

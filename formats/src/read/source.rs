@@ -11,6 +11,10 @@ use crate::shared::SharedBytes;
 pub(crate) struct ByteSource<'a> {
     text: TextInput<'a>,
     /// The owner of all bytes, if there is one that can be shared.
+    #[cfg_attr(
+        not(feature = "hdf5"),
+        expect(dead_code, reason = "only the library for HDF5 needs an owner")
+    )]
     shared: Option<&'a SharedBytes>,
 }
 
