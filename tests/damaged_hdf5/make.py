@@ -1,7 +1,7 @@
-"""Makes the damaged files of damaged/ with h5py, and damaged.tsv with words of the error that each must give.
+"""Makes the files of this directory with h5py: table.tsv has words of the error that each damaged one must give.
 
     pip install h5py==3.16.0 numpy==2.4.6
-    python tests/data/hdf5/damaged.py
+    python tests/damaged_hdf5/make.py
 """
 
 import pathlib
@@ -10,9 +10,7 @@ import zlib
 import h5py
 import numpy
 
-HERE = pathlib.Path(__file__).parent
-OUT = HERE / "damaged"
-OUT.mkdir(exist_ok=True)
+OUT = pathlib.Path(__file__).parent
 POINTS = numpy.arange(12, dtype="f8").reshape(4, 3)
 table = []
 
@@ -122,8 +120,8 @@ with made("text.h5", "no known layout") as file:
     file["positions"] = numpy.full((4, 3), b"1.0")
 with made("empty.h5", "it has no data sets") as file:
     pass
-with h5py.File(HERE / "bomb.h5", "w") as file:
+with h5py.File(OUT / "bomb.h5", "w") as file:
     # 48 MB of zeros
     file.create_dataset("positions", data=numpy.zeros((2 * 10**6, 3)), chunks=(10**6, 3), compression=9)
 lines = [f"{name}\t{words}\n" for name, words in sorted(table)]
-(HERE / "damaged.tsv").write_text("".join(lines))
+(OUT / "table.tsv").write_text("".join(lines))
