@@ -70,6 +70,23 @@ impl AttributeData {
         append!(I8, U8, I16, U16, I32, U32, I64, U64, F32, F64);
     }
 
+    /// The numbers as bytes, to be filled with little-endian ones before [`Self::decode_little_endian`].
+    #[cfg(feature = "hdf5")]
+    pub(crate) fn as_bytes_mut(&mut self) -> &mut [u8] {
+        with_values!(self, v => bytemuck::cast_slice_mut(v))
+    }
+
+    /// Brings numbers whose bytes are little-endian into the order of the machine.
+    #[cfg(feature = "hdf5")]
+    pub(crate) fn decode_little_endian(&mut self) {
+        if cfg!(target_endian = "big") {
+            let size = self.scalar_type().size();
+            for number in self.as_bytes_mut().chunks_exact_mut(size) {
+                number.reverse();
+            }
+        }
+    }
+
     /// Releases unused capacity.
     pub(crate) fn shrink(&mut self) {
         with_values!(self, v => v.shrink_to_fit());

@@ -15,10 +15,12 @@ mod format;
 mod frame;
 mod message;
 mod origin;
+mod ranges;
 mod reader;
 mod registry;
 mod regular;
 mod scalar;
+mod shared;
 mod step;
 mod value_error;
 

@@ -5,8 +5,9 @@
 //! and a colour among columns. A property without a list, such as density or mass, has no meaning to the
 //! program and keeps its name in the file.
 
-/// Names of a per-particle id. `ids` is common in numpy files, `Idp` comes from DualSPHysics.
-pub const ID: [&str; 3] = ["id", "ids", "Idp"];
+/// Names of a per-particle id. `ids` is common in numpy files, `Idp` comes from DualSPHysics, `ParticleIDs` from the
+/// GADGET family.
+pub const ID: [&str; 4] = ["id", "ids", "Idp", "ParticleIDs"];
 
 /// Names of a velocity with three components.
 pub const VELOCITY: [&str; 6] = ["velocity", "velocities", "vel", "velo", "v", "U"];

@@ -3,8 +3,10 @@
 //! Each format implements [`Reader`] in its own file. `registry.rs` lists the formats. Detection, opening,
 //! sequences and conversion use that list and refer to no format by name.
 
+use crate::ranges::ParticleRanges;
 use crate::read::ByteSource;
 use crate::read::columns::ParticleLayout;
+use crate::shared::SharedBytes;
 use crate::step::Step;
 use crate::{MemoryBudget, ParseError, RawParticles};
 
@@ -123,6 +125,16 @@ pub(crate) trait Reader: Sync {
         Ok(None)
     }
 
+    /// The particles of the only step as ranges of the mapped `file`, if they are not in a [`Self::layout`] but can be
+    /// read without decoding the whole file. Conversion then does so. The particles and the errors must be the same
+    /// as with [`Self::read`].
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    fn ranges(&self, _file: &SharedBytes) -> Result<Option<Box<dyn ParticleRanges>>, ParseError> {
+        Ok(None)
+    }
+
     /// Bytes held beside the file and the numbers of `particles` while they are read: those of the largest array, if
     /// the arrays of the file are compressed or encoded. `head` is the part of the file that is in memory.
     fn unpacked_arrays_len(
@@ -143,6 +155,16 @@ pub(crate) trait Reader: Sync {
     /// simulation cell, or names behind numbers.
     fn remarks(&self, _head: &[u8]) -> Vec<String> {
         Vec::new()
+    }
+
+    /// [`Self::remarks`] of all bytes of a file.
+    fn remarks_of_file(&self, file: &SharedBytes) -> Vec<String> {
+        self.remarks(file)
+    }
+
+    /// Number of files that the step in `file` is divided among.
+    fn piece_count(&self, _file: &SharedBytes) -> u64 {
+        1
     }
 
     /// True if users of the program that wrote the file expect y to point up.

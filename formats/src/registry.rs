@@ -19,6 +19,8 @@ const FORMATS: &[Format] = &[
     npy::NPY,
     npy::NPZ,
     gsd::FORMAT,
+    #[cfg(feature = "hdf5")]
+    crate::read::hdf5::FORMAT,
     csv::FORMAT,
 ];
 

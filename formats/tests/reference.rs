@@ -171,3 +171,9 @@ fn gsd_is_what_the_reference_reader_gives() {
 fn collections_are_what_the_reference_readers_give() {
     assert_eq!(compare("collections"), 54);
 }
+
+#[test]
+#[cfg(feature = "hdf5")]
+fn hdf5_is_what_the_reference_readers_give() {
+    assert_eq!(compare("hdf5"), 103);
+}

@@ -1,7 +1,7 @@
 """What the reference readers of `expected.tsv` files have in common.
 
 Each line is one array of one time step: file, index of the step, number of the step, time, array, type, components,
-particles, least and largest number of each component, CRC-32 of the little-endian bytes. `-` stands for none.
+particles, least and largest number (NaN aside) of each component, CRC-32 of the little-endian bytes. `-` stands for none.
 """
 
 import zlib
@@ -21,7 +21,7 @@ def line(file, index, number, time, name, array):
     components = array.shape[1] if array.ndim > 1 else 1
     bounds = ["-", "-"]
     if len(rows):
-        bounds = [" ".join(repr(v.item()) for v in f(axis=0)) for f in (rows.min, rows.max)]
+        bounds = [" ".join(repr(v.item()) for v in f(rows, axis=0)) for f in (numpy.fmin.reduce, numpy.fmax.reduce)]
     little = array.astype(array.dtype.newbyteorder("<"))
     fields = [file, index, "-" if number is None else number, "-" if time is None else repr(float(time)), name,
               TYPES[array.dtype.name], components, len(rows), *bounds, f"{zlib.crc32(little.tobytes()):08x}"]

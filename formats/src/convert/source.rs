@@ -28,6 +28,11 @@ pub trait ParticleSource: Sync {
         None
     }
 
+    /// Bytes of the positions of one particle in the precision of the source, if that is known.
+    fn position_len(&self) -> Option<u64> {
+        None
+    }
+
     /// Reads the world positions of the particles from index `first`, with the precision of the source. They
     /// need not be finite. Repeated calls give the same positions.
     ///

@@ -13,7 +13,7 @@ use crate::read::sniff::is_text;
 use crate::reader::{Confidence, HEAD_LEN};
 
 mod foreign;
-mod hdf5;
+pub(crate) mod hdf5;
 mod molecules;
 
 impl Format {
@@ -36,7 +36,7 @@ impl Format {
             }
         }
         if !bytes.is_empty() {
-            refuse_foreign(bytes, head, path, named)?;
+            refuse_foreign(head, path, named)?;
         }
         match named {
             Some(format) if format.reader().sniff(head)? >= Confidence::IfNamed => Ok(format),
@@ -61,14 +61,13 @@ impl Format {
 }
 
 /// Refuses files of known formats that are not read.
-fn refuse_foreign(
-    bytes: &[u8],
-    head: &[u8],
-    path: &Path,
-    named: Option<Format>,
-) -> Result<(), ParseError> {
-    let what = hdf5::what(bytes).or_else(|| is_text(head).then(|| molecules::what(head))?);
-    if let Some(what) = what {
+fn refuse_foreign(head: &[u8], path: &Path, named: Option<Format>) -> Result<(), ParseError> {
+    // Without the reader of the format
+    if hdf5::is_hdf5(head) {
+        let what = "an HDF5 file, and this program was built without the feature `hdf5`";
+        return Err(ParseError::unsupported(what));
+    }
+    if let Some(what) = is_text(head).then(|| molecules::what(head)).flatten() {
         return Err(ParseError::unsupported(what));
     }
     // Two or three bytes of raw floats may look like any short signature.
@@ -131,6 +130,11 @@ mod tests {
         assert_eq!(detect("a.xyz", b"\x93NUMPY\x01\0"), npy::NPY);
         assert_eq!(detect("a.zip", b"PK\x03\x04"), npy::NPZ);
         assert_eq!(detect("a.xyz", &[0xdf, 0x65].repeat(4)), gsd::FORMAT);
+        #[cfg(feature = "hdf5")]
+        assert_eq!(
+            detect("a.xyz", b"\x89HDF\r\n\x1a\n"),
+            crate::read::hdf5::FORMAT
+        );
         let vtu = b"<?xml version=\"1.0\"?>\n<VTKFile header_type=\"UInt64\" type=\"PolyData\">";
         assert_eq!(detect("a.vtk", vtu), vtk_xml::FORMAT);
     }
@@ -181,7 +185,6 @@ mod tests {
         refused("a.vti", b"<VTKFile type=\"ImageData\">", "ImageData");
         let odd = b"<VTKFile type=\"a\n\x1b[2J\">";
         refused("a.vti", odd, r"type a\n\u{1b}[2J is not read");
-        refused("a.h5", b"\x89HDF\r\n\x1a\n", "HDF5");
         refused(
             "a.csv",
             b"a title\n\n2 atoms\n1 atom types\n",

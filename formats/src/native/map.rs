@@ -108,6 +108,12 @@ impl MappedFile {
     }
 }
 
+impl AsRef<[u8]> for MappedFile {
+    fn as_ref(&self) -> &[u8] {
+        self.bytes()
+    }
+}
+
 /// An opened native frame; [`Self::frame`] gives the view of its particles.
 #[derive(Debug)]
 pub struct NativeFile {

@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
+use std::sync::Arc;
 
 use super::streamed::decompressor;
 use crate::compression::{ByteStream, StreamError, is_compressed};
@@ -11,6 +12,7 @@ use crate::message::one_line;
 use crate::native::{self, MappedFile};
 use crate::reader::HEAD_LEN;
 use crate::regular::regular_len;
+use crate::shared::SharedBytes;
 use crate::{FrameError, MemoryBudget};
 
 /// Whether the file at `path` begins as a native frame, without compression around it.
@@ -48,16 +50,26 @@ pub fn remarks(path: &Path) -> Vec<String> {
         if !reader.remarks_need_whole_file() {
             return Ok(reader.remarks(&head));
         }
-        let map = MappedFile::open(path)?;
+        let map = Arc::new(MappedFile::open(path)?);
         if is_compressed(map.bytes()) {
             return Ok(reader.remarks(&head));
         }
-        let remarks = reader.remarks(map.bytes());
+        let remarks = reader.remarks_of_file(&SharedBytes::new(map.clone()));
         map.check()?;
         Ok(remarks)
     });
     let remarks = remarks.unwrap_or_default().into_iter();
     remarks.map(one_line).collect()
+}
+
+/// Number of files that the step in the file at `path` is divided among, as the file states; 1 if it does not.
+pub(crate) fn piece_count(path: &Path) -> u64 {
+    let count = || {
+        let map = Arc::new(MappedFile::open(path).ok()?);
+        let format = Format::detect(map.bytes(), path).ok()?;
+        Some(format.reader().piece_count(&SharedBytes::new(map)))
+    };
+    count().unwrap_or(1)
 }
 
 /// The first bytes of the file at `path`, decompressed. Damage that comes later, or that lets some bytes pass, is no

@@ -1,12 +1,14 @@
 //! Files of several steps that are mapped for each step, so that only the pages of that step are in memory.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use crate::detect::Format;
 use crate::native::MappedFile;
 use crate::read::{ByteSource, Step};
 use crate::reader::HEAD_LEN;
 use crate::regular::FileStamp;
+use crate::shared::SharedBytes;
 use crate::{FrameError, MemoryBudget, ParseError, RawParticles};
 
 /// An uncompressed file that is not in memory.
@@ -73,8 +75,9 @@ impl SteppedFile {
         read: impl FnOnce(&mut ByteSource<'_>) -> Result<T, ParseError>,
     ) -> Result<T, FrameError> {
         self.stamp.check(path)?;
-        let map = MappedFile::open(path)?;
-        let result = read(&mut ByteSource::whole(map.bytes()));
+        let map = Arc::new(MappedFile::open(path)?);
+        let bytes = SharedBytes::new(map.clone());
+        let result = read(&mut ByteSource::shared(&bytes));
         // A file that changed explains any fault, and bytes that were cut off read as zeros.
         self.stamp.check(path)?;
         map.check()?;

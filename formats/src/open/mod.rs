@@ -7,6 +7,7 @@
 
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use rkyv::util::AlignedVec;
 
@@ -16,6 +17,7 @@ use crate::native;
 use crate::read::{ByteSource, Step};
 use crate::reader::FileExtent;
 use crate::regular::{FileStamp, regular_len};
+use crate::shared::SharedBytes;
 use crate::{FrameError, MemoryBudget, ParseError, RawParticles};
 
 mod head;
@@ -24,8 +26,8 @@ mod streamed;
 mod whole;
 
 pub use crate::compression::unpacked_len;
-pub(crate) use head::head;
 pub use head::{detect_file, is_native, remarks};
+pub(crate) use head::{head, piece_count};
 pub(crate) use whole::read_whole;
 
 use mapped::SteppedFile;
@@ -51,7 +53,7 @@ pub struct FrameFile {
 #[derive(Debug)]
 enum Content {
     /// In memory.
-    Whole(Vec<u8>),
+    Whole(SharedBytes),
     /// In memory, aligned for native frames, whose sections are used in place.
     Aligned(AlignedVec<64>),
     /// On the disk, mapped for each step.
@@ -61,6 +63,10 @@ enum Content {
 }
 
 impl Content {
+    fn whole(bytes: Vec<u8>) -> Self {
+        Self::Whole(SharedBytes::new(Arc::new(bytes)))
+    }
+
     /// All bytes, or the first ones if the file is on the disk.
     fn head(&self) -> &[u8] {
         match self {
@@ -130,7 +136,7 @@ impl FrameFile {
         // Fail before more is decompressed than is of use.
         let format = Format::detect(&bytes, path).map_err(|e| e.in_file(path))?;
         if is_whole {
-            return Ok((Content::Whole(bytes), stamp, stream.into_notes()));
+            return Ok((Content::whole(bytes), stamp, stream.into_notes()));
         }
         if format.is_streamed(&bytes) {
             let decoder_len = is_compressed.then(|| stream.decoder_len());
@@ -153,7 +159,7 @@ impl FrameFile {
         let more = usize::try_from(len).unwrap_or(usize::MAX);
         let _ = bytes.try_reserve_exact(more.saturating_sub(bytes.len()).saturating_add(1));
         let notes = stream.finish(&mut bytes, room).map_err(in_file)?;
-        Ok((Content::Whole(bytes), stamp, notes))
+        Ok((Content::whole(bytes), stamp, notes))
     }
 
     /// Reads `bytes` as the content of a file at `path`, which is not opened.
@@ -187,7 +193,7 @@ impl FrameFile {
             false => None,
         };
         let bytes = unpacked.unwrap_or(bytes);
-        Self::new(path, Content::Whole(bytes), stored_len, notes, budget)
+        Self::new(path, Content::whole(bytes), stored_len, notes, budget)
     }
 
     fn new(
@@ -203,8 +209,12 @@ impl FrameFile {
         let steps = match &content {
             Content::Streamed(file) => file.steps(path, format, left)?,
             Content::Stepped(file) => file.steps(path, format, left)?,
-            Content::Whole(_) | Content::Aligned(_) => {
-                let mut source = ByteSource::whole(content.head());
+            Content::Whole(bytes) => {
+                let mut source = ByteSource::shared(bytes);
+                format.steps_within(&mut source, left).map_err(in_file)?
+            }
+            Content::Aligned(bytes) => {
+                let mut source = ByteSource::whole(bytes);
                 format.steps_within(&mut source, left).map_err(in_file)?
             }
         };
@@ -304,8 +314,13 @@ impl FrameFile {
                 return file.read(&self.path, self.format, (step, self.steps.len()), left);
             }
             Content::Stepped(file) => file.read(&self.path, self.format, step, left)?,
-            Content::Whole(_) | Content::Aligned(_) => {
-                let mut source = ByteSource::whole(self.bytes());
+            Content::Whole(bytes) => {
+                let mut source = ByteSource::shared(bytes);
+                let particles = self.format.read_within(&mut source, step, left);
+                particles.map_err(in_file)?
+            }
+            Content::Aligned(bytes) => {
+                let mut source = ByteSource::whole(bytes);
                 let particles = self.format.read_within(&mut source, step, left);
                 particles.map_err(in_file)?
             }

@@ -337,7 +337,7 @@ fn gather(bytes: &[u8], count: usize, columns: &[StridedColumn]) -> Vec<Attribut
 }
 
 /// The storage of a column; untouched pages cost nothing yet.
-fn zeros(scalar: ScalarType, len: usize) -> AttributeData {
+pub(super) fn zeros(scalar: ScalarType, len: usize) -> AttributeData {
     match scalar {
         ScalarType::I8 => AttributeData::I8(vec![0; len]),
         ScalarType::U8 => AttributeData::U8(vec![0; len]),
@@ -382,12 +382,9 @@ pub(super) fn positions(parts: Vec<AttributeData>, count: usize) -> Positions {
         Ok([part]) => vec![part],
         Err(parts) => parts,
     };
-    let exact_in_f32 = parts.iter().all(|part| {
-        matches!(
-            part.scalar_type(),
-            ScalarType::F32 | ScalarType::I8 | ScalarType::U8 | ScalarType::I16 | ScalarType::U16
-        )
-    });
+    let exact_in_f32 = parts
+        .iter()
+        .all(|part| part.scalar_type().is_exact_in_f32());
     let wide = (0..count).map(|particle| {
         let mut axes = parts.iter().flat_map(|part| {
             let width = part.len() / count;

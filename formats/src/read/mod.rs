@@ -11,6 +11,8 @@ pub mod csv;
 #[cfg(test)]
 mod damage;
 pub mod gsd;
+#[cfg(feature = "hdf5")]
+pub mod hdf5;
 mod input;
 pub mod lammps;
 pub mod npy;

@@ -1,6 +1,7 @@
 //! The content of a file as its reader sees it.
 
 use super::input::TextInput;
+use crate::shared::SharedBytes;
 
 /// The uncompressed content of a file.
 ///
@@ -9,6 +10,12 @@ use super::input::TextInput;
 #[derive(Debug)]
 pub(crate) struct ByteSource<'a> {
     text: TextInput<'a>,
+    /// The owner of all bytes, if there is one that can be shared.
+    #[cfg_attr(
+        not(feature = "hdf5"),
+        expect(dead_code, reason = "only the library for HDF5 needs an owner")
+    )]
+    shared: Option<&'a SharedBytes>,
 }
 
 impl<'a> ByteSource<'a> {
@@ -17,9 +24,24 @@ impl<'a> ByteSource<'a> {
         Self::from_text(TextInput::whole(bytes))
     }
 
+    /// Content that is in memory or mapped, and can be shared.
+    pub(crate) fn shared(bytes: &'a SharedBytes) -> Self {
+        Self {
+            shared: Some(bytes),
+            ..Self::whole(bytes)
+        }
+    }
+
     /// Content that is read through `text`.
     pub(crate) const fn from_text(text: TextInput<'a>) -> Self {
-        Self { text }
+        Self { text, shared: None }
+    }
+
+    /// All bytes with their owner. Copies them if they have none that can be shared.
+    #[cfg(feature = "hdf5")]
+    pub(crate) fn to_shared(&self) -> SharedBytes {
+        let shared = self.shared.cloned();
+        shared.unwrap_or_else(|| SharedBytes::copy(self.bytes()))
     }
 
     /// All bytes if they are in memory.

@@ -27,6 +27,8 @@ pub(super) struct GroupFile {
     pub part: u32,
     /// `None` if the name has no number.
     pub number: Option<i64>,
+    /// Number of the file among those of one step, if there are several.
+    pub piece: Option<i64>,
 }
 
 /// Names that differ in numbers only, with the column that counts frames.
@@ -160,6 +162,7 @@ pub(super) fn listed(
         path,
         part: 0,
         number: Some(number),
+        piece: None,
     });
     Ok(FileGroup {
         files: files.collect(),
@@ -209,7 +212,10 @@ fn runs(names: Vec<FileName>) -> Vec<NameSeries> {
     let values =
         |column: usize| -> BTreeSet<i64> { names.iter().map(|n| n.numbers[column]).collect() };
     let varying: Vec<usize> = (0..columns).filter(|c| values(*c).len() > 1).collect();
-    let distinct = |column: usize| values(column).len() == names.len();
+    // Files of one step count once
+    let least = names.iter().filter_map(|name| name.piece).min();
+    let firsts = names.iter().filter(|name| name.piece == least).count();
+    let distinct = |column: usize| values(column).len() == firsts;
     let column = given
         .or_else(|| varying.iter().copied().find(|c| distinct(*c)))
         .or_else(|| varying.last().copied())
@@ -245,13 +251,18 @@ fn into_group(candidate: SequenceCandidate) -> Result<FileGroup, SequenceError> 
             path: name.path.clone(),
             part,
             number: run.number(name),
+            piece: name.piece,
         }));
     }
-    files.sort_by(|a, b| (a.number, a.part, &a.path).cmp(&(b.number, b.part, &b.path)));
+    files.sort_by(|a, b| {
+        let key = |file: &GroupFile| (file.number, file.part, file.piece);
+        (key(a), &a.path).cmp(&(key(b), &b.path))
+    });
     for pair in files.windows(2) {
         if let [a, b] = pair
             && a.number == b.number
             && a.part == b.part
+            && a.piece == b.piece
         {
             return Err(SequenceError::Duplicate {
                 number: a.number.unwrap_or(0),

@@ -69,10 +69,11 @@ impl Sequence {
         let mut parts = Vec::with_capacity(frame.parts.len());
         let mut read_bytes = 0;
         for part in &frame.parts {
-            // A list can name any number of files for one step
-            let budget = match part.listed {
-                Some(_) => self.budget.less(read_bytes),
-                None => self.budget,
+            // A list can name any number of files for one step, and a step may be divided among files
+            let is_divided = part.listed.is_some() || self.parts.len() < 2;
+            let budget = match is_divided {
+                true => self.budget.less(read_bytes),
+                false => self.budget,
             };
             let (file, step) = self.file_of(part, budget)?;
             let particles = file.read(step)?;

@@ -12,12 +12,14 @@ use crate::{Attribute, AttributeData, Positions, RawParticles, ScalarType};
 pub const PART_ATTRIBUTE: &str = "part";
 
 /// Puts `parts` (index of the part, its particles) after one another and adds the attribute
-/// `part`.
+/// `part`. If all have the same index and an attribute of this name, they keep it.
 ///
 /// Attributes that all parts with particles have in the same number of components are kept, in
 /// a type that holds them all; a part without particles takes none away, because writers drop
 /// the attributes then. `notes` reports what is lost.
 pub fn merge(parts: Vec<(u32, RawParticles)>, notes: &mut Vec<String>) -> RawParticles {
+    // Pieces of one part may have parts of their own.
+    let is_one = parts.windows(2).all(|pair| pair[0].0 == pair[1].0);
     let count = parts.iter().map(|(_, p)| p.positions.len()).sum();
     let mut part = Vec::with_capacity(count);
     for (index, particles) in &parts {
@@ -27,12 +29,15 @@ pub fn merge(parts: Vec<(u32, RawParticles)>, notes: &mut Vec<String>) -> RawPar
     let time = particles.iter().find_map(|p| p.time);
     let step = particles.iter().find_map(|p| p.step);
     let mut attributes = merge_attributes(&mut particles, notes);
-    attributes.retain(|a| a.name != PART_ATTRIBUTE);
-    attributes.push(Attribute {
-        name: PART_ATTRIBUTE.to_owned(),
-        components: 1,
-        data: AttributeData::U32(part),
-    });
+    let has_own = attributes.iter().any(|a| a.name == PART_ATTRIBUTE);
+    if !(is_one && has_own) {
+        attributes.retain(|a| a.name != PART_ATTRIBUTE);
+        attributes.push(Attribute {
+            name: PART_ATTRIBUTE.to_owned(),
+            components: 1,
+            data: AttributeData::U32(part),
+        });
+    }
     RawParticles {
         positions: merge_positions(particles.into_iter().map(|p| p.positions).collect()),
         attributes,
@@ -122,47 +127,16 @@ fn by_kind(part: &mut RawParticles) -> ByKind {
 
 fn join(first: AttributeData, others: Vec<AttributeData>) -> AttributeData {
     let kind = others.iter().fold(first.scalar_type(), |kind, other| {
-        common_type(kind, other.scalar_type())
+        kind.common_with(other.scalar_type())
     });
     others.into_iter().fold(convert(first, kind), |all, other| {
         append(all, convert(other, kind))
     })
 }
 
-/// The smallest type that holds both exactly, and f64 where none does.
-fn common_type(a: ScalarType, b: ScalarType) -> ScalarType {
-    use ScalarType::{F32, F64, I16, I32, I64};
-    let signed = |t| {
-        matches!(
-            t,
-            ScalarType::I8 | ScalarType::I16 | ScalarType::I32 | ScalarType::I64
-        )
-    };
-    let float = |t| matches!(t, F32 | F64);
-    if a == b {
-        return a;
-    }
-    if float(a) || float(b) {
-        // Integers of up to 16 bits fit into f32.
-        let small = |t: ScalarType| t == F32 || (!float(t) && t.size() <= 2);
-        return if small(a) && small(b) { F32 } else { F64 };
-    }
-    let (large, small) = if a.size() >= b.size() { (a, b) } else { (b, a) };
-    match (signed(large), signed(small)) {
-        (true, true) | (false, false) => large,
-        (true, false) if large.size() > small.size() => large,
-        _ => match large.size() {
-            1 => I16,
-            2 => I32,
-            4 => I64,
-            _ => F64,
-        },
-    }
-}
-
 #[expect(
     clippy::cast_possible_truncation,
-    reason = "common_type only widens; integers beyond 2^53 round where it says f64"
+    reason = "`ScalarType::common_with` only widens; integers beyond 2^53 round where it says f64"
 )]
 fn convert(data: AttributeData, kind: ScalarType) -> AttributeData {
     if data.scalar_type() == kind {
@@ -287,8 +261,8 @@ mod tests {
             (F32, I32, F64),
             (F32, F64, F64),
         ] {
-            assert_eq!(common_type(a, b), wide, "{a:?} {b:?}");
-            assert_eq!(common_type(b, a), wide, "{b:?} {a:?}");
+            assert_eq!(a.common_with(b), wide, "{a:?} {b:?}");
+            assert_eq!(b.common_with(a), wide, "{b:?} {a:?}");
         }
     }
 

@@ -137,14 +137,21 @@ impl Sequence {
         let mut notes = Vec::new();
         let group = match input {
             SequenceInput::Directory(path) => {
-                group::pick(path, scan::directory(path)?, &mut notes)?
+                let mut names = scan::directory(path)?;
+                scan::split_pieces(&mut names, &mut notes);
+                group::pick(path, names, &mut notes)?
             }
             SequenceInput::Pattern(path) => {
                 let pattern = Pattern::parse(path)?;
-                let names = scan::fitting(&pattern, path)?;
+                let mut names = scan::fitting(&pattern, path)?;
+                scan::split_pieces(&mut names, &mut notes);
                 group::pick(&pattern.directory, names, &mut notes)?
             }
-            SequenceInput::Files(paths) => group::listed(listed_names(paths)?, &mut notes)?,
+            SequenceInput::Files(paths) => {
+                let mut names = listed_names(paths)?;
+                scan::split_pieces(&mut names, &mut notes);
+                group::listed(names, &mut notes)?
+            }
         };
         if group
             .files

@@ -26,6 +26,8 @@ pub(super) struct FileName {
     pub extension: String,
     /// As written, dot and the extension of a compression included.
     suffix: String,
+    /// Number of a file among those of one step, see [`Self::split_piece`].
+    pub piece: Option<i64>,
 }
 
 impl FileName {
@@ -60,6 +62,30 @@ impl FileName {
             frame_column,
             extension,
             suffix: suffix.to_owned(),
+            piece: None,
+        }
+    }
+
+    /// Whether the name ends with a number between dots, as `snap_010.3.hdf5`.
+    pub(super) fn may_be_piece(&self) -> bool {
+        let is_snapshot = ["hdf5", "h5"].contains(&self.extension.as_str());
+        let column = self.numbers.len().checked_sub(1);
+        let is_free = column.is_some() && self.frame_column != column;
+        is_snapshot
+            && is_free
+            && matches!(self.literals.as_slice(), [.., dot, end] if dot == "." && end.is_empty())
+    }
+
+    /// Makes the last number that of a file among those of one step.
+    pub(super) fn split_piece(&mut self) {
+        if !self.may_be_piece() {
+            return;
+        }
+        self.piece = self.numbers.pop();
+        self.digits.pop();
+        self.literals.pop();
+        if let Some(end) = self.literals.last_mut() {
+            end.push('*');
         }
     }
 

@@ -173,11 +173,8 @@ fn missing_inputs_are_reported_with_a_remedy() {
     assert!(dir.error("").contains("empty"));
     fs::create_dir(dir.path("vtk")).expect("writable");
     assert!(dir.error("").contains("`vtk`; give one of them"));
-    fs::write(dir.path("a.hdf5"), b"\x89HDF\r\n\x1a\n").expect("writable");
-    assert!(
-        dir.error("")
-            .contains("an HDF5 file, which is not read yet")
-    );
+    fs::write(dir.path("a.abc"), b"Ogawa\0").expect("writable");
+    assert!(dir.error("").contains("Alembic"));
     let nothing = Sequence::open(&SequenceInput::Files(vec![]));
     assert!(matches!(nothing, Err(SequenceError::NoInput)));
 }

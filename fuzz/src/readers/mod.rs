@@ -23,7 +23,7 @@ pub use packed::{compressed, npz, open};
 pub type Target = fn(&[u8]) -> usize;
 
 /// Every target by the name of its folder in `corpus`.
-pub const TARGETS: [(&str, Target); 17] = [
+pub const TARGETS: [(&str, Target); 18] = [
     ("vtk", vtk),
     ("vtk_xml", vtk_xml),
     ("bgeo", bgeo),
@@ -34,6 +34,7 @@ pub const TARGETS: [(&str, Target); 17] = [
     ("npz", npz),
     ("csv", csv),
     ("gsd", gsd),
+    ("hdf5", hdf5),
     ("open", open),
     ("compressed", compressed),
     ("lists", lists),
@@ -107,6 +108,12 @@ pub fn csv(bytes: &[u8]) -> usize {
 /// GSD.
 pub fn gsd(bytes: &[u8]) -> usize {
     read_all(read::gsd::FORMAT, bytes, 1)
+}
+
+/// HDF5.
+pub fn hdf5(bytes: &[u8]) -> usize {
+    // A chunk may be packed more than once.
+    read_all(read::hdf5::FORMAT, bytes, DEFLATE_RATIO * DEFLATE_RATIO)
 }
 
 /// Reads `bytes` as `format`, the first steps and the last. `packing` is the ratio that

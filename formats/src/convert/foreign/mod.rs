@@ -1,9 +1,11 @@
 //! Files of other programs as sources of particles that need not fit into memory.
 //!
-//! The reader of the format decides which files qualify: their numbers must have fixed strides in the file itself.
+//! The reader of the format decides which files qualify: their numbers must have fixed strides in the file itself, or
+//! the reader must be able to decode ranges of them.
 //! Text, compressed files and files of several steps are read into memory by [`crate::FrameFile`] instead.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use super::ParticleSource;
 use crate::compression::is_compressed;
@@ -11,13 +13,16 @@ use crate::detect::Format;
 use crate::native::MappedFile;
 use crate::read::columns::ParticleLayout;
 use crate::regular::regular_len;
+use crate::shared::SharedBytes;
 use crate::{FrameError, ParseError};
 
 mod columns;
+mod ranges;
 
 use columns::ColumnSource;
+use ranges::RangeSource;
 
-/// The particles of the mapped file at `path`. `None` if they have no fixed strides: then
+/// The particles of the mapped file at `path`. `None` if they can only be read as a whole: then
 /// [`crate::FrameFile`] reads them, or returns the error.
 ///
 /// # Errors
@@ -31,8 +36,15 @@ pub fn open_source(path: &Path) -> Result<Option<Box<dyn ParticleSource>>, Frame
     let layout = layout_of(file.bytes(), path);
     // Missing bytes read as zeros; report the changed file, not the zeros.
     file.check()?;
-    let layout = layout.map_err(|e| e.in_file(path))?;
-    Ok(layout.map(|layout| Box::new(ColumnSource::new(file, layout)) as Box<dyn ParticleSource>))
+    if let Some(layout) = layout.map_err(|e| e.in_file(path))? {
+        return Ok(Some(Box::new(ColumnSource::new(file, layout))));
+    }
+    let file = Arc::new(file);
+    let ranges = Format::detect(file.bytes(), path)
+        .and_then(|format| format.reader().ranges(&SharedBytes::new(file.clone())));
+    file.check()?;
+    let ranges = ranges.map_err(|e| e.in_file(path))?;
+    Ok(ranges.map(|ranges| Box::new(RangeSource::new(file, ranges)) as Box<dyn ParticleSource>))
 }
 
 /// The layout of the particles in `bytes`, the contents of `path`; `None` if some numbers have no fixed stride.

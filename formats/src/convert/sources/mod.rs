@@ -17,7 +17,12 @@ use std::path::Path;
 use crate::FrameError;
 
 /// The range of `len` indices from `first`, if all are below `count`.
-fn places(path: &Path, first: u64, len: usize, count: u64) -> Result<Range<usize>, FrameError> {
+pub(super) fn places(
+    path: &Path,
+    first: u64,
+    len: usize,
+    count: u64,
+) -> Result<Range<usize>, FrameError> {
     let end = first.checked_add(len as u64).filter(|end| *end <= count);
     let range = end.and_then(|end| Some(usize::try_from(first).ok()?..usize::try_from(end).ok()?));
     range.ok_or_else(|| {

@@ -1,0 +1,173 @@
+//! HDF5 files: damage, limits of memory, and ranges for conversion. `reference.rs` compares good files with their
+//! reference readers.
+#![cfg(feature = "hdf5")]
+#![expect(clippy::expect_used, reason = "a test says what it expects")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+use spherule_formats::convert::open_source;
+use spherule_formats::{
+    Attribute, AttributeData, FrameError, FrameFile, MemoryBudget, RawParticles,
+};
+
+fn data(name: &str) -> PathBuf {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    root.join("../tests/data/hdf5").join(name)
+}
+
+fn damaged(name: &str) -> PathBuf {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    root.join("../tests/damaged_hdf5").join(name)
+}
+
+/// All steps, or the first error.
+fn read(file: Result<FrameFile, FrameError>) -> Result<Vec<RawParticles>, FrameError> {
+    let file = file?;
+    (0..file.steps().len())
+        .map(|step| file.read(step))
+        .collect()
+}
+
+#[test]
+fn damaged_files_give_their_errors() {
+    let table = fs::read_to_string(damaged("table.tsv")).expect("the table");
+    let mut count = 0;
+    for line in table.lines() {
+        let (name, words) = line.split_once('\t').expect("two fields");
+        let path = damaged(name);
+        let error = read(FrameFile::open(&path)).expect_err(name).to_string();
+        assert!(error.contains(words), "{name}: {error}");
+        assert!(
+            error.contains(name) && !error.contains(char::is_control),
+            "{error}"
+        );
+        // Conversion finds the same fault, when it opens the file or when it reads. It reads only files of one step.
+        if !name.ends_with("vtkhdf") && !name.ends_with("h5md") {
+            let read = open_source(&path).and_then(|source| {
+                let source = source.expect("one step");
+                let count = usize::try_from(source.count()).expect("few");
+                source.read_positions(0, &mut vec![DVec3::ZERO; count])
+            });
+            let error = read.expect_err(name).to_string();
+            assert!(error.contains(words), "{name}: {error}");
+        }
+        count += 1;
+    }
+    // Also the table, its script, and a file that is only too large.
+    let files = fs::read_dir(damaged("")).expect("files").count();
+    assert_eq!(count + 3, files);
+}
+
+#[test]
+fn bombs_are_refused_within_the_budget() {
+    let budget = |mebibytes: u64| MemoryBudget::new(mebibytes << 20, "take care");
+    let path = damaged("bomb.h5");
+    assert!(fs::metadata(&path).expect("a file").len() < 100_000);
+    for small in [1, 16, 40] {
+        let error = read(FrameFile::open_within(&path, budget(small))).expect_err("a bomb");
+        assert!(matches!(error, FrameError::TooLarge { .. }), "{error}");
+        assert!(error.to_string().ends_with("take care"), "{error}");
+    }
+    let steps = read(FrameFile::open_within(&path, budget(200))).expect("enough memory");
+    assert_eq!(steps[0].positions.len(), 2_000_000);
+}
+
+/// The values of `attribute`, little-endian.
+fn bytes_of(attribute: &Attribute) -> Vec<u8> {
+    macro_rules! bytes {
+        ($($variant:ident),*) => {
+            match &attribute.data {
+                $(AttributeData::$variant(v) => v.iter().flat_map(|x| x.to_le_bytes()).collect(),)*
+            }
+        };
+    }
+    bytes!(I8, U8, I16, U16, I32, U32, I64, U64, F32, F64)
+}
+
+#[test]
+fn ranges_are_parts_of_the_whole() {
+    for name in [
+        "axes.h5",
+        "plain.h5",
+        "table.h5",
+        "gadget.hdf5",
+        "swift.hdf5",
+        "pysph_250.hdf5",
+        "points.vtkhdf",
+    ] {
+        let path = data(name);
+        let whole = &read(FrameFile::open(&path)).expect("a good file")[0];
+        let source = open_source(&path).expect("a good file").expect("one step");
+        let count = whole.positions.len();
+        assert_eq!(source.count(), count as u64, "{name}");
+        assert_eq!(source.time(), whole.time, "{name}");
+        assert_eq!(source.attributes().len(), whole.attributes.len(), "{name}");
+        for len in [1, 7, count] {
+            for first in (0..count).step_by(len) {
+                let len = len.min(count - first);
+                let mut places = vec![DVec3::ZERO; len];
+                source
+                    .read_positions(first as u64, &mut places)
+                    .expect("there");
+                let expected = (first..first + len).map(|i| whole.positions.get(i));
+                assert!(places.into_iter().eq(expected), "{name} {first}");
+                for (index, attribute) in source.attributes().iter().enumerate() {
+                    let all = bytes_of(&whole.attributes[index]);
+                    let width = attribute.width();
+                    let mut own = vec![0; len * width];
+                    source
+                        .read_values(index, first as u64, &mut own)
+                        .expect("there");
+                    let expected = &all[first * width..(first + len) * width];
+                    assert_eq!(own, expected, "{name} {} {first}", attribute.name);
+                }
+            }
+        }
+        assert!(
+            source
+                .read_positions(count as u64, &mut [DVec3::ZERO])
+                .is_err()
+        );
+    }
+}
+
+#[test]
+fn truncations_and_wrong_bytes_are_survived() {
+    for name in [
+        "axes.h5",
+        "plain.h5",
+        "table.h5",
+        "temporal.vtkhdf",
+        "beam.h5part",
+    ] {
+        let path = data(name);
+        let whole = fs::read(&path).expect("readable");
+        let budget = MemoryBudget::new(64 << 20, "take care");
+        let open = |bytes| FrameFile::from_bytes_within(&path, bytes, budget);
+        for cut in (0..whole.len()).step_by(whole.len() / 30) {
+            assert!(
+                read(open(whole[..cut].to_vec())).is_err(),
+                "{name} cut at {cut}"
+            );
+        }
+        // Multiplicative steps reach all parts of the file
+        let mut seed = 12_345_usize;
+        for _ in 0..80 {
+            let mut bytes = whole.clone();
+            for _ in 0..3 {
+                seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                let at = (seed >> 20) % bytes.len();
+                bytes[at] = seed.to_le_bytes()[7];
+            }
+            if let Ok(steps) = read(open(bytes)) {
+                for step in steps {
+                    let count = step.positions.len();
+                    let is_whole = |a: &Attribute| a.data.len() == a.components * count;
+                    assert!(step.attributes.iter().all(is_whole), "{name}");
+                }
+            }
+        }
+    }
+}
