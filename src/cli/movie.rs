@@ -169,7 +169,7 @@ fn source(
     let timeline = Timeline::new(&frames, all, request.gaps);
     for (what, gaps) in [
         (
-            "is shown for them (--gaps skip leaves them out)",
+            "is shown for longer (--gaps skip leaves gaps out)",
             &timeline.held,
         ),
         (
@@ -182,7 +182,12 @@ fn source(
                 0 => String::new(),
                 more => format!(", and so on at {more} more places"),
             };
-            message!("{missing} frames are missing after frame {frame}, which {what}{more}");
+            let are = if *missing == 1 {
+                "frame is"
+            } else {
+                "frames are"
+            };
+            message!("{missing} {are} missing after frame {frame}, which {what}{more}");
         }
     }
     if request.format == MovieFormat::Gif && request.rate.per_second() > 50.0 {

@@ -316,6 +316,24 @@ mod tests {
     }
 
     #[test]
+    fn data_of_scripts_cannot_end_their_element() {
+        let hostile = serde_json::json!({"name": "</script><script>alert(1)</script><!--"});
+        let mut page = Page::new("a page");
+        page.data("data", &hostile);
+        page.script("run();\n", "'self'");
+        let html = page.html();
+        assert_eq!(html.matches("<script").count(), 2);
+        assert!(html.contains("<script>\nrun();\n</script>") && !html.contains("<!--"));
+        assert!(html.contains("img-src data: 'self'; script-src 'unsafe-inline'\">"));
+        let (_, after) = html.split_once("id=\"data\">").unwrap();
+        let (json, _) = after.split_once("</script>").unwrap();
+        assert_eq!(
+            serde_json::from_str::<serde_json::Value>(json).unwrap(),
+            hostile
+        );
+    }
+
+    #[test]
     fn columns_of_numbers_are_right_aligned() {
         let mut table = Table::new("t", &["name", "count"]);
         table.row(["a".to_owned(), "1 000".to_owned()]);

@@ -7,6 +7,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use rayon::prelude::*;
 use serde_json::{Value, json};
 use thiserror::Error;
 
@@ -29,6 +30,9 @@ const MAX_EMBEDDED: usize = 384 << 20;
 
 /// Most bytes of ids, values and channels in a page.
 const MAX_DATA: usize = 32 << 20;
+
+/// Frames per thread between two additions to the page.
+const FRAMES_PER_THREAD: usize = 2;
 
 /// Widths of ids and channels in samples, best first.
 const DATA_WIDTHS: [usize; 4] = [640, 480, 320, 160];
@@ -201,21 +205,30 @@ fn add_data(
     let Some(plan) = plan(frames, settings, &mut content)? else {
         return Ok(content);
     };
-    let mut bytes = 0;
-    for (frame, value) in frames.iter().zip(all) {
+    let data = |frame: &ViewerFrame| {
         let planes = planes(frame, settings, plan.width)?;
-        let (data, length) = frame_data(&planes, &plan, settings)?;
-        bytes += length;
-        // Frames may need more than those of the plan
-        if bytes > 2 * MAX_DATA {
-            content.notes.push(format!(
-                "ids and channels end before frame {}, to keep the page small",
-                frame.number
-            ));
-            break;
-        }
-        if let (Value::Object(into), Value::Object(data)) = (value, data) {
-            into.extend(data);
+        frame_data(&planes, &plan, settings)
+    };
+    // Frames in groups, so that few are in memory at a time
+    let group = FRAMES_PER_THREAD * rayon::current_num_threads();
+    let mut bytes = 0;
+    for (frames, values) in frames.chunks(group).zip(all.chunks_mut(group)) {
+        let read: Vec<Result<(Value, usize), ViewerError>> = frames.par_iter().map(data).collect();
+        for ((frame, value), read) in frames.iter().zip(values).zip(read) {
+            let (data, length) = read?;
+            bytes += length;
+            // Frames may need more than those of the plan
+            if bytes > 2 * MAX_DATA {
+                let number = frame.number;
+                let note = "ids and channels end before frame";
+                content
+                    .notes
+                    .push(format!("{note} {number}, to keep the page small"));
+                return Ok(content);
+            }
+            if let (Value::Object(into), Value::Object(data)) = (value, data) {
+                into.extend(data);
+            }
         }
     }
     Ok(content)

@@ -82,8 +82,7 @@ fn gaps_are_held_or_left_out() {
         "{}",
         held.text()
     );
-    let held =
-        held.prints("2 frames are missing after frame 3, which is shown for them (--gaps skip");
+    let held = held.prints("2 frames are missing after frame 3, which is shown for");
     drop(held);
     let skipped = workshop
         .run(&["movie", "out", "-o", "a.gif", "--gaps", "skip"])
@@ -241,7 +240,7 @@ fn sheets_have_chosen_frames() {
         .expect(DONE);
     assert_eq!(
         ran.text().trim(),
-        "a.png: 100x42, 3 columns of 28x16, frames 1-5".replace("42", "40")
+        "a.png: 100x40, 3 columns of 28x16, frames 1-5"
     );
     // At full size the pictures are unchanged
     let two = [
@@ -257,7 +256,7 @@ fn sheets_have_chosen_frames() {
         "0",
     ];
     let ran = workshop.run(&two).expect(DONE);
-    assert!(ran.text().contains("frames 1-5x4"), "{}", ran.text());
+    assert!(ran.text().contains("frames 1,5"), "{}", ran.text());
     let (size, pixels) = png(&workshop.join("b.png"));
     assert_eq!(size, [64, 72]);
     let first = png(&workshop.join("out/f.0001.png")).1;
