@@ -74,6 +74,14 @@ impl JobPictures {
         }
         let exposure = find("output.preview_exposure").and_then(|value| value.parse().ok());
         let has_previews = find("output.preview").is_none_or(|value| value == "true");
+        let is_transparent = find("output.transparent").is_some_and(|value| value == "true");
+        if is_transparent && !has_previews {
+            return Err(CliError::other(format!(
+                "{}: this job has no previews, and its images have no background; render it with --set \
+                 output.preview=true",
+                dir.display()
+            )));
+        }
         let selected = selected(&state, args.frames.as_ref())?;
         let is_done = |frame: &i64| state.frame_state(*frame) == Some(FrameState::Done);
         let (done, missing): (Vec<i64>, Vec<i64>) =

@@ -92,19 +92,14 @@ pub fn read_planes(
     })
 }
 
-/// The colours of a file through the view transform, like a preview. An image without background has no picture.
+/// The colours of a file through the view transform, like a preview. An image without background is in front of
+/// black.
 pub(super) fn picture(file: impl Read + Seek, exposure: f32) -> Result<Picture, Fault> {
-    let planes = decode(file, |name| ["R", "G", "B", "A"].contains(&name), |_| 1)?;
+    let planes = decode(file, |name| ["R", "G", "B"].contains(&name), |_| 1)?;
     let floats = |name| planes.floats(name);
     let (Some(red), Some(green), Some(blue)) = (floats("R"), floats("G"), floats("B")) else {
         return Err(Fault::Other("has no channels R, G and B".to_owned()));
     };
-    // Half-floats just below 1 are rounding
-    if floats("A").is_some_and(|alpha| alpha.iter().any(|a| *a < 0.999)) {
-        return Err(Fault::Other(
-            "has transparent pixels, and its background is unknown; render with output.preview = true".to_owned(),
-        ));
-    }
     let gain = exp2(exposure);
     let [width, height] = planes.size;
     let mut rgb = Vec::with_capacity(3 * red.len());

@@ -289,7 +289,7 @@ fn images_without_previews_are_shown() {
     let ran = workshop.run(&["movie", "open", "-o", "b.gif"]);
     refuses(
         ran,
-        "has transparent pixels, and its background is unknown; render with output.preview = true",
+        "this job has no previews, and its images have no background; render it with --set output.preview",
     );
 }
 
