@@ -239,7 +239,11 @@ mod tests {
     fn damaged_png_files_are_errors() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.png");
-        let whole = Picture::filled(40, 30, [20, 90, 200]).png("test").unwrap();
+        let picture = Picture::filled(40, 30, [20, 90, 200]);
+        let whole = picture.png("test").unwrap();
+        let header = &whole[..whole.len() / 2];
+        std::fs::write(&path, header).unwrap();
+        assert!(Picture::read(&path, 0.0).is_err());
         for at in (0..whole.len()).step_by(3) {
             let mut bytes = whole.clone();
             bytes[at] ^= 0x41;
@@ -247,7 +251,12 @@ mod tests {
             // No panic and no huge allocation; text chunks have no effect on the pixels
             let _ = Picture::read(&path, 0.0);
             std::fs::write(&path, &whole[..at]).unwrap();
-            assert!(Picture::read(&path, 0.0).is_err(), "{at}");
+            // Only the end mark may be missing
+            let read = Picture::read(&path, 0.0);
+            assert!(
+                read.is_err() || read.is_ok_and(|read| read == picture),
+                "{at}"
+            );
         }
     }
 }

@@ -129,6 +129,6 @@ mod tests {
             row[..3].iter().all(|v| *v < 40) && row[5..].iter().all(|v| *v > 215),
             "{row:?}"
         );
-        assert!(row[3] < 64 && row[4] > 224, "{row:?}");
+        assert!(row[3] < 96 && row[4] > 224, "{row:?}");
     }
 }

@@ -35,11 +35,19 @@ printf 'Made with spherule' >> "${last#file:}""#;
 
 #[test]
 fn pictures_go_through_a_pipe() {
-    let workshop = job(&[1, 2, 4], &["--width", "63", "--height", "35"]);
+    let workshop = job(&[1, 2, 4], &[]);
     let ran = run(
         &workshop,
         Some(KEEP),
-        &["movie", "out", "--output=-a:b.mp4", "--fps", "23.976"],
+        &[
+            "movie",
+            "out",
+            "--output=-a:b.mp4",
+            "--fps",
+            "23.976",
+            "--width",
+            "63",
+        ],
     )
     .expect(DONE);
     assert!(
@@ -99,7 +107,7 @@ fn without_ffmpeg_the_message_helps() {
     let ran = ran.prints("ffmpeg is not installed");
     let ran = ran.prints("sudo apt install ffmpeg");
     ran.prints(
-        "Or run by hand elsewhere: ffmpeg -framerate 25 -start_number 1 -i out/f.%04d.png -vf",
+        "Or run by hand elsewhere: ffmpeg -framerate 25 -start_number 1 -i 'out/f.%04d.png' -vf",
     );
     assert!(!workshop.join("a.mp4").exists());
     no_leftovers(workshop.path());
