@@ -32,7 +32,10 @@ pub mod job;
 pub mod manifest;
 pub mod math;
 pub mod metrics;
+#[cfg(feature = "movies")]
+pub mod movie;
 pub mod output;
+pub mod picture;
 pub mod pipeline;
 pub mod ray;
 pub mod reading;
@@ -44,3 +47,5 @@ pub mod scale;
 pub mod scene;
 pub mod surface;
 pub mod survey;
+#[cfg(feature = "reports")]
+pub mod viewer;

@@ -53,6 +53,12 @@ impl Publisher {
         })
     }
 
+    /// The temporary file, for another program that writes it by its name. The program must end before
+    /// [`Publisher::commit`].
+    pub fn part(&self) -> &Path {
+        &self.part
+    }
+
     /// Syncs the file and renames it to its final name, where it replaces an older one. Returns its length in
     /// bytes.
     ///
@@ -207,6 +213,21 @@ mod tests {
         assert_eq!(names(dir.path()), ["a.exr", "taken"]);
         assert!(publish(&dir.path().join("no/such"), b"x").is_err());
         assert!(publish(Path::new("/"), b"x").is_err());
+    }
+
+    #[test]
+    fn another_program_may_write_the_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let dst = dir.path().join("a.mp4");
+        let file = Publisher::create(&dst).unwrap();
+        fs::write(file.part(), b"by another program").unwrap();
+        assert_eq!(file.commit().unwrap(), 18);
+        assert_eq!(fs::read(&dst).unwrap(), b"by another program");
+        let file = Publisher::create(&dst).unwrap();
+        fs::write(file.part(), b"half").unwrap();
+        drop(file);
+        assert_eq!(fs::read(&dst).unwrap(), b"by another program");
+        assert_eq!(names(dir.path()), ["a.mp4"]);
     }
 
     #[test]

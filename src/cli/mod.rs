@@ -38,17 +38,21 @@ mod inspect;
 mod job;
 mod key_flags;
 mod manifest_args;
+mod movie;
 mod numbers;
 mod paths;
+mod pictures;
 mod print;
 mod progress;
 mod render;
 mod scale;
 mod schema;
+mod sheet;
 mod signals;
 mod status;
 mod still;
 mod verify;
+mod view;
 
 use errors::CliError;
 
@@ -68,6 +72,12 @@ enum Command {
     Still(Box<still::StillArgs>),
     /// Print what `render` would do, with memory and time. Changes nothing.
     Check(Box<check::CheckArgs>),
+    /// Write a movie of the finished pictures of a job: MP4, MOV, WebM, GIF, animated PNG or WebP.
+    Movie(movie::MovieArgs),
+    /// Write a contact sheet of the finished pictures of a job.
+    Sheet(sheet::SheetArgs),
+    /// Write a page that plays the finished pictures of a job, with ids and plots.
+    View(view::ViewArgs),
     /// Print the state of a job: frames done, failed, missing and running, rate and time left.
     Status(status::StatusArgs),
     /// Print a complete, commented manifest for an input.
@@ -155,6 +165,9 @@ fn run(command: Command) -> Result<Outcome, CliError> {
         Command::Render(args) => render::run(&args),
         Command::Still(args) => still::run(*args),
         Command::Check(args) => check::run(&args),
+        Command::Movie(args) => movie::run(&args),
+        Command::Sheet(args) => sheet::run(&args),
+        Command::View(args) => view::run(&args),
         Command::Status(args) => status::run(&args),
         Command::Init(args) => init::run(&args),
         Command::Schema => schema::run(),

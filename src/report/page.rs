@@ -1,4 +1,5 @@
-//! A report as one HTML file: without scripts or external resources, readable on a phone, in light and dark mode.
+//! A report as one HTML file: without external resources, readable on a phone, in light and dark mode. Only pages that
+//! add a script have one.
 //! External text (file names, messages) is escaped here and nowhere else.
 
 use std::fmt::Write as _;
@@ -95,6 +96,17 @@ impl Table {
 pub struct Page {
     title: String,
     body: String,
+    /// Style rules besides [`CSS`].
+    style: &'static str,
+    script: Option<Script>,
+}
+
+/// A script, and what a page with it may load.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Script {
+    code: &'static str,
+    /// Sources of images, as in a Content-Security-Policy.
+    images: &'static str,
 }
 
 impl Page {
@@ -103,7 +115,35 @@ impl Page {
         Self {
             title: title.to_owned(),
             body: format!("<h1>{}</h1>\n", escaped(title)),
+            style: "",
+            script: None,
         }
+    }
+
+    /// Adds HTML as it is: no external text.
+    pub fn markup(&mut self, html: &'static str) {
+        self.body += html;
+    }
+
+    /// Adds data for a script, as JSON in an element that is not shown.
+    pub fn data(&mut self, id: &str, data: &serde_json::Value) {
+        // Strings of JSON may contain any text, but nothing that ends the element
+        let json = data.to_string().replace('<', "\\u003c");
+        let id = escaped(id);
+        self.put(format_args!(
+            "<script type=\"application/json\" id=\"{id}\">{json}</script>\n"
+        ));
+    }
+
+    /// Sets additional style rules.
+    pub fn style(&mut self, css: &'static str) {
+        self.style = css;
+    }
+
+    /// Sets the script, which runs when the page is complete, and the sources from which the page may load images
+    /// (besides data in it), as in a Content-Security-Policy.
+    pub fn script(&mut self, code: &'static str, images: &'static str) {
+        self.script = Some(Script { code, images });
     }
 
     /// Begins a section; `id` is a link target.
@@ -176,18 +216,27 @@ impl Page {
 
     /// The whole file.
     pub fn html(&self) -> String {
+        let script = self
+            .script
+            .map(|s| format!("<script>\n{}</script>\n", s.code));
+        let policy = self
+            .script
+            .map(|s| format!(" {}; script-src 'unsafe-inline'", s.images));
         // The empty icon prevents browsers from requesting one from a server.
         format!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
              <meta http-equiv=\"Content-Security-Policy\" \
-             content=\"default-src 'none'; style-src 'unsafe-inline'; img-src data:\">\n\
+             content=\"default-src 'none'; style-src 'unsafe-inline'; img-src data:{}\">\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
              <meta name=\"color-scheme\" content=\"light dark\">\n\
              <link rel=\"icon\" href=\"data:,\">\n\
-             <title>{}</title>\n<style>\n{CSS}{}</style>\n</head>\n<body>\n<main>\n{}</main>\n</body>\n</html>\n",
+             <title>{}</title>\n<style>\n{CSS}{}{}</style>\n</head>\n<body>\n<main>\n{}</main>\n{}</body>\n</html>\n",
+            policy.unwrap_or_default(),
             escaped(&self.title),
             plots::CSS,
-            self.body
+            self.style,
+            self.body,
+            script.unwrap_or_default()
         )
     }
 
@@ -264,6 +313,24 @@ mod tests {
         let html = Page::new("a page").html();
         assert!(!html.contains("http://") && !html.contains("https://"));
         assert!(!html.contains("<script") && !html.contains("@import") && !html.contains("url("));
+    }
+
+    #[test]
+    fn data_of_scripts_cannot_end_their_element() {
+        let hostile = serde_json::json!({"name": "</script><script>alert(1)</script><!--"});
+        let mut page = Page::new("a page");
+        page.data("data", &hostile);
+        page.script("run();\n", "'self'");
+        let html = page.html();
+        assert_eq!(html.matches("<script").count(), 2);
+        assert!(html.contains("<script>\nrun();\n</script>") && !html.contains("<!--"));
+        assert!(html.contains("img-src data: 'self'; script-src 'unsafe-inline'\">"));
+        let (_, after) = html.split_once("id=\"data\">").unwrap();
+        let (json, _) = after.split_once("</script>").unwrap();
+        assert_eq!(
+            serde_json::from_str::<serde_json::Value>(json).unwrap(),
+            hostile
+        );
     }
 
     #[test]

@@ -40,6 +40,9 @@ fn options_come_in_groups_with_examples() {
         &["generate"],
         &["inspect"],
         &["export"],
+        &["movie"],
+        &["sheet"],
+        &["view"],
     ] {
         let short = help(&[command, &["-h"]].concat());
         let long = help(&[command, &["--help"]].concat());

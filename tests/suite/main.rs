@@ -24,6 +24,7 @@ mod help;
 mod in_place;
 mod memory;
 mod meshes;
+mod movies;
 mod parts;
 mod printing;
 mod progress;

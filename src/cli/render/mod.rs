@@ -1,10 +1,15 @@
 //! `spherule render`: a sequence, or the job of a manifest, to images.
 
+use std::path::PathBuf;
+
 use clap::Args;
 
 use super::job::{JobArgs, use_threads};
 use super::manifest_args::ManifestArgs;
+use super::movie::MovieAfter;
+use super::signals::SignalListener;
 use super::{CliError, Outcome, events, signals};
+use crate::job::JobManifest;
 use crate::manifest::ProgressMode;
 
 mod follow;
@@ -38,6 +43,11 @@ pub(super) struct RunArgs {
 pub(super) struct RenderArgs {
     #[command(flatten)]
     run: RunArgs,
+    /// After the render, write a movie of all frames: .mp4, .mov, .mkv, .webm, .gif, .png or .webp
+    ///
+    /// 25 frames per second; `spherule movie` has more settings.
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    movie: Option<PathBuf>,
 }
 
 const SIGNAL_MESSAGES: signals::SignalMessages = signals::SignalMessages {
@@ -53,15 +63,36 @@ pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
         events::start();
     }
     use_threads(settings.threads)?;
-    if settings.follow {
-        return follow::run(&args.run.job, requested, &signals);
+    let movie = args.movie.as_deref();
+    let movie = movie.map(|path| MovieAfter::new(path, &requested, args.run.job.force));
+    let movie = movie.transpose()?;
+    let outcome = match settings.follow {
+        true => follow::run(&args.run.job, requested, &signals)?,
+        false => run_once(&args.run.job, requested, &signals)?,
+    };
+    match movie {
+        Some(movie) if outcome == Outcome::Done => Ok(movie.make(signals.start_work())),
+        Some(_) => {
+            message!("no movie: not all frames are done");
+            Ok(outcome)
+        }
+        None => Ok(outcome),
     }
+}
+
+/// Renders the frames that are there.
+fn run_once(
+    args: &JobArgs,
+    requested: JobManifest,
+    signals: &SignalListener,
+) -> Result<Outcome, CliError> {
+    let grace = requested.manifest.job.grace;
     let sequence = requested.open_sequence()?;
     for note in sequence.notes() {
         note!("{note}");
     }
-    let mut run = Run::start(&args.run.job, requested, sequence)?;
-    let interrupt = signals.start_work_with_grace(settings.grace);
+    let mut run = Run::start(args, requested, sequence)?;
+    let interrupt = signals.start_work_with_grace(grace);
     let result = run.render_pending(interrupt);
     Ok(run.end(result, interrupt))
 }

@@ -72,6 +72,15 @@ struct Machine {
     simd: &'static str,
 }
 
+impl Machine {
+    fn this() -> Self {
+        Self {
+            threads: rayon::current_num_threads(),
+            simd: SimdLevel::best().name(),
+        }
+    }
+}
+
 impl Status {
     const fn name(self) -> &'static str {
         match self {
@@ -89,11 +98,16 @@ impl JobReport {
         let frames = frames
             .map(|planned| JobFrame::new(state, planned))
             .collect();
-        let machine = Machine {
-            threads: rayon::current_num_threads(),
-            simd: SimdLevel::best().name(),
-        };
-        Self::of(frames, manifest.settings(), machine)
+        Self::of(frames, manifest.settings(), Machine::this())
+    }
+
+    /// A report of a job whose manifest is not needed: its settings are those of the plan.
+    pub fn of_plan(state: &JobState) -> Self {
+        let frames = state.plan().frames().iter();
+        let frames = frames
+            .map(|planned| JobFrame::new(state, planned))
+            .collect();
+        Self::of(frames, state.plan().settings().to_vec(), Machine::this())
     }
 
     fn of(frames: Vec<JobFrame>, settings: Vec<(String, String)>, machine: Machine) -> Self {

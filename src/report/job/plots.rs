@@ -16,7 +16,7 @@ fn curve<'a>(name: &str, value: impl Fn(&FrameReport) -> f64 + 'a) -> Curve<'a> 
 
 impl JobReport {
     /// All plots, with gaps for frames that are not finished.
-    pub(super) fn plots(&self) -> Vec<Plot> {
+    pub fn plots(&self) -> Vec<Plot> {
         // Collect the curves
         let stages = vec![
             curve("read", |r| r.seconds.read),

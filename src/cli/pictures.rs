@@ -1,0 +1,249 @@
+//! The finished pictures of a job, for the commands that show them: `movie`, `sheet` and `view`.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use spherule_jobs::{FrameRange, FrameState, Interrupt, Job, JobState};
+
+use super::CliError;
+use super::job::{job_directory, list, no_job};
+use super::paths::absolute;
+use super::signals::SignalMessages;
+use crate::job::KIND;
+use crate::movie::Observer;
+use crate::picture::is_own_file;
+
+/// The job, and the frames to show.
+#[derive(Debug, Args)]
+pub(super) struct PicturesArgs {
+    /// A render job: the directory of its images, or its manifest (job.toml).
+    pub(super) job: PathBuf,
+    /// Frames to show: 7 | 1-10 | 1-10x2 | 1-5,8.
+    #[arg(long, value_name = "RANGE", allow_hyphen_values = true)]
+    pub(super) frames: Option<FrameRange>,
+}
+
+/// A finished frame.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct JobPicture {
+    pub(super) number: i64,
+    /// The preview, or the image if there is none.
+    pub(super) picture: PathBuf,
+    pub(super) image: PathBuf,
+}
+
+/// The finished pictures of a job.
+pub(super) struct JobPictures {
+    pub(super) state: JobState,
+    /// Ascending by number.
+    pub(super) pictures: Vec<JobPicture>,
+    /// All selected frames, finished or not.
+    pub(super) selected: Vec<i64>,
+    /// Selected frames that are not finished.
+    pub(super) missing: Vec<i64>,
+    /// Whether a worker is at work.
+    pub(super) is_running: bool,
+    /// Whether pictures are previews.
+    pub(super) has_previews: bool,
+    /// Exposure of previews, stops.
+    pub(super) exposure: f32,
+}
+
+impl JobPictures {
+    /// Reads the state of the job.
+    pub(super) fn read(args: &PicturesArgs) -> Result<Self, CliError> {
+        let dir = job_directory(&args.job)?;
+        // Before the ledger, so that no frame finishes in between
+        let workers = Job::workers(&dir)?;
+        let Some(state) = Job::read(&dir)? else {
+            return Err(no_job(&dir));
+        };
+        let settings = state.plan().settings();
+        let find = |name: &str| {
+            settings
+                .iter()
+                .find(|(key, _)| key == name)
+                .map(|(_, value)| value)
+        };
+        if find(KIND).is_some() {
+            return Err(CliError::other(format!(
+                "{}: this job has native frames, no pictures; render them first",
+                dir.display()
+            )));
+        }
+        let exposure = find("output.preview_exposure").and_then(|value| value.parse().ok());
+        let has_previews = find("output.preview").is_none_or(|value| value == "true");
+        let is_transparent = find("output.transparent").is_some_and(|value| value == "true");
+        if is_transparent && !has_previews {
+            return Err(CliError::other(format!(
+                "{}: this job has no previews, and its images have no background; render it with --set \
+                 output.preview=true",
+                dir.display()
+            )));
+        }
+        let selected = selected(&state, args.frames.as_ref())?;
+        let is_done = |frame: &i64| state.frame_state(*frame) == Some(FrameState::Done);
+        let (done, missing): (Vec<i64>, Vec<i64>) =
+            selected.iter().partition(|frame| is_done(frame));
+        let pictures = done
+            .iter()
+            .filter_map(|frame| picture(&state, *frame))
+            .collect();
+        Ok(Self {
+            pictures,
+            selected,
+            missing,
+            is_running: workers.iter().any(|worker| !worker.has_ended),
+            has_previews,
+            exposure: exposure.unwrap_or(0.0),
+            state,
+        })
+    }
+
+    /// The state of an unfinished job; None if all frames are done.
+    pub(super) fn gaps(&self) -> Option<String> {
+        if self.missing.is_empty() {
+            return None;
+        }
+        let running = if self.is_running {
+            "; a worker is at work"
+        } else {
+            ""
+        };
+        Some(format!(
+            "{}: {} of {} frames are done, missing: {}{running}",
+            self.state.dir().display(),
+            self.pictures.len(),
+            self.selected.len(),
+            list(&self.missing)
+        ))
+    }
+
+    /// Refuses a job without finished frames.
+    pub(super) fn require_any(&self) -> Result<(), CliError> {
+        match self.gaps().filter(|_| self.pictures.is_empty()) {
+            None => Ok(()),
+            Some(gaps) => Err(CliError::other(format!(
+                "{gaps}; there is nothing to show yet"
+            ))),
+        }
+    }
+
+    /// Adds how to get previews to an error of reading images.
+    pub(super) fn explain(&self, error: &dyn std::fmt::Display) -> CliError {
+        let remedy = match self.has_previews {
+            true => "",
+            false => "; this job has no previews: render it with --set output.preview=true",
+        };
+        CliError::other(format!("{error}{remedy}"))
+    }
+
+    /// Refuses an output that is an image of the job, that is not a file, or that another program has written.
+    pub(super) fn guard(&self, output: &Path, force: bool) -> Result<(), CliError> {
+        guard(output, force)?;
+        let planned = self
+            .state
+            .plan()
+            .frames()
+            .iter()
+            .flat_map(|frame| &frame.outputs);
+        let wanted = real(output)?;
+        for path in planned {
+            if real(&self.state.dir().join(path))? == wanted {
+                return Err(refused(
+                    output,
+                    "is an image of the job; choose another name",
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Refuses an output that is not a file, or that another program has written. Makes its directory.
+pub(super) fn guard(output: &Path, force: bool) -> Result<(), CliError> {
+    if let Ok(existing) = fs::metadata(output) {
+        if !existing.is_file() {
+            return Err(refused(output, "is not a file; choose another name"));
+        }
+        if !force && !is_own_file(output) {
+            let why = "already exists and was not made by this command; choose another name, or replace it \
+                       with --force";
+            return Err(refused(output, why));
+        }
+    }
+    match absolute(output)?.parent() {
+        Some(dir) => fs::create_dir_all(dir).map_err(CliError::io(dir)),
+        None => Ok(()),
+    }
+}
+
+fn refused(output: &Path, why: &str) -> CliError {
+    CliError::other(format!("{}: {why}", output.display()))
+}
+
+/// The path with a directory without links, whether or not the file exists.
+fn real(path: &Path) -> Result<PathBuf, CliError> {
+    let path = absolute(path)?;
+    let (Some(dir), Some(name)) = (path.parent(), path.file_name()) else {
+        return Ok(path);
+    };
+    Ok(dir
+        .canonicalize()
+        .unwrap_or_else(|_| dir.to_owned())
+        .join(name))
+}
+
+fn selected(state: &JobState, range: Option<&FrameRange>) -> Result<Vec<i64>, CliError> {
+    let numbers: Vec<i64> = state.plan().frames().iter().map(|f| f.number).collect();
+    let Some(range) = range else {
+        return Ok(numbers);
+    };
+    let selected = range.select(&numbers);
+    if selected.is_empty() {
+        return Err(CliError::other(format!(
+            "--frames: {range} contains none of the job's frames: {}",
+            list(&numbers)
+        )));
+    }
+    Ok(selected)
+}
+
+fn picture(state: &JobState, frame: i64) -> Option<JobPicture> {
+    let outputs = &state.plan().frame(frame)?.outputs;
+    let dir = if state.dir().as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        state.dir()
+    };
+    let image = dir.join(outputs.first()?);
+    let is_png = |path: &&String| {
+        Path::new(path)
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("png"))
+    };
+    let preview = outputs.iter().find(is_png).map(|path| dir.join(path));
+    Some(JobPicture {
+        number: frame,
+        picture: preview.unwrap_or_else(|| image.clone()),
+        image,
+    })
+}
+
+/// Stops when a signal has come.
+pub(super) struct Watch<'a>(pub(super) &'a Interrupt);
+
+impl Observer for Watch<'_> {
+    fn stops(&self) -> bool {
+        self.0.is_raised()
+    }
+
+    fn on_picture(&self, _: usize) {}
+}
+
+/// Messages after a signal.
+pub(super) const SIGNAL_MESSAGES: SignalMessages = SignalMessages {
+    stopping: "stopping",
+    stopped: "stopped; no file was written",
+};

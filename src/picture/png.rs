@@ -1,0 +1,121 @@
+//! PNG files of 8-bit RGB.
+
+use std::io::{self, Read};
+
+use png::{BitDepth, ColorType, Compression, DecodingError, Encoder, Limits, Transformations};
+
+use super::{Fault, Picture, check_size};
+
+/// Maximum memory of the decoder for chunks other than pixels, bytes.
+const MAX_CHUNKS: usize = 64 << 20;
+
+impl From<DecodingError> for Fault {
+    fn from(error: DecodingError) -> Self {
+        match error {
+            DecodingError::IoError(error) => Self::Io(error),
+            other => Self::Other(format!("cannot be decoded: {other}")),
+        }
+    }
+}
+
+/// Decodes a file. Transparent pixels show white.
+pub(super) fn picture(file: impl Read) -> Result<Picture, Fault> {
+    let mut decoder = png::Decoder::new_with_limits(file, Limits { bytes: MAX_CHUNKS });
+    decoder.set_transformations(Transformations::EXPAND | Transformations::STRIP_16);
+    let mut reader = decoder.read_info()?;
+    let (width, height) = (reader.info().width as usize, reader.info().height as usize);
+    check_size(width, height)?;
+    let mut bytes = vec![0; reader.output_buffer_size()];
+    let frame = reader.next_frame(&mut bytes)?;
+    bytes.truncate(frame.buffer_size());
+    let rgb = match frame.color_type {
+        ColorType::Rgb => bytes,
+        ColorType::Rgba => rgb_of(&bytes, |&[r, g, b, a]| [r, g, b].map(|v| over_white(v, a))),
+        ColorType::Grayscale => rgb_of(&bytes, |&[v]| [v; 3]),
+        ColorType::GrayscaleAlpha => rgb_of(&bytes, |&[v, a]| [over_white(v, a); 3]),
+        ColorType::Indexed => {
+            return Err(Fault::Other("has colours that cannot be expanded".into()));
+        }
+    };
+    if rgb.len() != 3 * width * height {
+        return Err(Fault::Other("has not all of its pixels".to_owned()));
+    }
+    Ok(Picture::new(width, height, rgb))
+}
+
+fn rgb_of<const N: usize>(bytes: &[u8], rgb: impl Fn(&[u8; N]) -> [u8; 3]) -> Vec<u8> {
+    let (pixels, _) = bytes.as_chunks::<N>();
+    pixels.iter().flat_map(rgb).collect()
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "at most 255")]
+fn over_white(value: u8, alpha: u8) -> u8 {
+    let (value, alpha) = (u32::from(value), u32::from(alpha));
+    ((value * alpha + 255 * (255 - alpha) + 127) / 255) as u8
+}
+
+/// See [`Picture::png`].
+pub(super) fn encode(picture: &Picture, software: &str) -> io::Result<Vec<u8>> {
+    let side = |side: usize| u32::try_from(side).map_err(io::Error::other);
+    let mut file = Vec::new();
+    let mut encoder = Encoder::new(&mut file, side(picture.width)?, side(picture.height)?);
+    encoder.set_color(ColorType::Rgb);
+    encoder.set_depth(BitDepth::Eight);
+    encoder.set_compression(Compression::Default);
+    encoder.set_adaptive_filter(png::AdaptiveFilterType::Adaptive);
+    encoder.add_text_chunk("Software".to_owned(), software.to_owned())?;
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(&picture.rgb)?;
+    writer.finish()?;
+    Ok(file)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[track_caller]
+    fn reads(color: ColorType, depth: BitDepth, data: &[u8], expected: [u8; 3]) {
+        let mut file = Vec::new();
+        let mut encoder = Encoder::new(&mut file, 1, 1);
+        encoder.set_color(color);
+        encoder.set_depth(depth);
+        let mut writer = encoder.write_header().unwrap();
+        writer.write_image_data(data).unwrap();
+        writer.finish().unwrap();
+        assert_eq!(picture(&file[..]).unwrap().rgb(), expected);
+    }
+
+    #[test]
+    fn other_kinds_of_pixels_become_rgb() {
+        reads(ColorType::Rgb, BitDepth::Eight, &[1, 2, 3], [1, 2, 3]);
+        reads(
+            ColorType::Rgb,
+            BitDepth::Sixteen,
+            &[1, 9, 2, 9, 3, 9],
+            [1, 2, 3],
+        );
+        reads(ColorType::Grayscale, BitDepth::One, &[0x80], [255; 3]);
+        reads(
+            ColorType::Rgba,
+            BitDepth::Eight,
+            &[0, 100, 255, 51],
+            [204, 224, 255],
+        );
+        reads(
+            ColorType::GrayscaleAlpha,
+            BitDepth::Eight,
+            &[7, 0],
+            [255; 3],
+        );
+    }
+
+    #[test]
+    fn written_files_read_back_and_name_their_origin() {
+        let pixels: Vec<u8> = (0..3 * 7 * 5).map(|i: u8| i.wrapping_mul(37)).collect();
+        let written = Picture::new(7, 5, pixels);
+        let file = encode(&written, "origin").unwrap();
+        assert_eq!(picture(&file[..]).unwrap(), written);
+        assert!(file.windows(6).any(|bytes| bytes == b"origin"));
+    }
+}
