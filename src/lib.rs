@@ -33,6 +33,7 @@ pub mod manifest;
 pub mod math;
 pub mod metrics;
 pub mod output;
+pub mod overlay;
 pub mod pipeline;
 pub mod ray;
 pub mod reading;

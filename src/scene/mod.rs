@@ -25,7 +25,7 @@ pub mod texture;
 
 pub use background::Background;
 pub use camera::{Camera, CameraError, CameraView, Framing, Lens};
-pub use colormap::{ColorMap, UnknownColorMap};
+pub use colormap::{ColorMap, ColorScale, UnknownColorMap};
 pub use environment::{Environment, EnvironmentAxes, IrradianceHarmonics, RadianceMap};
 pub use ground::{Ground, WetGround};
 pub use lens::{Aperture, Focus, LensSettings};
