@@ -78,7 +78,7 @@ impl Value for MapName {
             let what = match nearest(text, &names) {
                 Some(near) => format!("did you mean {near}?"),
                 None => format!(
-                    "choose one of {}, or one of them with _r for the reversed map",
+                    "choose one of {}; an `_r` at the end reverses a map",
                     names.join(", ")
                 ),
             };
@@ -91,9 +91,9 @@ impl Value for MapName {
     }
 
     fn schema(_: &Key) -> Json {
-        let both = |name: &str| [name.to_owned(), format!("{name}_r")];
-        let names: Vec<String> = known().flat_map(both).collect();
-        json!({ "enum": names })
+        let names: Vec<&str> = known().collect();
+        let reversed = format!("^({})_r$", names.join("|"));
+        json!({ "anyOf": [{ "enum": names }, { "type": "string", "pattern": reversed }] })
     }
 }
 

@@ -43,8 +43,8 @@ pub enum OverlayKind {
     ColorBar {
         /// The title; by default the name of the value.
         title: Option<String>,
-        /// The unit of the values.
-        unit: String,
+        /// The unit of the values, if it is shown.
+        unit: Option<String>,
         /// Length as a fraction of the height of the picture.
         length: f32,
     },
@@ -57,8 +57,8 @@ pub enum OverlayKind {
     ScaleBar {
         /// The length; by default a round one.
         length: Option<f64>,
-        /// The unit of length.
-        unit: String,
+        /// The unit of length, if it is shown.
+        unit: Option<String>,
     },
     /// The directions of the axes.
     Axes,
@@ -129,13 +129,13 @@ impl OverlayKind {
         match kind {
             OverlayType::ColorBar => Self::ColorBar {
                 title: None,
-                unit: String::new(),
+                unit: None,
                 length: 0.4,
             },
             OverlayType::Text => Self::Text { text: None },
             OverlayType::ScaleBar => Self::ScaleBar {
                 length: None,
-                unit: String::new(),
+                unit: None,
             },
             OverlayType::Axes => Self::Axes,
         }
@@ -185,7 +185,7 @@ impl Overlay {
                 /// Title above the bar
                 title => *title, example("\"Speed\""), unset("what the colours show");
                 /// Unit of the values, after the title
-                unit => *unit;
+                unit => *unit, example("\"m/s\""), unset("no unit");
                 /// Length of the bar as a fraction of the height of the picture
                 ///
                 /// Categories have swatches instead of a bar.
@@ -204,7 +204,7 @@ impl Overlay {
                 /// In perspective, it is right at the distance of the centre of the particles.
                 length => *length, unit("a length"), above(0), example("0.5"), unset("a round length");
                 /// Unit of length
-                unit => *unit;
+                unit => *unit, example("\"m\""), unset("no unit");
             ),
             OverlayKind::Axes => {}
         }
@@ -217,7 +217,7 @@ impl Overlay {
             /// Horizontal and vertical distance from the corner, as fractions of the height of the picture
             offset => self.offset;
             /// Height of text as a fraction of the height of the picture
-            size => self.size, from(0.005), to(0.2);
+            size => self.size, above(0), to(0.25);
             /// Colour of text and lines, linear RGB, or auto: black or white
             color => self.color, or("auto"), from(0), to(1);
         );
@@ -314,7 +314,7 @@ mod tests {
             ),
             (
                 "type = \"axes\"\nsize = 0.5",
-                "overlay.0.size: expected a number from 0.005 to 0.2",
+                "overlay.0.size: expected a number above 0, at most 0.25",
             ),
             (
                 "type = \"axes\"\noffset = [1, 11]",

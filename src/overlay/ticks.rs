@@ -26,14 +26,18 @@ fn power(exponent: i32) -> f64 {
     format!("1e{exponent}").parse().unwrap_or(f64::INFINITY)
 }
 
+/// The smallest exponent of a normal number.
+const LEAST: i32 = -307;
+
 /// The exponent of the largest power of ten that is at most `value`, which is above 0.
 fn decade(value: f64) -> i32 {
     #[expect(clippy::cast_possible_truncation, reason = "below 400")]
-    let mut exponent = libm::floor(libm::log10(value)) as i32;
-    while power(exponent) > value {
+    let mut exponent = libm::floor(libm::log10(value)).clamp(LEAST.into(), 308.0) as i32;
+    // The logarithm is rounded
+    if power(exponent) > value {
         exponent -= 1;
     }
-    while power(exponent + 1) <= value {
+    if power(exponent + 1) <= value {
         exponent += 1;
     }
     exponent
@@ -71,7 +75,7 @@ impl Ticks {
     /// the bands of a discrete map.
     pub fn of(range: [f64; 2], scale: ColorScale, steps: Option<u32>, most: usize) -> Self {
         let [low, high] = range;
-        if !(low < high && (high - low).is_finite()) {
+        if !(low < high && (high - low).is_normal()) {
             return Self::of_one(low);
         }
         let axis = Axis { range, scale };

@@ -40,8 +40,8 @@ pub struct DecodedShading {
 }
 
 impl DecodedFrame {
-    /// Extracts from `frame`, which was read from `file` and has this `number`, what `setup` needs. Also returns the number of radii that
-    /// were raised.
+    /// Extracts from `frame`, which was read from `file` and has this `number`, what `setup` needs. Also returns the
+    /// number of radii that were raised.
     pub(super) fn of(
         setup: &Setup,
         frame: ParticleFrame,

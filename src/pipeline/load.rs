@@ -162,7 +162,10 @@ fn missing_glyphs(setup: &Setup) -> Option<String> {
     let shown: Vec<String> = missing.iter().map(|c| format!("`{c}`")).collect();
     (!shown.is_empty()).then(|| {
         let all = shown.join(", ");
-        format!("overlay: the font, which has Latin, Greek and mathematical signs, has no glyph for {all}; boxes are drawn")
+        format!(
+            "overlay: the font, which has Latin, Greek and mathematical signs, has no glyph for {all}; boxes are \
+             drawn"
+        )
     })
 }
 

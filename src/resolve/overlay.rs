@@ -160,7 +160,7 @@ fn content(
             };
             Some(Content::ColorBar(ColorBar {
                 title: title.clone().unwrap_or(name),
-                unit: unit.clone(),
+                unit: unit.clone().unwrap_or_default(),
                 length: *length,
                 kind,
             }))
@@ -177,7 +177,7 @@ fn content(
         }
         OverlayKind::ScaleBar { length, unit } => Some(Content::ScaleBar(ScaleBar {
             length: length.unwrap_or_else(|| ScaleBar::round_length(units_per_height)),
-            unit: unit.clone(),
+            unit: unit.clone().unwrap_or_default(),
         })),
         OverlayKind::Axes => Some(Content::Axes(Axes {
             names: ["x", "y", "z"].map(str::to_owned),

@@ -17,7 +17,8 @@ NAMES = (
 tables = pathlib.Path(cmcrameri.__file__).parent / "cmaps"
 out = bytearray()
 for name in NAMES:
-    rows = [[float(v) for v in line.split()] for line in (tables / f"{name}.txt").read_text().splitlines() if line.strip()]
+    lines = (tables / f"{name}.txt").read_text().splitlines()
+    rows = [[float(v) for v in line.split()] for line in lines if line.strip()]
     assert len(rows) == 256 and all(len(row) == 3 for row in rows), name
     out += bytes(round(255 * v) for row in rows for v in row)
 pathlib.Path(__file__).with_name("crameri.bin").write_bytes(out)

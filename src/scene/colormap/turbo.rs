@@ -1,5 +1,5 @@
-//! The turbo map. That of `colorous` is a polynomial that differs from the published map by up to 22 of 255 at the ends,
-//! so turbo is interpolated here from knots of the published map.
+//! The turbo map. That of `colorous` is a polynomial that differs from the published map by up to 22 of 255 at the
+//! ends, so turbo is interpolated here from knots of the published map.
 
 use glam::Vec3;
 
