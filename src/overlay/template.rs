@@ -237,7 +237,7 @@ fn grouped(digits: &str) -> String {
     let mut text = String::new();
     for c in digits.chars() {
         if c.is_ascii_digit() {
-            if left != count && left % 3 == 0 {
+            if left != count && left.is_multiple_of(3) {
                 text.push(',');
             }
             left -= 1;

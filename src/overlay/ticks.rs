@@ -312,7 +312,8 @@ impl Axis {
             .map(|w| w[1] - w[0])
             .fold(f64::INFINITY, f64::min);
         let stride = values.len().div_ceil(most).max(1);
-        let stride = (stride..=values.len()).find(|stride| (values.len() - 1) % stride == 0);
+        let stride =
+            (stride..=values.len()).find(|stride| (values.len() - 1).is_multiple_of(*stride));
         let stride = stride.unwrap_or(1);
         let is_shown = |decimals: &usize| {
             let scale = power(i32::try_from(*decimals).unwrap_or(0));
