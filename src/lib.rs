@@ -35,6 +35,7 @@ pub mod metrics;
 #[cfg(feature = "movies")]
 pub mod movie;
 pub mod output;
+pub mod overlay;
 pub mod picture;
 pub mod pipeline;
 pub mod ray;

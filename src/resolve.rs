@@ -4,29 +4,28 @@ use glam::{DVec3, Vec3};
 use spherule_formats::native::Access;
 
 use crate::accel::{BvhSettings, SbvhSettings};
-use crate::manifest::{
-    ColorSetting, DEFAULT_MAP, IndirectSetting, Manifest, MapName, RadiusSetting, nearest,
-};
+use crate::manifest::{IndirectSetting, Manifest, RadiusSetting, nearest};
 use crate::metrics::memory::available;
 use crate::output::{ExrOptions, PlaneNames, PreviewOptions};
 use crate::pipeline::{
-    ColorRule, FrameSize, MemoryModel, Picture, RadiusRule, RunSettings, Setup, attribute_list,
+    FrameSize, MemoryModel, Picture, RadiusRule, RunSettings, Setup, attribute_list,
 };
 use crate::render::{IndirectLight, IntegratorKind, PixelFilter, RenderSettings};
 use crate::scene::{
-    Background, Bounds, CameraError, ColorMap, PathError, RadianceMap, Scene, default_lights,
-    material,
+    Background, Bounds, CameraError, PathError, RadianceMap, Scene, default_lights,
 };
 use crate::surface::SurfaceKind;
-use crate::survey::{ColorQuestion, Question, RadiusQuestion, Survey};
+use crate::survey::{Question, RadiusQuestion, Survey};
 
 mod camera;
 mod channels;
+mod color;
 mod denoise;
 mod environment;
 mod ground;
 mod lights;
 mod meshes;
+mod overlay;
 mod parts;
 mod shutter;
 mod surface;
@@ -108,11 +107,7 @@ pub enum ResolveError {
 /// What the survey has to determine.
 pub fn question(manifest: &Manifest) -> Question<'_> {
     Question {
-        color: match &manifest.material.color {
-            ColorSetting::Auto | ColorSetting::AutoWith { .. } => ColorQuestion::Speed,
-            ColorSetting::Rgb(_) => ColorQuestion::None,
-            ColorSetting::Attribute { attribute, .. } => ColorQuestion::Attribute(attribute),
-        },
+        color: color::question(&manifest.material.color),
         radius: match &manifest.input.radius {
             RadiusSetting::Auto if manifest.surface.kind != SurfaceKind::Spheres => {
                 RadiusQuestion::AutoOfBody
@@ -123,6 +118,8 @@ pub fn question(manifest: &Manifest) -> Question<'_> {
                 RadiusQuestion::Attribute(attribute, *scale)
             }
         },
+        up: manifest.input.up.map(|up| DVec3::from_array(up.vector())),
+        points: color::is_depth(&manifest.material.color) || overlay::needs_points(manifest),
     }
 }
 
@@ -145,7 +142,6 @@ pub fn setup(
     let surface = surface::settings(manifest)?;
     let radius = radius_rule(manifest, survey)?;
     check_radius(&radius)?;
-    let color = color_rule(manifest, survey)?;
     let up = up(manifest, survey);
     // Spheres reach beyond their centres.
     let reach = DVec3::splat(f64::from(reach(&radius, survey)));
@@ -159,6 +155,7 @@ pub fn setup(
     let framed = camera::framed(survey, &bounds, reach.x);
     let path = camera::path(manifest, &framed, up, aspect)?;
     let camera = camera::at_start(&path, aspect, survey.origin)?;
+    let color = color::rule(manifest, survey, &camera)?;
     let lens = camera::lens(manifest, &path, aspect)?;
     let shutter = shutter::shutter(manifest, survey)?;
     // Set up lights and ground
@@ -237,6 +234,7 @@ pub fn setup(
         least_radius: narrow(bounds.diagonal() * LEAST_RADIUS).max(f32::MIN_POSITIVE),
         radius,
         color,
+        up,
         path,
         unframed: camera::unframed(manifest, survey),
         lens,
@@ -268,6 +266,8 @@ pub fn setup(
         },
         attributes,
         step,
+        overlays: Vec::new(),
+        overlay_values: Vec::new(),
         preview: PreviewOptions {
             exposure: output.preview_exposure,
             backdrop: None,
@@ -293,7 +293,8 @@ pub fn setup(
         verify: manifest.input.verify,
         weight: survey.weight,
     };
-    let setup = Setup { picture, run };
+    let mut setup = Setup { picture, run };
+    overlay::add_overlays(&mut setup, manifest, survey, &camera)?;
     check_image_size(&setup)?;
     Ok(setup)
 }
@@ -387,63 +388,6 @@ fn require_attribute(survey: &Survey, key: &'static str, name: &str) -> Result<(
 fn similar(name: &str, attributes: &[String]) -> String {
     let known: Vec<&str> = attributes.iter().map(String::as_str).collect();
     nearest(name, &known).map_or_else(String::new, |found| format!(" (did you mean `{found}`?)"))
-}
-
-/// The source of the colours of particles; "auto" depends on the attributes that exist.
-fn color_rule(manifest: &Manifest, survey: &Survey) -> Result<ColorRule, ResolveError> {
-    // Maps an attribute. The default range is that of the survey
-    let mapped = |name: &str, map: Option<MapName>, range: Option<[f64; 2]>, required: bool| {
-        let found = survey
-            .color
-            .as_ref()
-            .map_or([0.0, 1.0], |c| [c.low, c.high]);
-        let [low, high] = range.unwrap_or(found);
-        let map = map.unwrap_or(DEFAULT_MAP).name();
-        let map = ColorMap::new(map, narrow(low), narrow(high)).map_err(|e| {
-            ResolveError::Unsupported {
-                key: "material.color.map",
-                what: e.to_string(),
-            }
-        })?;
-        Ok(ColorRule::Attribute {
-            name: name.to_owned(),
-            map,
-            required,
-        })
-    };
-    match &manifest.material.color {
-        ColorSetting::Rgb(rgb) => Ok(ColorRule::Constant(*rgb)),
-        ColorSetting::Auto => match (&survey.color, &survey.rgb) {
-            (Some(color), _) => mapped(&color.attribute, None, None, false),
-            (None, Some(rgb)) => Ok(ColorRule::Rgb {
-                name: rgb.attribute.clone(),
-                required: false,
-            }),
-            (None, None) => Ok(ColorRule::Constant(material::DEFAULT_COLOR)),
-        },
-        ColorSetting::AutoWith { map, range } => match &survey.color {
-            Some(color) => mapped(&color.attribute, *map, *range, false),
-            None => {
-                require_attribute(survey, "material.color", "velocity")?;
-                Ok(ColorRule::Constant(material::DEFAULT_COLOR))
-            }
-        },
-        ColorSetting::Attribute {
-            attribute,
-            map,
-            range,
-        } => {
-            require_attribute(survey, "material.color.attribute", attribute)?;
-            // A map or a range means that vectors are mapped by their length.
-            if map.is_none() && range.is_none() && survey.rgb.is_some() {
-                return Ok(ColorRule::Rgb {
-                    name: attribute.clone(),
-                    required: true,
-                });
-            }
-            mapped(attribute, *map, *range, true)
-        }
-    }
 }
 
 fn background(manifest: &Manifest, up: Vec3) -> Background {

@@ -19,10 +19,10 @@ const ACTIONS: [&str; 7] = [
 ];
 
 /// Options for parts of `material.color`.
-const COLORS: [&str; 3] = ["color_by", "map", "range"];
+const COLORS: [&str; 4] = ["color_by", "map", "range", "color_scale"];
 
 /// Other options with a value that is not the default, and the key that it is laid over.
-const FLAGS: [(&str, &str); 35] = [
+const FLAGS: [(&str, &str); 36] = [
     ("--output x.####.exr", "output.path = \"x.####.exr\""),
     ("--frames 3-4", "input.frames = \"3-4\""),
     ("--width 7", "image.width = 7"),
@@ -37,6 +37,7 @@ const FLAGS: [(&str, &str); 35] = [
     ),
     ("--map turbo", "material.color.map = \"turbo\""),
     ("--range 0 2", "material.color.range = [0.0, 2.0]"),
+    ("--color-scale log", "material.color.scale = \"log\""),
     ("--channels RGBA,Z", "output.channels = [\"RGBA\", \"Z\"]"),
     ("--max-depth 7", "render.max_depth = 7"),
     ("--ground", "render.ground = true"),
@@ -99,13 +100,14 @@ fn every_option_is_a_key() {
 }
 
 /// Options whose `[default: ...]` is no value that could be given.
-const WORDS: [&str; 7] = [
+const WORDS: [&str; 8] = [
     "crop",
     "memory-limit",
     "memory-ceiling",
     "parts",
     "color_by",
     "range",
+    "color_scale",
     "stop-file",
 ];
 
@@ -145,7 +147,7 @@ fn no_option_is_forgotten() {
         assert!(
             ACTIONS.contains(&name)
                 || COLORS.contains(&name)
-                || name == "mesh"
+                || ["mesh", "colorbar", "time_stamp"].contains(&name)
                 || of_keys.contains(&name),
             "{name}"
         );

@@ -34,8 +34,8 @@ pub(super) struct ManifestArgs {
     pub(super) draft: bool,
     /// Attribute to colour by [default: velocity, else the particles' own colours]
     ///
-    /// Colours (Cd, color, rgb, bytes) are used unchanged unless --map or --range is given. Vectors are mapped by
-    /// their length.
+    /// Colours (Cd, color, rgb, bytes) are used unchanged unless --map, --range or --color-scale is given. Vectors are
+    /// mapped by their length; velocity.x is a component. height, depth, index and radius need no attribute.
     #[arg(
         long,
         value_name = "ATTRIBUTE",
@@ -45,13 +45,27 @@ pub(super) struct ManifestArgs {
     pub(super) color_by: Option<String>,
     /// Colour map of the attribute [default: viridis]
     ///
-    /// viridis, turbo, plasma, inferno, magma, cividis, red-blue or greys.
+    /// viridis, turbo, plasma, inferno, magma, cividis, batlow, vik, greys and others, which the manual lists. A name
+    /// with _r is the reversed map.
     #[arg(long, value_name = "NAME", help_heading = "Look", display_order = 0)]
     pub(super) map: Option<String>,
     /// Values at the ends of the colour map [default: the range of the sequence]
     #[arg(long, num_args = 2, value_names = ["LOW", "HIGH"], allow_negative_numbers = true, value_parser = number,
         help_heading = "Look", display_order = 0)]
     pub(super) range: Option<Vec<f64>>,
+    /// Scale of the colour map: linear, log, symlog or categorical [default: linear]
+    #[arg(long, value_name = "SCALE", help_heading = "Look", display_order = 0)]
+    pub(super) color_scale: Option<String>,
+    /// Draw the colours with their values in a free corner of the previews
+    ///
+    /// The same as [[overlay]] type = "colorbar" in a manifest, which has more settings: title, unit, corner, size.
+    #[arg(long, help_heading = "Look", display_order = 0)]
+    pub(super) colorbar: bool,
+    /// Draw the time, or the frame number of files without times, in a free corner of the previews
+    ///
+    /// The same as [[overlay]] type = "text" in a manifest, which has more settings, such as text = "t = {time:.2f} s".
+    #[arg(long, help_heading = "Look", display_order = 0)]
+    pub(super) time_stamp: bool,
     /// Triangle mesh next to the particles, such as a tank: STL, OBJ, PLY, VTK. May be repeated.
     ///
     /// A name with #### or %04d for the frame number is one mesh per frame. [[mesh]] in a manifest has more settings:
@@ -147,6 +161,10 @@ impl ManifestArgs {
         if let Some(range) = &self.range {
             list.push(over("material.color.range", range.clone(), "--range")?);
         }
+        if let Some(scale) = &self.color_scale {
+            let value = scale.clone();
+            list.push(over("material.color.scale", value, "--color-scale")?);
+        }
         if let Some(look) = &self.look {
             list.extend(
                 Look::named(look)
@@ -160,6 +178,17 @@ impl ManifestArgs {
             table.insert("path".to_owned(), path.into());
             let append = Override::append("mesh", table, "--mesh");
             list.push(append.map_err(|e| CliError::other(e.to_string()))?);
+        }
+        for (is_given, kind, shown) in [
+            (self.colorbar, "colorbar", "--colorbar"),
+            (self.time_stamp, "text", "--time-stamp"),
+        ] {
+            if is_given {
+                let mut table = toml::Table::new();
+                table.insert("type".to_owned(), kind.into());
+                let append = Override::append("overlay", table, shown);
+                list.push(append.map_err(|e| CliError::other(e.to_string()))?);
+            }
         }
         for assignment in &self.set {
             list.push(Override::parse(assignment).map_err(|e| CliError::other(e.to_string()))?);

@@ -63,6 +63,8 @@ impl ConvertSettings {
     pub const fn question(&self) -> Question<'static> {
         Question {
             color: ColorQuestion::None,
+            up: None,
+            points: false,
             radius: match self.radius {
                 Some(_) => RadiusQuestion::None,
                 None => RadiusQuestion::Auto,

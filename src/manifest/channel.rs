@@ -58,6 +58,8 @@ named! {
         CryptoMaterial = "crypto_material",
         /// Cryptomatte by part.
         CryptoPart = "crypto_part",
+        /// What is drawn over previews.
+        Overlay = "overlay",
     }
 }
 

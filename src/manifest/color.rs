@@ -1,108 +1,150 @@
-//! Colours: constant ones, and those from an attribute of the particles, possibly through a map.
+//! Colours: constant ones, and those from values of the particles, possibly through a map.
 
 use glam::Vec3;
 use serde_json::{Value as Json, json};
 
+use super::color_map::{MapName, RangeSetting};
 use super::field::Field;
 use super::key::Key;
-use super::nearest::nearest;
-use super::value::{Fault, Value, numbers_schema, quoted};
-use crate::scene::Background;
+use super::tree::Kind;
+use super::value::{Fault, Slot, Value, named, quoted};
+use crate::scene::{Background, ColorMap};
 
 /// Source of the colours of particles.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ColorSetting {
     /// By speed if the particles have velocities, otherwise their own colours, otherwise one colour.
     Auto,
-    /// By speed, with a map or range that is not the default.
-    AutoWith {
-        /// The map; by default [`DEFAULT_MAP`].
-        map: Option<MapName>,
-        /// Values at the two ends of the map; by default the range of the whole sequence.
-        range: Option<[f64; 2]>,
-    },
     /// Linear RGB, the same for all particles.
     Rgb(Vec3),
-    /// An attribute: colours are used as they are unless a map or a range is given. All other values are mapped,
-    /// vectors by their length.
-    Attribute {
-        /// Name of the attribute.
-        attribute: String,
-        /// The map; by default [`DEFAULT_MAP`].
-        map: Option<MapName>,
-        /// Values at the two ends of the map; by default the range of the whole sequence.
-        range: Option<[f64; 2]>,
-    },
+    /// By a value of each particle.
+    Mapped(ColorMapping),
 }
 
-/// Available colour maps, by the names of [`crate::scene::ColorMap`].
-pub const COLOR_MAPS: [&str; 8] = [
-    "viridis", "turbo", "plasma", "inferno", "magma", "cividis", "red-blue", "greys",
-];
-
-/// The default map.
-pub const DEFAULT_MAP: MapName = MapName(COLOR_MAPS[0]);
-
-/// One of [`COLOR_MAPS`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct MapName(&'static str);
-
-impl MapName {
-    /// The map with a name, if there is one.
-    pub fn named(name: &str) -> Option<Self> {
-        let known = COLOR_MAPS.into_iter().find(|known| *known == name);
-        known.map(Self)
-    }
-
-    /// The name in a manifest.
-    pub const fn name(self) -> &'static str {
-        self.0
+named! {
+    /// Scales of colour maps.
+    ScaleKind {
+        /// Equal differences have equal lengths.
+        Linear = "linear",
+        /// Equal ratios have equal lengths.
+        Log = "log",
+        /// Linear around zero, logarithmic beyond.
+        SymLog = "symlog",
+        /// A colour for each integer.
+        Categorical = "categorical",
     }
 }
 
-impl Value for MapName {
-    fn kind(_: &Key) -> String {
-        "a colour map".to_owned()
-    }
-
-    fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {
-        let text = field.as_text().ok_or(Fault::Unwanted)?;
-        Self::named(text).ok_or_else(|| {
-            let hint = nearest(text, &COLOR_MAPS).map(|n| format!("; did you mean {n}?"));
-            Fault::Because(format!(
-                "unknown colour map `{text}`; choose one of {}{}",
-                COLOR_MAPS.join(", "),
-                hint.unwrap_or_default()
-            ))
-        })
-    }
-
-    fn toml(&self) -> String {
-        quoted(self.0)
-    }
-
-    fn schema(_: &Key) -> Json {
-        json!({ "enum": COLOR_MAPS })
-    }
+/// Colours from a value of each particle. Attributes with colours are used as they are unless another key is given.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ColorMapping {
+    /// The value: an attribute, which is mapped by its length if it is a vector, a component such as `velocity.x`, or
+    /// `height`, `depth`, `index` or `radius`. By default the velocity.
+    pub attribute: Option<String>,
+    /// The map; the default depends on scale and range.
+    pub map: Option<MapName>,
+    /// Values at the two ends of the map; by default the range of the whole sequence.
+    pub range: Option<RangeSetting>,
+    /// The scale; by default linear.
+    pub scale: Option<ScaleKind>,
+    /// Where the linear part of [`ScaleKind::SymLog`] ends; by default a hundredth of the largest value of the range.
+    pub threshold: Option<f64>,
+    /// Whether the map is reversed.
+    pub reverse: Option<bool>,
+    /// Number of colours of a discrete map.
+    pub steps: Option<u32>,
+    /// Names of categories.
+    pub names: Option<CategoryNames>,
 }
 
-/// The ends of a colour map.
-impl Value for [f64; 2] {
-    fn kind(_: &Key) -> String {
-        "two rising numbers, such as [0.0, 4.0]".to_owned()
+/// Names of categories, with their values.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct CategoryNames(pub Vec<(i64, String)>);
+
+impl ColorMapping {
+    /// Colours by this attribute, with defaults for the rest.
+    pub fn by(attribute: &str) -> Self {
+        Self {
+            attribute: Some(attribute.to_owned()),
+            ..Self::default()
+        }
     }
 
-    fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {
-        let range = field.as_numbers().filter(|[low, high]: &Self| low < high);
-        range.ok_or(Fault::Unwanted)
+    /// The scale.
+    pub fn scale(&self) -> ScaleKind {
+        self.scale.unwrap_or(ScaleKind::Linear)
     }
 
-    fn toml(&self) -> String {
-        format!("[{:?}, {:?}]", self[0], self[1])
+    /// Whether nothing but the attribute is given.
+    pub fn is_plain(&self) -> bool {
+        let plain = Self {
+            attribute: self.attribute.clone(),
+            ..Self::default()
+        };
+        *self == plain
     }
 
-    fn schema(_: &Key) -> Json {
-        numbers_schema(2)
+    /// The map, reversed if [`Self::reverse`] is set.
+    pub fn map(&self) -> MapName {
+        let map = self.map.unwrap_or(match (self.scale(), self.range) {
+            (ScaleKind::Categorical, _) => MapName::PALETTE,
+            (_, Some(RangeSetting::Symmetric)) => MapName::DIVERGING,
+            _ => MapName::DEFAULT,
+        });
+        match self.reverse {
+            Some(true) => map.reversed(),
+            _ => map,
+        }
+    }
+
+    /// The contradiction between keys, if there is one: the key, and the problem.
+    fn contradiction(&self) -> Option<(&'static str, String)> {
+        let scale = self.scale();
+        let is_categorical = scale == ScaleKind::Categorical;
+        if let (ScaleKind::Log, Some(RangeSetting::Values([low, _]))) = (scale, self.range)
+            && low <= 0.0
+        {
+            let what =
+                format!("{low:?} has no logarithm; begin above 0, or set scale = \"symlog\"");
+            return Some(("range", what));
+        }
+        if scale == ScaleKind::Log && self.range == Some(RangeSetting::Symmetric) {
+            let what = "a symmetric range has values below 0, which have no logarithm; set scale = \"symlog\"";
+            return Some(("range", what.to_owned()));
+        }
+        let has_palette = self.map.is_some_and(MapName::is_palette);
+        for (key, is_wrong, what) in [
+            (
+                "names",
+                !is_categorical && self.names.is_some(),
+                "only categories have names; set scale = \"categorical\"",
+            ),
+            (
+                "range",
+                is_categorical && self.range.is_some(),
+                "categories have no range",
+            ),
+            (
+                "steps",
+                is_categorical && self.steps.is_some(),
+                "categories have no steps",
+            ),
+            (
+                "threshold",
+                scale != ScaleKind::SymLog && self.threshold.is_some(),
+                "only scale = \"symlog\" has it",
+            ),
+            (
+                "map",
+                !is_categorical && has_palette,
+                "a palette needs scale = \"categorical\"",
+            ),
+        ] {
+            if is_wrong {
+                return Some((key, what.to_owned()));
+            }
+        }
+        None
     }
 }
 
@@ -119,42 +161,44 @@ impl Value for ColorSetting {
         let Some(mut section) = field.as_table() else {
             return Vec3::parse(field, key).map(Self::Rgb);
         };
-        let lacks = |key| section.lacks(key);
-        let is_auto = lacks("attribute") && !(lacks("map") && lacks("range"));
-        let (mut attribute, mut map, mut range) = (String::new(), None, None);
-        let mut name = Key::new("attribute", &[]);
-        if !is_auto {
-            name = name.required("the name of an attribute, such as \"velocity\"");
+        let mut by = ColorMapping::default();
+        let mut attribute = Key::new("attribute", &[]);
+        if matches!(&field.node.kind, Kind::Table(table) if table.is_empty()) {
+            attribute = attribute.required("the name of an attribute, such as \"velocity\"");
         }
-        section.read(&name, &mut attribute);
-        section.read(&Key::new("map", &[]), &mut map);
-        section.read(&Key::new("range", &[]), &mut range);
+        section.read(&attribute, &mut by.attribute);
+        section.read(&Key::new("map", &[]), &mut by.map);
+        section.read(&Key::new("range", &[]), &mut by.range);
+        section.read(&Key::new("scale", &[]), &mut by.scale);
+        section.read(&threshold_key(), &mut by.threshold);
+        section.read(&Key::new("reverse", &[]), &mut by.reverse);
+        section.read(&steps_key(), &mut by.steps);
+        section.read(&Key::new("names", &[]), &mut by.names);
+        if let Some((key, what)) = by.contradiction() {
+            section.wrong(key, &what);
+        }
         section.finish();
-        Ok(match is_auto {
-            true => Self::AutoWith { map, range },
-            false => Self::Attribute {
-                attribute,
-                map,
-                range,
-            },
-        })
+        Ok(Self::Mapped(by))
     }
 
     fn toml(&self) -> String {
-        let (attribute, map, range) = match self {
+        let by = match self {
             Self::Auto => return quoted("auto"),
             Self::Rgb(rgb) => return rgb.toml(),
-            Self::AutoWith { map, range } => (None, map, range),
-            Self::Attribute {
-                attribute,
-                map,
-                range,
-            } => (Some(attribute), map, range),
+            Self::Mapped(by) => by,
         };
+        fn pair<S: Slot>(key: &str, slot: &S) -> Option<String> {
+            slot.get().map(|value| format!("{key} = {}", value.toml()))
+        }
         let pairs = [
-            attribute.map(|attribute| format!("attribute = {}", attribute.toml())),
-            map.map(|map| format!("map = {}", map.toml())),
-            range.map(|range| format!("range = {}", range.toml())),
+            pair("attribute", &by.attribute),
+            pair("map", &by.map),
+            pair("range", &by.range),
+            pair("scale", &by.scale),
+            pair("threshold", &by.threshold),
+            pair("reverse", &by.reverse),
+            pair("steps", &by.steps),
+            pair("names", &by.names),
         ];
         let pairs: Vec<String> = pairs.into_iter().flatten().collect();
         format!("{{ {} }}", pairs.join(", "))
@@ -169,12 +213,65 @@ impl Value for ColorSetting {
                 "properties": {
                     "attribute": String::schema(key),
                     "map": MapName::schema(key),
-                    "range": <[f64; 2]>::schema(key),
+                    "range": RangeSetting::schema(key),
+                    "scale": ScaleKind::schema(key),
+                    "threshold": f64::schema(&threshold_key()),
+                    "reverse": bool::schema(key),
+                    "steps": u32::schema(&steps_key()),
+                    "names": CategoryNames::schema(key),
                 },
                 "minProperties": 1,
                 "additionalProperties": false,
             },
         ] })
+    }
+}
+
+fn threshold_key() -> Key {
+    Key::new("threshold", &[]).above(0)
+}
+
+fn steps_key() -> Key {
+    Key::new("steps", &[]).from(2).to(ColorMap::MAX_STEPS)
+}
+
+impl Value for CategoryNames {
+    fn kind(_: &Key) -> String {
+        "names of integers, such as { 1 = \"water\", 2 = \"sand\" }".to_owned()
+    }
+
+    fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {
+        let Kind::Table(table) = &field.node.kind else {
+            return Err(Fault::Unwanted);
+        };
+        let name = |(value, (_, node)): (&String, &(_, super::tree::TomlNode))| {
+            let Kind::Text(name) = &node.kind else {
+                return None;
+            };
+            let integer: i64 = value.parse().ok()?;
+            // Only one way to write each integer, so that no two keys mean the same
+            (integer.to_string() == *value).then(|| (integer, name.clone()))
+        };
+        let names: Option<Vec<(i64, String)>> = table.iter().map(name).collect();
+        let mut names = names.ok_or(Fault::Unwanted)?;
+        names.sort_unstable();
+        Ok(Self(names))
+    }
+
+    fn toml(&self) -> String {
+        let pairs = self
+            .0
+            .iter()
+            .map(|(value, name)| format!("{value} = {}", quoted(name)));
+        format!("{{ {} }}", pairs.collect::<Vec<_>>().join(", "))
+    }
+
+    fn schema(_: &Key) -> Json {
+        json!({
+            "type": "object",
+            "patternProperties": { "^(0|-?[1-9][0-9]{0,17})$": { "type": "string" } },
+            "additionalProperties": false,
+        })
     }
 }
 

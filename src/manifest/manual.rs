@@ -22,8 +22,12 @@ fn manual() -> String {
     );
     let mut tables: Vec<&[Entry]> = tables(&entries).collect();
     // A list follows the table that contains it, as in the file.
-    let is_list =
-        |table: &&[Entry]| matches!(table[0].section.split('.').next(), Some("light" | "mesh"));
+    let is_list = |table: &&[Entry]| {
+        matches!(
+            table[0].section.split('.').next(),
+            Some("light" | "mesh" | "overlay")
+        )
+    };
     tables.sort_by_key(is_list);
     for table in tables {
         let _ = write!(page, "\n## {}\n\n{}.\n", title(table), table[0].about);
@@ -44,7 +48,9 @@ fn title(table: &[Entry]) -> String {
         return format!("`[{}]`", table[0].section);
     };
     match table.iter().find(|entry| entry.name() == "type") {
-        Some(kind) if list == "light" => format!("`[[{list}]]` with `type = {}`", kind.sample()),
+        Some(kind) if matches!(list, "light" | "overlay") => {
+            format!("`[[{list}]]` with `type = {}`", kind.sample())
+        }
         _ => format!("`[[{list}]]`"),
     }
 }

@@ -24,6 +24,7 @@ mod camera;
 mod caustics;
 mod channel;
 mod color;
+mod color_map;
 mod crop;
 mod environment;
 mod field;
@@ -43,6 +44,7 @@ mod material;
 mod mesh;
 mod nearest;
 mod output;
+mod overlay;
 mod part;
 mod pattern;
 #[cfg(test)]
@@ -66,7 +68,8 @@ mod work_tests;
 
 pub use camera::{Camera, CameraKey, CameraMode};
 pub use channel::{ATTRIBUTE_CHANNEL, Channel, NamedChannel};
-pub use color::{COLOR_MAPS, ColorSetting, DEFAULT_MAP, MapName};
+pub use color::{CategoryNames, ColorMapping, ColorSetting, ScaleKind};
+pub use color_map::{MapName, RangeSetting};
 pub use crop::PixelBounds;
 pub use environment::{Environment, EnvironmentKind};
 pub use file::{is_marked, marked, read_manifest};
@@ -80,6 +83,7 @@ pub use material::{Material, MaterialKind};
 pub use mesh::{Mesh, MeshMaterial, MeshPath, MeshShading};
 pub(crate) use nearest::nearest;
 pub use output::Output;
+pub use overlay::{Overlay, OverlayKind, OverlayText};
 pub use part::{Part, PartKind};
 pub use pattern::{FramePattern, OutputPattern};
 pub use preset::{Look, draft};
@@ -118,6 +122,8 @@ pub struct Manifest {
     pub lights: Vec<Light>,
     /// Meshes next to the particles.
     pub meshes: Vec<Mesh>,
+    /// What is drawn over previews.
+    pub overlays: Vec<Overlay>,
     /// The images.
     pub output: Output,
     /// Execution options; no image depends on them.
@@ -158,6 +164,7 @@ impl Manifest {
             environment: Environment::default(),
             lights: Vec::new(),
             meshes: Vec::new(),
+            overlays: Vec::new(),
             output: Output::default(),
             job: Work::default(),
         }
@@ -252,6 +259,14 @@ impl Manifest {
             Light::keys,
         );
         keys.list("mesh", "mesh", mesh::ABOUT, &mut self.meshes, Mesh::keys);
+        let overlays = &mut self.overlays;
+        keys.list(
+            "overlay",
+            "overlay",
+            overlay::ABOUT,
+            overlays,
+            Overlay::keys,
+        );
     }
 
     /// Checks dependencies between tables.
@@ -266,6 +281,11 @@ impl Manifest {
                 "mesh",
                 &format!("{meshes} meshes, but at most {max} are possible"),
             );
+        }
+        let overlays = self.overlays.len();
+        if overlays > MAX_OVERLAYS {
+            let what = format!("{overlays} overlays, but at most {MAX_OVERLAYS} are possible");
+            root.wrong("overlay", &what);
         }
         self.image.check(root);
         if self.branches_at_spheres()
@@ -384,6 +404,7 @@ impl Manifest {
             ("material.part", NO_PARTS, self.material.parts.is_empty()),
             ("light", AUTO_LIGHTS, self.lights.is_empty()),
             ("mesh", NO_MESHES, self.meshes.is_empty()),
+            ("overlay", NO_OVERLAYS, self.overlays.is_empty()),
         ] {
             if is_empty {
                 let _ = write!(text, "\n# {comment}\n{}", examples.commented_out(list));
@@ -407,6 +428,7 @@ impl Manifest {
         manifest.material.parts = vec![Part::default()];
         manifest.lights = Light::examples();
         manifest.meshes = vec![Mesh::default()];
+        manifest.overlays = Overlay::examples();
         manifest
     }
 }
@@ -430,6 +452,11 @@ const AUTO_LIGHTS: &str = "Without [[light]], a key light and a soft fill light 
                            directional light has a direction instead of position and falloff.";
 
 const NO_MESHES: &str = "Tanks, obstacles and other bodies that are not particles.";
+
+/// Maximum number of overlays.
+const MAX_OVERLAYS: usize = 64;
+
+const NO_OVERLAYS: &str = "Colour bars, text, scale bars and axes are drawn over previews.";
 
 /// All keys that are not in lists.
 fn known_keys() -> Vec<String> {

@@ -30,12 +30,13 @@ section! {
         /// Images to write; #### or %04d is the frame number, with at least that many digits
         path: OutputPattern = OutputPattern::parse(DEFAULT_PATH).expect("a good pattern"),
             flag("output", "PATTERN", "Output");
-        /// Channels: RGBA,Z,N,id,P,V,albedo,lights,light_groups,shadow,motion,cryptomatte,attribute:NAME
+        /// Channels: RGBA,Z,N,id,P,V,albedo,lights,light_groups,shadow,motion,cryptomatte,overlay,attribute:NAME
         ///
         /// RGBA is always included. `lights` stands for the light channels diffuse, specular, reflection, refraction,
         /// emission and background, whose sum is `noisy`, the colour before denoising. `light_groups` has a layer for
         /// each `group` of lights, with the same sum. `cryptomatte` stands for crypto_particle, crypto_material and
-        /// crypto_part. `attribute:density` is the attribute `density`.
+        /// crypto_part. `overlay` is what `[[overlay]]` draws over previews, linear with alpha. `attribute:density` is
+        /// the attribute `density`.
         channels: Vec<Channel> = DEFAULT_CHANNELS.map(Channel::Named).to_vec(),
             example("[\"RGBA\", \"Z\"]"), flag("channels", "LIST", "Output");
         /// Maximum number of objects in a pixel of each Cryptomatte layer, rounded up to an even number

@@ -155,8 +155,7 @@ fn values_in_every_kind_of_table() {
     );
     fails_with(
         "input.path = \"a\"\nmaterial.color = { attribute = \"v\", map = \"trubo\" }",
-        "line 2, column 43: material.color.map: unknown colour map `trubo`; choose one of viridis, turbo, \
-         plasma, inferno, magma, cividis, red-blue, greys; did you mean turbo?",
+        "line 2, column 43: material.color.map: unknown colour map `trubo`; did you mean turbo?",
     );
 }
 

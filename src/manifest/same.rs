@@ -4,7 +4,7 @@
 //! an effect on the images must not count as changes.
 
 use super::value::Value;
-use super::{ColorSetting, DEFAULT_MAP, GroundKind, GroundSetting, Manifest};
+use super::{ColorMapping, ColorSetting, GroundKind, GroundSetting, Manifest, MapName};
 use crate::render::IntegratorKind;
 use crate::surface::SprayStyle;
 
@@ -118,27 +118,20 @@ impl Manifest {
     /// Whether `text` is another form of the same colour by an attribute: with or without the default map. All older
     /// versions wrote it.
     fn has_color_written(&self, text: &str, has_rgb: bool) -> bool {
-        let ColorSetting::Attribute {
-            attribute,
-            map,
-            range,
-        } = &self.material.color
-        else {
+        let ColorSetting::Mapped(by) = &self.material.color else {
             return false;
         };
+        if by.attribute.is_none() {
+            return false;
+        }
         // Attributes with colours are only mapped if a map is given.
-        let is_mapped = range.is_some() || !has_rgb;
+        let is_mapped = by.range.is_some() || !has_rgb;
         let written = |map| {
-            let (attribute, range) = (attribute.clone(), *range);
-            let same = ColorSetting::Attribute {
-                attribute,
-                map,
-                range,
-            };
-            same.toml() == text
+            let same = ColorMapping { map, ..by.clone() };
+            ColorSetting::Mapped(same).toml() == text
         };
-        let is_usual = map.is_none_or(|map| map == DEFAULT_MAP);
-        is_mapped && is_usual && (written(None) || written(Some(DEFAULT_MAP)))
+        let is_usual = by.map.is_none_or(|map| map == MapName::DEFAULT);
+        is_mapped && is_usual && (written(None) || written(Some(MapName::DEFAULT)))
     }
 }
 

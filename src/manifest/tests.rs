@@ -221,6 +221,38 @@ fn wrong_types_name_the_expected_type() {
         "[material]\ncolor = { attribute = \"v\", range = [4, 0] }",
         &["two rising numbers"],
     );
+    for (color, part) in [
+        ("range = \"99%-1%\"", "two rising numbers"),
+        ("range = \"1%-101%\"", "percentiles such as"),
+        ("range = [4, 0]", "reverse = true reverses the map"),
+        (
+            "scale = \"log\", range = [0, 1]",
+            "material.color.range: 0.0 has no logarithm",
+        ),
+        (
+            "scale = \"log\", range = \"symmetric\"",
+            "material.color.range: a symmetric range",
+        ),
+        (
+            "scale = \"categorical\", steps = 3",
+            "material.color.steps: categories have no steps",
+        ),
+        (
+            "scale = \"categorical\", range = [0, 1]",
+            "material.color.range: categories have no range",
+        ),
+        (
+            "names = { 1 = \"a\" }",
+            "material.color.names: only categories",
+        ),
+        ("threshold = 1", "material.color.threshold: only"),
+        ("map = \"okabe-ito\"", "material.color.map: a palette needs"),
+        ("map = \"batlov\"", "did you mean batlow?"),
+        ("scale = \"linar\"", "did you mean linear?"),
+    ] {
+        let text = format!("[material]\ncolor = {{ attribute = \"v\", {color} }}");
+        refused(&text, &[part]);
+    }
     refused("[material]\nreflection = 1.5", &["from 0 to 1"]);
     refused("[camera]\nfov = 180", &["camera.fov"]);
     refused(
@@ -419,11 +451,10 @@ fn overrides_replace_file_values() {
     assert_eq!(manifest.output.path.as_str(), "a=b.####.exr");
     assert_eq!(
         manifest.material.color,
-        ColorSetting::Attribute {
-            attribute: "velocity".to_owned(),
+        ColorSetting::Mapped(ColorMapping {
             map: MapName::named("turbo"),
-            range: None
-        }
+            ..ColorMapping::by("velocity")
+        })
     );
     assert_eq!(manifest.lights[0].intensity, 2.0);
     assert_eq!(manifest.input.parts, Some(vec!["fluid".to_owned()]));
@@ -431,9 +462,12 @@ fn overrides_replace_file_values() {
 
 #[test]
 fn map_alone_keeps_the_attribute() {
-    let auto = |range| ColorSetting::AutoWith {
-        map: MapName::named("turbo"),
-        range,
+    let auto = |range: Option<[f64; 2]>| {
+        ColorSetting::Mapped(ColorMapping {
+            map: MapName::named("turbo"),
+            range: range.map(RangeSetting::Values),
+            ..ColorMapping::default()
+        })
     };
     let color = |sets: &[&str]| {
         let sets = sets.iter().map(|s| Override::parse(s).unwrap()).collect();

@@ -9,6 +9,7 @@ use super::{
 };
 use crate::math::Supported;
 use crate::math::functions::exp2;
+use crate::overlay::Sprite;
 use crate::render::Film;
 
 /// Settings of a preview.
@@ -22,11 +23,15 @@ pub struct PreviewOptions {
     pub first_pixel: [i32; 2],
 }
 
-/// Encodes `film` as an 8-bit sRGB PNG, dithered.
+/// Encodes `film` as an 8-bit sRGB PNG, dithered, with `overlays` over it.
 ///
 /// # Errors
 /// If the encoder refuses the image.
-pub fn encode_preview(film: &Film, options: &PreviewOptions) -> Result<Vec<u8>, OutputError> {
+pub fn encode_preview(
+    film: &Film,
+    options: &PreviewOptions,
+    overlays: &[Sprite],
+) -> Result<Vec<u8>, OutputError> {
     let gain = exp2(options.exposure);
     let width = film.width.max(1) as usize;
     let mut bytes = vec![0; film.color.len() * 3];
@@ -45,6 +50,10 @@ pub fn encode_preview(film: &Film, options: &PreviewOptions) -> Result<Vec<u8>, 
             *pixel = [dither_threshold(left.wrapping_add(x), top.wrapping_add(y)); 3];
         }
         bytes_from_linear(Supported::default(), &linear, &thresholds, bytes);
+        let row = i32::try_from(y).unwrap_or(i32::MAX);
+        overlays
+            .iter()
+            .for_each(|overlay| overlay.draw_over(row, bytes));
     }
     let mut file = Vec::new();
     PngEncoder::new(&mut file)
@@ -73,7 +82,7 @@ mod tests {
 
     /// Mean of each 8-bit component in the preview of a film of one `color`.
     fn mean(color: [f32; 4], options: &PreviewOptions) -> Vec3 {
-        let image = decode(&encode_preview(&film(color), options).unwrap());
+        let image = decode(&encode_preview(&film(color), options, &[]).unwrap());
         let count = f32::from(u8::try_from(image.pixels().len()).unwrap());
         let bytes = |pixel: &image::Rgb<u8>| Vec3::from_array(pixel.0.map(f32::from));
         image.pixels().map(bytes).sum::<Vec3>() / count
@@ -87,9 +96,9 @@ mod tests {
     #[test]
     fn shows_the_film_in_srgb() {
         let options = PreviewOptions::default();
-        let png = encode_preview(&film([0.18, 0.02, 50.0, 0.5]), &options).unwrap();
+        let png = encode_preview(&film([0.18, 0.02, 50.0, 0.5]), &options, &[]).unwrap();
         assert_eq!(decode(&png).dimensions(), (24, 8));
-        let again = encode_preview(&film([0.18, 0.02, 50.0, 0.5]), &options).unwrap();
+        let again = encode_preview(&film([0.18, 0.02, 50.0, 0.5]), &options, &[]).unwrap();
         assert_eq!(png, again);
         let shown = mean([0.18, 0.02, 0.5, 0.0], &options);
         assert_near(shown.x, 0.18);
@@ -113,7 +122,7 @@ mod tests {
             let across = (index % 600) as f32 / 600.0;
             *color = [0.2 + 0.006 * across, 0.2, 0.2, 1.0];
         }
-        let image = decode(&encode_preview(&film, &PreviewOptions::default()).unwrap());
+        let image = decode(&encode_preview(&film, &PreviewOptions::default(), &[]).unwrap());
         for left in (0..600).step_by(16).filter(|left| left + 16 <= 600) {
             let (mut shown, mut expected) = (0.0, 0.0);
             for (x, y) in (0..256).map(|i| (left + i % 16, i / 16)) {

@@ -230,7 +230,12 @@ fn truncated_files_are_detected_and_huge_sizes_allocate_nothing() {
 
 #[test]
 fn previews_are_decoded_to_their_last_byte() {
-    let png = encode_preview(&film(40, 37, Channels::COLOR), &PreviewOptions::default()).unwrap();
+    let png = encode_preview(
+        &film(40, 37, Channels::COLOR),
+        &PreviewOptions::default(),
+        &[],
+    )
+    .unwrap();
     let verify = |bytes: &[u8], expected: &ImageShape| {
         verify_preview(Cursor::new(bytes), expected).map_err(|e| e.to_string())
     };

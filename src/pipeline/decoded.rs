@@ -8,7 +8,7 @@ use spherule_formats::{Attribute, AttributeData, ParticleFrame, Radius, is_radiu
 use super::load_error::{LoadError, missing, no_parts};
 use super::setup::{ColorRule, RadiusRule, Setup};
 use crate::scene::{PartMaterials, RgbEncoding};
-use crate::survey::{id_of, part_of, velocity_of};
+use crate::survey::{ParticleValue, id_of, part_of, velocity_of};
 
 /// A frame in memory, before the tree is built.
 #[derive(Debug)]
@@ -40,29 +40,37 @@ pub struct DecodedShading {
 }
 
 impl DecodedFrame {
-    /// Extracts from `frame`, which was read from `file`, what `setup` needs. Also returns the number of radii that
-    /// were raised.
+    /// Extracts from `frame`, which was read from `file` and has this `number`, what `setup` needs. Also returns the
+    /// number of radii that were raised.
     pub(super) fn of(
         setup: &Setup,
         frame: ParticleFrame,
+        number: i64,
         file: &str,
     ) -> Result<(Self, u64), LoadError> {
         // Extract radii and colours
         let (radius, clamped) = radii(setup, &frame, file)?;
-        let colored_by = match &setup.picture.color {
-            ColorRule::Constant(_) => None,
-            ColorRule::Attribute { name, required, .. } | ColorRule::Rgb { name, required } => {
-                match *required {
+        let (mut values, mut colors) = (Vec::new(), Vec::new());
+        match &setup.picture.color {
+            ColorRule::Constant(_) => {}
+            ColorRule::Rgb { name, required } => {
+                let found = match *required {
                     true => attribute(&frame, name, "colour", file)?,
                     false => frame.attribute(name),
-                }
+                };
+                colors = found.map(colors_of).unwrap_or_default();
             }
-        };
-        let (values, colors) = match (&setup.picture.color, colored_by) {
-            (ColorRule::Attribute { .. }, Some(by)) => (magnitudes(by, 1.0), Vec::new()),
-            (ColorRule::Rgb { .. }, Some(by)) => (Vec::new(), colors(by)),
-            _ => (Vec::new(), Vec::new()),
-        };
+            ColorRule::Attribute { name, required, .. } => {
+                let found = ParticleValue::named(name, &frame.attributes);
+                if found.is_none() && *required && !frame.is_empty() {
+                    let has = frame.attributes.iter().map(|a| a.name.as_str());
+                    return Err(missing(name, "colour", file, has));
+                }
+                values = found.map_or_else(Vec::new, |value| {
+                    values_of(setup, &frame, number, &radius, &value)
+                });
+            }
+        }
         // Extract ids and velocities for the channels
         let channels = setup.picture.render.channels;
         let ids = if setup.picture.needs_ids() {
@@ -245,8 +253,58 @@ fn magnitudes(attribute: &Attribute, scale: f64) -> Vec<f32> {
         .collect()
 }
 
+/// The values that colour the particles of frame `number`.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    reason = "colours need no more than f32"
+)]
+fn values_of(
+    setup: &Setup,
+    frame: &ParticleFrame,
+    number: i64,
+    radius: &Radius,
+    value: &ParticleValue,
+) -> Vec<f32> {
+    let particles = 0..frame.len();
+    let particles = particles.into_par_iter();
+    match value {
+        ParticleValue::Magnitude(name) => {
+            let found = frame.attribute(name);
+            found.map_or_else(Vec::new, |attribute| magnitudes(attribute, 1.0))
+        }
+        ParticleValue::Component(name, c) => component(frame.attribute(name), *c),
+        ParticleValue::Height => {
+            let picture = &setup.picture;
+            let height = |i: usize| {
+                picture
+                    .up
+                    .dot(picture.origin + frame.positions[i].as_dvec3())
+            };
+            particles.map(|i| height(i) as f32).collect()
+        }
+        // The view is checked in advance
+        ParticleValue::Depth => setup.camera_at(number).map_or_else(
+            |_| Vec::new(),
+            |camera| {
+                particles
+                    .map(|i| camera.depth_of(frame.positions[i]))
+                    .collect()
+            },
+        ),
+        ParticleValue::Index => match &frame.file_index {
+            Some(indices) => indices.par_iter().map(|i| *i as f32).collect(),
+            None => particles.map(|i| i as f32).collect(),
+        },
+        ParticleValue::Radius => match radius {
+            Radius::Common(radius) => vec![*radius; frame.len()],
+            Radius::PerParticle(radii) => radii.clone(),
+        },
+    }
+}
+
 /// The colours in `attribute`; missing components are 0.
-fn colors(attribute: &Attribute) -> Vec<Vec3> {
+fn colors_of(attribute: &Attribute) -> Vec<Vec3> {
     let encoding = RgbEncoding::of(attribute.data.scalar_type());
     let components = attribute.components;
     let value = |i: usize, c: usize| match c < components {

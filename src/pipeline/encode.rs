@@ -8,6 +8,7 @@ use serde_json::json;
 use spherule_jobs::{Publisher, publish};
 
 use super::error::WriteError;
+use super::overlays;
 use super::renderer::TracedFrame;
 use super::setup::Setup;
 use crate::metrics::{MemoryPeaks, MemoryUse};
@@ -19,10 +20,12 @@ use crate::report::frame::RssSummary;
 /// Encodes and publishes the images of `frame`. Returns the complete report and the planes, which can be reused.
 pub(super) fn write_frame(
     setup: &Setup,
-    frame: TracedFrame,
+    mut frame: TracedFrame,
     peaks: &mut MemoryPeaks,
 ) -> Result<(FrameReport, Film), WriteError> {
     let start = Instant::now();
+    let sprites = setup.overlays_of(&frame);
+    overlays::store(&mut frame.film, &sprites);
     let task = &frame.task;
     let mut report = frame.report.clone();
     let at = |path: &Path| {
@@ -31,9 +34,10 @@ pub(super) fn write_frame(
     };
     // The preview first: users wait for the EXR, and the ledger entry covers both
     if let Some(path) = &task.preview {
-        let png = encode_preview(&frame.film, &setup.preview_from(&frame.camera))?;
+        let png = encode_preview(&frame.film, &setup.preview_from(&frame.camera), &sprites)?;
         publish(path, &png).map_err(at(path))?;
     }
+    drop(sprites);
     if report.bytes.file.total() > 0 {
         peaks.use_samples_only();
     }

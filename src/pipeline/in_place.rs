@@ -9,12 +9,13 @@ use spherule_formats::native::{AttributeView, FrameIndex, NativeFile, NativeFram
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{FrameError, ScalarType, is_radius};
 
+use super::facts::{FileFacts, range_of};
 use super::load_error::{LoadError, missing, no_parts};
 use super::setup::{ColorRule, RadiusRule, Setup};
 use crate::accel::Structure;
 use crate::render::{NO_ID, ShadeSource, mean};
 use crate::scene::{ColorMap, PartMaterials, RgbEncoding};
-use crate::survey::{Named, id_of, part_of, velocity_of};
+use crate::survey::{Named, ParticleValue, id_of, part_of, velocity_of};
 
 /// In frames up to this size (bytes), all data in use are verified with their checksums before tracing. In larger
 /// frames only the nodes are, which are read anyway; rays touch little of the rest.
@@ -37,7 +38,10 @@ pub struct StoredFrame {
 /// Names of the attributes that shading needs, as in the file.
 #[derive(Debug, Default)]
 struct Names {
-    values: Option<String>,
+    /// The attribute with colours.
+    rgb: Option<String>,
+    /// The value that is mapped to colours.
+    values: Option<ParticleValue>,
     ids: Option<String>,
     velocities: Option<String>,
     parts: Option<String>,
@@ -112,7 +116,7 @@ impl StoredFrame {
 
     /// Whether attributes are looked up by particle.
     pub fn needs_indices(&self, setup: &Setup) -> bool {
-        setup.needs_particles() || self.names.values.is_some()
+        setup.needs_particles() || self.names.values.is_some() || self.names.rgb.is_some()
     }
 
     /// The particles in place.
@@ -128,17 +132,19 @@ impl StoredFrame {
     pub fn shading<'a>(&'a self, color: &'a ColorRule, default: Vec3) -> StoredShading<'a> {
         let frame = self.frame();
         let view = |name: &Option<String>| frame.attribute(name.as_deref()?);
-        let color = match (color, view(&self.names.values)) {
-            (ColorRule::Constant(color), _) => StoredColor::Constant(*color),
-            (ColorRule::Attribute { .. } | ColorRule::Rgb { .. }, None) => {
-                StoredColor::Constant(default)
-            }
-            (ColorRule::Rgb { .. }, Some(values)) => StoredColor::Rgb {
+        let color = match color {
+            ColorRule::Constant(color) => Some(StoredColor::Constant(*color)),
+            ColorRule::Rgb { .. } => view(&self.names.rgb).map(|values| StoredColor::Rgb {
                 encoding: encoding(&values),
                 values,
-            },
-            (ColorRule::Attribute { map, .. }, Some(values)) => StoredColor::Mapped { values, map },
+            }),
+            ColorRule::Attribute { map, .. } => {
+                let values = self.names.values.as_ref();
+                let values = values.and_then(|value| StoredValues::of(&frame, value));
+                values.map(|values| StoredColor::Mapped { values, map })
+            }
         };
+        let color = color.unwrap_or(StoredColor::Constant(default));
         StoredShading {
             color,
             ids: view(&self.names.ids),
@@ -164,6 +170,30 @@ impl StoredFrame {
         }
         let parts = (0..count).map_while(|index| parts.low_bits(index));
         known.absent(parts.map(u32::cast_signed))
+    }
+
+    /// What overlays show of the frame; `file` is the name of its file.
+    pub(super) fn facts(&self, setup: &Setup, file: String) -> FileFacts {
+        let names = setup.picture.overlay_values.iter();
+        let ranges = names.map(|name| self.range(name)).collect();
+        FileFacts { file, ranges }
+    }
+
+    /// Smallest and largest value of this name.
+    fn range(&self, name: &str) -> Option<[f64; 2]> {
+        let frame = self.frame();
+        let count = usize::try_from(self.particles()).ok()?;
+        match ParticleValue::named(name, &frame.attributes())? {
+            ParticleValue::Magnitude(name) => {
+                let values = frame.attribute(&name)?;
+                range_of(count, |i| values.magnitude(i))
+            }
+            ParticleValue::Component(name, c) => {
+                let values = frame.attribute(&name)?;
+                range_of(count, |i| values.get(i, c))
+            }
+            _ => None,
+        }
     }
 
     /// Whether the file is mapped and not read.
@@ -208,10 +238,11 @@ impl StoredFrame {
 
 impl Names {
     fn all(&self) -> Vec<&str> {
-        let all = [&self.values, &self.ids, &self.velocities, &self.parts];
+        let all = [&self.rgb, &self.ids, &self.velocities, &self.parts];
         let channels = self.channels.iter().map(|(name, _)| name);
         let all = all.into_iter().chain(channels);
-        let mut names: Vec<&str> = all.filter_map(Option::as_deref).collect();
+        let values = self.values.as_ref().and_then(ParticleValue::attribute);
+        let mut names: Vec<&str> = all.filter_map(Option::as_deref).chain(values).collect();
         names.sort_unstable();
         names.dedup();
         names
@@ -229,12 +260,17 @@ impl Names {
             }
             Ok(found)
         };
-        let values = match &setup.picture.color {
-            ColorRule::Constant(_) => None,
-            ColorRule::Attribute { name, required, .. } | ColorRule::Rgb { name, required } => {
-                find(name, "colour", *required)?
+        let (mut rgb, mut values) = (None, None);
+        match &setup.picture.color {
+            ColorRule::Constant(_) => {}
+            ColorRule::Rgb { name, required } => rgb = find(name, "colour", *required)?,
+            ColorRule::Attribute { name, required, .. } => {
+                values = ParticleValue::named(name, &attributes);
+                if values.is_none() {
+                    find(name, "colour", *required)?;
+                }
             }
-        };
+        }
         let with_channels = setup.picture.attributes.iter().map(|channel| {
             let found = find(&channel.name, "a channel", true)?;
             Ok((found, channel.components))
@@ -243,6 +279,7 @@ impl Names {
         let channels = setup.picture.render.channels;
         let name = |found: Option<&AttributeView>| found.map(|a| a.name().to_owned());
         Ok(Self {
+            rgb,
             values,
             // Only integers are ids, as in decoded frames.
             ids: name(
@@ -348,9 +385,45 @@ enum StoredColor<'a> {
         encoding: RgbEncoding,
     },
     Mapped {
-        values: AttributeView<'a>,
+        values: StoredValues<'a>,
         map: &'a ColorMap,
     },
+}
+
+/// Values of particles in place.
+#[derive(Debug, Clone, Copy)]
+enum StoredValues<'a> {
+    Magnitude(AttributeView<'a>),
+    Component(AttributeView<'a>, usize),
+    Index,
+}
+
+impl<'a> StoredValues<'a> {
+    /// None for values that need a copy of the particles.
+    fn of(frame: &NativeFrame<'a>, value: &ParticleValue) -> Option<Self> {
+        match value {
+            ParticleValue::Magnitude(name) => frame.attribute(name).map(Self::Magnitude),
+            ParticleValue::Component(name, component) => {
+                let view = frame.attribute(name)?;
+                Some(Self::Component(view, *component))
+            }
+            ParticleValue::Index => Some(Self::Index),
+            ParticleValue::Height | ParticleValue::Depth | ParticleValue::Radius => None,
+        }
+    }
+
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_precision_loss,
+        reason = "colours need no more than f32"
+    )]
+    fn get(&self, index: u32) -> f32 {
+        match self {
+            Self::Magnitude(values) => values.magnitude(index as usize) as f32,
+            Self::Component(values, component) => values.get(index as usize, *component) as f32,
+            Self::Index => index as f32,
+        }
+    }
 }
 
 /// The encoding of colours, as for decoded particles: codes of fewer bits are decoded to floats.
@@ -366,17 +439,11 @@ fn stored_rgb(values: &AttributeView, encoding: RgbEncoding, index: u32) -> Vec3
 }
 
 impl ShadeSource for StoredShading<'_> {
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "colours need no more than f32"
-    )]
     fn color(&self, index: u32) -> Vec3 {
         match &self.color {
             StoredColor::Constant(color) => *color,
             StoredColor::Rgb { values, encoding } => stored_rgb(values, *encoding, index),
-            StoredColor::Mapped { values, map } => {
-                map.color(values.magnitude(index as usize) as f32)
-            }
+            StoredColor::Mapped { values, map } => map.color(values.get(index)),
         }
     }
 
@@ -387,19 +454,16 @@ impl ShadeSource for StoredShading<'_> {
         }
     }
 
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "colours need no more than f32"
-    )]
     fn blended_color(&self, parts: &[(u32, f32)]) -> Vec3 {
         match &self.color {
             StoredColor::Constant(color) => *color,
             StoredColor::Rgb { values, encoding } => {
                 mean(parts, |i| stored_rgb(values, *encoding, i))
             }
-            StoredColor::Mapped { values, map } => {
-                map.color(mean(parts, |i| values.magnitude(i as usize) as f32))
+            StoredColor::Mapped { values, map } if map.categories().is_some() => {
+                mean(parts, |i| map.color(values.get(i)))
             }
+            StoredColor::Mapped { values, map } => map.color(mean(parts, |i| values.get(i))),
         }
     }
 

@@ -1,5 +1,7 @@
 //! First stage: reads the files of a frame into the form that tree and shading need.
 
+use std::collections::BTreeSet;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use glam::Vec3;
@@ -8,6 +10,7 @@ use spherule_formats::{FrameError, ParticleFrame};
 
 use super::ImageTask;
 use super::decoded::{DecodedFrame, particle_with_id};
+use super::facts::FileFacts;
 use super::in_place::{Opened, StoredFrame};
 use super::load_error::{LoadError, first_file};
 use super::meshes::{MeshSlices, meshes_of};
@@ -15,6 +18,7 @@ use super::motion::velocities_to_next;
 use super::predict::{FrameSize, MemoryModel};
 use super::setup::Setup;
 use crate::metrics::memory::{available, process_room};
+use crate::overlay::Overlay;
 
 /// A frame before its tree is built.
 #[derive(Debug)]
@@ -27,6 +31,8 @@ pub struct LoadedFrame {
     pub particles: LoadedParticles,
     /// The meshes of the image, one for each of the setup.
     pub meshes: Vec<MeshSlices>,
+    /// What overlays show of the file.
+    pub facts: FileFacts,
     /// Simulation time, if known.
     pub time: Option<f64>,
     /// Position of the particle in focus, relative to the origin, if the camera follows one.
@@ -73,6 +79,7 @@ pub fn load_frame(
     let opened = StoredFrame::open(setup, sequence, task.index);
     let mut loaded = match opened.map_err(|e| newest(e, sequence, task))? {
         Opened::InPlace(frame, clamped_radii) => LoadedFrame {
+            facts: frame.facts(setup, file_name(sequence, task.index)),
             time: sequence.listed_time(task.index).or(frame.time()),
             task: task.clone(),
             notes,
@@ -97,6 +104,7 @@ pub fn load_frame(
         "radii raised: too small to be seen, or no number",
     );
     loaded.note_absent_parts(setup);
+    loaded.notes.extend(missing_glyphs(setup));
     loaded.meshes = meshes_of(
         &setup.picture.meshes,
         setup.picture.shutter,
@@ -128,7 +136,8 @@ fn decode(
         }
         _ => None,
     };
-    let (mut decoded, clamped_radii) = DecodedFrame::of(setup, frame, &file)?;
+    let facts = FileFacts::of_decoded(setup, &frame, file_name(sequence, task.index));
+    let (mut decoded, clamped_radii) = DecodedFrame::of(setup, frame, task.frame, &file)?;
     if moving.is_some() {
         decoded.shading.velocities = moving;
     }
@@ -137,12 +146,34 @@ fn decode(
         notes,
         particles: LoadedParticles::Decoded(decoded),
         meshes: Vec::new(),
+        facts,
         time,
         focus,
         dropped,
         clamped_radii,
         read_time: Duration::ZERO,
     })
+}
+
+/// A note on the characters that the font of overlays does not have.
+fn missing_glyphs(setup: &Setup) -> Option<String> {
+    let overlays = setup.picture.overlays.iter();
+    let missing: BTreeSet<char> = overlays.flat_map(Overlay::missing_glyphs).collect();
+    let shown: Vec<String> = missing.iter().map(|c| format!("`{c}`")).collect();
+    (!shown.is_empty()).then(|| {
+        let all = shown.join(", ");
+        format!(
+            "overlay: the font, which has Latin, Greek and mathematical signs, has no glyph for {all}; boxes are \
+             drawn"
+        )
+    })
+}
+
+/// Name of the first file of a frame, without its directory.
+fn file_name(sequence: &Sequence, index: usize) -> String {
+    let path = first_file(sequence, index);
+    let name = Path::new(&path).file_name();
+    name.map_or(path.clone(), |name| name.to_string_lossy().into_owned())
 }
 
 /// The position of the particle in focus, relative to the origin; None if the camera does not follow one.

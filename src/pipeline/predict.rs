@@ -22,6 +22,7 @@ use crate::accel::{BuildBytes, BuildSettings, Structure, predicted_bytes, predic
 use crate::denoise;
 use crate::metrics::Bytes;
 use crate::output::PackBuffers;
+use crate::overlay;
 use crate::render::{Film, floor_light_bytes, scratch_bytes};
 use crate::scene::ground::Pattern;
 use crate::scene::{Environment, Ground};
@@ -553,7 +554,8 @@ impl<'a> MemoryModel<'a> {
         let threads = rayon::current_num_threads() as u64;
         // Each thread compresses one band, and some compressed bands wait, at worst at their original size.
         let bands = (threads + 1) * PackBuffers::predicted_bytes(band) + (threads + 2) * band;
-        (9 * pixels).max(bands)
+        let overlays = overlay::bytes(&self.setup.picture.overlays, render.width, render.height);
+        (9 * pixels + overlays).max(bands)
     }
 }
 

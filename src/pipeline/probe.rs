@@ -254,7 +254,7 @@ impl Trial {
         if task.preview.is_some() {
             let camera = full.camera_at(task.frame).map_err(TraceError::Camera)?;
             let options = full.preview_from(&camera);
-            let png = encode_preview(&self.film, &options)?;
+            let png = encode_preview(&self.film, &options, &[])?;
             bytes += png.len();
         }
         let encode = start.elapsed().as_secs_f64();

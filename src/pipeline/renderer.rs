@@ -7,6 +7,7 @@ use spherule_formats::FrameError;
 
 use super::ImageTask;
 use super::decoded::DecodedShading;
+use super::facts::FileFacts;
 use super::in_place::StoredFrame;
 use super::load::LoadedFrame;
 use super::meshes::MeshSlices;
@@ -59,6 +60,8 @@ pub struct TracedFrame {
     pub film: Film,
     /// Attributes of the file that describe its layers.
     pub texts: Vec<TextAttribute>,
+    /// What overlays show of the file.
+    pub facts: FileFacts,
     /// Simulation time, if known.
     pub time: Option<f64>,
     /// The report, without encoding.
@@ -73,6 +76,7 @@ pub struct BuiltFrame {
     pub(super) task: ImageTask,
     pub(super) particles: BuiltParticles,
     pub(super) meshes: Vec<MeshSlices>,
+    pub(super) facts: FileFacts,
     pub(super) time: Option<f64>,
     /// Position of the particle in focus.
     pub(super) focus: Option<Vec3>,

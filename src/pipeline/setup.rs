@@ -9,6 +9,7 @@ use super::shutter::{FrameStep, Shutter};
 use crate::accel::{BuildSettings, BvhSettings, SbvhSettings, Structure, choose};
 use crate::denoise::DenoiseSettings;
 use crate::output::{ExrOptions, PreviewOptions};
+use crate::overlay::Overlay;
 use crate::render::{RenderSettings, RendererKind};
 use crate::scene::{
     Camera, CameraError, CameraPath, ColorMap, Exposure, LensSettings, NextFrame, Scene,
@@ -44,15 +45,17 @@ pub enum ColorRule {
         /// As for [`Self::Attribute`].
         required: bool,
     },
-    /// An attribute through a map; vectors by magnitude.
+    /// A value of each particle through a map: see [`crate::survey::ParticleValue::named`].
     Attribute {
-        /// Its name.
+        /// Name of the value.
         name: String,
         /// The map with the range of the whole sequence.
         map: ColorMap,
         /// Whether the user named it, so that a frame without it is an error. Otherwise such
         /// a frame has the default colour.
         required: bool,
+        /// Whether the value is computed from positions or radii.
+        needs_geometry: bool,
     },
 }
 
@@ -101,6 +104,8 @@ pub struct Picture {
     pub radius: RadiusRule,
     /// Source of the colours.
     pub color: ColorRule,
+    /// The up direction, unit vector.
+    pub up: DVec3,
     /// The camera path, in world units.
     pub path: CameraPath,
     /// Number of particles of a frame, about, that are far from the others and that an automatic camera may leave out.
@@ -130,6 +135,10 @@ pub struct Picture {
     pub step: Option<FrameStep>,
     /// Options of the EXR; the camera is added for each frame.
     pub exr: ExrOptions,
+    /// What is drawn over previews.
+    pub overlays: Vec<Overlay>,
+    /// Names of the values whose ranges overlays show.
+    pub overlay_values: Vec<String>,
     /// Options of the PNG; [`Setup::preview_from`] adds the background.
     pub preview: PreviewOptions,
 }
@@ -284,6 +293,18 @@ impl Setup {
         }
         if self.focused_particle().is_some() {
             return Some("camera.focus searches for a particle in a copy of them".to_owned());
+        }
+        if matches!(
+            &self.picture.color,
+            ColorRule::Attribute {
+                needs_geometry: true,
+                ..
+            }
+        ) {
+            return Some(
+                "their colours are computed from a copy of them, 16 bytes per particle and more"
+                    .to_owned(),
+            );
         }
         let why = match self.picture.surface {
             SurfaceSettings {

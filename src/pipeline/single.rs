@@ -87,7 +87,8 @@ fn write_exr(setup: &Setup, frame: TracedFrame) -> Result<FrameReport, ImageErro
 fn write_png(setup: &Setup, frame: &TracedFrame) -> Result<FrameReport, ImageError> {
     let start = Instant::now();
     let options = setup.preview_from(&frame.camera);
-    let png = encode_preview(&frame.film, &options).map_err(WriteError::Encode)?;
+    let png = encode_preview(&frame.film, &options, &setup.overlays_of(frame))
+        .map_err(WriteError::Encode)?;
     let path = frame.task.image.clone();
     publish(&path, &png).map_err(|source| WriteError::Io { path, source })?;
     let mut report = frame.report.clone();

@@ -71,6 +71,7 @@ impl FrameRenderer for CpuRenderer {
             task: frame.task,
             particles,
             meshes: frame.meshes,
+            facts: frame.facts,
             time: frame.time,
             focus: frame.focus,
             report,
@@ -101,6 +102,7 @@ impl FrameRenderer for CpuRenderer {
         let texts = matte_attributes(setup, &frame);
         let BuiltFrame {
             task,
+            facts,
             time,
             mut report,
             ..
@@ -113,6 +115,7 @@ impl FrameRenderer for CpuRenderer {
             task,
             film,
             texts,
+            facts,
             time,
             report,
             memory,

@@ -187,6 +187,8 @@ pub struct Layers {
     pub attributes: u8,
     /// Cryptomatte.
     pub mattes: Mattes,
+    /// `overlay`: what is drawn over previews, linear RGB with alpha. Rendering leaves it as it is.
+    pub overlay: bool,
 }
 
 impl Layers {
@@ -199,6 +201,7 @@ impl Layers {
         motion: false,
         attributes: 0,
         mattes: Mattes::NONE,
+        overlay: false,
     };
 
     /// Adds the layers with this name in a manifest; None if there are none of that name.
@@ -210,6 +213,7 @@ impl Layers {
             "noisy" => self.noisy = true,
             "shadow" => self.shadow = true,
             "motion" => self.motion = true,
+            "overlay" => self.overlay = true,
             "cryptomatte" => self.mattes.kinds.fill(true),
             _ => {
                 let light = LightClass::ALL.into_iter().find(|c| c.name() == name);
@@ -234,7 +238,7 @@ impl Layers {
 
     /// Number of floats of a pixel.
     pub fn floats(&self) -> usize {
-        self.mattes_at().end
+        self.overlay_at().end
     }
 
     /// Whether there are none.
@@ -283,6 +287,12 @@ impl Layers {
         start..start + self.mattes.iter().count() * self.mattes.floats()
     }
 
+    /// Place of the overlay: R, G, B and A.
+    pub fn overlay_at(&self) -> Range<usize> {
+        let start = self.mattes_at().end;
+        start..start + if self.overlay { 4 } else { 0 }
+    }
+
     /// Place of the layer of `kind`: object and coverage of each level.
     pub fn matte_at(&self, kind: MatteKind) -> Option<Range<usize>> {
         let index = self.mattes.iter().position(|k| k == kind)?;
@@ -302,6 +312,7 @@ mod tests {
             shadow: true,
             motion: true,
             attributes: 4,
+            overlay: true,
             light_groups: 2,
             ..Layers::NONE
         };
@@ -320,9 +331,10 @@ mod tests {
             layers.attributes_at(),
             layers.matte_at(MatteKind::Particle).unwrap(),
             layers.matte_at(MatteKind::Part).unwrap(),
+            layers.overlay_at(),
         ];
         let mut end = 0;
-        for (range, len) in ranges.into_iter().zip([3, 3, 3, 3, 3, 1, 2, 4, 12, 12]) {
+        for (range, len) in ranges.into_iter().zip([3, 3, 3, 3, 3, 1, 2, 4, 12, 12, 4]) {
             assert_eq!((range.start, range.len()), (end, len));
             end = range.end;
         }

@@ -117,6 +117,9 @@ impl ShadeSource for ParticleShading<'_> {
 
     fn blended_color(&self, parts: &[(u32, f32)]) -> Vec3 {
         match self.colors {
+            Colors::Mapped { map, .. } if map.categories().is_some() => {
+                mean(parts, |i| self.color(i))
+            }
             Colors::Mapped { values, map } => {
                 let value = |i: u32| values.get(i as usize).copied().unwrap_or(f32::NAN);
                 map.color(mean(parts, value))

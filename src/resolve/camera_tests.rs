@@ -17,6 +17,7 @@ pub(in crate::resolve) fn survey() -> Survey {
         reach: 0.0,
         color: None,
         rgb: None,
+        points: Vec::new(),
         up: DVec3::Z,
         components: Vec::new(),
         frame_time: None,

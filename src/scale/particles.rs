@@ -170,6 +170,8 @@ impl FrameSurvey {
     ) -> Result<Self, CellError> {
         let question = Question {
             color: ColorQuestion::None,
+            up: None,
+            points: false,
             radius: RadiusQuestion::Auto,
         };
         let survey = Survey::of_frames(sequence, [index], question)?;

@@ -2,7 +2,7 @@
 
 use std::f32::consts::FRAC_1_PI;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use crate::math::functions::asin;
 
@@ -22,6 +22,28 @@ pub const STUDIO_TOP: Vec3 = Vec3::new(0.80, 0.82, 0.85);
 /// The brightest point of the backdrop of a studio, on the film; (0, 0) is the top left corner, (1, 1) the bottom right
 /// one.
 pub const STUDIO_CENTER: [f32; 2] = [0.5, 0.45];
+
+/// Fraction by which the corners of a studio are darkened at most.
+const VIGNETTE: f32 = 0.25;
+
+/// Growth of the darkening with the squared distance from the centre.
+const FALLOFF: f32 = 1.6;
+
+/// Factor on horizontal distances from the centre.
+const STRETCH: f32 = 1.15;
+
+/// The backdrop of a studio at a position of the film, linear RGB: a vertical gradient that is darker towards the
+/// corners.
+#[inline(always)]
+pub fn studio_on_film([x, y]: [f32; 2]) -> [f32; 3] {
+    let (bottom, top) = (STUDIO_BOTTOM.to_array(), STUDIO_TOP.to_array());
+    let across = STRETCH * (x - STUDIO_CENTER[0]);
+    let down = y - STUDIO_CENTER[1];
+    let darkening = FALLOFF * (across * across + down * down);
+    let darkening = if darkening < 1.0 { darkening } else { 1.0 };
+    let brightness = 1.0 - VIGNETTE * darkening;
+    [0, 1, 2].map(|axis| brightness * (top[axis] * (1.0 - y) + bottom[axis] * y))
+}
 
 /// Colour by direction, linear RGB.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,6 +84,15 @@ impl Background {
             Self::Constant(_) => self,
             Self::Gradient { bottom, top, .. } => Self::Gradient { bottom, top, up },
             Self::Studio { .. } => Self::Studio { up },
+        }
+    }
+
+    /// The colour of a camera ray in unit `direction` through a position of the film; (0, 0) is the top left corner,
+    /// (1, 1) the bottom right one.
+    pub fn color_on_film(&self, direction: Vec3, film: Vec2) -> Vec3 {
+        match self {
+            Self::Studio { .. } => Vec3::from_array(studio_on_film(film.to_array())),
+            _ => self.color(direction),
         }
     }
 

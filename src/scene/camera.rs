@@ -168,6 +168,20 @@ impl Camera {
         self.eye
     }
 
+    /// Distance of `point` from the eye along the view axis.
+    pub fn depth_of(&self, point: Vec3) -> f32 {
+        (point - self.eye).dot(self.forward)
+    }
+
+    /// The position on the film of `point`, in units of the image as in [`Self::ray`], as a pinhole sees it; None
+    /// behind the camera.
+    pub fn film_of(&self, point: Vec3) -> Option<Vec2> {
+        let depth = self.depth_of(point);
+        let to_point = point - self.eye;
+        let across = Vec2::new(to_point.dot(self.right), -to_point.dot(self.up));
+        (depth > 0.0).then(|| 0.5 + 0.5 * across / (depth * self.half_extent))
+    }
+
     /// The matrix of OpenEXR's `worldToCamera` (row vectors, row by row; left-handed, y up, z forward, so that the
     /// third coordinate of a point is its `Z`).
     pub fn world_to_camera(&self) -> [f32; 16] {

@@ -1,156 +1,57 @@
-//! Colour maps: those of `colorous`, as tables in linear RGB.
+//! Colour maps: from values of particles to linear RGB.
 //!
-//! The turbo map of `colorous` is a polynomial that differs from the published map by up to 22 of 255 at the ends, so
-//! turbo is interpolated here from knots of the published map.
+//! The maps of matplotlib and d3 are those of `colorous`, except turbo; those of Fabio Crameri are data.
 
 use glam::Vec3;
 use thiserror::Error;
 
+mod crameri;
+mod palette;
+mod scale;
+mod tables;
+mod turbo;
+
+use palette::{PALETTES, palette};
+pub use scale::ColorScale;
+use tables::Table;
+
 /// Entries of a table, as in the published 8-bit maps.
 const ENTRIES: usize = 256;
 
-/// Colour of a value that is NaN (linear RGB): a grey that is in no map except `greys`.
+/// Colour of a value that is NaN, or of an unknown category (linear RGB): a grey that is in no map except `greys`.
 pub const NO_VALUE: Vec3 = Vec3::new(0.18, 0.18, 0.18);
 
-/// Number of table entries between two knots of [`TURBO`].
-const TURBO_STEP: usize = 5;
-
-/// Every fifth of the 256 colours of turbo (sRGB): Mikhailov, "Turbo, an improved rainbow colormap for
-/// visualization", 2019. The cubics through them differ by at most 1 from all published entries.
-const TURBO: [[u8; 3]; (ENTRIES - 1) / TURBO_STEP + 1] = [
-    [48, 18, 59],
-    [54, 33, 95],
-    [59, 47, 128],
-    [63, 62, 156],
-    [66, 75, 181],
-    [69, 89, 203],
-    [70, 102, 221],
-    [71, 115, 235],
-    [70, 128, 246],
-    [69, 140, 253],
-    [64, 153, 255],
-    [56, 165, 251],
-    [47, 178, 244],
-    [39, 190, 233],
-    [31, 201, 221],
-    [26, 212, 208],
-    [24, 221, 194],
-    [26, 228, 182],
-    [34, 235, 170],
-    [47, 241, 155],
-    [63, 246, 138],
-    [82, 250, 122],
-    [101, 253, 105],
-    [121, 254, 89],
-    [139, 255, 75],
-    [156, 254, 64],
-    [169, 251, 57],
-    [183, 247, 53],
-    [195, 241, 52],
-    [208, 234, 52],
-    [219, 226, 54],
-    [229, 217, 56],
-    [238, 207, 58],
-    [245, 197, 58],
-    [250, 186, 57],
-    [253, 174, 53],
-    [254, 161, 48],
-    [254, 147, 42],
-    [252, 132, 35],
-    [249, 117, 29],
-    [244, 102, 23],
-    [239, 88, 17],
-    [232, 75, 12],
-    [225, 65, 9],
-    [216, 55, 6],
-    [206, 45, 4],
-    [195, 37, 3],
-    [183, 29, 2],
-    [169, 22, 1],
-    [155, 15, 1],
-    [139, 9, 2],
-    [122, 4, 3],
-];
-
-/// Source of the colours of a map.
-#[derive(Debug, Clone, Copy)]
-enum Source {
-    Colorous(colorous::Gradient),
-    Turbo,
-}
-
-impl Source {
-    /// Entry `i` of the table in linear RGB.
-    fn entry(self, i: usize) -> Vec3 {
-        let srgb = match self {
-            Self::Colorous(gradient) => {
-                let color = gradient.eval_rational(i, ENTRIES);
-                Vec3::new(color.r.into(), color.g.into(), color.b.into())
-            }
-            Self::Turbo => turbo(i),
-        };
-        (srgb / 255.0).map(linear_from_srgb)
-    }
-}
-
-/// Entry `i` of turbo in sRGB from 0 to 255: a Catmull-Rom spline through the knots.
-fn turbo(i: usize) -> Vec3 {
-    let knot = |k: usize| Vec3::from(TURBO[k.min(TURBO.len() - 1)].map(f32::from));
-    let (k, t) = (i / TURBO_STEP, (i % TURBO_STEP) as f32 / TURBO_STEP as f32);
-    let (from, to) = (knot(k), knot(k + 1));
-    // Extrapolate linearly beyond the ends
-    let before = if k == 0 { 2.0 * from - to } else { knot(k - 1) };
-    let after = if k + 2 < TURBO.len() {
-        knot(k + 2)
-    } else {
-        2.0 * to - from
-    };
-    // Evaluate the cubic between the knots
-    let (slope_from, slope_to) = (0.5 * (to - before), 0.5 * (after - from));
-    let bend = to - from;
-    let cubic = slope_from + slope_to - 2.0 * bend;
-    let square = 3.0 * bend - 2.0 * slope_from - slope_to;
-    let color = from + t * (slope_from + t * (square + t * cubic));
-    color.clamp(Vec3::ZERO, Vec3::splat(255.0))
-}
-
-/// Names and maps, best known first.
-const MAPS: [(&str, Source); 21] = [
-    ("viridis", Source::Colorous(colorous::VIRIDIS)),
-    ("turbo", Source::Turbo),
-    ("plasma", Source::Colorous(colorous::PLASMA)),
-    ("inferno", Source::Colorous(colorous::INFERNO)),
-    ("magma", Source::Colorous(colorous::MAGMA)),
-    ("cividis", Source::Colorous(colorous::CIVIDIS)),
-    ("greys", Source::Colorous(colorous::GREYS)),
-    ("blues", Source::Colorous(colorous::BLUES)),
-    ("greens", Source::Colorous(colorous::GREENS)),
-    ("oranges", Source::Colorous(colorous::ORANGES)),
-    ("purples", Source::Colorous(colorous::PURPLES)),
-    ("reds", Source::Colorous(colorous::REDS)),
-    ("warm", Source::Colorous(colorous::WARM)),
-    ("cool", Source::Colorous(colorous::COOL)),
-    ("cubehelix", Source::Colorous(colorous::CUBEHELIX)),
-    ("red-blue", Source::Colorous(colorous::RED_BLUE)),
-    (
-        "red-yellow-blue",
-        Source::Colorous(colorous::RED_YELLOW_BLUE),
-    ),
-    ("purple-orange", Source::Colorous(colorous::PURPLE_ORANGE)),
-    ("spectral", Source::Colorous(colorous::SPECTRAL)),
-    ("rainbow", Source::Colorous(colorous::RAINBOW)),
-    ("sinebow", Source::Colorous(colorous::SINEBOW)),
-];
+/// Ending of the names of reversed maps.
+const REVERSED: &str = "_r";
 
 /// A colour map with a fixed range, so that a value has the same colour in every frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ColorMap {
+    kind: Kind,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Kind {
+    Continuous(Continuous),
+    /// Values with their colours, rising.
+    Categories(Vec<(i64, Vec3)>),
+}
+
+/// A map of real numbers.
+#[derive(Debug, Clone, PartialEq)]
+struct Continuous {
     table: Box<[Vec3; ENTRIES]>,
+    /// The position on the scale where the map begins.
     low: f32,
-    /// Table steps per unit of value; 0 for an empty range.
-    scale: f32,
+    /// Table steps per unit of the scale; 0 for an empty range.
+    rate: f32,
     /// Table position of `low`.
     start: f32,
+    scale: ColorScale,
+    /// Values at the two ends.
+    range: [f64; 2],
+    /// Number of colours of a discrete map.
+    steps: Option<u32>,
 }
 
 /// An unknown name of a colour map.
@@ -164,32 +65,109 @@ pub struct UnknownColorMap {
 }
 
 impl ColorMap {
+    /// Largest number of colours of a discrete map.
+    pub const MAX_STEPS: u32 = 64;
+
     /// The map `name`, stretched over the range `low` to `high`; values outside get the colours at the ends. `low >
-    /// high` reverses the map; with `low == high` every number gets the middle colour.
+    /// high` reverses the map; with `low == high` every number gets the middle colour. Names that end in `_r` are
+    /// reversed maps.
     ///
     /// # Errors
     /// If the name is unknown.
     pub fn new(name: &str, low: f32, high: f32) -> Result<Self, UnknownColorMap> {
-        let found = MAPS.iter().find(|(known, _)| *known == name);
-        let (_, source) = found.ok_or_else(|| UnknownColorMap {
-            name: name.to_owned(),
-            nearest: nearest_name(name),
-        })?;
-        let table = Box::new(std::array::from_fn(|i| source.entry(i)));
+        Self::with_scale(name, [low.into(), high.into()], ColorScale::Linear)
+    }
+
+    /// Same as [`Self::new`], with a `scale`. The range must be above 0 for a logarithmic one.
+    ///
+    /// # Errors
+    /// If the name is unknown.
+    pub fn with_scale(
+        name: &str,
+        range: [f64; 2],
+        scale: ColorScale,
+    ) -> Result<Self, UnknownColorMap> {
+        let (table, is_reversed) = table(name)?;
+        let entry = |i| match is_reversed {
+            true => table.entry(ENTRIES - 1 - i),
+            false => table.entry(i),
+        };
         let last = (ENTRIES - 1) as f32;
+        let [low, high] = range.map(|value| narrow(scale.forward(value)));
         let span = high - low;
         let usable = span != 0.0 && span.is_finite();
         Ok(Self {
-            table,
-            low,
-            scale: if usable { last / span } else { 0.0 },
-            start: if usable { 0.0 } else { 0.5 * last },
+            kind: Kind::Continuous(Continuous {
+                table: Box::new(std::array::from_fn(entry)),
+                low,
+                rate: if usable { last / span } else { 0.0 },
+                start: if usable { 0.0 } else { 0.5 * last },
+                scale,
+                range,
+                steps: None,
+            }),
         })
     }
 
-    /// Names of all maps.
+    /// The map divided into `steps` bands of one colour each, from the first to the last colour of the map.
+    #[must_use]
+    pub fn with_steps(mut self, steps: Option<u32>) -> Self {
+        if let Kind::Continuous(map) = &mut self.kind {
+            map.steps = steps.map(|steps| steps.clamp(2, Self::MAX_STEPS));
+        }
+        self
+    }
+
+    /// Colours for the categories `values`, rising. `name` is a palette, or a map whose colours are taken at equal
+    /// distances. If the palette has a colour for each number from 0 to the largest value, the value is the index of
+    /// its colour; otherwise colours are assigned in order. After the last one, a palette starts again.
+    ///
+    /// # Errors
+    /// If the name is unknown.
+    pub fn of_categories(name: &str, values: &[i64]) -> Result<Self, UnknownColorMap> {
+        let (base, is_reversed) = base_name(name);
+        let last = values.len().saturating_sub(1).max(1);
+        let is_index = |count: usize| {
+            let fits = |value: &i64| usize::try_from(*value).is_ok_and(|value| value < count);
+            values.iter().all(fits)
+        };
+        let color = |(order, value): (usize, &i64)| match palette(base) {
+            Some(palette) => {
+                let count = palette.colors.len();
+                let index = match usize::try_from(*value) {
+                    Ok(index) if is_index(count) => index,
+                    _ => order % count,
+                };
+                let at = if is_reversed {
+                    count - 1 - index
+                } else {
+                    index
+                };
+                let srgb = palette.colors[at].map(|byte| f32::from(byte) / 255.0);
+                Ok(Vec3::from_array(srgb.map(linear_from_srgb)))
+            }
+            None => {
+                let (table, is_reversed) = table(name)?;
+                let at = order * (ENTRIES - 1) / last;
+                Ok(table.entry(if is_reversed { ENTRIES - 1 - at } else { at }))
+            }
+        };
+        let colors = values.iter().enumerate().map(color);
+        let colors: Result<Vec<Vec3>, UnknownColorMap> = colors.collect();
+        let categories = values.iter().copied().zip(colors?);
+        Ok(Self {
+            kind: Kind::Categories(categories.collect()),
+        })
+    }
+
+    /// Names of all maps of numbers, without the reversed ones.
     pub fn names() -> impl Iterator<Item = &'static str> {
-        MAPS.iter().map(|(name, _)| *name)
+        tables::names()
+    }
+
+    /// Names of the palettes for categories, the default first.
+    pub fn palette_names() -> impl Iterator<Item = &'static str> {
+        PALETTES.iter().map(|palette| palette.name)
     }
 
     /// Linear RGB of `value`, interpolated between table entries; [`NO_VALUE`] for NaN.
@@ -197,17 +175,98 @@ impl ColorMap {
         if value.is_nan() {
             return NO_VALUE;
         }
+        match &self.kind {
+            Kind::Continuous(map) => map.at(map.position(value)),
+            Kind::Categories(all) => {
+                #[expect(clippy::cast_possible_truncation, reason = "an integer, or saturated")]
+                let value = value as i64;
+                let found = all.binary_search_by_key(&value, |(known, _)| *known);
+                found.map_or(NO_VALUE, |index| all[index].1)
+            }
+        }
+    }
+
+    /// Linear RGB at a fraction of the length of the map; [`NO_VALUE`] for categories.
+    pub fn color_at(&self, fraction: f32) -> Vec3 {
+        match &self.kind {
+            Kind::Continuous(map) => map.at(fraction.clamp(0.0, 1.0) * (ENTRIES - 1) as f32),
+            Kind::Categories(_) => NO_VALUE,
+        }
+    }
+
+    /// The categories with their colours in linear RGB; None for a map of numbers.
+    pub fn categories(&self) -> Option<&[(i64, Vec3)]> {
+        match &self.kind {
+            Kind::Continuous(_) => None,
+            Kind::Categories(all) => Some(all),
+        }
+    }
+
+    /// Values at the two ends of a map of numbers, and its scale; None for categories.
+    pub fn range(&self) -> Option<([f64; 2], ColorScale)> {
+        match &self.kind {
+            Kind::Continuous(map) => Some((map.range, map.scale)),
+            Kind::Categories(_) => None,
+        }
+    }
+
+    /// Number of colours of a discrete map of numbers.
+    pub fn steps(&self) -> Option<u32> {
+        match &self.kind {
+            Kind::Continuous(map) => map.steps,
+            Kind::Categories(_) => None,
+        }
+    }
+}
+
+impl Continuous {
+    /// Position of a number in the table.
+    fn position(&self, value: f32) -> f32 {
+        let value = match self.scale {
+            ColorScale::Linear => value,
+            scale => narrow(scale.forward(value.into())),
+        };
         // An infinite value times 0 would be NaN, so the offset is bounded first.
-        let offset = (value - self.low).clamp(f32::MIN, f32::MAX) * self.scale;
-        let at = (self.start + offset).clamp(0.0, (ENTRIES - 1) as f32);
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "clamped to the table; the fraction is taken below"
-        )]
+        let offset = (value - self.low).clamp(f32::MIN, f32::MAX) * self.rate;
+        (self.start + offset).clamp(0.0, (ENTRIES - 1) as f32)
+    }
+
+    /// Linear RGB at a position in the table.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "clamped to the table or to the steps; the fraction is taken below"
+    )]
+    fn at(&self, position: f32) -> Vec3 {
+        let last = (ENTRIES - 1) as f32;
+        let at = match self.steps {
+            None => position,
+            Some(steps) => {
+                let step = ((position / last * steps as f32) as u32).min(steps - 1);
+                step as f32 / (steps - 1) as f32 * last
+            }
+        };
         let index = (at as usize).min(ENTRIES - 2);
         self.table[index].lerp(self.table[index + 1], at - index as f32)
     }
+}
+
+/// The name without the ending of reversed maps, and whether it had that.
+fn base_name(name: &str) -> (&str, bool) {
+    match name.strip_suffix(REVERSED) {
+        Some(base) => (base, true),
+        None => (name, false),
+    }
+}
+
+/// The table of a map, and whether it is reversed.
+fn table(name: &str) -> Result<(Table, bool), UnknownColorMap> {
+    let (base, is_reversed) = base_name(name);
+    let found = Table::named(base).ok_or_else(|| UnknownColorMap {
+        name: name.to_owned(),
+        nearest: nearest_name(name),
+    })?;
+    Ok((found, is_reversed))
 }
 
 /// The known name with the smallest edit distance to `name`.
@@ -215,7 +274,15 @@ fn nearest_name(name: &str) -> &'static str {
     let distance = |known: &str| strsim::damerau_levenshtein(known, &name.to_lowercase());
     ColorMap::names()
         .min_by_key(|known| distance(known))
-        .unwrap_or(MAPS[0].0)
+        .unwrap_or("viridis")
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "colours need no more than f32"
+)]
+fn narrow(value: f64) -> f32 {
+    value as f32
 }
 
 /// Inverse of the sRGB transfer function (IEC 61966-2-1).
@@ -297,5 +364,91 @@ mod tests {
         }
         let error = ColorMap::new("Virdis", 0.0, 1.0).unwrap_err();
         assert_eq!(error.nearest, "viridis");
+    }
+
+    /// Entry `i` of a map as sRGB bytes.
+    fn bytes(map: &ColorMap, i: u8) -> [u8; 3] {
+        let close = |linear: f32| {
+            let distance = |byte: &u8| (linear_from_srgb(f32::from(*byte) / 255.0) - linear).abs();
+            let bytes = 0..=255_u8;
+            let best = bytes.min_by(|a, b| distance(a).total_cmp(&distance(b)));
+            best.expect("not empty")
+        };
+        map.color(f32::from(i)).to_array().map(close)
+    }
+
+    #[test]
+    fn crameri_maps_are_the_published_ones() {
+        // Rounded from the tables of cmcrameri 1.10
+        for (name, ends) in [
+            ("batlow", [[1, 25, 89], [130, 130, 49], [250, 204, 250]]),
+            ("vik", [[0, 18, 97], [236, 229, 224], [89, 0, 8]]),
+            ("vikO", [[79, 26, 61], [213, 190, 179], [80, 25, 60]]),
+        ] {
+            let map = ColorMap::new(name, 0.0, 255.0).unwrap();
+            assert_eq!([0, 128, 255].map(|i| bytes(&map, i)), ends, "{name}");
+            let reversed = ColorMap::new(&format!("{name}_r"), 0.0, 255.0).unwrap();
+            assert_eq!([255, 127, 0].map(|i| bytes(&reversed, i)), ends, "{name}");
+        }
+    }
+
+    #[test]
+    fn log_maps_have_equal_lengths_for_equal_ratios() {
+        let log = ColorMap::with_scale("viridis", [1e-2, 1e2], ColorScale::Log).unwrap();
+        let linear = ColorMap::new("viridis", -2.0, 2.0).unwrap();
+        for exponent in [-2, -1, 0, 1, 2] {
+            let value = 10_f64.powi(exponent);
+            let found = log.color(narrow(value));
+            let expected = linear.color(narrow(f64::from(exponent)));
+            assert!((found - expected).length() < 1e-5, "{exponent}");
+        }
+        for value in [0.0, -3.0, f32::NEG_INFINITY] {
+            assert_eq!(log.color(value), log.color_at(0.0));
+        }
+        assert_eq!(log.color(f32::INFINITY), log.color_at(1.0));
+    }
+
+    #[test]
+    fn discrete_maps_have_bands() {
+        let map = ColorMap::new("batlow", 0.0, 8.0)
+            .unwrap()
+            .with_steps(Some(4));
+        let full = ColorMap::new("batlow", 0.0, 3.0).unwrap();
+        for (value, band) in [
+            (-1.0, 0.0),
+            (0.0, 0.0),
+            (1.9, 0.0),
+            (2.1, 1.0),
+            (5.9, 2.0),
+            (6.1, 3.0),
+            (9.0, 3.0),
+        ] {
+            assert!(
+                (map.color(value) - full.color(band)).length() < 1e-5,
+                "{value}"
+            );
+        }
+    }
+
+    #[test]
+    fn categories_have_colours_of_the_palette() {
+        let orange =
+            Vec3::from_array([230.0, 159.0, 0.0].map(|b: f32| linear_from_srgb(b / 255.0)));
+        // Small values are indices, so that a type keeps its colour if another is absent
+        let map = ColorMap::of_categories("okabe-ito", &[1, 3]).unwrap();
+        assert_eq!(map.color(1.0), orange);
+        assert_eq!(map.color(2.0), NO_VALUE);
+        // Others have colours in order
+        let map = ColorMap::of_categories("okabe-ito", &[-7, 1000, 1001]).unwrap();
+        assert_eq!(map.color(1000.0), orange);
+        // Palettes start again
+        let many: Vec<i64> = (100..110).collect();
+        let map = ColorMap::of_categories("okabe-ito", &many).unwrap();
+        assert_eq!(map.color(101.0), map.color(109.0));
+        // Maps of numbers are divided
+        let map = ColorMap::of_categories("viridis", &[5, 6, 70]).unwrap();
+        let viridis = ColorMap::new("viridis", 0.0, 1.0).unwrap();
+        assert_eq!(map.color(70.0), viridis.color(1.0));
+        assert!(ColorMap::of_categories("okabe", &[1]).is_err());
     }
 }

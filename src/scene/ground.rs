@@ -11,6 +11,7 @@ use super::sand::Lattice;
 use super::texture::{Beyond, Footprint, Texture};
 use super::{Bounds, sand};
 use crate::math::{Lanes3, Supported, lanes_in, set_lane3, splat};
+use crate::ray::Ray;
 
 /// Default colour of the ground (linear RGB): a dark grey that shows shadows and does not distract from the particles.
 pub const DEFAULT_COLOR: Vec3 = Vec3::new(0.135, 0.140, 0.150);
@@ -153,6 +154,14 @@ impl Ground {
             shadow_catcher: Some(strength),
             ..self
         }
+    }
+
+    /// Whether a ray meets the ground where it has not begun to fade.
+    pub fn is_opaque_at(&self, ray: &Ray) -> bool {
+        let along = ray.direction.dot(self.up);
+        let distance = (self.height - ray.origin.dot(self.up)) / along;
+        let point = ray.origin + distance * ray.direction;
+        distance > 0.0 && (point - self.center).length() < self.fade_start
     }
 
     /// The colour at a `point` of the ground.

@@ -27,7 +27,7 @@ pub mod texture;
 
 pub use background::Background;
 pub use camera::{Camera, CameraError, CameraView, Lens};
-pub use colormap::{ColorMap, UnknownColorMap};
+pub use colormap::{ColorMap, ColorScale, UnknownColorMap};
 pub use environment::{Environment, EnvironmentAxes, IrradianceHarmonics, RadianceMap};
 pub use framing::{Framed, Framing};
 pub use ground::{Ground, WetGround};

@@ -14,26 +14,32 @@ use spherule_formats::{Attribute, FrameError, ParticleFrame, Radius, choose_orig
 use crate::scene::{RgbEncoding, is_rgb};
 
 mod attributes;
+mod color;
 mod moments;
 mod outline;
 mod packing;
 mod robust;
 mod sample;
 mod stream;
+mod values;
 
 pub use attributes::{Named, PART_NAMES, id_of, part_of, velocity_of};
+pub use color::{Categories, ColorQuestion, ColorRange, MAX_CATEGORIES, RangeQuestion, range_of};
+use color::{ColorTotals, FrameContext};
 use moments::Moments;
 use outline::Outermost;
 pub use outline::Outline;
 use packing::Spacing;
 use packing::narrow;
-use robust::{
-    RobustBounds, estimate_packed, estimate_radius, robust_bounds, robust_largest, robust_range,
-};
+use robust::{RobustBounds, estimate_packed, estimate_radius, robust_bounds, robust_largest};
 use sample::FrameSample;
+pub use values::{GEOMETRIC_VALUES, ParticleValue};
 
 /// Maximum number of frames to sample; evenly distributed, including the first and the last one.
 const FRAMES: usize = 24;
+
+/// Maximum number of positions to keep.
+const POINTS: usize = 2048;
 
 /// Result of a survey.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -68,6 +74,9 @@ pub struct Survey {
     /// it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rgb: Option<RgbAttribute>,
+    /// Positions of some particles of all sampled frames, relative to the origin, if they were requested.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub points: Vec<[f32; 3]>,
     /// The up direction that is usual for this format, unit vector.
     pub up: DVec3,
     /// Names of all attributes in the sampled frames.
@@ -116,17 +125,6 @@ pub struct FrameWeight {
     pub in_place: bool,
 }
 
-/// An attribute and its range for a colour map.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ColorRange {
-    /// Name of the attribute.
-    pub attribute: String,
-    /// Value at the start of the map.
-    pub low: f64,
-    /// Value at the end of the map.
-    pub high: f64,
-}
-
 /// An attribute with colours.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RgbAttribute {
@@ -155,6 +153,10 @@ pub struct Question<'a> {
     pub color: ColorQuestion<'a>,
     /// Radii.
     pub radius: RadiusQuestion<'a>,
+    /// The up direction for heights; by default that of the format.
+    pub up: Option<DVec3>,
+    /// Whether positions of some particles are needed.
+    pub points: bool,
 }
 
 /// What a job needs to know about radii.
@@ -180,17 +182,6 @@ impl RadiusQuestion<'_> {
     }
 }
 
-/// What a job needs to know about colours.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ColorQuestion<'a> {
-    /// No attribute is needed.
-    None,
-    /// The velocity if there is one, otherwise an attribute with colours if there is one.
-    Speed,
-    /// This attribute.
-    Attribute(&'a str),
-}
-
 /// Running totals over the frames.
 struct Totals {
     bounds: Option<RobustBounds>,
@@ -198,8 +189,8 @@ struct Totals {
     radius: Option<(usize, Spacing)>,
     has_radii: bool,
     reach: f32,
-    range: Option<(f64, f64)>,
-    color: Option<String>,
+    color: ColorTotals,
+    points: Vec<DVec3>,
     velocity: Option<String>,
     rgb: Option<RgbAttribute>,
     attributes: BTreeMap<String, usize>,
@@ -271,8 +262,8 @@ impl Survey {
             radius: None,
             has_radii: false,
             reach: 0.0,
-            range: None,
-            color: None,
+            color: ColorTotals::default(),
+            points: Vec::new(),
             velocity: None,
             rgb: None,
             attributes: BTreeMap::new(),
@@ -282,13 +273,19 @@ impl Survey {
             origin: Origins::None,
             moments: Moments::default(),
         };
+        let format_up = if sequence.is_y_up() {
+            DVec3::Y
+        } else {
+            DVec3::Z
+        };
+        let up = question.up.unwrap_or(format_up);
         let mut failure = None;
         for index in indices {
             match FrameSample::of(sequence, index, question.radius) {
                 Ok(sample) => {
                     let number = sequence.frames().get(index).map_or(0, |frame| frame.number);
                     totals.moments.add(index, number, sample.particles.time);
-                    totals.add(sample, question);
+                    totals.add(sample, question, up);
                 }
                 Err(error) => {
                     failure.get_or_insert(error);
@@ -298,11 +295,7 @@ impl Survey {
         // Fail only if no frame was readable
         match failure {
             Some(error) if totals.frames == 0 => Err(error),
-            _ => Ok(totals.finish(if sequence.is_y_up() {
-                DVec3::Y
-            } else {
-                DVec3::Z
-            })),
+            _ => Ok(totals.finish(question, format_up)),
         }
     }
 }
@@ -328,7 +321,7 @@ fn spread(count: usize) -> Vec<usize> {
 }
 
 impl Totals {
-    fn add(&mut self, sample: FrameSample, question: Question) {
+    fn add(&mut self, sample: FrameSample, question: Question, up: DVec3) {
         self.frames += 1;
         self.origin = self.origin.and(sample.origin);
         let FrameSample {
@@ -357,8 +350,8 @@ impl Totals {
         if self.rgb.is_none() {
             self.rgb = match question.color {
                 ColorQuestion::None => None,
-                ColorQuestion::Speed => RgbAttribute::of(&raw.attributes, None),
-                ColorQuestion::Attribute(name) => RgbAttribute::of(&raw.attributes, Some(name)),
+                ColorQuestion::Speed(_) => RgbAttribute::of(&raw.attributes, None),
+                ColorQuestion::Value(name, _) => RgbAttribute::of(&raw.attributes, Some(name)),
             };
         }
         let origin = self.bounds.map_or(DVec3::ZERO, |bounds| {
@@ -377,7 +370,19 @@ impl Totals {
             self.weight = Some(weight);
         }
         // Update the ranges of colour and radius
-        self.add_color(&frame, question.color);
+        let context = FrameContext {
+            count,
+            origin,
+            up,
+            radius: question.radius,
+        };
+        let velocity = self.velocity.as_deref();
+        self.color.add(&frame, velocity, question.color, context);
+        if question.points {
+            let stride = frame.len().div_ceil(POINTS).max(1);
+            let some = frame.positions.iter().step_by(stride);
+            self.points.extend(some.map(|p| origin + p.as_dvec3()));
+        }
         match question.radius {
             RadiusQuestion::None => {}
             RadiusQuestion::Auto | RadiusQuestion::AutoOfBody => {
@@ -392,22 +397,6 @@ impl Totals {
                 }
             }
         }
-    }
-
-    fn add_color(&mut self, frame: &ParticleFrame, question: ColorQuestion) {
-        let name = match question {
-            ColorQuestion::None => None,
-            ColorQuestion::Speed => self.velocity.clone(),
-            ColorQuestion::Attribute(name) => Some(name.to_owned()),
-        };
-        let Some(name) = name else { return };
-        if let Some(attribute) = frame.attribute(&name)
-            && let Some((low, high)) = robust_range(attribute)
-        {
-            let (a, b) = self.range.unwrap_or((low, high));
-            self.range = Some((a.min(low), b.max(high)));
-        }
-        self.color = Some(name);
     }
 
     fn add_radius(
@@ -435,21 +424,15 @@ impl Totals {
         }
     }
 
-    fn finish(self, up: DVec3) -> Survey {
+    fn finish(self, question: Question, up: DVec3) -> Survey {
         let bounds = self.bounds.map(|bounds| bounds.outer);
         let (min, max) = bounds.unwrap_or((DVec3::splat(-0.5), DVec3::splat(0.5)));
+        let color = self.color.finish(question.color);
         // Speed has precedence over colours.
         let rgb = self.rgb.filter(|rgb| {
-            let is_colored_by = |color: &String| rgb.attribute.eq_ignore_ascii_case(color);
-            self.color.as_ref().is_none_or(is_colored_by)
-        });
-        let color = self.color.map(|attribute| {
-            let (low, high) = self.range.unwrap_or((0.0, 1.0));
-            ColorRange {
-                attribute,
-                low,
-                high,
-            }
+            let is_colored_by =
+                |color: &ColorRange| rgb.attribute.eq_ignore_ascii_case(&color.attribute);
+            color.as_ref().is_none_or(is_colored_by)
         });
         // Use the origin of native frames: with a different one, they could not be traced in place.
         let origin = match self.origin {
@@ -457,6 +440,9 @@ impl Totals {
             Origins::None | Origins::Mixed => choose_origin(min, max),
         };
         let in_place = self.origin == Origins::Shared(origin);
+        let stride = self.points.len().div_ceil(POINTS).max(1);
+        let points = self.points.iter().step_by(stride);
+        let points = points.map(|point| (*point - origin).as_vec3().to_array());
         let weight = self.weight.map(|weight| FrameWeight { in_place, ..weight });
         Survey {
             origin,
@@ -470,6 +456,7 @@ impl Totals {
             reach: self.reach,
             color,
             rgb,
+            points: points.collect(),
             up,
             components: self.attributes.values().copied().collect(),
             attributes: self.attributes.into_keys().collect(),

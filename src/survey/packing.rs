@@ -132,7 +132,16 @@ mod tests {
         let sequence = Sequence::open(&SequenceInput::from_path(&path)).expect("a frame");
         let survey = |radius| {
             let color = ColorQuestion::None;
-            Survey::of(&sequence, Question { color, radius }).expect("readable")
+            Survey::of(
+                &sequence,
+                Question {
+                    color,
+                    radius,
+                    up: None,
+                    points: false,
+                },
+            )
+            .expect("readable")
         };
         let stored = survey(RadiusQuestion::AutoOfBody);
         let radius = stored.packed_radius.expect("requested");

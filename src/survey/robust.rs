@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
-use spherule_formats::{Attribute, Positions};
+use spherule_formats::Positions;
 
 use super::packing;
 
@@ -104,20 +104,40 @@ pub(super) fn robust_largest(count: usize, radius: impl Fn(usize) -> f32) -> f32
     radii.get(place).copied().unwrap_or(0.0)
 }
 
-/// The range of the middle 99 % of the values of an attribute (for vectors: of the magnitudes, from zero).
-pub(super) fn robust_range(attribute: &Attribute) -> Option<(f64, f64)> {
-    let count = attribute.count();
+/// Up to [`SAMPLE`] of the `count` values that are finite, rising.
+pub(super) fn sorted_sample(count: usize, value: impl Fn(usize) -> f64) -> Vec<f64> {
     let stride = count.div_ceil(SAMPLE).max(1);
     let mut values: Vec<f64> = (0..count)
         .step_by(stride)
-        .map(|i| attribute.magnitude(i))
+        .map(value)
         .filter(|v| v.is_finite())
         .collect();
     values.sort_unstable_by(f64::total_cmp);
+    values
+}
+
+/// The range of the middle 99 % of `values`, which rise.
+pub(super) fn robust_range(values: &[f64]) -> Option<(f64, f64)> {
     let low = *values.get(values.len() / 200)?;
     let high = *values.get((values.len() - values.len() / 200).saturating_sub(1))?;
-    let is_vector = attribute.components > 1;
-    Some((if is_vector { 0.0 } else { low }, high))
+    Some((low, high))
+}
+
+/// A percentile of `values`, which rise, interpolated as in numpy.
+pub(super) fn percentile(values: &[f64], percent: f64) -> Option<f64> {
+    let last = values.len().checked_sub(1)?;
+    #[expect(clippy::cast_precision_loss, reason = "samples are few")]
+    let at = percent / 100.0 * last as f64;
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "limited to the values"
+    )]
+    let index = (at.max(0.0) as usize).min(last);
+    let (low, high) = (values[index], values[(index + 1).min(last)]);
+    #[expect(clippy::cast_precision_loss, reason = "samples are few")]
+    let part = at - index as f64;
+    Some(low + part * (high - low))
 }
 
 /// An even selection of the particles, for queries.
@@ -181,6 +201,23 @@ mod tests {
             .collect();
         all.push(other);
         robust_bounds(&Positions::F64(all), None).unwrap().outer
+    }
+
+    #[test]
+    fn percentiles_are_those_of_numpy() {
+        // numpy.percentile([1, 2, 4, 8, 16], [0, 1, 50, 90, 100])
+        let values = [1.0, 2.0, 4.0, 8.0, 16.0];
+        for (percent, expected) in [
+            (0.0, 1.0),
+            (1.0, 1.04),
+            (50.0, 4.0),
+            (90.0, 12.8),
+            (100.0, 16.0),
+        ] {
+            let found = percentile(&values, percent).unwrap();
+            assert!((found - expected).abs() < 1e-12, "{percent}: {found}");
+        }
+        assert_eq!(percentile(&[], 50.0), None);
     }
 
     #[test]

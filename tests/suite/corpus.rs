@@ -137,7 +137,7 @@ fn images() -> Vec<(String, u8, Vec<u8>)> {
         ("small_png", 0, color),
         ("large_png", 2, film(40, 37, Channels::COLOR)),
     ] {
-        let bytes = encode_preview(&film, &PreviewOptions::default()).expect("an image");
+        let bytes = encode_preview(&film, &PreviewOptions::default(), &[]).expect("an image");
         images.push((name.into(), choice, bytes));
     }
     images

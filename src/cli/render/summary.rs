@@ -47,14 +47,20 @@ pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup:
     if let Some(text) = unframed_text(setup) {
         message!("{text}");
     }
-    if let pipeline::ColorRule::Attribute { name, .. } = &setup.picture.color
-        && let Some(color) = &survey.color
-    {
-        message!(
-            "colour by `{name}`, range {} to {}",
-            short(color.low),
-            short(color.high)
-        );
+    if let pipeline::ColorRule::Attribute { name, map, .. } = &setup.picture.color {
+        match (map.range(), map.categories()) {
+            (Some(([low, high], _)), _) => {
+                message!(
+                    "colour by `{name}`, range {} to {}",
+                    short(low),
+                    short(high)
+                );
+            }
+            (None, categories) => {
+                let count = categories.map_or(0, <[_]>::len);
+                message!("colour by `{name}`, {count} categories");
+            }
+        }
     }
     if let (pipeline::ColorRule::Rgb { name, .. }, Some(rgb)) = (&setup.picture.color, &survey.rgb)
     {

@@ -100,9 +100,12 @@ fn table(entries: &Entries, section: &str) -> Value {
 }
 
 fn property(entry: &Entry) -> Value {
-    // The type of a light determines its keys.
+    // The type of a light or an overlay determines its keys.
+    let is_typed = ["light.", "overlay."]
+        .iter()
+        .any(|list| entry.section.starts_with(list));
     let mut schema = match entry.name() {
-        "type" if entry.section.starts_with("light.") => {
+        "type" if is_typed => {
             json!({ "const": json_of(entry.sample()) })
         }
         _ => entry.schema.clone(),

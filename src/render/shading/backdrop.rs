@@ -4,16 +4,7 @@
 use super::camera::CameraLanes;
 use crate::math::{LANES, Lanes3, lane_kernel};
 use crate::ray::RayPacket;
-use crate::scene::background::{STUDIO_BOTTOM, STUDIO_CENTER, STUDIO_TOP};
-
-/// Fraction by which the corners are darkened at most.
-const VIGNETTE: f32 = 0.25;
-
-/// Growth of the darkening with the squared distance from the centre.
-const FALLOFF: f32 = 1.6;
-
-/// Factor on horizontal distances from the centre.
-const STRETCH: f32 = 1.15;
+use crate::scene::background::studio_on_film;
 
 /// Adds the radiance of the backdrop along camera rays times `weight` to `radiance`, only for `lanes`.
 #[inline(always)]
@@ -24,22 +15,15 @@ fn add_backdrop_body(
     lanes: u32,
     radiance: &mut Lanes3,
 ) {
-    let (bottom, top) = (STUDIO_BOTTOM.to_array(), STUDIO_TOP.to_array());
     for l in 0..LANES {
         let (origin, direction) = (&rays.origin, &rays.direction);
-        let [x, y] = camera.film_position(
+        let color = studio_on_film(camera.film_position(
             [origin[0][l], origin[1][l], origin[2][l]],
             [direction[0][l], direction[1][l], direction[2][l]],
-        );
-        let across = STRETCH * (x - STUDIO_CENTER[0]);
-        let down = y - STUDIO_CENTER[1];
-        let darkening = FALLOFF * (across * across + down * down);
-        let darkening = if darkening < 1.0 { darkening } else { 1.0 };
-        let brightness = 1.0 - VIGNETTE * darkening;
+        ));
         let is_chosen = lanes >> l & 1 == 1;
         for axis in 0..3 {
-            let color = brightness * (top[axis] * (1.0 - y) + bottom[axis] * y);
-            let sum = radiance[axis][l] + weight[axis][l] * color;
+            let sum = radiance[axis][l] + weight[axis][l] * color[axis];
             radiance[axis][l] = if is_chosen { sum } else { radiance[axis][l] };
         }
     }
@@ -62,6 +46,7 @@ mod tests {
     use super::*;
     use crate::math::{Supported, lane3, set_lane3, splat};
     use crate::render::shading::lens_rays;
+    use crate::scene::background::{STUDIO_BOTTOM, STUDIO_TOP};
     use crate::scene::{Camera, CameraView, Lens};
 
     /// The colour at a position of the film.

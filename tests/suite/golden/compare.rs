@@ -181,5 +181,5 @@ fn png(pixels: &[[f32; 3]], like: &Picture) -> Vec<u8> {
     for (slot, [r, g, b]) in film.color.iter_mut().zip(pixels) {
         *slot = [*r, *g, *b, 1.0];
     }
-    encode_preview(&film, &PreviewOptions::default()).expect("a picture")
+    encode_preview(&film, &PreviewOptions::default(), &[]).expect("a picture")
 }

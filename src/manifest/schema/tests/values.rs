@@ -107,13 +107,24 @@ const VALUES: [&str; 100] = [
 ];
 
 /// Values for colours that come from an attribute.
-const COLORS: [&str; 6] = [
+const COLORS: [&str; 17] = [
     "{ attribute = \"v\", map = \"turbo\", range = [0, 1] }",
     "{ attribute = \"v\", map = \"trubo\" }",
     "{ attribute = \"v\", range = [1] }",
     "{ attribute = \"v\", range = [0, \"1\"] }",
     "{ attribute = \"v\", scale = 1 }",
     "{ map = \"turbo\" }",
+    "{ map = \"batlow_r\", reverse = true, steps = 2 }",
+    "{ map = \"turbo_r_r\" }",
+    "{ steps = 1 }",
+    "{ steps = 65 }",
+    "{ range = \"1%-99.5%\" }",
+    "{ range = \"-1%-99%\" }",
+    "{ range = \"1-99\" }",
+    "{ range = \"symmetric\" }",
+    "{ scale = \"symlog\", threshold = 0.5 }",
+    "{ scale = \"categorical\", map = \"okabe-ito\", names = { 0 = \"a\", -3 = \"b\" } }",
+    "{ scale = \"categorical\", names = { 01 = \"a\" } }",
 ];
 
 /// Values that the schema accepts and the reader rejects.
@@ -127,6 +138,7 @@ const BASE: &str = r#"
 input = { path = "data" }
 camera = { mode = "fixed", eye = [5, 6, 7.5], look_at = [9, 9, 9.25], key = [{ frame = 0, eye = [5, 6, 7.5], look_at = [9, 9, 9.25] }] }
 light = [{ type = "point", position = [0, 0, 10] }, { type = "directional", direction = [0, 0, -1] }, { type = "sun", direction = [0, 0, -1] }, { type = "sphere", position = [0, 0, 10], radius = 1 }, { type = "rect", position = [0, 0, 10], direction = [0, 0, -1], width = 2, height = 1 }, { type = "disc", position = [0, 0, 10], direction = [0, 0, -1], radius = 1 }]
+overlay = [{ type = "colorbar" }, { type = "text" }, { type = "scale_bar" }, { type = "axes" }]
 job = { isolate = true }
 "#;
 

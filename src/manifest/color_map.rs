@@ -1,0 +1,168 @@
+//! Names and ranges of colour maps.
+
+use serde_json::{Value as Json, json};
+
+use super::field::Field;
+use super::key::Key;
+use super::nearest::nearest;
+use super::value::{Fault, Value, numbers_schema, quoted};
+use crate::scene::ColorMap;
+
+/// The name of a colour map or of a palette.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MapName {
+    name: &'static str,
+    is_reversed: bool,
+}
+
+impl MapName {
+    /// The default map of numbers.
+    pub const DEFAULT: Self = Self::plain("viridis");
+    /// The default map of a symmetric range, with a light colour in the middle.
+    pub const DIVERGING: Self = Self::plain("vik");
+    /// The default palette.
+    pub const PALETTE: Self = Self::plain("okabe-ito");
+
+    const fn plain(name: &'static str) -> Self {
+        Self {
+            name,
+            is_reversed: false,
+        }
+    }
+
+    /// The map with a name, if there is one. The names of reversed maps end in `_r`.
+    pub fn named(name: &str) -> Option<Self> {
+        let (base, is_reversed) = match name.strip_suffix("_r") {
+            Some(base) => (base, true),
+            None => (name, false),
+        };
+        let name = known().find(|known| *known == base)?;
+        Some(Self { name, is_reversed })
+    }
+
+    /// The name in a manifest.
+    pub fn name(self) -> String {
+        let ending = if self.is_reversed { "_r" } else { "" };
+        format!("{}{ending}", self.name)
+    }
+
+    /// The same map from its end to its beginning.
+    #[must_use]
+    pub const fn reversed(self) -> Self {
+        Self {
+            is_reversed: !self.is_reversed,
+            ..self
+        }
+    }
+
+    /// Whether it is a palette for categories.
+    pub fn is_palette(self) -> bool {
+        ColorMap::palette_names().any(|palette| palette == self.name)
+    }
+}
+
+/// Names of all maps and palettes, without the reversed ones.
+fn known() -> impl Iterator<Item = &'static str> {
+    ColorMap::names().chain(ColorMap::palette_names())
+}
+
+impl Value for MapName {
+    fn kind(_: &Key) -> String {
+        "a colour map".to_owned()
+    }
+
+    fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {
+        let text = field.as_text().ok_or(Fault::Unwanted)?;
+        Self::named(text).ok_or_else(|| {
+            let names: Vec<&str> = known().collect();
+            let what = match nearest(text, &names) {
+                Some(near) => format!("did you mean {near}?"),
+                None => format!(
+                    "choose one of {}; an `_r` at the end reverses a map",
+                    names.join(", ")
+                ),
+            };
+            Fault::Because(format!("unknown colour map `{text}`; {what}"))
+        })
+    }
+
+    fn toml(&self) -> String {
+        quoted(&self.name())
+    }
+
+    fn schema(_: &Key) -> Json {
+        let names: Vec<&str> = known().collect();
+        let reversed = format!("^({})_r$", names.join("|"));
+        json!({ "anyOf": [{ "enum": names }, { "type": "string", "pattern": reversed }] })
+    }
+}
+
+/// The values at the two ends of a colour map.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum RangeSetting {
+    /// These values, rising.
+    Values([f64; 2]),
+    /// Percentiles of the values in the sequence, rising.
+    Percentiles([f64; 2]),
+    /// The range of the sequence, extended so that 0 is in the middle.
+    Symmetric,
+}
+
+const SYMMETRIC: &str = "symmetric";
+
+impl RangeSetting {
+    /// Reads two percentages, such as `1%-99%`.
+    fn percentiles(text: &str) -> Option<[f64; 2]> {
+        let (low, high) = text.split_once('-')?;
+        let number = |part: &str| {
+            let digits = part.trim().strip_suffix('%')?;
+            let is_plain = digits
+                .bytes()
+                .all(|byte| byte.is_ascii_digit() || byte == b'.');
+            digits.parse::<f64>().ok().filter(|_| is_plain)
+        };
+        let range = [number(low)?, number(high)?];
+        (range[0] < range[1] && range[1] <= 100.0).then_some(range)
+    }
+}
+
+impl Value for RangeSetting {
+    fn kind(_: &Key) -> String {
+        "two rising numbers, such as [0.0, 4.0], percentiles such as \"1%-99%\", or \"symmetric\""
+            .to_owned()
+    }
+
+    fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {
+        if let Some(text) = field.as_text() {
+            return match text {
+                SYMMETRIC => Ok(Self::Symmetric),
+                text => Self::percentiles(text)
+                    .map(Self::Percentiles)
+                    .ok_or(Fault::Unwanted),
+            };
+        }
+        match field.as_numbers() {
+            Some([low, high]) if low < high => Ok(Self::Values([low, high])),
+            Some([low, high]) => Err(Fault::Because(format!(
+                "expected two rising numbers, found [{low:?}, {high:?}]; reverse = true reverses the map"
+            ))),
+            None => Err(Fault::Unwanted),
+        }
+    }
+
+    fn toml(&self) -> String {
+        match self {
+            Self::Values([low, high]) => format!("[{low:?}, {high:?}]"),
+            Self::Percentiles([low, high]) => quoted(&format!("{low}%-{high}%")),
+            Self::Symmetric => quoted(SYMMETRIC),
+        }
+    }
+
+    fn schema(_: &Key) -> Json {
+        let percent = r" *([0-9]+(\.[0-9]*)?|\.[0-9]+)% *";
+        json!({ "anyOf": [
+            numbers_schema(2),
+            { "type": "string", "pattern": format!("^({SYMMETRIC}|{percent}-{percent})$") },
+        ] })
+    }
+}

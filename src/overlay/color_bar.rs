@@ -1,0 +1,259 @@
+//! Colour bars: a vertical bar with ticks, or swatches with the names of categories.
+
+use super::canvas::{Canvas, Color};
+use super::ticks::{Ticks, power_text};
+use super::{Pen, font};
+use crate::scene::ColorScale;
+
+/// A colour bar.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ColorBar {
+    /// What the colours show.
+    pub title: String,
+    /// The unit of the values; may be empty.
+    pub unit: String,
+    /// Length of the bar as a fraction of the height of the picture.
+    pub length: f32,
+    /// The colours.
+    pub kind: ColorBarKind,
+}
+
+/// Colours and their values.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ColorBarKind {
+    /// Numbers.
+    Numbers {
+        /// Colours at equal distances from the first to the last. For a discrete map, one for each band.
+        colors: Vec<Color>,
+        /// Values at the ends.
+        range: [f64; 2],
+        /// The scale.
+        scale: ColorScale,
+        /// Whether the map has bands of one colour.
+        is_discrete: bool,
+    },
+    /// Names of categories with their colours.
+    Categories(Vec<(String, Color)>),
+}
+
+/// Lengths in units of the size of text.
+const BAR_WIDTH: f32 = 0.9;
+const TICK: f32 = 0.3;
+const SMALL_TICK: f32 = 0.16;
+const LABEL_GAP: f32 = 0.5;
+const TITLE_GAP: f32 = 0.5;
+const SWATCH: f32 = 0.9;
+const SWATCH_PITCH: f32 = 1.4;
+/// Least distance of labels.
+const LABEL_PITCH: f32 = 2.0;
+
+impl ColorBar {
+    pub(super) fn texts(&self) -> Vec<&str> {
+        let names = match &self.kind {
+            ColorBarKind::Numbers { .. } => &[][..],
+            ColorBarKind::Categories(all) => all,
+        };
+        let names = names.iter().map(|(name, _)| &**name);
+        names.chain([&*self.title, &*self.unit]).collect()
+    }
+
+    /// The ticks for a bar of `length` pixels with text of `size` pixels.
+    fn ticks(&self, length: f32, size: f32) -> Ticks {
+        match &self.kind {
+            ColorBarKind::Categories(_) => Ticks::default(),
+            ColorBarKind::Numbers {
+                colors,
+                range,
+                scale,
+                is_discrete,
+            } => {
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "a few"
+                )]
+                let most = (length / (LABEL_PITCH * size)).floor().clamp(2.0, 9.0) as usize;
+                let steps = is_discrete.then(|| u32::try_from(colors.len()).unwrap_or(u32::MAX));
+                Ticks::of(*range, *scale, steps, most)
+            }
+        }
+    }
+
+    /// The title with unit and common exponent.
+    fn heading(&self, exponent: i32) -> String {
+        let factor = (exponent != 0).then(|| power_text(exponent));
+        let unit = [
+            factor,
+            Some(self.unit.clone()).filter(|unit| !unit.is_empty()),
+        ];
+        let unit: Vec<String> = unit.into_iter().flatten().collect();
+        match (self.title.is_empty(), unit.is_empty()) {
+            (_, true) => self.title.clone(),
+            (true, false) => unit.join(" "),
+            (false, false) => format!("{} ({})", self.title, unit.join(" ")),
+        }
+    }
+
+    fn length(&self, pen: &Pen) -> f32 {
+        match &self.kind {
+            ColorBarKind::Numbers { .. } => (self.length * pen.picture).round().max(1.0),
+            ColorBarKind::Categories(all) => {
+                #[expect(clippy::cast_precision_loss, reason = "a few")]
+                let count = all.len() as f32;
+                ((count - 1.0).max(0.0) * SWATCH_PITCH + SWATCH) * pen.font.size
+            }
+        }
+    }
+
+    /// Distance from the top to the bar.
+    fn above(&self, pen: &Pen, heading: &str) -> f32 {
+        let size = pen.font.size;
+        match (heading.is_empty(), &self.kind) {
+            // Half a label may be above the bar
+            (true, ColorBarKind::Numbers { .. }) => (0.5 * font::CAP_HEIGHT * size).ceil(),
+            (true, ColorBarKind::Categories(_)) => 0.0,
+            (false, _) => (pen.text_size(heading)[1] + TITLE_GAP * size).round(),
+        }
+    }
+
+    pub(super) fn measure(&self, pen: &Pen) -> [f32; 2] {
+        let size = pen.font.size;
+        let length = self.length(pen);
+        let ticks = self.ticks(length, size);
+        let heading = self.heading(ticks.exponent);
+        let labels = ticks.ticks.iter().filter_map(|tick| tick.label.as_deref());
+        let names: Vec<&str> = match &self.kind {
+            ColorBarKind::Numbers { .. } => labels.collect(),
+            ColorBarKind::Categories(all) => all.iter().map(|(name, _)| &**name).collect(),
+        };
+        let widest = names
+            .iter()
+            .map(|name| pen.font.width(name))
+            .fold(0.0, f32::max);
+        let width = (BAR_WIDTH + LABEL_GAP) * size + widest;
+        let below = match &self.kind {
+            ColorBarKind::Numbers { .. } => 0.5 * font::CAP_HEIGHT * size,
+            ColorBarKind::Categories(_) => 0.0,
+        };
+        let height = self.above(pen, &heading) + length + below;
+        [width.max(pen.font.width(&heading)), height]
+    }
+
+    pub(super) fn draw(&self, canvas: &mut Canvas, corner: [f32; 2], pen: &Pen) {
+        let size = pen.font.size;
+        let length = self.length(pen);
+        let ticks = self.ticks(length, size);
+        let heading = self.heading(ticks.exponent);
+        pen.text(canvas, &heading, corner);
+        let top = (corner[1] + self.above(pen, &heading)).round();
+        let left = corner[0].round();
+        match &self.kind {
+            ColorBarKind::Categories(all) => swatches(canvas, all, [left, top], pen),
+            ColorBarKind::Numbers {
+                colors,
+                is_discrete,
+                ..
+            } => {
+                let width = (BAR_WIDTH * size).round().max(2.0);
+                let (from, to) = ([left, top], [left + width, top + length]);
+                frame(canvas, from, to, pen);
+                fill(canvas, colors, *is_discrete, from, to);
+                draw_ticks(canvas, &ticks, from, to, pen);
+            }
+        }
+    }
+}
+
+/// Draws a thin frame around a rectangle.
+fn frame(canvas: &mut Canvas, from: [f32; 2], to: [f32; 2], pen: &Pen) {
+    let line = pen.line;
+    let outside = (
+        [from[0] - line, from[1] - line],
+        [to[0] + line, to[1] + line],
+    );
+    canvas.fill(outside.0, outside.1, pen.color);
+}
+
+/// Fills a bar from its first colour at the bottom to its last at the top.
+fn fill(canvas: &mut Canvas, colors: &[Color], is_discrete: bool, from: [f32; 2], to: [f32; 2]) {
+    let length = to[1] - from[1];
+    #[expect(clippy::cast_precision_loss, reason = "a few hundred")]
+    let count = colors.len() as f32;
+    if is_discrete {
+        for (color, i) in colors.iter().zip(0_u16..) {
+            let edge = |i: u16| (to[1] - length * f32::from(i) / count).round();
+            canvas.fill([from[0], edge(i + 1)], [to[0], edge(i)], *color);
+        }
+        return;
+    }
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "pixels"
+    )]
+    let rows = length as u32;
+    for row in 0..rows {
+        let y = from[1] + row as f32;
+        let at = (to[1] - (y + 0.5)) / length * (count - 1.0);
+        canvas.fill([from[0], y], [to[0], y + 1.0], between(colors, at));
+    }
+}
+
+/// The colour at a position between two entries.
+fn between(colors: &[Color], at: f32) -> Color {
+    let last = colors.len().saturating_sub(1);
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "limited to the entries"
+    )]
+    let index = (at.max(0.0) as usize).min(last);
+    let (Some(a), Some(b)) = (colors.get(index), colors.get((index + 1).min(last))) else {
+        return [0.0; 3];
+    };
+    #[expect(clippy::cast_precision_loss, reason = "a few hundred")]
+    let part = (at - index as f32).clamp(0.0, 1.0);
+    std::array::from_fn(|c| a[c] + part * (b[c] - a[c]))
+}
+
+fn draw_ticks(canvas: &mut Canvas, ticks: &Ticks, from: [f32; 2], to: [f32; 2], pen: &Pen) {
+    let (size, line) = (pen.font.size, pen.line);
+    let start = to[0] + line;
+    for tick in &ticks.ticks {
+        #[expect(clippy::cast_possible_truncation, reason = "pixels")]
+        let part = tick.position as f32;
+        let y = to[1] - part * (to[1] - from[1]);
+        // Marks at the ends continue the frame
+        let edge = (y - 0.5 * line).round().clamp(from[1] - line, to[1]);
+        let length = if tick.label.is_some() {
+            TICK
+        } else {
+            SMALL_TICK
+        };
+        canvas.fill(
+            [start, edge],
+            [start + (length * size).round(), edge + line],
+            pen.color,
+        );
+        if let Some(label) = &tick.label {
+            pen.label(canvas, label, to[0] + LABEL_GAP * size, edge + 0.5 * line);
+        }
+    }
+}
+
+fn swatches(canvas: &mut Canvas, all: &[(String, Color)], corner: [f32; 2], pen: &Pen) {
+    let size = pen.font.size;
+    let side = (SWATCH * size).round().max(2.0);
+    for ((name, color), i) in all.iter().zip(0_u16..) {
+        let top = (corner[1] + f32::from(i) * SWATCH_PITCH * size).round();
+        let (from, to) = ([corner[0], top], [corner[0] + side, top + side]);
+        frame(canvas, from, to, pen);
+        canvas.fill(from, to, *color);
+        pen.label(
+            canvas,
+            name,
+            corner[0] + (SWATCH + LABEL_GAP) * size,
+            top + 0.5 * side,
+        );
+    }
+}

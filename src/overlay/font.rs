@@ -1,0 +1,143 @@
+//! The embedded font: DejaVu Sans with Latin, Greek and mathematical signs (`font/LICENSE_DEJAVU`).
+//!
+//! Outlines are rasterised by `ab_glyph`, whose arithmetic has no fused multiply-add and no function of the C library
+//! except square roots, so that all machines draw the same bytes.
+
+use ab_glyph::{Font as _, FontRef, GlyphId, PxScale, ScaleFont as _, point};
+
+use super::canvas::{Canvas, Color};
+
+static BYTES: &[u8] = include_bytes!("font/DejaVuSans-subset.ttf");
+
+/// Height of capitals and digits, in units of the size.
+pub(super) const CAP_HEIGHT: f32 = 0.729;
+
+/// Distance of baselines in units of the size.
+pub(super) const LINE: f32 = 1.25;
+
+/// The font in one size.
+pub(super) struct Font {
+    font: FontRef<'static>,
+    /// Pixels per em.
+    pub(super) size: f32,
+    scale: PxScale,
+}
+
+impl Font {
+    /// The font with `size` pixels per em.
+    pub(super) fn new(size: f32) -> Self {
+        let font = embedded();
+        let per_em = font.units_per_em().unwrap_or(1.0);
+        let scale = PxScale::from(size * font.height_unscaled() / per_em);
+        Self { font, size, scale }
+    }
+
+    /// The glyphs of one line with their distances from its start, and the width of the line, pixels.
+    fn line(&self, text: &str) -> (Vec<(GlyphId, f32)>, f32) {
+        let scaled = self.font.as_scaled(self.scale);
+        let (mut glyphs, mut x) = (Vec::new(), 0.0);
+        let mut before = None;
+        for c in text.chars() {
+            // Characters without a glyph have a box, glyph 0
+            let id = self.font.glyph_id(c);
+            if let Some(before) = before {
+                x += scaled.kern(before, id);
+            }
+            glyphs.push((id, x));
+            x += scaled.h_advance(id);
+            before = Some(id);
+        }
+        (glyphs, x)
+    }
+
+    /// Width of the longest line of `text` in pixels.
+    pub(super) fn width(&self, text: &str) -> f32 {
+        let widths = text.lines().map(|line| self.line(line).1);
+        widths.fold(0.0, f32::max)
+    }
+
+    /// Draws one line. `x` is its start, and `baseline` is rounded to a pixel so that horizontal stems are sharp.
+    pub(super) fn draw(
+        &self,
+        canvas: &mut Canvas,
+        text: &str,
+        x: f32,
+        baseline: f32,
+        color: Color,
+    ) {
+        for (id, offset) in self.line(text).0 {
+            let position = point(x + offset, baseline.round());
+            let glyph = id.with_scale_and_position(self.scale, position);
+            let Some(outline) = self.font.outline_glyph(glyph) else {
+                continue;
+            };
+            let corner = outline.px_bounds().min;
+            #[expect(clippy::cast_possible_truncation, reason = "pixels of a picture")]
+            let (left, top) = (corner.x as i32, corner.y as i32);
+            outline.draw(|x, y, coverage| {
+                let (x, y) = (x.cast_signed() + left, y.cast_signed() + top);
+                canvas.blend(x, y, color, coverage);
+            });
+        }
+    }
+}
+
+fn embedded() -> FontRef<'static> {
+    FontRef::try_from_slice(BYTES).expect("the embedded font is complete")
+}
+
+/// The characters of `text` that the font does not have, in the order of the text.
+pub(super) fn missing_glyphs(text: &str) -> Vec<char> {
+    let font = embedded();
+    let mut missing: Vec<char> = Vec::new();
+    for c in text.chars().filter(|c| *c != '\n') {
+        if font.glyph_id(c).0 == 0 && !missing.contains(&c) {
+            missing.push(c);
+        }
+    }
+    missing
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn widths_are_those_of_the_font() {
+        // Advances of DejaVu Sans in units of 1/2048 em, read with fontTools: S 1300, p 1300, e 1260, d 1300
+        let font = Font::new(2048.0);
+        assert_eq!(
+            font.width("Speed"),
+            1300.0 + 1300.0 + 1260.0 + 1260.0 + 1300.0
+        );
+        assert_eq!(Font::new(20.48).width("m").round(), 20.0);
+        assert_eq!(font.width("d\nSpeed\nm"), font.width("Speed"));
+        assert_eq!(font.width(""), 0.0);
+        // Digits have the same width, so that numbers do not jump from frame to frame
+        for digit in '0'..='9' {
+            assert_eq!(font.width(&digit.to_string()), 1303.0, "{digit}");
+        }
+    }
+
+    #[test]
+    fn letters_have_the_height_of_capitals() {
+        let mut canvas = Canvas::new(120, 120);
+        Font::new(100.0).draw(&mut canvas, "H", 10.0, 100.0, [1.0; 3]);
+        let is_drawn = |row: i32| (0..120).any(|x| canvas.alpha(x, row) > 0.8);
+        let rows: Vec<i32> = (0..120).filter(|row| is_drawn(*row)).collect();
+        assert_eq!(
+            (rows[0], rows[rows.len() - 1]),
+            (27, 99),
+            "72.9 pixels above the baseline"
+        );
+    }
+
+    #[test]
+    fn missing_glyphs_are_found_and_boxes() {
+        assert!(missing_glyphs("ρ (kg/m³) ≤ 10⁻³ µm Ångström √∂∑ ½").is_empty());
+        assert_eq!(missing_glyphs("漢a\n漢字"), ['漢', '字']);
+        let mut canvas = Canvas::new(40, 40);
+        Font::new(30.0).draw(&mut canvas, "漢", 4.0, 32.0, [1.0; 3]);
+        assert!((0..1600).any(|i| canvas.alpha(i % 40, i / 40) > 0.9));
+    }
+}

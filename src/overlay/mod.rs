@@ -1,0 +1,258 @@
+//! What is drawn over a finished picture: colour bars, text, scale bars and axes. Overlays are small pictures with
+//! alpha. They know their size relative to the height of the picture and the corner where they are, but neither jobs
+//! nor files.
+
+mod axes;
+mod canvas;
+mod color_bar;
+mod font;
+mod layout;
+mod scale_bar;
+mod template;
+mod ticks;
+
+pub use axes::Axes;
+use canvas::Canvas;
+pub use canvas::Color;
+pub use color_bar::{ColorBar, ColorBarKind};
+use font::Font;
+use font::missing_glyphs;
+pub use layout::{Corner, Placement};
+pub use scale_bar::ScaleBar;
+pub use template::{FrameValues, Template};
+pub use ticks::{Tick, Ticks};
+
+/// Smallest size of text in pixels; smaller text cannot be read.
+const LEAST_TEXT: f32 = 9.0;
+
+/// Radius of the halo around text and lines, in units of the size of text.
+const HALO: f32 = 0.12;
+
+/// Something to draw over a picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Overlay {
+    /// What is drawn.
+    pub content: Content,
+    /// Where it is.
+    pub placement: Placement,
+    /// Height of text as a fraction of the height of the picture.
+    pub size: f32,
+    /// Colour of text and lines.
+    pub color: Color,
+    /// Colour around text and lines.
+    pub halo: Color,
+}
+
+/// What an overlay shows.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Content {
+    /// The colours of a map with their values.
+    ColorBar(ColorBar),
+    /// Text with variables.
+    Text(Template),
+    /// A length in the scene.
+    ScaleBar(ScaleBar),
+    /// The directions of the axes.
+    Axes(Axes),
+}
+
+/// What overlays show of a frame.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FrameView {
+    /// Values for variables.
+    pub values: FrameValues,
+    /// Lengths of the scene in the height of the picture, at the depth of the particles.
+    pub units_per_height: f64,
+    /// The axes of the scene to the right, up and along the view.
+    pub axes: [[f32; 3]; 3],
+}
+
+/// A small picture at a place of a large one: premultiplied sRGB with alpha.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Sprite {
+    /// Column of its left edge.
+    pub left: i32,
+    /// Row of its top edge.
+    pub top: i32,
+    /// Width in pixels.
+    pub width: i32,
+    /// Height in pixels.
+    pub height: i32,
+    /// The pixels, row by row.
+    pub pixels: Vec<[u8; 4]>,
+}
+
+impl Overlay {
+    /// Width and height in a picture with `height` rows, in pixels.
+    pub fn measure(&self, height: u32, frame: &FrameView) -> [i32; 2] {
+        let pen = self.pen(height);
+        self.content.measure(&pen, frame).map(|length| {
+            #[expect(clippy::cast_possible_truncation, reason = "saturated")]
+            let length = length.ceil() as i32;
+            length.clamp(0, 1 << 15)
+        })
+    }
+
+    /// The size, limited to that of the picture.
+    fn size_in(&self, width: u32, height: u32, frame: &FrameView) -> [i32; 2] {
+        let [own_width, own_height] = self.measure(height, frame);
+        let limit = |own: i32, side: u32| own.min(i32::try_from(side).unwrap_or(i32::MAX));
+        [limit(own_width, width), limit(own_height, height)]
+    }
+
+    /// The texts that do not change from frame to frame.
+    fn texts(&self) -> Vec<&str> {
+        match &self.content {
+            Content::ColorBar(bar) => bar.texts(),
+            Content::Text(template) => template.texts().collect(),
+            Content::ScaleBar(bar) => vec![&bar.unit],
+            Content::Axes(axes) => axes.names.iter().map(String::as_str).collect(),
+        }
+    }
+
+    /// The characters of its texts that the font does not have.
+    pub fn missing_glyphs(&self) -> Vec<char> {
+        missing_glyphs(&self.texts().concat())
+    }
+
+    fn pen(&self, height: u32) -> Pen {
+        let picture = height as f32;
+        let size = (self.size * picture).max(LEAST_TEXT);
+        Pen {
+            font: Font::new(size),
+            picture,
+            line: (size / 16.0).round().max(1.0),
+            color: self.color,
+        }
+    }
+
+    fn draw(&self, [left, top]: [i32; 2], size: [i32; 2], pen: &Pen, frame: &FrameView) -> Sprite {
+        let radius = (HALO * pen.font.size).max(1.0);
+        #[expect(clippy::cast_possible_truncation, reason = "a few pixels")]
+        let margin = radius.ceil() as i32 + 1;
+        let mut canvas = Canvas::new(size[0] + 2 * margin, size[1] + 2 * margin);
+        let corner = [margin as f32; 2];
+        self.content.draw(&mut canvas, corner, pen, frame);
+        canvas.add_halo(radius, self.halo);
+        canvas.into_sprite(left - margin, top - margin)
+    }
+}
+
+/// Draws `overlays` for a picture of `width` by `height` pixels.
+pub fn draw(overlays: &[Overlay], width: u32, height: u32, frame: &FrameView) -> Vec<Sprite> {
+    let sizes: Vec<[i32; 2]> = overlays
+        .iter()
+        .map(|overlay| overlay.size_in(width, height, frame))
+        .collect();
+    let placements: Vec<Placement> = overlays.iter().map(|overlay| overlay.placement).collect();
+    let corners = layout::place(&placements, &sizes, [width, height]);
+    let drawn = overlays.iter().zip(sizes).zip(corners);
+    drawn
+        .map(|((overlay, size), corner)| overlay.draw(corner, size, &overlay.pen(height), frame))
+        .collect()
+}
+
+/// Memory for drawing `overlays` over a picture, bytes. Variables of texts count as short.
+pub fn bytes(overlays: &[Overlay], width: u32, height: u32) -> u64 {
+    /// Bytes per pixel of a sprite, and of the canvas with its halo that it is drawn in.
+    const PIXEL: [u64; 2] = [4, 20];
+    let areas = overlays.iter().map(|overlay| {
+        let [width, height] = overlay.size_in(width, height, &FrameView::default());
+        // Margins of the halo, and values of variables
+        2 * u64::from(width.unsigned_abs()) * u64::from(height.unsigned_abs())
+    });
+    let (sum, most) = areas.fold((0, 0), |(sum, most), area| (sum + area, area.max(most)));
+    PIXEL[0] * sum + PIXEL[1] * most
+}
+
+impl Sprite {
+    /// Draws the part of the sprite in row `y` over the row of a picture, sRGB.
+    pub fn draw_over(&self, y: i32, row: &mut [u8]) {
+        let row = row.as_chunks_mut::<3>().0;
+        self.each_in_row(y, row.len(), |x, [r, g, b, a]| {
+            let under = u32::from(255 - a);
+            for (byte, over) in row[x].iter_mut().zip([r, g, b]) {
+                let below = (u32::from(*byte) * under + 127) / 255;
+                let sum = u32::from(over) + below;
+                *byte = u8::try_from(sum).unwrap_or(u8::MAX);
+            }
+        });
+    }
+
+    /// Calls `visit` with the column and the colour of each pixel in row `y` of a picture with `width` columns.
+    pub fn each_in_row(&self, y: i32, width: usize, mut visit: impl FnMut(usize, [u8; 4])) {
+        let inside = y
+            .checked_sub(self.top)
+            .filter(|row| (0..self.height).contains(row));
+        let Some(row) = inside.and_then(|row| usize::try_from(row).ok()) else {
+            return;
+        };
+        let own = usize::try_from(self.width).unwrap_or(0);
+        let pixels = self.pixels.iter().skip(row * own).take(own);
+        for (pixel, x) in pixels.zip(self.left..) {
+            if let Some(x) = usize::try_from(x).ok().filter(|x| *x < width) {
+                visit(x, *pixel);
+            }
+        }
+    }
+}
+
+/// What contents are drawn with.
+struct Pen {
+    font: Font,
+    /// Height of the picture in pixels.
+    picture: f32,
+    /// Width of thin lines in pixels.
+    line: f32,
+    color: Color,
+}
+
+impl Pen {
+    /// Width and height of lines of text.
+    fn text_size(&self, text: &str) -> [f32; 2] {
+        let lines = text.lines().count();
+        #[expect(clippy::cast_precision_loss, reason = "a few")]
+        let height = font::LINE * (lines as f32 - 1.0).max(0.0) + if lines > 0 { 1.0 } else { 0.0 };
+        [self.font.width(text), height * self.font.size]
+    }
+
+    /// Draws lines of text below `corner`.
+    fn text(&self, canvas: &mut Canvas, text: &str, corner: [f32; 2]) {
+        // Capitals are in the middle of the line
+        let mut baseline = corner[1] + 0.5 * (1.0 + font::CAP_HEIGHT) * self.font.size;
+        for line in text.lines() {
+            self.font
+                .draw(canvas, line, corner[0], baseline, self.color);
+            baseline += font::LINE * self.font.size;
+        }
+    }
+
+    /// Draws a label whose capitals and digits have their middle at `middle`.
+    fn label(&self, canvas: &mut Canvas, text: &str, x: f32, middle: f32) {
+        let baseline = middle + 0.5 * font::CAP_HEIGHT * self.font.size;
+        self.font.draw(canvas, text, x, baseline, self.color);
+    }
+}
+
+impl Content {
+    fn measure(&self, pen: &Pen, frame: &FrameView) -> [f32; 2] {
+        match self {
+            Self::ColorBar(bar) => bar.measure(pen),
+            Self::Text(template) => pen.text_size(&template.expand(&frame.values)),
+            Self::ScaleBar(bar) => bar.measure(pen, frame),
+            Self::Axes(axes) => axes.measure(pen),
+        }
+    }
+
+    fn draw(&self, canvas: &mut Canvas, corner: [f32; 2], pen: &Pen, frame: &FrameView) {
+        match self {
+            Self::ColorBar(bar) => bar.draw(canvas, corner, pen),
+            Self::Text(template) => pen.text(canvas, &template.expand(&frame.values), corner),
+            Self::ScaleBar(bar) => bar.draw(canvas, corner, pen, frame),
+            Self::Axes(axes) => axes.draw(canvas, corner, pen, frame),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,173 @@
+//! Sizes and pixels of overlays.
+
+use super::*;
+use crate::scene::ColorScale;
+
+const BLACK: Color = [0.0; 3];
+
+fn overlay(content: Content) -> Overlay {
+    Overlay {
+        content,
+        placement: Placement {
+            corner: Corner::TopLeft,
+            offset: [0.05, 0.05],
+        },
+        size: 0.05,
+        color: BLACK,
+        halo: [1.0; 3],
+    }
+}
+
+fn text(text: &str) -> Overlay {
+    overlay(Content::Text(Template::parse(text).unwrap()))
+}
+
+/// A bar from blue at 0 to yellow at 4.
+fn bar(title: &str) -> Overlay {
+    overlay(Content::ColorBar(ColorBar {
+        title: title.to_owned(),
+        unit: "m/s".to_owned(),
+        length: 0.5,
+        kind: ColorBarKind::Numbers {
+            colors: vec![[0.0, 0.0, 1.0], [1.0, 1.0, 0.0]],
+            range: [0.0, 4.0],
+            scale: ColorScale::Linear,
+            is_discrete: false,
+        },
+    }))
+}
+
+/// A white picture with the overlays.
+fn drawn(overlays: &[Overlay], width: u32, height: u32, frame: &FrameView) -> Vec<u8> {
+    let sprites = draw(overlays, width, height, frame);
+    let mut picture = vec![255; 3 * width as usize * height as usize];
+    for (row, y) in picture.chunks_mut(3 * width as usize).zip(0..) {
+        sprites.iter().for_each(|sprite| sprite.draw_over(y, row));
+    }
+    picture
+}
+
+#[test]
+fn text_has_the_size_of_its_letters() {
+    let frame = FrameView::default();
+    // 20 pixels: the widths of S, p, e, e, d in 1/2048 em are 1300, 1300, 1260, 1260, 1300
+    let width = 6420.0_f64 / 2048.0 * 20.0;
+    let expected = [width.ceil(), 20.0];
+    assert_eq!(text("Speed").measure(400, &frame).map(f64::from), expected);
+    // Two lines
+    assert_eq!(text("Speed\nd").measure(400, &frame), [63, 45]);
+    // Text never becomes too small to be read
+    assert_eq!(text("Speed").measure(40, &frame), [29, 9]);
+    assert_eq!(text("").measure(400, &frame), [0, 0]);
+}
+
+#[test]
+fn a_bar_shows_its_colours_from_bottom_to_top() {
+    let (width, height) = (200, 400);
+    let picture = drawn(&[bar("v")], width, height, &FrameView::default());
+    let pixel = |x: usize, y: usize| &picture[3 * (y * width as usize + x)..][..3];
+    // The bar is 18 pixels wide, from x = 20; title and gap are 30 pixels high, from y = 20
+    for row in [51, 150, 248] {
+        let part = 1.0 - (f64::from(row) + 0.5 - 50.0) / 200.0;
+        let expected = [part, part, 1.0 - part].map(|v| 255.0 * v);
+        for (found, expected) in pixel(29, row.try_into().unwrap()).iter().zip(expected) {
+            assert!((f64::from(*found) - expected).abs() <= 1.0, "{row}");
+        }
+    }
+    // A frame of a pixel, and ticks at 0, 1, 2, 3 and 4
+    assert_eq!(pixel(19, 150), [0, 0, 0]);
+    assert_eq!(pixel(38, 150), [0, 0, 0]);
+    for row in [49, 99, 149, 199, 249] {
+        let rows: Vec<usize> = (row - 2..=row + 2)
+            .filter(|y| pixel(42, *y) == [0, 0, 0])
+            .collect();
+        assert_eq!(rows.len(), 1, "{row}: {rows:?}");
+    }
+    assert_ne!(pixel(42, 125), [0, 0, 0]);
+}
+
+#[test]
+fn titles_have_unit_and_exponent() {
+    let frame = FrameView::default();
+    let plain = bar("speed").measure(400, &frame)[0];
+    let Content::ColorBar(mut large) = bar("speed").content else {
+        unreachable!()
+    };
+    if let ColorBarKind::Numbers { range, .. } = &mut large.kind {
+        *range = [0.0, 4e6];
+    }
+    let wide = overlay(Content::ColorBar(large)).measure(400, &frame)[0];
+    let text_width = |s: &str| text(s).measure(400, &frame)[0];
+    assert_eq!(plain, text_width("speed (m/s)"));
+    assert_eq!(wide, text_width("speed (10⁶ m/s)"));
+}
+
+#[test]
+fn lengths_of_scale_bars_are_those_of_the_scene() {
+    let frame = FrameView {
+        units_per_height: 4.0,
+        ..FrameView::default()
+    };
+    let scale_bar = |length: f64| {
+        overlay(Content::ScaleBar(ScaleBar {
+            length,
+            unit: "mm".to_owned(),
+        }))
+    };
+    // An eighth of 400 pixels; the label is wider
+    let sprite = &draw(&[scale_bar(0.5)], 600, 400, &frame)[0];
+    let dark = |x: &i32| {
+        let at = usize::try_from(27 + 3 + 10 / 2).unwrap() * usize::try_from(sprite.width).unwrap();
+        let pixel = sprite.pixels[at + usize::try_from(*x).unwrap()];
+        pixel == [0, 0, 0, 255]
+    };
+    let rows = 0..sprite.width;
+    assert_eq!(rows.filter(dark).count(), 50);
+    for (height, expected) in [
+        (4.0, 0.5),
+        (1.0, 0.2),
+        (0.049, 0.005),
+        (9999.0, 1000.0),
+        (0.0, 1.0),
+    ] {
+        assert_eq!(ScaleBar::round_length(height), expected, "{height}");
+    }
+}
+
+#[test]
+fn overlays_beyond_the_picture_are_cut_off() {
+    let frame = FrameView {
+        axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        ..FrameView::default()
+    };
+    let axes = overlay(Content::Axes(Axes {
+        names: ["x", "y", "z"].map(str::to_owned),
+    }));
+    for (width, height) in [(1, 1), (16, 9), (30, 300)] {
+        let all = [bar("a long title"), axes.clone(), text("t = 1")];
+        assert_eq!(
+            drawn(&all, width, height, &frame).len(),
+            3 * (width * height) as usize
+        );
+    }
+}
+
+/// The pixels of all machines.
+#[test]
+fn all_machines_draw_the_same_bytes() {
+    let frame = FrameView {
+        units_per_height: 4.0,
+        axes: [[0.8, 0.1, 0.5], [-0.5, 0.4, 0.7], [0.1, 0.9, -0.3]],
+        ..FrameView::default()
+    };
+    let mut corner = bar("speed ρ ≤ ½");
+    corner.placement.corner = Corner::BottomRight;
+    let axes = overlay(Content::Axes(Axes {
+        names: ["x", "y", "z"].map(str::to_owned),
+    }));
+    let picture = drawn(&[corner, axes, text("t = 0.35 s")], 480, 270, &frame);
+    assert_eq!(
+        blake3::hash(&picture).to_hex()[..16].to_owned(),
+        "f724e44a97c2398b"
+    );
+}

@@ -1,0 +1,82 @@
+//! The overlays of images.
+
+use super::renderer::TracedFrame;
+use super::setup::Setup;
+use crate::overlay::{FrameValues, FrameView, Sprite, draw};
+use crate::render::Film;
+use crate::scene::{Camera, RgbEncoding};
+
+impl Setup {
+    /// Lengths of the scene in the height of the picture, at the distance of the centre of the particles.
+    pub fn units_per_height(&self, camera: &Camera) -> f64 {
+        let [min, max] = self.picture.scene.particles;
+        let depth = f64::from(camera.depth_of(0.5 * (min + max)));
+        2.0 * f64::from(camera.half_extent().y) * depth
+    }
+
+    /// What overlays show of an image.
+    fn frame_view(&self, frame: &TracedFrame) -> FrameView {
+        let names = self.picture.overlay_values.iter().cloned();
+        let [right, up, forward] = frame.camera.axes();
+        let axis = |i: usize| [right[i], up[i], forward[i]];
+        FrameView {
+            values: FrameValues {
+                time: frame.time,
+                frame: frame.task.frame,
+                particles: frame.report.particles,
+                file: frame.facts.file.clone(),
+                ranges: names.zip(frame.facts.ranges.iter().copied()).collect(),
+            },
+            units_per_height: self.units_per_height(&frame.camera),
+            axes: [axis(0), axis(1), axis(2)],
+        }
+    }
+
+    /// The overlays of an image.
+    pub(super) fn overlays_of(&self, frame: &TracedFrame) -> Vec<Sprite> {
+        let overlays = &self.picture.overlays;
+        if overlays.is_empty() {
+            return Vec::new();
+        }
+        let (width, height) = (frame.film.width, frame.film.height);
+        draw(overlays, width, height, &self.frame_view(frame))
+    }
+}
+
+/// Stores overlays in their layer of `film`, if it has one.
+pub(super) fn store(film: &mut Film, sprites: &[Sprite]) {
+    let layers = film.channels.layers;
+    let (place, floats) = (layers.overlay_at(), layers.floats());
+    if place.is_empty() {
+        return;
+    }
+    let width = film.width as usize;
+    let Some(planes) = &mut film.layers else {
+        return;
+    };
+    for (row, y) in planes.chunks_mut((width * floats).max(1)).zip(0..) {
+        // The planes may be those of another image
+        for pixel in row.chunks_mut(floats) {
+            pixel[place.clone()].fill(0.0);
+        }
+        for sprite in sprites {
+            sprite.each_in_row(y, width, |x, pixel| {
+                let own = &mut row[x * floats..][..floats];
+                blend(&mut own[place.clone()], pixel);
+            });
+        }
+    }
+}
+
+/// Draws premultiplied sRGB over linear RGB with alpha.
+fn blend(under: &mut [f32], [r, g, b, a]: [u8; 4]) {
+    if a == 0 {
+        return;
+    }
+    let alpha = f32::from(a) / 255.0;
+    let straight = [r, g, b].map(|byte| f64::from(byte) / f64::from(a) * 255.0);
+    let color = alpha * RgbEncoding::Srgb8.color(straight);
+    for (under, over) in under.iter_mut().zip([color.x, color.y, color.z, alpha]) {
+        *under = over + *under * (1.0 - alpha);
+    }
+}

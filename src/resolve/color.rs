@@ -1,0 +1,258 @@
+//! Colours of particles: which value they show, and through which map.
+
+use super::{ResolveError, narrow, require_attribute, similar};
+use crate::manifest::{ColorMapping, ColorSetting, Manifest, RangeSetting, ScaleKind};
+use crate::pipeline::{ColorRule, attribute_list};
+use crate::scene::{Camera, ColorMap, ColorScale, UnknownColorMap, material};
+use crate::survey::{
+    Categories, ColorQuestion, ColorRange, GEOMETRIC_VALUES, MAX_CATEGORIES, Named, ParticleValue,
+    RangeQuestion, Survey, range_of,
+};
+
+const ATTRIBUTE: &str = "material.color.attribute";
+const SCALE: &str = "material.color.scale";
+
+/// [`ColorMapping::threshold`] as a fraction of the largest value of the range.
+const THRESHOLD: f64 = 0.01;
+
+/// What the survey has to determine.
+pub(super) fn question(setting: &ColorSetting) -> ColorQuestion<'_> {
+    match setting {
+        ColorSetting::Auto => ColorQuestion::Speed(RangeQuestion::default()),
+        ColorSetting::Rgb(_) => ColorQuestion::None,
+        ColorSetting::Mapped(by) => match &by.attribute {
+            Some(name) => ColorQuestion::Value(name, range_question(by)),
+            None => ColorQuestion::Speed(range_question(by)),
+        },
+    }
+}
+
+fn range_question(by: &ColorMapping) -> RangeQuestion {
+    match (by.scale(), by.range) {
+        (ScaleKind::Categorical, _) => RangeQuestion::Categories,
+        (ScaleKind::Log, Some(RangeSetting::Percentiles(range))) => {
+            RangeQuestion::PositivePercentiles(range)
+        }
+        (_, Some(RangeSetting::Percentiles(range))) => RangeQuestion::Percentiles(range),
+        (ScaleKind::Log, _) => RangeQuestion::Positive,
+        _ => RangeQuestion::Robust,
+    }
+}
+
+/// Whether particles are coloured by their distance from the camera.
+pub(super) fn is_depth(setting: &ColorSetting) -> bool {
+    let ColorSetting::Mapped(by) = setting else {
+        return false;
+    };
+    let name = by.attribute.as_deref();
+    name.and_then(ParticleValue::geometric) == Some(ParticleValue::Depth)
+}
+
+/// The source of the colours; "auto" depends on the attributes that exist.
+pub(super) fn rule(
+    manifest: &Manifest,
+    survey: &Survey,
+    camera: &Camera,
+) -> Result<ColorRule, ResolveError> {
+    let constant = ColorRule::Constant(material::DEFAULT_COLOR);
+    let by = match &manifest.material.color {
+        ColorSetting::Rgb(rgb) => return Ok(ColorRule::Constant(*rgb)),
+        ColorSetting::Auto => match (&survey.color, &survey.rgb) {
+            (Some(_), _) => &ColorMapping::default(),
+            (None, Some(rgb)) => {
+                return Ok(ColorRule::Rgb {
+                    name: rgb.attribute.clone(),
+                    required: false,
+                });
+            }
+            (None, None) => return Ok(constant),
+        },
+        ColorSetting::Mapped(by) => by,
+    };
+    let Some(name) = &by.attribute else {
+        return match &survey.color {
+            Some(color) => mapped(by, color, false, false),
+            None => {
+                require_attribute(survey, "material.color", "velocity")?;
+                Ok(constant)
+            }
+        };
+    };
+    let value = value_of(survey, name, ATTRIBUTE)?;
+    // Any other key means that vectors are mapped by their length
+    if by.is_plain() && survey.rgb.is_some() {
+        return Ok(ColorRule::Rgb {
+            name: name.clone(),
+            required: true,
+        });
+    }
+    let mut color = survey.color.clone().unwrap_or_else(|| ColorRange {
+        attribute: name.clone(),
+        low: 0.0,
+        high: 1.0,
+        left_out: false,
+        categories: None,
+    });
+    color.attribute.clone_from(name);
+    if value == ParticleValue::Depth {
+        let point = |p: &[f32; 3]| f64::from(camera.depth_of((*p).into()));
+        let depths = survey.points.iter().map(point);
+        let visible = depths.filter(|depth| *depth > 0.0).collect();
+        if let Some((low, high)) = range_of(visible, range_question(by)) {
+            (color.low, color.high) = (low, high);
+        }
+    }
+    mapped(by, &color, true, value.needs_geometry())
+}
+
+/// The value `name` of the particles in the survey.
+///
+/// # Errors
+/// There is none, which is a problem of `key`.
+pub(super) fn value_of(
+    survey: &Survey,
+    name: &str,
+    key: &'static str,
+) -> Result<ParticleValue, ResolveError> {
+    let components = survey.components.iter().copied();
+    let known: Vec<SurveyedAttribute<'_>> = (survey.attributes.iter())
+        .zip(components.chain(std::iter::repeat(3)))
+        .map(|(name, components)| SurveyedAttribute { name, components })
+        .collect();
+    let by_name = || ParticleValue::Magnitude(name.to_owned());
+    match ParticleValue::named(name, &known) {
+        Some(value) => Ok(value),
+        None if survey.most_particles == 0 => Ok(by_name()),
+        None => {
+            let geometric = GEOMETRIC_VALUES.map(str::to_owned);
+            let all = [&survey.attributes[..], &geometric].concat();
+            Err(ResolveError::MissingAttribute {
+                key,
+                name: name.to_owned(),
+                hint: similar(name, &all),
+                has: attribute_list(survey.attributes.iter().map(String::as_str)),
+            })
+        }
+    }
+}
+
+/// An attribute in the survey.
+struct SurveyedAttribute<'a> {
+    name: &'a str,
+    components: usize,
+}
+
+impl Named for SurveyedAttribute<'_> {
+    fn name(&self) -> &str {
+        self.name
+    }
+
+    fn components(&self) -> usize {
+        self.components
+    }
+
+    fn is_integer(&self) -> bool {
+        false
+    }
+}
+
+/// Colours by a value with the range in `color`, unless `by` has another one.
+fn mapped(
+    by: &ColorMapping,
+    color: &ColorRange,
+    required: bool,
+    needs_geometry: bool,
+) -> Result<ColorRule, ResolveError> {
+    let map = match by.scale() {
+        ScaleKind::Categorical => categories(by, color)?,
+        _ => continuous(by, color)?,
+    };
+    Ok(ColorRule::Attribute {
+        name: color.attribute.clone(),
+        map,
+        required,
+        needs_geometry,
+    })
+}
+
+fn unknown_map(error: UnknownColorMap) -> ResolveError {
+    ResolveError::Unsupported {
+        key: "material.color.map",
+        what: error.to_string(),
+    }
+}
+
+fn unsupported_scale(what: String) -> ResolveError {
+    ResolveError::Unsupported { key: SCALE, what }
+}
+
+fn categories(by: &ColorMapping, color: &ColorRange) -> Result<ColorMap, ResolveError> {
+    let name = &color.attribute;
+    let none = Vec::new();
+    let values = match &color.categories {
+        Some(Categories::Values(values)) => values,
+        Some(Categories::Fractional) => {
+            let what = format!("`{name}` has values that are no integers; choose another scale");
+            return Err(unsupported_scale(what));
+        }
+        Some(Categories::TooMany) => {
+            let what = format!(
+                "`{name}` has more than {MAX_CATEGORIES} different values; choose another scale"
+            );
+            return Err(unsupported_scale(what));
+        }
+        None => &none,
+    };
+    // Frames that were not surveyed may have the other categories with names
+    let named = by
+        .names
+        .iter()
+        .flat_map(|names| names.0.iter().map(|(value, _)| *value));
+    let mut all: Vec<i64> = values.iter().copied().chain(named).collect();
+    all.sort_unstable();
+    all.dedup();
+    ColorMap::of_categories(&by.map().name(), &all).map_err(unknown_map)
+}
+
+fn continuous(by: &ColorMapping, color: &ColorRange) -> Result<ColorMap, ResolveError> {
+    let range = match by.range {
+        Some(RangeSetting::Values(range)) => range,
+        Some(RangeSetting::Symmetric) => {
+            let high = color.low.abs().max(color.high.abs());
+            [-high, high]
+        }
+        Some(RangeSetting::Percentiles(_)) | None => [color.low, color.high],
+    };
+    let scale = match by.scale() {
+        ScaleKind::Linear | ScaleKind::Categorical => ColorScale::Linear,
+        ScaleKind::Log => {
+            // The user accepts other values by giving a range
+            let is_given = matches!(by.range, Some(RangeSetting::Values(_)));
+            if color.left_out && !is_given {
+                return Err(unsupported_scale(format!(
+                    "`{}` has values of 0 or less, which have no logarithm; give a range above 0, whose first colour \
+                     they get, or set scale = \"symlog\"",
+                    color.attribute
+                )));
+            }
+            ColorScale::Log
+        }
+        ScaleKind::SymLog => {
+            let largest = range[0].abs().max(range[1].abs());
+            let usual = if largest > 0.0 {
+                THRESHOLD * largest
+            } else {
+                1.0
+            };
+            ColorScale::SymLog {
+                threshold: by.threshold.unwrap_or(usual),
+            }
+        }
+    };
+    let name = by.map().name();
+    let map = match scale {
+        ColorScale::Linear => ColorMap::new(&name, narrow(range[0]), narrow(range[1])),
+        scale => ColorMap::with_scale(&name, range, scale),
+    };
+    Ok(map.map_err(unknown_map)?.with_steps(by.steps))
+}

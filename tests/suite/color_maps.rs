@@ -1,0 +1,240 @@
+//! Colours of values through maps: which value, its range, scale and map.
+
+use std::fmt::Write as _;
+use std::fs;
+
+use glam::Vec3;
+use spherule::scene::{ColorMap, ColorScale};
+
+use crate::harness::{Ran, SMALL, Workshop};
+use crate::picture::Picture;
+
+/// Balls next to each other in a row along x, seen from -y. Ball `i` has the speed `i` along y, the mass `10^(i - 2)`,
+/// the charge `i - 2` and the type `1 + i % 3`.
+const COUNT: u8 = 5;
+
+fn row(shop: &Workshop) {
+    let mut text = "x,y,z,vx,vy,vz,mass,charge,type,size\n".to_owned();
+    for i in 0..COUNT {
+        let mass = 10_f64.powi(i32::from(i) - 2);
+        let (charge, kind) = (i32::from(i) - 2, 1 + i % 3);
+        let size = 0.2 + 0.05 * f64::from(i);
+        writeln!(text, "{i},0,0,0,{i},0,{mass},{charge},{kind},{size}").expect("a line");
+    }
+    fs::create_dir_all(shop.join("in")).expect("a directory");
+    fs::write(shop.join("in/p_1.csv"), text).expect("a file");
+}
+
+fn render(shop: &Workshop, input: &str, options: &[&str]) -> Ran {
+    let arguments = [
+        "render",
+        input,
+        "-o",
+        "f.exr",
+        "--force",
+        "--channels",
+        "RGBA,albedo,P",
+        "--set",
+        "camera.mode=fixed",
+        "--set",
+        "camera.eye=[2,-8,0]",
+        "--set",
+        "camera.look_at=[2,0,0]",
+    ];
+    shop.run(&[&arguments[..], &SMALL, options].concat())
+}
+
+/// The base colour of each ball.
+#[track_caller]
+fn albedos(shop: &Workshop) -> [Vec3; COUNT as usize] {
+    let picture = Picture::open(&shop.join("f.exr"));
+    let [r, g, b] = ["albedo.R", "albedo.G", "albedo.B"].map(|name| picture.floats(name));
+    let (alpha, x) = (picture.floats("A"), picture.floats("P.X"));
+    std::array::from_fn(|i| {
+        let is_on = |at: usize| alpha[at] == 1.0 && (x[at] - i as f32).abs() < 0.1;
+        let at = (0..alpha.len()).find(|at| is_on(*at)).expect("the ball");
+        Vec3::new(r[at], g[at], b[at])
+    })
+}
+
+#[track_caller]
+fn assert_colors(shop: &Workshop, options: &[&str], map: &ColorMap, values: [f32; COUNT as usize]) {
+    let radius: &[&str] = match options.contains(&"input.radius.attribute=size") {
+        true => &[],
+        false => &["--radius", "0.3"],
+    };
+    for input in ["in", "native"] {
+        render(shop, input, &[radius, options].concat()).expect(0);
+        for (found, value) in albedos(shop).into_iter().zip(values) {
+            let expected = map.color(value);
+            let error = (found - expected).abs().max_element();
+            assert!(
+                error < 2e-3,
+                "{input} {options:?} {value}: {found} instead of {expected}"
+            );
+        }
+    }
+}
+
+fn shop() -> Workshop {
+    let shop = Workshop::new();
+    row(&shop);
+    shop.run(&["convert", "in", "-o", "native", "--bits", "none"]);
+    if !shop.join("native").exists() {
+        shop.run(&["convert", "in", "-o", "native"]).expect(0);
+    }
+    shop
+}
+
+#[test]
+fn values_that_colour_particles() {
+    let shop = shop();
+    let linear = |low, high| ColorMap::new("viridis", low, high).expect("a map");
+    let index = [0.0, 1.0, 2.0, 3.0, 4.0];
+    assert_colors(
+        &shop,
+        &["--color-by", "velocity.y"],
+        &linear(0.0, 4.0),
+        index,
+    );
+    let other = ["--color-by", "velocity[0]", "--range", "-1", "1"];
+    assert_colors(&shop, &other, &linear(-1.0, 1.0), [0.0; 5]);
+    assert_colors(&shop, &["--color-by", "index"], &linear(0.0, 4.0), index);
+    let height = ["--color-by", "height", "--up", "x"];
+    assert_colors(&shop, &height, &linear(0.0, 4.0), index);
+    // The distance along the view axis is that of the plane of the balls
+    let depth = ["--color-by", "depth", "--range", "7", "9"];
+    assert_colors(&shop, &depth, &linear(7.0, 9.0), [8.0; 5]);
+    let radius = [
+        "--color-by",
+        "radius",
+        "--set",
+        "input.radius.attribute=size",
+    ];
+    let sizes = index.map(|i| 0.2 + 0.05 * i);
+    assert_colors(&shop, &radius, &linear(0.2, 0.4), sizes);
+}
+
+#[test]
+fn scales_and_ranges() {
+    let shop = shop();
+    let index: [f32; 5] = [0.0, 1.0, 2.0, 3.0, 4.0];
+    let mass = [1e-2, 1e-1, 1.0, 10.0, 100.0];
+    let scaled = |name, range, scale| ColorMap::with_scale(name, range, scale).expect("a map");
+    let log = ["--color-by", "mass", "--color-scale", "log"];
+    let map = scaled("viridis", [1e-2, 1e2], ColorScale::Log);
+    assert_colors(&shop, &log, &map, mass);
+    let symlog = [
+        &log[..3],
+        &[
+            "symlog",
+            "--set",
+            "material.color.threshold=1",
+            "--map",
+            "batlow_r",
+        ],
+    ]
+    .concat();
+    let map = scaled(
+        "batlow_r",
+        [1e-2, 1e2],
+        ColorScale::SymLog { threshold: 1.0 },
+    );
+    assert_colors(&shop, &symlog, &map, mass);
+    let charge = index.map(|i| i - 2.0);
+    let symmetric = [
+        "--color-by",
+        "charge",
+        "--set",
+        "material.color.range=symmetric",
+    ];
+    let vik = ColorMap::new("vik", -2.0, 2.0).expect("a map");
+    assert_colors(&shop, &symmetric, &vik, charge);
+    // numpy.percentile([0, 1, 2, 3, 4], [10, 75])
+    let percentiles = [
+        "--color-by",
+        "velocity",
+        "--set",
+        "material.color.range=10%-75%",
+    ];
+    let map = ColorMap::new("viridis", 0.4, 3.0).expect("a map");
+    assert_colors(&shop, &percentiles, &map, index);
+    let steps = [
+        "--color-by",
+        "index",
+        "--set",
+        "material.color.steps=2",
+        "--set",
+        "material.color.reverse=true",
+    ];
+    let map = ColorMap::new("viridis_r", 0.0, 1.0).expect("a map");
+    assert_colors(&shop, &steps, &map, [0.0, 0.0, 1.0, 1.0, 1.0]);
+}
+
+#[test]
+fn categories() {
+    let shop = shop();
+    let types = ["--color-by", "type", "--color-scale", "categorical"];
+    render(&shop, "in", &[&types[..], &["--radius", "0.3"]].concat())
+        .prints("colour by `type`, 3 categories");
+    let map = ColorMap::of_categories("okabe-ito", &[1, 2, 3]).expect("a palette");
+    assert_colors(&shop, &types, &map, [1.0, 2.0, 3.0, 1.0, 2.0]);
+    let named = [
+        &types[..],
+        &[
+            "--map",
+            "tol-bright",
+            "--set",
+            "material.color.names.7=walls",
+        ],
+    ]
+    .concat();
+    let map = ColorMap::of_categories("tol-bright", &[1, 2, 3, 7]).expect("a palette");
+    assert_colors(&shop, &named, &map, [1.0, 2.0, 3.0, 1.0, 2.0]);
+}
+
+#[test]
+fn impossible_colours_are_refused() {
+    let shop = shop();
+    for (options, part) in [
+        (
+            &["--color-by", "charge", "--color-scale", "log"][..],
+            "`charge` has values of 0 or less",
+        ),
+        (&["--color-by", "mas"], "did you mean `mass`?"),
+        (&["--color-by", "hight"], "did you mean `height`?"),
+        (&["--color-by", "velocity.w"], "no attribute `velocity.w`"),
+        (
+            &["--color-by", "mass", "--color-scale", "categorical"],
+            "values that are no integers",
+        ),
+        (&["--range", "3", "3"], "two rising numbers"),
+        (
+            &[
+                "--color-by",
+                "mass",
+                "--color-scale",
+                "log",
+                "--range",
+                "0",
+                "1",
+            ],
+            "has no logarithm",
+        ),
+    ] {
+        let ran = render(&shop, "in", &[options, &["--radius", "0.3"]].concat());
+        ran.expect(2).prints(part);
+    }
+    // With a range, values that have no logarithm have the first colour
+    let log = [
+        "--color-by",
+        "charge",
+        "--color-scale",
+        "log",
+        "--range",
+        "1",
+        "2",
+    ];
+    let map = ColorMap::with_scale("viridis", [1.0, 2.0], ColorScale::Log).expect("a map");
+    assert_colors(&shop, &log, &map, [-2.0, -1.0, 0.0, 1.0, 2.0]);
+}
