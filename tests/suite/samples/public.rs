@@ -104,6 +104,10 @@ const SPLASHSURF: &[(&str, Is)] = &[
 
 const PYSPH: &[(&str, Is)] = &[
     (
+        "dam_break_3d_00100_gzip.hdf5",
+        Particles(8716, [-0.06, -0.56, -0.06], [3.24, 0.52, 1.02]),
+    ),
+    (
         "dam_break_3d_00300.npz",
         Refused("pickled python objects ('|O'), which are never unpickled"),
     ),
