@@ -1,7 +1,7 @@
 //! A page that plays the pictures of a job: one HTML file with a script and no access to a network.
 //!
 //! The caller lists the frames; this module reads their pictures, and from OpenEXR images what is under the pointer
-//! ([`ids`]) and small pictures of other channels ([`channels`]), within limits for the size of the page.
+//! (`ids`) and small pictures of other channels (`channels`), within limits for the size of the page.
 
 use std::fs;
 use std::io;
