@@ -2,7 +2,6 @@
 
 use super::dialect::{Dialect, StepInfo, integer, listed, no_step};
 use super::file::Node;
-use super::piece::Piece;
 use super::properties::{PropertyFinder, numbers, values};
 use super::table::{Part, ParticleTable};
 use super::values::{Slice, Values};
@@ -81,26 +80,8 @@ impl Dialect for StepGroups {
     fn table(&self, step: usize, budget: MemoryBudget) -> Result<ParticleTable, ParseError> {
         let (number, node) = self.node(step)?;
         let mut finder = PropertyFinder::new(0, budget);
-        let mut positions: Vec<Piece> = Vec::new();
-        for (index, name) in ["x", "y", "z"].into_iter().enumerate() {
-            let Some(axis) = axis(&node, name, budget)? else {
-                if index == 2 {
-                    continue;
-                }
-                let what = format!("{} has no coordinates {name}", node.path());
-                return Err(ParseError::malformed(0, what));
-            };
-            if index == 0 {
-                finder.count = axis.count();
-            }
-            if axis.count() != finder.count || axis.components() != 1 {
-                let (shape, count) = (&axis.stored().shape, finder.count);
-                let what = format!("shape {shape:?} for {count} particles");
-                return Err(axis.stored().bad(what));
-            }
-            finder.exclude(axis.stored());
-            positions.push(Piece::Stored(axis));
-        }
+        let find = |name: &str| axis(&node, name, budget);
+        let positions = finder.positions(&node, "coordinates", find)?;
         for name in node.members()?.1 {
             if !TIMES.contains(&name.as_str()) {
                 finder.add(&node, &name, &name, &Slice::ALL)?;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::dialect::{Dialect, StepInfo, listed, no_step, part_names, units};
 use super::file::{Node, dataset_number};
 use super::piece::Piece;
-use super::properties::PropertyFinder;
+use super::properties::{AXES, PropertyFinder};
 use super::stored::Stored;
 use super::table::{Part, ParticleTable};
 use super::values::{Slice, Values};
@@ -17,7 +17,6 @@ const POSITION: &str = "position";
 const OFFSET: &str = "positionOffset";
 /// What stands for the number of an iteration in the path to it.
 const ITERATION: &str = "%T";
-const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// A file with iterations.
 pub(super) struct OpenPmd {

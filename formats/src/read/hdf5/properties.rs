@@ -14,6 +14,9 @@ use crate::{MemoryBudget, ParseError};
 /// Most numbers of a data set that is read beside the particles, such as a list of times.
 const MOST_NUMBERS: u64 = 1 << 24;
 
+/// Names of data sets that each have the positions along one axis.
+pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
+
 /// Properties by name. The components of a vector may be several pieces.
 pub(super) type Named = Vec<(String, Vec<Piece>)>;
 
@@ -43,6 +46,40 @@ impl PropertyFinder {
     /// Makes the data set a position, so that it does not become a property.
     pub(super) fn exclude(&mut self, stored: &Stored) {
         self.used.insert(stored.at);
+    }
+
+    /// The positions, whose axes x, y and z are data sets of their own; z may be missing. The particles are as many as
+    /// the values of x. `values` are those of an axis, `what` says in messages what an axis has.
+    ///
+    /// # Errors
+    /// [`ParseError::Malformed`] if x or y is missing or an axis has another length, and those of `values`.
+    pub(super) fn positions(
+        &mut self,
+        node: &Node,
+        what: &str,
+        values: impl Fn(&str) -> Result<Option<Values>, ParseError>,
+    ) -> Result<Vec<Piece>, ParseError> {
+        let mut positions = Vec::new();
+        for (index, name) in AXES.into_iter().enumerate() {
+            let Some(axis) = values(name)? else {
+                if index == 2 {
+                    continue;
+                }
+                let what = format!("{} has no {what} {name}", node.path());
+                return Err(ParseError::malformed(0, what));
+            };
+            if index == 0 {
+                self.count = axis.count();
+            }
+            if axis.count() != self.count || axis.components() != 1 {
+                let (shape, count) = (&axis.stored().shape, self.count);
+                let what = format!("shape {shape:?} for {count} particles");
+                return Err(axis.stored().bad(what));
+            }
+            self.exclude(axis.stored());
+            positions.push(Piece::Stored(axis));
+        }
+        Ok(positions)
     }
 
     /// Adds the data set `dataset` of `node` as `name` if it has `slice` for the particles.

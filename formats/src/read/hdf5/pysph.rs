@@ -7,12 +7,10 @@ use hdf5_reader::Dataset;
 use super::dialect::{Dialect, StepInfo, integer, listed, part_names};
 use super::file::{Node, dataset_number};
 use super::piece::Piece;
-use super::properties::{PropertyFinder, values};
+use super::properties::{AXES, PropertyFinder, values};
 use super::table::{Part, ParticleTable};
 use super::values::Slice;
 use crate::{MemoryBudget, ParseError, ScalarType};
-
-const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// A file with particle arrays.
 pub(super) struct ParticleArrays {
@@ -82,28 +80,13 @@ impl ParticleArrays {
         names: &BTreeSet<String>,
         budget: MemoryBudget,
     ) -> Result<Part, ParseError> {
-        let mut positions = Vec::new();
         let mut finder = PropertyFinder::new(0, budget);
-        for (index, name) in AXES.into_iter().enumerate() {
+        // In two dimensions, z is empty
+        let find = |name: &str| {
             let axis = values(node, name, &Slice::ALL, budget)?;
-            let Some(axis) = axis.filter(|axis| index < 2 || axis.count() > 0) else {
-                if index == 2 {
-                    continue;
-                }
-                let what = format!("{} has no numbers {name}", node.path());
-                return Err(ParseError::malformed(0, what));
-            };
-            if index == 0 {
-                finder.count = axis.count();
-            }
-            if axis.count() != finder.count || axis.components() != 1 {
-                let (shape, count) = (&axis.stored().shape, finder.count);
-                let what = format!("shape {shape:?} for {count} particles");
-                return Err(axis.stored().bad(what));
-            }
-            finder.exclude(axis.stored());
-            positions.push(Piece::Stored(axis));
-        }
+            Ok(axis.filter(|axis| name != AXES[2] || axis.count() > 0))
+        };
+        let positions = finder.positions(node, "numbers", find)?;
         for name in node.members()?.1 {
             if names.contains(&name) && !AXES.contains(&name.as_str()) {
                 add_property(&mut finder, node, &name)?;
