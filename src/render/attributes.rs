@@ -48,14 +48,10 @@ impl RenderContext<'_> {
             }
         }
         // Look up the colours of all other surfaces
-        let sand = match &self.scene.ground {
-            Some(ground) => {
-                let lanes = hits.lanes_of(MaterialId::GROUND);
-                let is_sand = lanes != 0 && ground.sand_colors(self.simd, &hits.point, lanes, base);
-                if is_sand { lanes } else { 0 }
-            }
-            None => 0,
-        };
+        let ground = hits.lanes_of(MaterialId::GROUND);
+        let sand = self.scene.ground.as_ref().map_or(0, |pattern| {
+            pattern.sand_colors(self.simd, &hits.point, ground, base)
+        });
         for lane in lanes_in(hits.mask & !(particles | sand)) {
             let ray = (&segments.rays, segments.bounces[lane]);
             let color = self.fixed_color(ray, hits, lane);

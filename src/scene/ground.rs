@@ -196,16 +196,17 @@ impl Ground {
         }
     }
 
-    /// Sets the `colors` of `lanes` at the `points` of a ground of sand. Returns whether it is one.
+    /// Sets the `colors` of `lanes` at the `points` of a ground of sand. Returns these lanes; none for other patterns.
     pub(crate) fn sand_colors(
         &self,
         simd: Supported,
         points: &Lanes3,
         lanes: u32,
         colors: &mut Lanes3,
-    ) -> bool {
-        let Pattern::Sand { tile } = self.pattern else {
-            return false;
+    ) -> u32 {
+        let tile = match self.pattern {
+            Pattern::Sand { tile } if lanes != 0 => tile,
+            _ => return 0,
         };
         let [across, along] = self.axes();
         let lattice = Lattice {
@@ -219,7 +220,7 @@ impl Ground {
         for lane in lanes_in(lanes) {
             set_lane3(colors, lane, shades[lane] * self.color);
         }
-        true
+        lanes
     }
 
     /// The colour of a picture on the ground.
@@ -326,7 +327,11 @@ mod tests {
         let lanes = [0, 1, 2].map(|axis| points.map(|point| point[axis]));
         for level in SimdLevel::ALL {
             let mut colors = splat3(Vec3::ZERO);
-            assert!(ground.sand_colors(Supported::or_best(level), &lanes, 0xffff, &mut colors));
+            let simd = Supported::or_best(level);
+            assert_eq!(
+                ground.sand_colors(simd, &lanes, 0xffff, &mut colors),
+                0xffff
+            );
             for (lane, point) in points.iter().enumerate() {
                 assert_eq!(lane3(&colors, lane), ground.color_at(*point));
             }

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use spherule_formats::Positions;
 
-use super::robust::{ESCAPE_MIN, SAMPLE};
+use super::robust::{ESCAPE_MIN, sample_of};
 
 /// Number of axes along which the outermost particles are found, in both directions.
 const AXES: usize = 64;
@@ -49,12 +49,7 @@ struct End {
 impl Outermost {
     /// Adds a frame of `count` particles, of which `positions` may be an even selection.
     pub(super) fn add(&mut self, positions: &Positions, count: usize) {
-        let stride = positions.len().div_ceil(SAMPLE).max(1);
-        let sample: Vec<DVec3> = (0..positions.len())
-            .step_by(stride)
-            .map(|i| positions.get(i))
-            .filter(|p| p.is_finite())
-            .collect();
+        let mut sample = sample_of(positions);
         if sample.is_empty() {
             return;
         }
@@ -72,7 +67,6 @@ impl Outermost {
         outliers.dedup();
         let each = count.div_ceil(sample.len()).max(1);
         self.outliers = self.outliers.max((outliers.len() * each) as u64);
-        let mut sample = sample;
         for index in outliers.into_iter().rev() {
             sample.swap_remove(index);
         }

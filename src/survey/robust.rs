@@ -7,7 +7,7 @@ use spherule_formats::Positions;
 use super::packing;
 
 /// Number of particles of a frame from which percentiles are computed.
-pub(super) const SAMPLE: usize = 20_000;
+const SAMPLE: usize = 20_000;
 /// Minimum number of particles for which a single one may be treated as an outlier.
 pub(super) const ESCAPE_MIN: usize = 16;
 /// Number of nearest-neighbour distances from which the radius is estimated.
@@ -38,6 +38,14 @@ impl RobustBounds {
 /// A frame's lowest layer is one of this many parts of its particles.
 const LAYER: usize = 200;
 
+/// An even selection of up to [`SAMPLE`] of the `positions`, without those that are not finite.
+pub(super) fn sample_of(positions: &Positions) -> Vec<DVec3> {
+    let stride = positions.len().div_ceil(SAMPLE).max(1);
+    let sample = (0..positions.len()).step_by(stride);
+    let sample = sample.map(|i| positions.get(i));
+    sample.filter(|p| p.is_finite()).collect()
+}
+
 /// The box of the particles, limited on each axis to half the extent of the middle 98 % beyond them. None without
 /// finite particles. `extremes` is the box of all particles if `positions` are only a part of them.
 ///
@@ -50,8 +58,7 @@ pub(super) fn robust_bounds(
 ) -> Option<RobustBounds> {
     let count = positions.len();
     let finite = |i| Some(positions.get(i)).filter(|p: &DVec3| p.is_finite());
-    let stride = count.div_ceil(SAMPLE).max(1);
-    let mut sample: Vec<DVec3> = (0..count).step_by(stride).filter_map(finite).collect();
+    let mut sample = sample_of(positions);
     let outermost = || {
         let all = (0..count).into_par_iter().filter_map(finite);
         all.map(|p| (p, p))
