@@ -1,4 +1,4 @@
-//! `render.caustics`: light on ground and meshes through transmissive particles.
+//! `render.caustics`: light on ground, meshes and opaque particles through transmissive particles.
 
 use serde_json::{Value as Json, json};
 

@@ -169,7 +169,7 @@ section! {
         /// traced follows it up to `bounces`. ambient ends paths at the second surface and estimates the light there:
         /// it is faster and has less noise, but gaps between particles are too pale. It is for previews (--draft).
         indirect: IndirectSetting = IndirectSetting::Traced, affects(Affects::PathTracing);
-        /// Light on ground and meshes through transmissive particles: number of photons; 0 is none
+        /// Light on ground, meshes and opaque particles through transmissive particles: number of photons; 0 is none
         ///
         /// With photons, paths end at the ground, whose light is computed once for each image. Without photons, paths
         /// go on from the ground, and light of `[[light]]` passes particles in a straight line. Lights without shadows

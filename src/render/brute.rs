@@ -60,6 +60,7 @@ impl Ball {
                 normal: normal.as_vec3(),
                 shading: normal.as_vec3(),
                 lift: 0.0,
+                radius: self.radius,
                 particle,
                 anchor: point.as_vec3(),
                 offset: (1e-4 * self.radius).max(8.0 * f32::EPSILON * scale),

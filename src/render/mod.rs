@@ -76,6 +76,8 @@ mod motion_tests;
 #[cfg(test)]
 mod panes_tests;
 #[cfg(test)]
+mod part_caustics_tests;
+#[cfg(test)]
 mod part_tests;
 #[cfg(test)]
 mod path_tests;

@@ -181,6 +181,7 @@ impl Shape for Poisoned<'_> {
             hits.t[self.lane] = self.poison;
             hits.offset[self.lane] = self.poison;
             hits.lift[self.lane] = self.poison;
+            hits.radius[self.lane] = self.poison;
             set_lane3(&mut hits.point, self.lane, bad);
             set_lane3(&mut hits.anchor, self.lane, bad);
             set_lane3(&mut hits.normal, self.lane, bad);

@@ -87,6 +87,7 @@ impl Solid {
             normal: normal.as_vec3(),
             shading: normal.as_vec3(),
             lift: 0.0,
+            radius: f32::INFINITY,
             particle: 0,
             offset: 1e-5 * scale.max(1.0),
             anchor: point.as_vec3(),

@@ -83,6 +83,8 @@ pub struct Intersection {
     /// Length along `shading` by which shadow rays start higher, so that bumps that `shading` smooths over do not
     /// cast shadows onto each other; 0 without smoothing.
     pub lift: f32,
+    /// Radius of the sphere that the surface is part of, scene units; infinite if it is not part of one.
+    pub radius: f32,
     /// Index of the particle in the frame.
     pub particle: u32,
     /// Length to step along the normal, to either side, so that the next ray does not hit the same point again.
@@ -112,6 +114,8 @@ pub struct Intersections {
     pub offset: Lanes,
     /// Length along the shading normal by which shadow rays start higher (see [`Intersection::lift`]).
     pub lift: Lanes,
+    /// Radius of the sphere that the surface is part of (see [`Intersection::radius`]).
+    pub radius: Lanes,
     /// Opacity of the surface: 1, or less where a floor fades into the background.
     pub opacity: Lanes,
     /// Index of the particle in the frame.
@@ -132,6 +136,7 @@ impl Default for Intersections {
             anchor: [splat(0.0); 3],
             offset: splat(0.0),
             lift: splat(0.0),
+            radius: splat(f32::INFINITY),
             opacity: splat(1.0),
             particle: [0; PACKET_SIZE],
             material: [MaterialId::PARTICLES; PACKET_SIZE],
@@ -160,6 +165,7 @@ impl Intersections {
         set_lane3(&mut self.anchor, lane, hit.anchor);
         self.offset[lane] = hit.offset;
         self.lift[lane] = hit.lift;
+        self.radius[lane] = hit.radius;
         self.opacity[lane] = 1.0;
         self.particle[lane] = hit.particle;
         self.material[lane] = material;
@@ -190,6 +196,7 @@ impl Intersections {
             anchor: lane3(&self.anchor, lane),
             offset: self.offset[lane],
             lift: self.lift[lane],
+            radius: self.radius[lane],
             particle: self.particle[lane],
         }
     }

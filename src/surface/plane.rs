@@ -108,6 +108,11 @@ fn intersect_plane_body(
         rays.t_max[l] = if is_hit { t } else { rays.t_max[l] };
         hits.offset[l] = if is_hit { offset } else { hits.offset[l] };
         hits.lift[l] = if is_hit { 0.0 } else { hits.lift[l] };
+        hits.radius[l] = if is_hit {
+            f32::INFINITY
+        } else {
+            hits.radius[l]
+        };
         hits.opacity[l] = if is_hit { opacity } else { hits.opacity[l] };
     }
     for lane in 0..LANES {

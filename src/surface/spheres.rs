@@ -75,6 +75,7 @@ pub(super) fn sphere_hit(
         normal,
         shading: normal,
         lift: 0.0,
+        radius,
         particle: tree.particle(hit.slot),
         anchor: point,
         offset: (OFFSET_OF_RADIUS * radius).max(OFFSET_OF_ROUNDING * largest),
@@ -237,6 +238,7 @@ fn intersections_body(
         hits.t[l] = if is_hit { t[l] } else { hits.t[l] };
         hits.offset[l] = if is_hit { offset } else { hits.offset[l] };
         hits.lift[l] = if is_hit { 0.0 } else { hits.lift[l] };
+        hits.radius[l] = if is_hit { radii[l] } else { hits.radius[l] };
         hits.opacity[l] = if is_hit { 1.0 } else { hits.opacity[l] };
     }
 }

@@ -47,7 +47,7 @@ struct End {
 }
 
 impl Outermost {
-    /// Adds a frame of `count` particles, of which `positions` may be an even selection.
+    /// Adds a frame of `count` particles. `positions`: those of all of them, or of every n-th one.
     pub(super) fn add(&mut self, positions: &Positions, count: usize) {
         let mut sample = sample_of(positions);
         if sample.is_empty() {

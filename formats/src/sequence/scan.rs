@@ -35,7 +35,7 @@ pub(super) fn split_pieces(names: &mut [FileName], notes: &mut Vec<String>) {
         if count < stated {
             let path = path.display();
             notes.push(format!(
-                "`{path}` is one of {stated} files of its step, {count} of which are there"
+                "`{path}` belongs to a step of {stated} files, but only {count} of them exist"
             ));
         }
     }

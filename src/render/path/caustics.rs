@@ -1,4 +1,4 @@
-//! The light of photons on meshes and on shadow catchers. It has passed transmissive particles; what arrives straight
+//! The light of photons on meshes, opaque particles and shadow catchers. It has passed transmissive particles; what arrives straight
 //! from the lights is sampled.
 
 use glam::Vec3;
@@ -21,14 +21,25 @@ impl PathIntegrator<'_> {
             Some(_) => hits.lanes_of(MaterialId::GROUND),
             None => 0,
         };
-        let is_mesh = |lane: usize| hits.material[lane].mesh_index().is_some();
-        let of_meshes = match self.caustics.meshes {
+        let of_surfaces = match self.caustics.surfaces {
             Some(_) => lanes_in(hits.mask)
-                .filter(|lane| is_mesh(*lane))
+                .filter(|lane| self.takes_photons(hits.material[*lane]))
                 .fold(0, |l, lane| l | 1 << lane),
             None => 0,
         };
-        of_catcher | of_meshes
+        of_catcher | of_surfaces
+    }
+
+    /// Whether photons are stored at surfaces of `material` one by one.
+    pub(super) fn takes_photons(&self, material: MaterialId) -> bool {
+        material.mesh_index().is_some()
+            || material.part_index().is_some() && self.parts_take_photons()
+    }
+
+    /// Whether photons light opaque particles beside transmissive ones. Photons see the particles in the middle of the
+    /// exposure, and would light other points of particles that move.
+    pub(super) fn parts_take_photons(&self) -> bool {
+        self.context.parts.is_some() && self.context.exposure.is_none()
     }
 
     /// Adds the light of photons that `lanes` of a surface reflect.
@@ -53,7 +64,7 @@ impl PathIntegrator<'_> {
         }
         if let Some(map) = self
             .caustics
-            .meshes
+            .surfaces
             .as_ref()
             .filter(|_| lanes & !ground != 0)
         {
@@ -90,7 +101,10 @@ impl PathIntegrator<'_> {
         }
         for lane in lanes_in(surface.lanes) {
             let (point, normal) = (lane3(&hits.point, lane), lane3(&points.geometric, lane));
-            map.each_near(point, normal, found, |photon| near[lane].push(photon));
+            let radius = hits.radius[lane];
+            map.each_near(point, normal, radius, found, |photon| {
+                near[lane].push(photon);
+            });
         }
         // Reflect one photon of each lane after the other
         let mut sums = [Vec3::ZERO; LANES];

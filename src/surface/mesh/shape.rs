@@ -276,6 +276,7 @@ impl Shape for MeshSurface<'_> {
             normal,
             shading: if is_consistent { smooth } else { normal },
             lift: 0.0,
+            radius: f32::INFINITY,
             particle: triangle,
             offset: OFFSET * largest,
             anchor: point,

@@ -103,6 +103,7 @@ impl SmoothSurface<'_> {
             normal,
             shading: normal,
             lift: 0.0,
+            radius: f32::INFINITY,
             particle: 0,
             offset: (OFFSET * tree.voxel()).max(OFFSET_OF_ROUNDING * largest),
             anchor: point,

@@ -11,7 +11,7 @@ type Key = (usize, Option<u64>, u64);
 /// Decoded rows, or the reason why there are none.
 type Slot = Arc<OnceLock<Result<Arc<Vec<u8>>, ParseError>>>;
 
-/// Decoded chunks, the oldest of which go when they take too much memory.
+/// Decoded chunks. When they take too much memory, the oldest ones are dropped.
 #[derive(Debug)]
 pub(super) struct BandCache {
     most_bytes: usize,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::file::{H5File, Node};
 use super::piece::Piece;
-use super::stored::{Place, Stored};
+use super::stored::{Storage, Stored};
 use super::types::Field;
 use super::values::{Slice, Values};
 use crate::names::RECORD_VECTORS;
@@ -28,7 +28,7 @@ pub(super) struct PropertyFinder {
     pub(super) found: Named,
     /// Names of data sets that were left out: of another length or of an unknown type.
     pub(super) left_out: Vec<String>,
-    /// Object headers of data sets that are used, of which each counts once.
+    /// Object headers of the data sets in use, so that none is counted twice.
     used: BTreeSet<usize>,
 }
 
@@ -104,7 +104,7 @@ impl PropertyFinder {
             return Ok(());
         };
         // Writers leave space unallocated for what they do not compute.
-        if self.used.contains(&stored.at) || matches!(stored.place, Place::Missing) {
+        if self.used.contains(&stored.at) || matches!(stored.place, Storage::Missing) {
             return Ok(());
         }
         self.add_stored(node.file(), &stored, name, slice)

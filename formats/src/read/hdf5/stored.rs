@@ -23,12 +23,12 @@ pub(super) struct Stored {
     pub(super) datatype: Datatype,
     /// Bytes of one element.
     pub(super) element_len: usize,
-    pub(super) place: Place,
+    pub(super) place: Storage,
 }
 
 /// How the elements are stored.
 #[derive(Debug)]
-pub(super) enum Place {
+pub(super) enum Storage {
     /// In the object header.
     Compact(Vec<u8>),
     /// All together, from this byte of the file on.
@@ -77,7 +77,7 @@ impl Stored {
             max_shape: dataset.max_dims().map(<[u64]>::to_vec),
             datatype: dataset.dtype().clone(),
             element_len,
-            place: Place::Missing,
+            place: Storage::Missing,
             path,
         };
         // Find the messages about the storage
@@ -103,15 +103,15 @@ impl Stored {
         };
         stored.place =
             match layout {
-                Some(DataLayout::Compact { data }) => Place::Compact(data.clone()),
+                Some(DataLayout::Compact { data }) => Storage::Compact(data.clone()),
                 Some(
                     DataLayout::Contiguous { address, .. } | DataLayout::Chunked { address, .. },
-                ) if is_undefined(*address) => Place::Missing,
+                ) if is_undefined(*address) => Storage::Missing,
                 Some(DataLayout::Contiguous { address, .. }) => {
                     let base = file.inner().superblock().base_address;
                     let start = address.checked_add(base);
                     let start = start.and_then(|start| usize::try_from(start).ok());
-                    Place::Contiguous(start.unwrap_or(usize::MAX))
+                    Storage::Contiguous(start.unwrap_or(usize::MAX))
                 }
                 Some(DataLayout::Chunked {
                     address,
@@ -129,14 +129,14 @@ impl Stored {
                             stored.shape
                         )));
                     }
-                    Place::Chunked(ChunkedLayout {
+                    Storage::Chunked(ChunkedLayout {
                         index: *address,
                         indexing: chunk_indexing.clone(),
                         chunk,
                         filters,
                     })
                 }
-                None => Place::Missing,
+                None => Storage::Missing,
             };
         Ok(stored)
     }
@@ -159,9 +159,9 @@ impl Stored {
     /// [`ParseError::Malformed`] if they are not all there.
     pub(super) fn check_whole(&self, file_len: usize) -> Result<(), ParseError> {
         let (start, len) = match &self.place {
-            Place::Compact(bytes) => (0, bytes.len()),
-            Place::Contiguous(start) => (*start, file_len),
-            Place::Chunked(_) | Place::Missing => return Ok(()),
+            Storage::Compact(bytes) => (0, bytes.len()),
+            Storage::Contiguous(start) => (*start, file_len),
+            Storage::Chunked(_) | Storage::Missing => return Ok(()),
         };
         let end = self.byte_len().and_then(|len| len.checked_add(start));
         if end.is_some_and(|end| end <= len) {

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::band_cache::BandCache;
 use super::chunks::{ChunkGrid, Selection};
 use super::file::H5File;
-use super::stored::{Place, Stored};
+use super::stored::{Storage, Stored};
 use super::types::Field;
 use crate::read::columns::{ComponentStride, StridedColumn};
 use crate::{MemoryBudget, ParseError, ScalarType};
@@ -123,9 +123,9 @@ impl Values {
         }
         stored.check_whole(file.bytes().len())?;
         match &stored.place {
-            Place::Compact(_) | Place::Contiguous(_) => {}
-            Place::Missing => return Err(stored.never_written()),
-            Place::Chunked(layout) => {
+            Storage::Compact(_) | Storage::Contiguous(_) => {}
+            Storage::Missing => return Err(stored.never_written()),
+            Storage::Chunked(layout) => {
                 let stride = slice.stride.unwrap_or(1);
                 let selection = Selection {
                     frame: slice.frame,
@@ -181,7 +181,7 @@ impl Values {
     /// Where the numbers are, if they are in one range of the file.
     pub(super) fn column(&self) -> Option<StridedColumn> {
         match self.stored.place {
-            Place::Contiguous(start) if self.count > 0 => Some(self.column_from(start)),
+            Storage::Contiguous(start) if self.count > 0 => Some(self.column_from(start)),
             _ => None,
         }
     }
@@ -198,11 +198,11 @@ impl Values {
     ) -> Result<(), ParseError> {
         let start = usize::try_from(first).unwrap_or(usize::MAX);
         match (&self.stored.place, &self.chunks) {
-            (Place::Contiguous(place), _) => {
+            (Storage::Contiguous(place), _) => {
                 self.column_from(*place).read_values(input.bytes, start, to);
                 Ok(())
             }
-            (Place::Compact(bytes), _) => {
+            (Storage::Compact(bytes), _) => {
                 self.column_from(0).read_values(bytes, start, to);
                 Ok(())
             }
@@ -275,7 +275,7 @@ impl Values {
     /// The rows of a band as they are without filters.
     fn band(&self, bytes: &[u8], chunks: &Chunks, band: u64) -> Result<Vec<u8>, ParseError> {
         let (stored, grid) = (&*self.stored, &chunks.grid);
-        let Place::Chunked(layout) = &stored.place else {
+        let Storage::Chunked(layout) = &stored.place else {
             return Ok(Vec::new());
         };
         let rows = usize::try_from(chunks.band_rows).unwrap_or(usize::MAX);

@@ -8,8 +8,8 @@
 //!
 //! What arrives straight from light sources is sampled at each point of the ground as on other surfaces.
 //!
-//! A shadow catcher has the caustics only. The photons of meshes are stored one by one (`photon_map.rs`), and
-//! `caustics.rs` adds their light.
+//! A shadow catcher has the caustics only. The photons of meshes and opaque particles are stored one by one
+//! (`photon_map.rs`), and `caustics.rs` adds their light.
 
 use std::collections::BTreeSet;
 use std::f32::consts::FRAC_1_PI;
@@ -176,8 +176,8 @@ impl CausticMap {
 pub(super) struct Caustics {
     /// On a shadow catcher.
     pub(super) catcher: Option<CausticMap>,
-    /// On meshes.
-    pub(super) meshes: Option<PhotonMap>,
+    /// On meshes and opaque particles.
+    pub(super) surfaces: Option<PhotonMap>,
 }
 
 /// Whether particles focus light in pictures with these settings.
@@ -209,14 +209,15 @@ pub(in crate::render) fn bytes(scene: &Scene, settings: &RenderSettings) -> u64 
         Some(_) if emits => caustics,
         _ => 0,
     };
-    let has_meshes = emits && scene.meshes.iter().any(|mesh| !mesh.is_pane());
-    let of_meshes = match has_meshes {
+    let has_opaque = scene.meshes.iter().any(|mesh| !mesh.is_pane()) || !scene.parts.is_empty();
+    let has_surfaces = emits && has_opaque;
+    let of_surfaces = match has_surfaces {
         true => photon_map::bytes(settings.photons),
         false => 0,
     };
-    match of_ground + of_meshes {
+    match of_ground + of_surfaces {
         0 => 0,
-        stored => stored + photons::bytes(has_meshes),
+        stored => stored + photons::bytes(has_surfaces),
     }
 }
 
@@ -232,7 +233,7 @@ impl<'a> PathIntegrator<'a> {
         let ground = scene.ground.as_ref();
         let floor = ground.filter(|ground| !is_catcher(ground));
         let catcher = ground.filter(|g| is_catcher(g) && !sources.is_empty());
-        let has_meshes = !sources.is_empty() && self.has_opaque_meshes();
+        let has_surfaces = !sources.is_empty() && self.has_opaque_surfaces();
         // Trace the photons
         let square = floor.or(catcher).map(Square::of);
         let groups: BTreeSet<usize> = match settings.channels.layers.light_groups {
@@ -240,19 +241,19 @@ impl<'a> PathIntegrator<'a> {
             _ => sources.iter().map(|(group, _)| *group).collect(),
         };
         let mut cells = square.map(|_| GroundCells::new(&groups));
-        let mut collector = has_meshes.then(Collector::new);
+        let mut collector = has_surfaces.then(Collector::new);
         let mut counts = RayCounts::default();
-        if square.is_some() || has_meshes {
+        if square.is_some() || has_surfaces {
             let emitters = Emitter::of(&sources, scene.particles, settings.photons);
             let mut targets = Targets {
                 ground: square.as_ref().zip(cells.as_mut()),
-                meshes: collector.as_mut(),
+                surfaces: collector.as_mut(),
             };
             counts = trace_photons(&self, &emitters, &mut targets, stop)?;
         }
         // Make maps of them
         let [min, max] = scene.particles;
-        self.caustics.meshes = collector.map(|photons| photons.into_map((max - min).length()));
+        self.caustics.surfaces = collector.map(|photons| photons.into_map((max - min).length()));
         let caustics = square
             .zip(cells)
             .map(|(square, cells)| cells.into_map(square));
@@ -313,9 +314,9 @@ impl<'a> PathIntegrator<'a> {
             .collect()
     }
 
-    fn has_opaque_meshes(&self) -> bool {
+    fn has_opaque_surfaces(&self) -> bool {
         let mut shapes = self.context.shapes.iter();
-        shapes.any(|shape| shape.material().mesh_index().is_some())
+        self.parts_take_photons() || shapes.any(|shape| shape.material().mesh_index().is_some())
     }
 
     /// Adds the light that the ground reflects, where the paths of `surface` end.

@@ -1,4 +1,4 @@
-//! Photons on meshes: a k-d tree of photons, whose density at a point is estimated from the nearest ones (Jensen,
+//! Photons on meshes and opaque particles: a k-d tree of photons, whose density at a point is estimated from the nearest ones (Jensen,
 //! *Realistic Image Synthesis Using Photon Mapping*, 2001).
 //!
 //! The distance of the farthest of these photons sets the width of the kernel, and its own flux is left out, so that the
@@ -22,6 +22,11 @@ const MIN_NORMAL_COSINE: f32 = 0.7;
 
 /// Greatest height of a photon over the tangent plane of the point that it lights, as a fraction of its distance.
 const MAX_SLOPE: f32 = 0.5;
+
+/// Greatest distance of a photon from the point that it lights on a sphere, in radii: a little less than the chord
+/// between points whose normals have the cosine [`MIN_NORMAL_COSINE`], sqrt(2 - 2 * 0.7). The area of the sphere within a
+/// distance is that of a disc, so that the kernel needs no correction.
+const MAX_CHORD: f32 = 0.77;
 
 /// A photon that has arrived at a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -114,21 +119,24 @@ impl PhotonMap {
         }
     }
 
-    /// Calls `each` with each photon that lights a `point` with the geometric `normal` on the lit side. `found` is memory for the search.
+    /// Calls `each` with each photon that lights a `point` with the geometric `normal` on the lit side, on a sphere of
+    /// `radius` or, if it is infinite, on another surface. `found` is memory for the search.
     pub(in crate::render) fn each_near(
         &self,
         point: Vec3,
         normal: Vec3,
+        radius: f32,
         found: &mut Vec<Neighbour>,
         mut each: impl FnMut(NearPhoton),
     ) {
         found.clear();
+        let reach = self.max_distance.min(MAX_CHORD * radius);
         let mut search = Search {
             photons: &self.photons,
             axes: &self.axes,
             point,
             normal,
-            max2: self.max_distance * self.max_distance,
+            max2: reach * reach,
             found,
         };
         search.visit(0, self.photons.len());

@@ -21,7 +21,7 @@ fn on_square(count: u32) -> Vec<Photon> {
 
 fn irradiance(map: &PhotonMap, point: Vec3, normal: Vec3) -> f32 {
     let mut sum = 0.0;
-    map.each_near(point, normal, &mut Vec::new(), |photon| {
+    map.each_near(point, normal, f32::INFINITY, &mut Vec::new(), |photon| {
         sum += photon.irradiance.x;
     });
     sum
@@ -51,7 +51,7 @@ fn the_nearest_photons_are_found() {
         expected.sort_by(f32::total_cmp);
         expected.truncate(NEIGHBOURS);
         let mut found = Vec::new();
-        map.each_near(point, Vec3::Z, &mut found, |_| {});
+        map.each_near(point, Vec3::Z, f32::INFINITY, &mut found, |_| {});
         let mut found: Vec<f32> = found.iter().map(|(distance2, _)| *distance2).collect();
         found.sort_by(f32::total_cmp);
         assert_eq!(found, expected, "{point}");

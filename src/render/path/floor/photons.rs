@@ -1,4 +1,4 @@
-//! Traces photons of lights through transmissive particles to the ground and to meshes (Jensen, "Global illumination
+//! Traces photons of lights through transmissive particles to the ground, meshes and opaque particles (Jensen, "Global illumination
 //! using photon maps", 1996). Photons that get there without passing a particle are left out.
 //!
 //! Photons have fixed numbers and random numbers, and are stored in their order: the maps do not depend on threads.
@@ -33,8 +33,8 @@ const ROUND: usize = 64;
 const FIRST_DEPTH: u32 = 2;
 
 /// Memory for photons on surfaces before they are in the maps, with space to grow.
-pub(super) const fn bytes(has_meshes: bool) -> u64 {
-    let each = if has_meshes {
+pub(super) const fn bytes(has_surfaces: bool) -> u64 {
+    let each = if has_surfaces {
         size_of::<Photon>()
     } else {
         size_of::<Landed>()
@@ -52,14 +52,15 @@ struct Landed {
 #[derive(Default)]
 struct Arrivals {
     ground: Vec<Landed>,
-    meshes: Vec<Photon>,
+    surfaces: Vec<Photon>,
 }
 
 /// Where photons are stored.
 pub(super) struct Targets<'a> {
     /// The ground and its map.
     pub(super) ground: Option<(&'a Square, &'a mut GroundCells)>,
-    pub(super) meshes: Option<&'a mut Collector>,
+    /// Meshes and opaque particles.
+    pub(super) surfaces: Option<&'a mut Collector>,
 }
 
 /// Photons on the ground.
@@ -122,14 +123,14 @@ pub(super) fn trace_photons(
         let tasks: Vec<u32> = (0..emitter.photons).step_by(TASK as usize).collect();
         for round in tasks.chunks(ROUND) {
             let square = targets.ground.as_ref().map(|(square, _)| *square);
-            let has_meshes = targets.meshes.is_some();
+            let has_surfaces = targets.surfaces.is_some();
             let trace = |first: &u32| {
                 let last = emitter.photons.min(first + TASK);
                 let task = Task {
                     integrator,
                     emitter,
                     square,
-                    has_meshes,
+                    has_surfaces,
                 };
                 task.trace(*first..last, stop)
             };
@@ -151,8 +152,8 @@ impl Targets<'_> {
                 cells.add(photon, group);
             }
         }
-        if let Some(collector) = &mut self.meshes {
-            for photon in &arrivals.meshes {
+        if let Some(collector) = &mut self.surfaces {
+            for photon in &arrivals.surfaces {
                 collector.add(photon);
             }
         }
@@ -181,7 +182,7 @@ struct Task<'a> {
     integrator: &'a PathIntegrator<'a>,
     emitter: &'a Emitter,
     square: Option<&'a Square>,
-    has_meshes: bool,
+    has_surfaces: bool,
 }
 
 impl Task<'_> {
@@ -232,7 +233,7 @@ impl Task<'_> {
         }
     }
 
-    /// Stores the photons that have arrived at the ground or at meshes.
+    /// Stores the photons that have arrived at the ground, at meshes or at opaque particles.
     fn store(&self, segments: &SegmentPacket, packet: &PacketScratch, arrivals: &mut Arrivals) {
         let (hits, throughput) = (&packet.hits, &packet.throughput);
         // Light that enters a body has the square of its index times the radiance. Paths of the camera leave this
@@ -250,18 +251,18 @@ impl Task<'_> {
             let lanes = lanes_in(hits.lanes_of(MaterialId::GROUND));
             arrivals.ground.extend(lanes.map(landed));
         }
-        if !self.has_meshes {
+        if !self.has_surfaces {
             return;
         }
         let panes = self.integrator.context.pane_lanes(hits);
         for lane in lanes_in(hits.mask & !panes) {
-            if hits.material[lane].mesh_index().is_none() {
+            if !self.integrator.takes_photons(hits.material[lane]) {
                 continue;
             }
             let direction = lane3(&segments.rays.direction, lane);
             let normal = lane3(&hits.normal, lane);
             let against = normal.dot(direction) < 0.0;
-            arrivals.meshes.push(Photon {
+            arrivals.surfaces.push(Photon {
                 point: lane3(&hits.point, lane),
                 normal: if against { normal } else { -normal },
                 to_light: -direction,
