@@ -27,6 +27,7 @@ macro_rules! note {
 mod allocator;
 mod check;
 mod child;
+mod completions;
 mod convert;
 mod disk;
 mod errors;
@@ -37,6 +38,7 @@ mod init;
 mod inspect;
 mod job;
 mod key_flags;
+mod man;
 mod manifest_args;
 mod movie;
 mod numbers;
@@ -96,6 +98,10 @@ enum Command {
     Export(export::ExportArgs),
     /// Measure images per second, build time and memory over particle counts and structures.
     Scale(Box<scale::ScaleArgs>),
+    /// Print a script with which a shell completes commands, options and file names.
+    Completions(completions::CompletionsArgs),
+    /// Print a manual page in roff, for `man`.
+    Man(man::ManArgs),
 }
 
 /// Parses the arguments of the process, runs the command, and prints errors.
@@ -177,6 +183,8 @@ fn run(command: Command) -> Result<Outcome, CliError> {
         Command::Generate(args) => generate::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Scale(args) => scale::run(&args),
+        Command::Completions(args) => completions::run(&args),
+        Command::Man(args) => man::run(&args),
     }
 }
 

@@ -43,6 +43,8 @@ fn options_come_in_groups_with_examples() {
         &["movie"],
         &["sheet"],
         &["view"],
+        &["completions"],
+        &["man"],
     ] {
         let short = help(&[command, &["-h"]].concat());
         let long = help(&[command, &["--help"]].concat());
@@ -54,6 +56,52 @@ fn options_come_in_groups_with_examples() {
         }
         assert!(short.len() <= long.len());
     }
+}
+
+/// The commands that the help lists.
+fn commands() -> Vec<String> {
+    let text = help(&["--help"]);
+    let (_, list) = text.split_once("Commands:\n").expect("commands");
+    let lines = list.lines().take_while(|line| !line.is_empty());
+    lines
+        .filter_map(|line| Some(line.split_whitespace().next()?.to_owned()))
+        .filter(|name| name != "help")
+        .collect()
+}
+
+#[test]
+fn completions_know_every_command_and_option() {
+    for shell in ["bash", "zsh", "fish"] {
+        let script = help(&["completions", shell]);
+        for name in commands() {
+            assert!(script.contains(&name), "{shell}: {name}");
+        }
+        for option in ["samples", "turntable", "no-wait"] {
+            assert!(script.contains(option), "{shell}: {option}");
+        }
+    }
+    let errors = Workshop::new()
+        .run(&["completions", "csh"])
+        .expect(2)
+        .errors();
+    assert!(errors.contains("[possible values: bash"), "{errors}");
+}
+
+#[test]
+fn every_command_has_a_manual_page() {
+    let program = help(&["man"]);
+    assert!(program.contains(".TH spherule 1"), "{program}");
+    for name in commands() {
+        assert!(program.contains(&format!("spherule\\-{name}(1)")), "{name}");
+        let page = help(&["man", &name]);
+        assert!(page.contains(&format!("spherule\\-{name}")), "{page}");
+    }
+    assert!(help(&["man", "render"]).contains("\\-\\-samples"));
+    let errors = Workshop::new().run(&["man", "rendr"]).expect(2).errors();
+    assert!(
+        errors.contains("`rendr`") && errors.contains("render, still"),
+        "{errors}"
+    );
 }
 
 #[test]
