@@ -4,13 +4,13 @@
 //! When the grace period ends, tracing drops its frame. Stages that do not check the interrupt (reading, tree
 //! builders, encoders) get a moment more, then the process exits.
 
+use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::thread;
 use std::time::Duration;
 
 use signal_hook::consts::{SIGINT, SIGTERM};
-use signal_hook::iterator::Signals;
 use spherule_jobs::{Interrupt, discard_own_parts};
 
 use super::{CliError, INTERRUPTED, events};
@@ -57,8 +57,8 @@ pub(super) fn listen(messages: SignalMessages) -> Result<SignalListener, CliErro
     let interrupt = Interrupt::new();
     let has_started = Arc::new(AtomicBool::new(false));
     let grace = Arc::new(OnceLock::new());
-    let mut signals = Signals::new([SIGINT, SIGTERM])
-        .map_err(|e| CliError::other(format!("cannot listen for signals: {e}")))?;
+    let signals =
+        arrivals().map_err(|e| CliError::other(format!("cannot listen for signals: {e}")))?;
     let listener = SignalListener {
         interrupt: interrupt.clone(),
         has_started: Arc::clone(&has_started),
@@ -67,7 +67,7 @@ pub(super) fn listen(messages: SignalMessages) -> Result<SignalListener, CliErro
     // Threads that start after the survey reuse the memory that it has freed, which should be left to the frames
     spherule_jobs::start_heartbeat_thread();
     thread::spawn(move || {
-        for _ in signals.forever() {
+        for () in signals {
             if interrupt.is_raised() || !has_started.load(Ordering::Acquire) {
                 // Nothing is lost: images appear complete or not at all
                 exit_now(messages);
@@ -88,6 +88,30 @@ pub(super) fn listen(messages: SignalMessages) -> Result<SignalListener, CliErro
         }
     });
     Ok(listener)
+}
+
+/// The signals that arrive from now on, forever.
+#[cfg(unix)]
+fn arrivals() -> io::Result<impl Iterator<Item = ()> + Send> {
+    let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM])?;
+    Ok(std::iter::from_fn(move || {
+        signals.forever().next().map(|_| ())
+    }))
+}
+
+/// The signals that arrive from now on, forever. Other systems cannot wait for one.
+#[cfg(not(unix))]
+fn arrivals() -> io::Result<impl Iterator<Item = ()> + Send> {
+    const INTERVAL: Duration = Duration::from_millis(50);
+    let arrived = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM] {
+        signal_hook::flag::register(signal, Arc::clone(&arrived))?;
+    }
+    Ok(std::iter::repeat_with(move || {
+        while !arrived.swap(false, Ordering::AcqRel) {
+            thread::sleep(INTERVAL);
+        }
+    }))
 }
 
 /// Drops the frames that are still in progress after `grace`.
