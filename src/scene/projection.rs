@@ -1,7 +1,7 @@
 //! How a camera projects the scene onto the film.
 //!
-//! A point of the film has the coordinates `a` to the right and `b` upwards, from minus to plus the
-//! [half extent](super::Camera::half_extent) of the film. In each projection, they define a ray.
+//! A point of the film has the coordinates `a` to the right and `b` upwards, from the middle. In each projection, they
+//! define a ray.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
