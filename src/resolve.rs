@@ -12,7 +12,7 @@ use crate::pipeline::{
 };
 use crate::render::{IndirectLight, IntegratorKind, PixelFilter, RenderSettings};
 use crate::scene::{
-    Background, Bounds, CameraError, PathError, RadianceMap, Scene, default_lights,
+    Background, Bounds, Camera, CameraError, PathError, RadianceMap, Scene, default_lights,
 };
 use crate::surface::SurfaceKind;
 use crate::survey::{Question, RadiusQuestion, Survey};
@@ -30,7 +30,7 @@ mod parts;
 mod shutter;
 mod surface;
 
-pub use camera::check_views;
+pub use camera::{check_views, with_framed_meshes};
 use ground::Floor;
 pub use ground::add_ground_image;
 pub use meshes::{add_meshes, mesh_settings};
@@ -151,10 +151,16 @@ pub fn setup(
     };
     // Place the camera
     let image = &manifest.image;
-    let aspect = f64::from(image.width) / f64::from(image.height);
+    let [width, height] = image.size();
+    let aspect = f64::from(width) / f64::from(height);
     let framed = camera::framed(survey, &bounds, reach.x);
-    let path = camera::path(manifest, &framed, up, aspect)?;
-    let camera = camera::at_start(&path, aspect, survey.origin)?;
+    let (path, projection) = camera::path(manifest, &framed, up, aspect)?;
+    let stereo = camera::stereo(manifest);
+    let camera = camera::at_start(&path, |view| {
+        let camera = Camera::projected(view, projection, aspect, survey.origin)?;
+        let stereo = stereo.map(|stereo| stereo.stereo(view)).transpose()?;
+        Ok(camera.with_stereo(stereo))
+    })?;
     let color = color::rule(manifest, survey, &camera)?;
     let lens = camera::lens(manifest, &path, aspect)?;
     let shutter = shutter::shutter(manifest, survey)?;
@@ -200,11 +206,12 @@ pub fn setup(
     let (channels, attributes) = channels::channels(manifest, survey)?;
     let step = channels::frame_step(&channels, output, survey)?;
     // Manifests that were not read from a file are not checked
-    let [width, height] = image.data_size().ok_or_else(|| ResolveError::Unsupported {
+    let whole = manifest.picture();
+    let [width, height] = whole.data_size().ok_or_else(|| ResolveError::Unsupported {
         key: "image.crop",
         what: "the part of the image is empty or too large".to_owned(),
     })?;
-    let window = image.part().map(|_| image.data_window());
+    let window = whole.part().map(|_| whole.data_window());
     let mut render = RenderSettings::new(width, height);
     render.window = window;
     render.samples = image.samples;
@@ -236,6 +243,8 @@ pub fn setup(
         color,
         up,
         path,
+        projection,
+        stereo,
         unframed: camera::unframed(manifest, survey),
         lens,
         shutter,
@@ -259,8 +268,13 @@ pub fn setup(
             data_compression: output.data_compression,
             window,
             frames_per_second: output.fps.map(fps),
+            dpi: image.dpi,
+            is_panorama: projection.is_panorama() && stereo.is_none(),
             world_to_camera: None,
-            comments: Some(COMMENTS.to_owned()),
+            comments: Some(match projection.is_panorama() {
+                true => COMMENTS.replace("along the view axis", "from the eye"),
+                false => COMMENTS.to_owned(),
+            }),
             custom: None,
             texts: Vec::new(),
         },
@@ -272,6 +286,7 @@ pub fn setup(
             exposure: output.preview_exposure,
             backdrop: None,
             first_pixel: window.map_or([0, 0], |window| [window.left, window.top]),
+            dpi: image.dpi,
         },
     };
     // Collect the settings of the run

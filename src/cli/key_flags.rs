@@ -6,7 +6,7 @@ use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
 use toml::Value;
 
 use super::CliError;
-use super::numbers::{number, pixels, seconds, whole};
+use super::numbers::{number, seconds, whole};
 use super::paths::path_as_typed;
 use crate::manifest::{FlagKind, KeyFlag, Override, ProgressMode, key_flags};
 
@@ -109,7 +109,6 @@ fn argument(key: &KeyFlag) -> Arg {
     }
     argument = argument.value_name(key.flag.value_name);
     match key.kind {
-        FlagKind::Integer if key.unit == Some("pixels") => argument.value_parser(pixels),
         FlagKind::Integer => argument.value_parser(whole),
         FlagKind::Seconds => argument.value_parser(seconds),
         FlagKind::Number => argument.value_parser(number),

@@ -22,11 +22,17 @@ const ACTIONS: [&str; 7] = [
 const COLORS: [&str; 4] = ["color_by", "map", "range", "color_scale"];
 
 /// Other options with a value that is not the default, and the key that it is laid over.
-const FLAGS: [(&str, &str); 36] = [
+const FLAGS: [(&str, &str); 39] = [
     ("--output x.####.exr", "output.path = \"x.####.exr\""),
     ("--frames 3-4", "input.frames = \"3-4\""),
     ("--width 7", "image.width = 7"),
     ("--height 7", "image.height = 7"),
+    ("--dpi 7", "image.dpi = 7"),
+    (
+        "--projection orthographic",
+        "camera.projection = \"orthographic\"",
+    ),
+    ("--view top", "camera.view = \"top\""),
     ("--samples 7", "image.samples = 7"),
     ("--crop 3,4,50,60", "image.crop = [3, 4, 50, 60]"),
     ("--radius 0.5", "input.radius = 0.5"),
@@ -100,8 +106,10 @@ fn every_option_is_a_key() {
 }
 
 /// Options whose `[default: ...]` is no value that could be given.
-const WORDS: [&str; 8] = [
+const WORDS: [&str; 10] = [
     "crop",
+    "dpi",
+    "view",
     "memory-limit",
     "memory-ceiling",
     "parts",

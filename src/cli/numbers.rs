@@ -13,7 +13,7 @@ fn parse<T: FromStr>(text: &str, expected: &str) -> Result<T, ValueError> {
 }
 
 /// A number of pixels. The manifest checks the range.
-pub(super) fn pixels(text: &str) -> Result<i64, ValueError> {
+fn pixels(text: &str) -> Result<i64, ValueError> {
     parse(text, "a number of pixels, such as 3840")
 }
 

@@ -19,6 +19,7 @@ use crate::pipeline::{FrameSize, ImageTask, MemoryModel, NextMeshes, Schedule, S
 use crate::report::job::{HTML_FILE, JSON_FILE};
 use crate::resolve::{
     self, add_ground_image, add_meshes, check_views, needs_environment_image, question,
+    with_framed_meshes,
 };
 use crate::scene::{RadianceMap, Texture};
 use crate::survey::Survey;
@@ -297,11 +298,12 @@ impl RenderJob {
     fn setup(&self, survey: &Survey, sequence: &Sequence) -> Result<Setup, RunError> {
         let frames = sequence.frames().iter().map(|frame| frame.number);
         let map = self.environment_image()?;
-        let mut setup = resolve::setup(&self.manifest, survey, map)?;
+        let meshes = self.meshes.get(&self.manifest, self.dir(), survey)?;
+        let survey = with_framed_meshes(survey, &self.manifest, &meshes);
+        let mut setup = resolve::setup(&self.manifest, &survey, map)?;
         if let Some(texture) = self.ground_image()? {
             add_ground_image(&mut setup, &self.manifest, texture);
         }
-        let meshes = self.meshes.get(&self.manifest, self.dir(), survey)?;
         add_meshes(&mut setup, &self.manifest, meshes);
         check_views(&setup, frames)?;
         Ok(setup)

@@ -12,6 +12,10 @@ use super::value::named;
 use crate::scene::camera::DEFAULT_FOV;
 use crate::scene::lens::DEFAULT_SENSOR_WIDTH;
 
+mod projection;
+
+pub use projection::{AxisView, ConvergenceSetting, ProjectionKind};
+
 named! {
     /// Placement of the camera.
     CameraMode {
@@ -40,12 +44,28 @@ section! {
         look_at: Option<DVec3> = None, example("[5.0, 5.0, 0.0]");
         /// Direction that points up in the image
         up: Option<DVec3> = None, direction(), example("[0.0, 0.0, 1.0]"), unset("input.up");
+        /// Projection: perspective | orthographic | equirectangular
+        ///
+        /// orthographic is without perspective, for figures whose lengths are measured. equirectangular shows all
+        /// directions around the eye; its pictures should be twice as wide as high.
+        projection: ProjectionKind = ProjectionKind::Perspective, flag("projection", "PROJECTION", "Camera");
+        /// orthographic: height of the picture in scene units
+        height: Option<f64> = None, or("auto"), above(0), unit("a length");
         /// Vertical field of view, degrees
         fov: f64 = DEFAULT_FOV, above(0), below(180), unit("degrees");
+        /// auto, turntable: the side to look from: front | back | left | right | top | bottom | iso
+        ///
+        /// It stands for azimuth and elevation. The front view looks along +y if z is up, and along -z if y is up.
+        view: Option<AxisView> = None, example("\"front\""), unset("azimuth and elevation"),
+            flag("view", "SIDE", "Camera");
         /// auto, turntable: degrees around the up axis
         azimuth: Option<f64> = None, unit("degrees"), example("30.0");
         /// auto, turntable: degrees above the horizon
         elevation: Option<f64> = None, from(-90), to(90), unit("degrees"), example("20.0");
+        /// auto, turntable: show all of the meshes, too, not only the particles
+        ///
+        /// Holdouts and meshes that each frame has for itself do not count.
+        frame_meshes: bool = false;
         /// turntable: rotation from one frame to the next, degrees
         degrees_per_frame: f64 = 1.0, unit("degrees");
         /// f-number of the lens; 0 is a pinhole, with everything in focus
@@ -63,6 +83,14 @@ section! {
         ///
         /// auto focuses on the target point of the camera. A particle is followed by its id through all frames.
         focus: FocusSetting = FocusSetting::Auto;
+        /// Stereo pairs: the image of the left eye, and beside it that of the right one
+        ///
+        /// Each has the size of image.width and image.height. Equirectangular images are below each other.
+        stereo: bool = false;
+        /// stereo: distance of the eyes in scene units; auto is 1/30 of the distance to look_at
+        eye_distance: Option<f64> = None, or("auto"), above(0), unit("a length");
+        /// stereo: distance that appears at the screen: auto (look_at), parallel, or a distance along the view
+        convergence: ConvergenceSetting = ConvergenceSetting::DEFAULT;
         /// Motion blur: how long the shutter is open, as a fraction of the time between frames; 0 is none
         ///
         /// 0.5 is a film camera with a shutter of 180 degrees. Particles move with their velocities, or, if they have
@@ -105,10 +133,17 @@ impl Camera {
         self.keys(keys);
         let (up, mut frames) = (self.up, BTreeSet::new());
         let items = &mut self.keys;
+        let has_fov = self.projection == ProjectionKind::Perspective;
         keys.list("key", "camera.key", CameraKey::ABOUT, items, |key, keys| {
             key.keys(keys);
             if let Some(section) = keys.reading() {
                 key.check(section, up, &mut frames);
+                if key.fov.is_some() && !has_fov {
+                    section.wrong(
+                        "fov",
+                        "is given, but only perspective has a field of view; remove it",
+                    );
+                }
             }
         });
         if let Some(section) = keys.reading() {
@@ -117,6 +152,7 @@ impl Camera {
                 self.mode = self.usual_mode();
             }
             self.check(section);
+            self.check_projection(section);
         }
     }
 
@@ -208,25 +244,27 @@ pub(super) fn conditions() -> Json {
             "then": needs,
         })
     };
-    json!([
+    let mut all = projection::conditions();
+    all.extend([
         mode_needs(&["fixed"], json!({ "required": ["eye", "look_at"] })),
         mode_needs(&["keys"], json!({ "required": ["key"] })),
         mode_needs(
             &["auto", "turntable", "keys"],
             json!({ "properties": { "eye": false, "look_at": false } }),
         ),
-        {
+        json!({
             "if": { "required": ["aperture"] },
             "then": { "properties": { "f_stop": { "const": 0 } } },
-        },
+        }),
         // Without a mode, it follows from the other keys.
-        {
+        json!({
             "if": { "required": ["eye"], "properties": { "mode": false } },
             "then": { "required": ["look_at"] },
-        },
-        {
+        }),
+        json!({
             "if": { "properties": { "mode": false, "eye": false } },
             "then": { "properties": { "look_at": false } },
-        },
-    ])
+        }),
+    ]);
+    Json::Array(all)
 }

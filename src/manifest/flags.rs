@@ -13,8 +13,6 @@ pub struct KeyFlag {
     pub flag: Flag,
     /// The kind of value.
     pub kind: FlagKind,
-    /// Unit of the value.
-    pub unit: Option<&'static str>,
     /// One line of help.
     pub help: String,
     /// More paragraphs of help.
@@ -36,7 +34,6 @@ pub fn key_flags() -> Vec<KeyFlag> {
             key: entry.key.clone(),
             flag: entry.declared.flag?,
             kind: entry.flag_kind,
-            unit: entry.declared.unit,
             help: entry.declared.comment(),
             details: entry.declared.details(),
             default: unset.or_else(|| entry.value.as_ref().map(typed)),

@@ -9,7 +9,7 @@ use std::path::Path;
 
 use spherule_jobs::FrameRange;
 
-use crate::render::{IntegratorKind, MAX_LITERAL_DEPTH, RendererKind};
+use crate::render::{IntegratorKind, MAX_LITERAL_DEPTH, MAX_SIDE, RendererKind};
 use crate::scene::Fresnel;
 use crate::surface::{MaterialId, SprayStyle, SurfaceKind, SurfaceSettings};
 
@@ -50,6 +50,7 @@ mod pattern;
 #[cfg(test)]
 mod places_tests;
 mod preset;
+mod print_size;
 mod problem;
 mod reader;
 mod rebase;
@@ -66,7 +67,7 @@ mod work;
 #[cfg(test)]
 mod work_tests;
 
-pub use camera::{Camera, CameraKey, CameraMode};
+pub use camera::{AxisView, Camera, CameraKey, CameraMode, ConvergenceSetting, ProjectionKind};
 pub use channel::{ATTRIBUTE_CHANNEL, Channel, NamedChannel};
 pub use color::{CategoryNames, ColorMapping, ColorSetting, ScaleKind};
 pub use color_map::{MapName, RangeSetting};
@@ -87,6 +88,7 @@ pub use overlay::{Overlay, OverlayKind, OverlayText};
 pub use part::{Part, PartKind};
 pub use pattern::{FramePattern, OutputPattern};
 pub use preset::{Look, draft};
+pub use print_size::Side;
 #[cfg(feature = "cli")]
 pub(crate) use rebase::without_dots;
 pub use rebase::{RebaseError, named_place, real_dir};
@@ -235,7 +237,7 @@ impl Manifest {
     fn keys(&mut self, keys: &mut Keys<'_>) {
         keys.section("input", Input::ABOUT, |keys| self.input.keys(keys));
         keys.section("camera", Camera::ABOUT, |keys| self.camera.all_keys(keys));
-        keys.section("image", Image::ABOUT, |keys| self.image.keys(keys));
+        keys.section("image", Image::ABOUT, |keys| self.image.all_keys(keys));
         keys.section("render", Render::ABOUT, |keys| {
             surface::kind_key(&mut self.surface, keys);
             self.render.keys(keys);
@@ -288,6 +290,7 @@ impl Manifest {
             root.wrong("overlay", &what);
         }
         self.image.check(root);
+        self.check_camera(root);
         if self.branches_at_spheres()
             && self.render.min_weight == 0.0
             && self.render.max_depth > MAX_LITERAL_DEPTH
@@ -301,6 +304,59 @@ impl Manifest {
                 ),
             );
         }
+    }
+
+    /// Checks that the camera suits the image.
+    fn check_camera(&self, root: &mut Section<'_>) {
+        let image = &self.image;
+        if self.camera.stereo {
+            let part = [
+                ("crop", image.crop.is_some()),
+                ("overscan", image.overscan > 0),
+            ];
+            for (key, _) in part.iter().filter(|(_, is_given)| *is_given) {
+                let what = "is given, but stereo pairs are rendered as a whole; remove it";
+                root.section("image").wrong(key, what);
+            }
+            if image.crop.is_none() && image.overscan == 0 && self.picture().data_size().is_none() {
+                let what = format!(
+                    "makes the picture larger than {MAX_SIDE} pixels; make image.width smaller"
+                );
+                root.section("camera").wrong("stereo", &what);
+            }
+            if self
+                .output
+                .channels
+                .contains(&Channel::Named(NamedChannel::Motion))
+            {
+                let what = "motion is given, but stereo pairs have no such channel; remove it";
+                root.section("output").wrong("channels", what);
+            }
+        }
+        if self.camera.projection != ProjectionKind::Equirectangular {
+            return;
+        }
+        let is_scale_bar = |overlay: &Overlay| matches!(overlay.kind, OverlayKind::ScaleBar { .. });
+        if self.overlays.iter().any(is_scale_bar) {
+            let what = "has a scale bar, but an equirectangular picture has no scale; remove it";
+            root.wrong("overlay", what);
+        }
+        let [width, height] = image.size();
+        if width != 2 * height {
+            root.section("camera").warn(
+                "projection",
+                &format!(
+                    "equirectangular pictures are twice as wide as high, but this one is {width}x{height}; \
+                     --width {0} --height {height} makes it so",
+                    2 * height
+                ),
+            );
+        }
+    }
+
+    /// The image with those of both eyes of a stereo pair.
+    pub fn picture(&self) -> Image {
+        self.image.of_eyes(self.camera.eyes())
     }
 
     /// The picture on the ground.

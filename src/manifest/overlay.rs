@@ -7,7 +7,7 @@ use super::field::Field;
 use super::key::Key;
 use super::keys::{Keys, keys};
 use super::value::{Fault, Named, Value, named, numbers_schema, quoted};
-use crate::overlay::{Corner, Template};
+use crate::overlay::{Corner, Orientation, Template};
 
 named!(
     Corner: TopLeft = "top-left",
@@ -15,6 +15,8 @@ named!(
     BottomLeft = "bottom-left",
     BottomRight = "bottom-right"
 );
+
+named!(Orientation: Vertical = "vertical", Horizontal = "horizontal");
 
 pub(super) const ABOUT: &[&str] = &[
     "What is drawn over previews, and in the channel overlay, but never in RGBA: colour bars, text, scale bars, axes",
@@ -47,6 +49,8 @@ pub enum OverlayKind {
         unit: Option<String>,
         /// Length as a fraction of the height of the picture.
         length: f32,
+        /// Its direction.
+        orientation: Orientation,
     },
     /// Text.
     Text {
@@ -131,6 +135,7 @@ impl OverlayKind {
                 title: None,
                 unit: None,
                 length: 0.4,
+                orientation: Orientation::Vertical,
             },
             OverlayType::Text => Self::Text { text: None },
             OverlayType::ScaleBar => Self::ScaleBar {
@@ -181,6 +186,7 @@ impl Overlay {
                 title,
                 unit,
                 length,
+                orientation,
             } => keys!(keys:
                 /// Title above the bar
                 title => *title, example("\"Speed\""), unset("what the colours show");
@@ -190,6 +196,8 @@ impl Overlay {
                 ///
                 /// Categories have swatches instead of a bar.
                 length => *length, above(0), to(1);
+                /// Direction: vertical | horizontal
+                orientation => *orientation;
             ),
             OverlayKind::Text { text } => keys!(keys:
                 /// Text with {time:.2f}, {frame:04d}, {particles:,}, {file}, {density.min:.1f} or {density.max:.1f}
@@ -201,7 +209,8 @@ impl Overlay {
             OverlayKind::ScaleBar { length, unit } => keys!(keys:
                 /// Length in the scene
                 ///
-                /// In perspective, it is right at the distance of the centre of the particles.
+                /// It is exact in orthographic projection. In perspective, it is right at the distance of the centre of
+                /// the particles.
                 length => *length, unit("a length"), above(0), example("0.5"), unset("a round length");
                 /// Unit of length
                 unit => *unit, example("\"m\""), unset("no unit");

@@ -124,11 +124,22 @@ impl<'a> Section<'a> {
 
     /// Reports a problem of `key` in this table.
     pub(super) fn wrong(&self, key: &str, what: &str) {
+        self.problem(self.place_of(key), key, what);
+    }
+
+    /// Warns about `key` in this table.
+    pub(super) fn warn(&self, key: &str, what: &str) {
+        self.problems
+            .warn(&self.place_of(key), &self.full_key(key), what);
+    }
+
+    /// The place of the value of `key`, or of the table.
+    fn place_of(&self, key: &str) -> Place {
         let place = match self.node.map(|n| &n.kind) {
             Some(Kind::Table(table)) => table.get(key).map(|(place, _)| place.clone()),
             _ => None,
         };
-        self.problem(place.unwrap_or_else(|| self.place()), key, what);
+        place.unwrap_or_else(|| self.place())
     }
 
     fn place(&self) -> Place {

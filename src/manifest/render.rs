@@ -6,7 +6,8 @@ use super::caustics::Caustics;
 use super::crop::PixelBounds;
 use super::ground::GroundSetting;
 use super::key::Affects;
-use super::keys::section;
+use super::keys::{Keys, section};
+use super::print_size::{DEFAULT_DPI, Side, wrong_size};
 use super::reader::Section;
 use super::value::{Named, named};
 use crate::accel::{BvhLeaves, BvhPreset, SbvhSettings, Structure};
@@ -20,13 +21,22 @@ use crate::scene::{Background, ground};
 /// Maximum number of pixels to add on each side of an image.
 const MAX_OVERSCAN: u32 = 8192;
 
+/// Maximum number of pixels per inch.
+const MAX_DPI: u32 = 4800;
+
 section! {
     /// Size and sampling of the image
     Image {
-        /// Image width in pixels
-        width: u32 = 1920, from(1), to(MAX_SIDE), unit("pixels"), flag("width", "WIDTH", "Image");
-        /// Image height in pixels
-        height: u32 = 1080, from(1), to(MAX_SIDE), unit("pixels"), flag("height", "HEIGHT", "Image");
+        /// Image width in pixels, or on paper, such as "85mm"
+        ///
+        /// Units are mm, cm, in and pt; dpi gives the number of pixels. If only one side is a length on paper and the
+        /// other one is not given, the image is 16:9.
+        width: Side = Side::Pixels(1920), from(1), to(MAX_SIDE), flag("width", "WIDTH", "Image");
+        /// Image height in pixels, or on paper, such as "60mm"
+        height: Side = Side::Pixels(1080), from(1), to(MAX_SIDE), flag("height", "HEIGHT", "Image");
+        /// Pixels per inch on paper, stored in the images
+        dpi: Option<u32> = None, from(1), to(MAX_DPI), example("300"),
+            unset("not stored; 300 if a side is a length on paper"), flag("dpi", "DPI", "Image");
         /// Samples per pixel
         samples: u32 = 16, from(1), to(MAX_SAMPLES), flag("samples", "SAMPLES", "Image");
         /// Pixel filter: box | gaussian | blackman-harris
@@ -49,6 +59,46 @@ section! {
 }
 
 impl Image {
+    /// All keys. Lengths on paper become pixels.
+    pub(super) fn all_keys(&mut self, keys: &mut Keys<'_>) {
+        self.keys(keys);
+        let Some(section) = keys.reading() else {
+            return;
+        };
+        if ![self.width, self.height].into_iter().any(Side::is_on_paper) {
+            return;
+        }
+        let dpi = *self.dpi.get_or_insert(DEFAULT_DPI);
+        match [section.lacks("width"), section.lacks("height")] {
+            [false, true] => self.height = Side::Pixels((self.width.pixels(dpi) * 9).div_ceil(16)),
+            [true, false] => self.width = Side::Pixels((self.height.pixels(dpi) * 16).div_ceil(9)),
+            _ => {}
+        }
+        for (key, side) in [("width", &mut self.width), ("height", &mut self.height)] {
+            let pixels = side.pixels(dpi);
+            if let Some(what) = wrong_size(pixels, dpi) {
+                section.wrong(key, &what);
+            }
+            *side = Side::Pixels(pixels);
+        }
+    }
+
+    /// The picture that consists of so many of these images beside each other and below each other.
+    pub fn of_eyes(&self, eyes: [u32; 2]) -> Self {
+        let [width, height] = self.size();
+        Self {
+            width: Side::Pixels(width.saturating_mul(eyes[0])),
+            height: Side::Pixels(height.saturating_mul(eyes[1])),
+            ..self.clone()
+        }
+    }
+
+    /// Width and height in pixels.
+    pub fn size(&self) -> [u32; 2] {
+        let dpi = self.dpi.unwrap_or(DEFAULT_DPI);
+        [self.width.pixels(dpi), self.height.pixels(dpi)]
+    }
+
     /// The rendered pixels: columns and rows of the image from `[x0, y0]` up to, but without, `[x1, y1]`.
     fn data_bounds(&self) -> [i64; 4] {
         match self.crop {
@@ -59,7 +109,8 @@ impl Image {
 
     /// All pixels of the image, with its overscan.
     fn largest_bounds(&self) -> [i64; 4] {
-        let [width, height, overscan] = [self.width, self.height, self.overscan].map(i64::from);
+        let [width, height] = self.size().map(i64::from);
+        let overscan = i64::from(self.overscan);
         [-overscan, -overscan, width + overscan, height + overscan]
     }
 
@@ -75,7 +126,8 @@ impl Image {
 
     /// The rendered part of the image, `[x0, y0, x1, y1]`, if it is not the image itself.
     pub fn part(&self) -> Option<[i64; 4]> {
-        let image = [0, 0, i64::from(self.width), i64::from(self.height)];
+        let [width, height] = self.size().map(i64::from);
+        let image = [0, 0, width, height];
         Some(self.data_bounds()).filter(|part| *part != image)
     }
 
@@ -86,7 +138,7 @@ impl Image {
         DataWindow {
             left: pixel(left),
             top: pixel(top),
-            image: [self.width, self.height],
+            image: self.size(),
         }
     }
 

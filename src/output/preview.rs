@@ -21,6 +21,8 @@ pub struct PreviewOptions {
     pub backdrop: Option<Vec3>,
     /// Column and row of the first pixel in the whole image, so that the dithering of a part is that of the whole.
     pub first_pixel: [i32; 2],
+    /// Pixels per inch on paper, if they are stored.
+    pub dpi: Option<u32>,
 }
 
 /// Encodes `film` as an 8-bit sRGB PNG, dithered, with `overlays` over it.
@@ -59,7 +61,31 @@ pub fn encode_preview(
     PngEncoder::new(&mut file)
         .write_image(&bytes, film.width, film.height, ExtendedColorType::Rgb8)
         .map_err(OutputError::Png)?;
+    if let Some(dpi) = options.dpi {
+        file.splice(AFTER_HEADER..AFTER_HEADER, density_chunk(dpi));
+    }
     Ok(file)
+}
+
+/// Bytes of a PNG file up to the chunk after `IHDR`: signature, and a chunk with 13 bytes of data.
+const AFTER_HEADER: usize = 8 + 12 + 13;
+
+/// The chunk `pHYs`: pixels per metre along both axes.
+fn density_chunk(dpi: u32) -> Vec<u8> {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "positive; saturates"
+    )]
+    let per_metre = (f64::from(dpi) / 0.0254).round() as u32;
+    let mut chunk = b"pHYs".to_vec();
+    chunk.extend(per_metre.to_be_bytes());
+    chunk.extend(per_metre.to_be_bytes());
+    // The unit is the metre
+    chunk.push(1);
+    let crc = crc32fast::hash(&chunk);
+    let length: u32 = 9;
+    [&length.to_be_bytes()[..], &chunk, &crc.to_be_bytes()].concat()
 }
 
 #[cfg(test)]

@@ -1,9 +1,21 @@
-//! Colour bars: a vertical bar with ticks, or swatches with the names of categories.
+//! Colour bars: a bar with ticks, or swatches with the names of categories. This file has vertical ones.
 
 use super::canvas::{Canvas, Color};
 use super::ticks::{Ticks, power_text};
 use super::{Pen, font};
 use crate::scene::ColorScale;
+
+mod horizontal;
+
+/// The direction of a colour bar.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Orientation {
+    /// Values rise upwards; labels are at the right.
+    #[default]
+    Vertical,
+    /// Values rise to the right; labels are below.
+    Horizontal,
+}
 
 /// A colour bar.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,6 +26,8 @@ pub struct ColorBar {
     pub unit: String,
     /// Length of the bar as a fraction of the height of the picture.
     pub length: f32,
+    /// Its direction.
+    pub orientation: Orientation,
     /// The colours.
     pub kind: ColorBarKind,
 }
@@ -57,8 +71,19 @@ impl ColorBar {
         names.chain([&*self.title, &*self.unit]).collect()
     }
 
-    /// The ticks for a bar of `length` pixels with text of `size` pixels.
+    /// The ticks for a vertical bar of `length` pixels with text of `size` pixels.
     fn ticks(&self, length: f32, size: f32) -> Ticks {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a few"
+        )]
+        let most = (length / (LABEL_PITCH * size)).floor().clamp(2.0, 9.0) as usize;
+        self.ticks_with(most)
+    }
+
+    /// The ticks with at most `most` labels.
+    fn ticks_with(&self, most: usize) -> Ticks {
         match &self.kind {
             ColorBarKind::Categories(_) => Ticks::default(),
             ColorBarKind::Numbers {
@@ -67,12 +92,6 @@ impl ColorBar {
                 scale,
                 is_discrete,
             } => {
-                #[expect(
-                    clippy::cast_possible_truncation,
-                    clippy::cast_sign_loss,
-                    reason = "a few"
-                )]
-                let most = (length / (LABEL_PITCH * size)).floor().clamp(2.0, 9.0) as usize;
                 let steps = is_discrete.then(|| u32::try_from(colors.len()).unwrap_or(u32::MAX));
                 Ticks::of(*range, *scale, steps, most)
             }
@@ -117,6 +136,9 @@ impl ColorBar {
     }
 
     pub(super) fn measure(&self, pen: &Pen) -> [f32; 2] {
+        if self.orientation == Orientation::Horizontal {
+            return self.measure_horizontal(pen);
+        }
         let size = pen.font.size;
         let length = self.length(pen);
         let ticks = self.ticks(length, size);
@@ -140,6 +162,10 @@ impl ColorBar {
     }
 
     pub(super) fn draw(&self, canvas: &mut Canvas, corner: [f32; 2], pen: &Pen) {
+        if self.orientation == Orientation::Horizontal {
+            self.draw_horizontal(canvas, corner, pen);
+            return;
+        }
         let size = pen.font.size;
         let length = self.length(pen);
         let ticks = self.ticks(length, size);

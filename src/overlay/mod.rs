@@ -14,7 +14,7 @@ mod ticks;
 pub use axes::Axes;
 use canvas::Canvas;
 pub use canvas::Color;
-pub use color_bar::{ColorBar, ColorBarKind};
+pub use color_bar::{ColorBar, ColorBarKind, Orientation};
 use font::Font;
 use font::missing_glyphs;
 pub use layout::{Corner, Placement};

@@ -28,6 +28,7 @@ fn bar(title: &str) -> Overlay {
         title: title.to_owned(),
         unit: "m/s".to_owned(),
         length: 0.5,
+        orientation: Orientation::Vertical,
         kind: ColorBarKind::Numbers {
             colors: vec![[0.0, 0.0, 1.0], [1.0, 1.0, 0.0]],
             range: [0.0, 4.0],
@@ -84,6 +85,63 @@ fn a_bar_shows_its_colours_from_bottom_to_top() {
         assert_eq!(rows.len(), 1, "{row}: {rows:?}");
     }
     assert_ne!(pixel(42, 125), [0, 0, 0]);
+}
+
+fn horizontal(bar: &Overlay) -> Overlay {
+    let Content::ColorBar(mut bar) = bar.content.clone() else {
+        unreachable!()
+    };
+    bar.orientation = Orientation::Horizontal;
+    overlay(Content::ColorBar(bar))
+}
+
+#[test]
+fn a_horizontal_bar_shows_its_colours_from_left_to_right() {
+    let (width, height) = (300, 400);
+    let own = horizontal(&bar("v"));
+    let picture = drawn(
+        std::slice::from_ref(&own),
+        width,
+        height,
+        &FrameView::default(),
+    );
+    let pixel = |x: usize, y: usize| &picture[3 * (y * width as usize + x)..][..3];
+    // The label 0 is 20 * 1303 / 2048 pixels wide; half of it is left of the bar, which is 200 pixels long
+    let left = 20 + 7;
+    for column in [left, left + 99, left + 199] {
+        let part = (column as f64 + 0.5 - left as f64) / 200.0;
+        let expected = [part, part, 1.0 - part].map(|v| 255.0 * v);
+        // Title and gap are 30 pixels high, from y = 20, and the bar is 18 pixels high
+        for (found, expected) in pixel(column, 59).iter().zip(expected) {
+            assert!((f64::from(*found) - expected).abs() <= 1.0, "{column}");
+        }
+    }
+    assert_eq!(pixel(left - 1, 59), [0, 0, 0]);
+    assert_eq!(pixel(left + 50, 49), [0, 0, 0]);
+    // Ticks at 0, 1, 2, 3 and 4
+    for column in [left - 1, left + 49, left + 99, left + 149, left + 199] {
+        let columns: Vec<usize> = (column - 2..=column + 2)
+            .filter(|x| pixel(*x, 71) == [0, 0, 0])
+            .collect();
+        assert_eq!(columns.len(), 1, "{column}: {columns:?}");
+    }
+    let [own_width, own_height] = own.measure(height, &FrameView::default());
+    assert!((213..=215).contains(&own_width), "{own_width}");
+    assert!((70..=90).contains(&own_height), "{own_height}");
+}
+
+#[test]
+fn labels_of_horizontal_bars_do_not_touch() {
+    let Content::ColorBar(mut bar) = horizontal(&bar("v")).content else {
+        unreachable!()
+    };
+    if let ColorBarKind::Numbers { range, .. } = &mut bar.kind {
+        *range = [1000.0, 1010.0];
+    }
+    bar.length = 0.3;
+    let wide = overlay(Content::ColorBar(bar)).measure(400, &FrameView::default())[0];
+    // Two labels of four digits and at most one between them
+    assert!((120..190).contains(&wide), "{wide}");
 }
 
 #[test]

@@ -4,11 +4,14 @@ use super::renderer::TracedFrame;
 use super::setup::Setup;
 use crate::overlay::{FrameValues, FrameView, Sprite, draw};
 use crate::render::Film;
-use crate::scene::{Camera, RgbEncoding};
+use crate::scene::{Camera, Projection, RgbEncoding};
 
 impl Setup {
-    /// Lengths of the scene in the height of the picture, at the distance of the centre of the particles.
+    /// Lengths of the scene in the height of the picture, in perspective at the distance of the centre of the particles.
     pub fn units_per_height(&self, camera: &Camera) -> f64 {
+        if let Projection::Orthographic { height } = camera.projection() {
+            return height;
+        }
         let [min, max] = self.picture.scene.particles;
         let depth = f64::from(camera.depth_of(0.5 * (min + max)));
         2.0 * f64::from(camera.half_extent().y) * depth
@@ -38,8 +41,20 @@ impl Setup {
         if overlays.is_empty() {
             return Vec::new();
         }
-        let (width, height) = (frame.film.width, frame.film.height);
-        draw(overlays, width, height, &self.frame_view(frame))
+        // Each eye has its own, with which they appear at the distance of the screen
+        let [columns, rows] = frame.camera.eyes();
+        let (width, height) = (frame.film.width / columns, frame.film.height / rows);
+        let mut sprites = draw(overlays, width, height, &self.frame_view(frame));
+        if [columns, rows] != [1, 1] {
+            let shift = [width * (columns - 1), height * (rows - 1)].map(u32::cast_signed);
+            let right = sprites.clone().into_iter().map(|sprite| Sprite {
+                left: sprite.left + shift[0],
+                top: sprite.top + shift[1],
+                ..sprite
+            });
+            sprites.extend(right.collect::<Vec<_>>());
+        }
+        sprites
     }
 }
 

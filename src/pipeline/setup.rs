@@ -12,7 +12,8 @@ use crate::output::{ExrOptions, PreviewOptions};
 use crate::overlay::Overlay;
 use crate::render::{RenderSettings, RendererKind};
 use crate::scene::{
-    Camera, CameraError, CameraPath, ColorMap, Exposure, LensSettings, NextFrame, Scene,
+    Camera, CameraError, CameraPath, CameraView, ColorMap, Exposure, LensSettings, NextFrame,
+    Projection, Scene, StereoSettings,
 };
 use crate::surface::{SurfaceKind, SurfaceSettings};
 use crate::survey::FrameWeight;
@@ -108,13 +109,17 @@ pub struct Picture {
     pub up: DVec3,
     /// The camera path, in world units.
     pub path: CameraPath,
+    /// The projection of the camera.
+    pub projection: Projection,
+    /// The eyes, if images are stereo pairs.
+    pub stereo: Option<StereoSettings>,
     /// Number of particles of a frame, about, that are far from the others and that an automatic camera may leave out.
     pub unframed: u64,
     /// The lens of the camera; without one, it is a pinhole.
     pub lens: Option<LensSettings>,
     /// Motion blur, if there is any.
     pub shutter: Option<Shutter>,
-    /// Width of the images divided by their height; also used if fewer pixels are traced in a trial.
+    /// Width of the image of an eye divided by its height; also used if fewer pixels are traced in a trial.
     pub aspect: f64,
     /// Lights, material, background, ground; with the camera at the start of the path. [`Setup::scene_at`] returns
     /// the scene of a frame.
@@ -176,11 +181,15 @@ impl Setup {
     /// # Errors
     /// The view is invalid; [`crate::resolve::check_views`] detects that in advance.
     pub fn camera_at(&self, frame: i64) -> Result<Camera, CameraError> {
-        Camera::new(
-            &self.picture.path.view(frame),
-            self.picture.aspect,
-            self.picture.origin,
-        )
+        self.camera_with(&self.picture.path.view(frame))
+    }
+
+    /// The camera at `view`, without its lens.
+    fn camera_with(&self, view: &CameraView) -> Result<Camera, CameraError> {
+        let picture = &self.picture;
+        let camera = Camera::projected(view, picture.projection, picture.aspect, picture.origin)?;
+        let stereo = picture.stereo.map(|stereo| stereo.stereo(view));
+        Ok(camera.with_stereo(stereo.transpose()?))
     }
 
     /// The scene of `frame`: only the camera moves, lights and everything else are fixed. `focus` is the position of
@@ -225,7 +234,7 @@ impl Setup {
         let numbers = shutter.step.numbers as f64;
         let at = |part: f64| {
             let view = picture.path.view_between(frame, part * numbers);
-            let moved = Camera::new(&view, picture.aspect, picture.origin);
+            let moved = self.camera_with(&view);
             // Only views of frames are checked in advance
             moved.map_or(*camera, |moved| match camera.lens() {
                 Some(lens) => moved.with_lens(lens),

@@ -94,6 +94,7 @@ mod tests {
         group.pixels.push(Pixel {
             column: 0,
             row: 0,
+            side: 0.0,
             path: PathSeed::of_pixel(0, 0),
             data: DataSample::MISS,
         });

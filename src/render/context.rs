@@ -118,7 +118,7 @@ impl<'a> RenderContext<'a> {
         let interior = Interior::of(&scene.material, is_connected);
         // Prepare camera, background and lights for packets
         let eye = scene.camera.eye();
-        let [width, height] = settings.data_window().image;
+        let [width, height] = settings.eye_size(scene.camera.eyes());
         let contains_eye = |shape: &dyn Shape| shape.side_of(eye) == Side::Inside;
         Self {
             is_camera_inside: interior == Interior::Body && particles.is_some_and(contains_eye),

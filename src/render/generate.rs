@@ -8,7 +8,7 @@ use super::{
     sampler::{PathSeed, get_1d_lanes, get_2d_lanes},
     scratch::{Pixel, SampleGroup},
     settings::RenderSettings,
-    shading::{camera_rays, lens_rays, moving_camera_rays},
+    shading::{camera_rays, lens_rays, moving_camera_rays, stereo_rays},
     stream::SegmentPacket,
     tile::mosaic_start,
 };
@@ -28,17 +28,30 @@ impl RenderContext<'_> {
         group.layers.layers = self.settings.channels.layers;
         group.layers.background_group = self.background_group();
         let [left, top] = self.first_pixel(tile);
+        let eye_size = self.settings.eye_size(self.scene.camera.eyes());
+        let eye_size = eye_size.map(u32::cast_signed);
         for (column, row) in pixels {
             let (x, y) = (left + column.cast_signed(), top + row.cast_signed());
             // Numbers of pixels beyond the left or top border wrap around; they only select random numbers
             let [column_number, row_number] = [x, y].map(i32::cast_unsigned);
+            // The image of the right eye is beside that of the left one, or below it
+            let is_right = self.camera.is_stereo() && (x >= eye_size[0] || y >= eye_size[1]);
             group.pixels.push(Pixel {
                 column,
                 row,
+                side: match (self.camera.is_stereo(), is_right) {
+                    (false, _) => 0.0,
+                    (true, false) => -1.0,
+                    (true, true) => 1.0,
+                },
                 path: PathSeed::of_pixel(column_number, row_number),
                 data: DataSample::MISS,
             });
             let points = self.sampler.points(column_number, row_number);
+            let [x, y] = match is_right {
+                true => [x % eye_size[0], y % eye_size[1]],
+                false => [x, y],
+            };
             group.push_pixel(x as f32, y as f32, points);
         }
     }
@@ -81,6 +94,10 @@ impl RenderContext<'_> {
             }
         }
         rays.set_len(len);
+        if self.camera.is_stereo() {
+            let side = self.sides(group, first, len);
+            stereo_rays(simd, &self.camera, &side, rays);
+        }
         if self.camera.has_lens() {
             let u = self.lens_samples(group, first, len);
             lens_rays(simd, &self.camera, &u, rays);
@@ -99,6 +116,15 @@ impl RenderContext<'_> {
                 *path = group.pixels[(first + lane) / samples].path;
             }
         }
+    }
+
+    /// The eyes that see the `len` samples of `group` from `first` on.
+    fn sides(&self, group: &SampleGroup, first: usize, len: usize) -> Lanes {
+        let (samples, mut sides) = (self.settings.samples as usize, splat(0.0));
+        for (lane, side) in sides.iter_mut().enumerate().take(len) {
+            *side = group.pixels[(first + lane) / samples].side;
+        }
+        sides
     }
 
     /// Points in the unit square for the lens, of the `len` samples of `group` from `first` on.
@@ -141,8 +167,8 @@ impl RenderContext<'_> {
     /// Lanes of the camera rays that start inside a connected body.
     fn lanes_inside(&self, rays: &RayPacket) -> u32 {
         let lanes = first_lanes(rays.len());
-        match (self.camera.has_lens(), self.particles) {
-            (true, Some(body)) if self.interior == Interior::Body => lanes_in(lanes)
+        match (self.camera.has_one_origin(), self.particles) {
+            (false, Some(body)) if self.interior == Interior::Body => lanes_in(lanes)
                 .filter(|lane| body.side_of(lane3(&rays.origin, *lane)) == Side::Inside)
                 .fold(0, |inside, lane| inside | 1 << lane),
             _ if self.is_camera_inside => lanes,

@@ -247,6 +247,7 @@ pub(super) mod testing {
             group.pixels.push(Pixel {
                 column: 0,
                 row: 0,
+                side: 0.0,
                 path: PathSeed::of_pixel(film.x.to_bits(), film.y.to_bits()),
                 data: DataSample::MISS,
             });

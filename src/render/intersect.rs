@@ -101,7 +101,9 @@ impl RenderContext<'_> {
             &mut packet.weight,
         );
         let (rays, weight) = (&segments.rays, &packet.weight);
-        let is_backdrop = depth == 1 && matches!(self.scene.background, Background::Studio { .. });
+        let is_backdrop = depth == 1
+            && matches!(self.scene.background, Background::Studio { .. })
+            && !self.scene.camera.projection().is_panorama();
         let group = packet.groups.of_mut(NO_GROUP);
         for radiance in [Some(&mut packet.radiance), group].into_iter().flatten() {
             if is_backdrop {

@@ -84,6 +84,8 @@ mod path_tests;
 #[cfg(test)]
 mod poison_tests;
 #[cfg(test)]
+mod projection_tests;
+#[cfg(test)]
 pub(crate) mod solid;
 #[cfg(test)]
 mod spray_tests;

@@ -58,6 +58,8 @@ pub(super) struct SampleGroup {
 pub(super) struct Pixel {
     pub(super) column: u32,
     pub(super) row: u32,
+    /// The eye that sees it: -1 is the left one, 1 the right one, 0 the only one.
+    pub(super) side: f32,
     pub(super) path: PathSeed,
     pub(super) data: DataSample,
 }

@@ -143,6 +143,12 @@ impl RenderSettings {
         self.window.unwrap_or(DataWindow::whole(width, height))
     }
 
+    /// Width and height in pixels of the image of one eye, if a picture has `eyes` images beside and below each other.
+    pub(super) fn eye_size(&self, eyes: [u32; 2]) -> [u32; 2] {
+        let [width, height] = self.data_window().image;
+        [(width / eyes[0]).max(1), (height / eyes[1]).max(1)]
+    }
+
     /// The channels of the film, with those that are features for denoising.
     pub(super) const fn planes(&self) -> Channels {
         self.channels.with_features(self.has_features)

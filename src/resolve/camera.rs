@@ -1,47 +1,117 @@
 //! The camera path, and checks that every view along it is valid.
 
+use std::borrow::Cow;
+
 use glam::DVec3;
 
 use super::ResolveError;
-use crate::manifest::{self, CameraMode, FocusSetting, Manifest};
-use crate::pipeline::Setup;
-use crate::scene::framing::{DEFAULT_AZIMUTH, DEFAULT_ELEVATION};
+use crate::manifest::{self, CameraMode, FocusSetting, Manifest, ProjectionKind};
+use crate::pipeline::{PictureMesh, Setup};
 use crate::scene::{
-    Aperture, Bounds, Camera, CameraKey, CameraPath, CameraView, Focus, Framed, Framing, KeyedPath,
-    LensSettings,
+    Aperture, Bounds, Camera, CameraError, CameraKey, CameraPath, CameraView, Convergence, Focus,
+    Framed, Framing, KeyedPath, LensSettings, Projection, StereoSettings,
 };
 use crate::survey::Survey;
 
-/// The path that the manifest describes; `up` is the default upward direction.
+/// The path and the projection that the manifest describes; `up` is the default upward direction.
 pub(super) fn path(
     manifest: &Manifest,
     framed: &Framed,
     up: DVec3,
     aspect: f64,
-) -> Result<CameraPath, ResolveError> {
+) -> Result<(CameraPath, Projection), ResolveError> {
     let camera = &manifest.camera;
     let up = camera.up.unwrap_or(up);
+    let [azimuth, elevation] = camera.angles();
     let framing = Framing {
         up,
-        azimuth: camera.azimuth.unwrap_or(DEFAULT_AZIMUTH),
-        elevation: camera.elevation.unwrap_or(DEFAULT_ELEVATION),
+        azimuth,
+        elevation,
         fov: camera.fov,
         aspect,
     };
-    Ok(match camera.mode {
-        CameraMode::Auto => CameraPath::Still(framed.view(&framing)),
-        CameraMode::Fixed => CameraPath::Still(CameraView {
-            eye: camera.eye.unwrap_or_default(),
-            look_at: camera.look_at.unwrap_or_default(),
-            up,
-            fov: camera.fov,
-        }),
-        CameraMode::Turntable => CameraPath::turntable(framed, &framing, camera.degrees_per_frame),
-        CameraMode::Keys => {
-            let keys = camera.keys.iter().map(|key| keyed(key, up, camera.fov));
-            CameraPath::through(keys.collect())?
+    let (path, fitted) = match (camera.mode, camera.projection) {
+        (CameraMode::Auto, ProjectionKind::Perspective) => {
+            (CameraPath::Still(framed.view(&framing)), 0.0)
         }
+        (CameraMode::Auto, ProjectionKind::Orthographic) => {
+            let (view, height) = framed.parallel_view(&framing);
+            (CameraPath::Still(view), height)
+        }
+        (CameraMode::Auto, ProjectionKind::Equirectangular) => {
+            (CameraPath::Still(framed.panorama(&framing)), 0.0)
+        }
+        (CameraMode::Turntable, ProjectionKind::Orthographic) => {
+            CameraPath::parallel_turntable(framed, &framing, camera.degrees_per_frame)
+        }
+        (CameraMode::Turntable, _) => {
+            let path = CameraPath::turntable(framed, &framing, camera.degrees_per_frame);
+            (path, 0.0)
+        }
+        (CameraMode::Fixed, _) => {
+            let view = CameraView {
+                eye: camera.eye.unwrap_or_default(),
+                look_at: camera.look_at.unwrap_or_default(),
+                up,
+                fov: camera.fov,
+            };
+            (CameraPath::Still(view), framed.height_around(&view, aspect))
+        }
+        (CameraMode::Keys, _) => {
+            let keys = camera.keys.iter().map(|key| keyed(key, up, camera.fov));
+            let keys: Vec<CameraKey> = keys.collect();
+            let heights = keys
+                .iter()
+                .map(|key| framed.height_around(&key.view, aspect));
+            let height = heights.fold(0.0, f64::max);
+            (CameraPath::through(keys)?, height)
+        }
+    };
+    let projection = match camera.projection {
+        ProjectionKind::Perspective => Projection::Perspective,
+        ProjectionKind::Orthographic => Projection::Orthographic {
+            height: camera.height.unwrap_or(fitted),
+        },
+        ProjectionKind::Equirectangular => Projection::Equirectangular,
+    };
+    Ok((path, projection))
+}
+
+/// The eyes of stereo pairs.
+pub(super) fn stereo(manifest: &Manifest) -> Option<StereoSettings> {
+    let camera = &manifest.camera;
+    camera.stereo.then(|| StereoSettings {
+        eye_distance: camera.eye_distance,
+        convergence: match camera.projection {
+            ProjectionKind::Equirectangular => Convergence::Parallel,
+            _ => camera.convergence.0,
+        },
     })
+}
+
+/// The survey with the corners of `meshes` among the outermost particles, if `manifest` says that the camera shows them.
+/// `meshes` has one for each entry of the manifest.
+pub fn with_framed_meshes<'a>(
+    survey: &'a Survey,
+    manifest: &Manifest,
+    meshes: &[PictureMesh],
+) -> Cow<'a, Survey> {
+    if !manifest.camera.frame_meshes {
+        return Cow::Borrowed(survey);
+    }
+    let visible = manifest.meshes.iter().zip(meshes);
+    let trees = visible.filter_map(|(mesh, own)| own.tree.as_ref().filter(|_| !mesh.holdout));
+    let corners = trees.filter_map(|tree| tree.bounds()).flat_map(|bounds| {
+        let [min, max] = bounds.map(|corner| corner.as_dvec3());
+        Bounds { min, max }.corners()
+    });
+    let mut survey = survey.clone();
+    if let Some(outline) = &mut survey.outline {
+        outline
+            .points
+            .extend(corners.map(|corner| corner.as_vec3()));
+    }
+    Cow::Owned(survey)
 }
 
 /// What an automatic camera shows: the outermost particles of `survey`, or in jobs of earlier versions their `bounds`.
@@ -57,8 +127,11 @@ pub(super) fn framed(survey: &Survey, bounds: &Bounds, reach: f64) -> Framed {
 
 /// Number of particles of a frame that an automatic camera may leave out.
 pub(super) fn unframed(manifest: &Manifest, survey: &Survey) -> u64 {
+    let is_panorama = manifest.camera.projection == ProjectionKind::Equirectangular;
     match (manifest.camera.mode, &survey.outline) {
-        (CameraMode::Auto | CameraMode::Turntable, Some(outline)) => outline.outliers,
+        (CameraMode::Auto | CameraMode::Turntable, Some(outline)) if !is_panorama => {
+            outline.outliers
+        }
         _ => 0,
     }
 }
@@ -76,21 +149,20 @@ fn keyed(key: &manifest::CameraKey, up: DVec3, fov: f64) -> CameraKey {
     }
 }
 
-/// The camera at the start of `path`. All keys of a path are checked.
+/// The camera at the start of `path`. All keys of a path are checked. `camera` makes one of a view.
 pub(super) fn at_start(
     path: &CameraPath,
-    aspect: f64,
-    origin: DVec3,
+    camera: impl Fn(&CameraView) -> Result<Camera, CameraError>,
 ) -> Result<Camera, ResolveError> {
     if let CameraPath::Keys(keys) = path {
         for key in keys.keys() {
-            Camera::new(&key.view, aspect, origin).map_err(|source| ResolveError::View {
+            camera(&key.view).map_err(|source| ResolveError::View {
                 place: format!("camera.key: the key of frame {}", key.frame),
                 source,
             })?;
         }
     }
-    Ok(Camera::new(&path.start(), aspect, origin)?)
+    Ok(camera(&path.start())?)
 }
 
 /// The lens that the manifest describes, if its aperture is not 0.

@@ -1,5 +1,5 @@
 use super::*;
-use crate::manifest::{CameraKey as Key, RadiusSetting};
+use crate::manifest::{CameraKey as Key, RadiusSetting, Side};
 use crate::pipeline::Setup;
 use crate::render::IntegratorKind;
 use crate::survey::Survey;
@@ -43,7 +43,8 @@ fn setup(change: impl FnOnce(&mut manifest::Camera)) -> Result<Setup, ResolveErr
     let mut manifest = Manifest::new("in");
     manifest.render.integrator = Some(IntegratorKind::Whitted);
     manifest.input.radius = RadiusSetting::Length(0.1);
-    (manifest.image.width, manifest.image.height) = (64, 36);
+    manifest.image.width = Side::Pixels(64);
+    manifest.image.height = Side::Pixels(36);
     manifest.output.transparent = true;
     change(&mut manifest.camera);
     super::super::setup(&manifest, &survey(), None)

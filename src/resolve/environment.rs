@@ -32,11 +32,11 @@ pub(super) fn environment(
     let scale = settings.intensity * settings.color;
     let axes = |forward| EnvironmentAxes::of_view(forward, up, settings.rotation);
     let environment = match settings.kind {
-        EnvironmentKind::Studio => studio(axes(view.look_at - view.eye), scale),
+        EnvironmentKind::Studio => studio(axes(view.heading(up)), scale),
         EnvironmentKind::Sky => {
             let sun = &settings.sun;
             let direction = sky_direction(sun.elevation, sun.azimuth);
-            sky(axes(view.look_at - view.eye), direction, scale)
+            sky(axes(view.heading(up)), direction, scale)
         }
         EnvironmentKind::Constant => Environment::constant(scale),
         EnvironmentKind::Image => {
@@ -60,7 +60,7 @@ pub(super) fn sun(manifest: &Manifest, view: &CameraView, up: DVec3) -> Option<L
     let is_sky =
         manifest.integrator() == IntegratorKind::Path && settings.kind == EnvironmentKind::Sky;
     is_sky.then(|| {
-        let axes = EnvironmentAxes::of_view(view.look_at - view.eye, up, settings.rotation);
+        let axes = EnvironmentAxes::of_view(view.heading(up), up, settings.rotation);
         let sun = &settings.sun;
         Light {
             kind: scene::LightKind::Sun {

@@ -51,7 +51,9 @@ pub(super) fn add_overlays(
     survey: &Survey,
     camera: &Camera,
 ) -> Result<(), ResolveError> {
-    let picture = [setup.picture.render.width, setup.picture.render.height];
+    let [columns, rows] = camera.eyes();
+    let render = &setup.picture.render;
+    let picture = [render.width / columns, render.height / rows];
     let points = film_points(setup, survey, camera, picture);
     // Values as long as those of most frames
     let values = FrameValues {
@@ -146,6 +148,7 @@ fn content(
             title,
             unit,
             length,
+            orientation,
         } => {
             let Some((name, kind)) = color_bar(setup, manifest) else {
                 if survey.most_particles == 0 {
@@ -162,6 +165,7 @@ fn content(
                 title: title.clone().unwrap_or(name),
                 unit: unit.clone().unwrap_or_default(),
                 length: *length,
+                orientation: *orientation,
                 kind,
             }))
         }
@@ -312,6 +316,7 @@ fn backdrop(setup: &Setup, camera: &Camera, film: Vec2) -> Vec3 {
                 environment.radiance(ray.direction)
             }
             _ if picture.render.transparent_background => scene.background.color(camera.forward()),
+            _ if camera.projection().is_panorama() => scene.background.color(ray.direction),
             _ => scene.background.color_on_film(ray.direction, film),
         },
     };

@@ -1,13 +1,14 @@
 //! The pinhole camera of the thesis (program 4.1): `d = 2*film - 1`, `direction = d.x*u + d.y*v + w`, rays start at
-//! the eye.
+//! the eye. [`super::projection`] has other projections.
 //!
 //! It is set up in f64 world coordinates, and used in f32 relative to the origin of the sequence. Row 0 of the image
 //! is its top. [`super::path`] moves cameras, [`super::framing`] places them. [`super::lens`] adds depth of field.
 
-use glam::{DMat4, DVec2, DVec3, DVec4, Vec2, Vec3};
+use glam::{DMat4, DVec3, DVec4, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use super::projection::Projection;
 use crate::ray::Ray;
 
 /// Default vertical field of view in degrees: that of a 29 mm lens for a film still (24 mm high), wide enough for a
@@ -25,6 +26,20 @@ pub struct CameraView {
     pub up: DVec3,
     /// Vertical field of view in degrees, above 0 and below 180.
     pub fov: f64,
+}
+
+/// Sine of the angle to the up direction below which a view is one from straight above or below.
+const STEEP: f64 = 1e-3;
+
+impl CameraView {
+    /// The direction of the view; for one along `up`, the direction that points up in the image.
+    pub fn heading(&self, up: DVec3) -> DVec3 {
+        let forward = self.look_at - self.eye;
+        match forward.cross(up).length() < STEEP * forward.length() * up.length() {
+            true => self.up,
+            false => forward,
+        }
+    }
 }
 
 /// Reasons why a camera cannot be set up.
@@ -45,6 +60,9 @@ pub enum CameraError {
     /// Field of view outside 0 to 180 degrees.
     #[error("fov must be above 0 and below 180 degrees")]
     FieldOfView,
+    /// The height of an orthographic image is zero, negative, or out of range in single precision.
+    #[error("the height of the picture is out of range; choose another camera.height")]
+    Height,
     /// The aspect ratio is zero, negative or not finite.
     #[error("image width over height must be above 0")]
     Aspect,
@@ -58,6 +76,12 @@ pub enum CameraError {
         "the aperture is too large for single precision; raise camera.f_stop, or lower camera.aperture"
     )]
     Aperture,
+    /// The distance of the eyes of a stereo pair is out of range.
+    #[error(
+        "the distance or the convergence of the eyes is out of range in single precision; choose another \
+         camera.eye_distance or camera.convergence"
+    )]
+    Eyes,
 }
 
 /// The lens of a camera for one image, in scene units.
@@ -69,6 +93,16 @@ pub struct Lens {
     pub focus: f32,
 }
 
+/// A pair of eyes, in scene units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stereo {
+    /// Half the distance of the eyes, which are to the left and to the right of the eye of the camera.
+    pub half_distance: f32,
+    /// Distance along the view axis of the plane that both eyes see at the same positions of their images; infinite if
+    /// the eyes look in parallel directions.
+    pub convergence: f32,
+}
+
 /// A camera that generates rays.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Camera {
@@ -76,20 +110,36 @@ pub struct Camera {
     right: Vec3,
     up: Vec3,
     forward: Vec3,
-    /// `tan(fov / 2)`, horizontal and vertical.
+    projection: Projection,
     half_extent: Vec2,
     /// The lens; without one, the camera is a pinhole.
     lens: Option<Lens>,
+    /// The eyes, if there are two.
+    stereo: Option<Stereo>,
     /// World to camera space: x right, y up, z forward (left-handed, as in OpenEXR's `worldToCamera`).
     camera_from_world: DMat4,
 }
 
 impl Camera {
-    /// A camera at `view`, for images with `aspect` = width / height. Its coordinates are relative to `origin`.
+    /// A pinhole camera at `view`, for images with `aspect` = width / height. Its coordinates are relative to `origin`.
     ///
     /// # Errors
     /// If the direction or the up vector of the view is undefined, or if a number is out of range.
     pub fn new(view: &CameraView, aspect: f64, origin: DVec3) -> Result<Self, CameraError> {
+        Self::projected(view, Projection::Perspective, aspect, origin)
+    }
+
+    /// A camera with any projection. For a panorama, the axis to the front is the direction of the view without its
+    /// part along `up`.
+    ///
+    /// # Errors
+    /// Same as [`Self::new`].
+    pub fn projected(
+        view: &CameraView,
+        projection: Projection,
+        aspect: f64,
+        origin: DVec3,
+    ) -> Result<Self, CameraError> {
         // Check the view
         let points = [view.eye, view.look_at, view.up, origin];
         if !points.iter().all(|p| p.is_finite()) {
@@ -99,12 +149,14 @@ impl Camera {
         if !is_representable(view.eye) || !is_representable(view.look_at) {
             return Err(CameraError::TooFar);
         }
-        if !(view.fov > 0.0 && view.fov < 180.0) {
-            return Err(CameraError::FieldOfView);
-        }
         if !(aspect > 0.0 && aspect.is_finite()) {
             return Err(CameraError::Aspect);
         }
+        let half_extent = projection.half_extent(view.fov, aspect);
+        let half_extent = half_extent.ok_or(match projection {
+            Projection::Orthographic { .. } => CameraError::Height,
+            _ => CameraError::FieldOfView,
+        })?;
         // Build an orthonormal basis
         let forward = (view.look_at - view.eye)
             .try_normalize()
@@ -116,15 +168,19 @@ impl Camera {
             return Err(CameraError::NoUp);
         }
         let right = right.normalize();
-        let up = right.cross(forward);
-        let half_height = libm::tan(0.5 * view.fov.to_radians());
+        let (up, forward) = match projection.is_panorama() {
+            true => (up_hint, up_hint.cross(right)),
+            false => (right.cross(forward), forward),
+        };
         Ok(Self {
             eye: (view.eye - origin).as_vec3(),
             right: right.as_vec3(),
             up: up.as_vec3(),
             forward: forward.as_vec3(),
-            half_extent: DVec2::new(half_height * aspect, half_height).as_vec2(),
+            projection,
+            half_extent: half_extent.as_vec2(),
             lens: None,
+            stereo: None,
             camera_from_world: camera_from_world(view.eye, right, up, forward),
         })
     }
@@ -136,11 +192,27 @@ impl Camera {
         Self { lens, ..self }
     }
 
-    /// The ray through the eye and through `film`, in units of the image: (0, 0) is the top left corner, (1, 1) the bottom right one.
+    /// The camera with two eyes.
+    #[must_use]
+    pub fn with_stereo(self, stereo: Option<Stereo>) -> Self {
+        Self { stereo, ..self }
+    }
+
+    /// The ray from the eye through `film`, in units of the image: (0, 0) is the top left corner, (1, 1) the bottom right one.
     pub fn ray(&self, film: Vec2) -> Ray {
         let d = Vec2::new(2.0 * film.x - 1.0, 1.0 - 2.0 * film.y) * self.half_extent;
-        let direction = self.forward + d.x * self.right + d.y * self.up;
-        Ray::new(self.eye, direction.normalize())
+        let on_axes = self.projection.direction(d.to_array());
+        let direction = on_axes.z * self.forward + on_axes.x * self.right + on_axes.y * self.up;
+        let origin = match self.projection.has_one_origin() {
+            true => self.eye,
+            false => self.eye + d.x * self.right + d.y * self.up,
+        };
+        Ray::new(origin, direction.normalize())
+    }
+
+    /// The projection.
+    pub const fn projection(&self) -> Projection {
+        self.projection
     }
 
     /// The view axis.
@@ -158,7 +230,19 @@ impl Camera {
         self.lens
     }
 
-    /// Tangents of half the horizontal and vertical field of view.
+    /// The two eyes, if there are two.
+    pub(crate) const fn stereo(&self) -> Option<Stereo> {
+        self.stereo
+    }
+
+    /// Number of images beside each other and below each other in a picture: the left eye is at the left, or in a
+    /// panorama above.
+    pub const fn eyes(&self) -> [u32; 2] {
+        eyes(self.projection, self.stereo.is_some())
+    }
+
+    /// Half the width and the height of the film: tangents in perspective, lengths if orthographic, angles in a
+    /// panorama.
     pub(crate) const fn half_extent(&self) -> Vec2 {
         self.half_extent
     }
@@ -168,18 +252,21 @@ impl Camera {
         self.eye
     }
 
-    /// Distance of `point` from the eye along the view axis.
+    /// Distance of `point` from the eye along the view axis; in a panorama, in any direction.
     pub fn depth_of(&self, point: Vec3) -> f32 {
-        (point - self.eye).dot(self.forward)
+        match self.projection.is_panorama() {
+            true => (point - self.eye).length(),
+            false => (point - self.eye).dot(self.forward),
+        }
     }
 
-    /// The position on the film of `point`, in units of the image as in [`Self::ray`], as a pinhole sees it; None
-    /// behind the camera.
+    /// The position on the film of `point`, in units of the image as in [`Self::ray`], without a lens; None behind the
+    /// camera.
     pub fn film_of(&self, point: Vec3) -> Option<Vec2> {
-        let depth = self.depth_of(point);
         let to_point = point - self.eye;
-        let across = Vec2::new(to_point.dot(self.right), -to_point.dot(self.up));
-        (depth > 0.0).then(|| 0.5 + 0.5 * across / (depth * self.half_extent))
+        let on_axes = [self.right, self.up, self.forward].map(|axis| to_point.dot(axis));
+        let d = self.projection.project(on_axes.into())? / self.half_extent;
+        Some(0.5 + 0.5 * Vec2::new(d.x, -d.y))
     }
 
     /// The matrix of OpenEXR's `worldToCamera` (row vectors, row by row; left-handed, y up, z forward, so that the
@@ -187,6 +274,15 @@ impl Camera {
     pub fn world_to_camera(&self) -> [f32; 16] {
         // Rows for row vectors equal columns for column vectors.
         self.camera_from_world.as_mat4().to_cols_array()
+    }
+}
+
+/// Number of images beside each other and below each other in a picture.
+pub const fn eyes(projection: Projection, is_stereo: bool) -> [u32; 2] {
+    match (is_stereo, projection.is_panorama()) {
+        (false, _) => [1, 1],
+        (true, false) => [2, 1],
+        (true, true) => [1, 2],
     }
 }
 

@@ -10,6 +10,8 @@ use glam::{DVec2, DVec3};
 use super::Bounds;
 use super::camera::{CameraView, DEFAULT_FOV};
 
+mod parallel;
+
 /// Margin around a box as a fraction of half the width and height of the image.
 pub const BOX_MARGIN: f64 = 0.08;
 
@@ -29,9 +31,9 @@ pub struct Framing {
     pub up: DVec3,
     /// Rotation about `up` in degrees; 0 looks along +y if `up` is z, along -z if `up` is y.
     pub azimuth: f64,
-    /// Elevation above the horizon in degrees; a positive one looks down.
+    /// Elevation above the horizon in degrees; 90 looks straight down.
     pub elevation: f64,
-    /// Vertical field of view in degrees.
+    /// Vertical field of view in degrees; only for perspective.
     pub fov: f64,
     /// Width of the image divided by its height.
     pub aspect: f64,
@@ -100,9 +102,10 @@ impl Framed {
     /// for a single point, and for points in a plane.
     pub fn view(&self, framing: &Framing) -> CameraView {
         // Find the axes of the view
-        let up = framing.up.try_normalize().unwrap_or(DVec3::Z);
-        let direction = view_direction(up, framing.azimuth, framing.elevation);
-        let right = direction.cross(up).try_normalize().unwrap_or(DVec3::X);
+        let axes = ViewAxes::new(framing);
+        let ViewAxes {
+            right, direction, ..
+        } = axes;
         let screen_up = right.cross(direction);
         let half = self.half_extent(framing);
 
@@ -128,19 +131,23 @@ impl Framed {
         CameraView {
             eye: look_at - distance * direction,
             look_at,
-            up,
+            up: axes.up,
             fov: framing.fov,
         }
     }
 
     /// Half the extent of the image at distance 1, horizontally and vertically, without the margin.
     pub(super) fn half_extent(&self, framing: &Framing) -> DVec2 {
-        let margin = match self.is_centred {
-            true => SPHERES_MARGIN,
-            false => BOX_MARGIN,
-        };
-        let half_height = libm::tan(0.5 * framing.fov.to_radians()) * (1.0 - margin);
+        let half_height = libm::tan(0.5 * framing.fov.to_radians()) * self.used_part();
         DVec2::new(half_height * framing.aspect, half_height)
+    }
+
+    /// The part of the height or the width of the image that the particles may fill.
+    fn used_part(&self) -> f64 {
+        match self.is_centred {
+            true => 1.0 - SPHERES_MARGIN,
+            false => 1.0 - BOX_MARGIN,
+        }
     }
 
     /// Minimum distance for a single point, which would otherwise be fitted at distance 0.
@@ -198,10 +205,46 @@ fn centred(places: &[[f64; 2]], reach: f64, distance: f64, start: f64) -> f64 {
     0.5 * (low + high)
 }
 
+/// The axes of a view.
+struct ViewAxes {
+    right: DVec3,
+    direction: DVec3,
+    /// The direction that points up in the image: that of the framing, unless the view is along it.
+    up: DVec3,
+}
+
+/// Elevation in degrees beyond which the up direction of a view is not that of the framing.
+const STEEP: f64 = 89.5;
+
+impl ViewAxes {
+    fn new(framing: &Framing) -> Self {
+        let Framing {
+            azimuth, elevation, ..
+        } = *framing;
+        let up = framing.up.try_normalize().unwrap_or(DVec3::Z);
+        if elevation.abs() < STEEP {
+            let direction = view_direction(up, azimuth, elevation);
+            let right = direction.cross(up).try_normalize().unwrap_or(DVec3::X);
+            return Self {
+                right,
+                direction,
+                up,
+            };
+        }
+        // The direction to the right does not depend on the elevation
+        let right = view_direction(up, azimuth, 0.0).cross(up);
+        let direction = -elevation.signum() * up;
+        Self {
+            right,
+            direction,
+            up: right.cross(direction),
+        }
+    }
+}
+
 /// View direction of a camera at `azimuth` and `elevation` (degrees) about `up`.
 pub(crate) fn view_direction(up: DVec3, azimuth: f64, elevation: f64) -> DVec3 {
-    // The up direction is undefined for a view straight down; one degree makes no visible difference.
-    let elevation = elevation.clamp(-89.0, 89.0).to_radians();
+    let elevation = elevation.to_radians();
     let azimuth = azimuth.to_radians();
     let hint = if up.x.abs() < 0.9 { DVec3::X } else { DVec3::Y };
     let right = (hint - hint.dot(up) * up).normalize();

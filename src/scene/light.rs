@@ -141,7 +141,12 @@ impl Light {
 pub fn default_lights(bounds: &Bounds, up: DVec3, view: &CameraView) -> Vec<Light> {
     // Find the horizontal axes of the view
     let up = up.try_normalize().unwrap_or(DVec3::Z);
-    let to_eye = view.eye - bounds.center();
+    let is_steep = view.heading(up) == view.up;
+    let to_eye = if is_steep {
+        -view.up
+    } else {
+        view.eye - bounds.center()
+    };
     let level = to_eye - to_eye.dot(up) * up;
     // For a view from straight above, any direction will do.
     let back = level

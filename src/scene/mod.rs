@@ -21,12 +21,14 @@ pub mod material;
 pub mod mesh;
 pub mod part;
 pub mod path;
+pub mod projection;
 pub mod rgb;
 mod sand;
+pub mod stereo;
 pub mod texture;
 
 pub use background::Background;
-pub use camera::{Camera, CameraError, CameraView, Lens};
+pub use camera::{Camera, CameraError, CameraView, Lens, Stereo};
 pub use colormap::{ColorMap, ColorScale, UnknownColorMap};
 pub use environment::{Environment, EnvironmentAxes, IrradianceHarmonics, RadianceMap};
 pub use framing::{Framed, Framing};
@@ -37,7 +39,9 @@ pub use material::{Finish, Fresnel, Material, MaterialError};
 pub use mesh::{MeshFinish, MeshMaterial};
 pub use part::{PartMaterial, PartMaterials};
 pub use path::{CameraKey, CameraPath, KeyedPath, PathError, Turntable};
+pub use projection::Projection;
 pub use rgb::{RgbEncoding, is_rgb};
+pub use stereo::{Convergence, StereoSettings};
 pub use texture::Texture;
 
 /// An axis-aligned box in world units; includes the spheres.

@@ -47,6 +47,16 @@ impl CameraPath {
         Self::Turntable(Turntable::new(framed, framing, degrees_per_frame))
     }
 
+    /// The same for orthographic images, with their height in scene units.
+    pub fn parallel_turntable(
+        framed: &Framed,
+        framing: &Framing,
+        degrees_per_frame: f64,
+    ) -> (Self, f64) {
+        let (turntable, height) = Turntable::parallel(framed, framing, degrees_per_frame);
+        (Self::Turntable(turntable), height)
+    }
+
     /// An interpolation of `keys`, sorted by frame; see [`KeyedPath`].
     ///
     /// # Errors

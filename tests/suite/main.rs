@@ -30,6 +30,7 @@ mod overlays;
 mod parts;
 mod printing;
 mod progress;
+mod projections;
 mod resume;
 mod rough_glass;
 mod samples;

@@ -35,9 +35,10 @@ impl Check<'_> {
             self.tasks.iter().map(|t| json!(t.image)).collect(),
         );
         put("directory", json!(self.render_job.dir()));
+        let [width, height] = manifest.picture().size();
         let mut image = json!({
-            "width": manifest.image.width,
-            "height": manifest.image.height,
+            "width": width,
+            "height": height,
             "samples": manifest.image.samples,
             "channels": manifest.output.channels.iter().map(Channel::name).collect::<Vec<_>>(),
             "preview": manifest.output.preview,
@@ -84,11 +85,12 @@ impl Check<'_> {
         let mut lines = vec![self.frames_line()];
         let manifest = self.render_job.manifest();
         let names: Vec<_> = manifest.output.channels.iter().map(Channel::name).collect();
+        let [width, height] = manifest.picture().size();
         lines.push(format!(
             "images     {}: {}x{}{}, {} samples per pixel, {}{}",
             self.render_job.shown_output().display(),
-            manifest.image.width,
-            manifest.image.height,
+            width,
+            height,
             manifest
                 .image
                 .part()

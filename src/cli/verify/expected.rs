@@ -5,7 +5,9 @@ use std::collections::BTreeSet;
 use spherule_jobs::Plan;
 
 use crate::job::KIND;
-use crate::manifest::{ATTRIBUTE_CHANNEL as ATTRIBUTE, Image, PixelBounds};
+use crate::manifest::{
+    ATTRIBUTE_CHANNEL as ATTRIBUTE, Camera, Image, PixelBounds, ProjectionKind, Side,
+};
 use crate::output::ImageShape;
 use crate::render::Channels;
 
@@ -86,8 +88,8 @@ impl ExpectedOutput {
         });
         let crop = crop.map(|crop| crop.ok_or_else(|| wrong("image.crop")));
         let image = Image {
-            width: side("image.width")?,
-            height: side("image.height")?,
+            width: Side::Pixels(side("image.width")?),
+            height: Side::Pixels(side("image.height")?),
             crop: crop.transpose()?,
             overscan: match find("image.overscan") {
                 Some(_) => side("image.overscan")?,
@@ -95,6 +97,16 @@ impl ExpectedOutput {
             },
             ..Image::default()
         };
+        // Plans of older versions have one eye
+        let camera = Camera {
+            stereo: find("camera.stereo") == Some("true"),
+            projection: match find("camera.projection") {
+                Some("\"equirectangular\"") => ProjectionKind::Equirectangular,
+                _ => ProjectionKind::Perspective,
+            },
+            ..Camera::default()
+        };
+        let image = image.of_eyes(camera.eyes());
         let [width, height] = image.data_size().ok_or_else(|| wrong("image.crop"))?;
         let (channels, attributes, light_groups) =
             channels().ok_or_else(|| wrong("output.channels"))?;

@@ -14,6 +14,7 @@ mod values;
 const EVERYTHING: &str = r#"
 input = { path = ["a", "b"], frames = 7, radius = { attribute = "d", scale = 0.5 }, up = "-y", verify = true }
 camera = { mode = "keys", key = [{ frame = 9, eye = [1, 2, 3], look_at = [0, 0, 0], fov = 30 }] }
+image = { width = "85mm", height = "6 cm", dpi = 600 }
 render = { surface = "smooth", integrator = "path", bounces = 0, ground_pattern = "checker", ground_tile = 0.5, background = { bottom = [0, 0, 0], top = [1, 1, 1] }, ground = true, ground_height = -2, memory_limit = "1.5GiB" }
 surface = { normals = "field", smoothing = 1, exact = true, voxel = 0.5, smoothing_length = 2.5, threshold = 0.55, spray = true, spray_style = "spheres" }
 material = { color = { attribute = "velocity.x", map = "red-blue_r", range = "1%-99.5%", scale = "symlog", threshold = 0.1, steps = 8, reverse = true }, absorption = [0.5, 1, 0], absorption_length = 3, fresnel = "exact" }

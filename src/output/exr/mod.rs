@@ -7,6 +7,7 @@
 
 use std::io::{self, Cursor, Seek, Write};
 
+use exr::meta::attribute::EnvironmentMap;
 use exr::prelude::{AttributeValue, LayerAttributes, Text};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -76,6 +77,10 @@ pub struct ExrOptions {
     pub window: Option<DataWindow>,
     /// Attribute `framesPerSecond`, as numerator and denominator.
     pub frames_per_second: Option<(i32, u32)>,
+    /// Pixels per inch on paper, for the attribute `xDensity`.
+    pub dpi: Option<u32>,
+    /// Whether the image shows all directions by longitude and latitude, for the attribute `envmap`.
+    pub is_panorama: bool,
     /// Attribute `worldToCamera`, from [`crate::scene::Camera::world_to_camera`].
     pub world_to_camera: Option<[f32; 16]>,
     /// Attribute `comments`.
@@ -171,6 +176,10 @@ fn attributes(options: &ExrOptions) -> Result<LayerAttributes, OutputError> {
         software_name: Some(Text::from(concat!("spherule ", env!("CARGO_PKG_VERSION")))),
         frames_per_second: options.frames_per_second,
         world_to_camera: options.world_to_camera,
+        horizontal_density: options.dpi.map(|dpi| dpi as f32),
+        environment_map: options
+            .is_panorama
+            .then_some(EnvironmentMap::LatitudeLongitude),
         ..LayerAttributes::default()
     };
     attributes.comments = options.comments.as_deref().map(text);

@@ -10,8 +10,12 @@ use glam::Vec3;
 use super::frame::disc;
 use crate::math::{LANES, Lanes, lane_kernel};
 use crate::ray::RayPacket;
-use crate::scene::{Camera, Lens};
+use crate::scene::{Camera, Lens, Projection, Stereo};
 use crate::surface::Intersections;
+
+mod film_ray;
+
+use film_ray::{FilmRay, Panorama, Parallel, Pinhole};
 
 /// A camera in a form for packets.
 #[derive(Debug, Clone, Copy)]
@@ -20,11 +24,13 @@ pub(in crate::render) struct CameraLanes {
     right: Vec3,
     up: Vec3,
     forward: Vec3,
-    /// Tangents of half the field of view.
+    projection: Projection,
+    /// Half the width and the height of the film.
     half_extent: [f32; 2],
     /// Size of the image in pixels.
     size: [f32; 2],
     lens: Option<Lens>,
+    stereo: Option<Stereo>,
 }
 
 impl CameraLanes {
@@ -35,25 +41,48 @@ impl CameraLanes {
             right,
             up,
             forward,
+            projection: camera.projection(),
             half_extent: camera.half_extent().to_array(),
             size: [width as f32, height as f32],
             lens: camera.lens(),
+            stereo: camera.stereo(),
         }
     }
 
-    /// Whether camera rays start at different points.
+    /// Whether camera rays start at random points.
     pub(in crate::render) const fn has_lens(&self) -> bool {
         self.lens.is_some()
     }
 
+    /// Whether all camera rays start at the eye.
+    pub(in crate::render) const fn has_one_origin(&self) -> bool {
+        self.lens.is_none() && self.stereo.is_none() && self.projection.has_one_origin()
+    }
+
+    /// Whether there are images for two eyes.
+    pub(in crate::render) const fn is_stereo(&self) -> bool {
+        self.stereo.is_some()
+    }
+
     /// Width of a pixel at the distance of `point` from the eye.
     pub(in crate::render) fn pixel_width(&self, point: Vec3) -> f32 {
-        2.0 * self.half_extent[1] / self.size[1] * (point - self.eye).length()
+        let width = 2.0 * self.half_extent[1] / self.size[1];
+        match self.projection {
+            Projection::Orthographic { .. } => width,
+            _ => width * (point - self.eye).length(),
+        }
     }
 
     /// The position of `point` on the film in pixels from its top left corner; None behind the camera.
     pub(in crate::render) fn pixel_of(&self, point: Vec3) -> Option<[f32; 2]> {
         let direction = point - self.eye;
+        if self.projection != Projection::Perspective {
+            let on_axes = [self.right, self.up, self.forward].map(|axis| direction.dot(axis));
+            let [a, b] = self.projection.project(on_axes.into())?.to_array();
+            let [width, height] = self.half_extent;
+            let film = [0.5 + 0.5 * a / width, 0.5 - 0.5 * b / height];
+            return Some([film[0] * self.size[0], film[1] * self.size[1]]);
+        }
         if direction.dot(self.forward) <= 0.0 {
             return None;
         }
@@ -62,8 +91,17 @@ impl CameraLanes {
         Some([x * self.size[0], y * self.size[1]])
     }
 
+    /// Coordinates on the film of a point in pixels, to the right and upwards from the middle.
+    #[inline(always)]
+    fn on_film(&self, x: f32, y: f32) -> [f32; 2] {
+        [
+            (2.0 * (x / self.size[0]) - 1.0) * self.half_extent[0],
+            (1.0 - 2.0 * (y / self.size[1])) * self.half_extent[1],
+        ]
+    }
+
     /// The position on the film of the camera ray from `origin` with unit direction `d`; (0, 0) is the top left corner,
-    /// (1, 1) the bottom right one.
+    /// (1, 1) the bottom right one. Not for panoramas.
     #[inline(always)]
     pub(super) fn film_position(&self, origin: [f32; 3], mut d: [f32; 3]) -> [f32; 2] {
         let (r, u, f) = (self.right, self.up, self.forward);
@@ -74,7 +112,15 @@ impl CameraLanes {
                 d[axis] = origin[axis] - self.eye[axis] + distance * d[axis];
             }
         }
-        let depth = d[0] * f.x + d[1] * f.y + d[2] * f.z;
+        let depth = match self.projection {
+            Projection::Orthographic { .. } => {
+                for axis in 0..3 {
+                    d[axis] = origin[axis] - self.eye[axis];
+                }
+                1.0
+            }
+            _ => d[0] * f.x + d[1] * f.y + d[2] * f.z,
+        };
         let across = (d[0] * r.x + d[1] * r.y + d[2] * r.z) / (depth * self.half_extent[0]);
         let along = (d[0] * u.x + d[1] * u.y + d[2] * u.z) / (depth * self.half_extent[1]);
         [0.5 + 0.5 * across, 0.5 - 0.5 * along]
@@ -84,19 +130,21 @@ impl CameraLanes {
 /// Camera rays through points of the film, which are in pixels from its top left corner.
 #[inline(always)]
 fn camera_rays_body(camera: &CameraLanes, x: &Lanes, y: &Lanes, rays: &mut RayPacket) {
-    let (r, u, f) = (camera.right, camera.up, camera.forward);
+    match camera.projection {
+        Projection::Perspective => still_rays::<Pinhole>(camera, x, y, rays),
+        Projection::Orthographic { .. } => still_rays::<Parallel>(camera, x, y, rays),
+        Projection::Equirectangular => still_rays::<Panorama>(camera, x, y, rays),
+    }
+}
+
+#[inline(always)]
+fn still_rays<P: FilmRay>(camera: &CameraLanes, x: &Lanes, y: &Lanes, rays: &mut RayPacket) {
     for l in 0..LANES {
-        let a = (2.0 * (x[l] / camera.size[0]) - 1.0) * camera.half_extent[0];
-        let b = (1.0 - 2.0 * (y[l] / camera.size[1])) * camera.half_extent[1];
-        let d = [
-            f.x + a * r.x + b * u.x,
-            f.y + a * r.y + b * u.y,
-            f.z + a * r.z + b * u.z,
-        ];
+        let [origin, d] = P::ray(camera, camera.on_film(x[l], y[l]));
         let inverse = 1.0 / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
         for axis in 0..3 {
             rays.direction[axis][l] = d[axis] * inverse;
-            rays.origin[axis][l] = camera.eye[axis];
+            rays.origin[axis][l] = origin[axis];
         }
         rays.t_min[l] = 0.0;
         rays.t_max[l] = f32::INFINITY;
@@ -117,21 +165,32 @@ fn moving_camera_rays_body(
     y: &Lanes,
     rays: &mut RayPacket,
 ) {
+    match open.projection {
+        Projection::Perspective => moving_rays::<Pinhole>([open, close], x, y, rays),
+        Projection::Orthographic { .. } => moving_rays::<Parallel>([open, close], x, y, rays),
+        Projection::Equirectangular => moving_rays::<Panorama>([open, close], x, y, rays),
+    }
+}
+
+#[inline(always)]
+fn moving_rays<P: FilmRay>(
+    [open, close]: [&CameraLanes; 2],
+    x: &Lanes,
+    y: &Lanes,
+    rays: &mut RayPacket,
+) {
     for l in 0..LANES {
         let end = rays.time[l] + 0.5;
+        let [from, d_open] = P::ray(open, open.on_film(x[l], y[l]));
+        let [to, d_close] = P::ray(close, close.on_film(x[l], y[l]));
         let mut d = [0.0; 3];
-        for (camera, part) in [(open, 1.0 - end), (close, end)] {
-            let (r, u, f) = (camera.right, camera.up, camera.forward);
-            let a = (2.0 * (x[l] / camera.size[0]) - 1.0) * camera.half_extent[0];
-            let b = (1.0 - 2.0 * (y[l] / camera.size[1])) * camera.half_extent[1];
-            for axis in 0..3 {
-                d[axis] += part * (f[axis] + a * r[axis] + b * u[axis]);
-            }
+        for axis in 0..3 {
+            d[axis] = (1.0 - end) * d_open[axis] + end * d_close[axis];
         }
         let inverse = 1.0 / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
         for axis in 0..3 {
             rays.direction[axis][l] = d[axis] * inverse;
-            rays.origin[axis][l] = open.eye[axis] + end * (close.eye[axis] - open.eye[axis]);
+            rays.origin[axis][l] = from[axis] + end * (to[axis] - from[axis]);
         }
         rays.t_min[l] = 0.0;
         rays.t_max[l] = f32::INFINITY;
@@ -179,13 +238,62 @@ lane_kernel! {
     pub(in crate::render) fn lens_rays(camera: &CameraLanes, u: &[Lanes; 2], rays: &mut RayPacket) = lens_rays_body;
 }
 
-/// Distances of the intersections of camera rays along the view axis; infinite without an intersection.
+/// Moves the origins of `rays`, camera rays from the eye, to the left or the right eye: `side` is -1 or 1. Rays of a
+/// camera with a finite convergence still pass through the same points of the plane at this distance. Each direction of
+/// a panorama has its own pair of eyes, beside each other as seen along it (Peleg, Ben-Ezra and Pritch, "Omnistereo:
+/// panoramic stereo imaging", 2001).
+#[inline(always)]
+fn stereo_rays_body(camera: &CameraLanes, side: &Lanes, rays: &mut RayPacket) {
+    let Some(stereo) = camera.stereo else {
+        return;
+    };
+    let (r, f) = (camera.right, camera.forward);
+    let is_panorama = camera.projection.is_panorama();
+    let converges = stereo.convergence < f32::INFINITY;
+    for l in 0..LANES {
+        let shift = side[l] * stereo.half_distance;
+        let d = &mut rays.direction;
+        let along = d[0][l] * f.x + d[1][l] * f.y + d[2][l] * f.z;
+        let across = d[0][l] * r.x + d[1][l] * r.y + d[2][l] * r.z;
+        // The level direction to the right of the ray
+        let level = (along * along + across * across).sqrt();
+        let inverse = if level > 0.0 { 1.0 / level } else { 0.0 };
+        let is_turned = is_panorama && level > 0.0;
+        let (cos, sin) = if is_turned {
+            (along * inverse, across * inverse)
+        } else {
+            (1.0, 0.0)
+        };
+        let distance = stereo.convergence / along;
+        let (mut turned, mut square) = ([0.0; 3], 0.0);
+        for axis in 0..3 {
+            let offset = shift * (cos * r[axis] - sin * f[axis]);
+            rays.origin[axis][l] += offset;
+            turned[axis] = distance * d[axis][l] - offset;
+            square += turned[axis] * turned[axis];
+        }
+        let inverse = 1.0 / square.sqrt();
+        for axis in 0..3 {
+            let converged = turned[axis] * inverse;
+            d[axis][l] = if converges { converged } else { d[axis][l] };
+        }
+    }
+}
+
+lane_kernel! {
+    pub(in crate::render) fn stereo_rays(camera: &CameraLanes, side: &Lanes, rays: &mut RayPacket) = stereo_rays_body;
+}
+
+/// Distances of the intersections of camera rays along the view axis, or along the rays if these are parallel or those
+/// of a panorama; infinite without an intersection.
 #[inline(always)]
 fn depths_body(camera: &CameraLanes, rays: &RayPacket, hits: &Intersections, z: &mut Lanes) {
     let f = camera.forward;
     let d = &rays.direction;
+    let is_perspective = matches!(camera.projection, Projection::Perspective);
     for l in 0..LANES {
         let along = d[0][l] * f.x + d[1][l] * f.y + d[2][l] * f.z;
+        let along = if is_perspective { along } else { 1.0 };
         let is_hit = hits.mask >> l & 1 == 1;
         z[l] = if is_hit {
             hits.t[l] * along

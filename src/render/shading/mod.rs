@@ -13,5 +13,7 @@ mod frame;
 pub(super) use arithmetic::{add, product, scale};
 pub(super) use backdrop::add_backdrop;
 pub(super) use background::{BackgroundLanes, add_background};
-pub(super) use camera::{CameraLanes, camera_rays, depths, lens_rays, moving_camera_rays};
+pub(super) use camera::{
+    CameraLanes, camera_rays, depths, lens_rays, moving_camera_rays, stereo_rays,
+};
 pub(super) use frame::{disc, in_cone, tangents, to_world};

@@ -21,15 +21,32 @@ pub struct Turntable {
 
 impl Turntable {
     pub(super) fn new(framed: &Framed, framing: &Framing, degrees_per_frame: f64) -> Self {
-        let up = framing.up.try_normalize().unwrap_or(DVec3::Z);
-        let framing = Framing { up, ..*framing };
+        let framing = level(framing);
         let (shift, distance) = fit(framed, &framing);
         Self {
-            look_at: framed.bounds().center() + shift * up,
+            look_at: framed.bounds().center() + shift * framing.up,
             distance,
             framing,
             degrees_per_frame,
         }
+    }
+
+    /// The same for orthographic images, with their height in scene units.
+    pub(super) fn parallel(
+        framed: &Framed,
+        framing: &Framing,
+        degrees_per_frame: f64,
+    ) -> (Self, f64) {
+        let framing = level(framing);
+        let slant = slant(&framing);
+        let [height, shift] = framed.turning_height(&framing, slant);
+        let turntable = Self {
+            look_at: framed.bounds().center() + shift * framing.up,
+            distance: framed.far() + (shift * slant[0]).abs(),
+            framing,
+            degrees_per_frame,
+        };
+        (turntable, height)
     }
 
     /// The view `after` frames after `frame`.
@@ -55,6 +72,24 @@ impl Turntable {
     }
 }
 
+/// The framing with a normalised up vector, and not along it.
+fn level(framing: &Framing) -> Framing {
+    Framing {
+        up: framing.up.try_normalize().unwrap_or(DVec3::Z),
+        elevation: framing.elevation.clamp(-89.0, 89.0),
+        ..*framing
+    }
+}
+
+/// Sine and cosine of the elevation.
+fn slant(framing: &Framing) -> [f64; 2] {
+    let direction = view_direction(framing.up, 0.0, framing.elevation);
+    [
+        -direction.dot(framing.up),
+        direction.cross(framing.up).length(),
+    ]
+}
+
 /// Height of the target point above the centre of `framed`, and its distance.
 ///
 /// Derived like the view of [`crate::scene::framing`], for the circles on which the points rotate. Let `r` and `h` be
@@ -64,11 +99,7 @@ impl Turntable {
 /// or behind it.
 fn fit(framed: &Framed, framing: &Framing) -> (f64, f64) {
     // Find the view, and the half extent of the image
-    let direction = view_direction(framing.up, 0.0, framing.elevation);
-    let (sin, cos) = (
-        -direction.dot(framing.up),
-        direction.cross(framing.up).length(),
-    );
+    let [sin, cos] = slant(framing);
     let half = framed.half_extent(framing);
     let bounds = framed.bounds();
     let mut distance = framed.min_distance();

@@ -90,16 +90,16 @@ fn numbers_have_ranges() {
     for (options, expected) in [
         (
             ["--width", "-5"],
-            "--width: image.width: expected a whole number from 1 to 65536, found -5",
+            "--width: image.width: expected a length on paper such as \"85mm\", or a whole number from 1 to 65536, found -5",
         ),
         (
             ["--width", "0"],
-            "image.width: expected a whole number from 1 to 65536, found 0",
+            "image.width: expected a length on paper such as \"85mm\", or a whole number from 1 to 65536, found 0",
         ),
         (["--width", "65537"], "from 1 to 65536, found 65537"),
         (
             ["--height", "-1"],
-            "--height: image.height: expected a whole number from 1 to 65536",
+            "--height: image.height: expected a length on paper such as \"85mm\", or a whole number from 1 to 65536",
         ),
         (["--height", "99999999999"], "found 99999999999"),
         (
@@ -171,7 +171,7 @@ fn numbers_have_ranges() {
         ),
         (
             ["--width", "4k"],
-            "invalid value '4k' for '--width <WIDTH>': expected a number of pixels, such as 3840",
+            "--width: image.width: unknown unit `k`; write a whole number of pixels, or a length in mm, cm, in or pt",
         ),
         (["--samples", "many"], "expected a whole number, such as 16"),
         (["--idle", "1h"], "expected a number of seconds"),

@@ -42,8 +42,8 @@ fn wrong_types_have_line_and_column() {
     wrong(
         "[input]\npath = \"in\"\n[image]\nwidth = \"wide\"\nheight = 1.5\n",
         &[
-            "error: my.toml: line 4, column 9: image.width: expected a whole number from 1 to 65536, found the text \"wide\"",
-            "error: my.toml: line 5, column 10: image.height: expected a whole number",
+            "error: my.toml: line 4, column 9: image.width: expected a length on paper such as \"85mm\", or a whole number from 1 to 65536, found the text \"wide\"",
+            "error: my.toml: line 5, column 10: image.height: expected a length on paper",
         ],
     );
     wrong(

@@ -181,7 +181,10 @@ shots! {
     union
     smooth
     pca_normals
-    studio;
+    studio
+    orthographic
+    equirectangular
+    stereo;
     rendered:
     spray
     water;

@@ -3,8 +3,8 @@
 use glam::{DVec3, Vec3};
 use spherule::render::{Channels, Colors, RenderSettings};
 use spherule::scene::{
-    Background, Bounds, Camera, CameraView, ColorMap, Falloff, Fresnel, Ground, Light, Material,
-    Scene,
+    Background, Bounds, Camera, CameraView, ColorMap, Convergence, Falloff, Fresnel, Ground, Light,
+    Material, Projection, Scene, StereoSettings,
 };
 use spherule::surface::{NormalKind, SurfaceKind, SurfaceSettings};
 
@@ -122,6 +122,26 @@ impl Shot {
     fn sized(mut self, width: u32) -> Self {
         (self.settings.width, self.settings.height) = (width, width * HEIGHT / WIDTH);
         self
+    }
+
+    /// From another camera at `eye`, which looks at the origin or, if it is there, along +y.
+    fn project(&mut self, eye: DVec3, projection: Projection, eyes: Option<StereoSettings>) {
+        let view = CameraView {
+            eye,
+            look_at: if eye == DVec3::ZERO {
+                DVec3::Y
+            } else {
+                DVec3::ZERO
+            },
+            up: DVec3::Z,
+            fov: 35.0,
+        };
+        let aspect = f64::from(WIDTH) / f64::from(HEIGHT);
+        let camera = Camera::projected(&view, projection, aspect, DVec3::ZERO).expect("a camera");
+        let eyes = eyes.map(|eyes| eyes.stereo(&view).expect("eyes"));
+        self.scene.camera = camera.with_stereo(eyes);
+        let [columns, rows] = self.scene.camera.eyes();
+        (self.settings.width, self.settings.height) = (columns * WIDTH, rows * HEIGHT);
     }
 
     /// With one colour each.
@@ -394,4 +414,52 @@ pub(super) fn transparent_background() -> Shot {
     shot.scene.background = SUNSET;
     shot.settings.transparent_background = true;
     shot
+}
+
+/// A block of balls seen at equal angles to its three sides: all balls have the same size.
+pub(super) fn orthographic() -> Shot {
+    let side = || (0..4_u8).map(|i| f32::from(i) - 1.5);
+    let column = |x: f32| side().flat_map(move |y| side().map(move |z| Vec3::new(x, y, z)));
+    let centers: Vec<Vec3> = side().flat_map(column).collect();
+    let colors: Vec<Vec3> = centers.iter().map(|p| 0.5 + 0.25 * *p).collect();
+    let eye = 10.0 * DVec3::new(1.0, -1.0, 1.0);
+    let mut shot = Shot::new(centers, 0.4, eye, DVec3::ZERO);
+    shot.project(eye, Projection::Orthographic { height: 8.0 }, None);
+    shot.painted(&colors)
+}
+
+/// Rings of balls around the eye, above a floor: red ahead, green at the right, blue behind.
+pub(super) fn equirectangular() -> Shot {
+    let mut centers = Vec::new();
+    let mut colors = Vec::new();
+    for (i, color) in (0..16_u8).zip([RED, GREY, GREY, GREY, GREEN, GREY, GREY, GREY].repeat(2)) {
+        let angle = f32::from(i) * std::f32::consts::TAU / 16.0;
+        let level = Vec3::new(angle.sin(), angle.cos(), 0.0);
+        for height in [-0.8, 0.0, 2.5] {
+            centers.push(3.0 * level + height * Vec3::Z);
+            colors.push(if i == 8 { BLUE } else { color });
+        }
+    }
+    let mut shot = Shot::new(centers, 0.4, DVec3::ZERO, DVec3::Y);
+    shot.scene.ground = Some(floor(-1.2));
+    shot.scene.background = SUNSET;
+    shot.project(DVec3::ZERO, Projection::Equirectangular, None);
+    shot.painted(&colors)
+}
+
+/// Three balls: the middle one is at the distance of the screen, where both eyes see it in the same place.
+pub(super) fn stereo() -> Shot {
+    let centers = vec![
+        Vec3::new(-0.8, -3.0, 0.0),
+        Vec3::new(0.0, 0.0, 0.0),
+        Vec3::new(1.6, 5.0, 0.0),
+    ];
+    let eye = DVec3::new(0.0, -8.0, 0.0);
+    let mut shot = Shot::new(centers, 0.7, eye, DVec3::ZERO);
+    let eyes = StereoSettings {
+        eye_distance: Some(1.0),
+        convergence: Convergence::Target,
+    };
+    shot.project(eye, Projection::Perspective, Some(eyes));
+    shot.painted(&[RED, GREEN, BLUE])
 }
