@@ -23,6 +23,7 @@
 #![deny(unsafe_code)]
 
 pub mod accel;
+pub mod attributes;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod conversion;
@@ -46,6 +47,7 @@ pub mod resolve;
 #[cfg(feature = "reports")]
 pub mod scale;
 pub mod scene;
+pub mod selection;
 pub mod surface;
 pub mod survey;
 #[cfg(feature = "reports")]

@@ -14,6 +14,7 @@ use crate::render::{IndirectLight, IntegratorKind, PixelFilter, RenderSettings};
 use crate::scene::{
     Background, Bounds, Camera, CameraError, PathError, RadianceMap, Scene, default_lights,
 };
+use crate::selection::Selection;
 use crate::surface::SurfaceKind;
 use crate::survey::{Question, RadiusQuestion, Survey};
 
@@ -25,8 +26,10 @@ mod environment;
 mod ground;
 mod lights;
 mod meshes;
+mod opacity;
 mod overlay;
 mod parts;
+mod select;
 mod shutter;
 mod surface;
 
@@ -59,6 +62,20 @@ pub enum ResolveError {
         /// A similar name, if there is one.
         hint: String,
         /// The existing attributes.
+        has: String,
+    },
+    /// No frame has a value that a selection needs.
+    #[error(
+        "select.where: character {column}: no value `{name}` in the sampled frames{hint}; available: {has}"
+    )]
+    UnknownName {
+        /// The name in the condition.
+        name: String,
+        /// Its place in the condition, in characters from 1.
+        column: usize,
+        /// A similar name, if there is one.
+        hint: String,
+        /// The existing values.
         has: String,
     },
     /// There is no radius in the frames, and no estimate from the spacing of particles.
@@ -104,8 +121,8 @@ pub enum ResolveError {
     },
 }
 
-/// What the survey has to determine.
-pub fn question(manifest: &Manifest) -> Question<'_> {
+/// What the survey has to determine. `selection` is that of the manifest.
+pub fn question<'a>(manifest: &'a Manifest, selection: &'a Selection) -> Question<'a> {
     Question {
         color: color::question(&manifest.material.color),
         radius: match &manifest.input.radius {
@@ -119,6 +136,7 @@ pub fn question(manifest: &Manifest) -> Question<'_> {
             }
         },
         up: manifest.input.up.map(|up| DVec3::from_array(up.vector())),
+        selection: (!selection.is_all()).then_some(selection),
         points: color::is_depth(&manifest.material.color) || overlay::needs_points(manifest),
     }
 }
@@ -239,8 +257,10 @@ pub fn setup(
     let picture = Picture {
         origin: survey.origin,
         least_radius: narrow(bounds.diagonal() * LEAST_RADIUS).max(f32::MIN_POSITIVE),
+        selection: select::selection(manifest, survey)?,
         radius,
         color,
+        opacity: opacity::opacity(manifest, survey, scene.material.transmission > 0.0)?,
         up,
         path,
         projection,

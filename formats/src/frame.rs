@@ -4,6 +4,7 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use crate::attribute::with_values;
 use crate::names::RADII;
 use crate::{Attribute, AttributeData};
 
@@ -85,11 +86,50 @@ impl RawParticles {
         self.positions.byte_len() + attributes.sum::<u64>()
     }
 
+    /// Keeps only the particles with these indices, which are ascending. One array at a time is copied.
+    ///
+    /// # Panics
+    /// If there is no particle with one of the indices.
+    pub fn select(&mut self, indices: &[u32]) {
+        match &mut self.positions {
+            Positions::F32(v) => select(v, 1, indices),
+            Positions::F64(v) => select(v, 1, indices),
+        }
+        for attribute in &mut self.attributes {
+            with_values!(&mut attribute.data, v => select(v, attribute.components, indices));
+        }
+    }
+
     /// Bytes of the largest array among positions and attributes.
     pub(crate) fn largest_array_len(&self) -> u64 {
         let attributes = self.attributes.iter().map(|a| a.data.byte_len());
         attributes.fold(self.positions.byte_len(), u64::max)
     }
+}
+
+/// Keeps the groups of `components` items with these indices.
+fn select<T: Copy + Send + Sync>(items: &mut Vec<T>, components: usize, indices: &[u32]) {
+    fn groups<T: Copy + Send + Sync, const N: usize>(items: &[T], indices: &[u32]) -> Vec<T> {
+        let groups = items.as_chunks::<N>().0;
+        let kept = indices.par_iter().with_min_len(4096);
+        let kept: Vec<[T; N]> = kept.map(|index| groups[*index as usize]).collect();
+        kept.into_flattened()
+    }
+    *items = match components {
+        1 => groups::<T, 1>(items, indices),
+        2 => groups::<T, 2>(items, indices),
+        3 => groups::<T, 3>(items, indices),
+        4 => groups::<T, 4>(items, indices),
+        6 => groups::<T, 6>(items, indices),
+        9 => groups::<T, 9>(items, indices),
+        _ => {
+            let group = |index: &u32| {
+                let first = *index as usize * components;
+                &items[first..first + components]
+            };
+            indices.iter().flat_map(group).copied().collect()
+        }
+    };
 }
 
 /// Sphere radii in scene units.
@@ -117,7 +157,8 @@ pub struct ParticleFrame {
     pub time: Option<f64>,
     /// Particles that were dropped because a coordinate was NaN or beyond [`FARTHEST`].
     pub dropped: u64,
-    /// File-order index of each kept particle; `None` if no particle was dropped (the indices are then equal).
+    /// File-order index of each kept particle; `None` if all particles of the file were kept (the indices are then
+    /// equal).
     pub file_index: Option<Vec<u32>>,
 }
 
@@ -186,6 +227,20 @@ impl ParticleFrame {
         }
     }
 
+    /// Same as [`Self::from_raw`] for the particles with these indices, which are ascending. `file_index` has them.
+    ///
+    /// # Panics
+    /// If there is no particle with one of the indices.
+    pub fn from_selected(mut raw: RawParticles, indices: Vec<u32>, origin: DVec3) -> Self {
+        raw.select(&indices);
+        let mut frame = Self::from_raw(raw, origin);
+        frame.file_index = Some(match frame.file_index {
+            None => indices,
+            Some(kept) => kept.iter().map(|i| indices[*i as usize]).collect(),
+        });
+        frame
+    }
+
     /// The attribute called `name`: an exact match, else one that ignores case.
     pub fn attribute(&self, name: &str) -> Option<&Attribute> {
         let exact = self.attributes.iter().find(|a| a.name == name);
@@ -226,7 +281,7 @@ fn relative_positions(positions: Positions, origin: DVec3) -> Vec<Vec3> {
     clippy::cast_possible_truncation,
     reason = "radii are f32 in the renderer"
 )]
-pub(crate) fn find_radius(attributes: &[Attribute]) -> Option<Radius> {
+pub fn find_radius(attributes: &[Attribute]) -> Option<Radius> {
     let named = |name: &str| {
         attributes.iter().find(|a| {
             a.components == 1

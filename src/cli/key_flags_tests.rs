@@ -22,7 +22,7 @@ const ACTIONS: [&str; 7] = [
 const COLORS: [&str; 4] = ["color_by", "map", "range", "color_scale"];
 
 /// Other options with a value that is not the default, and the key that it is laid over.
-const FLAGS: [(&str, &str); 39] = [
+const FLAGS: [(&str, &str); 40] = [
     ("--output x.####.exr", "output.path = \"x.####.exr\""),
     ("--frames 3-4", "input.frames = \"3-4\""),
     ("--width 7", "image.width = 7"),
@@ -57,6 +57,7 @@ const FLAGS: [(&str, &str); 39] = [
     ("--spray", "surface.spray = true"),
     ("--no-mmap", "input.mmap = false"),
     ("--follow-links", "input.follow_links = true"),
+    ("--where x>2", "select.where = \"x>2\""),
     ("--parts a,b", "input.parts = [\"a\", \"b\"]"),
     ("--accelerator bvh", "render.accelerator = \"bvh\""),
     ("--memory-limit 4GiB", "render.memory_limit = \"4GiB\""),
@@ -106,7 +107,8 @@ fn every_option_is_a_key() {
 }
 
 /// Options whose `[default: ...]` is no value that could be given.
-const WORDS: [&str; 10] = [
+const WORDS: [&str; 11] = [
+    "where",
     "crop",
     "dpi",
     "view",

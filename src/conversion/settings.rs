@@ -65,6 +65,7 @@ impl ConvertSettings {
             color: ColorQuestion::None,
             up: None,
             points: false,
+            selection: None,
             radius: match self.radius {
                 Some(_) => RadiusQuestion::None,
                 None => RadiusQuestion::Auto,

@@ -289,7 +289,8 @@ impl RenderJob {
     /// # Errors
     /// No frame can be read, or the settings and the particles do not go together.
     pub fn survey(&self, sequence: &Sequence) -> Result<(Survey, Setup), RunError> {
-        let survey = in_thread(|| Survey::of(sequence, question(&self.manifest)))?;
+        let selection = self.manifest.selection();
+        let survey = in_thread(|| Survey::of(sequence, question(&self.manifest, &selection)))?;
         let setup = self.setup(&survey, sequence)?;
         Ok((survey, setup))
     }

@@ -25,7 +25,7 @@ fn manual() -> String {
     let is_list = |table: &&[Entry]| {
         matches!(
             table[0].section.split('.').next(),
-            Some("light" | "mesh" | "overlay")
+            Some("clip" | "light" | "mesh" | "overlay")
         )
     };
     tables.sort_by_key(is_list);
@@ -48,7 +48,7 @@ fn title(table: &[Entry]) -> String {
         return format!("`[{}]`", table[0].section);
     };
     match table.iter().find(|entry| entry.name() == "type") {
-        Some(kind) if matches!(list, "light" | "overlay") => {
+        Some(kind) if matches!(list, "clip" | "light" | "overlay") => {
             format!("`[[{list}]]` with `type = {}`", kind.sample())
         }
         _ => format!("`[[{list}]]`"),

@@ -7,6 +7,7 @@ use glam::Vec3;
 use super::color::ColorSetting;
 use super::key::{Affects, Key};
 use super::keys::{Keys, keys};
+use super::opacity::OpacitySetting;
 use super::part::{self, Part, ROUGHNESS};
 use super::value::named;
 use crate::scene::{self, Finish, Fresnel};
@@ -54,6 +55,8 @@ pub struct Material {
     pub roughness: f32,
     /// Source of the colours.
     pub color: ColorSetting,
+    /// How much each sphere covers of what is behind it.
+    pub opacity: OpacitySetting,
     /// The constants, except `fresnel` and `extinction`, which follow from the fields below.
     pub constants: scene::Material,
     /// The Fresnel equations; by default Schlick's approximation for spheres, as in the thesis, and the exact ones
@@ -83,6 +86,7 @@ impl Default for Material {
             kind: None,
             roughness: ROUGHNESS,
             color: ColorSetting::Auto,
+            opacity: OpacitySetting::Constant(1.0),
             constants: scene::Material::DEFAULT,
             fresnel: None,
             absorption: Vec3::ONE,
@@ -174,6 +178,11 @@ impl Material {
             /// { 1 = "water" }). `map` is reversed by `reverse = true` or a name with _r, and divided into bands by
             /// `steps = 8`.
             color => self.color;
+            /// Opacity of spheres, 0 to 1, or { attribute = "density", range = [990.0, 1010.0] }
+            ///
+            /// The values of `range` have the opacities 0 and 1. The attribute is named as for `color`. Glass, water,
+            /// unions and smooth surfaces have no opacity.
+            opacity => self.opacity;
             /// Weight of ambient light
             ambient => constants.ambient, from(0);
             /// Weight of diffuse reflection

@@ -11,6 +11,7 @@ use spherule_jobs::FrameRange;
 
 use crate::render::{IntegratorKind, MAX_LITERAL_DEPTH, MAX_SIDE, RendererKind};
 use crate::scene::Fresnel;
+use crate::selection::Selection;
 use crate::surface::{MaterialId, SprayStyle, SurfaceKind, SurfaceSettings};
 
 use key::Affects;
@@ -23,6 +24,7 @@ use tree::TomlNode;
 mod camera;
 mod caustics;
 mod channel;
+mod clip;
 mod color;
 mod color_map;
 mod crop;
@@ -43,6 +45,7 @@ mod manual;
 mod material;
 mod mesh;
 mod nearest;
+mod opacity;
 mod output;
 mod overlay;
 mod part;
@@ -57,6 +60,7 @@ mod rebase;
 mod render;
 mod same;
 mod schema;
+mod select;
 mod sun;
 mod surface;
 #[cfg(test)]
@@ -69,6 +73,7 @@ mod work_tests;
 
 pub use camera::{AxisView, Camera, CameraKey, CameraMode, ConvergenceSetting, ProjectionKind};
 pub use channel::{ATTRIBUTE_CHANNEL, Channel, NamedChannel};
+pub use clip::{Clip, ClipKind, KeptSide, PlaneNormal};
 pub use color::{CategoryNames, ColorMapping, ColorSetting, ScaleKind};
 pub use color_map::{MapName, RangeSetting};
 pub use crop::PixelBounds;
@@ -83,6 +88,7 @@ pub use light::{Light, LightKind};
 pub use material::{Material, MaterialKind};
 pub use mesh::{Mesh, MeshMaterial, MeshPath, MeshShading};
 pub(crate) use nearest::nearest;
+pub use opacity::OpacitySetting;
 pub use output::Output;
 pub use overlay::{Overlay, OverlayKind, OverlayText};
 pub use part::{Part, PartKind};
@@ -94,6 +100,7 @@ pub(crate) use rebase::without_dots;
 pub use rebase::{RebaseError, named_place, real_dir};
 pub use render::{GroundPattern, Image, IndirectSetting, Render};
 pub use schema::{SCHEMA_FILE, job_schema};
+pub use select::{Axis, Select, Slab};
 pub use sun::Sun;
 pub use tree::{Override, OverrideError};
 pub use value::FlagKind;
@@ -108,6 +115,10 @@ pub struct LightGroup(String);
 pub struct Manifest {
     /// The particles.
     pub input: Input,
+    /// The particles that are drawn.
+    pub select: Select,
+    /// Planes and boxes that leave out particles.
+    pub clips: Vec<Clip>,
     /// The camera.
     pub camera: Camera,
     /// Size and sampling of the image.
@@ -158,6 +169,8 @@ impl Manifest {
     pub fn new(path: impl Into<String>) -> Self {
         Self {
             input: Input::new(path),
+            select: Select::default(),
+            clips: Vec::new(),
             camera: Camera::default(),
             image: Image::default(),
             render: Render::default(),
@@ -236,6 +249,7 @@ impl Manifest {
     /// Visits all keys, in the order of the commented file. No other place knows the tables.
     fn keys(&mut self, keys: &mut Keys<'_>) {
         keys.section("input", Input::ABOUT, |keys| self.input.keys(keys));
+        keys.section("select", select::ABOUT, |keys| self.select.keys(keys));
         keys.section("camera", Camera::ABOUT, |keys| self.camera.all_keys(keys));
         keys.section("image", Image::ABOUT, |keys| self.image.all_keys(keys));
         keys.section("render", Render::ABOUT, |keys| {
@@ -253,6 +267,7 @@ impl Manifest {
         });
         keys.section("output", Output::ABOUT, |keys| self.output.keys(keys));
         keys.section("job", Work::ABOUT, |keys| self.job.all_keys(keys));
+        keys.list("clip", "clip", clip::ABOUT, &mut self.clips, Clip::keys);
         keys.list(
             "light",
             "light",
@@ -283,6 +298,11 @@ impl Manifest {
                 "mesh",
                 &format!("{meshes} meshes, but at most {max} are possible"),
             );
+        }
+        let clips = self.clips.len();
+        if clips > MAX_CLIPS {
+            let what = format!("{clips} clips, but at most {MAX_CLIPS} are possible");
+            root.wrong("clip", &what);
         }
         let overlays = self.overlays.len();
         if overlays > MAX_OVERLAYS {
@@ -357,6 +377,18 @@ impl Manifest {
     /// The image with those of both eyes of a stereo pair.
     pub fn picture(&self) -> Image {
         self.image.of_eyes(self.camera.eyes())
+    }
+
+    /// The particles that are drawn.
+    pub fn selection(&self) -> Selection {
+        let slab = self.select.slab.iter().map(Slab::region);
+        let clips = self.clips.iter().map(|clip| clip.kind.region());
+        Selection {
+            condition: self.select.condition.clone(),
+            ids: self.select.ids.clone(),
+            every: self.select.every,
+            regions: slab.chain(clips).collect(),
+        }
     }
 
     /// The picture on the ground.
@@ -458,6 +490,7 @@ impl Manifest {
         for (list, comment, is_empty) in [
             ("camera.key", NO_KEYS, self.camera.keys.is_empty()),
             ("material.part", NO_PARTS, self.material.parts.is_empty()),
+            ("clip", NO_CLIPS, self.clips.is_empty()),
             ("light", AUTO_LIGHTS, self.lights.is_empty()),
             ("mesh", NO_MESHES, self.meshes.is_empty()),
             ("overlay", NO_OVERLAYS, self.overlays.is_empty()),
@@ -482,6 +515,7 @@ impl Manifest {
         let mut manifest = Self::new("");
         manifest.camera.keys = vec![CameraKey::default()];
         manifest.material.parts = vec![Part::default()];
+        manifest.clips = Clip::examples();
         manifest.lights = Light::examples();
         manifest.meshes = vec![Mesh::default()];
         manifest.overlays = Overlay::examples();
@@ -503,6 +537,11 @@ const NO_KEYS: &str = "In mode \"keys\" the camera moves smoothly through these 
 
 const NO_PARTS: &str =
     "Parts of the particles (attribute part, type or phase) may have materials of their own.";
+
+/// Maximum number of clips.
+const MAX_CLIPS: usize = 64;
+
+const NO_CLIPS: &str = "Planes and boxes leave out particles.";
 
 const AUTO_LIGHTS: &str = "Without [[light]], a key light and a soft fill light are placed relative to the camera. A \
                            directional light has a direction instead of position and falloff.";

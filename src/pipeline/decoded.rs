@@ -6,7 +6,7 @@ use spherule_formats::order::index_u32;
 use spherule_formats::{Attribute, AttributeData, ParticleFrame, Radius, is_radius};
 
 use super::load_error::{LoadError, missing, no_parts};
-use super::setup::{ColorRule, RadiusRule, Setup};
+use super::setup::{ColorRule, OpacityRule, RadiusRule, Setup};
 use crate::scene::{PartMaterials, RgbEncoding};
 use crate::survey::{ParticleValue, id_of, part_of, velocity_of};
 
@@ -29,6 +29,8 @@ pub struct DecodedShading {
     pub values: Vec<f32>,
     /// Colours from an attribute, linear RGB; empty without one.
     pub colors: Vec<Vec3>,
+    /// Scalars that opacities follow from; empty if all particles have the same.
+    pub opacities: Vec<f32>,
     /// Values for the `id` channel; None if the index of the particle is used.
     pub ids: Option<Vec<u32>>,
     /// Velocities for the channels `V` and `motion`, and for motion blur until the tree is built.
@@ -71,6 +73,16 @@ impl DecodedFrame {
                 });
             }
         }
+        let mut opacities = Vec::new();
+        if let OpacityRule::Value { name, .. } = &setup.picture.opacity
+            && !frame.is_empty()
+        {
+            let value = ParticleValue::named(name, &frame.attributes).ok_or_else(|| {
+                let has = frame.attributes.iter().map(|a| a.name.as_str());
+                missing(name, "opacity", file, has)
+            })?;
+            opacities = values_of(setup, &frame, number, &radius, &value);
+        }
         // Extract ids and velocities for the channels
         let channels = setup.picture.render.channels;
         let ids = if setup.picture.needs_ids() {
@@ -108,6 +120,7 @@ impl DecodedFrame {
             shading: DecodedShading {
                 values,
                 colors,
+                opacities,
                 ids,
                 velocities,
                 parts,
@@ -134,6 +147,7 @@ impl DecodedFrame {
         }
         move_to_end(&mut shading.values, chosen);
         move_to_end(&mut shading.colors, chosen);
+        move_to_end(&mut shading.opacities, chosen);
         if let Some(ids) = &mut shading.ids {
             move_to_end(ids, chosen);
         }
@@ -184,13 +198,14 @@ impl DecodedShading {
         let ids = self.ids.as_deref().unwrap_or_default();
         let velocities = self.velocities.as_deref().unwrap_or_default();
         let colors = size_of_val(&self.values[..]) + size_of_val(&self.colors[..]);
+        let opacities = size_of_val(&self.opacities[..]);
         let parts = self
             .parts
             .as_ref()
             .map_or(0, |(_, parts)| size_of_val(&parts[..]));
         let attributes = self.attributes.iter().map(|plane| size_of_val(&plane[..]));
         let channels = size_of_val(ids) + size_of_val(velocities) + parts;
-        (colors + channels + attributes.sum::<usize>()) as u64
+        (colors + opacities + channels + attributes.sum::<usize>()) as u64
     }
 }
 

@@ -11,9 +11,9 @@ use spherule_formats::{FrameError, ScalarType, is_radius};
 
 use super::facts::{FileFacts, range_of};
 use super::load_error::{LoadError, missing, no_parts};
-use super::setup::{ColorRule, RadiusRule, Setup};
+use super::setup::{ColorRule, OpacityRule, Picture, RadiusRule, Setup};
 use crate::accel::Structure;
-use crate::render::{NO_ID, ShadeSource, mean};
+use crate::render::{NO_ID, ShadeSource, mean, opacity_of};
 use crate::scene::{ColorMap, PartMaterials, RgbEncoding};
 use crate::survey::{Named, ParticleValue, id_of, part_of, velocity_of};
 
@@ -42,6 +42,8 @@ struct Names {
     rgb: Option<String>,
     /// The value that is mapped to colours.
     values: Option<ParticleValue>,
+    /// The value that opacities follow from.
+    opacity: Option<ParticleValue>,
     ids: Option<String>,
     velocities: Option<String>,
     parts: Option<String>,
@@ -129,10 +131,10 @@ impl StoredFrame {
     }
 
     /// Attributes for shading, in the file.
-    pub fn shading<'a>(&'a self, color: &'a ColorRule, default: Vec3) -> StoredShading<'a> {
+    pub fn shading<'a>(&'a self, picture: &'a Picture, default: Vec3) -> StoredShading<'a> {
         let frame = self.frame();
         let view = |name: &Option<String>| frame.attribute(name.as_deref()?);
-        let color = match color {
+        let color = match &picture.color {
             ColorRule::Constant(color) => Some(StoredColor::Constant(*color)),
             ColorRule::Rgb { .. } => view(&self.names.rgb).map(|values| StoredColor::Rgb {
                 encoding: encoding(&values),
@@ -145,8 +147,18 @@ impl StoredFrame {
             }
         };
         let color = color.unwrap_or(StoredColor::Constant(default));
+        let opacity = match (&picture.opacity, &self.names.opacity) {
+            (OpacityRule::Constant(opacity), _) => StoredOpacity::Constant(*opacity),
+            (OpacityRule::Value { range, .. }, value) => {
+                let values = value.as_ref();
+                let values = values.and_then(|value| StoredValues::of(&frame, value));
+                let of = |values| StoredOpacity::Mapped(values, *range);
+                values.map_or(StoredOpacity::Constant(1.0), of)
+            }
+        };
         StoredShading {
             color,
+            opacity,
             ids: view(&self.names.ids),
             velocities: view(&self.names.velocities),
             parts: view(&self.names.parts),
@@ -241,7 +253,8 @@ impl Names {
         let all = [&self.rgb, &self.ids, &self.velocities, &self.parts];
         let channels = self.channels.iter().map(|(name, _)| name);
         let all = all.into_iter().chain(channels);
-        let values = self.values.as_ref().and_then(ParticleValue::attribute);
+        let values = [&self.values, &self.opacity].into_iter().flatten();
+        let values = values.filter_map(ParticleValue::attribute);
         let mut names: Vec<&str> = all.filter_map(Option::as_deref).chain(values).collect();
         names.sort_unstable();
         names.dedup();
@@ -271,6 +284,13 @@ impl Names {
                 }
             }
         }
+        let mut opacity = None;
+        if let OpacityRule::Value { name, .. } = &setup.picture.opacity {
+            opacity = ParticleValue::named(name, &attributes);
+            if opacity.is_none() {
+                find(name, "opacity", true)?;
+            }
+        }
         let with_channels = setup.picture.attributes.iter().map(|channel| {
             let found = find(&channel.name, "a channel", true)?;
             Ok((found, channel.components))
@@ -281,6 +301,7 @@ impl Names {
         Ok(Self {
             rgb,
             values,
+            opacity,
             // Only integers are ids, as in decoded frames.
             ids: name(
                 id_of(&attributes).filter(|a| channels.needs_ids() && a.low_bits(0).is_some()),
@@ -370,11 +391,19 @@ fn particles_in_place(setup: &Setup, index: &FrameIndex) -> Result<PlacedRadius,
 #[derive(Debug, Clone)]
 pub struct StoredShading<'a> {
     color: StoredColor<'a>,
+    opacity: StoredOpacity<'a>,
     ids: Option<AttributeView<'a>>,
     velocities: Option<AttributeView<'a>>,
     parts: Option<AttributeView<'a>>,
     /// Attributes with channels; the second is the number of components.
     channels: Vec<(Option<AttributeView<'a>>, usize)>,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum StoredOpacity<'a> {
+    Constant(f32),
+    /// Values, and those with opacity 0 and 1.
+    Mapped(StoredValues<'a>, [f32; 2]),
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -478,6 +507,17 @@ impl ShadeSource for StoredShading<'_> {
             let component = |c: usize| velocities.get(index as usize, c) as f32;
             Vec3::new(component(0), component(1), component(2))
         })
+    }
+
+    fn is_translucent(&self) -> bool {
+        !matches!(self.opacity, StoredOpacity::Constant(1.0))
+    }
+
+    fn opacity(&self, index: u32) -> f32 {
+        match &self.opacity {
+            StoredOpacity::Constant(opacity) => *opacity,
+            StoredOpacity::Mapped(values, range) => opacity_of(values.get(index), *range),
+        }
     }
 
     fn part(&self, index: u32) -> Option<(&str, i32)> {

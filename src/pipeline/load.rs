@@ -6,17 +6,17 @@ use std::time::{Duration, Instant};
 
 use glam::Vec3;
 use spherule_formats::sequence::Sequence;
-use spherule_formats::{FrameError, ParticleFrame};
+use spherule_formats::{FrameError, ParticleFrame, RawParticles};
 
 use super::ImageTask;
 use super::decoded::{DecodedFrame, particle_with_id};
 use super::facts::FileFacts;
 use super::in_place::{Opened, StoredFrame};
-use super::load_error::{LoadError, first_file};
+use super::load_error::{LoadError, first_file, unknown_name};
 use super::meshes::{MeshSlices, meshes_of};
 use super::motion::velocities_to_next;
 use super::predict::{FrameSize, MemoryModel};
-use super::setup::Setup;
+use super::setup::{Picture, Setup};
 use crate::metrics::memory::{available, process_room};
 use crate::overlay::Overlay;
 
@@ -37,6 +37,8 @@ pub struct LoadedFrame {
     pub time: Option<f64>,
     /// Position of the particle in focus, relative to the origin, if the camera follows one.
     pub focus: Option<Vec3>,
+    /// Number of particles in the files.
+    pub read: u64,
     /// Number of particles that were dropped because they were not finite.
     pub dropped: u64,
     /// Number of radii raised to the minimum.
@@ -79,6 +81,7 @@ pub fn load_frame(
     let opened = StoredFrame::open(setup, sequence, task.index);
     let mut loaded = match opened.map_err(|e| newest(e, sequence, task))? {
         Opened::InPlace(frame, clamped_radii) => LoadedFrame {
+            read: frame.particles(),
             facts: frame.facts(setup, file_name(sequence, task.index)),
             time: sequence.listed_time(task.index).or(frame.time()),
             task: task.clone(),
@@ -126,9 +129,16 @@ fn decode(
     let loaded = sequence.load_measured(task.index);
     let loaded = loaded.map_err(|e| newest(LoadError::Frame(e), sequence, task))?;
     notes.extend(loaded.notes);
-    let frame = ParticleFrame::from_raw(loaded.particles, setup.picture.origin);
-    let (time, dropped) = (frame.time, frame.dropped);
     let file = first_file(sequence, task.index);
+    let read = loaded.particles.positions.len() as u64;
+    let frame = selected(setup, loaded.particles, &file)?;
+    if frame.is_empty() && read > 0 && frame.dropped == 0 {
+        notes.push(format!(
+            "frame {}: none of {read} particles is selected; see [select] and [[clip]]",
+            task.frame
+        ));
+    }
+    let (time, dropped) = (frame.time, frame.dropped);
     let focus = focus_point(setup, &frame, &file)?;
     let moving = match setup.picture.shutter {
         Some(shutter) if !shutter.has_velocities => {
@@ -149,10 +159,28 @@ fn decode(
         facts,
         time,
         focus,
+        read,
         dropped,
         clamped_radii,
         read_time: Duration::ZERO,
     })
+}
+
+/// The particles that are drawn.
+fn selected(
+    setup: &Setup,
+    particles: RawParticles,
+    file: &str,
+) -> Result<ParticleFrame, LoadError> {
+    let Picture {
+        selection, origin, ..
+    } = &setup.picture;
+    if selection.is_all() {
+        return Ok(ParticleFrame::from_raw(particles, *origin));
+    }
+    let survivors = selection.survivors(&particles);
+    let survivors = survivors.map_err(|e| unknown_name(&e, file, &particles.attributes))?;
+    Ok(ParticleFrame::from_selected(particles, survivors, *origin))
 }
 
 /// A note on the characters that the font of overlays does not have.

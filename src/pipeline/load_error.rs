@@ -1,9 +1,10 @@
 //! Errors when reading frames.
 
-use spherule_formats::FrameError;
 use spherule_formats::sequence::Sequence;
+use spherule_formats::{Attribute, FrameError};
 
 use super::meshes::MeshLoadError;
+use crate::selection::UnknownName;
 
 /// Reasons why a frame cannot be rendered.
 #[derive(Debug, thiserror::Error)]
@@ -38,6 +39,18 @@ pub enum LoadError {
         name: String,
         /// Its purpose.
         purpose: &'static str,
+        /// The attributes of the frame.
+        has: String,
+    },
+    /// It lacks a value that a selection needs.
+    #[error("{file}: select.where: character {column}: no value `{name}`; the file has {has}")]
+    UnknownName {
+        /// The frame's first file.
+        file: String,
+        /// The name.
+        name: String,
+        /// Its place in the condition, in characters from 1.
+        column: usize,
         /// The attributes of the frame.
         has: String,
     },
@@ -84,6 +97,20 @@ pub(super) fn missing<'a>(
         name: name.to_owned(),
         purpose,
         has: attribute_list(has),
+    }
+}
+
+/// The error for a name in a selection that particles with `attributes` have no value for.
+pub(super) fn unknown_name(
+    unknown: &UnknownName,
+    file: &str,
+    attributes: &[Attribute],
+) -> LoadError {
+    LoadError::UnknownName {
+        file: file.to_owned(),
+        name: unknown.name.clone(),
+        column: unknown.column,
+        has: attribute_list(attributes.iter().map(|a| a.name.as_str())),
     }
 }
 

@@ -42,7 +42,9 @@ pub use predict::{FrameSize, MemoryModel, MemoryNeed};
 pub use probe::{Probe, ProbeError, probe};
 pub use renderer::{BuiltFrame, FrameRenderer, TraceError, TracedFrame};
 pub use schedule::{Overlap, Schedule};
-pub use setup::{AttributeChannel, ColorRule, Picture, RadiusRule, RunSettings, Setup};
+pub use setup::{
+    AttributeChannel, ColorRule, OpacityRule, Picture, RadiusRule, RunSettings, Setup,
+};
 pub use shutter::{FrameStep, Shutter};
 pub use single::{PictureKind, make_image, make_picture};
 pub use trace::{CpuRenderer, renderer_of};

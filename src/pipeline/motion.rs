@@ -83,7 +83,11 @@ pub(super) fn velocities_to_next(
     };
     let (own, others) = (ids_of(frame, task.index)?, ids_of(&other, other_index)?);
     let places = Places::new(&others, &own);
-    let half_extent = 0.5 * extent(&frame.positions);
+    // Those that are drawn may be few
+    let half_extent = match setup.picture.selection.is_all() {
+        true => 0.5 * extent(&frame.positions),
+        false => 0.5 * extent(&other.positions),
+    };
     let velocity = |(place, id): (usize, &u32)| {
         let Some(at) = places.find(place, *id) else {
             return Vec3::ZERO;

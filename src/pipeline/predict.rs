@@ -293,11 +293,25 @@ impl<'a> MemoryModel<'a> {
         let shared = if frame.is_shared { frame.content } else { 0 };
         // One byte per particle marks which are finite.
         let keeping = attributes + self.kept(frame) + n;
-        let reading = (files + frame.raw).max(shared + rounding.max(keeping));
+        // Indices of those that are drawn, twice while they are found, and a copy of one array after the other
+        let selecting = match self.setup.picture.selection.is_all() {
+            true => 0,
+            false => frame.raw + (4 * n + frame.positions.max(attributes)).max(8 * n),
+        };
+        let held = rounding.max(keeping) + self.file_indices(frame);
+        let reading = (files + frame.raw).max(shared + held.max(selecting));
         match self.setup.moves_to_next_frame() {
             // The next frame is read beside it, and its ids are sorted
             true => frame.raw + 12 * n + reading + 16 * n,
             false => reading,
+        }
+    }
+
+    /// Bytes of the places of particles in their file, if some of them are not drawn.
+    fn file_indices(&self, frame: &FrameSize) -> u64 {
+        match self.setup.picture.selection.is_all() {
+            true => 0,
+            false => 4 * frame.particles,
         }
     }
 
@@ -331,9 +345,11 @@ impl<'a> MemoryModel<'a> {
         let color = self.setup.picture.color.bytes();
         // Particles that are moved need an explicit id.
         let picture = &self.setup.picture;
-        let ids = picture.needs_ids() && (self.has_ids || picture.surface.spray);
+        let has_ids = self.has_ids || picture.surface.spray || !picture.selection.is_all();
+        let ids = picture.needs_ids() && has_ids;
         let each = [
             (true, color),
+            (picture.opacity.is_by_particle(), 4),
             (ids, 4),
             (channels.needs_velocities() && self.has_velocities, 12),
             // Whether there are parts is not known in advance

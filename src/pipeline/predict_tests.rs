@@ -26,7 +26,8 @@ fn setup() -> Setup {
     spherule_formats::write::npy::write(&file, &[glam::Vec3::ZERO]).expect("a file");
     let input = spherule_formats::SequenceInput::from_path(&file);
     let sequence = Sequence::open(&input).expect("a frame");
-    let question = crate::resolve::question(&manifest);
+    let selection = manifest.selection();
+    let question = crate::resolve::question(&manifest, &selection);
     let survey = crate::survey::Survey::of(&sequence, question).expect("readable");
     crate::resolve::setup(&manifest, &survey, None).expect("pictures")
 }

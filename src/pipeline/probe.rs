@@ -312,7 +312,8 @@ mod tests {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(example);
         let sequence = Sequence::open(&SequenceInput::from_path(&file)).expect("a frame");
         let manifest = crate::manifest::Manifest::new("in");
-        let question = crate::resolve::question(&manifest);
+        let selection = manifest.selection();
+        let question = crate::resolve::question(&manifest, &selection);
         let survey = crate::survey::Survey::of(&sequence, question).expect("readable");
         let setup = crate::resolve::setup(&manifest, &survey, None).expect("pictures");
         let task = ImageTask {

@@ -15,6 +15,7 @@ use crate::scene::{
     Camera, CameraError, CameraPath, CameraView, ColorMap, Exposure, LensSettings, NextFrame,
     Projection, Scene, StereoSettings,
 };
+use crate::selection::Selection;
 use crate::surface::{SurfaceKind, SurfaceSettings};
 use crate::survey::FrameWeight;
 
@@ -76,6 +77,32 @@ impl ColorRule {
     }
 }
 
+/// How much each sphere covers of what is behind it.
+#[derive(Debug, Clone, PartialEq)]
+pub enum OpacityRule {
+    /// The same for all particles, 0 to 1.
+    Constant(f32),
+    /// By a value of each particle: see [`crate::survey::ParticleValue::named`].
+    Value {
+        /// Name of the value.
+        name: String,
+        /// The values with opacity 0 and 1.
+        range: [f32; 2],
+        /// Whether the value is computed from positions or radii.
+        needs_geometry: bool,
+    },
+}
+
+impl OpacityRule {
+    /// Particles cover all that is behind them.
+    pub const OPAQUE: Self = Self::Constant(1.0);
+
+    /// Whether particles differ in their opacity, so that their indices are needed.
+    pub(super) const fn is_by_particle(&self) -> bool {
+        matches!(self, Self::Value { .. })
+    }
+}
+
 /// An attribute with channels in the images.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AttributeChannel {
@@ -101,10 +128,14 @@ pub struct Picture {
     pub origin: DVec3,
     /// Minimum radius; smaller ones would be invisible, and are raised to it.
     pub least_radius: f32,
+    /// Which particles are drawn.
+    pub selection: Selection,
     /// Source of the radii.
     pub radius: RadiusRule,
     /// Source of the colours.
     pub color: ColorRule,
+    /// How much each sphere covers of what is behind it.
+    pub opacity: OpacityRule,
     /// The up direction, unit vector.
     pub up: DVec3,
     /// The camera path, in world units.
@@ -278,7 +309,9 @@ impl Setup {
 
     /// Whether the indices of particles at intersections are needed, apart from their colours.
     pub(super) fn needs_particles(&self) -> bool {
-        self.picture.render.channels.needs_particles() || self.needs_parts()
+        let picture = &self.picture;
+        let is_for_channels = picture.render.channels.needs_particles();
+        is_for_channels || picture.opacity.is_by_particle() || self.needs_parts()
     }
 
     /// Whether native frames relative to [`Picture::origin`] are traced in place.
@@ -295,6 +328,12 @@ impl Setup {
                 "{structure} builds over a copy of them, 12 bytes per particle and more; lbvh and kdtree do not"
             ));
         }
+        if !self.picture.selection.is_all() {
+            return Some(
+                "[select] and [[clip]] take those that are drawn from a copy of them, 12 bytes per particle and more"
+                    .to_owned(),
+            );
+        }
         if self.has_motion() {
             return Some(
                 "motion blur moves a copy of them, 40 bytes per particle and more".to_owned(),
@@ -309,9 +348,15 @@ impl Setup {
                 needs_geometry: true,
                 ..
             }
+        ) || matches!(
+            &self.picture.opacity,
+            OpacityRule::Value {
+                needs_geometry: true,
+                ..
+            }
         ) {
             return Some(
-                "their colours are computed from a copy of them, 16 bytes per particle and more"
+                "their colours or opacities are computed from a copy of them, 16 bytes per particle and more"
                     .to_owned(),
             );
         }

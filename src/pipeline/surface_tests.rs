@@ -34,7 +34,8 @@ fn opened(file: &Path) -> (Setup, Sequence) {
     // Highlights show the normals of clear spheres
     manifest.render.integrator = Some(IntegratorKind::Whitted);
     let sequence = Sequence::open(&SequenceInput::from_path(file)).expect("a frame");
-    let question = crate::resolve::question(&manifest);
+    let selection = manifest.selection();
+    let question = crate::resolve::question(&manifest, &selection);
     let survey = crate::survey::Survey::of(&sequence, question).expect("readable");
     let mut setup = crate::resolve::setup(&manifest, &survey, None).expect("pictures");
     setup.picture.render.width = 48;

@@ -7,14 +7,14 @@ use super::in_place::StoredFrame;
 use super::load::{LoadedFrame, LoadedParticles};
 use super::mattes;
 use super::renderer::{BuiltFrame, BuiltParticles, FrameRenderer, TraceError, TracedFrame};
-use super::setup::{ColorRule, Setup};
+use super::setup::{ColorRule, OpacityRule, Picture, Setup};
 use super::surface::{SurfaceBuilder, spheres};
 use crate::accel::stored::{StoredSettings, StoredTree};
 use crate::accel::{BuildReport, TreeBuilder};
 use crate::denoise::{DenoiseError, DenoiseInput, denoise};
 use crate::metrics::MemoryUse;
 use crate::output::TextAttribute;
-use crate::render::{Colors, Film, ParticleShading, RayCounts, RendererKind, Stop};
+use crate::render::{Colors, Film, Opacities, ParticleShading, RayCounts, RendererKind, Stop};
 use crate::report::FrameReport;
 use crate::report::frame::FileBytes;
 use crate::scene::material::DEFAULT_COLOR;
@@ -39,6 +39,7 @@ impl FrameRenderer for CpuRenderer {
         // Begin the report
         let mut report = FrameReport {
             particles: frame.particles.count(),
+            particles_read: frame.read,
             dropped: frame.dropped,
             clamped_radii: frame.clamped_radii,
             ..FrameReport::default()
@@ -173,13 +174,13 @@ impl CpuRenderer {
         let (surface, meshes) = (&self.surface, &frame.meshes);
         match &frame.particles {
             BuiltParticles::Decoded(shading) => {
-                let source = particle_shading(&setup.picture.color, shading);
+                let source = particle_shading(&setup.picture, shading);
                 let tree = self.builder.tree().view();
                 Ok(surface.draw(setup, tree, meshes, &scene, &source, film, stop)?)
             }
             BuiltParticles::Stored(stored) => {
                 let leaves = stored.leaves()?;
-                let source = stored.shading(&setup.picture.color, DEFAULT_COLOR);
+                let source = stored.shading(&setup.picture, DEFAULT_COLOR);
                 let tree = self.stored.view(&leaves);
                 let rays = surface.draw(setup, tree, meshes, &scene, &source, film, stop)?;
                 // Reject the image if the file has changed meanwhile.
@@ -195,13 +196,13 @@ fn matte_attributes(setup: &Setup, frame: &BuiltFrame) -> Vec<TextAttribute> {
     if setup.picture.render.channels.layers.mattes.is_empty() {
         return Vec::new();
     }
-    let (count, color) = (frame.report.particles, &setup.picture.color);
+    let (count, picture) = (frame.report.particles, &setup.picture);
     match &frame.particles {
         BuiltParticles::Decoded(shading) => {
-            mattes::attributes(setup, &particle_shading(color, shading), count)
+            mattes::attributes(setup, &particle_shading(picture, shading), count)
         }
         BuiltParticles::Stored(stored) => {
-            mattes::attributes(setup, &stored.shading(color, DEFAULT_COLOR), count)
+            mattes::attributes(setup, &stored.shading(picture, DEFAULT_COLOR), count)
         }
     }
 }
@@ -235,9 +236,9 @@ fn denoise_film(setup: &Setup, film: &mut Film) -> Result<f64, DenoiseError> {
     Ok(seconds(start.elapsed()))
 }
 
-fn particle_shading<'a>(color: &'a ColorRule, shading: &'a DecodedShading) -> ParticleShading<'a> {
+fn particle_shading<'a>(picture: &'a Picture, shading: &'a DecodedShading) -> ParticleShading<'a> {
     let values = &shading.values;
-    let colors = match color {
+    let colors = match &picture.color {
         ColorRule::Constant(color) => Colors::Constant(*color),
         ColorRule::Rgb { .. } if shading.colors.is_empty() => Colors::Constant(DEFAULT_COLOR),
         ColorRule::Rgb { .. } => Colors::PerParticle(&shading.colors),
@@ -246,6 +247,13 @@ fn particle_shading<'a>(color: &'a ColorRule, shading: &'a DecodedShading) -> Pa
     };
     ParticleShading {
         colors,
+        opacities: match picture.opacity {
+            OpacityRule::Constant(opacity) => Opacities::Constant(opacity),
+            OpacityRule::Value { range, .. } => Opacities::Mapped {
+                values: &shading.opacities,
+                range,
+            },
+        },
         ids: shading.ids.as_deref(),
         velocities: shading.velocities.as_deref(),
         parts: shading

@@ -24,7 +24,7 @@ const MIN_SAMPLE_WIDTH: f32 = 0.125;
 
 /// A scene ready to be rendered.
 pub(super) struct RenderContext<'a> {
-    /// All shapes but panes and soft spray; the ground comes first, because it is the cheapest.
+    /// All shapes but panes, soft spray and particles that are not fully opaque; the ground comes first, because it is the cheapest.
     pub(super) shapes: Vec<&'a dyn Shape>,
     /// Meshes that rays pass.
     pub(super) panes: Vec<&'a dyn Shape>,
@@ -34,6 +34,8 @@ pub(super) struct RenderContext<'a> {
     pub(super) parts: Option<&'a PartMaterials>,
     /// Spray whose drops fade out; opaque spray is one of the shapes.
     pub(super) soft_spray: Option<&'a dyn Shape>,
+    /// Particles that are not fully opaque; they are separate spheres.
+    pub(super) translucent: Option<&'a dyn Shape>,
     /// Whether there are meshes that only hide what is behind them.
     pub(super) has_holdouts: bool,
     /// The particles, opaque or transmissive; all other shapes are opaque.
@@ -116,6 +118,10 @@ impl<'a> RenderContext<'a> {
         let particles = shapes.iter().find(is_particles).copied();
         let is_connected = particles.is_some_and(|shape| shape.is_connected());
         let interior = Interior::of(&scene.material, is_connected);
+        let has_opacity = source.is_translucent() && interior == Interior::Opaque && !is_connected;
+        let is_translucent =
+            |shape: &&dyn Shape| has_opacity && shape.material() == MaterialId::PARTICLES;
+        let (translucent, shapes): (Vec<_>, Vec<_>) = shapes.into_iter().partition(is_translucent);
         // Prepare camera, background and lights for packets
         let eye = scene.camera.eye();
         let [width, height] = settings.eye_size(scene.camera.eyes());
@@ -129,6 +135,7 @@ impl<'a> RenderContext<'a> {
                 .filter(|parts| !parts.is_empty() && !is_connected)
                 .filter(|_| settings.integrator == IntegratorKind::Path),
             soft_spray: spray.first().copied(),
+            translucent: translucent.first().copied(),
             has_holdouts: scene.meshes.iter().any(|mesh| mesh.is_holdout),
             particles,
             source,

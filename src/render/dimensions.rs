@@ -21,6 +21,8 @@ pub(super) const PANE: u32 = u32::MAX;
 pub(super) const SPRAY: u32 = u32::MAX - 1;
 /// Dimension of a point of wet ground: the direction of its reflection.
 pub(super) const WET: u32 = u32::MAX - 2;
+/// Dimension of a path segment: at which sphere that is not fully opaque it ends.
+pub(super) const OPACITY: u32 = u32::MAX - 3;
 /// Dimensions of a camera ray: its point on the lens, and its time.
 pub(super) const LENS: u32 = 0;
 pub(super) const TIME: u32 = 1;

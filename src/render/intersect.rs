@@ -28,6 +28,7 @@ impl RenderContext<'_> {
         for shape in &self.shapes {
             shape.intersect(&mut segments.rays, coherence, inside, &mut packet.hits);
         }
+        self.meet_translucent(segments, coherence, packet);
         self.meet_spray(segments, coherence, packet);
         self.assign_parts(packet);
         packet.throughput = segments.throughput;

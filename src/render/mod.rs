@@ -49,6 +49,7 @@ mod spray;
 mod stop;
 mod stream;
 mod tile;
+mod translucent;
 mod visibility;
 mod whitted;
 mod window;
@@ -73,6 +74,8 @@ mod lens_tests;
 mod light_groups_tests;
 #[cfg(test)]
 mod motion_tests;
+#[cfg(test)]
+mod opacity_tests;
 #[cfg(test)]
 mod panes_tests;
 #[cfg(test)]
@@ -103,7 +106,8 @@ pub use settings::{
     RenderError, RenderSettings,
 };
 pub(crate) use source::mean;
-pub use source::{Colors, ParticleShading, ShadeSource};
+pub(crate) use source::opacity_of;
+pub use source::{Colors, Opacities, ParticleShading, ShadeSource};
 pub use stop::{Deadline, Stop};
 pub use window::DataWindow;
 

@@ -36,6 +36,17 @@ pub trait ShadeSource: Sync {
         None
     }
 
+    /// Whether particles may have an opacity below 1.
+    fn is_translucent(&self) -> bool {
+        false
+    }
+
+    /// How much of what is behind it the particle covers, 0 to 1.
+    fn opacity(&self, index: u32) -> f32 {
+        let _ = index;
+        1.0
+    }
+
     /// Stores the values of the attribute channels in `floats`, as many as [`super::layers::Layers::attributes`].
     fn attributes(&self, index: u32, floats: &mut [f32]) {
         let _ = index;
@@ -69,11 +80,33 @@ pub enum Colors<'a> {
     },
 }
 
+/// Opacities of a frame.
+#[derive(Debug, Clone, Copy)]
+pub enum Opacities<'a> {
+    /// The same for all particles.
+    Constant(f32),
+    /// By a scalar per particle.
+    Mapped {
+        /// The scalars.
+        values: &'a [f32],
+        /// The values with opacity 0 and 1.
+        range: [f32; 2],
+    },
+}
+
+/// The opacity of a particle with this `value`; 0 if it is not a number.
+pub(crate) fn opacity_of(value: f32, [clear, opaque]: [f32; 2]) -> f32 {
+    let opacity = (value - clear) / (opaque - clear);
+    if opacity > 0.0 { opacity.min(1.0) } else { 0.0 }
+}
+
 /// A [`ShadeSource`] over slices in the order of the particles.
 #[derive(Debug, Clone, Copy)]
 pub struct ParticleShading<'a> {
     /// Base colours.
     pub colors: Colors<'a>,
+    /// Opacities.
+    pub opacities: Opacities<'a>,
     /// Ids; by default the id of a particle is its index.
     pub ids: Option<&'a [u32]>,
     /// Velocities; zero by default.
@@ -89,6 +122,7 @@ impl ParticleShading<'_> {
     pub const fn constant(color: Vec3) -> Self {
         Self {
             colors: Colors::Constant(color),
+            opacities: Opacities::Constant(1.0),
             ids: None,
             velocities: None,
             parts: None,
@@ -142,6 +176,20 @@ impl ShadeSource for ParticleShading<'_> {
     fn part(&self, index: u32) -> Option<(&str, i32)> {
         let (name, parts) = self.parts?;
         Some((name, *parts.get(index as usize)?))
+    }
+
+    fn is_translucent(&self) -> bool {
+        !matches!(self.opacities, Opacities::Constant(1.0))
+    }
+
+    fn opacity(&self, index: u32) -> f32 {
+        match self.opacities {
+            Opacities::Constant(opacity) => opacity,
+            Opacities::Mapped { values, range } => {
+                let value = values.get(index as usize).copied();
+                opacity_of(value.unwrap_or(f32::NAN), range)
+            }
+        }
     }
 
     fn attributes(&self, index: u32, floats: &mut [f32]) {

@@ -3,7 +3,8 @@
 //! Shadow rays pass straight through transmissive bodies, so there are no caustics. Each crossing of a surface
 //! multiplies their transmittance by `transmission*(1-r)`. `r` is for the angle outside on both sides of the surface
 //! (a refracted ray would have come from such an angle, and is never totally reflected). The medium of a connected
-//! body attenuates them as well. Panes (`panes.rs`) and soft spray (`spray.rs`) attenuate all shadow rays.
+//! body attenuates them as well. Panes (`panes.rs`), soft spray (`spray.rs`) and
+//! spheres that are not fully opaque (`translucent.rs`) attenuate all shadow rays.
 
 use super::{
     context::{Interior, RenderContext},
@@ -46,6 +47,7 @@ impl RenderContext<'_> {
         });
         self.attenuate_by_panes(samples);
         self.attenuate_by_spray(samples, coherence);
+        self.attenuate_by_opacity(samples, coherence);
         let Some(particles) = self.particles.filter(|_| self.interior != Interior::Opaque) else {
             return samples.lanes;
         };
@@ -97,6 +99,7 @@ impl RenderContext<'_> {
         self.occlude(coherence, samples, |_| true);
         self.attenuate_by_panes(samples);
         self.attenuate_by_spray(samples, coherence);
+        self.attenuate_by_opacity(samples, coherence);
         samples.lanes
     }
 

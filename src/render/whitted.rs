@@ -52,7 +52,7 @@ impl Integrator for WhittedIntegrator<'_> {
     }
 
     fn is_stochastic(&self) -> bool {
-        self.context.interior != Interior::Opaque
+        self.context.interior != Interior::Opaque || self.context.translucent.is_some()
     }
 
     fn shade(

@@ -13,6 +13,8 @@ use crate::render::RayCounts;
 pub struct FrameReport {
     /// Number of particles drawn.
     pub particles: u64,
+    /// Number of particles in the files; 0 in reports of older versions.
+    pub particles_read: u64,
     /// Number of particles dropped because a coordinate was NaN or infinite.
     pub dropped: u64,
     /// Number of particles with a radius raised to the minimum.
@@ -185,6 +187,7 @@ impl FrameReport {
     /// Adds all values that can be summed over frames; for memory, keeps the larger value.
     pub(super) fn add(&mut self, frame: &Self) {
         add(&mut self.particles, frame.particles);
+        add(&mut self.particles_read, frame.particles_read);
         add(&mut self.dropped, frame.dropped);
         add(&mut self.clamped_radii, frame.clamped_radii);
         add(&mut self.clamped_pixels, frame.clamped_pixels);

@@ -114,11 +114,7 @@ pub(super) fn value_of(
     name: &str,
     key: &'static str,
 ) -> Result<ParticleValue, ResolveError> {
-    let components = survey.components.iter().copied();
-    let known: Vec<SurveyedAttribute<'_>> = (survey.attributes.iter())
-        .zip(components.chain(std::iter::repeat(3)))
-        .map(|(name, components)| SurveyedAttribute { name, components })
-        .collect();
+    let known = known_attributes(survey);
     let by_name = || ParticleValue::Magnitude(name.to_owned());
     match ParticleValue::named(name, &known) {
         Some(value) => Ok(value),
@@ -136,8 +132,17 @@ pub(super) fn value_of(
     }
 }
 
+/// The attributes in the survey.
+pub(super) fn known_attributes(survey: &Survey) -> Vec<SurveyedAttribute<'_>> {
+    let components = survey.components.iter().copied();
+    (survey.attributes.iter())
+        .zip(components.chain(std::iter::repeat(3)))
+        .map(|(name, components)| SurveyedAttribute { name, components })
+        .collect()
+}
+
 /// An attribute in the survey.
-struct SurveyedAttribute<'a> {
+pub(super) struct SurveyedAttribute<'a> {
     name: &'a str,
     components: usize,
 }

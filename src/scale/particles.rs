@@ -172,6 +172,7 @@ impl FrameSurvey {
             color: ColorQuestion::None,
             up: None,
             points: false,
+            selection: None,
             radius: RadiusQuestion::Auto,
         };
         let survey = Survey::of_frames(sequence, [index], question)?;

@@ -6,9 +6,9 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use spherule_formats::{ParticleFrame, Radius};
 
+use super::ParticleValue;
 use super::RadiusQuestion;
 use super::robust::{percentile, robust_range, sorted_sample};
-use super::values::ParticleValue;
 
 /// Largest number of categories.
 pub const MAX_CATEGORIES: usize = 64;

@@ -6,14 +6,17 @@
 
 use std::collections::BTreeMap;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{Attribute, FrameError, ParticleFrame, Radius, choose_origin};
 
+pub use crate::attributes::{
+    GEOMETRIC_VALUES, Named, PART_NAMES, ParticleValue, id_of, part_of, velocity_of,
+};
 use crate::scene::{RgbEncoding, is_rgb};
+use crate::selection::Selection;
 
-mod attributes;
 mod color;
 mod moments;
 mod outline;
@@ -21,9 +24,7 @@ mod packing;
 mod robust;
 mod sample;
 mod stream;
-mod values;
 
-pub use attributes::{Named, PART_NAMES, id_of, part_of, velocity_of};
 pub use color::{Categories, ColorQuestion, ColorRange, MAX_CATEGORIES, RangeQuestion, range_of};
 use color::{ColorTotals, FrameContext};
 use moments::Moments;
@@ -33,7 +34,6 @@ use packing::Spacing;
 use packing::narrow;
 use robust::{RobustBounds, estimate_packed, estimate_radius, robust_bounds, robust_largest};
 use sample::FrameSample;
-pub use values::{GEOMETRIC_VALUES, ParticleValue};
 
 /// Maximum number of frames to sample; evenly distributed, including the first and the last one.
 const FRAMES: usize = 24;
@@ -146,7 +146,8 @@ impl RgbAttribute {
     }
 }
 
-/// What a job needs to know.
+/// What a job needs to know. The spacing of neighbours is that of all particles, everything else is about those that are
+/// drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Question<'a> {
     /// Colours.
@@ -157,6 +158,8 @@ pub struct Question<'a> {
     pub up: Option<DVec3>,
     /// Whether positions of some particles are needed.
     pub points: bool,
+    /// Which particles are drawn, if some are not.
+    pub selection: Option<&'a Selection>,
 }
 
 /// What a job needs to know about radii.
@@ -281,7 +284,7 @@ impl Survey {
         let up = question.up.unwrap_or(format_up);
         let mut failure = None;
         for index in indices {
-            match FrameSample::of(sequence, index, question.radius) {
+            match FrameSample::of(sequence, index, question) {
                 Ok(sample) => {
                     let number = sequence.frames().get(index).map_or(0, |frame| frame.number);
                     totals.moments.add(index, number, sample.particles.time);
@@ -300,10 +303,10 @@ impl Survey {
     }
 }
 
-/// The spacing of neighbours in a frame.
-fn spacing_of(frame: &ParticleFrame, needs_packed: bool) -> Option<Spacing> {
-    let touching = estimate_radius(&frame.positions)?;
-    let packed = || estimate_packed(&frame.positions, touching);
+/// The spacing of neighbours among `positions`.
+fn spacing_of(positions: &[Vec3], needs_packed: bool) -> Option<Spacing> {
+    let touching = estimate_radius(positions)?;
+    let packed = || estimate_packed(positions, touching);
     Some(Spacing {
         touching,
         packed: needs_packed.then(packed).flatten(),
@@ -386,8 +389,9 @@ impl Totals {
         match question.radius {
             RadiusQuestion::None => {}
             RadiusQuestion::Auto | RadiusQuestion::AutoOfBody => {
-                let estimate =
-                    || spacing.or_else(|| spacing_of(&frame, question.radius.is_packed()));
+                let estimate = || {
+                    spacing.or_else(|| spacing_of(&frame.positions, question.radius.is_packed()))
+                };
                 self.add_radius(&frame, count, estimate);
             }
             RadiusQuestion::Attribute(name, scale) => {

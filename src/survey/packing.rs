@@ -139,6 +139,7 @@ mod tests {
                     radius,
                     up: None,
                     points: false,
+                    selection: None,
                 },
             )
             .expect("readable")

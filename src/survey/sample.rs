@@ -1,17 +1,20 @@
 //! Samples one frame for the survey: all of it, or for large frames a part, with the rest taken from the index or
 //! read in runs.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use spherule_formats::convert::{SourceAttribute, open_source};
 use spherule_formats::native::layout::RadiusIndex;
 use spherule_formats::native::{Access, FrameIndex, NativeFile, NativeFrame};
 use spherule_formats::sequence::Sequence;
-use spherule_formats::{FrameError, ParseError, RawParticles};
+use spherule_formats::{
+    FrameError, ParseError, Positions, RawParticles, choose_origin, find_radius, is_near,
+};
 
 use super::packing::{self, Spacing};
-use super::robust::{NEIGHBOUR_QUERIES, median};
+use super::robust::{NEIGHBOUR_QUERIES, median, robust_bounds};
 use super::stream;
-use super::{FrameWeight, RadiusQuestion, id_of, velocity_of};
+use super::{FrameWeight, Question, RadiusQuestion, id_of, velocity_of};
+use crate::selection::Selection;
 
 /// Number of particles to sample in a native frame; smaller frames are read completely.
 const MAX_SAMPLE: usize = 1 << 17;
@@ -40,9 +43,15 @@ impl FrameSample {
     pub(super) fn of(
         sequence: &Sequence,
         index: usize,
-        question: RadiusQuestion,
+        question: Question,
     ) -> Result<Self, FrameError> {
-        let mut sample = Self::of_source(sequence, index, question)?;
+        let mut sample = match question.selection {
+            // Few of the particles of a sample may be drawn
+            Some(selection) => {
+                Self::of_files(sequence, index)?.selected(selection, question.radius)
+            }
+            None => Self::of_source(sequence, index, question.radius)?,
+        };
         let time = &mut sample.particles.time;
         *time = sequence.listed_time(index).or(*time);
         Ok(sample)
@@ -147,6 +156,20 @@ impl FrameSample {
         })
     }
 
+    /// The sample without the particles that are not drawn. The spacing is that of all of them: a slice or every tenth
+    /// particle has spheres of the same size.
+    fn selected(mut self, selection: &Selection, question: RadiusQuestion) -> Self {
+        if question.is_auto() && find_radius(&self.particles.attributes).is_none() {
+            self.spacing = spacing_of(&self.particles.positions, question.is_packed());
+        }
+        // A name without a value is reported later, with the attributes that there are
+        if let Ok(survivors) = selection.survivors(&self.particles) {
+            self.particles.select(&survivors);
+            self.count = survivors.len();
+        }
+        self
+    }
+
     fn of_native(file: &NativeFile, needs_packed: bool) -> Result<Self, ParseError> {
         let frame = file.frame_unchecked();
         let index = file.index();
@@ -174,6 +197,15 @@ impl FrameSample {
             particles,
         })
     }
+}
+
+/// The spacing of neighbours among `positions`.
+fn spacing_of(positions: &Positions, needs_packed: bool) -> Option<Spacing> {
+    let bounds = robust_bounds(positions, None)?;
+    let origin = choose_origin(bounds.outer.0, bounds.outer.1);
+    let relative = (0..positions.len()).map(|i| (positions.get(i) - origin).as_vec3());
+    let near: Vec<Vec3> = relative.filter(is_near).collect();
+    super::spacing_of(&near, needs_packed)
 }
 
 /// The spacing of neighbours in a native frame.

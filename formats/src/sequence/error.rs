@@ -68,7 +68,7 @@ pub enum SequenceError {
         second: PathBuf,
     },
     /// A requested part does not exist.
-    #[error("no part is called `{name}`; the parts are {}", if known.len() > 1 { known.join(", ") } else { "not named: there is one file a step".to_owned() })]
+    #[error("no part is called `{name}`; the parts are {}", if known.len() > 1 { known.join(", ") } else { "not named: there is one file a step; --where 'part == 1' selects a part inside of a file".to_owned() })]
     NoSuchPart {
         /// The requested name.
         name: String,

@@ -101,7 +101,7 @@ fn table(entries: &Entries, section: &str) -> Value {
 
 fn property(entry: &Entry) -> Value {
     // The type of a light or an overlay determines its keys.
-    let is_typed = ["light.", "overlay."]
+    let is_typed = ["clip.", "light.", "overlay."]
         .iter()
         .any(|list| entry.section.starts_with(list));
     let mut schema = match entry.name() {

@@ -17,7 +17,9 @@ camera = { mode = "keys", key = [{ frame = 9, eye = [1, 2, 3], look_at = [0, 0, 
 image = { width = "85mm", height = "6 cm", dpi = 600 }
 render = { surface = "smooth", integrator = "path", bounces = 0, ground_pattern = "checker", ground_tile = 0.5, background = { bottom = [0, 0, 0], top = [1, 1, 1] }, ground = true, ground_height = -2, memory_limit = "1.5GiB" }
 surface = { normals = "field", smoothing = 1, exact = true, voxel = 0.5, smoothing_length = 2.5, threshold = 0.55, spray = true, spray_style = "spheres" }
-material = { color = { attribute = "velocity.x", map = "red-blue_r", range = "1%-99.5%", scale = "symlog", threshold = 0.1, steps = 8, reverse = true }, absorption = [0.5, 1, 0], absorption_length = 3, fresnel = "exact" }
+select = { where = "x > 1 && !(speed <= 2)", ids = "1-5", every = 2, slab = { axis = "y", center = 0, thickness = 0.5 } }
+clip = [{ type = "plane", normal = "-x", offset = 2 }, { type = "plane", normal = [1, 2, 0], point = [1, 1, 1] }, { type = "box", min = [0, 0, 0], max = [1, 1, 1], keep = "outside" }]
+material = { opacity = { attribute = "density", range = [2, 1] }, color = { attribute = "velocity.x", map = "red-blue_r", range = "1%-99.5%", scale = "symlog", threshold = 0.1, steps = 8, reverse = true }, absorption = [0.5, 1, 0], absorption_length = 3, fresnel = "exact" }
 light = [{ type = "directional", direction = [0, 0, -2] }, { type = "point", position = [1, 1, 1], falloff = "inverse-square" }, { type = "sun", direction = [0, 0, -2], size = 2 }, { type = "sphere", position = [1, 1, 1], radius = 2, visible = true }, { type = "rect", position = [1, 1, 1], direction = [0, 1, 0], width = 2, height = 3 }, { type = "disc", position = [1, 1, 1], direction = [0, 1, 0], radius = 2 }]
 mesh = [{ path = "tank.stl" }, { path = "w.##.ply", material = "glass", color = [1, 1, 0.5], roughness = 0, normals = "flat", faces = "back", scale = 0.001, translate = [1, 0, 0] }, { path = "b", holdout = true }]
 overlay = [{ type = "colorbar", title = "Speed", unit = "m/s", length = 0.5, corner = "top-right" }, { type = "text", text = "t = {time:.2f}", offset = [0.1, -0.1], color = [1, 0, 0] }, { type = "scale_bar", length = 2, unit = "mm" }, { type = "axes", size = 0.05 }]
@@ -85,7 +87,7 @@ fn written_manifests_are_valid() {
 }
 
 /// Every table of the schema, with a manifest that ends in this table, so that a line can be appended to it.
-const TABLES: [(&str, &str); 30] = [
+const TABLES: [(&str, &str); 35] = [
     ("", ""),
     ("/properties/input", "[input]\n"),
     ("/properties/camera", "[camera]\n"),
@@ -172,6 +174,20 @@ const TABLES: [(&str, &str); 30] = [
     (
         "/properties/environment/properties/sun",
         "[environment.sun]\n",
+    ),
+    ("/properties/select", "[select]\n"),
+    ("/properties/select/properties/slab", "[select.slab]\n"),
+    (
+        "/properties/clip/items/oneOf/0",
+        "[[clip]]\ntype = \"plane\"\n",
+    ),
+    (
+        "/properties/clip/items/oneOf/1",
+        "[[clip]]\ntype = \"box\"\n",
+    ),
+    (
+        "/properties/material/properties/opacity/anyOf/1",
+        "[material.opacity]\n",
     ),
 ];
 

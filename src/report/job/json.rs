@@ -40,6 +40,7 @@ impl JobReport {
             "failed": self.with_status(Status::Failed),
             "pending": self.with_status(Status::Pending).len(),
             "particles": totals.particles,
+            "particles_read": totals.particles_read,
             "dropped": totals.dropped,
             "clamped_radii": totals.clamped_radii,
             "clamped_pixels": totals.clamped_pixels,

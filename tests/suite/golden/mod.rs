@@ -50,8 +50,7 @@ fn trace(shot: &Shot, simd: SimdLevel) -> Film {
         colors: shot.colors.as_colors(),
         ids: shot.ids.as_deref(),
         velocities: shot.velocities.as_deref(),
-        parts: None,
-        attributes: &[],
+        ..ParticleShading::constant(glam::Vec3::ZERO)
     };
     let mut grid = SmoothGrid::default();
     let surface = surface(shot, builder.tree().view(), &mut grid);

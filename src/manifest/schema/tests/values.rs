@@ -3,7 +3,7 @@
 use super::*;
 
 /// Values of every type, around every bound.
-const VALUES: [&str; 100] = [
+const VALUES: [&str; 103] = [
     "0",
     "1",
     "-1",
@@ -103,6 +103,9 @@ const VALUES: [&str; 100] = [
     "{ attribute = \"\" }",
     "{ bottom = [0, 0, 0], top = [1, 1, 1] }",
     "{ bottom = [0, 0, 0] }",
+    "\"x > 1\"",
+    "{ axis = \"z\", center = 1, thickness = 0.5 }",
+    "{ axis = \"z\", center = 1, thickness = 0 }",
     "{ top = [0, 0, 0], bottom = [1, 1, 1], x = 1 }",
 ];
 
@@ -140,6 +143,7 @@ const BASE: &str = r#"
 input = { path = "data" }
 camera = { mode = "fixed", eye = [5, 6, 7.5], look_at = [9, 9, 9.25], key = [{ frame = 0, eye = [5, 6, 7.5], look_at = [9, 9, 9.25] }] }
 light = [{ type = "point", position = [0, 0, 10] }, { type = "directional", direction = [0, 0, -1] }, { type = "sun", direction = [0, 0, -1] }, { type = "sphere", position = [0, 0, 10], radius = 1 }, { type = "rect", position = [0, 0, 10], direction = [0, 0, -1], width = 2, height = 1 }, { type = "disc", position = [0, 0, 10], direction = [0, 0, -1], radius = 1 }]
+clip = [{ type = "plane", normal = "x" }, { type = "box", min = [0, 0, 0], max = [1, 1, 1] }]
 overlay = [{ type = "colorbar" }, { type = "text" }, { type = "scale_bar" }, { type = "axes" }]
 job = { isolate = true }
 "#;

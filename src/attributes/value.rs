@@ -1,4 +1,4 @@
-//! Values of particles for colours, by name: attributes, their components, and values that follow from the geometry.
+//! Values of particles, by name: attributes, their components, and values that follow from the geometry.
 
 use spherule_formats::names;
 

@@ -1,7 +1,11 @@
-//! Attributes with a meaning to the program, by their names.
+//! Attributes with a meaning to the program, by their names, and the values of particles that users name.
 
 use spherule_formats::native::{AttributeView, StoredType};
 use spherule_formats::{Attribute, AttributeData, ScalarType, names};
+
+mod value;
+
+pub use value::{GEOMETRIC_VALUES, ParticleValue};
 
 /// An attribute by name and number of components, in memory or in a file.
 pub trait Named {

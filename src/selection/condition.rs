@@ -1,0 +1,410 @@
+//! Conditions on particles: their grammar, and their form for evaluation.
+//!
+//! The parser is our own and small: crates for expressions evaluate one particle at a time, call the C library for
+//! functions, or do not say where an error is.
+//!
+//! ```text
+//! condition  = and { "||" and }
+//! and        = comparison { "&&" comparison }
+//! comparison = sum [ ("<" | "<=" | ">" | ">=" | "==" | "!=") sum ]
+//! sum        = product { ("+" | "-") product }
+//! product    = unary { ("*" | "/") unary }
+//! unary      = [ "-" | "+" | "!" ] unary | primary
+//! primary    = number | name | name "[" number "]" | function "(" sum { "," sum } ")" | "(" condition ")"
+//! ```
+
+use std::fmt;
+
+use super::error::ConditionError;
+use super::token::{Placed, Token, tokens};
+
+/// Maximum length of a condition in bytes.
+const MAX_LENGTH: usize = 4096;
+
+/// Maximum depth of parentheses and signs within each other.
+const MAX_DEPTH: usize = 64;
+
+/// Names of the functions.
+pub(super) const FUNCTIONS: [&str; 4] = ["abs", "sqrt", "min", "max"];
+
+/// A condition on particles, such as `speed > 2 && z < 0.5`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Condition {
+    text: String,
+    /// Operations in postfix order.
+    pub(super) operations: Vec<Operation>,
+    pub(super) names: Vec<NameUse>,
+}
+
+/// A name in a condition, and where it appears first.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct NameUse {
+    pub(super) name: String,
+    /// In characters, from 1.
+    pub(super) column: usize,
+}
+
+/// Comparison of two numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Comparison {
+    Less,
+    LessOrEqual,
+    Greater,
+    GreaterOrEqual,
+    Equal,
+    NotEqual,
+}
+
+/// Function of two numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Arithmetic {
+    Add,
+    Subtract,
+    Multiply,
+    Divide,
+    Min,
+    Max,
+}
+
+/// An operation on two stacks, of numbers and of truth values.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Operation {
+    Number(f64),
+    /// The value with this index among the names.
+    Value(usize),
+    Negate,
+    Abs,
+    Sqrt,
+    Arithmetic(Arithmetic),
+    Compare(Comparison),
+    Not,
+    And,
+    Or,
+}
+
+/// The kind of a part of a condition.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Number,
+    Truth,
+}
+
+impl Condition {
+    /// Reads a condition.
+    ///
+    /// # Errors
+    /// The text has a syntax error, compares conditions as numbers, is too long or too deep.
+    pub fn parse(text: &str) -> Result<Self, ConditionError> {
+        if text.len() > MAX_LENGTH {
+            let what = format!(
+                "a condition may have {MAX_LENGTH} bytes, this one has {}",
+                text.len()
+            );
+            return Err(ConditionError { column: 1, what });
+        }
+        let mut parser = Parser {
+            tokens: tokens(text)?,
+            next: 0,
+            end: text.chars().count() + 1,
+            depth: 0,
+            operations: Vec::new(),
+            names: Vec::new(),
+        };
+        let kind = parser.any()?;
+        if let Some(found) = parser.tokens.get(parser.next) {
+            let what = match &found.token {
+                Token::Name(name) if ["and", "or"].contains(&name.as_str()) => {
+                    format!("`{name}` is not a sign of conditions: write && or ||")
+                }
+                token => format!("unexpected {token}"),
+            };
+            return Err(parser.error(found.column, what));
+        }
+        if kind == Kind::Number {
+            let what =
+                "this is a number, not a condition; compare it, as in `speed > 2`".to_owned();
+            return Err(parser.error(1, what));
+        }
+        Ok(Self {
+            text: text.to_owned(),
+            operations: parser.operations,
+            names: parser.names,
+        })
+    }
+
+    /// The text as it was written.
+    pub fn as_str(&self) -> &str {
+        &self.text
+    }
+}
+
+impl fmt::Display for Token {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(number) => write!(f, "`{number}`"),
+            Self::Name(name) => write!(f, "`{name}`"),
+            Self::Sign(sign) => write!(f, "`{sign}`"),
+        }
+    }
+}
+
+struct Parser {
+    tokens: Vec<Placed>,
+    next: usize,
+    /// Column behind the text.
+    end: usize,
+    depth: usize,
+    operations: Vec<Operation>,
+    names: Vec<NameUse>,
+}
+
+type Parsed = Result<Kind, ConditionError>;
+
+/// A level of the grammar.
+type Level = fn(&mut Parser) -> Parsed;
+
+impl Parser {
+    fn error(&self, column: usize, what: impl Into<String>) -> ConditionError {
+        ConditionError {
+            column,
+            what: what.into(),
+        }
+    }
+
+    /// Column of the next token.
+    fn column(&self) -> usize {
+        self.tokens
+            .get(self.next)
+            .map_or(self.end, |placed| placed.column)
+    }
+
+    /// Takes the next token if it is one of `signs`.
+    fn take(&mut self, signs: &[&str]) -> Option<&'static str> {
+        match self.tokens.get(self.next)?.token {
+            Token::Sign(sign) if signs.contains(&sign) => {
+                self.next += 1;
+                Some(sign)
+            }
+            _ => None,
+        }
+    }
+
+    fn require(&mut self, sign: &'static str, why: &str) -> Result<(), ConditionError> {
+        match self.take(&[sign]) {
+            Some(_) => Ok(()),
+            None => Err(self.error(self.column(), format!("expected `{sign}` {why}"))),
+        }
+    }
+
+    /// Parses a part that must be of a `kind` for `sign`.
+    fn part(&mut self, kind: Kind, sign: &str, level: Level) -> Result<(), ConditionError> {
+        let column = self.column();
+        let found = level(self)?;
+        self.check(column, found, kind, sign)
+    }
+
+    fn check(
+        &self,
+        column: usize,
+        found: Kind,
+        kind: Kind,
+        sign: &str,
+    ) -> Result<(), ConditionError> {
+        match (kind, found) {
+            (Kind::Number, Kind::Truth) => {
+                let what = format!("`{sign}` needs a number here, and this is a condition");
+                Err(self.error(column, what))
+            }
+            (Kind::Truth, Kind::Number) => {
+                let what =
+                    format!("`{sign}` needs a condition here, and this is a number; compare it");
+                Err(self.error(column, what))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Parts of one `kind` with `signs` between them.
+    fn chain(&mut self, kind: Kind, signs: &[(&'static str, Operation)], level: Level) -> Parsed {
+        let column = self.column();
+        let first = level(self)?;
+        let names: Vec<&str> = signs.iter().map(|(sign, _)| *sign).collect();
+        let mut result = first;
+        while let Some(sign) = self.take(&names) {
+            self.check(column, first, kind, sign)?;
+            self.part(kind, sign, level)?;
+            let operation = signs.iter().find(|(name, _)| *name == sign);
+            self.operations
+                .extend(operation.map(|(_, operation)| *operation));
+            result = kind;
+        }
+        Ok(result)
+    }
+
+    fn any(&mut self) -> Parsed {
+        self.chain(Kind::Truth, &[("||", Operation::Or)], |parser| {
+            parser.chain(Kind::Truth, &[("&&", Operation::And)], Self::comparison)
+        })
+    }
+
+    fn comparison(&mut self) -> Parsed {
+        const SIGNS: [(&str, Comparison); 6] = [
+            ("<", Comparison::Less),
+            ("<=", Comparison::LessOrEqual),
+            (">", Comparison::Greater),
+            (">=", Comparison::GreaterOrEqual),
+            ("==", Comparison::Equal),
+            ("!=", Comparison::NotEqual),
+        ];
+        let names = SIGNS.map(|(name, _)| name);
+        let column = self.column();
+        let left = self.sum()?;
+        let Some(sign) = self.take(&names) else {
+            return Ok(left);
+        };
+        self.check(column, left, Kind::Number, sign)?;
+        self.part(Kind::Number, sign, Self::sum)?;
+        let found = SIGNS.iter().find(|(name, _)| *name == sign);
+        self.operations
+            .extend(found.map(|(_, comparison)| Operation::Compare(*comparison)));
+        let column = self.column();
+        match self.take(&names) {
+            Some(_) => Err(self.error(
+                column,
+                "comparisons have two sides; join two of them with &&",
+            )),
+            None => Ok(Kind::Truth),
+        }
+    }
+
+    fn sum(&mut self) -> Parsed {
+        let signs = [
+            ("+", Operation::Arithmetic(Arithmetic::Add)),
+            ("-", Operation::Arithmetic(Arithmetic::Subtract)),
+        ];
+        self.chain(Kind::Number, &signs, Self::product)
+    }
+
+    fn product(&mut self) -> Parsed {
+        let signs = [
+            ("*", Operation::Arithmetic(Arithmetic::Multiply)),
+            ("/", Operation::Arithmetic(Arithmetic::Divide)),
+        ];
+        self.chain(Kind::Number, &signs, Self::unary)
+    }
+
+    /// A part within another one, which must not be too deep.
+    fn within(&mut self, level: Level) -> Parsed {
+        self.depth += 1;
+        if self.depth > MAX_DEPTH {
+            let what = format!("more than {MAX_DEPTH} parentheses or signs within each other");
+            return Err(self.error(self.column(), what));
+        }
+        let kind = level(self);
+        self.depth -= 1;
+        kind
+    }
+
+    fn unary(&mut self) -> Parsed {
+        let Some(sign) = self.take(&["-", "+", "!"]) else {
+            return self.primary();
+        };
+        let column = self.column();
+        let found = self.within(Self::unary)?;
+        let (kind, operation) = match sign {
+            "!" => (Kind::Truth, Some(Operation::Not)),
+            "-" => (Kind::Number, Some(Operation::Negate)),
+            _ => (Kind::Number, None),
+        };
+        self.check(column, found, kind, sign)?;
+        self.operations.extend(operation);
+        Ok(kind)
+    }
+
+    fn primary(&mut self) -> Parsed {
+        let column = self.column();
+        let Some(placed) = self.tokens.get(self.next) else {
+            return Err(self.error(
+                column,
+                "the condition ends here; a number or a name is missing",
+            ));
+        };
+        match placed.token.clone() {
+            Token::Number(number) => {
+                self.next += 1;
+                self.operations.push(Operation::Number(number));
+                Ok(Kind::Number)
+            }
+            Token::Name(name) => {
+                self.next += 1;
+                self.value(name, column)
+            }
+            Token::Sign("(") => {
+                self.next += 1;
+                let kind = self.within(Self::any)?;
+                self.require(")", "after the part in parentheses")?;
+                Ok(kind)
+            }
+            token => Err(self.error(
+                column,
+                format!("expected a number or a name, found {token}"),
+            )),
+        }
+    }
+
+    /// A value of particles or a function.
+    fn value(&mut self, mut name: String, column: usize) -> Parsed {
+        if self.take(&["("]).is_some() {
+            return self.function(&name, column);
+        }
+        if name == "not" {
+            return Err(self.error(column, "`not` is not a sign of conditions: write !"));
+        }
+        if self.take(&["["]).is_some() {
+            match self.tokens.get(self.next).map(|placed| &placed.token) {
+                Some(Token::Number(number)) => name = format!("{name}[{number}]"),
+                _ => return Err(self.error(self.column(), "expected the number of a component")),
+            }
+            self.next += 1;
+            self.require("]", "after the number of a component")?;
+        }
+        let known = self.names.iter().position(|used| used.name == name);
+        let index = known.unwrap_or(self.names.len());
+        if known.is_none() {
+            self.names.push(NameUse { name, column });
+        }
+        self.operations.push(Operation::Value(index));
+        Ok(Kind::Number)
+    }
+
+    /// The arguments of a function, and the parenthesis after them.
+    fn function(&mut self, name: &str, column: usize) -> Parsed {
+        let argument = |parser: &mut Self| {
+            let column = parser.column();
+            let found = parser.within(Self::any)?;
+            parser.check(column, found, Kind::Number, name)
+        };
+        let pair = match name {
+            "abs" | "sqrt" => None,
+            "min" => Some(Arithmetic::Min),
+            "max" => Some(Arithmetic::Max),
+            _ => {
+                let known = FUNCTIONS.join(", ");
+                let what = format!("unknown function `{name}`; there are {known}");
+                return Err(self.error(column, what));
+            }
+        };
+        argument(self)?;
+        match pair {
+            Some(function) => {
+                self.require(",", &format!("between the two arguments of {name}"))?;
+                argument(self)?;
+                self.operations.push(Operation::Arithmetic(function));
+            }
+            None if name == "abs" => self.operations.push(Operation::Abs),
+            None => self.operations.push(Operation::Sqrt),
+        }
+        self.require(")", &format!("after the arguments of {name}"))?;
+        Ok(Kind::Number)
+    }
+}

@@ -1,0 +1,167 @@
+//! Selects the particles of a frame that are drawn: by a condition on their values, by their ids, and by regions.
+//!
+//! The others are left out after a frame has been read, before anything is computed from it.
+
+use rayon::prelude::*;
+use spherule_formats::order::index_u32;
+use spherule_formats::{AttributeData, RawParticles};
+use spherule_jobs::FrameRange;
+
+mod condition;
+mod error;
+mod evaluate;
+mod region;
+#[cfg(test)]
+mod tests;
+mod token;
+mod values;
+
+pub use condition::Condition;
+pub use error::ConditionError;
+pub use region::Region;
+pub use values::{OTHER_NAMES, UnknownName};
+
+use crate::attributes::Named;
+use evaluate::{BLOCK, Stacks};
+use values::Value;
+
+/// Particles that one task tests.
+const RUN: usize = 64 * BLOCK;
+
+/// Which particles are drawn: those that meet all of these.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Selection {
+    /// A condition on their values.
+    pub condition: Option<Condition>,
+    /// Their ids, or their indices if they have none.
+    pub ids: Option<FrameRange>,
+    /// Only ids, or indices, that are multiples of this number, if it is above 1.
+    pub every: u32,
+    /// Regions that contain their centres.
+    pub regions: Vec<Region>,
+}
+
+impl Selection {
+    /// Whether all particles are drawn.
+    pub const fn is_all(&self) -> bool {
+        let is_by_id = self.ids.is_some() || self.every > 1;
+        self.condition.is_none() && !is_by_id && self.regions.is_empty()
+    }
+
+    /// Checks that the names in the condition have values, for particles with `attributes`.
+    ///
+    /// # Errors
+    /// The first name that has none.
+    pub fn check_names<A: Named>(
+        &self,
+        attributes: &[A],
+        time: Option<f64>,
+    ) -> Result<(), UnknownName> {
+        self.values(attributes, time).map(|_| ())
+    }
+
+    /// The values of the names in the condition.
+    fn values<A: Named>(
+        &self,
+        attributes: &[A],
+        time: Option<f64>,
+    ) -> Result<Vec<Value>, UnknownName> {
+        let names = self.condition.iter().flat_map(|condition| &condition.names);
+        names
+            .map(|name| Value::of(name, attributes, time))
+            .collect()
+    }
+
+    /// Indices of the particles that are drawn, ascending. The result does not depend on the number of threads.
+    ///
+    /// # Errors
+    /// A name in the condition has no value. Frames without particles need no attributes.
+    pub fn survivors(&self, particles: &RawParticles) -> Result<Vec<u32>, UnknownName> {
+        let count = particles.positions.len();
+        if count == 0 {
+            return Ok(Vec::new());
+        }
+        let values = self.values(&particles.attributes, particles.time)?;
+        let ids = Value::id(&particles.attributes);
+        let runs = (0..count.div_ceil(RUN)).into_par_iter();
+        let runs: Vec<Vec<u32>> = runs
+            .map_init(Stacks::default, |stacks, run| {
+                let range = run * RUN..(run * RUN + RUN).min(count);
+                let mut survivors = Vec::with_capacity(range.len());
+                for first in range.clone().step_by(BLOCK) {
+                    let mut keep = [true; BLOCK];
+                    let keep = &mut keep[..BLOCK.min(range.end - first)];
+                    if let Some(condition) = &self.condition {
+                        stacks.evaluate(&condition.operations, &values, particles, first, keep);
+                    }
+                    self.test_ids(particles, ids, first, keep);
+                    self.test_regions(particles, first, keep);
+                    push_kept(first, keep, &mut survivors);
+                }
+                survivors
+            })
+            .collect();
+        Ok(runs.concat())
+    }
+
+    /// Clears the marks of particles without a selected id.
+    fn test_ids(&self, particles: &RawParticles, ids: Value, first: usize, keep: &mut [bool]) {
+        if self.ids.is_none() && self.every <= 1 {
+            return;
+        }
+        let id = |i: usize| match ids {
+            Value::Component { attribute, .. } => {
+                integer(&particles.attributes[attribute].data, first + i)
+            }
+            _ => i64::try_from(first + i).ok(),
+        };
+        let every = i64::from(self.every.max(1));
+        let is_selected = |id: i64| {
+            let in_ranges = || self.ids.as_ref().is_none_or(|ids| ids.contains(id));
+            id % every == 0 && in_ranges()
+        };
+        for (i, keep) in keep.iter_mut().enumerate() {
+            *keep = *keep && id(i).is_some_and(is_selected);
+        }
+    }
+
+    /// Clears the marks of particles that are not in all regions.
+    fn test_regions(&self, particles: &RawParticles, first: usize, keep: &mut [bool]) {
+        for region in &self.regions {
+            for (i, keep) in keep.iter_mut().enumerate() {
+                *keep = *keep && region.contains(particles.positions.get(first + i));
+            }
+        }
+    }
+}
+
+/// Appends the indices of the marked particles.
+fn push_kept(first: usize, keep: &[bool], to: &mut Vec<u32>) {
+    // Every index is written, and the next one replaces those that are not kept: there is nothing to predict.
+    let start = to.len();
+    to.resize(start + keep.len(), 0);
+    let mut end = start;
+    for (i, keep) in keep.iter().enumerate() {
+        to[end] = index_u32(first + i);
+        end += usize::from(*keep);
+    }
+    to.truncate(end);
+}
+
+/// Value `index` as an integer; None if it is not one.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    clippy::float_cmp,
+    reason = "compared with the value"
+)]
+fn integer(data: &AttributeData, index: usize) -> Option<i64> {
+    match data {
+        AttributeData::I64(v) => Some(v[index]),
+        AttributeData::U64(v) => i64::try_from(v[index]).ok(),
+        other => {
+            let value = other.get_f64(index);
+            Some(value as i64).filter(|integer| *integer as f64 == value)
+        }
+    }
+}
