@@ -18,6 +18,7 @@ use crate::surface::SurfaceKind;
 use crate::survey::{Question, RadiusQuestion, Survey};
 
 mod camera;
+mod cell;
 mod channels;
 mod color;
 mod denoise;
@@ -152,7 +153,7 @@ pub fn setup(
     // Place the camera
     let image = &manifest.image;
     let aspect = f64::from(image.width) / f64::from(image.height);
-    let framed = camera::framed(survey, &bounds, reach.x);
+    let framed = camera::framed(manifest, survey, &bounds, reach.x);
     let path = camera::path(manifest, &framed, up, aspect)?;
     let camera = camera::at_start(&path, aspect, survey.origin)?;
     let color = color::rule(manifest, survey, &camera)?;
@@ -242,6 +243,7 @@ pub fn setup(
         aspect,
         scene,
         meshes: Vec::new(),
+        cell: None,
         renderer: crate::render::RendererKind::default(),
         render,
         denoise,

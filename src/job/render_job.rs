@@ -302,7 +302,7 @@ impl RenderJob {
             add_ground_image(&mut setup, &self.manifest, texture);
         }
         let meshes = self.meshes.get(&self.manifest, self.dir(), survey)?;
-        add_meshes(&mut setup, &self.manifest, meshes);
+        add_meshes(&mut setup, &self.manifest, survey, meshes);
         check_views(&setup, frames)?;
         Ok(setup)
     }

@@ -22,6 +22,7 @@ use tree::TomlNode;
 
 mod camera;
 mod caustics;
+mod cell;
 mod channel;
 mod color;
 mod color_map;
@@ -67,6 +68,7 @@ mod work;
 mod work_tests;
 
 pub use camera::{Camera, CameraKey, CameraMode};
+pub use cell::Cell;
 pub use channel::{ATTRIBUTE_CHANNEL, Channel, NamedChannel};
 pub use color::{CategoryNames, ColorMapping, ColorSetting, ScaleKind};
 pub use color_map::{MapName, RangeSetting};
@@ -120,6 +122,8 @@ pub struct Manifest {
     pub environment: Environment,
     /// Light sources; without any, a key light and a soft fill light are placed relative to the camera.
     pub lights: Vec<Light>,
+    /// The simulation cell.
+    pub cell: Cell,
     /// Meshes next to the particles.
     pub meshes: Vec<Mesh>,
     /// What is drawn over previews.
@@ -163,6 +167,7 @@ impl Manifest {
             material: Material::default(),
             environment: Environment::default(),
             lights: Vec::new(),
+            cell: Cell::default(),
             meshes: Vec::new(),
             overlays: Vec::new(),
             output: Output::default(),
@@ -249,6 +254,7 @@ impl Manifest {
         keys.section("environment", environment::ABOUT, |keys| {
             self.environment.keys(keys);
         });
+        keys.section("cell", Cell::ABOUT, |keys| self.cell.keys(keys));
         keys.section("output", Output::ABOUT, |keys| self.output.keys(keys));
         keys.section("job", Work::ABOUT, |keys| self.job.all_keys(keys));
         keys.list(
@@ -275,8 +281,9 @@ impl Manifest {
             return;
         };
         let meshes = self.meshes.len();
-        if meshes > MaterialId::MAX_MESHES {
-            let max = MaterialId::MAX_MESHES;
+        // The simulation cell takes the place of a mesh
+        let max = MaterialId::MAX_MESHES - usize::from(self.cell.visible);
+        if meshes > max {
             root.wrong(
                 "mesh",
                 &format!("{meshes} meshes, but at most {max} are possible"),

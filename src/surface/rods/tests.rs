@@ -6,7 +6,6 @@ use glam::{DVec3, Vec3};
 
 use super::*;
 use crate::accel::Coherence;
-use crate::accel::simd::tested_levels::tested_levels;
 use crate::ray::{Ray, RayPacket};
 use crate::surface::{Intersections, MaterialId, Shape, Side};
 
@@ -290,7 +289,7 @@ fn impossible_rods_are_left_out() {
 }
 
 #[test]
-fn many_rods_are_those_of_brute_force_at_each_simd_level() {
+fn many_rods_are_those_of_brute_force() {
     let mut random = Random(5);
     let rods: Vec<Rod> = (0..400)
         .map(|number| {
@@ -305,10 +304,8 @@ fn many_rods_are_those_of_brute_force_at_each_simd_level() {
         .collect();
     let tree = RodTree::new(rods, Caps::Round);
     let surface = RodSurface::new(&tree, MaterialId::PARTICLES);
-    // Rods are in double precision at each level, which the hierarchy does not change
-    tested_levels();
     let mut hits = 0;
-    for _ in 0..150 {
+    for _ in 0..60 {
         let mut packet = RayPacket::default();
         let mut expected = Vec::new();
         for _ in 0..16 {
@@ -346,5 +343,5 @@ fn many_rods_are_those_of_brute_force_at_each_simd_level() {
             }
         }
     }
-    assert!(hits > 500, "{hits} hits");
+    assert!(hits > 150, "{hits} hits");
 }
