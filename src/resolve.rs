@@ -19,6 +19,7 @@ use crate::surface::SurfaceKind;
 use crate::survey::{Question, RadiusQuestion, Survey};
 
 mod camera;
+mod cell;
 mod channels;
 mod color;
 mod denoise;
@@ -171,7 +172,7 @@ pub fn setup(
     let image = &manifest.image;
     let [width, height] = image.size();
     let aspect = f64::from(width) / f64::from(height);
-    let framed = camera::framed(survey, &bounds, reach.x);
+    let framed = camera::framed(manifest, survey, &bounds, reach.x);
     let (path, projection) = camera::path(manifest, &framed, up, aspect)?;
     let stereo = camera::stereo(manifest);
     let camera = camera::at_start(&path, |view| {
@@ -271,6 +272,7 @@ pub fn setup(
         aspect,
         scene,
         meshes: Vec::new(),
+        cell: None,
         renderer: crate::render::RendererKind::default(),
         render,
         denoise,

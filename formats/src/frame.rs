@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::attribute::with_values;
 use crate::names::RADII;
-use crate::{Attribute, AttributeData};
+use crate::{Attribute, AttributeData, SimulationCell};
 
 /// Positions in the precision of the file, world units.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,6 +77,8 @@ pub struct RawParticles {
     pub time: Option<f64>,
     /// Step number written inside the file (LAMMPS `TIMESTEP`), if any.
     pub step: Option<i64>,
+    /// The simulation cell, if the file has it.
+    pub cell: Option<SimulationCell>,
 }
 
 impl RawParticles {
@@ -155,6 +157,8 @@ pub struct ParticleFrame {
     pub attributes: Vec<Attribute>,
     /// Simulation time, if known.
     pub time: Option<f64>,
+    /// The simulation cell, if known, in world coordinates.
+    pub cell: Option<SimulationCell>,
     /// Particles that were dropped because a coordinate was NaN or beyond [`FARTHEST`].
     pub dropped: u64,
     /// File-order index of each kept particle; `None` if all particles of the file were kept (the indices are then
@@ -184,6 +188,7 @@ impl ParticleFrame {
             mut attributes,
             time,
             step: _,
+            cell,
         } = raw;
         // Find the particles to keep
         let relative = relative_positions(positions, origin);
@@ -199,6 +204,7 @@ impl ParticleFrame {
                 radius,
                 attributes,
                 time,
+                cell,
                 dropped,
                 file_index: None,
             };
@@ -222,6 +228,7 @@ impl ParticleFrame {
             radius,
             attributes,
             time,
+            cell,
             dropped,
             file_index: Some(file_index),
         }

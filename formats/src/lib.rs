@@ -8,6 +8,7 @@
 
 mod attribute;
 mod budget;
+mod cell;
 mod compression;
 mod decode;
 mod error;
@@ -40,6 +41,7 @@ pub mod write;
 
 pub use attribute::{Attribute, AttributeData};
 pub use budget::MemoryBudget;
+pub use cell::SimulationCell;
 pub use error::{FrameError, ParseError};
 pub use frame::{
     FARTHEST, ParticleFrame, Positions, Radius, RawParticles, find_radius, is_near, is_radius,

@@ -362,6 +362,7 @@ mod tests {
             attributes: attributes.into_iter().map(attribute).collect(),
             time: None,
             step: None,
+            cell: None,
         }
     }
 

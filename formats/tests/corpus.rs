@@ -64,6 +64,7 @@ fn frame(radius: Option<Radius>, origin: DVec3, count: u8) -> ParticleFrame {
         origin,
         radius,
         time: Some(0.25),
+        cell: None,
         dropped: 3,
         file_index: None,
     }

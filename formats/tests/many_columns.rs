@@ -266,6 +266,7 @@ fn parts_of_a_step() {
             .collect(),
         time: None,
         step: None,
+        cell: None,
     };
     let mut notes = Vec::new();
     let backwards = &mut (0..MANY).rev().map(|i| format!("a{i}"));

@@ -22,7 +22,7 @@ const ACTIONS: [&str; 7] = [
 const COLORS: [&str; 4] = ["color_by", "map", "range", "color_scale"];
 
 /// Other options with a value that is not the default, and the key that it is laid over.
-const FLAGS: [(&str, &str); 40] = [
+const FLAGS: [(&str, &str); 41] = [
     ("--output x.####.exr", "output.path = \"x.####.exr\""),
     ("--frames 3-4", "input.frames = \"3-4\""),
     ("--width 7", "image.width = 7"),
@@ -51,6 +51,7 @@ const FLAGS: [(&str, &str); 40] = [
         "--ground=shadow_catcher",
         "render.ground = \"shadow_catcher\"",
     ),
+    ("--cell", "cell.visible = true"),
     ("--surface union", "render.surface = \"union\""),
     ("--smoothing 0.5", "surface.smoothing = 0.5"),
     ("--exact-surface", "surface.exact = true"),

@@ -305,7 +305,7 @@ impl RenderJob {
         if let Some(texture) = self.ground_image()? {
             add_ground_image(&mut setup, &self.manifest, texture);
         }
-        add_meshes(&mut setup, &self.manifest, meshes);
+        add_meshes(&mut setup, &self.manifest, &survey, meshes);
         check_views(&setup, frames)?;
         Ok(setup)
     }

@@ -23,6 +23,7 @@ use tree::TomlNode;
 
 mod camera;
 mod caustics;
+mod cell;
 mod channel;
 mod clip;
 mod color;
@@ -72,6 +73,7 @@ mod work;
 mod work_tests;
 
 pub use camera::{AxisView, Camera, CameraKey, CameraMode, ConvergenceSetting, ProjectionKind};
+pub use cell::Cell;
 pub use channel::{ATTRIBUTE_CHANNEL, Channel, NamedChannel};
 pub use clip::{Clip, ClipKind, KeptSide, PlaneNormal};
 pub use color::{CategoryNames, ColorMapping, ColorSetting, ScaleKind};
@@ -133,6 +135,8 @@ pub struct Manifest {
     pub environment: Environment,
     /// Light sources; without any, a key light and a soft fill light are placed relative to the camera.
     pub lights: Vec<Light>,
+    /// The simulation cell.
+    pub cell: Cell,
     /// Meshes next to the particles.
     pub meshes: Vec<Mesh>,
     /// What is drawn over previews.
@@ -178,6 +182,7 @@ impl Manifest {
             material: Material::default(),
             environment: Environment::default(),
             lights: Vec::new(),
+            cell: Cell::default(),
             meshes: Vec::new(),
             overlays: Vec::new(),
             output: Output::default(),
@@ -265,6 +270,7 @@ impl Manifest {
         keys.section("environment", environment::ABOUT, |keys| {
             self.environment.keys(keys);
         });
+        keys.section("cell", Cell::ABOUT, |keys| self.cell.keys(keys));
         keys.section("output", Output::ABOUT, |keys| self.output.keys(keys));
         keys.section("job", Work::ABOUT, |keys| self.job.all_keys(keys));
         keys.list("clip", "clip", clip::ABOUT, &mut self.clips, Clip::keys);
@@ -292,8 +298,9 @@ impl Manifest {
             return;
         };
         let meshes = self.meshes.len();
-        if meshes > MaterialId::MAX_MESHES {
-            let max = MaterialId::MAX_MESHES;
+        // The simulation cell takes the place of a mesh
+        let max = MaterialId::MAX_MESHES - usize::from(self.cell.visible);
+        if meshes > max {
             root.wrong(
                 "mesh",
                 &format!("{meshes} meshes, but at most {max} are possible"),

@@ -16,6 +16,7 @@ use super::load_error::{LoadError, first_file, unknown_name};
 use super::meshes::{MeshSlices, meshes_of};
 use super::motion::velocities_to_next;
 use super::predict::{FrameSize, MemoryModel};
+use super::rods::{FrameRods, rods_of};
 use super::setup::{Picture, Setup};
 use crate::metrics::memory::{available, process_room};
 use crate::overlay::Overlay;
@@ -31,6 +32,8 @@ pub struct LoadedFrame {
     pub particles: LoadedParticles,
     /// The meshes of the image, one for each of the setup.
     pub meshes: Vec<MeshSlices>,
+    /// Rods next to the particles.
+    pub rods: Vec<FrameRods>,
     /// What overlays show of the file.
     pub facts: FileFacts,
     /// Simulation time, if known.
@@ -82,6 +85,7 @@ pub fn load_frame(
     let mut loaded = match opened.map_err(|e| newest(e, sequence, task))? {
         Opened::InPlace(frame, clamped_radii) => LoadedFrame {
             read: frame.particles(),
+            rods: rods_of(setup, None, task.frame, &mut notes),
             facts: frame.facts(setup, file_name(sequence, task.index)),
             time: sequence.listed_time(task.index).or(frame.time()),
             task: task.clone(),
@@ -146,6 +150,7 @@ fn decode(
         }
         _ => None,
     };
+    let rods = rods_of(setup, frame.cell.as_ref(), task.frame, &mut notes);
     let facts = FileFacts::of_decoded(setup, &frame, file_name(sequence, task.index));
     let (mut decoded, clamped_radii) = DecodedFrame::of(setup, frame, task.frame, &file)?;
     if moving.is_some() {
@@ -156,6 +161,7 @@ fn decode(
         notes,
         particles: LoadedParticles::Decoded(decoded),
         meshes: Vec::new(),
+        rods,
         facts,
         time,
         focus,

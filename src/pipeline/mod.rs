@@ -21,6 +21,7 @@ mod probe;
 mod rays;
 mod read_threads;
 mod renderer;
+mod rods;
 mod schedule;
 mod setup;
 mod shutter;
@@ -41,6 +42,7 @@ pub use meshes::{LoadedMesh, MeshLoadError, MeshSettings, MeshSlices, PictureMes
 pub use predict::{FrameSize, MemoryModel, MemoryNeed};
 pub use probe::{Probe, ProbeError, probe};
 pub use renderer::{BuiltFrame, FrameRenderer, TraceError, TracedFrame};
+pub use rods::{CellStyle, FrameRods};
 pub use schedule::{Overlap, Schedule};
 pub use setup::{
     AttributeChannel, ColorRule, OpacityRule, Picture, RadiusRule, RunSettings, Setup,

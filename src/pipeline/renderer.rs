@@ -11,6 +11,7 @@ use super::facts::FileFacts;
 use super::in_place::StoredFrame;
 use super::load::LoadedFrame;
 use super::meshes::MeshSlices;
+use super::rods::FrameRods;
 use super::setup::Setup;
 use crate::accel::stored::StoredFault;
 use crate::denoise::DenoiseError;
@@ -76,6 +77,7 @@ pub struct BuiltFrame {
     pub(super) task: ImageTask,
     pub(super) particles: BuiltParticles,
     pub(super) meshes: Vec<MeshSlices>,
+    pub(super) rods: Vec<FrameRods>,
     pub(super) facts: FileFacts,
     pub(super) time: Option<f64>,
     /// Position of the particle in focus.

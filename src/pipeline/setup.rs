@@ -5,6 +5,7 @@ use spherule_formats::native::Access;
 
 use super::meshes::PictureMesh;
 use super::rays::expected_rays;
+use super::rods::CellStyle;
 use super::shutter::{FrameStep, Shutter};
 use crate::accel::{BuildSettings, BvhSettings, SbvhSettings, Structure, choose};
 use crate::denoise::DenoiseSettings;
@@ -157,6 +158,8 @@ pub struct Picture {
     pub scene: Scene,
     /// The meshes; their materials are in the scene.
     pub meshes: Vec<PictureMesh>,
+    /// How the simulation cell is drawn, if it is.
+    pub cell: Option<CellStyle>,
     /// The renderer.
     pub renderer: RendererKind,
     /// Image size, samples, depth, channels.

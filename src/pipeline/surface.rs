@@ -10,6 +10,7 @@ use spherule_formats::Radius;
 use super::decoded::DecodedFrame;
 use super::meshes::{MeshSlices, PictureMesh};
 use super::motion::expose;
+use super::rods::FrameRods;
 use super::setup::Setup;
 use crate::accel::moving::MovingTree;
 use crate::accel::view::TreeView;
@@ -271,7 +272,7 @@ impl SurfaceBuilder {
         built
     }
 
-    /// Renders the surface that `setup` requires over the spheres of `tree`, and `meshes`, to `film`.
+    /// Renders the surface that `setup` requires over the spheres of `tree`, and the shapes `others`, to `film`.
     ///
     /// # Errors
     /// Same as [`render_into`].
@@ -283,7 +284,7 @@ impl SurfaceBuilder {
         &self,
         setup: &Setup,
         tree: TreeView<'_>,
-        meshes: &[MeshSlices],
+        others: &[Box<dyn Shape + '_>],
         scene: &Scene,
         source: &dyn ShadeSource,
         film: &mut Film,
@@ -300,8 +301,7 @@ impl SurfaceBuilder {
         if !self.spray.tree().view().is_empty() {
             shapes.push(&*spray);
         }
-        let meshes: Vec<_> = mesh_surfaces(&setup.picture.meshes, meshes).collect();
-        shapes.extend(meshes.iter().map(|mesh| &**mesh));
+        shapes.extend(others.iter().map(|shape| &**shape));
         render_into(film, &shapes, scene, source, &setup.picture.render, stop)
     }
 }
@@ -349,6 +349,16 @@ fn soft_drops(
         })
     });
     drops.unzip()
+}
+
+/// The shapes of `trees`, which are `meshes` of a picture, and of `rods`.
+pub(super) fn others<'a>(
+    meshes: &'a [PictureMesh],
+    trees: &'a [MeshSlices],
+    rods: &'a [FrameRods],
+) -> Vec<Box<dyn Shape + 'a>> {
+    let rods = rods.iter().map(FrameRods::surface);
+    mesh_surfaces(meshes, trees).chain(rods).collect()
 }
 
 /// The shapes of `trees`, which are `meshes` of a picture.

@@ -176,6 +176,7 @@ fn compact_frames_in_place_have_every_surface() {
         radius: None,
         attributes: Vec::new(),
         time: None,
+        cell: None,
         dropped: 0,
         file_index: None,
     };

@@ -7,8 +7,9 @@ use super::in_place::StoredFrame;
 use super::load::{LoadedFrame, LoadedParticles};
 use super::mattes;
 use super::renderer::{BuiltFrame, BuiltParticles, FrameRenderer, TraceError, TracedFrame};
+use super::rods::FrameRods;
 use super::setup::{ColorRule, OpacityRule, Picture, Setup};
-use super::surface::{SurfaceBuilder, spheres};
+use super::surface::{self, SurfaceBuilder, spheres};
 use crate::accel::stored::{StoredSettings, StoredTree};
 use crate::accel::{BuildReport, TreeBuilder};
 use crate::denoise::{DenoiseError, DenoiseInput, denoise};
@@ -68,10 +69,12 @@ impl FrameRenderer for CpuRenderer {
                 BuiltParticles::Stored(stored)
             }
         };
+        report.bytes.surface += frame.rods.iter().map(FrameRods::bytes).sum::<u64>();
         Ok(BuiltFrame {
             task: frame.task,
             particles,
             meshes: frame.meshes,
+            rods: frame.rods,
             facts: frame.facts,
             time: frame.time,
             focus: frame.focus,
@@ -171,18 +174,19 @@ impl CpuRenderer {
         stop: &dyn Stop,
     ) -> Result<RayCounts, TraceError> {
         let scene = setup.scene_at(frame.task.frame, frame.focus)?;
-        let (surface, meshes) = (&self.surface, &frame.meshes);
+        let surface = &self.surface;
+        let others = surface::others(&setup.picture.meshes, &frame.meshes, &frame.rods);
         match &frame.particles {
             BuiltParticles::Decoded(shading) => {
                 let source = particle_shading(&setup.picture, shading);
                 let tree = self.builder.tree().view();
-                Ok(surface.draw(setup, tree, meshes, &scene, &source, film, stop)?)
+                Ok(surface.draw(setup, tree, &others, &scene, &source, film, stop)?)
             }
             BuiltParticles::Stored(stored) => {
                 let leaves = stored.leaves()?;
                 let source = stored.shading(&setup.picture, DEFAULT_COLOR);
                 let tree = self.stored.view(&leaves);
-                let rays = surface.draw(setup, tree, meshes, &scene, &source, film, stop)?;
+                let rays = surface.draw(setup, tree, &others, &scene, &source, film, stop)?;
                 // Reject the image if the file has changed meanwhile.
                 stored.check()?;
                 Ok(rays)

@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use glam::DVec3;
+use spherule_formats::SimulationCell;
 
 use super::ResolveError;
 use crate::manifest::{self, CameraMode, FocusSetting, Manifest, ProjectionKind};
@@ -114,12 +115,15 @@ pub fn with_framed_meshes<'a>(
     Cow::Owned(survey)
 }
 
-/// What an automatic camera shows: the outermost particles of `survey`, or in jobs of earlier versions their `bounds`.
-pub(super) fn framed(survey: &Survey, bounds: &Bounds, reach: f64) -> Framed {
+/// What an automatic camera shows: the outermost particles of `survey`, or in jobs of earlier versions their `bounds`;
+/// and the simulation cell if it is visible.
+pub(super) fn framed(manifest: &Manifest, survey: &Survey, bounds: &Bounds, reach: f64) -> Framed {
+    let cells = survey.cells.iter().filter(|_| manifest.cell.visible);
     match &survey.outline {
         Some(outline) => {
             let points = outline.points.iter().map(|p| p.as_dvec3() + survey.origin);
-            Framed::spheres(points.collect(), reach)
+            let corners = cells.flat_map(SimulationCell::corners);
+            Framed::spheres(points.chain(corners).collect(), reach)
         }
         None => Framed::corners(bounds),
     }

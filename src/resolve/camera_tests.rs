@@ -11,6 +11,7 @@ pub(in crate::resolve) fn survey() -> Survey {
         max: DVec3::splat(1.0),
         layers: None,
         outline: None,
+        cells: Vec::new(),
         radius: None,
         packed_radius: None,
         has_radii: false,

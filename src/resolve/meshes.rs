@@ -3,6 +3,7 @@
 use glam::Vec3;
 use spherule_formats::MemoryBudget;
 
+use super::cell;
 use crate::manifest::{self, Manifest, MeshShading};
 use crate::pipeline::{MeshSettings, PictureMesh, Setup};
 use crate::scene::mesh::DEFAULT_COLOR;
@@ -44,16 +45,24 @@ pub fn mesh_settings(
     manifest.meshes.iter().map(settings).collect()
 }
 
-/// Adds the `meshes` of `manifest`, one for each of its entries, to the pictures of `setup`. Lowers an automatic ground
-/// below those that are the same in all frames.
-pub fn add_meshes(setup: &mut Setup, manifest: &Manifest, meshes: Vec<PictureMesh>) {
+/// Adds the `meshes` of `manifest`, one for each of its entries, and the simulation cell to the pictures of `setup`.
+/// Lowers an automatic ground below the cell, and below meshes that are the same in all frames.
+pub fn add_meshes(
+    setup: &mut Setup,
+    manifest: &Manifest,
+    survey: &Survey,
+    meshes: Vec<PictureMesh>,
+) {
     let scene = &mut setup.picture.scene;
     scene.meshes = manifest.meshes.iter().map(material).collect();
+    setup.picture.cell = cell::add_cell(scene, manifest, survey);
     if let Some(ground) = &mut scene.ground
         && manifest.render.ground_height.is_none()
     {
         let trees = meshes.iter().filter_map(|mesh| mesh.tree.as_ref());
-        for [min, max] in trees.filter_map(|tree| tree.bounds()) {
+        let boxes = trees.filter_map(|tree| tree.bounds());
+        let cells = cell::boxes(setup.picture.cell.as_ref(), survey);
+        for [min, max] in boxes.chain(cells) {
             let lowest = Vec3::select(ground.up.cmpgt(Vec3::ZERO), min, max).dot(ground.up);
             let below = lowest - GROUND_GAP * (max - min).length();
             if below < ground.height {

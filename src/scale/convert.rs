@@ -62,6 +62,7 @@ fn frame_of(particles: Particles, request: &CellRequest) -> ParticleFrame {
         attributes: Vec::new(),
         origin: request.stage.origin,
         time: None,
+        cell: None,
         dropped: 0,
         file_index: None,
     }

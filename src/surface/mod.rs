@@ -3,6 +3,7 @@
 
 pub mod field;
 mod gradient;
+mod hierarchy;
 mod intersections;
 pub mod mesh;
 pub mod moving;
@@ -11,6 +12,7 @@ mod normals;
 mod owners;
 mod pca;
 mod plane;
+pub mod rods;
 mod settings;
 mod shape;
 pub mod slices;

@@ -9,7 +9,9 @@ use std::collections::BTreeMap;
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use spherule_formats::sequence::Sequence;
-use spherule_formats::{Attribute, FrameError, ParticleFrame, Radius, choose_origin};
+use spherule_formats::{
+    Attribute, FrameError, ParticleFrame, Radius, SimulationCell, choose_origin,
+};
 
 pub use crate::attributes::{
     GEOMETRIC_VALUES, Named, PART_NAMES, ParticleValue, id_of, part_of, velocity_of,
@@ -57,6 +59,9 @@ pub struct Survey {
     /// The outermost particles, for the camera. Jobs of earlier versions lack them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outline: Option<Outline>,
+    /// The simulation cells of the sampled frames, each once; none of files that were only sampled.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cells: Vec<SimulationCell>,
     /// Radius for frames without radii: half the median distance of neighbours.
     pub radius: Option<f32>,
     /// The same for the particles of one body: half the edge of the cube that each particle occupies inside, slightly
@@ -189,6 +194,7 @@ impl RadiusQuestion<'_> {
 struct Totals {
     bounds: Option<RobustBounds>,
     outermost: Outermost,
+    cells: Vec<SimulationCell>,
     radius: Option<(usize, Spacing)>,
     has_radii: bool,
     reach: f32,
@@ -262,6 +268,7 @@ impl Survey {
         let mut totals = Totals {
             bounds: None,
             outermost: Outermost::default(),
+            cells: Vec::new(),
             radius: None,
             has_radii: false,
             reach: 0.0,
@@ -346,6 +353,10 @@ impl Totals {
             (before, found) => before.or(found),
         };
         self.outermost.add(&raw.positions, count);
+        let is_new = |cell: &SimulationCell| !self.cells.contains(cell);
+        if let Some(cell) = raw.cell.filter(is_new) {
+            self.cells.push(cell);
+        }
         // Find velocity and colours
         if self.velocity.is_none() {
             self.velocity = velocity_of(&raw.attributes).map(|a| a.name.clone());
@@ -454,6 +465,7 @@ impl Totals {
             max,
             layers: self.bounds.map(|bounds| bounds.layers),
             outline: self.outermost.outline(origin),
+            cells: self.cells,
             radius: self.radius.map(|(_, spacing)| spacing.touching),
             packed_radius: self.radius.and_then(|(_, spacing)| spacing.packed),
             has_radii: self.has_radii,

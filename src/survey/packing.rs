@@ -124,6 +124,7 @@ mod tests {
             attributes: Vec::new(),
             time: None,
             step: None,
+            cell: None,
         };
         let directory = tempfile::tempdir().expect("a directory");
         let path = directory.path().join("f_1.spf");

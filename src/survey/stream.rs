@@ -72,6 +72,7 @@ pub(super) fn sample(
         attributes,
         time: source.time(),
         step: source.step(),
+        cell: None,
     })
 }
 
@@ -228,6 +229,7 @@ mod tests {
             attributes: Vec::new(),
             time: None,
             step: None,
+            cell: None,
         };
         let source = RawSource::new(Path::new("nan"), &raw).expect("whole");
         assert_eq!(extremes(&source).expect("there"), None);

@@ -177,6 +177,7 @@ fn frame(encoding: Encoding) -> Vec<u8> {
         radius: Some(Radius::Common(0.4)),
         attributes: Vec::new(),
         time: None,
+        cell: None,
         dropped: 0,
         file_index: None,
     };

@@ -8,6 +8,7 @@ mod architecture;
 mod arithmetic;
 mod bad_input;
 mod camera;
+mod cell;
 mod channels;
 mod collections;
 mod color_maps;

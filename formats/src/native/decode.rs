@@ -27,6 +27,7 @@ impl NativeFrame<'_> {
             attributes,
             time: self.index().time,
             step: self.index().step,
+            cell: None,
         })
     }
 
@@ -70,6 +71,7 @@ impl NativeFrame<'_> {
             attributes,
             time: self.index().time,
             step: self.index().step,
+            cell: None,
         })
     }
 

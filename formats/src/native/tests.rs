@@ -35,6 +35,7 @@ fn frame(count: u8, origin: DVec3) -> ParticleFrame {
         origin,
         radius: None,
         time: Some(0.25),
+        cell: None,
         dropped: 3,
         file_index: None,
     }
@@ -317,6 +318,7 @@ fn stored_within(
         origin: DVec3::ZERO,
         radius,
         time: None,
+        cell: None,
         dropped: 0,
         file_index: None,
     };

@@ -36,6 +36,7 @@ fn stored(encoding: Encoding, own_radii: bool) -> Vec<u8> {
         origin: DVec3::ZERO,
         radius: Some(radius),
         time: None,
+        cell: None,
         dropped: 0,
         file_index: None,
     };

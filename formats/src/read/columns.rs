@@ -196,6 +196,7 @@ impl ParticleLayout {
             attributes,
             time: self.time,
             step: self.step,
+            cell: None,
         }
     }
 }

@@ -28,6 +28,7 @@ pub fn merge(parts: Vec<(u32, RawParticles)>, notes: &mut Vec<String>) -> RawPar
     let mut particles: Vec<RawParticles> = parts.into_iter().map(|(_, p)| p).collect();
     let time = particles.iter().find_map(|p| p.time);
     let step = particles.iter().find_map(|p| p.step);
+    let cell = particles.iter().find_map(|p| p.cell);
     let mut attributes = merge_attributes(&mut particles, notes);
     let has_own = attributes.iter().any(|a| a.name == PART_ATTRIBUTE);
     if !(is_one && has_own) {
@@ -43,6 +44,7 @@ pub fn merge(parts: Vec<(u32, RawParticles)>, notes: &mut Vec<String>) -> RawPar
         attributes,
         time,
         step,
+        cell,
     }
 }
 
@@ -187,6 +189,7 @@ mod tests {
             attributes,
             time: None,
             step: None,
+            cell: None,
         }
     }
 

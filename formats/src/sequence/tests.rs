@@ -203,6 +203,7 @@ fn write_frame(path: &Path, positions: Vec<Vec3>, step: i64) {
         attributes: vec![],
         time: None,
         step: None,
+        cell: None,
     };
     let frame = ParticleFrame::from_raw(raw, DVec3::ZERO);
     native::write(path, &frame, Some(step)).expect("writable");

@@ -141,6 +141,7 @@ fn frame(radius: Option<Radius>, origin: DVec3) -> ParticleFrame {
         origin,
         radius,
         time: Some(0.25),
+        cell: None,
         dropped: 3,
         file_index: None,
     }

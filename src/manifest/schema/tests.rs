@@ -87,7 +87,7 @@ fn written_manifests_are_valid() {
 }
 
 /// Every table of the schema, with a manifest that ends in this table, so that a line can be appended to it.
-const TABLES: [(&str, &str); 35] = [
+const TABLES: [(&str, &str); 36] = [
     ("", ""),
     ("/properties/input", "[input]\n"),
     ("/properties/camera", "[camera]\n"),
@@ -95,6 +95,7 @@ const TABLES: [(&str, &str); 35] = [
         "/properties/camera/properties/key/items",
         "[[camera.key]]\n",
     ),
+    ("/properties/cell", "[cell]\n"),
     ("/properties/image", "[image]\n"),
     ("/properties/render", "[render]\n"),
     ("/properties/surface", "[surface]\n"),

@@ -1,8 +1,6 @@
 //! Triangle meshes: tanks, obstacles and other bodies that are not particles.
 //!
-//! The hierarchy is a compressed wide BVH of the crate `obvhs`. Triangles are intersected in f64 (`triangle.rs`), so
-//! that no ray passes between two triangles with a common edge, and results do not depend on the hierarchy: at equal
-//! distances, the triangle with the lower index wins.
+//! Triangles are intersected in f64 (`triangle.rs`), so that no ray passes between two triangles with a common edge.
 
 use std::ops::Range;
 

@@ -83,6 +83,7 @@ fn spf(path: &Path, count: usize) {
         positions: Positions::F32(particles(count)),
         attributes: Vec::new(),
         time: None,
+        cell: None,
         step: None,
     };
     native::write(path, &ParticleFrame::from_raw(raw, DVec3::ZERO), None).expect("a file");

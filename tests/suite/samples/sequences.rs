@@ -182,7 +182,7 @@ fn file_metadata_is_reported() {
     let workshop = Workshop::new();
     let text = "2\nLattice=\"9 0 0 0 9 0 0 0 9\" pbc=\"T T T\" Properties=species:S:1:pos:R:3\nO 0 0 0\nH 1 0 0\n";
     fs::write(workshop.join("water.xyz"), text).expect("a file");
-    let cell = "periodic boundaries (T T T) is not used";
+    let cell = "simulation cell with periodic boundaries (T T T); --cell draws it";
     let names = "\"H\" = 1, \"O\" = 8";
     let text = workshop.run(&["inspect", "water.xyz"]).expect(0).text();
     assert!(text.contains(cell) && text.contains(names), "{text}");

@@ -118,6 +118,7 @@ pub(super) fn read(
         attributes,
         time: layout.time,
         step: None,
+        cell: None,
     })
 }
 

@@ -5,15 +5,22 @@
 
 use std::collections::BTreeMap;
 
+use glam::DVec3;
+
 use super::file::{GsdFile, IndexEntry};
 use crate::read::Step;
 use crate::read::columns::{ComponentStride, ParticleLayout, StridedColumn};
-use crate::{Attribute, AttributeData, Endian, MemoryBudget, ParseError, RawParticles, ScalarType};
+use crate::{
+    Attribute, AttributeData, Endian, MemoryBudget, ParseError, RawParticles, ScalarType,
+    SimulationCell,
+};
 
 /// Name of the chunk with the number of the time step.
 pub(super) const STEP: &str = "configuration/step";
 /// Name of the chunk with the number of particles.
 const COUNT: &str = "particles/N";
+/// Name of the chunk with the cell.
+pub(super) const BOX: &str = "configuration/box";
 const POSITION: &str = "particles/position";
 /// What the names of chunks of the schema's particles begin with.
 pub(super) const PARTICLES: &str = "particles/";
@@ -205,7 +212,7 @@ impl<'f, 'a> FrameChunks<'f, 'a> {
         let (own_count, first_count) = both(COUNT)?;
         let count = own_count.or(first_count).unwrap_or(0);
         if count != first_count.unwrap_or(0) {
-            first.clear();
+            first.retain(|name, _| Some(*name) == file.name(BOX));
         }
         Ok(Self {
             file,
@@ -229,8 +236,31 @@ impl<'f, 'a> FrameChunks<'f, 'a> {
         let mut particles = layout.particles(self.file.bytes)?;
         let defaults = missing.iter().map(|field| field.defaults(self.count));
         particles.attributes.extend(defaults);
+        particles.cell = self.cell();
         particles.step = self.step.and_then(|step| i64::try_from(step).ok());
         Ok(particles)
+    }
+
+    /// The cell: three lengths and three tilt factors, around the origin, periodic.
+    fn cell(&self) -> Option<SimulationCell> {
+        let entry = self.chunk(self.file.name(BOX))?;
+        let bytes = self
+            .file
+            .numbers(&entry)
+            .ok()
+            .filter(|bytes| bytes.len() <= 48)?;
+        let data = entry.scalar()?.decode(Endian::Little, bytes).ok()?;
+        if data.len() != 6 {
+            return None;
+        }
+        let [lx, ly, lz, xy, xz, yz]: [f64; 6] = std::array::from_fn(|i| data.get_f64(i));
+        let vectors = [
+            DVec3::new(lx, 0.0, 0.0),
+            DVec3::new(xy * ly, ly, 0.0),
+            DVec3::new(xz * lz, yz * lz, lz),
+        ];
+        let center = 0.5 * vectors.into_iter().sum::<DVec3>();
+        SimulationCell::new(-center, vectors, [true; 3])
     }
 
     /// Where the particles are in the file, if all their values are.

@@ -1,13 +1,12 @@
 //! Remarks about a GSD file: what is not in its particles.
 
 use super::file::{GsdFile, GsdHeader, IndexEntry, until_zero};
-use super::frame::{DIAMETER, FIELDS, LOGGED, PARTICLES, STEP};
-use crate::read::remarks::unused_cell;
+use super::frame::{BOX, DIAMETER, FIELDS, LOGGED, PARTICLES, STEP};
+use crate::read::remarks::cell_remark;
 use crate::read::text;
 use crate::{Endian, ScalarType};
 
 const TYPES: &str = "particles/types";
-const BOX: &str = "configuration/box";
 const DIMENSIONS: &str = "configuration/dimensions";
 
 /// Most types, or ignored names, that a remark lists.
@@ -42,7 +41,7 @@ pub(super) fn remarks(bytes: &[u8]) -> Vec<String> {
             lengths.join(" x "),
             tilts.join(", ")
         ));
-        remarks.push(unused_cell(None));
+        remarks.push(cell_remark(None));
     }
     if numbers(&file, DIMENSIONS).is_some_and(|d| d == [2.0]) {
         remarks.push("the simulation has two dimensions".to_owned());

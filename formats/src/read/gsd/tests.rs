@@ -325,6 +325,18 @@ fn chunks_must_not_overlap() {
 }
 
 #[test]
+fn the_cell_is_around_the_origin() {
+    let bytes = sample("gsd/polymer.gsd");
+    let steps = steps(&bytes).unwrap();
+    // 12 x 10 x 8, tilted by 0.25, 0 and -0.5
+    let cell = read(&bytes, &steps[0]).unwrap().cell.expect("a cell");
+    let vectors = [[12.0, 0.0, 0.0], [2.5, 10.0, 0.0], [0.0, -4.0, 8.0]];
+    assert_eq!(cell.vectors.map(|v| v.to_array()), vectors);
+    assert_eq!(cell.origin.to_array(), [-7.25, -3.0, -4.0]);
+    assert_eq!(cell.periodic, [true; 3]);
+}
+
+#[test]
 fn remarks_report_what_is_not_in_the_particles() {
     let remarks = Gsd.remarks(&sample("gsd/polymer.gsd"));
     assert_eq!(
@@ -333,7 +345,7 @@ fn remarks_report_what_is_not_in_the_particles() {
             "GSD 2.1, schema hoomd 2.0, written by \"gsd.hoomd 5.0.1\"",
             "attribute `typeid` has numbers for types: 0 = \"A\", 1 = \"solvent\"",
             "the cell of the first frame is 12 x 10 x 8, its tilt factors are 0.25, 0, -0.5",
-            "the cell of the simulation is not used: particles are drawn where the file has them",
+            "the file has a simulation cell; --cell draws it. Particles are drawn where the file has them",
             "not used: \"orientation\", \"bonds\", \"log\"",
         ]
     );

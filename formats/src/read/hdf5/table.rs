@@ -206,6 +206,7 @@ impl ParticleTable {
             attributes,
             time: self.time,
             step: self.step,
+            cell: None,
         })
     }
 

@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 
-use crate::ParseError;
 use crate::read::text::{self, Line};
+use crate::{ParseError, SimulationCell};
 
 /// A corner and the three edges that meet there.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,6 +30,19 @@ impl Axis {
             numbers: numbers.unwrap_or_default(),
         }
     }
+}
+
+/// The flags of the boundaries on a line such as `ITEM: BOX BOUNDS xy xz yz pp pp ff`.
+pub(super) fn boundary_flags(line: &[u8]) -> Vec<&[u8]> {
+    let words = text::words(line).skip(3);
+    let is_flag = |word: &&[u8]| word.len() == 2 && word.iter().all(|b| b"pfsm".contains(b));
+    words.filter(is_flag).take(3).collect()
+}
+
+/// Whether the boundaries are periodic, by such a line. Without flags, all are, as is the default of LAMMPS.
+pub(super) fn periodic_axes(line: &[u8]) -> [bool; 3] {
+    let flags = boundary_flags(line);
+    [0, 1, 2].map(|axis| flags.get(axis).is_none_or(|flag| flag.contains(&b'p')))
 }
 
 impl Bounds {
@@ -84,6 +97,11 @@ impl Bounds {
                 DVec3::new(xz, yz, size.z),
             ],
         }
+    }
+
+    /// The cell.
+    pub(super) fn cell(&self, periodic: [bool; 3]) -> Option<SimulationCell> {
+        SimulationCell::new(self.corner, self.edges, periodic)
     }
 
     /// The position of the fractions `scaled`.

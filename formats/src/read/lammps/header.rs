@@ -1,7 +1,7 @@
 //! The `ITEM:` lines before the atoms of a step.
 
 use super::ITEM;
-use super::bounds::{Axis, Bounds};
+use super::bounds::{Axis, Bounds, periodic_axes};
 use crate::read::Step;
 use crate::read::input::TextInput;
 use crate::read::table::CUT_SHORT;
@@ -66,6 +66,8 @@ pub(super) struct DumpHeader {
     pub(super) count_at: usize,
     /// The box, if given.
     pub(super) bounds: Option<Bounds>,
+    /// Whether the boundaries of each axis are periodic.
+    pub(super) periodic: [bool; 3],
     /// Where the columns are named.
     pub(super) names_at: usize,
     /// Names of the columns.
@@ -134,6 +136,7 @@ impl DumpHeader {
             count: 0,
             count_at: 0,
             bounds: None,
+            periodic: [true; 3],
             names_at: 0,
             names: Vec::new(),
         };
@@ -154,6 +157,7 @@ impl DumpHeader {
                     count = Some(atom_count(line)?);
                 }
                 DumpItem::Bounds => {
+                    header.periodic = periodic_axes(line.text);
                     let mut axis = || value(text).map(Axis::parse);
                     header.bounds = Some(Bounds::new([axis()?, axis()?, axis()?])?);
                 }

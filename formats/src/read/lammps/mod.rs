@@ -201,6 +201,9 @@ fn read(
         attributes,
         time: header.time,
         step: header.number,
+        cell: header
+            .bounds
+            .and_then(|bounds| bounds.cell(header.periodic)),
     })
 }
 

@@ -1,12 +1,13 @@
 //! Remarks about a dump: what is not in the particles.
 
 use super::ITEM;
+use super::bounds::boundary_flags;
 use super::header::{DumpHeader, DumpItem};
 use crate::MemoryBudget;
 use crate::names::LAMMPS_CATEGORIES;
 use crate::read::category;
 use crate::read::input::TextInput;
-use crate::read::remarks::unused_cell;
+use crate::read::remarks::cell_remark;
 use crate::read::text::{self, Lines};
 
 /// See [`crate::read::remarks`].
@@ -18,13 +19,12 @@ pub(in crate::read) fn remarks(head: &[u8]) -> Vec<String> {
             && matches!(DumpItem::of(line.text), DumpItem::Bounds | DumpItem::Atoms)
     });
     if let Some(bounds) = bounds.filter(|line| DumpItem::of(line.text) == DumpItem::Bounds) {
-        // `ITEM: BOX BOUNDS xy xz yz pp pp ff`
-        let flags = text::words(bounds.text)
-            .skip(3)
-            .filter(|word| word.len() == 2 && word.iter().all(|b| b"pfsm".contains(b)));
-        let flags: Vec<String> = flags.map(|f| String::from_utf8_lossy(f).into()).collect();
+        let flags: Vec<_> = boundary_flags(bounds.text)
+            .into_iter()
+            .map(String::from_utf8_lossy)
+            .collect();
         let is_periodic = flags.iter().any(|flag| flag.contains('p'));
-        remarks.push(unused_cell(is_periodic.then(|| flags.join(" ")).as_deref()));
+        remarks.push(cell_remark(is_periodic.then(|| flags.join(" ")).as_deref()));
     }
     let mut text = TextInput::whole(head);
     let Ok(header) = DumpHeader::parse(&mut text, MemoryBudget::UNLIMITED) else {

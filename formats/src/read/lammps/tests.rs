@@ -112,6 +112,11 @@ fn tilted_boxes() {
     let bounds = "ITEM: BOX BOUNDS xy xz yz pp pp pp\n-2 13 3\n-1 8 -2\n1 5 -1\n";
     let rows = ["0 0 0", "1 0 0", "0 1 0", "0 0 1", "0.5 0.5 0.5"];
     let particles = only(&dump(bounds, "xs ys zs", &rows)).unwrap();
+    let cell = particles.cell.expect("a cell");
+    assert_eq!(cell.origin, DVec3::new(0., 0., 1.));
+    let vectors = [[10., 0., 0.], [3., 8., 0.], [-2., -1., 4.]];
+    assert_eq!(cell.vectors, vectors.map(DVec3::from_array));
+    assert_eq!(cell.periodic, [true; 3]);
     let expected = [
         DVec3::new(0., 0., 1.),
         DVec3::new(10., 0., 1.),
@@ -121,8 +126,12 @@ fn tilted_boxes() {
     ];
     assert_eq!(f64_positions(&particles), expected);
 
-    let general = "ITEM: BOX BOUNDS abc origin pp pp pp\n1 2 0 10\n0 3 1 20\n-1 0 4 30\n";
+    let general = "ITEM: BOX BOUNDS abc origin pp fs pp\n1 2 0 10\n0 3 1 20\n-1 0 4 30\n";
     let particles = only(&dump(general, "xs ys zs", &rows)).unwrap();
+    let cell = particles.cell.expect("a cell");
+    assert_eq!(cell.origin, DVec3::new(10., 20., 30.));
+    assert_eq!(cell.vectors[2], DVec3::new(-1., 0., 4.));
+    assert_eq!(cell.periodic, [true, false, true]);
     let expected = [
         DVec3::new(10., 20., 30.),
         DVec3::new(11., 22., 30.),
@@ -208,7 +217,7 @@ fn remarks_name_the_cell_and_the_elements() {
         0 1 0\n0 1 0\nITEM: ATOMS id element x y z\n1 O 0 0 0\n2 H 0 0 0\nITEM: TIMESTEP\n1\n";
     let remarks = remarks::remarks(text.as_bytes());
     assert_eq!(remarks.len(), 2, "{remarks:?}");
-    assert!(remarks[0].contains("periodic boundaries (pp pp ff) is not used"));
+    assert!(remarks[0].contains("simulation cell with periodic boundaries (pp pp ff)"));
     assert!(remarks[1].ends_with("\"H\" = 1, \"O\" = 8"), "{remarks:?}");
     for end in 0..text.len() {
         remarks::remarks(&text.as_bytes()[..end]);

@@ -212,6 +212,7 @@ impl<'a> Archive<'a> {
             attributes: Vec::new(),
             time: None,
             step: None,
+            cell: None,
         })
     }
 

@@ -112,6 +112,7 @@ impl Reader for LegacyVtk {
             attributes: attributes?,
             time,
             step: None,
+            cell: None,
         })
     }
 

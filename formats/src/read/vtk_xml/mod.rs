@@ -89,6 +89,7 @@ impl Reader for XmlVtk {
                     attributes: merge::attributes(&document, appended)?,
                     time: time(&document, appended),
                     step: None,
+                    cell: None,
                 })
             },
         )

@@ -1,6 +1,11 @@
 //! The comment line of molecular text: the `key=value` pairs of extended XYZ, and the step that
 //! LAMMPS writes there.
 
+use glam::DVec3;
+
+use crate::SimulationCell;
+use crate::read::text;
+
 /// The value of `key` (any case) in the `key=value` pairs of `comment`. Values may be in quotes or
 /// braces and have blanks then.
 pub(super) fn value<'a>(comment: &'a [u8], key: &str) -> Option<&'a [u8]> {
@@ -80,6 +85,33 @@ fn closed_at(text: &[u8], closing: u8) -> Option<usize> {
     None
 }
 
+/// The simulation cell of extended XYZ: `Lattice`, with the edges one after the other, `Origin` (zero by default) and
+/// `pbc` (periodic by default).
+pub(super) fn cell(comment: &[u8]) -> Option<SimulationCell> {
+    let lattice = value(comment, "Lattice").or_else(|| value(comment, "Cell"))?;
+    let vectors: [DVec3; 3] = numbers::<9>(lattice)?
+        .chunks_exact(3)
+        .map(DVec3::from_slice)
+        .collect::<Vec<_>>()
+        .try_into()
+        .ok()?;
+    let origin = value(comment, "Origin").or_else(|| value(comment, "cell_origin"));
+    let origin = origin.and_then(numbers::<3>).unwrap_or_default();
+    let flags = value(comment, "pbc").map(|flags| text::words(flags).collect::<Vec<_>>());
+    let is_periodic = |axis: usize| {
+        let flag = flags.as_ref().and_then(|flags| flags.get(axis)?.first());
+        flag.is_none_or(|flag| matches!(flag, b'T' | b't' | b'1'))
+    };
+    let periodic = [0, 1, 2].map(is_periodic);
+    SimulationCell::new(DVec3::from_array(origin), vectors, periodic)
+}
+
+/// `N` numbers in `text`, if there are exactly so many.
+fn numbers<const N: usize>(text: &[u8]) -> Option<[f64; N]> {
+    let words = text::words(text).take(N + 1).map(text::number);
+    words.collect::<Option<Vec<f64>>>()?.try_into().ok()
+}
+
 /// The number in `Atoms. Timestep: 1000`, as LAMMPS' `dump xyz` writes it.
 pub(super) fn lammps_step(comment: &[u8]) -> Option<&[u8]> {
     let comment = comment.trim_ascii();
@@ -102,6 +134,27 @@ mod tests {
         assert_eq!(text("time"), Some("0.5"));
         assert_eq!(text("flag"), None);
         assert_eq!(text("x"), None);
+    }
+
+    #[test]
+    fn cells_of_extended_xyz() {
+        let found = cell(br#"Lattice="5 0 0 1 4 0 0.5 0 3" Origin="-1 2 3" pbc="T F T""#).unwrap();
+        assert_eq!(found.origin, DVec3::new(-1.0, 2.0, 3.0));
+        let vectors = [[5.0, 0.0, 0.0], [1.0, 4.0, 0.0], [0.5, 0.0, 3.0]];
+        assert_eq!(found.vectors, vectors.map(DVec3::from_array));
+        assert_eq!(found.periodic, [true, false, true]);
+        let plain = cell(b"Lattice='1 0 0 0 1 0 0 0 1'").unwrap();
+        assert_eq!((plain.origin, plain.periodic), (DVec3::ZERO, [true; 3]));
+        for bad in [
+            "Lattice=\"1 0 0 0 1 0 0 0\"",
+            "Lattice=\"1 0 0 0 1 0 0 0 1 0\"",
+            "Lattice=\"1 0 0 0 x 0 0 0 1\"",
+            "Lattice=\"0 0 0 0 0 0 0 0 0\"",
+            "Lattice=\"nan 0 0 0 1 0 0 0 1\"",
+            "none",
+        ] {
+            assert_eq!(cell(bad.as_bytes()), None, "{bad}");
+        }
     }
 
     #[test]

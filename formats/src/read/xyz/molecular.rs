@@ -56,6 +56,7 @@ pub(super) fn read(
         return Err(too_short(text.at(), "no comment after the count".into()));
     };
     let (number, time) = (number(comment), time(comment));
+    let cell = comment::cell(comment.text);
     let comment_at = comment.at;
     let properties = comment::value(comment.text, "Properties").map(<[u8]>::to_vec);
     let size = text.left_about();
@@ -100,6 +101,7 @@ pub(super) fn read(
         attributes,
         time,
         step: number,
+        cell,
     })
 }
 

@@ -2,7 +2,7 @@
 
 use super::molecular::{self, NAME};
 use super::{Lines, XyzVariant, comment, kind, text_start};
-use crate::read::remarks::unused_cell;
+use crate::read::remarks::cell_remark;
 use crate::read::{category, text};
 
 /// See [`crate::read::remarks`].
@@ -22,7 +22,7 @@ pub(in crate::read) fn remarks(head: &[u8]) -> Vec<String> {
     if value("Lattice").or_else(|| value("Cell")).is_some() {
         let flags = value("pbc").map(|flags| String::from_utf8_lossy(flags).into_owned());
         let is_periodic = |flags: &&String| flags.contains(['T', 't', '1']);
-        remarks.push(unused_cell(
+        remarks.push(cell_remark(
             flags.as_ref().filter(is_periodic).map(String::as_str),
         ));
     }

@@ -161,7 +161,7 @@ fn elements_and_species_become_numbers() {
     assert_eq!(whole(&extended, "id"), [7, 8, 9]);
     let notes = remarks::remarks(text.as_bytes());
     assert!(
-        notes[0].contains("periodic boundaries (T T F) is not used"),
+        notes[0].contains("simulation cell with periodic boundaries (T T F)"),
         "{notes:?}"
     );
     assert!(notes[1].contains("\"H\" = 1"), "{notes:?}");

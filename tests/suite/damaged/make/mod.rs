@@ -315,6 +315,7 @@ fn spf_bytes(points: &[[f32; 3]]) -> Vec<u8> {
         radius: None,
         attributes: Vec::new(),
         time: None,
+        cell: None,
         dropped: 0,
         file_index: None,
     };

@@ -1,0 +1,51 @@
+//! The simulation cell.
+
+use glam::{DVec3, Vec3};
+use spherule_formats::SimulationCell;
+
+use crate::manifest::Manifest;
+use crate::pipeline::CellStyle;
+use crate::scene::{Finish, MeshFinish, MeshMaterial, Scene};
+use crate::surface::MaterialId;
+use crate::survey::Survey;
+
+/// Automatic radius of the edges as a fraction of the diagonal of the cell: lines 3 pixels wide in a picture 1000 pixels
+/// high.
+const RADIUS: f64 = 0.0015;
+
+/// How the cell is drawn, if it is visible. Adds its material to those of the meshes of `scene`.
+pub(super) fn add_cell(
+    scene: &mut Scene,
+    manifest: &Manifest,
+    survey: &Survey,
+) -> Option<CellStyle> {
+    let cell = &manifest.cell;
+    if !cell.visible {
+        return None;
+    }
+    let material = MaterialId::of_mesh(scene.meshes.len())?;
+    scene.meshes.push(MeshMaterial {
+        color: cell.color,
+        finish: MeshFinish::Opaque(Finish::Matte),
+        is_holdout: false,
+    });
+    let radius = cell.radius.unwrap_or_else(|| {
+        let diagonals = survey.cells.iter().map(SimulationCell::diagonal);
+        let diagonal = diagonals.reduce(f64::max);
+        super::narrow(RADIUS * diagonal.unwrap_or(survey.min.distance(survey.max)))
+    });
+    Some(CellStyle { radius, material })
+}
+
+/// The boxes of all cells with their edges, relative to the origin; none if they are not drawn.
+pub(super) fn boxes(style: Option<&CellStyle>, survey: &Survey) -> impl Iterator<Item = [Vec3; 2]> {
+    let cells = style.into_iter().flat_map(move |style| {
+        let reach = DVec3::splat(f64::from(style.radius));
+        survey.cells.iter().map(move |cell| (cell.corners(), reach))
+    });
+    cells.map(move |(corners, reach)| {
+        let min = corners.into_iter().reduce(DVec3::min).unwrap_or_default();
+        let max = corners.into_iter().reduce(DVec3::max).unwrap_or_default();
+        [min - reach, max + reach].map(|corner| (corner - survey.origin).as_vec3())
+    })
+}

@@ -1,0 +1,135 @@
+//! Rods: cylinders, cones and capsules with a radius at each end, for the edges of a simulation cell, bonds, arrows and
+//! trails.
+//!
+//! Each rod is a convex body, and a ray passes through it on one interval (`interval.rs`), which is computed in f64 from
+//! the point of the ray closest to the rod. The surfaces of a rod leave no gap between them, and rods far from the
+//! origin are as exact as their coordinates.
+
+use std::fmt;
+
+use glam::{DVec3, Vec3};
+
+mod interval;
+mod shape;
+
+#[cfg(test)]
+mod tests;
+
+pub use shape::RodSurface;
+
+use super::hierarchy::Hierarchy;
+use interval::Body;
+
+/// The shape of both ends of a rod.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Caps {
+    /// None: a pipe that one can look into.
+    Open,
+    /// Discs: a cylinder, or a cone if one radius is 0.
+    Flat,
+    /// Spheres around the ends: a capsule. If the radii differ, the rod is the convex hull of both spheres.
+    Round,
+}
+
+/// A rod.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rod {
+    /// Its ends, relative to the origin of the sequence, scene units.
+    pub ends: [Vec3; 2],
+    /// Its radius at each end, scene units.
+    pub radii: [f32; 2],
+    /// The particles that give each half its colour and other attributes.
+    pub particles: [u32; 2],
+}
+
+impl Rod {
+    /// A rod of one radius that belongs to no particle.
+    pub const fn line(ends: [Vec3; 2], radius: f32) -> Self {
+        Self {
+            ends,
+            radii: [radius; 2],
+            particles: [0; 2],
+        }
+    }
+
+    /// Whether rays can hit it: its values are finite, no radius is negative, one of them is positive, and it has a
+    /// length unless its caps are round.
+    fn is_visible(&self, caps: Caps) -> bool {
+        let is_finite = self.ends.iter().all(|end| end.is_finite())
+            && self.radii.iter().all(|radius| radius.is_finite());
+        let has_radius =
+            self.radii.iter().all(|r| *r >= 0.0) && self.radii.iter().any(|r| *r > 0.0);
+        is_finite && has_radius && (caps == Caps::Round || self.ends[0] != self.ends[1])
+    }
+}
+
+/// Greatest number of rods.
+pub const MAX_RODS: usize = u32::MAX as usize;
+
+/// Rods with caps of one kind, and their hierarchy.
+pub struct RodTree {
+    rods: Vec<Rod>,
+    caps: Caps,
+    hierarchy: Hierarchy,
+    /// The largest coordinate of their boxes.
+    extent: f32,
+}
+
+impl fmt::Debug for RodTree {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("RodTree")
+            .field("rods", &self.rods.len())
+            .field("caps", &self.caps)
+            .finish_non_exhaustive()
+    }
+}
+
+impl RodTree {
+    /// Builds the hierarchy of `rods`, without those that no ray can hit, and of at most [`MAX_RODS`].
+    pub fn new(mut rods: Vec<Rod>, caps: Caps) -> Self {
+        rods.retain(|rod| rod.is_visible(caps));
+        rods.truncate(MAX_RODS);
+        #[expect(clippy::cast_possible_truncation, reason = "up to `MAX_RODS`")]
+        let count = rods.len() as u32;
+        let hierarchy = Hierarchy::new(count, |rod| Body::new(&rods[rod as usize], caps).bounds());
+        let extent = hierarchy
+            .bounds()
+            .map_or(0.0, |[min, max]| min.abs().max(max.abs()).max_element());
+        Self {
+            rods,
+            caps,
+            hierarchy,
+            extent,
+        }
+    }
+
+    /// Number of rods.
+    pub const fn len(&self) -> usize {
+        self.rods.len()
+    }
+
+    /// Whether there are none.
+    pub const fn is_empty(&self) -> bool {
+        self.rods.is_empty()
+    }
+
+    /// The lowest and the highest corner of their box; None without rods.
+    pub fn bounds(&self) -> Option<[Vec3; 2]> {
+        self.hierarchy.bounds()
+    }
+
+    /// Memory of the rods and their hierarchy, bytes.
+    pub const fn bytes(&self) -> usize {
+        size_of_val(self.rods.as_slice()) + self.hierarchy.bytes()
+    }
+
+    /// The body of the rod with this index.
+    fn body(&self, rod: u32) -> Body {
+        Body::new(&self.rods[rod as usize], self.caps)
+    }
+}
+
+/// `vector` in double precision.
+fn double(vector: Vec3) -> DVec3 {
+    vector.as_dvec3()
+}
