@@ -22,7 +22,7 @@ const ACTIONS: [&str; 7] = [
 const COLORS: [&str; 4] = ["color_by", "map", "range", "color_scale"];
 
 /// Other options with a value that is not the default, and the key that it is laid over.
-const FLAGS: [(&str, &str); 36] = [
+const FLAGS: [(&str, &str); 37] = [
     ("--output x.####.exr", "output.path = \"x.####.exr\""),
     ("--frames 3-4", "input.frames = \"3-4\""),
     ("--width 7", "image.width = 7"),
@@ -51,6 +51,7 @@ const FLAGS: [(&str, &str); 36] = [
     ("--spray", "surface.spray = true"),
     ("--no-mmap", "input.mmap = false"),
     ("--follow-links", "input.follow_links = true"),
+    ("--topology a.gro", "input.topology = \"a.gro\""),
     ("--parts a,b", "input.parts = [\"a\", \"b\"]"),
     ("--accelerator bvh", "render.accelerator = \"bvh\""),
     ("--memory-limit 4GiB", "render.memory_limit = \"4GiB\""),
@@ -100,11 +101,12 @@ fn every_option_is_a_key() {
 }
 
 /// Options whose `[default: ...]` is no value that could be given.
-const WORDS: [&str; 8] = [
+const WORDS: [&str; 9] = [
     "crop",
     "memory-limit",
     "memory-ceiling",
     "parts",
+    "topology",
     "color_by",
     "range",
     "color_scale",
