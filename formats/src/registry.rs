@@ -5,7 +5,9 @@ use std::path::Path;
 use crate::compression::strip_extension;
 use crate::format::Format;
 use crate::native;
-use crate::read::{bgeo, csv, gsd, lammps, npy, ply, vtk, vtk_xml, xyz};
+use crate::read::{
+    amber, bgeo, csv, dcd, gro, gsd, lammps, mmcif, npy, pdb, ply, trr, vtk, vtk_xml, xtc, xyz,
+};
 
 /// All formats. If several formats match a file equally well, the first one wins. Messages list them in this order.
 const FORMATS: &[Format] = &[
@@ -16,9 +18,17 @@ const FORMATS: &[Format] = &[
     ply::FORMAT,
     xyz::FORMAT,
     lammps::FORMAT,
+    lammps::BINARY,
     npy::NPY,
     npy::NPZ,
     gsd::FORMAT,
+    gro::FORMAT,
+    xtc::FORMAT,
+    trr::FORMAT,
+    dcd::FORMAT,
+    amber::FORMAT,
+    pdb::FORMAT,
+    mmcif::FORMAT,
     #[cfg(feature = "hdf5")]
     crate::read::hdf5::FORMAT,
     csv::FORMAT,

@@ -86,6 +86,14 @@ impl Step {
         Ok(())
     }
 
+    /// Removes the numbers of `steps` unless each is greater than the one before. Files that were joined after a restart
+    /// have some twice.
+    pub(crate) fn keep_increasing_numbers(steps: &mut [Self]) {
+        if !steps.is_sorted_by(|a, b| a.number < b.number) {
+            steps.iter_mut().for_each(|step| step.number = None);
+        }
+    }
+
     /// The bytes of the uncompressed file that hold the step, if they are one range.
     pub const fn byte_range(&self) -> Option<&Range<usize>> {
         match &self.handle {

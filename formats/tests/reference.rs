@@ -177,3 +177,8 @@ fn collections_are_what_the_reference_readers_give() {
 fn hdf5_is_what_the_reference_readers_give() {
     assert_eq!(compare("hdf5"), 103);
 }
+
+#[test]
+fn molecules_are_what_the_reference_readers_give() {
+    assert_eq!(compare("molecules"), 98);
+}

@@ -50,6 +50,9 @@ pub(super) struct ConvertArgs {
     /// Read files outside the directory of a list of files, such as a .pvd, that names them.
     #[arg(long, help_heading = "Input")]
     follow_links: bool,
+    /// File with the properties of the atoms of a trajectory: .gro, .pdb, .psf or other
+    #[arg(long, value_name = "FILE", help_heading = "Input")]
+    topology: Option<PathBuf>,
     /// Radius of all particles [default: from the files, else half the typical distance of neighbours]
     #[arg(long, value_parser = positive, help_heading = "Input")]
     radius: Option<f32>,
@@ -120,7 +123,10 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, CliError> {
         budget: conversion_budget(args.memory.map(limit)),
         follow_links: args.follow_links,
     };
-    let sequence = in_thread(|| Sequence::open_with(&input, settings))?;
+    let mut sequence = in_thread(|| Sequence::open_with(&input, settings))?;
+    if let Some(path) = &args.topology {
+        in_thread(|| sequence.add_topology(path))?;
+    }
     for note in sequence.notes() {
         note!("{note}");
     }

@@ -14,7 +14,7 @@ use crate::manifest::{FlagKind, KeyFlag, Override, ProgressMode, key_flags};
 const HEADINGS: [&str; 6] = ["Input", "Camera", "Image", "Look", "Output", "Job"];
 
 /// Keys whose values are paths, relative to where they are typed.
-const PATHS: [&str; 2] = ["output.path", "job.stop_file"];
+const PATHS: [&str; 3] = ["input.topology", "output.path", "job.stop_file"];
 
 /// The options that were given, with their values.
 #[derive(Debug)]

@@ -22,7 +22,7 @@ const ACTIONS: [&str; 7] = [
 const COLORS: [&str; 4] = ["color_by", "map", "range", "color_scale"];
 
 /// Other options with a value that is not the default, and the key that it is laid over.
-const FLAGS: [(&str, &str); 41] = [
+const FLAGS: [(&str, &str); 42] = [
     ("--output x.####.exr", "output.path = \"x.####.exr\""),
     ("--frames 3-4", "input.frames = \"3-4\""),
     ("--width 7", "image.width = 7"),
@@ -59,6 +59,7 @@ const FLAGS: [(&str, &str); 41] = [
     ("--no-mmap", "input.mmap = false"),
     ("--follow-links", "input.follow_links = true"),
     ("--where x>2", "select.where = \"x>2\""),
+    ("--topology a.gro", "input.topology = \"a.gro\""),
     ("--parts a,b", "input.parts = [\"a\", \"b\"]"),
     ("--accelerator bvh", "render.accelerator = \"bvh\""),
     ("--memory-limit 4GiB", "render.memory_limit = \"4GiB\""),
@@ -108,7 +109,7 @@ fn every_option_is_a_key() {
 }
 
 /// Options whose `[default: ...]` is no value that could be given.
-const WORDS: [&str; 11] = [
+const WORDS: [&str; 12] = [
     "where",
     "crop",
     "dpi",
@@ -116,6 +117,7 @@ const WORDS: [&str; 11] = [
     "memory-limit",
     "memory-ceiling",
     "parts",
+    "topology",
     "color_by",
     "range",
     "color_scale",

@@ -62,6 +62,10 @@ impl JobManifest {
         };
         let paths = SequenceInput::from_paths(paths);
         let mut sequence = in_thread(|| Sequence::open_with(&paths, settings))?;
+        if let Some(topology) = &input.topology {
+            let path = self.base.join(topology);
+            in_thread(|| sequence.add_topology(&path))?;
+        }
         if let Some(parts) = &input.parts {
             sequence.keep_parts(parts)?;
         }

@@ -74,6 +74,11 @@ section! {
         ///
         /// Without it, a list may only name files in its own directory and in those below.
         follow_links: bool = false, affects(Affects::Nothing), flag("follow-links", "", "Input");
+        /// File with the properties of the atoms of a trajectory: .gro, .pdb, .psf or other
+        ///
+        /// Elements and other attributes that do not change are added to all frames. The file has as many atoms as
+        /// they have, in the same order.
+        topology: Option<String> = None, example("\"conf.gro\""), unset("none"), flag("topology", "FILE", "Input");
         /// Particle radius: a length, auto, or { attribute = "radius", scale = 1.0 }
         ///
         /// `auto` takes the radius from the files. Without one, it is half the typical distance between neighbours

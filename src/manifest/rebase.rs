@@ -59,6 +59,9 @@ impl Manifest {
             path: output,
             reason,
         })?;
+        if let Some(path) = &mut self.input.topology {
+            *path = rebased(path, from, to)?;
+        }
         if let Some(path) = &mut self.environment.image {
             *path = rebased(path, from, to)?;
         }
@@ -161,6 +164,7 @@ mod tests {
         manifest.input.path.push("/abs/x.vtk".to_owned());
         manifest.input.path.push("../up/./x.vtk".to_owned());
         manifest.job.stop_file = Some("control/stop".to_owned());
+        manifest.input.topology = Some("conf.gro".to_owned());
         manifest.meshes = vec![Mesh {
             path: MeshPath::parse("walls.##.stl").unwrap(),
             ..Mesh::default()
@@ -173,6 +177,7 @@ mod tests {
             ["../data/dump.#.vtk", "/abs/x.vtk", "../../up/x.vtk"]
         );
         assert_eq!(manifest.output.path.as_str(), "frame.####.exr");
+        assert_eq!(manifest.input.topology.as_deref(), Some("../conf.gro"));
         assert_eq!(manifest.meshes[0].path.as_str(), "../walls.##.stl");
         assert_eq!(
             manifest.job.stop_file_in(there),

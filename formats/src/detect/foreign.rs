@@ -67,18 +67,6 @@ const MAGICS: &[(&[u8], &str)] = &[
         b" BDV",
         "an OpenVDB volume, which is not read; export the points as .ply or .bgeo",
     ),
-    (
-        b"CDF\x01",
-        "a NetCDF file, which is not read; export as .vtu or .npy",
-    ),
-    (
-        b"CDF\x02",
-        "a NetCDF file, which is not read; export as .vtu or .npy",
-    ),
-    (
-        b"CDF\x05",
-        "a NetCDF file, which is not read; export as .vtu or .npy",
-    ),
     (b"\x76\x2f\x31\x01", IMAGE),
     (b"\x89PNG", IMAGE),
     (b"\xff\xd8\xff", IMAGE),
@@ -88,10 +76,6 @@ const MAGICS: &[(&[u8], &str)] = &[
     (b"8BPS", IMAGE),
     (b"DDS ", IMAGE),
     (b"#?RADIANCE", IMAGE),
-    (b"\0\0\x07\xcb", TRAJECTORY),
-    (b"\0\0\x07\xc9\0\0\0\x0d", TRAJECTORY),
-    (b"\x54\0\0\0CORD", DCD),
-    (b"\0\0\0\x54CORD", DCD),
     (
         b"\x08\0\0\0HEAD",
         "a binary snapshot of Gadget, which is not read; write positions and attributes to .npz with pynbody or yt",
@@ -130,8 +114,6 @@ const MAGICS: &[(&[u8], &str)] = &[
 
 const IMAGE: &str = "an image, not a particle file";
 const ARCHIVE: &str = "an archive, which is not read; unpack it and give its files";
-const TRAJECTORY: &str = "a GROMACS trajectory (.xtc, .trr), which is not read; write .xyz with MDAnalysis, VMD or OVITO";
-const DCD: &str = "a DCD trajectory, which is not read; write .xyz with MDAnalysis, VMD or OVITO";
 const USD: &str = "a USD file, which is not read; export the points as .ply or .bgeo";
 const DUALSPHYSICS: &str =
     "a DualSPHysics binary part (.bi4), which is not read; `PartVTK` writes .vtk or .csv from it";
@@ -139,8 +121,7 @@ const GADGET: &str = "a binary snapshot of Gadget, which is not read; write posi
                       or yt";
 const PDB: &str = "a PDB particle file, which is not read; convert to .bgeo with partio";
 const UTF16: &str = "UTF-16 text, which is not read; save as UTF-8";
-const LAMMPS_BINARY: &str =
-    "a LAMMPS binary dump, which is not read; run `binary2txt` on it, or dump to a text file";
+const LAMMPS_BINARY: &str = "a LAMMPS binary dump without names of columns, which is not read; run `binary2txt` on it, or dump to a text file";
 const XDMF: &str = "an XDMF index, which keeps its data in other files; save as .vtu with ParaView";
 const HOUDINI_JSON: &str = "the newer Houdini bgeo in JSON, which is not read; save as .bhclassic";
 

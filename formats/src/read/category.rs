@@ -70,6 +70,11 @@ pub(in crate::read) fn code(name: &[u8]) -> i64 {
     }
 }
 
+/// Whether `code` is that of a chemical element.
+pub(in crate::read) fn is_element(code: i64) -> bool {
+    code < i64::from(FIRST_OTHER)
+}
+
 /// The hash of Fowler, Noll and Vo, 32 bits.
 fn fnv1a(bytes: &[u8]) -> u32 {
     bytes.iter().fold(0x811c_9dc5, |hash, byte| {

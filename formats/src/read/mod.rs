@@ -4,21 +4,31 @@
 //! holds a window of the file in memory. They trust none of it: they check every count against the bytes that are
 //! there, or against a budget, before they allocate.
 
+pub mod amber;
+mod atoms;
 pub mod bgeo;
 mod category;
 pub(crate) mod columns;
 pub mod csv;
 #[cfg(test)]
 mod damage;
+pub mod dcd;
+pub mod gro;
 pub mod gsd;
 #[cfg(feature = "hdf5")]
 pub mod hdf5;
 mod input;
 pub mod lammps;
+pub mod mmcif;
+#[cfg(test)]
+mod molecule_tests;
 pub mod npy;
+mod numbers;
+pub mod pdb;
 #[cfg(test)]
 mod pieces;
 pub mod ply;
+pub(crate) mod psf;
 mod remarks;
 pub(crate) mod sniff;
 mod source;
@@ -26,8 +36,11 @@ mod table;
 pub(crate) mod text;
 #[cfg(test)]
 mod text_samples;
+pub mod trr;
 pub mod vtk;
 pub mod vtk_xml;
+mod xdr;
+pub mod xtc;
 pub mod xyz;
 
 pub(crate) use input::{TextInput, stream_bytes};

@@ -19,3 +19,14 @@ pub(super) fn unused_cell(periodic: Option<&str>) -> String {
         "the cell of the simulation{boundaries} is not used: particles are drawn where the file has them"
     )
 }
+
+/// The units of a format, which are not converted.
+pub(super) fn units(length: &str, velocity: Option<&str>, time: Option<&str>) -> String {
+    let velocity = velocity.map_or_else(String::new, |unit| format!(", velocities in {unit}"));
+    let time = time.map_or_else(String::new, |unit| format!(", times in {unit}"));
+    format!("units of the format: lengths in {length}{velocity}{time}")
+}
+
+/// The remark that a file has names of atoms but no elements.
+pub(super) const GUESSED_ELEMENTS: &str =
+    "attribute `element` has the atomic numbers that follow from the names of the atoms";

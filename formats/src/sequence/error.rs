@@ -78,6 +78,9 @@ pub enum SequenceError {
     /// A list of files, such as a `.pvd`, that cannot be used.
     #[error(transparent)]
     List(FrameError),
+    /// A topology that cannot be used.
+    #[error(transparent)]
+    Topology(FrameError),
     /// A list names a file outside its directory.
     #[error(
         "{}: line {line}: `{}` is outside the directory of the list; allow it with --follow-links \

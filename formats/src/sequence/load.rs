@@ -76,7 +76,10 @@ impl Sequence {
                 false => self.budget,
             };
             let (file, step) = self.file_of(part, budget)?;
-            let particles = file.read(step)?;
+            let mut particles = file.read(step)?;
+            if let Some(topology) = &self.topology {
+                topology.add_to(&mut particles, file.path())?;
+            }
             read_bytes += particles.byte_len();
             notes.extend_from_slice(file.notes());
             all_bytes += file.unpacked_len();

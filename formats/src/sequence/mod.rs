@@ -26,6 +26,7 @@ mod name;
 mod notes;
 mod pattern;
 mod scan;
+mod topology;
 
 #[doc(hidden)]
 pub use collection::lists_of;
@@ -44,6 +45,7 @@ use load::{CachedFile, stamp};
 use name::FileName;
 use notes::{note_gaps, note_missing_parts};
 use pattern::Pattern;
+use topology::Topology;
 
 /// One file of a frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -102,6 +104,7 @@ pub struct Sequence {
     budget: MemoryBudget,
     /// The lists that the frames come from, if there are some.
     lists: Option<ListedFiles>,
+    topology: Option<Topology>,
 }
 
 impl Sequence {
@@ -174,6 +177,7 @@ impl Sequence {
             cache: Mutex::new(None),
             budget,
             lists: Some(expansion.lists),
+            topology: None,
         }
     }
 
@@ -193,6 +197,7 @@ impl Sequence {
             cache: Mutex::new(cache),
             budget,
             lists: None,
+            topology: None,
         }
     }
 
@@ -265,6 +270,17 @@ impl Sequence {
         Ok(())
     }
 
+    /// Adds to all frames the properties of their atoms that the file at `path` has and they have not: elements, residues
+    /// and others that do not change. The file is a PSF, or has any format with particles.
+    ///
+    /// # Errors
+    /// The file cannot be read. A frame with another number of atoms fails when it is loaded.
+    pub fn add_topology(&mut self, path: &Path) -> Result<(), SequenceError> {
+        let topology = Topology::open(path, self.budget);
+        self.topology = Some(topology.map_err(SequenceError::Topology)?);
+        Ok(())
+    }
+
     /// Keeps only the frames for which `keep` is true.
     pub fn keep_frames(&mut self, keep: impl FnMut(&SequenceFrame) -> bool) {
         self.frames.retain(keep);
@@ -302,12 +318,12 @@ impl Sequence {
         self.lone_file(index).filter(is_native)
     }
 
-    /// The file of frame `index` if that is all there is of the frame, and nothing else in the file.
+    /// The file of frame `index` if that is all there is of the frame, and nothing else in the file. None with a topology.
     pub fn lone_file(&self, index: usize) -> Option<&Path> {
         let [part] = self.frames.get(index)?.parts.as_slice() else {
             return None;
         };
-        let is_alone = self.parts.len() < 2 && part.step.is_none();
+        let is_alone = self.parts.len() < 2 && part.step.is_none() && self.topology.is_none();
         is_alone.then_some(&part.path)
     }
 }

@@ -23,7 +23,7 @@ pub use packed::{compressed, npz, open};
 pub type Target = fn(&[u8]) -> usize;
 
 /// Every target by the name of its folder in `corpus`.
-pub const TARGETS: [(&str, Target); 18] = [
+pub const TARGETS: [(&str, Target); 26] = [
     ("vtk", vtk),
     ("vtk_xml", vtk_xml),
     ("bgeo", bgeo),
@@ -34,6 +34,14 @@ pub const TARGETS: [(&str, Target); 18] = [
     ("npz", npz),
     ("csv", csv),
     ("gsd", gsd),
+    ("gro", gro),
+    ("xtc", xtc),
+    ("trr", trr),
+    ("dcd", dcd),
+    ("amber", amber),
+    ("pdb", pdb),
+    ("mmcif", mmcif),
+    ("lammps_binary", lammps_binary),
     ("hdf5", hdf5),
     ("open", open),
     ("compressed", compressed),
@@ -51,6 +59,8 @@ const EXPANSION: u64 = 8;
 /// What the tightest packing that is read gives for a byte: xz, then deflate.
 const XZ_RATIO: u64 = 16_384;
 const DEFLATE_RATIO: u64 = 1032;
+/// An atom of an `.xtc` file has two bits at least.
+const XTC_RATIO: u64 = 8;
 /// Headers that stand for values without bytes in the file (a radius common to all).
 const SLACK: u64 = 4096;
 
@@ -108,6 +118,46 @@ pub fn csv(bytes: &[u8]) -> usize {
 /// GSD.
 pub fn gsd(bytes: &[u8]) -> usize {
     read_all(read::gsd::FORMAT, bytes, 1)
+}
+
+/// GROMACS text.
+pub fn gro(bytes: &[u8]) -> usize {
+    read_all(read::gro::FORMAT, bytes, 1)
+}
+
+/// GROMACS trajectories of compressed positions.
+pub fn xtc(bytes: &[u8]) -> usize {
+    read_all(read::xtc::FORMAT, bytes, XTC_RATIO)
+}
+
+/// GROMACS trajectories of positions, velocities and forces.
+pub fn trr(bytes: &[u8]) -> usize {
+    read_all(read::trr::FORMAT, bytes, 1)
+}
+
+/// DCD.
+pub fn dcd(bytes: &[u8]) -> usize {
+    read_all(read::dcd::FORMAT, bytes, 1)
+}
+
+/// AMBER NetCDF.
+pub fn amber(bytes: &[u8]) -> usize {
+    read_all(read::amber::FORMAT, bytes, 1)
+}
+
+/// Protein Data Bank files.
+pub fn pdb(bytes: &[u8]) -> usize {
+    read_all(read::pdb::FORMAT, bytes, 1)
+}
+
+/// mmCIF.
+pub fn mmcif(bytes: &[u8]) -> usize {
+    read_all(read::mmcif::FORMAT, bytes, 1)
+}
+
+/// LAMMPS binary dumps.
+pub fn lammps_binary(bytes: &[u8]) -> usize {
+    read_all(read::lammps::BINARY, bytes, 1)
 }
 
 /// HDF5.

@@ -152,9 +152,7 @@ pub(super) fn steps(file: &GsdFile<'_>, budget: MemoryBudget) -> Result<Vec<Step
             step.number = step.number.or(initial);
         }
     }
-    if !steps.is_sorted_by(|a, b| a.number < b.number) {
-        steps.iter_mut().for_each(|step| step.number = None);
-    }
+    Step::keep_increasing_numbers(&mut steps);
     Ok(steps)
 }
 

@@ -81,8 +81,8 @@ impl Bounds {
         }
     }
 
-    /// `lo` and `hi` are those of the axis-parallel box around the tilted one.
-    fn triclinic(lo: DVec3, hi: DVec3, [xy, xz, yz]: [f64; 3]) -> Self {
+    /// `lo` and `hi` are those of the axis-parallel box around the tilted one, tilt factors are xy, xz and yz.
+    pub(super) fn triclinic(lo: DVec3, hi: DVec3, [xy, xz, yz]: [f64; 3]) -> Self {
         let shifts = [0.0, xy, xz, xy + xz];
         let lowest = |shifts: &[f64]| shifts.iter().copied().fold(0.0, f64::min);
         let highest = |shifts: &[f64]| shifts.iter().copied().fold(0.0, f64::max);

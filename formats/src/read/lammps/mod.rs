@@ -1,7 +1,7 @@
 //! LAMMPS text dumps (`dump custom` and `dump atom`), one or many steps a file.
 //!
-//! The layout is that of the `dump` and `dump_modify` pages of the LAMMPS manual. Binary dumps are
-//! another format and refused by name.
+//! The layout is that of the `dump` and `dump_modify` pages of the LAMMPS manual, and LIGGGHTS writes the same. Binary
+//! dumps are another format (`binary`).
 
 use std::collections::HashSet;
 
@@ -18,16 +18,22 @@ use crate::format::Format;
 use crate::reader::{Confidence, Reader, StreamUnit};
 use crate::{MemoryBudget, ParseError, Positions, RawParticles};
 
+mod binary;
 mod bounds;
 mod columns;
 mod header;
 mod remarks;
 
+pub use binary::FORMAT as BINARY;
+use bounds::Bounds;
 use columns::DumpColumns;
 use header::{DumpHeader, DumpItem};
 
 /// What every header line begins with.
 const ITEM: &[u8] = b"ITEM:";
+
+/// What binary dumps begin with, after its length.
+const MAGICS: [&[u8]; 2] = [b"DUMPATOM", b"DUMPCUSTOM"];
 
 /// LAMMPS text dumps.
 pub const FORMAT: Format = Format::new(&Lammps);
@@ -289,7 +295,7 @@ fn check_start(text: &mut TextInput<'_>) -> Result<(), ParseError> {
 fn not_a_dump(bytes: &[u8]) -> ParseError {
     let head = bytes.get(..64).unwrap_or(bytes);
     // A binary dump may begin with the name of its style.
-    if [&b"DUMPATOM"[..], b"DUMPCUSTOM"]
+    if MAGICS
         .iter()
         .any(|magic| memmem::find(head, magic).is_some())
     {

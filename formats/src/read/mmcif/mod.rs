@@ -1,0 +1,126 @@
+//! mmCIF files of the Protein Data Bank: the loop `_atom_site`, one or many models.
+//!
+//! [`tokens`] splits lines into values. The loop begins with the names of its columns; its rows are values in this order,
+//! whatever the line breaks. Lengths are A. After the PDBx/mmCIF dictionary.
+
+use super::atoms::{self, AtomTable, ELEMENT, RESIDUE};
+use super::sniff::is_text;
+use super::text;
+use super::{ByteSource, CUT_SHORT, Step, remarks};
+use crate::format::Format;
+use crate::reader::{Confidence, Reader, StreamUnit};
+use crate::{MemoryBudget, ParseError, RawParticles};
+
+mod rows;
+mod tokens;
+
+use rows::AtomRows;
+
+/// mmCIF files.
+pub const FORMAT: Format = Format::new(&MmCif);
+
+struct MmCif;
+
+impl Reader for MmCif {
+    fn name(&self) -> &'static str {
+        "mmcif"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["cif", "mmcif"]
+    }
+
+    /// Files of the older dictionary, for crystals, begin alike; reading them gives the error.
+    fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
+        let mut lines = text::Lines::new(head, 0..head.len())
+            .map(|line| line.text)
+            .filter(|line| !line.trim_ascii().is_empty() && !line.starts_with(b"#"));
+        let is_cif = is_text(head)
+            && lines.next().is_some_and(|line| line.starts_with(b"data_"))
+            && lines.any(|line| line.starts_with(b"_"));
+        Ok(Confidence::signature_if(is_cif))
+    }
+
+    fn may_hold_many_steps(&self) -> bool {
+        true
+    }
+
+    fn stream_unit(&self, _head: &[u8]) -> Option<StreamUnit> {
+        Some(StreamUnit::Words)
+    }
+
+    /// One step for each model, whose atoms are one after another.
+    fn steps(
+        &self,
+        source: &mut ByteSource<'_>,
+        budget: MemoryBudget,
+    ) -> Result<Vec<Step>, ParseError> {
+        let text = source.text();
+        let mut steps: Vec<Step> = Vec::new();
+        let mut rows = AtomRows::find(text, budget)?;
+        let mut model = None;
+        // A damaged row ends the last step, and is found again when that is read.
+        while let Ok(Some(row)) = rows.next(text) {
+            if steps.is_empty() || row.model != model {
+                model = row.model;
+                if let Some(last) = steps.last_mut() {
+                    last.end_at(row.at);
+                }
+                Step::push(&mut steps, row.at..row.at, budget)?;
+                if let Some(step) = steps.last_mut() {
+                    step.number = row.model;
+                }
+            }
+        }
+        match steps.last_mut() {
+            Some(last) => last.end_at(text.at()),
+            None => Step::push(&mut steps, 0..text.at(), budget)?,
+        }
+        Step::keep_increasing_numbers(&mut steps);
+        Ok(steps)
+    }
+
+    fn read(
+        &self,
+        source: &mut ByteSource<'_>,
+        step: &Step,
+        budget: MemoryBudget,
+    ) -> Result<RawParticles, ParseError> {
+        let text = source.text();
+        let mut rows = AtomRows::find(text, budget)?;
+        let range = step.byte_range().cloned().unwrap_or_default();
+        if range.start > text.at() {
+            rows.go_to(text, range.start);
+        }
+        let real = [("occupancy", 1), ("b_factor", 1)];
+        let mut atoms = AtomTable::new(&[ELEMENT, RESIDUE], &real, budget);
+        let mut model = None;
+        while let Some(row) = rows.next(text)? {
+            if *model.get_or_insert(row.model) != row.model {
+                break;
+            }
+            let element = atoms::element(&row.symbol, &row.name, &row.residue_name);
+            let whole = [element, row.residue.unwrap_or_default()];
+            let real = [row.occupancy.unwrap_or(1.0), row.b_factor.unwrap_or(0.0)];
+            atoms.push(row.position, &whole, &real)?;
+        }
+        let (positions, attributes) = atoms.into_parts();
+        Ok(RawParticles {
+            positions,
+            attributes,
+            time: None,
+            step: step.number,
+        })
+    }
+
+    fn remarks(&self, _head: &[u8]) -> Vec<String> {
+        vec![
+            remarks::units("angstroms", None, None),
+            remarks::unused_cell(None),
+        ]
+    }
+}
+
+fn cut_short(at: usize, what: &str) -> ParseError {
+    ParseError::malformed(at, format!("{what}: {CUT_SHORT}"))
+}

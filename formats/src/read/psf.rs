@@ -1,0 +1,121 @@
+//! PSF files of CHARMM and X-PLOR: the properties of the atoms of a simulation, without positions.
+//!
+//! Text. The first line begins with `PSF`. Behind a count and `!NATOM` is a line for each atom: number, segment, residue,
+//! name of the residue, name, type, charge, mass. Nothing else of it is read. After the manual of CHARMM.
+
+use super::atoms::{self, ELEMENT, RESIDUE};
+use super::text::{self, Lines};
+use crate::{Attribute, AttributeData, MemoryBudget, ParseError};
+
+/// What follows the count in the heading of the atoms.
+const ATOMS: &[u8] = b"!NATOM";
+
+/// Whether a file that begins with `head` is a PSF file.
+pub(crate) fn is_psf(head: &[u8]) -> bool {
+    head.strip_prefix(b"PSF")
+        .is_some_and(|rest| rest.first().is_none_or(u8::is_ascii_whitespace))
+}
+
+/// Reads the number of atoms and their properties.
+///
+/// # Errors
+/// [`ParseError`] if the file is damaged, or its atoms need more memory than `budget` allows.
+pub(crate) fn read(
+    bytes: &[u8],
+    budget: MemoryBudget,
+) -> Result<(usize, Vec<Attribute>), ParseError> {
+    let mut lines = Lines::new(bytes, 0..bytes.len());
+    let heading = lines.find(|line| text::words(line.text).nth(1).is_some_and(|w| w == ATOMS));
+    let Some(heading) = heading else {
+        let what = "a PSF file without a line `12 !NATOM`";
+        return Err(ParseError::malformed(bytes.len(), what));
+    };
+    let count = text::words(heading.text).next().and_then(text::integer);
+    let Some(count) = count.and_then(|count| usize::try_from(count).ok()) else {
+        let what = format!("{} is not a number of atoms", text::shown(heading.text));
+        return Err(ParseError::malformed(heading.at, what));
+    };
+    // A line of an atom has 15 bytes at least.
+    let most = count.min(bytes.len() / 15);
+    budget.check(24 * most as u64, "its numbers in memory are")?;
+    let (mut elements, mut residues) = (Vec::new(), Vec::new());
+    let (mut charges, mut masses) = (Vec::new(), Vec::new());
+    for index in 0..count {
+        let line = lines.next();
+        let words: Vec<&[u8]> = line
+            .map(|line| text::words(line.text).take(8).collect())
+            .unwrap_or_default();
+        let numbers = match *words.as_slice() {
+            [_, _, residue, residue_name, name, _, charge, mass] => {
+                elements.push(code(atoms::element(b"", name, residue_name)));
+                residues.push(code(text::integer(residue).unwrap_or_default()));
+                text::number(charge).zip(text::number(mass))
+            }
+            _ => None,
+        };
+        let Some((charge, mass)) = numbers else {
+            let at = line.map_or(bytes.len(), |line| line.at);
+            let what = format!(
+                "{count} atoms expected, line {} of them is not one with number, segment, residue, its name, name, \
+                 type, charge and mass",
+                index + 1
+            );
+            return Err(ParseError::malformed(at, what));
+        };
+        charges.push(charge);
+        masses.push(mass);
+    }
+    let attribute = |name: &str, data| Attribute {
+        name: name.to_owned(),
+        components: 1,
+        data,
+    };
+    let attributes = vec![
+        attribute(ELEMENT, AttributeData::I32(elements)),
+        attribute(RESIDUE, AttributeData::I32(residues)),
+        attribute("charge", AttributeData::F64(charges)),
+        attribute("mass", AttributeData::F64(masses)),
+    ];
+    Ok((count, attributes))
+}
+
+fn code(number: i64) -> i32 {
+    i32::try_from(number).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "PSF EXT\n\n 1 !NTITLE\n* made by hand\n\n 2 !NATOM\n \
+        1 SYS 7 SOL OW OT -0.834 15.9994 0\n 2 SYS 7 SOL HW1 HT 0.417 1.008 0\n\n 1 !NBOND\n";
+
+    fn fails(from: &str, to: &str, words: &str) {
+        let text = TEXT.replace(from, to);
+        let error = read(text.as_bytes(), MemoryBudget::UNLIMITED).expect_err("damaged");
+        assert!(error.to_string().contains(words), "{error}");
+    }
+
+    #[test]
+    fn atoms_have_elements_charges_and_masses() {
+        assert!(is_psf(TEXT.as_bytes()) && !is_psf(b"PSFX"));
+        let (count, attributes) = read(TEXT.as_bytes(), MemoryBudget::UNLIMITED).unwrap();
+        assert_eq!(count, 2);
+        let data = |i: usize| &attributes[i].data;
+        assert_eq!(data(0), &AttributeData::I32(vec![8, 1]));
+        assert_eq!(data(1), &AttributeData::I32(vec![7, 7]));
+        assert_eq!(data(2), &AttributeData::F64(vec![-0.834, 0.417]));
+        assert_eq!(data(3), &AttributeData::F64(vec![15.9994, 1.008]));
+    }
+
+    #[test]
+    fn damage_is_named() {
+        fails("2 !NATOM", "x !NATOM", "not a number of atoms");
+        fails("2 !NATOM", "3 !NATOM", "3 atoms expected, line 3");
+        fails("2 !NATOM", "2000000000 !NATOM", "line 3");
+        fails("!NATOM", "!ATOM", "without a line");
+        fails("15.9994", "heavy", "line 1 of them");
+        let tight = MemoryBudget::new(10, "take care");
+        assert!(read(TEXT.as_bytes(), tight).is_err());
+    }
+}

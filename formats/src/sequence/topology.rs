@@ -1,0 +1,65 @@
+//! Properties of the atoms of a trajectory that are in another file: its topology.
+
+use std::path::{Path, PathBuf};
+
+use crate::open::{FrameFile, read_whole};
+use crate::read::psf;
+use crate::{Attribute, FrameError, MemoryBudget, ParseError, RawParticles};
+
+/// Properties of a topology that change with time.
+const CHANGING: [&str; 2] = ["velocity", "force"];
+
+/// The properties of all atoms, in the order of the trajectory.
+#[derive(Debug)]
+pub(super) struct Topology {
+    path: PathBuf,
+    /// Atoms.
+    count: usize,
+    attributes: Vec<Attribute>,
+}
+
+impl Topology {
+    /// Reads the file at `path`, of which the first step counts.
+    pub(super) fn open(path: &Path, budget: MemoryBudget) -> Result<Self, FrameError> {
+        let (count, mut attributes) = if psf::is_psf(&crate::open::head(path)?) {
+            let bytes = read_whole(path, budget.for_content())?;
+            psf::read(&bytes, budget).map_err(|e| e.in_file(path))?
+        } else {
+            let particles = FrameFile::open_within(path, budget)?.read(0)?;
+            (particles.positions.len(), particles.attributes)
+        };
+        attributes.retain(|attribute| !CHANGING.contains(&attribute.name.as_str()));
+        Ok(Self {
+            path: path.to_owned(),
+            count,
+            attributes,
+        })
+    }
+
+    /// Adds the properties that `particles` of the file at `path` do not have.
+    pub(super) fn add_to(
+        &self,
+        particles: &mut RawParticles,
+        path: &Path,
+    ) -> Result<(), FrameError> {
+        let count = particles.positions.len();
+        if count != self.count {
+            let what = format!(
+                "{count} atoms, but the topology {} has {}; give the topology of this simulation",
+                self.path.display(),
+                self.count
+            );
+            return Err(ParseError::malformed(0, what).in_file(path));
+        }
+        for attribute in &self.attributes {
+            let is_known = particles
+                .attributes
+                .iter()
+                .any(|known| known.name == attribute.name);
+            if !is_known {
+                particles.attributes.push(attribute.clone());
+            }
+        }
+        Ok(())
+    }
+}
