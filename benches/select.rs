@@ -91,5 +91,6 @@ fn particles(count: usize) -> RawParticles {
         ],
         time: None,
         step: None,
+        cell: None,
     }
 }

@@ -81,7 +81,7 @@ pub(super) fn path(
 /// The eyes of stereo pairs.
 pub(super) fn stereo(manifest: &Manifest) -> Option<StereoSettings> {
     let camera = &manifest.camera;
-    camera.stereo.then(|| StereoSettings {
+    camera.stereo.then_some(StereoSettings {
         eye_distance: camera.eye_distance,
         convergence: match camera.projection {
             ProjectionKind::Equirectangular => Convergence::Parallel,

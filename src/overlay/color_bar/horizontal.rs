@@ -39,9 +39,9 @@ impl ColorBar {
             }
         };
         // As many labels as there is space for
-        let ticks = (2..=9).rev().map(|most| self.ticks_with(most));
+        let mut ticks = (2..=9).rev().map(|most| self.ticks_with(most));
         let fits = |ticks: &Ticks| is_spaced(ticks, length, pen);
-        let ticks = ticks.clone().find(fits).or_else(|| ticks.last());
+        let ticks = ticks.clone().find(fits).or_else(|| ticks.next_back());
         let ticks = ticks.unwrap_or_default();
         // Labels may reach beyond the ends
         let (mut before, mut after) = (0.0_f32, 0.0_f32);

@@ -1,10 +1,5 @@
 //! Camera rays, and the depth of their intersections along the view axis.
 
-#![expect(
-    clippy::needless_range_loop,
-    reason = "one index for the lanes of many arrays"
-)]
-
 use glam::Vec3;
 
 use super::frame::disc;

@@ -73,6 +73,7 @@ impl Shape for RodSurface<'_> {
             normal,
             shading: normal,
             lift: 0.0,
+            radius: f32::INFINITY,
             particle: tree.rods[rod as usize].particles[half],
             offset: OFFSET * largest,
             anchor: point.as_vec3(),

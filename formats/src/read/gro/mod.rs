@@ -151,6 +151,7 @@ fn read(
         attributes,
         time,
         step: number,
+        cell: None,
     })
 }
 

@@ -236,6 +236,8 @@ impl<'a> Frame<'a> {
             count: self.count,
             count_at: self.count_at,
             bounds: Some(self.bounds),
+            // It decides only about the cell, which is not read here
+            periodic: [true; 3],
             names_at: self.names_at,
             names: self.names.clone(),
         };

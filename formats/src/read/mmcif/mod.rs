@@ -110,6 +110,7 @@ impl Reader for MmCif {
             attributes,
             time: None,
             step: step.number,
+            cell: None,
         })
     }
 

@@ -171,5 +171,6 @@ fn read(
         attributes,
         time: None,
         step: step.number,
+        cell: None,
     })
 }

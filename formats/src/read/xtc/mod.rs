@@ -95,6 +95,7 @@ impl Reader for Xtc {
             attributes: Vec::new(),
             time: Some(frame.summary.time),
             step: Some(frame.summary.number.into()),
+            cell: None,
         })
     }
 
