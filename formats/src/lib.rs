@@ -41,7 +41,10 @@ pub mod write;
 pub use attribute::{Attribute, AttributeData};
 pub use budget::MemoryBudget;
 pub use error::{FrameError, ParseError};
-pub use frame::{FARTHEST, ParticleFrame, Positions, Radius, RawParticles, is_near, is_radius};
+pub use frame::{
+    FARTHEST, ParticleFrame, PositionSlice, Positions, Radius, RawParticles, find_radius, is_near,
+    is_radius,
+};
 pub use message::{escape_controls, is_control};
 pub use open::FrameFile;
 pub use origin::choose_origin;

@@ -1,14 +1,14 @@
 //! First stage: reads the files of a frame into the form that tree and shading need.
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 use glam::Vec3;
 use spherule_formats::sequence::Sequence;
-use spherule_formats::{FrameError, ParticleFrame};
+use spherule_formats::{FrameError, ParticleFrame, PositionSlice, RawParticles};
 
-use super::ImageTask;
 use super::decoded::{DecodedFrame, particle_with_id};
 use super::facts::FileFacts;
 use super::in_place::{Opened, StoredFrame};
@@ -17,18 +17,19 @@ use super::meshes::{MeshSlices, meshes_of};
 use super::motion::velocities_to_next;
 use super::predict::{FrameSize, MemoryModel};
 use super::setup::Setup;
+use super::{ImageTask, SharedFrame};
 use crate::metrics::memory::{available, process_room};
 use crate::overlay::Overlay;
 
 /// A frame before its tree is built.
 #[derive(Debug)]
-pub struct LoadedFrame {
+pub struct LoadedFrame<'a> {
     /// The image to be made.
     pub task: ImageTask,
     /// Notes for the user.
     pub notes: Vec<String>,
     /// The particles.
-    pub particles: LoadedParticles,
+    pub particles: LoadedParticles<'a>,
     /// The meshes of the image, one for each of the setup.
     pub meshes: Vec<MeshSlices>,
     /// What overlays show of the file.
@@ -47,14 +48,14 @@ pub struct LoadedFrame {
 
 /// The particles of a frame.
 #[derive(Debug)]
-pub enum LoadedParticles {
+pub enum LoadedParticles<'a> {
     /// In memory.
-    Decoded(DecodedFrame),
+    Decoded(DecodedFrame<'a>),
     /// In a native frame, to be traced in place.
     Stored(StoredFrame),
 }
 
-impl LoadedParticles {
+impl LoadedParticles<'_> {
     /// Particle count.
     pub fn count(&self) -> u64 {
         match self {
@@ -72,14 +73,14 @@ pub fn load_frame(
     setup: &Setup,
     sequence: &Sequence,
     task: &ImageTask,
-) -> Result<LoadedFrame, LoadError> {
+) -> Result<LoadedFrame<'static>, LoadError> {
     let start = Instant::now();
     let mut notes = Vec::new();
     // Trace a native frame in place if possible; otherwise decode the frame
     let opened = StoredFrame::open(setup, sequence, task.index);
     let mut loaded = match opened.map_err(|e| newest(e, sequence, task))? {
         Opened::InPlace(frame, clamped_radii) => LoadedFrame {
-            facts: frame.facts(setup, file_name(sequence, task.index)),
+            facts: frame.facts(setup, without_directory(&first_file(sequence, task.index))),
             time: sequence.listed_time(task.index).or(frame.time()),
             task: task.clone(),
             notes,
@@ -95,22 +96,7 @@ pub fn load_frame(
             decode(setup, sequence, task, notes)?
         }
     };
-    loaded.note_count(
-        loaded.dropped,
-        "particles left out: a coordinate is not finite or too far away",
-    );
-    loaded.note_count(
-        loaded.clamped_radii,
-        "radii raised: too small to be seen, or no number",
-    );
-    loaded.note_absent_parts(setup);
-    loaded.notes.extend(missing_glyphs(setup));
-    loaded.meshes = meshes_of(
-        &setup.picture.meshes,
-        setup.picture.shutter,
-        task,
-        &mut loaded.notes,
-    )?;
+    loaded.finish(setup)?;
     loaded.read_time = start.elapsed();
     Ok(loaded)
 }
@@ -121,30 +107,62 @@ fn decode(
     sequence: &Sequence,
     task: &ImageTask,
     mut notes: Vec<String>,
-) -> Result<LoadedFrame, LoadError> {
+) -> Result<LoadedFrame<'static>, LoadError> {
     check_memory(setup, sequence, task)?;
     let loaded = sequence.load_measured(task.index);
     let loaded = loaded.map_err(|e| newest(LoadError::Frame(e), sequence, task))?;
     notes.extend(loaded.notes);
     let frame = ParticleFrame::from_raw(loaded.particles, setup.picture.origin);
-    let (time, dropped) = (frame.time, frame.dropped);
-    let file = first_file(sequence, task.index);
-    let focus = focus_point(setup, &frame, &file)?;
+    let frame = frame.with_positions(Cow::Owned);
     let moving = match setup.picture.shutter {
         Some(shutter) if !shutter.has_velocities => {
             Some(velocities_to_next(setup, shutter, sequence, task, &frame)?)
         }
         _ => None,
     };
-    let facts = FileFacts::of_decoded(setup, &frame, file_name(sequence, task.index));
-    let (mut decoded, clamped_radii) = DecodedFrame::of(setup, frame, task.frame, &file)?;
-    if moving.is_some() {
-        decoded.shading.velocities = moving;
+    let file = first_file(sequence, task.index);
+    let mut loaded = decoded(setup, task, frame, &file)?;
+    loaded.notes = notes;
+    if let (Some(moving), LoadedParticles::Decoded(frame)) = (moving, &mut loaded.particles) {
+        frame.shading.velocities = Some(moving);
     }
+    Ok(loaded)
+}
+
+/// Prepares particles in memory for the image of `task`; `name` stands for their file. There is no next frame, so
+/// motion blur needs velocities.
+///
+/// # Errors
+/// Same as [`load_frame`].
+pub fn load_particles<'a>(
+    setup: &Setup,
+    particles: RawParticles<PositionSlice<'a>>,
+    name: &str,
+    task: &ImageTask,
+) -> Result<LoadedFrame<'a>, LoadError> {
+    let start = Instant::now();
+    let frame = ParticleFrame::borrowed(particles, setup.picture.origin);
+    let mut loaded = decoded(setup, task, frame, name)?;
+    loaded.finish(setup)?;
+    loaded.read_time = start.elapsed();
+    Ok(loaded)
+}
+
+/// Extracts from `frame`, which was read from `file`, what the image of `task` needs.
+fn decoded<'a>(
+    setup: &Setup,
+    task: &ImageTask,
+    frame: SharedFrame<'a>,
+    file: &str,
+) -> Result<LoadedFrame<'a>, LoadError> {
+    let (time, dropped) = (frame.time, frame.dropped);
+    let focus = focus_point(setup, &frame, file)?;
+    let facts = FileFacts::of_decoded(setup, &frame, without_directory(file));
+    let (particles, clamped_radii) = DecodedFrame::of(setup, frame, task.frame, file)?;
     Ok(LoadedFrame {
         task: task.clone(),
-        notes,
-        particles: LoadedParticles::Decoded(decoded),
+        notes: Vec::new(),
+        particles: LoadedParticles::Decoded(particles),
         meshes: Vec::new(),
         facts,
         time,
@@ -169,17 +187,16 @@ fn missing_glyphs(setup: &Setup) -> Option<String> {
     })
 }
 
-/// Name of the first file of a frame, without its directory.
-fn file_name(sequence: &Sequence, index: usize) -> String {
-    let path = first_file(sequence, index);
-    let name = Path::new(&path).file_name();
-    name.map_or(path.clone(), |name| name.to_string_lossy().into_owned())
+/// The name of `file` without its directory.
+fn without_directory(file: &str) -> String {
+    let name = Path::new(file).file_name();
+    name.map_or(file.to_owned(), |name| name.to_string_lossy().into_owned())
 }
 
 /// The position of the particle in focus, relative to the origin; None if the camera does not follow one.
 fn focus_point(
     setup: &Setup,
-    frame: &ParticleFrame,
+    frame: &SharedFrame<'_>,
     file: &str,
 ) -> Result<Option<Vec3>, LoadError> {
     let Some(id) = setup.focused_particle() else {
@@ -194,7 +211,28 @@ fn focus_point(
     }
 }
 
-impl LoadedFrame {
+impl LoadedFrame<'_> {
+    /// Adds notes for the user, and reads the meshes.
+    fn finish(&mut self, setup: &Setup) -> Result<(), LoadError> {
+        self.note_count(
+            self.dropped,
+            "particles left out: a coordinate is not finite or too far away",
+        );
+        self.note_count(
+            self.clamped_radii,
+            "radii raised: too small to be seen, or no number",
+        );
+        self.note_absent_parts(setup);
+        self.notes.extend(missing_glyphs(setup));
+        self.meshes = meshes_of(
+            &setup.picture.meshes,
+            setup.picture.shutter,
+            &self.task,
+            &mut self.notes,
+        )?;
+        Ok(())
+    }
+
     /// Notes parts with a material of their own that no particle has.
     fn note_absent_parts(&mut self, setup: &Setup) {
         let known = &setup.picture.scene.parts;
