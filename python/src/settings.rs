@@ -18,7 +18,7 @@ pub(crate) fn overrides(json: &str) -> Result<Vec<Override>, Failure> {
     for (section, value) in sections {
         match value {
             // One for each key, so that a section may be divided among dicts
-            Value::Object(keys) if !section.contains('.') => {
+            Value::Object(keys) if !section.contains('.') && !keys.is_empty() => {
                 for (key, value) in keys {
                     all.push((format!("{section}.{key}"), value));
                 }

@@ -35,7 +35,7 @@ def test_channels_and_layers_are_views_that_keep_the_picture_alive(ball, small):
         radius=0.3,
         attributes={"speed": speed, "id": np.arange(100, dtype=np.uint32)},
         color={"attribute": "speed", "map": "viridis"},
-        channels=["Z", "N", "id", "diffuse", "speed"],
+        channels=["Z", "N", "id", "diffuse", "attribute:speed"],
         **small,
     )
     shapes = {name: plane.shape for name, plane in image.planes.items()}
