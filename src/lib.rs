@@ -4,22 +4,54 @@
 //! `spherule-formats` turns bytes into frames and knows nothing about rays. `spherule-jobs` plans, records and resumes
 //! work and does not know what the work is. This crate connects the two; neither depends on it.
 //!
-//! This example builds a tree over two spheres and traces one ray:
+//! This example renders positions in memory to planes, and to the bytes of an EXR and a PNG, without files:
 //!
 //! ```
-//! use glam::Vec3;
-//! use spherule::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder};
-//! use spherule::ray::Ray;
+//! use std::sync::atomic::AtomicBool;
 //!
-//! let centers = [Vec3::ZERO, Vec3::new(3.0, 0.0, 0.0)];
-//! let spheres = Spheres { centers: &centers, radius: SphereRadius::Common(0.5) };
-//! let mut builder = TreeBuilder::new();
-//! builder.build(&spheres, &BuildSettings::default());
-//! let tree = builder.tree().view();
-//! let hit = tree.nearest(&Ray::new(Vec3::new(-2.0, 0.0, 0.0), Vec3::X)).expect("a hit");
-//! assert_eq!(hit.t, 1.5);
-//! assert_eq!(tree.particle(hit.slot), 0);
+//! use spherule::prelude::*;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! // A cube of 1000 particles with one attribute
+//! let at = |i: u16| Vec3::new(f32::from(i % 10), f32::from(i / 10 % 10), f32::from(i / 100));
+//! let positions: Vec<Vec3> = (0..1000).map(at).collect();
+//! let height: Vec<f32> = positions.iter().map(|p| p.z).collect();
+//!
+//! // Settings are those of a manifest; the rest is automatic
+//! let settings = StillSettings::parse(
+//!     r#"
+//!     image = { width = 64, height = 36, samples = 4 }
+//!     input.radius = 0.5
+//!     material.color = { attribute = "height", map = "viridis" }
+//!     output.channels = ["Z", "id"]
+//!     "#,
+//! )?;
+//! let particles = Particles {
+//!     attributes: vec![scalar("height", height)],
+//!     ..particles(PositionSlice::F32(&positions))
+//! };
+//!
+//! // Another thread may raise the flag to stop
+//! let image = render(&settings, particles, &AtomicBool::new(false))?;
+//!
+//! let film: &Film = image.film();
+//! let depth = film.depth.as_ref().expect("requested");
+//! assert!(film.color[32 + 18 * 64][3] > 0.9 && depth[32 + 18 * 64].is_finite());
+//! assert_eq!(image.to_exr()?[..4], [0x76, 0x2f, 0x31, 0x01]);
+//! assert_eq!(image.to_png()?[..4], *b"\x89PNG");
+//! # Ok(())
+//! # }
 //! ```
+//!
+//! [`still`] has the details, [`job`] runs whole jobs, and [`accel`] has trees for other programs.
+//!
+//! # Versions
+//!
+//! The version numbers follow semantic versioning: before 1.0, a new minor version may change the interface, and a
+//! patch version does not. The interface is what [`prelude`], [`still`], [`job`] and [`manifest`] export, and the public
+//! items of `spherule-formats` and `spherule-jobs`. All other modules are public for programs that need them, and may
+//! change with any version. Manifests, plans and native frames of earlier versions stay readable. The same input gives
+//! the same bytes in all patch versions, and the changelog names every change of an image.
 #![deny(unsafe_code)]
 
 pub mod accel;
@@ -39,6 +71,7 @@ pub mod output;
 pub mod overlay;
 pub mod picture;
 pub mod pipeline;
+pub mod prelude;
 pub mod ray;
 pub mod reading;
 pub mod render;
@@ -48,6 +81,7 @@ pub mod resolve;
 pub mod scale;
 pub mod scene;
 pub mod selection;
+pub mod still;
 pub mod surface;
 pub mod survey;
 #[cfg(feature = "reports")]

@@ -1,6 +1,9 @@
 //! One time step in memory: [`RawParticles`] as a reader returns them, and [`ParticleFrame`] as the renderer
 //! needs them (finite, f32, relative to the origin of the sequence).
 
+use std::borrow::Cow;
+use std::ops::Deref;
+
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -66,11 +69,43 @@ impl Positions {
     }
 }
 
-/// All data of one step as a reader returns it: unfiltered, in file order.
+/// Positions that belong to a caller, world units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(missing_docs, reason = "the same as of `Positions`")]
+pub enum PositionSlice<'a> {
+    F32(&'a [Vec3]),
+    F64(&'a [DVec3]),
+}
+
+impl PositionSlice<'_> {
+    /// Particle count.
+    pub const fn len(&self) -> usize {
+        match self {
+            Self::F32(v) => v.len(),
+            Self::F64(v) => v.len(),
+        }
+    }
+
+    /// True if there are no positions.
+    pub const fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// A copy.
+    pub fn to_positions(&self) -> Positions {
+        match self {
+            Self::F32(v) => Positions::F32(v.to_vec()),
+            Self::F64(v) => Positions::F64(v.to_vec()),
+        }
+    }
+}
+
+/// All data of one step as a reader returns it: unfiltered, in file order. The positions may belong to a caller, as
+/// [`PositionSlice`].
 #[derive(Debug, Clone, PartialEq)]
-pub struct RawParticles {
+pub struct RawParticles<P = Positions> {
     /// Positions in the precision of the file.
-    pub positions: Positions,
+    pub positions: P,
     /// All other numeric per-particle data; each attribute has exactly one value group per particle.
     pub attributes: Vec<Attribute>,
     /// Simulation time, if the file has it.
@@ -79,6 +114,19 @@ pub struct RawParticles {
     pub step: Option<i64>,
     /// The simulation cell, if the file has it.
     pub cell: Option<SimulationCell>,
+}
+
+impl RawParticles<PositionSlice<'_>> {
+    /// A copy that owns its positions.
+    pub fn to_owned_particles(&self) -> RawParticles {
+        RawParticles {
+            positions: self.positions.to_positions(),
+            attributes: self.attributes.clone(),
+            time: self.time,
+            step: self.step,
+            cell: self.cell,
+        }
+    }
 }
 
 impl RawParticles {
@@ -143,11 +191,12 @@ pub enum Radius {
     PerParticle(Vec<f32>),
 }
 
-/// The particles of one time step, ready for building a tree: every position is finite.
+/// The particles of one time step, ready for building a tree: every position is finite. The positions may belong to a
+/// caller, as `Cow<[Vec3]>`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ParticleFrame {
+pub struct ParticleFrame<P = Vec<Vec3>> {
     /// Positions relative to `origin`, scene units.
-    pub positions: Vec<Vec3>,
+    pub positions: P,
     /// World position that `positions` are relative to; the same for a whole sequence.
     pub origin: DVec3,
     /// Radii, if the file has them (an attribute named `radius` or `pscale`, or half of a `diameter`). `None`
@@ -183,55 +232,9 @@ pub fn is_radius(radius: f32) -> bool {
 impl ParticleFrame {
     /// Drops and counts particles that are not [near](is_near), subtracts `origin` in f64 and rounds to f32.
     pub fn from_raw(raw: RawParticles, origin: DVec3) -> Self {
-        let RawParticles {
-            positions,
-            mut attributes,
-            time,
-            step: _,
-            cell,
-        } = raw;
-        // Find the particles to keep
-        let relative = relative_positions(positions, origin);
-        let keep: Vec<bool> = relative.iter().map(is_near).collect();
-        let kept = keep.iter().filter(|k| **k).count();
-        let dropped = (relative.len() - kept) as u64;
-        // Keep the arrays if no particle is dropped
-        if dropped == 0 {
-            let radius = find_radius(&attributes);
-            return Self {
-                positions: relative,
-                origin,
-                radius,
-                attributes,
-                time,
-                cell,
-                dropped,
-                file_index: None,
-            };
-        }
-        // Remove the dropped particles
-        for attribute in &mut attributes {
-            attribute.data.retain_particles(attribute.components, &keep);
-        }
-        let mut positions = Vec::with_capacity(kept);
-        let mut file_index = Vec::with_capacity(kept);
-        for (index, position) in relative.into_iter().enumerate() {
-            if keep[index] {
-                positions.push(position);
-                file_index.push(u32::try_from(index).unwrap_or(u32::MAX));
-            }
-        }
-        let radius = find_radius(&attributes);
-        Self {
-            positions,
-            origin,
-            radius,
-            attributes,
-            time,
-            cell,
-            dropped,
-            file_index: Some(file_index),
-        }
+        let relative = Cow::Owned(relative_positions(raw.positions, origin));
+        ParticleFrame::kept(relative, raw.attributes, raw.time, raw.cell, origin)
+            .with_positions(Cow::into_owned)
     }
 
     /// Same as [`Self::from_raw`] for the particles with these indices, which are ascending. `file_index` has them.
@@ -247,7 +250,81 @@ impl ParticleFrame {
         });
         frame
     }
+}
 
+impl<'a> ParticleFrame<Cow<'a, [Vec3]>> {
+    /// Same as [`ParticleFrame::from_raw`], of positions that belong to a caller. They are not copied if they are in
+    /// single precision, the origin is zero, and no particle is dropped.
+    pub fn borrowed(raw: RawParticles<PositionSlice<'a>>, origin: DVec3) -> Self {
+        let relative = match raw.positions {
+            PositionSlice::F32(v) if origin == DVec3::ZERO => Cow::Borrowed(v),
+            PositionSlice::F32(v) => {
+                let moved = v.par_iter().map(|p| (p.as_dvec3() - origin).as_vec3());
+                Cow::Owned(moved.collect())
+            }
+            PositionSlice::F64(v) => {
+                Cow::Owned(v.par_iter().map(|p| (p - origin).as_vec3()).collect())
+            }
+        };
+        Self::kept(relative, raw.attributes, raw.time, raw.cell, origin)
+    }
+
+    /// The particles that are near, with `relative` positions.
+    fn kept(
+        relative: Cow<'a, [Vec3]>,
+        mut attributes: Vec<Attribute>,
+        time: Option<f64>,
+        cell: Option<SimulationCell>,
+        origin: DVec3,
+    ) -> Self {
+        // Keep the arrays if no particle is dropped
+        let (mut positions, mut file_index, mut dropped) = (relative, None, 0);
+        if !positions.iter().all(is_near) {
+            let keep: Vec<bool> = positions.iter().map(is_near).collect();
+            for attribute in &mut attributes {
+                attribute.data.retain_particles(attribute.components, &keep);
+            }
+            let count = keep.iter().filter(|k| **k).count();
+            let mut indices = Vec::with_capacity(count);
+            let mut near = Vec::with_capacity(count);
+            for (index, position) in positions.iter().enumerate().filter(|(i, _)| keep[*i]) {
+                near.push(*position);
+                indices.push(u32::try_from(index).unwrap_or(u32::MAX));
+            }
+            dropped = (positions.len() - count) as u64;
+            positions = Cow::Owned(near);
+            file_index = Some(indices);
+        }
+        Self {
+            positions,
+            origin,
+            radius: find_radius(&attributes),
+            attributes,
+            time,
+            cell,
+            dropped,
+            file_index,
+        }
+    }
+}
+
+impl<P> ParticleFrame<P> {
+    /// The same frame with its positions in another type.
+    pub fn with_positions<Q>(self, convert: impl FnOnce(P) -> Q) -> ParticleFrame<Q> {
+        ParticleFrame {
+            positions: convert(self.positions),
+            origin: self.origin,
+            radius: self.radius,
+            attributes: self.attributes,
+            time: self.time,
+            cell: self.cell,
+            dropped: self.dropped,
+            file_index: self.file_index,
+        }
+    }
+}
+
+impl<P: Deref<Target = [Vec3]>> ParticleFrame<P> {
     /// The attribute called `name`: an exact match, else one that ignores case.
     pub fn attribute(&self, name: &str) -> Option<&Attribute> {
         let exact = self.attributes.iter().find(|a| a.name == name);
@@ -283,7 +360,7 @@ fn relative_positions(positions: Positions, origin: DVec3) -> Vec<Vec3> {
     }
 }
 
-/// The radii, by the names that simulations and Houdini use.
+/// The radii among `attributes`, by the names that simulations and Houdini use.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "radii are f32 in the renderer"

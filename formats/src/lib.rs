@@ -44,7 +44,8 @@ pub use budget::MemoryBudget;
 pub use cell::SimulationCell;
 pub use error::{FrameError, ParseError};
 pub use frame::{
-    FARTHEST, ParticleFrame, Positions, Radius, RawParticles, find_radius, is_near, is_radius,
+    FARTHEST, ParticleFrame, PositionSlice, Positions, Radius, RawParticles, find_radius, is_near,
+    is_radius,
 };
 pub use message::{escape_controls, is_control};
 pub use open::FrameFile;

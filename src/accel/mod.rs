@@ -4,6 +4,23 @@
 //! cache line over blocks of 16 particles. It is rebuilt for every frame in buffers that are reused, it is traced
 //! through a [`view::TreeView`], and it is described by one [`BuildReport`]. This module knows nothing about shading,
 //! files or jobs.
+//!
+//! This example builds a tree over two spheres and traces one ray:
+//!
+//! ```
+//! use glam::Vec3;
+//! use spherule::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder};
+//! use spherule::ray::Ray;
+//!
+//! let centers = [Vec3::ZERO, Vec3::new(3.0, 0.0, 0.0)];
+//! let spheres = Spheres { centers: &centers, radius: SphereRadius::Common(0.5) };
+//! let mut builder = TreeBuilder::new();
+//! builder.build(&spheres, &BuildSettings::default());
+//! let tree = builder.tree().view();
+//! let hit = tree.nearest(&Ray::new(Vec3::new(-2.0, 0.0, 0.0), Vec3::X)).expect("a hit");
+//! assert_eq!(hit.t, 1.5);
+//! assert_eq!(tree.particle(hit.slot), 0);
+//! ```
 
 use glam::Vec3;
 

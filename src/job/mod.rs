@@ -49,6 +49,7 @@ mod manifest_file;
 mod meshes;
 mod render_job;
 mod render_run;
+mod scene_files;
 mod selection;
 mod target;
 
@@ -59,6 +60,7 @@ pub use follow::{FollowEnd, Follower};
 pub use manifest_file::{JobManifest, is_schema, schema_text};
 pub use render_job::{RenderJob, require_one_fits};
 pub use render_run::RenderRun;
+pub use scene_files::SceneFiles;
 pub use selection::{Shard, ShardError, frames_in};
 pub use target::KIND;
 

@@ -1,27 +1,21 @@
 //! A render job before anything is written: manifest, directory, frames, and the setup of its images.
 
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, OnceLock};
 
 use serde_json::Value;
 use spherule_formats::Sequence;
 use spherule_jobs::{FrameRequest, Job, JobRequest, Plan, ResumeMode};
 
 use super::manifest_file::{JobManifest, ManifestFile};
-use super::meshes::{self, JobMeshes, identity};
+use super::scene_files::SceneFiles;
 use super::selection::{frame_requests, frames_in, indices, select};
 use super::target::{check_output_dir, stored_survey};
 use super::{RunError, Shard, in_thread};
-use crate::hdr::{HdrError, read_radiance_map, read_texture};
-use crate::manifest::{GROUND_IMAGE, Manifest, named_place};
+use crate::manifest::Manifest;
 use crate::metrics::memory::available;
 use crate::pipeline::{FrameSize, ImageTask, MemoryModel, NextMeshes, Schedule, Setup};
 use crate::report::job::{HTML_FILE, JSON_FILE};
-use crate::resolve::{
-    self, add_ground_image, add_meshes, check_views, needs_environment_image, question,
-    with_framed_meshes,
-};
-use crate::scene::{RadianceMap, Texture};
+use crate::resolve::question;
 use crate::survey::Survey;
 
 /// A render job before anything is written.
@@ -33,11 +27,7 @@ pub struct RenderJob {
     /// The output path of the given manifest.
     shown_output: PathBuf,
     shard: Option<Shard>,
-    /// See [`RenderJob::environment_image`].
-    environment_image: OnceLock<Option<RadianceMap>>,
-    /// See [`RenderJob::ground_image`].
-    ground_image: OnceLock<Option<Arc<Texture>>>,
-    meshes: JobMeshes,
+    files: SceneFiles,
 }
 
 impl RenderJob {
@@ -54,14 +44,13 @@ impl RenderJob {
         requested.manifest.check_frame_count(frames.len())?;
         let shown_output = PathBuf::from(requested.manifest.output.path.as_str());
         let (manifest_file, manifest) = ManifestFile::new(requested)?;
+        let files = SceneFiles::new(manifest_file.dir());
         Ok(Self {
             manifest,
             manifest_file,
             shown_output,
             shard,
-            environment_image: OnceLock::new(),
-            ground_image: OnceLock::new(),
-            meshes: JobMeshes::default(),
+            files,
         })
     }
 
@@ -184,7 +173,7 @@ impl RenderJob {
     /// The settings of the images. Those with the same effect as in the existing plan are written as in the plan.
     fn settings(&self, mode: ResumeMode) -> Result<Vec<(String, String)>, RunError> {
         let mut settings = self.manifest.settings();
-        let identities = self.file_identities()?;
+        let identities = self.files.identities(&self.manifest)?;
         identify(&mut settings, &identities);
         let Some(planned) = self.existing_plan(mode)? else {
             return Ok(settings);
@@ -203,25 +192,9 @@ impl RenderJob {
         })
     }
 
-    /// Fingerprints of the files that all images depend on, by the keys of their paths: the files may be moved.
-    fn file_identities(&self) -> Result<Vec<(String, String)>, RunError> {
-        let mut identities = meshes::identities(&self.manifest, self.dir())?;
-        if let Some(path) = self.environment_path() {
-            let found = identity(&path).map_err(|source| HdrError::Io { path, source })?;
-            identities.push(("environment.image".to_owned(), found));
-        }
-        if let Some(path) = self.ground_path() {
-            let found = identity(&path);
-            let found =
-                found.map_err(|source| RunError::GroundImage(HdrError::Io { path, source }))?;
-            identities.push((GROUND_IMAGE.to_owned(), found));
-        }
-        Ok(identities)
-    }
-
     /// The files of the meshes that only `frame` has.
     fn mesh_files(&self, frame: i64) -> Vec<PathBuf> {
-        meshes::frame_files(&self.manifest, self.dir(), frame)
+        self.files.frame_meshes(&self.manifest, frame)
     }
 
     /// The meshes that those of the frame with `index` move to, with motion blur.
@@ -295,54 +268,9 @@ impl RenderJob {
         Ok((survey, setup))
     }
 
-    /// The setup, if the view is valid along the whole camera path.
     fn setup(&self, survey: &Survey, sequence: &Sequence) -> Result<Setup, RunError> {
         let frames = sequence.frames().iter().map(|frame| frame.number);
-        let map = self.environment_image()?;
-        let meshes = self.meshes.get(&self.manifest, self.dir(), survey)?;
-        let survey = with_framed_meshes(survey, &self.manifest, &meshes);
-        let mut setup = resolve::setup(&self.manifest, &survey, map)?;
-        if let Some(texture) = self.ground_image()? {
-            add_ground_image(&mut setup, &self.manifest, texture);
-        }
-        add_meshes(&mut setup, &self.manifest, &survey, meshes);
-        check_views(&setup, frames)?;
-        Ok(setup)
-    }
-
-    /// The path of the image of the environment, if there is one.
-    fn environment_path(&self) -> Option<PathBuf> {
-        let path = self.manifest.environment.image.as_ref()?;
-        // The directory may not exist yet, so that the system cannot follow `..` from it
-        needs_environment_image(&self.manifest).then(|| named_place(&self.dir().join(path)))
-    }
-
-    /// The image of the environment, if there is one, in the resolution of environments. Its file is read once.
-    fn environment_image(&self) -> Result<Option<&RadianceMap>, RunError> {
-        if let Some(map) = self.environment_image.get() {
-            return Ok(map.as_ref());
-        }
-        let path = self.environment_path();
-        let map = path.map(|path| read_radiance_map(&path)).transpose()?;
-        let reduced = map.map(|map| map.reduced());
-        Ok(self.environment_image.get_or_init(|| reduced).as_ref())
-    }
-
-    /// The path of the picture on the ground, if there is one.
-    fn ground_path(&self) -> Option<PathBuf> {
-        let image = self.manifest.ground_image()?;
-        Some(named_place(&self.dir().join(&image.path)))
-    }
-
-    /// The picture on the ground, if there is one. Its file is read once.
-    fn ground_image(&self) -> Result<Option<&Arc<Texture>>, RunError> {
-        if let Some(texture) = self.ground_image.get() {
-            return Ok(texture.as_ref());
-        }
-        let behind = self.manifest.render.ground_color;
-        let read = |path: PathBuf| read_texture(&path, behind).map_err(RunError::GroundImage);
-        let texture = self.ground_path().map(read).transpose()?.map(Arc::new);
-        Ok(self.ground_image.get_or_init(|| texture).as_ref())
+        self.files.setup(&self.manifest, survey, frames)
     }
 
     /// Notes for the user on the image of the environment, and on meshes that have been read for a setup.
@@ -350,17 +278,7 @@ impl RenderJob {
     /// # Errors
     /// The image cannot be read.
     pub fn scene_notes(&self) -> Result<Vec<String>, RunError> {
-        let negative = self.environment_image()?.map_or(0, RadianceMap::negative);
-        let note = |path: PathBuf| {
-            let path = path.display();
-            format!("{path}: {negative} pixels are negative, which counts as 0")
-        };
-        let path = self.environment_path().filter(|_| negative > 0);
-        Ok(path
-            .map(note)
-            .into_iter()
-            .chain(self.meshes.notes())
-            .collect())
+        self.files.notes(&self.manifest)
     }
 
     /// The setup with the survey that is stored in the plan.

@@ -10,7 +10,7 @@ pub mod view;
 pub use exr::{
     Compression, CustomAttribute, DEFAULT_LIGHT_GROUP, EncodedExr, ExrBlock, ExrLayout, ExrOptions,
     OutputError, PackBuffers, PackedBlock, PlaneNames, TextAttribute, ambiguous_name,
-    attribute_planes, encode_exr, pack_block, write_blocks, write_exr,
+    attribute_planes, encode_exr, layer_planes, pack_block, write_blocks, write_exr,
 };
 pub use preview::{PreviewOptions, encode_preview};
 pub use verify::{ImageFault, ImageShape, verify_exr, verify_preview};

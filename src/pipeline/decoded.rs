@@ -1,10 +1,13 @@
 //! Frames as plain particles in memory: those of other formats, and native frames that cannot be traced in place.
 
+use std::borrow::Cow;
+
 use glam::Vec3;
 use rayon::prelude::*;
 use spherule_formats::order::index_u32;
-use spherule_formats::{Attribute, AttributeData, ParticleFrame, Radius, is_radius};
+use spherule_formats::{Attribute, AttributeData, Radius, is_radius};
 
+use super::SharedFrame;
 use super::load_error::{LoadError, missing, no_parts};
 use super::setup::{ColorRule, OpacityRule, RadiusRule, Setup};
 use crate::scene::{PartMaterials, RgbEncoding};
@@ -12,9 +15,9 @@ use crate::survey::{ParticleValue, id_of, part_of, velocity_of};
 
 /// A frame in memory, before the tree is built.
 #[derive(Debug)]
-pub struct DecodedFrame {
-    /// Centres relative to the origin.
-    pub centers: Vec<Vec3>,
+pub struct DecodedFrame<'a> {
+    /// Centres relative to the origin. Those of a caller are copied only if they are changed.
+    pub centers: Cow<'a, [Vec3]>,
     /// Radii.
     pub radius: Radius,
     /// Attributes for shading.
@@ -41,12 +44,12 @@ pub struct DecodedShading {
     pub attributes: Vec<Vec<f32>>,
 }
 
-impl DecodedFrame {
+impl<'a> DecodedFrame<'a> {
     /// Extracts from `frame`, which was read from `file` and has this `number`, what `setup` needs. Also returns the
     /// number of radii that were raised.
     pub(super) fn of(
         setup: &Setup,
-        frame: ParticleFrame,
+        frame: SharedFrame<'a>,
         number: i64,
         file: &str,
     ) -> Result<(Self, u64), LoadError> {
@@ -131,7 +134,7 @@ impl DecodedFrame {
     }
 }
 
-impl DecodedFrame {
+impl DecodedFrame<'_> {
     /// Moves the particles `chosen` (ascending indices) behind all others; the order is otherwise unchanged. Returns
     /// the number of particles before them. If `ids` are needed, particles without an id get their position in the
     /// file as one.
@@ -141,7 +144,9 @@ impl DecodedFrame {
         if ids && shading.ids.is_none() && !chosen.is_empty() {
             shading.ids = Some((0..index_u32(count)).collect());
         }
-        move_to_end(&mut self.centers, chosen);
+        if !chosen.is_empty() {
+            move_to_end(self.centers.to_mut(), chosen);
+        }
         if let Radius::PerParticle(radii) = &mut self.radius {
             move_to_end(radii, chosen);
         }
@@ -211,7 +216,7 @@ impl DecodedShading {
 
 /// The attribute `name`; None in a frame without particles, which need not have any attributes.
 fn attribute<'a>(
-    frame: &'a ParticleFrame,
+    frame: &'a SharedFrame<'_>,
     name: &str,
     purpose: &'static str,
     file: &str,
@@ -225,7 +230,7 @@ fn attribute<'a>(
 }
 
 /// The radii of a frame, and the number of radii that were raised.
-fn radii(setup: &Setup, frame: &ParticleFrame, file: &str) -> Result<(Radius, u64), LoadError> {
+fn radii(setup: &Setup, frame: &SharedFrame<'_>, file: &str) -> Result<(Radius, u64), LoadError> {
     // Select the source of the radii
     let mut radius = match &setup.picture.radius {
         RadiusRule::Common(radius) => Radius::Common(*radius),
@@ -276,7 +281,7 @@ fn magnitudes(attribute: &Attribute, scale: f64) -> Vec<f32> {
 )]
 fn values_of(
     setup: &Setup,
-    frame: &ParticleFrame,
+    frame: &SharedFrame<'_>,
     number: i64,
     radius: &Radius,
     value: &ParticleValue,
@@ -356,7 +361,7 @@ fn component(attribute: Option<&Attribute>, c: usize) -> Vec<f32> {
 }
 
 /// The ids of the particles, or their positions in the file if particles between them were dropped.
-pub(super) fn ids(frame: &ParticleFrame) -> Option<Vec<u32>> {
+pub(super) fn ids(frame: &SharedFrame<'_>) -> Option<Vec<u32>> {
     let ids = id_of(&frame.attributes).and_then(|ids| low_bits(&ids.data));
     ids.or_else(|| frame.file_index.clone())
 }
@@ -389,7 +394,7 @@ fn low_bits(data: &AttributeData) -> Option<Vec<u32>> {
 }
 
 /// The index of the particle that has `id` in the `id` channel.
-pub(super) fn particle_with_id(frame: &ParticleFrame, id: u32) -> Option<usize> {
+pub(super) fn particle_with_id(frame: &SharedFrame<'_>, id: u32) -> Option<usize> {
     match ids(frame) {
         Some(ids) => ids.iter().position(|other| *other == id),
         None => usize::try_from(id)
@@ -419,7 +424,7 @@ mod tests {
         assert_eq!(frame.shading.ids, None);
         assert_eq!(frame.move_to_end(&[0, 3, 5], true), 3);
         let order = [1.0, 2.0, 4.0, 0.0, 3.0, 5.0];
-        assert_eq!(frame.centers, order.map(Vec3::splat));
+        assert_eq!(frame.centers[..], order.map(Vec3::splat));
         assert_eq!(frame.radius, Radius::PerParticle(order.to_vec()));
         assert_eq!(frame.shading.values, order);
         assert_eq!(frame.shading.colors, order.map(Vec3::splat));

@@ -1,6 +1,6 @@
 //! Encodes images, and publishes them under their final names.
 
-use std::io::{self, Seek, Write};
+use std::io::{self, Cursor, Seek, Write};
 use std::path::Path;
 use std::time::Instant;
 
@@ -12,7 +12,7 @@ use super::overlays;
 use super::renderer::TracedFrame;
 use super::setup::Setup;
 use crate::metrics::{MemoryPeaks, MemoryUse};
-use crate::output::{CustomAttribute, ExrOptions, encode_preview, write_exr};
+use crate::output::{CustomAttribute, ExrOptions, OutputError, encode_preview, write_exr};
 use crate::render::Film;
 use crate::report::FrameReport;
 use crate::report::frame::RssSummary;
@@ -68,6 +68,29 @@ pub(super) fn write_frame(
         anonymous: now.anonymous,
     };
     Ok((report, film))
+}
+
+impl TracedFrame {
+    /// The EXR as bytes, the same as a job writes.
+    ///
+    /// # Errors
+    /// The encoder fails.
+    pub fn to_exr(&self, setup: &Setup) -> Result<Vec<u8>, OutputError> {
+        let mut film = self.film.clone();
+        overlays::store(&mut film, &setup.overlays_of(self));
+        let mut file = Cursor::new(Vec::new());
+        write_exr(film, &exr_options(setup, self), &mut file)?;
+        Ok(file.into_inner())
+    }
+
+    /// The PNG as bytes, the same as a preview of a job.
+    ///
+    /// # Errors
+    /// The encoder fails.
+    pub fn to_png(&self, setup: &Setup) -> Result<Vec<u8>, OutputError> {
+        let options = setup.preview_from(&self.camera);
+        encode_preview(&self.film, &options, &setup.overlays_of(self))
+    }
 }
 
 /// Samples memory use during the first writes, when all buffers of the encoder exist.

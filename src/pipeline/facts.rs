@@ -1,8 +1,9 @@
 //! What overlays show of the file of a frame.
 
 use rayon::prelude::*;
-use spherule_formats::{Attribute, ParticleFrame};
+use spherule_formats::Attribute;
 
+use super::SharedFrame;
 use super::setup::Setup;
 use crate::survey::ParticleValue;
 
@@ -17,7 +18,7 @@ pub struct FileFacts {
 
 impl FileFacts {
     /// The facts of a decoded frame.
-    pub(super) fn of_decoded(setup: &Setup, frame: &ParticleFrame, file: String) -> Self {
+    pub(super) fn of_decoded(setup: &Setup, frame: &SharedFrame<'_>, file: String) -> Self {
         let range = |name: &String| match ParticleValue::named(name, &frame.attributes)? {
             ParticleValue::Magnitude(name) => {
                 let attribute = frame.attribute(&name)?;

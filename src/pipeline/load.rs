@@ -1,14 +1,14 @@
 //! First stage: reads the files of a frame into the form that tree and shading need.
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 use glam::Vec3;
 use spherule_formats::sequence::Sequence;
-use spherule_formats::{FrameError, ParticleFrame, RawParticles};
+use spherule_formats::{FrameError, ParticleFrame, PositionSlice, RawParticles};
 
-use super::ImageTask;
 use super::decoded::{DecodedFrame, particle_with_id};
 use super::facts::FileFacts;
 use super::in_place::{Opened, StoredFrame};
@@ -18,18 +18,19 @@ use super::motion::velocities_to_next;
 use super::predict::{FrameSize, MemoryModel};
 use super::rods::{FrameRods, rods_of};
 use super::setup::{Picture, Setup};
+use super::{ImageTask, SharedFrame};
 use crate::metrics::memory::{available, process_room};
 use crate::overlay::Overlay;
 
 /// A frame before its tree is built.
 #[derive(Debug)]
-pub struct LoadedFrame {
+pub struct LoadedFrame<'a> {
     /// The image to be made.
     pub task: ImageTask,
     /// Notes for the user.
     pub notes: Vec<String>,
     /// The particles.
-    pub particles: LoadedParticles,
+    pub particles: LoadedParticles<'a>,
     /// The meshes of the image, one for each of the setup.
     pub meshes: Vec<MeshSlices>,
     /// Rods next to the particles.
@@ -52,14 +53,14 @@ pub struct LoadedFrame {
 
 /// The particles of a frame.
 #[derive(Debug)]
-pub enum LoadedParticles {
+pub enum LoadedParticles<'a> {
     /// In memory.
-    Decoded(DecodedFrame),
+    Decoded(DecodedFrame<'a>),
     /// In a native frame, to be traced in place.
     Stored(StoredFrame),
 }
 
-impl LoadedParticles {
+impl LoadedParticles<'_> {
     /// Particle count.
     pub fn count(&self) -> u64 {
         match self {
@@ -77,7 +78,7 @@ pub fn load_frame(
     setup: &Setup,
     sequence: &Sequence,
     task: &ImageTask,
-) -> Result<LoadedFrame, LoadError> {
+) -> Result<LoadedFrame<'static>, LoadError> {
     let start = Instant::now();
     let mut notes = Vec::new();
     // Trace a native frame in place if possible; otherwise decode the frame
@@ -86,7 +87,7 @@ pub fn load_frame(
         Opened::InPlace(frame, clamped_radii) => LoadedFrame {
             read: frame.particles(),
             rods: rods_of(setup, None, task.frame, &mut notes),
-            facts: frame.facts(setup, file_name(sequence, task.index)),
+            facts: frame.facts(setup, without_directory(&first_file(sequence, task.index))),
             time: sequence.listed_time(task.index).or(frame.time()),
             task: task.clone(),
             notes,
@@ -102,22 +103,7 @@ pub fn load_frame(
             decode(setup, sequence, task, notes)?
         }
     };
-    loaded.note_count(
-        loaded.dropped,
-        "particles left out: a coordinate is not finite or too far away",
-    );
-    loaded.note_count(
-        loaded.clamped_radii,
-        "radii raised: too small to be seen, or no number",
-    );
-    loaded.note_absent_parts(setup);
-    loaded.notes.extend(missing_glyphs(setup));
-    loaded.meshes = meshes_of(
-        &setup.picture.meshes,
-        setup.picture.shutter,
-        task,
-        &mut loaded.notes,
-    )?;
+    loaded.finish(setup)?;
     loaded.read_time = start.elapsed();
     Ok(loaded)
 }
@@ -128,14 +114,60 @@ fn decode(
     sequence: &Sequence,
     task: &ImageTask,
     mut notes: Vec<String>,
-) -> Result<LoadedFrame, LoadError> {
+) -> Result<LoadedFrame<'static>, LoadError> {
     check_memory(setup, sequence, task)?;
     let loaded = sequence.load_measured(task.index);
     let loaded = loaded.map_err(|e| newest(LoadError::Frame(e), sequence, task))?;
     notes.extend(loaded.notes);
     let file = first_file(sequence, task.index);
     let read = loaded.particles.positions.len() as u64;
-    let frame = selected(setup, loaded.particles, &file)?;
+    let frame = selected(setup, loaded.particles, &file)?.with_positions(Cow::Owned);
+    let moving = match setup.picture.shutter {
+        Some(shutter) if !shutter.has_velocities => {
+            Some(velocities_to_next(setup, shutter, sequence, task, &frame)?)
+        }
+        _ => None,
+    };
+    let mut loaded = decoded(setup, task, frame, read, &file)?;
+    loaded.notes.splice(0..0, notes);
+    if let (Some(moving), LoadedParticles::Decoded(frame)) = (moving, &mut loaded.particles) {
+        frame.shading.velocities = Some(moving);
+    }
+    Ok(loaded)
+}
+
+/// Prepares particles in memory for the image of `task`; `name` stands for their file. There is no next frame, so
+/// motion blur needs velocities.
+///
+/// # Errors
+/// Same as [`load_frame`].
+pub fn load_particles<'a>(
+    setup: &Setup,
+    particles: RawParticles<PositionSlice<'a>>,
+    name: &str,
+    task: &ImageTask,
+) -> Result<LoadedFrame<'a>, LoadError> {
+    let start = Instant::now();
+    let read = particles.positions.len() as u64;
+    let frame = match setup.picture.selection.is_all() {
+        true => ParticleFrame::borrowed(particles, setup.picture.origin),
+        false => selected(setup, particles.to_owned_particles(), name)?.with_positions(Cow::Owned),
+    };
+    let mut loaded = decoded(setup, task, frame, read, name)?;
+    loaded.finish(setup)?;
+    loaded.read_time = start.elapsed();
+    Ok(loaded)
+}
+
+/// Extracts from `frame`, which was read from `file` with `read` particles, what the image of `task` needs.
+fn decoded<'a>(
+    setup: &Setup,
+    task: &ImageTask,
+    frame: SharedFrame<'a>,
+    read: u64,
+    file: &str,
+) -> Result<LoadedFrame<'a>, LoadError> {
+    let mut notes = Vec::new();
     if frame.is_empty() && read > 0 && frame.dropped == 0 {
         notes.push(format!(
             "frame {}: none of {read} particles is selected; see [select] and [[clip]]",
@@ -143,23 +175,14 @@ fn decode(
         ));
     }
     let (time, dropped) = (frame.time, frame.dropped);
-    let focus = focus_point(setup, &frame, &file)?;
-    let moving = match setup.picture.shutter {
-        Some(shutter) if !shutter.has_velocities => {
-            Some(velocities_to_next(setup, shutter, sequence, task, &frame)?)
-        }
-        _ => None,
-    };
+    let focus = focus_point(setup, &frame, file)?;
     let rods = rods_of(setup, frame.cell.as_ref(), task.frame, &mut notes);
-    let facts = FileFacts::of_decoded(setup, &frame, file_name(sequence, task.index));
-    let (mut decoded, clamped_radii) = DecodedFrame::of(setup, frame, task.frame, &file)?;
-    if moving.is_some() {
-        decoded.shading.velocities = moving;
-    }
+    let facts = FileFacts::of_decoded(setup, &frame, without_directory(file));
+    let (particles, clamped_radii) = DecodedFrame::of(setup, frame, task.frame, file)?;
     Ok(LoadedFrame {
         task: task.clone(),
         notes,
-        particles: LoadedParticles::Decoded(decoded),
+        particles: LoadedParticles::Decoded(particles),
         meshes: Vec::new(),
         rods,
         facts,
@@ -203,17 +226,16 @@ fn missing_glyphs(setup: &Setup) -> Option<String> {
     })
 }
 
-/// Name of the first file of a frame, without its directory.
-fn file_name(sequence: &Sequence, index: usize) -> String {
-    let path = first_file(sequence, index);
-    let name = Path::new(&path).file_name();
-    name.map_or(path.clone(), |name| name.to_string_lossy().into_owned())
+/// The name of `file` without its directory.
+fn without_directory(file: &str) -> String {
+    let name = Path::new(file).file_name();
+    name.map_or(file.to_owned(), |name| name.to_string_lossy().into_owned())
 }
 
 /// The position of the particle in focus, relative to the origin; None if the camera does not follow one.
 fn focus_point(
     setup: &Setup,
-    frame: &ParticleFrame,
+    frame: &SharedFrame<'_>,
     file: &str,
 ) -> Result<Option<Vec3>, LoadError> {
     let Some(id) = setup.focused_particle() else {
@@ -228,7 +250,28 @@ fn focus_point(
     }
 }
 
-impl LoadedFrame {
+impl LoadedFrame<'_> {
+    /// Adds notes for the user, and reads the meshes.
+    fn finish(&mut self, setup: &Setup) -> Result<(), LoadError> {
+        self.note_count(
+            self.dropped,
+            "particles left out: a coordinate is not finite or too far away",
+        );
+        self.note_count(
+            self.clamped_radii,
+            "radii raised: too small to be seen, or no number",
+        );
+        self.note_absent_parts(setup);
+        self.notes.extend(missing_glyphs(setup));
+        self.meshes = meshes_of(
+            &setup.picture.meshes,
+            setup.picture.shutter,
+            &self.task,
+            &mut self.notes,
+        )?;
+        Ok(())
+    }
+
     /// Notes parts with a material of their own that no particle has.
     fn note_absent_parts(&mut self, setup: &Setup) {
         let known = &setup.picture.scene.parts;

@@ -2,7 +2,11 @@
 //! pictures in advance. [`RenderWork`] runs the stages of several frames side by side; [`make_image`] renders one
 //! frame alone. Estimates of memory ([`MemoryModel`]) and time ([`probe`]) use the same parts.
 
+use std::borrow::Cow;
 use std::path::PathBuf;
+
+use glam::Vec3;
+use spherule_formats::ParticleFrame;
 
 mod decoded;
 mod encode;
@@ -34,7 +38,7 @@ mod work;
 pub use decoded::{DecodedFrame, DecodedShading};
 pub use error::{ImageError, WriteError};
 pub use in_place::{StoredFrame, StoredShading};
-pub use load::{LoadedFrame, LoadedParticles, load_frame};
+pub use load::{LoadedFrame, LoadedParticles, load_frame, load_particles};
 pub use load_error::LoadError;
 pub(crate) use load_error::attribute_list;
 pub use memory_limit::{MemoryLimitError, MemoryRemedy};
@@ -48,9 +52,12 @@ pub use setup::{
     AttributeChannel, ColorRule, OpacityRule, Picture, RadiusRule, RunSettings, Setup,
 };
 pub use shutter::{FrameStep, Shutter};
-pub use single::{PictureKind, make_image, make_picture};
+pub use single::{PictureKind, make_image, make_picture, trace_particles};
 pub use trace::{CpuRenderer, renderer_of};
 pub use work::RenderWork;
+
+/// A frame whose positions may belong to a caller.
+type SharedFrame<'a> = ParticleFrame<Cow<'a, [Vec3]>>;
 
 /// One image to render.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -1,21 +1,23 @@
 //! The motion of particles while the shutter is open: from their velocities, or from their places in the next frame.
 
+use std::borrow::Cow;
+
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use spherule_formats::ParticleFrame;
 use spherule_formats::order::index_u32;
 use spherule_formats::sequence::Sequence;
 
-use super::ImageTask;
 use super::decoded::{DecodedFrame, ids};
 use super::load_error::{LoadError, first_file, missing};
 use super::setup::Setup;
 use super::shutter::Shutter;
+use super::{ImageTask, SharedFrame};
 use crate::accel::moving::bounded;
 
 /// Moves the particles of `frame` to their places in the middle of the exposure. Returns by how far each of them moves
 /// from the opening of the shutter to its closing. Takes the velocities of the frame unless a channel needs them.
-pub(super) fn expose(setup: &Setup, shutter: Shutter, frame: &mut DecodedFrame) -> Vec<Vec3> {
+pub(super) fn expose(setup: &Setup, shutter: Shutter, frame: &mut DecodedFrame<'_>) -> Vec<Vec3> {
     let velocities = match setup.picture.render.channels.needs_velocities() {
         true => frame.shading.velocities.clone(),
         false => frame.shading.velocities.take(),
@@ -32,7 +34,7 @@ pub(super) fn expose(setup: &Setup, shutter: Shutter, frame: &mut DecodedFrame) 
         (0.5 * (shutter.open + shutter.close) * time) as f32,
         ((shutter.close - shutter.open) * time) as f32,
     ];
-    let centers = frame.centers.par_iter_mut();
+    let centers = frame.centers.to_mut().par_iter_mut();
     centers
         .zip(displacements.par_iter_mut())
         .for_each(|(center, velocity)| {
@@ -53,7 +55,7 @@ pub(super) fn velocities_to_next(
     shutter: Shutter,
     sequence: &Sequence,
     task: &ImageTask,
-    frame: &ParticleFrame,
+    frame: &SharedFrame<'_>,
 ) -> Result<Vec<Vec3>, LoadError> {
     // Read the other frame
     let is_last = task.index + 1 >= sequence.frames().len();
@@ -64,7 +66,8 @@ pub(super) fn velocities_to_next(
     };
     let loaded = sequence.load_measured(other_index);
     let loaded = loaded.map_err(LoadError::Frame)?;
-    let other = ParticleFrame::from_raw(loaded.particles, setup.picture.origin);
+    let other =
+        ParticleFrame::from_raw(loaded.particles, setup.picture.origin).with_positions(Cow::Owned);
     // Determine the time between the frames; files know it best
     let known = frame.time.zip(other.time).map(|(a, b)| b - a);
     let usual = match is_last {
@@ -73,7 +76,7 @@ pub(super) fn velocities_to_next(
     };
     let time = known.filter(|time| *time != 0.0).unwrap_or(usual);
     // Find each particle there
-    let ids_of = |frame: &ParticleFrame, index: usize| match ids(frame) {
+    let ids_of = |frame: &SharedFrame<'_>, index: usize| match ids(frame) {
         None if !frame.is_empty() => {
             let file = first_file(sequence, index);
             let has = frame.attributes.iter().map(|a| a.name.as_str());

@@ -106,7 +106,7 @@ pub trait FrameRenderer: Send + Sync {
     ///
     /// # Errors
     /// The frame cannot be rendered: damaged nodes, or a surface that does not fit.
-    fn prepare(&mut self, setup: &Setup, frame: LoadedFrame) -> Result<BuiltFrame, TraceError>;
+    fn prepare(&mut self, setup: &Setup, frame: LoadedFrame<'_>) -> Result<BuiltFrame, TraceError>;
 
     /// Renders `frame`, which must be the one prepared last.
     ///

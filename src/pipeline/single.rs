@@ -3,18 +3,19 @@
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use spherule_formats::Sequence;
+use spherule_formats::{PositionSlice, RawParticles, Sequence};
 use spherule_jobs::{catch_panic, publish};
 
 use super::ImageTask;
 use super::encode::write_frame;
 use super::error::{ImageError, WriteError};
-use super::load::load_frame;
+use super::load::{LoadedFrame, load_frame, load_particles};
+use super::load_error::LoadError;
 use super::renderer::TracedFrame;
 use super::setup::Setup;
 use super::trace::renderer_of;
 use crate::metrics::MemoryPeaks;
-use crate::output::encode_preview;
+use crate::render::Stop;
 use crate::report::FrameReport;
 
 /// The file format of a picture outside a job.
@@ -58,24 +59,50 @@ pub fn make_picture(
     })
 }
 
+/// Renders particles in memory to planes; `name` stands for their file. The tree copies the positions, and nothing
+/// else does if [`ParticleFrame::borrowed`](spherule_formats::ParticleFrame::borrowed) does not. Passes notes for the
+/// user to `note`.
+///
+/// # Errors
+/// See [`ImageError`]; [`RenderError::Interrupted`](crate::render::RenderError::Interrupted) if `stop` is raised.
+pub fn trace_particles(
+    setup: &Setup,
+    particles: RawParticles<PositionSlice<'_>>,
+    name: &str,
+    task: &ImageTask,
+    stop: &dyn Stop,
+    note: impl FnMut(String),
+) -> Result<TracedFrame, ImageError> {
+    let load = || load_particles(setup, particles, name, task);
+    catch_panic(|| trace(setup, load, stop, note))
+}
+
 fn trace_single(
     setup: &Setup,
     sequence: &Sequence,
     task: &ImageTask,
-    mut note: impl FnMut(String),
+    note: impl FnMut(String),
 ) -> Result<TracedFrame, ImageError> {
-    let mut report = |notes: &mut Vec<String>| notes.drain(..).for_each(&mut note);
     catch_panic(|| {
         task.check()?;
-        let mut frame = load_frame(setup, sequence, task)?;
-        report(&mut frame.notes);
-        // Build its tree, and trace the image
-        let mut tracer = renderer_of(setup.picture.renderer);
-        let mut built = tracer.prepare(setup, frame)?;
-        report(&mut built.notes);
         let stop = AtomicBool::new(false);
-        Ok(tracer.render(setup, built, &stop)?)
+        trace(setup, || load_frame(setup, sequence, task), &stop, note)
     })
+}
+
+/// Builds the tree of the frame that `load` returns, and traces its image.
+fn trace<'a>(
+    setup: &Setup,
+    load: impl FnOnce() -> Result<LoadedFrame<'a>, LoadError>,
+    stop: &dyn Stop,
+    mut note: impl FnMut(String),
+) -> Result<TracedFrame, ImageError> {
+    let mut frame = load()?;
+    frame.notes.drain(..).for_each(&mut note);
+    let mut tracer = renderer_of(setup.picture.renderer);
+    let mut built = tracer.prepare(setup, frame)?;
+    built.notes.drain(..).for_each(&mut note);
+    Ok(tracer.render(setup, built, stop)?)
 }
 
 fn write_exr(setup: &Setup, frame: TracedFrame) -> Result<FrameReport, ImageError> {
@@ -86,9 +113,7 @@ fn write_exr(setup: &Setup, frame: TracedFrame) -> Result<FrameReport, ImageErro
 /// Writes the preview of `frame` in place of its image.
 fn write_png(setup: &Setup, frame: &TracedFrame) -> Result<FrameReport, ImageError> {
     let start = Instant::now();
-    let options = setup.preview_from(&frame.camera);
-    let png = encode_preview(&frame.film, &options, &setup.overlays_of(frame))
-        .map_err(WriteError::Encode)?;
+    let png = frame.to_png(setup).map_err(WriteError::Encode)?;
     let path = frame.task.image.clone();
     publish(&path, &png).map_err(|source| WriteError::Io { path, source })?;
     let mut report = frame.report.clone();

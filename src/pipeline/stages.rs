@@ -53,7 +53,7 @@ impl ReadStage<'_> {
         Ok(())
     }
 
-    fn load(&self, task: &ImageTask) -> Result<LoadedFrame, ImageError> {
+    fn load(&self, task: &ImageTask) -> Result<LoadedFrame<'static>, ImageError> {
         task.check()?;
         let size = FrameSize::of_task(self.sequence, task, self.setup);
         let load = || load_frame(self.setup, self.sequence, task);
@@ -63,14 +63,14 @@ impl ReadStage<'_> {
 
 /// The channels from reading to tracing.
 pub(super) struct ToTrace {
-    pub(super) to_trace: SyncSender<StagedFrame<LoadedFrame>>,
+    pub(super) to_trace: SyncSender<StagedFrame<LoadedFrame<'static>>>,
     /// Signals that there is memory for another frame.
     pub(super) may_continue: Receiver<()>,
 }
 
 impl ToTrace {
     /// Sends the frame and waits until there is memory for another. Returns false once a later stage has ended.
-    fn send(&self, frame: StagedFrame<LoadedFrame>) -> bool {
+    fn send(&self, frame: StagedFrame<LoadedFrame<'static>>) -> bool {
         self.to_trace.send(frame).is_ok() && self.may_continue.recv().is_ok()
     }
 }
@@ -104,7 +104,7 @@ impl TraceStage<'_> {
     /// The neighbouring stages end when this one does, because it owns its ends of all channels.
     pub(super) fn run(
         &self,
-        loaded: Receiver<StagedFrame<LoadedFrame>>,
+        loaded: Receiver<StagedFrame<LoadedFrame<'static>>>,
         spare: Receiver<Film>,
         is_built: Option<SyncSender<()>>,
         next: SyncSender<StagedFrame<TracedFrame>>,

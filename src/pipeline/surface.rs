@@ -1,6 +1,7 @@
 //! The surfaces of a frame, as the setup requires: the spheres of its tree, or the additional structures that are
 //! built for other surfaces.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -70,7 +71,7 @@ impl SurfaceBuilder {
     pub(super) fn build(
         &mut self,
         setup: &Setup,
-        frame: &mut DecodedFrame,
+        frame: &mut DecodedFrame<'_>,
         trees: &mut TreeBuilder,
         report: &mut FrameReport,
     ) -> Result<Vec<String>, SmoothError> {
@@ -102,7 +103,7 @@ impl SurfaceBuilder {
             report.bytes.surface += self.build_unions(setup, frame)?;
         }
         if kind == SurfaceKind::Smooth || has_unions {
-            frame.centers = Vec::new();
+            frame.centers = Cow::Borrowed(&[]);
             frame.radius = Radius::Common(setup.picture.least_radius);
             self.displacements = Vec::new();
         }
@@ -127,8 +128,8 @@ impl SurfaceBuilder {
     fn build_slices(
         &mut self,
         setup: &Setup,
-        frame: &mut DecodedFrame,
-        mut build: impl FnMut(&mut Self, &DecodedFrame) -> Result<(), SmoothError>,
+        frame: &mut DecodedFrame<'_>,
+        mut build: impl FnMut(&mut Self, &DecodedFrame<'_>) -> Result<(), SmoothError>,
     ) -> Result<(), SmoothError> {
         let times = match setup.picture.shutter {
             Some(shutter) => slice_times(shutter.slices).collect(),
@@ -136,8 +137,11 @@ impl SurfaceBuilder {
         };
         let mut now = 0.0;
         for time in times {
-            for (center, displacement) in frame.centers.iter_mut().zip(&self.displacements) {
-                *center += (time - now) * *displacement;
+            if !self.displacements.is_empty() {
+                let centers = frame.centers.to_mut().iter_mut();
+                for (center, displacement) in centers.zip(&self.displacements) {
+                    *center += (time - now) * *displacement;
+                }
             }
             now = time;
             build(self, frame)?;
@@ -149,7 +153,7 @@ impl SurfaceBuilder {
     fn build_unions(
         &mut self,
         setup: &Setup,
-        frame: &mut DecodedFrame,
+        frame: &mut DecodedFrame<'_>,
     ) -> Result<u64, SmoothError> {
         let settings = setup.build_settings(frame.centers.len(), frame.shading.has_colors());
         let mut bytes = 0;
@@ -166,7 +170,7 @@ impl SurfaceBuilder {
     fn build_smooth(
         &mut self,
         setup: &Setup,
-        frame: &mut DecodedFrame,
+        frame: &mut DecodedFrame<'_>,
         notes: &mut Vec<String>,
     ) -> Result<SmoothReport, SmoothError> {
         let radius = match &frame.radius {
@@ -219,7 +223,7 @@ impl SurfaceBuilder {
     }
 
     /// Moves the particles of the spray behind those of the body.
-    fn find_spray(&mut self, setup: &Setup, frame: &mut DecodedFrame, trees: &mut TreeBuilder) {
+    fn find_spray(&mut self, setup: &Setup, frame: &mut DecodedFrame<'_>, trees: &mut TreeBuilder) {
         // Use the tree that is fastest to build; the result does not depend on the structure
         trees.build(&spheres(frame), &BuildSettings::new(Structure::Lbvh));
         let spray = spray_of(&trees.tree().view(), support(&setup.picture.surface));
@@ -228,7 +232,7 @@ impl SurfaceBuilder {
     }
 
     /// Builds the tree of the drops, and leaves only the body in `frame`.
-    fn build_spray(&mut self, setup: &Setup, frame: &mut DecodedFrame) -> BuildReport {
+    fn build_spray(&mut self, setup: &Setup, frame: &mut DecodedFrame<'_>) -> BuildReport {
         let body = frame.centers.len().min(self.body as usize);
         let is_soft = setup.picture.scene.is_spray_soft;
         let ids = frame.shading.ids.as_deref().filter(|_| is_soft);
@@ -264,7 +268,10 @@ impl SurfaceBuilder {
                 .collect();
             self.moving[1].build(&self.spray.tree().view(), &of_drops);
         }
-        frame.centers.truncate(body);
+        match &mut frame.centers {
+            Cow::Borrowed(all) => *all = &all[..body],
+            Cow::Owned(all) => all.truncate(body),
+        }
         self.displacements.truncate(body);
         if let Radius::PerParticle(radii) = &mut frame.radius {
             radii.truncate(body);
@@ -382,7 +389,7 @@ fn mesh_surfaces<'a>(
 }
 
 /// The spheres of a frame as the input of a builder.
-pub(super) fn spheres(frame: &DecodedFrame) -> Spheres<'_> {
+pub(super) fn spheres<'a>(frame: &'a DecodedFrame<'_>) -> Spheres<'a> {
     Spheres {
         centers: &frame.centers,
         radius: radius_of(&frame.radius),

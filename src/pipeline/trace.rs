@@ -36,7 +36,7 @@ impl FrameRenderer for CpuRenderer {
     ///
     /// # Errors
     /// [`TraceError::Stored`] if the nodes of a native frame are damaged, [`TraceError::File`] if it cannot be used.
-    fn prepare(&mut self, setup: &Setup, frame: LoadedFrame) -> Result<BuiltFrame, TraceError> {
+    fn prepare(&mut self, setup: &Setup, frame: LoadedFrame<'_>) -> Result<BuiltFrame, TraceError> {
         // Begin the report
         let mut report = FrameReport {
             particles: frame.particles.count(),
@@ -143,7 +143,7 @@ impl FrameRenderer for CpuRenderer {
 }
 
 impl CpuRenderer {
-    fn build_copy(&mut self, setup: &Setup, frame: &DecodedFrame) -> BuildReport {
+    fn build_copy(&mut self, setup: &Setup, frame: &DecodedFrame<'_>) -> BuildReport {
         let has_values = frame.shading.has_colors();
         let settings = setup.build_settings(frame.centers.len(), has_values);
         self.builder.build(&spheres(frame), &settings)

@@ -10,7 +10,8 @@ use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{
-    Attribute, FrameError, ParticleFrame, Radius, SimulationCell, choose_origin,
+    Attribute, FrameError, ParticleFrame, PositionSlice, Radius, RawParticles, SimulationCell,
+    choose_origin,
 };
 
 pub use crate::attributes::{
@@ -265,24 +266,7 @@ impl Survey {
         indices: impl IntoIterator<Item = usize>,
         question: Question,
     ) -> Result<Self, FrameError> {
-        let mut totals = Totals {
-            bounds: None,
-            outermost: Outermost::default(),
-            cells: Vec::new(),
-            radius: None,
-            has_radii: false,
-            reach: 0.0,
-            color: ColorTotals::default(),
-            points: Vec::new(),
-            velocity: None,
-            rgb: None,
-            attributes: BTreeMap::new(),
-            most_particles: 0,
-            frames: 0,
-            weight: None,
-            origin: Origins::None,
-            moments: Moments::default(),
-        };
+        let mut totals = Totals::new();
         let format_up = if sequence.is_y_up() {
             DVec3::Y
         } else {
@@ -310,6 +294,25 @@ impl Survey {
     }
 }
 
+impl Survey {
+    /// Surveys the particles of one frame in memory; `name` stands for their file in messages. The result is that of a
+    /// file with the same particles: one that is surveyed without reading it completely if there are more than a
+    /// million.
+    ///
+    /// # Errors
+    /// An attribute does not have all of its components for each particle.
+    pub fn of_particles(
+        name: &str,
+        particles: &RawParticles<PositionSlice<'_>>,
+        question: Question,
+    ) -> Result<Self, FrameError> {
+        let sample = FrameSample::of_memory(name, particles, question)?;
+        let mut totals = Totals::new();
+        totals.add(sample, question, question.up.unwrap_or(DVec3::Z));
+        Ok(totals.finish(question, DVec3::Z))
+    }
+}
+
 /// The spacing of neighbours among `positions`.
 fn spacing_of(positions: &[Vec3], needs_packed: bool) -> Option<Spacing> {
     let touching = estimate_radius(positions)?;
@@ -331,6 +334,27 @@ fn spread(count: usize) -> Vec<usize> {
 }
 
 impl Totals {
+    fn new() -> Self {
+        Self {
+            bounds: None,
+            outermost: Outermost::default(),
+            cells: Vec::new(),
+            radius: None,
+            has_radii: false,
+            reach: 0.0,
+            color: ColorTotals::default(),
+            points: Vec::new(),
+            velocity: None,
+            rgb: None,
+            attributes: BTreeMap::new(),
+            most_particles: 0,
+            frames: 0,
+            weight: None,
+            origin: Origins::None,
+            moments: Moments::default(),
+        }
+    }
+
     fn add(&mut self, sample: FrameSample, question: Question, up: DVec3) {
         self.frames += 1;
         self.origin = self.origin.and(sample.origin);

@@ -1,13 +1,16 @@
 //! Samples one frame for the survey: all of it, or for large frames a part, with the rest taken from the index or
 //! read in runs.
 
+use std::path::Path;
+
 use glam::{DVec3, Vec3};
-use spherule_formats::convert::{SourceAttribute, open_source};
+use spherule_formats::convert::{RawSource, open_source};
 use spherule_formats::native::layout::RadiusIndex;
 use spherule_formats::native::{Access, FrameIndex, NativeFile, NativeFrame};
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{
-    FrameError, ParseError, Positions, RawParticles, choose_origin, find_radius, is_near,
+    FrameError, ParseError, PositionSlice, Positions, RawParticles, choose_origin, find_radius,
+    is_near,
 };
 
 use super::packing::{self, Spacing};
@@ -89,15 +92,7 @@ impl FrameSample {
         let Some(source) = open_source(path)?.filter(|s| s.count() > LARGE) else {
             return Ok(None);
         };
-        // Read a sample, and stream over all particles for spacing and extremes
-        let particles = stream::sample(&*source, path, MAX_SAMPLE)?;
-        let is_radius = |a: &SourceAttribute| a.name.eq_ignore_ascii_case("radius");
-        let has_radii = source.attributes().iter().any(is_radius);
-        let spacing = match question.is_auto() && !has_radii {
-            true => stream::spacing(&*source, &particles.positions, question.is_packed())?,
-            false => None,
-        };
-        let extremes = stream::extremes(&*source)?;
+        let (particles, spacing, extremes) = stream::survey(&*source, path, MAX_SAMPLE, question)?;
         source.check()?;
         // Estimate the memory of the frame from its attributes
         let stored = std::fs::metadata(path).map_or(0, |meta| meta.len());
@@ -128,6 +123,39 @@ impl FrameSample {
             origin: None,
             particles,
         }))
+    }
+
+    /// Samples particles in memory as if they were in a file called `name`.
+    pub(super) fn of_memory(
+        name: &str,
+        raw: &RawParticles<PositionSlice<'_>>,
+        question: Question,
+    ) -> Result<Self, FrameError> {
+        let path = Path::new(name);
+        let source = RawSource::borrowed(path, raw)?;
+        let count = raw.positions.len();
+        let is_part = count as u64 > LARGE && question.selection.is_none();
+        let (particles, spacing, extremes) = match is_part {
+            true => stream::survey(&source, path, MAX_SAMPLE, question.radius)?,
+            false => (raw.to_owned_particles(), None, None),
+        };
+        let sample = Self {
+            weight: FrameWeight {
+                particles: count as u64,
+                ids: id_of(&raw.attributes).is_some(),
+                velocities: velocity_of(&raw.attributes).is_some(),
+                ..FrameWeight::default()
+            },
+            count,
+            extremes,
+            spacing,
+            origin: None,
+            particles,
+        };
+        Ok(match question.selection {
+            Some(selection) => sample.selected(selection, question.radius),
+            None => sample,
+        })
     }
 
     fn of_files(sequence: &Sequence, index: usize) -> Result<Self, FrameError> {

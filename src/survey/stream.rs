@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use spherule_formats::convert::{ParticleSource, SourceAttribute};
 use spherule_formats::{Attribute, Endian, FrameError, ParseError, Positions, RawParticles};
 
+use super::RadiusQuestion;
 use super::packing::{self, Spacing};
 use super::robust::{NEIGHBOUR_BUDGET, NEIGHBOUR_QUERIES, median};
 
@@ -16,6 +17,27 @@ const RUN: usize = 1 << 16;
 const SAMPLE_RUN: usize = 64;
 /// Minimum number of distances for the spacing, whatever they cost.
 const LEAST_QUERIES: usize = 16;
+
+/// What the survey needs of many particles.
+pub(super) type Streamed = (RawParticles, Option<Spacing>, Option<(DVec3, DVec3)>);
+
+/// At most `most` particles of the file `path`, the spacing of all if `question` requires it and there are no radii,
+/// and the bounding box of all.
+pub(super) fn survey(
+    source: &dyn ParticleSource,
+    path: &Path,
+    most: usize,
+    question: RadiusQuestion,
+) -> Result<Streamed, FrameError> {
+    let particles = sample(source, path, most)?;
+    let is_radius = |a: &SourceAttribute| a.name.eq_ignore_ascii_case("radius");
+    let has_radii = source.attributes().iter().any(is_radius);
+    let spacing = match question.is_auto() && !has_radii {
+        true => spacing(source, &particles.positions, question.is_packed())?,
+        false => None,
+    };
+    Ok((particles, spacing, extremes(source)?))
+}
 
 /// Bounding box of all finite particles; `None` without any.
 pub(super) fn extremes(source: &dyn ParticleSource) -> Result<Option<(DVec3, DVec3)>, FrameError> {

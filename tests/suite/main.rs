@@ -23,6 +23,7 @@ mod export;
 mod golden;
 mod ground_image;
 mod help;
+mod in_memory;
 mod in_place;
 mod memory;
 mod meshes;

@@ -26,7 +26,7 @@ pub(super) mod planes;
 pub use blocks::write_blocks;
 pub use layout::{ExrBlock, ExrLayout};
 pub use pack::{PackBuffers, PackedBlock, pack_block};
-pub use planes::{DEFAULT_LIGHT_GROUP, PlaneNames, ambiguous_name, attribute_planes};
+pub use planes::{DEFAULT_LIGHT_GROUP, PlaneNames, ambiguous_name, attribute_planes, layer_planes};
 
 /// Maximum length of an attribute name in the format, bytes.
 const NAME_MAX: usize = 255;

@@ -175,6 +175,19 @@ fn layers(layers: &Layers, names: &PlaneNames) -> Vec<Plane> {
     all
 }
 
+/// The planes of a film's [`layers`](crate::render::Film::layers): their names in a file, and the indices of their floats
+/// in a pixel.
+pub fn layer_planes(channels: Channels, names: &PlaneNames) -> Vec<(String, usize)> {
+    let planes = layers(&channels.layers, names).into_iter();
+    let float = |source| match source {
+        Source::LayerColor(i) | Source::Layer(i) | Source::ParticleLayer(i) => Some(i),
+        _ => None,
+    };
+    planes
+        .filter_map(|plane| Some((plane.name.into_owned(), float(plane.source)?)))
+        .collect()
+}
+
 /// The names of the planes of an attribute.
 pub fn attribute_planes(name: &str, components: usize) -> Vec<String> {
     match components {

@@ -8,13 +8,16 @@ use glam::DVec3;
 use super::places;
 use crate::attribute::with_values;
 use crate::convert::{ParticleSource, SourceAttribute};
-use crate::{Attribute, FrameError, Positions, RawParticles};
+use crate::{Attribute, FrameError, PositionSlice, Positions, RawParticles};
 
 /// A step that is completely in memory.
 #[derive(Debug)]
 pub struct RawSource<'a> {
     path: PathBuf,
-    raw: &'a RawParticles,
+    positions: PositionSlice<'a>,
+    raw_attributes: &'a [Attribute],
+    time: Option<f64>,
+    step: Option<i64>,
     attributes: Vec<SourceAttribute>,
 }
 
@@ -24,7 +27,30 @@ impl<'a> RawSource<'a> {
     /// # Errors
     /// If an attribute does not have all of its components for each particle.
     pub fn new(path: &Path, raw: &'a RawParticles) -> Result<Self, FrameError> {
-        let count = raw.positions.len();
+        let positions = match &raw.positions {
+            Positions::F32(v) => PositionSlice::F32(v),
+            Positions::F64(v) => PositionSlice::F64(v),
+        };
+        Self::build(path, positions, raw)
+    }
+
+    /// The particles of `raw`, whose positions belong to a caller; `path` is their name in messages.
+    ///
+    /// # Errors
+    /// Same as [`RawSource::new`].
+    pub fn borrowed(
+        path: &Path,
+        raw: &'a RawParticles<PositionSlice<'a>>,
+    ) -> Result<Self, FrameError> {
+        Self::build(path, raw.positions, raw)
+    }
+
+    fn build<P>(
+        path: &Path,
+        positions: PositionSlice<'a>,
+        raw: &'a RawParticles<P>,
+    ) -> Result<Self, FrameError> {
+        let count = positions.len();
         let fits = |a: &&Attribute| {
             a.components > 0 && count.checked_mul(a.components) == Some(a.data.len())
         };
@@ -43,8 +69,11 @@ impl<'a> RawSource<'a> {
         });
         Ok(Self {
             path: path.to_owned(),
+            positions,
+            raw_attributes: &raw.attributes,
+            time: raw.time,
+            step: raw.step,
             attributes: attributes.collect(),
-            raw,
         })
     }
 
@@ -55,7 +84,7 @@ impl<'a> RawSource<'a> {
 
 impl ParticleSource for RawSource<'_> {
     fn count(&self) -> u64 {
-        self.raw.positions.len() as u64
+        self.positions.len() as u64
     }
 
     fn attributes(&self) -> &[SourceAttribute] {
@@ -63,21 +92,21 @@ impl ParticleSource for RawSource<'_> {
     }
 
     fn time(&self) -> Option<f64> {
-        self.raw.time
+        self.time
     }
 
     fn step(&self) -> Option<i64> {
-        self.raw.step
+        self.step
     }
 
     fn read_positions(&self, first: u64, to: &mut [DVec3]) -> Result<(), FrameError> {
         let places = self.places(first, to.len())?;
-        match &self.raw.positions {
-            Positions::F32(all) => {
+        match self.positions {
+            PositionSlice::F32(all) => {
                 let own = all[places].iter().map(|p| p.as_dvec3());
                 to.iter_mut().zip(own).for_each(|(to, p)| *to = p);
             }
-            Positions::F64(all) => to.copy_from_slice(&all[places]),
+            PositionSlice::F64(all) => to.copy_from_slice(&all[places]),
         }
         Ok(())
     }
@@ -85,7 +114,7 @@ impl ParticleSource for RawSource<'_> {
     fn read_values(&self, attribute: usize, first: u64, to: &mut [u8]) -> Result<(), FrameError> {
         let width = self.attributes[attribute].width();
         let places = self.places(first, to.len() / width.max(1))?;
-        let attribute = &self.raw.attributes[attribute];
+        let attribute = &self.raw_attributes[attribute];
         let scalars = places.start * attribute.components..places.end * attribute.components;
         with_values!(&attribute.data, values => {
             let size = attribute.data.scalar_type().size();

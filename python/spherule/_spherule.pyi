@@ -1,0 +1,56 @@
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+__version__: str
+
+class NativeImage:
+    width: int
+    height: int
+    notes: list[str]
+    origin: tuple[float, float, float]
+    color_range: tuple[float, float] | None
+    def planes(self) -> dict[str, np.ndarray]: ...
+    def layers(self) -> tuple[np.ndarray, list[tuple[str, int]]] | None: ...
+    def to_exr(self) -> bytes: ...
+    def to_png(self) -> bytes: ...
+
+class FrameList:
+    numbers: list[int]
+    notes: list[str]
+    up: str
+    def __init__(self, paths: list[str], *, follow_links: bool) -> None: ...
+    def files(self, index: int) -> list[str]: ...
+    def read(self, index: int, threads: int | None) -> dict[str, Any]: ...
+
+def render(
+    positions: np.ndarray,
+    attributes: list[tuple[str, np.ndarray]],
+    settings: str,
+    *,
+    base: str,
+    frame: int,
+    name: str,
+    time: float | None,
+    threads: int | None,
+) -> NativeImage: ...
+def write_spf(
+    path: str,
+    positions: np.ndarray,
+    attributes: list[tuple[str, np.ndarray]],
+    *,
+    radius: float | None,
+    time: float | None,
+) -> None: ...
+def run_job(
+    file: str | None,
+    settings: str,
+    *,
+    base: str,
+    mode: str,
+    progress: Callable[[dict[str, Any]], object] | None,
+    threads: int | None,
+) -> dict[str, Any]: ...
+def job_dir(file: str | None, settings: str, *, base: str) -> str: ...
+def write_manifest(path: str, settings: str, *, base: str) -> None: ...

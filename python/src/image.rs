@@ -1,0 +1,174 @@
+//! Renders arrays to images in memory.
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use glam::Vec3;
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+use spherule::manifest::{Manifest, Override};
+use spherule::output::layer_planes;
+use spherule::still::{self, Particles, StillImage, StillSettings};
+
+use crate::arrays::{PositionArray, attribute, view};
+use crate::errors::{Class, Failure};
+use crate::settings::{overrides, raised};
+use crate::threads;
+
+/// A finished picture. It never changes, so that arrays may borrow its planes.
+#[pyclass(frozen, module = "spherule._spherule")]
+pub(crate) struct NativeImage {
+    image: StillImage,
+}
+
+/// Renders particles; see `spherule.render`, which checks the arguments.
+#[pyfunction]
+#[pyo3(signature = (positions, attributes, settings, *, base, frame, name, time, threads))]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "keyword arguments of one Python function"
+)]
+pub(crate) fn render(
+    py: Python<'_>,
+    positions: &Bound<'_, PyAny>,
+    attributes: Vec<(String, Bound<'_, PyAny>)>,
+    settings: &str,
+    base: PathBuf,
+    frame: i64,
+    name: String,
+    time: Option<f64>,
+    threads: Option<usize>,
+) -> PyResult<NativeImage> {
+    let settings = raised(py, read_settings(settings, base, frame, name))?;
+    let positions = PositionArray::new(positions)?;
+    let attributes = attributes.into_iter();
+    let attributes = attributes.map(|(name, array)| attribute(name, &array));
+    let particles = Particles {
+        positions: positions.slice()?,
+        attributes: attributes.collect::<PyResult<_>>()?,
+        time,
+        step: None,
+        cell: None,
+    };
+    let stop = AtomicBool::new(false);
+    let on_signal = || stop.store(true, Ordering::Relaxed);
+    let image = threads::run(py, threads, on_signal, || {
+        Ok(still::render(&settings, particles, &stop)?)
+    })?;
+    Ok(NativeImage { image })
+}
+
+fn read_settings(
+    json: &str,
+    base: PathBuf,
+    frame: i64,
+    name: String,
+) -> Result<StillSettings, Failure> {
+    let mut all = overrides(json)?;
+    let input = Override::new("input.path", name.clone(), "name");
+    all.push(input.map_err(|error| Failure::new(Class::Internal, error))?);
+    let manifest = Manifest::parse_with("", &PathBuf::from("settings"), all)?;
+    Ok(StillSettings {
+        base,
+        frame,
+        name,
+        ..StillSettings::new(manifest)
+    })
+}
+
+#[pymethods]
+impl NativeImage {
+    #[getter]
+    fn width(&self) -> u32 {
+        self.image.film().width
+    }
+
+    #[getter]
+    fn height(&self) -> u32 {
+        self.image.film().height
+    }
+
+    #[getter]
+    fn notes(&self) -> Vec<String> {
+        self.image.notes().to_vec()
+    }
+
+    #[getter]
+    fn origin(&self) -> [f64; 3] {
+        self.image.survey().origin.to_array()
+    }
+
+    /// Smallest and largest value of the colour map, if there is one.
+    #[getter]
+    fn color_range(&self) -> Option<(f64, f64)> {
+        match &self.image.setup().picture.color {
+            spherule::pipeline::ColorRule::Attribute { map, .. } => {
+                map.range().map(|([low, high], _)| (low, high))
+            }
+            _ => None,
+        }
+    }
+
+    /// The planes by name, as read-only arrays without a copy.
+    fn planes<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
+        let (py, owner) = (slf.py(), slf.as_any());
+        let film = slf.get().image.film();
+        let (width, height) = (film.width as usize, film.height as usize);
+        let planes = PyDict::new(py);
+        let colors = bytemuck::cast_slice::<[f32; 4], f32>(&film.color);
+        planes.set_item("rgba", view(owner, colors, &[height, width, 4])?)?;
+        if let Some(depth) = film.depth.as_ref().filter(|_| film.channels.depth) {
+            planes.set_item("Z", view(owner, depth, &[height, width])?)?;
+        }
+        let vectors = [
+            ("N", &film.normal, film.channels.normal),
+            ("P", &film.position, film.channels.position),
+            ("V", &film.velocity, film.channels.velocity),
+            ("albedo", &film.albedo, film.channels.albedo),
+        ];
+        for (name, plane, is_wanted) in vectors {
+            if let Some(plane) = plane.as_ref().filter(|_| is_wanted) {
+                let numbers = bytemuck::cast_slice::<Vec3, f32>(plane);
+                planes.set_item(name, view(owner, numbers, &[height, width, 3])?)?;
+            }
+        }
+        if let Some(ids) = film.id.as_ref().filter(|_| film.channels.id) {
+            planes.set_item("id", view(owner, ids, &[height, width])?)?;
+        }
+        Ok(planes)
+    }
+
+    /// The floats of all other planes, and the name and the index of each of them.
+    #[expect(clippy::type_complexity, reason = "a tuple for Python")]
+    fn layers<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> PyResult<Option<(Bound<'py, PyAny>, Vec<(String, usize)>)>> {
+        let image = &slf.get().image;
+        let film = image.film();
+        let Some(layers) = &film.layers else {
+            return Ok(None);
+        };
+        let (width, height) = (film.width as usize, film.height as usize);
+        let shape = [height, width, film.channels.layers.floats()];
+        let names = layer_planes(film.channels, &image.setup().picture.exr.names);
+        Ok(Some((view(slf.as_any(), layers, &shape)?, names)))
+    }
+
+    fn to_exr<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let bytes = py.detach(|| self.image.to_exr());
+        encoded(py, bytes)
+    }
+
+    fn to_png<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let bytes = py.detach(|| self.image.to_png());
+        encoded(py, bytes)
+    }
+}
+
+fn encoded(
+    py: Python<'_>,
+    bytes: Result<Vec<u8>, spherule::output::OutputError>,
+) -> PyResult<Bound<'_, PyBytes>> {
+    let bytes = bytes.map_err(|error| Failure::new(Class::Output, error).raise(py))?;
+    Ok(PyBytes::new(py, &bytes))
+}

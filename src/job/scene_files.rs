@@ -1,0 +1,140 @@
+//! The files that all images of a manifest share, each read once: the images of environment and ground, and meshes.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
+
+use super::RunError;
+use super::meshes::{self, JobMeshes, identity};
+use crate::hdr::{HdrError, read_radiance_map, read_texture};
+use crate::manifest::{GROUND_IMAGE, Manifest, named_place};
+use crate::pipeline::Setup;
+use crate::resolve::{
+    self, add_ground_image, add_meshes, check_views, needs_environment_image, with_framed_meshes,
+};
+use crate::scene::{RadianceMap, Texture};
+use crate::survey::Survey;
+
+/// See the module. One value belongs to one manifest, whose paths are relative to `dir`.
+#[derive(Debug, Clone)]
+pub struct SceneFiles {
+    dir: PathBuf,
+    /// See [`SceneFiles::environment_image`].
+    environment_image: OnceLock<Option<RadianceMap>>,
+    /// See [`SceneFiles::ground_image`].
+    ground_image: OnceLock<Option<Arc<Texture>>>,
+    meshes: JobMeshes,
+}
+
+impl SceneFiles {
+    /// Files relative to `dir`, which need not exist yet.
+    pub fn new(dir: impl Into<PathBuf>) -> Self {
+        Self {
+            dir: dir.into(),
+            environment_image: OnceLock::new(),
+            ground_image: OnceLock::new(),
+            meshes: JobMeshes::default(),
+        }
+    }
+
+    /// The setup of `frames`, if the view is valid along the whole camera path.
+    ///
+    /// # Errors
+    /// A file cannot be read, or the settings and the particles do not go together.
+    pub fn setup(
+        &self,
+        manifest: &Manifest,
+        survey: &Survey,
+        frames: impl Iterator<Item = i64>,
+    ) -> Result<Setup, RunError> {
+        let map = self.environment_image(manifest)?;
+        let meshes = self.meshes.get(manifest, &self.dir, survey)?;
+        let survey = with_framed_meshes(survey, manifest, &meshes);
+        let mut setup = resolve::setup(manifest, &survey, map)?;
+        if let Some(texture) = self.ground_image(manifest)? {
+            add_ground_image(&mut setup, manifest, texture);
+        }
+        add_meshes(&mut setup, manifest, &survey, meshes);
+        check_views(&setup, frames)?;
+        Ok(setup)
+    }
+
+    /// Notes for the user on the image of the environment, and on meshes that have been read for a setup.
+    ///
+    /// # Errors
+    /// The image cannot be read.
+    pub fn notes(&self, manifest: &Manifest) -> Result<Vec<String>, RunError> {
+        let negative = self
+            .environment_image(manifest)?
+            .map_or(0, RadianceMap::negative);
+        let note = |path: PathBuf| {
+            let path = path.display();
+            format!("{path}: {negative} pixels are negative, which counts as 0")
+        };
+        let path = environment_path(manifest, &self.dir).filter(|_| negative > 0);
+        Ok(path
+            .map(note)
+            .into_iter()
+            .chain(self.meshes.notes())
+            .collect())
+    }
+
+    /// The files of the meshes that only `frame` has.
+    pub fn frame_meshes(&self, manifest: &Manifest, frame: i64) -> Vec<PathBuf> {
+        meshes::frame_files(manifest, &self.dir, frame)
+    }
+
+    /// Fingerprints of the files, by the keys of their paths: the files may be moved.
+    pub(super) fn identities(
+        &self,
+        manifest: &Manifest,
+    ) -> Result<Vec<(String, String)>, RunError> {
+        let mut identities = meshes::identities(manifest, &self.dir)?;
+        if let Some(path) = environment_path(manifest, &self.dir) {
+            let found = identity(&path).map_err(|source| HdrError::Io { path, source })?;
+            identities.push(("environment.image".to_owned(), found));
+        }
+        if let Some(path) = ground_path(manifest, &self.dir) {
+            let found = identity(&path);
+            let found =
+                found.map_err(|source| RunError::GroundImage(HdrError::Io { path, source }))?;
+            identities.push((GROUND_IMAGE.to_owned(), found));
+        }
+        Ok(identities)
+    }
+
+    /// The image of the environment, if there is one, in the resolution of environments. Its file is read once.
+    fn environment_image(&self, manifest: &Manifest) -> Result<Option<&RadianceMap>, RunError> {
+        if let Some(map) = self.environment_image.get() {
+            return Ok(map.as_ref());
+        }
+        let path = environment_path(manifest, &self.dir);
+        let map = path.map(|path| read_radiance_map(&path)).transpose()?;
+        let reduced = map.map(|map| map.reduced());
+        Ok(self.environment_image.get_or_init(|| reduced).as_ref())
+    }
+
+    /// The picture on the ground, if there is one. Its file is read once.
+    fn ground_image(&self, manifest: &Manifest) -> Result<Option<&Arc<Texture>>, RunError> {
+        if let Some(texture) = self.ground_image.get() {
+            return Ok(texture.as_ref());
+        }
+        let behind = manifest.render.ground_color;
+        let read = |path: PathBuf| read_texture(&path, behind).map_err(RunError::GroundImage);
+        let path = ground_path(manifest, &self.dir);
+        let texture = path.map(read).transpose()?.map(Arc::new);
+        Ok(self.ground_image.get_or_init(|| texture).as_ref())
+    }
+}
+
+/// The path of the image of the environment, if there is one.
+fn environment_path(manifest: &Manifest, dir: &Path) -> Option<PathBuf> {
+    let path = manifest.environment.image.as_ref()?;
+    // The directory may not exist yet, so that the system cannot follow `..` from it
+    needs_environment_image(manifest).then(|| named_place(&dir.join(path)))
+}
+
+/// The path of the picture on the ground, if there is one.
+fn ground_path(manifest: &Manifest, dir: &Path) -> Option<PathBuf> {
+    let image = manifest.ground_image()?;
+    Some(named_place(&dir.join(&image.path)))
+}

@@ -1,0 +1,217 @@
+//! Renders particles in memory to single pictures in memory: no job, and no files except those that the settings name.
+//! The bytes are those that the command `spherule still` writes for a file with the same particles.
+
+use std::path::{Path, PathBuf};
+
+use spherule_formats::{Attribute, PositionSlice, RawParticles};
+use spherule_jobs::{Panic, catch_panic};
+
+use crate::job::{RunError, SceneFiles};
+use crate::manifest::{Manifest, ManifestError, Override};
+use crate::output::OutputError;
+use crate::pipeline::{ImageError, ImageTask, Setup, TracedFrame, trace_particles};
+use crate::render::{Film, RenderError, Stop};
+use crate::resolve::question;
+use crate::scene::Camera;
+use crate::survey::Survey;
+
+/// The name of particles without a file, in messages and overlays.
+const MEMORY: &str = "memory";
+
+/// The settings of pictures of particles in memory.
+#[derive(Debug, Clone)]
+pub struct StillSettings {
+    /// The manifest. Its input is not read.
+    pub manifest: Manifest,
+    /// The directory that its paths are relative to; empty for the current directory.
+    pub base: PathBuf,
+    /// Number of the frame, for cameras that move and for names with numbers.
+    pub frame: i64,
+    /// The name of the particles, in messages and overlays.
+    pub name: String,
+}
+
+impl Default for StillSettings {
+    fn default() -> Self {
+        Self::new(Manifest::new(MEMORY))
+    }
+}
+
+impl StillSettings {
+    /// The pictures of `manifest`.
+    pub fn new(manifest: Manifest) -> Self {
+        Self {
+            manifest,
+            base: PathBuf::new(),
+            frame: 0,
+            name: MEMORY.to_owned(),
+        }
+    }
+
+    /// Reads a manifest in TOML, without `input.path`. See [the manual](Manifest) for its keys.
+    ///
+    /// # Errors
+    /// It is not TOML, or has unknown keys or invalid values.
+    ///
+    /// # Panics
+    /// Never: the key of the input is valid.
+    pub fn parse(toml: &str) -> Result<Self, ManifestError> {
+        let input = Override::new("input.path", MEMORY, MEMORY);
+        let input = input.expect("the key is valid");
+        Manifest::parse_with(toml, Path::new("settings"), vec![input]).map(Self::new)
+    }
+}
+
+/// Particles in memory: positions that may belong to a caller, in world units, and attributes.
+pub type Particles<'a> = RawParticles<PositionSlice<'a>>;
+
+/// Particles without attributes.
+pub fn particles(positions: PositionSlice<'_>) -> Particles<'_> {
+    RawParticles {
+        positions,
+        attributes: Vec::new(),
+        time: None,
+        step: None,
+        cell: None,
+    }
+}
+
+/// A scalar attribute, such as `radius`.
+pub fn scalar(name: impl Into<String>, values: Vec<f32>) -> Attribute {
+    Attribute {
+        name: name.into(),
+        components: 1,
+        data: spherule_formats::AttributeData::F32(values),
+    }
+}
+
+/// Why there is no picture.
+#[derive(Debug, thiserror::Error)]
+pub enum StillError {
+    /// The settings and the particles do not go together, or a file that they name cannot be read.
+    #[error(transparent)]
+    Setup(#[from] RunError),
+    /// The picture cannot be rendered.
+    #[error(transparent)]
+    Image(#[from] ImageError),
+    /// A bug.
+    #[error(transparent)]
+    Panic(#[from] Panic),
+}
+
+impl StillError {
+    /// Whether rendering was stopped.
+    pub fn is_interrupted(&self) -> bool {
+        use crate::pipeline::TraceError::Render;
+        matches!(
+            self,
+            Self::Image(ImageError::Trace(Render(RenderError::Interrupted)))
+        )
+    }
+}
+
+/// A picture in memory.
+#[derive(Debug)]
+pub struct StillImage {
+    setup: Setup,
+    survey: Survey,
+    frame: TracedFrame,
+    notes: Vec<String>,
+}
+
+/// Renders `particles`, on the threads of the current pool. Positions that are in single precision, near zero and
+/// finite are not copied: the tree takes less than 16 bytes per particle.
+///
+/// # Errors
+/// See [`StillError`]; [`StillError::is_interrupted`] if `stop` is raised.
+pub fn render(
+    settings: &StillSettings,
+    particles: Particles<'_>,
+    stop: &dyn Stop,
+) -> Result<StillImage, StillError> {
+    let StillSettings {
+        manifest,
+        base,
+        frame,
+        name,
+    } = settings;
+    let base = std::path::absolute(Path::new(".").join(base));
+    let base = base.map_err(RunError::file(Path::new("."), "cannot be found"))?;
+    let files = SceneFiles::new(base);
+    // Determine the automatic settings
+    let (survey, setup) = catch_panic(|| -> Result<_, StillError> {
+        let selection = manifest.selection();
+        let survey = Survey::of_particles(name, &particles, question(manifest, &selection));
+        let survey = survey.map_err(RunError::from)?;
+        let setup = files.setup(manifest, &survey, std::iter::once(*frame))?;
+        Ok((survey, setup))
+    })?;
+    let mut notes = files.notes(manifest)?;
+    // Render
+    let task = ImageTask {
+        frame: *frame,
+        index: 0,
+        image: PathBuf::new(),
+        preview: None,
+        meshes: files.frame_meshes(manifest, *frame),
+        next_meshes: None,
+        refused: None,
+    };
+    let traced = trace_particles(&setup, particles, name, &task, stop, |note| {
+        notes.push(note);
+    })?;
+    Ok(StillImage {
+        setup,
+        survey,
+        frame: traced,
+        notes,
+    })
+}
+
+impl StillImage {
+    /// The planes.
+    pub const fn film(&self) -> &Film {
+        &self.frame.film
+    }
+
+    /// The camera.
+    pub const fn camera(&self) -> &Camera {
+        &self.frame.camera
+    }
+
+    /// The values of automatic settings.
+    pub const fn survey(&self) -> &Survey {
+        &self.survey
+    }
+
+    /// The settings of the picture, with all automatic values.
+    pub const fn setup(&self) -> &Setup {
+        &self.setup
+    }
+
+    /// The picture with its report.
+    pub const fn traced(&self) -> &TracedFrame {
+        &self.frame
+    }
+
+    /// Notes for the user: what was left out or changed.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    /// The picture as an OpenEXR file.
+    ///
+    /// # Errors
+    /// The encoder fails.
+    pub fn to_exr(&self) -> Result<Vec<u8>, OutputError> {
+        self.frame.to_exr(&self.setup)
+    }
+
+    /// The picture as a PNG file.
+    ///
+    /// # Errors
+    /// The encoder fails.
+    pub fn to_png(&self) -> Result<Vec<u8>, OutputError> {
+        self.frame.to_png(&self.setup)
+    }
+}
