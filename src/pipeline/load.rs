@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{FrameError, ParticleFrame, PositionSlice, RawParticles};
 
@@ -16,7 +16,7 @@ use super::load_error::{LoadError, first_file, unknown_name};
 use super::meshes::{MeshSlices, meshes_of};
 use super::motion::velocities_to_next;
 use super::predict::{FrameSize, MemoryModel};
-use super::rods::{FrameRods, rods_of};
+use super::rods::{CellStyle, FrameRods, rods_of};
 use super::setup::{Picture, Setup};
 use super::{ImageTask, SharedFrame};
 use crate::metrics::memory::{available, process_room};
@@ -86,7 +86,7 @@ pub fn load_frame(
     let mut loaded = match opened.map_err(|e| newest(e, sequence, task))? {
         Opened::InPlace(frame, clamped_radii) => LoadedFrame {
             read: frame.particles(),
-            rods: rods_of(setup, None, task.frame, &mut notes),
+            rods: rods_of(cell_style(setup), None, task.frame, &mut notes),
             facts: frame.facts(setup, without_directory(&first_file(sequence, task.index))),
             time: sequence.listed_time(task.index).or(frame.time()),
             task: task.clone(),
@@ -176,7 +176,12 @@ fn decoded<'a>(
     }
     let (time, dropped) = (frame.time, frame.dropped);
     let focus = focus_point(setup, &frame, file)?;
-    let rods = rods_of(setup, frame.cell.as_ref(), task.frame, &mut notes);
+    let rods = rods_of(
+        cell_style(setup),
+        frame.cell.as_ref(),
+        task.frame,
+        &mut notes,
+    );
     let facts = FileFacts::of_decoded(setup, &frame, without_directory(file));
     let (particles, clamped_radii) = DecodedFrame::of(setup, frame, task.frame, file)?;
     Ok(LoadedFrame {
@@ -193,6 +198,11 @@ fn decoded<'a>(
         clamped_radii,
         read_time: Duration::ZERO,
     })
+}
+
+/// How the simulation cell is drawn, if it is, and the origin.
+fn cell_style(setup: &Setup) -> (Option<&CellStyle>, DVec3) {
+    (setup.picture.cell.as_ref(), setup.picture.origin)
 }
 
 /// The particles that are drawn.

@@ -3,7 +3,6 @@
 use glam::{DVec3, Vec3};
 use spherule_formats::SimulationCell;
 
-use super::setup::Setup;
 use crate::surface::rods::{Caps, Rod, RodTree};
 use crate::surface::{MaterialId, Shape, rods::RodSurface};
 
@@ -35,14 +34,14 @@ impl FrameRods {
     }
 }
 
-/// The rods of a frame with this `cell`. Passes notes to `notes`.
+/// The rods of a frame with this `cell`, drawn in a `style`, relative to `origin`. Passes notes to `notes`.
 pub(super) fn rods_of(
-    setup: &Setup,
+    (style, origin): (Option<&CellStyle>, DVec3),
     cell: Option<&SimulationCell>,
     frame: i64,
     notes: &mut Vec<String>,
 ) -> Vec<FrameRods> {
-    let Some(style) = &setup.picture.cell else {
+    let Some(style) = style else {
         return Vec::new();
     };
     let Some(cell) = cell else {
@@ -51,7 +50,7 @@ pub(super) fn rods_of(
         ));
         return Vec::new();
     };
-    vec![cell_edges(cell, style, setup.picture.origin)]
+    vec![cell_edges(cell, style, origin)]
 }
 
 /// The edges of `cell`, relative to `origin`.

@@ -37,7 +37,7 @@ fn workshop() -> Workshop {
 }
 
 fn picture(workshop: &Workshop, out: &str, options: &[&str]) -> Picture {
-    let command = ["render", "in.xyz", "-o", out];
+    let command = ["still", "in.xyz", "-o", out];
     let ran = workshop.run(&[&command[..], &VIEW, options].concat());
     ran.expect(0);
     Picture::open(&workshop.join(out))

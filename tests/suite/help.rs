@@ -76,7 +76,7 @@ fn completions_know_every_command_and_option() {
         for name in commands() {
             assert!(script.contains(&name), "{shell}: {name}");
         }
-        for option in ["samples", "turntable", "no-wait"] {
+        for option in ["samples", "colorbar", "where"] {
             assert!(script.contains(option), "{shell}: {option}");
         }
     }

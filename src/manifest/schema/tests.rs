@@ -250,9 +250,12 @@ fn comments_defaults_and_examples_are_those_of_init() {
 fn defaults_of_items_are_the_readers() {
     let schema = job_schema();
     for (pointer, text) in [
-        (TABLES[8].0, "type = \"point\"\nposition = [1, 2, 3]\n"),
         (
-            TABLES[9].0,
+            "/properties/light/items/oneOf/0",
+            "type = \"point\"\nposition = [1, 2, 3]\n",
+        ),
+        (
+            "/properties/light/items/oneOf/1",
             "type = \"directional\"\ndirection = [1, 2, 3]\n",
         ),
     ] {

@@ -53,7 +53,8 @@ fn full_disk_is_reported_without_partial_files() {
         ("16k", 2),
         ("24k", 2),
         ("28k", 2),
-        ("32k", 1),
+        ("32k", 2),
+        ("40k", 1),
         ("48k", 1),
         ("68k", 1),
     ] {
