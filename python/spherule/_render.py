@@ -41,7 +41,7 @@ def render(
     attributes : dict of str to array, optional
         Other numbers of the particles, (N,) or (N, components), for colours, channels and motion.
     camera : dict, optional
-        Keys of the section `camera` of a manifest, such as {"position": [5, 5, 3], "target": [0, 0, 0]}.
+        Keys of the section `camera` of a manifest, such as {"mode": "fixed", "eye": [5, 5, 3], "look_at": [0, 0, 0]}.
     settings : dict, optional
         Any sections of a manifest, such as {"render": {"surface": "smooth"}, "environment.type": "studio"}.
         Paths in it are relative to the current directory.
