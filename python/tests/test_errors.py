@@ -61,7 +61,7 @@ CALLS = {
         "environment.image",
     ),
     "camera inside out": (
-        render(camera={"position": [0, 0, 0], "target": [0, 0, 0]}),
+        render(camera={"mode": "fixed", "eye": [0, 0, 0], "look_at": [0, 0, 0]}),
         SETTING,
         "camera",
     ),
