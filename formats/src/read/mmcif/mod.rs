@@ -1,7 +1,7 @@
 //! mmCIF files of the Protein Data Bank: the loop `_atom_site`, one or many models.
 //!
-//! [`tokens`] splits lines into values. The loop begins with the names of its columns; its rows are values in this order,
-//! whatever the line breaks. Lengths are A. After the PDBx/mmCIF dictionary.
+//! `tokens.rs` splits lines into values. The loop begins with the names of its columns; its rows are values in this
+//! order, whatever the line breaks. Lengths are A. After the PDBx/mmCIF dictionary.
 
 use super::atoms::{self, AtomTable, ELEMENT, RESIDUE};
 use super::sniff::is_text;

@@ -1,7 +1,7 @@
 //! GROMACS `.xtc` trajectories: positions alone, as integers of a chosen precision, compressed.
 //!
 //! A frame is a header, the box, and the positions: as they are for up to nine atoms, else compressed
-//! ([`coordinates`]). Lengths are nm, times ps. After the description of `xtc` in the GROMACS manual.
+//! (`coordinates.rs`). Lengths are nm, times ps. After the description of `xtc` in the GROMACS manual.
 
 use glam::Vec3;
 
