@@ -8,6 +8,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::attribute::with_values;
+use crate::gather::gather;
 use crate::names::RADII;
 use crate::{Attribute, AttributeData, SimulationCell};
 
@@ -142,11 +143,11 @@ impl RawParticles {
     /// If there is no particle with one of the indices.
     pub fn select(&mut self, indices: &[u32]) {
         match &mut self.positions {
-            Positions::F32(v) => select(v, 1, indices),
-            Positions::F64(v) => select(v, 1, indices),
+            Positions::F32(v) => *v = gather(v, 1, indices),
+            Positions::F64(v) => *v = gather(v, 1, indices),
         }
         for attribute in &mut self.attributes {
-            with_values!(&mut attribute.data, v => select(v, attribute.components, indices));
+            with_values!(&mut attribute.data, v => *v = gather(v, attribute.components, indices));
         }
     }
 
@@ -155,31 +156,6 @@ impl RawParticles {
         let attributes = self.attributes.iter().map(|a| a.data.byte_len());
         attributes.fold(self.positions.byte_len(), u64::max)
     }
-}
-
-/// Keeps the groups of `components` items with these indices.
-fn select<T: Copy + Send + Sync>(items: &mut Vec<T>, components: usize, indices: &[u32]) {
-    fn groups<T: Copy + Send + Sync, const N: usize>(items: &[T], indices: &[u32]) -> Vec<T> {
-        let groups = items.as_chunks::<N>().0;
-        let kept = indices.par_iter().with_min_len(4096);
-        let kept: Vec<[T; N]> = kept.map(|index| groups[*index as usize]).collect();
-        kept.into_flattened()
-    }
-    *items = match components {
-        1 => groups::<T, 1>(items, indices),
-        2 => groups::<T, 2>(items, indices),
-        3 => groups::<T, 3>(items, indices),
-        4 => groups::<T, 4>(items, indices),
-        6 => groups::<T, 6>(items, indices),
-        9 => groups::<T, 9>(items, indices),
-        _ => {
-            let group = |index: &u32| {
-                let first = *index as usize * components;
-                &items[first..first + components]
-            };
-            indices.iter().flat_map(group).copied().collect()
-        }
-    };
 }
 
 /// Sphere radii in scene units.

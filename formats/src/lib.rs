@@ -4,6 +4,36 @@
 //! `formats` turns bytes into frames and knows no rays. `jobs` plans, records and resumes work and
 //! does not know what the work is. `spherule` (accelerators, tracer, output, command line) joins
 //! them. Arrows never point the other way.
+//!
+//! This example opens a text file as a sequence, reads its particles, and writes them to a native frame:
+//!
+//! ```
+//! use glam::DVec3;
+//! use spherule_formats::{
+//!     FrameFile, ParticleFrame, Sequence, SequenceInput, choose_origin, native,
+//! };
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let dir = tempfile::tempdir()?;
+//! let table = dir.path().join("drop.0042.csv");
+//! std::fs::write(&table, "x,y,z,density\n0,0,1,998\n0,1,1,1001\n1,1,1,1004\n")?;
+//!
+//! // The files of a directory, of a pattern such as drop.####.csv, or of a list
+//! let sequence = Sequence::open(&SequenceInput::from_path(dir.path()))?;
+//! assert_eq!(sequence.frames()[0].number, 42);
+//!
+//! // One file, whose format is told by its content
+//! let particles = FrameFile::open(&table)?.read(0)?;
+//! assert_eq!(particles.positions.len(), 3);
+//! assert_eq!(particles.attributes[0].name, "density");
+//!
+//! // Positions relative to an origin, which a sequence has in common
+//! let origin = choose_origin(DVec3::ZERO, DVec3::ONE);
+//! let frame = ParticleFrame::from_raw(particles, origin);
+//! native::write(&dir.path().join("drop.0042.spf"), &frame, None)?;
+//! # Ok(())
+//! # }
+//! ```
 #![deny(unsafe_code)]
 
 mod attribute;
@@ -14,6 +44,7 @@ mod decode;
 mod error;
 mod format;
 mod frame;
+mod gather;
 mod message;
 mod origin;
 mod ranges;

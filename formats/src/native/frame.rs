@@ -3,7 +3,6 @@
 use std::io;
 use std::path::Path;
 
-use bytemuck::Pod;
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -11,6 +10,7 @@ use super::write::{AttributeSpec, FrameSpec, FrameWriter, RadiusSpec, Run};
 use super::{Bound, Encoding, FrameIndex, RadiusRange, StoredType, arrange, wide_blocks};
 use crate::attribute::with_values;
 use crate::blocks::Block;
+use crate::gather::gather;
 use crate::names::RADIUS;
 use crate::order::kd;
 use crate::{Attribute, AttributeData, FrameError, ParticleFrame, Radius, is_near, is_radius};
@@ -174,19 +174,6 @@ fn in_order(attribute: &Attribute, indices: &[u32]) -> Vec<u8> {
         let ordered = gather(values, components, indices);
         ordered.iter().flat_map(|value| value.to_le_bytes()).collect()
     })
-}
-
-/// The values of the particles with these indices, in the order of the indices.
-fn gather<T: Pod + Send + Sync>(values: &[T], components: usize, indices: &[u32]) -> Vec<T> {
-    let mut ordered = vec![T::zeroed(); values.len()];
-    ordered
-        .par_chunks_mut(components)
-        .zip(indices)
-        .with_min_len(4096)
-        .for_each(|(to, index)| {
-            to.copy_from_slice(&values[*index as usize * components..][..components]);
-        });
-    ordered
 }
 
 fn check(frame: &ParticleFrame) -> io::Result<()> {

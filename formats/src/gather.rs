@@ -1,0 +1,90 @@
+//! Copies the values of chosen particles.
+
+use bytemuck::Pod;
+use rayon::prelude::*;
+
+/// Particles of one task.
+const TASK: usize = 4096;
+
+/// The groups of `components` items with these indices, in the order of the indices.
+///
+/// # Panics
+/// If there is no group with one of the indices.
+pub(crate) fn gather<T: Pod>(items: &[T], components: usize, indices: &[u32]) -> Vec<T> {
+    let mut gathered: Vec<T> = bytemuck::zeroed_vec(indices.len() * components);
+    // As bytes, so that the loops are compiled for sizes of groups and not for every type of number
+    gather_bytes(
+        bytemuck::cast_slice(items),
+        components * size_of::<T>(),
+        indices,
+        bytemuck::cast_slice_mut(&mut gathered),
+    );
+    gathered
+}
+
+/// Copies the groups of `size` bytes with these indices into `to`.
+fn gather_bytes(from: &[u8], size: usize, indices: &[u32], to: &mut [u8]) {
+    if size == 0 {
+        return;
+    }
+    let tasks = to.par_chunks_mut(TASK * size);
+    tasks
+        .zip(indices.par_chunks(TASK))
+        .for_each(|(to, indices)| match size {
+            1 => copy::<1>(from, indices, to),
+            2 => copy::<2>(from, indices, to),
+            4 => copy::<4>(from, indices, to),
+            8 => copy::<8>(from, indices, to),
+            12 => copy::<12>(from, indices, to),
+            16 => copy::<16>(from, indices, to),
+            24 => copy::<24>(from, indices, to),
+            _ => {
+                for (to, index) in to.chunks_exact_mut(size).zip(indices) {
+                    to.copy_from_slice(&from[*index as usize * size..][..size]);
+                }
+            }
+        });
+}
+
+fn copy<const SIZE: usize>(from: &[u8], indices: &[u32], to: &mut [u8]) {
+    let groups = from.as_chunks::<SIZE>().0;
+    for (to, index) in to.as_chunks_mut::<SIZE>().0.iter_mut().zip(indices) {
+        *to = groups[*index as usize];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn groups_of_every_size_are_those_with_the_indices() {
+        let count = 3 * TASK + 17;
+        let indices: Vec<u32> = (0..count as u32).map(|i| i * 7919 % 1000).rev().collect();
+        for components in [0, 1, 2, 3, 4, 5, 6, 9] {
+            let items: Vec<u16> = (0..1000 * components as u16).collect();
+            let expected: Vec<u16> = indices
+                .iter()
+                .flat_map(|index| &items[*index as usize * components..][..components])
+                .copied()
+                .collect();
+            assert_eq!(gather(&items, components, &indices), expected);
+            let wide: Vec<f64> = items.iter().map(|item| f64::from(*item)).collect();
+            let gathered = gather(&wide, components, &indices);
+            assert!(
+                gathered.iter().eq(expected
+                    .iter()
+                    .map(|item| f64::from(*item))
+                    .collect::<Vec<_>>()
+                    .iter())
+            );
+        }
+        assert!(gather::<f32>(&[1.0, 2.0], 2, &[]).is_empty());
+    }
+
+    #[test]
+    #[should_panic(expected = "index out of bounds")]
+    fn an_index_beyond_the_items_panics() {
+        gather(&[1_u32, 2, 3], 1, &[3]);
+    }
+}
