@@ -11,6 +11,65 @@
 //! complete ([`Publisher`]) before they are recorded, so a kill at any moment loses at most the frames in
 //! progress. [`run_frames`] is the loop that claims, processes and records frames; the work is a [`FrameWork`].
 //! [`export`] describes frames as work for other engines.
+//!
+//! This example counts the bytes of two files, one frame each. A second run would find nothing to do:
+//!
+//! ```
+//! use serde_json::json;
+//! use spherule_jobs::{
+//!     ClaimedFrame, DEFAULT_TAKEOVER_AFTER, FailureKind, FinishedFrame, FrameFailure, FrameRequest, FrameWork,
+//!     Interrupt, Job, JobRequest, ResumeMode, RunContext, RunOptions, publish, run_frames,
+//! };
+//! use std::path::PathBuf;
+//!
+//! struct CountBytes(PathBuf);
+//!
+//! impl FrameWork for CountBytes {
+//!     type Report = u64;
+//!
+//!     fn process(
+//!         &self,
+//!         frame: &ClaimedFrame,
+//!         _: &RunContext<'_, u64>,
+//!     ) -> Result<FinishedFrame<u64>, FrameFailure> {
+//!         let fail = |e: std::io::Error| FrameFailure::new(FailureKind::Frame, frame.frame, e);
+//!         let input = self.0.join(format!("{}.txt", frame.frame));
+//!         let output = self.0.join(format!("out/{}.count", frame.frame));
+//!         let count = std::fs::read(&input).map_err(fail)?.len() as u64;
+//!         publish(&output, count.to_string().as_bytes()).map_err(fail)?;
+//!         Ok(FinishedFrame { outputs: vec![output], report: count })
+//!     }
+//! }
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let dir = tempfile::tempdir()?;
+//! let root = dir.path();
+//! for (frame, text) in [(1, "one"), (2, "three")] {
+//!     std::fs::write(root.join(format!("{frame}.txt")), text)?;
+//! }
+//! let request = |number| FrameRequest {
+//!     number,
+//!     inputs: vec![root.join(format!("{number}.txt"))],
+//!     companions: Vec::new(),
+//!     outputs: vec![root.join(format!("out/{number}.count"))],
+//! };
+//! let request = JobRequest {
+//!     settings: vec![("unit".to_owned(), "bytes".to_owned())],
+//!     frames: [1, 2].map(request).to_vec(),
+//!     extra_outputs: Vec::new(),
+//!     selection: None,
+//!     mode: ResumeMode::Resume,
+//!     takeover_after: DEFAULT_TAKEOVER_AFTER,
+//! };
+//! // What is found out once, and stays the same when the job is resumed, is stored in the plan
+//! let mut job = Job::open(&root.join("out"), request, |_| Ok::<_, String>(json!({})))?;
+//! let options = RunOptions { frames: job.pending(), retries: 0, interrupt: Interrupt::new() };
+//! run_frames(&mut job, &CountBytes(root.to_owned()), &options, &|_| ())?;
+//! assert!(job.pending().is_empty());
+//! assert_eq!(std::fs::read_to_string(root.join("out/2.count"))?, "5");
+//! # Ok(())
+//! # }
+//! ```
 #![deny(unsafe_code)]
 
 mod changes;
