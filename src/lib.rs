@@ -48,10 +48,10 @@
 //! # Versions
 //!
 //! The version numbers follow semantic versioning: before 1.0, a new minor version may change the interface, and a
-//! patch version does not. The interface is what [`prelude`], [`still`], [`job`] and [`manifest`] export, and the public
-//! items of `spherule-formats` and `spherule-jobs`. All other modules are public for programs that need them, and may
-//! change with any version. Manifests, plans and native frames of earlier versions stay readable. The same input gives
-//! the same bytes in all patch versions, and the changelog names every change of an image.
+//! patch version does not. The interface is what [`prelude`], [`still`], [`job`] and [`manifest`] export, and the
+//! public items of `spherule-formats` and `spherule-jobs`. All other modules are public for programs that need them,
+//! and may change with any version. Manifests, plans and native frames of earlier versions stay readable. The same
+//! input gives the same bytes in all patch versions, and the changelog names every change of an image.
 #![deny(unsafe_code)]
 
 pub mod accel;

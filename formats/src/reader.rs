@@ -65,8 +65,8 @@ pub(crate) trait Reader: Sync {
     /// File name extensions, in lower case without the dot.
     fn extensions(&self) -> &'static [&'static str];
 
-    /// Whether a file name is typical of this format. `stem` and `extension` are in lower case and without the extension
-    /// of a compression.
+    /// Whether a file name is typical of this format. `stem` and `extension` are in lower case and without the
+    /// extension of a compression.
     fn matches_name(&self, _stem: &str, extension: &str) -> bool {
         self.extensions().contains(&extension)
     }

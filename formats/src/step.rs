@@ -86,8 +86,8 @@ impl Step {
         Ok(())
     }
 
-    /// Removes the numbers of `steps` unless each is greater than the one before. Files that were joined after a restart
-    /// have some twice.
+    /// Removes the numbers of `steps` unless each is greater than the one before. Files that were joined after a
+    /// restart have some twice.
     pub(crate) fn keep_increasing_numbers(steps: &mut [Self]) {
         if !steps.is_sorted_by(|a, b| a.number < b.number) {
             steps.iter_mut().for_each(|step| step.number = None);

@@ -70,8 +70,8 @@ impl Fingerprint {
     }
 }
 
-/// BLAKE3 of the length (little-endian u64) and all contents of the file at `path`, in hex; for files that are read as a
-/// whole anyway. Up to 128 KiB, it is that of the fingerprint.
+/// BLAKE3 of the length (little-endian u64) and all contents of the file at `path`, in hex; for files that are read as
+/// a whole anyway. Up to 128 KiB, it is that of the fingerprint.
 ///
 /// # Errors
 /// The file cannot be opened or read.

@@ -1,5 +1,5 @@
-//! Reads typed values from a [`TomlNode`] tree and collects all problems with location and key, so that one run is enough
-//! to fix a manifest.
+//! Reads typed values from a [`TomlNode`] tree and collects all problems with location and key, so that one run is
+//! enough to fix a manifest.
 
 use super::field::Field;
 use super::key::Key;

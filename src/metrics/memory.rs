@@ -4,8 +4,8 @@
 //! value into anonymous and file-backed pages. If no data are mapped, the file-backed pages are the code of the
 //! program, a few MiB that only grow. So [`MemoryPeaks`] computes the peak of anonymous memory as `VmHWM` minus the
 //! largest sampled file-backed part, which misses nothing between two samples. If frames are mapped, their pages come
-//! and go, and would be counted. Then the peak is the largest sample of `RssAnon` ([`MemoryPeaks::use_samples_only`]), so
-//! samples must be taken where it is highest, at the ends of phases.
+//! and go, and would be counted. Then the peak is the largest sample of `RssAnon` ([`MemoryPeaks::use_samples_only`]),
+//! so samples must be taken where it is highest, at the ends of phases.
 
 use std::fs;
 

@@ -128,8 +128,7 @@ fn decode(
         }
         _ => None,
     };
-    let mut loaded = decoded(setup, task, frame, read, &file)?;
-    loaded.notes.splice(0..0, notes);
+    let mut loaded = decoded(setup, task, frame, read, &file, notes)?;
     if let (Some(moving), LoadedParticles::Decoded(frame)) = (moving, &mut loaded.particles) {
         frame.shading.velocities = Some(moving);
     }
@@ -153,21 +152,22 @@ pub fn load_particles<'a>(
         true => ParticleFrame::borrowed(particles, setup.picture.origin),
         false => selected(setup, particles.to_owned_particles(), name)?.with_positions(Cow::Owned),
     };
-    let mut loaded = decoded(setup, task, frame, read, name)?;
+    let mut loaded = decoded(setup, task, frame, read, name, Vec::new())?;
     loaded.finish(setup)?;
     loaded.read_time = start.elapsed();
     Ok(loaded)
 }
 
-/// Extracts from `frame`, which was read from `file` with `read` particles, what the image of `task` needs.
+/// Extracts from `frame`, which was read from `file` with `read` particles, what the image of `task` needs; adds its notes to
+/// `notes`.
 fn decoded<'a>(
     setup: &Setup,
     task: &ImageTask,
     frame: SharedFrame<'a>,
     read: u64,
     file: &str,
+    mut notes: Vec<String>,
 ) -> Result<LoadedFrame<'a>, LoadError> {
-    let mut notes = Vec::new();
     if frame.is_empty() && read > 0 && frame.dropped == 0 {
         notes.push(format!(
             "frame {}: none of {read} particles is selected; see [select] and [[clip]]",

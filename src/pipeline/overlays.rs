@@ -7,7 +7,8 @@ use crate::render::Film;
 use crate::scene::{Camera, Projection, RgbEncoding};
 
 impl Setup {
-    /// Lengths of the scene in the height of the picture, in perspective at the distance of the centre of the particles.
+    /// Lengths of the scene in the height of the picture, in perspective at the distance of the centre of the
+    /// particles.
     pub fn units_per_height(&self, camera: &Camera) -> f64 {
         if let Projection::Orthographic { height } = camera.projection() {
             return height;

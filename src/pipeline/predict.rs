@@ -187,8 +187,8 @@ pub struct MemoryModel<'a> {
 }
 
 /// Memory of the program: its data, the stacks of its threads and small allocations; large allocations are returned
-/// to the system when they are freed ([`RETURN_THRESHOLD`]). Measured on sequences of up to 1e6 particles, as the remainder
-/// of the other parts.
+/// to the system when they are freed ([`RETURN_THRESHOLD`]). Measured on sequences of up to 1e6 particles, as the
+/// remainder of the other parts.
 const PROGRAM: u64 = 3 << 20;
 /// Additional memory per thread.
 const THREAD: u64 = 256 << 10;

@@ -127,8 +127,9 @@ fn blocks(film: &Film) -> Vec<f32> {
     (0..64).map(mean).collect()
 }
 
-/// Distance from the middle of the picture beyond which no block shows the ball of [`every_kind_of_light_makes_caustics`].
-/// The ball magnifies what is below it, and the error of single kernels with it.
+/// Distance from the middle of the picture beyond which no block shows the ball of
+/// [`every_kind_of_light_makes_caustics`]. The ball magnifies what is below it, and the error of single kernels with
+/// it.
 const SILHOUETTE: f32 = 1.65;
 
 /// Whether the middle of a block is farther than `distance` from that of the picture.

@@ -24,7 +24,8 @@ const MIN_SAMPLE_WIDTH: f32 = 0.125;
 
 /// A scene ready to be rendered.
 pub(super) struct RenderContext<'a> {
-    /// All shapes but panes, soft spray and particles that are not fully opaque; the ground comes first, because it is the cheapest.
+    /// All shapes but panes, soft spray and particles that are not fully opaque; the ground comes first, because it is
+    /// the cheapest.
     pub(super) shapes: Vec<&'a dyn Shape>,
     /// Meshes that rays pass.
     pub(super) panes: Vec<&'a dyn Shape>,

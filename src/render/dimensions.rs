@@ -8,7 +8,8 @@ pub(super) const BOUNCED: u32 = 2;
 pub(super) const CAMERA: u32 = 3;
 
 /// Dimensions of a path at one vertex: the choice between specular rays, the continuation of a long path, the
-/// direction of a diffuse reflection or the microfacet of a rough interface, and a direction towards the environment. Those of lights follow.
+/// direction of a diffuse reflection or the microfacet of a rough interface, and a direction towards the environment.
+/// Those of lights follow.
 pub(super) const BRANCH: u32 = 0;
 pub(super) const CONTINUATION: u32 = 1;
 pub(super) const BSDF: u32 = 2;

@@ -200,9 +200,9 @@ impl Film {
         }
     }
 
-    /// Makes this a film of that size with these channels, and with the features for denoising if `has_features`. If it is one already, its memory and content stay; the
-    /// renderer sets every pixel. New planes are not written here, so that the page faults of their first use are
-    /// shared by all tracing threads.
+    /// Makes this a film of that size with these channels, and with the features for denoising if `has_features`. If it
+    /// is one already, its memory and content stay; the renderer sets every pixel. New planes are not written here, so
+    /// that the page faults of their first use are shared by all tracing threads.
     pub(super) fn fit(&mut self, width: u32, height: u32, channels: Channels, has_features: bool) {
         let is_fit = (self.width, self.height) == (width, height)
             && self.channels == channels

@@ -59,7 +59,8 @@ impl LightSplit {
         self.sum = *radiance;
     }
 
-    /// Divides what was added to `radiance` since the last call between diffuse and specular light, by [`Self::diffuse`].
+    /// Divides what was added to `radiance` since the last call between diffuse and specular light, by
+    /// [`Self::diffuse`].
     pub(super) fn take_reflected(&mut self, radiance: &Lanes3) {
         if !self.is_active {
             return;

@@ -159,8 +159,8 @@ pub fn floor_light_bytes(scene: &Scene, settings: &RenderSettings) -> u64 {
 /// Renders one image on the current rayon pool.
 ///
 /// The aspect ratio of the camera should be that of the image, `settings.width / settings.height` without a window. No
-/// light is created: `reflection` and `transmission` are at most 1, which is checked, so the background never contributes
-/// more to a ray than its brightest colour.
+/// light is created: `reflection` and `transmission` are at most 1, which is checked, so the background never
+/// contributes more to a ray than its brightest colour.
 ///
 /// # Errors
 /// If `stop` is raised (checked for each packet of samples), or if a setting is out of range.

@@ -359,8 +359,8 @@ impl PathIntegrator<'_> {
         visible
     }
 
-    /// Traces the shadow rays of the light samples, and multiplies their radiance by the transmittance. Returns the lanes
-    /// in which the light arrives.
+    /// Traces the shadow rays of the light samples, and multiplies their radiance by the transmittance. Returns the
+    /// lanes in which the light arrives.
     fn trace_samples(
         &self,
         occlusion: Occlusion,

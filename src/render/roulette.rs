@@ -13,8 +13,8 @@ use super::{
 };
 
 /// Path weight in a connected body from which both rays are traced, per sample of a pixel: the threshold grows with
-/// the number of samples, because many samples average out the noise of a random choice. Bounded by [`MIN_SPLIT_WEIGHT`]
-/// for few samples.
+/// the number of samples, because many samples average out the noise of a random choice. Bounded by
+/// [`MIN_SPLIT_WEIGHT`] for few samples.
 const SPLIT_WEIGHT: f32 = 1.0 / 80.0;
 
 /// A ray with this weight is visible in an image of one sample per pixel.

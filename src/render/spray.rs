@@ -2,8 +2,8 @@
 //! many of them are a white cluster.
 //!
 //! A ray that enters a drop ends there with the probability of its opacity along the ray, or else passes it, as it
-//! passes a pane. Shadow rays are attenuated by all drops that they enter. The drop in which a ray starts does not count:
-//! the BSDF (`bsdf/foam.rs`) has the light that it scatters itself.
+//! passes a pane. Shadow rays are attenuated by all drops that they enter. The drop in which a ray starts does not
+//! count: the BSDF (`bsdf/foam.rs`) has the light that it scatters itself.
 
 use super::{
     context::RenderContext, dimensions::SPRAY, lights::LightSamples, sampler::get_1d_lanes,

@@ -90,7 +90,8 @@ pub(super) fn stereo(manifest: &Manifest) -> Option<StereoSettings> {
     })
 }
 
-/// The survey with the corners of `meshes` among the outermost particles, if `manifest` says that the camera shows them.
+/// The survey with the corners of `meshes` among the outermost particles, if `manifest` says that the camera shows
+/// them.
 /// `meshes` has one for each entry of the manifest.
 pub fn with_framed_meshes<'a>(
     survey: &'a Survey,

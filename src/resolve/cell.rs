@@ -9,8 +9,8 @@ use crate::scene::{Finish, MeshFinish, MeshMaterial, Scene};
 use crate::surface::MaterialId;
 use crate::survey::Survey;
 
-/// Automatic radius of the edges as a fraction of the diagonal of the cell: lines 3 pixels wide in a picture 1000 pixels
-/// high.
+/// Automatic radius of the edges as a fraction of the diagonal of the cell: lines 3 pixels wide in a picture 1000
+/// pixels high.
 const RADIUS: f64 = 0.0015;
 
 /// How the cell is drawn, if it is visible. Adds its material to those of the meshes of `scene`.

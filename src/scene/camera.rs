@@ -198,7 +198,8 @@ impl Camera {
         Self { stereo, ..self }
     }
 
-    /// The ray from the eye through `film`, in units of the image: (0, 0) is the top left corner, (1, 1) the bottom right one.
+    /// The ray from the eye through `film`, in units of the image: (0, 0) is the top left corner, (1, 1) the bottom
+    /// right one.
     pub fn ray(&self, film: Vec2) -> Ray {
         let d = Vec2::new(2.0 * film.x - 1.0, 1.0 - 2.0 * film.y) * self.half_extent;
         let on_axes = self.projection.direction(d.to_array());

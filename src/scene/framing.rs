@@ -98,8 +98,8 @@ impl Framed {
         self.radius * libm::hypot(1.0, t)
     }
 
-    /// The nearest view with all spheres in the image, with a margin of [`BOX_MARGIN`] or [`SPHERES_MARGIN`]. Also works
-    /// for a single point, and for points in a plane.
+    /// The nearest view with all spheres in the image, with a margin of [`BOX_MARGIN`] or [`SPHERES_MARGIN`]. Also
+    /// works for a single point, and for points in a plane.
     pub fn view(&self, framing: &Framing) -> CameraView {
         // Find the axes of the view
         let axes = ViewAxes::new(framing);
@@ -162,8 +162,8 @@ impl Framed {
     }
 }
 
-/// Shift across the view and distance along it at which all `places` lie within the half extent `t`, with spheres that need `reach`
-/// more. Places are positions across and along the view.
+/// Shift across the view and distance along it at which all `places` lie within the half extent `t`, with spheres that
+/// need `reach` more. Places are positions across and along the view.
 fn fit(places: &[[f64; 2]], reach: f64, t: f64) -> (f64, f64) {
     let mut high = f64::NEG_INFINITY;
     let mut low = f64::INFINITY;

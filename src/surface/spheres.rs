@@ -185,7 +185,8 @@ impl Shape for SphereSurface<'_> {
     }
 }
 
-/// Intersections of rays and spheres for the lanes in `hit_lanes`, with the operations of [`sphere_hit`] in the same order.
+/// Intersections of rays and spheres for the lanes in `hit_lanes`, with the operations of [`sphere_hit`] in the same
+/// order.
 #[inline(always)]
 fn intersections_body(
     rays: &RayPacket,

@@ -152,8 +152,8 @@ impl RgbAttribute {
     }
 }
 
-/// What a job needs to know. The spacing of neighbours is that of all particles, everything else is about those that are
-/// drawn.
+/// What a job needs to know. The spacing of neighbours is that of all particles, everything else is about those that
+/// are drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Question<'a> {
     /// Colours.

@@ -43,8 +43,8 @@ fn picture(workshop: &Workshop, out: &str, options: &[&str]) -> Picture {
     Picture::open(&workshop.join(out))
 }
 
-/// Columns and rows of pixels at edges of the cell in its front, y = -2, 8 units from the camera. The picture is 5 units
-/// high there, with 12 pixels per unit.
+/// Columns and rows of pixels at edges of the cell in its front, y = -2, 8 units from the camera. The picture is 5
+/// units high there, with 12 pixels per unit.
 const EDGES: [[usize; 2]; 6] = [
     // The left edge leans from x = -2 at the bottom to -1 at the top: at z = -1, 0 and 1
     [24, 42],

@@ -22,7 +22,8 @@ pub(super) struct AtomTable {
 }
 
 impl AtomTable {
-    /// No atoms yet. They have attributes of one integer each, called `whole`, and of real numbers: names and components.
+    /// No atoms yet. They have attributes of one integer each, called `whole`, and of real numbers: names and
+    /// components.
     pub(super) fn new(
         whole: &[&'static str],
         real: &[(&'static str, usize)],

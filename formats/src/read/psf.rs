@@ -1,7 +1,7 @@
 //! PSF files of CHARMM and X-PLOR: the properties of the atoms of a simulation, without positions.
 //!
-//! Text. The first line begins with `PSF`. Behind a count and `!NATOM` is a line for each atom: number, segment, residue,
-//! name of the residue, name, type, charge, mass. Nothing else of it is read. After the manual of CHARMM.
+//! Text. The first line begins with `PSF`. Behind a count and `!NATOM` is a line for each atom: number, segment,
+//! residue, name of the residue, name, type, charge, mass. Nothing else of it is read. After the manual of CHARMM.
 
 use super::atoms::{self, ELEMENT, RESIDUE};
 use super::text::{self, Lines};

@@ -270,8 +270,8 @@ impl Sequence {
         Ok(())
     }
 
-    /// Adds to all frames the properties of their atoms that the file at `path` has and they have not: elements, residues
-    /// and others that do not change. The file is a PSF, or has any format with particles.
+    /// Adds to all frames the properties of their atoms that the file at `path` has and they have not: elements,
+    /// residues and others that do not change. The file is a PSF, or has any format with particles.
     ///
     /// # Errors
     /// The file cannot be read. A frame with another number of atoms fails when it is loaded.
@@ -318,7 +318,8 @@ impl Sequence {
         self.lone_file(index).filter(is_native)
     }
 
-    /// The file of frame `index` if that is all there is of the frame, and nothing else in the file. None with a topology.
+    /// The file of frame `index` if that is all there is of the frame, and nothing else in the file. None with a
+    /// topology.
     pub fn lone_file(&self, index: usize) -> Option<&Path> {
         let [part] = self.frames.get(index)?.parts.as_slice() else {
             return None;

@@ -19,7 +19,7 @@ pub(super) struct Topology {
 }
 
 impl Topology {
-    /// Reads the file at `path`, of which the first step counts.
+    /// Reads the first step of the file at `path`.
     pub(super) fn open(path: &Path, budget: MemoryBudget) -> Result<Self, FrameError> {
         let (count, mut attributes) = if psf::is_psf(&crate::open::head(path)?) {
             let bytes = read_whole(path, budget.for_content())?;

@@ -43,7 +43,8 @@ named! {
     }
 }
 
-/// Elevation in degrees at which three axes have equal angles to the view: that of a diagonal of a cube, atan(1/sqrt(2)).
+/// Elevation in degrees at which three axes have equal angles to the view: that of a diagonal of a cube,
+/// atan(1/sqrt(2)).
 const ISOMETRIC_ELEVATION: f64 = 35.264_389_682_754_654;
 
 impl AxisView {

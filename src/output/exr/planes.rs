@@ -175,8 +175,8 @@ fn layers(layers: &Layers, names: &PlaneNames) -> Vec<Plane> {
     all
 }
 
-/// The planes of a film's [`layers`](crate::render::Film::layers): their names in a file, and the indices of their floats
-/// in a pixel.
+/// The planes of a film's [`layers`](crate::render::Film::layers): their names in a file, and the indices of their
+/// floats in a pixel.
 pub fn layer_planes(channels: Channels, names: &PlaneNames) -> Vec<(String, usize)> {
     let planes = layers(&channels.layers, names).into_iter();
     let float = |source| match source {

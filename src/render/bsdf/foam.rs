@@ -1,6 +1,6 @@
-//! Foam and spray: white scattering without a hard boundary between lit and unlit. Light is scattered from both sides of
-//! the surface, the more the closer it is to the normal (wrapped diffuse reflection: Miller et al., "Interactive Editing
-//! and Modeling of Bidirectional Texture Functions", in a form that conserves energy).
+//! Foam and spray: white scattering without a hard boundary between lit and unlit. Light is scattered from both sides
+//! of the surface, the more the closer it is to the normal (wrapped diffuse reflection: Miller et al., "Interactive
+//! Editing and Modeling of Bidirectional Texture Functions", in a form that conserves energy).
 //!
 //! With the cosine `c` between light and normal, the value is `albedo * (c + w) / (pi * (1 + w)^2)` for `c` above `-w`.
 

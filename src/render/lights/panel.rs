@@ -168,8 +168,8 @@ fn between(value: f32, [low, high]: [f32; 2]) -> f32 {
     if value < high { value } else { high }
 }
 
-/// Probability density, per steradian, of a point that is sampled uniformly on the area of the light. `distance2` is the
-/// squared distance of the point, `height` the distance from the plane of the light.
+/// Probability density, per steradian, of a point that is sampled uniformly on the area of the light. `distance2` is
+/// the squared distance of the point, `height` the distance from the plane of the light.
 #[inline(always)]
 fn pdf_of_area(distance2: f32, height: f32, area: f32) -> f32 {
     distance2 * distance2.sqrt() / (height * area)

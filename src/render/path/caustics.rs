@@ -1,5 +1,5 @@
-//! The light of photons on meshes, opaque particles and shadow catchers. It has passed transmissive particles; what arrives straight
-//! from the lights is sampled.
+//! The light of photons on meshes, opaque particles and shadow catchers. It has passed transmissive particles; what
+//! arrives straight from the lights is sampled.
 
 use glam::Vec3;
 

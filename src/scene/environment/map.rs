@@ -108,8 +108,8 @@ impl RadianceMap {
         self.negative
     }
 
-    /// The map in the resolution of environments, for [`Environment::from_map`](super::Environment::from_map): a fraction
-    /// of the memory, and the same environment.
+    /// The map in the resolution of environments, for [`Environment::from_map`](super::Environment::from_map): a
+    /// fraction of the memory, and the same environment.
     #[must_use]
     pub fn reduced(&self) -> Self {
         Self {

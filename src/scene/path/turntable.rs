@@ -5,8 +5,8 @@ use glam::DVec3;
 use crate::scene::framing::view_direction;
 use crate::scene::{CameraView, Framed, Framing};
 
-/// A camera that rotates around particles about the axis through the centre of their box, at constant height and distance, and always
-/// looks at the same point of the axis.
+/// A camera that rotates around particles about the axis through the centre of their box, at constant height and
+/// distance, and always looks at the same point of the axis.
 ///
 /// It is as near as possible with all particles in the picture from all sides: the distance is computed for the circles
 /// on which they rotate, so it does not depend on the frames.

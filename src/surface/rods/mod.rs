@@ -1,8 +1,8 @@
 //! Rods: cylinders, cones and capsules with a radius at each end, for the edges of a simulation cell, bonds, arrows and
 //! trails.
 //!
-//! Each rod is a convex body, and a ray passes through it on one interval (`interval.rs`), which is computed in f64 from
-//! the point of the ray closest to the rod. The surfaces of a rod leave no gap between them, and rods far from the
+//! Each rod is a convex body, and a ray passes through it on one interval (`interval.rs`), which is computed in f64
+//! from the point of the ray closest to the rod. The surfaces of a rod leave no gap between them, and rods far from the
 //! origin are as exact as their coordinates.
 
 use std::fmt;

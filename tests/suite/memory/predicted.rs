@@ -1,5 +1,5 @@
-//! What `check` predicts is what `render` takes: within 15 % and 2 MiB of the peak of anonymous memory. The prediction of a
-//! smooth surface assumes particles that splash, and may be higher.
+//! What `check` predicts is what `render` takes: within 15 % and 2 MiB of the peak of anonymous memory. The prediction
+//! of a smooth surface assumes particles that splash, and may be higher.
 
 use std::fmt::Write as _;
 use std::fs;

@@ -1,7 +1,7 @@
 //! The header of NetCDF classic files, versions 1, 2 and 5 (CDF-1, CDF-2, CDF-5).
 //!
-//! Lists of dimensions, attributes and variables follow the magic number and the number of records. Variables whose first
-//! dimension is the unlimited one are stored by record: a slice of each of them, again and again. After the
+//! Lists of dimensions, attributes and variables follow the magic number and the number of records. Variables whose
+//! first dimension is the unlimited one are stored by record: a slice of each of them, again and again. After the
 //! specification in the NetCDF User's Guide. All numbers are big-endian.
 
 use crate::read::numbers::NumberReader;

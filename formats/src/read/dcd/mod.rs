@@ -41,7 +41,8 @@ impl Reader for Dcd {
         true
     }
 
-    /// As many frames as the file has room for: a simulation that was killed has not updated their number in the header.
+    /// As many frames as the file has room for: a simulation that was killed has not updated their number in the
+    /// header.
     fn steps(
         &self,
         source: &mut ByteSource<'_>,

@@ -1,4 +1,5 @@
-//! Snapshots of GADGET, AREPO, GIZMO, SWIFT and codes like these: groups `PartType0`, `PartType1`... with `Coordinates`.
+//! Snapshots of GADGET, AREPO, GIZMO, SWIFT and codes like these: groups `PartType0`, `PartType1`... with
+//! `Coordinates`.
 
 use std::sync::Arc;
 

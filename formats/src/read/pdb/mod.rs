@@ -1,7 +1,7 @@
 //! Protein Data Bank files: the positions of their atoms, one or many models.
 //!
-//! Text with fixed columns: each line is a record that begins with its name. Models are between `MODEL` and `ENDMDL`, or
-//! end with `END`. Lengths are A. After version 3.3 of the format.
+//! Text with fixed columns: each line is a record that begins with its name. Models are between `MODEL` and `ENDMDL`,
+//! or end with `END`. Lengths are A. After version 3.3 of the format.
 
 use super::atoms::{self, AtomTable, ELEMENT, RESIDUE, coordinate, field};
 use super::input::TextInput;

@@ -112,9 +112,9 @@ impl Cells {
     }
 }
 
-/// Flux in an area of a cell of the first of `levels` at a position, from wide to narrow filters. Whether a filter is used
-/// depends on the photons in the next wider one: its own count would prefer those that contain many by chance, and the
-/// light would grow.
+/// Flux in an area of a cell of the first of `levels` at a position, from wide to narrow filters. Whether a filter is
+/// used depends on the photons in the next wider one: its own count would prefer those that contain many by chance, and
+/// the light would grow.
 fn density(levels: &[Cells], position: [f32; 2]) -> Vec3 {
     let (mut density, mut expected) = (Vec3::ZERO, f32::INFINITY);
     for level in levels.iter().rev() {

@@ -121,8 +121,8 @@ impl Map {
     }
 }
 
-/// The four texels around a position from 0 to 1 in a map of `side` by `side` texels, two or more, with weights that add
-/// up to 1.
+/// The four texels around a position from 0 to 1 in a map of `side` by `side` texels, two or more, with weights that
+/// add up to 1.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

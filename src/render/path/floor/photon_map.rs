@@ -1,8 +1,10 @@
-//! Photons on meshes and opaque particles: a k-d tree of photons, whose density at a point is estimated from the nearest ones (Jensen,
+//! Photons on meshes and opaque particles: a k-d tree of photons, whose density at a point is estimated from the
+//! nearest ones (Jensen,
 //! *Realistic Image Synthesis Using Photon Mapping*, 2001).
 //!
-//! The distance of the farthest of these photons sets the width of the kernel, and its own flux is left out, so that the
-//! mean of the estimate is the density where that is constant. Photons on surfaces of another direction are left out.
+//! The distance of the farthest of these photons sets the width of the kernel, and its own flux is left out, so that
+//! the mean of the estimate is the density where that is constant. Photons on surfaces of another direction are left
+//! out.
 
 use glam::Vec3;
 
@@ -24,8 +26,8 @@ const MIN_NORMAL_COSINE: f32 = 0.7;
 const MAX_SLOPE: f32 = 0.5;
 
 /// Greatest distance of a photon from the point that it lights on a sphere, in radii: a little less than the chord
-/// between points whose normals have the cosine [`MIN_NORMAL_COSINE`], sqrt(2 - 2 * 0.7). The area of the sphere within a
-/// distance is that of a disc, so that the kernel needs no correction.
+/// between points whose normals have the cosine [`MIN_NORMAL_COSINE`], sqrt(2 - 2 * 0.7). The area of the sphere within
+/// a distance is that of a disc, so that the kernel needs no correction.
 const MAX_CHORD: f32 = 0.77;
 
 /// A photon that has arrived at a surface.

@@ -1,5 +1,5 @@
-//! Traces photons of lights through transmissive particles to the ground, meshes and opaque particles (Jensen, "Global illumination
-//! using photon maps", 1996). Photons that get there without passing a particle are left out.
+//! Traces photons of lights through transmissive particles to the ground, meshes and opaque particles (Jensen, "Global
+//! illumination using photon maps", 1996). Photons that get there without passing a particle are left out.
 //!
 //! Photons have fixed numbers and random numbers, and are stored in their order: the maps do not depend on threads.
 
