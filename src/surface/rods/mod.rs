@@ -38,7 +38,8 @@ pub struct Rod {
     pub ends: [Vec3; 2],
     /// Its radius at each end, scene units.
     pub radii: [f32; 2],
-    /// The particles that give each half its colour and other attributes.
+    /// The particles that give each half its colour and other attributes, or indices of its
+    /// [colours](RodTree::with_colors).
     pub particles: [u32; 2],
 }
 
@@ -69,6 +70,8 @@ pub const MAX_RODS: usize = u32::MAX as usize;
 /// Rods with caps of one kind, and their hierarchy.
 pub struct RodTree {
     rods: Vec<Rod>,
+    /// Base colours, linear RGB; empty if all rods have that of their material.
+    colors: Vec<Vec3>,
     caps: Caps,
     hierarchy: Hierarchy,
     /// The largest coordinate of their boxes.
@@ -97,10 +100,18 @@ impl RodTree {
             .map_or(0.0, |[min, max]| min.abs().max(max.abs()).max_element());
         Self {
             rods,
+            colors: Vec::new(),
             caps,
             hierarchy,
             extent,
         }
+    }
+
+    /// Gives each half of a rod the base colour at its index of [`Rod::particles`], linear RGB; halves without one keep
+    /// that of the material.
+    #[must_use]
+    pub fn with_colors(self, colors: Vec<Vec3>) -> Self {
+        Self { colors, ..self }
     }
 
     /// Number of rods.
@@ -118,9 +129,10 @@ impl RodTree {
         self.hierarchy.bounds()
     }
 
-    /// Memory of the rods and their hierarchy, bytes.
+    /// Memory of the rods, their colours and their hierarchy, bytes.
     pub const fn bytes(&self) -> usize {
-        size_of_val(self.rods.as_slice()) + self.hierarchy.bytes()
+        let colors = size_of_val(self.colors.as_slice());
+        size_of_val(self.rods.as_slice()) + colors + self.hierarchy.bytes()
     }
 
     /// The body of the rod with this index.
