@@ -21,6 +21,7 @@ use problem::{Place, Problem, Problems};
 use reader::Section;
 use tree::TomlNode;
 
+mod arrows;
 mod camera;
 mod caustics;
 mod cell;
@@ -72,6 +73,7 @@ mod work;
 #[cfg(test)]
 mod work_tests;
 
+pub use arrows::Arrows;
 pub use camera::{AxisView, Camera, CameraKey, CameraMode, ConvergenceSetting, ProjectionKind};
 pub use cell::Cell;
 pub use channel::{ATTRIBUTE_CHANNEL, Channel, NamedChannel};
@@ -139,6 +141,8 @@ pub struct Manifest {
     pub cell: Cell,
     /// Meshes next to the particles.
     pub meshes: Vec<Mesh>,
+    /// Arrows of vector attributes at the particles.
+    pub arrows: Vec<Arrows>,
     /// What is drawn over previews.
     pub overlays: Vec<Overlay>,
     /// The images.
@@ -184,6 +188,7 @@ impl Manifest {
             lights: Vec::new(),
             cell: Cell::default(),
             meshes: Vec::new(),
+            arrows: Vec::new(),
             overlays: Vec::new(),
             output: Output::default(),
             job: Work::default(),
@@ -282,6 +287,8 @@ impl Manifest {
             Light::keys,
         );
         keys.list("mesh", "mesh", mesh::ABOUT, &mut self.meshes, Mesh::keys);
+        let arrows = &mut self.arrows;
+        keys.list("arrows", "arrows", arrows::ABOUT, arrows, Arrows::keys);
         let overlays = &mut self.overlays;
         keys.list(
             "overlay",
@@ -298,8 +305,14 @@ impl Manifest {
             return;
         };
         let meshes = self.meshes.len();
-        // The simulation cell takes the place of a mesh
-        let max = MaterialId::MAX_MESHES - usize::from(self.cell.visible);
+        let arrows = self.arrows.len();
+        if arrows > MAX_ARROWS {
+            let what = format!("{arrows} kinds of arrows, but at most {MAX_ARROWS} are possible");
+            root.wrong("arrows", &what);
+        }
+        // The simulation cell and arrows take the places of meshes
+        let others = usize::from(self.cell.visible) + arrows.min(MAX_ARROWS);
+        let max = MaterialId::MAX_MESHES - others;
         if meshes > max {
             root.wrong(
                 "mesh",
@@ -500,6 +513,7 @@ impl Manifest {
             ("clip", NO_CLIPS, self.clips.is_empty()),
             ("light", AUTO_LIGHTS, self.lights.is_empty()),
             ("mesh", NO_MESHES, self.meshes.is_empty()),
+            ("arrows", NO_ARROWS, self.arrows.is_empty()),
             ("overlay", NO_OVERLAYS, self.overlays.is_empty()),
         ] {
             if is_empty {
@@ -525,6 +539,7 @@ impl Manifest {
         manifest.clips = Clip::examples();
         manifest.lights = Light::examples();
         manifest.meshes = vec![Mesh::default()];
+        manifest.arrows = vec![Arrows::default()];
         manifest.overlays = Overlay::examples();
         manifest
     }
@@ -554,6 +569,11 @@ const AUTO_LIGHTS: &str = "Without [[light]], a key light and a soft fill light 
                            directional light has a direction instead of position and falloff.";
 
 const NO_MESHES: &str = "Tanks, obstacles and other bodies that are not particles.";
+
+/// Maximum number of kinds of arrows.
+const MAX_ARROWS: usize = 16;
+
+const NO_ARROWS: &str = "Arrows show attributes with three components at the particles.";
 
 /// Maximum number of overlays.
 const MAX_OVERLAYS: usize = 64;

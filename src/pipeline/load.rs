@@ -9,6 +9,7 @@ use glam::{DVec3, Vec3};
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{FrameError, ParticleFrame, PositionSlice, RawParticles};
 
+use super::arrows::arrows_of;
 use super::decoded::{DecodedFrame, particle_with_id};
 use super::facts::FileFacts;
 use super::in_place::{Opened, StoredFrame};
@@ -176,12 +177,13 @@ fn decoded<'a>(
     }
     let (time, dropped) = (frame.time, frame.dropped);
     let focus = focus_point(setup, &frame, file)?;
-    let rods = rods_of(
+    let mut rods = rods_of(
         cell_style(setup),
         frame.cell.as_ref(),
         task.frame,
         &mut notes,
     );
+    rods.extend(arrows_of(setup, &frame, (task.frame, file), &mut notes)?);
     let facts = FileFacts::of_decoded(setup, &frame, without_directory(file));
     let (particles, clamped_radii) = DecodedFrame::of(setup, frame, task.frame, file)?;
     Ok(LoadedFrame {

@@ -27,6 +27,7 @@ use crate::render::{Film, floor_light_bytes, scratch_bytes};
 use crate::scene::ground::Pattern;
 use crate::scene::{Environment, Ground};
 use crate::surface::SurfaceKind;
+use crate::surface::rods::RodTree;
 use crate::surface::spray::SOFT_DROPS;
 use crate::survey::FrameWeight;
 
@@ -252,21 +253,34 @@ impl<'a> MemoryModel<'a> {
         }
     }
 
-    /// The same, with the meshes of the frame, which are read after its particles.
+    /// Upper bounds of the memory of the arrows of a frame: while they are made, and afterwards.
+    fn arrows(&self, frame: &FrameSize) -> SurfaceBytes {
+        let styles = self.setup.picture.arrows.iter();
+        let rods = styles.map(|style| 2 * frame.particles.div_ceil(u64::from(style.every.max(1))));
+        let [building, kept] = RodTree::predicted_bytes(rods.sum());
+        SurfaceBytes { building, kept }
+    }
+
+    /// The same, with the arrows and the meshes of the frame, which are made and read after its particles.
     fn reading_with_meshes(&self, frame: &FrameSize) -> u64 {
-        match frame.meshes {
-            0 => self.reading(frame),
-            bytes => {
-                // Those of the next frame are read beside them
-                let slices = u64::from(self.setup.slices());
-                let slices = match slices {
-                    1 => 0,
-                    _ => (slices * KEPT_PER_MESH_BYTE + READ_PER_MESH_BYTE).saturating_mul(bytes),
-                };
-                let meshes = self.kept(frame) + READ_PER_MESH_BYTE.saturating_mul(bytes) + slices;
-                self.reading(frame).max(meshes)
+        let arrows = self.arrows(frame).building;
+        arrows
+            + match frame.meshes {
+                0 => self.reading(frame),
+                bytes => {
+                    // Those of the next frame are read beside them
+                    let slices = u64::from(self.setup.slices());
+                    let slices = match slices {
+                        1 => 0,
+                        _ => {
+                            (slices * KEPT_PER_MESH_BYTE + READ_PER_MESH_BYTE).saturating_mul(bytes)
+                        }
+                    };
+                    let meshes =
+                        self.kept(frame) + READ_PER_MESH_BYTE.saturating_mul(bytes) + slices;
+                    self.reading(frame).max(meshes)
+                }
             }
-        }
     }
 
     /// Bytes of a native frame that is not mapped.
@@ -499,8 +513,9 @@ impl<'a> MemoryModel<'a> {
         // Add up each phase: reading, building, tracing, encoding
         let kept = self.kept(frame);
         let surface = self.surface(frame);
-        let meshes =
-            self.meshes + KEPT_PER_MESH_BYTE * frame.meshes * u64::from(self.setup.slices());
+        let meshes = self.meshes
+            + KEPT_PER_MESH_BYTE * frame.meshes * u64::from(self.setup.slices())
+            + self.arrows(frame).kept;
         let names = mattes::predicted_bytes(self.setup, frame.particles);
         let first_read = MemoryNeed {
             reading: self.reading_with_meshes(frame),

@@ -17,7 +17,8 @@ use crate::scene::{
     Projection, Scene, StereoSettings,
 };
 use crate::selection::Selection;
-use crate::surface::{SurfaceKind, SurfaceSettings};
+use crate::surface::rods::Anchor;
+use crate::surface::{MaterialId, SurfaceKind, SurfaceSettings};
 use crate::survey::FrameWeight;
 
 /// Source of the radii.
@@ -104,6 +105,25 @@ impl OpacityRule {
     }
 }
 
+/// How the arrows of an attribute are drawn.
+#[derive(Debug, Clone)]
+pub struct ArrowStyle {
+    /// Name of the attribute, which has three components.
+    pub attribute: String,
+    /// Length of an arrow per unit of the attribute, scene units.
+    pub scale: f64,
+    /// Radius of the shafts, scene units.
+    pub radius: f32,
+    /// Only particles whose id is a multiple of this have arrows; without ids, it is their place in the file.
+    pub every: u32,
+    /// The point of an arrow that is at its particle.
+    pub anchor: Anchor,
+    /// Their colours; None if all have that of the material.
+    pub color: Option<ColorRule>,
+    /// Their material, which is one of those of meshes.
+    pub material: MaterialId,
+}
+
 /// An attribute with channels in the images.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AttributeChannel {
@@ -160,6 +180,8 @@ pub struct Picture {
     pub meshes: Vec<PictureMesh>,
     /// How the simulation cell is drawn, if it is.
     pub cell: Option<CellStyle>,
+    /// Arrows of vector attributes.
+    pub arrows: Vec<ArrowStyle>,
     /// The renderer.
     pub renderer: RendererKind,
     /// Image size, samples, depth, channels.
@@ -335,6 +357,11 @@ impl Setup {
             return Some(
                 "[select] and [[clip]] take those that are drawn from a copy of them, 12 bytes per particle and more"
                     .to_owned(),
+            );
+        }
+        if !self.picture.arrows.is_empty() {
+            return Some(
+                "arrows are made from a copy of them, 12 bytes per particle and more".to_owned(),
             );
         }
         if self.has_motion() {

@@ -6,6 +6,7 @@ mod simd;
 
 mod architecture;
 mod arithmetic;
+mod arrows;
 mod bad_input;
 mod camera;
 mod cell;

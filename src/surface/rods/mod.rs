@@ -9,12 +9,14 @@ use std::fmt;
 
 use glam::{DVec3, Vec3};
 
+mod arrow;
 mod interval;
 mod shape;
 
 #[cfg(test)]
 mod tests;
 
+pub use arrow::{Anchor, arrow};
 pub use shape::RodSurface;
 
 use super::hierarchy::Hierarchy;
@@ -66,6 +68,11 @@ impl Rod {
 
 /// Greatest number of rods.
 pub const MAX_RODS: usize = u32::MAX as usize;
+
+/// Memory of a rod with its share of the hierarchy, and with a colour, bytes.
+const KEPT_BYTES: u64 = 120;
+/// The same while the hierarchy is built: boxes and a binary tree.
+const BUILT_BYTES: u64 = 400;
 
 /// Rods with caps of one kind, and their hierarchy.
 pub struct RodTree {
@@ -133,6 +140,14 @@ impl RodTree {
     pub const fn bytes(&self) -> usize {
         let colors = size_of_val(self.colors.as_slice());
         size_of_val(self.rods.as_slice()) + colors + self.hierarchy.bytes()
+    }
+
+    /// Upper bounds of the memory of `rods` rods with a colour each, bytes: while the tree is built, and afterwards.
+    pub const fn predicted_bytes(rods: u64) -> [u64; 2] {
+        [
+            rods.saturating_mul(BUILT_BYTES),
+            rods.saturating_mul(KEPT_BYTES),
+        ]
     }
 
     /// The body of the rod with this index.
