@@ -257,6 +257,7 @@ pub fn setup(
     let denoise = denoise::settings(manifest, &scene.material)?;
     render.has_features = denoise.is_some();
     let arrows = arrows::arrows(manifest, survey, &color, reach.x)?;
+    let trails = arrows::trails(manifest, survey, &color, reach.x)?;
     let picture = Picture {
         origin: survey.origin,
         least_radius: narrow(bounds.diagonal() * LEAST_RADIUS).max(f32::MIN_POSITIVE),
@@ -276,6 +277,7 @@ pub fn setup(
         meshes: Vec::new(),
         cell: None,
         arrows,
+        trails,
         renderer: crate::render::RendererKind::default(),
         render,
         denoise,

@@ -67,6 +67,7 @@ mod sun;
 mod surface;
 #[cfg(test)]
 mod tests;
+mod trails;
 mod tree;
 mod value;
 mod work;
@@ -106,6 +107,7 @@ pub use render::{GroundPattern, Image, IndirectSetting, Render};
 pub use schema::{SCHEMA_FILE, job_schema};
 pub use select::{Axis, Select, Slab};
 pub use sun::Sun;
+pub use trails::Trails;
 pub use tree::{Override, OverrideError};
 pub use value::FlagKind;
 pub use work::{MAX_THREADS, ProgressMode, STOP_FILE, Work};
@@ -141,6 +143,8 @@ pub struct Manifest {
     pub cell: Cell,
     /// Meshes next to the particles.
     pub meshes: Vec<Mesh>,
+    /// Trails of the particles over earlier frames.
+    pub trails: Trails,
     /// Arrows of vector attributes at the particles.
     pub arrows: Vec<Arrows>,
     /// What is drawn over previews.
@@ -188,6 +192,7 @@ impl Manifest {
             lights: Vec::new(),
             cell: Cell::default(),
             meshes: Vec::new(),
+            trails: Trails::default(),
             arrows: Vec::new(),
             overlays: Vec::new(),
             output: Output::default(),
@@ -276,6 +281,7 @@ impl Manifest {
             self.environment.keys(keys);
         });
         keys.section("cell", Cell::ABOUT, |keys| self.cell.keys(keys));
+        keys.section("trails", Trails::ABOUT, |keys| self.trails.keys(keys));
         keys.section("output", Output::ABOUT, |keys| self.output.keys(keys));
         keys.section("job", Work::ABOUT, |keys| self.job.all_keys(keys));
         keys.list("clip", "clip", clip::ABOUT, &mut self.clips, Clip::keys);
@@ -310,8 +316,10 @@ impl Manifest {
             let what = format!("{arrows} kinds of arrows, but at most {MAX_ARROWS} are possible");
             root.wrong("arrows", &what);
         }
-        // The simulation cell and arrows take the places of meshes
-        let others = usize::from(self.cell.visible) + arrows.min(MAX_ARROWS);
+        // The simulation cell, arrows and trails take the places of meshes
+        let others = usize::from(self.cell.visible)
+            + usize::from(self.trails.frames > 0)
+            + arrows.min(MAX_ARROWS);
         let max = MaterialId::MAX_MESHES - others;
         if meshes > max {
             root.wrong(

@@ -50,6 +50,18 @@ pub(super) fn arrows_of(
     Ok(all)
 }
 
+/// The particles of `frame` whose id is a multiple of `every`; without ids, it is their place in the file.
+pub(super) fn every_nth(frame: &SharedFrame<'_>, every: u32) -> Vec<usize> {
+    let all = 0..frame.len();
+    if every <= 1 {
+        return all.collect();
+    }
+    match ids(frame) {
+        Some(ids) => all.filter(|i| ids[*i].is_multiple_of(every)).collect(),
+        None => all.step_by(every as usize).collect(),
+    }
+}
+
 /// The arrows of an attribute.
 struct Arrows {
     rods: Vec<Rod>,
@@ -61,18 +73,12 @@ struct Arrows {
 
 impl Arrows {
     fn new(style: &ArrowStyle, frame: &SharedFrame<'_>, vectors: &Attribute) -> Self {
-        let ids = (style.every > 1).then(|| ids(frame)).flatten();
-        let has_arrow = |particle: usize| match (&ids, u32::try_from(particle)) {
-            (Some(ids), _) => ids[particle] % style.every == 0,
-            (None, Ok(index)) => index % style.every.max(1) == 0,
-            (None, Err(_)) => false,
-        };
         let mut arrows = Self {
             rods: Vec::new(),
             owners: Vec::new(),
             not_finite: 0,
         };
-        for particle in (0..frame.len()).filter(|particle| has_arrow(*particle)) {
+        for particle in every_nth(frame, style.every) {
             let point = frame.positions[particle];
             let vector = scaled(vectors, particle, style.scale);
             if !(vector.length_squared().is_finite() && (point + vector).is_finite()) {

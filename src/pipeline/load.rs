@@ -19,6 +19,7 @@ use super::motion::velocities_to_next;
 use super::predict::{FrameSize, MemoryModel};
 use super::rods::{CellStyle, FrameRods, rods_of};
 use super::setup::{Picture, Setup};
+use super::trails::trails_of;
 use super::{ImageTask, SharedFrame};
 use crate::metrics::memory::{available, process_room};
 use crate::overlay::Overlay;
@@ -129,8 +130,10 @@ fn decode(
         }
         _ => None,
     };
+    let trails = trails_of(setup, sequence, task, (&frame, read), &mut notes)?;
     let mut loaded = decoded(setup, task, frame, read, &file)?;
     loaded.notes.splice(0..0, notes);
+    loaded.rods.extend(trails);
     if let (Some(moving), LoadedParticles::Decoded(frame)) = (moving, &mut loaded.particles) {
         frame.shading.velocities = Some(moving);
     }

@@ -34,6 +34,7 @@ mod single;
 mod stages;
 mod surface;
 mod trace;
+mod trails;
 mod work;
 
 pub use decoded::{DecodedFrame, DecodedShading};
@@ -51,6 +52,7 @@ pub use rods::{CellStyle, FrameRods};
 pub use schedule::{Overlap, Schedule};
 pub use setup::{
     ArrowStyle, AttributeChannel, ColorRule, OpacityRule, Picture, RadiusRule, RunSettings, Setup,
+    TrailStyle,
 };
 pub use shutter::{FrameStep, Shutter};
 pub use single::{PictureKind, make_image, make_picture, trace_particles};

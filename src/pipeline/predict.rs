@@ -253,11 +253,14 @@ impl<'a> MemoryModel<'a> {
         }
     }
 
-    /// Upper bounds of the memory of the arrows of a frame: while they are made, and afterwards.
+    /// Upper bounds of the memory of the arrows and trails of a frame: while they are made, and afterwards.
     fn arrows(&self, frame: &FrameSize) -> SurfaceBytes {
-        let styles = self.setup.picture.arrows.iter();
-        let rods = styles.map(|style| 2 * frame.particles.div_ceil(u64::from(style.every.max(1))));
-        let [building, kept] = RodTree::predicted_bytes(rods.sum());
+        let picture = &self.setup.picture;
+        let share = |every: u32| frame.particles.div_ceil(u64::from(every.max(1)));
+        let arrows = picture.arrows.iter().map(|style| 2 * share(style.every));
+        let trails = picture.trails.iter();
+        let trails = trails.map(|style| share(style.every).saturating_mul(style.frames.into()));
+        let [building, kept] = RodTree::predicted_bytes(arrows.chain(trails).sum());
         SurfaceBytes { building, kept }
     }
 
@@ -314,10 +317,13 @@ impl<'a> MemoryModel<'a> {
         };
         let held = rounding.max(keeping) + self.file_indices(frame);
         let reading = (files + frame.raw).max(shared + held.max(selecting));
-        match self.setup.moves_to_next_frame() {
-            // The next frame is read beside it, and its ids are sorted
-            true => frame.raw + 12 * n + reading + 16 * n,
-            false => reading,
+        // Neighbouring frames are read beside it one at a time, and their ids are sorted
+        let beside = frame.raw + 12 * n + reading + 16 * n;
+        match (self.setup.moves_to_next_frame(), &self.setup.picture.trails) {
+            // Ids of the frame, and the ends of trails
+            (_, Some(_)) => beside + 32 * n,
+            (true, None) => beside,
+            (false, None) => reading,
         }
     }
 

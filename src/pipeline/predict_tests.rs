@@ -1,7 +1,7 @@
 //! Tests of the model alone; `tests/suite/memory` compares it with measurements.
 
 use super::*;
-use crate::pipeline::{ArrowStyle, Overlap};
+use crate::pipeline::{ArrowStyle, Overlap, TrailStyle};
 use crate::surface::MaterialId;
 use crate::surface::rods::Anchor;
 
@@ -142,7 +142,7 @@ fn light_groups_have_planes() {
 }
 
 #[test]
-fn arrows_are_counted() {
+fn arrows_and_trails_are_counted() {
     let mut setup = setup();
     let alone = |setup: &Setup| MemoryModel::new(setup).alone(&plain(1_000_000));
     let none = alone(&setup);
@@ -164,5 +164,19 @@ fn arrows_are_counted() {
     assert!(
         few.total() < none.total() + each(2, 100) / 10,
         "{none}\n{few}"
+    );
+    // A rod for each frame, and another frame beside the one that is read
+    setup.picture.arrows.clear();
+    setup.picture.trails = Some(TrailStyle {
+        frames: 5,
+        radius: 0.1,
+        every: 1,
+        color: None,
+        material: MaterialId::PARTICLES,
+    });
+    let trails = alone(&setup);
+    assert!(
+        trails.total() >= none.total() + each(5, 100),
+        "{none}\n{trails}"
     );
 }

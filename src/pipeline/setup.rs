@@ -124,6 +124,28 @@ pub struct ArrowStyle {
     pub material: MaterialId,
 }
 
+/// How the trails of particles over earlier frames are drawn.
+#[derive(Debug, Clone)]
+pub struct TrailStyle {
+    /// Number of earlier frames.
+    pub frames: u32,
+    /// Radius at the particles, scene units.
+    pub radius: f32,
+    /// Only particles whose id is a multiple of this have trails; without ids, it is their place in the file.
+    pub every: u32,
+    /// Their colours; None if all have that of the material.
+    pub color: Option<ColorRule>,
+    /// Their material, which is one of those of meshes.
+    pub material: MaterialId,
+}
+
+impl TrailStyle {
+    /// The radius where the particle was `age` frames ago.
+    pub(super) fn radius_at(&self, age: u32) -> f32 {
+        self.radius * (self.frames - age.min(self.frames)) as f32 / self.frames as f32
+    }
+}
+
 /// An attribute with channels in the images.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AttributeChannel {
@@ -182,6 +204,8 @@ pub struct Picture {
     pub cell: Option<CellStyle>,
     /// Arrows of vector attributes.
     pub arrows: Vec<ArrowStyle>,
+    /// Trails over earlier frames, if they are drawn.
+    pub trails: Option<TrailStyle>,
     /// The renderer.
     pub renderer: RendererKind,
     /// Image size, samples, depth, channels.
@@ -359,9 +383,10 @@ impl Setup {
                     .to_owned(),
             );
         }
-        if !self.picture.arrows.is_empty() {
+        if !self.picture.arrows.is_empty() || self.picture.trails.is_some() {
             return Some(
-                "arrows are made from a copy of them, 12 bytes per particle and more".to_owned(),
+                "arrows and trails are made from a copy of them, 12 bytes per particle and more"
+                    .to_owned(),
             );
         }
         if self.has_motion() {

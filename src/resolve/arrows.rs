@@ -1,8 +1,8 @@
-//! Arrows of vector attributes.
+//! Arrows of vector attributes, and trails.
 
 use super::{ResolveError, color, narrow, require_attribute};
 use crate::manifest::{ColorMapping, ColorSetting, Manifest, RangeSetting, ScaleKind};
-use crate::pipeline::{ArrowStyle, ColorRule};
+use crate::pipeline::{ArrowStyle, ColorRule, TrailStyle};
 use crate::scene::mesh::DEFAULT_COLOR;
 use crate::scene::{Finish, MeshFinish, MeshMaterial, Scene};
 use crate::surface::MaterialId;
@@ -10,9 +10,13 @@ use crate::survey::{ColorRange, Survey};
 
 const ATTRIBUTE: &str = "arrows.attribute";
 const COLOR: &str = "arrows.color";
+const TRAIL_COLOR: &str = "trails.color";
 
 /// Automatic radius of the shafts in radii of the particles.
 const RADIUS: f64 = 1.0 / 3.0;
+
+/// Automatic radius of trails in radii of the particles.
+const TRAIL_RADIUS: f64 = 0.5;
 
 /// How arrows are drawn. `particles`: the colours of the particles; `reach`: their radius. Their materials follow those
 /// of the meshes and of the cell.
@@ -36,7 +40,7 @@ pub(super) fn arrows(
         let color = match &own.color {
             ColorSetting::Rgb(_) => None,
             ColorSetting::Auto => Some(particles.clone()),
-            ColorSetting::Mapped(by) => Some(mapped(by, survey, &own.attribute)?),
+            ColorSetting::Mapped(by) => Some(mapped(by, survey, &own.attribute, COLOR)?),
         };
         Ok(ArrowStyle {
             attribute: own.attribute.clone(),
@@ -51,16 +55,56 @@ pub(super) fn arrows(
     styles.map(style).collect()
 }
 
-/// Adds the materials of arrows to those of the meshes of `scene`.
-pub(super) fn add_materials(scene: &mut Scene, manifest: &Manifest) {
-    let materials = manifest.arrows.iter().map(|own| MeshMaterial {
-        color: match own.color {
-            ColorSetting::Rgb(color) => color,
-            ColorSetting::Auto | ColorSetting::Mapped(_) => DEFAULT_COLOR,
+/// How trails are drawn, if they are; see [`arrows`]. Their material is the last one.
+///
+/// # Errors
+/// The job follows a simulation, or colours are not determined.
+pub(super) fn trails(
+    manifest: &Manifest,
+    survey: &Survey,
+    particles: &ColorRule,
+    reach: f64,
+) -> Result<Option<TrailStyle>, ResolveError> {
+    let own = &manifest.trails;
+    let others = manifest.meshes.len() + usize::from(manifest.cell.visible) + manifest.arrows.len();
+    let Some(material) = MaterialId::of_mesh(others).filter(|_| own.frames > 0) else {
+        return Ok(None);
+    };
+    if manifest.job.follow {
+        return Err(ResolveError::Unsupported {
+            key: "trails.frames",
+            what: "earlier frames may be completed later when job.follow is set; render the sequence when it is \
+                   complete"
+                .to_owned(),
+        });
+    }
+    Ok(Some(TrailStyle {
+        frames: own.frames,
+        radius: own.radius.unwrap_or_else(|| narrow(TRAIL_RADIUS * reach)),
+        every: own.every,
+        color: match &own.color {
+            ColorSetting::Rgb(_) => None,
+            ColorSetting::Auto => Some(particles.clone()),
+            ColorSetting::Mapped(by) => Some(mapped(by, survey, "velocity", TRAIL_COLOR)?),
         },
-        finish: MeshFinish::Opaque(Finish::Matte),
-        is_holdout: false,
-    });
+        material,
+    }))
+}
+
+/// Adds the materials of arrows and trails to those of the meshes of `scene`.
+pub(super) fn add_materials(scene: &mut Scene, manifest: &Manifest) {
+    let trails = Some(&manifest.trails).filter(|own| own.frames > 0);
+    let arrows = manifest.arrows.iter().map(|own| &own.color);
+    let materials = arrows
+        .chain(trails.map(|own| &own.color))
+        .map(|color| MeshMaterial {
+            color: match color {
+                ColorSetting::Rgb(color) => *color,
+                ColorSetting::Auto | ColorSetting::Mapped(_) => DEFAULT_COLOR,
+            },
+            finish: MeshFinish::Opaque(Finish::Matte),
+            is_holdout: false,
+        });
     scene.meshes.extend(materials);
 }
 
@@ -84,9 +128,14 @@ fn check_attribute(survey: &Survey, name: &str) -> Result<(), ResolveError> {
 }
 
 /// Colours by a value, by default that of the arrows themselves.
-fn mapped(by: &ColorMapping, survey: &Survey, own: &str) -> Result<ColorRule, ResolveError> {
+fn mapped(
+    by: &ColorMapping,
+    survey: &Survey,
+    own: &str,
+    key: &'static str,
+) -> Result<ColorRule, ResolveError> {
     let name = by.attribute.as_deref().unwrap_or(own);
-    let value = color::value_of(survey, name, COLOR)?;
+    let value = color::value_of(survey, name, key)?;
     let surveyed = survey.color.as_ref();
     let surveyed = surveyed.filter(|range| range.attribute.eq_ignore_ascii_case(name));
     let is_given = matches!(by.range, Some(RangeSetting::Values(_)));
@@ -101,7 +150,7 @@ fn mapped(by: &ColorMapping, survey: &Survey, own: &str) -> Result<ColorRule, Re
         },
         _ => {
             return Err(ResolveError::Unsupported {
-                key: COLOR,
+                key,
                 what: format!(
                     "the range of `{name}` is not known; give it as range = [low, high], or colour the particles by \
                      the same value (material.color)"

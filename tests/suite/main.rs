@@ -47,4 +47,5 @@ mod still;
 mod structures;
 mod surface;
 mod thesis;
+mod trails;
 mod verify;
