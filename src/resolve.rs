@@ -18,6 +18,7 @@ use crate::selection::Selection;
 use crate::surface::SurfaceKind;
 use crate::survey::{Question, RadiusQuestion, Survey};
 
+mod arrows;
 mod camera;
 mod cell;
 mod channels;
@@ -255,6 +256,8 @@ pub fn setup(
     render.transparent_background = output.transparent;
     let denoise = denoise::settings(manifest, &scene.material)?;
     render.has_features = denoise.is_some();
+    let arrows = arrows::arrows(manifest, survey, &color, reach.x)?;
+    let trails = arrows::trails(manifest, survey, &color, reach.x)?;
     let picture = Picture {
         origin: survey.origin,
         least_radius: narrow(bounds.diagonal() * LEAST_RADIUS).max(f32::MIN_POSITIVE),
@@ -273,6 +276,8 @@ pub fn setup(
         scene,
         meshes: Vec::new(),
         cell: None,
+        arrows,
+        trails,
         renderer: crate::render::RendererKind::default(),
         render,
         denoise,

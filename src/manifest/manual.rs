@@ -25,7 +25,7 @@ fn manual() -> String {
     let is_list = |table: &&[Entry]| {
         matches!(
             table[0].section.split('.').next(),
-            Some("clip" | "light" | "mesh" | "overlay")
+            Some("clip" | "light" | "mesh" | "arrows" | "overlay")
         )
     };
     tables.sort_by_key(is_list);

@@ -21,6 +21,7 @@ use problem::{Place, Problem, Problems};
 use reader::Section;
 use tree::TomlNode;
 
+mod arrows;
 mod camera;
 mod caustics;
 mod cell;
@@ -66,12 +67,14 @@ mod sun;
 mod surface;
 #[cfg(test)]
 mod tests;
+mod trails;
 mod tree;
 mod value;
 mod work;
 #[cfg(test)]
 mod work_tests;
 
+pub use arrows::Arrows;
 pub use camera::{AxisView, Camera, CameraKey, CameraMode, ConvergenceSetting, ProjectionKind};
 pub use cell::Cell;
 pub use channel::{ATTRIBUTE_CHANNEL, Channel, NamedChannel};
@@ -104,6 +107,7 @@ pub use render::{GroundPattern, Image, IndirectSetting, Render};
 pub use schema::{SCHEMA_FILE, job_schema};
 pub use select::{Axis, Select, Slab};
 pub use sun::Sun;
+pub use trails::Trails;
 pub use tree::{Override, OverrideError};
 pub use value::FlagKind;
 pub use work::{MAX_THREADS, ProgressMode, STOP_FILE, Work};
@@ -139,6 +143,10 @@ pub struct Manifest {
     pub cell: Cell,
     /// Meshes next to the particles.
     pub meshes: Vec<Mesh>,
+    /// Trails of the particles over earlier frames.
+    pub trails: Trails,
+    /// Arrows of vector attributes at the particles.
+    pub arrows: Vec<Arrows>,
     /// What is drawn over previews.
     pub overlays: Vec<Overlay>,
     /// The images.
@@ -184,6 +192,8 @@ impl Manifest {
             lights: Vec::new(),
             cell: Cell::default(),
             meshes: Vec::new(),
+            trails: Trails::default(),
+            arrows: Vec::new(),
             overlays: Vec::new(),
             output: Output::default(),
             job: Work::default(),
@@ -271,6 +281,7 @@ impl Manifest {
             self.environment.keys(keys);
         });
         keys.section("cell", Cell::ABOUT, |keys| self.cell.keys(keys));
+        keys.section("trails", Trails::ABOUT, |keys| self.trails.keys(keys));
         keys.section("output", Output::ABOUT, |keys| self.output.keys(keys));
         keys.section("job", Work::ABOUT, |keys| self.job.all_keys(keys));
         keys.list("clip", "clip", clip::ABOUT, &mut self.clips, Clip::keys);
@@ -282,6 +293,8 @@ impl Manifest {
             Light::keys,
         );
         keys.list("mesh", "mesh", mesh::ABOUT, &mut self.meshes, Mesh::keys);
+        let arrows = &mut self.arrows;
+        keys.list("arrows", "arrows", arrows::ABOUT, arrows, Arrows::keys);
         let overlays = &mut self.overlays;
         keys.list(
             "overlay",
@@ -298,8 +311,16 @@ impl Manifest {
             return;
         };
         let meshes = self.meshes.len();
-        // The simulation cell takes the place of a mesh
-        let max = MaterialId::MAX_MESHES - usize::from(self.cell.visible);
+        let arrows = self.arrows.len();
+        if arrows > MAX_ARROWS {
+            let what = format!("{arrows} kinds of arrows, but at most {MAX_ARROWS} are possible");
+            root.wrong("arrows", &what);
+        }
+        // The simulation cell, arrows and trails take the places of meshes
+        let others = usize::from(self.cell.visible)
+            + usize::from(self.trails.frames > 0)
+            + arrows.min(MAX_ARROWS);
+        let max = MaterialId::MAX_MESHES - others;
         if meshes > max {
             root.wrong(
                 "mesh",
@@ -500,6 +521,7 @@ impl Manifest {
             ("clip", NO_CLIPS, self.clips.is_empty()),
             ("light", AUTO_LIGHTS, self.lights.is_empty()),
             ("mesh", NO_MESHES, self.meshes.is_empty()),
+            ("arrows", NO_ARROWS, self.arrows.is_empty()),
             ("overlay", NO_OVERLAYS, self.overlays.is_empty()),
         ] {
             if is_empty {
@@ -525,6 +547,7 @@ impl Manifest {
         manifest.clips = Clip::examples();
         manifest.lights = Light::examples();
         manifest.meshes = vec![Mesh::default()];
+        manifest.arrows = vec![Arrows::default()];
         manifest.overlays = Overlay::examples();
         manifest
     }
@@ -554,6 +577,11 @@ const AUTO_LIGHTS: &str = "Without [[light]], a key light and a soft fill light 
                            directional light has a direction instead of position and falloff.";
 
 const NO_MESHES: &str = "Tanks, obstacles and other bodies that are not particles.";
+
+/// Maximum number of kinds of arrows.
+const MAX_ARROWS: usize = 16;
+
+const NO_ARROWS: &str = "Arrows show attributes with three components at the particles.";
 
 /// Maximum number of overlays.
 const MAX_OVERLAYS: usize = 64;

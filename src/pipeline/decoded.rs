@@ -10,7 +10,8 @@ use spherule_formats::{Attribute, AttributeData, Radius, is_radius};
 use super::SharedFrame;
 use super::load_error::{LoadError, missing, no_parts};
 use super::setup::{ColorRule, OpacityRule, RadiusRule, Setup};
-use crate::scene::{PartMaterials, RgbEncoding};
+use crate::scene::material::DEFAULT_COLOR;
+use crate::scene::{ColorMap, PartMaterials, RgbEncoding};
 use crate::survey::{ParticleValue, id_of, part_of, velocity_of};
 
 /// A frame in memory, before the tree is built.
@@ -55,27 +56,8 @@ impl<'a> DecodedFrame<'a> {
     ) -> Result<(Self, u64), LoadError> {
         // Extract radii and colours
         let (radius, clamped) = radii(setup, &frame, file)?;
-        let (mut values, mut colors) = (Vec::new(), Vec::new());
-        match &setup.picture.color {
-            ColorRule::Constant(_) => {}
-            ColorRule::Rgb { name, required } => {
-                let found = match *required {
-                    true => attribute(&frame, name, "colour", file)?,
-                    false => frame.attribute(name),
-                };
-                colors = found.map(colors_of).unwrap_or_default();
-            }
-            ColorRule::Attribute { name, required, .. } => {
-                let found = ParticleValue::named(name, &frame.attributes);
-                if found.is_none() && *required && !frame.is_empty() {
-                    let has = frame.attributes.iter().map(|a| a.name.as_str());
-                    return Err(missing(name, "colour", file, has));
-                }
-                values = found.map_or_else(Vec::new, |value| {
-                    values_of(setup, &frame, number, &radius, &value)
-                });
-            }
-        }
+        let rule = &setup.picture.color;
+        let (values, colors) = color_values(setup, &frame, (number, file), &radius, rule)?;
         let mut opacities = Vec::new();
         if let OpacityRule::Value { name, .. } = &setup.picture.opacity
             && !frame.is_empty()
@@ -167,6 +149,73 @@ impl DecodedFrame<'_> {
         }
         count - chosen.len()
     }
+}
+
+/// The colours of particles by a rule.
+pub(super) enum RuledColors<'a> {
+    Constant(Vec3),
+    Own(Vec<Vec3>),
+    Mapped(Vec<f32>, &'a ColorMap),
+}
+
+impl RuledColors<'_> {
+    /// The colour of a particle, linear RGB.
+    pub(super) fn get(&self, particle: usize) -> Vec3 {
+        match self {
+            Self::Constant(color) => *color,
+            Self::Own(colors) => colors[particle],
+            Self::Mapped(values, map) => map.color(values[particle]),
+        }
+    }
+}
+
+/// The colours of the particles of `frame` by `rule`; see [`DecodedFrame::of`] for the rest.
+pub(super) fn colors_by<'a>(
+    setup: &Setup,
+    frame: &SharedFrame<'_>,
+    (number, file): (i64, &str),
+    rule: &'a ColorRule,
+) -> Result<RuledColors<'a>, LoadError> {
+    if let ColorRule::Constant(color) = rule {
+        return Ok(RuledColors::Constant(*color));
+    }
+    let (radius, _) = radii(setup, frame, file)?;
+    let (values, colors) = color_values(setup, frame, (number, file), &radius, rule)?;
+    Ok(match rule {
+        ColorRule::Attribute { map, .. } if !values.is_empty() => RuledColors::Mapped(values, map),
+        _ if !colors.is_empty() => RuledColors::Own(colors),
+        _ => RuledColors::Constant(DEFAULT_COLOR),
+    })
+}
+
+/// The scalars for a colour map, or the colours, that `rule` takes from the particles of `frame`. One of them is empty;
+/// both are with a constant colour, or without an attribute that is optional.
+fn color_values(
+    setup: &Setup,
+    frame: &SharedFrame<'_>,
+    (number, file): (i64, &str),
+    radius: &Radius,
+    rule: &ColorRule,
+) -> Result<(Vec<f32>, Vec<Vec3>), LoadError> {
+    Ok(match rule {
+        ColorRule::Constant(_) => (Vec::new(), Vec::new()),
+        ColorRule::Rgb { name, required } => {
+            let found = match *required {
+                true => attribute(frame, name, "colour", file)?,
+                false => frame.attribute(name),
+            };
+            (Vec::new(), found.map(colors_of).unwrap_or_default())
+        }
+        ColorRule::Attribute { name, required, .. } => {
+            let found = ParticleValue::named(name, &frame.attributes);
+            if found.is_none() && *required && !frame.is_empty() {
+                let has = frame.attributes.iter().map(|a| a.name.as_str());
+                return Err(missing(name, "colour", file, has));
+            }
+            let values = found.map(|value| values_of(setup, frame, number, radius, &value));
+            (values.unwrap_or_default(), Vec::new())
+        }
+    })
 }
 
 /// Moves the items with the indices `chosen` behind all others.

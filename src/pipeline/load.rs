@@ -9,6 +9,7 @@ use glam::{DVec3, Vec3};
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{FrameError, ParticleFrame, PositionSlice, RawParticles};
 
+use super::arrows::arrows_of;
 use super::decoded::{DecodedFrame, particle_with_id};
 use super::facts::FileFacts;
 use super::in_place::{Opened, StoredFrame};
@@ -18,6 +19,7 @@ use super::motion::velocities_to_next;
 use super::predict::{FrameSize, MemoryModel};
 use super::rods::{CellStyle, FrameRods, rods_of};
 use super::setup::{Picture, Setup};
+use super::trails::trails_of;
 use super::{ImageTask, SharedFrame};
 use crate::metrics::memory::{available, process_room};
 use crate::overlay::Overlay;
@@ -128,7 +130,9 @@ fn decode(
         }
         _ => None,
     };
+    let trails = trails_of(setup, sequence, task, (&frame, read), &mut notes)?;
     let mut loaded = decoded(setup, task, frame, read, &file, notes)?;
+    loaded.rods.extend(trails);
     if let (Some(moving), LoadedParticles::Decoded(frame)) = (moving, &mut loaded.particles) {
         frame.shading.velocities = Some(moving);
     }
@@ -176,12 +180,13 @@ fn decoded<'a>(
     }
     let (time, dropped) = (frame.time, frame.dropped);
     let focus = focus_point(setup, &frame, file)?;
-    let rods = rods_of(
+    let mut rods = rods_of(
         cell_style(setup),
         frame.cell.as_ref(),
         task.frame,
         &mut notes,
     );
+    rods.extend(arrows_of(setup, &frame, (task.frame, file), &mut notes)?);
     let facts = FileFacts::of_decoded(setup, &frame, without_directory(file));
     let (particles, clamped_radii) = DecodedFrame::of(setup, frame, task.frame, file)?;
     Ok(LoadedFrame {

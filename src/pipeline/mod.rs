@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use glam::Vec3;
 use spherule_formats::ParticleFrame;
 
+mod arrows;
 mod decoded;
 mod encode;
 mod error;
@@ -33,6 +34,7 @@ mod single;
 mod stages;
 mod surface;
 mod trace;
+mod trails;
 mod work;
 
 pub use decoded::{DecodedFrame, DecodedShading};
@@ -49,7 +51,8 @@ pub use renderer::{BuiltFrame, FrameRenderer, TraceError, TracedFrame};
 pub use rods::{CellStyle, FrameRods};
 pub use schedule::{Overlap, Schedule};
 pub use setup::{
-    AttributeChannel, ColorRule, OpacityRule, Picture, RadiusRule, RunSettings, Setup,
+    ArrowStyle, AttributeChannel, ColorRule, OpacityRule, Picture, RadiusRule, RunSettings, Setup,
+    TrailStyle,
 };
 pub use shutter::{FrameStep, Shutter};
 pub use single::{PictureKind, make_image, make_picture, trace_particles};

@@ -115,7 +115,7 @@ fn extent(positions: &[Vec3]) -> DVec3 {
 }
 
 /// The places of particles by their ids.
-struct Places<'a> {
+pub(super) struct Places<'a> {
     ids: &'a [u32],
     /// Ids with their places, ascending; empty if they are not needed.
     sorted: Vec<(u32, u32)>,
@@ -123,7 +123,7 @@ struct Places<'a> {
 
 impl<'a> Places<'a> {
     /// The places in `ids` of the particles with ids `wanted`.
-    fn new(ids: &'a [u32], wanted: &[u32]) -> Self {
+    pub(super) fn new(ids: &'a [u32], wanted: &[u32]) -> Self {
         // Most files have the same order
         if ids.starts_with(wanted) {
             let sorted = Vec::new();
@@ -138,7 +138,7 @@ impl<'a> Places<'a> {
     }
 
     /// The place of the particle `id`; `guess` if it is there, else the first of several.
-    fn find(&self, guess: usize, id: u32) -> Option<usize> {
+    pub(super) fn find(&self, guess: usize, id: u32) -> Option<usize> {
         if self.ids.get(guess) == Some(&id) {
             return Some(guess);
         }

@@ -27,6 +27,7 @@ use crate::render::{Film, floor_light_bytes, scratch_bytes};
 use crate::scene::ground::Pattern;
 use crate::scene::{Environment, Ground};
 use crate::surface::SurfaceKind;
+use crate::surface::rods::RodTree;
 use crate::surface::spray::SOFT_DROPS;
 use crate::survey::FrameWeight;
 
@@ -252,21 +253,37 @@ impl<'a> MemoryModel<'a> {
         }
     }
 
-    /// The same, with the meshes of the frame, which are read after its particles.
+    /// Upper bounds of the memory of the arrows and trails of a frame: while they are made, and afterwards.
+    fn arrows(&self, frame: &FrameSize) -> SurfaceBytes {
+        let picture = &self.setup.picture;
+        let share = |every: u32| frame.particles.div_ceil(u64::from(every.max(1)));
+        let arrows = picture.arrows.iter().map(|style| 2 * share(style.every));
+        let trails = picture.trails.iter();
+        let trails = trails.map(|style| share(style.every).saturating_mul(style.frames.into()));
+        let [building, kept] = RodTree::predicted_bytes(arrows.chain(trails).sum());
+        SurfaceBytes { building, kept }
+    }
+
+    /// The same, with the arrows and the meshes of the frame, which are made and read after its particles.
     fn reading_with_meshes(&self, frame: &FrameSize) -> u64 {
-        match frame.meshes {
-            0 => self.reading(frame),
-            bytes => {
-                // Those of the next frame are read beside them
-                let slices = u64::from(self.setup.slices());
-                let slices = match slices {
-                    1 => 0,
-                    _ => (slices * KEPT_PER_MESH_BYTE + READ_PER_MESH_BYTE).saturating_mul(bytes),
-                };
-                let meshes = self.kept(frame) + READ_PER_MESH_BYTE.saturating_mul(bytes) + slices;
-                self.reading(frame).max(meshes)
+        let arrows = self.arrows(frame).building;
+        arrows
+            + match frame.meshes {
+                0 => self.reading(frame),
+                bytes => {
+                    // Those of the next frame are read beside them
+                    let slices = u64::from(self.setup.slices());
+                    let slices = match slices {
+                        1 => 0,
+                        _ => {
+                            (slices * KEPT_PER_MESH_BYTE + READ_PER_MESH_BYTE).saturating_mul(bytes)
+                        }
+                    };
+                    let meshes =
+                        self.kept(frame) + READ_PER_MESH_BYTE.saturating_mul(bytes) + slices;
+                    self.reading(frame).max(meshes)
+                }
             }
-        }
     }
 
     /// Bytes of a native frame that is not mapped.
@@ -300,10 +317,13 @@ impl<'a> MemoryModel<'a> {
         };
         let held = rounding.max(keeping) + self.file_indices(frame);
         let reading = (files + frame.raw).max(shared + held.max(selecting));
-        match self.setup.moves_to_next_frame() {
-            // The next frame is read beside it, and its ids are sorted
-            true => frame.raw + 12 * n + reading + 16 * n,
-            false => reading,
+        // Neighbouring frames are read beside it one at a time, and their ids are sorted
+        let beside = frame.raw + 12 * n + reading + 16 * n;
+        match (self.setup.moves_to_next_frame(), &self.setup.picture.trails) {
+            // Ids of the frame, and the ends of trails
+            (_, Some(_)) => beside + 32 * n,
+            (true, None) => beside,
+            (false, None) => reading,
         }
     }
 
@@ -499,8 +519,9 @@ impl<'a> MemoryModel<'a> {
         // Add up each phase: reading, building, tracing, encoding
         let kept = self.kept(frame);
         let surface = self.surface(frame);
-        let meshes =
-            self.meshes + KEPT_PER_MESH_BYTE * frame.meshes * u64::from(self.setup.slices());
+        let meshes = self.meshes
+            + KEPT_PER_MESH_BYTE * frame.meshes * u64::from(self.setup.slices())
+            + self.arrows(frame).kept;
         let names = mattes::predicted_bytes(self.setup, frame.particles);
         let first_read = MemoryNeed {
             reading: self.reading_with_meshes(frame),

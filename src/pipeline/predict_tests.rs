@@ -1,7 +1,9 @@
 //! Tests of the model alone; `tests/suite/memory` compares it with measurements.
 
 use super::*;
-use crate::pipeline::Overlap;
+use crate::pipeline::{ArrowStyle, Overlap, TrailStyle};
+use crate::surface::MaterialId;
+use crate::surface::rods::Anchor;
 
 /// A frame of plain single-precision positions.
 fn plain(particles: u64) -> FrameSize {
@@ -137,4 +139,44 @@ fn light_groups_have_planes() {
     setup.picture.render.channels.layers.light_groups = 4;
     let pixels = u64::from(setup.picture.render.width) * u64::from(setup.picture.render.height);
     assert!(images(&setup) >= none + 4 * 12 * pixels);
+}
+
+#[test]
+fn arrows_and_trails_are_counted() {
+    let mut setup = setup();
+    let alone = |setup: &Setup| MemoryModel::new(setup).alone(&plain(1_000_000));
+    let none = alone(&setup);
+    setup.picture.arrows.push(ArrowStyle {
+        attribute: "velocity".to_owned(),
+        scale: 1.0,
+        radius: 0.1,
+        every: 1,
+        anchor: Anchor::Tail,
+        color: None,
+        material: MaterialId::PARTICLES,
+    });
+    // Two rods for each particle
+    let each = |rods: u64, bytes: u64| rods * 1_000_000 * bytes;
+    let all = alone(&setup);
+    assert!(all.total() >= none.total() + each(2, 100), "{none}\n{all}");
+    setup.picture.arrows[0].every = 100;
+    let few = alone(&setup);
+    assert!(
+        few.total() < none.total() + each(2, 100) / 10,
+        "{none}\n{few}"
+    );
+    // A rod for each frame, and another frame beside the one that is read
+    setup.picture.arrows.clear();
+    setup.picture.trails = Some(TrailStyle {
+        frames: 5,
+        radius: 0.1,
+        every: 1,
+        color: None,
+        material: MaterialId::PARTICLES,
+    });
+    let trails = alone(&setup);
+    assert!(
+        trails.total() >= none.total() + each(5, 100),
+        "{none}\n{trails}"
+    );
 }

@@ -23,6 +23,10 @@ pub struct FrameRods {
 }
 
 impl FrameRods {
+    pub(super) const fn new(tree: RodTree, material: MaterialId) -> Self {
+        Self { tree, material }
+    }
+
     /// The rods as a shape.
     pub(super) fn surface(&self) -> Box<dyn Shape + '_> {
         Box::new(RodSurface::new(&self.tree, self.material))

@@ -17,7 +17,8 @@ use crate::scene::{
     Projection, Scene, StereoSettings,
 };
 use crate::selection::Selection;
-use crate::surface::{SurfaceKind, SurfaceSettings};
+use crate::surface::rods::Anchor;
+use crate::surface::{MaterialId, SurfaceKind, SurfaceSettings};
 use crate::survey::FrameWeight;
 
 /// Source of the radii.
@@ -104,6 +105,47 @@ impl OpacityRule {
     }
 }
 
+/// How the arrows of an attribute are drawn.
+#[derive(Debug, Clone)]
+pub struct ArrowStyle {
+    /// Name of the attribute, which has three components.
+    pub attribute: String,
+    /// Length of an arrow per unit of the attribute, scene units.
+    pub scale: f64,
+    /// Radius of the shafts, scene units.
+    pub radius: f32,
+    /// Only particles whose id is a multiple of this have arrows; without ids, it is their place in the file.
+    pub every: u32,
+    /// The point of an arrow that is at its particle.
+    pub anchor: Anchor,
+    /// Their colours; None if all have that of the material.
+    pub color: Option<ColorRule>,
+    /// Their material, which is one of those of meshes.
+    pub material: MaterialId,
+}
+
+/// How the trails of particles over earlier frames are drawn.
+#[derive(Debug, Clone)]
+pub struct TrailStyle {
+    /// Number of earlier frames.
+    pub frames: u32,
+    /// Radius at the particles, scene units.
+    pub radius: f32,
+    /// Only particles whose id is a multiple of this have trails; without ids, it is their place in the file.
+    pub every: u32,
+    /// Their colours; None if all have that of the material.
+    pub color: Option<ColorRule>,
+    /// Their material, which is one of those of meshes.
+    pub material: MaterialId,
+}
+
+impl TrailStyle {
+    /// The radius where the particle was `age` frames ago.
+    pub(super) fn radius_at(&self, age: u32) -> f32 {
+        self.radius * (self.frames - age.min(self.frames)) as f32 / self.frames as f32
+    }
+}
+
 /// An attribute with channels in the images.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AttributeChannel {
@@ -160,6 +202,10 @@ pub struct Picture {
     pub meshes: Vec<PictureMesh>,
     /// How the simulation cell is drawn, if it is.
     pub cell: Option<CellStyle>,
+    /// Arrows of vector attributes.
+    pub arrows: Vec<ArrowStyle>,
+    /// Trails over earlier frames, if they are drawn.
+    pub trails: Option<TrailStyle>,
     /// The renderer.
     pub renderer: RendererKind,
     /// Image size, samples, depth, channels.
@@ -334,6 +380,12 @@ impl Setup {
         if !self.picture.selection.is_all() {
             return Some(
                 "[select] and [[clip]] take those that are drawn from a copy of them, 12 bytes per particle and more"
+                    .to_owned(),
+            );
+        }
+        if !self.picture.arrows.is_empty() || self.picture.trails.is_some() {
+            return Some(
+                "arrows and trails are made from a copy of them, 12 bytes per particle and more"
                     .to_owned(),
             );
         }

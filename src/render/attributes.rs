@@ -83,7 +83,8 @@ impl RenderContext<'_> {
     /// diffuse reflections.
     fn fixed_color(&self, ray: (&RayPacket, u32), hits: &Intersections, lane: usize) -> Vec3 {
         if let Some(mesh) = self.mesh(hits.material[lane]) {
-            return mesh.color;
+            let own = self.part_color(hits.material[lane], hits.particle[lane]);
+            return own.unwrap_or(mesh.color);
         }
         if let Some(part) = self.part(hits.material[lane]) {
             let of_particle = || self.source.color(hits.particle[lane]);

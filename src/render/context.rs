@@ -29,6 +29,8 @@ pub(super) struct RenderContext<'a> {
     pub(super) shapes: Vec<&'a dyn Shape>,
     /// Meshes that rays pass.
     pub(super) panes: Vec<&'a dyn Shape>,
+    /// The colours of shapes other than particles whose parts differ in colour.
+    pub(super) part_colors: Vec<(MaterialId, &'a [Vec3])>,
     /// The materials of opaque surfaces.
     pub(super) materials: Vec<MaterialId>,
     /// Materials of parts of the particles, if these are separate spheres and paths are traced.
@@ -127,7 +129,13 @@ impl<'a> RenderContext<'a> {
         let eye = scene.camera.eye();
         let [width, height] = settings.eye_size(scene.camera.eyes());
         let contains_eye = |shape: &dyn Shape| shape.side_of(eye) == Side::Inside;
+        let part_colors = shapes
+            .iter()
+            .map(|shape| (shape.material(), shape.colors()));
         Self {
+            part_colors: part_colors
+                .filter(|(_, colors)| !colors.is_empty())
+                .collect(),
             is_camera_inside: interior == Interior::Body && particles.is_some_and(contains_eye),
             shapes,
             panes,
@@ -168,6 +176,14 @@ impl<'a> RenderContext<'a> {
     #[inline(always)]
     pub(super) fn mesh(&self, material: MaterialId) -> Option<&MeshMaterial> {
         self.scene.meshes.get(material.mesh_index()?)
+    }
+
+    /// The colour of a part of a shape of `material`, if it has one of its own.
+    #[inline(always)]
+    pub(super) fn part_color(&self, material: MaterialId, part: u32) -> Option<Vec3> {
+        let mut shapes = self.part_colors.iter();
+        let (_, colors) = shapes.find(|(id, _)| *id == material)?;
+        colors.get(part as usize).copied()
     }
 
     /// The material of the part of the particles that `material` belongs to.

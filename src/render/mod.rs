@@ -89,6 +89,8 @@ mod poison_tests;
 #[cfg(test)]
 mod projection_tests;
 #[cfg(test)]
+mod rods_tests;
+#[cfg(test)]
 pub(crate) mod solid;
 #[cfg(test)]
 mod spray_tests;

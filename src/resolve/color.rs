@@ -162,7 +162,7 @@ impl Named for SurveyedAttribute<'_> {
 }
 
 /// Colours by a value with the range in `color`, unless `by` has another one.
-fn mapped(
+pub(super) fn mapped(
     by: &ColorMapping,
     color: &ColorRange,
     required: bool,

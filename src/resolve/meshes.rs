@@ -3,7 +3,7 @@
 use glam::Vec3;
 use spherule_formats::MemoryBudget;
 
-use super::cell;
+use super::{arrows, cell};
 use crate::manifest::{self, Manifest, MeshShading};
 use crate::pipeline::{MeshSettings, PictureMesh, Setup};
 use crate::scene::mesh::DEFAULT_COLOR;
@@ -56,6 +56,7 @@ pub fn add_meshes(
     let scene = &mut setup.picture.scene;
     scene.meshes = manifest.meshes.iter().map(material).collect();
     setup.picture.cell = cell::add_cell(scene, manifest, survey);
+    arrows::add_materials(scene, manifest);
     if let Some(ground) = &mut scene.ground
         && manifest.render.ground_height.is_none()
     {

@@ -1,5 +1,7 @@
 //! The interface between surfaces and the renderer.
 
+use glam::Vec3;
+
 use super::{Intersection, Intersections, MaterialId, TransmittanceProduct};
 use crate::accel::Coherence;
 use crate::math::{Lanes, lanes_in};
@@ -57,13 +59,19 @@ pub trait Shape: Sync {
         MaterialId::PARTICLES
     }
 
+    /// Base colours of the parts of a shape, linear RGB, with the index [`Intersection::particle`]. A part without one
+    /// has the colour of the material. The colours of [`MaterialId::PARTICLES`] come from attributes.
+    fn colors(&self) -> &[Vec3] {
+        &[]
+    }
+
     /// Whether the shape bounds one connected body, so that rays are on one [`Side`] of it.
     fn is_connected(&self) -> bool {
         false
     }
 
     /// The side of a connected body on which `point` is.
-    fn side_of(&self, point: glam::Vec3) -> Side {
+    fn side_of(&self, point: Vec3) -> Side {
         let _ = point;
         Side::Outside
     }

@@ -6,6 +6,7 @@ mod simd;
 
 mod architecture;
 mod arithmetic;
+mod arrows;
 mod bad_input;
 mod camera;
 mod cell;
@@ -46,4 +47,5 @@ mod still;
 mod structures;
 mod surface;
 mod thesis;
+mod trails;
 mod verify;

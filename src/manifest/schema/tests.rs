@@ -22,6 +22,8 @@ clip = [{ type = "plane", normal = "-x", offset = 2 }, { type = "plane", normal 
 material = { opacity = { attribute = "density", range = [2, 1] }, color = { attribute = "velocity.x", map = "red-blue_r", range = "1%-99.5%", scale = "symlog", threshold = 0.1, steps = 8, reverse = true }, absorption = [0.5, 1, 0], absorption_length = 3, fresnel = "exact" }
 light = [{ type = "directional", direction = [0, 0, -2] }, { type = "point", position = [1, 1, 1], falloff = "inverse-square" }, { type = "sun", direction = [0, 0, -2], size = 2 }, { type = "sphere", position = [1, 1, 1], radius = 2, visible = true }, { type = "rect", position = [1, 1, 1], direction = [0, 1, 0], width = 2, height = 3 }, { type = "disc", position = [1, 1, 1], direction = [0, 1, 0], radius = 2 }]
 mesh = [{ path = "tank.stl" }, { path = "w.##.ply", material = "glass", color = [1, 1, 0.5], roughness = 0, normals = "flat", faces = "back", scale = 0.001, translate = [1, 0, 0] }, { path = "b", holdout = true }]
+trails = { frames = 8, radius = 0.1, every = 2, color = [1, 0, 0] }
+arrows = [{ attribute = "velocity", scale = 0.1 }, { attribute = "f", scale = 2, radius = 0.1, every = 10, anchor = "center", color = { attribute = "f", map = "turbo", range = [0, 5] } }]
 overlay = [{ type = "colorbar", title = "Speed", unit = "m/s", length = 0.5, corner = "top-right" }, { type = "text", text = "t = {time:.2f}", offset = [0.1, -0.1], color = [1, 0, 0] }, { type = "scale_bar", length = 2, unit = "mm" }, { type = "axes", size = 0.05 }]
 environment = { type = "image", image = "hall.exr", intensity = 2, rotation = -30, visible = true }
 output = { path = "x/%04d.EXR", channels = ["id"], fps = 24 }

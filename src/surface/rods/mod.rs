@@ -9,12 +9,14 @@ use std::fmt;
 
 use glam::{DVec3, Vec3};
 
+mod arrow;
 mod interval;
 mod shape;
 
 #[cfg(test)]
 mod tests;
 
+pub use arrow::{Anchor, arrow};
 pub use shape::RodSurface;
 
 use super::hierarchy::Hierarchy;
@@ -38,7 +40,8 @@ pub struct Rod {
     pub ends: [Vec3; 2],
     /// Its radius at each end, scene units.
     pub radii: [f32; 2],
-    /// The particles that give each half its colour and other attributes.
+    /// The particles that give each half its colour and other attributes, or indices of its
+    /// [colours](RodTree::with_colors).
     pub particles: [u32; 2],
 }
 
@@ -66,9 +69,16 @@ impl Rod {
 /// Greatest number of rods.
 pub const MAX_RODS: usize = u32::MAX as usize;
 
+/// Memory of a rod with its share of the hierarchy, and with a colour, bytes.
+const KEPT_BYTES: u64 = 120;
+/// The same while the hierarchy is built: boxes and a binary tree.
+const BUILT_BYTES: u64 = 400;
+
 /// Rods with caps of one kind, and their hierarchy.
 pub struct RodTree {
     rods: Vec<Rod>,
+    /// Base colours, linear RGB; empty if all rods have that of their material.
+    colors: Vec<Vec3>,
     caps: Caps,
     hierarchy: Hierarchy,
     /// The largest coordinate of their boxes.
@@ -97,10 +107,18 @@ impl RodTree {
             .map_or(0.0, |[min, max]| min.abs().max(max.abs()).max_element());
         Self {
             rods,
+            colors: Vec::new(),
             caps,
             hierarchy,
             extent,
         }
+    }
+
+    /// Gives each half of a rod the base colour at its index of [`Rod::particles`], linear RGB; halves without one keep
+    /// that of the material.
+    #[must_use]
+    pub fn with_colors(self, colors: Vec<Vec3>) -> Self {
+        Self { colors, ..self }
     }
 
     /// Number of rods.
@@ -118,9 +136,18 @@ impl RodTree {
         self.hierarchy.bounds()
     }
 
-    /// Memory of the rods and their hierarchy, bytes.
+    /// Memory of the rods, their colours and their hierarchy, bytes.
     pub const fn bytes(&self) -> usize {
-        size_of_val(self.rods.as_slice()) + self.hierarchy.bytes()
+        let colors = size_of_val(self.colors.as_slice());
+        size_of_val(self.rods.as_slice()) + colors + self.hierarchy.bytes()
+    }
+
+    /// Upper bounds of the memory of `rods` rods with a colour each, bytes: while the tree is built, and afterwards.
+    pub const fn predicted_bytes(rods: u64) -> [u64; 2] {
+        [
+            rods.saturating_mul(BUILT_BYTES),
+            rods.saturating_mul(KEPT_BYTES),
+        ]
     }
 
     /// The body of the rod with this index.

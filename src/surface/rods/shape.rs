@@ -1,6 +1,6 @@
 //! Rods as a shape.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use super::interval::Crossing;
 use super::{RodTree, double};
@@ -21,7 +21,8 @@ pub struct RodSurface<'a> {
 }
 
 impl<'a> RodSurface<'a> {
-    /// Rods with this material. With [`MaterialId::PARTICLES`], each half has the attributes of its particle.
+    /// Rods with this material. With [`MaterialId::PARTICLES`], each half has the attributes of its particle; with
+    /// another one, the [colours](RodTree::with_colors) of the tree.
     pub const fn new(tree: &'a RodTree, material: MaterialId) -> Self {
         Self { tree, material }
     }
@@ -82,6 +83,10 @@ impl Shape for RodSurface<'_> {
 
     fn material(&self) -> MaterialId {
         self.material
+    }
+
+    fn colors(&self) -> &[Vec3] {
+        &self.tree.colors
     }
 
     fn occluded(&self, rays: &RayPacket, _coherence: Coherence, lanes: u32) -> u32 {

@@ -345,3 +345,23 @@ fn many_rods_are_those_of_brute_force() {
     }
     assert!(hits > 150, "{hits} hits");
 }
+
+#[test]
+fn the_memory_of_many_rods_is_predicted() {
+    for count in [1_000_u32, 20_000] {
+        // Short rods in all directions, as of arrows
+        let mut random = Random(5);
+        let rods = (0..count).map(|_| {
+            let start = 100.0 * random.vector();
+            Rod::line([start, start + random.vector()], 0.1)
+        });
+        let colors = vec![Vec3::ONE; count as usize];
+        let tree = RodTree::new(rods.collect(), Caps::Flat).with_colors(colors);
+        let [_, predicted] = RodTree::predicted_bytes(u64::from(count));
+        let bytes = tree.bytes() as u64;
+        assert!(
+            (predicted / 3..=predicted).contains(&bytes),
+            "{bytes} of {predicted}"
+        );
+    }
+}

@@ -1,0 +1,225 @@
+//! Trails of particles over earlier frames of the sequence.
+
+use std::borrow::Cow;
+
+use glam::{DMat3, DVec3, Vec3};
+use spherule_formats::order::index_u32;
+use spherule_formats::sequence::Sequence;
+use spherule_formats::{ParticleFrame, SimulationCell};
+
+use super::arrows::every_nth;
+use super::decoded::{colors_by, ids};
+use super::load_error::{LoadError, first_file, missing};
+use super::motion::Places;
+use super::rods::FrameRods;
+use super::setup::{Setup, TrailStyle};
+use super::{ImageTask, SharedFrame};
+use crate::surface::rods::{Caps, Rod, RodTree};
+use crate::survey::id_of;
+
+/// The trails of the particles of `frame`, which was read for `task` from files with `read` particles. Passes notes to
+/// `notes`.
+///
+/// # Errors
+/// Particles cannot be found in an earlier frame: there are no ids, and their number changes.
+pub(super) fn trails_of(
+    setup: &Setup,
+    sequence: &Sequence,
+    task: &ImageTask,
+    (frame, read): (&SharedFrame<'_>, u64),
+    notes: &mut Vec<String>,
+) -> Result<Option<FrameRods>, LoadError> {
+    let Some(style) = setup.picture.trails.as_ref().filter(|_| !frame.is_empty()) else {
+        return Ok(None);
+    };
+    let file = first_file(sequence, task.index);
+    let (has_ids, own) = identities(frame);
+    let mut trails = Trails::new(style, frame);
+    for age in 1..=style.frames.min(index_u32(task.index)) {
+        let index = task.index - age as usize;
+        let loaded = match sequence.load_measured(index) {
+            Ok(loaded) => loaded.particles,
+            Err(error) => {
+                notes.push(format!(
+                    "frame {}: trails pass over a frame that cannot be read: {error}",
+                    task.frame
+                ));
+                continue;
+            }
+        };
+        let count = loaded.positions.len() as u64;
+        let earlier =
+            ParticleFrame::from_raw(loaded, setup.picture.origin).with_positions(Cow::Owned);
+        let (has_others, others) = identities(&earlier);
+        // Native frames have an order of their own
+        let is_native = [task.index, index].map(|index| sequence.native_file(index).is_some());
+        let has_order = count == read && is_native == [false; 2];
+        if !(has_ids && has_others || has_order || earlier.is_empty()) {
+            let has = frame.attributes.iter().map(|a| a.name.as_str());
+            let purpose = match is_native {
+                [false, false] => "trails, since the number of particles changes",
+                _ => "trails, since native frames have an order of their own",
+            };
+            return Err(missing("id", purpose, &file, has));
+        }
+        let places = Places::new(&others, &own);
+        let find = |particle: usize| {
+            let place = places.find(particle, own[particle])?;
+            Some(earlier.positions[place])
+        };
+        trails.extend(age, frame.cell.as_ref(), find);
+    }
+    notes.extend(gap_note(sequence, task, style.frames));
+    let mut colors = Vec::new();
+    if let Some(rule) = &style.color {
+        let of_particles = colors_by(setup, frame, (task.frame, &file), rule)?;
+        colors = trails.owners.iter().map(|i| of_particles.get(*i)).collect();
+    }
+    let tree = RodTree::new(trails.rods, Caps::Round).with_colors(colors);
+    Ok(Some(FrameRods::new(tree, style.material)))
+}
+
+/// Whether particles have ids, and the ids; without them, their places in the file.
+fn identities(frame: &SharedFrame<'_>) -> (bool, Vec<u32>) {
+    let has_ids = id_of(&frame.attributes).is_some();
+    let found = ids(frame).unwrap_or_else(|| (0..index_u32(frame.len())).collect());
+    (has_ids, found)
+}
+
+/// A note if the frames of a trail are not equally far apart.
+fn gap_note(sequence: &Sequence, task: &ImageTask, frames: u32) -> Option<String> {
+    let first = task.index.saturating_sub(frames as usize);
+    let numbers: Vec<i64> = sequence
+        .frames()
+        .get(first..=task.index)?
+        .iter()
+        .map(|f| f.number)
+        .collect();
+    let step = |pair: &&[i64]| pair[1].saturating_sub(pair[0]);
+    let usual = numbers.windows(2).map(|pair| step(&pair)).min()?;
+    let gap = numbers.windows(2).find(|pair| step(pair) > usual)?;
+    Some(format!(
+        "frame {}: trails cross a gap between the frames {} and {}",
+        task.frame, gap[0], gap[1]
+    ))
+}
+
+/// The trails of a frame.
+struct Trails<'a> {
+    style: &'a TrailStyle,
+    rods: Vec<Rod>,
+    /// The particle of each trail.
+    owners: Vec<usize>,
+    /// The oldest point of each trail with its age in frames; None where the trail has ended.
+    ends: Vec<Option<(Vec3, u32)>>,
+}
+
+impl<'a> Trails<'a> {
+    fn new(style: &'a TrailStyle, frame: &SharedFrame<'_>) -> Self {
+        let owners = every_nth(frame, style.every);
+        let ends = owners
+            .iter()
+            .map(|particle| Some((frame.positions[*particle], 0)));
+        Self {
+            style,
+            rods: Vec::new(),
+            ends: ends.collect(),
+            owners,
+        }
+    }
+
+    /// Adds the points that `find` has for particles, `age` frames earlier. Trails of particles without one end. Jumps
+    /// over a periodic boundary of `cell` are left out.
+    fn extend(
+        &mut self,
+        age: u32,
+        cell: Option<&SimulationCell>,
+        find: impl Fn(usize) -> Option<Vec3>,
+    ) {
+        let jumps = cell.map(Jumps::new);
+        for ((trail, owner), end) in (0..).zip(&self.owners).zip(&mut self.ends) {
+            let Some((newer, newer_age)) = *end else {
+                continue;
+            };
+            let older = find(*owner);
+            *end = older.map(|point| (point, age));
+            let Some(older) = older else { continue };
+            if jumps
+                .as_ref()
+                .is_some_and(|jumps| jumps.cross(older, newer))
+            {
+                continue;
+            }
+            self.rods.push(Rod {
+                ends: [newer, older],
+                radii: [newer_age, age].map(|age| self.style.radius_at(age)),
+                particles: [trail; 2],
+            });
+        }
+    }
+}
+
+/// Finds jumps over the boundaries of a periodic cell.
+struct Jumps {
+    /// The product with a way is its length along each edge, in edges; 0 along edges that do not repeat.
+    fractions: [DVec3; 3],
+}
+
+impl Jumps {
+    fn new(cell: &SimulationCell) -> Self {
+        let [a, b, c] = cell.vectors;
+        let matrix = DMat3::from_cols(a, b, c);
+        let inverse = match matrix.determinant() {
+            0.0 => DMat3::from_cols(a, b, c).transpose(),
+            _ => matrix.inverse(),
+        };
+        let of_edge = |edge: usize| {
+            let row = inverse.row(edge);
+            // In a flat cell, edges are assumed to be perpendicular
+            let scale = match row.dot(cell.vectors[edge]) {
+                0.0 => 0.0,
+                length => length.recip(),
+            };
+            if cell.periodic[edge] {
+                scale * row
+            } else {
+                DVec3::ZERO
+            }
+        };
+        Self {
+            fractions: [0, 1, 2].map(of_edge),
+        }
+    }
+
+    /// Whether the way between two points is longer than half of an edge that repeats.
+    fn cross(&self, from: Vec3, to: Vec3) -> bool {
+        let way = to.as_dvec3() - from.as_dvec3();
+        self.fractions.iter().any(|edge| way.dot(*edge).abs() > 0.5)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn jumps_are_ways_of_more_than_half_an_edge() {
+        let cell = |vectors: [[f64; 3]; 3], periodic| {
+            SimulationCell::new(DVec3::ZERO, vectors.map(DVec3::from_array), periodic).unwrap()
+        };
+        let crosses = |cell: &SimulationCell, way: [f32; 3]| {
+            let from = Vec3::new(1.0, 2.0, 3.0);
+            Jumps::new(cell).cross(from, from + Vec3::from_array(way))
+        };
+        let tilted = [[10.0, 0.0, 0.0], [4.0, 8.0, 0.0], [0.0, 0.0, 6.0]];
+        let all = cell(tilted, [true; 3]);
+        assert!(!crosses(&all, [4.9, 0.0, 0.0]) && crosses(&all, [-5.1, 0.0, 0.0]));
+        // Along the tilted edge, by 0.45 and 0.55 of it
+        assert!(!crosses(&all, [1.8, 3.6, 0.0]) && crosses(&all, [2.2, 4.4, 0.0]));
+        assert!(!crosses(&all, [0.0, 0.0, 2.9]) && crosses(&all, [0.0, 0.0, -3.1]));
+        let some = cell(tilted, [false, true, true]);
+        assert!(!crosses(&some, [9.0, 0.0, 0.0]));
+        let flat = cell([[10.0, 0.0, 0.0], [0.0, 8.0, 0.0], [0.0; 3]], [true; 3]);
+        assert!(!crosses(&flat, [4.9, 3.9, 100.0]) && crosses(&flat, [0.0, 4.1, 0.0]));
+    }
+}
