@@ -203,6 +203,11 @@ pub struct RunSettings {
 }
 
 impl Picture {
+    /// Number of images of eyes beside each other and below each other.
+    pub(super) const fn eyes(&self) -> [u32; 2] {
+        self.scene.camera.eyes()
+    }
+
     /// Whether ids of particles are needed: for channels, or for the sizes of soft drops.
     pub(super) fn needs_ids(&self) -> bool {
         self.render.channels.needs_ids() || self.scene.is_spray_soft
