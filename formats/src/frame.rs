@@ -136,18 +136,23 @@ impl RawParticles {
         self.positions.byte_len() + attributes.sum::<u64>()
     }
 
-    /// Keeps only the particles with these indices, which are ascending. One array at a time is copied.
+    /// Keeps only the particles with these indices, which are ascending. No array is copied.
     ///
     /// # Panics
     /// If there is no particle with one of the indices.
     pub fn select(&mut self, indices: &[u32]) {
-        match &mut self.positions {
-            Positions::F32(v) => select(v, 1, indices),
-            Positions::F64(v) => select(v, 1, indices),
-        }
-        for attribute in &mut self.attributes {
-            with_values!(&mut attribute.data, v => select(v, attribute.components, indices));
-        }
+        let (positions, attributes) = (&mut self.positions, &mut self.attributes);
+        rayon::join(
+            || match positions {
+                Positions::F32(v) => select(v, 1, indices),
+                Positions::F64(v) => select(v, 1, indices),
+            },
+            || {
+                attributes.par_iter_mut().for_each(|attribute| {
+                    with_values!(&mut attribute.data, v => select(v, attribute.components, indices));
+                });
+            },
+        );
     }
 
     /// Bytes of the largest array among positions and attributes.
@@ -157,15 +162,16 @@ impl RawParticles {
     }
 }
 
-/// Keeps the groups of `components` items with these indices.
-fn select<T: Copy + Send + Sync>(items: &mut Vec<T>, components: usize, indices: &[u32]) {
-    fn groups<T: Copy + Send + Sync, const N: usize>(items: &[T], indices: &[u32]) -> Vec<T> {
-        let groups = items.as_chunks::<N>().0;
-        let kept = indices.par_iter().with_min_len(4096);
-        let kept: Vec<[T; N]> = kept.map(|index| groups[*index as usize]).collect();
-        kept.into_flattened()
+/// Keeps the groups of `components` items with these indices, which are ascending. Groups move within the array: a
+/// new one would cost more time, for its pages.
+fn select<T: Copy>(items: &mut Vec<T>, components: usize, indices: &[u32]) {
+    fn groups<T: Copy, const N: usize>(items: &mut [T], indices: &[u32]) {
+        let groups = items.as_chunks_mut::<N>().0;
+        for (to, from) in indices.iter().enumerate() {
+            groups[to] = groups[*from as usize];
+        }
     }
-    *items = match components {
+    match components {
         1 => groups::<T, 1>(items, indices),
         2 => groups::<T, 2>(items, indices),
         3 => groups::<T, 3>(items, indices),
@@ -173,13 +179,14 @@ fn select<T: Copy + Send + Sync>(items: &mut Vec<T>, components: usize, indices:
         6 => groups::<T, 6>(items, indices),
         9 => groups::<T, 9>(items, indices),
         _ => {
-            let group = |index: &u32| {
-                let first = *index as usize * components;
-                &items[first..first + components]
-            };
-            indices.iter().flat_map(group).copied().collect()
+            for (to, from) in indices.iter().enumerate() {
+                let from = *from as usize * components;
+                items.copy_within(from..from + components, to * components);
+            }
         }
-    };
+    }
+    items.truncate(indices.len() * components);
+    items.shrink_to_fit();
 }
 
 /// Sphere radii in scene units.
