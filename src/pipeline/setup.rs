@@ -17,6 +17,7 @@ use crate::scene::{
     Projection, Scene, StereoSettings,
 };
 use crate::selection::Selection;
+use crate::surface::cut::ConvexRegion;
 use crate::surface::{SurfaceKind, SurfaceSettings};
 use crate::survey::FrameWeight;
 
@@ -131,6 +132,8 @@ pub struct Picture {
     pub least_radius: f32,
     /// Which particles are drawn.
     pub selection: Selection,
+    /// The region that spheres are cut to.
+    pub cut: ConvexRegion,
     /// Source of the radii.
     pub radius: RadiusRule,
     /// Source of the colours.

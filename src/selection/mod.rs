@@ -39,6 +39,9 @@ pub struct Selection {
     pub every: u32,
     /// Regions that contain their centres.
     pub regions: Vec<Region>,
+    /// Regions that spheres are cut to. Particles with centres outside are drawn as well, as their spheres may reach
+    /// into them.
+    pub cuts: Vec<Region>,
 }
 
 impl Selection {
@@ -46,6 +49,14 @@ impl Selection {
     pub const fn is_all(&self) -> bool {
         let is_by_id = self.ids.is_some() || self.every > 1;
         self.condition.is_none() && !is_by_id && self.regions.is_empty()
+    }
+
+    /// The particles with centres in the regions that spheres are cut to.
+    pub fn of_cuts(&self) -> Self {
+        Self {
+            regions: self.cuts.clone(),
+            ..Self::default()
+        }
     }
 
     /// Checks that the names in the condition have values, for particles with `attributes`.
