@@ -120,7 +120,8 @@ impl<'a, S: CutShape> CutSpheres<'a, S> {
             lanes,
             &mut |lane, particle, radius, [near, far]| {
                 let t = t[lane];
-                if !(near < t && t <= far) {
+                let contains = near < t && t <= far;
+                if !contains {
                     return;
                 }
                 let power = (t - near) * (t - far);
@@ -183,12 +184,13 @@ impl<'a, S: CutShape> CutSpheres<'a, S> {
             planes: [0; 2],
         };
         let (mut spans, mut crossing) = ([empty; LANES], [0; 2]);
-        for lane in 0..rays.len() {
+        for lane in lanes_in(first_lanes(rays.len())) {
             let ray = rays.ray(lane);
             let span = self.region.span(&ray);
             let [enter, leave] = span.ends;
             let (start, end) = (enter.max(ray.t_min), leave.min(ray.t_max));
-            if !(start < end) || lanes >> lane & 1 == 0 {
+            let is_in = start < end && lanes >> lane & 1 == 1;
+            if !is_in {
                 disable(rays, lane);
                 continue;
             }

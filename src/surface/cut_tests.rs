@@ -125,8 +125,7 @@ impl Balls {
                     &mut closeness,
                 );
             }
-            for end in 0..2 {
-                let t = span[end];
+            for (end, t) in span.into_iter().enumerate() {
                 if t <= chord[0] || t >= chord[1] {
                     continue;
                 }
