@@ -138,7 +138,7 @@ pub fn question<'a>(manifest: &'a Manifest, selection: &'a Selection) -> Questio
             }
         },
         up: manifest.input.up.map(|up| DVec3::from_array(up.vector())),
-        selection: (!selection.is_all()).then_some(selection),
+        selection: Some(selection).filter(|s| !s.is_all() || !s.cuts.is_empty()),
         points: color::is_depth(&manifest.material.color) || overlay::needs_points(manifest),
     }
 }
@@ -262,6 +262,7 @@ pub fn setup(
         origin: survey.origin,
         least_radius: narrow(bounds.diagonal() * LEAST_RADIUS).max(f32::MIN_POSITIVE),
         selection: select::selection(manifest, survey)?,
+        cut: select::cut(manifest, survey)?,
         radius,
         color,
         opacity: opacity::opacity(manifest, survey, scene.material.transmission > 0.0)?,

@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::attribute::with_values;
-use crate::gather::gather;
+use crate::gather::keep;
 use crate::names::RADII;
 use crate::{Attribute, AttributeData, SimulationCell};
 
@@ -137,18 +137,23 @@ impl RawParticles {
         self.positions.byte_len() + attributes.sum::<u64>()
     }
 
-    /// Keeps only the particles with these indices, which are ascending. One array at a time is copied.
+    /// Keeps only the particles with these indices, which are ascending. No array is copied.
     ///
     /// # Panics
     /// If there is no particle with one of the indices.
     pub fn select(&mut self, indices: &[u32]) {
-        match &mut self.positions {
-            Positions::F32(v) => *v = gather(v, 1, indices),
-            Positions::F64(v) => *v = gather(v, 1, indices),
-        }
-        for attribute in &mut self.attributes {
-            with_values!(&mut attribute.data, v => *v = gather(v, attribute.components, indices));
-        }
+        let (positions, attributes) = (&mut self.positions, &mut self.attributes);
+        rayon::join(
+            || match positions {
+                Positions::F32(v) => keep(v, 1, indices),
+                Positions::F64(v) => keep(v, 1, indices),
+            },
+            || {
+                attributes.par_iter_mut().for_each(|attribute| {
+                    with_values!(&mut attribute.data, v => keep(v, attribute.components, indices));
+                });
+            },
+        );
     }
 
     /// Bytes of the largest array among positions and attributes.

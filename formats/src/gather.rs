@@ -1,4 +1,6 @@
-//! Copies the values of chosen particles.
+//! Copies or keeps the values of chosen particles.
+//!
+//! Loops run over bytes, so that they are compiled for sizes of groups and not for every type of number.
 
 use bytemuck::Pod;
 use rayon::prelude::*;
@@ -12,7 +14,6 @@ const TASK: usize = 4096;
 /// If there is no group with one of the indices.
 pub(crate) fn gather<T: Pod>(items: &[T], components: usize, indices: &[u32]) -> Vec<T> {
     let mut gathered: Vec<T> = bytemuck::zeroed_vec(indices.len() * components);
-    // As bytes, so that the loops are compiled for sizes of groups and not for every type of number
     gather_bytes(
         bytemuck::cast_slice(items),
         components * size_of::<T>(),
@@ -44,6 +45,46 @@ fn gather_bytes(from: &[u8], size: usize, indices: &[u32], to: &mut [u8]) {
                 }
             }
         });
+}
+
+/// Keeps the groups of `components` items with these indices, which are ascending. Groups move within the array: the
+/// pages of a new one would cost more time.
+///
+/// # Panics
+/// If there is no group with one of the indices.
+pub(crate) fn keep<T: Pod>(items: &mut Vec<T>, components: usize, indices: &[u32]) {
+    keep_bytes(
+        bytemuck::cast_slice_mut(items),
+        components * size_of::<T>(),
+        indices,
+    );
+    items.truncate(indices.len() * components);
+    items.shrink_to_fit();
+}
+
+fn keep_bytes(items: &mut [u8], size: usize, indices: &[u32]) {
+    match size {
+        1 => move_down::<1>(items, indices),
+        2 => move_down::<2>(items, indices),
+        4 => move_down::<4>(items, indices),
+        8 => move_down::<8>(items, indices),
+        12 => move_down::<12>(items, indices),
+        16 => move_down::<16>(items, indices),
+        24 => move_down::<24>(items, indices),
+        _ => {
+            for (to, from) in indices.iter().enumerate() {
+                let from = *from as usize * size;
+                items.copy_within(from..from + size, to * size);
+            }
+        }
+    }
+}
+
+fn move_down<const SIZE: usize>(items: &mut [u8], indices: &[u32]) {
+    let groups = items.as_chunks_mut::<SIZE>().0;
+    for (to, from) in indices.iter().enumerate() {
+        groups[to] = groups[*from as usize];
+    }
 }
 
 fn copy<const SIZE: usize>(from: &[u8], indices: &[u32], to: &mut [u8]) {
@@ -80,6 +121,21 @@ mod tests {
             );
         }
         assert!(gather::<f32>(&[1.0, 2.0], 2, &[]).is_empty());
+    }
+
+    #[test]
+    fn kept_groups_are_those_with_the_indices() {
+        let indices: Vec<u32> = (0..1000).filter(|i| i % 7 < 3 || i % 11 == 0).collect();
+        for components in [1, 2, 3, 4, 5, 6, 9] {
+            let items: Vec<u16> = (0..1000 * components as u16).collect();
+            let mut wide: Vec<f64> = items.iter().map(|item| f64::from(*item)).collect();
+            let expected = gather(&wide, components, &indices);
+            keep(&mut wide, components, &indices);
+            assert_eq!(wide, expected);
+            let mut kept = items.clone();
+            keep(&mut kept, components, &indices);
+            assert_eq!(kept, gather(&items, components, &indices));
+        }
     }
 
     #[test]

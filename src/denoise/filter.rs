@@ -194,6 +194,7 @@ mod tests {
     #[test]
     fn the_memory_of_a_thread_is_what_it_allocates() {
         let input = DenoiseInput {
+            views: [1, 1],
             width: 0,
             height: 0,
             samples: 2,

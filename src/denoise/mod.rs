@@ -60,6 +60,9 @@ pub struct DenoiseInput<'a> {
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
+    /// Number of views beside each other and below each other, of equal size, as of the eyes of a stereo pair. Each is
+    /// filtered as a picture of its own.
+    pub views: [u32; 2],
     /// Samples per pixel, at least 2.
     pub samples: u32,
     /// Mean of all samples: linear RGB, and a fourth component that is ignored.
@@ -142,6 +145,15 @@ impl DenoiseInput<'_> {
         }
         Ok(())
     }
+
+    /// Width and height of a view.
+    fn view(&self) -> [usize; 2] {
+        let part = |length: u32, views: u32| length.div_ceil(views.max(1)) as usize;
+        [
+            part(self.width, self.views[0]),
+            part(self.height, self.views[1]),
+        ]
+    }
 }
 
 /// Returns the filtered linear RGB of a picture. Runs on the current rayon pool.
@@ -155,8 +167,8 @@ pub fn denoise(
     denoise_with(input, settings, &Execution::default())
 }
 
-/// Upper bound of the memory that filtering needs in addition to the input, bytes: the result, and the tiles of
-/// `threads` threads.
+/// Upper bound of the memory that filtering needs in addition to the input, of one view or two, bytes: the result, and
+/// the tiles of `threads` threads.
 pub fn predicted_bytes(width: u32, height: u32, settings: &DenoiseSettings, threads: u64) -> u64 {
     let search = settings.search.min(*SEARCH_RADII.end()) as usize;
     let result = u64::from(width) * u64::from(height) * size_of::<Vec3>() as u64;
@@ -193,13 +205,14 @@ fn denoise_with(
     if filtered.is_empty() {
         return Ok(filtered);
     }
-    // Divide the picture into equal tiles
-    let (width, height) = (input.width as usize, input.height as usize);
+    // Divide each view into equal tiles
+    let width = input.width as usize;
     let [max_width, max_height] = execution.tile;
     let max_width = max_width.min(TileLayout::max_width(settings.search as usize));
-    let columns = equal_part(width, max_width);
-    let rows = equal_part(height, max_height);
-    let tiles = tiles(&mut filtered, width, columns, rows);
+    let view = input.view();
+    let columns = equal_part(view[0], max_width);
+    let rows = equal_part(view[1], max_height);
+    let tiles = tiles(&mut filtered, width, view, [columns, rows]);
     // Filter them in parallel
     let simd = Supported::or_best(execution.simd);
     let filter = || TileFilter::new(simd, input, settings, [columns, rows]);

@@ -88,6 +88,7 @@ impl Picture {
 
     fn input(&self) -> DenoiseInput<'_> {
         DenoiseInput {
+            views: [1, 1],
             width: u32::try_from(self.width).expect("a small picture"),
             height: u32::try_from(self.height).expect("a small picture"),
             samples: self.samples,
@@ -405,6 +406,7 @@ fn invalid_input_is_an_error() {
         assert_eq!(message(&input, &settings), expected);
     }
     let huge = DenoiseInput {
+        views: [1, 1],
         width: u32::MAX,
         height: u32::MAX,
         ..valid
@@ -440,5 +442,50 @@ fn invalid_input_is_an_error() {
 fn a_picture_without_pixels_is_returned() {
     for (width, height) in [(0, 0), (0, 7), (7, 0)] {
         assert_eq!(Picture::flat(width, height).denoised(), []);
+    }
+}
+
+/// Two pictures of equal size beside each other, or below each other.
+fn joined<T: Copy>(a: &[T], b: &[T], width: usize, views: [u32; 2]) -> Vec<T> {
+    match views {
+        [2, 1] => {
+            let rows = a.chunks(width).zip(b.chunks(width));
+            rows.flat_map(|(a, b)| [a, b].concat()).collect()
+        }
+        _ => [a, b].concat(),
+    }
+}
+
+#[test]
+fn views_are_filtered_as_pictures_of_their_own() {
+    let (width, height) = (37, 21);
+    let [a, b] = [5, 6].map(|seed| Picture::random(width, height, seed));
+    for views in [[2_u32, 1_u32], [1, 2]] {
+        let pair = Picture {
+            width: width * views[0] as usize,
+            height: height * views[1] as usize,
+            samples: a.samples,
+            color: joined(&a.color, &b.color, width, views),
+            odd: joined(&a.odd, &b.odd, width, views),
+            albedo: joined(&a.albedo, &b.albedo, width, views),
+            normal: joined(&a.normal, &b.normal, width, views),
+            depth: joined(&a.depth, &b.depth, width, views),
+        };
+        let expected = joined(&a.denoised(), &b.denoised(), width, views);
+        for tile in [[usize::MAX, TILE_ROWS], [7, 5], [16, 1]] {
+            let execution = Execution {
+                tile,
+                ..Execution::default()
+            };
+            let input = DenoiseInput {
+                views,
+                ..pair.input()
+            };
+            let filtered = denoise_with(&input, &DenoiseSettings::OPAQUE, &execution);
+            let filtered = filtered.expect("valid input");
+            assert_eq!(bits(&filtered), bits(&expected), "{views:?} {tile:?}");
+        }
+        // As one view, pixels at the seam are averaged
+        assert_ne!(bits(&pair.denoised()), bits(&expected));
     }
 }

@@ -1,7 +1,7 @@
 //! The planes of a tile of the image and of the border around it that its pixels are compared with, in memory that
 //! stays in the cache.
 //!
-//! Pixels beside the image repeat those at its edge, so that patches are complete; their red albedo is [`OUTSIDE`], so
+//! Pixels beside the view repeat those at its edge, so that patches are complete; their red albedo is [`OUTSIDE`], so
 //! that their weight is 0.
 
 use std::ops::Range;
@@ -59,10 +59,10 @@ impl Tile {
             simd,
             input,
             margin,
-            left: place.left,
+            view: View::around(input, place),
         };
         for (number, row) in self.values.chunks_mut(ROW_LEN).take(rows).enumerate() {
-            line.copy(place.top + number, row, &mut self.buffer);
+            line.copy(number, place, row, &mut self.buffer);
         }
         // Derive noise and slopes from neighbouring rows
         for number in NOISE_RADIUS..rows - NOISE_RADIUS {
@@ -117,24 +117,47 @@ struct Line<'a> {
     input: &'a DenoiseInput<'a>,
     /// Pixels around the tile.
     margin: usize,
-    /// The first column of the tile in the image.
-    left: usize,
+    view: View,
+}
+
+/// The first and the last column and row of a view, which are its edges.
+struct View {
+    columns: [usize; 2],
+    rows: [usize; 2],
+}
+
+impl View {
+    /// The view that contains a tile.
+    fn around(input: &DenoiseInput<'_>, tile: &Rectangle) -> Self {
+        let ends = |start: usize, length: usize, of_image: u32| {
+            let first = start / length * length;
+            [first, (first + length).min(of_image as usize) - 1]
+        };
+        let [width, height] = input.view();
+        Self {
+            columns: ends(tile.left, width, input.width),
+            rows: ends(tile.top, height, input.height),
+        }
+    }
 }
 
 impl Line<'_> {
-    /// Copies the row `margin` above row `below` of the image to `row`.
-    fn copy(&self, below: usize, row: &mut [f32], usable: &mut [f32]) {
-        let margin = self.margin;
-        let (width, height) = (self.input.width as usize, self.input.height as usize);
-        let y = below.saturating_sub(margin).min(height - 1);
+    /// Copies row `number` of those of the `tile` and its margin to `row`.
+    fn copy(&self, number: usize, tile: &Rectangle, row: &mut [f32], usable: &mut [f32]) {
+        let (margin, [top, bottom]) = (self.margin, self.view.rows);
+        let width = self.input.width as usize;
+        let below = tile.top + number;
+        let y = below.saturating_sub(margin).clamp(top, bottom);
         let is_inside = y + margin == below;
-        // Copy the columns inside the image
-        let start = margin.saturating_sub(self.left);
-        let first = self.left.saturating_sub(margin);
-        let end = STRIDE.min(start + width - first);
+        // Copy the columns inside the view
+        let [leftmost, rightmost] = self.view.columns;
+        let left = tile.left - leftmost;
+        let start = margin.saturating_sub(left);
+        let first = leftmost + left.saturating_sub(margin);
+        let end = STRIDE.min(start + rightmost + 1 - first);
         let pixels = y * width + first..y * width + first + end - start;
         self.copy_pixels(pixels, row, start..end, usable);
-        // Repeat the columns at the edge of the image
+        // Repeat the columns at the edge of the view
         for (number, plane) in row.chunks_mut(STRIDE).take(NOISE).enumerate() {
             let outside = match number {
                 ALBEDO => Some(OUTSIDE),

@@ -75,39 +75,59 @@ pub(super) fn equal_part(whole: usize, max: usize) -> usize {
 /// The place of a tile, and its rows.
 type TileRows<'a> = (Rectangle, Vec<&'a mut [Vec3]>);
 
-/// Splits a plane into tiles of up to `columns` x `rows` pixels.
+/// Splits a plane of `width` columns with views of this size into tiles of up to `columns` x `rows` pixels, each in one
+/// view.
 pub(super) fn tiles(
     plane: &mut [Vec3],
     width: usize,
-    columns: usize,
-    rows: usize,
+    view: [usize; 2],
+    [columns, rows]: [usize; 2],
 ) -> Vec<TileRows<'_>> {
-    let count = width.div_ceil(columns) * plane.len().div_ceil(width * rows);
-    let mut all = Vec::with_capacity(count);
-    for (band, pixels) in plane.chunks_mut(width * rows).enumerate() {
+    let count = |length: usize, view: usize, part: usize| {
+        length / view * view.div_ceil(part) + (length % view).div_ceil(part)
+    };
+    let height = plane.len() / width;
+    let tiles = count(width, view[0], columns) * count(height, view[1], rows);
+    let mut all = Vec::with_capacity(tiles);
+    let bands = plane.chunks_mut(width * view[1]);
+    let mut top = 0;
+    for pixels in bands.flat_map(|views| views.chunks_mut(width * rows)) {
         let first = all.len();
         let height = pixels.len() / width;
-        let place = |left: usize| Rectangle {
-            left,
-            top: band * rows,
-            width: columns.min(width - left),
-            height,
-        };
-        let lefts = (0..width).step_by(columns);
-        all.extend(lefts.map(|left| (place(left), Vec::with_capacity(height))));
+        for start in (0..width).step_by(view[0]) {
+            let end = width.min(start + view[0]);
+            all.extend((start..end).step_by(columns).map(|left| {
+                let place = Rectangle {
+                    left,
+                    top,
+                    width: columns.min(end - left),
+                    height,
+                };
+                (place, Vec::with_capacity(height))
+            }));
+        }
         for row in pixels.chunks_mut(width) {
-            for ((_, tile), piece) in all[first..].iter_mut().zip(row.chunks_mut(columns)) {
+            let pieces = row.chunks_mut(view[0]);
+            let pieces = pieces.flat_map(|part| part.chunks_mut(columns));
+            for ((_, tile), piece) in all[first..].iter_mut().zip(pieces) {
                 tile.push(piece);
             }
         }
+        top += height;
     }
     all
 }
 
-/// Upper bound of the memory of [`tiles`] of an image, divided into equal parts of at most these lengths, bytes.
+/// Upper bound of the memory of [`tiles`] of an image of up to two views on each axis, divided into equal parts of at
+/// most these lengths, bytes.
 pub(super) fn tiles_bytes(width: u32, height: u32, max_columns: usize, max_rows: usize) -> u64 {
-    let columns = u64::from(width).div_ceil(max_columns as u64);
-    let tiles = columns * u64::from(height).div_ceil(max_rows as u64);
+    // The parts of two views are one more at most
+    let parts = |length: u32, max: usize| match length {
+        0 | 1 => 1,
+        _ => u64::from(length).div_ceil(max as u64) + 1,
+    };
+    let columns = parts(width, max_columns);
+    let tiles = columns * parts(height, max_rows);
     let rows = columns * u64::from(height);
     tiles * size_of::<TileRows<'_>>() as u64 + rows * size_of::<&[Vec3]>() as u64
 }
@@ -118,22 +138,33 @@ mod tests {
 
     #[test]
     fn tiles_cover_a_plane_once() {
-        for ([width, height], [max_columns, max_rows]) in [
-            ([1_u32, 1_u32], [9, 9]),
-            ([7, 5], [3, 2]),
-            ([154, 64], [154, 64]),
-            ([155, 65], [154, 64]),
+        for ([width, height], [max_columns, max_rows], views) in [
+            ([1_u32, 1_u32], [9, 9], [1, 1]),
+            ([7, 5], [3, 2], [1, 1]),
+            ([154, 64], [154, 64], [1, 1]),
+            ([155, 65], [154, 64], [1, 1]),
+            ([14, 5], [3, 2], [2, 1]),
+            ([5, 14], [3, 4], [1, 2]),
         ] {
             let predicted = tiles_bytes(width, height, max_columns, max_rows);
             let (width, height) = (width as usize, height as usize);
-            let columns = equal_part(width, max_columns);
-            let rows = equal_part(height, max_rows);
+            let view = [width / views[0], height / views[1]];
+            let columns = equal_part(view[0], max_columns);
+            let rows = equal_part(view[1], max_rows);
             let mut plane = vec![Vec3::ZERO; width * height];
-            let all = tiles(&mut plane, width, columns, rows);
+            let all = tiles(&mut plane, width, view, [columns, rows]);
             let places = size_of_val(&all[..]);
             let lines: usize = all.iter().map(|(_, rows)| size_of_val(&rows[..])).sum();
-            assert_eq!((places + lines) as u64, predicted, "{width}x{height}");
+            assert!((places + lines) as u64 <= predicted, "{width}x{height}");
             for (place, rows) in all {
+                assert_eq!(
+                    place.left / view[0],
+                    (place.left + place.width - 1) / view[0]
+                );
+                assert_eq!(
+                    place.top / view[1],
+                    (place.top + place.height - 1) / view[1]
+                );
                 assert_eq!(rows.len(), place.height);
                 for (y, row) in rows.into_iter().enumerate() {
                     assert_eq!(row.len(), place.width);

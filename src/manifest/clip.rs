@@ -1,4 +1,4 @@
-//! `[[clip]]`: planes and boxes that leave out particles.
+//! `[[clip]]`: planes and boxes that leave out particles, or cut their spheres.
 
 use glam::DVec3;
 use serde_json::{Value as Json, json};
@@ -30,6 +30,16 @@ named! {
         Inside = "inside",
         /// Particles outside of it.
         Outside = "outside",
+    }
+}
+
+named! {
+    /// What a clip does with the spheres at its border.
+    ClipMode {
+        /// Draws those with their centres on the kept side whole, and no others.
+        Particles = "particles",
+        /// Cuts them open.
+        Cut = "cut",
     }
 }
 
@@ -70,12 +80,15 @@ pub enum ClipKind {
 pub struct Clip {
     /// What it keeps.
     pub kind: ClipKind,
+    /// What it does with spheres at its border.
+    pub mode: ClipMode,
 }
 
 impl Default for Clip {
     fn default() -> Self {
         Self {
             kind: ClipKind::of(ClipType::Plane),
+            mode: ClipMode::Particles,
         }
     }
 }
@@ -144,6 +157,7 @@ impl Clip {
     pub(super) fn examples() -> Vec<Self> {
         let of_type = |(kind, _)| Self {
             kind: ClipKind::of(kind),
+            ..Self::default()
         };
         ClipType::names().into_iter().map(of_type).collect()
     }
@@ -160,6 +174,7 @@ impl Clip {
             }
             self.kind = ClipKind::of(kind);
         }
+        let mode = &mut self.mode;
         match &mut self.kind {
             ClipKind::Plane {
                 normal,
@@ -172,6 +187,8 @@ impl Clip {
                 point => *point;
                 /// Distance of the plane from the point, along the normal
                 offset => *offset;
+                /// Whole particles by their centres, or spheres cut open: particles | cut
+                mode => *mode;
             ),
             ClipKind::Box { min, max, keep } => {
                 keys!(keys:
@@ -181,6 +198,8 @@ impl Clip {
                     max => *max, required("a box needs two opposite corners, such as [1.0, 1.0, 1.0]");
                     /// Side that is kept: inside | outside
                     keep => *keep;
+                    /// Whole particles by their centres, or spheres cut open: particles | cut
+                    mode => *mode;
                 );
             }
         }

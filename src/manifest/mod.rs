@@ -78,7 +78,7 @@ pub use arrows::Arrows;
 pub use camera::{AxisView, Camera, CameraKey, CameraMode, ConvergenceSetting, ProjectionKind};
 pub use cell::Cell;
 pub use channel::{ATTRIBUTE_CHANNEL, Channel, NamedChannel};
-pub use clip::{Clip, ClipKind, KeptSide, PlaneNormal};
+pub use clip::{Clip, ClipKind, ClipMode, KeptSide, PlaneNormal};
 pub use color::{CategoryNames, ColorMapping, ColorSetting, ScaleKind};
 pub use color_map::{MapName, RangeSetting};
 pub use crop::PixelBounds;
@@ -410,12 +410,16 @@ impl Manifest {
     /// The particles that are drawn.
     pub fn selection(&self) -> Selection {
         let slab = self.select.slab.iter().map(Slab::region);
-        let clips = self.clips.iter().map(|clip| clip.kind.region());
+        let of_mode = |mode| {
+            let clips = self.clips.iter().filter(move |clip| clip.mode == mode);
+            clips.map(|clip| clip.kind.region())
+        };
         Selection {
             condition: self.select.condition.clone(),
             ids: self.select.ids.clone(),
             every: self.select.every,
-            regions: slab.chain(clips).collect(),
+            regions: slab.chain(of_mode(ClipMode::Particles)).collect(),
+            cuts: of_mode(ClipMode::Cut).collect(),
         }
     }
 

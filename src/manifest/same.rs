@@ -26,6 +26,8 @@ const CHANGED_DEFAULTS: [(&str, &str); 4] = [
     (GROUND_WETNESS, OLD_GROUND_WETNESS),
     (SPRAY_STYLE, OLD_SPRAY_STYLE),
 ];
+/// The default of `mode` of a clip.
+const WHOLE_PARTICLES: &str = "\"particles\"";
 const SURFACE: &str = "render.surface";
 /// The value of [`SURFACE`] in older versions, and the equivalent current one.
 const UNION: [&str; 2] = ["\"medium\"", "\"union\""];
@@ -82,6 +84,11 @@ impl Manifest {
         let is_usual =
             |setting: &(String, String)| usual.contains(setting) && setting.0 != MIN_WEIGHT;
         settings.retain(|setting| value(&setting.0).is_some() || !is_usual(setting));
+        // Versions without modes of clips drew whole particles
+        settings.retain(|(key, default)| {
+            let is_mode = key.starts_with("clip.") && key.ends_with(".mode");
+            !is_mode || default != WHOLE_PARTICLES || value(key).is_some()
+        });
         // Versions without this key had one renderer.
         if value(RENDERER).is_none() {
             settings.retain(|(key, _)| key != RENDERER);
@@ -262,6 +269,16 @@ mod tests {
         let other = manifest("image.samples = 3");
         let found = changes(&other, &without, false);
         assert_eq!(found, ["image.samples: (not set) -> 3"]);
+    }
+
+    #[test]
+    fn clips_of_older_versions_draw_whole_particles() {
+        let clip = "[[clip]]\ntype = \"plane\"\nnormal = \"x\"\n";
+        let planned = rewritten(&manifest(clip), "clip.0.mode", None);
+        assert_eq!(changes(&manifest(clip), &planned, false), [""; 0]);
+        let cut = manifest(&format!("{clip}mode = \"cut\""));
+        let found = changes(&cut, &planned, false);
+        assert_eq!(found, ["clip.0.mode: (not set) -> \"cut\""]);
     }
 
     #[test]

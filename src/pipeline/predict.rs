@@ -310,10 +310,11 @@ impl<'a> MemoryModel<'a> {
         let shared = if frame.is_shared { frame.content } else { 0 };
         // One byte per particle marks which are finite.
         let keeping = attributes + self.kept(frame) + n;
-        // Indices of those that are drawn, twice while they are found, and a copy of one array after the other
+        // Indices of those that are drawn, with a mark for each particle while they are found; and a copy of one array
+        // after the other, for allocators that cannot shrink one in its place
         let selecting = match self.setup.picture.selection.is_all() {
             true => 0,
-            false => frame.raw + (4 * n + frame.positions.max(attributes)).max(8 * n),
+            false => frame.raw + (4 * n + frame.positions.max(attributes)).max(5 * n),
         };
         let held = rounding.max(keeping) + self.file_indices(frame);
         let reading = (files + frame.raw).max(shared + held.max(selecting));

@@ -17,6 +17,7 @@ use crate::scene::{
     Projection, Scene, StereoSettings,
 };
 use crate::selection::Selection;
+use crate::surface::cut::ConvexRegion;
 use crate::surface::rods::Anchor;
 use crate::surface::{MaterialId, SurfaceKind, SurfaceSettings};
 use crate::survey::FrameWeight;
@@ -173,6 +174,8 @@ pub struct Picture {
     pub least_radius: f32,
     /// Which particles are drawn.
     pub selection: Selection,
+    /// The region that spheres are cut to.
+    pub cut: ConvexRegion,
     /// Source of the radii.
     pub radius: RadiusRule,
     /// Source of the colours.
@@ -249,6 +252,11 @@ pub struct RunSettings {
 }
 
 impl Picture {
+    /// Number of images of eyes beside each other and below each other.
+    pub(super) const fn eyes(&self) -> [u32; 2] {
+        self.scene.camera.eyes()
+    }
+
     /// Whether ids of particles are needed: for channels, or for the sizes of soft drops.
     pub(super) fn needs_ids(&self) -> bool {
         self.render.channels.needs_ids() || self.scene.is_spray_soft

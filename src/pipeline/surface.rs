@@ -21,6 +21,7 @@ use crate::metrics::memory::available;
 use crate::render::{Film, RayCounts, RenderError, ShadeSource, Stop, render_into};
 use crate::report::FrameReport;
 use crate::scene::Scene;
+use crate::surface::cut::{ConvexRegion, CutSpheres};
 use crate::surface::mesh::{MeshSurface, MeshTree};
 use crate::surface::moving::MovingSpheres;
 use crate::surface::slices::{SlicedSurface, slice_times};
@@ -29,8 +30,8 @@ use crate::surface::spheres::SphereSurface;
 use crate::surface::spray::{DROP_RADIUS, SOFT_DROPS, soft_drop, spray_of};
 use crate::surface::union::UnionSurface;
 use crate::surface::{
-    GradientNormals, MaterialId, NormalKind, PcaNormals, ShadingNormals, Shape, SphereOwners,
-    SurfaceKind, SurfaceSettings,
+    CutShape, GradientNormals, MaterialId, NormalKind, PcaNormals, ShadingNormals, Shape,
+    SphereOwners, SurfaceKind, SurfaceSettings,
 };
 
 /// Input for a tree without spheres.
@@ -315,14 +316,15 @@ impl SurfaceBuilder {
 
 impl SurfaceBuilder {
     /// The surface of the body, over the spheres of `tree` unless it has its own structures.
-    fn body<'a>(&'a self, setup: &Setup, tree: TreeView<'a>) -> Box<dyn Shape + 'a> {
+    fn body<'a>(&'a self, setup: &'a Setup, tree: TreeView<'a>) -> Box<dyn Shape + 'a> {
+        let region = &setup.picture.cut;
         let normals = shading_normals(&setup.picture.surface);
         let union = |tree| UnionSurface::new(tree).with_normals(normals);
         match (setup.picture.surface.kind, setup.has_motion()) {
             (SurfaceKind::Spheres, false) => {
-                Box::new(SphereSurface::new(tree).with_normals(normals))
+                cut(SphereSurface::new(tree).with_normals(normals), region)
             }
-            (SurfaceKind::Spheres, true) => Box::new(MovingSpheres::new(&self.moving[0])),
+            (SurfaceKind::Spheres, true) => cut(MovingSpheres::new(&self.moving[0]), region),
             (SurfaceKind::Union, false) => Box::new(union(tree)),
             (SurfaceKind::Union, true) => {
                 let trees = self.unions.iter().map(|trees| union(trees.tree().view()));
@@ -334,6 +336,14 @@ impl SurfaceBuilder {
                 Box::new(SlicedSurface::new(surfaces.collect(), true))
             }
         }
+    }
+}
+
+/// The part of `spheres` in `region`.
+fn cut<'a, S: CutShape + 'a>(spheres: S, region: &'a ConvexRegion) -> Box<dyn Shape + 'a> {
+    match region.is_everywhere() {
+        true => Box::new(spheres),
+        false => Box::new(CutSpheres::new(spheres, region)),
     }
 }
 

@@ -226,6 +226,7 @@ fn denoise_film(setup: &Setup, film: &mut Film) -> Result<f64, DenoiseError> {
     let input = DenoiseInput {
         width: film.width,
         height: film.height,
+        views: setup.picture.eyes(),
         samples: setup.picture.render.samples,
         color: &film.color,
         odd,

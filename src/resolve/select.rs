@@ -4,6 +4,8 @@ use super::{ResolveError, color, similar};
 use crate::manifest::Manifest;
 use crate::pipeline::attribute_list;
 use crate::selection::{OTHER_NAMES, Selection};
+use crate::surface::SurfaceKind;
+use crate::surface::cut::ConvexRegion;
 use crate::survey::Survey;
 
 /// The selection of `manifest`.
@@ -31,4 +33,33 @@ pub(super) fn selection(manifest: &Manifest, survey: &Survey) -> Result<Selectio
             })
         }
     }
+}
+
+/// The region that the spheres of `manifest` are cut to.
+///
+/// # Errors
+/// The surface cannot be cut, or a region is not convex.
+pub(super) fn cut(manifest: &Manifest, survey: &Survey) -> Result<ConvexRegion, ResolveError> {
+    let unsupported = |key, what: &str| ResolveError::Unsupported {
+        key,
+        what: what.to_owned(),
+    };
+    let cuts = manifest.selection().cuts;
+    if !cuts.is_empty() && manifest.surface.kind != SurfaceKind::Spheres {
+        let what =
+            "\"cut\" is for spheres; set render.surface to \"spheres\", or take \"particles\"";
+        return Err(unsupported("clip.mode", what));
+    }
+    let mut region = ConvexRegion::default();
+    for cut in cuts {
+        let planes = cut.planes().ok_or_else(|| {
+            let what = "\"outside\" has no cut faces: what is left is not convex; set keep to \"inside\", cut with \
+                        planes, or set mode to \"particles\"";
+            unsupported("clip.keep", what)
+        })?;
+        for (point, normal) in planes {
+            region.cut(point - survey.origin, normal);
+        }
+    }
+    Ok(region)
 }

@@ -30,9 +30,16 @@ impl Stacks {
         to: &mut [bool],
     ) {
         self.used = [0; 2];
-        for operation in operations {
+        let mut operations = operations.iter();
+        while let Some(operation) = operations.next() {
             match *operation {
-                Operation::Number(value) => self.push_number().fill(value),
+                Operation::Number(value) => match operations.as_slice().first() {
+                    Some(Operation::Compare(comparison)) => {
+                        self.compare_with(*comparison, value);
+                        operations.next();
+                    }
+                    _ => self.push_number().fill(value),
+                },
                 Operation::Value(index) => {
                     let count = to.len();
                     let block = self.push_number();
@@ -98,32 +105,31 @@ impl Stacks {
         }
     }
 
-    fn compare(&mut self, comparison: Comparison) {
-        fn each(
-            to: &mut [bool; BLOCK],
-            pair: [&[f64; BLOCK]; 2],
-            holds: impl Fn(f64, f64) -> bool,
-        ) {
-            for (to, (a, b)) in to.iter_mut().zip(pair[0].iter().zip(pair[1])) {
-                *to = holds(*a, *b);
-            }
-        }
-        if self.truths.len() == self.used[1] {
+    /// The topmost block of truth values after one has been added.
+    fn push_truth(&mut self) -> usize {
+        let top = self.used[1];
+        self.used[1] += 1;
+        if self.truths.len() == top {
             self.truths.push([false; BLOCK]);
         }
-        let to = &mut self.truths[self.used[1]];
-        self.used[1] += 1;
+        top
+    }
+
+    fn compare(&mut self, comparison: Comparison) {
+        let to = self.push_truth();
         self.used[0] -= 2;
-        let pair = [&self.numbers[self.used[0]], &self.numbers[self.used[0] + 1]];
-        #[expect(clippy::float_cmp, reason = "what the user asks for")]
-        match comparison {
-            Comparison::Less => each(to, pair, |a, b| a < b),
-            Comparison::LessOrEqual => each(to, pair, |a, b| a <= b),
-            Comparison::Greater => each(to, pair, |a, b| a > b),
-            Comparison::GreaterOrEqual => each(to, pair, |a, b| a >= b),
-            Comparison::Equal => each(to, pair, |a, b| a == b),
-            Comparison::NotEqual => each(to, pair, |a, b| a != b),
-        }
+        let [a, b] = [&self.numbers[self.used[0]], &self.numbers[self.used[0] + 1]];
+        let pairs = self.truths[to].iter_mut().zip(a.iter().zip(b));
+        compare(comparison, pairs.map(|(to, (a, b))| (to, *a, *b)));
+    }
+
+    /// Compares with a constant, which needs no block.
+    fn compare_with(&mut self, comparison: Comparison, constant: f64) {
+        let to = self.push_truth();
+        self.used[0] -= 1;
+        let numbers = &self.numbers[self.used[0]];
+        let pairs = self.truths[to].iter_mut().zip(numbers);
+        compare(comparison, pairs.map(|(to, a)| (to, *a, constant)));
     }
 
     fn join(&mut self, function: impl Fn(bool, bool) -> bool) {
@@ -132,5 +138,18 @@ impl Stacks {
         for (a, b) in below[self.used[1] - 1].iter_mut().zip(&above[0]) {
             *a = function(*a, *b);
         }
+    }
+}
+
+/// Stores whether each pair of numbers compares as asked.
+#[expect(clippy::float_cmp, reason = "what the user asks for")]
+fn compare<'a>(comparison: Comparison, pairs: impl Iterator<Item = (&'a mut bool, f64, f64)>) {
+    match comparison {
+        Comparison::Less => pairs.for_each(|(to, a, b)| *to = a < b),
+        Comparison::LessOrEqual => pairs.for_each(|(to, a, b)| *to = a <= b),
+        Comparison::Greater => pairs.for_each(|(to, a, b)| *to = a > b),
+        Comparison::GreaterOrEqual => pairs.for_each(|(to, a, b)| *to = a >= b),
+        Comparison::Equal => pairs.for_each(|(to, a, b)| *to = a == b),
+        Comparison::NotEqual => pairs.for_each(|(to, a, b)| *to = a != b),
     }
 }

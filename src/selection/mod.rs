@@ -39,6 +39,9 @@ pub struct Selection {
     pub every: u32,
     /// Regions that contain their centres.
     pub regions: Vec<Region>,
+    /// Regions that spheres are cut to. Particles with centres outside are drawn as well, as their spheres may reach
+    /// into them.
+    pub cuts: Vec<Region>,
 }
 
 impl Selection {
@@ -46,6 +49,14 @@ impl Selection {
     pub const fn is_all(&self) -> bool {
         let is_by_id = self.ids.is_some() || self.every > 1;
         self.condition.is_none() && !is_by_id && self.regions.is_empty()
+    }
+
+    /// The particles with centres in the regions that spheres are cut to.
+    pub fn of_cuts(&self) -> Self {
+        Self {
+            regions: self.cuts.clone(),
+            ..Self::default()
+        }
     }
 
     /// Checks that the names in the condition have values, for particles with `attributes`.
@@ -83,25 +94,43 @@ impl Selection {
         }
         let values = self.values(&particles.attributes, particles.time)?;
         let ids = Value::id(&particles.attributes);
-        let runs = (0..count.div_ceil(RUN)).into_par_iter();
-        let runs: Vec<Vec<u32>> = runs
-            .map_init(Stacks::default, |stacks, run| {
-                let range = run * RUN..(run * RUN + RUN).min(count);
-                let mut survivors = Vec::with_capacity(range.len());
-                for first in range.clone().step_by(BLOCK) {
-                    let mut keep = [true; BLOCK];
-                    let keep = &mut keep[..BLOCK.min(range.end - first)];
+        // Mark the particles that are drawn, and count them
+        let mut marks = vec![false; count];
+        let runs = marks.par_chunks_mut(RUN).enumerate();
+        let counts: Vec<usize> = runs
+            .map_init(Stacks::default, |stacks, (run, marks)| {
+                for (block, keep) in marks.chunks_mut(BLOCK).enumerate() {
+                    let first = run * RUN + block * BLOCK;
+                    keep.fill(true);
                     if let Some(condition) = &self.condition {
                         stacks.evaluate(&condition.operations, &values, particles, first, keep);
                     }
                     self.test_ids(particles, ids, first, keep);
                     self.test_regions(particles, first, keep);
-                    push_kept(first, keep, &mut survivors);
                 }
-                survivors
+                marks.iter().map(|mark| usize::from(*mark)).sum()
             })
             .collect();
-        Ok(runs.concat())
+        // Store their indices
+        let mut survivors = vec![0; counts.iter().sum()];
+        let mut rest = &mut survivors[..];
+        let mut parts = Vec::with_capacity(counts.len());
+        for count in counts {
+            let (part, after) = rest.split_at_mut(count);
+            parts.push(part);
+            rest = after;
+        }
+        let runs = marks.par_chunks(RUN).zip(parts).enumerate();
+        runs.for_each(|(run, (marks, mut to))| {
+            for (block, keep) in marks.chunks(BLOCK).enumerate() {
+                let mut kept = [0; BLOCK];
+                let count = indices_of(run * RUN + block * BLOCK, keep, &mut kept);
+                let (part, after) = to.split_at_mut(count);
+                part.copy_from_slice(&kept[..count]);
+                to = after;
+            }
+        });
+        Ok(survivors)
     }
 
     /// Clears the marks of particles without a selected id.
@@ -135,17 +164,15 @@ impl Selection {
     }
 }
 
-/// Appends the indices of the marked particles.
-fn push_kept(first: usize, keep: &[bool], to: &mut Vec<u32>) {
+/// Writes the indices of the marked particles of a block, and returns their number.
+fn indices_of(first: usize, keep: &[bool], to: &mut [u32; BLOCK]) -> usize {
     // Every index is written, and the next one replaces those that are not kept: there is nothing to predict.
-    let start = to.len();
-    to.resize(start + keep.len(), 0);
-    let mut end = start;
+    let mut end = 0;
     for (i, keep) in keep.iter().enumerate() {
         to[end] = index_u32(first + i);
         end += usize::from(*keep);
     }
-    to.truncate(end);
+    end
 }
 
 /// Value `index` as an integer; None if it is not one.

@@ -48,4 +48,21 @@ impl Region {
             Self::Slab { axis, low, high } => (low..=high).contains(&point[axis]),
         }
     }
+
+    /// The planes that bound the region: a point on each, and its unit normal, which points away from the region. None
+    /// if the region is not convex.
+    pub fn planes(&self) -> Option<Vec<(DVec3, DVec3)>> {
+        let faces = |axis: usize, min: DVec3, max: DVec3| {
+            let normal = DVec3::AXES[axis];
+            [(min, -normal), (max, normal)]
+        };
+        match *self {
+            Self::HalfSpace { point, normal } => Some(vec![(point, normal)]),
+            Self::Box { min, max } => Some((0..3).flat_map(|axis| faces(axis, min, max)).collect()),
+            Self::Slab { axis, low, high } => {
+                Some(faces(axis, DVec3::splat(low), DVec3::splat(high)).to_vec())
+            }
+            Self::OutsideBox { .. } => None,
+        }
+    }
 }

@@ -1,6 +1,7 @@
 //! Surfaces for ray tracing. A scene is a list of [`Shape`]s that intersect packets of rays. Every [`Intersection`]
 //! has a distance, a normal, a material, and a particle that provides attributes, whatever shape it belongs to.
 
+pub mod cut;
 pub mod field;
 mod gradient;
 mod hierarchy;
@@ -29,5 +30,5 @@ pub use owners::SphereOwners;
 pub use pca::PcaNormals;
 pub use plane::Plane;
 pub use settings::{NormalKind, SprayStyle, SurfaceKind, SurfaceSettings};
-pub use shape::{Shape, Side};
+pub use shape::{CutShape, Shape, Side};
 pub(crate) use transmittance::TransmittanceProduct;

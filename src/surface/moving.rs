@@ -1,7 +1,7 @@
 //! Spheres that move while the shutter is open, each a separate body, in a [`MovingTree`].
 
 use super::owners::{SphereOwners, cross_chord};
-use super::shape::crossing_of_packet;
+use super::shape::{CutShape, crossing_of_packet};
 use super::spheres::intersections;
 use super::{Intersection, Intersections, MaterialId, Shape, Side, TransmittanceProduct};
 use crate::accel::Coherence;
@@ -93,6 +93,22 @@ impl Shape for MovingSpheres<'_> {
                 cross_chord(&mut product, part, ends, rays, lane)
             });
             transmittance[lane] = product.value();
+        }
+    }
+}
+
+impl CutShape for MovingSpheres<'_> {
+    fn visit_chords(
+        &self,
+        rays: &RayPacket,
+        lanes: u32,
+        visit: &mut dyn FnMut(usize, u32, f32, [f32; 2]),
+    ) {
+        for lane in lanes_in(lanes) {
+            self.tree.visit_chords(rays, lane, |sphere, radius, ends| {
+                visit(lane, self.owners.particle_of(sphere), radius, ends);
+                true
+            });
         }
     }
 }

@@ -135,6 +135,18 @@ pub trait Shape: Sync {
     }
 }
 
+/// Spheres that can be cut.
+pub trait CutShape: Shape {
+    /// Calls `visit` with the ray, the particle, the radius, and the distances of both intersections for every sphere
+    /// that contains a point of the rays in `lanes` between their ends, and for some others.
+    fn visit_chords(
+        &self,
+        rays: &RayPacket,
+        lanes: u32,
+        visit: &mut dyn FnMut(usize, u32, f32, [f32; 2]),
+    );
+}
+
 /// [`Shape::intersect`] in terms of [`Shape::crossing`].
 pub(super) fn intersect_one_by_one<S: Shape + ?Sized>(
     shape: &S,

@@ -5,6 +5,7 @@ use std::cell::RefCell;
 use glam::Vec3;
 
 use super::owners::{SphereOwners, cross_chord};
+use super::shape::CutShape;
 use super::{
     Intersection, Intersections, MaterialId, ShadingNormals, Shape, Side, TransmittanceProduct,
 };
@@ -53,6 +54,13 @@ impl<'a> SphereSurface<'a> {
     }
 }
 
+/// Step off a surface of spheres of `radius` at `point`, above the rounding of the point, for rays from `origin`.
+#[inline]
+pub(super) fn step_off(radius: f32, point: Vec3, origin: Vec3) -> f32 {
+    let largest = point.abs().max_element().max(origin.abs().max_element());
+    (OFFSET_OF_RADIUS * radius).max(OFFSET_OF_ROUNDING * largest)
+}
+
 /// The intersection of a ray with the sphere of `hit` in `tree`.
 #[inline]
 pub(super) fn sphere_hit(
@@ -64,11 +72,6 @@ pub(super) fn sphere_hit(
     let (center, radius) = tree.sphere(hit.slot);
     let normal = outward(ray.at(hit.t) - center, radius, ray.direction);
     let point = center + normal * radius;
-    // Compute an offset above the rounding of the point
-    let largest = point
-        .abs()
-        .max_element()
-        .max(ray.origin.abs().max_element());
     let intersection = Intersection {
         t: hit.t,
         point,
@@ -78,7 +81,7 @@ pub(super) fn sphere_hit(
         radius,
         particle: tree.particle(hit.slot),
         anchor: point,
-        offset: (OFFSET_OF_RADIUS * radius).max(OFFSET_OF_ROUNDING * largest),
+        offset: step_off(radius, point, ray.origin),
     };
     normals.shade(tree, ray, intersection, radius)
 }
@@ -182,6 +185,21 @@ impl Shape for SphereSurface<'_> {
         for lane in lanes_in(lanes) {
             transmittance[lane] = product[lane].value();
         }
+    }
+}
+
+impl CutShape for SphereSurface<'_> {
+    fn visit_chords(
+        &self,
+        rays: &RayPacket,
+        lanes: u32,
+        visit: &mut dyn FnMut(usize, u32, f32, [f32; 2]),
+    ) {
+        self.tree.visit_chords(rays, lanes, |lane, chord| {
+            let particle = self.owners.particle_of(self.tree.particle(chord.slot));
+            visit(lane, particle, self.tree.sphere(chord.slot).1, chord.ends);
+            true
+        });
     }
 }
 

@@ -48,13 +48,12 @@ impl FrameSample {
         index: usize,
         question: Question,
     ) -> Result<Self, FrameError> {
-        let mut sample = match question.selection {
+        let sample = match question.selection {
             // Few of the particles of a sample may be drawn
-            Some(selection) => {
-                Self::of_files(sequence, index)?.selected(selection, question.radius)
-            }
-            None => Self::of_source(sequence, index, question.radius)?,
+            Some(selection) if !selection.is_all() => Self::of_files(sequence, index)?,
+            _ => Self::of_source(sequence, index, question.radius)?,
         };
+        let mut sample = sample.of_question(question);
         let time = &mut sample.particles.time;
         *time = sequence.listed_time(index).or(*time);
         Ok(sample)
@@ -134,7 +133,7 @@ impl FrameSample {
         let path = Path::new(name);
         let source = RawSource::borrowed(path, raw)?;
         let count = raw.positions.len();
-        let is_part = count as u64 > LARGE && question.selection.is_none();
+        let is_part = count as u64 > LARGE && question.selection.is_none_or(Selection::is_all);
         let (particles, spacing, extremes) = match is_part {
             true => stream::survey(&source, path, MAX_SAMPLE, question.radius)?,
             false => (raw.to_owned_particles(), None, None),
@@ -152,10 +151,7 @@ impl FrameSample {
             origin: None,
             particles,
         };
-        Ok(match question.selection {
-            Some(selection) => sample.selected(selection, question.radius),
-            None => sample,
-        })
+        Ok(sample.of_question(question))
     }
 
     fn of_files(sequence: &Sequence, index: usize) -> Result<Self, FrameError> {
@@ -184,16 +180,30 @@ impl FrameSample {
         })
     }
 
-    /// The sample without the particles that are not drawn. The spacing is that of all of them: a slice or every tenth
-    /// particle has spheres of the same size.
-    fn selected(mut self, selection: &Selection, question: RadiusQuestion) -> Self {
-        if question.is_auto() && find_radius(&self.particles.attributes).is_none() {
-            self.spacing = spacing_of(&self.particles.positions, question.is_packed());
+    /// The sample without the particles that are not drawn, or that cuts leave out. The spacing is that of all of them:
+    /// a slice or every tenth particle has spheres of the same size.
+    fn of_question(mut self, question: Question) -> Self {
+        let Some(selection) = question.selection else {
+            return self;
+        };
+        let has_radius = find_radius(&self.particles.attributes).is_some();
+        if question.radius.is_auto() && !has_radius && self.spacing.is_none() {
+            self.spacing = spacing_of(&self.particles.positions, question.radius.is_packed());
         }
         // A name without a value is reported later, with the attributes that there are
-        if let Ok(survivors) = selection.survivors(&self.particles) {
+        if let Ok(survivors) = selection.survivors(&self.particles)
+            && !selection.is_all()
+        {
             self.particles.select(&survivors);
             self.count = survivors.len();
+        }
+        // A thin slice may cut spheres without their centres
+        if let Ok(survivors) = selection.of_cuts().survivors(&self.particles)
+            && !selection.cuts.is_empty()
+            && !survivors.is_empty()
+        {
+            self.particles.select(&survivors);
+            self.extremes = None;
         }
         self
     }
