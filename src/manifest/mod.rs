@@ -21,6 +21,7 @@ use problem::{Place, Problem, Problems};
 use reader::Section;
 use tree::TomlNode;
 
+mod by_integer;
 mod camera;
 mod caustics;
 mod cell;
@@ -72,11 +73,12 @@ mod work;
 #[cfg(test)]
 mod work_tests;
 
+pub use by_integer::ByInteger;
 pub use camera::{AxisView, Camera, CameraKey, CameraMode, ConvergenceSetting, ProjectionKind};
-pub use cell::Cell;
+pub use cell::{Cell, Replicate};
 pub use channel::{ATTRIBUTE_CHANNEL, Channel, NamedChannel};
 pub use clip::{Clip, ClipKind, KeptSide, PlaneNormal};
-pub use color::{CategoryNames, ColorMapping, ColorSetting, ScaleKind};
+pub use color::{CategoryColors, CategoryNames, ColorMapping, ColorSetting, ScaleKind};
 pub use color_map::{MapName, RangeSetting};
 pub use crop::PixelBounds;
 pub use environment::{Environment, EnvironmentKind};

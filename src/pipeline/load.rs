@@ -183,7 +183,7 @@ fn decoded<'a>(
         &mut notes,
     );
     let facts = FileFacts::of_decoded(setup, &frame, without_directory(file));
-    let (particles, clamped_radii) = DecodedFrame::of(setup, frame, task.frame, file)?;
+    let (particles, clamped_radii) = DecodedFrame::of(setup, frame, task.frame, file, &mut notes)?;
     Ok(LoadedFrame {
         task: task.clone(),
         notes,

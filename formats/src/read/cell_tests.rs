@@ -107,7 +107,7 @@ fn gro_files_have_cells_in_their_last_line() {
     for damaged in [
         "0.0 0.0 0.0",
         "3.0 2.5 2.0 1.0",
-        "3.0 2-5 2.0",
+        "3.0 2.5e 2.0",
         "1e999 2.0 3.0",
     ] {
         assert_eq!(with(damaged), None, "{damaged}");

@@ -150,12 +150,16 @@ fn read(
     budget: MemoryBudget,
 ) -> Result<RawParticles, ParseError> {
     let range = step.byte_range().cloned().unwrap_or_default();
-    // What precedes the first model is about all of them
+    // What precedes the first model is about all of them. Atoms are not passed: text in pieces only goes forward.
     let mut cell = None;
-    while let Some(line) = text.line().filter(|line| !is_atom(*line)) {
+    while text.at() < range.start {
+        let Some(line) = text.peek_line().filter(|line| !is_atom(*line)) else {
+            break;
+        };
         if is_cell(line) {
             cell = self::cell(line);
         }
+        text.line();
     }
     text.go_to(range.start);
     text.end_at(range.end);
