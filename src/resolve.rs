@@ -136,6 +136,11 @@ pub fn question<'a>(manifest: &'a Manifest, selection: &'a Selection) -> Questio
             RadiusSetting::Attribute { attribute, scale } => {
                 RadiusQuestion::Attribute(attribute, *scale)
             }
+            RadiusSetting::Table {
+                attribute,
+                table,
+                scale,
+            } => RadiusQuestion::Table(attribute, table, *scale),
         },
         up: manifest.input.up.map(|up| DVec3::from_array(up.vector())),
         selection: Some(selection).filter(|s| !s.is_all() || !s.cuts.is_empty()),
@@ -382,6 +387,18 @@ fn radius_rule(manifest: &Manifest, survey: &Survey) -> Result<RadiusRule, Resol
                 scale: narrow(*scale),
             }
         }
+        RadiusSetting::Table {
+            attribute,
+            table,
+            scale,
+        } => {
+            require_attribute(survey, "input.radius", attribute)?;
+            RadiusRule::Table {
+                name: attribute.clone(),
+                table: table.clone(),
+                scale: scale * survey.unit_of(table),
+            }
+        }
         RadiusSetting::Auto => match surface::radius(manifest.surface.kind, survey) {
             Some(radius) => RadiusRule::FileOr(radius),
             // All frames contain radii, or there are no particles.
@@ -410,7 +427,7 @@ fn reach(rule: &RadiusRule, survey: &Survey) -> f32 {
     match rule {
         RadiusRule::Common(radius) => *radius,
         RadiusRule::FileOr(radius) => radius.max(survey.reach),
-        RadiusRule::Attribute { .. } => survey.reach,
+        RadiusRule::Attribute { .. } | RadiusRule::Table { .. } => survey.reach,
     }
 }
 

@@ -11,7 +11,7 @@ use crate::manifest::{Manifest, ManifestError, Override};
 use crate::output::OutputError;
 use crate::pipeline::{ImageError, ImageTask, Setup, TracedFrame, trace_particles};
 use crate::render::{Film, RenderError, Stop};
-use crate::resolve::question;
+use crate::resolve::{ResolveError, question};
 use crate::scene::Camera;
 use crate::survey::Survey;
 
@@ -135,6 +135,16 @@ pub fn render(
         frame,
         name,
     } = settings;
+    if !manifest.cell.images().is_none() {
+        let what =
+            "particles in memory are neither copied nor wrapped; do so before they are rendered";
+        return Err(StillError::Setup(RunError::from(
+            ResolveError::Unsupported {
+                key: "cell.replicate, cell.wrap",
+                what: what.to_owned(),
+            },
+        )));
+    }
     let base = std::path::absolute(Path::new(".").join(base));
     let base = base.map_err(RunError::file(Path::new("."), "cannot be found"))?;
     let files = SceneFiles::new(base);

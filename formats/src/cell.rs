@@ -26,6 +26,43 @@ impl SimulationCell {
         (is_finite && vectors != [DVec3::ZERO; 3]).then_some(cell)
     }
 
+    /// A periodic cell with a corner at the origin, from the lengths of its edges a, b, c and the cosines of the angles
+    /// alpha (between b and c), beta (a and c) and gamma (a and b). Edge a is along x, edge b in the plane of x and y, as
+    /// in the International Tables for Crystallography, volume B, 3.3. None if a length is not above 0, or there is no
+    /// body with these angles.
+    pub fn from_cosines(lengths: [f64; 3], cosines: [f64; 3]) -> Option<Self> {
+        let [a, b, c] = lengths;
+        let [alpha, beta, gamma] = cosines;
+        let sine = (1.0 - gamma * gamma).sqrt();
+        let y = (alpha - beta * gamma) / sine;
+        let z = (1.0 - beta * beta - y * y).sqrt();
+        // NaN where there is no such body
+        let is_body = lengths.iter().all(|length| *length > 0.0) && sine > 0.0 && z > 0.0;
+        let vectors = [
+            DVec3::new(a, 0.0, 0.0),
+            b * DVec3::new(gamma, sine, 0.0),
+            c * DVec3::new(beta, y, z),
+        ];
+        Self::new(DVec3::ZERO, vectors, [true; 3]).filter(|_| is_body)
+    }
+
+    /// Same as [`Self::from_cosines`], with the angles in degrees.
+    pub fn from_angles(lengths: [f64; 3], angles: [f64; 3]) -> Option<Self> {
+        let cosine = |angle: f64| match angle {
+            90.0 => 0.0,
+            _ => libm::cos(angle.to_radians()),
+        };
+        let is_angle = |angle: &f64| *angle > 0.0 && *angle < 180.0;
+        let angles = Some(angles).filter(|angles| angles.iter().all(is_angle))?;
+        Self::from_cosines(lengths, angles.map(cosine))
+    }
+
+    /// A periodic cell with a corner at the origin and these nine components of its edges; none if all are zero.
+    pub(crate) fn from_components(components: [f64; 9]) -> Option<Self> {
+        let [a, b, c] = [0, 3, 6].map(|start| DVec3::from_slice(&components[start..start + 3]));
+        Self::new(DVec3::ZERO, [a, b, c], [true; 3])
+    }
+
     /// The eight corners; bit `i` of the index says whether a corner is at the end of edge `i`.
     pub fn corners(&self) -> [DVec3; 8] {
         std::array::from_fn(|corner| {
@@ -57,6 +94,46 @@ impl SimulationCell {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn cells_follow_from_lengths_and_angles() {
+        // A hexagonal cell: b = 4 (cos 120, sin 120)
+        let cell = SimulationCell::from_angles([3.0, 4.0, 5.0], [90.0, 90.0, 120.0]).unwrap();
+        let expected = [
+            DVec3::new(3.0, 0.0, 0.0),
+            DVec3::new(-2.0, 4.0 * 0.75_f64.sqrt(), 0.0),
+            DVec3::new(0.0, 0.0, 5.0),
+        ];
+        for (found, expected) in cell.vectors.into_iter().zip(expected) {
+            assert!(found.distance(expected) < 1e-12, "{found} {expected}");
+        }
+        // A rhombohedral one: the primitive cell of a face-centred cube, whose edges have equal angles of 60 degrees
+        let cell = SimulationCell::from_cosines([2.0; 3], [0.5; 3]).unwrap();
+        let [a, b, c] = cell.vectors;
+        assert_eq!(a, DVec3::new(2.0, 0.0, 0.0));
+        for (one, other) in [(a, b), (a, c), (b, c)] {
+            assert!((one.dot(other) - 2.0).abs() < 1e-12);
+            assert!((one.length() - 2.0).abs() < 1e-12);
+        }
+        assert!((a.cross(b).dot(c) - 4.0 * 2.0_f64.sqrt()).abs() < 1e-12);
+        let lengths = [3.0, 4.0, 5.0];
+        for angles in [
+            [90.0, 90.0, 0.0],
+            [90.0, 180.0, 90.0],
+            [10.0, 20.0, 90.0],
+            [f64::NAN, 90.0, 90.0],
+            [-90.0, 90.0, 90.0],
+        ] {
+            assert_eq!(
+                SimulationCell::from_angles(lengths, angles),
+                None,
+                "{angles:?}"
+            );
+        }
+        for lengths in [[0.0, 4.0, 5.0], [3.0, -4.0, 5.0], [3.0, 4.0, f64::INFINITY]] {
+            assert_eq!(SimulationCell::from_angles(lengths, [90.0; 3]), None);
+        }
+    }
 
     #[test]
     fn a_tilted_cell_has_eight_corners_and_twelve_edges() {

@@ -45,6 +45,7 @@ mod error;
 mod format;
 mod frame;
 mod gather;
+mod images;
 mod message;
 mod origin;
 mod ranges;
@@ -78,9 +79,11 @@ pub use frame::{
     FARTHEST, ParticleFrame, PositionSlice, Positions, Radius, RawParticles, find_radius, is_near,
     is_radius,
 };
+pub use images::PeriodicImages;
 pub use message::{escape_controls, is_control};
 pub use open::FrameFile;
 pub use origin::choose_origin;
+pub use read::element_symbol;
 pub use scalar::{Endian, ScalarType};
 pub use sequence::{Sequence, SequenceError, SequenceFrame, SequenceInput, SequenceSettings};
 pub use value_error::ValueError;

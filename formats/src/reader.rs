@@ -171,4 +171,9 @@ pub(crate) trait Reader: Sync {
     fn is_y_up(&self, _head: &[u8]) -> bool {
         false
     }
+
+    /// Length of an angstrom in the unit of positions, if that is fixed by the format.
+    fn angstrom(&self) -> f64 {
+        1.0
+    }
 }

@@ -22,7 +22,7 @@ const ACTIONS: [&str; 7] = [
 const COLORS: [&str; 4] = ["color_by", "map", "range", "color_scale"];
 
 /// Other options with a value that is not the default, and the key that it is laid over.
-const FLAGS: [(&str, &str); 42] = [
+const FLAGS: [(&str, &str); 44] = [
     ("--output x.####.exr", "output.path = \"x.####.exr\""),
     ("--frames 3-4", "input.frames = \"3-4\""),
     ("--width 7", "image.width = 7"),
@@ -52,6 +52,8 @@ const FLAGS: [(&str, &str); 42] = [
         "render.ground = \"shadow_catcher\"",
     ),
     ("--cell", "cell.visible = true"),
+    ("--replicate 2,2,1", "cell.replicate = [2, 2, 1]"),
+    ("--wrap", "cell.wrap = true"),
     ("--surface union", "render.surface = \"union\""),
     ("--smoothing 0.5", "surface.smoothing = 0.5"),
     ("--exact-surface", "surface.exact = true"),

@@ -35,7 +35,8 @@ pub(super) struct ManifestArgs {
     /// Attribute to colour by [default: velocity, else the particles' own colours]
     ///
     /// Colours (Cd, color, rgb, bytes) are used unchanged unless --map, --range or --color-scale is given. Vectors are
-    /// mapped by their length; velocity.x is a component. height, depth, index and radius need no attribute.
+    /// mapped by their length; velocity.x is a component. height, depth, index and radius need no attribute. The word
+    /// elements stands for the usual colours of chemical elements.
     #[arg(
         long,
         value_name = "ATTRIBUTE",
@@ -153,7 +154,11 @@ impl ManifestArgs {
         if let Some(attribute) = &self.color_by {
             let mut table = toml::Table::new();
             table.insert("attribute".to_owned(), attribute.clone().into());
-            list.push(over("material.color", table, "--color-by")?);
+            let value = match attribute.as_str() {
+                "elements" => attribute.clone().into(),
+                _ => toml::Value::Table(table),
+            };
+            list.push(over("material.color", value, "--color-by")?);
         }
         if let Some(map) = &self.map {
             list.push(over("material.color.map", map.clone(), "--map")?);

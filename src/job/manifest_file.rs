@@ -69,6 +69,7 @@ impl JobManifest {
         if let Some(parts) = &input.parts {
             sequence.keep_parts(parts)?;
         }
+        sequence.set_images(self.manifest.cell.images());
         Ok(sequence)
     }
 

@@ -3,12 +3,22 @@
 use glam::Vec3;
 use serde_json::{Value as Json, json};
 
+use super::by_integer::ByInteger;
 use super::color_map::{MapName, RangeSetting};
 use super::field::Field;
 use super::key::Key;
 use super::tree::Kind;
 use super::value::{Fault, Slot, Value, named, quoted};
 use crate::scene::{Background, ColorMap};
+
+/// The word for colours by speed, or those of the particles.
+const AUTO: &str = "auto";
+
+/// The word for the colours of chemical elements.
+const ELEMENTS: &str = "elements";
+
+/// The attribute with the atomic numbers of particles.
+pub(super) const ELEMENT: &str = "element";
 
 /// Source of the colours of particles.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,11 +65,15 @@ pub struct ColorMapping {
     pub steps: Option<u32>,
     /// Names of categories.
     pub names: Option<CategoryNames>,
+    /// Colours of categories, linear RGB.
+    pub values: Option<CategoryColors>,
 }
 
 /// Names of categories, with their values.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct CategoryNames(pub Vec<(i64, String)>);
+pub type CategoryNames = ByInteger<String>;
+
+/// Colours of categories, with their values.
+pub type CategoryColors = ByInteger<Vec3>;
 
 impl ColorMapping {
     /// Colours by this attribute, with defaults for the rest.
@@ -70,9 +84,22 @@ impl ColorMapping {
         }
     }
 
+    /// The colours of chemical elements.
+    pub fn elements() -> Self {
+        Self {
+            map: Some(MapName::ELEMENTS),
+            scale: Some(ScaleKind::Categorical),
+            ..Self::by(ELEMENT)
+        }
+    }
+
     /// The scale.
     pub fn scale(&self) -> ScaleKind {
-        self.scale.unwrap_or(ScaleKind::Linear)
+        match (self.scale, &self.values) {
+            (Some(scale), _) => scale,
+            (None, Some(_)) => ScaleKind::Categorical,
+            (None, None) => ScaleKind::Linear,
+        }
     }
 
     /// Whether nothing but the attribute is given.
@@ -130,6 +157,16 @@ impl ColorMapping {
                 "categories have no steps",
             ),
             (
+                "values",
+                !is_categorical && self.values.is_some(),
+                "only categories have colours one by one; set scale = \"categorical\"",
+            ),
+            (
+                "map",
+                self.map.is_some() && self.values.is_some(),
+                "the colours are in `values`; leave one of the two out",
+            ),
+            (
                 "threshold",
                 scale != ScaleKind::SymLog && self.threshold.is_some(),
                 "only scale = \"symlog\" has it",
@@ -150,13 +187,20 @@ impl ColorMapping {
 
 impl Value for ColorSetting {
     fn kind(_: &Key) -> String {
-        "three numbers from 0, such as [0.6, 0.7, 0.9], { attribute = \"velocity\", map = \"viridis\" }, or \"auto\""
+        "three numbers from 0, such as [0.6, 0.7, 0.9], { attribute = \"velocity\", map = \"viridis\" }, \"elements\", \
+         or \"auto\""
             .to_owned()
     }
 
+    fn words() -> Vec<&'static str> {
+        vec![AUTO, ELEMENTS]
+    }
+
     fn parse(field: &Field<'_>, key: &Key) -> Result<Self, Fault> {
-        if field.as_text() == Some("auto") {
-            return Ok(Self::Auto);
+        match field.as_text() {
+            Some(AUTO) => return Ok(Self::Auto),
+            Some(ELEMENTS) => return Ok(Self::Mapped(ColorMapping::elements())),
+            _ => {}
         }
         let Some(mut section) = field.as_table() else {
             return Vec3::parse(field, key).map(Self::Rgb);
@@ -174,6 +218,7 @@ impl Value for ColorSetting {
         section.read(&Key::new("reverse", &[]), &mut by.reverse);
         section.read(&steps_key(), &mut by.steps);
         section.read(&Key::new("names", &[]), &mut by.names);
+        section.read(&Key::new("values", &[]), &mut by.values);
         if let Some((key, what)) = by.contradiction() {
             section.wrong(key, &what);
         }
@@ -183,8 +228,9 @@ impl Value for ColorSetting {
 
     fn toml(&self) -> String {
         let by = match self {
-            Self::Auto => return quoted("auto"),
+            Self::Auto => return quoted(AUTO),
             Self::Rgb(rgb) => return rgb.toml(),
+            Self::Mapped(by) if *by == ColorMapping::elements() => return quoted(ELEMENTS),
             Self::Mapped(by) => by,
         };
         fn pair<S: Slot>(key: &str, slot: &S) -> Option<String> {
@@ -199,6 +245,7 @@ impl Value for ColorSetting {
             pair("reverse", &by.reverse),
             pair("steps", &by.steps),
             pair("names", &by.names),
+            pair("values", &by.values),
         ];
         let pairs: Vec<String> = pairs.into_iter().flatten().collect();
         format!("{{ {} }}", pairs.join(", "))
@@ -206,7 +253,7 @@ impl Value for ColorSetting {
 
     fn schema(key: &Key) -> Json {
         json!({ "anyOf": [
-            { "const": "auto" },
+            { "enum": Self::words() },
             Vec3::schema(key),
             {
                 "type": "object",
@@ -219,6 +266,7 @@ impl Value for ColorSetting {
                     "reverse": bool::schema(key),
                     "steps": u32::schema(&steps_key()),
                     "names": CategoryNames::schema(key),
+                    "values": CategoryColors::schema(key),
                 },
                 "minProperties": 1,
                 "additionalProperties": false,
@@ -233,46 +281,6 @@ fn threshold_key() -> Key {
 
 fn steps_key() -> Key {
     Key::new("steps", &[]).from(2).to(ColorMap::MAX_STEPS)
-}
-
-impl Value for CategoryNames {
-    fn kind(_: &Key) -> String {
-        "names of integers, such as { 1 = \"water\", 2 = \"sand\" }".to_owned()
-    }
-
-    fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {
-        let Kind::Table(table) = &field.node.kind else {
-            return Err(Fault::Unwanted);
-        };
-        let name = |(value, (_, node)): (&String, &(_, super::tree::TomlNode))| {
-            let Kind::Text(name) = &node.kind else {
-                return None;
-            };
-            let integer: i64 = value.parse().ok()?;
-            // Only one way to write each integer, so that no two keys mean the same
-            (integer.to_string() == *value).then(|| (integer, name.clone()))
-        };
-        let names: Option<Vec<(i64, String)>> = table.iter().map(name).collect();
-        let mut names = names.ok_or(Fault::Unwanted)?;
-        names.sort_unstable();
-        Ok(Self(names))
-    }
-
-    fn toml(&self) -> String {
-        let pairs = self
-            .0
-            .iter()
-            .map(|(value, name)| format!("{value} = {}", quoted(name)));
-        format!("{{ {} }}", pairs.collect::<Vec<_>>().join(", "))
-    }
-
-    fn schema(_: &Key) -> Json {
-        json!({
-            "type": "object",
-            "patternProperties": { "^(0|-?[1-9][0-9]{0,17})$": { "type": "string" } },
-            "additionalProperties": false,
-        })
-    }
 }
 
 /// Name of the background of a photo studio.

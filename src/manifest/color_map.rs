@@ -22,6 +22,8 @@ impl MapName {
     pub const DIVERGING: Self = Self::plain("vik");
     /// The default palette.
     pub const PALETTE: Self = Self::plain("okabe-ito");
+    /// The colours of chemical elements, by atomic number.
+    pub const ELEMENTS: Self = Self::plain(ColorMap::ELEMENTS);
 
     const fn plain(name: &'static str) -> Self {
         Self {

@@ -5,10 +5,13 @@ use std::ops::{Deref, DerefMut};
 use serde_json::{Value as Json, json};
 use spherule_jobs::FrameRange;
 
+use super::by_integer::ByInteger;
+use super::color::ELEMENT;
 use super::field::Field;
 use super::key::{Affects, Key};
 use super::keys::section;
-use super::value::{Fault, FlagKind, Value, named};
+use super::value::{Fault, FlagKind, Value, named, quoted};
+use crate::scene::RadiusTable;
 
 named! {
     /// The axis of the simulation that points up.
@@ -56,7 +59,25 @@ pub enum RadiusSetting {
         /// Factor on its values: 0.5 for a diameter.
         scale: f64,
     },
+    /// By an integer attribute.
+    Table {
+        /// Its name.
+        attribute: String,
+        /// The radii.
+        table: RadiusTable,
+        /// Factor on them.
+        scale: f64,
+    },
 }
+
+/// The word for the radii of the file, or an estimate.
+const AUTO: &str = "auto";
+
+/// Words for radii of elements.
+const TABLES: [(&str, RadiusTable); 2] = [
+    ("vdw", RadiusTable::VanDerWaals),
+    ("covalent", RadiusTable::Covalent),
+];
 
 section! {
     /// Particles to render, and the interpretation of their data
@@ -83,6 +104,8 @@ section! {
         ///
         /// `auto` takes the radius from the files. Without one, it is half the typical distance between neighbours
         /// for spheres, an estimate from the particle density for smooth, and 1.8 times this estimate for union.
+        /// `vdw` and `covalent` are the radii of chemical elements; { table = "vdw", scale = 0.25 } makes them smaller.
+        /// { attribute = "type", values = { 1 = 0.5, 2 = 0.7 } } has a radius for each type.
         radius: RadiusSetting = RadiusSetting::Auto, flag("radius", "RADIUS", "Input");
         /// Axis that points up: x, y, z, -x, -y, -z, or auto
         ///
@@ -161,50 +184,153 @@ impl Value for RadiusSetting {
     const FLAG: FlagKind = FlagKind::NumberOrText;
 
     fn kind(_: &Key) -> String {
-        "a length above 0, \"auto\", or { attribute = \"radius\", scale = 1.0 }".to_owned()
+        "a length above 0, \"auto\", \"vdw\", \"covalent\", or { attribute = \"radius\", scale = 1.0 }".to_owned()
+    }
+
+    fn words() -> Vec<&'static str> {
+        let tables = TABLES.iter().map(|(word, _)| *word);
+        [AUTO].into_iter().chain(tables).collect()
     }
 
     fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {
-        if field.as_text() == Some("auto") {
-            return Ok(Self::Auto);
+        match field.as_text() {
+            Some(AUTO) => return Ok(Self::Auto),
+            Some(word) => {
+                let table = table_named(word).ok_or(Fault::Unwanted)?;
+                return Ok(Self::of_elements(table));
+            }
+            None => {}
         }
         let Some(mut section) = field.as_table() else {
             let length = field.as_number().filter(|v| *v > 0.0);
             return length.map(Self::Length).ok_or(Fault::Unwanted);
         };
-        let (mut attribute, mut scale) = (String::new(), 1.0);
-        let name =
-            Key::new("attribute", &[]).required("the name of an attribute, such as \"radius\"");
+        let mut attribute = None::<String>;
+        let (mut scale, mut table, mut values) = (1.0, None::<TableName>, None::<ByInteger<f64>>);
+        section.read(&Key::new("table", &[]), &mut table);
+        section.read(&Key::new("values", &[]), &mut values);
+        let mut name = Key::new("attribute", &[]);
+        if table.is_none() {
+            name = name.required("the name of an attribute, such as \"radius\"");
+        }
         section.read(&name, &mut attribute);
         section.read(&Key::new("scale", &[]).above(0), &mut scale);
+        if table.is_some() && values.is_some() {
+            section.wrong(
+                "values",
+                "the radii are in `table`; leave one of the two out",
+            );
+        }
         section.finish();
-        Ok(Self::Attribute { attribute, scale })
+        let table = table.and_then(|TableName(word)| table_named(word));
+        let values = values.map(|values| RadiusTable::Values(values.0));
+        let name = |usual: &str| attribute.clone().unwrap_or_else(|| usual.to_owned());
+        Ok(match table.or(values) {
+            Some(table) => Self::Table {
+                attribute: name(ELEMENT),
+                table,
+                scale,
+            },
+            None => Self::Attribute {
+                attribute: name(""),
+                scale,
+            },
+        })
     }
 
     fn toml(&self) -> String {
-        match self {
-            Self::Auto => "\"auto\"".to_owned(),
-            Self::Length(length) => length.toml(),
-            Self::Attribute { attribute, scale } => {
-                let (attribute, scale) = (attribute.toml(), scale.toml());
-                format!("{{ attribute = {attribute}, scale = {scale} }}")
+        let (attribute, table, scale) = match self {
+            Self::Auto => return quoted(AUTO),
+            Self::Length(length) => return length.toml(),
+            Self::Attribute { attribute, scale } => (attribute, None, scale),
+            Self::Table {
+                attribute,
+                table,
+                scale,
+            } => (attribute, Some(table), scale),
+        };
+        let word = TABLES.iter().find(|(_, known)| Some(known) == table);
+        let table = match (word, table) {
+            (Some((word, _)), _) if attribute == ELEMENT && *scale == 1.0 => return quoted(word),
+            (Some((word, _)), _) => format!("table = {}, ", quoted(word)),
+            (None, Some(RadiusTable::Values(values))) => {
+                format!("values = {}, ", ByInteger(values.clone()).toml())
             }
-        }
+            (None, _) => String::new(),
+        };
+        let (attribute, scale) = (attribute.toml(), scale.toml());
+        format!("{{ attribute = {attribute}, {table}scale = {scale} }}")
     }
 
     fn schema(key: &Key) -> Json {
+        let scale = json!({ "type": "number", "exclusiveMinimum": 0, "default": 1.0 });
         json!({ "anyOf": [
-            { "const": "auto" },
+            { "enum": Self::words() },
             { "type": "number", "exclusiveMinimum": 0 },
             {
                 "type": "object",
                 "properties": {
                     "attribute": String::schema(key),
-                    "scale": { "type": "number", "exclusiveMinimum": 0, "default": 1.0 },
+                    "values": <ByInteger<f64>>::schema(key),
+                    "scale": scale,
                 },
                 "required": ["attribute"],
                 "additionalProperties": false,
             },
+            {
+                "type": "object",
+                "properties": {
+                    "attribute": String::schema(key),
+                    "table": TableName::schema(key),
+                    "scale": scale,
+                },
+                "required": ["table"],
+                "additionalProperties": false,
+            },
         ] })
+    }
+}
+
+impl RadiusSetting {
+    /// The radii of elements in `table`.
+    pub fn of_elements(table: RadiusTable) -> Self {
+        Self::Table {
+            attribute: ELEMENT.to_owned(),
+            table,
+            scale: 1.0,
+        }
+    }
+}
+
+fn table_named(word: &str) -> Option<RadiusTable> {
+    let found = TABLES.iter().find(|(known, _)| *known == word);
+    found.map(|(_, table)| table.clone())
+}
+
+/// The word for a table of radii.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct TableName(&'static str);
+
+impl Value for TableName {
+    fn kind(_: &Key) -> String {
+        format!("one of {}", Self::words().join(", "))
+    }
+
+    fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {
+        let mut words = Self::words().into_iter();
+        let found = words.find(|word| field.as_text() == Some(word));
+        found.map(Self).ok_or(Fault::Unwanted)
+    }
+
+    fn toml(&self) -> String {
+        quoted(self.0)
+    }
+
+    fn schema(_: &Key) -> Json {
+        json!({ "enum": Self::words() })
+    }
+
+    fn words() -> Vec<&'static str> {
+        TABLES.iter().map(|(word, _)| *word).collect()
     }
 }

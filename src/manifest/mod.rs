@@ -22,6 +22,7 @@ use reader::Section;
 use tree::TomlNode;
 
 mod arrows;
+mod by_integer;
 mod camera;
 mod caustics;
 mod cell;
@@ -75,11 +76,12 @@ mod work;
 mod work_tests;
 
 pub use arrows::Arrows;
+pub use by_integer::ByInteger;
 pub use camera::{AxisView, Camera, CameraKey, CameraMode, ConvergenceSetting, ProjectionKind};
-pub use cell::Cell;
+pub use cell::{Cell, Replicate};
 pub use channel::{ATTRIBUTE_CHANNEL, Channel, NamedChannel};
 pub use clip::{Clip, ClipKind, ClipMode, KeptSide, PlaneNormal};
-pub use color::{CategoryNames, ColorMapping, ColorSetting, ScaleKind};
+pub use color::{CategoryColors, CategoryNames, ColorMapping, ColorSetting, ScaleKind};
 pub use color_map::{MapName, RangeSetting};
 pub use crop::PixelBounds;
 pub use environment::{Environment, EnvironmentKind};

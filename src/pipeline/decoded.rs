@@ -5,14 +5,18 @@ use std::borrow::Cow;
 use glam::Vec3;
 use rayon::prelude::*;
 use spherule_formats::order::index_u32;
-use spherule_formats::{Attribute, AttributeData, Radius, is_radius};
+use spherule_formats::{Attribute, AttributeData, Radius};
 
 use super::SharedFrame;
 use super::load_error::{LoadError, missing, no_parts};
-use super::setup::{ColorRule, OpacityRule, RadiusRule, Setup};
+use super::setup::{ColorRule, OpacityRule, Setup};
 use crate::scene::material::DEFAULT_COLOR;
 use crate::scene::{ColorMap, PartMaterials, RgbEncoding};
 use crate::survey::{ParticleValue, id_of, part_of, velocity_of};
+
+mod radii;
+
+use radii::{FrameRadii, radii};
 
 /// A frame in memory, before the tree is built.
 #[derive(Debug)]
@@ -53,9 +57,20 @@ impl<'a> DecodedFrame<'a> {
         frame: SharedFrame<'a>,
         number: i64,
         file: &str,
+        notes: &mut Vec<String>,
     ) -> Result<(Self, u64), LoadError> {
         // Extract radii and colours
-        let (radius, clamped) = radii(setup, &frame, file)?;
+        let FrameRadii {
+            radius,
+            raised,
+            unknown,
+        } = radii(setup, &frame, file)?;
+        if unknown > 0 {
+            notes.push(format!(
+                "frame {number}: {unknown} particles have no element with a known radius; they are drawn with a \
+                 radius of 1 angstrom"
+            ));
+        }
         let rule = &setup.picture.color;
         let (values, colors) = color_values(setup, &frame, (number, file), &radius, rule)?;
         let mut opacities = Vec::new();
@@ -112,7 +127,7 @@ impl<'a> DecodedFrame<'a> {
                 attributes: planes,
             },
         };
-        Ok((decoded, clamped))
+        Ok((decoded, raised))
     }
 }
 
@@ -179,7 +194,7 @@ pub(super) fn colors_by<'a>(
     if let ColorRule::Constant(color) = rule {
         return Ok(RuledColors::Constant(*color));
     }
-    let (radius, _) = radii(setup, frame, file)?;
+    let radius = radii(setup, frame, file)?.radius;
     let (values, colors) = color_values(setup, frame, (number, file), &radius, rule)?;
     Ok(match rule {
         ColorRule::Attribute { map, .. } if !values.is_empty() => RuledColors::Mapped(values, map),
@@ -276,39 +291,6 @@ fn attribute<'a>(
         return Err(missing(name, purpose, file, has));
     }
     Ok(found)
-}
-
-/// The radii of a frame, and the number of radii that were raised.
-fn radii(setup: &Setup, frame: &SharedFrame<'_>, file: &str) -> Result<(Radius, u64), LoadError> {
-    // Select the source of the radii
-    let mut radius = match &setup.picture.radius {
-        RadiusRule::Common(radius) => Radius::Common(*radius),
-        RadiusRule::FileOr(radius) => frame.radius.clone().unwrap_or(Radius::Common(*radius)),
-        RadiusRule::Attribute { name, scale } => {
-            match attribute(frame, name, "the radius", file)? {
-                Some(attribute) => Radius::PerParticle(magnitudes(attribute, f64::from(*scale))),
-                None => Radius::Common(setup.picture.least_radius),
-            }
-        }
-    };
-    if frame.is_empty() {
-        return Ok((radius, 0));
-    }
-    // Raise radii that are too small or invalid
-    let least = setup.picture.least_radius;
-    let mut clamped = 0;
-    let mut raise = |radius: &mut f32| {
-        // Written as `!(a >= b)` so that NaN is raised as well.
-        if !(*radius >= least && is_radius(*radius)) {
-            *radius = least;
-            clamped += 1;
-        }
-    };
-    match &mut radius {
-        Radius::Common(radius) => raise(radius),
-        Radius::PerParticle(radii) => radii.iter_mut().for_each(raise),
-    }
-    Ok((radius, clamped))
 }
 
 #[expect(

@@ -354,7 +354,7 @@ fn particles_in_place(setup: &Setup, index: &FrameIndex) -> Result<PlacedRadius,
     }
     // Find the radii
     let common = match (&setup.picture.radius, &index.radius) {
-        (RadiusRule::Attribute { .. }, _) => {
+        (RadiusRule::Attribute { .. } | RadiusRule::Table { .. }, _) => {
             return Err(
                 "the radius is an attribute, for 12 bytes per particle and more".to_owned(),
             );

@@ -188,7 +188,7 @@ fn decoded<'a>(
     );
     rods.extend(arrows_of(setup, &frame, (task.frame, file), &mut notes)?);
     let facts = FileFacts::of_decoded(setup, &frame, without_directory(file));
-    let (particles, clamped_radii) = DecodedFrame::of(setup, frame, task.frame, file)?;
+    let (particles, clamped_radii) = DecodedFrame::of(setup, frame, task.frame, file, &mut notes)?;
     Ok(LoadedFrame {
         task: task.clone(),
         notes,

@@ -42,6 +42,18 @@ pub enum LoadError {
         /// The attributes of the frame.
         has: String,
     },
+    /// It has particles that a table of radii does not list.
+    #[error(
+        "{file}: input.radius.values has no radius for `{name}` = {value}; add one, such as {value} = 0.5"
+    )]
+    NoRadius {
+        /// The frame's first file.
+        file: String,
+        /// Name of the attribute.
+        name: String,
+        /// The value of the attribute.
+        value: f64,
+    },
     /// It lacks a value that a selection needs.
     #[error("{file}: select.where: character {column}: no value `{name}`; the file has {has}")]
     UnknownName {

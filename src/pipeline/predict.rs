@@ -218,7 +218,7 @@ impl<'a> MemoryModel<'a> {
             own_radii: match setup.picture.radius {
                 RadiusRule::Common(_) => false,
                 RadiusRule::FileOr(_) => known.own_radii,
-                RadiusRule::Attribute { .. } => true,
+                RadiusRule::Attribute { .. } | RadiusRule::Table { .. } => true,
             },
             has_ids: known.ids,
             has_velocities: known.velocities,

@@ -14,7 +14,7 @@ use crate::overlay::Overlay;
 use crate::render::{RenderSettings, RendererKind};
 use crate::scene::{
     Camera, CameraError, CameraPath, CameraView, ColorMap, Exposure, LensSettings, NextFrame,
-    Projection, Scene, StereoSettings,
+    Projection, RadiusTable, Scene, StereoSettings,
 };
 use crate::selection::Selection;
 use crate::surface::cut::ConvexRegion;
@@ -35,6 +35,15 @@ pub enum RadiusRule {
         name: String,
         /// The factor.
         scale: f32,
+    },
+    /// By an integer attribute.
+    Table {
+        /// Name of the attribute.
+        name: String,
+        /// The radii.
+        table: RadiusTable,
+        /// Factor on them, for scene units.
+        scale: f64,
     },
 }
 
@@ -373,7 +382,11 @@ impl Setup {
 
     /// Whether native frames relative to [`Picture::origin`] are traced in place.
     pub fn traces_in_place(&self) -> bool {
-        self.needs_copy().is_none() && !matches!(self.picture.radius, RadiusRule::Attribute { .. })
+        let is_by_attribute = matches!(
+            self.picture.radius,
+            RadiusRule::Attribute { .. } | RadiusRule::Table { .. }
+        );
+        self.needs_copy().is_none() && !is_by_attribute
     }
 
     /// The reason why the particles of a native frame must be copied, whatever radii they have; None if they need not

@@ -26,6 +26,7 @@ pub(in crate::resolve) fn survey() -> Survey {
         attributes: Vec::new(),
         most_particles: 8,
         frames: 1,
+        angstrom: 1.0,
         weight: None,
     }
 }

@@ -192,6 +192,9 @@ fn unsupported_scale(what: String) -> ResolveError {
 }
 
 fn categories(by: &ColorMapping, color: &ColorRange) -> Result<ColorMap, ResolveError> {
+    if let Some(values) = &by.values {
+        return Ok(ColorMap::of_colors(values.0.clone()));
+    }
     let name = &color.attribute;
     let none = Vec::new();
     let values = match &color.categories {

@@ -1,9 +1,10 @@
 //! Overlays: what they show, where they are, and whether they are dark or light.
 
 use glam::{Vec2, Vec3};
+use spherule_formats::element_symbol;
 
 use super::ResolveError;
-use crate::manifest::{self, ColorSetting, Manifest, OverlayKind};
+use crate::manifest::{self, ColorSetting, Manifest, MapName, OverlayKind};
 use crate::math::functions::exp2;
 use crate::output::view::{srgb_from_linear, view_transform};
 use crate::overlay::{
@@ -238,14 +239,17 @@ impl Named for NamedVector<'_> {
 
 /// Categories with their names, or their numbers.
 fn named(categories: &[(i64, Vec3)], manifest: &Manifest) -> Vec<(String, Color)> {
-    let names = match &manifest.material.color {
-        ColorSetting::Mapped(by) => by.names.as_ref(),
-        _ => None,
+    let (names, is_elements) = match &manifest.material.color {
+        ColorSetting::Mapped(by) => (by.names.as_ref(), by.map() == MapName::ELEMENTS),
+        _ => (None, false),
     };
     let name = |value: i64| {
         let mut all = names.iter().flat_map(|names| &names.0);
         let found = all.find(|(known, _)| *known == value);
-        found.map_or_else(|| value.to_string(), |(_, name)| name.clone())
+        let symbol = || element_symbol(value).filter(|_| is_elements);
+        let name = found.map(|(_, name)| name.clone());
+        name.or_else(|| symbol().map(str::to_owned))
+            .unwrap_or_else(|| value.to_string())
     };
     let all = categories.iter();
     all.map(|(value, color)| (name(*value), srgb(*color)))

@@ -6,11 +6,13 @@ use glam::Vec3;
 use thiserror::Error;
 
 mod crameri;
+mod elements;
 mod palette;
 mod scale;
 mod tables;
 mod turbo;
 
+use elements::element_color;
 use palette::{PALETTES, palette};
 pub use scale::ColorScale;
 use tables::Table;
@@ -33,8 +35,16 @@ pub struct ColorMap {
 #[derive(Debug, Clone, PartialEq)]
 enum Kind {
     Continuous(Continuous),
-    /// Values with their colours, rising.
-    Categories(Vec<(i64, Vec3)>),
+    /// Values with their colours, rising, and the colours of all others.
+    Categories(Vec<(i64, Vec3)>, Others),
+}
+
+/// Colours of categories that are not listed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Others {
+    Unknown,
+    /// Values are atomic numbers.
+    Elements,
 }
 
 /// A map of real numbers.
@@ -67,6 +77,9 @@ pub struct UnknownColorMap {
 impl ColorMap {
     /// Largest number of colours of a discrete map.
     pub const MAX_STEPS: u32 = 64;
+
+    /// The palette with the colours of chemical elements, whose categories are atomic numbers.
+    pub const ELEMENTS: &str = "jmol";
 
     /// The map `name`, stretched over the range `low` to `high`; values outside get the colours at the ends. `low >
     /// high` reverses the map; with `low == high` every number gets the middle colour. Names that end in `_r` are
@@ -126,6 +139,11 @@ impl ColorMap {
     /// If the name is unknown.
     pub fn of_categories(name: &str, values: &[i64]) -> Result<Self, UnknownColorMap> {
         let (base, is_reversed) = base_name(name);
+        if base == Self::ELEMENTS {
+            let colors = values.iter().map(|value| (*value, element_color(*value)));
+            let kind = Kind::Categories(colors.collect(), Others::Elements);
+            return Ok(Self { kind });
+        }
         let last = values.len().saturating_sub(1).max(1);
         let is_index = |count: usize| {
             let fits = |value: &i64| usize::try_from(*value).is_ok_and(|value| value < count);
@@ -155,9 +173,14 @@ impl ColorMap {
         let colors = values.iter().enumerate().map(color);
         let colors: Result<Vec<Vec3>, UnknownColorMap> = colors.collect();
         let categories = values.iter().copied().zip(colors?);
-        Ok(Self {
-            kind: Kind::Categories(categories.collect()),
-        })
+        Ok(Self::of_colors(categories.collect()))
+    }
+
+    /// These colours for categories, linear RGB; the values rise.
+    pub const fn of_colors(categories: Vec<(i64, Vec3)>) -> Self {
+        Self {
+            kind: Kind::Categories(categories, Others::Unknown),
+        }
     }
 
     /// Names of all maps of numbers, without the reversed ones.
@@ -167,7 +190,7 @@ impl ColorMap {
 
     /// Names of the palettes for categories, the default first.
     pub fn palette_names() -> impl Iterator<Item = &'static str> {
-        PALETTES.iter().map(|palette| palette.name)
+        (PALETTES.iter().map(|palette| palette.name)).chain([Self::ELEMENTS])
     }
 
     /// Linear RGB of `value`, interpolated between table entries; [`NO_VALUE`] for NaN.
@@ -177,11 +200,15 @@ impl ColorMap {
         }
         match &self.kind {
             Kind::Continuous(map) => map.at(map.position(value)),
-            Kind::Categories(all) => {
+            Kind::Categories(all, others) => {
                 #[expect(clippy::cast_possible_truncation, reason = "an integer, or saturated")]
                 let value = value as i64;
                 let found = all.binary_search_by_key(&value, |(known, _)| *known);
-                found.map_or(NO_VALUE, |index| all[index].1)
+                match (found, others) {
+                    (Ok(index), _) => all[index].1,
+                    (Err(_), Others::Unknown) => NO_VALUE,
+                    (Err(_), Others::Elements) => element_color(value),
+                }
             }
         }
     }
@@ -190,7 +217,7 @@ impl ColorMap {
     pub fn color_at(&self, fraction: f32) -> Vec3 {
         match &self.kind {
             Kind::Continuous(map) => map.at(fraction.clamp(0.0, 1.0) * (ENTRIES - 1) as f32),
-            Kind::Categories(_) => NO_VALUE,
+            Kind::Categories(..) => NO_VALUE,
         }
     }
 
@@ -198,7 +225,7 @@ impl ColorMap {
     pub fn categories(&self) -> Option<&[(i64, Vec3)]> {
         match &self.kind {
             Kind::Continuous(_) => None,
-            Kind::Categories(all) => Some(all),
+            Kind::Categories(all, _) => Some(all),
         }
     }
 
@@ -206,7 +233,7 @@ impl ColorMap {
     pub fn range(&self) -> Option<([f64; 2], ColorScale)> {
         match &self.kind {
             Kind::Continuous(map) => Some((map.range, map.scale)),
-            Kind::Categories(_) => None,
+            Kind::Categories(..) => None,
         }
     }
 
@@ -214,7 +241,7 @@ impl ColorMap {
     pub fn steps(&self) -> Option<u32> {
         match &self.kind {
             Kind::Continuous(map) => map.steps,
-            Kind::Categories(_) => None,
+            Kind::Categories(..) => None,
         }
     }
 }

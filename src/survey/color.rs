@@ -158,12 +158,10 @@ impl ColorTotals {
                 self.add_values(2, |i| if i == 0 { 0.0 } else { last }, range, false);
             }
             ParticleValue::Radius => match (&frame.radius, context.radius) {
-                (_, RadiusQuestion::Attribute(name, scale)) => {
-                    let Some(attribute) = frame.attribute(name) else {
-                        return;
-                    };
-                    let radius = |i| attribute.magnitude(i) * scale;
-                    self.add_values(attribute.count(), radius, range, false);
+                (_, RadiusQuestion::Attribute(..) | RadiusQuestion::Table(..)) => {
+                    let radius = |i| context.radius.radius_by_attribute(frame, i);
+                    let radius = |i| radius(i).unwrap_or(f64::NAN);
+                    self.add_values(frame.len(), radius, range, false);
                 }
                 (Some(Radius::PerParticle(radii)), _) => {
                     self.add_values(radii.len(), |i| radii[i].into(), range, false);

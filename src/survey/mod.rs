@@ -17,7 +17,7 @@ use spherule_formats::{
 pub use crate::attributes::{
     GEOMETRIC_VALUES, Named, PART_NAMES, ParticleValue, id_of, part_of, velocity_of,
 };
-use crate::scene::{RgbEncoding, is_rgb};
+use crate::scene::{RadiusTable, RgbEncoding, is_rgb};
 use crate::selection::Selection;
 
 mod color;
@@ -100,9 +100,21 @@ pub struct Survey {
     pub most_particles: usize,
     /// Number of sampled frames.
     pub frames: usize,
+    /// Length of an angstrom in the unit of the positions. Jobs of earlier versions lack it.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub angstrom: f64,
     /// Size of the heaviest sampled frame. Jobs of the first versions lack it.
     #[serde(default)]
     pub weight: Option<FrameWeight>,
+}
+
+const fn one() -> f64 {
+    1.0
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
+fn is_one(angstrom: &f64) -> bool {
+    *angstrom == 1.0
 }
 
 /// Sizes and counts of a frame that was read, from which those of other frames are estimated.
@@ -179,6 +191,8 @@ pub enum RadiusQuestion<'a> {
     AutoOfBody,
     /// The largest values of an attribute times a factor.
     Attribute(&'a str, f64),
+    /// The largest radii of a table, by an attribute, times a factor.
+    Table(&'a str, &'a RadiusTable, f64),
 }
 
 impl RadiusQuestion<'_> {
@@ -188,6 +202,29 @@ impl RadiusQuestion<'_> {
 
     fn is_packed(&self) -> bool {
         *self == Self::AutoOfBody
+    }
+
+    /// The same for positions in a unit in which an angstrom has this length.
+    fn in_unit(self, angstrom: f64) -> Self {
+        match self {
+            Self::Table(name, table, scale) if table.is_of_elements() => {
+                Self::Table(name, table, scale * angstrom)
+            }
+            other => other,
+        }
+    }
+
+    /// The radius of particle `index` of `frame` by an attribute, if the question is about one and it has a radius.
+    fn radius_by_attribute(&self, frame: &ParticleFrame, index: usize) -> Option<f64> {
+        let value = |name: &str| frame.attribute(name).map(|a| a.magnitude(index));
+        match self {
+            Self::Attribute(name, scale) => Some(value(name)? * scale),
+            Self::Table(name, table, scale) => {
+                let radius = table.radius(value(name)?).or(table.other_radius())?;
+                Some(radius * scale)
+            }
+            Self::None | Self::Auto | Self::AutoOfBody => None,
+        }
     }
 }
 
@@ -237,6 +274,14 @@ impl Origins {
 const FLOOR: f64 = 0.02;
 
 impl Survey {
+    /// Length of the unit of a table of radii in the unit of the positions.
+    pub fn unit_of(&self, table: &RadiusTable) -> f64 {
+        match table.is_of_elements() {
+            true => self.angstrom,
+            false => 1.0,
+        }
+    }
+
     /// Whether particles lie on a floor at the lower end of the axis `up` at some time: the lowest layer is at the
     /// lower end.
     pub fn rests_on_floor(&self, up: DVec3) -> bool {
@@ -266,6 +311,11 @@ impl Survey {
         indices: impl IntoIterator<Item = usize>,
         question: Question,
     ) -> Result<Self, FrameError> {
+        let angstrom = sequence.angstrom();
+        let question = Question {
+            radius: question.radius.in_unit(angstrom),
+            ..question
+        };
         let mut totals = Totals::new();
         let format_up = if sequence.is_y_up() {
             DVec3::Y
@@ -289,7 +339,10 @@ impl Survey {
         // Fail only if no frame was readable
         match failure {
             Some(error) if totals.frames == 0 => Err(error),
-            _ => Ok(totals.finish(question, format_up)),
+            _ => Ok(Self {
+                angstrom,
+                ..totals.finish(question, format_up)
+            }),
         }
     }
 }
@@ -429,11 +482,10 @@ impl Totals {
                 };
                 self.add_radius(&frame, count, estimate);
             }
-            RadiusQuestion::Attribute(name, scale) => {
-                if let Some(attribute) = frame.attribute(name) {
-                    let radius = |i| narrow(attribute.magnitude(i) * scale);
-                    self.reach = self.reach.max(robust_largest(attribute.count(), radius));
-                }
+            RadiusQuestion::Attribute(..) | RadiusQuestion::Table(..) => {
+                let radius = |i| question.radius.radius_by_attribute(&frame, i);
+                let radius = |i| narrow(radius(i).unwrap_or_default());
+                self.reach = self.reach.max(robust_largest(frame.len(), radius));
             }
         }
     }
@@ -504,6 +556,7 @@ impl Totals {
             frame_numbers: self.moments.number_step(),
             most_particles: self.most_particles,
             frames: self.frames,
+            angstrom: 1.0,
             weight,
         }
     }

@@ -20,6 +20,7 @@ mod crop;
 mod damaged;
 mod denoise;
 mod draft;
+mod elements;
 mod export;
 mod golden;
 mod ground_image;

@@ -46,6 +46,12 @@ const fn numbers() -> [u8; 26 * SECOND] {
     table
 }
 
+/// The symbol of the chemical element with an atomic number, if there is one.
+pub fn element_symbol(number: i64) -> Option<&'static str> {
+    let index = usize::try_from(number.checked_sub(1)?).ok()?;
+    SYMBOLS.get(index).copied()
+}
+
 /// Where in [`NUMBERS`] a symbol is, in whatever case.
 const fn place(symbol: &[u8]) -> Option<usize> {
     match symbol {
@@ -118,6 +124,10 @@ mod tests {
         }
         for (number, symbol) in (1..).zip(SYMBOLS) {
             assert_eq!(code(symbol.as_bytes()), number, "{symbol}");
+            assert_eq!(element_symbol(number), Some(symbol));
+        }
+        for number in [i64::MIN, 0, 119, 1000] {
+            assert_eq!(element_symbol(number), None);
         }
     }
 

@@ -8,6 +8,8 @@ pub mod amber;
 mod atoms;
 pub mod bgeo;
 mod category;
+#[cfg(test)]
+mod cell_tests;
 pub(crate) mod columns;
 pub mod csv;
 #[cfg(test)]
@@ -43,6 +45,7 @@ mod xdr;
 pub mod xtc;
 pub mod xyz;
 
+pub use category::element_symbol;
 pub(crate) use input::{TextInput, stream_bytes};
 pub(crate) use source::ByteSource;
 pub(crate) use table::CUT_SHORT;

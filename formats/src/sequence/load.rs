@@ -93,6 +93,10 @@ impl Sequence {
             None
         };
         let mut particles = only.unwrap_or_else(|| merge(parts, &mut notes));
+        if let (false, Some(part)) = (self.images.is_none(), frame.parts.first()) {
+            let done = self.images.apply(&mut particles, self.budget);
+            done.map_err(|e| e.in_file(&part.path))?;
+        }
         particles.time = self.listed_time(index).or(particles.time);
         Ok(Loaded {
             particles,

@@ -10,10 +10,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
-use crate::MemoryBudget;
 use crate::detect::Format;
 use crate::native::layout::UP_Y;
 use crate::native::{self, Access, NativeFile};
+use crate::{MemoryBudget, PeriodicImages};
 
 mod collection;
 mod error;
@@ -105,6 +105,7 @@ pub struct Sequence {
     /// The lists that the frames come from, if there are some.
     lists: Option<ListedFiles>,
     topology: Option<Topology>,
+    images: PeriodicImages,
 }
 
 impl Sequence {
@@ -178,6 +179,7 @@ impl Sequence {
             budget,
             lists: Some(expansion.lists),
             topology: None,
+            images: PeriodicImages::default(),
         }
     }
 
@@ -198,6 +200,7 @@ impl Sequence {
             budget,
             lists: None,
             topology: None,
+            images: PeriodicImages::default(),
         }
     }
 
@@ -232,6 +235,17 @@ impl Sequence {
     pub fn is_y_up(&self) -> bool {
         let first = self.frames.first().and_then(|f| f.parts.first());
         first.is_some_and(|part| y_is_up(&part.path))
+    }
+
+    /// Length of an angstrom in the unit of positions: 0.1 for formats of GROMACS, which have nanometres, otherwise 1.
+    /// Looks into the first file.
+    pub fn angstrom(&self) -> f64 {
+        let first = self.frames.first().and_then(|f| f.parts.first());
+        let format = first.and_then(|part| {
+            let head = crate::open::head(&part.path).ok()?;
+            Format::detect(&head, &part.path).ok()
+        });
+        format.map_or(1.0, |format| format.reader().angstrom())
     }
 
     /// Names of the parts that the frames have, which are fewer after [`Self::keep_parts`].
@@ -281,6 +295,11 @@ impl Sequence {
         Ok(())
     }
 
+    /// Wraps and copies the particles of all frames. Frames without a simulation cell then fail when they are loaded.
+    pub const fn set_images(&mut self, images: PeriodicImages) {
+        self.images = images;
+    }
+
     /// Keeps only the frames for which `keep` is true.
     pub fn keep_frames(&mut self, keep: impl FnMut(&SequenceFrame) -> bool) {
         self.frames.retain(keep);
@@ -319,13 +338,14 @@ impl Sequence {
     }
 
     /// The file of frame `index` if that is all there is of the frame, and nothing else in the file. None with a
-    /// topology.
+    /// topology or periodic images.
     pub fn lone_file(&self, index: usize) -> Option<&Path> {
         let [part] = self.frames.get(index)?.parts.as_slice() else {
             return None;
         };
-        let is_alone = self.parts.len() < 2 && part.step.is_none() && self.topology.is_none();
-        is_alone.then_some(&part.path)
+        let is_alone = self.parts.len() < 2 && part.step.is_none();
+        let is_unchanged = self.topology.is_none() && self.images.is_none();
+        (is_alone && is_unchanged).then_some(&part.path)
     }
 }
 

@@ -12,6 +12,7 @@ use crate::cli::render::{radius_text, unframed_text};
 use crate::manifest::Channel;
 use crate::metrics::Bytes;
 use crate::pipeline::{Overlap, Probe, RadiusRule, Setup};
+use crate::scene::RadiusTable;
 use crate::survey::Survey;
 
 impl Check<'_> {
@@ -210,5 +211,13 @@ fn radius_json(setup: &Setup, survey: &Survey) -> Value {
         RadiusRule::FileOr(_) if survey.has_radii => json!("file"),
         RadiusRule::FileOr(radius) => json!(radius),
         RadiusRule::Attribute { name, scale } => json!({"attribute": name, "scale": scale}),
+        RadiusRule::Table { name, table, scale } => {
+            let table = match table {
+                RadiusTable::VanDerWaals => "vdw",
+                RadiusTable::Covalent => "covalent",
+                RadiusTable::Values(_) => "values",
+            };
+            json!({"attribute": name, "table": table, "scale": scale})
+        }
     }
 }

@@ -6,6 +6,7 @@ use spherule_formats::Sequence;
 use crate::cli::progress::ShowReport;
 use crate::pipeline::{self, RadiusRule, Setup};
 use crate::report::FrameReport;
+use crate::scene::RadiusTable;
 use crate::surface::SurfaceKind;
 use crate::survey::Survey;
 
@@ -104,6 +105,18 @@ pub(in crate::cli) fn radius_text(setup: &Setup, survey: &Survey) -> String {
             format!("radius {radius}, {why} (--radius sets it)")
         }
         RadiusRule::Attribute { name, scale } => format!("radius {scale} x attribute `{name}`"),
+        RadiusRule::Table { name, table, scale } => {
+            let scale = short(*scale);
+            match table {
+                RadiusTable::VanDerWaals => {
+                    format!("van der Waals radii of elements in `{name}`, angstroms x {scale}")
+                }
+                RadiusTable::Covalent => {
+                    format!("covalent radii of elements in `{name}`, angstroms x {scale}")
+                }
+                RadiusTable::Values(_) => format!("radii by `{name}` x {scale}"),
+            }
+        }
     }
 }
 

@@ -7,7 +7,10 @@ use super::columns::{ComponentStride, ParticleLayout, StridedColumn};
 use super::{ByteSource, CUT_SHORT, Step, remarks, text};
 use crate::format::Format;
 use crate::reader::{Confidence, Reader};
-use crate::{AttributeData, Endian, MemoryBudget, ParseError, Positions, RawParticles, ScalarType};
+use crate::{
+    AttributeData, Endian, MemoryBudget, ParseError, Positions, RawParticles, ScalarType,
+    SimulationCell,
+};
 
 mod netcdf;
 
@@ -65,6 +68,7 @@ impl Reader for Amber {
         budget.check(layout.byte_len(), "its numbers in memory are")?;
         let mut particles = layout.particles(bytes)?;
         trajectory.scale(&mut particles);
+        particles.cell = trajectory.cell(frame);
         Ok(particles)
     }
 
@@ -95,7 +99,7 @@ impl Reader for Amber {
                 text::shown(file.text("program"))
             ));
             if file.variable("cell_lengths").is_some() {
-                remarks.push(remarks::unused_cell(None));
+                remarks.push(remarks::cell_remark(None));
             }
         }
         remarks
@@ -217,6 +221,27 @@ impl<'a> Trajectory<'a> {
             _ => self.file.outer_start(time, frame),
         };
         self.file.real(time, at)
+    }
+
+    /// The cell of a frame: lengths, and angles in degrees.
+    fn cell(&self, frame: usize) -> Option<SimulationCell> {
+        let triple = |name: &str| {
+            let variable = self.file.variable(name)?;
+            variable.check_real(name).ok()?;
+            let start = match (self.has_frames, variable.shape.as_slice()) {
+                (true, [_, 3]) => self.file.outer_start(variable, frame),
+                (false, [3]) => variable.begin,
+                _ => return None,
+            };
+            let factor = variable.scale_factor.unwrap_or(1.0);
+            let size = variable.scalar?.size();
+            let mut numbers = [0.0; 3];
+            for (axis, number) in numbers.iter_mut().enumerate() {
+                *number = factor * self.file.real(variable, start.checked_add(axis * size)?)?;
+            }
+            Some(numbers)
+        };
+        SimulationCell::from_angles(triple("cell_lengths")?, triple("cell_angles")?)
     }
 
     /// Multiplies by the factors of the variables, in the precision of the file.

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::cut_short;
 use crate::read::numbers::NumberReader;
-use crate::{Endian, ParseError};
+use crate::{Endian, ParseError, SimulationCell};
 
 /// Bytes of the first record: `CORD` and 20 numbers.
 const FIRST_LEN: usize = 84;
@@ -217,6 +217,27 @@ impl DcdHeader {
             .records
             .whole_len(self.frame_count(index).saturating_mul(4));
         axes.saturating_mul(axis).saturating_add(cell)
+    }
+
+    /// The cell of the frame at byte `at`. The record has a, gamma, b, beta, alpha, c: lengths, and angles in degrees, or
+    /// their cosines, as CHARMM and NAMD write them. None if the numbers are no cell.
+    pub(super) fn cell(&self, bytes: &[u8], at: usize) -> Option<SimulationCell> {
+        let mut records = Records { at, ..self.records };
+        if !self.has_cell {
+            return None;
+        }
+        let start = records.expect(bytes, CELL_LEN, "unit cell").ok()?;
+        let mut numbers = NumberReader::new(bytes, start, records.endian);
+        let mut all = [0.0; 6];
+        for number in &mut all {
+            *number = numbers.f64().ok()?;
+        }
+        let [a, gamma, b, beta, alpha, c] = all;
+        let (lengths, angles) = ([a, b, c], [alpha, beta, gamma]);
+        match angles.iter().all(|angle| angle.abs() < 1.0) {
+            true => SimulationCell::from_cosines(lengths, angles),
+            false => SimulationCell::from_angles(lengths, angles),
+        }
     }
 
     /// The time step of frame `index`.

@@ -81,7 +81,10 @@ impl Reader for Dcd {
         let layout = layout(bytes, &header, at, index)?;
         let need = (size_of::<Vec3>() as u64).saturating_mul(header.count as u64);
         budget.check(need, "its numbers in memory are")?;
-        let particles = layout.particles(bytes)?;
+        let particles = RawParticles {
+            cell: header.cell(bytes, at),
+            ..layout.particles(bytes)?
+        };
         if index == 0 || header.free.is_none() {
             return Ok(particles);
         }
@@ -119,7 +122,7 @@ impl Reader for Dcd {
         let mut remarks = vec![remarks::units("angstroms", None, Some("ps"))];
         if let Ok(header) = DcdHeader::parse(head) {
             remarks.extend(header.remarks());
-            remarks.extend(header.has_cell.then(|| remarks::unused_cell(None)));
+            remarks.extend(header.has_cell.then(|| remarks::cell_remark(None)));
         }
         remarks
     }

@@ -10,7 +10,7 @@ use super::text::{self, Line};
 use super::{ByteSource, CUT_SHORT, Step, remarks};
 use crate::format::Format;
 use crate::reader::{Confidence, Reader, StreamUnit};
-use crate::{MemoryBudget, ParseError, RawParticles};
+use crate::{MemoryBudget, ParseError, RawParticles, SimulationCell};
 
 /// GROMACS `.gro` files.
 pub const FORMAT: Format = Format::new(&Gro);
@@ -73,11 +73,15 @@ impl Reader for Gro {
         read(source.text(), step, budget)
     }
 
+    fn angstrom(&self) -> f64 {
+        0.1
+    }
+
     fn remarks(&self, _head: &[u8]) -> Vec<String> {
         vec![
             remarks::units("nm", Some("nm/ps"), Some("ps")),
             remarks::GUESSED_ELEMENTS.to_owned(),
-            remarks::unused_cell(None),
+            remarks::cell_remark(None),
         ]
     }
 }
@@ -142,16 +146,16 @@ fn read(
         let residue = text::integer(field(line.text, 0, 5)).unwrap_or_default();
         atoms.push(position, &[element, residue], real)?;
     }
-    if text.line().is_none_or(|line| !is_box(line)) {
+    let Some(cell) = text.line().filter(|line| is_box(*line)).map(cell) else {
         return Err(cut_short(text, format!("no box after {count} atoms")));
-    }
+    };
     let (positions, attributes) = atoms.into_parts();
     Ok(RawParticles {
         positions,
         attributes,
         time,
         step: number,
-        cell: None,
+        cell,
     })
 }
 
@@ -174,6 +178,32 @@ fn is_box(line: Line<'_>) -> bool {
     let is_part = |b: &u8| b.is_ascii_digit() || b" \t.+-eE".contains(b);
     let points = memchr::memchr_iter(b'.', line.text).count();
     line.text.iter().all(is_part) && (points >= 3 || text::words(line.text).count() >= 3)
+}
+
+/// The cell in the line of the box: the diagonal of the matrix of its edges, and the other components if not all are
+/// zero. None if the numbers are damaged, or zero.
+fn cell(line: Line<'_>) -> Option<SimulationCell> {
+    let numbers: Option<Vec<f64>> = match text::words(line.text).count() {
+        3 | 9 => text::words(line.text).map(text::number).collect(),
+        // Columns of equal width
+        _ => {
+            let mut points = memchr::memchr_iter(b'.', line.text);
+            let width = points.next().zip(points.next()).map(|(x, y)| y - x)?;
+            let columns = line.text.trim_ascii_end().chunks(width);
+            columns
+                .map(|column| text::number(column.trim_ascii()))
+                .collect()
+        }
+    };
+    let numbers = numbers?;
+    let [x, y, z, rest @ ..] = numbers.as_slice() else {
+        return None;
+    };
+    let [ay, az, bx, bz, cx, cy] = match rest {
+        [] => [0.0; 6],
+        rest => rest.try_into().ok()?,
+    };
+    SimulationCell::from_components([*x, ay, az, bx, *y, bz, cx, cy, *z])
 }
 
 /// Where positions and velocities are in the lines of a frame.

@@ -110,14 +110,14 @@ impl Reader for MmCif {
             attributes,
             time: None,
             step: step.number,
-            cell: None,
+            cell: rows.cell(),
         })
     }
 
     fn remarks(&self, _head: &[u8]) -> Vec<String> {
         vec![
             remarks::units("angstroms", None, None),
-            remarks::unused_cell(None),
+            remarks::cell_remark(None),
         ]
     }
 }

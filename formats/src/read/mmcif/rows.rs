@@ -4,7 +4,7 @@ use super::cut_short;
 use super::tokens::{self, Token};
 use crate::read::input::TextInput;
 use crate::read::text;
-use crate::{MemoryBudget, ParseError};
+use crate::{MemoryBudget, ParseError, SimulationCell};
 
 /// What a column of the loop is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -93,6 +93,31 @@ impl AtomRow {
     }
 }
 
+/// Names of the lengths and angles of the cell.
+const CELL: [&str; 6] = [
+    "_cell.length_a",
+    "_cell.length_b",
+    "_cell.length_c",
+    "_cell.angle_alpha",
+    "_cell.angle_beta",
+    "_cell.angle_gamma",
+];
+
+/// Takes a number of the cell from a line with a name and its value.
+fn read_cell(line: &[u8], cell: &mut [f64; 6]) {
+    let mut words = text::words(line);
+    let Some(name) = words.next() else { return };
+    let is_named = |known: &&str| name.eq_ignore_ascii_case(known.as_bytes());
+    let number = words.next().and_then(|value| {
+        // A standard uncertainty may follow in parentheses
+        let digits = value.split(|byte| *byte == b'(').next()?;
+        text::number(digits)
+    });
+    if let (Some(index), Some(number)) = (CELL.iter().position(|known| is_named(&known)), number) {
+        cell[index] = number;
+    }
+}
+
 /// Most columns: the dictionary has about a hundred.
 const MOST_COLUMNS: usize = 1024;
 
@@ -100,6 +125,8 @@ const MOST_COLUMNS: usize = 1024;
 #[derive(Debug)]
 pub(super) struct AtomRows {
     columns: Vec<Column>,
+    /// Lengths and angles of the cell; NaN for those that the file does not have before the loop.
+    cell: [f64; 6],
     /// The current line, its offset, and where the next token is in it.
     line: Vec<u8>,
     line_at: usize,
@@ -115,7 +142,7 @@ impl AtomRows {
     /// [`ParseError`] if there is no such loop, or it has no positions.
     pub(super) fn find(text: &mut TextInput<'_>, budget: MemoryBudget) -> Result<Self, ParseError> {
         let mut columns = Vec::new();
-        let mut is_core = false;
+        let (mut is_core, mut cell) = (false, [f64::NAN; 6]);
         // Pass what precedes the loop
         let mut columns_at = None;
         while let Some(line) = text.peek_line() {
@@ -135,7 +162,10 @@ impl AtomRows {
                     return Err(ParseError::malformed(line.at, what));
                 }
                 None if columns_at.is_some() => break,
-                None => is_core |= name.starts_with(CORE_PREFIX),
+                None => {
+                    is_core |= name.starts_with(CORE_PREFIX);
+                    read_cell(name, &mut cell);
+                }
             }
             text.line();
         }
@@ -154,12 +184,21 @@ impl AtomRows {
         }
         Ok(Self {
             columns,
+            cell,
             line: Vec::new(),
             line_at: text.at(),
             next: 0,
             row: AtomRow::default(),
             budget,
         })
+    }
+
+    /// The cell, if the file has one.
+    pub(super) fn cell(&self) -> Option<SimulationCell> {
+        let [a, b, c, alpha, beta, gamma] = self.cell;
+        let (lengths, angles) = ([a, b, c], [alpha, beta, gamma]);
+        // A unit cube stands for no cell, as in PDB files
+        SimulationCell::from_angles(lengths, angles).filter(|_| lengths != [1.0; 3])
     }
 
     /// Goes on to the row at byte `at`.

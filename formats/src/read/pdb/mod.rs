@@ -10,7 +10,7 @@ use super::text::{self, Line};
 use super::{ByteSource, Step, remarks};
 use crate::format::Format;
 use crate::reader::{Confidence, Reader, StreamUnit};
-use crate::{MemoryBudget, ParseError, RawParticles};
+use crate::{MemoryBudget, ParseError, RawParticles, SimulationCell};
 
 /// Protein Data Bank files.
 pub const FORMAT: Format = Format::new(&Pdb);
@@ -79,8 +79,8 @@ impl Reader for Pdb {
     fn remarks(&self, head: &[u8]) -> Vec<String> {
         let mut remarks = vec![remarks::units("angstroms", None, None)];
         let mut lines = text::Lines::new(head, 0..head.len());
-        if lines.any(|line| line.text.starts_with(b"CRYST1")) {
-            remarks.push(remarks::unused_cell(None));
+        if lines.any(is_cell) {
+            remarks.push(remarks::cell_remark(None));
         }
         remarks
     }
@@ -88,6 +88,18 @@ impl Reader for Pdb {
 
 fn is_atom(line: Line<'_>) -> bool {
     line.text.starts_with(b"ATOM  ") || line.text.starts_with(b"HETATM")
+}
+
+fn is_cell(line: Line<'_>) -> bool {
+    line.text.starts_with(b"CRYST1")
+}
+
+/// The cell in a record `CRYST1`. None if a number is damaged, or for a unit cube, which stands for no cell.
+fn cell(line: Line<'_>) -> Option<SimulationCell> {
+    let number = |(start, end)| text::number(field(line.text, start, end)).unwrap_or(f64::NAN);
+    let lengths = [(6, 15), (15, 24), (24, 33)].map(number);
+    let angles = [(33, 40), (40, 47), (47, 54)].map(number);
+    SimulationCell::from_angles(lengths, angles).filter(|_| lengths != [1.0; 3])
 }
 
 /// Whether a model ends with `line`.
@@ -138,11 +150,25 @@ fn read(
     budget: MemoryBudget,
 ) -> Result<RawParticles, ParseError> {
     let range = step.byte_range().cloned().unwrap_or_default();
+    // What precedes the first model is about all of them. Atoms are not passed: text in pieces only goes forward.
+    let mut cell = None;
+    while text.at() < range.start {
+        let Some(line) = text.peek_line().filter(|line| !is_atom(*line)) else {
+            break;
+        };
+        if is_cell(line) {
+            cell = self::cell(line);
+        }
+        text.line();
+    }
     text.go_to(range.start);
     text.end_at(range.end);
     let real = [("occupancy", 1), ("b_factor", 1)];
     let mut atoms = AtomTable::new(&[ELEMENT, RESIDUE], &real, budget);
     while let Some(line) = text.line() {
+        if is_cell(line) {
+            cell = self::cell(line);
+        }
         if !is_atom(line) {
             continue;
         }
@@ -171,6 +197,6 @@ fn read(
         attributes,
         time: None,
         step: step.number,
-        cell: None,
+        cell,
     })
 }

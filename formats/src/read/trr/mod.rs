@@ -10,7 +10,7 @@ use super::xdr::{self, FrameSummary};
 use super::{ByteSource, Step, remarks};
 use crate::format::Format;
 use crate::reader::{Confidence, Reader};
-use crate::{Endian, MemoryBudget, ParseError, RawParticles, ScalarType};
+use crate::{Endian, MemoryBudget, ParseError, RawParticles, ScalarType, SimulationCell};
 
 /// GROMACS `.trr` trajectories.
 pub const FORMAT: Format = Format::new(&Trr);
@@ -53,9 +53,13 @@ impl Reader for Trr {
         budget: MemoryBudget,
     ) -> Result<RawParticles, ParseError> {
         let bytes = source.bytes();
-        let layout = Frame::parse(bytes, step.start())?.layout(bytes)?;
+        let frame = Frame::parse(bytes, step.start())?;
+        let layout = frame.layout(bytes)?;
         budget.check(layout.byte_len(), "its numbers in memory are")?;
-        layout.particles(bytes)
+        Ok(RawParticles {
+            cell: frame.cell(bytes),
+            ..layout.particles(bytes)?
+        })
     }
 
     /// `None` for several frames.
@@ -68,13 +72,17 @@ impl Reader for Trr {
         }
     }
 
+    fn angstrom(&self) -> f64 {
+        0.1
+    }
+
     fn remarks(&self, head: &[u8]) -> Vec<String> {
         let precision = Frame::parse(head, 0).map(|frame| frame.scalar);
         let mut remarks = vec![remarks::units("nm", Some("nm/ps"), Some("ps"))];
         if precision == Ok(ScalarType::F64) {
             remarks.push("positions have double precision".to_owned());
         }
-        remarks.push(remarks::unused_cell(None));
+        remarks.push(remarks::cell_remark(None));
         remarks
     }
 }
@@ -85,6 +93,8 @@ struct Frame {
     count: usize,
     scalar: ScalarType,
     summary: FrameSummary,
+    /// Where the box begins, if the frame has one.
+    box_at: Option<usize>,
     /// Where positions, velocities and forces begin, if the frame has them.
     blocks: [Option<usize>; 3],
 }
@@ -142,7 +152,7 @@ impl Frame {
             *start = end;
             end += length;
         }
-        let [.., x_at, v_at, f_at] = starts;
+        let [_, _, box_at, .., x_at, v_at, f_at] = starts;
         let block = |length: usize, start| (length > 0).then_some(start);
         Ok(Self {
             count,
@@ -153,8 +163,22 @@ impl Frame {
                 time,
                 has_positions: x > 0 || count == 0,
             },
+            box_at: block(box_len, box_at),
             blocks: [block(x, x_at), block(v, v_at), block(f, f_at)],
         })
+    }
+
+    /// The cell, if the frame has one.
+    fn cell(&self, bytes: &[u8]) -> Option<SimulationCell> {
+        let mut numbers = NumberReader::new(bytes, self.box_at?, Endian::Big);
+        let mut components = [0.0; 9];
+        for component in &mut components {
+            *component = match self.scalar {
+                ScalarType::F64 => numbers.f64().ok()?,
+                _ => numbers.f32().ok()?.into(),
+            };
+        }
+        SimulationCell::from_components(components)
     }
 
     /// Where the numbers are.

@@ -10,7 +10,7 @@ use super::xdr::{self, FrameSummary};
 use super::{ByteSource, Step, remarks};
 use crate::format::Format;
 use crate::reader::{Confidence, Reader};
-use crate::{Endian, MemoryBudget, ParseError, Positions, RawParticles};
+use crate::{Endian, MemoryBudget, ParseError, Positions, RawParticles, SimulationCell};
 
 mod bits;
 mod coordinates;
@@ -95,14 +95,18 @@ impl Reader for Xtc {
             attributes: Vec::new(),
             time: Some(frame.summary.time),
             step: Some(frame.summary.number.into()),
-            cell: None,
+            cell: frame.cell,
         })
+    }
+
+    fn angstrom(&self) -> f64 {
+        0.1
     }
 
     fn remarks(&self, _head: &[u8]) -> Vec<String> {
         vec![
             remarks::units("nm", None, Some("ps")),
-            remarks::unused_cell(None),
+            remarks::cell_remark(None),
         ]
     }
 }
@@ -112,6 +116,7 @@ impl Reader for Xtc {
 struct Frame {
     count: usize,
     summary: FrameSummary,
+    cell: Option<SimulationCell>,
     /// Where the positions begin, behind their number.
     data_at: usize,
     is_large: bool,
@@ -131,8 +136,10 @@ impl Frame {
         let count = header.count("number of atoms")?;
         let number = header.i32()?;
         let time = header.f32()?;
-        // The box is not used.
-        header.take(3 * TRIPLE)?;
+        let mut components = [0.0; 9];
+        for component in &mut components {
+            *component = header.f32()?.into();
+        }
         let again = header.count("number of positions")?;
         if again != count {
             let what = format!("{again} positions of {count} atoms");
@@ -158,6 +165,7 @@ impl Frame {
                 time: time.into(),
                 has_positions: true,
             },
+            cell: SimulationCell::from_components(components),
             data_at,
             is_large,
         })
