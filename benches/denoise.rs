@@ -122,6 +122,7 @@ impl Picture {
             width: u32::try_from(self.width).expect("a small picture"),
             height: u32::try_from(self.height).expect("a small picture"),
             samples: 2,
+            views: [1, 1],
             color: &self.color,
             odd: &self.odd,
             albedo: &self.albedo,

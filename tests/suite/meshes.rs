@@ -155,6 +155,30 @@ fn a_wall_hides_particles_behind_it() {
 }
 
 #[test]
+fn the_camera_shows_all_of_the_meshes_on_request() {
+    let workshop = particles(1);
+    tank(&workshop.join("tank.stl"));
+    for frame_meshes in [false, true] {
+        let out = format!("{frame_meshes}/f.#.exr");
+        let set = format!("camera.frame_meshes={frame_meshes}");
+        let scene = ["--radius", "0.3", "--mesh", "tank.stl", "--ground=none"];
+        let image = ["--width", "64", "--height", "36", "--samples", "1"];
+        let command = ["render", "in", "-o", &out, "--channels", "RGBA,Z", "--set", &set];
+        workshop
+            .run(&[&command[..], &scene, &image].concat())
+            .expect(0);
+        let image = Picture::open(&workshop.join(format!("{frame_meshes}/f.1.exr")));
+        let is_mesh = |x: usize, y: usize| image.floats("Z")[64 * y + x].is_finite();
+        // The tank reaches beyond the picture, or fills most of its height and touches no edge
+        let at_sides = (0..36).any(|y| is_mesh(0, y) || is_mesh(63, y));
+        let at_ends = (0..64).any(|x| is_mesh(x, 0) || is_mesh(x, 35));
+        assert_eq!(at_sides || at_ends, !frame_meshes);
+        let rows = (0..36).filter(|y| (0..64).any(|x| is_mesh(x, *y))).count();
+        assert!(rows > 27, "{frame_meshes}: {rows}");
+    }
+}
+
+#[test]
 fn one_looks_into_a_tank_with_visible_backs() {
     let workshop = particles(1);
     tank(&workshop.join("tank.stl"));

@@ -99,6 +99,65 @@ fn clips_and_slices_leave_out_particles() {
     }
 }
 
+/// Spheres are cut in frames that are read and in native ones, which are traced where they are.
+#[test]
+fn cuts_draw_the_same_picture_of_native_frames() {
+    let workshop = particles(NAMES);
+    workshop.run(&["convert", "in", "-o", "native"]).expect(0);
+    let cut = "[[clip]]\ntype = \"plane\"\nnormal = [1, -2, 0.5]\npoint = [3.3, 3.4, 3.5]\nmode = \"cut\"\n\
+               [[clip]]\ntype = \"box\"\nmin = [-1, -1, 1.2]\nmax = [9, 9, 6.3]\nmode = \"cut\"";
+    let camera = "[camera]\neye = [14, -16, 12]\nlook_at = [3.5, 3.5, 3.5]\nup = [0, 0, 1]";
+    let options = [&crate::harness::SMALL[..], &OPTIONS].concat();
+    for input in ["in", "native"] {
+        let text = format!(
+            "input.path = \"{input}\"\noutput.path = \"{input}_out/f.####.exr\"\n{cut}\n{camera}\n"
+        );
+        fs::write(workshop.join("job.toml"), text).expect("a manifest");
+        workshop
+            .run(&[&["render", "job.toml"][..], &options].concat())
+            .expect(0);
+        assert_eq!(counts(&workshop, &format!("{input}_out")), [512, 512]);
+    }
+    let report = fs::read_to_string(workshop.join("native_out/report.json")).expect("a report");
+    assert!(report.contains("kdtree"), "{report}");
+    let picture = |name: &str| Picture::open(&workshop.join(name).join("f.0001.exr"));
+    assert_eq!(picture("in_out").planes.keys().len(), 5);
+    // Positions in native frames are rounded
+    let pairs = [("in_out", "native_out")].map(|(a, b)| (picture(a), picture(b)));
+    for (of_file, of_native) in pairs {
+        let ids = of_file
+            .integers("id.I")
+            .iter()
+            .zip(of_native.integers("id.I"));
+        let different = ids.filter(|(a, b)| a != b).count();
+        assert!(different < 5, "{different}");
+    }
+    // The lowest layer, with z = 0, is cut away; that of z = 1 shows its upper half
+    let seen = ids(&workshop, "in_out");
+    assert!(seen.iter().all(|id| *id >= 1064), "{seen:?}");
+}
+
+#[test]
+fn cuts_that_are_not_possible_are_explained() {
+    let workshop = particles(NAMES);
+    let with = |clip: &str| {
+        let text =
+            format!("input.path = \"in\"\noutput.path = \"out/f.####.exr\"\n[[clip]]\n{clip}\n");
+        fs::write(workshop.join("job.toml"), text).expect("a manifest");
+    };
+    with("type = \"box\"\nmin = [0, 0, 0]\nmax = [3, 3, 3]\nkeep = \"outside\"\nmode = \"cut\"");
+    let failed = workshop.run(&["render", "job.toml"]).expect(2);
+    failed.prints("clip.keep: \"outside\" has no cut faces");
+    with("type = \"plane\"\nnormal = \"x\"\nmode = \"cut\"");
+    let failed = workshop
+        .run(&["render", "job.toml", "--surface", "smooth"])
+        .expect(2);
+    failed.prints("clip.mode: \"cut\" is for spheres");
+    with("type = \"plane\"\nnormal = \"x\"\nmode = \"open\"");
+    let failed = workshop.run(&["render", "job.toml"]).expect(2);
+    failed.prints("particles");
+}
+
 #[test]
 fn impossible_selections_are_explained() {
     let workshop = particles(NAMES);

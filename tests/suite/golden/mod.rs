@@ -15,6 +15,7 @@ use spherule::accel::view::TreeView;
 use spherule::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder};
 use spherule::output::{ExrOptions, encode_exr};
 use spherule::render::{Film, ParticleShading, render};
+use spherule::surface::cut::CutSpheres;
 use spherule::surface::smooth::SmoothGrid;
 use spherule::surface::spheres::SphereSurface;
 use spherule::surface::union::UnionSurface;
@@ -69,7 +70,13 @@ fn surface<'a>(shot: &Shot, tree: TreeView<'a>, grid: &'a mut SmoothGrid) -> Box
         _ => ShadingNormals::Sphere,
     };
     match shot.surface.kind {
-        SurfaceKind::Spheres => Box::new(SphereSurface::new(tree).with_normals(normals)),
+        SurfaceKind::Spheres => {
+            let spheres = SphereSurface::new(tree).with_normals(normals);
+            match shot.cut.is_everywhere() {
+                true => Box::new(spheres),
+                false => Box::new(CutSpheres::new(spheres, &shot.cut)),
+            }
+        }
         SurfaceKind::Union => Box::new(UnionSurface::new(tree).with_normals(normals)),
         SurfaceKind::Smooth => {
             let built = grid.build(&shot.centers, shot.radii[0], &shot.surface, true, None);
@@ -164,6 +171,7 @@ macro_rules! shots {
 shots! {
     traced:
     shadow
+    cut
     reflection
     refraction
     total_reflection

@@ -6,6 +6,7 @@ use spherule::scene::{
     Background, Bounds, Camera, CameraView, ColorMap, Convergence, Falloff, Fresnel, Ground, Light,
     Material, Projection, Scene, StereoSettings,
 };
+use spherule::surface::cut::ConvexRegion;
 use spherule::surface::{NormalKind, SurfaceKind, SurfaceSettings};
 
 mod bodies;
@@ -82,6 +83,7 @@ pub(super) struct Shot {
     pub(super) ids: Option<Vec<u32>>,
     pub(super) velocities: Option<Vec<Vec3>>,
     pub(super) surface: SurfaceSettings,
+    pub(super) cut: ConvexRegion,
     pub(super) scene: Scene,
     pub(super) settings: RenderSettings,
 }
@@ -103,6 +105,7 @@ impl Shot {
             ids: None,
             velocities: None,
             surface: SPHERES,
+            cut: ConvexRegion::default(),
             scene: Scene {
                 lights: vec![sun(Vec3::new(0.4, 0.7, -1.0), 0.9)],
                 material: MATT,
@@ -186,6 +189,30 @@ pub(super) fn shadow() -> Shot {
     let mut colors = vec![GREY; 63];
     colors.extend([RED, GREEN, BLUE]);
     shot.painted(&colors)
+}
+
+/// A packing of overlapping balls, cut by an oblique plane and from above: flat faces in the colours of the balls, with
+/// the shadow of a ball that lies in front of them.
+pub(super) fn cut() -> Shot {
+    let mut centers = Vec::new();
+    for layer in [-1.0, 0.0, 1.0] {
+        let row = wall(5, 3, 0.85).into_iter();
+        centers.extend(row.map(|p| p.with_y(0.85 * layer)));
+    }
+    centers.push(Vec3::new(-1.2, -2.2, 0.6));
+    let mut shot = Shot::new(centers, 0.5, DVec3::new(-2.0, -7.0, 4.5), DVec3::ZERO);
+    shot.radii = (0..46).map(|i| [0.5, 0.38, 0.55][i % 3]).collect();
+    shot.radii[45] = 0.3;
+    shot.cut.cut(DVec3::new(0.0, 0.0, 0.75), DVec3::Z);
+    let normal = DVec3::new(2.0, -3.0, 1.0).normalize();
+    shot.cut.cut(0.55 * normal, normal);
+    let colors = [RED, GREEN, BLUE, GREY];
+    shot.settings.channels = Channels {
+        id: true,
+        normal: true,
+        ..Channels::COLOR
+    };
+    shot.painted(&(0..46).map(|i| colors[i % 4]).collect::<Vec<_>>())
 }
 
 /// Metal balls that show each other and the sky.
