@@ -1,5 +1,7 @@
 //! Turns a [`Manifest`] and a [`Survey`] of the particles into a [`Setup`]: every "auto" gets its value.
 
+use std::sync::Arc;
+
 use glam::{DVec3, Vec3};
 use spherule_formats::native::Access;
 
@@ -7,6 +9,7 @@ use crate::accel::{BvhSettings, SbvhSettings};
 use crate::manifest::{IndirectSetting, Manifest, RadiusSetting, nearest};
 use crate::metrics::memory::available;
 use crate::output::{ExrOptions, PlaneNames, PreviewOptions};
+use crate::overlay::RgbaPixels;
 use crate::pipeline::{
     FrameSize, MemoryModel, Picture, RadiusRule, RunSettings, Setup, attribute_list,
 };
@@ -153,15 +156,23 @@ pub fn needs_environment_image(manifest: &Manifest) -> bool {
     environment::needs_image(manifest)
 }
 
-/// Determines everything about the images of a job. `map` is the image of the environment, if it
-/// [is needed](needs_environment_image). [`add_meshes`] adds meshes.
+/// Pictures that settings name.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct SceneImages<'a> {
+    /// The image of the environment, if it [is needed](needs_environment_image).
+    pub environment: Option<&'a RadianceMap>,
+    /// Those of overlays of the type image, in their order.
+    pub overlays: &'a [Arc<RgbaPixels>],
+}
+
+/// Determines everything about the images of a job. [`add_meshes`] adds meshes.
 ///
 /// # Errors
 /// See [`ResolveError`]; the messages name the manifest's keys.
 pub fn setup(
     manifest: &Manifest,
     survey: &Survey,
-    map: Option<&RadianceMap>,
+    images: &SceneImages<'_>,
 ) -> Result<Setup, ResolveError> {
     // Determine surface, radius and colours
     let surface = surface::settings(manifest)?;
@@ -190,7 +201,7 @@ pub fn setup(
     let lens = camera::lens(manifest, &path, aspect)?;
     let shutter = shutter::shutter(manifest, survey)?;
     // Set up lights and ground
-    let environment = environment::environment(manifest, map, &path.start(), up)?;
+    let environment = environment::environment(manifest, images.environment, &path.start(), up)?;
     let mut lights = match (manifest.lights.is_empty(), manifest.integrator()) {
         (false, _) => lights::lights(manifest, survey.origin, up)?,
         (true, IntegratorKind::Whitted) => default_lights(&bounds, up, &path.start()),
@@ -342,7 +353,7 @@ pub fn setup(
         weight: survey.weight,
     };
     let mut setup = Setup { picture, run };
-    overlay::add_overlays(&mut setup, manifest, survey, &camera)?;
+    overlay::add_overlays(&mut setup, manifest, survey, &camera, images.overlays)?;
     check_image_size(&setup)?;
     Ok(setup)
 }

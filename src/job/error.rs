@@ -10,6 +10,7 @@ use spherule_jobs::{FileError, FrameRange, JobError};
 use crate::conversion::UnknownAttribute;
 use crate::hdr::HdrError;
 use crate::manifest::{ManifestError, RebaseError};
+use crate::picture::PictureError;
 use crate::pipeline::{MemoryLimitError, MeshLoadError};
 use crate::resolve::ResolveError;
 
@@ -38,6 +39,14 @@ pub enum RunError {
     /// The picture on the ground cannot be read.
     #[error("render.ground.image: {0}")]
     GroundImage(HdrError),
+    /// A picture among the overlays cannot be read.
+    #[error("overlay.{index}.path: {source}")]
+    OverlayImage {
+        /// The index of the overlay in the manifest.
+        index: usize,
+        /// Why.
+        source: PictureError,
+    },
     /// A mesh cannot be read.
     #[error("mesh.{index}.path: {source}")]
     Mesh {

@@ -1,4 +1,5 @@
-//! The files that all images of a manifest share, each read once: the images of environment and ground, and meshes.
+//! The files that all images of a manifest share, each read once: the images of environment, ground and
+//! overlays, and meshes.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
@@ -6,10 +7,13 @@ use std::sync::{Arc, OnceLock};
 use super::RunError;
 use super::meshes::{self, JobMeshes, identity};
 use crate::hdr::{HdrError, read_radiance_map, read_texture};
-use crate::manifest::{GROUND_IMAGE, Manifest, named_place};
+use crate::manifest::{GROUND_IMAGE, Manifest, OverlayKind, named_place};
+use crate::overlay::RgbaPixels;
+use crate::picture::{PictureError, read_rgba};
 use crate::pipeline::Setup;
 use crate::resolve::{
-    self, add_ground_image, add_meshes, check_views, needs_environment_image, with_framed_meshes,
+    self, SceneImages, add_ground_image, add_meshes, check_views, needs_environment_image,
+    with_framed_meshes,
 };
 use crate::scene::{RadianceMap, Texture};
 use crate::survey::Survey;
@@ -22,6 +26,8 @@ pub struct SceneFiles {
     environment_image: OnceLock<Option<RadianceMap>>,
     /// See [`SceneFiles::ground_image`].
     ground_image: OnceLock<Option<Arc<Texture>>>,
+    /// See [`SceneFiles::overlay_images`].
+    overlay_images: OnceLock<Vec<Arc<RgbaPixels>>>,
     meshes: JobMeshes,
 }
 
@@ -32,6 +38,7 @@ impl SceneFiles {
             dir: dir.into(),
             environment_image: OnceLock::new(),
             ground_image: OnceLock::new(),
+            overlay_images: OnceLock::new(),
             meshes: JobMeshes::default(),
         }
     }
@@ -46,10 +53,13 @@ impl SceneFiles {
         survey: &Survey,
         frames: impl Iterator<Item = i64>,
     ) -> Result<Setup, RunError> {
-        let map = self.environment_image(manifest)?;
+        let images = SceneImages {
+            environment: self.environment_image(manifest)?,
+            overlays: self.overlay_images(manifest)?,
+        };
         let meshes = self.meshes.get(manifest, &self.dir, survey)?;
         let survey = with_framed_meshes(survey, manifest, &meshes);
-        let mut setup = resolve::setup(manifest, &survey, map)?;
+        let mut setup = resolve::setup(manifest, &survey, &images)?;
         if let Some(texture) = self.ground_image(manifest)? {
             add_ground_image(&mut setup, manifest, texture);
         }
@@ -99,6 +109,13 @@ impl SceneFiles {
                 found.map_err(|source| RunError::GroundImage(HdrError::Io { path, source }))?;
             identities.push((GROUND_IMAGE.to_owned(), found));
         }
+        for (index, path) in overlay_paths(manifest, &self.dir) {
+            let found = identity(&path).map_err(|source| RunError::OverlayImage {
+                index,
+                source: PictureError::Io { path, source },
+            })?;
+            identities.push((format!("overlay.{index}.path"), found));
+        }
         Ok(identities)
     }
 
@@ -111,6 +128,20 @@ impl SceneFiles {
         let map = path.map(|path| read_radiance_map(&path)).transpose()?;
         let reduced = map.map(|map| map.reduced());
         Ok(self.environment_image.get_or_init(|| reduced).as_ref())
+    }
+
+    /// The pictures of the overlays of the type image. Their files are read once.
+    fn overlay_images(&self, manifest: &Manifest) -> Result<&[Arc<RgbaPixels>], RunError> {
+        if let Some(images) = self.overlay_images.get() {
+            return Ok(images);
+        }
+        let read = |(index, path): (usize, PathBuf)| match read_rgba(&path) {
+            Ok((width, pixels)) => Ok(Arc::new(RgbaPixels::new(width, pixels))),
+            Err(source) => Err(RunError::OverlayImage { index, source }),
+        };
+        let images = overlay_paths(manifest, &self.dir).map(read);
+        let images = images.collect::<Result<Vec<_>, RunError>>()?;
+        Ok(self.overlay_images.get_or_init(|| images))
     }
 
     /// The picture on the ground, if there is one. Its file is read once.
@@ -131,6 +162,15 @@ fn environment_path(manifest: &Manifest, dir: &Path) -> Option<PathBuf> {
     let path = manifest.environment.image.as_ref()?;
     // The directory may not exist yet, so that the system cannot follow `..` from it
     needs_environment_image(manifest).then(|| named_place(&dir.join(path)))
+}
+
+/// The paths of the overlays of the type image, with the indices of these.
+fn overlay_paths(manifest: &Manifest, dir: &Path) -> impl Iterator<Item = (usize, PathBuf)> {
+    let overlays = manifest.overlays.iter().enumerate();
+    overlays.filter_map(|(index, overlay)| match &overlay.kind {
+        OverlayKind::Image { path, .. } => Some((index, named_place(&dir.join(path)))),
+        _ => None,
+    })
 }
 
 /// The path of the picture on the ground, if there is one.

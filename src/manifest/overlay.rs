@@ -19,7 +19,8 @@ named!(
 named!(Orientation: Vertical = "vertical", Horizontal = "horizontal");
 
 pub(super) const ABOUT: &[&str] = &[
-    "What is drawn over previews, and in the channel overlay, but never in RGBA: colour bars, text, scale bars, axes",
+    "What is drawn over previews, and in the channel overlay, but never in RGBA: colour bars, text, scale bars, axes, \
+     pictures",
 ];
 
 /// The key `type`.
@@ -29,13 +30,15 @@ enum OverlayType {
     Text,
     ScaleBar,
     Axes,
+    Image,
 }
 
 named!(
     OverlayType: ColorBar = "colorbar",
     Text = "text",
     ScaleBar = "scale_bar",
-    Axes = "axes"
+    Axes = "axes",
+    Image = "image"
 );
 
 /// What an overlay shows.
@@ -66,6 +69,13 @@ pub enum OverlayKind {
     },
     /// The directions of the axes.
     Axes,
+    /// A picture.
+    Image {
+        /// The PNG file.
+        path: String,
+        /// Height as a fraction of the height of the picture that it is drawn over.
+        height: f32,
+    },
 }
 
 /// Text with variables.
@@ -129,7 +139,7 @@ impl OverlayText {
 }
 
 impl OverlayKind {
-    const fn of(kind: OverlayType) -> Self {
+    fn of(kind: OverlayType) -> Self {
         match kind {
             OverlayType::ColorBar => Self::ColorBar {
                 title: None,
@@ -143,6 +153,10 @@ impl OverlayKind {
                 unit: None,
             },
             OverlayType::Axes => Self::Axes,
+            OverlayType::Image => Self::Image {
+                path: "logo.png".to_owned(),
+                height: 0.1,
+            },
         }
     }
 
@@ -152,6 +166,7 @@ impl OverlayKind {
             Self::Text { .. } => OverlayType::Text,
             Self::ScaleBar { .. } => OverlayType::ScaleBar,
             Self::Axes => OverlayType::Axes,
+            Self::Image { .. } => OverlayType::Image,
         }
     }
 }
@@ -168,7 +183,7 @@ impl Overlay {
 
     pub(super) fn keys(&mut self, keys: &mut Keys<'_>) {
         let mut kind = self.kind.overlay_type();
-        let key = Key::new("type", &["colorbar | text | scale_bar | axes"]);
+        let key = Key::new("type", &["colorbar | text | scale_bar | axes | image"]);
         keys.key(
             key.required("\"colorbar\" or \"text\", for example"),
             &mut kind,
@@ -216,6 +231,13 @@ impl Overlay {
                 unit => *unit, example("\"m\""), unset("no unit");
             ),
             OverlayKind::Axes => {}
+            OverlayKind::Image { path, height } => keys!(keys:
+                /// A PNG file, such as a logo; its alpha is kept
+                path => *path, example("\"logo.png\""),
+                    required("a picture needs its file, such as \"logo.png\"");
+                /// Height as a fraction of the height of the picture
+                height => *height, above(0), to(1);
+            ),
         }
         keys!(keys:
             /// Corner: auto | top-left | top-right | bottom-left | bottom-right
@@ -332,6 +354,14 @@ mod tests {
             (
                 "type = \"scale_bar\"\nlength = 0",
                 "overlay.0.length: expected a length above 0",
+            ),
+            (
+                "type = \"image\"",
+                "overlay.0.path: is missing; a picture needs its file",
+            ),
+            (
+                "type = \"image\"\npath = \"a.png\"\nheight = 2",
+                "overlay.0.height: expected a number above 0, at most 1",
             ),
         ] {
             let error = read(&format!("[[overlay]]\n{text}")).unwrap_err();

@@ -2,7 +2,7 @@
 
 use std::path::{Component, Path, PathBuf};
 
-use super::{Manifest, MeshPath, OutputPattern};
+use super::{Manifest, MeshPath, OutputPattern, OverlayKind};
 
 /// Why the paths of a manifest cannot be made relative to another directory.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -68,6 +68,11 @@ impl Manifest {
         let ground = self.render.ground.as_mut();
         if let Some(image) = ground.and_then(|ground| ground.image.as_mut()) {
             image.path = rebased(&image.path, from, to)?;
+        }
+        for overlay in &mut self.overlays {
+            if let OverlayKind::Image { path, .. } = &mut overlay.kind {
+                *path = rebased(path, from, to)?;
+            }
         }
         for mesh in &mut self.meshes {
             let path = rebased(mesh.path.as_str(), from, to)?;

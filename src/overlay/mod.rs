@@ -1,4 +1,4 @@
-//! What is drawn over a finished picture: colour bars, text, scale bars and axes. Overlays are small pictures with
+//! What is drawn over a finished picture: colour bars, text, scale bars, axes and pictures. Overlays are small pictures with
 //! alpha. They know their size relative to the height of the picture and the corner where they are, but neither jobs
 //! nor files.
 
@@ -6,6 +6,7 @@ mod axes;
 mod canvas;
 mod color_bar;
 mod font;
+mod image;
 mod layout;
 mod scale_bar;
 mod template;
@@ -17,6 +18,7 @@ pub use canvas::Color;
 pub use color_bar::{ColorBar, ColorBarKind, Orientation};
 use font::Font;
 use font::missing_glyphs;
+pub use image::{Image, RgbaPixels};
 pub use layout::{Corner, Placement};
 pub use scale_bar::ScaleBar;
 pub use template::{FrameValues, Template};
@@ -54,6 +56,8 @@ pub enum Content {
     ScaleBar(ScaleBar),
     /// The directions of the axes.
     Axes(Axes),
+    /// A picture.
+    Image(Image),
 }
 
 /// What overlays show of a frame.
@@ -107,6 +111,7 @@ impl Overlay {
             Content::Text(template) => template.texts().collect(),
             Content::ScaleBar(bar) => vec![&bar.unit],
             Content::Axes(axes) => axes.names.iter().map(String::as_str).collect(),
+            Content::Image(_) => Vec::new(),
         }
     }
 
@@ -133,7 +138,9 @@ impl Overlay {
         let mut canvas = Canvas::new(size[0] + 2 * margin, size[1] + 2 * margin);
         let corner = [margin as f32; 2];
         self.content.draw(&mut canvas, corner, pen, frame);
-        canvas.add_halo(radius, self.halo);
+        if !matches!(self.content, Content::Image(_)) {
+            canvas.add_halo(radius, self.halo);
+        }
         canvas.into_sprite(left - margin, top - margin)
     }
 }
@@ -162,7 +169,11 @@ pub fn bytes(overlays: &[Overlay], width: u32, height: u32) -> u64 {
         2 * u64::from(width.unsigned_abs()) * u64::from(height.unsigned_abs())
     });
     let (sum, most) = areas.fold((0, 0), |(sum, most), area| (sum + area, area.max(most)));
-    PIXEL[0] * sum + PIXEL[1] * most
+    let files = overlays.iter().map(|overlay| match &overlay.content {
+        Content::Image(image) => image.bytes(),
+        _ => 0,
+    });
+    PIXEL[0] * sum + PIXEL[1] * most + files.sum::<u64>()
 }
 
 impl Sprite {
@@ -241,6 +252,7 @@ impl Content {
             Self::Text(template) => pen.text_size(&template.expand(&frame.values)),
             Self::ScaleBar(bar) => bar.measure(pen, frame),
             Self::Axes(axes) => axes.measure(pen),
+            Self::Image(image) => image.measure(pen),
         }
     }
 
@@ -250,6 +262,7 @@ impl Content {
             Self::Text(template) => pen.text(canvas, &template.expand(&frame.values), corner),
             Self::ScaleBar(bar) => bar.draw(canvas, corner, pen, frame),
             Self::Axes(axes) => axes.draw(canvas, corner, pen, frame),
+            Self::Image(image) => image.draw(canvas, corner, pen),
         }
     }
 }

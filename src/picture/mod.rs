@@ -171,6 +171,15 @@ fn check_size(width: usize, height: usize) -> Result<(), Fault> {
     )))
 }
 
+/// Reads a PNG file with its alpha: the width, and the pixels of 8-bit sRGB, row by row from the top, whose colours are
+/// not multiplied by alpha.
+///
+/// # Errors
+/// See [`PictureError`]; messages begin with the path.
+pub fn read_rgba(path: &Path) -> Result<(usize, Vec<[u8; 4]>), PictureError> {
+    read(path, png::rgba)
+}
+
 /// Reads the file at `path` by `decode`.
 fn read<T>(
     path: &Path,

@@ -20,6 +20,15 @@ impl From<DecodingError> for Fault {
 
 /// Decodes a file. Transparent pixels show white.
 pub(super) fn picture(file: impl Read) -> Result<Picture, Fault> {
+    let (width, pixels) = rgba(file)?;
+    let rgb = pixels
+        .iter()
+        .flat_map(|&[r, g, b, a]| [r, g, b].map(|v| over_white(v, a)));
+    Ok(Picture::new(width, pixels.len() / width, rgb.collect()))
+}
+
+/// Decodes a file: the width, and the pixels, whose colours are not multiplied by alpha.
+pub(super) fn rgba(file: impl Read) -> Result<(usize, Vec<[u8; 4]>), Fault> {
     let mut decoder = png::Decoder::new_with_limits(file, Limits { bytes: MAX_CHUNKS });
     decoder.set_transformations(Transformations::EXPAND | Transformations::STRIP_16);
     let mut reader = decoder.read_info()?;
@@ -28,24 +37,23 @@ pub(super) fn picture(file: impl Read) -> Result<Picture, Fault> {
     let mut bytes = vec![0; reader.output_buffer_size()];
     let frame = reader.next_frame(&mut bytes)?;
     bytes.truncate(frame.buffer_size());
-    let rgb = match frame.color_type {
-        ColorType::Rgb => bytes,
-        ColorType::Rgba => rgb_of(&bytes, |&[r, g, b, a]| [r, g, b].map(|v| over_white(v, a))),
-        ColorType::Grayscale => rgb_of(&bytes, |&[v]| [v; 3]),
-        ColorType::GrayscaleAlpha => rgb_of(&bytes, |&[v, a]| [over_white(v, a); 3]),
+    let pixels = match frame.color_type {
+        ColorType::Rgb => pixels_of(&bytes, |&[r, g, b]| [r, g, b, 255]),
+        ColorType::Rgba => bytes.as_chunks().0.to_vec(),
+        ColorType::Grayscale => pixels_of(&bytes, |&[v]| [v, v, v, 255]),
+        ColorType::GrayscaleAlpha => pixels_of(&bytes, |&[v, a]| [v, v, v, a]),
         ColorType::Indexed => {
             return Err(Fault::Other("has colours that cannot be expanded".into()));
         }
     };
-    if rgb.len() != 3 * width * height {
+    if pixels.len() != width * height {
         return Err(Fault::Other("has not all of its pixels".to_owned()));
     }
-    Ok(Picture::new(width, height, rgb))
+    Ok((width, pixels))
 }
 
-fn rgb_of<const N: usize>(bytes: &[u8], rgb: impl Fn(&[u8; N]) -> [u8; 3]) -> Vec<u8> {
-    let (pixels, _) = bytes.as_chunks::<N>();
-    pixels.iter().flat_map(rgb).collect()
+fn pixels_of<const N: usize>(bytes: &[u8], rgba: impl Fn(&[u8; N]) -> [u8; 4]) -> Vec<[u8; 4]> {
+    bytes.as_chunks::<N>().0.iter().map(rgba).collect()
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "at most 255")]

@@ -31,7 +31,8 @@ fn setup() -> Setup {
     let selection = manifest.selection();
     let question = crate::resolve::question(&manifest, &selection);
     let survey = crate::survey::Survey::of(&sequence, question).expect("readable");
-    crate::resolve::setup(&manifest, &survey, None).expect("pictures")
+    crate::resolve::setup(&manifest, &survey, &crate::resolve::SceneImages::default())
+        .expect("pictures")
 }
 
 #[test]

@@ -315,7 +315,9 @@ mod tests {
         let selection = manifest.selection();
         let question = crate::resolve::question(&manifest, &selection);
         let survey = crate::survey::Survey::of(&sequence, question).expect("readable");
-        let setup = crate::resolve::setup(&manifest, &survey, None).expect("pictures");
+        let setup =
+            crate::resolve::setup(&manifest, &survey, &crate::resolve::SceneImages::default())
+                .expect("pictures");
         let task = ImageTask {
             frame: 1,
             index: 0,

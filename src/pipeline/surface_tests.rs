@@ -37,7 +37,9 @@ fn opened(file: &Path) -> (Setup, Sequence) {
     let selection = manifest.selection();
     let question = crate::resolve::question(&manifest, &selection);
     let survey = crate::survey::Survey::of(&sequence, question).expect("readable");
-    let mut setup = crate::resolve::setup(&manifest, &survey, None).expect("pictures");
+    let mut setup =
+        crate::resolve::setup(&manifest, &survey, &crate::resolve::SceneImages::default())
+            .expect("pictures");
     setup.picture.render.width = 48;
     setup.picture.render.height = 27;
     setup.picture.render.samples = 1;

@@ -1,5 +1,7 @@
 //! Overlays: what they show, where they are, and whether they are dark or light.
 
+use std::sync::Arc;
+
 use glam::{Vec2, Vec3};
 use spherule_formats::element_symbol;
 
@@ -8,8 +10,8 @@ use crate::manifest::{self, ColorSetting, Manifest, MapName, OverlayKind};
 use crate::math::functions::exp2;
 use crate::output::view::{srgb_from_linear, view_transform};
 use crate::overlay::{
-    Axes, Color, ColorBar, ColorBarKind, Content, Corner, FrameValues, FrameView, Overlay,
-    Placement, ScaleBar, Template,
+    Axes, Color, ColorBar, ColorBarKind, Content, Corner, FrameValues, FrameView, Image, Overlay,
+    Placement, RgbaPixels, ScaleBar, Template,
 };
 use crate::pipeline::{ColorRule, Setup};
 use crate::scene::Camera;
@@ -42,7 +44,7 @@ pub(super) fn needs_points(manifest: &Manifest) -> bool {
         .any(|overlay| overlay.corner.is_none())
 }
 
-/// Adds the overlays of `manifest` to `setup`.
+/// Adds the overlays of `manifest` to `setup`; `pictures` are those of its overlays of the type image, in this order.
 ///
 /// # Errors
 /// One shows what the particles do not have.
@@ -51,7 +53,9 @@ pub(super) fn add_overlays(
     manifest: &Manifest,
     survey: &Survey,
     camera: &Camera,
+    pictures: &[Arc<RgbaPixels>],
 ) -> Result<(), ResolveError> {
+    let mut pictures = pictures.iter();
     let [columns, rows] = camera.eyes();
     let render = &setup.picture.render;
     let picture = [render.width / columns, render.height / rows];
@@ -77,7 +81,15 @@ pub(super) fn add_overlays(
     for own in &manifest.overlays {
         #[expect(clippy::cast_possible_truncation, reason = "a fraction of the picture")]
         let offset = own.offset.map(|part| part as f32);
-        let content = content(setup, manifest, survey, &own.kind, view.units_per_height)?;
+        let content = match &own.kind {
+            OverlayKind::Image { height, .. } => pictures.next().map(|source| {
+                Content::Image(Image {
+                    source: Arc::clone(source),
+                    height: *height,
+                })
+            }),
+            kind => content(setup, manifest, survey, kind, view.units_per_height)?,
+        };
         let Some(content) = content else { continue };
         let mut overlay = Overlay {
             content,
@@ -187,6 +199,7 @@ fn content(
         OverlayKind::Axes => Some(Content::Axes(Axes {
             names: ["x", "y", "z"].map(str::to_owned),
         })),
+        OverlayKind::Image { .. } => None,
     })
 }
 

@@ -179,3 +179,60 @@ fn impossible_overlays_are_refused_or_noted() {
         .expect(0)
         .prints("no glyph for `字`, `漢`; boxes are drawn");
 }
+
+/// A logo of 4 by 2 pixels: red at the left, clear at the right.
+fn write_logo(shop: &Workshop) {
+    let pixel = |x: u32, _| {
+        image::Rgba(if x < 2 {
+            [255, 0, 0, 255]
+        } else {
+            [0, 0, 255, 0]
+        })
+    };
+    let logo = image::RgbaImage::from_fn(4, 2, pixel);
+    logo.save(shop.join("logo.png")).expect("a logo");
+}
+
+#[test]
+fn a_logo_is_drawn_with_its_alpha() {
+    let shop = shop();
+    write_logo(&shop);
+    render(&shop, "plain", &["--frames", "1"]).expect(0);
+    let logo = r#"overlay=[{ type = "image", path = "logo.png", height = 0.2, corner = "top-left", offset = [0, 0] }]"#;
+    render(&shop, "logo", &["--frames", "1", "--set", logo]).expect(0);
+    let (plain, drawn) = (preview(&shop, "plain", 1), preview(&shop, "logo", 1));
+    // 0.2 of 90 rows, twice as wide as high, of which the left half is seen
+    let changed = differences(&plain, &drawn);
+    assert_eq!(changed.len(), 18 * 18);
+    assert!(changed.iter().all(|(x, y)| *x < 18 && *y < 18));
+    assert!(
+        changed
+            .iter()
+            .all(|(x, y)| drawn.get_pixel(*x, *y).0 == [255, 0, 0])
+    );
+    // The manifest of the job names the file from where it is
+    let manifest = fs::read_to_string(shop.join("logo/job.toml")).expect("a manifest");
+    assert!(manifest.contains("path = \"../logo.png\""), "{manifest}");
+    shop.run(&["render", "logo/job.toml"]).expect(0);
+}
+
+#[test]
+fn a_logo_that_cannot_be_read_is_named() {
+    let shop = shop();
+    let logo = r#"overlay=[{ type = "text" }, { type = "image", path = "logo.png" }]"#;
+    for (content, part) in [
+        (None, "No such file"),
+        (Some(&b"GIF89a"[..]), "cannot be decoded"),
+    ] {
+        if let Some(content) = content {
+            fs::write(shop.join("logo.png"), content).expect("a file");
+        }
+        let ran = render(&shop, "out", &["--set", logo]);
+        let messages = ran.expect(2).errors();
+        assert!(
+            messages.contains("overlay.1.path: ") && messages.contains("logo.png"),
+            "{messages}"
+        );
+        assert!(messages.contains(part), "{messages}");
+    }
+}

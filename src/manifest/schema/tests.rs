@@ -24,7 +24,7 @@ light = [{ type = "directional", direction = [0, 0, -2] }, { type = "point", pos
 mesh = [{ path = "tank.stl" }, { path = "w.##.ply", material = "glass", color = [1, 1, 0.5], roughness = 0, normals = "flat", faces = "back", scale = 0.001, translate = [1, 0, 0] }, { path = "b", holdout = true }]
 trails = { frames = 8, radius = 0.1, every = 2, color = [1, 0, 0] }
 arrows = [{ attribute = "velocity", scale = 0.1 }, { attribute = "f", scale = 2, radius = 0.1, every = 10, anchor = "center", color = { attribute = "f", map = "turbo", range = [0, 5] } }]
-overlay = [{ type = "colorbar", title = "Speed", unit = "m/s", length = 0.5, corner = "top-right" }, { type = "text", text = "t = {time:.2f}", offset = [0.1, -0.1], color = [1, 0, 0] }, { type = "scale_bar", length = 2, unit = "mm" }, { type = "axes", size = 0.05 }]
+overlay = [{ type = "colorbar", title = "Speed", unit = "m/s", length = 0.5, corner = "top-right" }, { type = "text", text = "t = {time:.2f}", offset = [0.1, -0.1], color = [1, 0, 0] }, { type = "scale_bar", length = 2, unit = "mm" }, { type = "axes", size = 0.05 }, { type = "image", path = "logo.png", height = 0.2 }]
 environment = { type = "image", image = "hall.exr", intensity = 2, rotation = -30, visible = true }
 output = { path = "x/%04d.EXR", channels = ["id"], fps = 24 }
 job = { threads = 3, isolate = true, memory_ceiling = 1073741824, stop_file = "../stop" }
@@ -89,7 +89,7 @@ fn written_manifests_are_valid() {
 }
 
 /// Every table of the schema, with a manifest that ends in this table, so that a line can be appended to it.
-const TABLES: [(&str, &str); 36] = [
+const TABLES: [(&str, &str); 37] = [
     ("", ""),
     ("/properties/input", "[input]\n"),
     ("/properties/camera", "[camera]\n"),
@@ -141,6 +141,10 @@ const TABLES: [(&str, &str); 36] = [
     (
         "/properties/overlay/items/oneOf/3",
         "[[overlay]]\ntype = \"axes\"\n",
+    ),
+    (
+        "/properties/overlay/items/oneOf/4",
+        "[[overlay]]\ntype = \"image\"\npath = \"logo.png\"\n",
     ),
     ("/properties/mesh/items", "[[mesh]]\npath = \"a.stl\"\n"),
     (
