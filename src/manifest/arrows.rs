@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use super::color::ColorSetting;
 use super::keys::{Keys, keys};
+use super::select::MAX_STEP;
 use super::value::named;
 use crate::surface::rods::Anchor;
 
@@ -61,7 +62,7 @@ impl Arrows {
             /// Heads are 2.4 times as thick, and 6 radii long. Short arrows are thinner.
             radius => self.radius, or("auto"), unit("a length"), above(0), single();
             /// Draw only arrows of particles whose id is a multiple of this
-            every => self.every, from(1);
+            every => self.every, from(1), to(MAX_STEP);
             /// The point of an arrow that is at its particle: tail | center
             anchor => self.anchor;
             /// Colour, linear RGB, { attribute = "velocity", range = [0, 5] }, or auto: that of the particle

@@ -271,20 +271,13 @@ impl Value for RadiusSetting {
                 "type": "object",
                 "properties": {
                     "attribute": String::schema(key),
+                    "table": TableName::schema(key),
                     "values": <ByInteger<f64>>::schema(key),
                     "scale": scale,
                 },
-                "required": ["attribute"],
-                "additionalProperties": false,
-            },
-            {
-                "type": "object",
-                "properties": {
-                    "attribute": String::schema(key),
-                    "table": TableName::schema(key),
-                    "scale": scale,
-                },
-                "required": ["table"],
+                "if": { "required": ["table"] },
+                "then": { "not": { "required": ["values"] } },
+                "else": { "required": ["attribute"] },
                 "additionalProperties": false,
             },
         ] })

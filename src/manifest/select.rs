@@ -75,7 +75,7 @@ impl Default for Select {
 }
 
 /// Largest step between ids.
-const MAX_STEP: u32 = 1_000_000_000;
+pub(super) const MAX_STEP: u32 = 1_000_000_000;
 
 pub(super) const ABOUT: &[&str] = &[
     "Particles that are drawn: those that meet all of these; camera and colours are chosen for them",

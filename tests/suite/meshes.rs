@@ -163,7 +163,16 @@ fn the_camera_shows_all_of_the_meshes_on_request() {
         let set = format!("camera.frame_meshes={frame_meshes}");
         let scene = ["--radius", "0.3", "--mesh", "tank.stl", "--ground=none"];
         let image = ["--width", "64", "--height", "36", "--samples", "1"];
-        let command = ["render", "in", "-o", &out, "--channels", "RGBA,Z", "--set", &set];
+        let command = [
+            "render",
+            "in",
+            "-o",
+            &out,
+            "--channels",
+            "RGBA,Z",
+            "--set",
+            &set,
+        ];
         workshop
             .run(&[&command[..], &scene, &image].concat())
             .expect(0);
