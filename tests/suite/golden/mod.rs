@@ -62,7 +62,11 @@ fn trace(shot: &Shot, simd: SimdLevel) -> Film {
 }
 
 /// What rays hit. Every instruction set gives the same bits on a smooth surface, which is not traced in `tree`.
-fn surface<'a>(shot: &Shot, tree: TreeView<'a>, grid: &'a mut SmoothGrid) -> Box<dyn Shape + 'a> {
+fn surface<'a>(
+    shot: &'a Shot,
+    tree: TreeView<'a>,
+    grid: &'a mut SmoothGrid,
+) -> Box<dyn Shape + 'a> {
     let normals = match shot.surface.normals {
         NormalKind::Pca => {
             ShadingNormals::Pca(PcaNormals::new(2.0 * shot.surface.smoothing_length))
