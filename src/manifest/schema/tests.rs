@@ -89,7 +89,7 @@ fn written_manifests_are_valid() {
 }
 
 /// Every table of the schema, with a manifest that ends in this table, so that a line can be appended to it.
-const TABLES: [(&str, &str); 37] = [
+const TABLES: [(&str, &str); 41] = [
     ("", ""),
     ("/properties/input", "[input]\n"),
     ("/properties/camera", "[camera]\n"),
@@ -154,6 +154,19 @@ const TABLES: [(&str, &str); 37] = [
     ("/properties/environment", "[environment]\n"),
     ("/properties/output", "[output]\n"),
     ("/properties/job", "[job]\n"),
+    ("/properties/trails", "[trails]\n"),
+    (
+        "/properties/trails/properties/color/anyOf/2",
+        "[trails.color]\n",
+    ),
+    (
+        "/properties/arrows/items",
+        "[[arrows]]\nattribute = \"f\"\nscale = 1\n",
+    ),
+    (
+        "/properties/arrows/items/properties/color/anyOf/2",
+        "[[arrows]]\nattribute = \"f\"\nscale = 1\n[arrows.color]\n",
+    ),
     (
         "/properties/input/properties/radius/anyOf/2",
         "[input.radius]\n",
