@@ -122,7 +122,9 @@ fn only_some_particles_have_arrows() {
 #[test]
 fn native_frames_have_the_same_arrows() {
     let workshop = workshop();
-    workshop.run(&["convert", "in.xyz", "native"]).expect(0);
+    workshop
+        .run(&["convert", "in.xyz", "-o", "native"])
+        .expect(0);
     let arrows = "scale = 1, color = [0.8, 0.1, 0.05]";
     let original = picture(&workshop, "in.xyz", arrows, &[]);
     let native = picture(&workshop, "native", arrows, &[]);

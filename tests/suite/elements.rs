@@ -34,14 +34,7 @@ const VIEW: [&str; 18] = [
 const PIXELS: [usize; 3] = [40 * 161 + 32, 40 * 161 + 80, 40 * 161 + 128];
 
 fn still(shop: &Workshop, input: &str, options: &[&str]) -> Ran {
-    shop.run(
-        &[
-            &["still", input, "-o", "f.exr", "--force"],
-            &VIEW[..],
-            options,
-        ]
-        .concat(),
-    )
+    shop.run(&[&["still", input, "-o", "f.exr"], &VIEW[..], options].concat())
 }
 
 /// Radii of the three atoms in the picture.
