@@ -100,10 +100,11 @@ mod tests {
 
     #[test]
     fn groups_of_every_size_are_those_with_the_indices() {
-        let count = 3 * TASK + 17;
-        let indices: Vec<u32> = (0..count as u32).map(|i| i * 7919 % 1000).rev().collect();
-        for components in [0, 1, 2, 3, 4, 5, 6, 9] {
-            let items: Vec<u16> = (0..1000 * components as u16).collect();
+        // More than three tasks
+        let indices: Vec<u32> = (0..12_305_u32).map(|i| i * 7919 % 1000).rev().collect();
+        for components in [0_u16, 1, 2, 3, 4, 5, 6, 9] {
+            let items: Vec<u16> = (0..1000 * components).collect();
+            let components = usize::from(components);
             let expected: Vec<u16> = indices
                 .iter()
                 .flat_map(|index| &items[*index as usize * components..][..components])
@@ -126,8 +127,9 @@ mod tests {
     #[test]
     fn kept_groups_are_those_with_the_indices() {
         let indices: Vec<u32> = (0..1000).filter(|i| i % 7 < 3 || i % 11 == 0).collect();
-        for components in [1, 2, 3, 4, 5, 6, 9] {
-            let items: Vec<u16> = (0..1000 * components as u16).collect();
+        for components in [1_u16, 2, 3, 4, 5, 6, 9] {
+            let items: Vec<u16> = (0..1000 * components).collect();
+            let components = usize::from(components);
             let mut wide: Vec<f64> = items.iter().map(|item| f64::from(*item)).collect();
             let expected = gather(&wide, components, &indices);
             keep(&mut wide, components, &indices);

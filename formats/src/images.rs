@@ -172,9 +172,9 @@ fn inverse(cell: &SimulationCell) -> Option<DMat3> {
 fn wrapped(cell: &SimulationCell, inverse: DMat3, position: DVec3) -> DVec3 {
     let cells = (inverse * (position - cell.origin)).floor().to_array();
     let mut moved = position;
-    for axis in 0..3 {
-        if cell.periodic[axis] && cells[axis] != 0.0 {
-            moved -= cells[axis] * cell.vectors[axis];
+    for ((edge, count), is_periodic) in cell.vectors.iter().zip(cells).zip(cell.periodic) {
+        if is_periodic && count != 0.0 {
+            moved -= count * *edge;
         }
     }
     moved

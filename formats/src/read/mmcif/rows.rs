@@ -113,7 +113,7 @@ fn read_cell(line: &[u8], cell: &mut [f64; 6]) {
         let digits = value.split(|byte| *byte == b'(').next()?;
         text::number(digits)
     });
-    if let (Some(index), Some(number)) = (CELL.iter().position(|known| is_named(&known)), number) {
+    if let (Some(index), Some(number)) = (CELL.iter().position(is_named), number) {
         cell[index] = number;
     }
 }
