@@ -21,7 +21,7 @@ section! {
         every: u32 = 1, from(1), to(MAX_STEP);
         /// Colour, linear RGB, { attribute = "velocity", range = [0, 5] }, or auto: that of the particle
         ///
-        /// The keys of a map are those of material.color, as for [[arrows]].
+        /// The keys of a map are those of material.color, as for arrows.
         color: ColorSetting = ColorSetting::Auto, from(0);
     }
 }
