@@ -22,6 +22,7 @@ use crate::surface::SurfaceKind;
 use crate::survey::{Question, RadiusQuestion, Survey};
 
 mod arrows;
+mod bonds;
 mod camera;
 mod cell;
 mod channels;
@@ -274,6 +275,7 @@ pub fn setup(
     render.has_features = denoise.is_some();
     let arrows = arrows::arrows(manifest, survey, &color, reach.x)?;
     let trails = arrows::trails(manifest, survey, &color, reach.x)?;
+    let bonds = bonds::bonds(manifest, survey, &color, reach.x)?;
     let picture = Picture {
         origin: survey.origin,
         least_radius: narrow(bounds.diagonal() * LEAST_RADIUS).max(f32::MIN_POSITIVE),
@@ -295,6 +297,7 @@ pub fn setup(
         cell: None,
         arrows,
         trails,
+        bonds,
         renderer: crate::render::RendererKind::default(),
         render,
         denoise,

@@ -22,7 +22,7 @@ const ACTIONS: [&str; 7] = [
 const COLORS: [&str; 4] = ["color_by", "map", "range", "color_scale"];
 
 /// Other options with a value that is not the default, and the key that it is laid over.
-const FLAGS: [(&str, &str); 44] = [
+const FLAGS: [(&str, &str); 45] = [
     ("--output x.####.exr", "output.path = \"x.####.exr\""),
     ("--frames 3-4", "input.frames = \"3-4\""),
     ("--width 7", "image.width = 7"),
@@ -54,6 +54,7 @@ const FLAGS: [(&str, &str); 44] = [
     ("--cell", "cell.visible = true"),
     ("--replicate 2,2,1", "cell.replicate = [2, 2, 1]"),
     ("--wrap", "cell.wrap = true"),
+    ("--bonds covalent", "bonds.find = \"covalent\""),
     ("--surface union", "render.surface = \"union\""),
     ("--smoothing 0.5", "surface.smoothing = 0.5"),
     ("--exact-surface", "surface.exact = true"),
@@ -162,7 +163,7 @@ fn no_option_is_forgotten() {
         assert!(
             ACTIONS.contains(&name)
                 || COLORS.contains(&name)
-                || ["mesh", "colorbar", "time_stamp"].contains(&name)
+                || ["mesh", "camera_path", "colorbar", "time_stamp"].contains(&name)
                 || of_keys.contains(&name),
             "{name}"
         );

@@ -7,6 +7,7 @@ use clap::Args;
 use spherule_formats::sequence::SequenceError;
 
 use super::CliError;
+use super::camera_path::camera_keys;
 use super::key_flags::{KeyFlags, over};
 use super::numbers::number;
 use super::paths::{path_as_typed, text};
@@ -73,6 +74,11 @@ pub(super) struct ManifestArgs {
     /// material, colour, unit.
     #[arg(long, value_name = "FILE", help_heading = "Input", display_order = 0)]
     pub(super) mesh: Vec<PathBuf>,
+    /// JSON file with keyframes of the camera: a list of objects with frame, eye, look_at, and up and fov if needed
+    ///
+    /// They replace [[camera.key]]. The job keeps them; later changes of the file have no effect on it.
+    #[arg(long, value_name = "FILE", help_heading = "Camera", display_order = 0)]
+    pub(super) camera_path: Option<PathBuf>,
     /// Any key of the manifest: --set render.ground_pattern=checker. May be repeated.
     ///
     /// `spherule init` prints all keys with their meaning.
@@ -176,6 +182,11 @@ impl ManifestArgs {
                     .map_err(|e| CliError::other(format!("--look: {e}")))?
                     .settings(&format!("--look {look}")),
             );
+        }
+        if let Some(path) = &self.camera_path {
+            let keys = camera_keys(path)?;
+            let shown = format!("--camera-path {}", path.display());
+            list.push(over("camera.key", keys, &shown)?);
         }
         for mesh in &self.mesh {
             let mut table = toml::Table::new();

@@ -25,6 +25,7 @@ macro_rules! note {
 }
 
 mod allocator;
+mod camera_path;
 mod check;
 mod child;
 mod completions;

@@ -22,6 +22,7 @@ use reader::Section;
 use tree::TomlNode;
 
 mod arrows;
+mod bonds;
 mod by_integer;
 mod camera;
 mod caustics;
@@ -76,6 +77,7 @@ mod work;
 mod work_tests;
 
 pub use arrows::Arrows;
+pub use bonds::{BondSearch, Bonds};
 pub use by_integer::ByInteger;
 pub use camera::{AxisView, Camera, CameraKey, CameraMode, ConvergenceSetting, ProjectionKind};
 pub use cell::{Cell, Replicate};
@@ -147,6 +149,8 @@ pub struct Manifest {
     pub meshes: Vec<Mesh>,
     /// Trails of the particles over earlier frames.
     pub trails: Trails,
+    /// Bonds between particles.
+    pub bonds: Bonds,
     /// Arrows of vector attributes at the particles.
     pub arrows: Vec<Arrows>,
     /// What is drawn over previews.
@@ -195,6 +199,7 @@ impl Manifest {
             cell: Cell::default(),
             meshes: Vec::new(),
             trails: Trails::default(),
+            bonds: Bonds::default(),
             arrows: Vec::new(),
             overlays: Vec::new(),
             output: Output::default(),
@@ -284,6 +289,7 @@ impl Manifest {
         });
         keys.section("cell", Cell::ABOUT, |keys| self.cell.keys(keys));
         keys.section("trails", Trails::ABOUT, |keys| self.trails.keys(keys));
+        keys.section("bonds", Bonds::ABOUT, |keys| self.bonds.keys(keys));
         keys.section("output", Output::ABOUT, |keys| self.output.keys(keys));
         keys.section("job", Work::ABOUT, |keys| self.job.all_keys(keys));
         keys.list("clip", "clip", clip::ABOUT, &mut self.clips, Clip::keys);
@@ -318,9 +324,10 @@ impl Manifest {
             let what = format!("{arrows} kinds of arrows, but at most {MAX_ARROWS} are possible");
             root.wrong("arrows", &what);
         }
-        // The simulation cell, arrows and trails take the places of meshes
+        // The simulation cell, arrows, trails and bonds take the places of meshes
         let others = usize::from(self.cell.visible)
             + usize::from(self.trails.frames > 0)
+            + usize::from(self.bonds.find != BondSearch::None)
             + arrows.min(MAX_ARROWS);
         let max = MaterialId::MAX_MESHES - others;
         if meshes > max {

@@ -10,6 +10,7 @@ use spherule_formats::sequence::Sequence;
 use spherule_formats::{FrameError, ParticleFrame, PositionSlice, RawParticles};
 
 use super::arrows::arrows_of;
+use super::bonds::bonds_of;
 use super::decoded::{DecodedFrame, particle_with_id};
 use super::facts::FileFacts;
 use super::in_place::{Opened, StoredFrame};
@@ -187,6 +188,7 @@ fn decoded<'a>(
         &mut notes,
     );
     rods.extend(arrows_of(setup, &frame, (task.frame, file), &mut notes)?);
+    rods.extend(bonds_of(setup, &frame, (task.frame, file), &mut notes)?);
     let facts = FileFacts::of_decoded(setup, &frame, without_directory(file));
     let (particles, clamped_radii) = DecodedFrame::of(setup, frame, task.frame, file, &mut notes)?;
     Ok(LoadedFrame {

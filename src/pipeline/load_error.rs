@@ -77,6 +77,17 @@ pub enum LoadError {
         /// The attributes of the frame.
         has: String,
     },
+    /// Its particles are so near each other that there are too many bonds.
+    #[error(
+        "{file}: bonds.find gives more than 8 bonds for each of {particles} particles, on average; take a shorter \
+         distance"
+    )]
+    TooManyBonds {
+        /// The frame's first file.
+        file: String,
+        /// Number of particles.
+        particles: usize,
+    },
     /// The camera focuses on a particle that it does not have.
     #[error(
         "{file}: no particle has the id {id}, which camera.focus follows; choose another one, or a distance"

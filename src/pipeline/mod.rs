@@ -9,6 +9,7 @@ use glam::Vec3;
 use spherule_formats::ParticleFrame;
 
 mod arrows;
+mod bonds;
 mod decoded;
 mod encode;
 mod error;
@@ -51,8 +52,8 @@ pub use renderer::{BuiltFrame, FrameRenderer, TraceError, TracedFrame};
 pub use rods::{CellStyle, FrameRods};
 pub use schedule::{Overlap, Schedule};
 pub use setup::{
-    ArrowStyle, AttributeChannel, ColorRule, OpacityRule, Picture, RadiusRule, RunSettings, Setup,
-    TrailStyle,
+    ArrowStyle, AttributeChannel, BondRule, BondStyle, ColorRule, OpacityRule, Picture, RadiusRule,
+    RunSettings, Setup, TrailStyle,
 };
 pub use shutter::{FrameStep, Shutter};
 pub use single::{PictureKind, make_image, make_picture, trace_particles};

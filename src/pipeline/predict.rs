@@ -14,6 +14,7 @@ use spherule_formats::native::Access;
 use spherule_formats::open::unpacked_len;
 use spherule_formats::sequence::Sequence;
 
+use super::bonds::MAX_BONDS_EACH;
 use super::read_threads::needs_many;
 use super::setup::{RadiusRule, Setup};
 use super::{ImageTask, mattes};
@@ -253,14 +254,16 @@ impl<'a> MemoryModel<'a> {
         }
     }
 
-    /// Upper bounds of the memory of the arrows and trails of a frame: while they are made, and afterwards.
+    /// Upper bounds of the memory of the arrows, trails and bonds of a frame: while they are made, and afterwards.
     fn arrows(&self, frame: &FrameSize) -> SurfaceBytes {
         let picture = &self.setup.picture;
         let share = |every: u32| frame.particles.div_ceil(u64::from(every.max(1)));
         let arrows = picture.arrows.iter().map(|style| 2 * share(style.every));
         let trails = picture.trails.iter();
         let trails = trails.map(|style| share(style.every).saturating_mul(style.frames.into()));
-        let [building, kept] = RodTree::predicted_bytes(arrows.chain(trails).sum());
+        let bonds = picture.bonds.iter();
+        let bonds = bonds.map(|_| frame.particles.saturating_mul(MAX_BONDS_EACH));
+        let [building, kept] = RodTree::predicted_bytes(arrows.chain(trails).chain(bonds).sum());
         SurfaceBytes { building, kept }
     }
 

@@ -1,7 +1,7 @@
 //! Tests of the model alone; `tests/suite/memory` compares it with measurements.
 
 use super::*;
-use crate::pipeline::{ArrowStyle, Overlap, TrailStyle};
+use crate::pipeline::{ArrowStyle, BondRule, BondStyle, Overlap, TrailStyle};
 use crate::surface::MaterialId;
 use crate::surface::rods::Anchor;
 
@@ -143,7 +143,7 @@ fn light_groups_have_planes() {
 }
 
 #[test]
-fn arrows_and_trails_are_counted() {
+fn arrows_trails_and_bonds_are_counted() {
     let mut setup = setup();
     let alone = |setup: &Setup| MemoryModel::new(setup).alone(&plain(1_000_000));
     let none = alone(&setup);
@@ -179,5 +179,17 @@ fn arrows_and_trails_are_counted() {
     assert!(
         trails.total() >= none.total() + each(5, 100),
         "{none}\n{trails}"
+    );
+    setup.picture.trails = None;
+    setup.picture.bonds = Some(BondStyle {
+        rule: BondRule::Distance(1.0),
+        radius: 0.1,
+        color: None,
+        material: MaterialId::PARTICLES,
+    });
+    let bonds = alone(&setup);
+    assert!(
+        bonds.total() >= none.total() + each(MAX_BONDS_EACH, 100),
+        "{none}\n{bonds}"
     );
 }

@@ -156,6 +156,33 @@ impl TrailStyle {
     }
 }
 
+/// Which particles have a bond.
+#[derive(Debug, Clone, PartialEq)]
+pub enum BondRule {
+    /// Those up to this distance apart, scene units.
+    Distance(f32),
+    /// Those up to the sum of their covalent radii apart, with a tolerance.
+    Covalent {
+        /// Name of the attribute with atomic numbers.
+        name: String,
+        /// Length of an angstrom, scene units.
+        angstrom: f64,
+    },
+}
+
+/// How bonds between particles are drawn.
+#[derive(Debug, Clone)]
+pub struct BondStyle {
+    /// Which particles have one.
+    pub rule: BondRule,
+    /// Their radius, scene units.
+    pub radius: f32,
+    /// The colours of their halves, as those of particles; None if all have that of the material.
+    pub color: Option<ColorRule>,
+    /// Their material, which is one of those of meshes.
+    pub material: MaterialId,
+}
+
 /// An attribute with channels in the images.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AttributeChannel {
@@ -218,6 +245,8 @@ pub struct Picture {
     pub arrows: Vec<ArrowStyle>,
     /// Trails over earlier frames, if they are drawn.
     pub trails: Option<TrailStyle>,
+    /// Bonds between particles, if they are drawn.
+    pub bonds: Option<BondStyle>,
     /// The renderer.
     pub renderer: RendererKind,
     /// Image size, samples, depth, channels.
@@ -404,9 +433,15 @@ impl Setup {
                     .to_owned(),
             );
         }
-        if !self.picture.arrows.is_empty() || self.picture.trails.is_some() {
+        let Picture {
+            arrows,
+            trails,
+            bonds,
+            ..
+        } = &self.picture;
+        if !arrows.is_empty() || trails.is_some() || bonds.is_some() {
             return Some(
-                "arrows and trails are made from a copy of them, 12 bytes per particle and more"
+                "arrows, trails and bonds are made from a copy of them, 12 bytes per particle and more"
                     .to_owned(),
             );
         }

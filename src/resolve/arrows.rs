@@ -1,7 +1,7 @@
 //! Arrows of vector attributes, and trails.
 
 use super::{ResolveError, color, narrow, require_attribute};
-use crate::manifest::{ColorMapping, ColorSetting, Manifest, RangeSetting, ScaleKind};
+use crate::manifest::{BondSearch, ColorMapping, ColorSetting, Manifest, RangeSetting, ScaleKind};
 use crate::pipeline::{ArrowStyle, ColorRule, TrailStyle};
 use crate::scene::mesh::DEFAULT_COLOR;
 use crate::scene::{Finish, MeshFinish, MeshMaterial, Scene};
@@ -55,7 +55,7 @@ pub(super) fn arrows(
     styles.map(style).collect()
 }
 
-/// How trails are drawn, if they are; see [`arrows`]. Their material is the last one.
+/// How trails are drawn, if they are; see [`arrows`]. Their material follows those of the arrows.
 ///
 /// # Errors
 /// The job follows a simulation, or colours are not determined.
@@ -91,12 +91,14 @@ pub(super) fn trails(
     }))
 }
 
-/// Adds the materials of arrows and trails to those of the meshes of `scene`.
+/// Adds the materials of arrows, trails and bonds to those of the meshes of `scene`.
 pub(super) fn add_materials(scene: &mut Scene, manifest: &Manifest) {
     let trails = Some(&manifest.trails).filter(|own| own.frames > 0);
+    let bonds = Some(&manifest.bonds).filter(|own| own.find != BondSearch::None);
     let arrows = manifest.arrows.iter().map(|own| &own.color);
     let materials = arrows
         .chain(trails.map(|own| &own.color))
+        .chain(bonds.map(|own| &own.color))
         .map(|color| MeshMaterial {
             color: match color {
                 ColorSetting::Rgb(color) => *color,
@@ -128,7 +130,7 @@ fn check_attribute(survey: &Survey, name: &str) -> Result<(), ResolveError> {
 }
 
 /// Colours by a value, by default that of the arrows themselves.
-fn mapped(
+pub(super) fn mapped(
     by: &ColorMapping,
     survey: &Survey,
     own: &str,

@@ -16,6 +16,9 @@ use crate::surface::SurfaceKind;
 /// through the particles, and none is only a few pixels wide.
 const TILE: f64 = 1.0 / 8.0;
 
+/// Greatest depth of spheres in a shadow catcher as a fraction of the diagonal of the bounds.
+const SUNK: f64 = 1.0 / 100.0;
+
 /// Where the ground is.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Floor<'a> {
@@ -69,8 +72,12 @@ pub(super) fn ground(
     } else if is_catcher || manifest.surface.kind != SurfaceKind::Spheres {
         // Raise it to the lowest centres: between a body that only touched the ground and the ground itself would be
         // a thin layer of air, which reflects all light at grazing angles. Spheres that only touched a shadow catcher
-        // would seem to float.
-        ground.raise(narrow(floor.reach));
+        // would seem to float, but large ones would seem to be cut off.
+        let most = match manifest.surface.kind {
+            SurfaceKind::Spheres => SUNK * bounds.diagonal(),
+            _ => f64::INFINITY,
+        };
+        ground.raise(narrow(floor.reach.min(most)));
     }
     if is_catcher {
         let catcher = ground.into_shadow_catcher(bounds, render.ground_shadow);
@@ -173,10 +180,15 @@ mod tests {
             manifest.render.ground_pattern = GroundPattern::Checker;
         };
         assert_eq!(of(GroundKind::Plain, pattern).unwrap(), Some(checker));
-        // A shadow catcher goes through the lowest centres and fades from 2 to 8 diagonals, which are 6 long
+        // A shadow catcher goes through the lowest centres, but not far above the lowest points of large spheres, and
+        // fades from 2 to 8 diagonals, which are 6 long
         let catcher = of(GroundKind::ShadowCatcher, |m| m.render.ground_shadow = 0.5);
         let catcher = catcher.unwrap().unwrap();
-        assert_eq!((catcher.height, catcher.shadow_catcher), (3.25, Some(0.5)));
+        assert_eq!((catcher.height, catcher.shadow_catcher), (3.06, Some(0.5)));
+        let under_body = of(GroundKind::ShadowCatcher, |m| {
+            m.surface.kind = SurfaceKind::Union;
+        });
+        assert_eq!(under_body.unwrap().unwrap().height, 3.25);
         assert_eq!([catcher.fade_start, catcher.fade_end], [12.0, 48.0]);
         let low = of(GroundKind::ShadowCatcher, |m| {
             m.render.ground_height = Some(2.0)

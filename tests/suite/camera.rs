@@ -148,6 +148,54 @@ fn keys_are_reached_smoothly() {
 }
 
 #[test]
+fn keys_of_a_json_file_are_those_of_a_manifest() {
+    let with_keys = workshop(KEYS);
+    with_keys.run(&["render", "my.toml"]).expect(0);
+    let with_file = workshop("");
+    let keys = json!([
+        { "frame": 6, "eye": [5, 14.5, 30], "look_at": [5, 14.5, 0], "fov": 20 },
+        { "frame": 2, "eye": [5.0, 6.5, 30.0], "look_at": [5, 6.5, 0] },
+    ]);
+    let render = |text: &str| {
+        fs::write(with_file.join("shot.json"), text).expect("a file");
+        with_file.run(&["render", "my.toml", "--camera-path", "shot.json"])
+    };
+    render(&keys.to_string()).expect(0);
+    for frame in 1..=7 {
+        let of = |workshop: &Workshop| {
+            fs::read(workshop.join("out").join(image(frame))).expect("an image")
+        };
+        assert_eq!(of(&with_keys), of(&with_file), "{frame}");
+    }
+    // The same keys as an object continue the job, others do not
+    render(&json!({ "keys": keys }).to_string()).expect(0);
+    let moved = keys
+        .to_string()
+        .replace("30.0]", "31.0]")
+        .replace("14.5,30]", "14.5,32]");
+    render(&moved).expect(2).prints("camera.key");
+    for (text, part) in [
+        ("{", "--camera-path shot.json: no JSON"),
+        ("[]", "--camera-path shot.json: no keyframes"),
+        (
+            "{\"key\": []}",
+            "no keyframes; it must have a list of keyframes",
+        ),
+        ("[{\"frame\": null}]", "--camera-path shot.json: "),
+        ("[{\"frame\": 1, \"eye\": [0, 0, 1]}]", "look_at"),
+        (
+            "[{\"frame\": 1, \"eye\": [0, 0], \"look_at\": [0, 0, 1]}]",
+            "camera.key.0.eye",
+        ),
+        ("[{\"frame\": 1, \"eyes\": [0, 0, 1]}]", "eyes"),
+    ] {
+        render(text).expect(2).prints(part);
+    }
+    let ran = with_file.run(&["render", "my.toml", "--camera-path", "none.json"]);
+    ran.expect(2).prints("none.json");
+}
+
+#[test]
 fn moving_cameras_resume_deterministically() {
     for camera in [KEYS, "[camera]\nmode = \"turntable\"\n"] {
         let workshop = workshop(camera);

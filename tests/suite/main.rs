@@ -8,6 +8,7 @@ mod architecture;
 mod arithmetic;
 mod arrows;
 mod bad_input;
+mod bonds;
 mod camera;
 mod cell;
 mod channels;

@@ -23,6 +23,7 @@ material = { opacity = { attribute = "density", range = [2, 1] }, color = { attr
 light = [{ type = "directional", direction = [0, 0, -2] }, { type = "point", position = [1, 1, 1], falloff = "inverse-square" }, { type = "sun", direction = [0, 0, -2], size = 2 }, { type = "sphere", position = [1, 1, 1], radius = 2, visible = true }, { type = "rect", position = [1, 1, 1], direction = [0, 1, 0], width = 2, height = 3 }, { type = "disc", position = [1, 1, 1], direction = [0, 1, 0], radius = 2 }]
 mesh = [{ path = "tank.stl" }, { path = "w.##.ply", material = "glass", color = [1, 1, 0.5], roughness = 0, normals = "flat", faces = "back", scale = 0.001, translate = [1, 0, 0] }, { path = "b", holdout = true }]
 trails = { frames = 8, radius = 0.1, every = 2, color = [1, 0, 0] }
+bonds = { find = "covalent", radius = 0.1, color = { attribute = "f", map = "turbo", range = [0, 5] } }
 arrows = [{ attribute = "velocity", scale = 0.1 }, { attribute = "f", scale = 2, radius = 0.1, every = 10, anchor = "center", color = { attribute = "f", map = "turbo", range = [0, 5] } }]
 overlay = [{ type = "colorbar", title = "Speed", unit = "m/s", length = 0.5, corner = "top-right" }, { type = "text", text = "t = {time:.2f}", offset = [0.1, -0.1], color = [1, 0, 0] }, { type = "scale_bar", length = 2, unit = "mm" }, { type = "axes", size = 0.05 }, { type = "image", path = "logo.png", height = 0.2 }]
 environment = { type = "image", image = "hall.exr", intensity = 2, rotation = -30, visible = true }
@@ -89,7 +90,7 @@ fn written_manifests_are_valid() {
 }
 
 /// Every table of the schema, with a manifest that ends in this table, so that a line can be appended to it.
-const TABLES: [(&str, &str); 41] = [
+const TABLES: [(&str, &str); 43] = [
     ("", ""),
     ("/properties/input", "[input]\n"),
     ("/properties/camera", "[camera]\n"),
@@ -155,6 +156,11 @@ const TABLES: [(&str, &str); 41] = [
     ("/properties/output", "[output]\n"),
     ("/properties/job", "[job]\n"),
     ("/properties/trails", "[trails]\n"),
+    ("/properties/bonds", "[bonds]\n"),
+    (
+        "/properties/bonds/properties/color/anyOf/2",
+        "[bonds.color]\n",
+    ),
     (
         "/properties/trails/properties/color/anyOf/2",
         "[trails.color]\n",

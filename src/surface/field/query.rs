@@ -38,6 +38,14 @@ impl FieldParticles {
         }
     }
 
+    /// Calls `each` with the index in the frame and the offset from `point` of all particles within the support, in the
+    /// order of the bins. Requires indices.
+    pub(crate) fn each_offset(&self, point: Vec3, mut each: impl FnMut(u32, Vec3)) {
+        self.around(point, |place, _, offset| {
+            each(self.bins.indices()[place], offset);
+        });
+    }
+
     /// The field at `point`. Particles without a computed volume do not contribute.
     pub(crate) fn sample(&self, point: Vec3) -> Sample {
         let inverse = 1.0 / self.support();

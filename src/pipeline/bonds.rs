@@ -1,0 +1,371 @@
+//! Bonds between the particles of a frame that are near each other.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use glam::{BVec3, Vec3};
+use rayon::prelude::*;
+use spherule_formats::SimulationCell;
+
+use super::SharedFrame;
+use super::decoded::colors_by;
+use super::load_error::{LoadError, missing};
+use super::rods::FrameRods;
+use super::setup::{BondRule, BondStyle, Setup};
+use crate::scene::RadiusTable;
+use crate::surface::field::FieldParticles;
+use crate::surface::rods::{Caps, Rod, RodTree};
+
+/// Covalent bonds are as long as the sum of both radii and this tolerance, angstroms: the rule of the Cambridge
+/// Structural Database (Allen, Acta Crystallographica B 58, 2002).
+const TOLERANCE: f64 = 0.4;
+
+/// Greatest number of bonds per particle, on average; in close packings, there are 6 between nearest neighbours.
+pub(super) const MAX_BONDS_EACH: u64 = 8;
+
+/// Number of particles that one task searches around.
+const CHUNK: usize = 4096;
+
+/// The bonds of `frame`, which was read from `file` and has this `number`. Passes notes to `notes`.
+///
+/// # Errors
+/// The frame lacks an attribute, or there are too many bonds.
+pub(super) fn bonds_of(
+    setup: &Setup,
+    frame: &SharedFrame<'_>,
+    (number, file): (i64, &str),
+    notes: &mut Vec<String>,
+) -> Result<Option<FrameRods>, LoadError> {
+    let Some(style) = setup.picture.bonds.as_ref().filter(|_| !frame.is_empty()) else {
+        return Ok(None);
+    };
+    let reach = Reach::of(&style.rule, frame, file)?;
+    let search = Search::new(style, reach, frame);
+    let rods = search.bonds().ok_or_else(|| LoadError::TooManyBonds {
+        file: file.to_owned(),
+        particles: frame.len(),
+    })?;
+    if rods.is_empty() {
+        notes.push(format!(
+            "frame {number}: bonds.find gives no bonds: no particles are so near each other"
+        ));
+    }
+    let mut colors = Vec::new();
+    if let Some(rule) = &style.color {
+        let of_particles = colors_by(setup, frame, (number, file), rule)?;
+        colors = (0..frame.len()).map(|i| of_particles.get(i)).collect();
+    }
+    let tree = RodTree::new(rods, Caps::Flat).with_colors(colors);
+    Ok(Some(FrameRods::new(tree, style.material)))
+}
+
+/// How far apart particles with a bond are at most.
+struct Reach {
+    /// The greatest distance, scene units.
+    greatest: f32,
+    /// The share of each particle in the distance; empty if the distance is the same for all. NaN for those without
+    /// bonds.
+    shares: Vec<f32>,
+}
+
+impl Reach {
+    fn of(rule: &BondRule, frame: &SharedFrame<'_>, file: &str) -> Result<Self, LoadError> {
+        let (name, angstrom) = match rule {
+            BondRule::Distance(distance) => {
+                return Ok(Self {
+                    greatest: *distance,
+                    shares: Vec::new(),
+                });
+            }
+            BondRule::Covalent { name, angstrom } => (name, *angstrom),
+        };
+        let elements = frame.attribute(name).ok_or_else(|| {
+            let has = frame.attributes.iter().map(|a| a.name.as_str());
+            missing(name, "covalent bonds", file, has)
+        })?;
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "radii are f32 in the renderer"
+        )]
+        let share = |particle: usize| {
+            let radius = RadiusTable::Covalent.radius(elements.magnitude(particle));
+            radius.map_or(f32::NAN, |radius| {
+                (angstrom * (radius + 0.5 * TOLERANCE)) as f32
+            })
+        };
+        let shares: Vec<f32> = (0..frame.len()).map(share).collect();
+        // `max` ignores NaN
+        let greatest = 2.0 * shares.iter().copied().fold(0.0, f32::max);
+        Ok(Self { greatest, shares })
+    }
+
+    /// The square of the greatest length of a bond between two particles; NaN if they have none.
+    fn squared(&self, a: usize, b: u32) -> f32 {
+        let length = match self.shares.get(a).zip(self.shares.get(b as usize)) {
+            Some((a, b)) => a + b,
+            None => self.greatest,
+        };
+        length * length
+    }
+}
+
+/// The particles of a frame, and what their bonds are made from.
+struct Search<'a> {
+    radius: f32,
+    reach: Reach,
+    positions: &'a [Vec3],
+    bins: FieldParticles,
+    /// Where the images of the periodic cell around it are.
+    images: Vec<Vec3>,
+    /// The box that contains all particles within reach of one of the frame.
+    bounds: [Vec3; 2],
+}
+
+impl<'a> Search<'a> {
+    fn new(style: &BondStyle, reach: Reach, frame: &'a SharedFrame<'_>) -> Self {
+        let positions = &frame.positions[..];
+        // Bins need a size; a margin keeps particles at the greatest distance in neighbouring bins
+        let size = (1.001 * reach.greatest).max(f32::MIN_POSITIVE);
+        let min = positions.iter().copied().fold(Vec3::INFINITY, Vec3::min);
+        let max = positions
+            .iter()
+            .copied()
+            .fold(Vec3::NEG_INFINITY, Vec3::max);
+        Self {
+            radius: style.radius,
+            bins: FieldParticles::sorted(positions, size, true),
+            images: frame.cell.as_ref().map(images_around).unwrap_or_default(),
+            bounds: [min - reach.greatest, max + reach.greatest],
+            reach,
+            positions,
+        }
+    }
+
+    /// All bonds, in the order of the particles; None if there are too many.
+    fn bonds(&self) -> Option<Vec<Rod>> {
+        let found = AtomicU64::new(0);
+        let most = MAX_BONDS_EACH.saturating_mul(self.positions.len() as u64);
+        let starts: Vec<usize> = (0..self.positions.len()).step_by(CHUNK).collect();
+        let chunk = |start: &usize| {
+            let mut rods = Vec::new();
+            for particle in *start..(start + CHUNK).min(self.positions.len()) {
+                let before = rods.len();
+                self.add_bonds_of(particle, &mut rods);
+                let added = (rods.len() - before) as u64;
+                if found.fetch_add(added, Ordering::Relaxed) + added > most {
+                    return None;
+                }
+            }
+            Some(rods)
+        };
+        let chunks: Option<Vec<Vec<Rod>>> = starts.par_iter().map(chunk).collect();
+        Some(chunks?.concat())
+    }
+
+    /// Adds the bonds of a particle to those with greater indices, and its halves of the bonds that leave the periodic
+    /// cell. Each end of these is drawn from its particle to the middle.
+    fn add_bonds_of(&self, particle: usize, rods: &mut Vec<Rod>) {
+        let point = self.positions[particle];
+        let Ok(own) = u32::try_from(particle) else {
+            return;
+        };
+        let mut bond = |offset: Vec3, length: f32, other: u32| {
+            rods.push(Rod {
+                ends: [point, point + length * offset],
+                radii: [self.radius; 2],
+                particles: [own, other],
+            });
+        };
+        self.bins.each_offset(point, |other, offset| {
+            if other > own && offset.length_squared() <= self.reach.squared(particle, other) {
+                bond(offset, 1.0, other);
+            }
+        });
+        for image in &self.images {
+            let moved = point + *image;
+            let [min, max] = self.bounds;
+            if moved.cmplt(min) | moved.cmpgt(max) != BVec3::FALSE {
+                continue;
+            }
+            self.bins.each_offset(moved, |other, offset| {
+                if offset.length_squared() <= self.reach.squared(particle, other) {
+                    bond(offset, 0.5, own);
+                }
+            });
+        }
+    }
+}
+
+/// Where the images of `cell` next to it are, without itself.
+fn images_around(cell: &SimulationCell) -> Vec<Vec3> {
+    let steps = |edge: usize| match cell.periodic[edge] && cell.vectors[edge].length_squared() > 0.0
+    {
+        true => -1..=1,
+        false => 0..=0,
+    };
+    let mut images = Vec::new();
+    for a in steps(0) {
+        for b in steps(1) {
+            for c in steps(2) {
+                if [a, b, c] != [0; 3] {
+                    let edges = cell.vectors.into_iter().zip([a, b, c].map(f64::from));
+                    let offset: glam::DVec3 = edges.map(|(edge, number)| number * edge).sum();
+                    images.push(offset.as_vec3());
+                }
+            }
+        }
+    }
+    images
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+    use spherule_formats::{Attribute, AttributeData, ParticleFrame};
+
+    use super::*;
+    use crate::surface::MaterialId;
+
+    /// `count` particles in a cell of edges 6, 5 and 4, by a linear congruential generator.
+    fn frame(count: usize, periodic: [bool; 3]) -> SharedFrame<'static> {
+        let mut state = 7_u32;
+        let mut next = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / 16_777_216.0
+        };
+        let positions: Vec<Vec3> = (0..count)
+            .map(|_| Vec3::new(6.0 * next(), 5.0 * next(), 4.0 * next()))
+            .collect();
+        let elements = (0..count).map(|i| [1, 6, 8, 0][i % 4]).collect();
+        let edges = [DVec3::X * 6.0, DVec3::Y * 5.0, DVec3::Z * 4.0];
+        ParticleFrame {
+            positions: positions.into(),
+            origin: DVec3::ZERO,
+            radius: None,
+            attributes: vec![Attribute {
+                name: "element".to_owned(),
+                components: 1,
+                data: AttributeData::I32(elements),
+            }],
+            time: None,
+            cell: SimulationCell::new(DVec3::ZERO, edges, periodic),
+            dropped: 0,
+            file_index: None,
+        }
+    }
+
+    fn bonds(frame: &SharedFrame<'_>, rule: BondRule) -> Option<Vec<Rod>> {
+        let reach = Reach::of(&rule, frame, "in").unwrap();
+        let style = BondStyle {
+            rule,
+            radius: 0.1,
+            color: None,
+            material: MaterialId::of_mesh(0).unwrap(),
+        };
+        Search::new(&style, reach, frame).bonds()
+    }
+
+    /// Pairs and halves, by brute force in f64; `length` is the greatest length of the bond of two particles.
+    fn expected(
+        frame: &SharedFrame<'_>,
+        length: impl Fn(usize, usize) -> Option<f64>,
+    ) -> (Vec<[u32; 2]>, Vec<u32>) {
+        let cell = frame.cell.unwrap();
+        let images = images_around(&cell);
+        let (mut pairs, mut halves) = (Vec::new(), Vec::new());
+        for a in 0..frame.len() {
+            for b in 0..frame.len() {
+                let Some(length) = length(a, b) else { continue };
+                let way = frame.positions[b].as_dvec3() - frame.positions[a].as_dvec3();
+                if a < b && way.length() <= length {
+                    pairs.push([a as u32, b as u32]);
+                }
+                let near = images
+                    .iter()
+                    .filter(|i| (way - i.as_dvec3()).length() <= length);
+                halves.extend(near.map(|_| a as u32));
+            }
+        }
+        (pairs, halves)
+    }
+
+    /// The pairs of whole bonds, and the particles of halves, sorted.
+    fn found(rods: &[Rod]) -> (Vec<[u32; 2]>, Vec<u32>) {
+        let (halves, pairs): (Vec<&Rod>, _) = rods
+            .iter()
+            .partition(|rod| rod.particles[0] == rod.particles[1]);
+        let mut pairs: Vec<[u32; 2]> = pairs.into_iter().map(|rod| rod.particles).collect();
+        pairs.sort_unstable();
+        (
+            pairs,
+            halves.into_iter().map(|rod| rod.particles[0]).collect(),
+        )
+    }
+
+    #[test]
+    fn bonds_by_distance_are_those_of_brute_force() {
+        for periodic in [[false; 3], [true, false, true], [true; 3]] {
+            let frame = frame(300, periodic);
+            let rods = bonds(&frame, BondRule::Distance(0.8)).unwrap();
+            let (pairs, halves) = expected(&frame, |_, _| Some(0.8));
+            assert!(pairs.len() > 300, "{}", pairs.len());
+            assert_eq!(halves.is_empty(), periodic == [false; 3]);
+            assert_eq!(found(&rods), (pairs, halves), "{periodic:?}");
+            // Whole bonds go from particle to particle
+            for rod in &rods {
+                let [a, b] = rod.particles;
+                assert_eq!(rod.ends[0], frame.positions[a as usize]);
+                let end = frame.positions[b as usize];
+                assert!(a == b || rod.ends[1].distance(end) < 1e-6);
+                let length = rod.ends[0].distance(rod.ends[1]);
+                assert!(length <= if a == b { 0.4 } else { 0.8 } + 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn halves_of_a_bond_over_the_boundary_meet_in_its_middle() {
+        let mut frame = frame(2, [true, true, true]);
+        frame.positions = vec![Vec3::new(0.25, 1.0, 3.75), Vec3::new(5.75, 1.0, 0.25)].into();
+        let rods = bonds(&frame, BondRule::Distance(0.8)).unwrap();
+        let ends: Vec<[Vec3; 2]> = rods.iter().map(|rod| rod.ends).collect();
+        let expected = [
+            [Vec3::new(0.25, 1.0, 3.75), Vec3::new(0.0, 1.0, 4.0)],
+            [Vec3::new(5.75, 1.0, 0.25), Vec3::new(6.0, 1.0, 0.0)],
+        ];
+        assert_eq!(ends, expected);
+    }
+
+    #[test]
+    fn covalent_bonds_are_those_of_brute_force() {
+        let frame = frame(300, [true; 3]);
+        let angstrom = 0.5;
+        let name = "element".to_owned();
+        let rods = bonds(&frame, BondRule::Covalent { name, angstrom }).unwrap();
+        let radius = |i: usize| [Some(0.31), Some(0.76), Some(0.66), None][i % 4];
+        let length = |a: usize, b: usize| Some(angstrom * (radius(a)? + radius(b)? + 0.4));
+        let (pairs, halves) = expected(&frame, length);
+        assert!(pairs.len() > 200 && halves.len() > 20, "{}", pairs.len());
+        assert_eq!(found(&rods), (pairs, halves));
+    }
+
+    #[test]
+    fn too_many_bonds_are_refused() {
+        let frame = frame(2000, [true; 3]);
+        assert!(bonds(&frame, BondRule::Distance(3.0)).is_none());
+        assert!(bonds(&frame, BondRule::Distance(0.2)).is_some());
+        let empty = frame_at(&[]);
+        assert_eq!(bonds(&empty, BondRule::Distance(3.0)), Some(Vec::new()));
+        // Particles in one place have no direction to draw a bond in
+        let one_place = frame_at(&[Vec3::ONE; 3]);
+        let rods = bonds(&one_place, BondRule::Distance(3.0)).unwrap();
+        assert!(RodTree::new(rods, Caps::Flat).is_empty());
+    }
+
+    fn frame_at(positions: &[Vec3]) -> SharedFrame<'static> {
+        SharedFrame {
+            positions: positions.to_vec().into(),
+            cell: None,
+            ..frame(positions.len(), [false; 3])
+        }
+    }
+}
