@@ -92,5 +92,6 @@ fn particles(count: usize) -> RawParticles {
         time: None,
         step: None,
         cell: None,
+        bonds: Vec::new(),
     }
 }

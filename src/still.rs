@@ -73,6 +73,7 @@ pub fn particles(positions: PositionSlice<'_>) -> Particles<'_> {
         time: None,
         step: None,
         cell: None,
+        bonds: Vec::new(),
     }
 }
 

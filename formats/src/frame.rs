@@ -8,6 +8,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::attribute::with_values;
+use crate::bonds::{self, Bond};
 use crate::gather::keep;
 use crate::names::RADII;
 use crate::{Attribute, AttributeData, SimulationCell};
@@ -115,6 +116,22 @@ pub struct RawParticles<P = Positions> {
     pub step: Option<i64>,
     /// The simulation cell, if the file has it.
     pub cell: Option<SimulationCell>,
+    /// Bonds, if the file lists them, by indices of the particles.
+    pub bonds: Vec<Bond>,
+}
+
+impl<P> RawParticles<P> {
+    /// The same particles with their positions in another type.
+    fn with_positions<Q>(self, convert: impl FnOnce(P) -> Q) -> RawParticles<Q> {
+        RawParticles {
+            positions: convert(self.positions),
+            attributes: self.attributes,
+            time: self.time,
+            step: self.step,
+            cell: self.cell,
+            bonds: self.bonds,
+        }
+    }
 }
 
 impl RawParticles<PositionSlice<'_>> {
@@ -126,15 +143,17 @@ impl RawParticles<PositionSlice<'_>> {
             time: self.time,
             step: self.step,
             cell: self.cell,
+            bonds: self.bonds.clone(),
         }
     }
 }
 
 impl RawParticles {
-    /// Bytes of positions and attributes in memory.
+    /// Bytes of positions, attributes and bonds in memory.
     pub fn byte_len(&self) -> u64 {
         let attributes = self.attributes.iter().map(|a| a.data.byte_len());
-        self.positions.byte_len() + attributes.sum::<u64>()
+        let bonds = size_of_val(&self.bonds[..]) as u64;
+        self.positions.byte_len() + attributes.sum::<u64>() + bonds
     }
 
     /// Keeps only the particles with these indices, which are ascending. No array is copied.
@@ -142,6 +161,7 @@ impl RawParticles {
     /// # Panics
     /// If there is no particle with one of the indices.
     pub fn select(&mut self, indices: &[u32]) {
+        bonds::renumber(&mut self.bonds, self.positions.len(), indices);
         let (positions, attributes) = (&mut self.positions, &mut self.attributes);
         rayon::join(
             || match positions {
@@ -189,6 +209,8 @@ pub struct ParticleFrame<P = Vec<Vec3>> {
     pub time: Option<f64>,
     /// The simulation cell, if known, in world coordinates.
     pub cell: Option<SimulationCell>,
+    /// Bonds, if known, by indices of the particles.
+    pub bonds: Vec<Bond>,
     /// Particles that were dropped because a coordinate was NaN or beyond [`FARTHEST`].
     pub dropped: u64,
     /// File-order index of each kept particle; `None` if all particles of the file were kept (the indices are then
@@ -213,9 +235,8 @@ pub fn is_radius(radius: f32) -> bool {
 impl ParticleFrame {
     /// Drops and counts particles that are not [near](is_near), subtracts `origin` in f64 and rounds to f32.
     pub fn from_raw(raw: RawParticles, origin: DVec3) -> Self {
-        let relative = Cow::Owned(relative_positions(raw.positions, origin));
-        ParticleFrame::kept(relative, raw.attributes, raw.time, raw.cell, origin)
-            .with_positions(Cow::into_owned)
+        let relative = raw.with_positions(|p| Cow::Owned(relative_positions(p, origin)));
+        ParticleFrame::kept(relative, origin).with_positions(Cow::into_owned)
     }
 
     /// Same as [`Self::from_raw`] for the particles with these indices, which are ascending. `file_index` has them.
@@ -247,19 +268,21 @@ impl<'a> ParticleFrame<Cow<'a, [Vec3]>> {
                 Cow::Owned(v.par_iter().map(|p| (p - origin).as_vec3()).collect())
             }
         };
-        Self::kept(relative, raw.attributes, raw.time, raw.cell, origin)
+        Self::kept(raw.with_positions(|_| relative), origin)
     }
 
-    /// The particles that are near, with `relative` positions.
-    fn kept(
-        relative: Cow<'a, [Vec3]>,
-        mut attributes: Vec<Attribute>,
-        time: Option<f64>,
-        cell: Option<SimulationCell>,
-        origin: DVec3,
-    ) -> Self {
+    /// The particles that are near, of `raw` with positions relative to `origin`.
+    fn kept(raw: RawParticles<Cow<'a, [Vec3]>>, origin: DVec3) -> Self {
+        let RawParticles {
+            mut positions,
+            mut attributes,
+            time,
+            cell,
+            mut bonds,
+            ..
+        } = raw;
         // Keep the arrays if no particle is dropped
-        let (mut positions, mut file_index, mut dropped) = (relative, None, 0);
+        let (mut file_index, mut dropped) = (None, 0);
         if !positions.iter().all(is_near) {
             let keep: Vec<bool> = positions.iter().map(is_near).collect();
             for attribute in &mut attributes {
@@ -273,6 +296,7 @@ impl<'a> ParticleFrame<Cow<'a, [Vec3]>> {
                 indices.push(u32::try_from(index).unwrap_or(u32::MAX));
             }
             dropped = (positions.len() - count) as u64;
+            bonds::renumber(&mut bonds, positions.len(), &indices);
             positions = Cow::Owned(near);
             file_index = Some(indices);
         }
@@ -283,6 +307,7 @@ impl<'a> ParticleFrame<Cow<'a, [Vec3]>> {
             attributes,
             time,
             cell,
+            bonds,
             dropped,
             file_index,
         }
@@ -299,6 +324,7 @@ impl<P> ParticleFrame<P> {
             attributes: self.attributes,
             time: self.time,
             cell: self.cell,
+            bonds: self.bonds,
             dropped: self.dropped,
             file_index: self.file_index,
         }

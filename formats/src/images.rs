@@ -5,7 +5,8 @@ use glam::{DMat3, DVec3};
 use crate::attribute::with_values;
 use crate::names::ID;
 use crate::{
-    Attribute, AttributeData, MemoryBudget, ParseError, Positions, RawParticles, SimulationCell,
+    Attribute, AttributeData, Bond, MemoryBudget, ParseError, Positions, RawParticles,
+    SimulationCell,
 };
 
 /// Most particles after copying: indices have 32 bits.
@@ -96,6 +97,7 @@ impl PeriodicImages {
         }
         let need = particles.byte_len().saturating_mul(self.count());
         budget.check(need, "its copies in memory are")?;
+        particles.bonds = self.copied_bonds(particles, cell);
         // One array at a time
         match &mut particles.positions {
             Positions::F32(v) => repeat(v, copies),
@@ -119,12 +121,45 @@ impl PeriodicImages {
         Ok(())
     }
 
+    /// The bonds between copies: each joins a particle with the nearest image of the other, which may be in another copy
+    /// of the cell, or in that on the other side of all copies.
+    #[expect(clippy::cast_possible_truncation, reason = "indices fit into 32 bits")]
+    fn copied_bonds(&self, particles: &RawParticles, cell: &SimulationCell) -> Vec<Bond> {
+        let inverse = inverse(cell).unwrap_or(DMat3::ZERO);
+        let count = particles.positions.len();
+        let counts = self.replicate.map(i64::from);
+        let mut bonds = Vec::with_capacity(particles.bonds.len() * self.count() as usize);
+        for bond in &particles.bonds {
+            let [from, to] = bond.map(|index| particles.positions.get(index as usize));
+            let way = (inverse * (to - from)).round().to_array();
+            let cells: [i64; 3] = std::array::from_fn(|edge| match cell.periodic[edge] {
+                true => way[edge] as i64,
+                false => 0,
+            });
+            for image in 0..self.count() as usize {
+                let along = self.along(image);
+                let other: [usize; 3] = std::array::from_fn(|edge| {
+                    (along[edge] as i64 - cells[edge]).rem_euclid(counts[edge]) as usize
+                });
+                let [na, nb, _] = self.replicate.map(|n| n as usize);
+                let other = (other[2] * nb + other[1]) * na + other[0];
+                let [a, b] = bond.map(|index| index as usize);
+                bonds.push([(image * count + a) as u32, (other * count + b) as u32]);
+            }
+        }
+        bonds
+    }
+
+    /// The number of image `index` along each edge.
+    fn along(&self, index: usize) -> [usize; 3] {
+        let [na, nb, _] = self.replicate.map(|n| n as usize);
+        [index % na, index / na % nb, index / na / nb]
+    }
+
     /// Where image `index` is relative to the original.
     #[expect(clippy::cast_precision_loss, reason = "numbers of images")]
     fn offset(&self, cell: &SimulationCell, index: usize) -> DVec3 {
-        let [na, nb, _] = self.replicate.map(|n| n as usize);
-        let along = [index % na, index / na % nb, index / na / nb];
-        let edges = cell.vectors.into_iter().zip(along);
+        let edges = cell.vectors.into_iter().zip(self.along(index));
         edges.map(|(edge, number)| number as f64 * edge).sum()
     }
 }
@@ -203,6 +238,7 @@ mod tests {
             time: None,
             step: None,
             cell: SimulationCell::new(ORIGIN, EDGES, periodic),
+            bonds: Vec::new(),
         }
     }
 
@@ -281,6 +317,35 @@ mod tests {
             copies.attributes[0].data,
             AttributeData::F32([0.0, 1.0].repeat(6))
         );
+    }
+
+    #[test]
+    fn bonds_of_copies_join_the_nearest_images() {
+        // A bond in the cell, and one over the boundary of edge a
+        let positions = vec![
+            at([0.4, 0.5, 0.5]),
+            at([0.6, 0.5, 0.5]),
+            at([1.1, 0.5, 0.5]),
+        ];
+        let positions = [positions, vec![at([0.05, 0.5, 0.5]), at([0.95, 0.5, 0.5])]].concat();
+        let mut one = particles(positions, [true; 3]);
+        one.bonds = vec![[0, 1], [3, 4]];
+        let images = PeriodicImages {
+            replicate: [2, 1, 2],
+            wrap: false,
+        };
+        let copies = applied(images, one);
+        // Copies along a have 5 particles each, those along c 10
+        let expected = [
+            [[0, 1], [5, 6], [10, 11], [15, 16]],
+            [[3, 9], [8, 4], [13, 19], [18, 14]],
+        ];
+        assert_eq!(copies.bonds, expected.concat());
+        // Those that do not cross the outer boundary are short
+        for [a, b] in [[8, 4], [18, 14]] {
+            let [a, b] = [a, b].map(|i| copies.positions.get(i));
+            assert!(a.distance(b) < 0.11 * 4.0, "{a} {b}");
+        }
     }
 
     #[test]

@@ -37,6 +37,7 @@
 #![deny(unsafe_code)]
 
 mod attribute;
+mod bonds;
 mod budget;
 mod cell;
 mod compression;
@@ -72,6 +73,7 @@ pub mod stats;
 pub mod write;
 
 pub use attribute::{Attribute, AttributeData};
+pub use bonds::Bond;
 pub use budget::MemoryBudget;
 pub use cell::SimulationCell;
 pub use error::{FrameError, ParseError};

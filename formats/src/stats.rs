@@ -363,6 +363,7 @@ mod tests {
             time: None,
             step: None,
             cell: None,
+            bonds: Vec::new(),
         }
     }
 

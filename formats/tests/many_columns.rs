@@ -267,6 +267,7 @@ fn parts_of_a_step() {
         time: None,
         step: None,
         cell: None,
+        bonds: Vec::new(),
     };
     let mut notes = Vec::new();
     let backwards = &mut (0..MANY).rev().map(|i| format!("a{i}"));

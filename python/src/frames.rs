@@ -130,6 +130,7 @@ pub(crate) fn write_spf(
         time,
         step: None,
         cell: None,
+        bonds: Vec::new(),
     };
     threads::run(py, None, || {}, || write(&path, raw, radius))
 }

@@ -49,6 +49,7 @@ pub(crate) fn render(
         time,
         step: None,
         cell: None,
+        bonds: Vec::new(),
     };
     let stop = AtomicBool::new(false);
     let on_signal = || stop.store(true, Ordering::Relaxed);

@@ -11,11 +11,12 @@ use super::value::{Fault, FlagKind, Value, quoted};
 section! {
     /// Bonds between particles, as cylinders
     Bonds {
-        /// Which particles have a bond: those up to a distance apart, covalent, or none
+        /// Which particles have a bond: those up to a distance apart, covalent, file, or none
         ///
         /// `covalent` are those up to the sum of their covalent radii and 0.4 angstroms apart, by the attribute
-        /// `element`. In a periodic cell, bonds go on at the other side.
-        find: BondSearch = BondSearch::None, flag("bonds", "DISTANCE", "Look");
+        /// `element`. `file` are the bonds that GSD files list, or a PSF file as input.topology. In a periodic cell,
+        /// bonds go on at the other side.
+        find: BondSearch = BondSearch::None, flag("bonds", "HOW", "Look");
         /// Radius, or auto: a third of the radius of the particles
         radius: Option<f32> = None, or("auto"), unit("a length"), above(0), single();
         /// Colour, linear RGB, { attribute = "charge", range = [-1, 1] }, or auto: halves have those of their particles
@@ -33,28 +34,32 @@ pub enum BondSearch {
     None,
     /// Between atoms whose distance is that of a covalent bond.
     Covalent,
+    /// Those that the file lists.
+    File,
     /// Between particles up to this distance apart.
     Distance(f64),
 }
 
 const NONE: &str = "none";
 const COVALENT: &str = "covalent";
+const FILE: &str = "file";
 
 impl Value for BondSearch {
     const FLAG: FlagKind = FlagKind::NumberOrText;
 
     fn kind(_: &Key) -> String {
-        "a distance above 0, \"covalent\" or \"none\"".to_owned()
+        "a distance above 0, \"covalent\", \"file\" or \"none\"".to_owned()
     }
 
     fn words() -> Vec<&'static str> {
-        vec![NONE, COVALENT]
+        vec![NONE, COVALENT, FILE]
     }
 
     fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {
         match field.as_text() {
             Some(NONE) => Ok(Self::None),
             Some(COVALENT) => Ok(Self::Covalent),
+            Some(FILE) => Ok(Self::File),
             Some(_) => Err(Fault::Unwanted),
             None => {
                 let usable = |distance: &f64| *distance > 0.0 && *distance <= f64::from(f32::MAX);
@@ -68,6 +73,7 @@ impl Value for BondSearch {
         match self {
             Self::None => quoted(NONE),
             Self::Covalent => quoted(COVALENT),
+            Self::File => quoted(FILE),
             Self::Distance(distance) => distance.toml(),
         }
     }
@@ -100,6 +106,7 @@ mod tests {
             ("1.5", BondSearch::Distance(1.5)),
             ("2", BondSearch::Distance(2.0)),
             ("\"covalent\"", BondSearch::Covalent),
+            ("\"file\"", BondSearch::File),
             ("\"none\"", BondSearch::None),
         ] {
             let found = read(&format!("bonds.find = {text}")).unwrap();

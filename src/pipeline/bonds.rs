@@ -1,4 +1,4 @@
-//! Bonds between the particles of a frame that are near each other.
+//! Bonds between the particles of a frame: those that are near each other, or those that the file lists.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -8,9 +8,10 @@ use spherule_formats::SimulationCell;
 
 use super::SharedFrame;
 use super::decoded::colors_by;
+use super::lattice::Lattice;
 use super::load_error::{LoadError, missing};
 use super::rods::FrameRods;
-use super::setup::{BondRule, BondStyle, Setup};
+use super::setup::{BondRule, Setup};
 use crate::scene::RadiusTable;
 use crate::surface::field::FieldParticles;
 use crate::surface::rods::{Caps, Rod, RodTree};
@@ -38,16 +39,23 @@ pub(super) fn bonds_of(
     let Some(style) = setup.picture.bonds.as_ref().filter(|_| !frame.is_empty()) else {
         return Ok(None);
     };
-    let reach = Reach::of(&style.rule, frame, file)?;
-    let search = Search::new(style, reach, frame);
-    let rods = search.bonds().ok_or_else(|| LoadError::TooManyBonds {
+    let near = |reach: Reach| {
+        let search = Search::new(style.radius, reach, frame);
+        (search.bonds(), "no particles are so near each other")
+    };
+    let (rods, none) = match &style.rule {
+        BondRule::File => (listed(style.radius, frame), "the file lists none"),
+        BondRule::Distance(distance) => near(Reach::distance(*distance)),
+        BondRule::Covalent { name, angstrom } => {
+            near(Reach::covalent((name, *angstrom), frame, file)?)
+        }
+    };
+    let rods = rods.ok_or_else(|| LoadError::TooManyBonds {
         file: file.to_owned(),
         particles: frame.len(),
     })?;
     if rods.is_empty() {
-        notes.push(format!(
-            "frame {number}: bonds.find gives no bonds: no particles are so near each other"
-        ));
+        notes.push(format!("frame {number}: no bonds: {none}"));
     }
     let mut colors = Vec::new();
     if let Some(rule) = &style.color {
@@ -56,6 +64,44 @@ pub(super) fn bonds_of(
     }
     let tree = RodTree::new(rods, Caps::Flat).with_colors(colors);
     Ok(Some(FrameRods::new(tree, style.material)))
+}
+
+/// Greatest number of bonds of `frame`.
+const fn most_bonds(particles: usize) -> u64 {
+    MAX_BONDS_EACH.saturating_mul(particles as u64)
+}
+
+/// The bonds that the file of `frame` lists; None if there are too many. Where the cell is periodic, each end goes to
+/// the nearest image of the other particle: one that is across the boundary is drawn up to the middle from both sides.
+fn listed(radius: f32, frame: &SharedFrame<'_>) -> Option<Vec<Rod>> {
+    if frame.bonds.len() as u64 > most_bonds(frame.len()) {
+        return None;
+    }
+    let lattice = frame.cell.as_ref().map(Lattice::new);
+    let mut rods = Vec::with_capacity(frame.bonds.len());
+    for bond in &frame.bonds {
+        let [Some(a), Some(b)] = bond.map(|index| frame.positions.get(index as usize).copied())
+        else {
+            continue;
+        };
+        let image = lattice.as_ref().and_then(|lattice| lattice.image(b - a));
+        let mut rod = |ends, particles| {
+            rods.push(Rod {
+                ends,
+                radii: [radius; 2],
+                particles,
+            });
+        };
+        match image {
+            None => rod([a, b], *bond),
+            Some(image) => {
+                let half = 0.5 * (b - a - image);
+                rod([a, a + half], [bond[0]; 2]);
+                rod([b, b - half], [bond[1]; 2]);
+            }
+        }
+    }
+    Some(rods)
 }
 
 /// How far apart particles with a bond are at most.
@@ -68,16 +114,20 @@ struct Reach {
 }
 
 impl Reach {
-    fn of(rule: &BondRule, frame: &SharedFrame<'_>, file: &str) -> Result<Self, LoadError> {
-        let (name, angstrom) = match rule {
-            BondRule::Distance(distance) => {
-                return Ok(Self {
-                    greatest: *distance,
-                    shares: Vec::new(),
-                });
-            }
-            BondRule::Covalent { name, angstrom } => (name, *angstrom),
-        };
+    /// The same distance for all particles.
+    const fn distance(greatest: f32) -> Self {
+        Self {
+            greatest,
+            shares: Vec::new(),
+        }
+    }
+
+    /// Covalent radii with a tolerance, by the atomic numbers in the attribute `name`; `angstrom` is the length of one.
+    fn covalent(
+        (name, angstrom): (&str, f64),
+        frame: &SharedFrame<'_>,
+        file: &str,
+    ) -> Result<Self, LoadError> {
         let elements = frame.attribute(name).ok_or_else(|| {
             let has = frame.attributes.iter().map(|a| a.name.as_str());
             missing(name, "covalent bonds", file, has)
@@ -121,7 +171,7 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(style: &BondStyle, reach: Reach, frame: &'a SharedFrame<'_>) -> Self {
+    fn new(radius: f32, reach: Reach, frame: &'a SharedFrame<'_>) -> Self {
         let positions = &frame.positions[..];
         // Bins need a size; a margin keeps particles at the greatest distance in neighbouring bins
         let size = (1.001 * reach.greatest).max(f32::MIN_POSITIVE);
@@ -131,7 +181,7 @@ impl<'a> Search<'a> {
             .copied()
             .fold(Vec3::NEG_INFINITY, Vec3::max);
         Self {
-            radius: style.radius,
+            radius,
             bins: FieldParticles::sorted(positions, size, true),
             images: frame.cell.as_ref().map(images_around).unwrap_or_default(),
             bounds: [min - reach.greatest, max + reach.greatest],
@@ -143,7 +193,7 @@ impl<'a> Search<'a> {
     /// All bonds, in the order of the particles; None if there are too many.
     fn bonds(&self) -> Option<Vec<Rod>> {
         let found = AtomicU64::new(0);
-        let most = MAX_BONDS_EACH.saturating_mul(self.positions.len() as u64);
+        let most = most_bonds(self.positions.len());
         let starts: Vec<usize> = (0..self.positions.len()).step_by(CHUNK).collect();
         let chunk = |start: &usize| {
             let mut rods = Vec::new();
@@ -223,7 +273,6 @@ mod tests {
     use spherule_formats::{Attribute, AttributeData, ParticleFrame};
 
     use super::*;
-    use crate::surface::MaterialId;
 
     /// `count` particles in a cell of edges 6, 5 and 4, by a linear congruential generator.
     fn frame(count: usize, periodic: [bool; 3]) -> SharedFrame<'static> {
@@ -248,20 +297,14 @@ mod tests {
             }],
             time: None,
             cell: SimulationCell::new(DVec3::ZERO, edges, periodic),
+            bonds: Vec::new(),
             dropped: 0,
             file_index: None,
         }
     }
 
-    fn bonds(frame: &SharedFrame<'_>, rule: BondRule) -> Option<Vec<Rod>> {
-        let reach = Reach::of(&rule, frame, "in").unwrap();
-        let style = BondStyle {
-            rule,
-            radius: 0.1,
-            color: None,
-            material: MaterialId::of_mesh(0).unwrap(),
-        };
-        Search::new(&style, reach, frame).bonds()
+    fn bonds(frame: &SharedFrame<'_>, reach: Reach) -> Option<Vec<Rod>> {
+        Search::new(0.1, reach, frame).bonds()
     }
 
     /// Pairs and halves, by brute force in f64; `length` is the greatest length of the bond of two particles.
@@ -305,7 +348,7 @@ mod tests {
     fn bonds_by_distance_are_those_of_brute_force() {
         for periodic in [[false; 3], [true, false, true], [true; 3]] {
             let frame = frame(300, periodic);
-            let rods = bonds(&frame, BondRule::Distance(0.8)).unwrap();
+            let rods = bonds(&frame, Reach::distance(0.8)).unwrap();
             let (pairs, halves) = expected(&frame, |_, _| Some(0.8));
             assert!(pairs.len() > 300, "{}", pairs.len());
             assert_eq!(halves.is_empty(), periodic == [false; 3]);
@@ -326,7 +369,7 @@ mod tests {
     fn halves_of_a_bond_over_the_boundary_meet_in_its_middle() {
         let mut frame = frame(2, [true, true, true]);
         frame.positions = vec![Vec3::new(0.25, 1.0, 3.75), Vec3::new(5.75, 1.0, 0.25)].into();
-        let rods = bonds(&frame, BondRule::Distance(0.8)).unwrap();
+        let rods = bonds(&frame, Reach::distance(0.8)).unwrap();
         let ends: Vec<[Vec3; 2]> = rods.iter().map(|rod| rod.ends).collect();
         let expected = [
             [Vec3::new(0.25, 1.0, 3.75), Vec3::new(0.0, 1.0, 4.0)],
@@ -339,8 +382,8 @@ mod tests {
     fn covalent_bonds_are_those_of_brute_force() {
         let frame = frame(300, [true; 3]);
         let angstrom = 0.5;
-        let name = "element".to_owned();
-        let rods = bonds(&frame, BondRule::Covalent { name, angstrom }).unwrap();
+        let reach = Reach::covalent(("element", angstrom), &frame, "in").unwrap();
+        let rods = bonds(&frame, reach).unwrap();
         let radius = |i: usize| [Some(0.31), Some(0.76), Some(0.66), None][i % 4];
         let length = |a: usize, b: usize| Some(angstrom * (radius(a)? + radius(b)? + 0.4));
         let (pairs, halves) = expected(&frame, length);
@@ -351,20 +394,48 @@ mod tests {
     #[test]
     fn too_many_bonds_are_refused() {
         let frame = frame(2000, [true; 3]);
-        assert!(bonds(&frame, BondRule::Distance(3.0)).is_none());
-        assert!(bonds(&frame, BondRule::Distance(0.2)).is_some());
+        assert!(bonds(&frame, Reach::distance(3.0)).is_none());
+        assert!(bonds(&frame, Reach::distance(0.2)).is_some());
         let empty = frame_at(&[]);
-        assert_eq!(bonds(&empty, BondRule::Distance(3.0)), Some(Vec::new()));
+        assert_eq!(bonds(&empty, Reach::distance(3.0)), Some(Vec::new()));
         // Particles in one place have no direction to draw a bond in
         let one_place = frame_at(&[Vec3::ONE; 3]);
-        let rods = bonds(&one_place, BondRule::Distance(3.0)).unwrap();
+        let rods = bonds(&one_place, Reach::distance(3.0)).unwrap();
         assert!(RodTree::new(rods, Caps::Flat).is_empty());
+    }
+
+    #[test]
+    fn listed_bonds_go_to_the_nearest_images() {
+        let positions = [[0.5, 1.0, 1.0], [5.0, 1.0, 1.0], [2.0, 1.0, 1.0]].map(Vec3::from_array);
+        let mut frame = SharedFrame {
+            bonds: vec![[0, 2], [1, 0]],
+            ..frame_at(&positions)
+        };
+        let whole = listed(0.1, &frame).unwrap();
+        let ends: Vec<[Vec3; 2]> = whole.iter().map(|rod| rod.ends).collect();
+        assert_eq!(
+            ends,
+            [[positions[0], positions[2]], [positions[1], positions[0]]]
+        );
+        assert_eq!(whole[1].particles, [1, 0]);
+        // The images of the cell of length 6 are nearer
+        frame.cell = self::frame(1, [true; 3]).cell;
+        let halves = listed(0.1, &frame).unwrap();
+        let ends: Vec<[f32; 2]> = halves.iter().map(|rod| rod.ends.map(|end| end.x)).collect();
+        assert_eq!(ends, [[0.5, 2.0], [5.0, 5.75], [0.5, -0.25]]);
+        assert_eq!(halves[2].particles, [0, 0]);
+        // Bonds of particles that do not exist are left out, and there are at most 8 per particle
+        frame.bonds = vec![[0, 7]];
+        assert_eq!(listed(0.1, &frame), Some(Vec::new()));
+        frame.bonds = vec![[0, 1]; 25];
+        assert_eq!(listed(0.1, &frame), None);
     }
 
     fn frame_at(positions: &[Vec3]) -> SharedFrame<'static> {
         SharedFrame {
             positions: positions.to_vec().into(),
             cell: None,
+            bonds: Vec::new(),
             ..frame(positions.len(), [false; 3])
         }
     }

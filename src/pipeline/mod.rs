@@ -15,6 +15,7 @@ mod encode;
 mod error;
 mod facts;
 mod in_place;
+mod lattice;
 mod load;
 mod load_error;
 mod mattes;

@@ -168,6 +168,8 @@ pub enum BondRule {
         /// Length of an angstrom, scene units.
         angstrom: f64,
     },
+    /// Those that the file lists.
+    File,
 }
 
 /// How bonds between particles are drawn.

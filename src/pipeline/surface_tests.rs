@@ -179,6 +179,7 @@ fn compact_frames_in_place_have_every_surface() {
         attributes: Vec::new(),
         time: None,
         cell: None,
+        bonds: Vec::new(),
         dropped: 0,
         file_index: None,
     };

@@ -2,13 +2,14 @@
 
 use std::borrow::Cow;
 
-use glam::{DMat3, DVec3, Vec3};
+use glam::Vec3;
 use spherule_formats::order::index_u32;
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{ParticleFrame, SimulationCell};
 
 use super::arrows::every_nth;
 use super::decoded::{colors_by, ids};
+use super::lattice::Lattice;
 use super::load_error::{LoadError, first_file, missing};
 use super::motion::Places;
 use super::rods::FrameRods;
@@ -136,7 +137,7 @@ impl<'a> Trails<'a> {
         cell: Option<&SimulationCell>,
         find: impl Fn(usize) -> Option<Vec3>,
     ) {
-        let jumps = cell.map(Jumps::new);
+        let lattice = cell.map(Lattice::new);
         for ((trail, owner), end) in (0..).zip(&self.owners).zip(&mut self.ends) {
             let Some((newer, newer_age)) = *end else {
                 continue;
@@ -144,10 +145,10 @@ impl<'a> Trails<'a> {
             let older = find(*owner);
             *end = older.map(|point| (point, age));
             let Some(older) = older else { continue };
-            if jumps
+            let image = lattice
                 .as_ref()
-                .is_some_and(|jumps| jumps.cross(older, newer))
-            {
+                .and_then(|lattice| lattice.image(newer - older));
+            if image.is_some() {
                 continue;
             }
             self.rods.push(Rod {
@@ -156,70 +157,5 @@ impl<'a> Trails<'a> {
                 particles: [trail; 2],
             });
         }
-    }
-}
-
-/// Finds jumps over the boundaries of a periodic cell.
-struct Jumps {
-    /// The product with a way is its length along each edge, in edges; 0 along edges that do not repeat.
-    fractions: [DVec3; 3],
-}
-
-impl Jumps {
-    fn new(cell: &SimulationCell) -> Self {
-        let [a, b, c] = cell.vectors;
-        let matrix = DMat3::from_cols(a, b, c);
-        let inverse = match matrix.determinant() {
-            0.0 => DMat3::from_cols(a, b, c).transpose(),
-            _ => matrix.inverse(),
-        };
-        let of_edge = |edge: usize| {
-            let row = inverse.row(edge);
-            // In a flat cell, edges are assumed to be perpendicular
-            let scale = match row.dot(cell.vectors[edge]) {
-                0.0 => 0.0,
-                length => length.recip(),
-            };
-            if cell.periodic[edge] {
-                scale * row
-            } else {
-                DVec3::ZERO
-            }
-        };
-        Self {
-            fractions: [0, 1, 2].map(of_edge),
-        }
-    }
-
-    /// Whether the way between two points is longer than half of an edge that repeats.
-    fn cross(&self, from: Vec3, to: Vec3) -> bool {
-        let way = to.as_dvec3() - from.as_dvec3();
-        self.fractions.iter().any(|edge| way.dot(*edge).abs() > 0.5)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn jumps_are_ways_of_more_than_half_an_edge() {
-        let cell = |vectors: [[f64; 3]; 3], periodic| {
-            SimulationCell::new(DVec3::ZERO, vectors.map(DVec3::from_array), periodic).unwrap()
-        };
-        let crosses = |cell: &SimulationCell, way: [f32; 3]| {
-            let from = Vec3::new(1.0, 2.0, 3.0);
-            Jumps::new(cell).cross(from, from + Vec3::from_array(way))
-        };
-        let tilted = [[10.0, 0.0, 0.0], [4.0, 8.0, 0.0], [0.0, 0.0, 6.0]];
-        let all = cell(tilted, [true; 3]);
-        assert!(!crosses(&all, [4.9, 0.0, 0.0]) && crosses(&all, [-5.1, 0.0, 0.0]));
-        // Along the tilted edge, by 0.45 and 0.55 of it
-        assert!(!crosses(&all, [1.8, 3.6, 0.0]) && crosses(&all, [2.2, 4.4, 0.0]));
-        assert!(!crosses(&all, [0.0, 0.0, 2.9]) && crosses(&all, [0.0, 0.0, -3.1]));
-        let some = cell(tilted, [false, true, true]);
-        assert!(!crosses(&some, [9.0, 0.0, 0.0]));
-        let flat = cell([[10.0, 0.0, 0.0], [0.0, 8.0, 0.0], [0.0; 3]], [true; 3]);
-        assert!(!crosses(&flat, [4.9, 3.9, 100.0]) && crosses(&flat, [0.0, 4.1, 0.0]));
     }
 }

@@ -26,6 +26,7 @@ pub(super) fn bonds(
     let own = &manifest.bonds;
     let rule = match own.find {
         BondSearch::None => return Ok(None),
+        BondSearch::File => BondRule::File,
         BondSearch::Distance(distance) => BondRule::Distance(narrow(distance)),
         BondSearch::Covalent => {
             require_attribute(survey, "bonds.find", ELEMENT)?;

@@ -63,6 +63,7 @@ fn frame_of(particles: Particles, request: &CellRequest) -> ParticleFrame {
         origin: request.stage.origin,
         time: None,
         cell: None,
+        bonds: Vec::new(),
         dropped: 0,
         file_index: None,
     }

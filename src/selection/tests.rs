@@ -53,6 +53,7 @@ fn particles() -> RawParticles {
         time: Some(2.5),
         step: None,
         cell: None,
+        bonds: Vec::new(),
     }
 }
 
@@ -333,6 +334,7 @@ fn nothing_else_is_selected_by_default() {
         time: None,
         step: None,
         cell: None,
+        bonds: Vec::new(),
     };
     assert_eq!(Selection::default().survivors(&all), Ok(vec![0, 1, 2]));
     assert_eq!(by("x < 0 || x >= 0").survivors(&all), Ok(Vec::new()));

@@ -125,6 +125,7 @@ mod tests {
             time: None,
             step: None,
             cell: None,
+            bonds: Vec::new(),
         };
         let directory = tempfile::tempdir().expect("a directory");
         let path = directory.path().join("f_1.spf");

@@ -95,6 +95,7 @@ pub(super) fn sample(
         time: source.time(),
         step: source.step(),
         cell: None,
+        bonds: Vec::new(),
     })
 }
 
@@ -252,6 +253,7 @@ mod tests {
             time: None,
             step: None,
             cell: None,
+            bonds: Vec::new(),
         };
         let source = RawSource::new(Path::new("nan"), &raw).expect("whole");
         assert_eq!(extremes(&source).expect("there"), None);

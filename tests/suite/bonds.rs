@@ -4,7 +4,7 @@ use std::fs;
 
 use spherule::render::NO_ID;
 
-use crate::harness::Workshop;
+use crate::harness::{Workshop, sample};
 use crate::picture::Picture;
 
 /// Oxygen in the middle, hydrogen to its right, and hydrogen to its left that is too far away for a covalent bond.
@@ -169,5 +169,41 @@ fn impossible_bonds_are_refused() {
     ran.expect(1)
         .prints("bonds.find gives more than 8 bonds for each of 100 particles");
     let ran = run("many.csv", &["--bonds=0.5", "--force"]);
-    ran.expect(0).prints("bonds.find gives no bonds");
+    ran.expect(0)
+        .prints("no bonds: no particles are so near each other");
+}
+
+#[test]
+fn bonds_of_a_file_are_drawn() {
+    let workshop = workshop();
+    fs::write(
+        workshop.join("in.psf"),
+        "PSF\n\n 3 !NATOM\n 1 S 1 M O O 0 16 0\n 2 S 1 M H H 0 1 0\n 3 S 1 M H H 0 1 0\n\n 1 !NBOND\n 3 1\n",
+    )
+    .expect("a file");
+    let found = picture(&workshop, "in.xyz", &["--bonds=file", "--topology=in.psf"]);
+    assert!(bond(&found, -0.7).is_some() && bond(&found, 0.5).is_none());
+    let ran = workshop.run(&[
+        "render",
+        "in.xyz",
+        "-o",
+        "o.exr",
+        "--radius=0.2",
+        "--bonds=file",
+    ]);
+    ran.expect(0).prints("no bonds: the file lists none");
+    // A chain of 40 beads
+    let polymer = sample("gsd/polymer.gsd");
+    let command = ["still", polymer.to_str().expect("a path"), "-o", "out.exr"];
+    let with = |bonds: &str| {
+        let options = [bonds, "--radius=0.02", "--set", "bonds.radius=0.1"];
+        workshop
+            .run(&[&command[..], &VIEW[..5], &options].concat())
+            .expect(0);
+        Picture::open(&workshop.join("out.exr"))
+            .floats("A")
+            .iter()
+            .sum::<f32>()
+    };
+    assert!(with("--bonds=file") > 2.0 * with("--bonds=none"));
 }

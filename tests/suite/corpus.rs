@@ -178,6 +178,7 @@ fn frame(encoding: Encoding) -> Vec<u8> {
         attributes: Vec::new(),
         time: None,
         cell: None,
+        bonds: Vec::new(),
         dropped: 0,
         file_index: None,
     };

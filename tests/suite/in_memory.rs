@@ -63,6 +63,7 @@ fn the_bytes_are_those_of_a_file() {
         time: raw.time,
         step: None,
         cell: None,
+        bonds: Vec::new(),
     };
     let image = render(&settings, particles, &AtomicBool::new(false)).expect("a picture");
     assert!(image.to_exr().expect("bytes") == expected, "bytes differ");
@@ -89,6 +90,7 @@ fn positions_are_copied_only_if_they_change() {
         time: Some(2.0),
         step: None,
         cell: None,
+        bonds: Vec::new(),
     };
     let near = [Vec3::X, Vec3::Y, Vec3::Z];
     let with_nan = [Vec3::X, Vec3::NAN, Vec3::Z];

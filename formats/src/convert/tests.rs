@@ -58,6 +58,7 @@ fn raw(positions: Vec<Vec3>) -> RawParticles {
         time: Some(0.5),
         step: Some(9),
         cell: None,
+        bonds: Vec::new(),
     }
 }
 

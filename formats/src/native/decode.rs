@@ -28,6 +28,7 @@ impl NativeFrame<'_> {
             time: self.index().time,
             step: self.index().step,
             cell: None,
+            bonds: Vec::new(),
         })
     }
 
@@ -72,6 +73,7 @@ impl NativeFrame<'_> {
             time: self.index().time,
             step: self.index().step,
             cell: None,
+            bonds: Vec::new(),
         })
     }
 

@@ -36,6 +36,7 @@ fn frame(count: u8, origin: DVec3) -> ParticleFrame {
         radius: None,
         time: Some(0.25),
         cell: None,
+        bonds: Vec::new(),
         dropped: 3,
         file_index: None,
     }
@@ -319,6 +320,7 @@ fn stored_within(
         radius,
         time: None,
         cell: None,
+        bonds: Vec::new(),
         dropped: 0,
         file_index: None,
     };

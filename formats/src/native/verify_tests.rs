@@ -37,6 +37,7 @@ fn stored(encoding: Encoding, own_radii: bool) -> Vec<u8> {
         radius: Some(radius),
         time: None,
         cell: None,
+        bonds: Vec::new(),
         dropped: 0,
         file_index: None,
     };

@@ -197,6 +197,7 @@ impl ParticleLayout {
             time: self.time,
             step: self.step,
             cell: None,
+            bonds: Vec::new(),
         }
     }
 }

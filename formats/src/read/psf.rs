@@ -1,14 +1,17 @@
 //! PSF files of CHARMM and X-PLOR: the properties of the atoms of a simulation, without positions.
 //!
 //! Text. The first line begins with `PSF`. Behind a count and `!NATOM` is a line for each atom: number, segment,
-//! residue, name of the residue, name, type, charge, mass. Nothing else of it is read. After the manual of CHARMM.
+//! residue, name of the residue, name, type, charge, mass. Behind a count and `!NBOND` are the numbers of the atoms of
+//! each bond, from 1. Nothing else of it is read. After the manual of CHARMM.
 
 use super::atoms::{self, ELEMENT, RESIDUE};
-use super::text::{self, Lines};
-use crate::{Attribute, AttributeData, MemoryBudget, ParseError};
+use super::text::{self, Line, Lines};
+use crate::{Attribute, AttributeData, Bond, MemoryBudget, ParseError};
 
 /// What follows the count in the heading of the atoms.
 const ATOMS: &[u8] = b"!NATOM";
+/// The same of the bonds, which may have words after it: `!NBOND: bonds`.
+const BONDS: &[u8] = b"!NBOND";
 
 /// Whether a file that begins with `head` is a PSF file.
 pub(crate) fn is_psf(head: &[u8]) -> bool {
@@ -16,14 +19,14 @@ pub(crate) fn is_psf(head: &[u8]) -> bool {
         .is_some_and(|rest| rest.first().is_none_or(u8::is_ascii_whitespace))
 }
 
-/// Reads the number of atoms and their properties.
+/// Reads the number of atoms, their properties, and their bonds.
 ///
 /// # Errors
 /// [`ParseError`] if the file is damaged, or its atoms need more memory than `budget` allows.
 pub(crate) fn read(
     bytes: &[u8],
     budget: MemoryBudget,
-) -> Result<(usize, Vec<Attribute>), ParseError> {
+) -> Result<(usize, Vec<Attribute>, Vec<Bond>), ParseError> {
     let mut lines = Lines::new(bytes, 0..bytes.len());
     let heading = lines.find(|line| text::words(line.text).nth(1).is_some_and(|w| w == ATOMS));
     let Some(heading) = heading else {
@@ -76,7 +79,55 @@ pub(crate) fn read(
         attribute("charge", AttributeData::F64(charges)),
         attribute("mass", AttributeData::F64(masses)),
     ];
-    Ok((count, attributes))
+    Ok((count, attributes, bonds(&mut lines, count, budget)?))
+}
+
+/// Reads the bonds of `atoms` atoms from the `lines` behind these; there need not be any.
+fn bonds(
+    lines: &mut Lines<'_>,
+    atoms: usize,
+    budget: MemoryBudget,
+) -> Result<Vec<Bond>, ParseError> {
+    let is_heading = |line: &Line<'_>| {
+        let word = text::words(line.text).nth(1);
+        word.is_some_and(|word| word.starts_with(BONDS))
+    };
+    let Some(heading) = lines.find(is_heading) else {
+        return Ok(Vec::new());
+    };
+    let count = text::words(heading.text).next().and_then(text::integer);
+    let Some(count) = count.and_then(|count| usize::try_from(count).ok()) else {
+        let what = format!("{} is not a number of bonds", text::shown(heading.text));
+        return Err(ParseError::malformed(heading.at, what));
+    };
+    let mut bonds = Vec::new();
+    let mut first = None;
+    let mut at = heading.at;
+    while bonds.len() < count {
+        let Some(line) = lines.next() else {
+            let what = format!("{count} bonds expected, the file has {}", bonds.len());
+            return Err(ParseError::malformed(at, what));
+        };
+        at = line.at;
+        budget.check(8 * (bonds.len() as u64 + 8), "its bonds in memory are")?;
+        for word in text::words(line.text) {
+            let number = text::integer(word).and_then(|n| u32::try_from(n).ok());
+            let atom = number.filter(|n| (1..=atoms).contains(&(*n as usize)));
+            let Some(atom) = atom.map(|number| number - 1) else {
+                let what = format!(
+                    "{} in a bond is not the number of an atom, 1 to {atoms}",
+                    text::shown(word)
+                );
+                return Err(ParseError::malformed(line.at, what));
+            };
+            match first.take() {
+                None => first = Some(atom),
+                Some(_) if bonds.len() == count => break,
+                Some(first) => bonds.push([first, atom]),
+            }
+        }
+    }
+    Ok(bonds)
 }
 
 fn code(number: i64) -> i32 {
@@ -88,7 +139,8 @@ mod tests {
     use super::*;
 
     const TEXT: &str = "PSF EXT\n\n 1 !NTITLE\n* made by hand\n\n 2 !NATOM\n \
-        1 SYS 7 SOL OW OT -0.834 15.9994 0\n 2 SYS 7 SOL HW1 HT 0.417 1.008 0\n\n 1 !NBOND\n";
+        1 SYS 7 SOL OW OT -0.834 15.9994 0\n 2 SYS 7 SOL HW1 HT 0.417 1.008 0\n\n 2 !NBOND: bonds\n \
+        1 2 2\n 1\n";
 
     fn fails(from: &str, to: &str, words: &str) {
         let text = TEXT.replace(from, to);
@@ -99,8 +151,14 @@ mod tests {
     #[test]
     fn atoms_have_elements_charges_and_masses() {
         assert!(is_psf(TEXT.as_bytes()) && !is_psf(b"PSFX"));
-        let (count, attributes) = read(TEXT.as_bytes(), MemoryBudget::UNLIMITED).unwrap();
+        let (count, attributes, bonds) = read(TEXT.as_bytes(), MemoryBudget::UNLIMITED).unwrap();
         assert_eq!(count, 2);
+        assert_eq!(bonds, [[0, 1], [1, 0]]);
+        let without = TEXT.split_once(" 2 !NBOND").unwrap().0;
+        assert_eq!(
+            read(without.as_bytes(), MemoryBudget::UNLIMITED).unwrap().2,
+            Vec::<Bond>::new()
+        );
         let data = |i: usize| &attributes[i].data;
         assert_eq!(data(0), &AttributeData::I32(vec![8, 1]));
         assert_eq!(data(1), &AttributeData::I32(vec![7, 7]));
@@ -115,6 +173,15 @@ mod tests {
         fails("2 !NATOM", "2000000000 !NATOM", "line 3");
         fails("!NATOM", "!ATOM", "without a line");
         fails("15.9994", "heavy", "line 1 of them");
+        fails("2 !NBOND", "x !NBOND", "not a number of bonds");
+        fails("2 !NBOND", "3 !NBOND", "3 bonds expected, the file has 2");
+        fails(
+            "1 2 2",
+            "1 2 3",
+            "3 in a bond is not the number of an atom, 1 to 2",
+        );
+        fails("1 2 2", "1 two 2", "two in a bond");
+        fails("1 2 2", "0 2 2", "0 in a bond");
         let tight = MemoryBudget::new(10, "take care");
         assert!(read(TEXT.as_bytes(), tight).is_err());
     }

@@ -6,7 +6,8 @@ use glam::DVec3;
 
 use crate::attribute::with_values;
 use crate::message::one_line;
-use crate::{Attribute, AttributeData, Positions, RawParticles, ScalarType};
+use crate::order::index_u32;
+use crate::{Attribute, AttributeData, Bond, Positions, RawParticles, ScalarType};
 
 /// Name of the attribute that distinguishes the parts: an index into the sequence's part names.
 pub const PART_ATTRIBUTE: &str = "part";
@@ -29,6 +30,7 @@ pub fn merge(parts: Vec<(u32, RawParticles)>, notes: &mut Vec<String>) -> RawPar
     let time = particles.iter().find_map(|p| p.time);
     let step = particles.iter().find_map(|p| p.step);
     let cell = particles.iter().find_map(|p| p.cell);
+    let bonds = merge_bonds(&particles);
     let mut attributes = merge_attributes(&mut particles, notes);
     let has_own = attributes.iter().any(|a| a.name == PART_ATTRIBUTE);
     if !(is_one && has_own) {
@@ -45,7 +47,24 @@ pub fn merge(parts: Vec<(u32, RawParticles)>, notes: &mut Vec<String>) -> RawPar
         time,
         step,
         cell,
+        bonds,
     }
+}
+
+/// The bonds of all parts, by the indices that their particles have behind one another.
+fn merge_bonds(parts: &[RawParticles]) -> Vec<Bond> {
+    let mut bonds = Vec::new();
+    let mut first = 0_usize;
+    for part in parts {
+        let start = index_u32(first);
+        let moved = part
+            .bonds
+            .iter()
+            .map(|bond| bond.map(|i| i.saturating_add(start)));
+        bonds.extend(moved);
+        first += part.positions.len();
+    }
+    bonds
 }
 
 fn merge_positions(parts: Vec<Positions>) -> Positions {
@@ -190,6 +209,7 @@ mod tests {
             time: None,
             step: None,
             cell: None,
+            bonds: Vec::new(),
         }
     }
 

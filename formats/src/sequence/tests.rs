@@ -204,6 +204,7 @@ fn write_frame(path: &Path, positions: Vec<Vec3>, step: i64) {
         time: None,
         step: None,
         cell: None,
+        bonds: Vec::new(),
     };
     let frame = ParticleFrame::from_raw(raw, DVec3::ZERO);
     native::write(path, &frame, Some(step)).expect("writable");

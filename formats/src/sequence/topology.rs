@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::open::{FrameFile, read_whole};
 use crate::read::psf;
-use crate::{Attribute, FrameError, MemoryBudget, ParseError, RawParticles};
+use crate::{Attribute, Bond, FrameError, MemoryBudget, ParseError, RawParticles};
 
 /// Properties of a topology that change with time.
 const CHANGING: [&str; 2] = ["velocity", "force"];
@@ -16,27 +16,30 @@ pub(super) struct Topology {
     /// Atoms.
     count: usize,
     attributes: Vec<Attribute>,
+    bonds: Vec<Bond>,
 }
 
 impl Topology {
     /// Reads the first step of the file at `path`.
     pub(super) fn open(path: &Path, budget: MemoryBudget) -> Result<Self, FrameError> {
-        let (count, mut attributes) = if psf::is_psf(&crate::open::head(path)?) {
+        let (count, mut attributes, bonds) = if psf::is_psf(&crate::open::head(path)?) {
             let bytes = read_whole(path, budget.for_content())?;
             psf::read(&bytes, budget).map_err(|e| e.in_file(path))?
         } else {
             let particles = FrameFile::open_within(path, budget)?.read(0)?;
-            (particles.positions.len(), particles.attributes)
+            let count = particles.positions.len();
+            (count, particles.attributes, particles.bonds)
         };
         attributes.retain(|attribute| !CHANGING.contains(&attribute.name.as_str()));
         Ok(Self {
             path: path.to_owned(),
             count,
             attributes,
+            bonds,
         })
     }
 
-    /// Adds the properties that `particles` of the file at `path` do not have.
+    /// Adds the properties and the bonds that `particles` of the file at `path` do not have.
     pub(super) fn add_to(
         &self,
         particles: &mut RawParticles,
@@ -59,6 +62,9 @@ impl Topology {
             if !is_known {
                 particles.attributes.push(attribute.clone());
             }
+        }
+        if particles.bonds.is_empty() {
+            particles.bonds.clone_from(&self.bonds);
         }
         Ok(())
     }

@@ -142,6 +142,7 @@ fn frame(radius: Option<Radius>, origin: DVec3) -> ParticleFrame {
         radius,
         time: Some(0.25),
         cell: None,
+        bonds: Vec::new(),
         dropped: 3,
         file_index: None,
     }

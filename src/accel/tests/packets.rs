@@ -168,7 +168,7 @@ fn check_shapes(scene: &Scene, tree: &mut WideTree) -> usize {
         tree.set_simd(level);
         for shape in SHAPES {
             let mut random = Random(17);
-            for _ in 0..25 {
+            for _ in 0..12 {
                 let packet = packet(scene, shape, &mut random);
                 let what = format!("{} {level:?} {shape:?}", scene.name);
                 hits += check_packet(&tree.view(), &packet, &what);

@@ -84,6 +84,7 @@ fn spf(path: &Path, count: usize) {
         attributes: Vec::new(),
         time: None,
         cell: None,
+        bonds: Vec::new(),
         step: None,
     };
     native::write(path, &ParticleFrame::from_raw(raw, DVec3::ZERO), None).expect("a file");

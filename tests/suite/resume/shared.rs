@@ -92,7 +92,7 @@ fn frames_of_an_unresponsive_worker_are_taken_over() {
     fs::hard_link(work.join("far-7-00.worker"), work.join("frame.2.0")).expect("a link");
     fs::write(workshop.join("out/.f.0002.exr.far-7-00.3.part"), "half").expect("a file");
     let ran = workshop
-        .run(&arguments(&["--takeover-after", "1"]))
+        .run(&arguments(&["--takeover-after", "6"]))
         .expect(0)
         .prints("waiting for frame 2: process 7 on far is working on it");
     assert_eq!(ran.rendered().last(), Some(&2));

@@ -119,6 +119,7 @@ pub(super) fn read(
         time: layout.time,
         step: None,
         cell: None,
+        bonds: Vec::new(),
     })
 }
 

@@ -83,6 +83,7 @@ impl Reader for Dcd {
         budget.check(need, "its numbers in memory are")?;
         let particles = RawParticles {
             cell: header.cell(bytes, at),
+            bonds: Vec::new(),
             ..layout.particles(bytes)?
         };
         if index == 0 || header.free.is_none() {

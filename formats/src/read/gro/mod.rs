@@ -156,6 +156,7 @@ fn read(
         time,
         step: number,
         cell,
+        bonds: Vec::new(),
     })
 }
 

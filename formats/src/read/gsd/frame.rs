@@ -11,7 +11,7 @@ use super::file::{GsdFile, IndexEntry};
 use crate::read::Step;
 use crate::read::columns::{ComponentStride, ParticleLayout, StridedColumn};
 use crate::{
-    Attribute, AttributeData, Endian, MemoryBudget, ParseError, RawParticles, ScalarType,
+    Attribute, AttributeData, Bond, Endian, MemoryBudget, ParseError, RawParticles, ScalarType,
     SimulationCell,
 };
 
@@ -22,6 +22,8 @@ const COUNT: &str = "particles/N";
 /// Name of the chunk with the cell.
 pub(super) const BOX: &str = "configuration/box";
 const POSITION: &str = "particles/position";
+/// Name of the chunk with the particles of each bond.
+const BONDS: &str = "bonds/group";
 /// What the names of chunks of the schema's particles begin with.
 pub(super) const PARTICLES: &str = "particles/";
 /// What the names of logged values of particles begin with.
@@ -229,12 +231,15 @@ impl<'f, 'a> FrameChunks<'f, 'a> {
     pub(super) fn particles(self, budget: MemoryBudget) -> Result<RawParticles, ParseError> {
         let (layout, missing) = self.layout()?;
         let defaults = missing.iter().map(|field| field.defaults_len(self.count));
-        let need = defaults.fold(layout.byte_len(), u64::saturating_add);
+        let bonds = self.bonds()?;
+        let bonds_len = size_of_val(&bonds[..]) as u64;
+        let need = defaults.fold(layout.byte_len() + bonds_len, u64::saturating_add);
         budget.check(need, "its numbers in memory are")?;
         let mut particles = layout.particles(self.file.bytes)?;
         let defaults = missing.iter().map(|field| field.defaults(self.count));
         particles.attributes.extend(defaults);
         particles.cell = self.cell();
+        particles.bonds = bonds;
         particles.step = self.step.and_then(|step| i64::try_from(step).ok());
         Ok(particles)
     }
@@ -259,6 +264,42 @@ impl<'f, 'a> FrameChunks<'f, 'a> {
         ];
         let center = 0.5 * vectors.into_iter().sum::<DVec3>();
         SimulationCell::new(-center, vectors, [true; 3])
+    }
+
+    /// The bonds, which have no more bytes than the file.
+    ///
+    /// # Errors
+    /// [`ParseError::Malformed`] if they are no pairs of particles.
+    fn bonds(&self) -> Result<Vec<Bond>, ParseError> {
+        let Some(entry) = self
+            .chunk(self.file.name(BONDS))
+            .filter(|entry| entry.rows > 0)
+        else {
+            return Ok(Vec::new());
+        };
+        let malformed = |what: String| {
+            let what = format!("frame {}: {BONDS} {what}", self.frame);
+            ParseError::malformed(entry.at, what)
+        };
+        // The schema has unsigned integers, the writer in Python others
+        let is_index = matches!(entry.scalar(), Some(ScalarType::U32 | ScalarType::I32));
+        if !is_index || entry.columns != 2 {
+            return Err(malformed("has no pairs of unsigned integers".to_owned()));
+        }
+        let (numbers, _) = self.file.numbers(&entry)?.as_chunks();
+        let bond = |pair: &[[u8; 4]; 2]| pair.map(u32::from_le_bytes);
+        let bonds: Vec<Bond> = numbers.as_chunks().0.iter().map(bond).collect();
+        let wrong = bonds
+            .iter()
+            .flatten()
+            .find(|index| **index as usize >= self.count);
+        match wrong {
+            None => Ok(bonds),
+            Some(index) => Err(malformed(format!(
+                "has a bond of particle {index}, but there are {} particles",
+                self.count
+            ))),
+        }
     }
 
     /// Where the particles are in the file, if all their values are.

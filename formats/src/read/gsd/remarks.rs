@@ -109,6 +109,7 @@ fn ignored(file: &GsdFile<'_>) -> Option<String> {
         ]
         .contains(&&*name)
             || name.starts_with(LOGGED)
+            || name.starts_with("bonds/")
             || FIELDS
                 .iter()
                 .any(|f| name.strip_prefix(PARTICLES) == Some(f.name));

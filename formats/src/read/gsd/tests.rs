@@ -337,6 +337,29 @@ fn the_cell_is_around_the_origin() {
 }
 
 #[test]
+fn bonds_are_those_of_frame_0_unless_a_frame_has_its_own() {
+    let bytes = sample("gsd/polymer.gsd");
+    let chain: Vec<[u32; 2]> = (0..39).map(|i| [i, i + 1]).collect();
+    for step in steps(&bytes).unwrap() {
+        assert_eq!(read(&bytes, &step).unwrap().bonds, chain);
+    }
+    let bonds = |kind, shape, of: &[u32]| {
+        let bytes = of.iter().flat_map(|n| n.to_le_bytes()).collect();
+        let bonds = Chunk(0, "bonds/group", kind, shape, bytes);
+        file(&[count(0, 2), positions(0, 2), bonds])
+    };
+    assert_eq!(READER.one(&bonds(U32, (1, 2), &[1, 0])).bonds, [[1, 0]]);
+    fails(
+        &bonds(U32, (1, 2), &[0, 2]),
+        "frame 0: bonds/group has a bond of particle 2, but there are 2 particles",
+    );
+    fails(&bonds(I32, (1, 2), &[0, u32::MAX]), "particle 4294967295");
+    for bytes in [bonds(F32, (1, 2), &[0, 1]), bonds(U32, (2, 1), &[0, 1])] {
+        fails(&bytes, "bonds/group has no pairs of unsigned integers");
+    }
+}
+
+#[test]
 fn remarks_report_what_is_not_in_the_particles() {
     let remarks = Gsd.remarks(&sample("gsd/polymer.gsd"));
     assert_eq!(
@@ -346,7 +369,7 @@ fn remarks_report_what_is_not_in_the_particles() {
             "attribute `typeid` has numbers for types: 0 = \"A\", 1 = \"solvent\"",
             "the cell of the first frame is 12 x 10 x 8, its tilt factors are 0.25, 0, -0.5",
             "the file has a simulation cell; --cell draws it. Particles are drawn where the file has them",
-            "not used: \"orientation\", \"bonds\", \"log\"",
+            "not used: \"orientation\", \"log\"",
         ]
     );
     let flat = Gsd.remarks(&sample("gsd/varying.gsd"));

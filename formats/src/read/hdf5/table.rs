@@ -207,6 +207,7 @@ impl ParticleTable {
             time: self.time,
             step: self.step,
             cell: None,
+            bonds: Vec::new(),
         })
     }
 

@@ -210,6 +210,7 @@ fn read(
         cell: header
             .bounds
             .and_then(|bounds| bounds.cell(header.periodic)),
+        bonds: Vec::new(),
     })
 }
 

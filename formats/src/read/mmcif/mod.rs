@@ -111,6 +111,7 @@ impl Reader for MmCif {
             time: None,
             step: step.number,
             cell: rows.cell(),
+            bonds: Vec::new(),
         })
     }
 

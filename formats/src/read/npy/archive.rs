@@ -213,6 +213,7 @@ impl<'a> Archive<'a> {
             time: None,
             step: None,
             cell: None,
+            bonds: Vec::new(),
         })
     }
 

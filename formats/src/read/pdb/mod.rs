@@ -198,5 +198,6 @@ fn read(
         time: None,
         step: step.number,
         cell,
+        bonds: Vec::new(),
     })
 }

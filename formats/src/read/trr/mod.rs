@@ -58,6 +58,7 @@ impl Reader for Trr {
         budget.check(layout.byte_len(), "its numbers in memory are")?;
         Ok(RawParticles {
             cell: frame.cell(bytes),
+            bonds: Vec::new(),
             ..layout.particles(bytes)?
         })
     }

@@ -113,6 +113,7 @@ impl Reader for LegacyVtk {
             time,
             step: None,
             cell: None,
+            bonds: Vec::new(),
         })
     }
 

@@ -90,6 +90,7 @@ impl Reader for XmlVtk {
                     time: time(&document, appended),
                     step: None,
                     cell: None,
+                    bonds: Vec::new(),
                 })
             },
         )

@@ -96,6 +96,7 @@ impl Reader for Xtc {
             time: Some(frame.summary.time),
             step: Some(frame.summary.number.into()),
             cell: frame.cell,
+            bonds: Vec::new(),
         })
     }
 

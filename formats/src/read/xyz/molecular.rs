@@ -102,6 +102,7 @@ pub(super) fn read(
         time,
         step: number,
         cell,
+        bonds: Vec::new(),
     })
 }
 

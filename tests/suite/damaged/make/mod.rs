@@ -316,6 +316,7 @@ fn spf_bytes(points: &[[f32; 3]]) -> Vec<u8> {
         attributes: Vec::new(),
         time: None,
         cell: None,
+        bonds: Vec::new(),
         dropped: 0,
         file_index: None,
     };
