@@ -86,9 +86,9 @@ fn covalent_bonds_have_halves_in_the_colours_of_their_atoms() {
     near(bond(&found, 0.3), RED);
     near(bond(&found, 0.7), WHITE);
     assert_eq!(bond(&found, -0.7), None);
-    // A third of the radius of the particles thick
+    // A third of the radius of the particles thick; the pixel is half a pixel beside the axis
     let depth = found.floats("Z")[pixel(0.5)];
-    assert!((depth - (4.0 - 0.2 / 3.0)).abs() < 2e-3, "{depth}");
+    assert!((depth - (4.0 - 0.2 / 3.0)).abs() < 6e-3, "{depth}");
 }
 
 #[test]
@@ -104,7 +104,7 @@ fn bonds_by_distance_have_a_radius_and_a_colour() {
         near(bond(&found, x), [0.1, 0.2, 0.3]);
     }
     let depth = found.floats("Z")[pixel(0.5)];
-    assert!((depth - 3.95).abs() < 2e-3, "{depth}");
+    assert!((depth - 3.95).abs() < 6e-3, "{depth}");
     // Particles that are left out have none
     let options = ["--bonds=1.5", "--where", "x < 0.5"];
     let found = picture(&workshop, "in.xyz", &options);
@@ -198,7 +198,7 @@ fn bonds_of_a_file_are_drawn() {
     let with = |bonds: &str| {
         let options = [bonds, "--radius=0.02", "--set", "bonds.radius=0.1"];
         workshop
-            .run(&[&command[..], &VIEW[..5], &options].concat())
+            .run(&[&command[..], &VIEW[..3], &options].concat())
             .expect(0);
         Picture::open(&workshop.join("out.exr"))
             .floats("A")
