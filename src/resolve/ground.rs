@@ -16,7 +16,8 @@ use crate::surface::SurfaceKind;
 /// through the particles, and none is only a few pixels wide.
 const TILE: f64 = 1.0 / 8.0;
 
-/// Greatest depth of spheres in a shadow catcher as a fraction of the diagonal of the bounds.
+/// Greatest depth of spheres in a shadow catcher as a fraction of the diagonal of the bounds. Spheres with a greater
+/// radius are less deep, in proportion.
 const SUNK: f64 = 1.0 / 100.0;
 
 /// Where the ground is.
@@ -74,7 +75,7 @@ pub(super) fn ground(
         // a thin layer of air, which reflects all light at grazing angles. Spheres that only touched a shadow catcher
         // would seem to float, but large ones would seem to be cut off.
         let most = match manifest.surface.kind {
-            SurfaceKind::Spheres => SUNK * bounds.diagonal(),
+            SurfaceKind::Spheres => (SUNK * bounds.diagonal()).powi(2) / floor.reach,
             _ => f64::INFINITY,
         };
         ground.raise(narrow(floor.reach.min(most)));
@@ -184,7 +185,7 @@ mod tests {
         // fades from 2 to 8 diagonals, which are 6 long
         let catcher = of(GroundKind::ShadowCatcher, |m| m.render.ground_shadow = 0.5);
         let catcher = catcher.unwrap().unwrap();
-        assert_eq!((catcher.height, catcher.shadow_catcher), (3.06, Some(0.5)));
+        assert_eq!((catcher.height, catcher.shadow_catcher), (3.0144, Some(0.5)));
         let under_body = of(GroundKind::ShadowCatcher, |m| {
             m.surface.kind = SurfaceKind::Union;
         });
