@@ -1,7 +1,7 @@
 //! Frames of Blosc 1: a header of 16 bytes, the places of the blocks, and the blocks, each of one or several streams.
 //!
-//! After "Blosc Chunk Format" of c-blosc. Decoders of the streams are those of other compressions; the frame around them
-//! is small, and the crates for it bind the C library.
+//! After "Blosc Chunk Format" of c-blosc. The decoders of streams are those of other compressions. The frame around them
+//! is small, and the established crates for it bind the C library.
 
 use std::io;
 

@@ -1,8 +1,8 @@
 //! Compressed files: which compression a file has, by its content, and its content without it.
 //!
 //! `decompressor` reads a file from front to back, `member` decodes one stream of it (`lz4`, `scf` with `blosc`, and
-//! `zip` for an archive of one file), `length` estimates the decompressed length. NPZ files are archives of arrays and not compressed in
-//! this sense.
+//! `zip` for an archive of one file), `length` estimates the decompressed length. NPZ files are archives of arrays and
+//! not compressed in this sense.
 
 mod blosc;
 mod decompressor;

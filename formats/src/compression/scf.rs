@@ -43,7 +43,7 @@ impl<R: BufRead> ScfReader<R> {
     /// Reads the header and the first frame, if that can be decoded in `most` bytes.
     ///
     /// # Errors
-    /// [`io::Error`] if it cannot be read or is damaged, and with [`io::ErrorKind::OutOfMemory`] if `most` is too small.
+    /// [`io::Error`] if it cannot be read or is damaged; [`io::ErrorKind::OutOfMemory`] if `most` is too small.
     pub(super) fn new(mut reader: R, most: u64) -> io::Result<Self> {
         let mut header = [0; 12];
         reader.read_exact(&mut header)?;

@@ -4,8 +4,8 @@
     python tests/data/houdini/make.py
 
 Houdini is not needed: the layout is that of `UT_JSONDefines.h`, `UT_SCFWriter.h` and `UT_CompressedBlockIndex.h` of the
-Houdini Development Kit, and of `hgeo.py`. Blosc frames are those of c-blosc. `expected.tsv` has the arrays before they are
-divided into pages (`../reference.py`).
+Houdini Development Kit, and of `hgeo.py`. Blosc frames are those of c-blosc. `expected.tsv` has the arrays before they
+are divided into pages (`../reference.py`).
 """
 
 import os
@@ -214,7 +214,8 @@ def pages_of_all_kinds(writer):
     """Every storage, short pages of which some are constant, and other arrangements."""
     count = 29
     row = numpy.arange(count)
-    four = numpy.stack([row * 0.5, row * -0.25, row // 8 * 1.0, numpy.where(row < 16, 1.0, row % 3 * 2.0)], 1).astype("f4")
+    last = numpy.where(row < 16, 1.0, row % 3 * 2.0)
+    four = numpy.stack([row * 0.5, row * -0.25, row // 8 * 1.0, last], 1).astype("f4")
     w = four[:, 3:]
     position = four[:, :3] / numpy.where(w == 0, 1, w)
     how = {"page_len": 8}
