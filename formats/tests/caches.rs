@@ -88,33 +88,95 @@ fn damaged_houdini_geometry() {
     check(
         "houdini/flip_12.bgeo",
         &[
-            (Cut(3), "a"),
-            (Lose(100), "b"),
-            (At(5, b"\x05"), "c"),
-            // A name that is not defined, a length of a reserved kind
-            (Replace(b"&\x03", b"&\x63"), "d"),
-            (Replace(b"\x0afileversion", b"\xf3fileversion"), "e"),
-            (Replace(b"&\x02\x11\x19", b"&\x02\x11\xff"), "f"),
-            (Replace(b"&\x02\x11\x19", b"&\x02\x13\xff\xff\xff\x7f"), "g"),
-            (Replace(b"&\x02\x11\x19", b"&\x02\x30"), "h"),
-            (Replace(b"fpreal32", b"fpreal99"), "i"),
-            (Replace(b"\x01P&", b"\x01Q&"), "j"),
-            (Replace(b"\x0bPolygon_run", b"\x0ePackedGeometry"), "k"),
-            (Replace(b"numeric", b"numbers"), "l"),
-            (Replace(b"\x12\x00\x04", b"\x12\x00\x00"), "m"),
             (
-                Replace(b"@\x10\x01\x01\x00\x00\x00", b"@\x10\x02\x01\x00\x00\x00"),
-                "n",
+                Cut(3),
+                "byte 0: named like a bgeo file, but does not begin like one: bytes 7f 4e 53",
             ),
-            (Replace(b"@\x19\x4b", b"@\x19\xf0"), "o"),
+            (
+                Lose(100),
+                "byte 2352: 11 bytes expected here, file has 2 left: the file is cut short, perhaps still being written",
+            ),
+            (
+                At(5, b"\x05"),
+                "byte 5: 0x05 is not a token of binary JSON: the file is damaged here",
+            ),
+            // A name that is not defined, a length of a reserved kind
+            (
+                Replace(b"&\x03", b"&\x63"),
+                "byte 63: the name 99 is not defined: the file is damaged here",
+            ),
+            (
+                Replace(b"\x0bfileversion", b"\xf3fileversion"),
+                "byte 8: 0xf3 does not begin a length: the file is damaged here",
+            ),
+            // The number of points
+            (
+                Replace(b"&\x03\x11\x19", b"&\x03\x11\xff"),
+                "byte 64: the count -1",
+            ),
+            (
+                Replace(b"&\x03\x11\x19", b"&\x03\x13\xff\xff\xff\x7f"),
+                "byte 561: attribute `P` has 75 numbers, which do not fit 2147483647 points of 3 components",
+            ),
+            (
+                Replace(b"&\x03\x11\x19", b"&\x03\x30"),
+                "byte 64: a count expected here: the file is damaged here",
+            ),
+            (
+                Replace(b"pointcount", b"pointcourt"),
+                "byte 2454: the file has no number of points",
+            ),
+            (
+                Replace(b"fpreal32", b"fpreal99"),
+                "byte 558: numbers of the unknown type `fpreal99`",
+            ),
+            (
+                Replace(b"\x01P&", b"\x01Q&"),
+                "byte 2454: the points have no positions (attribute P)",
+            ),
+            (
+                Replace(b"\x0bPolygon_run", b"\x0ePackedGeometry"),
+                "geometry with packed primitives (PackedGeometry), whose points are not read; unpack it in Houdini before \
+                 it is saved (Unpack node)",
+            ),
+            (
+                Replace(b"numeric", b"numbers"),
+                "byte 2454: the points have no positions (attribute P)",
+            ),
+            // Length, flags and numbers of pages
+            (
+                Replace(b"\x12\x00\x04", b"\x12\x00\x00"),
+                "byte 558: attribute `P` has pages of 0 points",
+            ),
+            (
+                Replace(b"@\x10\x01\x01\0\0\0", b"@\x10\x02\x01\0\0\0"),
+                "byte 1356: attribute `pscale` does not have a flag for each of its 1 pages",
+            ),
+            (
+                Replace(b"@\x19\x01", b"@\x19\xf0"),
+                "byte 2319: a name expected here: the file is damaged here",
+            ),
+            (
+                Replace(b"&\x1b@\x19\x4b", b"&\x1b@\x77\x4b"),
+                "byte 559: an array of elements of the unknown type 0x77",
+            ),
         ],
     );
     check(
         "houdini/pages.bgeo",
         &[
-            (Replace(b"@\x21\x02\x03\x01", b"@\x21\x02\x03\x02"), "a"),
-            (Replace(b"@\x21\x02\x03\x01", b"@\x21\x02\x04\x00"), "b"),
-            (Replace(b"\x11\x1d", b"\x11\x1e"), "c"),
+            (
+                Replace(b"@\x21\x02\x03\x01", b"@\x21\x02\x03\x02"),
+                "byte 584: the packing of attribute `P` is not that of 4 components",
+            ),
+            (
+                Replace(b"@\x21\x02\x03\x01", b"@\x21\x02\x04\x00"),
+                "byte 584: the packing of attribute `P` is not that of 4 components",
+            ),
+            (
+                Replace(b"\x11\x1d", b"\x11\x1e"),
+                "byte 584: attribute `P` has 102 numbers, which do not fit 30 points of 4 components",
+            ),
         ],
     );
 }
@@ -124,27 +186,75 @@ fn damaged_compressed_geometry() {
     check(
         "houdini/cache_0012.bgeo.sc",
         &[
-            (Cut(10), "a"),
-            (Cut(200), "b"),
-            (Cut(12 + 4620), "c"),
-            (Lose(30), "d"),
-            (Lose(1), "e"),
+            (
+                Cut(10),
+                "byte 0: the blosc stream ends early here; perhaps it is still being written",
+            ),
+            (
+                Cut(200),
+                "byte 0: the blosc stream ends early here; perhaps it is still being written",
+            ),
+            (
+                Cut(12 + 4620),
+                "byte 16384: the blosc stream ends early here; perhaps it is still being written",
+            ),
+            (
+                Lose(30),
+                "byte 89980: the blosc stream ends early here; perhaps it is still being written",
+            ),
+            (
+                Lose(1),
+                "byte 89980: the blosc stream ends early here; perhaps it is still being written",
+            ),
             // Version, flags, lengths of the first frame
-            (At(12, b"\x09"), "f"),
-            (At(14, b"\x01"), "g"),
-            (At(14, b"\x81"), "h"),
-            (At(14, b"\x24"), "i"),
-            (At(16, b"\xff\xff\xff\x7f"), "j"),
-            (At(24, b"\xff\xff\xff\x7f"), "k"),
-            (At(28, b"\xff\xff\xff\x7f"), "l"),
-            (At(32, b"\xff\xff\xff\x7f"), "m"),
-            (At(60, b"\xff\xff\xff\xff\xff\xff\xff\xff"), "n"),
+            (
+                At(12, b"\x09"),
+                "byte 0: the blosc stream is damaged: what follows its frames is neither a frame nor the index",
+            ),
+            (
+                At(14, b"\x01"),
+                "its blosc frames are compressed with BloscLZ, which is not read; compress it with LZ4, as `hsc` of Houdini does",
+            ),
+            (
+                At(14, b"\x81"),
+                "its blosc frames are compressed with zstd, which is not read; compress it with LZ4, as `hsc` of Houdini does",
+            ),
+            (
+                At(14, b"\x24"),
+                "its blosc frames are shuffled by bits, which is not read; compress it with LZ4, as `hsc` of Houdini does",
+            ),
+            (
+                At(16, b"\xff\xff\xff\x7f"),
+                "its blosc stream needs more memory to be decompressed than is allowed; compress it with a smaller window or dictionary, or allow more",
+            ),
+            (
+                At(24, b"\xff\xff\xff\x7f"),
+                "byte 0: the blosc stream is damaged: a frame is longer than its content",
+            ),
+            (
+                At(28, b"\xff\xff\xff\x7f"),
+                "byte 0: the blosc stream is damaged: a block is outside its frame",
+            ),
+            (
+                At(32, b"\xff\xff\xff\x7f"),
+                "byte 0: the blosc stream is damaged: a block ends within a stream",
+            ),
+            (
+                At(60, b"\xff\xff\xff\xff\xff\xff\xff\xff"),
+                "byte 104: 0xff is not a token of binary JSON: the file is damaged here",
+            ),
             // Length of the index, of the last frame
-            (FromEnd(5, b"\x07"), "o"),
-            (FromEnd(13, b"\x07"), "p"),
+            (
+                FromEnd(5, b"\x07"),
+                "byte 89980: the blosc stream is damaged: what follows its frames is neither a frame nor the index",
+            ),
+            (
+                FromEnd(13, b"\x07"),
+                "byte 89980: the blosc stream is damaged: its frames have another length than the index states",
+            ),
             (
                 Replace(b"scf1\0\0\0\0\0\0\0\0", b"scf1\0\0\0\0\0\xff\0\0"),
-                "q",
+                "byte 0: the blosc stream ends early here; perhaps it is still being written",
             ),
         ],
     );
@@ -155,33 +265,69 @@ fn damaged_dualsphysics_parts() {
     check(
         "dualsphysics/Part_0000.bi4",
         &[
-            (Cut(30), "a"),
-            (Cut(100), "b"),
-            (Lose(5), "c"),
-            (At(60, b"\x07"), "d"),
-            (At(61, b"\x01"), "e"),
-            (Replace(b"\nITEM\n", b"\nITEX\n"), "f"),
-            (Replace(b"\nVALUES", b"\nVALVES"), "g"),
-            (Replace(b"Npiece\x08", b"Npiece\x63"), "h"),
-            (Replace(b"PART_0000", b"BART_0000"), "i"),
-            (Replace(b"Npok", b"Npox"), "j"),
-            (Replace(b"Npok\x08\0\0\0\x1e", b"Npok\x08\0\0\0\x1f"), "k"),
+            (
+                Cut(30),
+                "byte 0: 60 bytes expected here, file has 30 left: the file is cut short, perhaps still being written",
+            ),
+            (
+                Cut(100),
+                "byte 94: 8 bytes expected here, file has 6 left: the file is cut short, perhaps still being written",
+            ),
+            (
+                Lose(5),
+                "byte 2037: 120 bytes expected here, file has 115 left: the file is cut short, perhaps still being written",
+            ),
+            (
+                At(60, b"\x07"),
+                "byte 60: the byte order 7 is not known: the file is damaged here",
+            ),
+            (
+                At(61, b"\x01"),
+                "byte 60: the byte order 0 is not known: the file is damaged here",
+            ),
+            (
+                Replace(b"\nITEM\n", b"\nITEX\n"),
+                "byte 68: ITEM expected here: the file is damaged here",
+            ),
+            (
+                Replace(b"\nVALUES", b"\nVALVES"),
+                "byte 131: VALUES expected here: the file is damaged here",
+            ),
+            (
+                Replace(b"Npiece\x08", b"Npiece\x63"),
+                "byte 173: the type 99 is not known: the file is damaged here",
+            ),
+            (
+                Replace(b"PART_0000", b"BART_0000"),
+                "byte 2157: the file has no item PART_####, and no particles",
+            ),
+            (
+                Replace(b"Npok", b"Npox"),
+                "byte 752: the item has no number of particles (Npok)",
+            ),
+            (
+                Replace(b"Npok\x08\0\0\0\x1e", b"Npok\x08\0\0\0\x1f"),
+                "byte 1085: the array `Idp` has 30 elements of 31 particles",
+            ),
             (
                 Replace(b"\x03\0\0\0Pos\0\0\0\0", b"\x03\0\0\0Pox\0\0\0\0"),
-                "l",
+                "byte 752: the item has no positions (Pos or Posd)",
             ),
             (
                 Replace(b"Idp\0\0\0\0\x08\0\0\0\x1e", b"Idp\0\0\0\0\x08\0\0\0\x1f"),
-                "m",
+                "byte 1073: the array `Idp` of 31 elements has 120 bytes: the file is damaged here",
             ),
             (
                 Replace(
                     b"Rhop\0\0\0\0\x0b\0\0\0\x1e\0\0\0\x78\0\0\0",
                     b"Rhop\0\0\0\0\x0b\0\0\0\0\0\0\x40\0\0\0\0",
                 ),
-                "n",
+                "byte 2025: the array `Rhop` of 1073741824 elements has 0 bytes: the file is damaged here",
             ),
-            (Replace(b"JPartDataBi4 ", b"JPartDataHead"), "o"),
+            (
+                Replace(b"JPartDataBi4 ", b"JPartDataHead"),
+                "a DualSPHysics file of JPartDataHead, which has no particles of a time step; give the files Part_####.bi4",
+            ),
         ],
     );
 }

@@ -69,10 +69,9 @@ impl FrameHeader {
         }
     }
 
-    /// Bytes that decoding the frame takes: the frame, a block and a shuffled block.
-    pub(super) fn decoder_len(&self) -> u64 {
-        let block_len = self.block_len.min(self.len) as u64;
-        (self.len + HEADER) as u64 + 2 * block_len
+    /// Most bytes that decoding the frame takes: the frame, a block and a shuffled block.
+    pub(super) const fn decoder_len(&self) -> u64 {
+        3 * self.len as u64 + HEADER as u64
     }
 
     const fn has(&self, flag: u8) -> bool {
