@@ -5,9 +5,9 @@
 //! and a colour among columns. A property without a list, such as density or mass, has no meaning to the
 //! program and keeps its name in the file.
 
-/// Names of a per-particle id. `ids` is common in numpy files, `Idp` comes from DualSPHysics, `ParticleIDs` from the
+/// Names of a per-particle id. `ids` is common in numpy files, `Idp` and `Idpd` come from DualSPHysics, `ParticleIDs` from the
 /// GADGET family.
-pub const ID: [&str; 4] = ["id", "ids", "Idp", "ParticleIDs"];
+pub const ID: [&str; 5] = ["id", "ids", "Idp", "Idpd", "ParticleIDs"];
 
 /// Names of a velocity with three components.
 pub const VELOCITY: [&str; 6] = ["velocity", "velocities", "vel", "velo", "v", "U"];

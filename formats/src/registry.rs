@@ -6,7 +6,8 @@ use crate::compression::strip_extension;
 use crate::format::Format;
 use crate::native;
 use crate::read::{
-    amber, bgeo, csv, dcd, gro, gsd, lammps, mmcif, npy, pdb, ply, trr, vtk, vtk_xml, xtc, xyz,
+    amber, bgeo, bi4, csv, dcd, gro, gsd, houdini, lammps, mmcif, npy, pdb, ply, trr, vtk, vtk_xml,
+    xtc, xyz,
 };
 
 /// All formats. If several formats match a file equally well, the first one wins. Messages list them in this order.
@@ -15,6 +16,7 @@ const FORMATS: &[Format] = &[
     vtk::FORMAT,
     vtk_xml::FORMAT,
     bgeo::FORMAT,
+    houdini::FORMAT,
     ply::FORMAT,
     xyz::FORMAT,
     lammps::FORMAT,
@@ -22,6 +24,7 @@ const FORMATS: &[Format] = &[
     npy::NPY,
     npy::NPZ,
     gsd::FORMAT,
+    bi4::FORMAT,
     gro::FORMAT,
     xtc::FORMAT,
     trr::FORMAT,

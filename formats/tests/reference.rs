@@ -179,6 +179,16 @@ fn hdf5_is_what_the_reference_readers_give() {
 }
 
 #[test]
+fn houdini_geometry_is_what_was_written() {
+    assert_eq!(compare("houdini"), 39);
+}
+
+#[test]
+fn dualsphysics_parts_are_what_was_written() {
+    assert_eq!(compare("dualsphysics"), 22);
+}
+
+#[test]
 fn molecules_are_what_the_reference_readers_give() {
     assert_eq!(compare("molecules"), 98);
 }

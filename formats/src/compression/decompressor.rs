@@ -235,6 +235,9 @@ impl<R: BufRead + Seek> Decompressor<R> {
             );
             return ParseError::too_large(what).into();
         }
+        if error.kind() == io::ErrorKind::Unsupported {
+            return ParseError::unsupported(error.to_string()).into();
+        }
         let what = match is_early_end(&error) {
             true => {
                 format!("the {name} stream ends early here; perhaps it is still being written")

@@ -10,6 +10,7 @@ use ruzstd::decoding::errors::{FrameDecoderError, FrameHeaderError};
 use ruzstd::decoding::{FrameDecoder, StreamingDecoder};
 
 use super::lz4::{self, Lz4Frame};
+use super::scf::ScfReader;
 use super::zip::{ZipReader, ZippedFile};
 use super::{StreamFormat, xz};
 use crate::MemoryBudget;
@@ -28,6 +29,7 @@ pub(super) enum StreamDecoder<R: BufRead> {
     Bzip2(Box<BzDecoder<R>>),
     Xz(Box<XzReader<R>>),
     Lz4(Box<Lz4Frame<R>>),
+    Scf(Box<ScfReader<R>>),
     Zip(Box<ZipReader<R>>),
 }
 
@@ -75,6 +77,11 @@ impl<R: BufRead> StreamDecoder<R> {
                 let decoder = Lz4Frame::new(reader)?;
                 (Self::Lz4(Box::new(decoder)), lz4::DECODER_LEN)
             }
+            StreamFormat::Scf => {
+                let decoder = ScfReader::new(reader, most)?;
+                let held = decoder.decoder_len();
+                (Self::Scf(Box::new(decoder)), held)
+            }
         })
     }
 
@@ -86,6 +93,7 @@ impl<R: BufRead> StreamDecoder<R> {
             Self::Bzip2(decoder) => Some(decoder.into_inner()),
             Self::Xz(decoder) => Some(decoder.into_inner()),
             Self::Lz4(decoder) => Some(decoder.into_inner()),
+            Self::Scf(decoder) => Some(decoder.into_inner()),
             Self::Zip(_) => None,
         }
     }
@@ -96,7 +104,7 @@ impl<R: BufRead> StreamDecoder<R> {
             Self::Zstd(decoder) => Some(decoder.decoder.content_size()).filter(|len| *len > 0),
             Self::Lz4(decoder) => decoder.stated_len(),
             Self::Zip(decoder) => Some(decoder.stated_len()),
-            Self::Gzip(_) | Self::Bzip2(_) | Self::Xz(_) => None,
+            Self::Gzip(_) | Self::Bzip2(_) | Self::Xz(_) | Self::Scf(_) => None,
         }
     }
 
@@ -125,6 +133,7 @@ impl<R: BufRead> Read for StreamDecoder<R> {
             Self::Bzip2(decoder) => decoder.read(to),
             Self::Xz(decoder) => decoder.read(to),
             Self::Lz4(decoder) => decoder.read(to),
+            Self::Scf(decoder) => decoder.read(to),
             Self::Zip(decoder) => decoder.read(to),
         }
     }

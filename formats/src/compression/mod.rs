@@ -1,13 +1,15 @@
 //! Compressed files: which compression a file has, by its content, and its content without it.
 //!
-//! `decompressor` reads a file from front to back, `member` decodes one stream of it (`lz4`, and `zip` for an archive
-//! of one file), `length` estimates the decompressed length. NPZ files are archives of arrays and not compressed in
-//! this sense.
+//! `decompressor` reads a file from front to back, `member` decodes one stream of it (`lz4`, `scf` with `blosc`, and
+//! `zip` for an archive of one file), `length` estimates the decompressed length. NPZ files are archives of arrays and
+//! not compressed in this sense.
 
+mod blosc;
 mod decompressor;
 mod length;
 mod lz4;
 mod member;
+mod scf;
 #[cfg(test)]
 mod tests;
 mod xz;
@@ -23,7 +25,7 @@ use crate::ParseError;
 use zip::ZipContent;
 
 /// Extensions of compressed files, in lower case.
-const EXTENSIONS: [&str; 6] = [".gz", ".zst", ".bz2", ".xz", ".lz4", ".zip"];
+const EXTENSIONS: [&str; 7] = [".gz", ".zst", ".bz2", ".xz", ".lz4", ".sc", ".zip"];
 
 /// `name` without the extension of a compression; `name` must be in lower case.
 pub(crate) fn strip_extension(name: &str) -> &str {
@@ -59,6 +61,8 @@ pub(crate) enum StreamFormat {
     Xz,
     /// "LZ4 Frame Format".
     Lz4,
+    /// Houdini's "seekable compressed format".
+    Scf,
 }
 
 impl Compression {
@@ -98,7 +102,14 @@ impl Compression {
 }
 
 impl StreamFormat {
-    const ALL: [Self; 5] = [Self::Gzip, Self::Zstd, Self::Bzip2, Self::Xz, Self::Lz4];
+    const ALL: [Self; 6] = [
+        Self::Gzip,
+        Self::Zstd,
+        Self::Bzip2,
+        Self::Xz,
+        Self::Lz4,
+        Self::Scf,
+    ];
 
     /// The format of a file that begins with `head`.
     pub(crate) fn of(head: &[u8]) -> Option<Self> {
@@ -118,6 +129,7 @@ impl StreamFormat {
             Self::Bzip2 => "bzip2",
             Self::Xz => "xz",
             Self::Lz4 => "LZ4",
+            Self::Scf => "blosc",
         }
     }
 
@@ -138,7 +150,7 @@ impl StreamFormat {
                         .is_some_and(|level| (b'1'..=b'9').contains(level))
                     && blocks.iter().any(|block| bytes.get(4..10) == Some(block))
             }
-            Self::Zstd | Self::Xz | Self::Lz4 => bytes.starts_with(self.magic()),
+            Self::Zstd | Self::Xz | Self::Lz4 | Self::Scf => bytes.starts_with(self.magic()),
         }
     }
 
@@ -157,6 +169,7 @@ impl StreamFormat {
             Self::Bzip2 => b"BZh",
             Self::Xz => b"\xfd7zXZ\0",
             Self::Lz4 => b"\x04\x22\x4d\x18",
+            Self::Scf => scf::MAGIC,
         }
     }
 

@@ -12,6 +12,7 @@ fn signatures_decide() {
         (b"\x28\xb5\x2f\xfd\x04", Some(StreamFormat::Zstd)),
         (b"\xfd7zXZ\0\0\x04", Some(StreamFormat::Xz)),
         (b"\x04\x22\x4d\x18\x64", Some(StreamFormat::Lz4)),
+        (b"scf1\0\0", Some(StreamFormat::Scf)),
         (b"BZh91AY&SY", Some(StreamFormat::Bzip2)),
         (b"BZh9\x17\x72\x45\x38\x50\x90", Some(StreamFormat::Bzip2)),
         (b"BZh01AY&SY", None),
@@ -38,6 +39,7 @@ fn extensions_are_stripped() {
     for (name, stripped) in [
         ("a_7.vtk.gz", "a_7.vtk"),
         ("a_7.vtk.zst", "a_7.vtk"),
+        ("a_7.bgeo.sc", "a_7.bgeo"),
         ("a.zip", "a"),
         ("a.npz", "a.npz"),
         ("a.gz.xz", "a.gz"),

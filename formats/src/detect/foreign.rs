@@ -14,12 +14,8 @@ const MAGICS: &[(&[u8], &str)] = &[
         "an Alembic file, which is not read; export the points as .ply or .bgeo",
     ),
     (
-        b"\x7fNSJ",
-        "the newer Houdini binary bgeo, which is not read; save as .bhclassic",
-    ),
-    (
         b"scf1",
-        "a blosc-compressed bgeo (.bgeo.sc), which is not read; save as .bhclassic",
+        "blosc inside another compression, which is not read; unpack it once with hsc",
     ),
     (
         b"PGEOMETRY",
@@ -115,15 +111,16 @@ const MAGICS: &[(&[u8], &str)] = &[
 const IMAGE: &str = "an image, not a particle file";
 const ARCHIVE: &str = "an archive, which is not read; unpack it and give its files";
 const USD: &str = "a USD file, which is not read; export the points as .ply or .bgeo";
-const DUALSPHYSICS: &str =
-    "a DualSPHysics binary part (.bi4), which is not read; `PartVTK` writes .vtk or .csv from it";
+const DUALSPHYSICS: &str = "a DualSPHysics file of an older version, or without particles, which is not read; give \
+                            Part_####.bi4, or write .vtk with `PartVTK`";
 const GADGET: &str = "a binary snapshot of Gadget, which is not read; write positions and attributes to .npz with pynbody \
                       or yt";
 const PDB: &str = "a PDB particle file, which is not read; convert to .bgeo with partio";
 const UTF16: &str = "UTF-16 text, which is not read; save as UTF-8";
 const LAMMPS_BINARY: &str = "a LAMMPS binary dump without names of columns, which is not read; run `binary2txt` on it, or dump to a text file";
 const XDMF: &str = "an XDMF index, which keeps its data in other files; save as .vtu with ParaView";
-const HOUDINI_JSON: &str = "the newer Houdini bgeo in JSON, which is not read; save as .bhclassic";
+const HOUDINI_JSON: &str =
+    "Houdini geometry in text (.geo), which is not read; save as .bgeo or .bgeo.sc";
 
 /// Refuses what is known by its first bytes (magics of `shortest` bytes and more), or failing
 /// that by its name.
@@ -162,7 +159,7 @@ fn by_structure(head: &[u8]) -> Option<&'static str> {
 fn is_dualsphysics(head: &[u8], path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let name = name.to_ascii_lowercase();
-    let named = [".bi4", ".ibi4", ".obi4", ".bi2"]
+    let named = [".ibi4", ".obi4", ".bi2"]
         .iter()
         .any(|end| name.ends_with(end));
     named || (head.starts_with(b"#File ") && head.contains(&0))

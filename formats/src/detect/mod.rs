@@ -96,7 +96,7 @@ fn opening(head: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::read::{bgeo, csv, gsd, lammps, npy, ply, vtk, vtk_xml, xyz};
+    use crate::read::{bgeo, bi4, csv, gsd, houdini, lammps, npy, ply, vtk, vtk_xml, xyz};
 
     #[track_caller]
     fn detect(name: &str, bytes: &[u8]) -> Format {
@@ -126,6 +126,9 @@ mod tests {
         );
         assert_eq!(detect("a.vtk", b"ply\nformat ascii 1.0\n"), ply::FORMAT);
         assert_eq!(detect("a", b"BgeoV\0\0\0\x05"), bgeo::FORMAT);
+        assert_eq!(detect("a", b"#FileJBD JPartDataBi4   "), bi4::FORMAT);
+        assert_eq!(detect("a.bgeo", b"\x7fNSJb["), houdini::FORMAT);
+        assert_eq!(detect("a.bgeo", b"\x7fbJSN["), houdini::FORMAT);
         assert_eq!(detect("a.txt", b"ITEM: TIMESTEP\n0\n"), lammps::FORMAT);
         assert_eq!(detect("a.xyz", b"\x93NUMPY\x01\0"), npy::NPY);
         assert_eq!(detect("a.zip", b"PK\x03\x04"), npy::NPZ);
@@ -193,8 +196,13 @@ mod tests {
         refused("a.usdz", &zip(b"scene.usdc"), "USD");
         refused("a.usda", b"#usda 1.0\n", "USD");
         refused("a.gsd", &[0x65, 0xdf].repeat(4), "big-endian");
-        refused("Part_0001.bi4", &[1, 2, 3], "DualSPHysics");
+        refused("Part_0001.bi2", &[1, 2, 3], "DualSPHysics");
         refused("Part_0001", b"#File JPartDataBi4\0\0", "DualSPHysics");
+        refused(
+            "Part_Head.ibi4",
+            b"#FileJBD JPartDataHead  ",
+            "JPartDataHead, which has no particles",
+        );
         let mut snapshot = vec![0; 400];
         (snapshot[1], snapshot[261]) = (1, 1);
         refused("snapshot_001", &snapshot, "Gadget");
@@ -205,9 +213,8 @@ mod tests {
         refused("a.webp", b"RIFF\0\0\0\0WEBP", "image");
         refused("a.xmf", b"<?xml version=\"1.0\"?>\n<Xdmf>", "XDMF");
         refused("a.abc", b"Ogawa\0", "Alembic");
-        refused("a.bgeo", b"\x7fNSJ", "bhclassic");
-        refused("a.bgeo", b"[\n\t\"fileversion\",\"19.5\"", "bhclassic");
-        refused("a.bgeo.sc", b"scf1", "bhclassic");
+        refused("a.bgeo", b"[\n\t\"fileversion\",\"19.5\"", "bgeo.sc");
+        refused("a.bgeo.sc", b"scf1", "blosc inside");
         refused("a.geo", b"PGEOMETRY V5\n", "bgeo");
         refused("a.pdb", b"\x9e\x02\0\0\x01\0", "PDB");
         refused("a.zst", b"\x28\xb5\x2f\xfd", "zstd");

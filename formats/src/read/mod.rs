@@ -7,6 +7,7 @@
 pub mod amber;
 mod atoms;
 pub mod bgeo;
+pub mod bi4;
 mod category;
 #[cfg(test)]
 mod cell_tests;
@@ -19,6 +20,7 @@ pub mod gro;
 pub mod gsd;
 #[cfg(feature = "hdf5")]
 pub mod hdf5;
+pub mod houdini;
 mod input;
 pub mod lammps;
 pub mod mmcif;

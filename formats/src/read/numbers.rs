@@ -40,7 +40,10 @@ impl<'a> NumberReader<'a> {
     }
 
     /// The bytes of a number, the least significant first.
-    fn array<const N: usize>(&mut self) -> Result<[u8; N], ParseError> {
+    ///
+    /// # Errors
+    /// As [`Self::take`].
+    pub(super) fn array<const N: usize>(&mut self) -> Result<[u8; N], ParseError> {
         let mut array = [0; N];
         array.copy_from_slice(self.take(N)?);
         if self.endian == Endian::Big {

@@ -17,16 +17,17 @@ pub use lists::lists;
 pub use mesh::mesh;
 pub use names::names;
 pub use native::native;
-pub use packed::{compressed, npz, open};
+pub use packed::{compressed, houdini, npz, open};
 
 /// A target: takes any bytes, panics where a promise is broken, returns the steps that were read.
 pub type Target = fn(&[u8]) -> usize;
 
 /// Every target by the name of its folder in `corpus`.
-pub const TARGETS: [(&str, Target); 26] = [
+pub const TARGETS: [(&str, Target); 28] = [
     ("vtk", vtk),
     ("vtk_xml", vtk_xml),
     ("bgeo", bgeo),
+    ("houdini", houdini),
     ("ply", ply),
     ("xyz", xyz),
     ("lammps", lammps),
@@ -34,6 +35,7 @@ pub const TARGETS: [(&str, Target); 26] = [
     ("npz", npz),
     ("csv", csv),
     ("gsd", gsd),
+    ("bi4", bi4),
     ("gro", gro),
     ("xtc", xtc),
     ("trr", trr),
@@ -118,6 +120,11 @@ pub fn csv(bytes: &[u8]) -> usize {
 /// GSD.
 pub fn gsd(bytes: &[u8]) -> usize {
     read_all(read::gsd::FORMAT, bytes, 1)
+}
+
+/// DualSPHysics.
+pub fn bi4(bytes: &[u8]) -> usize {
+    read_all(read::bi4::FORMAT, bytes, 1)
 }
 
 /// GROMACS text.

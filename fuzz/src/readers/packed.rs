@@ -86,14 +86,38 @@ pub fn compressed(bytes: &[u8]) -> usize {
     }
 }
 
+/// Geometry of Houdini, in which a few numbers may stand for pages of points. Any bytes are understood.
+pub fn houdini(bytes: &[u8]) -> usize {
+    let budget = MemoryBudget::new(DECOMPRESSED, "get more");
+    match FrameFile::from_bytes_within(Path::new("a.bgeo"), bytes.to_vec(), budget) {
+        Ok(file) if !file.steps().is_empty() => match file.read(0) {
+            Ok(particles) => {
+                check_particles(&particles, DECOMPRESSED);
+                prepare(particles);
+                1
+            }
+            Err(error) => {
+                check_message(&error.to_string());
+                0
+            }
+        },
+        Ok(_) => 0,
+        Err(error) => {
+            check_message(&error.to_string());
+            0
+        }
+    }
+}
+
 /// Beginnings of compressed files.
-const SIGNATURES: [&[u8]; 6] = [
+const SIGNATURES: [&[u8]; 7] = [
     b"\x1f\x8b\x08\0",
     b"\x28\xb5\x2f\xfd",
     b"BZh91AY&SY",
     b"\xfd7zXZ\0",
     b"\x04\x22\x4d\x18",
     b"PK\x03\x04",
+    b"scf1\0\0\0\0\0\0\0\0",
 ];
 
 /// Most bytes that an input may become.
