@@ -133,6 +133,7 @@ fn particles(
         time: None,
         step: None,
         cell: None,
+        bonds: Vec::new(),
     };
     let mut has_positions = false;
     for attribute in &geometry.attributes {
