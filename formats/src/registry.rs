@@ -6,7 +6,7 @@ use crate::compression::strip_extension;
 use crate::format::Format;
 use crate::native;
 use crate::read::{
-    amber, bgeo, csv, dcd, gro, gsd, lammps, mmcif, npy, pdb, ply, trr, vtk, vtk_xml, xtc, xyz,
+    amber, bgeo, csv, dcd, gro, gsd, lammps, mmcif, npy, pdb, ply, trr, usd, vtk, vtk_xml, xtc, xyz,
 };
 
 /// All formats. If several formats match a file equally well, the first one wins. Messages list them in this order.
@@ -29,6 +29,7 @@ const FORMATS: &[Format] = &[
     amber::FORMAT,
     pdb::FORMAT,
     mmcif::FORMAT,
+    usd::FORMAT,
     #[cfg(feature = "hdf5")]
     crate::read::hdf5::FORMAT,
     csv::FORMAT,

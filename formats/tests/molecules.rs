@@ -447,6 +447,22 @@ fn damaged_pdb() {
     let found = outcome("a.pdb", header.into());
     let what = "byte 0: no ATOM or HETATM records: the file has no positions";
     assert_eq!(found, (0, Some(what.to_owned())));
+    // A file of UTF-16, one without line breaks, and one with tabs between the fields
+    let record =
+        "ATOM      1  N   ALA A   1      11.000  12.000  13.000  1.00 16.50           N  \n";
+    let wide: Vec<u8> = record.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let marked = [&b"\xff\xfe"[..], &wide].concat();
+    let tabs = record.replace("   ", "\t");
+    let cases = [
+        (marked, "UTF-16 text, which is not read; save as UTF-8"),
+        (tabs.into_bytes(), "?"),
+        (record.replace("13.000", "13.0_0").into_bytes(), "?"),
+        (record.replace("  12.000", "12.0.000").into_bytes(), "?"),
+    ];
+    for (bytes, what) in cases {
+        let found = outcome("a.pdb", bytes);
+        assert_eq!(found, (0, Some(what.to_owned())));
+    }
 }
 
 #[test]
@@ -490,6 +506,10 @@ fn damaged_mmcif() {
                 0,
                 "byte 0: named like a mmcif file, but does not begin like one: `date_MAD`",
             ),
+            (Text("_atom_site.Cartn_z", "_atom_site.Cartn_x"), 0, "?"),
+            (Text("\"CA\" .", "\"CA ."), 0, "?"),
+            (Text(" 502.001", ""), 0, "?"),
+            (Text("936.442", "936,442"), 0, "?"),
         ],
     );
 }

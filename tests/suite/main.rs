@@ -48,5 +48,6 @@ mod still;
 mod structures;
 mod surface;
 mod thesis;
+mod topology;
 mod trails;
 mod verify;
