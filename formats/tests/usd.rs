@@ -77,33 +77,114 @@ fn damaged_binary_files() {
     let good = bytes_of("drops.usdc");
     let table = u64_at(&good, 16);
     let huge = u64::MAX.to_le_bytes();
+    let count = 25_u64.to_le_bytes();
+    let array = good
+        .windows(8)
+        .position(|w| w == count)
+        .expect("an array of 25 points");
     let many = 200_000_u64.to_le_bytes();
     let [tokens, fields, sets, paths, specs] =
         ["TOKENS", "FIELDS", "FIELDSETS", "PATHS", "SPECS"].map(|name| section(&good, name));
     check(
         "drops.usdc",
         &[
-            (good[..50].to_vec(), 0, "?"),
-            (good[..3000].to_vec(), 0, "?"),
-            (good[..good.len() - 1].to_vec(), 0, "?"),
-            (patched(&good, 9, &[3]), 0, "?"),
-            (patched(&good, 8, &[1]), 0, "?"),
-            (patched(&good, 16, &huge), 0, "?"),
-            (patched(&good, table, &huge), 0, "?"),
-            (patched(&good, tokens.1, b"TOKEN!"), 0, "?"),
-            (patched(&good, tokens.0, &huge), 0, "?"),
-            (patched(&good, tokens.0 + 8, &huge), 0, "?"),
-            (patched(&good, tokens.0, &many), 0, "?"),
-            (patched(&good, tokens.0 + 30, &[0xff; 20]), 0, "?"),
-            (patched(&good, fields.0, &many), 0, "?"),
-            (patched(&good, fields.0 + 8, &huge), 0, "?"),
-            (patched(&good, sets.0 + 16, &[9]), 0, "?"),
-            (patched(&good, paths.0 + 8, &many), 0, "?"),
-            (patched(&good, paths.0 + 8, &[1]), 0, "?"),
-            (patched(&good, specs.0, &huge), 0, "?"),
-            // The first arrays of the file: their lengths
-            (patched(&good, 88, &[0xff; 8]), 0, "?"),
-            (vec![0; 100], 0, "?"),
+            (
+                good[..50].to_vec(),
+                0,
+                "byte 0: 88 bytes expected here, file has 50 left: the file is cut short, perhaps still being written",
+            ),
+            (
+                good[..3000].to_vec(),
+                0,
+                "byte 16: something is at byte 6274, the file has 3000: it is damaged or cut short",
+            ),
+            (
+                good[..good.len() - 1].to_vec(),
+                0,
+                "byte 6466: 8 bytes expected here, file has 7 left: the file is cut short, perhaps still being written",
+            ),
+            (
+                patched(&good, 9, &[3]),
+                0,
+                "version 0.3 of binary USD files, 0.4 to 0.13 are read; write the file anew: usdcat old.usd -o new.usda",
+            ),
+            (
+                patched(&good, 8, &[1]),
+                0,
+                "version 1.8 of binary USD files, 0.4 to 0.13 are read; write the file anew: usdcat old.usd -o new.usda",
+            ),
+            (
+                patched(&good, 16, &huge),
+                0,
+                "byte 16: something is at byte 18446744073709551615, the file has 6474: it is damaged or cut short",
+            ),
+            (
+                patched(&good, table, &huge),
+                0,
+                "byte 6274: a table of 18446744073709551615 sections: the file is damaged",
+            ),
+            (
+                patched(&good, tokens.1, b"TOKEN!"),
+                0,
+                "byte 6274: the file has no section TOKENS",
+            ),
+            (
+                patched(&good, tokens.0, &huge),
+                0,
+                "byte 5490: more tokens than a file of 6474 bytes can have",
+            ),
+            (
+                patched(&good, tokens.0 + 8, &huge),
+                0,
+                "byte 5498: 18446744073709551615 bytes of tokens: the file is damaged",
+            ),
+            (
+                patched(&good, tokens.0, &many),
+                0,
+                "byte 5514: 33 tokens, the file promises 200000: it is damaged",
+            ),
+            (
+                patched(&good, tokens.0 + 30, &[0xff; 20]),
+                0,
+                "byte 5514: 29 tokens, the file promises 33: it is damaged",
+            ),
+            (
+                patched(&good, fields.0, &many),
+                0,
+                "byte 5824: the block here does not have 200000 integers: the file is damaged",
+            ),
+            (
+                patched(&good, fields.0 + 8, &huge),
+                0,
+                "byte 5824: 18446744073709551615 bytes expected here, file has 650 left: the file is cut short, perhaps still being written",
+            ),
+            (
+                patched(&good, sets.0 + 16, &[9]),
+                0,
+                "byte 6037: the compressed block here is damaged",
+            ),
+            (
+                patched(&good, paths.0 + 8, &many),
+                0,
+                "byte 6108: 200000 paths, the file promises 14: it is damaged",
+            ),
+            (
+                patched(&good, paths.0 + 8, &[1]),
+                0,
+                "byte 6124: the compressed block here is damaged",
+            ),
+            (
+                patched(&good, specs.0, &huge),
+                0,
+                "byte 6195: more objects than a file of 6474 bytes can have",
+            ),
+            // The length of an array
+            (patched(&good, array, &huge), 2, "?"),
+            (
+                vec![0; 100],
+                0,
+                "byte 0: named like a usd file, but does not begin like one: bytes 00 00 00 00 00 00 00 00",
+            ),
         ],
     );
 }
@@ -136,16 +217,16 @@ fn damaged_text_files() {
             ),
             (
                 with(
-                    "point3f[] points.timeSamples = {\n            0: [(",
-                    "point3f[] points.timeSamples = {\n            0: [(x, ",
+                    "point3f[] points.timeSamples = {\n        0: [(",
+                    "point3f[] points.timeSamples = {\n        0: [(x, ",
                 ),
                 0,
                 "?",
             ),
             (
                 with(
-                    "point3f[] points.timeSamples = {\n            0: [(",
-                    "point3f[] points.timeSamples = {\n            0: [(1, ",
+                    "point3f[] points.timeSamples = {\n        0: [(",
+                    "point3f[] points.timeSamples = {\n        0: [(1, ",
                 ),
                 0,
                 "?",
@@ -157,8 +238,8 @@ fn damaged_text_files() {
             (with("def Points", "= Points"), 0, "?"),
             (
                 with(
-                    "int64[] ids.timeSamples = {\n            0: [",
-                    "int64[] ids.timeSamples = {\n            0: [1.5, ",
+                    "int64[] ids.timeSamples = {\n        0: [",
+                    "int64[] ids.timeSamples = {\n        0: [1.5, ",
                 ),
                 0,
                 "?",
@@ -173,12 +254,36 @@ fn damaged_packages() {
     check(
         "drops.usdz",
         &[
-            (good[..28].to_vec(), 0, "?"),
-            (good[..2000].to_vec(), 0, "?"),
-            (patched(&good, 8, &[8]), 0, "?"),
-            (patched(&good, 6, &[1]), 0, "?"),
-            (patched(&good, 18, &[0xff; 4]), 0, "?"),
-            (patched(&good, 64, b"ABCDEFGH"), 0, "?"),
+            (
+                good[..28].to_vec(),
+                0,
+                "byte 0: npz: invalid Zip archive: Could not find EOCD: the file is damaged or cut short, perhaps still being written",
+            ),
+            (
+                good[..2000].to_vec(),
+                0,
+                "byte 2000: no USD file in the package: the file is cut short, perhaps still being written",
+            ),
+            (
+                patched(&good, 8, &[8]),
+                0,
+                "a USD package whose first file is compressed, which the format does not allow; unpack it",
+            ),
+            (
+                patched(&good, 6, &[1]),
+                0,
+                "a USD package whose first file is compressed, which the format does not allow; unpack it",
+            ),
+            (
+                patched(&good, 18, &[0xff; 4]),
+                0,
+                "byte 6640: no USD file in the package: the file is cut short, perhaps still being written",
+            ),
+            (
+                patched(&good, 64, b"ABCDEFGH"),
+                0,
+                "byte 64: not a USD file: it begins neither with PXR-USDC nor with #usda",
+            ),
         ],
     );
 }

@@ -263,9 +263,9 @@ impl Trajectory {
                 .filter(|count| *count <= 3)?;
             let numbers = Piece::Stored(values).all(node.file().bytes(), count).ok()?;
             let vectors = edges_of(&numbers)?;
-            let boundary = node.text("boundary").unwrap_or_default();
-            let mut words = boundary.split([',', ' ']).filter(|word| !word.is_empty());
-            let periodic = [(); 3].map(|()| words.next().is_none_or(|word| word == "periodic"));
+            let boundary = node.texts("boundary");
+            let is_periodic = |text: &String| text.trim_end_matches('\0').trim() == "periodic";
+            let periodic = [0, 1, 2].map(|axis| boundary.get(axis).is_none_or(is_periodic));
             SimulationCell::new(DVec3::ZERO, vectors, periodic)
         });
         boxes.next()

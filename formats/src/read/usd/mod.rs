@@ -1,8 +1,8 @@
 //! USD files: the points of `UsdGeomPoints` prims, and the instances of `UsdGeomPointInstancer` prims.
 //!
 //! `binary` and `text` read the prims of the two kinds of files, and later their values, for a `layer`. `scene` finds
-//! the prims with particles and values at a time, `transform` multiplies the transforms of prims, `particles` reads a time
-//! step. `package` finds the file in a `.usdz`. After the documentation of OpenUSD.
+//! the prims with particles and values at a time, `transform` multiplies the transforms of prims, `particles` reads a
+//! time step. `package` finds the file in a `.usdz`. After the documentation of OpenUSD.
 //!
 //! One file is read, without those that it refers to: if positions might depend on others, the file is refused.
 

@@ -301,8 +301,8 @@ fn part_numbers(parts: &[Part]) -> Attribute {
     }
 }
 
-/// The attributes of all parts. A scalar of floating point that some parts do not have is NaN there; other attributes that
-/// are not in all parts are left out.
+/// The attributes of all parts. A scalar of floating point that some parts do not have is NaN there; other attributes
+/// that are not in all parts are left out.
 fn joined(parts: &mut [Part], is_divided: bool) -> Vec<Attribute> {
     let mut names: Vec<String> = Vec::new();
     let mut known = BTreeSet::new();

@@ -55,7 +55,8 @@ impl ParticlePrims {
                 if has_arcs {
                     let path = layer.path(&layer.chain(visit.prim).unwrap_or_default());
                     let what = format!(
-                        "a USD file in which {path} depends on other files, variants or classes, which are not read; {FLATTEN}"
+                        "a USD file in which {path} depends on other files, variants or classes, which are not read; \
+                         {FLATTEN}"
                     );
                     return Err(ParseError::unsupported(what));
                 }
@@ -222,8 +223,8 @@ fn bracket(layer: &Layer<'_>, samples: &Samples, time: f64) -> Option<Bracket> {
 }
 
 /// The numbers of a property at a time code, or at no time. Numbers of floating point between two samples are
-/// interpolated as OpenUSD does by default; if the samples differ in length, and for other numbers and quaternions, those
-/// of the earlier sample are used.
+/// interpolated as OpenUSD does by default; if the samples differ in length, and for other numbers and quaternions,
+/// those of the earlier sample are used.
 ///
 /// # Errors
 /// [`ParseError`] if the values are damaged or do not fit into `budget`.

@@ -101,7 +101,8 @@ fn budget_limits_every_array() {
 #[test]
 fn text_has_comments_strings_and_separators_anywhere() {
     let particles = text(
-        "( # a comment with ) and \"\n \"\"\"documentation with \"quotes\" and )\"\"\"\n upAxis = 'Z'; doc = 'it\\'s' )\n\
+        "( # a comment with ) and \"\n \"\"\"documentation with \"quotes\" and )\"\"\"\n upAxis = 'Z';\n\
+         doc = 'it\\'s' )\n\
          /* no def Points \"X\" { } */\n\
          def Xform \"A\" ( kind = \"group\" prepend apiSchemas = [\"B\"]\n customData = { string a = \"}\" } )\n{\n\
          rel target = </A/P>\n custom string note = \"\"\"{ ( [\"\"\"\n uniform token[] names = [\"]\", '}']\n\
@@ -112,7 +113,8 @@ fn text_has_comments_strings_and_separators_anywhere() {
     // A comma after the last number of a tuple is no longer USD
     assert!(particles.is_err());
     let particles = text(
-        "( # a comment with ) and \"\n \"\"\"documentation with \"quotes\" and )\"\"\"\n upAxis = 'Z'; doc = 'it\\'s' )\n\
+        "( # a comment with ) and \"\n \"\"\"documentation with \"quotes\" and )\"\"\"\n upAxis = 'Z';\n\
+         doc = 'it\\'s' )\n\
          /* no def Points \"X\" { } */\n\
          def Xform \"A\" ( kind = \"group\" prepend apiSchemas = [\"B\"]\n customData = { string a = \"}\" } )\n{\n\
          rel target = </A/P>\n custom string note = \"\"\"{ ( [\"\"\"\n uniform token[] names = [\"]\", '}']\n\

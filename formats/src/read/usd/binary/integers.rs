@@ -1,13 +1,13 @@
 //! Compressed blocks of binary USD files: LZ4, and lists of integers as differences of 0 to 8 bytes.
 //!
-//! A list of integers begins with the most frequent difference. Codes of two bits follow, one for each integer: 0 stands
-//! for that difference, 1 to 3 for one of a quarter, half and all bytes of the type, which follow all codes. After the
-//! layout that OpenUSD documents in `integerCoding.cpp` and `fastCompression.h`.
+//! A list of integers begins with the most frequent difference. Codes of two bits follow, one for each integer: 0
+//! stands for that difference, 1 to 3 for one of a quarter, half and all bytes of the type, which follow all codes.
+//! After the layout that OpenUSD documents in `integerCoding.cpp` and `fastCompression.h`.
 
 use crate::ParseError;
 
 /// LZ4 cannot make a block that much shorter than its content.
-const RATIO: usize = 256;
+pub(super) const RATIO: usize = 256;
 
 /// Least content that a block may have, whatever its length.
 const SLACK: usize = 64;

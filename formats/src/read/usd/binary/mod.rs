@@ -8,7 +8,7 @@ mod integers;
 mod tree;
 mod values;
 
-use self::integers::{Coded, can_have, coded_len, decoded, unpacked};
+use self::integers::{Coded, RATIO, can_have, coded_len, decoded, unpacked};
 pub(super) use self::tree::read;
 use super::prim::ValueRep;
 use crate::read::numbers::NumberReader;
@@ -94,8 +94,8 @@ impl<'a> CrateFile<'a> {
         let (major, minor) = (head[8], head[9]);
         if major != 0 || !(4..=NEWEST).contains(&minor) {
             let what = format!(
-                "version {major}.{minor} of binary USD files, 0.4 to 0.{NEWEST} are read; write the file anew: usdcat old.usd \
-                 -o new.usda"
+                "version {major}.{minor} of binary USD files, 0.4 to 0.{NEWEST} are read; write the file anew: usdcat \
+                 old.usd -o new.usda"
             );
             return Err(ParseError::unsupported(what));
         }
@@ -231,10 +231,14 @@ impl<'a> CrateFile<'a> {
         let count = self.count(&mut reader, "tokens", 4, budget)?;
         let at = reader.at();
         let len = reader.u64()?;
-        budget.check(len, "the text of its tokens is")?;
-        let len = u32::try_from(len).map_err(|_| {
-            ParseError::malformed(at, format!("{len} bytes of tokens: the file is damaged"))
-        })?;
+        // LZ4 cannot pack them better
+        let most = self.bytes.len().saturating_mul(RATIO) as u64;
+        let damaged = || format!("{len} bytes of tokens: the file is damaged");
+        let len = u32::try_from(len)
+            .ok()
+            .filter(|len| u64::from(*len) <= most);
+        let len = len.ok_or_else(|| ParseError::malformed(at, damaged()))?;
+        budget.check(len.into(), "the text of its tokens is")?;
         let (block, at) = Self::block(&mut reader)?;
         if count == 0 {
             return Ok(());
