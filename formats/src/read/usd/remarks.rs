@@ -92,8 +92,8 @@ fn is_transformed(layer: &Layer<'_>, prims: &ParticlePrims) -> bool {
             let mut own = layer.properties(prim).iter();
             own.any(|property| {
                 let is_operation = layer.text(&property.name).starts_with(b"xformOp:");
-                is_operation && numbers_at(layer, property, None, VALUE_BUDGET) != Ok(None)
-                    || is_operation && property.samples.is_some()
+                let has_value = || numbers_at(layer, property, None, VALUE_BUDGET) != Ok(None);
+                is_operation && (property.samples.is_some() || has_value())
             })
         })
     })
