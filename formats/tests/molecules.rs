@@ -447,14 +447,14 @@ fn damaged_pdb() {
     let found = outcome("a.pdb", header.into());
     let what = "byte 0: no ATOM or HETATM records: the file has no positions";
     assert_eq!(found, (0, Some(what.to_owned())));
-    // A file of UTF-16, one without line breaks, and one with tabs between the fields
+    // A file of UTF-16, one with tabs between the fields, and numbers that are none
     let record =
         "ATOM      1  N   ALA A   1      11.000  12.000  13.000  1.00 16.50           N  \n";
     let wide: Vec<u8> = record.encode_utf16().flat_map(u16::to_le_bytes).collect();
     let marked = [&b"\xff\xfe"[..], &wide].concat();
-    let tabs = record.replace("   ", "\t");
+    let tabs = header.replace("END\n", &record.replace("   ", "\t"));
     let cases = [
-        (marked, what),
+        (marked, "UTF-16 text, which is not read; save as UTF-8"),
         (tabs.into_bytes(), what),
         (
             record.replace("13.000", "13.0_0").into_bytes(),

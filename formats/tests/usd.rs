@@ -179,7 +179,11 @@ fn damaged_binary_files() {
                 "byte 6195: more objects than a file of 6474 bytes can have",
             ),
             // The length of an array
-            (patched(&good, array, &huge), 2, "?"),
+            (
+                patched(&good, array, &huge),
+                2,
+                "its numbers in memory are larger than 31 MiB; take care",
+            ),
             (
                 vec![0; 100],
                 0,
@@ -200,49 +204,97 @@ fn damaged_text_files() {
     check(
         "between.usda",
         &[
-            (cut(7), 0, "?"),
-            (cut(60), 0, "?"),
-            (cut(1000), 0, "?"),
-            (cut(good.len() - 3), 0, "?"),
-            (with("#usda 1.0", "#usd 1.0"), 0, "?"),
-            (with("def Points \"One\"", "def Points One"), 0, "?"),
-            (with("def Points \"One\"", "def Points \"One"), 0, "?"),
+            (
+                cut(7),
+                0,
+                "a USD file without Points and PointInstancer prims; export the particles as points",
+            ),
+            (
+                cut(60),
+                0,
+                "byte 60: `)` expected: the file is cut short, perhaps still being written",
+            ),
+            (
+                cut(1000),
+                0,
+                "byte 1000: the name of a property expected: the file is cut short, perhaps still being written",
+            ),
+            (
+                cut(good.len() - 3),
+                0,
+                "byte 17669: `}` expected: the file is cut short, perhaps still being written",
+            ),
+            (
+                with("#usda 1.0", "#usd 1.0"),
+                0,
+                "byte 0: named like a usd file, but does not begin like one: `#usd 1.0`",
+            ),
+            (
+                with("def Points \"One\"", "def Points One"),
+                0,
+                "byte 93: a string expected, not \"One\"",
+            ),
+            (
+                with("def Points \"One\"", "def Points \"One"),
+                0,
+                "byte 3161: `{` expected, not \"vertex\\\"\"",
+            ),
             (
                 with(
                     "point3f[] points.timeSamples = {",
                     "point3f[] points.timeSamples = [",
                 ),
                 0,
-                "?",
+                "byte 1025: `{` expected, not \"[\"",
             ),
             (
                 with(
                     "point3f[] points.timeSamples = {\n        0: [(",
                     "point3f[] points.timeSamples = {\n        0: [(x, ",
                 ),
-                0,
-                "?",
+                3,
+                "byte 1040: \"x\" is not a number of this type",
             ),
             (
                 with(
                     "point3f[] points.timeSamples = {\n        0: [(",
                     "point3f[] points.timeSamples = {\n        0: [(1, ",
                 ),
-                0,
-                "?",
+                3,
+                "byte 1065: `)` expected, not \", -0.80487704), (-0.9127\"...",
             ),
-            (with("1.5: [", "half: ["), 0, "?"),
-            (with("1.5: [", "1.5 ["), 0, "?"),
-            (with("point3f[] points", "int[] points"), 0, "?"),
-            (with("upAxis = \"Z\"\n)", "upAxis = \"Z\"\n"), 0, "?"),
-            (with("def Points", "= Points"), 0, "?"),
+            (
+                with("1.5: [", "half: ["),
+                0,
+                "byte 424: \"half\" is not a time",
+            ),
+            (
+                with("1.5: [", "1.5 ["),
+                0,
+                "byte 428: `:` expected, not \"[1099511627782, 10995116\"...",
+            ),
+            (
+                with("point3f[] points", "int[] points"),
+                0,
+                "byte 1035: \"\" is not a number of this type",
+            ),
+            (
+                with("upAxis = \"Z\"\n)", "upAxis = \"Z\"\n"),
+                0,
+                "byte 98: `)` expected, not \"{\"",
+            ),
+            (
+                with("def Points", "= Points"),
+                0,
+                "byte 82: a prim or a property expected, not \"= Points \\\"One\\\"\"",
+            ),
             (
                 with(
                     "int64[] ids.timeSamples = {\n        0: [",
                     "int64[] ids.timeSamples = {\n        0: [1.5, ",
                 ),
-                0,
-                "?",
+                3,
+                "byte 145: \"1.5\" is not a number of this type",
             ),
         ],
     );
