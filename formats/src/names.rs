@@ -19,8 +19,16 @@ pub const RADIUS: &str = "radius";
 pub const RADII: [(&str, f64); 3] = [(RADIUS, 1.0), ("pscale", 1.0), ("diameter", 0.5)];
 
 /// Names of a colour with three or four components.
-pub const COLOR: [&str; 8] = [
-    "color", "colors", "colour", "colours", "rgb", "rgba", "rgbcolor", "cd",
+pub const COLOR: [&str; 9] = [
+    "color",
+    "colors",
+    "colour",
+    "colours",
+    "rgb",
+    "rgba",
+    "rgbcolor",
+    "cd",
+    "displaycolor",
 ];
 
 /// Names of a colour whose integers are sRGB codes. `Cd` is missing because it is linear.

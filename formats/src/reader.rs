@@ -167,8 +167,9 @@ pub(crate) trait Reader: Sync {
         1
     }
 
-    /// True if users of the program that wrote the file expect y to point up.
-    fn is_y_up(&self, _head: &[u8]) -> bool {
+    /// True if users of the program that wrote the file expect y to point up. `_bytes` are the first bytes of the file,
+    /// or all if [`Self::remarks_need_whole_file`] and the file is not compressed.
+    fn is_y_up(&self, _bytes: &[u8]) -> bool {
         false
     }
 

@@ -447,6 +447,28 @@ fn damaged_pdb() {
     let found = outcome("a.pdb", header.into());
     let what = "byte 0: no ATOM or HETATM records: the file has no positions";
     assert_eq!(found, (0, Some(what.to_owned())));
+    // A file of UTF-16, one with tabs between the fields, and numbers that are none
+    let record =
+        "ATOM      1  N   ALA A   1      11.000  12.000  13.000  1.00 16.50           N  \n";
+    let wide: Vec<u8> = record.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let marked = [&b"\xff\xfe"[..], &wide].concat();
+    let tabs = header.replace("END\n", &record.replace("   ", "\t"));
+    let cases = [
+        (marked, "UTF-16 text, which is not read; save as UTF-8"),
+        (tabs.into_bytes(), what),
+        (
+            record.replace("13.000", "13.0_0").into_bytes(),
+            "byte 0: columns 47 to 54 of an atom have \"13.0_0\", not a coordinate",
+        ),
+        (
+            record.replace("  12.000", "12.0.000").into_bytes(),
+            "byte 0: columns 39 to 46 of an atom have \"12.0.000\", not a coordinate",
+        ),
+    ];
+    for (bytes, what) in cases {
+        let found = outcome("a.pdb", bytes);
+        assert_eq!(found, (0, Some(what.to_owned())));
+    }
 }
 
 #[test]
@@ -489,6 +511,21 @@ fn damaged_mmcif() {
                 Text("data_MADE", "date_MADE"),
                 0,
                 "byte 0: named like a mmcif file, but does not begin like one: `date_MAD`",
+            ),
+            (
+                Text("_atom_site.Cartn_z", "_atom_site.Cartn_x"),
+                0,
+                "byte 49: _atom_site has no column Cartn_z",
+            ),
+            (
+                Text(" 502.001", ""),
+                1,
+                "byte 1174: a row has 16 of 17 values: the file is cut short, perhaps still being written",
+            ),
+            (
+                Text("936.442", "936,442"),
+                0,
+                "byte 475: \"936,442\" is not a coordinate",
             ),
         ],
     );

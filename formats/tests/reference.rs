@@ -192,3 +192,8 @@ fn dualsphysics_parts_are_what_was_written() {
 fn molecules_are_what_the_reference_readers_give() {
     assert_eq!(compare("molecules"), 98);
 }
+
+#[test]
+fn usd_is_what_the_reference_reader_gives() {
+    assert_eq!(compare("usd"), 172);
+}

@@ -93,8 +93,8 @@ pub(super) fn select(
     }
 }
 
-/// Requests for all frames of `sequence`; `companions` returns further files that the images of a frame depend on,
-/// `outputs` the output files.
+/// Requests for all frames of `sequence`; `companions` returns further files that the images of a frame depend on beside
+/// the topology, `outputs` the output files.
 pub(super) fn frame_requests(
     sequence: &Sequence,
     companions: impl Fn(i64) -> Vec<PathBuf>,
@@ -102,10 +102,13 @@ pub(super) fn frame_requests(
 ) -> Vec<FrameRequest> {
     let request = |(index, number)| {
         let inputs = sequence.inputs(index).into_iter();
+        let topology = sequence
+            .topology()
+            .map(|topology| topology.path().to_owned());
         FrameRequest {
             number,
             inputs: inputs.map(Path::to_owned).collect(),
-            companions: companions(number),
+            companions: topology.into_iter().chain(companions(number)).collect(),
             outputs: outputs(number),
         }
     };

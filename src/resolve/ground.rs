@@ -185,7 +185,10 @@ mod tests {
         // fades from 2 to 8 diagonals, which are 6 long
         let catcher = of(GroundKind::ShadowCatcher, |m| m.render.ground_shadow = 0.5);
         let catcher = catcher.unwrap().unwrap();
-        assert_eq!((catcher.height, catcher.shadow_catcher), (3.0144, Some(0.5)));
+        assert_eq!(
+            (catcher.height, catcher.shadow_catcher),
+            (3.0144, Some(0.5))
+        );
         let under_body = of(GroundKind::ShadowCatcher, |m| {
             m.surface.kind = SurfaceKind::Union;
         });

@@ -49,5 +49,6 @@ mod still;
 mod structures;
 mod surface;
 mod thesis;
+mod topology;
 mod trails;
 mod verify;

@@ -5,7 +5,6 @@ use std::path::Path;
 use memchr::memmem;
 
 use crate::ParseError;
-use crate::read::npy::is_usdz;
 
 /// Magic bytes at the start, and the message.
 const MAGICS: &[(&[u8], &str)] = &[
@@ -76,8 +75,6 @@ const MAGICS: &[(&[u8], &str)] = &[
         b"\x08\0\0\0HEAD",
         "a binary snapshot of Gadget, which is not read; write positions and attributes to .npz with pynbody or yt",
     ),
-    (b"#usda ", USD),
-    (b"PXR-USDC", USD),
     (b"7z\xbc\xaf\x27\x1c", ARCHIVE),
     (b"Rar!\x1a\x07", ARCHIVE),
     (
@@ -110,7 +107,6 @@ const MAGICS: &[(&[u8], &str)] = &[
 
 const IMAGE: &str = "an image, not a particle file";
 const ARCHIVE: &str = "an archive, which is not read; unpack it and give its files";
-const USD: &str = "a USD file, which is not read; export the points as .ply or .bgeo";
 const DUALSPHYSICS: &str = "a DualSPHysics file of an older version, or without particles, which is not read; give \
                             Part_####.bi4, or write .vtk with `PartVTK`";
 const GADGET: &str = "a binary snapshot of Gadget, which is not read; write positions and attributes to .npz with pynbody \
@@ -145,7 +141,6 @@ fn by_structure(head: &[u8]) -> Option<&'static str> {
         .iter()
         .any(|length| at(0, length) && at(260, length));
     [
-        (is_usdz(head), USD),
         (at(257, b"ustar"), ARCHIVE),
         (at(0, b"RIFF") && at(8, b"WEBP"), IMAGE),
         (at(4, b"ftyp"), "a video or image, not a particle file"),

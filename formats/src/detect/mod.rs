@@ -96,7 +96,7 @@ fn opening(head: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::read::{bgeo, bi4, csv, gsd, houdini, lammps, npy, ply, vtk, vtk_xml, xyz};
+    use crate::read::{bgeo, bi4, csv, gsd, houdini, lammps, npy, ply, usd, vtk, vtk_xml, xyz};
 
     #[track_caller]
     fn detect(name: &str, bytes: &[u8]) -> Format {
@@ -132,6 +132,9 @@ mod tests {
         assert_eq!(detect("a.txt", b"ITEM: TIMESTEP\n0\n"), lammps::FORMAT);
         assert_eq!(detect("a.xyz", b"\x93NUMPY\x01\0"), npy::NPY);
         assert_eq!(detect("a.zip", b"PK\x03\x04"), npy::NPZ);
+        assert_eq!(detect("a.zip", &zip(b"scene.usdc")), usd::FORMAT);
+        assert_eq!(detect("a.csv", b"#usda 1.0\n"), usd::FORMAT);
+        assert_eq!(detect("a", b"PXR-USDC\0\x08\0"), usd::FORMAT);
         assert_eq!(detect("a.xyz", &[0xdf, 0x65].repeat(4)), gsd::FORMAT);
         #[cfg(feature = "hdf5")]
         assert_eq!(
@@ -193,8 +196,6 @@ mod tests {
             b"a title\n\n2 atoms\n1 atom types\n",
             "LAMMPS data file",
         );
-        refused("a.usdz", &zip(b"scene.usdc"), "USD");
-        refused("a.usda", b"#usda 1.0\n", "USD");
         refused("a.gsd", &[0x65, 0xdf].repeat(4), "big-endian");
         refused("Part_0001.bi2", &[1, 2, 3], "DualSPHysics");
         refused("Part_0001", b"#File JPartDataBi4\0\0", "DualSPHysics");

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::damage::sample;
-use super::{amber, dcd, gro, mmcif, pdb, trr, xtc};
+use super::{amber, dcd, gro, lammps, mmcif, pdb, trr, xtc};
 use crate::SimulationCell;
 use crate::format::Format;
 
@@ -233,4 +233,66 @@ fn mmcif_files_have_cells() {
         None
     );
     assert_eq!(with(""), None);
+}
+
+#[test]
+fn lammps_binary_dumps_have_cells_and_boundaries() {
+    let bytes = sample("molecules/custom.lammpsbin");
+    // In the header, the sides of the box around the tilted one: 4.10394 = lx + xy + xz, 3.76195 = ly + yz
+    let (xy, xz, yz) = (0.5129927840030091, 0.1709975946676697, 0.3419951893353394);
+    let edges = [
+        [4.103942272024073 - xy - xz, 0.0, 0.0],
+        [xy, 3.761947082688733 - yz, 0.0],
+        [xz, yz, 3.4199518933533937],
+    ];
+    let found = cells(lammps::BINARY, &bytes);
+    assert_eq!(found.len(), 3);
+    assert_cell(found[0], edges);
+    // After the names, the numbers of the step and of atoms, and the flag of a tilted box: flags of boundaries
+    let mut fixed = bytes.clone();
+    fixed[18 + 24 + 4 + 2 * 8..][..4].copy_from_slice(&1_i32.to_le_bytes());
+    fixed[18 + 24 + 4 + 2 * 8 + 4..][..4].copy_from_slice(&2_i32.to_le_bytes());
+    let cell = cells(lammps::BINARY, &fixed)[0].expect("a cell");
+    assert_eq!(cell.periodic, [true, true, false]);
+    let mut damaged = bytes;
+    damaged[18 + 24 + 28..][..8].copy_from_slice(&f64::NAN.to_le_bytes());
+    assert_eq!(cells(lammps::BINARY, &damaged)[0], None);
+}
+
+#[test]
+#[cfg(feature = "hdf5")]
+fn h5md_files_have_cells_that_may_change() {
+    use super::hdf5;
+
+    let read = |name: &str| cells(hdf5::FORMAT, &sample(&format!("hdf5/cell-{name}.h5md")));
+    let moving = |step: f64| {
+        [
+            DVec3::new(4.0 + step, 0.0, 0.0),
+            DVec3::new(0.5, 3.0, 0.0),
+            DVec3::new(0.25, 0.75, 2.0 - 0.5 * step),
+        ]
+    };
+    let cell = |vectors, periodic| SimulationCell::new(DVec3::ZERO, vectors, periodic);
+    let expected = [0.0, 1.0, 2.0].map(|step| cell(moving(step), [true, false, true]));
+    assert_eq!(read("moving"), expected);
+    assert_eq!(read("fixed"), [cell(moving(1.0), [true; 3]); 3]);
+    let lengths = [3.0 * DVec3::X, 2.5 * DVec3::Y, 2.0 * DVec3::Z];
+    assert_eq!(read("lengths"), [cell(lengths, [false; 3]); 3]);
+    // A group `box` without edges
+    assert_eq!(cells(hdf5::FORMAT, &sample("hdf5/polymer.h5md")), [None; 3]);
+}
+
+#[test]
+#[cfg(feature = "hdf5")]
+fn gadget_snapshots_have_cells_by_the_size_of_their_box() {
+    use super::hdf5;
+
+    let read = |bytes: &[u8]| cells(hdf5::FORMAT, bytes)[0];
+    assert_cell(read(&sample("hdf5/swift.hdf5")), diagonal([2.0; 3]));
+    let bytes = sample("hdf5/gadget.hdf5");
+    assert_cell(read(&bytes), diagonal([10.0; 3]));
+    for size in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let bytes = replaced(&bytes, &10.0_f64.to_le_bytes(), &size.to_le_bytes());
+        assert_eq!(read(&bytes), None, "{size}");
+    }
 }

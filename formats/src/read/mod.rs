@@ -41,6 +41,7 @@ pub(crate) mod text;
 #[cfg(test)]
 mod text_samples;
 pub mod trr;
+pub mod usd;
 pub mod vtk;
 pub mod vtk_xml;
 mod xdr;

@@ -10,16 +10,6 @@ pub(super) fn cell_remark(periodic: Option<&str>) -> String {
     )
 }
 
-/// The remark that the cell of a file is not read; `periodic` are the flags of its boundaries.
-pub(super) fn unused_cell(periodic: Option<&str>) -> String {
-    let boundaries = periodic.map_or_else(String::new, |flags| {
-        format!(" and its periodic boundaries ({flags})")
-    });
-    format!(
-        "the cell of the simulation{boundaries} is not used: particles are drawn where the file has them"
-    )
-}
-
 /// The units of a format, which are not converted.
 pub(super) fn units(length: &str, velocity: Option<&str>, time: Option<&str>) -> String {
     let velocity = velocity.map_or_else(String::new, |unit| format!(", velocities in {unit}"));

@@ -10,9 +10,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
+use crate::compression::is_compressed;
 use crate::detect::Format;
 use crate::native::layout::UP_Y;
-use crate::native::{self, Access, NativeFile};
+use crate::native::{self, Access, MappedFile, NativeFile};
 use crate::{MemoryBudget, PeriodicImages};
 
 mod collection;
@@ -37,6 +38,7 @@ pub use from_names::{frames_of_list, frames_of_names};
 pub use input::SequenceInput;
 pub use load::Loaded;
 pub use merge::{PART_ATTRIBUTE, merge};
+pub use topology::Topology;
 
 use collection::{Expansion, ListedFiles};
 use group::FileGroup;
@@ -45,7 +47,6 @@ use load::{CachedFile, stamp};
 use name::FileName;
 use notes::{note_gaps, note_missing_parts};
 use pattern::Pattern;
-use topology::Topology;
 
 /// One file of a frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -231,7 +232,8 @@ impl Sequence {
     }
 
     /// Whether users of this format are used to y pointing up: Houdini's BGEO, and VTK files that
-    /// SPlisHSPlasH signs in their title, and native frames made of either. Elsewhere z is. Looks into the first file.
+    /// SPlisHSPlasH signs in their title, USD files that say so, and native frames made of any. Elsewhere z is. Looks into
+    /// the first file.
     pub fn is_y_up(&self) -> bool {
         let first = self.frames.first().and_then(|f| f.parts.first());
         first.is_some_and(|part| y_is_up(&part.path))
@@ -293,6 +295,11 @@ impl Sequence {
         let topology = Topology::open(path, self.budget);
         self.topology = Some(topology.map_err(SequenceError::Topology)?);
         Ok(())
+    }
+
+    /// The topology of [`Self::add_topology`].
+    pub const fn topology(&self) -> Option<&Topology> {
+        self.topology.as_ref()
     }
 
     /// Wraps and copies the particles of all frames. Frames without a simulation cell then fail when they are loaded.
@@ -393,6 +400,12 @@ fn y_is_up(path: &Path) -> bool {
         // The index of a native frame is at its end.
         let file = NativeFile::open(path, Access::Map);
         return file.is_ok_and(|file| file.index().up == UP_Y);
+    }
+    if format.reader().remarks_need_whole_file()
+        && let Ok(map) = MappedFile::open(path)
+        && !is_compressed(map.bytes())
+    {
+        return format.reader().is_y_up(map.bytes());
     }
     format.reader().is_y_up(&head)
 }

@@ -11,7 +11,7 @@ const CHANGING: [&str; 2] = ["velocity", "force"];
 
 /// The properties of all atoms, in the order of the trajectory.
 #[derive(Debug)]
-pub(super) struct Topology {
+pub struct Topology {
     path: PathBuf,
     /// Atoms.
     count: usize,
@@ -21,7 +21,10 @@ pub(super) struct Topology {
 
 impl Topology {
     /// Reads the first step of the file at `path`.
-    pub(super) fn open(path: &Path, budget: MemoryBudget) -> Result<Self, FrameError> {
+    ///
+    /// # Errors
+    /// [`FrameError`] if it cannot be read.
+    pub fn open(path: &Path, budget: MemoryBudget) -> Result<Self, FrameError> {
         let (count, mut attributes, bonds) = if psf::is_psf(&crate::open::head(path)?) {
             let bytes = read_whole(path, budget.for_content())?;
             psf::read(&bytes, budget).map_err(|e| e.in_file(path))?
@@ -39,12 +42,16 @@ impl Topology {
         })
     }
 
+    /// The file of the topology.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// Adds the properties and the bonds that `particles` of the file at `path` do not have.
-    pub(super) fn add_to(
-        &self,
-        particles: &mut RawParticles,
-        path: &Path,
-    ) -> Result<(), FrameError> {
+    ///
+    /// # Errors
+    /// [`FrameError::Malformed`] if there are more or fewer particles than atoms.
+    pub fn add_to(&self, particles: &mut RawParticles, path: &Path) -> Result<(), FrameError> {
         let count = particles.positions.len();
         if count != self.count {
             let what = format!(

@@ -23,7 +23,7 @@ pub use packed::{compressed, houdini, npz, open};
 pub type Target = fn(&[u8]) -> usize;
 
 /// Every target by the name of its folder in `corpus`.
-pub const TARGETS: [(&str, Target); 28] = [
+pub const TARGETS: [(&str, Target); 29] = [
     ("vtk", vtk),
     ("vtk_xml", vtk_xml),
     ("bgeo", bgeo),
@@ -44,6 +44,7 @@ pub const TARGETS: [(&str, Target); 28] = [
     ("pdb", pdb),
     ("mmcif", mmcif),
     ("lammps_binary", lammps_binary),
+    ("usd", usd),
     ("hdf5", hdf5),
     ("open", open),
     ("compressed", compressed),
@@ -165,6 +166,12 @@ pub fn mmcif(bytes: &[u8]) -> usize {
 /// LAMMPS binary dumps.
 pub fn lammps_binary(bytes: &[u8]) -> usize {
     read_all(read::lammps::BINARY, bytes, 1)
+}
+
+/// USD.
+pub fn usd(bytes: &[u8]) -> usize {
+    // Integers are packed twice, a value may stand for those of all particles, and parts may share their values.
+    read_all(read::usd::FORMAT, bytes, DEFLATE_RATIO * DEFLATE_RATIO)
 }
 
 /// HDF5.

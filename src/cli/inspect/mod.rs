@@ -7,7 +7,9 @@ use clap::Args;
 use serde_json::json;
 use spherule_formats::native::{FORMAT, layout, verify};
 use spherule_formats::open::{is_native, remarks};
-use spherule_formats::sequence::{ListSummary, SequenceSettings, is_list, lone_frame_number};
+use spherule_formats::sequence::{
+    ListSummary, SequenceError, SequenceSettings, Topology, is_list, lone_frame_number,
+};
 use spherule_formats::stats::FrameStats;
 use spherule_formats::{FrameError, FrameFile, Positions, Sequence, SequenceInput};
 
@@ -28,7 +30,9 @@ Examples:
   spherule inspect --json run1
       The same for all frames of a directory, as JSON
   spherule inspect --verify run1-native
-      Check all frames for damage";
+      Check all frames for damage
+  spherule inspect md.xtc --topology conf.gro
+      A trajectory with the elements of another file";
 
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
@@ -42,6 +46,9 @@ pub(super) struct InspectArgs {
     /// Read files outside the directory of a list of files, such as a .pvd, that names them.
     #[arg(long)]
     follow_links: bool,
+    /// File with the properties of the atoms of a trajectory: .gro, .pdb, .psf or other
+    #[arg(long, value_name = "FILE")]
+    topology: Option<PathBuf>,
     /// Check everything: all sections of native frames, every number of other files.
     #[arg(long)]
     verify: bool,
@@ -68,11 +75,14 @@ struct Inspected<'a> {
 
 pub(super) fn run(args: &InspectArgs) -> Result<Outcome, CliError> {
     let mut outcome = Outcome::Done;
+    let topology = args.topology.as_ref();
+    let topology = topology.map(|path| Topology::open(path, read_budget(None, None)));
+    let topology = topology.transpose().map_err(SequenceError::Topology)?;
     for meant in expand(args) {
         let inspected = match meant {
             Meant::List(list) => Ok(list.print(args.json)),
             Meant::File(file, place) => {
-                inspect(&file, place, args).map_err(|e| (file, e.to_string()))
+                inspect(&file, place, args, topology.as_ref()).map_err(|e| (file, e.to_string()))
             }
             Meant::Nothing(argument, why) => Err((argument, why)),
         };
@@ -194,13 +204,15 @@ fn expand(args: &InspectArgs) -> Vec<Meant> {
     all
 }
 
-/// Inspects one file. The outer error is of the file, the inner one of the output.
+/// Inspects one file, whose particles get the properties of `topology`. The outer error is of the file, the inner one of
+/// the output.
 fn inspect(
     path: &Path,
     place: FramePlace,
     args: &InspectArgs,
+    topology: Option<&Topology>,
 ) -> Result<Result<Reader, CliError>, FrameError> {
-    if is_native(path)? {
+    if topology.is_none() && is_native(path)? {
         let mut inspected = native::inspect(path, place.number, args.verify)?;
         inspected.time = place.time.or(inspected.time);
         return Ok(inspected.print(args.json));
@@ -209,7 +221,7 @@ fn inspect(
     // For several steps, the metadata come from the first one.
     let mut remarks = remarks(path);
     for index in 0..file.steps().len() {
-        let mut inspected = read(&file, index, place.number)?;
+        let mut inspected = read(&file, index, place.number, topology)?;
         inspected.time = place.time.or(inspected.time);
         inspected.notes = std::mem::take(&mut remarks);
         if args.verify && inspected.native.is_some() {
@@ -225,8 +237,16 @@ fn inspect(
 }
 
 /// Reads step `index` of `file`.
-fn read(file: &FrameFile, index: usize, number: Option<i64>) -> Result<Inspected<'_>, FrameError> {
-    let raw = file.read(index)?;
+fn read<'a>(
+    file: &'a FrameFile,
+    index: usize,
+    number: Option<i64>,
+    topology: Option<&Topology>,
+) -> Result<Inspected<'a>, FrameError> {
+    let mut raw = file.read(index)?;
+    if let Some(topology) = topology {
+        topology.add_to(&mut raw, file.path())?;
+    }
     let mut stats = FrameStats::of(&raw);
     let step = &file.steps()[index];
     let running = i64::try_from(index).ok();

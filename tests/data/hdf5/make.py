@@ -423,6 +423,29 @@ def plain():
                                            "id": data["id"]})
 
 
+# Cells of H5MD: edges at each step, a matrix and three lengths; see formats/src/read/cell_tests.rs
+def cells():
+    steps, times = numpy.array([0, 10, 20]), numpy.array([0.0, 1.0, 2.0])
+    moving = numpy.array([[[4 + step, 0, 0], [0.5, 3, 0], [0.25, 0.75, 2 - 0.5 * step]] for step in range(3)])
+    for name, edges, boundary in [("moving", moving, ["periodic", "none", "periodic"]),
+                                  ("fixed", moving[1], ["periodic"] * 3),
+                                  ("lengths", numpy.array([3.0, 2.5, 2.0], "f4"), ["none"] * 3)]:
+        with h5py.File(HERE / f"cell-{name}.h5md", "w") as file:
+            file.create_group("h5md").attrs["version"] = [1, 1]
+            group = file.create_group("particles/all")
+            position = group.create_group("position")
+            position["value"] = numpy.zeros((3, 2, 3), "f4")
+            position["step"], position["time"] = steps, times
+            box = group.create_group("box")
+            box.attrs["dimension"], box.attrs["boundary"] = 3, numpy.array(boundary, "S8")
+            if edges.ndim == 3:
+                node = box.create_group("edges")
+                node["value"] = edges
+                node["step"], node["time"] = position["step"], position["time"]
+            else:
+                box["edges"] = edges
+
+
 gadget()
 swift()
 snapshots()
@@ -433,4 +456,5 @@ h5md()
 openpmd()
 vtkhdf()
 plain()
+cells()
 (HERE / "expected.tsv").write_text("".join(lines))

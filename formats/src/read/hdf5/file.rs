@@ -242,6 +242,13 @@ impl Node {
         self.numbers(name)?.first().copied()
     }
 
+    /// The texts of an attribute that is an array of them; empty if it is not.
+    pub(super) fn texts(&self, name: &str) -> Vec<String> {
+        let attribute = self.group.attribute(name).ok();
+        let texts = attribute.and_then(|attribute| attribute.read_strings().ok());
+        texts.unwrap_or_default()
+    }
+
     /// The text of an attribute, as one line.
     pub(super) fn text(&self, name: &str) -> Option<String> {
         text(&self.group.attribute(name).ok()?)

@@ -3,6 +3,8 @@
 
 use std::sync::Arc;
 
+use glam::{DMat3, DVec3};
+
 use super::dialect::{Dialect, StepInfo, integer, listed, units};
 use super::file::{Node, dataset_number, dataset_text};
 use super::piece::Piece;
@@ -10,8 +12,8 @@ use super::properties::PropertyFinder;
 use super::stored::Stored;
 use super::table::{Part, ParticleTable};
 use super::values::{Slice, Values};
-use crate::read::remarks::unused_cell;
-use crate::{MemoryBudget, ParseError};
+use crate::read::remarks::cell_remark;
+use crate::{MemoryBudget, ParseError, SimulationCell};
 
 /// What the names of the groups of types begin with.
 const TYPE: &str = "PartType";
@@ -92,6 +94,24 @@ impl Snapshot {
 
     fn header_number(&self, name: &str) -> Option<f64> {
         self.header.as_ref()?.number(name)
+    }
+
+    /// The cell by `BoxSize`: a cube, or a cuboid with three lengths. None without a length above 0, as in runs without
+    /// boundaries. It repeats, unless SWIFT says otherwise.
+    fn cell(&self) -> Option<SimulationCell> {
+        let sizes = self.header.as_ref()?.numbers("BoxSize")?;
+        let lengths = match sizes[..] {
+            [size] => [size; 3],
+            [x, y, z] => [x, y, z],
+            _ => return None,
+        };
+        let swift = self.root.group("RuntimePars").ok().flatten();
+        let periodic = swift.and_then(|parameters| parameters.number("PeriodicBoundariesOn"));
+        let periodic = periodic != Some(0.0);
+        let vectors = DMat3::from_diagonal(lengths.into());
+        let vectors = [vectors.x_axis, vectors.y_axis, vectors.z_axis];
+        let has_lengths = lengths.iter().all(|length| *length > 0.0);
+        SimulationCell::new(DVec3::ZERO, vectors, [periodic; 3]).filter(|_| has_lengths)
     }
 
     /// Particles of this file by its header; 1 without a header.
@@ -240,7 +260,8 @@ impl Dialect for Snapshot {
         }
         let time = self.header_number("Time");
         // Also with one type: later snapshots may have more.
-        Ok(ParticleTable::new(parts, true).at(time, None))
+        let table = ParticleTable::new(parts, true).at(time, None);
+        Ok(table.in_cell(self.cell()))
     }
 
     fn remarks(&self) -> Vec<String> {
@@ -276,8 +297,8 @@ impl Dialect for Snapshot {
             let what = "not one group of numbers for each particle, or not readable, so left out";
             remarks.push(format!("{what}: {}", listed(&left_out)));
         }
-        if self.header_number("BoxSize").is_some_and(|size| size > 0.0) {
-            remarks.push(unused_cell(None));
+        if self.cell().is_some() {
+            remarks.push(cell_remark(None));
         }
         remarks
     }

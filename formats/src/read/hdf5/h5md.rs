@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use glam::DVec3;
+
 use super::dialect::{Dialect, StepInfo, integer, listed, no_step, part_names, units};
 use super::file::{Node, dataset_number, dataset_text};
 use super::piece::Piece;
@@ -10,8 +12,8 @@ use super::properties::{PropertyFinder, numbers};
 use super::stored::Stored;
 use super::table::{Part, ParticleTable};
 use super::values::{Slice, Values};
-use crate::read::remarks::unused_cell;
-use crate::{MemoryBudget, ParseError};
+use crate::read::remarks::cell_remark;
+use crate::{MemoryBudget, ParseError, SimulationCell};
 
 const POSITION: &str = "position";
 /// Least budget for lists of steps.
@@ -89,6 +91,25 @@ impl Element {
             }
         }
     }
+}
+
+/// The edges of a cell in two or three dimensions, from their lengths or all their components.
+fn edges_of(numbers: &[f64]) -> Option<[DVec3; 3]> {
+    Some(match *numbers {
+        [a, b, c] => [a * DVec3::X, b * DVec3::Y, c * DVec3::Z],
+        [a, b] => [a * DVec3::X, b * DVec3::Y, DVec3::ZERO],
+        [ax, ay, bx, by] => [
+            DVec3::new(ax, ay, 0.0),
+            DVec3::new(bx, by, 0.0),
+            DVec3::ZERO,
+        ],
+        [ax, ay, az, bx, by, bz, cx, cy, cz] => [
+            DVec3::new(ax, ay, az),
+            DVec3::new(bx, by, bz),
+            DVec3::new(cx, cy, cz),
+        ],
+        _ => return None,
+    })
 }
 
 /// The numbers `name` for `count` samples: a list, or an increment from an offset.
@@ -229,6 +250,27 @@ impl Trajectory {
         }))
     }
 
+    /// The cell at a step, that of the first group that has one. A damaged cell is none.
+    fn cell(&self, number: i64, budget: MemoryBudget) -> Option<SimulationCell> {
+        let mut boxes = self.groups.iter().filter_map(|group| {
+            let node = group.node.group("box").ok()??;
+            let edges = Element::open(&node, "edges", budget).ok()??;
+            let slice = edges.slice(number)?;
+            let values = Values::find(node.file(), &edges.stored, &slice, budget).ok()??;
+            // Three lengths, or a matrix whose rows are the edges
+            let count = usize::try_from(values.count())
+                .ok()
+                .filter(|count| *count <= 3)?;
+            let numbers = Piece::Stored(values).all(node.file().bytes(), count).ok()?;
+            let vectors = edges_of(&numbers)?;
+            let boundary = node.texts("boundary");
+            let is_periodic = |text: &String| text.trim_end_matches('\0').trim() == "periodic";
+            let periodic = [0, 1, 2].map(|axis| boundary.get(axis).is_none_or(is_periodic));
+            SimulationCell::new(DVec3::ZERO, vectors, periodic)
+        });
+        boxes.next()
+    }
+
     /// Units of the elements of the first group.
     fn units(&self) -> Vec<String> {
         let Some(group) = self.groups.first() else {
@@ -278,7 +320,8 @@ impl Dialect for Trajectory {
             .groups
             .iter()
             .all(|group| group.position.steps.is_none());
-        Ok(table.at(found.time, (!is_fixed).then_some(found.number)))
+        let table = table.at(found.time, (!is_fixed).then_some(found.number));
+        Ok(table.in_cell(self.cell(found.number, budget)))
     }
 
     fn remarks(&self) -> Vec<String> {
@@ -305,9 +348,9 @@ impl Dialect for Trajectory {
             _ => remarks.push(part_names((0..).zip(names.iter().map(String::as_str)))),
         }
         remarks.extend(units(&self.units()));
-        let has_box = |group: &ParticleGroup| matches!(group.node.group("box"), Ok(Some(_)));
-        if self.groups.iter().any(has_box) {
-            remarks.push(unused_cell(None));
+        let first = self.steps.first().map_or(0, |step| step.number);
+        if self.cell(first, MemoryBudget::UNLIMITED).is_some() {
+            remarks.push(cell_remark(None));
         }
         remarks
     }

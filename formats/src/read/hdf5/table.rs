@@ -6,7 +6,9 @@ use super::piece::{Piece, encoded};
 use super::values::Input;
 use crate::names::is_radius_name;
 use crate::read::columns::{StridedColumn, positions, zeros};
-use crate::{Attribute, AttributeData, MemoryBudget, ParseError, RawParticles, ScalarType};
+use crate::{
+    Attribute, AttributeData, MemoryBudget, ParseError, RawParticles, ScalarType, SimulationCell,
+};
 
 /// The attribute that tells parts apart.
 pub(super) const PART: &str = "part";
@@ -46,6 +48,7 @@ pub(super) struct ParticleTable {
     is_divided: bool,
     time: Option<f64>,
     step: Option<i64>,
+    cell: Option<SimulationCell>,
     /// Names of attributes that are in some parts only, and left out.
     left_out: Vec<String>,
 }
@@ -103,6 +106,7 @@ impl ParticleTable {
             is_divided,
             time: None,
             step: None,
+            cell: None,
             left_out,
         }
     }
@@ -110,6 +114,11 @@ impl ParticleTable {
     /// The same particles at this time and step.
     pub(super) fn at(self, time: Option<f64>, step: Option<i64>) -> Self {
         Self { time, step, ..self }
+    }
+
+    /// The same particles in this simulation cell.
+    pub(super) fn in_cell(self, cell: Option<SimulationCell>) -> Self {
+        Self { cell, ..self }
     }
 
     /// Number of particles.
@@ -206,7 +215,7 @@ impl ParticleTable {
             attributes,
             time: self.time,
             step: self.step,
-            cell: None,
+            cell: self.cell,
             bonds: Vec::new(),
         })
     }

@@ -13,7 +13,7 @@ use crate::format::Format;
 use crate::names::{LAMMPS_CATEGORIES, LAMMPS_INTEGERS};
 use crate::read::columns::{ComponentStride, GrowingParticles, ParticleLayout, StridedColumn};
 use crate::read::numbers::NumberReader;
-use crate::read::remarks::unused_cell;
+use crate::read::remarks::cell_remark;
 use crate::read::{ByteSource, Step, text};
 use crate::reader::{Confidence, Reader};
 use crate::{
@@ -80,7 +80,7 @@ impl Reader for LammpsBinary {
     }
 
     fn remarks(&self, head: &[u8]) -> Vec<String> {
-        let mut remarks = vec![unused_cell(None)];
+        let mut remarks = vec![cell_remark(None)];
         if let Ok(frame) = Frame::parse(head, 0, MemoryBudget::UNLIMITED)
             && !frame.units.is_empty()
         {
@@ -110,6 +110,8 @@ struct Frame<'a> {
     /// Where the count is.
     count_at: usize,
     bounds: Bounds,
+    /// Whether the cell repeats along each edge.
+    periodic: [bool; 3],
     units: &'a [u8],
     /// Names of the columns, and where they are.
     names: Vec<Vec<u8>>,
@@ -142,7 +144,7 @@ impl<'a> Frame<'a> {
         let count = header.i64()?;
         let count = usize::try_from(count)
             .map_err(|_| ParseError::malformed(count_at, format!("{count} atoms")))?;
-        let bounds = box_bounds(&mut header)?;
+        let (bounds, periodic) = box_bounds(&mut header)?;
         let size_at = header.at();
         let size = header.count("number of columns")?;
         let len = header.count("length of the units")?;
@@ -168,6 +170,7 @@ impl<'a> Frame<'a> {
             count,
             count_at,
             bounds,
+            periodic,
             units,
             names,
             names_at,
@@ -215,6 +218,7 @@ impl<'a> Frame<'a> {
 
     fn particles(self, bytes: &'a [u8], budget: MemoryBudget) -> Result<RawParticles, ParseError> {
         let (layout, scaled_by) = self.layout()?;
+        let cell = self.bounds.cell(self.periodic);
         // A damaged count may promise more than there is.
         let each = F64 * self.names.len().max(1);
         let room = self.count.min(bytes.len() / each);
@@ -225,6 +229,7 @@ impl<'a> Frame<'a> {
             v.par_iter_mut().for_each(|p| *p = bounds.place(*p));
         }
         particles.attributes.iter_mut().for_each(to_integers);
+        particles.cell = cell;
         Ok(particles)
     }
 
@@ -236,8 +241,7 @@ impl<'a> Frame<'a> {
             count: self.count,
             count_at: self.count_at,
             bounds: Some(self.bounds),
-            // It decides only about the cell, which is not read here
-            periodic: [true; 3],
+            periodic: self.periodic,
             names_at: self.names_at,
             names: self.names.clone(),
         };
@@ -285,11 +289,13 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// The box: flags, and its sides with tilt factors if it is triclinic.
-fn box_bounds(header: &mut NumberReader<'_>) -> Result<Bounds, ParseError> {
+/// The box, and whether it repeats along its edges: flags, and its sides with tilt factors if it is triclinic.
+fn box_bounds(header: &mut NumberReader<'_>) -> Result<(Bounds, [bool; 3]), ParseError> {
     let tilted = header.i32()?;
-    for _ in 0..6 {
-        header.i32()?;
+    // Two flags for each axis, 0 for a periodic boundary
+    let mut periodic = [true; 3];
+    for periodic in &mut periodic {
+        *periodic = [header.i32()?, header.i32()?].contains(&0);
     }
     let [mut lo, mut hi, mut tilt] = [[0.0; 3]; 3];
     for (lo, hi) in lo.iter_mut().zip(&mut hi) {
@@ -307,7 +313,7 @@ fn box_bounds(header: &mut NumberReader<'_>) -> Result<Bounds, ParseError> {
             return Err(ParseError::unsupported(what));
         }
     }
-    Ok(Bounds::triclinic(lo.into(), hi.into(), tilt))
+    Ok((Bounds::triclinic(lo.into(), hi.into(), tilt), periodic))
 }
 
 /// Ids, types and molecules are integers, unless one is not whole.
