@@ -97,7 +97,9 @@ fn bonds_by_distance_have_a_radius_and_a_colour() {
     let options = [
         "--bonds=1.5",
         "--set",
-        "bonds={radius=0.05, color=[0.1, 0.2, 0.3]}",
+        "bonds.radius=0.05",
+        "--set",
+        "bonds.color=[0.1, 0.2, 0.3]",
     ];
     let found = picture(&workshop, "in.xyz", &options);
     for x in [-0.7, 0.3, 0.7] {

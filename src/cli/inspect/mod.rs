@@ -30,9 +30,7 @@ Examples:
   spherule inspect --json run1
       The same for all frames of a directory, as JSON
   spherule inspect --verify run1-native
-      Check all frames for damage
-  spherule inspect md.xtc --topology conf.gro
-      A trajectory with the elements of another file";
+      Check all frames for damage";
 
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
