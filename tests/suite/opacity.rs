@@ -8,6 +8,7 @@ use crate::picture::Picture;
 
 const VIEW: &str = "output.transparent = true
 output.preview = false
+render.ground = \"none\"
 image = { width = 24, height = 24, samples = 64 }
 camera = { mode = \"fixed\", eye = [0, 0, 60], look_at = [0, 0, 0], up = [0, 1, 0], fov = 0.8 }
 ";

@@ -44,9 +44,8 @@ fn inspect_shows_the_attributes_of_a_topology() {
     };
     assert_eq!(names(&[]), ["velocity"]);
     assert_eq!(names(&TOPOLOGY), ["velocity", "element", "residue"]);
-    shop.run(&["inspect", "md.trr", "--topology", "conf.gro"])
-        .expect(0)
-        .prints("element");
+    let ran = shop.run(&["inspect", "md.trr", "--topology", "conf.gro"]);
+    assert!(ran.expect(0).text().contains("element"));
     shop.run(&["inspect", "md.trr", "--topology", "nothing.gro"])
         .expect(2)
         .prints("nothing.gro");

@@ -178,10 +178,10 @@ mod tests {
         fails(
             "1 2 2",
             "1 2 3",
-            "3 in a bond is not the number of an atom, 1 to 2",
+            "\"3\" in a bond is not the number of an atom, 1 to 2",
         );
-        fails("1 2 2", "1 two 2", "two in a bond");
-        fails("1 2 2", "0 2 2", "0 in a bond");
+        fails("1 2 2", "1 two 2", "\"two\" in a bond");
+        fails("1 2 2", "0 2 2", "\"0\" in a bond");
         let tight = MemoryBudget::new(10, "take care");
         assert!(read(TEXT.as_bytes(), tight).is_err());
     }
