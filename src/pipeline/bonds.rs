@@ -270,6 +270,7 @@ fn images_around(cell: &SimulationCell) -> Vec<Vec3> {
 #[cfg(test)]
 mod tests {
     use glam::DVec3;
+    use spherule_formats::order::index_u32;
     use spherule_formats::{Attribute, AttributeData, ParticleFrame};
 
     use super::*;
@@ -320,12 +321,12 @@ mod tests {
                 let Some(length) = length(a, b) else { continue };
                 let way = frame.positions[b].as_dvec3() - frame.positions[a].as_dvec3();
                 if a < b && way.length() <= length {
-                    pairs.push([a as u32, b as u32]);
+                    pairs.push([a, b].map(index_u32));
                 }
                 let near = images
                     .iter()
                     .filter(|i| (way - i.as_dvec3()).length() <= length);
-                halves.extend(near.map(|_| a as u32));
+                halves.extend(near.map(|_| index_u32(a)));
             }
         }
         (pairs, halves)

@@ -226,6 +226,9 @@ fn selected(
     }
     let survivors = selection.survivors(&particles);
     let survivors = survivors.map_err(|e| unknown_name(&e, file, &particles.attributes))?;
+    if survivors.len() == particles.positions.len() {
+        return Ok(ParticleFrame::from_raw(particles, *origin));
+    }
     Ok(ParticleFrame::from_selected(particles, survivors, *origin))
 }
 
