@@ -35,6 +35,10 @@ struct Usd;
 /// The key of the step of a file in which nothing changes: the bits of a NaN.
 const NO_TIME: u64 = u64::MAX;
 
+/// Memory for what is not about the particles of a step: packed lists of a damaged file may be thousands of times as
+/// long as the file.
+const METADATA_BUDGET: MemoryBudget = MemoryBudget::new(1 << 30, "write fewer prims into one file");
+
 impl Reader for Usd {
     fn name(&self) -> &'static str {
         "usd"
@@ -112,13 +116,13 @@ impl Reader for Usd {
     }
 
     fn remarks(&self, bytes: &[u8]) -> Vec<String> {
-        let budget = MemoryBudget::UNLIMITED;
+        let budget = METADATA_BUDGET;
         let remarks = with_layer(bytes, budget, |layer, _| Ok(remarks::remarks(layer)));
         remarks.unwrap_or_default()
     }
 
     fn is_y_up(&self, bytes: &[u8]) -> bool {
-        let budget = MemoryBudget::UNLIMITED;
+        let budget = METADATA_BUDGET;
         let is_y_up = with_layer(bytes, budget, |layer, _| Ok(!layer.metadata.is_z_up));
         is_y_up.unwrap_or(true)
     }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use super::METADATA_BUDGET;
 use super::layer::Layer;
 use super::number_type::Numbers;
 use super::prim::{MOST_LEVELS, PrimKind, Property, Samples};
@@ -301,9 +302,7 @@ pub(super) fn changes_around(
     };
     let numbers = |index| {
         let value = layer.sample_value(samples, index);
-        value.map_or(Ok(None), |value| {
-            layer.numbers(&value, MemoryBudget::UNLIMITED)
-        })
+        value.map_or(Ok(None), |value| layer.numbers(&value, METADATA_BUDGET))
     };
     Ok(numbers(index)? != numbers(index + 1)?)
 }
