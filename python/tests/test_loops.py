@@ -71,7 +71,9 @@ def test_arrays_that_nobody_else_holds_live_as_long_as_the_render(small):
 def test_ctrl_c_stops_a_render():
     code = textwrap.dedent(
         """
-        import numpy, spherule
+        import numpy, signal, spherule
+        # Programs that were started in the background of a script ignore the signal
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         print("started", flush=True)
         positions = numpy.random.default_rng(1).random((1000, 3), dtype="float32")
         spherule.render(positions, radius=0.02, size=(3840, 2160), samples=4096)
