@@ -167,6 +167,12 @@ pub(crate) trait Reader: Sync {
         1
     }
 
+    /// Whether `file` has no values of its own but those of the files that its step is divided among, which are beside
+    /// it.
+    fn refers_to_pieces(&self, _file: &SharedBytes) -> bool {
+        false
+    }
+
     /// True if users of the program that wrote the file expect y to point up. `_bytes` are the first bytes of the file,
     /// or all if [`Self::remarks_need_whole_file`] and the file is not compressed.
     fn is_y_up(&self, _bytes: &[u8]) -> bool {

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use spherule_formats::convert::open_source;
+use spherule_formats::sequence::{Sequence, SequenceInput};
 use spherule_formats::{
     Attribute, AttributeData, FrameError, FrameFile, MemoryBudget, RawParticles,
 };
@@ -170,4 +171,66 @@ fn truncations_and_wrong_bytes_are_survived() {
             }
         }
     }
+}
+
+/// Copies the files `names` of the data to an empty directory.
+fn directory_of(names: &[&str]) -> tempfile::TempDir {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    for name in names {
+        fs::copy(data(name), dir.path().join(name)).expect("readable");
+    }
+    dir
+}
+
+/// The ids of each frame of `input`, and the notes.
+fn ids_of(input: SequenceInput) -> (Vec<Vec<f64>>, String) {
+    let sequence = Sequence::open(&input).expect("a sequence");
+    let ids = |index| {
+        let frame = sequence.load_raw(index).expect("readable");
+        let ids = frame.attributes.iter().find(|a| a.name == "ParticleIDs");
+        let ids = ids.expect("ids");
+        (0..ids.data.len()).map(|i| ids.data.get_f64(i)).collect()
+    };
+    let frames = (0..sequence.frames().len()).map(ids).collect();
+    (frames, sequence.notes().join("; "))
+}
+
+#[test]
+fn virtual_data_sets_of_a_snapshot_give_the_files_with_the_values() {
+    const ALL: [&str; 6] = [
+        "snap_003.hdf5",
+        "snap_003.0.hdf5",
+        "snap_003.1.hdf5",
+        "snap_004.hdf5",
+        "snap_004.0.hdf5",
+        "snap_004.1.hdf5",
+    ];
+    let pattern = |dir: &Path, name: &str| SequenceInput::Pattern(dir.join(name));
+    let dir = directory_of(&ALL);
+    let (expected, notes) = ids_of(pattern(dir.path(), "snap_#.*.hdf5"));
+    assert_eq!(expected.iter().map(Vec::len).collect::<Vec<_>>(), [52, 54]);
+    assert!(!notes.contains("virtual"), "{notes}");
+    // The directory, the virtual files, and one of them
+    let virtual_files = pattern(dir.path(), "snap_#.hdf5");
+    for input in [SequenceInput::Directory(dir.path().into()), virtual_files] {
+        let (found, notes) = ids_of(input);
+        assert_eq!(found, expected);
+        assert!(
+            notes.contains("and 1 more have virtual data sets"),
+            "{notes}"
+        );
+    }
+    let one = SequenceInput::Files(vec![dir.path().join(ALL[3])]);
+    assert_eq!(ids_of(one).0, expected[1..]);
+    // A file with the values is missing
+    let dir = directory_of(&ALL[..2]);
+    let (found, notes) = ids_of(SequenceInput::Directory(dir.path().into()));
+    assert_eq!(found[0].len(), 23);
+    assert!(notes.contains("only 1 of them exist"), "{notes}");
+    // All are
+    let dir = directory_of(&ALL[..1]);
+    let sequence = Sequence::open(&SequenceInput::Directory(dir.path().into()));
+    let error = sequence.and_then(|s| Ok(s.load_raw(0))).expect("one frame");
+    let error = error.expect_err("no values").to_string();
+    assert!(error.contains("a virtual data set"), "{error}");
 }

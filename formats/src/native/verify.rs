@@ -16,6 +16,7 @@ use crate::blocks::{
     Aabb, BLOCK_SIZE, Block, BlockRadii, CompactBlock, FARTHEST_PLANE, Node, StoredBlocks,
     StoredLeaves, WIDTH,
 };
+use crate::message::one_line;
 
 /// Reserved header bytes, zero in this version.
 const RESERVED: std::ops::Range<usize> = 48..56;
@@ -145,7 +146,8 @@ fn verify_section(bytes: &[u8], what: &str, section: &Section) -> Result<(), Par
 fn fault(at: u64, what: &str) -> ParseError {
     ParseError::Malformed {
         at,
-        what: format!("{what}; convert again"),
+        // Names of attributes may hold anything
+        what: one_line(format!("{what}; convert again")),
     }
 }
 

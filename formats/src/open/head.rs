@@ -10,7 +10,7 @@ use crate::compression::{ByteStream, StreamError, is_compressed};
 use crate::detect::Format;
 use crate::message::one_line;
 use crate::native::{self, MappedFile};
-use crate::reader::HEAD_LEN;
+use crate::reader::{HEAD_LEN, Reader};
 use crate::regular::regular_len;
 use crate::shared::SharedBytes;
 use crate::{FrameError, MemoryBudget};
@@ -64,12 +64,19 @@ pub fn remarks(path: &Path) -> Vec<String> {
 
 /// Number of files that the step in the file at `path` is divided among, as the file states; 1 if it does not.
 pub(crate) fn piece_count(path: &Path) -> u64 {
-    let count = || {
-        let map = Arc::new(MappedFile::open(path).ok()?);
-        let format = Format::detect(map.bytes(), path).ok()?;
-        Some(format.reader().piece_count(&SharedBytes::new(map)))
-    };
-    count().unwrap_or(1)
+    with_reader(path, |reader, file| reader.piece_count(file)).unwrap_or(1)
+}
+
+/// Whether the file at `path` only refers to the files that its step is divided among.
+pub(crate) fn refers_to_pieces(path: &Path) -> bool {
+    with_reader(path, |reader, file| reader.refers_to_pieces(file)).unwrap_or(false)
+}
+
+/// What the reader of the file at `path` says of it; None if the file cannot be opened, or has no known format.
+fn with_reader<T>(path: &Path, ask: impl FnOnce(&dyn Reader, &SharedBytes) -> T) -> Option<T> {
+    let map = Arc::new(MappedFile::open(path).ok()?);
+    let format = Format::detect(map.bytes(), path).ok()?;
+    Some(ask(format.reader(), &SharedBytes::new(map)))
 }
 
 /// The first bytes of the file at `path`, decompressed. Damage that comes later, or that lets some bytes pass, is no

@@ -27,7 +27,7 @@ mod whole;
 
 pub use crate::compression::unpacked_len;
 pub use head::{detect_file, is_native, remarks};
-pub(crate) use head::{head, piece_count};
+pub(crate) use head::{head, piece_count, refers_to_pieces};
 pub(crate) use whole::read_whole;
 
 use mapped::SteppedFile;

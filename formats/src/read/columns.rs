@@ -81,14 +81,16 @@ impl StridedColumn {
 /// of `len` bytes.
 ///
 /// # Errors
-/// [`ParseError::Malformed`] at `at`, with the bytes needed and the bytes there.
+/// [`ParseError::Malformed`] at `at`, or at the end of the file if `at` is beyond it, with the bytes needed and the
+/// bytes there.
 pub(super) fn check_room(
     at: usize,
     count: usize,
     each: usize,
     len: usize,
 ) -> Result<(), ParseError> {
-    let available = len.saturating_sub(at);
+    let at = at.min(len);
+    let available = len - at;
     match count.checked_mul(each) {
         Some(need) if need <= available => Ok(()),
         Some(need) => Err(ParseError::malformed(

@@ -26,6 +26,7 @@ mod merge;
 mod name;
 mod notes;
 mod pattern;
+mod pieces;
 mod scan;
 mod topology;
 
@@ -142,19 +143,16 @@ impl Sequence {
         let mut notes = Vec::new();
         let group = match input {
             SequenceInput::Directory(path) => {
-                let mut names = scan::directory(path)?;
-                scan::split_pieces(&mut names, &mut notes);
+                let names = pieces::find_pieces(scan::directory(path)?, &mut notes);
                 group::pick(path, names, &mut notes)?
             }
             SequenceInput::Pattern(path) => {
                 let pattern = Pattern::parse(path)?;
-                let mut names = scan::fitting(&pattern, path)?;
-                scan::split_pieces(&mut names, &mut notes);
+                let names = pieces::find_pieces(scan::fitting(&pattern, path)?, &mut notes);
                 group::pick(&pattern.directory, names, &mut notes)?
             }
             SequenceInput::Files(paths) => {
-                let mut names = listed_names(paths)?;
-                scan::split_pieces(&mut names, &mut notes);
+                let names = pieces::find_pieces(listed_names(paths)?, &mut notes);
                 group::listed(names, &mut notes)?
             }
         };

@@ -68,10 +68,9 @@ impl FileName {
 
     /// Whether the name ends with a number between dots, as `snap_010.3.hdf5`.
     pub(super) fn may_be_piece(&self) -> bool {
-        let is_snapshot = ["hdf5", "h5"].contains(&self.extension.as_str());
         let column = self.numbers.len().checked_sub(1);
         let is_free = column.is_some() && self.frame_column != column;
-        is_snapshot
+        self.is_snapshot()
             && is_free
             && matches!(self.literals.as_slice(), [.., dot, end] if dot == "." && end.is_empty())
     }
@@ -87,6 +86,32 @@ impl FileName {
         if let Some(end) = self.literals.last_mut() {
             end.push('*');
         }
+    }
+
+    /// The path of the file `number` among those of one step, if this is the name of the whole: `snap_010.3.hdf5` of
+    /// `snap_010.hdf5`.
+    pub(super) fn piece_path(&self, number: i64) -> Option<PathBuf> {
+        if !self.is_snapshot() || self.piece.is_some() {
+            return None;
+        }
+        let name = self.path.file_name()?.to_str()?;
+        let stem = name.strip_suffix(&self.suffix)?;
+        let suffix = &self.suffix;
+        Some(self.path.with_file_name(format!("{stem}.{number}{suffix}")))
+    }
+
+    /// The name of that file.
+    pub(super) fn piece(&self, number: i64) -> Option<Self> {
+        let mut piece = self.clone();
+        piece.path = self.piece_path(number)?;
+        piece.piece = Some(number);
+        piece.literals.last_mut()?.push_str(".*");
+        Some(piece)
+    }
+
+    /// Whether files with such a name may belong to one step.
+    fn is_snapshot(&self) -> bool {
+        ["hdf5", "h5"].contains(&self.extension.as_str())
     }
 
     /// The number of a file that has no siblings: what follows the word `frame`, else the last.

@@ -11,35 +11,8 @@ use super::pattern::Pattern;
 use super::{NumberedStep, PartFile, SequenceError};
 use crate::MemoryBudget;
 use crate::detect::Format;
-use crate::open::{FrameFile, detect_file, piece_count};
+use crate::open::{FrameFile, detect_file};
 use crate::read::Step;
-
-/// Finds names whose last number is that of a file of one step: the files state how many a step has. Notes steps that
-/// have fewer.
-pub(super) fn split_pieces(names: &mut [FileName], notes: &mut Vec<String>) {
-    let mut counts = BTreeMap::<Vec<String>, u64>::new();
-    for name in names.iter_mut().filter(|name| name.may_be_piece()) {
-        let count = counts.entry(name.literals.clone());
-        let count = *count.or_insert_with(|| piece_count(&name.path));
-        if count > 1 {
-            name.split_piece();
-        }
-    }
-    let mut found = BTreeMap::<(&[String], &[i64]), (u64, &Path)>::new();
-    for name in names.iter().filter(|name| name.piece.is_some()) {
-        let step = found.entry((&name.literals, &name.numbers));
-        step.or_insert((0, &name.path)).0 += 1;
-    }
-    for (count, path) in found.into_values() {
-        let stated = piece_count(path);
-        if count < stated {
-            let path = path.display();
-            notes.push(format!(
-                "`{path}` belongs to a step of {stated} files, but only {count} of them exist"
-            ));
-        }
-    }
-}
 
 /// The particle files of a directory. Pictures, notes, hidden and unfinished files are passed
 /// over by name; only where no name is known are the files looked into.

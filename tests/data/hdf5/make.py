@@ -139,6 +139,32 @@ def snapshots():
                {name: numpy.concatenate([part[name] for part in parts]) for name in parts[0]})
 
 
+# SWIFT: a file of virtual data sets beside the files with the values
+def virtual_snapshots():
+    for number in [3, 4]:
+        pieces = [f"snap_{number:03}.{piece}.hdf5" for piece in range(2)]
+        with h5py.File(HERE / f"snap_{number:03}.hdf5", "w") as file:
+            header = file.create_group("Header")
+            header.attrs["NumFilesPerSnapshot"], header.attrs["Virtual"] = [1], [1]
+            header.attrs["Time"] = 0.5 * number
+            for kind in range(2):
+                for name in ["Coordinates", "ParticleIDs"]:
+                    path, sources = f"PartType{kind}/{name}", []
+                    for piece in pieces:
+                        with h5py.File(HERE / piece) as source:
+                            if path in source:
+                                sources.append((h5py.VirtualSource(source[path]), len(source[path])))
+                                dtype, row = source[path].dtype, source[path].shape[1:]
+                    layout = h5py.VirtualLayout((sum(count for _, count in sources), *row), dtype)
+                    end = 0
+                    for source, count in sources:
+                        # The file beside this one, by its name alone
+                        source.path = pathlib.Path(source.path).name
+                        layout[end:end + count] = source
+                        end += count
+                    file.create_virtual_dataset(path, layout)
+
+
 # PySPH: the layout of its output, arrays with other properties, vectors with a stride
 def pysph():
     with h5py.File(HERE / "pysph_250.hdf5", "w", libver="earliest") as file:
@@ -449,6 +475,7 @@ def cells():
 gadget()
 swift()
 snapshots()
+virtual_snapshots()
 pysph()
 real_pysph()
 h5part()

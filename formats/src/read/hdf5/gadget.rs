@@ -50,6 +50,13 @@ pub(super) fn file_count(root: &Node) -> u64 {
         .unwrap_or(1)
 }
 
+/// Whether the snapshot consists of virtual data sets: SWIFT writes such a file beside those with the values, and says
+/// so in the header.
+pub(super) fn is_virtual(root: &Node) -> bool {
+    let header = root.group("Header").ok().flatten();
+    header.is_some_and(|header| header.number("Virtual") == Some(1.0))
+}
+
 impl Snapshot {
     /// The snapshot in the file; `None` if it has another layout.
     ///

@@ -123,6 +123,11 @@ impl Reader for Hdf5 {
         root.map_or(1, |root| gadget::file_count(&root))
     }
 
+    fn refers_to_pieces(&self, file: &SharedBytes) -> bool {
+        let root = H5File::open(file).and_then(|file| file.root());
+        root.is_ok_and(|root| gadget::is_virtual(&root))
+    }
+
     fn remarks_need_whole_file(&self) -> bool {
         true
     }
