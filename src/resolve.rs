@@ -219,7 +219,7 @@ pub fn setup(
     };
     let ground = ground::ground(manifest, &floor)?;
     let wet_ground = ground::wet_ground(manifest, &floor);
-    let scene = Scene {
+    let mut scene = Scene {
         origin: survey.origin,
         camera,
         lights,
@@ -229,7 +229,7 @@ pub fn setup(
         background: background(manifest, up.as_vec3()),
         ground,
         wet_ground,
-        meshes: Vec::new(),
+        meshes: meshes::materials(manifest),
         particles: [bounds.min, bounds.max].map(|corner| (corner - survey.origin).as_vec3()),
         is_spray_soft: manifest.draws_soft_spray(),
         environment,
@@ -273,9 +273,11 @@ pub fn setup(
     render.transparent_background = output.transparent;
     let denoise = denoise::settings(manifest, &scene.material)?;
     render.has_features = denoise.is_some();
-    let arrows = arrows::arrows(manifest, survey, &color, reach.x)?;
-    let trails = arrows::trails(manifest, survey, &color, reach.x)?;
-    let bonds = bonds::bonds(manifest, survey, &color, reach.x)?;
+    // The materials of rods follow those of the meshes
+    let cell = cell::add_cell(&mut scene, manifest, survey);
+    let arrows = arrows::arrows(&mut scene, manifest, survey, &color, reach.x)?;
+    let trails = arrows::trails(&mut scene, manifest, survey, &color, reach.x)?;
+    let bonds = bonds::bonds(&mut scene, manifest, survey, &color, reach.x)?;
     let picture = Picture {
         origin: survey.origin,
         least_radius: narrow(bounds.diagonal() * LEAST_RADIUS).max(f32::MIN_POSITIVE),
@@ -294,7 +296,7 @@ pub fn setup(
         aspect,
         scene,
         meshes: Vec::new(),
-        cell: None,
+        cell,
         arrows,
         trails,
         bonds,

@@ -1,7 +1,7 @@
 //! Arrows of vector attributes, and trails.
 
 use super::{ResolveError, color, narrow, require_attribute};
-use crate::manifest::{BondSearch, ColorMapping, ColorSetting, Manifest, RangeSetting, ScaleKind};
+use crate::manifest::{ColorMapping, ColorSetting, Manifest, RangeSetting, ScaleKind};
 use crate::pipeline::{ArrowStyle, ColorRule, TrailStyle};
 use crate::scene::mesh::DEFAULT_COLOR;
 use crate::scene::{Finish, MeshFinish, MeshMaterial, Scene};
@@ -18,58 +18,53 @@ const RADIUS: f64 = 1.0 / 3.0;
 /// Automatic radius of trails in radii of the particles.
 const TRAIL_RADIUS: f64 = 0.5;
 
-/// How arrows are drawn. `particles`: the colours of the particles; `reach`: their radius. Their materials follow those
-/// of the meshes and of the cell.
+/// How arrows are drawn. `particles`: the colours of the particles; `reach`: their radius. Adds their materials to
+/// those of the meshes of `scene`.
 ///
 /// # Errors
 /// The particles have no such attribute, or colours are not determined.
 pub(super) fn arrows(
+    scene: &mut Scene,
     manifest: &Manifest,
     survey: &Survey,
     particles: &ColorRule,
     reach: f64,
 ) -> Result<Vec<ArrowStyle>, ResolveError> {
-    let first = manifest.meshes.len() + usize::from(manifest.cell.visible);
-    // The manifest has no more of them than there are materials
-    let styles = manifest
-        .arrows
-        .iter()
-        .zip((first..).map_while(MaterialId::of_mesh));
-    let style = |(own, material): (&crate::manifest::Arrows, MaterialId)| {
+    let mut styles = Vec::new();
+    for own in &manifest.arrows {
         check_attribute(survey, &own.attribute)?;
-        let color = match &own.color {
-            ColorSetting::Rgb(_) => None,
-            ColorSetting::Auto => Some(particles.clone()),
-            ColorSetting::Mapped(by) => Some(mapped(by, survey, &own.attribute, COLOR)?),
+        // The manifest has no more of them than there are materials
+        let Some(material) = add_material(scene, &own.color) else {
+            break;
         };
-        Ok(ArrowStyle {
+        styles.push(ArrowStyle {
             attribute: own.attribute.clone(),
             scale: own.scale,
             radius: own.radius.unwrap_or_else(|| narrow(RADIUS * reach)),
             every: own.every,
             anchor: own.anchor,
-            color,
+            color: rule(&own.color, particles, survey, &own.attribute, COLOR)?,
             material,
-        })
-    };
-    styles.map(style).collect()
+        });
+    }
+    Ok(styles)
 }
 
-/// How trails are drawn, if they are; see [`arrows`]. Their material follows those of the arrows.
+/// How trails are drawn, if they are; see [`arrows`].
 ///
 /// # Errors
 /// The job follows a simulation, or colours are not determined.
 pub(super) fn trails(
+    scene: &mut Scene,
     manifest: &Manifest,
     survey: &Survey,
     particles: &ColorRule,
     reach: f64,
 ) -> Result<Option<TrailStyle>, ResolveError> {
     let own = &manifest.trails;
-    let others = manifest.meshes.len() + usize::from(manifest.cell.visible) + manifest.arrows.len();
-    let Some(material) = MaterialId::of_mesh(others).filter(|_| own.frames > 0) else {
+    if own.frames == 0 {
         return Ok(None);
-    };
+    }
     if manifest.job.follow {
         return Err(ResolveError::Unsupported {
             key: "trails.frames",
@@ -78,36 +73,29 @@ pub(super) fn trails(
                 .to_owned(),
         });
     }
-    Ok(Some(TrailStyle {
+    let color = rule(&own.color, particles, survey, "velocity", TRAIL_COLOR)?;
+    let style = |material| TrailStyle {
         frames: own.frames,
         radius: own.radius.unwrap_or_else(|| narrow(TRAIL_RADIUS * reach)),
         every: own.every,
-        color: match &own.color {
-            ColorSetting::Rgb(_) => None,
-            ColorSetting::Auto => Some(particles.clone()),
-            ColorSetting::Mapped(by) => Some(mapped(by, survey, "velocity", TRAIL_COLOR)?),
-        },
+        color,
         material,
-    }))
+    };
+    Ok(add_material(scene, &own.color).map(style))
 }
 
-/// Adds the materials of arrows, trails and bonds to those of the meshes of `scene`.
-pub(super) fn add_materials(scene: &mut Scene, manifest: &Manifest) {
-    let trails = Some(&manifest.trails).filter(|own| own.frames > 0);
-    let bonds = Some(&manifest.bonds).filter(|own| own.find != BondSearch::None);
-    let arrows = manifest.arrows.iter().map(|own| &own.color);
-    let materials = arrows
-        .chain(trails.map(|own| &own.color))
-        .chain(bonds.map(|own| &own.color))
-        .map(|color| MeshMaterial {
-            color: match color {
-                ColorSetting::Rgb(color) => *color,
-                ColorSetting::Auto | ColorSetting::Mapped(_) => DEFAULT_COLOR,
-            },
-            finish: MeshFinish::Opaque(Finish::Matte),
-            is_holdout: false,
-        });
-    scene.meshes.extend(materials);
+/// Adds the material of rods of this colour to those of the meshes of `scene`; None if there are too many.
+pub(super) fn add_material(scene: &mut Scene, color: &ColorSetting) -> Option<MaterialId> {
+    let id = MaterialId::of_mesh(scene.meshes.len())?;
+    scene.meshes.push(MeshMaterial {
+        color: match color {
+            ColorSetting::Rgb(color) => *color,
+            ColorSetting::Auto | ColorSetting::Mapped(_) => DEFAULT_COLOR,
+        },
+        finish: MeshFinish::Opaque(Finish::Matte),
+        is_holdout: false,
+    });
+    Some(id)
 }
 
 /// Refuses attributes that do not exist or are no vectors.
@@ -129,8 +117,24 @@ fn check_attribute(survey: &Survey, name: &str) -> Result<(), ResolveError> {
     }
 }
 
-/// Colours by a value, by default that of the arrows themselves.
-pub(super) fn mapped(
+/// Colours of rods for each of their particles, if they have not all the same: by default those of `particles`, else by
+/// a value, by default the attribute `own`. `key`: the setting.
+pub(super) fn rule(
+    color: &ColorSetting,
+    particles: &ColorRule,
+    survey: &Survey,
+    own: &str,
+    key: &'static str,
+) -> Result<Option<ColorRule>, ResolveError> {
+    Ok(match color {
+        ColorSetting::Rgb(_) => None,
+        ColorSetting::Auto => Some(particles.clone()),
+        ColorSetting::Mapped(by) => Some(mapped(by, survey, own, key)?),
+    })
+}
+
+/// Colours by a value, by default the attribute `own`.
+fn mapped(
     by: &ColorMapping,
     survey: &Survey,
     own: &str,

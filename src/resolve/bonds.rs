@@ -1,10 +1,10 @@
 //! Bonds between particles.
 
-use super::arrows::mapped;
+use super::arrows::{add_material, rule};
 use super::{ResolveError, narrow, require_attribute};
-use crate::manifest::{BondSearch, ColorSetting, Manifest};
+use crate::manifest::{BondSearch, Manifest};
 use crate::pipeline::{BondRule, BondStyle, ColorRule};
-use crate::surface::MaterialId;
+use crate::scene::Scene;
 use crate::survey::Survey;
 
 /// Automatic radius in radii of the particles.
@@ -13,18 +13,19 @@ const RADIUS: f64 = 1.0 / 3.0;
 /// The attribute with atomic numbers.
 const ELEMENT: &str = "element";
 
-/// How bonds are drawn, if they are; see [`arrows`](super::arrows::arrows). Their material follows that of the trails.
+/// How bonds are drawn, if they are; see [`arrows`](super::arrows::arrows).
 ///
 /// # Errors
 /// There are no elements, or colours are not determined.
 pub(super) fn bonds(
+    scene: &mut Scene,
     manifest: &Manifest,
     survey: &Survey,
     particles: &ColorRule,
     reach: f64,
 ) -> Result<Option<BondStyle>, ResolveError> {
     let own = &manifest.bonds;
-    let rule = match own.find {
+    let search = match own.find {
         BondSearch::None => return Ok(None),
         BondSearch::File => BondRule::File,
         BondSearch::Distance(distance) => BondRule::Distance(narrow(distance)),
@@ -36,21 +37,12 @@ pub(super) fn bonds(
             }
         }
     };
-    let others = manifest.meshes.len()
-        + usize::from(manifest.cell.visible)
-        + manifest.arrows.len()
-        + usize::from(manifest.trails.frames > 0);
-    let Some(material) = MaterialId::of_mesh(others) else {
-        return Ok(None);
-    };
-    Ok(Some(BondStyle {
-        rule,
+    let color = rule(&own.color, particles, survey, ELEMENT, "bonds.color")?;
+    let style = |material| BondStyle {
+        rule: search,
         radius: own.radius.unwrap_or_else(|| narrow(RADIUS * reach)),
-        color: match &own.color {
-            ColorSetting::Rgb(_) => None,
-            ColorSetting::Auto => Some(particles.clone()),
-            ColorSetting::Mapped(by) => Some(mapped(by, survey, ELEMENT, "bonds.color")?),
-        },
+        color,
         material,
-    }))
+    };
+    Ok(add_material(scene, &own.color).map(style))
 }

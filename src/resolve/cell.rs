@@ -3,10 +3,10 @@
 use glam::{DVec3, Vec3};
 use spherule_formats::SimulationCell;
 
-use crate::manifest::Manifest;
+use super::arrows::add_material;
+use crate::manifest::{ColorSetting, Manifest};
 use crate::pipeline::CellStyle;
-use crate::scene::{Finish, MeshFinish, MeshMaterial, Scene};
-use crate::surface::MaterialId;
+use crate::scene::Scene;
 use crate::survey::Survey;
 
 /// Automatic radius of the edges as a fraction of the diagonal of the cell: lines 3 pixels wide in a picture 1000
@@ -23,12 +23,7 @@ pub(super) fn add_cell(
     if !cell.visible {
         return None;
     }
-    let material = MaterialId::of_mesh(scene.meshes.len())?;
-    scene.meshes.push(MeshMaterial {
-        color: cell.color,
-        finish: MeshFinish::Opaque(Finish::Matte),
-        is_holdout: false,
-    });
+    let material = add_material(scene, &ColorSetting::Rgb(cell.color))?;
     let radius = cell.radius.unwrap_or_else(|| {
         let diagonals = survey.cells.iter().map(SimulationCell::diagonal);
         let diagonal = diagonals.reduce(f64::max);

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use spherule_formats::MemoryBudget;
 
-use super::{arrows, cell};
+use super::cell;
 use crate::manifest::{self, Manifest, MeshShading};
 use crate::pipeline::{MeshSettings, PictureMesh, Setup};
 use crate::scene::mesh::DEFAULT_COLOR;
@@ -45,8 +45,12 @@ pub fn mesh_settings(
     manifest.meshes.iter().map(settings).collect()
 }
 
-/// Adds the `meshes` of `manifest`, one for each of its entries, and the simulation cell to the pictures of `setup`.
-/// Lowers an automatic ground below the cell, and below meshes that are the same in all frames.
+/// The materials of the meshes of `manifest`.
+pub(super) fn materials(manifest: &Manifest) -> Vec<MeshMaterial> {
+    manifest.meshes.iter().map(material).collect()
+}
+
+/// Adds the `meshes` of the manifest, one for each of its entries, to the pictures of `setup`. Lowers an automatic ground below the cell, and below meshes that are the same in all frames.
 pub fn add_meshes(
     setup: &mut Setup,
     manifest: &Manifest,
@@ -54,9 +58,6 @@ pub fn add_meshes(
     meshes: Vec<PictureMesh>,
 ) {
     let scene = &mut setup.picture.scene;
-    scene.meshes = manifest.meshes.iter().map(material).collect();
-    setup.picture.cell = cell::add_cell(scene, manifest, survey);
-    arrows::add_materials(scene, manifest);
     if let Some(ground) = &mut scene.ground
         && manifest.render.ground_height.is_none()
     {
