@@ -75,9 +75,11 @@ pub(crate) const LAMMPS_CATEGORIES: [&str; 2] = ["element", "typelabel"];
 pub(crate) const LAMMPS_INTEGERS: [&str; 3] = ["id", "type", "mol"];
 
 /// LAMMPS columns that form a vector together, with the name of the vector.
-pub(crate) const LAMMPS_VECTORS: [([&str; 3], &str); 2] = [
+pub(crate) const LAMMPS_VECTORS: [([&str; 3], &str); 4] = [
     (["vx", "vy", "vz"], "velocity"),
     (["fx", "fy", "fz"], "force"),
+    (["omegax", "omegay", "omegaz"], "omega"),
+    (["tqx", "tqy", "tqz"], "torque"),
 ];
 
 /// Stems that are joined to a component without a separator, as in `vx` and `PosX`. The second entry is the

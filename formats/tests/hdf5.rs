@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use spherule_formats::convert::open_source;
-use spherule_formats::sequence::{Sequence, SequenceInput};
+use spherule_formats::sequence::{Sequence, SequenceInput, stands_for_others};
 use spherule_formats::{
     Attribute, AttributeData, FrameError, FrameFile, MemoryBudget, RawParticles,
 };
@@ -220,6 +220,7 @@ fn virtual_data_sets_of_a_snapshot_give_the_files_with_the_values() {
             "{notes}"
         );
     }
+    assert!(stands_for_others(&dir.path().join(ALL[3])) && !stands_for_others(&data(ALL[4])));
     let one = SequenceInput::Files(vec![dir.path().join(ALL[3])]);
     assert_eq!(ids_of(one).0, expected[1..]);
     // A file with the values is missing

@@ -30,9 +30,9 @@ mod pieces;
 mod scan;
 mod topology;
 
+pub use collection::ListSummary;
 #[doc(hidden)]
 pub use collection::lists_of;
-pub use collection::{ListSummary, is_list};
 pub use error::{GroupSummary, SequenceError};
 #[doc(hidden)]
 pub use from_names::{frames_of_list, frames_of_names};
@@ -48,6 +48,12 @@ use load::{CachedFile, stamp};
 use name::FileName;
 use notes::{note_gaps, note_missing_parts};
 use pattern::Pattern;
+
+/// Whether the file at `path` has no particles itself, but stands for others: it is a list of files, or a snapshot of
+/// virtual data sets beside the files with the values.
+pub fn stands_for_others(path: &Path) -> bool {
+    collection::is_list(path) || pieces::is_reference(path)
+}
 
 /// One file of a frame.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -15,13 +15,19 @@ pub(super) fn find_pieces(mut names: Vec<FileName>, notes: &mut Vec<String>) -> 
     names
 }
 
+/// Whether the file at `path` only refers to others that are beside it.
+pub(super) fn is_reference(path: &Path) -> bool {
+    refers_to_others(&FileName::parse(path, None))
+}
+
+fn refers_to_others(name: &FileName) -> bool {
+    let first = name.piece_path(0);
+    first.is_some_and(|first| first.is_file() && refers_to_pieces(&name.path))
+}
+
 /// Replaces files that only refer to others beside them by those.
 fn follow_references(names: &mut Vec<FileName>, notes: &mut Vec<String>) {
-    let is_reference = |name: &FileName| {
-        let first = name.piece_path(0);
-        first.is_some_and(|first| first.is_file() && refers_to_pieces(&name.path))
-    };
-    let (references, others): (Vec<_>, Vec<_>) = names.drain(..).partition(is_reference);
+    let (references, others): (Vec<_>, Vec<_>) = names.drain(..).partition(refers_to_others);
     *names = others;
     let Some(first) = references.first() else {
         return;

@@ -8,7 +8,7 @@ use serde_json::json;
 use spherule_formats::native::{FORMAT, layout, verify};
 use spherule_formats::open::{is_native, remarks};
 use spherule_formats::sequence::{
-    ListSummary, SequenceError, SequenceSettings, Topology, is_list, lone_frame_number,
+    ListSummary, SequenceError, SequenceSettings, Topology, lone_frame_number, stands_for_others,
 };
 use spherule_formats::stats::FrameStats;
 use spherule_formats::{FrameError, FrameFile, Positions, Sequence, SequenceInput};
@@ -160,7 +160,7 @@ fn expand(args: &InspectArgs) -> Vec<Meant> {
     };
     for argument in &args.files {
         match SequenceInput::from_path(argument) {
-            SequenceInput::Files(listed) if !listed.iter().any(|file| is_list(file)) => {
+            SequenceInput::Files(listed) if !listed.iter().any(|file| stands_for_others(file)) => {
                 for file in listed {
                     let place = FramePlace {
                         number: lone_frame_number(&file),

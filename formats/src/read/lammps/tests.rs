@@ -199,6 +199,20 @@ fn columns_of_every_type() {
     assert_eq!(real(&twice, "vx"), [4.]);
 }
 
+/// The columns of the examples of LIGGGHTS: the type twice, and blanks at the ends of lines.
+#[test]
+fn columns_of_liggghts() {
+    let columns = "id type type x y z ix iy iz vx vy vz fx fy fz omegax omegay omegaz radius ";
+    let row = "7 1 1 0.01 0.02 0.03 0 0 0 1 2 3 4 5 6 7 8 9 0.0025 ";
+    let walls = "ITEM: BOX BOUNDS mm ff fs\n-0.05 0.05\n-0.05 0.05\n0 0.15\n";
+    let particles = only(&dump(walls, columns, &[row])).unwrap();
+    assert_eq!(particles.positions.get(0), DVec3::new(0.01, 0.02, 0.03));
+    assert_eq!(whole(&particles, "id"), [7]);
+    assert_eq!(real(&particles, "velocity"), [1., 2., 3.]);
+    assert_eq!(real(&particles, "omega"), [7., 8., 9.]);
+    assert_eq!(real(&particles, "radius"), [0.0025]);
+}
+
 #[test]
 fn elements_are_the_same_numbers_in_every_frame() {
     let code = |rows: &[&str]| {

@@ -84,7 +84,7 @@ fn has_extension(path: &Path, known: &[&str]) -> bool {
 }
 
 /// Whether the file at `path` lists others: its name says so, or its content if the name says nothing.
-pub fn is_list(path: &Path) -> bool {
+pub(super) fn is_list(path: &Path) -> bool {
     let by_content = || {
         let head = crate::open::head(path);
         head.is_ok_and(|head| ListKind::of(&head).is_some())
