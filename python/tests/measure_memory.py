@@ -1,4 +1,7 @@
-"""Prints by how many bytes for each particle a render raises the peak of resident memory: measure_memory.py COUNT."""
+"""Prints by how many bytes for each particle a render raises the peak of resident memory, and its time.
+
+measure_memory.py COUNT [CHANNEL ...]
+"""
 
 import resource
 import sys
@@ -13,8 +16,8 @@ def peak():
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
-def main(count):
-    options = {"size": (320, 180), "samples": 1}
+def main(count, *channels):
+    options = {"channels": list(channels) or None, "size": (320, 180), "samples": 1}
     spherule.render(np.zeros((2, 3), np.float32), radius=0.1, **options)
     positions = np.empty((count, 3), np.float32)
     generator = np.random.default_rng(1)
@@ -27,4 +30,4 @@ def main(count):
 
 
 if __name__ == "__main__":
-    main(int(float(sys.argv[1])))
+    main(int(float(sys.argv[1])), *sys.argv[2:])
