@@ -231,7 +231,7 @@ fn virtual_data_sets_of_a_snapshot_give_the_files_with_the_values() {
     // All are
     let dir = directory_of(&ALL[..1]);
     let sequence = Sequence::open(&SequenceInput::Directory(dir.path().into()));
-    let error = sequence.and_then(|s| Ok(s.load_raw(0))).expect("one frame");
+    let error = sequence.expect("one frame").load_raw(0);
     let error = error.expect_err("no values").to_string();
     assert!(error.contains("a virtual data set"), "{error}");
 }

@@ -1,7 +1,7 @@
 //! What the fuzz targets do with their bytes, and what must hold of whatever comes out.
 //!
 //! One function a target. Ordinary tests replay the corpus through the same functions with the stable
-//! toolchain: `formats/tests/corpus.rs` includes `readers`, `tests/suite/corpus.rs` includes `program`.
+//! toolchain: `formats/tests/corpus` includes `readers`, `tests/suite/corpus.rs` includes `program`.
 
 use std::borrow::Cow;
 

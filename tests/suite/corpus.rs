@@ -56,7 +56,7 @@ fn every_target_replays_its_corpus() {
     }
 }
 
-/// Those of the readers are replayed by `formats/tests/corpus.rs`.
+/// Those of the readers are replayed by `formats/tests/corpus`.
 #[test]
 fn every_folder_has_its_target() {
     let readers = fs::read_to_string(fuzz("src/readers/mod.rs")).expect("readable");

@@ -7,9 +7,11 @@ use glam::{DVec3, Vec3};
 use spherule_formats::native::{Bound, Encoding, RadiusCode, StoreSettings, StoredType, layout};
 use spherule_formats::{Attribute, AttributeData, ParticleFrame, Radius, native};
 
-#[path = "../../fuzz/src/readers/mod.rs"]
+#[path = "../../../fuzz/src/readers/mod.rs"]
 #[expect(unreachable_pub, reason = "a library of its own for the fuzz targets")]
 mod targets;
+
+mod mutations;
 
 use targets::{TARGETS, Target};
 
