@@ -151,7 +151,7 @@ fn impossible_bonds_are_refused() {
     let workshop = workshop();
     let run = |input: &str, options: &[&str]| {
         let command = ["render", input, "-o", "out.exr", "--radius=0.2"];
-        workshop.run(&[&command[..], options].concat())
+        workshop.run(&[&command[..], &VIEW[..3], options].concat())
     };
     for (find, part) in [
         ("0", "bonds.find: expected a distance above 0"),
@@ -185,14 +185,8 @@ fn bonds_of_a_file_are_drawn() {
     .expect("a file");
     let found = picture(&workshop, "in.xyz", &["--bonds=file", "--topology=in.psf"]);
     assert!(bond(&found, -0.7).is_some() && bond(&found, 0.5).is_none());
-    let ran = workshop.run(&[
-        "render",
-        "in.xyz",
-        "-o",
-        "o.exr",
-        "--radius=0.2",
-        "--bonds=file",
-    ]);
+    let command = ["render", "in.xyz", "-o", "o.exr", "--bonds=file"];
+    let ran = workshop.run(&[&command[..], &VIEW[..4]].concat());
     ran.expect(0).prints("no bonds: the file lists none");
     // A chain of 40 beads
     let polymer = sample("gsd/polymer.gsd");
