@@ -192,7 +192,7 @@ fn a_directory_that_is_closed_while_a_job_runs() {
     use std::os::unix::fs::PermissionsExt;
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 1..=6);
-    let long = ["--width", "320", "--height", "180", "--samples", "32"];
+    let long = ["--width", "320", "--height", "180", "--samples", "12"];
     let whole = [&["render", "in", "-o", "whole/f.####.exr"][..], &long].concat();
     workshop.run(&whole).expect(0);
     let out = workshop.join("out");
