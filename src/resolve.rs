@@ -35,6 +35,7 @@ mod meshes;
 mod opacity;
 mod overlay;
 mod parts;
+mod rods;
 mod select;
 mod shutter;
 mod surface;

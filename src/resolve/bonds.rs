@@ -1,6 +1,6 @@
 //! Bonds between particles.
 
-use super::arrows::{add_material, rule};
+use super::rods::{add_material, rule};
 use super::{ResolveError, narrow, require_attribute};
 use crate::manifest::{BondSearch, Manifest};
 use crate::pipeline::{BondRule, BondStyle, ColorRule};

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 use spherule_formats::SimulationCell;
 
-use super::arrows::add_material;
+use super::rods::add_material;
 use crate::manifest::{ColorSetting, Manifest};
 use crate::pipeline::CellStyle;
 use crate::scene::Scene;

@@ -50,7 +50,8 @@ pub(super) fn materials(manifest: &Manifest) -> Vec<MeshMaterial> {
     manifest.meshes.iter().map(material).collect()
 }
 
-/// Adds the `meshes` of the manifest, one for each of its entries, to the pictures of `setup`. Lowers an automatic ground below the cell, and below meshes that are the same in all frames.
+/// Adds the `meshes` of the manifest, one for each of its entries, to the pictures of `setup`. Lowers an automatic ground
+/// below the cell, and below meshes that are the same in all frames.
 pub fn add_meshes(
     setup: &mut Setup,
     manifest: &Manifest,

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use super::name::FileName;
 use crate::open::{piece_count, refers_to_pieces};
 
-/// Replaces files that only refer to others by those, and finds which files are those of one step. Notes both, and steps
-/// of which files are missing.
+/// Replaces files that only refer to others by those, and finds which files belong to one step. Adds a note on replaced
+/// files, and on steps with missing files.
 pub(super) fn find_pieces(mut names: Vec<FileName>, notes: &mut Vec<String>) -> Vec<FileName> {
     follow_references(&mut names, notes);
     split_pieces(&mut names, notes);

@@ -312,7 +312,9 @@ impl<'a> CrateFile<'a> {
     /// A number of the metadata.
     pub(super) fn number(&self, rep: ValueRep) -> Option<f64> {
         // A packed array may be many times as long as the file
-        let rep = Some(rep).filter(|rep| !rep.is_array())?;
+        if rep.is_array() {
+            return None;
+        }
         let numbers = self.numbers(rep, MemoryBudget::UNLIMITED).ok()??;
         numbers.single::<1>().map(|[number]| number)
     }
