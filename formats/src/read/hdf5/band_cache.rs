@@ -3,10 +3,11 @@
 use std::collections::{HashMap, VecDeque};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use super::stored::StoredKey;
 use crate::ParseError;
 
-/// Object header of a data set, index of a frame, number of a band.
-type Key = (usize, Option<u64>, u64);
+/// Data set, index of a frame, number of a band.
+type Key = (StoredKey, Option<u64>, u64);
 
 /// Decoded rows, or the reason why there are none.
 type Slot = Arc<OnceLock<Result<Arc<Vec<u8>>, ParseError>>>;
@@ -76,7 +77,7 @@ mod tests {
         let cache = BandCache::new(10);
         let mut decoded = 0;
         let mut get = |band| {
-            let rows = cache.get((0, None, band), || {
+            let rows = cache.get(((0, 0), None, band), || {
                 decoded += 1;
                 Ok(vec![0; 4])
             });
@@ -87,7 +88,7 @@ mod tests {
             [get(0), get(1), get(0), get(2), get(1), get(0)],
             [1, 2, 2, 3, 3, 4]
         );
-        let fault = cache.get((1, None, 0), || Err(ParseError::malformed(7, "bad")));
+        let fault = cache.get(((0, 1), None, 0), || Err(ParseError::malformed(7, "bad")));
         assert!(fault.is_err());
     }
 }

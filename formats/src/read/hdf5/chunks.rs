@@ -17,7 +17,6 @@ use hdf5_reader::filters::{
 use hdf5_reader::fixed_array::collect_fixed_array_chunk_entries_storage;
 use hdf5_reader::messages::layout::ChunkIndexing;
 
-use super::file::H5File;
 use super::lzf::{self, FILTER_LZF};
 use super::stored::{ChunkedLayout, Stored};
 use crate::read::CUT_SHORT;
@@ -65,7 +64,6 @@ impl ChunkGrid {
     /// [`ParseError::Malformed`] if the index is damaged or a chunk is missing or not in the file,
     /// [`ParseError::Unsupported`] for other filters, [`ParseError::TooLarge`].
     pub(super) fn find(
-        file: &H5File,
         stored: &Stored,
         layout: &ChunkedLayout,
         selection: &Selection,
@@ -101,12 +99,12 @@ impl ChunkGrid {
             .zip(&last)
             .map(|(first, last)| last - first + 1);
         let count = counts.clone().try_fold(1_u64, u64::checked_mul);
-        let most = file.bytes().len() as u64;
+        let most = stored.file.bytes().len() as u64;
         let count = count.filter(|count| *count <= most);
         let count = count.ok_or_else(|| stored.never_written())?;
         let list_len = count.saturating_mul(160);
         budget.check(list_len, "the list of its chunks is")?;
-        let entries = entries(file, stored, layout, (&first, &last))?;
+        let entries = entries(stored, layout, (&first, &last))?;
         // Put each at its place
         let band_chunks = counts.skip(row_dimension + 1).product::<u64>();
         let place = |entry: &ChunkEntry| {
@@ -129,7 +127,7 @@ impl ChunkGrid {
             if slot.is_some() {
                 return Err(stored.bad(format!("two chunks at {:?}", entry.offsets)));
             }
-            let chunk = Chunk::of(file, stored, entry, chunk_len)?;
+            let chunk = Chunk::of(stored, entry, chunk_len)?;
             all_len += chunk.len as u64;
             *slot = Some(chunk);
         }
@@ -153,8 +151,7 @@ impl ChunkGrid {
     /// [`ParseError::Malformed`] if they are damaged.
     pub(super) fn decode<'a>(
         &self,
-        bytes: &'a [u8],
-        stored: &Stored,
+        stored: &'a Stored,
         layout: &ChunkedLayout,
         (band, number): (u64, usize),
     ) -> Result<Cow<'a, [u8]>, ParseError> {
@@ -164,7 +161,10 @@ impl ChunkGrid {
             .saturating_add(number);
         let chunk = self.chunks.get(place);
         let chunk = chunk.ok_or_else(|| stored.never_written())?;
-        let packed = bytes.get(chunk.start..chunk.start + chunk.len);
+        let packed = stored
+            .file
+            .bytes()
+            .get(chunk.start..chunk.start + chunk.len);
         let packed = packed.unwrap_or_default();
         let is_filtered = (0..layout.filters.len()).any(|i| chunk.filter_mask >> i & 1 == 0);
         let len = self.chunk_len;
@@ -185,12 +185,8 @@ impl ChunkGrid {
 
 impl Chunk {
     /// The chunk of `entry`, whose bytes must be in the file.
-    fn of(
-        file: &H5File,
-        stored: &Stored,
-        entry: &ChunkEntry,
-        chunk_len: usize,
-    ) -> Result<Self, ParseError> {
+    fn of(stored: &Stored, entry: &ChunkEntry, chunk_len: usize) -> Result<Self, ParseError> {
+        let file = &stored.file;
         let base = file.inner().superblock().base_address;
         let start = entry.address.checked_add(base);
         let start = start.and_then(|start| usize::try_from(start).ok());
@@ -277,11 +273,11 @@ fn unpack(
 
 /// The chunks between the numbers `bounds` (along each dimension, both included), from whatever index there is.
 fn entries(
-    file: &H5File,
     stored: &Stored,
     layout: &ChunkedLayout,
     bounds: (&[u64], &[u64]),
 ) -> Result<Vec<ChunkEntry>, ParseError> {
+    let file = &stored.file;
     let inner = file.inner();
     let (storage, index, chunk) = (inner.storage(), layout.index, layout.chunk.as_slice());
     let (offset_size, length_size) = {
@@ -294,7 +290,7 @@ fn entries(
     let entries = match &layout.indexing {
         None => {
             let sizes = (offset_size, length_size);
-            btree_v1(file, stored, layout, sizes, bounds)
+            btree_v1(stored, layout, sizes, bounds)
         }
         Some(ChunkIndexing::SingleChunk {
             filtered_size,
@@ -348,7 +344,6 @@ type Bounds<'a> = Option<(&'a [u64], &'a [u64])>;
 
 /// The entries of an index that is a B-tree of version 1.
 fn btree_v1(
-    file: &H5File,
     stored: &Stored,
     layout: &ChunkedLayout,
     (offset_size, length_size): (u8, u8),
@@ -356,7 +351,7 @@ fn btree_v1(
 ) -> Result<Vec<ChunkEntry>, Error> {
     let rank = stored.shape.len();
     let leaves = collect_btree_v1_leaves_storage(
-        file.inner().storage(),
+        stored.file.inner().storage(),
         layout.index,
         offset_size,
         length_size,

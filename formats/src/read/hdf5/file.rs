@@ -1,5 +1,6 @@
 //! Groups and attributes of an HDF5 file, through the crate `hdf5-reader`, with the errors of this crate.
 
+use std::fmt;
 use std::sync::Arc;
 
 use hdf5_reader::error::Error;
@@ -41,6 +42,12 @@ impl Storage for SharedStorage {
     }
 }
 
+impl fmt::Debug for H5File {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.bytes.fmt(f)
+    }
+}
+
 impl H5File {
     /// Opens `bytes`.
     ///
@@ -62,6 +69,11 @@ impl H5File {
             bytes: bytes.clone(),
             file,
         })
+    }
+
+    /// Whether `other` is this file.
+    pub(super) fn is_same(&self, other: &Self) -> bool {
+        std::ptr::eq(self.bytes(), other.bytes())
     }
 
     /// All bytes.

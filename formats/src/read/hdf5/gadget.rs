@@ -137,7 +137,7 @@ impl Snapshot {
     ) -> Result<(Part, Vec<String>), ParseError> {
         let stored = Stored::open(node, COORDINATES)?.map(Arc::new);
         let stored = stored.ok_or_else(|| ParseError::malformed(0, "Coordinates are missing"))?;
-        let positions = Values::find(node.file(), &stored, &Slice::ALL, budget)?;
+        let positions = Values::find(&stored, &Slice::ALL, budget)?;
         let Some(positions) = positions.filter(|values| matches!(values.components(), 2 | 3))
         else {
             let shape = &stored.shape;

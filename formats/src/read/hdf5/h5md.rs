@@ -221,7 +221,7 @@ impl Trajectory {
             return Ok(None);
         };
         let stored = &group.position.stored;
-        let positions = Values::find(group.node.file(), stored, &slice, budget)?;
+        let positions = Values::find(stored, &slice, budget)?;
         let positions = positions.filter(|values| matches!(values.components(), 2 | 3));
         let positions = positions.ok_or_else(|| {
             let shape = &stored.shape;
@@ -239,7 +239,7 @@ impl Trajectory {
                 continue;
             };
             if let Some(slice) = element.slice(number) {
-                finder.add_stored(group.node.file(), &element.stored, name, &slice)?;
+                finder.add_stored(&element.stored, name, &slice)?;
             }
         }
         Ok(Some(Part {
@@ -256,12 +256,12 @@ impl Trajectory {
             let node = group.node.group("box").ok()??;
             let edges = Element::open(&node, "edges", budget).ok()??;
             let slice = edges.slice(number)?;
-            let values = Values::find(node.file(), &edges.stored, &slice, budget).ok()??;
+            let values = Values::find(&edges.stored, &slice, budget).ok()??;
             // Three lengths, or a matrix whose rows are the edges
             let count = usize::try_from(values.count())
                 .ok()
                 .filter(|count| *count <= 3)?;
-            let numbers = Piece::Stored(values).all(node.file().bytes(), count).ok()?;
+            let numbers = Piece::Stored(values).all(count).ok()?;
             let vectors = edges_of(&numbers)?;
             let boundary = node.texts("boundary");
             let is_periodic = |text: &String| text.trim_end_matches('\0').trim() == "periodic";

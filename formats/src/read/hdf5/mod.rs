@@ -94,9 +94,8 @@ impl Reader for Hdf5 {
         step: &Step,
         budget: MemoryBudget,
     ) -> Result<RawParticles, ParseError> {
-        let bytes = source.to_shared();
-        let table = dialect_of(&bytes)?.table(step.index, budget)?;
-        table.read_all(&bytes, budget)
+        let table = dialect_of(&source.to_shared())?.table(step.index, budget)?;
+        table.read_all(budget)
     }
 
     fn ranges(&self, file: &SharedBytes) -> Result<Option<Box<dyn ParticleRanges>>, ParseError> {
@@ -105,7 +104,7 @@ impl Reader for Hdf5 {
             return Ok(None);
         }
         let table = dialect.table(0, MemoryBudget::UNLIMITED)?;
-        Ok(Some(Box::new(TableRanges::new(file, table))))
+        Ok(Some(Box::new(TableRanges::new(table))))
     }
 
     /// Some chunks that are decoded at the same time.

@@ -261,7 +261,7 @@ impl Component {
         if let Some(dataset) = record.dataset(name)? {
             let unit = dataset_number(&dataset, "unitSI").unwrap_or(1.0);
             let stored = Arc::new(Stored::of(record, name, &dataset)?);
-            let values = Values::find(record.file(), &stored, &Slice::ALL, budget)?;
+            let values = Values::find(&stored, &Slice::ALL, budget)?;
             let Some(values) = values.filter(|values| values.components() == 1) else {
                 let shape = &stored.shape;
                 return Err(stored.bad(format!("shape {shape:?}, one number a particle is needed")));

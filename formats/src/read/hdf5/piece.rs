@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::values::{Input, Values};
+use super::values::{Cache, Values};
 use crate::{Endian, ParseError, ScalarType};
 
 /// Rows that are converted together by one thread.
@@ -67,10 +67,10 @@ impl Piece {
     }
 
     /// The numbers of `count` rows from `first` on, little-endian in the type of the piece.
-    fn numbers(&self, input: Input<'_>, first: u64, count: usize) -> Result<Vec<u8>, ParseError> {
+    fn numbers(&self, cache: Cache<'_>, first: u64, count: usize) -> Result<Vec<u8>, ParseError> {
         let mut bytes = vec![0; count * self.components() * self.scalar().size()];
         match self {
-            Self::Stored(values) => values.read(input, first, &mut bytes)?,
+            Self::Stored(values) => values.read(cache, first, &mut bytes)?,
             Self::Constant(value, scalar) => {
                 let number = encoded(*value, *scalar);
                 let size = scalar.size();
@@ -85,8 +85,8 @@ impl Piece {
                 offset_unit,
             } => {
                 let (v, o) = (values.scalar(), offset.scalar());
-                let values = values.numbers(input, first, count)?;
-                let offset = offset.numbers(input, first, count)?;
+                let values = values.numbers(cache, first, count)?;
+                let offset = offset.numbers(cache, first, count)?;
                 let numbers = values
                     .chunks_exact(v.size())
                     .zip(offset.chunks_exact(o.size()));
@@ -104,9 +104,9 @@ impl Piece {
     ///
     /// # Errors
     /// [`ParseError::Malformed`] if a chunk is damaged.
-    pub(super) fn all(&self, bytes: &[u8], count: usize) -> Result<Vec<f64>, ParseError> {
+    pub(super) fn all(&self, count: usize) -> Result<Vec<f64>, ParseError> {
         let scalar = self.scalar();
-        let bytes = self.numbers(Input { bytes, cache: None }, 0, count)?;
+        let bytes = self.numbers(None, 0, count)?;
         let numbers = bytes.chunks_exact(scalar.size());
         Ok(numbers
             .map(|number| scalar.decode_one(number, Endian::Little))
@@ -120,7 +120,7 @@ impl Piece {
     /// [`ParseError::Malformed`] if a chunk is damaged.
     pub(super) fn read(
         &self,
-        input: Input<'_>,
+        cache: Cache<'_>,
         first: u64,
         to: &mut [u8],
         (component, width, scalar): (usize, usize, ScalarType),
@@ -131,7 +131,7 @@ impl Piece {
             && own == width
             && values.scalar() == scalar
         {
-            return values.read(input, first, to);
+            return values.read(cache, first, to);
         }
         let mut first = first;
         let mut left = to;
@@ -140,7 +140,7 @@ impl Piece {
             let block = self.converted_rows();
             let rows = usize::try_from(block - first % block).unwrap_or(usize::MAX);
             let (to, rest) = left.split_at_mut(rows.saturating_mul(record).min(left.len()));
-            let numbers = self.numbers(input, first, to.len() / record)?;
+            let numbers = self.numbers(cache, first, to.len() / record)?;
             let from = self.scalar();
             let each = own * from.size();
             let blocks = to.par_chunks_mut(BLOCK * record);

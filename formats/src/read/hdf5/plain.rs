@@ -108,7 +108,6 @@ impl PlainFile {
         budget: MemoryBudget,
     ) -> Result<(Part, Vec<String>), ParseError> {
         let frame = self.frames.map(|_| step as u64);
-        let file = group.node.file();
         let count = group.count(frame.is_some());
         let mut finder = PropertyFinder::new(count, budget);
         let mut positions = Vec::new();
@@ -118,7 +117,7 @@ impl PlainFile {
                 field: data.field,
                 ..Slice::ALL
             };
-            let values = Values::find(file, &data.stored, &slice, budget)?;
+            let values = Values::find(&data.stored, &slice, budget)?;
             let values = values.filter(|values| values.count() == count);
             let values = values.ok_or_else(|| {
                 let shape = &data.stored.shape;
@@ -141,7 +140,7 @@ impl PlainFile {
                         field: Some(field),
                         ..Slice::ALL
                     };
-                    finder.add_stored(file, &first.stored, &name, &slice)?;
+                    finder.add_stored(&first.stored, &name, &slice)?;
                 }
             }
             finder.exclude(&first.stored);

@@ -3,9 +3,9 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use super::file::{H5File, Node};
+use super::file::Node;
 use super::piece::Piece;
-use super::stored::{Storage, Stored};
+use super::stored::{Storage, Stored, StoredKey};
 use super::types::Field;
 use super::values::{Slice, Values};
 use crate::names::RECORD_VECTORS;
@@ -29,7 +29,7 @@ pub(super) struct PropertyFinder {
     /// Names of data sets that were left out: of another length or of an unknown type.
     pub(super) left_out: Vec<String>,
     /// Object headers of the data sets in use, so that none is counted twice.
-    used: BTreeSet<usize>,
+    used: BTreeSet<StoredKey>,
 }
 
 impl PropertyFinder {
@@ -45,7 +45,7 @@ impl PropertyFinder {
 
     /// Makes the data set a position, so that it does not become a property.
     pub(super) fn exclude(&mut self, stored: &Stored) {
-        self.used.insert(stored.at);
+        self.used.insert(stored.key());
     }
 
     /// The positions, whose axes x, y and z are data sets of their own; z may be missing. The particles are as many as
@@ -104,10 +104,10 @@ impl PropertyFinder {
             return Ok(());
         };
         // Writers leave space unallocated for what they do not compute.
-        if self.used.contains(&stored.at) || matches!(stored.place, Storage::Missing) {
+        if self.used.contains(&stored.key()) || matches!(stored.place, Storage::Missing) {
             return Ok(());
         }
-        self.add_stored(node.file(), &stored, name, slice)
+        self.add_stored(&stored, name, slice)
     }
 
     /// [`Self::add`] of a data set that is open.
@@ -116,7 +116,6 @@ impl PropertyFinder {
     /// As [`Self::add`].
     pub(super) fn add_stored(
         &mut self,
-        file: &H5File,
         stored: &Arc<Stored>,
         name: &str,
         slice: &Slice,
@@ -129,26 +128,25 @@ impl PropertyFinder {
                     ..slice.clone()
                 };
                 let name = format!("{name}.{field_name}");
-                self.add_values(file, stored, &name, &slice)?;
+                self.add_values(stored, &name, &slice)?;
             }
-            self.used.insert(stored.at);
+            self.used.insert(stored.key());
             return Ok(());
         }
-        self.add_values(file, stored, name, slice)?;
+        self.add_values(stored, name, slice)?;
         if slice.field.is_none() {
-            self.used.insert(stored.at);
+            self.used.insert(stored.key());
         }
         Ok(())
     }
 
     fn add_values(
         &mut self,
-        file: &H5File,
         stored: &Arc<Stored>,
         name: &str,
         slice: &Slice,
     ) -> Result<(), ParseError> {
-        match Values::find(file, stored, slice, self.budget) {
+        match Values::find(stored, slice, self.budget) {
             Ok(Some(values)) if values.count() == self.count => {
                 let piece = vec![Piece::Stored(values)];
                 self.found.push((name.to_owned(), piece));
@@ -204,7 +202,7 @@ pub(super) fn values(
     budget: MemoryBudget,
 ) -> Result<Option<Values>, ParseError> {
     match Stored::open(node, name)? {
-        Some(stored) => Values::find(node.file(), &Arc::new(stored), slice, budget),
+        Some(stored) => Values::find(&Arc::new(stored), slice, budget),
         None => Ok(None),
     }
 }
@@ -225,7 +223,7 @@ pub(super) fn numbers(
         stored.shape = vec![1];
     }
     let stored = Arc::new(stored);
-    let Some(values) = Values::find(node.file(), &stored, &Slice::ALL, budget)? else {
+    let Some(values) = Values::find(&stored, &Slice::ALL, budget)? else {
         return Ok(None);
     };
     let count = values.count().saturating_mul(values.components() as u64);
@@ -234,6 +232,6 @@ pub(super) fn numbers(
     }
     budget.check(count.saturating_mul(16), "its lists are")?;
     let rows = usize::try_from(values.count()).unwrap_or(0);
-    let numbers = Piece::Stored(values).all(node.file().bytes(), rows)?;
+    let numbers = Piece::Stored(values).all(rows)?;
     Ok(Some(numbers))
 }

@@ -4,36 +4,30 @@ use glam::DVec3;
 
 use super::band_cache::BandCache;
 use super::table::{Column, PART, ParticleTable};
-use super::values::Input;
+use super::values::Cache;
 use crate::ranges::{ParticleRanges, RangeAttribute};
-use crate::shared::SharedBytes;
 use crate::{ParseError, ScalarType};
 
 /// Bytes of decoded chunks that are kept, as neighbouring ranges need the same ones.
 const CACHE_BYTES: usize = 48 << 20;
 
-/// The particles of one time step, and the file that has them.
+/// The particles of one time step.
 #[derive(Debug)]
 pub(super) struct TableRanges {
-    bytes: SharedBytes,
     table: ParticleTable,
     cache: BandCache,
 }
 
 impl TableRanges {
-    pub(super) fn new(bytes: &SharedBytes, table: ParticleTable) -> Self {
+    pub(super) fn new(table: ParticleTable) -> Self {
         Self {
-            bytes: bytes.clone(),
             table,
             cache: BandCache::new(CACHE_BYTES),
         }
     }
 
-    fn input(&self) -> Input<'_> {
-        Input {
-            bytes: &self.bytes,
-            cache: Some(&self.cache),
-        }
+    const fn cache(&self) -> Cache<'_> {
+        Some(&self.cache)
     }
 }
 
@@ -71,7 +65,7 @@ impl ParticleRanges for TableRanges {
 
     fn read_positions(&self, first: u64, to: &mut [DVec3]) -> Result<(), ParseError> {
         let bytes = bytemuck::cast_slice_mut(to);
-        self.table.read_positions(self.input(), first, bytes)?;
+        self.table.read_positions(self.cache(), first, bytes)?;
         if cfg!(target_endian = "big") {
             for position in to {
                 let [x, y, z] = position
@@ -87,7 +81,7 @@ impl ParticleRanges for TableRanges {
         match self.table.attributes().get(attribute) {
             Some(column) => {
                 let scalar = column.scalar;
-                self.table.read(column, self.input(), first, to, scalar)
+                self.table.read(column, self.cache(), first, to, scalar)
             }
             None => {
                 self.table.read_parts(first, to);

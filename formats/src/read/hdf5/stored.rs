@@ -5,13 +5,15 @@ use hdf5_reader::messages::filter_pipeline::FilterDescription;
 use hdf5_reader::messages::layout::{ChunkIndexing, DataLayout};
 use hdf5_reader::{Dataset, Datatype, dtype_element_size};
 
-use super::file::Node;
+use super::file::{H5File, Node};
 use crate::ParseError;
 use crate::read::CUT_SHORT;
 
 /// A data set.
 #[derive(Debug)]
 pub(super) struct Stored {
+    /// The file that has the values.
+    pub(super) file: H5File,
     /// Path in the file.
     pub(super) path: String,
     /// Byte of the file at which its object header is, for messages.
@@ -25,6 +27,9 @@ pub(super) struct Stored {
     pub(super) element_len: usize,
     pub(super) place: Storage,
 }
+
+/// Tells data sets of open files apart: address of the file in memory, place in the file.
+pub(super) type StoredKey = (usize, usize);
 
 /// How the elements are stored.
 #[derive(Debug)]
@@ -72,6 +77,7 @@ impl Stored {
         let element_len = dtype_element_size(dataset.dtype());
         let element_len = element_len.map_err(|e| file.error(&e, address, &path))?;
         let mut stored = Self {
+            file: file.clone(),
             at: file.place(address),
             shape: dataset.shape().to_vec(),
             max_shape: dataset.max_dims().map(<[u64]>::to_vec),
@@ -141,6 +147,10 @@ impl Stored {
         Ok(stored)
     }
 
+    pub(super) fn key(&self) -> StoredKey {
+        (self.file.bytes().as_ptr() as usize, self.at)
+    }
+
     /// Number of elements; `None` if no file can have as many.
     pub(super) fn element_count(&self) -> Option<u64> {
         let mut sizes = self.shape.iter();
@@ -157,10 +167,10 @@ impl Stored {
     ///
     /// # Errors
     /// [`ParseError::Malformed`] if they are not all there.
-    pub(super) fn check_whole(&self, file_len: usize) -> Result<(), ParseError> {
+    pub(super) fn check_whole(&self) -> Result<(), ParseError> {
         let (start, len) = match &self.place {
             Storage::Compact(bytes) => (0, bytes.len()),
-            Storage::Contiguous(start) => (*start, file_len),
+            Storage::Contiguous(start) => (*start, self.file.bytes().len()),
             Storage::Chunked(_) | Storage::Missing => return Ok(()),
         };
         let end = self.byte_len().and_then(|len| len.checked_add(start));

@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use super::file::H5File;
 use super::piece::{Piece, encoded};
-use super::values::Input;
+use super::values::Cache;
 use crate::names::is_radius_name;
 use crate::read::columns::{StridedColumn, positions, zeros};
 use crate::{
@@ -168,11 +169,7 @@ impl ParticleTable {
     ///
     /// # Errors
     /// [`ParseError::TooLarge`], [`ParseError::Malformed`] if a chunk is damaged.
-    pub(super) fn read_all(
-        &self,
-        bytes: &[u8],
-        budget: MemoryBudget,
-    ) -> Result<RawParticles, ParseError> {
+    pub(super) fn read_all(&self, budget: MemoryBudget) -> Result<RawParticles, ParseError> {
         let count = self.count();
         let columns = || std::iter::once(&self.positions).chain(&self.attributes);
         let width = columns().map(|column| (column.components * column.scalar.size()) as u64);
@@ -182,11 +179,10 @@ impl ParticleTable {
         let need = width.saturating_mul(count).saturating_add(2 * chunk);
         budget.check(need, "its numbers in memory are")?;
         let count = usize::try_from(count).unwrap_or(usize::MAX);
-        let input = Input { bytes, cache: None };
         let read = |column: &Column| {
             let mut data = zeros(column.scalar, column.components * count);
             let to = data.as_bytes_mut();
-            self.read(column, input, 0, to, column.scalar)?;
+            self.read(column, None, 0, to, column.scalar)?;
             data.decode_little_endian();
             Ok::<_, ParseError>(data)
         };
@@ -226,11 +222,11 @@ impl ParticleTable {
     /// [`ParseError::Malformed`] if a chunk is damaged.
     pub(super) fn read_positions(
         &self,
-        input: Input<'_>,
+        cache: Cache<'_>,
         first: u64,
         to: &mut [u8],
     ) -> Result<(), ParseError> {
-        self.read(&self.positions, input, first, to, ScalarType::F64)
+        self.read(&self.positions, cache, first, to, ScalarType::F64)
     }
 
     /// Reads the values of `column` of the particles from `first` on, little-endian in type `scalar`.
@@ -240,7 +236,7 @@ impl ParticleTable {
     pub(super) fn read(
         &self,
         column: &Column,
-        input: Input<'_>,
+        cache: Cache<'_>,
         first: u64,
         to: &mut [u8],
         scalar: ScalarType,
@@ -253,7 +249,7 @@ impl ParticleTable {
             if first < end && !left.is_empty() {
                 let rows = usize::try_from(end - first).unwrap_or(usize::MAX);
                 let (own, rest) = left.split_at_mut(rows.saturating_mul(record).min(left.len()));
-                column.read_cell(cell, input, first - start, own, scalar)?;
+                column.read_cell(cell, cache, first - start, own, scalar)?;
                 first += (own.len() / record) as u64;
                 left = rest;
             }
@@ -323,7 +319,7 @@ impl Column {
     fn read_cell(
         &self,
         cell: &[Piece],
-        input: Input<'_>,
+        cache: Cache<'_>,
         first: u64,
         to: &mut [u8],
         scalar: ScalarType,
@@ -336,37 +332,43 @@ impl Column {
             }
             return Ok(());
         }
-        if let Some(column) = together(cell, scalar) {
+        if let Some((file, column)) = together(cell, scalar) {
             let first = usize::try_from(first).unwrap_or(usize::MAX);
-            column.read_values(input.bytes, first, to);
+            column.read_values(file.bytes(), first, to);
             return Ok(());
         }
         let mut component = 0;
         for piece in cell {
             let place = (component, self.components, scalar);
-            piece.read(input, first, to, place)?;
+            piece.read(cache, first, to, place)?;
             component += piece.components();
         }
         Ok(())
     }
 }
 
-/// All pieces as one column, if each is one range of the file and they have the type `scalar`.
-fn together(cell: &[Piece], scalar: ScalarType) -> Option<StridedColumn> {
+/// All pieces as one column of a file, if each is one range of it and they have the type `scalar`.
+fn together(cell: &[Piece], scalar: ScalarType) -> Option<(&H5File, StridedColumn)> {
     let columns = cell.iter().map(|piece| match piece {
-        Piece::Stored(values) => values.column().filter(|column| column.scalar == scalar),
+        Piece::Stored(values) => {
+            let column = values.column().filter(|column| column.scalar == scalar);
+            column.map(|column| (&values.stored().file, column))
+        }
         _ => None,
     });
-    let columns: Vec<StridedColumn> = columns.collect::<Option<_>>()?;
-    let (first, others) = columns.split_first()?;
-    if others.is_empty() || others.iter().any(|other| other.endian != first.endian) {
+    let columns: Vec<(&H5File, StridedColumn)> = columns.collect::<Option<_>>()?;
+    let ((file, first), others) = columns.split_first()?;
+    let fits = |(other, column): &(&H5File, StridedColumn)| {
+        column.endian == first.endian && other.is_same(file)
+    };
+    if others.is_empty() || !others.iter().all(fits) {
         return None;
     }
     let mut joined = first.clone();
-    for other in others {
+    for (_, other) in others {
         joined
             .component_strides
             .extend_from_slice(&other.component_strides);
     }
-    Some(joined)
+    Some((file, joined))
 }

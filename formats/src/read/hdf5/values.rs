@@ -7,7 +7,6 @@ use rayon::prelude::*;
 
 use super::band_cache::BandCache;
 use super::chunks::{ChunkGrid, Selection};
-use super::file::H5File;
 use super::stored::{Storage, Stored};
 use super::types::Field;
 use crate::read::columns::{ComponentStride, StridedColumn};
@@ -81,13 +80,8 @@ struct Chunks {
     is_parallel: bool,
 }
 
-/// The file that values are read from.
-#[derive(Clone, Copy)]
-pub(super) struct Input<'a> {
-    pub(super) bytes: &'a [u8],
-    /// Keeps chunks for the next range; `None` if everything is read once.
-    pub(super) cache: Option<&'a BandCache>,
-}
+/// Keeps chunks for the next range; `None` if everything is read once.
+pub(super) type Cache<'a> = Option<&'a BandCache>;
 
 impl Values {
     /// The numbers of `slice` of `stored`; `None` if its elements are no numbers, or its shape is another.
@@ -95,7 +89,6 @@ impl Values {
     /// # Errors
     /// [`ParseError::Malformed`] if they are not all in the file, [`ParseError::Unsupported`] for other filters.
     pub(super) fn find(
-        file: &H5File,
         stored: &Arc<Stored>,
         slice: &Slice,
         budget: MemoryBudget,
@@ -121,7 +114,7 @@ impl Values {
         if values.count == 0 {
             return Ok(Some(values));
         }
-        stored.check_whole(file.bytes().len())?;
+        stored.check_whole()?;
         match &stored.place {
             Storage::Compact(_) | Storage::Contiguous(_) => {}
             Storage::Missing => return Err(stored.never_written()),
@@ -131,7 +124,7 @@ impl Values {
                     frame: slice.frame,
                     rows: rows.start * stride..rows.end * stride,
                 };
-                let grid = ChunkGrid::find(file, stored, layout, &selection, budget)?;
+                let grid = ChunkGrid::find(stored, layout, &selection, budget)?;
                 if grid.band_rows % stride != 0 {
                     return Ok(None);
                 }
@@ -192,21 +185,22 @@ impl Values {
     /// [`ParseError::Malformed`] if a chunk is damaged.
     pub(super) fn read(
         &self,
-        input: Input<'_>,
+        cache: Cache<'_>,
         first: u64,
         to: &mut [u8],
     ) -> Result<(), ParseError> {
         let start = usize::try_from(first).unwrap_or(usize::MAX);
         match (&self.stored.place, &self.chunks) {
             (Storage::Contiguous(place), _) => {
-                self.column_from(*place).read_values(input.bytes, start, to);
+                let bytes = self.stored.file.bytes();
+                self.column_from(*place).read_values(bytes, start, to);
                 Ok(())
             }
             (Storage::Compact(bytes), _) => {
                 self.column_from(0).read_values(bytes, start, to);
                 Ok(())
             }
-            (_, Some(chunks)) => self.read_chunks(input, chunks, first, to),
+            (_, Some(chunks)) => self.read_chunks(cache, chunks, first, to),
             (_, None) => Ok(()),
         }
     }
@@ -230,7 +224,7 @@ impl Values {
 
     fn read_chunks(
         &self,
-        input: Input<'_>,
+        cache: Cache<'_>,
         chunks: &Chunks,
         first: u64,
         to: &mut [u8],
@@ -253,11 +247,11 @@ impl Values {
         }
         let read = |(band, row, to): (u64, u64, &mut [u8])| {
             let row = usize::try_from(row).unwrap_or(usize::MAX);
-            let decode = || self.band(input.bytes, chunks, band);
-            match input.cache {
+            let decode = || self.band(chunks, band);
+            match cache {
                 None => self.rows_at(0).read_values(&decode()?, row, to),
                 Some(cache) => {
-                    let key = (self.stored.at, self.frame, band);
+                    let key = (self.stored.key(), self.frame, band);
                     let rows = cache.get(key, decode)?;
                     self.rows_at(0).read_values(&rows, row, to);
                 }
@@ -273,7 +267,7 @@ impl Values {
     }
 
     /// The rows of a band as they are without filters.
-    fn band(&self, bytes: &[u8], chunks: &Chunks, band: u64) -> Result<Vec<u8>, ParseError> {
+    fn band(&self, chunks: &Chunks, band: u64) -> Result<Vec<u8>, ParseError> {
         let (stored, grid) = (&*self.stored, &chunks.grid);
         let Storage::Chunked(layout) = &stored.place else {
             return Ok(Vec::new());
@@ -285,7 +279,7 @@ impl Values {
         let frame = self.frame.unwrap_or(0) % frames.max(1);
         let frame_len = grid.chunk_len / usize::try_from(frames.max(1)).unwrap_or(usize::MAX);
         let start = usize::try_from(frame).unwrap_or(usize::MAX) * frame_len;
-        let decoded = |number| grid.decode(bytes, stored, layout, (band, number));
+        let decoded = |number| grid.decode(stored, layout, (band, number));
         if grid.band_chunks == 1 && frame_len == rows * self.row_len {
             let mut chunk = decoded(0)?.into_owned();
             chunk.drain(..start);
