@@ -146,6 +146,14 @@ pub(crate) trait Reader: Sync {
         0
     }
 
+    /// Whether files may refer to others that are not steps of their own.
+    fn may_refer_to_files(&self) -> bool {
+        false
+    }
+
+    /// Opens the files beside `file` that have particles of it, as far as they exist.
+    fn open_referenced(&self, _file: &SharedBytes) {}
+
     /// Whether [`Self::remarks`] needs all bytes of a file. It gets them if the file is not compressed.
     fn remarks_need_whole_file(&self) -> bool {
         false

@@ -33,11 +33,21 @@ fn read(file: Result<FrameFile, FrameError>) -> Result<Vec<RawParticles>, FrameE
 
 #[test]
 fn damaged_files_give_their_errors() {
-    let table = fs::read_to_string(damaged("table.tsv")).expect("the table");
+    give_their_errors(&damaged(""));
+}
+
+#[test]
+fn damaged_references_give_their_errors() {
+    give_their_errors(&damaged("../damaged_hdf5_links"));
+}
+
+/// Each file of `directory` gives the error in its table.
+fn give_their_errors(directory: &Path) {
+    let table = fs::read_to_string(directory.join("table.tsv")).expect("the table");
     let mut count = 0;
     for line in table.lines() {
         let (name, words) = line.split_once('\t').expect("two fields");
-        let path = damaged(name);
+        let path = directory.join(name);
         let error = read(FrameFile::open(&path)).expect_err(name).to_string();
         assert!(error.contains(words), "{name}: {error}");
         assert!(
@@ -56,8 +66,8 @@ fn damaged_files_give_their_errors() {
         }
         count += 1;
     }
-    // Also the table, its script, and a file that is only too large.
-    let files = fs::read_dir(damaged("")).expect("files").count();
+    // Also the table, its script, and one good file.
+    let files = fs::read_dir(directory).expect("files").count();
     assert_eq!(count + 3, files);
 }
 
@@ -97,6 +107,11 @@ fn ranges_are_parts_of_the_whole() {
         "swift.hdf5",
         "pysph_250.hdf5",
         "points.vtkhdf",
+        "../hdf5_links/joined.h5",
+        "../hdf5_links/selected.h5",
+        "../hdf5_links/table.h5",
+        "../hdf5_links/linked.hdf5",
+        "../hdf5_links/many.h5",
     ] {
         let path = data(name);
         let whole = &read(FrameFile::open(&path)).expect("a good file")[0];
@@ -144,33 +159,92 @@ fn truncations_and_wrong_bytes_are_survived() {
         "beam.h5part",
     ] {
         let path = data(name);
-        let whole = fs::read(&path).expect("readable");
         let budget = MemoryBudget::new(64 << 20, "take care");
         let open = |bytes| FrameFile::from_bytes_within(&path, bytes, budget);
-        for cut in (0..whole.len()).step_by(whole.len() / 30) {
-            assert!(
-                read(open(whole[..cut].to_vec())).is_err(),
-                "{name} cut at {cut}"
-            );
+        survives(name, &fs::read(&path).expect("readable"), 80, open);
+    }
+}
+
+/// Opens cut and changed versions of `whole`, which must be errors or whole particles.
+fn survives(
+    name: &str,
+    whole: &[u8],
+    changes: usize,
+    open: impl Fn(Vec<u8>) -> Result<FrameFile, FrameError>,
+) {
+    for cut in (0..whole.len()).step_by(whole.len() / 30) {
+        assert!(
+            read(open(whole[..cut].to_vec())).is_err(),
+            "{name} cut at {cut}"
+        );
+    }
+    // Multiplicative steps reach all parts of the file
+    let mut seed = 12_345_usize;
+    for _ in 0..changes {
+        let mut bytes = whole.to_owned();
+        for _ in 0..3 {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            let at = (seed >> 20) % bytes.len();
+            bytes[at] = seed.to_le_bytes()[7];
         }
-        // Multiplicative steps reach all parts of the file
-        let mut seed = 12_345_usize;
-        for _ in 0..80 {
-            let mut bytes = whole.clone();
-            for _ in 0..3 {
-                seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-                let at = (seed >> 20) % bytes.len();
-                bytes[at] = seed.to_le_bytes()[7];
-            }
-            if let Ok(steps) = read(open(bytes)) {
-                for step in steps {
-                    let count = step.positions.len();
-                    let is_whole = |a: &Attribute| a.data.len() == a.components * count;
-                    assert!(step.attributes.iter().all(is_whole), "{name}");
-                }
+        if let Ok(steps) = read(open(bytes)) {
+            for step in steps {
+                let count = step.positions.len();
+                let is_whole = |a: &Attribute| a.data.len() == a.components * count;
+                assert!(step.attributes.iter().all(is_whole), "{name}");
             }
         }
     }
+}
+
+#[test]
+fn wrong_bytes_in_references_are_survived() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    fs::create_dir(dir.path().join("parts")).expect("writable");
+    for part in ["first.h5", "second.h5", "type.h5"] {
+        let part = Path::new("parts").join(part);
+        let from = data("../hdf5_links").join(&part);
+        fs::copy(from, dir.path().join(part)).expect("readable");
+    }
+    for name in [
+        "joined.h5",
+        "joined-latest.h5",
+        "table.h5",
+        "frames.h5",
+        "linked.hdf5",
+        "many.h5",
+    ] {
+        let whole = fs::read(data("../hdf5_links").join(name)).expect("readable");
+        let path = dir.path().join(name);
+        survives(name, &whole, 100, |bytes| {
+            fs::write(&path, bytes).expect("writable");
+            FrameFile::open_within(&path, MemoryBudget::new(64 << 20, "take care"))
+        });
+    }
+}
+
+#[test]
+fn files_that_are_referred_to_are_among_those_of_a_sequence() {
+    let references = |name: &str| {
+        let path = data("../hdf5_links").join(name);
+        let sequence = Sequence::open(&SequenceInput::Files(vec![path])).expect("a sequence");
+        let found = sequence.references().into_values().flatten();
+        let name = |path: PathBuf| path.file_name().map(|name| name.to_owned());
+        Vec::from_iter(found.filter_map(name))
+    };
+    assert_eq!(references("joined.h5"), ["first.h5", "second.h5"]);
+    assert_eq!(references("frames.h5"), ["first.h5", "second.h5"]);
+    let all = ["first.h5", "second.h5", "type.h5"];
+    assert_eq!(references("linked.hdf5"), all);
+    assert!(references("../hdf5/plain.h5").is_empty());
+}
+
+#[test]
+fn bytes_in_memory_refer_to_no_files() {
+    let path = data("../hdf5_links/joined.h5");
+    let bytes = fs::read(&path).expect("readable");
+    let error = read(FrameFile::from_bytes(&path, bytes)).expect_err("no directory");
+    assert!(error.to_string().contains("in memory"), "{error}");
 }
 
 /// Copies the files `names` of the data to an empty directory.
@@ -233,5 +307,8 @@ fn virtual_data_sets_of_a_snapshot_give_the_files_with_the_values() {
     let sequence = Sequence::open(&SequenceInput::Directory(dir.path().into()));
     let error = sequence.expect("one frame").load_raw(0);
     let error = error.expect_err("no values").to_string();
-    assert!(error.contains("a virtual data set"), "{error}");
+    assert!(
+        error.contains("refers to the file `snap_003.0.hdf5`"),
+        "{error}"
+    );
 }

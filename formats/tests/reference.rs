@@ -179,6 +179,12 @@ fn hdf5_is_what_the_reference_readers_give() {
 }
 
 #[test]
+#[cfg(feature = "hdf5")]
+fn hdf5_in_several_files_is_what_the_reference_reader_gives() {
+    assert_eq!(compare("hdf5_links"), 20);
+}
+
+#[test]
 fn houdini_geometry_is_what_was_written() {
     assert_eq!(compare("houdini"), 39);
 }

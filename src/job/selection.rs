@@ -94,21 +94,25 @@ pub(super) fn select(
 }
 
 /// Requests for all frames of `sequence`; `companions` returns further files that the images of a frame depend on beside
-/// the topology, `outputs` the output files.
+/// the topology and the files that its inputs refer to, `outputs` the output files.
 pub(super) fn frame_requests(
     sequence: &Sequence,
     companions: impl Fn(i64) -> Vec<PathBuf>,
     outputs: impl Fn(i64) -> Vec<PathBuf>,
 ) -> Vec<FrameRequest> {
+    let references = sequence.references();
     let request = |(index, number)| {
-        let inputs = sequence.inputs(index).into_iter();
+        let inputs = sequence.inputs(index);
         let topology = sequence
             .topology()
             .map(|topology| topology.path().to_owned());
+        let referenced = inputs.iter().filter_map(|path| references.get(path));
+        let referenced = referenced.flatten().cloned();
+        let beside = topology.into_iter().chain(referenced);
         FrameRequest {
             number,
-            inputs: inputs.map(Path::to_owned).collect(),
-            companions: topology.into_iter().chain(companions(number)).collect(),
+            companions: beside.chain(companions(number)).collect(),
+            inputs: inputs.into_iter().map(Path::to_owned).collect(),
             outputs: outputs(number),
         }
     };

@@ -105,11 +105,11 @@ with made("points.vtkhdf", "rows 0 to 9 of 4") as file:
     group = file.create_group("VTKHDF")
     group.attrs["Type"] = numpy.bytes_("PolyData")
     group["NumberOfPoints"], group["Points"] = [9], POINTS
-with made("external-link.h5", "links to other files are not followed: /positions in other.h5") as file:
+with made("external-link.h5", "/positions refers to the file `other.h5`, which cannot be opened") as file:
     file["positions"] = h5py.ExternalLink("other.h5", "/positions")
 with made("external-values.h5", "its values are in another file") as file:
     file.create_dataset("positions", (4, 3), "f8", external=[("values.bin", 0, 96)])
-with made("virtual.h5", "virtual data set") as file:
+with made("virtual.h5", "/positions: refers to the file `other.h5`, which cannot be opened") as file:
     layout = h5py.VirtualLayout((4, 3), "f8")
     layout[:] = h5py.VirtualSource("other.h5", "positions", (4, 3))
     file.create_virtual_dataset("positions", layout)

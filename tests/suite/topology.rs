@@ -1,4 +1,4 @@
-//! Topologies: `inspect` shows their attributes, and jobs notice when the file changes.
+//! Topologies and other files that inputs refer to: `inspect` shows them, and jobs notice when they change.
 
 use std::fs;
 
@@ -103,4 +103,34 @@ fn jobs_notice_that_a_topology_has_changed() {
     // Without the topology it is another job
     let ran = shop.run(&["convert", "md.trr", "-o", "native"]);
     assert_ne!(ran.code(), Some(0), "{}", ran.errors());
+}
+
+#[test]
+fn jobs_notice_that_a_file_of_an_external_link_has_changed() {
+    let shop = Workshop::new();
+    fs::create_dir(shop.join("parts")).expect("writable");
+    for file in [
+        "linked.hdf5",
+        "parts/first.h5",
+        "parts/second.h5",
+        "parts/type.h5",
+    ] {
+        fs::copy(sample(&format!("hdf5_links/{file}")), shop.join(file)).expect("a copy");
+    }
+    let inspected = shop.run(&["inspect", "linked.hdf5"]).expect(0);
+    inspected.prints("refers to other files: parts/first.h5, parts/type.h5");
+    let render = |options: &[&str]| {
+        let fixed = ["render", "linked.hdf5", "-o", "out/f.#.exr", "--radius=0.1"];
+        let small = ["--width=32", "--height=18", "--samples=1"];
+        shop.run(&[&fixed[..], &small, options].concat())
+    };
+    assert_eq!(render(&[]).expect(0).rendered().len(), 1);
+    render(&[]).expect(0).prints("are done already");
+    // A coordinate in the file behind the virtual data set behind the link
+    let path = shop.join("parts/second.h5");
+    let bytes = fs::read(&path).expect("readable");
+    fs::write(&path, &bytes[..bytes.len() - 1]).expect("writable");
+    let ran = render(&[]);
+    assert_ne!(ran.code(), Some(0), "{}", ran.errors());
+    assert!(ran.errors().contains("second.h5"), "{}", ran.errors());
 }

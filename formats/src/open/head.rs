@@ -2,9 +2,10 @@
 
 use std::fs::File;
 use std::io::{self, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::siblings::SiblingFiles;
 use super::streamed::decompressor;
 use crate::compression::{ByteStream, StreamError, is_compressed};
 use crate::detect::Format;
@@ -54,8 +55,10 @@ pub fn remarks(path: &Path) -> Vec<String> {
         if is_compressed(map.bytes()) {
             return Ok(reader.remarks(&head));
         }
-        let remarks = reader.remarks_of_file(&SharedBytes::new(map.clone()));
+        let siblings = SiblingFiles::of(path);
+        let remarks = reader.remarks_of_file(&siblings.around(SharedBytes::new(map.clone())));
         map.check()?;
+        siblings.check()?;
         Ok(remarks)
     });
     let remarks = remarks.unwrap_or_default().into_iter();
@@ -72,11 +75,32 @@ pub(crate) fn refers_to_pieces(path: &Path) -> bool {
     with_reader(path, |reader, file| reader.refers_to_pieces(file)).unwrap_or(false)
 }
 
+/// The files that the one at `path` refers to, in its directory or below it, if they exist; empty unless its name is that
+/// of a format whose files may do so.
+pub(crate) fn referenced_files(path: &Path) -> Vec<PathBuf> {
+    let may_refer = |format: Format| format.reader().may_refer_to_files();
+    if !Format::by_name(path).is_some_and(may_refer) {
+        return Vec::new();
+    }
+    let siblings = SiblingFiles::of(path);
+    with_reader_among(path, &siblings, |reader, file| reader.open_referenced(file));
+    siblings.paths()
+}
+
 /// What the reader of the file at `path` says of it; None if the file cannot be opened, or has no known format.
 fn with_reader<T>(path: &Path, ask: impl FnOnce(&dyn Reader, &SharedBytes) -> T) -> Option<T> {
+    with_reader_among(path, &SiblingFiles::of(path), ask)
+}
+
+fn with_reader_among<T>(
+    path: &Path,
+    siblings: &SiblingFiles,
+    ask: impl FnOnce(&dyn Reader, &SharedBytes) -> T,
+) -> Option<T> {
     let map = Arc::new(MappedFile::open(path).ok()?);
     let format = Format::detect(map.bytes(), path).ok()?;
-    Some(ask(format.reader(), &SharedBytes::new(map)))
+    let file = siblings.around(SharedBytes::new(map));
+    Some(ask(format.reader(), &file))
 }
 
 /// The first bytes of the file at `path`, decompressed. Damage that comes later, or that lets some bytes pass, is no

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use super::siblings::SiblingFiles;
 use crate::detect::Format;
 use crate::native::MappedFile;
 use crate::read::{ByteSource, Step};
@@ -76,11 +77,13 @@ impl SteppedFile {
     ) -> Result<T, FrameError> {
         self.stamp.check(path)?;
         let map = Arc::new(MappedFile::open(path)?);
-        let bytes = SharedBytes::new(map.clone());
+        let siblings = SiblingFiles::of(path);
+        let bytes = siblings.around(SharedBytes::new(map.clone()));
         let result = read(&mut ByteSource::shared(&bytes));
         // A file that changed explains any fault, and bytes that were cut off read as zeros.
         self.stamp.check(path)?;
         map.check()?;
+        siblings.check()?;
         result.map_err(|e| e.in_file(path))
     }
 }

@@ -22,15 +22,17 @@ use crate::{FrameError, MemoryBudget, ParseError, RawParticles};
 
 mod head;
 mod mapped;
+mod siblings;
 mod streamed;
 mod whole;
 
 pub use crate::compression::unpacked_len;
 pub use head::{detect_file, is_native, remarks};
-pub(crate) use head::{head, piece_count, refers_to_pieces};
+pub(crate) use head::{head, piece_count, referenced_files, refers_to_pieces};
 pub(crate) use whole::read_whole;
 
 use mapped::SteppedFile;
+pub(crate) use siblings::SiblingFiles;
 use streamed::{StreamedFile, decompressor};
 
 /// Files up to this length, decompressed, are always read as a whole. Of longer files, this many bytes decide whether
@@ -47,6 +49,8 @@ pub struct FrameFile {
     stored_len: u64,
     notes: Vec<String>,
     budget: MemoryBudget,
+    /// The files that it refers to, if it was read as a whole.
+    siblings: SiblingFiles,
 }
 
 /// Where the bytes of a file are.
@@ -65,6 +69,14 @@ enum Content {
 impl Content {
     fn whole(bytes: Vec<u8>) -> Self {
         Self::Whole(SharedBytes::new(Arc::new(bytes)))
+    }
+
+    /// The same content of a file that may refer to `siblings`.
+    fn among(self, siblings: &SiblingFiles) -> Self {
+        match self {
+            Self::Whole(bytes) => Self::Whole(siblings.around(bytes)),
+            other => other,
+        }
     }
 
     /// All bytes, or the first ones if the file is on the disk.
@@ -115,7 +127,10 @@ impl FrameFile {
         }
         let (content, stamp, notes) = Self::read_content(path, budget)?;
         stamp.check(path)?;
-        Self::new(path, content, stamp.len, notes, budget)
+        let siblings = SiblingFiles::of(path);
+        let content = content.among(&siblings);
+        let file = Self::new(path, content, stamp.len, notes, budget)?;
+        Ok(Self { siblings, ..file })
     }
 
     /// Reads as much of the file at `path` as has to be in memory. Also returns what the file was before, and notes.
@@ -219,6 +234,7 @@ impl FrameFile {
             }
         };
         Ok(Self {
+            siblings: SiblingFiles::of(path),
             path: path.to_owned(),
             format,
             steps,
@@ -317,6 +333,7 @@ impl FrameFile {
             Content::Whole(bytes) => {
                 let mut source = ByteSource::shared(bytes);
                 let particles = self.format.read_within(&mut source, step, left);
+                self.siblings.check()?;
                 particles.map_err(in_file)?
             }
             Content::Aligned(bytes) => {

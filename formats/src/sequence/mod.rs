@@ -27,6 +27,7 @@ mod name;
 mod notes;
 mod pattern;
 mod pieces;
+mod references;
 mod scan;
 mod topology;
 

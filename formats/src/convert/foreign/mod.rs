@@ -11,6 +11,7 @@ use super::ParticleSource;
 use crate::compression::is_compressed;
 use crate::detect::Format;
 use crate::native::MappedFile;
+use crate::open::SiblingFiles;
 use crate::read::columns::ParticleLayout;
 use crate::regular::regular_len;
 use crate::shared::SharedBytes;
@@ -40,11 +41,15 @@ pub fn open_source(path: &Path) -> Result<Option<Box<dyn ParticleSource>>, Frame
         return Ok(Some(Box::new(ColumnSource::new(file, layout))));
     }
     let file = Arc::new(file);
-    let ranges = Format::detect(file.bytes(), path)
-        .and_then(|format| format.reader().ranges(&SharedBytes::new(file.clone())));
+    let siblings = SiblingFiles::of(path);
+    let bytes = siblings.around(SharedBytes::new(file.clone()));
+    let ranges = Format::detect(&bytes, path).and_then(|format| format.reader().ranges(&bytes));
     file.check()?;
+    siblings.check()?;
     let ranges = ranges.map_err(|e| e.in_file(path))?;
-    Ok(ranges.map(|ranges| Box::new(RangeSource::new(file, ranges)) as Box<dyn ParticleSource>))
+    Ok(ranges.map(|ranges| {
+        Box::new(RangeSource::new(file, siblings, ranges)) as Box<dyn ParticleSource>
+    }))
 }
 
 /// The layout of the particles in `bytes`, the contents of `path`; `None` if some numbers have no fixed stride.

@@ -8,19 +8,25 @@ use crate::FrameError;
 use crate::convert::sources::places;
 use crate::convert::{ParticleSource, SourceAttribute};
 use crate::native::MappedFile;
+use crate::open::SiblingFiles;
 use crate::ranges::ParticleRanges;
 
 /// The particles of a mapped file.
 #[derive(Debug)]
 pub(super) struct RangeSource {
     file: Arc<MappedFile>,
+    siblings: SiblingFiles,
     ranges: Box<dyn ParticleRanges>,
     attributes: Vec<SourceAttribute>,
 }
 
 impl RangeSource {
-    /// The particles of `ranges`, which reads `file`.
-    pub(super) fn new(file: Arc<MappedFile>, ranges: Box<dyn ParticleRanges>) -> Self {
+    /// The particles of `ranges`, which reads `file` and some of its `siblings`.
+    pub(super) fn new(
+        file: Arc<MappedFile>,
+        siblings: SiblingFiles,
+        ranges: Box<dyn ParticleRanges>,
+    ) -> Self {
         let attributes = ranges.attributes().into_iter();
         let attributes = attributes.map(|attribute| SourceAttribute {
             name: attribute.name,
@@ -30,6 +36,7 @@ impl RangeSource {
         Self {
             attributes: attributes.collect(),
             file,
+            siblings,
             ranges,
         }
     }
@@ -77,6 +84,7 @@ impl ParticleSource for RangeSource {
     }
 
     fn check(&self) -> Result<(), FrameError> {
-        self.file.check()
+        self.file.check()?;
+        self.siblings.check()
     }
 }

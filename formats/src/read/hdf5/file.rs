@@ -1,44 +1,70 @@
-//! Groups and attributes of an HDF5 file, through the crate `hdf5-reader`, with the errors of this crate.
+//! An open HDF5 file, through the crate `hdf5-reader`, and the files that it refers to.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 
 use hdf5_reader::error::Error;
-use hdf5_reader::group::Group;
-use hdf5_reader::messages::HdfMessage;
-use hdf5_reader::messages::link::LinkTarget;
+use hdf5_reader::global_heap::GlobalHeapCollection;
 use hdf5_reader::object_header::ObjectHeader;
-use hdf5_reader::{Attribute, Dataset, Hdf5File, OpenOptions, Storage, StorageBuffer};
+use hdf5_reader::{Hdf5File, OpenOptions, Storage, StorageBuffer};
 
-use super::types::stored_scalar;
+use super::header_patch::{Addressing, Patch, virtual_layout};
+use super::links::{ExternalLink, external_links};
+use super::node::Node;
+use super::virtual_list::{VirtualPart, read_list};
 use crate::ParseError;
-use crate::message::one_line;
 use crate::read::CUT_SHORT;
 use crate::shared::SharedBytes;
 
 /// Most bytes of the header of one object. Those of simulations have some kibibytes.
 const MOST_HEADER_BYTES: usize = 16 << 20;
-/// Most numbers of an attribute that are read.
-const MOST_ATTRIBUTE_NUMBERS: usize = 1 << 16;
-
 /// An open file.
 #[derive(Clone)]
 pub(super) struct H5File {
     bytes: SharedBytes,
     file: Hdf5File,
+    storage: Arc<PatchedStorage>,
+    /// Whether it was opened for another file, which calls it so.
+    name: Option<Arc<str>>,
+    found: Arc<Mutex<Found>>,
 }
 
-/// The bytes of a file for `hdf5-reader`.
-struct SharedStorage(SharedBytes);
+/// What was looked up in a file.
+#[derive(Default)]
+struct Found {
+    /// Lists of parts of virtual data sets by the addresses of their headers.
+    virtual_parts: BTreeMap<u64, Arc<Vec<VirtualPart>>>,
+    /// Links to other files by the addresses of their groups.
+    links: BTreeMap<u64, Arc<Vec<ExternalLink>>>,
+    /// Open files by their names in this one.
+    others: BTreeMap<String, H5File>,
+}
 
-impl Storage for SharedStorage {
+/// The bytes of a file as `hdf5-reader` sees them.
+struct PatchedStorage {
+    bytes: SharedBytes,
+    patches: RwLock<Vec<Patch>>,
+}
+
+impl Storage for PatchedStorage {
     fn len(&self) -> u64 {
-        self.0.len() as u64
+        self.bytes.len() as u64
     }
 
     fn read_range(&self, offset: u64, len: usize) -> Result<StorageBuffer, Error> {
         let start = usize::try_from(offset).map_err(|_| Error::OffsetOutOfBounds(offset))?;
-        StorageBuffer::from_shared_owner(self.0.owner(), start, len)
+        let buffer = StorageBuffer::from_shared_owner(self.bytes.owner(), start, len)?;
+        let patches = self.patches.read().unwrap_or_else(PoisonError::into_inner);
+        let range = offset..offset.saturating_add(len as u64);
+        if !patches.iter().any(|patch| patch.touches(&range)) {
+            return Ok(buffer);
+        }
+        let mut patched = buffer.to_vec();
+        for patch in &*patches {
+            patch.apply(offset, &mut patched);
+        }
+        Ok(StorageBuffer::from_vec(patched))
     }
 }
 
@@ -57,8 +83,11 @@ impl H5File {
         let options = OpenOptions::default()
             .with_chunk_cache_bytes(0)
             .with_max_object_header_bytes(MOST_HEADER_BYTES);
-        let storage = Arc::new(SharedStorage(bytes.clone()));
-        let file = Hdf5File::from_storage_with_options(storage, options);
+        let storage = Arc::new(PatchedStorage {
+            bytes: bytes.clone(),
+            patches: RwLock::default(),
+        });
+        let file = Hdf5File::from_storage_with_options(storage.clone(), options);
         let file = file.map_err(|e| parse_error(&e, bytes.len(), 0))?;
         let stated = file.superblock().eof_address;
         if stated > bytes.len() as u64 {
@@ -68,6 +97,9 @@ impl H5File {
         Ok(Self {
             bytes: bytes.clone(),
             file,
+            storage,
+            name: None,
+            found: Arc::default(),
         })
     }
 
@@ -99,11 +131,136 @@ impl H5File {
     pub(super) fn root(&self) -> Result<Node, ParseError> {
         let group = self.file.root_group();
         let group = group.map_err(|e| parse_error(&e, self.bytes.len(), 0))?;
-        Ok(Node {
-            file: self.clone(),
-            group,
-            path: String::new(),
-        })
+        Ok(Node::new(self, group, String::new()))
+    }
+
+    fn found(&self) -> MutexGuard<'_, Found> {
+        self.found.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The file that is called `name` in this one; `.` is this one.
+    ///
+    /// # Errors
+    /// [`ParseError`] that names it, if it is not beside this one or is damaged.
+    pub(super) fn other(&self, name: &str) -> Result<Self, ParseError> {
+        if name == "." {
+            return Ok(self.clone());
+        }
+        if let Some(other) = self.found().others.get(name) {
+            return Ok(other.clone());
+        }
+        let bytes = self.bytes.sibling(name)?;
+        let other = Self::open(&bytes);
+        let other = other.map_err(|e| e.map_message(|what| format!("in `{name}`: {what}")))?;
+        let other = Self {
+            name: Some(name.into()),
+            ..other
+        };
+        self.found().others.insert(name.to_owned(), other.clone());
+        Ok(other)
+    }
+
+    /// Whether it was opened because another file refers to it. Its own links are not followed then, so that files
+    /// that refer to each other come to an end.
+    pub(super) const fn is_other(&self) -> bool {
+        self.name.is_some()
+    }
+
+    /// Names of the files that were met, as they are called in this one.
+    pub(super) fn other_names(&self) -> BTreeSet<String> {
+        let found = self.found();
+        let parts = found.virtual_parts.values().flat_map(|parts| parts.iter());
+        let parts = parts.map(|part| part.file.clone());
+        let names = parts.chain(found.others.keys().cloned());
+        names.filter(|name| name != ".").collect()
+    }
+
+    /// Opens the files that were met, and those that were met in these, as far as they exist.
+    pub(super) fn open_others(&self) {
+        for name in self.other_names() {
+            let Ok(other) = self.other(&name) else {
+                continue;
+            };
+            for name in other.other_names() {
+                let _ = other.other(&name);
+            }
+        }
+    }
+
+    /// The links to other files in the group at `address` with the name `path`.
+    ///
+    /// # Errors
+    /// [`ParseError::Malformed`].
+    pub(super) fn links(
+        &self,
+        address: u64,
+        path: &str,
+    ) -> Result<Arc<Vec<ExternalLink>>, ParseError> {
+        if let Some(links) = self.found().links.get(&address) {
+            return Ok(Arc::clone(links));
+        }
+        let header = self.header(address, path)?;
+        let links = external_links(&self.file, &header);
+        let links = Arc::new(links.map_err(|e| self.error(&e, address, path))?);
+        self.found().links.insert(address, Arc::clone(&links));
+        Ok(links)
+    }
+
+    /// The parts of the data set whose header is at `address`, if it is virtual and was met before.
+    pub(super) fn virtual_parts(&self, address: u64) -> Option<Arc<Vec<VirtualPart>>> {
+        self.found().virtual_parts.get(&address).cloned()
+    }
+
+    /// What `ask` gives when all virtual data sets that it meets are shown to the library as empty ones. `path` is for
+    /// messages.
+    ///
+    /// # Errors
+    /// [`ParseError`] if the list of the parts of one is damaged.
+    pub(super) fn with_virtual<T>(
+        &self,
+        path: &str,
+        ask: impl Fn() -> Result<T, Error>,
+    ) -> Result<Result<T, Error>, ParseError> {
+        loop {
+            match ask() {
+                Err(error) => match virtual_address(&error) {
+                    Some(address) if self.virtual_parts(address).is_none() => {
+                        let shown = self.show_virtual(address);
+                        shown.map_err(|e| self.error(&e, address, path))?;
+                    }
+                    _ => return Ok(Err(error)),
+                },
+                Ok(answer) => return Ok(Ok(answer)),
+            }
+        }
+    }
+
+    /// Reads the list of the virtual data set whose header is at `address`, and shows the header as that of an empty
+    /// data set.
+    fn show_virtual(&self, address: u64) -> Result<(), Error> {
+        let superblock = self.file.superblock();
+        let addressing = Addressing {
+            offset_size: superblock.offset_size,
+            length_size: superblock.length_size,
+            base: superblock.base_address,
+        };
+        let found = virtual_layout(&self.bytes, address, addressing)?;
+        let (place, patches) = found.ok_or(Error::UnsupportedLayoutClass(3))?;
+        let (offsets, lengths) = (addressing.offset_size, addressing.length_size);
+        let heap = GlobalHeapCollection::parse_at_storage(
+            self.file.storage(),
+            place.collection,
+            offsets,
+            lengths,
+        )?;
+        let object = heap.get_object(place.index);
+        let missing = || Error::InvalidData("the list of a virtual data set is missing".into());
+        let parts = read_list(&object.ok_or_else(missing)?.data, lengths)?;
+        let shown = &self.storage.patches;
+        let mut shown = shown.write().unwrap_or_else(PoisonError::into_inner);
+        shown.extend(patches);
+        self.found().virtual_parts.insert(address, Arc::new(parts));
+        Ok(())
     }
 
     /// The header of the object at `address`.
@@ -118,7 +275,16 @@ impl H5File {
     /// `error` of the object at `address` with the name `path`.
     pub(super) fn error(&self, error: &Error, address: u64, path: &str) -> ParseError {
         let error = parse_error(error, self.bytes.len(), self.place(address));
+        let path = self.named(path);
         error.map_message(|what| format!("{path}: {what}"))
+    }
+
+    /// `path`, with the name of this file if another one refers to it.
+    pub(super) fn named(&self, path: &str) -> String {
+        match &self.name {
+            Some(name) => format!("in `{name}`: {path}"),
+            None => path.to_owned(),
+        }
     }
 }
 
@@ -129,10 +295,6 @@ fn parse_error(error: &Error, len: usize, at: usize) -> ParseError {
         root = source;
     }
     match root {
-        Error::UnsupportedLayoutClass(3) => ParseError::unsupported(
-            "a virtual data set, which is not read: its values are in other files; give these, or copy it to a \
-             file of its own with h5py",
-        ),
         Error::UnsupportedFilter(what) | Error::UnsupportedEncoding(what) => {
             ParseError::unsupported(format!(
                 "HDF5 with {what}, which is not read; repack the file with `h5repack -f GZIP=4`"
@@ -144,164 +306,19 @@ fn parse_error(error: &Error, len: usize, at: usize) -> ParseError {
     }
 }
 
-/// A group.
-#[derive(Clone)]
-pub(super) struct Node {
-    file: H5File,
-    group: Group,
-    path: String,
-}
-
-impl Node {
-    /// The file.
-    pub(super) const fn file(&self) -> &H5File {
-        &self.file
+/// The address of the header of a virtual data set, if `error` is that it is one.
+fn virtual_address(error: &Error) -> Option<u64> {
+    // The library gives it as text only
+    let (mut innermost, mut root) = (None, error);
+    while let Error::Context { path, source } = root {
+        innermost = Some(path);
+        root = source;
     }
-
-    /// The path from the root, which is empty; without a slash at the end.
-    pub(super) fn path(&self) -> &str {
-        &self.path
-    }
-
-    /// The path of the member `name`.
-    pub(super) fn path_of(&self, name: &str) -> String {
-        format!("{}/{name}", self.path)
-    }
-
-    /// Names of the groups and of the data sets in it, sorted.
-    ///
-    /// # Errors
-    /// [`ParseError`] if the group is damaged.
-    pub(super) fn members(&self) -> Result<(Vec<String>, Vec<String>), ParseError> {
-        let names = self.group.member_names();
-        let (mut groups, mut datasets) = names.map_err(|e| self.error(&e))?;
-        groups.sort();
-        datasets.sort();
-        Ok((groups, datasets))
-    }
-
-    /// The group `name`, if there is one.
-    ///
-    /// # Errors
-    /// As [`Self::members`].
-    pub(super) fn group(&self, name: &str) -> Result<Option<Self>, ParseError> {
-        match self.group.group(name) {
-            Ok(group) => Ok(Some(Self {
-                file: self.file.clone(),
-                group,
-                path: self.path_of(name),
-            })),
-            Err(Error::GroupNotFound(_)) => Ok(None),
-            Err(e) => Err(self
-                .file
-                .error(&e, self.group.address(), &self.path_of(name))),
+    match root {
+        Error::UnsupportedLayoutClass(3) => {
+            let (_, address) = innermost?.rsplit_once("at 0x")?;
+            u64::from_str_radix(address, 16).ok()
         }
+        _ => None,
     }
-
-    /// The group at `path` below this one, if there is one.
-    ///
-    /// # Errors
-    /// As [`Self::members`].
-    pub(super) fn descend(&self, path: &str) -> Result<Option<Self>, ParseError> {
-        let mut node = self.clone();
-        for name in path.split('/').filter(|name| !name.is_empty()) {
-            let Some(next) = node.group(name)? else {
-                return Ok(None);
-            };
-            node = next;
-        }
-        Ok(Some(node))
-    }
-
-    /// The data set `name`, if there is one.
-    ///
-    /// # Errors
-    /// As [`Self::members`].
-    pub(super) fn dataset(&self, name: &str) -> Result<Option<Dataset>, ParseError> {
-        match self.group.dataset(name) {
-            Ok(dataset) => Ok(Some(dataset)),
-            Err(Error::DatasetNotFound(_)) => Ok(None),
-            Err(e) => Err(self
-                .file
-                .error(&e, self.group.address(), &self.path_of(name))),
-        }
-    }
-
-    /// Links to other files, which are not followed: file and name there.
-    pub(super) fn external_links(&self) -> Vec<String> {
-        let Ok(header) = self.file.file.get_or_parse_header(self.group.address()) else {
-            return Vec::new();
-        };
-        let links = header.messages.iter().filter_map(|message| match message {
-            HdfMessage::Link(link) => match &link.target {
-                LinkTarget::External { filename, .. } => {
-                    Some(format!("{} in {filename}", self.path_of(&link.name)))
-                }
-                _ => None,
-            },
-            _ => None,
-        });
-        links.collect()
-    }
-
-    /// The numbers of an attribute; `None` if it is missing or has no numbers.
-    pub(super) fn numbers(&self, name: &str) -> Option<Vec<f64>> {
-        numbers(&self.group.attribute(name).ok()?)
-    }
-
-    /// The first number of an attribute.
-    pub(super) fn number(&self, name: &str) -> Option<f64> {
-        self.numbers(name)?.first().copied()
-    }
-
-    /// The texts of an attribute that is an array of them; empty if it is not.
-    pub(super) fn texts(&self, name: &str) -> Vec<String> {
-        let attribute = self.group.attribute(name).ok();
-        let texts = attribute.and_then(|attribute| attribute.read_strings().ok());
-        texts.unwrap_or_default()
-    }
-
-    /// The text of an attribute, as one line.
-    pub(super) fn text(&self, name: &str) -> Option<String> {
-        text(&self.group.attribute(name).ok()?)
-    }
-
-    fn error(&self, error: &Error) -> ParseError {
-        let path = if self.path.is_empty() {
-            "/"
-        } else {
-            &self.path
-        };
-        self.file.error(error, self.group.address(), path)
-    }
-}
-
-/// The first number of an attribute of a data set.
-pub(super) fn dataset_number(dataset: &Dataset, name: &str) -> Option<f64> {
-    numbers(&dataset.attribute(name).ok()?)?.first().copied()
-}
-
-/// The text of an attribute of a data set, as one line.
-pub(super) fn dataset_text(dataset: &Dataset, name: &str) -> Option<String> {
-    text(&dataset.attribute(name).ok()?)
-}
-
-fn numbers(attribute: &Attribute) -> Option<Vec<f64>> {
-    let (scalar, endian) = stored_scalar(&attribute.datatype)?;
-    let bytes = attribute.raw_data.chunks_exact(scalar.size());
-    let count = usize::try_from(attribute.num_elements().ok()?).ok()?;
-    let numbers = bytes.take(count.min(MOST_ATTRIBUTE_NUMBERS));
-    Some(
-        numbers
-            .map(|number| scalar.decode_one(number, endian))
-            .collect(),
-    )
-}
-
-fn text(attribute: &Attribute) -> Option<String> {
-    let text = match attribute.read_string() {
-        Ok(text) => text,
-        Err(_) => attribute.read_strings().ok()?.join(", "),
-    };
-    Some(one_line(text.trim().to_owned()))
 }

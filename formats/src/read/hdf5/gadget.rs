@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::{DMat3, DVec3};
 
 use super::dialect::{Dialect, StepInfo, integer, listed, units};
-use super::file::{Node, dataset_number, dataset_text};
+use super::node::{Node, dataset_number, dataset_text};
 use super::piece::Piece;
 use super::properties::PropertyFinder;
 use super::stored::Stored;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::dialect::{Dialect, StepInfo, integer, listed, no_step, part_names, units};
-use super::file::{Node, dataset_number, dataset_text};
+use super::node::{Node, dataset_number, dataset_text};
 use super::piece::Piece;
 use super::properties::{PropertyFinder, numbers};
 use super::stored::Stored;
@@ -144,7 +144,7 @@ fn sampled(
         return Ok(Some(samples.collect()));
     }
     if (all.len() as u64) < count {
-        let stored = Stored::of(group, name, &dataset)?;
+        let stored = Stored::of(&group.path_of(name), &dataset)?;
         return Err(stored.bad(format!("{} numbers for {count} samples", all.len())));
     }
     Ok(Some(
@@ -280,7 +280,10 @@ impl Trajectory {
         let elements = elements.unwrap_or_default().into_iter();
         let unit = |name: String| {
             let element = group.node.group(&name).ok()??;
-            let unit = |what: &str| dataset_text(&element.dataset(what).ok()??, "unit");
+            let unit = |what: &str| {
+                let dataset = element.dataset(what).ok()??;
+                dataset_text(&dataset, "unit")
+            };
             let time = match name == POSITION {
                 true => unit("time").map(|unit| format!("time {unit}, ")),
                 false => None,

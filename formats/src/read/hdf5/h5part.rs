@@ -1,7 +1,7 @@
 //! H5Part and H5hut files: a group `Step#<number>` for each time step, with a data set for each property.
 
 use super::dialect::{Dialect, StepInfo, integer, listed, no_step};
-use super::file::Node;
+use super::node::Node;
 use super::properties::{PropertyFinder, numbers, values};
 use super::table::{Part, ParticleTable};
 use super::values::{Slice, Values};

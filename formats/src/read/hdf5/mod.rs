@@ -12,7 +12,10 @@ mod file;
 mod gadget;
 mod h5md;
 mod h5part;
+mod header_patch;
+mod links;
 mod lzf;
+mod node;
 mod openpmd;
 mod piece;
 mod plain;
@@ -23,6 +26,8 @@ mod stored;
 mod table;
 mod types;
 mod values;
+mod virtual_list;
+mod virtual_rows;
 mod vtkhdf;
 
 use self::dialect::{Dialect, listed};
@@ -30,6 +35,7 @@ use self::file::H5File;
 use self::gadget::Snapshot;
 use self::h5md::Trajectory;
 use self::h5part::StepGroups;
+use self::node::Node;
 use self::openpmd::OpenPmd;
 use self::plain::PlainFile;
 use self::pysph::ParticleArrays;
@@ -132,7 +138,7 @@ impl Reader for Hdf5 {
     }
 
     fn remarks_of_file(&self, file: &SharedBytes) -> Vec<String> {
-        let Ok(dialect) = dialect_of(file) else {
+        let Ok((file, dialect)) = open(file) else {
             return Vec::new();
         };
         let mut remarks = dialect.remarks();
@@ -147,31 +153,61 @@ impl Reader for Hdf5 {
                 ));
             }
         }
+        let others = Vec::from_iter(file.other_names());
+        if !others.is_empty() {
+            remarks.push(format!("refers to other files: {}", listed(&others)));
+        }
         remarks
+    }
+
+    fn may_refer_to_files(&self) -> bool {
+        true
+    }
+
+    fn open_referenced(&self, file: &SharedBytes) {
+        let Ok((file, dialect)) = open(file) else {
+            return;
+        };
+        // What is looked up on the way tells the files
+        let unlimited = MemoryBudget::UNLIMITED;
+        let steps = dialect.steps(unlimited).map_or(0, |steps| steps.len());
+        for step in [0, steps.saturating_sub(1)] {
+            let _ = dialect.table(step, unlimited);
+        }
+        file.open_others();
     }
 }
 
 /// The layout of the file `bytes`.
 fn dialect_of(bytes: &SharedBytes) -> Result<Box<dyn Dialect>, ParseError> {
+    open(bytes).map(|(_, dialect)| dialect)
+}
+
+/// The file `bytes` and its layout.
+fn open(bytes: &SharedBytes) -> Result<(H5File, Box<dyn Dialect>), ParseError> {
     let file = H5File::open(bytes)?;
-    let root = file.root()?;
-    if let Some(points) = VtkHdf::open(&root)? {
+    let dialect = dialect_in(&file.root()?)?;
+    Ok((file, dialect))
+}
+
+fn dialect_in(root: &Node) -> Result<Box<dyn Dialect>, ParseError> {
+    if let Some(points) = VtkHdf::open(root)? {
         return Ok(Box::new(points));
     }
-    if let Some(iterations) = OpenPmd::open(&root)? {
+    if let Some(iterations) = OpenPmd::open(root)? {
         return Ok(Box::new(iterations));
     }
-    if let Some(trajectory) = Trajectory::open(&root)? {
+    if let Some(trajectory) = Trajectory::open(root)? {
         return Ok(Box::new(trajectory));
     }
-    if let Some(steps) = StepGroups::open(&root)? {
+    if let Some(steps) = StepGroups::open(root)? {
         return Ok(Box::new(steps));
     }
-    if let Some(snapshot) = Snapshot::open(&root)? {
+    if let Some(snapshot) = Snapshot::open(root)? {
         return Ok(Box::new(snapshot));
     }
-    if let Some(arrays) = ParticleArrays::open(&root)? {
+    if let Some(arrays) = ParticleArrays::open(root)? {
         return Ok(Box::new(arrays));
     }
-    Ok(Box::new(PlainFile::open(&root)?))
+    Ok(Box::new(PlainFile::open(root)?))
 }

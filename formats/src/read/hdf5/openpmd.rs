@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use super::dialect::{Dialect, StepInfo, listed, no_step, part_names, units};
-use super::file::{Node, dataset_number};
+use super::node::{Node, dataset_number};
 use super::piece::Piece;
 use super::properties::{AXES, PropertyFinder};
 use super::stored::Stored;
@@ -201,7 +201,8 @@ impl OpenPmd {
         for (species, node) in self.first_species() {
             let (groups, datasets) = node.members().unwrap_or_default();
             let scalars = datasets.into_iter().filter_map(|name| {
-                let unit = dataset_number(&node.dataset(&name).ok()??, "unitSI")?;
+                let dataset = node.dataset(&name).ok()??;
+                let unit = dataset_number(&dataset, "unitSI")?;
                 Some((name, unit))
             });
             let vectors = groups.into_iter().filter_map(|name| {
@@ -260,7 +261,7 @@ impl Component {
     fn open(record: &Node, name: &str, budget: MemoryBudget) -> Result<Option<Self>, ParseError> {
         if let Some(dataset) = record.dataset(name)? {
             let unit = dataset_number(&dataset, "unitSI").unwrap_or(1.0);
-            let stored = Arc::new(Stored::of(record, name, &dataset)?);
+            let stored = Arc::new(Stored::of(&record.path_of(name), &dataset)?);
             let values = Values::find(&stored, &Slice::ALL, budget)?;
             let Some(values) = values.filter(|values| values.components() == 1) else {
                 let shape = &stored.shape;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::dialect::{Dialect, StepInfo, integer, listed, no_step, part_names};
-use super::file::Node;
+use super::node::Node;
 use super::piece::Piece;
 use super::properties::{PropertyFinder, numbers};
 use super::stored::Stored;
@@ -305,7 +305,6 @@ struct Search {
     visited: usize,
     /// Data sets with their shapes, for the message.
     datasets: Vec<String>,
-    links: Vec<String>,
 }
 
 impl Search {
@@ -317,7 +316,6 @@ impl Search {
         let (groups, datasets) = node.members()?;
         self.groups.extend(PositionGroup::find(node, &datasets)?);
         if self.groups.is_empty() {
-            self.links.extend(node.external_links());
             for name in &datasets {
                 let shape = match node.dataset(name) {
                     Ok(Some(dataset)) => format!("{:?}", dataset.shape()),
@@ -340,14 +338,7 @@ impl Search {
 
     /// The error for a file without positions.
     fn nothing(self) -> ParseError {
-        let mut what =
-            "an HDF5 file of no known layout, and without a data set for positions".to_owned();
-        if !self.links.is_empty() {
-            what += &format!(
-                "; links to other files are not followed: {}; give these files, or copy them into one with `h5copy`",
-                listed(&self.links)
-            );
-        }
+        let what = "an HDF5 file of no known layout, and without a data set for positions";
         let found = match self.datasets.is_empty() {
             true => "no data sets".to_owned(),
             false => listed(&self.datasets),

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use super::file::Node;
+use super::node::Node;
 use super::piece::Piece;
 use super::stored::{Storage, Stored, StoredKey};
 use super::types::Field;

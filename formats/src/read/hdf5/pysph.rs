@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use hdf5_reader::Dataset;
 
 use super::dialect::{Dialect, StepInfo, integer, listed, part_names};
-use super::file::{Node, dataset_number};
+use super::node::{Node, dataset_number};
 use super::piece::Piece;
 use super::properties::{AXES, PropertyFinder, values};
 use super::table::{Part, ParticleTable};

@@ -1,11 +1,15 @@
 //! Where the bytes of a data set are: shape, type, and storage, from its object header.
 
+use std::sync::Arc;
+
 use hdf5_reader::messages::HdfMessage;
 use hdf5_reader::messages::filter_pipeline::FilterDescription;
 use hdf5_reader::messages::layout::{ChunkIndexing, DataLayout};
-use hdf5_reader::{Dataset, Datatype, dtype_element_size};
+use hdf5_reader::{Datatype, dtype_element_size};
 
-use super::file::{H5File, Node};
+use super::file::H5File;
+use super::node::{Node, NodeDataset};
+use super::virtual_list::VirtualPart;
 use crate::ParseError;
 use crate::read::CUT_SHORT;
 
@@ -39,6 +43,8 @@ pub(super) enum Storage {
     /// All together, from this byte of the file on.
     Contiguous(usize),
     Chunked(ChunkedLayout),
+    /// In other data sets.
+    Virtual(Arc<Vec<VirtualPart>>),
     /// Space was never allocated.
     Missing,
 }
@@ -63,19 +69,18 @@ impl Stored {
         let Some(dataset) = node.dataset(name)? else {
             return Ok(None);
         };
-        Self::of(node, name, &dataset).map(Some)
+        Self::of(&node.path_of(name), &dataset).map(Some)
     }
 
-    /// `dataset`, which is `name` in `node`.
+    /// `dataset`, whose path is `path`.
     ///
     /// # Errors
     /// As [`Self::open`].
-    pub(super) fn of(node: &Node, name: &str, dataset: &Dataset) -> Result<Self, ParseError> {
-        let file = node.file();
-        let path = node.path_of(name);
+    pub(super) fn of(path: &str, dataset: &NodeDataset) -> Result<Self, ParseError> {
+        let file = &dataset.file;
         let address = dataset.address();
         let element_len = dtype_element_size(dataset.dtype());
-        let element_len = element_len.map_err(|e| file.error(&e, address, &path))?;
+        let element_len = element_len.map_err(|e| file.error(&e, address, path))?;
         let mut stored = Self {
             file: file.clone(),
             at: file.place(address),
@@ -84,10 +89,14 @@ impl Stored {
             datatype: dataset.dtype().clone(),
             element_len,
             place: Storage::Missing,
-            path,
+            path: file.named(path),
         };
+        if let Some(parts) = file.virtual_parts(address) {
+            stored.place = Storage::Virtual(parts);
+            return Ok(stored);
+        }
         // Find the messages about the storage
-        let header = file.header(address, &stored.path)?;
+        let header = file.header(address, path)?;
         let (mut layout, mut filters) = (None, Vec::new());
         for message in &header.messages {
             match message {
@@ -171,7 +180,7 @@ impl Stored {
         let (start, len) = match &self.place {
             Storage::Compact(bytes) => (0, bytes.len()),
             Storage::Contiguous(start) => (*start, self.file.bytes().len()),
-            Storage::Chunked(_) | Storage::Missing => return Ok(()),
+            Storage::Chunked(_) | Storage::Virtual(_) | Storage::Missing => return Ok(()),
         };
         let end = self.byte_len().and_then(|len| len.checked_add(start));
         if end.is_some_and(|end| end <= len) {

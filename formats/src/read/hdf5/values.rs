@@ -9,6 +9,8 @@ use super::band_cache::BandCache;
 use super::chunks::{ChunkGrid, Selection};
 use super::stored::{Storage, Stored};
 use super::types::Field;
+use super::virtual_list::VirtualPart;
+use super::virtual_rows::{SourceRows, WantedRows, source_rows};
 use crate::read::columns::{ComponentStride, StridedColumn};
 use crate::{MemoryBudget, ParseError, ScalarType};
 
@@ -69,6 +71,8 @@ pub(super) struct Values {
     /// Rows of the dimension, to find `frame`.
     all_rows: u64,
     chunks: Option<Chunks>,
+    /// Data sets that have the rows of a virtual one.
+    sources: Vec<SourceRows>,
 }
 
 /// Chunks that hold the rows.
@@ -110,6 +114,7 @@ impl Values {
             frame: slice.frame,
             all_rows: shape.rows,
             chunks: None,
+            sources: Vec::new(),
         };
         if values.count == 0 {
             return Ok(Some(values));
@@ -118,6 +123,7 @@ impl Values {
         match &stored.place {
             Storage::Compact(_) | Storage::Contiguous(_) => {}
             Storage::Missing => return Err(stored.never_written()),
+            Storage::Virtual(parts) => values.find_sources(slice, parts, budget)?,
             Storage::Chunked(layout) => {
                 let stride = slice.stride.unwrap_or(1);
                 let selection = Selection {
@@ -138,6 +144,36 @@ impl Values {
             }
         }
         Ok(Some(values))
+    }
+
+    /// Finds the data sets that have the rows of a virtual one.
+    fn find_sources(
+        &mut self,
+        slice: &Slice,
+        parts: &[VirtualPart],
+        budget: MemoryBudget,
+    ) -> Result<(), ParseError> {
+        let stored = &self.stored;
+        let elements = (self.row_len / stored.element_len.max(1)) as u64;
+        let row = self.frame.unwrap_or(0) * self.all_rows + self.first;
+        let wanted = WantedRows {
+            slice,
+            first: row * elements,
+            count: self.count,
+            elements,
+        };
+        let sources = source_rows(stored, parts, &wanted, budget)?;
+        let own = (self.scalar(), self.components());
+        let differs =
+            |source: &&SourceRows| (source.values.scalar(), source.values.components()) != own;
+        if let Some(other) = sources.iter().find(differs) {
+            let (path, from) = (&stored.path, &other.values.stored.path);
+            return Err(ParseError::unsupported(format!(
+                "{path}: a virtual data set with values of {from}, which has numbers of another type; copy it with h5py"
+            )));
+        }
+        self.sources = sources;
+        Ok(())
     }
 
     /// Number of rows.
@@ -162,13 +198,18 @@ impl Values {
 
     /// Rows of a chunk, if there are chunks.
     pub(super) fn band_rows(&self) -> Option<u64> {
-        self.chunks.as_ref().map(|chunks| chunks.band_rows)
+        let sources = self.sources.iter();
+        let sources = sources.filter_map(|source| source.values.band_rows());
+        let own = self.chunks.as_ref().map(|chunks| chunks.band_rows);
+        own.into_iter().chain(sources).max()
     }
 
     /// Bytes of a decoded chunk, 0 without chunks.
     pub(super) fn chunk_len(&self) -> u64 {
-        let chunks = self.chunks.as_ref();
-        chunks.map_or(0, |chunks| chunks.grid.chunk_len as u64)
+        let own = self.chunks.as_ref();
+        let own = own.map_or(0, |chunks| chunks.grid.chunk_len as u64);
+        let sources = self.sources.iter().map(|source| source.values.chunk_len());
+        sources.fold(own, u64::max)
     }
 
     /// Where the numbers are, if they are in one range of the file.
@@ -201,7 +242,7 @@ impl Values {
                 Ok(())
             }
             (_, Some(chunks)) => self.read_chunks(cache, chunks, first, to),
-            (_, None) => Ok(()),
+            (_, None) => self.read_sources(cache, first, to),
         }
     }
 
@@ -220,6 +261,24 @@ impl Values {
         };
         let scalar = (self.field.scalar, self.field.endian);
         StridedColumn::interleaved(&self.stored.path, scalar, self.field.components, first)
+    }
+
+    /// Reads rows of other data sets.
+    fn read_sources(&self, cache: Cache<'_>, first: u64, to: &mut [u8]) -> Result<(), ParseError> {
+        let width = self.components() * self.scalar().size();
+        let mut row = first;
+        let mut left = to;
+        for source in self.sources.iter().filter(|source| source.rows.end > first) {
+            let rows = usize::try_from(source.rows.end - row).unwrap_or(usize::MAX);
+            let (own, rest) = left.split_at_mut(rows.saturating_mul(width).min(left.len()));
+            if own.is_empty() {
+                break;
+            }
+            source.values.read(cache, row - source.rows.start, own)?;
+            row = source.rows.end;
+            left = rest;
+        }
+        Ok(())
     }
 
     fn read_chunks(

@@ -1,7 +1,7 @@
 //! VTKHDF files: points and point data of `PolyData` and `UnstructuredGrid`, also with time steps.
 
 use super::dialect::{Dialect, StepInfo, integer, no_step};
-use super::file::Node;
+use super::node::Node;
 use super::piece::Piece;
 use super::properties::{PropertyFinder, numbers, values};
 use super::stored::Stored;
