@@ -93,6 +93,26 @@ def gadget():
     expect("gadget.hdf5", 0, None, 0.5, joined(gadget_parts("gadget.hdf5"), scalars))
 
 
+# GADGET: types with masses of their own, with one mass in the header, and with none
+def mass_table():
+    numbers = numpy.random.default_rng(12)
+    parts = []
+    with h5py.File(HERE / "mass-table.hdf5", "w", libver="earliest") as file:
+        header = file.create_group("Header")
+        header.attrs["NumPart_ThisFile"] = numpy.array([8, 6, 4], "u4")
+        header.attrs["MassTable"] = numpy.array([0.5, 0.25, 0.0])
+        for number, count in enumerate([8, 6, 4]):
+            arrays = {"Coordinates": numbers.uniform(size=(count, 3)), "ParticleIDs": numpy.arange(count)}
+            if number == 0:
+                arrays["Masses"] = numbers.uniform(size=count)
+            for name, array in arrays.items():
+                file[f"PartType{number}/{name}"] = array
+            if number == 1:
+                arrays["Masses"] = numpy.full(count, 0.25)
+            parts.append((number, {GADGET[name]: array for name, array in arrays.items()}))
+    expect("mass-table.hdf5", 0, None, None, joined(parts, ("Masses",)))
+
+
 # SWIFT: HDF5 1.10 and later, double precision, checksums, times in arrays
 def swift():
     with h5py.File(HERE / "swift.hdf5", "w", libver="latest") as file:
@@ -484,4 +504,5 @@ openpmd()
 vtkhdf()
 plain()
 cells()
+mass_table()
 (HERE / "expected.tsv").write_text("".join(lines))

@@ -13,11 +13,12 @@ use super::stored::Stored;
 use super::table::{Part, ParticleTable};
 use super::values::{Slice, Values};
 use crate::read::remarks::cell_remark;
-use crate::{MemoryBudget, ParseError, SimulationCell};
+use crate::{MemoryBudget, ParseError, ScalarType, SimulationCell};
 
 /// What the names of the groups of types begin with.
 const TYPE: &str = "PartType";
 const COORDINATES: &str = "Coordinates";
+const MASSES: &str = "Masses";
 
 /// Usual content of the types, by number.
 const USUAL: [&str; 7] = [
@@ -153,6 +154,12 @@ impl Snapshot {
         for name in datasets.iter().filter(|name| *name != COORDINATES) {
             finder.add(node, name, name, &Slice::ALL)?;
         }
+        if let Some(mass) = self.mass_in_header(number)
+            && !datasets.iter().any(|name| name == MASSES)
+        {
+            let piece = vec![Piece::Constant(mass, ScalarType::F64)];
+            finder.found.push((MASSES.to_owned(), piece));
+        }
         finder.join_vectors();
         let part = Part {
             value: number,
@@ -161,6 +168,13 @@ impl Snapshot {
             attributes: finder.found,
         };
         Ok((part, finder.left_out))
+    }
+
+    /// The mass of each particle of a type whose particles have no masses of their own.
+    fn mass_in_header(&self, number: u32) -> Option<f64> {
+        let masses = self.header.as_ref()?.numbers("MassTable")?;
+        let mass = masses.get(number as usize).copied();
+        mass.filter(|mass| *mass != 0.0)
     }
 
     /// Compares the number of coordinates with the header.
