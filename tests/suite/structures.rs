@@ -147,7 +147,7 @@ fn radii_of_their_own() {
 #[test]
 fn water_as_a_union() {
     // The light on the ground takes most of the time of such small images: once is enough
-    for (surface, photons) in [("union", 0), ("smooth", 500_000)] {
+    for (surface, photons) in [("union", 0), ("smooth", 100_000)] {
         let caustics = format!("render.caustics={{photons={photons}}}");
         let look = ["--look", "water", "--set", &caustics];
         let water = [&look[..], &["--spray", "--surface", surface]].concat();

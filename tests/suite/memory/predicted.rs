@@ -202,13 +202,13 @@ fn many_particles_in_a_small_image() {
 fn every_structure() {
     for structure in ["lbvh", "bvh", "sbvh", "kdtree"] {
         let options = [&SMALL[..], &["--accelerator", structure]].concat();
-        compare("npy", |path| npy(path, 1_000_000), &options);
+        compare("npy", |path| npy(path, 600_000), &options);
     }
 }
 
 #[test]
 fn every_particle_encoding() {
-    const COUNT: usize = 400_000;
+    const COUNT: usize = 250_000;
     compare(
         "csv",
         |path| fs::write(path, csv(COUNT)).expect("a file"),
@@ -227,7 +227,7 @@ fn every_particle_encoding() {
 
 #[test]
 fn every_text_format() {
-    const COUNT: usize = 400_000;
+    const COUNT: usize = 250_000;
     compare(
         "lammpstrj.gz",
         |path| gz(path, dump(COUNT).as_bytes()),

@@ -15,7 +15,7 @@ const LONG: [&str; 10] = [
     "--height",
     "180",
     "--samples",
-    "32",
+    "12",
 ];
 
 #[test]

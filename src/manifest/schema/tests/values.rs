@@ -1,5 +1,7 @@
 //! Many values for every key: the schema accepts a value if and only if the reader accepts it.
 
+use std::sync::LazyLock;
+
 use super::*;
 
 /// Values of every type, around every bound.
@@ -156,7 +158,8 @@ fn keys() -> Vec<String> {
 
 /// `BASE` with `value` for the dotted `key`.
 fn with(key: &str, value: &toml::Value) -> Table {
-    let mut base: toml::Value = toml::Value::Table(BASE.parse().unwrap());
+    static PARSED: LazyLock<Table> = LazyLock::new(|| BASE.parse().unwrap());
+    let mut base = toml::Value::Table(PARSED.clone());
     let mut node = &mut base;
     for part in key.split('.') {
         node = match node {
@@ -207,17 +210,21 @@ fn schema_and_reader_accept_the_same_values() {
         .map(|v| (*v).to_owned())
         .collect();
     words_and_slips(&schema, &mut values);
+    let parsed = |text: String| {
+        let value = format!("v = {text}").parse::<Table>().unwrap()["v"].clone();
+        (text, value)
+    };
+    let values: Vec<(String, toml::Value)> = values.into_iter().map(parsed).collect();
     let mut differ = Vec::new();
     for key in keys() {
         let mut taken = 0;
-        for text in &values {
-            let value = format!("v = {text}").parse::<Table>().unwrap()["v"].clone();
-            let table = with(&key, &value);
+        for (text, value) in &values {
+            let table = with(&key, value);
             let read = read(&table.to_string());
             let valid = validator.is_valid(&serde_json::to_value(&table).unwrap());
             taken += usize::from(valid);
             let is_known = BEYOND.contains(&(key.as_str(), value.as_str().unwrap_or_default()));
-            if valid != read.is_ok() && !(valid && is_whole_float(&value)) && !is_known {
+            if valid != read.is_ok() && !(valid && is_whole_float(value)) && !is_known {
                 let verdict =
                     read.map_or_else(|e| e.to_string(), |_| "the schema refuses it".to_owned());
                 differ.push(format!("{key} = {text}: {verdict}"));
