@@ -71,13 +71,11 @@ impl AttributeData {
     }
 
     /// The numbers as bytes, to be filled with little-endian ones before [`Self::decode_little_endian`].
-    #[cfg(feature = "hdf5")]
     pub(crate) fn as_bytes_mut(&mut self) -> &mut [u8] {
         with_values!(self, v => bytemuck::cast_slice_mut(v))
     }
 
     /// Brings numbers whose bytes are little-endian into the order of the machine.
-    #[cfg(feature = "hdf5")]
     pub(crate) fn decode_little_endian(&mut self) {
         if cfg!(target_endian = "big") {
             let size = self.scalar_type().size();

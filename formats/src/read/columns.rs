@@ -341,7 +341,7 @@ fn gather(bytes: &[u8], count: usize, columns: &[StridedColumn]) -> Vec<Attribut
 }
 
 /// The storage of a column; untouched pages cost nothing yet.
-pub(super) fn zeros(scalar: ScalarType, len: usize) -> AttributeData {
+pub(crate) fn zeros(scalar: ScalarType, len: usize) -> AttributeData {
     match scalar {
         ScalarType::I8 => AttributeData::I8(vec![0; len]),
         ScalarType::U8 => AttributeData::U8(vec![0; len]),

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::json;
+use spherule_formats::convert::open_source;
 use spherule_formats::native::{FORMAT, layout, verify};
 use spherule_formats::open::{is_native, remarks};
 use spherule_formats::sequence::{
@@ -234,6 +235,52 @@ fn inspect(
     Ok(Ok(Reader::Listening))
 }
 
+/// What is in a step of a file.
+struct Contents {
+    stats: FrameStats,
+    time: Option<f64>,
+    encoding: &'static str,
+}
+
+impl Contents {
+    /// The only step of the file at `path`, with a part of its particles in memory at a time; `None` if its format
+    /// does not allow it.
+    fn in_blocks(path: &Path) -> Result<Option<Self>, FrameError> {
+        let Some(source) = open_source(path)? else {
+            return Ok(None);
+        };
+        let contents = Self {
+            stats: FrameStats::of_source(&*source)?,
+            time: source.time(),
+            encoding: match source.position_len() {
+                Some(12) => "f32",
+                _ => "f64",
+            },
+        };
+        Ok(Some(contents))
+    }
+
+    /// Step `index` of `file`, with the properties of `topology`.
+    fn at_once(
+        file: &FrameFile,
+        index: usize,
+        topology: Option<&Topology>,
+    ) -> Result<Self, FrameError> {
+        let mut raw = file.read(index)?;
+        if let Some(topology) = topology {
+            topology.add_to(&mut raw, file.path())?;
+        }
+        Ok(Self {
+            stats: FrameStats::of(&raw),
+            time: raw.time,
+            encoding: match raw.positions {
+                Positions::F32(_) => "f32",
+                Positions::F64(_) => "f64",
+            },
+        })
+    }
+}
+
 /// Reads step `index` of `file`.
 fn read<'a>(
     file: &'a FrameFile,
@@ -241,11 +288,15 @@ fn read<'a>(
     number: Option<i64>,
     topology: Option<&Topology>,
 ) -> Result<Inspected<'a>, FrameError> {
-    let mut raw = file.read(index)?;
-    if let Some(topology) = topology {
-        topology.add_to(&mut raw, file.path())?;
-    }
-    let mut stats = FrameStats::of(&raw);
+    let contents = match topology {
+        None if file.steps().len() == 1 => Contents::in_blocks(file.path())?,
+        _ => None,
+    };
+    let contents = match contents {
+        Some(contents) => contents,
+        None => Contents::at_once(file, index, topology)?,
+    };
+    let mut stats = contents.stats;
     let step = &file.steps()[index];
     let running = i64::try_from(index).ok();
     let number = if file.steps().len() > 1 {
@@ -270,11 +321,10 @@ fn read<'a>(
         file: file.path(),
         format: file.format().name(),
         frame: step.number.or(number),
-        time: raw.time,
-        encoding: match (&native, &raw.positions) {
-            (Some(index), _) => index.encoding().name(),
-            (None, Positions::F32(_)) => "f32",
-            (None, Positions::F64(_)) => "f64",
+        time: contents.time,
+        encoding: match &native {
+            Some(index) => index.encoding().name(),
+            None => contents.encoding,
         },
         stats,
         bytes_per_particle: (all > 0).then(|| stored / all as f64),
