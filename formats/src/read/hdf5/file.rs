@@ -5,10 +5,10 @@ use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 
 use hdf5_reader::error::Error;
-use hdf5_reader::global_heap::GlobalHeapCollection;
 use hdf5_reader::object_header::ObjectHeader;
 use hdf5_reader::{Hdf5File, OpenOptions, Storage, StorageBuffer};
 
+use super::global_heap::heap_object;
 use super::header_patch::{Addressing, Patch, virtual_layout};
 use super::links::{ExternalLink, external_links};
 use super::node::Node;
@@ -19,6 +19,10 @@ use crate::shared::SharedBytes;
 
 /// Most bytes of the header of one object. Those of simulations have some kibibytes.
 const MOST_HEADER_BYTES: usize = 16 << 20;
+/// Most virtual data sets of a file, each of which is found by listing its group once more.
+const MOST_VIRTUAL: usize = 1024;
+/// Most parts of all virtual data sets of a file. Simulations have one for each file of a step and data set.
+const MOST_PARTS: usize = 1 << 15;
 /// An open file.
 #[derive(Clone)]
 pub(super) struct H5File {
@@ -170,7 +174,7 @@ impl H5File {
     pub(super) fn other_names(&self) -> BTreeSet<String> {
         let found = self.found();
         let parts = found.virtual_parts.values().flat_map(|parts| parts.iter());
-        let parts = parts.map(|part| part.file.clone());
+        let parts = parts.map(|part| part.file.to_string());
         let names = parts.chain(found.others.keys().cloned());
         names.filter(|name| name != ".").collect()
     }
@@ -246,16 +250,20 @@ impl H5File {
         };
         let found = virtual_layout(&self.bytes, address, addressing)?;
         let (place, patches) = found.ok_or(Error::UnsupportedLayoutClass(3))?;
-        let (offsets, lengths) = (addressing.offset_size, addressing.length_size);
-        let heap = GlobalHeapCollection::parse_at_storage(
-            self.file.storage(),
-            place.collection,
-            offsets,
-            lengths,
-        )?;
-        let object = heap.get_object(place.index);
+        // Read the list, within what is left of the limits
+        let (known, used) = {
+            let all = &self.found().virtual_parts;
+            (all.len(), all.values().map(|parts| parts.len()).sum())
+        };
+        if known >= MOST_VIRTUAL {
+            let what = format!("more than {MOST_VIRTUAL} virtual data sets");
+            return Err(Error::UnsupportedEncoding(what));
+        }
+        let list = heap_object(&self.bytes, place, addressing)?;
         let missing = || Error::InvalidData("the list of a virtual data set is missing".into());
-        let parts = read_list(&object.ok_or_else(missing)?.data, lengths)?;
+        let left = MOST_PARTS.saturating_sub(used);
+        let parts = read_list(list.ok_or_else(missing)?, addressing.length_size, left)?;
+        // Show another header
         let shown = &self.storage.patches;
         let mut shown = shown.write().unwrap_or_else(PoisonError::into_inner);
         shown.extend(patches);

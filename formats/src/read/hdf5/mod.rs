@@ -10,6 +10,7 @@ mod chunks;
 mod dialect;
 mod file;
 mod gadget;
+mod global_heap;
 mod h5md;
 mod h5part;
 mod header_patch;

@@ -3,12 +3,11 @@
 //! Layout of the list and of selections: HDF5 File Format Specification 3.0, III.I and VIII.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use hdf5_reader::error::Error;
 use hdf5_reader::io::Cursor;
 
-/// Most parts of a virtual data set. Simulations have one for each file of a step.
-const MOST_PARTS: u64 = 1 << 14;
 /// Most dimensions that HDF5 has.
 const MOST_DIMENSIONS: u32 = 32;
 
@@ -16,9 +15,9 @@ const MOST_DIMENSIONS: u32 = 32;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct VirtualPart {
     /// The file as it is called in this one; `.` is this one.
-    pub(super) file: String,
+    pub(super) file: Arc<str>,
     /// Path of the data set in that file.
-    pub(super) dataset: String,
+    pub(super) dataset: Arc<str>,
     /// Which of its elements.
     pub(super) source: Selection,
     /// Which elements of the virtual data set they are.
@@ -67,11 +66,16 @@ impl Selection {
     }
 }
 
-/// Reads the list in the object `bytes` of the global heap of a file with lengths of `length_size` bytes.
+/// Reads the list of at most `most` parts in the object `bytes` of the global heap of a file with lengths of
+/// `length_size` bytes.
 ///
 /// # Errors
 /// [`Error`] if it is damaged or of a later version.
-pub(super) fn read_list(bytes: &[u8], length_size: u8) -> Result<Vec<VirtualPart>, Error> {
+pub(super) fn read_list(
+    bytes: &[u8],
+    length_size: u8,
+    most: usize,
+) -> Result<Vec<VirtualPart>, Error> {
     let mut cursor = Cursor::new(bytes);
     let version = cursor.read_u8()?;
     if version > 1 {
@@ -79,27 +83,27 @@ pub(super) fn read_list(bytes: &[u8], length_size: u8) -> Result<Vec<VirtualPart
         return Err(Error::UnsupportedEncoding(what));
     }
     let count = cursor.read_length(length_size)?;
-    if count > MOST_PARTS {
-        let what = format!("{count} parts of a virtual data set, at most {MOST_PARTS} are read");
+    if count > most as u64 {
+        let what = format!("{count} parts of a virtual data set, at most {most} more are read");
         return Err(Error::InvalidData(what));
     }
     let mut parts: Vec<VirtualPart> = Vec::new();
     for _ in 0..count {
         let flags = if version == 1 { cursor.read_u8()? } else { 0 };
         // Names may be those of an earlier part
-        let mut name = |is_shared: bool, of: fn(&VirtualPart) -> &String| match is_shared {
+        let mut name = |is_shared: bool, of: fn(&VirtualPart) -> &Arc<str>| match is_shared {
             true => {
                 let index = cursor.read_length(length_size)?;
                 let part = usize::try_from(index)
                     .ok()
                     .and_then(|index| parts.get(index));
                 let missing = || Error::InvalidData(format!("the name of part {index} is missing"));
-                part.map(|part| of(part).clone()).ok_or_else(missing)
+                part.map(|part| Arc::clone(of(part))).ok_or_else(missing)
             }
-            false => cursor.read_null_terminated_string(),
+            false => cursor.read_null_terminated_string().map(Arc::from),
         };
         let file = match flags & 4 != 0 {
-            true => ".".to_owned(),
+            true => ".".into(),
             false => name(flags & 1 != 0, |part| &part.file)?,
         };
         let dataset = name(flags & 2 != 0, |part| &part.dataset)?;
@@ -256,19 +260,20 @@ mod tests {
     fn damaged_lists_are_errors() {
         let all = [&3_u32.to_le_bytes()[..], &1_u32.to_le_bytes(), &[0; 8]].concat();
         let good = [&[0][..], &1_u64.to_le_bytes(), b"a\0x\0", &all, &all].concat();
-        assert_eq!(read_list(&good, 8).expect("good")[0].file, "a");
+        assert_eq!(&*read_list(&good, 8, 9).expect("good")[0].file, "a");
+        assert!(read_list(&good, 8, 0).is_err());
         for len in 0..good.len() {
-            assert!(read_list(&good[..len], 8).is_err(), "{len}");
+            assert!(read_list(&good[..len], 8, 9).is_err(), "{len}");
         }
         let mut bad = good.clone();
         bad[0] = 2;
-        assert!(read_list(&bad, 8).is_err());
+        assert!(read_list(&bad, 8, 9).is_err());
         bad.clone_from(&good);
         bad[4] = 1;
-        assert!(read_list(&bad, 8).is_err());
+        assert!(read_list(&bad, 8, 9).is_err());
         bad.clone_from(&good);
         bad[13] = 9;
-        assert!(read_list(&bad, 8).is_err());
+        assert!(read_list(&bad, 8, 9).is_err());
     }
 
     #[test]
@@ -280,12 +285,10 @@ mod tests {
         let second = [&[3][..], &zero, &zero, &all, &all].concat();
         let third = [&[4][..], b"y\0", &all, &all].concat();
         let list = [&[1][..], &count, &first, &second, &third].concat();
-        let parts = read_list(&list, 8).expect("good");
-        let names = parts
-            .iter()
-            .map(|part| (part.file.as_str(), part.dataset.as_str()));
+        let parts = read_list(&list, 8, 9).expect("good");
+        let names = parts.iter().map(|part| (&*part.file, &*part.dataset));
         assert!(names.eq([("a", "x"), ("a", "x"), (".", "y")]));
         let forward = [&[1][..], &count, &second, &second, &second].concat();
-        assert!(read_list(&forward, 8).is_err());
+        assert!(read_list(&forward, 8, 9).is_err());
     }
 }
