@@ -20,7 +20,7 @@ use crate::shared::SharedBytes;
 /// Most bytes of the header of one object. Those of simulations have some kibibytes.
 const MOST_HEADER_BYTES: usize = 16 << 20;
 /// Most virtual data sets of a file, each of which is found by listing its group once more.
-const MOST_VIRTUAL: usize = 1024;
+const MOST_VIRTUAL: usize = 512;
 /// Most parts of all virtual data sets of a file. Simulations have one for each file of a step and data set.
 const MOST_PARTS: usize = 1 << 15;
 /// An open file.
