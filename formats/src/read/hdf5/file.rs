@@ -11,7 +11,6 @@ use hdf5_reader::{Hdf5File, OpenOptions, Storage, StorageBuffer};
 use super::global_heap::heap_object;
 use super::header_patch::{Addressing, Patch, virtual_layout};
 use super::links::{ExternalLink, external_links};
-use super::node::Node;
 use super::virtual_list::{VirtualPart, read_list};
 use crate::ParseError;
 use crate::read::CUT_SHORT;
@@ -126,16 +125,6 @@ impl H5File {
     pub(super) fn place(&self, address: u64) -> usize {
         let place = address.saturating_add(self.file.superblock().base_address);
         usize::try_from(place).map_or(self.bytes.len(), |place| place.min(self.bytes.len()))
-    }
-
-    /// The root group.
-    ///
-    /// # Errors
-    /// [`ParseError::Malformed`].
-    pub(super) fn root(&self) -> Result<Node, ParseError> {
-        let group = self.file.root_group();
-        let group = group.map_err(|e| parse_error(&e, self.bytes.len(), 0))?;
-        Ok(Node::new(self, group, String::new()))
     }
 
     fn found(&self) -> MutexGuard<'_, Found> {

@@ -9,9 +9,10 @@ use super::dialect::{Dialect, StepInfo, integer, listed, units};
 use super::node::{Node, dataset_number, dataset_text};
 use super::piece::Piece;
 use super::properties::PropertyFinder;
+use super::slice::Slice;
 use super::stored::Stored;
 use super::table::{Part, ParticleTable};
-use super::values::{Slice, Values};
+use super::values::Values;
 use crate::read::remarks::cell_remark;
 use crate::{MemoryBudget, ParseError, ScalarType, SimulationCell};
 

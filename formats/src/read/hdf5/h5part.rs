@@ -3,8 +3,9 @@
 use super::dialect::{Dialect, StepInfo, integer, listed, no_step};
 use super::node::Node;
 use super::properties::{PropertyFinder, numbers, values};
+use super::slice::Slice;
 use super::table::{Part, ParticleTable};
-use super::values::{Slice, Values};
+use super::values::Values;
 use crate::{MemoryBudget, ParseError};
 
 const STEP: &str = "Step#";

@@ -23,6 +23,7 @@ mod plain;
 mod properties;
 mod pysph;
 mod ranges;
+mod slice;
 mod stored;
 mod table;
 mod types;
@@ -125,12 +126,12 @@ impl Reader for Hdf5 {
     }
 
     fn piece_count(&self, file: &SharedBytes) -> u64 {
-        let root = H5File::open(file).and_then(|file| file.root());
+        let root = H5File::open(file).and_then(|file| Node::root(&file));
         root.map_or(1, |root| gadget::file_count(&root))
     }
 
     fn refers_to_pieces(&self, file: &SharedBytes) -> bool {
-        let root = H5File::open(file).and_then(|file| file.root());
+        let root = H5File::open(file).and_then(|file| Node::root(&file));
         root.is_ok_and(|root| gadget::is_virtual(&root))
     }
 
@@ -187,7 +188,7 @@ fn dialect_of(bytes: &SharedBytes) -> Result<Box<dyn Dialect>, ParseError> {
 /// The file `bytes` and its layout.
 fn open(bytes: &SharedBytes) -> Result<(H5File, Box<dyn Dialect>), ParseError> {
     let file = H5File::open(bytes)?;
-    let dialect = dialect_in(&file.root()?)?;
+    let dialect = dialect_in(&Node::root(&file)?)?;
     Ok((file, dialect))
 }
 

@@ -45,8 +45,18 @@ enum Linked {
 }
 
 impl Node {
+    /// The root group of `file`.
+    ///
+    /// # Errors
+    /// [`ParseError::Malformed`].
+    pub(super) fn root(file: &H5File) -> Result<Self, ParseError> {
+        let group = file.inner().root_group();
+        let group = group.map_err(|e| file.error(&e, 0, "/"))?;
+        Ok(Self::new(file, group, String::new()))
+    }
+
     /// `group` of `file`, whose path is `path`.
-    pub(super) fn new(file: &H5File, group: Group, path: String) -> Self {
+    fn new(file: &H5File, group: Group, path: String) -> Self {
         Self {
             file: file.clone(),
             group,
@@ -177,7 +187,7 @@ impl Node {
         }
         let other = self.file.other(&link.file);
         let other = other.map_err(|e| e.map_message(|what| format!("{path} {what}")))?;
-        let root = other.root()?;
+        let root = Self::root(&other)?;
         if let Some(node) = root.descend(&link.path)? {
             return Ok(Linked::Group(Self { path, ..node }));
         }

@@ -8,9 +8,10 @@ use super::dialect::{Dialect, StepInfo, listed, no_step, part_names, units};
 use super::node::{Node, dataset_number};
 use super::piece::Piece;
 use super::properties::{AXES, PropertyFinder};
+use super::slice::Slice;
 use super::stored::Stored;
 use super::table::{Part, ParticleTable};
-use super::values::{Slice, Values};
+use super::values::Values;
 use crate::{MemoryBudget, ParseError, ScalarType};
 
 const POSITION: &str = "position";

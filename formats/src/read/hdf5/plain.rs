@@ -6,10 +6,11 @@ use super::dialect::{Dialect, StepInfo, integer, listed, no_step, part_names};
 use super::node::Node;
 use super::piece::Piece;
 use super::properties::{PropertyFinder, numbers};
+use super::slice::Slice;
 use super::stored::Stored;
 use super::table::{Part, ParticleTable};
 use super::types::Field;
-use super::values::{Slice, Values};
+use super::values::Values;
 use crate::names::{POSITION_ARRAYS, POSITION_STEMS, is_one_of};
 use crate::{MemoryBudget, ParseError};
 

@@ -5,9 +5,10 @@ use std::sync::Arc;
 
 use super::node::Node;
 use super::piece::Piece;
+use super::slice::Slice;
 use super::stored::{Storage, Stored, StoredKey};
 use super::types::Field;
-use super::values::{Slice, Values};
+use super::values::Values;
 use crate::names::RECORD_VECTORS;
 use crate::{MemoryBudget, ParseError};
 

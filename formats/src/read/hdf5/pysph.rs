@@ -8,8 +8,8 @@ use super::dialect::{Dialect, StepInfo, integer, listed, part_names};
 use super::node::{Node, dataset_number};
 use super::piece::Piece;
 use super::properties::{AXES, PropertyFinder, values};
+use super::slice::Slice;
 use super::table::{Part, ParticleTable};
-use super::values::Slice;
 use crate::{MemoryBudget, ParseError, ScalarType};
 
 /// A file with particle arrays.

@@ -7,54 +7,16 @@ use rayon::prelude::*;
 
 use super::band_cache::BandCache;
 use super::chunks::{ChunkGrid, Selection};
+use super::slice::Slice;
 use super::stored::{Storage, Stored};
 use super::types::Field;
 use super::virtual_list::VirtualPart;
-use super::virtual_rows::{SourceRows, WantedRows, source_rows};
+use super::virtual_rows::{WantedRows, source_rows};
 use crate::read::columns::{ComponentStride, StridedColumn};
 use crate::{MemoryBudget, ParseError, ScalarType};
 
 /// Most numbers in a row.
 pub(super) const MOST_COMPONENTS: usize = 64;
-
-/// Which rows of a data set, and what in them.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Slice {
-    /// Index along the first dimension, if rows are the second.
-    pub(super) frame: Option<u64>,
-    /// Rows; all if `None`.
-    pub(super) rows: Option<Range<u64>>,
-    /// Elements of a data set of one dimension that form a row, if there are several.
-    pub(super) stride: Option<u64>,
-    /// A field of a compound type; `None` for all numbers of a row.
-    pub(super) field: Option<Field>,
-}
-
-impl Slice {
-    /// All rows.
-    pub(super) const ALL: Self = Self {
-        frame: None,
-        rows: None,
-        stride: None,
-        field: None,
-    };
-
-    /// The rows at index `frame` of the first dimension.
-    pub(super) fn frame(frame: u64) -> Self {
-        Self {
-            frame: Some(frame),
-            ..Self::ALL
-        }
-    }
-
-    /// `rows` of a data set.
-    pub(super) fn rows(rows: Range<u64>) -> Self {
-        Self {
-            rows: Some(rows),
-            ..Self::ALL
-        }
-    }
-}
 
 /// Numbers of some rows.
 #[derive(Debug, Clone)]
@@ -72,7 +34,15 @@ pub(super) struct Values {
     all_rows: u64,
     chunks: Option<Chunks>,
     /// Data sets that have the rows of a virtual one.
-    sources: Vec<SourceRows>,
+    sources: Vec<Source>,
+}
+
+/// Rows of a virtual data set as those of another one.
+#[derive(Debug, Clone)]
+struct Source {
+    /// Counted from the first row.
+    rows: Range<u64>,
+    values: Values,
 }
 
 /// Chunks that hold the rows.
@@ -162,15 +132,20 @@ impl Values {
             count: self.count,
             elements,
         };
-        let sources = source_rows(stored, parts, &wanted, budget)?;
         let own = (self.scalar(), self.components());
-        let differs =
-            |source: &&SourceRows| (source.values.scalar(), source.values.components()) != own;
-        if let Some(other) = sources.iter().find(differs) {
-            let (path, from) = (&stored.path, &other.values.stored.path);
-            return Err(ParseError::unsupported(format!(
-                "{path}: a virtual data set with values of {from}, which has numbers of another type; copy it with h5py"
-            )));
+        let mut sources = Vec::new();
+        for found in source_rows(stored, parts, &wanted)? {
+            let values = Self::find(&found.stored, &found.slice, budget)?;
+            let fits = |values: &Self| (values.scalar(), values.components()) == own;
+            let Some(values) = values.filter(fits) else {
+                let (path, from) = (&stored.path, &found.stored.path);
+                return Err(ParseError::unsupported(format!(
+                    "{path}: a virtual data set with values of {from}, which has numbers of another type; copy it with \
+                     h5py"
+                )));
+            };
+            let rows = found.rows;
+            sources.push(Source { rows, values });
         }
         self.sources = sources;
         Ok(())

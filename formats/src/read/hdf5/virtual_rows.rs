@@ -3,17 +3,21 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use super::node::Node;
+use super::slice::Slice;
 use super::stored::{Storage, Stored};
-use super::values::{Slice, Values};
 use super::virtual_list::VirtualPart;
-use crate::{MemoryBudget, ParseError};
+use crate::ParseError;
 
-/// Rows of a virtual data set, and the same rows in the data set that has them.
-#[derive(Debug, Clone)]
+/// Rows of a virtual data set, and where they are.
+#[derive(Debug)]
 pub(super) struct SourceRows {
     /// Counted from the first row that is wanted.
     pub(super) rows: Range<u64>,
-    pub(super) values: Values,
+    /// The data set that has them.
+    pub(super) stored: Arc<Stored>,
+    /// The same rows in it.
+    pub(super) slice: Slice,
 }
 
 /// The rows of a virtual data set that are wanted.
@@ -37,7 +41,6 @@ pub(super) fn source_rows(
     stored: &Stored,
     parts: &[VirtualPart],
     wanted: &WantedRows<'_>,
-    budget: MemoryBudget,
 ) -> Result<Vec<SourceRows>, ParseError> {
     let size = wanted.elements.max(1);
     if stored.element_count().is_none() {
@@ -84,9 +87,11 @@ pub(super) fn source_rows(
         if field.is_some() && source.datatype != stored.datatype {
             return Err(refused(part, "which has other fields"));
         }
-        let values = Values::find(&source, &Slice { field, ..slice }, budget)?;
-        let values = values.ok_or_else(|| not_rows(part))?;
-        sources.push(SourceRows { rows, values });
+        sources.push(SourceRows {
+            rows,
+            stored: source,
+            slice: Slice { field, ..slice },
+        });
     }
     Ok(sources)
 }
@@ -123,7 +128,7 @@ fn open_source(stored: &Stored, part: &VirtualPart) -> Result<Arc<Stored>, Parse
     };
     let file = stored.file.other(&part.file);
     let file = file.map_err(|e| e.map_message(|what| format!("{}: {what}", stored.path)))?;
-    let dataset = file.root()?.dataset_at(&part.dataset)?;
+    let dataset = Node::root(&file)?.dataset_at(&part.dataset)?;
     let dataset = dataset.ok_or_else(|| missing("where it is not"))?;
     let source = Stored::of(&part.dataset, &dataset)?;
     if matches!(source.place, Storage::Virtual(_)) {

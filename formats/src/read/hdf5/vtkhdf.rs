@@ -4,9 +4,9 @@ use super::dialect::{Dialect, StepInfo, integer, no_step};
 use super::node::Node;
 use super::piece::Piece;
 use super::properties::{PropertyFinder, numbers, values};
+use super::slice::Slice;
 use super::stored::Stored;
 use super::table::{Part, ParticleTable};
-use super::values::Slice;
 use crate::message::one_line;
 use crate::{MemoryBudget, ParseError};
 
