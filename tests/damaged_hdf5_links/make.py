@@ -61,6 +61,7 @@ virtual("not-there.h5", "of whole rows one after the other", (ALL, SOURCE, "shor
 virtual("every-other.h5", "of whole rows one after the other",
         (slice(None, None, 2), SOURCE, "short", (2, 3), ALL), (slice(1, None, 2), SOURCE, "short", (2, 3), ALL))
 virtual("columns.h5", "of whole rows one after the other", ((ALL, slice(0, 2)), SOURCE, "positions", (4, 3), (ALL, slice(0, 2))))
+virtual("shape.h5", "a virtual data set of shape", (slice(0, 4), SOURCE, "positions", (4, 3), ALL), shape=(2**63 - 1, 3))
 virtual("gap.h5", "are in no other one", (slice(0, 2), SOURCE, "short", (2, 3), ALL))
 virtual("twice.h5", "are in two others", (slice(0, 2), SOURCE, "short", (2, 3), ALL), WHOLE)
 virtual("other-type.h5", "which has numbers of another type", (ALL, SOURCE, "single", (4, 3), ALL))

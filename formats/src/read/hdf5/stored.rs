@@ -172,7 +172,7 @@ impl Stored {
         count.checked_mul(self.element_len)
     }
 
-    /// Whether all elements are in one range of the file or of the header.
+    /// Whether all elements are in one range of the file or of the header, or can be counted if they are elsewhere.
     ///
     /// # Errors
     /// [`ParseError::Malformed`] if they are not all there.
@@ -180,6 +180,9 @@ impl Stored {
         let (start, len) = match &self.place {
             Storage::Compact(bytes) => (0, bytes.len()),
             Storage::Contiguous(start) => (*start, self.file.bytes().len()),
+            Storage::Virtual(_) if self.element_count().is_none() => {
+                return Err(self.bad(format!("a virtual data set of shape {:?}", self.shape)));
+            }
             Storage::Chunked(_) | Storage::Virtual(_) | Storage::Missing => return Ok(()),
         };
         let end = self.byte_len().and_then(|len| len.checked_add(start));

@@ -43,9 +43,6 @@ pub(super) fn source_rows(
     wanted: &WantedRows<'_>,
 ) -> Result<Vec<SourceRows>, ParseError> {
     let size = wanted.elements.max(1);
-    if stored.element_count().is_none() {
-        return Err(stored.bad(format!("shape {:?}", stored.shape)));
-    }
     let end = wanted.first + wanted.count * size;
     let refused = |part: &VirtualPart, why: &str| {
         let from = format!("`{}` in `{}`", part.dataset, part.file);
