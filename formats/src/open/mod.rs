@@ -116,6 +116,19 @@ impl FrameFile {
     /// [`FrameError::TooLarge`] if it needs more memory than `budget` allows, and
     /// [`FrameError::Malformed`] for everything that breaks its own format.
     pub fn open_within(path: &Path, budget: MemoryBudget) -> Result<Self, FrameError> {
+        Self::open_as(path, budget, false)
+    }
+
+    /// [`Self::open_within`] of a file whose particles are not read at once: if it is neither compressed nor text, it is
+    /// mapped instead of read into memory, also if it has one step.
+    ///
+    /// # Errors
+    /// As [`Self::open_within`].
+    pub fn open_mapped(path: &Path, budget: MemoryBudget) -> Result<Self, FrameError> {
+        Self::open_as(path, budget, true)
+    }
+
+    fn open_as(path: &Path, budget: MemoryBudget, always_map: bool) -> Result<Self, FrameError> {
         if is_native(path)? {
             let len = regular_len(path)?;
             let fits = budget.for_content().check(len, "the file is");
@@ -125,7 +138,7 @@ impl FrameFile {
             let content = Content::Aligned(bytes);
             return Self::new(path, content, stored_len, Vec::new(), budget);
         }
-        let (content, stamp, notes) = Self::read_content(path, budget)?;
+        let (content, stamp, notes) = Self::read_content(path, budget, always_map)?;
         stamp.check(path)?;
         let siblings = SiblingFiles::of(path);
         let content = content.among(&siblings);
@@ -137,6 +150,7 @@ impl FrameFile {
     fn read_content(
         path: &Path,
         budget: MemoryBudget,
+        always_map: bool,
     ) -> Result<(Content, FileStamp, Vec<String>), FrameError> {
         let in_file = |e: StreamError| e.in_file(path);
         let stamp = FileStamp::of(path)?;
@@ -158,9 +172,9 @@ impl FrameFile {
             let file = StreamedFile::new(bytes, decoder_len, stamp);
             return Ok((Content::Streamed(Box::new(file)), stamp, Vec::new()));
         }
-        if !is_compressed && format.may_hold_many_steps() {
+        if !is_compressed && (always_map || format.may_hold_many_steps()) {
             let file = SteppedFile::new(&bytes, stamp);
-            if file.is_worth_mapping(path, format, budget) {
+            if always_map || file.is_worth_mapping(path, format, budget) {
                 return Ok((Content::Stepped(file), stamp, Vec::new()));
             }
         }

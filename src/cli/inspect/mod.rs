@@ -216,7 +216,7 @@ fn inspect(
         inspected.time = place.time.or(inspected.time);
         return Ok(inspected.print(args.json));
     }
-    let file = FrameFile::open_within(path, read_budget(None, None))?;
+    let file = FrameFile::open_mapped(path, read_budget(None, None))?;
     // For several steps, the metadata come from the first one.
     let mut remarks = remarks(path);
     for index in 0..file.steps().len() {
