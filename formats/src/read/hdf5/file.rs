@@ -18,7 +18,7 @@ use crate::shared::SharedBytes;
 
 /// Most bytes of the header of one object. Those of simulations have some kibibytes.
 const MOST_HEADER_BYTES: usize = 16 << 20;
-/// Most virtual data sets of a file, each of which is found by listing its group once more.
+/// Most virtual data sets of a file. The group is listed again for each of them, so time grows with the square.
 const MOST_VIRTUAL: usize = 512;
 /// Most parts of all virtual data sets of a file. Simulations have one for each file of a step and data set.
 const MOST_PARTS: usize = 1 << 15;

@@ -63,11 +63,43 @@ impl Patch {
     }
 }
 
-/// A part of a header: messages, and a checksum after them in version 2.
+/// How messages of a header begin.
+#[derive(Debug, Clone, Copy)]
+enum Version {
+    First,
+    /// Messages may have two bytes for their order.
+    Second {
+        has_order: bool,
+    },
+}
+
+impl Version {
+    /// Bytes before the data of a message.
+    fn head_len(self) -> u64 {
+        match self {
+            Self::First => 8,
+            Self::Second { has_order } => 4 + 2 * u64::from(has_order),
+        }
+    }
+
+    /// Reads the type of a message and the length of its data, which follows.
+    fn read_head(self, cursor: &mut Cursor<'_>) -> Result<(u16, usize), Error> {
+        let (kind, len, others) = match self {
+            Self::First => (cursor.read_u16_le()?, cursor.read_u16_le()?, 4),
+            Self::Second { has_order } => {
+                let kind = u16::from(cursor.read_u8()?);
+                (kind, cursor.read_u16_le()?, 1 + 2 * usize::from(has_order))
+            }
+        };
+        cursor.skip(others)?;
+        Ok((kind, usize::from(len)))
+    }
+}
+
+/// A part of a header: messages, and in version 2 a checksum after them.
 struct Block {
     start: u64,
     messages: Range<u64>,
-    has_checksum: bool,
 }
 
 /// Finds the layout message of the virtual data set whose header is at `address` of the file `bytes`: where its list
@@ -83,75 +115,61 @@ pub(super) fn virtual_layout(
     let start = address.saturating_add(addressing.base);
     let mut cursor = Cursor::new(bytes);
     cursor.set_position(start);
-    let is_second = cursor.peek_bytes(4)? == b"OHDR";
-    let (first, has_order) = match is_second {
-        true => second_version(&mut cursor, start)?,
-        false => (first_version(&mut cursor, start)?, false),
+    let (version, first) = match cursor.peek_bytes(4)? {
+        b"OHDR" => second_version(&mut cursor, start)?,
+        _ => (Version::First, first_version(&mut cursor, start)?),
     };
     let mut blocks = vec![first];
     let mut next = 0;
     while let Some(block) = blocks.get(next) {
-        let (start, end, has_checksum) = (block.start, block.messages.end, block.has_checksum);
+        let (start, end) = (block.start, block.messages.end);
         cursor.set_position(block.messages.start);
-        let head_len = if !is_second {
-            8
-        } else {
-            4 + 2 * u64::from(has_order)
-        };
-        while cursor.position() + head_len <= end {
-            let (kind, len) = match is_second {
-                true => {
-                    let kind = u16::from(cursor.read_u8()?);
-                    (kind, cursor.read_u16_le()?)
-                }
-                false => (cursor.read_u16_le()?, cursor.read_u16_le()?),
-            };
-            cursor.skip(if !is_second {
-                4
-            } else {
-                1 + 2 * usize::from(has_order)
-            })?;
+        while cursor.position() + version.head_len() <= end {
+            let (kind, len) = version.read_head(&mut cursor)?;
             let place = cursor.position();
-            let data = cursor.read_bytes(usize::from(len))?;
+            let data = cursor.read_bytes(len)?;
             if kind == LAYOUT && data.get(1) == Some(&VIRTUAL) {
-                let mut fields = Cursor::new(&data[2..]);
-                let collection = fields.read_offset(addressing.offset_size)?;
-                let index = u16::try_from(fields.read_u32_le()?);
-                let index =
-                    index.map_err(|_| Error::InvalidData("heap index above 65535".into()))?;
+                let list = list_place(&data[2..], addressing)?;
                 // Class 0, and a length of 0 in two bytes
                 let mut patches = vec![Patch {
                     start: place + 1,
                     bytes: vec![0; 3],
                 }];
-                if has_checksum {
+                if matches!(version, Version::Second { .. }) {
                     patches.push(checksum(bytes, start..end, &patches[0])?);
                 }
-                return Ok(Some((ListPlace { collection, index }, patches)));
+                return Ok(Some((list, patches)));
             }
             if kind == CONTINUATION && blocks.len() < MOST_BLOCKS {
-                let mut fields = Cursor::new(data);
-                let start = fields.read_offset(addressing.offset_size)?;
-                let start = start.saturating_add(addressing.base);
-                let len = fields.read_length(addressing.length_size)?;
-                let end = start.saturating_add(len);
-                blocks.push(match is_second {
-                    true => Block {
-                        start,
-                        messages: start.saturating_add(4)..end.saturating_sub(4),
-                        has_checksum: true,
-                    },
-                    false => Block {
-                        start,
-                        messages: start..end,
-                        has_checksum: false,
-                    },
-                });
+                blocks.push(continuation(data, version, addressing)?);
             }
         }
         next += 1;
     }
     Ok(None)
+}
+
+/// The place of the list in a layout message, from the third byte of its data on.
+fn list_place(fields: &[u8], addressing: Addressing) -> Result<ListPlace, Error> {
+    let mut fields = Cursor::new(fields);
+    let collection = fields.read_offset(addressing.offset_size)?;
+    let index = u16::try_from(fields.read_u32_le()?);
+    let index = index.map_err(|_| Error::InvalidData("heap index above 65535".into()))?;
+    Ok(ListPlace { collection, index })
+}
+
+/// The part of a header that the `data` of a continuation message refers to.
+fn continuation(data: &[u8], version: Version, addressing: Addressing) -> Result<Block, Error> {
+    let mut fields = Cursor::new(data);
+    let start = fields.read_offset(addressing.offset_size)?;
+    let start = start.saturating_add(addressing.base);
+    let end = start.saturating_add(fields.read_length(addressing.length_size)?);
+    let messages = match version {
+        Version::First => start..end,
+        // A signature before them
+        Version::Second { .. } => start.saturating_add(4)..end.saturating_sub(4),
+    };
+    Ok(Block { start, messages })
 }
 
 /// The first part of a header of version 1 that begins at byte `start`.
@@ -161,15 +179,12 @@ fn first_version(cursor: &mut Cursor<'_>, start: u64) -> Result<Block, Error> {
     let len = u64::from(cursor.read_u32_le()?);
     cursor.skip(4)?;
     let first = cursor.position();
-    Ok(Block {
-        start,
-        messages: first..first + len,
-        has_checksum: false,
-    })
+    let messages = first..first + len;
+    Ok(Block { start, messages })
 }
 
-/// The first part of a header of version 2 that begins at byte `start`, and whether messages have their order.
-fn second_version(cursor: &mut Cursor<'_>, start: u64) -> Result<(Block, bool), Error> {
+/// How messages begin in a header of version 2 that begins at byte `start`, and its first part.
+fn second_version(cursor: &mut Cursor<'_>, start: u64) -> Result<(Version, Block), Error> {
     // Signature and version
     cursor.skip(5)?;
     let flags = cursor.read_u8()?;
@@ -178,12 +193,9 @@ fn second_version(cursor: &mut Cursor<'_>, start: u64) -> Result<(Block, bool), 
     cursor.skip(times + limits)?;
     let len = cursor.read_uvar(1 << (flags & 3))?;
     let first = cursor.position();
-    let block = Block {
-        start,
-        messages: first..first.saturating_add(len),
-        has_checksum: true,
-    };
-    Ok((block, flags & 4 != 0))
+    let messages = first..first.saturating_add(len);
+    let has_order = flags & 4 != 0;
+    Ok((Version::Second { has_order }, Block { start, messages }))
 }
 
 /// The checksum after `range` as it is with `patch`.

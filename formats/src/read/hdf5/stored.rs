@@ -156,6 +156,7 @@ impl Stored {
         Ok(stored)
     }
 
+    /// Equal for the same data set of the same open file.
     pub(super) fn key(&self) -> StoredKey {
         (self.file.bytes().as_ptr() as usize, self.at)
     }

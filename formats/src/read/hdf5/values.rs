@@ -127,7 +127,7 @@ impl Values {
         let elements = (self.row_len / stored.element_len.max(1)) as u64;
         let row = self.frame.unwrap_or(0) * self.all_rows + self.first;
         let wanted = WantedRows {
-            slice,
+            field: slice.field,
             first: row * elements,
             count: self.count,
             elements,

@@ -1,4 +1,4 @@
-//! The list of the parts of a virtual data set: which elements are those of which data set of which file.
+//! The list in the header of a virtual data set that maps ranges of its elements to data sets in other files.
 //!
 //! Layout of the list and of selections: HDF5 File Format Specification 3.0, III.I and VIII.
 

@@ -1,4 +1,4 @@
-//! Rows of virtual data sets: which rows of which other data sets they are.
+//! Finds the data sets, and the rows in them, that have the rows of a virtual data set.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::node::Node;
 use super::slice::Slice;
 use super::stored::{Storage, Stored};
+use super::types::Field;
 use super::virtual_list::VirtualPart;
 use crate::ParseError;
 
@@ -22,8 +23,9 @@ pub(super) struct SourceRows {
 
 /// The rows of a virtual data set that are wanted.
 #[derive(Debug, Clone)]
-pub(super) struct WantedRows<'a> {
-    pub(super) slice: &'a Slice,
+pub(super) struct WantedRows {
+    /// A field of a compound type; `None` for all numbers of a row.
+    pub(super) field: Option<Field>,
     /// The first element among all elements of the data set.
     pub(super) first: u64,
     /// Number of rows.
@@ -40,16 +42,14 @@ pub(super) struct WantedRows<'a> {
 pub(super) fn source_rows(
     stored: &Stored,
     parts: &[VirtualPart],
-    wanted: &WantedRows<'_>,
+    wanted: &WantedRows,
 ) -> Result<Vec<SourceRows>, ParseError> {
     let size = wanted.elements.max(1);
     let end = wanted.first + wanted.count * size;
-    let refused = |part: &VirtualPart, why: &str| {
-        let from = format!("`{}` in `{}`", part.dataset, part.file);
-        let what = format!("{}: a virtual data set with values of {from}", stored.path);
-        ParseError::unsupported(format!("{what}, {why}; copy it with h5py"))
+    let not_rows = |part| {
+        let why = "but not of whole rows one after the other; copy it with h5py";
+        refused(stored, part, why)
     };
-    let not_rows = |part| refused(part, "but not of whole rows one after the other");
     // Find the wanted elements of each part
     let mut found = Vec::new();
     for part in parts {
@@ -74,15 +74,23 @@ pub(super) fn source_rows(
         let from = part.source.range(&source.shape);
         let from = from.ok_or_else(|| not_rows(part))?;
         if from.end - from.start != target.end - target.start {
-            return Err(refused(part, "but another number of them"));
+            return Err(refused(
+                stored,
+                part,
+                "but another number of them; copy it with h5py",
+            ));
         }
         let first = from.start + (wanted.first + rows.start * size - target.start);
         let len = (rows.end - rows.start) * size;
         let slice = slice_of(&source.shape, first, len, size);
         let slice = slice.ok_or_else(|| not_rows(part))?;
-        let field = wanted.slice.field;
+        let field = wanted.field;
         if field.is_some() && source.datatype != stored.datatype {
-            return Err(refused(part, "which has other fields"));
+            return Err(refused(
+                stored,
+                part,
+                "which has other fields; copy it with h5py",
+            ));
         }
         sources.push(SourceRows {
             rows,
@@ -91,6 +99,14 @@ pub(super) fn source_rows(
         });
     }
     Ok(sources)
+}
+
+/// The error for a virtual data set with a `part` that is not read.
+fn refused(stored: &Stored, part: &VirtualPart, why: &str) -> ParseError {
+    let (path, dataset, file) = (&stored.path, &part.dataset, &part.file);
+    ParseError::unsupported(format!(
+        "{path}: a virtual data set with values of `{dataset}` in `{file}`, {why}"
+    ))
 }
 
 /// Rows, the part that has them, and its elements.
@@ -117,19 +133,17 @@ fn check_once(stored: &Stored, found: &mut [PartRows<'_>], count: u64) -> Result
 
 /// Opens the data set of `part`.
 fn open_source(stored: &Stored, part: &VirtualPart) -> Result<Arc<Stored>, ParseError> {
-    let missing = |why: &str| {
-        let (path, dataset, file) = (&stored.path, &part.dataset, &part.file);
-        ParseError::unsupported(format!(
-            "{path}: a virtual data set with values of `{dataset}` in `{file}`, {why}"
-        ))
-    };
     let file = stored.file.other(&part.file);
     let file = file.map_err(|e| e.map_message(|what| format!("{}: {what}", stored.path)))?;
     let dataset = Node::root(&file)?.dataset_at(&part.dataset)?;
-    let dataset = dataset.ok_or_else(|| missing("where it is not"))?;
+    let dataset = dataset.ok_or_else(|| refused(stored, part, "where it is not"))?;
     let source = Stored::of(&part.dataset, &dataset)?;
     if matches!(source.place, Storage::Virtual(_)) {
-        return Err(missing("which is virtual as well; copy it with h5py"));
+        return Err(refused(
+            stored,
+            part,
+            "which is virtual as well; copy it with h5py",
+        ));
     }
     Ok(Arc::new(source))
 }
