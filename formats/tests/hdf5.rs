@@ -312,3 +312,60 @@ fn virtual_data_sets_of_a_snapshot_give_the_files_with_the_values() {
         "{error}"
     );
 }
+
+/// The only step of a file with unusual names.
+fn named(name: &str) -> RawParticles {
+    let path = data("../hdf5_names").join(name);
+    let mut steps = read(FrameFile::open(&path)).expect("a good file");
+    assert_eq!(steps.len(), 1, "{name}");
+    steps.remove(0)
+}
+
+/// Links and attributes of more than 512 KiB are in indirect blocks of indirect blocks.
+#[test]
+fn heaps_with_several_levels_are_read() {
+    let particles = named("deep_heaps.h5.xz");
+    assert_eq!(particles.positions.len(), 10);
+    assert_eq!(particles.time, Some(2.5));
+    let density = particles.attributes.iter().find(|a| a.name == "density");
+    let density = &density.expect("the attribute").data;
+    let expected: Vec<f32> = (0..10_u8).map(f32::from).collect();
+    assert_eq!(*density, AttributeData::F32(expected));
+}
+
+/// Blocks that are missing, or there twice, are found in every indirect block.
+#[test]
+fn damaged_heaps_with_several_levels_are_refused() {
+    // Signature, version, address of the heap, and offset of the block are before the addresses of blocks
+    const FIRST: usize = 17;
+    let path = data("../hdf5_names").join("deep_heaps.h5.xz");
+    let file = FrameFile::open(&path).expect("a good file");
+    let good = file.bytes();
+    let blocks = good.windows(4).enumerate();
+    let blocks = blocks.filter(|(_, bytes)| bytes == b"FHIB");
+    let blocks: Vec<usize> = blocks.map(|(at, _)| at + FIRST).collect();
+    assert!(blocks.len() >= 4, "two heaps with two levels");
+    for at in blocks {
+        let second = &good[at + 8..at + 16];
+        for wrong in [&[0xee; 8], second] {
+            let mut bytes = good.to_vec();
+            bytes[at..at + 8].copy_from_slice(wrong);
+            let name = Path::new("deep_heaps.h5");
+            match read(FrameFile::from_bytes(name, bytes)) {
+                Err(error) => assert!(error.to_string().contains("deep_heaps.h5: byte"), "{error}"),
+                // In the attributes of the group
+                Ok(steps) => assert_eq!(steps[0].time, None),
+            }
+        }
+    }
+}
+
+#[test]
+fn objects_with_several_names_count_once() {
+    for name in ["alias_links.h5", "alias_pysph.h5"] {
+        let particles = named(name);
+        assert_eq!(particles.positions.len(), 4, "{name}");
+        let has_parts = particles.attributes.iter().any(|a| a.name == "part");
+        assert!(!has_parts || name == "alias_pysph.h5", "{name}");
+    }
+}

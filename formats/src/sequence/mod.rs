@@ -53,7 +53,7 @@ use pattern::Pattern;
 /// Whether the file at `path` has no particles itself, but stands for others: it is a list of files, or a snapshot of
 /// virtual data sets beside the files with the values.
 pub fn stands_for_others(path: &Path) -> bool {
-    collection::is_list(path) || pieces::is_reference(path)
+    collection::has_list(std::iter::once(path)) || pieces::is_reference(path)
 }
 
 /// One file of a frame.
@@ -163,11 +163,7 @@ impl Sequence {
                 group::listed(names, &mut notes)?
             }
         };
-        if group
-            .files
-            .iter()
-            .any(|file| collection::is_list(&file.path))
-        {
+        if collection::has_list(group.files.iter().map(|file| &*file.path)) {
             let expansion = collection::expand(&group, settings, &mut notes)?;
             return Ok(Self::from_expansion(expansion, notes, settings.budget));
         }

@@ -3,11 +3,11 @@
 use std::collections::{HashMap, VecDeque};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use super::stored::StoredKey;
+use super::file::ObjectKey;
 use crate::ParseError;
 
 /// Data set, index of a frame, number of a band.
-type Key = (StoredKey, Option<u64>, u64);
+type Key = (ObjectKey, Option<u64>, u64);
 
 /// Decoded rows, or the reason why there are none.
 type Slot = Arc<OnceLock<Result<Arc<Vec<u8>>, ParseError>>>;
@@ -28,7 +28,7 @@ struct Bands {
 }
 
 impl BandCache {
-    /// A cache of `most_bytes`. What is in use may take more.
+    /// A cache of `most_bytes`. What is in use may take more, and so may the newest rows: the next range needs them.
     pub(super) fn new(most_bytes: usize) -> Self {
         Self {
             most_bytes,
@@ -58,6 +58,7 @@ impl BandCache {
             bands.order.push_back((key, len));
             bands.bytes += len;
             while bands.bytes > self.most_bytes
+                && bands.order.len() > 1
                 && let Some((oldest, len)) = bands.order.pop_front()
             {
                 bands.slots.remove(&oldest);
@@ -88,6 +89,17 @@ mod tests {
             [get(0), get(1), get(0), get(2), get(1), get(0)],
             [1, 2, 2, 3, 3, 4]
         );
+        // Rows that are larger than the cache are decoded once for all ranges
+        let small = BandCache::new(3);
+        let mut decoded = 0;
+        for _ in 0..2 {
+            let rows = small.get(((0, 0), None, 0), || {
+                decoded += 1;
+                Ok(vec![0; 4])
+            });
+            rows.expect("decoded");
+        }
+        assert_eq!(decoded, 1);
         let fault = cache.get(((0, 1), None, 0), || Err(ParseError::malformed(7, "bad")));
         assert!(fault.is_err());
     }

@@ -2,12 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, RwLock};
 
 use hdf5_reader::error::Error;
 use hdf5_reader::object_header::ObjectHeader;
 use hdf5_reader::{Hdf5File, OpenOptions, Storage, StorageBuffer};
 
+use super::flat_heap::FlatHeaps;
 use super::global_heap::heap_object;
 use super::header_patch::{Addressing, Patch, virtual_layout};
 use super::links::{ExternalLink, external_links};
@@ -22,6 +23,11 @@ const MOST_HEADER_BYTES: usize = 16 << 20;
 const MOST_VIRTUAL: usize = 512;
 /// Most parts of all virtual data sets of a file. Simulations have one for each file of a step and data set.
 const MOST_PARTS: usize = 1 << 15;
+
+/// Tells the groups and data sets of open files apart, whatever their names: address of the file in memory, place of
+/// the object header in the file.
+pub(super) type ObjectKey = (usize, usize);
+
 /// An open file.
 #[derive(Clone)]
 pub(super) struct H5File {
@@ -48,6 +54,9 @@ struct Found {
 struct PatchedStorage {
     bytes: SharedBytes,
     patches: RwLock<Vec<Patch>>,
+    heaps: Mutex<FlatHeaps>,
+    /// Byte of the file at which address 0 is.
+    base: OnceLock<u64>,
 }
 
 impl Storage for PatchedStorage {
@@ -56,6 +65,13 @@ impl Storage for PatchedStorage {
     }
 
     fn read_range(&self, offset: u64, len: usize) -> Result<StorageBuffer, Error> {
+        let heaps = self.heaps.lock();
+        let mut heaps = heaps.unwrap_or_else(PoisonError::into_inner);
+        let base = self.base.get().copied().unwrap_or(0);
+        if let Some(shown) = heaps.shown(&self.bytes, base, offset, len)? {
+            return Ok(shown);
+        }
+        drop(heaps);
         let start = usize::try_from(offset).map_err(|_| Error::OffsetOutOfBounds(offset))?;
         let buffer = StorageBuffer::from_shared_owner(self.bytes.owner(), start, len)?;
         let patches = self.patches.read().unwrap_or_else(PoisonError::into_inner);
@@ -89,9 +105,12 @@ impl H5File {
         let storage = Arc::new(PatchedStorage {
             bytes: bytes.clone(),
             patches: RwLock::default(),
+            heaps: Mutex::default(),
+            base: OnceLock::new(),
         });
         let file = Hdf5File::from_storage_with_options(storage.clone(), options);
         let file = file.map_err(|e| parse_error(&e, bytes.len(), 0))?;
+        storage.base.get_or_init(|| file.superblock().base_address);
         let stated = file.superblock().eof_address;
         if stated > bytes.len() as u64 {
             let what = format!("the superblock states {stated} bytes: {CUT_SHORT}");
@@ -109,6 +128,11 @@ impl H5File {
     /// Whether `other` is this file.
     pub(super) fn is_same(&self, other: &Self) -> bool {
         std::ptr::eq(self.bytes(), other.bytes())
+    }
+
+    /// The key of the object whose header is at byte `at`.
+    pub(super) fn key(&self, at: usize) -> ObjectKey {
+        (self.bytes().as_ptr().addr(), at)
     }
 
     /// All bytes.

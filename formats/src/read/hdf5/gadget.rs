@@ -65,13 +65,11 @@ impl Snapshot {
     /// # Errors
     /// [`ParseError`] if the file is damaged, or no type has coordinates.
     pub(super) fn open(root: &Node) -> Result<Option<Self>, ParseError> {
-        let (groups, _) = root.members()?;
-        let number = |name: &String| name.strip_prefix(TYPE)?.parse::<u32>().ok();
-        let mut named: Vec<(u32, String)> = groups
-            .into_iter()
-            .filter_map(|name| Some((number(&name)?, name)))
-            .collect();
-        named.sort();
+        let number = |name: &str| name.strip_prefix(TYPE)?.parse::<u32>().ok();
+        let groups = root.distinct_groups()?.into_iter();
+        let named = groups.filter_map(|(name, node)| Some((number(&name)?, name, node)));
+        let mut named: Vec<(u32, String, Node)> = named.collect();
+        named.sort_by_key(|(number, _, _)| *number);
         if named.is_empty() {
             return Ok(None);
         }
@@ -81,10 +79,7 @@ impl Snapshot {
             types: Vec::new(),
             without: Vec::new(),
         };
-        for (number, name) in named {
-            let Some(node) = root.group(&name)? else {
-                continue;
-            };
+        for (number, name, node) in named {
             if node.dataset(COORDINATES)?.is_some() {
                 snapshot.types.push((number, node));
             } else {

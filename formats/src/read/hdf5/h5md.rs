@@ -168,10 +168,7 @@ impl Trajectory {
         let mut groups = Vec::new();
         let particles = root.group("particles")?;
         if let Some(particles) = particles {
-            for name in particles.members()?.0 {
-                let Some(node) = particles.group(&name)? else {
-                    continue;
-                };
+            for (name, node) in particles.distinct_groups()? {
                 if let Some(position) = Element::open(&node, POSITION, budget)? {
                     groups.push(ParticleGroup {
                         name,

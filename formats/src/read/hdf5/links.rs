@@ -2,7 +2,7 @@
 
 use hdf5_reader::btree_v2::{BTreeV2Header, BTreeV2Record, collect_btree_v2_records_storage};
 use hdf5_reader::error::Error;
-use hdf5_reader::fractal_heap::FractalHeap;
+use hdf5_reader::fractal_heap::{FractalHeap, FractalHeapDirectBlockCache};
 use hdf5_reader::io::Cursor;
 use hdf5_reader::messages::HdfMessage;
 use hdf5_reader::messages::link::{self, LinkMessage, LinkTarget};
@@ -67,12 +67,14 @@ fn heap_links(file: &Hdf5File, info: &LinkInfoMessage) -> Result<Vec<ExternalLin
     let index = BTreeV2Header::parse_at_storage(storage, index, offsets, lengths)?;
     let records =
         collect_btree_v2_records_storage(storage, &index, offsets, lengths, None, &[], None)?;
+    let mut blocks = FractalHeapDirectBlockCache::default();
     let mut links = Vec::new();
     for record in &records {
         let BTreeV2Record::LinkNameHash { heap_id, .. } = record else {
             continue;
         };
-        let bytes = heap.get_object_storage(heap_id, storage, offsets, lengths)?;
+        let bytes =
+            heap.get_object_storage_cached(heap_id, storage, offsets, lengths, &mut blocks)?;
         let link = link::parse(&mut Cursor::new(&bytes), offsets, lengths, bytes.len())?;
         links.extend(external(&link));
     }

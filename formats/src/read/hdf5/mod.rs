@@ -9,6 +9,7 @@ mod band_cache;
 mod chunks;
 mod dialect;
 mod file;
+mod flat_heap;
 mod gadget;
 mod global_heap;
 mod h5md;

@@ -1,5 +1,6 @@
 //! Groups and attributes of HDF5 files, with the errors of this crate. Links to other files are followed.
 
+use std::collections::HashSet;
 use std::ops::Deref;
 use std::sync::Arc;
 
@@ -7,7 +8,7 @@ use hdf5_reader::error::Error;
 use hdf5_reader::group::Group;
 use hdf5_reader::{Attribute, Dataset};
 
-use super::file::H5File;
+use super::file::{H5File, ObjectKey};
 use super::links::ExternalLink;
 use super::types::stored_scalar;
 use crate::ParseError;
@@ -97,6 +98,29 @@ impl Node {
         groups.sort();
         datasets.sort();
         Ok((groups, datasets))
+    }
+
+    /// Names of the groups in it, with the groups, sorted. A group with several names is there under the first of them:
+    /// its particles would count several times.
+    ///
+    /// # Errors
+    /// As [`Self::members`].
+    pub(super) fn distinct_groups(&self) -> Result<Vec<(String, Self)>, ParseError> {
+        let mut seen = HashSet::new();
+        let mut groups = Vec::new();
+        for name in self.members()?.0 {
+            if let Some(group) = self.group(&name)?
+                && seen.insert(group.key())
+            {
+                groups.push((name, group));
+            }
+        }
+        Ok(groups)
+    }
+
+    /// What is the same for all names of the group.
+    pub(super) fn key(&self) -> ObjectKey {
+        self.file.key(self.file.place(self.group.address()))
     }
 
     /// The group `name`, if there is one.

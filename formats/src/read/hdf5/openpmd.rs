@@ -80,7 +80,8 @@ impl OpenPmd {
         };
         for (_, iteration) in &file.iterations {
             if let Some(particles) = iteration.descend(&file.particles)? {
-                file.species.extend(particles.members()?.0);
+                let species = particles.distinct_groups()?.into_iter();
+                file.species.extend(species.map(|(name, _)| name));
             }
         }
         file.species.sort();
@@ -186,12 +187,8 @@ impl OpenPmd {
     fn first_species(&self) -> Vec<(String, Node)> {
         let mut found = self.iterations.iter().filter_map(|(_, iteration)| {
             let particles = iteration.descend(&self.particles).ok()??;
-            let names = particles.members().ok()?.0.into_iter();
-            let nodes = names.filter_map(|name| {
-                let node = particles.group(&name).ok()??;
-                Some((name, node))
-            });
-            Some(nodes.collect::<Vec<_>>()).filter(|nodes| !nodes.is_empty())
+            let species = particles.distinct_groups().ok()?;
+            Some(species).filter(|species| !species.is_empty())
         });
         found.next().unwrap_or_default()
     }

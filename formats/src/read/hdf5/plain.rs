@@ -1,8 +1,10 @@
 //! Files without a known layout: data sets with the usual names of positions, in any group.
 
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use super::dialect::{Dialect, StepInfo, integer, listed, no_step, part_names};
+use super::file::ObjectKey;
 use super::node::Node;
 use super::piece::Piece;
 use super::properties::{PropertyFinder, numbers};
@@ -191,6 +193,12 @@ impl PositionGroup {
         }
     }
 
+    /// What is the same for all names of its positions: the data sets, and the places of the fields in their rows.
+    fn keys(&self) -> impl Iterator<Item = (ObjectKey, Option<usize>)> {
+        let positions = self.positions.iter();
+        positions.map(|data| (data.stored.key(), data.field.map(|field| field.offset)))
+    }
+
     /// Number of particles of a step.
     fn count(&self, has_frames: bool) -> u64 {
         let shape = self.positions.first().map(|data| &data.stored.shape);
@@ -303,19 +311,25 @@ fn position_fields(fields: &[(String, Field)]) -> Vec<Field> {
 #[derive(Default)]
 struct Search {
     groups: Vec<PositionGroup>,
-    visited: usize,
+    visited: HashSet<ObjectKey>,
+    /// Data sets of positions.
+    positions: HashSet<(ObjectKey, Option<usize>)>,
     /// Data sets with their shapes, for the message.
     datasets: Vec<String>,
 }
 
 impl Search {
+    /// Looks at a group and those in it, unless it was met before under another name.
     fn visit(&mut self, node: &Node, depth: usize) -> Result<(), ParseError> {
-        self.visited += 1;
-        if self.visited > MOST_GROUPS {
+        if self.visited.len() >= MOST_GROUPS || !self.visited.insert(node.key()) {
             return Ok(());
         }
         let (groups, datasets) = node.members()?;
-        self.groups.extend(PositionGroup::find(node, &datasets)?);
+        if let Some(group) = PositionGroup::find(node, &datasets)?
+            && group.keys().all(|key| self.positions.insert(key))
+        {
+            self.groups.push(group);
+        }
         if self.groups.is_empty() {
             for name in &datasets {
                 let shape = match node.dataset(name) {

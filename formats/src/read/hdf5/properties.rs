@@ -3,10 +3,11 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use super::file::ObjectKey;
 use super::node::Node;
 use super::piece::Piece;
 use super::slice::Slice;
-use super::stored::{Storage, Stored, StoredKey};
+use super::stored::{Storage, Stored};
 use super::types::Field;
 use super::values::Values;
 use crate::names::RECORD_VECTORS;
@@ -30,7 +31,7 @@ pub(super) struct PropertyFinder {
     /// Names of data sets that were left out: of another length or of an unknown type.
     pub(super) left_out: Vec<String>,
     /// Object headers of the data sets in use, so that none is counted twice.
-    used: BTreeSet<StoredKey>,
+    used: BTreeSet<ObjectKey>,
 }
 
 impl PropertyFinder {

@@ -32,8 +32,8 @@ impl ParticleArrays {
             return Ok(None);
         };
         let mut arrays = Vec::new();
-        for name in particles.members()?.0 {
-            if let Some(node) = particles.descend(&format!("{name}/arrays"))? {
+        for (name, node) in particles.distinct_groups()? {
+            if let Some(node) = node.group("arrays")? {
                 arrays.push((name, node));
             }
         }

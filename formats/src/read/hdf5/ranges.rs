@@ -9,7 +9,10 @@ use crate::ranges::{ParticleRanges, RangeAttribute};
 use crate::{ParseError, ScalarType};
 
 /// Bytes of decoded chunks that are kept, as neighbouring ranges need the same ones.
-const CACHE_BYTES: usize = 48 << 20;
+const CACHE_BYTES: u64 = 48 << 20;
+/// The same for files with large chunks. If less than one chunk of each column is kept, chunks are decoded once for
+/// every range.
+const LARGE_CACHE_BYTES: u64 = 256 << 20;
 
 /// The particles of one time step.
 #[derive(Debug)]
@@ -20,9 +23,11 @@ pub(super) struct TableRanges {
 
 impl TableRanges {
     pub(super) fn new(table: ParticleTable) -> Self {
+        let one_of_each = table.chunk_lens().fold(0, u64::saturating_add);
+        let most = one_of_each.clamp(CACHE_BYTES, LARGE_CACHE_BYTES);
         Self {
             table,
-            cache: BandCache::new(CACHE_BYTES),
+            cache: BandCache::new(usize::try_from(most).unwrap_or(usize::MAX)),
         }
     }
 

@@ -7,7 +7,7 @@ use hdf5_reader::messages::filter_pipeline::FilterDescription;
 use hdf5_reader::messages::layout::{ChunkIndexing, DataLayout};
 use hdf5_reader::{Datatype, dtype_element_size};
 
-use super::file::H5File;
+use super::file::{H5File, ObjectKey};
 use super::node::{Node, NodeDataset};
 use super::virtual_list::VirtualPart;
 use crate::ParseError;
@@ -31,9 +31,6 @@ pub(super) struct Stored {
     pub(super) element_len: usize,
     pub(super) place: Storage,
 }
-
-/// Tells data sets of open files apart: address of the file in memory, place in the file.
-pub(super) type StoredKey = (usize, usize);
 
 /// How the elements are stored.
 #[derive(Debug)]
@@ -157,8 +154,8 @@ impl Stored {
     }
 
     /// Equal for the same data set of the same open file.
-    pub(super) fn key(&self) -> StoredKey {
-        (self.file.bytes().as_ptr() as usize, self.at)
+    pub(super) fn key(&self) -> ObjectKey {
+        self.file.key(self.at)
     }
 
     /// Number of elements; `None` if no file can have as many.

@@ -151,6 +151,12 @@ impl ParticleTable {
         &self.left_out
     }
 
+    /// Bytes of the largest chunk of each column.
+    pub(super) fn chunk_lens(&self) -> impl Iterator<Item = u64> {
+        let columns = std::iter::once(&self.positions).chain(&self.attributes);
+        columns.map(Column::chunk_len)
+    }
+
     /// Whether positions are stored as integers.
     pub(super) fn has_integer_positions(&self) -> bool {
         let mut pieces = self.positions.cells.iter().flatten();
@@ -175,7 +181,7 @@ impl ParticleTable {
         let width = columns().map(|column| (column.components * column.scalar.size()) as u64);
         let part = if self.is_divided { 4 } else { 0 };
         let width = width.fold(part, u64::saturating_add);
-        let chunk = columns().map(Column::chunk_len).max().unwrap_or(0);
+        let chunk = self.chunk_lens().max().unwrap_or(0);
         let need = width.saturating_mul(count).saturating_add(2 * chunk);
         budget.check(need, "its numbers in memory are")?;
         let count = usize::try_from(count).unwrap_or(usize::MAX);

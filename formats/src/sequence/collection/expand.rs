@@ -1,6 +1,6 @@
 //! Follows lists of files to the files of particles, and makes time steps of them.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -9,14 +9,15 @@ use super::super::{ListPlace, NumberedStep, PartFile, SequenceError, SequenceSet
 use super::entry::{List, ListEntry, ListKind, label};
 use super::parts::{PartKey, PartTable, stem_of};
 use super::paths::ListRoot;
-use super::{ListSummary, is_list};
+use super::{ListSummary, is_list, stands_for_blocks};
 use crate::{FrameError, ParseError};
 
 /// Most lists that list one another in a chain.
 const MAX_DEPTH: usize = 16;
 
-/// Most files of a sequence that is made of lists: a list that is listed often would have more than memory has.
-const MAX_FILES: usize = 1 << 22;
+/// Most entries that are followed in all lists together, and so most files of a sequence that is made of lists. Each
+/// list is followed once for each time step that lists it, which would take time without end, with files or without.
+const MAX_ENTRIES: usize = 1 << 22;
 
 /// The time steps that lists of files make.
 #[derive(Debug)]
@@ -65,6 +66,12 @@ pub(in crate::sequence) fn expand(
         number(file, found, leaves, is_only, (&mut numbers, &mut times))?;
     }
     expander.note_ghosts(notes);
+    if expander.repeated > 0 {
+        let count = expander.repeated;
+        notes.push(format!(
+            "{count} lists of files are listed twice for one time step and used once"
+        ));
+    }
     let Expander {
         leaves,
         lists,
@@ -174,6 +181,12 @@ struct Expander {
     faults: BTreeMap<PathBuf, ParseError>,
     /// Bytes of `leaves` and `lists`.
     held: u64,
+    /// Entries that were followed.
+    entries: usize,
+    /// Lists that were followed for the file that is expanded, with their times.
+    followed: HashSet<(Arc<Path>, Option<u64>)>,
+    /// Number of entries that were left out because their lists are in `followed`.
+    repeated: usize,
     /// A list whose pieces share points.
     has_ghosts: Option<Arc<Path>>,
 }
@@ -188,6 +201,9 @@ impl Expander {
             parts: PartTable::default(),
             faults: BTreeMap::new(),
             held: 0,
+            entries: 0,
+            followed: HashSet::new(),
+            repeated: 0,
             has_ghosts: None,
         }
     }
@@ -206,7 +222,7 @@ impl Expander {
             },
             ..LeafContext::default()
         };
-        if !is_list(&file.path) {
+        if !(is_list(&file.path) || stands_for_blocks(&file.path)) {
             self.push(file.path.clone(), &context)?;
             return Ok(None);
         }
@@ -218,6 +234,7 @@ impl Expander {
             self.push(file.path.clone(), &context)?;
             return Ok(None);
         };
+        self.followed.clear();
         self.follow(&opened, &context, &mut Vec::new())?;
         Ok(Some(opened.list.kind))
     }
@@ -238,6 +255,7 @@ impl Expander {
                 file: entry.path.clone(),
             })?;
             let context = context.of(&opened.list, &opened.path, index, entry);
+            self.count_entry(opened)?;
             if !is_list(&target) {
                 self.push(target, &context)?;
             } else if let Some(what) = fault_of_chain(chain, &target) {
@@ -247,13 +265,32 @@ impl Expander {
                 self.faults.entry(list.clone()).or_insert(fault);
                 self.push(list, &context)?;
             } else if let Some(inner) = self.list(&target) {
-                self.follow(&inner, &context, chain)?;
+                let time = context.time.map(f64::to_bits);
+                if self.followed.insert((Arc::clone(&inner.path), time)) {
+                    self.held += size_of::<(Arc<Path>, Option<u64>)>() as u64;
+                    self.follow(&inner, &context, chain)?;
+                } else {
+                    self.repeated += 1;
+                }
             } else {
                 self.push(target, &context)?;
             }
         }
         chain.pop();
         Ok(())
+    }
+
+    /// Counts an entry of `opened` that is followed.
+    fn count_entry(&mut self, opened: &OpenedList) -> Result<(), SequenceError> {
+        self.entries += 1;
+        if self.entries <= MAX_ENTRIES {
+            return Ok(());
+        }
+        let what = format!(
+            "it and the lists in it have more than {MAX_ENTRIES} entries; give a part of them"
+        );
+        let error = ParseError::too_large(what).in_file(&opened.path);
+        Err(SequenceError::List(error))
     }
 
     /// The list at `path`; `None` if it cannot be read. Then its fault is noted, unless it is an error of the operating
@@ -306,13 +343,6 @@ impl Expander {
         self.held += need as u64;
         let budget = self.settings.budget;
         let fits = budget.check(self.held, "the list of its files is");
-        let fits = fits.and_then(|()| match self.leaves.len() < MAX_FILES {
-            true => Ok(()),
-            false => {
-                let what = format!("it lists more than {MAX_FILES} files; give a part of them");
-                Err(ParseError::too_large(what))
-            }
-        });
         fits.map_err(|e| {
             let list = context.listed.as_ref().map_or(&*path, |place| &place.list);
             SequenceError::List(e.in_file(list))

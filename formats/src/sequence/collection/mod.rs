@@ -18,6 +18,7 @@ use std::path::Path;
 
 use crate::compression::strip_extension;
 use crate::detect::Format;
+use crate::read::vtk_xml;
 
 pub(super) use expand::{Expansion, ListedFiles, expand};
 #[doc(hidden)]
@@ -85,9 +86,22 @@ fn has_extension(path: &Path, known: &[&str]) -> bool {
 
 /// Whether the file at `path` lists others: its name says so, or its content if the name says nothing.
 pub(super) fn is_list(path: &Path) -> bool {
-    let by_content = || {
-        let head = crate::open::head(path);
-        head.is_ok_and(|head| ListKind::of(&head).is_some())
-    };
-    has_list_name(path) || Format::by_name(path).is_none() && by_content()
+    has_list_name(path) || Format::by_name(path).is_none() && has_list_content(path)
+}
+
+/// Whether one of the files of a sequence lists others. Some programs call lists of blocks `.vtp`. To open each of
+/// thousands of such files would take long, so the first one stands for all.
+pub(super) fn has_list<'a>(mut paths: impl Iterator<Item = &'a Path> + Clone) -> bool {
+    let first = paths.clone().next();
+    first.is_some_and(stands_for_blocks) || paths.any(is_list)
+}
+
+/// Whether the file at `path` is a list although its name is that of particles in XML.
+pub(super) fn stands_for_blocks(path: &Path) -> bool {
+    Format::by_name(path) == Some(vtk_xml::FORMAT) && has_list_content(path)
+}
+
+fn has_list_content(path: &Path) -> bool {
+    let head = crate::open::head(path);
+    head.is_ok_and(|head| ListKind::of(&head).is_some())
 }

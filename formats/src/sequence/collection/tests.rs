@@ -293,7 +293,7 @@ fn cycles_end() {
 fn time_and_memory_are_bounded() {
     let lists = Lists::new();
     lists.particles(&["a.csv"]);
-    // Each list names the next one a thousand times: 10^15 files
+    // Each list names the next one a thousand times: 10^15 entries, with a file at the end or without
     for depth in 0..5 {
         let next = match depth {
             4 => "a.csv".to_owned(),
@@ -310,7 +310,23 @@ fn time_and_memory_are_bounded() {
         let input = SequenceInput::from_path(lists.path(name));
         Sequence::open_within(&input, budget).map(|_| ())
     };
-    let error = open("l0.vtm", 16 << 20).expect_err("a bomb").to_string();
+    open("l0.vtm", 16 << 20).expect("each list once");
+    let sequence = lists.good("l0.vtm");
+    assert_eq!(sequence.frames()[0].parts.len(), 1);
+    assert_eq!(
+        sequence.notes()[..2],
+        [
+            "3996 lists of files are listed twice for one time step and used once",
+            "999 files are listed twice for one time step and used once",
+        ]
+    );
+    lists.file("l4.vtm", &vtk_file("vtkMultiBlockDataSet", ""));
+    let sequence = lists.good("l0.vtm");
+    assert!(lists.frame_error(&sequence, 0).contains("l4.vtm"));
+    // Lists are followed once for each time
+    timed_lists(&lists, 3000);
+    let error = open("times.pvd", 16 << 20).expect_err("too many");
+    let error = error.to_string();
     assert!(
         error.ends_with("is larger than 16 MiB; take care"),
         "{error}"
@@ -347,6 +363,36 @@ fn time_and_memory_are_bounded() {
     sequence.budget = budget;
     let error = sequence.load_raw(0).expect_err("too much").to_string();
     assert!(error.ends_with("take care"), "{error}");
+}
+
+/// Writes `times.pvd`, which lists `l0.vtm` at each of `count` times.
+fn timed_lists(lists: &Lists, count: usize) {
+    let entry = |time: usize| format!("<DataSet timestep=\"{time}\" file=\"l0.vtm\"/>\n");
+    let times: String = (0..count).map(entry).collect();
+    lists.file("times.pvd", &vtk_file("Collection", &times));
+}
+
+#[test]
+#[ignore = "follows four million entries"]
+fn lists_without_files_come_to_an_end() {
+    let lists = Lists::new();
+    let blocks = "<DataSet file=\"l1.vtm\"/>\n".repeat(1000);
+    lists.file("l0.vtm", &vtk_file("vtkMultiBlockDataSet", &blocks));
+    lists.file("l1.vtm", &vtk_file("vtkMultiBlockDataSet", ""));
+    timed_lists(&lists, 5000);
+    let error = lists.error("times.pvd");
+    assert!(error.contains("have more than 4194304 entries"), "{error}");
+}
+
+/// ParaView has written such files.
+#[test]
+fn blocks_may_have_the_name_of_particles() {
+    let lists = Lists::new();
+    lists.particles(&["a.csv", "b.csv"]);
+    let blocks = "<DataSet index=\"0\" file=\"a.csv\"/>\n<DataSet index=\"1\" file=\"b.csv\"/>\n";
+    let path = lists.file("blocks.vtp", &vtk_file("vtkMultiBlockDataSet", blocks));
+    assert_eq!(lists.good("blocks.vtp").frames()[0].parts.len(), 2);
+    assert!(crate::sequence::stands_for_others(&path));
 }
 
 #[test]
