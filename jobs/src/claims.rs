@@ -43,16 +43,16 @@ impl FrameClaims {
     /// [`JobError::DeclaredDead`], [`JobError::LedgerDamaged`], or a file cannot be read or written.
     pub fn claim(&self, frame: i64) -> Result<ClaimOutcome, JobError> {
         if self.registry.is_declared_dead() {
-            let dir = self.dir.clone();
-            return Err(JobError::DeclaredDead { dir });
+            return Err(self.declared_dead());
         }
         if let Some(status) = self.finished_by_other(frame) {
             return Ok(ClaimOutcome::Finished(status));
         }
         let outcome = self.registry.claim_frame(frame);
-        let outcome = outcome.map_err(|e| JobError::io(&self.dir, "claiming a frame", e))?;
+        let outcome =
+            outcome.map_err(|e| self.explain(JobError::io(&self.dir, "claiming a frame", e)))?;
         // A worker records a frame before it drops the claim, so this sees whoever had it before
-        self.refresh()?;
+        self.refresh().map_err(|e| self.explain(e))?;
         Ok(match (self.finished_by_other(frame), outcome) {
             (Some(status), outcome) => {
                 if let ClaimOutcome::Acquired(claim) = outcome {
@@ -62,6 +62,22 @@ impl FrameClaims {
             }
             (None, outcome) => outcome,
         })
+    }
+
+    /// The error that ends the run: if other workers have declared this worker dead and removed its files, that is the
+    /// reason why `error` occurred.
+    pub(crate) fn explain(&self, error: JobError) -> JobError {
+        if self.registry.has_lost_record() {
+            self.declared_dead()
+        } else {
+            error
+        }
+    }
+
+    fn declared_dead(&self) -> JobError {
+        JobError::DeclaredDead {
+            dir: self.dir.clone(),
+        }
     }
 
     fn finished_by_other(&self, frame: i64) -> Option<EntryStatus> {

@@ -17,8 +17,9 @@ impl Job {
         let dir = self.state.dir.clone();
         let new = request.selected();
         let mut fingerprints = FingerprintCache::prefetch(request, &new, Some(&self.state.plan));
-        let lock_failed = |e| JobError::io(&dir, "locking the job", e);
-        let lock = self.claims.registry().lock().map_err(lock_failed)?;
+        let claims = self.claims.clone();
+        let lock_failed = |e| claims.explain(JobError::io(&dir, "locking the job", e));
+        let lock = claims.registry().lock().map_err(lock_failed)?;
         self.refresh()?;
         let ExtendedPlan { plan, changes } =
             extended_plan(&self.state, request, &new, &mut fingerprints)?;

@@ -341,8 +341,9 @@ impl Job {
         let Some(slot) = self.state.states.get_mut(&frame) else {
             return Err(JobError::UnknownFrame { frame });
         };
-        self.writer
-            .append(&entry, self.claims.has_other_workers())?;
+        let is_shared = self.claims.has_other_workers();
+        let appended = self.writer.append(&entry, is_shared);
+        appended.map_err(|e| self.claims.explain(e))?;
         *slot = state;
         self.state.ledger.merge(entry);
         Ok(())
@@ -401,11 +402,11 @@ fn resume(old: JobState, plan: Plan, registry: &WorkerRegistry) -> Result<JobSta
     Ok(JobState::new(&old.dir, plan, old.ledger))
 }
 
-/// Refuses an operation that is not possible while other workers are active.
+/// Refuses an operation that is not possible while other workers are active. Waits for a heartbeat of those that may
+/// have died with their machine.
 fn refuse_other_workers(dir: &Path, registry: &WorkerRegistry) -> Result<(), JobError> {
-    let others = registry.others();
-    let others = others.map_err(|e| JobError::io(dir, "listing workers", e))?;
-    match others.first() {
+    let beating = registry.wait_for_others();
+    match beating.map_err(|e| JobError::io(dir, "listing workers", e))? {
         Some(other) => Err(JobError::Busy {
             dir: dir.to_owned(),
             worker: other.description(),

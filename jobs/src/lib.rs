@@ -125,7 +125,7 @@ pub use spherule_publish::{
     Publisher, discard_own_parts, discard_parts, owner, publish, publish_with, set_owner,
 };
 pub use state::{FrameState, JobState, JobSummary};
-pub use workers::{Claim, ClaimOutcome, WorkerStatus, start_heartbeat_thread};
+pub use workers::{Claim, ClaimOutcome, WORK_DIR, WorkerStatus, start_heartbeat_thread};
 
 /// Name of the plan in the job's directory.
 pub const PLAN_FILE: &str = "job.plan.json";

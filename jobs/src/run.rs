@@ -203,7 +203,8 @@ impl<'a, R: Serialize> FrameRecorder<'a, R> {
         match result {
             Ok(finished) => {
                 let details = json!(finished.report);
-                self.job.record_done(number, &finished.outputs, details)?;
+                let recorded = self.job.record_done(number, &finished.outputs, details);
+                recorded.map_err(|e| self.job.claims.explain(e))?;
                 let finished = &finished;
                 (self.context.on_event)(FrameEvent::Done {
                     frame: number,
@@ -213,7 +214,9 @@ impl<'a, R: Serialize> FrameRecorder<'a, R> {
             Err(failure) if failure.kind == FailureKind::Interrupted => {
                 return Ok(Recorded::Stopped);
             }
-            Err(failure) if failure.kind.stops_run() => return Err(JobError::Stopped(failure)),
+            Err(failure) if failure.kind.stops_run() => {
+                return Err(self.job.claims.explain(JobError::Stopped(failure)));
+            }
             Err(failure) => {
                 (self.context.on_event)(FrameEvent::Failed(&failure));
                 self.job.record_failed(&failure)?;

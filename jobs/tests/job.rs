@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 use spherule_jobs::{
-    ClaimOutcome, DEFAULT_TAKEOVER_AFTER, EntryStatus, FailureKind, FileError, FrameFailure,
-    FrameRequest, FrameState, Job, JobError, JobRequest, PLAN_FILE, ResumeMode, publish,
+    ClaimOutcome, ClaimedFrame, DEFAULT_TAKEOVER_AFTER, EntryStatus, FailureKind, FileError,
+    FinishedFrame, FrameFailure, FrameRequest, FrameState, FrameWork, Interrupt, Job, JobError,
+    JobRequest, PLAN_FILE, ResumeMode, RunContext, RunOptions, publish, run_frames,
 };
 use tempfile::TempDir;
 
@@ -592,4 +593,42 @@ fn an_unwritable_directory_is_named() {
         matches!(error, JobError::File(FileError::Unwritable { .. })),
         "{error}"
     );
+}
+
+/// Work of a worker that is suspended, declared dead and revived: its temporary file is gone.
+struct Revived {
+    work_dir: PathBuf,
+}
+
+impl FrameWork for Revived {
+    type Report = ();
+
+    fn process(
+        &self,
+        frame: &ClaimedFrame,
+        _: &RunContext<'_, ()>,
+    ) -> Result<FinishedFrame<()>, FrameFailure> {
+        for entry in fs::read_dir(&self.work_dir).unwrap() {
+            fs::remove_file(entry.unwrap().path()).unwrap();
+        }
+        let path = Path::new("f.exr");
+        let gone = std::io::ErrorKind::NotFound.into();
+        Err(FrameFailure::writing(frame.frame, path, gone))
+    }
+}
+
+#[test]
+fn a_revived_worker_reports_that_it_was_declared_dead() {
+    let fixture = Fixture::new(0..2);
+    let mut job = fixture.open(fixture.request(0..2)).unwrap();
+    let work = Revived {
+        work_dir: fixture.dir().join("job.work"),
+    };
+    let options = RunOptions {
+        frames: job.pending(),
+        retries: 0,
+        interrupt: Interrupt::default(),
+    };
+    let error = run_frames(&mut job, &work, &options, &|_| {}).unwrap_err();
+    assert!(matches!(error, JobError::DeclaredDead { .. }), "{error}");
 }

@@ -31,8 +31,18 @@ pub(super) struct LivenessMonitor {
     /// A worker without a heartbeat for this long is unresponsive.
     timeout: Duration,
     clock: Clock,
-    /// Last observed length of each file, and when that length was first observed.
-    observed: Mutex<HashMap<PathBuf, (u64, Instant)>>,
+    /// The last observation of each file.
+    observed: Mutex<HashMap<PathBuf, Observation>>,
+}
+
+/// What is known of a file to which heartbeats are appended.
+#[derive(Debug, Clone, Copy)]
+struct Observation {
+    length: u64,
+    /// When this length was first observed.
+    since: Instant,
+    /// Whether the length has changed since the first observation: only a living worker does that.
+    has_beaten: bool,
 }
 
 impl LivenessMonitor {
@@ -61,6 +71,13 @@ impl LivenessMonitor {
         self.observe(path, self.timeout)
     }
 
+    /// Whether a heartbeat of the worker with this record has been observed.
+    pub(super) fn has_beaten(&self, work_dir: &Path, record: &WorkerRecord) -> bool {
+        let observed = self.observed.lock().unwrap_or_else(|e| e.into_inner());
+        let observation = observed.get(&work_dir.join(record.file_name()));
+        observation.is_some_and(|observation| observation.has_beaten)
+    }
+
     fn observe(&self, path: &Path, timeout: Duration) -> Liveness {
         // Network file systems revalidate attributes on open, not on stat
         let length = match open_regular(path) {
@@ -70,11 +87,19 @@ impl LivenessMonitor {
         };
         let mut observed = self.observed.lock().unwrap_or_else(|e| e.into_inner());
         let now = self.clock.now();
-        let (last_length, since) = observed.entry(path.to_owned()).or_insert((length, now));
-        if *last_length != length {
-            (*last_length, *since) = (length, now);
+        let first = Observation {
+            length,
+            since: now,
+            has_beaten: false,
+        };
+        let last = observed.entry(path.to_owned()).or_insert(first);
+        if last.length != length {
+            *last = Observation {
+                has_beaten: true,
+                ..first
+            };
         }
-        if now.duration_since(*since) >= timeout {
+        if now.duration_since(last.since) >= timeout {
             Liveness::Unresponsive
         } else {
             Liveness::Alive

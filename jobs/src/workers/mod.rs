@@ -35,7 +35,7 @@ pub use status::WorkerStatus;
 pub(crate) use status::worker_statuses;
 
 /// Name of the directory in the job's directory.
-const WORK_DIR: &str = "job.work";
+pub const WORK_DIR: &str = "job.work";
 
 /// Suffix of the file name of a worker record.
 const RECORD_SUFFIX: &str = ".worker";

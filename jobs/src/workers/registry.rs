@@ -15,6 +15,7 @@ use super::files::{ListedParts, list_files, list_records, remove_if_exists};
 use super::record::is_worker_name;
 use super::{HeartbeatSchedule, Liveness, LivenessMonitor, RECORD_SUFFIX, WORK_DIR, WorkerRecord};
 use crate::clock::Clock;
+use crate::open_regular;
 use crate::process::{Process, now_ms};
 
 /// Longest time between heartbeats.
@@ -22,6 +23,9 @@ const HEARTBEAT_INTERVAL: Duration = Duration::from_secs(5);
 
 /// Shortest time between heartbeats.
 const MIN_HEARTBEAT_INTERVAL: Duration = Duration::from_millis(10);
+
+/// Time between looks at the heartbeats of other workers.
+const WAIT_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Suffix of the file name of a record that spherule 0.1.0 was writing.
 const DRAFT_SUFFIX: &str = ".new";
@@ -112,6 +116,37 @@ impl WorkerRegistry {
             (liveness == Liveness::Alive && path.exists()).then_some(record)
         };
         Ok(records.into_iter().filter_map(living).collect())
+    }
+
+    /// Waits until each of the other workers has either ended or missed its heartbeats, or until one of them has shown
+    /// a heartbeat: that one is returned. A record alone does not tell a busy worker from one whose machine is gone.
+    /// The caller must hold the lock.
+    pub(crate) fn wait_for_others(&self) -> io::Result<Option<WorkerRecord>> {
+        loop {
+            let others = self.others()?;
+            let mut beating = others
+                .iter()
+                .filter(|record| self.monitor.has_beaten(&self.work_dir, record));
+            if let Some(record) = beating.next() {
+                return Ok(Some(record.clone()));
+            }
+            if others.is_empty() {
+                self.remove_dead()?;
+                return Ok(None);
+            }
+            self.clock().sleep(WAIT_INTERVAL);
+        }
+    }
+
+    /// Whether this worker's record is gone although the directory of its job is still there: other workers have
+    /// declared it dead. A worker that was suspended learns it here before its next heartbeat.
+    pub(crate) fn has_lost_record(&self) -> bool {
+        let is_gone = || match open_regular(&self.record_path) {
+            Err(e) => e.kind() == io::ErrorKind::NotFound,
+            Ok(_) => false,
+        };
+        let has_job = || self.work_dir.parent().is_some_and(Path::exists);
+        self.is_declared_dead() || (is_gone() && has_job())
     }
 
     /// The names of all registered workers, dead or alive, including those whose records are damaged.

@@ -192,6 +192,44 @@ fn the_claim_of_another_machine_is_free_after_missed_heartbeats() {
     assert!(!dir.path().join(WORK_DIR).exists());
 }
 
+/// A record alone does not tell whether the worker's machine is still there.
+#[test]
+fn whoever_waits_for_others_sees_a_heartbeat_or_declares_them_dead() {
+    let dir = tempfile::tempdir().unwrap();
+    let record = remote_worker(dir.path(), "far", 3);
+    let clock = Clock::manual();
+    let start = clock.now();
+    let here = Machine::new(&clock);
+    let a = here.register(dir.path(), millis(60_000));
+    assert_eq!(a.wait_for_others().unwrap(), None);
+    assert_eq!(clock.now() - start, millis(60_000));
+    assert!(!record.exists(), "all workers must agree that it is dead");
+    // The heartbeats of this one are real, the clock of the observer is not
+    let worker = WorkerRegistry::register(dir.path(), millis(40)).unwrap();
+    let length = || fs::metadata(&worker.record_path).unwrap().len();
+    assert_eq!(a.others().unwrap().len(), 1);
+    let first = length();
+    while length() == first {
+        thread::yield_now();
+    }
+    let beating = a.wait_for_others().unwrap();
+    assert_eq!(beating.as_ref(), Some(&worker.record));
+}
+
+/// A suspended worker that comes back must not take missing files for errors of the disk.
+#[test]
+fn a_worker_learns_from_its_record_that_it_was_declared_dead() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = Machine::new(&Clock::manual());
+    let a = here.register(dir.path(), millis(400));
+    assert!(!a.has_lost_record());
+    register(dir.path()).declare_dead(&a.record).unwrap();
+    assert!(!a.is_declared_dead() && a.has_lost_record());
+    // Without the directory of the job, that is the reason for all errors
+    fs::remove_dir_all(dir.path()).unwrap();
+    assert!(!a.has_lost_record());
+}
+
 #[test]
 fn a_worker_notices_that_it_was_declared_dead() {
     let dir = tempfile::tempdir().unwrap();
