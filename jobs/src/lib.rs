@@ -75,6 +75,7 @@
 mod changes;
 mod claims;
 mod clock;
+mod copies;
 mod error;
 mod existing_outputs;
 pub mod export;

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use serde_json::value::RawValue;
 
+use crate::copies::Copies;
 use crate::{
     Fingerprint, JobError, PLAN_FILE, PlanError, SettingChange, compare_settings, publish,
     read_regular, settings_hash, text_hash,
@@ -227,8 +228,12 @@ impl Plan {
 }
 
 impl PlannedFrame {
-    /// The first input of `now` that differs from the inputs of `self`, which was planned earlier.
-    pub(crate) fn changed_input(&self, now: &Self) -> Option<(PathBuf, String)> {
+    /// The first input of `now` that differs from the inputs of `self`, which was planned earlier. Copies are equal.
+    pub(crate) fn changed_input(
+        &self,
+        now: &Self,
+        copies: &mut Copies,
+    ) -> Option<(PathBuf, String)> {
         if self.inputs.len() != now.inputs.len() {
             let path = now.inputs.first().or(self.inputs.first())?.path.clone();
             let what = format!("{} -> {} input files", self.inputs.len(), now.inputs.len());
@@ -236,7 +241,11 @@ impl PlannedFrame {
         }
         self.inputs.iter().zip(&now.inputs).find_map(|(old, new)| {
             let what = match (&old.fingerprint, &new.fingerprint) {
-                (Some(old), Some(new)) => old.difference(new),
+                (Some(before), Some(after)) if before.may_be_copy(after) => {
+                    let difference = before.difference(after);
+                    difference.filter(|_| !copies.are_equal(old, new))
+                }
+                (Some(before), Some(after)) => before.difference(after),
                 (Some(_), None) => Some("is no longer readable".to_owned()),
                 (None, Some(_)) => Some("was not readable when it was planned".to_owned()),
                 (None, None) => None,

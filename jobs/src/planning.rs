@@ -6,6 +6,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
+use crate::copies::Copies;
 use crate::fingerprint_cache::{FingerprintCache, frames_to_fingerprint};
 use crate::input::{check_input, merged_input_dirs};
 use crate::{
@@ -137,11 +138,15 @@ fn keep_unreadable_done(state: &JobState, frames: &mut Vec<PlannedFrame>) {
 
 /// Finished frames whose inputs have changed. The other frames use the current inputs anyway.
 fn changed_inputs(state: &JobState, frames: &[PlannedFrame]) -> Vec<InputChange> {
+    let mut copies = Copies::default();
     let mut changes: Vec<InputChange> = frames
         .iter()
         .filter(|now| state.is_done(now.number))
         .filter_map(|now| {
-            let (path, what) = state.plan.frame(now.number)?.changed_input(now)?;
+            let (path, what) = state
+                .plan
+                .frame(now.number)?
+                .changed_input(now, &mut copies)?;
             Some(InputChange {
                 frame: now.number,
                 path,
