@@ -1,9 +1,8 @@
 //! Follows a simulation: waits for the frames that it writes.
 
-use std::fmt;
-use std::path::PathBuf;
-use std::thread;
-use std::time::{Duration, Instant};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant, SystemTime};
+use std::{fmt, fs, thread};
 
 use spherule_formats::{FrameError, Sequence, SequenceError};
 use spherule_jobs::Interrupt;
@@ -42,12 +41,36 @@ impl fmt::Display for FollowEnd {
 pub struct Follower<'a> {
     manifest: JobManifest,
     complete: CompleteFrames,
-    stop_file: PathBuf,
+    stop_file: StopFile,
     interrupt: Interrupt,
     on_waiting: &'a dyn Fn(&SequenceError),
     /// When frames were last rendered.
     last_activity: Instant,
     is_waiting: bool,
+}
+
+/// The file that ends following when it appears.
+struct StopFile {
+    path: PathBuf,
+    /// When the file was written that an earlier run has left.
+    earlier: Option<SystemTime>,
+}
+
+impl StopFile {
+    fn new(path: PathBuf) -> Self {
+        let earlier = modified(&path);
+        Self { path, earlier }
+    }
+
+    /// Whether the file was written since following began.
+    fn has_appeared(&self) -> bool {
+        let now = modified(&self.path);
+        now.is_some() && now != self.earlier
+    }
+}
+
+fn modified(path: &Path) -> Option<SystemTime> {
+    fs::metadata(path).and_then(|file| file.modified()).ok()
 }
 
 impl<'a> Follower<'a> {
@@ -63,13 +86,19 @@ impl<'a> Follower<'a> {
     ) -> Result<Self, RunError> {
         Ok(Self {
             complete: CompleteFrames::new(manifest.manifest.job.settle),
-            stop_file: manifest.stop_file()?,
+            stop_file: StopFile::new(manifest.stop_file()?),
             manifest,
             interrupt: interrupt.clone(),
             on_waiting,
             last_activity: Instant::now(),
             is_waiting: false,
         })
+    }
+
+    /// The stop file of an earlier run, which does not end this one.
+    pub fn earlier_stop_file(&self) -> Option<&Path> {
+        let stop_file = &self.stop_file;
+        stop_file.earlier.map(|_| &*stop_file.path)
     }
 
     /// The interrupt that ends following.
@@ -97,7 +126,7 @@ impl<'a> Follower<'a> {
                 return Ok(Err(FollowEnd::Interrupted));
             }
             // Check before the scan: frames that were complete when the file appeared are still rendered
-            let is_stopped = self.stop_file.exists();
+            let is_stopped = self.stop_file.has_appeared();
             let start = Instant::now();
             if let Some(mut sequence) = self.scan()? {
                 let now = Instant::now();
@@ -111,7 +140,7 @@ impl<'a> Follower<'a> {
                 }
             }
             if is_stopped && self.complete.all_complete(Instant::now()) {
-                return Ok(Err(FollowEnd::StopFile(self.stop_file.clone())));
+                return Ok(Err(FollowEnd::StopFile(self.stop_file.path.clone())));
             }
             let idle = self.manifest.manifest.job.idle;
             if self.last_activity.max(self.complete.last_change).elapsed() >= idle {

@@ -22,6 +22,12 @@ pub(super) fn run(
     let interrupt = signals.start_work_with_grace(requested.manifest.job.grace);
     let on_waiting = |error: &SequenceError| message!("waiting: {error}");
     let mut follower = Follower::new(requested.clone(), interrupt, &on_waiting)?;
+    if let Some(stop_file) = follower.earlier_stop_file() {
+        note!(
+            "{} is from an earlier run and does not end this one; write it again to end it",
+            stop_file.display()
+        );
+    }
     let (sequence, _) = match follower.next()? {
         Ok(found) => found,
         Err(FollowEnd::Interrupted) => return Ok(Outcome::Interrupted),
