@@ -4,7 +4,7 @@ use std::fmt;
 
 use glam::DVec3;
 
-use crate::{ParseError, ScalarType};
+use crate::{ParseError, ScalarType, SimulationCell};
 
 /// Name, components and scalar type of an attribute.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -28,6 +28,9 @@ pub(crate) trait ParticleRanges: Send + Sync + fmt::Debug {
 
     /// Step number, if the file has it.
     fn step(&self) -> Option<i64>;
+
+    /// The simulation cell, if the file has it.
+    fn cell(&self) -> Option<SimulationCell>;
 
     /// Bytes of the positions of one particle in the precision of the file.
     fn position_len(&self) -> u64;

@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 
-use crate::{FrameError, ScalarType};
+use crate::{FrameError, ScalarType, SimulationCell};
 
 /// The particles of one frame, by their index in the source. Many threads read ranges at the same time.
 pub trait ParticleSource: Sync {
@@ -25,6 +25,11 @@ pub trait ParticleSource: Sync {
 
     /// Step number of the simulation, if known.
     fn step(&self) -> Option<i64> {
+        None
+    }
+
+    /// The simulation cell, if known.
+    fn cell(&self) -> Option<SimulationCell> {
         None
     }
 

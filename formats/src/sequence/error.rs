@@ -145,6 +145,10 @@ fn listed(groups: &[GroupSummary]) -> String {
 
 pub(super) fn counted(group: &GroupSummary) -> String {
     let plural = |n: usize| if n == 1 { "" } else { "s" };
+    // A file by itself may have any number of frames
+    if group.files == 1 {
+        return "1 file".to_owned();
+    }
     let frames = format!("{} frame{}", group.frames, plural(group.frames));
     if group.frames == group.files {
         return frames;

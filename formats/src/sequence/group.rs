@@ -11,6 +11,7 @@ use std::path::PathBuf;
 
 use super::error::{GroupSummary, SequenceError, counted};
 use super::name::FileName;
+use crate::compression::strip_extension;
 
 /// The files of one sequence, sorted by number, then part.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -140,6 +141,7 @@ pub(super) fn listed(
     if candidates.len() == 1 && (order.len() == 1 || !candidates[0].numbers.is_empty()) {
         return into_group(candidates.swap_remove(0));
     }
+    note_mixed_formats(&order, notes);
     let numbered: BTreeMap<i64, PathBuf> = candidates
         .iter()
         .flat_map(|c| &c.runs)
@@ -168,6 +170,33 @@ pub(super) fn listed(
         files: files.collect(),
         parts: vec![String::new()],
     })
+}
+
+/// Notes listed files of several formats: these are seldom frames of one simulation.
+fn note_mixed_formats(paths: &[PathBuf], notes: &mut Vec<String>) {
+    let extension = |path: &PathBuf| {
+        let name = path.file_name()?.to_str()?.to_ascii_lowercase();
+        let extension = strip_extension(&name).rsplit_once('.')?.1;
+        Some(extension.to_owned())
+    };
+    let extensions: BTreeSet<String> = paths.iter().filter_map(extension).collect();
+    let topology = paths
+        .iter()
+        .find(|path| extension(path).as_deref() == Some("psf"));
+    if extensions.len() < 2 {
+        return;
+    }
+    let names: Vec<String> = extensions.into_iter().map(|e| format!(".{e}")).collect();
+    notes.push(match topology {
+        Some(path) => format!(
+            "`{}` is a topology, not a frame; give it with --topology instead",
+            path.display()
+        ),
+        None => format!(
+            "files of several formats ({}) are used as frames of one sequence",
+            names.join(", ")
+        ),
+    });
 }
 
 /// Runs of `names`, joined where they share frame numbers.

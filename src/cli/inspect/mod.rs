@@ -12,7 +12,7 @@ use spherule_formats::sequence::{
     ListSummary, SequenceError, SequenceSettings, Topology, lone_frame_number, stands_for_others,
 };
 use spherule_formats::stats::FrameStats;
-use spherule_formats::{FrameError, FrameFile, Positions, Sequence, SequenceInput};
+use spherule_formats::{FrameError, FrameFile, Positions, Sequence, SequenceInput, SimulationCell};
 
 use super::print::{self, Reader};
 use super::render::parts_text;
@@ -21,8 +21,10 @@ use crate::reading::read_budget;
 
 mod native;
 mod show;
+mod steps;
 
 use native::NativeFacts;
+use steps::StepLines;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -66,6 +68,7 @@ struct Inspected<'a> {
     bytes_per_particle: Option<f64>,
     /// Summary of a native frame.
     native: Option<NativeFacts>,
+    cell: Option<SimulationCell>,
     /// Metadata of the file that is not per particle.
     notes: Vec<String>,
     /// Whether a full verification was requested and done.
@@ -219,6 +222,7 @@ fn inspect(
     let file = FrameFile::open_mapped(path, read_budget(None, None))?;
     // For several steps, the metadata come from the first one.
     let mut remarks = remarks(path);
+    let mut lines = StepLines::new(file.steps().len());
     for index in 0..file.steps().len() {
         let mut inspected = read(&file, index, place.number, topology)?;
         inspected.time = place.time.or(inspected.time);
@@ -227,7 +231,11 @@ fn inspect(
             verify(file.bytes()).map_err(|e| e.in_file(path))?;
         }
         inspected.verified = args.verify;
-        match inspected.print(args.json) {
+        let printed = match args.json {
+            true => inspected.print(true),
+            false => lines.print(&inspected),
+        };
+        match printed {
             Ok(Reader::Listening) => {}
             ended => return Ok(ended),
         }
@@ -239,6 +247,7 @@ fn inspect(
 struct Contents {
     stats: FrameStats,
     time: Option<f64>,
+    cell: Option<SimulationCell>,
     encoding: &'static str,
 }
 
@@ -252,6 +261,7 @@ impl Contents {
         let contents = Self {
             stats: FrameStats::of_source(&*source)?,
             time: source.time(),
+            cell: source.cell(),
             encoding: match source.position_len() {
                 Some(12) => "f32",
                 _ => "f64",
@@ -273,6 +283,7 @@ impl Contents {
         Ok(Self {
             stats: FrameStats::of(&raw),
             time: raw.time,
+            cell: raw.cell,
             encoding: match raw.positions {
                 Positions::F32(_) => "f32",
                 Positions::F64(_) => "f64",
@@ -329,6 +340,7 @@ fn read<'a>(
         stats,
         bytes_per_particle: (all > 0).then(|| stored / all as f64),
         native: native.map(|index| NativeFacts::new(index, file.bytes().len() as u64, None)),
+        cell: contents.cell,
         notes: Vec::new(),
         verified: false,
     })

@@ -51,6 +51,7 @@ pub(super) fn inspect(
         stats,
         bytes_per_particle: (index.count > 0).then(|| bytes as f64 / index.count as f64),
         native: Some(NativeFacts::new(index, bytes, sample)),
+        cell: None,
         notes: Vec::new(),
         verified: verify,
     })

@@ -1,6 +1,7 @@
 //! Prints the result of `inspect`.
 
 use serde_json::{Value, json};
+use spherule_formats::SimulationCell;
 use spherule_formats::stats::{AttributeStats, Number};
 
 use super::{Inspected, InspectedList};
@@ -61,6 +62,12 @@ impl Inspected<'_> {
             }),
             "mean": stats.mean.map(|m| m.to_array()),
             "attributes": stats.attributes.iter().map(|a| self.attribute_json(a)).collect::<Vec<_>>(),
+            "cell": self.cell.map(|cell| json!({
+                "origin": cell.origin.to_array(),
+                "vectors": cell.vectors.map(|vector| vector.to_array()),
+                "periodic": cell.periodic,
+            })),
+            "notes": self.notes,
             "encoding": self.encoding,
             "error_bound": self.native.as_ref().map_or(0.0, |native| native.index.max_error),
             "bytes_per_particle": self.bytes_per_particle,
@@ -74,7 +81,7 @@ impl Inspected<'_> {
         object
     }
 
-    fn to_lines(&self) -> Vec<String> {
+    pub(super) fn to_lines(&self) -> Vec<String> {
         let stats = &self.stats;
         let mut lines = vec![self.heading()];
         let dropped = match stats.dropped {
@@ -91,6 +98,7 @@ impl Inspected<'_> {
         if let Some((min, max)) = stats.bounds {
             lines.push(format!("  bounds {min} to {max}"));
         }
+        lines.extend(self.cell.as_ref().map(cell_line));
         lines.push(match stats.radius {
             None => "  radius not in the file".to_owned(),
             Some((low, high)) if low == high => format!("  radius {low}"),
@@ -134,6 +142,17 @@ impl Inspected<'_> {
         }
         object
     }
+}
+
+fn cell_line(cell: &SimulationCell) -> String {
+    let [a, b, c] = cell.vectors;
+    let mut line = format!("  cell {a} {b} {c} from {}", cell.origin);
+    let names = ["a", "b", "c"].iter().zip(cell.periodic);
+    let names: Vec<&str> = names.filter(|(_, is)| *is).map(|(name, _)| *name).collect();
+    if !names.is_empty() {
+        line += &format!(", periodic along {}", names.join(", "));
+    }
+    line
 }
 
 fn attribute_line(attribute: &AttributeStats) -> String {

@@ -5,10 +5,11 @@ use serde_json::Value;
 use super::data_files;
 use crate::harness::{Workshop, sample};
 
-const KEYS: [&str; 13] = [
+const KEYS: [&str; 15] = [
     "attributes",
     "bounds",
     "bytes_per_particle",
+    "cell",
     "count",
     "dropped",
     "encoding",
@@ -17,6 +18,7 @@ const KEYS: [&str; 13] = [
     "format",
     "frame",
     "mean",
+    "notes",
     "radius",
     "time",
 ];
@@ -166,6 +168,44 @@ fn a_file_of_several_steps_gives_an_object_each() {
         check_shape(object);
         assert_eq!(object["count"], 200);
         assert_eq!(object["attributes"][0]["sum"][0], 200 * 201 / 2);
+    }
+}
+
+/// Scripts see the cell and the notes that people see.
+#[test]
+fn cells_and_notes_are_in_the_object() {
+    let objects = inspect(&[sample("molecules/water.gro").display().to_string()], 0);
+    check_shape(&objects[0]);
+    let vectors = objects[0]["cell"]["vectors"].as_array().expect("vectors");
+    assert_eq!(vectors.len(), 3);
+    assert!(vectors[0][0].as_f64().is_some_and(|length| length > 0.0));
+    assert_eq!(
+        objects[0]["cell"]["periodic"],
+        serde_json::json!([true, true, true])
+    );
+    assert!(!objects[0]["notes"].as_array().expect("notes").is_empty());
+    // Also of files that are read in blocks
+    let objects = inspect(&[sample("hdf5/gadget.hdf5").display().to_string()], 0);
+    assert!(objects[0]["cell"]["vectors"].is_array(), "{}", objects[0]);
+}
+
+/// As text, steps that are like the one before are counted.
+#[test]
+fn a_long_trajectory_has_its_first_and_last_step_as_text() {
+    let workshop = Workshop::new();
+    let step = |number: usize, count: usize| {
+        let atoms: String = (0..count).map(|i| format!("C {i} {number} 0\n")).collect();
+        format!("{count}\nstep\n{atoms}")
+    };
+    let steps: String = (0..40)
+        .map(|number| step(number, if number == 20 { 4 } else { 3 }))
+        .collect();
+    std::fs::write(workshop.join("long.xyz"), steps).expect("a file");
+    let text = workshop.run(&["inspect", "long.xyz"]).expect(0).text();
+    let shown = text.lines().filter(|line| line.starts_with("long.xyz"));
+    assert_eq!(shown.count(), 4, "{text}");
+    for skipped in ["... 19 steps with as many", "... 17 steps with as many"] {
+        assert!(text.contains(skipped), "{text}");
     }
 }
 

@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use crate::FrameError;
 use crate::convert::sources::places;
 use crate::convert::{ParticleSource, SourceAttribute};
 use crate::native::MappedFile;
 use crate::open::SiblingFiles;
 use crate::ranges::ParticleRanges;
+use crate::{FrameError, SimulationCell};
 
 /// The particles of a mapped file.
 #[derive(Debug)]
@@ -57,6 +57,10 @@ impl ParticleSource for RangeSource {
 
     fn time(&self) -> Option<f64> {
         self.ranges.time()
+    }
+
+    fn cell(&self) -> Option<SimulationCell> {
+        self.ranges.cell()
     }
 
     fn step(&self) -> Option<i64> {

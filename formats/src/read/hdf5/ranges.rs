@@ -6,7 +6,7 @@ use super::band_cache::BandCache;
 use super::table::{Column, PART, ParticleTable};
 use super::values::Cache;
 use crate::ranges::{ParticleRanges, RangeAttribute};
-use crate::{ParseError, ScalarType};
+use crate::{ParseError, ScalarType, SimulationCell};
 
 /// Bytes of decoded chunks that are kept, as neighbouring ranges need the same ones.
 const CACHE_BYTES: u64 = 48 << 20;
@@ -62,6 +62,10 @@ impl ParticleRanges for TableRanges {
 
     fn step(&self) -> Option<i64> {
         self.table.step()
+    }
+
+    fn cell(&self) -> Option<SimulationCell> {
+        self.table.cell()
     }
 
     fn position_len(&self) -> u64 {

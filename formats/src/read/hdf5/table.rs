@@ -146,6 +146,10 @@ impl ParticleTable {
         self.step
     }
 
+    pub(super) const fn cell(&self) -> Option<SimulationCell> {
+        self.cell
+    }
+
     /// Names of attributes that are in some parts only, and left out.
     pub(super) fn left_out(&self) -> &[String] {
         &self.left_out

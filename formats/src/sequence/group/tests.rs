@@ -113,7 +113,7 @@ fn few_stray_files_are_skipped_and_reported() {
         numbers(&group),
         (0..10).map(|i| i * 400).collect::<Vec<_>>()
     );
-    assert_eq!(notes, ["`drop_4frames.lammpstrj` (1 frame) is left out"]);
+    assert_eq!(notes, ["`drop_4frames.lammpstrj` (1 file) is left out"]);
     let files = owned(&["out_1.vtk", "out_2.vtk", "initial.vtk"]);
     let (group, notes) = picked(&files);
     assert_eq!((numbers(&group), notes.len()), (vec![1, 2], 1));
