@@ -55,3 +55,26 @@ fn damaged_archives_are_left_to_the_readers() {
     assert!(matches!(found, Ok(None)));
     assert!(!is_compressed(damaged));
 }
+
+/// The library has one file for each name, so that particles would be lost silently.
+#[test]
+fn archives_with_a_name_twice_are_refused() {
+    let mut writer = ::zip::ZipWriter::new(Cursor::new(Vec::new()));
+    let stored = ::zip::write::SimpleFileOptions::default()
+        .compression_method(::zip::CompressionMethod::Stored);
+    for name in ["frame1.csv", "frame2.csv"] {
+        writer.start_file(name, stored).expect("a member");
+        std::io::Write::write_all(&mut writer, b"x,y,z\n1,2,3\n").expect("written");
+    }
+    let bytes = writer.finish().expect("an archive").into_inner();
+    // Names of equal lengths: the second becomes the first, also in the directory
+    let text: String = bytes.iter().map(|byte| char::from(*byte)).collect();
+    let bytes: Vec<u8> = text
+        .replace("frame2.csv", "frame1.csv")
+        .chars()
+        .map(|c| u8::try_from(u32::from(c)).expect("a byte"))
+        .collect();
+    let error = Compression::detect(&mut Cursor::new(bytes)).expect_err("two files");
+    let error = format!("{error:?}");
+    assert!(error.contains("a name twice, frame1.csv"), "{error}");
+}

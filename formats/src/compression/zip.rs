@@ -53,6 +53,10 @@ pub(super) fn content<R: Read + Seek>(reader: &mut R) -> ZipContent {
     if names.iter().any(is_other) {
         return ZipContent::Other;
     }
+    // Of several files of one name, the archive has one
+    if archive.has_duplicate_names() {
+        names.push("a name twice".to_owned());
+    }
     names.sort_unstable();
     let only = match names.as_slice() {
         [] => return ZipContent::Other,

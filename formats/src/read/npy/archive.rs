@@ -50,6 +50,12 @@ impl<'a> Archive<'a> {
         if overlaps.map_err(|e| zip_error(&e, "npz"))? {
             return Err(ParseError::malformed(0, "npz members overlap"));
         }
+        if zip.has_duplicate_names() {
+            return Err(ParseError::malformed(
+                0,
+                "npz with two arrays of one name; save it again",
+            ));
+        }
         let mut members = Vec::new();
         for index in 0..zip.len() {
             members.extend(member::open(&mut zip, index)?);
