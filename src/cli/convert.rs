@@ -9,9 +9,9 @@ use spherule_formats::detect::Format;
 use spherule_formats::native::{Bound, Encoding, FORMAT};
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{MemoryBudget, SequenceInput, SequenceSettings};
-use spherule_jobs::FrameRange;
+use spherule_jobs::{DEFAULT_TAKEOVER_AFTER, FrameRange, ResumeMode};
 
-use super::job::{FinishedRun, JobArgs, report_kept, use_threads};
+use super::job::{FinishedRun, JobArgs, report_kept, report_wait, use_threads};
 use super::numbers::{DEFAULT_BOUND, duration, not_negative, positive};
 use super::progress::{Progress, ShowReport};
 use super::{CliError, Outcome, events, signals};
@@ -116,6 +116,7 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, CliError> {
         events::start();
     }
     guard_name(&args.output)?;
+    guard_input(&args.input, &args.output)?;
     use_threads(args.threads)?;
     let input = SequenceInput::from_paths(args.input.clone());
     let limit = |memory: Bytes| MemoryBudget::new(memory.0, MEMORY_REMEDY);
@@ -144,6 +145,9 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, CliError> {
         )),
         error => error.into(),
     })?;
+    if mode != ResumeMode::Resume {
+        report_wait(convert_job.dir(), DEFAULT_TAKEOVER_AFTER)?;
+    }
     let (mut job, conversion) = convert_job.open(mode).map_err(|error| match error {
         RunError::UnknownAttribute(error) => CliError::other(format!("--attributes: {error}")),
         error => error.into(),
@@ -185,6 +189,20 @@ fn guard_name(output: &Path) -> Result<(), CliError> {
         output.display(),
         dir.display()
     )))
+}
+
+/// Refuses to write frames into a directory that is an input: later it would contain two sequences.
+fn guard_input(inputs: &[PathBuf], output: &Path) -> Result<(), CliError> {
+    let real = output.canonicalize().ok();
+    let is_output =
+        |input: &&PathBuf| real.is_some() && input.is_dir() && input.canonicalize().ok() == real;
+    match inputs.iter().find(is_output) {
+        None => Ok(()),
+        Some(input) => Err(CliError::other(format!(
+            "{}: is the input; choose another directory for the native frames",
+            input.display()
+        ))),
+    }
 }
 
 impl ShowReport for ConvertedFrame {

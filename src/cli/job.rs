@@ -2,17 +2,17 @@
 
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use clap::Args;
 use serde_json::json;
-use spherule_jobs::{FrameRange, Interrupt, Job, JobError, PLAN_FILE, ResumeMode};
+use spherule_jobs::{FrameRange, Interrupt, Job, JobError, JobState, PLAN_FILE, ResumeMode};
 
 use super::manifest_args::{is_manifest, read_manifest};
 use super::paths::absolute;
 use super::progress::{FinishedFrames, duration};
 use super::{CliError, Outcome, events};
-use crate::job::{RunError, Shard};
+use crate::job::{RunError, Shard, requested_frames};
 use crate::manifest::{Manifest, real_dir};
 
 /// How one run treats the results of earlier runs. These options are not in the manifest: a manifest that always
@@ -89,6 +89,39 @@ pub(super) fn no_job(dir: &Path) -> CliError {
         "{}: no job here (no {PLAN_FILE}); give the directory of its images, or its job.toml",
         dir.display()
     ))
+}
+
+/// The frames of the job in `range`; without a range those that its runs have asked for.
+pub(super) fn selected_frames(
+    state: &JobState,
+    range: Option<&FrameRange>,
+) -> Result<Vec<i64>, CliError> {
+    let Some(range) = range else {
+        return Ok(requested_frames(state));
+    };
+    let numbers: Vec<i64> = state.plan().frames().iter().map(|f| f.number).collect();
+    let selected = range.select(&numbers);
+    if selected.is_empty() {
+        return Err(CliError::other(format!(
+            "--frames: {range} contains none of the job's frames: {}",
+            list(&numbers)
+        )));
+    }
+    Ok(selected)
+}
+
+/// Reports that opening the job in `dir` waits for other workers, which may have died with their machine: a job is not
+/// replaced while others work on it.
+pub(super) fn report_wait(dir: &Path, takeover_after: Duration) -> Result<(), CliError> {
+    if let Some(worker) = Job::workers(dir)?.iter().find(|worker| !worker.has_ended) {
+        message!(
+            "waiting for a heartbeat of process {} on {}, {} at most",
+            worker.pid,
+            worker.host,
+            duration(takeover_after.as_secs_f64())
+        );
+    }
+    Ok(())
 }
 
 /// Reports how many frames of the run are done already.

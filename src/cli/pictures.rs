@@ -4,15 +4,16 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use spherule_jobs::{FrameRange, FrameState, Interrupt, Job, JobState};
+use spherule_jobs::{FrameRange, FrameState, Interrupt, Job, JobState, PLAN_FILE, WORK_DIR};
 
 use super::CliError;
-use super::job::{job_directory, list, no_job};
+use super::job::{job_directory, list, no_job, selected_frames};
 use super::paths::absolute;
 use super::signals::SignalMessages;
 use crate::job::KIND;
 use crate::movie::Observer;
 use crate::picture::is_own_file;
+use crate::report::job::{HTML_FILE, JSON_FILE};
 
 /// The job, and the frames to show.
 #[derive(Debug, Args)]
@@ -82,7 +83,7 @@ impl JobPictures {
                 dir.display()
             )));
         }
-        let selected = selected(&state, args.frames.as_ref())?;
+        let selected = selected_frames(&state, args.frames.as_ref())?;
         let is_done = |frame: &i64| state.frame_state(*frame) == Some(FrameState::Done);
         let (done, missing): (Vec<i64>, Vec<i64>) =
             selected.iter().partition(|frame| is_done(frame));
@@ -139,21 +140,20 @@ impl JobPictures {
         CliError::other(format!("{error}{remedy}"))
     }
 
-    /// Refuses an output that is an image of the job, that is not a file, or that another program has written.
+    /// Refuses an output that is a file of the job, that is not a file, or that another program has written.
     pub(super) fn guard(&self, output: &Path, force: bool) -> Result<(), CliError> {
         guard(output, force)?;
-        let planned = self
-            .state
-            .plan()
-            .frames()
-            .iter()
-            .flat_map(|frame| &frame.outputs);
+        let frames = self.state.plan().frames().iter();
+        let files = frames.flat_map(|frame| {
+            let inputs = frame.inputs.iter().map(|input| &input.path);
+            frame.outputs.iter().chain(inputs).map(Path::new)
+        });
         let wanted = real(output)?;
-        for path in planned {
+        for path in files.filter(|path| path.file_name() == wanted.file_name()) {
             if real(&self.state.dir().join(path))? == wanted {
                 return Err(refused(
                     output,
-                    "is an image of the job; choose another name",
+                    "is an image or an input of the job; choose another name",
                 ));
             }
         }
@@ -161,8 +161,13 @@ impl JobPictures {
     }
 }
 
-/// Refuses an output that is not a file, or that another program has written. Makes its directory.
+/// Refuses an output that is not a file, that belongs to the records of a job, or that another program has written. Makes
+/// its directory.
 pub(super) fn guard(output: &Path, force: bool) -> Result<(), CliError> {
+    if is_job_file(&real(output)?) {
+        let why = "belongs to the records of a job; choose another name";
+        return Err(refused(output, why));
+    }
     if let Ok(existing) = fs::metadata(output) {
         if !existing.is_file() {
             return Err(refused(output, "is not a file; choose another name"));
@@ -179,6 +184,18 @@ pub(super) fn guard(output: &Path, force: bool) -> Result<(), CliError> {
     }
 }
 
+/// Whether `path` is in the directory of a job and has the name of one of its records: plan, ledgers, manifest, schema,
+/// reports.
+fn is_job_file(path: &Path) -> bool {
+    let (Some(dir), Some(name)) = (path.parent(), path.file_name()) else {
+        return false;
+    };
+    let is_in_work = dir.file_name().is_some_and(|name| name == WORK_DIR);
+    let name = name.to_string_lossy();
+    let is_record = name.starts_with("job.") || [JSON_FILE, HTML_FILE].contains(&&*name);
+    is_in_work || (is_record && dir.join(PLAN_FILE).exists())
+}
+
 fn refused(output: &Path, why: &str) -> CliError {
     CliError::other(format!("{}: {why}", output.display()))
 }
@@ -193,21 +210,6 @@ fn real(path: &Path) -> Result<PathBuf, CliError> {
         .canonicalize()
         .unwrap_or_else(|_| dir.to_owned())
         .join(name))
-}
-
-fn selected(state: &JobState, range: Option<&FrameRange>) -> Result<Vec<i64>, CliError> {
-    let numbers: Vec<i64> = state.plan().frames().iter().map(|f| f.number).collect();
-    let Some(range) = range else {
-        return Ok(numbers);
-    };
-    let selected = range.select(&numbers);
-    if selected.is_empty() {
-        return Err(CliError::other(format!(
-            "--frames: {range} contains none of the job's frames: {}",
-            list(&numbers)
-        )));
-    }
-    Ok(selected)
 }
 
 fn picture(state: &JobState, frame: i64) -> Option<JobPicture> {

@@ -75,6 +75,11 @@ impl ConvertJob {
         &self.sequence
     }
 
+    /// The directory of the frames and of all files of the job, absolute.
+    pub fn dir(&self) -> &Path {
+        &self.dir
+    }
+
     fn output(&self, frame: i64) -> PathBuf {
         match &self.name {
             Some(name) => self.dir.join(name),

@@ -37,6 +37,20 @@ fn refuses(ran: Ran, text: &str) {
     ran.expect(REFUSED).prints(text);
 }
 
+/// A job of some frames is complete when these are done.
+#[test]
+fn movies_have_the_frames_that_the_render_asked_for() {
+    let workshop = job(&[1, 2, 3, 4, 5], &["--frames", "1-5x2"]);
+    let movie = ["movie", "out", "-o", "a.gif"];
+    let ran = workshop.run(&movie).expect(DONE);
+    assert!(ran.text().contains("3 frames"), "{}", ran.text());
+    let ran = workshop.run(&["verify", "out"]).expect(DONE);
+    assert!(!ran.text().contains("pending"), "{}", ran.text());
+    workshop.render(&["--frames", "1-5"]).expect(DONE);
+    let ran = workshop.run(&movie).expect(DONE);
+    assert!(ran.text().contains("5 frames"), "{}", ran.text());
+}
+
 #[test]
 fn animations_have_all_frames() {
     let workshop = job(&[1, 2, 3], &[]);

@@ -7,7 +7,7 @@ use spherule_jobs::Interrupt;
 
 use super::isolate::COMMAND;
 use super::summary::print_summary;
-use crate::cli::job::{FinishedRun, JobArgs, report_kept};
+use crate::cli::job::{FinishedRun, JobArgs, report_kept, report_wait};
 use crate::cli::progress::Progress;
 use crate::cli::{CliError, Outcome};
 use crate::job::{ChildCommand, FollowEnd, Follower, JobManifest, RenderJob, RenderRun, RunError};
@@ -36,6 +36,7 @@ impl Run {
         let job = job.resuming(mode)?;
         if job.needs_survey(mode)? {
             message!("surveying the sequence");
+            report_wait(job.dir(), job.manifest().job.takeover_after)?;
         }
         let command = ChildCommand::own_program([COMMAND]);
         let command = command.map_err(|e| CliError::other(format!("spherule: {e}")))?;

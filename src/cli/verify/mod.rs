@@ -13,7 +13,7 @@ use spherule_jobs::{
     catch_panic,
 };
 
-use super::job::{job_directory, list, no_job, use_threads};
+use super::job::{job_directory, list, no_job, selected_frames, use_threads};
 use super::print::{self, Reader};
 use super::{CliError, Outcome};
 use crate::manifest::MAX_THREADS;
@@ -97,7 +97,9 @@ pub(super) fn run(args: &VerifyArgs) -> Result<Outcome, CliError> {
     };
     let expected = ExpectedOutput::of(state.plan())
         .map_err(|e| CliError::other(format!("{}: {e}", dir.join(PLAN_FILE).display())))?;
-    let frames = selected(&state, args.frames.as_ref())?;
+    let frames = selected_frames(&state, args.frames.as_ref())?;
+    let plan = state.plan();
+    let frames: Vec<&PlannedFrame> = frames.iter().filter_map(|n| plan.frame(*n)).collect();
     let mut verdicts = Vec::with_capacity(frames.len());
     let mut damaged = Vec::new();
     for chunk in frames.chunks(FRAMES_PER_THREAD * rayon::current_num_threads()) {
@@ -141,25 +143,6 @@ fn requeue(state: &JobState, damaged: &[(i64, String)]) -> Result<(), CliError> 
         );
     }
     Ok(())
-}
-
-fn selected<'a>(
-    state: &'a JobState,
-    range: Option<&FrameRange>,
-) -> Result<Vec<&'a PlannedFrame>, CliError> {
-    let plan = state.plan();
-    let Some(range) = range else {
-        return Ok(plan.frames().iter().collect());
-    };
-    let numbers: Vec<i64> = plan.frames().iter().map(|f| f.number).collect();
-    let selected = range.select(&numbers);
-    if selected.is_empty() {
-        return Err(CliError::other(format!(
-            "--frames: {range} contains none of the job's frames: {}",
-            list(&numbers)
-        )));
-    }
-    Ok(selected.iter().filter_map(|n| plan.frame(*n)).collect())
 }
 
 fn check_frame(

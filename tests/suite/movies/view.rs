@@ -4,7 +4,7 @@ use std::fs;
 
 use serde_json::Value;
 
-use super::{DONE, job, refuses};
+use super::{DONE, REFUSED, job, refuses};
 use crate::harness::Workshop;
 
 /// The data in a page.
@@ -13,6 +13,32 @@ fn data(workshop: &Workshop, page: &str) -> Value {
     let (_, after) = html.split_once("id=\"viewer-data\">").expect("data");
     let (json, _) = after.split_once("</script>").expect("data");
     serde_json::from_str(json).expect("JSON")
+}
+
+/// Even with `--force`, which is for files of other programs.
+#[test]
+fn records_and_inputs_of_a_job_are_not_replaced() {
+    let workshop = job(&[1], &[]);
+    let names = [
+        "out/job.plan.json",
+        "out/job.toml",
+        "out/job.schema.json",
+        "out/report.json",
+        "out/report.html",
+        "out/f.0001.exr",
+        "in/f_1.bgeo",
+    ];
+    for name in names {
+        let before = fs::read(workshop.join(name)).expect("a file");
+        let view = ["view", "out", "--force", "-o", name];
+        refuses(workshop.run(&view), "choose another name");
+        for command in ["movie", "sheet"] {
+            let ran = workshop.run(&[command, "out", "--force", "-o", name]);
+            ran.expect(REFUSED);
+        }
+        assert!(fs::read(workshop.join(name)).expect("a file") == before);
+    }
+    workshop.run(&["verify", "out"]).expect(DONE);
 }
 
 #[test]

@@ -100,6 +100,12 @@ fn a_frame_that_was_not_complete_after_all_is_made_once_it_is() {
     let (messages, status) = running.end();
     assert_eq!(status.code(), Some(0), "{messages}");
     assert_eq!(images(&workshop.join("out")).len(), 4);
+    // The stop file is of this run, not of the next
+    workshop
+        .run(&arguments(&["--idle", "0.5"]))
+        .expect(0)
+        .prints("job.stop is from an earlier run and does not end this one")
+        .prints("no new frames for 0.5 s");
 }
 
 #[test]

@@ -117,6 +117,29 @@ fn moved_data_with_the_same_contents_go_on() {
     assert!(ran.rendered().is_empty());
 }
 
+/// `cp -r` gives files other times. The hash covers files of up to 128 KiB; larger ones are compared with the originals.
+#[test]
+fn copied_data_go_on() {
+    let workshop = Workshop::new();
+    for dir in ["in", "copy"] {
+        dam_break(&workshop.join(dir), 1..=3);
+    }
+    let long = |dir: &str| workshop.join(dir).join("f_3.bgeo");
+    let size = fs::metadata(long("in")).expect("a file").len();
+    assert!(size > 128 << 10, "{size}");
+    render(&workshop, "in", &[]).expect(0);
+    let ran = render(&workshop, "copy", &[]).expect(0);
+    assert!(ran.rendered().is_empty());
+    // Of a file that differs in the middle, no end tells
+    let mut bytes = fs::read(long("copy")).expect("a file");
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    fs::write(long("copy"), bytes).expect("a file");
+    render(&workshop, "copy", &[])
+        .expect(2)
+        .prints("modification time has changed");
+}
+
 #[test]
 fn a_conversion_belongs_to_one_input_too() {
     let workshop = Workshop::new();
@@ -130,6 +153,11 @@ fn a_conversion_belongs_to_one_input_too() {
     workshop
         .run(&["convert", "other", "-o", "out", "--force"])
         .expect(0);
+    // Not the directory with the input itself
+    workshop
+        .run(&["convert", "in", "-o", "./in"])
+        .expect(2)
+        .prints("in: is the input; choose another directory for the native frames");
 }
 
 #[test]

@@ -101,6 +101,31 @@ fn frames_of_an_unresponsive_worker_are_taken_over() {
     no_leftovers(&workshop.join("out"));
 }
 
+/// A worker whose machine is gone shows no heartbeat, and must not keep a job from starting over.
+#[test]
+fn a_job_of_an_unresponsive_worker_starts_over() {
+    let workshop = with_whole();
+    workshop.run(&arguments(&[])).expect(0);
+    let cases = [
+        (&["--force"][..], FRAMES),
+        (&["--keep-done", "--samples", "3"], 0),
+    ];
+    for (options, frames) in cases {
+        let work = workshop.join("out/job.work");
+        fs::create_dir_all(&work).expect("a directory");
+        let record = r#"{"worker":"far-7-00","process":{"token":"far-7-00","host":"far","machine":"gone","pid":7,"start":9},"since_ms":1}"#;
+        fs::write(work.join("far-7-00.worker"), format!("{record}\n")).expect("a file");
+        let options = [options, &["--takeover-after", "0.3"]].concat();
+        let ran = workshop
+            .run(&arguments(&options))
+            .expect(0)
+            .prints("waiting for a heartbeat of process 7 on far");
+        assert_eq!(ran.rendered().len(), frames);
+        assert!(!work.exists());
+    }
+    assert!(images(&workshop.join("out")) == images(&workshop.join("whole")));
+}
+
 /// The directory with the worker records may be removed while a worker is active.
 #[test]
 fn a_worker_that_was_declared_dead_stops_and_may_rejoin() {
