@@ -110,7 +110,7 @@ impl Plan {
     }
 
     /// The input directories; empty in plans of version 1.
-    pub(crate) fn input_dirs(&self) -> &[String] {
+    pub fn input_dirs(&self) -> &[String] {
         &self.input_dirs
     }
 

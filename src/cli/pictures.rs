@@ -143,18 +143,24 @@ impl JobPictures {
     /// Refuses an output that is a file of the job, that is not a file, or that another program has written.
     pub(super) fn guard(&self, output: &Path, force: bool) -> Result<(), CliError> {
         guard(output, force)?;
-        let frames = self.state.plan().frames().iter();
-        let files = frames.flat_map(|frame| {
-            let inputs = frame.inputs.iter().map(|input| &input.path);
-            frame.outputs.iter().chain(inputs).map(Path::new)
-        });
         let wanted = real(output)?;
-        for path in files.filter(|path| path.file_name() == wanted.file_name()) {
-            if real(&self.state.dir().join(path))? == wanted {
-                return Err(refused(
-                    output,
-                    "is an image or an input of the job; choose another name",
-                ));
+        let (dir, name) = (wanted.parent(), wanted.file_name());
+        let plan = self.state.plan();
+        let is_in =
+            |input_dir: &Path| dir.is_some() && input_dir.canonicalize().ok().as_deref() == dir;
+        let may_be_input = plan.input_dirs().iter().any(|dir| is_in(Path::new(dir)));
+        for frame in plan.frames() {
+            let mut inputs = frame.inputs.iter().map(|input| Path::new(&input.path));
+            let is_input = may_be_input && inputs.any(|input| input.file_name() == name);
+            let mut outputs = frame.outputs.iter().map(Path::new);
+            let output_of_name = outputs.find(|output| output.file_name() == name);
+            let is_output = match output_of_name {
+                Some(path) => real(&self.state.dir().join(path))? == wanted,
+                None => false,
+            };
+            if is_input || is_output {
+                let why = "is an image or an input of the job; choose another name";
+                return Err(refused(output, why));
             }
         }
         Ok(())
