@@ -6,8 +6,8 @@ use crate::compression::strip_extension;
 use crate::format::Format;
 use crate::native;
 use crate::read::{
-    amber, bgeo, bi4, csv, dcd, gro, gsd, houdini, lammps, mmcif, npy, pdb, ply, trr, usd, vtk,
-    vtk_xml, xtc, xyz,
+    amber, bgeo, bi4, csv, dcd, gro, gsd, houdini, lammps, mmcif, npy, pdb, ply, rst7, trr, usd,
+    vtk, vtk_xml, xtc, xyz,
 };
 
 /// All formats. If several formats match a file equally well, the first one wins. Messages list them in this order.
@@ -30,6 +30,7 @@ const FORMATS: &[Format] = &[
     trr::FORMAT,
     dcd::FORMAT,
     amber::FORMAT,
+    rst7::FORMAT,
     pdb::FORMAT,
     mmcif::FORMAT,
     usd::FORMAT,

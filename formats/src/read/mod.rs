@@ -34,6 +34,7 @@ mod pieces;
 pub mod ply;
 pub(crate) mod psf;
 mod remarks;
+pub mod rst7;
 pub(crate) mod sniff;
 mod source;
 mod table;

@@ -23,7 +23,7 @@ pub use packed::{compressed, houdini, npz, open};
 pub type Target = fn(&[u8]) -> usize;
 
 /// Every target by the name of its folder in `corpus`.
-pub const TARGETS: [(&str, Target); 29] = [
+pub const TARGETS: [(&str, Target); 30] = [
     ("vtk", vtk),
     ("vtk_xml", vtk_xml),
     ("bgeo", bgeo),
@@ -41,6 +41,7 @@ pub const TARGETS: [(&str, Target); 29] = [
     ("trr", trr),
     ("dcd", dcd),
     ("amber", amber),
+    ("rst7", rst7),
     ("pdb", pdb),
     ("mmcif", mmcif),
     ("lammps_binary", lammps_binary),
@@ -151,6 +152,11 @@ pub fn dcd(bytes: &[u8]) -> usize {
 /// AMBER NetCDF.
 pub fn amber(bytes: &[u8]) -> usize {
     read_all(read::amber::FORMAT, bytes, 1)
+}
+
+/// AMBER restart files in text.
+pub fn rst7(bytes: &[u8]) -> usize {
+    read_all(read::rst7::FORMAT, bytes, 1)
 }
 
 /// Protein Data Bank files.

@@ -15,7 +15,7 @@ mod text;
 
 use base::{Base, find, replace};
 use gsd::gsd;
-use text::{csv, lammps, vtk_ascii, xyz};
+use text::{csv, lammps, rst7, vtk_ascii, xyz};
 
 /// Name and content.
 pub(super) type Made = (String, Vec<u8>);
@@ -29,7 +29,7 @@ const NAN: [[f32; 3]; 3] = [WHOLE[0], [f32::NAN, 0.5, 0.25], WHOLE[2]];
 pub(super) fn files() -> Vec<Made> {
     let mut all = vec![("empty.vtk".to_owned(), Vec::new())];
     for kind in [
-        vtk, vtk_ascii, vtu, bgeo, gzip, ply, xyz, lammps, npy, npz, csv, spf, gsd,
+        vtk, vtk_ascii, vtu, bgeo, gzip, ply, xyz, lammps, npy, npz, csv, rst7, spf, gsd,
     ] {
         all.extend(kind());
     }

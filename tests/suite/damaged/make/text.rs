@@ -62,6 +62,32 @@ pub(super) fn lammps() -> Vec<Made> {
         .made
 }
 
+/// AMBER restart files: six numbers of twelve columns in a line.
+pub(super) fn rst7() -> Vec<Made> {
+    let restart = |points: &[[f32; 3]]| {
+        let numbers: Vec<f32> = points.iter().flatten().copied().collect();
+        let row = |row: &[f32]| row.iter().map(|n| format!("{n:12.7}")).collect::<String>() + "\n";
+        let rows: String = numbers.chunks(6).map(row).collect();
+        format!("title\n{:5}  0.5000000E+01\n{rows}", points.len()).into_bytes()
+    };
+    let overflow = String::from_utf8(restart(&WHOLE)).expect("text");
+    Base::new("restart", "rst7", restart(&WHOLE))
+        .cut("cut-in-title", "title", 3)
+        .cut("cut-in-positions", "   2.0000000", 0)
+        .replace("absurd-atoms", "    3  0", "2000000000  0")
+        .replace("other-count", "    3  0", "    5  0")
+        .replace("no-count", "    3  0", "three  0")
+        .replace("word", "0.2500000", "0.25half0")
+        .file(
+            "nan",
+            overflow
+                .replace("   0.2500000", "************")
+                .into_bytes(),
+        )
+        .file("zero", restart(&[]))
+        .made
+}
+
 pub(super) fn csv() -> Vec<Made> {
     let table =
         |points: &[[f32; 3]]| format!("x,y,z\n{}", text(points).replace(' ', ",")).into_bytes();
