@@ -62,6 +62,7 @@ impl TableLayout {
             time: None,
             candidate: None,
             comment: None,
+            passed: None,
         }
         .run(lines, bytes.len())
     }
@@ -88,6 +89,8 @@ struct LayoutSearch<'a> {
     candidate: Option<Line<'a>>,
     /// The last comment.
     comment: Option<Line<'a>>,
+    /// The first line that is nothing of a table.
+    passed: Option<Line<'a>>,
 }
 
 impl<'a> LayoutSearch<'a> {
@@ -119,10 +122,15 @@ impl<'a> LayoutSearch<'a> {
             }
             if cells.len() >= 3 {
                 self.candidate = Some(line);
-            } else if let [name, value] = &cells[..]
-                && is_time(name)
-            {
-                self.time = number(value, self.dialect.decimal);
+                continue;
+            }
+            match &cells[..] {
+                [name, value] if is_time(name) => {
+                    self.time = number(value, self.dialect.decimal);
+                }
+                _ => {
+                    self.passed.get_or_insert(line);
+                }
             }
         }
         if let Some(line) = self.candidate {
@@ -158,7 +166,8 @@ impl<'a> LayoutSearch<'a> {
     }
 
     /// A row of numbers: the names are in a comment, or in a line without positions (which is an
-    /// error to come), or there are none.
+    /// error to come), or there are none. Without names, nothing but comments and a time may come before the row:
+    /// numbers behind other lines are those of another format.
     fn first_row(self, cells: &[&[u8]], rows: Range<usize>) -> Result<TableLayout, ParseError> {
         let columns = cells.len();
         if let Some(line) = self.candidate {
@@ -174,6 +183,14 @@ impl<'a> LayoutSearch<'a> {
                     return Ok(self.layout(Some(names), columns, line.at, rows));
                 }
             }
+        }
+        if let Some(line) = self.passed {
+            let what = format!(
+                "numbers without names of columns follow {}: put # before this line, or write names of columns such as \
+                 x y z below it",
+                text::shown(line.text)
+            );
+            return Err(ParseError::malformed(line.at, what));
         }
         let leading = cells.iter().take(3);
         if leading

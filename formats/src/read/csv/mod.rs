@@ -6,7 +6,7 @@
 
 use super::input::TextInput;
 use super::sniff::{TextShape, is_text, text_shape};
-use super::table::{NumberKind, Table, TargetArray, TargetComponent, TextPolicy};
+use super::table::{NumberKind, RowLabels, Table, TargetArray, TargetComponent, TextPolicy};
 use super::{ByteSource, Step};
 use crate::format::Format;
 use crate::names::{COLOR_CODES, is_one_of, is_radius_name};
@@ -63,6 +63,20 @@ impl Reader for Csv {
     ) -> Result<RawParticles, ParseError> {
         read(source.text(), budget)
     }
+
+    fn remarks(&self, head: &[u8]) -> Vec<String> {
+        remarks(head)
+    }
+}
+
+/// Remarks about a table that begins with `head`.
+pub(super) fn remarks(head: &[u8]) -> Vec<String> {
+    let has_no_names = TableLayout::find(head).is_ok_and(|layout| layout.names.is_none());
+    let remark = "the table has no names of columns: columns 1 to 3 are the positions";
+    has_no_names
+        .then(|| remark.to_owned())
+        .into_iter()
+        .collect()
 }
 
 /// The only time step of `text`, with the time if a line before the names has it.
@@ -105,11 +119,16 @@ pub(super) fn read(
         let len = text.left_about() as u64;
         len.saturating_mul(lines) / rows.len().max(1) as u64 / 16 * 17
     };
+    let before = head.get(..layout.rows.start).unwrap_or_default();
     let table = Table {
         dialect: layout.dialect,
         fields,
         targets,
         rows: usize::try_from(guess).unwrap_or(usize::MAX),
+        labels: Some(RowLabels {
+            first_line: memchr::memchr_iter(b'\n', before).count() + 1,
+            columns: layout.names.unwrap_or_default(),
+        }),
     };
     text.go_to(layout.rows.start);
     let (positions, attributes) = table.particles(text, usize::MAX, budget).content?;
@@ -142,7 +161,7 @@ fn layout_columns(layout: &TableLayout) -> Result<TableColumns, ParseError> {
 }
 
 /// True if a line of `bytes` names positions.
-pub(super) fn finds_columns(bytes: &[u8]) -> bool {
+pub(crate) fn finds_columns(bytes: &[u8]) -> bool {
     TableLayout::find(bytes)
         .is_ok_and(|layout| layout.names.is_some_and(|n| names::position(&n).is_some()))
 }

@@ -143,6 +143,24 @@ fn missing_positions() {
 }
 
 #[test]
+fn tables_without_names_have_a_remark() {
+    let remarks = |text: &str| FORMAT.reader().remarks(text.as_bytes());
+    assert_eq!(
+        remarks("# run 7\n1 2 3 4\n5 6 7 8\n"),
+        ["the table has no names of columns: columns 1 to 3 are the positions"]
+    );
+    for text in [
+        "x,y,z\n1,2,3\n",
+        "# x y z\n1 2 3\n",
+        "a,b,c\n1,2,3\n",
+        "words\n",
+        "",
+    ] {
+        assert!(remarks(text).is_empty(), "{text}");
+    }
+}
+
+#[test]
 fn tables_without_rows() {
     for text in [
         "x,y,z,id\n",
@@ -180,10 +198,23 @@ fn faults_are_described() {
             "a,b,c\n1,2,3\n",
             "byte 0: no positions among the columns \"a\", \"b\", \"c\":",
         ),
-        ("x,y,z\n1,2,3\n1,2\n", "byte 12: line has 2 of 3 columns"),
+        ("x,y,z\n1,2,3\n1,2\n", "byte 12: line 3 has 2 of 3 columns"),
         ("x,y,z\n1,2,3\n1,2", "perhaps still being written"),
-        ("x,y,z\n1,2,3,4\n", "byte 12: line has more than 3 columns"),
-        ("x,y,z\n1,2,3\n1,b,3\n", "byte 14: column 2 has \"b\""),
+        (
+            "x,y,z\n1,2,3,4\n",
+            "byte 12: line 2 has more than 3 columns",
+        ),
+        (
+            "x,y,z\n1,2,3\n1,b,3\n",
+            "byte 14: line 3: column \"y\" has \"b\", not a number",
+        ),
+        ("# c\n\n1 2 3\n1 2 b\n", "line 4: column 3 has \"b\""),
+        (
+            "title\n1 2 3\n4 5 6\n",
+            "byte 0: numbers without names of columns follow \"title\"",
+        ),
+        ("title\n 2 0.5\n1 2 3 4 5 6\n", "follow \"title\""),
+        ("2\n1,2,3\n4,5,6\n", "follow \"2\""),
         ("a,1,2,3\nb,4,5,6\n", "first three columns are not numbers"),
     ];
     for (text, expected) in cases {

@@ -179,6 +179,7 @@ fn read(
                 rows: most_rows(text.left_about(), columns.fields.len()).min(header.count),
                 fields: columns.fields,
                 targets: columns.targets,
+                labels: None,
             };
             (table.particles(text, most, budget), columns.scaled_by)
         }

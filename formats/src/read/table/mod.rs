@@ -159,6 +159,17 @@ pub(super) struct Table {
     pub(super) targets: Vec<TargetArray>,
     /// How many rows there may be: a guess, for which room is made.
     pub(super) rows: usize,
+    /// Where users find a fault; `None` where only its byte is known.
+    pub(super) labels: Option<RowLabels>,
+}
+
+/// What users know of the rows of a table.
+#[derive(Debug)]
+pub(super) struct RowLabels {
+    /// Number of the first line in the file, from 1.
+    pub(super) first_line: usize,
+    /// Names of the columns; none if the file has none.
+    pub(super) columns: Vec<String>,
 }
 
 /// Positions and attributes.
@@ -203,17 +214,17 @@ impl Table {
             if some.is_empty() {
                 break None;
             }
-            lines += some.iter().map(|piece| piece.lines).sum::<usize>();
             let parsed: Vec<Result<Vec<ColumnValues>, ParseError>> = some
                 .par_iter()
-                .map(|piece| {
-                    let parsed = self.rows_of(piece).parse();
-                    parsed.map_err(|error| error.behind(piece.at))
-                })
+                .map(|piece| self.rows_of(piece).parse())
                 .collect();
-            let fault = parsed
-                .into_iter()
-                .find_map(|piece| piece.and_then(|piece| values.append(piece)).err());
+            let mut before = lines;
+            lines += some.iter().map(|piece| piece.lines).sum::<usize>();
+            let fault = some.iter().zip(parsed).find_map(|(piece, parsed)| {
+                let parsed = parsed.map_err(|error| self.located(error, piece, before));
+                before += piece.lines;
+                parsed.and_then(|parsed| values.append(parsed)).err()
+            });
             text.take_back(some);
             if fault.is_some() {
                 lines += text.pass_lines(most - lines);
@@ -240,6 +251,33 @@ impl Table {
         }
     }
 
+    /// `error` in `piece`, behind `before` lines of the rows, with its place in the file.
+    fn located(&self, error: ParseError, piece: &LinePiece<'_>, before: usize) -> ParseError {
+        let (Some(labels), ParseError::Malformed { at, .. }) = (&self.labels, &error) else {
+            return error.behind(piece.at);
+        };
+        let passed = usize::try_from(*at)
+            .ok()
+            .and_then(|at| piece.bytes.get(..at));
+        let passed = memchr::memchr_iter(b'\n', passed.unwrap_or_default()).count();
+        let line = labels.first_line + before + passed;
+        let message = |what: &str| match what.strip_prefix("line ") {
+            Some(rest) => format!("line {line} {rest}"),
+            None => format!("line {line}: {what}"),
+        };
+        error.map_message(message).behind(piece.at)
+    }
+
+    /// The name of a field for messages, or its number if the table has no names.
+    fn label(&self, field: usize) -> String {
+        let names = self.labels.as_ref().map(|labels| labels.columns.as_slice());
+        let name = names.and_then(|names| names.get(field));
+        name.filter(|name| !name.is_empty()).map_or_else(
+            || format!("column {}", field + 1),
+            |name| format!("column {}", text::shown(name.as_bytes())),
+        )
+    }
+
     fn rows_of<'t>(&'t self, piece: &'t LinePiece<'_>) -> Rows<'t> {
         Rows {
             bytes: &piece.bytes,
@@ -247,6 +285,7 @@ impl Table {
             dialect: self.dialect,
             fields: &self.fields,
             targets: &self.targets,
+            table: self,
         }
     }
 }
@@ -265,6 +304,7 @@ struct Rows<'t> {
     dialect: Dialect,
     fields: &'t [Option<TargetComponent>],
     targets: &'t [TargetArray],
+    table: &'t Table,
 }
 
 fn particles(targets: Vec<TargetArray>, values: Vec<ColumnValues>) -> Particles {
@@ -392,8 +432,8 @@ impl Rows<'_> {
             values[place.target] = ColumnValues::Text;
             return Ok(());
         }
-        let column = field + 1;
-        let what = format!("column {column} has {}, not a number", text::shown(token));
+        let column = self.table.label(field);
+        let what = format!("{column} has {}, not a number", text::shown(token));
         Err(ParseError::malformed(at, self.with_cause(at, what)))
     }
 

@@ -26,6 +26,7 @@ fn columns(bytes: &[u8], dialect: Dialect, targets: Vec<TargetArray>) -> WholeTe
         fields: (0..targets.len()).map(place).collect(),
         targets,
         rows: 0,
+        labels: None,
     };
     WholeText { bytes, table }
 }
@@ -62,6 +63,7 @@ fn fields_are_assigned_by_name() {
             scalar(NumberKind::WholeIfAll, TextPolicy::Fault),
         ],
         rows: 2,
+        labels: None,
     };
     let table = WholeText { bytes, table };
     let mut values = table.parse(MemoryBudget::UNLIMITED).unwrap();
