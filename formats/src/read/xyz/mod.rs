@@ -13,6 +13,7 @@ use crate::reader::{Confidence, Reader, StreamUnit};
 use crate::{Endian, MemoryBudget, ParseError, RawParticles, ScalarType};
 
 mod comment;
+mod foreign;
 mod molecular;
 mod remarks;
 
@@ -81,7 +82,7 @@ impl Reader for Xyz {
         let text = source.text();
         let head = text.head();
         match kind(head)? {
-            XyzVariant::Raw => raw_layout(head).particles(head),
+            XyzVariant::Raw => raw_layout(head)?.particles(head),
             XyzVariant::Molecular => {
                 let range = step.byte_range().cloned().unwrap_or_default();
                 molecular::read(text, range, budget)
@@ -92,11 +93,16 @@ impl Reader for Xyz {
 
     /// `None` for text.
     fn layout(&self, bytes: &[u8]) -> Result<Option<ParticleLayout>, ParseError> {
-        Ok((kind(bytes)? == XyzVariant::Raw).then(|| raw_layout(bytes)))
+        let is_raw = kind(bytes)? == XyzVariant::Raw;
+        is_raw.then(|| raw_layout(bytes)).transpose()
     }
 
     fn remarks(&self, head: &[u8]) -> Vec<String> {
-        remarks::remarks(head)
+        match kind(head) {
+            Ok(XyzVariant::Molecular) => remarks::remarks(head),
+            Ok(XyzVariant::Bare) => csv::remarks(head),
+            Ok(XyzVariant::Raw) | Err(_) => Vec::new(),
+        }
     }
 }
 
@@ -161,14 +167,46 @@ pub fn kind(bytes: &[u8]) -> Result<XyzVariant, ParseError> {
     Err(ParseError::malformed(start, what))
 }
 
-fn raw_layout(bytes: &[u8]) -> ParticleLayout {
+/// Where the numbers of raw triples are.
+///
+/// # Errors
+/// [`ParseError::Unsupported`] if the first ones cannot be positions.
+fn raw_layout(bytes: &[u8]) -> Result<ParticleLayout, ParseError> {
+    check_plausible(bytes)?;
     let first = ComponentStride {
         start: 0,
         stride: TRIPLE,
     };
     let scalar = (ScalarType::F32, Endian::Little);
     let axes = StridedColumn::interleaved("the positions", scalar, 3, first);
-    ParticleLayout::new(bytes.len() / TRIPLE, vec![axes], Vec::new())
+    Ok(ParticleLayout::new(
+        bytes.len() / TRIPLE,
+        vec![axes],
+        Vec::new(),
+    ))
+}
+
+/// Raw numbers that are looked at.
+const SAMPLE: usize = 1 << 14;
+
+/// Checks that the first numbers of `bytes` may be raw triples. Integers, double precision, or the other byte order
+/// look like coordinates both far smaller and far larger than any simulation has together.
+fn check_plausible(bytes: &[u8]) -> Result<(), ParseError> {
+    let (numbers, _) = bytes.as_chunks::<4>();
+    let sizes = numbers.iter().take(SAMPLE);
+    let sizes = sizes.map(|number| f32::from_le_bytes(*number).abs());
+    let sizes = sizes.filter(|size| *size > 0.0 && size.is_finite());
+    let (smallest, largest) = sizes.fold((f32::INFINITY, 0.0_f32), |(low, high), size| {
+        (low.min(size), high.max(size))
+    });
+    if smallest > 1e-20 || largest < 1e15 {
+        return Ok(());
+    }
+    let what = format!(
+        "not raw f32 triples, the only binary .xyz that is read: as such its coordinates would be between {smallest:e} \
+         and {largest:e}; write .vtk, .ply or .npy (of Plot3D grids, with ParaView)"
+    );
+    Err(ParseError::unsupported(what))
 }
 
 /// Offset of the text after a byte order mark.

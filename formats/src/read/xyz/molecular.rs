@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::comment;
+use super::{comment, foreign};
 use crate::names::{POSITION_PROPERTIES, SPECIES_PROPERTIES};
 use crate::read::Step;
 use crate::read::input::TextInput;
@@ -20,6 +20,7 @@ pub(super) fn steps(
     budget: MemoryBudget,
 ) -> Result<Vec<Step>, ParseError> {
     let mut steps = Vec::new();
+    let mut are_empty = true;
     while let Some(line) = text.line() {
         if line.is_blank() {
             continue;
@@ -29,11 +30,16 @@ pub(super) fn steps(
             Ok(_) => text.line().map(|comment| (number(comment), time(comment))),
             Err(_) => None,
         };
+        are_empty &= !count.as_ref().is_ok_and(|count| *count > 0);
         text.pass_lines(count.as_ref().map_or(usize::MAX, |count| *count));
         Step::push(&mut steps, at..text.at(), budget)?;
         if let (Some(step), Some(comment)) = (steps.last_mut(), comment) {
             (step.number, step.time) = comment;
         }
+    }
+    if are_empty && steps.len() > 1 {
+        let what = "counts of 0 particles and nothing else: not molecular text";
+        return Err(ParseError::malformed(0, what));
     }
     Ok(steps)
 }
@@ -58,6 +64,7 @@ pub(super) fn read(
     let (number, time) = (number(comment), time(comment));
     let cell = comment::cell(comment.text);
     let comment_at = comment.at;
+    let first_row = comment.text.to_vec();
     let properties = comment::value(comment.text, "Properties").map(<[u8]>::to_vec);
     let size = text.left_about();
     let blank = text.pass_blank_lines(count);
@@ -78,6 +85,7 @@ pub(super) fn read(
                 rows: most_rows(text.left_about(), fields.len()).min(count),
                 fields,
                 targets,
+                labels: None,
             };
             table.particles(text, most, budget)
         }
@@ -85,6 +93,11 @@ pub(super) fn read(
     };
     let found = blank + rows.lines;
     if found < count {
+        if found + 1 == count
+            && let Some(what) = foreign::without_comment(&first_row)
+        {
+            return Err(ParseError::unsupported(what));
+        }
         let what = format!("{count} particles expected, {found} lines follow");
         return Err(too_short(count_at, what));
     }
@@ -214,6 +227,7 @@ fn extended_columns(
     let mut targets = vec![TargetArray::positions()];
     let mut fields = Vec::new();
     let mut positioned = false;
+    let mut cells = first.map(text::words);
     let parts: Vec<&[u8]> = properties.split(|b| *b == b':').collect();
     let (triples, rest) = parts.as_chunks::<3>();
     budget.check((triples.len() * COLUMN) as u64, "its columns in memory are")?;
@@ -235,6 +249,10 @@ fn extended_columns(
             return Err(malformed(what));
         }
         let columns = if size > 0 { components } else { 0 };
+        let cell = cells.as_mut().and_then(Iterator::next);
+        if columns > 1 {
+            cells.as_mut().and_then(|cells| cells.nth(columns - 2));
+        }
         let need = (fields.len().saturating_add(columns))
             .saturating_mul(size_of::<Option<TargetComponent>>());
         budget.check(need as u64, "its columns in memory are")?;
@@ -245,7 +263,6 @@ fn extended_columns(
             positioned = true;
             Some(0)
         } else {
-            let cell = first.and_then(|first| text::words(first).nth(fields.len()));
             attribute(name, kind, components, cell).map(|attribute| {
                 targets.push(attribute);
                 targets.len() - 1

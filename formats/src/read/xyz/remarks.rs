@@ -1,15 +1,12 @@
 //! Remarks about molecular text: what is not in the particles.
 
 use super::molecular::{self, NAME};
-use super::{Lines, XyzVariant, comment, kind, text_start};
+use super::{Lines, comment, text_start};
 use crate::read::remarks::cell_remark;
 use crate::read::{category, text};
 
-/// See [`crate::read::remarks`].
+/// Remarks about molecular text that begins with `head`.
 pub(in crate::read) fn remarks(head: &[u8]) -> Vec<String> {
-    if !matches!(kind(head), Ok(XyzVariant::Molecular)) {
-        return Vec::new();
-    }
     let mut lines = Lines::new(head, text_start(head)..head.len());
     let count = lines
         .next()

@@ -258,6 +258,63 @@ fn faults_are_described() {
 }
 
 #[test]
+fn formats_without_a_comment_are_named() {
+    for (text, words) in [
+        (
+            "3\n1 2 3 -5 0 0 255\n4 5 6 7 1 1 1\n7 8 9 0 2 2 2\n",
+            "Leica",
+        ),
+        ("2\n1 2 3\n4 5 6 7\n", "Leica"),
+        ("2\n1 O 0 0 0 1 2\n2 H 1 0 0 2 1\n", "Tinker"),
+    ] {
+        let found = fault(text);
+        assert!(
+            found.contains(words) && !found.contains("cut short"),
+            "{found}"
+        );
+    }
+}
+
+#[test]
+fn text_of_zeros_has_no_particles() {
+    for text in ["0\n0\n0\n0\n", "0\n0\n0\n0\n0.5\n1 2\n"] {
+        assert!(fault(text).contains("counts of 0 particles"), "{text:?}");
+    }
+    assert!(only(b"0\n0\n").positions.is_empty());
+}
+
+#[test]
+fn binary_grids_are_not_taken_for_raw_triples() {
+    // A grid of 2 x 2 x 1 points in the other byte order, then in double precision
+    let big: Vec<u8> = [2_i32, 2, 1]
+        .into_iter()
+        .flat_map(i32::to_be_bytes)
+        .collect();
+    let coordinates = [
+        0.5_f32, -3.25, 100.0, 7.5, 0.1, -0.2, 3.0, 8.0, 4.5, 1e-3, 2e4, -9.75,
+    ];
+    let swapped = coordinates.into_iter().flat_map(f32::to_be_bytes);
+    let doubles = coordinates
+        .into_iter()
+        .flat_map(|c| (1.7 * f64::from(c)).to_le_bytes());
+    let little: Vec<u8> = coordinates.into_iter().flat_map(f32::to_le_bytes).collect();
+    for bytes in [
+        big.into_iter().chain(swapped).collect::<Vec<u8>>(),
+        doubles.collect(),
+    ] {
+        let error = read(&bytes, &Step::whole(bytes.len())).expect_err("implausible");
+        assert!(error.to_string().contains("not raw f32 triples"), "{error}");
+        assert!(FORMAT.reader().layout(&bytes).is_err());
+    }
+    assert_eq!(only(&little).positions.len(), 4);
+    let missing: Vec<u8> = [f32::NAN, f32::INFINITY, 3e37]
+        .into_iter()
+        .flat_map(f32::to_le_bytes)
+        .collect();
+    assert_eq!(only(&missing).positions.len(), 1);
+}
+
+#[test]
 fn huge_counts_allocate_nothing() {
     for count in ["99999999999", "9223372036854775807"] {
         let found = fault(&format!("{count}\n\nW 1 2 3\n"));

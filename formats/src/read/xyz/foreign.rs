@@ -1,0 +1,24 @@
+//! Other formats that begin with a count, but have no comment behind it.
+
+use crate::read::text;
+
+const POINT_CLOUD: &str = "a point cloud with a count and no comment (Leica .pts), which is not read; delete its first line: \
+                           columns 1 to 3 of the rest are the positions";
+const TINKER: &str = "a Tinker file, which is not read; write .xyz with Open Babel (`obabel -itxyz in.xyz -oxyz -O out.xyz`)";
+
+/// What a text is in whose second line, `row`, is one of the counted lines instead of a comment.
+pub(super) fn without_comment(row: &[u8]) -> Option<&'static str> {
+    let words: Vec<&[u8]> = text::words(row).take(8).collect();
+    let is_number = |word: &&[u8]| text::number(word).is_some();
+    match words.as_slice() {
+        [index, name, x, y, z, ..]
+            if text::integer(index) == Some(1)
+                && !is_number(name)
+                && [x, y, z].into_iter().all(is_number) =>
+        {
+            Some(TINKER)
+        }
+        [_, _, _, ..] if words.iter().all(is_number) => Some(POINT_CLOUD),
+        _ => None,
+    }
+}
