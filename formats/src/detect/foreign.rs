@@ -101,6 +101,10 @@ const MAGICS: &[(&[u8], &str)] = &[
         b"glTF",
         "a glTF file, which is not read; export the points as .ply",
     ),
+    (
+        b"LASF",
+        "a LAS or LAZ point cloud, which is not read; write .ply or .csv with PDAL (`pdal translate in.las out.ply`)",
+    ),
     (b"\xff\xfe", UTF16),
     (b"\xfe\xff", UTF16),
 ];
@@ -112,6 +116,13 @@ const DUALSPHYSICS: &str = "a DualSPHysics file of an older version, or without 
 const GADGET: &str = "a binary snapshot of Gadget, which is not read; write positions and attributes to .npz with pynbody \
                       or yt";
 const PDB: &str = "a PDB particle file, which is not read; convert to .bgeo with partio";
+/// What ADIOS2 writes, a file or a directory.
+pub(crate) const ADIOS: &str = "ADIOS2 data (.bp), which is not read; write HDF5 instead, or convert with `openpmd-pipe --infile in.bp \
+                                --outfile out.h5`";
+const TNG: &str =
+    "a GROMACS TNG trajectory, which is not read; write .xtc (`gmx trjconv -f in.tng -o out.xtc`)";
+const TPR: &str = "a GROMACS run input file (.tpr), which is not read; write .gro (`gmx editconf -f in.tpr -o out.gro`), which \
+                   can also be given with --topology";
 const UTF16: &str = "UTF-16 text, which is not read; save as UTF-8";
 const LAMMPS_BINARY: &str = "a LAMMPS binary dump without names of columns, which is not read; run `binary2txt` on it, or dump to a text file";
 const XDMF: &str = "an XDMF index, which keeps its data in other files; save as .vtu with ParaView";
@@ -128,6 +139,11 @@ pub(super) fn refuse(head: &[u8], path: &Path, shortest: usize) -> Result<(), Pa
         .or_else(|| by_structure(head))
         .or_else(|| is_lammps_binary(head, path).then_some(LAMMPS_BINARY))
         .or_else(|| is_dualsphysics(head, path).then_some(DUALSPHYSICS))
+        .or_else(|| {
+            path.extension()
+                .is_some_and(|end| end == "bp")
+                .then_some(ADIOS)
+        })
         .or_else(|| is_houdini_json(head).then_some(HOUDINI_JSON))
         .or_else(|| is_xdmf(head).then_some(XDMF));
     what.map_or(Ok(()), |what| Err(ParseError::unsupported(what)))
@@ -145,6 +161,8 @@ fn by_structure(head: &[u8]) -> Option<&'static str> {
         (at(0, b"RIFF") && at(8, b"WEBP"), IMAGE),
         (at(4, b"ftyp"), "a video or image, not a particle file"),
         (is_gadget, GADGET),
+        (at(40, b"GENERAL INFO\0"), TNG),
+        (at(8, b"VERSION "), TPR),
     ]
     .into_iter()
     .find_map(|(is_one, what)| is_one.then_some(what))

@@ -13,8 +13,9 @@ use crate::read::sniff::is_text;
 use crate::reader::{Confidence, HEAD_LEN};
 
 mod foreign;
+pub(crate) use foreign::ADIOS;
 pub(crate) mod hdf5;
-mod molecules;
+mod text;
 
 impl Format {
     /// The format of an uncompressed file that begins with `bytes` (all of it, or at least
@@ -67,7 +68,7 @@ fn refuse_foreign(head: &[u8], path: &Path, named: Option<Format>) -> Result<(),
         let what = "an HDF5 file, and this program was built without the feature `hdf5`";
         return Err(ParseError::unsupported(what));
     }
-    if let Some(what) = is_text(head).then(|| molecules::what(head)).flatten() {
+    if let Some(what) = is_text(head).then(|| text::what(head)).flatten() {
         return Err(ParseError::unsupported(what));
     }
     // Two or three bytes of raw floats may look like any short signature.
@@ -225,5 +226,14 @@ mod tests {
         refused("a.png", b"\x89PNG\r\n", "image");
         refused("a.exr", b"\x76\x2f\x31\x01", "image");
         refused("a.gz", b"\x1f\x8b\x08", "gzip inside gzip");
+        refused("a.laz", b"LASF\0\0\0\0", "pdal");
+        refused(
+            "a.tpr",
+            b"\0\0\0\x0d\0\0\0\x0cVERSION 5.1.2",
+            "gmx editconf",
+        );
+        let mut tng = vec![1; 40];
+        tng.extend(b"GENERAL INFO\0");
+        refused("a.tng", &tng, "gmx trjconv");
     }
 }

@@ -1,0 +1,370 @@
+//! Text formats that are known but not read, recognised by the structure of their first lines.
+
+use crate::read::psf;
+use crate::read::text::{integer, number, words};
+
+/// The first lines of a file.
+type Lines<'a> = [&'a [u8]];
+
+/// How a format is recognised, and what to do with its files.
+type TextFormat = (fn(&Lines<'_>) -> bool, &'static str);
+
+const FORMATS: &[TextFormat] = &[
+    (
+        is_lammps_data,
+        "a LAMMPS data file, which is the start of a simulation and is not read; write a dump from it \
+         (`write_dump all custom out.dump id type x y z`)",
+    ),
+    (
+        |lines| lines.first() == Some(&&b"---"[..]) && begins(lines, b"creator: LAMMPS"),
+        "a LAMMPS dump in YAML, which is not read; use `dump custom`",
+    ),
+    (
+        |lines| first(lines, psf::is_psf),
+        "a topology (PSF), which has no positions; give it with --topology beside a file with coordinates",
+    ),
+    (
+        |lines| first(lines, |line| line.starts_with(b"%VERSION")),
+        "an AMBER topology (prmtop), which is not read; write a PDB file from it (`cpptraj -p a.prmtop -y a.rst7 -x \
+         a.pdb`) and give that, or give it with --topology beside a trajectory",
+    ),
+    (
+        |lines| begins(lines, b"@<TRIPOS>"),
+        "a Tripos mol2 file, which is not read; write .pdb or .xyz with Open Babel (`obabel in.mol2 -O out.pdb`)",
+    ),
+    (
+        |lines| {
+            lines
+                .get(3)
+                .is_some_and(|line| line.ends_with(b"V2000") || line.ends_with(b"V3000"))
+        },
+        "an MDL file (.mol, .sdf), which is not read; write .pdb or .xyz with Open Babel (`obabel in.sdf -O out.pdb`)",
+    ),
+    (
+        |lines| {
+            begins(lines, b"# .PCD v") || (begins(lines, b"FIELDS ") && begins(lines, b"DATA "))
+        },
+        "a PCD point cloud, which is not read; write .ply (`pcl_pcd2ply in.pcd out.ply`, or Open3D)",
+    ),
+    (
+        is_poscar,
+        "a file of VASP (POSCAR, CONTCAR or XDATCAR), which is not read; write extended XYZ with ASE (`ase convert \
+         POSCAR out.extxyz`) or OVITO",
+    ),
+    (
+        is_tinker,
+        "a Tinker file, which is not read; write .xyz with Open Babel (`obabel -itxyz in.xyz -oxyz -O out.xyz`)",
+    ),
+    (
+        is_mdcrd,
+        "an AMBER trajectory in text (mdcrd), which is not read since it has no number of atoms; write NetCDF \
+         (`cpptraj -p a.prmtop -y a.mdcrd -x a.nc`)",
+    ),
+    (
+        is_charmm_card,
+        "a CHARMM coordinate file (.crd, .cor), which is not read; write .pdb or .dcd with CHARMM, VMD or MDAnalysis",
+    ),
+    (
+        |lines| lines.first() == Some(&&b"TITLE"[..]) && lines.contains(&&b"END"[..]),
+        "a GROMOS file, which is not read; write .gro, .pdb or .dcd with MDAnalysis or gromos++",
+    ),
+    (
+        |lines| begins(lines, b"Number of particles ="),
+        "an AtomEye configuration (.cfg), which is not read; write a LAMMPS dump or extended XYZ with OVITO",
+    ),
+    (
+        is_dl_poly,
+        "a DL_POLY file (CONFIG, REVCON or HISTORY), which is not read; write .xyz or .dcd with ASE, VMD or MDAnalysis",
+    ),
+    (
+        is_pqr,
+        "a PQR file, which is not read; write a table x,y,z,radius (.csv), or .pdb",
+    ),
+];
+
+/// The message for `head`, the beginning of a file, if that is one of the formats.
+pub(super) fn what(head: &[u8]) -> Option<&'static str> {
+    let lines: Vec<&[u8]> = head
+        .split(|b| *b == b'\n')
+        .map(|line| line.strip_suffix(b"\r").unwrap_or(line))
+        .collect();
+    let format = FORMATS.iter().find(|(is_one, _)| is_one(&lines));
+    format.map(|(_, what)| *what)
+}
+
+fn first(lines: &Lines<'_>, is_one: impl Fn(&[u8]) -> bool) -> bool {
+    lines.first().is_some_and(|line| is_one(line))
+}
+
+/// Whether a line begins with `start`.
+fn begins(lines: &Lines<'_>, start: &[u8]) -> bool {
+    lines.iter().any(|line| line.starts_with(start))
+}
+
+/// The line as numbers, if it has nothing else.
+fn numbers(line: Option<&&[u8]>) -> Option<Vec<f64>> {
+    words(line?).take(32).map(number).collect()
+}
+
+/// Whether a line has `count` numbers and nothing else.
+fn has_numbers(line: Option<&&[u8]>, count: usize) -> bool {
+    numbers(line).is_some_and(|numbers| numbers.len() == count)
+}
+
+/// Whether a line has integers and nothing else.
+fn has_integers(line: Option<&&[u8]>) -> bool {
+    let mut words = line.into_iter().flat_map(|line| words(line)).peekable();
+    words.peek().is_some() && words.all(|word| integer(word).is_some())
+}
+
+/// A title, counts as `12 atoms`, and the box as `0 1 xlo xhi` or counts of types.
+fn is_lammps_data(lines: &Lines<'_>) -> bool {
+    let signed = |line: &[u8]| line.starts_with(b"LAMMPS data file");
+    let (mut atoms, mut others) = (false, false);
+    // The first line is free text.
+    for line in lines.iter().skip(1) {
+        let code = line.split(|b| *b == b'#').next().unwrap_or_default();
+        let words: Vec<&[u8]> = words(code).take(5).collect();
+        match words.as_slice() {
+            [count, b"atoms"] => atoms |= is_count(count),
+            [count, b"atom", b"types"] => others |= is_count(count),
+            [_, _, b"xlo", b"xhi"] => others = true,
+            _ => {}
+        }
+    }
+    (atoms && others) || (first(lines, signed) && (atoms || others))
+}
+
+fn is_count(word: &[u8]) -> bool {
+    integer(word).is_some_and(|count| count >= 0)
+}
+
+/// A title, a scale, three edges, names of species (which older files lack), their counts, and how coordinates are
+/// meant.
+fn is_poscar(lines: &Lines<'_>) -> bool {
+    let has_edges = (2..5).all(|line| has_numbers(lines.get(line), 3));
+    let counts = [5, 6]
+        .into_iter()
+        .find(|line| has_integers(lines.get(*line)));
+    let mode = counts.and_then(|line| lines.get(line + 1)?.trim_ascii_start().first());
+    let is_mode = mode.is_some_and(|mode| b"cCkKdDsS".contains(mode));
+    has_numbers(lines.get(1), 1) && has_edges && is_mode
+}
+
+/// A count with a title behind it, perhaps a line of the box, then atoms: number, name, x, y, z, type.
+fn is_tinker(lines: &Lines<'_>) -> bool {
+    let is_heading = |line: &[u8]| {
+        let mut words = words(line);
+        words.next().is_some_and(is_count)
+            && words.next().is_some_and(|word| number(word).is_none())
+    };
+    let is_atom = |line: Option<&&[u8]>| {
+        let words: Vec<&[u8]> = line
+            .into_iter()
+            .flat_map(|line| words(line))
+            .take(6)
+            .collect();
+        let [index, name, place @ .., kind] = words.as_slice() else {
+            return false;
+        };
+        integer(index) == Some(1)
+            && number(name).is_none()
+            && place.len() == 3
+            && place.iter().all(|word| number(word).is_some())
+            && integer(kind).is_some()
+    };
+    let atom = if has_numbers(lines.get(1), 6) { 2 } else { 1 };
+    first(lines, is_heading) && is_atom(lines.get(atom))
+}
+
+/// A title that is no numbers, then numbers of eight columns, ten in each line (Fortran's 10F8.3). The last line may be
+/// cut, and so is that of each frame.
+fn is_mdcrd(lines: &Lines<'_>) -> bool {
+    const WIDTH: usize = 8;
+    let is_field = |field: &[u8]| {
+        field.len() == WIDTH && field.get(4) == Some(&b'.') && number(field.trim_ascii()).is_some()
+    };
+    let is_row = |line: &&[u8]| line.len() == 10 * WIDTH && line.chunks(WIDTH).all(is_field);
+    let title = numbers(lines.first());
+    let names_columns = first(lines, |line| {
+        line.starts_with(b"#") || crate::read::csv::finds_columns(line)
+    });
+    title.is_none_or(|numbers| numbers.is_empty())
+        && !names_columns
+        && lines.get(1).is_some_and(is_row)
+}
+
+/// Titles that begin with an asterisk, the number of atoms, then atoms: two numbers, two names, x, y, z.
+fn is_charmm_card(lines: &Lines<'_>) -> bool {
+    let is_title = |line: &&&[u8]| line.starts_with(b"*");
+    let titles = lines.iter().take_while(is_title).count();
+    let atom: Vec<&[u8]> = lines
+        .get(titles + 1)
+        .into_iter()
+        .flat_map(|line| words(line))
+        .take(5)
+        .collect();
+    let is_atom = matches!(*atom.as_slice(), [index, residue, _, name, x]
+        if is_count(index) && is_count(residue) && number(name).is_none() && number(x).is_some());
+    let count = lines.get(titles).and_then(|line| words(line).next());
+    titles > 0 && count.is_some_and(is_count) && is_atom
+}
+
+/// A title, two to five numbers, of which the first are codes, then `timestep`, or the edges of a cell and an atom: its
+/// name, perhaps its index, and its place.
+fn is_dl_poly(lines: &Lines<'_>) -> bool {
+    let kinds = numbers(lines.get(1)).unwrap_or_default();
+    let [content, boundary, rest @ ..] = kinds.as_slice() else {
+        return false;
+    };
+    let is_code = |code: f64, most: f64| code.fract() == 0.0 && (0.0..=most).contains(&code);
+    if rest.len() > 3 || !is_code(*content, 2.0) || !is_code(*boundary, 7.0) {
+        return false;
+    }
+    let has_edges = *boundary > 0.0;
+    let atom = if has_edges { 5 } else { 2 };
+    let edges = (2..atom).all(|line| has_numbers(lines.get(line), 3));
+    let name: Vec<&[u8]> = lines
+        .get(atom)
+        .into_iter()
+        .flat_map(|line| words(line))
+        .take(3)
+        .collect();
+    let is_name = match *name.as_slice() {
+        [name] => number(name).is_none(),
+        [name, index, ..] => number(name).is_none() && integer(index).is_some(),
+        [] => false,
+    };
+    let is_history = lines
+        .get(2)
+        .is_some_and(|line| line.starts_with(b"timestep "));
+    is_history || (edges && is_name && has_numbers(lines.get(atom + 1), 3))
+}
+
+/// Atoms as in PDB files, but in words, of which the last five are x, y, z, charge and radius.
+fn is_pqr(lines: &Lines<'_>) -> bool {
+    let is_atom = |line: &&&[u8]| line.starts_with(b"ATOM ") || line.starts_with(b"HETATM ");
+    let has_places = |line: &[u8]| {
+        let mut fields = [30, 38, 46]
+            .into_iter()
+            .map(|start| line.get(start..start + 8));
+        fields.all(|field| field.is_some_and(|field| number(field.trim_ascii()).is_some()))
+    };
+    let is_pqr_atom = |line: &[u8]| {
+        let words: Vec<&[u8]> = words(line).take(12).collect();
+        let real = words.iter().rev().take_while(|word| number(word).is_some());
+        matches!(words.len(), 10 | 11) && real.count() >= 5 && !has_places(line)
+    };
+    lines
+        .iter()
+        .find(is_atom)
+        .is_some_and(|line| is_pqr_atom(line))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::format::Format;
+
+    /// Whatever the name, the file is refused with `hint`.
+    #[track_caller]
+    fn suggests(text: &str, hint: &str) {
+        let crlf = text.replace('\n', "\r\n");
+        for text in [text, &crlf] {
+            for name in ["a", "a.xyz", "a.csv", "a.txt", "a.pdb"] {
+                let error = Format::detect(text.as_bytes(), Path::new(name)).expect_err("refused");
+                assert!(error.to_string().contains(hint), "{name}: {error}: {text}");
+            }
+        }
+    }
+
+    #[test]
+    fn formats_are_recognised_by_their_lines() {
+        suggests(
+            "LAMMPS data file via write_data, version 2 Aug 2023\n\n3 atoms\n1 atom types\n\n\
+             0 1 xlo xhi\n0 1 ylo yhi\n0 1 zlo zhi\n\nAtoms # atomic\n\n1 1 0 0 0\n",
+            "write_dump",
+        );
+        suggests(
+            "# made by hand\n\n  3  atoms # all\n-1 1.5 xlo xhi\n",
+            "LAMMPS data",
+        );
+        suggests("---\ncreator: LAMMPS\ntimestep: 0\n", "dump custom");
+        suggests("PSF CMAP\n\n 1 !NTITLE\n", "--topology beside");
+        suggests(
+            "%VERSION  VERSION_STAMP = V0001.000\n%FLAG TITLE\n",
+            "prmtop",
+        );
+        suggests("# a comment\n@<TRIPOS>MOLECULE\nSMALL\n", "obabel in.mol2");
+        suggests(
+            "name\n  program\n\n  1  0  0  0  0  0  0  0  0  0999 V2000\n    0.0000    0.0000    0.0000 C\n",
+            "MDL",
+        );
+        suggests(
+            "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nDATA ascii\n1 2 3\n4 5 6\n",
+            "PCD",
+        );
+        let cell = "4.0 0 0\n0 4.0 0\n0 0 4.0\n";
+        suggests(
+            &format!("Cr metal\n1.0\n{cell}Cr O\n1 1\nDirect\n0 0 0\n0.5 0.5 0.5\n"),
+            "VASP",
+        );
+        suggests(
+            &format!("Cr metal\n1.0\n{cell}2\nCartesian\n0 0 0\n0.5 0.5 0.5\n"),
+            "VASP",
+        );
+        suggests(
+            "  2  water\n  1  O  0.1 0.2 0.3  1  2\n  2  H  1.1 0.2 0.3  2  1\n",
+            "Tinker",
+        );
+        let row =
+            "   1.000  -2.500   3.000   4.000   5.000   6.000   7.000   8.000   9.000  10.000\n";
+        suggests(&format!("ACE\n{row}{row}   1.000\n"), "mdcrd");
+        suggests(&format!("\n{row}   1.000   2.000\n"), "mdcrd");
+        suggests(
+            "* a title\n*\n    1\n    1    1 TIP3 OH2    1.00000   2.00000   3.00000 W    1      0.00000\n",
+            "CHARMM",
+        );
+        suggests(
+            "TITLE\n water\nEND\nTIMESTEP\n 0 0.0\nEND\nPOSITIONRED\n 1 2 3\n",
+            "GROMOS",
+        );
+        suggests("Number of particles = 2\nA = 1.0 Angstrom\n", "AtomEye");
+        suggests(
+            &format!("a title\n  0  1  2\n{cell}Na 1\n 1 2 3\n"),
+            "DL_POLY",
+        );
+        suggests("a title\n 0 0 2 0.5\nNa\n 1 2 3\nCl\n 4 5 6\n", "DL_POLY");
+        suggests(
+            &format!("a title\n 0 1 2 3 26\ntimestep 1 2 0 1 0.001\n{cell}Na 1 22.9 1.0\n 1 2 3\n"),
+            "DL_POLY",
+        );
+        suggests("ATOM 1 N ALA 1 1.5 2.5 3.5 -0.3 1.85\n", "PQR");
+        let shifted = "ATOM      1  N   MET     1      26.017   13.289   84.371  0.1592 1.8240\n";
+        suggests(shifted, "PQR");
+    }
+
+    #[test]
+    fn particle_text_is_not_misrecognised() {
+        let row =
+            "   1.000  -2.500   3.000   4.000   5.000   6.000   7.000   8.000   9.000  10.000\n";
+        for text in [
+            "x,y,z\n0,1,2\n",
+            "3\n\nH 0 0 0\n",
+            "2\ncell\nO 0.1 0.2 0.3 1\nH 1 2 3 1\n",
+            "title\n3\n0 0 0\n",
+            "atoms\n3 atoms here\n",
+            "ATOM,x,y,z\n1,0,0,0\n",
+            "x y z a b c d e f g\n 1 2 3 4 5 6 7 8 9 10\n",
+            &format!("x y z a b c d e f g\n{row}"),
+            &format!("# ten columns\n{row}"),
+            &format!("{row}{row}"),
+            "ATOM      1  N   ALA A   1      11.104   6.134  -6.504  1.00  0.00           N\n",
+            "",
+        ] {
+            assert_eq!(what(text.as_bytes()), None, "{text}");
+        }
+    }
+}
