@@ -94,6 +94,12 @@ pub(crate) trait Reader: Sync {
         None
     }
 
+    /// Whether a step of a file that is read in pieces needs nothing of what is before it but `head`, the beginning of
+    /// the file.
+    fn reads_steps_alone(&self, _head: &[u8]) -> bool {
+        true
+    }
+
     /// Lists the time steps of a file. A truncated step is listed too, so that reading it gives the error.
     ///
     /// # Errors

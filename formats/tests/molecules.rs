@@ -644,3 +644,107 @@ fn frames_of_a_trajectory_have_the_properties_of_its_topology() {
         .expect_err("no file");
     assert!(matches!(error, SequenceError::Topology(_)), "{error}");
 }
+
+/// Text of `models` models of `atoms` atoms each: before all of them, before each, each atom, behind each.
+fn models(
+    head: &str,
+    (start, end): (impl Fn(usize) -> String, &str),
+    atom: impl Fn(usize, usize) -> String,
+) -> String {
+    let mut text = head.to_owned();
+    for model in 0..MODELS {
+        text += &start(model);
+        for index in 0..ATOMS {
+            text += &atom(model, index);
+        }
+        text += end;
+    }
+    text
+}
+
+const MODELS: usize = 20;
+const ATOMS: usize = 2000;
+
+/// Files that are larger than what is read as a whole.
+fn large_texts() -> [(&'static str, String); 5] {
+    let place = |model: usize, index: usize| (model + 1, index % 100, index / 100);
+    let pad = "#".repeat(30);
+    let cif = "data_A\n_cell.length_a 30\n_cell.length_b 40\n_cell.length_c 50\n_cell.angle_alpha 90\n\
+               _cell.angle_beta 90\n_cell.angle_gamma 90\nloop_\n_atom_site.group_PDB\n_atom_site.type_symbol\n\
+               _atom_site.Cartn_x\n_atom_site.Cartn_y\n_atom_site.Cartn_z\n_atom_site.note\n\
+               _atom_site.pdbx_PDB_model_num\n";
+    let cif = models(cif, (|_| String::new(), ""), |model, index| {
+        let (x, y, z) = place(model, index);
+        format!("ATOM C {x}.0 {y}.5 {z}.25 'a{pad}' {}\n", model + 1)
+    });
+    let cell = "CRYST1   30.000   40.000   50.000  90.00  90.00  90.00 P 1           1\n";
+    let pdb = models(
+        cell,
+        (|model| format!("MODEL     {:4}\n", model + 1), "ENDMDL\n"),
+        |model, index| {
+            let (x, y, z) = place(model, index);
+            format!(
+                "ATOM  {:5}  CA  ALA A   1    {x:4}.000{y:4}.000{z:4}.000  1.00  0.00           C\n",
+                index + 1
+            )
+        },
+    );
+    let start = |model| format!("t={model}.0\n{ATOMS}\n");
+    let gro = models(
+        "",
+        (start, "   9.00000   9.00000   9.00000\n"),
+        |model, index| {
+            let (x, y, z) = place(model, index);
+            format!(
+                "    1ALA     CA{:5}{x:4}.00000000{y:4}.00000000{z:4}.00000000\n",
+                index + 1
+            )
+        },
+    );
+    let xyz = models(
+        "",
+        (|model| format!("{ATOMS}\nTime={model}\n"), ""),
+        |model, index| {
+            let (x, y, z) = place(model, index);
+            format!("C {x} {y} {z} {pad}{pad}\n")
+        },
+    );
+    let start = |model| {
+        format!(
+            "ITEM: TIMESTEP\n{model}\nITEM: NUMBER OF ATOMS\n{ATOMS}\nITEM: BOX BOUNDS pp pp pp\n0 9\n0 9\n0 9\n\
+                 ITEM: ATOMS x y z note\n"
+        )
+    };
+    let lammps = models("", (start, ""), |model, index| {
+        let (x, y, z) = place(model, index);
+        format!("{x} {y} {z} a{pad}{pad}\n")
+    });
+    [
+        ("a.cif", cif),
+        ("a.pdb", pdb),
+        ("a.gro", gro),
+        ("a.xyz", xyz),
+        ("a.lammpstrj", lammps),
+    ]
+}
+
+#[test]
+fn steps_of_large_texts_are_read_in_any_order() {
+    let dir = tempfile::tempdir().expect("a directory");
+    for (name, text) in large_texts() {
+        assert!(text.len() > 2 << 20, "{name}: {}", text.len());
+        let path = dir.path().join(name);
+        fs::write(&path, &text).expect("writable");
+        let file = FrameFile::open(&path).expect("a good file");
+        assert_eq!(file.steps().len(), MODELS, "{name}");
+        assert!(file.bytes().len() < text.len(), "{name} is read in pieces");
+        for index in [0, 10, 19, 5, 6, 7, 15, 2, 2] {
+            let particles = file.read(index);
+            let particles = particles.unwrap_or_else(|error| panic!("{index}: {error}"));
+            assert_eq!(particles.positions.len(), ATOMS, "{name}: {index}");
+            let last = particles.positions.get(ATOMS - 1);
+            assert_eq!(last.x, (index + 1) as f64, "{name}");
+            assert_eq!(particles.cell.is_some(), name != "a.xyz", "{name}: {index}");
+        }
+    }
+}

@@ -98,7 +98,9 @@ impl StreamedFile {
         self.stamp.check(path)?;
         let parked = || self.parked.lock().unwrap_or_else(PoisonError::into_inner);
         let last = parked().take();
-        let can_reach = |source: &mut ByteSource<'_>| source.text().can_reach(step.start());
+        let is_alone = format.reader().reads_steps_alone(&self.head);
+        let can_reach =
+            |source: &mut ByteSource<'_>| is_alone && source.text().can_reach(step.start());
         let mut source = match last.and_then(|mut s| can_reach(&mut s).then_some(s)) {
             Some(source) => source,
             None => self.source(path, budget)?,

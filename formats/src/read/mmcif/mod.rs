@@ -4,6 +4,7 @@
 //! order, whatever the line breaks. Lengths are A. After the PDBx/mmCIF dictionary.
 
 use super::atoms::{self, AtomTable, ELEMENT, RESIDUE};
+use super::input::TextInput;
 use super::sniff::is_text;
 use super::text;
 use super::{ByteSource, CUT_SHORT, Step, remarks};
@@ -49,6 +50,11 @@ impl Reader for MmCif {
         Some(StreamUnit::Words)
     }
 
+    /// The names of the columns are before all steps.
+    fn reads_steps_alone(&self, head: &[u8]) -> bool {
+        AtomRows::find(&mut TextInput::whole(head), MemoryBudget::UNLIMITED).is_ok()
+    }
+
     /// One step for each model, whose atoms are one after another.
     fn steps(
         &self,
@@ -87,11 +93,17 @@ impl Reader for MmCif {
         budget: MemoryBudget,
     ) -> Result<RawParticles, ParseError> {
         let text = source.text();
-        let mut rows = AtomRows::find(text, budget)?;
+        let is_inside = text.at() > 0;
+        let mut rows = if is_inside {
+            AtomRows::find(&mut TextInput::whole(text.head()), budget)?
+        } else {
+            AtomRows::find(text, budget)?
+        };
         let range = step.byte_range().cloned().unwrap_or_default();
-        if range.start > text.at() {
+        if is_inside || range.start > text.at() {
             rows.go_to(text, range.start);
         }
+        text.end_at(range.end);
         let real = [("occupancy", 1), ("b_factor", 1)];
         let mut atoms = AtomTable::new(&[ELEMENT, RESIDUE], &real, budget);
         let mut model = None;
@@ -100,7 +112,10 @@ impl Reader for MmCif {
                 break;
             }
             let element = atoms::element(&row.symbol, &row.name, &row.residue_name);
-            let whole = [element, row.residue.unwrap_or_default()];
+            let whole = [
+                element,
+                row.residue.or(row.label_residue).unwrap_or_default(),
+            ];
             let real = [row.occupancy.unwrap_or(1.0), row.b_factor.unwrap_or(0.0)];
             atoms.push(row.position, &whole, &real)?;
         }

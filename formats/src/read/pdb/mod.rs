@@ -42,7 +42,7 @@ impl Reader for Pdb {
             .next()
             .is_some_and(|line| OPENINGS.iter().any(|name| line.text.starts_with(name)));
         let is_sure = head.starts_with(b"HEADER    ")
-            || lines.any(|line| is_atom(line) && coordinate(line, 30, 38).is_ok());
+            || lines.any(|line| is_atom(line) && position(line).is_ok());
         Ok(match opens {
             true if is_sure => Confidence::Signature,
             true => Confidence::IfNamed,
@@ -57,6 +57,11 @@ impl Reader for Pdb {
 
     fn stream_unit(&self, _head: &[u8]) -> Option<StreamUnit> {
         Some(StreamUnit::Words)
+    }
+
+    /// The cell may be before all models.
+    fn reads_steps_alone(&self, head: &[u8]) -> bool {
+        text::Lines::new(head, 0..head.len()).any(is_atom)
     }
 
     fn steps(
@@ -90,6 +95,15 @@ fn is_atom(line: Line<'_>) -> bool {
     line.text.starts_with(b"ATOM  ") || line.text.starts_with(b"HETATM")
 }
 
+/// The position of an atom.
+fn position(line: Line<'_>) -> Result<[f64; 3], ParseError> {
+    let mut position = [0.0; 3];
+    for (number, start) in position.iter_mut().zip([30, 38, 46]) {
+        *number = coordinate(line, start, start + 8)?;
+    }
+    Ok(position)
+}
+
 fn is_cell(line: Line<'_>) -> bool {
     line.text.starts_with(b"CRYST1")
 }
@@ -107,14 +121,23 @@ fn ends_model(line: Line<'_>) -> bool {
     matches!(line.text.trim_ascii_end(), b"END" | b"ENDMDL")
 }
 
-/// The models: parts of the file that have atoms, up to a record for their end or to the next model.
+/// The cell in the records of `head` before the first atom.
+fn header_cell(head: &[u8]) -> Option<SimulationCell> {
+    let records = text::Lines::new(head, 0..head.len()).take_while(|line| !is_atom(*line));
+    records.filter(|line| is_cell(*line)).last().and_then(cell)
+}
+
+/// The models: parts of the file that have atoms, up to a record for their end or to the next model. Records between
+/// two models are about the second one, but cells about the first one if that had none before its atoms.
 fn steps(text: &mut TextInput<'_>, budget: MemoryBudget) -> Result<Vec<Step>, ParseError> {
     let mut steps = Vec::new();
     let mut start = text.at();
     let (mut has_atoms, mut number) = (false, None);
+    let mut has_cell_first = false;
     loop {
         let at = text.at();
         let line = text.line();
+        let (is_cell, is_behind) = (line.is_some_and(is_cell), !has_atoms && !has_cell_first);
         let model = line.and_then(|line| line.text.strip_prefix(b"MODEL "));
         let next_number = model.and_then(|model| text::integer(model.trim_ascii()));
         let (is_model, is_file_end) = (model.is_some(), line.is_none());
@@ -128,6 +151,14 @@ fn steps(text: &mut TextInput<'_>, budget: MemoryBudget) -> Result<Vec<Step>, Pa
                 step.number = number;
             }
             (has_atoms, number, start) = (false, None, end);
+        }
+        match steps.last_mut() {
+            None => has_cell_first |= is_cell && !has_atoms,
+            Some(last) if is_cell && is_behind => {
+                start = text.at();
+                last.end_at(start);
+            }
+            Some(_) => {}
         }
         if is_model {
             number = next_number;
@@ -151,7 +182,11 @@ fn read(
 ) -> Result<RawParticles, ParseError> {
     let range = step.byte_range().cloned().unwrap_or_default();
     // What precedes the first model is about all of them. Atoms are not passed: text in pieces only goes forward.
-    let mut cell = None;
+    let mut cell = if text.at() > 0 {
+        header_cell(text.head())
+    } else {
+        None
+    };
     while text.at() < range.start {
         let Some(line) = text.peek_line().filter(|line| !is_atom(*line)) else {
             break;
@@ -172,10 +207,7 @@ fn read(
         if !is_atom(line) {
             continue;
         }
-        let mut position = [0.0; 3];
-        for (number, start) in position.iter_mut().zip([30, 38, 46]) {
-            *number = coordinate(line, start, start + 8)?;
-        }
+        let position = position(line)?;
         let [name, residue, symbol] =
             [(12, 16), (17, 21), (76, 78)].map(|(start, end)| field(line.text, start, end));
         let whole = [
