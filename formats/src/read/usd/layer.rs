@@ -156,6 +156,18 @@ impl Layer<'_> {
         }
     }
 
+    /// The type of the values of `property`, if that is not one of numbers.
+    pub(super) fn foreign_type(&self, property: &Property) -> Option<String> {
+        let samples = property.samples.as_ref();
+        let sample = samples.and_then(|samples| self.sample_value(samples, 0));
+        let mut values = [sample, property.default.clone()].into_iter().flatten();
+        values.find_map(|value| match (&value, &self.source) {
+            (Value::Binary(rep), Source::Binary(_)) => binary::CrateFile::foreign_type(*rep),
+            (Value::Text(value), Source::Text(file)) => file.foreign_type(value),
+            _ => None,
+        })
+    }
+
     /// The words of `value`, an array of tokens or a single one; none if it has other values.
     ///
     /// # Errors

@@ -89,6 +89,14 @@ fn part(
     }
     // Read positions
     let positions = numbers_at(layer, property, time, *budget)?;
+    if positions.is_none()
+        && let Some(type_name) = layer.foreign_type(property)
+    {
+        let path = layer.path(&chain);
+        let what =
+            format!("the positions of {path} have the unknown type {type_name}; use point3f[]");
+        return Err(ParseError::unsupported(what));
+    }
     let Some(mut positions) = positions.filter(|positions| positions.len() > 0) else {
         return Ok(None);
     };

@@ -43,6 +43,61 @@ fn refused(content: &str, words: &str) {
 const POINTS: &str = "def Points \"P\" { point3f[] points = [(1, 2, 3), (4, 5, 6)] }";
 
 #[test]
+fn older_names_of_types_read_alike() {
+    let with = |point: &str, vector: &str, color: &str, quaternion: &str, matrix: &str| {
+        let content = format!(
+            "def Points \"P\" {{ {point}[] points = [(1, 2, 3), (4, 5, 6)]\n {vector}[] velocities = [(1, 0, 0), (0, 1, 0)]\n \
+             {color}[] primvars:displayColor = [(1, 0.5, 0), (0, 0.25, 1)]\n {quaternion} primvars:turn = (1, 0, 0, 0)\n \
+             {matrix} xformOp:transform = ((1, 0, 0, 0), (0, 2, 0, 0), (0, 0, 1, 0), (5, 0, 0, 1))\n \
+             uniform token[] xformOpOrder = [\"xformOp:transform\"] }}"
+        );
+        text(&content).expect("known types")
+    };
+    let today = with("point3f", "vector3f", "color3f", "quath", "matrix4d");
+    assert_eq!(today[0].positions.len(), 2);
+    assert_eq!(today[0].attributes.len(), 3);
+    let older = with(
+        "PointFloat",
+        "VectorFloat",
+        "ColorFloat",
+        "Quath",
+        "Matrix4d",
+    );
+    assert_eq!(older, today);
+    let older = with("Point", "Vector", "Color", "Quatd", "Frame");
+    assert_eq!(
+        older,
+        with("point3d", "vector3d", "color3d", "quatd", "frame4d")
+    );
+    assert_eq!(
+        with("Vec3f", "Normal", "Vec3d", "Quatf", "Matrix4d")[0].positions,
+        today[0].positions
+    );
+}
+
+#[test]
+fn unknown_types_of_positions_and_transforms_are_refused() {
+    let points = "[(1, 2, 3), (4, 5, 6)]";
+    refused(
+        &format!("def Points \"P\" {{ Location[] points = {points} }}"),
+        "of /P have the unknown type \"Location[]\"",
+    );
+    refused(
+        &format!("def Points \"P\" {{ Location[] points.timeSamples = {{ 1: {points} }} }}"),
+        "unknown type",
+    );
+    let blocked = text("def Points \"P\" { Location[] points = None }").expect("no value");
+    assert_eq!(blocked[0].positions.len(), 0);
+    refused(
+        &format!(
+            "def Points \"P\" {{ point3f[] points = {points}\n Matrix xformOp:transform = ((1, 0), (0, 1))\n \
+             uniform token[] xformOpOrder = [\"xformOp:transform\"] }}"
+        ),
+        "unknown type",
+    );
+}
+
+#[test]
 fn whatever_byte_is_changed_there_is_no_panic() {
     for name in SAMPLES {
         let bytes = usd(name);

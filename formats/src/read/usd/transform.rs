@@ -106,7 +106,10 @@ fn operation(
         return Err(refused(name, "is a curve over time, which is not read"));
     }
     let Some(numbers) = numbers_at(layer, property, time, VALUE_BUDGET)? else {
-        return Ok(DAffine3::IDENTITY);
+        return match layer.foreign_type(property) {
+            Some(_) => Err(refused(name, "has a value of an unknown type")),
+            None => Ok(DAffine3::IDENTITY),
+        };
     };
     if numbers.is_quaternion && changes_around(layer, property, time)? {
         let why = "has no sample at the time of the positions, and rotations are not interpolated";

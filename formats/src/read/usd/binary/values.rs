@@ -12,6 +12,8 @@ const TOKEN_VECTOR: u8 = 41;
 const TIME_SAMPLES: u8 = 46;
 const DOUBLE: u8 = 9;
 const DOUBLE_VECTOR: u8 = 48;
+/// There is no value, although the prim may have had one.
+const BLOCK: u8 = 51;
 
 /// Shortest arrays that are compressed.
 const LEAST_COMPRESSED: usize = 16;
@@ -87,6 +89,12 @@ impl<'a> CrateFile<'a> {
     pub(in crate::read::usd) fn u64_at(&self, at: usize) -> u64 {
         let stored = self.bytes.get(at..).and_then(<[u8]>::first_chunk);
         stored.map_or(0, |stored| u64::from_le_bytes(*stored))
+    }
+
+    /// The code of the type of a value, if that is not one of numbers.
+    pub(in crate::read::usd) fn foreign_type(rep: ValueRep) -> Option<String> {
+        let is_foreign = rep.number_type().is_none() && rep.kind() != BLOCK;
+        is_foreign.then(|| format!("number {}", rep.kind()))
     }
 
     /// See [`crate::read::usd::layer::Layer::numbers`].

@@ -41,6 +41,14 @@ impl<'a> TextFile<'a> {
         tokens
     }
 
+    /// The type of a value, if that is not one of numbers.
+    pub(in crate::read::usd) fn foreign_type(&self, value: &TextValue) -> Option<String> {
+        let name = self.text(&value.type_name);
+        let is_blocked = self.text(&value.range) == b"None";
+        let is_known = number_type(name.strip_suffix(b"[]").unwrap_or(name)).is_some();
+        (!is_blocked && !is_known).then(|| shown(name))
+    }
+
     /// See [`crate::read::usd::layer::Layer::numbers`].
     pub(in crate::read::usd) fn numbers(
         &self,
@@ -172,8 +180,43 @@ fn integer<T: TryFrom<i128>>(word: &[u8]) -> Option<T> {
     T::try_from(number).ok()
 }
 
+/// Names of types that older files have, and those of today, as OpenUSD reads them.
+const ALIASES: [(&[u8], &[u8]); 27] = [
+    (b"Color", b"color3d"),
+    (b"ColorFloat", b"color3f"),
+    (b"Frame", b"frame4d"),
+    (b"Matrix2d", b"matrix2d"),
+    (b"Matrix3d", b"matrix3d"),
+    (b"Matrix4d", b"matrix4d"),
+    (b"Normal", b"normal3d"),
+    (b"NormalFloat", b"normal3f"),
+    (b"Point", b"point3d"),
+    (b"PointFloat", b"point3f"),
+    (b"Quatd", b"quatd"),
+    (b"Quatf", b"quatf"),
+    (b"Quath", b"quath"),
+    (b"Vec2d", b"double2"),
+    (b"Vec2f", b"float2"),
+    (b"Vec2h", b"half2"),
+    (b"Vec2i", b"int2"),
+    (b"Vec3d", b"double3"),
+    (b"Vec3f", b"float3"),
+    (b"Vec3h", b"half3"),
+    (b"Vec3i", b"int3"),
+    (b"Vec4d", b"double4"),
+    (b"Vec4f", b"float4"),
+    (b"Vec4h", b"half4"),
+    (b"Vec4i", b"int4"),
+    (b"Vector", b"vector3d"),
+    (b"VectorFloat", b"vector3f"),
+];
+
 /// The type of numbers called `name`; `None` for other types.
 fn number_type(name: &[u8]) -> Option<NumberType> {
+    let today = ALIASES.iter().find(|(alias, _)| *alias == name);
+    if let Some((_, today)) = today {
+        return number_type(today);
+    }
     const F32: Scalar = Scalar::Plain(ScalarType::F32);
     const F64: Scalar = Scalar::Plain(ScalarType::F64);
     let plain = |scalar| Some(NumberType::new(Scalar::Plain(scalar), 1));
@@ -185,7 +228,7 @@ fn number_type(name: &[u8]) -> Option<NumberType> {
         b"uint64" => return plain(ScalarType::U64),
         b"half" => return Some(NumberType::new(Scalar::Half, 1)),
         b"float" => return Some(NumberType::new(F32, 1)),
-        b"double" | b"timecode" => return Some(NumberType::new(F64, 1)),
+        b"double" | b"timecode" | b"duration" => return Some(NumberType::new(F64, 1)),
         b"matrix2d" => return None,
         b"matrix3d" => return Some(NumberType::new(F64, 9)),
         b"matrix4d" | b"frame4d" => return Some(NumberType::new(F64, 16)),
