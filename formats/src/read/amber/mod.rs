@@ -1,7 +1,8 @@
 //! AMBER trajectories and restart files: NetCDF classic files with the conventions `AMBER` and `AMBERRESTART`.
 //!
 //! `netcdf` reads the header of any classic file; here are the variables of the conventions, version 1.0. Lengths are A,
-//! velocities A/ps, times ps. Files of other conventions are rejected.
+//! velocities A/ps, times ps, unless the variables have other `units`: LAMMPS writes those of the run. Times are
+//! converted to ps. Files of other conventions are rejected.
 
 use super::columns::{ComponentStride, ParticleLayout, StridedColumn};
 use super::{ByteSource, CUT_SHORT, Step, remarks, text};
@@ -85,12 +86,9 @@ impl Reader for Amber {
     }
 
     fn remarks(&self, head: &[u8]) -> Vec<String> {
-        let mut remarks = vec![remarks::units(
-            "angstroms",
-            Some("angstroms/ps"),
-            Some("ps"),
-        )];
+        let mut remarks = Vec::new();
         if let Ok(trajectory) = Trajectory::parse(head) {
+            remarks.push(trajectory.units());
             let file = &trajectory.file;
             remarks.push(format!(
                 "{} file, NetCDF classic version {}, written by {}",
@@ -104,6 +102,26 @@ impl Reader for Amber {
         }
         remarks
     }
+}
+
+/// Units of time, by what their names begin with, and their lengths in ps.
+const TIMES: [(&str, f64); 7] = [
+    ("femtosecond", 1e-3),
+    ("picosecond", 1.0),
+    ("nanosecond", 1e3),
+    ("microsecond", 1e6),
+    ("millisecond", 1e9),
+    ("second", 1e12),
+    ("ps", 1.0),
+];
+
+/// The length of the unit of `time` in ps; `None` for units without a length, such as those of Lennard-Jones.
+fn picoseconds(time: &Variable) -> Option<f64> {
+    let units = String::from_utf8_lossy(&time.units).to_ascii_lowercase();
+    let known = TIMES.iter().find(|(name, _)| units.starts_with(name));
+    known
+        .map(|(_, len)| *len)
+        .or(units.is_empty().then_some(1.0))
 }
 
 /// The variables of a file with the conventions.
@@ -220,7 +238,33 @@ impl<'a> Trajectory<'a> {
             [] => time.begin,
             _ => self.file.outer_start(time, frame),
         };
-        self.file.real(time, at)
+        let factor = time.scale_factor.unwrap_or(1.0) * picoseconds(time).unwrap_or(1.0);
+        // A product with 1 is the same number
+        Some(self.file.real(time, at)? * factor)
+    }
+
+    /// The remark on units.
+    fn units(&self) -> String {
+        let units_of = |variable: &Variable, default: &str| {
+            let own = String::from_utf8_lossy(&variable.units).into_owned();
+            if own.is_empty() {
+                default.to_owned()
+            } else {
+                own
+            }
+        };
+        let velocities = self.velocities.as_ref();
+        let velocities = velocities.map(|velocities| units_of(velocities, "angstrom/picosecond"));
+        let times = self.time.as_ref().map(|time| {
+            let own = units_of(time, "picosecond");
+            match picoseconds(time) {
+                Some(1.0) => "ps".to_owned(),
+                Some(_) => format!("ps (the file has {own})"),
+                None => own,
+            }
+        });
+        let lengths = units_of(&self.coordinates, "angstrom");
+        remarks::units(&lengths, velocities.as_deref(), times.as_deref())
     }
 
     /// The cell of a frame: lengths, and angles in degrees.
@@ -241,7 +285,17 @@ impl<'a> Trajectory<'a> {
             }
             Some(numbers)
         };
-        SimulationCell::from_angles(triple("cell_lengths")?, triple("cell_angles")?)
+        let are_radians = self
+            .file
+            .variable("cell_angles")
+            .is_some_and(|angles| angles.units.starts_with(b"radian"));
+        let angles = triple("cell_angles")?;
+        let degrees = if are_radians {
+            angles.map(f64::to_degrees)
+        } else {
+            angles
+        };
+        SimulationCell::from_angles(triple("cell_lengths")?, degrees)
     }
 
     /// Multiplies by the factors of the variables, in the precision of the file.
@@ -280,3 +334,6 @@ fn scale_positions(positions: &mut Positions, factor: f64) {
         Positions::F64(v) => v.iter_mut().for_each(|p| *p *= factor),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -29,6 +29,8 @@ pub(super) struct Variable {
     pub(super) begin: usize,
     /// Attribute `scale_factor`.
     pub(super) scale_factor: Option<f64>,
+    /// Attribute `units`; empty if there is none.
+    pub(super) units: Vec<u8>,
     /// Offset of the entry in the header.
     pub(super) at: usize,
 }
@@ -318,7 +320,9 @@ impl<'a> HeaderReader<'a> {
                 })?;
                 shape.push(length);
             }
-            let (_, scale_factor) = self.attributes()?;
+            let (texts, scale_factor) = self.attributes()?;
+            let units = texts.iter().find(|(name, _)| *name == b"units");
+            let units = units.map_or(b"".as_slice(), |(_, units)| *units);
             let scalar = self.kind()?;
             // Too short for large variables, and known from the shape.
             self.numbers.take(if self.version == 5 { 8 } else { 4 })?;
@@ -333,6 +337,7 @@ impl<'a> HeaderReader<'a> {
                 scalar,
                 begin,
                 scale_factor,
+                units: units.trim_ascii_end().to_vec(),
                 at,
             });
         }
