@@ -147,6 +147,35 @@ fn dcd_files_have_cells_with_angles_or_cosines() {
     for cell in cells(dcd::FORMAT, &sample("molecules/x-plor.dcd")) {
         assert_eq!(cell, None);
     }
+    let has_remark = |bytes: &[u8]| {
+        let remarks = dcd::FORMAT.reader().remarks(bytes);
+        remarks
+            .iter()
+            .any(|remark| remark.contains("--cell draws it"))
+    };
+    assert!(has_remark(&bytes) && !has_remark(&replaced(&bytes, &old, &big_endian(&[0.0; 6]))));
+    // Symmetric matrices of newer versions of CHARMM. The last number of the header is the version, here 24
+    let newer = |numbers: [f64; 6]| {
+        let mut bytes = replaced(&bytes, &old, &big_endian(&numbers));
+        bytes[84..88].copy_from_slice(&36_i32.to_be_bytes());
+        (cells(dcd::FORMAT, &bytes)[0], has_remark(&bytes))
+    };
+    let matrix = [4.0, 0.5, 5.0, -0.25, 0.25, 6.0];
+    let rows = [[4.0, 0.5, -0.25], [0.5, 5.0, 0.25], [-0.25, 0.25, 6.0]];
+    assert_cell(newer(matrix).0, rows);
+    assert_ne!(with(matrix), newer(matrix).0);
+    // Without the version: as angles these are none
+    assert_cell(
+        with([4.0, 2.5, 5.0, -0.25, 0.75, 6.0]),
+        [[4.0, 2.5, -0.25], [2.5, 5.0, 0.75], [-0.25, 0.75, 6.0]],
+    );
+    assert_cell(
+        newer([300.0, 90.0, 250.0, 90.0, 90.0, 200.0]).0,
+        diagonal([300.0, 250.0, 200.0]),
+    );
+    assert_cell(newer([3.0, 120.0, 4.0, 90.0, 90.0, 5.0]).0, hexagonal);
+    assert_eq!(newer([f64::NAN; 6]), (None, false));
+    assert_eq!(newer([4.0, 100.0, 5.0, 300.0, -7.0, 6.0]), (None, false));
 }
 
 #[test]
@@ -294,5 +323,26 @@ fn gadget_snapshots_have_cells_by_the_size_of_their_box() {
     for size in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let bytes = replaced(&bytes, &10.0_f64.to_le_bytes(), &size.to_le_bytes());
         assert_eq!(read(&bytes), None, "{size}");
+    }
+}
+
+#[test]
+fn pdb_cells_behind_models_belong_to_the_model_before() {
+    let atom = "ATOM      1  N   ALA A   1     362.864 -78.459 936.442  1.00 16.50           N\n";
+    let model = |edge: f64| {
+        let cell =
+            format!("CRYST1{edge:9.3}{edge:9.3}{edge:9.3}  90.00  90.00  90.00 P 1           1\n");
+        (format!("MODEL        {edge}\n{atom}ENDMDL\n"), cell)
+    };
+    let (behind, before) = [2.0, 3.0, 4.0].map(model).into_iter().fold(
+        (String::new(), String::new()),
+        |(behind, before), (model, cell)| (behind + &model + &cell, before + &cell + &model),
+    );
+    for text in [behind, before] {
+        let found = cells(pdb::FORMAT, format!("{text}END\n").as_bytes());
+        assert_eq!(found.len(), 3);
+        for (cell, edge) in found.into_iter().zip([2.0, 3.0, 4.0]) {
+            assert_cell(cell, diagonal([edge; 3]));
+        }
     }
 }

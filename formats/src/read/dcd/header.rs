@@ -12,6 +12,8 @@ const FIRST_LEN: usize = 84;
 const TITLE_LEN: usize = 80;
 /// Bytes of the unit cell.
 pub(super) const CELL_LEN: usize = 48;
+/// The first version of CHARMM whose cells are symmetric matrices. Other programs write 24, or 0 as X-PLOR.
+const MATRIX_VERSION: i32 = 25;
 /// The unit of time of CHARMM, ps: where kcal/mol, A and atomic mass units have no factors.
 const AKMA: f64 = 0.048_888_21;
 
@@ -135,11 +137,40 @@ pub(super) struct DcdHeader {
     /// Where the first frame begins.
     pub(super) frames_at: usize,
     is_charmm: bool,
+    /// Version of CHARMM, or what other programs write for it.
+    version: i32,
     /// First time step, and steps between frames.
     first_step: i32,
     interval: i32,
     /// Length of a time step, AKMA.
     delta: f64,
+}
+
+/// The cell in a, gamma, b, beta, alpha, c: lengths, and angles in degrees or their cosines, as NAMD and CHARMM up to
+/// version 24 write them.
+fn cell_of_angles([a, gamma, b, beta, alpha, c]: [f64; 6]) -> Option<SimulationCell> {
+    let (lengths, angles) = ([a, b, c], [alpha, beta, gamma]);
+    if angles.iter().all(|angle| angle.abs() < 1.0) {
+        SimulationCell::from_cosines(lengths, angles)
+    } else {
+        SimulationCell::from_angles(lengths, angles)
+    }
+}
+
+/// The cell whose edges are the rows of a symmetric matrix, given by its lower half, as newer versions of CHARMM write
+/// it. None if the matrix is not one of a cell: those have no negative eigenvalues. Right angles in degrees may look like
+/// one.
+fn cell_of_matrix(half: [f64; 6]) -> Option<SimulationCell> {
+    let [xx, xy, yy, xz, yz, zz] = half;
+    if [xy, xz, yz] == [90.0; 3] {
+        return None;
+    }
+    let minor = xx * yy - xy * xy;
+    let determinant = zz * minor - yz * (xx * yz - xy * xz) + xz * (xy * yz - yy * xz);
+    let is_positive = xx > 0.0 && minor > 0.0 && determinant > 0.0;
+    is_positive
+        .then(|| SimulationCell::from_components([xx, xy, xz, xy, yy, yz, xz, yz, zz]))
+        .flatten()
 }
 
 impl DcdHeader {
@@ -159,7 +190,8 @@ impl DcdHeader {
         }
         let number =
             |index: usize| NumberReader::new(bytes, first + 4 + 4 * index, records.endian).i32();
-        let is_charmm = number(19)? != 0;
+        let version = number(19)?;
+        let is_charmm = version != 0;
         let mut delta = NumberReader::new(bytes, first + 4 + 4 * 9, records.endian);
         let delta = match is_charmm {
             true => delta.f32()?.into(),
@@ -191,6 +223,7 @@ impl DcdHeader {
             free,
             frames_at: records.at,
             is_charmm,
+            version,
             first_step,
             interval,
             delta,
@@ -219,8 +252,7 @@ impl DcdHeader {
         axes.saturating_mul(axis).saturating_add(cell)
     }
 
-    /// The cell of the frame at byte `at`. The record has a, gamma, b, beta, alpha, c: lengths, and angles in degrees, or
-    /// their cosines, as CHARMM and NAMD write them. None if the numbers are no cell.
+    /// The cell of the frame at byte `at`. None if the numbers are no cell.
     pub(super) fn cell(&self, bytes: &[u8], at: usize) -> Option<SimulationCell> {
         let mut records = Records { at, ..self.records };
         if !self.has_cell {
@@ -232,12 +264,18 @@ impl DcdHeader {
         for number in &mut all {
             *number = numbers.f64().ok()?;
         }
-        let [a, gamma, b, beta, alpha, c] = all;
-        let (lengths, angles) = ([a, b, c], [alpha, beta, gamma]);
-        match angles.iter().all(|angle| angle.abs() < 1.0) {
-            true => SimulationCell::from_cosines(lengths, angles),
-            false => SimulationCell::from_angles(lengths, angles),
+        let by_angles = || cell_of_angles(all);
+        if self.version >= MATRIX_VERSION {
+            cell_of_matrix(all).or_else(by_angles)
+        } else {
+            by_angles().or_else(|| cell_of_matrix(all))
         }
+    }
+
+    /// Whether frames have a cell, by the first one if that is among `bytes`, the beginning of the file.
+    pub(super) fn shows_cell(&self, bytes: &[u8]) -> bool {
+        let is_there = bytes.len() >= self.frames_at + self.records.whole_len(CELL_LEN);
+        self.has_cell && (!is_there || self.cell(bytes, self.frames_at).is_some())
     }
 
     /// The time step of frame `index`.

@@ -123,7 +123,7 @@ impl Reader for Dcd {
         let mut remarks = vec![remarks::units("angstroms", None, Some("ps"))];
         if let Ok(header) = DcdHeader::parse(head) {
             remarks.extend(header.remarks());
-            remarks.extend(header.has_cell.then(|| remarks::cell_remark(None)));
+            remarks.extend(header.shows_cell(head).then(|| remarks::cell_remark(None)));
         }
         remarks
     }
