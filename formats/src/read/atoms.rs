@@ -98,6 +98,18 @@ pub(super) fn field(line: &[u8], first: usize, end: usize) -> &[u8] {
     line.get(first..end).unwrap_or_default().trim_ascii()
 }
 
+/// The number of a residue, without the code of an insertion behind it (`52A`); 0 without a number.
+pub(super) fn residue(field: &[u8]) -> i64 {
+    let is_digit =
+        |(index, byte): (usize, &u8)| byte.is_ascii_digit() || (index == 0 && *byte == b'-');
+    let len = field
+        .iter()
+        .enumerate()
+        .take_while(|place| is_digit(*place))
+        .count();
+    text::integer(field.get(..len).unwrap_or_default()).unwrap_or_default()
+}
+
 /// [`field`] as a coordinate.
 ///
 /// # Errors
@@ -123,6 +135,15 @@ const ION_NAMES: [(&[u8], &[u8]); 5] = [
     (b"CES", b"Cs"),
 ];
 
+/// The number of sites that are no atoms.
+const NO_ELEMENT: i64 = 0;
+
+/// Letters in the names of such sites: charges of water models, lone pairs, masses of rigid groups, dummies.
+const SITES: [&[u8]; 13] = [
+    b"M", b"MW", b"EP", b"EPW", b"LP", b"LPA", b"LPB", b"VS", b"DUM", b"DU", b"MCH", b"MNH",
+    b"MTRP",
+];
+
 /// Symbols of two letters that names of atoms begin with. Others are names such as `CA`, which is the carbon alpha,
 /// except for ions.
 const LONG_SYMBOLS: [&[u8; 2]; 14] = [
@@ -134,9 +155,16 @@ const LONG_SYMBOLS: [&[u8; 2]; 14] = [
 /// residue.
 pub(super) fn element(symbol: &[u8], name: &[u8], residue: &[u8]) -> i64 {
     if symbol.first().is_some_and(u8::is_ascii_alphabetic) {
-        return category::code(letters(symbol));
+        return match letters(symbol) {
+            b"X" => NO_ELEMENT,
+            site if is_any(site, &SITES) => NO_ELEMENT,
+            symbol => category::code(symbol),
+        };
     }
     let prefix = letters(name);
+    if is_any(prefix, &SITES) {
+        return NO_ELEMENT;
+    }
     let ion = ION_NAMES
         .iter()
         .find(|(ion, _)| prefix.eq_ignore_ascii_case(ion));
@@ -152,10 +180,16 @@ pub(super) fn element(symbol: &[u8], name: &[u8], residue: &[u8]) -> i64 {
         return category::code(first_two);
     }
     let short = prefix.get(..1).unwrap_or_default();
+    // Isotopes of hydrogen are seldom meant by the first letter of a name
     match category::code(short) {
-        number if !short.is_empty() && category::is_element(number) => number,
+        number if category::is_element(number) && !category::is_isotope(short) => number,
         _ => category::code(name),
     }
+}
+
+/// Whether `name` is one of `names`, in whatever case.
+fn is_any(name: &[u8], names: &[&[u8]]) -> bool {
+    names.iter().any(|known| name.eq_ignore_ascii_case(known))
 }
 
 /// The letters at the start of a name, after digits.
@@ -194,9 +228,41 @@ mod tests {
         }
         assert_eq!(element(b"ZN", b"C1", b"X"), 30);
         assert_eq!(element(b"O1-", b"C1", b"X"), 8);
-        assert!(element(b"", b"MW", b"SOL") >= 1000);
+        for name in ["MW", "M", "EP1", "EPW", "LP2", "DUM", "mw4"] {
+            assert_eq!(element(b"", name.as_bytes(), b"SOL"), 0, "{name}");
+        }
+        for (symbol, number) in [
+            ("D", 1),
+            ("T", 1),
+            ("X", 0),
+            ("LP", 0),
+            ("MG", 12),
+            ("M", 0),
+        ] {
+            assert_eq!(
+                element(symbol.as_bytes(), b"CA", b"ALA"),
+                number,
+                "{symbol}"
+            );
+        }
+        assert!(element(b"", b"T3", b"") >= 1000);
         assert!(element(b"", b"7", b"") >= 1000);
         assert!(element(b"", b"", b"") >= 1000);
+    }
+
+    #[test]
+    fn residues_may_have_codes_of_insertions() {
+        for (field, number) in [
+            ("52A", 52),
+            ("52", 52),
+            ("-5B", -5),
+            ("A", 0),
+            ("", 0),
+            ("1H2", 1),
+            ("5-6", 5),
+        ] {
+            assert_eq!(residue(field.as_bytes()), number, "{field}");
+        }
     }
 
     #[test]

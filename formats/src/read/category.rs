@@ -67,8 +67,16 @@ const fn letter(byte: u8) -> usize {
     (byte.to_ascii_lowercase() - b'a') as usize
 }
 
-/// The number of `name`.
+/// Whether `name` is the symbol of deuterium or tritium.
+pub(in crate::read) fn is_isotope(name: &[u8]) -> bool {
+    matches!(name, b"D" | b"T")
+}
+
+/// The number of `name`. Isotopes of hydrogen are hydrogen.
 pub(in crate::read) fn code(name: &[u8]) -> i64 {
+    if is_isotope(name) {
+        return 1;
+    }
     let element = place(name).and_then(|place| NUMBERS.get(place));
     match element {
         Some(0) | None => i64::from(FIRST_OTHER + fnv1a(name) % OTHERS),
@@ -119,6 +127,8 @@ mod tests {
             ("CU", 29),
             ("u", 92),
             ("Og", 118),
+            ("D", 1),
+            ("T", 1),
         ] {
             assert_eq!(code(symbol.as_bytes()), number, "{symbol}");
         }

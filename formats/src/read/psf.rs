@@ -1,7 +1,7 @@
 //! PSF files of CHARMM and X-PLOR: the properties of the atoms of a simulation, without positions.
 //!
-//! Text. The first line begins with `PSF`. Behind a count and `!NATOM` is a line for each atom: number, segment,
-//! residue, name of the residue, name, type, charge, mass. Behind a count and `!NBOND` are the numbers of the atoms of
+//! Text. The first line begins with `PSF`. Behind a count and `!NATOM` is a line for each atom: number, segment (which
+//! may be missing), residue, name of the residue, name, type, charge, mass. Behind a count and `!NBOND` are the numbers of the atoms of
 //! each bond, from 1. Nothing else of it is read. After the manual of CHARMM.
 
 use super::atoms::{self, ELEMENT, RESIDUE};
@@ -48,10 +48,11 @@ pub(crate) fn read(
         let words: Vec<&[u8]> = line
             .map(|line| text::words(line.text).take(8).collect())
             .unwrap_or_default();
-        let numbers = match *words.as_slice() {
-            [_, _, residue, residue_name, name, _, charge, mass] => {
+        let fields = words.get(if has_segment(&words) { 2 } else { 1 }..);
+        let numbers = match fields {
+            Some([residue, residue_name, name, _, charge, mass, ..]) => {
                 elements.push(code(atoms::element(b"", name, residue_name)));
-                residues.push(code(text::integer(residue).unwrap_or_default()));
+                residues.push(code(atoms::residue(residue)));
                 text::number(charge).zip(text::number(mass))
             }
             _ => None,
@@ -80,6 +81,16 @@ pub(crate) fn read(
         attribute("mass", AttributeData::F64(masses)),
     ];
     Ok((count, attributes, bonds(&mut lines, count, budget)?))
+}
+
+/// Whether the `words` of an atom have a segment. Without one, charge and mass come one word earlier, and an integer
+/// follows them.
+fn has_segment(words: &[&[u8]]) -> bool {
+    let is_real = |word: &[u8]| word.contains(&b'.') && text::number(word).is_some();
+    let [.., charge, mass, fixed] = words else {
+        return true;
+    };
+    !(words.len() == 8 && is_real(charge) && is_real(mass) && text::integer(fixed).is_some())
 }
 
 /// Reads the bonds of `atoms` atoms from the `lines` behind these; there need not be any.
@@ -164,6 +175,21 @@ mod tests {
         assert_eq!(data(1), &AttributeData::I32(vec![7, 7]));
         assert_eq!(data(2), &AttributeData::F64(vec![-0.834, 0.417]));
         assert_eq!(data(3), &AttributeData::F64(vec![15.9994, 1.008]));
+    }
+
+    #[test]
+    fn segments_may_be_missing_and_residues_have_letters() {
+        let data = |text: &str| read(text.as_bytes(), MemoryBudget::UNLIMITED).unwrap().1;
+        let whole = data(TEXT);
+        assert_eq!(data(&TEXT.replace(" SYS ", " ")), whole);
+        assert_eq!(data(&TEXT.replace(" 7 SOL", " 7A SOL")), whole);
+        // Types may be numbers, and more numbers may follow
+        let numbers = TEXT.replace(
+            "OT -0.834 15.9994 0",
+            "2 -0.834 15.9994 0 0.00000 -0.301140E-02",
+        );
+        assert_eq!(data(&numbers), whole);
+        assert_eq!(data(&numbers.replace(" SYS ", " ")), whole);
     }
 
     #[test]
