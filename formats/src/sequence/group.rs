@@ -4,7 +4,8 @@
 //! number that differs between all files; a second one that varies along (a particle count) is
 //! ignored. If no number does, but two vary (`Fluid_<object>_<frame>`), the last is the frame and
 //! the others split the run. Runs that share at least half of the frame numbers of the smaller
-//! one are *parts* of one group (`Fluid_7` with `Oil_7`); others are another sequence.
+//! one are *parts* of one group (`Fluid_7` with `Oil_7`); others are another sequence. A run of one frame beside one of
+//! several, as the initial state of a case, is a part only if users ask for it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -19,6 +20,17 @@ pub(super) struct FileGroup {
     pub files: Vec<GroupFile>,
     /// One name for each part.
     pub parts: Vec<String>,
+    /// Parts that occur in one step of several; `None` if there are none.
+    pub lone: Option<LoneParts>,
+}
+
+/// Parts that are left out unless users name them.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct LoneParts {
+    /// Their indices.
+    pub parts: BTreeSet<u32>,
+    /// Names of the other parts, which are those of a group without them.
+    pub others: Vec<String>,
 }
 
 /// One file and what its name says about its position in the sequence.
@@ -62,6 +74,8 @@ impl NameSeries {
 #[derive(Debug, Default)]
 struct SequenceCandidate {
     runs: Vec<NameSeries>,
+    /// Runs of one frame beside those of several.
+    lone: Vec<NameSeries>,
     numbers: BTreeSet<i64>,
 }
 
@@ -127,7 +141,20 @@ pub(super) fn pick(
             counted(&other)
         ));
     }
-    into_group(candidates.swap_remove(0))
+    let group = into_group(candidates.swap_remove(0))?;
+    for part in group.lone.iter().flat_map(|lone| &lone.parts) {
+        let name = group.parts.get(*part as usize);
+        let file = group.files.iter().find(|file| file.part == *part);
+        let file = file
+            .and_then(|file| file.path.file_name())
+            .unwrap_or_default();
+        notes.push(format!(
+            "`{}` is left out, since no other step has a file of this name; --parts {} draws its particles",
+            file.to_string_lossy(),
+            name.map_or("", String::as_str)
+        ));
+    }
+    Ok(group)
 }
 
 /// The sequence that listed files make: parts if they share frame numbers, else by number, else
@@ -138,6 +165,9 @@ pub(super) fn listed(
 ) -> Result<FileGroup, SequenceError> {
     let order: Vec<PathBuf> = names.iter().map(|n| n.path.clone()).collect();
     let mut candidates = candidates(names);
+    for candidate in &mut candidates {
+        candidate.runs.append(&mut candidate.lone);
+    }
     if candidates.len() == 1 && (order.len() == 1 || !candidates[0].numbers.is_empty()) {
         return into_group(candidates.swap_remove(0));
     }
@@ -169,6 +199,7 @@ pub(super) fn listed(
     Ok(FileGroup {
         files: files.collect(),
         parts: vec![String::new()],
+        lone: None,
     })
 }
 
@@ -228,8 +259,13 @@ fn candidates(names: Vec<FileName>) -> Vec<SequenceCandidate> {
             homes.entry(*number).or_default().insert(home);
         }
         let candidate = &mut candidates[home];
+        let is_lone = numbers.len() == 1 && candidate.numbers.len() > 1;
         candidate.numbers.extend(numbers);
-        candidate.runs.push(run);
+        if is_lone {
+            candidate.lone.push(run);
+        } else {
+            candidate.runs.push(run);
+        }
     }
     candidates
 }
@@ -271,11 +307,17 @@ fn runs(names: Vec<FileName>) -> Vec<NameSeries> {
 }
 
 fn into_group(candidate: SequenceCandidate) -> Result<FileGroup, SequenceError> {
-    let mut runs = candidate.runs;
-    runs.sort_by_cached_key(NameSeries::pattern);
-    let patterns: Vec<String> = runs.iter().map(NameSeries::pattern).collect();
+    let mut others: Vec<String> = candidate.runs.iter().map(NameSeries::pattern).collect();
+    others.sort();
+    let lone = candidate.lone.into_iter().map(|run| (run, true));
+    let runs = candidate.runs.into_iter().map(|run| (run, false));
+    let mut runs: Vec<(NameSeries, bool)> = runs.chain(lone).collect();
+    runs.sort_by_cached_key(|(run, _)| run.pattern());
+    let patterns: Vec<String> = runs.iter().map(|(run, _)| run.pattern()).collect();
+    let lone = (0..).zip(&runs).filter(|(_, (_, is_lone))| *is_lone);
+    let lone: BTreeSet<u32> = lone.map(|(part, _)| part).collect();
     let mut files: Vec<GroupFile> = Vec::new();
-    for (part, run) in (0..).zip(&runs) {
+    for (part, (run, _)) in (0..).zip(&runs) {
         files.extend(run.names.iter().map(|name| GroupFile {
             path: name.path.clone(),
             part,
@@ -303,6 +345,10 @@ fn into_group(candidate: SequenceCandidate) -> Result<FileGroup, SequenceError> 
     Ok(FileGroup {
         files,
         parts: part_names(&patterns),
+        lone: (!lone.is_empty()).then(|| LoneParts {
+            parts: lone,
+            others: part_names(&others),
+        }),
     })
 }
 

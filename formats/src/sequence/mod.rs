@@ -14,6 +14,7 @@ use crate::compression::is_compressed;
 use crate::detect::Format;
 use crate::native::layout::UP_Y;
 use crate::native::{self, Access, MappedFile, NativeFile};
+use crate::order::index_u32;
 use crate::{MemoryBudget, PeriodicImages};
 
 mod collection;
@@ -115,6 +116,8 @@ pub struct Sequence {
     lists: Option<ListedFiles>,
     topology: Option<Topology>,
     images: PeriodicImages,
+    /// Frames and names of all parts, if some are left out unless they are named.
+    all_parts: Option<(Vec<SequenceFrame>, Vec<String>)>,
 }
 
 impl Sequence {
@@ -182,27 +185,37 @@ impl Sequence {
             lists: Some(expansion.lists),
             topology: None,
             images: PeriodicImages::default(),
+            all_parts: None,
         }
     }
 
     fn from_group(group: FileGroup, mut notes: Vec<String>, budget: MemoryBudget) -> Self {
         let (numbered, last) = scan::number_steps(group.files, budget, &mut notes);
-        let frames = frames_of(numbered);
+        let all = frames_of(numbered);
+        let (frames, parts, all_parts) = match group.lone {
+            None => (all, group.parts, None),
+            Some(lone) => (
+                without_parts(&all, &lone.parts),
+                lone.others,
+                Some((all, group.parts)),
+            ),
+        };
         note_gaps(&frames, &mut notes);
-        note_missing_parts(&frames, &group.parts, &mut notes);
+        note_missing_parts(&frames, &parts, &mut notes);
         let cache = last.filter(|f| f.steps().len() > 1).map(|file| CachedFile {
             stamp: stamp(file.path()),
             file: Arc::new(file),
         });
         Self {
             frames,
-            parts: group.parts,
+            parts,
             notes,
             cache: Mutex::new(cache),
             budget,
             lists: None,
             topology: None,
             images: PeriodicImages::default(),
+            all_parts,
         }
     }
 
@@ -268,6 +281,9 @@ impl Sequence {
     /// # Errors
     /// The first name that matches no part.
     pub fn keep_parts(&mut self, names: &[String]) -> Result<(), SequenceError> {
+        if let Some((frames, parts)) = self.all_parts.take() {
+            (self.frames, self.parts) = (frames, parts);
+        }
         let mut meant = BTreeSet::new();
         for name in names {
             let found = parts_meant(&self.parts, name);
@@ -367,6 +383,19 @@ fn frames_of(steps: Vec<NumberedStep>) -> Vec<SequenceFrame> {
     frames
         .map(|(number, parts)| SequenceFrame { number, parts })
         .collect()
+}
+
+/// The `frames` without some parts; the others are numbered anew.
+fn without_parts(frames: &[SequenceFrame], parts: &BTreeSet<u32>) -> Vec<SequenceFrame> {
+    let mut frames = frames.to_vec();
+    for frame in &mut frames {
+        frame.parts.retain(|file| !parts.contains(&file.part));
+        for file in &mut frame.parts {
+            file.part -= index_u32(parts.range(..file.part).count());
+        }
+    }
+    frames.retain(|frame| !frame.parts.is_empty());
+    frames
 }
 
 /// Indices of the `parts` that match `name`, see [`Sequence::keep_parts`].

@@ -10,7 +10,7 @@ use super::name::FileName;
 use super::pattern::Pattern;
 use super::{NumberedStep, PartFile, SequenceError};
 use crate::MemoryBudget;
-use crate::detect::Format;
+use crate::detect::{ADIOS, Format};
 use crate::open::{FrameFile, detect_file};
 use crate::read::Step;
 
@@ -36,12 +36,23 @@ pub(super) fn directory(path: &Path) -> Result<Vec<FileName>, SequenceError> {
         }
     }
     if names.is_empty() {
+        let refusal = is_adios(&files).then(|| ADIOS.to_owned()).or(refusal);
         return Err(SequenceError::NoFrames {
             path: path.to_owned(),
             found: refusal.unwrap_or_else(|| what_is_there(path, &files)),
         });
     }
     Ok(names)
+}
+
+/// Whether `files` are those of a directory that ADIOS2 writes.
+fn is_adios(files: &[PathBuf]) -> bool {
+    let has = |name: &str| {
+        files
+            .iter()
+            .any(|file| file.file_name().is_some_and(|n| n == name))
+    };
+    has("md.idx") && has("data.0")
 }
 
 /// The lists of files in a directory without particle files: the only one with times, else all.

@@ -211,6 +211,55 @@ fn write_frame(path: &Path, positions: Vec<Vec3>, step: i64) {
 }
 
 #[test]
+fn directories_of_adios_are_named() {
+    let dir = Dir::with(&owned(&["data.0", "md.0", "md.idx", "mmd.0"]));
+    let error = dir.error(".");
+    assert!(
+        error.contains("ADIOS2 data (.bp)") && error.contains("openpmd-pipe"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_part_of_one_step_is_drawn_if_it_is_named() {
+    let mut names = series(3, |i| format!("Fluid_{i}.csv"));
+    names.push("Case1.csv".into());
+    let dir = Dir::with(&[]);
+    for name in &names {
+        fs::write(dir.path(name), "x,y,z\n1,2,3\n").expect("writable");
+    }
+    let mut sequence = dir.open(".").expect("a sequence");
+    let count = |sequence: &Sequence| sequence.load(0, DVec3::ZERO).expect("a frame").len();
+    assert_eq!(
+        (sequence.part_names(), count(&sequence)),
+        (&owned(&[""])[..], 1)
+    );
+    assert!(
+        sequence.notes()[0].contains("--parts Case"),
+        "{:?}",
+        sequence.notes()
+    );
+    assert!(sequence.lone_file(1).is_some());
+    sequence
+        .keep_parts(&owned(&["Case", "Fluid"]))
+        .expect("both");
+    assert_eq!((sequence.frames().len(), count(&sequence)), (3, 2));
+    let mut sequence = dir.open(".").expect("a sequence");
+    sequence.keep_parts(&owned(&["Case"])).expect("the part");
+    assert_eq!((sequence.frames().len(), count(&sequence)), (1, 1));
+    let error = dir
+        .open(".")
+        .expect("a sequence")
+        .keep_parts(&owned(&["Oil"]));
+    assert!(
+        error
+            .expect_err("no part")
+            .to_string()
+            .contains("Case, Fluid")
+    );
+}
+
+#[test]
 fn frames_are_loaded_and_parts_merged() {
     let dir = Dir::with(&[]);
     for i in [1u8, 2, 10] {

@@ -91,6 +91,27 @@ fn objects_of_one_model_become_parts() {
 }
 
 #[test]
+fn a_name_of_one_step_is_left_out_of_several() {
+    for count in [2, 3, 20] {
+        let mut files: Vec<String> = (0..count).map(|i| format!("Part_{i:04}.bi4")).collect();
+        files.push("CaseDam0.bi4".into());
+        let (group, notes) = picked(&files);
+        let lone = group.lone.expect("the initial state");
+        assert_eq!(
+            (lone.parts, lone.others),
+            (BTreeSet::from([0]), owned(&[""]))
+        );
+        assert!(
+            notes[0].starts_with("`CaseDam0.bi4` is left out")
+                && notes[0].contains("--parts CaseDam"),
+            "{notes:?}"
+        );
+        let listed = listed(names(&files), &mut Vec::new()).expect("a sequence");
+        assert_eq!((listed.files.len(), listed.lone), (files.len(), None));
+    }
+}
+
+#[test]
 fn parts_may_start_late() {
     let mut files: Vec<String> = (1..9).map(|i| format!("Fluid_{i}.vtk")).collect();
     files.extend((7..9).map(|i| format!("Oil_{i}.vtk")));
