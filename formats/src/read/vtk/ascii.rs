@@ -60,6 +60,36 @@ pub(super) fn skip_words(text: &mut TextInput<'_>, count: usize) -> Result<(), P
     each_word(text, count, |_, _| Ok(()))
 }
 
+/// Skips about `count` integers, up to the next word that is none. Some writers count the cells of a section wrongly,
+/// and VTK reads such files.
+///
+/// # Errors
+/// [`ParseError::Malformed`] if the text ends before that many.
+pub(super) fn skip_integers(text: &mut TextInput<'_>, count: usize) -> Result<(), ParseError> {
+    check_room(text, count)?;
+    let is_integer = |word: &[u8]| word.iter().all(|b| b.is_ascii_digit() || *b == b'-');
+    let mut done = 0;
+    loop {
+        let at = text.at();
+        let near = text.words(count.saturating_sub(done).max(1));
+        let len = near.len();
+        let mut words = Words { text: near, at: 0 };
+        let mut used = 0;
+        while words.next().is_some_and(is_integer) {
+            used = words.at;
+            done += 1;
+        }
+        let is_at_end = near[used..].trim_ascii().is_empty();
+        text.advance(if is_at_end { len } else { used });
+        if len == 0 && done < count {
+            return Err(ends_after(at, done, count));
+        }
+        if len == 0 || !is_at_end {
+            return Ok(());
+        }
+    }
+}
+
 /// Refuses a count that the rest of the file cannot hold, if that is known.
 fn check_room(text: &TextInput<'_>, count: usize) -> Result<(), ParseError> {
     match text.left() {

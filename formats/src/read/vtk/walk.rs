@@ -1,6 +1,7 @@
 //! The walk through a legacy file, from keyword line to keyword line, and what it finds.
 
 use super::MOST_COMPONENTS;
+use super::ascii::skip_integers;
 use super::attributes::{ArrayHeader, count, field_array, keyword_array};
 use super::cursor::{LineCursor, VtkLine, shown};
 use super::keywords::{is_keyword, is_section_start, is_time_name, parse_version};
@@ -299,7 +300,11 @@ impl<'c, 'a> Walker<'c, 'a> {
         if self.mesh.is_some() && has_faces {
             return self.take(stored, values, what).map(Some);
         }
-        skip_values(&mut self.cursor, self.encoding, stored, values, what)?;
+        if self.is_text() {
+            skip_integers(self.cursor.text(), values)?;
+        } else {
+            skip_values(&mut self.cursor, self.encoding, stored, values, what)?;
+        }
         Ok(None)
     }
 

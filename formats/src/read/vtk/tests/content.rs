@@ -38,6 +38,36 @@ fn payloads_may_contain_keywords() {
 }
 
 #[test]
+fn cells_in_text_may_be_counted_wrongly() {
+    let file = |lines: &str| {
+        format!(
+            "# vtk DataFile Version 2.0\nt\nASCII\nDATASET POLYDATA\nPOINTS 3 float\n0 0 0\n1 0 0\n2 0 0\n{lines}\n\
+             POINT_DATA 3\nSCALARS h float\nLOOKUP_TABLE default\n1 2 3\n"
+        )
+    };
+    for lines in [
+        "LINES 1 4\n3 0 1 2",
+        "LINES 1 4\n3\n0\n1\n2\n2\n2",
+        "LINES 1 6\n3 0 1 2",
+        "POLYGONS 1 3 3\n3 0 1 2\nLINES 1 2\n2 0 1",
+    ] {
+        let found = good(file(lines).as_bytes());
+        assert_eq!(
+            attribute(&found, "h").data,
+            AttributeData::F32(vec![1.0, 2.0, 3.0]),
+            "{lines}"
+        );
+    }
+    let cut = file("LINES 1 4\n3 0 1 2")
+        .replace("\nPOINT_DATA", "#")
+        .split('#')
+        .next()
+        .map(str::to_owned);
+    let cut = cut.expect("a beginning").replace("1 2", "1");
+    assert!(parse(cut.as_bytes()).is_err());
+}
+
+#[test]
 fn no_or_any_white_space_may_follow_a_payload() {
     for gap in ["", "\n", "\r\n", "\n\n", " \r\n \n"] {
         let found = good(
