@@ -137,9 +137,14 @@ fn vertices(header: &PlyHeader) -> Result<&Element, ParseError> {
         .iter()
         .find_map(|name| header.element(name).filter(|e| e.count > 0));
     if let Some(faces) = faces {
+        // Strips are counted as one, and are not drawn
+        let (count, remedy) = match faces.name.as_str() {
+            "face" => (format!("{} faces", faces.count), "draw it with --mesh, or "),
+            _ => ("triangle strips".to_owned(), ""),
+        };
         return Err(ParseError::unsupported(format!(
-            "a mesh with {} faces, not particles: export points only",
-            faces.count
+            "a mesh with {count}, not particles: {remedy}save its vertices alone, as a point cloud, with MeshLab, \
+             CloudCompare or Open3D"
         )));
     }
     header.element("vertex").ok_or_else(|| {

@@ -84,7 +84,23 @@ fn mesh_is_rejected() {
     let error = READER.error(&sample("public_splashsurf/cube_normals.ply"));
     assert_eq!(
         error,
-        ParseError::unsupported("a mesh with 12 faces, not particles: export points only")
+        ParseError::unsupported(
+            "a mesh with 12 faces, not particles: draw it with --mesh, or save its vertices alone, as a point cloud, \
+             with MeshLab, CloudCompare or Open3D"
+        )
+    );
+    let strips = points(
+        "1",
+        &[
+            "element tristrips 1",
+            "property list int int vertex_indices",
+        ],
+        "1 2 3\n3 0 0 0\n",
+    );
+    let error = READER.error(&strips).to_string();
+    assert!(
+        error.starts_with("a mesh with triangle strips, not particles: save its vertices"),
+        "{error}"
     );
     let faceless = points(
         "1",
