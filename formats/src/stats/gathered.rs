@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::sums::{FloatSum, Sum};
 use super::{AttributeStats, FrameStats};
 use crate::frame::find_radius;
-use crate::{Attribute, Positions, Radius, ScalarType};
+use crate::{Attribute, FARTHEST, Positions, Radius, ScalarType, is_near};
 
 /// The sums over the particles so far.
 pub(super) struct Gathered {
@@ -35,7 +35,7 @@ impl Gathered {
 
     /// Adds particles. If others follow, they must be whole pieces.
     pub(super) fn add(&mut self, positions: &Positions, attributes: &[Attribute]) {
-        let keep = finite(positions);
+        let keep = near(positions);
         let count = keep.iter().filter(|k| **k).count();
         self.count += count as u64;
         self.dropped += (keep.len() - count) as u64;
@@ -77,10 +77,15 @@ impl Gathered {
     }
 }
 
-fn finite(positions: &Positions) -> Vec<bool> {
+/// Which positions are those of particles that are drawn.
+fn near(positions: &Positions) -> Vec<bool> {
+    let farthest = DVec3::splat(FARTHEST.into());
     match positions {
-        Positions::F32(v) => v.par_iter().map(|p| p.is_finite()).collect(),
-        Positions::F64(v) => v.par_iter().map(|p| p.is_finite()).collect(),
+        Positions::F32(v) => v.par_iter().map(is_near).collect(),
+        Positions::F64(v) => v
+            .par_iter()
+            .map(|p| p.abs().cmple(farthest).all())
+            .collect(),
     }
 }
 

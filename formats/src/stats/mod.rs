@@ -22,9 +22,9 @@ const BLOCK: usize = 16 * PIECE;
 /// Statistics of a frame, world units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameStats {
-    /// Number of particles with finite positions.
+    /// Number of particles that are drawn: with finite positions, not beyond [`FARTHEST`](crate::FARTHEST).
     pub count: u64,
-    /// Number of particles with a NaN or infinite coordinate; the other fields ignore them.
+    /// Number of the others, which have a coordinate that is NaN or beyond it; the other fields ignore them.
     pub dropped: u64,
     /// Smallest and largest radius in the file; `None` if the file has no radii.
     pub radius: Option<(f32, f32)>,
@@ -198,6 +198,20 @@ mod tests {
             (Some(Number::Float(1.0)), 1, Some(1.0))
         );
         assert_eq!((v[1].sum, v[1].nan), (Number::Float(7.0), 0));
+    }
+
+    #[test]
+    fn particles_that_frames_drop_are_not_counted() {
+        let far = [0.0, 2e37, 3e37, -3e37, f32::MAX];
+        let single = far.map(|x| Vec3::new(1.0, x, 0.0)).to_vec();
+        let double = far.map(|x| DVec3::new(1.0, 0.0, f64::from(x))).to_vec();
+        for positions in [Positions::F32(single), Positions::F64(double)] {
+            let raw = raw(positions, Vec::new());
+            let stats = FrameStats::of(&raw);
+            let frame = crate::ParticleFrame::from_raw(raw, DVec3::ZERO);
+            assert_eq!((stats.count, stats.dropped), (2, 3));
+            assert_eq!((frame.len() as u64, frame.dropped), (2, 3));
+        }
     }
 
     #[test]
