@@ -6,8 +6,10 @@ use std::io::{Cursor, Write};
 
 use spherule_formats::detect::Format;
 use spherule_formats::read::{bgeo, csv, lammps, npy, ply, vtk, vtk_xml, xyz};
-use spherule_formats::sequence::merge;
-use spherule_formats::{Attribute, AttributeData, ParseError, Positions, RawParticles};
+use spherule_formats::sequence::{Topology, merge};
+use spherule_formats::{
+    Attribute, AttributeData, MemoryBudget, ParseError, Positions, RawParticles,
+};
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
@@ -162,9 +164,12 @@ fn xyz() {
         format!("1\n\nH 1 2 3{numbers}\n").as_bytes(),
         MANY + 1,
     );
-    let properties: String = numbered(MANY).map(|n| format!(":{n}:I:1")).collect();
+    // Columns that each begin a search in the first row would take minutes.
+    let many = 8 * MANY;
+    let numbers = " 7".repeat(many);
+    let properties: String = numbered(many).map(|n| format!(":{n}:I:1")).collect();
     let file = format!("1\nProperties=pos:R:3{properties}\n1 2 3{numbers}\n");
-    has(xyz::FORMAT, file.as_bytes(), MANY);
+    has(xyz::FORMAT, file.as_bytes(), many);
 }
 
 #[test]
@@ -285,4 +290,24 @@ fn parts_of_a_step() {
     );
     assert_eq!(merged.attributes.len(), 1);
     assert_eq!(notes.len(), 1);
+}
+
+#[test]
+fn topology_of_other_attributes() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let path = dir.path().join("topology.csv");
+    let table = |prefix: &str| {
+        let names: String = (0..MANY).map(|i| format!(",{prefix}{i}")).collect();
+        format!("x,y,z{names}\n1,2,3{}\n", ",7".repeat(MANY))
+    };
+    std::fs::write(&path, table("t")).expect("writable");
+    let topology = Topology::open(&path, MemoryBudget::UNLIMITED).expect("a good file");
+    let mut particles = read(csv::FORMAT, table("f").as_bytes()).expect("a good file");
+    topology
+        .add_to(&mut particles, &path)
+        .expect("one particle");
+    topology
+        .add_to(&mut particles, &path)
+        .expect("one particle");
+    assert_eq!(particles.attributes.len(), 2 * MANY);
 }

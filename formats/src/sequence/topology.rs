@@ -1,5 +1,6 @@
 //! Properties of the atoms of a trajectory that are in another file: its topology.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use crate::open::{FrameFile, read_whole};
@@ -61,15 +62,12 @@ impl Topology {
             );
             return Err(ParseError::malformed(0, what).in_file(path));
         }
-        for attribute in &self.attributes {
-            let is_known = particles
-                .attributes
-                .iter()
-                .any(|known| known.name == attribute.name);
-            if !is_known {
-                particles.attributes.push(attribute.clone());
-            }
-        }
+        // Looked up, never searched for: there may be very many.
+        let own = particles.attributes.iter();
+        let known: HashSet<String> = own.map(|attribute| attribute.name.clone()).collect();
+        let is_new = |attribute: &&Attribute| !known.contains(&attribute.name);
+        let new = self.attributes.iter().filter(is_new).cloned();
+        particles.attributes.extend(new);
         if particles.bonds.is_empty() {
             particles.bonds.clone_from(&self.bonds);
         }
