@@ -1,6 +1,6 @@
 //! Reads a file from front to back and decompresses it.
 
-use std::io::{self, BufRead, Read, Seek};
+use std::io::{self, BufRead, Read, Seek, SeekFrom};
 
 use super::member::{StreamDecoder, is_early_end};
 use super::{Compression, SKIPPABLE_HEADER, StreamFormat, skippable_len};
@@ -59,6 +59,8 @@ pub(crate) struct Decompressor<R: BufRead> {
     budget: MemoryBudget,
     /// Number of uncompressed bytes returned so far.
     at: usize,
+    /// Bytes of the file, if it is compressed.
+    stored_len: u64,
     notes: Vec<String>,
 }
 
@@ -76,12 +78,17 @@ impl<R: BufRead + Seek> Decompressor<R> {
     /// begin.
     pub(crate) fn new(mut reader: R, budget: MemoryBudget) -> Result<Self, StreamError> {
         let compression = Compression::detect(&mut reader)?;
+        let stored_len = match &compression {
+            Some(_) => len_of(&mut reader).map_err(StreamError::Io)?,
+            None => 0,
+        };
         let mut this = Self {
             state: DecompressorState::Ended,
             compression: compression.clone(),
             decoder_len: 0,
             budget,
             at: 0,
+            stored_len,
             notes: Vec::new(),
         };
         this.state = match compression {
@@ -238,14 +245,31 @@ impl<R: BufRead + Seek> Decompressor<R> {
         if error.kind() == io::ErrorKind::Unsupported {
             return ParseError::unsupported(error.to_string()).into();
         }
+        // Frames of Blosc may end early in the middle of the file
+        let is_at_end = !matches!(self.compression, Some(Compression::Zip(_))) && name != "blosc";
+        let place = if is_at_end {
+            format!(", at byte {} of the file", self.stored_len)
+        } else {
+            String::new()
+        };
         let what = match is_early_end(&error) {
             true => {
-                format!("the {name} stream ends early here; perhaps it is still being written")
+                format!(
+                    "the {name} stream ends early here{place}; perhaps it is still being written"
+                )
             }
             false => format!("the {name} stream is damaged: {error}"),
         };
         ParseError::malformed(at, what).into()
     }
+}
+
+/// Bytes of the file that `reader` reads, whose place stays the same.
+fn len_of(reader: &mut impl Seek) -> io::Result<u64> {
+    let here = reader.stream_position()?;
+    let len = reader.seek(SeekFrom::End(0))?;
+    reader.seek(SeekFrom::Start(here))?;
+    Ok(len)
 }
 
 /// Skips the frames at which `reader` is that are not part of the content.
