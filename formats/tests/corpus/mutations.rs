@@ -1,9 +1,10 @@
 //! Mutations of the committed inputs: fuzzing without a nightly toolchain.
 //!
-//! A number of inputs per target that are the same in each run; with `PROPTEST_CASES`, as many others:
+//! A number of inputs per target that are the same in each run; with `PROPTEST_CASES`, as many others; with
+//! `FUZZ_TARGETS`, of these targets alone:
 //!
 //! ```text
-//! PROPTEST_CASES=1000000 cargo test --release -p spherule-formats --test corpus mutated
+//! PROPTEST_CASES=1000000 FUZZ_TARGETS=csv,npy cargo test --release -p spherule-formats --test corpus mutated
 //! ```
 
 use std::fs;
@@ -117,7 +118,12 @@ fn mutated_inputs_keep_the_promises() {
     if !is_long {
         config.cases = CASES;
     }
-    for (name, target) in TARGETS {
+    let wanted = std::env::var("FUZZ_TARGETS").ok();
+    let is_wanted = |name: &str| {
+        let mut names = wanted.iter().flat_map(|names| names.split(','));
+        wanted.is_none() || names.any(|wanted| wanted == name)
+    };
+    for (name, target) in TARGETS.into_iter().filter(|(name, _)| is_wanted(name)) {
         let all: Vec<Vec<u8>> = inputs(&corpus().join(name))
             .iter()
             .map(|path| fs::read(path).expect("readable"))
