@@ -118,7 +118,7 @@ impl StoredFrame {
 
     /// Whether attributes are looked up by particle.
     pub fn needs_indices(&self, setup: &Setup) -> bool {
-        setup.needs_particles() || self.names.values.is_some() || self.names.rgb.is_some()
+        setup.needs_indices(self.names.values.is_some() || self.names.rgb.is_some())
     }
 
     /// The particles in place.

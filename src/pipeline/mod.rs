@@ -23,6 +23,8 @@ mod memory_limit;
 mod meshes;
 mod motion;
 mod overlays;
+#[cfg(test)]
+mod owner_tests;
 mod predict;
 mod probe;
 mod rays;

@@ -392,7 +392,7 @@ impl Setup {
             (structure, _) => structure,
         };
         BuildSettings {
-            keep_indices: self.needs_particles() || has_values || self.has_motion(),
+            keep_indices: self.needs_indices(has_values) || self.has_motion(),
             bvh: self.run.bvh,
             sbvh: self.run.sbvh,
             ..BuildSettings::new(structure)
@@ -402,6 +402,11 @@ impl Setup {
     /// Whether the parts of particles are needed, for channels or for their materials.
     pub(super) fn needs_parts(&self) -> bool {
         self.picture.render.channels.needs_parts() || !self.picture.scene.parts.is_empty()
+    }
+
+    /// Whether the indices of particles at intersections are needed, with or without values for colours.
+    pub(super) fn needs_indices(&self, has_values: bool) -> bool {
+        self.needs_particles() || has_values
     }
 
     /// Whether the indices of particles at intersections are needed, apart from their colours.

@@ -257,7 +257,8 @@ impl SurfaceBuilder {
         };
         let is_moving = !self.displacements.is_empty();
         let settings = BuildSettings {
-            keep_indices: is_moving,
+            // A drop has the attributes of its particle
+            keep_indices: is_moving || setup.needs_indices(frame.shading.has_colors()),
             ..BuildSettings::default()
         };
         let built = self.spray.build(&built, &settings);
