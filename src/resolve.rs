@@ -30,6 +30,8 @@ mod color;
 mod denoise;
 mod environment;
 mod ground;
+#[cfg(test)]
+mod lattice_tests;
 mod lights;
 mod meshes;
 mod opacity;

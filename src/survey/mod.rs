@@ -6,12 +6,12 @@
 
 use std::collections::BTreeMap;
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{
     Attribute, FrameError, ParticleFrame, PositionSlice, Radius, RawParticles, SimulationCell,
-    choose_origin,
+    choose_origin, sample_indices,
 };
 
 pub use crate::attributes::{
@@ -33,9 +33,8 @@ use color::{ColorTotals, FrameContext};
 use moments::Moments;
 use outline::Outermost;
 pub use outline::Outline;
-use packing::Spacing;
-use packing::narrow;
-use robust::{RobustBounds, estimate_packed, estimate_radius, robust_bounds, robust_largest};
+use packing::{Spacing, SpacingRequest, narrow};
+use robust::{RobustBounds, robust_bounds, robust_largest};
 use sample::FrameSample;
 
 /// Maximum number of frames to sample; evenly distributed, including the first and the last one.
@@ -63,7 +62,8 @@ pub struct Survey {
     /// The simulation cells of the sampled frames, each once; none of files that were only sampled.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cells: Vec<SimulationCell>,
-    /// Radius for frames without radii: half the median distance of neighbours.
+    /// Radius for frames without radii: half the median distance of neighbours, whichever particles are drawn; the
+    /// median of the frames.
     pub radius: Option<f32>,
     /// The same for the particles of one body: half the edge of the cube that each particle occupies inside, slightly
     /// enlarged. Only if it was requested.
@@ -196,12 +196,13 @@ pub enum RadiusQuestion<'a> {
 }
 
 impl RadiusQuestion<'_> {
-    fn is_auto(&self) -> bool {
-        matches!(self, Self::Auto | Self::AutoOfBody)
-    }
-
-    fn is_packed(&self) -> bool {
-        *self == Self::AutoOfBody
+    /// The estimates that it needs, of each of so many `frames`.
+    fn spacing(&self, frames: usize) -> Option<SpacingRequest> {
+        let is_auto = matches!(self, Self::Auto | Self::AutoOfBody);
+        is_auto.then_some(SpacingRequest {
+            needs_packed: *self == Self::AutoOfBody,
+            frames,
+        })
     }
 
     /// The same for positions in a unit in which an angstrom has this length.
@@ -233,7 +234,8 @@ struct Totals {
     bounds: Option<RobustBounds>,
     outermost: Outermost,
     cells: Vec<SimulationCell>,
-    radius: Option<(usize, Spacing)>,
+    /// The spacing in each frame, with its number of particles.
+    spacings: Vec<(u64, Spacing)>,
     has_radii: bool,
     reach: f32,
     color: ColorTotals,
@@ -324,8 +326,10 @@ impl Survey {
         };
         let up = question.up.unwrap_or(format_up);
         let mut failure = None;
+        let indices: Vec<usize> = indices.into_iter().collect();
+        let frames = indices.len();
         for index in indices {
-            match FrameSample::of(sequence, index, question) {
+            match FrameSample::of(sequence, index, (question, frames)) {
                 Ok(sample) => {
                     let number = sequence.frames().get(index).map_or(0, |frame| frame.number);
                     totals.moments.add(index, number, sample.particles.time);
@@ -366,14 +370,24 @@ impl Survey {
     }
 }
 
-/// The spacing of neighbours among `positions`.
-fn spacing_of(positions: &[Vec3], needs_packed: bool) -> Option<Spacing> {
-    let touching = estimate_radius(positions)?;
-    let packed = || estimate_packed(positions, touching);
-    Some(Spacing {
-        touching,
-        packed: needs_packed.then(packed).flatten(),
-    })
+/// The median of an estimate over the frames, weighted by their particle counts: neither frames with few particles nor
+/// a lattice at the start decides.
+fn of_frames(
+    spacings: &[(u64, Spacing)],
+    estimate: impl Fn(&Spacing) -> Option<f32>,
+) -> Option<f32> {
+    let estimates = spacings
+        .iter()
+        .filter_map(|(count, spacing)| Some((estimate(spacing)?, *count)));
+    let mut estimates: Vec<(f32, u64)> = estimates.collect();
+    estimates.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let all: u64 = estimates.iter().map(|(_, count)| count).sum();
+    let mut below = 0;
+    let median = estimates.iter().find(|(_, count)| {
+        below += count;
+        2 * below >= all
+    });
+    median.map(|(estimate, _)| *estimate)
 }
 
 /// Up to [`FRAMES`] indices below `count`, evenly distributed.
@@ -392,7 +406,7 @@ impl Totals {
             bounds: None,
             outermost: Outermost::default(),
             cells: Vec::new(),
-            radius: None,
+            spacings: Vec::new(),
             has_radii: false,
             reach: 0.0,
             color: ColorTotals::default(),
@@ -470,17 +484,13 @@ impl Totals {
         let velocity = self.velocity.as_deref();
         self.color.add(&frame, velocity, question.color, context);
         if question.points {
-            let stride = frame.len().div_ceil(POINTS).max(1);
-            let some = frame.positions.iter().step_by(stride);
+            let some = sample_indices(frame.len(), POINTS).map(|i| frame.positions[i]);
             self.points.extend(some.map(|p| origin + p.as_dvec3()));
         }
         match question.radius {
             RadiusQuestion::None => {}
             RadiusQuestion::Auto | RadiusQuestion::AutoOfBody => {
-                let estimate = || {
-                    spacing.or_else(|| spacing_of(&frame.positions, question.radius.is_packed()))
-                };
-                self.add_radius(&frame, count, estimate);
+                self.add_radius(&frame, weight.particles, spacing);
             }
             RadiusQuestion::Attribute(..) | RadiusQuestion::Table(..) => {
                 let radius = |i| question.radius.radius_by_attribute(&frame, i);
@@ -490,12 +500,8 @@ impl Totals {
         }
     }
 
-    fn add_radius(
-        &mut self,
-        frame: &ParticleFrame,
-        count: usize,
-        estimate: impl Fn() -> Option<Spacing>,
-    ) {
+    /// Adds the radii of `frame`, which has `count` particles before the selection.
+    fn add_radius(&mut self, frame: &ParticleFrame, count: u64, spacing: Option<Spacing>) {
         match &frame.radius {
             Some(Radius::Common(radius)) => {
                 self.has_radii = true;
@@ -506,11 +512,8 @@ impl Totals {
                 self.reach = self.reach.max(robust_largest(radii.len(), |i| radii[i]));
             }
             None => {
-                // The estimate is best in the frame with the most particles.
-                let is_fuller = self.radius.is_none_or(|(known, _)| count > known);
-                if is_fuller && let Some(spacing) = estimate() {
-                    self.radius = Some((count, spacing));
-                }
+                self.spacings
+                    .extend(spacing.map(|spacing| (count, spacing)));
             }
         }
     }
@@ -531,9 +534,8 @@ impl Totals {
             Origins::None | Origins::Mixed => choose_origin(min, max),
         };
         let in_place = self.origin == Origins::Shared(origin);
-        let stride = self.points.len().div_ceil(POINTS).max(1);
-        let points = self.points.iter().step_by(stride);
-        let points = points.map(|point| (*point - origin).as_vec3().to_array());
+        let points = sample_indices(self.points.len(), POINTS).map(|i| self.points[i]);
+        let points = points.map(|point| (point - origin).as_vec3().to_array());
         let weight = self.weight.map(|weight| FrameWeight { in_place, ..weight });
         Survey {
             origin,
@@ -542,8 +544,8 @@ impl Totals {
             layers: self.bounds.map(|bounds| bounds.layers),
             outline: self.outermost.outline(origin),
             cells: self.cells,
-            radius: self.radius.map(|(_, spacing)| spacing.touching),
-            packed_radius: self.radius.and_then(|(_, spacing)| spacing.packed),
+            radius: of_frames(&self.spacings, |spacing| Some(spacing.touching)),
+            packed_radius: of_frames(&self.spacings, |spacing| spacing.packed),
             has_radii: self.has_radii,
             reach: self.reach,
             color,
@@ -561,3 +563,7 @@ impl Totals {
         }
     }
 }
+
+#[cfg(test)]
+#[path = "radius_tests.rs"]
+mod tests;

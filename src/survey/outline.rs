@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use spherule_formats::Positions;
+use spherule_formats::{Positions, sample_indices};
 
 use super::robust::{ESCAPE_MIN, sample_of};
 
@@ -21,6 +21,9 @@ const MARGIN: f64 = 0.25;
 
 /// Below this number, a particle may be as far from the others as their extent.
 const FEW: usize = 100;
+
+/// From that number on, at most one particle of this many is an outlier: more are a part of the picture.
+const MAX_OUTLIERS: usize = 100;
 
 /// The outermost particles over a sequence.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -47,7 +50,7 @@ struct End {
 }
 
 impl Outermost {
-    /// Adds a frame of `count` particles. `positions`: those of all of them, or of every n-th one.
+    /// Adds a frame of `count` particles. `positions`: those of all of them, or of some.
     pub(super) fn add(&mut self, positions: &Positions, count: usize) {
         let mut sample = sample_of(positions);
         if sample.is_empty() {
@@ -60,11 +63,8 @@ impl Outermost {
         let longest = DVec3::AXES.iter().map(extent).fold(0.0, f64::max);
         // A particle that is far from the others along one axis is an outlier on all
         let axes = || (0..AXES).into_par_iter().map(axis);
-        let mut outliers: Vec<usize> = axes()
-            .flat_map_iter(|axis| beyond(&sample, axis, longest))
-            .collect();
-        outliers.sort_unstable();
-        outliers.dedup();
+        let found = axes().flat_map_iter(|axis| beyond(&sample, axis, longest));
+        let outliers = farthest(found.collect(), sample.len());
         let each = count.div_ceil(sample.len()).max(1);
         self.outliers = self.outliers.max((outliers.len() * each) as u64);
         for index in outliers.into_iter().rev() {
@@ -103,9 +103,8 @@ impl Outermost {
 
 /// Positions along `axis` of the layers beyond which are only the outermost particles of a `sample`.
 fn layers(sample: &[DVec3], axis: DVec3) -> [f64; 2] {
-    let stride = sample.len().div_ceil(LAYER_SAMPLE).max(1);
-    let sample = sample.iter().step_by(stride);
-    let mut along: Vec<f64> = sample.map(|p| p.dot(axis)).collect();
+    let some = sample_indices(sample.len(), LAYER_SAMPLE);
+    let mut along: Vec<f64> = some.map(|i| sample[i].dot(axis)).collect();
     let outside = match along.len() / OUTSIDE {
         0 => usize::from(along.len() >= ESCAPE_MIN),
         some => some,
@@ -114,23 +113,45 @@ fn layers(sample: &[DVec3], axis: DVec3) -> [f64; 2] {
     [outside, last - outside].map(|place| *along.select_nth_unstable_by(place, f64::total_cmp).1)
 }
 
-/// Indices of the particles of a `sample` that are far from the others along `axis`. `longest` is the longest side of
-/// the box of the others.
-fn beyond(sample: &[DVec3], axis: DVec3, longest: f64) -> Vec<usize> {
+/// A particle of a sample that is far from the others along an axis.
+#[derive(Clone, Copy)]
+struct Outlier {
+    index: usize,
+    /// Distance from the others.
+    distance: f64,
+}
+
+/// The particles of a `sample` that are far from the others along `axis`. `longest` is the longest side of the box of
+/// the others.
+fn beyond(sample: &[DVec3], axis: DVec3, longest: f64) -> Vec<Outlier> {
     let [low, high] = layers(sample, axis);
     let margin = match sample.len() < FEW {
         true => longest,
         false => MARGIN * (high - low),
     };
-    let is_far = |p: &DVec3| {
+    let outliers = sample.iter().enumerate().map(|(index, p)| {
         let along = p.dot(axis);
-        along < low - margin || along > high + margin
-    };
-    let places = sample.iter().enumerate();
-    places
-        .filter(|(_, p)| is_far(p))
-        .map(|(index, _)| index)
-        .collect()
+        let distance = (low - along).max(along - high);
+        Outlier { index, distance }
+    });
+    outliers.filter(|o| o.distance > margin).collect()
+}
+
+/// The indices of `outliers`, which may be there once for each axis, rising: of those of the farthest particles, if they
+/// are too many of `count`.
+fn farthest(mut outliers: Vec<Outlier>, count: usize) -> Vec<usize> {
+    // Keep the axis along which a particle is farthest
+    outliers.sort_unstable_by(|a, b| {
+        let farther = b.distance.total_cmp(&a.distance);
+        a.index.cmp(&b.index).then(farther)
+    });
+    outliers.dedup_by_key(|outlier| outlier.index);
+    if count >= FEW && outliers.len() > count / MAX_OUTLIERS {
+        outliers.sort_by(|a, b| b.distance.total_cmp(&a.distance));
+        outliers.truncate(count / MAX_OUTLIERS);
+        outliers.sort_unstable_by_key(|outlier| outlier.index);
+    }
+    outliers.into_iter().map(|outlier| outlier.index).collect()
 }
 
 /// The lowest and the highest particle of a `sample` along `axis`, the first in a tie; `None` without particles.

@@ -18,6 +18,15 @@ const RATHER_LARGE: f64 = 1.05;
 /// or a few particles, do not become too large.
 const MOST: f64 = 2.0;
 
+/// Which estimates a survey of some frames needs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct SpacingRequest {
+    /// Whether [`Spacing::packed`] is needed.
+    pub(super) needs_packed: bool,
+    /// Number of surveyed frames, which share the effort.
+    pub(super) frames: usize,
+}
+
 /// Estimates of the radius from the distances of particles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Spacing {
@@ -62,11 +71,20 @@ mod tests {
     use spherule_formats::sequence::Sequence;
     use spherule_formats::{ParticleFrame, Positions, RawParticles, SequenceInput, native};
 
-    use super::super::robust::{estimate_packed, estimate_radius};
+    use super::super::robust::spacing_of;
     use super::super::{ColorQuestion, Question, RadiusQuestion, Survey};
+    use super::*;
+
+    fn spacing(positions: &[Vec3]) -> Option<Spacing> {
+        let request = SpacingRequest {
+            needs_packed: true,
+            frames: 1,
+        };
+        spacing_of(positions, request)
+    }
 
     fn packed(positions: &[Vec3]) -> Option<f32> {
-        estimate_packed(positions, estimate_radius(positions)?)
+        spacing(positions)?.packed
     }
 
     fn lattice(side: u8) -> Vec<Vec3> {
@@ -91,7 +109,7 @@ mod tests {
     #[test]
     fn lattice_and_fluid_have_the_same_packed_radius() {
         for (positions, touching) in [(lattice(18), 0.1), (block(6000), 0.085)] {
-            let half = estimate_radius(&positions).expect("some");
+            let half = spacing(&positions).expect("some").touching;
             assert!((half / touching - 1.0).abs() < 0.1, "{half}");
             let radius = packed(&positions).expect("some");
             assert!((0.96..1.1).contains(&(radius / 0.1)), "{radius}");

@@ -2,9 +2,9 @@
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
-use spherule_formats::Positions;
+use spherule_formats::{Positions, sample_indices};
 
-use super::packing;
+use super::packing::{self, Spacing, SpacingRequest};
 
 /// Number of particles of a frame from which percentiles are computed.
 const SAMPLE: usize = 20_000;
@@ -12,8 +12,16 @@ const SAMPLE: usize = 20_000;
 pub(super) const ESCAPE_MIN: usize = 16;
 /// Number of nearest-neighbour distances from which the radius is estimated.
 pub(super) const NEIGHBOUR_QUERIES: usize = 512;
-/// Maximum number of distance computations of the estimate: half a second for a frame of 1e7.
-pub(super) const NEIGHBOUR_BUDGET: usize = 1_000_000_000;
+/// Minimum number of these distances, whatever they cost.
+const MIN_NEIGHBOUR_QUERIES: usize = 16;
+/// Maximum number of distance computations for the estimates of all frames: half a second.
+const NEIGHBOUR_BUDGET: usize = 1_000_000_000;
+
+/// Number of distances for the estimate of a frame of `count` particles, which is one of `frames`.
+pub(super) fn neighbour_queries(count: usize, frames: usize) -> usize {
+    let affordable = NEIGHBOUR_BUDGET / frames.max(1) / count.max(1);
+    affordable.clamp(MIN_NEIGHBOUR_QUERIES, NEIGHBOUR_QUERIES)
+}
 
 /// Boxes of the particles of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,9 +48,7 @@ const LAYER: usize = 200;
 
 /// An even selection of up to [`SAMPLE`] of the `positions`, without those that are not finite.
 pub(super) fn sample_of(positions: &Positions) -> Vec<DVec3> {
-    let stride = positions.len().div_ceil(SAMPLE).max(1);
-    let sample = (0..positions.len()).step_by(stride);
-    let sample = sample.map(|i| positions.get(i));
+    let sample = sample_indices(positions.len(), SAMPLE).map(|i| positions.get(i));
     sample.filter(|p| p.is_finite()).collect()
 }
 
@@ -100,9 +106,7 @@ pub(super) fn robust_bounds(
 
 /// The 99th percentile of `count` radii; 0 without finite ones.
 pub(super) fn robust_largest(count: usize, radius: impl Fn(usize) -> f32) -> f32 {
-    let stride = count.div_ceil(SAMPLE).max(1);
-    let mut radii: Vec<f32> = (0..count)
-        .step_by(stride)
+    let mut radii: Vec<f32> = sample_indices(count, SAMPLE)
         .map(radius)
         .filter(|r| r.is_finite() && *r > 0.0)
         .collect();
@@ -113,9 +117,7 @@ pub(super) fn robust_largest(count: usize, radius: impl Fn(usize) -> f32) -> f32
 
 /// Up to [`SAMPLE`] of the `count` values that are finite, rising.
 pub(super) fn sorted_sample(count: usize, value: impl Fn(usize) -> f64) -> Vec<f64> {
-    let stride = count.div_ceil(SAMPLE).max(1);
-    let mut values: Vec<f64> = (0..count)
-        .step_by(stride)
+    let mut values: Vec<f64> = sample_indices(count, SAMPLE)
         .map(value)
         .filter(|v| v.is_finite())
         .collect();
@@ -147,15 +149,24 @@ pub(super) fn percentile(values: &[f64], percent: f64) -> Option<f64> {
     Some(low + part * (high - low))
 }
 
-/// An even selection of the particles, for queries.
-fn queries(positions: &[Vec3]) -> impl Iterator<Item = &Vec3> {
-    let count = (NEIGHBOUR_BUDGET / positions.len().max(1)).clamp(16, NEIGHBOUR_QUERIES);
-    let stride = positions.len().div_ceil(count).max(1);
-    positions.iter().step_by(stride)
+/// `count` of the particles, for queries.
+fn queries(positions: &[Vec3], count: usize) -> impl Iterator<Item = &Vec3> {
+    sample_indices(positions.len(), count).map(|i| &positions[i])
 }
 
-/// The radius from the density; `touching` is half the distance to the nearest neighbour.
-pub(super) fn estimate_packed(positions: &[Vec3], touching: f32) -> Option<f32> {
+/// The spacing of neighbours among `positions`.
+pub(super) fn spacing_of(positions: &[Vec3], request: SpacingRequest) -> Option<Spacing> {
+    let query_count = neighbour_queries(positions.len(), request.frames);
+    let touching = estimate_radius(positions, query_count)?;
+    let packed = || estimate_packed(positions, touching, query_count);
+    Some(Spacing {
+        touching,
+        packed: request.needs_packed.then(packed).flatten(),
+    })
+}
+
+/// The radius from the density, by this number of queries; `touching` is half the distance to the nearest neighbour.
+fn estimate_packed(positions: &[Vec3], touching: f32, query_count: usize) -> Option<f32> {
     let square = packing::reach(touching).powi(2);
     let count = |from: &Vec3| {
         let chunks = positions.par_chunks(64 * 1024);
@@ -167,12 +178,14 @@ pub(super) fn estimate_packed(positions: &[Vec3], touching: f32) -> Option<f32> 
         };
         chunks.map(near).sum()
     };
-    packing::packed_radius(touching, queries(positions).map(count).collect())
+    let counts = queries(positions, query_count).map(count);
+    packing::packed_radius(touching, counts.collect())
 }
 
-/// Half the median distance to the nearest neighbour. None for fewer than two distinct particles.
-pub(super) fn estimate_radius(positions: &[Vec3]) -> Option<f32> {
-    let distances: Vec<f32> = queries(positions)
+/// Half the median distance to the nearest neighbour, by this number of queries. None for fewer than two distinct
+/// particles.
+fn estimate_radius(positions: &[Vec3], query_count: usize) -> Option<f32> {
+    let distances: Vec<f32> = queries(positions, query_count)
         .filter_map(|from| {
             let nearest = positions
                 .par_chunks(64 * 1024)

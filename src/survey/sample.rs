@@ -13,10 +13,10 @@ use spherule_formats::{
     is_near,
 };
 
-use super::packing::{self, Spacing};
-use super::robust::{NEIGHBOUR_QUERIES, median, robust_bounds};
+use super::packing::{self, Spacing, SpacingRequest};
+use super::robust::{self, NEIGHBOUR_QUERIES, median, robust_bounds};
 use super::stream;
-use super::{FrameWeight, Question, RadiusQuestion, id_of, velocity_of};
+use super::{FrameWeight, Question, id_of, velocity_of};
 use crate::selection::Selection;
 
 /// Number of particles to sample in a native frame; smaller frames are read completely.
@@ -27,13 +27,13 @@ const LARGE: u64 = 1 << 20;
 
 /// A sample of a frame.
 pub(super) struct FrameSample {
-    /// The particles, or an even selection of them.
+    /// The particles, or some of them.
     pub(super) particles: RawParticles,
-    /// Particle count of the frame.
+    /// Number of particles of the frame that are drawn.
     pub(super) count: usize,
     /// Bounding box of all particles, if it is known.
     pub(super) extremes: Option<(DVec3, DVec3)>,
-    /// The spacing of neighbours, if the sample is not sufficient to compute it.
+    /// The spacing of neighbours among all particles, if it was requested.
     pub(super) spacing: Option<Spacing>,
     /// Origin of the coordinates in a native frame.
     pub(super) origin: Option<DVec3>,
@@ -41,38 +41,56 @@ pub(super) struct FrameSample {
 }
 
 impl FrameSample {
-    /// Samples frame `index` of `sequence`. The spacing takes long to compute, so it is only computed if `question`
-    /// requires it.
+    /// Samples frame `index` of `sequence`, one of `frames` frames.
     pub(super) fn of(
         sequence: &Sequence,
         index: usize,
-        question: Question,
+        (question, frames): (Question, usize),
     ) -> Result<Self, FrameError> {
+        let request = question.radius.spacing(frames);
         let sample = match question.selection {
-            // Few of the particles of a sample may be drawn
-            Some(selection) if !selection.is_all() => Self::of_files(sequence, index)?,
-            _ => Self::of_source(sequence, index, question.radius)?,
+            // Few of the particles of a sample may be drawn; the spacing is the same as without a selection
+            Some(selection) if !selection.is_all() => Self {
+                spacing: Self::spacing_of_large(sequence, index, request)?,
+                ..Self::of_files(sequence, index)?
+            },
+            _ => Self::of_source(sequence, index, request)?,
         };
-        let mut sample = sample.of_question(question);
+        let mut sample = sample.of_question(question, request);
         let time = &mut sample.particles.time;
         *time = sequence.listed_time(index).or(*time);
         Ok(sample)
     }
 
+    /// The spacing of a frame that would not be read as a whole without a selection; None for others.
+    fn spacing_of_large(
+        sequence: &Sequence,
+        index: usize,
+        request: Option<SpacingRequest>,
+    ) -> Result<Option<Spacing>, FrameError> {
+        if request.is_none() {
+            return Ok(None);
+        }
+        let sample = match sequence.native_file(index) {
+            Some(_) => Some(Self::of_source(sequence, index, request)?),
+            None => Self::of_large(sequence, index, request)?,
+        };
+        Ok(sample.and_then(|sample| sample.spacing))
+    }
+
     fn of_source(
         sequence: &Sequence,
         index: usize,
-        question: RadiusQuestion,
+        request: Option<SpacingRequest>,
     ) -> Result<Self, FrameError> {
         match sequence.native_file(index) {
             Some(path) => {
                 let file = NativeFile::open(path, Access::Map)?;
-                let sample =
-                    Self::of_native(&file, question.is_packed()).map_err(|e| e.in_file(path))?;
+                let sample = Self::of_native(&file, request).map_err(|e| e.in_file(path))?;
                 file.check()?;
                 Ok(sample)
             }
-            None => match Self::of_large(sequence, index, question)? {
+            None => match Self::of_large(sequence, index, request)? {
                 Some(sample) => Ok(sample),
                 None => Self::of_files(sequence, index),
             },
@@ -83,7 +101,7 @@ impl FrameSample {
     fn of_large(
         sequence: &Sequence,
         index: usize,
-        question: RadiusQuestion,
+        request: Option<SpacingRequest>,
     ) -> Result<Option<Self>, FrameError> {
         let Some(path) = sequence.lone_file(index) else {
             return Ok(None);
@@ -91,7 +109,7 @@ impl FrameSample {
         let Some(source) = open_source(path)?.filter(|s| s.count() > LARGE) else {
             return Ok(None);
         };
-        let (particles, spacing, extremes) = stream::survey(&*source, path, MAX_SAMPLE, question)?;
+        let (particles, spacing, extremes) = stream::survey(&*source, path, MAX_SAMPLE, request)?;
         source.check()?;
         // Estimate the memory of the frame from its attributes
         let stored = std::fs::metadata(path).map_or(0, |meta| meta.len());
@@ -133,11 +151,15 @@ impl FrameSample {
         let path = Path::new(name);
         let source = RawSource::borrowed(path, raw)?;
         let count = raw.positions.len();
-        let is_part = count as u64 > LARGE && question.selection.is_none_or(Selection::is_all);
-        let (particles, spacing, extremes) = match is_part {
-            true => stream::survey(&source, path, MAX_SAMPLE, question.radius)?,
-            false => (raw.to_owned_particles(), None, None),
-        };
+        let request = question.radius.spacing(1);
+        let (mut spacing, mut part) = (None, None);
+        if count as u64 > LARGE {
+            let (particles, found, extremes) = stream::survey(&source, path, MAX_SAMPLE, request)?;
+            spacing = found;
+            let is_whole = question.selection.is_none_or(Selection::is_all);
+            part = is_whole.then_some((particles, extremes));
+        }
+        let (particles, extremes) = part.unwrap_or_else(|| (raw.to_owned_particles(), None));
         let sample = Self {
             weight: FrameWeight {
                 particles: count as u64,
@@ -151,7 +173,7 @@ impl FrameSample {
             origin: None,
             particles,
         };
-        Ok(sample.of_question(question))
+        Ok(sample.of_question(question, request))
     }
 
     fn of_files(sequence: &Sequence, index: usize) -> Result<Self, FrameError> {
@@ -182,14 +204,14 @@ impl FrameSample {
 
     /// The sample without the particles that are not drawn, or that cuts leave out. The spacing is that of all of them:
     /// a slice or every tenth particle has spheres of the same size.
-    fn of_question(mut self, question: Question) -> Self {
+    fn of_question(mut self, question: Question, request: Option<SpacingRequest>) -> Self {
+        let has_radius = find_radius(&self.particles.attributes).is_some();
+        if let Some(request) = request.filter(|_| !has_radius && self.spacing.is_none()) {
+            self.spacing = spacing_of(&self.particles.positions, request);
+        }
         let Some(selection) = question.selection else {
             return self;
         };
-        let has_radius = find_radius(&self.particles.attributes).is_some();
-        if question.radius.is_auto() && !has_radius && self.spacing.is_none() {
-            self.spacing = spacing_of(&self.particles.positions, question.radius.is_packed());
-        }
         // A name without a value is reported later, with the attributes that there are
         if let Ok(survivors) = selection.survivors(&self.particles)
             && !selection.is_all()
@@ -208,7 +230,7 @@ impl FrameSample {
         self
     }
 
-    fn of_native(file: &NativeFile, needs_packed: bool) -> Result<Self, ParseError> {
+    fn of_native(file: &NativeFile, request: Option<SpacingRequest>) -> Result<Self, ParseError> {
         let frame = file.frame_unchecked();
         let index = file.index();
         let too_many = |_| ParseError::unsupported("more particles than this machine can count");
@@ -220,8 +242,8 @@ impl FrameSample {
         }
         frame.verify_nodes()?;
         let particles = frame.sample(MAX_SAMPLE)?;
-        let spacing = match index.radius {
-            RadiusIndex::None if is_part => stored_spacing(&frame, needs_packed)?,
+        let spacing = match (index.radius, request) {
+            (RadiusIndex::None, Some(request)) if is_part => stored_spacing(&frame, request)?,
             _ => None,
         };
         let origin = DVec3::from_array(index.origin);
@@ -238,24 +260,24 @@ impl FrameSample {
 }
 
 /// The spacing of neighbours among `positions`.
-fn spacing_of(positions: &Positions, needs_packed: bool) -> Option<Spacing> {
+fn spacing_of(positions: &Positions, request: SpacingRequest) -> Option<Spacing> {
     let bounds = robust_bounds(positions, None)?;
     let origin = choose_origin(bounds.outer.0, bounds.outer.1);
     let relative = (0..positions.len()).map(|i| (positions.get(i) - origin).as_vec3());
     let near: Vec<Vec3> = relative.filter(is_near).collect();
-    super::spacing_of(&near, needs_packed)
+    robust::spacing_of(&near, request)
 }
 
 /// The spacing of neighbours in a native frame.
 fn stored_spacing(
     frame: &NativeFrame<'_>,
-    needs_packed: bool,
+    request: SpacingRequest,
 ) -> Result<Option<Spacing>, ParseError> {
     let nearest = median(frame.neighbour_distances(NEIGHBOUR_QUERIES)?);
     let Some(touching) = nearest.map(|d| 0.5 * d) else {
         return Ok(None);
     };
-    let packed = match needs_packed {
+    let packed = match request.needs_packed {
         true => {
             let counts = frame.neighbour_counts(NEIGHBOUR_QUERIES, packing::reach(touching))?;
             packing::packed_radius(touching, counts)

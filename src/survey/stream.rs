@@ -5,36 +5,35 @@ use std::path::Path;
 use glam::DVec3;
 use rayon::prelude::*;
 use spherule_formats::convert::{ParticleSource, SourceAttribute};
-use spherule_formats::{Attribute, Endian, FrameError, ParseError, Positions, RawParticles};
+use spherule_formats::{
+    Attribute, Endian, FrameError, ParseError, Positions, RawParticles, sample_indices,
+};
 
-use super::RadiusQuestion;
-use super::packing::{self, Spacing};
-use super::robust::{NEIGHBOUR_BUDGET, NEIGHBOUR_QUERIES, median};
+use super::packing::{self, Spacing, SpacingRequest};
+use super::robust::{median, neighbour_queries};
 
 /// Particles per read.
 const RUN: usize = 1 << 16;
 /// Particles per run of the sample: enough for reading a page of the file to be worthwhile.
 const SAMPLE_RUN: usize = 64;
-/// Minimum number of distances for the spacing, whatever they cost.
-const LEAST_QUERIES: usize = 16;
 
 /// What the survey needs of many particles.
 pub(super) type Streamed = (RawParticles, Option<Spacing>, Option<(DVec3, DVec3)>);
 
-/// At most `most` particles of the file `path`, the spacing of all if `question` requires it and there are no radii,
-/// and the bounding box of all.
+/// At most `most` particles of the file `path`, the spacing of all if there is a request and there are no radii, and the
+/// bounding box of all.
 pub(super) fn survey(
     source: &dyn ParticleSource,
     path: &Path,
     most: usize,
-    question: RadiusQuestion,
+    request: Option<SpacingRequest>,
 ) -> Result<Streamed, FrameError> {
     let particles = sample(source, path, most)?;
     let is_radius = |a: &SourceAttribute| a.name.eq_ignore_ascii_case("radius");
     let has_radii = source.attributes().iter().any(is_radius);
-    let spacing = match question.is_auto() && !has_radii {
-        true => spacing(source, &particles.positions, question.is_packed())?,
-        false => None,
+    let spacing = match request.filter(|_| !has_radii) {
+        Some(request) => spacing(source, &particles.positions, request)?,
+        None => None,
     };
     Ok((particles, spacing, extremes(source)?))
 }
@@ -55,7 +54,7 @@ pub(super) fn extremes(source: &dyn ParticleSource) -> Result<Option<(DVec3, DVe
     each_run(source, of_run, || None, join)
 }
 
-/// At most `most` particles of the file `path`, in short runs that are evenly distributed.
+/// At most `most` particles of the file `path`, in short runs that are distributed over it.
 pub(super) fn sample(
     source: &dyn ParticleSource,
     path: &Path,
@@ -63,8 +62,8 @@ pub(super) fn sample(
 ) -> Result<RawParticles, FrameError> {
     // Distribute the runs over the file
     let runs = source.count().div_ceil(SAMPLE_RUN as u64);
-    let stride = runs.div_ceil((most / SAMPLE_RUN).max(1) as u64).max(1);
-    let starts = || (0..runs).step_by(usize::try_from(stride).unwrap_or(usize::MAX));
+    let runs = usize::try_from(runs).unwrap_or(usize::MAX);
+    let starts = || sample_indices(runs, (most / SAMPLE_RUN).max(1)).map(|run| run as u64);
     let run = |number: u64| {
         let first = number * SAMPLE_RUN as u64;
         let len = (source.count() - first).min(SAMPLE_RUN as u64);
@@ -107,30 +106,26 @@ fn decoded(attribute: &SourceAttribute, values: &[u8]) -> Result<Attribute, Pars
     })
 }
 
-/// An even selection of the `sample`, for queries.
-fn query_points(source: &dyn ParticleSource, sample: &Positions) -> Vec<DVec3> {
+/// Some of the `sample`, for queries.
+fn query_points(source: &dyn ParticleSource, sample: &Positions, frames: usize) -> Vec<DVec3> {
     let count = usize::try_from(source.count()).unwrap_or(usize::MAX);
-    let query_count = (NEIGHBOUR_BUDGET / count.max(1)).clamp(LEAST_QUERIES, NEIGHBOUR_QUERIES);
-    let stride = sample.len().div_ceil(query_count).max(1);
-    (0..sample.len())
-        .step_by(stride)
+    sample_indices(sample.len(), neighbour_queries(count, frames))
         .map(|i| sample.get(i))
         .filter(|p| p.is_finite())
         .collect()
 }
 
-/// The spacing of neighbours, from queries for some of the `sample` among all particles. `needs_packed` requests the
-/// radius from the density as well.
+/// The spacing of neighbours, from queries for some of the `sample` among all particles.
 pub(super) fn spacing(
     source: &dyn ParticleSource,
     sample: &Positions,
-    needs_packed: bool,
+    request: SpacingRequest,
 ) -> Result<Option<Spacing>, FrameError> {
-    let queries = query_points(source, sample);
+    let queries = query_points(source, sample, request.frames);
     let Some(touching) = half_nearest(source, &queries)? else {
         return Ok(None);
     };
-    let packed = match needs_packed {
+    let packed = match request.needs_packed {
         true => packing::packed_radius(touching, around(source, &queries, touching)?),
         false => None,
     };
@@ -210,7 +205,7 @@ mod tests {
     use spherule_formats::convert::{BoxSource, RawSource};
     use spherule_formats::generate::BoxSettings;
 
-    use super::super::robust::{estimate_packed, estimate_radius};
+    use super::super::robust::spacing_of;
     use super::*;
 
     #[test]
@@ -224,18 +219,22 @@ mod tests {
         let some = sample(&source, Path::new("box"), 4096).expect("there");
         assert!((3000..=4096).contains(&some.positions.len()));
         assert!((0..some.positions.len()).all(|i| all.contains(&some.positions.get(i))));
-        let streamed = spacing(&source, &some.positions, true)
+        let request = |needs_packed| SpacingRequest {
+            needs_packed,
+            frames: 1,
+        };
+        let streamed = spacing(&source, &some.positions, request(true))
             .expect("there")
             .expect("some");
         let single: Vec<Vec3> = all.iter().map(|p| p.as_vec3()).collect();
-        let whole = estimate_radius(&single).expect("some");
+        let whole = spacing_of(&single, request(true)).expect("some");
         let near = |a: f32, b: f32| assert!((a / b - 1.0).abs() < 0.1, "{a} {b}");
-        near(streamed.touching, whole);
-        let packed = estimate_packed(&single, whole).expect("some");
+        near(streamed.touching, whole.touching);
+        let packed = whole.packed.expect("requested");
         near(streamed.packed.expect("requested"), packed);
         // Nearest neighbours of randomly placed particles are close, so the two estimates differ.
-        assert!(packed > 1.5 * whole, "{packed} {whole}");
-        let without_packed = spacing(&source, &some.positions, false).expect("there");
+        assert!(packed > 1.5 * whole.touching, "{packed} {whole:?}");
+        let without_packed = spacing(&source, &some.positions, request(false)).expect("there");
         assert_eq!(
             without_packed,
             Some(Spacing {
@@ -257,6 +256,11 @@ mod tests {
         };
         let source = RawSource::new(Path::new("nan"), &raw).expect("whole");
         assert_eq!(extremes(&source).expect("there"), None);
-        assert_eq!(spacing(&source, &raw.positions, true).expect("there"), None);
+        let request = SpacingRequest {
+            needs_packed: true,
+            frames: 1,
+        };
+        let spacing = spacing(&source, &raw.positions, request).expect("there");
+        assert_eq!(spacing, None);
     }
 }

@@ -7,7 +7,7 @@ use super::layout::RadiusIndex;
 use super::view::NativeFrame;
 use crate::blocks::{BLOCK_SIZE, StoredLeaves};
 use crate::names::RADIUS;
-use crate::{Attribute, AttributeData, ParseError, Positions, RawParticles};
+use crate::{Attribute, AttributeData, ParseError, Positions, RawParticles, sample_indices};
 
 impl NativeFrame<'_> {
     /// All particles in the order of the file, in world coordinates: f32 if the origin is zero, else f64.
@@ -40,11 +40,9 @@ impl NativeFrame<'_> {
     pub fn sample(&self, most: usize) -> Result<RawParticles, ParseError> {
         let leaves = self.leaves()?;
         let count = self.len()?;
-        // Choose whole blocks at equal distances
+        // Choose whole blocks
         let blocks = count.div_ceil(BLOCK_SIZE);
-        let stride = blocks.div_ceil((most / BLOCK_SIZE).max(1)).max(1);
-        let chosen: Vec<usize> = (0..blocks)
-            .step_by(stride)
+        let chosen: Vec<usize> = sample_indices(blocks, (most / BLOCK_SIZE).max(1))
             .flat_map(|block| block * BLOCK_SIZE..count.min((block + 1) * BLOCK_SIZE))
             .collect();
         let origin = DVec3::from_array(self.index().origin);
@@ -116,7 +114,6 @@ impl NativeFrame<'_> {
         const AROUND: usize = 1536;
         let leaves = self.leaves()?;
         let count = self.len()?;
-        let stride = count.div_ceil(queries.max(1)).max(1);
         let of = |i: usize| {
             let from = leaves.center(i);
             let blocks =
@@ -124,7 +121,7 @@ impl NativeFrame<'_> {
             let others = blocks.flat_map(|block| leaves.block(block).centers());
             reduce(&mut others.map(|to| from.distance_squared(to)))
         };
-        let indices: Vec<usize> = (0..count).step_by(stride).collect();
+        let indices: Vec<usize> = sample_indices(count, queries.max(1)).collect();
         Ok(indices.into_par_iter().map(of).collect())
     }
 
