@@ -244,11 +244,21 @@ impl Manifest {
         })?;
         // Apply the defaults of a look last, to keys that are still missing
         let (under, over): (Vec<_>, Vec<_>) = overrides.into_iter().partition(Override::is_under);
-        for overlay in over.into_iter().chain(under) {
+        let lay_over = |tree: &mut TomlNode, overlay| {
             if let Err(problem) = tree.lay_over(overlay) {
                 problems.errors.borrow_mut().push(problem);
             }
-        }
+        };
+        over.into_iter().for_each(|o| lay_over(&mut tree, o));
+        // The pattern of a look is not that of a ground which is named plain
+        let kinds = [&["render", "ground"][..], &["render", "ground", "type"]];
+        let is_plain = kinds
+            .iter()
+            .any(|keys| tree.has_text(keys, GroundKind::Plain.name()));
+        under
+            .into_iter()
+            .filter(|o| !(is_plain && o.is_of("render.ground_pattern")))
+            .for_each(|o| lay_over(&mut tree, o));
         // Read all keys, then check dependencies between them
         let mut manifest = Self::new("");
         let mut root = Keys::Read(Section::root(&tree, &problems));

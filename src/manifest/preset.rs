@@ -229,6 +229,25 @@ mod tests {
     }
 
     #[test]
+    fn a_ground_that_is_named_plain_has_no_pattern_of_a_look() {
+        let pattern = |text: &str, sets: &[&str]| {
+            let text = format!("input.path = \"data\"\n{text}");
+            water(&text, sets).render.ground_pattern
+        };
+        assert_eq!(pattern("", &["render.ground=plain"]), GroundPattern::Plain);
+        assert_eq!(
+            pattern("render.ground = \"plain\"", &[]),
+            GroundPattern::Plain
+        );
+        assert_eq!(pattern("render.ground = true", &[]), GroundPattern::Sand);
+        for own in ["sand", "checker"] {
+            let set = format!("render.ground_pattern={own}");
+            let both = pattern("", &["render.ground=plain", &set]);
+            assert_eq!(both, pattern("", &[&set]));
+        }
+    }
+
+    #[test]
     fn unknown_look_lists_the_known_ones() {
         let error = Look::named("watre").unwrap_err();
         assert_eq!(

@@ -140,6 +140,11 @@ impl Override {
     pub(super) fn is_under(&self) -> bool {
         self.is_under
     }
+
+    /// Whether it sets the dotted `key`.
+    pub(super) fn is_of(&self, key: &str) -> bool {
+        key.split('.').eq(&self.keys)
+    }
 }
 
 fn split_key(key: &str) -> Result<Vec<String>, OverrideFault> {
@@ -151,13 +156,24 @@ fn split_key(key: &str) -> Result<Vec<String>, OverrideFault> {
 }
 
 impl TomlNode {
+    /// The value of `keys`, each in the table of the one before.
+    fn value(&self, keys: &[&str]) -> Option<&Kind> {
+        keys.iter().try_fold(&self.kind, |kind, key| {
+            let Kind::Table(values) = kind else {
+                return None;
+            };
+            values.get(*key).map(|(_, node)| &node.kind)
+        })
+    }
+
     /// Whether `table` is a table with `key`.
     pub(super) fn contains(&self, table: &str, key: &str) -> bool {
-        let Kind::Table(tables) = &self.kind else {
-            return false;
-        };
-        let table = tables.get(table).map(|(_, node)| &node.kind);
-        matches!(table, Some(Kind::Table(keys)) if keys.contains_key(key))
+        self.value(&[table, key]).is_some()
+    }
+
+    /// Whether the value of `keys` is this `text`.
+    pub(super) fn has_text(&self, keys: &[&str], text: &str) -> bool {
+        matches!(self.value(keys), Some(Kind::Text(found)) if found == text)
     }
 
     /// Parses a whole file.
