@@ -36,6 +36,19 @@ pub(super) struct Hierarchy {
 }
 
 impl Hierarchy {
+    /// The hierarchy of primitives that are in several boxes each: primitive `owners[i]` is in the box `box_of(i)`.
+    pub(super) fn of_parts(owners: &[u32], box_of: impl Fn(u32) -> [DVec3; 2] + Sync) -> Self {
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "the caller limits the number of parts"
+        )]
+        let mut hierarchy = Self::new(owners.len() as u32, box_of);
+        for index in &mut hierarchy.bvh.primitive_indices {
+            *index = owners[*index as usize];
+        }
+        hierarchy
+    }
+
     /// The hierarchy of `count` primitives in the boxes `box_of`: lowest and highest corner.
     pub(super) fn new(count: u32, box_of: impl Fn(u32) -> [DVec3; 2] + Sync) -> Self {
         let nothing = || [DVec3::INFINITY, DVec3::NEG_INFINITY];

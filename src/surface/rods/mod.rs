@@ -11,6 +11,7 @@ use glam::{DVec3, Vec3};
 
 mod arrow;
 mod interval;
+mod parts;
 mod shape;
 
 #[cfg(test)]
@@ -21,6 +22,7 @@ pub use shape::RodSurface;
 
 use super::hierarchy::Hierarchy;
 use interval::Body;
+use parts::parts_of;
 
 /// The shape of both ends of a rod.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,8 +68,8 @@ impl Rod {
     }
 }
 
-/// Greatest number of rods.
-pub const MAX_RODS: usize = u32::MAX as usize;
+/// Greatest number of rods; long ones have several parts each.
+pub const MAX_RODS: usize = u32::MAX as usize / 2;
 
 /// Memory of a rod with its share of the hierarchy, and with a colour, bytes.
 const KEPT_BYTES: u64 = 120;
@@ -99,9 +101,10 @@ impl RodTree {
     pub fn new(mut rods: Vec<Rod>, caps: Caps) -> Self {
         rods.retain(|rod| rod.is_visible(caps));
         rods.truncate(MAX_RODS);
-        #[expect(clippy::cast_possible_truncation, reason = "up to `MAX_RODS`")]
-        let count = rods.len() as u32;
-        let hierarchy = Hierarchy::new(count, |rod| Body::new(&rods[rod as usize], caps).bounds());
+        let parts = parts_of(&rods, extent_of(&rods));
+        let owners: Vec<u32> = parts.iter().map(|part| part.rod).collect();
+        let bounds = |part: u32| parts[part as usize].bounds(&rods, caps);
+        let hierarchy = Hierarchy::of_parts(&owners, bounds);
         let extent = hierarchy
             .bounds()
             .map_or(0.0, |[min, max]| min.abs().max(max.abs()).max_element());
@@ -154,6 +157,14 @@ impl RodTree {
     fn body(&self, rod: u32) -> Body {
         Body::new(&self.rods[rod as usize], self.caps)
     }
+}
+
+/// The largest side of the box of the ends of `rods`.
+fn extent_of(rods: &[Rod]) -> f64 {
+    let ends = rods.iter().flat_map(|rod| rod.ends.map(double));
+    let corners = ends.map(|end| [end; 2]);
+    let bounds = corners.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+    bounds.map_or(0.0, |[min, max]| (max - min).max_element())
 }
 
 /// `vector` in double precision.
