@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use glam::{DVec3, Vec3};
 
 use super::gather::{DEPTHS, MAX_VALUE, MIN_ALBEDO, MIN_NOISE, RELATIVE_NOISE, UNUSABLE_NOISE};
+use super::glints::{ALIKE, BRIGHTER, RADIUS};
 use super::kernels::MAX_DISTANCE;
 use super::settings::{
     ALBEDO_TOLERANCE, DEPTH_TOLERANCE, NORMAL_TOLERANCE, OWN_PART, SLOPE_TOLERANCE,
@@ -24,6 +25,7 @@ fn square(center: Position, radius: i64) -> impl Iterator<Item = Position> {
 pub(super) fn denoise(input: &DenoiseInput<'_>, settings: &DenoiseSettings) -> Vec<DVec3> {
     let mut picture = Picture {
         input,
+        limits: Vec::new(),
         noise: HashMap::new(),
     };
     let (width, height) = (i64::from(input.width), i64::from(input.height));
@@ -31,12 +33,15 @@ pub(super) fn denoise(input: &DenoiseInput<'_>, settings: &DenoiseSettings) -> V
         let columns = move |y| (-border..width + border).map(move |x| [x, y]);
         (-border..height + border).flat_map(columns)
     };
+    picture.limits = rows(0).map(|p| picture.limit(p)).collect();
     picture.noise = rows(1).map(|p| (p, picture.noise_at(p))).collect();
     rows(0).map(|p| picture.filtered(p, settings)).collect()
 }
 
 struct Picture<'a> {
     input: &'a DenoiseInput<'a>,
+    /// The limits of all pixels.
+    limits: Vec<f64>,
     /// The noise of all pixels, and of those in patches at the edges.
     noise: HashMap<Position, f64>,
 }
@@ -97,8 +102,35 @@ impl Picture<'_> {
         [1.0 - odd, odd]
     }
 
-    /// The colours of both halves without albedo.
+    /// The colours of both halves without albedo, within the limit of a glint.
     fn halves(&self, p: Position) -> [DVec3; 2] {
+        let limit = DVec3::splat(self.limits[self.index(p)]);
+        self.unlimited(p).map(|half| half.clamp(-limit, limit))
+    }
+
+    /// The limit of a pixel.
+    fn limit(&self, p: Position) -> f64 {
+        let brightness = |p| {
+            let [even, odd] = self.unlimited(p).map(|half| half.abs().max_element());
+            even.max(odd)
+        };
+        let around = square(p, i64::try_from(RADIUS).expect("few"));
+        let others = around.filter(|q| *q != p && self.is_inside(*q));
+        let mut others: Vec<f64> = others.map(brightness).collect();
+        others.sort_by(|a, b| b.total_cmp(a));
+        let Some(last) = others.len().min(ALIKE).checked_sub(1) else {
+            return f64::INFINITY;
+        };
+        let limit = f64::from(BRIGHTER) * others[last];
+        if brightness(p) > limit {
+            limit
+        } else {
+            f64::INFINITY
+        }
+    }
+
+    /// The colours of both halves without albedo.
+    fn unlimited(&self, p: Position) -> [DVec3; 2] {
         if !self.is_usable(p) {
             return [DVec3::ZERO; 2];
         }

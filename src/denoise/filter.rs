@@ -25,6 +25,8 @@ const DISTANCES_LEN: usize = PATCH_SIDE * 2 * STRIDE;
 pub(super) struct TileFilter<'a> {
     simd: Supported,
     input: &'a DenoiseInput<'a>,
+    /// See [`super::glints`].
+    limits: &'a [f32],
     search: isize,
     /// Factor of the sum of colour distances over a patch.
     color_scale: f32,
@@ -71,7 +73,7 @@ impl<'a> TileFilter<'a> {
     /// For tiles of up to `columns` x `rows` pixels.
     pub(super) fn new(
         simd: Supported,
-        input: &'a DenoiseInput<'a>,
+        (input, limits): (&'a DenoiseInput<'a>, &'a [f32]),
         settings: &DenoiseSettings,
         [columns, rows]: [usize; 2],
     ) -> Self {
@@ -82,6 +84,7 @@ impl<'a> TileFilter<'a> {
         Self {
             simd,
             input,
+            limits,
             search: search as isize,
             color_scale: 1.0 / (settings.k * settings.k * (PATCH_SIDE * PATCH_SIDE) as f32),
             layout,
@@ -103,7 +106,8 @@ impl<'a> TileFilter<'a> {
 
     /// Filters the pixels at `place` into `rows`.
     pub(super) fn filter(&mut self, place: &Rectangle, rows: &mut [&mut [Vec3]]) {
-        self.tile.gather(self.simd, self.input, place);
+        let image = (self.input, self.limits);
+        self.tile.gather(self.simd, image, place);
         for sums in &mut self.sums {
             sums.fill(0.0);
         }
@@ -206,7 +210,8 @@ mod tests {
         };
         for (search, rows) in [(1, 1), (4, 64), (16, 64)] {
             let settings = DenoiseSettings { search, k: 1.0 };
-            let filter = TileFilter::new(Supported::default(), &input, &settings, [16, rows]);
+            let filter =
+                TileFilter::new(Supported::default(), (&input, &[]), &settings, [16, rows]);
             let [p, q] = &filter.sums;
             let values = [p, q, &filter.distances, &filter.pixels].map(Vec::capacity);
             let floats = values.iter().sum::<usize>() + filter.tile.capacity();

@@ -54,7 +54,7 @@ fn is_depth(depth: f32) -> bool {
 
 /// What a component of colours is divided by before they are filtered.
 #[inline(always)]
-fn divisor(albedo: f32, depth: f32) -> f32 {
+pub(super) fn divisor(albedo: f32, depth: f32) -> f32 {
     let albedo = smaller(larger(albedo, MIN_ALBEDO), MAX_VALUE);
     if is_depth(depth) { albedo } else { 1.0 }
 }
@@ -63,6 +63,19 @@ fn divisor(albedo: f32, depth: f32) -> f32 {
 #[inline(always)]
 fn magnitude(values: &[f32; 3]) -> f32 {
     values[0].abs() + values[1].abs() + values[2].abs()
+}
+
+/// Whether a pixel of these values can be filtered: all of them are finite, and their squares.
+#[inline(always)]
+pub(super) fn is_usable(
+    color: &[f32; 3],
+    odd: &[f32; 3],
+    albedo: &[f32; 3],
+    normal: &[f32; 3],
+) -> bool {
+    let color = magnitude(color) + magnitude(odd);
+    let feature = magnitude(albedo) + magnitude(normal);
+    color + feature <= MAX_VALUE
 }
 
 /// Stores 1 for pixels that can be filtered, otherwise 0; and depths, with one value for all missed pixels.
@@ -82,9 +95,7 @@ fn classify_body(
     let depth_plane = &mut depth_plane[..count];
     for x in 0..count {
         let [r, g, b, _] = color[x];
-        let color = magnitude(&[r, g, b]) + magnitude(&odd[x]);
-        let feature = magnitude(&albedo[x]) + magnitude(&normal[x]);
-        usable[x] = if color + feature <= MAX_VALUE {
+        usable[x] = if is_usable(&[r, g, b], &odd[x], &albedo[x], &normal[x]) {
             1.0
         } else {
             0.0
@@ -100,8 +111,8 @@ lane_kernel! {
     ) = classify_body;
 }
 
-/// Computes component `axis` of both halves of a row, divided by albedo, and adds the variance of a half by the
-/// difference of the two. All of it is 0 where a pixel is not usable.
+/// Computes component `axis` of both halves of a row, divided by albedo and within `limits`, and adds the variance of a
+/// half by the difference of the two. All of it is 0 where a pixel is not usable.
 #[inline(always)]
 #[expect(clippy::too_many_arguments, reason = "see `math::lane_kernel`")]
 fn halves_body(
@@ -112,13 +123,14 @@ fn halves_body(
     albedo: &[[f32; 3]],
     depth: &[f32],
     usable: &[f32],
+    limits: &[f32],
     even_plane: &mut [f32],
     odd_plane: &mut [f32],
     variance: &mut [f32],
 ) {
     let count = color.len();
     let (odd, albedo) = (&odd[..count], &albedo[..count]);
-    let (depth, usable) = (&depth[..count], &usable[..count]);
+    let (depth, usable, limits) = (&depth[..count], &usable[..count], &limits[..count]);
     let (even_plane, odd_plane) = (&mut even_plane[..count], &mut odd_plane[..count]);
     let variance = &mut variance[..count];
     let to_even = 1.0 / shares.even;
@@ -127,8 +139,11 @@ fn halves_body(
         let odd = odd[x][axis];
         let even = (color[x][axis] - odd * shares.odd) * to_even;
         let is_usable = usable[x] > 0.0;
-        let even = if is_usable { even * scale } else { 0.0 };
-        let odd = if is_usable { odd * scale } else { 0.0 };
+        let limit = limits[x];
+        let even = larger(smaller(even * scale, limit), -limit);
+        let odd = larger(smaller(odd * scale, limit), -limit);
+        let even = if is_usable { even } else { 0.0 };
+        let odd = if is_usable { odd } else { 0.0 };
         even_plane[x] = even;
         odd_plane[x] = odd;
         variance[x] += 0.5 * (even - odd) * (even - odd);
@@ -138,7 +153,7 @@ fn halves_body(
 lane_kernel! {
     pub(super) fn halves(
         axis: usize, shares: Shares, color: &[[f32; 4]], odd: &[[f32; 3]], albedo: &[[f32; 3]], depth: &[f32],
-        usable: &[f32], even_plane: &mut [f32], odd_plane: &mut [f32], variance: &mut [f32],
+        usable: &[f32], limits: &[f32], even_plane: &mut [f32], odd_plane: &mut [f32], variance: &mut [f32],
     ) = halves_body;
 }
 

@@ -19,6 +19,9 @@
 //! half itself. Otherwise a bright sample that the other half does not have is spread over the window: the error of
 //! water with 16 samples rose from 3.4 to 4.8 of 255, and is 3.3 this way.
 //!
+//! A pixel that is more than 4 times as bright as all but 3 of its 24 neighbours is limited to that when it is filtered;
+//! the rest of its light stays where it is. Otherwise glints of a sun become squares as large as the window.
+//!
 //! The result is the colour of the input plus the filtered change, so pixels without a similar neighbour keep their
 //! bits. Pixels with NaN or infinite values keep theirs, and no other pixel receives them.
 //!
@@ -33,6 +36,7 @@ use crate::math::{SimdLevel, Supported};
 
 mod filter;
 mod gather;
+mod glints;
 mod kernels;
 mod planes;
 mod settings;
@@ -167,11 +171,12 @@ pub fn denoise(
     denoise_with(input, settings, &Execution::default())
 }
 
-/// Upper bound of the memory that filtering needs in addition to the input, of one view or two, bytes: the result, and
-/// the tiles of `threads` threads.
+/// Upper bound of the memory that filtering needs in addition to the input, of one view or two, bytes: the result,
+/// brightness and limits, and the tiles of `threads` threads.
 pub fn predicted_bytes(width: u32, height: u32, settings: &DenoiseSettings, threads: u64) -> u64 {
     let search = settings.search.min(*SEARCH_RADII.end()) as usize;
-    let result = u64::from(width) * u64::from(height) * size_of::<Vec3>() as u64;
+    let result =
+        u64::from(width) * u64::from(height) * (size_of::<Vec3>() + 2 * size_of::<f32>()) as u64;
     let tiles = tiles_bytes(width, height, TileLayout::max_width(search), TILE_ROWS);
     result + tiles + threads * TileFilter::bytes(search, TILE_ROWS) as u64
 }
@@ -205,6 +210,7 @@ fn denoise_with(
     if filtered.is_empty() {
         return Ok(filtered);
     }
+    let limits = glints::limits(input);
     // Divide each view into equal tiles
     let width = input.width as usize;
     let [max_width, max_height] = execution.tile;
@@ -215,7 +221,7 @@ fn denoise_with(
     let tiles = tiles(&mut filtered, width, view, [columns, rows]);
     // Filter them in parallel
     let simd = Supported::or_best(execution.simd);
-    let filter = || TileFilter::new(simd, input, settings, [columns, rows]);
+    let filter = || TileFilter::new(simd, (input, &limits), settings, [columns, rows]);
     tiles
         .into_par_iter()
         .for_each_init(filter, |filter, (place, mut rows)| {

@@ -352,6 +352,57 @@ fn a_bright_sample_does_not_spread() {
     }
 }
 
+/// Glints: pixels that both halves have, or one.
+#[test]
+fn glints_do_not_become_squares() {
+    for (light, glint) in [1e3, 1e4, 1e5].into_iter().flat_map(|light| {
+        let shapes = [
+            &[(20, 20)][..],
+            &[(20, 20), (21, 20)],
+            &[(20, 20), (21, 21), (20, 21)],
+            &[(0, 39)],
+        ];
+        shapes.map(|shape| (light, shape))
+    }) {
+        for part_of_odd in [0.0, 0.4, 1.0] {
+            let mut picture = Picture::new(40, 40, |_, _| (Vec3::ONE, 1.0));
+            picture.add_noise(0.7, 1);
+            let before = picture.denoised();
+            let is_glint = |i: usize| glint.contains(&(i % 40, i / 40));
+            for i in (0..before.len()).filter(|i| is_glint(*i)) {
+                picture.odd[i] += 2.0 * part_of_odd * light;
+                picture.color[i] = picture.color[i].map(|c| c + light);
+            }
+            let after = picture.denoised();
+            let name = format!("{light} {glint:?} {part_of_odd}");
+            let mut sum = 0.0;
+            for i in 0..before.len() {
+                let change = (after[i] - before[i]).x;
+                if is_glint(i) {
+                    // Its light stays where it is
+                    assert!(
+                        (change / light - 1.0).abs() < 0.01,
+                        "{name}: {change} at {i}"
+                    );
+                } else {
+                    // Patches of its neighbours are like no others, so that these keep their noise
+                    let is_beside = |(x, y): &(usize, usize)| {
+                        x.abs_diff(i % 40) <= 1 && y.abs_diff(i / 40) <= 1
+                    };
+                    let limit = if glint.iter().any(is_beside) {
+                        1.0
+                    } else {
+                        0.3
+                    };
+                    assert!(change.abs() < limit, "{name}: {change} at {i}");
+                    sum += change;
+                }
+            }
+            assert!(sum.abs() < 8.0, "{name}: {sum} in all other pixels");
+        }
+    }
+}
+
 #[test]
 fn invalid_input_is_an_error() {
     let picture = Picture::flat(5, 4);

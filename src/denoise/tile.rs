@@ -50,14 +50,20 @@ impl Tile {
         &self.values[self.layout.row(y) * ROW_LEN..][..ROW_LEN]
     }
 
-    /// Fills the planes for the tile at `place`.
-    pub(super) fn gather(&mut self, simd: Supported, input: &DenoiseInput<'_>, place: &Rectangle) {
+    /// Fills the planes for the tile at `place`; `limits` are those of all pixels of `input`.
+    pub(super) fn gather(
+        &mut self,
+        simd: Supported,
+        (input, limits): (&DenoiseInput<'_>, &[f32]),
+        place: &Rectangle,
+    ) {
         let margin = self.layout.margin;
         let rows = place.height + 2 * margin;
         // Copy the rows of the image
         let line = Line {
             simd,
             input,
+            limits,
             margin,
             view: View::around(input, place),
         };
@@ -115,6 +121,7 @@ fn planes_mut<const N: usize>(row: &mut [f32], range: Range<usize>) -> [&mut [f3
 struct Line<'a> {
     simd: Supported,
     input: &'a DenoiseInput<'a>,
+    limits: &'a [f32],
     /// Pixels around the tile.
     margin: usize,
     view: View,
@@ -186,7 +193,7 @@ impl Line<'_> {
         let color = &input.color[pixels.clone()];
         let [odd, albedo, normal] = [input.odd, input.albedo, input.normal]
             .map(|plane| bytemuck::cast_slice(&plane[pixels.clone()]));
-        let depth = &input.depth[pixels];
+        let (depth, limits) = (&input.depth[pixels.clone()], &self.limits[pixels]);
         let usable = &mut usable[to.clone()];
         let planes: [_; NOISE] = planes_mut(row, to);
         let [er, eg, eb, or, og, ob, ar, ag, ab, nx, ny, nz, z, variance] = planes;
@@ -194,7 +201,8 @@ impl Line<'_> {
         variance.fill(0.0);
         for (axis, (even, odd_plane)) in [(er, or), (eg, og), (eb, ob)].into_iter().enumerate() {
             halves(
-                simd, axis, shares, color, odd, albedo, depth, usable, even, odd_plane, variance,
+                simd, axis, shares, color, odd, albedo, depth, usable, limits, even, odd_plane,
+                variance,
             );
         }
         for (axis, plane) in [ar, ag, ab].into_iter().enumerate() {

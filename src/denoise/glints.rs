@@ -1,0 +1,78 @@
+//! Limits of pixels that are much brighter than their neighbours: glints of a sun, and samples of light that few paths
+//! find. Weights of a few hundredths would spread such a pixel as a visible square over the window.
+
+use rayon::prelude::*;
+
+use super::DenoiseInput;
+use super::gather::{Shares, divisor, is_usable};
+
+/// A pixel gives the others at most this many times the light of its neighbours.
+pub(super) const BRIGHTER: f32 = 4.0;
+/// Neighbours on each side that a pixel is compared with.
+pub(super) const RADIUS: usize = 2;
+/// Number of neighbours that are about as bright as a pixel that is no glint; a glint may have fewer.
+pub(super) const ALIKE: usize = 4;
+
+/// The limit of the components of each pixel in both halves, without albedo; infinite unless a pixel is a glint.
+pub(super) fn limits(input: &DenoiseInput<'_>) -> Vec<f32> {
+    let (width, height) = (input.width as usize, input.height as usize);
+    let shares = Shares::of(input.samples);
+    let brightness = (0..width * height).into_par_iter();
+    let brightness: Vec<f32> = brightness
+        .map(|i| brightness_of(input, shares, i))
+        .collect();
+    let view = input.view();
+    let mut limits = vec![f32::INFINITY; brightness.len()];
+    let rows = limits.par_chunks_mut(width.max(1)).enumerate();
+    rows.for_each(|(y, row)| {
+        for (x, limit) in row.iter_mut().enumerate() {
+            let around = [(x, width, view[0]), (y, height, view[1])].map(|(at, length, view)| {
+                let first = at / view * view;
+                let end = (first + view).min(length);
+                at.saturating_sub(RADIUS).max(first)..(at + RADIUS + 1).min(end)
+            });
+            let [columns, rows] = around;
+            // At the edges of tiny views, there are fewer neighbours
+            let needed = ALIKE.min(columns.len() * rows.len() - 1);
+            let all = rows.flat_map(|y| &brightness[y * width..][columns.clone()]);
+            *limit = limit_of(brightness[y * width + x], needed, all);
+        }
+    });
+    limits
+}
+
+/// The largest component of both halves, without albedo; 0 if the pixel cannot be filtered.
+fn brightness_of(input: &DenoiseInput<'_>, shares: Shares, i: usize) -> f32 {
+    let [r, g, b, _] = input.color[i];
+    let (color, odd) = ([r, g, b], input.odd[i].to_array());
+    let (albedo, normal) = (input.albedo[i].to_array(), input.normal[i].to_array());
+    if !is_usable(&color, &odd, &albedo, &normal) {
+        return 0.0;
+    }
+    let component = |axis: usize| {
+        let even = (color[axis] - odd[axis] * shares.odd) / shares.even;
+        even.abs().max(odd[axis].abs()) / divisor(albedo[axis], input.depth[i])
+    };
+    component(0).max(component(1)).max(component(2))
+}
+
+/// The limit of a pixel of this `brightness`, which is one of `all` around it, unless it has as many neighbours of its
+/// kind as are `needed`, at most [`ALIKE`].
+fn limit_of<'a>(brightness: f32, needed: usize, all: impl Iterator<Item = &'a f32>) -> f32 {
+    // The largest ones, falling, with the pixel itself
+    let mut largest = [0.0_f32; ALIKE + 1];
+    let mut alike = 0;
+    for other in all {
+        alike += usize::from(other * BRIGHTER >= brightness);
+        if alike > needed {
+            return f32::INFINITY;
+        }
+        let mut rest = *other;
+        for place in &mut largest {
+            if rest > *place {
+                std::mem::swap(place, &mut rest);
+            }
+        }
+    }
+    BRIGHTER * largest[needed]
+}
