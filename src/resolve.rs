@@ -8,7 +8,7 @@ use spherule_formats::native::Access;
 use crate::accel::{BvhSettings, SbvhSettings};
 use crate::manifest::{IndirectSetting, Manifest, RadiusSetting, nearest};
 use crate::metrics::memory::available;
-use crate::output::{ExrOptions, PlaneNames, PreviewOptions};
+use crate::output::{ExrOptions, PlaneNames, PreviewBackground, PreviewOptions};
 use crate::overlay::RgbaPixels;
 use crate::pipeline::{
     FrameSize, MemoryModel, Picture, RadiusRule, RunSettings, Setup, attribute_list,
@@ -336,10 +336,14 @@ pub fn setup(
         overlay_values: Vec::new(),
         preview: PreviewOptions {
             exposure: output.preview_exposure,
-            backdrop: None,
+            background: match output.transparent {
+                true => PreviewBackground::Transparent,
+                false => PreviewBackground::Included,
+            },
             first_pixel: window.map_or([0, 0], |window| [window.left, window.top]),
             dpi: image.dpi,
         },
+        has_opaque_previews: manifest.has_opaque_previews && output.transparent,
     };
     // Collect the settings of the run
     let run = RunSettings {

@@ -99,6 +99,8 @@ def test_threads_do_not_change_bytes(ball):
 def test_no_particles_are_a_picture(small):
     image = spherule.render(np.zeros((0, 3), np.float32), radius=0.1, settings={"output.transparent": True}, **small)
     assert not image.rgba[..., 3].any()
+    # The colour type in the header of the PNG: with alpha
+    assert image.to_png()[25] == 6
 
 
 def test_frames_of_a_sequence_are_read_when_asked_for(example):

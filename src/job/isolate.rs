@@ -30,6 +30,8 @@ pub struct IsolatedTask {
     dir: PathBuf,
     /// The manifest, as TOML.
     manifest: String,
+    /// See [`Manifest::has_opaque_previews`].
+    has_opaque_previews: bool,
     /// The resolved automatic settings.
     resolved: Value,
     frame: i64,
@@ -72,7 +74,8 @@ pub fn render_task(task: IsolatedTask) -> Result<IsolatedResult, RunError> {
 }
 
 fn render(task: IsolatedTask) -> Result<Outcome, RunError> {
-    let manifest = Manifest::parse(&task.manifest, &task.dir.join("job.toml"))?;
+    let mut manifest = Manifest::parse(&task.manifest, &task.dir.join("job.toml"))?;
+    manifest.has_opaque_previews = task.has_opaque_previews;
     let manifest = JobManifest::new(manifest, task.dir);
     let sequence = manifest.open_sequence()?;
     let render_job = RenderJob::new(manifest, &sequence, None)?;
@@ -153,6 +156,7 @@ impl IsolatedRender<'_> {
             owner: owner().to_owned(),
             dir: self.render_job.dir().to_owned(),
             manifest: manifest.to_commented_toml(),
+            has_opaque_previews: manifest.has_opaque_previews,
             resolved: self.resolved.clone(),
             frame,
             ceiling: manifest.job.memory_ceiling.map(|limit| limit.0),

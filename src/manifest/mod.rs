@@ -159,6 +159,8 @@ pub struct Manifest {
     pub output: Output,
     /// Execution options; no image depends on them.
     pub job: Work,
+    /// Whether the PNG of an image without background has one, as in jobs of earlier versions. It has no key.
+    pub has_opaque_previews: bool,
 }
 
 /// All problems of a manifest, one line each.
@@ -204,6 +206,7 @@ impl Manifest {
             overlays: Vec::new(),
             output: Output::default(),
             job: Work::default(),
+            has_opaque_previews: false,
         }
     }
 
@@ -528,7 +531,16 @@ impl Manifest {
         if is_rough && self.integrator() == IntegratorKind::Path {
             settings.push((same::ROUGH_INTERFACE.to_owned(), "true".to_owned()));
         }
+        // Versions whose previews showed the background had the same keys
+        if self.has_transparent_previews() {
+            settings.push((same::PREVIEW_ALPHA.to_owned(), "true".to_owned()));
+        }
         settings
+    }
+
+    /// Whether the PNG next to an image has alpha.
+    const fn has_transparent_previews(&self) -> bool {
+        self.output.transparent && self.output.preview && !self.has_opaque_previews
     }
 
     /// A complete manifest with every key and comments; reading it gives an equal manifest.

@@ -52,7 +52,7 @@ section! {
         preview: bool = true;
         /// Exposure of the PNG, stops
         preview_exposure: f32 = 0.0, from(-100), to(100), unit("stops");
-        /// Omit the background from the EXR, for compositing; previews show it
+        /// Omit the background, for compositing: the EXR and the PNG have alpha
         transparent: bool = false;
         /// Time from one frame to the next, for the channel motion
         ///

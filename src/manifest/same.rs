@@ -36,6 +36,9 @@ pub(super) const RENDERER: &str = "renderer";
 /// Whether glass or water is rough; not a key of manifests.
 pub(super) const ROUGH_INTERFACE: &str = "material.rough_interface";
 
+/// Whether previews of images without background have alpha; not a key of manifests.
+pub(super) const PREVIEW_ALPHA: &str = "output.preview_alpha";
+
 impl Manifest {
     /// Gives automatic settings the defaults of the version that made a plan with the settings `planned`, so that a job
     /// is finished as it was begun.
@@ -51,13 +54,16 @@ impl Manifest {
         if render.ground.is_none() && is_old(GROUND, OLD_GROUND) {
             render.ground = Some(GroundSetting::of(GroundKind::None));
         }
-        // Versions without these keys had dry ground, and spray of spheres
+        // Versions without these keys had dry ground, spray of spheres, and previews with a background
         let has = |name: &str| planned.iter().any(|(key, _)| key == name);
         if self.has_path_traced_body() && !has(GROUND_WETNESS) {
             self.render.ground_wetness = 0.0;
         }
         if self.has_path_traced_spray() && !has(SPRAY_STYLE) {
             self.surface.spray_style = SprayStyle::Spheres;
+        }
+        if self.has_transparent_previews() && !has(PREVIEW_ALPHA) {
+            self.has_opaque_previews = true;
         }
     }
 
@@ -218,6 +224,19 @@ mod tests {
             let settings = manifest(rest).settings();
             assert!(settings.iter().all(|(key, _)| key != SPRAY_STYLE), "{rest}");
         }
+    }
+
+    #[test]
+    fn jobs_of_older_versions_keep_the_background_of_previews() {
+        let current = manifest("output.transparent = true");
+        let planned = rewritten(&current, PREVIEW_ALPHA, None);
+        let mut adopted = current.clone();
+        adopted.adopt_old_defaults(&planned);
+        assert!(adopted.has_opaque_previews && !current.has_opaque_previews);
+        assert_eq!(changes(&adopted, &planned, false), [""; 0]);
+        let mut same = current.clone();
+        same.adopt_old_defaults(&current.settings());
+        assert_eq!(same, current);
     }
 
     #[test]

@@ -12,5 +12,5 @@ pub use exr::{
     OutputError, PackBuffers, PackedBlock, PlaneNames, TextAttribute, ambiguous_name,
     attribute_planes, encode_exr, layer_planes, pack_block, write_blocks, write_exr,
 };
-pub use preview::{PreviewOptions, encode_preview};
+pub use preview::{PreviewBackground, PreviewOptions, encode_preview};
 pub use verify::{ImageFault, ImageShape, verify_exr, verify_preview};

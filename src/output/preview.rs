@@ -1,4 +1,4 @@
-//! PNG previews: the film over an opaque background, after the view transform.
+//! PNG previews: the film after the view transform, with its alpha if the background is transparent.
 
 use glam::Vec3;
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
@@ -17,12 +17,24 @@ use crate::render::Film;
 pub struct PreviewOptions {
     /// Exposure in stops: each stop doubles the brightness.
     pub exposure: f32,
-    /// Linear RGB behind a film with a transparent background. `None` for a film whose colours include the background.
-    pub backdrop: Option<Vec3>,
+    /// What is behind the film.
+    pub background: PreviewBackground,
     /// Column and row of the first pixel in the whole image, so that the dithering of a part is that of the whole.
     pub first_pixel: [i32; 2],
     /// Pixels per inch on paper, if they are stored.
     pub dpi: Option<u32>,
+}
+
+/// What is behind the film in a preview.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum PreviewBackground {
+    /// Nothing more: its colours include the background.
+    #[default]
+    Included,
+    /// Nothing: the PNG has alpha, and its colours are not multiplied by it.
+    Transparent,
+    /// A colour, linear RGB.
+    Color(Vec3),
 }
 
 /// Encodes `film` as an 8-bit sRGB PNG, dithered, with `overlays` over it.
@@ -36,14 +48,29 @@ pub fn encode_preview(
 ) -> Result<Vec<u8>, OutputError> {
     let gain = exp2(options.exposure);
     let width = film.width.max(1) as usize;
-    let mut bytes = vec![0; film.color.len() * 3];
+    let is_transparent = options.background == PreviewBackground::Transparent;
+    let color_type = if is_transparent {
+        ExtendedColorType::Rgba8
+    } else {
+        ExtendedColorType::Rgb8
+    };
+    let pixel_len = usize::from(color_type.channel_count());
+    let mut bytes = vec![0; film.color.len() * pixel_len];
     let (mut linear, mut thresholds) = (vec![0.0; 3 * width], vec![0.0; 3 * width]);
-    let rows = film.color.chunks(width).zip(bytes.chunks_mut(3 * width));
+    let mut colors = vec![0; 3 * width];
+    let rows = film
+        .color
+        .chunks(width)
+        .zip(bytes.chunks_mut(pixel_len * width));
     for (y, (row, bytes)) in (0..film.height).zip(rows) {
         let pixels = linear.as_chunks_mut().0.iter_mut();
         for (pixel, &[r, g, b, a]) in pixels.zip(row) {
-            let background = options.backdrop.unwrap_or_default() * (1.0 - a);
-            *pixel = view_transform((Vec3::new(r, g, b) + background) * gain).to_array();
+            let color = match options.background {
+                PreviewBackground::Included => Vec3::new(r, g, b),
+                PreviewBackground::Transparent => straight(Vec3::new(r, g, b), a),
+                PreviewBackground::Color(color) => Vec3::new(r, g, b) + color * (1.0 - a),
+            };
+            *pixel = view_transform(color * gain).to_array();
         }
         let pixels = thresholds.as_chunks_mut::<3>().0.iter_mut();
         let [left, top] = options.first_pixel.map(i32::cast_unsigned);
@@ -51,20 +78,51 @@ pub fn encode_preview(
             // One threshold for all components, so that grey stays grey
             *pixel = [dither_threshold(left.wrapping_add(x), top.wrapping_add(y)); 3];
         }
-        bytes_from_linear(Supported::default(), &linear, &thresholds, bytes);
-        let row = i32::try_from(y).unwrap_or(i32::MAX);
-        overlays
-            .iter()
-            .for_each(|overlay| overlay.draw_over(row, bytes));
+        bytes_from_linear(Supported::default(), &linear, &thresholds, &mut colors);
+        let y = i32::try_from(y).unwrap_or(i32::MAX);
+        if is_transparent {
+            add_alpha(&colors, row, &thresholds, bytes);
+            overlays.iter().for_each(|o| o.draw_over_rgba(y, bytes));
+        } else {
+            bytes.copy_from_slice(&colors);
+            overlays.iter().for_each(|o| o.draw_over(y, bytes));
+        }
     }
     let mut file = Vec::new();
     PngEncoder::new(&mut file)
-        .write_image(&bytes, film.width, film.height, ExtendedColorType::Rgb8)
+        .write_image(&bytes, film.width, film.height, color_type)
         .map_err(OutputError::Png)?;
     if let Some(dpi) = options.dpi {
         file.splice(AFTER_HEADER..AFTER_HEADER, density_chunk(dpi));
     }
     Ok(file)
+}
+
+/// A colour that is not multiplied by `alpha`; black where nothing covers the background.
+fn straight(premultiplied: Vec3, alpha: f32) -> Vec3 {
+    if alpha > 0.0 {
+        premultiplied / alpha
+    } else {
+        Vec3::ZERO
+    }
+}
+
+/// Joins the `colors` of a row with the alpha of `pixels`, dithered like them.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "in 0 to 255 after clamping; NaN becomes 0"
+)]
+fn add_alpha(colors: &[u8], pixels: &[[f32; 4]], thresholds: &[f32], rgba: &mut [u8]) {
+    let colors = colors.as_chunks::<3>().0.iter();
+    let thresholds = thresholds.as_chunks::<3>().0.iter();
+    let pixels = pixels.iter().zip(colors).zip(thresholds);
+    for (rgba, ((pixel, &[r, g, b]), [threshold, ..])) in
+        rgba.as_chunks_mut().0.iter_mut().zip(pixels)
+    {
+        let alpha = pixel[3].clamp(0.0, 1.0) * 255.0 + threshold;
+        *rgba = [r, g, b, alpha as u8];
+    }
 }
 
 /// Bytes of a PNG file up to the chunk after `IHDR`: signature, and a chunk with 13 bytes of data.
@@ -163,17 +221,45 @@ mod tests {
     }
 
     #[test]
-    fn exposure_and_backdrop() {
+    fn exposure_and_background() {
         let options = PreviewOptions {
             exposure: 1.0,
             ..PreviewOptions::default()
         };
         assert_near(mean([0.18, 0.0, 0.0, 1.0], &options).x, 0.36);
         let options = PreviewOptions {
-            exposure: 0.0,
-            backdrop: Some(Vec3::new(0.18, 0.2, 0.0)),
+            background: PreviewBackground::Color(Vec3::new(0.18, 0.2, 0.0)),
             ..PreviewOptions::default()
         };
         assert_near(mean([0.09, 0.0, 0.0, 0.5], &options).x, 0.18);
+    }
+
+    #[test]
+    fn a_transparent_background_has_straight_alpha() {
+        let options = PreviewOptions {
+            background: PreviewBackground::Transparent,
+            ..PreviewOptions::default()
+        };
+        let mut film = film([0.0; 4]);
+        film.color[1] = [0.5, 0.02, 1.0, 1.0];
+        film.color[2] = [0.09, 0.01, 0.5, 0.5];
+        film.color[3] = [f32::NAN, 0.5, 0.5, f32::NAN];
+        let png = encode_preview(&film, &options, &[]).unwrap();
+        let image = image::load_from_memory(&png).unwrap();
+        assert_eq!(image.color(), image::ColorType::Rgba8);
+        let pixels: Vec<[u8; 4]> = image.into_rgba8().pixels().map(|p| p.0).collect();
+        assert_eq!(pixels[0], [0; 4]);
+        // Colours are those of what covers the pixel, whatever part of it
+        for (pixel, linear, alpha) in [
+            (pixels[1], [0.5, 0.02, 1.0], 255.0),
+            (pixels[2], [0.18, 0.02, 1.0], 127.5),
+        ] {
+            let [r, g, b] = linear.map(|linear| 255.0 * srgb_from_linear(linear));
+            for (byte, expected) in pixel.into_iter().zip([r, g, b, alpha]) {
+                assert!((f32::from(byte) - expected).abs() <= 1.0, "{pixel:?}");
+            }
+        }
+        assert_eq!(pixels[1][3], 255);
+        assert_eq!(pixels[3][3], 0);
     }
 }

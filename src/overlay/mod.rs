@@ -190,6 +190,24 @@ impl Sprite {
         });
     }
 
+    /// The same over the row of a picture with alpha, whose colours are not multiplied by it.
+    pub fn draw_over_rgba(&self, y: i32, row: &mut [u8]) {
+        let row = row.as_chunks_mut::<4>().0;
+        self.each_in_row(y, row.len(), |x, [r, g, b, a]| {
+            // In units of 1 / 255^2
+            let below = u32::from(row[x][3]) * u32::from(255 - a);
+            let alpha = 255 * u32::from(a) + below;
+            if alpha == 0 {
+                return;
+            }
+            for (byte, over) in row[x].iter_mut().zip([r, g, b]) {
+                let sum = 255 * 255 * u32::from(over) + u32::from(*byte) * below;
+                *byte = u8::try_from((sum + alpha / 2) / alpha).unwrap_or(u8::MAX);
+            }
+            row[x][3] = u8::try_from((alpha + 127) / 255).unwrap_or(u8::MAX);
+        });
+    }
+
     /// Calls `visit` with the column and the colour of each pixel in row `y` of a picture with `width` columns.
     pub fn each_in_row(&self, y: i32, width: usize, mut visit: impl FnMut(usize, [u8; 4])) {
         let inside = y

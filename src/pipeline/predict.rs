@@ -22,7 +22,7 @@ use crate::accel::moving::MovingTree;
 use crate::accel::{BuildBytes, BuildSettings, Structure, predicted_bytes, predicted_stored_bytes};
 use crate::denoise;
 use crate::metrics::Bytes;
-use crate::output::PackBuffers;
+use crate::output::{PackBuffers, PreviewBackground};
 use crate::overlay;
 use crate::render::{Film, floor_light_bytes, scratch_bytes};
 use crate::scene::ground::Pattern;
@@ -595,8 +595,12 @@ impl<'a> MemoryModel<'a> {
         let threads = rayon::current_num_threads() as u64;
         // Each thread compresses one band, and some compressed bands wait, at worst at their original size.
         let bands = (threads + 1) * PackBuffers::predicted_bytes(band) + (threads + 2) * band;
+        let preview = match self.setup.picture.preview.background {
+            PreviewBackground::Transparent => 12 * pixels,
+            PreviewBackground::Included | PreviewBackground::Color(_) => 9 * pixels,
+        };
         let overlays = overlay::bytes(&self.setup.picture.overlays, render.width, render.height);
-        (9 * pixels + overlays).max(bands)
+        (preview + overlays).max(bands)
     }
 }
 

@@ -9,7 +9,7 @@ use super::rods::CellStyle;
 use super::shutter::{FrameStep, Shutter};
 use crate::accel::{BuildSettings, BvhSettings, SbvhSettings, Structure, choose};
 use crate::denoise::DenoiseSettings;
-use crate::output::{ExrOptions, PreviewOptions};
+use crate::output::{ExrOptions, PreviewBackground, PreviewOptions};
 use crate::overlay::Overlay;
 use crate::render::{RenderSettings, RendererKind};
 use crate::scene::{
@@ -267,8 +267,10 @@ pub struct Picture {
     pub overlays: Vec<Overlay>,
     /// Names of the values whose ranges overlays show.
     pub overlay_values: Vec<String>,
-    /// Options of the PNG; [`Setup::preview_from`] adds the background.
+    /// Options of the PNG; [`Setup::preview_from`] adds the background of jobs of earlier versions.
     pub preview: PreviewOptions,
+    /// Whether previews of images without background have one, as in jobs of earlier versions.
+    pub has_opaque_previews: bool,
 }
 
 /// Execution options of a run.
@@ -375,13 +377,14 @@ impl Setup {
         })
     }
 
-    /// Options for the PNG of an image from `camera`: a film without background gets one.
+    /// Options for the PNG of an image from `camera`.
     pub fn preview_from(&self, camera: &Camera) -> PreviewOptions {
-        let behind = || self.picture.scene.background.color(camera.forward());
-        PreviewOptions {
-            backdrop: self.picture.render.transparent_background.then(behind),
-            ..self.picture.preview
+        let mut options = self.picture.preview;
+        if self.picture.has_opaque_previews {
+            let behind = self.picture.scene.background.color(camera.forward());
+            options.background = PreviewBackground::Color(behind);
         }
+        options
     }
 
     /// Settings for the tree of a frame with `particles`, with or without values for colours.

@@ -1,5 +1,6 @@
 use super::*;
 use crate::manifest::{CameraKey as Key, RadiusSetting, Side};
+use crate::output::PreviewBackground;
 use crate::pipeline::Setup;
 use crate::render::IntegratorKind;
 use crate::survey::Survey;
@@ -96,19 +97,22 @@ fn each_frame_has_its_camera_and_all_have_the_same_light() {
 }
 
 #[test]
-fn preview_backdrop_follows_the_camera() {
+fn previews_of_older_jobs_have_a_background_that_follows_the_camera() {
     let keys = [key(1, [5.0, 0.0, -4.0]), key(2, [5.0, 0.0, 4.0])];
-    let setup = keyed_setup(keys).unwrap();
+    let mut setup = keyed_setup(keys).unwrap();
+    setup.picture.has_opaque_previews = true;
     let behind = |frame| {
         let camera = setup.camera_at(frame).unwrap();
-        let shown = setup.preview_from(&camera).backdrop;
-        assert_eq!(
-            shown,
-            Some(setup.picture.scene.background.color(camera.forward()))
-        );
+        let shown = setup.preview_from(&camera).background;
+        let color = setup.picture.scene.background.color(camera.forward());
+        assert_eq!(shown, PreviewBackground::Color(color));
         shown
     };
     assert_ne!(behind(1), behind(2));
+    setup.picture.has_opaque_previews = false;
+    let camera = setup.camera_at(1).unwrap();
+    let background = setup.preview_from(&camera).background;
+    assert_eq!(background, PreviewBackground::Transparent);
 }
 
 #[test]
