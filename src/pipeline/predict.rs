@@ -186,6 +186,8 @@ pub struct MemoryModel<'a> {
     in_place: bool,
     /// Memory of the meshes that all frames share.
     meshes: u64,
+    /// The same while they are read, before the first frame.
+    reading_meshes: u64,
 }
 
 /// Memory of the program: its data, the stacks of its threads and small allocations; large allocations are returned
@@ -225,6 +227,7 @@ impl<'a> MemoryModel<'a> {
             has_velocities: known.velocities,
             in_place: known.in_place && setup.traces_in_place(),
             meshes: shared_meshes(setup),
+            reading_meshes: reading_shared_meshes(setup),
         }
     }
 
@@ -258,35 +261,53 @@ impl<'a> MemoryModel<'a> {
     fn arrows(&self, frame: &FrameSize) -> SurfaceBytes {
         let picture = &self.setup.picture;
         let share = |every: u32| frame.particles.div_ceil(u64::from(every.max(1)));
-        let arrows = picture.arrows.iter().map(|style| 2 * share(style.every));
-        let trails = picture.trails.iter();
-        let trails = trails.map(|style| share(style.every).saturating_mul(style.frames.into()));
-        let bonds = picture.bonds.iter();
-        let bonds = bonds.map(|_| frame.particles.saturating_mul(MAX_BONDS_EACH));
-        let [building, kept] = RodTree::predicted_bytes(arrows.chain(trails).chain(bonds).sum());
+        let none = [0_u64; 2];
+        // Rods, and their colours
+        let arrows = picture.arrows.iter().map(|style| {
+            let arrows = share(style.every);
+            [2 * arrows, style.color.as_ref().map_or(0, |_| arrows)]
+        });
+        let trails = picture.trails.as_ref().map_or(none, |style| {
+            let trails = share(style.every);
+            let rods = trails.saturating_mul(style.frames.into());
+            [rods, style.color.as_ref().map_or(0, |_| trails)]
+        });
+        let bonds = picture.bonds.as_ref().map_or(none, |_| {
+            let rods = frame.particles.saturating_mul(MAX_BONDS_EACH);
+            [rods, frame.particles]
+        });
+        let [rods, colors] = arrows.chain([trails, bonds]).fold(none, |sum, more| {
+            [0, 1].map(|i| sum[i].saturating_add(more[i]))
+        });
+        let [building, kept] = RodTree::predicted_bytes(rods, colors);
         SurfaceBytes { building, kept }
     }
 
     /// The same, with the arrows and the meshes of the frame, which are made and read after its particles.
     fn reading_with_meshes(&self, frame: &FrameSize) -> u64 {
-        let arrows = self.arrows(frame).building;
-        arrows
-            + match frame.meshes {
-                0 => self.reading(frame),
-                bytes => {
-                    // Those of the next frame are read beside them
-                    let slices = u64::from(self.setup.slices());
-                    let slices = match slices {
-                        1 => 0,
-                        _ => {
-                            (slices * KEPT_PER_MESH_BYTE + READ_PER_MESH_BYTE).saturating_mul(bytes)
-                        }
-                    };
-                    let meshes =
-                        self.kept(frame) + READ_PER_MESH_BYTE.saturating_mul(bytes) + slices;
-                    self.reading(frame).max(meshes)
-                }
-            }
+        let reading = self.reading(frame).max(self.making_rods(frame));
+        if frame.meshes == 0 {
+            return reading;
+        }
+        // Those of the next frame are read beside them
+        let slices = u64::from(self.setup.slices());
+        let slices = match slices {
+            1 => 0,
+            _ => (slices * KEPT_PER_MESH_BYTE + READ_PER_MESH_BYTE).saturating_mul(frame.meshes),
+        };
+        let meshes = READ_PER_MESH_BYTE.saturating_mul(frame.meshes) + slices;
+        reading.max(self.kept(frame) + self.arrows(frame).kept + meshes)
+    }
+
+    /// Memory while arrows, trails and bonds are made from the particles of a frame, which were read; and while what
+    /// is kept of these is taken from them.
+    fn making_rods(&self, frame: &FrameSize) -> u64 {
+        let rods = self.arrows(frame);
+        if rods.building == 0 {
+            return 0;
+        }
+        let held = frame.raw + self.file_indices(frame);
+        held + rods.building.max(rods.kept + self.kept(frame))
     }
 
     /// Bytes of a native frame that is not mapped.
@@ -547,7 +568,11 @@ impl<'a> MemoryModel<'a> {
                 self.reading_with_meshes(after).max(idle.reading)
             }),
             particles: self.shading(frame),
-            tree,
+            // Spheres in motion have a tree of their own instead
+            tree: match (self.setup.picture.surface.kind, self.setup.has_motion()) {
+                (SurfaceKind::Spheres, true) => 0,
+                _ => tree,
+            },
             surface: surface.kept + meshes,
             images: film + film_before + denoising.max(self.tracing_scratch() * threads),
             encoding: encoding_before + names,
@@ -559,7 +584,13 @@ impl<'a> MemoryModel<'a> {
             encoding: self.encoding() + names,
             ..idle
         };
-        first_read.larger(building).larger(tracing).larger(encoding)
+        let starting = MemoryNeed {
+            surface: self.reading_meshes,
+            program: PROGRAM + THREAD * threads,
+            ..MemoryNeed::default()
+        };
+        let frame = first_read.larger(building).larger(tracing).larger(encoding);
+        starting.larger(frame)
     }
 
     /// Memory of the planes of an image.
@@ -622,6 +653,17 @@ fn ground_image_bytes(ground: &Ground) -> u64 {
 fn shared_meshes(setup: &Setup) -> u64 {
     let trees = (setup.picture.meshes.iter()).filter_map(|mesh| mesh.tree.as_ref());
     trees.map(|tree| tree.bytes() as u64).sum()
+}
+
+/// Memory for reading the meshes that all frames share: each of them is built next to those before it.
+fn reading_shared_meshes(setup: &Setup) -> u64 {
+    let trees = (setup.picture.meshes.iter()).filter_map(|mesh| mesh.tree.as_ref());
+    let sums = trees.scan(0, |before, tree| {
+        let need = *before + tree.building_bytes();
+        *before += tree.bytes() as u64;
+        Some(need)
+    });
+    sums.max().unwrap_or(0)
 }
 
 /// Bytes of a sorted particle, with its volume and its share of the bins.

@@ -1,8 +1,16 @@
 //! Tests of the model alone; `tests/suite/memory` compares it with measurements.
 
+use std::sync::Arc;
+
+use glam::{DVec3, Vec3};
+use spherule_formats::MemoryBudget;
+
 use super::*;
-use crate::pipeline::{ArrowStyle, BondRule, BondStyle, Overlap, TrailStyle};
+use crate::pipeline::{
+    ArrowStyle, BondRule, BondStyle, MeshSettings, Overlap, PictureMesh, TrailStyle,
+};
 use crate::surface::MaterialId;
+use crate::surface::mesh::{MeshNormals, MeshTree, TriangleMesh, VisibleFaces};
 use crate::surface::rods::Anchor;
 
 /// A frame of plain single-precision positions.
@@ -192,4 +200,37 @@ fn arrows_trails_and_bonds_are_counted() {
         bonds.total() >= none.total() + each(MAX_BONDS_EACH, 100),
         "{none}\n{bonds}"
     );
+}
+
+#[test]
+fn shared_meshes_are_built_before_the_first_frame() {
+    let mut setup = setup();
+    let corner = |i: u16| Vec3::new(f32::from(i), f32::from(i % 7), f32::from(i % 3));
+    let vertices: Vec<Vec3> = (0..60_000).map(corner).collect();
+    let triangles = (0..150_000).map(|i| [0, 1, 2].map(|corner| i % 50_000 + corner));
+    let mesh = TriangleMesh::new(vertices, triangles.collect(), MeshNormals::Flat).expect("valid");
+    let count = mesh.len() as u64;
+    let tree = Arc::new(MeshTree::new(mesh));
+    let picture = PictureMesh {
+        settings: MeshSettings {
+            scale: 1.0,
+            translate: DVec3::ZERO,
+            origin: DVec3::ZERO,
+            normals: MeshNormals::Flat,
+            faces: VisibleFaces::Both,
+            particle_extent: 1.0,
+            budget: MemoryBudget::UNLIMITED,
+        },
+        tree: Some(Arc::clone(&tree)),
+    };
+    setup.picture.render.width = 8;
+    setup.picture.render.height = 8;
+    setup.picture.meshes = vec![picture.clone(), picture];
+    // The second one is built next to the first
+    let building = MemoryModel::new(&setup).alone(&plain(10));
+    assert_eq!(
+        building.surface,
+        tree.bytes() as u64 + tree.building_bytes()
+    );
+    assert!(tree.building_bytes() >= count * 300);
 }

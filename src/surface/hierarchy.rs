@@ -23,6 +23,10 @@ const PADDING: f32 = 8.0 * f32::EPSILON;
 /// the first 1e-4 of a ray.
 const LEAD: f64 = 1e-3;
 
+/// Memory of `obvhs` for a box while a hierarchy is built, with its share of the hierarchy, bytes. Measured on triangles
+/// and rods, as the remainder of what they hold themselves.
+pub(super) const BUILT_BYTES: u64 = 296;
+
 /// `value` in single precision.
 #[expect(clippy::cast_possible_truncation, reason = "rounds")]
 pub(super) const fn single(value: f64) -> f32 {

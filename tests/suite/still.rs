@@ -166,3 +166,68 @@ fn help_has_examples_and_no_job_options() {
         assert!(!help.contains(hidden), "{hidden} in\n{help}");
     }
 }
+
+#[test]
+fn pictures_without_background_have_alpha() {
+    let workshop = workshop();
+    let options = [
+        "--set",
+        "output.transparent=true",
+        "--ground=none",
+        "--color-by",
+        "velocity",
+    ];
+    still(
+        &workshop,
+        &[&options[..], &["--frame", "3", "-o", "a.png"]].concat(),
+    )
+    .expect(0);
+    let picture = image::open(workshop.join("a.png")).expect("a picture");
+    assert_eq!(picture.color(), image::ColorType::Rgba8);
+    let pixels: Vec<[u8; 4]> = picture.into_rgba8().pixels().map(|p| p.0).collect();
+    assert_eq!(pixels[0], [0; 4]);
+    // Particles are opaque, and have the colours that they have in front of a background
+    still(
+        &workshop,
+        &[&options[2..], &["--frame", "3", "-o", "b.png"]].concat(),
+    )
+    .expect(0);
+    let opaque = image::open(workshop.join("b.png"))
+        .expect("a picture")
+        .into_rgb8();
+    let particles = pixels
+        .iter()
+        .zip(opaque.pixels())
+        .filter(|(pixel, _)| pixel[3] == 255);
+    let mut count = 0;
+    for ([r, g, b, _], other) in particles {
+        count += 1;
+        let difference = [r, g, b]
+            .into_iter()
+            .zip(other.0)
+            .map(|(a, b)| a.abs_diff(b))
+            .max();
+        assert!(difference <= Some(1), "{difference:?}");
+    }
+    assert!(count > 50, "{count}");
+    assert!(
+        pixels
+            .iter()
+            .all(|[r, g, b, a]| *a > 0 || [r, g, b] == [&0; 3])
+    );
+    // Previews of jobs are the same, and other commands read them
+    workshop.render(&options).expect(0);
+    let preview = fs::read(workshop.join("out/f.0003.png")).expect("a preview");
+    assert_eq!(
+        preview,
+        fs::read(workshop.join("a.png")).expect("a picture")
+    );
+    for command in [
+        &["verify", "out"][..],
+        &["sheet", "out", "-o", "sheet.png"],
+        &["movie", "out", "-o", "movie.gif"],
+        &["view", "out", "-o", "view.html"],
+    ] {
+        workshop.run(command).expect(0);
+    }
+}

@@ -9,7 +9,7 @@ use super::{TriangleMesh, VisibleFaces};
 use crate::accel::Coherence;
 use crate::math::lanes_in;
 use crate::ray::{Ray, RayPacket};
-use crate::surface::hierarchy::{Hierarchy, single};
+use crate::surface::hierarchy::{BUILT_BYTES, Hierarchy, single};
 use crate::surface::{Intersection, MaterialId, Shape, Side};
 
 /// Distance by which rays step off a surface, in units of the rounding of the largest coordinate.
@@ -58,6 +58,11 @@ impl MeshTree {
     /// Memory of the mesh and its hierarchy, bytes.
     pub const fn bytes(&self) -> usize {
         self.mesh.bytes() + self.hierarchy.bytes()
+    }
+
+    /// Memory while the hierarchy is built, bytes.
+    pub const fn building_bytes(&self) -> u64 {
+        self.mesh.bytes() as u64 + self.mesh.len() as u64 * BUILT_BYTES
     }
 
     /// The lowest and the highest corner of its box; None without triangles.

@@ -20,7 +20,7 @@ mod tests;
 pub use arrow::{Anchor, arrow};
 pub use shape::RodSurface;
 
-use super::hierarchy::Hierarchy;
+use super::hierarchy::{self, Hierarchy};
 use interval::Body;
 use parts::parts_of;
 
@@ -71,10 +71,10 @@ impl Rod {
 /// Greatest number of rods; long ones have several parts each.
 pub const MAX_RODS: usize = u32::MAX as usize / 2;
 
-/// Memory of a rod with its share of the hierarchy, and with a colour, bytes.
-const KEPT_BYTES: u64 = 120;
-/// The same while the hierarchy is built: boxes and a binary tree.
-const BUILT_BYTES: u64 = 400;
+/// Memory of a rod with its share of the hierarchy, bytes.
+const KEPT_BYTES: u64 = size_of::<Rod>() as u64 + 48;
+/// The same while the hierarchy is built: the rod, its part, and what the hierarchy needs.
+const BUILT_BYTES: u64 = size_of::<Rod>() as u64 + 16 + hierarchy::BUILT_BYTES;
 
 /// Rods with caps of one kind, and their hierarchy.
 pub struct RodTree {
@@ -145,11 +145,12 @@ impl RodTree {
         size_of_val(self.rods.as_slice()) + colors + self.hierarchy.bytes()
     }
 
-    /// Upper bounds of the memory of `rods` rods with a colour each, bytes: while the tree is built, and afterwards.
-    pub const fn predicted_bytes(rods: u64) -> [u64; 2] {
+    /// Upper bounds of the memory of `rods` rods with so many `colors`, bytes: while the tree is built, and afterwards.
+    pub const fn predicted_bytes(rods: u64, colors: u64) -> [u64; 2] {
+        let colors = colors.saturating_mul(size_of::<Vec3>() as u64);
         [
-            rods.saturating_mul(BUILT_BYTES),
-            rods.saturating_mul(KEPT_BYTES),
+            rods.saturating_mul(BUILT_BYTES).saturating_add(colors),
+            rods.saturating_mul(KEPT_BYTES).saturating_add(colors),
         ]
     }
 
