@@ -36,8 +36,7 @@ named! {
 pub(super) const ABOUT: &[&str] = &["Material of the particles"];
 
 /// The comment of `type`.
-const TYPE: &str =
-    "Kind: auto | matte | plastic | metal | glass | water | whitted; auto is whitted";
+const TYPE: &str = "Kind: auto (matte, or clear with transmission) | matte | plastic | metal | glass | water | whitted (as auto)";
 
 /// Details of `type`.
 const KINDS: [&str; 3] = [
@@ -70,16 +69,6 @@ pub struct Material {
     pub parts: Vec<Part>,
 }
 
-/// Terms of the thesis's model. All but `transmission` have no effect on opaque surfaces in path tracing.
-pub(super) const THESIS_TERMS: [&str; 6] = [
-    "ambient",
-    "diffuse",
-    "specular",
-    "shininess",
-    "reflection",
-    "transmission",
-];
-
 impl Default for Material {
     fn default() -> Self {
         Self {
@@ -101,6 +90,22 @@ const GLASS: f32 = 1.5;
 const WATER: f32 = 1.333;
 
 impl Material {
+    /// The first term of the thesis's model with another value than its default. All but `transmission` have no effect
+    /// on opaque surfaces in path tracing.
+    pub(super) fn changed_term(&self) -> Option<&'static str> {
+        let (own, usual) = (&self.constants, &scene::Material::DEFAULT);
+        let terms = [
+            ("ambient", own.ambient, usual.ambient),
+            ("diffuse", own.diffuse, usual.diffuse),
+            ("specular", own.specular, usual.specular),
+            ("shininess", own.shininess, usual.shininess),
+            ("reflection", own.reflection, usual.reflection),
+            ("transmission", own.transmission, usual.transmission),
+        ];
+        let changed = terms.iter().find(|(_, own, usual)| own != usual);
+        changed.map(|(name, ..)| *name)
+    }
+
     /// The constants, except `extinction`, with those that the kind of material sets. `fresnel` is the formula unless
     /// the kind or a key sets one.
     pub fn resolved(&self, fresnel: Fresnel) -> scene::Material {

@@ -266,9 +266,8 @@ impl Manifest {
         let mut manifest = Self::new("");
         let mut root = Keys::Read(Section::root(&tree, &problems));
         manifest.keys(&mut root);
-        let has_term = |term: &&str| tree.contains("material", term);
-        if !tree.contains("render", "integrator") && material::THESIS_TERMS.iter().any(has_term) {
-            manifest.render.integrator = Some(IntegratorKind::Whitted);
+        if !tree.contains("render", "integrator") {
+            manifest.select_integrator(&mut root);
         }
         manifest.check(&mut root);
         root.finish();
@@ -278,6 +277,19 @@ impl Manifest {
             Ok((manifest, ManifestError::new(warnings, text, path).lines))
         } else {
             Err(ManifestError::new(errors, text, path))
+        }
+    }
+
+    /// Selects the integrator for the terms of the thesis's model, if one has another value than its default. A
+    /// warning names it.
+    fn select_integrator(&mut self, root: &mut Keys<'_>) {
+        let Some(term) = self.material.changed_term() else {
+            return;
+        };
+        self.render.integrator = Some(IntegratorKind::Whitted);
+        if let Some(root) = root.reading() {
+            let what = "selects integrator = \"whitted\"; render.integrator = \"path\" keeps path tracing";
+            root.section("material").warn(term, what);
         }
     }
 

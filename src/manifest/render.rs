@@ -209,9 +209,9 @@ section! {
         /// Light transport: auto | path | whitted; auto is path
         ///
         /// path is lit by the environment and by lights, and follows the light that surfaces reflect. whitted is the
-        /// model of the thesis: lights without extent, ambient light and highlights. A manifest that has one of the
-        /// thesis's terms in `[material]` (ambient, diffuse, specular, shininess, reflection, transmission) and no
-        /// integrator is rendered with whitted, as is a job of a version without path.
+        /// model of the thesis: lights without extent, ambient light and highlights. A manifest in which one
+        /// of the thesis's terms in `[material]` (ambient, diffuse, specular, shininess, reflection, transmission) has
+        /// another value than its default, and that names no integrator, is rendered with whitted.
         integrator: Option<IntegratorKind> = None, or("auto"), flag("integrator", "NAME", "Look");
         /// Diffuse reflections that light may take before its last one; 0 is direct light only
         bounces: u32 = DEFAULT_BOUNCES, from(0), to(MAX_BOUNCES), affects(Affects::PathTracing),

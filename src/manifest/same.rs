@@ -188,6 +188,12 @@ mod tests {
             assert_eq!(adopted.integrator(), IntegratorKind::Whitted);
             assert_eq!(changes(&adopted, &planned, false), [""; 0]);
         }
+        // Versions selected the integrator for a term with its default, too
+        let mut named = manifest("material.transmission = 0.0");
+        let whitted_plan = manifest("render.integrator = \"whitted\"").settings();
+        named.adopt_old_defaults(&whitted_plan);
+        assert_eq!(named.integrator(), IntegratorKind::Whitted);
+        assert_eq!(changes(&named, &whitted_plan, false), [""; 0]);
         // A plan of this version
         let planned = current.settings();
         current.adopt_old_defaults(&planned);

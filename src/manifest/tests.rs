@@ -89,7 +89,6 @@ fn example_manifest_is_valid() {
     expected.camera.eye = Some(DVec3::ZERO);
     expected.camera.look_at = Some(DVec3::new(5.0, 5.0, 0.0));
     expected.camera.up = Some(DVec3::Z);
-    expected.render.integrator = Some(IntegratorKind::Whitted);
     expected.render.ground = Some(GroundSetting::of(GroundKind::None));
     expected.render.background = Some(Background::Constant(Vec3::new(0.05, 0.06, 0.08)));
     expected.material.color = ColorSetting::Rgb(Vec3::new(0.6, 0.7, 0.9));
@@ -688,9 +687,29 @@ fn terms_of_the_thesis_select_its_model() {
     let integrator = |text: &str| parse(&format!("input.path = \"a\"\n{text}")).integrator();
     let whitted = IntegratorKind::Whitted;
     assert_eq!(integrator("material.shininess = 5"), whitted);
+    // Defaults select nothing, however they are written
+    assert_eq!(integrator("material.transmission = 0.0"), IntegratorKind::Path);
     assert_eq!(integrator(""), IntegratorKind::Path);
     assert_eq!(integrator("material.ior = 1.5"), IntegratorKind::Path);
     // The integrator that a manifest names is the one that it gets
     let both = "render.integrator = \"path\"\nmaterial.shininess = 5";
     assert_eq!(integrator(both), IntegratorKind::Path);
+}
+
+#[test]
+fn a_term_that_selects_the_integrator_is_named_in_a_warning() {
+    let warnings = |text: &str| {
+        let text = format!("input.path = \"a\"\n[material]\n{text}");
+        Manifest::parse_with_warnings(&text, path(), Vec::new()).unwrap().1
+    };
+    assert_eq!(
+        warnings("ambient = 0.1\ntransmission = 1.0"),
+        [
+            "job.toml: line 4, column 1: material.transmission: selects integrator = \"whitted\"; \
+             render.integrator = \"path\" keeps path tracing"
+        ]
+    );
+    assert_eq!(warnings("ambient = 0.1\ntransmission = 0.0"), [""; 0]);
+    let named = "transmission = 1.0\n[render]\nintegrator = \"path\"";
+    assert_eq!(warnings(named), [""; 0]);
 }
