@@ -5,7 +5,7 @@ use spherule_formats::{Attribute, AttributeData, ScalarType, names};
 
 mod value;
 
-pub use value::{GEOMETRIC_VALUES, ParticleValue};
+pub use value::{GEOMETRIC_VALUES, ParticleValue, SPEED, shown_name};
 
 /// An attribute by name and number of components, in memory or in a file.
 pub trait Named {

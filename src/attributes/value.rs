@@ -1,8 +1,9 @@
 //! Values of particles, by name: attributes, their components, and values that follow from the geometry.
 
+use glam::DVec3;
 use spherule_formats::names;
 
-use super::Named;
+use super::{Named, velocity_of};
 
 /// A number for each particle.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -11,6 +12,8 @@ pub enum ParticleValue {
     Magnitude(String),
     /// A component of an attribute.
     Component(String, usize),
+    /// World coordinate on an axis: 0 is x.
+    Position(usize),
     /// Height along the up direction, in world units.
     Height,
     /// Distance from the camera along its view axis.
@@ -22,7 +25,13 @@ pub enum ParticleValue {
 }
 
 /// Names of values that need no attribute. Except for the radius, an attribute of the same name has precedence.
-pub const GEOMETRIC_VALUES: [&str; 4] = ["height", "depth", "index", "radius"];
+pub const GEOMETRIC_VALUES: [&str; 7] = ["x", "y", "z", "height", "depth", "index", "radius"];
+
+/// Name of the magnitude of the velocity, whatever its attribute is called.
+pub const SPEED: &str = "speed";
+
+/// Names of the components of the velocity, whatever its attribute is called.
+const VELOCITY_COMPONENTS: [&str; 3] = ["vx", "vy", "vz"];
 
 /// Names of components.
 const COMPONENTS: [(&str, usize); 8] = [
@@ -62,12 +71,26 @@ impl ParticleValue {
                 Part::Component(_) => None,
             };
         }
-        Self::geometric(name)
+        Self::geometric(name).or_else(|| Self::of_velocity(name, attributes))
+    }
+
+    /// The speed or a component of the velocity, if `name` is one.
+    fn of_velocity<A: Named>(name: &str, attributes: &[A]) -> Option<Self> {
+        let velocity = velocity_of(attributes)?.name().to_owned();
+        let name = name.to_ascii_lowercase();
+        if name == SPEED {
+            return Some(Self::Magnitude(velocity));
+        }
+        let axis = VELOCITY_COMPONENTS.iter().position(|known| *known == name);
+        axis.map(|axis| Self::Component(velocity, axis))
     }
 
     /// The value that needs no attribute with this name.
     pub fn geometric(name: &str) -> Option<Self> {
         match name.to_ascii_lowercase().as_str() {
+            "x" => Some(Self::Position(0)),
+            "y" => Some(Self::Position(1)),
+            "z" => Some(Self::Position(2)),
             "height" => Some(Self::Height),
             "depth" => Some(Self::Depth),
             "index" => Some(Self::Index),
@@ -80,14 +103,32 @@ impl ParticleValue {
     pub fn attribute(&self) -> Option<&str> {
         match self {
             Self::Magnitude(name) | Self::Component(name, _) => Some(name),
-            Self::Height | Self::Depth | Self::Index | Self::Radius => None,
+            Self::Position(_) | Self::Height | Self::Depth | Self::Index | Self::Radius => None,
+        }
+    }
+
+    /// The direction in which positions are measured, if they are.
+    pub fn direction(&self, up: DVec3) -> Option<DVec3> {
+        match self {
+            Self::Position(axis) => Some(DVec3::AXES[*axis]),
+            Self::Height => Some(up),
+            _ => None,
         }
     }
 
     /// Whether it is computed from positions or radii.
     pub const fn needs_geometry(&self) -> bool {
-        matches!(self, Self::Height | Self::Depth | Self::Radius)
+        matches!(
+            self,
+            Self::Position(_) | Self::Height | Self::Depth | Self::Radius
+        )
     }
+}
+
+/// The name of a value in pictures and messages: the magnitude of a velocity is called speed.
+pub fn shown_name(name: &str) -> &str {
+    let is_velocity = names::VELOCITY.iter().any(|v| name.eq_ignore_ascii_case(v));
+    if is_velocity { SPEED } else { name }
 }
 
 enum Part {
@@ -152,10 +193,30 @@ mod tests {
             // Attributes have precedence
             ("index", Some(ParticleValue::Magnitude("index".to_owned()))),
             ("A.X", Some(ParticleValue::Magnitude("a.x".to_owned()))),
-            ("speed", None),
+            (
+                "speed",
+                Some(ParticleValue::Magnitude("Velocity".to_owned())),
+            ),
+            ("vy", Some(component(1))),
+            ("Z", Some(ParticleValue::Position(2))),
+            ("w", None),
             ("", None),
         ] {
             assert_eq!(ParticleValue::named(name, &all), expected, "{name}");
+        }
+        // Attributes have precedence, and there is no speed without a velocity
+        let own = [attribute("x", 1), attribute("vx", 1)];
+        for name in ["x", "vx"] {
+            let expected = ParticleValue::Magnitude(name.to_owned());
+            assert_eq!(ParticleValue::named(name, &own), Some(expected));
+        }
+        assert_eq!(ParticleValue::named("speed", &own), None);
+    }
+
+    #[test]
+    fn velocities_are_shown_as_speed() {
+        for (name, shown) in [("Vel", "speed"), ("density", "density"), ("speed", "speed")] {
+            assert_eq!(shown_name(name), shown);
         }
     }
 }

@@ -325,14 +325,11 @@ fn values_of(
             found.map_or_else(Vec::new, |attribute| magnitudes(attribute, 1.0))
         }
         ParticleValue::Component(name, c) => component(frame.attribute(name), *c),
-        ParticleValue::Height => {
+        ParticleValue::Position(_) | ParticleValue::Height => {
             let picture = &setup.picture;
-            let height = |i: usize| {
-                picture
-                    .up
-                    .dot(picture.origin + frame.positions[i].as_dvec3())
-            };
-            particles.map(|i| height(i) as f32).collect()
+            let direction = value.direction(picture.up).unwrap_or(picture.up);
+            let along = |i: usize| direction.dot(picture.origin + frame.positions[i].as_dvec3());
+            particles.map(|i| along(i) as f32).collect()
         }
         // The view is checked in advance
         ParticleValue::Depth => setup.camera_at(number).map_or_else(

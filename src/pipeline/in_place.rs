@@ -437,7 +437,10 @@ impl<'a> StoredValues<'a> {
                 Some(Self::Component(view, *component))
             }
             ParticleValue::Index => Some(Self::Index),
-            ParticleValue::Height | ParticleValue::Depth | ParticleValue::Radius => None,
+            ParticleValue::Position(_)
+            | ParticleValue::Height
+            | ParticleValue::Depth
+            | ParticleValue::Radius => None,
         }
     }
 

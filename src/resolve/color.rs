@@ -6,7 +6,7 @@ use crate::pipeline::{ColorRule, attribute_list};
 use crate::scene::{Camera, ColorMap, ColorScale, UnknownColorMap, material};
 use crate::survey::{
     Categories, ColorQuestion, ColorRange, GEOMETRIC_VALUES, MAX_CATEGORIES, Named, ParticleValue,
-    RangeQuestion, Survey, range_of,
+    RangeQuestion, SPEED, Survey, range_of, velocity_of,
 };
 
 const ATTRIBUTE: &str = "material.color.attribute";
@@ -120,16 +120,27 @@ pub(super) fn value_of(
         Some(value) => Ok(value),
         None if survey.most_particles == 0 => Ok(by_name()),
         None => {
-            let geometric = GEOMETRIC_VALUES.map(str::to_owned);
-            let all = [&survey.attributes[..], &geometric].concat();
+            let all = value_names(survey, &GEOMETRIC_VALUES);
             Err(ResolveError::MissingAttribute {
                 key,
                 name: name.to_owned(),
                 hint: similar(name, &all),
-                has: attribute_list(survey.attributes.iter().map(String::as_str)),
+                has: attribute_list(all.iter().map(String::as_str)),
             })
         }
     }
+}
+
+/// The attributes in the survey and the `other` values of particles, each once.
+pub(super) fn value_names(survey: &Survey, other: &[&str]) -> Vec<String> {
+    let speed = velocity_of(&known_attributes(survey)).map(|_| SPEED);
+    let mut all = survey.attributes.clone();
+    for name in speed.iter().chain(other) {
+        if !all.iter().any(|known| known.eq_ignore_ascii_case(name)) {
+            all.push((*name).to_owned());
+        }
+    }
+    all
 }
 
 /// The attributes in the survey.

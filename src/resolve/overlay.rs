@@ -15,7 +15,7 @@ use crate::overlay::{
 };
 use crate::pipeline::{ColorRule, Setup};
 use crate::scene::Camera;
-use crate::survey::{Named, ParticleValue, Survey, velocity_of};
+use crate::survey::{ParticleValue, Survey, shown_name};
 
 /// Colours of a continuous bar.
 const COLORS: u16 = 256;
@@ -227,27 +227,7 @@ fn color_bar(setup: &Setup, manifest: &Manifest) -> Option<(String, ColorBarKind
         }
         (None, categories) => ColorBarKind::Categories(named(categories?, manifest)),
     };
-    // The magnitude of a velocity has a name
-    let is_velocity = velocity_of(&[NamedVector(name)]).is_some();
-    let title = if is_velocity { "speed" } else { name };
-    Some((title.to_owned(), kind))
-}
-
-/// An attribute with three components.
-struct NamedVector<'a>(&'a str);
-
-impl Named for NamedVector<'_> {
-    fn name(&self) -> &str {
-        self.0
-    }
-
-    fn components(&self) -> usize {
-        3
-    }
-
-    fn is_integer(&self) -> bool {
-        false
-    }
+    Some((shown_name(name).to_owned(), kind))
 }
 
 /// Categories with their names, or their numbers.

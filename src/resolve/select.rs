@@ -22,12 +22,20 @@ pub(super) fn selection(manifest: &Manifest, survey: &Survey) -> Result<Selectio
     match checked {
         Ok(()) => Ok(selection),
         Err(unknown) => {
-            let others = OTHER_NAMES.map(str::to_owned);
-            let all = [&survey.attributes[..], &others].concat();
+            let radius = survey.has_radii.then_some("radius");
+            let time = survey.frame_time.map(|_| "time");
+            let others: Vec<&str> = OTHER_NAMES.into_iter().chain(radius).chain(time).collect();
+            let all = color::value_names(survey, &others);
             let name = unknown.name.split(['.', '[']).next().unwrap_or_default();
+            let hint = match name.to_ascii_lowercase().as_str() {
+                "height" | "depth" => {
+                    " (it is a value for colours; conditions have x, y and z)".to_owned()
+                }
+                _ => similar(name, &all),
+            };
             Err(ResolveError::UnknownName {
                 column: unknown.column,
-                hint: similar(name, &all),
+                hint,
                 has: attribute_list(all.iter().map(String::as_str)),
                 name: unknown.name,
             })

@@ -3,7 +3,7 @@
 use spherule_formats::{Attribute, AttributeData, Positions, RawParticles, names};
 
 use super::condition::NameUse;
-use crate::attributes::{Named, ParticleValue, id_of, velocity_of};
+use crate::attributes::{Named, ParticleValue, id_of};
 
 /// Names of values that do not need an attribute; for messages.
 pub const OTHER_NAMES: [&str; 5] = ["x", "y", "z", "index", "id"];
@@ -59,10 +59,9 @@ impl Value {
             }
             Some(ParticleValue::Index) => Some(Self::Index),
             Some(ParticleValue::Radius) => radius(attributes),
+            Some(ParticleValue::Position(axis)) => Some(Self::Position(axis)),
+            // Both depend on the particles that are drawn
             Some(ParticleValue::Height | ParticleValue::Depth) => None,
-            None if name == "speed" => velocity_of(attributes)
-                .and_then(|velocity| index_of(velocity.name()))
-                .map(Self::Magnitude),
             None if name == "time" => time.map(Self::Constant),
             None => None,
         };

@@ -144,13 +144,13 @@ impl ColorTotals {
                 let value = |i: usize| attribute.data.get_f64(i * attribute.components + c);
                 self.add_values(attribute.count(), value, range, false);
             }
-            ParticleValue::Height => {
-                let height = |i: usize| {
-                    context
-                        .up
-                        .dot(context.origin + frame.positions[i].as_dvec3())
+            ParticleValue::Position(_) | ParticleValue::Height => {
+                let Some(direction) = value.direction(context.up) else {
+                    return;
                 };
-                self.add_values(frame.len(), height, range, false);
+                let along =
+                    |i: usize| direction.dot(context.origin + frame.positions[i].as_dvec3());
+                self.add_values(frame.len(), along, range, false);
             }
             ParticleValue::Index => {
                 #[expect(clippy::cast_precision_loss, reason = "a range of colours")]

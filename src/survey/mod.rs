@@ -15,7 +15,8 @@ use spherule_formats::{
 };
 
 pub use crate::attributes::{
-    GEOMETRIC_VALUES, Named, PART_NAMES, ParticleValue, id_of, part_of, velocity_of,
+    GEOMETRIC_VALUES, Named, PART_NAMES, ParticleValue, SPEED, id_of, part_of, shown_name,
+    velocity_of,
 };
 use crate::scene::{RadiusTable, RgbEncoding, is_rgb};
 use crate::selection::Selection;

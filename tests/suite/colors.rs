@@ -79,11 +79,32 @@ fn bytes_of_vtk_and_ply_are_colours() {
 fn speed_has_precedence_over_unnamed_colours() {
     let shop = Workshop::new();
     table(&shop, "vx,vy,vz,rgb_x,rgb_y,rgb_z", "1,2,3,0.25,0.5,0.75");
-    render(&shop, "in", &[]).prints("colour by `velocity`, range");
+    render(&shop, "in", &[]).prints("colour by `speed`, range");
     render(&shop, "in", &["--color-by", "RGB"]).prints("colour by the RGB attribute `RGB`");
     assert_near(albedo(&shop), [0.25, 0.5, 0.75]);
     render(&shop, "in", &["--set", "material.color=[0.1,0.2,0.3]"]);
     assert_near(albedo(&shop), [0.1, 0.2, 0.3]);
+}
+
+#[test]
+fn conditions_and_colours_know_the_same_names() {
+    let shop = Workshop::new();
+    table(&shop, "vx,vy,vz", "1,2,2");
+    shop.run(&["convert", "in", "-o", "native"]).expect(0);
+    for input in ["in", "native"] {
+        for (name, range) in [
+            ("speed", "0 to 3"),
+            ("vy", "2 to 2"),
+            ("velocity.y", "2 to 2"),
+            ("y", "0 to 2"),
+            ("index", "0 to 2"),
+        ] {
+            let condition = format!("{name} >= 0");
+            render(&shop, input, &["--color-by", name, "--where", &condition])
+                .prints(&format!("colour by `{name}`, range {range}"));
+        }
+    }
+    render(&shop, "in", &["--color-by", "velocity"]).prints("colour by `speed`, range 0 to 3");
 }
 
 #[test]

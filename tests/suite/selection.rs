@@ -170,7 +170,12 @@ fn impossible_selections_are_explained() {
             "x > 1 && velocity.x > 2",
             "character 10: no value `velocity.x`",
         ),
-        ("x > (1", "select.where: character 7: expected `)`"),
+        (
+            "height > 1",
+            "no value `height` in the sampled frames (it is a value for colours; conditions have x, y and z); \
+             available: `id`, `type`, `x`, `y`, `z`, `index`",
+        ),
+        ("x > (1", "--where: character 7: expected `)`"),
         (
             "(x > 1) > 2",
             "character 1: `>` needs a number here, and this is a condition",
