@@ -147,15 +147,26 @@ fn make(
         }
     };
     let [width, height] = finished.size;
+    let rate = played_rate(request);
     Ok(Some(format!(
         "{}: {}, {width}x{height}, {} frames in {:.2} s at {} fps, {} bytes",
         request.output.display(),
         request.format.name(),
         finished.shown,
-        finished.shown as f64 / request.rate.per_second(),
-        request.rate,
+        finished.shown as f64 / rate.per_second(),
+        rate,
         finished.bytes
     )))
+}
+
+/// Most frames per second of a GIF.
+const MAX_GIF_RATE: f64 = 50.0;
+
+/// The rate at which the movie plays, which the format may limit.
+fn played_rate(request: &Request<'_>) -> FrameRate {
+    let is_limited = request.format == MovieFormat::Gif && request.rate.per_second() > MAX_GIF_RATE;
+    let limit = FrameRate::new(MAX_GIF_RATE).ok();
+    limit.filter(|_| is_limited).unwrap_or(request.rate)
 }
 
 /// The pictures in their order, with notes about gaps, odd sizes and rates that the format changes.
@@ -180,6 +191,7 @@ fn source(
         if let Some((frame, missing)) = gaps.first() {
             let more = match gaps.len() - 1 {
                 0 => String::new(),
+                1 => ", and so on at 1 more place".to_owned(),
                 more => format!(", and so on at {more} more places"),
             };
             let are = if *missing == 1 {
@@ -190,9 +202,9 @@ fn source(
             message!("{missing} {are} missing after frame {frame}, which {what}{more}");
         }
     }
-    if request.format == MovieFormat::Gif && request.rate.per_second() > 50.0 {
+    if played_rate(request) != request.rate {
         message!(
-            "GIF has at most 50 frames per second: the movie is slower than {} fps",
+            "GIF has at most {MAX_GIF_RATE} frames per second: the movie is slower than {} fps",
             request.rate
         );
     }

@@ -29,7 +29,10 @@ impl FramePattern {
         // Find the number in the file name
         let name_at = text.rfind(std::path::is_separator).map_or(0, |i| i + 1);
         let (dir, name) = text.split_at(name_at);
-        if find_number(dir)?.is_some() {
+        // Other `%` are characters of the directory
+        let places = dir.match_indices(['#', '%']);
+        let mut numbers = places.filter_map(|(at, _)| find_number(&dir[at..]).ok());
+        if numbers.any(|number| number.is_some_and(|(start, ..)| start == 0)) {
             return Err("the frame number belongs into the file's name, not a directory's".into());
         }
         let Some((start, end, digits)) = find_number(name)? else {
@@ -190,6 +193,8 @@ mod tests {
         path("a.%d.b.EXR", 12, "a.12.b.EXR");
         path("/x/ä_%012d.exr", 12, "/x/ä_000000000012.exr");
         path("still.exr", 12, "still.exr");
+        path("100%~=x/f.#.exr", 12, "100%~=x/f.12.exr");
+        path("50%/f.exr", 12, "50%/f.exr");
         let zeros = "0".repeat(30);
         path(
             &format!("{}.exr", "#".repeat(32)),

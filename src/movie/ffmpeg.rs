@@ -138,19 +138,29 @@ pub fn by_hand(source: &MovieSource, format: MovieFormat, path: &Path) -> Option
         .map(|width| format!("scale='min({width},iw)':-1:flags=lanczos,"));
     let filter = format!("{}pad=ceil(iw/2)*2:ceil(ih/2)*2", scale.unwrap_or_default());
     let mut output = output_arguments(container, codec, Some(&filter));
-    output.push(path.as_os_str().to_owned());
+    output.push(plain_name(&path.to_string_lossy()).into());
     let output = shell_line(&output);
     if let Some((pattern, start)) = consecutive(source) {
-        let pattern = quoted(&pattern);
+        let pattern = quoted(&plain_name(&pattern));
         return Some(format!(
             "{FFMPEG} -framerate {rate} -start_number {start} -i {pattern} {output}"
         ));
     }
     let (before, _, after) = number_in(first.to_str()?)?;
-    let files = format!("{}*{}", quoted(before), quoted(after));
+    let files = format!("{}*{}", quoted(&plain_name(before)), quoted(after));
     Some(format!(
         "cat {files} | {FFMPEG} -f image2pipe -framerate {rate} -c:v png -i - {output}"
     ))
+}
+
+/// `path` in a form that programs take neither for an option nor for the name of a protocol.
+fn plain_name(path: &str) -> String {
+    let first = path.split('/').next().unwrap_or_default();
+    if first.starts_with('-') || first.contains(':') {
+        format!("./{path}")
+    } else {
+        path.to_owned()
+    }
 }
 
 /// The pattern and the first number of files with consecutive numbers, each shown once.
@@ -326,6 +336,23 @@ mod tests {
             line.contains("-crf 16") && line.ends_with(r"'it'\''s.mp4'"),
             "{line}"
         );
+    }
+
+    #[test]
+    fn names_by_hand_are_neither_options_nor_protocols() {
+        let format = MovieFormat::of(Path::new("a.mp4"), None).unwrap();
+        let line = |names: &[&str], output: &str| {
+            by_hand(&source(names, 1), format, Path::new(output)).unwrap()
+        };
+        let consecutive = line(&["concat:a|b/f.01.png"], "-y.mp4");
+        assert!(
+            consecutive.contains("-i './concat:a|b/f.%02d.png' "),
+            "{consecutive}"
+        );
+        assert!(consecutive.ends_with(" ./-y.mp4"), "{consecutive}");
+        let piped = line(&["-n/f.1.png", "-n/f.3.png"], "a/b:c.mp4");
+        assert!(piped.starts_with("cat ./-n/f.*.png |"), "{piped}");
+        assert!(piped.ends_with(" a/b:c.mp4"), "{piped}");
     }
 
     #[test]

@@ -83,8 +83,32 @@ fn animations_have_all_frames() {
         "{}",
         small.text()
     );
+    // A GIF cannot be as fast
+    let fast = ["movie", "out", "-o", "f.gif", "--fps", "100"];
+    let fast = workshop.run(&fast).expect(DONE);
+    assert!(
+        fast.text().contains("3 frames in 0.06 s at 50 fps"),
+        "{}",
+        fast.text()
+    );
+    fast.prints("the movie is slower than 100 fps");
     no_leftovers(workshop.path());
     no_leftovers(&workshop.join("out"));
+}
+
+#[test]
+fn an_image_is_no_job() {
+    let workshop = job(&[1], &[]);
+    for arguments in [
+        &["movie", "out/f.0001.exr", "-o", "a.gif"][..],
+        &["status", "out/f.0001.exr"],
+        &["verify", "out/f.0001.png"],
+    ] {
+        workshop
+            .run(arguments)
+            .expect(REFUSED)
+            .prints("is a file; give the directory of the job: out");
+    }
 }
 
 #[test]

@@ -124,6 +124,15 @@ fn tasks_call_render() {
 }
 
 #[test]
+fn directories_may_contain_percent_signs() {
+    let workshop = Workshop::new();
+    job(&workshop, "100%~x", &[1]);
+    let arguments = ["export", "openjd", "100%~x/job.toml"];
+    let text = workshop.run(&arguments).expect(0).text();
+    assert!(text.contains("100%~x"), "{text}");
+}
+
+#[test]
 fn default_output_is_yaml() {
     let workshop = Workshop::new();
     job(&workshop, "it's \"so\": {x}, y", &[1, 2]);

@@ -80,8 +80,8 @@ fn unsupported_job_features() {
         &openjd,
         "new.txt: engines recognise a template by its name",
     );
-    job(&workshop, "100%", &[1]);
-    let openjd = ["export", "openjd", "100%/job.toml"];
+    job(&workshop, "%04d", &[1]);
+    let openjd = ["export", "openjd", "%04d/job.toml"];
     only(&workshop, &openjd, "rename the directory");
     job(&workshop, "a{{b", &[1]);
     let openjd = ["export", "openjd", "a{{b/job.toml"];
