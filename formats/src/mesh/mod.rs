@@ -67,7 +67,7 @@ pub fn parse_mesh(bytes: &[u8], path: &Path, budget: MemoryBudget) -> Result<Mes
         stl::read_binary(bytes, budget)
     } else {
         Err(ParseError::unsupported(
-            "not a mesh that is read; supported are stl, obj, ply, vtk, vtp and vtu",
+            "not a mesh in a format that spherule reads, which are stl, obj, ply, vtk, vtp and vtu",
         ))
     }
 }

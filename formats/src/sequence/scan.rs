@@ -92,14 +92,7 @@ pub(super) fn fitting(pattern: &Pattern, text: &Path) -> Result<Vec<FileName>, S
 impl SequenceError {
     /// The file `path` does not exist. The error names similar files in its directory.
     pub fn missing(path: &Path) -> Self {
-        let directory = match path.parent() {
-            Some(parent) if parent != Path::new("") => parent,
-            _ => Path::new("."),
-        };
-        let hint = match list(directory) {
-            Ok(files) if !files.is_empty() => format!("; {}", closest(path, directory, &files)),
-            _ => String::new(),
-        };
+        let hint = similar(path).unwrap_or_default();
         Self::Missing {
             path: path.to_owned(),
             hint,
@@ -175,21 +168,9 @@ fn closest(missing: &Path, directory: &Path, files: &[PathBuf]) -> String {
     if files.is_empty() {
         return format!("`{}` has no files", directory.display());
     }
-    let name_of = |p: &Path| {
-        let name = p.file_name().unwrap_or_default();
-        name.to_string_lossy().into_owned()
-    };
     let missing = name_of(missing);
-    let likeness = |name: &str| {
-        let start = name
-            .chars()
-            .zip(missing.chars())
-            .take_while(|(a, b)| a == b);
-        let end = name.chars().rev().zip(missing.chars().rev());
-        start.count() + end.take_while(|(a, b)| a == b).count()
-    };
     let mut names: Vec<String> = files.iter().map(|f| name_of(f)).collect();
-    names.sort_by_key(|name| std::cmp::Reverse(likeness(name)));
+    names.sort_by_key(|name| std::cmp::Reverse(likeness(name, &missing)));
     names.truncate(3);
     format!(
         "closest of {} files in `{}`: {}",
@@ -197,6 +178,46 @@ fn closest(missing: &Path, directory: &Path, files: &[PathBuf]) -> String {
         directory.display(),
         names.join(", ")
     )
+}
+
+fn name_of(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
+}
+
+/// Number of characters that two names have in common at the start and at the end.
+fn likeness(a: &str, b: &str) -> usize {
+    let start = a.chars().zip(b.chars()).take_while(|(a, b)| a == b).count();
+    let end = a.chars().rev().zip(b.chars().rev());
+    let end = end.take_while(|(a, b)| a == b).count();
+    // `aaa` is as long as its common start and end with `aa`
+    (start + end).min(a.chars().count().min(b.chars().count()))
+}
+
+/// Up to three names in the directory of `missing` that may have been meant, as a clause: those that have two thirds of
+/// their characters in common with it. Directories and files with the name of a particle format come first.
+fn similar(missing: &Path) -> Option<String> {
+    let directory = match missing.parent() {
+        Some(parent) if parent != Path::new("") => parent,
+        _ => Path::new("."),
+    };
+    let name = name_of(missing);
+    let mut found = Vec::new();
+    for entry in fs::read_dir(directory).ok()? {
+        let path = entry.ok()?.path();
+        let other = name_of(&path);
+        let alike = likeness(&name, &other);
+        let length = name.chars().count().max(other.chars().count());
+        if !other.starts_with('.') && 3 * alike >= 2 * length {
+            let is_input = path.is_dir() || Format::by_name(&path).is_some();
+            found.push((!is_input, std::cmp::Reverse(alike), other));
+        }
+    }
+    found.sort();
+    found.truncate(3);
+    let names: Vec<String> = found.into_iter().map(|(.., name)| name).collect();
+    let place = directory.display();
+    (!names.is_empty()).then(|| format!("; closest in `{place}`: {}", names.join(", ")))
 }
 
 /// Opens files that may hold several steps and numbers every step: by the number written in the

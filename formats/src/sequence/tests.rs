@@ -166,6 +166,12 @@ fn missing_inputs_are_reported_with_a_remedy() {
         text.contains("no such file") && text.contains("x_1.vtk"),
         "{text}"
     );
+    // Nothing like it is there
+    let text = dir.error("nothing");
+    assert!(
+        text.ends_with("nothing: no such file or directory"),
+        "{text}"
+    );
     assert!(dir.error("none/x_#.vtk").contains("no such file"));
     fs::remove_file(dir.path("x_1.vtk")).expect("removable");
     assert!(dir.error("").contains("it has 1 .png"));
