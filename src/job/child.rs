@@ -147,6 +147,16 @@ fn reader(pipe: Option<impl Read + Send + 'static>) -> JoinHandle<String> {
     })
 }
 
+/// The start of the reason if no more memory could be allocated.
+const OUT_OF_MEMORY: &str = "out of memory";
+
+impl Crash {
+    /// Whether the process could not allocate memory.
+    pub fn is_out_of_memory(&self) -> bool {
+        matches!(self, Self::Died(reason) if reason.starts_with(OUT_OF_MEMORY))
+    }
+}
+
 /// Why the child ended without a result.
 fn reason(status: ExitStatus, errors: &str) -> String {
     let lines: Vec<&str> = errors
@@ -154,9 +164,17 @@ fn reason(status: ExitStatus, errors: &str) -> String {
         .map(|line| line.strip_prefix("error: ").unwrap_or(line).trim())
         .filter(|line| !line.is_empty() && !line.starts_with("note: "))
         .collect();
-    let text: String = lines.join("; ").chars().take(MAX_REASON).collect();
-    if text.contains("memory allocation of") {
-        return format!("out of memory: {text}");
+    // What follows is a backtrace, which says nothing about memory
+    let allocation = lines
+        .iter()
+        .find(|line| line.contains("memory allocation of"));
+    let shown = match allocation {
+        Some(line) => (*line).to_owned(),
+        None => lines.join("; "),
+    };
+    let text: String = shown.chars().take(MAX_REASON).collect();
+    if allocation.is_some() {
+        return format!("{OUT_OF_MEMORY}: {text}");
     }
     let how = match signal(status) {
         Some(9) => "killed by the system, probably because memory ran out".to_owned(),
@@ -192,7 +210,7 @@ mod tests {
         for (status, errors, expected) in [
             (
                 by_signal(6),
-                "memory allocation of 48000000000 bytes failed\n",
+                "memory allocation of 48000000000 bytes failed\nstack backtrace:\n   0: main\n",
                 "out of memory: memory allocation of 48000000000 bytes failed",
             ),
             (
@@ -214,6 +232,11 @@ mod tests {
             ),
         ] {
             assert_eq!(reason(status, errors), expected);
+            let crash = Crash::Died(reason(status, errors));
+            assert_eq!(
+                crash.is_out_of_memory(),
+                errors.contains("memory allocation")
+            );
         }
     }
 }

@@ -3,6 +3,7 @@
 //! The process writes the image. The parent does everything else: claims, ledger, reports, and removing the temporary
 //! files of a process that died.
 
+use std::error::Error;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -15,7 +16,7 @@ use spherule_jobs::{
     owner, set_owner,
 };
 
-use super::{ChildCommand, ChildResult, JobManifest, RenderJob, RunError};
+use super::{ChildCommand, ChildResult, Crash, JobManifest, RenderJob, RunError};
 use crate::manifest::Manifest;
 use crate::pipeline::{ImageError, ImageTask, WriteError, make_image};
 use crate::render::RenderError;
@@ -141,7 +142,7 @@ impl FrameWork for IsolatedRender<'_> {
             ChildResult::Completed(IsolatedResult(outcome)) => {
                 self.finished(image, outcome, start, context)
             }
-            ChildResult::Crashed(crash) => failure(FailureKind::Crash, crash.into()),
+            ChildResult::Crashed(crash) => failure(FailureKind::Crash, self.explained(crash)),
             ChildResult::Interrupted => {
                 failure(FailureKind::Interrupted, RenderError::Interrupted.into())
             }
@@ -161,6 +162,16 @@ impl IsolatedRender<'_> {
             frame,
             ceiling: manifest.job.memory_ceiling.map(|limit| limit.0),
             threads: manifest.job.threads,
+        }
+    }
+
+    /// The reason of a crash, with the remedy if memory was limited.
+    fn explained(&self, crash: Crash) -> Box<dyn Error + Send + Sync> {
+        match self.render_job.manifest().job.memory_ceiling {
+            Some(ceiling) if crash.is_out_of_memory() => {
+                format!("{crash}; raise job.memory_ceiling, which is {ceiling}").into()
+            }
+            _ => crash.into(),
         }
     }
 
