@@ -191,6 +191,10 @@ fn keys_of_a_json_file_are_those_of_a_manifest() {
     ] {
         render(text).expect(2).prints(part);
     }
+    let many = vec!["{}"; 20_001].join(",");
+    render(&format!("[{many}]"))
+        .expect(2)
+        .prints("20001 keyframes, but at most 20000 are possible");
     let ran = with_file.run(&["render", "my.toml", "--camera-path", "none.json"]);
     ran.expect(2).prints("none.json");
 }

@@ -81,6 +81,16 @@ fn pipes_among_the_files_of_a_job() {
 }
 
 #[test]
+fn pipes_as_camera_paths() {
+    let workshop = two_frames();
+    pipe(&workshop.join("shot.json"));
+    for command in ["render", "check"] {
+        let arguments = [command, "in", "--camera-path", "shot.json"];
+        refused(&workshop, &arguments, &["shot.json: ", PIPE]);
+    }
+}
+
+#[test]
 fn pipes_among_the_particles() {
     let workshop = two_frames();
     pipe(&workshop.join("in/f_3.bgeo"));
