@@ -11,10 +11,10 @@ use spherule_formats::Sequence;
 use spherule_jobs::{FrameRange, Job};
 
 use super::job::{list, use_threads};
-use super::manifest_args::ManifestArgs;
+use super::manifest_args::{ManifestArgs, open_sequence};
 use super::paths::absolute;
 use super::render::print_summary;
-use super::{CliError, Outcome, print, signals};
+use super::{CliError, Outcome, disk, print, signals};
 use crate::job::{JobManifest, RenderJob, frames_in, require_one_fits};
 use crate::pipeline::{ImageError, PictureKind, WriteError, make_picture};
 use crate::render::Channels;
@@ -48,9 +48,45 @@ const EXAMPLES: &str = "Examples:
 pub(super) struct StillArgs {
     #[command(flatten)]
     manifest: ManifestArgs,
-    /// Number of the frame to render [default: the middle one]
-    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true)]
-    frame: Option<i64>,
+    /// Number of the frame to render, first, or last [default: the middle one]
+    ///
+    /// -1 is the last frame and -2 the one before it, unless frames have these numbers.
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, value_parser = FrameChoice::parse)]
+    frame: Option<FrameChoice>,
+}
+
+/// The frame that is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum FrameChoice {
+    First,
+    Last,
+    Number(i64),
+}
+
+impl FrameChoice {
+    fn parse(text: &str) -> Result<Self, String> {
+        match text {
+            "first" => Ok(Self::First),
+            "last" => Ok(Self::Last),
+            _ => text
+                .parse()
+                .map(Self::Number)
+                .map_err(|_| "expected the number of a frame, first or last".to_owned()),
+        }
+    }
+
+    /// The frame among `numbers`, which rise.
+    fn among(self, numbers: &[i64]) -> Option<i64> {
+        match self {
+            Self::First => numbers.first().copied(),
+            Self::Last => numbers.last().copied(),
+            Self::Number(number) if numbers.contains(&number) => Some(number),
+            Self::Number(number) => {
+                let from_end = usize::try_from(number.checked_neg()?).ok()?;
+                numbers.get(numbers.len().checked_sub(from_end)?).copied()
+            }
+        }
+    }
 }
 
 /// Hides and refuses an option that only applies to jobs.
@@ -72,7 +108,7 @@ pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
     let output = absolute(&shown)?;
     let mut requested = args.manifest.manifest()?;
     use_threads(requested.manifest.job.threads)?;
-    let sequence = requested.open_sequence()?;
+    let sequence = open_sequence(&requested)?;
     for note in sequence.notes() {
         note!("{note}");
     }
@@ -125,7 +161,7 @@ fn kind(path: &Path) -> Result<PictureKind, CliError> {
         Some("exr") => Ok(PictureKind::Exr),
         Some("png") => Ok(PictureKind::Png),
         _ => Err(CliError::other(format!(
-            "--output {}: the name must end in .png or .exr",
+            "--output {}: the name must end in .png or .exr; other programs convert PNG to other formats",
             path.display()
         ))),
     }
@@ -134,23 +170,27 @@ fn kind(path: &Path) -> Result<PictureKind, CliError> {
 /// The requested frame, or the middle one of those that the manifest selects. The first frame of a simulation is
 /// rarely typical.
 fn frame(
-    number: Option<i64>,
+    choice: Option<FrameChoice>,
     requested: &JobManifest,
     sequence: &Sequence,
 ) -> Result<i64, CliError> {
-    let Some(number) = number else {
+    let Some(choice) = choice else {
         let range = requested.manifest.input.frames.as_ref();
         let frames = frames_in(sequence, range)?;
         return Ok(frames[frames.len() / 2]);
     };
     let numbers: Vec<i64> = sequence.frames().iter().map(|f| f.number).collect();
-    if numbers.contains(&number) {
-        return Ok(number);
-    }
-    Err(CliError::other(format!(
-        "--frame {number}: is not among the frames: {}",
-        list(&numbers)
-    )))
+    choice.among(&numbers).ok_or_else(|| {
+        let shown = match choice {
+            FrameChoice::Number(number) => number.to_string(),
+            FrameChoice::First => "first".to_owned(),
+            FrameChoice::Last => "last".to_owned(),
+        };
+        CliError::other(format!(
+            "--frame {shown}: is not among the frames: {}",
+            list(&numbers)
+        ))
+    })
 }
 
 /// Refuses to replace anything but an image, and images that belong to the input or to a job.
@@ -167,8 +207,12 @@ fn guard(
     if is_planned(output)? {
         return refused("is an image of the job in that directory");
     }
-    let Ok(existing) = fs::metadata(output) else {
-        return Ok(());
+    let existing = match fs::metadata(output) {
+        Ok(existing) => existing,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            return check_writable(shown, output);
+        }
+        Err(error) => return Err(CliError::io(shown)(error)),
     };
     let real = output.canonicalize().map_err(CliError::io(shown))?;
     let inputs = (0..sequence.frames().len()).flat_map(|index| sequence.inputs(index));
@@ -183,6 +227,21 @@ fn guard(
         return refused("is not an image and would be overwritten");
     }
     Ok(())
+}
+
+/// Refuses a new file that could not be written after the render.
+fn check_writable(shown: &Path, output: &Path) -> Result<(), CliError> {
+    let existing = disk::nearest_existing(output);
+    let is_writable = disk::check_writable(&existing);
+    // The directory of the file may be missing, too, which hides that its name is too long
+    let named = output
+        .file_name()
+        .map(|name| fs::metadata(existing.join(name)));
+    let name = match named {
+        Some(Err(error)) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    };
+    is_writable.and(name).map_err(CliError::io(shown))
 }
 
 /// Whether a job in the same directory has an output of this name.
@@ -214,5 +273,32 @@ fn make_directory(output: &Path) -> Result<(), CliError> {
     match output.parent() {
         Some(dir) => fs::create_dir_all(dir).map_err(CliError::io(dir)),
         None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_chosen_by_number_or_place() {
+        let numbers = [3, 5, 9];
+        for (text, expected) in [
+            ("first", Some(3)),
+            ("last", Some(9)),
+            ("5", Some(5)),
+            ("4", None),
+            ("-1", Some(9)),
+            ("-3", Some(3)),
+            ("-4", None),
+            ("0", None),
+            ("-9223372036854775808", None),
+        ] {
+            let choice = FrameChoice::parse(text).expect("a choice");
+            assert_eq!(choice.among(&numbers), expected, "{text}");
+        }
+        // Numbers of frames have precedence
+        assert_eq!(FrameChoice::Number(-1).among(&[-1, 0]), Some(-1));
+        assert!(FrameChoice::parse("middle").is_err());
     }
 }

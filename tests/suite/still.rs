@@ -112,7 +112,10 @@ fn only_images_are_replaced() {
         &["--frame", "9", "-o", "a.png"],
         "--frame 9: is not among the frames: 1-5",
     );
-    refused(&["--follow", "-o", "a.png"], "--follow");
+    refused(
+        &["--follow", "-o", "a.png"],
+        "--follow: is for jobs, and `spherule still` has none",
+    );
     refused(&[], "--output");
 
     // The input under the name of an image.
@@ -122,6 +125,29 @@ fn only_images_are_replaced() {
     let ran = still(&workshop, &["--frame", "1", "-o", "a.png"]);
     ran.expect(2)
         .prints("a.png: is an input and would be overwritten;");
+}
+
+#[test]
+fn names_are_checked_before_the_render() {
+    let workshop = workshop();
+    let long = "x".repeat(5000) + ".png";
+    for name in [long.clone(), format!("new/{long}")] {
+        let ran = still(&workshop, &["-o", &name]).expect(2);
+        assert!(!ran.errors().contains("surveying"), "{}", ran.errors());
+    }
+    assert!(!workshop.join("new").exists());
+}
+
+#[test]
+fn the_first_and_last_frames_have_names() {
+    let workshop = workshop();
+    for (frame, number) in [("first", 1), ("last", 5), ("-1", 5), ("-5", 1)] {
+        let made = still(&workshop, &["--frame", frame, "-o", "a.png"]).expect(0);
+        assert!(made.text().starts_with(&format!("a.png: frame {number}, ")));
+    }
+    still(&workshop, &["--frame", "middle", "-o", "a.png"])
+        .expect(2)
+        .prints("expected the number of a frame, first or last");
 }
 
 #[test]
