@@ -7,6 +7,7 @@ use spherule_formats::Sequence;
 use spherule_jobs::{DryRun, FrameState, Job, ResumeMode};
 
 use super::job::use_threads;
+use super::manifest_args::open_sequence;
 use super::render::RunArgs;
 use super::{CliError, Outcome, disk, print};
 use crate::job::{RenderJob, require_one_fits};
@@ -40,7 +41,7 @@ pub(super) struct CheckArgs {
 pub(super) fn run(args: &CheckArgs) -> Result<Outcome, CliError> {
     let requested = args.run.manifest.manifest()?;
     use_threads(requested.manifest.job.threads)?;
-    let sequence = requested.open_sequence()?;
+    let sequence = open_sequence(&requested)?;
     for note in sequence.notes() {
         note!("{note}");
     }

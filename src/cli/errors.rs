@@ -8,19 +8,26 @@ use std::path::{Path, PathBuf};
 use spherule_formats::FrameError;
 use spherule_formats::sequence::SequenceError;
 use spherule_jobs::export::ExportError;
-use spherule_jobs::{FileError, JobError};
+use spherule_jobs::{FileError, JobError, PLAN_FILE};
 
 use crate::job::RunError;
 use crate::manifest::ManifestError;
+use crate::pipeline::MeshLoadError;
 use crate::resolve::ResolveError;
+
+/// The manifest of a job, beside its images.
+const JOB_FILE: &str = "job.toml";
+
+/// The attribute with atomic numbers.
+const ELEMENT: &str = "element";
 
 #[derive(Debug, thiserror::Error)]
 pub(super) enum CliError {
-    #[error("{}", WithRemedy(.0, run_remedy(.0)))]
+    #[error("{}", run_message(.0))]
     Run(#[from] RunError),
     #[error("{}", WithRemedy(.0, export_remedy(.0)))]
     Export(#[from] ExportError),
-    #[error("{}: {}", path.display(), io_message(source))]
+    #[error("{}", io_message(path, source))]
     Io { path: PathBuf, source: io::Error },
     #[error("{0}")]
     Other(String),
@@ -46,6 +53,49 @@ impl<E: fmt::Display> fmt::Display for WithRemedy<'_, E> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.0.fmt(f)?;
         self.1.map_or(Ok(()), |remedy| write!(f, "; {remedy}"))
+    }
+}
+
+/// The message of an error of a run.
+fn run_message(error: &RunError) -> String {
+    match error {
+        RunError::Sequence(SequenceError::NoFrames { path, .. }) if is_render_job(path) => {
+            format!(
+                "{}: the directory of a render job; continue it with: spherule render {}",
+                path.display(),
+                path.join(JOB_FILE).display()
+            )
+        }
+        RunError::Sequence(SequenceError::Topology(error) | SequenceError::List(error))
+        | RunError::Frame(error)
+            if is_missing(error) =>
+        {
+            frame_message(error)
+        }
+        RunError::Mesh {
+            index,
+            source: MeshLoadError::File(error),
+        } => format!("mesh.{index}.path: {}", frame_message(error)),
+        _ => WithRemedy(error, run_remedy(error)).to_string(),
+    }
+}
+
+/// Whether `dir` has images of a job, which are not particles.
+fn is_render_job(dir: &Path) -> bool {
+    dir.join(PLAN_FILE).is_file() && dir.join(JOB_FILE).is_file()
+}
+
+fn is_missing(error: &FrameError) -> bool {
+    matches!(error, FrameError::Io { source, .. } if matches!(source.kind(), io::ErrorKind::NotFound))
+}
+
+/// The message about a file, with the names of files that may have been meant.
+pub(super) fn frame_message(error: &FrameError) -> String {
+    match error {
+        FrameError::Io { path, .. } if is_missing(error) => {
+            SequenceError::missing(path).to_string()
+        }
+        other => other.to_string(),
     }
 }
 
@@ -110,7 +160,17 @@ const fn file_remedy(error: &FileError) -> Option<&'static str> {
 
 /// What the user can do if the manifest and the particles do not go together.
 fn resolve_remedy(error: &ResolveError) -> Option<&'static str> {
-    matches!(error, ResolveError::NoRadius).then_some("give a length with --radius")
+    match error {
+        ResolveError::NoRadius => Some("give a length with --radius"),
+        ResolveError::MissingAttribute { key, name, .. }
+            if *key == "bonds.find" && name == ELEMENT =>
+        {
+            Some(
+                "give a file that has elements with --topology, or a distance, such as --bonds 1.8",
+            )
+        }
+        _ => None,
+    }
 }
 
 /// What the user can do if a job cannot be exported.
@@ -119,13 +179,15 @@ fn export_remedy(error: &ExportError) -> Option<&'static str> {
     is_too_long.then_some("export them in parts with --frames")
 }
 
-/// The message of the operating system, with a remedy if there is one.
-fn io_message(error: &io::Error) -> String {
+/// The message about a file that the operating system refuses, with a remedy if there is one.
+fn io_message(path: &Path, error: &io::Error) -> String {
     match error.kind() {
-        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
-            "no space left; free some and run the same command again".to_owned()
-        }
-        _ => error.to_string(),
+        io::ErrorKind::NotFound => SequenceError::missing(path).to_string(),
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => format!(
+            "{}: no space left; free some and run the same command again",
+            path.display()
+        ),
+        _ => format!("{}: {error}", path.display()),
     }
 }
 

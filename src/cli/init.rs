@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::manifest_args::ManifestArgs;
+use super::manifest_args::{ManifestArgs, open_sequence};
 use super::{CliError, Outcome, print};
 
 #[derive(Debug, Args)]
@@ -13,7 +13,7 @@ pub(super) struct InitArgs {
 
 pub(super) fn run(args: &InitArgs) -> Result<Outcome, CliError> {
     let requested = args.manifest.manifest()?;
-    let sequence = requested.open_sequence()?;
+    let sequence = open_sequence(&requested)?;
     for note in sequence.notes() {
         note!("{note}");
     }

@@ -74,6 +74,14 @@ pub(super) fn useful_threads(requested: usize) -> usize {
 
 /// The directory of a job that is given as a directory or as a manifest.
 pub(super) fn job_directory(job: &Path) -> Result<PathBuf, CliError> {
+    if job.is_file() && !is_manifest(job) {
+        let dir = job.parent().filter(|dir| !dir.as_os_str().is_empty());
+        return Err(CliError::other(format!(
+            "{}: is a file; give the directory of the job: {}",
+            job.display(),
+            dir.unwrap_or(Path::new(".")).display()
+        )));
+    }
     if !is_manifest(job) || job.is_dir() {
         return Ok(job.to_owned());
     }

@@ -1,14 +1,16 @@
 //! Options that set a key of the manifest, made from the declarations of the keys.
 
-use clap::builder::EnumValueParser;
-use clap::builder::TypedValueParser as _;
+use std::ffi::{OsStr, OsString};
+use std::path::Path;
+
+use clap::builder::{EnumValueParser, PossibleValue, StringValueParser, TypedValueParser};
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
 use toml::Value;
 
 use super::CliError;
 use super::numbers::{number, seconds, whole};
 use super::paths::path_as_typed;
-use crate::manifest::{FlagKind, KeyFlag, Override, ProgressMode, key_flags};
+use crate::manifest::{FlagKind, KeyFlag, Override, ProgressMode, key_flags, nearest};
 
 /// Headings of the help, in this order.
 const HEADINGS: [&str; 6] = ["Input", "Camera", "Image", "Look", "Output", "Job"];
@@ -88,9 +90,71 @@ pub(super) fn over(
     Override::new(key, value, shown).map_err(|e| CliError::other(e.to_string()))
 }
 
+/// The value of an option that was given without one, if it may be.
+const fn usual_value(kind: FlagKind) -> Option<&'static str> {
+    match kind {
+        FlagKind::SwitchOrText(usual) | FlagKind::SwitchOrNumberOrText(usual) => Some(usual),
+        _ => None,
+    }
+}
+
+/// `arguments` with a `=` between options that need no value and the values that follow them. What follows is a value if
+/// it is one of the words of the option, or similar to one and no file, or a number if the option takes numbers.
+pub(super) fn with_equals(arguments: impl IntoIterator<Item = OsString>) -> Vec<OsString> {
+    let flags = key_flags();
+    let option = |argument: &OsString| {
+        let name = argument.to_str()?.strip_prefix("--")?;
+        let flag = flags.iter().find(|flag| flag.flag.name == name)?;
+        usual_value(flag.kind).is_some().then_some(flag)
+    };
+    let mut joined: Vec<OsString> = Vec::new();
+    let mut has_options = true;
+    for argument in arguments {
+        has_options &= argument != "--";
+        let flag = joined.last().filter(|_| has_options).and_then(option);
+        if let (Some(flag), Some(last)) = (flag, joined.last_mut())
+            && argument.to_str().is_some_and(|text| is_value(text, flag))
+        {
+            last.push("=");
+            last.push(argument);
+        } else {
+            joined.push(argument);
+        }
+    }
+    joined
+}
+
+fn is_value(text: &str, flag: &KeyFlag) -> bool {
+    let takes_numbers = matches!(flag.kind, FlagKind::SwitchOrNumberOrText(_));
+    flag.words.contains(&text)
+        || takes_numbers && text.parse::<f64>().is_ok()
+        || nearest(text, &flag.words).is_some() && !Path::new(text).exists()
+}
+
+/// Any text, with words that shells complete. The words are checked with the manifest.
+#[derive(Debug, Clone)]
+pub(super) struct KnownWords(pub(super) Vec<&'static str>);
+
+impl TypedValueParser for KnownWords {
+    type Value = String;
+
+    fn parse_ref(
+        &self,
+        command: &Command,
+        argument: Option<&Arg>,
+        value: &OsStr,
+    ) -> Result<String, clap::Error> {
+        StringValueParser::new().parse_ref(command, argument, value)
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        Some(Box::new(self.0.iter().map(PossibleValue::new)))
+    }
+}
+
 fn argument(key: &KeyFlag) -> Arg {
     let is_switch = key.kind == FlagKind::Switch;
-    let needs_value = !is_switch && !matches!(key.kind, FlagKind::SwitchOrText(_));
+    let needs_value = !is_switch && usual_value(key.kind).is_none();
     let default = key.default.as_ref().filter(|_| needs_value);
     let default = default.map(|default| format!(" [default: {default}]"));
     let help = format!("{}{}", key.help, default.unwrap_or_default());
@@ -119,16 +183,25 @@ fn argument(key: &KeyFlag) -> Arg {
             argument.value_parser(modes.map(|mode| mode.name().to_owned()))
         }
         FlagKind::Text(may_begin_with_hyphen) => {
-            argument.allow_hyphen_values(may_begin_with_hyphen)
+            let argument = argument.allow_hyphen_values(may_begin_with_hyphen);
+            match key.words.is_empty() {
+                true => argument,
+                false => argument.value_parser(KnownWords(key.words.clone())),
+            }
         }
-        // With `=`, so that an argument that follows is not taken as the value
-        FlagKind::SwitchOrText(usual) => argument
+        // With `=`, so that an argument that follows is not taken as the value; see `with_equals`
+        FlagKind::SwitchOrText(usual) | FlagKind::SwitchOrNumberOrText(usual) => argument
             .num_args(0..=1)
             .require_equals(true)
-            .default_missing_value(usual),
+            .default_missing_value(usual)
+            .value_parser(KnownWords(key.words.clone())),
         FlagKind::Integers => argument.allow_hyphen_values(true),
+        FlagKind::NumberOrText if !key.words.is_empty() => {
+            argument.value_parser(KnownWords(key.words.clone()))
+        }
         FlagKind::NumberOrText | FlagKind::Switch => argument,
     }
+    .hide_possible_values(key.flag.name != "progress")
     .allow_negative_numbers(!matches!(
         key.kind,
         FlagKind::Text(_) | FlagKind::List | FlagKind::Integers
@@ -148,8 +221,12 @@ fn value(key: &KeyFlag, matches: &ArgMatches) -> Option<Value> {
         FlagKind::Number | FlagKind::Seconds => {
             matches.get_one::<f64>(name).map(|v| Value::from(*v))
         }
-        FlagKind::Text(_) | FlagKind::SwitchOrText(_) => text().map(Value::from),
-        FlagKind::NumberOrText => text().map(|text| {
+        FlagKind::Text(_) => text().map(Value::from),
+        FlagKind::SwitchOrText(_) => text().map(|text| {
+            let is_on = text.parse::<bool>().map(Value::from);
+            is_on.unwrap_or(Value::from(text))
+        }),
+        FlagKind::NumberOrText | FlagKind::SwitchOrNumberOrText(_) => text().map(|text| {
             let whole = text.parse::<i64>().map(Value::from);
             let number = whole.or_else(|_| text.parse::<f64>().map(Value::from));
             number.unwrap_or(Value::from(text))

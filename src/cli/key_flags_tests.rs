@@ -22,7 +22,7 @@ const ACTIONS: [&str; 7] = [
 const COLORS: [&str; 4] = ["color_by", "map", "range", "color_scale"];
 
 /// Other options with a value that is not the default, and the key that it is laid over.
-const FLAGS: [(&str, &str); 45] = [
+const FLAGS: [(&str, &str); 49] = [
     ("--output x.####.exr", "output.path = \"x.####.exr\""),
     ("--frames 3-4", "input.frames = \"3-4\""),
     ("--width 7", "image.width = 7"),
@@ -51,6 +51,10 @@ const FLAGS: [(&str, &str); 45] = [
         "--ground=shadow_catcher",
         "render.ground = \"shadow_catcher\"",
     ),
+    ("--ground checker", "render.ground = \"checker\""),
+    ("--denoise false", "render.denoise = false"),
+    ("--denoise", "render.denoise = true"),
+    ("--bonds", "bonds.find = \"covalent\""),
     ("--cell", "cell.visible = true"),
     ("--replicate 2,2,1", "cell.replicate = [2, 2, 1]"),
     ("--wrap", "cell.wrap = true"),
@@ -88,7 +92,8 @@ fn command() -> Command {
 
 fn manifest(flags: &str) -> Manifest {
     let arguments = format!("render data {flags}");
-    let matches = command().get_matches_from(arguments.split_whitespace());
+    let arguments = with_equals(arguments.split_whitespace().map(OsString::from));
+    let matches = command().get_matches_from(arguments);
     let run = RunArgs::from_arg_matches(&matches).unwrap();
     run.manifest.manifest().unwrap().manifest
 }
@@ -176,5 +181,25 @@ fn no_option_is_forgotten() {
     for key in key_flags() {
         let is_tried = |other: &KeyFlag| other.kind == key.kind && tried.contains(other.flag.name);
         assert!(key_flags().iter().any(is_tried), "{key:?}");
+    }
+}
+
+#[test]
+fn values_without_equals_are_told_from_inputs() {
+    for (line, expected) in [
+        ("--ground checker in", "--ground=checker in"),
+        ("--ground in", "--ground in"),
+        ("--ground cheker", "--ground=cheker"),
+        ("--ground --cell", "--ground --cell"),
+        ("--denoise false --cell", "--denoise=false --cell"),
+        ("--bonds 1.8 in", "--bonds=1.8 in"),
+        ("--bonds=1.8 2", "--bonds=1.8 2"),
+        ("-- --ground checker", "-- --ground checker"),
+        // A file
+        ("--ground Cargo.toml", "--ground Cargo.toml"),
+    ] {
+        let joined = with_equals(line.split_whitespace().map(OsString::from));
+        let joined: Vec<&str> = joined.iter().filter_map(|text| text.to_str()).collect();
+        assert_eq!(joined.join(" "), expected);
     }
 }

@@ -1,18 +1,19 @@
 //! Makes a manifest and its sequence from command-line arguments.
 
-use std::io;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use spherule_formats::Sequence;
 use spherule_formats::sequence::SequenceError;
+use spherule_jobs::PLAN_FILE;
 
 use super::CliError;
 use super::camera_path::camera_keys;
-use super::key_flags::{KeyFlags, over};
+use super::key_flags::{KeyFlags, KnownWords, over};
 use super::numbers::number;
 use super::paths::{path_as_typed, text};
-use crate::job::JobManifest;
-use crate::manifest::{self, Look, Manifest, Override, draft};
+use crate::job::{JobManifest, RunError};
+use crate::manifest::{self, Look, Manifest, MapName, Override, ScaleKind, draft};
 
 /// Options that set keys of the manifest: `--set` for any key, and options for common keys.
 #[derive(Debug, Args)]
@@ -24,8 +25,9 @@ pub(super) struct ManifestArgs {
     #[command(flatten)]
     pub(super) keys: KeyFlags,
 
-    /// Preset for all settings that are not given explicitly: water, studio or paper.
-    #[arg(long, value_name = "NAME", help_heading = "Look", display_order = 0)]
+    /// Preset for all settings that are not given explicitly: water, studio, paper or whitted.
+    #[arg(long, value_name = "NAME", help_heading = "Look", display_order = 0, value_parser = looks(),
+        hide_possible_values = true)]
     pub(super) look: Option<String>,
     /// Quick preview: 4 samples per pixel, ambient light instead of light between surfaces
     ///
@@ -36,8 +38,8 @@ pub(super) struct ManifestArgs {
     /// Attribute to colour by [default: velocity, else the particles' own colours]
     ///
     /// Colours (Cd, color, rgb, bytes) are used unchanged unless --map, --range or --color-scale is given. Vectors are
-    /// mapped by their length; velocity.x is a component. height, depth, index and radius need no attribute. The word
-    /// elements stands for the usual colours of chemical elements.
+    /// mapped by their length; velocity.x is a component. x, y, z, height, depth, index and radius need no attribute;
+    /// speed, vx, vy and vz are those of the velocity. The word elements stands for the usual colours of chemical elements.
     #[arg(
         long,
         value_name = "ATTRIBUTE",
@@ -49,14 +51,16 @@ pub(super) struct ManifestArgs {
     ///
     /// viridis, turbo, plasma, inferno, magma, cividis, batlow, vik, greys and others, which the manual lists. A name
     /// with _r is the reversed map.
-    #[arg(long, value_name = "NAME", help_heading = "Look", display_order = 0)]
+    #[arg(long, value_name = "NAME", help_heading = "Look", display_order = 0,
+        value_parser = KnownWords(MapName::all()), hide_possible_values = true)]
     pub(super) map: Option<String>,
     /// Values at the ends of the colour map [default: the range of the sequence]
     #[arg(long, num_args = 2, value_names = ["LOW", "HIGH"], allow_negative_numbers = true, value_parser = number,
         help_heading = "Look", display_order = 0)]
     pub(super) range: Option<Vec<f64>>,
     /// Scale of the colour map: linear, log, symlog or categorical [default: linear]
-    #[arg(long, value_name = "SCALE", help_heading = "Look", display_order = 0)]
+    #[arg(long, value_name = "SCALE", help_heading = "Look", display_order = 0,
+        value_parser = KnownWords(ScaleKind::all()), hide_possible_values = true)]
     pub(super) color_scale: Option<String>,
     /// Draw the colours with their values in a free corner of the previews
     ///
@@ -89,6 +93,10 @@ pub(super) struct ManifestArgs {
         display_order = 0
     )]
     pub(super) set: Vec<String>,
+}
+
+fn looks() -> KnownWords {
+    KnownWords(Look::ALL.iter().map(|(_, name)| *name).collect())
 }
 
 impl ManifestArgs {
@@ -215,9 +223,29 @@ impl ManifestArgs {
 
 /// Reads the text of the manifest `path`.
 pub(super) fn read_manifest(path: &Path) -> Result<String, CliError> {
-    manifest::read_manifest(path).map_err(|error| match error.kind() {
-        io::ErrorKind::NotFound => SequenceError::missing(path).into(),
-        _ => CliError::io(path)(error),
+    manifest::read_manifest(path).map_err(CliError::io(path))
+}
+
+/// Finds the frames of the input of `requested`. Paths from a manifest are reported with its name.
+pub(super) fn open_sequence(requested: &JobManifest) -> Result<Sequence, CliError> {
+    requested.open_sequence().map_err(|error| {
+        let (Some(file), RunError::Sequence(SequenceError::Missing { .. })) =
+            (&requested.file, &error)
+        else {
+            return error.into();
+        };
+        let mut text = format!("{}: input.path: {error}", file.display());
+        let output = requested.base.join(requested.manifest.output.path.dir());
+        if output.join(PLAN_FILE).is_file() {
+            let output = requested
+                .base
+                .join(requested.manifest.output.path.to_string());
+            text += &format!(
+                "; if the files have moved: spherule render NEW_PLACE -o {}",
+                output.display()
+            );
+        }
+        CliError::other(text)
     })
 }
 

@@ -7,7 +7,7 @@ use std::ffi::OsString;
 use std::io::Write;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use spherule_formats::escape_controls;
 
 /// Prints a line on standard error.
@@ -35,6 +35,7 @@ mod errors;
 mod events;
 mod export;
 mod generate;
+mod hints;
 mod init;
 mod inspect;
 mod job;
@@ -141,7 +142,8 @@ fn hidden_command(arguments: &[OsString]) -> Option<fn() -> Result<Outcome, CliE
 
 /// Parses the command. If there is none, prints help or a message and returns the exit code.
 fn parse(arguments: &[OsString]) -> Result<Command, u8> {
-    let error = match Cli::try_parse_from(arguments) {
+    let arguments = key_flags::with_equals(arguments.iter().cloned());
+    let error = match Cli::try_parse_from(&arguments) {
         Ok(cli) => return Ok(cli.command),
         Err(error) => error,
     };
@@ -161,6 +163,8 @@ fn parse(arguments: &[OsString]) -> Result<Command, u8> {
         escape_controls(&text).into_owned()
     });
     let error = Cli::try_parse_from(escaped).err().unwrap_or(error);
+    let name = arguments.get(1).and_then(|name| name.to_str());
+    let error = hints::with_hints(error, name.unwrap_or_default(), &Cli::command());
     for line in error.render().to_string().lines() {
         message!("{line}");
     }

@@ -1,5 +1,6 @@
 //! Shows the progress of a job: a bar on a terminal, otherwise one line per frame, or lines for other programs.
 
+use std::fmt;
 use std::io::{IsTerminal, stderr};
 use std::path::Path;
 use std::sync::Mutex;
@@ -8,7 +9,7 @@ use std::time::Instant;
 
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use serde_json::{Value, json};
 use spherule_jobs::{EntryStatus, FinishedFrame, FrameEvent, FrameFailure, QueueEvent};
 
@@ -250,13 +251,29 @@ pub(super) fn openjd(done: usize, total: usize, plain: &str) {
 }
 
 fn bar(total: usize) -> ProgressBar {
-    let template = "{bar:30} {pos}/{len} frames  {msg}  {elapsed} elapsed, {eta} left";
+    let template = "{bar:30} {pos}/{len} frames  {msg}  {elapsed} elapsed{left}";
     let style = ProgressStyle::with_template(template)
         .expect("the template is well formed")
+        .with_key(
+            "left",
+            |state: &ProgressState, text: &mut dyn fmt::Write| {
+                // Writing to a string cannot fail
+                let _ = text.write_str(&left(state.pos(), state.eta().as_secs_f64()));
+            },
+        )
         .progress_chars("━╸─");
     let bar = ProgressBar::new(total as u64).with_style(style);
     bar.enable_steady_tick(std::time::Duration::from_millis(200));
     bar
+}
+
+/// The remaining time behind the elapsed one; unknown before the first frame is done.
+fn left(done: u64, seconds: f64) -> String {
+    if done == 0 {
+        String::new()
+    } else {
+        format!(", {} left", duration(seconds))
+    }
 }
 
 /// Formats seconds: `12 s`, `3:20 min`.
@@ -267,5 +284,16 @@ pub(super) fn duration(seconds: f64) -> String {
         0..60 => format!("{whole} s"),
         60..3600 => format!("{}:{:02} min", whole / 60, whole % 60),
         _ => format!("{}:{:02} h", whole / 3600, whole % 3600 / 60),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn time_left_is_unknown_before_the_first_frame() {
+        assert_eq!(left(0, 0.0), "");
+        assert_eq!(left(3, 200.0), ", 3:20 min left");
     }
 }

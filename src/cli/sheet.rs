@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::pictures::{JobPicture, JobPictures, PicturesArgs, SIGNAL_MESSAGES, Watch};
+use super::render::counted;
 use super::{CliError, Outcome, print, signals};
 use crate::movie::{MovieError, SheetSettings, write_sheet};
 
@@ -89,11 +90,11 @@ pub(super) fn run(args: &SheetArgs) -> Result<Outcome, CliError> {
     };
     let numbers: Vec<i64> = chosen.iter().map(|picture| picture.number).collect();
     print::lines([format!(
-        "{}: {}x{}, {} columns of {}x{}, frames {}",
+        "{}: {}x{}, {} of {}x{}, frames {}",
         args.output.display(),
         layout.size[0],
         layout.size[1],
-        layout.cells[0],
+        counted(layout.cells[0], "column"),
         layout.cell[0],
         layout.cell[1],
         super::job::list(&numbers)

@@ -45,7 +45,7 @@ const COVALENT: &str = "covalent";
 const FILE: &str = "file";
 
 impl Value for BondSearch {
-    const FLAG: FlagKind = FlagKind::NumberOrText;
+    const FLAG: FlagKind = FlagKind::SwitchOrNumberOrText(COVALENT);
 
     fn kind(_: &Key) -> String {
         "a distance above 0, \"covalent\", \"file\" or \"none\"".to_owned()

@@ -45,11 +45,18 @@ named! {
     }
 }
 
+impl ScaleKind {
+    /// The names of all scales.
+    pub fn all() -> Vec<&'static str> {
+        Self::words()
+    }
+}
+
 /// Colours from a value of each particle. Attributes with colours are used as they are unless another key is given.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ColorMapping {
     /// The value: an attribute, which is mapped by its length if it is a vector, a component such as `velocity.x`, or
-    /// `height`, `depth`, `index` or `radius`. By default the velocity.
+    /// `x`, `height`, `depth`, `index` or `radius`. By default the velocity.
     pub attribute: Option<String>,
     /// The map; the default depends on scale and range.
     pub map: Option<MapName>,

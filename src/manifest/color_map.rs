@@ -57,10 +57,39 @@ impl MapName {
         }
     }
 
+    /// The names of all maps and palettes, without reversed ones.
+    pub fn all() -> Vec<&'static str> {
+        known().collect()
+    }
+
     /// Whether it is a palette for categories.
     pub fn is_palette(self) -> bool {
         ColorMap::palette_names().any(|palette| palette == self.name)
     }
+}
+
+/// Names of maps in other programs, with the most similar map here.
+const SIMILAR: [(&str, &str); 12] = [
+    ("coolwarm", "vik"),
+    ("bwr", "vik"),
+    ("seismic", "vik"),
+    ("rdbu", "red-blue"),
+    ("rdylbu", "red-yellow-blue"),
+    ("puor", "purple-orange"),
+    ("jet", "turbo"),
+    ("hot", "lajolla"),
+    ("hsv", "romaO"),
+    ("twilight", "romaO"),
+    ("gray", "greys"),
+    ("grey", "greys"),
+];
+
+/// The map that was probably meant, if one is similar.
+fn similar(name: &str) -> Option<&'static str> {
+    let base = name.strip_suffix("_r").unwrap_or(name).to_ascii_lowercase();
+    let elsewhere = SIMILAR.iter().find(|(other, _)| *other == base);
+    let names: Vec<&str> = known().collect();
+    elsewhere.map_or_else(|| nearest(name, &names), |(_, known)| Some(*known))
 }
 
 /// Names of all maps and palettes, without the reversed ones.
@@ -73,15 +102,18 @@ impl Value for MapName {
         "a colour map".to_owned()
     }
 
+    fn words() -> Vec<&'static str> {
+        known().collect()
+    }
+
     fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {
         let text = field.as_text().ok_or(Fault::Unwanted)?;
         Self::named(text).ok_or_else(|| {
-            let names: Vec<&str> = known().collect();
-            let what = match nearest(text, &names) {
+            let what = match similar(text) {
                 Some(near) => format!("did you mean {near}?"),
                 None => format!(
                     "choose one of {}; an `_r` at the end reverses a map",
-                    names.join(", ")
+                    known().collect::<Vec<_>>().join(", ")
                 ),
             };
             Fault::Because(format!("unknown colour map `{text}`; {what}"))

@@ -13,6 +13,8 @@ pub struct KeyFlag {
     pub flag: Flag,
     /// The kind of value.
     pub kind: FlagKind,
+    /// All words that are values.
+    pub words: Vec<&'static str>,
     /// One line of help.
     pub help: String,
     /// More paragraphs of help.
@@ -34,6 +36,7 @@ pub fn key_flags() -> Vec<KeyFlag> {
             key: entry.key.clone(),
             flag: entry.declared.flag?,
             kind: entry.flag_kind,
+            words: entry.words.clone(),
             help: entry.declared.comment(),
             details: entry.declared.details(),
             default: unset.or_else(|| entry.value.as_ref().map(typed)),

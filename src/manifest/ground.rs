@@ -147,7 +147,7 @@ impl Value for GroundSetting {
     const FLAG: FlagKind = FlagKind::SwitchOrText(GroundKind::Plain.name());
 
     fn kind(_: &Key) -> String {
-        format!("true, false or one of {}", Self::words().join(", "))
+        format!("true, false or one of {}", GroundKind::words().join(", "))
     }
 
     fn parse(field: &Field<'_>, key: &Key) -> Result<Self, Fault> {
@@ -180,7 +180,8 @@ impl Value for GroundSetting {
 
     fn schema(key: &Key) -> Json {
         let kind = GroundKind::schema(key);
-        let without_file: Vec<&str> = Self::words().into_iter().filter(|w| *w != IMAGE).collect();
+        let kinds = GroundKind::words().into_iter();
+        let without_file: Vec<&str> = kinds.filter(|w| *w != IMAGE).collect();
         let is_image =
             json!({ "required": ["type"], "properties": { "type": { "const": IMAGE } } });
         json!({ "anyOf": [
@@ -207,10 +208,8 @@ impl Value for GroundSetting {
     }
 
     fn words() -> Vec<&'static str> {
-        GroundKind::names()
-            .into_iter()
-            .map(|(_, name)| name)
-            .collect()
+        let kinds = GroundKind::names().into_iter().map(|(_, name)| name);
+        kinds.chain(bool::words()).collect()
     }
 }
 

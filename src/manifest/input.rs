@@ -86,6 +86,8 @@ section! {
         path: Paths = Paths::default(), affects(Affects::Nothing),
             required("a directory, a pattern as \"dump.#.vtk\", or a list of files");
         /// Frames to render: 7 | 1-10 | 1-10x2 | 1-5,8
+        ///
+        /// 10-1 has the same frames as 1-10, from the last to the first.
         frames: Option<FrameRange> = None, or("all"), affects(Affects::Nothing), flag("frames", "RANGE", "Input");
         /// Parts to keep if frames consist of several files or blocks: fluid,oil
         ///
@@ -112,7 +114,7 @@ section! {
         /// `auto` is y for BGEO files and files of SPlisHSPlasH, and z for all others. To set the camera itself, use
         /// --set with camera.eye, camera.look_at, camera.fov or camera.mode.
         up: Option<UpAxis> = None, or("auto"), flag("up", "UP", "Camera");
-        /// Memory-map native frames; --no-mmap reads them instead
+        /// Map native frames into memory (true), or read them (false, --no-mmap)
         ///
         /// Use --no-mmap if another program may truncate the files during the render.
         mmap: bool = true, affects(Affects::Nothing), flag("no-mmap", "", "Input");

@@ -30,6 +30,8 @@ pub(super) struct Entry {
     pub(super) kind: String,
     pub(super) schema: Json,
     pub(super) flag_kind: FlagKind,
+    /// All words that are values.
+    pub(super) words: Vec<&'static str>,
 }
 
 impl Entry {
@@ -106,11 +108,13 @@ impl Entries {
                 (Some(_), FlagKind::Integer | FlagKind::Number | FlagKind::Seconds) => {
                     FlagKind::NumberOrText
                 }
+                (Some(_), FlagKind::Switch) => FlagKind::SwitchOrText("true"),
                 (_, FlagKind::Text(false)) => {
                     FlagKind::Text(T::words().iter().any(|word| word.starts_with('-')))
                 }
                 (_, kind) => kind,
             },
+            words: T::words().into_iter().chain(key.word).collect(),
         });
     }
 

@@ -177,8 +177,8 @@ impl Material {
             roughness => self.roughness, from(0), to(1), affects(Affects::PathTracing);
             /// Colour: auto (by speed), linear RGB, or { attribute = "velocity", map = "viridis", range = [0.0, 4.0] }
             ///
-            /// `attribute` is an attribute (a vector by its length), a component such as "velocity.x", or height,
-            /// depth, index or radius. `range` may be percentiles of the sequence, "1%-99%", or "symmetric" around 0.
+            /// `attribute` is an attribute (a vector by its length), a component such as "velocity.x", or speed,
+            /// vx, vy, vz, x, y, z, height, depth, index or radius. `range` may be percentiles of the sequence, "1%-99%", or "symmetric" around 0.
             /// `scale` is linear, log, symlog (linear up to `threshold`) or categorical (integers, with `names` such as
             /// { 1 = "water" } and colours of your own, `values` such as { 1 = [0.1, 0.3, 0.8] }). `map` is reversed by
             /// `reverse = true` or a name with _r, and divided into bands by `steps = 8`. "elements" has the usual

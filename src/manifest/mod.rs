@@ -167,12 +167,18 @@ pub struct Manifest {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ManifestError {
     lines: Vec<String>,
+    key: Option<String>,
 }
 
 impl ManifestError {
     /// One message per problem, in the order of the file.
     pub fn messages(&self) -> &[String] {
         &self.lines
+    }
+
+    /// The key of the first message, if it is about one.
+    pub fn key(&self) -> Option<&str> {
+        self.key.as_deref()
     }
 }
 
@@ -288,7 +294,8 @@ impl Manifest {
         };
         self.render.integrator = Some(IntegratorKind::Whitted);
         if let Some(root) = root.reading() {
-            let what = "selects integrator = \"whitted\"; render.integrator = \"path\" keeps path tracing";
+            let what =
+                "selects integrator = \"whitted\"; render.integrator = \"path\" keeps path tracing";
             root.section("material").warn(term, what);
         }
     }
@@ -521,6 +528,7 @@ impl Manifest {
             _ => "all frames that come".to_owned(),
         };
         Err(ManifestError {
+            key: Some("output.path".to_owned()),
             lines: vec![format!(
                 "output.path: {} for {count}: {NEEDS_NUMBER}, or select one frame (input.frames)",
                 self.output.path
@@ -641,6 +649,14 @@ fn known_keys() -> Vec<String> {
     entries.list().iter().map(|e| e.key.clone()).collect()
 }
 
+/// The dotted keys of this name that are not in lists.
+#[cfg(feature = "cli")]
+pub(crate) fn keys_called(name: &str) -> Vec<String> {
+    let mut all = known_keys();
+    all.retain(|key| key.rsplit('.').next() == Some(name));
+    all
+}
+
 /// Maximum number of problems that are reported at once.
 const MOST_SHOWN: usize = 50;
 
@@ -658,13 +674,30 @@ impl ManifestError {
         if problems.len() > MOST_SHOWN {
             lines.push(format!("{}: and more like these", path.display()));
         }
-        Self { lines }
+        let key = problems.first().map(|problem| problem.key.clone());
+        Self {
+            lines,
+            key: key.filter(|key| !key.is_empty()),
+        }
     }
+}
+
+/// Whether the option `shown` names the `key` already, or sets nothing else.
+fn is_option_of(shown: &str, key: &str) -> bool {
+    let assigned = shown
+        .strip_prefix("--set ")
+        .and_then(|set| set.split_once('='));
+    let is_flag =
+        |flag: &KeyFlag| flag.key == key && shown.strip_prefix("--") == Some(flag.flag.name);
+    assigned.is_some_and(|(set, _)| set.trim() == key) || key_flags().iter().any(is_flag)
 }
 
 /// Location, key and text of a problem.
 fn message(problem: &Problem, text: &str, path: &Path) -> String {
     let place = match &problem.place {
+        Place::Option(shown) if is_option_of(shown, &problem.key) => {
+            return format!("{shown}: {}", problem.what);
+        }
         Place::Option(shown) => shown.clone(),
         Place::Nowhere => path.display().to_string(),
         Place::Byte(at) => {

@@ -206,10 +206,13 @@ impl<'a> Field<'a> {
     }
 }
 
-/// The same key in another section that has it: `samples` belongs to `image`.
+/// The same key in the only other section that has it: `samples` belongs to `image`.
 fn elsewhere(key: &str, path: &str) -> Option<String> {
-    super::known_keys()
-        .into_iter()
-        .filter(|known| !known.starts_with(&format!("{path}.")) || path.is_empty())
-        .find(|known| known.rsplit('.').next() == Some(key))
+    let own = format!("{path}.");
+    let mut others = super::known_keys().into_iter().filter(|known| {
+        let is_elsewhere = path.is_empty() || !known.starts_with(&own);
+        is_elsewhere && known.rsplit('.').next() == Some(key)
+    });
+    let first = others.next();
+    first.filter(|_| others.next().is_none())
 }

@@ -242,7 +242,7 @@ section! {
         /// studio is a grey gradient over the image with darker corners. It does not move with the camera. auto is
         /// studio with path, and a darker gradient along the up axis with whitted.
         background: Option<Background> = None, or("auto");
-        /// Ground under the particles: auto | false | true (plain) | checker | shadow_catcher | image
+        /// Ground under the particles: auto | none (false) | plain (true) | checker | shadow_catcher | image
         ///
         /// A shadow catcher is invisible: it shows the background, darker where particles take light away. It needs
         /// integrator = "path" and has no colour. auto is a shadow catcher with path if particles lie on the floor of

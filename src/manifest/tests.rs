@@ -506,15 +506,12 @@ fn invalid_overrides() {
     };
     wrong(
         "render.max_dept=5",
-        "--set render.max_dept=5: render.max_dept: unknown key; did you mean `render.max_depth`?",
+        "--set render.max_dept=5: unknown key; did you mean `render.max_depth`?",
     );
-    wrong(
-        "image.width=wide",
-        "--set image.width=wide: image.width: expected",
-    );
+    wrong("image.width=wide", "--set image.width=wide: expected");
     wrong(
         "image.width.x=1",
-        "image.width.x: image.width is 1920, which has no keys; set image.width itself",
+        "--set image.width.x=1: image.width is 1920, which has no keys; set image.width itself",
     );
     wrong("light.1.intensity=1", "light.1: the list has no such item");
     for (set, part) in [
@@ -688,7 +685,10 @@ fn terms_of_the_thesis_select_its_model() {
     let whitted = IntegratorKind::Whitted;
     assert_eq!(integrator("material.shininess = 5"), whitted);
     // Defaults select nothing, however they are written
-    assert_eq!(integrator("material.transmission = 0.0"), IntegratorKind::Path);
+    assert_eq!(
+        integrator("material.transmission = 0.0"),
+        IntegratorKind::Path
+    );
     assert_eq!(integrator(""), IntegratorKind::Path);
     assert_eq!(integrator("material.ior = 1.5"), IntegratorKind::Path);
     // The integrator that a manifest names is the one that it gets
@@ -700,7 +700,9 @@ fn terms_of_the_thesis_select_its_model() {
 fn a_term_that_selects_the_integrator_is_named_in_a_warning() {
     let warnings = |text: &str| {
         let text = format!("input.path = \"a\"\n[material]\n{text}");
-        Manifest::parse_with_warnings(&text, path(), Vec::new()).unwrap().1
+        Manifest::parse_with_warnings(&text, path(), Vec::new())
+            .unwrap()
+            .1
     };
     assert_eq!(
         warnings("ambient = 0.1\ntransmission = 1.0"),

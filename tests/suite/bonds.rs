@@ -154,15 +154,19 @@ fn impossible_bonds_are_refused() {
         workshop.run(&[&command[..], &VIEW[..3], options].concat())
     };
     for (find, part) in [
-        ("0", "bonds.find: expected a distance above 0"),
-        ("covalentt", "bonds.find: expected a distance above 0"),
+        ("0", "--bonds: expected a distance above 0"),
+        ("covalentt", "--bonds: expected a distance above 0"),
     ] {
         let ran = run("in.xyz", &[&format!("--bonds={find}")]);
         ran.expect(2).prints(part);
     }
     fs::write(workshop.join("plain.csv"), "x,y,z\n0,0,0\n1,0,0\n").expect("a file");
     let ran = run("plain.csv", &["--bonds=covalent"]);
-    ran.expect(2).prints("bonds.find: no attribute `element`");
+    ran.expect(2)
+        .prints("bonds.find: no attribute `element`")
+        .prints(
+            "give a file that has elements with --topology, or a distance, such as --bonds 1.8",
+        );
     // Far too many, and none
     let line = |i: usize| format!("{},0,0\n", i);
     let many: String = (0..100).map(line).collect();

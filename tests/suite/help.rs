@@ -80,6 +80,16 @@ fn completions_know_every_command_and_option() {
             assert!(script.contains(option), "{shell}: {option}");
         }
     }
+    // Values, too
+    let script = help(&["completions", "bash"]);
+    for values in [
+        "water studio paper whitted",
+        "spheres union smooth",
+        "viridis turbo plasma",
+        "linear log symlog",
+    ] {
+        assert!(script.contains(values), "{values}");
+    }
     let errors = Workshop::new()
         .run(&["completions", "csh"])
         .expect(2)
@@ -96,7 +106,20 @@ fn every_command_has_a_manual_page() {
         let page = help(&["man", &name]);
         assert!(page.contains(&format!("spherule\\-{name}")), "{page}");
     }
-    assert!(help(&["man", "render"]).contains("\\-\\-samples"));
+    let render = help(&["man", "render"]);
+    assert!(render.contains("\\-\\-samples"));
+    assert!(
+        render.contains(concat!("\"spherule ", env!("CARGO_PKG_VERSION"), "\"")),
+        "{render}"
+    );
+    let (_, status) = render
+        .split_once(".SH \"EXIT STATUS\"\n")
+        .expect("the codes");
+    let (_, examples) = status.split_once(".SH EXAMPLES\n.nf\n").expect("examples");
+    assert!(
+        examples.contains("\\&  spherule render run1 \\-o out/frame.####.exr\n"),
+        "{examples}"
+    );
     let errors = Workshop::new().run(&["man", "rendr"]).expect(2).errors();
     assert!(
         errors.contains("`rendr`") && errors.contains("render, still"),
@@ -127,7 +150,7 @@ fn the_manual_of_maps_is_complete() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), [1]);
     let errors = workshop
-        .run(&["render", "in", "--map", "jet"])
+        .run(&["render", "in", "--map", "xyzzy"])
         .expect(2)
         .errors();
     let (_, list) = errors.split_once("choose one of ").expect("a list");

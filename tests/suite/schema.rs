@@ -68,5 +68,5 @@ fn job_settings_are_kept_and_may_change() {
     workshop
         .render(&["--threads", "-3"])
         .expect(2)
-        .prints("--threads: job.threads: expected \"all\" or a whole number from 1");
+        .prints("--threads: expected \"all\" or a whole number from 1");
 }

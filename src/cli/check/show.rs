@@ -8,7 +8,7 @@ use super::{Check, whole};
 use crate::accel::Structure;
 use crate::cli::job::list;
 use crate::cli::progress::duration;
-use crate::cli::render::{radius_text, unframed_text};
+use crate::cli::render::{counted, radius_text, unframed_text};
 use crate::manifest::Channel;
 use crate::metrics::Bytes;
 use crate::pipeline::{Overlap, Probe, RadiusRule, Setup};
@@ -88,7 +88,7 @@ impl Check<'_> {
         let names: Vec<_> = manifest.output.channels.iter().map(Channel::name).collect();
         let [width, height] = manifest.picture().size();
         lines.push(format!(
-            "images     {}: {}x{}{}, {} samples per pixel, {}{}",
+            "images     {}: {}x{}{}, {} per pixel, {}{}",
             self.render_job.shown_output().display(),
             width,
             height,
@@ -97,7 +97,7 @@ impl Check<'_> {
                 .part()
                 .map(|part| format!(", part {part:?}"))
                 .unwrap_or_default(),
-            manifest.image.samples,
+            counted(manifest.image.samples as usize, "sample"),
             names.join(" "),
             if manifest.output.preview {
                 ", with previews"
@@ -144,7 +144,9 @@ impl Check<'_> {
     }
 
     fn memory_lines(&self) -> Vec<String> {
-        let Some(schedule) = &self.schedule else {
+        // No frame that fits needs no memory
+        let schedule = self.schedule.as_ref();
+        let Some(schedule) = schedule.filter(|schedule| schedule.need.total() > 0) else {
             return Vec::new();
         };
         let mut line = format!("memory     about {}", Bytes(schedule.need.total()));
@@ -183,7 +185,7 @@ impl Check<'_> {
         }
         let others = match probe.frames {
             1 => String::new(),
-            frames => format!(", and of {} others", frames - 1),
+            frames => format!(", and of {}", counted(frames as usize - 1, "other")),
         };
         Some(format!(
             "time       about {}, an estimate: frame {} read in {:.3} s and built in {:.3} s just \

@@ -14,6 +14,8 @@ use spherule_formats::sequence::{
 use spherule_formats::stats::FrameStats;
 use spherule_formats::{FrameError, FrameFile, Positions, Sequence, SequenceInput, SimulationCell};
 
+use super::errors::frame_message;
+use super::manifest_args::is_manifest;
 use super::print::{self, Reader};
 use super::render::parts_text;
 use super::{CliError, Outcome};
@@ -83,9 +85,8 @@ pub(super) fn run(args: &InspectArgs) -> Result<Outcome, CliError> {
     for meant in expand(args) {
         let inspected = match meant {
             Meant::List(list) => Ok(list.print(args.json)),
-            Meant::File(file, place) => {
-                inspect(&file, place, args, topology.as_ref()).map_err(|e| (file, e.to_string()))
-            }
+            Meant::File(file, place) => inspect(&file, place, args, topology.as_ref())
+                .map_err(|e| (file, frame_message(&e))),
             Meant::Nothing(argument, why) => Err((argument, why)),
         };
         let printed = match inspected {
@@ -163,6 +164,14 @@ fn expand(args: &InspectArgs) -> Vec<Meant> {
         follow_links: args.follow_links,
     };
     for argument in &args.files {
+        if is_manifest(argument) && argument.is_file() {
+            let why = format!(
+                "{}: a manifest, not particles; check it with: spherule check {0}",
+                argument.display()
+            );
+            all.push(Meant::Nothing(argument.clone(), why));
+            continue;
+        }
         match SequenceInput::from_path(argument) {
             SequenceInput::Files(listed) if !listed.iter().any(|file| stands_for_others(file)) => {
                 for file in listed {

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::job::{JobArgs, use_threads};
-use super::manifest_args::ManifestArgs;
+use super::manifest_args::{ManifestArgs, open_sequence};
 use super::movie::MovieAfter;
 use super::signals::SignalListener;
 use super::{CliError, Outcome, events, signals};
@@ -18,7 +18,7 @@ mod run;
 mod summary;
 
 use run::Run;
-pub(super) use summary::{parts_text, print_summary, radius_text, unframed_text};
+pub(super) use summary::{counted, parts_text, print_summary, radius_text, unframed_text};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -87,7 +87,7 @@ fn run_once(
     signals: &SignalListener,
 ) -> Result<Outcome, CliError> {
     let grace = requested.manifest.job.grace;
-    let sequence = requested.open_sequence()?;
+    let sequence = open_sequence(&requested)?;
     for note in sequence.notes() {
         note!("{note}");
     }

@@ -8,7 +8,7 @@ use crate::pipeline::{self, RadiusRule, Setup};
 use crate::report::FrameReport;
 use crate::scene::RadiusTable;
 use crate::surface::SurfaceKind;
-use crate::survey::Survey;
+use crate::survey::{Survey, shown_name};
 
 impl ShowReport for FrameReport {
     fn summary(&self) -> String {
@@ -39,7 +39,10 @@ pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup:
         message!("{parts}");
     }
     for remark in sequence.remarks() {
-        note!("{remark}");
+        note!(
+            "{}",
+            without_cell_hint(remark, setup.picture.cell.is_some())
+        );
     }
     if survey.most_particles == 0 {
         return;
@@ -49,17 +52,18 @@ pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup:
         message!("{text}");
     }
     if let pipeline::ColorRule::Attribute { name, map, .. } = &setup.picture.color {
+        let shown = shown_name(name);
         match (map.range(), map.categories()) {
             (Some(([low, high], _)), _) => {
                 message!(
-                    "colour by `{name}`, range {} to {}",
+                    "colour by `{shown}`, range {} to {}",
                     short(low),
                     short(high)
                 );
             }
             (None, categories) => {
                 let count = categories.map_or(0, <[_]>::len);
-                message!("colour by `{name}`, {count} categories");
+                message!("colour by `{shown}`, {count} categories");
             }
         }
     }
@@ -72,6 +76,18 @@ pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup:
     }
     if survey.origin != glam::DVec3::ZERO {
         message!("origin {}: the particles are far from zero", survey.origin);
+    }
+}
+
+/// What a remark on the simulation cell says about the option that draws it.
+const CELL_HINT: &str = "; --cell draws it";
+
+/// `remark` without a hint that was followed already.
+fn without_cell_hint(remark: String, is_cell_drawn: bool) -> String {
+    if is_cell_drawn {
+        remark.replace(CELL_HINT, "")
+    } else {
+        remark
     }
 }
 
@@ -137,7 +153,29 @@ fn short(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
 }
 
-fn counted(count: usize, what: &str) -> String {
+/// `3 frames`, but `1 frame`.
+pub(in crate::cli) fn counted(count: usize, what: &str) -> String {
     let plural = if count == 1 { "" } else { "s" };
     format!("{count} {what}{plural}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn drawn_cells_need_no_option() {
+        let remark = "the file has a simulation cell; --cell draws it. Particles are".to_owned();
+        assert_eq!(without_cell_hint(remark.clone(), false), remark);
+        assert_eq!(
+            without_cell_hint(remark, true),
+            "the file has a simulation cell. Particles are"
+        );
+    }
+
+    #[test]
+    fn single_things_have_no_plural() {
+        assert_eq!(counted(1, "column"), "1 column");
+        assert_eq!(counted(2, "column"), "2 columns");
+    }
 }

@@ -37,6 +37,8 @@ pub enum FlagKind {
     Text(bool),
     /// Text, or no value, which means this text.
     SwitchOrText(&'static str),
+    /// A number or a word, or no value, which means this word.
+    SwitchOrNumberOrText(&'static str),
     /// A number or a word.
     NumberOrText,
     /// Text, with commas between items.
@@ -214,6 +216,10 @@ impl Value for bool {
 
     fn schema(_: &Key) -> Json {
         json!({ "type": "boolean" })
+    }
+
+    fn words() -> Vec<&'static str> {
+        vec!["true", "false"]
     }
 }
 

@@ -22,9 +22,7 @@ fn misspelled_values_have_suggestions() {
     not_rendered(
         &workshop,
         &["--set", "render.max_dept=4"],
-        &[
-            "--set render.max_dept=4: render.max_dept: unknown key; did you mean `render.max_depth`?",
-        ],
+        &["--set render.max_dept=4: unknown key; did you mean `render.max_depth`?"],
     );
     not_rendered(
         &workshop,
@@ -34,10 +32,7 @@ fn misspelled_values_have_suggestions() {
     not_rendered(
         &workshop,
         &["--accelerator", "lbhv"],
-        &[
-            "--accelerator: render.accelerator: expected one of ",
-            "did you mean lbvh?",
-        ],
+        &["--accelerator: expected one of ", "did you mean lbvh?"],
     );
     not_rendered(
         &workshop,
@@ -48,7 +43,7 @@ fn misspelled_values_have_suggestions() {
         &workshop,
         &["--surface", "smoth"],
         &[
-            "--surface: render.surface: expected one of spheres, union, smooth",
+            "--surface: expected one of spheres, union, smooth",
             "did you mean smooth?",
         ],
     );
@@ -77,7 +72,7 @@ fn contradictory_surface_options_are_rejected() {
         ),
         (
             ["--smoothing", "1.5"],
-            "--smoothing: surface.smoothing: expected a number from 0 to 1",
+            "--smoothing: expected a number from 0 to 1",
         ),
     ] {
         not_rendered(&workshop, &options, &[expected]);
@@ -90,76 +85,70 @@ fn numbers_have_ranges() {
     for (options, expected) in [
         (
             ["--width", "-5"],
-            "--width: image.width: expected a length on paper such as \"85mm\", or a whole number from 1 to 65536, found -5",
+            "--width: expected a length on paper such as \"85mm\", or a whole number from 1 to 65536, found -5",
         ),
         (
             ["--width", "0"],
-            "image.width: expected a length on paper such as \"85mm\", or a whole number from 1 to 65536, found 0",
+            "--width: expected a length on paper such as \"85mm\", or a whole number from 1 to 65536, found 0",
         ),
         (["--width", "65537"], "from 1 to 65536, found 65537"),
         (
             ["--height", "-1"],
-            "--height: image.height: expected a length on paper such as \"85mm\", or a whole number from 1 to 65536",
+            "--height: expected a length on paper such as \"85mm\", or a whole number from 1 to 65536",
         ),
         (["--height", "99999999999"], "found 99999999999"),
         (
             ["--samples", "0"],
-            "--samples: image.samples: expected a whole number from 1 to 4096, found 0",
+            "--samples: expected a whole number from 1 to 4096, found 0",
         ),
         (
             ["--samples", "-4"],
-            "image.samples: expected a whole number from 1 to 4096, found -4",
+            "--samples: expected a whole number from 1 to 4096, found -4",
         ),
         (
             ["--max-depth", "0"],
-            "render.max_depth: expected a whole number from 1 to 64, found 0",
+            "--max-depth: expected a whole number from 1 to 64, found 0",
         ),
         (
             ["--max-depth", "-3"],
-            "render.max_depth: expected a whole number from 1 to 64, found -3",
+            "--max-depth: expected a whole number from 1 to 64, found -3",
         ),
-        (
-            ["--radius", "0"],
-            "--radius: input.radius: expected a length above 0",
-        ),
-        (
-            ["--radius", "-0.1"],
-            "input.radius: expected a length above 0",
-        ),
+        (["--radius", "0"], "--radius: expected a length above 0"),
+        (["--radius", "-0.1"], "--radius: expected a length above 0"),
         (["--radius", "nan"], "found NaN"),
         (["--radius", "inf"], "found inf"),
         (["--radius", "thick"], "found the text \"thick\""),
         (
             ["--set", "camera.fov=0"],
-            "--set camera.fov=0: camera.fov: expected degrees between 0 and 180, found 0",
+            "--set camera.fov=0: expected degrees between 0 and 180, found 0",
         ),
         (
             ["--set", "camera.fov=180"],
-            "camera.fov: expected degrees between 0 and 180, found 180",
+            "--set camera.fov=180: expected degrees between 0 and 180, found 180",
         ),
         (
             ["--set", "material.ior=nan"],
-            "--set material.ior=nan: material.ior: expected a number above 0, found NaN",
+            "--set material.ior=nan: expected a number above 0, found NaN",
         ),
         (
             ["--set", "material.diffuse=inf"],
-            "material.diffuse: expected a number from 0, found inf",
+            "--set material.diffuse=inf: expected a number from 0, found inf",
         ),
         (
             ["--set", "material.reflection=1.5"],
-            "material.reflection: expected a number from 0 to 1",
+            "--set material.reflection=1.5: expected a number from 0 to 1",
         ),
         (
             ["--set", "camera.eye=[nan,0,0]"],
-            "camera.eye: expected three numbers",
+            "--set camera.eye=[nan,0,0]: expected three numbers",
         ),
         (
             ["--set", "camera.eye=[1,2]"],
-            "camera.eye: expected three numbers",
+            "--set camera.eye=[1,2]: expected three numbers",
         ),
         (
             ["--set", "camera.up=[0,0,0]"],
-            "camera.up: expected three numbers that are not all 0",
+            "--set camera.up=[0,0,0]: expected three numbers that are not all 0",
         ),
         (
             ["--set", "image.width"],
@@ -167,21 +156,21 @@ fn numbers_have_ranges() {
         ),
         (
             ["--set", "image=7"],
-            "--set image=7: image: expected a table, found 7",
+            "--set image=7: expected a table, found 7",
         ),
         (
             ["--width", "4k"],
-            "--width: image.width: unknown unit `k`; write a whole number of pixels, or a length in mm, cm, in or pt",
+            "--width: unknown unit `k`; write a whole number of pixels, or a length in mm, cm, in or pt",
         ),
         (["--samples", "many"], "expected a whole number, such as 16"),
         (["--idle", "1h"], "expected a number of seconds"),
         (
             ["--threads", "2000"],
-            "--threads: job.threads: expected \"all\" or a whole number from 1 to 1024, found 2000",
+            "--threads: expected \"all\" or a whole number from 1 to 1024, found 2000",
         ),
         (["--threads", "0"], "--threads"),
         (["--threads", "many"], "--threads"),
-        (["--up", "w"], "--up: input.up: expected one of x, y, z"),
+        (["--up", "w"], "--up: expected one of x, y, z"),
     ] {
         not_rendered(&workshop, &options, &[expected]);
     }
@@ -200,11 +189,7 @@ fn all_invalid_options_are_reported_at_once() {
             "--set",
             "output.previw=false",
         ],
-        &[
-            "image.width",
-            "image.samples",
-            "did you mean `output.preview`?",
-        ],
+        &["--width: ", "--samples: ", "did you mean `output.preview`?"],
     );
 }
 
@@ -223,13 +208,13 @@ fn invalid_cameras() {
         "eye=[1,2,3]",
         "look_at=[1,2,3]",
         "up=[0,1,0]",
-        "camera.look_at: is where the eye is; they must differ",
+        "--set camera.look_at=[1,2,3]: is where the eye is; they must differ",
     );
     camera(
         "eye=[0,5,0]",
         "look_at=[0,0,0]",
         "up=[0,-2,0]",
-        "camera.up: points along the view; it must not",
+        "--set camera.up=[0,-2,0]: points along the view; it must not",
     );
     // BGEO is y up, and that is along this view.
     camera(
@@ -259,9 +244,9 @@ fn frame_ranges() {
         ),
         (
             "3-",
-            "--frames: input.frames: frame range `3-`: character 3: a frame number is missing",
+            "--frames: frame range `3-`: character 3: a frame number is missing",
         ),
-        ("", "input.frames"),
+        ("", "--frames: frame range"),
         ("one", "`one`: character 1"),
         ("1-3x0", "`1-3x0`"),
     ] {
@@ -276,7 +261,8 @@ fn missing_colour_attribute() {
         &workshop,
         &["--color-by", "nosuch"],
         &[
-            "material.color.attribute: no attribute `nosuch` in the sampled frames; available: `density`, `id`, `velocity`",
+            "material.color.attribute: no attribute `nosuch` in the sampled frames; available: `density`, `id`, `velocity`, \
+             `speed`, `x`, `y`, `z`, `height`, `depth`, `index`, `radius`",
         ],
     );
     not_rendered(
@@ -310,7 +296,7 @@ fn map_applies_to_the_existing_colour() {
     workshop
         .render(&["--map", "turbo"])
         .expect(0)
-        .prints("colour by `velocity`");
+        .prints("colour by `speed`");
     assert!(kept("color = ").starts_with("color = { map = \"turbo\" }"));
     let plain = workshop.render_to("plain", &[]).expect(0);
     drop(plain);

@@ -46,6 +46,60 @@ fn missing_paths_are_named() {
 }
 
 #[test]
+fn only_similar_names_are_suggested() {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("dump"), 1..=3);
+    fs::write(workshop.join("picture.exr"), b"").expect("a file");
+    no_sequence(
+        &workshop,
+        "dunp",
+        &["error: dunp: no such file or directory; closest in `.`: dump"],
+    );
+    let ran = workshop.run(&["render", "elsewhere"]).expect(2);
+    assert!(!ran.errors().contains("picture.exr"), "{}", ran.errors());
+    for arguments in [
+        &["render", "dump", "--mesh", "tank.stl"][..],
+        &["render", "dump", "--topology", "tank.stl"],
+        &["render", "dump", "--camera-path", "tank.stl"],
+    ] {
+        fs::write(workshop.join("tonk.stl"), b"").expect("a file");
+        refused(
+            &workshop,
+            arguments,
+            &[
+                "tank.stl: no such file or directory; closest in `",
+                "`: tonk.stl",
+            ],
+        );
+    }
+    let ran = workshop.run(&["inspect", "dump/f_9.bgeo"]).expect(1);
+    ran.prints("dump/f_9.bgeo: no such file or directory; closest in `dump`: f_1.bgeo");
+}
+
+#[test]
+fn a_job_is_continued_by_its_manifest() {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 1..=2);
+    workshop.render(&["--frames", "1"]).expect(0);
+    refused(
+        &workshop,
+        &["render", "out"],
+        &["out: the directory of a render job; continue it with: spherule render out/job.toml"],
+    );
+    fs::rename(workshop.join("in"), workshop.join("moved")).expect("a directory");
+    refused(
+        &workshop,
+        &["render", "out/job.toml"],
+        &[
+            "out/job.toml: input.path: out/../in: no such file or directory",
+            "if the files have moved: spherule render NEW_PLACE -o out/f.####.exr",
+        ],
+    );
+    let inspected = workshop.run(&["inspect", "out/job.toml"]).expect(1);
+    inspected.prints("out/job.toml: a manifest, not particles; check it with: spherule check");
+}
+
+#[test]
 fn inspect_continues_after_a_missing_path() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), [1, 2]);

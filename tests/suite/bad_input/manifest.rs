@@ -76,7 +76,7 @@ fn missing_keys_are_named() {
     );
     wrong(
         "[input]\npath = \"elsewhere\"\n",
-        &["elsewhere: no such file or directory"],
+        &["my.toml: input.path: elsewhere: no such file or directory"],
     );
 }
 

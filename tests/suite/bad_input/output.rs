@@ -51,19 +51,19 @@ fn invalid_output_names() {
         .prints("1 of 1 frames done");
     assert!(workshop.join("one/f.exr").is_file());
     fs::remove_dir_all(workshop.join("one")).expect("the job");
-    let ending = "--output: output.path: must end in .exr (example: out/frame.####.exr)";
+    let ending = "--output: must end in .exr (example: out/frame.####.exr)";
     for pattern in ["out/f.####.png", "out/", "out", "", "out/f.####"] {
         not_there(&workshop, pattern, &[ending]);
     }
     not_there(
         &workshop,
         "out/%q.exr",
-        &["output.path: invalid frame number `%q.exr`; use #### or %04d"],
+        &["--output: invalid frame number `%q.exr`; use #### or %04d"],
     );
     not_there(
         &workshop,
         "out/##.##.exr",
-        &["output.path: has places for two numbers"],
+        &["--output: has places for two numbers"],
     );
     not_there(
         &workshop,

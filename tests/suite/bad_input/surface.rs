@@ -98,6 +98,6 @@ fn unknown_surfaces() {
     dam_break(&workshop.join("in"), [1]);
     not_rendered(&workshop, &["--surface", "smoth"], &["smoth", "smooth"]);
     let voxel = [&SMOOTH[..], &["--set", "surface.voxel=0"]].concat();
-    let expected = "surface.voxel: expected a number of particle radii from 0.25 to 4";
+    let expected = "--set surface.voxel=0: expected a number of particle radii from 0.25 to 4";
     not_rendered(&workshop, &voxel, &[expected]);
 }

@@ -100,9 +100,9 @@ fn finished_job_needs_no_time() {
 #[test]
 fn check_names_reasons_why_render_fails() {
     let workshop = frames();
-    check(&workshop, &["--memory-limit", "1MiB"])
-        .expect(2)
-        .prints("error: no frame fits into memory");
+    let ran = check(&workshop, &["--memory-limit", "1MiB"]).expect(2);
+    assert!(!ran.text().contains("\nmemory "), "{}", ran.text());
+    ran.prints("error: no frame fits into memory");
     fs::write(workshop.join("out"), "a file").expect("a file");
     check(&workshop, &[])
         .expect(2)

@@ -52,9 +52,10 @@ fn invalid_sizes() {
     let workshop = Workshop::new();
     vtk(&workshop.join("in/f_1.vtk"), 10, false);
     for size in ["0", "", "-5", "much", "4 gallons", "1e3"] {
-        workshop.render(&["--memory-limit", size]).expect(2).prints(
-            "--memory-limit: render.memory_limit: expected a size above 0, such as \"4GiB\"",
-        );
+        workshop
+            .render(&["--memory-limit", size])
+            .expect(2)
+            .prints("--memory-limit: expected a size above 0, such as \"4GiB\"");
     }
     for size in ["2GiB", "2G", "2048m", "2147483648"] {
         workshop.render(&["--memory-limit", size]).expect(0);

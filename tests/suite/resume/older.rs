@@ -86,7 +86,7 @@ fn unions_that_were_called_medium_go_on() {
     older("medium")
         .render(&["--surface", "medium", "--force"])
         .expect(0)
-        .prints("--surface: render.surface: \"medium\" is now called \"union\"; the old name still works");
+        .prints("--surface: \"medium\" is now called \"union\"; the old name still works");
     older("medium")
         .render(&["--surface", "smooth"])
         .expect(2)
