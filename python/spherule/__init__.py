@@ -8,7 +8,7 @@
 
 from ._command import command, inspect
 from ._errors import ArrayError, Error, InputError, InternalError, JobError, OutputError, SettingError
-from ._frames import Frame, Sequence, read, sequence, write_spf
+from ._frames import Cell, Frame, Sequence, read, sequence, write_spf
 from ._image import Image
 from ._job import Job
 from ._render import render
@@ -16,6 +16,7 @@ from ._spherule import __version__
 
 __all__ = [
     "ArrayError",
+    "Cell",
     "Error",
     "Frame",
     "Image",

@@ -4,7 +4,7 @@ from os import PathLike
 from typing import Any, Literal, TypeAlias, overload
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, DTypeLike
 
 __version__: str
 
@@ -23,6 +23,17 @@ class OutputError(Error): ...
 class JobError(Error): ...
 class InternalError(Error): ...
 
+class Cell:
+    vectors: np.ndarray
+    origin: tuple[float, float, float]
+    periodic: tuple[bool, bool, bool]
+    def __init__(
+        self,
+        vectors: ArrayLike,
+        origin: tuple[float, float, float] = ...,
+        periodic: tuple[bool, bool, bool] = ...,
+    ) -> None: ...
+
 class Frame:
     positions: np.ndarray
     radius: float | np.ndarray | None
@@ -33,6 +44,7 @@ class Frame:
     up: str
     name: str
     notes: list[str]
+    cell: Cell | None
     def __init__(
         self,
         positions: np.ndarray,
@@ -44,6 +56,7 @@ class Frame:
         up: str = ...,
         name: str = ...,
         notes: list[str] = ...,
+        cell: Cell | None = ...,
     ) -> None: ...
     def __len__(self) -> int: ...
 
@@ -66,6 +79,9 @@ class Image:
     color_range: tuple[float, float] | None
     @property
     def rgba(self) -> np.ndarray: ...
+    @property
+    def srgb(self) -> np.ndarray: ...
+    def __array__(self, dtype: DTypeLike | None = ..., copy: bool | None = ...) -> np.ndarray: ...
     def __getitem__(self, name: str) -> np.ndarray: ...
     def to_exr(self) -> bytes: ...
     def to_png(self) -> bytes: ...
@@ -90,7 +106,7 @@ class Job:
 def render(
     positions: ArrayLike | Frame,
     *,
-    radius: ArrayLike | Literal["auto"] | None = ...,
+    radius: ArrayLike | Literal["auto", "vdw", "covalent"] | None = ...,
     attributes: Mapping[str, ArrayLike] | None = ...,
     camera: _Settings | None = ...,
     settings: _Settings | None = ...,
@@ -99,13 +115,14 @@ def render(
     samples: int | None = ...,
     color: Any = ...,
     channels: list[str] | None = ...,
-    up: Literal["y", "z"] | None = ...,
+    up: Literal["x", "y", "z", "-x", "-y", "-z"] | None = ...,
+    cell: Cell | ArrayLike | None = ...,
     frame: int = ...,
     name: str = ...,
     threads: int | None = ...,
 ) -> Image: ...
-def sequence(path: _Path | list[_Path], *, follow_links: bool = ...) -> Sequence: ...
-def read(path: _Path | list[_Path], frame: int | None = ...) -> Frame: ...
+def sequence(path: _Path | list[_Path], *, follow_links: bool = ..., topology: _Path | None = ...) -> Sequence: ...
+def read(path: _Path | list[_Path], frame: int | None = ..., *, topology: _Path | None = ...) -> Frame: ...
 def write_spf(
     path: _Path,
     positions: ArrayLike,

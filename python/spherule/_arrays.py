@@ -90,6 +90,8 @@ def radius_of(radius, count):
     """A common radius and an array of radii; one of them is None, or both."""
     if radius is None or (isinstance(radius, str) and radius == "auto"):
         return None, None
+    if isinstance(radius, str):
+        raise ArrayError(f"radius: expected a number or an array, found {radius!r}", place="radius")
     array = _numbers("radius", radius)
     if array.ndim > 1 or (array.ndim == 1 and len(array) != count):
         raise ArrayError(
@@ -105,6 +107,42 @@ def radius_of(radius, count):
         row = int(np.argmin(array))
         raise ArrayError(f"radius: {array[row]} of particle {row} is not positive", place="radius")
     return None, np.ascontiguousarray(array, dtype=np.float32)
+
+
+def color_of(color, attributes, count):
+    """The setting `material.color`. An array with a colour for each particle is added to `attributes`."""
+    if isinstance(color, str):
+        return color if color in ("auto", "elements") else {"attribute": color}
+    if color is None or hasattr(color, "items"):
+        return color
+    array = _numbers("color", color)
+    if array.ndim == 1:
+        return array.tolist()
+    if array.shape not in ((count, 3), (count, 4)):
+        raise ArrayError(
+            f"color: expected three numbers or the shape ({count}, 3), found the shape {array.shape}; numbers for a "
+            f"colour map are an attribute",
+            place="color",
+        )
+    known = [name.lower() for name, _ in attributes]
+    if "cd" in known:
+        raise ArrayError("color: attributes have colours `Cd` too; give one of them", place="color")
+    attributes.append(("Cd", np.require(array, requirements=["C", "A"])))
+    return {"attribute": "Cd"}
+
+
+def cell_vectors_of(vectors):
+    """The edges of a cell, float64 (3, 3)."""
+    array = _numbers("cell", vectors).astype(np.float64)
+    if array.shape == (3,):
+        array = np.diag(array)
+    if array.shape != (3, 3):
+        raise ArrayError(
+            f"cell: expected the edges, of the shape (3, 3), or three lengths, found the shape {array.shape}",
+            place="cell",
+        )
+    _check_finite("cell", array)
+    return array
 
 
 def threads_of(threads):

@@ -31,13 +31,13 @@ def command():
     return found
 
 
-def json_lines(*arguments, error=InputError):
-    """The JSON objects that the command prints, one for each line, and its exit code."""
+def json_lines(*arguments, error=InputError, shown=str):
+    """The JSON objects that the command prints, one for each line, and its exit code. `shown` changes its texts."""
     done = subprocess.run([command(), *arguments], capture_output=True, text=True, stdin=subprocess.DEVNULL)
     if not done.stdout.strip():
-        message = done.stderr.strip().removeprefix("error: ") or f"the command ended with code {done.returncode}"
+        message = shown(done.stderr).strip().removeprefix("error: ") or f"the command ended with code {done.returncode}"
         raise error(message)
-    decoder, objects, text = json.JSONDecoder(), [], done.stdout.strip()
+    decoder, objects, text = json.JSONDecoder(), [], shown(done.stdout).strip()
     while text:
         value, end = decoder.raw_decode(text)
         objects.append(value)

@@ -11,6 +11,28 @@ from ._errors import InputError
 
 
 @dataclass
+class Cell:
+    """A simulation cell, in world units.
+
+    Attributes
+    ----------
+    vectors : array (3, 3)
+        The edges, one in each row.
+    origin : tuple of float
+        The corner where the edges begin.
+    periodic : tuple of bool
+        Whether the cell repeats along each edge.
+    """
+
+    vectors: object
+    origin: tuple = (0.0, 0.0, 0.0)
+    periodic: tuple = (True, True, True)
+
+    def __post_init__(self):
+        self.vectors = _arrays.cell_vectors_of(self.vectors)
+
+
+@dataclass
 class Frame:
     """The particles of one time step.
 
@@ -32,6 +54,8 @@ class Frame:
         The up axis that is usual for the format, "y" or "z".
     notes : list of str
         Oddities of the file.
+    cell : Cell or None
+        The simulation cell, if the file has one.
     """
 
     positions: np.ndarray
@@ -43,6 +67,7 @@ class Frame:
     up: str = "z"
     name: str = "memory"
     notes: list = field(default_factory=list)
+    cell: object = None
 
     def __len__(self):
         return len(self.positions)
@@ -75,8 +100,14 @@ class Sequence(_SequenceType):
             raise IndexError(f"no frame has the index {index}, there are {len(self)}")
         index %= len(self)
         files = self._native.files(index)
+        found = self._native.read(index, None)
+        cell = found.pop("cell")
+        if cell is not None:
+            origin, vectors, periodic = cell
+            cell = Cell(vectors, tuple(origin), tuple(periodic))
         return Frame(
-            **self._native.read(index, None),
+            **found,
+            cell=cell,
             number=self.numbers[index],
             up=self._native.up,
             name=os.path.basename(files[0]) if files else "memory",
@@ -101,7 +132,7 @@ def _paths(path):
     return [os.fspath(path) for path in paths]
 
 
-def sequence(path, *, follow_links=False):
+def sequence(path, *, follow_links=False, topology=None):
     """Finds the frames of files.
 
     Parameters
@@ -110,6 +141,8 @@ def sequence(path, *, follow_links=False):
         Files, a directory, or a pattern such as "run1/frame_####.vtk".
     follow_links : bool
         Whether lists of files, such as a .pvd, may name files outside their directory.
+    topology : path, optional
+        A file with the elements and other properties of the atoms of a trajectory, such as a .gro, .pdb or .psf.
 
     Returns
     -------
@@ -120,10 +153,11 @@ def sequence(path, *, follow_links=False):
     InputError
         There are no frames, or they cannot be listed.
     """
-    return Sequence(_spherule.FrameList(_paths(path), follow_links=follow_links))
+    topology = None if topology is None else os.fspath(topology)
+    return Sequence(_spherule.FrameList(_paths(path), follow_links=follow_links, topology=topology))
 
 
-def read(path, frame=None):
+def read(path, frame=None, *, topology=None):
     """Reads one frame.
 
     Parameters
@@ -132,6 +166,8 @@ def read(path, frame=None):
         As of `sequence`.
     frame : int, optional
         Number of the frame; may be left out if there is only one.
+    topology : path, optional
+        As of `sequence`.
 
     Returns
     -------
@@ -142,7 +178,7 @@ def read(path, frame=None):
     InputError
         It cannot be read, or there are several frames and none was chosen.
     """
-    frames = sequence(path)
+    frames = sequence(path, topology=topology)
     if frame is not None:
         return frames.frame(frame)
     if len(frames) != 1:

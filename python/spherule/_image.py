@@ -3,6 +3,8 @@
 import os
 import tempfile
 
+import numpy as np
+
 from ._errors import OutputError
 
 
@@ -29,6 +31,7 @@ class Image:
 
     def __init__(self, native):
         self._native = native
+        self._srgb = None
         self.width, self.height = native.width, native.height
         self.notes = native.notes
         self.origin = tuple(native.origin)
@@ -42,6 +45,23 @@ class Image:
     def rgba(self):
         """The colours, see `planes`."""
         return self.planes["rgba"]
+
+    @property
+    def srgb(self):
+        """The pixels of the PNG: uint8 (height, width, 3), or 4 with alpha, in sRGB after the view transform."""
+        if self._srgb is None:
+            self._srgb = self._native.srgb()
+            self._srgb.flags.writeable = False
+        return self._srgb
+
+    def __array__(self, dtype=None, copy=None):
+        """`srgb`, so that matplotlib and others show the picture."""
+        pixels = self.srgb
+        if dtype is not None and np.dtype(dtype) != pixels.dtype:
+            if copy is False:
+                raise ValueError(f"pixels are uint8, and become {np.dtype(dtype)} only in a copy")
+            return pixels.astype(dtype)
+        return pixels.copy() if copy else pixels
 
     def __getitem__(self, name):
         """The plane called `name`."""

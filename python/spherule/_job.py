@@ -17,8 +17,8 @@ class Job:
     Parameters
     ----------
     manifest : dict or path
-        The sections of a manifest, with `input.path` and `output.path` relative to the current directory, or the file of
-        a manifest.
+        The sections of a manifest, with `input.path` and `output.path` relative to the current directory, the file of a
+        manifest, or the directory of a job.
     settings : dict, optional
         Settings that replace those of the manifest.
     """
@@ -27,7 +27,8 @@ class Job:
         self._base = os.getcwd()
         self._dir = None
         if isinstance(manifest, (str, os.PathLike)):
-            self._file = os.path.abspath(manifest)
+            path = os.path.abspath(manifest)
+            self._file = os.path.join(path, "job.toml") if os.path.isdir(path) else path
             self._text = settings_text(settings or {})
         else:
             self._file = None
@@ -89,10 +90,10 @@ class Job:
         with tempfile.TemporaryDirectory() as empty:
             path = os.path.join(empty, "job.toml")
             _spherule.write_manifest(path, self._text, base=self._base)
-            return self._checked(path)
+            return self._checked(path, lambda text: _without(empty, self._base, text))
 
-    def _checked(self, path):
-        return json_lines("check", "--json", path, error=JobError)[0][0]
+    def _checked(self, path, shown=str):
+        return json_lines("check", "--json", path, error=JobError, shown=shown)[0][0]
 
     @property
     def dir(self):
@@ -108,3 +109,12 @@ class Job:
     def verify(self):
         """Checks all images against the ledger: the dicts of `spherule verify --json`, one for each frame."""
         return json_lines("verify", "--json", self.dir, error=JobError)[0]
+
+
+def _without(directory, base, text):
+    """`text` about a manifest in `directory`, in which paths are relative to `base` or absolute."""
+    text = text.replace(os.path.join(directory, "job.toml") + ": ", "")
+    depth = os.path.realpath(directory).count(os.sep)
+    to_base = os.path.relpath(base, os.path.realpath(directory))
+    text = text.replace(os.path.join(directory, to_base) + os.sep, "")
+    return text.replace(directory + (os.sep + os.pardir) * depth, "")

@@ -4,7 +4,7 @@ import os
 
 from . import _arrays, _spherule
 from ._errors import ArrayError
-from ._frames import Frame
+from ._frames import Cell, Frame
 from ._image import Image
 from ._settings import merged, settings_text
 
@@ -22,6 +22,7 @@ def render(
     color=None,
     channels=None,
     up=None,
+    cell=None,
     frame=0,
     name="memory",
     threads=None,
@@ -36,8 +37,9 @@ def render(
     positions : array (N, 3) or Frame
         World positions. Those in float32 that are C-contiguous and near zero are used without a copy. All others are
         converted to float32 relative to a common origin, which is subtracted in float64.
-    radius : float or array (N,), optional
-        Radii of the spheres, in units of the positions; by default from the spacing of the particles.
+    radius : float, array (N,) or str, optional
+        Radii of the spheres, in units of the positions; by default from the spacing of the particles. "vdw" and
+        "covalent" are those of chemical elements, by the attribute `element`.
     attributes : dict of str to array, optional
         Other numbers of the particles, (N,) or (N, components), for colours, channels and motion.
     camera : dict, optional
@@ -52,11 +54,15 @@ def render(
     samples : int, optional
         Samples per pixel.
     color : optional
-        `material.color`: linear RGB, or a dict such as {"attribute": "velocity", "map": "viridis"}.
+        `material.color`: linear RGB, the name of an attribute, a dict such as {"attribute": "velocity", "map":
+        "viridis"}, or an array (N, 3) with a colour for each particle: linear, or sRGB if it is uint8.
     channels : list of str, optional
         `output.channels`, such as ["Z", "N", "id"].
     up : str, optional
-        The up axis, "y" or "z".
+        The up axis, such as "y", "z" or "-x".
+    cell : Cell or array, optional
+        The simulation cell: edges (3, 3), one in each row, or the three lengths of a box. It is drawn with
+        settings={"cell.visible": True}.
     frame : int
         Number of the frame, for moving cameras and overlays.
     name : str
@@ -85,10 +91,12 @@ def render(
         up = given.up if up is None else up
         frame = given.number if frame == 0 else frame
         name = given.name if name == "memory" else name
+        cell = given.cell if cell is None else cell
     positions = _arrays.positions_of(positions)
     count = len(positions)
-    common, radii = _arrays.radius_of(radius, count)
+    common, radii = (radius, None) if isinstance(radius, str) else _arrays.radius_of(radius, count)
     attributes = _arrays.attributes_of(attributes, count)
+    color = _arrays.color_of(color, attributes, count)
     if radii is not None:
         if any(known.lower() == "radius" for known, _ in attributes):
             raise ArrayError("radius: attributes have radii too; give one of them", place="radius")
@@ -119,6 +127,17 @@ def render(
         frame=frame,
         name=name,
         time=time,
+        cell=_cell(cell),
         threads=_arrays.threads_of(threads),
     )
     return Image(native)
+
+
+def _cell(cell):
+    """Corner, edges and periodic edges for the native module."""
+    if cell is None:
+        return None
+    if not isinstance(cell, Cell):
+        cell = Cell(cell)
+    origin = [float(value) for value in cell.origin]
+    return origin, cell.vectors.tolist(), [bool(value) for value in cell.periodic]

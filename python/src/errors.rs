@@ -84,18 +84,26 @@ impl From<FrameError> for Failure {
 
 impl From<SequenceError> for Failure {
     fn from(error: SequenceError) -> Self {
-        Self::new(Class::Input, error)
+        match error {
+            SequenceError::List(error) | SequenceError::Topology(error) => error.into(),
+            error => {
+                let failure = Self::new(Class::Input, &error);
+                match &error {
+                    SequenceError::Missing { path, .. }
+                    | SequenceError::NoFrames { path, .. }
+                    | SequenceError::Ambiguous { path, .. }
+                    | SequenceError::Io { path, .. } => failure.of_file(path),
+                    _ => failure,
+                }
+            }
+        }
     }
 }
 
 impl From<ManifestError> for Failure {
     fn from(error: ManifestError) -> Self {
-        // The first word of a line that is a key
-        let is_key = |part: &&str| part.contains('.') && !part.contains(' ');
-        let first = error.messages().first();
-        let place = first.and_then(|line| line.split(": ").skip(1).find(is_key));
         Self {
-            place: place.map(str::to_owned),
+            place: error.key().map(str::to_owned),
             ..Self::new(Class::Setting, &error)
         }
     }

@@ -8,12 +8,13 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use spherule::reading::read_budget;
 use spherule_formats::{
-    ParticleFrame, PositionSlice, Radius, RawParticles, Sequence, SequenceInput, SequenceSettings,
-    choose_origin, find_radius, native,
+    ParticleFrame, PositionSlice, Radius, RawParticles, Sequence, SequenceError, SequenceInput,
+    SequenceSettings, choose_origin, find_radius, native,
 };
 
 use crate::arrays::{self, PositionArray, attribute};
 use crate::errors::{Class, Failure};
+use crate::image::Cell;
 use crate::settings::raised;
 use crate::threads;
 
@@ -26,14 +27,25 @@ pub(crate) struct FrameList {
 #[pymethods]
 impl FrameList {
     #[new]
-    #[pyo3(signature = (paths, *, follow_links))]
-    fn new(py: Python<'_>, paths: Vec<PathBuf>, follow_links: bool) -> PyResult<Self> {
+    #[pyo3(signature = (paths, *, follow_links, topology))]
+    fn new(
+        py: Python<'_>,
+        paths: Vec<PathBuf>,
+        follow_links: bool,
+        topology: Option<PathBuf>,
+    ) -> PyResult<Self> {
         let settings = SequenceSettings {
             budget: read_budget(None, None),
             follow_links,
         };
         let paths = SequenceInput::from_paths(paths);
-        let sequence = py.detach(|| Sequence::open_with(&paths, settings));
+        let sequence = py.detach(|| {
+            let mut sequence = Sequence::open_with(&paths, settings)?;
+            if let Some(topology) = &topology {
+                sequence.add_topology(topology)?;
+            }
+            Ok::<_, SequenceError>(sequence)
+        });
         let sequence = raised(py, sequence)?;
         Ok(Self { sequence })
     }
@@ -90,6 +102,11 @@ impl FrameList {
         dict.set_item("origin", origin.to_array())?;
         dict.set_item("time", raw.time)?;
         dict.set_item("notes", loaded.notes)?;
+        let cell = raw.cell.map(|cell| -> Cell {
+            let vectors = cell.vectors.map(|vector| vector.to_array());
+            (cell.origin.to_array(), vectors, cell.periodic)
+        });
+        dict.set_item("cell", cell)?;
         dict.set_item("positions", arrays::positions(py, raw.positions)?)?;
         let attributes = PyDict::new(py);
         for attribute in raw.attributes {

@@ -3,12 +3,14 @@
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
+use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use spherule::manifest::{Manifest, Override};
 use spherule::output::layer_planes;
 use spherule::still::{self, Particles, StillImage, StillSettings};
+use spherule_formats::SimulationCell;
 
 use crate::arrays::{PositionArray, attribute, view};
 use crate::errors::{Class, Failure};
@@ -23,7 +25,7 @@ pub(crate) struct NativeImage {
 
 /// Renders particles; see `spherule.render`, which checks the arguments.
 #[pyfunction]
-#[pyo3(signature = (positions, attributes, settings, *, base, frame, name, time, threads))]
+#[pyo3(signature = (positions, attributes, settings, *, base, frame, name, time, cell, threads))]
 #[expect(
     clippy::too_many_arguments,
     reason = "keyword arguments of one Python function"
@@ -37,6 +39,7 @@ pub(crate) fn render(
     frame: i64,
     name: String,
     time: Option<f64>,
+    cell: Option<Cell>,
     threads: Option<usize>,
 ) -> PyResult<NativeImage> {
     let settings = raised(py, read_settings(settings, base, frame, name))?;
@@ -48,7 +51,7 @@ pub(crate) fn render(
         attributes: attributes.collect::<PyResult<_>>()?,
         time,
         step: None,
-        cell: None,
+        cell: cell.and_then(simulation_cell),
         bonds: Vec::new(),
     };
     let stop = AtomicBool::new(false);
@@ -57,6 +60,14 @@ pub(crate) fn render(
         Ok(still::render(&settings, particles, &stop)?)
     })?;
     Ok(NativeImage { image })
+}
+
+/// A simulation cell: its corner, its edges, and along which of them it repeats.
+pub(crate) type Cell = ([f64; 3], [[f64; 3]; 3], [bool; 3]);
+
+/// None for a cell without an extent.
+fn simulation_cell((origin, vectors, periodic): Cell) -> Option<SimulationCell> {
+    SimulationCell::new(origin.into(), vectors.map(DVec3::from_array), periodic)
 }
 
 fn read_settings(
@@ -158,6 +169,16 @@ impl NativeImage {
     fn to_exr<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         let bytes = py.detach(|| self.image.to_exr());
         encoded(py, bytes)
+    }
+
+    /// The pixels of the PNG: 8-bit sRGB.
+    fn srgb<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let pixels = py.detach(|| self.image.to_srgb());
+        let pixels = pixels.map_err(|error| Failure::new(Class::Output, error).raise(py))?;
+        let film = self.image.film();
+        let shape = [film.height as usize, film.width as usize, pixels.channels];
+        let array = PyArray1::from_vec(py, pixels.bytes).reshape(shape)?;
+        Ok(array.into_any())
     }
 
     fn to_png<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {

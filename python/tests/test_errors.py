@@ -99,3 +99,18 @@ def test_errors_name_file_place_and_remedy(example, tmp_path):
     with pytest.raises(INPUT, match="choose one with frame=") as caught:
         spherule.read(example)
     assert caught.value.place == "frame"
+    with pytest.raises(SETTING) as caught:
+        spherule.render(ROWS, radius=0.1, settings={"lighting": {}})
+    assert caught.value.place == "lighting"
+    with pytest.raises(INPUT) as caught:
+        spherule.read(tmp_path / "missing.vtk")
+    assert caught.value.file == str(tmp_path / "missing.vtk")
+
+
+def test_messages_name_no_temporary_files(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for path, shown in (("data/nothing", "data/nothing"), ("/nowhere/at all", "/nowhere/at all")):
+        job = spherule.Job({"input": {"path": path}, "output": {"path": "out/f.####.exr"}})
+        with pytest.raises(spherule.JobError) as caught:
+            job.check()
+        assert str(caught.value) == f"input.path: {shown}: no such file or directory"

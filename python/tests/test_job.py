@@ -34,6 +34,8 @@ def test_images_are_those_of_the_command(example, tmp_path):
     assert job.status()["done"] == [1, 3, 5]
     assert [frame["frame"] for frame in job.verify() if frame["status"] != "pending"] == [1, 3, 5]
     assert job.run()["pending"] == result["pending"]
+    # The directory of the job stands for its manifest
+    assert spherule.Job(tmp_path / "module").run()["done"] == 3
 
 
 def test_a_check_writes_nothing(example, tmp_path):

@@ -3,6 +3,7 @@
 import gc
 import subprocess
 import sys
+import zlib
 
 import numpy as np
 import pytest
@@ -128,3 +129,93 @@ def test_native_frames_keep_positions_attributes_and_time(ball, tmp_path):
 def test_the_module_imports_nothing_but_numpy():
     code = "import sys, spherule; assert not {'pandas', 'matplotlib'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_pixels_are_those_of_the_png(ball, small):
+    image = spherule.render(ball, radius=0.3, **small)
+    pixels = image.srgb
+    assert pixels.shape == (18, 32, 3) and pixels.dtype == np.uint8 and not pixels.flags.writeable
+    assert np.array_equal(pixels, decoded(image.to_png()))
+    assert np.asarray(image) is pixels
+    copy = np.array(image)
+    copy[0, 0] = 1
+    assert np.asarray(image, dtype=float).max() == pixels.max()
+
+
+def decoded(png):
+    """The pixels of a PNG of 8-bit RGB."""
+    width, height = (int.from_bytes(png[at : at + 4], "big") for at in (16, 20))
+    at, packed = 8, b""
+    while at < len(png):
+        length, kind = int.from_bytes(png[at : at + 4], "big"), png[at + 4 : at + 8]
+        if kind == b"IDAT":
+            packed += png[at + 8 : at + 8 + length]
+        at += 12 + length
+    rows = np.frombuffer(zlib.decompress(packed), np.uint8).reshape(height, 1 + 3 * width)
+    pixels = np.zeros((height, width, 3), np.uint8)
+    for y, row in enumerate(rows):
+        kind, row = row[0], row[1:].reshape(width, 3).astype(int)
+        for x in range(width):
+            left = pixels[y, x - 1].astype(int) if x else np.zeros(3, int)
+            up = pixels[y - 1, x].astype(int) if y else np.zeros(3, int)
+            corner = pixels[y - 1, x - 1].astype(int) if x and y else np.zeros(3, int)
+            distances = np.abs([up - corner, left - corner, left + up - 2 * corner])
+            paeth = np.where(
+                (distances[0] <= distances[1]) & (distances[0] <= distances[2]),
+                left,
+                np.where(distances[1] <= distances[2], up, corner),
+            )
+            guess = [0, left, up, (left + up) // 2, paeth][kind]
+            pixels[y, x] = (row[x] + guess) % 256
+    return pixels
+
+
+def test_colours_by_name_and_by_particle(ball, small):
+    speed = np.linspace(0, 1, len(ball), dtype=np.float32)
+    by_dict = spherule.render(ball, radius=0.3, attributes={"s": speed}, color={"attribute": "s"}, **small)
+    by_name = spherule.render(ball, radius=0.3, attributes={"s": speed}, color="s", **small)
+    assert by_name.to_exr() == by_dict.to_exr()
+    colors = np.random.default_rng(5).random((len(ball), 3), dtype=np.float32)
+    by_array = spherule.render(ball, radius=0.3, color=colors, **small)
+    by_attribute = spherule.render(ball, radius=0.3, attributes={"Cd": colors}, color={"attribute": "Cd"}, **small)
+    assert by_array.to_exr() == by_attribute.to_exr() != by_name.to_exr()
+    with pytest.raises(spherule.ArrayError, match="color: attributes have"):
+        spherule.render(ball, radius=0.3, attributes={"Cd": colors}, color=colors, **small)
+    with pytest.raises(spherule.ArrayError, match="color: expected three numbers"):
+        spherule.render(ball, radius=0.3, color=colors[:7], **small)
+
+
+def test_cells_are_kept_and_drawn(ball, small, tmp_path):
+    dump = tmp_path / "a.dump"
+    rows = "".join(f"{i} {x} {y} {z}\n" for i, (x, y, z) in enumerate(ball))
+    bounds = "ITEM: BOX BOUNDS pp pp ff\n-4 4\n-4 4\n-5 5\n"
+    dump.write_text(f"ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n100\n{bounds}ITEM: ATOMS id x y z\n{rows}")
+    frame = spherule.read(dump)
+    assert np.array_equal(frame.cell.vectors, np.diag([8.0, 8, 10]))
+    assert tuple(frame.cell.origin) == (-4, -4, -5) and tuple(frame.cell.periodic) == (True, True, False)
+    visible = {"cell.visible": True}
+    of_file = spherule.render(frame, radius=0.3, settings=visible, **small).to_exr()
+    assert of_file != spherule.render(frame, radius=0.3, **small).to_exr()
+    cell = spherule.Cell([8, 8, 10], origin=(-4, -4, -5))
+    attributes = frame.attributes
+    of_array = spherule.render(ball, radius=0.3, attributes=attributes, cell=cell, settings=visible, **small)
+    same = spherule.render(frame.positions, radius=0.3, attributes=attributes, cell=cell, settings=visible, **small)
+    assert of_array.notes == same.notes == []
+    assert spherule.render(ball, radius=0.3, cell=np.eye(3) * 8, settings=visible, **small).notes == []
+    with pytest.raises(spherule.ArrayError, match="cell: expected the edges"):
+        spherule.render(ball, cell=np.ones((2, 3)), **small)
+
+
+def test_radii_of_elements_and_topologies(small, tmp_path):
+    molecules = "3\n\nO 0 0 0\nH 0.96 0 0\nH -0.24 0.93 0\n"
+    (tmp_path / "water.xyz").write_text(molecules)
+    frame = spherule.read(tmp_path / "water.xyz")
+    by_argument = spherule.render(frame, radius="vdw", **small).to_exr()
+    assert by_argument == spherule.render(frame, settings={"input.radius": "vdw"}, **small).to_exr()
+    with pytest.raises(spherule.ArrayError, match="radius: expected a number or an array"):
+        spherule.write_spf(tmp_path / "a.spf", frame.positions, radius="vdw")
+    # Another trajectory with the same atoms, without their elements
+    (tmp_path / "plain.csv").write_text("x,y,z\n0,0,0\n1,0,0\n0,1,0\n")
+    assert "element" not in spherule.read(tmp_path / "plain.csv").attributes
+    with_elements = spherule.read(tmp_path / "plain.csv", topology=tmp_path / "water.xyz")
+    assert with_elements.attributes["element"].tolist() == [8, 1, 1]
