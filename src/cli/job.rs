@@ -104,10 +104,19 @@ pub(super) fn selected_frames(
     state: &JobState,
     range: Option<&FrameRange>,
 ) -> Result<Vec<i64>, CliError> {
-    let Some(range) = range else {
-        return Ok(requested_frames(state));
-    };
     let numbers: Vec<i64> = state.plan().frames().iter().map(|f| f.number).collect();
+    let Some(range) = range else {
+        let requested = requested_frames(state);
+        if requested.len() < numbers.len() {
+            note!(
+                "{} of {} frames, those that renders have asked for; --frames {} takes all",
+                requested.len(),
+                numbers.len(),
+                list(&numbers)
+            );
+        }
+        return Ok(requested);
+    };
     let selected = range.select(&numbers);
     if selected.is_empty() {
         return Err(CliError::other(format!(
