@@ -31,6 +31,33 @@ pub(super) struct LoneParts {
     pub parts: BTreeSet<u32>,
     /// Names of the other parts, which are those of a group without them.
     pub others: Vec<String>,
+    /// Notes about the files that are left out.
+    pub notes: Vec<String>,
+}
+
+impl LoneParts {
+    /// The `parts` with these indices among `files`, whose parts are called `names`.
+    fn new(
+        parts: BTreeSet<u32>,
+        others: Vec<String>,
+        files: &[GroupFile],
+        names: &[String],
+    ) -> Self {
+        let note = |part: &u32| {
+            let file = files.iter().find(|file| file.part == *part);
+            let file = file.and_then(|file| file.path.file_name());
+            format!(
+                "`{}` is left out, since no other step has a file of this name; --parts {} draws its particles",
+                file.unwrap_or_default().to_string_lossy(),
+                names.get(*part as usize).map_or("", String::as_str)
+            )
+        };
+        Self {
+            notes: parts.iter().map(note).collect(),
+            parts,
+            others,
+        }
+    }
 }
 
 /// One file and what its name says about its position in the sequence.
@@ -141,20 +168,7 @@ pub(super) fn pick(
             counted(&other)
         ));
     }
-    let group = into_group(candidates.swap_remove(0))?;
-    for part in group.lone.iter().flat_map(|lone| &lone.parts) {
-        let name = group.parts.get(*part as usize);
-        let file = group.files.iter().find(|file| file.part == *part);
-        let file = file
-            .and_then(|file| file.path.file_name())
-            .unwrap_or_default();
-        notes.push(format!(
-            "`{}` is left out, since no other step has a file of this name; --parts {} draws its particles",
-            file.to_string_lossy(),
-            name.map_or("", String::as_str)
-        ));
-    }
-    Ok(group)
+    into_group(candidates.swap_remove(0))
 }
 
 /// The sequence that listed files make: parts if they share frame numbers, else by number, else
@@ -342,14 +356,10 @@ fn into_group(candidate: SequenceCandidate) -> Result<FileGroup, SequenceError> 
             });
         }
     }
-    Ok(FileGroup {
-        files,
-        parts: part_names(&patterns),
-        lone: (!lone.is_empty()).then(|| LoneParts {
-            parts: lone,
-            others: part_names(&others),
-        }),
-    })
+    let parts = part_names(&patterns);
+    let lone =
+        (!lone.is_empty()).then(|| LoneParts::new(lone, part_names(&others), &files, &parts));
+    Ok(FileGroup { files, parts, lone })
 }
 
 /// The parts of the names that differ between patterns: `Fluid` and `Oil` of `ParticleData_Fluid_#.vtk` and

@@ -116,8 +116,16 @@ pub struct Sequence {
     lists: Option<ListedFiles>,
     topology: Option<Topology>,
     images: PeriodicImages,
-    /// Frames and names of all parts, if some are left out unless they are named.
-    all_parts: Option<(Vec<SequenceFrame>, Vec<String>)>,
+    /// What there is with all parts, if some are left out unless they are named.
+    all_parts: Option<AllParts>,
+}
+
+/// Frames, names and notes of a sequence of all parts.
+#[derive(Debug)]
+struct AllParts {
+    frames: Vec<SequenceFrame>,
+    parts: Vec<String>,
+    notes: Vec<String>,
 }
 
 impl Sequence {
@@ -192,16 +200,26 @@ impl Sequence {
     fn from_group(group: FileGroup, mut notes: Vec<String>, budget: MemoryBudget) -> Self {
         let (numbered, last) = scan::number_steps(group.files, budget, &mut notes);
         let all = frames_of(numbered);
+        let add_notes = |frames: &[SequenceFrame], parts: &[String], notes: &mut Vec<String>| {
+            note_gaps(frames, notes);
+            note_missing_parts(frames, parts, notes);
+        };
         let (frames, parts, all_parts) = match group.lone {
             None => (all, group.parts, None),
-            Some(lone) => (
-                without_parts(&all, &lone.parts),
-                lone.others,
-                Some((all, group.parts)),
-            ),
+            Some(lone) => {
+                let mut all_notes = notes.clone();
+                add_notes(&all, &group.parts, &mut all_notes);
+                notes.extend(lone.notes);
+                let some = without_parts(&all, &lone.parts);
+                let all_parts = AllParts {
+                    frames: all,
+                    parts: group.parts,
+                    notes: all_notes,
+                };
+                (some, lone.others, Some(all_parts))
+            }
         };
-        note_gaps(&frames, &mut notes);
-        note_missing_parts(&frames, &parts, &mut notes);
+        add_notes(&frames, &parts, &mut notes);
         let cache = last.filter(|f| f.steps().len() > 1).map(|file| CachedFile {
             stamp: stamp(file.path()),
             file: Arc::new(file),
@@ -281,8 +299,8 @@ impl Sequence {
     /// # Errors
     /// The first name that matches no part.
     pub fn keep_parts(&mut self, names: &[String]) -> Result<(), SequenceError> {
-        if let Some((frames, parts)) = self.all_parts.take() {
-            (self.frames, self.parts) = (frames, parts);
+        if let Some(all) = self.all_parts.take() {
+            (self.frames, self.parts, self.notes) = (all.frames, all.parts, all.notes);
         }
         let mut meant = BTreeSet::new();
         for name in names {

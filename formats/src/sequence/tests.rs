@@ -249,6 +249,8 @@ fn a_part_of_one_step_is_drawn_if_it_is_named() {
     sequence
         .keep_parts(&owned(&["Case", "Fluid"]))
         .expect("both");
+    let notes = sequence.notes();
+    assert!(!notes[0].contains("left out"), "{notes:?}");
     assert_eq!((sequence.frames().len(), count(&sequence)), (3, 2));
     let mut sequence = dir.open(".").expect("a sequence");
     sequence.keep_parts(&owned(&["Case"])).expect("the part");

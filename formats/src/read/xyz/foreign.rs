@@ -6,9 +6,10 @@ const POINT_CLOUD: &str = "a point cloud with a count and no comment (Leica .pts
                            columns 1 to 3 of the rest are the positions";
 const TINKER: &str = "a Tinker file, which is not read; write .xyz with Open Babel (`obabel -itxyz in.xyz -oxyz -O out.xyz`)";
 
-/// What a text is in whose second line, `row`, is one of the counted lines instead of a comment.
-pub(super) fn without_comment(row: &[u8]) -> Option<&'static str> {
-    let words: Vec<&[u8]> = text::words(row).take(8).collect();
+/// What a text is in whose second line, `row`, is one of the counted lines instead of a comment. The next line has
+/// `columns` words.
+pub(super) fn without_comment(row: &[u8], columns: usize) -> Option<&'static str> {
+    let words: Vec<&[u8]> = text::words(row).collect();
     let is_number = |word: &&[u8]| text::number(word).is_some();
     match words.as_slice() {
         [index, name, x, y, z, ..]
@@ -18,7 +19,7 @@ pub(super) fn without_comment(row: &[u8]) -> Option<&'static str> {
         {
             Some(TINKER)
         }
-        [_, _, _, ..] if words.iter().all(is_number) => Some(POINT_CLOUD),
+        [_, _, _, ..] if words.len() == columns && words.iter().all(is_number) => Some(POINT_CLOUD),
         _ => None,
     }
 }

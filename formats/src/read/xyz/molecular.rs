@@ -4,13 +4,13 @@ use std::ops::Range;
 
 use super::{comment, foreign};
 use crate::names::{POSITION_PROPERTIES, SPECIES_PROPERTIES};
-use crate::read::Step;
 use crate::read::input::TextInput;
 use crate::read::table::{
     CUT_SHORT, Comments, Decimal, Dialect, ExtraCells, NumberKind, RowsRead, Separator, Table,
     TargetArray, TargetComponent, TextPolicy, most_rows,
 };
 use crate::read::text::{self, Line};
+use crate::read::{Step, csv};
 use crate::{MemoryBudget, ParseError, RawParticles};
 
 /// The frames of `text`. Where a count should be and is not, the rest of the file is
@@ -64,12 +64,13 @@ pub(super) fn read(
     let (number, time) = (number(comment), time(comment));
     let cell = comment::cell(comment.text);
     let comment_at = comment.at;
-    let first_row = comment.text.to_vec();
+    let second_line = comment.text.to_vec();
     let properties = comment::value(comment.text, "Properties").map(<[u8]>::to_vec);
     let size = text.left_about();
     let blank = text.pass_blank_lines(count);
     let most = count - blank;
     let first = if most > 0 { text.peek_line() } else { None };
+    let words = first.map_or(0, |line| text::words(line.text).count());
     let columns = match properties {
         Some(properties) => {
             let size = if count > 0 { size } else { 0 };
@@ -93,8 +94,10 @@ pub(super) fn read(
     };
     let found = blank + rows.lines;
     if found < count {
-        if found + 1 == count
-            && let Some(what) = foreign::without_comment(&first_row)
+        let is_only = span.start <= csv::BYTE_ORDER_MARK.len() && text.is_file_end();
+        if is_only
+            && found + 1 == count
+            && let Some(what) = foreign::without_comment(&second_line, words)
         {
             return Err(ParseError::unsupported(what));
         }
