@@ -357,7 +357,7 @@ fn the_memory_of_many_rods_is_predicted() {
         });
         let colors = vec![Vec3::ONE; count as usize];
         let tree = RodTree::new(rods.collect(), Caps::Flat).with_colors(colors);
-        let [_, predicted] = RodTree::predicted_bytes(u64::from(count));
+        let [_, predicted] = RodTree::predicted_bytes(count.into(), count.into());
         let bytes = tree.bytes() as u64;
         assert!(
             (predicted / 3..=predicted).contains(&bytes),
