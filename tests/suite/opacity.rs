@@ -62,7 +62,7 @@ fn impossible_opacities_are_explained() {
     for (setting, message) in [
         (
             "material.opacity=1.5",
-            "material.opacity: expected a number from 0 to 1",
+            "--set material.opacity=1.5: expected a number from 0 to 1",
         ),
         (
             "material.opacity={ attribute = \"density\" }",

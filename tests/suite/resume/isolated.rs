@@ -84,7 +84,7 @@ fn a_frame_beyond_the_ceiling_costs_one_frame() {
             "1GiB",
         ])
         .expect(2)
-        .prints("job.memory_ceiling");
+        .prints("--memory-ceiling: applies to the process of a frame");
 }
 
 /// The process that makes the frame, once there is one.
