@@ -33,10 +33,12 @@ pub(super) fn parts_of(rods: &[Rod], size: f64) -> Vec<Part> {
     // Parts as long as the number of parts allows
     let part = shortest.max(total / (SPARE_PARTS + PARTS_PER_ROD * rods.len() as f64));
     let of_rod = |(rod, value): (u32, &Rod)| {
-        let count = match long(&value) {
-            true => (length(value) / part).ceil().max(1.0) as u32,
-            false => 1,
-        };
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "a rod is at most as long as the diagonal of all rods"
+        )]
+        let parts = (length(value) / part).ceil().max(1.0) as u32;
+        let count = if long(&value) { parts } else { 1 };
         (0..count).map(move |number| Part { rod, number, count })
     };
     (0..).zip(rods).flat_map(of_rod).collect()
