@@ -67,11 +67,12 @@ pub(super) struct ConvertArgs {
     #[arg(long, help_heading = "Output")]
     encoding: Option<Encoding>,
     /// Largest error of a position as a fraction of the radius [default: 0.02 for q16 and q10]
-    #[arg(long, value_name = "FRACTION", value_parser = not_negative, help_heading = "Output")]
+    #[arg(long, value_name = "FRACTION", value_parser = not_negative, allow_negative_numbers = true,
+        help_heading = "Output")]
     max_error: Option<f64>,
     /// Largest error of a position as a length.
-    #[arg(long, value_name = "LENGTH", value_parser = not_negative, conflicts_with = "max_error",
-        help_heading = "Output")]
+    #[arg(long, value_name = "LENGTH", value_parser = not_negative, allow_negative_numbers = true,
+        conflicts_with = "max_error", help_heading = "Output")]
     max_error_length: Option<f64>,
     /// How attributes are stored: velocity:f16,density:u8,id:keep,*:off [default: *:keep]
     ///
