@@ -10,13 +10,10 @@ use spherule_formats::sequence::SequenceError;
 use spherule_jobs::export::ExportError;
 use spherule_jobs::{FileError, JobError, PLAN_FILE};
 
-use crate::job::RunError;
+use crate::job::{JOB_FILE, RunError};
 use crate::manifest::ManifestError;
 use crate::pipeline::MeshLoadError;
 use crate::resolve::ResolveError;
-
-/// The manifest of a job, beside its images.
-const JOB_FILE: &str = "job.toml";
 
 /// The attribute with atomic numbers.
 const ELEMENT: &str = "element";

@@ -15,7 +15,7 @@ use crate::manifest::{
 use crate::reading::read_budget;
 
 /// The name of the manifest that is written next to the images.
-pub(super) const JOB_FILE: &str = "job.toml";
+pub const JOB_FILE: &str = "job.toml";
 
 /// A manifest with all overrides applied.
 #[derive(Debug, Clone)]

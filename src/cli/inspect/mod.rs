@@ -240,9 +240,10 @@ fn inspect(
             verify(file.bytes()).map_err(|e| e.in_file(path))?;
         }
         inspected.verified = args.verify;
-        let printed = match args.json {
-            true => inspected.print(true),
-            false => lines.print(&inspected),
+        let printed = if args.json {
+            inspected.print(true)
+        } else {
+            lines.print(&inspected)
         };
         match printed {
             Ok(Reader::Listening) => {}
