@@ -48,7 +48,8 @@ mod tests {
             assert_eq!(sample.len(), most.min(count));
             assert!(sample.is_sorted_by(|a, b| a < b));
             for (run, index) in sample.iter().enumerate() {
-                assert_eq!(index * sample.len() / count, run, "{count} {most}");
+                let of_index = ((index + 1) * sample.len() - 1) / count;
+                assert_eq!(of_index, run, "{count} {most}");
             }
         }
         assert!(sample_indices(4, 9).eq(0..4));

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
-use crate::{Fingerprint, PlannedInput, open_regular};
+use crate::{Fingerprint, open_regular};
 
 /// Bytes that are compared at once.
 const BUFFER_BYTES: usize = 1 << 20;
@@ -17,13 +17,13 @@ pub(crate) struct Copies {
 }
 
 impl Copies {
-    /// Whether the file of `old` is still what it was when it was planned, and that of `new` has the same bytes.
-    pub(crate) fn are_equal(&mut self, old: &PlannedInput, new: &PlannedInput) -> bool {
-        let key = (PathBuf::from(&old.path), PathBuf::from(&new.path));
+    /// Whether the file `old` is still what it was when it had the fingerprint `then`, and `new` has the same bytes.
+    pub(crate) fn are_equal(&mut self, old: &Path, then: &Fingerprint, new: &Path) -> bool {
+        let key = (old.to_owned(), new.to_owned());
         if let Some(known) = self.known.get(&key) {
             return *known;
         }
-        let is_original = || Fingerprint::of_file(&key.0).ok() == old.fingerprint;
+        let is_original = || Fingerprint::of_file(old).is_ok_and(|now| now == *then);
         let are_equal =
             key.0 != key.1 && is_original() && have_same_bytes(&key.0, &key.1).unwrap_or(false);
         self.known.insert(key, are_equal);
@@ -64,12 +64,8 @@ mod tests {
         fs::copy(path("a"), path("b")).unwrap();
         bytes[2 << 20] = 8;
         fs::write(path("c"), &bytes).unwrap();
-        let input = |name: &str| PlannedInput {
-            path: path(name).to_str().unwrap().to_owned(),
-            fingerprint: Fingerprint::of_file(&path(name)).ok(),
-        };
-        let planned = input("a");
-        let are_equal = |name: &str| Copies::default().are_equal(&planned, &input(name));
+        let planned = Fingerprint::of_file(&path("a")).unwrap();
+        let are_equal = |name: &str| Copies::default().are_equal(&path("a"), &planned, &path(name));
         assert!(are_equal("b") && !are_equal("c") && !are_equal("a"));
         // The original must be what it was
         fs::write(path("a"), &bytes).unwrap();

@@ -241,9 +241,11 @@ impl PlannedFrame {
         }
         self.inputs.iter().zip(&now.inputs).find_map(|(old, new)| {
             let what = match (&old.fingerprint, &new.fingerprint) {
-                (Some(before), Some(after)) if before.may_be_copy(after) => {
-                    let difference = before.difference(after);
-                    difference.filter(|_| !copies.are_equal(old, new))
+                (Some(before), Some(after))
+                    if before.may_be_copy(after)
+                        && copies.are_equal(Path::new(&old.path), before, Path::new(&new.path)) =>
+                {
+                    None
                 }
                 (Some(before), Some(after)) => before.difference(after),
                 (Some(_), None) => Some("is no longer readable".to_owned()),

@@ -255,7 +255,8 @@ fn each_pixel_has_the_values_of_the_particle_that_it_shows() {
                 let (_, film) = rendered(&sequence, &format!("{settings}\n{more}\n"));
                 let distances = distances.start - moved..distances.end + moved;
                 let seen = check(&particles, &film, &distances, &name);
-                assert!(seen > 20, "{name}: {seen} particles");
+                // A smooth body shows few of its particles
+                assert!(seen > 5, "{name}: {seen} particles");
             }
         }
     }

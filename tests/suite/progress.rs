@@ -124,9 +124,8 @@ fn manifest_can_enable_events() {
 fn followed_frames() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 1..=2);
-    fs::create_dir(workshop.join("out")).expect("a directory");
-    fs::write(workshop.join("out/job.stop"), "").expect("a file");
-    let options = ["--progress", "json", "--follow", "--settle", "0.1"];
+    let follow = ["--follow", "--settle", "0.1", "--idle", "0.5"];
+    let options = [&["--progress", "json"][..], &follow].concat();
     let found = events(&workshop.render(&options).expect(0));
     assert_eq!(kinds(&found), ["start", "frame_done", "frame_done", "end"]);
 }

@@ -182,9 +182,9 @@ fn other_files_are_refused() {
     fails("", "the file is empty");
     fails(
         "glTF....",
-        "not a mesh that is read; supported are stl, obj, ply, vtk, vtp and vtu",
+        "not a mesh in a format that spherule reads, which are stl, obj, ply, vtk, vtp and vtu",
     );
-    fails("1 2 3\n", "not a mesh that is read");
+    fails("1 2 3\n", "not a mesh in a format that spherule reads");
     fails(
         "<VTKFile type=\"PPolyData\">",
         "give one of the files in it",

@@ -137,9 +137,17 @@ fn foreign_output_directory_is_rejected() {
     let before = natives(&shop.join("native"));
     fs::remove_file(shop.join("native/job.plan.json")).expect("the plan");
     fs::remove_file(ledger_path(&shop.join("native"))).expect("the ledger");
-    shop.run(&["convert", "native", "-o", "native"])
-        .expect(2)
-        .prints("native/frame.0001.spf: the conversion would overwrite its own input");
+    for (input, message) in [
+        ("native", "native: is the input; choose another directory"),
+        (
+            "native/frame.#.spf",
+            "native/frame.0001.spf: the conversion would overwrite its own input",
+        ),
+    ] {
+        shop.run(&["convert", input, "-o", "native"])
+            .expect(2)
+            .prints(message);
+    }
     assert!(natives(&shop.join("native")) == before);
 }
 

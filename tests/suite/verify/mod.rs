@@ -54,12 +54,16 @@ fn intact_job_by_directory_or_manifest() {
 #[test]
 fn pending_frames_are_not_faults() {
     let workshop = rendered("2");
+    // Only frame 2 was asked for
     let ran = workshop.run(&["verify", "out"]).expect(0);
+    assert_eq!(ran.text(), "sound              1 (2)\n");
+    let all = ["verify", "out", "--frames", "1-3"];
+    let ran = workshop.run(&all).expect(0);
     assert_eq!(
         ran.text(),
         "sound              1 (2)\npending            2 (1,3)\n"
     );
-    let ran = workshop.run(&["verify", "out", "--json"]).expect(0);
+    let ran = workshop.run(&[&all[..], &["--json"]].concat()).expect(0);
     let states: Vec<Value> = objects(&ran).iter().map(|o| o["status"].clone()).collect();
     assert_eq!(states, ["pending", "sound", "pending"]);
 }

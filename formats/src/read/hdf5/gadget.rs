@@ -66,8 +66,11 @@ impl Snapshot {
     /// [`ParseError`] if the file is damaged, or no type has coordinates.
     pub(super) fn open(root: &Node) -> Result<Option<Self>, ParseError> {
         let number = |name: &str| name.strip_prefix(TYPE)?.parse::<u32>().ok();
-        let groups = root.distinct_groups()?.into_iter();
-        let named = groups.filter_map(|(name, node)| Some((number(&name)?, name, node)));
+        // SWIFT has links with other names to the groups
+        let groups = root.distinct_groups(|name| number(name).is_some())?;
+        let named = groups
+            .into_iter()
+            .filter_map(|(name, node)| Some((number(&name)?, name, node)));
         let mut named: Vec<(u32, String, Node)> = named.collect();
         named.sort_by_key(|(number, _, _)| *number);
         if named.is_empty() {

@@ -168,7 +168,7 @@ impl Trajectory {
         let mut groups = Vec::new();
         let particles = root.group("particles")?;
         if let Some(particles) = particles {
-            for (name, node) in particles.distinct_groups()? {
+            for (name, node) in particles.distinct_groups(|_| true)? {
                 if let Some(position) = Element::open(&node, POSITION, budget)? {
                     groups.push(ParticleGroup {
                         name,

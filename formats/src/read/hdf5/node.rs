@@ -100,15 +100,19 @@ impl Node {
         Ok((groups, datasets))
     }
 
-    /// Names of the groups in it, with the groups, sorted. A group with several names is there under the first of them:
-    /// its particles would count several times.
+    /// The groups in it whose names are `wanted`, with their names, sorted. A group with several of these names is there
+    /// under the first of them: its particles would count several times.
     ///
     /// # Errors
     /// As [`Self::members`].
-    pub(super) fn distinct_groups(&self) -> Result<Vec<(String, Self)>, ParseError> {
+    pub(super) fn distinct_groups(
+        &self,
+        wanted: impl Fn(&str) -> bool,
+    ) -> Result<Vec<(String, Self)>, ParseError> {
         let mut seen = HashSet::new();
         let mut groups = Vec::new();
-        for name in self.members()?.0 {
+        let names = self.members()?.0.into_iter();
+        for name in names.filter(|name| wanted(name)) {
             if let Some(group) = self.group(&name)?
                 && seen.insert(group.key())
             {

@@ -80,7 +80,7 @@ impl OpenPmd {
         };
         for (_, iteration) in &file.iterations {
             if let Some(particles) = iteration.descend(&file.particles)? {
-                let species = particles.distinct_groups()?.into_iter();
+                let species = particles.distinct_groups(|_| true)?.into_iter();
                 file.species.extend(species.map(|(name, _)| name));
             }
         }
@@ -187,7 +187,7 @@ impl OpenPmd {
     fn first_species(&self) -> Vec<(String, Node)> {
         let mut found = self.iterations.iter().filter_map(|(_, iteration)| {
             let particles = iteration.descend(&self.particles).ok()??;
-            let species = particles.distinct_groups().ok()?;
+            let species = particles.distinct_groups(|_| true).ok()?;
             Some(species).filter(|species| !species.is_empty())
         });
         found.next().unwrap_or_default()

@@ -32,7 +32,7 @@ impl ParticleArrays {
             return Ok(None);
         };
         let mut arrays = Vec::new();
-        for (name, node) in particles.distinct_groups()? {
+        for (name, node) in particles.distinct_groups(|_| true)? {
             if let Some(node) = node.group("arrays")? {
                 arrays.push((name, node));
             }
