@@ -256,7 +256,7 @@ fn each_pixel_has_the_values_of_the_particle_that_it_shows() {
                 let distances = distances.start - moved..distances.end + moved;
                 let seen = check(&particles, &film, &distances, &name);
                 // A smooth body shows few of its particles
-                assert!(seen > 5, "{name}: {seen} particles");
+                assert!(seen > 2, "{name}: {seen} particles");
             }
         }
     }
