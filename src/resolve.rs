@@ -336,9 +336,10 @@ pub fn setup(
         overlay_values: Vec::new(),
         preview: PreviewOptions {
             exposure: output.preview_exposure,
-            background: match output.transparent {
-                true => PreviewBackground::Transparent,
-                false => PreviewBackground::Included,
+            background: if output.transparent {
+                PreviewBackground::Transparent
+            } else {
+                PreviewBackground::Included
             },
             first_pixel: window.map_or([0, 0], |window| [window.left, window.top]),
             dpi: image.dpi,

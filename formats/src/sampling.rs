@@ -1,5 +1,7 @@
 //! Samples of particles that are in some order.
 
+use crate::generate::splitmix64;
+
 /// At most `most` of the indices below `count`, rising: one of each of equal runs, at a pseudo-random place in it.
 ///
 /// Particles are often stored in the order of a lattice. A sample at equal distances may contain only a few of the
@@ -9,7 +11,7 @@ pub fn sample_indices(count: usize, most: usize) -> impl Iterator<Item = usize> 
     (0..runs).map(move |run| {
         let [first, end] = [run, run + 1].map(|run| start(run, runs, count as u64));
         #[expect(clippy::cast_possible_truncation, reason = "below `count`")]
-        let index = (first + mix(run) % (end - first)) as usize;
+        let index = (first + splitmix64(0, run + 1) % (end - first)) as usize;
         index
     })
 }
@@ -19,14 +21,6 @@ fn start(run: u64, runs: u64, count: u64) -> u64 {
     #[expect(clippy::cast_possible_truncation, reason = "at most `count`")]
     let start = (u128::from(run) * u128::from(count) / u128::from(runs)) as u64;
     start
-}
-
-/// Random bits (the generator of Steele, Lea and Flood, "Fast splittable pseudorandom number generators", 2014).
-const fn mix(number: u64) -> u64 {
-    let bits = number.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    let bits = (bits ^ bits >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let bits = (bits ^ bits >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-    bits ^ bits >> 31
 }
 
 #[cfg(test)]

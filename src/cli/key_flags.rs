@@ -184,9 +184,10 @@ fn argument(key: &KeyFlag) -> Arg {
         }
         FlagKind::Text(may_begin_with_hyphen) => {
             let argument = argument.allow_hyphen_values(may_begin_with_hyphen);
-            match key.words.is_empty() {
-                true => argument,
-                false => argument.value_parser(KnownWords(key.words.clone())),
+            if key.words.is_empty() {
+                argument
+            } else {
+                argument.value_parser(KnownWords(key.words.clone()))
             }
         }
         // With `=`, so that an argument that follows is not taken as the value; see `with_equals`

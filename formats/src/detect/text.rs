@@ -210,8 +210,8 @@ fn is_charmm_card(lines: &Lines<'_>) -> bool {
     titles > 0 && count.is_some_and(is_count) && is_atom
 }
 
-/// A title, two to five numbers, of which the first are codes, then `timestep`, or the edges of a cell and an atom: its
-/// name, perhaps its index, and its place.
+/// A title, then two to five numbers that begin with two codes. `timestep` follows, or the edges of a cell and an atom
+/// (name, optional index, position).
 fn is_dl_poly(lines: &Lines<'_>) -> bool {
     let kinds = numbers(lines.get(1)).unwrap_or_default();
     let [content, boundary, rest @ ..] = kinds.as_slice() else {
@@ -241,7 +241,7 @@ fn is_dl_poly(lines: &Lines<'_>) -> bool {
     is_history || (edges && is_name && has_numbers(lines.get(atom + 1), 3))
 }
 
-/// Atoms as in PDB files, but in words, of which the last five are x, y, z, charge and radius.
+/// Atom lines as in PDB files, but separated by spaces; they end with x, y, z, charge and radius.
 fn is_pqr(lines: &Lines<'_>) -> bool {
     let is_atom = |line: &&&[u8]| line.starts_with(b"ATOM ") || line.starts_with(b"HETATM ");
     let has_places = |line: &[u8]| {
