@@ -3,6 +3,7 @@
 use super::Inspected;
 use crate::cli::CliError;
 use crate::cli::print::{self, Reader};
+use crate::cli::render::counted;
 
 /// Most steps that are all printed.
 const ALL: usize = 4;
@@ -64,12 +65,9 @@ impl StepLines {
         }
         let mut lines = Vec::new();
         if self.skipped > 0 {
-            let what = match self.skipped {
-                1 => "1 step".to_owned(),
-                skipped => format!("{skipped} steps"),
-            };
             lines.push(format!(
-                "  ... {what} with as many particles and the same attributes (--json prints all)"
+                "  ... {} with as many particles and the same attributes (--json prints all)",
+                counted(self.skipped, "step")
             ));
         }
         lines.extend(step.to_lines());
