@@ -3,7 +3,8 @@
 //!
 //! It adds up what the stages hold at the same time (see the parent module). While the tree of frame i is built,
 //! frame i-1 is encoded, and the planes of frame i-2 are kept for frame i. While frame i is traced, frame i+1 is
-//! read, and frame i-1 may still be encoded. Only anonymous memory counts, not the pages of mapped files. Particle
+//! read, and frame i-1 may still be encoded. Both are usually done when frame i is denoised; [`MemoryModel::bound`] is
+//! what is needed if they are not. Only anonymous memory counts, not the pages of mapped files. Particle
 //! counts of frames that have not been opened are estimated from the length of their files and the heaviest frame of
 //! the survey. Native frames that are traced in place need almost no memory.
 
@@ -203,6 +204,15 @@ const RETURN_THRESHOLD: u64 = 1 << 20;
 /// One in this many particles is assumed to be spray.
 const PARTICLES_PER_DROP: u64 = 10;
 
+/// The frames before and after one that is denoised.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Neighbours {
+    /// One is written, the other is read.
+    Ready,
+    /// One is still being encoded, the other read.
+    InWork,
+}
+
 /// Memory of a surface, without the tree.
 #[derive(Debug, Clone, Copy, Default)]
 struct SurfaceBytes {
@@ -231,14 +241,25 @@ impl<'a> MemoryModel<'a> {
         }
     }
 
-    /// Peak memory while these frames are rendered one after another.
+    /// Peak memory while these frames are rendered one after another, if reading and encoding a frame take less time
+    /// than tracing its neighbour.
     pub fn peak(&self, frames: &[FrameSize]) -> MemoryNeed {
+        self.peak_of(frames, Neighbours::Ready)
+    }
+
+    /// The same, however long reading and encoding take.
+    pub fn bound(&self, frames: &[FrameSize]) -> MemoryNeed {
+        self.peak_of(frames, Neighbours::InWork)
+    }
+
+    fn peak_of(&self, frames: &[FrameSize], neighbours: Neighbours) -> MemoryNeed {
         let mut need = MemoryNeed::default();
         let mut tree = 0;
         for (i, frame) in frames.iter().enumerate() {
             // The memory of the tree is reused from frame to frame, and never shrinks.
             tree = self.tree(frame).max(tree);
-            need = need.larger(self.peak_around(i, frame, frames.get(i + 1), tree));
+            let after = frames.get(i + 1);
+            need = need.larger(self.peak_around(i, frame, after, tree, neighbours));
         }
         need
     }
@@ -508,13 +529,11 @@ impl<'a> MemoryModel<'a> {
         frame: &FrameSize,
         after: Option<&FrameSize>,
         tree: u64,
+        neighbours: Neighbours,
     ) -> MemoryNeed {
         let render = &self.setup.picture.render;
         let film = self.film();
         let threads = rayon::current_num_threads() as u64;
-        let denoising = self.setup.picture.denoise.map_or(0, |settings| {
-            denoise::predicted_bytes(render.width, render.height, &settings, threads)
-        });
         let film_before = if before > 0 { film } else { 0 };
         let film_kept = if before > 1 { film } else { 0 };
         let encoding_before = if before > 0 { self.encoding() } else { 0 };
@@ -530,18 +549,20 @@ impl<'a> MemoryModel<'a> {
         let environment = scene.environment.as_deref();
         let environment = tables * environment.map_or(0, Environment::byte_len);
         let picture = scene.ground.as_ref().map_or(0, ground_image_bytes);
-        let light = environment + picture + floor_light_bytes(scene, render);
         // Count the threads, including those for reading
         let has_read_pool = [Some(frame), after]
             .into_iter()
             .flatten()
             .any(FrameSize::needs_many);
         let idle = MemoryNeed {
-            program: PROGRAM + light + THREAD * threads * if has_read_pool { 2 } else { 1 },
+            program: PROGRAM
+                + environment
+                + picture
+                + THREAD * threads * if has_read_pool { 2 } else { 1 },
             reading: shared.max(self.retained(frame)),
             ..MemoryNeed::default()
         };
-        // Add up each phase: reading, building, tracing, encoding
+        // Add up each phase: reading, building, tracing, denoising, encoding
         let kept = self.kept(frame);
         let surface = self.surface(frame);
         let meshes = self.meshes
@@ -564,6 +585,7 @@ impl<'a> MemoryModel<'a> {
             ..idle
         };
         let tracing = MemoryNeed {
+            program: idle.program + floor_light_bytes(scene, render),
             reading: after.map_or(idle.reading, |after| {
                 self.reading_with_meshes(after).max(idle.reading)
             }),
@@ -574,9 +596,29 @@ impl<'a> MemoryModel<'a> {
                 _ => tree,
             },
             surface: surface.kept + meshes,
-            images: film + film_before + denoising.max(self.tracing_scratch() * threads),
+            images: film + film_before + self.tracing_scratch() * threads,
             encoding: encoding_before + names,
             ..idle
+        };
+        let denoising = match self.setup.picture.denoise {
+            Some(settings) => MemoryNeed {
+                program: idle.program,
+                reading: match neighbours {
+                    Neighbours::Ready => {
+                        after.map_or(idle.reading, |next| self.kept(next).max(idle.reading))
+                    }
+                    Neighbours::InWork => tracing.reading,
+                },
+                images: film
+                    + film_before
+                    + denoise::predicted_bytes(render.width, render.height, &settings, threads),
+                encoding: match neighbours {
+                    Neighbours::Ready => names,
+                    Neighbours::InWork => tracing.encoding,
+                },
+                ..tracing
+            },
+            None => MemoryNeed::default(),
         };
         let encoding = MemoryNeed {
             surface: self.meshes,
@@ -589,8 +631,9 @@ impl<'a> MemoryModel<'a> {
             program: PROGRAM + THREAD * threads,
             ..MemoryNeed::default()
         };
-        let frame = first_read.larger(building).larger(tracing).larger(encoding);
-        starting.larger(frame)
+        [first_read, building, tracing, denoising, encoding]
+            .into_iter()
+            .fold(starting, MemoryNeed::larger)
     }
 
     /// Memory of the planes of an image.

@@ -48,12 +48,11 @@ impl MemoryModel<'_> {
             }
         }
         // Overlap the others if that fits
-        let overlapping = self.peak(&fitting);
         let bound = limit
             .map_or(u64::MAX, |limit| limit.0)
             .min(free.unwrap_or(u64::MAX));
-        let (overlap, need) = if overlapping.total() <= bound {
-            (Overlap::Stages, overlapping)
+        let (overlap, need) = if self.bound(&fitting).total() <= bound {
+            (Overlap::Stages, self.peak(&fitting))
         } else {
             let alone = fitting.iter().map(|frame| self.alone(frame));
             let need = alone.fold(MemoryNeed::default(), MemoryNeed::larger);

@@ -205,7 +205,8 @@ pub(in crate::render) fn bytes(scene: &Scene, settings: &RenderSettings) -> u64 
         several => (1 + several.min(groups)) * density::BYTES,
     };
     let of_ground = match &scene.ground {
-        Some(ground) if !is_catcher(ground) => caustics + (1 + groups) * sky::BYTES + wet::BYTES,
+        // The cells of the photons are freed when the other maps are made
+        Some(ground) if !is_catcher(ground) => caustics.max((1 + groups) * sky::BYTES + wet::BYTES),
         Some(_) if emits => caustics,
         _ => 0,
     };
