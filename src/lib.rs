@@ -59,6 +59,7 @@ pub mod attributes;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod conversion;
+pub mod defaults;
 pub mod denoise;
 pub mod hdr;
 pub mod job;

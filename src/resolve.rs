@@ -152,6 +152,8 @@ pub fn question<'a>(manifest: &'a Manifest, selection: &'a Selection) -> Questio
         up: manifest.input.up.map(|up| DVec3::from_array(up.vector())),
         selection: Some(selection).filter(|s| !s.is_all() || !s.cuts.is_empty()),
         points: color::is_depth(&manifest.material.color) || overlay::needs_points(manifest),
+        fit: camera::fit(manifest),
+        framed: None,
     }
 }
 
@@ -219,6 +221,7 @@ pub fn setup(
         up,
         origin: survey.origin,
         has_layer: survey.rests_on_floor(up),
+        is_of_earlier_version: survey.standing.is_none(),
     };
     let ground = ground::ground(manifest, &floor)?;
     let wet_ground = ground::wet_ground(manifest, &floor);

@@ -6,14 +6,15 @@ use std::path::{Path, PathBuf};
 use spherule_formats::{Attribute, PositionSlice, RawParticles};
 use spherule_jobs::{Panic, catch_panic};
 
+use crate::defaults::{Files, rules};
 use crate::job::{RunError, SceneFiles};
-use crate::manifest::{Manifest, ManifestError, Override};
+use crate::manifest::{Manifest, ManifestError, ManifestSource, Override};
 use crate::output::OutputError;
 use crate::pipeline::{ImageError, ImageTask, Setup, TracedFrame, trace_particles};
 use crate::render::{Film, RenderError, Stop};
 use crate::resolve::{ResolveError, question};
 use crate::scene::Camera;
-use crate::survey::Survey;
+use crate::survey::{Facts, Survey};
 
 /// The name of particles without a file, in messages and overlays.
 const MEMORY: &str = "memory";
@@ -29,6 +30,9 @@ pub struct StillSettings {
     pub frame: i64,
     /// The name of the particles, in messages and overlays.
     pub name: String,
+    /// What the manifest was read from, if it is to be completed with defaults that follow from the particles, as on the
+    /// command line.
+    pub source: Option<ManifestSource>,
 }
 
 impl Default for StillSettings {
@@ -45,6 +49,7 @@ impl StillSettings {
             base: PathBuf::new(),
             frame: 0,
             name: MEMORY.to_owned(),
+            source: None,
         }
     }
 
@@ -58,7 +63,39 @@ impl StillSettings {
     pub fn parse(toml: &str) -> Result<Self, ManifestError> {
         let input = Override::new("input.path", MEMORY, MEMORY);
         let input = input.expect("the key is valid");
-        Manifest::parse_with(toml, Path::new("settings"), vec![input]).map(Self::new)
+        Self::of_source(ManifestSource::new(
+            toml,
+            Path::new("settings"),
+            vec![input],
+        ))
+    }
+
+    /// The pictures of a manifest, completed with defaults that follow from the particles.
+    ///
+    /// # Errors
+    /// The manifest has unknown keys or invalid values.
+    pub fn of_source(source: ManifestSource) -> Result<Self, ManifestError> {
+        let (manifest, _) = source.parse()?;
+        Ok(Self {
+            source: Some(source),
+            ..Self::new(manifest)
+        })
+    }
+
+    /// The manifest with the defaults that follow from `particles`, and a line for each rule that has something to say.
+    fn completed(&self, particles: &Particles<'_>) -> Result<(Manifest, Vec<String>), RunError> {
+        let Some(source) = &self.source else {
+            return Ok((self.manifest.clone(), Vec::new()));
+        };
+        let facts = Facts::of_particles(&self.name, particles)?;
+        let mut lines = Vec::new();
+        let rules = rules(&self.manifest, source, &facts, Files::default());
+        let layers = rules.into_iter().flat_map(|rule| {
+            lines.extend(rule.line);
+            rule.settings
+        });
+        let manifest = source.parse_over(layers.collect())?;
+        Ok((manifest, lines))
     }
 }
 
@@ -140,11 +177,10 @@ pub fn render(
     stop: &dyn Stop,
 ) -> Result<StillImage, StillError> {
     let StillSettings {
-        manifest,
-        base,
-        frame,
-        name,
+        base, frame, name, ..
     } = settings;
+    let (manifest, lines) = settings.completed(&particles)?;
+    let manifest = &manifest;
     if !manifest.cell.images().is_none() {
         let what =
             "particles in memory are neither copied nor wrapped; do so before they are rendered";
@@ -166,7 +202,8 @@ pub fn render(
         let setup = files.setup(manifest, &survey, std::iter::once(*frame))?;
         Ok((survey, setup))
     })?;
-    let mut notes = files.notes(manifest)?;
+    let mut notes = lines;
+    notes.extend(files.notes(manifest)?);
     // Render
     let task = ImageTask {
         frame: *frame,

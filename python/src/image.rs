@@ -1,13 +1,13 @@
 //! Renders arrays to images in memory.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use glam::{DVec3, Vec3};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
-use spherule::manifest::{Manifest, Override};
+use spherule::manifest::{ManifestSource, Override};
 use spherule::output::layer_planes;
 use spherule::still::{self, Particles, StillImage, StillSettings};
 use spherule_formats::SimulationCell;
@@ -79,12 +79,12 @@ fn read_settings(
     let mut all = overrides(json)?;
     let input = Override::new("input.path", name.clone(), "name");
     all.push(input.map_err(|error| Failure::new(Class::Internal, error))?);
-    let manifest = Manifest::parse_with("", &PathBuf::from("settings"), all)?;
+    let source = ManifestSource::new("", Path::new("settings"), all);
     Ok(StillSettings {
         base,
         frame,
         name,
-        ..StillSettings::new(manifest)
+        ..StillSettings::of_source(source)?
     })
 }
 

@@ -6,7 +6,7 @@ use std::sync::Mutex;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use spherule::job::{JobManifest, RenderJob, RenderRun};
-use spherule::manifest::{Manifest, read_manifest, real_dir};
+use spherule::manifest::{Manifest, ManifestSource, read_manifest, real_dir};
 use spherule::report::FrameReport;
 use spherule_jobs::{FrameEvent, Interrupt, ResumeMode};
 
@@ -50,8 +50,11 @@ pub(crate) fn run_job<'py>(
     };
     let on_signal = || interrupt.raise();
     let done = threads::run(py, threads, on_signal, || {
-        let manifest = manifest(file.as_deref(), settings, base)?;
-        let sequence = manifest.open_sequence()?;
+        let mut manifest = manifest(file.as_deref(), settings, base)?;
+        let mut sequence = manifest.open_sequence()?;
+        for line in manifest.complete(&mut sequence, Some(mode))? {
+            on_event(FrameEvent::Note(&line));
+        }
         let job = RenderJob::new(manifest, &sequence, None)?;
         let mut run = RenderRun::open(job, sequence, mode)?;
         for note in run.notes() {
@@ -112,16 +115,23 @@ pub(crate) fn write_manifest(
 fn manifest(file: Option<&Path>, settings: &str, base: PathBuf) -> Result<JobManifest, Failure> {
     let overrides = overrides(settings)?;
     let Some(file) = file else {
-        let manifest = Manifest::parse_with("", Path::new("settings"), overrides)?;
-        return Ok(JobManifest::new(manifest, base));
+        let source = ManifestSource::new("", Path::new("settings"), overrides);
+        let (manifest, _) = source.parse()?;
+        return Ok(JobManifest {
+            source: Some(source),
+            ..JobManifest::new(manifest, base)
+        });
     };
     let text = read_manifest(file)
         .map_err(|error| Failure::new(Class::Input, format!("{}: {error}", file.display())))?;
+    let source = ManifestSource::new(&*text, file, overrides);
+    let (manifest, _) = source.parse()?;
     Ok(JobManifest {
-        manifest: Manifest::parse_with(&text, file, overrides)?,
+        manifest,
         base: file.parent().map_or_else(PathBuf::new, Path::to_owned),
         file: Some(file.to_owned()),
         unchanged: Manifest::parse(&text, file).ok(),
+        source: Some(source),
     })
 }
 

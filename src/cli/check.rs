@@ -7,7 +7,7 @@ use spherule_formats::Sequence;
 use spherule_jobs::{DryRun, FrameState, Job, ResumeMode};
 
 use super::job::use_threads;
-use super::manifest_args::open_sequence;
+use super::manifest_args::{complete, open_sequence};
 use super::render::RunArgs;
 use super::{CliError, Outcome, disk, print};
 use crate::job::{RenderJob, require_one_fits};
@@ -39,13 +39,14 @@ pub(super) struct CheckArgs {
 }
 
 pub(super) fn run(args: &CheckArgs) -> Result<Outcome, CliError> {
-    let requested = args.run.manifest.manifest()?;
+    let mut requested = args.run.manifest.manifest()?;
     use_threads(requested.manifest.job.threads)?;
-    let sequence = open_sequence(&requested)?;
+    let mut sequence = open_sequence(&requested)?;
     for note in sequence.notes() {
         note!("{note}");
     }
     let mode = args.run.job.mode();
+    complete(&mut requested, &mut sequence, Some(mode))?;
     let mut render_job = RenderJob::new(requested, &sequence, args.run.job.shard)?;
     // The check reports a directory that cannot be used
     if render_job.check_output_dir(mode).is_ok() {

@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::manifest_args::{ManifestArgs, open_sequence};
+use super::manifest_args::{ManifestArgs, complete, open_sequence};
 use super::{CliError, Outcome, print};
 
 #[derive(Debug, Args)]
@@ -12,11 +12,12 @@ pub(super) struct InitArgs {
 }
 
 pub(super) fn run(args: &InitArgs) -> Result<Outcome, CliError> {
-    let requested = args.manifest.manifest()?;
-    let sequence = open_sequence(&requested)?;
+    let mut requested = args.manifest.manifest()?;
+    let mut sequence = open_sequence(&requested)?;
     for note in sequence.notes() {
         note!("{note}");
     }
+    complete(&mut requested, &mut sequence, None)?;
     print::file(&requested.manifest.to_commented_toml())?;
     Ok(Outcome::Done)
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use spherule_formats::Sequence;
 use spherule_formats::sequence::SequenceError;
-use spherule_jobs::PLAN_FILE;
+use spherule_jobs::{PLAN_FILE, ResumeMode};
 
 use super::CliError;
 use super::camera_path::camera_keys;
@@ -13,7 +13,7 @@ use super::key_flags::{KeyFlags, KnownWords, over};
 use super::numbers::number;
 use super::paths::{path_as_typed, text};
 use crate::job::{JobManifest, RunError};
-use crate::manifest::{self, Look, Manifest, MapName, Override, ScaleKind, draft};
+use crate::manifest::{self, Manifest, ManifestSource, MapName, Override, ScaleKind, draft};
 
 /// Options that set keys of the manifest: `--set` for any key, and options for common keys.
 #[derive(Debug, Args)]
@@ -25,10 +25,6 @@ pub(super) struct ManifestArgs {
     #[command(flatten)]
     pub(super) keys: KeyFlags,
 
-    /// Preset for all settings that are not given explicitly: water, studio, paper or whitted.
-    #[arg(long, value_name = "NAME", help_heading = "Look", display_order = 0, value_parser = looks(),
-        hide_possible_values = true)]
-    pub(super) look: Option<String>,
     /// Quick preview: 4 samples per pixel, ambient light instead of light between surfaces
     ///
     /// Sets image.samples = 4, render.indirect = "ambient" and render.denoise = "auto", whatever the manifest says;
@@ -95,10 +91,6 @@ pub(super) struct ManifestArgs {
     pub(super) set: Vec<String>,
 }
 
-fn looks() -> KnownWords {
-    KnownWords(Look::ALL.iter().map(|(_, name)| *name).collect())
-}
-
 impl ManifestArgs {
     /// Reads the manifest, or makes one from the arguments.
     pub(super) fn manifest(&self) -> Result<JobManifest, CliError> {
@@ -121,7 +113,8 @@ impl ManifestArgs {
         let shown = file
             .clone()
             .unwrap_or_else(|| PathBuf::from("command line"));
-        let (manifest, warnings) = Manifest::parse_with_warnings(&text, &shown, overrides)?;
+        let source = ManifestSource::new(text.clone(), &shown, overrides);
+        let (manifest, warnings) = source.parse()?;
         for warning in warnings {
             note!("{warning}");
         }
@@ -133,6 +126,7 @@ impl ManifestArgs {
             base,
             file,
             unchanged,
+            source: Some(source),
         })
     }
 
@@ -183,13 +177,6 @@ impl ManifestArgs {
         if let Some(scale) = &self.color_scale {
             let value = scale.clone();
             list.push(over("material.color.scale", value, "--color-scale")?);
-        }
-        if let Some(look) = &self.look {
-            list.extend(
-                Look::named(look)
-                    .map_err(|e| CliError::other(format!("--look: {e}")))?
-                    .settings(&format!("--look {look}")),
-            );
         }
         if let Some(path) = &self.camera_path {
             let keys = camera_keys(path)?;
@@ -247,6 +234,18 @@ pub(super) fn open_sequence(requested: &JobManifest) -> Result<Sequence, CliErro
         }
         CliError::other(text)
     })
+}
+
+/// Completes `requested` with the defaults that follow from the particles, and says which; see [`JobManifest::complete`].
+pub(super) fn complete(
+    requested: &mut JobManifest,
+    sequence: &mut Sequence,
+    mode: Option<ResumeMode>,
+) -> Result<(), CliError> {
+    for line in requested.complete(sequence, mode)? {
+        message!("{line}");
+    }
+    Ok(())
 }
 
 /// Whether the file name is that of a manifest.

@@ -11,7 +11,7 @@ use spherule_formats::Sequence;
 use spherule_jobs::{FrameRange, Job};
 
 use super::job::{list, use_threads};
-use super::manifest_args::{ManifestArgs, open_sequence};
+use super::manifest_args::{ManifestArgs, complete, open_sequence};
 use super::paths::absolute;
 use super::render::print_summary;
 use super::{CliError, Outcome, disk, print, signals};
@@ -108,12 +108,14 @@ pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
     let output = absolute(&shown)?;
     let mut requested = args.manifest.manifest()?;
     use_threads(requested.manifest.job.threads)?;
-    let sequence = open_sequence(&requested)?;
+    let mut sequence = open_sequence(&requested)?;
     for note in sequence.notes() {
         note!("{note}");
     }
     guard(&shown, &output, requested.file.as_deref(), &sequence)?;
     let frame = frame(args.frame, &requested, &sequence)?;
+    complete(&mut requested, &mut sequence, None)?;
+    requested.manifest.show_own_frame();
     requested.manifest.input.frames = FrameRange::from_frames([frame]);
 
     let render_job = RenderJob::new(requested, &sequence, None)?;

@@ -7,7 +7,7 @@ use spherule_formats::native::{Bound, Encoding};
 use super::attributes::AttributeChoices;
 use super::error::UnknownAttribute;
 use crate::metrics::Bytes;
-use crate::survey::{ColorQuestion, Question, RadiusQuestion, Survey};
+use crate::survey::{ColorQuestion, Fit, Question, RadiusQuestion, Survey};
 
 /// The settings of the user.
 #[derive(Debug, Clone, PartialEq)]
@@ -66,6 +66,8 @@ impl ConvertSettings {
             up: None,
             points: false,
             selection: None,
+            fit: Fit::All,
+            framed: None,
             radius: match self.radius {
                 Some(_) => RadiusQuestion::None,
                 None => RadiusQuestion::Auto,

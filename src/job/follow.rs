@@ -106,6 +106,11 @@ impl<'a> Follower<'a> {
         &self.interrupt
     }
 
+    /// Follows only these parts from now on; None stands for all.
+    pub fn keep_parts(&mut self, parts: Option<Vec<String>>) {
+        self.manifest.manifest.input.parts = parts;
+    }
+
     /// Resets the time without new frames.
     pub fn mark_activity(&mut self) {
         self.last_activity = Instant::now();

@@ -9,8 +9,8 @@ use spherule_jobs::{publish, read_regular_text};
 
 use super::{RunError, in_thread};
 use crate::manifest::{
-    Manifest, OutputPattern, RebaseError, SCHEMA_FILE, is_marked, job_schema, marked, named_place,
-    read_manifest, real_dir,
+    Manifest, ManifestSource, OutputPattern, RebaseError, SCHEMA_FILE, is_marked, job_schema,
+    marked, named_place, read_manifest, real_dir,
 };
 use crate::reading::read_budget;
 
@@ -28,6 +28,8 @@ pub struct JobManifest {
     pub file: Option<PathBuf>,
     /// The manifest in that file without the overrides, if it is valid.
     pub unchanged: Option<Manifest>,
+    /// What the manifest was read from, if it may be completed with defaults that follow from the particles.
+    pub source: Option<ManifestSource>,
 }
 
 /// Budget for reading one file in the job of `manifest`.
@@ -46,6 +48,7 @@ impl JobManifest {
             base: base.into(),
             file: None,
             unchanged: None,
+            source: None,
         }
     }
 

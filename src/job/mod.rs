@@ -40,6 +40,7 @@
 //! ```
 
 mod child;
+mod complete;
 mod complete_frames;
 mod convert_job;
 mod error;

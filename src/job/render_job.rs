@@ -11,12 +11,12 @@ use super::scene_files::SceneFiles;
 use super::selection::{frame_requests, frames_in, indices, select};
 use super::target::{check_output_dir, stored_survey};
 use super::{RunError, Shard, in_thread};
-use crate::manifest::Manifest;
+use crate::manifest::{FitSetting, Manifest};
 use crate::metrics::memory::available;
 use crate::pipeline::{FrameSize, ImageTask, MemoryModel, NextMeshes, Schedule, Setup};
 use crate::report::job::{HTML_FILE, JSON_FILE};
 use crate::resolve::question;
-use crate::survey::Survey;
+use crate::survey::{Question, Survey};
 
 /// A render job before anything is written.
 #[derive(Debug, Clone)]
@@ -263,9 +263,25 @@ impl RenderJob {
     /// No frame can be read, or the settings and the particles do not go together.
     pub fn survey(&self, sequence: &Sequence) -> Result<(Survey, Setup), RunError> {
         let selection = self.manifest.selection();
-        let survey = in_thread(|| Survey::of(sequence, question(&self.manifest, &selection)))?;
+        let question = Question {
+            framed: self.framed(sequence),
+            ..question(&self.manifest, &selection)
+        };
+        let survey = in_thread(|| Survey::of(sequence, question))?;
         let setup = self.setup(&survey, sequence)?;
         Ok((survey, setup))
+    }
+
+    /// Index of the only frame whose particles the camera shows, if there is one.
+    fn framed(&self, sequence: &Sequence) -> Option<usize> {
+        if self.manifest.camera.fit != Some(FitSetting::This) {
+            return None;
+        }
+        let first = *self.selected(sequence).first()?;
+        sequence
+            .frames()
+            .iter()
+            .position(|frame| frame.number == first)
     }
 
     fn setup(&self, survey: &Survey, sequence: &Sequence) -> Result<Setup, RunError> {

@@ -6,14 +6,16 @@ use glam::DVec3;
 use serde_json::{Value as Json, json};
 
 use super::focus::FocusSetting;
-use super::keys::{Keys, section};
+use super::keys::{Keys, keys, section};
 use super::reader::Section;
 use super::value::named;
 use crate::scene::camera::DEFAULT_FOV;
 use crate::scene::lens::DEFAULT_SENSOR_WIDTH;
 
+mod fit;
 mod projection;
 
+pub use fit::{BoxSetting, FitSetting};
 pub use projection::{AxisView, ConvergenceSetting, ProjectionKind};
 
 named! {
@@ -62,6 +64,16 @@ section! {
         azimuth: Option<f64> = None, unit("degrees"), example("30.0");
         /// auto, turntable: degrees above the horizon
         elevation: Option<f64> = None, from(-90), to(90), unit("degrees"), example("20.0");
+        /// auto, turntable: what is in the picture: all | this | a percentage, such as 99%
+        ///
+        /// 99% is that part of the particles of all frames together; the others are left out if they are far from these.
+        /// this is the same for the frame of a still alone. all is every particle of all frames, except at most 1 % of a
+        /// frame that are far from the others.
+        fit: Option<FitSetting> = None, example("\"99%\""), unset("99%, and this for stills"), flag("fit", "WHAT", "Camera");
+        /// auto: the point in the middle of the picture
+        center: Option<DVec3> = None, example("[0.5, 0.5, 0.5]");
+        /// Enlarges the picture around its middle
+        zoom: f64 = 1.0, above(0), flag("zoom", "FACTOR", "Camera");
         /// auto, turntable: show all of the meshes, too, not only the particles
         ///
         /// Holdouts and meshes that each frame has for itself do not count.
@@ -105,6 +117,9 @@ section! {
         @
         /// `[[camera.key]]`, ascending by frame
         keys: Vec<CameraKey>;
+        @
+        /// The box that is in the picture in place of the particles
+        bounds: Option<BoxSetting>;
     }
 }
 
@@ -131,6 +146,10 @@ impl Camera {
     /// All keys, including those of `[[camera.key]]`.
     pub(super) fn all_keys(&mut self, keys: &mut Keys<'_>) {
         self.keys(keys);
+        keys!(keys:
+            /// auto, turntable: two corners of a box that is in the picture in place of the particles
+            box => self.bounds, example("[[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]]");
+        );
         let (up, mut frames) = (self.up, BTreeSet::new());
         let items = &mut self.keys;
         let has_fov = self.projection == ProjectionKind::Perspective;
@@ -165,6 +184,25 @@ impl Camera {
     }
 
     fn check(&self, section: &Section<'_>) {
+        let is_automatic = matches!(self.mode, CameraMode::Auto | CameraMode::Turntable);
+        for (key, is_given) in [
+            ("fit", self.fit.is_some()),
+            ("box", self.bounds.is_some()),
+            ("center", self.center.is_some()),
+        ] {
+            if is_given && !is_automatic {
+                section.wrong(
+                    key,
+                    "is given, but eye and look_at place the camera; remove it or them",
+                );
+            }
+        }
+        if self.center.is_some() && self.mode == CameraMode::Turntable {
+            section.wrong(
+                "center",
+                "is given, but a turntable turns around the particles; remove it",
+            );
+        }
         if self.aperture.is_some() && self.f_stop > 0.0 {
             section.wrong("aperture", "is given, but so is f_stop; remove one of them");
         }

@@ -94,7 +94,10 @@ impl Entries {
     pub(super) fn push<T: Value>(&mut self, key: Key, value: Option<&T>) {
         let word = || key.word.map(|word| word.to_owned().toml());
         self.list.push(Entry {
-            key: format!("{}.{}", self.section, key.name),
+            key: match &*self.section {
+                "" => key.name.to_owned(),
+                section => format!("{section}.{}", key.name),
+            },
             section: self.section.clone(),
             header: self.header.clone(),
             about: self.about.clone(),

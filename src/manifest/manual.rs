@@ -30,7 +30,11 @@ fn manual() -> String {
     };
     tables.sort_by_key(is_list);
     for table in tables {
-        let _ = write!(page, "\n## {}\n\n{}.\n", title(table), table[0].about);
+        let about = match &*table[0].about {
+            "" => "It stands before all tables",
+            about => about,
+        };
+        let _ = write!(page, "\n## {}\n\n{about}.\n", title(table));
         for entry in table {
             page += &section(entry);
         }
@@ -44,6 +48,9 @@ fn tables(entries: &Entries) -> impl Iterator<Item = &[Entry]> {
 
 /// `[image]`, or `[[light]]` with its type.
 fn title(table: &[Entry]) -> String {
+    if table[0].section.is_empty() {
+        return "Look".to_owned();
+    }
     let Some((list, _)) = table[0].section.rsplit_once('.') else {
         return format!("`[{}]`", table[0].section);
     };

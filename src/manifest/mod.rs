@@ -44,6 +44,7 @@ mod keys;
 mod light;
 mod light_group;
 mod list;
+mod look;
 #[cfg(test)]
 mod manual;
 mod material;
@@ -56,7 +57,6 @@ mod part;
 mod pattern;
 #[cfg(test)]
 mod places_tests;
-mod preset;
 mod print_size;
 mod problem;
 mod reader;
@@ -65,6 +65,7 @@ mod render;
 mod same;
 mod schema;
 mod select;
+mod source;
 mod sun;
 mod surface;
 #[cfg(test)]
@@ -79,7 +80,10 @@ mod work_tests;
 pub use arrows::Arrows;
 pub use bonds::{BondSearch, Bonds};
 pub use by_integer::ByInteger;
-pub use camera::{AxisView, Camera, CameraKey, CameraMode, ConvergenceSetting, ProjectionKind};
+pub use camera::{
+    AxisView, BoxSetting, Camera, CameraKey, CameraMode, ConvergenceSetting, FitSetting,
+    ProjectionKind,
+};
 pub use cell::{Cell, Replicate};
 pub use channel::{ATTRIBUTE_CHANNEL, Channel, NamedChannel};
 pub use clip::{Clip, ClipKind, ClipMode, KeptSide, PlaneNormal};
@@ -94,6 +98,7 @@ pub use ground::{GroundImage, GroundKind, GroundSetting};
 pub use input::{Input, Paths, RadiusSetting, UpAxis};
 pub use key::Flag;
 pub use light::{Light, LightKind};
+pub use look::{Look, draft};
 pub use material::{Material, MaterialKind};
 pub use mesh::{Mesh, MeshMaterial, MeshPath, MeshShading};
 pub(crate) use nearest::nearest;
@@ -102,7 +107,6 @@ pub use output::Output;
 pub use overlay::{Overlay, OverlayKind, OverlayText};
 pub use part::{Part, PartKind};
 pub use pattern::{FramePattern, OutputPattern};
-pub use preset::{Look, draft};
 pub use print_size::Side;
 #[cfg(feature = "cli")]
 pub(crate) use rebase::without_dots;
@@ -110,6 +114,7 @@ pub use rebase::{RebaseError, named_place, real_dir};
 pub use render::{GroundPattern, Image, IndirectSetting, Render};
 pub use schema::{SCHEMA_FILE, job_schema};
 pub use select::{Axis, Select, Slab};
+pub use source::ManifestSource;
 pub use sun::Sun;
 pub use trails::Trails;
 pub use tree::{Override, OverrideError};
@@ -123,6 +128,8 @@ pub struct LightGroup(String);
 /// The settings of a job.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Manifest {
+    /// The defaults of the other settings.
+    pub look: Look,
     /// The particles.
     pub input: Input,
     /// The particles that are drawn.
@@ -194,6 +201,7 @@ impl Manifest {
     /// Default settings for the particles at `path`.
     pub fn new(path: impl Into<String>) -> Self {
         Self {
+            look: Look::Auto,
             input: Input::new(path),
             select: Select::default(),
             clips: Vec::new(),
@@ -251,23 +259,9 @@ impl Manifest {
             let key = String::new();
             ManifestError::new(vec![Problem { place, key, what }], text, path)
         })?;
-        // Apply the defaults of a look last, to keys that are still missing
-        let (under, over): (Vec<_>, Vec<_>) = overrides.into_iter().partition(Override::is_under);
-        let lay_over = |tree: &mut TomlNode, overlay| {
-            if let Err(problem) = tree.lay_over(overlay) {
-                problems.errors.borrow_mut().push(problem);
-            }
-        };
-        over.into_iter().for_each(|o| lay_over(&mut tree, o));
-        // The pattern of a look is not that of a ground which is named plain
-        let kinds = [&["render", "ground"][..], &["render", "ground", "type"]];
-        let is_plain = kinds
-            .iter()
-            .any(|keys| tree.has_text(keys, GroundKind::Plain.name()));
-        under
-            .into_iter()
-            .filter(|o| !(is_plain && o.is_of("render.ground_pattern")))
-            .for_each(|o| lay_over(&mut tree, o));
+        lay_over(&mut tree, text, overrides, |problem| {
+            problems.errors.borrow_mut().push(problem);
+        });
         // Read all keys, then check dependencies between them
         let mut manifest = Self::new("");
         let mut root = Keys::Read(Section::root(&tree, &problems));
@@ -302,6 +296,7 @@ impl Manifest {
 
     /// Visits all keys, in the order of the commented file. No other place knows the tables.
     fn keys(&mut self, keys: &mut Keys<'_>) {
+        look::keys(&mut self.look, keys);
         keys.section("input", Input::ABOUT, |keys| self.input.keys(keys));
         keys.section("select", select::ABOUT, |keys| self.select.keys(keys));
         keys.section("camera", Camera::ABOUT, |keys| self.camera.all_keys(keys));
@@ -440,6 +435,14 @@ impl Manifest {
                     2 * height
                 ),
             );
+        }
+    }
+
+    /// Shows the particles of one frame, the first that is rendered, unless the manifest says what is in the picture.
+    pub fn show_own_frame(&mut self) {
+        let camera = &mut self.camera;
+        if matches!(camera.mode, CameraMode::Auto | CameraMode::Turntable) {
+            camera.fit.get_or_insert(FitSetting::This);
         }
     }
 
@@ -606,6 +609,37 @@ impl Manifest {
         manifest.overlays = Overlay::examples();
         manifest
     }
+}
+
+/// Applies `overrides` to the `tree` of a manifest with this `text`, and then the defaults of its look and those among
+/// the overrides to keys that are still missing.
+fn lay_over(
+    tree: &mut TomlNode,
+    text: &str,
+    overrides: Vec<Override>,
+    mut on_problem: impl FnMut(Problem),
+) {
+    let mut lay = |tree: &mut TomlNode, layer| {
+        if let Err(problem) = tree.lay_over(layer) {
+            on_problem(problem);
+        }
+    };
+    let (under, over): (Vec<_>, Vec<_>) = overrides.into_iter().partition(Override::is_under);
+    over.into_iter().for_each(|o| lay(tree, o));
+    // Jobs write their settings as a whole
+    if is_marked(text) {
+        let none = Override::new("look", Look::None.name(), "the file");
+        none.into_iter().for_each(|o| lay(tree, o.under()));
+    }
+    // The pattern of a look is not that of a ground which is named plain
+    let kinds = [&["render", "ground"][..], &["render", "ground", "type"]];
+    let is_plain = kinds
+        .iter()
+        .any(|keys| tree.has_text(keys, GroundKind::Plain.name()));
+    let defaults = Look::of(tree).settings("look").into_iter().chain(under);
+    defaults
+        .filter(|o| !(is_plain && o.is_of("render.ground_pattern")))
+        .for_each(|o| lay(tree, o));
 }
 
 /// The key of the picture on the ground in the settings that images depend on.

@@ -141,8 +141,15 @@ impl Override {
         self.is_under
     }
 
+    /// Whether it sets the dotted `key`, or one in the table `key`.
+    pub fn is_in(&self, key: &str) -> bool {
+        let mut own = self.keys.iter();
+        key.split('.')
+            .all(|part| own.next().is_some_and(|own| own == part))
+    }
+
     /// Whether it sets the dotted `key`.
-    pub(super) fn is_of(&self, key: &str) -> bool {
+    pub fn is_of(&self, key: &str) -> bool {
         key.split('.').eq(&self.keys)
     }
 }
@@ -164,6 +171,11 @@ impl TomlNode {
             };
             values.get(*key).map(|(_, node)| &node.kind)
         })
+    }
+
+    /// Whether there is a value of `keys`.
+    pub(super) fn has(&self, keys: &[&str]) -> bool {
+        self.value(keys).is_some()
     }
 
     /// Whether `table` is a table with `key`.

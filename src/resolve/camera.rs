@@ -6,13 +6,15 @@ use glam::DVec3;
 use spherule_formats::SimulationCell;
 
 use super::ResolveError;
-use crate::manifest::{self, CameraMode, FocusSetting, Manifest, ProjectionKind};
+use crate::manifest::{
+    self, BoxSetting, CameraMode, FitSetting, FocusSetting, Manifest, ProjectionKind,
+};
 use crate::pipeline::{PictureMesh, Setup};
 use crate::scene::{
     Aperture, Bounds, Camera, CameraError, CameraKey, CameraPath, CameraView, Convergence, Focus,
     Framed, Framing, KeyedPath, LensSettings, Projection, StereoSettings,
 };
-use crate::survey::Survey;
+use crate::survey::{Fit, Survey};
 
 /// The path and the projection that the manifest describes; `up` is the default upward direction.
 pub(super) fn path(
@@ -23,7 +25,7 @@ pub(super) fn path(
 ) -> Result<(CameraPath, Projection), ResolveError> {
     let camera = &manifest.camera;
     let up = camera.up.unwrap_or(up);
-    let [azimuth, elevation] = camera.angles();
+    let [azimuth, elevation] = camera.angles(up);
     let framing = Framing {
         up,
         azimuth,
@@ -68,10 +70,15 @@ pub(super) fn path(
             (CameraPath::through(keys)?, height)
         }
     };
+    let path = path.zoomed(camera.zoom);
+    let path = match camera.center {
+        Some(center) => path.centered(center),
+        None => path,
+    };
     let projection = match camera.projection {
         ProjectionKind::Perspective => Projection::Perspective,
         ProjectionKind::Orthographic => Projection::Orthographic {
-            height: camera.height.unwrap_or(fitted),
+            height: camera.height.unwrap_or(fitted) / camera.zoom,
         },
         ProjectionKind::Equirectangular => Projection::Equirectangular,
     };
@@ -116,9 +123,24 @@ pub fn with_framed_meshes<'a>(
     Cow::Owned(survey)
 }
 
-/// What an automatic camera shows: the outermost particles of `survey`, or in jobs of earlier versions their `bounds`;
+/// The part of the particles of all frames, or of that of a still, that the automatic camera shows if nothing is said.
+const SHARE: f64 = 0.99;
+
+/// The particles that the survey looks for.
+pub(super) fn fit(manifest: &Manifest) -> Fit {
+    match manifest.camera.fit {
+        Some(FitSetting::All) => Fit::All,
+        Some(FitSetting::Percent(percent)) => Fit::Share(percent / 100.0),
+        Some(FitSetting::This) | None => Fit::Share(SHARE),
+    }
+}
+
+/// What an automatic camera shows: the box that is given, or the outermost particles of `survey`, or in jobs of earlier versions their `bounds`;
 /// and the simulation cell if it is visible.
 pub(super) fn framed(manifest: &Manifest, survey: &Survey, bounds: &Bounds, reach: f64) -> Framed {
+    if let Some(BoxSetting { min, max }) = manifest.camera.bounds {
+        return Framed::corners(&Bounds { min, max });
+    }
     let cells = survey.cells.iter().filter(|_| manifest.cell.visible);
     match &survey.outline {
         Some(outline) => {

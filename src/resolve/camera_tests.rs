@@ -11,6 +11,8 @@ pub(in crate::resolve) fn survey() -> Survey {
         min: DVec3::splat(-1.0),
         max: DVec3::splat(1.0),
         layers: None,
+        is_flat: false,
+        standing: None,
         outline: None,
         cells: Vec::new(),
         radius: None,

@@ -16,9 +16,16 @@ use crate::surface::SurfaceKind;
 /// through the particles, and none is only a few pixels wide.
 const TILE: f64 = 1.0 / 8.0;
 
-/// Greatest depth of spheres in a shadow catcher as a fraction of the diagonal of the bounds. Spheres with a greater
-/// radius are less deep, in proportion.
+/// Greatest depth of spheres in a shadow catcher in jobs of earlier versions, as a fraction of the diagonal of the bounds.
+/// Spheres with a greater radius are less deep, in proportion.
 const SUNK: f64 = 1.0 / 100.0;
+
+/// Distances from the middle at which shadows start to fade and have faded out, in diagonals of the bounds: the ground is
+/// white beside the particles.
+const NEAR_FADE: [f32; 2] = [0.5, 1.1];
+
+/// The same in jobs of earlier versions.
+const FAR_FADE: [f32; 2] = [2.0, 8.0];
 
 /// Where the ground is.
 #[derive(Debug, Clone, Copy)]
@@ -31,6 +38,8 @@ pub(super) struct Floor<'a> {
     pub(super) origin: DVec3,
     /// Whether particles lie on the lower side of the box at some time.
     pub(super) has_layer: bool,
+    /// Whether the job is of an earlier version: spheres are sunk in a shadow catcher, whose shadows reach far.
+    pub(super) is_of_earlier_version: bool,
 }
 
 /// The ground of `render.ground`, if there is one.
@@ -70,18 +79,20 @@ pub(super) fn ground(
         let relative = narrow(height - origin.dot(up.normalize_or(DVec3::Z)));
         ground.center += (relative - ground.height) * ground.up;
         ground.height = relative;
-    } else if is_catcher || manifest.surface.kind != SurfaceKind::Spheres {
+    } else if manifest.surface.kind != SurfaceKind::Spheres {
         // Raise it to the lowest centres: between a body that only touched the ground and the ground itself would be
-        // a thin layer of air, which reflects all light at grazing angles. Spheres that only touched a shadow catcher
-        // would seem to float, but large ones would seem to be cut off.
-        let most = match manifest.surface.kind {
-            SurfaceKind::Spheres => (SUNK * bounds.diagonal()).powi(2) / floor.reach,
-            _ => f64::INFINITY,
-        };
+        // a thin layer of air, which reflects all light at grazing angles
+        ground.raise(narrow(floor.reach));
+    } else if is_catcher && floor.is_of_earlier_version {
+        let most = (SUNK * bounds.diagonal()).powi(2) / floor.reach;
         ground.raise(narrow(floor.reach.min(most)));
     }
     if is_catcher {
-        let catcher = ground.into_shadow_catcher(bounds, render.ground_shadow);
+        let fade = match floor.is_of_earlier_version {
+            true => FAR_FADE,
+            false => NEAR_FADE,
+        };
+        let catcher = ground.into_shadow_catcher(bounds, render.ground_shadow, fade);
         return Ok(Some(catcher));
     }
     // Colour it
@@ -156,6 +167,7 @@ mod tests {
             up: DVec3::Z,
             origin: DVec3::ZERO,
             has_layer,
+            is_of_earlier_version: true,
         }
     }
 
@@ -189,6 +201,13 @@ mod tests {
             (catcher.height, catcher.shadow_catcher),
             (3.0144, Some(0.5))
         );
+        let standing = Floor {
+            is_of_earlier_version: false,
+            ..floor(true)
+        };
+        let mut manifest = Manifest::new("in");
+        manifest.render.ground = Some(GroundSetting::of(GroundKind::ShadowCatcher));
+        assert_eq!(ground(&manifest, &standing).unwrap().unwrap().height, 3.0);
         let under_body = of(GroundKind::ShadowCatcher, |m| {
             m.surface.kind = SurfaceKind::Union;
         });

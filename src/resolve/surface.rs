@@ -14,6 +14,9 @@ const ABSORPTION: f64 = 0.25;
 /// passes through a sponge of beads; these spheres overlap enough to close the gaps.
 const OVERLAP: f32 = 1.8;
 
+/// Radius of spheres in a plane, in half distances of neighbours: those of a square lattice cover the area between them.
+const AREA: f32 = std::f32::consts::SQRT_2;
+
 /// The surface that the manifest describes.
 ///
 /// # Errors
@@ -62,6 +65,7 @@ pub(super) fn settings(manifest: &Manifest) -> Result<SurfaceSettings, ResolveEr
 /// use the estimate for spheres.
 pub(super) fn radius(kind: SurfaceKind, survey: &Survey) -> Option<f32> {
     let packed = match kind {
+        SurfaceKind::Spheres if survey.is_flat => survey.radius.map(|radius| AREA * radius),
         SurfaceKind::Spheres => None,
         SurfaceKind::Union => survey.packed_radius.map(|radius| OVERLAP * radius),
         SurfaceKind::Smooth => survey.packed_radius,

@@ -10,7 +10,7 @@ use crate::accel::{SphereRadius, Spheres};
 use crate::metrics::memory;
 use crate::reading::read_budget;
 use crate::scene::Bounds;
-use crate::survey::{ColorQuestion, Question, RadiusQuestion, Survey};
+use crate::survey::{ColorQuestion, Fit, Question, RadiusQuestion, Survey};
 
 /// Minimum radius as a fraction of the diagonal of the bounds; smaller ones would be invisible in f32.
 const MIN_RADIUS: f64 = 1e-6;
@@ -173,6 +173,8 @@ impl FrameSurvey {
             up: None,
             points: false,
             selection: None,
+            fit: Fit::All,
+            framed: None,
             radius: RadiusQuestion::Auto,
         };
         let survey = Survey::of_frames(sequence, [index], question)?;

@@ -32,9 +32,6 @@ const FADE_START: f32 = 1.5;
 /// Default distance at which it has faded out.
 const FADE_END: f32 = 6.0;
 
-/// The same two distances for a shadow catcher, whose horizon is not visible.
-const CATCHER_FADE: [f32; 2] = [2.0, 8.0];
-
 /// Least cosine between a ray and the normal for the length of its cut with the ground.
 const MIN_COSINE: f32 = 1e-3;
 
@@ -143,9 +140,9 @@ impl Ground {
 
     /// A shadow catcher with shadows of a `strength` from 0 to 1, in place of this ground under `bounds`.
     #[must_use]
-    pub fn into_shadow_catcher(self, bounds: &Bounds, strength: f32) -> Self {
+    pub fn into_shadow_catcher(self, bounds: &Bounds, strength: f32, fade: [f32; 2]) -> Self {
         let diagonal = (bounds.max - bounds.min).as_vec3().length();
-        let [fade_start, fade_end] = CATCHER_FADE.map(|distance| distance * diagonal);
+        let [fade_start, fade_end] = fade.map(|part| part * diagonal);
         Self {
             color: CATCHER_COLOR,
             fade_start,

@@ -1,6 +1,7 @@
 //! The camera at each frame of a sequence. A pure function in f64: a frame number always gives the same view,
 //! whatever other frames exist.
 
+use glam::DVec3;
 use thiserror::Error;
 
 use super::{CameraView, Framed, Framing};
@@ -63,6 +64,39 @@ impl CameraPath {
     /// There are no keys, two keys for one frame, or opposite up vectors at consecutive keys.
     pub fn through(keys: Vec<CameraKey>) -> Result<Self, PathError> {
         KeyedPath::new(keys).map(Self::Keys)
+    }
+
+    /// The same path with pictures that are enlarged by `factor` around their middle. Keys have fields of view of their
+    /// own.
+    #[must_use]
+    pub fn zoomed(self, factor: f64) -> Self {
+        let narrowed = |fov: f64| {
+            let half = libm::tan(0.5 * fov.to_radians()) / factor;
+            2.0 * libm::atan(half).to_degrees()
+        };
+        match self {
+            // The identity would be rounded
+            path if factor == 1.0 => path,
+            Self::Still(view) => Self::Still(CameraView {
+                fov: narrowed(view.fov),
+                ..view
+            }),
+            Self::Turntable(turntable) => Self::Turntable(turntable.with_fov(narrowed)),
+            Self::Keys(keys) => Self::Keys(keys),
+        }
+    }
+
+    /// The same path with `center` in the middle of the picture, if the camera stands still.
+    #[must_use]
+    pub fn centered(self, center: DVec3) -> Self {
+        match self {
+            Self::Still(view) => Self::Still(CameraView {
+                eye: view.eye + (center - view.look_at),
+                look_at: center,
+                ..view
+            }),
+            path => path,
+        }
     }
 
     /// The view at `frame`. It may be invalid (up parallel to the view, for example), which [`super::Camera::new`]

@@ -22,21 +22,26 @@ use crate::scene::{RadiusTable, RgbEncoding, is_rgb};
 use crate::selection::Selection;
 
 mod color;
+mod facts;
 mod moments;
 mod outline;
 mod packing;
 mod robust;
 mod sample;
+mod standing;
 mod stream;
 
 pub use color::{Categories, ColorQuestion, ColorRange, MAX_CATEGORIES, RangeQuestion, range_of};
 use color::{ColorTotals, FrameContext};
+use facts::flat_axis;
+pub use facts::{Category, ELEMENT, Elements, Facts};
 use moments::Moments;
 use outline::Outermost;
-pub use outline::Outline;
+pub use outline::{Fit, Outline};
 use packing::{Spacing, SpacingRequest, narrow};
-use robust::{RobustBounds, robust_bounds, robust_largest};
+use robust::{RobustBounds, robust_bounds, robust_largest, sample_of};
 use sample::FrameSample;
+use standing::standing;
 
 /// Maximum number of frames to sample; evenly distributed, including the first and the last one.
 const FRAMES: usize = 24;
@@ -57,6 +62,13 @@ pub struct Survey {
     /// them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub layers: Option<(DVec3, DVec3)>,
+    /// Whether the particles lie in a plane. Jobs of earlier versions do not say so.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub is_flat: bool,
+    /// The largest measure of particles on the lowest plane of a frame: 1 for a cube on a floor, about 0.1 for a ball.
+    /// Jobs of earlier versions lack it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub standing: Option<f64>,
     /// The outermost particles, for the camera. Jobs of earlier versions lack them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outline: Option<Outline>,
@@ -179,6 +191,10 @@ pub struct Question<'a> {
     pub points: bool,
     /// Which particles are drawn, if some are not.
     pub selection: Option<&'a Selection>,
+    /// The particles that the camera shows.
+    pub fit: Fit,
+    /// Index of the only frame whose particles the camera shows, if there is one.
+    pub framed: Option<usize>,
 }
 
 /// What a job needs to know about radii.
@@ -234,6 +250,7 @@ impl RadiusQuestion<'_> {
 struct Totals {
     bounds: Option<RobustBounds>,
     outermost: Outermost,
+    standing: f64,
     cells: Vec<SimulationCell>,
     /// The spacing in each frame, with its number of particles.
     spacings: Vec<(u64, Spacing)>,
@@ -276,6 +293,9 @@ impl Origins {
 /// ball has much less of its volume there, a box or a heap more.
 const FLOOR: f64 = 0.02;
 
+/// [`Survey::standing`] from which on particles stand on a floor.
+const STANDING: f64 = 0.3;
+
 impl Survey {
     /// Length of the unit of a table of radii in the unit of the positions.
     pub fn unit_of(&self, table: &RadiusTable) -> f64 {
@@ -285,9 +305,12 @@ impl Survey {
         }
     }
 
-    /// Whether particles lie on a floor at the lower end of the axis `up` at some time: the lowest layer is at the
+    /// Whether particles lie on a floor at the lower end of the axis `up` at some time: a whole layer of them is at the
     /// lower end.
     pub fn rests_on_floor(&self, up: DVec3) -> bool {
+        if self.standing.is_some_and(|standing| standing < STANDING) {
+            return false;
+        }
         let Some(layers) = self.layers else {
             return false;
         };
@@ -302,7 +325,12 @@ impl Survey {
     /// # Errors
     /// If none of the frames can be read: the error of the first one.
     pub fn of(sequence: &Sequence, question: Question) -> Result<Self, FrameError> {
-        Self::of_frames(sequence, spread(sequence.frames().len()), question)
+        let mut indices = spread(sequence.frames().len());
+        if let Some(framed) = question.framed.filter(|framed| !indices.contains(framed)) {
+            indices.push(framed);
+            indices.sort_unstable();
+        }
+        Self::of_frames(sequence, indices, question)
     }
 
     /// Surveys the frames of `sequence` with these indices.
@@ -334,7 +362,8 @@ impl Survey {
                 Ok(sample) => {
                     let number = sequence.frames().get(index).map_or(0, |frame| frame.number);
                     totals.moments.add(index, number, sample.particles.time);
-                    totals.add(sample, question, up);
+                    let is_framed = question.framed.is_none_or(|framed| framed == index);
+                    totals.add(sample, question, up, is_framed);
                 }
                 Err(error) => {
                     failure.get_or_insert(error);
@@ -366,7 +395,7 @@ impl Survey {
     ) -> Result<Self, FrameError> {
         let sample = FrameSample::of_memory(name, particles, question)?;
         let mut totals = Totals::new();
-        totals.add(sample, question, question.up.unwrap_or(DVec3::Z));
+        totals.add(sample, question, question.up.unwrap_or(DVec3::Z), true);
         Ok(totals.finish(question, DVec3::Z))
     }
 }
@@ -406,6 +435,7 @@ impl Totals {
         Self {
             bounds: None,
             outermost: Outermost::default(),
+            standing: 0.0,
             cells: Vec::new(),
             spacings: Vec::new(),
             has_radii: false,
@@ -423,7 +453,8 @@ impl Totals {
         }
     }
 
-    fn add(&mut self, sample: FrameSample, question: Question, up: DVec3) {
+    /// Adds a frame, which the camera shows if it `is_framed`.
+    fn add(&mut self, sample: FrameSample, question: Question, up: DVec3, is_framed: bool) {
         self.frames += 1;
         self.origin = self.origin.and(sample.origin);
         let FrameSample {
@@ -444,7 +475,11 @@ impl Totals {
             (Some(before), Some(found)) => Some(before.and(found)),
             (before, found) => before.or(found),
         };
-        self.outermost.add(&raw.positions, count);
+        if is_framed {
+            self.outermost.add(&raw.positions, count);
+        }
+        let standing = standing(&sample_of(&raw.positions), count, up);
+        self.standing = self.standing.max(standing);
         let is_new = |cell: &SimulationCell| !self.cells.contains(cell);
         if let Some(cell) = raw.cell.filter(is_new) {
             self.cells.push(cell);
@@ -543,7 +578,9 @@ impl Totals {
             min,
             max,
             layers: self.bounds.map(|bounds| bounds.layers),
-            outline: self.outermost.outline(origin),
+            is_flat: flat_axis(min, max).is_some(),
+            standing: Some(self.standing),
+            outline: self.outermost.outline(question.fit, origin),
             cells: self.cells,
             radius: of_frames(&self.spacings, |spacing| Some(spacing.touching)),
             packed_radius: of_frames(&self.spacings, |spacing| spacing.packed),

@@ -1,5 +1,7 @@
 //! The particles at the outside of a sequence, for cameras that show all of it.
 
+use std::collections::HashSet;
+
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -25,6 +27,19 @@ const FEW: usize = 100;
 /// From that number on, at most one particle of this many is an outlier: more are a part of the picture.
 const MAX_OUTLIERS: usize = 100;
 
+/// Number of particles of a frame that are kept to find the outermost ones of all frames together.
+const KEPT: usize = 4096;
+
+/// Which particles an outline is about.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Fit {
+    /// All of each frame, except at most 1 % that are far from the others in it.
+    #[default]
+    All,
+    /// At least this part of those of all frames together. The others are left out if they are far from these.
+    Share(f64),
+}
+
 /// The outermost particles over a sequence.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Outline {
@@ -41,6 +56,15 @@ pub(super) struct Outermost {
     /// The outermost particle at the lower end of each axis and at the upper one, with its distance along the axis.
     ends: Vec<[End; 2]>,
     outliers: u64,
+    /// Some particles of each frame, for a share of all.
+    kept: Vec<Kept>,
+}
+
+/// Some particles of a frame.
+struct Kept {
+    points: Vec<DVec3>,
+    /// Number of particles that each of them stands for.
+    each: usize,
 }
 
 #[derive(Clone, Copy)]
@@ -56,15 +80,25 @@ impl Outermost {
         if sample.is_empty() {
             return;
         }
+        let points: Vec<DVec3> = sample_indices(sample.len(), KEPT)
+            .map(|i| sample[i])
+            .collect();
+        let each = count.div_ceil(points.len());
+        self.kept.push(Kept { points, each });
         let extent = |axis: &DVec3| {
-            let [low, high] = layers(&sample, *axis);
+            let [low, high] = layers(&sample, *axis, outside(sample.len()));
             high - low
         };
         let longest = DVec3::AXES.iter().map(extent).fold(0.0, f64::max);
         // A particle that is far from the others along one axis is an outlier on all
         let axes = || (0..AXES).into_par_iter().map(axis);
-        let found = axes().flat_map_iter(|axis| beyond(&sample, axis, longest));
-        let outliers = farthest(found.collect(), sample.len());
+        let tail = outside(sample.len());
+        let found = axes().flat_map_iter(|axis| beyond(&sample, axis, longest, tail));
+        let most = match sample.len() {
+            0..FEW => usize::MAX,
+            many => many / MAX_OUTLIERS,
+        };
+        let outliers = farthest(found.collect(), most);
         let each = count.div_ceil(sample.len()).max(1);
         self.outliers = self.outliers.max((outliers.len() * each) as u64);
         for index in outliers.into_iter().rev() {
@@ -87,8 +121,11 @@ impl Outermost {
         }
     }
 
-    /// The outline, relative to `origin`; `None` without a particle.
-    pub(super) fn outline(self, origin: DVec3) -> Option<Outline> {
+    /// The outline for `fit`, relative to `origin`; `None` without a particle.
+    pub(super) fn outline(mut self, fit: Fit, origin: DVec3) -> Option<Outline> {
+        if let Fit::Share(share) = fit {
+            self.keep(share);
+        }
         let mut points: Vec<Vec3> = Vec::new();
         for end in self.ends.into_iter().flatten() {
             let point = (end.point - origin).as_vec3();
@@ -101,14 +138,66 @@ impl Outermost {
     }
 }
 
-/// Positions along `axis` of the layers beyond which are only the outermost particles of a `sample`.
-fn layers(sample: &[DVec3], axis: DVec3) -> [f64; 2] {
+impl Outermost {
+    /// Finds the outermost particles of a `share` of all frames together.
+    fn keep(&mut self, share: f64) {
+        let all: Vec<DVec3> = self
+            .kept
+            .iter()
+            .flat_map(|frame| &frame.points)
+            .copied()
+            .collect();
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            clippy::cast_precision_loss,
+            reason = "a part of a sample"
+        )]
+        let most = ((1.0 - share.clamp(0.0, 1.0)) * all.len() as f64) as usize;
+        if most == 0 {
+            return;
+        }
+        // The layers must not be those of the particles that may be left out
+        let tail = (most * LAYER_SAMPLE.min(all.len()) / all.len()).max(outside(all.len()));
+        let extents = DVec3::AXES.map(|axis| {
+            let [low, high] = layers(&all, axis, tail);
+            high - low
+        });
+        let longest = extents.into_iter().fold(0.0, f64::max);
+        let axes = || (0..AXES).into_par_iter().map(axis);
+        let found = axes().flat_map_iter(|axis| beyond(&all, axis, longest, tail));
+        let outliers: HashSet<usize> = farthest(found.collect(), most).into_iter().collect();
+        let indices = 0..all.len();
+        let rest: Vec<DVec3> = indices
+            .filter(|i| !outliers.contains(i))
+            .map(|i| all[i])
+            .collect();
+        let mut first = 0;
+        self.outliers = 0;
+        for frame in &self.kept {
+            let own = first..first + frame.points.len();
+            let outside = own.clone().filter(|i| outliers.contains(i)).count();
+            self.outliers = self.outliers.max((outside * frame.each) as u64);
+            first = own.end;
+        }
+        self.ends = axes().filter_map(|axis| ends_along(&rest, axis)).collect();
+    }
+}
+
+/// Number of particles beyond a layer of the outermost ones of a sample of `count`.
+fn outside(count: usize) -> usize {
+    match count.min(LAYER_SAMPLE) / OUTSIDE {
+        0 => usize::from(count >= ESCAPE_MIN),
+        some => some,
+    }
+}
+
+/// Positions along `axis` of the layers beyond which are only the outermost particles of a `sample`, `outside` of
+/// [`LAYER_SAMPLE`].
+fn layers(sample: &[DVec3], axis: DVec3, outside: usize) -> [f64; 2] {
     let some = sample_indices(sample.len(), LAYER_SAMPLE);
     let mut along: Vec<f64> = some.map(|i| sample[i].dot(axis)).collect();
-    let outside = match along.len() / OUTSIDE {
-        0 => usize::from(along.len() >= ESCAPE_MIN),
-        some => some,
-    };
+    let outside = outside.min((along.len() - 1) / 2);
     let last = along.len() - 1;
     [outside, last - outside].map(|place| *along.select_nth_unstable_by(place, f64::total_cmp).1)
 }
@@ -123,8 +212,8 @@ struct Outlier {
 
 /// The particles of a `sample` that are far from the others along `axis`. `longest` is the longest side of the box of
 /// the others.
-fn beyond(sample: &[DVec3], axis: DVec3, longest: f64) -> Vec<Outlier> {
-    let [low, high] = layers(sample, axis);
+fn beyond(sample: &[DVec3], axis: DVec3, longest: f64, outside: usize) -> Vec<Outlier> {
+    let [low, high] = layers(sample, axis, outside);
     let margin = match sample.len() < FEW {
         true => longest,
         false => MARGIN * (high - low),
@@ -137,18 +226,18 @@ fn beyond(sample: &[DVec3], axis: DVec3, longest: f64) -> Vec<Outlier> {
     outliers.filter(|o| o.distance > margin).collect()
 }
 
-/// The indices of `outliers`, which may be there once for each axis, rising: of those of the farthest particles, if they
-/// are too many of `count`.
-fn farthest(mut outliers: Vec<Outlier>, count: usize) -> Vec<usize> {
+/// The indices of `outliers`, which may be there once for each axis, rising: those of the farthest particles, if there are
+/// more than `most`.
+fn farthest(mut outliers: Vec<Outlier>, most: usize) -> Vec<usize> {
     // Keep the axis along which a particle is farthest
     outliers.sort_unstable_by(|a, b| {
         let farther = b.distance.total_cmp(&a.distance);
         a.index.cmp(&b.index).then(farther)
     });
     outliers.dedup_by_key(|outlier| outlier.index);
-    if count >= FEW && outliers.len() > count / MAX_OUTLIERS {
+    if outliers.len() > most {
         outliers.sort_by(|a, b| b.distance.total_cmp(&a.distance));
-        outliers.truncate(count / MAX_OUTLIERS);
+        outliers.truncate(most);
         outliers.sort_unstable_by_key(|outlier| outlier.index);
     }
     outliers.into_iter().map(|outlier| outlier.index).collect()
@@ -191,7 +280,7 @@ mod tests {
         for frame in frames {
             outermost.add(&Positions::F64(frame.to_vec()), frame.len());
         }
-        outermost.outline(DVec3::ZERO).unwrap()
+        outermost.outline(Fit::All, DVec3::ZERO).unwrap()
     }
 
     fn doubles(outline: &Outline) -> Vec<DVec3> {
@@ -268,9 +357,45 @@ mod tests {
     }
 
     #[test]
+    fn fliers_of_some_frames_are_left_out_of_a_share_of_all() {
+        // A heap in ten frames; in one of them, 4 % of its particles fly far above it
+        let heap = ball(400);
+        let mut flying = heap.clone();
+        for point in &mut flying[..16] {
+            point.z += 12.0;
+        }
+        let outline = |fit| {
+            let mut outermost = Outermost::default();
+            for frame in 0..10 {
+                let points = if frame == 4 { &flying } else { &heap };
+                outermost.add(&Positions::F64(points.clone()), points.len());
+            }
+            outermost.outline(fit, DVec3::ZERO).unwrap()
+        };
+        let highest = |outline: &Outline| {
+            let heights = outline.points.iter().map(|p| p.z);
+            heights.fold(f32::NEG_INFINITY, f32::max)
+        };
+        assert!(highest(&outline(Fit::All)) > 11.0);
+        let most = outline(Fit::Share(0.99));
+        assert!(highest(&most) <= 1.0, "{}", highest(&most));
+        assert_eq!(most.outliers, 16);
+        // Nothing of a solid body is left out
+        let mut outermost = Outermost::default();
+        outermost.add(&Positions::F64(heap.clone()), heap.len());
+        assert_eq!(
+            outermost
+                .outline(Fit::Share(0.99), DVec3::ZERO)
+                .unwrap()
+                .outliers,
+            0
+        );
+    }
+
+    #[test]
     fn no_particles_have_no_outline() {
         let mut outermost = Outermost::default();
         outermost.add(&Positions::F64(vec![DVec3::NAN]), 1);
-        assert_eq!(outermost.outline(DVec3::ZERO), None);
+        assert_eq!(outermost.outline(Fit::All, DVec3::ZERO), None);
     }
 }

@@ -72,7 +72,7 @@ mod tests {
     use spherule_formats::{ParticleFrame, Positions, RawParticles, SequenceInput, native};
 
     use super::super::robust::spacing_of;
-    use super::super::{ColorQuestion, Question, RadiusQuestion, Survey};
+    use super::super::{ColorQuestion, Fit, Question, RadiusQuestion, Survey};
     use super::*;
 
     fn spacing(positions: &[Vec3]) -> Option<Spacing> {
@@ -160,6 +160,8 @@ mod tests {
                     up: None,
                     points: false,
                     selection: None,
+                    fit: Fit::All,
+                    framed: None,
                 },
             )
             .expect("readable")

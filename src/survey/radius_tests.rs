@@ -49,6 +49,8 @@ fn question(selection: Option<&Selection>) -> Question<'_> {
         up: None,
         points: false,
         selection,
+        fit: Fit::All,
+        framed: None,
     }
 }
 

@@ -190,6 +190,7 @@ fn requested_manifest(args: &CommonArgs) -> Result<JobManifest, CliError> {
         base: path.parent().map_or_else(PathBuf::new, Path::to_owned),
         file: Some(path.clone()),
         unchanged: Manifest::parse(&content, path).ok(),
+        source: None,
     })
 }
 

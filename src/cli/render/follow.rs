@@ -4,13 +4,14 @@ use spherule_formats::SequenceError;
 
 use super::run::Run;
 use crate::cli::job::JobArgs;
+use crate::cli::manifest_args::complete;
 use crate::cli::signals::SignalListener;
 use crate::cli::{CliError, Outcome};
 use crate::job::{FollowEnd, Follower, JobManifest};
 
 pub(super) fn run(
     args: &JobArgs,
-    requested: JobManifest,
+    mut requested: JobManifest,
     signals: &SignalListener,
 ) -> Result<Outcome, CliError> {
     if let Some(shard) = args.shard {
@@ -28,11 +29,13 @@ pub(super) fn run(
             stop_file.display()
         );
     }
-    let (sequence, _) = match follower.next()? {
+    let (mut sequence, _) = match follower.next()? {
         Ok(found) => found,
         Err(FollowEnd::Interrupted) => return Ok(Outcome::Interrupted),
         Err(end) => return Err(CliError::other(format!("found no complete frame: {end}"))),
     };
+    complete(&mut requested, &mut sequence, Some(args.mode()))?;
+    follower.keep_parts(requested.manifest.input.parts.clone());
     let mut run = Run::start(args, requested, sequence)?;
     Ok(match run.follow(&mut follower) {
         Ok(end) => {

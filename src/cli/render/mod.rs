@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::job::{JobArgs, use_threads};
-use super::manifest_args::{ManifestArgs, open_sequence};
+use super::manifest_args::{ManifestArgs, complete, open_sequence};
 use super::movie::MovieAfter;
 use super::signals::SignalListener;
 use super::{CliError, Outcome, events, signals};
@@ -83,14 +83,15 @@ pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
 /// Renders the frames that are there.
 fn run_once(
     args: &JobArgs,
-    requested: JobManifest,
+    mut requested: JobManifest,
     signals: &SignalListener,
 ) -> Result<Outcome, CliError> {
     let grace = requested.manifest.job.grace;
-    let sequence = open_sequence(&requested)?;
+    let mut sequence = open_sequence(&requested)?;
     for note in sequence.notes() {
         note!("{note}");
     }
+    complete(&mut requested, &mut sequence, Some(args.mode()))?;
     let mut run = Run::start(args, requested, sequence)?;
     let interrupt = signals.start_work_with_grace(grace);
     let result = run.render_pending(interrupt);

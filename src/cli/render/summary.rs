@@ -1,12 +1,13 @@
 //! Messages of a render: the resolved settings, and progress.
 
+use glam::DVec3;
 use serde_json::{Value, json};
 use spherule_formats::Sequence;
 
 use crate::cli::progress::ShowReport;
 use crate::pipeline::{self, RadiusRule, Setup};
 use crate::report::FrameReport;
-use crate::scene::RadiusTable;
+use crate::scene::{CameraPath, Projection, RadiusTable};
 use crate::surface::SurfaceKind;
 use crate::survey::{Survey, shown_name};
 
@@ -55,11 +56,8 @@ pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup:
         let shown = shown_name(name);
         match (map.range(), map.categories()) {
             (Some(([low, high], _)), _) => {
-                message!(
-                    "colour by `{shown}`, range {} to {}",
-                    short(low),
-                    short(high)
-                );
+                let [low, high] = [low, high].map(short);
+                message!("colour by `{shown}`, range {low} to {high} (--range {low} {high})");
             }
             (None, categories) => {
                 let count = categories.map_or(0, <[_]>::len);
@@ -74,7 +72,10 @@ pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup:
             rgb.encoding.name()
         );
     }
-    if survey.origin != glam::DVec3::ZERO {
+    if let Some(options) = view_options(setup) {
+        message!("camera: {options}");
+    }
+    if survey.origin != DVec3::ZERO {
         message!("origin {}: the particles are far from zero", survey.origin);
     }
 }
@@ -88,6 +89,27 @@ fn without_cell_hint(remark: String, is_cell_drawn: bool) -> String {
         remark.replace(CELL_HINT, "")
     } else {
         remark
+    }
+}
+
+/// The options that place a camera which stands still where it is; None for those that move, and panoramas.
+fn view_options(setup: &Setup) -> Option<String> {
+    let CameraPath::Still(view) = &setup.picture.path else {
+        return None;
+    };
+    let point = |p: DVec3| format!("[{},{},{}]", short(p.x), short(p.y), short(p.z));
+    let place = format!(
+        "--set 'camera.eye={}' --set 'camera.look_at={}'",
+        point(view.eye),
+        point(view.look_at)
+    );
+    match setup.picture.projection {
+        Projection::Perspective => Some(format!("{place} --set camera.fov={}", short(view.fov))),
+        Projection::Orthographic { height } => Some(format!(
+            "{place} --projection orthographic --set camera.height={}",
+            short(height)
+        )),
+        Projection::Equirectangular => None,
     }
 }
 
@@ -112,6 +134,7 @@ pub(in crate::cli) fn radius_text(setup: &Setup, survey: &Survey) -> String {
         RadiusRule::FileOr(radius) => {
             let radius = short(f64::from(*radius));
             let why = match (setup.picture.surface.kind, survey.packed_radius) {
+                (SurfaceKind::Spheres, _) if survey.is_flat => "large enough to cover the plane",
                 (SurfaceKind::Spheres, _) | (_, None) => "half the typical distance of neighbours",
                 (SurfaceKind::Union, _) => {
                     "from the particle density, enlarged so that spheres overlap"

@@ -1,5 +1,6 @@
 //! The projection of the camera, views along axes, and stereo pairs: their values, and which keys fit together.
 
+use glam::DVec3;
 use serde_json::{Value as Json, json};
 
 use super::{Camera, CameraMode};
@@ -9,7 +10,7 @@ use crate::manifest::reader::Section;
 use crate::manifest::value::{Fault, FlagKind, Value, named};
 use crate::scene::Convergence;
 use crate::scene::camera::DEFAULT_FOV;
-use crate::scene::framing::{DEFAULT_AZIMUTH, DEFAULT_ELEVATION};
+use crate::scene::framing::{DEFAULT_AZIMUTH, DEFAULT_ELEVATION, view_direction};
 
 named! {
     /// How the camera projects the scene onto the picture.
@@ -40,6 +41,18 @@ named! {
         Bottom = "bottom",
         /// Three sides at equal angles.
         Iso = "iso",
+        /// From the positive end of the x axis.
+        X = "x",
+        /// From the negative end of the x axis.
+        MinusX = "-x",
+        /// From the positive end of the y axis.
+        Y = "y",
+        /// From the negative end of the y axis.
+        MinusY = "-y",
+        /// From the positive end of the z axis.
+        Z = "z",
+        /// From the negative end of the z axis.
+        MinusZ = "-z",
     }
 }
 
@@ -48,9 +61,15 @@ named! {
 const ISOMETRIC_ELEVATION: f64 = 35.264_389_682_754_654;
 
 impl AxisView {
-    /// Azimuth and elevation in degrees.
-    pub const fn angles(self) -> [f64; 2] {
+    /// Azimuth and elevation in degrees; `up` is the direction up in the world.
+    pub fn angles(self, up: DVec3) -> [f64; 2] {
         match self {
+            Self::X => angles_of(DVec3::X, up),
+            Self::MinusX => angles_of(DVec3::NEG_X, up),
+            Self::Y => angles_of(DVec3::Y, up),
+            Self::MinusY => angles_of(DVec3::NEG_Y, up),
+            Self::Z => angles_of(DVec3::Z, up),
+            Self::MinusZ => angles_of(DVec3::NEG_Z, up),
             Self::Front => [0.0, 0.0],
             Self::Back => [180.0, 0.0],
             Self::Left => [-90.0, 0.0],
@@ -70,11 +89,24 @@ impl AxisView {
     }
 }
 
+/// Azimuth and elevation in degrees of a view from the side `from`.
+fn angles_of(from: DVec3, up: DVec3) -> [f64; 2] {
+    let up = up.normalize_or(DVec3::Z);
+    let height = from.dot(up).clamp(-1.0, 1.0);
+    if height.abs() > 1.0 - 1e-9 {
+        return [0.0, 90.0 * height.signum()];
+    }
+    // The directions from which azimuths of 0 and 90 degrees look
+    let [front, right] = [0.0, 90.0].map(|azimuth| -view_direction(up, azimuth, 0.0));
+    let azimuth = libm::atan2(from.dot(right), from.dot(front));
+    [azimuth.to_degrees(), libm::asin(height).to_degrees()]
+}
+
 impl Camera {
-    /// Azimuth and elevation of the automatic camera in degrees.
-    pub fn angles(&self) -> [f64; 2] {
+    /// Azimuth and elevation of the automatic camera in degrees; `up` is the direction up in the world.
+    pub fn angles(&self, up: DVec3) -> [f64; 2] {
         match self.view {
-            Some(view) => view.angles(),
+            Some(view) => view.angles(up),
             // The up direction is undefined for a view straight down; one degree makes no visible difference
             None => [
                 self.azimuth.unwrap_or(DEFAULT_AZIMUTH),
@@ -332,7 +364,10 @@ mod tests {
     fn cameras_have_a_projection() {
         let (plain, _) = read("").unwrap();
         assert_eq!(plain.camera.projection, ProjectionKind::Perspective);
-        assert_eq!(plain.camera.angles(), [DEFAULT_AZIMUTH, DEFAULT_ELEVATION]);
+        assert_eq!(
+            plain.camera.angles(DVec3::Z),
+            [DEFAULT_AZIMUTH, DEFAULT_ELEVATION]
+        );
         assert_eq!(plain.picture(), plain.image);
         for (rest, size) in [
             ("projection = \"orthographic\"\nheight = 2", [1920, 1080]),

@@ -17,8 +17,14 @@ pub const SCHEMA_FILE: &str = "job.schema.json";
 /// The schema of manifests (draft 2020-12).
 pub fn job_schema() -> Value {
     let entries = Manifest::examples().entries();
-    let mut properties = Map::new();
-    for section in sections(&entries).filter(|s| !s.contains('.')) {
+    let outside = entries
+        .list()
+        .iter()
+        .filter(|entry| entry.section.is_empty());
+    let mut properties: Map<_, _> = outside
+        .map(|entry| (entry.name().to_owned(), property(entry)))
+        .collect();
+    for section in sections(&entries).filter(|s| !s.is_empty() && !s.contains('.')) {
         let mut table = table(&entries, section);
         match section {
             "camera" => table["allOf"] = camera::conditions(),

@@ -49,6 +49,12 @@ impl Turntable {
         (turntable, height)
     }
 
+    /// The same with a field of view that is a function of the present one, degrees.
+    pub(super) fn with_fov(mut self, change: impl Fn(f64) -> f64) -> Self {
+        self.framing.fov = change(self.framing.fov);
+        self
+    }
+
     /// The view `after` frames after `frame`.
     pub(super) fn view(&self, frame: i64, after: f64) -> CameraView {
         let Framing { up, elevation, .. } = self.framing;

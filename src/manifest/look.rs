@@ -1,22 +1,32 @@
-//! Looks: named sets of defaults, which values in a manifest and options override.
+//! Looks: named sets of defaults, which values in a manifest and options override. Those of some looks depend on the
+//! particles and are found elsewhere (`defaults`).
 
-use spherule_formats::ValueError;
 use toml::Value;
 
 use super::Override;
-use super::nearest::nearest;
+use super::key::Affects;
+use super::keys::{Keys, keys};
+use super::tree::TomlNode;
+use super::value::{Named, named};
 
-/// A look, see the module.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Look {
-    /// Clear water on sand, under a clear sky.
-    Water,
-    /// Matte particles in a photo studio, with path tracing.
-    Studio,
-    /// The same in front of white, for print.
-    Paper,
-    /// The model of the thesis: lights without extent, ambient light and highlights.
-    Whitted,
+named! {
+    /// A look, see the module.
+    Look {
+        /// What the particles suggest, in front of white, with a legend: see `defaults`.
+        Auto = "auto",
+        /// The same without a legend.
+        Plain = "plain",
+        /// The same as `auto`.
+        Paper = "paper",
+        /// Matte particles in a grey photo studio, with path tracing.
+        Studio = "studio",
+        /// Clear water on sand, under a clear sky.
+        Water = "water",
+        /// The model of the thesis: lights without extent, ambient light and highlights.
+        Whitted = "whitted",
+        /// The defaults of the keys, whatever the particles are. Manifests that jobs write have it.
+        None = "none",
+    }
 }
 
 /// Water: one body with a smooth surface. Its colour comes from absorption, and its reflections from the sky; the sun
@@ -46,15 +56,7 @@ material.absorption = [0.42, 0.78, 0.86]
 /// A photo studio, whose light is the default environment.
 const STUDIO: &str = r#"
 render.integrator = "path"
-render.ground = "shadow_catcher"
 render.background = "studio"
-"#;
-
-/// White paper in the light of a studio.
-const PAPER: &str = r#"
-render.integrator = "path"
-render.ground = "shadow_catcher"
-render.background = [1.0, 1.0, 1.0]
 "#;
 
 /// The thesis's equation 4.1, without a ground.
@@ -91,34 +93,38 @@ fn settings(text: &str, shown: &str) -> impl Iterator<Item = Override> {
     sections.into_iter().flat_map(key).map(set)
 }
 
-impl Look {
-    /// All looks with their names.
-    pub const ALL: &[(Self, &'static str)] = &[
-        (Self::Water, "water"),
-        (Self::Studio, "studio"),
-        (Self::Paper, "paper"),
-        (Self::Whitted, "whitted"),
-    ];
+pub(super) fn keys(look: &mut Look, keys: &mut Keys<'_>) {
+    keys!(keys:
+        /// Defaults of the settings that are not given: auto | plain | paper | studio | water | whitted | none
+        ///
+        /// auto follows from the particles, in front of white, with a legend. plain has no legend; paper is the same as
+        /// auto. studio is a grey room, water clear water on sand, whitted the model of the thesis. none leaves the
+        /// defaults of the keys as this file has them.
+        look => *look, affects(Affects::Nothing), flag("look", "NAME", "Look");
+    );
+}
 
-    /// The look with a name.
-    ///
-    /// # Errors
-    /// The name is unknown; lists the known ones.
-    pub fn named(name: &str) -> Result<Self, ValueError> {
-        let found = Self::ALL.iter().find(|(_, known)| *known == name);
-        found.map(|(look, _)| *look).ok_or_else(|| {
-            let known: Vec<&str> = Self::ALL.iter().map(|(_, known)| *known).collect();
-            ValueError::one_of(&known, name).with_similar(nearest(name, &known))
-        })
+impl Look {
+    /// The look that the manifest in `tree` names, if it is known.
+    pub(super) fn of(tree: &TomlNode) -> Self {
+        let mut all = Self::names().into_iter();
+        let found = all.find(|(_, name)| tree.has_text(&["look"], name));
+        found.map_or(Self::Auto, |(look, _)| look)
+    }
+
+    /// Whether pictures have a legend unasked.
+    pub const fn has_legend(self) -> bool {
+        matches!(self, Self::Auto | Self::Paper)
     }
 
     /// Its defaults. `shown` is the name of their origin in messages: the option that selected the look.
-    pub fn settings(self, shown: &str) -> Vec<Override> {
+    pub(super) fn settings(self, shown: &str) -> Vec<Override> {
         let text = match self {
             Self::Water => WATER,
             Self::Studio => STUDIO,
-            Self::Paper => PAPER,
             Self::Whitted => WHITTED,
+            // These depend on the particles
+            Self::Auto | Self::Plain | Self::Paper | Self::None => return Vec::new(),
         };
         settings(text, shown).map(Override::under).collect()
     }
@@ -131,29 +137,23 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::manifest::{GroundKind, GroundPattern, GroundSetting, Manifest};
+    use crate::manifest::{GroundKind, GroundPattern, GroundSetting, Manifest, marked};
     use crate::render::IntegratorKind;
     use crate::scene::Background;
     use crate::surface::SurfaceKind;
 
     fn water(text: &str, sets: &[&str]) -> Manifest {
-        let sets = sets.iter().map(|set| Override::parse(set).unwrap());
-        let all = Look::Water
-            .settings("--look water")
-            .into_iter()
-            .chain(sets)
-            .collect();
-        Manifest::parse_with(text, Path::new("job.toml"), all).unwrap()
+        let sets = sets.iter().chain(&["look=water"]);
+        let sets = sets.map(|set| Override::parse(set).unwrap()).collect();
+        Manifest::parse_with(text, Path::new("job.toml"), sets).unwrap()
     }
 
     #[test]
     fn every_look_is_read() {
-        for (look, name) in Look::ALL {
-            assert_eq!(Look::named(name).unwrap(), *look);
-            let text = "input.path = \"data\"";
-            let manifest =
-                Manifest::parse_with(text, Path::new("job.toml"), look.settings("--look water"))
-                    .unwrap();
+        for (look, name) in Look::names() {
+            let text = format!("look = \"{name}\"\ninput.path = \"data\"");
+            let manifest = Manifest::parse(&text, Path::new("job.toml")).unwrap();
+            assert_eq!(manifest.look, look);
             let shown = manifest.to_commented_toml();
             assert_eq!(Manifest::parse(&shown, Path::new("x")).unwrap(), manifest);
         }
@@ -173,25 +173,17 @@ mod tests {
     }
 
     #[test]
-    fn studio_and_paper_trace_paths_above_a_shadow_catcher() {
+    fn a_studio_traces_paths() {
         let look = |look: Look, text: &str| {
-            let text = format!("input.path = \"data\"\n{text}");
-            Manifest::parse_with(&text, Path::new("job.toml"), look.settings("--look")).unwrap()
+            let text = format!("look = \"{}\"\ninput.path = \"data\"\n{text}", look.name());
+            Manifest::parse(&text, Path::new("job.toml")).unwrap()
         };
-        for (name, background) in [
-            (Look::Studio, Background::Studio { up: Vec3::Z }),
-            (Look::Paper, Background::Constant(Vec3::ONE)),
-        ] {
-            let plain = look(name, "").render;
-            assert_eq!(plain.integrator, Some(IntegratorKind::Path));
-            assert_eq!(
-                plain.ground,
-                Some(GroundSetting::of(GroundKind::ShadowCatcher))
-            );
-            assert_eq!(plain.background, Some(background));
-            // A source of light of the manifest's own
-            look(name, "environment.image = \"hall.exr\"");
-        }
+        let plain = look(Look::Studio, "").render;
+        assert_eq!(plain.integrator, Some(IntegratorKind::Path));
+        assert_eq!(plain.ground, None);
+        assert_eq!(plain.background, Some(Background::Studio { up: Vec3::Z }));
+        // A source of light of the manifest's own
+        look(Look::Studio, "environment.image = \"hall.exr\"");
         let own = look(
             Look::Studio,
             "render.integrator = \"whitted\"\nrender.ground = false",
@@ -218,12 +210,8 @@ mod tests {
         );
         // An error in the file is reported once, with its position.
         let wrong = "input.path = \"data\"\nrender = 3";
-        let error = Manifest::parse_with(
-            wrong,
-            Path::new("job.toml"),
-            Look::Water.settings("--look water"),
-        );
-        let error = error.unwrap_err();
+        let look = vec![Override::parse("look=water").unwrap()];
+        let error = Manifest::parse_with(wrong, Path::new("job.toml"), look).unwrap_err();
         assert_eq!(error.messages().len(), 1, "{error}");
         assert!(error.to_string().contains("line 2"), "{error}");
     }
@@ -249,11 +237,26 @@ mod tests {
 
     #[test]
     fn unknown_look_lists_the_known_ones() {
-        let error = Look::named("watre").unwrap_err();
-        assert_eq!(
-            error.to_string(),
-            "expected one of water, studio, paper, whitted, found \"watre\"; did you mean water?"
+        let text = "look = \"watre\"\ninput.path = \"data\"";
+        let error = Manifest::parse(text, Path::new("job.toml"))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("look: expected one of auto, plain, paper, studio, water"),
+            "{error}"
         );
-        assert_eq!(Look::named("lava").unwrap_err().similar, None);
+        assert!(error.ends_with("did you mean water?"), "{error}");
+    }
+
+    #[test]
+    fn manifests_of_jobs_have_no_look() {
+        let text = "input.path = \"data\"";
+        let look = |text: &str| Manifest::parse(text, Path::new("job.toml")).unwrap().look;
+        assert_eq!(look(text), Look::Auto);
+        assert_eq!(look(&marked(text)), Look::None);
+        assert_eq!(
+            look(&marked(&format!("look = \"studio\"\n{text}"))),
+            Look::Studio
+        );
     }
 }

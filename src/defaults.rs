@@ -1,0 +1,441 @@
+//! Defaults that follow from what the files say: colours and radii of elements, categories, walls, cells, floors, flat
+//! data. Each rule gives settings under those of the manifest and its look, so that naming a key overrides it, and a
+//! line that says what it did. `docs/manual/defaults.md` lists the rules.
+
+use glam::DVec3;
+use spherule_formats::sequence::PART_ATTRIBUTE;
+use toml::Value;
+
+use crate::manifest::{
+    CameraMode, ColorSetting, Look, Manifest, ManifestSource, Override, ProjectionKind,
+};
+use crate::render::IntegratorKind;
+use crate::survey::{Category, ELEMENT, Facts};
+
+mod parts;
+mod planned;
+
+pub use parts::{Walls, walls};
+pub use planned::planned;
+
+/// The keys that rules set, except overlays. A job that goes on has the values of its plan.
+const KEYS: [&str; 17] = [
+    "input.radius",
+    "input.parts",
+    "select.where",
+    "camera.projection",
+    "camera.view",
+    "camera.azimuth",
+    "camera.elevation",
+    "camera.fov",
+    "render.background",
+    "render.ground",
+    "render.integrator",
+    COLOR,
+    "material.ambient",
+    "material.diffuse",
+    "material.specular",
+    "cell.visible",
+    "bonds.find",
+];
+
+/// The key of the colours of particles.
+const COLOR: &str = "material.color";
+
+/// The colour of particles of which nothing is known, linear RGB: light, so that their shading shows their form.
+const NEUTRAL: [f64; 3] = [0.42, 0.47, 0.54];
+
+/// Vertical field of view in degrees. A long lens keeps parallel edges nearly parallel.
+const FOV: f64 = 25.0;
+
+/// The side from which cells are seen, degrees: three faces show, and their edges remain nearly upright.
+const CELL_VIEW: [f64; 2] = [20.0, 12.0];
+
+/// A cell is drawn if the particles extend along at least this part of its longest edge; in a larger one they would be
+/// small.
+const FILLED: f64 = 0.4;
+
+/// The part of the particles that must be in a cell that is drawn: those of a molecule that was made whole, or moved, are
+/// not.
+const INSIDE: f64 = 0.9;
+
+/// Height of the text of a legend as a fraction of the picture.
+const TEXT_SIZE: f64 = 0.032;
+
+/// Smaller pictures, in pixels of their shorter side, have no legend: its text could not be read.
+const LEAST_SIDE: u32 = 240;
+
+/// What a rule did.
+#[derive(Debug, Clone)]
+pub struct Rule {
+    /// The settings.
+    pub settings: Vec<Override>,
+    /// One line for the user; none if nothing needs to be said.
+    pub line: Option<String>,
+}
+
+/// Applies the rules to a manifest.
+struct Rules<'a> {
+    manifest: &'a Manifest,
+    source: &'a ManifestSource,
+    facts: &'a Facts,
+    files: Files<'a>,
+    found: Vec<Rule>,
+}
+
+/// What the files say beside the facts of a frame.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Files<'a> {
+    /// Names of the parts of a step, by the numbers in the attribute `part`.
+    pub parts: &'a [String],
+    /// Whether y is up, and not z.
+    pub is_y_up: bool,
+}
+
+/// The rules that act on particles with these `facts` from `files`, for the manifest that `source` gives.
+pub fn rules(
+    manifest: &Manifest,
+    source: &ManifestSource,
+    facts: &Facts,
+    files: Files<'_>,
+) -> Vec<Rule> {
+    let mut rules = Rules {
+        manifest,
+        source,
+        facts,
+        files,
+        found: Vec::new(),
+    };
+    if matches!(manifest.look, Look::None | Look::Whitted) || facts.particles == 0 {
+        return rules.found;
+    }
+    let left_out = rules.leave_out();
+    rules.elements();
+    rules.categories(&left_out);
+    rules.neutral();
+    rules.cell();
+    rules.floor();
+    rules.flat();
+    if rules.is_white() {
+        rules.white();
+    }
+    rules.legend();
+    rules.found
+}
+
+impl Rules<'_> {
+    /// Whether neither the manifest nor a rule so far gives a value of `key`.
+    fn lacks(&self, key: &str) -> bool {
+        let mut set = self.found.iter().flat_map(|rule| &rule.settings);
+        self.source.lacks(key) && !set.any(|setting| setting.is_in(key))
+    }
+
+    /// Sets those of the keys that are missing. The `line` is said if there is one.
+    fn set<const N: usize>(&mut self, settings: [(&str, Value); N], line: Option<String>) {
+        let free = settings.into_iter().filter(|(key, _)| self.lacks(key));
+        let settings: Vec<Override> = free
+            .filter_map(|(key, value)| Override::new(key, value, "the defaults").ok())
+            .collect();
+        if !settings.is_empty() {
+            self.found.push(Rule { settings, line });
+        }
+    }
+
+    /// Whether the picture is in front of white.
+    fn is_white(&self) -> bool {
+        let is_own = matches!(self.manifest.look, Look::Auto | Look::Plain | Look::Paper);
+        is_own && self.manifest.integrator() == IntegratorKind::Path
+    }
+
+    /// Leaves out virtual sites, and particles at rest around others that move.
+    fn leave_out(&mut self) -> Vec<(String, Vec<i64>)> {
+        let mut left_out = Vec::new();
+        if self
+            .facts
+            .elements
+            .is_some_and(|elements| elements.has_others)
+        {
+            let line = "left out: virtual sites and other particles that are no atoms (--where 'element >= 0' \
+                        shows them)";
+            self.set(
+                [("select.where", "element >= 1 && element <= 118".into())],
+                Some(line.to_owned()),
+            );
+        }
+        let is_molecular = self.facts.elements.is_some() || self.is_periodic();
+        let category = self.facts.categories.iter().find(|c| !c.at_rest.is_empty());
+        if let Some(Category { name, at_rest, .. }) = category.filter(|_| !is_molecular) {
+            let all: Vec<String> = at_rest.iter().map(|v| format!("{name} != {v}")).collect();
+            let values: Vec<String> = at_rest.iter().map(i64::to_string).collect();
+            let line = format!(
+                "left out: particles with {name} {}, which rest around the others (--where '{name} >= {}' shows them)",
+                values.join(", "),
+                at_rest.first().copied().unwrap_or_default()
+            );
+            if self.lacks("select.where") {
+                left_out.push((name.clone(), at_rest.clone()));
+            }
+            self.set([("select.where", all.join(" && ").into())], Some(line));
+        }
+        left_out
+    }
+
+    /// Elements have their colours and radii, and the bonds of the file are drawn.
+    fn elements(&mut self) {
+        if self.facts.has_bonds {
+            let line = "bonds of the file are drawn (--bonds none leaves them out)";
+            self.set([("bonds.find", "file".into())], Some(line.to_owned()));
+        }
+        if self.facts.elements.is_none() {
+            return;
+        }
+        let has_bonds = self.facts.has_bonds && self.source.lacks("bonds.find");
+        let mut radius = toml::Table::new();
+        radius.insert("attribute".to_owned(), ELEMENT.into());
+        let (radius, name): (Value, _) = match has_bonds {
+            true => {
+                radius.insert("table".to_owned(), "covalent".into());
+                radius.insert("scale".to_owned(), 0.5.into());
+                (radius.into(), "half their covalent radii")
+            }
+            false => ("vdw".into(), "their van der Waals radii"),
+        };
+        if self.has_open_colors() {
+            let line = "elements have their usual colours (--color-by gives others)";
+            self.set(
+                [
+                    ("material.color.attribute", ELEMENT.into()),
+                    ("material.color.map", "jmol".into()),
+                    ("material.color.scale", "categorical".into()),
+                ],
+                Some(line.to_owned()),
+            );
+        }
+        if !self.facts.has_radii {
+            let line = format!("elements have {name} (--radius gives another)");
+            self.set([("input.radius", radius)], Some(line));
+        }
+    }
+
+    /// Few integers are categories.
+    fn categories(&mut self, left_out: &[(String, Vec<i64>)]) {
+        let remaining = |category: &&Category| {
+            let gone = left_out.iter().find(|(name, _)| *name == category.name);
+            category.values.len() - gone.map_or(0, |(_, values)| values.len()) > 1
+        };
+        let Some(category) = self.facts.categories.iter().find(remaining) else {
+            return;
+        };
+        if self.facts.elements.is_none() && !self.facts.has_colors && self.has_open_colors() {
+            let line = format!(
+                "coloured by `{}`, {} categories (--color-by gives another value)",
+                category.name,
+                category.values.len()
+            );
+            self.set(
+                [
+                    ("material.color.attribute", category.name.clone().into()),
+                    ("material.color.scale", "categorical".into()),
+                ],
+                Some(line),
+            );
+            if category.name == PART_ATTRIBUTE && self.files.parts.len() > 1 {
+                let names = self.files.parts.iter().enumerate();
+                let names = names.map(|(number, name)| (number.to_string(), name.clone().into()));
+                let names: toml::Table = names
+                    .filter(|(number, _)| category.values.iter().any(|v| v.to_string() == *number))
+                    .collect();
+                self.set([("material.color.names", names.into())], None);
+            }
+        }
+    }
+
+    /// Whether no value or colour is given for the particles; a map may be.
+    fn has_open_colors(&self) -> bool {
+        match &self.manifest.material.color {
+            ColorSetting::Auto => self.lacks(COLOR),
+            ColorSetting::Mapped(by) => by.attribute.is_none(),
+            ColorSetting::Rgb(_) => false,
+        }
+    }
+
+    /// Particles of which nothing is known have a neutral colour.
+    fn neutral(&mut self) {
+        let is_unknown = !self.facts.has_velocities && !self.facts.has_colors;
+        if is_unknown && self.manifest.look != Look::Water {
+            let color = NEUTRAL.map(Value::from).to_vec();
+            self.set([(COLOR, color.into())], None);
+        }
+    }
+
+    fn is_periodic(&self) -> bool {
+        let cell = self.facts.cell.as_ref();
+        cell.is_some_and(|cell| cell.periodic.contains(&true))
+    }
+
+    /// A simulation cell is drawn without perspective.
+    fn cell(&mut self) {
+        let (Some(cell), Some((min, max))) = (&self.facts.cell, self.facts.bounds) else {
+            return;
+        };
+        let longest = cell.vectors.iter().map(|v| v.length()).fold(0.0, f64::max);
+        if (max - min).max_element() < FILLED * longest || self.facts.in_cell < INSIDE {
+            return;
+        }
+        let line =
+            "the simulation cell of the file is drawn (--set cell.visible=false leaves it out)";
+        self.set([("cell.visible", true.into())], Some(line.to_owned()));
+        if self.is_placed_automatically() && self.facts.flat_axis().is_none() {
+            let [azimuth, elevation] = CELL_VIEW;
+            if self.lacks("camera.view") {
+                self.set(
+                    [
+                        ("camera.azimuth", azimuth.into()),
+                        ("camera.elevation", elevation.into()),
+                    ],
+                    None,
+                );
+            }
+            let line = "drawn without perspective (--projection perspective)";
+            self.set(
+                [("camera.projection", "orthographic".into())],
+                Some(line.to_owned()),
+            );
+        }
+    }
+
+    /// Molecules and periodic cells stand on nothing.
+    fn floor(&mut self) {
+        if self.facts.elements.is_some() || self.is_periodic() {
+            self.set([("render.ground", "none".into())], None);
+        }
+    }
+
+    /// White behind the particles, and a long lens.
+    fn white(&mut self) {
+        let white: Value = vec![Value::from(1.0); 3].into();
+        self.set([("render.background", white)], None);
+        if self.is_placed_automatically()
+            && self.manifest.camera.projection == ProjectionKind::Perspective
+            && !self
+                .found
+                .iter()
+                .flat_map(|rule| &rule.settings)
+                .any(|s| s.is_of("camera.projection"))
+        {
+            self.set([("camera.fov", FOV.into())], None);
+        }
+    }
+
+    fn is_placed_automatically(&self) -> bool {
+        matches!(
+            self.manifest.camera.mode,
+            CameraMode::Auto | CameraMode::Turntable
+        )
+    }
+
+    /// Two-dimensional data are seen from the front, in flat light.
+    fn flat(&mut self) {
+        let (Some(axis), true) = (self.facts.flat_axis(), self.is_placed_automatically()) else {
+            return;
+        };
+        let usual = match self.files.is_y_up {
+            true => DVec3::Y,
+            false => DVec3::Z,
+        };
+        let own = self
+            .manifest
+            .input
+            .up
+            .map(|up| DVec3::from_array(up.vector()));
+        let side = side_along(axis, own.unwrap_or(usual));
+        if self.lacks("camera.azimuth") && self.lacks("camera.elevation") {
+            self.set([("camera.view", side.into())], None);
+        }
+        let line = format!(
+            "the particles lie in a plane: seen from the {side} in flat light (--view and --integrator path give \
+             others)"
+        );
+        self.set(
+            [
+                ("camera.projection", "orthographic".into()),
+                ("render.ground", "none".into()),
+            ],
+            Some(line),
+        );
+        if self.is_white() && self.lacks("render.integrator") && self.has_plain_material() {
+            self.set(
+                [
+                    ("render.integrator", "whitted".into()),
+                    ("material.ambient", 1.0.into()),
+                    ("material.diffuse", 0.0.into()),
+                    ("material.specular", 0.0.into()),
+                ],
+                None,
+            );
+        }
+    }
+
+    /// Whether nothing of the material but its colour is given.
+    fn has_plain_material(&self) -> bool {
+        let mut plain = Manifest::new("").material;
+        plain.color.clone_from(&self.manifest.material.color);
+        plain == self.manifest.material
+    }
+
+    /// A legend of the colours, and the time.
+    fn legend(&mut self) {
+        let [width, height] = self.manifest.image.size();
+        let is_plain = self.manifest.camera.projection != ProjectionKind::Equirectangular
+            && !self.manifest.camera.stereo
+            && self.manifest.image.crop.is_none();
+        if !self.manifest.look.has_legend() || !is_plain || width.min(height) < LEAST_SIDE {
+            return;
+        }
+        let mut overlays = Vec::new();
+        let item = |kind: &str| {
+            let mut table = toml::Table::new();
+            table.insert("type".to_owned(), kind.into());
+            table.insert("size".to_owned(), TEXT_SIZE.into());
+            Value::from(table)
+        };
+        if self.has_mapped_colors() {
+            overlays.push(item("colorbar"));
+        }
+        if self.facts.has_time {
+            overlays.push(item("text"));
+        }
+        if !overlays.is_empty() {
+            self.set([("overlay", overlays.into())], None);
+        }
+    }
+
+    /// Whether the colours are those of a map.
+    fn has_mapped_colors(&self) -> bool {
+        let mut set = self.found.iter().flat_map(|rule| &rule.settings);
+        match &self.manifest.material.color {
+            ColorSetting::Rgb(_) => false,
+            ColorSetting::Mapped(_) => true,
+            ColorSetting::Auto => {
+                set.any(|setting| setting.is_of("material.color.attribute"))
+                    || self.facts.has_velocities
+            }
+        }
+    }
+}
+
+/// The side from which a plane without extent along `axis` is seen.
+fn side_along(axis: usize, up: DVec3) -> &'static str {
+    if up[axis] != 0.0 {
+        return "top";
+    }
+    // The front looks along y if z is up, and along z if y is up
+    let is_front = match up.y != 0.0 {
+        true => axis == 2,
+        false => axis == 1,
+    };
+    if is_front { "front" } else { "right" }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,248 @@
+use std::path::Path;
+
+use spherule_formats::SimulationCell;
+
+use super::*;
+use crate::manifest::{AxisView, BondSearch, OverlayKind, RadiusSetting};
+use crate::survey::Elements;
+
+/// Facts of a thousand particles in a unit cube of which nothing else is known.
+fn facts() -> Facts {
+    Facts {
+        particles: 1000,
+        bounds: Some((DVec3::ZERO, DVec3::ONE)),
+        ..Facts::default()
+    }
+}
+
+fn category(name: &str, values: &[i64], at_rest: &[i64]) -> Category {
+    Category {
+        name: name.to_owned(),
+        values: values.to_vec(),
+        at_rest: at_rest.to_vec(),
+    }
+}
+
+/// The manifest of `text` with the defaults that follow from `facts`, and the lines of the rules.
+fn completed(text: &str, facts: &Facts, files: Files<'_>) -> (Manifest, String) {
+    let text = format!("input.path = \"data\"\n{text}");
+    // Keys before all tables
+    let text = match text.split_once("look") {
+        Some((before, after)) => format!("look{after}\n{before}"),
+        None => text,
+    };
+    let source = ManifestSource::new(text, Path::new("job.toml"), Vec::new());
+    let (manifest, _) = source.parse().unwrap();
+    let mut lines = Vec::new();
+    let mut layers = Vec::new();
+    for rule in rules(&manifest, &source, facts, files) {
+        lines.extend(rule.line);
+        layers.extend(rule.settings);
+    }
+    (source.parse_over(layers).unwrap(), lines.join("\n"))
+}
+
+fn of(text: &str, facts: &Facts) -> Manifest {
+    completed(text, facts, Files::default()).0
+}
+
+fn attribute(manifest: &Manifest) -> Option<&str> {
+    match &manifest.material.color {
+        ColorSetting::Mapped(by) => by.attribute.as_deref(),
+        _ => None,
+    }
+}
+
+fn has_legend(manifest: &Manifest) -> bool {
+    let mut overlays = manifest.overlays.iter();
+    overlays.any(|overlay| matches!(overlay.kind, OverlayKind::ColorBar { .. }))
+}
+
+#[test]
+fn elements_have_their_colours_and_radii() {
+    let mut atoms = facts();
+    atoms.elements = Some(Elements { has_others: true });
+    atoms.has_velocities = true;
+    atoms.has_time = true;
+    let (manifest, lines) = completed("", &atoms, Files::default());
+    assert_eq!(attribute(&manifest), Some("element"));
+    assert!(matches!(manifest.input.radius, RadiusSetting::Table { scale, .. } if scale == 1.0));
+    assert!(
+        manifest.select.condition.is_some() && lines.contains("virtual sites"),
+        "{lines}"
+    );
+    assert!(has_legend(&manifest) && manifest.overlays.len() == 2);
+    assert_eq!(
+        manifest.render.ground.map(|g| g.kind),
+        Some(crate::manifest::GroundKind::None)
+    );
+    // With bonds
+    atoms.has_bonds = true;
+    let bonded = of("", &atoms);
+    assert_eq!(bonded.bonds.find, BondSearch::File);
+    assert!(matches!(bonded.input.radius, RadiusSetting::Table { scale, .. } if scale == 0.5));
+    // Whatever is named stays
+    let own = of(
+        "input.radius = 0.3\n[bonds]\nfind = \"none\"\n[material]\ncolor = [1, 0, 0]\n[select]\nwhere = \"z > 0\"",
+        &atoms,
+    );
+    assert_eq!(own.input.radius, RadiusSetting::Length(0.3));
+    assert_eq!(own.bonds.find, BondSearch::None);
+    assert!(attribute(&own).is_none() && !has_legend(&own));
+    // A map alone is that of the elements
+    let mapped = of("material.color.map = \"tol-muted\"", &atoms);
+    assert_eq!(attribute(&mapped), Some("element"));
+}
+
+#[test]
+fn categories_come_before_speed_and_walls_are_left_out() {
+    let mut fluid = facts();
+    fluid.has_velocities = true;
+    assert!(matches!(of("", &fluid).material.color, ColorSetting::Auto));
+    assert!(has_legend(&of("", &fluid)));
+    fluid.categories = vec![category("type", &[0, 1, 3], &[])];
+    assert_eq!(attribute(&of("", &fluid)), Some("type"));
+    // One type remains: it has the colours of its speed
+    fluid.categories = vec![category("type", &[0, 1, 3], &[0, 3])];
+    let (manifest, lines) = completed("", &fluid, Files::default());
+    assert_eq!(attribute(&manifest), None);
+    let condition = manifest.select.condition.map(|c| c.to_string());
+    assert_eq!(condition.as_deref(), Some("type != 0 && type != 3"));
+    assert!(
+        lines.contains("left out: particles with type 0, 3"),
+        "{lines}"
+    );
+    // Frozen atoms are no walls
+    fluid.elements = Some(Elements { has_others: false });
+    assert!(of("", &fluid).select.condition.is_none());
+}
+
+#[test]
+fn parts_have_their_names_in_the_legend() {
+    let mut two = facts();
+    two.categories = vec![category("part", &[0, 2], &[])];
+    let parts = ["water", "wall", "ship"].map(str::to_owned);
+    let files = Files {
+        parts: &parts,
+        is_y_up: false,
+    };
+    let (manifest, _) = completed("", &two, files);
+    let ColorSetting::Mapped(by) = &manifest.material.color else {
+        panic!("no map");
+    };
+    let names = by.names.as_ref().expect("names");
+    assert_eq!(names.0, [(0, "water".to_owned()), (2, "ship".to_owned())]);
+}
+
+#[test]
+fn cells_are_drawn_if_the_particles_fill_them() {
+    let cell = |edge: f64| {
+        let edges = DVec3::AXES.map(|axis| edge * axis);
+        SimulationCell::new(DVec3::ZERO, edges, [true; 3]).expect("a cell")
+    };
+    let mut crystal = facts();
+    crystal.cell = Some(cell(1.0));
+    crystal.in_cell = 1.0;
+    let manifest = of("", &crystal);
+    assert!(manifest.cell.visible);
+    assert_eq!(manifest.camera.projection, ProjectionKind::Orthographic);
+    assert_eq!(manifest.camera.angles(DVec3::Z), CELL_VIEW);
+    let side = of("camera.view = \"front\"", &crystal);
+    assert_eq!(side.camera.view, Some(AxisView::Front));
+    for (edge, in_cell) in [(10.0, 1.0), (1.0, 0.5)] {
+        crystal.cell = Some(cell(edge));
+        crystal.in_cell = in_cell;
+        assert!(!of("", &crystal).cell.visible, "{edge} {in_cell}");
+    }
+}
+
+#[test]
+fn planes_are_seen_from_their_front_in_flat_light() {
+    let mut plane = facts();
+    for (max, is_y_up, side) in [
+        (DVec3::new(1.0, 0.0, 1.0), false, AxisView::Front),
+        (DVec3::new(1.0, 1.0, 0.0), false, AxisView::Top),
+        (DVec3::new(1.0, 1.0, 0.0), true, AxisView::Front),
+        (DVec3::new(0.0, 1.0, 1.0), true, AxisView::Right),
+    ] {
+        plane.bounds = Some((DVec3::ZERO, max));
+        let files = Files {
+            is_y_up,
+            ..Files::default()
+        };
+        let (manifest, _) = completed("", &plane, files);
+        assert_eq!(manifest.camera.view, Some(side), "{max}");
+        assert_eq!(manifest.integrator(), IntegratorKind::Whitted);
+        assert_eq!(manifest.camera.projection, ProjectionKind::Orthographic);
+    }
+    // Nor is anything but the light of a material that is given
+    let glass = of("material.transmission = 1", &plane);
+    assert_eq!(glass.material.constants.transmission, 1.0);
+    assert_ne!(glass.material.constants.ambient, 1.0);
+}
+
+#[test]
+fn looks_have_their_own_rules() {
+    let mut fluid = facts();
+    fluid.has_velocities = true;
+    let white = Some(crate::scene::Background::Constant(glam::Vec3::ONE));
+    assert_eq!(of("", &fluid).render.background, white);
+    assert_eq!(of("", &fluid).camera.fov, FOV);
+    let plain = of("look = \"plain\"", &fluid);
+    assert!(plain.render.background == white && plain.overlays.is_empty());
+    assert_ne!(of("look = \"studio\"", &fluid).render.background, white);
+    for look in ["none", "whitted"] {
+        let manifest = of(&format!("look = \"{look}\""), &fluid);
+        let bare = Manifest::new("data").camera;
+        assert!(
+            manifest.camera == bare && manifest.overlays.is_empty(),
+            "{look}"
+        );
+    }
+    // Small pictures have no legend, and cameras that are placed keep their lens
+    assert!(
+        of("image.width = 200\nimage.height = 100", &fluid)
+            .overlays
+            .is_empty()
+    );
+    let placed = of(
+        "camera.eye = [0, -9, 0]\ncamera.look_at = [0, 0, 0]",
+        &fluid,
+    );
+    assert_eq!(placed.camera.fov, Manifest::new("").camera.fov);
+    // Nothing is known of no particles
+    let nothing = of("", &Facts::default());
+    assert_eq!(nothing, of("look = \"auto\"", &Facts::default()));
+}
+
+#[test]
+fn jobs_that_go_on_have_the_defaults_of_their_plan() {
+    let mut atoms = facts();
+    atoms.elements = Some(Elements { has_others: true });
+    atoms.has_time = true;
+    let begun = of("", &atoms);
+    for text in [
+        "",
+        "material.color.map = \"tol-muted\"",
+        "image.samples = 4",
+    ] {
+        let begun = of(text, &atoms);
+        let source = ManifestSource::new(
+            format!("input.path = \"data\"\n{text}"),
+            Path::new("job.toml"),
+            Vec::new(),
+        );
+        let resumed = source
+            .parse_over(planned(&source, &begun.settings()))
+            .unwrap();
+        assert_eq!(resumed.settings(), begun.settings(), "{text}");
+    }
+    // A job of an earlier version: without rules
+    let source = ManifestSource::new("input.path = \"data\"", Path::new("x"), Vec::new());
+    let (plain, _) = source.parse().unwrap();
+    let resumed = source
+        .parse_over(planned(&source, &plain.settings()))
+        .unwrap();
+    assert_eq!(resumed.settings(), plain.settings());
+    assert_ne!(begun.settings(), plain.settings());
+}

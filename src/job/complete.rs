@@ -1,0 +1,85 @@
+//! Completes a manifest with the defaults that follow from its particles.
+
+use spherule_formats::sequence::Sequence;
+use spherule_jobs::{Job, ResumeMode};
+
+use super::manifest_file::JobManifest;
+use super::{RunError, in_thread};
+use crate::defaults::{Files, planned, rules, walls};
+use crate::manifest::{Look, ManifestSource, Override, real_dir};
+use crate::survey::Facts;
+
+impl JobManifest {
+    /// Completes the manifest with the defaults that follow from the particles of `sequence`, from which walls are left
+    /// out; a job that goes on in `mode` keeps those of its plan. Afterwards the manifest has no look. Returns a line for
+    /// each rule that has something to say.
+    ///
+    /// # Errors
+    /// The plan of an existing job cannot be read, or the defaults contradict the manifest.
+    pub fn complete(
+        &mut self,
+        sequence: &mut Sequence,
+        mode: Option<ResumeMode>,
+    ) -> Result<Vec<String>, RunError> {
+        let Some(source) = self.source.clone() else {
+            return Ok(Vec::new());
+        };
+        if self.manifest.look == Look::None {
+            return Ok(Vec::new());
+        }
+        let plan = match mode {
+            Some(ResumeMode::Force) | None => None,
+            Some(_) => {
+                let dir = self.absolute_base()?.join(self.manifest.output.path.dir());
+                Job::read_plan(&real_dir(&dir))?
+            }
+        };
+        let mut lines = Vec::new();
+        let layers = match plan {
+            Some(plan) => planned(&source, plan.settings()),
+            None => self.defaults(&source, sequence, &mut lines)?,
+        };
+        let mut manifest = source.parse_over(layers)?;
+        if let Some(parts) = manifest
+            .input
+            .parts
+            .as_ref()
+            .filter(|_| source.lacks("input.parts"))
+        {
+            sequence.keep_parts(parts)?;
+        }
+        manifest.look = Look::None;
+        self.manifest = manifest;
+        Ok(lines)
+    }
+
+    fn defaults(
+        &self,
+        source: &ManifestSource,
+        sequence: &mut Sequence,
+        lines: &mut Vec<String>,
+    ) -> Result<Vec<Override>, RunError> {
+        let mut layers = Vec::new();
+        // The facts are those of what is drawn
+        let found = walls(sequence.part_names()).filter(|_| source.lacks("input.parts"));
+        if let Some(walls) = found.filter(|_| self.manifest.look != Look::Whitted) {
+            lines.push(format!(
+                "left out: {}, walls by name (--parts {} shows them)",
+                walls.left_out.join(", "),
+                sequence.part_names().join(",")
+            ));
+            sequence.keep_parts(&walls.kept)?;
+            layers.extend(Override::new("input.parts", walls.kept, "the defaults"));
+        }
+        let facts = in_thread(|| Facts::of(sequence));
+        let files = Files {
+            parts: sequence.part_names(),
+            is_y_up: sequence.is_y_up(),
+        };
+        for rule in rules(&self.manifest, source, &facts, files) {
+            lines.extend(rule.line);
+            layers.extend(rule.settings);
+        }
+        Ok(layers)
+    }
+}

@@ -1,0 +1,55 @@
+//! What a manifest was read from, so that it can be read again with other defaults.
+
+use std::path::{Path, PathBuf};
+
+use super::tree::TomlNode;
+use super::{Manifest, ManifestError, Override, lay_over};
+
+/// The text of a manifest, and the values that replace or complete it.
+#[derive(Debug, Clone)]
+pub struct ManifestSource {
+    text: String,
+    /// For messages.
+    path: PathBuf,
+    overrides: Vec<Override>,
+}
+
+impl ManifestSource {
+    /// `text` from the file `path`, which is only used for messages, with `overrides` in order. The text may be empty.
+    pub fn new(text: impl Into<String>, path: &Path, overrides: Vec<Override>) -> Self {
+        Self {
+            text: text.into(),
+            path: path.to_owned(),
+            overrides,
+        }
+    }
+
+    /// The manifest, with warnings about obsolete forms.
+    ///
+    /// # Errors
+    /// Same as [`Manifest::parse_with`].
+    pub fn parse(&self) -> Result<(Manifest, Vec<String>), ManifestError> {
+        Manifest::parse_with_warnings(&self.text, &self.path, self.overrides.clone())
+    }
+
+    /// The manifest with `defaults` for the values that neither it nor its look gives.
+    ///
+    /// # Errors
+    /// Same as [`Manifest::parse_with`].
+    pub fn parse_over(&self, defaults: Vec<Override>) -> Result<Manifest, ManifestError> {
+        let defaults = defaults.into_iter().map(Override::under);
+        let all = self.overrides.iter().cloned().chain(defaults).collect();
+        Manifest::parse_with(&self.text, &self.path, all)
+    }
+
+    /// Whether neither the manifest nor an override or the look gives a value of the dotted `key`.
+    pub fn lacks(&self, key: &str) -> bool {
+        let Ok(mut tree) = TomlNode::parse(&self.text) else {
+            return false;
+        };
+        // Problems are reported when it is read
+        lay_over(&mut tree, &self.text, self.overrides.clone(), |_| {});
+        let keys: Vec<&str> = key.split('.').collect();
+        !tree.has(&keys)
+    }
+}
