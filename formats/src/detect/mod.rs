@@ -68,7 +68,7 @@ fn refuse_foreign(head: &[u8], path: &Path, named: Option<Format>) -> Result<(),
         let what = "an HDF5 file, and this program was built without the feature `hdf5`";
         return Err(ParseError::unsupported(what));
     }
-    if let Some(what) = is_text(head).then(|| text::what(head)).flatten() {
+    if let Some(what) = is_text(head).then(|| text::what(head, path)).flatten() {
         return Err(ParseError::unsupported(what));
     }
     // Two or three bytes of raw floats may look like any short signature.

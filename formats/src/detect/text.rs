@@ -1,5 +1,7 @@
 //! Text formats that are known but not read, recognised by the structure of their first lines.
 
+use std::path::Path;
+
 use crate::read::psf;
 use crate::read::text::{integer, number, words};
 
@@ -24,7 +26,7 @@ const FORMATS: &[TextFormat] = &[
         "a topology (PSF), which has no positions; give it with --topology beside a file with coordinates",
     ),
     (
-        |lines| first(lines, |line| line.starts_with(b"%VERSION")),
+        is_prmtop,
         "an AMBER topology (prmtop), which is not read; write a PDB file from it (`cpptraj -p a.prmtop -y a.rst7 -x \
          a.pdb`) and give that, or give it with --topology beside a trajectory",
     ),
@@ -76,20 +78,31 @@ const FORMATS: &[TextFormat] = &[
         is_dl_poly,
         "a DL_POLY file (CONFIG, REVCON or HISTORY), which is not read; write .xyz or .dcd with ASE, VMD or MDAnalysis",
     ),
-    (
-        is_pqr,
-        "a PQR file, which is not read; write a table x,y,z,radius (.csv), or .pdb",
-    ),
+    (is_pqr, PQR),
 ];
 
-/// The message for `head`, the beginning of a file, if that is one of the formats.
-pub(super) fn what(head: &[u8]) -> Option<&'static str> {
+const PQR: &str = "a PQR file, which is not read; write a table x,y,z,radius (.csv), or .pdb";
+
+/// The message for `head`, the beginning of the file `path`, if that is one of the formats.
+pub(super) fn what(head: &[u8], path: &Path) -> Option<&'static str> {
     let lines: Vec<&[u8]> = head
         .split(|b| *b == b'\n')
         .map(|line| line.strip_suffix(b"\r").unwrap_or(line))
         .collect();
     let format = FORMATS.iter().find(|(is_one, _)| is_one(&lines));
-    format.map(|(_, what)| *what)
+    let is_named_pqr = path
+        .extension()
+        .is_some_and(|end| end.eq_ignore_ascii_case("pqr"));
+    format
+        .map(|(_, what)| *what)
+        .or_else(|| (is_named_pqr && has_only_remarks(&lines)).then_some(PQR))
+}
+
+/// Whether the atoms come later: what writes PQR files may put long remarks before them.
+fn has_only_remarks(lines: &Lines<'_>) -> bool {
+    let (_, whole) = lines.split_last().unwrap_or((&&b""[..], &[]));
+    let is_remark = |line: &&[u8]| line.is_empty() || line.starts_with(b"REMARK");
+    whole.iter().all(is_remark)
 }
 
 fn first(lines: &Lines<'_>, is_one: impl Fn(&[u8]) -> bool) -> bool {
@@ -115,6 +128,17 @@ fn has_numbers(line: Option<&&[u8]>, count: usize) -> bool {
 fn has_integers(line: Option<&&[u8]>) -> bool {
     let mut words = line.into_iter().flat_map(|line| words(line)).peekable();
     words.peek().is_some() && words.all(|word| integer(word).is_some())
+}
+
+/// Lines with a version, or the first section with its format, which older programs write alone. Comments may come
+/// first.
+fn is_prmtop(lines: &Lines<'_>) -> bool {
+    let is_head = |line: &&&[u8]| !line.trim_ascii().is_empty() && !line.starts_with(b"%COMMENT");
+    let mut head = lines.iter().filter(is_head);
+    let first = head.next().copied().unwrap_or_default();
+    let second = head.next().copied().unwrap_or_default();
+    first.starts_with(b"%VERSION")
+        || (first.starts_with(b"%FLAG ") && second.starts_with(b"%FORMAT("))
 }
 
 /// A title, counts as `12 atoms`, and the box as `0 1 xlo xhi` or counts of types.
@@ -263,8 +287,6 @@ fn is_pqr(lines: &Lines<'_>) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
     use crate::format::Format;
 
@@ -297,6 +319,11 @@ mod tests {
             "%VERSION  VERSION_STAMP = V0001.000\n%FLAG TITLE\n",
             "prmtop",
         );
+        for before in ["", "\n", "%COMMENT from a script\n"] {
+            let section =
+                "%FLAG TITLE\n%FORMAT(20a4)\nACE\n%FLAG POINTERS\n%FORMAT(10I8)\n       3       1";
+            suggests(&format!("{before}{section}\n"), "prmtop");
+        }
         suggests("# a comment\n@<TRIPOS>MOLECULE\nSMALL\n", "obabel in.mol2");
         suggests(
             "name\n  program\n\n  1  0  0  0  0  0  0  0  0  0999 V2000\n    0.0000    0.0000    0.0000 C\n",
@@ -347,6 +374,22 @@ mod tests {
     }
 
     #[test]
+    fn long_remarks_are_those_of_the_format_in_the_name() {
+        let remarks =
+            "REMARK   1 written by a program that describes all that it did to get charges\n"
+                .repeat(60);
+        let text = format!("{remarks}ATOM 1 N ALA 1 1.5 2.5 3.5 -0.3 1.85\n");
+        for name in ["a.pqr", "a.PQR"] {
+            let error = Format::detect(text.as_bytes(), Path::new(name)).expect_err("refused");
+            assert!(error.to_string().contains("PQR"), "{error}");
+        }
+        let pdb = Format::detect(text.as_bytes(), Path::new("a.pdb"));
+        assert_eq!(pdb.map(|format| format.name()), Ok("pdb"));
+        let other = Format::detect(b"x,y,z\n1,2,3\n", Path::new("a.pqr"));
+        assert_eq!(other.map(|format| format.name()), Ok("csv"));
+    }
+
+    #[test]
     fn particle_text_is_not_misrecognised() {
         let row =
             "   1.000  -2.500   3.000   4.000   5.000   6.000   7.000   8.000   9.000  10.000\n";
@@ -364,7 +407,7 @@ mod tests {
             "ATOM      1  N   ALA A   1      11.104   6.134  -6.504  1.00  0.00           N\n",
             "",
         ] {
-            assert_eq!(what(text.as_bytes()), None, "{text}");
+            assert_eq!(what(text.as_bytes(), Path::new("a")), None, "{text}");
         }
     }
 }

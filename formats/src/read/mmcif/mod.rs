@@ -141,3 +141,33 @@ impl Reader for MmCif {
 fn cut_short(at: usize, what: &str) -> ParseError {
     ParseError::malformed(at, format!("{what}: {CUT_SHORT}"))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::read::damage::{attribute, numbers};
+    use crate::read::pieces;
+
+    /// Residues of two atoms whose rows have `columns` with `values`.
+    #[track_caller]
+    fn residues(columns: &str, values: [&str; 2]) -> Vec<f64> {
+        let names = ["Cartn_x", "Cartn_y", "Cartn_z"].into_iter();
+        let names = names.chain(columns.split(' '));
+        let names: String = names.map(|name| format!("_atom_site.{name}\n")).collect();
+        let rows: String = values.map(|value| format!("1 2 3 {value}\n")).concat();
+        let text = format!("data_a\nloop_\n{names}{rows}");
+        let steps = pieces::steps(FORMAT, text.as_bytes()).expect("steps");
+        let particles = pieces::read(FORMAT, text.as_bytes(), &steps[0]).expect("atoms");
+        numbers(&attribute(&particles, "residue").data)
+    }
+
+    #[test]
+    fn residues_without_a_number_of_the_author_have_that_of_the_label() {
+        let both = "auth_seq_id label_seq_id";
+        assert_eq!(residues(both, ["7 1", "8 2"]), [7.0, 8.0]);
+        assert_eq!(residues("label_seq_id", ["1", "2"]), [1.0, 2.0]);
+        assert_eq!(residues(both, ["7 1", "? 2"]), [7.0, 2.0]);
+        // Water has neither
+        assert_eq!(residues(both, ["7 1", ". ."]), [7.0, 0.0]);
+    }
+}
