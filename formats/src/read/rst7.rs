@@ -147,32 +147,17 @@ fn read(text: &mut TextInput<'_>, budget: MemoryBudget) -> Result<RawParticles, 
     let (count, rows) = (heading.count, heading.rows());
     let len = count.saturating_mul(3);
     let mut positions = RowNumbers::new(budget);
+    let mut numbers = Vec::new();
     for row in 0..rows {
         let Some(line) = text.line() else {
             let what = format!("{count} atoms have {rows} lines of positions, {row} follow");
             return Err(cut_short(text, what));
         };
-        positions.push(line, PER_LINE.min(len - row * PER_LINE))?;
+        read_row(line, PER_LINE.min(len - row * PER_LINE), &mut numbers)?;
+        positions.push(&numbers)?;
     }
-    // What follows tells by the number of its lines whether it is velocities
     let mut others = RowNumbers::new(budget.less(8 * len as u64));
-    while let Some(line) = text.line() {
-        if line.is_blank() {
-            continue;
-        }
-        if others.rows > rows {
-            let what = "more than positions, velocities and a box";
-            return Err(ParseError::malformed(line.at, what));
-        }
-        let numbers = line.text.trim_ascii_end().len().div_ceil(WIDTH);
-        others.push(line, numbers.min(PER_LINE))?;
-    }
-    let has_box = is_box_at(others.rows, rows) && is_box(others.last_row());
-    let cell = if has_box {
-        others.pop_row()
-    } else {
-        Vec::new()
-    };
+    let cell = read_tail(text, rows, |row| others.push(row))?;
     let mut velocities = others.numbers;
     if !velocities.is_empty() && velocities.len() != len {
         let what = format!(
@@ -192,17 +177,58 @@ fn read(text: &mut TextInput<'_>, budget: MemoryBudget) -> Result<RawParticles, 
         attributes: velocity.into_iter().collect(),
         time: heading.time,
         step: None,
-        cell: self::cell(&cell),
+        cell,
         bonds: Vec::new(),
     })
 }
 
-/// Numbers of lines with fixed columns.
+/// Passes on the lines of velocities behind `rows` lines of positions, and gives the cell of the box behind them, if
+/// there is one. The number of lines tells whether the last one may be a box.
+fn read_tail(
+    text: &mut TextInput<'_>,
+    rows: usize,
+    mut add: impl FnMut(&[f64]) -> Result<(), ParseError>,
+) -> Result<Option<SimulationCell>, ParseError> {
+    let (mut count, mut last) = (0, Vec::new());
+    while let Some(line) = text.line() {
+        if line.is_blank() {
+            continue;
+        }
+        if count > rows {
+            let what = "more than positions, velocities and a box";
+            return Err(ParseError::malformed(line.at, what));
+        }
+        add(&last)?;
+        let numbers = line.text.trim_ascii_end().len().div_ceil(WIDTH);
+        read_row(line, numbers.min(PER_LINE), &mut last)?;
+        count += 1;
+    }
+    if is_box_at(count, rows) && is_box(&last) {
+        return Ok(cell(&last));
+    }
+    add(&last)?;
+    Ok(None)
+}
+
+/// Reads the `count` numbers of `line`.
+fn read_row(line: Line<'_>, count: usize, numbers: &mut Vec<f64>) -> Result<(), ParseError> {
+    if line.text.trim_ascii_end().len() != count * WIDTH {
+        let what = format!(
+            "expected {count} numbers of {WIDTH} columns, found {}: the file is damaged, or still being written",
+            text::shown(line.text)
+        );
+        return Err(ParseError::malformed(line.at, what));
+    }
+    numbers.clear();
+    for start in (0..count).map(|index| index * WIDTH) {
+        numbers.push(coordinate(line, start, start + WIDTH)?);
+    }
+    Ok(())
+}
+
+/// Numbers of many lines.
 struct RowNumbers {
     numbers: Vec<f64>,
-    rows: usize,
-    /// Numbers before the last line.
-    last_start: usize,
     budget: MemoryBudget,
 }
 
@@ -210,41 +236,18 @@ impl RowNumbers {
     const fn new(budget: MemoryBudget) -> Self {
         Self {
             numbers: Vec::new(),
-            rows: 0,
-            last_start: 0,
             budget,
         }
     }
 
-    /// Adds the `count` numbers of `line`.
-    fn push(&mut self, line: Line<'_>, count: usize) -> Result<(), ParseError> {
-        if line.text.trim_ascii_end().len() != count * WIDTH {
-            let what = format!(
-                "expected {count} numbers of {WIDTH} columns, found {}: the file is damaged, or still being written",
-                text::shown(line.text)
-            );
-            return Err(ParseError::malformed(line.at, what));
-        }
+    /// Adds the numbers of a line.
+    fn push(&mut self, row: &[f64]) -> Result<(), ParseError> {
         // A vector that grows holds its old numbers and twice the room for new ones.
-        let need = 3 * size_of::<f64>() * (self.numbers.len() + count);
+        let need = 3 * size_of::<f64>() * (self.numbers.len() + row.len());
         self.budget
             .check(need as u64, "its numbers in memory are")?;
-        self.last_start = self.numbers.len();
-        self.rows += 1;
-        for start in (0..count).map(|index| index * WIDTH) {
-            self.numbers.push(coordinate(line, start, start + WIDTH)?);
-        }
+        self.numbers.extend(row);
         Ok(())
-    }
-
-    /// The numbers of the last line.
-    fn last_row(&self) -> &[f64] {
-        self.numbers.get(self.last_start..).unwrap_or_default()
-    }
-
-    /// Removes the numbers of the last line.
-    fn pop_row(&mut self) -> Vec<f64> {
-        self.numbers.split_off(self.last_start)
     }
 }
 
@@ -274,23 +277,15 @@ fn cell(numbers: &[f64]) -> Option<SimulationCell> {
 
 /// Whether the file `bytes` has a box that is a cell.
 fn has_cell(bytes: &[u8]) -> bool {
-    let mut lines = Lines::new(bytes, 0..bytes.len()).skip(1);
-    let Some(Ok(heading)) = lines.next().map(Heading::of) else {
+    let mut text = TextInput::whole(bytes);
+    text.line();
+    let Some(Ok(heading)) = text.line().map(Heading::of) else {
         return false;
     };
     let rows = heading.rows();
-    let (mut count, mut last) = (0, None);
-    for line in lines.skip(rows).filter(|line| !line.is_blank()) {
-        (count, last) = (count + 1, Some(line));
-    }
-    let mut numbers = RowNumbers::new(MemoryBudget::UNLIMITED);
-    last.is_some_and(|line| {
-        let len = line.text.trim_ascii_end().len().div_ceil(WIDTH);
-        is_box_at(count, rows)
-            && numbers.push(line, len.min(PER_LINE)).is_ok()
-            && is_box(&numbers.numbers)
-            && cell(&numbers.numbers).is_some()
-    })
+    let has_positions = (0..rows).all(|_| text.line().is_some());
+    let cell = read_tail(&mut text, rows, |_| Ok(()));
+    has_positions && matches!(cell, Ok(Some(_)))
 }
 
 fn cut_short(text: &TextInput<'_>, what: String) -> ParseError {
