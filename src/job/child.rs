@@ -40,6 +40,9 @@ pub enum Crash {
     /// The state of the process is unknown.
     #[error("lost the process: {0}")]
     Lost(#[source] io::Error),
+    /// The process could not allocate memory: what it printed.
+    #[error("the process died: out of memory: {0}")]
+    OutOfMemory(String),
     /// The process ended without a result: how, and what it printed.
     #[error("the process died: {0}")]
     Died(String),
@@ -119,7 +122,7 @@ impl ChildCommand {
         let (output, errors) = (text(output), text(errors));
         match serde_json::from_str(&output) {
             Ok(result) if status.success() => ChildResult::Completed(result),
-            _ => ChildResult::Crashed(Crash::Died(reason(status, &errors))),
+            _ => ChildResult::Crashed(Crash::of(status, &errors)),
         }
     }
 
@@ -147,45 +150,33 @@ fn reader(pipe: Option<impl Read + Send + 'static>) -> JoinHandle<String> {
     })
 }
 
-/// The start of the reason if no more memory could be allocated.
-const OUT_OF_MEMORY: &str = "out of memory";
-
 impl Crash {
-    /// Whether the process could not allocate memory.
-    pub fn is_out_of_memory(&self) -> bool {
-        matches!(self, Self::Died(reason) if reason.starts_with(OUT_OF_MEMORY))
-    }
-}
-
-/// Why the child ended without a result.
-fn reason(status: ExitStatus, errors: &str) -> String {
-    let lines: Vec<&str> = errors
-        .lines()
-        .map(|line| line.strip_prefix("error: ").unwrap_or(line).trim())
-        .filter(|line| !line.is_empty() && !line.starts_with("note: "))
-        .collect();
-    // What follows is a backtrace, which says nothing about memory
-    let allocation = lines
-        .iter()
-        .find(|line| line.contains("memory allocation of"));
-    let shown = match allocation {
-        Some(line) => (*line).to_owned(),
-        None => lines.join("; "),
-    };
-    let text: String = shown.chars().take(MAX_REASON).collect();
-    if allocation.is_some() {
-        return format!("{OUT_OF_MEMORY}: {text}");
-    }
-    let how = match signal(status) {
-        Some(9) => "killed by the system, probably because memory ran out".to_owned(),
-        Some(signal) => format!("ended by signal {signal}"),
-        None if text.contains("panicked at") => "internal error, please report it".to_owned(),
-        None => status.to_string(),
-    };
-    if text.is_empty() {
-        how
-    } else {
-        format!("{how}: {text}")
+    /// Why the child ended without a result, by its `status` and what it printed. Rust ends a process that cannot
+    /// allocate memory as it ends others that abort, so that only its message tells.
+    fn of(status: ExitStatus, errors: &str) -> Self {
+        let lines: Vec<&str> = errors
+            .lines()
+            .map(|line| line.strip_prefix("error: ").unwrap_or(line).trim())
+            .filter(|line| !line.is_empty() && !line.starts_with("note: "))
+            .collect();
+        let shown = |text: &str| text.chars().take(MAX_REASON).collect::<String>();
+        // What follows is a backtrace, which says nothing about memory
+        let mut all = lines.iter();
+        if let Some(line) = all.find(|line| line.contains("memory allocation of")) {
+            return Self::OutOfMemory(shown(line));
+        }
+        let text = shown(&lines.join("; "));
+        let how = match signal(status) {
+            Some(9) => "killed by the system, probably because memory ran out".to_owned(),
+            Some(signal) => format!("ended by signal {signal}"),
+            None if text.contains("panicked at") => "internal error, please report it".to_owned(),
+            None => status.to_string(),
+        };
+        if text.is_empty() {
+            Self::Died(how)
+        } else {
+            Self::Died(format!("{how}: {text}"))
+        }
     }
 }
 
@@ -231,10 +222,10 @@ mod tests {
                 "exit status: 2: standard input: not a task",
             ),
         ] {
-            assert_eq!(reason(status, errors), expected);
-            let crash = Crash::Died(reason(status, errors));
+            let crash = Crash::of(status, errors);
+            assert_eq!(crash.to_string(), format!("the process died: {expected}"));
             assert_eq!(
-                crash.is_out_of_memory(),
+                matches!(crash, Crash::OutOfMemory(_)),
                 errors.contains("memory allocation")
             );
         }

@@ -167,8 +167,8 @@ impl IsolatedRender<'_> {
 
     /// The reason of a crash, with the remedy if memory was limited.
     fn explained(&self, crash: Crash) -> Box<dyn Error + Send + Sync> {
-        match self.render_job.manifest().job.memory_ceiling {
-            Some(ceiling) if crash.is_out_of_memory() => {
+        match (&crash, self.render_job.manifest().job.memory_ceiling) {
+            (Crash::OutOfMemory(_), Some(ceiling)) => {
                 format!("{crash}; raise job.memory_ceiling, which is {ceiling}").into()
             }
             _ => crash.into(),
