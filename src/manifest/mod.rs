@@ -464,6 +464,8 @@ impl Manifest {
             every: self.select.every,
             regions: slab.chain(of_mode(ClipMode::Particles)).collect(),
             cuts: of_mode(ClipMode::Cut).collect(),
+            // With "auto", that of the files
+            up: None,
         }
     }
 

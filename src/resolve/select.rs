@@ -13,7 +13,10 @@ use crate::survey::Survey;
 /// # Errors
 /// The particles have no value with a name in the condition.
 pub(super) fn selection(manifest: &Manifest, survey: &Survey) -> Result<Selection, ResolveError> {
-    let selection = manifest.selection();
+    let selection = Selection {
+        up: Some(super::up(manifest, survey)),
+        ..manifest.selection()
+    };
     if survey.most_particles == 0 {
         return Ok(selection);
     }
@@ -28,8 +31,9 @@ pub(super) fn selection(manifest: &Manifest, survey: &Survey) -> Result<Selectio
             let all = color::value_names(survey, &others);
             let name = unknown.name.split(['.', '[']).next().unwrap_or_default();
             let hint = match name.to_ascii_lowercase().as_str() {
-                "height" | "depth" => {
-                    " (it is a value for colours; conditions have x, y and z)".to_owned()
+                "depth" => {
+                    " (it depends on the camera, which depends on the particles; conditions have x, y, z and height)"
+                        .to_owned()
                 }
                 _ => similar(name, &all),
             };

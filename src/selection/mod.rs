@@ -2,6 +2,7 @@
 //!
 //! The others are left out after a frame has been read, before anything is computed from it.
 
+use glam::DVec3;
 use rayon::prelude::*;
 use spherule_formats::order::index_u32;
 use spherule_formats::{AttributeData, RawParticles};
@@ -42,6 +43,8 @@ pub struct Selection {
     /// Regions that spheres are cut to. Particles with centres outside are drawn as well, as their spheres may reach
     /// into them.
     pub cuts: Vec<Region>,
+    /// The direction of heights, once it is known; without it, conditions have none.
+    pub up: Option<DVec3>,
 }
 
 impl Selection {
@@ -79,7 +82,7 @@ impl Selection {
     ) -> Result<Vec<Value>, UnknownName> {
         let names = self.condition.iter().flat_map(|condition| &condition.names);
         names
-            .map(|name| Value::of(name, attributes, time))
+            .map(|name| Value::of(name, attributes, time, self.up))
             .collect()
     }
 

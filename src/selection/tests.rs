@@ -292,6 +292,14 @@ fn names_without_a_value_are_found() {
         let unknown = by(text).survivors(&all).expect_err(text);
         assert_eq!((unknown.name.as_str(), unknown.column), (name, column));
     }
+    let tilted = Selection {
+        up: Some(DVec3::new(0.0, 0.6, 0.8)),
+        ..by("height > 0.5")
+    };
+    assert_selects(&tilted, &all, |i| {
+        let place = all.positions.get(i);
+        0.6 * place.y + 0.8 * place.z > 0.5
+    });
     let mut empty = all.clone();
     empty.select(&[]);
     assert_eq!(by("sped > 1").survivors(&empty), Ok(Vec::new()));

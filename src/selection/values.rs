@@ -1,18 +1,21 @@
 //! The values that names in a condition stand for.
 
+use glam::DVec3;
 use spherule_formats::{Attribute, AttributeData, Positions, RawParticles, names};
 
 use super::condition::NameUse;
 use crate::attributes::{Named, ParticleValue, id_of};
 
 /// Names of values that do not need an attribute; for messages.
-pub const OTHER_NAMES: [&str; 5] = ["x", "y", "z", "index", "id"];
+pub const OTHER_NAMES: [&str; 6] = ["x", "y", "z", "height", "index", "id"];
 
 /// A number for each particle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Value {
     /// World coordinate on an axis.
     Position(usize),
+    /// World coordinate along a direction.
+    Height(DVec3),
     /// Position of the particle in its frame.
     Index,
     /// The same number for all.
@@ -35,11 +38,12 @@ pub struct UnknownName {
 }
 
 impl Value {
-    /// The value of `used` of particles with `attributes` at `time`.
+    /// The value of `used` of particles with `attributes` at `time`, with heights along `up`.
     pub(super) fn of<A: Named>(
         used: &NameUse,
         attributes: &[A],
         time: Option<f64>,
+        up: Option<DVec3>,
     ) -> Result<Self, UnknownName> {
         let name = used.name.to_ascii_lowercase();
         if let Some(axis) = ["x", "y", "z"].iter().position(|axis| *axis == name) {
@@ -60,8 +64,9 @@ impl Value {
             Some(ParticleValue::Index) => Some(Self::Index),
             Some(ParticleValue::Radius) => radius(attributes),
             Some(ParticleValue::Position(axis)) => Some(Self::Position(axis)),
-            // Both depend on the particles that are drawn
-            Some(ParticleValue::Height | ParticleValue::Depth) => None,
+            Some(ParticleValue::Height) => up.map(Self::Height),
+            // The camera depends on the particles that are drawn
+            Some(ParticleValue::Depth) => None,
             None if name == "time" => time.map(Self::Constant),
             None => None,
         };
@@ -88,6 +93,7 @@ impl Value {
         let attribute = |index: usize| &particles.attributes[index];
         match *self {
             Self::Position(axis) => load_position(&particles.positions, axis, first, to),
+            Self::Height(up) => fill(to, |i| up.dot(particles.positions.get(first + i))),
             Self::Index => fill(to, |i| (first + i) as f64),
             Self::Constant(value) => to.fill(value),
             Self::Component {

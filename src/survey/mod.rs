@@ -197,6 +197,16 @@ pub struct Question<'a> {
     pub framed: Option<usize>,
 }
 
+impl Question<'_> {
+    /// The selection, with heights along `up`.
+    fn selection_with(&self, up: DVec3) -> Option<Selection> {
+        self.selection.map(|selection| Selection {
+            up: Some(up),
+            ..selection.clone()
+        })
+    }
+}
+
 /// What a job needs to know about radii.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RadiusQuestion<'a> {
@@ -343,10 +353,6 @@ impl Survey {
         question: Question,
     ) -> Result<Self, FrameError> {
         let angstrom = sequence.angstrom();
-        let question = Question {
-            radius: question.radius.in_unit(angstrom),
-            ..question
-        };
         let mut totals = Totals::new();
         let format_up = if sequence.is_y_up() {
             DVec3::Y
@@ -354,6 +360,12 @@ impl Survey {
             DVec3::Z
         };
         let up = question.up.unwrap_or(format_up);
+        let selection = question.selection_with(up);
+        let question = Question {
+            radius: question.radius.in_unit(angstrom),
+            selection: selection.as_ref(),
+            ..question
+        };
         let mut failure = None;
         let indices: Vec<usize> = indices.into_iter().collect();
         let frames = indices.len();
@@ -393,9 +405,15 @@ impl Survey {
         particles: &RawParticles<PositionSlice<'_>>,
         question: Question,
     ) -> Result<Self, FrameError> {
+        let up = question.up.unwrap_or(DVec3::Z);
+        let selection = question.selection_with(up);
+        let question = Question {
+            selection: selection.as_ref(),
+            ..question
+        };
         let sample = FrameSample::of_memory(name, particles, question)?;
         let mut totals = Totals::new();
-        totals.add(sample, question, question.up.unwrap_or(DVec3::Z), true);
+        totals.add(sample, question, up, true);
         Ok(totals.finish(question, DVec3::Z))
     }
 }

@@ -83,6 +83,11 @@ fn clips_and_slices_leave_out_particles() {
             448,
         ),
         (
+            "height",
+            "input.up = \"y\"\n[select]\nwhere = \"height >= 6 && z < 2\"",
+            32,
+        ),
+        (
             "both",
             "[[clip]]\ntype = \"plane\"\nnormal = [1, 1, 0]\npoint = [1, 0, 0]\n\
              [[clip]]\ntype = \"plane\"\nnormal = \"z\"",
@@ -171,9 +176,9 @@ fn impossible_selections_are_explained() {
             "character 10: no value `velocity.x`",
         ),
         (
-            "height > 1",
-            "no value `height` in the sampled frames (it is a value for colours; conditions have x, y and z); \
-             available: `id`, `type`, `x`, `y`, `z`, `index`",
+            "depth > 1",
+            "no value `depth` in the sampled frames (it depends on the camera, which depends on the particles; \
+             conditions have x, y, z and height); available: `id`, `type`, `x`, `y`, `z`, `height`, `index`",
         ),
         ("x > (1", "--where: character 7: expected `)`"),
         (
