@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::pictures::{JobPicture, JobPictures, PicturesArgs, SIGNAL_MESSAGES, Watch};
-use super::render::counted;
 use super::{CliError, Outcome, print, signals};
+use crate::metrics::counted;
 use crate::movie::{MovieError, SheetSettings, write_sheet};
 
 const EXAMPLES: &str = "\

@@ -22,6 +22,7 @@ use super::rods::{CellStyle, FrameRods, rods_of};
 use super::setup::{Picture, Setup};
 use super::trails::trails_of;
 use super::{ImageTask, SharedFrame};
+use crate::metrics::counted;
 use crate::metrics::memory::{available, process_room};
 use crate::overlay::Overlay;
 
@@ -275,11 +276,11 @@ impl LoadedFrame<'_> {
     fn finish(&mut self, setup: &Setup) -> Result<(), LoadError> {
         self.note_count(
             self.dropped,
-            "particles left out: a coordinate is not finite or too far away",
+            "left out: a coordinate is not finite or too far away",
         );
         self.note_count(
             self.clamped_radii,
-            "radii raised: too small to be seen, or no number",
+            "with a raised radius: it was too small to be seen, or no number",
         );
         self.note_absent_parts(setup);
         self.notes.extend(missing_glyphs(setup));
@@ -308,9 +309,14 @@ impl LoadedFrame<'_> {
         }
     }
 
+    /// Notes what has been done with `count` particles.
     fn note_count(&mut self, count: u64, what: &str) {
         if count > 0 {
-            let note = format!("frame {}: {count} {what}", self.task.frame);
+            let note = format!(
+                "frame {}: {} {what}",
+                self.task.frame,
+                counted(count, "particle")
+            );
             self.notes.push(note);
         }
     }

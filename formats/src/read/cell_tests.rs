@@ -151,7 +151,7 @@ fn dcd_files_have_cells_with_angles_or_cosines() {
         let remarks = dcd::FORMAT.reader().remarks(bytes);
         remarks
             .iter()
-            .any(|remark| remark.contains("--cell draws it"))
+            .any(|remark| remark.contains("simulation cell"))
     };
     assert!(has_remark(&bytes) && !has_remark(&replaced(&bytes, &old, &big_endian(&[0.0; 6]))));
     // Symmetric matrices of newer versions of CHARMM. The last number of the header is the version, here 24

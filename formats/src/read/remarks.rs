@@ -6,7 +6,7 @@ pub(super) fn cell_remark(periodic: Option<&str>) -> String {
         format!(" with periodic boundaries ({flags})")
     });
     format!(
-        "the file has a simulation cell{boundaries}; --cell draws it. Particles are drawn where the file has them"
+        "the file has a simulation cell{boundaries}; particles are drawn where the file has them"
     )
 }
 

@@ -7,6 +7,7 @@ use spherule_formats::stats::{AttributeStats, Number};
 use super::{Inspected, InspectedList};
 use crate::cli::CliError;
 use crate::cli::print::{self, Reader};
+use crate::cli::render::CELL_HINT;
 
 impl InspectedList {
     /// Prints one line of JSON, or several for people.
@@ -152,7 +153,7 @@ fn cell_line(cell: &SimulationCell) -> String {
     if !names.is_empty() {
         line += &format!(", periodic along {}", names.join(", "));
     }
-    line
+    line + &format!(" ({CELL_HINT})")
 }
 
 fn attribute_line(attribute: &AttributeStats) -> String {

@@ -3,7 +3,7 @@
 use super::Inspected;
 use crate::cli::CliError;
 use crate::cli::print::{self, Reader};
-use crate::cli::render::counted;
+use crate::metrics::counted;
 
 /// Most steps that are all printed.
 const ALL: usize = 4;

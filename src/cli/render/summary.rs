@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 use spherule_formats::Sequence;
 
 use crate::cli::progress::ShowReport;
+use crate::metrics::counted;
 use crate::pipeline::{self, RadiusRule, Setup};
 use crate::report::FrameReport;
 use crate::scene::{CameraPath, Projection, RadiusTable};
@@ -40,10 +41,10 @@ pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup:
         message!("{parts}");
     }
     for remark in sequence.remarks() {
-        note!(
-            "{}",
-            without_cell_hint(remark, setup.picture.cell.is_some())
-        );
+        note!("{remark}");
+    }
+    if setup.picture.cell.is_none() && !survey.cells.is_empty() {
+        note!("{CELL_HINT}");
     }
     if survey.most_particles == 0 {
         return;
@@ -80,17 +81,8 @@ pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup:
     }
 }
 
-/// What a remark on the simulation cell says about the option that draws it.
-const CELL_HINT: &str = "; --cell draws it";
-
-/// `remark` without a hint that was followed already.
-fn without_cell_hint(remark: String, is_cell_drawn: bool) -> String {
-    if is_cell_drawn {
-        remark.replace(CELL_HINT, "")
-    } else {
-        remark
-    }
-}
+/// What draws the simulation cell of a file.
+pub(in crate::cli) const CELL_HINT: &str = "--cell draws the simulation cell";
 
 /// The options that place a camera which stands still where it is; None for those that move, and panoramas.
 fn view_options(setup: &Setup) -> Option<String> {
@@ -174,31 +166,4 @@ pub(in crate::cli) fn unframed_text(setup: &Setup) -> Option<String> {
 /// Rounds to four digits.
 fn short(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
-}
-
-/// `3 frames`, but `1 frame`.
-pub(in crate::cli) fn counted(count: usize, what: &str) -> String {
-    let plural = if count == 1 { "" } else { "s" };
-    format!("{count} {what}{plural}")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn drawn_cells_need_no_option() {
-        let remark = "the file has a simulation cell; --cell draws it. Particles are".to_owned();
-        assert_eq!(without_cell_hint(remark.clone(), false), remark);
-        assert_eq!(
-            without_cell_hint(remark, true),
-            "the file has a simulation cell. Particles are"
-        );
-    }
-
-    #[test]
-    fn single_things_have_no_plural() {
-        assert_eq!(counted(1, "column"), "1 column");
-        assert_eq!(counted(2, "column"), "2 columns");
-    }
 }

@@ -7,6 +7,7 @@ use spherule_formats::escape_controls;
 use super::{
     CellMeasurement, CellReport, Column, FAILED, MIB, MISSING, ScaleReport, Spread, parts,
 };
+use crate::metrics::counted;
 use crate::scale::{Budget, Motion};
 
 /// All tables with their headings.
@@ -69,7 +70,7 @@ pub fn subject(report: &ScaleReport) -> String {
     );
     let budget = match s.budget {
         Budget::Seconds(seconds) => format!("{seconds} s"),
-        Budget::Images(images) => format!("{images} images"),
+        Budget::Images(images) => counted(images, "image"),
     };
     format!(
         "{what}; {}x{}, samples per pixel {}, depth {}, {budget} per cell",

@@ -182,10 +182,12 @@ fn file_metadata_is_reported() {
     let workshop = Workshop::new();
     let text = "2\nLattice=\"9 0 0 0 9 0 0 0 9\" pbc=\"T T T\" Properties=species:S:1:pos:R:3\nO 0 0 0\nH 1 0 0\n";
     fs::write(workshop.join("water.xyz"), text).expect("a file");
-    let cell = "simulation cell with periodic boundaries (T T T); --cell draws it";
+    let cell = "simulation cell with periodic boundaries (T T T)";
+    let hint = "--cell draws the simulation cell";
     let names = "\"H\" = 1, \"O\" = 8";
     let text = workshop.run(&["inspect", "water.xyz"]).expect(0).text();
     assert!(text.contains(cell) && text.contains(names), "{text}");
+    assert_eq!(text.matches(hint).count(), 1, "{text}");
     let size = ["--width", "48", "--height", "27", "--samples", "1"];
     let arguments = [
         "render",
@@ -199,8 +201,15 @@ fn file_metadata_is_reported() {
         .run(&[&arguments[..], &size].concat())
         .expect(0)
         .prints(cell)
+        .prints(hint)
         .prints(names)
         .prints("colour by `element`, range 1 to 8");
+    let drawn = ["still", "water.xyz", "-o", "c.png", "--cell"];
+    let errors = workshop
+        .run(&[&drawn[..], &size].concat())
+        .expect(0)
+        .errors();
+    assert!(errors.contains(cell) && !errors.contains(hint), "{errors}");
 }
 
 #[test]
