@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use serde_json::{Value, json};
+use spherule_formats::convert;
 use spherule_formats::detect::Format;
 use spherule_formats::native::{Bound, Encoding, FORMAT};
 use spherule_formats::sequence::Sequence;
@@ -12,6 +13,7 @@ use spherule_formats::{MemoryBudget, SequenceInput, SequenceSettings};
 use spherule_jobs::{DEFAULT_TAKEOVER_AFTER, FrameRange, ResumeMode};
 
 use super::job::{FinishedRun, JobArgs, report_kept, report_wait, use_threads};
+use super::key_flags::encodings;
 use super::numbers::{DEFAULT_BOUND, duration, not_negative, positive};
 use super::progress::{Progress, ShowReport};
 use super::{CliError, Outcome, events, signals};
@@ -64,7 +66,7 @@ pub(super) struct ConvertArgs {
     /// Encoding of positions: f32 (12 bytes per particle), q16 (6) or q10 (4) [default: f32]
     ///
     /// If an error bound is given, the default is the smallest encoding within the bound.
-    #[arg(long, help_heading = "Output")]
+    #[arg(long, value_parser = encodings(), hide_possible_values = true, help_heading = "Output")]
     encoding: Option<Encoding>,
     /// Largest error of a position as a fraction of the radius [default: 0.02 for q16 and q10]
     #[arg(long, value_name = "FRACTION", value_parser = not_negative, allow_negative_numbers = true,
@@ -87,7 +89,7 @@ pub(super) struct ConvertArgs {
     /// Native frames have another order.
     #[arg(long, help_heading = "Output")]
     ids: bool,
-    /// Memory limit of the conversion: 4GiB, 512MiB [default: 2GiB]
+    /// Memory limit of the conversion: 4GiB, 512MiB [default: 2GiB]; at least 64MiB are used
     ///
     /// A frame that does not fit is sorted in parts, in temporary files on the disk of the output. The particles of
     /// text files and compressed files are read into memory first; if they need more than SIZE, the frame fails.
@@ -120,7 +122,11 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, CliError> {
     guard_input(&args.input, &args.output)?;
     use_threads(args.threads)?;
     let input = SequenceInput::from_paths(args.input.clone());
-    let limit = |memory: Bytes| MemoryBudget::new(memory.0, MEMORY_REMEDY);
+    // The conversion itself holds as much
+    let limit = |memory: Bytes| {
+        let bytes = memory.0.max(convert::ConvertSettings::LEAST_MEMORY);
+        MemoryBudget::new(bytes, MEMORY_REMEDY)
+    };
     let settings = SequenceSettings {
         budget: conversion_budget(args.memory.map(limit)),
         follow_links: args.follow_links,

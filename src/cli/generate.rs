@@ -13,6 +13,7 @@ use spherule_formats::native::{Bound, Encoding};
 use spherule_formats::{ValueError, write};
 use spherule_jobs::Interrupt;
 
+use super::key_flags::encodings;
 use super::numbers::{DEFAULT_BOUND, not_negative, positive};
 use super::{CliError, Outcome, signals};
 use crate::metrics::Bytes;
@@ -81,7 +82,7 @@ struct CommonArgs {
     /// Encoding of positions in native frames: f32 (12 bytes per particle), q16 (6) or q10 (4) [default: f32]
     ///
     /// If --max-error is given, the default is the smallest encoding within that error.
-    #[arg(long)]
+    #[arg(long, value_parser = encodings(), hide_possible_values = true)]
     encoding: Option<Encoding>,
     /// Largest error of a position as a fraction of the radius [default: 0.02 for q16 and q10 with a radius]
     #[arg(long, value_name = "FRACTION", value_parser = not_negative)]

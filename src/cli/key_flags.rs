@@ -5,6 +5,7 @@ use std::path::Path;
 
 use clap::builder::{EnumValueParser, PossibleValue, StringValueParser, TypedValueParser};
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
+use spherule_formats::native::Encoding;
 use toml::Value;
 
 use super::CliError;
@@ -150,6 +151,12 @@ impl TypedValueParser for KnownWords {
     fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
         Some(Box::new(self.0.iter().map(PossibleValue::new)))
     }
+}
+
+/// Encodings of native frames, which shells complete.
+pub(super) fn encodings() -> impl TypedValueParser<Value = Encoding> {
+    let names = Encoding::ALL.map(Encoding::name);
+    KnownWords(names.to_vec()).try_map(|name| name.parse::<Encoding>())
 }
 
 fn argument(key: &KeyFlag) -> Arg {

@@ -87,6 +87,7 @@ fn completions_know_every_command_and_option() {
         "spheres union smooth",
         "viridis turbo plasma",
         "linear log symlog",
+        "f32 q16 q10",
     ] {
         assert!(script.contains(values), "{values}");
     }
