@@ -9,7 +9,7 @@ use spherule_formats::ValueError;
 use spherule_jobs::export::Chunks;
 use spherule_jobs::{ResumeMode, publish};
 
-use super::manifest_args::{is_manifest, read_manifest};
+use super::manifest_args::{is_manifest, open_sequence, read_manifest};
 use super::paths::absolute;
 use super::{CliError, Outcome, print};
 use crate::job::{JobManifest, RenderJob};
@@ -117,7 +117,7 @@ impl ExportJob {
     /// Reads the manifest, finds the frames, and refuses what `render` would refuse.
     fn read(args: &CommonArgs, max_tasks: NonZeroUsize) -> Result<Self, CliError> {
         let requested = requested_manifest(args)?;
-        let sequence = requested.open_sequence()?;
+        let sequence = open_sequence(&requested)?;
         for note in sequence.notes() {
             note!("{note}");
         }

@@ -57,6 +57,20 @@ fn jobs_that_cannot_be_exported() {
 }
 
 #[test]
+fn the_input_of_a_job_may_have_moved() {
+    let workshop = Workshop::new();
+    job(&workshop, "data", &[1]);
+    workshop.run(&["render", "data/job.toml"]).expect(0);
+    fs::rename(workshop.join("data/in"), workshop.join("data/moved")).expect("a directory");
+    refused(
+        &workshop,
+        &["data/job.toml", "-o", "new.yaml"],
+        "data/job.toml: input.path: data/in: no such file or directory; \
+         if the files have moved: spherule render NEW_PLACE -o data/out/f.####.exr",
+    );
+}
+
+#[test]
 fn unsupported_job_features() {
     let workshop = Workshop::new();
     job(&workshop, "data", &[1]);
