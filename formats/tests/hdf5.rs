@@ -345,19 +345,21 @@ fn damaged_heaps_with_several_levels_are_refused() {
     let blocks = blocks.filter(|(_, bytes)| bytes == b"FHIB");
     let blocks: Vec<usize> = blocks.map(|(at, _)| at + FIRST).collect();
     assert!(blocks.len() >= 4, "two heaps with two levels");
+    let mut is_attribute = Vec::new();
     for at in blocks {
         let second = &good[at + 8..at + 16];
         for wrong in [&[0xee; 8], second] {
             let mut bytes = good.to_vec();
             bytes[at..at + 8].copy_from_slice(wrong);
             let name = Path::new("deep_heaps.h5");
-            match read(FrameFile::from_bytes(name, bytes)) {
-                Err(error) => assert!(error.to_string().contains("deep_heaps.h5: byte"), "{error}"),
-                // In the attributes of the group
-                Ok(steps) => assert_eq!(steps[0].time, None),
-            }
+            let error = read(FrameFile::from_bytes(name, bytes)).expect_err("a damaged heap");
+            let error = error.to_string();
+            assert!(error.contains("deep_heaps.h5: byte"), "{error}");
+            assert!(error.contains("/run"), "{error}");
+            is_attribute.push(error.contains("attributes of /run: damaged HDF5"));
         }
     }
+    assert!(is_attribute.contains(&true) && is_attribute.contains(&false));
 }
 
 #[test]

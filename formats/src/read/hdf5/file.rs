@@ -5,6 +5,7 @@ use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, RwLock};
 
 use hdf5_reader::error::Error;
+use hdf5_reader::group::Group;
 use hdf5_reader::object_header::ObjectHeader;
 use hdf5_reader::{Hdf5File, OpenOptions, Storage, StorageBuffer};
 
@@ -12,6 +13,7 @@ use super::flat_heap::FlatHeaps;
 use super::global_heap::heap_object;
 use super::header_patch::{Addressing, Patch, virtual_layout};
 use super::links::{ExternalLink, external_links};
+use super::members::{Lookups, Members};
 use super::virtual_list::{VirtualPart, read_list};
 use crate::ParseError;
 use crate::read::CUT_SHORT;
@@ -46,6 +48,10 @@ struct Found {
     virtual_parts: BTreeMap<u64, Arc<Vec<VirtualPart>>>,
     /// Links to other files by the addresses of their groups.
     links: BTreeMap<u64, Arc<Vec<ExternalLink>>>,
+    /// Members of groups by the addresses of these.
+    members: BTreeMap<u64, Lookups>,
+    /// The first damaged attribute or heap of attributes.
+    attribute_fault: Option<ParseError>,
     /// Open files by their names in this one.
     others: BTreeMap<String, H5File>,
 }
@@ -221,6 +227,36 @@ impl H5File {
         let links = Arc::new(links.map_err(|e| self.error(&e, address, path))?);
         self.found().links.insert(address, Arc::clone(&links));
         Ok(links)
+    }
+
+    /// All members of `group`, if many of its names have been looked up.
+    pub(super) fn members(&self, group: &Group) -> Option<Arc<Members>> {
+        let mut found = self.found();
+        let lookups = found.members.entry(group.address()).or_default();
+        lookups.next(group)
+    }
+
+    /// Remembers damage of the attributes of the object at `address` with the name `path`. Attributes of types that
+    /// are not read count as missing.
+    pub(super) fn report_attribute(&self, error: &Error, address: u64, path: &str) {
+        let fault = self.error(error, address, &format!("attributes of {path}"));
+        if matches!(fault, ParseError::Malformed { .. }) {
+            self.found().attribute_fault.get_or_insert(fault);
+        }
+    }
+
+    /// Fails if attributes that were looked up, in this file or in those that it refers to, are damaged.
+    ///
+    /// # Errors
+    /// [`ParseError::Malformed`] with the name of their object.
+    pub(super) fn check_attributes(&self) -> Result<(), ParseError> {
+        let found = self.found();
+        if let Some(fault) = &found.attribute_fault {
+            return Err(fault.clone());
+        }
+        let others = found.others.values().cloned().collect::<Vec<_>>();
+        drop(found);
+        others.iter().try_for_each(Self::check_attributes)
     }
 
     /// The parts of the data set whose header is at `address`, if it is virtual and was met before.

@@ -17,6 +17,7 @@ mod h5part;
 mod header_patch;
 mod links;
 mod lzf;
+mod members;
 mod node;
 mod openpmd;
 mod piece;
@@ -81,8 +82,8 @@ impl Reader for Hdf5 {
         source: &mut ByteSource<'_>,
         budget: MemoryBudget,
     ) -> Result<Vec<Step>, ParseError> {
-        let dialect = dialect_of(&source.to_shared())?;
-        let infos = dialect.steps(budget)?;
+        let file = OpenFile::open(&source.to_shared())?;
+        let infos = file.checked(file.dialect.steps(budget))?;
         // Numbers that do not increase say nothing about the order
         let is_numbered = infos.iter().all(|info| info.number.is_some())
             && infos.is_sorted_by(|a, b| a.number < b.number);
@@ -103,16 +104,17 @@ impl Reader for Hdf5 {
         step: &Step,
         budget: MemoryBudget,
     ) -> Result<RawParticles, ParseError> {
-        let table = dialect_of(&source.to_shared())?.table(step.index, budget)?;
+        let file = OpenFile::open(&source.to_shared())?;
+        let table = file.checked(file.dialect.table(step.index, budget))?;
         table.read_all(budget)
     }
 
     fn ranges(&self, file: &SharedBytes) -> Result<Option<Box<dyn ParticleRanges>>, ParseError> {
-        let dialect = dialect_of(file)?;
-        if dialect.steps(MemoryBudget::UNLIMITED)?.len() != 1 {
+        let file = OpenFile::open(file)?;
+        if file.dialect.steps(MemoryBudget::UNLIMITED)?.len() != 1 {
             return Ok(None);
         }
-        let table = dialect.table(0, MemoryBudget::UNLIMITED)?;
+        let table = file.checked(file.dialect.table(0, MemoryBudget::UNLIMITED))?;
         Ok(Some(Box::new(TableRanges::new(table))))
     }
 
@@ -141,7 +143,7 @@ impl Reader for Hdf5 {
     }
 
     fn remarks_of_file(&self, file: &SharedBytes) -> Vec<String> {
-        let Ok((file, dialect)) = open(file) else {
+        let Ok(OpenFile { file, dialect }) = OpenFile::open(file) else {
             return Vec::new();
         };
         let mut remarks = dialect.remarks();
@@ -168,7 +170,7 @@ impl Reader for Hdf5 {
     }
 
     fn open_referenced(&self, file: &SharedBytes) {
-        let Ok((file, dialect)) = open(file) else {
+        let Ok(OpenFile { file, dialect }) = OpenFile::open(file) else {
             return;
         };
         // What is looked up on the way tells the files
@@ -181,16 +183,29 @@ impl Reader for Hdf5 {
     }
 }
 
-/// The layout of the file `bytes`.
-fn dialect_of(bytes: &SharedBytes) -> Result<Box<dyn Dialect>, ParseError> {
-    open(bytes).map(|(_, dialect)| dialect)
+/// An open file and its layout.
+struct OpenFile {
+    file: H5File,
+    dialect: Box<dyn Dialect>,
 }
 
-/// The file `bytes` and its layout.
-fn open(bytes: &SharedBytes) -> Result<(H5File, Box<dyn Dialect>), ParseError> {
-    let file = H5File::open(bytes)?;
-    let dialect = dialect_in(&Node::root(&file)?)?;
-    Ok((file, dialect))
+impl OpenFile {
+    /// Opens the file `bytes`.
+    fn open(bytes: &SharedBytes) -> Result<Self, ParseError> {
+        let file = H5File::open(bytes)?;
+        let dialect = dialect_in(&Node::root(&file)?);
+        file.check_attributes()?;
+        Ok(Self {
+            dialect: dialect?,
+            file,
+        })
+    }
+
+    /// `answer` of the layout, or damage of attributes that were looked up for it. These count as missing until here.
+    fn checked<T>(&self, answer: Result<T, ParseError>) -> Result<T, ParseError> {
+        self.file.check_attributes()?;
+        answer
+    }
 }
 
 fn dialect_in(root: &Node) -> Result<Box<dyn Dialect>, ParseError> {

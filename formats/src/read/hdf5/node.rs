@@ -122,6 +122,12 @@ impl Node {
         Ok(groups)
     }
 
+    /// Whether a name that is looked up is taken from a list of all members.
+    #[cfg(test)]
+    pub(super) fn is_opened_as_a_whole(&self) -> bool {
+        self.file.members(&self.group).is_some()
+    }
+
     /// What is the same for all names of the group.
     pub(super) fn key(&self) -> ObjectKey {
         self.file.key(self.file.place(self.group.address()))
@@ -133,7 +139,10 @@ impl Node {
     /// As [`Self::members`].
     pub(super) fn group(&self, name: &str) -> Result<Option<Self>, ParseError> {
         let path = self.path_of(name);
-        let group = self.file.with_virtual(&path, || self.group.group(name))?;
+        let group = match self.file.members(&self.group) {
+            Some(members) => members.group(name),
+            None => self.file.with_virtual(&path, || self.group.group(name))?,
+        };
         match group {
             Ok(group) => Ok(Some(Self::new(&self.file, group, path))),
             Err(Error::GroupNotFound(_)) => match self.linked(name)? {
@@ -165,7 +174,10 @@ impl Node {
     /// As [`Self::members`].
     pub(super) fn dataset(&self, name: &str) -> Result<Option<NodeDataset>, ParseError> {
         let path = self.path_of(name);
-        let dataset = self.file.with_virtual(&path, || self.group.dataset(name))?;
+        let dataset = match self.file.members(&self.group) {
+            Some(members) => members.dataset(name),
+            None => self.file.with_virtual(&path, || self.group.dataset(name))?,
+        };
         match dataset {
             Ok(dataset) => Ok(Some(NodeDataset {
                 file: self.file.clone(),
@@ -227,7 +239,7 @@ impl Node {
 
     /// The numbers of an attribute; `None` if it is missing or has no numbers.
     pub(super) fn numbers(&self, name: &str) -> Option<Vec<f64>> {
-        numbers(&self.group.attribute(name).ok()?)
+        numbers(&self.attribute(name)?)
     }
 
     /// The first number of an attribute.
@@ -237,14 +249,29 @@ impl Node {
 
     /// The texts of an attribute that is an array of them; empty if it is not.
     pub(super) fn texts(&self, name: &str) -> Vec<String> {
-        let attribute = self.group.attribute(name).ok();
-        let texts = attribute.and_then(|attribute| attribute.read_strings().ok());
+        let texts = self
+            .attribute(name)
+            .and_then(|attribute| attribute.read_strings().ok());
         texts.unwrap_or_default()
     }
 
     /// The text of an attribute, as one line.
     pub(super) fn text(&self, name: &str) -> Option<String> {
-        text(&self.group.attribute(name).ok()?)
+        text(&self.attribute(name)?)
+    }
+
+    /// An attribute, if there is one. Damage is reported to the file.
+    fn attribute(&self, name: &str) -> Option<Attribute> {
+        match self.group.attribute(name) {
+            Ok(attribute) => Some(attribute),
+            Err(Error::AttributeNotFound(_)) => None,
+            Err(error) => {
+                let address = self.group.address();
+                self.file
+                    .report_attribute(&error, address, self.shown_path());
+                None
+            }
+        }
     }
 
     fn shown_path(&self) -> &str {
