@@ -106,6 +106,7 @@ class Job:
 def render(
     positions: ArrayLike | Frame,
     *,
+    look: Literal["auto", "plain", "paper", "studio", "water", "whitted", "none"] | None = ...,
     radius: ArrayLike | Literal["auto", "vdw", "covalent"] | None = ...,
     attributes: Mapping[str, ArrayLike] | None = ...,
     camera: _Settings | None = ...,

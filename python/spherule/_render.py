@@ -12,6 +12,7 @@ from ._settings import merged, settings_text
 def render(
     positions,
     *,
+    look=None,
     radius=None,
     attributes=None,
     camera=None,
@@ -37,6 +38,8 @@ def render(
     positions : array (N, 3) or Frame
         World positions. Those in float32 that are C-contiguous and near zero are used without a copy. All others are
         converted to float32 relative to a common origin, which is subtracted in float64.
+    look : str, optional
+        "auto" (the default), "plain", "studio", "water", "whitted" or "none"; see the manual's page on defaults.
     radius : float, array (N,) or str, optional
         Radii of the spheres, in units of the positions; by default from the spacing of the particles. "vdw" and
         "covalent" are those of chemical elements, by the attribute `element`.
@@ -61,8 +64,8 @@ def render(
     up : str, optional
         The up axis, such as "y", "z" or "-x".
     cell : Cell or array, optional
-        The simulation cell: edges (3, 3), one in each row, or the three lengths of a box. It is drawn with
-        settings={"cell.visible": True}.
+        The simulation cell: edges (3, 3), one in each row, or the three lengths of a box. It is drawn if the particles
+        fill it.
     frame : int
         Number of the frame, for moving cameras and overlays.
     name : str
@@ -109,16 +112,17 @@ def render(
             image["width"], image["height"] = size
         except (TypeError, ValueError):
             raise ArrayError(f"size: expected (width, height), found {size!r}", place="size") from None
-    text = settings_text(
-        merged(
-            settings,
-            input={"radius": common, "up": up},
-            camera=camera,
-            image=image,
-            material={"color": color},
-            output={"channels": channels},
-        )
+    sections = merged(
+        settings,
+        input={"radius": common, "up": up},
+        camera=camera,
+        image=image,
+        material={"color": color},
+        output={"channels": channels},
     )
+    if look is not None:
+        sections["look"] = look
+    text = settings_text(sections)
     native = _spherule.render(
         positions,
         attributes,

@@ -117,7 +117,8 @@ fn every_option_is_a_key() {
 }
 
 /// Options whose `[default: ...]` is no value that could be given.
-const WORDS: [&str; 12] = [
+const WORDS: [&str; 13] = [
+    "fit",
     "where",
     "crop",
     "dpi",

@@ -68,6 +68,13 @@ pub(super) struct ManifestArgs {
     /// The same as [[overlay]] type = "text" in a manifest, which has more settings, such as text = "t = {time:.2f} s".
     #[arg(long, help_heading = "Look", display_order = 0)]
     pub(super) time_stamp: bool,
+    /// Turn around one frame, the middle one, in so many pictures
+    ///
+    /// Sets input.repeat, camera.mode = "turntable" and camera.degrees_per_frame = 360 / PICTURES. A still shows the first
+    /// of them.
+    #[arg(long, value_name = "PICTURES", value_parser = clap::value_parser!(u32).range(1..=100_000),
+        help_heading = "Camera", display_order = 0)]
+    pub(super) turntable: Option<u32>,
     /// Triangle mesh next to the particles, such as a tank: STL, OBJ, PLY, VTK. May be repeated.
     ///
     /// A name with #### or %04d for the frame number is one mesh per frame. [[mesh]] in a manifest has more settings:
@@ -177,6 +184,13 @@ impl ManifestArgs {
         if let Some(scale) = &self.color_scale {
             let value = scale.clone();
             list.push(over("material.color.scale", value, "--color-scale")?);
+        }
+        if let Some(count) = self.turntable {
+            let shown = format!("--turntable {count}");
+            list.push(over("input.repeat", i64::from(count), &shown)?);
+            list.push(over("camera.mode", "turntable", &shown)?);
+            let each = 360.0 / f64::from(count);
+            list.push(over("camera.degrees_per_frame", each, &shown)?);
         }
         if let Some(path) = &self.camera_path {
             let keys = camera_keys(path)?;

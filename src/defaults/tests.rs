@@ -27,8 +27,8 @@ fn category(name: &str, values: &[i64], at_rest: &[i64]) -> Category {
 fn completed(text: &str, facts: &Facts, files: Files<'_>) -> (Manifest, String) {
     let text = format!("input.path = \"data\"\n{text}");
     // Keys before all tables
-    let text = match text.split_once("look") {
-        Some((before, after)) => format!("look{after}\n{before}"),
+    let text = match text.split_once("look =") {
+        Some((before, after)) => format!("look ={after}\n{before}"),
         None => text,
     };
     let source = ManifestSource::new(text, Path::new("job.toml"), Vec::new());
@@ -90,7 +90,7 @@ fn elements_have_their_colours_and_radii() {
     assert_eq!(own.bonds.find, BondSearch::None);
     assert!(attribute(&own).is_none() && !has_legend(&own));
     // A map alone is that of the elements
-    let mapped = of("material.color.map = \"tol-muted\"", &atoms);
+    let mapped = of("material.color.map = \"turbo\"", &atoms);
     assert_eq!(attribute(&mapped), Some("element"));
 }
 
@@ -106,8 +106,11 @@ fn categories_come_before_speed_and_walls_are_left_out() {
     fluid.categories = vec![category("type", &[0, 1, 3], &[0, 3])];
     let (manifest, lines) = completed("", &fluid, Files::default());
     assert_eq!(attribute(&manifest), None);
-    let condition = manifest.select.condition.map(|c| c.to_string());
-    assert_eq!(condition.as_deref(), Some("type != 0 && type != 3"));
+    let condition = (
+        "select.where".to_owned(),
+        "\"type != 0 && type != 3\"".to_owned(),
+    );
+    assert!(manifest.settings().contains(&condition));
     assert!(
         lines.contains("left out: particles with type 0, 3"),
         "{lines}"
@@ -221,11 +224,7 @@ fn jobs_that_go_on_have_the_defaults_of_their_plan() {
     atoms.elements = Some(Elements { has_others: true });
     atoms.has_time = true;
     let begun = of("", &atoms);
-    for text in [
-        "",
-        "material.color.map = \"tol-muted\"",
-        "image.samples = 4",
-    ] {
+    for text in ["", "material.color.map = \"turbo\"", "image.samples = 4"] {
         let begun = of(text, &atoms);
         let source = ManifestSource::new(
             format!("input.path = \"data\"\n{text}"),

@@ -46,7 +46,7 @@ impl JobManifest {
             .as_ref()
             .filter(|_| source.lacks("input.parts"))
         {
-            sequence.keep_parts(parts)?;
+            self.keep_parts(sequence, Some(parts))?;
         }
         manifest.look = Look::None;
         self.manifest = manifest;
@@ -68,7 +68,7 @@ impl JobManifest {
                 walls.left_out.join(", "),
                 sequence.part_names().join(",")
             ));
-            sequence.keep_parts(&walls.kept)?;
+            self.keep_parts(sequence, Some(&walls.kept))?;
             layers.extend(Override::new("input.parts", walls.kept, "the defaults"));
         }
         let facts = in_thread(|| Facts::of(sequence));

@@ -69,11 +69,24 @@ impl JobManifest {
             let path = self.base.join(topology);
             in_thread(|| sequence.add_topology(&path))?;
         }
-        if let Some(parts) = &input.parts {
-            sequence.keep_parts(parts)?;
-        }
+        self.keep_parts(&mut sequence, input.parts.as_deref())?;
         sequence.set_images(self.manifest.cell.images());
         Ok(sequence)
+    }
+
+    /// Keeps only these `parts` of `sequence`, and repeats a frame if the manifest says so.
+    pub(super) fn keep_parts(
+        &self,
+        sequence: &mut Sequence,
+        parts: Option<&[String]>,
+    ) -> Result<(), RunError> {
+        if let Some(parts) = parts {
+            sequence.keep_parts(parts)?;
+        }
+        if let Some(count) = self.manifest.input.repeat {
+            sequence.repeat_middle(count);
+        }
+        Ok(())
     }
 
     /// The directory that paths are relative to, absolute.

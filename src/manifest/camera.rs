@@ -69,7 +69,7 @@ section! {
         /// 99% is that part of the particles of all frames together; the others are left out if they are far from these.
         /// this is the same for the frame of a still alone. all is every particle of all frames, except at most 1 % of a
         /// frame that are far from the others.
-        fit: Option<FitSetting> = None, example("\"99%\""), unset("99%, and this for stills"), flag("fit", "WHAT", "Camera");
+        fit: Option<FitSetting> = None, example("\"99%\""), unset("for stills this, else 99%"), flag("fit", "WHAT", "Camera");
         /// auto: the point in the middle of the picture
         center: Option<DVec3> = None, example("[0.5, 0.5, 0.5]");
         /// Enlarges the picture around its middle
@@ -184,19 +184,6 @@ impl Camera {
     }
 
     fn check(&self, section: &Section<'_>) {
-        let is_automatic = matches!(self.mode, CameraMode::Auto | CameraMode::Turntable);
-        for (key, is_given) in [
-            ("fit", self.fit.is_some()),
-            ("box", self.bounds.is_some()),
-            ("center", self.center.is_some()),
-        ] {
-            if is_given && !is_automatic {
-                section.wrong(
-                    key,
-                    "is given, but eye and look_at place the camera; remove it or them",
-                );
-            }
-        }
         if self.center.is_some() && self.mode == CameraMode::Turntable {
             section.wrong(
                 "center",

@@ -89,6 +89,10 @@ section! {
         ///
         /// 10-1 has the same frames as 1-10, from the last to the first.
         frames: Option<FrameRange> = None, or("all"), affects(Affects::Nothing), flag("frames", "RANGE", "Input");
+        /// Render one frame so many times, with the numbers from 0, for a camera that moves
+        ///
+        /// It is the middle one; name its file to have another. --turntable 36 sets it with a camera that goes around once.
+        repeat: Option<u32> = None, from(1), to(100_000), affects(Affects::Nothing), example("36"), unset("all frames once");
         /// Parts to keep if frames consist of several files or blocks: fluid,oil
         ///
         /// Case does not matter, and a fragment of a name is enough.

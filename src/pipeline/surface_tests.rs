@@ -31,6 +31,8 @@ fn particles() -> Vec<Vec3> {
 fn opened(file: &Path) -> (Setup, Sequence) {
     let mut manifest = Manifest::new("in");
     manifest.input.radius = RadiusSetting::Length(0.12);
+    // The lone particles, too
+    manifest.camera.fit = Some(crate::manifest::FitSetting::All);
     // Highlights show the normals of clear spheres
     manifest.render.integrator = Some(IntegratorKind::Whitted);
     let sequence = Sequence::open(&SequenceInput::from_path(file)).expect("a frame");

@@ -342,6 +342,21 @@ impl Sequence {
         self.images = images;
     }
 
+    /// Replaces the frames by `count` times the middle one, with the numbers from 0: for pictures from all sides.
+    pub fn repeat_middle(&mut self, count: u32) {
+        let Some(middle) = self.frames.get(self.frames.len() / 2).cloned() else {
+            return;
+        };
+        let numbers = 0..i64::from(count);
+        let repeated = numbers.map(|number| SequenceFrame {
+            number,
+            parts: middle.parts.clone(),
+        });
+        self.frames = repeated.collect();
+        // Notes are about the frames that there were
+        self.notes.clear();
+    }
+
     /// Keeps only the frames for which `keep` is true.
     pub fn keep_frames(&mut self, keep: impl FnMut(&SequenceFrame) -> bool) {
         self.frames.retain(keep);

@@ -55,7 +55,7 @@ impl Value for FitSetting {
     fn schema(_: &Key) -> Json {
         json!({ "anyOf": [
             { "enum": [ALL, THIS] },
-            { "type": "string", "pattern": "^[0-9]+(\\.[0-9]+)?%$" },
+            { "type": "string", "pattern": "^(100|[5-9][0-9](\\.[0-9]+)?)%$" },
         ] })
     }
 
