@@ -12,6 +12,7 @@ use super::paths::absolute;
 use super::signals::SignalMessages;
 use crate::job::KIND;
 use crate::movie::Observer;
+use crate::output::PictureFormat;
 use crate::picture::is_own_file;
 use crate::report::job::{HTML_FILE, JSON_FILE};
 
@@ -45,7 +46,7 @@ pub(super) struct JobPictures {
     pub(super) missing: Vec<i64>,
     /// Whether a worker is at work.
     pub(super) is_running: bool,
-    /// Whether pictures are previews.
+    /// Whether pictures are PNG files.
     pub(super) has_previews: bool,
     /// Exposure of previews, stops.
     pub(super) exposure: f32,
@@ -74,7 +75,8 @@ impl JobPictures {
             )));
         }
         let exposure = find("output.preview_exposure").and_then(|value| value.parse().ok());
-        let has_previews = find("output.preview").is_none_or(|value| value == "true");
+        let mut frames = state.plan().frames().iter();
+        let has_previews = frames.any(|frame| frame.outputs.iter().any(is_png));
         let is_transparent = find("output.transparent").is_some_and(|value| value == "true");
         if is_transparent && !has_previews {
             return Err(CliError::other(format!(
@@ -218,6 +220,10 @@ fn real(path: &Path) -> Result<PathBuf, CliError> {
         .join(name))
 }
 
+fn is_png(path: &String) -> bool {
+    PictureFormat::of(Path::new(path)) == Some(PictureFormat::Png)
+}
+
 fn picture(state: &JobState, frame: i64) -> Option<JobPicture> {
     let outputs = &state.plan().frame(frame)?.outputs;
     let dir = if state.dir().as_os_str().is_empty() {
@@ -226,12 +232,10 @@ fn picture(state: &JobState, frame: i64) -> Option<JobPicture> {
         state.dir()
     };
     let image = dir.join(outputs.first()?);
-    let is_png = |path: &&String| {
-        Path::new(path)
-            .extension()
-            .is_some_and(|e| e.eq_ignore_ascii_case("png"))
-    };
-    let preview = outputs.iter().find(is_png).map(|path| dir.join(path));
+    let preview = outputs
+        .iter()
+        .find(|path| is_png(path))
+        .map(|path| dir.join(path));
     Some(JobPicture {
         number: frame,
         picture: preview.unwrap_or_else(|| image.clone()),

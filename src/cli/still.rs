@@ -1,6 +1,5 @@
 //! `spherule still`: renders a single frame to try settings. No job: no plan, ledger, manifest or report.
 
-use std::ffi::OsStr;
 use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -16,13 +15,20 @@ use super::paths::absolute;
 use super::render::print_summary;
 use super::{CliError, Outcome, disk, print, signals};
 use crate::job::{JobManifest, RenderJob, frames_in, require_one_fits};
-use crate::pipeline::{ImageError, PictureKind, WriteError, make_picture};
+use crate::output::{OutputError, PictureFormat};
+use crate::pipeline::{ImageError, WriteError, make_image};
 use crate::render::Channels;
 
-/// Signatures of the files that `still` may replace: OpenEXR and PNG.
-const IMAGE_SIGNATURES: [&[u8]; 2] = [b"\x76\x2f\x31\x01", b"\x89PNG\r\n\x1a\n"];
+/// Signatures of the files that `still` may replace: OpenEXR, PNG, JPEG and TIFF.
+const IMAGE_SIGNATURES: [&[u8]; 4] = [
+    b"\x76\x2f\x31\x01",
+    b"\x89PNG\r\n\x1a\n",
+    b"\xff\xd8\xff",
+    b"II*\0",
+];
 
-const OUTPUT_HELP: &str = "Image to write: look.png or look.exr; an existing image is replaced";
+const OUTPUT_HELP: &str =
+    "Image to write: look.png, look.exr, look.jpg or look.tif; an existing image is replaced";
 
 const EXAMPLES: &str = "Examples:
   spherule still dump -o look.png
@@ -104,10 +110,13 @@ pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
     let _signals = signals::listen(SIGNAL_MESSAGES)?;
     let shown = args.manifest.keys.take("output").map(PathBuf::from);
     let shown = shown.ok_or_else(|| CliError::other("--output: is missing"))?;
-    let kind = kind(&shown)?;
+    let format = format_of(&shown)?;
     let output = absolute(&shown)?;
     let mut requested = args.manifest.manifest()?;
     use_threads(requested.manifest.job.threads)?;
+    if format == PictureFormat::Jpeg && requested.manifest.output.transparent {
+        return Err(CliError::other(OutputError::NoAlpha.to_string()));
+    }
     let mut sequence = open_sequence(&requested)?;
     for note in sequence.notes() {
         note!("{note}");
@@ -124,7 +133,7 @@ pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
     for note in render_job.scene_notes()? {
         note!("{note}");
     }
-    if kind == PictureKind::Png {
+    if format != PictureFormat::Exr {
         setup.picture.render.channels = Channels::COLOR;
     }
     print_summary(&sequence, &survey, &setup);
@@ -137,7 +146,7 @@ pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
     require_one_fits(&tasks)?;
     let task = tasks.first().expect("the frame is in the sequence");
     make_directory(&output)?;
-    let rendered = make_picture(&setup, &sequence, task, kind, |note| note!("{note}"));
+    let rendered = make_image(&setup, &sequence, task, |note| note!("{note}"));
     match rendered {
         Ok(report) => {
             print::lines([format!(
@@ -157,16 +166,13 @@ pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
 }
 
 /// The file format of the extension.
-fn kind(path: &Path) -> Result<PictureKind, CliError> {
-    let extension = path.extension().map(OsStr::to_ascii_lowercase);
-    match extension.as_ref().and_then(|e| e.to_str()) {
-        Some("exr") => Ok(PictureKind::Exr),
-        Some("png") => Ok(PictureKind::Png),
-        _ => Err(CliError::other(format!(
-            "--output {}: the name must end in .png or .exr; other programs convert PNG to other formats",
+fn format_of(path: &Path) -> Result<PictureFormat, CliError> {
+    PictureFormat::of(path).ok_or_else(|| {
+        CliError::other(format!(
+            "--output {}: the name must end in .png, .exr, .jpg or .tif; other programs convert PNG to other formats",
             path.display()
-        ))),
-    }
+        ))
+    })
 }
 
 /// The requested frame, or the middle one of those that the manifest selects. The first frame of a simulation is

@@ -9,6 +9,7 @@ use super::pictures::{JobPictures, PicturesArgs};
 use super::{CliError, Outcome, print};
 use crate::manifest::ATTRIBUTE_CHANNEL;
 use crate::movie::FrameRate;
+use crate::output::PictureFormat;
 use crate::report::job::JobReport;
 use crate::viewer::{PageContent, ViewerError, ViewerFrame, ViewerSettings, viewer_page};
 
@@ -78,13 +79,17 @@ pub(super) fn run(args: &ViewArgs) -> Result<Outcome, CliError> {
     if !pictures.has_previews && !args.embed {
         message!("the job has no previews: pictures are made from the images, into the page");
     }
+    let format_of = |frame: &ViewerFrame| PictureFormat::of(&frame.image);
+    let has_exr = frames
+        .iter()
+        .any(|frame| format_of(frame) == Some(PictureFormat::Exr));
     let settings = ViewerSettings {
         title: title(&pictures),
         rate: args.fps.per_second(),
         embed: args.embed || !pictures.has_previews,
         width: args.width.map(usize::from),
         exposure: pictures.exposure,
-        data: !args.no_data,
+        data: !args.no_data && has_exr,
         attributes: attributes(&pictures),
     };
     let report = JobReport::of_plan(&pictures.state);

@@ -119,7 +119,7 @@ impl RenderJob {
     fn preview(&self, frame: i64) -> Option<PathBuf> {
         let output = &self.manifest.output;
         let path = || self.dir().join(output.path.preview_path_for(frame));
-        output.preview.then(path)
+        output.has_previews().then(path)
     }
 
     /// The request for the job.

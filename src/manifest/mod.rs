@@ -563,9 +563,10 @@ impl Manifest {
         settings
     }
 
-    /// Whether the PNG next to an image has alpha.
-    const fn has_transparent_previews(&self) -> bool {
-        self.output.transparent && self.output.preview && !self.has_opaque_previews
+    /// Whether the PNG of an image has alpha.
+    fn has_transparent_previews(&self) -> bool {
+        let has_png = self.output.preview || self.output.path.is_png();
+        self.output.transparent && has_png && !self.has_opaque_previews
     }
 
     /// A complete manifest with every key and comments; reading it gives an equal manifest.
@@ -685,11 +686,17 @@ fn known_keys() -> Vec<String> {
     entries.list().iter().map(|e| e.key.clone()).collect()
 }
 
-/// The dotted keys of this name that are not in lists.
+/// The dotted keys that are not in lists and have this name, with or without their table, however its words are joined:
+/// `f_stop`, `f-stop`, `camera-fstop`.
 #[cfg(feature = "cli")]
 pub(crate) fn keys_called(name: &str) -> Vec<String> {
+    let joined = |text: &str| text.replace(['-', '_', '.'], "").to_ascii_lowercase();
+    let name = joined(name);
     let mut all = known_keys();
-    all.retain(|key| key.rsplit('.').next() == Some(name));
+    all.retain(|key| {
+        let (_, last) = key.rsplit_once('.').unwrap_or_default();
+        joined(last) == name || joined(key) == name
+    });
     all
 }
 

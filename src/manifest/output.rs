@@ -28,6 +28,8 @@ section! {
     /// Images to write, and their channels
     Output {
         /// Images to write; #### or %04d is the frame number, with at least that many digits
+        ///
+        /// A name that ends in .png has only the picture: no EXR, no other channels.
         path: OutputPattern = OutputPattern::parse(DEFAULT_PATH).expect("a good pattern"),
             flag("output", "PATTERN", "Output");
         /// Channels: RGBA,Z,N,id,P,V,albedo,lights,light_groups,shadow,motion,cryptomatte,overlay,attribute:NAME
@@ -48,18 +50,25 @@ section! {
         /// If it differs from `compression`, the EXR has two parts: `color` (RGBA, light channels, light groups, noisy)
         /// and `data` (all other channels).
         data_compression: Option<Compression> = None, example("\"zips\""), unset("the same as compression");
-        /// Write a PNG next to each image
+        /// Write a PNG next to each EXR
         preview: bool = true;
         /// Exposure of the PNG, stops
         preview_exposure: f32 = 0.0, from(-100), to(100), unit("stops");
         /// Omit the background, for compositing: the EXR and the PNG have alpha
-        transparent: bool = false;
+        transparent: bool = false, flag("transparent", "", "Output");
         /// Time from one frame to the next, for the channel motion
         ///
         /// In the unit of time of the velocities. By default, it comes from the times in the files, or is 1 / fps.
         frame_time: Option<f64> = None, above(0), example("0.04"), unset("from the files, or 1 / fps");
         /// Frames per second, stored in the images
         fps: Option<f64> = None, above(0), example("24.0"), unset("not stored");
+    }
+}
+
+impl Output {
+    /// Whether a PNG is written next to each image.
+    pub fn has_previews(&self) -> bool {
+        self.preview && !self.path.is_png()
     }
 }
 
@@ -78,7 +87,7 @@ impl Value for OutputPattern {
     }
 
     fn schema(_: &Key) -> Json {
-        json!({ "type": "string", "pattern": r"[^/\\]\.[eE][xX][rR]$" })
+        json!({ "type": "string", "pattern": r"[^/\\]\.([eE][xX][rR]|[pP][nN][gG])$" })
     }
 
     /// Only the file name: a job may be moved together with its images.

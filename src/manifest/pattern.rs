@@ -101,24 +101,31 @@ impl FramePattern {
 pub struct OutputPattern(FramePattern);
 
 impl OutputPattern {
-    /// Parses a pattern for EXR files.
+    /// Parses a pattern for EXR or PNG files.
     ///
     /// # Errors
-    /// It does not end in `.exr` or does not name a file, and those of [`FramePattern::parse`].
+    /// It does not end in `.exr` or `.png` or does not name a file, and those of [`FramePattern::parse`].
     pub fn parse(text: &str) -> Result<Self, String> {
-        let is_exr = Path::new(text)
-            .extension()
-            .is_some_and(|e| e.eq_ignore_ascii_case("exr"));
-        if !is_exr {
-            return Err("must end in .exr (example: out/frame.####.exr)".to_owned());
+        if !has_extension(text, "exr") && !has_extension(text, "png") {
+            return Err("must end in .exr or .png (example: out/frame.####.exr)".to_owned());
         }
         FramePattern::parse(text, "frame.####.exr").map(Self)
+    }
+
+    /// Whether the images are PNG files, which have no previews and no channels besides RGBA.
+    pub fn is_png(&self) -> bool {
+        has_extension(self.as_str(), "png")
     }
 
     /// The path of the preview of `frame`: that of the image with `.png`.
     pub fn preview_path_for(&self, frame: i64) -> PathBuf {
         self.path_for(frame).with_extension("png")
     }
+}
+
+fn has_extension(path: &str, extension: &str) -> bool {
+    let found = Path::new(path).extension();
+    found.is_some_and(|found| found.eq_ignore_ascii_case(extension))
 }
 
 impl Deref for OutputPattern {
@@ -211,6 +218,10 @@ mod tests {
         assert_eq!(pattern.file_name(), "f.####.exr");
         assert!(pattern.has_number());
         assert_eq!(pattern.preview_path_for(3), Path::new("a/b/f.0003.png"));
+        assert!(!pattern.is_png());
+        let png = OutputPattern::parse("a/f.####.PNG").unwrap();
+        assert!(png.is_png());
+        assert_eq!(png.path_for(3), Path::new("a/f.0003.PNG"));
         let still = OutputPattern::parse("still.exr").unwrap();
         assert!(!still.has_number());
         assert_eq!(still.dir(), Path::new(""));
@@ -227,7 +238,7 @@ mod tests {
         refused("", ".exr");
         refused("out/", ".exr");
         refused("out/.exr", ".exr");
-        refused("a.####.png", ".exr");
+        refused("a.####.jpg", ".exr or .png");
         refused("####/a.exr", "directory");
         refused("a.##.##.exr", "two numbers");
         refused("a.##.%04d.exr", "two numbers");

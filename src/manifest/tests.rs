@@ -281,7 +281,10 @@ fn wrong_types_name_the_expected_type() {
         "[[light]]\ntype = \"point\"",
         &["light.0.position: is missing"],
     );
-    refused("[output]\npath = \"x.png\"", &["output.path", ".exr"]);
+    refused(
+        "[output]\npath = \"x.jpg\"",
+        &["output.path", ".exr or .png"],
+    );
     refused("[output]\nchannels = []", &["output.channels"]);
     refused(
         "[output]\nchannels = [\"RGBA\", \"z\"]",

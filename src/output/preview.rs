@@ -46,56 +46,78 @@ pub fn encode_preview(
     options: &PreviewOptions,
     overlays: &[Sprite],
 ) -> Result<Vec<u8>, OutputError> {
-    let gain = exp2(options.exposure);
-    let width = film.width.max(1) as usize;
-    let is_transparent = options.background == PreviewBackground::Transparent;
-    let color_type = if is_transparent {
+    let picture = SrgbPicture::of(film, options, overlays);
+    let color_type = if picture.has_alpha {
         ExtendedColorType::Rgba8
     } else {
         ExtendedColorType::Rgb8
     };
-    let pixel_len = usize::from(color_type.channel_count());
-    let mut bytes = vec![0; film.color.len() * pixel_len];
-    let (mut linear, mut thresholds) = (vec![0.0; 3 * width], vec![0.0; 3 * width]);
-    let mut colors = vec![0; 3 * width];
-    let rows = film
-        .color
-        .chunks(width)
-        .zip(bytes.chunks_mut(pixel_len * width));
-    for (y, (row, bytes)) in (0..film.height).zip(rows) {
-        let pixels = linear.as_chunks_mut().0.iter_mut();
-        for (pixel, &[r, g, b, a]) in pixels.zip(row) {
-            let color = match options.background {
-                PreviewBackground::Included => Vec3::new(r, g, b),
-                PreviewBackground::Transparent => straight(Vec3::new(r, g, b), a),
-                PreviewBackground::Color(color) => Vec3::new(r, g, b) + color * (1.0 - a),
-            };
-            *pixel = view_transform(color * gain).to_array();
-        }
-        let pixels = thresholds.as_chunks_mut::<3>().0.iter_mut();
-        let [left, top] = options.first_pixel.map(i32::cast_unsigned);
-        for (pixel, x) in pixels.zip(0..film.width) {
-            // One threshold for all components, so that grey stays grey
-            *pixel = [dither_threshold(left.wrapping_add(x), top.wrapping_add(y)); 3];
-        }
-        bytes_from_linear(Supported::default(), &linear, &thresholds, &mut colors);
-        let y = i32::try_from(y).unwrap_or(i32::MAX);
-        if is_transparent {
-            add_alpha(&colors, row, &thresholds, bytes);
-            overlays.iter().for_each(|o| o.draw_over_rgba(y, bytes));
-        } else {
-            bytes.copy_from_slice(&colors);
-            overlays.iter().for_each(|o| o.draw_over(y, bytes));
-        }
-    }
     let mut file = Vec::new();
     PngEncoder::new(&mut file)
-        .write_image(&bytes, film.width, film.height, color_type)
+        .write_image(&picture.bytes, picture.width, picture.height, color_type)
         .map_err(OutputError::Png)?;
     if let Some(dpi) = options.dpi {
         file.splice(AFTER_HEADER..AFTER_HEADER, density_chunk(dpi));
     }
     Ok(file)
+}
+
+/// A finished picture: 8-bit sRGB, dithered.
+pub(super) struct SrgbPicture {
+    /// RGB, or RGBA with colours that are not multiplied by alpha, row by row from the top.
+    pub(super) bytes: Vec<u8>,
+    pub(super) width: u32,
+    pub(super) height: u32,
+    pub(super) has_alpha: bool,
+}
+
+impl SrgbPicture {
+    /// The picture of `film`, with `overlays` over it.
+    pub(super) fn of(film: &Film, options: &PreviewOptions, overlays: &[Sprite]) -> Self {
+        let gain = exp2(options.exposure);
+        let width = film.width.max(1) as usize;
+        let is_transparent = options.background == PreviewBackground::Transparent;
+        let pixel_len = if is_transparent { 4 } else { 3 };
+        let mut bytes = vec![0; film.color.len() * pixel_len];
+        let (mut linear, mut thresholds) = (vec![0.0; 3 * width], vec![0.0; 3 * width]);
+        let mut colors = vec![0; 3 * width];
+        let rows = film
+            .color
+            .chunks(width)
+            .zip(bytes.chunks_mut(pixel_len * width));
+        for (y, (row, bytes)) in (0..film.height).zip(rows) {
+            let pixels = linear.as_chunks_mut().0.iter_mut();
+            for (pixel, &[r, g, b, a]) in pixels.zip(row) {
+                let color = match options.background {
+                    PreviewBackground::Included => Vec3::new(r, g, b),
+                    PreviewBackground::Transparent => straight(Vec3::new(r, g, b), a),
+                    PreviewBackground::Color(color) => Vec3::new(r, g, b) + color * (1.0 - a),
+                };
+                *pixel = view_transform(color * gain).to_array();
+            }
+            let pixels = thresholds.as_chunks_mut::<3>().0.iter_mut();
+            let [left, top] = options.first_pixel.map(i32::cast_unsigned);
+            for (pixel, x) in pixels.zip(0..film.width) {
+                // One threshold for all components, so that grey stays grey
+                *pixel = [dither_threshold(left.wrapping_add(x), top.wrapping_add(y)); 3];
+            }
+            bytes_from_linear(Supported::default(), &linear, &thresholds, &mut colors);
+            let y = i32::try_from(y).unwrap_or(i32::MAX);
+            if is_transparent {
+                add_alpha(&colors, row, &thresholds, bytes);
+                overlays.iter().for_each(|o| o.draw_over_rgba(y, bytes));
+            } else {
+                bytes.copy_from_slice(&colors);
+                overlays.iter().for_each(|o| o.draw_over(y, bytes));
+            }
+        }
+        Self {
+            bytes,
+            width: film.width,
+            height: film.height,
+            has_alpha: is_transparent,
+        }
+    }
 }
 
 /// A colour that is not multiplied by `alpha`; black where nothing covers the background.

@@ -12,7 +12,10 @@ use super::overlays;
 use super::renderer::TracedFrame;
 use super::setup::Setup;
 use crate::metrics::{MemoryPeaks, MemoryUse};
-use crate::output::{CustomAttribute, ExrOptions, OutputError, encode_preview, write_exr};
+use crate::output::{
+    CustomAttribute, ExrOptions, OutputError, PictureFormat, encode_picture, encode_preview,
+    write_exr,
+};
 use crate::render::Film;
 use crate::report::FrameReport;
 use crate::report::frame::RssSummary;
@@ -28,21 +31,53 @@ pub(super) fn write_frame(
     overlays::store(&mut frame.film, &sprites);
     let task = &frame.task;
     let mut report = frame.report.clone();
-    let at = |path: &Path| {
-        let path = path.to_owned();
-        move |source| WriteError::Io { path, source }
-    };
     // The preview first: users wait for the EXR, and the ledger entry covers both
     if let Some(path) = &task.preview {
         let png = encode_preview(&frame.film, &setup.preview_from(&frame.camera), &sprites)?;
         publish(path, &png).map_err(at(path))?;
     }
+    let format = PictureFormat::of(&task.image).unwrap_or(PictureFormat::Exr);
+    let picture = match format {
+        PictureFormat::Exr => None,
+        format => {
+            let options = setup.preview_from(&frame.camera);
+            Some(encode_picture(&frame.film, &options, &sprites, format)?)
+        }
+    };
     drop(sprites);
     if report.bytes.file.total() > 0 {
         peaks.use_samples_only();
     }
     peaks.update(frame.memory);
-    // Encode and publish the EXR
+    let (film, clamped) = match picture {
+        Some(picture) => {
+            peaks.update(MemoryUse::now());
+            publish(&task.image, &picture).map_err(at(&task.image))?;
+            (frame.film, 0)
+        }
+        None => publish_exr(setup, frame, peaks)?,
+    };
+    // Complete the report
+    report.clamped_pixels = clamped;
+    report.seconds.encode = start.elapsed().as_secs_f64();
+    let now = MemoryUse::now();
+    peaks.update(now);
+    report.rss = RssSummary {
+        anonymous_peak: peaks.anonymous,
+        file_peak: peaks.file,
+        total_peak: peaks.total,
+        anonymous: now.anonymous,
+    };
+    Ok((report, film))
+}
+
+/// Encodes the EXR of `frame` and publishes it. Returns its planes, and the number of clamped values.
+fn publish_exr(
+    setup: &Setup,
+    frame: TracedFrame,
+    peaks: &mut MemoryPeaks,
+) -> Result<(Film, u64), WriteError> {
+    let task = &frame.task;
     let mut file = Publisher::create(&task.image).map_err(at(&task.image))?;
     let mut sampler = MemorySampler {
         out: &mut file,
@@ -55,19 +90,17 @@ pub(super) fn write_frame(
             Ok(source) => at(&task.image)(source),
             Err(error) => error.into(),
         })?;
-    // Complete the report
-    report.clamped_pixels = clamped;
     file.commit().map_err(at(&task.image))?;
-    report.seconds.encode = start.elapsed().as_secs_f64();
-    let now = MemoryUse::now();
-    peaks.update(now);
-    report.rss = RssSummary {
-        anonymous_peak: peaks.anonymous,
-        file_peak: peaks.file,
-        total_peak: peaks.total,
-        anonymous: now.anonymous,
-    };
-    Ok((report, film))
+    Ok((film, clamped))
+}
+
+/// The error of writing to `path`.
+fn at(path: &Path) -> impl Fn(io::Error) -> WriteError + use<> {
+    let path = path.to_owned();
+    move |source| WriteError::Io {
+        path: path.clone(),
+        source,
+    }
 }
 
 impl TracedFrame {

@@ -59,7 +59,7 @@ pub use setup::{
     RunSettings, Setup, TrailStyle,
 };
 pub use shutter::{FrameStep, Shutter};
-pub use single::{PictureKind, make_image, make_picture, trace_particles};
+pub use single::{make_image, trace_particles};
 pub use trace::{CpuRenderer, renderer_of};
 pub use work::RenderWork;
 
@@ -73,7 +73,7 @@ pub struct ImageTask {
     pub frame: i64,
     /// Index in the sequence.
     pub index: usize,
-    /// Path of the EXR.
+    /// Path of the image: an EXR, or another picture file by its ending.
     pub image: PathBuf,
     /// Path of the optional PNG.
     pub preview: Option<PathBuf>,

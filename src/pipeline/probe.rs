@@ -15,7 +15,7 @@ use super::{
     BuiltFrame, FrameRenderer, FrameSize, ImageTask, LoadError, Overlap, Setup, TraceError,
     load_frame, renderer_of,
 };
-use crate::output::{OutputError, encode_exr, encode_preview};
+use crate::output::{OutputError, PictureFormat, encode_exr, encode_preview};
 use crate::render::{Deadline, Film, RenderError};
 
 /// Width in pixels of the first mosaic of tiles; each further one is twice as wide.
@@ -249,9 +249,16 @@ impl Trial {
         let pool = ThreadPoolBuilder::new().num_threads(1).build();
         let pool = pool?;
         let start = Instant::now();
-        let exr = pool.install(|| encode_exr(&self.film, &full.picture.exr));
-        let mut bytes = exr?.bytes.len();
-        if task.preview.is_some() {
+        let has_exr = matches!(
+            PictureFormat::of(&task.image),
+            Some(PictureFormat::Exr) | None
+        );
+        let mut bytes = 0;
+        if has_exr {
+            let exr = pool.install(|| encode_exr(&self.film, &full.picture.exr));
+            bytes += exr?.bytes.len();
+        }
+        if task.preview.is_some() || !has_exr {
             let camera = full.camera_at(task.frame).map_err(TraceError::Camera)?;
             let options = full.preview_from(&camera);
             let png = encode_preview(&self.film, &options, &[])?;

@@ -1,14 +1,13 @@
 //! Renders one image, with no other frame in memory.
 
 use std::sync::atomic::AtomicBool;
-use std::time::Instant;
 
 use spherule_formats::{PositionSlice, RawParticles, Sequence};
-use spherule_jobs::{catch_panic, publish};
+use spherule_jobs::catch_panic;
 
 use super::ImageTask;
 use super::encode::write_frame;
-use super::error::{ImageError, WriteError};
+use super::error::ImageError;
 use super::load::{LoadedFrame, load_frame, load_particles};
 use super::load_error::LoadError;
 use super::renderer::TracedFrame;
@@ -18,16 +17,7 @@ use crate::metrics::MemoryPeaks;
 use crate::render::Stop;
 use crate::report::FrameReport;
 
-/// The file format of a picture outside a job.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PictureKind {
-    /// OpenEXR, like the images of a job.
-    Exr,
-    /// PNG, like the previews of a job.
-    Png,
-}
-
-/// Renders the image of `task` with its preview. Passes notes for the user to `note`.
+/// Renders the image of `task`, in the format of its name, with its preview. Passes notes for the user to `note`.
 ///
 /// # Errors
 /// See [`ImageError`]. No file is left behind.
@@ -38,24 +28,9 @@ pub fn make_image(
     note: impl FnMut(String),
 ) -> Result<FrameReport, ImageError> {
     let traced = trace_single(setup, sequence, task, note)?;
-    catch_panic(|| write_exr(setup, traced))
-}
-
-/// Renders only the image of `task`, in a file of this `kind`. Passes notes for the user to `note`.
-///
-/// # Errors
-/// See [`ImageError`]. No file is left behind.
-pub fn make_picture(
-    setup: &Setup,
-    sequence: &Sequence,
-    task: &ImageTask,
-    kind: PictureKind,
-    note: impl FnMut(String),
-) -> Result<FrameReport, ImageError> {
-    let traced = trace_single(setup, sequence, task, note)?;
-    catch_panic(|| match kind {
-        PictureKind::Exr => write_exr(setup, traced),
-        PictureKind::Png => write_png(setup, &traced),
+    catch_panic(|| {
+        let (report, _) = write_frame(setup, traced, &mut MemoryPeaks::default())?;
+        Ok(report)
     })
 }
 
@@ -103,20 +78,4 @@ fn trace<'a>(
     let mut built = tracer.prepare(setup, frame)?;
     built.notes.drain(..).for_each(&mut note);
     Ok(tracer.render(setup, built, stop)?)
-}
-
-fn write_exr(setup: &Setup, frame: TracedFrame) -> Result<FrameReport, ImageError> {
-    let (report, _) = write_frame(setup, frame, &mut MemoryPeaks::default())?;
-    Ok(report)
-}
-
-/// Writes the preview of `frame` in place of its image.
-fn write_png(setup: &Setup, frame: &TracedFrame) -> Result<FrameReport, ImageError> {
-    let start = Instant::now();
-    let png = frame.to_png(setup).map_err(WriteError::Encode)?;
-    let path = frame.task.image.clone();
-    publish(&path, &png).map_err(|source| WriteError::Io { path, source })?;
-    let mut report = frame.report.clone();
-    report.seconds.encode = start.elapsed().as_secs_f64();
-    Ok(report)
 }

@@ -24,6 +24,9 @@ pub(super) fn channels(
     survey: &Survey,
 ) -> Result<(Channels, Vec<AttributeChannel>), ResolveError> {
     let output = &manifest.output;
+    if output.path.is_png() {
+        return Ok((Channels::COLOR, Vec::new()));
+    }
     let unsupported = |what: String| ResolveError::Unsupported { key: KEY, what };
     // Find the channels with fixed names
     let is_named = |channel: &&Channel| matches!(channel, Channel::Named(_));

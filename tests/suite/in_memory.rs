@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use spherule::job::{JobManifest, RenderJob};
 use spherule::manifest::{Manifest, Override};
-use spherule::pipeline::{PictureKind, make_picture};
+use spherule::pipeline::make_image;
 use spherule::prelude::*;
 use spherule_formats::{ParticleFrame, Positions, RawParticles};
 
@@ -50,7 +50,7 @@ fn the_bytes_are_those_of_a_file() {
     let mut task = job.tasks(&sequence, &[number]).remove(0);
     task.image = dir.path().join("file.exr");
     task.preview = None;
-    make_picture(&setup, &sequence, &task, PictureKind::Exr, drop).expect("a picture");
+    make_image(&setup, &sequence, &task, drop).expect("a picture");
     let expected = std::fs::read(&task.image).expect("a file");
     // In memory
     let raw = sequence.load_raw(0).expect("particles");

@@ -2,6 +2,7 @@
 
 mod harness;
 mod picture;
+mod picture_formats;
 mod simd;
 
 mod architecture;

@@ -104,10 +104,13 @@ fn only_images_are_replaced() {
     fs::create_dir(workshop.join("dir.exr")).expect("a directory");
     refused(&["-o", "dir.exr"], "dir.exr: is not a file;");
     refused(
-        &["-o", "look.jpg"],
-        "--output look.jpg: the name must end in .png or .exr",
+        &["-o", "look.svg"],
+        "--output look.svg: the name must end in .png, .exr, .jpg or .tif",
     );
-    refused(&["-o", "look"], "the name must end in .png or .exr");
+    refused(
+        &["-o", "look"],
+        "the name must end in .png, .exr, .jpg or .tif",
+    );
     refused(
         &["--frame", "9", "-o", "a.png"],
         "--frame 9: is not among the frames: 1-5",

@@ -1,5 +1,7 @@
 //! The results of `check` as text and as JSON.
 
+use std::borrow::Cow;
+
 use serde_json::{Map, Value, json};
 use spherule_jobs::FrameState;
 
@@ -9,7 +11,7 @@ use crate::accel::Structure;
 use crate::cli::job::list;
 use crate::cli::progress::duration;
 use crate::cli::render::{radius_text, unframed_text};
-use crate::manifest::Channel;
+use crate::manifest::{Channel, Manifest, NamedChannel};
 use crate::metrics::{Bytes, counted};
 use crate::pipeline::{Overlap, Probe, RadiusRule, Setup};
 use crate::scene::RadiusTable;
@@ -41,8 +43,8 @@ impl Check<'_> {
             "width": width,
             "height": height,
             "samples": manifest.image.samples,
-            "channels": manifest.output.channels.iter().map(Channel::name).collect::<Vec<_>>(),
-            "preview": manifest.output.preview,
+            "channels": channels(manifest),
+            "preview": manifest.output.has_previews(),
         });
         if let Some(part) = manifest.image.part() {
             image["data_window"] = json!(part);
@@ -85,7 +87,7 @@ impl Check<'_> {
     pub(super) fn to_lines(&self) -> Vec<String> {
         let mut lines = vec![self.frames_line()];
         let manifest = self.render_job.manifest();
-        let names: Vec<_> = manifest.output.channels.iter().map(Channel::name).collect();
+        let names = channels(manifest);
         let [width, height] = manifest.picture().size();
         lines.push(format!(
             "images     {}: {}x{}{}, {} per pixel, {}{}",
@@ -99,7 +101,7 @@ impl Check<'_> {
                 .unwrap_or_default(),
             counted(manifest.image.samples as usize, "sample"),
             names.join(" "),
-            if manifest.output.preview {
+            if manifest.output.has_previews() {
                 ", with previews"
             } else {
                 ""
@@ -200,6 +202,20 @@ impl Check<'_> {
 }
 
 /// The structure for the largest surveyed frame. Other frames may have another.
+/// The names of the channels of the images.
+fn channels(manifest: &Manifest) -> Vec<Cow<'static, str>> {
+    let output = &manifest.output;
+    let is_stored = |channel: &&Channel| {
+        !output.path.is_png() || **channel == Channel::Named(NamedChannel::Rgba)
+    };
+    output
+        .channels
+        .iter()
+        .filter(is_stored)
+        .map(Channel::name)
+        .collect()
+}
+
 fn structure(survey: &Survey, setup: &Setup) -> Structure {
     let has_values = setup.picture.color.is_by_particle();
     setup

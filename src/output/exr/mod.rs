@@ -128,6 +128,15 @@ pub enum OutputError {
     /// The PNG encoder failed.
     #[error("the preview cannot be encoded as PNG: {0}")]
     Png(#[source] image::ImageError),
+    /// The JPEG encoder failed.
+    #[error("the picture cannot be encoded as JPEG: {0}")]
+    Jpeg(#[source] image::ImageError),
+    /// The TIFF encoder failed.
+    #[error("the picture cannot be encoded as TIFF: {0}")]
+    Tiff(#[source] tiff::TiffError),
+    /// A picture without background needs alpha.
+    #[error("JPEG files have no alpha for a transparent background; choose .png or .tif")]
+    NoAlpha,
 }
 
 impl OutputError {
