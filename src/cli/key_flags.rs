@@ -2,6 +2,7 @@
 
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
+use std::str::FromStr;
 
 use clap::builder::{EnumValueParser, PossibleValue, StringValueParser, TypedValueParser};
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
@@ -203,7 +204,8 @@ fn argument(key: &KeyFlag) -> Arg {
             .require_equals(true)
             .default_missing_value(usual)
             .value_parser(KnownWords(key.words.clone())),
-        FlagKind::Integers => argument.allow_hyphen_values(true),
+        FlagKind::Integers | FlagKind::Numbers => argument.allow_hyphen_values(true),
+        FlagKind::Toml => argument.value_parser(KnownWords(key.words.clone())),
         FlagKind::NumberOrText if !key.words.is_empty() => {
             argument.value_parser(KnownWords(key.words.clone()))
         }
@@ -212,7 +214,7 @@ fn argument(key: &KeyFlag) -> Arg {
     .hide_possible_values(key.flag.name != "progress")
     .allow_negative_numbers(!matches!(
         key.kind,
-        FlagKind::Text(_) | FlagKind::List | FlagKind::Integers
+        FlagKind::Text(_) | FlagKind::List | FlagKind::Integers | FlagKind::Numbers
     ))
 }
 
@@ -239,16 +241,25 @@ fn value(key: &KeyFlag, matches: &ArgMatches) -> Option<Value> {
             let number = whole.or_else(|_| text.parse::<f64>().map(Value::from));
             number.unwrap_or(Value::from(text))
         }),
-        FlagKind::Integers => text().map(|text| {
-            let items = text.split(',').map(|item| item.trim().parse::<i64>());
-            let items: Result<Vec<i64>, _> = items.collect();
-            items.map_or_else(|_| Value::from(text), Value::from)
+        FlagKind::Integers => text().map(items::<i64>),
+        FlagKind::Numbers => text().map(items::<f64>),
+        FlagKind::Toml => text().map(|text| {
+            let table = format!("value = {text}").parse::<toml::Table>();
+            let value = table.ok().and_then(|mut table| table.remove("value"));
+            value.unwrap_or_else(|| Value::from(text))
         }),
         FlagKind::List => {
             let items: Vec<String> = matches.get_many(name)?.cloned().collect();
             Some(Value::from(items))
         }
     }
+}
+
+/// The items between the commas of `text`, or else the text.
+fn items<T: FromStr + Into<Value>>(text: String) -> Value {
+    let items = text.split(',').map(|item| item.trim().parse::<T>());
+    let items: Result<Vec<T>, _> = items.collect();
+    items.map_or_else(|_| Value::from(text), Value::from)
 }
 
 #[cfg(test)]

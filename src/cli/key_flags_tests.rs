@@ -21,8 +21,26 @@ const ACTIONS: [&str; 7] = [
 /// Options for parts of `material.color`.
 const COLORS: [&str; 4] = ["color_by", "map", "range", "color_scale"];
 
+/// Options for several keys.
+const SHORT: [&str; 5] = ["size", "ortho", "vmin", "vmax", "slice"];
+
+/// Options for items of lists. Their tests are below.
+const LISTS: [&str; 11] = [
+    "mesh",
+    "camera_path",
+    "clip",
+    "arrows",
+    "colorbar",
+    "title",
+    "unit",
+    "time_stamp",
+    "text",
+    "scale_bar",
+    "axes",
+];
+
 /// Other options with a value that is not the default, and the key that it is laid over.
-const FLAGS: [(&str, &str); 49] = [
+const FLAGS: [(&str, &str); 61] = [
     ("--output x.####.exr", "output.path = \"x.####.exr\""),
     ("--frames 3-4", "input.frames = \"3-4\""),
     ("--width 7", "image.width = 7"),
@@ -33,6 +51,21 @@ const FLAGS: [(&str, &str); 49] = [
         "camera.projection = \"orthographic\"",
     ),
     ("--view top", "camera.view = \"top\""),
+    ("--ortho", "camera.projection = \"orthographic\""),
+    ("--fov 30", "camera.fov = 30.0"),
+    ("--azimuth -30", "camera.azimuth = -30.0"),
+    ("--elevation 20", "camera.elevation = 20.0"),
+    (
+        "--eye -1,2,3 --look-at 0,0,0",
+        "camera = { eye = [-1.0, 2.0, 3.0], look_at = [0.0, 0.0, 0.0] }",
+    ),
+    ("--size 7x1080", "image.width = 7"),
+    ("--background #fff", "render.background = [1.0, 1.0, 1.0]"),
+    ("--color red", "material.color = [1.0, 0.0, 0.0]"),
+    ("--opacity 0.5", "material.opacity = 0.5"),
+    ("--trails 3", "trails.frames = 3"),
+    ("--transparent", "output.transparent = true"),
+    ("--vmin 0 --vmax 2", "material.color.range = [0.0, 2.0]"),
     ("--samples 7", "image.samples = 7"),
     ("--crop 3,4,50,60", "image.crop = [3, 4, 50, 60]"),
     ("--radius 0.5", "input.radius = 0.5"),
@@ -134,6 +167,90 @@ const WORDS: [&str; 13] = [
 ];
 
 #[test]
+fn options_of_lists_add_items() {
+    for (flags, sets) in [
+        ("--colorbar", "overlay=[{type=\"colorbar\"}]"),
+        ("--legend", "overlay=[{type=\"colorbar\"}]"),
+        (
+            "--title Speed --unit m/s",
+            "overlay=[{type=\"colorbar\",title=\"Speed\",unit=\"m/s\"}]",
+        ),
+        (
+            "--text a --text {frame} --scale-bar --axes --timestamp",
+            "overlay=[{type=\"text\"},{type=\"text\",text=\"a\"},{type=\"text\",text=\"{frame}\"},\
+             {type=\"scale_bar\"},{type=\"axes\"}]",
+        ),
+        (
+            "--arrows velocity:0.05",
+            "arrows=[{attribute=\"velocity\",scale=0.05}]",
+        ),
+        (
+            "--clip x<0.5 --clip z>=-1",
+            "clip=[{type=\"plane\",normal=\"x\",offset=0.5},{type=\"plane\",normal=\"-z\",offset=1.0}]",
+        ),
+        (
+            "--slice z=0.5:0.1",
+            "select.slab={axis=\"z\",center=0.5,thickness=0.1}",
+        ),
+        ("--cmap turbo", "material.color.map=turbo"),
+        ("--colour-by v", "material.color={attribute=\"v\"}"),
+        ("--size 80mmx60mm", "image={width=\"80mm\",height=\"60mm\"}"),
+    ] {
+        let expected = manifest(&format!("--set {sets}"));
+        assert_eq!(manifest(flags), expected, "{flags}");
+        assert_ne!(expected, Manifest::new("data"), "{flags}");
+    }
+}
+
+#[test]
+fn wrong_values_of_short_options_are_refused() {
+    for (flags, part) in [
+        ("--size 640", "the width and the height, such as 1280x720"),
+        ("--size x640", "the width and the height"),
+        ("--size 0x0", "--size: image.width: expected"),
+        ("--size 640x480 --width 7", "cannot be used with"),
+        ("--background notacolour", "--background: expected a colour"),
+        ("--background #12345", "needs 3 or 6 hexadecimal digits"),
+        ("--background [300,0,0]", "300 is not in 0 to 255"),
+        ("--background [1,0", "--background: expected a colour"),
+        ("--color velocty", "--color: expected a colour"),
+        ("--text", "a value is required"),
+        ("--text=", "a value is required"),
+        ("--text {tme}", "unknown variable `{tme}`"),
+        ("--vmin 3", "--vmax"),
+        ("--vmin 3 --vmax 2", "expected two rising numbers"),
+        ("--vmin 0 --vmax 2 --range 0 1", "cannot be used with"),
+        ("--arrows velocity", "such as velocity:0.05"),
+        ("--arrows velocity:-1", "scale: expected"),
+        ("--slice z=0.5", "such as z=0.5:0.1"),
+        (
+            "--slice w=0.5:0.1",
+            "select.slab.axis: expected one of x, y, z",
+        ),
+        ("--slice z=0.5:0", "thickness: expected"),
+        ("--clip w<1", "such as x<0.5"),
+        ("--clip x<nan", "such as x<0.5"),
+        ("--clip x", "such as x<0.5"),
+        ("--fov 180", "--fov: expected"),
+        ("--eye 1,2", "--eye: expected three numbers"),
+        ("--opacity 2", "--opacity: expected a number from 0 to 1"),
+        ("--color red --color-by v", "cannot be used with"),
+    ] {
+        let arguments = format!("render data {flags}");
+        let arguments = with_equals(arguments.split_whitespace().map(OsString::from));
+        let message = match command().try_get_matches_from(arguments) {
+            Err(error) => error.to_string(),
+            Ok(matches) => {
+                let run = RunArgs::from_arg_matches(&matches).unwrap();
+                let error = run.manifest.manifest().expect_err(flags);
+                error.messages().join("\n")
+            }
+        };
+        assert!(message.contains(part), "{flags}: {message}");
+    }
+}
+
+#[test]
 fn defaults_in_the_help_are_those_of_the_manifest() {
     let mut checked = 0;
     for argument in command().get_arguments() {
@@ -169,7 +286,8 @@ fn no_option_is_forgotten() {
         assert!(
             ACTIONS.contains(&name)
                 || COLORS.contains(&name)
-                || ["mesh", "camera_path", "colorbar", "time_stamp"].contains(&name)
+                || LISTS.contains(&name)
+                || SHORT.contains(&name)
                 || of_keys.contains(&name),
             "{name}"
         );

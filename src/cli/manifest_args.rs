@@ -12,6 +12,7 @@ use super::camera_path::camera_keys;
 use super::key_flags::{KeyFlags, KnownWords, over};
 use super::numbers::number;
 use super::paths::{path_as_typed, text};
+use super::shortcuts::Shortcuts;
 use crate::job::{JobManifest, RunError};
 use crate::manifest::{self, Manifest, ManifestSource, MapName, Override, ScaleKind, draft};
 
@@ -38,6 +39,8 @@ pub(super) struct ManifestArgs {
     /// speed, vx, vy and vz are those of the velocity. The word elements stands for the usual colours of chemical elements.
     #[arg(
         long,
+        alias = "colour-by",
+        conflicts_with = "color",
         value_name = "ATTRIBUTE",
         help_heading = "Look",
         display_order = 0
@@ -47,27 +50,18 @@ pub(super) struct ManifestArgs {
     ///
     /// viridis, turbo, plasma, inferno, magma, cividis, batlow, vik, greys and others, which the manual lists. A name
     /// with _r is the reversed map.
-    #[arg(long, value_name = "NAME", help_heading = "Look", display_order = 0,
-        value_parser = KnownWords(MapName::all()), hide_possible_values = true)]
+    #[arg(long, visible_alias = "cmap", aliases = ["colormap", "colourmap", "color-map", "colour-map"],
+        value_name = "NAME", help_heading = "Look", display_order = 0, value_parser = KnownWords(MapName::all()),
+        hide_possible_values = true)]
     pub(super) map: Option<String>,
     /// Values at the ends of the colour map [default: the range of the sequence]
     #[arg(long, num_args = 2, value_names = ["LOW", "HIGH"], allow_negative_numbers = true, value_parser = number,
         help_heading = "Look", display_order = 0)]
     pub(super) range: Option<Vec<f64>>,
     /// Scale of the colour map: linear, log, symlog or categorical [default: linear]
-    #[arg(long, value_name = "SCALE", help_heading = "Look", display_order = 0,
+    #[arg(long, alias = "colour-scale", value_name = "SCALE", help_heading = "Look", display_order = 0,
         value_parser = KnownWords(ScaleKind::all()), hide_possible_values = true)]
     pub(super) color_scale: Option<String>,
-    /// Draw the colours with their values in a free corner of the previews
-    ///
-    /// The same as [[overlay]] type = "colorbar" in a manifest, which has more settings: title, unit, corner, size.
-    #[arg(long, help_heading = "Look", display_order = 0)]
-    pub(super) colorbar: bool,
-    /// Draw the time, or the frame number of files without times, in a free corner of the previews
-    ///
-    /// The same as [[overlay]] type = "text" in a manifest, which has more settings, such as text = "t = {time:.2f} s".
-    #[arg(long, help_heading = "Look", display_order = 0)]
-    pub(super) time_stamp: bool,
     /// Turn around one frame, the middle one, in so many pictures
     ///
     /// Sets input.repeat, camera.mode = "turntable" and camera.degrees_per_frame = 360 / PICTURES. A still shows the first
@@ -75,6 +69,8 @@ pub(super) struct ManifestArgs {
     #[arg(long, value_name = "PICTURES", value_parser = clap::value_parser!(u32).range(1..=100_000),
         help_heading = "Camera", display_order = 0)]
     pub(super) turntable: Option<u32>,
+    #[command(flatten)]
+    shortcuts: Shortcuts,
     /// Triangle mesh next to the particles, such as a tank: STL, OBJ, PLY, VTK. May be repeated.
     ///
     /// A name with #### or %04d for the frame number is one mesh per frame. [[mesh]] in a manifest has more settings:
@@ -192,6 +188,7 @@ impl ManifestArgs {
             let each = 360.0 / f64::from(count);
             list.push(over("camera.degrees_per_frame", each, &shown)?);
         }
+        self.shortcuts.add_overrides(list)?;
         if let Some(path) = &self.camera_path {
             let keys = camera_keys(path)?;
             let shown = format!("--camera-path {}", path.display());
@@ -203,17 +200,6 @@ impl ManifestArgs {
             table.insert("path".to_owned(), path.into());
             let append = Override::append("mesh", table, "--mesh");
             list.push(append.map_err(|e| CliError::other(e.to_string()))?);
-        }
-        for (is_given, kind, shown) in [
-            (self.colorbar, "colorbar", "--colorbar"),
-            (self.time_stamp, "text", "--time-stamp"),
-        ] {
-            if is_given {
-                let mut table = toml::Table::new();
-                table.insert("type".to_owned(), kind.into());
-                let append = Override::append("overlay", table, shown);
-                list.push(append.map_err(|e| CliError::other(e.to_string()))?);
-            }
         }
         for assignment in &self.set {
             list.push(Override::parse(assignment).map_err(|e| CliError::other(e.to_string()))?);

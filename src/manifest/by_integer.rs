@@ -99,7 +99,7 @@ impl TableValue for f64 {
 
 /// Colours.
 impl TableValue for Vec3 {
-    const KIND: &str = "colours of integers, such as { 1 = [0.8, 0.1, 0.1], 2 = [0.1, 0.3, 0.8] }";
+    const KIND: &str = "colours of integers, such as { 1 = \"orange\", 2 = [0.1, 0.3, 0.8] }";
 
     fn parse(field: &Field<'_>) -> Option<Self> {
         Value::parse(field, &Key::new("values", &[])).ok()

@@ -41,9 +41,9 @@ section! {
         /// placed automatically otherwise.
         mode: CameraMode = CameraMode::Auto;
         /// fixed: position of the camera
-        eye: Option<DVec3> = None, example("[0.0, 0.0, 0.0]");
+        eye: Option<DVec3> = None, example("[0.0, 0.0, 0.0]"), flag("eye", "X,Y,Z", "Camera");
         /// fixed: target point, in the centre of the image
-        look_at: Option<DVec3> = None, example("[5.0, 5.0, 0.0]");
+        look_at: Option<DVec3> = None, example("[5.0, 5.0, 0.0]"), flag("look-at", "X,Y,Z", "Camera");
         /// Direction that points up in the image
         up: Option<DVec3> = None, direction(), example("[0.0, 0.0, 1.0]"), unset("input.up");
         /// Projection: perspective | orthographic | equirectangular
@@ -54,16 +54,17 @@ section! {
         /// orthographic: height of the picture in scene units
         height: Option<f64> = None, or("auto"), above(0), unit("a length");
         /// Vertical field of view, degrees
-        fov: f64 = DEFAULT_FOV, above(0), below(180), unit("degrees");
+        fov: f64 = DEFAULT_FOV, above(0), below(180), unit("degrees"), flag("fov", "DEGREES", "Camera");
         /// auto, turntable: the side to look from: front | back | left | right | top | bottom | iso
         ///
         /// It stands for azimuth and elevation. The front view looks along +y if z is up, and along -z if y is up.
         view: Option<AxisView> = None, example("\"front\""), unset("azimuth and elevation"),
             flag("view", "SIDE", "Camera");
         /// auto, turntable: degrees around the up axis
-        azimuth: Option<f64> = None, unit("degrees"), example("30.0");
+        azimuth: Option<f64> = None, unit("degrees"), example("30.0"), flag("azimuth", "DEGREES", "Camera");
         /// auto, turntable: degrees above the horizon
-        elevation: Option<f64> = None, from(-90), to(90), unit("degrees"), example("20.0");
+        elevation: Option<f64> = None, from(-90), to(90), unit("degrees"), example("20.0"),
+            flag("elevation", "DEGREES", "Camera");
         /// auto, turntable: what is in the picture: all | this | a percentage, such as 99%
         ///
         /// 99% is that part of the particles of all frames together; the others are left out if they are far from these.

@@ -8,7 +8,7 @@ use super::color_map::{MapName, RangeSetting};
 use super::field::Field;
 use super::key::Key;
 use super::tree::Kind;
-use super::value::{Fault, Slot, Value, named, quoted};
+use super::value::{Fault, FlagKind, Slot, Value, named, quoted};
 use crate::scene::{Background, ColorMap};
 
 /// The word for colours by speed, or those of the particles.
@@ -193,14 +193,16 @@ impl ColorMapping {
 }
 
 impl Value for ColorSetting {
+    const FLAG: FlagKind = FlagKind::Toml;
+
     fn kind(_: &Key) -> String {
-        "three numbers from 0, such as [0.6, 0.7, 0.9], { attribute = \"velocity\", map = \"viridis\" }, \"elements\", \
-         or \"auto\""
+        "a colour, such as \"orange\", \"#ff8000\" or [0.6, 0.7, 0.9] (linear RGB from 0), { attribute = \"velocity\", map = \
+         \"viridis\" }, \"elements\", or \"auto\""
             .to_owned()
     }
 
     fn words() -> Vec<&'static str> {
-        vec![AUTO, ELEMENTS]
+        [vec![AUTO, ELEMENTS], Vec3::words()].concat()
     }
 
     fn parse(field: &Field<'_>, key: &Key) -> Result<Self, Fault> {
@@ -260,7 +262,7 @@ impl Value for ColorSetting {
 
     fn schema(key: &Key) -> Json {
         json!({ "anyOf": [
-            { "enum": Self::words() },
+            { "enum": [AUTO, ELEMENTS] },
             Vec3::schema(key),
             {
                 "type": "object",
@@ -295,13 +297,16 @@ const STUDIO: &str = "studio";
 
 /// The up direction is set by [`Background::with_up`].
 impl Value for Background {
+    const FLAG: FlagKind = FlagKind::Toml;
+
     fn kind(_: &Key) -> String {
-        "three numbers from 0, such as [0.1, 0.1, 0.1], { bottom = [...], top = [...] }, \"studio\""
+        "a colour, such as \"white\", \"#f0f0f0\" or [0.1, 0.1, 0.1] (linear RGB from 0), { bottom = \"white\", top = \"skyblue\" \
+         }, or \"studio\""
             .to_owned()
     }
 
     fn words() -> Vec<&'static str> {
-        vec![STUDIO]
+        [vec![STUDIO], Vec3::words()].concat()
     }
 
     fn parse(field: &Field<'_>, key: &Key) -> Result<Self, Fault> {
@@ -313,7 +318,8 @@ impl Value for Background {
         };
         let (mut bottom, mut top) = (Vec3::ZERO, Vec3::ZERO);
         for (name, color) in [("bottom", &mut bottom), ("top", &mut top)] {
-            let key = Key::new(name, &[]).required("three numbers from 0, such as [0.1, 0.1, 0.1]");
+            let key =
+                Key::new(name, &[]).required("a colour, such as \"white\" or [0.1, 0.1, 0.1]");
             section.read(&key, color);
         }
         section.finish();

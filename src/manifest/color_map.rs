@@ -68,28 +68,58 @@ impl MapName {
     }
 }
 
-/// Names of maps in other programs, with the most similar map here.
-const SIMILAR: [(&str, &str); 12] = [
-    ("coolwarm", "vik"),
-    ("bwr", "vik"),
-    ("seismic", "vik"),
-    ("rdbu", "red-blue"),
-    ("rdylbu", "red-yellow-blue"),
-    ("puor", "purple-orange"),
-    ("jet", "turbo"),
-    ("hot", "lajolla"),
-    ("hsv", "romaO"),
-    ("twilight", "romaO"),
-    ("gray", "greys"),
-    ("grey", "greys"),
+/// Maps here, each with the names of similar ones in matplotlib, ParaView, OVITO, VMD and MATLAB: alike in kind
+/// (sequential, diverging, cyclic) first, then in hue.
+const SIMILAR: [(&str, &str); 24] = [
+    (
+        "vik",
+        "coolwarm cooltowarm bluewhitered bwr rwb bgr seismic blueorange diverging",
+    ),
+    ("red-blue", "rdbu redwhiteblue redblue"),
+    ("red-yellow-blue", "rdylbu"),
+    ("spectral", "rdylgn"),
+    ("purple-orange", "puor"),
+    ("cork", "piyg prgn"),
+    ("broc", "brbg"),
+    (
+        "turbo",
+        "jet hsvrainbow nipyspectral gistrainbow gistncar rainbowuniform colorspectrum",
+    ),
+    (
+        "lajolla",
+        "hot afmhot gistheat heat fire blackbody blackbodyradiation gnuplot2 cmrmap",
+    ),
+    ("inferno", "rocket"),
+    ("magma", "bluered"),
+    ("plasma", "gnuplot ember"),
+    ("viridis", "parula default"),
+    ("romaO", "hsv twilight twilightshifted phase cyclic hue"),
+    (
+        "greys",
+        "gray grey grays grayscale greyscale gistgray gistyarg binary blackwhite xray",
+    ),
+    ("blues", "bone ice gnbu pubu"),
+    ("greens", "summer ylgn bugn"),
+    ("reds", "orrd autumn"),
+    ("oranges", "copper wistia ylorbr ylorrd"),
+    ("oleron", "terrain topo gistearth earth"),
+    ("devon", "ocean winter deep"),
+    ("batlow", "haline thermal crameri"),
+    (
+        "okabe-ito",
+        "tab10 set1 dark2 paired categorical colorblind",
+    ),
+    ("tol-muted", "tab20 set2 set3 pastel1 accent"),
 ];
 
 /// The map that was probably meant, if one is similar.
 fn similar(name: &str) -> Option<&'static str> {
     let base = name.strip_suffix("_r").unwrap_or(name).to_ascii_lowercase();
-    let elsewhere = SIMILAR.iter().find(|(other, _)| *other == base);
+    let joined = base.replace([' ', '-', '_', '.', '(', ')'], "");
+    let is_other = |others: &str| others.split(' ').any(|other| other == joined);
+    let elsewhere = SIMILAR.iter().find(|(_, others)| is_other(others));
     let names: Vec<&str> = known().collect();
-    elsewhere.map_or_else(|| nearest(name, &names), |(_, known)| Some(*known))
+    elsewhere.map_or_else(|| nearest(name, &names), |(known, _)| Some(*known))
 }
 
 /// Names of all maps and palettes, without the reversed ones.
@@ -198,5 +228,36 @@ impl Value for RangeSetting {
             numbers_schema(2),
             { "type": "string", "pattern": format!("^({SYMMETRIC}|{percent}-{percent})$") },
         ] })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_other_programs_have_a_similar_map() {
+        for (typed, expected) in [
+            ("coolwarm", "vik"),
+            ("Cool to Warm", "vik"),
+            ("RdBu", "red-blue"),
+            ("RdBu_r", "red-blue"),
+            ("jet", "turbo"),
+            ("gist_rainbow", "turbo"),
+            ("Black-Body Radiation", "lajolla"),
+            ("parula", "viridis"),
+            ("gray", "greys"),
+            ("virdis", "viridis"),
+        ] {
+            assert_eq!(similar(typed), Some(expected), "{typed}");
+        }
+        assert_eq!(similar("xyzzy"), None);
+        for (map, others) in SIMILAR {
+            assert!(MapName::named(map).is_some(), "{map}");
+            for other in others.split(' ') {
+                assert!(MapName::named(other).is_none(), "{other}");
+                assert_eq!(similar(other), Some(map), "{other}");
+            }
+        }
     }
 }

@@ -183,12 +183,12 @@ impl Material {
             /// { 1 = "water" } and colours of your own, `values` such as { 1 = [0.1, 0.3, 0.8] }). `map` is reversed by
             /// `reverse = true` or a name with _r, and divided into bands by `steps = 8`. "elements" has the usual
             /// colours of chemical elements, by the attribute `element`.
-            color => self.color;
+            color => self.color, flag("color", "COLOR", "Look");
             /// Opacity of spheres, 0 to 1, or { attribute = "density", range = [990.0, 1010.0] }
             ///
             /// The values of `range` have the opacities 0 and 1. The attribute is named as for `color`. Glass, water,
             /// unions and smooth surfaces have no opacity.
-            opacity => self.opacity;
+            opacity => self.opacity, flag("opacity", "OPACITY", "Look");
             /// Weight of ambient light
             ambient => constants.ambient, from(0);
             /// Weight of diffuse reflection

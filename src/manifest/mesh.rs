@@ -246,7 +246,7 @@ mod tests {
                 "mesh.0.scale: expected",
             ),
             (
-                "[[mesh]]\npath = \"a.stl\"\ncolor = [2, 0, 0]",
+                "[[mesh]]\npath = \"a.stl\"\ncolor = [2.0, 0, 0]",
                 "mesh.0.color: expected",
             ),
             (

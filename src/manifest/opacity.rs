@@ -21,7 +21,7 @@ pub enum OpacitySetting {
 }
 
 impl Value for OpacitySetting {
-    const FLAG: FlagKind = FlagKind::NumberOrText;
+    const FLAG: FlagKind = FlagKind::Toml;
 
     fn kind(_: &Key) -> String {
         "a number from 0 to 1, or { attribute = \"density\", range = [990.0, 1010.0] }".to_owned()

@@ -237,11 +237,11 @@ section! {
         /// both
         min_weight: f32 = DEFAULT_MIN_WEIGHT, affects(Affects::BranchingSpheres), or_zero(),
             from(*MIN_WEIGHTS.start()), to(*MIN_WEIGHTS.end());
-        /// Background: auto, studio, linear RGB, or { bottom = [...], top = [...] }
+        /// Background: auto, studio, a colour, or { bottom = [...], top = [...] }
         ///
         /// studio is a grey gradient over the image with darker corners. It does not move with the camera. auto is
         /// studio with path, and a darker gradient along the up axis with whitted.
-        background: Option<Background> = None, or("auto");
+        background: Option<Background> = None, or("auto"), flag("background", "COLOR", "Look");
         /// Ground under the particles: auto | none (false) | plain (true) | checker | shadow_catcher | image
         ///
         /// A shadow catcher is invisible: it shows the background, darker where particles take light away. It needs

@@ -14,7 +14,7 @@ section! {
         ///
         /// Particles are found in earlier frames by their ids, or by their place in the file if their number does not
         /// change. Each picture reads so many earlier frames.
-        frames: u32 = 0, from(0), to(MAX_FRAMES);
+        frames: u32 = 0, from(0), to(MAX_FRAMES), flag("trails", "COUNT", "Look");
         /// Radius at the particles, or auto: half the radius of the particles; it falls to 0 at the oldest end
         radius: Option<f32> = None, or("auto"), unit("a length"), above(0), single();
         /// Draw only trails of particles whose id is a multiple of this

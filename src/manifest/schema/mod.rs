@@ -6,6 +6,7 @@
 use serde_json::{Map, Value, json};
 
 use super::list::{Entries, Entry};
+use super::value::{COLOR_SCHEMA, color_schema};
 use super::{ABOUT, Manifest, camera, environment, mesh, work};
 
 #[cfg(test)]
@@ -43,6 +44,7 @@ pub fn job_schema() -> Value {
         "properties": properties,
         "required": ["input"],
         "additionalProperties": false,
+        "$defs": { COLOR_SCHEMA: color_schema() },
     })
 }
 

@@ -7,9 +7,12 @@ use super::field::Field;
 use super::key::Key;
 use super::nearest::nearest;
 
+mod color;
+mod color_names;
 mod numbers;
 mod text;
 
+pub(super) use color::{COLOR_SCHEMA, color_schema};
 pub(super) use numbers::numbers_schema;
 
 /// Reasons why a value is not accepted.
@@ -41,10 +44,14 @@ pub enum FlagKind {
     SwitchOrNumberOrText(&'static str),
     /// A number or a word.
     NumberOrText,
+    /// A value in TOML, or text without quotes.
+    Toml,
     /// Text, with commas between items.
     List,
     /// Integers with commas between them.
     Integers,
+    /// Numbers with commas between them.
+    Numbers,
 }
 
 /// A type of values.

@@ -1,8 +1,8 @@
-//! Numbers, times, vectors and colours.
+//! Numbers, times and vectors.
 
 use std::time::Duration;
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use serde_json::{Value as Json, json};
 
 use super::{Fault, FlagKind, Value, list};
@@ -155,6 +155,8 @@ impl Value for Duration {
 
 /// World coordinates.
 impl Value for DVec3 {
+    const FLAG: FlagKind = FlagKind::Numbers;
+
     fn kind(key: &Key) -> String {
         let kind = match key.is_direction {
             true => "three numbers that are not all 0, such as [0.0, 0.0, 1.0]",
@@ -178,37 +180,6 @@ impl Value for DVec3 {
         if key.is_direction {
             schema["contains"] = json!({ "not": { "const": 0 } });
         }
-        schema
-    }
-}
-
-/// Linear RGB; the range of the key is that of each component.
-impl Value for Vec3 {
-    fn kind(key: &Key) -> String {
-        let example = match key.high {
-            Some(_) => "[0.6, 0.9, 0.95]",
-            None => "[0.6, 0.7, 0.9]",
-        };
-        format!("three numbers{}, such as {example}", key.from(0).range())
-    }
-
-    fn parse(field: &Field<'_>, key: &Key) -> Result<Self, Fault> {
-        let color = field.as_numbers().map(|c: [f64; 3]| c.map(narrow));
-        let key = key.from(0);
-        let holds = |c: &[f32; 3]| c.iter().all(|c| key.holds(f64::from(*c)));
-        color
-            .filter(holds)
-            .map(Self::from_array)
-            .ok_or(Fault::Unwanted)
-    }
-
-    fn toml(&self) -> String {
-        list(self.to_array().iter().map(Value::toml))
-    }
-
-    fn schema(key: &Key) -> Json {
-        let mut schema = numbers_schema(3);
-        schema["items"] = f32::schema(&key.from(0));
         schema
     }
 }
