@@ -195,10 +195,11 @@ impl ColorMapping {
 impl Value for ColorSetting {
     const FLAG: FlagKind = FlagKind::Toml;
 
-    fn kind(_: &Key) -> String {
-        "a colour, such as \"orange\", \"#ff8000\" or [0.6, 0.7, 0.9] (linear RGB from 0), { attribute = \"velocity\", map = \
-         \"viridis\" }, \"elements\", or \"auto\""
-            .to_owned()
+    fn kind(key: &Key) -> String {
+        let color = Vec3::kind(key);
+        format!(
+            "{color}, {{ attribute = \"velocity\", map = \"viridis\" }}, \"elements\", or \"auto\""
+        )
     }
 
     fn words() -> Vec<&'static str> {
@@ -299,10 +300,9 @@ const STUDIO: &str = "studio";
 impl Value for Background {
     const FLAG: FlagKind = FlagKind::Toml;
 
-    fn kind(_: &Key) -> String {
-        "a colour, such as \"white\", \"#f0f0f0\" or [0.1, 0.1, 0.1] (linear RGB from 0), { bottom = \"white\", top = \"skyblue\" \
-         }, or \"studio\""
-            .to_owned()
+    fn kind(key: &Key) -> String {
+        let color = Vec3::kind(key);
+        format!("{color}, {{ bottom = \"white\", top = \"skyblue\" }}, or \"studio\"")
     }
 
     fn words() -> Vec<&'static str> {
