@@ -51,8 +51,8 @@ fn invalid_output_names() {
         .prints("1 of 1 frames done");
     assert!(workshop.join("one/f.exr").is_file());
     fs::remove_dir_all(workshop.join("one")).expect("the job");
-    let ending = "--output: must end in .exr (example: out/frame.####.exr)";
-    for pattern in ["out/f.####.png", "out/", "out", "", "out/f.####"] {
+    let ending = "--output: must end in .exr or .png (example: out/frame.####.exr)";
+    for pattern in ["out/f.####.jpg", "out/", "out", "", "out/f.####"] {
         not_there(&workshop, pattern, &[ending]);
     }
     not_there(
