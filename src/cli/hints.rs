@@ -84,12 +84,13 @@ fn hint(typed: &str, command: &Command) -> Option<String> {
         return Some("'--progress none' prints only warnings and errors".to_owned());
     }
     let name = typed.trim_start_matches('-');
-    let hints: Vec<String> = hints_for(name)
-        .filter(|hint| is_possible(hint, command))
-        .map(|hint| format!("'{hint}'"))
-        .collect();
-    if !hints.is_empty() {
-        return Some(format!("try {}", hints.join(" or ")));
+    let hints = hints_for(name).filter(|hint| is_possible(hint, command));
+    let (options, texts): (Vec<&str>, Vec<&str>) = hints.partition(|hint| hint.starts_with("--"));
+    if !options.is_empty() {
+        return Some(format!("try '{}'", options.join("' or '")));
+    }
+    if let Some(text) = texts.first() {
+        return Some(text.replace("COMMAND", command.get_name()));
     }
     if name.len() < 2 || !has_option(command, "set") {
         return None;

@@ -125,9 +125,9 @@ fn hex_code(digits: &str) -> Option<u32> {
     let code = u32::from_str_radix(digits, 16).ok()?;
     match digits.len() {
         3 => Some(
-            [code >> 8, code >> 4 & 15, code & 15]
+            [code >> 8, (code >> 4) & 15, code & 15]
                 .iter()
-                .fold(0, |all, digit| all << 8 | digit * 17),
+                .fold(0, |all, digit| (all << 8) | (digit * 17)),
         ),
         6 => Some(code),
         _ => None,
