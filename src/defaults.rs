@@ -163,7 +163,10 @@ impl Rules<'_> {
             );
         }
         let is_molecular = self.facts.elements.is_some() || self.is_periodic();
-        let category = self.facts.categories.iter().find(|c| !c.at_rest.is_empty());
+        // Parts with names are walls by these alone
+        let has_names = |c: &&Category| c.name == PART_ATTRIBUTE && self.files.parts.len() > 1;
+        let mut all = self.facts.categories.iter().filter(|c| !has_names(c));
+        let category = all.find(|c| !c.at_rest.is_empty());
         if let Some(Category { name, at_rest, .. }) = category.filter(|_| !is_molecular) {
             let all: Vec<String> = at_rest.iter().map(|v| format!("{name} != {v}")).collect();
             let values: Vec<String> = at_rest.iter().map(i64::to_string).collect();

@@ -51,10 +51,11 @@ pub(super) const GUESSES: &[(&str, &str)] = &[
         "--view SIDE",
     ),
     (
-        "viewangle fieldofview angleofview lens focallength zoomfactor zoom",
+        "viewangle fieldofview angleofview lens focallength",
         "--fov DEGREES",
     ),
-    ("turntable spin revolve", "--set camera.mode=turntable"),
+    ("zoomfactor magnification", "--zoom FACTOR"),
+    ("spin revolve", "--turntable PICTURES"),
     (
         "dof depthoffield fnumber bokeh",
         "--set camera.f_stop=NUMBER",

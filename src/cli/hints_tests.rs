@@ -80,8 +80,8 @@ const GUESSED: &[(&str, &str)] = &[
     ("--color-map jet", ""),
     ("--colorbar", ""),
     // Hints
-    ("--turntable", "camera.mode=turntable"),
-    ("--zoom 2", "--fov"),
+    ("--turntable 36", ""),
+    ("--zoom 2", ""),
     ("--box", "--cell"),
     ("--bbox", "--cell"),
     ("--select x", "--where"),

@@ -22,7 +22,7 @@ const ACTIONS: [&str; 7] = [
 const COLORS: [&str; 4] = ["color_by", "map", "range", "color_scale"];
 
 /// Options for several keys.
-const SHORT: [&str; 5] = ["size", "ortho", "vmin", "vmax", "slice"];
+const SHORT: [&str; 6] = ["size", "ortho", "vmin", "vmax", "slice", "turntable"];
 
 /// Options for items of lists. Their tests are below.
 const LISTS: [&str; 11] = [
@@ -194,6 +194,10 @@ fn options_of_lists_add_items() {
         ),
         ("--cmap turbo", "material.color.map=turbo"),
         ("--colour-by v", "material.color={attribute=\"v\"}"),
+        (
+            "--turntable 36",
+            "camera.mode=turntable --set camera.degrees_per_frame=10.0 --set input.repeat=36",
+        ),
         ("--size 80mmx60mm", "image={width=\"80mm\",height=\"60mm\"}"),
     ] {
         let expected = manifest(&format!("--set {sets}"));

@@ -31,7 +31,11 @@ impl JobManifest {
             Some(ResumeMode::Force) | None => None,
             Some(_) => {
                 let dir = self.absolute_base()?.join(self.manifest.output.path.dir());
-                Job::read_plan(&real_dir(&dir))?
+                // That it is a file, or cannot be read, is reported when the job is opened
+                match real_dir(&dir) {
+                    dir if dir.is_dir() => Job::read_plan(&dir)?,
+                    _ => None,
+                }
             }
         };
         let mut lines = Vec::new();

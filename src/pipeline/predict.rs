@@ -598,7 +598,6 @@ impl<'a> MemoryModel<'a> {
             surface: surface.kept + meshes,
             images: film + film_before + self.tracing_scratch() * threads,
             encoding: encoding_before + names,
-            ..idle
         };
         let denoising = match self.setup.picture.denoise {
             Some(settings) => MemoryNeed {

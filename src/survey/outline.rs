@@ -21,6 +21,10 @@ const OUTSIDE: usize = 1000;
 /// Distance from the other particles beyond which these are outliers, as a fraction of the extent of the others.
 const MARGIN: f64 = 0.25;
 
+/// The same for a share of all particles, whose layers leave out more of them: the corners of a box are far
+/// from the layers in the directions of its diagonals.
+const SHARE_MARGIN: f64 = 0.5;
+
 /// Below this number, a particle may be as far from the others as their extent.
 const FEW: usize = 100;
 
@@ -28,7 +32,7 @@ const FEW: usize = 100;
 const MAX_OUTLIERS: usize = 100;
 
 /// Number of particles of a frame that are kept to find the outermost ones of all frames together.
-const KEPT: usize = 4096;
+const KEPT: usize = 16_384;
 
 /// Which particles an outline is about.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -92,7 +96,7 @@ impl Outermost {
         let longest = DVec3::AXES.iter().map(extent).fold(0.0, f64::max);
         // A particle that is far from the others along one axis is an outlier on all
         let axes = || (0..AXES).into_par_iter().map(axis);
-        let tail = outside(sample.len());
+        let tail = (outside(sample.len()), MARGIN);
         let found = axes().flat_map_iter(|axis| beyond(&sample, axis, longest, tail));
         let most = match sample.len() {
             0..FEW => usize::MAX,
@@ -165,7 +169,7 @@ impl Outermost {
         });
         let longest = extents.into_iter().fold(0.0, f64::max);
         let axes = || (0..AXES).into_par_iter().map(axis);
-        let found = axes().flat_map_iter(|axis| beyond(&all, axis, longest, tail));
+        let found = axes().flat_map_iter(|axis| beyond(&all, axis, longest, (tail, SHARE_MARGIN)));
         let outliers: HashSet<usize> = farthest(found.collect(), most).into_iter().collect();
         let indices = 0..all.len();
         let rest: Vec<DVec3> = indices
@@ -212,11 +216,16 @@ struct Outlier {
 
 /// The particles of a `sample` that are far from the others along `axis`. `longest` is the longest side of the box of
 /// the others.
-fn beyond(sample: &[DVec3], axis: DVec3, longest: f64, outside: usize) -> Vec<Outlier> {
+fn beyond(
+    sample: &[DVec3],
+    axis: DVec3,
+    longest: f64,
+    (outside, part): (usize, f64),
+) -> Vec<Outlier> {
     let [low, high] = layers(sample, axis, outside);
     let margin = match sample.len() < FEW {
         true => longest,
-        false => MARGIN * (high - low),
+        false => part * (high - low),
     };
     let outliers = sample.iter().enumerate().map(|(index, p)| {
         let along = p.dot(axis);

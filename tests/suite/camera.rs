@@ -30,7 +30,7 @@ fn workshop(camera: &str) -> Workshop {
         npy(&path, 2000, 1, Vec3::ZERO);
     }
     let text = format!(
-        "[input]\npath = \"in\"\nup = \"y\"\n[image]\nwidth = 64\nheight = 36\nsamples = 1\n\
+        "look = \"none\"\n[input]\npath = \"in\"\nup = \"y\"\n[image]\nwidth = 64\nheight = 36\nsamples = 1\n\
          [output]\npath = \"out/f.####.exr\"\n{camera}"
     );
     fs::write(workshop.join("my.toml"), text).expect("a manifest");

@@ -73,7 +73,14 @@ fn render_check_convert_and_resume() {
     );
     check.expect(0);
     let arguments = [
-        &["render", "in/parts.pvd", "-o", "out/f.####.exr"],
+        &[
+            "render",
+            "in/parts.pvd",
+            "--parts",
+            "fluid,wall",
+            "-o",
+            "out/f.####.exr",
+        ],
         &SMALL[..],
     ]
     .concat();
@@ -106,7 +113,14 @@ fn faults_of_members_cost_their_frame() {
     let workshop = workshop();
     fs::remove_file(workshop.join("in/parts/wall_10_1.vtu")).expect("a file");
     let arguments = [
-        &["render", "in/parts.pvd", "-o", "out/f.####.exr"],
+        &[
+            "render",
+            "in/parts.pvd",
+            "--parts",
+            "fluid,wall",
+            "-o",
+            "out/f.####.exr",
+        ],
         &SMALL[..],
     ]
     .concat();

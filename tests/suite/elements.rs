@@ -105,7 +105,12 @@ fn radii_have_the_unit_of_the_format() {
     let ran = still(
         &shop,
         "in.gro",
-        &["--set", "input.radius={table=\"vdw\", scale=10}"],
+        &[
+            "--look",
+            "none",
+            "--set",
+            "input.radius={table=\"vdw\", scale=10}",
+        ],
     );
     ran.expect(0)
         .prints("van der Waals radii of elements in `element`, angstroms x 1")

@@ -83,7 +83,7 @@ fn completions_know_every_command_and_option() {
     // Values, too
     let script = help(&["completions", "bash"]);
     for values in [
-        "water studio paper whitted",
+        "auto plain paper studio water whitted none",
         "spheres union smooth",
         "viridis turbo plasma",
         "linear log symlog",

@@ -46,6 +46,8 @@ fn picture_equals_that_of_a_job() {
         "turbo",
         "--set",
         "camera.fov=50",
+        "--fit",
+        "all",
     ];
     workshop.render(&look).expect(0);
     for (name, image) in [("a.png", "f.0004.png"), ("a.exr", "f.0004.exr")] {
@@ -205,6 +207,8 @@ fn pictures_without_background_have_alpha() {
         "--ground=none",
         "--color-by",
         "velocity",
+        "--fit",
+        "all",
     ];
     still(
         &workshop,

@@ -51,7 +51,7 @@ fn misspelled_values_have_suggestions() {
         &workshop,
         &["--look", "watr"],
         &[
-            "--look: expected one of water, studio, paper, whitted, found \"watr\"",
+            "--look: expected one of auto, plain, paper, studio, water, whitted, none, found the text \"watr\"",
             "did you mean water?",
         ],
     );

@@ -54,7 +54,7 @@ fn full_disk_is_reported_without_partial_files() {
         ("24k", 2),
         ("28k", 2),
         ("32k", 2),
-        ("40k", 1),
+        ("40k", 2),
         ("48k", 1),
         ("68k", 1),
     ] {

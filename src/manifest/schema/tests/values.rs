@@ -5,7 +5,9 @@ use std::sync::LazyLock;
 use super::*;
 
 /// Values of every type, around every bound.
-const VALUES: [&str; 103] = [
+const VALUES: [&str; 105] = [
+    "[[0, 0, 0], [1, 1, 1]]",
+    "\"99%\"",
     "0",
     "1",
     "-1",
