@@ -139,7 +139,7 @@ pub fn question<'a>(manifest: &'a Manifest, selection: &'a Selection) -> Questio
                 RadiusQuestion::AutoOfBody
             }
             RadiusSetting::Auto => RadiusQuestion::Auto,
-            RadiusSetting::Length(_) => RadiusQuestion::None,
+            RadiusSetting::Length(_) => RadiusQuestion::Given,
             RadiusSetting::Attribute { attribute, scale } => {
                 RadiusQuestion::Attribute(attribute, *scale)
             }

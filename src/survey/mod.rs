@@ -210,8 +210,10 @@ impl Question<'_> {
 /// What a job needs to know about radii.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RadiusQuestion<'a> {
-    /// Nothing, because the radius is given.
+    /// Nothing.
     None,
+    /// The spacing of particles, beside which a given radius is judged.
+    Given,
     /// The radii of the frames, or an estimate for frames without.
     Auto,
     /// Same as `Auto`, and an estimate for particles of one body.
@@ -225,8 +227,8 @@ pub enum RadiusQuestion<'a> {
 impl RadiusQuestion<'_> {
     /// The estimates that it needs, of each of so many `frames`.
     fn spacing(&self, frames: usize) -> Option<SpacingRequest> {
-        let is_auto = matches!(self, Self::Auto | Self::AutoOfBody);
-        is_auto.then_some(SpacingRequest {
+        let needs_spacing = matches!(self, Self::Given | Self::Auto | Self::AutoOfBody);
+        needs_spacing.then_some(SpacingRequest {
             needs_packed: *self == Self::AutoOfBody,
             frames,
         })
@@ -251,7 +253,7 @@ impl RadiusQuestion<'_> {
                 let radius = table.radius(value(name)?).or(table.other_radius())?;
                 Some(radius * scale)
             }
-            Self::None | Self::Auto | Self::AutoOfBody => None,
+            Self::None | Self::Given | Self::Auto | Self::AutoOfBody => None,
         }
     }
 }
@@ -543,6 +545,10 @@ impl Totals {
         }
         match question.radius {
             RadiusQuestion::None => {}
+            RadiusQuestion::Given => {
+                self.spacings
+                    .extend(spacing.map(|spacing| (weight.particles, spacing)));
+            }
             RadiusQuestion::Auto | RadiusQuestion::AutoOfBody => {
                 self.add_radius(&frame, weight.particles, spacing);
             }

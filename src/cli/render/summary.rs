@@ -50,6 +50,9 @@ pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup:
         return;
     }
     message!("{}", radius_text(setup, survey));
+    if let Some(text) = doubtful_radius(setup, survey) {
+        note!("{text}");
+    }
     if let Some(text) = unframed_text(setup) {
         message!("{text}");
     }
@@ -149,6 +152,27 @@ pub(in crate::cli) fn radius_text(setup: &Setup, survey: &Survey) -> String {
             }
         }
     }
+}
+
+/// Factor between a given radius and half the distance of neighbours beyond which the unit is probably another one.
+const DOUBTFUL: f64 = 10.0;
+
+/// Says that a given radius is far from the spacing of the particles, if it is.
+fn doubtful_radius(setup: &Setup, survey: &Survey) -> Option<String> {
+    let RadiusRule::Common(radius) = setup.picture.radius else {
+        return None;
+    };
+    let spacing = f64::from(survey.radius?);
+    let factor = f64::from(radius) / spacing;
+    let is_doubtful = !(DOUBTFUL.recip()..=DOUBTFUL).contains(&factor);
+    is_doubtful.then(|| {
+        format!(
+            "the radius {radius} is {} times half the typical distance of neighbours, {}; is its unit that of the \
+             positions?",
+            short(factor),
+            short(spacing)
+        )
+    })
 }
 
 /// Says how many particles the camera may leave out, if there are any.

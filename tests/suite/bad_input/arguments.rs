@@ -1,7 +1,7 @@
 //! Flags and their values.
 
 use super::{not_rendered, refused};
-use crate::harness::{Workshop, dam_break};
+use crate::harness::{SMALL, Workshop, dam_break};
 
 fn one_frame() -> Workshop {
     let workshop = Workshop::new();
@@ -460,4 +460,16 @@ fn conversions_write_directories() {
         assert!(!workshop.join(output).exists());
     }
     workshop.run(&["convert", "in", "-o", "v1.2"]).expect(0);
+}
+
+#[test]
+fn a_radius_far_from_the_spacing_gets_a_note() {
+    let workshop = one_frame();
+    let still = |radius: &str| {
+        let start = ["still", "in", "-o", "a.png", "--radius", radius];
+        workshop.run(&[&start[..], &SMALL].concat()).expect(0)
+    };
+    still("5").prints("note: the radius 5 is ");
+    let usual = still("0.025");
+    assert!(!usual.text().contains("is its unit"), "{}", usual.text());
 }
