@@ -13,7 +13,7 @@ use crate::output::OutputError;
 use crate::pipeline::{ImageError, ImageTask, Setup, TracedFrame, trace_particles};
 use crate::render::{Film, RenderError, Stop};
 use crate::resolve::{ResolveError, question};
-use crate::scene::Camera;
+use crate::scene::{Camera, CameraView, Projection};
 use crate::survey::{Facts, Survey};
 
 /// The name of particles without a file, in messages and overlays.
@@ -229,6 +229,12 @@ impl StillImage {
     /// The planes.
     pub const fn film(&self) -> &Film {
         &self.frame.film
+    }
+
+    /// The view and the projection of the picture, from which another one can be made.
+    pub fn view(&self) -> (CameraView, Projection) {
+        let picture = &self.setup.picture;
+        (picture.path.view(self.frame.task.frame), picture.projection)
     }
 
     /// The camera.

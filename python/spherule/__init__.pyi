@@ -77,6 +77,8 @@ class Image:
     notes: list[str]
     origin: tuple[float, float, float]
     color_range: tuple[float, float] | None
+    range: tuple[float, float] | None
+    camera: dict[str, Any]
     @property
     def rgba(self) -> np.ndarray: ...
     @property

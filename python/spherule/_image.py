@@ -8,6 +8,14 @@ import numpy as np
 from ._errors import OutputError
 
 
+def _camera(eye, look_at, up, fov, height):
+    """Keys of a camera that does not move."""
+    keys = {"mode": "fixed", "eye": eye, "look_at": look_at, "up": up}
+    if height is None:
+        return {**keys, "fov": fov}
+    return {**keys, "projection": "orthographic", "height": height}
+
+
 class Image:
     """A picture in memory.
 
@@ -25,8 +33,11 @@ class Image:
         What was left out or changed.
     origin : tuple of float
         World position that the tree was relative to.
-    color_range : tuple of float or None
+    color_range, range : tuple of float or None
         The values at both ends of the colour map, for a colour bar.
+    camera : dict
+        The view of the picture as keys of the section `camera` of a manifest: render(..., camera=image.camera) has the
+        same view of other particles.
     """
 
     def __init__(self, native):
@@ -36,6 +47,8 @@ class Image:
         self.notes = native.notes
         self.origin = tuple(native.origin)
         self.color_range = native.color_range
+        self.range = self.color_range
+        self.camera = _camera(*native.view)
         self.planes = native.planes()
         layers = native.layers()
         if layers is not None:

@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use spherule::manifest::{ManifestSource, Override};
 use spherule::output::layer_planes;
+use spherule::scene::Projection;
 use spherule::still::{self, Particles, StillImage, StillSettings};
 use spherule_formats::SimulationCell;
 
@@ -108,6 +109,19 @@ impl NativeImage {
     #[getter]
     fn origin(&self) -> [f64; 3] {
         self.image.survey().origin.to_array()
+    }
+
+    /// Eye, target, direction up, and field of view in degrees; and the height of an orthographic picture.
+    #[getter]
+    #[expect(clippy::type_complexity, reason = "a tuple for Python")]
+    fn view(&self) -> ([f64; 3], [f64; 3], [f64; 3], f64, Option<f64>) {
+        let (view, projection) = self.image.view();
+        let height = match projection {
+            Projection::Orthographic { height } => Some(height),
+            Projection::Perspective | Projection::Equirectangular => None,
+        };
+        let [eye, look_at, up] = [view.eye, view.look_at, view.up].map(|v| v.to_array());
+        (eye, look_at, up, view.fov, height)
     }
 
     /// Smallest and largest value of the colour map, if there is one.

@@ -74,7 +74,7 @@ section! {
         /// auto: the point in the middle of the picture
         center: Option<DVec3> = None, example("[0.5, 0.5, 0.5]");
         /// Enlarges the picture around its middle
-        zoom: f64 = 1.0, above(0), flag("zoom", "FACTOR", "Camera");
+        zoom: f64 = 1.0, above(0), to(10_000), flag("zoom", "FACTOR", "Camera");
         /// auto, turntable: show all of the meshes, too, not only the particles
         ///
         /// Holdouts and meshes that each frame has for itself do not count.
