@@ -113,7 +113,6 @@ impl NativeImage {
 
     /// Eye, target, direction up, and field of view in degrees; and the height of an orthographic picture.
     #[getter]
-    #[expect(clippy::type_complexity, reason = "a tuple for Python")]
     fn view(&self) -> ([f64; 3], [f64; 3], [f64; 3], f64, Option<f64>) {
         let (view, projection) = self.image.view();
         let height = match projection {
