@@ -62,6 +62,9 @@ const INSIDE: f64 = 0.9;
 /// Height of the text of a legend as a fraction of the picture.
 const TEXT_SIZE: f64 = 0.032;
 
+/// The same on paper: what journals ask for.
+const TEXT_ON_PAPER: &str = "7pt";
+
 /// Smaller pictures, in pixels of their shorter side, have no legend: its text could not be read.
 const LEAST_SIDE: u32 = 240;
 
@@ -120,6 +123,7 @@ pub fn rules(
         rules.white();
     }
     rules.legend();
+    rules.text_on_paper();
     rules.found
 }
 
@@ -396,10 +400,14 @@ impl Rules<'_> {
             return;
         }
         let mut overlays = Vec::new();
+        let size: Value = match self.manifest.image.dpi {
+            Some(_) => TEXT_ON_PAPER.into(),
+            None => TEXT_SIZE.into(),
+        };
         let item = |kind: &str| {
             let mut table = toml::Table::new();
             table.insert("type".to_owned(), kind.into());
-            table.insert("size".to_owned(), TEXT_SIZE.into());
+            table.insert("size".to_owned(), size.clone());
             Value::from(table)
         };
         if self.has_mapped_colors() {
@@ -411,6 +419,22 @@ impl Rules<'_> {
         if !overlays.is_empty() {
             self.set([("overlay", overlays.into())], None);
         }
+    }
+
+    /// Text of overlays that are given has the size of a journal's on paper.
+    fn text_on_paper(&mut self) {
+        if self.manifest.image.dpi.is_none() {
+            return;
+        }
+        let sizes = (0..self.manifest.overlays.len()).filter_map(|index| {
+            let key = format!("overlay.{index}.size");
+            Override::new(&key, TEXT_ON_PAPER, "the defaults").ok()
+        });
+        let settings = sizes.collect();
+        self.found.push(Rule {
+            settings,
+            line: None,
+        });
     }
 
     /// Whether the colours are those of a map.

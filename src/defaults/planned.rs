@@ -36,6 +36,16 @@ pub fn planned(source: &ManifestSource, planned: &[(String, String)]) -> Vec<Ove
     {
         layers.extend(layer("overlay", overlays));
     }
+    // Sizes of overlays that are given
+    let given = source
+        .parse()
+        .map_or(0, |(manifest, _)| manifest.overlays.len());
+    let sizes = (0..given).filter_map(|index| {
+        let key = format!("overlay.{index}.size");
+        let (_, text) = planned.iter().find(|(known, _)| *known == key)?;
+        layer(&key, value(text)?)
+    });
+    layers.extend(sizes);
     layers
 }
 

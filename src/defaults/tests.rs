@@ -3,7 +3,7 @@ use std::path::Path;
 use spherule_formats::SimulationCell;
 
 use super::*;
-use crate::manifest::{AxisView, BondSearch, OverlayKind, RadiusSetting};
+use crate::manifest::{AxisView, BondSearch, OverlayKind, RadiusSetting, TextSize};
 use crate::survey::Elements;
 
 /// Facts of a thousand particles in a unit cube of which nothing else is known.
@@ -202,6 +202,16 @@ fn looks_have_their_own_rules() {
             "{look}"
         );
     }
+    // On paper, text has the size of a journal's
+    let sizes = |text: &str| of(text, &fluid).overlays[0].size;
+    assert_eq!(sizes("image.width = \"80mm\""), TextSize::Points(7.0));
+    assert_eq!(sizes(""), TextSize::Fraction(0.032));
+    let given = "image.width = \"80mm\"\n[[overlay]]\ntype = \"axes\"\n";
+    assert_eq!(sizes(given), TextSize::Points(7.0));
+    assert_eq!(
+        sizes(&format!("{given}size = 0.1")),
+        TextSize::Fraction(0.1)
+    );
     // Small pictures have no legend, and cameras that are placed keep their lens
     assert!(
         of("image.width = 200\nimage.height = 100", &fluid)
@@ -224,7 +234,12 @@ fn jobs_that_go_on_have_the_defaults_of_their_plan() {
     atoms.elements = Some(Elements { has_others: true });
     atoms.has_time = true;
     let begun = of("", &atoms);
-    for text in ["", "material.color.map = \"turbo\"", "image.samples = 4"] {
+    for text in [
+        "",
+        "material.color.map = \"turbo\"",
+        "image.samples = 4",
+        "image.width = \"80mm\"\n[[overlay]]\ntype = \"axes\"",
+    ] {
         let begun = of(text, &atoms);
         let source = ManifestSource::new(
             format!("input.path = \"data\"\n{text}"),

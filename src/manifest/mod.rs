@@ -70,6 +70,7 @@ mod sun;
 mod surface;
 #[cfg(test)]
 mod tests;
+mod text_size;
 mod trails;
 mod tree;
 mod value;
@@ -116,6 +117,7 @@ pub use schema::{SCHEMA_FILE, job_schema};
 pub use select::{Axis, Select, Slab};
 pub use source::ManifestSource;
 pub use sun::Sun;
+pub use text_size::{TextSize, points_on_paper};
 pub use trails::Trails;
 pub use tree::{Override, OverrideError};
 pub use value::FlagKind;

@@ -6,6 +6,7 @@ use serde_json::{Value as Json, json};
 use super::field::Field;
 use super::key::Key;
 use super::keys::{Keys, keys};
+use super::text_size::TextSize;
 use super::value::{Fault, Named, Value, named, numbers_schema, quoted};
 use crate::overlay::{Corner, Orientation, Template};
 
@@ -94,8 +95,8 @@ pub struct Overlay {
     pub corner: Option<Corner>,
     /// Distance from the corner as fractions of the height of the picture.
     pub offset: [f64; 2],
-    /// Height of text as a fraction of the height of the picture.
-    pub size: f32,
+    /// Height of text.
+    pub size: TextSize,
     /// Colour of text and lines, linear RGB; by default black or white.
     pub color: Option<Vec3>,
 }
@@ -109,7 +110,7 @@ impl Default for Overlay {
             kind: OverlayKind::of(OverlayType::ColorBar),
             corner: None,
             offset: [0.04, 0.04],
-            size: SIZE,
+            size: TextSize::Fraction(SIZE),
             color: None,
         }
     }
@@ -247,7 +248,9 @@ impl Overlay {
             corner => self.corner, or("auto");
             /// Horizontal and vertical distance from the corner, as fractions of the height of the picture
             offset => self.offset;
-            /// Height of text as a fraction of the height of the picture
+            /// Height of text as a fraction of the height of the picture, or in points on paper: "7pt"
+            ///
+            /// Points need the dots per inch of the picture, image.dpi, or 300 without it.
             size => self.size, above(0), to(0.25);
             /// Colour of text and lines, linear RGB, or auto: black or white
             color => self.color, or("auto"), from(0), to(1);

@@ -97,7 +97,7 @@ pub(super) fn add_overlays(
                 corner: own.corner.unwrap_or(Corner::TopLeft),
                 offset,
             },
-            size: own.size,
+            size: own.size.fraction(picture[1], manifest.image.dpi),
             color: [0.0; 3],
             halo: [1.0; 3],
         };

@@ -5,7 +5,9 @@ use serde_json::{Value, json};
 use spherule_formats::Sequence;
 
 use crate::cli::progress::ShowReport;
+use crate::manifest::points_on_paper;
 use crate::metrics::counted;
+use crate::overlay::{Content, Overlay};
 use crate::pipeline::{self, RadiusRule, Setup};
 use crate::report::FrameReport;
 use crate::scene::{CameraPath, Projection, RadiusTable};
@@ -75,6 +77,9 @@ pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup:
             "colour by the RGB attribute `{name}` ({})",
             rgb.encoding.name()
         );
+    }
+    if let Some(text) = small_text(setup) {
+        note!("{text}");
     }
     if let Some(options) = view_options(setup) {
         message!("camera: {options}");
@@ -152,6 +157,24 @@ pub(in crate::cli) fn radius_text(setup: &Setup, survey: &Survey) -> String {
             }
         }
     }
+}
+
+/// Height in points below which text cannot be read on paper.
+const LEAST_POINTS: f64 = 6.0;
+
+/// Says that text is too small on paper, if it is.
+fn small_text(setup: &Setup) -> Option<String> {
+    let picture = &setup.picture;
+    let dpi = picture.exr.dpi?;
+    let has_text = |overlay: &&Overlay| !matches!(overlay.content, Content::Image(_));
+    let sizes = picture.overlays.iter().filter(has_text);
+    let points = sizes.map(|overlay| points_on_paper(overlay.size, picture.render.height, dpi));
+    let least = points.fold(f64::INFINITY, f64::min);
+    (least < LEAST_POINTS - 1e-3).then(|| {
+        format!(
+            "text is {least:.1} points high on paper; from {LEAST_POINTS} on it can be read (size = \"7pt\" of [[overlay]])"
+        )
+    })
 }
 
 /// Factor between a given radius and half the distance of neighbours beyond which the unit is probably another one.
