@@ -15,6 +15,7 @@ use super::paths::absolute;
 use super::render::print_summary;
 use super::{CliError, Outcome, disk, print, signals};
 use crate::job::{JobManifest, RenderJob, frames_in, require_one_fits};
+use crate::manifest::Look;
 use crate::output::{OutputError, PictureFormat};
 use crate::pipeline::{ImageError, WriteError, make_image};
 use crate::render::Channels;
@@ -123,8 +124,12 @@ pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
     }
     guard(&shown, &output, requested.file.as_deref(), &sequence)?;
     let frame = frame(args.frame, &requested, &sequence)?;
+    // The manifest of a job has the camera of the job
+    let is_of_job = requested.manifest.look == Look::None;
     complete(&mut requested, &mut sequence, None)?;
-    requested.manifest.show_own_frame();
+    if !is_of_job {
+        requested.manifest.show_own_frame();
+    }
     requested.manifest.input.frames = FrameRange::from_frames([frame]);
 
     let render_job = RenderJob::new(requested, &sequence, None)?;

@@ -199,6 +199,19 @@ fn help_has_examples_and_no_job_options() {
 }
 
 #[test]
+fn manifests_of_jobs_have_the_camera_of_the_job() {
+    let workshop = workshop();
+    workshop.render(&[]).expect(0);
+    let job = fs::read(workshop.join("out/f.0004.png")).expect("an image");
+    let arguments = ["still", "out/job.toml", "--frame", "4", "-o", "a.png"];
+    workshop.run(&arguments).expect(0);
+    assert!(fs::read(workshop.join("a.png")).expect("a picture") == job);
+    // Without the job, the camera shows the frame of the picture
+    let printed = still(&workshop, &["--frame", "4", "-o", "b.png"]).expect(0);
+    printed.prints("camera: --set 'camera.eye=");
+}
+
+#[test]
 fn pictures_without_background_have_alpha() {
     let workshop = workshop();
     let options = [

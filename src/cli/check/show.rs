@@ -13,9 +13,9 @@ use crate::cli::progress::duration;
 use crate::cli::render::{radius_text, unframed_text};
 use crate::manifest::{Channel, Manifest, NamedChannel};
 use crate::metrics::{Bytes, counted};
-use crate::pipeline::{Overlap, Probe, RadiusRule, Setup};
+use crate::pipeline::{ColorRule, Overlap, Probe, RadiusRule, Setup};
 use crate::scene::RadiusTable;
-use crate::survey::Survey;
+use crate::survey::{Survey, shown_name};
 
 impl Check<'_> {
     pub(super) fn to_json(&self) -> Value {
@@ -54,6 +54,10 @@ impl Check<'_> {
             put("structure", json!(structure(survey, setup).name()));
             put("most_particles", json!(survey.most_particles));
             put("radius", radius_json(setup, survey));
+            if let ColorRule::Attribute { name, map, .. } = &setup.picture.color {
+                let range = map.range().map(|(range, _)| range);
+                put("range", json!({"value": shown_name(name), "ends": range}));
+            }
             put("camera", self.camera(setup).to_json());
         }
         if let Some(schedule) = &self.schedule {
