@@ -6,7 +6,7 @@
 (36, 64, 4)
 """
 
-from ._command import command, inspect
+from ._command import command, inspect, movie, sheet
 from ._errors import ArrayError, Error, InputError, InternalError, JobError, OutputError, SettingError
 from ._frames import Cell, Frame, Sequence, read, sequence, write_spf
 from ._image import Image
@@ -30,8 +30,10 @@ __all__ = [
     "__version__",
     "command",
     "inspect",
+    "movie",
     "read",
     "render",
     "sequence",
+    "sheet",
     "write_spf",
 ]

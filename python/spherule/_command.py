@@ -7,7 +7,7 @@ import subprocess
 import sys
 import sysconfig
 
-from ._errors import Error, InputError
+from ._errors import Error, InputError, JobError
 
 
 def command():
@@ -43,6 +43,72 @@ def json_lines(*arguments, error=InputError, shown=str):
         objects.append(value)
         text = text[end:].lstrip()
     return objects, done.returncode
+
+
+def _run(name, job, path, options):
+    """Runs a command that makes the file `path` of a job."""
+    arguments = [command(), name, os.fspath(job), "-o", os.fspath(path)]
+    for key, value in options.items():
+        option = "--" + key.replace("_", "-")
+        if value is True:
+            arguments.append(option)
+        elif value is not None and value is not False:
+            arguments.append(f"{option}={value}")
+    done = subprocess.run(arguments, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    if done.returncode:
+        lines = [line.removeprefix("error: ") for line in done.stderr.splitlines() if line.startswith("error: ")]
+        raise JobError("\n".join(lines) or done.stderr.strip() or f"the command ended with code {done.returncode}")
+    return os.fspath(path)
+
+
+def movie(job, path, **options):
+    """Writes a movie of the finished pictures of a job.
+
+    Parameters
+    ----------
+    job : path
+        The directory of its images, such as `Job.dir`.
+    path : path
+        .mp4, .mov, .mkv and .webm need ffmpeg; .gif, .png and .webp do not.
+    **options
+        Options of `spherule movie`, such as fps=10, width=640 or partial=True.
+
+    Returns
+    -------
+    str
+        The path of the movie.
+
+    Raises
+    ------
+    JobError
+        Frames are missing, or the movie cannot be written.
+    """
+    return _run("movie", job, path, options)
+
+
+def sheet(job, path, **options):
+    """Writes the finished pictures of a job on one picture; see `movie`.
+
+    Parameters
+    ----------
+    job : path
+        The directory of its images, such as `Job.dir`.
+    path : path
+        The picture, .png.
+    **options
+        Options of `spherule sheet`, such as columns=3.
+
+    Returns
+    -------
+    str
+        The path of the picture.
+
+    Raises
+    ------
+    JobError
+        There are no pictures, or the sheet cannot be written.
+    """
+    return _run("sheet", job, path, options)
 
 
 def inspect(path):

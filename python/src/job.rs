@@ -101,7 +101,12 @@ pub(crate) fn write_manifest(
     base: PathBuf,
 ) -> PyResult<()> {
     let written = || -> Result<(), Failure> {
-        let mut manifest = manifest(None, settings, base.clone())?.manifest;
+        let mut requested = manifest(None, settings, base.clone())?;
+        // What cannot be opened is reported when the manifest is used
+        if let Ok(mut sequence) = requested.open_sequence() {
+            requested.complete(&mut sequence, Some(ResumeMode::Resume))?;
+        }
+        let mut manifest = requested.manifest;
         let dir = path.parent().map_or_else(PathBuf::new, real_dir);
         let moved = manifest.rebase(&base, &dir);
         moved.map_err(|error| Failure::new(Class::Setting, error))?;

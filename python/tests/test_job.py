@@ -58,3 +58,23 @@ def test_changed_settings_are_refused(example, tmp_path):
     with pytest.raises(spherule.JobError):
         spherule.Job(manifest(example, tmp_path), settings={"image.samples": 2}).run()
     assert spherule.Job(manifest(example, tmp_path), settings={"image.samples": 2}).run(mode="force")["done"] == 3
+
+
+def test_movies_and_sheets_are_functions(example, tmp_path):
+    settings = manifest(example, tmp_path / "out")
+    settings["output"]["preview"] = True
+    job = spherule.Job(settings)
+    job.run()
+    movie = spherule.movie(job.dir, tmp_path / "m.gif", fps=5)
+    assert open(movie, "rb").read(6) == b"GIF89a"
+    sheet = spherule.sheet(job.dir, tmp_path / "s.png", columns=3)
+    assert open(sheet, "rb").read(4) == b"\x89PNG"
+    with pytest.raises(spherule.JobError):
+        spherule.movie(tmp_path / "nothing", tmp_path / "n.gif")
+
+
+def test_a_check_has_the_camera_of_the_run(example, tmp_path):
+    job = spherule.Job(manifest(example, tmp_path / "out"))
+    checked = job.check()
+    job.run()
+    assert spherule.Job(tmp_path / "out").check()["camera"] == checked["camera"]
