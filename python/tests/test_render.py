@@ -195,13 +195,16 @@ def test_cells_are_kept_and_drawn(ball, small, tmp_path):
     assert tuple(frame.cell.origin) == (-4, -4, -5) and tuple(frame.cell.periodic) == (True, True, False)
     visible = {"cell.visible": True}
     of_file = spherule.render(frame, radius=0.3, settings=visible, **small).to_exr()
-    assert of_file != spherule.render(frame, radius=0.3, **small).to_exr()
+    hidden = {"cell.visible": False}
+    assert of_file != spherule.render(frame, radius=0.3, settings=hidden, **small).to_exr()
     cell = spherule.Cell([8, 8, 10], origin=(-4, -4, -5))
+    # Rules of a look would be among the notes
+    plain = {"radius": 0.3, "settings": visible, "look": "none", **small}
     attributes = frame.attributes
-    of_array = spherule.render(ball, radius=0.3, attributes=attributes, cell=cell, settings=visible, **small)
-    same = spherule.render(frame.positions, radius=0.3, attributes=attributes, cell=cell, settings=visible, **small)
+    of_array = spherule.render(ball, attributes=attributes, cell=cell, **plain)
+    same = spherule.render(frame.positions, attributes=attributes, cell=cell, **plain)
     assert of_array.notes == same.notes == []
-    assert spherule.render(ball, radius=0.3, cell=np.eye(3) * 8, settings=visible, **small).notes == []
+    assert spherule.render(ball, cell=np.eye(3) * 8, **plain).notes == []
     with pytest.raises(spherule.ArrayError, match="cell: expected the edges"):
         spherule.render(ball, cell=np.ones((2, 3)), **small)
 
