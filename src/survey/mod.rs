@@ -539,7 +539,7 @@ impl Totals {
         };
         let velocity = self.velocity.as_deref();
         self.color.add(&frame, velocity, question.color, context);
-        if question.points {
+        if question.points && is_framed {
             let some = sample_indices(frame.len(), POINTS).map(|i| frame.positions[i]);
             self.points.extend(some.map(|p| origin + p.as_dvec3()));
         }
