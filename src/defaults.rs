@@ -42,7 +42,8 @@ const KEYS: [&str; 17] = [
 /// The key of the colours of particles.
 const COLOR: &str = "material.color";
 
-/// The colour of particles of which nothing is known, linear RGB: light, so that their shading shows their form.
+/// The colour of particles without elements, categories, colours and velocities, linear RGB: light, so that shading shows
+/// their form.
 const NEUTRAL: [f64; 3] = [0.42, 0.47, 0.54];
 
 /// Vertical field of view in degrees. A long lens keeps parallel edges nearly parallel.
@@ -68,13 +69,13 @@ const TEXT_ON_PAPER: &str = "7pt";
 /// Smaller pictures, in pixels of their shorter side, have no legend: its text could not be read.
 const LEAST_SIDE: u32 = 240;
 
-/// What a rule did.
-#[derive(Debug, Clone)]
-pub struct Rule {
+/// What the rules chose.
+#[derive(Debug, Clone, Default)]
+pub struct Defaults {
     /// The settings.
     pub settings: Vec<Override>,
-    /// One line for the user; none if nothing needs to be said.
-    pub line: Option<String>,
+    /// A line for the user for each rule that has something to say.
+    pub lines: Vec<String>,
 }
 
 /// Applies the rules to a manifest.
@@ -83,7 +84,7 @@ struct Rules<'a> {
     source: &'a ManifestSource,
     facts: &'a Facts,
     files: Files<'a>,
-    found: Vec<Rule>,
+    found: Defaults,
 }
 
 /// What the files say beside the facts of a frame.
@@ -101,13 +102,13 @@ pub fn rules(
     source: &ManifestSource,
     facts: &Facts,
     files: Files<'_>,
-) -> Vec<Rule> {
+) -> Defaults {
     let mut rules = Rules {
         manifest,
         source,
         facts,
         files,
-        found: Vec::new(),
+        found: Defaults::default(),
     };
     if matches!(manifest.look, Look::None | Look::Whitted) || facts.particles == 0 {
         return rules.found;
@@ -130,8 +131,12 @@ pub fn rules(
 impl Rules<'_> {
     /// Whether neither the manifest nor a rule so far gives a value of `key`.
     fn lacks(&self, key: &str) -> bool {
-        let mut set = self.found.iter().flat_map(|rule| &rule.settings);
-        self.source.lacks(key) && !set.any(|setting| setting.is_in(key))
+        self.source.lacks(key) && !self.has_set(key)
+    }
+
+    /// Whether a rule so far gives a value of `key`, or one in the table `key`.
+    fn has_set(&self, key: &str) -> bool {
+        self.found.settings.iter().any(|setting| setting.is_in(key))
     }
 
     /// Sets those of the keys that are missing. The `line` is said if there is one.
@@ -141,7 +146,8 @@ impl Rules<'_> {
             .filter_map(|(key, value)| Override::new(key, value, "the defaults").ok())
             .collect();
         if !settings.is_empty() {
-            self.found.push(Rule { settings, line });
+            self.found.settings.extend(settings);
+            self.found.lines.extend(line);
         }
     }
 
@@ -197,15 +203,15 @@ impl Rules<'_> {
             return;
         }
         let has_bonds = self.facts.has_bonds && self.source.lacks("bonds.find");
-        let mut radius = toml::Table::new();
-        radius.insert("attribute".to_owned(), ELEMENT.into());
-        let (radius, name): (Value, _) = match has_bonds {
-            true => {
-                radius.insert("table".to_owned(), "covalent".into());
-                radius.insert("scale".to_owned(), 0.5.into());
-                (radius.into(), "half their covalent radii")
-            }
-            false => ("vdw".into(), "their van der Waals radii"),
+        let (radius, name): (Value, _) = if has_bonds {
+            let keys = [("table", Value::from("covalent")), ("scale", 0.5.into())];
+            let keys = keys.map(|(key, value)| (key.to_owned(), value));
+            (
+                toml::Table::from_iter(keys).into(),
+                "half their covalent radii",
+            )
+        } else {
+            ("vdw".into(), "their van der Waals radii")
         };
         if self.has_open_colors() {
             let line = "elements have their usual colours (--color-by gives others)";
@@ -266,10 +272,9 @@ impl Rules<'_> {
         }
     }
 
-    /// Particles of which nothing is known have a neutral colour.
+    /// Particles without values for colours have a neutral one.
     fn neutral(&mut self) {
-        let is_unknown = !self.facts.has_velocities && !self.facts.has_colors;
-        if is_unknown && self.manifest.look != Look::Water {
+        if !self.facts.has_velocities && !self.facts.has_colors {
             let color = NEUTRAL.map(Value::from).to_vec();
             self.set([(COLOR, color.into())], None);
         }
@@ -324,11 +329,7 @@ impl Rules<'_> {
         self.set([("render.background", white)], None);
         if self.is_placed_automatically()
             && self.manifest.camera.projection == ProjectionKind::Perspective
-            && !self
-                .found
-                .iter()
-                .flat_map(|rule| &rule.settings)
-                .any(|s| s.is_of("camera.projection"))
+            && !self.has_set("camera.projection")
         {
             self.set([("camera.fov", FOV.into())], None);
         }
@@ -346,9 +347,10 @@ impl Rules<'_> {
         let (Some(axis), true) = (self.facts.flat_axis(), self.is_placed_automatically()) else {
             return;
         };
-        let usual = match self.files.is_y_up {
-            true => DVec3::Y,
-            false => DVec3::Z,
+        let usual = if self.files.is_y_up {
+            DVec3::Y
+        } else {
+            DVec3::Z
         };
         let own = self
             .manifest
@@ -430,22 +432,16 @@ impl Rules<'_> {
             let key = format!("overlay.{index}.size");
             Override::new(&key, TEXT_ON_PAPER, "the defaults").ok()
         });
-        let settings = sizes.collect();
-        self.found.push(Rule {
-            settings,
-            line: None,
-        });
+        self.found.settings.extend(sizes);
     }
 
     /// Whether the colours are those of a map.
     fn has_mapped_colors(&self) -> bool {
-        let mut set = self.found.iter().flat_map(|rule| &rule.settings);
         match &self.manifest.material.color {
             ColorSetting::Rgb(_) => false,
             ColorSetting::Mapped(_) => true,
             ColorSetting::Auto => {
-                set.any(|setting| setting.is_of("material.color.attribute"))
-                    || self.facts.has_velocities
+                self.has_set("material.color.attribute") || self.facts.has_velocities
             }
         }
     }
@@ -457,11 +453,8 @@ fn side_along(axis: usize, up: DVec3) -> &'static str {
         return "top";
     }
     // The front looks along y if z is up, and along z if y is up
-    let is_front = match up.y != 0.0 {
-        true => axis == 2,
-        false => axis == 1,
-    };
-    if is_front { "front" } else { "right" }
+    let front = if up.y != 0.0 { 2 } else { 1 };
+    if axis == front { "front" } else { "right" }
 }
 
 #[cfg(test)]

@@ -88,14 +88,8 @@ impl StillSettings {
             return Ok((self.manifest.clone(), Vec::new()));
         };
         let facts = Facts::of_particles(&self.name, particles)?;
-        let mut lines = Vec::new();
-        let rules = rules(&self.manifest, source, &facts, Files::default());
-        let layers = rules.into_iter().flat_map(|rule| {
-            lines.extend(rule.line);
-            rule.settings
-        });
-        let manifest = source.parse_over(layers.collect())?;
-        Ok((manifest, lines))
+        let found = rules(&self.manifest, source, &facts, Files::default());
+        Ok((source.parse_over(found.settings)?, found.lines))
     }
 }
 

@@ -14,9 +14,7 @@ use crate::job::{JOB_FILE, RunError};
 use crate::manifest::ManifestError;
 use crate::pipeline::MeshLoadError;
 use crate::resolve::ResolveError;
-
-/// The attribute with atomic numbers.
-const ELEMENT: &str = "element";
+use crate::survey::ELEMENT;
 
 #[derive(Debug, thiserror::Error)]
 pub(super) enum CliError {

@@ -6,7 +6,7 @@ use super::*;
 use crate::manifest::{AxisView, BondSearch, OverlayKind, RadiusSetting, TextSize};
 use crate::survey::Elements;
 
-/// Facts of a thousand particles in a unit cube of which nothing else is known.
+/// Facts of a thousand particles in a unit cube without attributes.
 fn facts() -> Facts {
     Facts {
         particles: 1000,
@@ -33,13 +33,9 @@ fn completed(text: &str, facts: &Facts, files: Files<'_>) -> (Manifest, String) 
     };
     let source = ManifestSource::new(text, Path::new("job.toml"), Vec::new());
     let (manifest, _) = source.parse().unwrap();
-    let mut lines = Vec::new();
-    let mut layers = Vec::new();
-    for rule in rules(&manifest, &source, facts, files) {
-        lines.extend(rule.line);
-        layers.extend(rule.settings);
-    }
-    (source.parse_over(layers).unwrap(), lines.join("\n"))
+    let found = rules(&manifest, &source, facts, files);
+    let completed = source.parse_over(found.settings).unwrap();
+    (completed, found.lines.join("\n"))
 }
 
 fn of(text: &str, facts: &Facts) -> Manifest {

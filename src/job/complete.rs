@@ -5,7 +5,7 @@ use spherule_jobs::{Job, ResumeMode};
 
 use super::manifest_file::JobManifest;
 use super::{RunError, in_thread};
-use crate::defaults::{Files, planned, rules, walls};
+use crate::defaults::{Defaults, Files, planned, rules, walls};
 use crate::manifest::{Look, ManifestSource, Override, real_dir};
 use crate::survey::Facts;
 
@@ -38,12 +38,14 @@ impl JobManifest {
                 }
             }
         };
-        let mut lines = Vec::new();
-        let layers = match plan {
-            Some(plan) => planned(&source, plan.settings()),
-            None => self.defaults(&source, sequence, &mut lines)?,
+        let defaults = match plan {
+            Some(plan) => Defaults {
+                settings: planned(&source, plan.settings()),
+                lines: Vec::new(),
+            },
+            None => self.defaults(&source, sequence)?,
         };
-        let mut manifest = source.parse_over(layers)?;
+        let mut manifest = source.parse_over(defaults.settings)?;
         if let Some(parts) = manifest
             .input
             .parts
@@ -54,36 +56,35 @@ impl JobManifest {
         }
         manifest.look = Look::None;
         self.manifest = manifest;
-        Ok(lines)
+        Ok(defaults.lines)
     }
 
     fn defaults(
         &self,
         source: &ManifestSource,
         sequence: &mut Sequence,
-        lines: &mut Vec<String>,
-    ) -> Result<Vec<Override>, RunError> {
-        let mut layers = Vec::new();
+    ) -> Result<Defaults, RunError> {
+        let mut defaults = Defaults::default();
         // The facts are those of what is drawn
         let found = walls(sequence.part_names()).filter(|_| source.lacks("input.parts"));
         if let Some(walls) = found.filter(|_| self.manifest.look != Look::Whitted) {
-            lines.push(format!(
+            defaults.lines.push(format!(
                 "left out: {}, walls by name (--parts {} shows them)",
                 walls.left_out.join(", "),
                 sequence.part_names().join(",")
             ));
             self.keep_parts(sequence, Some(&walls.kept))?;
-            layers.extend(Override::new("input.parts", walls.kept, "the defaults"));
+            let parts = Override::new("input.parts", walls.kept, "the defaults");
+            defaults.settings.extend(parts);
         }
         let facts = in_thread(|| Facts::of(sequence));
         let files = Files {
             parts: sequence.part_names(),
             is_y_up: sequence.is_y_up(),
         };
-        for rule in rules(&self.manifest, source, &facts, files) {
-            lines.extend(rule.line);
-            layers.extend(rule.settings);
-        }
-        Ok(layers)
+        let found = rules(&self.manifest, source, &facts, files);
+        defaults.settings.extend(found.settings);
+        defaults.lines.extend(found.lines);
+        Ok(defaults)
     }
 }

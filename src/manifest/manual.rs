@@ -11,7 +11,7 @@ on the command line; this works for every key. Frequent keys also have an option
 `spherule schema` prints a JSON schema of the manifest for editors.
 
 Where a value is a colour, it is linear RGB, or sRGB as a name of CSS (\"steelblue\"), `\"#4682b4\"`, `\"#48b\"` or integers
-of which one is above 1 (`[70, 130, 180]`). All of them are stored as linear RGB.
+with a number above 1 (`[70, 130, 180]`). All of them are stored as linear RGB.
 
 Keys that do not change images may change between runs of a job. If any other key has changed, the job does not resume
 unless you give `--force` or `--keep-done`. [Adding a manifest key](adding-a-manifest-key.md) explains how to add a key.

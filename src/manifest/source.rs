@@ -12,15 +12,24 @@ pub struct ManifestSource {
     /// For messages.
     path: PathBuf,
     overrides: Vec<Override>,
+    /// The values that it gives, with those of its look; None if it is not TOML.
+    given: Option<TomlNode>,
 }
 
 impl ManifestSource {
     /// `text` from the file `path`, which is only used for messages, with `overrides` in order. The text may be empty.
     pub fn new(text: impl Into<String>, path: &Path, overrides: Vec<Override>) -> Self {
+        let text = text.into();
+        let mut given = TomlNode::parse(&text).ok();
+        if let Some(tree) = &mut given {
+            // Problems are reported when it is read
+            lay_over(tree, &text, overrides.clone(), |_| {});
+        }
         Self {
-            text: text.into(),
+            text,
             path: path.to_owned(),
             overrides,
+            given,
         }
     }
 
@@ -44,12 +53,7 @@ impl ManifestSource {
 
     /// Whether neither the manifest nor an override or the look gives a value of the dotted `key`.
     pub fn lacks(&self, key: &str) -> bool {
-        let Ok(mut tree) = TomlNode::parse(&self.text) else {
-            return false;
-        };
-        // Problems are reported when it is read
-        lay_over(&mut tree, &self.text, self.overrides.clone(), |_| {});
         let keys: Vec<&str> = key.split('.').collect();
-        !tree.has(&keys)
+        self.given.as_ref().is_some_and(|tree| !tree.has(&keys))
     }
 }

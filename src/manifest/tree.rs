@@ -149,7 +149,7 @@ impl Override {
     }
 
     /// Whether it sets the dotted `key`.
-    pub fn is_of(&self, key: &str) -> bool {
+    pub(super) fn is_of(&self, key: &str) -> bool {
         key.split('.').eq(&self.keys)
     }
 }

@@ -5,13 +5,10 @@ use super::{ResolveError, narrow, require_attribute};
 use crate::manifest::{BondSearch, Manifest};
 use crate::pipeline::{BondRule, BondStyle, ColorRule};
 use crate::scene::Scene;
-use crate::survey::Survey;
+use crate::survey::{ELEMENT, Survey};
 
 /// Automatic radius in radii of the particles.
 const RADIUS: f64 = 1.0 / 3.0;
-
-/// The attribute with atomic numbers.
-const ELEMENT: &str = "element";
 
 /// How bonds are drawn, if they are; see [`arrows`](super::arrows::arrows).
 ///

@@ -88,9 +88,10 @@ pub(super) fn ground(
         ground.raise(narrow(floor.reach.min(most)));
     }
     if is_catcher {
-        let fade = match floor.is_of_earlier_version {
-            true => FAR_FADE,
-            false => NEAR_FADE,
+        let fade = if floor.is_of_earlier_version {
+            FAR_FADE
+        } else {
+            NEAR_FADE
         };
         let catcher = ground.into_shadow_catcher(bounds, render.ground_shadow, fade);
         return Ok(Some(catcher));

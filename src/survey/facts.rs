@@ -214,9 +214,10 @@ fn category(attribute: &Attribute, velocity: Option<&Attribute>) -> Option<Categ
             moving.insert(value);
         }
     }
-    let at_rest = match moving.is_empty() {
-        true => Vec::new(),
-        false => all.difference(&moving).copied().collect(),
+    let at_rest = if moving.is_empty() {
+        Vec::new()
+    } else {
+        all.difference(&moving).copied().collect()
     };
     (all.len() > 1).then(|| Category {
         name: attribute.name.clone(),

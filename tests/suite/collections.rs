@@ -61,6 +61,12 @@ fn inspect_describes_lists_and_their_files() {
     );
 }
 
+/// Walls are drawn, too.
+fn render_of_all_parts() -> Vec<&'static str> {
+    let start = ["render", "in/parts.pvd", "--parts", "fluid,wall"];
+    [&start[..], &["-o", "out/f.####.exr"], &SMALL].concat()
+}
+
 #[test]
 fn render_check_convert_and_resume() {
     let workshop = workshop();
@@ -72,18 +78,7 @@ fn render_check_convert_and_resume() {
         .concat(),
     );
     check.expect(0);
-    let arguments = [
-        &[
-            "render",
-            "in/parts.pvd",
-            "--parts",
-            "fluid,wall",
-            "-o",
-            "out/f.####.exr",
-        ],
-        &SMALL[..],
-    ]
-    .concat();
+    let arguments = render_of_all_parts();
     let ran = workshop.run(&arguments).expect(0);
     assert_eq!(ran.rendered(), [0, 1, 2]);
     ran.prints("ParaView collection, 3 time steps, 9 files, times 0 to 0.5");
@@ -112,18 +107,7 @@ fn render_check_convert_and_resume() {
 fn faults_of_members_cost_their_frame() {
     let workshop = workshop();
     fs::remove_file(workshop.join("in/parts/wall_10_1.vtu")).expect("a file");
-    let arguments = [
-        &[
-            "render",
-            "in/parts.pvd",
-            "--parts",
-            "fluid,wall",
-            "-o",
-            "out/f.####.exr",
-        ],
-        &SMALL[..],
-    ]
-    .concat();
+    let arguments = render_of_all_parts();
     workshop.run(&arguments).expect(1).prints(
         "in/parts/wall_10.pvtu: line 11: it lists in/parts/wall_10_1.vtu, which does not exist",
     );

@@ -84,15 +84,14 @@ impl Value for BoxSetting {
             return Err(Fault::Unwanted);
         };
         let (a, b) = (DVec3::parse(a, key)?, DVec3::parse(b, key)?);
-        match a == b {
-            true => Err(Fault::Because(
-                "has no extent: its corners are equal".to_owned(),
-            )),
-            false => Ok(Self {
-                min: a.min(b),
-                max: a.max(b),
-            }),
+        if a == b {
+            let what = "has no extent: its corners are equal".to_owned();
+            return Err(Fault::Because(what));
         }
+        Ok(Self {
+            min: a.min(b),
+            max: a.max(b),
+        })
     }
 
     fn toml(&self) -> String {
