@@ -7,10 +7,7 @@
 //! The time hardly depends on the picture. This one is a floor under a grid of balls, with uniform noise.
 
 #![expect(clippy::print_stdout, reason = "the table is what it is for")]
-#![expect(
-    clippy::cast_precision_loss,
-    reason = "coordinates and noise need no more digits"
-)]
+#![expect(clippy::cast_precision_loss, reason = "coordinates and noise need no more digits")]
 
 use std::env;
 
@@ -60,14 +57,11 @@ fn main() {
     println!("{width}x{height}, CPU seconds of one thread, best of {turns} turns, {simd}");
     println!("{:<8} {:>8} {:>8} {:>8}", "", "CPU s", "before", "after");
     let before = picture.error(picture.color.iter().map(|c| Vec3::new(c[0], c[1], c[2])));
-    for (name, settings) in [
-        ("opaque", DenoiseSettings::OPAQUE),
-        ("water", DenoiseSettings::WATER),
-    ] {
+    for (name, settings) in [("opaque", DenoiseSettings::OPAQUE), ("water", DenoiseSettings::WATER)]
+    {
         let times = (0..turns).map(|_| picture.denoised(&settings));
-        let (seconds, filtered) = times
-            .min_by(|(a, _), (b, _)| a.total_cmp(b))
-            .expect("at least one turn");
+        let (seconds, filtered) =
+            times.min_by(|(a, _), (b, _)| a.total_cmp(b)).expect("at least one turn");
         let after = picture.error(filtered.into_iter());
         println!("{name:<8} {seconds:>8.3} {before:>8.4} {after:>8.4}");
     }
@@ -139,9 +133,7 @@ impl Picture {
 
     /// Root of the mean squared error of a component.
     fn error(&self, pixels: impl Iterator<Item = Vec3>) -> f32 {
-        let squares = pixels
-            .zip(&self.expected)
-            .map(|(p, q)| p.distance_squared(*q));
+        let squares = pixels.zip(&self.expected).map(|(p, q)| p.distance_squared(*q));
         (squares.sum::<f32>() / (3 * self.expected.len()) as f32).sqrt()
     }
 }

@@ -45,10 +45,8 @@ fn main() {
         let radius = 0.5 * (VOLUME / count as f32).cbrt();
         let mut builder = TreeBuilder::new();
         let build = |builder: &mut TreeBuilder, larger: f32| {
-            let spheres = Spheres {
-                centers: &centers,
-                radius: SphereRadius::Common(larger * radius),
-            };
+            let spheres =
+                Spheres { centers: &centers, radius: SphereRadius::Common(larger * radius) };
             builder.build(&spheres, &BuildSettings::default());
         };
         build(&mut builder, 1.0);
@@ -98,10 +96,7 @@ fn follow<S: Shape>(surface: &S, mut ray: Ray) -> Events {
     let forward = ray.direction;
     let is_beyond = |point: Vec3| (point - CENTER).dot(forward) > 0.0;
     let mut side = Side::Outside;
-    let mut found = Events {
-        to_middle: None,
-        to_leave: None,
-    };
+    let mut found = Events { to_middle: None, to_leave: None };
     for events in 0..=EVENTS[EVENTS.len() - 1] {
         let hit = surface.crossing(&ray, side);
         let is_past = match &hit {
@@ -123,16 +118,9 @@ fn follow<S: Shape>(surface: &S, mut ray: Ray) -> Events {
 /// Where a path goes on, and on which side of one body.
 fn bend(ray: &Ray, hit: &Intersection, side: Side) -> (Ray, Side) {
     let entering = ray.direction.dot(hit.normal) < 0.0;
-    let (normal, ratio) = if entering {
-        (hit.normal, 1.0 / IOR)
-    } else {
-        (-hit.normal, IOR)
-    };
+    let (normal, ratio) = if entering { (hit.normal, 1.0 / IOR) } else { (-hit.normal, IOR) };
     match refract(ray.direction, normal, ratio) {
-        Some(onward) => (
-            Ray::new(hit.anchor - hit.offset * normal, onward),
-            side.other(),
-        ),
+        Some(onward) => (Ray::new(hit.anchor - hit.offset * normal, onward), side.other()),
         None => {
             let back = reflect(ray.direction, normal);
             (Ray::new(hit.anchor + hit.offset * normal, back), side)

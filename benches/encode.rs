@@ -35,10 +35,7 @@ const NAME: &str = "encode";
 const ALL: &str = "RGBA,Z,N,id,P,V,albedo";
 
 fn main() {
-    let given: Vec<String> = env::args()
-        .skip(1)
-        .filter(|a| !a.starts_with('-'))
-        .collect();
+    let given: Vec<String> = env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
     let has = |flag: &str| env::args().any(|argument| argument == flag);
     let files: Vec<PathBuf> = given.iter().map(PathBuf::from).collect();
     let are_files = files.iter().all(|file| file.is_file());
@@ -80,11 +77,8 @@ fn rendered(place: &Path, is_quick: bool) -> Vec<PathBuf> {
         let what = ["render", &input, "-o", &output, "--frames", frame];
         run(&[&what[..], &["--channels", ALL], size].concat());
         let image = place.join(format!("{name}.exr"));
-        fs::rename(
-            place.join(name).join(format!("image.{frame:0>4}.exr")),
-            &image,
-        )
-        .expect("an image");
+        fs::rename(place.join(name).join(format!("image.{frame:0>4}.exr")), &image)
+            .expect("an image");
         image
     };
     inputs.into_iter().map(image).collect()
@@ -102,12 +96,7 @@ fn run(arguments: &[&str]) {
 fn print_rows(file: &Path, turns: usize) {
     let film = film(file);
     let has = film.channels();
-    let data = Channels {
-        depth: has.depth,
-        normal: has.normal,
-        id: has.id,
-        ..Channels::COLOR
-    };
+    let data = Channels { depth: has.depth, normal: has.normal, id: has.id, ..Channels::COLOR };
     let name = file.file_stem().unwrap_or_default().to_string_lossy();
     let mut done = Vec::new();
     for (set, channels) in [("RGBA", Channels::COLOR), ("Z N id", data), ("all", has)] {
@@ -243,9 +232,7 @@ fn film(file: &Path) -> Film {
     let mut film = Film {
         width: side(layer.size.x()),
         height: side(layer.size.y()),
-        color: (0..color[0].len())
-            .map(|at| std::array::from_fn(|c| color[c][at]))
-            .collect(),
+        color: (0..color[0].len()).map(|at| std::array::from_fn(|c| color[c][at])).collect(),
         depth: floats("Z"),
         normal: vectors("N", ["X", "Y", "Z"]),
         position: vectors("P", ["X", "Y", "Z"]),

@@ -72,12 +72,7 @@ fn sequence(place: &Path) {
         let report = json(&text);
         let frames = report["frames"].as_array().expect("frames");
         let sum = |names: &[&str]| -> f64 {
-            let of = |f: &Value| {
-                names
-                    .iter()
-                    .filter_map(|n| f["seconds"][n].as_f64())
-                    .sum::<f64>()
-            };
+            let of = |f: &Value| names.iter().filter_map(|n| f["seconds"][n].as_f64()).sum::<f64>();
             frames.iter().map(of).sum()
         };
         let stages = [&["read"][..], &["build", "surface", "trace"], &["encode"]].map(sum);
@@ -94,26 +89,9 @@ fn sequence(place: &Path) {
 /// Renders all frames and prints the time beyond writing images.
 fn render(place: &Path, options: &[&str]) {
     let _ = fs::remove_dir_all(place.join("out"));
-    let small = [
-        "--width",
-        "64",
-        "--height",
-        "64",
-        "--samples",
-        "1",
-        "--progress",
-        "none",
-    ];
+    let small = ["--width", "64", "--height", "64", "--samples", "1", "--progress", "none"];
     let start = Instant::now();
-    run(
-        place,
-        &[
-            &["render", "in", "-o", "out/f.####.exr"],
-            &small[..],
-            options,
-        ]
-        .concat(),
-    );
+    run(place, &[&["render", "in", "-o", "out/f.####.exr"], &small[..], options].concat());
     let took = start.elapsed().as_secs_f64();
     let text = fs::read_to_string(place.join("out/report.json")).expect("a report");
     let report: Value = serde_json::from_str(&text).expect("JSON");
@@ -147,11 +125,8 @@ fn enlarge(place: &Path) {
         .filter_map(|entry| Some(entry.ok()?.path()))
         .find(|path| path.extension().is_some_and(|e| e == "jsonl"))
         .expect("a ledger");
-    let entries: Vec<Value> = fs::read_to_string(ledger)
-        .expect("a ledger")
-        .lines()
-        .map(json)
-        .collect();
+    let entries: Vec<Value> =
+        fs::read_to_string(ledger).expect("a ledger").lines().map(json).collect();
     let (mut frames, mut lines) = (Vec::new(), String::new());
     for turn in 0..TIMES {
         for frame in &planned {
@@ -172,9 +147,7 @@ fn enlarge(place: &Path) {
     plan["frames"] = frames.into();
     let text = plan.to_string();
     let seal = serde_json::json!({"version": sealed["version"], "blake3": spherule_jobs::text_hash(&text)});
-    let sealed = seal
-        .to_string()
-        .replacen('}', &format!(",\"plan\":{text}}}"), 1);
+    let sealed = seal.to_string().replacen('}', &format!(",\"plan\":{text}}}"), 1);
     fs::write(to.join("job.plan.json"), sealed).expect("a file");
     fs::write(to.join("job.ledger.ended.jsonl"), lines).expect("a file");
 }
@@ -212,8 +185,5 @@ fn run(place: &Path, arguments: &[&str]) {
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .status();
-    assert!(
-        status.expect("the program starts").success(),
-        "{arguments:?}"
-    );
+    assert!(status.expect("the program starts").success(), "{arguments:?}");
 }

@@ -70,8 +70,7 @@ fn main() {
     let centers = centers(particles);
     let settings = options.settings();
     let mut grid = SmoothGrid::default();
-    grid.build(&centers, options.radius, &settings, false, None)
-        .expect("memory for the surface");
+    grid.build(&centers, options.radius, &settings, false, None).expect("memory for the surface");
     let found: Vec<Option<Difference>> = vertices
         .par_iter()
         .map(|vertex| difference(&grid.surface(), vertex, options.radius))
@@ -83,11 +82,7 @@ fn main() {
         100.0 * (vertices.len() - hits.len()) as f64 / vertices.len() as f64
     );
     print_percentiles("angle", "degrees", hits.iter().map(|d| d.angle).collect());
-    print_percentiles(
-        "distance",
-        "radii",
-        hits.iter().map(|d| d.distance).collect(),
-    );
+    print_percentiles("distance", "radii", hits.iter().map(|d| d.distance).collect());
 }
 
 impl Options {
@@ -119,19 +114,12 @@ fn vertices(text: &str) -> Vec<Vertex> {
     let (points, normals) = (triples("v "), triples("vn "));
     assert_eq!(points.len(), normals.len(), "a normal for each vertex");
     let pairs = points.into_iter().zip(normals);
-    pairs
-        .map(|(point, normal)| Vertex {
-            point,
-            normal: normal.normalize(),
-        })
-        .collect()
+    pairs.map(|(point, normal)| Vertex { point, normal: normal.normalize() }).collect()
 }
 
 fn triple(text: &str) -> Vec3 {
-    let numbers: Vec<f32> = text
-        .split_whitespace()
-        .map(|word| word.parse().expect("a number"))
-        .collect();
+    let numbers: Vec<f32> =
+        text.split_whitespace().map(|word| word.parse().expect("a number")).collect();
     Vec3::from_slice(&numbers)
 }
 
@@ -139,16 +127,10 @@ fn triple(text: &str) -> Vec3 {
 fn difference(surface: &impl Shape, vertex: &Vertex, radius: f32) -> Option<Difference> {
     let side = surface.side_of(vertex.point);
     let outward = if side == Side::Outside { -1.0 } else { 1.0 };
-    let ray = Ray {
-        t_max: REACH * radius,
-        ..Ray::new(vertex.point, outward * vertex.normal)
-    };
+    let ray = Ray { t_max: REACH * radius, ..Ray::new(vertex.point, outward * vertex.normal) };
     let hit = surface.crossing(&ray, side)?;
     let cosine = hit.normal.dot(vertex.normal).clamp(-1.0, 1.0);
-    Some(Difference {
-        distance: -outward * hit.t / radius,
-        angle: cosine.acos().to_degrees(),
-    })
+    Some(Difference { distance: -outward * hit.t / radius, angle: cosine.acos().to_degrees() })
 }
 
 /// Prints quantiles of all that was found.

@@ -41,11 +41,7 @@ fn main() {
     for particles in particle_counts(quick) {
         let case = Case::new(particles);
         for structure in structures() {
-            let table = Table {
-                case: &case,
-                structure,
-                rounds,
-            };
+            let table = Table { case: &case, structure, rounds };
             table.print_builds();
             let builder = case.tree(structure);
             table.print_rays(structure.name(), &builder.tree().view());
@@ -60,10 +56,7 @@ fn main() {
 
 /// Not when tests are only listed, nor when another benchmark was named.
 fn is_asked_for() -> bool {
-    let mut names = env::args()
-        .skip(1)
-        .filter(|a| !a.starts_with('-'))
-        .peekable();
+    let mut names = env::args().skip(1).filter(|a| !a.starts_with('-')).peekable();
     let listing = env::args().any(|a| a == "--list");
     !listing && (names.peek().is_none() || names.any(|name| NAME.contains(&name)))
 }
@@ -126,11 +119,7 @@ impl Table<'_> {
         let (mut ours, mut theirs) = (TreeBuilder::new(), ObvhsBuilder::new());
         let report = build(&mut ours);
         let node_bytes = theirs.build(spheres);
-        let turns = Turns::take(
-            self.rounds,
-            || build(&mut ours).nodes,
-            || theirs.build(spheres),
-        );
+        let turns = Turns::take(self.rounds, || build(&mut ours).nodes, || theirs.build(spheres));
         self.print_row(name, "build, kept memory, s", &turns.text(Unit::Seconds));
 
         // Positions and structure; neither keeps the way back to the particles' order.
@@ -181,11 +170,8 @@ impl Table<'_> {
         self.print_row(name, "in packets", &turns.text(unit));
 
         let unit = Unit::MillionsOf(points.len());
-        let turns = Turns::take(
-            self.rounds,
-            || trace_shadow(tree, points),
-            || trace_shadow(obvhs, points),
-        );
+        let turns =
+            Turns::take(self.rounds, || trace_shadow(tree, points), || trace_shadow(obvhs, points));
         self.print_row(name, "shadow, Mrays/s", &turns.text(unit));
         let turns = Turns::take(
             self.rounds,
@@ -278,12 +264,8 @@ impl Turns {
             let digits = unit.digits();
             format!("{best:.digits$} ({middle:.digits$})")
         };
-        let ratios: Vec<f64> = self
-            .ours
-            .iter()
-            .zip(&self.theirs)
-            .map(|(ours, theirs)| theirs / ours)
-            .collect();
+        let ratios: Vec<f64> =
+            self.ours.iter().zip(&self.theirs).map(|(ours, theirs)| theirs / ours).collect();
         format!(
             "{:>15} {:>15} {:>7.2} ({:.2})",
             side(&self.ours),

@@ -77,11 +77,8 @@ fn particles(count: usize) -> RawParticles {
     let positions = Positions::F32(positions.collect());
     let velocity = (0..3 * count).map(|_| 4.0 * random() - 2.0).collect();
     let kind = (0..count).map(|_| (4.0 * random()) as i32).collect();
-    let attribute = |name: &str, components, data| Attribute {
-        name: name.to_owned(),
-        components,
-        data,
-    };
+    let attribute =
+        |name: &str, components, data| Attribute { name: name.to_owned(), components, data };
     RawParticles {
         positions,
         attributes: vec![

@@ -45,24 +45,11 @@ struct Size {
     turns: usize,
 }
 
-const QUICK: Size = Size {
-    width: "64",
-    height: "36",
-    samples: "1",
-    turns: 1,
-};
-const USUAL: Size = Size {
-    width: "1920",
-    height: "1080",
-    samples: "16",
-    turns: TURNS,
-};
+const QUICK: Size = Size { width: "64", height: "36", samples: "1", turns: 1 };
+const USUAL: Size = Size { width: "1920", height: "1080", samples: "16", turns: TURNS };
 
 fn main() {
-    let given: Vec<String> = env::args()
-        .skip(1)
-        .filter(|a| !a.starts_with('-'))
-        .collect();
+    let given: Vec<String> = env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
     let has = |flag: &str| env::args().any(|argument| argument == flag);
     // One word is the name of a benchmark, as other benchmarks take it.
     let is_other = given.len() == 1 && !NAME.contains(&given[0][..]);
@@ -92,21 +79,8 @@ fn blocks(place: &Path, is_quick: bool, is_full: bool) -> Vec<Case> {
     let block = |count: &str| {
         let file = place.join(format!("block_{count}.npy"));
         let output = file.to_str().expect("a plain path");
-        run(&[
-            "generate",
-            "block",
-            "--particles",
-            count,
-            "--radius",
-            RADIUS,
-            "-o",
-            output,
-        ]);
-        Case {
-            name: format!("block {count}"),
-            file,
-            radius: RADIUS.to_owned(),
-        }
+        run(&["generate", "block", "--particles", count, "--radius", RADIUS, "-o", output]);
+        Case { name: format!("block {count}"), file, radius: RADIUS.to_owned() }
     };
     counts.split(',').map(str::trim).map(block).collect()
 }
@@ -114,10 +88,7 @@ fn blocks(place: &Path, is_quick: bool, is_full: bool) -> Vec<Case> {
 /// Pairs of a file and its radius.
 fn files(given: &[String]) -> Vec<Case> {
     let pairs = given.chunks_exact(2);
-    assert!(
-        pairs.remainder().is_empty(),
-        "each file needs a radius: FILE RADIUS ..."
-    );
+    assert!(pairs.remainder().is_empty(), "each file needs a radius: FILE RADIUS ...");
     let case = |pair: &[String]| {
         let file = Path::new(&pair[0]);
         let name = file.file_name().unwrap_or(file.as_os_str());
@@ -155,9 +126,7 @@ fn print_head(size: Size) {
 }
 
 fn print_row(place: &Path, case: &Case, size: Size) {
-    let turns: Vec<Value> = (0..size.turns)
-        .map(|_| frame_of(place, case, size))
-        .collect();
+    let turns: Vec<Value> = (0..size.turns).map(|_| frame_of(place, case, size)).collect();
     let seconds = |stage: &str| -> Vec<f64> {
         let of = |frame: &Value| frame["seconds"][stage].as_f64().expect("seconds");
         turns.iter().map(of).collect()

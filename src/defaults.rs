@@ -103,13 +103,7 @@ pub fn rules(
     facts: &Facts,
     files: Files<'_>,
 ) -> Defaults {
-    let mut rules = Rules {
-        manifest,
-        source,
-        facts,
-        files,
-        found: Defaults::default(),
-    };
+    let mut rules = Rules { manifest, source, facts, files, found: Defaults::default() };
     if matches!(manifest.look, Look::None | Look::Whitted) || facts.particles == 0 {
         return rules.found;
     }
@@ -160,11 +154,7 @@ impl Rules<'_> {
     /// Leaves out virtual sites, and particles at rest around others that move.
     fn leave_out(&mut self) -> Vec<(String, Vec<i64>)> {
         let mut left_out = Vec::new();
-        if self
-            .facts
-            .elements
-            .is_some_and(|elements| elements.has_others)
-        {
+        if self.facts.elements.is_some_and(|elements| elements.has_others) {
             let line = "left out: virtual sites and other particles that are no atoms (--where 'element >= 0' \
                         shows them)";
             self.set(
@@ -206,10 +196,7 @@ impl Rules<'_> {
         let (radius, name): (Value, _) = if has_bonds {
             let keys = [("table", Value::from("covalent")), ("scale", 0.5.into())];
             let keys = keys.map(|(key, value)| (key.to_owned(), value));
-            (
-                toml::Table::from_iter(keys).into(),
-                "half their covalent radii",
-            )
+            (toml::Table::from_iter(keys).into(), "half their covalent radii")
         } else {
             ("vdw".into(), "their van der Waals radii")
         };
@@ -301,18 +288,12 @@ impl Rules<'_> {
             let [azimuth, elevation] = CELL_VIEW;
             if self.lacks("camera.view") {
                 self.set(
-                    [
-                        ("camera.azimuth", azimuth.into()),
-                        ("camera.elevation", elevation.into()),
-                    ],
+                    [("camera.azimuth", azimuth.into()), ("camera.elevation", elevation.into())],
                     None,
                 );
             }
             let line = "drawn without perspective (--projection perspective)";
-            self.set(
-                [("camera.projection", "orthographic".into())],
-                Some(line.to_owned()),
-            );
+            self.set([("camera.projection", "orthographic".into())], Some(line.to_owned()));
         }
     }
 
@@ -336,10 +317,7 @@ impl Rules<'_> {
     }
 
     fn is_placed_automatically(&self) -> bool {
-        matches!(
-            self.manifest.camera.mode,
-            CameraMode::Auto | CameraMode::Turntable
-        )
+        matches!(self.manifest.camera.mode, CameraMode::Auto | CameraMode::Turntable)
     }
 
     /// Two-dimensional data are seen from the front, in flat light.
@@ -347,16 +325,8 @@ impl Rules<'_> {
         let (Some(axis), true) = (self.facts.flat_axis(), self.is_placed_automatically()) else {
             return;
         };
-        let usual = if self.files.is_y_up {
-            DVec3::Y
-        } else {
-            DVec3::Z
-        };
-        let own = self
-            .manifest
-            .input
-            .up
-            .map(|up| DVec3::from_array(up.vector()));
+        let usual = if self.files.is_y_up { DVec3::Y } else { DVec3::Z };
+        let own = self.manifest.input.up.map(|up| DVec3::from_array(up.vector()));
         let side = side_along(axis, own.unwrap_or(usual));
         if self.lacks("camera.azimuth") && self.lacks("camera.elevation") {
             self.set([("camera.view", side.into())], None);
@@ -366,10 +336,7 @@ impl Rules<'_> {
              others)"
         );
         self.set(
-            [
-                ("camera.projection", "orthographic".into()),
-                ("render.ground", "none".into()),
-            ],
+            [("camera.projection", "orthographic".into()), ("render.ground", "none".into())],
             Some(line),
         );
         if self.is_white() && self.lacks("render.integrator") && self.has_plain_material() {

@@ -18,12 +18,7 @@ pub struct Ray {
 impl Ray {
     /// An unbounded ray from `origin` along the unit vector `direction`.
     pub const fn new(origin: Vec3, direction: Vec3) -> Self {
-        Self {
-            origin,
-            direction,
-            t_min: 0.0,
-            t_max: f32::INFINITY,
-        }
+        Self { origin, direction, t_min: 0.0, t_max: f32::INFINITY }
     }
 
     /// The point at distance `t`.

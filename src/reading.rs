@@ -37,10 +37,7 @@ fn smallest(requested: [Option<MemoryBudget>; 2]) -> MemoryBudget {
         let remedy = "that is what free memory allows: free some, or use a machine with more";
         MemoryBudget::new(reading_share(bytes), remedy)
     });
-    let all = requested
-        .into_iter()
-        .chain([of_process, of_machine])
-        .flatten();
+    let all = requested.into_iter().chain([of_process, of_machine]).flatten();
     let smallest = all.min_by_key(|budget| budget.bytes());
     smallest.map_or(MemoryBudget::UNLIMITED, |budget| budget.at_least(MIN_BYTES))
 }

@@ -143,11 +143,9 @@ pub fn question<'a>(manifest: &'a Manifest, selection: &'a Selection) -> Questio
             RadiusSetting::Attribute { attribute, scale } => {
                 RadiusQuestion::Attribute(attribute, *scale)
             }
-            RadiusSetting::Table {
-                attribute,
-                table,
-                scale,
-            } => RadiusQuestion::Table(attribute, table, *scale),
+            RadiusSetting::Table { attribute, table, scale } => {
+                RadiusQuestion::Table(attribute, table, *scale)
+            }
         },
         up: manifest.input.up.map(|up| DVec3::from_array(up.vector())),
         selection: Some(selection).filter(|s| !s.is_all() || !s.cuts.is_empty()),
@@ -187,10 +185,7 @@ pub fn setup(
     let up = up(manifest, survey);
     // Spheres reach beyond their centres.
     let reach = DVec3::splat(f64::from(reach(&radius, survey)));
-    let bounds = Bounds {
-        min: survey.min - reach,
-        max: survey.max + reach,
-    };
+    let bounds = Bounds { min: survey.min - reach, max: survey.max + reach };
     // Place the camera
     let image = &manifest.image;
     let [width, height] = image.size();
@@ -260,17 +255,13 @@ pub fn setup(
     render.samples = image.samples;
     render.filter = PixelFilter {
         kind: image.filter,
-        width: image
-            .filter_width
-            .unwrap_or_else(|| image.filter.default_width()),
+        width: image.filter_width.unwrap_or_else(|| image.filter.default_width()),
     };
     render.integrator = manifest.integrator();
     render.bounces = manifest.render.bounces;
     render.indirect = match manifest.render.indirect {
         IndirectSetting::Traced => IndirectLight::Traced,
-        IndirectSetting::Ambient => IndirectLight::Ambient {
-            radius: narrow(reach.x),
-        },
+        IndirectSetting::Ambient => IndirectLight::Ambient { radius: narrow(reach.x) },
     };
     render.photons = manifest.render.caustics.photons;
     render.max_depth = manifest.render.max_depth;
@@ -313,11 +304,7 @@ pub fn setup(
         exr: ExrOptions {
             names: PlaneNames {
                 attributes: channels::attribute_planes(&attributes),
-                light_groups: manifest
-                    .light_groups()
-                    .into_iter()
-                    .map(str::to_owned)
-                    .collect(),
+                light_groups: manifest.light_groups().into_iter().map(str::to_owned).collect(),
             },
             compression: output.compression,
             data_compression: output.data_compression,
@@ -353,10 +340,7 @@ pub fn setup(
     let run = RunSettings {
         memory_limit: manifest.render.memory_limit.map(|limit| limit.0),
         accelerator: manifest.render.accelerator,
-        bvh: BvhSettings {
-            preset: manifest.render.bvh_preset,
-            leaves: manifest.render.bvh_leaves,
-        },
+        bvh: BvhSettings { preset: manifest.render.bvh_preset, leaves: manifest.render.bvh_leaves },
         sbvh: SbvhSettings {
             alpha: manifest.render.sbvh_alpha,
             budget: manifest.render.sbvh_budget,
@@ -409,16 +393,9 @@ fn radius_rule(manifest: &Manifest, survey: &Survey) -> Result<RadiusRule, Resol
         RadiusSetting::Length(radius) => RadiusRule::Common(narrow(*radius)),
         RadiusSetting::Attribute { attribute, scale } => {
             require_attribute(survey, "input.radius", attribute)?;
-            RadiusRule::Attribute {
-                name: attribute.clone(),
-                scale: narrow(*scale),
-            }
+            RadiusRule::Attribute { name: attribute.clone(), scale: narrow(*scale) }
         }
-        RadiusSetting::Table {
-            attribute,
-            table,
-            scale,
-        } => {
+        RadiusSetting::Table { attribute, table, scale } => {
             require_attribute(survey, "input.radius", attribute)?;
             RadiusRule::Table {
                 name: attribute.clone(),
@@ -486,10 +463,7 @@ fn background(manifest: &Manifest, up: Vec3) -> Background {
 }
 
 /// A rate as a fraction: 24 as 24/1, 29.97 as 29970/1000.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "clamped to what the attribute holds"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "clamped to what the attribute holds")]
 fn fps(rate: f64) -> (i32, u32) {
     let whole = rate.round();
     if (rate - whole).abs() < 1e-9 {

@@ -44,13 +44,7 @@ impl Default for StillSettings {
 impl StillSettings {
     /// The pictures of `manifest`.
     pub fn new(manifest: Manifest) -> Self {
-        Self {
-            manifest,
-            base: PathBuf::new(),
-            frame: 0,
-            name: MEMORY.to_owned(),
-            source: None,
-        }
+        Self { manifest, base: PathBuf::new(), frame: 0, name: MEMORY.to_owned(), source: None }
     }
 
     /// Reads a manifest in TOML, without `input.path`. See [the manual](Manifest) for its keys.
@@ -63,11 +57,7 @@ impl StillSettings {
     pub fn parse(toml: &str) -> Result<Self, ManifestError> {
         let input = Override::new("input.path", MEMORY, MEMORY);
         let input = input.expect("the key is valid");
-        Self::of_source(ManifestSource::new(
-            toml,
-            Path::new("settings"),
-            vec![input],
-        ))
+        Self::of_source(ManifestSource::new(toml, Path::new("settings"), vec![input]))
     }
 
     /// The pictures of a manifest, completed with defaults that follow from the particles.
@@ -76,10 +66,7 @@ impl StillSettings {
     /// The manifest has unknown keys or invalid values.
     pub fn of_source(source: ManifestSource) -> Result<Self, ManifestError> {
         let (manifest, _) = source.parse()?;
-        Ok(Self {
-            source: Some(source),
-            ..Self::new(manifest)
-        })
+        Ok(Self { source: Some(source), ..Self::new(manifest) })
     }
 
     /// The manifest with the defaults that follow from `particles`, and a line for each rule that has something to say.
@@ -135,10 +122,7 @@ impl StillError {
     /// Whether rendering was stopped.
     pub fn is_interrupted(&self) -> bool {
         use crate::pipeline::TraceError::Render;
-        matches!(
-            self,
-            Self::Image(ImageError::Trace(Render(RenderError::Interrupted)))
-        )
+        matches!(self, Self::Image(ImageError::Trace(Render(RenderError::Interrupted))))
     }
 }
 
@@ -170,20 +154,16 @@ pub fn render(
     particles: Particles<'_>,
     stop: &dyn Stop,
 ) -> Result<StillImage, StillError> {
-    let StillSettings {
-        base, frame, name, ..
-    } = settings;
+    let StillSettings { base, frame, name, .. } = settings;
     let (manifest, lines) = settings.completed(&particles)?;
     let manifest = &manifest;
     if !manifest.cell.images().is_none() {
         let what =
             "particles in memory are neither copied nor wrapped; do so before they are rendered";
-        return Err(StillError::Setup(RunError::from(
-            ResolveError::Unsupported {
-                key: "cell.replicate, cell.wrap",
-                what: what.to_owned(),
-            },
-        )));
+        return Err(StillError::Setup(RunError::from(ResolveError::Unsupported {
+            key: "cell.replicate, cell.wrap",
+            what: what.to_owned(),
+        })));
     }
     let base = std::path::absolute(Path::new(".").join(base));
     let base = base.map_err(RunError::file(Path::new("."), "cannot be found"))?;
@@ -211,12 +191,7 @@ pub fn render(
     let traced = trace_particles(&setup, particles, name, &task, stop, |note| {
         notes.push(note);
     })?;
-    Ok(StillImage {
-        setup,
-        survey,
-        frame: traced,
-        notes,
-    })
+    Ok(StillImage { setup, survey, frame: traced, notes })
 }
 
 impl StillImage {
@@ -279,9 +254,6 @@ impl StillImage {
     pub fn to_srgb(&self) -> Result<SrgbPixels, OutputError> {
         // Whatever viewers of the file show
         let image = image::load_from_memory(&self.to_png()?).map_err(OutputError::Png)?;
-        Ok(SrgbPixels {
-            channels: image.color().channel_count().into(),
-            bytes: image.into_bytes(),
-        })
+        Ok(SrgbPixels { channels: image.color().channel_count().into(), bytes: image.into_bytes() })
     }
 }

@@ -17,11 +17,8 @@ const PARTICLES_VARIABLE: &str = "SPHERULE_BENCH_PARTICLES";
 /// Structures: a comma-separated list such as `lbvh,kdtree`.
 const STRUCTURES_VARIABLE: &str = "SPHERULE_BENCH_STRUCTURES";
 /// The thesis's three, with the primary rays that hit for seed 1. Every exact method finds these.
-const KNOWN_HITS: [(usize, usize); 3] = [
-    (100_000, 614_870),
-    (1_000_000, 622_911),
-    (10_000_000, 626_647),
-];
+const KNOWN_HITS: [(usize, usize); 3] =
+    [(100_000, 614_870), (1_000_000, 622_911), (10_000_000, 626_647)];
 /// Part of the rays whose result may differ between two programs: spheres grazed within rounding.
 const GRAZING: f64 = 2e-5;
 /// Part of a radius by which two distances may differ.
@@ -57,14 +54,7 @@ impl Case {
         check_primary("obvhs", &scene, &obvhs, &mut records);
         let points = rays::surface_points(&obvhs, &scene, &records);
         let secondary = count_secondary(&obvhs, &points);
-        Self {
-            scene,
-            spheres,
-            obvhs,
-            points,
-            records,
-            secondary,
-        }
+        Self { scene, spheres, obvhs, points, records, secondary }
     }
 
     /// Builds our tree by `structure`.
@@ -92,26 +82,15 @@ impl Case {
             records.iter().map(HitRecord::distance).collect()
         };
         assert_eq!(distances(&records), distances(&others), "packets");
-        assert_eq!(
-            lit,
-            rays::trace_shadow_packets(tree, &self.points),
-            "packets"
-        );
-        assert_eq!(
-            hits,
-            rays::trace_reflection_packets(tree, &self.points),
-            "hybrid packets"
-        );
+        assert_eq!(lit, rays::trace_shadow_packets(tree, &self.points), "packets");
+        assert_eq!(hits, rays::trace_reflection_packets(tree, &self.points), "hybrid packets");
         builder
     }
 }
 
 /// Lit points and reflections that hit.
 fn count_secondary<T: Tracer>(tracer: &T, points: &[SurfacePoint]) -> [usize; 2] {
-    [
-        rays::trace_shadow(tracer, points),
-        rays::trace_reflection(tracer, points),
-    ]
+    [rays::trace_shadow(tracer, points), rays::trace_reflection(tracer, points)]
 }
 
 /// Builds our tree in the memory of `builder`; indices are not kept, as nothing here needs them.
@@ -120,17 +99,8 @@ pub(crate) fn build_ours(
     builder: &mut TreeBuilder,
     scene: &Scene,
 ) -> BuildReport {
-    let spheres = Spheres {
-        centers: &scene.centers,
-        radius: SphereRadius::Common(scene.radius),
-    };
-    builder.build(
-        &spheres,
-        &BuildSettings {
-            keep_indices: false,
-            ..BuildSettings::new(structure)
-        },
-    )
+    let spheres = Spheres { centers: &scene.centers, radius: SphereRadius::Common(scene.radius) };
+    builder.build(&spheres, &BuildSettings { keep_indices: false, ..BuildSettings::new(structure) })
 }
 
 /// Structures to measure: from the environment, else all.
@@ -149,11 +119,7 @@ pub(crate) fn structures() -> Vec<Structure> {
 pub(crate) fn particle_counts(quick: bool) -> Vec<usize> {
     let Ok(list) = env::var(PARTICLES_VARIABLE) else {
         let counts = KNOWN_HITS.map(|(count, _)| count);
-        return if quick {
-            counts[..1].to_vec()
-        } else {
-            counts.to_vec()
-        };
+        return if quick { counts[..1].to_vec() } else { counts.to_vec() };
     };
     list.split(',').map(parse_count).collect()
 }
@@ -186,10 +152,7 @@ fn check_primary<T: Tracer>(name: &str, scene: &Scene, tracer: &T, records: &mut
     let hits = rays::trace_primary(tracer, scene, records);
     let particles = scene.centers.len();
     if let Some((_, known)) = KNOWN_HITS.iter().find(|(count, _)| *count == particles) {
-        assert_eq!(
-            hits, *known,
-            "{name}: primary hits at {particles} particles"
-        );
+        assert_eq!(hits, *known, "{name}: primary hits at {particles} particles");
     }
 }
 
@@ -200,8 +163,5 @@ fn check_agreement(what: &str, counts: [usize; 2], rays: usize) {
     let allowed = (rays as f64 * GRAZING).ceil();
     #[expect(clippy::cast_precision_loss, reason = "millions at most")]
     let difference = counts[0].abs_diff(counts[1]) as f64;
-    assert!(
-        difference <= allowed,
-        "{what}: the programs count {counts:?} of {rays} rays"
-    );
+    assert!(difference <= allowed, "{what}: the programs count {counts:?} of {rays} rays");
 }

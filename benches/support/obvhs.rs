@@ -32,20 +32,14 @@ pub(crate) struct Sphere {
 
 impl Boundable for Sphere {
     fn aabb(&self) -> Aabb {
-        Aabb::new(
-            (self.center - self.radius).into(),
-            (self.center + self.radius).into(),
-        )
+        Aabb::new((self.center - self.radius).into(), (self.center + self.radius).into())
     }
 }
 
 /// The scene as obvhs wants it; made before the clock starts.
 pub(crate) fn spheres(scene: &Scene) -> Vec<Sphere> {
     let radius = scene.radius;
-    let sphere = |center: &Vec3| Sphere {
-        center: *center,
-        radius,
-    };
+    let sphere = |center: &Vec3| Sphere { center: *center, radius };
     scene.centers.par_iter().map(sphere).collect()
 }
 
@@ -60,10 +54,7 @@ pub(crate) struct ObvhsBuilder {
 impl ObvhsBuilder {
     /// A builder without memory yet.
     pub(crate) fn new() -> Self {
-        Self {
-            ploc: PlocBuilder::new(),
-            tree: Bvh2::default(),
-        }
+        Self { ploc: PlocBuilder::new(), tree: Bvh2::default() }
     }
 
     /// Builds the tree, replacing the last. Returns the bytes of its nodes.
@@ -118,38 +109,24 @@ impl Obvhs {
         }
         let chord = discriminant.sqrt();
         let near = middle - chord;
-        let t = if near >= ray.tmin {
-            near
-        } else {
-            middle + chord
-        };
+        let t = if near >= ray.tmin { near } else { middle + chord };
         if t >= ray.tmin { t } else { f32::INFINITY }
     }
 }
 
 fn converted(ray: &Ray) -> obvhs::ray::Ray {
-    obvhs::ray::Ray::new(
-        ray.origin.into(),
-        ray.direction.into(),
-        ray.t_min,
-        ray.t_max,
-    )
+    obvhs::ray::Ray::new(ray.origin.into(), ray.direction.into(), ray.t_min, ray.t_max)
 }
 
 impl Tracer for Obvhs {
     fn nearest(&self, ray: &Ray) -> Option<(f32, u32)> {
         let mut hit = RayHit::none();
-        self.tree
-            .ray_traverse(converted(ray), &mut hit, |ray, sphere| {
-                self.distance(ray, sphere)
-            });
+        self.tree.ray_traverse(converted(ray), &mut hit, |ray, sphere| self.distance(ray, sphere));
         (hit.primitive_id != INVALID_ID).then_some((hit.t, hit.primitive_id))
     }
 
     fn any_hit(&self, ray: &Ray) -> bool {
-        !self
-            .tree
-            .ray_traverse_miss(converted(ray), |ray, sphere| self.distance(ray, sphere))
+        !self.tree.ray_traverse_miss(converted(ray), |ray, sphere| self.distance(ray, sphere))
     }
 
     fn center(&self, sphere: u32) -> Vec3 {

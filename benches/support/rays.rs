@@ -50,10 +50,7 @@ pub(crate) struct HitRecord {
 }
 
 impl HitRecord {
-    const MISS: Self = Self {
-        t: f32::INFINITY,
-        sphere: u32::MAX,
-    };
+    const MISS: Self = Self { t: f32::INFINITY, sphere: u32::MAX };
 
     /// Along the primary ray; infinite for a miss.
     pub(crate) fn distance(&self) -> f32 {
@@ -78,10 +75,8 @@ impl SurfacePoint {
     fn to_light(self) -> Option<Ray> {
         let to_light = LIGHT - self.position;
         let distance = to_light.length();
-        (self.normal.dot(to_light) > 0.0).then(|| Ray {
-            t_max: distance,
-            ..Ray::new(self.position, to_light / distance)
-        })
+        (self.normal.dot(to_light) > 0.0)
+            .then(|| Ray { t_max: distance, ..Ray::new(self.position, to_light / distance) })
     }
 
     /// The ray mirrored here.
@@ -170,10 +165,8 @@ pub(crate) fn trace_primary_packets(
             let mut hits = 0;
             for (record, hit) in records.iter_mut().zip(tree.nearest_packet(&packet)) {
                 hits += usize::from(hit.is_some());
-                *record = hit.map_or(HitRecord::MISS, |hit| HitRecord {
-                    t: hit.t,
-                    sphere: hit.slot,
-                });
+                *record =
+                    hit.map_or(HitRecord::MISS, |hit| HitRecord { t: hit.t, sphere: hit.slot });
             }
             hits
         })
@@ -186,9 +179,7 @@ pub(crate) fn trace_shadow_packets(tree: &TreeView, points: &[SurfacePoint]) -> 
         .par_chunks(CHUNK)
         .map(|chunk| {
             let squares = chunk.chunk_by(|a, b| a.square == b.square);
-            squares
-                .map(|square| lit_of_square(tree, square))
-                .sum::<usize>()
+            squares.map(|square| lit_of_square(tree, square)).sum::<usize>()
         })
         .sum()
 }
@@ -222,17 +213,12 @@ pub(crate) fn trace_reflection_packets(tree: &TreeView, points: &[SurfacePoint])
         hits.mask().count_ones() as usize
     };
     let chunks = points.par_chunks(CHUNK);
-    chunks
-        .map(|chunk| chunk.chunks(PACKET_SIZE).map(count).sum::<usize>())
-        .sum()
+    chunks.map(|chunk| chunk.chunks(PACKET_SIZE).map(count).sum::<usize>()).sum()
 }
 
 fn count_in_chunks(
     points: &[SurfacePoint],
     counts: impl Fn(&&SurfacePoint) -> bool + Sync,
 ) -> usize {
-    points
-        .par_chunks(CHUNK)
-        .map(|chunk| chunk.iter().filter(&counts).count())
-        .sum()
+    points.par_chunks(CHUNK).map(|chunk| chunk.iter().filter(&counts).count()).sum()
 }

@@ -59,11 +59,7 @@ impl Camera {
         let right = forward.cross(Vec3::Z).normalize();
         let half_height = 22.5_f32.to_radians().tan();
         let half_width = half_height * f32::from(WIDTH) / f32::from(HEIGHT);
-        Self {
-            forward,
-            right: right * half_width,
-            up: right.cross(forward) * half_height,
-        }
+        Self { forward, right: right * half_width, up: right.cross(forward) * half_height }
     }
 
     /// The ray through the middle of a pixel; row 0 is the top.

@@ -54,11 +54,7 @@ impl OwnedLeaves {
             Encoding::Q10 => OwnedBlocks::Q10(coded(&blocks, &nodes)),
             Encoding::F32 => OwnedBlocks::F32(blocks),
         };
-        Self {
-            count,
-            nodes,
-            blocks,
-        }
+        Self { count, nodes, blocks }
     }
 
     /// As files give them.

@@ -31,26 +31,17 @@ impl MemoryBudget {
     /// The same budget, limited to `bytes`.
     #[must_use]
     pub fn at_least(self, bytes: u64) -> Self {
-        Self {
-            bytes: self.bytes.max(bytes),
-            ..self
-        }
+        Self { bytes: self.bytes.max(bytes), ..self }
     }
 
     /// The budget minus `held` bytes.
     pub(crate) const fn less(self, held: u64) -> Self {
-        Self {
-            bytes: self.bytes.saturating_sub(held),
-            ..self
-        }
+        Self { bytes: self.bytes.saturating_sub(held), ..self }
     }
 
     /// The share for the bytes of a file that must be in memory as a whole. The other half is for the numbers.
     pub(crate) const fn for_content(self) -> Self {
-        Self {
-            bytes: self.bytes / 2,
-            ..self
-        }
+        Self { bytes: self.bytes / 2, ..self }
     }
 
     /// Checks that the budget allows `need` bytes. `what` begins the message, for example `decompressed it is`.
@@ -58,11 +49,7 @@ impl MemoryBudget {
     /// # Errors
     /// [`ParseError::TooLarge`].
     pub(crate) fn check(self, need: u64, what: &str) -> Result<(), ParseError> {
-        if need <= self.bytes {
-            Ok(())
-        } else {
-            Err(self.exceeded(what))
-        }
+        if need <= self.bytes { Ok(()) } else { Err(self.exceeded(what)) }
     }
 
     /// The error for a file that needs more than the budget.
@@ -91,10 +78,7 @@ mod tests {
         assert_eq!(budget.check(64 << 20, "it is"), Ok(()));
         let error = |budget: MemoryBudget| budget.check(u64::MAX, "it is").unwrap_err().to_string();
         assert_eq!(error(budget), "it is larger than 64 MiB; raise the limit");
-        assert_eq!(
-            error(budget.for_content()),
-            "it is larger than 32 MiB; raise the limit"
-        );
+        assert_eq!(error(budget.for_content()), "it is larger than 32 MiB; raise the limit");
         let little = budget.less((64 << 20) - 5);
         assert_eq!(error(little), "it is larger than 5 bytes; raise the limit");
         assert_eq!(budget.less(u64::MAX).bytes(), 0);

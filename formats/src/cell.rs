@@ -17,11 +17,7 @@ pub struct SimulationCell {
 impl SimulationCell {
     /// A cell; None if a number is not finite, or all edges have no length.
     pub fn new(origin: DVec3, vectors: [DVec3; 3], periodic: [bool; 3]) -> Option<Self> {
-        let cell = Self {
-            origin,
-            vectors,
-            periodic,
-        };
+        let cell = Self { origin, vectors, periodic };
         let is_finite = cell.corners().iter().all(|corner| corner.is_finite());
         (is_finite && vectors != [DVec3::ZERO; 3]).then_some(cell)
     }
@@ -38,11 +34,8 @@ impl SimulationCell {
         let z = (1.0 - beta * beta - y * y).sqrt();
         // NaN where there is no such body
         let is_body = lengths.iter().all(|length| *length > 0.0) && sine > 0.0 && z > 0.0;
-        let vectors = [
-            DVec3::new(a, 0.0, 0.0),
-            b * DVec3::new(gamma, sine, 0.0),
-            c * DVec3::new(beta, y, z),
-        ];
+        let vectors =
+            [DVec3::new(a, 0.0, 0.0), b * DVec3::new(gamma, sine, 0.0), c * DVec3::new(beta, y, z)];
         Self::new(DVec3::ZERO, vectors, [true; 3]).filter(|_| is_body)
     }
 
@@ -124,11 +117,7 @@ mod tests {
             [f64::NAN, 90.0, 90.0],
             [-90.0, 90.0, 90.0],
         ] {
-            assert_eq!(
-                SimulationCell::from_angles(lengths, angles),
-                None,
-                "{angles:?}"
-            );
+            assert_eq!(SimulationCell::from_angles(lengths, angles), None, "{angles:?}");
         }
         for lengths in [[0.0, 4.0, 5.0], [3.0, -4.0, 5.0], [3.0, 4.0, f64::INFINITY]] {
             assert_eq!(SimulationCell::from_angles(lengths, [90.0; 3]), None);
@@ -137,11 +126,8 @@ mod tests {
 
     #[test]
     fn a_tilted_cell_has_eight_corners_and_twelve_edges() {
-        let [a, b, c] = [
-            DVec3::new(2.0, 0.0, 0.0),
-            DVec3::new(1.0, 3.0, 0.0),
-            DVec3::new(0.5, 0.25, 4.0),
-        ];
+        let [a, b, c] =
+            [DVec3::new(2.0, 0.0, 0.0), DVec3::new(1.0, 3.0, 0.0), DVec3::new(0.5, 0.25, 4.0)];
         let origin = DVec3::new(-1.0, 5.0, 7.0);
         let cell = SimulationCell::new(origin, [a, b, c], [true; 3]).unwrap();
         let corners = cell.corners();
@@ -159,13 +145,7 @@ mod tests {
             assert_eq!(along.count(), 4);
         }
         assert_eq!(cell.diagonal(), (a + b + c).length());
-        assert_eq!(
-            SimulationCell::new(origin, [DVec3::ZERO; 3], [true; 3]),
-            None
-        );
-        assert_eq!(
-            SimulationCell::new(origin, [a, DVec3::NAN, c], [true; 3]),
-            None
-        );
+        assert_eq!(SimulationCell::new(origin, [DVec3::ZERO; 3], [true; 3]), None);
+        assert_eq!(SimulationCell::new(origin, [a, DVec3::NAN, c], [true; 3]), None);
     }
 }

@@ -11,11 +11,7 @@ impl ScalarType {
         if !bytes.len().is_multiple_of(self.size()) {
             return Err(ParseError::malformed(
                 0,
-                format!(
-                    "{} bytes are not a whole number of {}",
-                    bytes.len(),
-                    self.name()
-                ),
+                format!("{} bytes are not a whole number of {}", bytes.len(), self.name()),
             ));
         }
         macro_rules! decode {

@@ -39,34 +39,26 @@ pub enum ParseError {
 impl ParseError {
     /// A [`ParseError::Malformed`] at byte `at`.
     pub fn malformed(at: usize, what: impl Into<String>) -> Self {
-        Self::Malformed {
-            at: at as u64,
-            what: one_line(what.into()),
-        }
+        Self::Malformed { at: at as u64, what: one_line(what.into()) }
     }
 
     /// A [`ParseError::Unsupported`].
     pub fn unsupported(what: impl Into<String>) -> Self {
-        Self::Unsupported {
-            what: one_line(what.into()),
-        }
+        Self::Unsupported { what: one_line(what.into()) }
     }
 
     /// A [`ParseError::TooLarge`].
     pub fn too_large(what: impl Into<String>) -> Self {
-        Self::TooLarge {
-            what: one_line(what.into()),
-        }
+        Self::TooLarge { what: one_line(what.into()) }
     }
 
     /// The same fault with its offset increased by `start`, the number of bytes before the parsed ones.
     #[must_use]
     pub(crate) fn behind(self, start: usize) -> Self {
         match self {
-            Self::Malformed { at, what } => Self::Malformed {
-                at: at.saturating_add(start as u64),
-                what,
-            },
+            Self::Malformed { at, what } => {
+                Self::Malformed { at: at.saturating_add(start as u64), what }
+            }
             other => other,
         }
     }
@@ -75,10 +67,7 @@ impl ParseError {
     #[must_use]
     pub fn map_message(self, message: impl FnOnce(&str) -> String) -> Self {
         match self {
-            Self::Malformed { at, what } => Self::Malformed {
-                at,
-                what: one_line(message(&what)),
-            },
+            Self::Malformed { at, what } => Self::Malformed { at, what: one_line(message(&what)) },
             Self::Unsupported { what } => Self::unsupported(message(&what)),
             Self::TooLarge { what } => Self::too_large(message(&what)),
         }
@@ -137,10 +126,7 @@ pub enum FrameError {
 impl FrameError {
     /// An [`FrameError::Io`] for `path`.
     pub fn io(path: &Path, source: io::Error) -> Self {
-        Self::Io {
-            path: path.to_owned(),
-            source,
-        }
+        Self::Io { path: path.to_owned(), source }
     }
 }
 

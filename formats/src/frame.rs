@@ -273,14 +273,7 @@ impl<'a> ParticleFrame<Cow<'a, [Vec3]>> {
 
     /// The particles that are near, of `raw` with positions relative to `origin`.
     fn kept(raw: RawParticles<Cow<'a, [Vec3]>>, origin: DVec3) -> Self {
-        let RawParticles {
-            mut positions,
-            mut attributes,
-            time,
-            cell,
-            mut bonds,
-            ..
-        } = raw;
+        let RawParticles { mut positions, mut attributes, time, cell, mut bonds, .. } = raw;
         // Keep the arrays if no particle is dropped
         let (mut file_index, mut dropped) = (None, 0);
         if !positions.iter().all(is_near) {
@@ -335,11 +328,7 @@ impl<P: Deref<Target = [Vec3]>> ParticleFrame<P> {
     /// The attribute called `name`: an exact match, else one that ignores case.
     pub fn attribute(&self, name: &str) -> Option<&Attribute> {
         let exact = self.attributes.iter().find(|a| a.name == name);
-        exact.or_else(|| {
-            self.attributes
-                .iter()
-                .find(|a| a.name.eq_ignore_ascii_case(name))
-        })
+        exact.or_else(|| self.attributes.iter().find(|a| a.name.eq_ignore_ascii_case(name)))
     }
 
     /// Number of particles (kept ones, which are finite).
@@ -368,10 +357,7 @@ fn relative_positions(positions: Positions, origin: DVec3) -> Vec<Vec3> {
 }
 
 /// The radii among `attributes`, by the names that simulations and Houdini use.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "radii are f32 in the renderer"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "radii are f32 in the renderer")]
 pub fn find_radius(attributes: &[Attribute]) -> Option<Radius> {
     let named = |name: &str| {
         attributes.iter().find(|a| {
@@ -382,9 +368,8 @@ pub fn find_radius(attributes: &[Attribute]) -> Option<Radius> {
     };
     let mut found = RADII.iter().map(|(name, scale)| (named(name), scale));
     let (attribute, scale) = found.find_map(|(attribute, scale)| attribute.zip(Some(scale)))?;
-    let radii: Vec<f32> = (0..attribute.count())
-        .map(|i| (attribute.data.get_f64(i) * scale) as f32)
-        .collect();
+    let radii: Vec<f32> =
+        (0..attribute.count()).map(|i| (attribute.data.get_f64(i) * scale) as f32).collect();
     match radii.first() {
         Some(first) if radii.iter().all(|r| r == first) => Some(Radius::Common(*first)),
         Some(_) => Some(Radius::PerParticle(radii)),

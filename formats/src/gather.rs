@@ -29,22 +29,20 @@ fn gather_bytes(from: &[u8], size: usize, indices: &[u32], to: &mut [u8]) {
         return;
     }
     let tasks = to.par_chunks_mut(TASK * size);
-    tasks
-        .zip(indices.par_chunks(TASK))
-        .for_each(|(to, indices)| match size {
-            1 => copy::<1>(from, indices, to),
-            2 => copy::<2>(from, indices, to),
-            4 => copy::<4>(from, indices, to),
-            8 => copy::<8>(from, indices, to),
-            12 => copy::<12>(from, indices, to),
-            16 => copy::<16>(from, indices, to),
-            24 => copy::<24>(from, indices, to),
-            _ => {
-                for (to, index) in to.chunks_exact_mut(size).zip(indices) {
-                    to.copy_from_slice(&from[*index as usize * size..][..size]);
-                }
+    tasks.zip(indices.par_chunks(TASK)).for_each(|(to, indices)| match size {
+        1 => copy::<1>(from, indices, to),
+        2 => copy::<2>(from, indices, to),
+        4 => copy::<4>(from, indices, to),
+        8 => copy::<8>(from, indices, to),
+        12 => copy::<12>(from, indices, to),
+        16 => copy::<16>(from, indices, to),
+        24 => copy::<24>(from, indices, to),
+        _ => {
+            for (to, index) in to.chunks_exact_mut(size).zip(indices) {
+                to.copy_from_slice(&from[*index as usize * size..][..size]);
             }
-        });
+        }
+    });
 }
 
 /// Keeps the groups of `components` items with these indices, which are ascending. Groups move within the array: the
@@ -53,11 +51,7 @@ fn gather_bytes(from: &[u8], size: usize, indices: &[u32], to: &mut [u8]) {
 /// # Panics
 /// If there is no group with one of the indices.
 pub(crate) fn keep<T: Pod>(items: &mut Vec<T>, components: usize, indices: &[u32]) {
-    keep_bytes(
-        bytemuck::cast_slice_mut(items),
-        components * size_of::<T>(),
-        indices,
-    );
+    keep_bytes(bytemuck::cast_slice_mut(items), components * size_of::<T>(), indices);
     items.truncate(indices.len() * components);
     items.shrink_to_fit();
 }

@@ -22,12 +22,7 @@ pub struct BoxSettings {
 impl BoxSettings {
     /// The thesis's box, (3, 5, -2) to (7, 8, 2).
     pub const fn thesis(count: usize, seed: u64) -> Self {
-        Self {
-            count,
-            seed,
-            min: Vec3::new(3.0, 5.0, -2.0),
-            max: Vec3::new(7.0, 8.0, 2.0),
-        }
+        Self { count, seed, min: Vec3::new(3.0, 5.0, -2.0), max: Vec3::new(7.0, 8.0, 2.0) }
     }
 }
 
@@ -43,10 +38,7 @@ impl BoxSettings {
 /// assert!(centers.iter().all(|c| c.cmpge(settings.min).all() && c.cmple(settings.max).all()));
 /// ```
 pub fn fill_box(settings: &BoxSettings) -> Vec<Vec3> {
-    (0..settings.count)
-        .into_par_iter()
-        .map(|index| settings.particle(index as u64))
-        .collect()
+    (0..settings.count).into_par_iter().map(|index| settings.particle(index as u64)).collect()
 }
 
 impl BoxSettings {
@@ -109,12 +101,6 @@ mod tests {
             assert_eq!(point.to_array(), expected);
             assert!(point.cmpge(settings.min).all() && point.cmple(settings.max).all());
         }
-        assert!(
-            fill_box(&BoxSettings {
-                count: 0,
-                ..settings
-            })
-            .is_empty()
-        );
+        assert!(fill_box(&BoxSettings { count: 0, ..settings }).is_empty());
     }
 }

@@ -23,10 +23,7 @@ pub struct PeriodicImages {
 
 impl Default for PeriodicImages {
     fn default() -> Self {
-        Self {
-            replicate: [1; 3],
-            wrap: false,
-        }
+        Self { replicate: [1; 3], wrap: false }
     }
 }
 
@@ -114,10 +111,7 @@ impl PeriodicImages {
         });
         let [a, b, c] = cell.vectors;
         let [na, nb, nc] = self.replicate.map(f64::from);
-        particles.cell = Some(SimulationCell {
-            vectors: [na * a, nb * b, nc * c],
-            ..*cell
-        });
+        particles.cell = Some(SimulationCell { vectors: [na * a, nb * b, nc * c], ..*cell });
         Ok(())
     }
 
@@ -219,11 +213,8 @@ fn wrapped(cell: &SimulationCell, inverse: DMat3, position: DVec3) -> DVec3 {
 mod tests {
     use super::*;
 
-    const EDGES: [DVec3; 3] = [
-        DVec3::new(4.0, 0.0, 0.0),
-        DVec3::new(1.0, 3.0, 0.0),
-        DVec3::new(-0.5, 0.75, 2.0),
-    ];
+    const EDGES: [DVec3; 3] =
+        [DVec3::new(4.0, 0.0, 0.0), DVec3::new(1.0, 3.0, 0.0), DVec3::new(-0.5, 0.75, 2.0)];
     const ORIGIN: DVec3 = DVec3::new(10.0, -20.0, 5.0);
 
     fn particles(positions: Vec<DVec3>, periodic: [bool; 3]) -> RawParticles {
@@ -256,19 +247,11 @@ mod tests {
     #[test]
     fn particles_are_wrapped_into_a_tilted_cell() {
         let inside = at([0.25, 0.5, 0.75]);
-        let moved = [
-            [2.0, -3.0, 5.0],
-            [0.0; 3],
-            [-1e6, 1e6, 1.0],
-            [0.0, -1.0, 0.0],
-        ];
+        let moved = [[2.0, -3.0, 5.0], [0.0; 3], [-1e6, 1e6, 1.0], [0.0, -1.0, 0.0]];
         let positions = moved.map(|[a, b, c]| at([0.25 + a, 0.5 + b, 0.75 + c]));
         let nan = DVec3::new(f64::NAN, 0.0, 0.0);
         let all = [&positions[..], &[nan]].concat();
-        let images = PeriodicImages {
-            wrap: true,
-            ..PeriodicImages::default()
-        };
+        let images = PeriodicImages { wrap: true, ..PeriodicImages::default() };
         let wrapped = applied(images, particles(all.clone(), [true; 3]));
         for i in 0..4 {
             let distance = wrapped.positions.get(i).distance(inside);
@@ -286,10 +269,7 @@ mod tests {
     #[test]
     fn copies_are_whole_edges_apart_with_the_ids_of_their_originals() {
         let positions = vec![at([0.1, 0.2, 0.3]), at([0.9, -0.4, 0.5])];
-        let images = PeriodicImages {
-            replicate: [2, 3, 1],
-            wrap: false,
-        };
+        let images = PeriodicImages { replicate: [2, 3, 1], wrap: false };
         let copies = applied(images, particles(positions.clone(), [true; 3]));
         assert_eq!(copies.positions.len(), 12);
         let mut index = 0;
@@ -313,33 +293,20 @@ mod tests {
         named.attributes[0].name = "ID".to_owned();
         let copies = applied(images, named);
         assert_eq!(copies.attributes.len(), 1);
-        assert_eq!(
-            copies.attributes[0].data,
-            AttributeData::F32([0.0, 1.0].repeat(6))
-        );
+        assert_eq!(copies.attributes[0].data, AttributeData::F32([0.0, 1.0].repeat(6)));
     }
 
     #[test]
     fn bonds_of_copies_join_the_nearest_images() {
         // A bond in the cell, and one over the boundary of edge a
-        let positions = vec![
-            at([0.4, 0.5, 0.5]),
-            at([0.6, 0.5, 0.5]),
-            at([1.1, 0.5, 0.5]),
-        ];
+        let positions = vec![at([0.4, 0.5, 0.5]), at([0.6, 0.5, 0.5]), at([1.1, 0.5, 0.5])];
         let positions = [positions, vec![at([0.05, 0.5, 0.5]), at([0.95, 0.5, 0.5])]].concat();
         let mut one = particles(positions, [true; 3]);
         one.bonds = vec![[0, 1], [3, 4]];
-        let images = PeriodicImages {
-            replicate: [2, 1, 2],
-            wrap: false,
-        };
+        let images = PeriodicImages { replicate: [2, 1, 2], wrap: false };
         let copies = applied(images, one);
         // Copies along a have 5 particles each, those along c 10
-        let expected = [
-            [[0, 1], [5, 6], [10, 11], [15, 16]],
-            [[3, 9], [8, 4], [13, 19], [18, 14]],
-        ];
+        let expected = [[[0, 1], [5, 6], [10, 11], [15, 16]], [[3, 9], [8, 4], [13, 19], [18, 14]]];
         assert_eq!(copies.bonds, expected.concat());
         // Those that do not cross the outer boundary are short
         for [a, b] in [[8, 4], [18, 14]] {
@@ -354,31 +321,19 @@ mod tests {
             let error = images.apply(&mut particles, budget).unwrap_err();
             error.to_string()
         };
-        let wrap = PeriodicImages {
-            wrap: true,
-            ..PeriodicImages::default()
-        };
-        let copy = |replicate| PeriodicImages {
-            replicate,
-            wrap: false,
-        };
+        let wrap = PeriodicImages { wrap: true, ..PeriodicImages::default() };
+        let copy = |replicate| PeriodicImages { replicate, wrap: false };
         let unlimited = MemoryBudget::UNLIMITED;
         let one = || particles(vec![ORIGIN; 5], [true; 3]);
         let mut none = one();
         none.cell = None;
         let error = fails(wrap, none, unlimited);
-        assert!(
-            error.contains("no simulation cell, which cell.replicate"),
-            "{error}"
-        );
+        assert!(error.contains("no simulation cell, which cell.replicate"), "{error}");
         let mut flat = one();
         flat.cell = SimulationCell::new(ORIGIN, [EDGES[0], EDGES[1], DVec3::ZERO], [true; 3]);
         let error = fails(wrap, flat, unlimited);
         assert!(error.contains("has no volume"), "{error}");
         let error = fails(copy([1000, 1000, 1000]), one(), unlimited);
-        assert!(
-            error.contains("1000000000 copies of 5 particles"),
-            "{error}"
-        );
+        assert!(error.contains("1000000000 copies of 5 particles"), "{error}");
     }
 }

@@ -77,10 +77,7 @@ mod tests {
         shown("a `b\\c` d", "a `b\\c` d");
         shown("größe \u{3b1}", "größe \u{3b1}");
         shown("a\nb\r\tc", "a\\nb\\r\\tc");
-        shown(
-            "\u{1b}[2Jx\0\u{7f}\u{9b}",
-            "\\u{1b}[2Jx\\u{0}\\u{7f}\\u{9b}",
-        );
+        shown("\u{1b}[2Jx\0\u{7f}\u{9b}", "\\u{1b}[2Jx\\u{0}\\u{7f}\\u{9b}");
         shown("a\u{202e}b\u{2028}c", "a\\u{202e}b\\u{2028}c");
         shown("a\u{61c}b", "a\\u{61c}b");
     }

@@ -19,33 +19,15 @@ pub const RADIUS: &str = "radius";
 pub const RADII: [(&str, f64); 3] = [(RADIUS, 1.0), ("pscale", 1.0), ("diameter", 0.5)];
 
 /// Names of a colour with three or four components.
-pub const COLOR: [&str; 9] = [
-    "color",
-    "colors",
-    "colour",
-    "colours",
-    "rgb",
-    "rgba",
-    "rgbcolor",
-    "cd",
-    "displaycolor",
-];
+pub const COLOR: [&str; 9] =
+    ["color", "colors", "colour", "colours", "rgb", "rgba", "rgbcolor", "cd", "displaycolor"];
 
 /// Names of a colour whose integers are sRGB codes. `Cd` is missing because it is linear.
 pub(crate) const COLOR_CODES: [&str; 4] = ["color", "colors", "rgb", "rgba"];
 
 /// Names of numpy arrays and fields that hold positions.
-pub(crate) const POSITION_ARRAYS: [&str; 9] = [
-    "positions",
-    "position",
-    "pos",
-    "points",
-    "coordinates",
-    "coords",
-    "coord",
-    "xyz",
-    "r",
-];
+pub(crate) const POSITION_ARRAYS: [&str; 9] =
+    ["positions", "position", "pos", "points", "coordinates", "coords", "coord", "xyz", "r"];
 
 /// Names of position columns without the component: `pos` for `pos_x`. The empty stem stands for plain `x`, `y`, `z`.
 pub(crate) const POSITION_STEMS: [&str; 11] = [
@@ -119,7 +101,5 @@ pub fn is_one_of(name: &str, names: &[&str]) -> bool {
 
 /// True if `name` is a name of a radius or diameter.
 pub(crate) fn is_radius_name(name: &str) -> bool {
-    RADII
-        .iter()
-        .any(|(known, _)| known.eq_ignore_ascii_case(name))
+    RADII.iter().any(|(known, _)| known.eq_ignore_ascii_case(name))
 }

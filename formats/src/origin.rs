@@ -58,10 +58,7 @@ mod tests {
 
     #[test]
     fn empty_bounds_have_a_zero_origin() {
-        assert_eq!(
-            choose_origin(DVec3::INFINITY, DVec3::NEG_INFINITY),
-            DVec3::ZERO
-        );
+        assert_eq!(choose_origin(DVec3::INFINITY, DVec3::NEG_INFINITY), DVec3::ZERO);
         assert_eq!(choose_origin(DVec3::NAN, DVec3::ONE), DVec3::ZERO);
         assert_eq!(choose_origin(DVec3::ONE, DVec3::ZERO), DVec3::ZERO);
     }

@@ -30,11 +30,7 @@ pub(crate) enum Confidence {
 impl Confidence {
     /// [`Self::Signature`] if the file has one.
     pub(crate) const fn signature_if(has_signature: bool) -> Self {
-        if has_signature {
-            Self::Signature
-        } else {
-            Self::No
-        }
+        if has_signature { Self::Signature } else { Self::No }
     }
 }
 

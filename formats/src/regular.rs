@@ -40,10 +40,7 @@ impl FileStamp {
     pub(crate) fn of(path: &Path) -> Result<Self, FrameError> {
         let len = regular_len(path)?;
         let meta = fs::metadata(path).map_err(|e| FrameError::io(path, e))?;
-        Ok(Self {
-            len,
-            modified: meta.modified().ok(),
-        })
+        Ok(Self { len, modified: meta.modified().ok() })
     }
 
     /// Checks that the file still has this stamp.
@@ -51,8 +48,7 @@ impl FileStamp {
     /// # Errors
     /// [`FrameError::Io`] if the file has changed.
     pub(crate) fn check(self, path: &Path) -> Result<(), FrameError> {
-        self.check_same(Self::of(path)?)
-            .map_err(|e| FrameError::io(path, e))
+        self.check_same(Self::of(path)?).map_err(|e| FrameError::io(path, e))
     }
 
     fn check_same(self, now: Self) -> io::Result<()> {
@@ -65,9 +61,7 @@ impl FileStamp {
             let (before, after) = (self.len, now.len);
             format!("the size went from {before} to {after} bytes while it was read")
         };
-        Err(io::Error::other(format!(
-            "{what}; it is still being written, try again later"
-        )))
+        Err(io::Error::other(format!("{what}; it is still being written, try again later")))
     }
 }
 

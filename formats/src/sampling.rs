@@ -29,15 +29,7 @@ mod tests {
 
     #[test]
     fn samples_rise_and_have_one_index_of_each_run() {
-        for (count, most) in [
-            (0, 5),
-            (5, 0),
-            (5, 5),
-            (3, 9),
-            (10, 9),
-            (1000, 7),
-            (24_000, 2000),
-        ] {
+        for (count, most) in [(0, 5), (5, 0), (5, 5), (3, 9), (10, 9), (1000, 7), (24_000, 2000)] {
             let sample: Vec<usize> = sample_indices(count, most).collect();
             assert_eq!(sample.len(), most.min(count));
             assert!(sample.is_sorted_by(|a, b| a < b));
@@ -60,10 +52,7 @@ mod tests {
             }
             let expected = 6000 / divisor;
             let range = expected / 2..2 * expected;
-            assert!(
-                counts.iter().all(|count| range.contains(count)),
-                "{counts:?}"
-            );
+            assert!(counts.iter().all(|count| range.contains(count)), "{counts:?}");
         }
     }
 }

@@ -25,18 +25,12 @@ pub(crate) trait Siblings: Send + Sync {
 impl SharedBytes {
     /// The bytes of `owner`, which can refer to no other files.
     pub(crate) fn new(owner: Arc<dyn AsRef<[u8]> + Send + Sync>) -> Self {
-        Self {
-            owner,
-            siblings: None,
-        }
+        Self { owner, siblings: None }
     }
 
     /// The same bytes of a file among `siblings`.
     pub(crate) fn among(self, siblings: Arc<dyn Siblings>) -> Self {
-        Self {
-            siblings: Some(siblings),
-            ..self
-        }
+        Self { siblings: Some(siblings), ..self }
     }
 
     /// A copy of `bytes`.

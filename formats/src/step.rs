@@ -42,12 +42,7 @@ impl Step {
     }
 
     const fn new(index: usize, handle: StepHandle) -> Self {
-        Self {
-            index,
-            number: None,
-            time: None,
-            handle,
-        }
+        Self { index, number: None, time: None, handle }
     }
 
     /// Appends a step with the bytes `range` to the steps of a file.

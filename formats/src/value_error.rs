@@ -15,11 +15,7 @@ pub struct ValueError {
 impl ValueError {
     /// The text `found` is not `expected`.
     pub fn new(expected: impl Into<String>, found: impl Into<String>) -> Self {
-        Self {
-            expected: expected.into(),
-            found: found.into(),
-            similar: None,
-        }
+        Self { expected: expected.into(), found: found.into(), similar: None }
     }
 
     /// The text `found` is none of `names`.
@@ -46,10 +42,7 @@ mod tests {
     #[test]
     fn messages_have_expected_and_found_values() {
         let error = ValueError::one_of(&["q16", "q10"], "q1\n");
-        assert_eq!(
-            error.to_string(),
-            r#"expected one of q16, q10, found "q1\n""#
-        );
+        assert_eq!(error.to_string(), r#"expected one of q16, q10, found "q1\n""#);
         let error = error.with_similar(Some("q16"));
         assert!(error.to_string().ends_with("; did you mean q16?"));
     }

@@ -60,19 +60,10 @@ fn bomb(name: &str, bytes: &[u8], words: &str) {
     let in_memory = in_memory.and_then(|file| file.read(0));
     for (from, result) in [("disk", read(&path, BUDGET)), ("memory", in_memory)] {
         let error = result.expect_err("a bomb");
-        assert!(
-            matches!(error, FrameError::TooLarge { .. }),
-            "{from}: {error}"
-        );
+        assert!(matches!(error, FrameError::TooLarge { .. }), "{from}: {error}");
         let text = error.to_string();
-        assert!(
-            text.starts_with(&format!("{}: ", path.display())),
-            "{from}: {text}"
-        );
-        assert!(
-            text.contains(words) && text.ends_with("MiB; take care"),
-            "{from}: {text}"
-        );
+        assert!(text.starts_with(&format!("{}: ", path.display())), "{from}: {text}");
+        assert!(text.contains(words) && text.ends_with("MiB; take care"), "{from}: {text}");
     }
 }
 
@@ -83,24 +74,12 @@ fn csv(bytes: usize) -> Vec<u8> {
 #[test]
 fn tables_in_gzip() {
     bomb("a.csv.gz", &gz(&csv(LARGE)), "larger than");
-    bomb(
-        "a.xyz.gz",
-        &gz("1 2 3\n".repeat(LARGE / 6).as_bytes()),
-        "larger than",
-    );
+    bomb("a.xyz.gz", &gz("1 2 3\n".repeat(LARGE / 6).as_bytes()), "larger than");
     // The length at the end of the file is only that of its last member.
     let members = [gz(&csv(LARGE)), gz(b"1,2,3\n")].concat();
     bomb("a.csv.gz", &members, "larger than");
-    bomb(
-        "a.csv.gz",
-        &gz(&[csv(600), vec![b'1'; LARGE]].concat()),
-        "larger than",
-    );
-    bomb(
-        "a.csv.gz",
-        &gz(&vec![b'1'; LARGE]),
-        "decompressed it is larger than 4",
-    );
+    bomb("a.csv.gz", &gz(&[csv(600), vec![b'1'; LARGE]].concat()), "larger than");
+    bomb("a.csv.gz", &gz(&vec![b'1'; LARGE]), "decompressed it is larger than 4");
     let empty = format!(
         "x,y,z{}\n{}",
         ",a".repeat(50),
@@ -119,11 +98,7 @@ fn other_formats_in_gzip() {
     let rows = "1 2 3\n";
     let count = LARGE / 6;
     let rows_of = |head: String| gz((head + &rows.repeat(count)).as_bytes());
-    bomb(
-        "dump.0.gz",
-        &gz(&dump(&rows.repeat(count), count)),
-        "larger than",
-    );
+    bomb("dump.0.gz", &gz(&dump(&rows.repeat(count), count)), "larger than");
     bomb(
         "a.xyz.gz",
         &gz(format!("{count}\n\n{}", "H 1 2 3\n".repeat(count)).as_bytes()),
@@ -139,22 +114,10 @@ fn other_formats_in_gzip() {
     bomb("a.vtk.gz", &rows_of(points), "larger than");
     // The text fits, but its numbers do not.
     let few = 500_000;
-    bomb(
-        "dump.0.gz",
-        &gz(&dump(&rows.repeat(few), few)),
-        "its numbers in memory are",
-    );
+    bomb("dump.0.gz", &gz(&dump(&rows.repeat(few), few)), "its numbers in memory are");
     // The list of steps is too large.
-    bomb(
-        "dump.0.gz",
-        &gz("ITEM: TIMESTEP\n".repeat(LARGE / 15).as_bytes()),
-        "larger than",
-    );
-    bomb(
-        "a.xyz.gz",
-        &gz("0\n\n".repeat(LARGE / 3).as_bytes()),
-        "larger than",
-    );
+    bomb("dump.0.gz", &gz("ITEM: TIMESTEP\n".repeat(LARGE / 15).as_bytes()), "larger than");
+    bomb("a.xyz.gz", &gz("0\n\n".repeat(LARGE / 3).as_bytes()), "larger than");
     // One line is too long.
     let line = "ITEM: ATOMS x".to_owned() + &" y".repeat(LARGE / 2);
     bomb("dump.0.gz", &gz(&dump(&line, 3)), "larger than");
@@ -180,11 +143,7 @@ fn huge_counts_in_gzip() {
             format!("{ply}element vertex {count}\n{properties}{rows}"),
             "file ends before",
         ),
-        (
-            "a.vtk.gz",
-            format!("{vtk}POINTS {count} float\n{rows}"),
-            "the text ends after 1500000",
-        ),
+        ("a.vtk.gz", format!("{vtk}POINTS {count} float\n{rows}"), "the text ends after 1500000"),
     ] {
         let path = dir.file(name, &gz(text.as_bytes()));
         let budget = MemoryBudget::new(64 << 20, "take care");
@@ -225,20 +184,13 @@ fn texts(rows: usize) -> [(&'static str, String); 4] {
          POINTS {rows} float\n{points}METADATA\nCOMPONENT_NAMES\nX\nY\nZ\n\nVERTICES 1 2\n1 0\n\
          POINT_DATA {rows}\nVECTORS velocity double\n{points}"
     );
-    [
-        ("dump.0", dump),
-        ("a.xyz", xyz),
-        ("a.ply", ply),
-        ("a.vtk", vtk),
-    ]
+    [("dump.0", dump), ("a.xyz", xyz), ("a.ply", ply), ("a.vtk", vtk)]
 }
 
 /// Reads all steps of the text.
 fn all(file: Result<FrameFile, FrameError>) -> Result<Vec<RawParticles>, FrameError> {
     let file = file?;
-    (0..file.steps().len())
-        .map(|step| file.read(step))
-        .collect()
+    (0..file.steps().len()).map(|step| file.read(step)).collect()
 }
 
 #[test]
@@ -298,12 +250,7 @@ fn errors_in_chunked_text_have_the_file_offset() {
             let plain = dir.file(name, bad.as_bytes());
             let found = all(FrameFile::open(&plain));
             let found = found.map_err(|e| e.to_string().replace(&*plain.to_string_lossy(), name));
-            assert!(
-                found == expected,
-                "{name}: {:?} {:?}",
-                found.err(),
-                expected.err()
-            );
+            assert!(found == expected, "{name}: {:?} {:?}", found.err(), expected.err());
         }
         // A truncated stream, a damaged checksum, and a stream with trailing bytes.
         let packed = gz(text.as_bytes());
@@ -314,9 +261,7 @@ fn errors_in_chunked_text_have_the_file_offset() {
         let crc = sum.len() - 8;
         sum[crc] ^= 1;
         let path = dir.file(&format!("{name}.gz"), &sum);
-        let error = all(FrameFile::open(&path))
-            .expect_err("damaged")
-            .to_string();
+        let error = all(FrameFile::open(&path)).expect_err("damaged").to_string();
         assert!(error.contains("damaged"), "{name}: {error}");
         let path = dir.file(&format!("{name}.gz"), &[packed, b"junk".to_vec()].concat());
         let file = FrameFile::open(&path).expect(name);
@@ -329,9 +274,7 @@ fn errors_in_chunked_text_have_the_file_offset() {
 fn gzip_in_gzip_is_not_unpacked() {
     let dir = Dir::new();
     // The decompressed content is too large as well.
-    let inner: Vec<u8> = std::iter::repeat_n(gz(&csv(LARGE)), 400)
-        .flatten()
-        .collect();
+    let inner: Vec<u8> = std::iter::repeat_n(gz(&csv(LARGE)), 400).flatten().collect();
     let path = dir.file("a.csv.gz", &gz(&inner));
     let error = read(&path, BUDGET).expect_err("refused").to_string();
     assert!(error.contains("gzip inside gzip"), "{error}");
@@ -359,11 +302,7 @@ fn npz(members: &[(&str, &[u8])]) -> Vec<u8> {
 #[test]
 fn members_of_archives() {
     let large = npy(LARGE / 12);
-    bomb(
-        "a.npz",
-        &npz(&[("pos", &large)]),
-        "npz member pos: decompressed it is",
-    );
+    bomb("a.npz", &npz(&[("pos", &large)]), "npz member pos: decompressed it is");
     // No member alone is too large.
     let few = npy((2 << 20) / 12);
     let names = ["pos", "a", "b", "c", "d", "e", "f", "g"];
@@ -462,11 +401,7 @@ fn table(rows: usize, turn: usize) -> String {
     let mut text = String::from("# made by a test\nx;y;z;id;kind;v_x;v_y;v_z\n");
     for i in 0..rows {
         let number = i as f64 * 0.5;
-        let id = if i < turn {
-            i.to_string()
-        } else {
-            format!("{i}.5")
-        };
+        let id = if i < turn { i.to_string() } else { format!("{i}.5") };
         let kind = if i == turn { "fluid" } else { "7" };
         writeln!(text, "{number};{number};1e-3;{id};{kind};1;2;{i}").expect("memory takes all");
         if i % 1000 == 3 {
@@ -482,11 +417,7 @@ fn chunked_tables_read_as_whole_tables() {
     let rows = 150_000;
     for turn in [0, rows / 2, rows - 1, rows] {
         let text = table(rows, turn);
-        let packed = [
-            gz(&text.as_bytes()[..1 << 21]),
-            gz(&text.as_bytes()[1 << 21..]),
-        ]
-        .concat();
+        let packed = [gz(&text.as_bytes()[..1 << 21]), gz(&text.as_bytes()[1 << 21..])].concat();
         let plain = dir.file("a.csv", text.as_bytes());
         let gz = dir.file("b.csv.gz", &packed);
         let whole = FrameFile::from_bytes(&plain, text.clone().into_bytes());
@@ -513,26 +444,17 @@ fn errors_in_chunked_tables_have_the_file_offset() {
         text.replace_range(place..place + with.len(), with);
         text
     };
-    for bad in [
-        harm(line, "?"),
-        harm(line, ";;;;;;;"),
-        text[..text.len() - 9].to_owned(),
-    ] {
+    for bad in [harm(line, "?"), harm(line, ";;;;;;;"), text[..text.len() - 9].to_owned()] {
         let plain = dir.file("a.csv", bad.as_bytes());
         let whole = FrameFile::from_bytes(&plain, bad.clone().into_bytes());
         let expected = whole.and_then(|file| file.read(0)).expect_err("damaged");
         let found = FrameFile::open(&plain).and_then(|file| file.read(0));
-        assert_eq!(
-            found.expect_err("damaged").to_string(),
-            expected.to_string()
-        );
+        assert_eq!(found.expect_err("damaged").to_string(), expected.to_string());
     }
     // A truncated stream, and a stream with trailing bytes.
     let packed = gz(text.as_bytes());
     let cut = dir.file("a.csv.gz", &packed[..packed.len() - 99]);
-    let error = FrameFile::open(&cut)
-        .and_then(|file| file.read(0))
-        .expect_err("cut");
+    let error = FrameFile::open(&cut).and_then(|file| file.read(0)).expect_err("cut");
     assert!(error.to_string().contains("still being written"), "{error}");
     let more = dir.file("b.csv.gz", &[packed, b"junk".to_vec()].concat());
     let file = FrameFile::open(&more).expect("a table");

@@ -88,10 +88,7 @@ fn damaged_houdini_geometry() {
     check(
         "houdini/flip_12.bgeo",
         &[
-            (
-                Cut(3),
-                "byte 0: named like a bgeo file, but does not begin like one: bytes 7f 4e 53",
-            ),
+            (Cut(3), "byte 0: named like a bgeo file, but does not begin like one: bytes 7f 4e 53"),
             (
                 Lose(100),
                 "byte 2352: 11 bytes expected here, file has 2 left: the file is cut short, perhaps still being written",
@@ -110,10 +107,7 @@ fn damaged_houdini_geometry() {
                 "byte 8: 0xf3 does not begin a length: the file is damaged here",
             ),
             // The number of points
-            (
-                Replace(b"&\x03\x11\x19", b"&\x03\x11\xff"),
-                "byte 64: the count -1",
-            ),
+            (Replace(b"&\x03\x11\x19", b"&\x03\x11\xff"), "byte 64: the count -1"),
             (
                 Replace(b"&\x03\x11\x19", b"&\x03\x13\xff\xff\xff\x7f"),
                 "byte 561: attribute `P` has 75 numbers, which do not fit 2147483647 points of 3 components",
@@ -122,14 +116,8 @@ fn damaged_houdini_geometry() {
                 Replace(b"&\x03\x11\x19", b"&\x03\x30"),
                 "byte 64: a count expected here: the file is damaged here",
             ),
-            (
-                Replace(b"pointcount", b"pointcourt"),
-                "byte 2454: the file has no number of points",
-            ),
-            (
-                Replace(b"fpreal32", b"fpreal99"),
-                "byte 558: numbers of the unknown type `fpreal99`",
-            ),
+            (Replace(b"pointcount", b"pointcourt"), "byte 2454: the file has no number of points"),
+            (Replace(b"fpreal32", b"fpreal99"), "byte 558: numbers of the unknown type `fpreal99`"),
             (
                 Replace(b"\x01P&", b"\x01Q&"),
                 "byte 2454: the points have no positions (attribute P)",
@@ -277,14 +265,8 @@ fn damaged_dualsphysics_parts() {
                 Lose(5),
                 "byte 2037: 120 bytes expected here, file has 115 left: the file is cut short, perhaps still being written",
             ),
-            (
-                At(60, b"\x07"),
-                "byte 60: the byte order 7 is not known: the file is damaged here",
-            ),
-            (
-                At(61, b"\x01"),
-                "byte 60: the byte order 0 is not known: the file is damaged here",
-            ),
+            (At(60, b"\x07"), "byte 60: the byte order 7 is not known: the file is damaged here"),
+            (At(61, b"\x01"), "byte 60: the byte order 0 is not known: the file is damaged here"),
             (
                 Replace(b"\nITEM\n", b"\nITEX\n"),
                 "byte 68: ITEM expected here: the file is damaged here",
@@ -301,10 +283,7 @@ fn damaged_dualsphysics_parts() {
                 Replace(b"PART_0000", b"BART_0000"),
                 "byte 2157: the file has no item PART_####, and no particles",
             ),
-            (
-                Replace(b"Npok", b"Npox"),
-                "byte 752: the item has no number of particles (Npok)",
-            ),
+            (Replace(b"Npok", b"Npox"), "byte 752: the item has no number of particles (Npok)"),
             (
                 Replace(b"Npok\x08\0\0\0\x1e", b"Npok\x08\0\0\0\x1f"),
                 "byte 1085: the array `Idp` has 30 elements of 31 particles",
@@ -358,10 +337,7 @@ fn bombs_are_refused_within_the_budget() {
     let error = open(MemoryBudget::new(32 << 20, "take care")).expect_err("a bomb");
     assert!(matches!(error, FrameError::TooLarge { .. }), "{error}");
     let text = error.to_string();
-    assert!(
-        text.ends_with("decompressed it is larger than 16 MiB; take care"),
-        "{text}"
-    );
+    assert!(text.ends_with("decompressed it is larger than 16 MiB; take care"), "{text}");
     // Less than the decoder needs
     let error = open(MemoryBudget::new(1 << 20, "take care")).expect_err("a bomb");
     assert!(matches!(error, FrameError::TooLarge { .. }), "{error}");
@@ -407,10 +383,7 @@ fn files_make_sequences_by_number() {
         fs::copy(data(from), directory.path().join(to)).expect("writable");
     };
     for number in [9, 10, 12] {
-        copy(
-            "houdini/split.bgeo.sc",
-            &format!("fluid.{number:04}.bgeo.sc"),
-        );
+        copy("houdini/split.bgeo.sc", &format!("fluid.{number:04}.bgeo.sc"));
     }
     let numbers = |input: &SequenceInput| -> Vec<i64> {
         let sequence = Sequence::open(input).expect("a sequence");
@@ -430,9 +403,6 @@ fn pieces_of_a_time_step_are_one_frame() {
     assert_eq!(sequence.frames().len(), 1);
     let particles = sequence.load_raw(0).expect("two pieces");
     assert_eq!(particles.positions.len(), 30);
-    let part = particles
-        .attributes
-        .iter()
-        .find(|a| a.name == PART_ATTRIBUTE);
+    let part = particles.attributes.iter().find(|a| a.name == PART_ATTRIBUTE);
     assert!(part.is_some());
 }

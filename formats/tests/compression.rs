@@ -41,13 +41,8 @@ const COPIES: [&str; 16] = [
 ];
 
 /// Copies without a checksum of the content, in which changed bytes may pass.
-const UNCHECKED: [&str; 5] = [
-    "drop-plain.csv.zst",
-    "drop-none.csv.xz",
-    "drop.csv.lz4",
-    "drop-frames.csv.lz4",
-    "drop.csv",
-];
+const UNCHECKED: [&str; 5] =
+    ["drop-plain.csv.zst", "drop-none.csv.xz", "drop.csv.lz4", "drop-frames.csv.lz4", "drop.csv"];
 
 fn read(path: &Path) -> Result<RawParticles, FrameError> {
     FrameFile::open(path)?.read(0)
@@ -80,10 +75,7 @@ fn copies_read_as_the_plain_file() {
 #[test]
 fn names_without_compression_make_sequences() {
     let directory = tempfile::tempdir().expect("a temporary directory");
-    for (index, extension) in ["gz", "zst", "bz2", "xz", "lz4", "zip"]
-        .into_iter()
-        .enumerate()
-    {
+    for (index, extension) in ["gz", "zst", "bz2", "xz", "lz4", "zip"].into_iter().enumerate() {
         let name = format!("drop_{index}.csv.{extension}");
         let bytes = bytes_of(&format!("drop.csv.{extension}"));
         fs::write(directory.path().join(name), bytes).expect("writable");
@@ -139,10 +131,7 @@ fn changed_bytes_are_detected() {
             // Some bytes of headers mean nothing: names, times, padding, the operating system
             if let Ok(file) = FrameFile::from_bytes(Path::new(name), changed) {
                 let is_first = plain.starts_with(file.bytes()) && !file.notes().is_empty();
-                assert!(
-                    file.bytes() == plain || is_first,
-                    "{name}: byte {at} may change"
-                );
+                assert!(file.bytes() == plain || is_first, "{name}: byte {at} may change");
             }
         }
     }
@@ -166,10 +155,7 @@ fn bombs_are_refused_within_the_budget() {
             let error = result.expect_err("a bomb");
             assert!(matches!(error, FrameError::TooLarge { .. }), "{error}");
             let text = error.to_string();
-            assert!(
-                text.ends_with("decompressed it is larger than 16 MiB; take care"),
-                "{text}"
-            );
+            assert!(text.ends_with("decompressed it is larger than 16 MiB; take care"), "{text}");
         }
         // Less than the decoder needs
         let little = MemoryBudget::new(100 << 10, "take care");
@@ -190,12 +176,7 @@ fn archives_of_several_files_name_them() {
 
 #[test]
 fn other_bytes_after_a_stream_are_reported() {
-    for (extension, format) in [
-        ("zst", "zstd"),
-        ("bz2", "bzip2"),
-        ("xz", "xz"),
-        ("lz4", "LZ4"),
-    ] {
+    for (extension, format) in [("zst", "zstd"), ("bz2", "bzip2"), ("xz", "xz"), ("lz4", "LZ4")] {
         let name = format!("drop.csv.{extension}");
         let junk = [bytes_of(&name), b"junk".to_vec()].concat();
         let file = FrameFile::from_bytes(Path::new(&name), junk).expect("ignored");
@@ -213,8 +194,6 @@ fn compression_in_compression_is_refused() {
     let mut outer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
     std::io::Write::write_all(&mut outer, &inner).expect("memory takes all");
     let outer = outer.finish().expect("memory takes all");
-    let error = read_bytes("a.csv.gz", &outer)
-        .expect_err("refused")
-        .to_string();
+    let error = read_bytes("a.csv.gz", &outer).expect_err("refused").to_string();
     assert!(error.contains("zstd inside another compression"), "{error}");
 }

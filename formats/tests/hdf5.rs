@@ -26,9 +26,7 @@ fn damaged(name: &str) -> PathBuf {
 /// All steps, or the first error.
 fn read(file: Result<FrameFile, FrameError>) -> Result<Vec<RawParticles>, FrameError> {
     let file = file?;
-    (0..file.steps().len())
-        .map(|step| file.read(step))
-        .collect()
+    (0..file.steps().len()).map(|step| file.read(step)).collect()
 }
 
 #[test]
@@ -50,10 +48,7 @@ fn give_their_errors(directory: &Path) {
         let path = directory.join(name);
         let error = read(FrameFile::open(&path)).expect_err(name).to_string();
         assert!(error.contains(words), "{name}: {error}");
-        assert!(
-            error.contains(name) && !error.contains(char::is_control),
-            "{error}"
-        );
+        assert!(error.contains(name) && !error.contains(char::is_control), "{error}");
         // Conversion finds the same fault, when it opens the file or when it reads. It reads only files of one step.
         if !name.ends_with("vtkhdf") && !name.ends_with("h5md") {
             let read = open_source(&path).and_then(|source| {
@@ -124,40 +119,26 @@ fn ranges_are_parts_of_the_whole() {
             for first in (0..count).step_by(len) {
                 let len = len.min(count - first);
                 let mut places = vec![DVec3::ZERO; len];
-                source
-                    .read_positions(first as u64, &mut places)
-                    .expect("there");
+                source.read_positions(first as u64, &mut places).expect("there");
                 let expected = (first..first + len).map(|i| whole.positions.get(i));
                 assert!(places.into_iter().eq(expected), "{name} {first}");
                 for (index, attribute) in source.attributes().iter().enumerate() {
                     let all = bytes_of(&whole.attributes[index]);
                     let width = attribute.width();
                     let mut own = vec![0; len * width];
-                    source
-                        .read_values(index, first as u64, &mut own)
-                        .expect("there");
+                    source.read_values(index, first as u64, &mut own).expect("there");
                     let expected = &all[first * width..(first + len) * width];
                     assert_eq!(own, expected, "{name} {} {first}", attribute.name);
                 }
             }
         }
-        assert!(
-            source
-                .read_positions(count as u64, &mut [DVec3::ZERO])
-                .is_err()
-        );
+        assert!(source.read_positions(count as u64, &mut [DVec3::ZERO]).is_err());
     }
 }
 
 #[test]
 fn truncations_and_wrong_bytes_are_survived() {
-    for name in [
-        "axes.h5",
-        "plain.h5",
-        "table.h5",
-        "temporal.vtkhdf",
-        "beam.h5part",
-    ] {
+    for name in ["axes.h5", "plain.h5", "table.h5", "temporal.vtkhdf", "beam.h5part"] {
         let path = data(name);
         let budget = MemoryBudget::new(64 << 20, "take care");
         let open = |bytes| FrameFile::from_bytes_within(&path, bytes, budget);
@@ -173,10 +154,7 @@ fn survives(
     open: impl Fn(Vec<u8>) -> Result<FrameFile, FrameError>,
 ) {
     for cut in (0..whole.len()).step_by(whole.len() / 30) {
-        assert!(
-            read(open(whole[..cut].to_vec())).is_err(),
-            "{name} cut at {cut}"
-        );
+        assert!(read(open(whole[..cut].to_vec())).is_err(), "{name} cut at {cut}");
     }
     // Multiplicative steps reach all parts of the file
     let mut seed = 12_345_usize;
@@ -206,14 +184,8 @@ fn wrong_bytes_in_references_are_survived() {
         let from = data("../hdf5_links").join(&part);
         fs::copy(from, dir.path().join(part)).expect("readable");
     }
-    for name in [
-        "joined.h5",
-        "joined-latest.h5",
-        "table.h5",
-        "frames.h5",
-        "linked.hdf5",
-        "many.h5",
-    ] {
+    for name in ["joined.h5", "joined-latest.h5", "table.h5", "frames.h5", "linked.hdf5", "many.h5"]
+    {
         let whole = fs::read(data("../hdf5_links").join(name)).expect("readable");
         let path = dir.path().join(name);
         survives(name, &whole, 100, |bytes| {
@@ -289,10 +261,7 @@ fn virtual_data_sets_of_a_snapshot_give_the_files_with_the_values() {
     for input in [SequenceInput::Directory(dir.path().into()), virtual_files] {
         let (found, notes) = ids_of(input);
         assert_eq!(found, expected);
-        assert!(
-            notes.contains("and 1 more have virtual data sets"),
-            "{notes}"
-        );
+        assert!(notes.contains("and 1 more have virtual data sets"), "{notes}");
     }
     assert!(stands_for_others(&dir.path().join(ALL[3])) && !stands_for_others(&data(ALL[4])));
     let one = SequenceInput::Files(vec![dir.path().join(ALL[3])]);
@@ -307,10 +276,7 @@ fn virtual_data_sets_of_a_snapshot_give_the_files_with_the_values() {
     let sequence = Sequence::open(&SequenceInput::Directory(dir.path().into()));
     let error = sequence.expect("one frame").load_raw(0);
     let error = error.expect_err("no values").to_string();
-    assert!(
-        error.contains("refers to the file `snap_003.0.hdf5`"),
-        "{error}"
-    );
+    assert!(error.contains("refers to the file `snap_003.0.hdf5`"), "{error}");
 }
 
 /// The only step of a file with unusual names.

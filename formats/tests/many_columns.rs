@@ -78,9 +78,8 @@ fn vtk_xml_of_repeated_names_that_the_last_piece_lacks() {
 fn vtk_xml_of_arrays_that_share_their_bytes() {
     // A slow reader would search for each array behind all blanks.
     let array = "<DataArray type=\"UInt8\" Name=\"a\" format=\"appended\" offset=\"0\"/>";
-    let arrays: Vec<String> = (0..MANY)
-        .map(|i| array.replace("\"a\"", &format!("\"a{i}\"")))
-        .collect();
+    let arrays: Vec<String> =
+        (0..MANY).map(|i| array.replace("\"a\"", &format!("\"a{i}\""))).collect();
     let head = format!(
         "<VTKFile type=\"PolyData\"><PolyData><Piece NumberOfPoints=\"1\"><PointData>{}</PointData>\
          <Points><DataArray type=\"Float32\" NumberOfComponents=\"3\">1 2 3</DataArray></Points></Piece>\
@@ -92,10 +91,7 @@ fn vtk_xml_of_arrays_that_share_their_bytes() {
         "{head}<AppendedData encoding=\"base64\">_{blanks}AQAAAAc=</AppendedData></VTKFile>"
     );
     let error = read(vtk_xml::FORMAT, file.as_bytes()).expect_err("shared bytes");
-    assert!(
-        error.to_string().contains("needs bytes of its own"),
-        "{error}"
-    );
+    assert!(error.to_string().contains("needs bytes of its own"), "{error}");
 }
 
 #[test]
@@ -126,9 +122,7 @@ fn vtk_legacy_in_binary() {
 
 #[test]
 fn ply() {
-    let properties: String = numbered(MANY)
-        .map(|n| format!("property uchar {n}\n"))
-        .collect();
+    let properties: String = numbered(MANY).map(|n| format!("property uchar {n}\n")).collect();
     let head = "element vertex 1\nproperty float x\nproperty float y\nproperty float z\n";
     for format in ["ascii", "binary_little_endian"] {
         let mut file =
@@ -145,10 +139,7 @@ fn ply() {
 fn csv() {
     for names in [
         numbered(MANY).collect::<Vec<_>>().join(","),
-        (0..MANY)
-            .map(|i| format!("a{i}.x"))
-            .collect::<Vec<_>>()
-            .join(","),
+        (0..MANY).map(|i| format!("a{i}.x")).collect::<Vec<_>>().join(","),
     ] {
         let file = format!("x,y,z,{names}\n1,2,3{}\n", ",7".repeat(MANY));
         has(csv::FORMAT, file.as_bytes(), MANY);
@@ -159,11 +150,7 @@ fn csv() {
 fn xyz() {
     let numbers = " 7".repeat(MANY);
     // The element is one more attribute.
-    has(
-        xyz::FORMAT,
-        format!("1\n\nH 1 2 3{numbers}\n").as_bytes(),
-        MANY + 1,
-    );
+    has(xyz::FORMAT, format!("1\n\nH 1 2 3{numbers}\n").as_bytes(), MANY + 1);
     // Columns that each begin a search in the first row would take minutes.
     let many = 8 * MANY;
     let numbers = " 7".repeat(many);
@@ -188,11 +175,7 @@ fn lammps() {
 
 #[test]
 fn lammps_headers_in_one_line() {
-    let file = format!(
-        "{}\n{}\n",
-        "ITEM: TIMESTEP ".repeat(1 << 18),
-        "0".repeat(1 << 22)
-    );
+    let file = format!("{}\n{}\n", "ITEM: TIMESTEP ".repeat(1 << 18), "0".repeat(1 << 22));
     let steps = lammps::FORMAT.steps(file.as_bytes()).expect("steps");
     assert_eq!(steps.len(), 1);
 }
@@ -231,9 +214,7 @@ fn npy(descr: &str, shape: &str, data: &[u8]) -> Vec<u8> {
 fn npy_of_many_fields() {
     // Headers of up to 1 MiB are accepted.
     let count = 50_000;
-    let fields: String = numbered(count)
-        .map(|n| format!("('{n}', '<f4'), "))
-        .collect();
+    let fields: String = numbered(count).map(|n| format!("('{n}', '<f4'), ")).collect();
     let descr = format!("[('pos', '<f4', (3,)), {fields}]");
     let file = npy(&descr, "(1,)", &vec![0; 12 + 4 * count]);
     has(npy::NPY, &file, count);
@@ -245,8 +226,7 @@ fn npz_of_many_members() {
     let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
     let options = SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
     let mut add = |name: &str, bytes: &[u8]| {
-        zip.start_file(format!("{name}.npy"), options)
-            .expect("memory takes all");
+        zip.start_file(format!("{name}.npy"), options).expect("memory takes all");
         zip.write_all(bytes).expect("memory takes all");
     };
     add("pos", &npy("'<f4'", "(1, 3)", &[0; 12]));
@@ -263,11 +243,7 @@ fn parts_of_a_step() {
     let part = |names: &mut dyn Iterator<Item = String>| RawParticles {
         positions: Positions::F32(vec![glam::Vec3::ZERO]),
         attributes: names
-            .map(|name| Attribute {
-                name,
-                components: 1,
-                data: AttributeData::U8(vec![7]),
-            })
+            .map(|name| Attribute { name, components: 1, data: AttributeData::U8(vec![7]) })
             .collect(),
         time: None,
         step: None,
@@ -276,18 +252,12 @@ fn parts_of_a_step() {
     };
     let mut notes = Vec::new();
     let backwards = &mut (0..MANY).rev().map(|i| format!("a{i}"));
-    let merged = merge(
-        vec![(0, part(&mut numbered(MANY))), (1, part(backwards))],
-        &mut notes,
-    );
+    let merged = merge(vec![(0, part(&mut numbered(MANY))), (1, part(backwards))], &mut notes);
     assert_eq!(merged.attributes.len(), MANY + 1);
     assert_eq!(merged.attributes[3].name, "a3");
     assert!(notes.is_empty());
     let others = &mut (0..MANY).map(|i| format!("b{i}"));
-    let merged = merge(
-        vec![(0, part(&mut numbered(MANY))), (1, part(others))],
-        &mut notes,
-    );
+    let merged = merge(vec![(0, part(&mut numbered(MANY))), (1, part(others))], &mut notes);
     assert_eq!(merged.attributes.len(), 1);
     assert_eq!(notes.len(), 1);
 }
@@ -303,11 +273,7 @@ fn topology_of_other_attributes() {
     std::fs::write(&path, table("t")).expect("writable");
     let topology = Topology::open(&path, MemoryBudget::UNLIMITED).expect("a good file");
     let mut particles = read(csv::FORMAT, table("f").as_bytes()).expect("a good file");
-    topology
-        .add_to(&mut particles, &path)
-        .expect("one particle");
-    topology
-        .add_to(&mut particles, &path)
-        .expect("one particle");
+    topology.add_to(&mut particles, &path).expect("one particle");
+    topology.add_to(&mut particles, &path).expect("one particle");
     assert_eq!(particles.attributes.len(), 2 * MANY);
 }

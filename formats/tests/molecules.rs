@@ -69,9 +69,7 @@ fn outcome(name: &str, bytes: Vec<u8>) -> (usize, Option<String>) {
     match FrameFile::from_bytes_within(path, bytes, budget) {
         Err(error) => (0, Some(shown(error))),
         Ok(file) => {
-            let mut read: Vec<_> = (0..file.steps().len())
-                .map(|step| file.read(step))
-                .collect();
+            let mut read: Vec<_> = (0..file.steps().len()).map(|step| file.read(step)).collect();
             let fault = read.iter().position(Result::is_err);
             let fault = fault.map(|step| read.remove(step).map(|_| ()));
             let good = read.iter().filter(|step| step.is_ok()).count();
@@ -117,11 +115,7 @@ fn damaged_xtc() {
             ),
             (Big(4, -1), 0, "byte 4: the number of atoms is -1"),
             (Big(52, 179), 3, "byte 52: 179 positions of 180 atoms"),
-            (
-                Big(56, 0),
-                3,
-                "byte 56: the precision is 0: the file is damaged",
-            ),
+            (Big(56, 0), 3, "byte 56: the precision is 0: the file is damaged"),
             (
                 Big(60, 2_000_000_000),
                 3,
@@ -142,11 +136,7 @@ fn damaged_xtc() {
                 0,
                 "byte 92: 2147483647 bytes expected here, file has 2908 left: the file is cut short, perhaps still being written",
             ),
-            (
-                Big(88, -5),
-                3,
-                "byte 88: the length of the compressed positions is -5",
-            ),
+            (Big(88, -5), 3, "byte 88: the length of the compressed positions is -5"),
             (
                 Big(88, 20),
                 3,
@@ -196,11 +186,7 @@ fn damaged_trr() {
                 2,
                 "byte 24: the box has 36 bytes and the positions, velocities and forces of 12 atoms 146, 144 and 144: neither single nor double precision",
             ),
-            (
-                Big(56, -1),
-                2,
-                "byte 56: the length of the velocities is -1",
-            ),
+            (Big(56, -1), 2, "byte 56: the length of the velocities is -1"),
             (Big(64, -1), 2, "byte 64: the number of atoms is -1"),
             (
                 Big(64, i32::MAX),
@@ -226,26 +212,14 @@ fn damaged_gro() {
                 0,
                 "byte 9: no number of atoms after the title: the file is cut short, perhaps still being written",
             ),
-            (
-                Lose(40),
-                2,
-                "byte 2565: columns 61 to 68 of an atom have \"\", not a coordinate",
-            ),
+            (Lose(40), 2, "byte 2565: columns 61 to 68 of an atom have \"\", not a coordinate"),
             (
                 Lose(31),
                 2,
                 "byte 2634: no box after 12 atoms: the file is cut short, perhaps still being written",
             ),
-            (
-                Text("\n12\n", "\ntwelve\n"),
-                0,
-                "byte 25: \"twelve\" is not a number of atoms",
-            ),
-            (
-                Text("\n12\n", "\n-12\n"),
-                0,
-                "byte 25: \"-12\" is not a number of atoms",
-            ),
+            (Text("\n12\n", "\ntwelve\n"), 0, "byte 25: \"twelve\" is not a number of atoms"),
+            (Text("\n12\n", "\n-12\n"), 0, "byte 25: \"-12\" is not a number of atoms"),
             (
                 Text("\n12\n", "\n2000000000\n"),
                 0,
@@ -311,16 +285,8 @@ fn damaged_dcd() {
                 "byte 88: the record of the header does not end with its length: the file is damaged here",
             ),
             (Little(92, i32::MAX), 4, ""),
-            (
-                Little(40, 21),
-                0,
-                "byte 40: the number of fixed atoms is not in 0..20",
-            ),
-            (
-                Little(40, -1),
-                0,
-                "byte 40: the number of fixed atoms is not in 0..20",
-            ),
+            (Little(40, 21), 0, "byte 40: the number of fixed atoms is not in 0..20"),
+            (Little(40, -1), 0, "byte 40: the number of fixed atoms is not in 0..20"),
             (Little(348, -1), 0, "byte 348: the number of atoms is -1"),
             (
                 Little(348, 21),
@@ -417,16 +383,8 @@ fn damaged_pdb() {
                 1,
                 "byte 113: columns 31 to 38 of an atom have \"\", not a coordinate",
             ),
-            (
-                Cut(120),
-                0,
-                "byte 113: columns 31 to 38 of an atom have \"\", not a coordinate",
-            ),
-            (
-                Lose(60),
-                1,
-                "byte 1008: columns 39 to 46 of an atom have \"\", not a coordinate",
-            ),
+            (Cut(120), 0, "byte 113: columns 31 to 38 of an atom have \"\", not a coordinate"),
+            (Lose(60), 1, "byte 1008: columns 39 to 46 of an atom have \"\", not a coordinate"),
             (
                 Text("-78.459", "-78,459"),
                 1,
@@ -482,11 +440,7 @@ fn damaged_mmcif() {
                 1,
                 "byte 1177: a row has 10 of 17 values: the file is cut short, perhaps still being written",
             ),
-            (
-                Text("Cartn_y", "Cartn_w"),
-                0,
-                "byte 49: _atom_site has no column Cartn_y",
-            ),
+            (Text("Cartn_y", "Cartn_w"), 0, "byte 49: _atom_site has no column Cartn_y"),
             (
                 Text("_atom_site.group_PDB", "_atom_site.group_PDB ATOM"),
                 0,
@@ -497,16 +451,8 @@ fn damaged_mmcif() {
                 0,
                 "_atom_site has text of several lines, which is not read",
             ),
-            (
-                Text("ALA 1 ", "ALA 1 half "),
-                0,
-                "byte 459: \"half\" is not a coordinate",
-            ),
-            (
-                Text("ALA 1 ", "ALA 1 ? "),
-                0,
-                "byte 459: \"?\" is not a coordinate",
-            ),
+            (Text("ALA 1 ", "ALA 1 half "), 0, "byte 459: \"half\" is not a coordinate"),
+            (Text("ALA 1 ", "ALA 1 ? "), 0, "byte 459: \"?\" is not a coordinate"),
             (
                 Text("data_MADE", "date_MADE"),
                 0,
@@ -522,11 +468,7 @@ fn damaged_mmcif() {
                 1,
                 "byte 1174: a row has 16 of 17 values: the file is cut short, perhaps still being written",
             ),
-            (
-                Text("936.442", "936,442"),
-                0,
-                "byte 475: \"936,442\" is not a coordinate",
-            ),
+            (Text("936.442", "936,442"), 0, "byte 475: \"936,442\" is not a coordinate"),
         ],
     );
 }
@@ -557,11 +499,7 @@ fn damaged_lammps_binary() {
                 "a LAMMPS binary dump without names of columns; run `binary2txt` on it",
             ),
             (Little(38, -1), 0, "byte 34: -4294967264 atoms"),
-            (
-                Little(34, i32::MAX),
-                0,
-                "byte 34: 2147483647 atoms expected, 32 in the blocks",
-            ),
+            (Little(34, i32::MAX), 0, "byte 34: 2147483647 atoms expected, 32 in the blocks"),
             (
                 Little(42, 2),
                 0,
@@ -593,10 +531,7 @@ fn scaled_positions_are_those_in_the_box() {
         file.read(step).expect("a good step")
     };
     for step in 0..3 {
-        let (custom, scaled) = (
-            read("custom.lammpsbin", step),
-            read("scaled.lammpsbin", step),
-        );
+        let (custom, scaled) = (read("custom.lammpsbin", step), read("scaled.lammpsbin", step));
         // Positions outside the box are put back into it by the scaled dump.
         let distances = (0..32).map(|i| custom.positions.get(i).distance(scaled.positions.get(i)));
         let near = distances.filter(|distance| *distance < 1e-12).count();
@@ -612,36 +547,20 @@ fn frames_of_a_trajectory_have_the_properties_of_its_topology() {
         Sequence::open(&input).expect("a sequence")
     };
     let mut sequence = open("double.trr");
-    sequence
-        .add_topology(&data("water.gro"))
-        .expect("a topology");
+    sequence.add_topology(&data("water.gro")).expect("a topology");
     for index in 0..2 {
         let particles = sequence.load_raw(index).expect("as many atoms");
-        let names: Vec<&str> = particles
-            .attributes
-            .iter()
-            .map(|a| a.name.as_str())
-            .collect();
+        let names: Vec<&str> = particles.attributes.iter().map(|a| a.name.as_str()).collect();
         assert_eq!(names, ["velocity", "element", "residue"]);
         assert_eq!(particles.attributes[1].data.get_f64(3), 8.0);
     }
     // Of the first frame of a topology and of one file of several
     let mut sequence = open("water.xtc");
-    sequence
-        .add_topology(&data("water.gro"))
-        .expect("a topology");
+    sequence.add_topology(&data("water.gro")).expect("a topology");
     let error = sequence.load_raw(2).expect_err("other atoms").to_string();
-    assert!(
-        error.contains("water.xtc: byte 0: 180 atoms, but the topology"),
-        "{error}"
-    );
-    assert!(
-        error.ends_with("water.gro has 12; give the topology of this simulation"),
-        "{error}"
-    );
-    let error = sequence
-        .add_topology(&data("nothing.gro"))
-        .expect_err("no file");
+    assert!(error.contains("water.xtc: byte 0: 180 atoms, but the topology"), "{error}");
+    assert!(error.ends_with("water.gro has 12; give the topology of this simulation"), "{error}");
+    let error = sequence.add_topology(&data("nothing.gro")).expect_err("no file");
     assert!(matches!(error, SequenceError::Topology(_)), "{error}");
 }
 
@@ -690,25 +609,14 @@ fn large_texts() -> [(&'static str, String); 5] {
         },
     );
     let start = |model| format!("t={model}.0\n{ATOMS}\n");
-    let gro = models(
-        "",
-        (start, "   9.00000   9.00000   9.00000\n"),
-        |model, index| {
-            let (x, y, z) = place(model, index);
-            format!(
-                "    1ALA     CA{:5}{x:4}.00000000{y:4}.00000000{z:4}.00000000\n",
-                index + 1
-            )
-        },
-    );
-    let xyz = models(
-        "",
-        (|model| format!("{ATOMS}\nTime={model}\n"), ""),
-        |model, index| {
-            let (x, y, z) = place(model, index);
-            format!("C {x} {y} {z} {pad}{pad}\n")
-        },
-    );
+    let gro = models("", (start, "   9.00000   9.00000   9.00000\n"), |model, index| {
+        let (x, y, z) = place(model, index);
+        format!("    1ALA     CA{:5}{x:4}.00000000{y:4}.00000000{z:4}.00000000\n", index + 1)
+    });
+    let xyz = models("", (|model| format!("{ATOMS}\nTime={model}\n"), ""), |model, index| {
+        let (x, y, z) = place(model, index);
+        format!("C {x} {y} {z} {pad}{pad}\n")
+    });
     let start = |model| {
         format!(
             "ITEM: TIMESTEP\n{model}\nITEM: NUMBER OF ATOMS\n{ATOMS}\nITEM: BOX BOUNDS pp pp pp\n0 9\n0 9\n0 9\n\
@@ -719,13 +627,7 @@ fn large_texts() -> [(&'static str, String); 5] {
         let (x, y, z) = place(model, index);
         format!("{x} {y} {z} a{pad}{pad}\n")
     });
-    [
-        ("a.cif", cif),
-        ("a.pdb", pdb),
-        ("a.gro", gro),
-        ("a.xyz", xyz),
-        ("a.lammpstrj", lammps),
-    ]
+    [("a.cif", cif), ("a.pdb", pdb), ("a.gro", gro), ("a.xyz", xyz), ("a.lammpstrj", lammps)]
 }
 
 #[test]

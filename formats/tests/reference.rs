@@ -12,9 +12,7 @@ use flate2::Crc;
 use spherule_formats::{AttributeData, Positions, RawParticles, Sequence, SequenceInput};
 
 fn directory(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../tests/data")
-        .join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data").join(name)
 }
 
 /// One array of a step, as the reference reader has it.
@@ -42,19 +40,8 @@ fn expected(directory: &Path) -> BTreeMap<String, Vec<ExpectedStep>> {
     let mut files = BTreeMap::<String, Vec<ExpectedStep>>::new();
     for line in text.lines() {
         let fields: Vec<&str> = line.split('\t').collect();
-        let [
-            file,
-            index,
-            number,
-            time,
-            name,
-            scalar,
-            components,
-            count,
-            least,
-            largest,
-            crc,
-        ] = fields[..]
+        let [file, index, number, time, name, scalar, components, count, least, largest, crc] =
+            fields[..]
         else {
             panic!("not 11 fields: {line}");
         };
@@ -86,9 +73,7 @@ fn arrays(particles: RawParticles) -> BTreeMap<String, (usize, AttributeData)> {
         Positions::F64(v) => AttributeData::F64(v.iter().flat_map(|p| p.to_array()).collect()),
     };
     let attributes = particles.attributes.into_iter();
-    let mut all: BTreeMap<_, _> = attributes
-        .map(|a| (a.name, (a.components, a.data)))
-        .collect();
+    let mut all: BTreeMap<_, _> = attributes.map(|a| (a.name, (a.components, a.data))).collect();
     all.insert("positions".to_owned(), (3, positions));
     all
 }
@@ -112,9 +97,7 @@ fn bounds_of(components: usize, data: &AttributeData) -> [Vec<f64>; 2] {
     let numbers: Vec<f64> = (0..data.len()).map(|i| data.get_f64(i)).collect();
     let of = |better: fn(f64, f64) -> f64, worst: f64| -> Vec<f64> {
         let component = |c| numbers.iter().skip(c).step_by(components).copied();
-        (0..components)
-            .map(|c| component(c).fold(worst, better))
-            .collect()
+        (0..components).map(|c| component(c).fold(worst, better)).collect()
     };
     [of(f64::min, f64::INFINITY), of(f64::max, f64::NEG_INFINITY)]
 }

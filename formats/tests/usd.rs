@@ -27,9 +27,7 @@ fn outcome(name: &str, bytes: Vec<u8>) -> (usize, String) {
     match FrameFile::from_bytes_within(Path::new(name), bytes, budget) {
         Err(error) => (0, shown(error)),
         Ok(file) => {
-            let read: Vec<_> = (0..file.steps().len())
-                .map(|step| file.read(step))
-                .collect();
+            let read: Vec<_> = (0..file.steps().len()).map(|step| file.read(step)).collect();
             let good = read.iter().filter(|step| step.is_ok()).count();
             let error = read.into_iter().find_map(Result::err);
             (good, error.map_or_else(String::new, shown))
@@ -78,10 +76,7 @@ fn damaged_binary_files() {
     let table = u64_at(&good, 16);
     let huge = u64::MAX.to_le_bytes();
     let count = 25_u64.to_le_bytes();
-    let array = good
-        .windows(8)
-        .position(|w| w == count)
-        .expect("an array of 25 points");
+    let array = good.windows(8).position(|w| w == count).expect("an array of 25 points");
     let many = 200_000_u64.to_le_bytes();
     let [tokens, fields, sets, paths, specs] =
         ["TOKENS", "FIELDS", "FIELDSETS", "PATHS", "SPECS"].map(|name| section(&good, name));
@@ -123,11 +118,7 @@ fn damaged_binary_files() {
                 0,
                 "byte 6274: a table of 18446744073709551615 sections: the file is damaged",
             ),
-            (
-                patched(&good, tokens.1, b"TOKEN!"),
-                0,
-                "byte 6274: the file has no section TOKENS",
-            ),
+            (patched(&good, tokens.1, b"TOKEN!"), 0, "byte 6274: the file has no section TOKENS"),
             (
                 patched(&good, tokens.0, &huge),
                 0,
@@ -240,10 +231,7 @@ fn damaged_text_files() {
                 "byte 3161: `{` expected, not \"vertex\\\"\"",
             ),
             (
-                with(
-                    "point3f[] points.timeSamples = {",
-                    "point3f[] points.timeSamples = [",
-                ),
+                with("point3f[] points.timeSamples = {", "point3f[] points.timeSamples = ["),
                 0,
                 "byte 1025: `{` expected, not \"[\"",
             ),
@@ -263,11 +251,7 @@ fn damaged_text_files() {
                 3,
                 "byte 1065: `)` expected, not \", -0.80487704), (-0.9127\"...",
             ),
-            (
-                with("1.5: [", "half: ["),
-                0,
-                "byte 424: \"half\" is not a time",
-            ),
+            (with("1.5: [", "half: ["), 0, "byte 424: \"half\" is not a time"),
             (
                 with("1.5: [", "1.5 ["),
                 0,
@@ -278,11 +262,7 @@ fn damaged_text_files() {
                 0,
                 "byte 1035: \"\" is not a number of this type",
             ),
-            (
-                with("upAxis = \"Z\"\n)", "upAxis = \"Z\"\n"),
-                0,
-                "byte 98: `)` expected, not \"{\"",
-            ),
+            (with("upAxis = \"Z\"\n)", "upAxis = \"Z\"\n"), 0, "byte 98: `)` expected, not \"{\""),
             (
                 with("def Points", "= Points"),
                 0,
@@ -346,49 +326,33 @@ fn transforms_are_those_of_the_reference() {
     let table = fs::read_to_string(data("moved.tsv")).expect("the table");
     for name in ["moved.usda", "moved.usdc"] {
         let file = FrameFile::open(&data(name)).expect("a good file");
-        let steps: Vec<_> = (0..file.steps().len())
-            .map(|step| file.read(step).expect("a good step"))
-            .collect();
+        let steps: Vec<_> =
+            (0..file.steps().len()).map(|step| file.read(step).expect("a good step")).collect();
         assert_eq!(steps.len(), 3);
-        let lines = table
-            .lines()
-            .filter_map(|line| line.strip_prefix(name)?.strip_prefix('\t'));
+        let lines = table.lines().filter_map(|line| line.strip_prefix(name)?.strip_prefix('\t'));
         let (mut positions, mut velocities) = ([0; 3], [0; 3]);
         for line in lines {
             let fields: Vec<&str> = line.split('\t').collect();
             let step: usize = fields[0].parse().expect("a step");
-            let expected: Vec<f64> = fields[2..]
-                .iter()
-                .map(|f| f.parse().expect("a number"))
-                .collect();
+            let expected: Vec<f64> =
+                fields[2..].iter().map(|f| f.parse().expect("a number")).collect();
             let (found, most) = match fields[1] {
                 "positions" => {
                     positions[step] += 1;
-                    (
-                        steps[step].positions.get(positions[step] - 1).to_array(),
-                        1e-12,
-                    )
+                    (steps[step].positions.get(positions[step] - 1).to_array(), 1e-12)
                 }
                 _ => {
                     velocities[step] += 1;
                     let all = &steps[step].attributes;
-                    let all = all
-                        .iter()
-                        .find(|a| a.name == "velocities")
-                        .expect("velocities");
-                    let AttributeData::F32(v) = &all.data else {
-                        panic!("f32")
-                    };
+                    let all = all.iter().find(|a| a.name == "velocities").expect("velocities");
+                    let AttributeData::F32(v) = &all.data else { panic!("f32") };
                     let start = 3 * (velocities[step] - 1);
                     ([0, 1, 2].map(|axis| f64::from(v[start + axis])), 1e-6)
                 }
             };
             for (found, expected) in found.iter().zip(&expected) {
                 let distance = (found - expected).abs();
-                assert!(
-                    distance <= most * 200.0,
-                    "{name} {line}: {found} instead of {expected}"
-                );
+                assert!(distance <= most * 200.0, "{name} {line}: {found} instead of {expected}");
             }
         }
         assert_eq!([positions, velocities], [[7; 3]; 2], "{name}");

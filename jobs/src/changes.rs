@@ -17,13 +17,7 @@ pub struct SettingChange {
 impl fmt::Display for SettingChange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let show = |value: &Option<String>| value.clone().unwrap_or_else(|| "(not set)".to_owned());
-        write!(
-            f,
-            "{}: {} -> {}",
-            self.key,
-            show(&self.old),
-            show(&self.new)
-        )
+        write!(f, "{}: {} -> {}", self.key, show(&self.old), show(&self.new))
     }
 }
 
@@ -40,12 +34,6 @@ pub struct InputChange {
 
 impl fmt::Display for InputChange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "frame {}: {}: {}",
-            self.frame,
-            self.path.display(),
-            self.what
-        )
+        write!(f, "frame {}: {}: {}", self.frame, self.path.display(), self.what)
     }
 }

@@ -67,17 +67,11 @@ impl FrameClaims {
     /// The error that ends the run: if other workers have declared this worker dead and removed its files, that is the
     /// reason why `error` occurred.
     pub(crate) fn explain(&self, error: JobError) -> JobError {
-        if self.registry.has_lost_record() {
-            self.declared_dead()
-        } else {
-            error
-        }
+        if self.registry.has_lost_record() { self.declared_dead() } else { error }
     }
 
     fn declared_dead(&self) -> JobError {
-        JobError::DeclaredDead {
-            dir: self.dir.clone(),
-        }
+        JobError::DeclaredDead { dir: self.dir.clone() }
     }
 
     fn finished_by_other(&self, frame: i64) -> Option<EntryStatus> {
@@ -88,8 +82,7 @@ impl FrameClaims {
     pub(crate) fn refresh(&self) -> Result<(), JobError> {
         let workers = self.registry.worker_names();
         let workers = workers.map_err(|e| JobError::io(&self.dir, "listing workers", e))?;
-        self.has_other_workers
-            .store(workers.len() > 1, Ordering::Relaxed);
+        self.has_other_workers.store(workers.len() > 1, Ordering::Relaxed);
         let now = self.clock().now();
         self.watcher().refresh(&workers, now)
     }

@@ -32,12 +32,7 @@ impl Copies {
 }
 
 fn have_same_bytes(a: &Path, b: &Path) -> io::Result<bool> {
-    let open = |path| {
-        io::Result::Ok(BufReader::with_capacity(
-            BUFFER_BYTES,
-            open_regular(path)?.0,
-        ))
-    };
+    let open = |path| io::Result::Ok(BufReader::with_capacity(BUFFER_BYTES, open_regular(path)?.0));
     let (mut a, mut b) = (open(a)?, open(b)?);
     loop {
         let (from_a, from_b) = (a.fill_buf()?, b.fill_buf()?);

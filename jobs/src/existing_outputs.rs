@@ -48,11 +48,7 @@ impl JobState {
 }
 
 fn refuse(paths: Vec<PathBuf>) -> Result<(), JobError> {
-    if paths.is_empty() {
-        Ok(())
-    } else {
-        Err(JobError::OutputsExist { paths })
-    }
+    if paths.is_empty() { Ok(()) } else { Err(JobError::OutputsExist { paths }) }
 }
 
 /// The existing ones of `paths`. Lists directories first, because a query per file is slow on network file
@@ -77,15 +73,9 @@ fn existing(paths: impl IntoIterator<Item = PathBuf>) -> Vec<PathBuf> {
 }
 
 fn names_in(dir: &Path) -> io::Result<HashSet<String>> {
-    let dir = if dir.as_os_str().is_empty() {
-        Path::new(".")
-    } else {
-        dir
-    };
+    let dir = if dir.as_os_str().is_empty() { Path::new(".") } else { dir };
     let entries = fs::read_dir(dir)?;
-    entries
-        .map(|entry| Ok(lowercase_name(&entry?.path())))
-        .collect()
+    entries.map(|entry| Ok(lowercase_name(&entry?.path()))).collect()
 }
 
 /// Some file systems ignore case.

@@ -59,11 +59,7 @@ impl FrameFailure {
         frame: i64,
         source: impl Into<Box<dyn Error + Send + Sync>>,
     ) -> Self {
-        Self {
-            kind,
-            frame,
-            source: source.into(),
-        }
+        Self { kind, frame, source: source.into() }
     }
 
     /// The failure to write the output at `path`. Its kind depends on the error: a full disk stops the run, an

@@ -45,11 +45,7 @@ impl FileError {
             io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
                 Self::Unwritable { path, source }
             }
-            _ => Self::Other {
-                path,
-                action,
-                source,
-            },
+            _ => Self::Other { path, action, source },
         }
     }
 }

@@ -35,9 +35,7 @@ impl Fingerprint {
         let mut hasher = blake3::Hasher::new();
         hasher.update(&length.to_le_bytes());
         let mut sample = Vec::new();
-        Read::by_ref(&mut file)
-            .take(SAMPLE_BYTES)
-            .read_to_end(&mut sample)?;
+        Read::by_ref(&mut file).take(SAMPLE_BYTES).read_to_end(&mut sample)?;
         if length > SAMPLE_BYTES {
             let tail = SAMPLE_BYTES.max(length - SAMPLE_BYTES);
             file.seek(SeekFrom::Start(tail))?;
@@ -146,21 +144,14 @@ mod tests {
     use std::time::{Duration, SystemTime};
 
     fn pairs(list: &[(&str, &str)]) -> Vec<(String, String)> {
-        list.iter()
-            .map(|(k, v)| ((*k).to_owned(), (*v).to_owned()))
-            .collect()
+        list.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect()
     }
 
     /// Writes `bytes` with a fixed modification time.
     fn write(path: &Path, bytes: &[u8], seconds: u64) -> Fingerprint {
         fs::write(path, bytes).unwrap();
         let time = SystemTime::UNIX_EPOCH + Duration::from_secs(seconds);
-        File::options()
-            .write(true)
-            .open(path)
-            .unwrap()
-            .set_modified(time)
-            .unwrap();
+        File::options().write(true).open(path).unwrap().set_modified(time).unwrap();
         Fingerprint::of_file(path).unwrap()
     }
 
@@ -194,22 +185,12 @@ mod tests {
             assert_eq!(touched.is_some(), size > 131_072);
             assert!(touched.is_none_or(|what| what.contains("time")));
             bytes[size - 1] = 8;
-            assert_eq!(
-                old.difference(&write(&path, &bytes, 5)).unwrap(),
-                "other contents"
-            );
+            assert_eq!(old.difference(&write(&path, &bytes, 5)).unwrap(), "other contents");
             bytes[size - 1] = 7;
             bytes[0] = 8;
-            assert_eq!(
-                old.difference(&write(&path, &bytes, 5)).unwrap(),
-                "other contents"
-            );
+            assert_eq!(old.difference(&write(&path, &bytes, 5)).unwrap(), "other contents");
             bytes.push(7);
-            assert!(
-                old.difference(&write(&path, &bytes, 5))
-                    .unwrap()
-                    .contains("length")
-            );
+            assert!(old.difference(&write(&path, &bytes, 5)).unwrap().contains("length"));
         }
         write(&path, b"", 5);
         assert!(Fingerprint::of_file(&dir.path().join("none")).is_err());
@@ -217,36 +198,19 @@ mod tests {
 
     #[test]
     fn changed_settings_are_listed() {
-        let old = pairs(&[
-            ("render.max_depth", "3"),
-            ("image.width", "640"),
-            ("gone", "1"),
-        ]);
-        let new = pairs(&[
-            ("image.width", "640"),
-            ("render.max_depth", "5"),
-            ("new", "2"),
-        ]);
-        let named: Vec<String> = compare_settings(&old, &new)
-            .iter()
-            .map(ToString::to_string)
-            .collect();
+        let old = pairs(&[("render.max_depth", "3"), ("image.width", "640"), ("gone", "1")]);
+        let new = pairs(&[("image.width", "640"), ("render.max_depth", "5"), ("new", "2")]);
+        let named: Vec<String> =
+            compare_settings(&old, &new).iter().map(ToString::to_string).collect();
         assert_eq!(
             named,
-            [
-                "render.max_depth: 3 -> 5",
-                "new: (not set) -> 2",
-                "gone: 1 -> (not set)"
-            ]
+            ["render.max_depth: 3 -> 5", "new: (not set) -> 2", "gone: 1 -> (not set)"]
         );
         assert!(compare_settings(&old, &old).is_empty());
     }
 
     #[test]
     fn hash_includes_boundaries() {
-        assert_ne!(
-            settings_hash(&pairs(&[("ab", "c")])),
-            settings_hash(&pairs(&[("a", "bc")]))
-        );
+        assert_ne!(settings_hash(&pairs(&[("ab", "c")])), settings_hash(&pairs(&[("a", "bc")])));
     }
 }

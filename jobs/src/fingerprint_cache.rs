@@ -43,7 +43,5 @@ pub(crate) fn frames_to_fingerprint<'a>(
     let selected: HashSet<i64> = selected.iter().copied().collect();
     let is_known = |number| old.is_some_and(|plan| plan.frame(number).is_some());
     let frames = request.frames.iter();
-    frames
-        .filter(|f| selected.contains(&f.number) || !is_known(f.number))
-        .collect()
+    frames.filter(|f| selected.contains(&f.number) || !is_known(f.number)).collect()
 }

@@ -34,10 +34,7 @@ pub(crate) fn check_input(
     };
     let mut dirs = DirCache::default();
     let known_dirs: HashSet<PathBuf> = match state.plan.input_dirs() {
-        [] => planned
-            .clone()
-            .map(|i| dirs.get(Path::new(&i.path)))
-            .collect(),
+        [] => planned.clone().map(|i| dirs.get(Path::new(&i.path))).collect(),
         known => known.iter().map(PathBuf::from).collect(),
     };
     let names: HashSet<_> = planned.map(|i| Path::new(&i.path).file_name()).collect();
@@ -82,9 +79,8 @@ fn has_same_contents(
         .filter(|(old, _)| old.inputs.iter().all(|i| i.fingerprint.is_some()))
         .collect();
     // Prefer finished frames: the inputs of the others may have changed since they were planned
-    let (done, pending): (Vec<_>, Vec<_>) = shared
-        .into_iter()
-        .partition(|(old, _)| state.is_done(old.number));
+    let (done, pending): (Vec<_>, Vec<_>) =
+        shared.into_iter().partition(|(old, _)| state.is_done(old.number));
     let comparable = if done.is_empty() { pending } else { done };
     let step = comparable.len().div_ceil(MAX_COMPARED).max(1);
     let compared: Vec<bool> = comparable
@@ -102,12 +98,10 @@ fn is_same_frame(
 ) -> bool {
     let mut pairs = old.iter().zip(new.dependencies());
     old.len() == new.dependencies().count()
-        && pairs.all(
-            |(old, new)| match (&old.fingerprint, fingerprints.get(new)) {
-                (Some(old), Some(new)) => old.has_same_contents(&new),
-                _ => false,
-            },
-        )
+        && pairs.all(|(old, new)| match (&old.fingerprint, fingerprints.get(new)) {
+            (Some(old), Some(new)) => old.has_same_contents(&new),
+            _ => false,
+        })
 }
 
 /// The input directories of a plan after `request`, given the `old` ones.

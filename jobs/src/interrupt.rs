@@ -29,9 +29,8 @@ impl Interrupt {
 
     /// Requests to stop; the second request is more urgent.
     pub fn raise(&self) {
-        let _ = self
-            .requests
-            .fetch_update(Ordering::AcqRel, Ordering::Acquire, |n| n.checked_add(1));
+        let _ =
+            self.requests.fetch_update(Ordering::AcqRel, Ordering::Acquire, |n| n.checked_add(1));
     }
 
     /// The current level.

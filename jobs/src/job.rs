@@ -83,10 +83,7 @@ impl Job {
         let (ledger, plan) = thread::scope(|scope| {
             let plan = scope.spawn(|| Plan::load(dir));
             let ledger = Ledger::read(dir);
-            (
-                ledger,
-                plan.join().unwrap_or_else(|e| panic::resume_unwind(e)),
-            )
+            (ledger, plan.join().unwrap_or_else(|e| panic::resume_unwind(e)))
         });
         let ledger = ledger?;
         Ok(plan?.map(|plan| JobState::new(dir, plan, ledger)))
@@ -145,12 +142,7 @@ impl Job {
         for change in &requeued {
             state.states.insert(change.frame, FrameState::Pending);
         }
-        Ok(DryRun {
-            state,
-            selected,
-            resolved,
-            requeued,
-        })
+        Ok(DryRun { state, selected, resolved, requeued })
     }
 
     /// Starts the job in `dir`, or resumes it. Other workers may have the same job open. The directory is
@@ -173,11 +165,8 @@ impl Job {
         }
         request.check()?;
         // Open the job without any frames, then add them like those that change while it is open
-        let without = JobRequest {
-            selection: Some(Vec::new()),
-            mode: ResumeMode::Resume,
-            ..request.clone()
-        };
+        let without =
+            JobRequest { selection: Some(Vec::new()), mode: ResumeMode::Resume, ..request.clone() };
         let mut job = Self::open_unchanged(dir, without, resolve)?;
         job.requeued = job.extend(&request)?;
         Ok(job)
@@ -407,10 +396,7 @@ fn resume(old: JobState, plan: Plan, registry: &WorkerRegistry) -> Result<JobSta
 fn refuse_other_workers(dir: &Path, registry: &WorkerRegistry) -> Result<(), JobError> {
     let beating = registry.wait_for_others();
     match beating.map_err(|e| JobError::io(dir, "listing workers", e))? {
-        Some(other) => Err(JobError::Busy {
-            dir: dir.to_owned(),
-            worker: other.description(),
-        }),
+        Some(other) => Err(JobError::Busy { dir: dir.to_owned(), worker: other.description() }),
         None => Ok(()),
     }
 }
@@ -468,9 +454,5 @@ fn remove_leftovers(
 
 /// The directory of a bare file name is the current directory.
 fn or_current_dir(dir: &Path) -> &Path {
-    if dir.as_os_str().is_empty() {
-        Path::new(".")
-    } else {
-        dir
-    }
+    if dir.as_os_str().is_empty() { Path::new(".") } else { dir }
 }

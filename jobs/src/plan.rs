@@ -80,13 +80,7 @@ impl Plan {
         input_dirs: Vec<String>,
         frames: Vec<PlannedFrame>,
     ) -> Self {
-        Self {
-            version: VERSION,
-            settings,
-            resolved,
-            input_dirs,
-            frames,
-        }
+        Self { version: VERSION, settings, resolved, input_dirs, frames }
     }
 
     /// Everything that outputs depend on besides the inputs.
@@ -137,9 +131,7 @@ impl Plan {
             Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
             Err(e) => return Err(JobError::io(&path, "reading the plan", e)),
         };
-        Self::parse(&bytes)
-            .map(Some)
-            .map_err(|source| JobError::PlanDamaged { path, source })
+        Self::parse(&bytes).map(Some).map_err(|source| JobError::PlanDamaged { path, source })
     }
 
     /// Parses the file of a plan. The error does not contain the file's name.
@@ -157,10 +149,7 @@ impl Plan {
             VERSION => Self::parse_version_2(bytes)?,
             1 => Self::parse_version_1(bytes)?,
             found => {
-                return Err(PlanError::Version {
-                    found,
-                    latest: VERSION,
-                });
+                return Err(PlanError::Version { found, latest: VERSION });
             }
         };
         if !plan.frames.is_sorted_by(|a, b| a.number < b.number) {
@@ -194,20 +183,15 @@ impl Plan {
 
     pub(crate) fn store(&self, dir: &Path) -> Result<(), JobError> {
         let path = Self::path_in(dir);
-        let bytes = self.to_bytes().map_err(|source| JobError::Serialize {
-            path: path.clone(),
-            source,
-        })?;
+        let bytes =
+            self.to_bytes().map_err(|source| JobError::Serialize { path: path.clone(), source })?;
         publish(&path, &bytes).map_err(|e| JobError::io(&path, "writing the plan", e))
     }
 
     fn to_bytes(&self) -> serde_json::Result<Vec<u8>> {
         let text = RawValue::from_string(serde_json::to_string_pretty(self)?)?;
-        let checksummed = ChecksummedPlan {
-            version: VERSION,
-            blake3: text_hash(text.get()),
-            plan: &text,
-        };
+        let checksummed =
+            ChecksummedPlan { version: VERSION, blake3: text_hash(text.get()), plan: &text };
         let mut bytes = serde_json::to_vec_pretty(&checksummed)?;
         bytes.push(b'\n');
         Ok(bytes)
@@ -216,10 +200,7 @@ impl Plan {
     /// Adds `frames`. They replace frames with the same numbers.
     pub(crate) fn merge(&mut self, frames: Vec<PlannedFrame>) {
         for frame in frames {
-            match self
-                .frames
-                .binary_search_by_key(&frame.number, |f| f.number)
-            {
+            match self.frames.binary_search_by_key(&frame.number, |f| f.number) {
                 Ok(index) => self.frames[index] = frame,
                 Err(index) => self.frames.insert(index, frame),
             }

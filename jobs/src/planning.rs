@@ -66,19 +66,13 @@ pub(crate) fn merged_plan<E: Into<Box<dyn Error + Send + Sync>>>(
     } else {
         resolve(Some(state.plan.resolved())).map_err(|e| JobError::Resolve(e.into()))?
     };
-    let settings = if changes.is_empty() {
-        state.plan.settings().to_vec()
-    } else {
-        request.settings.clone()
-    };
+    let settings =
+        if changes.is_empty() { state.plan.settings().to_vec() } else { request.settings.clone() };
     let dirs = merged_input_dirs(state.plan.input_dirs(), request);
     let mut plan = Plan::new(settings, resolved, dirs, state.plan.frames().to_vec());
     plan.merge(frames);
     refuse_shared_outputs(&dir, &plan)?;
-    Ok(ExtendedPlan {
-        plan,
-        changes: outdated,
-    })
+    Ok(ExtendedPlan { plan, changes: outdated })
 }
 
 /// Refuses two frames with the same output: a request may have other frames than the plan.
@@ -117,11 +111,8 @@ pub(crate) fn extended_plan(
     if !changes.is_empty() {
         return Err(JobError::SettingsChanged { dir, changes });
     }
-    let mut frames = planned_frames(
-        fingerprints,
-        &dir,
-        frames_to_fingerprint(request, new, Some(&state.plan)),
-    )?;
+    let mut frames =
+        planned_frames(fingerprints, &dir, frames_to_fingerprint(request, new, Some(&state.plan)))?;
     keep_unreadable_done(state, &mut frames);
     let changes = changed_inputs(state, &frames);
     let mut plan = state.plan.clone();
@@ -143,15 +134,8 @@ fn changed_inputs(state: &JobState, frames: &[PlannedFrame]) -> Vec<InputChange>
         .iter()
         .filter(|now| state.is_done(now.number))
         .filter_map(|now| {
-            let (path, what) = state
-                .plan
-                .frame(now.number)?
-                .changed_input(now, &mut copies)?;
-            Some(InputChange {
-                frame: now.number,
-                path,
-                what,
-            })
+            let (path, what) = state.plan.frame(now.number)?.changed_input(now, &mut copies)?;
+            Some(InputChange { frame: now.number, path, what })
         })
         .collect();
     changes.sort_by_key(|c| c.frame);
@@ -168,10 +152,7 @@ fn planned_frames<'a>(
     for frame in frames {
         let mut inputs = Vec::with_capacity(frame.inputs.len());
         for path in frame.dependencies() {
-            inputs.push(PlannedInput {
-                path: utf8(path)?,
-                fingerprint: fingerprints.get(path),
-            });
+            inputs.push(PlannedInput { path: utf8(path)?, fingerprint: fingerprints.get(path) });
         }
         let outputs = frame.outputs.iter().map(|path| stored_path(dir, path));
         planned.push(PlannedFrame {
@@ -192,9 +173,5 @@ pub(crate) fn stored_path(dir: &Path, path: &Path) -> Result<String, JobError> {
 }
 
 fn utf8(path: &Path) -> Result<String, JobError> {
-    path.to_str()
-        .map(str::to_owned)
-        .ok_or_else(|| JobError::NotUtf8 {
-            path: path.to_owned(),
-        })
+    path.to_str().map(str::to_owned).ok_or_else(|| JobError::NotUtf8 { path: path.to_owned() })
 }

@@ -70,10 +70,7 @@ struct FoundProcess {
 fn find_process(pid: u32) -> Option<FoundProcess> {
     let Ok(stat) = fs::read_to_string(format!("/proc/{pid}/stat")) else {
         // The process may exist but be hidden
-        return exists(pid).then_some(FoundProcess {
-            is_running: true,
-            start: None,
-        });
+        return exists(pid).then_some(FoundProcess { is_running: true, start: None });
     };
     // The name in parentheses may itself contain parentheses
     let mut fields = stat.rsplit_once(')')?.1.split_ascii_whitespace();
@@ -87,17 +84,12 @@ fn find_process(pid: u32) -> Option<FoundProcess> {
 
 #[cfg(not(target_os = "linux"))]
 fn find_process(pid: u32) -> Option<FoundProcess> {
-    exists(pid).then_some(FoundProcess {
-        is_running: true,
-        start: None,
-    })
+    exists(pid).then_some(FoundProcess { is_running: true, start: None })
 }
 
 #[cfg(unix)]
 fn exists(pid: u32) -> bool {
-    let pid = i32::try_from(pid)
-        .ok()
-        .and_then(rustix::process::Pid::from_raw);
+    let pid = i32::try_from(pid).ok().and_then(rustix::process::Pid::from_raw);
     pid.is_none_or(|pid| rustix::process::test_kill_process(pid) != Err(rustix::io::Errno::SRCH))
 }
 
@@ -123,29 +115,17 @@ mod tests {
         assert!(!current.has_ended());
         assert!(!current.token.contains('.') && current.token.contains(&current.pid.to_string()));
         if current.machine.is_some() {
-            let earlier = Process {
-                start: Some(1),
-                ..current.clone()
-            };
+            let earlier = Process { start: Some(1), ..current.clone() };
             assert!(earlier.has_ended());
-            let elsewhere = Process {
-                machine: Some("another".to_owned()),
-                ..earlier
-            };
-            assert!(
-                !elsewhere.has_ended(),
-                "the state on other machines is unknown"
-            );
+            let elsewhere = Process { machine: Some("another".to_owned()), ..earlier };
+            assert!(!elsewhere.has_ended(), "the state on other machines is unknown");
         }
     }
 
     #[cfg(target_os = "linux")]
     #[test]
     fn a_killed_child_has_ended_before_it_is_reaped() {
-        let mut child = std::process::Command::new("sleep")
-            .arg("60")
-            .spawn()
-            .unwrap();
+        let mut child = std::process::Command::new("sleep").arg("60").spawn().unwrap();
         let process = Process {
             pid: child.id(),
             start: find_process(child.id()).unwrap().start,

@@ -60,10 +60,7 @@ impl<'a> FrameQueue<'a> {
     ///
     /// # Errors
     /// Those of [`FrameClaims::claim`].
-    #[expect(
-        clippy::should_implement_trait,
-        reason = "an iterator cannot return errors with `?`"
-    )]
+    #[expect(clippy::should_implement_trait, reason = "an iterator cannot return errors with `?`")]
     pub fn next(&mut self) -> Result<Option<ClaimedFrame>, JobError> {
         let mut interval = POLL_INTERVALS.0;
         let mut has_reported = false;
@@ -77,11 +74,7 @@ impl<'a> FrameQueue<'a> {
                 let Some((index, frame)) = next else { break };
                 match self.claims.claim(frame)? {
                     ClaimOutcome::Acquired(claim) => {
-                        return Ok(Some(ClaimedFrame {
-                            index,
-                            frame,
-                            claim,
-                        }));
+                        return Ok(Some(ClaimedFrame { index, frame, claim }));
                     }
                     ClaimOutcome::Finished(status) => {
                         (self.on_event)(QueueEvent::FinishedElsewhere(frame, status));

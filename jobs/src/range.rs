@@ -51,14 +51,10 @@ struct Part {
 impl FrameRange {
     /// The frames in the order of the text, each once. Lazy.
     pub fn iter(&self) -> impl Iterator<Item = i64> + '_ {
-        self.parts
-            .iter()
-            .enumerate()
-            .flat_map(move |(index, part)| {
-                let earlier = &self.parts[..index];
-                part.iter()
-                    .filter(move |frame| !earlier.iter().any(|p| p.contains(*frame)))
-            })
+        self.parts.iter().enumerate().flat_map(move |(index, part)| {
+            let earlier = &self.parts[..index];
+            part.iter().filter(move |frame| !earlier.iter().any(|p| p.contains(*frame)))
+        })
     }
 
     /// Whether the range contains `frame`. The time is linear in the number of parts.
@@ -100,12 +96,7 @@ impl FrameRange {
             let run = even_run(rest);
             match run {
                 Some((step, count)) => {
-                    parts.push(Part {
-                        first: *first,
-                        last: rest[count - 1],
-                        step,
-                        fill: false,
-                    });
+                    parts.push(Part { first: *first, last: rest[count - 1], step, fill: false });
                     rest = &rest[count..];
                 }
                 None => {
@@ -122,46 +113,30 @@ impl FrameRange {
 /// range: two neighbours, or three frames with a step.
 fn even_run(frames: &[i64]) -> Option<(i64, usize)> {
     let step = frames.get(1)?.checked_sub(*frames.first()?)?;
-    let pairs = frames
-        .windows(2)
-        .take_while(|pair| pair[1].checked_sub(pair[0]) == Some(step))
-        .count();
+    let pairs =
+        frames.windows(2).take_while(|pair| pair[1].checked_sub(pair[0]) == Some(step)).count();
     (step == 1 || pairs >= 2).then_some((step, pairs + 1))
 }
 
 impl Part {
     const fn single(frame: i64) -> Self {
-        Self {
-            first: frame,
-            last: frame,
-            step: 1,
-            fill: false,
-        }
+        Self { first: frame, last: frame, step: 1, fill: false }
     }
 
     fn contains(&self, frame: i64) -> bool {
         let inside = (self.first.min(self.last)..=self.first.max(self.last)).contains(&frame);
-        let on_step = self
-            .first
-            .abs_diff(frame)
-            .is_multiple_of(self.step.unsigned_abs());
+        let on_step = self.first.abs_diff(frame).is_multiple_of(self.step.unsigned_abs());
         inside && on_step != self.fill
     }
 
     fn iter(self) -> impl Iterator<Item = i64> {
-        let stride = if self.fill {
-            self.step.signum()
-        } else {
-            self.step
-        };
+        let stride = if self.fill { self.step.signum() } else { self.step };
         std::iter::successors(Some(self.first), move |frame| frame.checked_add(stride))
-            .take_while(move |frame| {
-                if stride > 0 {
-                    *frame <= self.last
-                } else {
-                    *frame >= self.last
-                }
-            })
+            .take_while(
+                move |frame| {
+                    if stride > 0 { *frame <= self.last } else { *frame >= self.last }
+                },
+            )
             .filter(move |frame| self.contains(*frame))
     }
 }
@@ -196,11 +171,7 @@ impl FromStr for FrameRange {
     type Err = RangeError;
 
     fn from_str(text: &str) -> Result<Self, RangeError> {
-        let mut scanner = Scanner {
-            text,
-            chars: text.chars().collect(),
-            at: 0,
-        };
+        let mut scanner = Scanner { text, chars: text.chars().collect(), at: 0 };
         let mut parts = vec![scanner.part()?];
         while scanner.eat(',') {
             parts.push(scanner.part()?);
@@ -237,11 +208,7 @@ struct Scanner<'a> {
 
 impl Scanner<'_> {
     fn error(&self, at: usize, what: impl Into<String>) -> RangeError {
-        RangeError {
-            text: self.text.to_owned(),
-            at: at + 1,
-            what: what.into(),
-        }
+        RangeError { text: self.text.to_owned(), at: at + 1, what: what.into() }
     }
 
     /// The next character that is not white space.
@@ -262,10 +229,7 @@ impl Scanner<'_> {
         let _ = self.peek();
         let start = self.at;
         let sign = usize::from(self.chars.get(start) == Some(&'-'));
-        let digits = self.chars[start + sign..]
-            .iter()
-            .take_while(|c| c.is_ascii_digit())
-            .count();
+        let digits = self.chars[start + sign..].iter().take_while(|c| c.is_ascii_digit()).count();
         if digits == 0 {
             return Err(match self.chars.get(start) {
                 None => self.error(start, "a frame number is missing"),
@@ -274,8 +238,7 @@ impl Scanner<'_> {
         }
         self.at = start + sign + digits;
         let word: String = self.chars[start..self.at].iter().collect();
-        word.parse()
-            .map_err(|_| self.error(start, format!("{word} does not fit in 64 bits")))
+        word.parse().map_err(|_| self.error(start, format!("{word} does not fit in 64 bits")))
     }
 
     fn part(&mut self) -> Result<Part, RangeError> {
@@ -323,17 +286,8 @@ impl Scanner<'_> {
             return Ok(Part::single(first));
         }
         // `10-1x3` counts down just as `10-1` does.
-        let step = if last < first && step > 0 {
-            -step
-        } else {
-            step
-        };
-        Ok(Part {
-            first,
-            last,
-            step,
-            fill,
-        })
+        let step = if last < first && step > 0 { -step } else { step };
+        Ok(Part { first, last, step, fill })
     }
 }
 

@@ -50,15 +50,9 @@ fn check(metadata: &Metadata) -> io::Result<()> {
         return Ok(());
     }
     let (kind, what) = if metadata.is_dir() {
-        (
-            io::ErrorKind::IsADirectory,
-            "is a directory where a file is expected",
-        )
+        (io::ErrorKind::IsADirectory, "is a directory where a file is expected")
     } else {
-        (
-            io::ErrorKind::InvalidInput,
-            "is not a regular file but a pipe, a device or a socket",
-        )
+        (io::ErrorKind::InvalidInput, "is not a regular file but a pipe, a device or a socket")
     };
     Err(io::Error::new(kind, what))
 }

@@ -206,10 +206,7 @@ impl<'a, R: Serialize> FrameRecorder<'a, R> {
                 let recorded = self.job.record_done(number, &finished.outputs, details);
                 recorded.map_err(|e| self.job.claims.explain(e))?;
                 let finished = &finished;
-                (self.context.on_event)(FrameEvent::Done {
-                    frame: number,
-                    finished,
-                });
+                (self.context.on_event)(FrameEvent::Done { frame: number, finished });
             }
             Err(failure) if failure.kind == FailureKind::Interrupted => {
                 return Ok(Recorded::Stopped);
@@ -231,11 +228,7 @@ impl<'a, R: Serialize> FrameRecorder<'a, R> {
     }
 
     fn record_attempt(&mut self, failure: &FrameFailure, attempt: u32) -> Result<(), JobError> {
-        (self.context.on_event)(FrameEvent::Retrying {
-            failure,
-            attempt,
-            attempts: self.attempts,
-        });
+        (self.context.on_event)(FrameEvent::Retrying { failure, attempt, attempts: self.attempts });
         self.job.record_failed(failure)
     }
 }
@@ -260,10 +253,7 @@ pub fn run_frames<W: FrameWork>(
     let on_queue_event = |event: QueueEvent| on_event(FrameEvent::OtherWorker(event));
     let frames = options.frames.iter().copied();
     let mut queue = FrameQueue::new(job.claims(), frames, &options.interrupt, &on_queue_event);
-    let mut recorder = FrameRecorder {
-        job,
-        context: &context,
-        attempts: options.retries.saturating_add(1),
-    };
+    let mut recorder =
+        FrameRecorder { job, context: &context, attempts: options.retries.saturating_add(1) };
     work.process_all(&mut queue, &mut recorder)
 }

@@ -48,12 +48,7 @@ pub struct JobState {
 impl JobState {
     pub(crate) fn new(dir: &Path, plan: Plan, ledger: Ledger) -> Self {
         let states = frame_states(dir, plan.frames(), &ledger);
-        Self {
-            dir: dir.to_owned(),
-            plan,
-            ledger,
-            states,
-        }
+        Self { dir: dir.to_owned(), plan, ledger, states }
     }
 
     /// The directory of the job.
@@ -124,10 +119,8 @@ fn frame_states(dir: &Path, frames: &[PlannedFrame], ledger: &Ledger) -> BTreeMa
     let chunk_size = frames.len().div_ceil(MAX_THREADS);
     let chunk_size = chunk_size.max(MIN_FRAMES_PER_THREAD);
     thread::scope(|scope| {
-        let threads: Vec<_> = frames
-            .chunks(chunk_size)
-            .map(|chunk| scope.spawn(move || check(chunk)))
-            .collect();
+        let threads: Vec<_> =
+            frames.chunks(chunk_size).map(|chunk| scope.spawn(move || check(chunk))).collect();
         let states = threads
             .into_iter()
             .map(|thread| thread.join().unwrap_or_else(|e| panic::resume_unwind(e)));
@@ -145,11 +138,7 @@ fn frame_state(dir: &Path, planned: &PlannedFrame, entry: Option<&LedgerEntry>) 
         Some(entry) if entry.status == EntryStatus::Failed => FrameState::Failed,
         Some(entry) => {
             let written = |path: &String| entry.outputs.iter().find(|o| o.path == *path);
-            if planned
-                .outputs
-                .iter()
-                .all(|p| written(p).is_some_and(exists))
-            {
+            if planned.outputs.iter().all(|p| written(p).is_some_and(exists)) {
                 FrameState::Done
             } else {
                 FrameState::Lost

@@ -136,10 +136,7 @@ fn valid_texts_are_read_like_fileseq_does() {
 fn texts_that_fileseq_rejects_are_rejected() {
     for text in REFUSED_BY_BOTH {
         let error = text.parse::<FrameRange>().expect_err(text);
-        assert!(
-            (1..=text.chars().count() + 1).contains(&error.at),
-            "{error}"
-        );
+        assert!((1..=text.chars().count() + 1).contains(&error.at), "{error}");
     }
 }
 

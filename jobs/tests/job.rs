@@ -18,9 +18,7 @@ struct Fixture {
 
 impl Fixture {
     fn new(frames: impl IntoIterator<Item = i64>) -> Self {
-        let fixture = Self {
-            root: tempfile::tempdir().unwrap(),
-        };
+        let fixture = Self { root: tempfile::tempdir().unwrap() };
         fs::create_dir(fixture.root.path().join("data")).unwrap();
         for frame in frames {
             fixture.write_input(frame, &format!("particles of {frame}"));
@@ -47,9 +45,8 @@ impl Fixture {
     /// The ledgers of all workers.
     fn ledgers(&self) -> Vec<PathBuf> {
         let paths = fs::read_dir(self.dir()).unwrap().map(|e| e.unwrap().path());
-        let mut ledgers: Vec<PathBuf> = paths
-            .filter(|p| p.extension().is_some_and(|e| e == "jsonl"))
-            .collect();
+        let mut ledgers: Vec<PathBuf> =
+            paths.filter(|p| p.extension().is_some_and(|e| e == "jsonl")).collect();
         ledgers.sort();
         ledgers
     }
@@ -94,8 +91,7 @@ impl Fixture {
 
     fn finish(&self, job: &mut Job, frame: i64) {
         publish(&self.image(frame), b"an image").unwrap();
-        job.record_done(frame, &[self.image(frame)], json!({ "particles": 5 }))
-            .unwrap();
+        job.record_done(frame, &[self.image(frame)], json!({ "particles": 5 })).unwrap();
     }
 }
 
@@ -122,12 +118,7 @@ fn contents(dir: &Path) -> Vec<(String, Vec<u8>)> {
     let mut all: Vec<_> = fs::read_dir(dir)
         .unwrap()
         .map(|e| e.unwrap())
-        .map(|e| {
-            (
-                e.file_name().into_string().unwrap(),
-                fs::read(e.path()).unwrap(),
-            )
-        })
+        .map(|e| (e.file_name().into_string().unwrap(), fs::read(e.path()).unwrap()))
         .collect();
     all.sort();
     all
@@ -157,10 +148,7 @@ fn failed_frames_are_retried_on_resume() {
     assert_eq!(job.summary().done, 4);
     let state = Job::read(&fixture.dir()).unwrap().unwrap();
     assert_eq!(state.summary().done, 4);
-    assert_eq!(
-        state.ledger().entry(0).unwrap().details.value(),
-        json!({ "particles": 5 })
-    );
+    assert_eq!(state.ledger().entry(0).unwrap().details.value(), json!({ "particles": 5 }));
 }
 
 #[test]
@@ -298,9 +286,7 @@ fn changed_input_of_a_finished_frame_is_refused_by_name() {
     fixture.write_input(2, "more particles of 2");
     fixture.write_input(1, "more particles of 1");
     let error = Job::open(&fixture.dir(), fixture.request(0..4), never).unwrap_err();
-    let JobError::InputChanged { changes, .. } = &error else {
-        panic!("{error}")
-    };
+    let JobError::InputChanged { changes, .. } = &error else { panic!("{error}") };
     let frames: Vec<i64> = changes.iter().map(|c| c.frame).collect();
     assert_eq!(frames, [1]);
     let text = error.to_string();
@@ -315,10 +301,7 @@ fn changed_input_of_a_finished_frame_is_refused_by_name() {
     keep.mode = ResumeMode::KeepDone;
     assert_eq!(fixture.open(keep).unwrap().pending(), [2, 3]);
     // Accepted once, the change is not reported again
-    assert_eq!(
-        fixture.open(fixture.request(0..4)).unwrap().pending(),
-        [2, 3]
-    );
+    assert_eq!(fixture.open(fixture.request(0..4)).unwrap().pending(), [2, 3]);
 }
 
 #[test]
@@ -327,10 +310,7 @@ fn unreadable_inputs_do_not_stop_the_rest() {
     fixture.started(0..2, &[]);
     let job = fixture.open(fixture.request(0..2)).unwrap();
     assert_eq!(job.pending(), [0, 1]);
-    assert_eq!(
-        job.state().plan().frame(1).unwrap().inputs[0].fingerprint,
-        None
-    );
+    assert_eq!(job.state().plan().frame(1).unwrap().inputs[0].fingerprint, None);
 }
 
 #[test]
@@ -372,10 +352,7 @@ fn damage_is_an_error_and_never_a_fresh_start() {
     let ledger = fs::read_to_string(fixture.ledger()).unwrap();
     fs::write(fixture.ledger(), ledger.replacen('{', "", 1)).unwrap();
     let error = fixture.open(fixture.request(0..2)).unwrap_err();
-    assert!(
-        matches!(error, JobError::LedgerDamaged { line: 1, .. }),
-        "{error}"
-    );
+    assert!(matches!(error, JobError::LedgerDamaged { line: 1, .. }), "{error}");
     assert!(Job::read(&fixture.dir()).is_err());
 }
 
@@ -385,28 +362,16 @@ fn several_workers_share_the_frames() {
     let mut a = fixture.open(fixture.request(0..4)).unwrap();
     let mut b = Job::open(&fixture.dir(), fixture.request(0..4), never).unwrap();
     let claim = |job: &Job, frame| job.claims().claim(frame).unwrap();
-    let ClaimOutcome::Acquired(zero) = claim(&a, 0) else {
-        panic!("the frame is free")
-    };
+    let ClaimOutcome::Acquired(zero) = claim(&a, 0) else { panic!("the frame is free") };
     assert!(matches!(claim(&b, 0), ClaimOutcome::Held(_)));
-    let ClaimOutcome::Acquired(one) = claim(&b, 1) else {
-        panic!("the frame is free")
-    };
+    let ClaimOutcome::Acquired(one) = claim(&b, 1) else { panic!("the frame is free") };
     fixture.finish(&mut a, 0);
     zero.complete();
     b.record_failed(&failure(1, "damaged")).unwrap();
     one.complete();
-    assert!(matches!(
-        claim(&b, 0),
-        ClaimOutcome::Finished(EntryStatus::Done)
-    ));
-    assert!(matches!(
-        claim(&a, 1),
-        ClaimOutcome::Finished(EntryStatus::Failed)
-    ));
-    let ClaimOutcome::Acquired(dropped) = claim(&a, 2) else {
-        panic!("the frame is free")
-    };
+    assert!(matches!(claim(&b, 0), ClaimOutcome::Finished(EntryStatus::Done)));
+    assert!(matches!(claim(&a, 1), ClaimOutcome::Finished(EntryStatus::Failed)));
+    let ClaimOutcome::Acquired(dropped) = claim(&a, 2) else { panic!("the frame is free") };
     drop(dropped);
     assert!(matches!(claim(&b, 2), ClaimOutcome::Acquired(_)));
     a.refresh().unwrap();
@@ -425,11 +390,8 @@ fn several_workers_share_the_frames() {
 fn settings_of_active_workers_do_not_change() {
     let fixture = Fixture::new(0..2);
     let active = fixture.open(fixture.request(0..2)).unwrap();
-    let with = |mode, depth| JobRequest {
-        mode,
-        settings: settings(depth),
-        ..fixture.request(0..2)
-    };
+    let with =
+        |mode, depth| JobRequest { mode, settings: settings(depth), ..fixture.request(0..2) };
     for (mode, depth) in [(ResumeMode::Force, 3), (ResumeMode::KeepDone, 5)] {
         let error = fixture.open(with(mode, depth)).unwrap_err();
         assert!(matches!(error, JobError::Busy { .. }), "{error}");
@@ -451,12 +413,8 @@ fn frames_with_changed_inputs_are_requeued_on_request() {
         selection: Some(selection.to_vec()),
         ..fixture.request(0..3)
     };
-    let error = fixture
-        .open(JobRequest {
-            mode: ResumeMode::Resume,
-            ..request(&[1, 2])
-        })
-        .unwrap_err();
+    let error =
+        fixture.open(JobRequest { mode: ResumeMode::Resume, ..request(&[1, 2]) }).unwrap_err();
     assert!(matches!(error, JobError::InputChanged { .. }), "{error}");
     let dry_run = Job::dry_run(&fixture.dir(), &request(&[2, 1, 0])).unwrap();
     assert_eq!(dry_run.pending(), [2, 1]);
@@ -475,10 +433,7 @@ fn frames_with_changed_inputs_are_requeued_on_request() {
     let job = fixture.open(request(&[2, 1, 0])).unwrap();
     assert_eq!((job.pending(), job.requeued()), (vec![2], &[][..]));
     drop(job);
-    let other = JobRequest {
-        settings: settings(5),
-        ..request(&[2])
-    };
+    let other = JobRequest { settings: settings(5), ..request(&[2]) };
     let error = fixture.open(other).unwrap_err();
     assert!(matches!(error, JobError::SettingsChanged { .. }), "{error}");
 }
@@ -525,10 +480,7 @@ fn ledgers_are_compacted() {
         fixture.finish(&mut job, frame);
     }
     assert!(fixture.ledgers().len() < 11, "{:?}", fixture.ledgers());
-    assert_eq!(
-        Job::read(&fixture.dir()).unwrap().unwrap().summary().done,
-        20
-    );
+    assert_eq!(Job::read(&fixture.dir()).unwrap().unwrap().summary().done, 20);
 }
 
 #[test]
@@ -549,9 +501,7 @@ fn inconsistent_requests_are_refused() {
 fn records_need_a_planned_frame_and_its_output() {
     let fixture = Fixture::new(0..2);
     let mut job = fixture.open(fixture.request(0..2)).unwrap();
-    let error = job
-        .record_done(0, &[fixture.image(0)], Value::Null)
-        .unwrap_err();
+    let error = job.record_done(0, &[fixture.image(0)], Value::Null).unwrap_err();
     assert!(error.to_string().contains("frame.0.exr"), "{error}");
     assert!(job.record_failed(&failure(9, "why")).is_err());
     assert!(fixture.ledgers().is_empty());
@@ -561,10 +511,8 @@ fn records_need_a_planned_frame_and_its_output() {
 #[test]
 fn a_failure_to_resolve_is_returned_and_leaves_no_plan() {
     let fixture = Fixture::new(0..2);
-    let error = Job::open(&fixture.dir(), fixture.request(0..2), |_| {
-        Err("no particles")
-    })
-    .unwrap_err();
+    let error =
+        Job::open(&fixture.dir(), fixture.request(0..2), |_| Err("no particles")).unwrap_err();
     assert_eq!(error.to_string(), "no particles");
     assert!(Job::read_plan(&fixture.dir()).unwrap().is_none());
 }
@@ -589,10 +537,7 @@ fn an_unwritable_directory_is_named() {
         return;
     }
     let error = fixture.open(fixture.request(0..1)).unwrap_err();
-    assert!(
-        matches!(error, JobError::File(FileError::Unwritable { .. })),
-        "{error}"
-    );
+    assert!(matches!(error, JobError::File(FileError::Unwritable { .. })), "{error}");
 }
 
 /// Work of a worker that is suspended, declared dead and revived: its temporary file is gone.
@@ -621,14 +566,8 @@ impl FrameWork for Revived {
 fn a_revived_worker_reports_that_it_was_declared_dead() {
     let fixture = Fixture::new(0..2);
     let mut job = fixture.open(fixture.request(0..2)).unwrap();
-    let work = Revived {
-        work_dir: fixture.dir().join("job.work"),
-    };
-    let options = RunOptions {
-        frames: job.pending(),
-        retries: 0,
-        interrupt: Interrupt::default(),
-    };
+    let work = Revived { work_dir: fixture.dir().join("job.work") };
+    let options = RunOptions { frames: job.pending(), retries: 0, interrupt: Interrupt::default() };
     let error = run_frames(&mut job, &work, &options, &|_| {}).unwrap_err();
     assert!(matches!(error, JobError::DeclaredDead { .. }), "{error}");
 }

@@ -25,18 +25,11 @@ fn template<'a>(frames: &'a [i64], chunks: &'a Chunks) -> JobTemplate<'a> {
         description: "Renders \"it\".".to_owned(),
         step: "Render",
         program: ("Program", "/opt/it's/render"),
-        paths: vec![
-            path("Manifest", false, Some("job.toml")),
-            path("OutDir", true, None),
-        ],
+        paths: vec![path("Manifest", false, Some("job.toml")), path("OutDir", true, None)],
         arguments: vec![parameter("Manifest"), "--frames".into(), FRAMES.into()],
         frames,
         chunks,
-        host: HostRequirements {
-            system: Some("linux"),
-            cpus: Some(4),
-            memory: Some(1 << 30),
-        },
+        host: HostRequirements { system: Some("linux"), cpus: Some(4), memory: Some(1 << 30) },
     }
 }
 
@@ -107,18 +100,14 @@ steps:
 fn the_yaml_of_a_template() {
     let frames = [-2, -1, 0, 1];
     let chunks = chunks(&frames, 2);
-    let text = template(&frames, &chunks)
-        .text(TemplateFormat::Yaml)
-        .unwrap();
+    let text = template(&frames, &chunks).text(TemplateFormat::Yaml).unwrap();
     assert_eq!(text, WHOLE);
 }
 
 /// The JSON template for these frames.
 fn read(frames: &[i64]) -> Value {
     let chunks = chunks(frames, 1);
-    let text = template(frames, &chunks)
-        .text(TemplateFormat::Json)
-        .unwrap();
+    let text = template(frames, &chunks).text(TemplateFormat::Json).unwrap();
     serde_json::from_str(&text).unwrap()
 }
 

@@ -22,10 +22,7 @@ fn script<'a>(chunks: &'a Chunks, program: &'a str) -> ArrayScript<'a> {
             limit_memory: true,
         },
         chunks,
-        resources: Resources {
-            cpus: 8,
-            ..Resources::default()
-        },
+        resources: Resources { cpus: 8, ..Resources::default() },
         signal_ahead: 120,
         log_dir: "/data/logs",
     }
@@ -117,12 +114,9 @@ fn texts_that_could_become_another_line_or_option_are_rejected() {
 #[test]
 fn job_names_have_only_plain_characters() {
     let chunks = chunks(&[1], 1);
-    for (name, shown) in [
-        ("größe 7", "gr--e-7"),
-        ("--", "frames"),
-        ("a,b;c", "a-b-c"),
-        ("", "frames"),
-    ] {
+    for (name, shown) in
+        [("größe 7", "gr--e-7"), ("--", "frames"), ("a,b;c", "a-b-c"), ("", "frames")]
+    {
         let mut script = script(&chunks, "/bin/spherule");
         script.name = name;
         assert_eq!(directives(&script)[0], format!("job-name={shown}"));
@@ -162,10 +156,7 @@ exit "${CODE:-75}"
             let chunks = chunks(frames, size);
             let program = dir.path().join("pro gram's");
             let text = script(&chunks, program.to_str().unwrap()).text().unwrap();
-            let cluster = Self {
-                script: dir.path().join("array.sh"),
-                dir,
-            };
+            let cluster = Self { script: dir.path().join("array.sh"), dir };
             fs::write(&cluster.script, text).unwrap();
             cluster.write_script("pro gram's", PROGRAM);
             cluster.write_script("bin/squeue", "#!/bin/sh\necho \"$STATE\"\n");
@@ -247,11 +238,7 @@ exit "${CODE:-75}"
         assert_eq!(code(cluster.start(3, "", &[])), Some(2));
         let ran = cluster.start(0, "", &[("CODE", "0"), ("SLURM_MEM_PER_NODE", "4000")]);
         assert_eq!(code(ran), Some(0));
-        assert!(
-            cluster
-                .output("called")
-                .ends_with("--memory-limit\n3600MiB\n")
-        );
+        assert!(cluster.output("called").ends_with("--memory-limit\n3600MiB\n"));
     }
 
     #[test]
@@ -259,10 +246,7 @@ exit "${CODE:-75}"
         let cluster = FakeCluster::new(&[1], 1);
         let other = "#!/bin/sh\necho other > called\n";
         cluster.write_script("bin/other", other);
-        assert_eq!(
-            code(cluster.start(0, "", &[("SPHERULE", "other")])),
-            Some(0)
-        );
+        assert_eq!(code(cluster.start(0, "", &[("SPHERULE", "other")])), Some(0));
         assert_eq!(cluster.output("called"), "other\n");
     }
 

@@ -35,10 +35,7 @@ pub fn process_token() -> &'static str {
 /// The name of this machine; empty if it is unknown.
 #[cfg(unix)]
 pub fn host_name() -> String {
-    rustix::system::uname()
-        .nodename()
-        .to_string_lossy()
-        .into_owned()
+    rustix::system::uname().nodename().to_string_lossy().into_owned()
 }
 
 /// The name of this machine; empty if it is unknown.
@@ -121,11 +118,7 @@ mod tests {
     #[test]
     fn the_files_of_one_owner_and_name_are_removed() {
         let dir = tempfile::tempdir().unwrap();
-        let names = [
-            ".a.exr.h-1-ff.0.part",
-            ".a.exr.h-2-ff.0.part",
-            ".b.exr.h-1-ff.0.part",
-        ];
+        let names = [".a.exr.h-1-ff.0.part", ".a.exr.h-2-ff.0.part", ".b.exr.h-1-ff.0.part"];
         for name in names {
             fs::write(dir.path().join(name), b"half").unwrap();
         }

@@ -25,10 +25,7 @@ struct LastSteps {
     sync_directory: fn(&Path) -> io::Result<()>,
 }
 
-const LAST_STEPS: LastSteps = LastSteps {
-    rename: |from, to| fs::rename(from, to),
-    sync_directory,
-};
+const LAST_STEPS: LastSteps = LastSteps { rename: |from, to| fs::rename(from, to), sync_directory };
 
 impl Publisher {
     /// Starts a file that will be called `dst`; its directory must exist.
@@ -38,19 +35,11 @@ impl Publisher {
     pub fn create(dst: &Path) -> io::Result<Self> {
         let part = part_path(dst)?;
         let mut open = open_parts();
-        let file = OpenOptions::new()
-            .read(true)
-            .write(true)
-            .create(true)
-            .truncate(true)
-            .open(&part)?;
+        let file =
+            OpenOptions::new().read(true).write(true).create(true).truncate(true).open(&part)?;
         open.push(part.clone());
         drop(open);
-        Ok(Self {
-            dst: dst.to_owned(),
-            part,
-            file: Some(BufWriter::with_capacity(1 << 18, file)),
-        })
+        Ok(Self { dst: dst.to_owned(), part, file: Some(BufWriter::with_capacity(1 << 18, file)) })
     }
 
     /// The temporary file, for another program that writes it by its name. The program must end before
@@ -291,10 +280,8 @@ mod tests {
     #[cfg(unix)]
     #[test]
     fn a_failed_rename_leaves_the_old_file_and_no_other() {
-        let steps = LastSteps {
-            rename: |_, _| Err(rustix::io::Errno::ACCESS.into()),
-            ..LAST_STEPS
-        };
+        let steps =
+            LastSteps { rename: |_, _| Err(rustix::io::Errno::ACCESS.into()), ..LAST_STEPS };
         let (result, content) = commit_by(&steps);
         assert_eq!(result.unwrap_err().kind(), io::ErrorKind::PermissionDenied);
         assert_eq!(content, b"old");
@@ -311,10 +298,8 @@ mod tests {
         if let Some(dst) = std::env::var_os(CRASH_AT) {
             let mut file = Publisher::create(Path::new(&dst)).unwrap();
             file.write_all(b"new bytes").unwrap();
-            let _ = file.commit_by(&LastSteps {
-                rename: |_, _| std::process::abort(),
-                ..LAST_STEPS
-            });
+            let _ =
+                file.commit_by(&LastSteps { rename: |_, _| std::process::abort(), ..LAST_STEPS });
             unreachable!("it has crashed");
         }
         let dir = tempfile::tempdir().unwrap();

@@ -56,9 +56,7 @@ pub(crate) fn attribute(name: String, array: &Bound<'_, PyAny>) -> PyResult<Attr
     try_types!(
         F32: f32, F64: f64, I32: i32, I64: i64, U32: u32, U64: u64, I16: i16, U16: u16, I8: i8, U8: u8
     );
-    Err(PyTypeError::new_err(format!(
-        "attribute {name}: its type of numbers is not supported"
-    )))
+    Err(PyTypeError::new_err(format!("attribute {name}: its type of numbers is not supported")))
 }
 
 /// An array of the numbers of an attribute: one row for each particle if there are several components.

@@ -43,12 +43,7 @@ pub(crate) struct Failure {
 
 impl Failure {
     pub(crate) fn new(class: Class, message: impl ToString) -> Self {
-        Self {
-            class,
-            message: message.to_string(),
-            file: None,
-            place: None,
-        }
+        Self { class, message: message.to_string(), file: None, place: None }
     }
 
     fn of_file(mut self, path: &Path) -> Self {
@@ -71,10 +66,9 @@ impl From<FrameError> for Failure {
     fn from(error: FrameError) -> Self {
         let failure = Self::new(Class::Input, &error);
         match &error {
-            FrameError::Malformed { path, at, .. } => Self {
-                place: Some(format!("byte {at}")),
-                ..failure.of_file(path)
-            },
+            FrameError::Malformed { path, at, .. } => {
+                Self { place: Some(format!("byte {at}")), ..failure.of_file(path) }
+            }
             FrameError::Unsupported { path, .. }
             | FrameError::TooLarge { path, .. }
             | FrameError::Io { path, .. } => failure.of_file(path),
@@ -102,10 +96,7 @@ impl From<SequenceError> for Failure {
 
 impl From<ManifestError> for Failure {
     fn from(error: ManifestError) -> Self {
-        Self {
-            place: error.key().map(str::to_owned),
-            ..Self::new(Class::Setting, &error)
-        }
+        Self { place: error.key().map(str::to_owned), ..Self::new(Class::Setting, &error) }
     }
 }
 

@@ -34,10 +34,7 @@ impl FrameList {
         follow_links: bool,
         topology: Option<PathBuf>,
     ) -> PyResult<Self> {
-        let settings = SequenceSettings {
-            budget: read_budget(None, None),
-            follow_links,
-        };
+        let settings = SequenceSettings { budget: read_budget(None, None), follow_links };
         let paths = SequenceInput::from_paths(paths);
         let sequence = py.detach(|| {
             let mut sequence = Sequence::open_with(&paths, settings)?;

@@ -27,10 +27,7 @@ pub(crate) struct NativeImage {
 /// Renders particles; see `spherule.render`, which checks the arguments.
 #[pyfunction]
 #[pyo3(signature = (positions, attributes, settings, *, base, frame, name, time, cell, threads))]
-#[expect(
-    clippy::too_many_arguments,
-    reason = "keyword arguments of one Python function"
-)]
+#[expect(clippy::too_many_arguments, reason = "keyword arguments of one Python function")]
 pub(crate) fn render(
     py: Python<'_>,
     positions: &Bound<'_, PyAny>,
@@ -57,9 +54,8 @@ pub(crate) fn render(
     };
     let stop = AtomicBool::new(false);
     let on_signal = || stop.store(true, Ordering::Relaxed);
-    let image = threads::run(py, threads, on_signal, || {
-        Ok(still::render(&settings, particles, &stop)?)
-    })?;
+    let image =
+        threads::run(py, threads, on_signal, || Ok(still::render(&settings, particles, &stop)?))?;
     Ok(NativeImage { image })
 }
 
@@ -81,12 +77,7 @@ fn read_settings(
     let input = Override::new("input.path", name.clone(), "name");
     all.push(input.map_err(|error| Failure::new(Class::Internal, error))?);
     let source = ManifestSource::new("", Path::new("settings"), all);
-    Ok(StillSettings {
-        base,
-        frame,
-        name,
-        ..StillSettings::of_source(source)?
-    })
+    Ok(StillSettings { base, frame, name, ..StillSettings::of_source(source)? })
 }
 
 #[pymethods]

@@ -122,10 +122,7 @@ fn manifest(file: Option<&Path>, settings: &str, base: PathBuf) -> Result<JobMan
     let Some(file) = file else {
         let source = ManifestSource::new("", Path::new("settings"), overrides);
         let (manifest, _) = source.parse()?;
-        return Ok(JobManifest {
-            source: Some(source),
-            ..JobManifest::new(manifest, base)
-        });
+        return Ok(JobManifest { source: Some(source), ..JobManifest::new(manifest, base) });
     };
     let text = read_manifest(file)
         .map_err(|error| Failure::new(Class::Input, format!("{}: {error}", file.display())))?;

@@ -47,10 +47,7 @@ fn build_over_blocks(
     let mut clock = PhaseClock::new();
     // Sort the particles into blocks along the Hilbert curve
     let sort_bytes = lbvh::sort_into_blocks(tree, spheres, settings.keep_indices, &mut clock);
-    tree.blocks
-        .par_iter_mut()
-        .with_min_len(256)
-        .for_each(Block::transpose_points);
+    tree.blocks.par_iter_mut().with_min_len(256).for_each(Block::transpose_points);
 
     // Cluster the boxes of the blocks into a binary tree
     let padding = tree.padding;
@@ -58,19 +55,11 @@ fn build_over_blocks(
         Some(radii) => tree.blocks[block].sphere_bounds(radii),
         None => tree.blocks[block].bounds().padded(padding),
     };
-    let clustered = cluster(
-        tree.blocks.len(),
-        bounds_of,
-        padding,
-        settings.bvh.preset,
-        &mut clock,
-    );
+    let clustered = cluster(tree.blocks.len(), bounds_of, padding, settings.bvh.preset, &mut clock);
     // Collapse the binary tree into 8-wide nodes
     let held = clustered.peak_bytes.max(sort_bytes);
-    let Collapsed {
-        sah_cost,
-        scratch_bytes,
-    } = collapse(tree, clustered.tree, &Content::Blocks, &mut clock);
+    let Collapsed { sah_cost, scratch_bytes } =
+        collapse(tree, clustered.tree, &Content::Blocks, &mut clock);
     if !settings.keep_indices {
         tree.drop_indices();
     }
@@ -97,21 +86,10 @@ fn build_over_particles(
     let bounds_of = |particle: usize| {
         let radius = each.get(particle).copied().unwrap_or(common);
         let center = spheres.centers[particle];
-        Aabb {
-            min: center - radius,
-            max: center + radius,
-        }
+        Aabb { min: center - radius, max: center + radius }
     };
-    let Clustered {
-        tree: binary,
-        peak_bytes,
-    } = cluster(
-        spheres.centers.len(),
-        bounds_of,
-        common,
-        settings.bvh.preset,
-        &mut clock,
-    );
+    let Clustered { tree: binary, peak_bytes } =
+        cluster(spheres.centers.len(), bounds_of, common, settings.bvh.preset, &mut clock);
     // Pack the particles into blocks and collapse the binary tree into 8-wide nodes
     let collapsed = collapse(tree, binary, &Content::Particles(*spheres), &mut clock);
     let mut report = tree.report(

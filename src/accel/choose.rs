@@ -35,11 +35,7 @@ const MEASURED_THREADS: usize = 16;
 pub fn choose(particles: usize, expected_rays: f64, threads: usize) -> Structure {
     let threads = threads.min(MEASURED_THREADS);
     let least = RAYS_PER_PARTICLE + MORE_PER_THREAD * threads as f64;
-    if expected_rays >= least * particles as f64 {
-        Structure::Kdtree
-    } else {
-        Structure::Lbvh
-    }
+    if expected_rays >= least * particles as f64 { Structure::Kdtree } else { Structure::Lbvh }
 }
 
 #[cfg(test)]

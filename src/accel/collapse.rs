@@ -93,10 +93,7 @@ pub(super) fn collapse(
     drop(packed);
     let sah_cost = build_nodes(tree, layout, &boxes);
     clock.lap("nodes");
-    Collapsed {
-        sah_cost,
-        scratch_bytes,
-    }
+    Collapsed { sah_cost, scratch_bytes }
 }
 
 /// The block of the packed tree that is not full. Slots up to the number of particles hold particles, so this block

@@ -142,18 +142,14 @@ impl Children {
 
     /// Opens the largest part until there are eight parts or none can be opened.
     fn open_largest(tree: &PackedTree, left: u32) -> Self {
-        let mut children = Self {
-            parts: [Part::Subtree(left); WIDTH],
-            count: 2,
-        };
+        let mut children = Self { parts: [Part::Subtree(left); WIDTH], count: 2 };
         children.parts[1] = Part::Subtree(left + 1);
         while usize::from(children.count) < WIDTH {
             // Find the part of largest area that can be opened
             let candidates = children.all().iter().enumerate();
             let largest = candidates
                 .filter_map(|(slot, part)| {
-                    part.as_openable(tree)
-                        .map(|(left, area)| (slot, left, area))
+                    part.as_openable(tree).map(|(left, area)| (slot, left, area))
                 })
                 .reduce(|best, other| if other.2 > best.2 { other } else { best });
             let Some((slot, left, _)) = largest else {
@@ -180,15 +176,10 @@ impl Children {
             let blocks = u64::from(count) * u64::from(part) / u64::from(parts);
             first + blocks as u32
         };
-        let mut children = Self {
-            parts: [Part::Run { first, count }; WIDTH],
-            count: parts as u8,
-        };
+        let mut children = Self { parts: [Part::Run { first, count }; WIDTH], count: parts as u8 };
         for part in 0..parts {
-            children.parts[part as usize] = Part::Run {
-                first: bound(part),
-                count: bound(part + 1) - bound(part),
-            };
+            children.parts[part as usize] =
+                Part::Run { first: bound(part), count: bound(part + 1) - bound(part) };
         }
         children
     }
@@ -199,10 +190,7 @@ impl Children {
 
     /// The parts that are nodes.
     fn nodes(&self, tree: &PackedTree) -> impl Iterator<Item = Part> {
-        self.all()
-            .iter()
-            .copied()
-            .filter(|part| !part.is_block(tree))
+        self.all().iter().copied().filter(|part| !part.is_block(tree))
     }
 
     /// The parts that are blocks.

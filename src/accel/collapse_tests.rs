@@ -30,10 +30,7 @@ fn points(count: u16) -> Vec<Vec3> {
 }
 
 fn spheres(centers: &[Vec3]) -> Spheres<'_> {
-    Spheres {
-        centers,
-        radius: SphereRadius::Common(RADIUS),
-    }
+    Spheres { centers, radius: SphereRadius::Common(RADIUS) }
 }
 
 /// A tree over leaves that each hold a run of references; `split` returns how many leaves of a run go to the left.
@@ -42,11 +39,7 @@ fn binary(leaves: &[(Aabb, Vec<u32>)], split: impl Fn(usize) -> usize) -> Binary
     if leaves.is_empty() {
         return tree;
     }
-    let empty = BinaryNode {
-        bounds: Aabb::EMPTY,
-        first: 0,
-        count: 0,
-    };
+    let empty = BinaryNode { bounds: Aabb::EMPTY, first: 0, count: 0 };
     tree.nodes.push(empty);
     let mut pending = vec![(0, leaves)];
     while let Some((place, leaves)) = pending.pop() {
@@ -71,8 +64,7 @@ fn binary(leaves: &[(Aabb, Vec<u32>)], split: impl Fn(usize) -> usize) -> Binary
 fn leaves(centers: &[Vec3], size: usize) -> Vec<(Aabb, Vec<u32>)> {
     let numbers: Vec<u32> = (0..index_u32(centers.len())).collect();
     let runs = centers.chunks(size).zip(numbers.chunks(size));
-    runs.map(|(points, numbers)| (Aabb::around(points), numbers.to_vec()))
-        .collect()
+    runs.map(|(points, numbers)| (Aabb::around(points), numbers.to_vec())).collect()
 }
 
 #[test]
@@ -99,20 +91,12 @@ fn small_subtrees_share_a_block_if_cheaper() {
     let near = points(8);
     let mut tree = WideTree::default();
     let tree_of = |leaves: &[_]| binary(leaves, |n| n / 2);
-    collapse(
-        &mut tree,
-        tree_of(&leaves(&near, 4)),
-        &Content::Particles(spheres(&near)),
-    );
+    collapse(&mut tree, tree_of(&leaves(&near, 4)), &Content::Particles(spheres(&near)));
     assert_eq!(tree.blocks.len(), 1, "one block of two leaves");
 
     let mut far = near;
     far[4..].iter_mut().for_each(|p| p.x += 1000.0);
-    collapse(
-        &mut tree,
-        tree_of(&leaves(&far, 4)),
-        &Content::Particles(spheres(&far)),
-    );
+    collapse(&mut tree, tree_of(&leaves(&far, 4)), &Content::Particles(spheres(&far)));
     assert_eq!(tree.blocks.len(), 2, "two blocks far from each other");
 }
 
@@ -131,10 +115,8 @@ fn blocks_are_permuted_and_the_partial_one_is_last() {
             }
             tree.blocks.iter_mut().for_each(Block::transpose_points);
             // The unfilled block is the first one in tree order.
-            let leaves: Vec<(Aabb, Vec<u32>)> = (0..blocks)
-                .rev()
-                .map(|b| (tree.blocks[b].bounds(), vec![index_u32(b)]))
-                .collect();
+            let leaves: Vec<(Aabb, Vec<u32>)> =
+                (0..blocks).rev().map(|b| (tree.blocks[b].bounds(), vec![index_u32(b)])).collect();
             collapse(&mut tree, binary(&leaves, split), &Content::Blocks);
             let what = format!("{count} particles, shape {shape}");
             assert!(!tree.has_copies, "{what}");
@@ -174,10 +156,7 @@ fn clipped_spheres_are_hit_once_from_either_side() {
             |tree: &TreeView, c: &super::traverse::TreeCrossing| (c.t, tree.particle(c.slot));
         assert_eq!(
             ours.iter().map(|c| describe(&tree, c)).collect::<Vec<_>>(),
-            theirs
-                .iter()
-                .map(|c| describe(&other, c))
-                .collect::<Vec<_>>(),
+            theirs.iter().map(|c| describe(&other, c)).collect::<Vec<_>>(),
             "ray {i}"
         );
         let hit = tree.nearest(&ray).map(|hit| hit.t);

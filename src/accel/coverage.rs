@@ -31,10 +31,7 @@ impl WideTree {
     /// Describes the first sphere with an uncovered point.
     pub(super) fn validate_coverage(&self, spheres: &Spheres) -> Result<(), TreeFault> {
         let mut covered: Vec<Points> = vec![0; self.count];
-        let everywhere = Cell {
-            min: DVec3::NEG_INFINITY,
-            max: DVec3::INFINITY,
-        };
+        let everywhere = Cell { min: DVec3::NEG_INFINITY, max: DVec3::INFINITY };
         // Walk down the tree; intersect the boxes on the path and mark the points that each leaf covers
         let mut pending = Vec::new();
         pending.extend((!self.nodes.is_empty()).then_some((Linked::ROOT, everywhere)));
@@ -129,30 +126,13 @@ mod tests {
     #[test]
     fn missing_part_is_detected() {
         let centers: Vec<Vec3> = (0..1000_u16)
-            .map(|i| {
-                Vec3::new(
-                    f32::from(i % 10),
-                    f32::from(i / 10 % 10),
-                    f32::from(i / 100),
-                )
-            })
+            .map(|i| Vec3::new(f32::from(i % 10), f32::from(i / 10 % 10), f32::from(i / 100)))
             .collect();
-        let radii: Vec<f32> = (0..1000)
-            .map(|i| if i % 7 == 0 { 1.5 } else { 0.05 })
-            .collect();
-        let spheres = Spheres {
-            centers: &centers,
-            radius: SphereRadius::Each(&radii),
-        };
+        let radii: Vec<f32> = (0..1000).map(|i| if i % 7 == 0 { 1.5 } else { 0.05 }).collect();
+        let spheres = Spheres { centers: &centers, radius: SphereRadius::Each(&radii) };
         let mut builder = TreeBuilder::new();
-        let sbvh = SbvhSettings {
-            alpha: 0.0,
-            budget: 2.0,
-        };
-        let settings = BuildSettings {
-            sbvh,
-            ..BuildSettings::new(Structure::Sbvh)
-        };
+        let sbvh = SbvhSettings { alpha: 0.0, budget: 2.0 };
+        let settings = BuildSettings { sbvh, ..BuildSettings::new(Structure::Sbvh) };
         let report = builder.build(&spheres, &settings);
         assert!(report.references > report.particles, "nothing was cut");
         let tree = builder.tree_mut();
@@ -164,12 +144,7 @@ mod tests {
                 *index = 0;
             }
         }
-        let fault = tree
-            .validate_coverage(&spheres)
-            .expect_err("a part is lost");
-        assert!(
-            matches!(fault, TreeFault::Uncovered { particle: 100, .. }),
-            "{fault}"
-        );
+        let fault = tree.validate_coverage(&spheres).expect_err("a part is lost");
+        assert!(matches!(fault, TreeFault::Uncovered { particle: 100, .. }), "{fault}");
     }
 }

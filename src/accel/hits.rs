@@ -26,10 +26,7 @@ pub struct TreeHits {
 
 impl Default for TreeHits {
     fn default() -> Self {
-        Self {
-            t: [-1.0; PACKET_SIZE],
-            slot: [Self::NO_SLOT; PACKET_SIZE],
-        }
+        Self { t: [-1.0; PACKET_SIZE], slot: [Self::NO_SLOT; PACKET_SIZE] }
     }
 }
 

@@ -25,12 +25,7 @@ impl TreeView<'_> {
     /// [`TreeView::nearest`] for the rays in `lanes`; the other rays hit nothing.
     pub(super) fn nearest_by_lanes(&self, rays: &RayPacket, lanes: u32, hits: &mut TreeHits) {
         let backward = backward_lanes(rays) & lanes;
-        self.run(LaneQuery {
-            rays,
-            lanes: lanes & !backward,
-            query: Nearest,
-            hits,
-        });
+        self.run(LaneQuery { rays, lanes: lanes & !backward, query: Nearest, hits });
         for lane in lanes_in(backward) {
             if let Some(hit) = self.nearest(&rays.ray(lane)) {
                 (hits.t[lane], hits.slot[lane]) = (hit.t, hit.slot);
@@ -42,12 +37,7 @@ impl TreeView<'_> {
     pub(super) fn occluded_by_lanes(&self, rays: &RayPacket, lanes: u32) -> u32 {
         let backward = backward_lanes(rays) & lanes;
         let mut hits = TreeHits::default();
-        self.run(LaneQuery {
-            rays,
-            lanes: lanes & !backward,
-            query: Any,
-            hits: &mut hits,
-        });
+        self.run(LaneQuery { rays, lanes: lanes & !backward, query: Any, hits: &mut hits });
         let mut occluded = hits.mask();
         for lane in lanes_in(backward) {
             occluded |= u32::from(self.any_hit(&rays.ray(lane))) << lane;
@@ -149,10 +139,7 @@ impl Query for Nearest {
         hits: &mut TreeHits,
         lane: usize,
     ) {
-        let best = TreeHit {
-            t: hits.t[lane],
-            slot: hits.slot[lane],
-        };
+        let best = TreeHit { t: hits.t[lane], slot: hits.slot[lane] };
         let tree = subtree.tree;
         let mut search = NearestOfRay { tree, ray, best };
         subtree.walk(&mut search, best.t);
@@ -235,21 +222,15 @@ fn walk_lanes<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
     let slabs = LaneSlabs::new(rays, view.padding);
     let mut entered = EnteredChildren::NONE;
     let mut single_stack = WalkStack::new();
-    let mut stack = LaneStack {
-        near: [[0.0; PACKET_SIZE]; STACK_SIZE],
-        code: [0; STACK_SIZE],
-        depth: 0,
-    };
+    let mut stack =
+        LaneStack { near: [[0.0; PACKET_SIZE]; STACK_SIZE], code: [0; STACK_SIZE], depth: 0 };
     let (mut code, mut alive) = (T::ROOT, lanes);
     loop {
         match tree.topology.resolve(code) {
             // Many rays enter the node: test its children with all of them, and push the nearest child last
             NodeRef::Node(node) if alive.count_ones() > MAX_SINGLE_RAYS => {
                 let found = kernel.test_node_with_lanes(&slabs, node, alive, &hits.t, &mut entered);
-                let below = Below {
-                    tree,
-                    children: tree.topology.children(code),
-                };
+                let below = Below { tree, children: tree.topology.children(code) };
                 let keys = &mut entered.keys[..found];
                 sort_descending(keys);
                 for key in keys {
@@ -264,12 +245,7 @@ fn walk_lanes<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
             _ => {
                 for lane in lanes_in(alive) {
                     let ray = kernel.prepare(&rays.ray(lane), view.radius, view.padding);
-                    let subtree = Subtree {
-                        kernel,
-                        tree,
-                        code,
-                        stack: &mut single_stack,
-                    };
+                    let subtree = Subtree { kernel, tree, code, stack: &mut single_stack };
                     query.search(subtree, &ray, hits, lane);
                 }
             }

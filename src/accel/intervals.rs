@@ -63,10 +63,7 @@ impl TreeView<'_> {
         if point.cmplt(bounds.min).any() || point.cmpgt(bounds.max).any() {
             return false;
         }
-        let ray = Ray {
-            t_max: 0.0,
-            ..Ray::new(point, Vec3::X)
-        };
+        let ray = Ray { t_max: 0.0, ..Ray::new(point, Vec3::X) };
         self.run(Contains { ray: &ray })
     }
 }
@@ -81,10 +78,7 @@ fn slots_of(block: usize, mut lanes: u32, slots: usize) -> impl Iterator<Item = 
             return None;
         }
         lanes &= lanes - 1;
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "slots are counted in 32 bits"
-        )]
+        #[expect(clippy::cast_possible_truncation, reason = "slots are counted in 32 bits")]
         Some((lane, slot as u32))
     })
 }
@@ -265,10 +259,7 @@ impl UnionEnd {
                 if near > self.end {
                     next = next.min(near);
                 } else if far > self.end || (far == self.end && self.precedes_current(view, slot)) {
-                    *self = Self {
-                        end: far,
-                        slot: Some(slot),
-                    };
+                    *self = Self { end: far, slot: Some(slot) };
                 }
             }
             // Repeat if the end has moved past the beginning of a skipped interval of the block.
@@ -280,8 +271,7 @@ impl UnionEnd {
 
     /// Whether `slot`, which ends where the union ends, precedes the current slot.
     fn precedes_current(&self, view: &TreeView, slot: u32) -> bool {
-        self.slot
-            .is_none_or(|held| view.tie_order(slot, held).is_lt())
+        self.slot.is_none_or(|held| view.tie_order(slot, held).is_lt())
     }
 }
 
@@ -302,10 +292,7 @@ impl TreeTask for Exit<'_> {
         // Prepare the ray with the current end as `t_min`, so that boxes that lie before it are culled.
         let from = |t_min: f32| kernel.prepare(&Ray { t_min, ..*ray }, view.radius, view.padding);
         let limit = ray.t_max.next_down();
-        let mut union = UnionEnd {
-            end: ray.t_min,
-            slot: None,
-        };
+        let mut union = UnionEnd { end: ray.t_min, slot: None };
         let mut prepared = from(union.end);
         // Nodes and blocks that begin before the end; at most the children of one node per level.
         let mut stack = [0_u32; STACK_SIZE];

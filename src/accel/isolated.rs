@@ -17,10 +17,7 @@ impl TreeView<'_> {
     /// # Panics
     /// If `enough` is more than 16.
     pub(crate) fn isolated(&self, support: f32, enough: usize) -> Vec<u32> {
-        assert!(
-            enough <= MAX_NEIGHBOURS,
-            "only few neighbours are distinguished"
-        );
+        assert!(enough <= MAX_NEIGHBOURS, "only few neighbours are distinguished");
         let slots = self.slot_count();
         // Check every particle, block by block
         let mut isolated: Vec<u32> = (0..slots.div_ceil(BLOCK_SIZE))
@@ -64,10 +61,7 @@ impl TreeView<'_> {
             let distance = self.sphere(*slot).0.distance_squared(center);
             distance <= reach * reach
         };
-        let mut has_neighbours = block
-            .clone()
-            .filter(is_within_reach)
-            .any(&mut add_neighbour);
+        let mut has_neighbours = block.clone().filter(is_within_reach).any(&mut add_neighbour);
         if !has_neighbours {
             self.visit_neighbours(center, reach, |slot, _| {
                 has_neighbours = add_neighbour(slot);

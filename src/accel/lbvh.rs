@@ -90,10 +90,7 @@ pub(super) fn sort_into_blocks(
 }
 
 fn bounds_of(centers: &[Vec3]) -> Aabb {
-    centers
-        .par_chunks(64 * 1024)
-        .map(Aabb::around)
-        .reduce(|| Aabb::EMPTY, Aabb::union)
+    centers.par_chunks(64 * 1024).map(Aabb::around).reduce(|| Aabb::EMPTY, Aabb::union)
 }
 
 /// Position and size of the grid: the box of the bulk of the particles, so that a few outliers do not put all others
@@ -125,16 +122,16 @@ fn sort_cells(
     points: &mut [Vec3],
     indices: &mut [u32],
 ) {
-    cells
-        .slices_of(points, indices)
-        .into_par_iter()
-        .for_each_init(CellScratch::default, |scratch, (points, indices)| {
+    cells.slices_of(points, indices).into_par_iter().for_each_init(
+        CellScratch::default,
+        |scratch, (points, indices)| {
             if points.len() > LARGE_CELL {
                 sort_large_cell(grid, top_levels, points, indices);
             } else {
                 scratch.sort(grid, top_levels, points, indices);
             }
-        });
+        },
+    );
 }
 
 /// Peak memory of the sort in bytes next to the particles. Crowded cells are copied with their keys; all other cells
@@ -252,16 +249,10 @@ fn sort_large_cell(grid: &Grid, top_levels: u32, points: &mut [Vec3], indices: &
     keys.par_sort_unstable();
     // Move points and indices into the sorted order
     let old = points.to_vec();
-    points
-        .par_iter_mut()
-        .zip(&keys)
-        .for_each(|(p, (_, from))| *p = old[*from as usize]);
+    points.par_iter_mut().zip(&keys).for_each(|(p, (_, from))| *p = old[*from as usize]);
     if !indices.is_empty() {
         let old = indices.to_vec();
-        indices
-            .par_iter_mut()
-            .zip(&keys)
-            .for_each(|(i, (_, from))| *i = old[*from as usize]);
+        indices.par_iter_mut().zip(&keys).for_each(|(i, (_, from))| *i = old[*from as usize]);
     }
 }
 

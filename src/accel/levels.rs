@@ -98,10 +98,7 @@ pub(super) fn build_levels(
             build_level(level, padding, &child)
         } else {
             build_level(level, padding, |index| {
-                below.get(index).map(|bounds| Child {
-                    bounds: *bounds,
-                    inner_area: 0.0,
-                })
+                below.get(index).map(|bounds| Child { bounds: *bounds, inner_area: 0.0 })
             })
         };
         built.child_areas += area;
@@ -163,9 +160,5 @@ fn build_level(
 /// Expected number of tests for a ray that hits the `root` box, given the total area of all children.
 pub(super) fn sah_cost(child_areas: f64, root: Aabb) -> f64 {
     let root_area = root.area();
-    if root_area > 0.0 {
-        1.0 + child_areas / root_area
-    } else {
-        1.0
-    }
+    if root_area > 0.0 { 1.0 + child_areas / root_area } else { 1.0 }
 }

@@ -69,10 +69,9 @@ pub(super) fn block_boxes(tree: &WideTree, given: &[Aabb], layout: &Layout) -> V
     let own = |place: usize| match tree.radii.get(place) {
         Some(radii) => tree.blocks[place].sphere_bounds(radii),
         // Pad by the radius only if boxes bound spheres.
-        None if tree.padding == 0.0 && tree.radius > 0.0 => tree.blocks[place]
-            .bounds()
-            .padded(tree.radius)
-            .rounded_outwards(),
+        None if tree.padding == 0.0 && tree.radius > 0.0 => {
+            tree.blocks[place].bounds().padded(tree.radius).rounded_outwards()
+        }
         None => tree.blocks[place].bounds(),
     };
     (0..tree.blocks.len())
@@ -94,12 +93,7 @@ pub(super) fn block_boxes(tree: &WideTree, given: &[Aabb], layout: &Layout) -> V
 
 /// Builds the nodes of `tree` over blocks with the boxes `block_boxes`. Returns the SAH cost.
 pub(super) fn build_nodes(tree: &mut WideTree, layout: Layout, block_boxes: &[Aabb]) -> f64 {
-    let Layout {
-        links,
-        child_counts,
-        level_starts,
-        ..
-    } = layout;
+    let Layout { links, child_counts, level_starts, .. } = layout;
     // Reuse the memory of the previous nodes
     let mut nodes = std::mem::take(&mut tree.nodes);
     nodes.clear();
@@ -127,9 +121,8 @@ pub(super) fn build_nodes(tree: &mut WideTree, layout: Layout, block_boxes: &[Aa
     tree.level_starts = level_starts;
     tree.mapped.clear();
     tree.mapped_level = u32::MAX;
-    tree.bounds = boxes.first().map_or(Aabb::EMPTY, |root| {
-        root.padded(tree.padding).rounded_outwards()
-    });
+    tree.bounds =
+        boxes.first().map_or(Aabb::EMPTY, |root| root.padded(tree.padding).rounded_outwards());
     sah_cost(areas, tree.bounds)
 }
 

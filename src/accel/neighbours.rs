@@ -21,11 +21,7 @@ impl TreeView<'_> {
         reach: f32,
         visit: impl FnMut(u32, Vec3) -> bool,
     ) {
-        self.run(Neighbours {
-            point,
-            reach,
-            visit,
-        });
+        self.run(Neighbours { point, reach, visit });
     }
 }
 
@@ -45,11 +41,7 @@ impl<F: FnMut(u32, Vec3) -> bool> TreeTask for Neighbours<F> {
         kernel: K,
         tree: Resolved<'a, T, L>,
     ) {
-        let Self {
-            point,
-            reach,
-            mut visit,
-        } = self;
+        let Self { point, reach, mut visit } = self;
         // Use a ray of length zero and boxes padded by `reach`: all boxes contain the centres of their particles, so
         // the ray enters every box with a centre within `reach`
         let ray = Ray::new(point, Vec3::X);

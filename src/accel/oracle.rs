@@ -24,10 +24,7 @@ impl ParticleTree {
             (0..).zip(centers).map(|(i, c)| (c.as_dvec3(), i)).collect();
         let mut nodes = vec![OracleNode::default(); centers.len()];
         place(&mut particles, 0, &mut nodes);
-        Self {
-            nodes,
-            radius: f64::from(radius),
-        }
+        Self { nodes, radius: f64::from(radius) }
     }
 
     /// Distance and particle of the nearest crossing not behind the origin, and the margin of the closest decision
@@ -66,11 +63,7 @@ fn clip([from, to]: [f64; 2], offset: f64, slope: f64) -> Option<[f64; 2]> {
         return (offset >= 0.0).then_some([from, to]);
     }
     let t = -offset / slope;
-    let inside = if slope > 0.0 {
-        [from.max(t), to]
-    } else {
-        [from, to.min(t)]
-    };
+    let inside = if slope > 0.0 { [from.max(t), to] } else { [from, to.min(t)] };
     // Extended a little, so that rounding loses nothing.
     (inside[0] <= inside[1] + 1e-9).then_some(inside)
 }
@@ -109,19 +102,13 @@ fn place(particles: &mut [(DVec3, usize)], index: usize, nodes: &mut [OracleNode
         return;
     }
     let low = particles.iter().fold(DVec3::INFINITY, |a, p| a.min(p.0));
-    let high = particles
-        .iter()
-        .fold(DVec3::NEG_INFINITY, |a, p| a.max(p.0));
+    let high = particles.iter().fold(DVec3::NEG_INFINITY, |a, p| a.max(p.0));
     let extent = high - low;
     let axis = (0..3).fold(0, |a, b| if extent[b] > extent[a] { b } else { a });
     let left = left_size(particles.len());
     particles.select_nth_unstable_by(left, |a, b| a.0[axis].total_cmp(&b.0[axis]));
     let (center, particle) = particles[left];
-    nodes[index] = OracleNode {
-        center,
-        particle,
-        axis,
-    };
+    nodes[index] = OracleNode { center, particle, axis };
     let (below, above) = particles.split_at_mut(left);
     place(below, 2 * index + 1, nodes);
     place(&mut above[1..], 2 * index + 2, nodes);

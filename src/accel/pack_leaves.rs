@@ -122,12 +122,7 @@ impl PackedTree {
     }
 
     fn leaf(&self) -> PackedNode {
-        PackedNode {
-            area: 0.0,
-            child: 0,
-            first: self.block_count(),
-            count: 0,
-        }
+        PackedNode { area: 0.0, child: 0, first: self.block_count(), count: 0 }
     }
 
     /// Adds the subtree of node `index` as one block, or as several blocks if it is a leaf that is too large for one.
@@ -210,11 +205,7 @@ fn costs(binary: &BinaryTree, packing: LeafPacking) -> Vec<Cost> {
         };
         // Compare with the cost of a single block
         let is_block = usize::from(references) <= packing.capacity && area <= apart;
-        costs[index] = Cost {
-            tests: if is_block { area } else { apart },
-            references,
-            is_block,
-        };
+        costs[index] = Cost { tests: if is_block { area } else { apart }, references, is_block };
     }
     costs
 }
@@ -228,10 +219,7 @@ struct Areas {
 
 impl Areas {
     fn of(binary: &BinaryTree, padding: f32) -> Self {
-        let root = binary
-            .nodes
-            .first()
-            .map_or(0.0, |root| root.bounds.padded(padding).area());
+        let root = binary.nodes.first().map_or(0.0, |root| root.bounds.padded(padding).area());
         Self { padding, root }
     }
 

@@ -35,11 +35,7 @@ impl TreeView<'_> {
             Coherence::Coherent => self.run(AnyInBeam { rays }),
             Coherence::Incoherent => (0, ALL_LANES),
         };
-        if lanes == 0 {
-            occluded
-        } else {
-            occluded | self.occluded_by_lanes(rays, lanes)
-        }
+        if lanes == 0 { occluded } else { occluded | self.occluded_by_lanes(rays, lanes) }
     }
 
     /// [`TreeView::nearest_lanes`] for coherent rays.
@@ -84,10 +80,7 @@ impl PacketBlock<'_> {
             Some(radii) => radii.0[lane],
             None => self.radius,
         };
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "slots are counted in 32 bits"
-        )]
+        #[expect(clippy::cast_possible_truncation, reason = "slots are counted in 32 bits")]
         PacketSphere {
             center: [centers.x[lane], centers.y[lane], centers.z[lane]],
             radius_squared: radius * radius,
@@ -125,13 +118,8 @@ impl TreeTask for NearestInBeam<'_, '_> {
         };
         // Traverse the tree with the beam; give up after too many blocks
         let limit = hits.farthest();
-        let mut search = NearestOfBeam {
-            tree,
-            beam: &beam,
-            rays,
-            hits,
-            blocks_left: MAX_BEAM_BLOCKS,
-        };
+        let mut search =
+            NearestOfBeam { tree, beam: &beam, rays, hits, blocks_left: MAX_BEAM_BLOCKS };
         walk_with(kernel, tree, &mut search, limit);
         if search.blocks_left == 0 { lanes } else { 0 }
     }
@@ -160,12 +148,7 @@ impl<'a, K: PacketKernel, T: Topology<'a>, L: Leaves> Walker<K> for NearestOfBea
         let radii = LoadedRadii::of(&view.radii, index);
         let (centers, radii) = (centers.borrow(), radii.as_ref());
         let found = kernel.spheres_in_beam(self.beam, centers, radii, limit);
-        let block = PacketBlock {
-            index,
-            centers,
-            radii,
-            radius: view.radius,
-        };
+        let block = PacketBlock { index, centers, radii, radius: view.radius };
         // Test each of these spheres with all rays
         for lane in lanes_in(found) {
             let sphere = block.sphere(lane);
@@ -221,14 +204,8 @@ impl TreeTask for AnyInBeam<'_> {
         };
         // Traverse the tree with the beam; give up after too many blocks
         let limit = hits.farthest();
-        let mut search = AnyOfBeam {
-            tree,
-            beam: &beam,
-            rays,
-            hits,
-            occluded: 0,
-            blocks_left: MAX_BEAM_BLOCKS,
-        };
+        let mut search =
+            AnyOfBeam { tree, beam: &beam, rays, hits, occluded: 0, blocks_left: MAX_BEAM_BLOCKS };
         walk_with(kernel, tree, &mut search, limit);
         let occluded = search.occluded;
         let is_decided = search.blocks_left > 0;
@@ -260,12 +237,7 @@ impl<'a, K: PacketKernel, T: Topology<'a>, L: Leaves> Walker<K> for AnyOfBeam<'_
         let (centers, radii) = (centers.borrow(), radii.as_ref());
         // Find the spheres of the block that the beam touches
         let inside = kernel.spheres_in_beam(self.beam, centers, radii, limit);
-        let block = PacketBlock {
-            index,
-            centers,
-            radii,
-            radius: view.radius,
-        };
+        let block = PacketBlock { index, centers, radii, radius: view.radius };
         // Test each of these spheres with all rays that are not occluded yet
         let mut found = 0;
         for lane in lanes_in(inside) {

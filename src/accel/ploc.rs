@@ -75,10 +75,7 @@ pub(super) fn cluster(
     bvh.parents = Vec::new();
     let tree = scale.binary(&bvh.nodes, padding);
     let convert_bytes = bytes(&bvh.nodes) + bytes(&tree.nodes) + bytes(&tree.references);
-    Clustered {
-        tree,
-        peak_bytes: ploc_bytes.max(reinsert_bytes).max(convert_bytes),
-    }
+    Clustered { tree, peak_bytes: ploc_bytes.max(reinsert_bytes).max(convert_bytes) }
 }
 
 fn bytes<T>(values: &Vec<T>) -> u64 {
@@ -95,11 +92,7 @@ fn merge(ploc: &mut PlocBuilder, bvh: &mut Bvh2, preset: BvhPreset) {
     bvh.reset_for_reuse(ploc.current_nodes.len(), Some(Vec::new()));
     let leaves = ploc.current_nodes.par_iter().map(|node| *node.aabb());
     let total = leaves.reduce(obvhs::aabb::Aabb::empty, |a, b| a.union(&b));
-    let Effort {
-        near_passes,
-        precision,
-        ..
-    } = preset.effort();
+    let Effort { near_passes, precision, .. } = preset.effort();
     // The search radius is a compile-time constant.
     match preset {
         BvhPreset::Fast => {
@@ -145,9 +138,8 @@ fn reinsert(bvh: &mut Bvh2, share: f32) -> u64 {
 fn largest_nodes(nodes: &[Bvh2Node], part: f32) -> Vec<u32> {
     let count = ((nodes.len() as f32 * part) as usize).clamp(1, nodes.len() - 1);
     let looked_at = nodes.len().min(2 * (count + 1));
-    let mut found: Vec<(f32, u32)> = (1..looked_at)
-        .map(|index| (nodes[index].aabb().half_area(), index_u32(index)))
-        .collect();
+    let mut found: Vec<(f32, u32)> =
+        (1..looked_at).map(|index| (nodes[index].aabb().half_area(), index_u32(index))).collect();
     found.par_sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     found.truncate(count);
     found.into_iter().map(|(_, index)| index).collect()
@@ -177,20 +169,13 @@ struct Scale {
 impl Scale {
     /// Scales all boxes into -2..2 by a power of two, which is exact.
     fn of(bounds: impl ParallelIterator<Item = Aabb>) -> Self {
-        let largest = bounds
-            .map(|b| b.min.abs().max(b.max.abs()).max_element())
-            .reduce(|| 0.0, f32::max);
+        let largest =
+            bounds.map(|b| b.min.abs().max(b.max.abs()).max_element()).reduce(|| 0.0, f32::max);
         #[expect(clippy::cast_possible_wrap, reason = "nine bits")]
         let exponent = ((largest.to_bits() >> 23) as i32 - 126).clamp(-126, 127);
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "a power of two in the range of f32"
-        )]
+        #[expect(clippy::cast_possible_truncation, reason = "a power of two in the range of f32")]
         let power = |exponent| 2.0_f64.powi(exponent) as f32;
-        Self {
-            factor: power(-exponent),
-            inverse: power(exponent),
-        }
+        Self { factor: power(-exponent), inverse: power(exponent) }
     }
 
     /// `bounds` in the coordinates of obvhs, shifted so that no two distances are equal.
@@ -201,10 +186,7 @@ impl Scale {
         let far = min.abs().max(max.abs()).max_element();
         let edge = (max - min).max_element();
         let shift = (SHIFT * edge).max(LEAST_SHIFT * far).max(SMALLEST_SHIFT) * unit_vector(place);
-        Aabb {
-            min: min + shift,
-            max: max + shift,
-        }
+        Aabb { min: min + shift, max: max + shift }
     }
 
     /// Converts a tree of obvhs to the order and coordinates of this crate; boxes shrink by `padding`.
@@ -238,15 +220,8 @@ impl Scale {
 
     fn node(self, node: &Bvh2Node, padding: f32) -> BinaryNode {
         let corner = |corner: Vec3A| Vec3::from(corner) * self.inverse;
-        let bounds = Aabb {
-            min: corner(node.aabb().min),
-            max: corner(node.aabb().max),
-        };
-        BinaryNode {
-            bounds: bounds.padded(-padding),
-            first: 0,
-            count: 0,
-        }
+        let bounds = Aabb { min: corner(node.aabb().min), max: corner(node.aabb().max) };
+        BinaryNode { bounds: bounds.padded(-padding), first: 0, count: 0 }
     }
 }
 
@@ -269,17 +244,9 @@ mod tests {
 
     /// Clusters spheres of radius 1 around `centers`.
     fn clustered(centers: &[Vec3], preset: BvhPreset) -> Clustered {
-        let bounds_of = |place: usize| Aabb {
-            min: centers[place] - 1.0,
-            max: centers[place] + 1.0,
-        };
-        cluster(
-            centers.len(),
-            bounds_of,
-            1.0,
-            preset,
-            &mut PhaseClock::new(),
-        )
+        let bounds_of =
+            |place: usize| Aabb { min: centers[place] - 1.0, max: centers[place] + 1.0 };
+        cluster(centers.len(), bounds_of, 1.0, preset, &mut PhaseClock::new())
     }
 
     fn levels(tree: &BinaryTree) -> usize {
@@ -333,13 +300,8 @@ mod tests {
                 max: Vec3::splat(size * side as f32),
             }));
             assert!(scale.factor * scale.inverse == 1.0, "{size}: {scale:?}");
-            let shifted = scale.shifted(
-                Aabb {
-                    min: Vec3::splat(-size),
-                    max: Vec3::splat(size),
-                },
-                7,
-            );
+            let shifted =
+                scale.shifted(Aabb { min: Vec3::splat(-size), max: Vec3::splat(size) }, 7);
             assert!(shifted.min.abs().max(shifted.max.abs()).max_element() < 2.1);
             assert!(shifted.min.is_finite(), "{shifted:?}");
         }

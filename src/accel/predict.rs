@@ -20,11 +20,7 @@ pub struct BuildBytes {
 
 /// Predicted memory of a build over `particles`, with or without a radius per particle (`own_radii`).
 pub fn predicted_bytes(settings: &BuildSettings, particles: u64, own_radii: bool) -> BuildBytes {
-    let size = Size {
-        particles,
-        own_radii,
-        keep_indices: settings.keep_indices,
-    };
+    let size = Size { particles, own_radii, keep_indices: settings.keep_indices };
     match settings.structure {
         Structure::Lbvh => size.lbvh(),
         Structure::Kdtree => size.kdtree(),
@@ -86,11 +82,8 @@ impl Size {
 
     /// As lbvh, but without reordered top levels, and with a search for the upper cuts.
     fn kdtree(&self) -> BuildBytes {
-        let cuts = if self.particles > kd::CELL_LEN as u64 {
-            CUT_BYTES * self.particles
-        } else {
-            0
-        };
+        let cuts =
+            if self.particles > kd::CELL_LEN as u64 { CUT_BYTES * self.particles } else { 0 };
         self.in_place(whole_levels(self.blocks()).0, cuts)
     }
 
@@ -121,10 +114,7 @@ impl Size {
             BvhPreset::High => CLUSTER_BYTES_HIGH,
             BvhPreset::Fast | BvhPreset::Medium => CLUSTER_BYTES,
         };
-        BuildBytes {
-            tree,
-            scratch: (self.particles * each).saturating_sub(tree),
-        }
+        BuildBytes { tree, scratch: (self.particles * each).saturating_sub(tree) }
     }
 
     /// With equal spheres almost no references are split. With a radius per particle the whole budget may be used;
@@ -139,15 +129,8 @@ impl Size {
         let budget = f64::from(budget);
         let references = self.particles as f64 * (1.0 + budget) * REFERENCE_BYTES;
         let binary = self.particles as f64 * SPLIT_TREE_BYTES;
-        let copies = if self.own_radii {
-            tree as f64 * budget
-        } else {
-            0.0
-        };
-        BuildBytes {
-            tree,
-            scratch: (references + binary + copies) as u64,
-        }
+        let copies = if self.own_radii { tree as f64 * budget } else { 0.0 };
+        BuildBytes { tree, scratch: (references + binary + copies) as u64 }
     }
 
     /// Number of full blocks, plus one if particles are left over.
@@ -157,22 +140,14 @@ impl Size {
 
     /// Bytes of blocks with the radii and indices of their particles.
     fn leaves(&self, blocks: u64, indexed: bool) -> u64 {
-        let radii = if self.own_radii {
-            size_of::<BlockRadii>()
-        } else {
-            0
-        };
+        let radii = if self.own_radii { size_of::<BlockRadii>() } else { 0 };
         let indices = if indexed { 4 * BLOCK_SIZE } else { 0 };
         blocks * (size_of::<Block>() + radii + indices) as u64
     }
 
     /// Bytes of indices that exist only during the build, because radii are gathered by index.
     fn temporary_index_bytes(&self) -> u64 {
-        if self.own_radii && !self.keep_indices {
-            self.blocks() * 4 * BLOCK_SIZE as u64
-        } else {
-            0
-        }
+        if self.own_radii && !self.keep_indices { self.blocks() * 4 * BLOCK_SIZE as u64 } else { 0 }
     }
 
     /// Bytes of a tree with links over blocks of `fill` particles; such a tree always has indices.
@@ -241,11 +216,7 @@ mod tests {
         let predicted = predicted_bytes(settings, particles as u64, own_radii);
         let built = report.position_bytes + report.structure_bytes;
         // The fill of few blocks varies.
-        let slack = if particles < 10_000 {
-            1024 + particles as u64 * 12
-        } else {
-            0
-        };
+        let slack = if particles < 10_000 { 1024 + particles as u64 * 12 } else { 0 };
         let (low, high) = (predicted.tree * 85 / 100, predicted.tree * 115 / 100);
         assert!(
             (low.saturating_sub(slack)..=high + slack).contains(&built),
@@ -260,22 +231,13 @@ mod tests {
 
     #[test]
     fn builders_use_the_predicted_memory() {
-        let particles = BvhSettings {
-            leaves: BvhLeaves::Particles,
-            ..BvhSettings::default()
-        };
-        let over_particles = BuildSettings {
-            bvh: particles,
-            ..BuildSettings::new(Structure::Bvh)
-        };
+        let particles = BvhSettings { leaves: BvhLeaves::Particles, ..BvhSettings::default() };
+        let over_particles = BuildSettings { bvh: particles, ..BuildSettings::new(Structure::Bvh) };
         let plain = Structure::ALL.map(BuildSettings::new);
         for settings in plain.into_iter().chain([over_particles]) {
             for particles in [0, 1, 17, 1000, 40_000] {
                 for (own_radii, keep_indices) in [(false, false), (false, true), (true, false)] {
-                    let settings = BuildSettings {
-                        keep_indices,
-                        ..settings
-                    };
+                    let settings = BuildSettings { keep_indices, ..settings };
                     compare(&settings, particles, own_radii);
                 }
             }
@@ -284,10 +246,7 @@ mod tests {
 
     #[test]
     fn trees_of_whole_levels_are_counted_exactly() {
-        let settings = BuildSettings {
-            keep_indices: false,
-            ..BuildSettings::new(Structure::Lbvh)
-        };
+        let settings = BuildSettings { keep_indices: false, ..BuildSettings::new(Structure::Lbvh) };
         for (particles, bytes) in [
             (0, 0),
             (16, 192 + 64),

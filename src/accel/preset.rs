@@ -30,21 +30,15 @@ impl BvhPreset {
 
     pub(super) const fn effort(self) -> Effort {
         match self {
-            Self::Fast => Effort {
-                near_passes: 2,
-                reinsertion: 0.02,
-                precision: SortPrecision::U64,
-            },
-            Self::Medium => Effort {
-                near_passes: 3,
-                reinsertion: 0.05,
-                precision: SortPrecision::U64,
-            },
-            Self::High => Effort {
-                near_passes: 2,
-                reinsertion: 0.2,
-                precision: SortPrecision::U128,
-            },
+            Self::Fast => {
+                Effort { near_passes: 2, reinsertion: 0.02, precision: SortPrecision::U64 }
+            }
+            Self::Medium => {
+                Effort { near_passes: 3, reinsertion: 0.05, precision: SortPrecision::U64 }
+            }
+            Self::High => {
+                Effort { near_passes: 2, reinsertion: 0.2, precision: SortPrecision::U128 }
+            }
         }
     }
 }

@@ -57,18 +57,12 @@ pub(crate) struct PhaseClock {
 
 impl PhaseClock {
     pub(crate) fn new() -> Self {
-        Self {
-            last: Instant::now(),
-            phases: Vec::new(),
-        }
+        Self { last: Instant::now(), phases: Vec::new() }
     }
 
     pub(crate) fn lap(&mut self, name: &'static str) {
         let now = Instant::now();
-        self.phases.push(Phase {
-            name,
-            time: now - self.last,
-        });
+        self.phases.push(Phase { name, time: now - self.last });
         self.last = now;
     }
 

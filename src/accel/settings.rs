@@ -128,10 +128,7 @@ pub struct SbvhSettings {
 
 impl SbvhSettings {
     /// The alpha of the paper, and at most one additional reference per particle.
-    pub const DEFAULT: Self = Self {
-        alpha: 1e-5,
-        budget: 1.0,
-    };
+    pub const DEFAULT: Self = Self { alpha: 1e-5, budget: 1.0 };
     /// Valid values of `alpha`.
     pub const ALPHAS: RangeInclusive<f32> = 0.0..=1.0;
     /// Valid values of `budget`; a larger one would only cost memory.

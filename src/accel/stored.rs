@@ -68,19 +68,14 @@ impl fmt::Display for StoredFault {
             Self::TooMany { count } => {
                 write!(f, "{count} particles, but a tree holds fewer than 2^32")
             }
-            Self::Length {
-                what,
-                found,
-                expected,
-            } => write!(f, "{found} {what}, should be {expected}"),
+            Self::Length { what, found, expected } => {
+                write!(f, "{found} {what}, should be {expected}")
+            }
             Self::ChildMask { node } => {
                 write!(f, "node {node} does not have the blocks below it")
             }
             Self::Plane { node } => {
-                write!(
-                    f,
-                    "node {node}: a plane is not finite or beyond {FARTHEST_PLANE:.1e}"
-                )
+                write!(f, "node {node}: a plane is not finite or beyond {FARTHEST_PLANE:.1e}")
             }
             Self::NoRadius => write!(f, "the particles have no radius: give one"),
         }
@@ -214,8 +209,7 @@ impl StoredTree {
             let read = read_node(node, shape.children_of(index), padding);
             Some(read.unwrap_or_else(|fault| lowest_fault.record(index, fault)))
         };
-        self.nodes
-            .resize(upper.iter().sum(), bytemuck::Zeroable::zeroed());
+        self.nodes.resize(upper.iter().sum(), bytemuck::Zeroable::zeroed());
         let built = build_levels(&mut self.nodes, upper, mapped_level, padding, child);
         // A single stored node is the root itself
         let (bounds, areas) = match upper {
@@ -278,9 +272,7 @@ struct Shape {
 impl Shape {
     /// The shape of `leaves`, after a check of the lengths of all arrays.
     fn of(leaves: &StoredLeaves) -> Result<Self, StoredFault> {
-        let too_many = |_| StoredFault::TooMany {
-            count: leaves.count,
-        };
+        let too_many = |_| StoredFault::TooMany { count: leaves.count };
         let count = u32::try_from(leaves.count).map_err(too_many)?;
         let blocks = count.div_ceil(index_u32(BLOCK_SIZE));
         let nodes = blocks.div_ceil(index_u32(WIDTH));
@@ -295,10 +287,7 @@ impl Shape {
         if let Some(radii) = radii {
             expect_length("blocks of radii", radii, blocks)?;
         }
-        Ok(Self {
-            count: count as usize,
-            blocks: blocks as usize,
-        })
+        Ok(Self { count: count as usize, blocks: blocks as usize })
     }
 
     /// Node count of each level, root level first; the last level is the stored one.
@@ -316,11 +305,7 @@ fn expect_length(what: &'static str, found: usize, expected: u32) -> Result<(), 
     if found == expected as usize {
         return Ok(());
     }
-    Err(StoredFault::Length {
-        what,
-        found,
-        expected: u64::from(expected),
-    })
+    Err(StoredFault::Length { what, found, expected: u64::from(expected) })
 }
 
 /// Faults of a stored node.
@@ -358,11 +343,7 @@ fn read_node(node: &Node, children: usize, padding: f32) -> Result<Child, NodeFa
 #[expect(clippy::cast_possible_truncation, reason = "rounded, then put right")]
 fn rounded_down(value: f64) -> f32 {
     let nearest = value as f32;
-    if f64::from(nearest) > value {
-        nearest.next_down()
-    } else {
-        nearest
-    }
+    if f64::from(nearest) > value { nearest.next_down() } else { nearest }
 }
 
 /// The faulty node with the lowest index, whatever the order of the checks.
@@ -379,10 +360,7 @@ impl LowestFault {
     fn record(&self, index: usize, fault: NodeFault) -> Child {
         let word = (index as u64) << 1 | fault as u64;
         self.0.fetch_min(word, Ordering::Relaxed);
-        Child {
-            bounds: Aabb::around(&[glam::Vec3::ZERO]),
-            inner_area: 0.0,
-        }
+        Child { bounds: Aabb::around(&[glam::Vec3::ZERO]), inner_area: 0.0 }
     }
 
     fn found(&self) -> Option<StoredFault> {

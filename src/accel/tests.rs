@@ -31,11 +31,7 @@ struct Scene {
 
 impl Scene {
     fn common(name: &'static str, centers: Vec<Vec3>, radius: f32) -> Self {
-        Self {
-            name,
-            centers,
-            radii: vec![radius],
-        }
+        Self { name, centers, radii: vec![radius] }
     }
 
     fn spheres(&self) -> Spheres<'_> {
@@ -43,18 +39,11 @@ impl Scene {
             [one] => SphereRadius::Common(one),
             _ => SphereRadius::Each(&self.radii),
         };
-        Spheres {
-            centers: &self.centers,
-            radius,
-        }
+        Spheres { centers: &self.centers, radius }
     }
 
     fn radius(&self, particle: usize) -> f32 {
-        if self.radii.len() == 1 {
-            self.radii[0]
-        } else {
-            self.radii[particle]
-        }
+        if self.radii.len() == 1 { self.radii[0] } else { self.radii[particle] }
     }
 
     fn typical_radius(&self) -> f32 {
@@ -86,10 +75,7 @@ fn random_points(count: usize, seed: u64) -> Vec<Vec3> {
 
 fn awkward_scenes() -> Vec<Scene> {
     let cloud = random_points(3000, 1);
-    let far = cloud
-        .iter()
-        .map(|p| *p + Vec3::new(1e4, -1e4, 1e4))
-        .collect();
+    let far = cloud.iter().map(|p| *p + Vec3::new(1e4, -1e4, 1e4)).collect();
     let flat = cloud.iter().map(|p| p.with_z(0.0)).collect();
     let mut escaped = cloud.clone();
     escaped.push(Vec3::new(1e6, 0.0, 0.0));
@@ -99,9 +85,7 @@ fn awkward_scenes() -> Vec<Scene> {
         .map(|i| Vec3::new((i % 16) as f32, (i / 16 % 16) as f32, (i / 256) as f32))
         .collect();
     let mut random = Random(7);
-    let radii = (0..3000)
-        .map(|_| 10.0_f32.powf(-5.0 + 4.0 * random.next()))
-        .collect();
+    let radii = (0..3000).map(|_| 10.0_f32.powf(-5.0 + 4.0 * random.next())).collect();
     let mut clustered = random_points(2000, 3);
     clustered.extend(random_points(2000, 4).iter().map(|p| *p * 1e-4 + 0.5));
     vec![
@@ -116,17 +100,11 @@ fn awkward_scenes() -> Vec<Scene> {
         Scene::common("overlapping", cloud.clone(), 0.4),
         Scene::common("tiny", cloud.clone(), 1e-4),
         Scene::common("clustered", clustered, 1e-3),
-        Scene {
-            name: "radii of their own",
-            centers: cloud,
-            radii,
-        },
+        Scene { name: "radii of their own", centers: cloud, radii },
         Scene {
             name: "tiny next to huge",
             centers: random_points(40, 9),
-            radii: (0..40)
-                .map(|i| if i % 8 == 0 { 30.0 } else { 1e-3 })
-                .collect(),
+            radii: (0..40).map(|i| if i % 8 == 0 { 30.0 } else { 1e-3 }).collect(),
         },
     ]
 }
@@ -134,11 +112,7 @@ fn awkward_scenes() -> Vec<Scene> {
 /// Rays from outside and from inside the scene, some along the axes, many at particles.
 fn rays(scene: &Scene, count: usize, seed: u64) -> Vec<Ray> {
     let mut random = Random(seed);
-    let targets = if scene.centers.is_empty() {
-        vec![Vec3::ZERO]
-    } else {
-        scene.centers.clone()
-    };
+    let targets = if scene.centers.is_empty() { vec![Vec3::ZERO] } else { scene.centers.clone() };
     let radius = scene.typical_radius();
     (0..count)
         .map(|i| {
@@ -179,10 +153,7 @@ fn every_bvh() -> impl Iterator<Item = BvhSettings> {
 
 /// Default settings, spatial splits wherever they reduce the cost, and no spatial splits.
 fn every_sbvh() -> [SbvhSettings; 3] {
-    let none = SbvhSettings {
-        budget: 0.0,
-        ..SbvhSettings::DEFAULT
-    };
+    let none = SbvhSettings { budget: 0.0, ..SbvhSettings::DEFAULT };
     [SbvhSettings::DEFAULT, EAGER, none]
 }
 
@@ -201,10 +172,7 @@ fn all_settings() -> Vec<BuildSettings> {
 }
 
 /// Spatial splits wherever they reduce the cost.
-const EAGER: SbvhSettings = SbvhSettings {
-    alpha: 0.0,
-    budget: 2.0,
-};
+const EAGER: SbvhSettings = SbvhSettings { alpha: 0.0, budget: 2.0 };
 
 /// Returns the number of rays that were compared; rays whose result may change by rounding are skipped.
 #[track_caller]
@@ -212,10 +180,7 @@ fn check(scene: &Scene, settings: &BuildSettings, ray_count: usize) -> usize {
     let mut judged = 0;
     for keep_indices in [true, false] {
         let mut builder = TreeBuilder::new();
-        let settings = BuildSettings {
-            keep_indices,
-            ..*settings
-        };
+        let settings = BuildSettings { keep_indices, ..*settings };
         let report = builder.build(&scene.spheres(), &settings);
         assert_eq!(report.particles, scene.centers.len() as u64);
         builder.tree().validate(&scene.spheres()).expect(scene.name);
@@ -256,30 +221,20 @@ fn check_ray(scene: &Scene, tree: &TreeView, ray: &Ray, indexed: bool, level: Si
     }
     let hit = tree.nearest(ray);
     let what = format!("{} {level:?} indexed {indexed} {ray:?}", scene.name);
-    assert_eq!(
-        hit.is_some(),
-        nearest.is_some(),
-        "{what}: {hit:?} {nearest:?}"
-    );
+    assert_eq!(hit.is_some(), nearest.is_some(), "{what}: {hit:?} {nearest:?}");
     assert_eq!(tree.any_hit(ray), nearest.is_some(), "{what}");
     let (Some(hit), Some((t, particle))) = (hit, nearest) else {
         return true;
     };
     let (_, radius) = tree.sphere(hit.slot);
-    let scale = t
-        .max(f64::from(radius))
-        .max(f64::from(ray.origin.abs().max_element()) * 0.1);
+    let scale = t.max(f64::from(radius)).max(f64::from(ray.origin.abs().max_element()) * 0.1);
     assert!(
         (f64::from(hit.t) - t).abs() < 1e-3 * scale.min(f64::from(radius)) + 1e-5 * scale,
         "{what}: {} should be {t}",
         hit.t
     );
     if indexed && scene.name == "coincident" {
-        assert_eq!(
-            tree.particle(hit.slot),
-            0,
-            "{what}: equal distances go to the lower index"
-        );
+        assert_eq!(tree.particle(hit.slot), 0, "{what}: equal distances go to the lower index");
     } else if indexed {
         let found = tree.particle(hit.slot) as usize;
         let (other, _) = exact(ray, scene.centers[found], scene.radius(found));
@@ -293,10 +248,7 @@ fn check_ray(scene: &Scene, tree: &TreeView, ray: &Ray, indexed: bool, level: Si
     assert_eq!(crossings.len(), certain_crossings, "{what}");
     assert_eq!(crossings[0].t, hit.t, "{what}");
     assert!(crossings.is_sorted_by(|a, b| a.t <= b.t), "{what}");
-    let beyond = Ray {
-        t_max: hit.t,
-        ..*ray
-    };
+    let beyond = Ray { t_max: hit.t, ..*ray };
     assert!(!tree.any_hit(&beyond), "{what}: t_max is exclusive");
     true
 }
@@ -306,11 +258,7 @@ fn awkward_scenes_match_brute_force() {
     for settings in all_settings() {
         for scene in awkward_scenes() {
             let judged = check(&scene, &settings, 150);
-            assert!(
-                judged >= 60,
-                "{} {settings:?}: only {judged} of 150 rays judged",
-                scene.name
-            );
+            assert!(judged >= 60, "{} {settings:?}: only {judged} of 150 rays judged", scene.name);
         }
     }
 }
@@ -354,11 +302,7 @@ fn fused_kernels_of_all_processors_agree_to_the_bit() {
         let mut crossings = Vec::new();
         for ray in rays(&scene, 2000, 22) {
             builder.tree().view().crossings(&ray, &mut crossings);
-            let nearest = builder
-                .tree()
-                .view()
-                .nearest(&ray)
-                .map_or(0, |hit| hit.t.to_bits());
+            let nearest = builder.tree().view().nearest(&ray).map_or(0, |hit| hit.t.to_bits());
             let all = crossings.iter().map(|c| c.t.to_bits());
             for bits in all.chain([nearest]) {
                 // FNV-1a by words.
@@ -393,16 +337,10 @@ fn trees_do_not_depend_on_threads() {
 #[test]
 fn cuts_do_not_depend_on_threads() {
     let scene = large_among_small(70_000);
-    let settings = BuildSettings {
-        sbvh: EAGER,
-        ..BuildSettings::new(Structure::Sbvh)
-    };
+    let settings = BuildSettings { sbvh: EAGER, ..BuildSettings::new(Structure::Sbvh) };
     let one = tree_by_threads(&scene, &settings, 1);
     for threads in [2, 8] {
-        assert!(
-            one == tree_by_threads(&scene, &settings, threads),
-            "{threads}"
-        );
+        assert!(one == tree_by_threads(&scene, &settings, threads), "{threads}");
     }
 }
 
@@ -412,19 +350,12 @@ fn tree_by_threads(
     settings: &BuildSettings,
     threads: usize,
 ) -> (Vec<Node>, Vec<u32>, u64) {
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .expect("threads");
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
     pool.install(|| {
         let mut builder = TreeBuilder::new();
         let report = builder.build(&scene.spheres(), settings);
         let tree = builder.tree();
-        (
-            tree.nodes.clone(),
-            tree.indices.clone(),
-            report.sah_cost.to_bits(),
-        )
+        (tree.nodes.clone(), tree.indices.clone(), report.sah_cost.to_bits())
     })
 }
 
@@ -449,38 +380,23 @@ fn builder_keeps_no_state_between_frames() {
 /// Large spheres among small ones: the case that spatial splits are for.
 fn large_among_small(count: usize) -> Scene {
     let radii = (0..count).map(|i| if i % 7 == 0 { 0.2 } else { 1e-3 });
-    Scene {
-        name: "large among small",
-        centers: random_points(count, 13),
-        radii: radii.collect(),
-    }
+    Scene { name: "large among small", centers: random_points(count, 13), radii: radii.collect() }
 }
 
 #[test]
 fn clipped_spheres_are_hit_once() {
     let scene = large_among_small(3000);
-    let settings = every_sbvh().map(|sbvh| BuildSettings {
-        sbvh,
-        ..BuildSettings::new(Structure::Sbvh)
-    });
+    let settings =
+        every_sbvh().map(|sbvh| BuildSettings { sbvh, ..BuildSettings::new(Structure::Sbvh) });
     let [usual, eager, none] = settings.map(|settings| {
         let judged = check(&scene, &settings, 300);
-        assert!(
-            judged >= 120,
-            "{settings:?}: only {judged} of 300 rays judged"
-        );
+        assert!(judged >= 120, "{settings:?}: only {judged} of 300 rays judged");
         let report = TreeBuilder::new().build(&scene.spheres(), &settings);
         report.references
     });
     assert_eq!(none, 3000, "nothing may be cut without a budget");
-    assert!(
-        usual > 4000 && usual <= 6000,
-        "{usual} with the usual budget"
-    );
-    assert!(
-        eager > usual && eager <= 9000,
-        "{eager} with twice the budget"
-    );
+    assert!(usual > 4000 && usual <= 6000, "{usual} with the usual budget");
+    assert!(eager > usual && eager <= 9000, "{eager} with twice the budget");
 }
 
 #[test]
@@ -500,13 +416,8 @@ fn a_crowded_cell_is_sorted_by_all_threads() {
 #[test]
 fn large_scenes_match_a_particle_tree() {
     let cloud = random_points(100_000, 21);
-    let crowded = cloud
-        .iter()
-        .enumerate()
-        .map(|(i, p)| if i % 3 == 0 { *p } else { *p * 1e-2 });
-    let planes = cloud
-        .iter()
-        .map(|p| (*p * 8.0).round() / 8.0 + p.with_x(0.0) * 1e-3);
+    let crowded = cloud.iter().enumerate().map(|(i, p)| if i % 3 == 0 { *p } else { *p * 1e-2 });
+    let planes = cloud.iter().map(|p| (*p * 8.0).round() / 8.0 + p.with_x(0.0) * 1e-3);
     let scenes = [
         Scene::common("cloud", cloud.clone(), 5e-3),
         Scene::common("crowded cloud", crowded.collect(), 1e-3),
@@ -529,11 +440,7 @@ fn large_scenes_match_a_particle_tree() {
                 let what = format!("{} {settings:?} {ray:?}", scene.name);
                 let hit = builder.tree().view().nearest(ray);
                 assert_eq!(hit.is_some(), nearest.is_some(), "{what}");
-                assert_eq!(
-                    builder.tree().view().any_hit(ray),
-                    nearest.is_some(),
-                    "{what}"
-                );
+                assert_eq!(builder.tree().view().any_hit(ray), nearest.is_some(), "{what}");
                 if let (Some(hit), Some((t, _))) = (hit, nearest) {
                     assert!((f64::from(hit.t) - t).abs() < 1e-4, "{what}: {} {t}", hit.t);
                 }

@@ -65,13 +65,7 @@ fn widest_axis(items: &[Item]) -> usize {
         }
     }
     let extent = |axis: usize| max[axis] - min[axis];
-    (1..3).fold(0, |best, axis| {
-        if extent(axis) > extent(best) {
-            axis
-        } else {
-            best
-        }
-    })
+    (1..3).fold(0, |best, axis| if extent(axis) > extent(best) { axis } else { best })
 }
 
 #[cfg(test)]
@@ -92,12 +86,7 @@ mod tests {
         let order = kd_order(&boxes);
         let mut sorted = order.clone();
         sorted.sort_unstable();
-        assert!(
-            sorted
-                .iter()
-                .enumerate()
-                .all(|(i, place)| i == *place as usize)
-        );
+        assert!(sorted.iter().enumerate().all(|(i, place)| i == *place as usize));
         for run in order.chunks(8) {
             let x = |place: &u32| boxes[*place as usize].min.x;
             let low = run.iter().map(x).fold(f32::INFINITY, f32::min);

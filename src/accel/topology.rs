@@ -59,11 +59,7 @@ impl<'a> Implicit<'a> {
     /// Index of the first child of node `index` on `level`, among the nodes or blocks of the next level.
     #[inline(always)]
     pub(super) fn first_child(self, level: u32, index: usize) -> usize {
-        if level == self.mapped_level {
-            self.mapped[index] as usize * WIDTH
-        } else {
-            index * WIDTH
-        }
+        if level == self.mapped_level { self.mapped[index] as usize * WIDTH } else { index * WIDTH }
     }
 }
 
@@ -203,17 +199,7 @@ mod tests {
         let places = |code: u32| {
             [0, 1, 2].map(|slot| Linked::decode(linked.child(linked.children(code), slot)))
         };
-        assert_eq!(
-            places(0),
-            [
-                NodeRef::Node(MAX_INDEX - 1),
-                NodeRef::Block(7),
-                NodeRef::Block(8)
-            ]
-        );
-        assert_eq!(
-            places(1),
-            [NodeRef::Block(3), NodeRef::Block(4), NodeRef::Block(5)]
-        );
+        assert_eq!(places(0), [NodeRef::Node(MAX_INDEX - 1), NodeRef::Block(7), NodeRef::Block(8)]);
+        assert_eq!(places(1), [NodeRef::Block(3), NodeRef::Block(4), NodeRef::Block(5)]);
     }
 }

@@ -171,10 +171,7 @@ impl<'a, K: PacketKernel, T: Topology<'a>, L: Leaves> Walker<K>
 /// The slot among the `lanes` of `block` that wins a tie in distance.
 #[inline(always)]
 fn first_of_tied(tree: &TreeView, block: usize, lanes: u32) -> u32 {
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "slots are counted in 32 bits"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "slots are counted in 32 bits")]
     let first = (block * BLOCK_SIZE) as u32;
     let mut slot = first + lanes.trailing_zeros();
     let mut others = lanes & (lanes - 1);
@@ -202,11 +199,8 @@ impl TreeTask for AnyHit<'_> {
         tree: Resolved<'a, T, L>,
     ) -> bool {
         let (ray, view) = (self.ray, tree.view);
-        let mut search = AnyOfRay {
-            tree,
-            ray: &kernel.prepare(ray, view.radius, view.padding),
-            found: false,
-        };
+        let mut search =
+            AnyOfRay { tree, ray: &kernel.prepare(ray, view.radius, view.padding), found: false };
         walk_with(kernel, tree, &mut search, ray.t_max.next_down());
         search.found
     }
@@ -275,11 +269,7 @@ impl<F: FnMut(TreeCrossing) -> bool> TreeTask for Crossings<'_, F> {
                 chord.ends.into_iter().all(|t| {
                     let is_within = t >= ray.t_min && t < ray.t_max;
                     !is_within
-                        || visit(TreeCrossing {
-                            t,
-                            slot: chord.slot,
-                            half_chord: chord.half(),
-                        })
+                        || visit(TreeCrossing { t, slot: chord.slot, half_chord: chord.half() })
                 })
             },
         };
@@ -322,10 +312,7 @@ where
             if slot >= view.slot_count() {
                 break;
             }
-            #[expect(
-                clippy::cast_possible_truncation,
-                reason = "slots are counted in 32 bits"
-            )]
+            #[expect(clippy::cast_possible_truncation, reason = "slots are counted in 32 bits")]
             let slot = slot as u32;
             let ends = [found.near[lane], found.far[lane]];
             if !(self.visit)(TreeChord { slot, ends }) {

@@ -125,12 +125,7 @@ impl TreeFault {
         slot: usize,
         fault: ChildFault,
     ) -> Self {
-        Self::LevelChild {
-            level,
-            node,
-            slot,
-            fault,
-        }
+        Self::LevelChild { level, node, slot, fault }
     }
 
     pub(super) const fn in_node(node: usize, slot: u32, fault: ChildFault) -> Self {

@@ -46,9 +46,7 @@ impl WideTree {
         let view = self.view();
         let topology = view.implicit();
         let levels = self.level_starts.len();
-        let mut below: Vec<Aabb> = (0..self.blocks.len())
-            .map(|b| self.block_bounds(b))
-            .collect();
+        let mut below: Vec<Aabb> = (0..self.blocks.len()).map(|b| self.block_bounds(b)).collect();
         for level in (0..levels).rev() {
             below = self.validate_level(level, topology, &below)?;
         }
@@ -66,10 +64,7 @@ impl WideTree {
         below: &[Aabb],
     ) -> Result<Vec<Aabb>, TreeFault> {
         let start = self.level_starts[level] as usize;
-        let end = self
-            .level_starts
-            .get(level + 1)
-            .map_or(self.nodes.len(), |s| *s as usize);
+        let end = self.level_starts.get(level + 1).map_or(self.nodes.len(), |s| *s as usize);
         let mut own = Vec::with_capacity(end - start);
         let mut reached = vec![false; below.len()];
         // Check that each child exists, has one parent, and is inside it
@@ -101,10 +96,7 @@ impl WideTree {
     /// Checks a tree with links from the root down.
     fn validate_links(&self) -> Result<(), TreeFault> {
         if self.links.len() != self.nodes.len() {
-            return Err(TreeFault::LinkCount {
-                links: self.links.len(),
-                nodes: self.nodes.len(),
-            });
+            return Err(TreeFault::LinkCount { links: self.links.len(), nodes: self.nodes.len() });
         }
         let mut reached = Reached {
             nodes: vec![false; self.nodes.len()],
@@ -140,9 +132,7 @@ impl WideTree {
             // Check that the child exists and has one parent
             let child = topology.child(topology.children(code), slot);
             let node_ref = Linked::decode(child);
-            reached
-                .mark(node_ref)
-                .map_err(|fault| TreeFault::in_node(index, slot, fault))?;
+            reached.mark(node_ref).map_err(|fault| TreeFault::in_node(index, slot, fault))?;
             // Check the subtree of the child
             let bounds = match node_ref {
                 NodeRef::Block(block) => self.block_bounds(block),
@@ -161,11 +151,7 @@ impl WideTree {
     /// radius.
     fn validate_particles(&self, spheres: &Spheres) -> Result<(), TreeFault> {
         if self.indices.is_empty() {
-            return if self.has_copies {
-                Err(TreeFault::UnidentifiedCopies)
-            } else {
-                Ok(())
-            };
+            return if self.has_copies { Err(TreeFault::UnidentifiedCopies) } else { Ok(()) };
         }
         let mut is_stored = vec![false; self.count];
         for slot in 0..self.view().slot_count() {

@@ -77,10 +77,7 @@ impl<'a> TreeView<'a> {
 
     /// The topology of links; only for trees with links.
     pub(super) fn linked(&self) -> Linked<'a> {
-        Linked {
-            nodes: self.levels[0],
-            links: self.links,
-        }
+        Linked { nodes: self.levels[0], links: self.links }
     }
 
     /// Bounding box of the spheres; empty without particles.
@@ -113,10 +110,7 @@ impl<'a> TreeView<'a> {
 
     /// `slot`, or the last slot with a particle. In a damaged file, the padding of the last block need not repeat the
     /// last particle, so rays may hit it.
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "slots are counted in 32 bits"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "slots are counted in 32 bits")]
     fn clamped_slot(&self, slot: u32) -> u32 {
         slot.min(self.count.saturating_sub(1) as u32)
     }
@@ -176,11 +170,7 @@ impl<'a> TreeView<'a> {
 
     /// Number of slots in use: all, or those before the padding of the last block.
     pub(super) fn slot_count(&self) -> usize {
-        if self.has_copies {
-            self.indices.len()
-        } else {
-            self.count
-        }
+        if self.has_copies { self.indices.len() } else { self.count }
     }
 
     /// Nodes above the blocks, in a tree of complete levels.
@@ -200,10 +190,7 @@ impl<'a> TreeView<'a> {
         }
         let center = |slot| self.sphere(slot).0;
         let (p, q) = (center(a), center(b));
-        p.x.total_cmp(&q.x)
-            .then(p.y.total_cmp(&q.y))
-            .then(p.z.total_cmp(&q.z))
-            .then(a.cmp(&b))
+        p.x.total_cmp(&q.x).then(p.y.total_cmp(&q.y)).then(p.z.total_cmp(&q.z)).then(a.cmp(&b))
     }
 
     /// Runs `task` in code compiled for the topology, the leaves and the instruction set.
@@ -232,11 +219,7 @@ impl<'a> TreeView<'a> {
         leaves: L,
         task: W,
     ) -> W::Output {
-        let tree = Resolved {
-            view: self,
-            topology,
-            leaves,
-        };
+        let tree = Resolved { view: self, topology, leaves };
         self.simd.run(InTree { tree, task })
     }
 }

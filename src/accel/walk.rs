@@ -123,10 +123,7 @@ pub(super) fn walk_from<'a, K: Kernel, T: Topology<'a>, L: Leaves>(
             NodeRef::Node(node) => {
                 // Test all children of the node
                 let (found, keys) = walker.test(kernel, node, limit);
-                let below = Below {
-                    tree,
-                    children: topology.children(code),
-                };
+                let below = Below { tree, children: topology.children(code) };
                 // One child: continue with it
                 if found == 1 {
                     code = below.code(kernel.first_two(keys)[0]);

@@ -78,11 +78,7 @@ impl WideTree {
             padding: self.padding,
             has_copies: self.has_copies,
             indices: &self.indices,
-            ties: if self.indices.is_empty() {
-                TieOrder::Center
-            } else {
-                TieOrder::Index
-            },
+            ties: if self.indices.is_empty() { TieOrder::Center } else { TieOrder::Index },
             count: self.count,
             bounds: self.bounds,
             simd: self.simd,
@@ -144,22 +140,18 @@ impl WideTree {
 
     /// The memory of the blocks as plain points, and the indices, for builders that sort in place.
     pub(super) fn points_mut(&mut self) -> (&mut [Vec3], &mut [u32]) {
-        (
-            bytemuck::cast_slice_mut(&mut self.blocks),
-            &mut self.indices,
-        )
+        (bytemuck::cast_slice_mut(&mut self.blocks), &mut self.indices)
     }
 
     /// Copies the radii of the frame in tree order, by the indices.
     pub(super) fn gather_radii(&mut self, radii: &[f32]) {
-        self.radii
-            .par_iter_mut()
-            .zip(self.indices.par_chunks(BLOCK_SIZE))
-            .for_each(|(block, indices)| {
+        self.radii.par_iter_mut().zip(self.indices.par_chunks(BLOCK_SIZE)).for_each(
+            |(block, indices)| {
                 for (radius, index) in block.0.iter_mut().zip(indices) {
                     *radius = radii[*index as usize];
                 }
-            });
+            },
+        );
     }
 
     pub(super) fn drop_indices(&mut self) {
@@ -182,15 +174,11 @@ impl WideTree {
 
     /// Converts sorted points to blocks and builds all levels over them. Returns the SAH cost.
     pub(super) fn finish(&mut self, upper: TopLevels) -> f64 {
-        self.blocks
-            .par_iter_mut()
-            .with_min_len(256)
-            .for_each(Block::transpose_points);
+        self.blocks.par_iter_mut().with_min_len(256).for_each(Block::transpose_points);
         // Size the levels
         let counts = level_counts(self.blocks.len());
         self.level_starts = level_starts(&counts);
-        self.nodes
-            .resize(counts.iter().sum(), bytemuck::Zeroable::zeroed());
+        self.nodes.resize(counts.iter().sum(), bytemuck::Zeroable::zeroed());
         let mapped_level = upper.mapped_level(counts.len());
         self.mapped_level = mapped_level.map_or(u32::MAX, index_u32);
         // Build the levels over the boxes of the blocks

@@ -48,9 +48,7 @@ impl Named for AttributeView<'_> {
 /// The attribute with velocities, if there is one.
 pub fn velocity_of<A: Named>(attributes: &[A]) -> Option<&A> {
     names::VELOCITY.iter().find_map(|name| {
-        attributes
-            .iter()
-            .find(|a| a.components() == 3 && a.name().eq_ignore_ascii_case(name))
+        attributes.iter().find(|a| a.components() == 3 && a.name().eq_ignore_ascii_case(name))
     })
 }
 
@@ -58,11 +56,7 @@ pub fn velocity_of<A: Named>(attributes: &[A]) -> Option<&A> {
 pub fn id_of<A: Named>(attributes: &[A]) -> Option<&A> {
     names::ID.iter().find_map(|name| {
         let exact = attributes.iter().find(|a| a.name() == *name);
-        let alike = || {
-            attributes
-                .iter()
-                .find(|a| a.name().eq_ignore_ascii_case(name))
-        };
+        let alike = || attributes.iter().find(|a| a.name().eq_ignore_ascii_case(name));
         exact.or_else(alike).filter(|a| a.components() == 1)
     })
 }
@@ -74,9 +68,5 @@ pub const PART_NAMES: [&str; 3] = ["part", "type", "phase"];
 pub fn part_of<A: Named>(attributes: &[A]) -> Option<&A> {
     let is_part = |a: &&A, name: &str| a.components() == 1 && a.name().eq_ignore_ascii_case(name);
     let mut names = PART_NAMES.iter();
-    names.find_map(|name| {
-        attributes
-            .iter()
-            .find(|a| is_part(a, name) && a.is_integer())
-    })
+    names.find_map(|name| attributes.iter().find(|a| is_part(a, name) && a.is_integer()))
 }

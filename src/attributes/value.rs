@@ -34,16 +34,8 @@ pub const SPEED: &str = "speed";
 const VELOCITY_COMPONENTS: [&str; 3] = ["vx", "vy", "vz"];
 
 /// Names of components.
-const COMPONENTS: [(&str, usize); 8] = [
-    ("x", 0),
-    ("y", 1),
-    ("z", 2),
-    ("w", 3),
-    ("r", 0),
-    ("g", 1),
-    ("b", 2),
-    ("a", 3),
-];
+const COMPONENTS: [(&str, usize); 8] =
+    [("x", 0), ("y", 1), ("z", 2), ("w", 3), ("r", 0), ("g", 1), ("b", 2), ("a", 3)];
 
 impl ParticleValue {
     /// The value `name` of particles with `attributes`. Names are compared without regard to case; `v.x` and `v[0]` are
@@ -53,11 +45,7 @@ impl ParticleValue {
         if name.eq_ignore_ascii_case(names::RADIUS) {
             return Some(Self::Radius);
         }
-        let find = |name: &str| {
-            attributes
-                .iter()
-                .find(|a| a.name().eq_ignore_ascii_case(name))
-        };
+        let find = |name: &str| attributes.iter().find(|a| a.name().eq_ignore_ascii_case(name));
         if let Some(attribute) = find(name) {
             return Some(Self::Magnitude(attribute.name().to_owned()));
         }
@@ -118,10 +106,7 @@ impl ParticleValue {
 
     /// Whether it is computed from positions or radii.
     pub const fn needs_geometry(&self) -> bool {
-        matches!(
-            self,
-            Self::Position(_) | Self::Height | Self::Depth | Self::Radius
-        )
+        matches!(self, Self::Position(_) | Self::Height | Self::Depth | Self::Radius)
     }
 }
 
@@ -138,10 +123,7 @@ enum Part {
 
 /// Splits `v.x`, `v[0]` or `v.magnitude`.
 fn split(name: &str) -> Option<(&str, Part)> {
-    if let Some((base, index)) = name
-        .strip_suffix(']')
-        .and_then(|rest| rest.rsplit_once('['))
-    {
+    if let Some((base, index)) = name.strip_suffix(']').and_then(|rest| rest.rsplit_once('[')) {
         return Some((base, Part::Component(index.parse().ok()?)));
     }
     let (base, part) = name.rsplit_once('.')?;
@@ -166,21 +148,11 @@ mod tests {
             components,
             data: AttributeData::F32(Vec::new()),
         };
-        let all = [
-            attribute("Velocity", 3),
-            attribute("index", 1),
-            attribute("a.x", 1),
-        ];
+        let all = [attribute("Velocity", 3), attribute("index", 1), attribute("a.x", 1)];
         let component = |c| ParticleValue::Component("Velocity".to_owned(), c);
         for (name, expected) in [
-            (
-                "velocity",
-                Some(ParticleValue::Magnitude("Velocity".to_owned())),
-            ),
-            (
-                "velocity.magnitude",
-                Some(ParticleValue::Magnitude("Velocity".to_owned())),
-            ),
+            ("velocity", Some(ParticleValue::Magnitude("Velocity".to_owned()))),
+            ("velocity.magnitude", Some(ParticleValue::Magnitude("Velocity".to_owned()))),
             ("VELOCITY.Y", Some(component(1))),
             ("velocity[2]", Some(component(2))),
             ("velocity.w", None),
@@ -193,10 +165,7 @@ mod tests {
             // Attributes have precedence
             ("index", Some(ParticleValue::Magnitude("index".to_owned()))),
             ("A.X", Some(ParticleValue::Magnitude("a.x".to_owned()))),
-            (
-                "speed",
-                Some(ParticleValue::Magnitude("Velocity".to_owned())),
-            ),
+            ("speed", Some(ParticleValue::Magnitude("Velocity".to_owned()))),
             ("vy", Some(component(1))),
             ("Z", Some(ParticleValue::Position(2))),
             ("w", None),

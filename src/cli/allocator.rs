@@ -5,10 +5,7 @@
 //! frames need, and nobody can foresee it.
 #![cfg_attr(
     all(target_os = "linux", target_env = "gnu"),
-    expect(
-        unsafe_code,
-        reason = "a setting of the C library; it says why it is sound"
-    )
+    expect(unsafe_code, reason = "a setting of the C library; it says why it is sound")
 )]
 
 /// Pieces from this size on have pages of their own, which go back to the system when they are freed.

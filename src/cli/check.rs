@@ -62,11 +62,7 @@ pub(super) fn run(args: &CheckArgs) -> Result<Outcome, CliError> {
     for problem in &check.problems {
         message!("error: {problem}");
     }
-    Ok(if check.problems.is_empty() {
-        Outcome::Done
-    } else {
-        Outcome::Refused
-    })
+    Ok(if check.problems.is_empty() { Outcome::Done } else { Outcome::Refused })
 }
 
 /// The results of a check.
@@ -105,9 +101,7 @@ impl<'a> Check<'a> {
 
     /// Returns the value, or adds the error to the problems.
     fn or_problem<T, E: Into<CliError>>(&mut self, result: Result<T, E>) -> Option<T> {
-        result
-            .map_err(|error| self.problems.extend(error.into().messages()))
-            .ok()
+        result.map_err(|error| self.problems.extend(error.into().messages())).ok()
     }
 
     fn run(&mut self, args: &RunArgs) {
@@ -154,10 +148,7 @@ impl<'a> Check<'a> {
 
     /// Checks the output directory. Returns whether it is, or could be, a directory.
     fn check_output_dir(&mut self, mode: ResumeMode) -> bool {
-        if self
-            .or_problem(self.render_job.check_output_dir(mode))
-            .is_none()
-        {
+        if self.or_problem(self.render_job.check_output_dir(mode)).is_none() {
             return false;
         }
         self.or_problem(self.render_job.check_manifest_file());
@@ -190,10 +181,7 @@ impl<'a> Check<'a> {
         let Some((_, setup)) = &self.setup else {
             return;
         };
-        let Some(heaviest) = self
-            .renderable()
-            .max_by_key(|task| self.size(setup, task).raw)
-        else {
+        let Some(heaviest) = self.renderable().max_by_key(|task| self.size(setup, task).raw) else {
             return;
         };
         let others = self.spread_tasks(heaviest);
@@ -245,10 +233,7 @@ impl<'a> Check<'a> {
         let (_, setup) = self.setup.as_ref()?;
         let threads = rayon::current_num_threads();
         let overlap = self.schedule.as_ref()?.overlap;
-        let sizes: Vec<FrameSize> = self
-            .renderable()
-            .map(|task| self.size(setup, task))
-            .collect();
+        let sizes: Vec<FrameSize> = self.renderable().map(|task| self.size(setup, task)).collect();
         let probed = self.renderable().find(|task| task.frame == probe.frame)?;
         let frames = probe.seconds_for(&sizes, &self.size(setup, probed), overlap, threads);
         Some(self.survey_time.as_secs_f64() + frames)
@@ -260,8 +245,7 @@ impl<'a> Check<'a> {
             return Vec::new();
         };
         let all = dry_run.selected.iter().copied();
-        all.filter(|frame| dry_run.state.frame_state(*frame) == Some(state))
-            .collect()
+        all.filter(|frame| dry_run.state.frame_state(*frame) == Some(state)).collect()
     }
 
     fn too_large(&self) -> Vec<i64> {

@@ -42,12 +42,7 @@ pub(super) struct ConvertArgs {
     #[arg(required = true)]
     input: Vec<PathBuf>,
     /// Frames to convert: 7 | 1-10 | 1-10x2 | 1-5,8 [default: all]
-    #[arg(
-        long,
-        value_name = "RANGE",
-        allow_hyphen_values = true,
-        help_heading = "Input"
-    )]
+    #[arg(long, value_name = "RANGE", allow_hyphen_values = true, help_heading = "Input")]
     frames: Option<FrameRange>,
     /// Read files outside the directory of a list of files, such as a .pvd, that names them.
     #[arg(long, help_heading = "Input")]

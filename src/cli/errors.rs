@@ -67,10 +67,9 @@ fn run_message(error: &RunError) -> String {
         {
             frame_message(error)
         }
-        RunError::Mesh {
-            index,
-            source: MeshLoadError::File(error),
-        } => format!("mesh.{index}.path: {}", frame_message(error)),
+        RunError::Mesh { index, source: MeshLoadError::File(error) } => {
+            format!("mesh.{index}.path: {}", frame_message(error))
+        }
         _ => WithRemedy(error, run_remedy(error)).to_string(),
     }
 }
@@ -178,10 +177,9 @@ fn export_remedy(error: &ExportError) -> Option<&'static str> {
 fn io_message(path: &Path, error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::NotFound => SequenceError::missing(path).to_string(),
-        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => format!(
-            "{}: no space left; free some and run the same command again",
-            path.display()
-        ),
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+            format!("{}: no space left; free some and run the same command again", path.display())
+        }
         _ => format!("{}: {error}", path.display()),
     }
 }
@@ -224,9 +222,7 @@ mod tests {
                 "out/f.exr: no space left; free some, then the same command continues",
             ),
             (
-                CliError::from(JobError::Resolve(Box::new(RunError::from(
-                    ResolveError::NoRadius,
-                )))),
+                CliError::from(JobError::Resolve(Box::new(RunError::from(ResolveError::NoRadius)))),
                 "give a length with --radius",
             ),
             (

@@ -26,10 +26,7 @@ fn stream() -> MutexGuard<'static, Option<Stream>> {
 
 /// Starts the stream of events.
 pub(super) fn start() {
-    *stream() = Some(Stream {
-        summary: Map::new(),
-        is_closed: false,
-    });
+    *stream() = Some(Stream { summary: Map::new(), is_closed: false });
 }
 
 /// Sends one event.

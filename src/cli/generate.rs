@@ -18,10 +18,8 @@ use super::numbers::{DEFAULT_BOUND, not_negative, positive};
 use super::{CliError, Outcome, signals};
 use crate::metrics::Bytes;
 
-const SIGNAL_MESSAGES: signals::SignalMessages = signals::SignalMessages {
-    stopping: "stopping",
-    stopped: "stopped",
-};
+const SIGNAL_MESSAGES: signals::SignalMessages =
+    signals::SignalMessages { stopping: "stopping", stopped: "stopped" };
 
 const EXAMPLES: &str = "\
 Examples:
@@ -101,9 +99,7 @@ pub(super) fn run(args: &GenerateArgs) -> Result<Outcome, CliError> {
     };
     let format = Format::of(&common.output)?;
     if common.max_error.is_some() && matches!(args.what, What::Box(_)) && radius.is_none() {
-        return Err(CliError::other(
-            "--max-error is a fraction of the radius and needs --radius",
-        ));
+        return Err(CliError::other("--max-error is a fraction of the radius and needs --radius"));
     }
     let settings = BoxSettings::thesis(common.particles, common.seed);
     let source: Box<dyn ParticleSource> = match &args.what {
@@ -121,12 +117,7 @@ pub(super) fn run(args: &GenerateArgs) -> Result<Outcome, CliError> {
         Err(ConvertError::Interrupted) => return Ok(Outcome::Interrupted),
         result => result.map_err(|e| CliError::Other(e.to_string()))?,
     }
-    let CommonArgs {
-        particles,
-        seed,
-        output,
-        ..
-    } = common;
+    let CommonArgs { particles, seed, output, .. } = common;
     message!("{}: {particles} particles, seed {seed}", output.display());
     Ok(Outcome::Done)
 }
@@ -136,11 +127,7 @@ struct Until<'a>(&'a Interrupt);
 
 impl Progress for Until<'_> {
     fn advanced(&self, _phase: Phase, _done: u64, _total: u64) -> ControlFlow<()> {
-        if self.0.is_raised() {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
+        if self.0.is_raised() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 }
 

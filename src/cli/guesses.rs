@@ -14,21 +14,12 @@ pub(super) const GUESSES: &[(&str, &str)] = &[
         "--samples N",
     ),
     ("fast lowquality lq quick hq", "--draft|--samples N"),
-    (
-        "part region tile subregion roi renderregion",
-        "--crop X0,Y0,X1,Y1",
-    ),
+    ("part region tile subregion roi renderregion", "--crop X0,Y0,X1,Y1"),
     ("margin padding border", "--set image.overscan=PIXELS"),
     ("ppi pixelsperinch", "--dpi DPI"),
     // Camera
-    (
-        "orthographic parallel parallelprojection ortho2d isometric",
-        "--ortho",
-    ),
-    (
-        "perspective panorama 360 fisheye",
-        "--projection PROJECTION",
-    ),
+    ("orthographic parallel parallelprojection ortho2d isometric", "--ortho"),
+    ("perspective panorama 360 fisheye", "--projection PROJECTION"),
     (
         "camera cam camerapos cameraposition viewpos pos position eyepos eyeposition from viewpoint",
         "--eye X,Y,Z|--view SIDE",
@@ -38,28 +29,13 @@ pub(super) const GUESSES: &[(&str, &str)] = &[
         "--look-at X,Y,Z",
     ),
     ("upaxis viewup vup updirection cameraup", "--up AXIS"),
-    (
-        "rotate rotation angle yaw phi orbit heading azim rotatez",
-        "--azimuth DEGREES|--view SIDE",
-    ),
-    (
-        "pitch theta tilt elev altitude inclination rotatex",
-        "--elevation DEGREES|--view SIDE",
-    ),
-    (
-        "side viewdir viewdirection viewtype direction front topview",
-        "--view SIDE",
-    ),
-    (
-        "viewangle fieldofview angleofview lens focallength",
-        "--fov DEGREES",
-    ),
+    ("rotate rotation angle yaw phi orbit heading azim rotatez", "--azimuth DEGREES|--view SIDE"),
+    ("pitch theta tilt elev altitude inclination rotatex", "--elevation DEGREES|--view SIDE"),
+    ("side viewdir viewdirection viewtype direction front topview", "--view SIDE"),
+    ("viewangle fieldofview angleofview lens focallength", "--fov DEGREES"),
     ("zoomfactor magnification", "--zoom FACTOR"),
     ("spin revolve", "--turntable PICTURES"),
-    (
-        "dof depthoffield fnumber bokeh",
-        "--set camera.f_stop=NUMBER",
-    ),
+    ("dof depthoffield fnumber bokeh", "--set camera.f_stop=NUMBER"),
     ("motionblur blur shutterangle", "--set camera.shutter=0.5"),
     ("keyframes camerapath campath", "--camera-path FILE"),
     ("anaglyph sidebyside vr", "--set camera.stereo=true"),
@@ -69,10 +45,7 @@ pub(super) const GUESSES: &[(&str, &str)] = &[
          coloring colorcoding colourcoding colorcode by colormode colorproperty colormethod hue",
         "--color-by ATTRIBUTE",
     ),
-    (
-        "lut palette colors colours gradient transferfunction colortable mapname",
-        "--map NAME",
-    ),
+    ("lut palette colors colours gradient transferfunction colortable mapname", "--map NAME"),
     (
         "clim crange colorrange colourrange datarange scalarrange limits valuerange rangeminmax",
         "--range LOW HIGH",
@@ -81,40 +54,19 @@ pub(super) const GUESSES: &[(&str, &str)] = &[
         "min max cmin cmax rangemin rangemax startvalue endvalue low high lower upper",
         "--vmin LOW --vmax HIGH",
     ),
-    (
-        "log logscale lognorm norm uselog logarithmic linear symlog",
-        "--color-scale SCALE",
-    ),
-    (
-        "discrete categories categorical bytype",
-        "--color-scale categorical",
-    ),
-    (
-        "percentile percentiles robust autorange",
-        "--set material.color.range=1%-99%",
-    ),
-    (
-        "symmetric symmetricrange vcenter midpoint",
-        "--set material.color.range=symmetric",
-    ),
-    (
-        "invert reverse reversed flip reversecolormap",
-        "--map NAME_r",
-    ),
-    (
-        "levels bins ncolors colorsteps bands",
-        "--set material.color.steps=N",
-    ),
+    ("log logscale lognorm norm uselog logarithmic linear symlog", "--color-scale SCALE"),
+    ("discrete categories categorical bytype", "--color-scale categorical"),
+    ("percentile percentiles robust autorange", "--set material.color.range=1%-99%"),
+    ("symmetric symmetricrange vcenter midpoint", "--set material.color.range=symmetric"),
+    ("invert reverse reversed flip reversecolormap", "--map NAME_r"),
+    ("levels bins ncolors colorsteps bands", "--set material.color.steps=N"),
     ("colorbyelement cpkcolors", "--color-by elements"),
     (
         "particlecolor spherecolor uniformcolor solidcolor fillcolor facecolor colour",
         "--color COLOR",
     ),
     // Overlays
-    (
-        "colorlegend showlegend scalarbar colormaplegend",
-        "--colorbar",
-    ),
+    ("colorlegend showlegend scalarbar colormaplegend", "--colorbar"),
     (
         "label clabel cbarlabel cbartitle colorbarlabel colorbartitle legendtitle legendlabel barlabel maptitle",
         "--title TEXT",
@@ -124,19 +76,13 @@ pub(super) const GUESSES: &[(&str, &str)] = &[
         "caption annotation annotate subtitle suptitle textlabel watermark header name",
         "--text TEXT",
     ),
-    (
-        "time timelabel showtime clock timeannotation annotatetime",
-        "--time-stamp|--frame NUMBER",
-    ),
+    ("time timelabel showtime clock timeannotation annotatetime", "--time-stamp|--frame NUMBER"),
     ("ruler scale lengthbar sizebar", "--scale-bar"),
     (
         "axis triad tripod orientationaxes coordinateaxes coordsystem coordinatetripod gizmo showaxes",
         "--axes",
     ),
-    (
-        "logo image overlayimage",
-        "--set 'overlay=[{type=\"image\",path=\"FILE\"}]'",
-    ),
+    ("logo image overlayimage", "--set 'overlay=[{type=\"image\",path=\"FILE\"}]'"),
     (
         "fontsize textsize labelsize legendsize colorbarsize",
         "--set 'overlay=[{type=\"colorbar\",size=0.05}]'",
@@ -158,82 +104,40 @@ pub(super) const GUESSES: &[(&str, &str)] = &[
         "trail tail tails pathlines pathline trajectories trajectorylines traces streaklines history",
         "--trails COUNT",
     ),
-    (
-        "alpha transparency translucency translucent opaque",
-        "--opacity NUMBER|--transparent",
-    ),
+    ("alpha transparency translucency translucent opaque", "--opacity NUMBER|--transparent"),
     (
         "slab section crosssection sliceplane cutslice slicez",
         "--slice AXIS=VALUE:THICKNESS|--clip 'AXIS<VALUE'",
     ),
-    (
-        "cut cutplane cutaway clipping clipplane halfspace plane",
-        "--clip 'AXIS<VALUE'",
-    ),
+    ("cut cutplane cutaway clipping clipplane halfspace plane", "--clip 'AXIS<VALUE'"),
     (
         "select selection condition expression expr filterby only show query sel if particlefilter",
         "--where 'CONDITION'",
     ),
-    (
-        "type types species atomtype kind",
-        "--where 'type == 1'|--color-by type",
-    ),
-    (
-        "hide remove exclude delete skipparts",
-        "--where 'CONDITION'|--parts LIST",
-    ),
-    (
-        "id particleid index indices",
-        "--set select.ids=1-100|--where 'id == 1'",
-    ),
-    (
-        "subsample decimate nth sparse thin downsample maskpoints",
-        "--set select.every=N",
-    ),
-    (
-        "group layer body bodies phase block component",
-        "--parts LIST",
-    ),
+    ("type types species atomtype kind", "--where 'type == 1'|--color-by type"),
+    ("hide remove exclude delete skipparts", "--where 'CONDITION'|--parts LIST"),
+    ("id particleid index indices", "--set select.ids=1-100|--where 'id == 1'"),
+    ("subsample decimate nth sparse thin downsample maskpoints", "--set select.every=N"),
+    ("group layer body bodies phase block component", "--parts LIST"),
     (
         "box bbox boundingbox unitcell simcell simulationcell showcell showbox celledges outline wireframe",
         "--cell",
     ),
-    (
-        "cellwidth linewidth lw edgewidth",
-        "--set cell.radius=LENGTH",
-    ),
-    (
-        "pbc periodic wraparound periodicimages",
-        "--wrap|--replicate A,B,C",
-    ),
-    (
-        "repeat supercell copies images multiply",
-        "--replicate A,B,C",
-    ),
+    ("cellwidth linewidth lw edgewidth", "--set cell.radius=LENGTH"),
+    ("pbc periodic wraparound periodicimages", "--wrap|--replicate A,B,C"),
+    ("repeat supercell copies images multiply", "--replicate A,B,C"),
     ("bond sticks stick showbonds createbonds", "--bonds"),
-    (
-        "ballandstick ballstick licorice cpk",
-        "--radius covalent --bonds",
-    ),
-    (
-        "spacefill spacefilling vdwspheres vanderwaals vdw",
-        "--radius vdw",
-    ),
+    ("ballandstick ballstick licorice cpk", "--radius covalent --bonds"),
+    ("spacefill spacefilling vdwspheres vanderwaals vdw", "--radius vdw"),
     (
         "r particleradius particlesize particlescale pointsize spheresize sphereradius radii markersize ms atomradius \
          diameter",
         "--radius LENGTH",
     ),
     ("structure topologyfile psf prmtop", "--topology FILE"),
-    (
-        "geometryfile stl obj boundary wall walls tank",
-        "--mesh FILE",
-    ),
+    ("geometryfile stl obj boundary wall walls tank", "--mesh FILE"),
     // Look
-    (
-        "style theme preset representation rep template mode stylesheet",
-        "--look NAME",
-    ),
+    ("style theme preset representation rep template mode stylesheet", "--look NAME"),
     (
         "isosurface iso contour liquid fluidsurface skin molecularsurface quicksurf smooth blobs metaballs",
         "--surface smooth",
@@ -250,15 +154,9 @@ pub(super) const GUESSES: &[(&str, &str)] = &[
         "transparentbackground nobackground filmtransparent rgba alphachannel nobg transparentbg savealpha",
         "--transparent",
     ),
-    (
-        "floor groundplane shadowcatcher checkerboard grid floorplane",
-        "--ground KIND",
-    ),
+    ("floor groundplane shadowcatcher checkerboard grid floorplane", "--ground KIND"),
     ("nofloor noground hidefloor", "--ground=none"),
-    (
-        "noshadow noshadows",
-        "--ground=none|--set render.ground_shadow=0",
-    ),
+    ("noshadow noshadows", "--ground=none|--set render.ground_shadow=0"),
     (
         "shadow shadows castshadows softshadows floorshadow",
         "--ground shadow_catcher|--set render.ground_shadow=NUMBER",
@@ -267,30 +165,12 @@ pub(super) const GUESSES: &[(&str, &str)] = &[
         "ao ambientocclusion ssao gi globalillumination indirectlight occlusion",
         "--bounces COUNT|--set render.indirect=ambient",
     ),
-    (
-        "maxbounces raydepth recursion tracedepth maxraydepth",
-        "--bounces COUNT|--max-depth N",
-    ),
-    (
-        "engine raytracer tracer method raytracing pathtracing",
-        "--integrator NAME",
-    ),
-    (
-        "light lights lighting lightdir lightdirection sky sunlight",
-        "--set environment.type=sky",
-    ),
-    (
-        "hdri hdr envmap environmentmap ibl skybox",
-        "--set environment.image=FILE",
-    ),
-    (
-        "lightintensity lightpower ambientlight",
-        "--set environment.intensity=NUMBER",
-    ),
-    (
-        "exposure brightness gain gamma ev",
-        "--set output.preview_exposure=STOPS",
-    ),
+    ("maxbounces raydepth recursion tracedepth maxraydepth", "--bounces COUNT|--max-depth N"),
+    ("engine raytracer tracer method raytracing pathtracing", "--integrator NAME"),
+    ("light lights lighting lightdir lightdirection sky sunlight", "--set environment.type=sky"),
+    ("hdri hdr envmap environmentmap ibl skybox", "--set environment.image=FILE"),
+    ("lightintensity lightpower ambientlight", "--set environment.intensity=NUMBER"),
+    ("exposure brightness gain gamma ev", "--set output.preview_exposure=STOPS"),
     ("denoiser noise nonoise despeckle", "--denoise"),
     ("nodenoise", "--denoise=false"),
     ("nobonds", "--bonds=none"),
@@ -305,10 +185,7 @@ pub(super) const GUESSES: &[(&str, &str)] = &[
         "step timestep snapshot framenumber t f n iteration timeindex tstep",
         "--frame NUMBER|--frames NUMBER",
     ),
-    (
-        "framerate rate framespersecond",
-        "--fps RATE|--set output.fps=RATE",
-    ),
+    ("framerate rate framespersecond", "--fps RATE|--set output.fps=RATE"),
     ("dt timebetweenframes", "--set output.frame_time=TIME"),
     // Files
     (
@@ -326,10 +203,7 @@ pub(super) const GUESSES: &[(&str, &str)] = &[
     ),
     ("option key param define", "--set KEY=VALUE"),
     ("y yes overwrite replace clobber", "--force"),
-    (
-        "dryrun estimate plan",
-        "spherule check prints what a render would do",
-    ),
+    ("dryrun estimate plan", "spherule check prints what a render would do"),
     (
         "info listattributes list attributes describe stats",
         "spherule inspect prints the attributes of files",
@@ -338,14 +212,8 @@ pub(super) const GUESSES: &[(&str, &str)] = &[
         "video animate animation mp4 gif makemovie avi movie",
         "--movie FILE|spherule movie writes movies of jobs",
     ),
-    (
-        "montage contactsheet panels panel",
-        "spherule sheet writes a sheet of the pictures of a job",
-    ),
-    (
-        "aov aovs passes layers renderpasses extrachannels planes depthmap",
-        "--channels LIST",
-    ),
+    ("montage contactsheet panels panel", "spherule sheet writes a sheet of the pictures of a job"),
+    ("aov aovs passes layers renderpasses extrachannels planes depthmap", "--channels LIST"),
     ("compress", "--set output.compression=NAME"),
     // Execution
     (
@@ -353,18 +221,13 @@ pub(super) const GUESSES: &[(&str, &str)] = &[
         "--threads COUNT",
     ),
     ("mem memory maxmemory ram maxmem", "--memory-limit SIZE"),
-    (
-        "resume continue restart",
-        "the same command continues a job",
-    ),
+    ("resume continue restart", "the same command continues a job"),
     ("bvh kdtree acceleration", "--accelerator NAME"),
 ];
 
 /// The hints for an option `name`, without hyphens at its beginning.
 pub(super) fn hints_for(name: &str) -> impl Iterator<Item = &'static str> {
     let name = name.replace(['-', '_', '.'], "").to_ascii_lowercase();
-    let found = GUESSES
-        .iter()
-        .find(|(words, _)| words.split_whitespace().any(|word| word == name));
+    let found = GUESSES.iter().find(|(words, _)| words.split_whitespace().any(|word| word == name));
     found.into_iter().flat_map(|(_, hints)| hints.split('|'))
 }

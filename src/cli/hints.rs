@@ -49,11 +49,7 @@ fn unknown_option(mut error: Error, command: &Command) -> Error {
     if let Some(similar) = similar.first() {
         let option = similar.split(['=', ' ']).next().unwrap_or_default();
         let is_near = |typed: &String| {
-            nearest(
-                typed.trim_start_matches('-'),
-                &[option.trim_start_matches('-')],
-            )
-            .is_some()
+            nearest(typed.trim_start_matches('-'), &[option.trim_start_matches('-')]).is_some()
         };
         if hint.is_none() && !is_hidden(command, similar) && typed.first().is_some_and(is_near) {
             return error;
@@ -95,16 +91,10 @@ fn hint(typed: &str, command: &Command) -> Option<String> {
     if name.len() < 2 || !has_option(command, "set") {
         return None;
     }
-    let options: Vec<String> = keys_called(name)
-        .iter()
-        .map(|key| format!("'--set {key}=VALUE'"))
-        .collect();
-    (!options.is_empty()).then(|| {
-        format!(
-            "a key of the manifest has this name: {}",
-            options.join(" or ")
-        )
-    })
+    let options: Vec<String> =
+        keys_called(name).iter().map(|key| format!("'--set {key}=VALUE'")).collect();
+    (!options.is_empty())
+        .then(|| format!("a key of the manifest has this name: {}", options.join(" or ")))
 }
 
 /// Whether the help of `command` lists the option `name`.

@@ -15,14 +15,8 @@ fn message(line: &str) -> String {
 #[test]
 fn hints_name_what_the_command_has() {
     for (line, expected) in [
-        (
-            "spherule still a -o b.png --filter box",
-            "'--set image.filter=VALUE'",
-        ),
-        (
-            "spherule still a -o b.png --camera-f-stop 3",
-            "'--set camera.f_stop=VALUE'",
-        ),
+        ("spherule still a -o b.png --filter box", "'--set image.filter=VALUE'"),
+        ("spherule still a -o b.png --camera-f-stop 3", "'--set camera.f_stop=VALUE'"),
         ("spherule render a --widht 3", "'--width'"),
         ("spherule render a -q", "'--progress none'"),
         (
@@ -227,20 +221,11 @@ fn natural_guesses_lead_to_the_right_option() {
 fn hints_name_only_what_the_command_has() {
     let program = Cli::command();
     for command in program.get_subcommands() {
-        for word in GUESSES
-            .iter()
-            .flat_map(|(words, _)| words.split_whitespace())
-        {
+        for word in GUESSES.iter().flat_map(|(words, _)| words.split_whitespace()) {
             let text = hint(&format!("--{word}"), command).unwrap_or_default();
-            let options = text
-                .split(['\'', ' ', '='])
-                .filter_map(|part| part.strip_prefix("--"));
+            let options = text.split(['\'', ' ', '=']).filter_map(|part| part.strip_prefix("--"));
             for option in options {
-                assert!(
-                    has_option(command, option),
-                    "{} --{word}: {text}",
-                    command.get_name()
-                );
+                assert!(has_option(command, option), "{} --{word}: {text}", command.get_name());
             }
         }
     }
@@ -249,10 +234,8 @@ fn hints_name_only_what_the_command_has() {
 #[test]
 fn every_guess_is_there_once_and_has_a_hint_somewhere() {
     let program = Cli::command();
-    let mut words: Vec<&str> = GUESSES
-        .iter()
-        .flat_map(|(words, _)| words.split_whitespace())
-        .collect();
+    let mut words: Vec<&str> =
+        GUESSES.iter().flat_map(|(words, _)| words.split_whitespace()).collect();
     for word in &words {
         let mut commands = program.get_subcommands();
         let has_hint = |command: &Command| hints_for(word).any(|hint| is_possible(hint, command));
@@ -260,9 +243,7 @@ fn every_guess_is_there_once_and_has_a_hint_somewhere() {
     }
     // Keys in hints are keys
     for hint in GUESSES.iter().flat_map(|(_, hints)| hints.split('|')) {
-        let key = hint
-            .strip_prefix("--set ")
-            .and_then(|set| set.split_once('='));
+        let key = hint.strip_prefix("--set ").and_then(|set| set.split_once('='));
         if let Some((key, _)) = key
             && !key.contains(['\'', 'K'])
         {

@@ -29,10 +29,7 @@ pub(super) struct KeyFlags {
 impl KeyFlags {
     /// Removes the option `name` and returns its value.
     pub(super) fn take(&mut self, name: &str) -> Option<String> {
-        let at = self
-            .given
-            .iter()
-            .position(|(flag, _)| flag.flag.name == name)?;
+        let at = self.given.iter().position(|(flag, _)| flag.flag.name == name)?;
         let (_, value) = self.given.swap_remove(at);
         value.as_str().map(str::to_owned)
     }
@@ -72,9 +69,7 @@ impl FromArgMatches for KeyFlags {
             let value = value(&flag, matches)?;
             Some((flag, value))
         });
-        Ok(Self {
-            given: given.collect(),
-        })
+        Ok(Self { given: given.collect() })
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {

@@ -8,15 +8,7 @@ use crate::manifest::Manifest;
 
 /// Options that are no property of a job: where it is, any key, many keys, and what one run does with what is
 /// there.
-const ACTIONS: [&str; 7] = [
-    "input",
-    "set",
-    "look",
-    "draft",
-    "force",
-    "keep_done",
-    "shard",
-];
+const ACTIONS: [&str; 7] = ["input", "set", "look", "draft", "force", "keep_done", "shard"];
 
 /// Options for parts of `material.color`.
 const COLORS: [&str; 4] = ["color_by", "map", "range", "color_scale"];
@@ -46,10 +38,7 @@ const FLAGS: [(&str, &str); 61] = [
     ("--width 7", "image.width = 7"),
     ("--height 7", "image.height = 7"),
     ("--dpi 7", "image.dpi = 7"),
-    (
-        "--projection orthographic",
-        "camera.projection = \"orthographic\"",
-    ),
+    ("--projection orthographic", "camera.projection = \"orthographic\""),
     ("--view top", "camera.view = \"top\""),
     ("--ortho", "camera.projection = \"orthographic\""),
     ("--fov 30", "camera.fov = 30.0"),
@@ -80,10 +69,7 @@ const FLAGS: [(&str, &str); 61] = [
     ("--channels RGBA,Z", "output.channels = [\"RGBA\", \"Z\"]"),
     ("--max-depth 7", "render.max_depth = 7"),
     ("--ground", "render.ground = true"),
-    (
-        "--ground=shadow_catcher",
-        "render.ground = \"shadow_catcher\"",
-    ),
+    ("--ground=shadow_catcher", "render.ground = \"shadow_catcher\""),
     ("--ground checker", "render.ground = \"checker\""),
     ("--denoise false", "render.denoise = false"),
     ("--denoise", "render.denoise = true"),
@@ -106,10 +92,7 @@ const FLAGS: [(&str, &str); 61] = [
     ("--threads 7", "job.threads = 7"),
     ("--progress json", "job.progress = \"json\""),
     ("--isolate", "job.isolate = true"),
-    (
-        "--isolate --memory-ceiling 4GiB",
-        "job.memory_ceiling = \"4GiB\"",
-    ),
+    ("--isolate --memory-ceiling 4GiB", "job.memory_ceiling = \"4GiB\""),
     ("--retries 7", "job.retries = 7"),
     ("--takeover-after 7", "job.takeover_after = 7.0"),
     ("--grace 7", "job.grace = 7.0"),
@@ -141,9 +124,7 @@ fn every_option_is_a_key() {
         if flags.contains("--isolate --") {
             sets.push("job.isolate=true".to_owned());
         }
-        let sets = sets
-            .iter()
-            .map(|set| format!(" --set {}", set.replace(' ', "")));
+        let sets = sets.iter().map(|set| format!(" --set {}", set.replace(' ', "")));
         plain = manifest(&sets.collect::<String>());
         assert_eq!(manifest(flags), plain, "{flags}");
     }
@@ -171,27 +152,18 @@ fn options_of_lists_add_items() {
     for (flags, sets) in [
         ("--colorbar", "overlay=[{type=\"colorbar\"}]"),
         ("--legend", "overlay=[{type=\"colorbar\"}]"),
-        (
-            "--title Speed --unit m/s",
-            "overlay=[{type=\"colorbar\",title=\"Speed\",unit=\"m/s\"}]",
-        ),
+        ("--title Speed --unit m/s", "overlay=[{type=\"colorbar\",title=\"Speed\",unit=\"m/s\"}]"),
         (
             "--text a --text {frame} --scale-bar --axes --timestamp",
             "overlay=[{type=\"text\"},{type=\"text\",text=\"a\"},{type=\"text\",text=\"{frame}\"},\
              {type=\"scale_bar\"},{type=\"axes\"}]",
         ),
-        (
-            "--arrows velocity:0.05",
-            "arrows=[{attribute=\"velocity\",scale=0.05}]",
-        ),
+        ("--arrows velocity:0.05", "arrows=[{attribute=\"velocity\",scale=0.05}]"),
         (
             "--clip x<0.5 --clip z>=-1",
             "clip=[{type=\"plane\",normal=\"x\",offset=0.5},{type=\"plane\",normal=\"-z\",offset=1.0}]",
         ),
-        (
-            "--slice z=0.5:0.1",
-            "select.slab={axis=\"z\",center=0.5,thickness=0.1}",
-        ),
+        ("--slice z=0.5:0.1", "select.slab={axis=\"z\",center=0.5,thickness=0.1}"),
         ("--cmap turbo", "material.color.map=turbo"),
         ("--colour-by v", "material.color={attribute=\"v\"}"),
         (
@@ -227,10 +199,7 @@ fn wrong_values_of_short_options_are_refused() {
         ("--arrows velocity", "such as velocity:0.05"),
         ("--arrows velocity:-1", "scale: expected"),
         ("--slice z=0.5", "such as z=0.5:0.1"),
-        (
-            "--slice w=0.5:0.1",
-            "select.slab.axis: expected one of x, y, z",
-        ),
+        ("--slice w=0.5:0.1", "select.slab.axis: expected one of x, y, z"),
         ("--slice z=0.5:0", "thickness: expected"),
         ("--clip w<1", "such as x<0.5"),
         ("--clip x<nan", "such as x<0.5"),
@@ -295,10 +264,7 @@ fn no_option_is_forgotten() {
                 || of_keys.contains(&name),
             "{name}"
         );
-        assert!(
-            !COLORS.contains(&name) || tried.contains(&*name.replace('_', "-")),
-            "{name}"
-        );
+        assert!(!COLORS.contains(&name) || tried.contains(&*name.replace('_', "-")), "{name}");
     }
     // Every kind of value is tried.
     for key in key_flags() {

@@ -107,10 +107,7 @@ fn example_section(examples: &str) -> String {
 
 fn unknown(name: &str, program: &Command) -> CliError {
     let names: Vec<&str> = program.get_subcommands().map(Command::get_name).collect();
-    CliError::other(format!(
-        "there is no command `{name}`; the commands are {}",
-        names.join(", ")
-    ))
+    CliError::other(format!("there is no command `{name}`; the commands are {}", names.join(", ")))
 }
 
 #[cfg(test)]

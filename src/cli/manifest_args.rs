@@ -85,12 +85,7 @@ pub(super) struct ManifestArgs {
     /// Any key of the manifest: --set render.ground_pattern=checker. May be repeated.
     ///
     /// `spherule init` prints all keys with their meaning.
-    #[arg(
-        long,
-        value_name = "KEY=VALUE",
-        help_heading = "Job",
-        display_order = 0
-    )]
+    #[arg(long, value_name = "KEY=VALUE", help_heading = "Job", display_order = 0)]
     pub(super) set: Vec<String>,
 }
 
@@ -102,10 +97,7 @@ impl ManifestArgs {
         let (text, base) = match &file {
             Some(path) => {
                 let text = read_manifest(path)?;
-                (
-                    text,
-                    path.parent().map_or_else(PathBuf::new, Path::to_owned),
-                )
+                (text, path.parent().map_or_else(PathBuf::new, Path::to_owned))
             }
             None => {
                 overrides.push(self.input_override()?);
@@ -113,24 +105,14 @@ impl ManifestArgs {
             }
         };
         self.add_overrides(&mut overrides, file.is_some())?;
-        let shown = file
-            .clone()
-            .unwrap_or_else(|| PathBuf::from("command line"));
+        let shown = file.clone().unwrap_or_else(|| PathBuf::from("command line"));
         let source = ManifestSource::new(text.clone(), &shown, overrides);
         let (manifest, warnings) = source.parse()?;
         for warning in warnings {
             note!("{warning}");
         }
-        let unchanged = file
-            .as_ref()
-            .and_then(|path| Manifest::parse(&text, path).ok());
-        Ok(JobManifest {
-            manifest,
-            base,
-            file,
-            unchanged,
-            source: Some(source),
-        })
+        let unchanged = file.as_ref().and_then(|path| Manifest::parse(&text, path).ok());
+        Ok(JobManifest { manifest, base, file, unchanged, source: Some(source) })
     }
 
     fn manifest_file(&self) -> Result<Option<PathBuf>, CliError> {
@@ -145,11 +127,7 @@ impl ManifestArgs {
     }
 
     fn input_override(&self) -> Result<Override, CliError> {
-        let paths = self
-            .input
-            .iter()
-            .map(|p| text(p))
-            .collect::<Result<Vec<_>, _>>()?;
+        let paths = self.input.iter().map(|p| text(p)).collect::<Result<Vec<_>, _>>()?;
         let value = match <[String; 1]>::try_from(paths) {
             Ok([one]) => toml::Value::from(one),
             Err(many) => toml::Value::from(many),
@@ -224,9 +202,7 @@ pub(super) fn open_sequence(requested: &JobManifest) -> Result<Sequence, CliErro
         let mut text = format!("{}: input.path: {error}", file.display());
         let output = requested.base.join(requested.manifest.output.path.dir());
         if output.join(PLAN_FILE).is_file() {
-            let output = requested
-                .base
-                .join(requested.manifest.output.path.to_string());
+            let output = requested.base.join(requested.manifest.output.path.to_string());
             text += &format!(
                 "; if the files have moved: spherule render NEW_PLACE -o {}",
                 output.display()
@@ -250,6 +226,5 @@ pub(super) fn complete(
 
 /// Whether the file name is that of a manifest.
 pub(super) fn is_manifest(path: &Path) -> bool {
-    path.extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"))
 }

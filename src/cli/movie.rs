@@ -122,12 +122,7 @@ fn make(
     pictures: &JobPictures,
     observer: &dyn Observer,
 ) -> Result<Option<String>, CliError> {
-    let source = source(
-        request,
-        &pictures.pictures,
-        &pictures.selected,
-        pictures.exposure,
-    );
+    let source = source(request, &pictures.pictures, &pictures.selected, pictures.exposure);
     let made = write_movie(&source, request.format, request.output, observer);
     let finished = match made {
         Ok(finished) => finished,
@@ -140,10 +135,7 @@ fn make(
         }
         Err(error @ MovieError::Picture(_)) => return Err(pictures.explain(&error)),
         Err(error) => {
-            return Err(CliError::other(format!(
-                "{}: {error}",
-                request.output.display()
-            )));
+            return Err(CliError::other(format!("{}: {error}", request.output.display())));
         }
     };
     let [width, height] = finished.size;
@@ -179,14 +171,8 @@ fn source(
     let frames: Vec<i64> = pictures.iter().map(|picture| picture.number).collect();
     let timeline = Timeline::new(&frames, all, request.gaps);
     for (what, gaps) in [
-        (
-            "is shown for longer (--gaps skip leaves gaps out)",
-            &timeline.held,
-        ),
-        (
-            "is followed by the next (the movie jumps)",
-            &timeline.skipped,
-        ),
+        ("is shown for longer (--gaps skip leaves gaps out)", &timeline.held),
+        ("is followed by the next (the movie jumps)", &timeline.skipped),
     ] {
         if let Some((frame, missing)) = gaps.first() {
             let more = match gaps.len() - 1 {
@@ -194,11 +180,7 @@ fn source(
                 1 => ", and so on at 1 more place".to_owned(),
                 more => format!(", and so on at {more} more places"),
             };
-            let are = if *missing == 1 {
-                "frame is"
-            } else {
-                "frames are"
-            };
+            let are = if *missing == 1 { "frame is" } else { "frames are" };
             message!("{missing} {are} missing after frame {frame}, which {what}{more}");
         }
     }
@@ -209,10 +191,7 @@ fn source(
         );
     }
     let source = MovieSource {
-        paths: pictures
-            .iter()
-            .map(|picture| picture.picture.clone())
-            .collect(),
+        paths: pictures.iter().map(|picture| picture.picture.clone()).collect(),
         repeats: timeline.repeats,
         rate: request.rate,
         width: request.width.map(usize::from),

@@ -49,9 +49,7 @@ pub(super) fn not_negative(text: &str) -> Result<f64, ValueError> {
     let expected = "a number from 0, such as 0.02";
     let value: f64 = parse(text, expected)?;
     let is_valid = value >= 0.0 && value.is_finite();
-    is_valid
-        .then_some(value)
-        .ok_or_else(|| ValueError::new(expected, text))
+    is_valid.then_some(value).ok_or_else(|| ValueError::new(expected, text))
 }
 
 /// A time in seconds: 0 or more.
@@ -66,7 +64,5 @@ pub(super) fn positive(text: &str) -> Result<f32, ValueError> {
     let expected = "a radius above 0, such as 0.05";
     let value: f32 = parse(text, expected)?;
     let is_valid = value > 0.0 && value.is_finite();
-    is_valid
-        .then_some(value)
-        .ok_or_else(|| ValueError::new(expected, text))
+    is_valid.then_some(value).ok_or_else(|| ValueError::new(expected, text))
 }

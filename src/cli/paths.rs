@@ -8,11 +8,7 @@ use super::CliError;
 /// `path` for a manifest. A typed path is relative to the working directory; a path in a manifest from a file is relative
 /// to the file, so it is made absolute.
 pub(super) fn path_as_typed(path: &str, from_file: bool) -> Result<String, CliError> {
-    if from_file {
-        text(&absolute(Path::new(path))?)
-    } else {
-        Ok(path.to_owned())
-    }
+    if from_file { text(&absolute(Path::new(path))?) } else { Ok(path.to_owned()) }
 }
 
 /// `path` from the root, without looking at what is there.

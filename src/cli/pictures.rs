@@ -62,12 +62,8 @@ impl JobPictures {
             return Err(no_job(&dir));
         };
         let settings = state.plan().settings();
-        let find = |name: &str| {
-            settings
-                .iter()
-                .find(|(key, _)| key == name)
-                .map(|(_, value)| value)
-        };
+        let find =
+            |name: &str| settings.iter().find(|(key, _)| key == name).map(|(_, value)| value);
         if find(KIND).is_some() {
             return Err(CliError::other(format!(
                 "{}: this job has native frames, no pictures; render them first",
@@ -89,10 +85,7 @@ impl JobPictures {
         let is_done = |frame: &i64| state.frame_state(*frame) == Some(FrameState::Done);
         let (done, missing): (Vec<i64>, Vec<i64>) =
             selected.iter().partition(|frame| is_done(frame));
-        let pictures = done
-            .iter()
-            .filter_map(|frame| picture(&state, *frame))
-            .collect();
+        let pictures = done.iter().filter_map(|frame| picture(&state, *frame)).collect();
         Ok(Self {
             pictures,
             selected,
@@ -109,11 +102,7 @@ impl JobPictures {
         if self.missing.is_empty() {
             return None;
         }
-        let running = if self.is_running {
-            "; a worker is at work"
-        } else {
-            ""
-        };
+        let running = if self.is_running { "; a worker is at work" } else { "" };
         Some(format!(
             "{}: {} of {} frames are done, missing: {}{running}",
             self.state.dir().display(),
@@ -127,9 +116,7 @@ impl JobPictures {
     pub(super) fn require_any(&self) -> Result<(), CliError> {
         match self.gaps().filter(|_| self.pictures.is_empty()) {
             None => Ok(()),
-            Some(gaps) => Err(CliError::other(format!(
-                "{gaps}; there is nothing to show yet"
-            ))),
+            Some(gaps) => Err(CliError::other(format!("{gaps}; there is nothing to show yet"))),
         }
     }
 
@@ -214,10 +201,7 @@ fn real(path: &Path) -> Result<PathBuf, CliError> {
     let (Some(dir), Some(name)) = (path.parent(), path.file_name()) else {
         return Ok(path);
     };
-    Ok(dir
-        .canonicalize()
-        .unwrap_or_else(|_| dir.to_owned())
-        .join(name))
+    Ok(dir.canonicalize().unwrap_or_else(|_| dir.to_owned()).join(name))
 }
 
 fn is_png(path: &String) -> bool {
@@ -226,21 +210,10 @@ fn is_png(path: &String) -> bool {
 
 fn picture(state: &JobState, frame: i64) -> Option<JobPicture> {
     let outputs = &state.plan().frame(frame)?.outputs;
-    let dir = if state.dir().as_os_str().is_empty() {
-        Path::new(".")
-    } else {
-        state.dir()
-    };
+    let dir = if state.dir().as_os_str().is_empty() { Path::new(".") } else { state.dir() };
     let image = dir.join(outputs.first()?);
-    let preview = outputs
-        .iter()
-        .find(|path| is_png(path))
-        .map(|path| dir.join(path));
-    Some(JobPicture {
-        number: frame,
-        picture: preview.unwrap_or_else(|| image.clone()),
-        image,
-    })
+    let preview = outputs.iter().find(|path| is_png(path)).map(|path| dir.join(path));
+    Some(JobPicture { number: frame, picture: preview.unwrap_or_else(|| image.clone()), image })
 }
 
 /// Stops when a signal has come.
@@ -255,7 +228,5 @@ impl Observer for Watch<'_> {
 }
 
 /// Messages after a signal.
-pub(super) const SIGNAL_MESSAGES: SignalMessages = SignalMessages {
-    stopping: "stopping",
-    stopped: "stopped; no file was written",
-};
+pub(super) const SIGNAL_MESSAGES: SignalMessages =
+    SignalMessages { stopping: "stopping", stopped: "stopped; no file was written" };

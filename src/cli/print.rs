@@ -123,10 +123,7 @@ mod tests {
     #[test]
     fn lines_stay_single_lines() {
         assert_eq!(line("a.xyz: 3 particles"), "a.xyz: 3 particles\n");
-        assert_eq!(
-            line("a\nerror: b\u{1b}[31m\u{202e}"),
-            "a\\nerror: b\\u{1b}[31m\\u{202e}\n"
-        );
+        assert_eq!(line("a\nerror: b\u{1b}[31m\u{202e}"), "a\\nerror: b\\u{1b}[31m\\u{202e}\n");
     }
 
     #[test]

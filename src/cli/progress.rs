@@ -18,13 +18,7 @@ use crate::manifest::ProgressMode;
 
 impl ValueEnum for ProgressMode {
     fn value_variants<'a>() -> &'a [Self] {
-        &[
-            Self::Auto,
-            Self::Plain,
-            Self::Json,
-            Self::Openjd,
-            Self::None,
-        ]
+        &[Self::Auto, Self::Plain, Self::Json, Self::Openjd, Self::None]
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
@@ -76,10 +70,7 @@ impl Progress {
     /// Progress of a run of `command` with `total` frames. `output` is the path that the user gave.
     pub(super) fn new(mode: ProgressMode, command: &str, total: usize, output: &Path) -> Self {
         let output = output.display().to_string();
-        events::send(
-            "start",
-            json!({"command": command, "total": total, "output": output}),
-        );
+        events::send("start", json!({"command": command, "total": total, "output": output}));
         let display = match mode {
             ProgressMode::Auto if stderr().is_terminal() => Display::Bar(bar(total)),
             ProgressMode::Auto | ProgressMode::Plain => Display::Plain,
@@ -113,11 +104,7 @@ impl Progress {
             FrameEvent::Stage { frame, stage } => self.stage(*frame, stage),
             FrameEvent::Done { frame, finished } => self.done(*frame, finished),
             FrameEvent::Failed(failure) => self.failed(failure),
-            FrameEvent::Retrying {
-                failure,
-                attempt,
-                attempts,
-            } => self.note(&format!(
+            FrameEvent::Retrying { failure, attempt, attempts } => self.note(&format!(
                 "frame {}: attempt {attempt} of {attempts} failed: {failure}",
                 failure.frame
             )),
@@ -172,11 +159,7 @@ impl Progress {
                 let plain = format!("frame {frame}: {result} by another worker");
                 let facts = json!({"frame": frame, "elsewhere": true,
                     "done": done, "total": self.total()});
-                let event = if is_done {
-                    "frame_done"
-                } else {
-                    "frame_failed"
-                };
+                let event = if is_done { "frame_done" } else { "frame_failed" };
                 events::send(event, facts);
                 self.line(done, &plain);
             }
@@ -204,9 +187,7 @@ impl Progress {
         if let Display::Bar(bar) = &self.display {
             bar.finish_and_clear();
         }
-        self.finished
-            .into_inner()
-            .unwrap_or_else(|e| e.into_inner())
+        self.finished.into_inner().unwrap_or_else(|e| e.into_inner())
     }
 
     /// Counts a finished frame.
@@ -222,11 +203,9 @@ impl Progress {
         match &self.display {
             Display::Bar(bar) => bar.set_position(done as u64),
             Display::Plain if plain.is_empty() => {}
-            Display::Plain => message!(
-                "[{done}/{}] {plain}, {}",
-                self.total(),
-                self.remaining(done)
-            ),
+            Display::Plain => {
+                message!("[{done}/{}] {plain}, {}", self.total(), self.remaining(done))
+            }
             Display::Openjd => openjd(done, self.total(), plain),
             Display::Nothing => {}
         }
@@ -254,13 +233,10 @@ fn bar(total: usize) -> ProgressBar {
     let template = "{bar:30} {pos}/{len} frames  {msg}  {elapsed} elapsed{left}";
     let style = ProgressStyle::with_template(template)
         .expect("the template is well formed")
-        .with_key(
-            "left",
-            |state: &ProgressState, text: &mut dyn fmt::Write| {
-                // Writing to a string cannot fail
-                let _ = text.write_str(&left(state.pos(), state.eta().as_secs_f64()));
-            },
-        )
+        .with_key("left", |state: &ProgressState, text: &mut dyn fmt::Write| {
+            // Writing to a string cannot fail
+            let _ = text.write_str(&left(state.pos(), state.eta().as_secs_f64()));
+        })
         .progress_chars("━╸─");
     let bar = ProgressBar::new(total as u64).with_style(style);
     bar.enable_steady_tick(std::time::Duration::from_millis(200));
@@ -269,11 +245,7 @@ fn bar(total: usize) -> ProgressBar {
 
 /// The remaining time behind the elapsed one; unknown before the first frame is done.
 fn left(done: u64, seconds: f64) -> String {
-    if done == 0 {
-        String::new()
-    } else {
-        format!(", {} left", duration(seconds))
-    }
+    if done == 0 { String::new() } else { format!(", {} left", duration(seconds)) }
 }
 
 /// Formats seconds: `12 s`, `3:20 min`.

@@ -45,15 +45,8 @@ pub(super) struct SheetArgs {
 
 pub(super) fn run(args: &SheetArgs) -> Result<Outcome, CliError> {
     let signals = signals::listen(SIGNAL_MESSAGES)?;
-    if !args
-        .output
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("png"))
-    {
-        let text = format!(
-            "--output {}: the name must end in .png",
-            args.output.display()
-        );
+    if !args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
+        let text = format!("--output {}: the name must end in .png", args.output.display());
         return Err(CliError::other(text));
     }
     let pictures = JobPictures::read(&args.pictures)?;
@@ -63,10 +56,7 @@ pub(super) fn run(args: &SheetArgs) -> Result<Outcome, CliError> {
     }
     pictures.guard(&args.output, args.force)?;
     let chosen = chosen(&pictures.pictures, args.count.map(usize::from));
-    let paths: Vec<PathBuf> = chosen
-        .iter()
-        .map(|picture| picture.picture.clone())
-        .collect();
+    let paths: Vec<PathBuf> = chosen.iter().map(|picture| picture.picture.clone()).collect();
     let settings = SheetSettings {
         columns: args.columns.map(usize::from),
         width: usize::from(args.width),
@@ -82,10 +72,7 @@ pub(super) fn run(args: &SheetArgs) -> Result<Outcome, CliError> {
         }
         Err(error @ MovieError::Picture(_)) => return Err(pictures.explain(&error)),
         Err(error) => {
-            return Err(CliError::other(format!(
-                "{}: {error}",
-                args.output.display()
-            )));
+            return Err(CliError::other(format!("{}: {error}", args.output.display())));
         }
     };
     let numbers: Vec<i64> = chosen.iter().map(|picture| picture.number).collect();
@@ -119,16 +106,10 @@ mod tests {
     use super::*;
 
     fn numbers(total: i64, count: Option<usize>) -> Vec<i64> {
-        let picture = |number| JobPicture {
-            number,
-            picture: PathBuf::new(),
-            image: PathBuf::new(),
-        };
+        let picture =
+            |number| JobPicture { number, picture: PathBuf::new(), image: PathBuf::new() };
         let pictures: Vec<JobPicture> = (1..=total).map(picture).collect();
-        chosen(&pictures, count)
-            .iter()
-            .map(|picture| picture.number)
-            .collect()
+        chosen(&pictures, count).iter().map(|picture| picture.number).collect()
     }
 
     #[test]

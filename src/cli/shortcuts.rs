@@ -18,12 +18,7 @@ pub(super) struct Shortcuts {
         conflicts_with_all = ["width", "height"])]
     size: Option<Size>,
     /// Orthographic projection: the same as --projection orthographic
-    #[arg(
-        long,
-        help_heading = "Camera",
-        display_order = 0,
-        conflicts_with = "projection"
-    )]
+    #[arg(long, help_heading = "Camera", display_order = 0, conflicts_with = "projection")]
     ortho: bool,
     /// Value at the lower end of the colour map; --vmin LOW --vmax HIGH is the same as --range LOW HIGH
     #[arg(long, value_name = "LOW", allow_negative_numbers = true, value_parser = number, requires = "vmax",
@@ -105,20 +100,14 @@ impl Size {
         let sides = sides.filter(|(width, height)| [width, height].iter().all(|s| !s.is_empty()));
         let (width, height) = sides
             .ok_or_else(|| ValueError::new("the width and the height, such as 1280x720", text))?;
-        Ok(Self {
-            width: width.to_owned(),
-            height: height.to_owned(),
-        })
+        Ok(Self { width: width.to_owned(), height: height.to_owned() })
     }
 }
 
 impl Arrows {
     fn parse(text: &str) -> Result<Self, ValueError> {
         let arrows = text.rsplit_once(':').and_then(|(attribute, scale)| {
-            Some(Self {
-                attribute: attribute.to_owned(),
-                scale: scale.parse().ok()?,
-            })
+            Some(Self { attribute: attribute.to_owned(), scale: scale.parse().ok()? })
         });
         arrows.ok_or_else(|| {
             let expected =

@@ -75,11 +75,7 @@ pub(super) fn listen(messages: SignalMessages) -> Result<SignalListener, CliErro
             interrupt.raise();
             match grace.get() {
                 Some(grace) => {
-                    message!(
-                        "{} (grace period: {} s)",
-                        messages.stopping,
-                        grace.as_secs_f64()
-                    );
+                    message!("{} (grace period: {} s)", messages.stopping, grace.as_secs_f64());
                     let (grace, interrupt) = (*grace, interrupt.clone());
                     thread::spawn(move || stop_after(grace, &interrupt, messages));
                 }
@@ -94,9 +90,7 @@ pub(super) fn listen(messages: SignalMessages) -> Result<SignalListener, CliErro
 #[cfg(unix)]
 fn arrivals() -> io::Result<impl Iterator<Item = ()> + Send> {
     let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM])?;
-    Ok(std::iter::from_fn(move || {
-        signals.forever().next().map(|_| ())
-    }))
+    Ok(std::iter::from_fn(move || signals.forever().next().map(|_| ())))
 }
 
 /// The signals that arrive from now on, forever. Other systems cannot wait for one.
@@ -117,10 +111,7 @@ fn arrivals() -> io::Result<impl Iterator<Item = ()> + Send> {
 /// Drops the frames that are still in progress after `grace`.
 fn stop_after(grace: Duration, interrupt: &Interrupt, messages: SignalMessages) {
     thread::sleep(grace);
-    message!(
-        "the grace period of {} s is over (--grace): stopping now",
-        grace.as_secs_f64()
-    );
+    message!("the grace period of {} s is over (--grace): stopping now", grace.as_secs_f64());
     interrupt.raise();
     thread::sleep(SHUTDOWN_TIME);
     exit_now(messages);

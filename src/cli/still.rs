@@ -21,12 +21,8 @@ use crate::pipeline::{ImageError, WriteError, make_image};
 use crate::render::Channels;
 
 /// Signatures of the files that `still` may replace: OpenEXR, PNG, JPEG and TIFF.
-const IMAGE_SIGNATURES: [&[u8]; 4] = [
-    b"\x76\x2f\x31\x01",
-    b"\x89PNG\r\n\x1a\n",
-    b"\xff\xd8\xff",
-    b"II*\0",
-];
+const IMAGE_SIGNATURES: [&[u8]; 4] =
+    [b"\x76\x2f\x31\x01", b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"II*\0"];
 
 const OUTPUT_HELP: &str =
     "Image to write: look.png, look.exr, look.jpg or look.tif; an existing image is replaced";
@@ -101,10 +97,8 @@ fn no_job(option: clap::Arg) -> clap::Arg {
     option.hide(true).conflicts_with("output")
 }
 
-const SIGNAL_MESSAGES: signals::SignalMessages = signals::SignalMessages {
-    stopping: "stopping",
-    stopped: "stopped; no image was written",
-};
+const SIGNAL_MESSAGES: signals::SignalMessages =
+    signals::SignalMessages { stopping: "stopping", stopped: "stopped; no image was written" };
 
 pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
     let start = Instant::now();
@@ -199,10 +193,7 @@ fn frame(
             FrameChoice::First => "first".to_owned(),
             FrameChoice::Last => "last".to_owned(),
         };
-        CliError::other(format!(
-            "--frame {shown}: is not among the frames: {}",
-            list(&numbers)
-        ))
+        CliError::other(format!("--frame {shown}: is not among the frames: {}", list(&numbers)))
     })
 }
 
@@ -247,9 +238,7 @@ fn check_writable(shown: &Path, output: &Path) -> Result<(), CliError> {
     let existing = disk::nearest_existing(output);
     let is_writable = disk::check_writable(&existing);
     // The directory of the file may be missing, too, which hides that its name is too long
-    let named = output
-        .file_name()
-        .map(|name| fs::metadata(existing.join(name)));
+    let named = output.file_name().map(|name| fs::metadata(existing.join(name)));
     let name = match named {
         Some(Err(error)) if error.kind() != io::ErrorKind::NotFound => Err(error),
         _ => Ok(()),
@@ -276,9 +265,7 @@ fn is_planned(output: &Path) -> Result<bool, CliError> {
 fn is_image(path: &Path) -> io::Result<bool> {
     let mut start = Vec::new();
     File::open(path)?.take(8).read_to_end(&mut start)?;
-    let is_known = IMAGE_SIGNATURES
-        .iter()
-        .any(|known| start.starts_with(known));
+    let is_known = IMAGE_SIGNATURES.iter().any(|known| start.starts_with(known));
     Ok(is_known || start.is_empty())
 }
 

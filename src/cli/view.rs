@@ -40,12 +40,7 @@ pub(super) struct ViewArgs {
     #[arg(long, value_name = "PIXELS", requires = "embed", value_parser = clap::value_parser!(u16).range(1..))]
     width: Option<u16>,
     /// Pictures per second when the page plays.
-    #[arg(
-        long,
-        value_name = "RATE",
-        default_value = "10",
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "RATE", default_value = "10", allow_negative_numbers = true)]
     fps: FrameRate,
     /// Leave out particle ids, values and channels, which make the page larger.
     #[arg(long)]
@@ -62,10 +57,7 @@ pub(super) fn run(args: &ViewArgs) -> Result<Outcome, CliError> {
     if let Some(gaps) = &gaps {
         message!("{gaps}; the page shows what is there");
     }
-    let output = args
-        .output
-        .clone()
-        .unwrap_or_else(|| pictures.state.dir().join(FILE));
+    let output = args.output.clone().unwrap_or_else(|| pictures.state.dir().join(FILE));
     pictures.guard(&output, args.force)?;
     let frames: Vec<ViewerFrame> = pictures
         .pictures
@@ -80,9 +72,7 @@ pub(super) fn run(args: &ViewArgs) -> Result<Outcome, CliError> {
         message!("the job has no previews: pictures are made from the images, into the page");
     }
     let format_of = |frame: &ViewerFrame| PictureFormat::of(&frame.image);
-    let has_exr = frames
-        .iter()
-        .any(|frame| format_of(frame) == Some(PictureFormat::Exr));
+    let has_exr = frames.iter().any(|frame| format_of(frame) == Some(PictureFormat::Exr));
     let settings = ViewerSettings {
         title: title(&pictures),
         rate: args.fps.per_second(),
@@ -93,13 +83,7 @@ pub(super) fn run(args: &ViewArgs) -> Result<Outcome, CliError> {
         attributes: attributes(&pictures),
     };
     let report = JobReport::of_plan(&pictures.state);
-    let made = viewer_page(
-        &frames,
-        &settings,
-        &output,
-        gaps.as_deref(),
-        &report.plots(),
-    );
+    let made = viewer_page(&frames, &settings, &output, gaps.as_deref(), &report.plots());
     let (html, content) = made.map_err(|error| match error {
         ViewerError::Picture(_) => pictures.explain(&error),
         error => CliError::other(format!("{}: {error}", output.display())),
@@ -150,14 +134,8 @@ fn title(pictures: &JobPictures) -> String {
 fn attributes(pictures: &JobPictures) -> Vec<String> {
     let channels = setting(pictures, "output.channels");
     let channels = channels.as_ref().and_then(|value| value.as_array());
-    let names = channels
-        .into_iter()
-        .flatten()
-        .filter_map(|channel| channel.as_str());
-    names
-        .filter_map(|name| name.strip_prefix(ATTRIBUTE_CHANNEL))
-        .map(str::to_owned)
-        .collect()
+    let names = channels.into_iter().flatten().filter_map(|channel| channel.as_str());
+    names.filter_map(|name| name.strip_prefix(ATTRIBUTE_CHANNEL)).map(str::to_owned).collect()
 }
 
 /// A setting of the plan.

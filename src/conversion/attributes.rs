@@ -49,10 +49,7 @@ pub struct AttributeChoices {
 
 impl AttributeChoices {
     /// Stores no attributes.
-    pub const NONE: Self = Self {
-        named: BTreeMap::new(),
-        others: Storage::Off,
-    };
+    pub const NONE: Self = Self { named: BTreeMap::new(), others: Storage::Off };
 
     /// The storage of the attribute `name`. An exact match has priority over one that ignores case.
     pub fn of(&self, name: &str) -> Storage {
@@ -68,9 +65,7 @@ impl AttributeChoices {
 
     /// Whether the attribute `name` is listed.
     pub fn names(&self, name: &str) -> bool {
-        self.named
-            .keys()
-            .any(|known| known.eq_ignore_ascii_case(name))
+        self.named.keys().any(|known| known.eq_ignore_ascii_case(name))
     }
 
     /// All listed attributes and their storage, with `*` last.
@@ -181,10 +176,7 @@ mod tests {
             ("velocity", "write NAME:HOW"),
             (":f16", "has no storage"),
             ("v:f16,,", "has no storage"),
-            (
-                "v:f64",
-                "unknown storage `f64`; use one of keep, f32, f16, u8, off",
-            ),
+            ("v:f64", "unknown storage `f64`; use one of keep, f32, f16, u8, off"),
             ("v:f16,v:off", "`v` occurs twice"),
             ("*:f16,*:off", "`*` occurs twice"),
         ] {

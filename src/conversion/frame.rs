@@ -72,10 +72,7 @@ pub fn convert_frame(
         return convert(&NativeSource::new(&file)?, Vec::new());
     }
     // Stream a binary file
-    let streamed = sequence
-        .lone_file(task.index)
-        .map(open_source)
-        .transpose()?;
+    let streamed = sequence.lone_file(task.index).map(open_source).transpose()?;
     if let Some(source) = streamed.flatten() {
         return convert(&*source, Vec::new());
     }
@@ -102,13 +99,9 @@ impl Conversion {
             is_y_up: self.is_y_up,
             radius: match settings.radius {
                 Some(radius) => RadiusRule::All(radius),
-                None => RadiusRule::Source {
-                    otherwise: self.estimate,
-                },
+                None => RadiusRule::Source { otherwise: self.estimate },
             },
-            memory: settings
-                .memory
-                .map_or(convert::ConvertSettings::USUAL_MEMORY, |m| m.0),
+            memory: settings.memory.map_or(convert::ConvertSettings::USUAL_MEMORY, |m| m.0),
             other_attributes: AttributeChoice::AsIs,
             attributes: source.attributes().iter().map(choice).collect(),
             keep_ids: settings.keep_ids,

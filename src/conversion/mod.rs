@@ -50,18 +50,12 @@ impl FrameWork for ConvertWork<'_> {
     ) -> Result<FinishedFrame<ConvertedFrame>, FrameFailure> {
         let task = &self.tasks[frame.index];
         context.report_stage(task.frame, "converting");
-        let progress = FrameProgress {
-            frame: task.frame,
-            context,
-        };
+        let progress = FrameProgress { frame: task.frame, context };
         let converted = convert_frame(self.conversion, self.sequence, task, &progress);
         let mut report = converted
             .map_err(|e| ConversionError::new(e, self.sequence, task.index).into_failure(task))?;
         context.report_notes(report.notes.drain(..));
-        Ok(FinishedFrame {
-            outputs: vec![task.output.clone()],
-            report,
-        })
+        Ok(FinishedFrame { outputs: vec![task.output.clone()], report })
     }
 }
 

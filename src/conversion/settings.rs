@@ -33,10 +33,8 @@ impl ConvertSettings {
             Some(encoding) => encoding.to_string(),
             None => "smallest".to_owned(),
         };
-        let mut settings = vec![
-            ("version".to_owned(), VERSION.to_string()),
-            ("encoding".to_owned(), encoding),
-        ];
+        let mut settings =
+            vec![("version".to_owned(), VERSION.to_string()), ("encoding".to_owned(), encoding)];
         // Exact positions do not depend on the bound
         match self.bound {
             _ if self.encoding == Some(Encoding::F32) => {}
@@ -48,9 +46,7 @@ impl ConvertSettings {
                 settings.push(("max-error-length".to_owned(), length.to_string()));
             }
         }
-        let radius = self
-            .radius
-            .map_or_else(|| "auto".to_owned(), |r| r.to_string());
+        let radius = self.radius.map_or_else(|| "auto".to_owned(), |r| r.to_string());
         settings.push(("radius".to_owned(), radius));
         settings.push(("attributes".to_owned(), self.attributes.to_string()));
         if self.keep_ids {

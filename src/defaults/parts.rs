@@ -35,10 +35,8 @@ pub fn walls<S: AsRef<str>>(names: &[S]) -> Option<Walls> {
     };
     let (left_out, kept): (Vec<&S>, Vec<&S>) = names.iter().partition(is_wall);
     let owned = |names: Vec<&S>| names.into_iter().map(|n| n.as_ref().to_owned()).collect();
-    (!left_out.is_empty() && !kept.is_empty()).then(|| Walls {
-        kept: owned(kept),
-        left_out: owned(left_out),
-    })
+    (!left_out.is_empty() && !kept.is_empty())
+        .then(|| Walls { kept: owned(kept), left_out: owned(left_out) })
 }
 
 #[cfg(test)]

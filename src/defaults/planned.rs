@@ -17,9 +17,7 @@ pub fn planned(source: &ManifestSource, planned: &[(String, String)]) -> Vec<Ove
         COLOR => source.lacks("material.color.attribute"),
         key => source.lacks(key),
     };
-    let ours = planned
-        .iter()
-        .filter(|(key, _)| KEYS.contains(&&**key) && is_missing(key));
+    let ours = planned.iter().filter(|(key, _)| KEYS.contains(&&**key) && is_missing(key));
     let mut layers: Vec<Override> = ours
         .flat_map(|(key, text)| match (&**key, value(text)) {
             // A map may be given without the attribute
@@ -37,9 +35,7 @@ pub fn planned(source: &ManifestSource, planned: &[(String, String)]) -> Vec<Ove
         layers.extend(layer("overlay", overlays));
     }
     // Sizes of overlays that are given
-    let given = source
-        .parse()
-        .map_or(0, |(manifest, _)| manifest.overlays.len());
+    let given = source.parse().map_or(0, |(manifest, _)| manifest.overlays.len());
     let sizes = (0..given).filter_map(|index| {
         let key = format!("overlay.{index}.size");
         let (_, text) = planned.iter().find(|(known, _)| *known == key)?;

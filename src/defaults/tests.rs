@@ -8,19 +8,11 @@ use crate::survey::Elements;
 
 /// Facts of a thousand particles in a unit cube without attributes.
 fn facts() -> Facts {
-    Facts {
-        particles: 1000,
-        bounds: Some((DVec3::ZERO, DVec3::ONE)),
-        ..Facts::default()
-    }
+    Facts { particles: 1000, bounds: Some((DVec3::ZERO, DVec3::ONE)), ..Facts::default() }
 }
 
 fn category(name: &str, values: &[i64], at_rest: &[i64]) -> Category {
-    Category {
-        name: name.to_owned(),
-        values: values.to_vec(),
-        at_rest: at_rest.to_vec(),
-    }
+    Category { name: name.to_owned(), values: values.to_vec(), at_rest: at_rest.to_vec() }
 }
 
 /// The manifest of `text` with the defaults that follow from `facts`, and the lines of the rules.
@@ -63,15 +55,9 @@ fn elements_have_their_colours_and_radii() {
     let (manifest, lines) = completed("", &atoms, Files::default());
     assert_eq!(attribute(&manifest), Some("element"));
     assert!(matches!(manifest.input.radius, RadiusSetting::Table { scale, .. } if scale == 1.0));
-    assert!(
-        manifest.select.condition.is_some() && lines.contains("virtual sites"),
-        "{lines}"
-    );
+    assert!(manifest.select.condition.is_some() && lines.contains("virtual sites"), "{lines}");
     assert!(has_legend(&manifest) && manifest.overlays.len() == 2);
-    assert_eq!(
-        manifest.render.ground.map(|g| g.kind),
-        Some(crate::manifest::GroundKind::None)
-    );
+    assert_eq!(manifest.render.ground.map(|g| g.kind), Some(crate::manifest::GroundKind::None));
     // With bonds
     atoms.has_bonds = true;
     let bonded = of("", &atoms);
@@ -102,15 +88,9 @@ fn categories_come_before_speed_and_walls_are_left_out() {
     fluid.categories = vec![category("type", &[0, 1, 3], &[0, 3])];
     let (manifest, lines) = completed("", &fluid, Files::default());
     assert_eq!(attribute(&manifest), None);
-    let condition = (
-        "select.where".to_owned(),
-        "\"type != 0 && type != 3\"".to_owned(),
-    );
+    let condition = ("select.where".to_owned(), "\"type != 0 && type != 3\"".to_owned());
     assert!(manifest.settings().contains(&condition));
-    assert!(
-        lines.contains("left out: particles with type 0, 3"),
-        "{lines}"
-    );
+    assert!(lines.contains("left out: particles with type 0, 3"), "{lines}");
     // Frozen atoms are no walls
     fluid.elements = Some(Elements { has_others: false });
     assert!(of("", &fluid).select.condition.is_none());
@@ -121,10 +101,7 @@ fn parts_have_their_names_in_the_legend() {
     let mut two = facts();
     two.categories = vec![category("part", &[0, 2], &[])];
     let parts = ["water", "wall", "ship"].map(str::to_owned);
-    let files = Files {
-        parts: &parts,
-        is_y_up: false,
-    };
+    let files = Files { parts: &parts, is_y_up: false };
     let (manifest, _) = completed("", &two, files);
     let ColorSetting::Mapped(by) = &manifest.material.color else {
         panic!("no map");
@@ -165,10 +142,7 @@ fn planes_are_seen_from_their_front_in_flat_light() {
         (DVec3::new(0.0, 1.0, 1.0), true, AxisView::Right),
     ] {
         plane.bounds = Some((DVec3::ZERO, max));
-        let files = Files {
-            is_y_up,
-            ..Files::default()
-        };
+        let files = Files { is_y_up, ..Files::default() };
         let (manifest, _) = completed("", &plane, files);
         assert_eq!(manifest.camera.view, Some(side), "{max}");
         assert_eq!(manifest.integrator(), IntegratorKind::Whitted);
@@ -193,10 +167,7 @@ fn looks_have_their_own_rules() {
     for look in ["none", "whitted"] {
         let manifest = of(&format!("look = \"{look}\""), &fluid);
         let bare = Manifest::new("data").camera;
-        assert!(
-            manifest.camera == bare && manifest.overlays.is_empty(),
-            "{look}"
-        );
+        assert!(manifest.camera == bare && manifest.overlays.is_empty(), "{look}");
     }
     // On paper, text has the size of a journal's
     let sizes = |text: &str| of(text, &fluid).overlays[0].size;
@@ -204,20 +175,10 @@ fn looks_have_their_own_rules() {
     assert_eq!(sizes(""), TextSize::Fraction(0.032));
     let given = "image.width = \"80mm\"\n[[overlay]]\ntype = \"axes\"\n";
     assert_eq!(sizes(given), TextSize::Points(7.0));
-    assert_eq!(
-        sizes(&format!("{given}size = 0.1")),
-        TextSize::Fraction(0.1)
-    );
+    assert_eq!(sizes(&format!("{given}size = 0.1")), TextSize::Fraction(0.1));
     // Small pictures have no legend, and cameras that are placed keep their lens
-    assert!(
-        of("image.width = 200\nimage.height = 100", &fluid)
-            .overlays
-            .is_empty()
-    );
-    let placed = of(
-        "camera.eye = [0, -9, 0]\ncamera.look_at = [0, 0, 0]",
-        &fluid,
-    );
+    assert!(of("image.width = 200\nimage.height = 100", &fluid).overlays.is_empty());
+    let placed = of("camera.eye = [0, -9, 0]\ncamera.look_at = [0, 0, 0]", &fluid);
     assert_eq!(placed.camera.fov, Manifest::new("").camera.fov);
     // Nothing is known of no particles
     let nothing = of("", &Facts::default());
@@ -242,17 +203,13 @@ fn jobs_that_go_on_have_the_defaults_of_their_plan() {
             Path::new("job.toml"),
             Vec::new(),
         );
-        let resumed = source
-            .parse_over(planned(&source, &begun.settings()))
-            .unwrap();
+        let resumed = source.parse_over(planned(&source, &begun.settings())).unwrap();
         assert_eq!(resumed.settings(), begun.settings(), "{text}");
     }
     // A job of an earlier version: without rules
     let source = ManifestSource::new("input.path = \"data\"", Path::new("x"), Vec::new());
     let (plain, _) = source.parse().unwrap();
-    let resumed = source
-        .parse_over(planned(&source, &plain.settings()))
-        .unwrap();
+    let resumed = source.parse_over(planned(&source, &plain.settings())).unwrap();
     assert_eq!(resumed.settings(), plain.settings());
     assert_ne!(begun.settings(), plain.settings());
 }

@@ -23,11 +23,7 @@ fn square(center: Position, radius: i64) -> impl Iterator<Item = Position> {
 
 /// The filtered picture.
 pub(super) fn denoise(input: &DenoiseInput<'_>, settings: &DenoiseSettings) -> Vec<DVec3> {
-    let mut picture = Picture {
-        input,
-        limits: Vec::new(),
-        noise: HashMap::new(),
-    };
+    let mut picture = Picture { input, limits: Vec::new(), noise: HashMap::new() };
     let (width, height) = (i64::from(input.width), i64::from(input.height));
     let rows = |border: i64| {
         let columns = move |y| (-border..width + border).map(move |x| [x, y]);
@@ -62,12 +58,7 @@ impl Picture<'_> {
     fn is_usable(&self, p: Position) -> bool {
         let (input, i) = (self.input, self.index(p));
         let [r, g, b, _] = input.color[i];
-        let vectors = [
-            Vec3::new(r, g, b),
-            input.odd[i],
-            input.albedo[i],
-            input.normal[i],
-        ];
+        let vectors = [Vec3::new(r, g, b), input.odd[i], input.albedo[i], input.normal[i]];
         let sum: f32 = vectors.iter().map(|v| v.abs().element_sum()).sum();
         sum <= MAX_VALUE
     }
@@ -83,9 +74,7 @@ impl Picture<'_> {
     fn divisor(&self, p: Position) -> DVec3 {
         let i = self.index(p);
         if (DEPTHS[0]..=DEPTHS[1]).contains(&self.input.depth[i]) {
-            self.input.albedo[i]
-                .as_dvec3()
-                .max(DVec3::splat(MIN_ALBEDO.into()))
+            self.input.albedo[i].as_dvec3().max(DVec3::splat(MIN_ALBEDO.into()))
         } else {
             DVec3::ONE
         }
@@ -122,11 +111,7 @@ impl Picture<'_> {
             return f64::INFINITY;
         };
         let limit = f64::from(BRIGHTER) * others[last];
-        if brightness(p) > limit {
-            limit
-        } else {
-            f64::INFINITY
-        }
+        if brightness(p) > limit { limit } else { f64::INFINITY }
     }
 
     /// The colours of both halves without albedo.

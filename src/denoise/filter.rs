@@ -135,17 +135,14 @@ impl<'a> TileFilter<'a> {
     /// Computes the colour distances of row `y` at offset `number`.
     fn compare(&mut self, place: &Rectangle, number: usize, y: isize) {
         let offset = self.offsets[number];
-        let [p_first, q_first] = offset
-            .first_columns()
-            .map(|x| self.layout.column(x - PATCH_RADIUS as isize));
+        let [p_first, q_first] =
+            offset.first_columns().map(|x| self.layout.column(x - PATCH_RADIUS as isize));
         // The slot depends on the image and not on the tile, and so does the order of the sum over slots
         let slot = (place.top as isize + y).rem_euclid(PATCH_SIDE as isize) as usize;
         let sums = &mut self.distances[number * DISTANCES_LEN + slot * 2 * STRIDE..][..2 * STRIDE];
         let p = &self.tile.row(y)[p_first..];
         let q = &self.tile.row(y + offset.dy)[q_first..];
-        let TileLayout {
-            pairs, compared, ..
-        } = self.layout;
+        let TileLayout { pairs, compared, .. } = self.layout;
         distances(self.simd, p, q, compared, pairs, &mut self.pixels, sums);
     }
 
@@ -217,11 +214,7 @@ mod tests {
             let floats = values.iter().sum::<usize>() + filter.tile.capacity();
             let offsets = filter.offsets.capacity() * size_of::<Offset>();
             let held = floats * size_of::<f32>() + offsets;
-            assert_eq!(
-                TileFilter::bytes(search as usize, rows),
-                held,
-                "{search} {rows}"
-            );
+            assert_eq!(TileFilter::bytes(search as usize, rows), held, "{search} {rows}");
         }
     }
 }

@@ -35,19 +35,13 @@ impl Shares {
     /// Of at least 2 samples, counted from 0.
     pub(super) fn of(samples: u32) -> Self {
         let odd = (samples / 2) as f32 / samples as f32;
-        Self {
-            even: 1.0 - odd,
-            odd,
-        }
+        Self { even: 1.0 - odd, odd }
     }
 }
 
 /// Whether `depth` is that of an intersection.
 #[inline(always)]
-#[expect(
-    clippy::manual_range_contains,
-    reason = "both comparisons without a branch"
-)]
+#[expect(clippy::manual_range_contains, reason = "both comparisons without a branch")]
 fn is_depth(depth: f32) -> bool {
     (depth >= DEPTHS[0]) & (depth <= DEPTHS[1])
 }
@@ -95,11 +89,7 @@ fn classify_body(
     let depth_plane = &mut depth_plane[..count];
     for x in 0..count {
         let [r, g, b, _] = color[x];
-        usable[x] = if is_usable(&[r, g, b], &odd[x], &albedo[x], &normal[x]) {
-            1.0
-        } else {
-            0.0
-        };
+        usable[x] = if is_usable(&[r, g, b], &odd[x], &albedo[x], &normal[x]) { 1.0 } else { 0.0 };
         depth_plane[x] = if is_depth(depth[x]) { depth[x] } else { MISSED };
     }
 }
@@ -196,21 +186,14 @@ fn noise_body(
     let count = noise.len();
     // Sum along columns
     let width = count + 2;
-    let [above, at, below] = [
-        &variance[0][..width],
-        &variance[1][..width],
-        &variance[2][..width],
-    ];
+    let [above, at, below] = [&variance[0][..width], &variance[1][..width], &variance[2][..width]];
     let column_sums = &mut column_sums[..width];
     for x in 0..width {
         column_sums[x] = above[x] + at[x] + below[x];
     }
     // Sum along rows
-    let (left, center, right) = (
-        &column_sums[..count],
-        &column_sums[1..][..count],
-        &column_sums[2..][..count],
-    );
+    let (left, center, right) =
+        (&column_sums[..count], &column_sums[1..][..count], &column_sums[2..][..count]);
     let colors = colors.map(
         #[inline(always)]
         |plane| &plane[..count],

@@ -139,12 +139,7 @@ impl DenoiseInput<'_> {
             ("depth", self.depth.len()),
         ] {
             if len as u64 != wanted {
-                return Err(DenoiseError::Length {
-                    plane,
-                    len,
-                    width,
-                    height,
-                });
+                return Err(DenoiseError::Length { plane, len, width, height });
             }
         }
         Ok(())
@@ -153,10 +148,7 @@ impl DenoiseInput<'_> {
     /// Width and height of a view.
     fn view(&self) -> [usize; 2] {
         let part = |length: u32, views: u32| length.div_ceil(views.max(1)) as usize;
-        [
-            part(self.width, self.views[0]),
-            part(self.height, self.views[1]),
-        ]
+        [part(self.width, self.views[0]), part(self.height, self.views[1])]
     }
 }
 
@@ -191,10 +183,7 @@ struct Execution {
 
 impl Default for Execution {
     fn default() -> Self {
-        Self {
-            simd: SimdLevel::best(),
-            tile: [usize::MAX, TILE_ROWS],
-        }
+        Self { simd: SimdLevel::best(), tile: [usize::MAX, TILE_ROWS] }
     }
 }
 
@@ -222,10 +211,8 @@ fn denoise_with(
     // Filter them in parallel
     let simd = Supported::or_best(execution.simd);
     let filter = || TileFilter::new(simd, (input, &limits), settings, [columns, rows]);
-    tiles
-        .into_par_iter()
-        .for_each_init(filter, |filter, (place, mut rows)| {
-            filter.filter(&place, &mut rows);
-        });
+    tiles.into_par_iter().for_each_init(filter, |filter, (place, mut rows)| {
+        filter.filter(&place, &mut rows);
+    });
     Ok(filtered)
 }

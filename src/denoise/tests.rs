@@ -54,9 +54,8 @@ impl Picture {
         let mut random = Random(seed);
         let mut picture = Self::flat(width, height);
         picture.samples = 3;
-        let objects: Vec<_> = (0..64)
-            .map(|_| (random.vector(), random.vector(), random.next()))
-            .collect();
+        let objects: Vec<_> =
+            (0..64).map(|_| (random.vector(), random.vector(), random.next())).collect();
         for i in 0..width * height {
             let (x, y) = (i % width, i / width);
             let (color, normal, depth) = objects[x / 9 % 8 * 8 + y / 7 % 8];
@@ -193,14 +192,7 @@ fn the_result_does_not_depend_on_tiles_threads_and_instruction_sets() {
 
 #[test]
 fn pictures_of_one_colour_keep_their_bits() {
-    for (samples, value) in [
-        (2, 0.1),
-        (3, 0.1),
-        (5, 1e-30),
-        (16, 7e5),
-        (64, 0.0),
-        (2, -0.3),
-    ] {
+    for (samples, value) in [(2, 0.1), (3, 0.1), (5, 1e-30), (16, 7e5), (64, 0.0), (2, -0.3)] {
         for albedo in [0.0, 0.3, 1.0] {
             let mut picture = Picture::flat(40, 20);
             picture.samples = samples;
@@ -210,11 +202,7 @@ fn pictures_of_one_colour_keep_their_bits() {
             picture.albedo.fill(Vec3::splat(albedo));
             let filtered = picture.denoised();
             let expected = vec![color; filtered.len()];
-            assert_eq!(
-                bits(&filtered),
-                bits(&expected),
-                "{samples} {value} {albedo}"
-            );
+            assert_eq!(bits(&filtered), bits(&expected), "{samples} {value} {albedo}");
         }
     }
 }
@@ -245,10 +233,7 @@ fn values_that_are_not_finite_stay_where_they_are() {
         if kept.contains(&i) {
             assert_eq!(bits(&[*pixel]), bits(&[picture.color(i)]), "{i}");
         } else {
-            assert!(
-                pixel.is_finite() && pixel.max_element() < 10.0,
-                "{i}: {pixel}"
-            );
+            assert!(pixel.is_finite() && pixel.max_element() < 10.0, "{i}: {pixel}");
         }
     }
 }
@@ -295,14 +280,7 @@ fn picture_with_edge(change: impl Fn(&mut Picture, usize)) -> Picture {
 /// The difference of brightness between the columns beside the edge.
 fn step_at_edge(picture: &Picture) -> f32 {
     let filtered = picture.denoised();
-    let column = |x: usize| {
-        filtered
-            .iter()
-            .skip(x)
-            .step_by(64)
-            .map(|p| p.x)
-            .sum::<f32>()
-    };
+    let column = |x: usize| filtered.iter().skip(x).step_by(64).map(|p| p.x).sum::<f32>();
     (column(32) - column(31)) / picture.height as f32
 }
 
@@ -324,9 +302,8 @@ fn edges_of_features_stay_sharp() {
 
 #[test]
 fn surfaces_at_an_angle_are_not_edges() {
-    let mut picture = Picture::new(100, 100, |x, y| {
-        (Vec3::splat(0.5), 1.0 + 0.3 * x as f32 + 0.7 * y as f32)
-    });
+    let mut picture =
+        Picture::new(100, 100, |x, y| (Vec3::splat(0.5), 1.0 + 0.3 * x as f32 + 0.7 * y as f32));
     picture.add_noise(0.3, 1);
     let before = flat_noise((0..100 * 100).map(|i| picture.color(i)));
     let ratio = before / flat_noise(picture.denoised().into_iter());
@@ -356,12 +333,8 @@ fn a_bright_sample_does_not_spread() {
 #[test]
 fn glints_do_not_become_squares() {
     for (light, glint) in [1e3, 1e4, 1e5].into_iter().flat_map(|light| {
-        let shapes = [
-            &[(20, 20)][..],
-            &[(20, 20), (21, 20)],
-            &[(20, 20), (21, 21), (20, 21)],
-            &[(0, 39)],
-        ];
+        let shapes =
+            [&[(20, 20)][..], &[(20, 20), (21, 20)], &[(20, 20), (21, 21), (20, 21)], &[(0, 39)]];
         shapes.map(|shape| (light, shape))
     }) {
         for part_of_odd in [0.0, 0.4, 1.0] {
@@ -380,20 +353,13 @@ fn glints_do_not_become_squares() {
                 let change = (after[i] - before[i]).x;
                 if is_glint(i) {
                     // Its light stays where it is
-                    assert!(
-                        (change / light - 1.0).abs() < 0.01,
-                        "{name}: {change} at {i}"
-                    );
+                    assert!((change / light - 1.0).abs() < 0.01, "{name}: {change} at {i}");
                 } else {
                     // Patches of its neighbours are like no others, so that these keep their noise
                     let is_beside = |(x, y): &(usize, usize)| {
                         x.abs_diff(i % 40) <= 1 && y.abs_diff(i / 40) <= 1
                     };
-                    let limit = if glint.iter().any(is_beside) {
-                        1.0
-                    } else {
-                        0.3
-                    };
+                    let limit = if glint.iter().any(is_beside) { 1.0 } else { 0.3 };
                     assert!(change.abs() < limit, "{name}: {change} at {i}");
                     sum += change;
                 }
@@ -417,73 +383,22 @@ fn invalid_input_is_an_error() {
         assert!(message(&input, &settings).contains("use at least 2"));
     }
     for (input, plane) in [
-        (
-            DenoiseInput {
-                color: &picture.color[1..],
-                ..valid
-            },
-            "color",
-        ),
-        (
-            DenoiseInput {
-                odd: &picture.odd[1..],
-                ..valid
-            },
-            "odd",
-        ),
-        (
-            DenoiseInput {
-                albedo: &picture.albedo[1..],
-                ..valid
-            },
-            "albedo",
-        ),
-        (
-            DenoiseInput {
-                normal: &picture.normal[1..],
-                ..valid
-            },
-            "normal",
-        ),
-        (
-            DenoiseInput {
-                depth: &picture.depth[1..],
-                ..valid
-            },
-            "depth",
-        ),
+        (DenoiseInput { color: &picture.color[1..], ..valid }, "color"),
+        (DenoiseInput { odd: &picture.odd[1..], ..valid }, "odd"),
+        (DenoiseInput { albedo: &picture.albedo[1..], ..valid }, "albedo"),
+        (DenoiseInput { normal: &picture.normal[1..], ..valid }, "normal"),
+        (DenoiseInput { depth: &picture.depth[1..], ..valid }, "depth"),
     ] {
         let expected = format!("the plane {plane} has 19 pixels, the picture has 5x4");
         assert_eq!(message(&input, &settings), expected);
     }
-    let huge = DenoiseInput {
-        views: [1, 1],
-        width: u32::MAX,
-        height: u32::MAX,
-        ..valid
-    };
+    let huge = DenoiseInput { views: [1, 1], width: u32::MAX, height: u32::MAX, ..valid };
     assert!(message(&huge, &settings).contains("has 20 pixels"));
     for (search, k, expected) in [
-        (
-            0,
-            0.5,
-            "search radius 0 is out of range, it must lie in 1 to 16",
-        ),
-        (
-            17,
-            0.5,
-            "search radius 17 is out of range, it must lie in 1 to 16",
-        ),
-        (
-            4,
-            0.0,
-            "k = 0 is out of range, it must lie in 0.001 to 1000",
-        ),
-        (
-            4,
-            f32::NAN,
-            "k = NaN is out of range, it must lie in 0.001 to 1000",
-        ),
+        (0, 0.5, "search radius 0 is out of range, it must lie in 1 to 16"),
+        (17, 0.5, "search radius 17 is out of range, it must lie in 1 to 16"),
+        (4, 0.0, "k = 0 is out of range, it must lie in 0.001 to 1000"),
+        (4, f32::NAN, "k = NaN is out of range, it must lie in 0.001 to 1000"),
     ] {
         assert_eq!(message(&valid, &DenoiseSettings { search, k }), expected);
     }
@@ -524,14 +439,8 @@ fn views_are_filtered_as_pictures_of_their_own() {
         };
         let expected = joined(&a.denoised(), &b.denoised(), width, views);
         for tile in [[usize::MAX, TILE_ROWS], [7, 5], [16, 1]] {
-            let execution = Execution {
-                tile,
-                ..Execution::default()
-            };
-            let input = DenoiseInput {
-                views,
-                ..pair.input()
-            };
+            let execution = Execution { tile, ..Execution::default() };
+            let input = DenoiseInput { views, ..pair.input() };
             let filtered = denoise_with(&input, &DenoiseSettings::OPAQUE, &execution);
             let filtered = filtered.expect("valid input");
             assert_eq!(bits(&filtered), bits(&expected), "{views:?} {tile:?}");

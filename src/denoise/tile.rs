@@ -60,13 +60,7 @@ impl Tile {
         let margin = self.layout.margin;
         let rows = place.height + 2 * margin;
         // Copy the rows of the image
-        let line = Line {
-            simd,
-            input,
-            limits,
-            margin,
-            view: View::around(input, place),
-        };
+        let line = Line { simd, input, limits, margin, view: View::around(input, place) };
         for (number, row) in self.values.chunks_mut(ROW_LEN).take(rows).enumerate() {
             line.copy(number, place, row, &mut self.buffer);
         }
@@ -89,14 +83,7 @@ impl Tile {
         let colors: [&[f32]; 6] = std::array::from_fn(|c| &plane(row, EVEN + c)[inner.clone()]);
         let variance = [above, row, below].map(|row| plane(row, VARIANCE));
         let albedo = &plane(row, ALBEDO + 1)[inner.clone()];
-        noise(
-            simd,
-            &variance,
-            &colors,
-            albedo,
-            &mut self.buffer,
-            noise_plane,
-        );
+        noise(simd, &variance, &colors, albedo, &mut self.buffer, noise_plane);
         // Compute slopes
         let [above, below] = [above, below].map(|row| &plane(row, DEPTH)[inner.clone()]);
         slopes(simd, plane(row, DEPTH), above, below, slope_x, slope_y);

@@ -97,12 +97,7 @@ pub(super) fn tiles(
         for start in (0..width).step_by(view[0]) {
             let end = width.min(start + view[0]);
             all.extend((start..end).step_by(columns).map(|left| {
-                let place = Rectangle {
-                    left,
-                    top,
-                    width: columns.min(end - left),
-                    height,
-                };
+                let place = Rectangle { left, top, width: columns.min(end - left), height };
                 (place, Vec::with_capacity(height))
             }));
         }
@@ -157,14 +152,8 @@ mod tests {
             let lines: usize = all.iter().map(|(_, rows)| size_of_val(&rows[..])).sum();
             assert!((places + lines) as u64 <= predicted, "{width}x{height}");
             for (place, rows) in all {
-                assert_eq!(
-                    place.left / view[0],
-                    (place.left + place.width - 1) / view[0]
-                );
-                assert_eq!(
-                    place.top / view[1],
-                    (place.top + place.height - 1) / view[1]
-                );
+                assert_eq!(place.left / view[0], (place.left + place.width - 1) / view[0]);
+                assert_eq!(place.top / view[1], (place.top + place.height - 1) / view[1]);
                 assert_eq!(rows.len(), place.height);
                 for (y, row) in rows.into_iter().enumerate() {
                     assert_eq!(row.len(), place.width);

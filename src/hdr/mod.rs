@@ -80,9 +80,8 @@ type Check = fn(usize, usize) -> Result<(), Fault>;
 /// See [`HdrError`]; messages begin with the path.
 pub fn read_radiance_map(path: &Path) -> Result<RadianceMap, HdrError> {
     read(path, |file| {
-        let image = decode_radiance(file, |width, height| {
-            Ok(RadianceMap::check_size(width, height)?)
-        })?;
+        let image =
+            decode_radiance(file, |width, height| Ok(RadianceMap::check_size(width, height)?))?;
         Ok(RadianceMap::new(image.width, image.height, image.pixels)?)
     })
 }
@@ -107,21 +106,13 @@ fn read<T>(
     path: &Path,
     decode: impl FnOnce(BufReader<File>) -> Result<T, Fault> + std::panic::UnwindSafe,
 ) -> Result<T, HdrError> {
-    let unusable = |what: String| HdrError::Unusable {
-        path: path.to_owned(),
-        what,
-    };
-    let file = spherule_jobs::open_regular(path).map_err(|source| HdrError::Io {
-        path: path.to_owned(),
-        source,
-    })?;
+    let unusable = |what: String| HdrError::Unusable { path: path.to_owned(), what };
+    let file = spherule_jobs::open_regular(path)
+        .map_err(|source| HdrError::Io { path: path.to_owned(), source })?;
     // Decoders of files from elsewhere may panic
     match catch_panic(|| Ok::<_, Panic>(decode(BufReader::new(file.0)))) {
         Ok(Ok(image)) => Ok(image),
-        Ok(Err(Fault::Io(source))) => Err(HdrError::Io {
-            path: path.to_owned(),
-            source,
-        }),
+        Ok(Err(Fault::Io(source))) => Err(HdrError::Io { path: path.to_owned(), source }),
         Ok(Err(fault)) => Err(unusable(fault.to_string())),
         Err(_) => Err(unusable("the image is damaged".to_owned())),
     }

@@ -33,9 +33,7 @@ pub(super) fn decode(file: impl Read + Seek, check_size: Check) -> Result<Pixels
     let found = meta.headers.iter().zip(0_usize..);
     let mut found = found.filter_map(|(header, part)| Some((part, header, components(header)?)));
     let Some((part, header, components)) = found.next() else {
-        return Err(Fault::Other(
-            "has no part with the channels R, G and B".to_owned(),
-        ));
+        return Err(Fault::Other("has no part with the channels R, G and B".to_owned()));
     };
     check(header, check_size)?;
     let [width, height] = [header.layer_size.x(), header.layer_size.y()];
@@ -60,11 +58,7 @@ pub(super) fn decode(file: impl Read + Seek, check_size: Check) -> Result<Pixels
             }
         }
     }
-    Ok(Pixels {
-        width,
-        height,
-        pixels,
-    })
+    Ok(Pixels { width, height, pixels })
 }
 
 /// Indices of the channels R, G and B, if the part has all of them.
@@ -98,15 +92,11 @@ fn check(header: &Header, check_size: Check) -> Result<(), Fault> {
 #[expect(clippy::cast_precision_loss, reason = "integers are seldom radiance")]
 fn samples(line: &LineRef<'_>, kind: SampleType) -> Result<Vec<f32>, Fault> {
     let values: Result<Vec<f32>, exr::error::Error> = match kind {
-        SampleType::F16 => line
-            .read_samples::<half::f16>()
-            .map(|v| v.map(half::f16::to_f32))
-            .collect(),
+        SampleType::F16 => {
+            line.read_samples::<half::f16>().map(|v| v.map(half::f16::to_f32)).collect()
+        }
         SampleType::F32 => line.read_samples::<f32>().collect(),
-        SampleType::U32 => line
-            .read_samples::<u32>()
-            .map(|v| v.map(|v| v as f32))
-            .collect(),
+        SampleType::U32 => line.read_samples::<u32>().map(|v| v.map(|v| v as f32)).collect(),
     };
     Ok(values?)
 }

@@ -66,16 +66,12 @@ pub(super) fn decode(file: impl Read, check: Check, behind: Vec3) -> Result<Pixe
         RgbEncoding::Srgb16 => (bytes.chunks_exact(2 * channels))
             .map(|p| pixel(&|c| u16::from_be_bytes([p[2 * c], p[2 * c + 1]])))
             .collect(),
-        RgbEncoding::Srgb8 | RgbEncoding::Linear => (bytes.chunks_exact(channels))
-            .map(|p| pixel(&|c| u16::from(p[c])))
-            .collect(),
+        RgbEncoding::Srgb8 | RgbEncoding::Linear => {
+            (bytes.chunks_exact(channels)).map(|p| pixel(&|c| u16::from(p[c]))).collect()
+        }
     };
     if pixels.len() != width * height {
         return Err(Fault::Other("ends before its last row".to_owned()));
     }
-    Ok(Pixels {
-        width,
-        height,
-        pixels,
-    })
+    Ok(Pixels { width, height, pixels })
 }

@@ -27,9 +27,5 @@ pub(super) fn decode(file: impl BufRead, check_size: Check) -> Result<Pixels, Fa
     decoder.read_image(bytemuck::cast_slice_mut(&mut values))?;
     let (pixels, _) = values.as_chunks::<3>();
     let pixels = pixels.iter().map(|pixel| Vec3::from_array(*pixel));
-    Ok(Pixels {
-        width,
-        height,
-        pixels: pixels.collect(),
-    })
+    Ok(Pixels { width, height, pixels: pixels.collect() })
 }

@@ -48,9 +48,7 @@ fn radiance_bytes(width: usize, height: usize) -> Vec<u8> {
 fn message(path: &Path) -> String {
     let message = read_radiance_map(path).unwrap_err().to_string();
     let name = path.display().to_string();
-    let rest = message
-        .strip_prefix(&name)
-        .expect("messages begin with the file");
+    let rest = message.strip_prefix(&name).expect("messages begin with the file");
     rest.to_owned()
 }
 
@@ -93,12 +91,7 @@ fn channels_are_found_among_others_and_in_tiles() {
         line_order: LineOrder::Unspecified,
     };
     let channels = AnyChannels::sort(list.into_iter().collect());
-    let layer = Layer::new(
-        (WIDTH, HEIGHT),
-        LayerAttributes::default(),
-        encoding,
-        channels,
-    );
+    let layer = Layer::new((WIDTH, HEIGHT), LayerAttributes::default(), encoding, channels);
     Image::from_layer(layer).write().to_file(&path).unwrap();
     assert_eq!(read_radiance_map(&path).unwrap(), expected());
 }
@@ -111,14 +104,8 @@ fn bad_images_are_refused_by_name_and_reason() {
         std::fs::write(&path, bytes).unwrap();
         path
     };
-    assert!(matches!(
-        read_radiance_map(&dir.path().join("none")),
-        Err(HdrError::Io { .. })
-    ));
-    assert!(matches!(
-        read_radiance_map(dir.path()),
-        Err(HdrError::Io { .. })
-    ));
+    assert!(matches!(read_radiance_map(&dir.path().join("none")), Err(HdrError::Io { .. })));
+    assert!(matches!(read_radiance_map(dir.path()), Err(HdrError::Io { .. })));
     assert!(message(&at("a.hdr", b"")).contains("neither an OpenEXR nor"));
     assert!(message(&at("b.hdr", b"\x89PNG\r\n\x1a\n")).contains("convert it"));
     assert!(message(&at("c.hdr", &radiance_bytes(12, 11))).contains("twice as wide"));

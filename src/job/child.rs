@@ -61,10 +61,7 @@ impl ChildCommand {
         program: impl Into<PathBuf>,
         arguments: impl IntoIterator<Item = impl Into<String>>,
     ) -> Self {
-        Self {
-            program: program.into(),
-            arguments: arguments.into_iter().map(Into::into).collect(),
-        }
+        Self { program: program.into(), arguments: arguments.into_iter().map(Into::into).collect() }
     }
 
     /// The command that runs the executable of this process with `arguments`, even if the file is replaced meanwhile.
@@ -172,11 +169,7 @@ impl Crash {
             None if text.contains("panicked at") => "internal error, please report it".to_owned(),
             None => status.to_string(),
         };
-        if text.is_empty() {
-            Self::Died(how)
-        } else {
-            Self::Died(format!("{how}: {text}"))
-        }
+        if text.is_empty() { Self::Died(how) } else { Self::Died(format!("{how}: {text}")) }
     }
 }
 
@@ -204,11 +197,7 @@ mod tests {
                 "memory allocation of 48000000000 bytes failed\nstack backtrace:\n   0: main\n",
                 "out of memory: memory allocation of 48000000000 bytes failed",
             ),
-            (
-                by_signal(9),
-                "",
-                "killed by the system, probably because memory ran out",
-            ),
+            (by_signal(9), "", "killed by the system, probably because memory ran out"),
             (by_signal(15), "", "ended by signal 15"),
             (
                 ExitStatus::from_raw(101 << 8),

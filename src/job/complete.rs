@@ -39,19 +39,13 @@ impl JobManifest {
             }
         };
         let defaults = match plan {
-            Some(plan) => Defaults {
-                settings: planned(&source, plan.settings()),
-                lines: Vec::new(),
-            },
+            Some(plan) => {
+                Defaults { settings: planned(&source, plan.settings()), lines: Vec::new() }
+            }
             None => self.defaults(&source, sequence)?,
         };
         let mut manifest = source.parse_over(defaults.settings)?;
-        if let Some(parts) = manifest
-            .input
-            .parts
-            .as_ref()
-            .filter(|_| source.lacks("input.parts"))
-        {
+        if let Some(parts) = manifest.input.parts.as_ref().filter(|_| source.lacks("input.parts")) {
             self.keep_parts(sequence, Some(parts))?;
         }
         manifest.look = Look::None;
@@ -78,10 +72,7 @@ impl JobManifest {
             defaults.settings.extend(parts);
         }
         let facts = in_thread(|| Facts::of(sequence));
-        let files = Files {
-            parts: sequence.part_names(),
-            is_y_up: sequence.is_y_up(),
-        };
+        let files = Files { parts: sequence.part_names(), is_y_up: sequence.is_y_up() };
         let found = rules(&self.manifest, source, &facts, files);
         defaults.settings.extend(found.settings);
         defaults.lines.extend(found.lines);

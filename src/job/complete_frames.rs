@@ -35,11 +35,7 @@ pub(super) struct CompleteFrames {
 impl CompleteFrames {
     /// Files are complete when they have not changed for `settle`.
     pub(super) fn new(settle: Duration) -> Self {
-        Self {
-            settle,
-            observed: BTreeMap::new(),
-            last_change: Instant::now(),
-        }
+        Self { settle, observed: BTreeMap::new(), last_change: Instant::now() }
     }
 
     /// Checks the files of all frames at the time `now`.
@@ -48,17 +44,9 @@ impl CompleteFrames {
         for (index, frame) in sequence.frames().iter().enumerate() {
             let paths = sequence.inputs(index).into_iter();
             let files: Vec<_> = paths
-                .map(|path| {
-                    *known
-                        .entry(path.to_owned())
-                        .or_insert_with(|| file_state(path))
-                })
+                .map(|path| *known.entry(path.to_owned()).or_insert_with(|| file_state(path)))
                 .collect();
-            let current = ObservedFrame {
-                files,
-                unchanged_since: now,
-                is_returned: false,
-            };
+            let current = ObservedFrame { files, unchanged_since: now, is_returned: false };
             match self.observed.get_mut(&frame.number) {
                 Some(known) if known.files == current.files => continue,
                 Some(known) => *known = current,
@@ -79,9 +67,7 @@ impl CompleteFrames {
 
     /// Whether all known frames are complete at the time `now`.
     pub(super) fn all_complete(&self, now: Instant) -> bool {
-        self.observed
-            .keys()
-            .all(|frame| self.is_complete(*frame, now))
+        self.observed.keys().all(|frame| self.is_complete(*frame, now))
     }
 
     /// The complete frames that are new or have changed since they were returned, ascending.

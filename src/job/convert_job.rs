@@ -92,10 +92,7 @@ impl ConvertJob {
         let frames = frames_in(&self.sequence, self.range.as_ref())?;
         let is_named = self.name.is_some();
         if is_named && frames.len() > 1 {
-            return Err(RunError::OneName {
-                path: self.output.clone(),
-                frames: frames.len(),
-            });
+            return Err(RunError::OneName { path: self.output.clone(), frames: frames.len() });
         }
         let is_selected = |(_, frame): &(usize, &SequenceFrame)| frames.contains(&frame.number);
         let all = self.sequence.frames().iter().enumerate();
@@ -113,11 +110,8 @@ impl ConvertJob {
     fn request(&self, mode: ResumeMode) -> JobRequest {
         let mut settings = vec![(KIND.to_owned(), CONVERT.to_owned())];
         settings.extend(self.settings.settings());
-        let mut frames = frame_requests(
-            &self.sequence,
-            |_| Vec::new(),
-            |frame| vec![self.output(frame)],
-        );
+        let mut frames =
+            frame_requests(&self.sequence, |_| Vec::new(), |frame| vec![self.output(frame)]);
         if let Some(range) = self.range.as_ref().filter(|_| self.name.is_some()) {
             frames.retain(|frame| range.contains(frame.number));
         }
@@ -172,22 +166,14 @@ impl ConvertJob {
         on_event: OnFrameEvent<'_, ConvertedFrame>,
     ) -> Result<(), RunError> {
         let tasks: Vec<ConvertTask> = indices(&self.sequence, &job.pending())
-            .map(|(frame, index)| ConvertTask {
-                frame,
-                index,
-                output: self.output(frame),
-            })
+            .map(|(frame, index)| ConvertTask { frame, index, output: self.output(frame) })
             .collect();
         let options = RunOptions {
             frames: tasks.iter().map(|task| task.frame).collect(),
             retries: 0,
             interrupt: interrupt.clone(),
         };
-        let work = ConvertWork {
-            conversion,
-            sequence: &self.sequence,
-            tasks: &tasks,
-        };
+        let work = ConvertWork { conversion, sequence: &self.sequence, tasks: &tasks };
         Ok(run_frames(job, &work, &options, on_event)?)
     }
 }

@@ -121,10 +121,7 @@ impl<'a> Follower<'a> {
     ///
     /// # Errors
     /// The input cannot be listed.
-    #[expect(
-        clippy::should_implement_trait,
-        reason = "an iterator cannot return errors with `?`"
-    )]
+    #[expect(clippy::should_implement_trait, reason = "an iterator cannot return errors with `?`")]
     pub fn next(&mut self) -> Result<Result<(Sequence, Vec<i64>), FollowEnd>, RunError> {
         loop {
             if self.interrupt.is_raised() {

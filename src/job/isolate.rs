@@ -86,24 +86,16 @@ fn render(task: IsolatedTask) -> Result<Outcome, RunError> {
         return Ok(Outcome::Missing);
     };
     let mut notes = Vec::new();
-    Ok(
-        match make_image(&setup, &sequence, image, |note| notes.push(note)) {
-            Ok(report) => Outcome::Done {
-                report: Box::new(report),
-                notes,
-            },
-            Err(ImageError::Write(WriteError::Io { path, source })) => {
-                Outcome::Unwritable(path, source.raw_os_error())
-            }
-            Err(error) => {
-                let failure = error.into_failure(task.frame);
-                Outcome::Failed {
-                    kind: failure.kind,
-                    reason: failure.to_string(),
-                }
-            }
-        },
-    )
+    Ok(match make_image(&setup, &sequence, image, |note| notes.push(note)) {
+        Ok(report) => Outcome::Done { report: Box::new(report), notes },
+        Err(ImageError::Write(WriteError::Io { path, source })) => {
+            Outcome::Unwritable(path, source.raw_os_error())
+        }
+        Err(error) => {
+            let failure = error.into_failure(task.frame);
+            Outcome::Failed { kind: failure.kind, reason: failure.to_string() }
+        }
+    })
 }
 
 /// Renders the frames of a job in child processes.
@@ -132,11 +124,7 @@ impl FrameWork for IsolatedRender<'_> {
         let stop = || context.interrupt().stop_now();
         let failure = |kind, source| {
             discard(image);
-            Err(FrameFailure {
-                kind,
-                frame: number,
-                source,
-            })
+            Err(FrameFailure { kind, frame: number, source })
         };
         match self.command.run(&self.task(number), stop) {
             ChildResult::Completed(IsolatedResult(outcome)) => {
@@ -187,10 +175,7 @@ impl IsolatedRender<'_> {
             Outcome::Done { mut report, notes } => {
                 context.report_notes(notes);
                 report.seconds.wall = start.elapsed().as_secs_f64();
-                Ok(FinishedFrame {
-                    outputs: image.outputs(),
-                    report: *report,
-                })
+                Ok(FinishedFrame { outputs: image.outputs(), report: *report })
             }
             Outcome::Failed { kind, reason } => Err(FrameFailure::new(kind, frame, reason)),
             Outcome::Missing => {

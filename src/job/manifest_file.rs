@@ -43,13 +43,7 @@ pub(super) fn reading_budget(manifest: &Manifest) -> MemoryBudget {
 impl JobManifest {
     /// A manifest that is not in a file. Its paths are relative to `base`.
     pub fn new(manifest: Manifest, base: impl Into<PathBuf>) -> Self {
-        Self {
-            manifest,
-            base: base.into(),
-            file: None,
-            unchanged: None,
-            source: None,
-        }
+        Self { manifest, base: base.into(), file: None, unchanged: None, source: None }
     }
 
     /// Finds the frames of the input.
@@ -134,11 +128,7 @@ impl ManifestFile {
             move_into(manifest, &base, &dir)?;
         }
         let given = requested.file.as_deref().map(absolute).transpose()?;
-        let file = Self {
-            dir,
-            given: given.map(|f| named_place(&f)),
-            unchanged,
-        };
+        let file = Self { dir, given: given.map(|f| named_place(&f)), unchanged };
         Ok((file, manifest))
     }
 
@@ -214,11 +204,8 @@ fn move_into(manifest: &mut Manifest, base: &Path, dir: &Path) -> Result<(), Reb
     // Store only the file name, so that the directory can be moved with its manifest
     if real_dir(&dir.join(manifest.output.path.dir())) == dir {
         let name = manifest.output.path.file_name();
-        manifest.output.path =
-            OutputPattern::parse(name).map_err(|reason| RebaseError::Output {
-                path: name.to_owned(),
-                reason,
-            })?;
+        manifest.output.path = OutputPattern::parse(name)
+            .map_err(|reason| RebaseError::Output { path: name.to_owned(), reason })?;
     }
     Ok(())
 }

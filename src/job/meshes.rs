@@ -55,10 +55,7 @@ impl JobMeshes {
             let origin = survey.origin;
             Ok(SharedMeshes { origin, meshes })
         };
-        let known = self
-            .loaded
-            .get()
-            .filter(|known| known.origin == survey.origin);
+        let known = self.loaded.get().filter(|known| known.origin == survey.origin);
         let shared = match known {
             Some(known) => known.clone(),
             None => {
@@ -78,10 +75,7 @@ impl JobMeshes {
     /// Notes for the user on those that have been read.
     pub(super) fn notes(&self) -> Vec<String> {
         let meshes = self.loaded.get().into_iter().flat_map(|l| l.meshes.iter());
-        meshes
-            .flatten()
-            .flat_map(|mesh| mesh.notes.clone())
-            .collect()
+        meshes.flatten().flat_map(|mesh| mesh.notes.clone()).collect()
     }
 }
 
@@ -93,8 +87,7 @@ fn shared_file(path: &MeshPath, dir: &Path) -> Option<PathBuf> {
 /// The files of the meshes that only `frame` has.
 pub(super) fn frame_files(manifest: &Manifest, dir: &Path, frame: i64) -> Vec<PathBuf> {
     let own = manifest.meshes.iter().filter(|mesh| mesh.path.has_number());
-    own.map(|mesh| named_place(&dir.join(mesh.path.path_for(frame))))
-        .collect()
+    own.map(|mesh| named_place(&dir.join(mesh.path.path_for(frame)))).collect()
 }
 
 /// Hashes of the meshes that all images share, by the keys of their paths. Those of a frame are among its inputs.

@@ -75,8 +75,6 @@ use std::thread;
 pub(crate) fn in_thread<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     thread::scope(|scope| {
         let thread = scope.spawn(work);
-        thread
-            .join()
-            .unwrap_or_else(|payload| panic::resume_unwind(payload))
+        thread.join().unwrap_or_else(|payload| panic::resume_unwind(payload))
     })
 }

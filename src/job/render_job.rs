@@ -45,13 +45,7 @@ impl RenderJob {
         let shown_output = PathBuf::from(requested.manifest.output.path.as_str());
         let (manifest_file, manifest) = ManifestFile::new(requested)?;
         let files = SceneFiles::new(manifest_file.dir());
-        Ok(Self {
-            manifest,
-            manifest_file,
-            shown_output,
-            shard,
-            files,
-        })
+        Ok(Self { manifest, manifest_file, shown_output, shard, files })
     }
 
     /// The job with the defaults of the version that began it, if a run in `mode` resumes one.
@@ -138,9 +132,7 @@ impl RenderJob {
                 |frame| self.mesh_files(frame),
                 outputs,
             )),
-            extra_outputs: [JSON_FILE, HTML_FILE]
-                .map(|name| self.dir().join(name))
-                .into(),
+            extra_outputs: [JSON_FILE, HTML_FILE].map(|name| self.dir().join(name)).into(),
             selection: Some(self.selected(sequence)),
             mode: match mode {
                 // A running simulation may have paused in the middle of a file
@@ -179,9 +171,7 @@ impl RenderJob {
             return Ok(settings);
         };
         let has_rgb = planned.resolved().get("rgb").is_some_and(Value::is_object);
-        let mut as_planned = self
-            .manifest
-            .settings_as_planned(planned.settings(), has_rgb);
+        let mut as_planned = self.manifest.settings_as_planned(planned.settings(), has_rgb);
         identify(&mut as_planned, &identities);
         // Settings that are resolved again must be the new ones
         let resolves_again =
@@ -207,10 +197,7 @@ impl RenderJob {
             Some(next) => (next, 1),
             None => (frames.get(index.checked_sub(1)?)?, -1),
         };
-        Some(NextMeshes {
-            files: self.mesh_files(other.number),
-            steps,
-        })
+        Some(NextMeshes { files: self.mesh_files(other.number), steps })
     }
 
     /// The frames of the job: all of the sequence, or the selected one if the output has no number.
@@ -263,10 +250,8 @@ impl RenderJob {
     /// No frame can be read, or the settings and the particles do not go together.
     pub fn survey(&self, sequence: &Sequence) -> Result<(Survey, Setup), RunError> {
         let selection = self.manifest.selection();
-        let question = Question {
-            framed: self.framed(sequence),
-            ..question(&self.manifest, &selection)
-        };
+        let question =
+            Question { framed: self.framed(sequence), ..question(&self.manifest, &selection) };
         let survey = in_thread(|| Survey::of(sequence, question))?;
         let setup = self.setup(&survey, sequence)?;
         Ok((survey, setup))
@@ -278,10 +263,7 @@ impl RenderJob {
             return None;
         }
         let first = *self.selected(sequence).first()?;
-        sequence
-            .frames()
-            .iter()
-            .position(|frame| frame.number == first)
+        sequence.frames().iter().position(|frame| frame.number == first)
     }
 
     fn setup(&self, survey: &Survey, sequence: &Sequence) -> Result<Setup, RunError> {
@@ -333,10 +315,8 @@ impl RenderJob {
         setup: &Setup,
         tasks: &mut [ImageTask],
     ) -> Schedule {
-        let sizes: Vec<FrameSize> = tasks
-            .iter()
-            .map(|task| FrameSize::of_task(sequence, task, setup))
-            .collect();
+        let sizes: Vec<FrameSize> =
+            tasks.iter().map(|task| FrameSize::of_task(sequence, task, setup)).collect();
         let limit = self.manifest.render.memory_limit;
         let mut schedule = MemoryModel::new(setup).schedule(&sizes, limit, available());
         for (index, error) in schedule.too_large.drain(..) {
@@ -353,10 +333,9 @@ impl RenderJob {
 pub fn require_one_fits(tasks: &[ImageTask]) -> Result<(), RunError> {
     let refused = tasks.iter().map(|t| Some((t.frame, t.refused.as_ref()?)));
     match refused.collect::<Option<Vec<_>>>().as_deref() {
-        Some([(frame, error), ..]) => Err(RunError::NothingFits {
-            frame: *frame,
-            source: (*error).clone(),
-        }),
+        Some([(frame, error), ..]) => {
+            Err(RunError::NothingFits { frame: *frame, source: (*error).clone() })
+        }
         _ => Ok(()),
     }
 }

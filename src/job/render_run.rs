@@ -168,9 +168,7 @@ impl RenderRun {
         pending.retain(|frame| new.contains(frame));
         self.sequence = sequence;
         self.tasks = self.render_job.tasks(&self.sequence, &pending);
-        self.schedule = self
-            .render_job
-            .schedule(&self.sequence, &self.setup, &mut self.tasks);
+        self.schedule = self.render_job.schedule(&self.sequence, &self.setup, &mut self.tasks);
         Ok(changes)
     }
 

@@ -73,19 +73,13 @@ impl SceneFiles {
     /// # Errors
     /// The image cannot be read.
     pub fn notes(&self, manifest: &Manifest) -> Result<Vec<String>, RunError> {
-        let negative = self
-            .environment_image(manifest)?
-            .map_or(0, RadianceMap::negative);
+        let negative = self.environment_image(manifest)?.map_or(0, RadianceMap::negative);
         let note = |path: PathBuf| {
             let path = path.display();
             format!("{path}: {negative} pixels are negative, which counts as 0")
         };
         let path = environment_path(manifest, &self.dir).filter(|_| negative > 0);
-        Ok(path
-            .map(note)
-            .into_iter()
-            .chain(self.meshes.notes())
-            .collect())
+        Ok(path.map(note).into_iter().chain(self.meshes.notes()).collect())
     }
 
     /// The files of the meshes that only `frame` has.

@@ -68,10 +68,9 @@ pub fn frames_in(sequence: &Sequence, range: Option<&FrameRange>) -> Result<Vec<
     };
     let selected = range.select(&numbers);
     match FrameRange::from_frames(numbers) {
-        Some(available) if selected.is_empty() => Err(RunError::NoFrames {
-            range: range.clone(),
-            available,
-        }),
+        Some(available) if selected.is_empty() => {
+            Err(RunError::NoFrames { range: range.clone(), available })
+        }
         _ => Ok(selected),
     }
 }
@@ -103,9 +102,7 @@ pub(super) fn frame_requests(
     let references = sequence.references();
     let request = |(index, number)| {
         let inputs = sequence.inputs(index);
-        let topology = sequence
-            .topology()
-            .map(|topology| topology.path().to_owned());
+        let topology = sequence.topology().map(|topology| topology.path().to_owned());
         let referenced = inputs.iter().filter_map(|path| references.get(path));
         let referenced = referenced.flatten().cloned();
         let beside = topology.into_iter().chain(referenced);
@@ -116,11 +113,7 @@ pub(super) fn frame_requests(
             outputs: outputs(number),
         }
     };
-    numbers(sequence)
-        .into_iter()
-        .enumerate()
-        .map(request)
-        .collect()
+    numbers(sequence).into_iter().enumerate().map(request).collect()
 }
 
 /// The numbers and indices of the `frames` that are in `sequence`.
@@ -146,14 +139,9 @@ mod tests {
 
     #[test]
     fn invalid_parts_are_rejected() {
-        assert_eq!(
-            "2/3".parse::<Shard>().unwrap().select(&[5, 6, 7, 8, 9]),
-            [6, 9]
-        );
+        assert_eq!("2/3".parse::<Shard>().unwrap().select(&[5, 6, 7, 8, 9]), [6, 9]);
         assert!("4/4".parse::<Shard>().unwrap().select(&[1, 2]).is_empty());
-        for text in [
-            "", "1", "0/2", "3/2", "1/0", "-1/2", "a/b", "1/2/3", "1.5/2",
-        ] {
+        for text in ["", "1", "0/2", "3/2", "1/0", "-1/2", "a/b", "1/2/3", "1.5/2"] {
             assert!(text.parse::<Shard>().is_err(), "{text}");
         }
     }

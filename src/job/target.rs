@@ -37,17 +37,11 @@ pub(super) fn check_output_dir(
         return Ok(());
     }
     let command = |kind: Option<&str>| kind.unwrap_or("render").to_owned();
-    Err(RunError::OtherKind {
-        dir: dir.to_owned(),
-        found: command(found),
-        expected: command(kind),
-    })
+    Err(RunError::OtherKind { dir: dir.to_owned(), found: command(found), expected: command(kind) })
 }
 
 /// The survey that is stored in the plan of the job in `dir`.
 pub(super) fn stored_survey(resolved: &Value, dir: &Path) -> Result<Survey, RunError> {
-    serde_json::from_value(resolved.clone()).map_err(|source| RunError::StoredSurvey {
-        path: dir.join(PLAN_FILE),
-        source,
-    })
+    serde_json::from_value(resolved.clone())
+        .map_err(|source| RunError::StoredSurvey { path: dir.join(PLAN_FILE), source })
 }

@@ -104,23 +104,11 @@ mod tests {
     fn impossible_arrows_are_refused() {
         for (text, part) in [
             ("scale = 1", "arrows.0.attribute: is missing; arrows need"),
-            (
-                "attribute = \"v\"",
-                "arrows.0.scale: is missing; the length",
-            ),
+            ("attribute = \"v\"", "arrows.0.scale: is missing; the length"),
             ("attribute = \"v\"\nscale = -1", "arrows.0.scale: expected"),
-            (
-                "attribute = \"v\"\nscale = 1\nradius = 0",
-                "arrows.0.radius: expected",
-            ),
-            (
-                "attribute = \"v\"\nscale = 1\nevery = 0",
-                "arrows.0.every: expected",
-            ),
-            (
-                "attribute = \"v\"\nscale = 1\nanchor = \"head\"",
-                "tail, center",
-            ),
+            ("attribute = \"v\"\nscale = 1\nradius = 0", "arrows.0.radius: expected"),
+            ("attribute = \"v\"\nscale = 1\nevery = 0", "arrows.0.every: expected"),
+            ("attribute = \"v\"\nscale = 1\nanchor = \"head\"", "tail, center"),
         ] {
             let error = read(&format!("[[arrows]]\n{text}")).unwrap_err();
             assert!(error.contains(part), "{text}: {error}");

@@ -111,17 +111,11 @@ mod tests {
         ] {
             let found = read(&format!("bonds.find = {text}")).unwrap();
             assert_eq!(found.find, expected);
-            assert_eq!(
-                read(&format!("bonds.find = {}", found.find.toml())),
-                Ok(found)
-            );
+            assert_eq!(read(&format!("bonds.find = {}", found.find.toml())), Ok(found));
         }
         for text in ["0", "-1", "nan", "1e39", "\"metallic\"", "[1]"] {
             let error = read(&format!("bonds.find = {text}")).unwrap_err();
-            assert!(
-                error.contains("bonds.find: expected a distance above 0"),
-                "{error}"
-            );
+            assert!(error.contains("bonds.find: expected a distance above 0"), "{error}");
         }
     }
 }

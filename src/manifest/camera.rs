@@ -186,10 +186,8 @@ impl Camera {
 
     fn check(&self, section: &Section<'_>) {
         if self.center.is_some() && self.mode == CameraMode::Turntable {
-            section.wrong(
-                "center",
-                "is given, but a turntable turns around the particles; remove it",
-            );
+            section
+                .wrong("center", "is given, but a turntable turns around the particles; remove it");
         }
         if self.aperture.is_some() && self.f_stop > 0.0 {
             section.wrong("aperture", "is given, but so is f_stop; remove one of them");
@@ -234,10 +232,7 @@ impl CameraKey {
     /// Checks one key. `camera_up` is for keys without an up vector; `frames` contains the frames of the previous keys.
     fn check(&self, section: &Section<'_>, camera_up: Option<DVec3>, frames: &mut BTreeSet<i64>) {
         if section.has("frame") && !frames.insert(self.frame) {
-            section.wrong(
-                "frame",
-                &format!("there is a key of frame {} already", self.frame),
-            );
+            section.wrong("frame", &format!("there is a key of frame {} already", self.frame));
         }
         if !(section.has("eye") && section.has("look_at")) {
             return;
@@ -248,10 +243,7 @@ impl CameraKey {
         } else if self.up.is_some_and(is_parallel) {
             section.wrong("up", "points along the view; it must not");
         } else if self.up.is_none() && camera_up.is_some_and(is_parallel) {
-            section.wrong(
-                "up",
-                "is camera.up, which points along the view; give the key another",
-            );
+            section.wrong("up", "is camera.up, which points along the view; give the key another");
         }
     }
 }

@@ -15,9 +15,7 @@ pub struct Caustics {
 }
 
 impl Caustics {
-    pub(super) const DEFAULT: Self = Self {
-        photons: DEFAULT_PHOTONS,
-    };
+    pub(super) const DEFAULT: Self = Self { photons: DEFAULT_PHOTONS };
 }
 
 fn photons() -> Key {
@@ -69,19 +67,10 @@ mod tests {
         assert_eq!(photons("[render.caustics]\nphotons = 0"), Ok(0));
         assert_eq!(photons("render.caustics.photons = 7"), Ok(7));
         for (setting, part) in [
-            (
-                "render.caustics = 5",
-                "expected a table such as { photons = 500000 }",
-            ),
+            ("render.caustics = 5", "expected a table such as { photons = 500000 }"),
             ("render.caustics.photons = -1", "render.caustics.photons: "),
-            (
-                "render.caustics.photons = 1e30",
-                "render.caustics.photons: ",
-            ),
-            (
-                "render.caustics.photon = 1",
-                "did you mean `render.caustics.photons`?",
-            ),
+            ("render.caustics.photons = 1e30", "render.caustics.photons: "),
+            ("render.caustics.photon = 1", "did you mean `render.caustics.photons`?"),
         ] {
             let error = photons(setting).unwrap_err().to_string();
             assert!(error.contains(part), "{setting}: {error}");

@@ -35,10 +35,7 @@ section! {
 impl Cell {
     /// What is done with the particles.
     pub const fn images(&self) -> PeriodicImages {
-        PeriodicImages {
-            replicate: self.replicate.0,
-            wrap: self.wrap,
-        }
+        PeriodicImages { replicate: self.replicate.0, wrap: self.wrap }
     }
 }
 

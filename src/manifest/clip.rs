@@ -86,10 +86,7 @@ pub struct Clip {
 
 impl Default for Clip {
     fn default() -> Self {
-        Self {
-            kind: ClipKind::of(ClipType::Plane),
-            mode: ClipMode::Particles,
-        }
+        Self { kind: ClipKind::of(ClipType::Plane), mode: ClipMode::Particles }
     }
 }
 
@@ -112,11 +109,9 @@ impl ClipKind {
                 point: DVec3::ZERO,
                 offset: 0.0,
             },
-            ClipType::Box => Self::Box {
-                min: DVec3::ZERO,
-                max: DVec3::ONE,
-                keep: KeptSide::Inside,
-            },
+            ClipType::Box => {
+                Self::Box { min: DVec3::ZERO, max: DVec3::ONE, keep: KeptSide::Inside }
+            }
         }
     }
 
@@ -130,16 +125,9 @@ impl ClipKind {
     /// The region that is kept.
     pub fn region(&self) -> Region {
         match *self {
-            Self::Plane {
-                normal,
-                point,
-                offset,
-            } => {
+            Self::Plane { normal, point, offset } => {
                 let normal = normal.unit();
-                Region::HalfSpace {
-                    point: point + offset * normal,
-                    normal,
-                }
+                Region::HalfSpace { point: point + offset * normal, normal }
             }
             Self::Box { min, max, keep } => {
                 let (min, max) = (min.min(max), min.max(max));
@@ -155,10 +143,7 @@ impl ClipKind {
 impl Clip {
     /// One clip of each type.
     pub(super) fn examples() -> Vec<Self> {
-        let of_type = |(kind, _)| Self {
-            kind: ClipKind::of(kind),
-            ..Self::default()
-        };
+        let of_type = |(kind, _)| Self { kind: ClipKind::of(kind), ..Self::default() };
         ClipType::names().into_iter().map(of_type).collect()
     }
 
@@ -176,11 +161,7 @@ impl Clip {
         }
         let mode = &mut self.mode;
         match &mut self.kind {
-            ClipKind::Plane {
-                normal,
-                point,
-                offset,
-            } => keys!(keys:
+            ClipKind::Plane { normal, point, offset } => keys!(keys:
                 /// Side of the plane that is left out: x, y, z, -x, -y, -z, or a vector towards it
                 normal => *normal, required("the direction of the side that is left out, such as \"x\"");
                 /// A point on the plane, if the offset is 0
@@ -220,10 +201,7 @@ impl Value for PlaneNormal {
         if let Some(text) = field.as_text() {
             let axes = UpAxis::names().into_iter();
             let mut axes = axes.filter(|(_, name)| *name == text);
-            return axes
-                .next()
-                .map(|(axis, _)| Self::Axis(axis))
-                .ok_or(Fault::Unwanted);
+            return axes.next().map(|(axis, _)| Self::Axis(axis)).ok_or(Fault::Unwanted);
         }
         let vector = DVec3::parse(field, &direction())?;
         Ok(Self::Vector(vector))

@@ -85,10 +85,7 @@ pub type CategoryColors = ByInteger<Vec3>;
 impl ColorMapping {
     /// Colours by this attribute, with defaults for the rest.
     pub fn by(attribute: &str) -> Self {
-        Self {
-            attribute: Some(attribute.to_owned()),
-            ..Self::default()
-        }
+        Self { attribute: Some(attribute.to_owned()), ..Self::default() }
     }
 
     /// The colours of chemical elements.
@@ -111,10 +108,7 @@ impl ColorMapping {
 
     /// Whether nothing but the attribute is given.
     pub fn is_plain(&self) -> bool {
-        let plain = Self {
-            attribute: self.attribute.clone(),
-            ..Self::default()
-        };
+        let plain = Self { attribute: self.attribute.clone(), ..Self::default() };
         *self == plain
     }
 
@@ -153,16 +147,8 @@ impl ColorMapping {
                 !is_categorical && self.names.is_some(),
                 "only categories have names; set scale = \"categorical\"",
             ),
-            (
-                "range",
-                is_categorical && self.range.is_some(),
-                "categories have no range",
-            ),
-            (
-                "steps",
-                is_categorical && self.steps.is_some(),
-                "categories have no steps",
-            ),
+            ("range", is_categorical && self.range.is_some(), "categories have no range"),
+            ("steps", is_categorical && self.steps.is_some(), "categories have no steps"),
             (
                 "values",
                 !is_categorical && self.values.is_some(),
@@ -178,11 +164,7 @@ impl ColorMapping {
                 scale != ScaleKind::SymLog && self.threshold.is_some(),
                 "only scale = \"symlog\" has it",
             ),
-            (
-                "map",
-                !is_categorical && has_palette,
-                "a palette needs scale = \"categorical\"",
-            ),
+            ("map", !is_categorical && has_palette, "a palette needs scale = \"categorical\""),
         ] {
             if is_wrong {
                 return Some((key, what.to_owned()));

@@ -26,10 +26,7 @@ impl MapName {
     pub const ELEMENTS: Self = Self::plain(ColorMap::ELEMENTS);
 
     const fn plain(name: &'static str) -> Self {
-        Self {
-            name,
-            is_reversed: false,
-        }
+        Self { name, is_reversed: false }
     }
 
     /// The map with a name, if there is one. The names of reversed maps end in `_r`.
@@ -51,10 +48,7 @@ impl MapName {
     /// The same map from its end to its beginning.
     #[must_use]
     pub const fn reversed(self) -> Self {
-        Self {
-            is_reversed: !self.is_reversed,
-            ..self
-        }
+        Self { is_reversed: !self.is_reversed, ..self }
     }
 
     /// The names of all maps and palettes, without reversed ones.
@@ -71,33 +65,21 @@ impl MapName {
 /// Maps here, each with the names of similar ones in matplotlib, ParaView, OVITO, VMD and MATLAB: alike in kind
 /// (sequential, diverging, cyclic) first, then in hue.
 const SIMILAR: [(&str, &str); 24] = [
-    (
-        "vik",
-        "coolwarm cooltowarm bluewhitered bwr rwb bgr seismic blueorange diverging",
-    ),
+    ("vik", "coolwarm cooltowarm bluewhitered bwr rwb bgr seismic blueorange diverging"),
     ("red-blue", "rdbu redwhiteblue redblue"),
     ("red-yellow-blue", "rdylbu"),
     ("spectral", "rdylgn"),
     ("purple-orange", "puor"),
     ("cork", "piyg prgn"),
     ("broc", "brbg"),
-    (
-        "turbo",
-        "jet hsvrainbow nipyspectral gistrainbow gistncar rainbowuniform colorspectrum",
-    ),
-    (
-        "lajolla",
-        "hot afmhot gistheat heat fire blackbody blackbodyradiation gnuplot2 cmrmap",
-    ),
+    ("turbo", "jet hsvrainbow nipyspectral gistrainbow gistncar rainbowuniform colorspectrum"),
+    ("lajolla", "hot afmhot gistheat heat fire blackbody blackbodyradiation gnuplot2 cmrmap"),
     ("inferno", "rocket"),
     ("magma", "bluered"),
     ("plasma", "gnuplot ember"),
     ("viridis", "parula default"),
     ("romaO", "hsv twilight twilightshifted phase cyclic hue"),
-    (
-        "greys",
-        "gray grey grays grayscale greyscale gistgray gistyarg binary blackwhite xray",
-    ),
+    ("greys", "gray grey grays grayscale greyscale gistgray gistyarg binary blackwhite xray"),
     ("blues", "bone ice gnbu pubu"),
     ("greens", "summer ylgn bugn"),
     ("reds", "orrd autumn"),
@@ -105,10 +87,7 @@ const SIMILAR: [(&str, &str); 24] = [
     ("oleron", "terrain topo gistearth earth"),
     ("devon", "ocean winter deep"),
     ("batlow", "haline thermal crameri"),
-    (
-        "okabe-ito",
-        "tab10 set1 dark2 paired categorical colorblind",
-    ),
+    ("okabe-ito", "tab10 set1 dark2 paired categorical colorblind"),
     ("tol-muted", "tab20 set2 set3 pastel1 accent"),
 ];
 
@@ -180,9 +159,7 @@ impl RangeSetting {
         let (low, high) = text.split_once('-')?;
         let number = |part: &str| {
             let digits = part.trim().strip_suffix('%')?;
-            let is_plain = digits
-                .bytes()
-                .all(|byte| byte.is_ascii_digit() || byte == b'.');
+            let is_plain = digits.bytes().all(|byte| byte.is_ascii_digit() || byte == b'.');
             digits.parse::<f64>().ok().filter(|_| is_plain)
         };
         let range = [number(low)?, number(high)?];
@@ -200,9 +177,7 @@ impl Value for RangeSetting {
         if let Some(text) = field.as_text() {
             return match text {
                 SYMMETRIC => Ok(Self::Symmetric),
-                text => Self::percentiles(text)
-                    .map(Self::Percentiles)
-                    .ok_or(Fault::Unwanted),
+                text => Self::percentiles(text).map(Self::Percentiles).ok_or(Fault::Unwanted),
             };
         }
         match field.as_numbers() {

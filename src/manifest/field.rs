@@ -68,10 +68,7 @@ impl<'a> Field<'a> {
     }
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "callers check that it is finite"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "callers check that it is finite")]
 pub(super) const fn narrow(value: f64) -> f32 {
     value as f32
 }

@@ -12,10 +12,8 @@ use spherule_jobs::{read_regular_text, text_hash};
 const MAX_BYTES: u64 = 16 << 20;
 
 /// The last line, before and after the checksum.
-const MARK: (&str, &str) = (
-    "# Written by spherule, blake3 ",
-    ". Once edited, this file is not overwritten any more.\n",
-);
+const MARK: (&str, &str) =
+    ("# Written by spherule, blake3 ", ". Once edited, this file is not overwritten any more.\n");
 
 /// The text of the manifest at `path`.
 ///
@@ -49,10 +47,7 @@ mod tests {
         let manifest = Manifest::new("in");
         let text = marked(&manifest.to_commented_toml());
         assert!(is_marked(&text));
-        assert_eq!(
-            Manifest::parse(&text, Path::new("job.toml")).unwrap(),
-            manifest
-        );
+        assert_eq!(Manifest::parse(&text, Path::new("job.toml")).unwrap(), manifest);
         assert!(!is_marked(&manifest.to_commented_toml()));
         for edited in [
             format!("# mine\n{text}"),

@@ -87,14 +87,8 @@ mod tests {
         for (setting, part) in [
             ("camera.focus = 0", "expected a length above 0"),
             ("camera.focus = \"far\"", "expected a length above 0"),
-            (
-                "camera.focus = { id = 4 }",
-                "camera.focus.particle: is missing",
-            ),
-            (
-                "camera.focus = { particle = -4 }",
-                "expected a whole number from 0",
-            ),
+            ("camera.focus = { id = 4 }", "camera.focus.particle: is missing"),
+            ("camera.focus = { particle = -4 }", "expected a whole number from 0"),
             (
                 "camera = { f_stop = 2, aperture = 1 }",
                 "camera.aperture: is given, but so is f_stop",

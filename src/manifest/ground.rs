@@ -53,13 +53,7 @@ pub struct GroundImage {
 impl GroundImage {
     /// The picture at `path`, repeated.
     pub fn new(path: impl Into<String>) -> Self {
-        Self {
-            path: path.into(),
-            width: None,
-            center: None,
-            rotation: 0.0,
-            repeats: true,
-        }
+        Self { path: path.into(), width: None, center: None, rotation: 0.0, repeats: true }
     }
 
     /// Its keys with values, without the path.
@@ -118,10 +112,7 @@ fn parse_table(section: &mut Section<'_>) -> GroundSetting {
     section.read(&Key::new("image", &[]), &mut image.path);
     section.read(&width_key(), &mut image.width);
     section.read(&Key::new("center", &[]), &mut image.center);
-    section.read(
-        &Key::new("rotation", &[]).unit("degrees"),
-        &mut image.rotation,
-    );
+    section.read(&Key::new("rotation", &[]).unit("degrees"), &mut image.rotation);
     section.read(&Key::new("repeat", &[]), &mut image.repeats);
     if kind != GroundKind::Image {
         if section.has("type") {
@@ -132,15 +123,9 @@ fn parse_table(section: &mut Section<'_>) -> GroundSetting {
         return GroundSetting::of(kind);
     }
     if section.lacks("image") {
-        section.missing(
-            "image",
-            "type = \"image\" needs a file, such as \"floor.png\"",
-        );
+        section.missing("image", "type = \"image\" needs a file, such as \"floor.png\"");
     }
-    GroundSetting {
-        kind,
-        image: Some(image),
-    }
+    GroundSetting { kind, image: Some(image) }
 }
 
 impl Value for GroundSetting {
@@ -237,32 +222,17 @@ mod tests {
             ("render.ground = true", Some(GroundKind::Plain)),
             ("render.ground = \"none\"", Some(GroundKind::None)),
             ("render.ground = \"checker\"", Some(GroundKind::Checker)),
-            (
-                "[render.ground]\ntype = \"shadow_catcher\"",
-                Some(GroundKind::ShadowCatcher),
-            ),
+            ("[render.ground]\ntype = \"shadow_catcher\"", Some(GroundKind::ShadowCatcher)),
         ] {
             assert_eq!(kind(setting), Ok(wanted), "{setting}");
         }
         for (setting, part) in [
             ("render.ground = 1", "expected true, false or one of none"),
-            (
-                "render.ground = \"shadowcatcher\"",
-                "did you mean shadow_catcher?",
-            ),
-            (
-                "[render.ground]\nkind = 1",
-                "render.ground.type: is missing",
-            ),
+            ("render.ground = \"shadowcatcher\"", "did you mean shadow_catcher?"),
+            ("[render.ground]\nkind = 1", "render.ground.type: is missing"),
             ("[render.ground]\ntype = 1", "expected one of none"),
-            (
-                "render.ground = \"image\"",
-                "render.ground: needs a file: { type",
-            ),
-            (
-                "[render.ground]\ntype = \"image\"",
-                "render.ground.image: is missing",
-            ),
+            ("render.ground = \"image\"", "render.ground: needs a file: { type"),
+            ("[render.ground]\ntype = \"image\"", "render.ground.image: is missing"),
             (
                 "render.ground = { type = \"image\", image = \"a.png\", width = 0 }",
                 "render.ground.width: expected a length above 0",
@@ -291,15 +261,8 @@ mod tests {
              repeat = false }",
         );
         for setting in [plain, all] {
-            assert_eq!(
-                read(&format!("render.ground = {}", setting.toml())),
-                setting
-            );
-            assert!(
-                !setting.setting().contains("image ="),
-                "{}",
-                setting.setting()
-            );
+            assert_eq!(read(&format!("render.ground = {}", setting.toml())), setting);
+            assert!(!setting.setting().contains("image ="), "{}", setting.setting());
         }
     }
 }

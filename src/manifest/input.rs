@@ -74,10 +74,8 @@ pub enum RadiusSetting {
 const AUTO: &str = "auto";
 
 /// Words for radii of elements.
-const TABLES: [(&str, RadiusTable); 2] = [
-    ("vdw", RadiusTable::VanDerWaals),
-    ("covalent", RadiusTable::Covalent),
-];
+const TABLES: [(&str, RadiusTable); 2] =
+    [("vdw", RadiusTable::VanDerWaals), ("covalent", RadiusTable::Covalent)];
 
 section! {
     /// Particles to render, and the interpretation of their data
@@ -130,10 +128,7 @@ section! {
 impl Input {
     /// All frames at `path`, with default settings.
     pub fn new(path: impl Into<String>) -> Self {
-        Self {
-            path: Paths(vec![path.into()]),
-            ..Self::default()
-        }
+        Self { path: Paths(vec![path.into()]), ..Self::default() }
     }
 }
 
@@ -166,10 +161,7 @@ impl Value for Paths {
             Some(_) => Vec::parse(field, key).map(Self),
             None => match field.as_text().filter(|text| !text.trim().is_empty()) {
                 Some(path) => Ok(Self(vec![path.to_owned()])),
-                None => field
-                    .value::<String>(key)
-                    .map(|path| Self(vec![path]))
-                    .ok_or(Fault::Noted),
+                None => field.value::<String>(key).map(|path| Self(vec![path])).ok_or(Fault::Noted),
             },
         }
     }
@@ -222,25 +214,15 @@ impl Value for RadiusSetting {
         section.read(&name, &mut attribute);
         section.read(&Key::new("scale", &[]).above(0), &mut scale);
         if table.is_some() && values.is_some() {
-            section.wrong(
-                "values",
-                "the radii are in `table`; leave one of the two out",
-            );
+            section.wrong("values", "the radii are in `table`; leave one of the two out");
         }
         section.finish();
         let table = table.and_then(|TableName(word)| table_named(word));
         let values = values.map(|values| RadiusTable::Values(values.0));
         let name = |usual: &str| attribute.clone().unwrap_or_else(|| usual.to_owned());
         Ok(match table.or(values) {
-            Some(table) => Self::Table {
-                attribute: name(ELEMENT),
-                table,
-                scale,
-            },
-            None => Self::Attribute {
-                attribute: name(""),
-                scale,
-            },
+            Some(table) => Self::Table { attribute: name(ELEMENT), table, scale },
+            None => Self::Attribute { attribute: name(""), scale },
         })
     }
 
@@ -249,11 +231,7 @@ impl Value for RadiusSetting {
             Self::Auto => return quoted(AUTO),
             Self::Length(length) => return length.toml(),
             Self::Attribute { attribute, scale } => (attribute, None, scale),
-            Self::Table {
-                attribute,
-                table,
-                scale,
-            } => (attribute, Some(table), scale),
+            Self::Table { attribute, table, scale } => (attribute, Some(table), scale),
         };
         let word = TABLES.iter().find(|(_, known)| Some(known) == table);
         let table = match (word, table) {
@@ -293,11 +271,7 @@ impl Value for RadiusSetting {
 impl RadiusSetting {
     /// The radii of elements in `table`.
     pub fn of_elements(table: RadiusTable) -> Self {
-        Self::Table {
-            attribute: ELEMENT.to_owned(),
-            table,
-            scale: 1.0,
-        }
+        Self::Table { attribute: ELEMENT.to_owned(), table, scale: 1.0 }
     }
 }
 

@@ -115,11 +115,7 @@ impl Key {
         value_name: &'static str,
         heading: &'static str,
     ) -> Self {
-        let flag = Some(Flag {
-            name,
-            value_name,
-            heading,
-        });
+        let flag = Some(Flag { name, value_name, heading });
         Self { flag, ..self }
     }
 }
@@ -179,10 +175,7 @@ impl Key {
 
     /// The range of a number for messages: ` from 0 to 1`.
     pub(super) fn range(&self) -> String {
-        let zero = self
-            .zero
-            .map(|zero| format!(" ({zero})"))
-            .unwrap_or_default();
+        let zero = self.zero.map(|zero| format!(" ({zero})")).unwrap_or_default();
         let low = self.low.map(|b| (shown(b.value) + &zero, b.is_excluded));
         // The limit of single precision is not worth mentioning.
         let high = self.high.filter(|b| b.value < f64::from(f32::MAX));
@@ -222,8 +215,5 @@ fn shown(value: f64) -> String {
 /// The lines of a doc comment, joined into one line per paragraph.
 pub(super) fn paragraphs(docs: &[&str]) -> Vec<String> {
     let lines: Vec<&str> = docs.iter().map(|line| line.trim()).collect();
-    lines
-        .split(|line| line.is_empty())
-        .map(|p| p.join(" "))
-        .collect()
+    lines.split(|line| line.is_empty()).map(|p| p.join(" ")).collect()
 }

@@ -118,21 +118,12 @@ impl Default for Light {
 impl LightKind {
     const fn of(kind: LightType) -> Self {
         match kind {
-            LightType::Point => Self::Point {
-                position: DVec3::new(0.0, 0.0, 10.0),
-                falloff: Falloff::None,
-            },
-            LightType::Directional => Self::Directional {
-                direction: DVec3::NEG_Z,
-            },
-            LightType::Sun => Self::Sun {
-                direction: DVec3::NEG_Z,
-                size: SUN_SIZE,
-            },
-            LightType::Sphere => Self::Sphere {
-                position: DVec3::new(0.0, 0.0, 10.0),
-                radius: 1.0,
-            },
+            LightType::Point => {
+                Self::Point { position: DVec3::new(0.0, 0.0, 10.0), falloff: Falloff::None }
+            }
+            LightType::Directional => Self::Directional { direction: DVec3::NEG_Z },
+            LightType::Sun => Self::Sun { direction: DVec3::NEG_Z, size: SUN_SIZE },
+            LightType::Sphere => Self::Sphere { position: DVec3::new(0.0, 0.0, 10.0), radius: 1.0 },
             LightType::Rect => Self::Rect {
                 position: DVec3::new(0.0, 0.0, 10.0),
                 direction: DVec3::NEG_Z,
@@ -169,23 +160,14 @@ impl LightKind {
 impl Light {
     /// One light of each type.
     pub(super) fn examples() -> Vec<Self> {
-        let of_type = |(kind, _)| Self {
-            kind: LightKind::of(kind),
-            ..Self::default()
-        };
+        let of_type = |(kind, _)| Self { kind: LightKind::of(kind), ..Self::default() };
         LightType::names().into_iter().map(of_type).collect()
     }
 
     pub(super) fn keys(&mut self, keys: &mut Keys<'_>) {
         let mut kind = self.kind.light_type();
-        let key = Key::new(
-            "type",
-            &["point | directional | sun | sphere | rect | disc"],
-        );
-        keys.key(
-            key.required("\"point\" or \"directional\", for example"),
-            &mut kind,
-        );
+        let key = Key::new("type", &["point | directional | sun | sphere | rect | disc"]);
+        keys.key(key.required("\"point\" or \"directional\", for example"), &mut kind);
         if let Some(section) = keys.reading() {
             // The type determines which keys are known, so the rest is not checked.
             if !section.has("type") {
@@ -220,12 +202,7 @@ impl Light {
                 radius => *radius, unit("a length"), above(0), single(),
                     required("a sphere needs its radius, such as 1.0");
             ),
-            LightKind::Rect {
-                position,
-                direction,
-                width,
-                height,
-            } => {
+            LightKind::Rect { position, direction, width, height } => {
                 flat_keys(position, direction, keys);
                 keys!(keys:
                     /// Width of the rectangle, which is horizontal
@@ -236,11 +213,7 @@ impl Light {
                         required("a rectangle needs its height, such as 1.0");
                 );
             }
-            LightKind::Disc {
-                position,
-                direction,
-                radius,
-            } => {
+            LightKind::Disc { position, direction, radius } => {
                 flat_keys(position, direction, keys);
                 keys!(keys:
                     /// Radius of the disc
@@ -264,10 +237,7 @@ impl Light {
             group => self.group, example("\"key\""), unset("light_default, the layer of light without a group"),
                 affects(Affects::LightGroups);
         );
-        if !matches!(
-            self.kind,
-            LightKind::Point { .. } | LightKind::Directional { .. }
-        ) {
+        if !matches!(self.kind, LightKind::Point { .. } | LightKind::Directional { .. }) {
             keys!(keys:
                 /// Whether the camera sees the light
                 visible => self.visible;

@@ -22,10 +22,8 @@ impl Manifest {
     /// The names of all light groups, in the order of their layers after that of light without a group.
     pub fn light_groups(&self) -> Vec<&str> {
         let own = self.lights.iter().filter_map(|light| light.group.as_ref());
-        let mut names: Vec<&str> = own
-            .chain(&self.environment.group)
-            .map(LightGroup::as_str)
-            .collect();
+        let mut names: Vec<&str> =
+            own.chain(&self.environment.group).map(LightGroup::as_str).collect();
         names.sort_unstable();
         names.dedup();
         names

@@ -81,10 +81,9 @@ pub fn draft(shown: &str) -> Vec<Override> {
 fn settings(text: &str, shown: &str) -> impl Iterator<Item = Override> {
     let sections: toml::Table = text.parse().expect("built-in settings are valid TOML");
     let key = |(section, keys): (String, Value)| match keys {
-        Value::Table(keys) => keys
-            .into_iter()
-            .map(|(key, value)| (format!("{section}.{key}"), value))
-            .collect(),
+        Value::Table(keys) => {
+            keys.into_iter().map(|(key, value)| (format!("{section}.{key}"), value)).collect()
+        }
         value => vec![(section, value)],
     };
     let set = move |(key, value): (String, Value)| {
@@ -184,10 +183,7 @@ mod tests {
         assert_eq!(plain.background, Some(Background::Studio { up: Vec3::Z }));
         // A source of light of the manifest's own
         look(Look::Studio, "environment.image = \"hall.exr\"");
-        let own = look(
-            Look::Studio,
-            "render.integrator = \"whitted\"\nrender.ground = false",
-        );
+        let own = look(Look::Studio, "render.integrator = \"whitted\"\nrender.ground = false");
         assert_eq!(own.integrator(), IntegratorKind::Whitted);
         assert_eq!(own.render.ground, Some(GroundSetting::of(GroundKind::None)));
     }
@@ -195,19 +191,13 @@ mod tests {
     #[test]
     fn explicit_settings_override_a_look() {
         let text = "input.path = \"data\"\n[render]\nmax_depth = 5\nground_tile = 2\n[material]\nabsorption = [1, 1, 1]";
-        let mixed = water(
-            text,
-            &["render.surface=spheres", "render.background=[1,0,0]"],
-        );
+        let mixed = water(text, &["render.surface=spheres", "render.background=[1,0,0]"]);
         assert_eq!(mixed.render.max_depth, 5);
         assert_eq!(mixed.render.ground_tile, Some(2.0));
         assert_eq!(mixed.material.absorption, Vec3::ONE);
         assert_eq!(mixed.surface.kind, SurfaceKind::Spheres);
         assert_eq!(mixed.render.background, Some(Background::Constant(Vec3::X)));
-        assert_eq!(
-            mixed.render.ground,
-            Some(GroundSetting::of(GroundKind::Plain))
-        );
+        assert_eq!(mixed.render.ground, Some(GroundSetting::of(GroundKind::Plain)));
         // An error in the file is reported once, with its position.
         let wrong = "input.path = \"data\"\nrender = 3";
         let look = vec![Override::parse("look=water").unwrap()];
@@ -223,10 +213,7 @@ mod tests {
             water(&text, sets).render.ground_pattern
         };
         assert_eq!(pattern("", &["render.ground=plain"]), GroundPattern::Plain);
-        assert_eq!(
-            pattern("render.ground = \"plain\"", &[]),
-            GroundPattern::Plain
-        );
+        assert_eq!(pattern("render.ground = \"plain\"", &[]), GroundPattern::Plain);
         assert_eq!(pattern("render.ground = true", &[]), GroundPattern::Sand);
         for own in ["sand", "checker"] {
             let set = format!("render.ground_pattern={own}");
@@ -238,9 +225,7 @@ mod tests {
     #[test]
     fn unknown_look_lists_the_known_ones() {
         let text = "look = \"watre\"\ninput.path = \"data\"";
-        let error = Manifest::parse(text, Path::new("job.toml"))
-            .unwrap_err()
-            .to_string();
+        let error = Manifest::parse(text, Path::new("job.toml")).unwrap_err().to_string();
         assert!(
             error.contains("look: expected one of auto, plain, paper, studio, water"),
             "{error}"
@@ -254,9 +239,6 @@ mod tests {
         let look = |text: &str| Manifest::parse(text, Path::new("job.toml")).unwrap().look;
         assert_eq!(look(text), Look::Auto);
         assert_eq!(look(&marked(text)), Look::None);
-        assert_eq!(
-            look(&marked(&format!("look = \"studio\"\n{text}"))),
-            Look::Studio
-        );
+        assert_eq!(look(&marked(&format!("look = \"studio\"\n{text}"))), Look::Studio);
     }
 }

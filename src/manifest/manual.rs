@@ -74,11 +74,7 @@ fn section(entry: &Entry) -> String {
     }
     properties.push(key.affects.text().to_owned());
     let meaning = [vec![key.comment()], key.details()].concat().join(". ");
-    let end = if meaning.ends_with(['.', ':']) {
-        ""
-    } else {
-        "."
-    };
+    let end = if meaning.ends_with(['.', ':']) { "" } else { "." };
     let heading = entry.name();
     let meaning = wrapped(&format!("{meaning}{end}"));
     let properties = wrapped(&properties.join(" "));

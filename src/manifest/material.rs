@@ -110,11 +110,7 @@ impl Material {
     /// the kind or a key sets one.
     pub fn resolved(&self, fresnel: Fresnel) -> scene::Material {
         let roughness = self.roughness;
-        let opaque = |finish| scene::Material {
-            transmission: 0.0,
-            finish,
-            ..self.constants
-        };
+        let opaque = |finish| scene::Material { transmission: 0.0, finish, ..self.constants };
         let clear = |ior| scene::Material {
             reflection: 1.0,
             transmission: 1.0,
@@ -130,10 +126,7 @@ impl Material {
             },
             ..self.constants
         };
-        let usual = scene::Material {
-            fresnel,
-            ..self.constants
-        };
+        let usual = scene::Material { fresnel, ..self.constants };
         let found = match self.kind {
             None | Some(MaterialKind::Whitted) => usual,
             Some(MaterialKind::Matte) => opaque(Finish::Matte),
@@ -142,10 +135,7 @@ impl Material {
             Some(MaterialKind::Glass) => clear(GLASS),
             Some(MaterialKind::Water) => clear(WATER),
         };
-        scene::Material {
-            fresnel: self.fresnel.unwrap_or(found.fresnel),
-            ..found
-        }
+        scene::Material { fresnel: self.fresnel.unwrap_or(found.fresnel), ..found }
     }
 
     /// All keys, including those of `[[material.part]]`.

@@ -207,9 +207,7 @@ mod tests {
     fn read(text: &str) -> Result<Vec<Mesh>, String> {
         let text = format!("input.path = \"a\"\n{text}");
         let manifest = Manifest::parse(&text, Path::new("job.toml"));
-        manifest
-            .map(|manifest| manifest.meshes)
-            .map_err(|e| e.to_string())
+        manifest.map(|manifest| manifest.meshes).map_err(|e| e.to_string())
     }
 
     #[test]
@@ -231,46 +229,25 @@ mod tests {
         for (text, part) in [
             ("[[mesh]]", "mesh.0.path: is missing; a mesh needs its file"),
             ("[[mesh]]\npath = \"\"", "mesh.0.path: must name a file"),
-            (
-                "[[mesh]]\npath = \"walls/\"",
-                "mesh.0.path: must name a file",
-            ),
+            ("[[mesh]]\npath = \"walls/\"", "mesh.0.path: must name a file"),
             ("[[mesh]]\npath = \"w.##.##.stl\"", "two numbers"),
             ("[[mesh]]\npath = \"##/w.stl\"", "not a directory's"),
-            (
-                "[[mesh]]\npath = 1",
-                "mesh.0.path: expected a file name in quotes",
-            ),
-            (
-                "[[mesh]]\npath = \"a.stl\"\nscale = 0",
-                "mesh.0.scale: expected",
-            ),
-            (
-                "[[mesh]]\npath = \"a.stl\"\ncolor = [2.0, 0, 0]",
-                "mesh.0.color: expected",
-            ),
-            (
-                "[[mesh]]\npath = \"a.stl\"\nmaterial = \"gold\"",
-                "matte, plastic, metal, glass",
-            ),
+            ("[[mesh]]\npath = 1", "mesh.0.path: expected a file name in quotes"),
+            ("[[mesh]]\npath = \"a.stl\"\nscale = 0", "mesh.0.scale: expected"),
+            ("[[mesh]]\npath = \"a.stl\"\ncolor = [2.0, 0, 0]", "mesh.0.color: expected"),
+            ("[[mesh]]\npath = \"a.stl\"\nmaterial = \"gold\"", "matte, plastic, metal, glass"),
             (
                 "[[mesh]]\npath = \"a.stl\"\nmaterial = \"glass\"\nholdout = true",
                 "mesh.0.holdout: hides what is behind",
             ),
-            (
-                "mesh = \"a.stl\"",
-                "mesh: expected a list of tables, such as [[mesh]]",
-            ),
+            ("mesh = \"a.stl\"", "mesh: expected a list of tables, such as [[mesh]]"),
         ] {
             let error = read(text).unwrap_err();
             assert!(error.contains(part), "{text}: {error}");
         }
         let many = "[[mesh]]\npath = \"a.stl\"\n".repeat(201);
         let error = read(&many).unwrap_err();
-        assert!(
-            error.contains("mesh: 201 meshes, but at most 200"),
-            "{error}"
-        );
+        assert!(error.contains("mesh: 201 meshes, but at most 200"), "{error}");
     }
 
     #[test]
@@ -284,17 +261,12 @@ mod tests {
             let overrides = paths.iter().map(append).collect();
             Manifest::parse_with(&text, Path::new("job.toml"), overrides)
         };
-        let meshes = parse("[[mesh]]\npath = \"a.stl\"", &["b.stl", "c.#.stl"])
-            .unwrap()
-            .meshes;
+        let meshes = parse("[[mesh]]\npath = \"a.stl\"", &["b.stl", "c.#.stl"]).unwrap().meshes;
         let paths: Vec<&str> = meshes.iter().map(|mesh| mesh.path.as_str()).collect();
         assert_eq!(paths, ["a.stl", "b.stl", "c.#.stl"]);
         assert_eq!(parse("", &["b.stl"]).unwrap().meshes.len(), 1);
         let error = parse("mesh = 3", &["b.stl"]).unwrap_err().to_string();
-        assert!(
-            error.contains("--mesh: mesh: is 3, which is no list"),
-            "{error}"
-        );
+        assert!(error.contains("--mesh: mesh: is 3, which is no list"), "{error}");
         let error = parse("", &["##.##.stl"]).unwrap_err().to_string();
         assert!(error.starts_with("--mesh: mesh.0.path: "), "{error}");
     }

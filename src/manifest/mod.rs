@@ -322,24 +322,12 @@ impl Manifest {
         keys.section("output", Output::ABOUT, |keys| self.output.keys(keys));
         keys.section("job", Work::ABOUT, |keys| self.job.all_keys(keys));
         keys.list("clip", "clip", clip::ABOUT, &mut self.clips, Clip::keys);
-        keys.list(
-            "light",
-            "light",
-            light::ABOUT,
-            &mut self.lights,
-            Light::keys,
-        );
+        keys.list("light", "light", light::ABOUT, &mut self.lights, Light::keys);
         keys.list("mesh", "mesh", mesh::ABOUT, &mut self.meshes, Mesh::keys);
         let arrows = &mut self.arrows;
         keys.list("arrows", "arrows", arrows::ABOUT, arrows, Arrows::keys);
         let overlays = &mut self.overlays;
-        keys.list(
-            "overlay",
-            "overlay",
-            overlay::ABOUT,
-            overlays,
-            Overlay::keys,
-        );
+        keys.list("overlay", "overlay", overlay::ABOUT, overlays, Overlay::keys);
     }
 
     /// Checks dependencies between tables.
@@ -360,10 +348,7 @@ impl Manifest {
             + arrows.min(MAX_ARROWS);
         let max = MaterialId::MAX_MESHES - others;
         if meshes > max {
-            root.wrong(
-                "mesh",
-                &format!("{meshes} meshes, but at most {max} are possible"),
-            );
+            root.wrong("mesh", &format!("{meshes} meshes, but at most {max} are possible"));
         }
         let clips = self.clips.len();
         if clips > MAX_CLIPS {
@@ -396,10 +381,7 @@ impl Manifest {
     fn check_camera(&self, root: &mut Section<'_>) {
         let image = &self.image;
         if self.camera.stereo {
-            let part = [
-                ("crop", image.crop.is_some()),
-                ("overscan", image.overscan > 0),
-            ];
+            let part = [("crop", image.crop.is_some()), ("overscan", image.overscan > 0)];
             for (key, _) in part.iter().filter(|(_, is_given)| *is_given) {
                 let what = "is given, but stereo pairs are rendered as a whole; remove it";
                 root.section("image").wrong(key, what);
@@ -410,11 +392,7 @@ impl Manifest {
                 );
                 root.section("camera").wrong("stereo", &what);
             }
-            if self
-                .output
-                .channels
-                .contains(&Channel::Named(NamedChannel::Motion))
-            {
+            if self.output.channels.contains(&Channel::Named(NamedChannel::Motion)) {
                 let what = "motion is given, but stereo pairs have no such channel; remove it";
                 root.section("output").wrong("channels", what);
             }
@@ -638,13 +616,9 @@ fn lay_over(
     }
     // The pattern of a look is not that of a ground which is named plain
     let kinds = [&["render", "ground"][..], &["render", "ground", "type"]];
-    let is_plain = kinds
-        .iter()
-        .any(|keys| tree.has_text(keys, GroundKind::Plain.name()));
+    let is_plain = kinds.iter().any(|keys| tree.has_text(keys, GroundKind::Plain.name()));
     let defaults = Look::of(tree).settings("look").into_iter().chain(under);
-    defaults
-        .filter(|o| !(is_plain && o.is_of("render.ground_pattern")))
-        .for_each(|o| lay(tree, o));
+    defaults.filter(|o| !(is_plain && o.is_of("render.ground_pattern"))).for_each(|o| lay(tree, o));
 }
 
 /// The key of the picture on the ground in the settings that images depend on.
@@ -720,18 +694,13 @@ impl ManifestError {
             lines.push(format!("{}: and more like these", path.display()));
         }
         let key = problems.first().map(|problem| problem.key.clone());
-        Self {
-            lines,
-            key: key.filter(|key| !key.is_empty()),
-        }
+        Self { lines, key: key.filter(|key| !key.is_empty()) }
     }
 }
 
 /// Whether the option `shown` names the `key` already, or sets nothing else.
 fn is_option_of(shown: &str, key: &str) -> bool {
-    let assigned = shown
-        .strip_prefix("--set ")
-        .and_then(|set| set.split_once('='));
+    let assigned = shown.strip_prefix("--set ").and_then(|set| set.split_once('='));
     let is_flag =
         |flag: &KeyFlag| flag.key == key && shown.strip_prefix("--") == Some(flag.flag.name);
     assigned.is_some_and(|(set, _)| set.trim() == key) || key_flags().iter().any(is_flag)

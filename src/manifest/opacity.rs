@@ -39,19 +39,13 @@ impl Value for OpacitySetting {
         let ends = Key::new("range", &[]).required("the values with opacity 0 and 1");
         section.read(&ends, &mut range);
         section.finish();
-        Ok(Self::Attribute {
-            attribute,
-            range: range.0,
-        })
+        Ok(Self::Attribute { attribute, range: range.0 })
     }
 
     fn toml(&self) -> String {
         match self {
             Self::Constant(opacity) => opacity.toml(),
-            Self::Attribute {
-                attribute,
-                range: [low, high],
-            } => {
+            Self::Attribute { attribute, range: [low, high] } => {
                 let attribute = attribute.toml();
                 format!("{{ attribute = {attribute}, range = [{low:?}, {high:?}] }}")
             }

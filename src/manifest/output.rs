@@ -14,12 +14,8 @@ use crate::render::layers::Mattes;
 named!(Compression: None = "none", Rle = "rle", Zip = "zip", Zips = "zips", Piz = "piz");
 
 /// Default channels.
-const DEFAULT_CHANNELS: [NamedChannel; 4] = [
-    NamedChannel::Rgba,
-    NamedChannel::Z,
-    NamedChannel::N,
-    NamedChannel::Id,
-];
+const DEFAULT_CHANNELS: [NamedChannel; 4] =
+    [NamedChannel::Rgba, NamedChannel::Z, NamedChannel::N, NamedChannel::Id];
 
 /// Default names of images.
 const DEFAULT_PATH: &str = "out/frame.####.exr";

@@ -122,10 +122,7 @@ impl OverlayText {
     /// # Errors
     /// See [`Template::parse`].
     pub fn parse(text: &str) -> Result<Self, String> {
-        Ok(Self {
-            text: text.to_owned(),
-            template: Template::parse(text)?,
-        })
+        Ok(Self { text: text.to_owned(), template: Template::parse(text)? })
     }
 
     /// The text as it was written.
@@ -149,15 +146,9 @@ impl OverlayKind {
                 orientation: Orientation::Vertical,
             },
             OverlayType::Text => Self::Text { text: None },
-            OverlayType::ScaleBar => Self::ScaleBar {
-                length: None,
-                unit: None,
-            },
+            OverlayType::ScaleBar => Self::ScaleBar { length: None, unit: None },
             OverlayType::Axes => Self::Axes,
-            OverlayType::Image => Self::Image {
-                path: "logo.png".to_owned(),
-                height: 0.1,
-            },
+            OverlayType::Image => Self::Image { path: "logo.png".to_owned(), height: 0.1 },
         }
     }
 
@@ -175,20 +166,14 @@ impl OverlayKind {
 impl Overlay {
     /// One overlay of each type.
     pub(super) fn examples() -> Vec<Self> {
-        let of_type = |(kind, _)| Self {
-            kind: OverlayKind::of(kind),
-            ..Self::default()
-        };
+        let of_type = |(kind, _)| Self { kind: OverlayKind::of(kind), ..Self::default() };
         OverlayType::names().into_iter().map(of_type).collect()
     }
 
     pub(super) fn keys(&mut self, keys: &mut Keys<'_>) {
         let mut kind = self.kind.overlay_type();
         let key = Key::new("type", &["colorbar | text | scale_bar | axes | image"]);
-        keys.key(
-            key.required("\"colorbar\" or \"text\", for example"),
-            &mut kind,
-        );
+        keys.key(key.required("\"colorbar\" or \"text\", for example"), &mut kind);
         if let Some(section) = keys.reading() {
             // The type determines which keys are known, so the rest is not checked.
             if !section.has("type") {
@@ -198,12 +183,7 @@ impl Overlay {
             self.kind = OverlayKind::of(kind);
         }
         match &mut self.kind {
-            OverlayKind::ColorBar {
-                title,
-                unit,
-                length,
-                orientation,
-            } => keys!(keys:
+            OverlayKind::ColorBar { title, unit, length, orientation } => keys!(keys:
                 /// Title above the bar
                 title => *title, example("\"Speed\""), unset("what the colours show");
                 /// Unit of the values, after the title
@@ -312,9 +292,7 @@ mod tests {
     fn read(text: &str) -> Result<Vec<Overlay>, String> {
         let text = format!("input.path = \"a\"\n{text}");
         let manifest = Manifest::parse(&text, Path::new("job.toml"));
-        manifest
-            .map(|manifest| manifest.overlays)
-            .map_err(|e| e.to_string())
+        manifest.map(|manifest| manifest.overlays).map_err(|e| e.to_string())
     }
 
     #[test]
@@ -334,34 +312,16 @@ mod tests {
         for (text, part) in [
             ("", "overlay.0.type: is missing"),
             ("type = \"colourbar\"", "did you mean colorbar?"),
-            (
-                "type = \"text\"\ntext = \"{tme}\"",
-                "overlay.0.text: unknown variable `{tme}`",
-            ),
-            (
-                "type = \"text\"\ntitle = \"a\"",
-                "overlay.0.title: unknown key",
-            ),
-            (
-                "type = \"axes\"\ncorner = \"top\"",
-                "overlay.0.corner: expected one of",
-            ),
+            ("type = \"text\"\ntext = \"{tme}\"", "overlay.0.text: unknown variable `{tme}`"),
+            ("type = \"text\"\ntitle = \"a\"", "overlay.0.title: unknown key"),
+            ("type = \"axes\"\ncorner = \"top\"", "overlay.0.corner: expected one of"),
             (
                 "type = \"axes\"\nsize = 0.5",
                 "overlay.0.size: expected a number above 0, at most 0.25",
             ),
-            (
-                "type = \"axes\"\noffset = [1, 11]",
-                "overlay.0.offset: expected two numbers",
-            ),
-            (
-                "type = \"scale_bar\"\nlength = 0",
-                "overlay.0.length: expected a length above 0",
-            ),
-            (
-                "type = \"image\"",
-                "overlay.0.path: is missing; a picture needs its file",
-            ),
+            ("type = \"axes\"\noffset = [1, 11]", "overlay.0.offset: expected two numbers"),
+            ("type = \"scale_bar\"\nlength = 0", "overlay.0.length: expected a length above 0"),
+            ("type = \"image\"", "overlay.0.path: is missing; a picture needs its file"),
             (
                 "type = \"image\"\npath = \"a.png\"\nheight = 2",
                 "overlay.0.height: expected a number above 0, at most 1",

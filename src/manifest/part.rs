@@ -11,10 +11,9 @@ use super::keys::{Keys, keys};
 use super::value::{Fault, FlagKind, Value, list, named};
 use crate::scene::{Finish, PartMaterial};
 
-pub(super) const ABOUT: &[&str] = &[
-    "Materials of parts of the particles, for integrator = \"path\" and separate \
-                                     spheres",
-];
+pub(super) const ABOUT: &[&str] =
+    &["Materials of parts of the particles, for integrator = \"path\" and separate \
+                                     spheres"];
 
 named! {
     /// Materials of parts.
@@ -50,12 +49,7 @@ pub struct Part {
 
 impl Default for Part {
     fn default() -> Self {
-        Self {
-            parts: vec![1],
-            kind: PartKind::Matte,
-            roughness: ROUGHNESS,
-            color: None,
-        }
+        Self { parts: vec![1], kind: PartKind::Matte, roughness: ROUGHNESS, color: None }
     }
 }
 
@@ -151,9 +145,7 @@ mod tests {
     fn read(text: &str) -> Result<Vec<Part>, String> {
         let text = format!("input.path = \"a\"\n{text}");
         let manifest = Manifest::parse(&text, Path::new("job.toml"));
-        manifest
-            .map(|manifest| manifest.material.parts)
-            .map_err(|e| e.to_string())
+        manifest.map(|manifest| manifest.material.parts).map_err(|e| e.to_string())
     }
 
     #[test]
@@ -173,10 +165,7 @@ mod tests {
     fn impossible_parts_are_refused() {
         for (text, part) in [
             ("[[material.part]]", "material.part.0.parts: is missing"),
-            (
-                "[[material.part]]\nparts = []",
-                "material.part.0.parts: expected a list of integers",
-            ),
+            ("[[material.part]]\nparts = []", "material.part.0.parts: expected a list of integers"),
             (
                 "[[material.part]]\nparts = [1.5]",
                 "material.part.0.parts: expected a list of integers",
@@ -197,17 +186,12 @@ mod tests {
                 "[[material.part]]\nparts = [1]\ntype = \"glass\"",
                 "material.part.0.type: parts are opaque",
             ),
-            (
-                "[[material.part]]\nparts = [1]\ntype = \"gold\"",
-                "matte, plastic, metal",
-            ),
+            ("[[material.part]]\nparts = [1]\ntype = \"gold\"", "matte, plastic, metal"),
         ] {
             let error = read(text).unwrap_err();
             assert!(error.contains(part), "{text}: {error}");
         }
-        let many: String = (0..51)
-            .map(|i| format!("[[material.part]]\nparts = [{i}]\n"))
-            .collect();
+        let many: String = (0..51).map(|i| format!("[[material.part]]\nparts = [{i}]\n")).collect();
         let error = read(&many).unwrap_err();
         assert!(error.contains("material.part: 51 materials"), "{error}");
     }

@@ -46,9 +46,7 @@ impl FramePattern {
         // Reject a second number
         let after = &name[end..];
         if find_number(after)?.is_some() {
-            return Err(format!(
-                "has places for two numbers; use one (example: {example})"
-            ));
+            return Err(format!("has places for two numbers; use one (example: {example})"));
         }
         Ok(Self {
             text: text.to_owned(),
@@ -75,10 +73,7 @@ impl FramePattern {
 
     /// The file name, with the placeholder for the number.
     pub fn file_name(&self) -> &str {
-        let name_at = self
-            .text
-            .rfind(std::path::is_separator)
-            .map_or(0, |i| i + 1);
+        let name_at = self.text.rfind(std::path::is_separator).map_or(0, |i| i + 1);
         &self.text[name_at..]
     }
 
@@ -89,10 +84,7 @@ impl FramePattern {
         };
         let sign = if frame < 0 { "-" } else { "" };
         let number = frame.unsigned_abs();
-        PathBuf::from(format!(
-            "{}{sign}{number:0digits$}{}",
-            self.before, self.after
-        ))
+        PathBuf::from(format!("{}{sign}{number:0digits$}{}", self.before, self.after))
     }
 }
 
@@ -190,11 +182,7 @@ mod tests {
         path("out/frame.####.exr", 7, "out/frame.0007.exr");
         path("out/frame.####.exr", 123_456, "out/frame.123456.exr");
         path("out/frame.####.exr", -7, "out/frame.-0007.exr");
-        path(
-            "out/frame.####.exr",
-            i64::MIN,
-            "out/frame.-9223372036854775808.exr",
-        );
+        path("out/frame.####.exr", i64::MIN, "out/frame.-9223372036854775808.exr");
         path("f#.exr", 12, "f12.exr");
         path("%04d.exr", 12, "0012.exr");
         path("a.%d.b.EXR", 12, "a.12.b.EXR");
@@ -203,11 +191,7 @@ mod tests {
         path("100%~=x/f.#.exr", 12, "100%~=x/f.12.exr");
         path("50%/f.exr", 12, "50%/f.exr");
         let zeros = "0".repeat(30);
-        path(
-            &format!("{}.exr", "#".repeat(32)),
-            12,
-            &format!("{zeros}12.exr"),
-        );
+        path(&format!("{}.exr", "#".repeat(32)), 12, &format!("{zeros}12.exr"));
         path("%032d.exr", 12, &format!("{zeros}12.exr"));
     }
 
@@ -247,24 +231,12 @@ mod tests {
         refused("a.%0-4d.exr", "%04d");
         refused("a.%0d.exr", "%04d");
         for digits in [33, 65_535, 65_536, 70_000] {
-            refused(
-                &format!("{}.exr", "#".repeat(digits)),
-                "more than 32 digits",
-            );
+            refused(&format!("{}.exr", "#".repeat(digits)), "more than 32 digits");
         }
-        for width in [
-            "033",
-            "099999",
-            "0999999d0999999",
-            "099999999999999999999999",
-        ] {
+        for width in ["033", "099999", "0999999d0999999", "099999999999999999999999"] {
             refused(
                 &format!("a.%{width}d.exr"),
-                if width.contains('d') {
-                    "digits"
-                } else {
-                    "more than 32"
-                },
+                if width.contains('d') { "digits" } else { "more than 32" },
             );
         }
     }

@@ -39,47 +39,14 @@ fn keys_in_tables() {
         ("[rendre]", "line 3, column 2", "rendre", "render"),
         ("[[lights]]", "line 3, column 3", "lights", "light"),
         ("[camra.key]", "line 3, column 2", "camra", "camera"),
-        (
-            "[image]\n\n  widht = 3",
-            "line 5, column 3",
-            "image.widht",
-            "image.width",
-        ),
-        (
-            "[camera]\nfvo = 3",
-            "line 4, column 1",
-            "camera.fvo",
-            "camera.fov",
-        ),
-        (
-            "[render]\nmax-depth = 3",
-            "line 4, column 1",
-            "render.max-depth",
-            "render.max_depth",
-        ),
-        (
-            "[material]\n\"iro\" = 3",
-            "line 4, column 1",
-            "material.iro",
-            "material.ior",
-        ),
-        (
-            "[output]\nchannel = 3",
-            "line 4, column 1",
-            "output.channel",
-            "output.channels",
-        ),
-        (
-            "[job]\ntheads = 3",
-            "line 4, column 1",
-            "job.theads",
-            "job.threads",
-        ),
+        ("[image]\n\n  widht = 3", "line 5, column 3", "image.widht", "image.width"),
+        ("[camera]\nfvo = 3", "line 4, column 1", "camera.fvo", "camera.fov"),
+        ("[render]\nmax-depth = 3", "line 4, column 1", "render.max-depth", "render.max_depth"),
+        ("[material]\n\"iro\" = 3", "line 4, column 1", "material.iro", "material.ior"),
+        ("[output]\nchannel = 3", "line 4, column 1", "output.channel", "output.channels"),
+        ("[job]\ntheads = 3", "line 4, column 1", "job.theads", "job.threads"),
     ] {
-        fails_below(
-            text,
-            &format!("{place}: {key}: unknown key; did you mean `{nearest}`?"),
-        );
+        fails_below(text, &format!("{place}: {key}: unknown key; did you mean `{nearest}`?"));
     }
 }
 
@@ -169,19 +136,13 @@ fn invalid_toml() {
         ("[camera]\neye = [1, 2", "line 4, column 12"),
         ("[camera]\nfov = 1\nfov = 2", "line 5, column 1"),
         ("[job]\n[job]", "line 4, column 2"),
-        (
-            "[material]\ncolor = { attribute = \"v\", attribute = \"w\" }",
-            "line 4, column 28",
-        ),
+        ("[material]\ncolor = { attribute = \"v\", attribute = \"w\" }", "line 4, column 28"),
         ("[job]\nidle = 1.2.3", "line 4, column 11"),
     ] {
         let text = format!("[input]\npath = \"ä\"\n{text}");
         let error = Manifest::parse(&text, Path::new("job.toml")).unwrap_err();
         assert_eq!(error.messages().len(), 1, "{error}");
         let expected = format!("job.toml: {place}: ");
-        assert!(
-            error.to_string().starts_with(&expected),
-            "{error}, not {place}"
-        );
+        assert!(error.to_string().starts_with(&expected), "{error}, not {place}");
     }
 }

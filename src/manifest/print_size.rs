@@ -74,9 +74,8 @@ impl Value for Side {
         let Some(text) = field.as_text() else {
             return u32::parse(field, key).map(Self::Pixels);
         };
-        let starts_with_number = text
-            .trim_start()
-            .starts_with(|c: char| c.is_ascii_digit() || c == '.');
+        let starts_with_number =
+            text.trim_start().starts_with(|c: char| c.is_ascii_digit() || c == '.');
         if !starts_with_number {
             return Err(Fault::Unwanted);
         }
@@ -124,10 +123,7 @@ mod tests {
         for (image, wanted) in [
             ("width = \"85mm\"\ndpi = 300", [1004, 565]),
             ("width = \"85mm\"", [1004, 565]),
-            (
-                "width = \"8.5 cm\"\nheight = \"6cm\"\ndpi = 600",
-                [2008, 1417],
-            ),
+            ("width = \"8.5 cm\"\nheight = \"6cm\"\ndpi = 600", [2008, 1417]),
             ("width = \"3in\"\nheight = \"144pt\"\ndpi = 100", [300, 200]),
             ("height = \"1in\"\ndpi = 90", [160, 90]),
             ("width = \"1in\"\nheight = 77\ndpi = 90", [90, 77]),
@@ -140,20 +136,11 @@ mod tests {
     #[test]
     fn wrong_lengths_are_refused() {
         for (image, part) in [
-            (
-                "width = \"85\"",
-                "image.width: \"85\" has no unit; write \"85mm\"",
-            ),
-            (
-                "width = \"85px\"",
-                "image.width: unknown unit `px`; write a whole number of pixels",
-            ),
+            ("width = \"85\"", "image.width: \"85\" has no unit; write \"85mm\""),
+            ("width = \"85px\"", "image.width: unknown unit `px`; write a whole number of pixels"),
             ("width = \"85 m\"", "unknown unit `m`"),
             ("width = \"8.5.1cm\"", "\"8.5.1cm\" is no length on paper"),
-            (
-                "height = \"0mm\"",
-                "image.height: \"0mm\" is no length on paper",
-            ),
+            ("height = \"0mm\"", "image.height: \"0mm\" is no length on paper"),
             (
                 "width = \"wide\"",
                 "image.width: expected a length on paper such as \"85mm\", or a whole number from 1 to 65536",

@@ -36,11 +36,7 @@ impl<'a> Section<'a> {
     }
 
     fn full_key(&self, key: &str) -> String {
-        if self.path.is_empty() {
-            key.to_owned()
-        } else {
-            format!("{}.{key}", self.path)
-        }
+        if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) }
     }
 
     /// The value of `key`, if it is present.
@@ -75,10 +71,7 @@ impl<'a> Section<'a> {
         let renamed = old.map(|[old, new]| {
             let what = format!("\"{old}\" is now called \"{new}\"; the old name still works");
             self.problems.warn(&field.node.place, &field.key, &what);
-            TomlNode {
-                kind: Kind::Text(new.to_owned()),
-                place: field.node.place.clone(),
-            }
+            TomlNode { kind: Kind::Text(new.to_owned()), place: field.node.place.clone() }
         });
         // Parse the value
         let node = renamed.as_ref().unwrap_or(field.node);
@@ -129,8 +122,7 @@ impl<'a> Section<'a> {
 
     /// Warns about `key` in this table.
     pub(super) fn warn(&self, key: &str, what: &str) {
-        self.problems
-            .warn(&self.place_of(key), &self.full_key(key), what);
+        self.problems.warn(&self.place_of(key), &self.full_key(key), what);
     }
 
     /// The place of the value of `key`, or of the table.

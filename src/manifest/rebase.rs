@@ -46,19 +46,15 @@ impl Manifest {
     pub fn rebase(&mut self, from: &Path, to: &Path) -> Result<(), RebaseError> {
         for dir in [from, to] {
             if !dir.is_absolute() {
-                return Err(RebaseError::NotAbsolute {
-                    dir: dir.to_owned(),
-                });
+                return Err(RebaseError::NotAbsolute { dir: dir.to_owned() });
             }
         }
         for path in self.input.path.iter_mut() {
             *path = rebased(path, from, to)?;
         }
         let output = rebased(self.output.path.as_str(), from, to)?;
-        self.output.path = OutputPattern::parse(&output).map_err(|reason| RebaseError::Output {
-            path: output,
-            reason,
-        })?;
+        self.output.path = OutputPattern::parse(&output)
+            .map_err(|reason| RebaseError::Output { path: output, reason })?;
         if let Some(path) = &mut self.input.topology {
             *path = rebased(path, from, to)?;
         }
@@ -102,11 +98,7 @@ fn rebased(path: &str, from: &Path, to: &Path) -> Result<String, RebaseError> {
 
 /// `target` relative to `base`, both absolute and without `..`.
 fn relative(target: &Path, base: &Path) -> Result<String, RebaseError> {
-    let shared = target
-        .components()
-        .zip(base.components())
-        .take_while(|(a, b)| a == b)
-        .count();
+    let shared = target.components().zip(base.components()).take_while(|(a, b)| a == b).count();
     // Without a common root, `target` is on another drive.
     let relative: PathBuf = if shared == 0 {
         target.to_owned()
@@ -170,24 +162,16 @@ mod tests {
         manifest.input.path.push("../up/./x.vtk".to_owned());
         manifest.job.stop_file = Some("control/stop".to_owned());
         manifest.input.topology = Some("conf.gro".to_owned());
-        manifest.meshes = vec![Mesh {
-            path: MeshPath::parse("walls.##.stl").unwrap(),
-            ..Mesh::default()
-        }];
+        manifest.meshes =
+            vec![Mesh { path: MeshPath::parse("walls.##.stl").unwrap(), ..Mesh::default() }];
         let (here, there) = (Path::new("/home/me/sim"), Path::new("/home/me/sim/out"));
         let before = manifest.clone();
         manifest.rebase(here, there).unwrap();
-        assert_eq!(
-            *manifest.input.path,
-            ["../data/dump.#.vtk", "/abs/x.vtk", "../../up/x.vtk"]
-        );
+        assert_eq!(*manifest.input.path, ["../data/dump.#.vtk", "/abs/x.vtk", "../../up/x.vtk"]);
         assert_eq!(manifest.output.path.as_str(), "frame.####.exr");
         assert_eq!(manifest.input.topology.as_deref(), Some("../conf.gro"));
         assert_eq!(manifest.meshes[0].path.as_str(), "../walls.##.stl");
-        assert_eq!(
-            manifest.job.stop_file_in(there),
-            Path::new("/home/me/sim/out/../control/stop")
-        );
+        assert_eq!(manifest.job.stop_file_in(there), Path::new("/home/me/sim/out/../control/stop"));
         assert_eq!(
             Manifest::new("a").job.stop_file_in(there),
             Path::new("/home/me/sim/out/job.stop")
@@ -216,10 +200,7 @@ mod tests {
         assert_eq!(from("data/f_#.vtk", "work/in"), "../data/f_#.vtk");
         assert_eq!(from("in/f_#.vtk", "work/new/out"), "../../in/f_#.vtk");
         let real = root.path().canonicalize().unwrap();
-        assert_eq!(
-            real_dir(&at("work/out/../new/../a")),
-            real.join("disk/deep/a")
-        );
+        assert_eq!(real_dir(&at("work/out/../new/../a")), real.join("disk/deep/a"));
         assert_eq!(named_place(&at("work/data")), real.join("work/data"));
     }
 }

@@ -135,11 +135,7 @@ impl Image {
     pub fn data_window(&self) -> DataWindow {
         let [left, top, ..] = self.data_bounds();
         let pixel = |at: i64| i32::try_from(at).unwrap_or(i32::MIN);
-        DataWindow {
-            left: pixel(left),
-            top: pixel(top),
-            image: self.size(),
-        }
+        DataWindow { left: pixel(left), top: pixel(top), image: self.size() }
     }
 
     /// Checks that the rendered part is in the image.
@@ -148,10 +144,8 @@ impl Image {
         if let Some(PixelBounds(bounds)) = self.crop {
             let [x0, y0, x1, y1] = bounds.map(i64::from);
             if x0 >= x1 || y0 >= y1 {
-                root.section("image").wrong(
-                    "crop",
-                    "has no pixels; x0 must be below x1, and y0 below y1",
-                );
+                root.section("image")
+                    .wrong("crop", "has no pixels; x0 must be below x1, and y0 below y1");
             } else if x0 < left || y0 < top || x1 > right || y1 > bottom {
                 let what = format!(
                     "reaches beyond the image, which is [{left}, {top}, {right}, {bottom}] with its overscan"
@@ -279,9 +273,7 @@ named!(IntegratorKind: Whitted = "whitted", Path = "path");
 
 impl Named for Structure {
     fn names() -> Vec<(Self, &'static str)> {
-        Self::ALL
-            .map(|structure| (structure, structure.name()))
-            .to_vec()
+        Self::ALL.map(|structure| (structure, structure.name())).to_vec()
     }
 }
 

@@ -222,11 +222,7 @@ mod tests {
         same.adopt_old_defaults(&current.settings());
         assert_eq!(same, current);
         // Nothing else depends on it
-        for rest in [
-            "",
-            "render.surface = \"smooth\"",
-            "render.integrator = \"whitted\"",
-        ] {
+        for rest in ["", "render.surface = \"smooth\"", "render.integrator = \"whitted\""] {
             let settings = manifest(rest).settings();
             assert!(settings.iter().all(|(key, _)| key != SPRAY_STYLE), "{rest}");
         }
@@ -249,10 +245,7 @@ mod tests {
     fn jobs_of_older_versions_keep_their_dry_ground() {
         let current = manifest("render.surface = \"smooth\"");
         let planned = rewritten(&current, GROUND_WETNESS, None);
-        assert_eq!(
-            changes(&current, &planned, false),
-            ["render.ground_wetness: (not set) -> 0.5"]
-        );
+        assert_eq!(changes(&current, &planned, false), ["render.ground_wetness: (not set) -> 0.5"]);
         let mut adopted = current.clone();
         adopted.adopt_old_defaults(&planned);
         assert_eq!(adopted.render.ground_wetness, 0.0);
@@ -269,11 +262,7 @@ mod tests {
             ("", None, ""),
             ("", Some("0.5"), ""),
             ("render.min_weight = 0.5", None, ""),
-            (
-                "render.surface = \"union\"\nmaterial.transmission = 1",
-                None,
-                "",
-            ),
+            ("render.surface = \"union\"\nmaterial.transmission = 1", None, ""),
             (glass, None, "render.min_weight: (not set) -> 0.0009765625"),
             (glass, Some("0.5"), "render.min_weight: 0.5 -> 0.0009765625"),
             ("material.transmission = 1\nrender.min_weight = 0", None, ""),
@@ -313,10 +302,7 @@ mod tests {
         assert!(changes(&union, &planned, false).is_empty());
         assert_eq!(manifest("render.surface = \"medium\""), union);
         let spheres = changes(&manifest(""), &planned, false).join("; ");
-        assert!(
-            spheres.contains("render.surface: \"medium\" -> \"spheres\""),
-            "{spheres}"
-        );
+        assert!(spheres.contains("render.surface: \"medium\" -> \"spheres\""), "{spheres}");
     }
 
     #[test]

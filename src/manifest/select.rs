@@ -65,12 +65,7 @@ pub struct Select {
 
 impl Default for Select {
     fn default() -> Self {
-        Self {
-            condition: None,
-            ids: None,
-            every: 1,
-            slab: None,
-        }
+        Self { condition: None, ids: None, every: 1, slab: None }
     }
 }
 
@@ -129,17 +124,10 @@ impl Value for Slab {
 
     fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {
         let mut section = field.as_table().ok_or(Fault::Unwanted)?;
-        let mut slab = Self {
-            axis: Axis::Z,
-            center: 0.0,
-            thickness: 1.0,
-        };
+        let mut slab = Self { axis: Axis::Z, center: 0.0, thickness: 1.0 };
         let key = |name, why| Key::new(name, &[]).required(why);
         section.read(&key("axis", "x, y or z"), &mut slab.axis);
-        section.read(
-            &key("center", "the coordinate of the middle"),
-            &mut slab.center,
-        );
+        section.read(&key("center", "the coordinate of the middle"), &mut slab.center);
         let thickness = key("thickness", "the thickness of the slice");
         section.read(&thickness.above(0), &mut slab.thickness);
         section.finish();

@@ -25,12 +25,7 @@ impl ManifestSource {
             // Problems are reported when it is read
             lay_over(tree, &text, overrides.clone(), |_| {});
         }
-        Self {
-            text,
-            path: path.to_owned(),
-            overrides,
-            given,
-        }
+        Self { text, path: path.to_owned(), overrides, given }
     }
 
     /// The manifest, with warnings about obsolete forms.

@@ -20,21 +20,13 @@ pub struct Sun {
 impl Sun {
     /// High on the left behind the viewer. It is larger than the sun as seen from the earth, so that shadows and
     /// caustics are not too sharp.
-    pub(super) const DEFAULT: Self = Self {
-        elevation: 42.0,
-        azimuth: 140.0,
-        size: 1.2,
-    };
+    pub(super) const DEFAULT: Self = Self { elevation: 42.0, azimuth: 140.0, size: 1.2 };
 }
 
 /// The keys of the table.
 fn keys() -> [Key; 3] {
     let key = |name| Key::new(name, &[]).unit("degrees");
-    [
-        key("elevation").from(0).to(90),
-        key("azimuth"),
-        key("size").above(0).to(90),
-    ]
+    [key("elevation").from(0).to(90), key("azimuth"), key("size").above(0).to(90)]
 }
 
 impl Value for Sun {
@@ -56,11 +48,7 @@ impl Value for Sun {
     }
 
     fn toml(&self) -> String {
-        let Self {
-            elevation,
-            azimuth,
-            size,
-        } = self;
+        let Self { elevation, azimuth, size } = self;
         format!("{{ elevation = {elevation:?}, azimuth = {azimuth:?}, size = {size:?} }}")
     }
 

@@ -93,10 +93,7 @@ fn example_manifest_is_valid() {
     expected.render.background = Some(Background::Constant(Vec3::new(0.05, 0.06, 0.08)));
     expected.material.color = ColorSetting::Rgb(Vec3::new(0.6, 0.7, 0.9));
     expected.lights = vec![Light {
-        kind: LightKind::Point {
-            position: DVec3::new(0.0, 0.0, 10.0),
-            falloff: Falloff::None,
-        },
+        kind: LightKind::Point { position: DVec3::new(0.0, 0.0, 10.0), falloff: Falloff::None },
         color: Vec3::ONE,
         intensity: 1.0,
         visible: false,
@@ -112,10 +109,7 @@ fn path_is_the_only_required_key() {
     let manifest = Manifest::parse_with("", path(), vec![overlay]).unwrap();
     assert_eq!(manifest, Manifest::new("5"));
     let error = Manifest::parse("", path()).unwrap_err().to_string();
-    assert!(
-        error.starts_with("job.toml: input.path: is missing"),
-        "{error}"
-    );
+    assert!(error.starts_with("job.toml: input.path: is missing"), "{error}");
 }
 
 #[test]
@@ -127,15 +121,9 @@ fn unknown_keys_name_the_nearest() {
         ],
     );
     refused("[renderer]\n", &["did you mean `render`?"]);
-    refused(
-        "[material]\ncolour = [1,1,1]",
-        &["did you mean `material.color`?"],
-    );
+    refused("[material]\ncolour = [1,1,1]", &["did you mean `material.color`?"]);
     refused("[render]\nsamples = 4", &["did you mean `image.samples`?"]);
-    refused(
-        "[image]\nqqqqq = 4",
-        &["known here: width, height, dpi, samples"],
-    );
+    refused("[image]\nqqqqq = 4", &["known here: width, height, dpi, samples"]);
     refused(
         "samples = 4",
         &["job.toml: line 2, column 1: samples: unknown key here; did you mean `image.samples`?"],
@@ -164,23 +152,11 @@ fn wrong_types_name_the_expected_type() {
             "render.ground: expected true, false or one of none, plain, checker, shadow_catcher, image or \"auto\", found 1",
         ],
     );
-    refused(
-        "[render]\nbackground = [1, 2]",
-        &["render.background", "a list of 2"],
-    );
-    refused(
-        "[render]\nbackground = { bottom = [0,0,0] }",
-        &["render.background.top: is missing"],
-    );
+    refused("[render]\nbackground = [1, 2]", &["render.background", "a list of 2"]);
+    refused("[render]\nbackground = { bottom = [0,0,0] }", &["render.background.top: is missing"]);
     refused("[render]\naccelerator = \"lbhv\"", &["did you mean lbvh?"]);
-    refused(
-        "[render]\nbvh_preset = \"meduim\"",
-        &["render.bvh_preset", "did you mean medium?"],
-    );
-    refused(
-        "[render]\nbvh_leaves = 16",
-        &["render.bvh_leaves: expected one of blocks, particles"],
-    );
+    refused("[render]\nbvh_preset = \"meduim\"", &["render.bvh_preset", "did you mean medium?"]);
+    refused("[render]\nbvh_leaves = 16", &["render.bvh_leaves: expected one of blocks, particles"]);
     for wrong in ["-0.5", "nan", "8.01", "1e39", "inf", "\"much\"", "[1]"] {
         refused(
             &format!("[render]\nsbvh_budget = {wrong}"),
@@ -198,52 +174,28 @@ fn wrong_types_name_the_expected_type() {
         let budget = with_sets(&[&set]).unwrap().render.sbvh_budget;
         assert_eq!(budget, right.parse::<f32>().unwrap());
     }
-    refused(
-        "[render]\nground_height = inf",
-        &["render.ground_height", "height or"],
-    );
-    refused(
-        "[material]\ncolor = [0.1, -0.2, 0.3]",
-        &["material.color", "from 0"],
-    );
+    refused("[render]\nground_height = inf", &["render.ground_height", "height or"]);
+    refused("[material]\ncolor = [0.1, -0.2, 0.3]", &["material.color", "from 0"]);
     refused("[material]\ncolor = [0.1, nan, 0.3]", &["material.color"]);
     refused("[material]\ncolor = [0.1, 1e39, 0.3]", &["material.color"]);
-    refused(
-        "[material]\ncolor = {}",
-        &["material.color.attribute: is missing"],
-    );
+    refused("[material]\ncolor = {}", &["material.color.attribute: is missing"]);
     refused(
         "[material]\ncolor = { attribute = \"v\", map = \"virids\" }",
         &["did you mean viridis?"],
     );
-    refused(
-        "[material]\ncolor = { attribute = \"v\", range = [4, 0] }",
-        &["two rising numbers"],
-    );
+    refused("[material]\ncolor = { attribute = \"v\", range = [4, 0] }", &["two rising numbers"]);
     for (color, part) in [
         ("range = \"99%-1%\"", "two rising numbers"),
         ("range = \"1%-101%\"", "percentiles such as"),
         ("range = [4, 0]", "reverse = true reverses the map"),
-        (
-            "scale = \"log\", range = [0, 1]",
-            "material.color.range: 0.0 has no logarithm",
-        ),
-        (
-            "scale = \"log\", range = \"symmetric\"",
-            "material.color.range: a symmetric range",
-        ),
-        (
-            "scale = \"categorical\", steps = 3",
-            "material.color.steps: categories have no steps",
-        ),
+        ("scale = \"log\", range = [0, 1]", "material.color.range: 0.0 has no logarithm"),
+        ("scale = \"log\", range = \"symmetric\"", "material.color.range: a symmetric range"),
+        ("scale = \"categorical\", steps = 3", "material.color.steps: categories have no steps"),
         (
             "scale = \"categorical\", range = [0, 1]",
             "material.color.range: categories have no range",
         ),
-        (
-            "names = { 1 = \"a\" }",
-            "material.color.names: only categories",
-        ),
+        ("names = { 1 = \"a\" }", "material.color.names: only categories"),
         ("threshold = 1", "material.color.threshold: only"),
         ("map = \"okabe-ito\"", "material.color.map: a palette needs"),
         ("map = \"batlov\"", "did you mean batlow?"),
@@ -254,14 +206,8 @@ fn wrong_types_name_the_expected_type() {
     }
     refused("[material]\nreflection = 1.5", &["from 0 to 1"]);
     refused("[camera]\nfov = 180", &["camera.fov"]);
-    refused(
-        "[camera]\nmode = \"fixed\"\neye = [1,2,3]",
-        &["camera.look_at: is missing"],
-    );
-    refused(
-        "[camera]\neye = [1,2,3]\nlook_at = [1,2,3]",
-        &["camera.look_at: is where"],
-    );
+    refused("[camera]\nmode = \"fixed\"\neye = [1,2,3]", &["camera.look_at: is missing"]);
+    refused("[camera]\neye = [1,2,3]\nlook_at = [1,2,3]", &["camera.look_at: is where"]);
     refused(
         "[camera]\neye = [0,0,0]\nlook_at = [0,0,3]\nup = [0,0,1]",
         &["line 5", "camera.up: points along"],
@@ -272,30 +218,15 @@ fn wrong_types_name_the_expected_type() {
         "[camera]\nmode = \"turntable\"\neye = [1,2,3]",
         &["line 4, column 1: camera.eye: is given, but a turntable finds its own"],
     );
-    refused(
-        "[light]\ntype = \"point\"",
-        &["light: expected a list of tables, such as [[light]]"],
-    );
+    refused("[light]\ntype = \"point\"", &["light: expected a list of tables, such as [[light]]"]);
     refused("[[light]]\n", &["light.0.type: is missing"]);
-    refused(
-        "[[light]]\ntype = \"point\"",
-        &["light.0.position: is missing"],
-    );
-    refused(
-        "[output]\npath = \"x.jpg\"",
-        &["output.path", ".exr or .png"],
-    );
+    refused("[[light]]\ntype = \"point\"", &["light.0.position: is missing"]);
+    refused("[output]\npath = \"x.jpg\"", &["output.path", ".exr or .png"]);
     refused("[output]\nchannels = []", &["output.channels"]);
-    refused(
-        "[output]\nchannels = [\"RGBA\", \"z\"]",
-        &["output.channels.1", "did you mean Z?"],
-    );
+    refused("[output]\nchannels = [\"RGBA\", \"z\"]", &["output.channels.1", "did you mean Z?"]);
     refused("[output]\nchannels = [\"Z\", \"Z\"]", &["Z is there twice"]);
     refused("[output]\nfps = 0", &["output.fps"]);
-    refused(
-        "[output]\ncompression = 3",
-        &["one of none, rle, zip, zips, piz, found 3"],
-    );
+    refused("[output]\ncompression = 3", &["one of none, rle, zip, zips, piz, found 3"]);
     refused("render = 3", &["render: expected a table, found 3"]);
 }
 
@@ -303,18 +234,9 @@ fn wrong_types_name_the_expected_type() {
 fn keys_of_the_camera_are_checked() {
     let key = |rest: &str| format!("[[camera.key]]\nframe = 4\neye = [0,0,9]\n{rest}\n");
     for (rest, what) in [
-        (
-            "",
-            "line 2, column 1: camera.key.0.look_at: is missing; each",
-        ),
-        (
-            "look_at = [0,0,9]",
-            "line 5, column 1: camera.key.0.look_at: is where the eye is",
-        ),
-        (
-            "look_at = [0,1]",
-            "line 5, column 11: camera.key.0.look_at: expected three numbers",
-        ),
+        ("", "line 2, column 1: camera.key.0.look_at: is missing; each"),
+        ("look_at = [0,0,9]", "line 5, column 1: camera.key.0.look_at: is where the eye is"),
+        ("look_at = [0,1]", "line 5, column 11: camera.key.0.look_at: expected three numbers"),
         (
             "look_at = [0,0,1]\nup = [0,0,-2]",
             "line 6, column 1: camera.key.0.up: points along the view",
@@ -327,14 +249,8 @@ fn keys_of_the_camera_are_checked() {
             "look_at = [0,0,1]\n[camera]\nup = [0,0,3]",
             "line 2, column 1: camera.key.0.up: is camera.up, which points along the view",
         ),
-        (
-            "look_at = [0,1,1]\nfov = 180",
-            "line 6, column 7: camera.key.0.fov: expected degrees",
-        ),
-        (
-            "look_at = [0,1,1]\nupp = [0,0,1]",
-            "did you mean `camera.key.0.up`?",
-        ),
+        ("look_at = [0,1,1]\nfov = 180", "line 6, column 7: camera.key.0.fov: expected degrees"),
+        ("look_at = [0,1,1]\nupp = [0,0,1]", "did you mean `camera.key.0.up`?"),
     ] {
         refused(&key(rest), &[what]);
     }
@@ -361,10 +277,7 @@ fn images_depend_on_keys_and_not_on_their_order() {
     let base = settings([key(1, ""), key(5, "")]);
     assert_eq!(settings([key(5, ""), key(1, "")]), base);
     for (rest, shown) in [
-        (
-            "up = [0,1,0]",
-            "camera.key.1.up: (not set) -> [0.0, 1.0, 0.0]",
-        ),
+        ("up = [0,1,0]", "camera.key.1.up: (not set) -> [0.0, 1.0, 0.0]"),
         ("fov = 30", "camera.key.1.fov: (not set) -> 30.0"),
     ] {
         let other = settings([key(1, ""), key(5, rest)]);
@@ -384,14 +297,8 @@ fn input_is_checked() {
     refused("[input]\npath = \"\"", "input.path: expected a name");
     refused("[input]\npath = []", "input.path: expected a directory");
     refused("[input]\npath = [\"a\", 3]", "input.path.1");
-    refused(
-        "[input]\npath = \"a\"\nradius = 0",
-        "input.radius: expected a length above 0",
-    );
-    refused(
-        "[input]\npath = \"a\"\nradius = { scale = 2 }",
-        "input.radius.attribute: is missing",
-    );
+    refused("[input]\npath = \"a\"\nradius = 0", "input.radius: expected a length above 0");
+    refused("[input]\npath = \"a\"\nradius = { scale = 2 }", "input.radius.attribute: is missing");
     refused("[input]\npath = \"a\"\nframes = \"1-z\"", "character 3");
     let manifest = parse("[input]\npath = [\"a\", \"b\"]\nframes = 7\nradius = 2");
     assert_eq!(*manifest.input.path, ["a", "b"]);
@@ -404,10 +311,7 @@ fn input_is_checked() {
         let one = parse(&text);
         assert!(one.check_frame_count(1).is_ok());
         let error = one.check_frame_count(2).unwrap_err().to_string();
-        assert!(
-            error.contains("a.exr for 2 frames: several frames would get"),
-            "{error}"
-        );
+        assert!(error.contains("a.exr for 2 frames: several frames would get"), "{error}");
         let followed = parse(&format!("{text}\njob.follow = true"));
         assert_eq!(followed.check_frame_count(1).is_ok(), range == "3");
     }
@@ -415,13 +319,9 @@ fn input_is_checked() {
 
 #[test]
 fn toml_errors_have_line_and_column() {
-    let error = Manifest::parse("[input]\npath = \n", path())
-        .unwrap_err()
-        .to_string();
+    let error = Manifest::parse("[input]\npath = \n", path()).unwrap_err().to_string();
     assert!(error.starts_with("job.toml: line 2, column "), "{error}");
-    let error = Manifest::parse("a = 1\na = 2", path())
-        .unwrap_err()
-        .to_string();
+    let error = Manifest::parse("a = 1\na = 2", path()).unwrap_err().to_string();
     assert!(error.contains("line 2"), "{error}");
 }
 
@@ -477,11 +377,7 @@ fn map_alone_keeps_the_attribute() {
         manifest.unwrap().material.color
     };
     assert_eq!(color(&["material.color.map=turbo"]), auto(None));
-    let both = [
-        "material.color=auto",
-        "material.color.map=turbo",
-        "material.color.range=[1, 2]",
-    ];
+    let both = ["material.color=auto", "material.color.map=turbo", "material.color.range=[1, 2]"];
     assert_eq!(color(&both), auto(Some([1.0, 2.0])));
     let mut manifest = Manifest::new("data");
     manifest.material.color = auto(Some([1.0, 2.0]));
@@ -493,9 +389,7 @@ fn map_alone_keeps_the_attribute() {
 fn control_characters_in_strings_are_escaped() {
     let hostile = "a\u{1b}[2J\nb\u{9b}\u{202e}\"\\";
     let text = Manifest::new(hostile).to_commented_toml();
-    let raw = text
-        .chars()
-        .find(|c| *c != '\n' && spherule_formats::is_control(*c));
+    let raw = text.chars().find(|c| *c != '\n' && spherule_formats::is_control(*c));
     assert_eq!(raw, None);
     let again = Manifest::parse(&text, path());
     assert_eq!(again, Ok(Manifest::new(hostile)));
@@ -573,11 +467,7 @@ fn settings_are_what_images_depend_on() {
     let changes = spherule_jobs::compare_settings(&base, &other);
     assert_eq!(changes.len(), 1);
     assert_eq!(changes[0].to_string(), "render.max_depth: 3 -> 5");
-    for set in [
-        "output.path=out/f.####.exr",
-        "light.0.intensity=2",
-        "output.fps=25",
-    ] {
+    for set in ["output.path=out/f.####.exr", "light.0.intensity=2", "output.fps=25"] {
         assert_eq!(
             spherule_jobs::compare_settings(&base, &with_sets(&[set]).unwrap().settings()).len(),
             1,
@@ -600,15 +490,11 @@ fn commented_file_round_trips_with_every_key() {
     let uncommented: String = text
         .lines()
         .map(|l| {
-            l.strip_prefix("# ")
-                .filter(|l| l.contains(" = ") || l.starts_with("[["))
-                .unwrap_or(l)
+            l.strip_prefix("# ").filter(|l| l.contains(" = ") || l.starts_with("[[")).unwrap_or(l)
         })
         .map(|l| format!("{l}\n"))
         .collect();
-    let error = Manifest::parse(&uncommented, path())
-        .unwrap_err()
-        .to_string();
+    let error = Manifest::parse(&uncommented, path()).unwrap_err().to_string();
     assert!(error.contains("camera.eye: is given"), "{error}");
     let all = uncommented.replace("mode = \"auto\"", "mode = \"fixed\"");
     let all = all.replace("type = \"studio\"", "type = \"image\"");
@@ -675,10 +561,7 @@ fn number_of_reported_problems_is_limited() {
         message.contains("line 3, column 1: image.widt0: unknown key; did you mean"),
         "{message}"
     );
-    assert!(
-        message.ends_with("job.toml: and more like these"),
-        "{message}"
-    );
+    assert!(message.ends_with("job.toml: and more like these"), "{message}");
     assert_eq!(message.lines().count(), 51);
 }
 
@@ -688,10 +571,7 @@ fn terms_of_the_thesis_select_its_model() {
     let whitted = IntegratorKind::Whitted;
     assert_eq!(integrator("material.shininess = 5"), whitted);
     // Defaults select nothing, however they are written
-    assert_eq!(
-        integrator("material.transmission = 0.0"),
-        IntegratorKind::Path
-    );
+    assert_eq!(integrator("material.transmission = 0.0"), IntegratorKind::Path);
     assert_eq!(integrator(""), IntegratorKind::Path);
     assert_eq!(integrator("material.ior = 1.5"), IntegratorKind::Path);
     // The integrator that a manifest names is the one that it gets
@@ -703,16 +583,12 @@ fn terms_of_the_thesis_select_its_model() {
 fn a_term_that_selects_the_integrator_is_named_in_a_warning() {
     let warnings = |text: &str| {
         let text = format!("input.path = \"a\"\n[material]\n{text}");
-        Manifest::parse_with_warnings(&text, path(), Vec::new())
-            .unwrap()
-            .1
+        Manifest::parse_with_warnings(&text, path(), Vec::new()).unwrap().1
     };
     assert_eq!(
         warnings("ambient = 0.1\ntransmission = 1.0"),
-        [
-            "job.toml: line 4, column 1: material.transmission: selects integrator = \"whitted\"; \
-             render.integrator = \"path\" keeps path tracing"
-        ]
+        ["job.toml: line 4, column 1: material.transmission: selects integrator = \"whitted\"; \
+             render.integrator = \"path\" keeps path tracing"]
     );
     assert_eq!(warnings("ambient = 0.1\ntransmission = 0.0"), [""; 0]);
     let named = "transmission = 1.0\n[render]\nintegrator = \"path\"";

@@ -57,10 +57,7 @@ impl Value for TextSize {
         let number = text.trim().strip_suffix("pt").map(str::trim);
         let points = number.and_then(|number| number.parse().ok());
         let usable = |points: &f64| *points > 0.0 && *points <= MOST_POINTS;
-        points
-            .filter(usable)
-            .map(Self::Points)
-            .ok_or(Fault::Unwanted)
+        points.filter(usable).map(Self::Points).ok_or(Fault::Unwanted)
     }
 
     fn toml(&self) -> String {

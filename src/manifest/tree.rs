@@ -64,10 +64,7 @@ impl Override {
     /// There is no `=`, a key is empty, or a list, table or quoted text is incomplete.
     pub fn parse(assignment: &str) -> Result<Self, OverrideError> {
         let shown = format!("--set {assignment}");
-        let error = |fault| OverrideError {
-            shown: shown.clone(),
-            fault,
-        };
+        let error = |fault| OverrideError { shown: shown.clone(), fault };
         let Some((key, value)) = assignment.split_once('=') else {
             return Err(error(OverrideFault::NoValue));
         };
@@ -84,12 +81,7 @@ impl Override {
             }
             Err(_) => Kind::Text(value.to_owned()),
         };
-        Ok(Self {
-            keys,
-            node: TomlNode { kind, place },
-            is_under: false,
-            is_item: false,
-        })
+        Ok(Self { keys, node: TomlNode { kind, place }, is_under: false, is_item: false })
     }
 
     /// Sets the dotted `key` to `value`; `shown` is its name in messages, such as `--output`.
@@ -103,10 +95,8 @@ impl Override {
     ) -> Result<Self, OverrideError> {
         let place = Place::Option(shown.to_owned());
         Ok(Self {
-            keys: split_key(key).map_err(|fault| OverrideError {
-                shown: shown.to_owned(),
-                fault,
-            })?,
+            keys: split_key(key)
+                .map_err(|fault| OverrideError { shown: shown.to_owned(), fault })?,
             node: TomlNode::from_value(value.into(), &place),
             is_under: false,
             is_item: false,
@@ -122,19 +112,13 @@ impl Override {
         item: impl Into<toml::Value>,
         shown: &str,
     ) -> Result<Self, OverrideError> {
-        Ok(Self {
-            is_item: true,
-            ..Self::new(key, item, shown)?
-        })
+        Ok(Self { is_item: true, ..Self::new(key, item, shown)? })
     }
 
     /// Converts it to a default: values of the manifest and of other overrides take precedence.
     #[must_use]
     pub fn under(self) -> Self {
-        Self {
-            is_under: true,
-            ..self
-        }
+        Self { is_under: true, ..self }
     }
 
     pub(super) fn is_under(&self) -> bool {
@@ -144,8 +128,7 @@ impl Override {
     /// Whether it sets the dotted `key`, or one in the table `key`.
     pub fn is_in(&self, key: &str) -> bool {
         let mut own = self.keys.iter();
-        key.split('.')
-            .all(|part| own.next().is_some_and(|own| own == part))
+        key.split('.').all(|part| own.next().is_some_and(|own| own == part))
     }
 
     /// Whether it sets the dotted `key`.
@@ -214,12 +197,9 @@ impl TomlNode {
             DeValue::Float(f) => f.as_str().parse().map_or(Kind::Other, Kind::Float),
             DeValue::Boolean(b) => Kind::Bool(b),
             DeValue::Datetime(_) => Kind::Other,
-            DeValue::Array(items) => Kind::Array(
-                items
-                    .into_iter()
-                    .map(|item| Self::from_toml(item, place))
-                    .collect(),
-            ),
+            DeValue::Array(items) => {
+                Kind::Array(items.into_iter().map(|item| Self::from_toml(item, place)).collect())
+            }
             DeValue::Table(table) => Kind::from_table(table, place),
         };
         Self { kind, place: at }
@@ -232,12 +212,9 @@ impl TomlNode {
             toml::Value::Float(f) => Kind::Float(f),
             toml::Value::Boolean(b) => Kind::Bool(b),
             toml::Value::Datetime(_) => Kind::Other,
-            toml::Value::Array(items) => Kind::Array(
-                items
-                    .into_iter()
-                    .map(|item| Self::from_value(item, place))
-                    .collect(),
-            ),
+            toml::Value::Array(items) => {
+                Kind::Array(items.into_iter().map(|item| Self::from_value(item, place)).collect())
+            }
             toml::Value::Table(table) => Kind::Table(
                 table
                     .into_iter()
@@ -245,10 +222,7 @@ impl TomlNode {
                     .collect(),
             ),
         };
-        Self {
-            kind,
-            place: place.clone(),
-        }
+        Self { kind, place: place.clone() }
     }
 
     /// Applies `overlay` to this tree and creates the necessary tables, also in place of `"auto"`, which is
@@ -276,10 +250,7 @@ impl TomlNode {
                 }
                 Kind::Table(table) => {
                     let place = &overlay.node.place;
-                    let empty = Self {
-                        kind: Kind::Table(BTreeMap::new()),
-                        place: place.clone(),
-                    };
+                    let empty = Self { kind: Kind::Table(BTreeMap::new()), place: place.clone() };
                     let entry = table.entry(key.clone()).or_insert((place.clone(), empty));
                     &mut entry.1
                 }

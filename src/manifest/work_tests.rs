@@ -27,11 +27,8 @@ fn with(sets: &[&str]) -> Result<Manifest, ManifestError> {
 }
 
 fn job(sets: [&str; 2]) -> Result<Manifest, ManifestError> {
-    let sets: Vec<String> = sets
-        .iter()
-        .filter(|set| !set.is_empty())
-        .map(|set| format!("job.{set}"))
-        .collect();
+    let sets: Vec<String> =
+        sets.iter().filter(|set| !set.is_empty()).map(|set| format!("job.{set}")).collect();
     with(&sets.iter().map(String::as_str).collect::<Vec<_>>())
 }
 
@@ -72,22 +69,13 @@ fn invalid_values() {
         "progress: expected one of auto, plain, json, openjd, none, found the text \"jsno\"; did you mean json?",
     );
     refused("isolate=1", "isolate: expected true or false");
-    refused(
-        "memory_ceiling=0",
-        "memory_ceiling: expected a size above 0",
-    );
+    refused("memory_ceiling=0", "memory_ceiling: expected a size above 0");
     refused(
         "memory_ceiling=4GiB",
         "memory_ceiling: applies to the process of a frame; set job.isolate = true too",
     );
-    refused(
-        "retries=-1",
-        "retries: expected a whole number from 0 to 100",
-    );
-    refused(
-        "retries=101",
-        "retries: expected a whole number from 0 to 100",
-    );
+    refused("retries=-1", "retries: expected a whole number from 0 to 100");
+    refused("retries=101", "retries: expected a whole number from 0 to 100");
     for wrong in ["0", "-1", "1.1e9", "inf", "nan", "soon"] {
         for key in ["takeover_after", "idle"] {
             refused(
@@ -118,10 +106,7 @@ fn any_time_is_a_duration() {
 /// Keys that require other keys, and these keys with values.
 const NEEDS: [(&str, &[&str]); 3] = [
     ("camera.eye", &["camera.look_at=[1,2,3]"]),
-    (
-        "camera.look_at",
-        &["camera.mode=fixed", "camera.eye=[1,2,3]"],
-    ),
+    ("camera.look_at", &["camera.mode=fixed", "camera.eye=[1,2,3]"]),
     ("job.memory_ceiling", &["job.isolate=true"]),
 ];
 

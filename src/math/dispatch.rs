@@ -29,11 +29,7 @@ impl SimdLevel {
 
     /// The best instruction set of this machine.
     pub fn best() -> Self {
-        Self::ALL
-            .into_iter()
-            .rev()
-            .find(|level| level.is_supported())
-            .unwrap_or(Self::Portable)
+        Self::ALL.into_iter().rev().find(|level| level.is_supported()).unwrap_or(Self::Portable)
     }
 
     /// Whether this machine supports it.
@@ -53,11 +49,7 @@ impl SimdLevel {
     /// Itself if it is supported, otherwise the best instruction set.
     #[must_use]
     pub fn or_best(self) -> Self {
-        if self.is_supported() {
-            self
-        } else {
-            Self::best()
-        }
+        if self.is_supported() { self } else { Self::best() }
     }
 
     /// The name in reports.

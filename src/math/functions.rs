@@ -145,10 +145,7 @@ pub fn atan2(y: f32, x: f32) -> f32 {
 
 /// Sine and cosine of an angle of magnitude up to 8192 radians, absolute error below 2e-7.
 #[inline(always)]
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "quadrants are counted in few bits"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "quadrants are counted in few bits")]
 pub fn sin_cos(x: f32) -> (f32, f32) {
     // Reduce x = quadrant * pi/2 + r with |r| <= pi/4; pi/2 in three parts (Cody and Waite)
     let quadrant = (x * (2.0 * FRAC_1_PI) + ROUND) - ROUND;
@@ -167,11 +164,7 @@ pub fn sin_cos(x: f32) -> (f32, f32) {
     let cosine = c * z * z - 0.5 * z + 1.0;
     // Swap and negate them depending on the quadrant
     let quarter = quadrant as i32;
-    let (s, c) = if quarter & 1 == 0 {
-        (sine, cosine)
-    } else {
-        (cosine, sine)
-    };
+    let (s, c) = if quarter & 1 == 0 { (sine, cosine) } else { (cosine, sine) };
     let s = if quarter & 2 == 0 { s } else { -s };
     let c = if (quarter + 1) & 2 == 0 { c } else { -c };
     (s, c)
@@ -207,9 +200,7 @@ mod tests {
     fn exp2_is_within_its_error_bound() {
         check(-125.0, 127.9, exp2, f64::exp2, |_, y| 2e-7 * y);
         check(-1.0, 1.0, exp2, f64::exp2, |_, y| 2e-7 * y);
-        check(-80.0, 80.0, exp, f64::exp, |x, y| {
-            (2e-7 + 1e-7 * x.abs()) * y
-        });
+        check(-80.0, 80.0, exp, f64::exp, |x, y| (2e-7 + 1e-7 * x.abs()) * y);
         assert_eq!(exp2(0.0), 1.0);
         assert_eq!(exp2(-1.0), 0.5);
         assert_eq!(exp2(128.0), f32::INFINITY);
@@ -261,11 +252,7 @@ mod tests {
                 let (x, y) = ((length * exact.cos()) as f32, (length * exact.sin()) as f32);
                 let expected = f64::from(y).atan2(f64::from(x));
                 let error = (f64::from(atan2(y, x)) - expected).abs();
-                assert!(
-                    error < 4e-7,
-                    "{x} {y}: {} instead of {expected}",
-                    atan2(y, x)
-                );
+                assert!(error < 4e-7, "{x} {y}: {} instead of {expected}", atan2(y, x));
             }
         }
         assert_eq!(atan2(0.0, 0.0), 0.0);

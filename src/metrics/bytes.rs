@@ -40,11 +40,7 @@ impl FromStr for Bytes {
         let factor = match unit {
             "" => 1,
             _ => {
-                UNITS
-                    .iter()
-                    .find(|(name, _)| name.eq_ignore_ascii_case(unit))
-                    .ok_or_else(wrong)?
-                    .1
+                UNITS.iter().find(|(name, _)| name.eq_ignore_ascii_case(unit)).ok_or_else(wrong)?.1
             }
         };
         if let Ok(whole) = number.parse::<u64>() {
@@ -72,11 +68,7 @@ impl fmt::Display for Bytes {
             return write!(f, "{} B", self.0);
         };
         let value = self.0 as f64 / *factor as f64;
-        let digits = if value < 9.995 {
-            2
-        } else {
-            usize::from(value < 99.95)
-        };
+        let digits = if value < 9.995 { 2 } else { usize::from(value < 99.95) };
         write!(f, "{value:.digits$} {name}")
     }
 }
@@ -102,19 +94,9 @@ mod tests {
         ] {
             assert_eq!(text.parse(), Ok(Bytes(bytes)), "{text}");
         }
-        for text in [
-            "",
-            "G",
-            "-1",
-            "4X",
-            "4GiB of it",
-            "1.5",
-            "1.2.3G",
-            "1e9",
-            "99999999TiB",
-            "inf",
-            ".",
-        ] {
+        for text in
+            ["", "G", "-1", "4X", "4GiB of it", "1.5", "1.2.3G", "1e9", "99999999TiB", "inf", "."]
+        {
             let error = text.parse::<Bytes>().unwrap_err();
             assert!(error.expected.contains("4GiB"), "{text}: {error}");
         }

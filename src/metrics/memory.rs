@@ -103,9 +103,7 @@ impl MemoryPeaks {
         self.sampled_anonymous = self.sampled_anonymous.max(now.anonymous);
         self.anonymous = match self.use_samples_only {
             true => self.sampled_anonymous,
-            false => self
-                .sampled_anonymous
-                .max(self.total.saturating_sub(self.file)),
+            false => self.sampled_anonymous.max(self.total.saturating_sub(self.file)),
         };
     }
 }
@@ -117,11 +115,7 @@ mod tests {
     #[test]
     fn peak_between_two_samples_counts() {
         let mut peaks = MemoryPeaks::default();
-        let use_of = |peak, anonymous, file| MemoryUse {
-            peak,
-            anonymous,
-            file,
-        };
+        let use_of = |peak, anonymous, file| MemoryUse { peak, anonymous, file };
         peaks.update(use_of(100, 30, 8));
         assert_eq!((peaks.anonymous, peaks.file, peaks.total), (92, 8, 100));
         peaks.update(use_of(100, 40, 10));
@@ -137,11 +131,7 @@ mod tests {
         peaks.use_samples_only();
         // The map was larger between two samples.
         for (peak, anonymous, file) in [(1000, 50, 600), (1000, 40, 20)] {
-            peaks.update(MemoryUse {
-                peak,
-                anonymous,
-                file,
-            });
+            peaks.update(MemoryUse { peak, anonymous, file });
         }
         assert_eq!((peaks.anonymous, peaks.file, peaks.total), (50, 600, 1000));
     }
@@ -149,11 +139,7 @@ mod tests {
     #[test]
     fn parses_proc_status() {
         let status = "Name:\tx\nVmHWM:\t    2048 kB\nRssAnon:\t 1024 kB\nRssFile:\t   12 kB\nRssShmem: 4 kB\n";
-        let expected = MemoryUse {
-            peak: 2 << 20,
-            anonymous: 1 << 20,
-            file: 16 << 10,
-        };
+        let expected = MemoryUse { peak: 2 << 20, anonymous: 1 << 20, file: 16 << 10 };
         assert_eq!(MemoryUse::parse(status), expected);
         assert_eq!(MemoryUse::parse("nothing here"), MemoryUse::default());
     }

@@ -27,9 +27,7 @@ pub(super) fn write(
     encoder.set_animated(count, 0).map_err(failed)?;
     encoder.set_blend_op(BlendOp::Source).map_err(failed)?;
     encoder.set_dispose_op(DisposeOp::None).map_err(failed)?;
-    encoder
-        .add_text_chunk("Software".to_owned(), MARKER.to_owned())
-        .map_err(failed)?;
+    encoder.add_text_chunk("Software".to_owned(), MARKER.to_owned()).map_err(failed)?;
     let mut writer = encoder.write_header().map_err(failed)?;
 
     let mut before: Option<Picture> = None;
@@ -47,9 +45,7 @@ pub(super) fn write(
             let piece = part(&picture, bounds);
             let [left, top, right, bottom] = bounds.map(|v| u32::try_from(v).unwrap_or(u32::MAX));
             writer.reset_frame_position().map_err(failed)?;
-            writer
-                .set_frame_dimension(right - left, bottom - top)
-                .map_err(failed)?;
+            writer.set_frame_dimension(right - left, bottom - top).map_err(failed)?;
             writer.set_frame_position(left, top).map_err(failed)?;
             writer.write_image_data(piece.rgb()).map_err(failed)?;
         } else {
@@ -66,8 +62,5 @@ fn failed(error: EncodingError) -> MovieError {
         EncodingError::IoError(source) => source,
         other => io::Error::other(other.to_string()),
     };
-    MovieError::Io {
-        path: "PNG".into(),
-        source,
-    }
+    MovieError::Io { path: "PNG".into(), source }
 }

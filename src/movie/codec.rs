@@ -45,16 +45,7 @@ impl Codec {
         match self {
             Self::H264 => &["-c:v", "libx264", "-preset", "medium", "-crf", "16"],
             Self::ProRes => &["-c:v", "prores_ks", "-profile:v", "3", "-vendor", "apl0"],
-            Self::Vp9 => &[
-                "-c:v",
-                "libvpx-vp9",
-                "-crf",
-                "22",
-                "-b:v",
-                "0",
-                "-row-mt",
-                "1",
-            ],
+            Self::Vp9 => &["-c:v", "libvpx-vp9", "-crf", "22", "-b:v", "0", "-row-mt", "1"],
         }
     }
 }
@@ -69,9 +60,6 @@ impl FromStr for Codec {
     type Err = CodecError;
 
     fn from_str(text: &str) -> Result<Self, CodecError> {
-        Self::ALL
-            .into_iter()
-            .find(|codec| codec.name() == text)
-            .ok_or(CodecError)
+        Self::ALL.into_iter().find(|codec| codec.name() == text).ok_or(CodecError)
     }
 }

@@ -30,11 +30,7 @@ const PAUSE: Duration = Duration::from_millis(10);
 /// Whether `ffmpeg` can be started.
 pub fn ffmpeg_is_installed() -> bool {
     let mut command = Command::new(FFMPEG);
-    command
-        .arg("-version")
-        .stdin(Stdio::null())
-        .stdout(Stdio::null())
-        .stderr(Stdio::null());
+    command.arg("-version").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     command.status().is_ok()
 }
 
@@ -73,9 +69,8 @@ fn arguments(
     codec: Codec,
     path: &Path,
 ) -> Vec<OsString> {
-    let mut all: Vec<OsString> = ["-hide_banner", "-loglevel", "error", "-nostdin", "-y"]
-        .map(Into::into)
-        .into();
+    let mut all: Vec<OsString> =
+        ["-hide_banner", "-loglevel", "error", "-nostdin", "-y"].map(Into::into).into();
     let video_size = format!("{width}x{height}");
     let rate = source.rate.to_string();
     all.extend(["-f", "rawvideo", "-pixel_format", "rgb24", "-video_size"].map(Into::into));
@@ -91,9 +86,7 @@ fn arguments(
 
 /// Arguments for codec, colours and container; `filter` is applied first.
 fn output_arguments(container: Container, codec: Codec, filter: Option<&str>) -> Vec<OsString> {
-    let first = filter
-        .map(|filter| format!("{filter},"))
-        .unwrap_or_default();
+    let first = filter.map(|filter| format!("{filter},")).unwrap_or_default();
     // sRGB has the primaries of BT.709. Without a matrix and its name, players guess by the size.
     let filters = format!(
         "{first}scale=out_color_matrix=bt709:out_range=tv:flags=lanczos+accurate_rnd+full_chroma_int,format={}",
@@ -101,14 +94,7 @@ fn output_arguments(container: Container, codec: Codec, filter: Option<&str>) ->
     );
     let mut all: Vec<OsString> = vec!["-vf".into(), filters.into()];
     all.extend(codec.arguments().iter().map(Into::into));
-    let colors = [
-        "-color_range",
-        "tv",
-        "-colorspace",
-        "bt709",
-        "-color_primaries",
-        "bt709",
-    ];
+    let colors = ["-color_range", "tv", "-colorspace", "bt709", "-color_primaries", "bt709"];
     all.extend(colors.map(Into::into));
     all.extend(["-color_trc", "iec61966-2-1"].map(Into::into));
     let comment = format!("comment={MARKER}");
@@ -126,16 +112,11 @@ pub fn by_hand(source: &MovieSource, format: MovieFormat, path: &Path) -> Option
         return None;
     };
     let first = source.paths.first()?;
-    if first
-        .extension()
-        .is_none_or(|e| e.eq_ignore_ascii_case(EXR_EXTENSION))
-    {
+    if first.extension().is_none_or(|e| e.eq_ignore_ascii_case(EXR_EXTENSION)) {
         return None;
     }
     let rate = source.rate.to_string();
-    let scale = source
-        .width
-        .map(|width| format!("scale='min({width},iw)':-1:flags=lanczos,"));
+    let scale = source.width.map(|width| format!("scale='min({width},iw)':-1:flags=lanczos,"));
     let filter = format!("{}pad=ceil(iw/2)*2:ceil(ih/2)*2", scale.unwrap_or_default());
     let mut output = output_arguments(container, codec, Some(&filter));
     output.push(plain_name(&path.to_string_lossy()).into());
@@ -148,9 +129,7 @@ pub fn by_hand(source: &MovieSource, format: MovieFormat, path: &Path) -> Option
     }
     let (before, _, after) = number_in(first.to_str()?)?;
     let files = format!("{}*{}", quoted(&plain_name(before)), quoted(after));
-    Some(format!(
-        "cat {files} | {FFMPEG} -f image2pipe -framerate {rate} -c:v png -i - {output}"
-    ))
+    Some(format!("cat {files} | {FFMPEG} -f image2pipe -framerate {rate} -c:v png -i - {output}"))
 }
 
 /// `path` in a form that programs take neither for an option nor for the name of a protocol.
@@ -181,9 +160,7 @@ fn consecutive(source: &MovieSource) -> Option<(String, u64)> {
 /// The last number in a file name: what is before, its digits, and what follows.
 fn number_in(path: &str) -> Option<(&str, &str, &str)> {
     let end = path.rfind(|c: char| c.is_ascii_digit())? + 1;
-    let start = path[..end]
-        .rfind(|c: char| !c.is_ascii_digit())
-        .map_or(0, |at| at + 1);
+    let start = path[..end].rfind(|c: char| !c.is_ascii_digit()).map_or(0, |at| at + 1);
     Some((&path[..start], &path[start..end], &path[end..]))
 }
 
@@ -199,20 +176,13 @@ struct Process {
 impl Process {
     fn start(arguments: &[OsString]) -> Result<Self, MovieError> {
         let mut command = Command::new(FFMPEG);
-        command
-            .args(arguments)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::null())
-            .stderr(Stdio::piped());
+        command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
         // A Ctrl-C in the terminal is for this process, which then stops it
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let mut child = command.spawn().map_err(|source| match source.kind() {
             io::ErrorKind::NotFound => MovieError::NoFfmpeg,
-            _ => MovieError::Io {
-                path: FFMPEG.into(),
-                source,
-            },
+            _ => MovieError::Io { path: FFMPEG.into(), source },
         })?;
         let stderr = child.stderr.take().expect("standard error is piped");
         Ok(Self {
@@ -224,14 +194,8 @@ impl Process {
 
     /// Sends the bytes of a picture.
     fn send(&mut self, bytes: &[u8]) -> Result<(), MovieError> {
-        let input = self
-            .input
-            .as_mut()
-            .expect("open until all pictures are sent");
-        input.write_all(bytes).map_err(|source| MovieError::Io {
-            path: FFMPEG.into(),
-            source,
-        })
+        let input = self.input.as_mut().expect("open until all pictures are sent");
+        input.write_all(bytes).map_err(|source| MovieError::Io { path: FFMPEG.into(), source })
     }
 
     /// Waits for the end of the movie.
@@ -239,10 +203,7 @@ impl Process {
         drop(self.input.take());
         loop {
             let ended = self.child.try_wait();
-            let ended = ended.map_err(|source| MovieError::Io {
-                path: FFMPEG.into(),
-                source,
-            })?;
+            let ended = ended.map_err(|source| MovieError::Io { path: FFMPEG.into(), source })?;
             match ended {
                 Some(status) if status.success() => return Ok(()),
                 Some(status) => return Err(self.failure(status)),
@@ -272,10 +233,7 @@ impl Process {
         if lines.is_empty() {
             lines.push("it printed nothing".to_owned());
         }
-        MovieError::Ffmpeg {
-            status: status.to_string(),
-            lines,
-        }
+        MovieError::Ffmpeg { status: status.to_string(), lines }
     }
 }
 
@@ -293,11 +251,7 @@ fn last_lines(errors: impl Read) -> Vec<String> {
     let mut lines = VecDeque::new();
     let mut line = Vec::new();
     // Pieces of long lines are lines
-    while (&mut errors)
-        .take(MAX_LINE)
-        .read_until(b'\n', &mut line)
-        .is_ok_and(|read| read > 0)
-    {
+    while (&mut errors).take(MAX_LINE).read_until(b'\n', &mut line).is_ok_and(|read| read > 0) {
         let text = String::from_utf8_lossy(&line).trim().to_owned();
         if !text.is_empty() {
             lines.push_back(text);
@@ -332,10 +286,7 @@ mod tests {
         let format = MovieFormat::of(Path::new("a.mp4"), None).unwrap();
         let line = by_hand(&source(names, repeats), format, Path::new("it's.mp4")).unwrap();
         assert!(line.starts_with(start), "{line}");
-        assert!(
-            line.contains("-crf 16") && line.ends_with(r"'it'\''s.mp4'"),
-            "{line}"
-        );
+        assert!(line.contains("-crf 16") && line.ends_with(r"'it'\''s.mp4'"), "{line}");
     }
 
     #[test]
@@ -345,10 +296,7 @@ mod tests {
             by_hand(&source(names, 1), format, Path::new(output)).unwrap()
         };
         let consecutive = line(&["concat:a|b/f.01.png"], "-y.mp4");
-        assert!(
-            consecutive.contains("-i './concat:a|b/f.%02d.png' "),
-            "{consecutive}"
-        );
+        assert!(consecutive.contains("-i './concat:a|b/f.%02d.png' "), "{consecutive}");
         assert!(consecutive.ends_with(" ./-y.mp4"), "{consecutive}");
         let piped = line(&["-n/f.1.png", "-n/f.3.png"], "a/b:c.mp4");
         assert!(piped.starts_with("cat ./-n/f.*.png |"), "{piped}");
@@ -364,17 +312,12 @@ mod tests {
         check_by_hand(&["out a/f.009.png", "out a/f.010.png"], 2, piped);
         check_by_hand(&["f%.1.png", "f%.2.png"], 1, "cat 'f%.'*.png");
         let format = MovieFormat::of(Path::new("a.mp4"), None).unwrap();
-        assert_eq!(
-            by_hand(&source(&["f.1.exr"], 1), format, Path::new("a.mp4")),
-            None
-        );
+        assert_eq!(by_hand(&source(&["f.1.exr"], 1), format, Path::new("a.mp4")), None);
     }
 
     #[test]
     fn the_last_lines_are_kept() {
-        let text = (0..50)
-            .map(|i| format!("line {i}\r\n\n"))
-            .collect::<String>();
+        let text = (0..50).map(|i| format!("line {i}\r\n\n")).collect::<String>();
         let lines = last_lines(text.as_bytes());
         assert_eq!(lines.first().unwrap(), "line 44");
         assert_eq!(lines.last().unwrap(), "line 49");

@@ -116,27 +116,16 @@ impl MovieFormat {
         Err(FormatError::Codec {
             extension: container.extension(),
             codec,
-            possible: possible
-                .iter()
-                .map(|c| c.name())
-                .collect::<Vec<_>>()
-                .join(", "),
+            possible: possible.iter().map(|c| c.name()).collect::<Vec<_>>().join(", "),
         })
     }
 
     /// A name for messages.
     pub const fn name(self) -> &'static str {
         match self {
-            Self::Ffmpeg {
-                codec: Codec::H264, ..
-            } => "H.264",
-            Self::Ffmpeg {
-                codec: Codec::ProRes,
-                ..
-            } => "ProRes",
-            Self::Ffmpeg {
-                codec: Codec::Vp9, ..
-            } => "VP9",
+            Self::Ffmpeg { codec: Codec::H264, .. } => "H.264",
+            Self::Ffmpeg { codec: Codec::ProRes, .. } => "ProRes",
+            Self::Ffmpeg { codec: Codec::Vp9, .. } => "VP9",
             Self::Gif => "GIF",
             Self::Apng => "animated PNG",
             Self::WebP => "animated WebP",
@@ -183,10 +172,7 @@ mod tests {
             assert!(of(name, None).is_err() || name == "a.mp4/", "{name}");
         }
         let error = of("a.webm", prores).unwrap_err().to_string();
-        assert_eq!(
-            error,
-            "webm files cannot have the codec prores; choose one of vp9"
-        );
+        assert_eq!(error, "webm files cannot have the codec prores; choose one of vp9");
     }
 
     #[test]

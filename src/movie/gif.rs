@@ -36,19 +36,13 @@ pub(super) fn write(
     })?;
     let palette = histogram.palette();
     let mut ditherer = Ditherer::new(&palette);
-    let side = |side: usize| {
-        u16::try_from(side).map_err(|_| MovieError::TooLarge {
-            format: "GIF",
-            size,
-        })
-    };
+    let side =
+        |side: usize| u16::try_from(side).map_err(|_| MovieError::TooLarge { format: "GIF", size });
     let (width, height) = (side(size[0])?, side(size[1])?);
     let mut encoder = Encoder::new(file, width, height, &full(palette.bytes())).map_err(failed)?;
     encoder.set_repeat(Repeat::Infinite).map_err(failed)?;
     let comment = AnyExtension::from(Extension::Comment);
-    encoder
-        .write_raw_extension(comment, &[MARKER.as_bytes()])
-        .map_err(failed)?;
+    encoder.write_raw_extension(comment, &[MARKER.as_bytes()]).map_err(failed)?;
 
     let mut before: Option<Vec<u8>> = None;
     let (mut shown, mut ticks) = (0, 0);
@@ -72,10 +66,7 @@ fn full(bytes: &[u8]) -> Vec<u8> {
 }
 
 /// The pixels that have changed since `before`, or all.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "places in a picture of a GIF"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "places in a picture of a GIF")]
 fn frame(before: Option<&[u8]>, now: &[u8], width: usize, delay: u16) -> Frame<'static> {
     let whole = [0, 0, width, now.len() / width];
     let bounds = match before {
@@ -120,8 +111,5 @@ fn failed(error: EncodingError) -> MovieError {
         EncodingError::Io(source) => source,
         other => io::Error::other(other.to_string()),
     };
-    MovieError::Io {
-        path: "GIF".into(),
-        source,
-    }
+    MovieError::Io { path: "GIF".into(), source }
 }

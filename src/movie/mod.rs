@@ -115,18 +115,12 @@ pub fn write_movie(
     path: &Path,
     observer: &dyn Observer,
 ) -> Result<FinishedMovie, MovieError> {
-    let io = |source| MovieError::Io {
-        path: path.to_owned(),
-        source,
-    };
+    let io = |source| MovieError::Io { path: path.to_owned(), source };
     let first = source.first()?;
     let [width, height] = first.size();
     let size = format.padded([width, height]);
     if size.iter().any(|side| *side > format.max_side()) {
-        return Err(MovieError::TooLarge {
-            format: format.name(),
-            size,
-        });
+        return Err(MovieError::TooLarge { format: format.name(), size });
     }
     let mut file = Publisher::create(path).map_err(io)?;
     match format {
@@ -138,11 +132,7 @@ pub fn write_movie(
         MovieFormat::WebP => webp::write(source, &mut file, observer)?,
     }
     let bytes = file.commit().map_err(io)?;
-    Ok(FinishedMovie {
-        size,
-        shown: source.shown(),
-        bytes,
-    })
+    Ok(FinishedMovie { size, shown: source.shown(), bytes })
 }
 
 /// The commands of a shell that install `ffmpeg`, by system.
@@ -151,9 +141,7 @@ pub const INSTALL: &str = "Debian, Ubuntu: sudo apt install ffmpeg; Fedora: sudo
 
 /// Arguments as a line for a shell.
 fn shell_line(arguments: &[OsString]) -> String {
-    let quoted = arguments
-        .iter()
-        .map(|argument| quoted(&argument.to_string_lossy()));
+    let quoted = arguments.iter().map(|argument| quoted(&argument.to_string_lossy()));
     quoted.collect::<Vec<_>>().join(" ")
 }
 
@@ -170,9 +158,7 @@ fn quoted(text: &str) -> String {
 /// exclusive. None if there is no difference.
 fn changed<T: PartialEq>(before: &[T], now: &[T], width: usize) -> Option<[usize; 4]> {
     let rows = || before.chunks(width).zip(now.chunks(width)).enumerate();
-    let mut differing = rows()
-        .filter(|(_, (before, now))| before != now)
-        .map(|(y, _)| y);
+    let mut differing = rows().filter(|(_, (before, now))| before != now).map(|(y, _)| y);
     let top = differing.next()?;
     let bottom = differing.last().unwrap_or(top) + 1;
     let mut bounds = [width, top, 0, bottom];
@@ -182,9 +168,7 @@ fn changed<T: PartialEq>(before: &[T], now: &[T], width: usize) -> Option<[usize
             continue;
         };
         let mut columns = before.iter().zip(now);
-        let last = columns
-            .rposition(|(before, now)| before != now)
-            .unwrap_or(first);
+        let last = columns.rposition(|(before, now)| before != now).unwrap_or(first);
         bounds[0] = bounds[0].min(first);
         bounds[2] = bounds[2].max(last + 1);
     }

@@ -52,18 +52,14 @@ struct Sample {
 
 impl Histogram {
     pub(super) fn new() -> Self {
-        Self {
-            cells: vec![Cell::default(); 1 << (3 * BITS)],
-            exact: Some(BTreeMap::new()),
-        }
+        Self { cells: vec![Cell::default(); 1 << (3 * BITS)], exact: Some(BTreeMap::new()) }
     }
 
     /// Counts the pixels of `picture`.
     pub(super) fn add(&mut self, picture: &Picture) {
         for pixel in picture.pixels() {
-            let index = pixel
-                .iter()
-                .fold(0, |index, v| (index << BITS) | usize::from(v >> (8 - BITS)));
+            let index =
+                pixel.iter().fold(0, |index, v| (index << BITS) | usize::from(v >> (8 - BITS)));
             let cell = &mut self.cells[index];
             cell.count += 1;
             for (sum, value) in cell.sums.iter_mut().zip(pixel) {
@@ -119,15 +115,8 @@ impl Group {
     fn new(samples: &[Sample], start: usize, end: usize) -> Self {
         let part = &samples[start..end];
         let spreads = [0, 1, 2].map(|axis| spread(part, axis));
-        let axis = (0..3)
-            .max_by(|a, b| spreads[*a].total_cmp(&spreads[*b]))
-            .unwrap_or(0);
-        Self {
-            start,
-            end,
-            axis,
-            spread: spreads[axis],
-        }
+        let axis = (0..3).max_by(|a, b| spreads[*a].total_cmp(&spreads[*b])).unwrap_or(0);
+        Self { start, end, axis, spread: spreads[axis] }
     }
 }
 
@@ -155,19 +144,14 @@ fn cut(samples: &mut [Sample]) -> Vec<[f32; 3]> {
         let Some(widest) = widest.filter(|i| groups[*i].spread > 0.0) else {
             break;
         };
-        let Group {
-            start, end, axis, ..
-        } = groups[widest];
+        let Group { start, end, axis, .. } = groups[widest];
         let part = &mut samples[start..end];
         part.sort_by(|a, b| a.color[axis].total_cmp(&b.color[axis]));
         let at = start + best_cut(part, axis);
         groups[widest] = Group::new(samples, start, at);
         groups.push(Group::new(samples, at, end));
     }
-    groups
-        .iter()
-        .map(|group| mean(&samples[group.start..group.end]))
-        .collect()
+    groups.iter().map(|group| mean(&samples[group.start..group.end])).collect()
 }
 
 /// The index before which to cut sorted samples, so that the parts have the smallest spread.
@@ -195,10 +179,7 @@ fn best_cut(samples: &[Sample], axis: usize) -> usize {
 fn mean(samples: &[Sample]) -> [f32; 3] {
     let weight: f64 = samples.iter().map(|sample| sample.weight).sum();
     [0, 1, 2].map(|axis| {
-        let sum: f64 = samples
-            .iter()
-            .map(|s| s.weight * f64::from(s.color[axis]))
-            .sum();
+        let sum: f64 = samples.iter().map(|s| s.weight * f64::from(s.color[axis])).sum();
         (sum / weight) as f32
     })
 }
@@ -222,9 +203,7 @@ fn refine(colors: &mut [[f32; 3]], samples: &[Sample]) {
 }
 
 fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
-    (0..3)
-        .map(|i| WEIGHTS[i] * (a[i] - b[i]) * (a[i] - b[i]))
-        .sum()
+    (0..3).map(|i| WEIGHTS[i] * (a[i] - b[i]) * (a[i] - b[i])).sum()
 }
 
 fn nearest(colors: &[[f32; 3]], color: [f32; 3]) -> usize {
@@ -253,11 +232,7 @@ struct Mixture {
 }
 
 impl Palette {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "means of bytes"
-    )]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "means of bytes")]
     fn new(colors: &[[f32; 3]]) -> Self {
         let mut rounded: Vec<[u8; 3]> = colors.iter().map(|c| c.map(|v| v.round() as u8)).collect();
         rounded.sort_unstable();
@@ -279,11 +254,7 @@ impl Palette {
         let color = color.map(f32::from);
         let first = nearest(&self.colors, color);
         let base = self.colors[first];
-        let mut best = Mixture {
-            first: first as u8,
-            second: first as u8,
-            part: 0.0,
-        };
+        let mut best = Mixture { first: first as u8, second: first as u8, part: 0.0 };
         let mut smallest = distance(base, color);
         for (second, other) in self.colors.iter().enumerate() {
             let length = distance(base, *other);
@@ -291,19 +262,14 @@ impl Palette {
                 continue;
             }
             // Project the colour to the line between both
-            let along: f32 = (0..3)
-                .map(|i| WEIGHTS[i] * (color[i] - base[i]) * (other[i] - base[i]))
-                .sum();
+            let along: f32 =
+                (0..3).map(|i| WEIGHTS[i] * (color[i] - base[i]) * (other[i] - base[i])).sum();
             let part = (along / length).clamp(0.0, 0.5);
             let mixed = [0, 1, 2].map(|i| base[i] + part * (other[i] - base[i]));
             let error = distance(mixed, color) + MIX_WEIGHT * part * (1.0 - part) * length;
             if error < smallest {
                 smallest = error;
-                best = Mixture {
-                    second: second as u8,
-                    part,
-                    ..best
-                };
+                best = Mixture { second: second as u8, part, ..best };
             }
         }
         best
@@ -321,10 +287,7 @@ const MAX_REMEMBERED: usize = 1 << 21;
 
 impl<'a> Ditherer<'a> {
     pub(super) fn new(palette: &'a Palette) -> Self {
-        Self {
-            palette,
-            mixtures: HashMap::new(),
-        }
+        Self { palette, mixtures: HashMap::new() }
     }
 
     /// The indices of the pixels.
@@ -338,11 +301,7 @@ impl<'a> Ditherer<'a> {
                 let known = self.mixtures.entry(*pixel);
                 let mixture = known.or_insert_with(|| self.palette.mixture(*pixel));
                 let is_second = dither_threshold(x, y) < mixture.part;
-                indices.push(if is_second {
-                    mixture.second
-                } else {
-                    mixture.first
-                });
+                indices.push(if is_second { mixture.second } else { mixture.first });
             }
         }
         indices

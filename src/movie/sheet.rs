@@ -40,9 +40,7 @@ impl SheetLayout {
     /// The layout of `count` pictures of this size, at least one.
     pub fn new(count: usize, picture: [usize; 2], settings: &SheetSettings) -> Self {
         let count = count.max(1);
-        let columns = settings
-            .columns
-            .unwrap_or_else(|| free_columns(count, picture));
+        let columns = settings.columns.unwrap_or_else(|| free_columns(count, picture));
         let columns = columns.clamp(1, count);
         let rows = count.div_ceil(columns);
         let gaps = settings.gap * (columns - 1);
@@ -51,11 +49,7 @@ impl SheetLayout {
         let width = width.clamp(1, picture[0]);
         let cell = [width, scaled_height(width, picture)];
         let size = |axis: usize, cells: usize| cells * cell[axis] + (cells - 1) * settings.gap;
-        Self {
-            cells: [columns, rows],
-            cell,
-            size: [size(0, columns), size(1, rows)],
-        }
+        Self { cells: [columns, rows], cell, size: [size(0, columns), size(1, rows)] }
     }
 
     /// Left and top of picture number `index`.
@@ -108,10 +102,7 @@ pub fn write_sheet(
         observer.on_picture(index + 1);
     }
     let (sheet, layout) = sheet.ok_or(MovieError::Empty)?;
-    let io = |source| MovieError::Io {
-        path: file.to_owned(),
-        source,
-    };
+    let io = |source| MovieError::Io { path: file.to_owned(), source };
     let png = sheet.png(MARKER).map_err(io)?;
     spherule_jobs::publish(file, &png).map_err(io)?;
     Ok(layout)
@@ -123,10 +114,7 @@ fn check(layout: &SheetLayout) -> Result<(), MovieError> {
     if width.max(height) <= 1 << 14 && width * height <= 1 << 27 {
         return Ok(());
     }
-    Err(MovieError::TooLarge {
-        format: "a sheet",
-        size: layout.size,
-    })
+    Err(MovieError::TooLarge { format: "a sheet", size: layout.size })
 }
 
 #[cfg(test)]
@@ -134,12 +122,7 @@ mod tests {
     use super::*;
 
     fn settings(columns: Option<usize>, width: usize) -> SheetSettings {
-        SheetSettings {
-            columns,
-            width,
-            gap: 8,
-            exposure: 0.0,
-        }
+        SheetSettings { columns, width, gap: 8, exposure: 0.0 }
     }
 
     #[test]
@@ -159,9 +142,6 @@ mod tests {
         assert_eq!((layout.cells, layout.size), ([2, 1], [136, 36]));
         let layout = SheetLayout::new(1000, [1920, 2], &settings(Some(1000), 10));
         assert_eq!(layout.cell, [1, 1]);
-        assert_eq!(
-            SheetLayout::new(1, [7, 5], &settings(None, 100)).size,
-            [7, 5]
-        );
+        assert_eq!(SheetLayout::new(1, [7, 5], &settings(None, 100)).size, [7, 5]);
     }
 }

@@ -11,11 +11,7 @@ use crate::picture::is_own_file;
 fn picture(step: usize) -> Picture {
     let ramp = |i: usize| [u8::try_from(60 + i % 41).unwrap(); 3];
     let mut picture = Picture::new(41, 27, (0..41 * 27).flat_map(ramp).collect());
-    picture.put(
-        &Picture::filled(6, 5, [220, 40, 10]),
-        3 + 7 * step,
-        2 + 5 * step,
-    );
+    picture.put(&Picture::filled(6, 5, [220, 40, 10]), 3 + 7 * step, 2 + 5 * step);
     picture
 }
 
@@ -60,11 +56,8 @@ fn gif_is_near_and_keeps_the_time() {
     for step in 0..3 {
         let frame = decoder.read_next_frame().unwrap().unwrap();
         delays.push(frame.delay);
-        let (left, top, width) = (
-            usize::from(frame.left),
-            usize::from(frame.top),
-            usize::from(frame.width),
-        );
+        let (left, top, width) =
+            (usize::from(frame.left), usize::from(frame.top), usize::from(frame.width));
         for (i, pixel) in frame.buffer.as_chunks::<4>().0.iter().enumerate() {
             if pixel[3] == 255 {
                 canvas[(top + i / width) * 41 + left + i % width] = [pixel[0], pixel[1], pixel[2]];
@@ -81,9 +74,8 @@ fn gif_is_near_and_keeps_the_time() {
 fn animated_png_is_exact() {
     let dir = tempfile::tempdir().unwrap();
     let path = movie("a.png", &source(dir.path()), dir.path());
-    let mut reader = png::Decoder::new(BufReader::new(File::open(path).unwrap()))
-        .read_info()
-        .unwrap();
+    let mut reader =
+        png::Decoder::new(BufReader::new(File::open(path).unwrap())).read_info().unwrap();
     let animation = reader.info().animation_control().copied().unwrap();
     assert_eq!((animation.num_frames, animation.num_plays), (3, 0));
     let mut canvas = Picture::filled(41, 27, [0; 3]);
@@ -115,10 +107,7 @@ fn animated_webp_is_exact() {
         let mut bytes = vec![0; decoder.output_buffer_size().unwrap()];
         durations.push(decoder.read_frame(&mut bytes).unwrap());
         let channels = bytes.len() / (41 * 27);
-        let rgb = bytes
-            .chunks(channels)
-            .flat_map(|pixel| pixel[..3].to_vec())
-            .collect();
+        let rgb = bytes.chunks(channels).flat_map(|pixel| pixel[..3].to_vec()).collect();
         assert_eq!(Picture::new(41, 27, rgb), picture(step), "{step}");
     }
     assert_eq!(durations, [33, 67, 33]);
@@ -128,11 +117,7 @@ fn animated_webp_is_exact() {
 fn pictures_of_several_sizes_are_refused() {
     let dir = tempfile::tempdir().unwrap();
     let source = source(dir.path());
-    fs::write(
-        &source.paths[2],
-        Picture::filled(40, 27, [0; 3]).png("test").unwrap(),
-    )
-    .unwrap();
+    fs::write(&source.paths[2], Picture::filled(40, 27, [0; 3]).png("test").unwrap()).unwrap();
     for name in ["a.gif", "a.png", "a.webp"] {
         let path = dir.path().join(name);
         let error =
@@ -144,11 +129,7 @@ fn pictures_of_several_sizes_are_refused() {
         );
         assert!(!path.exists());
     }
-    assert_eq!(
-        fs::read_dir(dir.path()).unwrap().count(),
-        3,
-        "temporary files are removed"
-    );
+    assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 3, "temporary files are removed");
 }
 
 #[test]
@@ -168,12 +149,7 @@ fn a_stopped_movie_leaves_nothing() {
     for name in ["a.gif", "a.png", "a.webp"] {
         let path = dir.path().join(name);
         let observer = StopAfter(RefCell::new(2));
-        let stopped = write_movie(
-            &source,
-            MovieFormat::of(&path, None).unwrap(),
-            &path,
-            &observer,
-        );
+        let stopped = write_movie(&source, MovieFormat::of(&path, None).unwrap(), &path, &observer);
         assert!(matches!(stopped, Err(MovieError::Stopped)));
     }
     assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 3);

@@ -31,11 +31,8 @@ impl Timeline {
     /// frequent difference between planned frames.
     pub fn new(frames: &[i64], all: &[i64], gaps: Gaps) -> Self {
         let step = step(all);
-        let mut timeline = Self {
-            repeats: vec![1; frames.len()],
-            held: Vec::new(),
-            skipped: Vec::new(),
-        };
+        let mut timeline =
+            Self { repeats: vec![1; frames.len()], held: Vec::new(), skipped: Vec::new() };
         for (pair, repeats) in frames.windows(2).zip(&mut timeline.repeats) {
             let distance = pair[1].abs_diff(pair[0]);
             let missing = distance.saturating_add(step / 2) / step;
@@ -43,9 +40,7 @@ impl Timeline {
             if missing == 0 {
                 continue;
             }
-            let shown = u32::try_from(missing + 1)
-                .ok()
-                .filter(|_| missing < MAX_HELD);
+            let shown = u32::try_from(missing + 1).ok().filter(|_| missing < MAX_HELD);
             match shown.filter(|_| gaps == Gaps::Hold) {
                 Some(shown) => {
                     *repeats = shown;
@@ -78,10 +73,7 @@ mod tests {
         assert_eq!(timeline.repeats, repeats);
         let skipped = Timeline::new(frames, all, Gaps::Skip);
         assert!(skipped.repeats.iter().all(|repeats| *repeats == 1) && skipped.held.is_empty());
-        assert_eq!(
-            skipped.skipped.len(),
-            timeline.held.len() + timeline.skipped.len()
-        );
+        assert_eq!(skipped.skipped.len(), timeline.held.len() + timeline.skipped.len());
         timeline
     }
 

@@ -36,21 +36,14 @@ pub(super) fn write(
         }
         shown += u64::from(repeats);
         let end = source.rate.end(shown, TICKS);
-        let bounds = before
-            .as_ref()
-            .map_or([0, 0, picture.width(), picture.height()], |before| {
-                let bounds = changed(before.pixels(), picture.pixels(), picture.width());
-                let [left, top, right, bottom] = bounds.unwrap_or([0, 0, 1, 1]);
-                // Frames begin at even places
-                [left & !1, top & !1, right, bottom]
-            });
-        write_frame(
-            file,
-            &part(&picture, bounds),
-            [bounds[0], bounds[1]],
-            end - ticks,
-        )
-        .map_err(failed)?;
+        let bounds = before.as_ref().map_or([0, 0, picture.width(), picture.height()], |before| {
+            let bounds = changed(before.pixels(), picture.pixels(), picture.width());
+            let [left, top, right, bottom] = bounds.unwrap_or([0, 0, 1, 1]);
+            // Frames begin at even places
+            [left & !1, top & !1, right, bottom]
+        });
+        write_frame(file, &part(&picture, bounds), [bounds[0], bounds[1]], end - ticks)
+            .map_err(failed)?;
         ticks = end;
         before = Some(picture);
         Ok(())
@@ -116,18 +109,12 @@ fn write_chunk(file: &mut impl Write, name: &[u8; 4], data: &[u8]) -> io::Result
 }
 
 /// Three bytes; larger values become the largest.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "the low bytes of a value below 2^24"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "the low bytes of a value below 2^24")]
 fn u24(value: usize) -> [u8; 3] {
     let value = value.min(0xff_ffff);
     [value as u8, (value >> 8) as u8, (value >> 16) as u8]
 }
 
 fn failed(source: io::Error) -> MovieError {
-    MovieError::Io {
-        path: "WebP".into(),
-        source,
-    }
+    MovieError::Io { path: "WebP".into(), source }
 }

@@ -108,11 +108,7 @@ mod tests {
     }
 
     fn encoded(format: PictureFormat, background: PreviewBackground) -> Vec<u8> {
-        let options = PreviewOptions {
-            background,
-            dpi: Some(300),
-            ..PreviewOptions::default()
-        };
+        let options = PreviewOptions { background, dpi: Some(300), ..PreviewOptions::default() };
         encode_picture(&film(), &options, &[], format).unwrap()
     }
 

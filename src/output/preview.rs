@@ -47,11 +47,8 @@ pub fn encode_preview(
     overlays: &[Sprite],
 ) -> Result<Vec<u8>, OutputError> {
     let picture = SrgbPicture::of(film, options, overlays);
-    let color_type = if picture.has_alpha {
-        ExtendedColorType::Rgba8
-    } else {
-        ExtendedColorType::Rgb8
-    };
+    let color_type =
+        if picture.has_alpha { ExtendedColorType::Rgba8 } else { ExtendedColorType::Rgb8 };
     let mut file = Vec::new();
     PngEncoder::new(&mut file)
         .write_image(&picture.bytes, picture.width, picture.height, color_type)
@@ -81,10 +78,7 @@ impl SrgbPicture {
         let mut bytes = vec![0; film.color.len() * pixel_len];
         let (mut linear, mut thresholds) = (vec![0.0; 3 * width], vec![0.0; 3 * width]);
         let mut colors = vec![0; 3 * width];
-        let rows = film
-            .color
-            .chunks(width)
-            .zip(bytes.chunks_mut(pixel_len * width));
+        let rows = film.color.chunks(width).zip(bytes.chunks_mut(pixel_len * width));
         for (y, (row, bytes)) in (0..film.height).zip(rows) {
             let pixels = linear.as_chunks_mut().0.iter_mut();
             for (pixel, &[r, g, b, a]) in pixels.zip(row) {
@@ -111,22 +105,13 @@ impl SrgbPicture {
                 overlays.iter().for_each(|o| o.draw_over(y, bytes));
             }
         }
-        Self {
-            bytes,
-            width: film.width,
-            height: film.height,
-            has_alpha: is_transparent,
-        }
+        Self { bytes, width: film.width, height: film.height, has_alpha: is_transparent }
     }
 }
 
 /// A colour that is not multiplied by `alpha`; black where nothing covers the background.
 fn straight(premultiplied: Vec3, alpha: f32) -> Vec3 {
-    if alpha > 0.0 {
-        premultiplied / alpha
-    } else {
-        Vec3::ZERO
-    }
+    if alpha > 0.0 { premultiplied / alpha } else { Vec3::ZERO }
 }
 
 /// Joins the `colors` of a row with the alpha of `pixels`, dithered like them.
@@ -235,19 +220,13 @@ mod tests {
                 shown += f32::from(image.get_pixel(x, y).0[0]) / 256.0;
                 expected += 255.0 * srgb_from_linear(0.2 + 0.006 * x as f32 / 600.0) / 256.0;
             }
-            assert!(
-                (shown - expected).abs() < 0.05,
-                "{left}: {shown} {expected}"
-            );
+            assert!((shown - expected).abs() < 0.05, "{left}: {shown} {expected}");
         }
     }
 
     #[test]
     fn exposure_and_background() {
-        let options = PreviewOptions {
-            exposure: 1.0,
-            ..PreviewOptions::default()
-        };
+        let options = PreviewOptions { exposure: 1.0, ..PreviewOptions::default() };
         assert_near(mean([0.18, 0.0, 0.0, 1.0], &options).x, 0.36);
         let options = PreviewOptions {
             background: PreviewBackground::Color(Vec3::new(0.18, 0.2, 0.0)),
@@ -272,10 +251,9 @@ mod tests {
         let pixels: Vec<[u8; 4]> = image.into_rgba8().pixels().map(|p| p.0).collect();
         assert_eq!(pixels[0], [0; 4]);
         // Colours are those of what covers the pixel, whatever part of it
-        for (pixel, linear, alpha) in [
-            (pixels[1], [0.5, 0.02, 1.0], 255.0),
-            (pixels[2], [0.18, 0.02, 1.0], 127.5),
-        ] {
+        for (pixel, linear, alpha) in
+            [(pixels[1], [0.5, 0.02, 1.0], 255.0), (pixels[2], [0.18, 0.02, 1.0], 127.5)]
+        {
             let [r, g, b] = linear.map(|linear| 255.0 * srgb_from_linear(linear));
             for (byte, expected) in pixel.into_iter().zip([r, g, b, alpha]) {
                 assert!((f32::from(byte) - expected).abs() <= 1.0, "{pixel:?}");

@@ -101,10 +101,7 @@ pub fn verify_exr(file: impl Read + Seek, expected: &ImageShape) -> Result<(), I
     for chunk in reader.filter_chunks(true, |_, _, _| true)? {
         let block = UncompressedBlock::decompress_chunk(chunk?, &meta, true)?;
         let (at, size) = (block.index.pixel_position, block.index.pixel_size);
-        let (header, rows) = (
-            &meta.headers[block.index.layer],
-            &mut all_rows[block.index.layer],
-        );
+        let (header, rows) = (&meta.headers[block.index.layer], &mut all_rows[block.index.layer]);
         let bytes = size.area() * header.channels.bytes_per_pixel;
         if (at.x(), at.y(), size.x()) != (0, *rows, header.layer_size.x())
             || block.data.len() != bytes
@@ -130,10 +127,7 @@ fn expected_parts(headers: &[Header], expected: &ImageShape) -> Vec<Vec<Plane>> 
     let mut channels = expected.channels;
     let attributes = attributes(&found, &expected.attributes);
     channels.layers.attributes = u8::try_from(attributes.len()).unwrap_or(u8::MAX);
-    let names = PlaneNames {
-        attributes,
-        light_groups: expected.light_groups.clone(),
-    };
+    let names = PlaneNames { attributes, light_groups: expected.light_groups.clone() };
     parts(planes(channels, &names), expected.has_data_part)
 }
 
@@ -148,19 +142,14 @@ fn check_header(
     let found = header.channels.list.iter();
     let found = found.map(|c| (c.name.to_string(), c.sample_type));
     let found: Vec<(String, SampleType)> = found.collect();
-    let planes: Vec<_> = planes
-        .iter()
-        .map(|plane| (plane.name.to_string(), plane.sample_type()))
-        .collect();
+    let planes: Vec<_> =
+        planes.iter().map(|plane| (plane.name.to_string(), plane.sample_type())).collect();
     let has_all_pixels = |c: &ChannelDescription| c.sampling.x() == 1 && c.sampling.y() == 1;
     let is_complete = header.channels.list.iter().all(has_all_pixels);
     if is_complete && found.len() == planes.len() && planes.iter().all(|p| found.contains(p)) {
         return Ok(());
     }
-    Err(ImageFault::Channels {
-        found: listed(&found),
-        expected: listed(&planes),
-    })
+    Err(ImageFault::Channels { found: listed(&found), expected: listed(&planes) })
 }
 
 /// The names of the planes of attributes `names`, with the number of components that each has among the channels
@@ -200,10 +189,7 @@ fn check_window(header: &Header, expected: &DataWindow) -> Result<(), ImageFault
     let text = |[x, y, left, top]: [i64; 4], [width, height]: [i64; 2]| {
         format!("at ({x}, {y}) in an image of {width}x{height} at ({left}, {top})")
     };
-    Err(ImageFault::Window {
-        found: text(found, found_size),
-        expected: text(wanted, wanted_size),
-    })
+    Err(ImageFault::Window { found: text(found, found_size), expected: text(wanted, wanted_size) })
 }
 
 /// Names and types of channels for messages.
@@ -213,11 +199,7 @@ fn listed(planes: &[(String, SampleType)]) -> String {
         SampleType::F32 => format!("{name} (float)"),
         SampleType::U32 => format!("{name} (uint)"),
     };
-    planes
-        .iter()
-        .map(description)
-        .collect::<Vec<_>>()
-        .join(", ")
+    planes.iter().map(description).collect::<Vec<_>>().join(", ")
 }
 
 /// Decodes the PNG file `file` and compares its size with `expected`.

@@ -18,10 +18,7 @@ fn film(width: u32, height: u32, channels: Channels) -> Film {
 }
 
 fn exr(film: &Film, compression: Compression) -> Vec<u8> {
-    let options = ExrOptions {
-        compression,
-        ..ExrOptions::default()
-    };
+    let options = ExrOptions { compression, ..ExrOptions::default() };
     encode_exr(film, &options).unwrap().bytes
 }
 
@@ -57,26 +54,13 @@ fn channel_sets() -> impl Iterator<Item = Channels> {
 #[test]
 fn another_part_of_the_image_is_a_fault() {
     let film = film(40, 37, Channels::COLOR);
-    let window = DataWindow {
-        left: 3,
-        top: -8,
-        image: [64, 48],
-    };
-    let options = ExrOptions {
-        window: Some(window),
-        ..ExrOptions::default()
-    };
+    let window = DataWindow { left: 3, top: -8, image: [64, 48] };
+    let options = ExrOptions { window: Some(window), ..ExrOptions::default() };
     let bytes = encode_exr(&film, &options).unwrap().bytes;
-    let expected = |window| ImageShape {
-        window,
-        ..shape(Channels::COLOR)
-    };
+    let expected = |window| ImageShape { window, ..shape(Channels::COLOR) };
     assert_eq!(verify(&bytes, &expected(window)), Ok(()));
     let moved = DataWindow { left: 4, ..window };
-    let larger = DataWindow {
-        image: [64, 49],
-        ..window
-    };
+    let larger = DataWindow { image: [64, 49], ..window };
     for other in [moved, larger] {
         let fault = verify(&bytes, &expected(other)).unwrap_err();
         let found = "has the data window at (3, -8) in an image of 64x48 at (0, 0), expected";
@@ -90,12 +74,7 @@ fn written_files_verify() {
         let bytes = exr(&film(40, 37, channels), Compression::Zip);
         assert_eq!(verify(&bytes, &shape(channels)), Ok(()), "{channels:?}");
     }
-    for compression in [
-        Compression::None,
-        Compression::Rle,
-        Compression::Zips,
-        Compression::Piz,
-    ] {
+    for compression in [Compression::None, Compression::Rle, Compression::Zips, Compression::Piz] {
         let bytes = exr(&film(40, 37, Channels::ALL), compression);
         let verdict = verify(&bytes, &shape(Channels::ALL));
         assert_eq!(verdict, Ok(()), "{compression:?}");
@@ -110,10 +89,7 @@ fn in_parts(channels: Channels) -> (Vec<u8>, ImageShape) {
         ..ExrOptions::default()
     };
     let bytes = encode_exr(&film(40, 37, channels), &options).unwrap().bytes;
-    let expected = ImageShape {
-        has_data_part: true,
-        ..shape(channels)
-    };
+    let expected = ImageShape { has_data_part: true, ..shape(channels) };
     (bytes, expected)
 }
 
@@ -147,14 +123,8 @@ fn wrong_size_or_channels_are_faults() {
     let bytes = exr(&film(40, 37, Channels::COLOR), Compression::Zip);
     let mut expected = shape(Channels::COLOR);
     expected.height = 38;
-    assert_eq!(
-        verify(&bytes, &expected).unwrap_err(),
-        "is 40x37, expected 40x38"
-    );
-    let expected = shape(Channels {
-        id: true,
-        ..Channels::COLOR
-    });
+    assert_eq!(verify(&bytes, &expected).unwrap_err(), "is 40x37, expected 40x38");
+    let expected = shape(Channels { id: true, ..Channels::COLOR });
     assert_eq!(
         verify(&bytes, &expected).unwrap_err(),
         "has the channels A (half), B (half), G (half), R (half), \
@@ -171,9 +141,7 @@ fn samples(bytes: &[u8]) -> Vec<u8> {
     let chunks = reader.filter_chunks(true, |_, _, _| true).unwrap();
     chunks
         .flat_map(|chunk| {
-            UncompressedBlock::decompress_chunk(chunk.unwrap(), &meta, true)
-                .unwrap()
-                .data
+            UncompressedBlock::decompress_chunk(chunk.unwrap(), &meta, true).unwrap().data
         })
         .collect()
 }
@@ -219,10 +187,7 @@ fn truncated_files_are_detected_and_huge_sizes_allocate_nothing() {
     // An absurd size in the header is rejected before memory is allocated
     let mut huge = exr(&film(40, 37, Channels::COLOR), Compression::Zip);
     let window = b"dataWindow\0box2i\0";
-    let at = huge
-        .windows(window.len())
-        .position(|w| w == window)
-        .unwrap();
+    let at = huge.windows(window.len()).position(|w| w == window).unwrap();
     let corner = at + window.len() + 4 + 8;
     huge[corner..corner + 8].copy_from_slice(&[0xff, 0xff, 0xff, 0x0f, 0xff, 0xff, 0xff, 0x0f]);
     assert!(verify(&huge, &shape(Channels::COLOR)).is_err());
@@ -230,12 +195,8 @@ fn truncated_files_are_detected_and_huge_sizes_allocate_nothing() {
 
 #[test]
 fn previews_are_decoded_to_their_last_byte() {
-    let png = encode_preview(
-        &film(40, 37, Channels::COLOR),
-        &PreviewOptions::default(),
-        &[],
-    )
-    .unwrap();
+    let png =
+        encode_preview(&film(40, 37, Channels::COLOR), &PreviewOptions::default(), &[]).unwrap();
     let verify = |bytes: &[u8], expected: &ImageShape| {
         verify_preview(Cursor::new(bytes), expected).map_err(|e| e.to_string())
     };
@@ -249,8 +210,5 @@ fn previews_are_decoded_to_their_last_byte() {
     }
     let mut other = expected;
     other.width = 41;
-    assert_eq!(
-        verify(&png, &other).unwrap_err(),
-        "is 40x37, expected 41x37"
-    );
+    assert_eq!(verify(&png, &other).unwrap_err(), "is 40x37, expected 41x37");
 }

@@ -32,11 +32,7 @@ pub fn view_transform(color: Vec3) -> Vec3 {
 /// The sRGB transfer function (IEC 61966-2-1) for linear light in 0 to 1.
 #[inline(always)]
 pub fn srgb_from_linear(linear: f32) -> f32 {
-    if linear <= 0.003_130_8 {
-        12.92 * linear
-    } else {
-        1.055 * pow(linear, 1.0 / 2.4) - 0.055
-    }
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * pow(linear, 1.0 / 2.4) - 0.055 }
 }
 
 /// The 8-bit sRGB value of linear light, with a rounding threshold for dithering: fractions of at least
@@ -74,9 +70,7 @@ fn bytes_body(linear: &[f32], thresholds: &[f32], bytes: &mut [u8]) {
 pub fn dither_threshold(x: u32, y: u32) -> f32 {
     /// `2^32 / p` and `2^32 / p^2`.
     const STEPS: [u32; 2] = [3_242_174_889, 2_447_445_414];
-    let sawtooth = x
-        .wrapping_mul(STEPS[0])
-        .wrapping_add(y.wrapping_mul(STEPS[1]));
+    let sawtooth = x.wrapping_mul(STEPS[0]).wrapping_add(y.wrapping_mul(STEPS[1]));
     let is_falling = sawtooth >> 31 == 1;
     let triangle = (if is_falling { !sawtooth } else { sawtooth }) << 1;
     ((triangle >> 24) as f32 + 0.5) / 256.0
@@ -127,9 +121,7 @@ mod tests {
 
     #[test]
     fn conversion_in_lanes_equals_single_conversion() {
-        let linear: Vec<f32> = (0..5000_u16)
-            .map(|i| f32::from(i) / 4900.0 - 0.01)
-            .collect();
+        let linear: Vec<f32> = (0..5000_u16).map(|i| f32::from(i) / 4900.0 - 0.01).collect();
         let thresholds: Vec<f32> = (0..5000).map(|i| dither_threshold(i, i / 7)).collect();
         let expected = linear.iter().zip(&thresholds);
         let expected: Vec<u8> = expected.map(|(l, t)| byte_from_linear(*l, *t)).collect();
@@ -152,10 +144,7 @@ mod tests {
                     sum += (100.0 + level + threshold).floor();
                 }
                 let mean = sum / (side * side) as f32;
-                assert!(
-                    (mean - expected).abs() < 0.02,
-                    "{left} {top} {level}: {mean}"
-                );
+                assert!((mean - expected).abs() < 0.02, "{left} {top} {level}: {mean}");
             }
         }
     }

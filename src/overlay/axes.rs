@@ -28,10 +28,7 @@ impl Axes {
         let widths = self.names.iter().map(|name| pen.font.width(name));
         let widest = widths.fold(0.0, f32::max);
         let half = HALF_SIDE * pen.font.size;
-        [
-            2.0 * half.max(LABEL * pen.font.size + 0.5 * widest),
-            2.0 * half,
-        ]
+        [2.0 * half.max(LABEL * pen.font.size + 0.5 * widest), 2.0 * half]
     }
 
     pub(super) fn draw(&self, canvas: &mut Canvas, corner: [f32; 2], pen: &Pen, frame: &FrameView) {
@@ -39,10 +36,7 @@ impl Axes {
         let [width, height] = self.measure(pen);
         let center = [corner[0] + 0.5 * width, corner[1] + 0.5 * height];
         let at = |axis: [f32; 3], length: f32| {
-            [
-                center[0] + length * size * axis[0],
-                center[1] - length * size * axis[1],
-            ]
+            [center[0] + length * size * axis[0], center[1] - length * size * axis[1]]
         };
         // The farthest first
         let mut order = [0, 1, 2];
@@ -67,10 +61,7 @@ impl Axes {
             // Names of axes along the view would hide each other
             let reach = if flat > 0.2 { LABEL } else { LABEL - ARM };
             let [x, y] = match flat > 0.2 {
-                true => at(
-                    [axis[0] / flat, axis[1] / flat, 0.0],
-                    ARM * flat + reach - ARM,
-                ),
+                true => at([axis[0] / flat, axis[1] / flat, 0.0], ARM * flat + reach - ARM),
                 false => [center[0] - 0.6 * size, center[1] + 0.6 * size],
             };
             let name = &self.names[i];

@@ -22,11 +22,7 @@ impl Canvas {
     pub(super) fn new(width: i32, height: i32) -> Self {
         let (width, height) = (width.clamp(0, MAX_SIDE), height.clamp(0, MAX_SIDE));
         let count = usize::try_from(i64::from(width) * i64::from(height)).unwrap_or(0);
-        Self {
-            width,
-            height,
-            pixels: vec![[0.0; 4]; count],
-        }
+        Self { width, height, pixels: vec![[0.0; 4]; count] }
     }
 
     fn index(&self, x: i32, y: i32) -> Option<usize> {
@@ -70,16 +66,8 @@ impl Canvas {
         let reach = 0.5 * width + 1.0;
         let along = [to[0] - from[0], to[1] - from[1]];
         let square = along[0] * along[0] + along[1] * along[1];
-        for y in pixels(
-            from[1].min(to[1]) - reach,
-            from[1].max(to[1]) + reach,
-            self.height,
-        ) {
-            for x in pixels(
-                from[0].min(to[0]) - reach,
-                from[0].max(to[0]) + reach,
-                self.width,
-            ) {
+        for y in pixels(from[1].min(to[1]) - reach, from[1].max(to[1]) + reach, self.height) {
+            for x in pixels(from[0].min(to[0]) - reach, from[0].max(to[0]) + reach, self.width) {
                 let at = [x as f32 + 0.5 - from[0], y as f32 + 0.5 - from[1]];
                 let t = match square > 0.0 {
                     true => ((at[0] * along[0] + at[1] * along[1]) / square).clamp(0.0, 1.0),
@@ -170,10 +158,7 @@ mod tests {
         assert_eq!(row, [0.5, 1.0, 0.25, 0.0]);
         assert_eq!(canvas.alpha(1, 0), 0.0);
         let sprite = canvas.into_sprite(0, 0);
-        assert_eq!(
-            sprite.pixels[4..7],
-            [[128, 64, 0, 128], [255, 128, 0, 255], [64, 32, 0, 64]]
-        );
+        assert_eq!(sprite.pixels[4..7], [[128, 64, 0, 128], [255, 128, 0, 255], [64, 32, 0, 64]]);
     }
 
     #[test]

@@ -73,11 +73,7 @@ impl ColorBar {
 
     /// The ticks for a vertical bar of `length` pixels with text of `size` pixels.
     fn ticks(&self, length: f32, size: f32) -> Ticks {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a few"
-        )]
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few")]
         let most = (length / (LABEL_PITCH * size)).floor().clamp(2.0, 9.0) as usize;
         self.ticks_with(most)
     }
@@ -86,12 +82,7 @@ impl ColorBar {
     fn ticks_with(&self, most: usize) -> Ticks {
         match &self.kind {
             ColorBarKind::Categories(_) => Ticks::default(),
-            ColorBarKind::Numbers {
-                colors,
-                range,
-                scale,
-                is_discrete,
-            } => {
+            ColorBarKind::Numbers { colors, range, scale, is_discrete } => {
                 let steps = is_discrete.then(|| u32::try_from(colors.len()).unwrap_or(u32::MAX));
                 Ticks::of(*range, *scale, steps, most)
             }
@@ -101,10 +92,7 @@ impl ColorBar {
     /// The title with unit and common exponent.
     fn heading(&self, exponent: i32) -> String {
         let factor = (exponent != 0).then(|| power_text(exponent));
-        let unit = [
-            factor,
-            Some(self.unit.clone()).filter(|unit| !unit.is_empty()),
-        ];
+        let unit = [factor, Some(self.unit.clone()).filter(|unit| !unit.is_empty())];
         let unit: Vec<String> = unit.into_iter().flatten().collect();
         match (self.title.is_empty(), unit.is_empty()) {
             (_, true) => self.title.clone(),
@@ -148,10 +136,7 @@ impl ColorBar {
             ColorBarKind::Numbers { .. } => labels.collect(),
             ColorBarKind::Categories(all) => all.iter().map(|(name, _)| &**name).collect(),
         };
-        let widest = names
-            .iter()
-            .map(|name| pen.font.width(name))
-            .fold(0.0, f32::max);
+        let widest = names.iter().map(|name| pen.font.width(name)).fold(0.0, f32::max);
         let width = (BAR_WIDTH + LABEL_GAP) * size + widest;
         let below = match &self.kind {
             ColorBarKind::Numbers { .. } => 0.5 * font::CAP_HEIGHT * size,
@@ -175,11 +160,7 @@ impl ColorBar {
         let left = corner[0].round();
         match &self.kind {
             ColorBarKind::Categories(all) => swatches(canvas, all, [left, top], pen),
-            ColorBarKind::Numbers {
-                colors,
-                is_discrete,
-                ..
-            } => {
+            ColorBarKind::Numbers { colors, is_discrete, .. } => {
                 let width = (BAR_WIDTH * size).round().max(2.0);
                 let (from, to) = ([left, top], [left + width, top + length]);
                 frame(canvas, from, to, pen);
@@ -193,10 +174,7 @@ impl ColorBar {
 /// Draws a thin frame around a rectangle.
 fn frame(canvas: &mut Canvas, from: [f32; 2], to: [f32; 2], pen: &Pen) {
     let line = pen.line;
-    let outside = (
-        [from[0] - line, from[1] - line],
-        [to[0] + line, to[1] + line],
-    );
+    let outside = ([from[0] - line, from[1] - line], [to[0] + line, to[1] + line]);
     canvas.fill(outside.0, outside.1, pen.color);
 }
 
@@ -212,11 +190,7 @@ fn fill(canvas: &mut Canvas, colors: &[Color], is_discrete: bool, from: [f32; 2]
         }
         return;
     }
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "pixels"
-    )]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "pixels")]
     let rows = length as u32;
     for row in 0..rows {
         let y = from[1] + row as f32;
@@ -251,16 +225,8 @@ fn draw_ticks(canvas: &mut Canvas, ticks: &Ticks, from: [f32; 2], to: [f32; 2], 
         let y = to[1] - part * (to[1] - from[1]);
         // Marks at the ends continue the frame
         let edge = (y - 0.5 * line).round().clamp(from[1] - line, to[1]);
-        let length = if tick.label.is_some() {
-            TICK
-        } else {
-            SMALL_TICK
-        };
-        canvas.fill(
-            [start, edge],
-            [start + (length * size).round(), edge + line],
-            pen.color,
-        );
+        let length = if tick.label.is_some() { TICK } else { SMALL_TICK };
+        canvas.fill([start, edge], [start + (length * size).round(), edge + line], pen.color);
         if let Some(label) = &tick.label {
             pen.label(canvas, label, to[0] + LABEL_GAP * size, edge + 0.5 * line);
         }
@@ -275,11 +241,6 @@ fn swatches(canvas: &mut Canvas, all: &[(String, Color)], corner: [f32; 2], pen:
         let (from, to) = ([corner[0], top], [corner[0] + side, top + side]);
         frame(canvas, from, to, pen);
         canvas.fill(from, to, *color);
-        pen.label(
-            canvas,
-            name,
-            corner[0] + (SWATCH + LABEL_GAP) * size,
-            top + 0.5 * side,
-        );
+        pen.label(canvas, name, corner[0] + (SWATCH + LABEL_GAP) * size, top + 0.5 * side);
     }
 }

@@ -106,10 +106,7 @@ mod tests {
     fn widths_are_those_of_the_font() {
         // Advances of DejaVu Sans in units of 1/2048 em, read with fontTools: S 1300, p 1300, e 1260, d 1300
         let font = Font::new(2048.0);
-        assert_eq!(
-            font.width("Speed"),
-            1300.0 + 1300.0 + 1260.0 + 1260.0 + 1300.0
-        );
+        assert_eq!(font.width("Speed"), 1300.0 + 1300.0 + 1260.0 + 1260.0 + 1300.0);
         assert_eq!(Font::new(20.48).width("m").round(), 20.0);
         assert_eq!(font.width("d\nSpeed\nm"), font.width("Speed"));
         assert_eq!(font.width(""), 0.0);
@@ -125,11 +122,7 @@ mod tests {
         Font::new(100.0).draw(&mut canvas, "H", 10.0, 100.0, [1.0; 3]);
         let is_drawn = |row: i32| (0..120).any(|x| canvas.alpha(x, row) > 0.8);
         let rows: Vec<i32> = (0..120).filter(|row| is_drawn(*row)).collect();
-        assert_eq!(
-            (rows[0], rows[rows.len() - 1]),
-            (27, 99),
-            "72.9 pixels above the baseline"
-        );
+        assert_eq!((rows[0], rows[rows.len() - 1]), (27, 99), "72.9 pixels above the baseline");
     }
 
     #[test]

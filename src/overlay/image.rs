@@ -95,10 +95,7 @@ impl Image {
     /// edges of text.
     pub(super) fn draw(&self, canvas: &mut Canvas, corner: [f32; 2], pen: &Pen) {
         let size = self.measure(pen);
-        let scale = [
-            self.source.width as f32 / size[0],
-            self.source.height() as f32 / size[1],
-        ];
+        let scale = [self.source.width as f32 / size[0], self.source.height() as f32 / size[1]];
         #[expect(clippy::cast_possible_truncation, reason = "whole pixels")]
         let [left, top, width, height] = [corner[0], corner[1], size[0], size[1]].map(|v| v as i32);
         for y in 0..height {

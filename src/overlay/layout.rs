@@ -27,12 +27,7 @@ const GAP: f32 = 0.02;
 
 impl Corner {
     /// All corners.
-    pub const ALL: [Self; 4] = [
-        Self::TopLeft,
-        Self::TopRight,
-        Self::BottomLeft,
-        Self::BottomRight,
-    ];
+    pub const ALL: [Self; 4] = [Self::TopLeft, Self::TopRight, Self::BottomLeft, Self::BottomRight];
 
     const fn is_left(self) -> bool {
         matches!(self, Self::TopLeft | Self::BottomLeft)
@@ -52,10 +47,7 @@ impl Corner {
         points: &[[f32; 2]],
     ) -> Self {
         let covered = |corner: &&Self| {
-            let placement = Placement {
-                corner: **corner,
-                offset,
-            };
+            let placement = Placement { corner: **corner, offset };
             let [left, top] = placement.place(size, 0, picture).map(|v| v as f32);
             let [right, bottom] = [left + size[0] as f32, top + size[1] as f32];
             let is_inside =
@@ -80,9 +72,7 @@ impl Placement {
     /// The top left corner of a box, `below` others in the same corner.
     fn place(&self, size: [i32; 2], below: i32, picture: [u32; 2]) -> [i32; 2] {
         #[expect(clippy::cast_possible_truncation, reason = "pixels, saturated")]
-        let offset = self
-            .offset
-            .map(|part| (part * picture[1] as f32).round() as i32);
+        let offset = self.offset.map(|part| (part * picture[1] as f32).round() as i32);
         let [width, height] = picture.map(|side| i32::try_from(side).unwrap_or(i32::MAX));
         let far =
             |length: i32, own: i32, offset: i32| length.saturating_sub(own).saturating_sub(offset);
@@ -124,10 +114,7 @@ mod tests {
     const PICTURE: [u32; 2] = [400, 200];
 
     fn placement(corner: Corner) -> Placement {
-        Placement {
-            corner,
-            offset: [0.05, 0.1],
-        }
+        Placement { corner, offset: [0.05, 0.1] }
     }
 
     #[test]
@@ -143,20 +130,12 @@ mod tests {
     fn boxes_in_one_corner_are_stacked() {
         let all = [Corner::BottomRight, Corner::TopLeft, Corner::BottomRight].map(placement);
         let sizes = [[50, 30], [10, 10], [20, 10]];
-        assert_eq!(
-            place(&all, &sizes, PICTURE),
-            [[340, 150], [10, 20], [370, 136]]
-        );
+        assert_eq!(place(&all, &sizes, PICTURE), [[340, 150], [10, 20], [370, 136]]);
     }
 
     #[test]
     fn the_free_corner_is_chosen() {
-        let order = [
-            Corner::BottomRight,
-            Corner::TopRight,
-            Corner::BottomLeft,
-            Corner::TopLeft,
-        ];
+        let order = [Corner::BottomRight, Corner::TopRight, Corner::BottomLeft, Corner::TopLeft];
         let free =
             |points: &[[f32; 2]]| Corner::freest(&order, [0.05, 0.1], [50, 30], PICTURE, points);
         assert_eq!(free(&[]), Corner::BottomRight);
@@ -164,13 +143,7 @@ mod tests {
         assert_eq!(free(&[[350.0, 160.0]]), Corner::TopRight);
         assert_eq!(free(&[[350.0, 160.0], [350.0, 30.0]]), Corner::BottomLeft);
         // All are covered: the one with the fewest points
-        let all = [
-            [350.0, 160.0],
-            [351.0, 161.0],
-            [350.0, 30.0],
-            [20.0, 160.0],
-            [20.0, 30.0],
-        ];
+        let all = [[350.0, 160.0], [351.0, 161.0], [350.0, 30.0], [20.0, 160.0], [20.0, 30.0]];
         assert_eq!(free(&all), Corner::TopRight);
     }
 }

@@ -147,10 +147,8 @@ impl Overlay {
 
 /// Draws `overlays` for a picture of `width` by `height` pixels.
 pub fn draw(overlays: &[Overlay], width: u32, height: u32, frame: &FrameView) -> Vec<Sprite> {
-    let sizes: Vec<[i32; 2]> = overlays
-        .iter()
-        .map(|overlay| overlay.size_in(width, height, frame))
-        .collect();
+    let sizes: Vec<[i32; 2]> =
+        overlays.iter().map(|overlay| overlay.size_in(width, height, frame)).collect();
     let placements: Vec<Placement> = overlays.iter().map(|overlay| overlay.placement).collect();
     let corners = layout::place(&placements, &sizes, [width, height]);
     let drawn = overlays.iter().zip(sizes).zip(corners);
@@ -210,9 +208,7 @@ impl Sprite {
 
     /// Calls `visit` with the column and the colour of each pixel in row `y` of a picture with `width` columns.
     pub fn each_in_row(&self, y: i32, width: usize, mut visit: impl FnMut(usize, [u8; 4])) {
-        let inside = y
-            .checked_sub(self.top)
-            .filter(|row| (0..self.height).contains(row));
+        let inside = y.checked_sub(self.top).filter(|row| (0..self.height).contains(row));
         let Some(row) = inside.and_then(|row| usize::try_from(row).ok()) else {
             return;
         };
@@ -250,8 +246,7 @@ impl Pen {
         // Capitals are in the middle of the line
         let mut baseline = corner[1] + 0.5 * (1.0 + font::CAP_HEIGHT) * self.font.size;
         for line in text.lines() {
-            self.font
-                .draw(canvas, line, corner[0], baseline, self.color);
+            self.font.draw(canvas, line, corner[0], baseline, self.color);
             baseline += font::LINE * self.font.size;
         }
     }

@@ -31,16 +31,12 @@ impl ScaleBar {
             let power: f64 = format!("1e{exponent}").parse().unwrap_or(1.0);
             [1.0, 2.0, 5.0].map(|digit| digit * power)
         });
-        lengths
-            .filter(|length| *length <= most)
-            .fold(most, |_, length| length)
+        lengths.filter(|length| *length <= most).fold(most, |_, length| length)
     }
 
     fn label(&self) -> String {
         let decimals = (0..9).find(|decimals| {
-            let shown: f64 = format!("{:.*}", decimals, self.length)
-                .parse()
-                .unwrap_or(0.0);
+            let shown: f64 = format!("{:.*}", decimals, self.length).parse().unwrap_or(0.0);
             (shown - self.length).abs() <= 1e-6 * self.length.abs()
         });
         let length = match decimals {
@@ -55,20 +51,13 @@ impl ScaleBar {
         #[expect(clippy::cast_possible_truncation, reason = "pixels")]
         let part = (self.length / frame.units_per_height) as f32;
         let length = (part * pen.picture).round();
-        if length.is_finite() {
-            length.clamp(1.0, 4.0 * pen.picture)
-        } else {
-            1.0
-        }
+        if length.is_finite() { length.clamp(1.0, 4.0 * pen.picture) } else { 1.0 }
     }
 
     pub(super) fn measure(&self, pen: &Pen, frame: &FrameView) -> [f32; 2] {
         let [width, height] = pen.text_size(&self.label());
         let size = pen.font.size;
-        [
-            width.max(self.pixels(pen, frame)),
-            height + (GAP + END) * size,
-        ]
+        [width.max(self.pixels(pen, frame)), height + (GAP + END) * size]
     }
 
     pub(super) fn draw(&self, canvas: &mut Canvas, corner: [f32; 2], pen: &Pen, frame: &FrameView) {
@@ -76,11 +65,7 @@ impl ScaleBar {
         let [text_width, text_height] = pen.text_size(&label);
         let size = pen.font.size;
         let width = text_width.max(length);
-        pen.text(
-            canvas,
-            &label,
-            [corner[0] + 0.5 * (width - text_width), corner[1]],
-        );
+        pen.text(canvas, &label, [corner[0] + 0.5 * (width - text_width), corner[1]]);
         // The line with a mark at each end
         let left = (corner[0] + 0.5 * (width - length)).round();
         let right = left + length;

@@ -110,9 +110,7 @@ impl Template {
     pub fn expand(&self, values: &FrameValues) -> String {
         let range = |name: &str| {
             let mut ranges = values.ranges.iter();
-            ranges
-                .find(|(known, _)| known == name)
-                .and_then(|(_, range)| *range)
+            ranges.find(|(known, _)| known == name).and_then(|(_, range)| *range)
         };
         let pieces = self.pieces.iter().map(|piece| match piece {
             Piece::Text(text) => text.clone(),
@@ -160,13 +158,8 @@ impl Format {
         let mut format = Self::default();
         let mut rest = text;
         if let Some(after) = rest.strip_prefix('0') {
-            let end = after
-                .find(|c: char| !c.is_ascii_digit())
-                .unwrap_or(after.len());
-            format.digits = after[..end]
-                .parse()
-                .ok()
-                .filter(|digits| *digits <= MAX_DIGITS)?;
+            let end = after.find(|c: char| !c.is_ascii_digit()).unwrap_or(after.len());
+            format.digits = after[..end].parse().ok().filter(|digits| *digits <= MAX_DIGITS)?;
             rest = &after[end..];
         }
         if let Some(after) = rest.strip_prefix(',') {
@@ -174,13 +167,8 @@ impl Format {
             rest = after;
         }
         if let Some(after) = rest.strip_prefix('.') {
-            let end = after
-                .find(|c: char| !c.is_ascii_digit())
-                .unwrap_or(after.len());
-            let decimals = after[..end]
-                .parse()
-                .ok()
-                .filter(|digits| *digits <= MAX_DIGITS)?;
+            let end = after.find(|c: char| !c.is_ascii_digit()).unwrap_or(after.len());
+            let decimals = after[..end].parse().ok().filter(|digits| *digits <= MAX_DIGITS)?;
             format.decimals = Some(decimals);
             rest = &after[end..];
             format.is_scientific = rest == "e";
@@ -192,11 +180,7 @@ impl Format {
     fn integer(self, value: i128) -> String {
         let digits = format!("{:0width$}", value.unsigned_abs(), width = self.digits);
         let sign = if value < 0 { "\u{2212}" } else { "" };
-        let digits = if self.is_grouped {
-            grouped(&digits)
-        } else {
-            digits
-        };
+        let digits = if self.is_grouped { grouped(&digits) } else { digits };
         format!("{sign}{digits}")
     }
 
@@ -273,10 +257,7 @@ mod tests {
             ("frame {frame:04d}/{frame}", "frame 0007/7"),
             ("{particles:,} of {particles}", "1,234,567 of 1234567"),
             ("{file}", "dump_0007.bgeo"),
-            (
-                "ρ = {density.min:.1f} … {density.max:.0f}",
-                "ρ = −998.5 … 1001",
-            ),
+            ("ρ = {density.min:.1f} … {density.max:.0f}", "ρ = −998.5 … 1001"),
             ("{density.max:,.2f}", "1,001.25"),
             ("{mass.max:.1f}", "–"),
             ("{{time}} }}", "{time} }"),
@@ -287,14 +268,8 @@ mod tests {
         }
         let template = Template::parse("{density.min} {v.x.max:.1f}").expect("good");
         assert_eq!(template.names().collect::<Vec<_>>(), ["density", "v.x"]);
-        let early = FrameValues {
-            time: None,
-            ..values()
-        };
-        assert_eq!(
-            Template::parse("{time:.1f}").expect("good").expand(&early),
-            "–"
-        );
+        let early = FrameValues { time: None, ..values() };
+        assert_eq!(Template::parse("{time:.1f}").expect("good").expand(&early), "–");
     }
 
     #[test]

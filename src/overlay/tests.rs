@@ -8,10 +8,7 @@ const BLACK: Color = [0.0; 3];
 fn overlay(content: Content) -> Overlay {
     Overlay {
         content,
-        placement: Placement {
-            corner: Corner::TopLeft,
-            offset: [0.05, 0.05],
-        },
+        placement: Placement { corner: Corner::TopLeft, offset: [0.05, 0.05] },
         size: 0.05,
         color: BLACK,
         halo: [1.0; 3],
@@ -79,18 +76,14 @@ fn a_bar_shows_its_colours_from_bottom_to_top() {
     assert_eq!(pixel(19, 150), [0, 0, 0]);
     assert_eq!(pixel(38, 150), [0, 0, 0]);
     for row in [49, 99, 149, 199, 249] {
-        let rows: Vec<usize> = (row - 2..=row + 2)
-            .filter(|y| pixel(42, *y) == [0, 0, 0])
-            .collect();
+        let rows: Vec<usize> = (row - 2..=row + 2).filter(|y| pixel(42, *y) == [0, 0, 0]).collect();
         assert_eq!(rows.len(), 1, "{row}: {rows:?}");
     }
     assert_ne!(pixel(42, 125), [0, 0, 0]);
 }
 
 fn horizontal(bar: &Overlay) -> Overlay {
-    let Content::ColorBar(mut bar) = bar.content.clone() else {
-        unreachable!()
-    };
+    let Content::ColorBar(mut bar) = bar.content.clone() else { unreachable!() };
     bar.orientation = Orientation::Horizontal;
     overlay(Content::ColorBar(bar))
 }
@@ -99,12 +92,7 @@ fn horizontal(bar: &Overlay) -> Overlay {
 fn a_horizontal_bar_shows_its_colours_from_left_to_right() {
     let (width, height) = (300, 400);
     let own = horizontal(&bar("v"));
-    let picture = drawn(
-        std::slice::from_ref(&own),
-        width,
-        height,
-        &FrameView::default(),
-    );
+    let picture = drawn(std::slice::from_ref(&own), width, height, &FrameView::default());
     let pixel = |x: usize, y: usize| &picture[3 * (y * width as usize + x)..][..3];
     // The label 0 is 20 * 1303 / 2048 pixels wide; half of it is left of the bar, which is 200 pixels long
     let left = 20 + 7;
@@ -120,9 +108,8 @@ fn a_horizontal_bar_shows_its_colours_from_left_to_right() {
     assert_eq!(pixel(left + 50, 49), [0, 0, 0]);
     // Ticks at 0, 1, 2, 3 and 4
     for column in [left - 1, left + 49, left + 99, left + 149, left + 199] {
-        let columns: Vec<usize> = (column - 2..=column + 2)
-            .filter(|x| pixel(*x, 71) == [0, 0, 0])
-            .collect();
+        let columns: Vec<usize> =
+            (column - 2..=column + 2).filter(|x| pixel(*x, 71) == [0, 0, 0]).collect();
         assert_eq!(columns.len(), 1, "{column}: {columns:?}");
     }
     let [own_width, own_height] = own.measure(height, &FrameView::default());
@@ -132,9 +119,7 @@ fn a_horizontal_bar_shows_its_colours_from_left_to_right() {
 
 #[test]
 fn labels_of_horizontal_bars_do_not_touch() {
-    let Content::ColorBar(mut bar) = horizontal(&bar("v")).content else {
-        unreachable!()
-    };
+    let Content::ColorBar(mut bar) = horizontal(&bar("v")).content else { unreachable!() };
     if let ColorBarKind::Numbers { range, .. } = &mut bar.kind {
         *range = [1000.0, 1010.0];
     }
@@ -148,9 +133,7 @@ fn labels_of_horizontal_bars_do_not_touch() {
 fn titles_have_unit_and_exponent() {
     let frame = FrameView::default();
     let plain = bar("speed").measure(400, &frame)[0];
-    let Content::ColorBar(mut large) = bar("speed").content else {
-        unreachable!()
-    };
+    let Content::ColorBar(mut large) = bar("speed").content else { unreachable!() };
     if let ColorBarKind::Numbers { range, .. } = &mut large.kind {
         *range = [0.0, 4e6];
     }
@@ -162,16 +145,9 @@ fn titles_have_unit_and_exponent() {
 
 #[test]
 fn lengths_of_scale_bars_are_those_of_the_scene() {
-    let frame = FrameView {
-        units_per_height: 4.0,
-        ..FrameView::default()
-    };
-    let scale_bar = |length: f64| {
-        overlay(Content::ScaleBar(ScaleBar {
-            length,
-            unit: "mm".to_owned(),
-        }))
-    };
+    let frame = FrameView { units_per_height: 4.0, ..FrameView::default() };
+    let scale_bar =
+        |length: f64| overlay(Content::ScaleBar(ScaleBar { length, unit: "mm".to_owned() }));
     // An eighth of 400 pixels; the label is wider
     let sprite = &draw(&[scale_bar(0.5)], 600, 400, &frame)[0];
     let dark = |x: &i32| {
@@ -181,13 +157,8 @@ fn lengths_of_scale_bars_are_those_of_the_scene() {
     };
     let rows = 0..sprite.width;
     assert_eq!(rows.filter(dark).count(), 50);
-    for (height, expected) in [
-        (4.0, 0.5),
-        (1.0, 0.2),
-        (0.049, 0.005),
-        (9999.0, 1000.0),
-        (0.0, 1.0),
-    ] {
+    for (height, expected) in [(4.0, 0.5), (1.0, 0.2), (0.049, 0.005), (9999.0, 1000.0), (0.0, 1.0)]
+    {
         assert_eq!(ScaleBar::round_length(height), expected, "{height}");
     }
 }
@@ -198,15 +169,10 @@ fn overlays_beyond_the_picture_are_cut_off() {
         axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
         ..FrameView::default()
     };
-    let axes = overlay(Content::Axes(Axes {
-        names: ["x", "y", "z"].map(str::to_owned),
-    }));
+    let axes = overlay(Content::Axes(Axes { names: ["x", "y", "z"].map(str::to_owned) }));
     for (width, height) in [(1, 1), (16, 9), (30, 300)] {
         let all = [bar("a long title"), axes.clone(), text("t = 1")];
-        assert_eq!(
-            drawn(&all, width, height, &frame).len(),
-            3 * (width * height) as usize
-        );
+        assert_eq!(drawn(&all, width, height, &frame).len(), 3 * (width * height) as usize);
     }
 }
 
@@ -220,12 +186,7 @@ fn all_machines_draw_the_same_bytes() {
     };
     let mut corner = bar("speed ρ ≤ ½");
     corner.placement.corner = Corner::BottomRight;
-    let axes = overlay(Content::Axes(Axes {
-        names: ["x", "y", "z"].map(str::to_owned),
-    }));
+    let axes = overlay(Content::Axes(Axes { names: ["x", "y", "z"].map(str::to_owned) }));
     let picture = drawn(&[corner, axes, text("t = 0.35 s")], 480, 270, &frame);
-    assert_eq!(
-        blake3::hash(&picture).to_hex()[..16].to_owned(),
-        "f724e44a97c2398b"
-    );
+    assert_eq!(blake3::hash(&picture).to_hex()[..16].to_owned(), "f724e44a97c2398b");
 }

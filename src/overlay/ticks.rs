@@ -92,13 +92,7 @@ impl Ticks {
     fn of_one(value: f64) -> Self {
         let exponent = common_exponent(value, value);
         let label = significant(value / power(exponent));
-        Self {
-            ticks: vec![Tick {
-                position: 0.5,
-                label: Some(label),
-            }],
-            exponent,
-        }
+        Self { ticks: vec![Tick { position: 0.5, label: Some(label) }], exponent }
     }
 }
 
@@ -141,10 +135,7 @@ impl Axis {
     }
 
     fn tick(&self, value: f64, label: Option<String>) -> Tick {
-        Tick {
-            position: self.position(value).clamp(0.0, 1.0),
-            label,
-        }
+        Tick { position: self.position(value).clamp(0.0, 1.0), label }
     }
 
     /// Multiples of 1, 2 or 5 times a power of ten.
@@ -185,10 +176,7 @@ impl Axis {
             let label = number(multiple * step / power(exponent), decimals);
             self.tick(multiple * step, Some(label))
         });
-        Ticks {
-            ticks: ticks.collect(),
-            exponent,
-        }
+        Ticks { ticks: ticks.collect(), exponent }
     }
 
     /// Powers of ten with small marks between them; in short ranges, 1, 2 and 5 times powers of ten, or round values.
@@ -209,20 +197,13 @@ impl Axis {
             let values: Vec<(f64, i32)> = values.filter(|(value, _)| is_inside(*value)).collect();
             if values.len() < 3 || values.len() > most || !is_plain {
                 let few = self.linear(most.min(5));
-                return if within < 2 {
-                    few
-                } else {
-                    self.decades(most, is_plain)
-                };
+                return if within < 2 { few } else { self.decades(most, is_plain) };
             }
             let label = |(value, e): (f64, i32)| {
                 let decimals = usize::try_from(-e).unwrap_or(0);
                 self.tick(value, Some(number(value, decimals)))
             };
-            return Ticks {
-                ticks: values.into_iter().map(label).collect(),
-                exponent: 0,
-            };
+            return Ticks { ticks: values.into_iter().map(label).collect(), exponent: 0 };
         }
         self.decades(most, is_plain)
     }
@@ -264,21 +245,15 @@ impl Axis {
         // In order of importance: zero, the largest powers, the threshold
         let powers = powers.rev().map(power).filter(|size| *size > threshold);
         let sizes = powers.chain([threshold]);
-        let both = |size: f64| {
-            vec![
-                (size, text(size)),
-                (-size, format!("\u{2212}{}", text(size))),
-            ]
-        };
+        let both = |size: f64| vec![(size, text(size)), (-size, format!("\u{2212}{}", text(size)))];
         let groups = std::iter::once(vec![(0.0, "0".to_owned())]).chain(sizes.map(both));
         #[expect(clippy::cast_precision_loss, reason = "a few")]
         let gap = 0.8 / most as f64;
         let mut kept: Vec<Tick> = Vec::new();
         for group in groups {
             let group = group.into_iter().filter(|(value, _)| is_inside(value));
-            let group: Vec<Tick> = group
-                .map(|(value, label)| self.tick(value, Some(label)))
-                .collect();
+            let group: Vec<Tick> =
+                group.map(|(value, label)| self.tick(value, Some(label))).collect();
             // Both signs have a tick, or none
             let is_free = |tick: &Tick| {
                 let mut others = kept.iter();
@@ -289,10 +264,7 @@ impl Axis {
             }
         }
         kept.sort_by(|a, b| a.position.total_cmp(&b.position));
-        Ticks {
-            ticks: kept,
-            exponent: 0,
-        }
+        Ticks { ticks: kept, exponent: 0 }
     }
 
     /// The borders of bands of one colour.
@@ -307,10 +279,7 @@ impl Axis {
         };
         let values: Vec<f64> = (0..=steps).map(|i| value(i) / power(exponent)).collect();
         // Use the fewest decimals that show all values
-        let step = values
-            .windows(2)
-            .map(|w| w[1] - w[0])
-            .fold(f64::INFINITY, f64::min);
+        let step = values.windows(2).map(|w| w[1] - w[0]).fold(f64::INFINITY, f64::min);
         let stride = values.len().div_ceil(most).max(1);
         let stride =
             (stride..=values.len()).find(|stride| (values.len() - 1).is_multiple_of(*stride));
@@ -318,27 +287,17 @@ impl Axis {
         let is_shown = |decimals: &usize| {
             let scale = power(i32::try_from(*decimals).unwrap_or(0));
             let error = |v: &f64| ((v * scale).round() / scale - v).abs();
-            values
-                .iter()
-                .step_by(stride)
-                .all(|v| error(v) < 0.02 * step)
+            values.iter().step_by(stride).all(|v| error(v) < 0.02 * step)
         };
         let decimals = (0..8).find(is_shown).unwrap_or(8);
-        let ticks = values
-            .iter()
-            .enumerate()
-            .zip(0..=steps)
-            .map(|((at, value), i)| Tick {
-                position: part(i),
-                label: (at % stride == 0).then(|| match self.scale {
-                    ColorScale::Linear => number(*value, decimals),
-                    _ => significant(*value),
-                }),
-            });
-        Ticks {
-            ticks: ticks.collect(),
-            exponent,
-        }
+        let ticks = values.iter().enumerate().zip(0..=steps).map(|((at, value), i)| Tick {
+            position: part(i),
+            label: (at % stride == 0).then(|| match self.scale {
+                ColorScale::Linear => number(*value, decimals),
+                _ => significant(*value),
+            }),
+        });
+        Ticks { ticks: ticks.collect(), exponent }
     }
 }
 

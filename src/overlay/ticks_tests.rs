@@ -5,14 +5,8 @@ use super::*;
 /// The labels, `.` for a small mark, and the common exponent.
 fn labels(range: [f64; 2], scale: ColorScale, steps: Option<u32>, most: usize) -> (String, i32) {
     let found = Ticks::of(range, scale, steps, most);
-    let texts = found
-        .ticks
-        .iter()
-        .map(|tick| tick.label.as_deref().unwrap_or("."));
-    assert!(
-        found.ticks.is_sorted_by(|a, b| a.position < b.position),
-        "{found:?}"
-    );
+    let texts = found.ticks.iter().map(|tick| tick.label.as_deref().unwrap_or("."));
+    assert!(found.ticks.is_sorted_by(|a, b| a.position < b.position), "{found:?}");
     (texts.collect::<Vec<_>>().join(" "), found.exponent)
 }
 
@@ -66,16 +60,8 @@ fn positions_are_fractions_of_the_range() {
 #[test]
 fn log_ticks_are_powers_of_ten() {
     let small = ". . . . . . . .";
-    assert_labels(
-        [0.1, 100.0],
-        ColorScale::Log,
-        &format!("0.1 {small} 1 {small} 10 {small} 100"),
-    );
-    assert_labels(
-        [1e-6, 1e-4],
-        ColorScale::Log,
-        &format!("10⁻⁶ {small} 10⁻⁵ {small} 10⁻⁴"),
-    );
+    assert_labels([0.1, 100.0], ColorScale::Log, &format!("0.1 {small} 1 {small} 10 {small} 100"));
+    assert_labels([1e-6, 1e-4], ColorScale::Log, &format!("10⁻⁶ {small} 10⁻⁵ {small} 10⁻⁴"));
     assert_labels([2.0, 50.0], ColorScale::Log, "2 5 10 20 50");
     assert_labels([3.0, 4.2], ColorScale::Log, "3.0 3.5 4.0");
     // Many decades have labels at equal distances
@@ -98,33 +84,17 @@ fn symlog_ticks_have_zero_in_the_middle() {
 fn bands_have_ticks_at_their_borders() {
     let bands = |range, scale, steps, most| labels(range, scale, Some(steps), most).0;
     assert_eq!(bands([0.0, 4.0], ColorScale::Linear, 4, 8), "0 1 2 3 4");
-    assert_eq!(
-        bands([0.0, 1.0], ColorScale::Linear, 8, 5),
-        "0.00 . 0.25 . 0.50 . 0.75 . 1.00"
-    );
+    assert_eq!(bands([0.0, 1.0], ColorScale::Linear, 8, 5), "0.00 . 0.25 . 0.50 . 0.75 . 1.00");
     assert_eq!(bands([1.0, 100.0], ColorScale::Log, 2, 8), "1 10 100");
     // A prime number of bands: first and last
-    assert_eq!(
-        bands([0.0, 7.0], ColorScale::Linear, 7, 4),
-        "0 . . . . . . 7"
-    );
+    assert_eq!(bands([0.0, 7.0], ColorScale::Linear, 7, 4), "0 . . . . . . 7");
 }
 
 #[test]
 fn unusual_ranges_have_a_tick_or_none() {
-    assert_eq!(
-        labels([3.0, 3.0], ColorScale::Linear, None, 6),
-        ("3".to_owned(), 0)
-    );
-    assert_eq!(
-        labels([0.0, 0.0], ColorScale::Linear, None, 6),
-        ("0".to_owned(), 0)
-    );
-    for (low, high) in [
-        (0.0, 5e-324),
-        (-1.7e308, 1.7e308),
-        (1.0, 1.0 + f64::EPSILON),
-    ] {
+    assert_eq!(labels([3.0, 3.0], ColorScale::Linear, None, 6), ("3".to_owned(), 0));
+    assert_eq!(labels([0.0, 0.0], ColorScale::Linear, None, 6), ("0".to_owned(), 0));
+    for (low, high) in [(0.0, 5e-324), (-1.7e308, 1.7e308), (1.0, 1.0 + f64::EPSILON)] {
         let found = Ticks::of([low, high], ColorScale::Linear, None, 6);
         assert!(found.ticks.len() <= 101);
     }

@@ -46,9 +46,7 @@ impl SampledPlanes {
     /// The samples of the plane `name`.
     pub fn plane(&self, name: &str) -> Option<&PlaneSamples> {
         let mut planes = self.planes.iter();
-        planes
-            .find(|(other, _)| other == name)
-            .map(|(_, samples)| samples)
+        planes.find(|(other, _)| other == name).map(|(_, samples)| samples)
     }
 
     /// The samples of the plane `name`, if they are floats.
@@ -87,9 +85,7 @@ pub fn read_planes(
     is_wanted: impl Fn(&str) -> bool + std::panic::UnwindSafe,
     max_width: usize,
 ) -> Result<SampledPlanes, PictureError> {
-    read(path, |file| {
-        decode(file, is_wanted, |width| width.div_ceil(max_width.max(1)))
-    })
+    read(path, |file| decode(file, is_wanted, |width| width.div_ceil(max_width.max(1))))
 }
 
 /// The colours of a file through the view transform, like a preview. An image without background is in front of
@@ -141,11 +137,7 @@ fn decode(
             if !is_wanted(&name) {
                 continue;
             }
-            targets.push(Target {
-                part,
-                channel,
-                plane: planes.len(),
-            });
+            targets.push(Target { part, channel, plane: planes.len() });
             let samples = match description.sample_type {
                 SampleType::U32 => PlaneSamples::Integer(vec![0; size[0] * size[1]]),
                 _ => PlaneSamples::Float(vec![0.0; size[0] * size[1]]),
@@ -153,12 +145,7 @@ fn decode(
             planes.push((name, samples));
         }
     }
-    let mut sampled = SampledPlanes {
-        size,
-        image_size,
-        step,
-        planes,
-    };
+    let mut sampled = SampledPlanes { size, image_size, step, planes };
     // Decode the blocks of their parts
     let is_read = |part: usize| targets.iter().any(|target| target.part == part);
     let chunks = reader.filter_chunks(false, |_, _, block| {

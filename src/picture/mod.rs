@@ -155,8 +155,7 @@ impl Picture {
 
 /// Whether the name is that of an OpenEXR image.
 fn is_exr(path: &Path) -> bool {
-    path.extension()
-        .is_some_and(|extension| extension.eq_ignore_ascii_case(EXR_EXTENSION))
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(EXR_EXTENSION))
 }
 
 /// Checks a size before memory for its pixels is allocated.
@@ -185,14 +184,8 @@ fn read<T>(
     path: &Path,
     decode: impl FnOnce(BufReader<File>) -> Result<T, Fault> + std::panic::UnwindSafe,
 ) -> Result<T, PictureError> {
-    let io = |source| PictureError::Io {
-        path: path.to_owned(),
-        source,
-    };
-    let unusable = |what: String| PictureError::Unusable {
-        path: path.to_owned(),
-        what,
-    };
+    let io = |source| PictureError::Io { path: path.to_owned(), source };
+    let unusable = |what: String| PictureError::Unusable { path: path.to_owned(), what };
     let (file, _) = spherule_jobs::open_regular(path).map_err(io)?;
     // Decoders of damaged files may panic
     match catch_panic(|| Ok::<_, Panic>(decode(BufReader::new(file)))) {
@@ -262,10 +255,7 @@ mod tests {
             std::fs::write(&path, &whole[..at]).unwrap();
             // Only the end mark may be missing
             let read = Picture::read(&path, 0.0);
-            assert!(
-                read.is_err() || read.is_ok_and(|read| read == picture),
-                "{at}"
-            );
+            assert!(read.is_err() || read.is_ok_and(|read| read == picture), "{at}");
         }
     }
 }

@@ -21,9 +21,7 @@ impl From<DecodingError> for Fault {
 /// Decodes a file. Transparent pixels show white.
 pub(super) fn picture(file: impl Read) -> Result<Picture, Fault> {
     let (width, pixels) = rgba(file)?;
-    let rgb = pixels
-        .iter()
-        .flat_map(|&[r, g, b, a]| [r, g, b].map(|v| over_white(v, a)));
+    let rgb = pixels.iter().flat_map(|&[r, g, b, a]| [r, g, b].map(|v| over_white(v, a)));
     Ok(Picture::new(width, pixels.len() / width, rgb.collect()))
 }
 
@@ -97,25 +95,10 @@ mod tests {
     #[test]
     fn other_kinds_of_pixels_become_rgb() {
         reads(ColorType::Rgb, BitDepth::Eight, &[1, 2, 3], [1, 2, 3]);
-        reads(
-            ColorType::Rgb,
-            BitDepth::Sixteen,
-            &[1, 9, 2, 9, 3, 9],
-            [1, 2, 3],
-        );
+        reads(ColorType::Rgb, BitDepth::Sixteen, &[1, 9, 2, 9, 3, 9], [1, 2, 3]);
         reads(ColorType::Grayscale, BitDepth::One, &[0x80], [255; 3]);
-        reads(
-            ColorType::Rgba,
-            BitDepth::Eight,
-            &[0, 100, 255, 51],
-            [204, 224, 255],
-        );
-        reads(
-            ColorType::GrayscaleAlpha,
-            BitDepth::Eight,
-            &[7, 0],
-            [255; 3],
-        );
+        reads(ColorType::Rgba, BitDepth::Eight, &[0, 100, 255, 51], [204, 224, 255]);
+        reads(ColorType::GrayscaleAlpha, BitDepth::Eight, &[7, 0], [255; 3]);
     }
 
     #[test]

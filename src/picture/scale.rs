@@ -125,10 +125,7 @@ mod tests {
         picture.put(&Picture::filled(40, 80, [255; 3]), 40, 0);
         let small = picture.scaled(8, 8);
         let row: Vec<u8> = small.row(4).iter().copied().step_by(3).collect();
-        assert!(
-            row[..3].iter().all(|v| *v < 40) && row[5..].iter().all(|v| *v > 215),
-            "{row:?}"
-        );
+        assert!(row[..3].iter().all(|v| *v < 40) && row[5..].iter().all(|v| *v > 215), "{row:?}");
         assert!(row[3] < 96 && row[4] > 224, "{row:?}");
     }
 }

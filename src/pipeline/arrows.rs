@@ -73,11 +73,7 @@ struct Arrows {
 
 impl Arrows {
     fn new(style: &ArrowStyle, frame: &SharedFrame<'_>, vectors: &Attribute) -> Self {
-        let mut arrows = Self {
-            rods: Vec::new(),
-            owners: Vec::new(),
-            not_finite: 0,
-        };
+        let mut arrows = Self { rods: Vec::new(), owners: Vec::new(), not_finite: 0 };
         for particle in every_nth(frame, style.every) {
             let point = frame.positions[particle];
             let vector = scaled(vectors, particle, style.scale);

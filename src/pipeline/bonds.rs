@@ -50,10 +50,8 @@ pub(super) fn bonds_of(
             near(Reach::covalent((name, *angstrom), frame, file)?)
         }
     };
-    let rods = rods.ok_or_else(|| LoadError::TooManyBonds {
-        file: file.to_owned(),
-        particles: frame.len(),
-    })?;
+    let rods = rods
+        .ok_or_else(|| LoadError::TooManyBonds { file: file.to_owned(), particles: frame.len() })?;
     if rods.is_empty() {
         notes.push(format!("frame {number}: no bonds: {none}"));
     }
@@ -86,11 +84,7 @@ fn listed(radius: f32, frame: &SharedFrame<'_>) -> Option<Vec<Rod>> {
         };
         let image = lattice.as_ref().and_then(|lattice| lattice.image(b - a));
         let mut rod = |ends, particles| {
-            rods.push(Rod {
-                ends,
-                radii: [radius; 2],
-                particles,
-            });
+            rods.push(Rod { ends, radii: [radius; 2], particles });
         };
         match image {
             None => rod([a, b], *bond),
@@ -116,10 +110,7 @@ struct Reach {
 impl Reach {
     /// The same distance for all particles.
     const fn distance(greatest: f32) -> Self {
-        Self {
-            greatest,
-            shares: Vec::new(),
-        }
+        Self { greatest, shares: Vec::new() }
     }
 
     /// Covalent radii with a tolerance, by the atomic numbers in the attribute `name`; `angstrom` is the length of one.
@@ -132,15 +123,10 @@ impl Reach {
             let has = frame.attributes.iter().map(|a| a.name.as_str());
             missing(name, "covalent bonds", file, has)
         })?;
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "radii are f32 in the renderer"
-        )]
+        #[expect(clippy::cast_possible_truncation, reason = "radii are f32 in the renderer")]
         let share = |particle: usize| {
             let radius = RadiusTable::Covalent.radius(elements.magnitude(particle));
-            radius.map_or(f32::NAN, |radius| {
-                (angstrom * (radius + 0.5 * TOLERANCE)) as f32
-            })
+            radius.map_or(f32::NAN, |radius| (angstrom * (radius + 0.5 * TOLERANCE)) as f32)
         };
         let shares: Vec<f32> = (0..frame.len()).map(share).collect();
         // `max` ignores NaN
@@ -176,10 +162,7 @@ impl<'a> Search<'a> {
         // Bins need a size; a margin keeps particles at the greatest distance in neighbouring bins
         let size = (1.001 * reach.greatest).max(f32::MIN_POSITIVE);
         let min = positions.iter().copied().fold(Vec3::INFINITY, Vec3::min);
-        let max = positions
-            .iter()
-            .copied()
-            .fold(Vec3::NEG_INFINITY, Vec3::max);
+        let max = positions.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max);
         Self {
             radius,
             bins: FieldParticles::sorted(positions, size, true),
@@ -282,9 +265,8 @@ mod tests {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             (state >> 8) as f32 / 16_777_216.0
         };
-        let positions: Vec<Vec3> = (0..count)
-            .map(|_| Vec3::new(6.0 * next(), 5.0 * next(), 4.0 * next()))
-            .collect();
+        let positions: Vec<Vec3> =
+            (0..count).map(|_| Vec3::new(6.0 * next(), 5.0 * next(), 4.0 * next())).collect();
         let elements = (0..count).map(|i| [1, 6, 8, 0][i % 4]).collect();
         let edges = [DVec3::X * 6.0, DVec3::Y * 5.0, DVec3::Z * 4.0];
         ParticleFrame {
@@ -323,9 +305,7 @@ mod tests {
                 if a < b && way.length() <= length {
                     pairs.push([a, b].map(index_u32));
                 }
-                let near = images
-                    .iter()
-                    .filter(|i| (way - i.as_dvec3()).length() <= length);
+                let near = images.iter().filter(|i| (way - i.as_dvec3()).length() <= length);
                 halves.extend(near.map(|_| index_u32(a)));
             }
         }
@@ -334,15 +314,11 @@ mod tests {
 
     /// The pairs of whole bonds, and the particles of halves, sorted.
     fn found(rods: &[Rod]) -> (Vec<[u32; 2]>, Vec<u32>) {
-        let (halves, pairs): (Vec<&Rod>, _) = rods
-            .iter()
-            .partition(|rod| rod.particles[0] == rod.particles[1]);
+        let (halves, pairs): (Vec<&Rod>, _) =
+            rods.iter().partition(|rod| rod.particles[0] == rod.particles[1]);
         let mut pairs: Vec<[u32; 2]> = pairs.into_iter().map(|rod| rod.particles).collect();
         pairs.sort_unstable();
-        (
-            pairs,
-            halves.into_iter().map(|rod| rod.particles[0]).collect(),
-        )
+        (pairs, halves.into_iter().map(|rod| rod.particles[0]).collect())
     }
 
     #[test]
@@ -408,16 +384,10 @@ mod tests {
     #[test]
     fn listed_bonds_go_to_the_nearest_images() {
         let positions = [[0.5, 1.0, 1.0], [5.0, 1.0, 1.0], [2.0, 1.0, 1.0]].map(Vec3::from_array);
-        let mut frame = SharedFrame {
-            bonds: vec![[0, 2], [1, 0]],
-            ..frame_at(&positions)
-        };
+        let mut frame = SharedFrame { bonds: vec![[0, 2], [1, 0]], ..frame_at(&positions) };
         let whole = listed(0.1, &frame).unwrap();
         let ends: Vec<[Vec3; 2]> = whole.iter().map(|rod| rod.ends).collect();
-        assert_eq!(
-            ends,
-            [[positions[0], positions[2]], [positions[1], positions[0]]]
-        );
+        assert_eq!(ends, [[positions[0], positions[2]], [positions[1], positions[0]]]);
         assert_eq!(whole[1].particles, [1, 0]);
         // The images of the cell of length 6 are nearer
         frame.cell = self::frame(1, [true; 3]).cell;

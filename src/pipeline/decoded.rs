@@ -60,11 +60,7 @@ impl<'a> DecodedFrame<'a> {
         notes: &mut Vec<String>,
     ) -> Result<(Self, u64), LoadError> {
         // Extract radii and colours
-        let FrameRadii {
-            radius,
-            raised,
-            unknown,
-        } = radii(setup, &frame, file)?;
+        let FrameRadii { radius, raised, unknown } = radii(setup, &frame, file)?;
         if unknown > 0 {
             notes.push(format!(
                 "frame {number}: {unknown} particles have no element with a known radius; they are drawn with a \
@@ -85,11 +81,7 @@ impl<'a> DecodedFrame<'a> {
         }
         // Extract ids and velocities for the channels
         let channels = setup.picture.render.channels;
-        let ids = if setup.picture.needs_ids() {
-            ids(&frame)
-        } else {
-            None
-        };
+        let ids = if setup.picture.needs_ids() { ids(&frame) } else { None };
         let shutter = setup.picture.shutter.as_ref();
         let is_moved = shutter.is_some_and(|shutter| shutter.has_velocities);
         let velocities = match channels.needs_velocities() || is_moved {
@@ -268,10 +260,7 @@ impl DecodedShading {
         let velocities = self.velocities.as_deref().unwrap_or_default();
         let colors = size_of_val(&self.values[..]) + size_of_val(&self.colors[..]);
         let opacities = size_of_val(&self.opacities[..]);
-        let parts = self
-            .parts
-            .as_ref()
-            .map_or(0, |(_, parts)| size_of_val(&parts[..]));
+        let parts = self.parts.as_ref().map_or(0, |(_, parts)| size_of_val(&parts[..]));
         let attributes = self.attributes.iter().map(|plane| size_of_val(&plane[..]));
         let channels = size_of_val(ids) + size_of_val(velocities) + parts;
         (colors + opacities + channels + attributes.sum::<usize>()) as u64
@@ -293,10 +282,7 @@ fn attribute<'a>(
     Ok(found)
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "colours need no more than f32"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "colours need no more than f32")]
 fn magnitudes(attribute: &Attribute, scale: f64) -> Vec<f32> {
     (0..attribute.count())
         .into_par_iter()
@@ -334,11 +320,7 @@ fn values_of(
         // The view is checked in advance
         ParticleValue::Depth => setup.camera_at(number).map_or_else(
             |_| Vec::new(),
-            |camera| {
-                particles
-                    .map(|i| camera.depth_of(frame.positions[i]))
-                    .collect()
-            },
+            |camera| particles.map(|i| camera.depth_of(frame.positions[i])).collect(),
         ),
         ParticleValue::Index => match &frame.file_index {
             Some(indices) => indices.par_iter().map(|i| *i as f32).collect(),
@@ -425,9 +407,7 @@ fn low_bits(data: &AttributeData) -> Option<Vec<u32>> {
 pub(super) fn particle_with_id(frame: &SharedFrame<'_>, id: u32) -> Option<usize> {
     match ids(frame) {
         Some(ids) => ids.iter().position(|other| *other == id),
-        None => usize::try_from(id)
-            .ok()
-            .filter(|index| *index < frame.positions.len()),
+        None => usize::try_from(id).ok().filter(|index| *index < frame.positions.len()),
     }
 }
 

@@ -79,11 +79,7 @@ fn publish_exr(
 ) -> Result<(Film, u64), WriteError> {
     let task = &frame.task;
     let mut file = Publisher::create(&task.image).map_err(at(&task.image))?;
-    let mut sampler = MemorySampler {
-        out: &mut file,
-        peaks,
-        samples: 0,
-    };
+    let mut sampler = MemorySampler { out: &mut file, peaks, samples: 0 };
     let options = exr_options(setup, &frame);
     let (film, clamped) =
         write_exr(frame.film, &options, &mut sampler).map_err(|e| match e.into_io() {
@@ -97,10 +93,7 @@ fn publish_exr(
 /// The error of writing to `path`.
 fn at(path: &Path) -> impl Fn(io::Error) -> WriteError + use<> {
     let path = path.to_owned();
-    move |source| WriteError::Io {
-        path: path.clone(),
-        source,
-    }
+    move |source| WriteError::Io { path: path.clone(), source }
 }
 
 impl TracedFrame {
@@ -165,10 +158,7 @@ fn exr_options(setup: &Setup, frame: &TracedFrame) -> ExrOptions {
         "particles": frame.report.particles,
     });
     ExrOptions {
-        custom: Some(CustomAttribute {
-            name: "spherule".to_owned(),
-            json: facts.to_string(),
-        }),
+        custom: Some(CustomAttribute { name: "spherule".to_owned(), json: facts.to_string() }),
         world_to_camera: Some(frame.camera.world_to_camera()),
         texts: frame.texts.clone(),
         ..setup.picture.exr.clone()

@@ -71,10 +71,7 @@ mod tests {
     #[test]
     fn the_error_decides_what_the_run_does() {
         let write = |kind: io::ErrorKind| {
-            ImageError::Write(WriteError::Io {
-                path: PathBuf::from("f.exr"),
-                source: kind.into(),
-            })
+            ImageError::Write(WriteError::Io { path: PathBuf::from("f.exr"), source: kind.into() })
         };
         let interrupted = TraceError::Render(RenderError::Interrupted);
         let message = "index out of bounds".to_owned();

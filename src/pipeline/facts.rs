@@ -32,10 +32,7 @@ impl FileFacts {
             _ => None,
         };
         let names = setup.picture.overlay_values.iter();
-        Self {
-            file,
-            ranges: names.map(range).collect(),
-        }
+        Self { file, ranges: names.map(range).collect() }
     }
 }
 

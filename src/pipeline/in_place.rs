@@ -81,12 +81,7 @@ impl StoredFrame {
         };
         // Find the attributes, and verify the data
         let names = Names::of(setup, &file)?;
-        let frame = Self {
-            file: Box::new(file),
-            structure,
-            radius: radius.common,
-            names,
-        };
+        let frame = Self { file: Box::new(file), structure, radius: radius.common, names };
         frame.verify(setup.run.verify).map_err(LoadError::Frame)?;
         Ok(Opened::InPlace(frame, radius.raised))
     }
@@ -136,10 +131,8 @@ impl StoredFrame {
         let view = |name: &Option<String>| frame.attribute(name.as_deref()?);
         let color = match &picture.color {
             ColorRule::Constant(color) => Some(StoredColor::Constant(*color)),
-            ColorRule::Rgb { .. } => view(&self.names.rgb).map(|values| StoredColor::Rgb {
-                encoding: encoding(&values),
-                values,
-            }),
+            ColorRule::Rgb { .. } => view(&self.names.rgb)
+                .map(|values| StoredColor::Rgb { encoding: encoding(&values), values }),
             ColorRule::Attribute { map, .. } => {
                 let values = self.names.values.as_ref();
                 let values = values.and_then(|value| StoredValues::of(&frame, value));
@@ -355,9 +348,7 @@ fn particles_in_place(setup: &Setup, index: &FrameIndex) -> Result<PlacedRadius,
     // Find the radii
     let common = match (&setup.picture.radius, &index.radius) {
         (RadiusRule::Attribute { .. } | RadiusRule::Table { .. }, _) => {
-            return Err(
-                "the radius is an attribute, for 12 bytes per particle and more".to_owned(),
-            );
+            return Err("the radius is an attribute, for 12 bytes per particle and more".to_owned());
         }
         (RadiusRule::Common(radius), _) | (RadiusRule::FileOr(radius), RadiusIndex::None) => {
             *radius
@@ -366,10 +357,7 @@ fn particles_in_place(setup: &Setup, index: &FrameIndex) -> Result<PlacedRadius,
         (RadiusRule::FileOr(_), RadiusIndex::PerParticle(radii))
             if radii.low >= setup.picture.least_radius =>
         {
-            return Ok(PlacedRadius {
-                common: None,
-                raised: 0,
-            });
+            return Ok(PlacedRadius { common: None, raised: 0 });
         }
         (RadiusRule::FileOr(_), RadiusIndex::PerParticle(_)) => {
             return Err("some radii are too small to be seen and are raised".to_owned());
@@ -378,11 +366,7 @@ fn particles_in_place(setup: &Setup, index: &FrameIndex) -> Result<PlacedRadius,
     // Raise a common radius that is too small or NaN
     let is_visible = common >= setup.picture.least_radius && is_radius(common);
     Ok(PlacedRadius {
-        common: Some(if is_visible {
-            common
-        } else {
-            setup.picture.least_radius
-        }),
+        common: Some(if is_visible { common } else { setup.picture.least_radius }),
         raised: if is_visible { 0 } else { index.count },
     })
 }
@@ -409,14 +393,8 @@ enum StoredOpacity<'a> {
 #[derive(Debug, Clone, Copy)]
 enum StoredColor<'a> {
     Constant(Vec3),
-    Rgb {
-        values: AttributeView<'a>,
-        encoding: RgbEncoding,
-    },
-    Mapped {
-        values: StoredValues<'a>,
-        map: &'a ColorMap,
-    },
+    Rgb { values: AttributeView<'a>, encoding: RgbEncoding },
+    Mapped { values: StoredValues<'a>, map: &'a ColorMap },
 }
 
 /// Values of particles in place.
@@ -500,8 +478,7 @@ impl ShadeSource for StoredShading<'_> {
     }
 
     fn id(&self, index: u32) -> u32 {
-        self.ids
-            .map_or(index, |ids| ids.low_bits(index as usize).unwrap_or(NO_ID))
+        self.ids.map_or(index, |ids| ids.low_bits(index as usize).unwrap_or(NO_ID))
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "the channel is f32")]

@@ -26,16 +26,9 @@ impl Lattice {
                 0.0 => 0.0,
                 length => length.recip(),
             };
-            if cell.periodic[edge] {
-                scale * row
-            } else {
-                DVec3::ZERO
-            }
+            if cell.periodic[edge] { scale * row } else { DVec3::ZERO }
         };
-        Self {
-            edges: cell.vectors,
-            fractions: [0, 1, 2].map(of_edge),
-        }
+        Self { edges: cell.vectors, fractions: [0, 1, 2].map(of_edge) }
     }
 
     /// What must be subtracted from the way to a particle for the way to its nearest image; None if it is the nearest

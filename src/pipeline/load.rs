@@ -182,12 +182,7 @@ fn decoded<'a>(
     }
     let (time, dropped) = (frame.time, frame.dropped);
     let focus = focus_point(setup, &frame, file)?;
-    let mut rods = rods_of(
-        cell_style(setup),
-        frame.cell.as_ref(),
-        task.frame,
-        &mut notes,
-    );
+    let mut rods = rods_of(cell_style(setup), frame.cell.as_ref(), task.frame, &mut notes);
     rods.extend(arrows_of(setup, &frame, (task.frame, file), &mut notes)?);
     rods.extend(bonds_of(setup, &frame, (task.frame, file), &mut notes)?);
     let facts = FileFacts::of_decoded(setup, &frame, without_directory(file));
@@ -219,9 +214,7 @@ fn selected(
     particles: RawParticles,
     file: &str,
 ) -> Result<ParticleFrame, LoadError> {
-    let Picture {
-        selection, origin, ..
-    } = &setup.picture;
+    let Picture { selection, origin, .. } = &setup.picture;
     if selection.is_all() {
         return Ok(ParticleFrame::from_raw(particles, *origin));
     }
@@ -264,32 +257,22 @@ fn focus_point(
     };
     match particle_with_id(frame, id) {
         Some(index) => Ok(Some(frame.positions[index])),
-        None => Err(LoadError::NoFocus {
-            file: file.to_owned(),
-            id,
-        }),
+        None => Err(LoadError::NoFocus { file: file.to_owned(), id }),
     }
 }
 
 impl LoadedFrame<'_> {
     /// Adds notes for the user, and reads the meshes.
     fn finish(&mut self, setup: &Setup) -> Result<(), LoadError> {
-        self.note_count(
-            self.dropped,
-            "left out: a coordinate is not finite or too far away",
-        );
+        self.note_count(self.dropped, "left out: a coordinate is not finite or too far away");
         self.note_count(
             self.clamped_radii,
             "with a raised radius: it was too small to be seen, or no number",
         );
         self.note_absent_parts(setup);
         self.notes.extend(missing_glyphs(setup));
-        self.meshes = meshes_of(
-            &setup.picture.meshes,
-            setup.picture.shutter,
-            &self.task,
-            &mut self.notes,
-        )?;
+        self.meshes =
+            meshes_of(&setup.picture.meshes, setup.picture.shutter, &self.task, &mut self.notes)?;
         Ok(())
     }
 
@@ -312,11 +295,7 @@ impl LoadedFrame<'_> {
     /// Notes what has been done with `count` particles.
     fn note_count(&mut self, count: u64, what: &str) {
         if count > 0 {
-            let note = format!(
-                "frame {}: {} {what}",
-                self.task.frame,
-                counted(count, "particle")
-            );
+            let note = format!("frame {}: {} {what}", self.task.frame, counted(count, "particle"));
             self.notes.push(note);
         }
     }

@@ -103,9 +103,7 @@ pub enum LoadError {
 /// The first file of the frame with `index`, for messages.
 pub(super) fn first_file(sequence: &Sequence, index: usize) -> String {
     let inputs = sequence.inputs(index);
-    inputs
-        .first()
-        .map_or_else(String::new, |p| p.display().to_string())
+    inputs.first().map_or_else(String::new, |p| p.display().to_string())
 }
 
 /// The error for an attribute that is not among those that the file `has`.
@@ -139,18 +137,11 @@ pub(super) fn unknown_name(
 
 /// The error for a frame that `has` only attributes that are no parts.
 pub(super) fn no_parts<'a>(file: &str, has: impl Iterator<Item = &'a str>) -> LoadError {
-    LoadError::NoParts {
-        file: file.to_owned(),
-        has: attribute_list(has),
-    }
+    LoadError::NoParts { file: file.to_owned(), has: attribute_list(has) }
 }
 
 /// A list of names for a message.
 pub(crate) fn attribute_list<'a>(names: impl Iterator<Item = &'a str>) -> String {
     let names: Vec<String> = names.map(|n| format!("`{n}`")).collect();
-    if names.is_empty() {
-        "none".to_owned()
-    } else {
-        names.join(", ")
-    }
+    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
 }

@@ -36,10 +36,7 @@ pub(super) fn attributes(
         // The key of a layer is the start of the hash of its name
         let hash = format!("{:08x}", murmur_hash3(kind.name().as_bytes()));
         let mut put = |name: &str, text: String| {
-            all.push(TextAttribute {
-                name: format!("cryptomatte/{}/{name}", &hash[..7]),
-                text,
-            });
+            all.push(TextAttribute { name: format!("cryptomatte/{}/{name}", &hash[..7]), text });
         };
         put("conversion", "uint32_to_float32".to_owned());
         put("hash", "MurmurHash3_32".to_owned());

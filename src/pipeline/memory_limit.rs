@@ -37,12 +37,7 @@ pub enum MemoryRemedy {
 impl MemoryLimitError {
     /// The error for a frame of size `frame` that needs `need`.
     pub(super) fn new(setup: &Setup, frame: &FrameSize, need: MemoryNeed, limit: Bytes) -> Self {
-        Self {
-            need,
-            limit,
-            surface: surface_text(setup),
-            remedies: remedies(setup, frame, limit),
-        }
+        Self { need, limit, surface: surface_text(setup), remedies: remedies(setup, frame, limit) }
     }
 }
 

@@ -144,36 +144,23 @@ fn build_mesh(
     let total = file.triangles.len();
     let not_finite = total - file.triangles.iter().filter(|t| is_finite(t)).count();
     let mesh = TriangleMesh::new(vertices, file.triangles, settings.normals);
-    let mesh = mesh.map_err(|source| MeshLoadError::Mesh {
-        path: path.to_owned(),
-        source,
-    })?;
+    let mesh = mesh.map_err(|source| MeshLoadError::Mesh { path: path.to_owned(), source })?;
     let degenerate = total - mesh.len() - not_finite;
     if mesh.is_empty() {
-        return Err(MeshLoadError::Invisible {
-            path: path.to_owned(),
-            not_finite,
-            degenerate,
-        });
+        return Err(MeshLoadError::Invisible { path: path.to_owned(), not_finite, degenerate });
     }
     let tree = MeshTree::new(mesh);
     let mut notes = Vec::new();
-    for (count, why) in [
-        (not_finite, "a coordinate is not finite or too large"),
-        (degenerate, "without an area"),
-    ] {
+    for (count, why) in
+        [(not_finite, "a coordinate is not finite or too large"), (degenerate, "without an area")]
+    {
         if count > 0 {
             let path = path.display();
-            notes.push(format!(
-                "{path}: {count} of {total} triangles left out: {why}"
-            ));
+            notes.push(format!("{path}: {count} of {total} triangles left out: {why}"));
         }
     }
     notes.extend(ratio_note(path, &tree, settings.particle_extent));
-    Ok(LoadedMesh {
-        tree: Arc::new(tree),
-        notes,
-    })
+    Ok(LoadedMesh { tree: Arc::new(tree), notes })
 }
 
 /// A note if the mesh is much larger or smaller than the particles, so that its unit is probably another one.
@@ -219,10 +206,8 @@ pub(super) fn meshes_of(
             let next = task.next_meshes.as_ref().zip(shutter);
             let slices = match next.and_then(|(next, s)| Some((next.files.get(number)?, next, s))) {
                 Some((file, next, shutter)) => {
-                    let times = shutter
-                        .slice_times()
-                        .map(|time| time / f64::from(next.steps))
-                        .collect();
+                    let times =
+                        shutter.slice_times().map(|time| time / f64::from(next.steps)).collect();
                     moving_mesh(path, file, times, &mesh.settings, notes)
                 }
                 None => load_mesh(path, &mesh.settings).map(|mesh| vec![mesh]),
@@ -248,19 +233,14 @@ fn moving_mesh(
     let not_blurred = match RawMesh::read(next, settings) {
         Ok(other) if other.triangles == file.triangles => {
             #[expect(clippy::cast_possible_truncation, reason = "fractions of a step")]
-            let slices = times
-                .into_iter()
-                .map(|time| file.towards(&other, time as f32));
+            let slices = times.into_iter().map(|time| file.towards(&other, time as f32));
             let slices = slices.map(|slice| build_mesh(path, slice, settings));
             return slices.collect();
         }
         Ok(_) => format!("{} has other triangles", next.display()),
         Err(error) => error.to_string(),
     };
-    notes.push(format!(
-        "{}: not blurred by motion: {not_blurred}",
-        path.display()
-    ));
+    notes.push(format!("{}: not blurred by motion: {not_blurred}", path.display()));
     Ok(vec![build_mesh(path, file, settings)?])
 }
 
@@ -326,10 +306,7 @@ mod tests {
         assert!(notes.contains("m.obj: 1 of 4 triangles left out: without an area"));
         let none = "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 2 3 2\n";
         let error = load(none, &SETTINGS).unwrap_err();
-        assert!(
-            error.contains("1 have a coordinate that is not finite"),
-            "{error}"
-        );
+        assert!(error.contains("1 have a coordinate that is not finite"), "{error}");
         assert!(error.contains("1 have no area"), "{error}");
     }
 
@@ -342,10 +319,7 @@ mod tests {
             (1e-3, Some("1414 times larger")),
             (0.0, None),
         ] {
-            let settings = MeshSettings {
-                particle_extent,
-                ..SETTINGS
-            };
+            let settings = MeshSettings { particle_extent, ..SETTINGS };
             let notes = load(TRIANGLE, &settings).unwrap().notes;
             let found = notes.first().map_or("", String::as_str);
             match part {

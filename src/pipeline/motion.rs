@@ -26,21 +26,16 @@ pub(super) fn expose(setup: &Setup, shutter: Shutter, frame: &mut DecodedFrame<'
     let mut displacements = velocities.unwrap_or_default();
     displacements.resize(frame.centers.len(), Vec3::ZERO);
     let time = f64::from(shutter.step.time);
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "lengths of a scene are f32"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "lengths of a scene are f32")]
     let [middle, length] = [
         (0.5 * (shutter.open + shutter.close) * time) as f32,
         ((shutter.close - shutter.open) * time) as f32,
     ];
     let centers = frame.centers.to_mut().par_iter_mut();
-    centers
-        .zip(displacements.par_iter_mut())
-        .for_each(|(center, velocity)| {
-            *center += bounded(middle * *velocity);
-            *velocity = bounded(length * *velocity);
-        });
+    centers.zip(displacements.par_iter_mut()).for_each(|(center, velocity)| {
+        *center += bounded(middle * *velocity);
+        *velocity = bounded(length * *velocity);
+    });
     displacements
 }
 
@@ -106,10 +101,10 @@ pub(super) fn velocities_to_next(
 
 /// Size of the box around `positions`; infinite along axes without extent.
 fn extent(positions: &[Vec3]) -> DVec3 {
-    let ends = positions.par_iter().map(|p| [*p, *p]).reduce(
-        || [Vec3::INFINITY, Vec3::NEG_INFINITY],
-        |a, b| [a[0].min(b[0]), a[1].max(b[1])],
-    );
+    let ends = positions
+        .par_iter()
+        .map(|p| [*p, *p])
+        .reduce(|| [Vec3::INFINITY, Vec3::NEG_INFINITY], |a, b| [a[0].min(b[0]), a[1].max(b[1])]);
     let size = (ends[1] - ends[0]).as_dvec3();
     DVec3::select(size.cmpgt(DVec3::ZERO), size, DVec3::INFINITY)
 }
@@ -129,10 +124,8 @@ impl<'a> Places<'a> {
             let sorted = Vec::new();
             return Self { ids, sorted };
         }
-        let mut sorted: Vec<(u32, u32)> = (0..index_u32(ids.len()))
-            .zip(ids)
-            .map(|(place, id)| (*id, place))
-            .collect();
+        let mut sorted: Vec<(u32, u32)> =
+            (0..index_u32(ids.len())).zip(ids).map(|(place, id)| (*id, place)).collect();
         sorted.par_sort_unstable();
         Self { ids, sorted }
     }

@@ -42,9 +42,7 @@ impl Particles {
             0 => Vec3::new(random(), random(), random()),
             _ => 0.08 * Vec3::from([i % 5, i / 5 % 5, i / 25].map(|c| c as f32)),
         };
-        Self {
-            centers: (0..COUNT).map(center).collect(),
-        }
+        Self { centers: (0..COUNT).map(center).collect() }
     }
 
     fn id(index: u32) -> u32 {
@@ -53,10 +51,7 @@ impl Particles {
 
     fn index(id: u32) -> u32 {
         let index = (9000 - id) / 7;
-        assert!(
-            index < COUNT && Self::id(index) == id,
-            "no particle has the id {id}"
-        );
+        assert!(index < COUNT && Self::id(index) == id, "no particle has the id {id}");
         index
     }
 
@@ -96,22 +91,15 @@ impl Particles {
         for &i in order {
             let (p, v) = (self.centers[i as usize] + offset, Self::velocity(i));
             let (id, mass, part) = (Self::id(i), Self::mass(i), Self::part(i));
-            writeln!(
-                text,
-                "{},{},{},{id},{},{},{},{mass},{part}",
-                p.x, p.y, p.z, v.x, v.y, v.z
-            )
-            .expect("memory takes all");
+            writeln!(text, "{},{},{},{id},{},{},{},{mass},{part}", p.x, p.y, p.z, v.x, v.y, v.z)
+                .expect("memory takes all");
         }
         text
     }
 
     fn raw(&self, order: &[u32], offset: Vec3) -> RawParticles {
-        let attribute = |name: &str, components, data| Attribute {
-            name: name.to_owned(),
-            components,
-            data,
-        };
+        let attribute =
+            |name: &str, components, data| Attribute { name: name.to_owned(), components, data };
         let velocities = order.iter().flat_map(|i| Self::velocity(*i).to_array());
         let masses = order.iter().map(|i| Self::mass(*i));
         let integers =
@@ -210,28 +198,16 @@ const SURFACES: [(&str, &str, Range<f32>); 9] = [
         "clip = [{ type = \"plane\", normal = \"z\", point = [0, 0, 0.3], mode = \"cut\" }]",
         0.0..1.01,
     ),
-    (
-        "parts",
-        "material.part = [{ parts = [1], color = [1, 0, 0] }]",
-        0.99..1.01,
-    ),
+    ("parts", "material.part = [{ parts = [1], color = [1, 0, 0] }]", 0.99..1.01),
     ("union", "render.surface = \"union\"", 0.99..1.01),
     ("smooth", "render.surface = \"smooth\"", 0.0..2.5),
-    (
-        "smooth, soft spray",
-        "render.surface = \"smooth\"\nsurface.spray = true",
-        0.0..2.5,
-    ),
+    ("smooth, soft spray", "render.surface = \"smooth\"\nsurface.spray = true", 0.0..2.5),
     (
         "smooth, spheres of spray",
         "render.surface = \"smooth\"\nsurface.spray = true\nsurface.spray_style = \"spheres\"",
         0.0..2.5,
     ),
-    (
-        "union, soft spray",
-        "render.surface = \"union\"\nsurface.spray = true",
-        0.0..2.0,
-    ),
+    ("union, soft spray", "render.surface = \"union\"\nsurface.spray = true", 0.0..2.0),
     (
         "union, spheres of spray",
         "render.surface = \"union\"\nsurface.spray = true\nsurface.spray_style = \"spheres\"",
@@ -274,11 +250,7 @@ fn rods_have_the_colours_of_their_particles() {
                 "arrows = [{ attribute = \"velocity\", scale = 2, radius = 0.01, color = \"auto\" }]",
                 0.14,
             ),
-            (
-                "trails",
-                "trails = { frames = 1, radius = 0.03, color = \"auto\" }",
-                0.14,
-            ),
+            ("trails", "trails = { frames = 1, radius = 0.03, color = \"auto\" }", 0.14),
             ("bonds", "bonds = { find = 0.25, radius = 0.03 }", 0.16),
         ] {
             let (setup, film) = rendered(&sequence, settings);

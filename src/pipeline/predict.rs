@@ -157,11 +157,7 @@ impl MemoryNeed {
     }
 
     pub(super) fn larger(self, other: Self) -> Self {
-        if other.total() > self.total() {
-            other
-        } else {
-            self
-        }
+        if other.total() > self.total() { other } else { self }
     }
 }
 
@@ -271,11 +267,7 @@ impl<'a> MemoryModel<'a> {
 
     /// Peak memory for reading a frame.
     pub fn reading(&self, frame: &FrameSize) -> u64 {
-        if self.in_place {
-            self.held_file(frame)
-        } else {
-            self.decoding(frame)
-        }
+        if self.in_place { self.held_file(frame) } else { self.decoding(frame) }
     }
 
     /// Upper bounds of the memory of the arrows, trails and bonds of a frame: while they are made, and afterwards.
@@ -297,9 +289,9 @@ impl<'a> MemoryModel<'a> {
             let rods = frame.particles.saturating_mul(MAX_BONDS_EACH);
             [rods, frame.particles]
         });
-        let [rods, colors] = arrows.chain([trails, bonds]).fold(none, |sum, more| {
-            [0, 1].map(|i| sum[i].saturating_add(more[i]))
-        });
+        let [rods, colors] = arrows
+            .chain([trails, bonds])
+            .fold(none, |sum, more| [0, 1].map(|i| sum[i].saturating_add(more[i])));
         let [building, kept] = RodTree::predicted_bytes(rods, colors);
         SurfaceBytes { building, kept }
     }
@@ -343,11 +335,7 @@ impl<'a> MemoryModel<'a> {
     pub fn decoding(&self, frame: &FrameSize) -> u64 {
         let n = frame.particles;
         // Several files are read one after another, then combined.
-        let files = if frame.files > 1 {
-            frame.content.max(frame.raw)
-        } else {
-            frame.content
-        };
+        let files = if frame.files > 1 { frame.content.max(frame.raw) } else { frame.content };
         let attributes = frame.raw.saturating_sub(frame.positions);
         // Double precision is rounded to a copy, single precision is used as it is.
         let is_double = frame.positions >= 24 * n;
@@ -384,11 +372,7 @@ impl<'a> MemoryModel<'a> {
     /// Memory that the allocator retains after the buffers for reading a frame are freed: all of it, if there are
     /// only small allocations.
     fn retained(&self, frame: &FrameSize) -> u64 {
-        if frame.content.max(frame.positions) < RETURN_THRESHOLD {
-            self.reading(frame)
-        } else {
-            0
-        }
+        if frame.content.max(frame.positions) < RETURN_THRESHOLD { self.reading(frame) } else { 0 }
     }
 
     /// Memory of a frame between reading and the end of its build.
@@ -441,10 +425,7 @@ impl<'a> MemoryModel<'a> {
         }
         // Spray is searched in a separate tree, in the same memory.
         let first = self.plain_tree(frame.particles);
-        BuildBytes {
-            tree: build.tree.max(first.tree),
-            scratch: build.scratch.max(first.scratch),
-        }
+        BuildBytes { tree: build.tree.max(first.tree), scratch: build.scratch.max(first.scratch) }
     }
 
     /// The tree of a body.
@@ -500,20 +481,13 @@ impl<'a> MemoryModel<'a> {
             }
             SurfaceKind::Union if self.setup.has_motion() => {
                 let one = self.body_tree(n);
-                SurfaceBytes {
-                    building: slices * one.tree + one.scratch,
-                    kept: slices * one.tree,
-                }
+                SurfaceBytes { building: slices * one.tree + one.scratch, kept: slices * one.tree }
             }
-            SurfaceKind::Spheres | SurfaceKind::Union => SurfaceBytes {
-                building: moving,
-                kept: moving,
-            },
+            SurfaceKind::Spheres | SurfaceKind::Union => {
+                SurfaceBytes { building: moving, kept: moving }
+            }
         };
-        SurfaceBytes {
-            building: spray + body.building,
-            kept: spray + body.kept,
-        }
+        SurfaceBytes { building: spray + body.building, kept: spray + body.kept }
     }
 
     fn tree(&self, frame: &FrameSize) -> u64 {
@@ -540,20 +514,13 @@ impl<'a> MemoryModel<'a> {
         let shared = if frame.is_shared { frame.content } else { 0 };
         let scene = &self.setup.picture.scene;
         // A shadow catcher has a table of its own
-        let tables = 1 + u64::from(
-            scene
-                .ground
-                .as_ref()
-                .is_some_and(|g| g.shadow_catcher.is_some()),
-        );
+        let tables =
+            1 + u64::from(scene.ground.as_ref().is_some_and(|g| g.shadow_catcher.is_some()));
         let environment = scene.environment.as_deref();
         let environment = tables * environment.map_or(0, Environment::byte_len);
         let picture = scene.ground.as_ref().map_or(0, ground_image_bytes);
         // Count the threads, including those for reading
-        let has_read_pool = [Some(frame), after]
-            .into_iter()
-            .flatten()
-            .any(FrameSize::needs_many);
+        let has_read_pool = [Some(frame), after].into_iter().flatten().any(FrameSize::needs_many);
         let idle = MemoryNeed {
             program: PROGRAM
                 + environment
@@ -569,11 +536,8 @@ impl<'a> MemoryModel<'a> {
             + KEPT_PER_MESH_BYTE * frame.meshes * u64::from(self.setup.slices())
             + self.arrows(frame).kept;
         let names = mattes::predicted_bytes(self.setup, frame.particles);
-        let first_read = MemoryNeed {
-            reading: self.reading_with_meshes(frame),
-            surface: self.meshes,
-            ..idle
-        };
+        let first_read =
+            MemoryNeed { reading: self.reading_with_meshes(frame), surface: self.meshes, ..idle };
         let building = MemoryNeed {
             particles: kept,
             // The kept data are in the memory that the allocator retains.
@@ -586,9 +550,8 @@ impl<'a> MemoryModel<'a> {
         };
         let tracing = MemoryNeed {
             program: idle.program + floor_light_bytes(scene, render),
-            reading: after.map_or(idle.reading, |after| {
-                self.reading_with_meshes(after).max(idle.reading)
-            }),
+            reading: after
+                .map_or(idle.reading, |after| self.reading_with_meshes(after).max(idle.reading)),
             particles: self.shading(frame),
             // Spheres in motion have a tree of their own instead
             tree: match (self.setup.picture.surface.kind, self.setup.has_motion()) {
@@ -638,12 +601,7 @@ impl<'a> MemoryModel<'a> {
     /// Memory of the planes of an image.
     fn film(&self) -> u64 {
         let render = &self.setup.picture.render;
-        Film::bytes_for(
-            render.width,
-            render.height,
-            render.channels,
-            render.has_features,
-        )
+        Film::bytes_for(render.width, render.height, render.channels, render.has_features)
     }
 
     /// Memory of a thread during tracing.

@@ -51,10 +51,7 @@ fn more_of_anything_needs_more() {
     assert!(total(&[plain(4_000_000)]) < total(&[plain(8_000_000)]));
     assert!(total(&[plain(8_000_000)]) < total(&[plain(8_000_000); 2]));
     // Memory is constant over a sequence.
-    assert_eq!(
-        total(&[plain(8_000_000); 3]),
-        total(&[plain(8_000_000); 30])
-    );
+    assert_eq!(total(&[plain(8_000_000); 3]), total(&[plain(8_000_000); 30]));
     let mut larger = setup.clone();
     larger.picture.render.width *= 2;
     let more = MemoryModel::new(&larger).alone(&plain(1000)).images;
@@ -87,10 +84,7 @@ fn a_smooth_surface_has_a_grid_and_no_tree() {
 fn meshes_of_a_frame_are_counted() {
     let setup = setup();
     let model = MemoryModel::new(&setup);
-    let with = |meshes| FrameSize {
-        meshes,
-        ..plain(1000)
-    };
+    let with = |meshes| FrameSize { meshes, ..plain(1000) };
     let one = model.alone(&with(10_000_000));
     assert!(one.reading >= 160_000_000, "{one}");
     let two = model.peak(&[with(10_000_000); 2]);
@@ -170,10 +164,7 @@ fn arrows_trails_and_bonds_are_counted() {
     assert!(all.total() >= none.total() + each(2, 100), "{none}\n{all}");
     setup.picture.arrows[0].every = 100;
     let few = alone(&setup);
-    assert!(
-        few.total() < none.total() + each(2, 100) / 10,
-        "{none}\n{few}"
-    );
+    assert!(few.total() < none.total() + each(2, 100) / 10, "{none}\n{few}");
     // A rod for each frame, and another frame beside the one that is read
     setup.picture.arrows.clear();
     setup.picture.trails = Some(TrailStyle {
@@ -184,10 +175,7 @@ fn arrows_trails_and_bonds_are_counted() {
         material: MaterialId::PARTICLES,
     });
     let trails = alone(&setup);
-    assert!(
-        trails.total() >= none.total() + each(5, 100),
-        "{none}\n{trails}"
-    );
+    assert!(trails.total() >= none.total() + each(5, 100), "{none}\n{trails}");
     setup.picture.trails = None;
     setup.picture.bonds = Some(BondStyle {
         rule: BondRule::Distance(1.0),
@@ -196,10 +184,7 @@ fn arrows_trails_and_bonds_are_counted() {
         material: MaterialId::PARTICLES,
     });
     let bonds = alone(&setup);
-    assert!(
-        bonds.total() >= none.total() + each(MAX_BONDS_EACH, 100),
-        "{none}\n{bonds}"
-    );
+    assert!(bonds.total() >= none.total() + each(MAX_BONDS_EACH, 100), "{none}\n{bonds}");
 }
 
 #[test]
@@ -228,9 +213,6 @@ fn shared_meshes_are_built_before_the_first_frame() {
     setup.picture.meshes = vec![picture.clone(), picture];
     // The second one is built next to the first
     let building = MemoryModel::new(&setup).alone(&plain(10));
-    assert_eq!(
-        building.surface,
-        tree.bytes() as u64 + tree.building_bytes()
-    );
+    assert_eq!(building.surface, tree.bytes() as u64 + tree.building_bytes());
     assert!(tree.building_bytes() >= count * 300);
 }

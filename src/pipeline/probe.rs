@@ -222,12 +222,7 @@ impl Trial {
             }
             Err(error) => return Err(error.into()),
         };
-        Ok(Self {
-            setup,
-            film,
-            seconds,
-            is_interrupted,
-        })
+        Ok(Self { setup, film, seconds, is_interrupted })
     }
 
     /// Fraction of the pixels of the full image.
@@ -249,10 +244,7 @@ impl Trial {
         let pool = ThreadPoolBuilder::new().num_threads(1).build();
         let pool = pool?;
         let start = Instant::now();
-        let has_exr = matches!(
-            PictureFormat::of(&task.image),
-            Some(PictureFormat::Exr) | None
-        );
+        let has_exr = matches!(PictureFormat::of(&task.image), Some(PictureFormat::Exr) | None);
         let mut bytes = 0;
         if has_exr {
             let exr = pool.install(|| encode_exr(&self.film, &full.picture.exr));
@@ -339,13 +331,7 @@ mod tests {
         assert!(cut_off.is_lower_bound && cut_off.traced_part == 0.0);
         assert_eq!(cut_off.frames, 1);
         assert!(cut_off.particles > 0 && cut_off.trace > 0.0);
-        let whole = probe_for(
-            Duration::from_secs(3600),
-            &setup,
-            &sequence,
-            &task,
-            &[&task],
-        );
+        let whole = probe_for(Duration::from_secs(3600), &setup, &sequence, &task, &[&task]);
         assert!(whole.is_ok_and(|probe| !probe.is_lower_bound && probe.traced_part > 0.0));
     }
 
@@ -363,10 +349,7 @@ mod tests {
             traced_part: 0.1,
             is_lower_bound: false,
         };
-        let size = |raw| FrameSize {
-            raw,
-            ..FrameSize::default()
-        };
+        let size = |raw| FrameSize { raw, ..FrameSize::default() };
         let frames = [size(50), size(100), size(300)];
         let seconds = |overlap| probe.seconds_for(&frames, &size(100), overlap, 2);
         // Built in 0.5, 1 and 3 s, read in 1, 2 and 6 s, the last beyond the image's 5 s.

@@ -18,10 +18,8 @@ pub(super) fn expected_rays(image: &RenderSettings, scene: &Scene) -> f64 {
         return paths * rays_per_path(lights, 1, 1 + image.traced_bounces().min(MOST_BOUNCES));
     }
     let material = &scene.material;
-    let branches = [material.reflection, material.transmission]
-        .iter()
-        .filter(|weight| **weight > 0.0)
-        .count();
+    let branches =
+        [material.reflection, material.transmission].iter().filter(|weight| **weight > 0.0).count();
     paths * rays_per_path(scene.lights.len(), branches, image.max_depth)
 }
 

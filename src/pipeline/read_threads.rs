@@ -30,11 +30,7 @@ impl ReadThreads {
     /// If the system has no thread left, as [`std::thread::spawn`] does.
     pub(super) fn new() -> Self {
         let one = start(1).unwrap_or_else(|| panic!("the system has no thread left for reading"));
-        Self {
-            one,
-            many: OnceLock::new(),
-            tracing: rayon::current_num_threads(),
-        }
+        Self { one, many: OnceLock::new(), tracing: rayon::current_num_threads() }
     }
 
     /// Runs `work` on the current thread; tasks that it spawns run on the thread of the first stage, and have

@@ -49,9 +49,7 @@ pub(super) fn rods_of(
         return Vec::new();
     };
     let Some(cell) = cell else {
-        notes.push(format!(
-            "frame {frame}: no simulation cell in the file, so that none is drawn"
-        ));
+        notes.push(format!("frame {frame}: no simulation cell in the file, so that none is drawn"));
         return Vec::new();
     };
     vec![cell_edges(cell, style, origin)]
@@ -79,10 +77,7 @@ mod tests {
         let vectors = [[10.0, 0.0, 0.0], [3.0, 8.0, 0.0], [-1.0, 2.0, 6.0]];
         let origin = DVec3::new(1e6, -2e6, 3e6);
         let cell = SimulationCell::new(origin, vectors.map(DVec3::from_array), [true; 3]).unwrap();
-        let style = CellStyle {
-            radius: 0.05,
-            material: MaterialId::of_mesh(0).unwrap(),
-        };
+        let style = CellStyle { radius: 0.05, material: MaterialId::of_mesh(0).unwrap() };
         let rods = cell_edges(&cell, &style, origin);
         let surface = rods.surface();
         assert_eq!(surface.material(), style.material);
@@ -91,17 +86,9 @@ mod tests {
         let is_hit = |point: Vec3, from: Vec3| {
             let eye = point + from;
             let ray = Ray::new(eye, -from.normalize());
-            surface
-                .nearest(&ray)
-                .is_some_and(|hit| hit.t < from.length() + 0.1)
+            surface.nearest(&ray).is_some_and(|hit| hit.t < from.length() + 0.1)
         };
-        for point in [
-            0.3 * a,
-            b + 0.7 * a,
-            c + 0.5 * a + b,
-            a + 0.2 * c,
-            a + b + 0.9 * c,
-        ] {
+        for point in [0.3 * a, b + 0.7 * a, c + 0.5 * a + b, a + 0.2 * c, a + b + 0.9 * c] {
             assert!(is_hit(point, Vec3::new(0.1, -3.0, 2.0)), "{point}");
         }
         for point in [0.3 * a + 0.4 * b, 0.5 * (a + c), 0.3 * b + 0.6 * c] {

@@ -48,9 +48,7 @@ impl MemoryModel<'_> {
             }
         }
         // Overlap the others if that fits
-        let bound = limit
-            .map_or(u64::MAX, |limit| limit.0)
-            .min(free.unwrap_or(u64::MAX));
+        let bound = limit.map_or(u64::MAX, |limit| limit.0).min(free.unwrap_or(u64::MAX));
         let (overlap, need) = if self.bound(&fitting).total() <= bound {
             (Overlap::Stages, self.peak(&fitting))
         } else {
@@ -58,10 +56,6 @@ impl MemoryModel<'_> {
             let need = alone.fold(MemoryNeed::default(), MemoryNeed::larger);
             (Overlap::None, need)
         };
-        Schedule {
-            need,
-            overlap,
-            too_large,
-        }
+        Schedule { need, overlap, too_large }
     }
 }

@@ -357,10 +357,7 @@ impl Setup {
     fn exposure(&self, frame: i64, camera: &Camera) -> Option<Exposure> {
         let picture = &self.picture;
         let shutter = picture.shutter?;
-        #[expect(
-            clippy::cast_precision_loss,
-            reason = "frame numbers of neighbours differ little"
-        )]
+        #[expect(clippy::cast_precision_loss, reason = "frame numbers of neighbours differ little")]
         let numbers = shutter.step.numbers as f64;
         let at = |part: f64| {
             let view = picture.path.view_between(frame, part * numbers);
@@ -371,10 +368,7 @@ impl Setup {
                 None => moved,
             })
         };
-        Some(Exposure {
-            cameras: [at(shutter.open), at(shutter.close)],
-            slices: self.slices(),
-        })
+        Some(Exposure { cameras: [at(shutter.open), at(shutter.close)], slices: self.slices() })
     }
 
     /// Options for the PNG of an image from `camera`.
@@ -421,10 +415,8 @@ impl Setup {
 
     /// Whether native frames relative to [`Picture::origin`] are traced in place.
     pub fn traces_in_place(&self) -> bool {
-        let is_by_attribute = matches!(
-            self.picture.radius,
-            RadiusRule::Attribute { .. } | RadiusRule::Table { .. }
-        );
+        let is_by_attribute =
+            matches!(self.picture.radius, RadiusRule::Attribute { .. } | RadiusRule::Table { .. });
         self.needs_copy().is_none() && !is_by_attribute
     }
 
@@ -443,12 +435,7 @@ impl Setup {
                     .to_owned(),
             );
         }
-        let Picture {
-            arrows,
-            trails,
-            bonds,
-            ..
-        } = &self.picture;
+        let Picture { arrows, trails, bonds, .. } = &self.picture;
         if !arrows.is_empty() || trails.is_some() || bonds.is_some() {
             return Some(
                 "arrows, trails and bonds are made from a copy of them, 12 bytes per particle and more"
@@ -463,29 +450,18 @@ impl Setup {
         if self.focused_particle().is_some() {
             return Some("camera.focus searches for a particle in a copy of them".to_owned());
         }
-        if matches!(
-            &self.picture.color,
-            ColorRule::Attribute {
-                needs_geometry: true,
-                ..
-            }
-        ) || matches!(
-            &self.picture.opacity,
-            OpacityRule::Value {
-                needs_geometry: true,
-                ..
-            }
-        ) {
+        if matches!(&self.picture.color, ColorRule::Attribute { needs_geometry: true, .. })
+            || matches!(&self.picture.opacity, OpacityRule::Value { needs_geometry: true, .. })
+        {
             return Some(
                 "their colours or opacities are computed from a copy of them, 16 bytes per particle and more"
                     .to_owned(),
             );
         }
         let why = match self.picture.surface {
-            SurfaceSettings {
-                kind: SurfaceKind::Smooth,
-                ..
-            } => "a smooth surface sorts a copy of them, 12 bytes per particle and more",
+            SurfaceSettings { kind: SurfaceKind::Smooth, .. } => {
+                "a smooth surface sorts a copy of them, 12 bytes per particle and more"
+            }
             SurfaceSettings { spray: true, .. } => {
                 "spray is parted from them, for 12 bytes per particle and more"
             }
@@ -511,9 +487,7 @@ impl Setup {
 
     /// Whether particles move to their places in the next frame, which is read too.
     pub(super) fn moves_to_next_frame(&self) -> bool {
-        self.picture
-            .shutter
-            .is_some_and(|shutter| !shutter.has_velocities)
+        self.picture.shutter.is_some_and(|shutter| !shutter.has_velocities)
     }
 
     /// The id of the particle in focus.

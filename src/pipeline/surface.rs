@@ -35,10 +35,7 @@ use crate::surface::{
 };
 
 /// Input for a tree without spheres.
-const NOTHING: Spheres<'_> = Spheres {
-    centers: &[],
-    radius: SphereRadius::Common(1.0),
-};
+const NOTHING: Spheres<'_> = Spheres { centers: &[], radius: SphereRadius::Common(1.0) };
 
 /// Radii with a smaller relative difference count as equal.
 const RADIUS_TOLERANCE: f32 = 0.01;
@@ -216,11 +213,7 @@ impl SurfaceBuilder {
     /// Releases everything of the previous frame.
     pub(super) fn clear(&mut self) {
         self.spray.build(&NOTHING, &BuildSettings::default());
-        *self = Self {
-            spray: std::mem::take(&mut self.spray),
-            body: u32::MAX,
-            ..Self::default()
-        };
+        *self = Self { spray: std::mem::take(&mut self.spray), body: u32::MAX, ..Self::default() };
     }
 
     /// Moves the particles of the spray behind those of the body.
@@ -246,14 +239,8 @@ impl SurfaceBuilder {
         self.drops_per_particle = if is_soft { SOFT_DROPS } else { 1 };
         let drops = ids.map(|ids| soft_drops(&frame.centers, &frame.radius, body, ids));
         let built = match &drops {
-            Some((centers, radii)) => Spheres {
-                centers,
-                radius: SphereRadius::Each(radii),
-            },
-            None => Spheres {
-                centers: &frame.centers[body..],
-                radius: radius_of(&plain),
-            },
+            Some((centers, radii)) => Spheres { centers, radius: SphereRadius::Each(radii) },
+            None => Spheres { centers: &frame.centers[body..], radius: radius_of(&plain) },
         };
         let is_moving = !self.displacements.is_empty();
         let settings = BuildSettings {
@@ -285,10 +272,7 @@ impl SurfaceBuilder {
     ///
     /// # Errors
     /// Same as [`render_into`].
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "parts of a frame with different owners"
-    )]
+    #[expect(clippy::too_many_arguments, reason = "parts of a frame with different owners")]
     pub(super) fn draw(
         &self,
         setup: &Setup,
@@ -391,20 +375,14 @@ fn mesh_surfaces<'a>(
         let surface = |tree: &'a Arc<MeshTree>| MeshSurface::new(tree, faces, material);
         Some(match &slices[..] {
             [tree] => Box::new(surface(tree)) as Box<dyn Shape>,
-            _ => Box::new(SlicedSurface::new(
-                slices.iter().map(surface).collect(),
-                false,
-            )),
+            _ => Box::new(SlicedSurface::new(slices.iter().map(surface).collect(), false)),
         })
     })
 }
 
 /// The spheres of a frame as the input of a builder.
 pub(super) fn spheres<'a>(frame: &'a DecodedFrame<'_>) -> Spheres<'a> {
-    Spheres {
-        centers: &frame.centers,
-        radius: radius_of(&frame.radius),
-    }
+    Spheres { centers: &frame.centers, radius: radius_of(&frame.radius) }
 }
 
 fn radius_of(radius: &Radius) -> SphereRadius<'_> {
@@ -423,10 +401,7 @@ fn median_radius(radii: &[f32], notes: &mut Vec<String>) -> f32 {
     }
     let (_, median, _) = sorted.select_nth_unstable_by(middle, f32::total_cmp);
     let median = *median;
-    if radii
-        .iter()
-        .any(|radius| (radius - median).abs() > RADIUS_TOLERANCE * median)
-    {
+    if radii.iter().any(|radius| (radius - median).abs() > RADIUS_TOLERANCE * median) {
         notes.push(format!(
             "radii differ; a smooth surface has one for all, here their median {median} (input.radius sets another)"
         ));

@@ -72,14 +72,8 @@ fn drawn(setup: &Setup, sequence: &Sequence, tracer: &mut CpuRenderer) -> Drawn 
     let in_place = matches!(loaded.particles, LoadedParticles::Stored(_));
     let built = tracer.prepare(setup, loaded).expect("a tree");
     let report = built.report.clone();
-    let (film, _) = tracer
-        .image(setup, &built, &AtomicBool::new(false))
-        .expect("an image");
-    Drawn {
-        film,
-        report,
-        in_place,
-    }
+    let (film, _) = tracer.image(setup, &built, &AtomicBool::new(false)).expect("an image");
+    Drawn { film, report, in_place }
 }
 
 /// Every surface.
@@ -92,12 +86,7 @@ fn surfaces() -> Vec<SurfaceSettings> {
             (NormalKind::Field, false),
             (NormalKind::Auto, true),
         ] {
-            all.push(SurfaceSettings {
-                kind,
-                normals,
-                spray,
-                ..SurfaceSettings::DEFAULT
-            });
+            all.push(SurfaceSettings { kind, normals, spray, ..SurfaceSettings::DEFAULT });
         }
     }
     all
@@ -125,11 +114,7 @@ fn every_structure_draws_every_surface_alike() {
         films.push(alike[0].clone());
     }
     for (i, film) in films.iter().enumerate() {
-        assert!(
-            !films[..i].contains(film),
-            "{:?} changes nothing",
-            surfaces()[i]
-        );
+        assert!(!films[..i].contains(film), "{:?} changes nothing", surfaces()[i]);
     }
 }
 
@@ -185,11 +170,8 @@ fn compact_frames_in_place_have_every_surface() {
         dropped: 0,
         file_index: None,
     };
-    let settings = StoreSettings {
-        encoding: Some(Encoding::Q16),
-        bound: Bound::None,
-        rounding: 0.0,
-    };
+    let settings =
+        StoreSettings { encoding: Some(Encoding::Q16), bound: Bound::None, rounding: 0.0 };
     store(&file, &frame, None, &settings).expect("a frame");
     let (setup, sequence) = opened(&file);
     for surface in surfaces() {

@@ -50,9 +50,7 @@ impl FrameRenderer for CpuRenderer {
         let mut notes = Vec::new();
         let particles = match frame.particles {
             LoadedParticles::Decoded(mut decoded) => {
-                notes = self
-                    .surface
-                    .build(setup, &mut decoded, &mut self.builder, &mut report)?;
+                notes = self.surface.build(setup, &mut decoded, &mut self.builder, &mut report)?;
                 report.set_build(&self.build_copy(setup, &decoded));
                 self.surface.set_in_motion(&mut self.builder, &mut report);
                 report.bytes.attributes = decoded.shading.byte_len();
@@ -104,13 +102,7 @@ impl FrameRenderer for CpuRenderer {
         let rays = self.draw(setup, &frame, &mut film, stop)?;
         let memory = MemoryUse::now();
         let texts = matte_attributes(setup, &frame);
-        let BuiltFrame {
-            task,
-            facts,
-            time,
-            mut report,
-            ..
-        } = frame;
+        let BuiltFrame { task, facts, time, mut report, .. } = frame;
         report.seconds.trace = seconds(start.elapsed());
         report.seconds.denoise = denoise_film(setup, &mut film)?;
         report.rays = rays.into();
@@ -160,10 +152,7 @@ impl CpuRenderer {
             keep_indices: frame.needs_indices(setup),
         };
         let built = self.stored.build(&frame.leaves()?, settings);
-        built.map_err(|fault| TraceError::Stored {
-            path: frame.path().to_owned(),
-            fault,
-        })
+        built.map_err(|fault| TraceError::Stored { path: frame.path().to_owned(), fault })
     }
 
     fn draw(
@@ -213,13 +202,9 @@ fn matte_attributes(setup: &Setup, frame: &BuiltFrame) -> Vec<TextAttribute> {
 
 /// Denoises `film` if the setup says so. Returns the time, seconds.
 fn denoise_film(setup: &Setup, film: &mut Film) -> Result<f64, DenoiseError> {
-    let (Some(settings), Some(odd), Some(albedo), Some(normal), Some(depth)) = (
-        &setup.picture.denoise,
-        &film.odd,
-        &film.albedo,
-        &film.normal,
-        &film.depth,
-    ) else {
+    let (Some(settings), Some(odd), Some(albedo), Some(normal), Some(depth)) =
+        (&setup.picture.denoise, &film.odd, &film.albedo, &film.normal, &film.depth)
+    else {
         return Ok(0.0);
     };
     let start = Instant::now();
@@ -254,17 +239,13 @@ fn particle_shading<'a>(picture: &'a Picture, shading: &'a DecodedShading) -> Pa
         colors,
         opacities: match picture.opacity {
             OpacityRule::Constant(opacity) => Opacities::Constant(opacity),
-            OpacityRule::Value { range, .. } => Opacities::Mapped {
-                values: &shading.opacities,
-                range,
-            },
+            OpacityRule::Value { range, .. } => {
+                Opacities::Mapped { values: &shading.opacities, range }
+            }
         },
         ids: shading.ids.as_deref(),
         velocities: shading.velocities.as_deref(),
-        parts: shading
-            .parts
-            .as_ref()
-            .map(|(name, parts)| (name.as_str(), &parts[..])),
+        parts: shading.parts.as_ref().map(|(name, parts)| (name.as_str(), &parts[..])),
         attributes: &shading.attributes,
     }
 }

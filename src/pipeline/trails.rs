@@ -90,12 +90,8 @@ fn identities(frame: &SharedFrame<'_>) -> (bool, Vec<u32>) {
 /// A note if the frames of a trail are not equally far apart.
 fn gap_note(sequence: &Sequence, task: &ImageTask, frames: u32) -> Option<String> {
     let first = task.index.saturating_sub(frames as usize);
-    let numbers: Vec<i64> = sequence
-        .frames()
-        .get(first..=task.index)?
-        .iter()
-        .map(|f| f.number)
-        .collect();
+    let numbers: Vec<i64> =
+        sequence.frames().get(first..=task.index)?.iter().map(|f| f.number).collect();
     let step = |pair: &&[i64]| pair[1].saturating_sub(pair[0]);
     let usual = numbers.windows(2).map(|pair| step(&pair)).min()?;
     let gap = numbers.windows(2).find(|pair| step(pair) > usual)?;
@@ -118,15 +114,8 @@ struct Trails<'a> {
 impl<'a> Trails<'a> {
     fn new(style: &'a TrailStyle, frame: &SharedFrame<'_>) -> Self {
         let owners = every_nth(frame, style.every);
-        let ends = owners
-            .iter()
-            .map(|particle| Some((frame.positions[*particle], 0)));
-        Self {
-            style,
-            rods: Vec::new(),
-            ends: ends.collect(),
-            owners,
-        }
+        let ends = owners.iter().map(|particle| Some((frame.positions[*particle], 0)));
+        Self { style, rods: Vec::new(), ends: ends.collect(), owners }
     }
 
     /// Adds the points that `find` has for particles, `age` frames earlier. Trails of particles without one end. Jumps
@@ -145,9 +134,7 @@ impl<'a> Trails<'a> {
             let older = find(*owner);
             *end = older.map(|point| (point, age));
             let Some(older) = older else { continue };
-            let image = lattice
-                .as_ref()
-                .and_then(|lattice| lattice.image(newer - older));
+            let image = lattice.as_ref().and_then(|lattice| lattice.image(newer - older));
             if image.is_some() {
                 continue;
             }

@@ -78,10 +78,7 @@ impl FrameWork for RenderWork<'_> {
             tasks: self.tasks,
             threads: &threads,
             context,
-            next: ToTrace {
-                to_trace,
-                may_continue,
-            },
+            next: ToTrace { to_trace, may_continue },
         };
         let outcome = &mut read;
         let written = threads.scope(|first| {
@@ -106,10 +103,7 @@ impl FrameWork for RenderWork<'_> {
                 let stage = TraceStage {
                     setup: self.setup,
                     context,
-                    stop: DropFrame {
-                        has_failed: &has_failed,
-                        interrupt: context.interrupt(),
-                    },
+                    stop: DropFrame { has_failed: &has_failed, interrupt: context.interrupt() },
                 };
                 stage.run(loaded, spare, is_built, to_write);
                 join_result(writer.join())

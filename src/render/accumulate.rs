@@ -41,11 +41,7 @@ impl SampleGroup {
         let odd = (first + 1..first + samples).step_by(2);
         let radiance = |sample: usize| lane3(&self.radiance[sample / LANES], sample % LANES);
         let mean = odd.map(radiance).sum::<Vec3>() / (samples / 2).max(1) as f32;
-        if is_bounded {
-            mean.max(Vec3::ZERO)
-        } else {
-            mean
-        }
+        if is_bounded { mean.max(Vec3::ZERO) } else { mean }
     }
 }
 

@@ -56,11 +56,7 @@ mod tests {
 
     #[test]
     fn the_nearest_wins_and_the_first_of_equals() {
-        let at = |z, id| DataSample {
-            z,
-            id,
-            ..DataSample::MISS
-        };
+        let at = |z, id| DataSample { z, id, ..DataSample::MISS };
         let mut pixel = DataSample::MISS;
         for sample in [at(f32::INFINITY, 9), at(3.0, 1), at(2.0, 2), at(2.0, 3)] {
             pixel.keep_nearest(sample.z, || sample);

@@ -35,9 +35,7 @@ impl RenderContext<'_> {
         has_color: bool,
         packet: &mut PacketScratch,
     ) {
-        let PacketScratch {
-            hits, base, blend, ..
-        } = packet;
+        let PacketScratch { hits, base, blend, .. } = packet;
         // Look up the colours of particles
         let particles = hits.lanes_of(MaterialId::PARTICLES);
         if let Some(color) = self.color {
@@ -49,9 +47,11 @@ impl RenderContext<'_> {
         }
         // Look up the colours of all other surfaces
         let ground = hits.lanes_of(MaterialId::GROUND);
-        let sand = self.scene.ground.as_ref().map_or(0, |pattern| {
-            pattern.sand_colors(self.simd, &hits.point, ground, base)
-        });
+        let sand = self
+            .scene
+            .ground
+            .as_ref()
+            .map_or(0, |pattern| pattern.sand_colors(self.simd, &hits.point, ground, base));
         for lane in lanes_in(hits.mask & !(particles | sand)) {
             let ray = (&segments.rays, segments.bounces[lane]);
             let color = self.fixed_color(ray, hits, lane);
@@ -218,9 +218,7 @@ impl RenderContext<'_> {
             MaterialId::SPRAY => cryptomatte::SPRAY,
             MaterialId::GROUND => cryptomatte::GROUND,
             _ => {
-                return object(ObjectName::of_mesh(
-                    material.mesh_index().unwrap_or_default(),
-                ));
+                return object(ObjectName::of_mesh(material.mesh_index().unwrap_or_default()));
             }
         })
     }
@@ -239,10 +237,7 @@ impl RenderContext<'_> {
         let Some((next, time)) = &self.next_frame else {
             return [0.0; 2];
         };
-        let (from, to) = (
-            self.camera.pixel_of(point),
-            next.pixel_of(point + *time * velocity),
-        );
+        let (from, to) = (self.camera.pixel_of(point), next.pixel_of(point + *time * velocity));
         match (from, to) {
             (Some(from), Some(to)) => [to[0] - from[0], from[1] - to[1]],
             _ => [0.0; 2],
@@ -277,18 +272,10 @@ impl RenderContext<'_> {
         };
         DataSample {
             z,
-            normal: if direction.dot(normal) < 0.0 {
-                normal
-            } else {
-                -normal
-            },
+            normal: if direction.dot(normal) < 0.0 { normal } else { -normal },
             position: (self.scene.origin + point.as_dvec3()).as_vec3(),
             velocity,
-            albedo: if channels.albedo {
-                albedo(blend)
-            } else {
-                Vec3::ZERO
-            },
+            albedo: if channels.albedo { albedo(blend) } else { Vec3::ZERO },
             id: particle.map_or(NO_ID, |particle| self.source.id(particle)),
             particle,
             motion,

@@ -32,12 +32,7 @@ const CLEAR: Material = Material {
 const R: f32 = 0.04;
 
 fn scene(eye: DVec3, look_at: DVec3, material: Material) -> Scene {
-    let view = CameraView {
-        eye,
-        look_at,
-        up: DVec3::X,
-        fov: 20.0,
-    };
+    let view = CameraView { eye, look_at, up: DVec3::X, fov: 20.0 };
     Scene {
         material,
         background: Background::Constant(Vec3::ONE),
@@ -47,18 +42,11 @@ fn scene(eye: DVec3, look_at: DVec3, material: Material) -> Scene {
 
 /// Looks straight down from `height`.
 fn from_above(height: f64, material: Material) -> Scene {
-    scene(
-        DVec3::new(0.0, 0.0, height),
-        DVec3::new(0.0, 0.0, height - 1.0),
-        material,
-    )
+    scene(DVec3::new(0.0, 0.0, height), DVec3::new(0.0, 0.0, height - 1.0), material)
 }
 
 fn with_loss(color: Vec3, length: f32) -> Material {
-    Material {
-        extinction: extinction(color, length),
-        ..CLEAR
-    }
+    Material { extinction: extinction(color, length), ..CLEAR }
 }
 
 /// An infinite grey ground.
@@ -76,10 +64,7 @@ fn floor(height: f32) -> Ground {
 }
 
 fn depth(max_depth: u32) -> RenderSettings {
-    RenderSettings {
-        max_depth,
-        ..RenderSettings::new(1, 1)
-    }
+    RenderSettings { max_depth, ..RenderSettings::new(1, 1) }
 }
 
 /// The radiance at positions on the film; `split` is the weight from which both rays are traced.
@@ -133,9 +118,7 @@ fn assert_within(limit: f32, value: Vec3, expected: Vec3) {
 fn film(solid: &Solid, scene: &Scene, settings: &RenderSettings) -> Film {
     let source = ParticleShading::constant(Vec3::ONE);
     let never = AtomicBool::new(false);
-    render(&[solid], scene, &source, settings, &never)
-        .unwrap()
-        .0
+    render(&[solid], scene, &source, settings, &never).unwrap().0
 }
 
 #[test]
@@ -148,11 +131,7 @@ fn a_glass_ball_refracts_at_the_known_angles() {
         let eye = DVec3::new(0.0, offset, 10.0);
         let mut scene = scene(eye, eye - DVec3::Z, CLEAR);
         // Brightness encodes the angle from straight down: 1 there, 0 straight up.
-        scene.background = Background::Gradient {
-            bottom: Vec3::ONE,
-            top: Vec3::ZERO,
-            up: Vec3::Z,
-        };
+        scene.background = Background::Gradient { bottom: Vec3::ONE, top: Vec3::ZERO, up: Vec3::Z };
         let (a, b) = (offset.asin(), (offset / 1.5).asin());
         let sky = |turned: f64| {
             let turned = turned.rem_euclid(2.0 * PI);
@@ -173,17 +152,10 @@ fn energy_is_never_created() {
     let solids = [Solid::ball(1.0), Solid::slab(-0.3, 0.8)];
     let eye = DVec3::new(0.4, -6.0, 3.0);
     for (samples, solid) in [1, 16].iter().flat_map(|s| solids.iter().map(|b| (*s, b))) {
-        let settings = RenderSettings {
-            samples,
-            max_depth: 8,
-            ..RenderSettings::new(24, 24)
-        };
+        let settings = RenderSettings { samples, max_depth: 8, ..RenderSettings::new(24, 24) };
         let furnace = scene(eye, DVec3::ZERO, CLEAR);
         for pixel in film(solid, &furnace, &settings).color {
-            assert!(
-                pixel[..3].iter().all(|c| (c - 1.0).abs() < 2e-6),
-                "{pixel:?}"
-            );
+            assert!(pixel[..3].iter().all(|c| (c - 1.0).abs() < 2e-6), "{pixel:?}");
         }
         let dim = scene(eye, DVec3::ZERO, with_loss(Vec3::new(0.5, 1.0, 0.0), 1.0));
         let film = film(solid, &dim, &settings);
@@ -203,10 +175,7 @@ fn energy_is_never_created() {
 fn slab_absorbs_along_the_path_through_it() {
     let solid = Solid::slab(-2.0, 0.0);
     // Without refraction, at normal incidence and at 60 degrees, the paths inside have lengths 2 and 4.
-    let tinted = Material {
-        ior: 1.0,
-        ..with_loss(Vec3::new(0.5, 0.25, 1.0), 2.0)
-    };
+    let tinted = Material { ior: 1.0, ..with_loss(Vec3::new(0.5, 0.25, 1.0), 2.0) };
     let down = middle(&solid, &from_above(5.0, tinted), 8);
     assert_within(1e-5, down, Vec3::new(0.5, 0.25, 1.0));
     let eye = DVec3::new(0.0, -3.0_f64.sqrt(), 1.0);
@@ -232,9 +201,8 @@ fn roulette_and_splitting_have_the_same_mean() {
         up: Vec3::Z,
     };
     let solid = Solid::ball(1.0);
-    let films: Vec<Vec2> = (0..4096)
-        .map(|i| Vec2::new((i % 64) as f32, (i / 64) as f32) / 64.0)
-        .collect();
+    let films: Vec<Vec2> =
+        (0..4096).map(|i| Vec2::new((i % 64) as f32, (i / 64) as f32) / 64.0).collect();
     let colors = |split: f32| {
         let (colors, counts) = radiance_at(&films, split, &[&solid], &scene, &depth(8));
         let red: Vec<f32> = colors.into_iter().map(|color| color.x).collect();
@@ -243,11 +211,7 @@ fn roulette_and_splitting_have_the_same_mean() {
     let (all, all_rays) = colors(0.0);
     let (drawn, drawn_rays) = colors(1.0);
     assert!(3 * drawn_rays < all_rays, "{drawn_rays} {all_rays}");
-    let errors: Vec<f64> = all
-        .iter()
-        .zip(&drawn)
-        .map(|(a, b)| f64::from(b - a))
-        .collect();
+    let errors: Vec<f64> = all.iter().zip(&drawn).map(|(a, b)| f64::from(b - a)).collect();
     let count = errors.len() as f64;
     let mean = errors.iter().sum::<f64>() / count;
     let variance = errors.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / count;
@@ -262,10 +226,7 @@ fn more_samples_use_roulette_earlier() {
     let source = ParticleShading::constant(Vec3::ONE);
     let solid = Solid::ball(1.0);
     let split = |samples| {
-        let settings = RenderSettings {
-            samples,
-            ..depth(8)
-        };
+        let settings = RenderSettings { samples, ..depth(8) };
         let shapes: Vec<&dyn Shape> = vec![&solid];
         let integrator =
             WhittedIntegrator::new(RenderContext::new(shapes, &scene, &source, &settings));
@@ -317,11 +278,7 @@ fn ground_is_refracted_through_a_slab() {
             ..floor(0.0)
         });
         let value = middle(&solid, &scene, 8).x;
-        assert_eq!(
-            (value - light).abs() < 1e-5,
-            is_light,
-            "{tile}: {value} {light}"
-        );
+        assert_eq!((value - light).abs() < 1e-5, is_light, "{tile}: {value} {light}");
         assert!(value > 0.0);
     }
 }
@@ -346,13 +303,7 @@ fn shadows_are_attenuated_by_interfaces_and_absorption() {
     let half = with_loss(Vec3::splat(0.5), 2.0);
     assert!((under_a_slab(half, Vec::new()) - 0.5 * crossed).abs() < 1e-6);
     // A wet ground, seen through a body that extends below it: one crossing.
-    let mut scene = from_above(
-        5.0,
-        Material {
-            reflection: 0.0,
-            ..half
-        },
-    );
+    let mut scene = from_above(5.0, Material { reflection: 0.0, ..half });
     scene.ground = Some(floor(0.0));
     scene.ambient_light = Vec3::ZERO;
     scene.lights = vec![Light::directional(Vec3::NEG_Z, Vec3::ONE).unwrap()];
@@ -363,19 +314,13 @@ fn shadows_are_attenuated_by_interfaces_and_absorption() {
 
 #[test]
 fn spray_is_white_and_stops_light() {
-    let ball = |z: f32| Ball {
-        center: Vec3::new(0.0, 0.0, z),
-        radius: 0.5,
-    };
+    let ball = |z: f32| Ball { center: Vec3::new(0.0, 0.0, z), radius: 0.5 };
     for height in [3.0, 10.0] {
         assert_eq!(under_a_slab(CLEAR, vec![ball(height)]), 0.0);
     }
     // In a slab, straight under its surface and under the light.
     let (solid, drops) = (Solid::slab(-5.0, 1.0), Drops(Balls(vec![ball(0.0)])));
-    let half = Material {
-        reflection: 0.0,
-        ..with_loss(Vec3::splat(0.5), 0.5)
-    };
+    let half = Material { reflection: 0.0, ..with_loss(Vec3::splat(0.5), 0.5) };
     let mut scene = from_above(5.0, half);
     scene.lights = vec![Light::directional(Vec3::NEG_Z, Vec3::ONE).unwrap()];
     let lit = ground::AMBIENT + ground::DIFFUSE * 0.5 * (1.0 - R);
@@ -386,43 +331,25 @@ fn spray_is_white_and_stops_light() {
 
 #[test]
 fn an_opaque_body_is_shaded_as_a_sphere() {
-    let opaque = Material {
-        transmission: 0.0,
-        ..Material::DEFAULT
-    };
+    let opaque = Material { transmission: 0.0, ..Material::DEFAULT };
     let mut scene = scene(DVec3::new(0.4, -6.0, 3.0), DVec3::ZERO, opaque);
     scene.lights = vec![Light::directional(Vec3::new(1.0, 0.5, -1.0), Vec3::ONE).unwrap()];
     scene.ground = Some(floor(-1.5));
-    let settings = RenderSettings {
-        samples: 4,
-        ..RenderSettings::new(32, 32)
-    };
+    let settings = RenderSettings { samples: 4, ..RenderSettings::new(32, 32) };
     let source = ParticleShading::constant(Vec3::new(0.2, 0.4, 0.8));
     let never = AtomicBool::new(false);
-    let body = render(&[&Solid::ball(1.0)], &scene, &source, &settings, &never)
-        .unwrap()
-        .0;
+    let body = render(&[&Solid::ball(1.0)], &scene, &source, &settings, &never).unwrap().0;
     let ball = Balls::one(Vec3::ZERO, 1.0);
-    let sphere = render(&[&ball], &scene, &source, &settings, &never)
-        .unwrap()
-        .0;
-    for (body, sphere) in body
-        .color
-        .iter()
-        .flatten()
-        .zip(sphere.color.iter().flatten())
-    {
+    let sphere = render(&[&ball], &scene, &source, &settings, &never).unwrap().0;
+    for (body, sphere) in body.color.iter().flatten().zip(sphere.color.iter().flatten()) {
         assert!((body - sphere).abs() < 1e-3, "{body} {sphere}");
     }
 }
 
 #[test]
 fn the_same_bytes_on_any_number_of_threads() {
-    let mut scene = scene(
-        DVec3::new(0.4, -6.0, 3.0),
-        DVec3::ZERO,
-        with_loss(Vec3::splat(0.6), 1.0),
-    );
+    let mut scene =
+        scene(DVec3::new(0.4, -6.0, 3.0), DVec3::ZERO, with_loss(Vec3::splat(0.6), 1.0));
     scene.material.specular = 0.5;
     scene.background = Background::default_for(Vec3::Z);
     scene.ground = Some(floor(-0.8));
@@ -435,9 +362,7 @@ fn the_same_bytes_on_any_number_of_threads() {
     };
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
-        pool.build()
-            .unwrap()
-            .install(|| film(&Solid::ball(1.0), &scene, &settings))
+        pool.build().unwrap().install(|| film(&Solid::ball(1.0), &scene, &settings))
     };
     let one = on(1);
     assert!(one.color.iter().flatten().all(|v| v.is_finite()));

@@ -44,12 +44,7 @@ fn glass_scene() -> Scene {
     };
     Scene {
         ambient_light: Vec3::splat(AMBIENT),
-        material: Material {
-            ambient: 1.0,
-            ior: 1.5,
-            transmission: 1.0,
-            ..Material::DEFAULT
-        },
+        material: Material { ambient: 1.0, ior: 1.5, transmission: 1.0, ..Material::DEFAULT },
         background: Background::Gradient {
             bottom: Vec3::ZERO,
             top: Vec3::ONE,
@@ -61,14 +56,7 @@ fn glass_scene() -> Scene {
 
 fn trace(surface: &dyn Shape, scene: &Scene, settings: &RenderSettings) -> (Film, RayCounts) {
     let source = ParticleShading::constant(Vec3::ONE);
-    render(
-        &[surface],
-        scene,
-        &source,
-        settings,
-        &AtomicBool::new(false),
-    )
-    .unwrap()
+    render(&[surface], scene, &source, settings, &AtomicBool::new(false)).unwrap()
 }
 
 /// Equation 4.1 with ambient light only, and always both branches.
@@ -97,19 +85,13 @@ fn equation_4_1(surface: &Balls, scene: &Scene, ray: &Ray, levels: u32) -> Vec3 
 fn min_weight_0_is_equation_4_1() {
     let balls = Balls(heap(40));
     let scene = glass_scene();
-    let settings = RenderSettings {
-        max_depth: 6,
-        min_weight: 0.0,
-        ..RenderSettings::new(12, 12)
-    };
+    let settings = RenderSettings { max_depth: 6, min_weight: 0.0, ..RenderSettings::new(12, 12) };
     let (film, _) = trace(&balls, &scene, &settings);
     for (pixel, color) in film.color.iter().enumerate() {
         let (x, y) = (pixel % 12, pixel / 12);
         let place = Vec2::new(x as f32 + 0.5, y as f32 + 0.5) / 12.0;
         let expected = equation_4_1(&balls, &scene, &scene.camera.ray(place), 6);
-        let error = (Vec3::from_slice(&color[..3]) - expected)
-            .abs()
-            .max_element();
+        let error = (Vec3::from_slice(&color[..3]) - expected).abs().max_element();
         assert!(error < 1e-5, "{pixel}: {color:?} {expected}");
     }
 }
@@ -125,12 +107,8 @@ fn one_random_branch_has_the_mean_of_both() {
     let surface = SphereSurface::new(builder.tree().view());
     let scene = glass_scene();
     let image = |min_weight: f32| {
-        let settings = RenderSettings {
-            max_depth: 6,
-            min_weight,
-            samples: 1024,
-            ..RenderSettings::new(4, 4)
-        };
+        let settings =
+            RenderSettings { max_depth: 6, min_weight, samples: 1024, ..RenderSettings::new(4, 4) };
         trace(&surface, &scene, &settings)
     };
     let (literal, all) = image(0.0);
@@ -162,10 +140,7 @@ fn the_deepest_recursion_has_a_bounded_number_of_rays() {
     let surface = SphereSurface::new(builder.tree().view());
     let scene = glass_scene();
     let rays = |max_depth: u32| {
-        let settings = RenderSettings {
-            max_depth,
-            ..RenderSettings::new(16, 16)
-        };
+        let settings = RenderSettings { max_depth, ..RenderSettings::new(16, 16) };
         let (_, counts) = trace(&surface, &scene, &settings);
         (counts.reflection + counts.refraction) as f64 / counts.primary as f64
     };
@@ -183,11 +158,8 @@ fn opaque_spheres_do_not_depend_on_the_weight() {
         scene.material.reflection = reflection;
         scene.material.transmission = transmission;
         let image = |min_weight: f32| {
-            let settings = RenderSettings {
-                max_depth: MAX_DEPTH,
-                min_weight,
-                ..RenderSettings::new(24, 24)
-            };
+            let settings =
+                RenderSettings { max_depth: MAX_DEPTH, min_weight, ..RenderSettings::new(24, 24) };
             trace(&balls, &scene, &settings)
         };
         assert!(image(0.0) == image(1.0), "{reflection} {transmission}");
@@ -199,19 +171,8 @@ fn unbounded_settings_are_rejected() {
     let balls = Balls(heap(2));
     let source = ParticleShading::constant(Vec3::ONE);
     let refused = |scene: &Scene, max_depth: u32, min_weight: f32| {
-        let settings = RenderSettings {
-            max_depth,
-            min_weight,
-            ..RenderSettings::new(2, 2)
-        };
-        render(
-            &[&balls],
-            scene,
-            &source,
-            &settings,
-            &AtomicBool::new(false),
-        )
-        .err()
+        let settings = RenderSettings { max_depth, min_weight, ..RenderSettings::new(2, 2) };
+        render(&[&balls], scene, &source, &settings, &AtomicBool::new(false)).err()
     };
     let mut scene = glass_scene();
     assert_eq!(refused(&scene, MAX_LITERAL_DEPTH, 0.0), None);
@@ -229,16 +190,11 @@ fn radiance_does_not_depend_on_packet_neighbours() {
     let balls = Balls(heap(60));
     let solid = Solid::ball(1.0);
     let shapes: [&dyn Shape; 2] = [&balls, &solid];
-    let films: Vec<Vec2> = (0..400)
-        .map(|i| Vec2::new((i % 20) as f32, (i / 20) as f32) / 20.0)
-        .collect();
+    let films: Vec<Vec2> =
+        (0..400).map(|i| Vec2::new((i % 20) as f32, (i / 20) as f32) / 20.0).collect();
     let scene = glass_scene();
     let source = ParticleShading::constant(Vec3::ONE);
-    let settings = RenderSettings {
-        max_depth: 7,
-        min_weight: 0.01,
-        ..RenderSettings::new(20, 20)
-    };
+    let settings = RenderSettings { max_depth: 7, min_weight: 0.01, ..RenderSettings::new(20, 20) };
     for shape in shapes {
         let of = |films: &[Vec2], segments: usize| {
             let mut integrator =

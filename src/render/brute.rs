@@ -26,10 +26,7 @@ impl Balls {
     /// All intersections of `ray` with spheres in its range.
     fn all<'a>(&'a self, ray: &'a Ray) -> impl Iterator<Item = Intersection> + 'a {
         self.0.iter().zip(0_u32..).flat_map(move |(ball, index)| {
-            ball.roots(ray)
-                .into_iter()
-                .flatten()
-                .filter_map(move |t| ball.hit(ray, t, index))
+            ball.roots(ray).into_iter().flatten().filter_map(move |t| ball.hit(ray, t, index))
         })
     }
 }
@@ -71,8 +68,7 @@ impl Ball {
 
 impl Shape for Balls {
     fn crossing(&self, ray: &Ray, _side: Side) -> Option<Intersection> {
-        self.all(ray)
-            .reduce(|best, hit| if hit.t < best.t { hit } else { best })
+        self.all(ray).reduce(|best, hit| if hit.t < best.t { hit } else { best })
     }
 
     fn transmittance(

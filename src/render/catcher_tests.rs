@@ -84,23 +84,15 @@ fn nothing() -> Balls {
 
 #[test]
 fn where_nothing_is_in_the_way_the_background_is_exact() {
-    for background in [
-        Background::Constant(Vec3::new(0.3, 0.6, 0.9)),
-        Background::Studio { up: Vec3::Z },
-    ] {
+    for background in
+        [Background::Constant(Vec3::new(0.3, 0.6, 0.9)), Background::Studio { up: Vec3::Z }]
+    {
         let mut open = scene(studio_light());
         open.background = background;
         open.lights = vec![sun(Vec3::ONE)];
-        let caught = image(
-            &nothing(),
-            &with_catcher(open.clone(), 1.0),
-            &settings(12, 5, 2),
-        );
+        let caught = image(&nothing(), &with_catcher(open.clone(), 1.0), &settings(12, 5, 2));
         open.ground = None;
-        assert_eq!(
-            caught.color,
-            image(&nothing(), &open, &settings(12, 5, 2)).color
-        );
+        assert_eq!(caught.color, image(&nothing(), &open, &settings(12, 5, 2)).color);
     }
     // Outside the shadow of a light without extent, and inside it
     for strength in [1.0, 0.25] {
@@ -109,12 +101,7 @@ fn where_nothing_is_in_the_way_the_background_is_exact() {
         let film = image(&ball(), &scene, &settings(32, 1, 0));
         let floor = film.color.iter().filter(|c| c[3] == 0.0);
         let (dark, bright): (Vec<&[f32; 4]>, Vec<&[f32; 4]>) = floor.partition(|c| c[0] < 1.0);
-        assert!(
-            dark.len() > 10 && bright.len() > 400,
-            "{} {}",
-            dark.len(),
-            bright.len()
-        );
+        assert!(dark.len() > 10 && bright.len() > 400, "{} {}", dark.len(), bright.len());
         assert!(bright.iter().all(|c| **c == [1.0, 1.0, 1.0, 0.0]));
         let shadow = |c: &[f32; 4]| (c[0] - (1.0 - strength)).abs() < 1e-6;
         assert!(dark.iter().all(|c| shadow(c)), "{strength}: {:?}", dark[0]);
@@ -146,10 +133,7 @@ fn shadows_are_those_of_a_rendered_floor() {
         }
         let [wanted, found] = sums.map(|sum| sum / f32::from(u16::try_from(count).unwrap()));
         assert!(count > 300 && wanted.x < 0.97, "{count} {wanted}");
-        assert!(
-            (wanted - found).abs().max_element() < 4e-3,
-            "{wanted} {found}"
-        );
+        assert!((wanted - found).abs().max_element() < 4e-3, "{wanted} {found}");
         assert!(worst < 0.12, "{worst}");
     }
 }
@@ -158,14 +142,8 @@ fn shadows_are_those_of_a_rendered_floor() {
 fn in_transparent_images_shadows_are_coverage() {
     let scene = with_catcher(scene(Environment::constant(Vec3::ONE)), 0.8);
     let opaque = settings(24, 64, 0);
-    let transparent = RenderSettings {
-        transparent_background: true,
-        ..opaque
-    };
-    let (behind, above) = (
-        image(&ball(), &scene, &opaque),
-        image(&ball(), &scene, &transparent),
-    );
+    let transparent = RenderSettings { transparent_background: true, ..opaque };
+    let (behind, above) = (image(&ball(), &scene, &opaque), image(&ball(), &scene, &transparent));
     let mut darkest = 0.0_f32;
     for (behind, above) in behind.color.iter().zip(&above.color) {
         assert!(above.iter().all(|v| *v >= 0.0) && above[3] <= 1.0);
@@ -207,15 +185,8 @@ fn a_light_with_an_extent_lights_a_floor() {
         up: DVec3::Z,
         fov: 0.5,
     };
-    let disc = LightKind::Disc {
-        center: Vec3::Z * 3.0,
-        normal: Vec3::NEG_Z,
-        radius: 1.5,
-    };
-    let sphere = LightKind::Sphere {
-        center: Vec3::Z * 3.0,
-        radius: 1.5,
-    };
+    let disc = LightKind::Disc { center: Vec3::Z * 3.0, normal: Vec3::NEG_Z, radius: 1.5 };
+    let sphere = LightKind::Sphere { center: Vec3::Z * 3.0, radius: 1.5 };
     let rectangle = LightKind::Rectangle {
         center: Vec3::Z * 3.0,
         axes: [Vec3::X, Vec3::NEG_Y, Vec3::NEG_Z],
@@ -227,11 +198,7 @@ fn a_light_with_an_extent_lights_a_floor() {
         let root = (height * height + side * side).sqrt();
         4.0 * (side / root) * (side / root).atan() / std::f32::consts::PI
     };
-    for (kind, wanted) in [
-        (disc, 2.25 / 11.25),
-        (sphere, 2.25 / 9.0),
-        (rectangle, corner),
-    ] {
+    for (kind, wanted) in [(disc, 2.25 / 11.25), (sphere, 2.25 / 9.0), (rectangle, corner)] {
         let mut scene = scene(Environment::constant(Vec3::ZERO));
         scene.camera = Camera::new(&view, 1.0, DVec3::ZERO).unwrap();
         scene.lights = vec![Light {
@@ -245,10 +212,7 @@ fn a_light_with_an_extent_lights_a_floor() {
             let film = image(&nothing(), &scene, &settings(4, 256, bounces));
             let mean = film.color.iter().map(|c| c[1]).sum::<f32>() / 16.0;
             let wanted = 0.5 * 4.0 * wanted;
-            assert!(
-                (mean / wanted - 1.0).abs() < 0.01,
-                "{kind:?} {bounces}: {mean} {wanted}"
-            );
+            assert!((mean / wanted - 1.0).abs() < 0.01, "{kind:?} {bounces}: {mean} {wanted}");
         }
     }
 }
@@ -259,10 +223,7 @@ fn the_camera_sees_visible_lights_only() {
         let mut scene = scene(Environment::constant(Vec3::ZERO));
         scene.ground = None;
         scene.lights = vec![Light {
-            kind: LightKind::Sphere {
-                center: Vec3::ZERO,
-                radius: 1.0,
-            },
+            kind: LightKind::Sphere { center: Vec3::ZERO, radius: 1.0 },
             radiance: Vec3::splat(5.0),
             casts_shadow: true,
             is_visible,
@@ -272,11 +233,7 @@ fn the_camera_sees_visible_lights_only() {
         assert_eq!(film.color[40], wanted);
         assert_eq!(film.color[0], [1.0, 1.0, 1.0, 0.0]);
         // A body in front of it hides it
-        let film = image(
-            &Balls::one(Vec3::new(0.0, -2.4, 2.0), 0.5),
-            &scene,
-            &settings(9, 1, 0),
-        );
+        let film = image(&Balls::one(Vec3::new(0.0, -2.4, 2.0), 0.5), &scene, &settings(9, 1, 0));
         assert!(film.color[40][0] < 4.0 && film.color[40][3] == 1.0);
     }
 }

@@ -32,12 +32,7 @@ fn matte(albedo: f32) -> MeshMaterial {
 
 /// Glass around a dark world, seen from `eye`.
 fn scene(eye: DVec3, look_at: DVec3, lights: Vec<Light>) -> Scene {
-    let view = CameraView {
-        eye,
-        look_at,
-        up: DVec3::Y,
-        fov: 28.0,
-    };
+    let view = CameraView { eye, look_at, up: DVec3::Y, fov: 28.0 };
     let mut scene = floor_from_above(Environment::constant(Vec3::ZERO), Vec3::ONE);
     scene.camera = Camera::new(&view, 1.0, DVec3::ZERO).unwrap();
     scene.material = GLASS;
@@ -63,43 +58,22 @@ fn mesh_floor(lights: Vec<Light>) -> (Scene, MeshTree) {
 }
 
 fn light(kind: LightKind, radiance: f32) -> Light {
-    Light {
-        kind,
-        radiance: Vec3::splat(radiance),
-        casts_shadow: true,
-        is_visible: false,
-        group: 0,
-    }
+    Light { kind, radiance: Vec3::splat(radiance), casts_shadow: true, is_visible: false, group: 0 }
 }
 
 fn sun(to_light: Vec3, half_angle: f64, irradiance: f32) -> Light {
     let to_light = to_light.normalize();
-    light(
-        LightKind::Sun {
-            to_light,
-            half_angle,
-        },
-        irradiance,
-    )
+    light(LightKind::Sun { to_light, half_angle }, irradiance)
 }
 
 fn square(center: Vec3, u: Vec3, v: Vec3) -> MeshTree {
-    let corners = vec![
-        center - u - v,
-        center + u - v,
-        center + u + v,
-        center - u + v,
-    ];
+    let corners = vec![center - u - v, center + u - v, center + u + v, center - u + v];
     let triangles = vec![[0, 1, 2], [0, 2, 3]];
     MeshTree::new(TriangleMesh::new(corners, triangles, MeshNormals::Flat).unwrap())
 }
 
 fn with_photons(photons: u32, samples: u32, bounces: u32) -> RenderSettings {
-    RenderSettings {
-        photons,
-        max_depth: 8,
-        ..settings(SIDE, samples, bounces)
-    }
+    RenderSettings { photons, max_depth: 8, ..settings(SIDE, samples, bounces) }
 }
 
 fn image(body: &dyn Shape, meshes: &[MeshTree], scene: &Scene, settings: &RenderSettings) -> Film {
@@ -151,10 +125,7 @@ fn compare(found: &Film, expected: &Film, distance: f32, tolerance: f32, what: &
             continue;
         }
         let limit = tolerance * (expected + 0.2 * brightest);
-        assert!(
-            (found - expected).abs() < limit,
-            "{what} {number}: {found} {expected}"
-        );
+        assert!((found - expected).abs() < limit, "{what} {number}: {found} {expected}");
     }
 }
 
@@ -183,15 +154,9 @@ fn a_slope_in_water_has_the_irradiance_of_refracted_light() {
         let expected = 0.5 * irradiance / (PI * GLASS.ior * GLASS.ior);
         let light: Vec<f32> = film.color.iter().map(|pixel| pixel[0]).collect();
         let mean = light.iter().sum::<f32>() / light.len() as f32;
-        assert!(
-            (mean / expected - 1.0).abs() < 0.03,
-            "{tilt} {sun_angle}: {mean} {expected}"
-        );
+        assert!((mean / expected - 1.0).abs() < 0.03, "{tilt} {sun_angle}: {mean} {expected}");
         let is_even = |value: &&f32| (*value / expected - 1.0).abs() < 0.35;
-        assert!(
-            light.iter().all(|value| is_even(&value)),
-            "{tilt} {sun_angle}"
-        );
+        assert!(light.iter().all(|value| is_even(&value)), "{tilt} {sun_angle}");
     }
 }
 
@@ -246,49 +211,18 @@ fn every_kind_of_light_makes_caustics() {
     let axes = [across, across.cross(to_light), -to_light];
     let side = 0.5 * radius * PI.sqrt();
     let kinds = [
-        (
-            "sphere",
-            LightKind::Sphere {
-                center: position,
-                radius,
-            },
-            radiance,
-        ),
-        (
-            "disc",
-            LightKind::Disc {
-                center: position,
-                normal: -to_light,
-                radius,
-            },
-            radiance,
-        ),
-        (
-            "rectangle",
-            LightKind::Rectangle {
-                center: position,
-                axes,
-                half: [side; 2],
-            },
-            radiance,
-        ),
+        ("sphere", LightKind::Sphere { center: position, radius }, radiance),
+        ("disc", LightKind::Disc { center: position, normal: -to_light, radius }, radiance),
+        ("rectangle", LightKind::Rectangle { center: position, axes, half: [side; 2] }, radiance),
         (
             "point",
-            LightKind::Point {
-                position,
-                falloff: Falloff::InverseSquare,
-            },
+            LightKind::Point { position, falloff: Falloff::InverseSquare },
             PI * distance * distance,
         ),
     ];
     let ball = Solid::ball_at(Vec3::new(0.0, 0.0, 1.6), 1.0);
     let settings = with_photons(1_500_000, 16, 0);
-    let expected = image(
-        &ball,
-        &[],
-        &floor(vec![sun(to_light, half_angle, PI)]),
-        &settings,
-    );
+    let expected = image(&ball, &[], &floor(vec![sun(to_light, half_angle, PI)]), &settings);
     for (name, kind, radiance) in kinds {
         let lights = vec![light(kind, radiance)];
         let found = image(&ball, &[], &floor(lights), &settings);
@@ -313,10 +247,7 @@ fn a_shadow_catcher_is_brighter_in_caustics() {
         unreachable!("a sun");
     };
     let mut scene = floor(lights());
-    scene.ground = scene.ground.map(|ground| Ground {
-        shadow_catcher: Some(1.0),
-        ..ground
-    });
+    scene.ground = scene.ground.map(|ground| Ground { shadow_catcher: Some(1.0), ..ground });
     scene.background = Background::Constant(Vec3::splat(to_light.z));
     let found = image(&ball, &[], &scene, &settings);
     // Beside the ball, the background is multiplied by the light of the floor over that without the ball
@@ -325,24 +256,13 @@ fn a_shadow_catcher_is_brighter_in_caustics() {
     for number in (0..64).filter(|number| is_beyond(0.95, *number)) {
         let (found, expected) = (found[number], expected[number]);
         brightest = brightest.max(found);
-        assert!(
-            (found - expected).abs() < 0.03 + 0.03 * expected,
-            "{number}: {found} {expected}"
-        );
+        assert!((found - expected).abs() < 0.03 + 0.03 * expected, "{number}: {found} {expected}");
     }
     assert!(brightest > 1.2 * to_light.z, "{brightest}: no caustic");
     // Light is no coverage
-    let settings = RenderSettings {
-        transparent_background: true,
-        ..settings
-    };
+    let settings = RenderSettings { transparent_background: true, ..settings };
     let film = image(&ball, &[], &scene, &settings);
-    assert!(
-        film.color
-            .iter()
-            .flatten()
-            .all(|v| (0.0..=1.001).contains(v))
-    );
+    assert!(film.color.iter().flatten().all(|v| (0.0..=1.001).contains(v)));
     assert!(film.color.iter().any(|pixel| pixel[3] > 0.5));
 }
 
@@ -356,17 +276,9 @@ fn a_glossy_mesh_reflects_caustics() {
     scene.meshes = vec![matte(1.0)];
     scene.meshes[0].finish = MeshFinish::Opaque(Finish::Plastic { roughness: 0.6 });
     let settings = with_photons(400_000, 64, 0);
-    let above = image(
-        &Solid::slab(5.0, 6.0),
-        std::slice::from_ref(&mesh),
-        &scene,
-        &settings,
-    );
+    let above = image(&Solid::slab(5.0, 6.0), std::slice::from_ref(&mesh), &scene, &settings);
     // The same without water, attenuated by both surfaces and reflections between them
-    scene.material = Material {
-        transmission: 0.0,
-        ..GLASS
-    };
+    scene.material = Material { transmission: 0.0, ..GLASS };
     let open = image(&Solid::slab(-21.0, -20.0), &[mesh], &scene, &settings);
     let mean = |film: &Film| film.color.iter().map(|pixel| pixel[0]).sum::<f32>() / 1024.0;
     let ratio = mean(&above) / mean(&open);
@@ -378,37 +290,25 @@ fn light_of_photons_is_the_same_on_any_number_of_threads_and_for_all_instruction
     let ball = Solid::ball_at(Vec3::new(0.3, 0.0, 1.6), 1.0);
     let lights = vec![
         sun(Vec3::new(0.3, 0.2, 1.0), 0.05, PI),
-        light(
-            LightKind::Sphere {
-                center: Vec3::new(3.0, 3.0, 5.0),
-                radius: 0.4,
-            },
-            20.0,
-        ),
+        light(LightKind::Sphere { center: Vec3::new(3.0, 3.0, 5.0), radius: 0.4 }, 20.0),
     ];
     let (mut scene, mesh) = mesh_floor(lights);
     scene.meshes[0].finish = MeshFinish::Opaque(Finish::Plastic { roughness: 0.3 });
-    let catcher = Ground {
-        shadow_catcher: Some(0.8),
-        height: -0.5,
-        ..floor(Vec::new()).ground.unwrap()
-    };
+    let catcher =
+        Ground { shadow_catcher: Some(0.8), height: -0.5, ..floor(Vec::new()).ground.unwrap() };
     scene.ground = Some(catcher);
     let settings = with_photons(40_000, 4, 3);
     let meshes = [mesh];
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
-        pool.build()
-            .unwrap()
-            .install(|| image(&ball, &meshes, &scene, &settings))
+        pool.build().unwrap().install(|| image(&ball, &meshes, &scene, &settings))
     };
     let film = on(1);
     assert!(film.color.iter().flatten().all(|v| v.is_finite()));
     assert_eq!(film, on(3));
     // Instruction sets
-    let films: Vec<Vec2> = (0..48_u8)
-        .map(|i| Vec2::new(f32::from(i % 7) / 7.0, f32::from(i) / 48.0))
-        .collect();
+    let films: Vec<Vec2> =
+        (0..48_u8).map(|i| Vec2::new(f32::from(i % 7) / 7.0, f32::from(i) / 48.0)).collect();
     let source = ParticleShading::constant(Vec3::ONE);
     let surfaces = surfaces(&meshes);
     let by = |level: SimdLevel| {

@@ -94,8 +94,7 @@ impl Interior {
 /// Whether `shape` is a pane in `scene`.
 fn is_pane(scene: &Scene, shape: &dyn Shape) -> bool {
     let mesh = shape.material().mesh_index();
-    mesh.and_then(|index| scene.meshes.get(index))
-        .is_some_and(MeshMaterial::is_pane)
+    mesh.and_then(|index| scene.meshes.get(index)).is_some_and(MeshMaterial::is_pane)
 }
 
 /// Whether `shape` is soft spray in pictures with these settings.
@@ -129,13 +128,9 @@ impl<'a> RenderContext<'a> {
         let eye = scene.camera.eye();
         let [width, height] = settings.eye_size(scene.camera.eyes());
         let contains_eye = |shape: &dyn Shape| shape.side_of(eye) == Side::Inside;
-        let part_colors = shapes
-            .iter()
-            .map(|shape| (shape.material(), shape.colors()));
+        let part_colors = shapes.iter().map(|shape| (shape.material(), shape.colors()));
         Self {
-            part_colors: part_colors
-                .filter(|(_, colors)| !colors.is_empty())
-                .collect(),
+            part_colors: part_colors.filter(|(_, colors)| !colors.is_empty()).collect(),
             is_camera_inside: interior == Interior::Body && particles.is_some_and(contains_eye),
             shapes,
             panes,
@@ -154,19 +149,14 @@ impl<'a> RenderContext<'a> {
             camera: CameraLanes::new(&scene.camera, width, height),
             next_frame: (scene.next_frame.as_ref())
                 .map(|next| (CameraLanes::new(&next.camera, width, height), next.time)),
-            exposure: (scene.exposure.as_ref()).map(|e| {
-                e.cameras
-                    .map(|camera| CameraLanes::new(&camera, width, height))
-            }),
+            exposure: (scene.exposure.as_ref())
+                .map(|e| e.cameras.map(|camera| CameraLanes::new(&camera, width, height))),
             background: BackgroundLanes::from(&scene.background),
             lights: scene.lights.iter().map(light_of).collect(),
             color: source.constant_color(),
             interior,
             boundary: Dielectric::new(&scene.material),
-            sample_width: (settings.samples as f32)
-                .sqrt()
-                .recip()
-                .max(MIN_SAMPLE_WIDTH),
+            sample_width: (settings.samples as f32).sqrt().recip().max(MIN_SAMPLE_WIDTH),
             sampler: FilmSampler::with_filter(settings.samples, settings.filter),
             max_segments: SEGMENTS,
         }
@@ -197,9 +187,7 @@ impl<'a> RenderContext<'a> {
     pub(super) fn material_of(&self, parts: &PartMaterials, particle: u32) -> MaterialId {
         let part = self.source.part(particle);
         let index = part.and_then(|(_, part)| parts.index_of(part));
-        index
-            .and_then(MaterialId::of_part)
-            .unwrap_or(MaterialId::PARTICLES)
+        index.and_then(MaterialId::of_part).unwrap_or(MaterialId::PARTICLES)
     }
 
     /// The particles, if they bound one connected body.

@@ -27,10 +27,7 @@ pub fn murmur_hash3(key: &[u8]) -> u32 {
     let mut hash = 0_u32;
     for word in words {
         hash ^= scramble(u32::from_le_bytes(*word));
-        hash = hash
-            .rotate_left(13)
-            .wrapping_mul(5)
-            .wrapping_add(0xe654_6b64);
+        hash = hash.rotate_left(13).wrapping_mul(5).wrapping_add(0xe654_6b64);
     }
     // Mix the bytes after them
     let mut last = [0; 4];

@@ -119,9 +119,10 @@ impl Channels {
                 "V" => channels.velocity = true,
                 "albedo" => channels.albedo = true,
                 "id" => channels.id = true,
-                _ => channels.layers.insert(name).ok_or_else(|| UnknownChannel {
-                    name: name.to_owned(),
-                })?,
+                _ => channels
+                    .layers
+                    .insert(name)
+                    .ok_or_else(|| UnknownChannel { name: name.to_owned() })?,
             }
         }
         Ok(channels)
@@ -218,13 +219,8 @@ impl Film {
     pub fn bytes_for(width: u32, height: u32, channels: Channels, has_features: bool) -> u64 {
         let channels = channels.with_features(has_features);
         let scalars = [channels.depth, channels.id];
-        let vectors = [
-            channels.normal,
-            channels.position,
-            channels.velocity,
-            channels.albedo,
-            has_features,
-        ];
+        let vectors =
+            [channels.normal, channels.position, channels.velocity, channels.albedo, has_features];
         let count = |is_present: &[bool]| is_present.iter().filter(|w| **w).count() as u64;
         let layers = 4 * channels.layers.floats() as u64;
         let pixel = 16 + 4 * count(&scalars) + 12 * count(&vectors) + layers;
@@ -455,10 +451,7 @@ mod tests {
         let mut film = Film::new(21, 35, Channels::ALL);
         let mut bands = film.bands_mut(16);
         let mut tiles: Vec<_> = bands.iter_mut().flat_map(|band| band.tiles(16)).collect();
-        let sizes: Vec<_> = tiles
-            .iter()
-            .map(|t| (t.left, t.top, t.width, t.rows))
-            .collect();
+        let sizes: Vec<_> = tiles.iter().map(|t| (t.left, t.top, t.width, t.rows)).collect();
         let is_present = [
             (0, 0, 16, 16),
             (16, 0, 5, 16),
@@ -474,14 +467,7 @@ mod tests {
                 let (column, row) = (pixel % width, pixel / width);
                 let id = u32::from(number);
                 tile.set_color(column, row, [f32::from(number); 4]);
-                tile.set_data(
-                    column,
-                    row,
-                    &DataSample {
-                        id,
-                        ..DataSample::MISS
-                    },
-                );
+                tile.set_data(column, row, &DataSample { id, ..DataSample::MISS });
             }
         }
         let of_tile = |x: usize, y: usize| 1.0 + (y / 16 * 2 + x / 16) as f32;

@@ -25,12 +25,7 @@ fn poisoned(width: u32, height: u32, channels: Channels) -> Film {
     if let Some(plane) = &mut film.layers {
         plane.fill(poison);
     }
-    let vectors = [
-        &mut film.normal,
-        &mut film.position,
-        &mut film.velocity,
-        &mut film.albedo,
-    ];
+    let vectors = [&mut film.normal, &mut film.position, &mut film.velocity, &mut film.albedo];
     for plane in vectors.into_iter().flatten() {
         plane.fill(Vec3::splat(poison));
     }
@@ -41,11 +36,7 @@ fn poisoned(width: u32, height: u32, channels: Channels) -> Film {
 fn bits(film: &Film) -> Vec<u32> {
     let vectors = [&film.normal, &film.position, &film.velocity, &film.albedo];
     let vectors = vectors.into_iter().flatten().flatten();
-    let floats = film
-        .color
-        .iter()
-        .flatten()
-        .chain(film.depth.iter().flatten());
+    let floats = film.color.iter().flatten().chain(film.depth.iter().flatten());
     let floats = floats.copied().chain(vectors.flat_map(|v| v.to_array()));
     let floats = floats.chain(film.layers.iter().flatten().copied());
     let floats = floats.map(f32::to_bits);
@@ -54,10 +45,7 @@ fn bits(film: &Film) -> Vec<u32> {
 
 /// A ball in the middle of nothing, or of a plane.
 fn scene(has_ground: bool) -> Scene {
-    let bounds = Bounds {
-        min: DVec3::NEG_ONE,
-        max: DVec3::ONE,
-    };
+    let bounds = Bounds { min: DVec3::NEG_ONE, max: DVec3::ONE };
     let view = Framed::corners(&bounds).view(&Framing::three_quarter(DVec3::Z, 1.5));
     Scene {
         lights: default_lights(&bounds, DVec3::Z, &view),
@@ -114,12 +102,8 @@ fn every_layer_is_written_whole() {
         for integrator in [IntegratorKind::Whitted, IntegratorKind::Path] {
             let mut channels = Channels::from_names(names.iter().copied()).unwrap();
             channels.layers.attributes = 2;
-            let settings = RenderSettings {
-                channels,
-                integrator,
-                samples: 3,
-                ..RenderSettings::new(19, 18)
-            };
+            let settings =
+                RenderSettings { channels, integrator, samples: 3, ..RenderSettings::new(19, 18) };
             check(&settings, &scene(true));
             check(&settings, &scene(false));
         }

@@ -21,19 +21,14 @@ fn coverage(filter: PixelFilter, samples: u32) -> Vec<f64> {
         background: Background::Constant(Vec3::ZERO),
         ..Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).unwrap())
     };
-    let settings = RenderSettings {
-        samples,
-        filter,
-        ..RenderSettings::new(SIDE, SIDE)
-    };
+    let settings = RenderSettings { samples, filter, ..RenderSettings::new(SIDE, SIDE) };
     let source = ParticleShading::constant(Vec3::ONE);
     let never = AtomicBool::new(false);
     let slab = Solid::slab(-100.0, 0.0);
     let film = render(&[&slab], &scene, &source, &settings, &never);
     let rows = film.unwrap().0.color;
     let rows = rows.chunks(SIDE as usize);
-    rows.map(|row| row.iter().map(|c| f64::from(c[3])).sum::<f64>() / f64::from(SIDE))
-        .collect()
+    rows.map(|row| row.iter().map(|c| f64::from(c[3])).sum::<f64>() / f64::from(SIDE)).collect()
 }
 
 /// The integral of the filter from its lower end to `to` pixels from its centre, relative to its whole integral.
@@ -77,20 +72,14 @@ fn an_edge_is_convolved_with_the_filter() {
         for (row, found) in found.iter().enumerate() {
             // The edge is between rows 7 and 8
             let expected = integral(filter, row as f64 + 0.5 - 8.0);
-            assert!(
-                (found - expected).abs() < 0.01,
-                "{filter:?} {row}: {found} {expected}"
-            );
+            assert!((found - expected).abs() < 0.01, "{filter:?} {row}: {found} {expected}");
         }
     }
 }
 
 #[test]
 fn a_single_sample_is_at_the_centre() {
-    let filter = PixelFilter {
-        kind: FilterKind::Gaussian,
-        width: 8.0,
-    };
+    let filter = PixelFilter { kind: FilterKind::Gaussian, width: 8.0 };
     let found = coverage(filter, 1);
     assert!(found[..8].iter().all(|c| *c == 0.0) && found[8..].iter().all(|c| *c == 1.0));
 }

@@ -43,10 +43,7 @@ fn dark() -> Environment {
 
 fn sun(half_angle: f64, irradiance: Vec3) -> Light {
     Light {
-        kind: LightKind::Sun {
-            to_light: Vec3::Z,
-            half_angle,
-        },
+        kind: LightKind::Sun { to_light: Vec3::Z, half_angle },
         radiance: irradiance,
         casts_shadow: true,
         is_visible: false,
@@ -55,11 +52,7 @@ fn sun(half_angle: f64, irradiance: Vec3) -> Light {
 }
 
 fn with_photons(photons: u32, samples: u32) -> RenderSettings {
-    RenderSettings {
-        photons,
-        max_depth: 8,
-        ..settings(32, samples, 0)
-    }
+    RenderSettings { photons, max_depth: 8, ..settings(32, samples, 0) }
 }
 
 /// Means of the red parts of squares of four by four pixels.
@@ -91,12 +84,7 @@ fn the_caustic_of_a_glass_ball_is_that_of_path_tracing() {
     let irradiance = environment.irradiance(Vec3::Z);
     let half_angle = std::f64::consts::PI * CAP_ROWS as f64 / 256.0;
     let ball = Solid::ball_at(Vec3::new(0.0, 0.0, 1.6), 1.0);
-    let expected = image(
-        &ball,
-        &floor(environment),
-        Vec3::ONE,
-        &with_photons(0, 1024),
-    );
+    let expected = image(&ball, &floor(environment), Vec3::ONE, &with_photons(0, 1024));
     let mut scene = floor(dark());
     scene.lights = vec![sun(half_angle, irradiance)];
     let found = image(&ball, &scene, Vec3::ONE, &with_photons(2_000_000, 64));
@@ -106,16 +94,10 @@ fn the_caustic_of_a_glass_ball_is_that_of_path_tracing() {
     let ratio = sum(&found) / sum(&expected);
     assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
     let brightest = expected.iter().fold(0.0_f32, |a, b| a.max(*b));
-    assert!(
-        brightest > 4.0 * irradiance.x / PI,
-        "{brightest}: no caustic"
-    );
+    assert!(brightest > 4.0 * irradiance.x / PI, "{brightest}: no caustic");
     for (number, (found, expected)) in found.iter().zip(&expected).enumerate() {
         let limit = 0.05 * expected + 0.01 * brightest;
-        assert!(
-            (found - expected).abs() < limit,
-            "{number}: {found} {expected}"
-        );
+        assert!((found - expected).abs() < limit, "{number}: {found} {expected}");
     }
 }
 
@@ -123,12 +105,7 @@ fn the_caustic_of_a_glass_ball_is_that_of_path_tracing() {
 fn light_below_a_slab_is_what_it_transmits() {
     let mut scene = floor(dark());
     scene.lights = vec![sun(0.01, Vec3::splat(PI))];
-    let film = image(
-        &Solid::slab(0.5, 0.7),
-        &scene,
-        Vec3::ONE,
-        &with_photons(400_000, 256),
-    );
+    let film = image(&Solid::slab(0.5, 0.7), &scene, Vec3::ONE, &with_photons(400_000, 256));
     // Of repeated reflections between both surfaces remains (1 - r) / (1 + r), and again from the floor to the camera
     let transmitted = 0.96 / 1.04_f32;
     let (mean, deviation) = statistics(&middle(&film));
@@ -141,12 +118,7 @@ fn light_below_a_slab_is_what_it_transmits() {
 fn a_floor_inside_a_slab_is_darker_by_the_square_of_the_index() {
     let mut scene = floor(dark());
     scene.lights = vec![sun(0.01, Vec3::splat(PI))];
-    let film = image(
-        &Solid::slab(-0.5, 0.7),
-        &scene,
-        Vec3::ONE,
-        &with_photons(400_000, 256),
-    );
+    let film = image(&Solid::slab(-0.5, 0.7), &scene, Vec3::ONE, &with_photons(400_000, 256));
     // The light enters the slab once and leaves it once, into a larger solid angle
     let expected = 0.96 * 0.96 / (GLASS.ior * GLASS.ior);
     let (mean, deviation) = statistics(&middle(&film));
@@ -157,21 +129,11 @@ fn a_floor_inside_a_slab_is_darker_by_the_square_of_the_index() {
 #[test]
 fn a_white_floor_below_glass_is_white() {
     let balls = Balls::one(Vec3::new(0.0, 0.0, 1.2), 1.0);
-    let settings = RenderSettings {
-        max_depth: 24,
-        bounces: 1000,
-        ..with_photons(1000, 16)
-    };
-    for shape in [
-        &balls as &dyn Shape,
-        &Solid::ball_at(Vec3::new(0.0, 0.0, 1.2), 1.0),
-    ] {
+    let settings = RenderSettings { max_depth: 24, bounces: 1000, ..with_photons(1000, 16) };
+    for shape in [&balls as &dyn Shape, &Solid::ball_at(Vec3::new(0.0, 0.0, 1.2), 1.0)] {
         let film = image(shape, &floor(white()), Vec3::ONE, &settings);
         let (mean, deviation) = statistics(&covered(&film));
-        assert!(
-            (mean - 1.0).abs() < 0.01 && deviation < 0.02,
-            "{mean} {deviation}"
-        );
+        assert!((mean - 1.0).abs() < 0.01 && deviation < 0.02, "{mean} {deviation}");
     }
 }
 
@@ -179,23 +141,13 @@ fn a_white_floor_below_glass_is_white() {
 fn without_particles_the_floor_is_lit_as_without_photons() {
     let axes = EnvironmentAxes::of_view(DVec3::Y, DVec3::Z, 0.0);
     let mut scene = floor(crate::scene::environment::studio(axes, Vec3::ONE));
-    scene.lights = vec![
-        sun(0.01, Vec3::ONE),
-        Light::directional(Vec3::NEG_Z, Vec3::splat(0.5)).unwrap(),
-    ];
+    scene.lights =
+        vec![sun(0.01, Vec3::ONE), Light::directional(Vec3::NEG_Z, Vec3::splat(0.5)).unwrap()];
     let wanted = (scene.environment.as_ref().unwrap().irradiance(Vec3::Z) + 1.5) / PI;
-    let film = image(
-        &Balls(Vec::new()),
-        &scene,
-        Vec3::ONE,
-        &with_photons(1000, 4),
-    );
+    let film = image(&Balls(Vec::new()), &scene, Vec3::ONE, &with_photons(1000, 4));
     for pixel in covered(&film) {
         // The paths of the environment are few, and vary
-        assert!(
-            (pixel / wanted - 1.0).abs().max_element() < 0.05,
-            "{pixel} {wanted}"
-        );
+        assert!((pixel / wanted - 1.0).abs().max_element() < 0.05, "{pixel} {wanted}");
     }
 }
 
@@ -203,10 +155,7 @@ fn without_particles_the_floor_is_lit_as_without_photons() {
 fn photons_are_the_same_on_any_number_of_threads_and_can_be_stopped() {
     let mut scene = floor(white());
     scene.lights = vec![sun(0.02, Vec3::ONE)];
-    scene.ground = scene.ground.map(|ground| Ground {
-        color: Vec3::new(0.3, 0.5, 0.2),
-        ..ground
-    });
+    scene.ground = scene.ground.map(|ground| Ground { color: Vec3::new(0.3, 0.5, 0.2), ..ground });
     let source = ParticleShading::constant(Vec3::ONE);
     let settings = with_photons(30_000, 4);
     let ball = Solid::ball_at(Vec3::new(0.3, 0.0, 1.2), 1.0);
@@ -222,15 +171,8 @@ fn photons_are_the_same_on_any_number_of_threads_and_can_be_stopped() {
     assert_eq!(stopped.unwrap_err(), RenderError::Interrupted);
     // Photons that meet nothing change nothing
     scene.environment = Some(Arc::new(dark()));
-    let light = |photons| {
-        image(
-            &Balls(Vec::new()),
-            &scene,
-            Vec3::ONE,
-            &with_photons(photons, 4),
-        )
-        .color
-    };
+    let light =
+        |photons| image(&Balls(Vec::new()), &scene, Vec3::ONE, &with_photons(photons, 4)).color;
     assert_eq!(light(10), light(20_000));
 }
 
@@ -242,10 +184,7 @@ fn around_water(environment: Environment, albedo: f32, strength: f32) -> Film {
     if let Some(ground) = &mut scene.ground {
         ground.color = Vec3::splat(albedo);
     }
-    scene.wet_ground = Some(WetGround {
-        strength,
-        margin: 0.4,
-    });
+    scene.wet_ground = Some(WetGround { strength, margin: 0.4 });
     let ball = Solid::ball_at(Vec3::ZERO, 1.0);
     image(&ball, &scene, Vec3::ONE, &with_photons(20_000, 16))
 }

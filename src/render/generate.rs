@@ -67,10 +67,7 @@ impl RenderContext<'_> {
             ],
         };
         let window = self.settings.data_window();
-        [
-            left.cast_signed() + window.left,
-            top.cast_signed() + window.top,
-        ]
+        [left.cast_signed() + window.left, top.cast_signed() + window.top]
     }
 
     /// Generates the camera rays of packet `number` of a group, and the seeds of their paths if `seeds` is set.

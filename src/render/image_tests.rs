@@ -31,18 +31,12 @@ fn heap(count: u32) -> Balls {
 }
 
 fn heap_scene(transmission: f32) -> Scene {
-    let bounds = Bounds {
-        min: DVec3::splat(-0.4),
-        max: DVec3::splat(4.4),
-    };
+    let bounds = Bounds { min: DVec3::splat(-0.4), max: DVec3::splat(4.4) };
     let framing = Framing::three_quarter(DVec3::Z, 1.5);
     let view = Framed::corners(&bounds).view(&framing);
     Scene {
         lights: default_lights(&bounds, DVec3::Z, &view),
-        material: Material {
-            transmission,
-            ..Material::DEFAULT
-        },
+        material: Material { transmission, ..Material::DEFAULT },
         background: Background::default_for(Vec3::Z),
         ground: Some(Ground::under(&bounds, Vec3::Z, DVec3::ZERO)),
         ..Scene::new(Camera::new(&view, 1.5, DVec3::ZERO).unwrap())
@@ -65,37 +59,21 @@ fn a_mosaic_has_tiles_of_the_whole_image() {
     let scene = heap_scene(0.8);
     let image = |settings: &RenderSettings| {
         let never = AtomicBool::new(false);
-        render(&[&heap], &scene, &source, settings, &never)
-            .unwrap()
-            .0
+        render(&[&heap], &scene, &source, settings, &never).unwrap().0
     };
     let whole = image(&settings());
     // Shares of 25 columns and of 50 rows; the last column of tiles is cut.
-    let mosaic = image(&RenderSettings {
-        width: 40,
-        height: 16,
-        mosaic_of: Some([75, 50]),
-        ..settings()
-    });
+    let mosaic =
+        image(&RenderSettings { width: 40, height: 16, mosaic_of: Some([75, 50]), ..settings() });
     for (x, y) in (0..16).flat_map(|y| (0..40).map(move |x| (x, y))) {
         let (left, top) = ([4, 29, 54][x / 16], 17);
         let (here, there) = (40 * y + x, 75 * (top + y) + left + x % 16);
         assert_eq!(mosaic.color[here], whole.color[there], "{x} {y}");
-        assert_eq!(
-            mosaic.id.as_ref().unwrap()[here],
-            whole.id.as_ref().unwrap()[there]
-        );
+        assert_eq!(mosaic.id.as_ref().unwrap()[here], whole.id.as_ref().unwrap()[there]);
     }
     // A mosaic of all tiles is the image itself.
-    let all = RenderSettings {
-        width: 64,
-        height: 48,
-        ..settings()
-    };
-    let mosaic = RenderSettings {
-        mosaic_of: Some([64, 48]),
-        ..all
-    };
+    let all = RenderSettings { width: 64, height: 48, ..settings() };
+    let mosaic = RenderSettings { mosaic_of: Some([64, 48]), ..all };
     assert!(image(&mosaic) == image(&all));
 }
 
@@ -111,11 +89,7 @@ fn a_part_of_the_image_has_the_pixels_of_the_whole() {
                 width,
                 height,
                 integrator,
-                window: Some(DataWindow {
-                    left,
-                    top,
-                    image: [75, 50],
-                }),
+                window: Some(DataWindow { left, top, image: [75, 50] }),
                 ..settings()
             };
             let rendered = render(&[&heap], &scene, &source, &settings, &never);
@@ -123,10 +97,7 @@ fn a_part_of_the_image_has_the_pixels_of_the_whole() {
         };
         // The whole, a part that no tile begins with, and the whole with margins
         let whole = image(0, 0, 75, 50);
-        let plain = RenderSettings {
-            integrator,
-            ..settings()
-        };
+        let plain = RenderSettings { integrator, ..settings() };
         let never = AtomicBool::new(false);
         let (film, _) = render(&[&heap], &scene, &source, &plain, &never).unwrap();
         assert!(film == whole);
@@ -175,10 +146,7 @@ fn reused_film_is_cleared() {
     let mut bare = heap_scene(0.0);
     bare.ground = None;
     for channels in [Channels::ALL, Channels::COLOR] {
-        let settings = RenderSettings {
-            channels,
-            ..settings()
-        };
+        let settings = RenderSettings { channels, ..settings() };
         // Rays with and without intersections.
         for (balls, scene) in [(heap(60), &scene), (Balls(Vec::new()), &bare)] {
             let into = |film: &mut Film| {
@@ -209,12 +177,7 @@ fn filled(width: u32, height: u32, channels: Channels) -> Film {
     film.color.fill([7.0; 4]);
     film.depth.iter_mut().flatten().for_each(|z| *z = 7.0);
     film.id.iter_mut().flatten().for_each(|id| *id = 7);
-    let vectors = [
-        &mut film.normal,
-        &mut film.position,
-        &mut film.velocity,
-        &mut film.albedo,
-    ];
+    let vectors = [&mut film.normal, &mut film.position, &mut film.velocity, &mut film.albedo];
     for plane in vectors.into_iter().flatten() {
         plane.fill(Vec3::splat(7.0));
     }
@@ -240,10 +203,7 @@ fn data_planes_hold_the_nearest_sample() {
         velocities: Some(&velocities),
         ..ParticleShading::constant(Vec3::new(0.1, 0.2, 0.3))
     };
-    let settings = RenderSettings {
-        channels: Channels::ALL,
-        ..RenderSettings::new(33, 33)
-    };
+    let settings = RenderSettings { channels: Channels::ALL, ..RenderSettings::new(33, 33) };
     let ball = Balls::one(Vec3::ZERO, 1.0);
     let never = AtomicBool::new(false);
     let (film, _) = render(&[&ball], &scene, &source, &settings, &never).unwrap();
@@ -277,14 +237,7 @@ fn row_zero_is_the_top() {
     let never = AtomicBool::new(false);
     // Above and to the right of the centre.
     let ball = Balls::one(Vec3::new(1.0, 0.0, 1.0), 0.3);
-    let (film, _) = render(
-        &[&ball],
-        &scene,
-        &source,
-        &RenderSettings::new(8, 8),
-        &never,
-    )
-    .unwrap();
+    let (film, _) = render(&[&ball], &scene, &source, &RenderSettings::new(8, 8), &never).unwrap();
     let covered = |x: usize, y: usize| film.color[y * 8 + x][3] == 1.0;
     assert!(covered(6, 1) && !covered(6, 6) && !covered(1, 1));
 }
@@ -294,19 +247,13 @@ fn transparent_background_is_left_out() {
     let mut scene = heap_scene(0.0);
     let source = ParticleShading::constant(Vec3::ONE);
     let never = AtomicBool::new(false);
-    let settings = RenderSettings {
-        transparent_background: true,
-        ..settings()
-    };
+    let settings = RenderSettings { transparent_background: true, ..settings() };
     let nothing = Balls(Vec::new());
     scene.ground = None;
     let (film, counts) = render(&[&nothing], &scene, &source, &settings, &never).unwrap();
     assert!(film.color.iter().all(|c| *c == [0.0; 4]));
     assert_eq!(counts.total(), counts.primary);
-    let opaque = RenderSettings {
-        transparent_background: false,
-        ..settings
-    };
+    let opaque = RenderSettings { transparent_background: false, ..settings };
     let (film, _) = render(&[&nothing], &scene, &source, &opaque, &never).unwrap();
     assert!(film.color.iter().all(|c| c[0] > 0.0 && c[3] == 0.0));
 }
@@ -323,14 +270,8 @@ fn interruption_and_bad_settings_are_errors() {
     for bad in [
         RenderSettings::new(0, 5),
         RenderSettings::new(5, MAX_SIDE + 1),
-        RenderSettings {
-            samples: 0,
-            ..settings()
-        },
-        RenderSettings {
-            max_depth: MAX_DEPTH + 1,
-            ..settings()
-        },
+        RenderSettings { samples: 0, ..settings() },
+        RenderSettings { max_depth: MAX_DEPTH + 1, ..settings() },
     ] {
         let result = render(&[&nothing], &scene, &source, &bad, &never);
         assert!(matches!(result, Err(RenderError::OutOfRange { .. })));
@@ -371,18 +312,12 @@ fn packets_make_the_same_film_as_single_rays() {
     let never = AtomicBool::new(false);
     let mut builder = TreeBuilder::new();
     for radius in [SphereRadius::Common(0.05), SphereRadius::Each(&radii)] {
-        let spheres = Spheres {
-            centers: &centers,
-            radius,
-        };
+        let spheres = Spheres { centers: &centers, radius };
         builder.build(&spheres, &BuildSettings::default());
         let surface = SphereSurface::new(builder.tree().view());
         for (samples, transmission) in [(1, 0.0), (5, 0.0), (16, 0.0), (2, 0.8)] {
             let scene = heap_scene(transmission);
-            let settings = RenderSettings {
-                samples,
-                ..settings()
-            };
+            let settings = RenderSettings { samples, ..settings() };
             let packets = render(&[&surface], &scene, &source, &settings, &never).unwrap();
             let single = OneByOne(surface);
             let singles = render(&[&single], &scene, &source, &settings, &never).unwrap();

@@ -63,10 +63,7 @@ pub(super) trait Integrator: Sync {
         let samples = context.settings.samples;
         // Render the pixels in groups of samples that fit into the cache
         let group_len = (GROUP / samples).max(1) as usize;
-        let slices = context
-            .scene
-            .exposure
-            .map_or(1, |exposure| exposure.slices.max(1));
+        let slices = context.scene.exposure.map_or(1, |exposure| exposure.slices.max(1));
         scratch.current.set_slices(slices);
         scratch.next.set_slices(slices);
         scratch.packet.counts = RayCounts::default();

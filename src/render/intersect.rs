@@ -95,12 +95,7 @@ impl RenderContext<'_> {
             0 => 1.0,
             _ => 1.0 - hits.opacity[lane],
         });
-        scale(
-            self.simd,
-            &packet.throughput,
-            &background_part,
-            &mut packet.weight,
-        );
+        scale(self.simd, &packet.throughput, &background_part, &mut packet.weight);
         let (rays, weight) = (&segments.rays, &packet.weight);
         let is_backdrop = depth == 1
             && matches!(self.scene.background, Background::Studio { .. })

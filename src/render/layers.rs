@@ -125,10 +125,8 @@ impl Mattes {
     pub const MAX_LEVELS: u8 = 32;
 
     /// No layers.
-    pub const NONE: Self = Self {
-        kinds: [false; MatteKind::ALL.len()],
-        levels: Self::DEFAULT_LEVELS,
-    };
+    pub const NONE: Self =
+        Self { kinds: [false; MatteKind::ALL.len()], levels: Self::DEFAULT_LEVELS };
 
     /// Sets the number of levels, rounded up to an even number.
     pub fn set_levels(&mut self, levels: u32) {

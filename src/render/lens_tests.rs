@@ -25,10 +25,7 @@ fn scene(lens: Option<Lens>) -> Scene {
         up: DVec3::Z,
         fov: 2.0 * f64::from(TANGENT).atan().to_degrees(),
     };
-    let pinhole = Lens {
-        radius: 0.0,
-        focus: 1.0,
-    };
+    let pinhole = Lens { radius: 0.0, focus: 1.0 };
     let camera = Camera::new(&view, 1.0, DVec3::ZERO).unwrap();
     Scene {
         material: Material {
@@ -44,11 +41,8 @@ fn scene(lens: Option<Lens>) -> Scene {
 }
 
 fn film(shape: &dyn Shape, lens: Option<Lens>, change: impl Fn(&mut RenderSettings)) -> Film {
-    let mut settings = RenderSettings {
-        samples: 256,
-        channels: Channels::ALL,
-        ..RenderSettings::new(SIDE, SIDE)
-    };
+    let mut settings =
+        RenderSettings { samples: 256, channels: Channels::ALL, ..RenderSettings::new(SIDE, SIDE) };
     change(&mut settings);
     let source = ParticleShading::constant(Vec3::ONE);
     let never = AtomicBool::new(false);
@@ -85,11 +79,9 @@ fn moments(film: &Film) -> [f32; 3] {
 #[test]
 fn a_ball_out_of_focus_covers_its_disc_of_confusion() {
     // Near and far of the focus. The disc has the diameter a |z - f| / z on the plane in focus.
-    for (focus, distance, radius) in [
-        (5.0_f32, 8.0_f32, 0.5_f32),
-        (5.0, 3.0, 0.25),
-        (2.0, 4.0, 0.2),
-    ] {
+    for (focus, distance, radius) in
+        [(5.0_f32, 8.0_f32, 0.5_f32), (5.0, 3.0, 0.25), (2.0, 4.0, 0.2)]
+    {
         let pixels = |length: f32, z: f32| 0.5 * SIDE as f32 * length / (z * TANGENT);
         let blur = pixels(radius * (distance - focus).abs() / distance, focus);
         let sharp = pixels(RADIUS, distance);
@@ -102,10 +94,7 @@ fn a_ball_out_of_focus_covers_its_disc_of_confusion() {
             assert!((sum / area - 1.0).abs() < 0.03, "{sum} {area}");
             // The squared radii of discs add up in a convolution; a pixel adds 1/6
             let expected = 0.5 * (blur * blur + sharp * sharp) + 1.0 / 6.0;
-            assert!(
-                (square / expected - 1.0).abs() < 0.02,
-                "{square} {expected}"
-            );
+            assert!((square / expected - 1.0).abs() < 0.02, "{square} {expected}");
             let edge = blur + sharp;
             assert!(reach > edge - 1.5 && reach < edge + 1.5, "{reach} {edge}");
             // The disc has the same brightness everywhere
@@ -122,19 +111,10 @@ fn a_ball_out_of_focus_covers_its_disc_of_confusion() {
 #[test]
 fn what_is_in_focus_stays_sharp() {
     let balls = Balls(vec![
-        Ball {
-            center: Vec3::new(-0.5, 4.0, 0.3),
-            radius: 0.2,
-        },
-        Ball {
-            center: Vec3::new(0.4, 4.0, -0.2),
-            radius: 0.1,
-        },
+        Ball { center: Vec3::new(-0.5, 4.0, 0.3), radius: 0.2 },
+        Ball { center: Vec3::new(0.4, 4.0, -0.2), radius: 0.1 },
     ]);
-    let lens = Lens {
-        radius: 0.2,
-        focus: 4.0,
-    };
+    let lens = Lens { radius: 0.2, focus: 4.0 };
     let (sharp, blurred) = (film(&balls, None, |_| {}), film(&balls, Some(lens), |_| {}));
     for (index, (a, b)) in sharp.color.iter().zip(&blurred.color).enumerate() {
         // Only the outline is seen from different points
@@ -154,10 +134,7 @@ fn what_is_in_focus_stays_sharp() {
 
 #[test]
 fn depth_is_measured_along_the_view_axis() {
-    let lens = Lens {
-        radius: 0.5,
-        focus: 5.0,
-    };
+    let lens = Lens { radius: 0.5, focus: 5.0 };
     let film = film(&ball(8.0), Some(lens), |_| {});
     let mut count = 0;
     for (z, color) in film.depth.as_ref().unwrap().iter().zip(&film.color) {
@@ -176,33 +153,16 @@ fn a_tree_gives_the_same_blur_as_single_spheres() {
         let across = 2.0 * Vec2::new(unit(3 * i + 1), unit(7 * i + 5)) - 1.0;
         Vec3::new(across.x, 3.0 + 4.0 * unit(11 * i + 3), across.y)
     };
-    let balls = (0..90).map(|i| Ball {
-        center: center(i),
-        radius: 0.125,
-    });
+    let balls = (0..90).map(|i| Ball { center: center(i), radius: 0.125 });
     let balls = Balls(balls.collect());
     let centers: Vec<Vec3> = balls.0.iter().map(|ball| ball.center).collect();
-    let spheres = Spheres {
-        centers: &centers,
-        radius: SphereRadius::Common(0.125),
-    };
+    let spheres = Spheres { centers: &centers, radius: SphereRadius::Common(0.125) };
     let mut builder = TreeBuilder::new();
-    builder.build(
-        &spheres,
-        &BuildSettings {
-            keep_indices: true,
-            ..BuildSettings::default()
-        },
-    );
+    builder.build(&spheres, &BuildSettings { keep_indices: true, ..BuildSettings::default() });
     let tree = SphereSurface::new(builder.tree().view());
-    let lens = Lens {
-        radius: 0.3,
-        focus: 5.0,
-    };
-    let (one, other) = (
-        film(&balls, Some(lens), |s| s.samples = 5),
-        film(&tree, Some(lens), |s| s.samples = 5),
-    );
+    let lens = Lens { radius: 0.3, focus: 5.0 };
+    let (one, other) =
+        (film(&balls, Some(lens), |s| s.samples = 5), film(&tree, Some(lens), |s| s.samples = 5));
     let pixels = one.color.iter().zip(&other.color);
     let different = pixels.filter(|(a, b)| a[3] != b[3]).count();
     assert!(different < 8, "{different}");

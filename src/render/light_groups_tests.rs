@@ -16,19 +16,11 @@ const GROUPS: [u8; 4] = [1, 3, 1, 4];
 const COUNT: u8 = 5;
 
 fn lights() -> Vec<Light> {
-    let sun = |x: f32| LightKind::Sun {
-        to_light: Vec3::new(x, 0.3, 1.0).normalize(),
-        half_angle: 0.02,
-    };
+    let sun =
+        |x: f32| LightKind::Sun { to_light: Vec3::new(x, 0.3, 1.0).normalize(), half_angle: 0.02 };
     let kinds = [
-        LightKind::Point {
-            position: Vec3::new(2.0, 1.0, 5.0),
-            falloff: Falloff::InverseSquare,
-        },
-        LightKind::Sphere {
-            center: Vec3::new(0.6, 0.5, 2.5),
-            radius: 0.3,
-        },
+        LightKind::Point { position: Vec3::new(2.0, 1.0, 5.0), falloff: Falloff::InverseSquare },
+        LightKind::Sphere { center: Vec3::new(0.6, 0.5, 2.5), radius: 0.3 },
         sun(0.5),
         sun(-0.2),
     ];
@@ -62,10 +54,7 @@ fn lit(scene: &Scene, groups: &[u8]) -> Scene {
 
 fn grouped(settings: &RenderSettings) -> RenderSettings {
     let mut grouped = *settings;
-    grouped.channels.layers = Layers {
-        light_groups: COUNT,
-        ..Layers::NONE
-    };
+    grouped.channels.layers = Layers { light_groups: COUNT, ..Layers::NONE };
     grouped
 }
 
@@ -74,9 +63,7 @@ fn of_group(film: &Film, group: u8) -> Vec<Vec3> {
     let layers = film.channels.layers;
     let pixels = film.layers.as_ref().unwrap().chunks(layers.floats());
     let at = layers.light_group_at(usize::from(group));
-    pixels
-        .map(|floats| Vec3::from_slice(&floats[at.clone()]))
-        .collect()
+    pixels.map(|floats| Vec3::from_slice(&floats[at.clone()])).collect()
 }
 
 fn colors(film: &Film) -> Vec<Vec3> {
@@ -96,10 +83,7 @@ fn check_sum(shape: &dyn Shape, scene: &Scene, settings: &RenderSettings) -> Fil
         let sum: Vec3 = groups.iter().map(|group| group[pixel]).sum();
         let size: Vec3 = groups.iter().map(|group| group[pixel].abs()).sum();
         let difference = (sum - color).abs();
-        assert!(
-            difference.cmple(1e-5 * size + 1e-6).all(),
-            "{pixel}: {sum} of {color}"
-        );
+        assert!(difference.cmple(1e-5 * size + 1e-6).all(), "{pixel}: {sum} of {color}");
     }
     film
 }
@@ -120,10 +104,7 @@ fn check(shape: &dyn Shape, scene: &Scene, settings: &RenderSettings, empty: &[u
                 let sum = |light: &[Vec3]| light.iter().map(|l| l.element_sum()).sum::<f32>();
                 let (found, expected) = (sum(&found), sum(&expected));
                 let error = (found - expected).abs();
-                assert!(
-                    error <= 0.15 * expected,
-                    "group {group}: {found} {expected}"
-                );
+                assert!(error <= 0.15 * expected, "group {group}: {found} {expected}");
             }
         }
         let is_empty = found.iter().all(|light| *light == Vec3::ZERO);
@@ -144,18 +125,12 @@ fn opaque() -> Scene {
 
 #[test]
 fn a_group_is_the_image_of_its_lights_alone() {
-    let settings = RenderSettings {
-        max_depth: 4,
-        ..settings(20, 5, 4)
-    };
+    let settings = RenderSettings { max_depth: 4, ..settings(20, 5, 4) };
     check(&heap(), &opaque(), &settings, &[]);
     // The last segment of a path is a shadow ray, if no light has an extent
     let mut scene = opaque();
     scene.lights.truncate(1);
-    let direct = RenderSettings {
-        bounces: 0,
-        ..settings
-    };
+    let direct = RenderSettings { bounces: 0, ..settings };
     check(&heap(), &scene, &direct, &[3, 4]);
     // A visible environment is in its own group
     scene.is_environment_visible = true;
@@ -168,19 +143,12 @@ fn groups_are_known_behind_refraction_and_in_caustics() {
     scene.material = GLASS;
     let ball = Solid::ball_at(Vec3::new(0.0, 0.0, 0.8), 0.5);
     for photons in [0, 20_000] {
-        let settings = RenderSettings {
-            photons,
-            max_depth: 5,
-            ..settings(20, 4, 2)
-        };
+        let settings = RenderSettings { photons, max_depth: 5, ..settings(20, 4, 2) };
         check(&ball, &scene, &settings, &[]);
     }
     // All photons in one group
     scene.lights[3].group = 1;
-    let settings = RenderSettings {
-        photons: 20_000,
-        ..settings(20, 4, 2)
-    };
+    let settings = RenderSettings { photons: 20_000, ..settings(20, 4, 2) };
     check(&ball, &scene, &settings, &[4]);
 }
 
@@ -202,10 +170,7 @@ fn groups_of_the_whitted_integrator_are_images_of_their_lights() {
         group: 3,
         ..Light::directional(Vec3::new(0.2, 0.4, -1.0), Vec3::ONE).unwrap()
     });
-    let settings = RenderSettings {
-        integrator: IntegratorKind::Whitted,
-        ..settings(20, 4, 0)
-    };
+    let settings = RenderSettings { integrator: IntegratorKind::Whitted, ..settings(20, 4, 0) };
     check(&heap(), &scene, &settings, &[2, 4]);
     scene.material = GLASS;
     let ball = Solid::ball_at(Vec3::new(0.0, 0.0, 0.8), 0.5);
@@ -220,9 +185,6 @@ fn a_group_without_a_layer_is_refused() {
     let never = std::sync::atomic::AtomicBool::new(false);
     let draw = |settings: &RenderSettings| render(&[&heap()], &scene, &source, settings, &never);
     let error = draw(&grouped(&settings(4, 1, 0))).unwrap_err();
-    assert!(matches!(
-        error,
-        RenderError::LightGroup { group: 5, count: 5 }
-    ));
+    assert!(matches!(error, RenderError::LightGroup { group: 5, count: 5 }));
     assert!(draw(&settings(4, 1, 0)).is_ok());
 }

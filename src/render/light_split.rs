@@ -1,10 +1,7 @@
 //! Light of one packet by its first interaction: what camera rays see is divided into classes, and direct light into
 //! what arrives and what is in shadow.
 
-#![expect(
-    clippy::needless_range_loop,
-    reason = "one index for the lanes of many arrays"
-)]
+#![expect(clippy::needless_range_loop, reason = "one index for the lanes of many arrays")]
 
 use glam::Vec3;
 

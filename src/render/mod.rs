@@ -145,12 +145,8 @@ pub fn scratch_bytes(
 ) -> u64 {
     let max_paths = integrator::max_paths(settings, Interior::of(material, is_body));
     let max_depth = integrator::max_depth(settings);
-    scratch::scratch_bytes(
-        settings.samples,
-        max_depth,
-        max_paths,
-        &settings.channels.layers,
-    ) + stream::bytes_of_slices(slices)
+    scratch::scratch_bytes(settings.samples, max_depth, max_paths, &settings.channels.layers)
+        + stream::bytes_of_slices(slices)
 }
 
 /// Upper bound of the memory for the light of photons and on the ground around transmissive particles, in bytes.
@@ -199,13 +195,7 @@ pub fn render_into(
         settings.validate_branches(&scene.material)?;
     }
     // Prepare film, shapes and integrator
-    let RenderSettings {
-        width,
-        height,
-        channels,
-        has_features,
-        ..
-    } = *settings;
+    let RenderSettings { width, height, channels, has_features, .. } = *settings;
     film.fit(width, height, channels, has_features);
     let plane = scene.ground.as_ref().map(Plane::new);
     let floor = plane.iter().map(|plane| plane as &dyn Shape);

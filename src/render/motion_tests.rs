@@ -34,12 +34,7 @@ fn scene_from(x: f32) -> Scene {
     };
     Scene {
         background: Background::Constant(Vec3::ZERO),
-        material: Material {
-            ambient: 0.0,
-            specular: 0.0,
-            reflection: 0.0,
-            ..Material::DEFAULT
-        },
+        material: Material { ambient: 0.0, specular: 0.0, reflection: 0.0, ..Material::DEFAULT },
         ..Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).unwrap())
     }
 }
@@ -51,15 +46,9 @@ fn exposure(cameras: [Camera; 2], slices: u32) -> Option<Exposure> {
 
 /// Spheres in a static tree.
 fn tree(centers: &[Vec3], radii: &[f32]) -> TreeBuilder {
-    let spheres = Spheres {
-        centers,
-        radius: SphereRadius::Each(radii),
-    };
+    let spheres = Spheres { centers, radius: SphereRadius::Each(radii) };
     let mut builder = TreeBuilder::new();
-    let build = BuildSettings {
-        keep_indices: true,
-        ..BuildSettings::default()
-    };
+    let build = BuildSettings { keep_indices: true, ..BuildSettings::default() };
     builder.build(&spheres, &build);
     builder
 }
@@ -83,9 +72,7 @@ fn film(shape: &dyn Shape, scene: &Scene, integrator: IntegratorKind) -> Film {
     };
     let source = ParticleShading::constant(Vec3::ONE);
     let never = AtomicBool::new(false);
-    render(&[shape], scene, &source, &settings, &never)
-        .unwrap()
-        .0
+    render(&[shape], scene, &source, &settings, &never).unwrap().0
 }
 
 /// Coverage of the pixel in column `x` and row `y` by a disc of `radius` whose centre moves from `start` by `length`
@@ -147,11 +134,7 @@ fn a_moving_camera_blurs_what_is_still() {
     // The camera moves the other way
     let close = scene_from(-LENGTH * PIXEL).camera;
     scene.exposure = exposure([scene.camera, close], 1);
-    let film = film(
-        &SphereSurface::new(tree.tree().view()),
-        &scene,
-        IntegratorKind::Path,
-    );
+    let film = film(&SphereSurface::new(tree.tree().view()), &scene, IntegratorKind::Path);
     check_coverage(&film, RADIUS, START, LENGTH);
 }
 
@@ -159,15 +142,11 @@ fn a_moving_camera_blurs_what_is_still() {
 fn slices_are_seen_at_their_times() {
     // Two slices: a ball on the left, and one on the right
     let trees = [-2.0, 2.0].map(|x| tree(&[Vec3::new(x, 0.0, 0.0)], &[1.0]));
-    let surfaces = trees
-        .iter()
-        .map(|trees| SphereSurface::new(trees.tree().view()));
+    let surfaces = trees.iter().map(|trees| SphereSurface::new(trees.tree().view()));
     let sliced = SlicedSurface::new(surfaces.collect(), false);
     let mut scene = scene();
     scene.exposure = exposure([scene.camera; 2], 2);
-    scene
-        .lights
-        .push(Light::directional(Vec3::Y, Vec3::ONE).unwrap());
+    scene.lights.push(Light::directional(Vec3::Y, Vec3::ONE).unwrap());
     let film = film(&sliced, &scene, IntegratorKind::Whitted);
     let pixel = |x: u32| film.color[(16 * SIDE + x) as usize];
     for x in [8, 23] {
@@ -186,9 +165,7 @@ fn shadows_move_with_their_spheres() {
     let moving = moving(&centers, &[0.5, 0.4], Vec3::new(0.0, 0.0, 3.0));
     let mut scene = scene();
     scene.exposure = exposure([scene.camera; 2], 1);
-    scene
-        .lights
-        .push(Light::directional(Vec3::X, Vec3::ONE).unwrap());
+    scene.lights.push(Light::directional(Vec3::X, Vec3::ONE).unwrap());
     for integrator in [IntegratorKind::Whitted, IntegratorKind::Path] {
         let film = film(&MovingSpheres::new(&moving), &scene, integrator);
         let (mut left, mut right) = (0.0, 0.0);

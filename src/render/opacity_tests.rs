@@ -19,10 +19,7 @@ const SIDE: u32 = 16;
 
 /// Balls of radius 1 above each other, the highest first.
 fn tower(count: u16) -> Balls {
-    let ball = |i: u16| Ball {
-        center: 3.0 * f32::from(count - i) * Vec3::Z,
-        radius: 1.0,
-    };
+    let ball = |i: u16| Ball { center: 3.0 * f32::from(count - i) * Vec3::Z, radius: 1.0 };
     Balls((0..count).map(ball).collect())
 }
 
@@ -66,11 +63,8 @@ fn mean(film: &Film, component: usize) -> f32 {
 #[test]
 fn layers_cover_what_they_leave_of_each_other() {
     for integrator in [IntegratorKind::Path, IntegratorKind::Whitted] {
-        let settings = RenderSettings {
-            transparent_background: true,
-            integrator,
-            ..settings(SIDE, 64, 0)
-        };
+        let settings =
+            RenderSettings { transparent_background: true, integrator, ..settings(SIDE, 64, 0) };
         let coverage = |count: u16, source: &ParticleShading<'_>| {
             mean(&image(&tower(count), &scene(), source, &settings), 3)
         };
@@ -89,10 +83,7 @@ fn layers_cover_what_they_leave_of_each_other() {
             ([-2.0, -9.0, 3.0], 1.0),
         ] {
             let source = ParticleShading {
-                opacities: Opacities::Mapped {
-                    values: &values,
-                    range: [0.0, -4.0],
-                },
+                opacities: Opacities::Mapped { values: &values, range: [0.0, -4.0] },
                 ..ParticleShading::constant(Vec3::ONE)
             };
             let found = coverage(3, &source);
@@ -113,20 +104,10 @@ fn the_order_of_particles_does_not_matter() {
 
 #[test]
 fn white_layers_in_white_surroundings_are_white() {
-    let film = image(
-        &tower(1),
-        &scene(),
-        &translucent(0.4),
-        &settings(SIDE, 256, 0),
-    );
+    let film = image(&tower(1), &scene(), &translucent(0.4), &settings(SIDE, 256, 0));
     assert!((mean(&film, 0) - 1.0).abs() < 4e-3, "{}", mean(&film, 0));
     // Light that the balls keep from each other is missing, and none is added
-    let film = image(
-        &tower(4),
-        &scene(),
-        &translucent(0.4),
-        &settings(SIDE, 256, 4),
-    );
+    let film = image(&tower(4), &scene(), &translucent(0.4), &settings(SIDE, 256, 4));
     assert!((0.9..1.01).contains(&mean(&film, 0)), "{}", mean(&film, 0));
 }
 
@@ -147,36 +128,17 @@ fn floor() -> Scene {
 #[test]
 fn shadows_are_attenuated_by_all_layers() {
     for (count, opacity) in [(0, 0.3), (1, 0.3), (4, 0.3), (3, 1.0)] {
-        let film = image(
-            &tower(count),
-            &floor(),
-            &translucent(opacity),
-            &settings(SIDE, 1, 0),
-        );
+        let film = image(&tower(count), &floor(), &translucent(opacity), &settings(SIDE, 1, 0));
         let expected = (1.0 - opacity).powi(count.into());
         for pixel in &film.color {
-            assert!(
-                (pixel[0] - expected).abs() < 1e-3,
-                "{count}: {pixel:?} {expected}"
-            );
+            assert!((pixel[0] - expected).abs() < 1e-3, "{count}: {pixel:?} {expected}");
         }
     }
     // The ambient light of Whitted's model casts no shadows
-    let settings = RenderSettings {
-        integrator: IntegratorKind::Whitted,
-        ..settings(SIDE, 1, 0)
-    };
-    let of = |count| {
-        mean(
-            &image(&tower(count), &floor(), &translucent(0.5), &settings),
-            0,
-        )
-    };
+    let settings = RenderSettings { integrator: IntegratorKind::Whitted, ..settings(SIDE, 1, 0) };
+    let of = |count| mean(&image(&tower(count), &floor(), &translucent(0.5), &settings), 0);
     let (first, second) = (of(0) - of(1), of(1) - of(2));
-    assert!(
-        second > 0.01 && (first / second - 2.0).abs() < 1e-3,
-        "{first} {second}"
-    );
+    assert!(second > 0.01 && (first / second - 2.0).abs() < 1e-3, "{first} {second}");
 }
 
 #[test]
@@ -185,14 +147,11 @@ fn opacities_are_the_same_on_any_number_of_threads_and_for_all_instruction_sets(
     let balls = tower(5);
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
-        pool.build()
-            .unwrap()
-            .install(|| image(&balls, &scene, &source, &settings))
+        pool.build().unwrap().install(|| image(&balls, &scene, &source, &settings))
     };
     assert_eq!(on(1), on(3));
-    let films: Vec<Vec2> = (0..48_u8)
-        .map(|i| Vec2::new(f32::from(i % 7) / 7.0, f32::from(i) / 48.0))
-        .collect();
+    let films: Vec<Vec2> =
+        (0..48_u8).map(|i| Vec2::new(f32::from(i % 7) / 7.0, f32::from(i) / 48.0)).collect();
     let by = |level: SimdLevel| {
         let mut context = RenderContext::new(vec![&balls], &scene, &source, &settings);
         context.simd = Supported::or_best(level);

@@ -172,11 +172,7 @@ impl RenderContext<'_> {
         for lane in lanes_in(lanes) {
             let hit = packet.hits.get(lane);
             let direction = lane3(&segments.rays.direction, lane);
-            let side = if direction.dot(hit.normal) < 0.0 {
-                1.0
-            } else {
-                -1.0
-            };
+            let side = if direction.dot(hit.normal) < 0.0 { 1.0 } else { -1.0 };
             let geometric = side * hit.normal;
             let mirrored = |normal: Vec3| {
                 (direction - 2.0 * direction.dot(normal) * normal).normalize_or(geometric)
@@ -192,8 +188,7 @@ impl RenderContext<'_> {
             set_lane3(&mut rays.throughput, lane, lane3(&packet.throughput, lane));
         }
         let inside = segments.inside;
-        next.reflected
-            .push(lanes & !last, rays, segments, inside, REFLECTED);
+        next.reflected.push(lanes & !last, rays, segments, inside, REFLECTED);
     }
 }
 

@@ -15,11 +15,8 @@ use crate::scene::{
 use crate::surface::MaterialId;
 use crate::surface::mesh::{MeshNormals, MeshSurface, MeshTree, TriangleMesh, VisibleFaces};
 
-const CLEAR: MeshMaterial = MeshMaterial {
-    color: Vec3::ONE,
-    finish: MeshFinish::Pane,
-    is_holdout: false,
-};
+const CLEAR: MeshMaterial =
+    MeshMaterial { color: Vec3::ONE, finish: MeshFinish::Pane, is_holdout: false };
 
 const MATTE: MeshMaterial = MeshMaterial {
     color: Vec3::new(0.5, 0.25, 0.125),
@@ -45,12 +42,7 @@ fn scene(background: Vec3, environment: Vec3, meshes: &[MeshMaterial]) -> Scene 
 
 /// A square of side 2 around `center`, spanned by two unit vectors; its front is the side of `u` x `v`.
 fn square(center: Vec3, u: Vec3, v: Vec3) -> MeshTree {
-    let corners = vec![
-        center - u - v,
-        center + u - v,
-        center + u + v,
-        center - u + v,
-    ];
+    let corners = vec![center - u - v, center + u - v, center + u + v, center - u + v];
     let triangles = vec![[0, 1, 2], [0, 2, 3]];
     MeshTree::new(TriangleMesh::new(corners, triangles, MeshNormals::Flat).unwrap())
 }
@@ -67,12 +59,7 @@ fn closed_box() -> MeshTree {
         for side in [-1.0, 1.0] {
             let (center, first) = (side * u.cross(v), u32::try_from(vertices.len()).unwrap());
             let u = side * u;
-            let corners = [
-                center - u - v,
-                center + u - v,
-                center + u + v,
-                center - u + v,
-            ];
+            let corners = [center - u - v, center + u - v, center + u + v, center - u + v];
             vertices.extend(corners.map(|corner| 2.0 * corner));
             triangles.extend([[0, 1, 2], [0, 2, 3]].map(|t: [u32; 3]| t.map(|i| first + i)));
         }
@@ -127,10 +114,7 @@ fn near(found: [f32; 4], wanted: [f32; 4], tolerance: f32) {
 
 #[test]
 fn panes_attenuate_and_reflect() {
-    let tinted = MeshMaterial {
-        color: Vec3::new(1.0, 0.5, 0.25),
-        ..CLEAR
-    };
+    let tinted = MeshMaterial { color: Vec3::new(1.0, 0.5, 0.25), ..CLEAR };
     let (background, environment) = (Vec3::new(0.2, 0.4, 0.8), Vec3::splat(3.0));
     let scene = scene(background, environment, &[CLEAR, tinted]);
     let r = pane_reflectance(1.0);
@@ -146,18 +130,12 @@ fn panes_attenuate_and_reflect() {
     let walls = [&wall(0.0), &wall(1.0)];
     let film = image(&walls, &nothing(), 0.5, &scene, &settings(1024, 0));
     near(
-        mean(&film)[..3]
-            .try_into()
-            .map(|[a, b, c]: [f32; 3]| [a, b, c, 0.0])
-            .unwrap(),
+        mean(&film)[..3].try_into().map(|[a, b, c]: [f32; 3]| [a, b, c, 0.0]).unwrap(),
         [two[0], two[1], two[2], 0.0],
         0.02,
     );
     // Whitted: without reflections, and without noise
-    let whitted = RenderSettings {
-        integrator: IntegratorKind::Whitted,
-        ..settings(1, 0)
-    };
+    let whitted = RenderSettings { integrator: IntegratorKind::Whitted, ..settings(1, 0) };
     let film = image(&walls, &nothing(), 0.5, &scene, &whitted);
     let t = (1.0 - r) * (1.0 - r) * background * tinted.color;
     near(mean(&film), [t.x, t.y, t.z, 0.0], 1e-4);
@@ -192,9 +170,7 @@ fn data_are_of_what_is_behind_a_pane() {
 fn lit(meshes: &[MeshMaterial]) -> Scene {
     let mut scene = scene(Vec3::ONE, Vec3::ZERO, meshes);
     scene.lights = vec![Light {
-        kind: LightKind::Directional {
-            to_light: Vec3::new(0.6, -0.8, 0.0),
-        },
+        kind: LightKind::Directional { to_light: Vec3::new(0.6, -0.8, 0.0) },
         radiance: Vec3::ONE,
         casts_shadow: true,
         is_visible: false,
@@ -206,10 +182,7 @@ fn lit(meshes: &[MeshMaterial]) -> Scene {
 #[test]
 fn meshes_are_lit_and_panes_attenuate_shadow_rays() {
     for integrator in [IntegratorKind::Path, IntegratorKind::Whitted] {
-        let settings = RenderSettings {
-            integrator,
-            ..settings(1, 0)
-        };
+        let settings = RenderSettings { integrator, ..settings(1, 0) };
         let scene = lit(&[MATTE, CLEAR]);
         // The light falls at 36.9 degrees; Whitted adds ambient light
         let matte = match integrator {
@@ -220,12 +193,7 @@ fn meshes_are_lit_and_panes_attenuate_shadow_rays() {
         near(mean(&film), [matte.x, matte.y, matte.z, 1.0], 1e-4);
         assert!(film.id.unwrap().iter().all(|id| *id == NO_ID));
         assert!(film.depth.unwrap().iter().all(|z| (z - 12.0).abs() < 1e-4));
-        assert!(
-            film.normal
-                .unwrap()
-                .iter()
-                .all(|n| (*n - Vec3::NEG_Y).length() < 1e-6)
-        );
+        assert!(film.normal.unwrap().iter().all(|n| (*n - Vec3::NEG_Y).length() < 1e-6));
         // Beside the view: only the light passes it
         let beside = square(Vec3::new(1.5, 0.0, 0.0), Vec3::X, Vec3::Z);
         let film = image(&[&wall(2.0), &beside], &nothing(), 0.5, &scene, &settings);
@@ -245,15 +213,9 @@ fn meshes_are_lit_and_panes_attenuate_shadow_rays() {
 
 #[test]
 fn holdouts_are_holes_that_throw_shadows() {
-    let holdout = MeshMaterial {
-        is_holdout: true,
-        ..MATTE
-    };
+    let holdout = MeshMaterial { is_holdout: true, ..MATTE };
     for integrator in [IntegratorKind::Path, IntegratorKind::Whitted] {
-        let settings = RenderSettings {
-            integrator,
-            ..settings(4, 1)
-        };
+        let settings = RenderSettings { integrator, ..settings(4, 1) };
         // It hides the wall and the ball behind it, and the background
         let ball = Balls::one(Vec3::Y, 0.5);
         let scene = lit(&[MATTE, holdout]);

@@ -20,10 +20,7 @@ const CAP_ROWS: usize = 9;
 
 /// A ball of glass above an opaque one, which is white.
 fn balls() -> Balls {
-    let ball = |z: f32| Ball {
-        center: z * Vec3::Z,
-        radius: 0.6,
-    };
+    let ball = |z: f32| Ball { center: z * Vec3::Z, radius: 0.6 };
     Balls(vec![ball(1.3), ball(0.0)])
 }
 
@@ -35,11 +32,7 @@ fn scene(environment: Environment, lights: Vec<Light>) -> Scene {
         up: DVec3::Z,
         fov: 10.0,
     };
-    let part = PartMaterial {
-        parts: vec![1],
-        finish: Finish::Matte,
-        color: None,
-    };
+    let part = PartMaterial { parts: vec![1], finish: Finish::Matte, color: None };
     Scene {
         background: Background::Constant(Vec3::ZERO),
         environment: Some(Arc::new(environment)),
@@ -53,10 +46,7 @@ fn scene(environment: Environment, lights: Vec<Light>) -> Scene {
 
 fn sun(half_angle: f64, irradiance: f32) -> Light {
     Light {
-        kind: LightKind::Sun {
-            to_light: Vec3::Z,
-            half_angle,
-        },
+        kind: LightKind::Sun { to_light: Vec3::Z, half_angle },
         radiance: Vec3::splat(irradiance),
         casts_shadow: true,
         is_visible: false,
@@ -65,19 +55,11 @@ fn sun(half_angle: f64, irradiance: f32) -> Light {
 }
 
 fn image(scene: &Scene, photons: u32, samples: u32) -> Film {
-    let settings = RenderSettings {
-        photons,
-        max_depth: 8,
-        ..settings(32, samples, 0)
-    };
-    let source = ParticleShading {
-        parts: Some(("part", &[0, 1])),
-        ..ParticleShading::constant(Vec3::ONE)
-    };
+    let settings = RenderSettings { photons, max_depth: 8, ..settings(32, samples, 0) };
+    let source =
+        ParticleShading { parts: Some(("part", &[0, 1])), ..ParticleShading::constant(Vec3::ONE) };
     let never = AtomicBool::new(false);
-    render(&[&balls()], scene, &source, &settings, &never)
-        .unwrap()
-        .0
+    render(&[&balls()], scene, &source, &settings, &never).unwrap().0
 }
 
 /// Means of the red parts of squares of four by four pixels.
@@ -115,9 +97,6 @@ fn an_opaque_particle_has_the_caustic_of_path_tracing() {
     assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
     for (number, (found, expected)) in found.iter().zip(&expected).enumerate() {
         let limit = 0.05 * expected + 0.02 * brightest;
-        assert!(
-            (found - expected).abs() < limit,
-            "{number}: {found} {expected}"
-        );
+        assert!((found - expected).abs() < limit, "{number}: {found} {expected}");
     }
 }

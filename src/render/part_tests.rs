@@ -20,10 +20,7 @@ const COLORS: [Vec3; 2] = [Vec3::new(0.2, 0.7, 0.3), Vec3::new(0.8, 0.4, 0.1)];
 
 /// Two balls beside each other, of the parts 5 and -1.
 fn pair() -> Balls {
-    let ball = |x: f32| Ball {
-        center: Vec3::new(x, 0.0, 0.0),
-        radius: 0.9,
-    };
+    let ball = |x: f32| Ball { center: Vec3::new(x, 0.0, 0.0), radius: 0.9 };
     Balls(vec![ball(-1.0), ball(1.0)])
 }
 
@@ -46,27 +43,15 @@ fn scene(material: Material, parts: Vec<PartMaterial>) -> Scene {
 }
 
 fn opaque(finish: Finish) -> Material {
-    Material {
-        finish,
-        ..Material::DEFAULT
-    }
+    Material { finish, ..Material::DEFAULT }
 }
 
 fn glass() -> Material {
-    Material {
-        transmission: 1.0,
-        fresnel: Fresnel::Exact,
-        ior: 1.5,
-        ..Material::DEFAULT
-    }
+    Material { transmission: 1.0, fresnel: Fresnel::Exact, ior: 1.5, ..Material::DEFAULT }
 }
 
 fn part(parts: &[i32], finish: Finish, color: Option<Vec3>) -> PartMaterial {
-    PartMaterial {
-        parts: parts.to_vec(),
-        finish,
-        color,
-    }
+    PartMaterial { parts: parts.to_vec(), finish, color }
 }
 
 fn image(scene: &Scene, bounces: u32, colors: &[Vec3]) -> Film {
@@ -89,10 +74,7 @@ fn image(scene: &Scene, bounces: u32, colors: &[Vec3]) -> Film {
 /// The left or the right half of an image.
 fn half(film: &Film, right: bool) -> Vec<[f32; 4]> {
     let pixels = film.color.iter().enumerate();
-    pixels
-        .filter(|(i, _)| (i % 32 >= 16) == right)
-        .map(|(_, color)| *color)
-        .collect()
+    pixels.filter(|(i, _)| (i % 32 >= 16) == right).map(|(_, color)| *color).collect()
 }
 
 const METAL: Finish = Finish::Metal { roughness: 0.3 };
@@ -141,10 +123,7 @@ fn opaque_parts_are_among_transmissive_spheres() {
     let solid = image(&scene(opaque(Finish::Matte), Vec::new()), 0, &COLORS);
     let mean = |pixels: &[[f32; 4]]| pixels.iter().map(|c| c[1]).sum::<f32>() / pixels.len() as f32;
     let [mixed_right, solid_right] = [&mixed, &solid].map(|film| mean(&half(film, true)));
-    assert!(
-        (mixed_right / solid_right - 1.0).abs() < 0.15,
-        "{mixed_right} {solid_right}"
-    );
+    assert!((mixed_right / solid_right - 1.0).abs() < 0.15, "{mixed_right} {solid_right}");
     assert_ne!(half(&clear, true), half(&mixed, true));
     assert_ne!(half(&mixed, false), half(&solid, false));
 }
@@ -165,10 +144,7 @@ fn opaque_parts_throw_full_shadows() {
         up: DVec3::Z,
         fov: 40.0,
     };
-    let bounds = crate::scene::Bounds {
-        min: DVec3::splat(-1.9),
-        max: DVec3::splat(1.9),
-    };
+    let bounds = crate::scene::Bounds { min: DVec3::splat(-1.9), max: DVec3::splat(1.9) };
     // The pixels of points in both shadows
     let shadows = |parts: Vec<PartMaterial>| {
         let mut scene = scene(glass(), parts);

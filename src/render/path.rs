@@ -254,22 +254,14 @@ impl PathIntegrator<'_> {
     fn prepare_surface(&self, surface: &Surface<'_>, packet: &mut PacketScratch) {
         let (context, simd) = (&self.context, self.context.simd);
         // Transmissive particles have no colour
-        context.base_colors(
-            surface.segments,
-            context.interior == Interior::Opaque,
-            packet,
-        );
+        context.base_colors(surface.segments, context.interior == Interior::Opaque, packet);
         let (rays, points) = (&surface.segments.rays, &mut packet.surface);
         surface_points(simd, rays, &packet.hits, &packet.base, points);
         if context.soft_spray.is_some() {
             // Light that foam scatters leaves from inside its drop, in all directions
             for lane in lanes_in(packet.hits.lanes_of(MaterialId::SPRAY)) {
                 let inwards = -packet.hits.offset[lane] * lane3(&points.geometric, lane);
-                set_lane3(
-                    &mut points.start,
-                    lane,
-                    lane3(&packet.hits.anchor, lane) + inwards,
-                );
+                set_lane3(&mut points.start, lane, lane3(&packet.hits.anchor, lane) + inwards);
             }
         }
         let opacity = &packet.hits.opacity;
@@ -315,12 +307,7 @@ impl PathIntegrator<'_> {
         self.divide_samples(surface, packet);
         let unoccluded = packet.unoccluded();
         let visible = self.add_visible(occlusion, group, surface, packet);
-        let PacketScratch {
-            split,
-            light,
-            radiance,
-            ..
-        } = packet;
+        let PacketScratch { split, light, radiance, .. } = packet;
         split.take_reflected(radiance);
         if let Some((lanes, unoccluded)) = unoccluded {
             split.add_direct(lanes, &unoccluded, visible, &light.radiance);
@@ -347,12 +334,7 @@ impl PathIntegrator<'_> {
         packet: &mut PacketScratch,
     ) -> u32 {
         let visible = self.trace_samples(occlusion, surface, packet);
-        let PacketScratch {
-            light: samples,
-            radiance,
-            groups,
-            ..
-        } = packet;
+        let PacketScratch { light: samples, radiance, groups, .. } = packet;
         let simd = self.context.simd;
         add(simd, &samples.radiance, &Vec3::ONE, visible, radiance);
         groups.add(simd, group, &samples.radiance, visible);
@@ -368,12 +350,7 @@ impl PathIntegrator<'_> {
         packet: &mut PacketScratch,
     ) -> u32 {
         let (context, segments, depth) = (&self.context, surface.segments, surface.depth);
-        let PacketScratch {
-            light: samples,
-            crossings,
-            counts,
-            ..
-        } = packet;
+        let PacketScratch { light: samples, crossings, counts, .. } = packet;
         match occlusion {
             Occlusion::None => samples.lanes,
             Occlusion::Straight => {
@@ -412,10 +389,9 @@ impl PathIntegrator<'_> {
                 Some(_) => with_photons,
                 None => 0,
             };
-            for (lanes, occlusion) in [
-                (surface.lanes & !opaque, Occlusion::of(&**light)),
-                (opaque, Occlusion::Opaque),
-            ] {
+            for (lanes, occlusion) in
+                [(surface.lanes & !opaque, Occlusion::of(&**light)), (opaque, Occlusion::Opaque)]
+            {
                 if lanes != 0 {
                     let surface = &Surface { lanes, ..*surface };
                     self.reflect_light(index, competes, surface, packet);
@@ -468,8 +444,7 @@ impl PathIntegrator<'_> {
             _ => 0,
         };
         let deeper = self.roulette(surface, lanes & !last, &mut rays.throughput);
-        next.reflected
-            .push(deeper, rays, segments, segments.inside, BOUNCED);
+        next.reflected.push(deeper, rays, segments, segments.inside, BOUNCED);
         // Infinite densities mark specular rays
         if last != 0 {
             self.add_last(surface, last, packet);
@@ -490,13 +465,7 @@ impl PathIntegrator<'_> {
                 bsdf.sample(simd, &segments.rays, points, &u, lanes, samples);
             }
         }
-        let PacketScratch {
-            bounce,
-            points,
-            weight,
-            surface: at,
-            ..
-        } = &mut *packet;
+        let PacketScratch { bounce, points, weight, surface: at, .. } = &mut *packet;
         let rays = &mut points.reflected;
         rays.origin = at.start;
         rays.direction = bounce.direction;
@@ -532,14 +501,7 @@ impl PathIntegrator<'_> {
         let (direction, throughput) = (&rays.direction, &rays.throughput);
         let radiance = &mut samples.radiance;
         let simd = self.context.simd;
-        environment_along(
-            simd,
-            environment,
-            direction,
-            &rays.pdf,
-            throughput,
-            radiance,
-        );
+        environment_along(simd, environment, direction, &rays.pdf, throughput, radiance);
         let is_bright = |l| lane3(&samples.radiance, l).max_element() > 0.0;
         samples.lanes = lanes & lanes_where(is_bright);
         let is_traced = |l: usize| samples.lanes >> l & 1 == 1;
@@ -583,12 +545,7 @@ impl PathIntegrator<'_> {
         let last = lanes & self.last_specular(segments, depth);
         (self.context).reflect_at_panes(segments, lanes, last, packet, next);
         if last != 0 {
-            let PacketScratch {
-                points,
-                radiance,
-                groups,
-                ..
-            } = &mut *packet;
+            let PacketScratch { points, radiance, groups, .. } = &mut *packet;
             let rays = &points.reflected;
             let group = groups.of_mut(self.context.environment_group());
             for sum in [Some(radiance), group].into_iter().flatten() {

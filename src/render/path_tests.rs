@@ -55,9 +55,7 @@ pub(super) fn image(
 ) -> Film {
     let source = ParticleShading::constant(albedo);
     let never = AtomicBool::new(false);
-    render(&[shape], scene, &source, settings, &never)
-        .unwrap()
-        .0
+    render(&[shape], scene, &source, settings, &never).unwrap().0
 }
 
 /// The pixels that the shape covers, as colours.
@@ -70,11 +68,7 @@ pub(super) fn covered(film: &Film) -> Vec<Vec3> {
 pub(super) fn statistics(pixels: &[Vec3]) -> (f32, f32) {
     let count = pixels.len() as f32;
     let mean = pixels.iter().map(|p| p.element_sum() / 3.0).sum::<f32>() / count;
-    let square = pixels
-        .iter()
-        .map(|p| (*p - mean).length_squared() / 3.0)
-        .sum::<f32>()
-        / count;
+    let square = pixels.iter().map(|p| (*p - mean).length_squared() / 3.0).sum::<f32>() / count;
     (mean, square.sqrt())
 }
 
@@ -97,12 +91,7 @@ fn a_convex_body_in_white_surroundings_has_its_albedo() {
     let ball = Balls::one(Vec3::ZERO, 1.0);
     let scene = scene(white());
     for (albedo, bounces) in [(0.5, 0), (0.5, 6), (1.0, 0), (0.0, 3)] {
-        let film = image(
-            &ball,
-            &scene,
-            Vec3::splat(albedo),
-            &settings(24, 64, bounces),
-        );
+        let film = image(&ball, &scene, Vec3::splat(albedo), &settings(24, 64, bounces));
         let pixels = covered(&film);
         let (mean, deviation) = statistics(&pixels);
         assert!(pixels.len() > 200);
@@ -124,12 +113,7 @@ fn white_bodies_in_white_surroundings_are_white() {
     let film = image(&heap, &scene(white()), Vec3::ONE, &settings(24, 16, 0));
     assert!(statistics(&covered(&film)).0 < 0.9);
     // Colours above white do not create light.
-    let film = image(
-        &heap,
-        &scene(white()),
-        Vec3::splat(7.0),
-        &settings(24, 16, 1000),
-    );
+    let film = image(&heap, &scene(white()), Vec3::splat(7.0), &settings(24, 16, 1000));
     assert!(statistics(&covered(&film)).0 < 1.02);
 }
 
@@ -148,14 +132,9 @@ fn light_inside_a_ball_is_a_geometric_series() {
         let settings = settings(8, 256, bounces);
         let film = image(&ball, &scene, Vec3::splat(albedo), &settings);
         let (mean, _) = statistics(&covered(&film));
-        let series: f32 = (0..=bounces)
-            .map(|n| albedo.powi(i32::try_from(n).unwrap()))
-            .sum();
+        let series: f32 = (0..=bounces).map(|n| albedo.powi(i32::try_from(n).unwrap())).sum();
         let wanted = direct * series;
-        assert!(
-            (mean / wanted - 1.0).abs() < limit,
-            "{bounces}: {mean} {wanted}"
-        );
+        assert!((mean / wanted - 1.0).abs() < limit, "{bounces}: {mean} {wanted}");
     }
 }
 
@@ -195,19 +174,12 @@ fn a_floor_shows_the_irradiance_of_the_environment() {
     let pixels = covered(&film);
     let mean = pixels.iter().sum::<Vec3>() / pixels.len() as f32;
     assert_eq!(pixels.len(), 256);
-    assert!(
-        (mean / wanted - 1.0).abs().max_element() < 5e-3,
-        "{mean} {wanted}"
-    );
+    assert!((mean / wanted - 1.0).abs().max_element() < 5e-3, "{mean} {wanted}");
 }
 
 /// A clear material: no light is lost in it.
-pub(super) const GLASS: Material = Material {
-    ior: 1.5,
-    transmission: 1.0,
-    fresnel: Fresnel::Exact,
-    ..Material::DEFAULT
-};
+pub(super) const GLASS: Material =
+    Material { ior: 1.5, transmission: 1.0, fresnel: Fresnel::Exact, ..Material::DEFAULT };
 
 #[test]
 fn glass_in_white_surroundings_is_invisible() {
@@ -216,16 +188,10 @@ fn glass_in_white_surroundings_is_invisible() {
         let mut scene = scene(white());
         scene.material = GLASS;
         for max_depth in [1, 2, 8] {
-            let settings = RenderSettings {
-                max_depth,
-                ..settings(16, 16, 6)
-            };
+            let settings = RenderSettings { max_depth, ..settings(16, 16, 6) };
             let film = image(shape, &scene, Vec3::splat(0.3), &settings);
             for pixel in covered(&film) {
-                assert!(
-                    (pixel - 1.0).abs().max_element() < 1e-4,
-                    "{max_depth}: {pixel}"
-                );
+                assert!((pixel - 1.0).abs().max_element() < 1e-4, "{max_depth}: {pixel}");
             }
         }
     }
@@ -234,19 +200,14 @@ fn glass_in_white_surroundings_is_invisible() {
 #[test]
 fn a_white_floor_below_glass_is_white() {
     // Light that shadow rays do not bring through the glass, paths must bring, and none twice.
-    let shapes: [&dyn Shape; 2] = [
-        &Balls::one(Vec3::new(0.0, 0.0, 1.2), 1.0),
-        &Solid::slab(0.5, 1.5),
-    ];
+    let shapes: [&dyn Shape; 2] =
+        [&Balls::one(Vec3::new(0.0, 0.0, 1.2), 1.0), &Solid::slab(0.5, 1.5)];
     for shape in shapes {
         let mut scene = floor_from_above(white(), Vec3::ONE);
         scene.material = GLASS;
         // Without diffuse reflections, light that the glass sends back to the floor is lost
         for (bounces, low, high) in [(1000, 0.99, 1.01), (0, 0.8, 0.97)] {
-            let settings = RenderSettings {
-                max_depth: 24,
-                ..settings(16, 64, bounces)
-            };
+            let settings = RenderSettings { max_depth: 24, ..settings(16, 64, bounces) };
             let film = image(shape, &scene, Vec3::ONE, &settings);
             let (mean, _) = statistics(&covered(&film));
             assert!(mean > low && mean < high, "{bounces}: {mean}");
@@ -260,10 +221,7 @@ fn lights_shine_straight_through_glass() {
     let mut scene = floor_from_above(Environment::constant(Vec3::ZERO), Vec3::splat(0.5));
     scene.lights = vec![Light::directional(Vec3::NEG_Z, Vec3::splat(PI)).unwrap()];
     scene.material = GLASS;
-    let settings = RenderSettings {
-        max_depth: 8,
-        ..settings(4, 64, 0)
-    };
+    let settings = RenderSettings { max_depth: 8, ..settings(4, 64, 0) };
     let open = image(&Balls(Vec::new()), &scene, Vec3::ONE, &settings);
     let below = image(&Solid::slab(20.0, 30.0), &scene, Vec3::ONE, &settings);
     let [open, below] = [open, below].map(|film| statistics(&covered(&film)).0);
@@ -276,10 +234,7 @@ fn the_camera_sees_the_background_unless_the_environment_is_visible() {
     let nothing = Balls(Vec::new());
     let mut scene = scene(Environment::constant(Vec3::new(3.0, 2.0, 1.0)));
     let pixel = |scene: &Scene, transparent_background: bool| {
-        let settings = RenderSettings {
-            transparent_background,
-            ..settings(1, 1, 1)
-        };
+        let settings = RenderSettings { transparent_background, ..settings(1, 1, 1) };
         image(&nothing, scene, Vec3::ONE, &settings).color[0]
     };
     assert_eq!(pixel(&scene, false), [0.1, 0.2, 0.3, 0.0]);
@@ -301,10 +256,7 @@ fn the_same_bits_on_any_threads_and_instructions() {
         let mut scene = floor_from_above(studio(axes, Vec3::ONE), Vec3::splat(0.5));
         scene.material.transmission = transmission;
         scene.background = Background::Studio { up: Vec3::Z };
-        let kind = LightKind::Sphere {
-            center: Vec3::new(1.0, 2.0, 2.0),
-            radius: 0.5,
-        };
+        let kind = LightKind::Sphere { center: Vec3::new(1.0, 2.0, 2.0), radius: 0.5 };
         scene.lights = vec![Light {
             kind,
             radiance: Vec3::ONE,
@@ -331,9 +283,8 @@ fn the_same_bits_on_any_threads_and_instructions() {
         assert_eq!((film.clone(), counts), on(2));
         assert_eq!((film, counts), on(5));
         // Instruction sets
-        let films: Vec<Vec2> = (0..48_u8)
-            .map(|i| Vec2::new(f32::from(i % 7) / 7.0, f32::from(i) / 48.0))
-            .collect();
+        let films: Vec<Vec2> =
+            (0..48_u8).map(|i| Vec2::new(f32::from(i % 7) / 7.0, f32::from(i) / 48.0)).collect();
         let by = |level: SimdLevel| {
             let plane = scene.ground.as_ref().map(Plane::new);
             let mut shapes: Vec<&dyn Shape> = vec![&heap];
@@ -350,10 +301,7 @@ fn the_same_bits_on_any_threads_and_instructions() {
 }
 
 fn with_ambient(settings: RenderSettings) -> RenderSettings {
-    RenderSettings {
-        indirect: IndirectLight::Ambient { radius: 0.3 },
-        ..settings
-    }
+    RenderSettings { indirect: IndirectLight::Ambient { radius: 0.3 }, ..settings }
 }
 
 #[test]
@@ -368,9 +316,7 @@ fn ambient_light_creates_none() {
     let pixels = covered(&film);
     let (mean, _) = statistics(&pixels);
     assert!(mean > 0.75 && mean < 1.0, "{mean}");
-    let brightest = pixels
-        .iter()
-        .fold(0.0_f32, |most, p| most.max(p.max_element()));
+    let brightest = pixels.iter().fold(0.0_f32, |most, p| most.max(p.max_element()));
     // But for noise
     assert!(brightest < 1.1, "{brightest}");
 }
@@ -391,17 +337,11 @@ fn ambient_light_needs_fewer_rays() {
     let (ambient, counts) = traced(with_ambient(settings(24, 16, 6)));
     assert_eq!(counts.primary, full.primary);
     assert!(counts.shadow < 4 * full.shadow / 5, "{counts:?} {full:?}");
-    assert!(
-        counts.reflection < 4 * full.reflection / 5,
-        "{counts:?} {full:?}"
-    );
+    assert!(counts.reflection < 4 * full.reflection / 5, "{counts:?} {full:?}");
     // No path has more than one diffuse reflection
     assert_eq!((ambient, counts), traced(with_ambient(settings(24, 16, 1))));
     // Direct light needs no estimate
-    assert_eq!(
-        traced(settings(24, 16, 0)),
-        traced(with_ambient(settings(24, 16, 0)))
-    );
+    assert_eq!(traced(settings(24, 16, 0)), traced(with_ambient(settings(24, 16, 0))));
 }
 
 #[test]
@@ -415,10 +355,8 @@ fn ambient_light_is_that_of_every_source() {
             statistics(&covered(&film)).0
         };
         let direct = mean(&settings(24, 64, 0));
-        let (full, ambient) = (
-            mean(&settings(24, 64, 6)),
-            mean(&with_ambient(settings(24, 64, 6))),
-        );
+        let (full, ambient) =
+            (mean(&settings(24, 64, 6)), mean(&with_ambient(settings(24, 64, 6))));
         assert!(full > 1.02 * direct, "{direct} {full}");
         assert!(ambient > 1.02 * direct, "{direct} {ambient}");
         assert!((ambient / full - 1.0).abs() < 0.25, "{full} {ambient}");
@@ -438,9 +376,8 @@ fn ambient_light_is_the_same_on_any_threads_and_instructions() {
         pool.build().unwrap().install(draw)
     };
     assert_eq!(on(1), on(4));
-    let films: Vec<Vec2> = (0..48_u8)
-        .map(|i| Vec2::new(f32::from(i % 7) / 7.0, f32::from(i) / 48.0))
-        .collect();
+    let films: Vec<Vec2> =
+        (0..48_u8).map(|i| Vec2::new(f32::from(i % 7) / 7.0, f32::from(i) / 48.0)).collect();
     let by = |level: SimdLevel| {
         let mut context = RenderContext::new(vec![&heap], &scene, &source, &settings);
         context.simd = Supported::or_best(level);
@@ -459,17 +396,11 @@ fn more_samples_converge_to_the_same_picture() {
     let scene = scene(studio(axes, Vec3::ONE));
     let of = |samples| {
         // Without the background, which would hide differences
-        let settings = RenderSettings {
-            transparent_background: true,
-            ..settings(12, samples, 6)
-        };
+        let settings = RenderSettings { transparent_background: true, ..settings(12, samples, 6) };
         let film = image(&heap, &scene, Vec3::new(0.7, 0.5, 0.2), &settings);
         let pixels = film.color.iter().map(|c| Vec3::from_slice(&c[..3]));
         pixels.sum::<Vec3>()
     };
     let (few, many) = (of(16), of(1024));
-    assert!(
-        (few / many - 1.0).abs().max_element() < 0.05,
-        "{few} {many}"
-    );
+    assert!((few / many - 1.0).abs().max_element() < 0.05, "{few} {many}");
 }

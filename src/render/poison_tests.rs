@@ -31,10 +31,7 @@ fn scene(transmission: f32) -> Scene {
         up: DVec3::Z,
         fov: 30.0,
     };
-    let bounds = Bounds {
-        min: DVec3::splat(-1.0),
-        max: DVec3::ONE,
-    };
+    let bounds = Bounds { min: DVec3::splat(-1.0), max: DVec3::ONE };
     let lamp = DVec3::new(3.0, -2.0, 4.0);
     let falloff = Falloff::InverseSquare;
     let axes = EnvironmentAxes::of_view(DVec3::Y, DVec3::Z, 0.0);
@@ -104,10 +101,7 @@ fn check(shape: &dyn Shape, transmission: f32) {
 
 fn check_integrator(integrator: &dyn Integrator, scene: &Scene) {
     let clean = segments(scene);
-    assert!(
-        left(integrator, &clean, 0).len() > 40,
-        "there is something to see"
-    );
+    assert!(left(integrator, &clean, 0).len() > 40, "there is something to see");
     for lane in [0, 5, 6, 15] {
         let expected = left(integrator, &clean, lane);
         for poison in POISON {
@@ -117,11 +111,7 @@ fn check_integrator(integrator: &dyn Integrator, scene: &Scene) {
             set_lane3(&mut poisoned[1].rays.direction, lane, bad);
             set_lane3(&mut poisoned[2].throughput, lane, bad);
             for segments in poisoned {
-                assert_eq!(
-                    left(integrator, &segments, lane),
-                    expected,
-                    "{lane} {poison}"
-                );
+                assert_eq!(left(integrator, &segments, lane), expected, "{lane} {poison}");
             }
         }
     }
@@ -129,11 +119,7 @@ fn check_integrator(integrator: &dyn Integrator, scene: &Scene) {
 
 fn heap() -> Vec<Ball> {
     let ball = |i: u16| Ball {
-        center: Vec3::new(
-            f32::from(i % 5) - 2.0,
-            f32::from(i / 5) - 2.0,
-            0.1 * f32::from(i % 7),
-        ),
+        center: Vec3::new(f32::from(i % 5) - 2.0, f32::from(i / 5) - 2.0, 0.1 * f32::from(i % 7)),
         radius: 0.6,
     };
     (0..25).map(ball).collect()
@@ -205,11 +191,7 @@ fn nan_particles_do_not_affect_other_particles() {
             left(&integrator, &clean, lane)
         };
         for (lane, poison) in [5, 6, 9].into_iter().flat_map(|l| POISON.map(|p| (l, p))) {
-            let poisoned = Poisoned {
-                shape,
-                lane,
-                poison,
-            };
+            let poisoned = Poisoned { shape, lane, poison };
             assert_eq!(of(&poisoned, lane), of(shape, lane), "{lane} {poison}");
         }
     }

@@ -22,12 +22,7 @@ const LOOK_AT: DVec3 = DVec3::new(0.5, 0.0, 0.0);
 const ORTHOGRAPHIC: Projection = Projection::Orthographic { height: 5.0 };
 
 fn view() -> CameraView {
-    CameraView {
-        eye: EYE,
-        look_at: LOOK_AT,
-        up: DVec3::Z,
-        fov: 50.0,
-    }
+    CameraView { eye: EYE, look_at: LOOK_AT, up: DVec3::Z, fov: 50.0 }
 }
 
 fn camera(projection: Projection, stereo: Option<StereoSettings>) -> Camera {
@@ -49,11 +44,8 @@ fn ray_by_hand(
     let up = right.cross(forward);
     let aspect = f64::from(SIZE[0]) / f64::from(SIZE[1]);
     let (x, y) = (2.0 * film.x - 1.0, 1.0 - 2.0 * film.y);
-    let half = stereo.map_or(0.0, |stereo| {
-        0.5 * stereo
-            .eye_distance
-            .unwrap_or((LOOK_AT - EYE).length() / 30.0)
-    });
+    let half = stereo
+        .map_or(0.0, |stereo| 0.5 * stereo.eye_distance.unwrap_or((LOOK_AT - EYE).length() / 30.0));
     match projection {
         Projection::Perspective => {
             let tangent = 25.0_f64.to_radians().tan();
@@ -84,63 +76,35 @@ fn ray_by_hand(
 
 /// Cameras of all kinds.
 fn cameras() -> Vec<(Projection, Option<StereoSettings>)> {
-    let stereo = |eye_distance, convergence| {
-        Some(StereoSettings {
-            eye_distance,
-            convergence,
-        })
-    };
+    let stereo = |eye_distance, convergence| Some(StereoSettings { eye_distance, convergence });
     vec![
         (Projection::Perspective, None),
         (ORTHOGRAPHIC, None),
         (Projection::Equirectangular, None),
         (Projection::Perspective, stereo(None, Convergence::Target)),
-        (
-            Projection::Perspective,
-            stereo(Some(0.5), Convergence::Parallel),
-        ),
-        (
-            Projection::Perspective,
-            stereo(Some(0.4), Convergence::Distance(4.0)),
-        ),
-        (
-            Projection::Equirectangular,
-            stereo(Some(0.5), Convergence::Parallel),
-        ),
+        (Projection::Perspective, stereo(Some(0.5), Convergence::Parallel)),
+        (Projection::Perspective, stereo(Some(0.4), Convergence::Distance(4.0))),
+        (Projection::Equirectangular, stereo(Some(0.5), Convergence::Parallel)),
     ]
 }
 
 #[test]
 fn rays_of_single_points_are_those_by_hand() {
-    for projection in [
-        Projection::Perspective,
-        ORTHOGRAPHIC,
-        Projection::Equirectangular,
-    ] {
+    for projection in [Projection::Perspective, ORTHOGRAPHIC, Projection::Equirectangular] {
         let camera = camera(projection, None);
         for (x, y) in [(0.0, 0.0), (0.1, 0.9), (0.5, 0.5), (0.77, 0.3), (1.0, 1.0)] {
             let ray = camera.ray(Vec2::new(x, y));
             let film = DVec2::new(f64::from(x), f64::from(y));
             let [origin, direction] = ray_by_hand(projection, None, 0.0, film);
-            assert!(
-                ray.origin.as_dvec3().distance(origin) < 1e-5,
-                "{projection:?} {film}"
-            );
-            assert!(
-                ray.direction.as_dvec3().distance(direction) < 1e-5,
-                "{projection:?} {film}"
-            );
+            assert!(ray.origin.as_dvec3().distance(origin) < 1e-5, "{projection:?} {film}");
+            assert!(ray.direction.as_dvec3().distance(direction) < 1e-5, "{projection:?} {film}");
         }
     }
 }
 
 #[test]
 fn points_are_projected_onto_their_rays() {
-    for projection in [
-        Projection::Perspective,
-        ORTHOGRAPHIC,
-        Projection::Equirectangular,
-    ] {
+    for projection in [Projection::Perspective, ORTHOGRAPHIC, Projection::Equirectangular] {
         let camera = camera(projection, None);
         let lanes = CameraLanes::new(&camera, SIZE[0], SIZE[1]);
         for (x, y) in [(0.2, 0.3), (0.5, 0.5), (0.93, 0.71), (0.05, 0.9)] {
@@ -149,16 +113,10 @@ fn points_are_projected_onto_their_rays() {
             for distance in [0.5, 7.0] {
                 let point = ray.origin + distance * ray.direction;
                 let found = camera.film_of(point).unwrap();
-                assert!(
-                    found.distance(film) < 1e-5,
-                    "{projection:?}: {film} {found}"
-                );
+                assert!(found.distance(film) < 1e-5, "{projection:?}: {film} {found}");
                 let pixel = Vec2::from(lanes.pixel_of(point).unwrap());
                 let wanted = film * Vec2::new(SIZE[0] as f32, SIZE[1] as f32);
-                assert!(
-                    pixel.distance(wanted) < 1e-3,
-                    "{projection:?}: {wanted} {pixel}"
-                );
+                assert!(pixel.distance(wanted) < 1e-3, "{projection:?}: {wanted} {pixel}");
             }
         }
         // Only a panorama shows what is behind the camera
@@ -175,8 +133,7 @@ fn centers() -> Vec<Vec3> {
         Vec3::new(6.0 * a - 2.5, 14.0 * b - 12.0, 5.0 * c - 2.5)
     };
     let all = (0..250).map(center);
-    all.filter(|center| center.distance(EYE.as_vec3()) > 1.0)
-        .collect()
+    all.filter(|center| center.distance(EYE.as_vec3()) > 1.0).collect()
 }
 
 /// The nearest sphere by brute force, its distance along the ray, and whether rounding may decide which one it is.
@@ -225,15 +182,10 @@ fn film(
             ..Material::DEFAULT
         },
         background: Background::Studio { up: Vec3::Z },
-        environment: Some(std::sync::Arc::new(crate::scene::Environment::constant(
-            Vec3::ONE,
-        ))),
+        environment: Some(std::sync::Arc::new(crate::scene::Environment::constant(Vec3::ONE))),
         ..Scene::new(camera)
     };
-    let source = ParticleShading {
-        ids: Some(ids),
-        ..ParticleShading::constant(Vec3::ONE)
-    };
+    let source = ParticleShading { ids: Some(ids), ..ParticleShading::constant(Vec3::ONE) };
     let never = AtomicBool::new(false);
     let rendered = render(&[shape], &scene, &source, &settings, &never);
     rendered.unwrap().0
@@ -242,15 +194,9 @@ fn film(
 /// Calls `check` with a tree over [`centers`].
 fn with_tree(check: impl Fn(&dyn Shape, &[u32], &[Vec3])) {
     let centers = centers();
-    let spheres = Spheres {
-        centers: &centers,
-        radius: SphereRadius::Common(RADIUS),
-    };
+    let spheres = Spheres { centers: &centers, radius: SphereRadius::Common(RADIUS) };
     let mut builder = TreeBuilder::new();
-    let settings = BuildSettings {
-        keep_indices: true,
-        ..BuildSettings::default()
-    };
+    let settings = BuildSettings { keep_indices: true, ..BuildSettings::default() };
     builder.build(&spheres, &settings);
     let ids: Vec<u32> = (0..).map(|i| 3 * i + 7).take(centers.len()).collect();
     check(&SphereSurface::new(builder.tree().view()), &ids, &centers);
@@ -278,12 +224,8 @@ fn every_pixel_shows_the_sphere_that_its_ray_hits_in_f64() {
                         _ => 1.0,
                     };
                     let at = DVec2::new((column % w) as f64 + 0.5, (row % h) as f64 + 0.5);
-                    let ray = ray_by_hand(
-                        projection,
-                        stereo,
-                        side,
-                        at / DVec2::new(w as f64, h as f64),
-                    );
+                    let ray =
+                        ray_by_hand(projection, stereo, side, at / DVec2::new(w as f64, h as f64));
                     let (wanted, is_close) = nearest(centers, ray);
                     if is_close {
                         continue;
@@ -299,10 +241,7 @@ fn every_pixel_shows_the_sphere_that_its_ray_hits_in_f64() {
                         Projection::Perspective => t * ray[1].dot(forward),
                         _ => t,
                     };
-                    assert!(
-                        (f64::from(*z) - wanted_z).abs() < 1e-3,
-                        "{place}: {z} {wanted_z}"
-                    );
+                    assert!((f64::from(*z) - wanted_z).abs() < 1e-3, "{place}: {z} {wanted_z}");
                 }
                 let eyes = 1 + usize::from(stereo.is_some());
                 assert!(hits[..eyes].iter().all(|count| *count > 100), "{hits:?}");
@@ -315,24 +254,13 @@ fn every_pixel_shows_the_sphere_that_its_ray_hits_in_f64() {
 #[test]
 fn a_stereo_pair_is_two_images() {
     with_tree(|tree, ids, _| {
-        let settings = StereoSettings {
-            eye_distance: Some(0.5),
-            convergence: Convergence::Parallel,
-        };
-        let pair = film(
-            camera(Projection::Perspective, Some(settings)),
-            tree,
-            ids,
-            |_| {},
-        );
+        let settings =
+            StereoSettings { eye_distance: Some(0.5), convergence: Convergence::Parallel };
+        let pair = film(camera(Projection::Perspective, Some(settings)), tree, ids, |_| {});
         let right = (LOOK_AT - EYE).cross(DVec3::Z).normalize();
         for (eye, side) in [(0, -0.25), (1, 0.25)] {
             let shift = side * right;
-            let view = CameraView {
-                eye: EYE + shift,
-                look_at: LOOK_AT + shift,
-                ..view()
-            };
+            let view = CameraView { eye: EYE + shift, look_at: LOOK_AT + shift, ..view() };
             let one = Camera::new(&view, 1.5, DVec3::ZERO).unwrap();
             let one = film(one, tree, ids, |_| {});
             let (mut differing, width) = (0, SIZE[0] as usize);
@@ -362,11 +290,7 @@ fn parts_of_images_are_those_of_the_whole() {
             let part = film(camera(projection, None), tree, ids, |s| {
                 samples(s);
                 (s.width, s.height) = (20, 10);
-                s.window = Some(DataWindow {
-                    left: 17,
-                    top: 9,
-                    image: SIZE,
-                });
+                s.window = Some(DataWindow { left: 17, top: 9, image: SIZE });
             });
             for (index, color) in part.color.iter().enumerate() {
                 let (column, row) = (17 + index % 20, 9 + index / 20);

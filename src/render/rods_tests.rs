@@ -35,10 +35,7 @@ fn albedo(tree: &RodTree, integrator: IntegratorKind) -> Vec<Vec3> {
     let settings = RenderSettings {
         samples: 4,
         integrator,
-        channels: Channels {
-            albedo: true,
-            ..Channels::default()
-        },
+        channels: Channels { albedo: true, ..Channels::default() },
         ..RenderSettings::new(32, 32)
     };
     let source = ParticleShading::constant(Vec3::ONE);
@@ -50,10 +47,7 @@ fn albedo(tree: &RodTree, integrator: IntegratorKind) -> Vec<Vec3> {
 
 /// A thick rod across the view.
 fn rod(particles: [u32; 2]) -> Rod {
-    Rod {
-        particles,
-        ..Rod::line([Vec3::new(-2.5, 0.0, 0.0), Vec3::new(2.5, 0.0, 0.0)], 1.0)
-    }
+    Rod { particles, ..Rod::line([Vec3::new(-2.5, 0.0, 0.0), Vec3::new(2.5, 0.0, 0.0)], 1.0) }
 }
 
 #[test]

@@ -42,20 +42,13 @@ impl SplitRule {
             Interior::Spheres => settings.min_weight,
             Interior::Body => (SPLIT_WEIGHT * settings.samples as f32).clamp(MIN_SPLIT_WEIGHT, 1.0),
         };
-        Self {
-            least,
-            favors_first: interior == Interior::Body,
-        }
+        Self { least, favors_first: interior == Interior::Body }
     }
 
     /// Maximum number of rays of one sample at any depth: the path weights of a sample never add up to more than 1.
     pub(super) fn max_paths(&self, max_depth: u32) -> usize {
         let by_depth = 1_usize << (max_depth.min(MAX_DEPTH) - 1).min(30);
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "saturates"
-        )]
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
         let by_weight = (1.0 / self.least) as usize;
         let by_weight = by_weight.saturating_add(usize::from(self.favors_first));
         by_depth.min(by_weight).max(1)

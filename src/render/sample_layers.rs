@@ -68,11 +68,7 @@ impl SampleLayers {
             false => (LightClass::COUNT + 1) * size_of::<Lanes3>(),
         };
         let groups = usize::from(layers.light_groups) * size_of::<Lanes3>();
-        let direct = if layers.shadow {
-            size_of::<[Lanes; 2]>()
-        } else {
-            0
-        };
+        let direct = if layers.shadow { size_of::<[Lanes; 2]>() } else { 0 };
         // Vectors grow by doubling
         2 * samples.div_ceil(LANES) * (objects + lights + groups + direct)
     }
@@ -188,16 +184,10 @@ impl SampleLayers {
                 continue;
             };
             let objects = &self.objects[kind as usize];
-            let sample = |s: usize| {
-                (
-                    objects[s / LANES][s % LANES],
-                    coverage[s / LANES][s % LANES],
-                )
-            };
+            let sample = |s: usize| (objects[s / LANES][s % LANES], coverage[s / LANES][s % LANES]);
             self.covered.clear();
             let samples = range.clone().map(sample);
-            self.covered
-                .extend(samples.filter(|(object, _)| *object != 0));
+            self.covered.extend(samples.filter(|(object, _)| *object != 0));
             rank(&mut self.covered, share, &mut floats[at]);
         }
     }

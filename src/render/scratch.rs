@@ -138,10 +138,7 @@ impl SampleGroup {
         }
         let (across, down) = (across.as_chunks().0, down.as_chunks().0);
         for (across, down) in across.iter().zip(down) {
-            self.push_packet([
-                across.map(|offset| x + offset),
-                down.map(|offset| y + offset),
-            ]);
+            self.push_packet([across.map(|offset| x + offset), down.map(|offset| y + offset)]);
             self.len += LANES;
         }
     }

@@ -28,10 +28,7 @@ pub(crate) struct Solid {
 
 impl Solid {
     pub(crate) const fn ball(radius: f32) -> Self {
-        Self::of(Body::Ball {
-            center: Vec3::ZERO,
-            radius,
-        })
+        Self::of(Body::Ball { center: Vec3::ZERO, radius })
     }
 
     pub(crate) const fn ball_at(center: Vec3, radius: f32) -> Self {

@@ -163,9 +163,7 @@ impl ShadeSource for ParticleShading<'_> {
     }
 
     fn id(&self, index: u32) -> u32 {
-        self.ids.map_or(index, |ids| {
-            ids.get(index as usize).copied().unwrap_or(NO_ID)
-        })
+        self.ids.map_or(index, |ids| ids.get(index as usize).copied().unwrap_or(NO_ID))
     }
 
     fn velocity(&self, index: u32) -> Vec3 {

@@ -49,14 +49,7 @@ impl RenderContext<'_> {
         if self.interior != Interior::Opaque {
             self.split_weights(split, hits, packet);
         }
-        let PacketScratch {
-            points,
-            throughput,
-            radiance,
-            split: lights,
-            groups,
-            ..
-        } = packet;
+        let PacketScratch { points, throughput, radiance, split: lights, groups, .. } = packet;
         // Describe both rays: weight, stream, side and branch of the path
         let (inside, other_side) = match self.interior {
             Interior::Opaque | Interior::Spheres => (0, 0),

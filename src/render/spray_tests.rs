@@ -83,40 +83,25 @@ fn distance(column: usize, width: f32) -> f32 {
 /// The middle row of a component of the pixels.
 fn middle_row(film: &Film, component: usize) -> Vec<f32> {
     let row = (SIDE / 2 * SIDE) as usize;
-    film.color[row..row + SIDE as usize]
-        .iter()
-        .map(|pixel| pixel[component])
-        .collect()
+    film.color[row..row + SIDE as usize].iter().map(|pixel| pixel[component]).collect()
 }
 
 #[test]
 fn drops_fade_out_towards_their_silhouettes() {
-    let settings = RenderSettings {
-        transparent_background: true,
-        ..settings(SIDE, 1024, 0)
-    };
+    let settings = RenderSettings { transparent_background: true, ..settings(SIDE, 1024, 0) };
     let film = image(&[&drop_at(0.0)], &scene(white()), &settings);
     let width = 2.0 * 99.0 * (0.75_f32).to_radians().tan();
     for (column, coverage) in middle_row(&film, 3).iter().enumerate() {
         let x = distance(column, width).min(1.0);
         let expected = 1.0 - (-DEPTH * (1.0 - x * x).powf(1.5)).exp();
-        assert!(
-            (coverage - expected).abs() < 0.05,
-            "{x}: {coverage} {expected}"
-        );
+        assert!((coverage - expected).abs() < 0.05, "{x}: {coverage} {expected}");
     }
     // Without path tracing, and if it is not soft, spray is opaque
-    let hard = Scene {
-        is_spray_soft: false,
-        ..scene(white())
-    };
+    let hard = Scene { is_spray_soft: false, ..scene(white()) };
     let film = image(&[&drop_at(0.0)], &hard, &settings);
     assert_eq!(film.color[(SIDE / 2 * SIDE + 2) as usize][3], 0.0);
     assert_eq!(film.color[(SIDE / 2 * SIDE + SIDE / 2) as usize][3], 1.0);
-    let whitted = RenderSettings {
-        integrator: IntegratorKind::Whitted,
-        ..settings
-    };
+    let whitted = RenderSettings { integrator: IntegratorKind::Whitted, ..settings };
     let film = image(&[&drop_at(0.0)], &scene(white()), &whitted);
     assert_eq!(film.color[(SIDE / 2 * SIDE + SIDE / 2) as usize][3], 1.0);
 }
@@ -147,10 +132,7 @@ fn shadows_of_drops_are_soft_and_add_up() {
         scene.camera = Camera::new(&view, 1.0, DVec3::ZERO).unwrap();
         scene.is_spray_soft = true;
         scene.lights = vec![Light::directional(Vec3::NEG_Z, Vec3::splat(PI)).unwrap()];
-        let balls = drops.iter().map(|height| Ball {
-            center: *height * Vec3::Z,
-            radius: 1.0,
-        });
+        let balls = drops.iter().map(|height| Ball { center: *height * Vec3::Z, radius: 1.0 });
         let cloud = Drops(Balls(balls.collect()));
         let film = image(&[&cloud], &scene, &settings(SIDE, 1, 0));
         let width = 2.0 * 0.9 * 53.0_f32.to_radians().tan();
@@ -167,11 +149,7 @@ fn shadows_of_drops_are_soft_and_add_up() {
 fn a_thick_cloud_is_white_and_creates_no_light() {
     let film = image(&[&cloud()], &scene(white()), &settings(SIDE, 64, 20));
     let mean = |film: &Film| film.color.iter().map(|p| p[0]).sum::<f32>() / film.color.len() as f32;
-    assert!(
-        film.color
-            .iter()
-            .all(|pixel| pixel[0] < 1.1 && pixel[0] > 0.5)
-    );
+    assert!(film.color.iter().all(|pixel| pixel[0] < 1.1 && pixel[0] > 0.5));
     assert!((0.75..0.98).contains(&mean(&film)), "{}", mean(&film));
 }
 
@@ -185,14 +163,11 @@ fn spray_is_the_same_on_any_number_of_threads_and_for_all_instruction_sets() {
     let settings = settings(SIDE, 4, 3);
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
-        pool.build()
-            .unwrap()
-            .install(|| image(&shapes, &scene, &settings))
+        pool.build().unwrap().install(|| image(&shapes, &scene, &settings))
     };
     assert_eq!(on(1), on(3));
-    let films: Vec<Vec2> = (0..48_u8)
-        .map(|i| Vec2::new(f32::from(i % 7) / 7.0, f32::from(i) / 48.0))
-        .collect();
+    let films: Vec<Vec2> =
+        (0..48_u8).map(|i| Vec2::new(f32::from(i % 7) / 7.0, f32::from(i) / 48.0)).collect();
     let source = ParticleShading::constant(Vec3::ONE);
     let by = |level: SimdLevel| {
         let mut context = RenderContext::new(shapes.to_vec(), &scene, &source, &settings);

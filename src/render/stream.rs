@@ -91,9 +91,7 @@ pub(super) struct RayStream {
 
 impl Default for RayStream {
     fn default() -> Self {
-        Self {
-            runs: vec![SegmentRun::default()],
-        }
+        Self { runs: vec![SegmentRun::default()] }
     }
 }
 
@@ -114,8 +112,7 @@ impl RayStream {
     #[cfg(test)]
     pub(super) fn packets(&self) -> Vec<&SegmentPacket> {
         let runs = self.runs.iter();
-        runs.flat_map(|run| &run.packets[..run.len.div_ceil(LANES)])
-            .collect()
+        runs.flat_map(|run| &run.packets[..run.len.div_ceil(LANES)]).collect()
     }
 
     fn packets_mut(&mut self) -> impl Iterator<Item = &mut SegmentPacket> {
@@ -269,14 +266,10 @@ mod tests {
             }
             assert_eq!(stream.len(), expected.len(), "{round}");
             let packets = stream.packets();
-            let found: Vec<u32> = packets
-                .iter()
-                .flat_map(|p| p.sample[..p.rays.len()].to_vec())
-                .collect();
+            let found: Vec<u32> =
+                packets.iter().flat_map(|p| p.sample[..p.rays.len()].to_vec()).collect();
             assert_eq!(found, expected);
-            let origins = packets
-                .iter()
-                .flat_map(|p| p.rays.rays().map(|r| r.origin.x));
+            let origins = packets.iter().flat_map(|p| p.rays.rays().map(|r| r.origin.x));
             assert!(origins.eq(expected.iter().map(|s| *s as f32)));
             for packet in packets {
                 for lane in 0..packet.rays.len() {

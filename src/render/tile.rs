@@ -12,9 +12,7 @@ pub(super) fn mosaic_start(start: u32, length: u32, full: u32) -> u32 {
     let (number, count) = (u64::from(start / SIDE), u64::from(length.div_ceil(SIDE)));
     let middle = (2 * number + 1) * u64::from(full) / (2 * count);
     let middle = u32::try_from(middle).unwrap_or(full);
-    middle
-        .saturating_sub(SIDE / 2)
-        .min(full.saturating_sub(SIDE))
+    middle.saturating_sub(SIDE / 2).min(full.saturating_sub(SIDE))
 }
 
 /// Column and row of each pixel of `tile` along a Z-order curve. Every aligned square with a power of two as its edge

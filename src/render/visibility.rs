@@ -61,25 +61,13 @@ impl RenderContext<'_> {
             Interior::Body => {
                 let inside = segments.inside;
                 let (samples, transmittance) = (&*samples, &mut transmittance);
-                self.cross_body(
-                    particles,
-                    samples,
-                    coherence,
-                    inside,
-                    crossings,
-                    transmittance,
-                )
+                self.cross_body(particles, samples, coherence, inside, crossings, transmittance)
             }
             _ => self.cross_spheres(particles, samples, &mut transmittance),
         };
         // Attenuate the light
         let unoccluded = samples.radiance;
-        product(
-            self.simd,
-            &unoccluded,
-            &transmittance,
-            &mut samples.radiance,
-        );
+        product(self.simd, &unoccluded, &transmittance, &mut samples.radiance);
         reached
     }
 
@@ -172,13 +160,7 @@ impl RenderContext<'_> {
             // Attenuate by the medium up to the crossing, and by the crossing
             let lanes = alive & inside;
             let length = inside_lengths(rays, hits, crossing, lanes, &from);
-            attenuate(
-                self.simd,
-                &boundary.extinction,
-                &length,
-                lanes,
-                transmittance,
-            );
+            attenuate(self.simd, &boundary.extinction, &length, lanes, transmittance);
             cross_straight(self.simd, boundary, rays, hits, crossing, transmittance);
 
             // End rays without transmittance
@@ -215,11 +197,7 @@ fn inside_lengths(
 ) -> Lanes {
     let mut length = splat(0.0);
     for lane in lanes_in(lanes) {
-        let end = if crossing >> lane & 1 == 1 {
-            hits.t[lane]
-        } else {
-            rays.t_max[lane]
-        };
+        let end = if crossing >> lane & 1 == 1 { hits.t[lane] } else { rays.t_max[lane] };
         if end.is_finite() {
             length[lane] = end - from[lane];
         }

@@ -88,12 +88,8 @@ impl Integrator for WhittedIntegrator<'_> {
             if material.constants().sends_rays() {
                 // At the last depth, rays see the background
                 let is_last = depth >= context.settings.max_depth;
-                let hits = SpecularHits {
-                    segments,
-                    depth,
-                    lanes,
-                    last: if is_last { lanes } else { 0 },
-                };
+                let hits =
+                    SpecularHits { segments, depth, lanes, last: if is_last { lanes } else { 0 } };
                 let (constants, split) = (material.constants(), &self.split);
                 let (simd, background) = (context.simd, &context.background);
                 let escape = Escape {
@@ -161,18 +157,11 @@ impl WhittedIntegrator<'_> {
             }
             if let Some(mut matte) = arriving {
                 // Reflect the light without the highlight
-                let constants = &WhittedMaterial {
-                    specular: 0.0,
-                    ..*constants
-                };
-                reflect_lights(
-                    simd, constants, rays, points, base, weight, lanes, &mut matte,
-                );
+                let constants = &WhittedMaterial { specular: 0.0, ..*constants };
+                reflect_lights(simd, constants, rays, points, base, weight, lanes, &mut matte);
                 split.diffuse = ratio(&matte.radiance, &samples.radiance);
             }
-            let unoccluded = split
-                .has_shadow
-                .then_some((samples.lanes, samples.radiance));
+            let unoccluded = split.has_shadow.then_some((samples.lanes, samples.radiance));
             let visible = if light.casts_shadow() {
                 let context = &self.context;
                 context.trace_shadow_rays(segments, depth, samples, crossings, counts)

@@ -31,38 +31,22 @@ fn scene(material: Material) -> Scene {
 }
 
 const fn glass() -> Material {
-    Material {
-        ambient: 1.0,
-        ior: 1.5,
-        transmission: 1.0,
-        ..Material::DEFAULT
-    }
+    Material { ambient: 1.0, ior: 1.5, transmission: 1.0, ..Material::DEFAULT }
 }
 
 /// The centre pixel of `scene`.
 fn middle(surface: &Balls, scene: &Scene, max_depth: u32) -> (Vec3, RayCounts) {
-    let settings = RenderSettings {
-        max_depth,
-        ..RenderSettings::new(1, 1)
-    };
+    let settings = RenderSettings { max_depth, ..RenderSettings::new(1, 1) };
     let source = ParticleShading::constant(Vec3::ONE);
-    let (film, counts) = render(
-        &[surface],
-        scene,
-        &source,
-        &settings,
-        &AtomicBool::new(false),
-    )
-    .unwrap();
+    let (film, counts) =
+        render(&[surface], scene, &source, &settings, &AtomicBool::new(false)).unwrap();
     (Vec3::from_slice(&film.color[0][..3]), counts)
 }
 
 fn image(surface: &Balls, scene: &Scene, settings: &RenderSettings) -> Film {
     let source = ParticleShading::constant(Vec3::ONE);
     let never = AtomicBool::new(false);
-    render(&[surface], scene, &source, settings, &never)
-        .unwrap()
-        .0
+    render(&[surface], scene, &source, settings, &never).unwrap().0
 }
 
 #[track_caller]
@@ -78,11 +62,7 @@ fn assert_within(limit: f32, value: Vec3, expected: f32) {
 
 /// A background that is `front` along +y and `back` along -y.
 fn front_and_back(front: f32, back: f32) -> Background {
-    Background::Gradient {
-        bottom: Vec3::splat(back),
-        top: Vec3::splat(front),
-        up: Vec3::Y,
-    }
+    Background::Gradient { bottom: Vec3::splat(back), top: Vec3::splat(front), up: Vec3::Y }
 }
 
 #[test]
@@ -115,11 +95,7 @@ fn equation_4_1_through_the_middle_of_a_glass_ball() {
 
 #[test]
 fn the_weights_scale_their_rays_and_zero_traces_none() {
-    let mut scene = scene(Material {
-        reflection: 0.5,
-        transmission: 0.25,
-        ..glass()
-    });
+    let mut scene = scene(Material { reflection: 0.5, transmission: 0.25, ..glass() });
     scene.background = front_and_back(0.5, 2.0);
     let ball = Balls::one(Vec3::ZERO, 1.0);
     let (value, _) = middle(&ball, &scene, 1);
@@ -141,10 +117,7 @@ fn refraction_through_a_ball_leaves_at_the_known_angle() {
             up: DVec3::Z,
             fov: 20.0,
         };
-        let mut scene = scene(Material {
-            reflection: 0.0,
-            ..glass()
-        });
+        let mut scene = scene(Material { reflection: 0.0, ..glass() });
         scene.camera = Camera::new(&view, 1.0, DVec3::ZERO).unwrap();
         // Brightness encodes the angle to +y.
         scene.background = front_and_back(1.0, 0.0);
@@ -182,33 +155,19 @@ fn total_internal_reflection_keeps_everything_inside() {
 
 #[test]
 fn shadows_are_opaque_or_attenuated_per_interface() {
-    let up_front = [Ball {
-        center: Vec3::new(0.0, -5.0, 5.0),
-        radius: 0.5,
-    }];
-    let beyond = [Ball {
-        center: Vec3::new(0.0, -12.0, 12.0),
-        radius: 0.5,
-    }];
+    let up_front = [Ball { center: Vec3::new(0.0, -5.0, 5.0), radius: 0.5 }];
+    let beyond = [Ball { center: Vec3::new(0.0, -12.0, 12.0), radius: 0.5 }];
     let lit = |material: Material, between: &[Ball]| {
-        let mut scene = scene(Material {
-            diffuse: 1.0,
-            specular: 0.0,
-            reflection: 0.0,
-            ..material
-        });
+        let mut scene =
+            scene(Material { diffuse: 1.0, specular: 0.0, reflection: 0.0, ..material });
         scene.background = Background::Constant(Vec3::ZERO);
         // In line with the point (0, -1, 0) and the centres of the balls, at 45 degrees.
         let light = Light::point(DVec3::new(0.0, -10.0, 9.0), DVec3::ZERO, Vec3::ONE);
         scene.lights = vec![light];
-        let mut balls = vec![Ball {
-            center: Vec3::ZERO,
-            radius: 1.0,
-        }];
-        balls.extend(between.iter().map(|b| Ball {
-            center: b.center + Vec3::new(0.0, 0.0, -1.0),
-            ..*b
-        }));
+        let mut balls = vec![Ball { center: Vec3::ZERO, radius: 1.0 }];
+        balls.extend(
+            between.iter().map(|b| Ball { center: b.center + Vec3::new(0.0, 0.0, -1.0), ..*b }),
+        );
         middle(&Balls(balls), &scene, 1)
     };
     let cosine = 0.5_f32.sqrt();
@@ -221,11 +180,7 @@ fn shadows_are_opaque_or_attenuated_per_interface() {
     assert_near(lit(opaque, &beyond).0, cosine);
 
     // Through the centre of a ball: two crossings at normal incidence.
-    let clear = Material {
-        transmission: 0.5,
-        ior: 1.5,
-        ..Material::DEFAULT
-    };
+    let clear = Material { transmission: 0.5, ior: 1.5, ..Material::DEFAULT };
     let through = 0.5 * (1.0 - R);
     assert_near(lit(clear, &up_front).0, cosine * through * through);
     assert_near(lit(clear, &beyond).0, cosine);
@@ -263,17 +218,9 @@ fn energy_never_grows() {
     );
     for (reflection, transmission) in [(1.0, 1.0), (1.0, 0.0), (0.0, 1.0), (0.7, 0.6)] {
         for ior in [0.7, 1.0, 1.33, 2.4] {
-            let scene = scene(Material {
-                reflection,
-                transmission,
-                ior,
-                ..Material::DEFAULT
-            });
-            let settings = RenderSettings {
-                max_depth: 6,
-                samples: 3,
-                ..RenderSettings::new(24, 24)
-            };
+            let scene = scene(Material { reflection, transmission, ior, ..Material::DEFAULT });
+            let settings =
+                RenderSettings { max_depth: 6, samples: 3, ..RenderSettings::new(24, 24) };
             let film = image(&balls, &scene, &settings);
             let values = film.color.iter().flatten();
             let worst = values.copied().fold(0.0, f32::max);
@@ -312,10 +259,8 @@ fn no_acne_and_no_leaks_at_any_scale() {
             scene.background = Background::Constant(Vec3::ZERO);
             scene.lights = vec![Light::point(from(-10.0), DVec3::ZERO, Vec3::ONE)];
             let ball = Balls::one(center, scale);
-            let settings = RenderSettings {
-                channels: Channels::ALL,
-                ..RenderSettings::new(48, 48)
-            };
+            let settings =
+                RenderSettings { channels: Channels::ALL, ..RenderSettings::new(48, 48) };
             let film = image(&ball, &scene, &settings);
             let normals = film.normal.as_ref().unwrap();
             let mut hits = 0;
@@ -327,24 +272,14 @@ fn no_acne_and_no_leaks_at_any_scale() {
                     let to_light = (from(-10.0).as_vec3() - position).normalize();
                     let cosine = normal.dot(to_light);
                     // Cosines near 0 may have either sign.
-                    assert!(
-                        (color[0] - cosine).abs() < 2e-3,
-                        "{scale}: {color:?} {cosine}"
-                    );
+                    assert!((color[0] - cosine).abs() < 2e-3, "{scale}: {color:?} {cosine}");
                 }
             }
             assert!(hits > 1000, "{hits}");
 
             // The light is inside a second ball that contains neither the camera nor the first ball.
-            let shade = Ball {
-                center: center + Vec3::new(0.0, -10.0, 5.0) * scale,
-                radius: scale,
-            };
-            scene.lights = vec![Light::point(
-                shade.center.as_dvec3(),
-                DVec3::ZERO,
-                Vec3::ONE,
-            )];
+            let shade = Ball { center: center + Vec3::new(0.0, -10.0, 5.0) * scale, radius: scale };
+            scene.lights = vec![Light::point(shade.center.as_dvec3(), DVec3::ZERO, Vec3::ONE)];
             let both = Balls(vec![ball.0[0], shade]);
             let film = image(&both, &scene, &settings);
             assert!(film.color.iter().all(|c| c[0] == 0.0), "{scale}");
@@ -357,10 +292,7 @@ fn a_glass_ball_has_no_acne_inside() {
     // With weights 1 and a constant background every hit adds exactly its ambient light; a ray that hit the same wall
     // twice would add it once more.
     for scale in [1e-4_f32, 1.0, 1e4] {
-        let mut scene = scene(Material {
-            reflection: 0.0,
-            ..glass()
-        });
+        let mut scene = scene(Material { reflection: 0.0, ..glass() });
         let view = CameraView {
             eye: DVec3::new(0.0, -10.0, 0.0) * f64::from(scale),
             look_at: DVec3::ZERO,
@@ -368,10 +300,7 @@ fn a_glass_ball_has_no_acne_inside() {
             fov: 11.0,
         };
         scene.camera = Camera::new(&view, 1.0, DVec3::ZERO).unwrap();
-        let settings = RenderSettings {
-            max_depth: 10,
-            ..RenderSettings::new(40, 40)
-        };
+        let settings = RenderSettings { max_depth: 10, ..RenderSettings::new(40, 40) };
         let source = ParticleShading::constant(Vec3::ONE);
         let never = AtomicBool::new(false);
         let ball = Balls::one(Vec3::ZERO, scale);
@@ -408,10 +337,7 @@ fn ground_receives_shadows_and_blocks_light_from_below() {
     assert_near(middle(&above, &scene, 1).0, 0.0);
     assert_near(middle(&aside, &scene, 1).0, 0.5 * 0.7);
     // Planes of a pixel on the ground.
-    let settings = RenderSettings {
-        channels: Channels::ALL,
-        ..RenderSettings::new(1, 1)
-    };
+    let settings = RenderSettings { channels: Channels::ALL, ..RenderSettings::new(1, 1) };
     let film = image(&aside, &scene, &settings);
     assert_eq!(film.color[0][3], 1.0);
     assert_eq!(film.id.unwrap()[0], NO_ID);

@@ -14,10 +14,6 @@ pub struct DataWindow {
 impl DataWindow {
     /// The window of a film that is the whole image.
     pub const fn whole(width: u32, height: u32) -> Self {
-        Self {
-            left: 0,
-            top: 0,
-            image: [width, height],
-        }
+        Self { left: 0, top: 0, image: [width, height] }
     }
 }

@@ -8,10 +8,7 @@ use spherule_formats::is_control;
 /// change the direction of text are replaced by escape sequences.
 pub(super) fn escaped(text: &str) -> Cow<'_, str> {
     let is_odd = |c: char| is_control(c) && c != '\n' && c != '\t';
-    if !text
-        .chars()
-        .any(|c| matches!(c, '&' | '<' | '>' | '"' | '\'') || is_odd(c))
-    {
+    if !text.chars().any(|c| matches!(c, '&' | '<' | '>' | '"' | '\'') || is_odd(c)) {
         return Cow::Borrowed(text);
     }
     let mut html = String::with_capacity(text.len() + 16);

@@ -223,12 +223,7 @@ impl FrameBytes {
 
     /// Memory during tracing: positions, structure, surface and attributes.
     pub const fn held(&self) -> u64 {
-        saturating_sum(&[
-            self.positions,
-            self.structure,
-            self.surface,
-            self.attributes,
-        ])
+        saturating_sum(&[self.positions, self.structure, self.surface, self.attributes])
     }
 
     /// The part of [`Self::held`] that is in anonymous memory.

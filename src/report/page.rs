@@ -34,18 +34,12 @@ impl Table {
 
     /// Adds a row; missing cells are empty.
     pub fn row(&mut self, cells: impl IntoIterator<Item = String>) {
-        self.rows.push(Row {
-            class: None,
-            cells: cells.into_iter().collect(),
-        });
+        self.rows.push(Row { class: None, cells: cells.into_iter().collect() });
     }
 
     /// Adds a highlighted row for a failure.
     pub fn bad_row(&mut self, cells: impl IntoIterator<Item = String>) {
-        self.rows.push(Row {
-            class: Some("bad"),
-            cells: cells.into_iter().collect(),
-        });
+        self.rows.push(Row { class: Some("bad"), cells: cells.into_iter().collect() });
     }
 
     /// Whether there are no rows.
@@ -60,13 +54,7 @@ impl Table {
 
     fn html(&self) -> String {
         let columns: Vec<&str> = (0..self.heads.len())
-            .map(|i| {
-                if self.is_numeric(i) {
-                    " class=\"number\""
-                } else {
-                    ""
-                }
-            })
+            .map(|i| if self.is_numeric(i) { " class=\"number\"" } else { "" })
             .collect();
         let mut html = format!(
             "<div class=\"wide\" tabindex=\"0\">\n<table id=\"{}\">\n<thead><tr>",
@@ -77,9 +65,7 @@ impl Table {
         }
         html += "</tr></thead>\n<tbody>\n";
         for row in &self.rows {
-            html += &row
-                .class
-                .map_or_else(|| "<tr>".to_owned(), |c| format!("<tr class=\"{c}\">"));
+            html += &row.class.map_or_else(|| "<tr>".to_owned(), |c| format!("<tr class=\"{c}\">"));
             let blank = String::new();
             let cells = row.cells.iter().chain(std::iter::repeat(&blank));
             for (cell, class) in cells.zip(&columns) {
@@ -130,9 +116,7 @@ impl Page {
         // Strings of JSON may contain any text, but nothing that ends the element
         let json = data.to_string().replace('<', "\\u003c");
         let id = escaped(id);
-        self.put(format_args!(
-            "<script type=\"application/json\" id=\"{id}\">{json}</script>\n"
-        ));
+        self.put(format_args!("<script type=\"application/json\" id=\"{id}\">{json}</script>\n"));
     }
 
     /// Sets additional style rules.
@@ -148,11 +132,7 @@ impl Page {
 
     /// Begins a section; `id` is a link target.
     pub fn section(&mut self, id: &str, heading: &str) {
-        self.put(format_args!(
-            "<h2 id=\"{}\">{}</h2>\n",
-            escaped(id),
-            escaped(heading)
-        ));
+        self.put(format_args!("<h2 id=\"{}\">{}</h2>\n", escaped(id), escaped(heading)));
     }
 
     /// Adds a paragraph.
@@ -203,10 +183,7 @@ impl Page {
 
     /// Begins a collapsed part.
     pub fn fold(&mut self, heading: &str) {
-        self.put(format_args!(
-            "<details>\n<summary>{}</summary>\n",
-            escaped(heading)
-        ));
+        self.put(format_args!("<details>\n<summary>{}</summary>\n", escaped(heading)));
     }
 
     /// Ends the collapsed part.
@@ -216,12 +193,8 @@ impl Page {
 
     /// The whole file.
     pub fn html(&self) -> String {
-        let script = self
-            .script
-            .map(|s| format!("<script>\n{}</script>\n", s.code));
-        let policy = self
-            .script
-            .map(|s| format!(" {}; script-src 'unsafe-inline'", s.images));
+        let script = self.script.map(|s| format!("<script>\n{}</script>\n", s.code));
+        let policy = self.script.map(|s| format!(" {}; script-src 'unsafe-inline'", s.images));
         // The empty icon prevents browsers from requesting one from a server.
         format!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
@@ -241,9 +214,7 @@ impl Page {
     }
 
     fn put(&mut self, html: std::fmt::Arguments) {
-        self.body
-            .write_fmt(html)
-            .expect("a string takes everything");
+        self.body.write_fmt(html).expect("a string takes everything");
     }
 }
 
@@ -327,10 +298,7 @@ mod tests {
         assert!(html.contains("img-src data: 'self'; script-src 'unsafe-inline'\">"));
         let (_, after) = html.split_once("id=\"data\">").unwrap();
         let (json, _) = after.split_once("</script>").unwrap();
-        assert_eq!(
-            serde_json::from_str::<serde_json::Value>(json).unwrap(),
-            hostile
-        );
+        assert_eq!(serde_json::from_str::<serde_json::Value>(json).unwrap(), hostile);
     }
 
     #[test]

@@ -28,10 +28,7 @@ pub(super) fn bonds(
         BondSearch::Distance(distance) => BondRule::Distance(narrow(distance)),
         BondSearch::Covalent => {
             require_attribute(survey, "bonds.find", ELEMENT)?;
-            BondRule::Covalent {
-                name: ELEMENT.to_owned(),
-                angstrom: survey.angstrom,
-            }
+            BondRule::Covalent { name: ELEMENT.to_owned(), angstrom: survey.angstrom }
         }
     };
     let color = rule(&own.color, particles, survey, ELEMENT, "bonds.color")?;

@@ -26,13 +26,7 @@ pub(super) fn path(
     let camera = &manifest.camera;
     let up = camera.up.unwrap_or(up);
     let [azimuth, elevation] = camera.angles(up);
-    let framing = Framing {
-        up,
-        azimuth,
-        elevation,
-        fov: camera.fov,
-        aspect,
-    };
+    let framing = Framing { up, azimuth, elevation, fov: camera.fov, aspect };
     let (path, fitted) = match (camera.mode, camera.projection) {
         (CameraMode::Auto, ProjectionKind::Perspective) => {
             (CameraPath::Still(framed.view(&framing)), 0.0)
@@ -63,9 +57,7 @@ pub(super) fn path(
         (CameraMode::Keys, _) => {
             let keys = camera.keys.iter().map(|key| keyed(key, up, camera.fov));
             let keys: Vec<CameraKey> = keys.collect();
-            let heights = keys
-                .iter()
-                .map(|key| framed.height_around(&key.view, aspect));
+            let heights = keys.iter().map(|key| framed.height_around(&key.view, aspect));
             let height = heights.fold(0.0, f64::max);
             (CameraPath::through(keys)?, height)
         }
@@ -77,9 +69,9 @@ pub(super) fn path(
     };
     let projection = match camera.projection {
         ProjectionKind::Perspective => Projection::Perspective,
-        ProjectionKind::Orthographic => Projection::Orthographic {
-            height: camera.height.unwrap_or(fitted) / camera.zoom,
-        },
+        ProjectionKind::Orthographic => {
+            Projection::Orthographic { height: camera.height.unwrap_or(fitted) / camera.zoom }
+        }
         ProjectionKind::Equirectangular => Projection::Equirectangular,
     };
     Ok((path, projection))
@@ -116,9 +108,7 @@ pub fn with_framed_meshes<'a>(
     });
     let mut survey = survey.clone();
     if let Some(outline) = &mut survey.outline {
-        outline
-            .points
-            .extend(corners.map(|corner| corner.as_vec3()));
+        outline.points.extend(corners.map(|corner| corner.as_vec3()));
     }
     Cow::Owned(survey)
 }
@@ -201,10 +191,9 @@ pub(super) fn lens(
     let camera = &manifest.camera;
     let aperture = match (camera.aperture, camera.f_stop) {
         (Some(diameter), _) if diameter > 0.0 => Aperture::Diameter(diameter),
-        (None, f_stop) if f_stop > 0.0 => Aperture::FStop {
-            f_stop,
-            sensor_width: camera.sensor_width,
-        },
+        (None, f_stop) if f_stop > 0.0 => {
+            Aperture::FStop { f_stop, sensor_width: camera.sensor_width }
+        }
         _ => return Ok(None),
     };
     let focus = match camera.focus {
@@ -229,12 +218,10 @@ pub fn check_views(
         return Ok(());
     }
     for frame in frames {
-        setup
-            .camera_at(frame)
-            .map_err(|source| ResolveError::View {
-                place: place(&setup.picture.path, frame),
-                source,
-            })?;
+        setup.camera_at(frame).map_err(|source| ResolveError::View {
+            place: place(&setup.picture.path, frame),
+            source,
+        })?;
     }
     Ok(())
 }

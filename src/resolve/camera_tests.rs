@@ -35,13 +35,7 @@ pub(in crate::resolve) fn survey() -> Survey {
 }
 
 fn key(frame: i64, eye: [f64; 3]) -> Key {
-    Key {
-        frame,
-        eye: eye.into(),
-        look_at: DVec3::ZERO,
-        up: None,
-        fov: None,
-    }
+    Key { frame, eye: eye.into(), look_at: DVec3::ZERO, up: None, fov: None }
 }
 
 fn setup(change: impl FnOnce(&mut manifest::Camera)) -> Result<Setup, ResolveError> {
@@ -138,14 +132,8 @@ fn invalid_key_view_is_named() {
 fn invalid_frame_view_is_named() {
     // Paths through the point that the camera looks at, and vertically above it.
     for (eyes, what) in [
-        (
-            [[5.0, 0.0, 0.0], [-5.0, 0.0, 0.0]],
-            "eye and look_at are the same point",
-        ),
-        (
-            [[5.0, 0.0, 5.0], [-5.0, 0.0, 5.0]],
-            "up is zero or points along the view",
-        ),
+        ([[5.0, 0.0, 0.0], [-5.0, 0.0, 0.0]], "eye and look_at are the same point"),
+        ([[5.0, 0.0, 5.0], [-5.0, 0.0, 5.0]], "up is zero or points along the view"),
     ] {
         let setup = keyed_setup([key(10, eyes[0]), key(20, eyes[1])]).unwrap();
         check_views(&setup, (0..15).chain(16..30)).unwrap();

@@ -30,12 +30,7 @@ pub(super) fn channels(
     let unsupported = |what: String| ResolveError::Unsupported { key: KEY, what };
     // Find the channels with fixed names
     let is_named = |channel: &&Channel| matches!(channel, Channel::Named(_));
-    let names: Vec<_> = output
-        .channels
-        .iter()
-        .filter(is_named)
-        .map(Channel::name)
-        .collect();
+    let names: Vec<_> = output.channels.iter().filter(is_named).map(Channel::name).collect();
     let channels = Channels::from_names(names.iter().map(|name| &**name));
     let mut channels = channels.map_err(|e| unsupported(e.to_string()))?;
     channels.layers.mattes.set_levels(output.cryptomatte_levels);
@@ -87,10 +82,7 @@ fn attribute(name: &str, survey: &Survey) -> Result<AttributeChannel, ResolveErr
             "channels of OpenEXR files need short names in ASCII; rename the attribute",
         ));
     }
-    let index = survey
-        .attributes
-        .iter()
-        .position(|a| a.eq_ignore_ascii_case(name));
+    let index = survey.attributes.iter().position(|a| a.eq_ignore_ascii_case(name));
     let components = index.and_then(|index| survey.components.get(index));
     let components = components.copied().unwrap_or(1);
     Ok(AttributeChannel {
@@ -131,10 +123,7 @@ pub(super) const UNKNOWN_STEP: &str =
 pub(super) fn step_to_next(output: &Output, survey: &Survey) -> Option<FrameStep> {
     let time = output.frame_time.or(survey.frame_time);
     let time = time.or_else(|| output.fps.map(f64::recip))?;
-    Some(FrameStep {
-        time: narrow(time),
-        numbers: survey.frame_numbers.unwrap_or(1),
-    })
+    Some(FrameStep { time: narrow(time), numbers: survey.frame_numbers.unwrap_or(1) })
 }
 
 /// Whether the frames have velocities.

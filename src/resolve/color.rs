@@ -60,10 +60,7 @@ pub(super) fn rule(
         ColorSetting::Auto => match (&survey.color, &survey.rgb) {
             (Some(_), _) => &ColorMapping::default(),
             (None, Some(rgb)) => {
-                return Ok(ColorRule::Rgb {
-                    name: rgb.attribute.clone(),
-                    required: false,
-                });
+                return Ok(ColorRule::Rgb { name: rgb.attribute.clone(), required: false });
             }
             (None, None) => return Ok(constant),
         },
@@ -81,10 +78,7 @@ pub(super) fn rule(
     let value = value_of(survey, name, ATTRIBUTE)?;
     // Any other key means that vectors are mapped by their length
     if by.is_plain() && survey.rgb.is_some() {
-        return Ok(ColorRule::Rgb {
-            name: name.clone(),
-            required: true,
-        });
+        return Ok(ColorRule::Rgb { name: name.clone(), required: true });
     }
     let mut color = survey.color.clone().unwrap_or_else(|| ColorRange {
         attribute: name.clone(),
@@ -183,19 +177,11 @@ pub(super) fn mapped(
         ScaleKind::Categorical => categories(by, color)?,
         _ => continuous(by, color)?,
     };
-    Ok(ColorRule::Attribute {
-        name: color.attribute.clone(),
-        map,
-        required,
-        needs_geometry,
-    })
+    Ok(ColorRule::Attribute { name: color.attribute.clone(), map, required, needs_geometry })
 }
 
 fn unknown_map(error: UnknownColorMap) -> ResolveError {
-    ResolveError::Unsupported {
-        key: "material.color.map",
-        what: error.to_string(),
-    }
+    ResolveError::Unsupported { key: "material.color.map", what: error.to_string() }
 }
 
 fn unsupported_scale(what: String) -> ResolveError {
@@ -223,10 +209,7 @@ fn categories(by: &ColorMapping, color: &ColorRange) -> Result<ColorMap, Resolve
         None => &none,
     };
     // Frames that were not surveyed may have the other categories with names
-    let named = by
-        .names
-        .iter()
-        .flat_map(|names| names.0.iter().map(|(value, _)| *value));
+    let named = by.names.iter().flat_map(|names| names.0.iter().map(|(value, _)| *value));
     let mut all: Vec<i64> = values.iter().copied().chain(named).collect();
     all.sort_unstable();
     all.dedup();
@@ -258,14 +241,8 @@ fn continuous(by: &ColorMapping, color: &ColorRange) -> Result<ColorMap, Resolve
         }
         ScaleKind::SymLog => {
             let largest = range[0].abs().max(range[1].abs());
-            let usual = if largest > 0.0 {
-                THRESHOLD * largest
-            } else {
-                1.0
-            };
-            ColorScale::SymLog {
-                threshold: by.threshold.unwrap_or(usual),
-            }
+            let usual = if largest > 0.0 { THRESHOLD * largest } else { 1.0 };
+            ColorScale::SymLog { threshold: by.threshold.unwrap_or(usual) }
         }
     };
     let name = by.map().name();

@@ -71,9 +71,7 @@ pub(super) fn ground(
         });
     }
     // Place it under the particles
-    let Floor {
-        bounds, up, origin, ..
-    } = *floor;
+    let Floor { bounds, up, origin, .. } = *floor;
     let mut ground = Ground::under(bounds, up.as_vec3(), origin);
     if let Some(height) = render.ground_height {
         let relative = narrow(height - origin.dot(up.normalize_or(DVec3::Z)));
@@ -88,11 +86,7 @@ pub(super) fn ground(
         ground.raise(narrow(floor.reach.min(most)));
     }
     if is_catcher {
-        let fade = if floor.is_of_earlier_version {
-            FAR_FADE
-        } else {
-            NEAR_FADE
-        };
+        let fade = if floor.is_of_earlier_version { FAR_FADE } else { NEAR_FADE };
         let catcher = ground.into_shadow_catcher(bounds, render.ground_shadow, fade);
         return Ok(Some(catcher));
     }
@@ -146,10 +140,8 @@ mod tests {
     use super::*;
     use crate::manifest::GroundSetting;
 
-    const BOUNDS: Bounds = Bounds {
-        min: DVec3::new(-1.0, -2.0, 3.0),
-        max: DVec3::new(1.0, 2.0, 7.0),
-    };
+    const BOUNDS: Bounds =
+        Bounds { min: DVec3::new(-1.0, -2.0, 3.0), max: DVec3::new(1.0, 2.0, 7.0) };
 
     fn of(
         kind: GroundKind,
@@ -198,14 +190,8 @@ mod tests {
         // fades from 2 to 8 diagonals, which are 6 long
         let catcher = of(GroundKind::ShadowCatcher, |m| m.render.ground_shadow = 0.5);
         let catcher = catcher.unwrap().unwrap();
-        assert_eq!(
-            (catcher.height, catcher.shadow_catcher),
-            (3.0144, Some(0.5))
-        );
-        let standing = Floor {
-            is_of_earlier_version: false,
-            ..floor(true)
-        };
+        assert_eq!((catcher.height, catcher.shadow_catcher), (3.0144, Some(0.5)));
+        let standing = Floor { is_of_earlier_version: false, ..floor(true) };
         let mut manifest = Manifest::new("in");
         manifest.render.ground = Some(GroundSetting::of(GroundKind::ShadowCatcher));
         assert_eq!(ground(&manifest, &standing).unwrap().unwrap().height, 3.0);
@@ -214,9 +200,7 @@ mod tests {
         });
         assert_eq!(under_body.unwrap().unwrap().height, 3.25);
         assert_eq!([catcher.fade_start, catcher.fade_end], [12.0, 48.0]);
-        let low = of(GroundKind::ShadowCatcher, |m| {
-            m.render.ground_height = Some(2.0)
-        });
+        let low = of(GroundKind::ShadowCatcher, |m| m.render.ground_height = Some(2.0));
         assert_eq!(low.unwrap().unwrap().height, 2.0);
     }
 
@@ -224,9 +208,7 @@ mod tests {
     fn whitted_has_no_shadow_catcher() {
         let whitted =
             |manifest: &mut Manifest| manifest.render.integrator = Some(IntegratorKind::Whitted);
-        let error = of(GroundKind::ShadowCatcher, whitted)
-            .unwrap_err()
-            .to_string();
+        let error = of(GroundKind::ShadowCatcher, whitted).unwrap_err().to_string();
         assert!(error.starts_with("render.ground: ") && error.contains("--integrator path"));
         assert!(of(GroundKind::Checker, whitted).unwrap().is_some());
     }

@@ -11,14 +11,7 @@ use crate::manifest::Manifest;
 use crate::survey::Survey;
 
 /// The six orders of the axes, from the one that varies slowest.
-const ORDERS: [[usize; 3]; 6] = [
-    [0, 1, 2],
-    [0, 2, 1],
-    [1, 0, 2],
-    [1, 2, 0],
-    [2, 0, 1],
-    [2, 1, 0],
-];
+const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
 
 const STEP: f32 = 0.02;
 
@@ -68,11 +61,7 @@ fn is_shown(counts: [u16; 3], order: [usize; 3]) {
     // Colours begin at the lowest layer and end at the highest
     let color = survey.color.as_ref().expect("requested");
     assert!(color.low.abs() <= 0.01 * height, "{name}: {}", color.low);
-    assert!(
-        (color.high / height - 1.0).abs() <= 0.01,
-        "{name}: {}",
-        color.high
-    );
+    assert!((color.high / height - 1.0).abs() <= 0.01, "{name}: {}", color.high);
     // All corners are in the picture
     let setup = setup(&manifest, &survey, &SceneImages::default()).expect("possible");
     let camera = setup.camera_at(0).expect("a camera");
@@ -88,9 +77,7 @@ fn is_shown(counts: [u16; 3], order: [usize; 3]) {
 
 #[test]
 fn lattices_of_all_orders_are_shown_as_a_whole() {
-    for layers in [
-        10, 11, 12, 14, 15, 16, 18, 20, 22, 24, 25, 28, 30, 32, 35, 36, 40,
-    ] {
+    for layers in [10, 11, 12, 14, 15, 16, 18, 20, 22, 24, 25, 28, 30, 32, 35, 36, 40] {
         for order in ORDERS {
             is_shown([40, 30, layers], order);
         }

@@ -58,37 +58,21 @@ fn light_of(light: &manifest::Light, origin: DVec3, up: DVec3) -> Option<Light> 
             to_light: -unit(direction),
             half_angle: (0.5 * size).to_radians(),
         },
-        LightKind::Sphere { position, radius } => scene::LightKind::Sphere {
-            center: relative(position),
-            radius: narrow(radius),
-        },
-        LightKind::Rect {
-            position,
-            direction,
-            width,
-            height,
-        } => scene::LightKind::Rectangle {
+        LightKind::Sphere { position, radius } => {
+            scene::LightKind::Sphere { center: relative(position), radius: narrow(radius) }
+        }
+        LightKind::Rect { position, direction, width, height } => scene::LightKind::Rectangle {
             center: relative(position),
             axes: axes(direction, up),
             half: [narrow(0.5 * width), narrow(0.5 * height)],
         },
-        LightKind::Disc {
-            position,
-            direction,
-            radius,
-        } => scene::LightKind::Disc {
+        LightKind::Disc { position, direction, radius } => scene::LightKind::Disc {
             center: relative(position),
             normal: unit(direction),
             radius: narrow(radius),
         },
     };
-    Some(Light {
-        kind,
-        radiance,
-        casts_shadow: true,
-        is_visible: light.visible,
-        group: 0,
-    })
+    Some(Light { kind, radiance, casts_shadow: true, is_visible: light.visible, group: 0 })
 }
 
 /// The unit vector along `direction`, which is not zero.

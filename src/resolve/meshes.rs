@@ -23,10 +23,7 @@ pub fn mesh_settings(
     survey: &Survey,
     budget: MemoryBudget,
 ) -> Vec<MeshSettings> {
-    let particles = Bounds {
-        min: survey.min,
-        max: survey.max,
-    };
+    let particles = Bounds { min: survey.min, max: survey.max };
     let settings = |mesh: &manifest::Mesh| MeshSettings {
         scale: mesh.scale,
         translate: mesh.translate,

@@ -17,12 +17,8 @@ pub(super) fn opacity(
     survey: &Survey,
     is_clear: bool,
 ) -> Result<OpacityRule, ResolveError> {
-    let unsupported = |what: &str| {
-        Err(ResolveError::Unsupported {
-            key: KEY,
-            what: what.to_owned(),
-        })
-    };
+    let unsupported =
+        |what: &str| Err(ResolveError::Unsupported { key: KEY, what: what.to_owned() });
     let setting = &manifest.material.opacity;
     if *setting == OpacitySetting::Constant(1.0) {
         return Ok(OpacityRule::OPAQUE);

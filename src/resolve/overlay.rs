@@ -21,27 +21,16 @@ use crate::survey::{ParticleValue, Survey, shown_name};
 const COLORS: u16 = 256;
 
 /// Corners for colour bars and scale bars, best first.
-const BAR_CORNERS: [Corner; 4] = [
-    Corner::BottomRight,
-    Corner::TopRight,
-    Corner::BottomLeft,
-    Corner::TopLeft,
-];
+const BAR_CORNERS: [Corner; 4] =
+    [Corner::BottomRight, Corner::TopRight, Corner::BottomLeft, Corner::TopLeft];
 
 /// Corners for text and axes, best first.
-const TEXT_CORNERS: [Corner; 4] = [
-    Corner::TopLeft,
-    Corner::BottomLeft,
-    Corner::TopRight,
-    Corner::BottomRight,
-];
+const TEXT_CORNERS: [Corner; 4] =
+    [Corner::TopLeft, Corner::BottomLeft, Corner::TopRight, Corner::BottomRight];
 
 /// Whether positions of particles are needed to find a free corner.
 pub(super) fn needs_points(manifest: &Manifest) -> bool {
-    manifest
-        .overlays
-        .iter()
-        .any(|overlay| overlay.corner.is_none())
+    manifest.overlays.iter().any(|overlay| overlay.corner.is_none())
 }
 
 /// Adds the overlays of `manifest` to `setup`; `pictures` are those of its overlays of the type image, in this order.
@@ -72,10 +61,7 @@ pub(super) fn add_overlays(
         ..FrameView::default()
     };
     // Overlays without a corner leave those that others have
-    let given = manifest
-        .overlays
-        .iter()
-        .filter_map(|overlay| overlay.corner);
+    let given = manifest.overlays.iter().filter_map(|overlay| overlay.corner);
     let mut taken: Vec<Corner> = given.collect();
     let mut overlays = Vec::new();
     for own in &manifest.overlays {
@@ -83,34 +69,25 @@ pub(super) fn add_overlays(
         let offset = own.offset.map(|part| part as f32);
         let content = match &own.kind {
             OverlayKind::Image { height, .. } => pictures.next().map(|source| {
-                Content::Image(Image {
-                    source: Arc::clone(source),
-                    height: *height,
-                })
+                Content::Image(Image { source: Arc::clone(source), height: *height })
             }),
             kind => content(setup, manifest, survey, kind, view.units_per_height)?,
         };
         let Some(content) = content else { continue };
         let mut overlay = Overlay {
             content,
-            placement: Placement {
-                corner: own.corner.unwrap_or(Corner::TopLeft),
-                offset,
-            },
+            placement: Placement { corner: own.corner.unwrap_or(Corner::TopLeft), offset },
             size: own.size.fraction(picture[1], manifest.image.dpi),
             color: [0.0; 3],
             halo: [1.0; 3],
         };
         let size = overlay.measure(picture[1], &view);
         if own.corner.is_none() {
-            let is_bar = matches!(
-                own.kind,
-                OverlayKind::ColorBar { .. } | OverlayKind::ScaleBar { .. }
-            );
+            let is_bar =
+                matches!(own.kind, OverlayKind::ColorBar { .. } | OverlayKind::ScaleBar { .. });
             let order = if is_bar { BAR_CORNERS } else { TEXT_CORNERS };
-            let free: Vec<Corner> = (order.into_iter())
-                .filter(|corner| !taken.contains(corner))
-                .collect();
+            let free: Vec<Corner> =
+                (order.into_iter()).filter(|corner| !taken.contains(corner)).collect();
             let choice = if free.is_empty() { &order[..] } else { &free };
             overlay.placement.corner = Corner::freest(choice, offset, size, picture, &points);
             taken.push(overlay.placement.corner);
@@ -118,10 +95,7 @@ pub(super) fn add_overlays(
         let at = overlay.placement.center(size, picture);
         (overlay.color, overlay.halo) = colors(setup, camera, own, at);
         if let Content::Text(template) = &overlay.content {
-            setup
-                .picture
-                .overlay_values
-                .extend(template.names().map(str::to_owned));
+            setup.picture.overlay_values.extend(template.names().map(str::to_owned));
         }
         overlays.push(overlay);
     }
@@ -157,12 +131,7 @@ fn content(
     units_per_height: f64,
 ) -> Result<Option<Content>, ResolveError> {
     Ok(match kind {
-        OverlayKind::ColorBar {
-            title,
-            unit,
-            length,
-            orientation,
-        } => {
+        OverlayKind::ColorBar { title, unit, length, orientation } => {
             let Some((name, kind)) = color_bar(setup, manifest) else {
                 if survey.most_particles == 0 {
                     return Ok(None);
@@ -196,9 +165,9 @@ fn content(
             length: length.unwrap_or_else(|| ScaleBar::round_length(units_per_height)),
             unit: unit.clone().unwrap_or_default(),
         })),
-        OverlayKind::Axes => Some(Content::Axes(Axes {
-            names: ["x", "y", "z"].map(str::to_owned),
-        })),
+        OverlayKind::Axes => {
+            Some(Content::Axes(Axes { names: ["x", "y", "z"].map(str::to_owned) }))
+        }
         OverlayKind::Image { .. } => None,
     })
 }
@@ -211,9 +180,7 @@ fn color_bar(setup: &Setup, manifest: &Manifest) -> Option<(String, ColorBarKind
     let kind = match (map.range(), map.categories()) {
         (Some((range, scale)), _) => {
             let steps = map.steps();
-            let count = steps
-                .and_then(|steps| u16::try_from(steps).ok())
-                .unwrap_or(COLORS);
+            let count = steps.and_then(|steps| u16::try_from(steps).ok()).unwrap_or(COLORS);
             let at = |i: u16| match steps {
                 Some(_) => (f32::from(i) + 0.5) / f32::from(count),
                 None => f32::from(i) / f32::from(count - 1),
@@ -241,12 +208,10 @@ fn named(categories: &[(i64, Vec3)], manifest: &Manifest) -> Vec<(String, Color)
         let found = all.find(|(known, _)| *known == value);
         let symbol = || element_symbol(value).filter(|_| is_elements);
         let name = found.map(|(_, name)| name.clone());
-        name.or_else(|| symbol().map(str::to_owned))
-            .unwrap_or_else(|| value.to_string())
+        name.or_else(|| symbol().map(str::to_owned)).unwrap_or_else(|| value.to_string())
     };
     let all = categories.iter();
-    all.map(|(value, color)| (name(*value), srgb(*color)))
-        .collect()
+    all.map(|(value, color)| (name(*value), srgb(*color))).collect()
 }
 
 /// The time, with decimals for the time between frames, or the frame number.
@@ -321,7 +286,5 @@ fn backdrop(setup: &Setup, camera: &Camera, film: Vec2) -> Vec3 {
 }
 
 fn srgb(linear: Vec3) -> Color {
-    linear
-        .to_array()
-        .map(|v| srgb_from_linear(v.clamp(0.0, 1.0)))
+    linear.to_array().map(|v| srgb_from_linear(v.clamp(0.0, 1.0)))
 }

@@ -17,10 +17,7 @@ pub(super) fn parts(manifest: &Manifest, survey: &Survey) -> Result<PartMaterial
     if parts.is_empty() {
         return Ok(PartMaterials::default());
     }
-    let unsupported = |what: String| ResolveError::Unsupported {
-        key: "material.part",
-        what,
-    };
+    let unsupported = |what: String| ResolveError::Unsupported { key: "material.part", what };
     if manifest.integrator() != IntegratorKind::Path {
         return Err(unsupported(
             "render.integrator = \"whitted\" has one material for all particles; choose \"path\" (--integrator path), \
@@ -36,9 +33,7 @@ pub(super) fn parts(manifest: &Manifest, survey: &Survey) -> Result<PartMaterial
     }
     let is_part = |(name, components): (&String, Option<&usize>)| {
         components.is_none_or(|components| *components == 1)
-            && PART_NAMES
-                .iter()
-                .any(|part| name.eq_ignore_ascii_case(part))
+            && PART_NAMES.iter().any(|part| name.eq_ignore_ascii_case(part))
     };
     let components = survey.components.iter().map(Some);
     let components = components.chain(std::iter::repeat(None));
@@ -49,7 +44,5 @@ pub(super) fn parts(manifest: &Manifest, survey: &Survey) -> Result<PartMaterial
             attribute_list(survey.attributes.iter().map(String::as_str))
         )));
     }
-    Ok(PartMaterials::new(
-        parts.iter().map(Part::resolved).collect(),
-    ))
+    Ok(PartMaterials::new(parts.iter().map(Part::resolved).collect()))
 }

@@ -13,10 +13,7 @@ use crate::survey::Survey;
 /// # Errors
 /// The particles have no value with a name in the condition.
 pub(super) fn selection(manifest: &Manifest, survey: &Survey) -> Result<Selection, ResolveError> {
-    let selection = Selection {
-        up: Some(super::up(manifest, survey)),
-        ..manifest.selection()
-    };
+    let selection = Selection { up: Some(super::up(manifest, survey)), ..manifest.selection() };
     if survey.most_particles == 0 {
         return Ok(selection);
     }
@@ -52,10 +49,7 @@ pub(super) fn selection(manifest: &Manifest, survey: &Survey) -> Result<Selectio
 /// # Errors
 /// The surface cannot be cut, or a region is not convex.
 pub(super) fn cut(manifest: &Manifest, survey: &Survey) -> Result<ConvexRegion, ResolveError> {
-    let unsupported = |key, what: &str| ResolveError::Unsupported {
-        key,
-        what: what.to_owned(),
-    };
+    let unsupported = |key, what: &str| ResolveError::Unsupported { key, what: what.to_owned() };
     let cuts = manifest.selection().cuts;
     if !cuts.is_empty() && manifest.surface.kind != SurfaceKind::Spheres {
         let what =

@@ -22,10 +22,7 @@ pub(super) fn shutter(
     if camera.shutter == 0.0 {
         return Ok(None);
     }
-    let unsupported = |what: String| ResolveError::Unsupported {
-        key: "camera.shutter",
-        what,
-    };
+    let unsupported = |what: String| ResolveError::Unsupported { key: "camera.shutter", what };
     let surface = &manifest.surface;
     let has_own_normals = matches!(surface.normals, NormalKind::Auto | NormalKind::Sphere);
     if surface.kind == SurfaceKind::Spheres && !has_own_normals {
@@ -34,11 +31,7 @@ pub(super) fn shutter(
         ));
     }
     // Determine where the motion comes from
-    let is_id = |name: &String| {
-        names::ID
-            .iter()
-            .any(|known| name.eq_ignore_ascii_case(known))
-    };
+    let is_id = |name: &String| names::ID.iter().any(|known| name.eq_ignore_ascii_case(known));
     let has_velocities = has_velocities(survey);
     if survey.most_particles > 0 && !has_velocities && !survey.attributes.iter().any(is_id) {
         return Err(unsupported(format!(
@@ -61,10 +54,8 @@ pub(super) fn shutter(
         ));
     }
     // Without velocities, particles move from one frame to the next whatever the time is
-    let without_time = (!has_velocities).then(|| FrameStep {
-        time: 1.0,
-        numbers: survey.frame_numbers.unwrap_or(1),
-    });
+    let without_time = (!has_velocities)
+        .then(|| FrameStep { time: 1.0, numbers: survey.frame_numbers.unwrap_or(1) });
     let step = step_to_next(&manifest.output, survey).or(without_time);
     let step = step.ok_or_else(|| unsupported(format!("motion blur needs {UNKNOWN_STEP}")))?;
     let open = camera.shutter_offset.unwrap_or(-0.5 * camera.shutter);

@@ -84,10 +84,7 @@ pub(super) fn material(manifest: &Manifest, bounds: &Bounds) -> Material {
         SurfaceKind::Spheres => Fresnel::Schlick,
         SurfaceKind::Union | SurfaceKind::Smooth => Fresnel::Exact,
     };
-    Material {
-        extinction: material::extinction(m.absorption, length),
-        ..m.resolved(usual)
-    }
+    Material { extinction: material::extinction(m.absorption, length), ..m.resolved(usual) }
 }
 
 /// The larger of two values divided by the smaller.

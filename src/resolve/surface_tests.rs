@@ -39,10 +39,7 @@ fn each_surface_has_its_own_radius() {
     assert_eq!(radius(SurfaceKind::Spheres, &found), Some(0.4));
     assert_eq!(radius(SurfaceKind::Smooth, &found), Some(0.5));
     assert_eq!(radius(SurfaceKind::Union, &found), Some(0.9));
-    let older = Survey {
-        packed_radius: None,
-        ..found
-    };
+    let older = Survey { packed_radius: None, ..found };
     for kind in [SurfaceKind::Smooth, SurfaceKind::Union] {
         assert_eq!(radius(kind, &older), Some(0.4));
     }
@@ -52,18 +49,12 @@ fn each_surface_has_its_own_radius() {
 fn contradictory_settings_are_rejected() {
     refused("surface.normals = \"field\"", "surface.normals: \"field\"");
     refused("surface.exact = true", "surface.exact: is for the smooth");
-    refused(
-        "surface.spray = true",
-        "surface.spray: lies beside one body",
-    );
+    refused("surface.spray = true", "surface.spray: lies beside one body");
     for normals in ["pca", "sphere"] {
         let smooth = format!("render.surface = \"smooth\"\nsurface.normals = \"{normals}\"");
         refused(&smooth, "surface.normals: a smooth surface has");
     }
-    refused(
-        "render.surface = \"union\"\nsurface.exact = true",
-        "surface.exact",
-    );
+    refused("render.surface = \"union\"\nsurface.exact = true", "surface.exact");
     for right in [
         "surface.normals = \"pca\"",
         "render.surface = \"union\"\nsurface.normals = \"field\"\nsurface.spray = true",
@@ -75,10 +66,7 @@ fn contradictory_settings_are_rejected() {
 
 #[test]
 fn one_body_has_exact_fresnel_and_absorption() {
-    let bounds = Bounds {
-        min: glam::DVec3::ZERO,
-        max: glam::DVec3::new(2.0, 3.0, 6.0),
-    };
+    let bounds = Bounds { min: glam::DVec3::ZERO, max: glam::DVec3::new(2.0, 3.0, 6.0) };
     let of = |text: &str| material(&manifest(text), &bounds);
     assert_eq!(of(""), Material::DEFAULT);
     let smooth = "render.surface = \"smooth\"\nmaterial.absorption = [0.5, 1, 1]\n";
@@ -96,13 +84,7 @@ fn one_body_has_exact_fresnel_and_absorption() {
 
 #[test]
 fn lengths_are_rounded_to_1_2_5() {
-    for (length, expected) in [
-        (0.9, 1.0),
-        (1.3, 1.0),
-        (0.017, 0.02),
-        (3.3, 5.0),
-        (80.0, 100.0),
-    ] {
+    for (length, expected) in [(0.9, 1.0), (1.3, 1.0), (0.017, 0.02), (3.3, 5.0), (80.0, 100.0)] {
         assert_eq!(round(length), expected, "{length}");
     }
     for nothing in [0.0, f64::NAN, f64::INFINITY, 1e-320] {

@@ -115,10 +115,7 @@ mod tests {
 
     /// Measures the same cell in a native frame.
     fn in_place(request: &CellRequest, representation: Representation) -> CellMeasurement {
-        let request = CellRequest {
-            representation,
-            ..request.clone()
-        };
+        let request = CellRequest { representation, ..request.clone() };
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("particles.spf");
         let conversion = convert::convert(&request, &path).unwrap();
@@ -166,10 +163,7 @@ mod tests {
     fn short_budget_gives_the_minimum_number_of_images() {
         let mut request = request(10, Structure::default());
         request.budget = Budget::Seconds(1e-9);
-        assert_eq!(
-            measure(&request, None).unwrap().images,
-            u64::from(MIN_IMAGES)
-        );
+        assert_eq!(measure(&request, None).unwrap().images, u64::from(MIN_IMAGES));
     }
 
     #[test]

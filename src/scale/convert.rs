@@ -19,11 +19,8 @@ const BOUND: Bound = Bound::OfRadius(0.02);
 /// # Errors
 /// Describes why they do not fit into memory, cannot be read, or the file cannot be written.
 pub fn convert(request: &CellRequest, path: &Path) -> Result<Conversion, CellError> {
-    let settings = StoreSettings {
-        encoding: request.representation.encoding(),
-        bound: BOUND,
-        rounding: 0.0,
-    };
+    let settings =
+        StoreSettings { encoding: request.representation.encoding(), bound: BOUND, rounding: 0.0 };
     let peaks = Peaks::default();
     let start = Instant::now();
     let particles = peaks.during(|| Particles::of(request))?;
@@ -32,13 +29,8 @@ pub fn convert(request: &CellRequest, path: &Path) -> Result<Conversion, CellErr
     let start = Instant::now();
     let index = peaks.during(|| native::store(path, &frame, None, &settings))?;
     let seconds = start.elapsed().as_secs_f64();
-    let length = path
-        .metadata()
-        .map_err(|source| CellError::Io {
-            path: path.to_owned(),
-            source,
-        })?
-        .len();
+    let length =
+        path.metadata().map_err(|source| CellError::Io { path: path.to_owned(), source })?.len();
     // The maximum error is also given relative to the smallest radius
     let smallest = match index.radius {
         RadiusIndex::None => 0.0,

@@ -119,10 +119,7 @@ pub(super) fn trace(
     let surface = SphereSurface::new(tree);
     let shading = ParticleShading::constant(DEFAULT_COLOR);
     let never = AtomicBool::new(false);
-    let mut images = Images {
-        seconds: Vec::new(),
-        rays: RayCounts::default(),
-    };
+    let mut images = Images { seconds: Vec::new(), rays: RayCounts::default() };
     let mut spent = 0.0;
     for index in 0.. {
         // Stop if the budget is spent, otherwise choose a position on the path

@@ -56,20 +56,12 @@ impl fmt::Display for Motion {
 fn orbited(view: &CameraView, center: DVec3, turns: f64) -> CameraView {
     let turn = DQuat::from_axis_angle(view.up.normalize_or(DVec3::Z), turns * TAU);
     let around = |point: DVec3| center + turn * (point - center);
-    CameraView {
-        eye: around(view.eye),
-        look_at: around(view.look_at),
-        ..*view
-    }
+    CameraView { eye: around(view.eye), look_at: around(view.look_at), ..*view }
 }
 
 fn shifted(view: &CameraView, t: f64) -> CameraView {
     let shift = (3.0 * t - 1.0) * (view.look_at - view.eye);
-    CameraView {
-        eye: view.eye + shift,
-        look_at: view.look_at + shift,
-        ..*view
-    }
+    CameraView { eye: view.eye + shift, look_at: view.look_at + shift, ..*view }
 }
 
 /// Position on the path of image `index` in a run with a time limit: the van der Corput sequence, so that any number

@@ -65,23 +65,15 @@ impl Particles {
         // Find and read the frame
         let input = SequenceInput::from_path(&source.path);
         let sequence = Sequence::open_within(&input, read_budget(None, None))?;
-        let index = sequence
-            .frames()
-            .iter()
-            .position(|f| f.number == source.frame)
-            .ok_or_else(|| CellError::MissingFrame {
-                path: source.path.clone(),
-                frame: source.frame,
+        let index =
+            sequence.frames().iter().position(|f| f.number == source.frame).ok_or_else(|| {
+                CellError::MissingFrame { path: source.path.clone(), frame: source.frame }
             })?;
         let frame = sequence.load(index, source.origin)?;
-        let ParticleFrame {
-            positions, radius, ..
-        } = frame;
+        let ParticleFrame { positions, radius, .. } = frame;
         // Reduce it to the requested count
-        let mut particles = Self {
-            radius: radius.unwrap_or(Radius::Common(source.radius)),
-            centers: positions,
-        };
+        let mut particles =
+            Self { radius: radius.unwrap_or(Radius::Common(source.radius)), centers: positions };
         particles.thin(count, seed);
         particles.raise_radii(source.least_radius);
         Ok(particles)
@@ -180,17 +172,11 @@ impl FrameSurvey {
         let survey = Survey::of_frames(sequence, [index], question)?;
         let frame = sequence.frames()[index].number;
         if survey.most_particles == 0 {
-            return Err(CellError::NoParticles {
-                path: path.to_owned(),
-                frame,
-            });
+            return Err(CellError::NoParticles { path: path.to_owned(), frame });
         }
         // Frame the spheres, which extend beyond their centres
         let reach = f64::from(survey.radius.unwrap_or(0.0).max(survey.reach));
-        let bounds = Bounds {
-            min: survey.min - reach,
-            max: survey.max + reach,
-        };
+        let bounds = Bounds { min: survey.min - reach, max: survey.max + reach };
         let stage = Stage::framing(bounds, survey.up, aspect, survey.origin);
         let distance = stage.view.eye.distance(bounds.center());
         Ok(Self {
@@ -247,9 +233,7 @@ mod tests {
             radius: Radius::PerParticle((0..800_u16).map(f32::from).collect()),
         };
         particles.thin(100, 1);
-        let Radius::PerParticle(radii) = &particles.radius else {
-            panic!("radii stay one each")
-        };
+        let Radius::PerParticle(radii) = &particles.radius else { panic!("radii stay one each") };
         for (center, radius) in particles.centers.iter().zip(radii) {
             assert!((radius - 2.0 * center.x).abs() <= 1e-3, "{center} {radius}");
         }

@@ -36,10 +36,7 @@ pub enum Lighting {
 impl Stage {
     /// The box and the camera of the thesis.
     pub const THESIS: Self = Self {
-        bounds: Bounds {
-            min: DVec3::new(3.0, 5.0, -2.0),
-            max: DVec3::new(7.0, 8.0, 2.0),
-        },
+        bounds: Bounds { min: DVec3::new(3.0, 5.0, -2.0), max: DVec3::new(7.0, 8.0, 2.0) },
         view: CameraView {
             eye: DVec3::ZERO,
             look_at: DVec3::new(5.0, 5.0, 0.0),
@@ -68,11 +65,9 @@ impl Stage {
         let view = motion.view_at(t, &self.view, self.bounds.center());
         let up = self.view.up;
         let lights = match self.lighting {
-            Lighting::Point => vec![Light::point(
-                DVec3::new(0.0, 0.0, 10.0),
-                self.origin,
-                Vec3::ONE,
-            )],
+            Lighting::Point => {
+                vec![Light::point(DVec3::new(0.0, 0.0, 10.0), self.origin, Vec3::ONE)]
+            }
             Lighting::Studio => default_lights(&self.bounds, up, &self.view),
         };
         Ok(Scene {

@@ -35,20 +35,11 @@ pub(super) fn trace_in_place(request: &CellRequest, path: &Path) -> Result<Measu
     let builds = peaks.during(|| {
         Builds::repeat(request.budget, || {
             let built = tree.build(&leaves, settings);
-            built.map_err(|fault| CellError::Stored {
-                path: path.to_owned(),
-                fault,
-            })
+            built.map_err(|fault| CellError::Stored { path: path.to_owned(), fault })
         })
     })?;
     let images = trace(tree.view(&leaves), request, &peaks)?;
     // Pages lost in the meantime would be read as zeros.
     file.check()?;
-    Ok(Measured {
-        particles: leaves.count,
-        load_seconds,
-        builds,
-        images,
-        peaks,
-    })
+    Ok(Measured { particles: leaves.count, load_seconds, builds, images, peaks })
 }

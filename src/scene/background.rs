@@ -70,11 +70,7 @@ pub enum Background {
 impl Background {
     /// The default background, a calm gradient.
     pub fn default_for(up: Vec3) -> Self {
-        Self::Gradient {
-            bottom: DEFAULT_BOTTOM,
-            top: DEFAULT_TOP,
-            up: up.normalize_or(Vec3::Z),
-        }
+        Self::Gradient { bottom: DEFAULT_BOTTOM, top: DEFAULT_TOP, up: up.normalize_or(Vec3::Z) }
     }
 
     /// The same background with its gradient along `up`.
@@ -114,11 +110,8 @@ mod tests {
 
     #[test]
     fn gradient_is_linear_in_the_angle() {
-        let sky = Background::Gradient {
-            bottom: Vec3::ZERO,
-            top: Vec3::new(1.0, 2.0, 4.0),
-            up: Vec3::Z,
-        };
+        let sky =
+            Background::Gradient { bottom: Vec3::ZERO, top: Vec3::new(1.0, 2.0, 4.0), up: Vec3::Z };
         for (degrees, part) in [(-90.0_f32, 0.0), (-45.0, 0.25), (0.0, 0.5), (90.0, 1.0)] {
             let angle = degrees.to_radians();
             let color = sky.color(Vec3::new(angle.cos(), 0.0, angle.sin()));

@@ -158,9 +158,7 @@ impl Camera {
             _ => CameraError::FieldOfView,
         })?;
         // Build an orthonormal basis
-        let forward = (view.look_at - view.eye)
-            .try_normalize()
-            .ok_or(CameraError::NoDirection)?;
+        let forward = (view.look_at - view.eye).try_normalize().ok_or(CameraError::NoDirection)?;
         let up_hint = view.up.try_normalize().ok_or(CameraError::NoUp)?;
         let right = forward.cross(up_hint);
         // For smaller values, rounding of the input determines the up direction.

@@ -4,12 +4,7 @@ use super::*;
 
 /// The thesis's camera: eye at the origin, looking at (5, 5, 0), z up.
 fn thesis_view() -> CameraView {
-    CameraView {
-        eye: DVec3::ZERO,
-        look_at: DVec3::new(5.0, 5.0, 0.0),
-        up: DVec3::Z,
-        fov: 90.0,
-    }
+    CameraView { eye: DVec3::ZERO, look_at: DVec3::new(5.0, 5.0, 0.0), up: DVec3::Z, fov: 90.0 }
 }
 
 #[track_caller]
@@ -21,10 +16,7 @@ fn assert_near(a: Vec3, b: Vec3) {
 fn centre_and_corners() {
     let camera = Camera::new(&thesis_view(), 2.0, DVec3::ZERO).unwrap();
     let half = 0.5_f32.sqrt();
-    assert_near(
-        camera.ray(Vec2::splat(0.5)).direction,
-        Vec3::new(half, half, 0.0),
-    );
+    assert_near(camera.ray(Vec2::splat(0.5)).direction, Vec3::new(half, half, 0.0));
     // fov 90 and aspect 2: corners at forward +- 2 right +- 1 up, right = (1, -1, 0) / sqrt 2.
     let (forward, right) = (Vec3::new(half, half, 0.0), Vec3::new(half, -half, 0.0));
     for (film, x, y) in [
@@ -70,10 +62,7 @@ fn invalid_views_are_rejected() {
     };
     assert_eq!(with(|v| v.look_at = v.eye), CameraError::NoDirection);
     assert_eq!(with(|v| v.up = DVec3::ZERO), CameraError::NoUp);
-    assert_eq!(
-        with(|v| v.up = DVec3::new(-2.0, -2.0, 0.0)),
-        CameraError::NoUp
-    );
+    assert_eq!(with(|v| v.up = DVec3::new(-2.0, -2.0, 0.0)), CameraError::NoUp);
     assert_eq!(with(|v| v.fov = 180.0), CameraError::FieldOfView);
     assert_eq!(with(|v| v.fov = f64::NAN), CameraError::FieldOfView);
     assert_eq!(with(|v| v.eye.x = f64::NAN), CameraError::NotFinite);

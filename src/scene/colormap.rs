@@ -156,11 +156,7 @@ impl ColorMap {
                     Ok(index) if is_index(count) => index,
                     _ => order % count,
                 };
-                let at = if is_reversed {
-                    count - 1 - index
-                } else {
-                    index
-                };
+                let at = if is_reversed { count - 1 - index } else { index };
                 let srgb = palette.colors[at].map(|byte| f32::from(byte) / 255.0);
                 Ok(Vec3::from_array(srgb.map(linear_from_srgb)))
             }
@@ -178,9 +174,7 @@ impl ColorMap {
 
     /// These colours for categories, linear RGB; the values rise.
     pub const fn of_colors(categories: Vec<(i64, Vec3)>) -> Self {
-        Self {
-            kind: Kind::Categories(categories, Others::Unknown),
-        }
+        Self { kind: Kind::Categories(categories, Others::Unknown) }
     }
 
     /// Names of all maps of numbers, without the reversed ones.
@@ -289,36 +283,25 @@ fn base_name(name: &str) -> (&str, bool) {
 /// The table of a map, and whether it is reversed.
 fn table(name: &str) -> Result<(Table, bool), UnknownColorMap> {
     let (base, is_reversed) = base_name(name);
-    let found = Table::named(base).ok_or_else(|| UnknownColorMap {
-        name: name.to_owned(),
-        nearest: nearest_name(name),
-    })?;
+    let found = Table::named(base)
+        .ok_or_else(|| UnknownColorMap { name: name.to_owned(), nearest: nearest_name(name) })?;
     Ok((found, is_reversed))
 }
 
 /// The known name with the smallest edit distance to `name`.
 fn nearest_name(name: &str) -> &'static str {
     let distance = |known: &str| strsim::damerau_levenshtein(known, &name.to_lowercase());
-    ColorMap::names()
-        .min_by_key(|known| distance(known))
-        .unwrap_or("viridis")
+    ColorMap::names().min_by_key(|known| distance(known)).unwrap_or("viridis")
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "colours need no more than f32"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "colours need no more than f32")]
 fn narrow(value: f64) -> f32 {
     value as f32
 }
 
 /// Inverse of the sRGB transfer function (IEC 61966-2-1).
 pub(super) fn linear_from_srgb(v: f32) -> f32 {
-    if v <= 0.040_45 {
-        v / 12.92
-    } else {
-        libm::powf((v + 0.055) / 1.055, 2.4)
-    }
+    if v <= 0.040_45 { v / 12.92 } else { libm::powf((v + 0.055) / 1.055, 2.4) }
 }
 
 #[cfg(test)]
@@ -356,10 +339,7 @@ mod tests {
             let color = map.color(entry).to_array();
             for (got, expected) in color.into_iter().zip(published) {
                 let step = |by: f32| linear_from_srgb((expected + by).clamp(0.0, 255.0) / 255.0);
-                assert!(
-                    (step(-1.0)..=step(1.0)).contains(&got),
-                    "{entry}: {got} {expected}"
-                );
+                assert!((step(-1.0)..=step(1.0)).contains(&got), "{entry}: {got} {expected}");
             }
         }
     }
@@ -437,23 +417,12 @@ mod tests {
 
     #[test]
     fn discrete_maps_have_bands() {
-        let map = ColorMap::new("batlow", 0.0, 8.0)
-            .unwrap()
-            .with_steps(Some(4));
+        let map = ColorMap::new("batlow", 0.0, 8.0).unwrap().with_steps(Some(4));
         let full = ColorMap::new("batlow", 0.0, 3.0).unwrap();
-        for (value, band) in [
-            (-1.0, 0.0),
-            (0.0, 0.0),
-            (1.9, 0.0),
-            (2.1, 1.0),
-            (5.9, 2.0),
-            (6.1, 3.0),
-            (9.0, 3.0),
-        ] {
-            assert!(
-                (map.color(value) - full.color(band)).length() < 1e-5,
-                "{value}"
-            );
+        for (value, band) in
+            [(-1.0, 0.0), (0.0, 0.0), (1.9, 0.0), (2.1, 1.0), (5.9, 2.0), (6.1, 3.0), (9.0, 3.0)]
+        {
+            assert!((map.color(value) - full.color(band)).length() < 1e-5, "{value}");
         }
     }
 

@@ -97,11 +97,7 @@ mod tests {
             (f64::NEG_INFINITY, None, None),
         ] {
             assert_eq!(RadiusTable::Covalent.radius(number), covalent, "{number}");
-            assert_eq!(
-                RadiusTable::VanDerWaals.radius(number),
-                van_der_waals,
-                "{number}"
-            );
+            assert_eq!(RadiusTable::VanDerWaals.radius(number), van_der_waals, "{number}");
         }
     }
 

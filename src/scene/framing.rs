@@ -65,20 +65,12 @@ pub struct Framed {
 impl Framed {
     /// The corners of a box.
     pub fn corners(bounds: &Bounds) -> Self {
-        Self {
-            points: bounds.corners().to_vec(),
-            radius: 0.0,
-            is_centred: false,
-        }
+        Self { points: bounds.corners().to_vec(), radius: 0.0, is_centred: false }
     }
 
     /// Spheres of a `radius` around `points`, which are not empty. Their image has equal margins on opposite sides.
     pub fn spheres(points: Vec<DVec3>, radius: f64) -> Self {
-        Self {
-            points,
-            radius,
-            is_centred: true,
-        }
+        Self { points, radius, is_centred: true }
     }
 
     /// The box of the points.
@@ -103,9 +95,7 @@ impl Framed {
     pub fn view(&self, framing: &Framing) -> CameraView {
         // Find the axes of the view
         let axes = ViewAxes::new(framing);
-        let ViewAxes {
-            right, direction, ..
-        } = axes;
+        let ViewAxes { right, direction, .. } = axes;
         let screen_up = right.cross(direction);
         let half = self.half_extent(framing);
 
@@ -117,9 +107,7 @@ impl Framed {
             relative.map(|p| [p.dot(axis), p.dot(direction)]).collect()
         };
         let sides = [(along(right), half.x), (along(screen_up), half.y)];
-        let fits = sides
-            .each_ref()
-            .map(|(places, t)| fit(places, self.reach(*t), *t));
+        let fits = sides.each_ref().map(|(places, t)| fit(places, self.reach(*t), *t));
         let distance = fits[0].1.max(fits[1].1).max(self.min_distance());
         let mut shift = fits.map(|(shift, _)| shift);
         if self.is_centred {
@@ -128,12 +116,7 @@ impl Framed {
             }
         }
         let look_at = center + shift[0] * right + shift[1] * screen_up;
-        CameraView {
-            eye: look_at - distance * direction,
-            look_at,
-            up: axes.up,
-            fov: framing.fov,
-        }
+        CameraView { eye: look_at - distance * direction, look_at, up: axes.up, fov: framing.fov }
     }
 
     /// Half the extent of the image at distance 1, horizontally and vertically, without the margin.
@@ -192,9 +175,8 @@ fn centred(places: &[[f64; 2]], reach: f64, distance: f64, start: f64) -> f64 {
         low + high
     };
     let xs = places.iter().map(|[x, _]| *x);
-    let (mut low, mut high) = xs.fold((start, start), |(low, high), x| {
-        (low.min(x - reach), high.max(x + reach))
-    });
+    let (mut low, mut high) =
+        xs.fold((start, start), |(low, high), x| (low.min(x - reach), high.max(x + reach)));
     for _ in 0..HALVINGS {
         let middle = 0.5 * (low + high);
         match difference(middle) > 0.0 {
@@ -218,27 +200,17 @@ const STEEP: f64 = 89.5;
 
 impl ViewAxes {
     fn new(framing: &Framing) -> Self {
-        let Framing {
-            azimuth, elevation, ..
-        } = *framing;
+        let Framing { azimuth, elevation, .. } = *framing;
         let up = framing.up.try_normalize().unwrap_or(DVec3::Z);
         if elevation.abs() < STEEP {
             let direction = view_direction(up, azimuth, elevation);
             let right = direction.cross(up).try_normalize().unwrap_or(DVec3::X);
-            return Self {
-                right,
-                direction,
-                up,
-            };
+            return Self { right, direction, up };
         }
         // The direction to the right does not depend on the elevation
         let right = view_direction(up, azimuth, 0.0).cross(up);
         let direction = -elevation.signum() * up;
-        Self {
-            right,
-            direction,
-            up: right.cross(direction),
-        }
+        Self { right, direction, up: right.cross(direction) }
     }
 }
 

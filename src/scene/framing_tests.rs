@@ -18,10 +18,7 @@ fn project(view: &CameraView, aspect: f64, point: DVec3) -> DVec2 {
 fn framing_fits_every_corner_and_wastes_nothing() {
     let boxes = [
         (DVec3::new(3.0, 5.0, -2.0), DVec3::new(7.0, 8.0, 2.0)),
-        (
-            DVec3::new(-1e4, 1e5, 0.0),
-            DVec3::new(-1e4 + 1e-3, 1e5 + 1.0, 0.01),
-        ),
+        (DVec3::new(-1e4, 1e5, 0.0), DVec3::new(-1e4 + 1e-3, 1e5 + 1.0, 0.01)),
         (DVec3::ZERO, DVec3::new(1.0, 0.0, 0.0)),
     ];
     for (min, max) in boxes {
@@ -29,18 +26,12 @@ fn framing_fits_every_corner_and_wastes_nothing() {
             for aspect in [0.5, 1.0, 16.0 / 9.0] {
                 for azimuth in [0.0, 30.0, 200.0] {
                     let bounds = Bounds { min, max };
-                    let framing = Framing {
-                        azimuth,
-                        ..Framing::three_quarter(up, aspect)
-                    };
+                    let framing = Framing { azimuth, ..Framing::three_quarter(up, aspect) };
                     let view = Framed::corners(&bounds).view(&framing);
                     let projected = bounds.corners().map(|c| project(&view, aspect, c).abs());
                     let far = projected.iter().fold(DVec2::ZERO, |a, b| a.max(*b));
                     let limit = 1.0 - BOX_MARGIN;
-                    assert!(
-                        (far.max_element() - limit).abs() < 1e-4,
-                        "{far} {framing:?}"
-                    );
+                    assert!((far.max_element() - limit).abs() < 1e-4, "{far} {framing:?}");
                 }
             }
         }
@@ -49,10 +40,7 @@ fn framing_fits_every_corner_and_wastes_nothing() {
 
 #[test]
 fn framing_looks_down_with_up_on_top() {
-    let bounds = Bounds {
-        min: DVec3::ZERO,
-        max: DVec3::ONE,
-    };
+    let bounds = Bounds { min: DVec3::ZERO, max: DVec3::ONE };
     for up in [DVec3::Y, DVec3::Z] {
         let view = Framed::corners(&bounds).view(&Framing::three_quarter(up, 1.0));
         assert!((view.eye - view.look_at).dot(up) > 0.0);
@@ -61,11 +49,7 @@ fn framing_looks_down_with_up_on_top() {
         assert!(high.y > low.y && (high.x - low.x).abs() < 0.05);
     }
     // A front view with z up looks along +y, with x to the right.
-    let front = Framing {
-        azimuth: 0.0,
-        elevation: 0.0,
-        ..Framing::three_quarter(DVec3::Z, 1.0)
-    };
+    let front = Framing { azimuth: 0.0, elevation: 0.0, ..Framing::three_quarter(DVec3::Z, 1.0) };
     let view = Framed::corners(&bounds).view(&front);
     assert!((view.look_at - view.eye).normalize().y > 0.999_999);
     assert!(project(&view, 1.0, DVec3::ONE).x > 0.0);
@@ -97,13 +81,14 @@ fn spheres_fit_and_their_image_is_centred() {
         let axes = [right, right.cross(forward)];
         let sides = [(0, -1.0), (0, 1.0), (1, -1.0), (1, 1.0)].map(|(axis, sign)| {
             let seen = |center: &DVec3| {
-                (0..3600)
-                    .map(|i| f64::from(i) * std::f64::consts::TAU / 3600.0)
-                    .fold(-9.0, |most: f64, angle| {
+                (0..3600).map(|i| f64::from(i) * std::f64::consts::TAU / 3600.0).fold(
+                    -9.0,
+                    |most: f64, angle| {
                         let around = libm::cos(angle) * axes[axis] + libm::sin(angle) * forward;
                         let on_film = project(&view, aspect, *center + radius * around);
                         most.max(sign * [on_film.x, on_film.y][axis])
-                    })
+                    },
+                )
             };
             points.iter().map(seen).fold(-9.0, f64::max)
         });

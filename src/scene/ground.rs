@@ -120,10 +120,7 @@ impl Ground {
     pub fn under(bounds: &Bounds, up: Vec3, origin: glam::DVec3) -> Self {
         let up = up.normalize_or(Vec3::Z);
         let relative = bounds.corners().map(|c| (c - origin).as_vec3());
-        let height = relative
-            .iter()
-            .map(|c| c.dot(up))
-            .fold(f32::INFINITY, f32::min);
+        let height = relative.iter().map(|c| c.dot(up)).fold(f32::INFINITY, f32::min);
         let diagonal = (bounds.max - bounds.min).as_vec3().length();
         let center = (bounds.center() - origin).as_vec3();
         Self {
@@ -164,11 +161,7 @@ impl Ground {
     /// The colour at a `point` of the ground.
     pub fn color_at(&self, point: Vec3) -> Vec3 {
         let (direction, width) = (-self.up, 0.0);
-        self.color(&GroundSample {
-            point,
-            direction,
-            width,
-        })
+        self.color(&GroundSample { point, direction, width })
     }
 
     /// The colour that a ray sees; only pictures are filtered.
@@ -206,12 +199,7 @@ impl Ground {
             _ => return 0,
         };
         let [across, along] = self.axes();
-        let lattice = Lattice {
-            center: self.center,
-            tile,
-            across,
-            along,
-        };
+        let lattice = Lattice { center: self.center, tile, across, along };
         let mut shades = splat(0.0);
         sand::shades(simd, &lattice, points, &mut shades);
         for lane in lanes_in(lanes) {
@@ -233,10 +221,8 @@ impl Ground {
         let cosine = sample.direction.dot(self.up);
         let forward = (sample.direction - cosine * self.up).normalize_or_zero();
         let length = sample.width / cosine.abs().max(MIN_COSINE);
-        let footprint = Footprint {
-            long: on_image(length * forward),
-            short: sample.width / image.width,
-        };
+        let footprint =
+            Footprint { long: on_image(length * forward), short: sample.width / image.width };
         let beyond = match image.repeats {
             true => Beyond::Repeat,
             false => Beyond::Plain(self.color),
@@ -284,10 +270,7 @@ mod tests {
     use crate::math::{LANES, SimdLevel, lane3, splat3};
 
     fn floor() -> Ground {
-        let bounds = Bounds {
-            min: DVec3::new(9.0, 9.0, 5.0),
-            max: DVec3::new(11.0, 11.0, 6.0),
-        };
+        let bounds = Bounds { min: DVec3::new(9.0, 9.0, 5.0), max: DVec3::new(11.0, 11.0, 6.0) };
         Ground::under(&bounds, Vec3::Z, DVec3::new(10.0, 10.0, 4.0))
     }
 
@@ -300,21 +283,14 @@ mod tests {
 
     #[test]
     fn sand_varies_around_its_colour() {
-        let ground = Ground {
-            pattern: Pattern::Sand { tile: 0.7 },
-            ..floor()
-        };
+        let ground = Ground { pattern: Pattern::Sand { tile: 0.7 }, ..floor() };
         let shade = |i: i32, j: i32| {
             let point = ground.center + 0.013 * Vec3::new(i as f32, j as f32, 0.0);
             ground.color_at(point).x / ground.color.x
         };
-        let shades: Vec<f32> = (0..10_000)
-            .map(|i| shade(i / 100 - 50, i % 100 - 50))
-            .collect();
+        let shades: Vec<f32> = (0..10_000).map(|i| shade(i / 100 - 50, i % 100 - 50)).collect();
         let mean = shades.iter().sum::<f32>() / 1e4;
-        let largest = shades
-            .iter()
-            .fold(0.0_f32, |most, shade| most.max((shade - 1.0).abs()));
+        let largest = shades.iter().fold(0.0_f32, |most, shade| most.max((shade - 1.0).abs()));
         assert!((mean - 1.0).abs() < 0.05, "{mean}");
         assert!((0.05..=sand::CONTRAST).contains(&largest), "{largest}");
         // A packet has the same shades, to the bit
@@ -325,10 +301,7 @@ mod tests {
         for level in SimdLevel::ALL {
             let mut colors = splat3(Vec3::ZERO);
             let simd = Supported::or_best(level);
-            assert_eq!(
-                ground.sand_colors(simd, &lanes, 0xffff, &mut colors),
-                0xffff
-            );
+            assert_eq!(ground.sand_colors(simd, &lanes, 0xffff, &mut colors), 0xffff);
             for (lane, point) in points.iter().enumerate() {
                 assert_eq!(lane3(&colors, lane), ground.color_at(*point));
             }
@@ -362,26 +335,17 @@ mod tests {
             // The top left corner turns to the bottom left
             (right_angle, [Vec3::Y, Vec3::ONE, Vec3::X, Vec3::Z]),
         ] {
-            let ground = Ground {
-                pattern: picture(false, rotation),
-                ..floor()
-            };
+            let ground = Ground { pattern: picture(false, rotation), ..floor() };
             assert_eq!(ground.axes(), [Vec3::X, Vec3::Y]);
             let at = |x: f32, y: f32| ground.color_at(ground.center + Vec3::new(1.0 + x, y, 0.0));
             let found = [at(-1.0, 1.0), at(1.0, 1.0), at(-1.0, -1.0), at(1.0, -1.0)];
             for (found, wanted) in found.iter().zip(corners) {
-                assert!(
-                    (found - wanted).length() < 1e-5,
-                    "{rotation}: {found} {wanted}"
-                );
+                assert!((found - wanted).length() < 1e-5, "{rotation}: {found} {wanted}");
             }
             assert_eq!(at(0.0, 2.5), ground.color);
             assert_eq!(at(-2.5, 0.0), ground.color);
         }
-        let ground = Ground {
-            pattern: picture(true, 0.0),
-            ..floor()
-        };
+        let ground = Ground { pattern: picture(true, 0.0), ..floor() };
         let at = |x: f32, y: f32| ground.color_at(ground.center + Vec3::new(1.0 + x, y, 0.0));
         for tile in [-4.0, 0.0, 8.0] {
             assert!((at(tile - 1.0, 1.0 - tile) - Vec3::X).length() < 1e-5);
@@ -390,39 +354,23 @@ mod tests {
 
     #[test]
     fn distant_pictures_are_blurred_along_the_ray() {
-        let ground = Ground {
-            pattern: picture(true, 0.0),
-            ..floor()
-        };
+        let ground = Ground { pattern: picture(true, 0.0), ..floor() };
         let color = |direction: Vec3, width: f32| {
             let point = ground.center + Vec3::new(0.0, 1.0, 0.0);
             let direction = direction.normalize();
-            ground.color(&GroundSample {
-                point,
-                direction,
-                width,
-            })
+            ground.color(&GroundSample { point, direction, width })
         };
         assert!((color(Vec3::NEG_Z, 0.0) - Vec3::X).length() < 1e-5);
         let mean = Vec3::splat(0.5);
         assert!((color(Vec3::NEG_Z, 50.0) - mean).length() < 1e-2);
         // A slanted ray along x sees the upper row only, both of its texels
         let slanted = color(Vec3::new(1.0, 0.0, -0.01), 0.04);
-        assert!(
-            (slanted - Vec3::new(0.5, 0.5, 0.0)).length() < 0.1,
-            "{slanted}"
-        );
+        assert!((slanted - Vec3::new(0.5, 0.5, 0.0)).length() < 0.1, "{slanted}");
     }
 
     #[test]
     fn squares_alternate_around_the_middle() {
-        for up in [
-            Vec3::X,
-            Vec3::Y,
-            Vec3::Z,
-            Vec3::NEG_Z,
-            Vec3::ONE.normalize(),
-        ] {
+        for up in [Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_Z, Vec3::ONE.normalize()] {
             let mut floor = Ground { up, ..floor() };
             assert_eq!(floor.color_at(floor.center), floor.color);
             floor.pattern = Pattern::Checker { tile: 0.5 };

@@ -60,9 +60,9 @@ impl LensSettings {
     ) -> Result<Lens, CameraError> {
         let focus = match (self.focus, particle) {
             (Focus::Distance(distance), _) => distance,
-            (Focus::Particle(_), Some(point)) => (view.look_at - view.eye)
-                .normalize_or_zero()
-                .dot(point - view.eye),
+            (Focus::Particle(_), Some(point)) => {
+                (view.look_at - view.eye).normalize_or_zero().dot(point - view.eye)
+            }
             (Focus::Target | Focus::Particle(_), _) => (view.look_at - view.eye).length(),
         };
         let radius = 0.5 * self.aperture.diameter(view.fov, aspect);
@@ -91,10 +91,7 @@ impl Aperture {
     fn diameter(self, fov: f64, aspect: f64) -> f64 {
         match self {
             Self::Diameter(diameter) => diameter,
-            Self::FStop {
-                f_stop,
-                sensor_width,
-            } => {
+            Self::FStop { f_stop, sensor_width } => {
                 let sensor_height = sensor_width / aspect;
                 let focal_length = 0.5 * sensor_height / libm::tan(0.5 * fov.to_radians());
                 focal_length / f_stop
@@ -119,10 +116,7 @@ mod tests {
     #[test]
     fn an_f_number_is_the_focal_length_in_diameters() {
         let settings = LensSettings {
-            aperture: Aperture::FStop {
-                f_stop: 2.0,
-                sensor_width: 0.036,
-            },
+            aperture: Aperture::FStop { f_stop: 2.0, sensor_width: 0.036 },
             focus: Focus::Target,
         };
         // The sensor is 24 mm high, and the tangent of half the field of view is 1/2: the focal length is 24 mm.
@@ -144,13 +138,7 @@ mod tests {
         let behind = DVec3::new(0.0, -11.0, 0.0);
         let error = lens(Focus::Particle(4), Some(behind)).unwrap_err();
         assert_eq!(error, CameraError::Focus);
-        let huge = LensSettings {
-            aperture: Aperture::Diameter(1e300),
-            focus: Focus::Target,
-        };
-        assert_eq!(
-            huge.lens(&view(), 1.0, None).unwrap_err(),
-            CameraError::Aperture
-        );
+        let huge = LensSettings { aperture: Aperture::Diameter(1e300), focus: Focus::Target };
+        assert_eq!(huge.lens(&view(), 1.0, None).unwrap_err(), CameraError::Aperture);
     }
 }

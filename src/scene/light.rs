@@ -110,10 +110,7 @@ impl Light {
     /// A point light at a world `position`.
     pub fn point_with(position: DVec3, origin: DVec3, radiance: Vec3, falloff: Falloff) -> Self {
         Self {
-            kind: LightKind::Point {
-                position: (position - origin).as_vec3(),
-                falloff,
-            },
+            kind: LightKind::Point { position: (position - origin).as_vec3(), falloff },
             radiance,
             casts_shadow: true,
             is_visible: false,
@@ -124,9 +121,7 @@ impl Light {
     /// Light that travels along `direction` (of any length); `None` for a zero vector.
     pub fn directional(direction: Vec3, radiance: Vec3) -> Option<Self> {
         Some(Self {
-            kind: LightKind::Directional {
-                to_light: -direction.try_normalize()?,
-            },
+            kind: LightKind::Directional { to_light: -direction.try_normalize()? },
             radiance,
             casts_shadow: true,
             is_visible: false,
@@ -142,46 +137,25 @@ pub fn default_lights(bounds: &Bounds, up: DVec3, view: &CameraView) -> Vec<Ligh
     // Find the horizontal axes of the view
     let up = up.try_normalize().unwrap_or(DVec3::Z);
     let is_steep = view.heading(up) == view.up;
-    let to_eye = if is_steep {
-        -view.up
-    } else {
-        view.eye - bounds.center()
-    };
+    let to_eye = if is_steep { -view.up } else { view.eye - bounds.center() };
     let level = to_eye - to_eye.dot(up) * up;
     // For a view from straight above, any direction will do.
-    let back = level
-        .try_normalize()
-        .unwrap_or_else(|| up.any_orthonormal_vector());
+    let back = level.try_normalize().unwrap_or_else(|| up.any_orthonormal_vector());
     let right = up.cross(back);
     // Place both lights relative to these axes
     let light = |right_part: f64, up_part: f64, back_part: f64, radiance| {
         let to_light = (right_part * right + up_part * up + back_part * back).normalize();
-        LightKind::Directional {
-            to_light: to_light.as_vec3(),
-        }
-        .with(radiance)
+        LightKind::Directional { to_light: to_light.as_vec3() }.with(radiance)
     };
     let key = light(-0.7, 1.0, 0.45, KEY_INTENSITY * KEY_COLOR);
     let fill = light(0.9, 0.25, 0.6, FILL_INTENSITY * FILL_COLOR);
-    vec![
-        key,
-        Light {
-            casts_shadow: false,
-            ..fill
-        },
-    ]
+    vec![key, Light { casts_shadow: false, ..fill }]
 }
 
 impl LightKind {
     /// A shadow-casting light of this kind.
     const fn with(self, radiance: Vec3) -> Light {
-        Light {
-            kind: self,
-            radiance,
-            casts_shadow: true,
-            is_visible: false,
-            group: 0,
-        }
+        Light { kind: self, radiance, casts_shadow: true, is_visible: false, group: 0 }
     }
 }
 
@@ -205,20 +179,11 @@ mod tests {
 
     #[test]
     fn default_lights_come_from_above_and_from_the_viewer() {
-        let bounds = Bounds {
-            min: DVec3::ZERO,
-            max: DVec3::ONE,
-        };
-        for (up, eye) in [
-            (DVec3::Z, DVec3::new(0.5, -9.0, 3.0)),
-            (DVec3::Y, DVec3::new(0.5, 9.0, 0.5)),
-        ] {
-            let view = CameraView {
-                eye,
-                look_at: bounds.center(),
-                up,
-                fov: 30.0,
-            };
+        let bounds = Bounds { min: DVec3::ZERO, max: DVec3::ONE };
+        for (up, eye) in
+            [(DVec3::Z, DVec3::new(0.5, -9.0, 3.0)), (DVec3::Y, DVec3::new(0.5, 9.0, 0.5))]
+        {
+            let view = CameraView { eye, look_at: bounds.center(), up, fov: 30.0 };
             let lights = default_lights(&bounds, up, &view);
             assert_eq!(lights.len(), 2);
             for light in lights {

@@ -113,18 +113,12 @@ impl Material {
         }
         let extinction = self.extinction.to_array();
         if let Some(value) = extinction.iter().find(|v| !(0.0..=f32::MAX).contains(*v)) {
-            return Err(MaterialError {
-                name: "extinction",
-                value: *value,
-            });
+            return Err(MaterialError { name: "extinction", value: *value });
         }
         if self.ior > 0.0 && self.ior.is_finite() {
             Ok(())
         } else {
-            Err(MaterialError {
-                name: "ior",
-                value: self.ior,
-            })
+            Err(MaterialError { name: "ior", value: self.ior })
         }
     }
 
@@ -207,10 +201,7 @@ mod tests {
     use super::*;
 
     fn with_ior(ior: f32) -> Material {
-        Material {
-            ior,
-            ..Material::DEFAULT
-        }
+        Material { ior, ..Material::DEFAULT }
     }
 
     #[test]
@@ -228,10 +219,7 @@ mod tests {
             (1.5, 80.0, 0.409_910),
         ] {
             let r = schlick(with_ior(ior).r0(), degrees.to_radians().cos());
-            assert!(
-                (r - expected).abs() < 2e-6,
-                "{ior} {degrees}: {r} {expected}"
-            );
+            assert!((r - expected).abs() < 2e-6, "{ior} {degrees}: {r} {expected}");
         }
         assert!((schlick(0.04, 0.0) - 1.0).abs() < 1e-6);
         assert_eq!(schlick(0.04, 1.000_001), 0.04);
@@ -254,10 +242,7 @@ mod tests {
             (0.3, 1.0, 0.0),
         ] {
             let r = dielectric(cosine, ratio);
-            assert!(
-                (r - expected).abs() < 2e-6,
-                "{cosine} {ratio}: {r} {expected}"
-            );
+            assert!((r - expected).abs() < 2e-6, "{cosine} {ratio}: {r} {expected}");
         }
         // The same on the same path in reverse.
         let inside = (1.0 - 0.75_f32 / 2.25).sqrt();
@@ -296,20 +281,14 @@ mod tests {
     #[test]
     fn bad_constants_are_named() {
         assert_eq!(Material::DEFAULT.validate(), Ok(()));
-        let shiny = Material {
-            reflection: 1.5,
-            ..Material::DEFAULT
-        };
+        let shiny = Material { reflection: 1.5, ..Material::DEFAULT };
         assert_eq!(
             shiny.validate().unwrap_err().to_string(),
             "material reflection = 1.5 is out of range"
         );
         assert_eq!(with_ior(0.0).validate().unwrap_err().name, "ior");
         assert_eq!(with_ior(f32::NAN).validate().unwrap_err().name, "ior");
-        let dark = Material {
-            diffuse: -0.1,
-            ..Material::DEFAULT
-        };
+        let dark = Material { diffuse: -0.1, ..Material::DEFAULT };
         assert_eq!(dark.validate().unwrap_err().name, "diffuse");
     }
 }

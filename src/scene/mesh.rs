@@ -34,11 +34,8 @@ pub struct MeshMaterial {
 
 impl MeshMaterial {
     /// A matte mesh in the default colour.
-    pub const DEFAULT: Self = Self {
-        color: DEFAULT_COLOR,
-        finish: MeshFinish::Opaque(Finish::Matte),
-        is_holdout: false,
-    };
+    pub const DEFAULT: Self =
+        Self { color: DEFAULT_COLOR, finish: MeshFinish::Opaque(Finish::Matte), is_holdout: false };
 
     /// Whether light passes through.
     pub fn is_pane(&self) -> bool {

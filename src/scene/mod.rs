@@ -170,10 +170,7 @@ mod tests {
 
     #[test]
     fn box_has_eight_corners() {
-        let bounds = Bounds {
-            min: DVec3::new(-1.0, 2.0, 3.0),
-            max: DVec3::new(4.0, 5.0, 6.0),
-        };
+        let bounds = Bounds { min: DVec3::new(-1.0, 2.0, 3.0), max: DVec3::new(4.0, 5.0, 6.0) };
         let corners = bounds.corners();
         assert_eq!(corners[0], bounds.min);
         assert_eq!(corners[7], bounds.max);

@@ -58,9 +58,7 @@ impl PartMaterials {
             }
         }
         let known = self.by_part.iter().zip(is_absent);
-        known
-            .filter_map(|(part, is_absent)| is_absent.then_some(*part))
-            .collect()
+        known.filter_map(|(part, is_absent)| is_absent.then_some(*part)).collect()
     }
 
     /// The index of the material of `part`; None if it has that of all other particles.
@@ -76,29 +74,18 @@ mod tests {
     use super::*;
 
     fn of(parts: &[i32]) -> PartMaterial {
-        PartMaterial {
-            parts: parts.to_vec(),
-            finish: Finish::Matte,
-            color: None,
-        }
+        PartMaterial { parts: parts.to_vec(), finish: Finish::Matte, color: None }
     }
 
     #[test]
     fn parts_have_the_material_that_names_them() {
         let parts = PartMaterials::new(vec![of(&[7, -3]), of(&[0, 7, i32::MAX])]);
-        for (part, index) in [
-            (7, Some(0)),
-            (-3, Some(0)),
-            (0, Some(1)),
-            (i32::MAX, Some(1)),
-            (1, None),
-        ] {
+        for (part, index) in
+            [(7, Some(0)), (-3, Some(0)), (0, Some(1)), (i32::MAX, Some(1)), (1, None)]
+        {
             assert_eq!(parts.index_of(part), index, "{part}");
         }
-        assert_eq!(
-            parts.absent([0, 7, 0, 2].into_iter()),
-            [(-3, 0), (i32::MAX, 1)]
-        );
+        assert_eq!(parts.absent([0, 7, 0, 2].into_iter()), [(-3, 0), (i32::MAX, 1)]);
         assert!(
             PartMaterials::default().is_empty() && PartMaterials::new(vec![of(&[])]).is_empty()
         );

@@ -77,10 +77,7 @@ impl CameraPath {
         match self {
             // The identity would be rounded
             path if factor == 1.0 => path,
-            Self::Still(view) => Self::Still(CameraView {
-                fov: narrowed(view.fov),
-                ..view
-            }),
+            Self::Still(view) => Self::Still(CameraView { fov: narrowed(view.fov), ..view }),
             Self::Turntable(turntable) => Self::Turntable(turntable.with_fov(narrowed)),
             Self::Keys(keys) => Self::Keys(keys),
         }

@@ -41,10 +41,7 @@ impl RgbEncoding {
     }
 
     /// Linear RGB from 0 to 1; 0 for NaN.
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "colours need no more than f32"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "colours need no more than f32")]
     pub fn color(self, rgb: [f64; 3]) -> Vec3 {
         let linear = |value: f64| {
             let part = match self {
@@ -80,11 +77,7 @@ mod tests {
     use super::*;
 
     fn attribute(name: &str, components: usize, data: AttributeData) -> Attribute {
-        Attribute {
-            name: name.to_owned(),
-            components,
-            data,
-        }
+        Attribute { name: name.to_owned(), components, data }
     }
 
     #[test]

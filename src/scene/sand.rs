@@ -72,10 +72,7 @@ lane_kernel! {
 /// The place among spots of half the size. It is turned by 37 degrees, so that the lattices do not coincide.
 #[inline(always)]
 fn halved(x: f32, y: f32) -> [f32; 2] {
-    [
-        2.0 * (0.8 * x - 0.6 * y) + 0.37,
-        2.0 * (0.6 * x + 0.8 * y) + 0.71,
-    ]
+    [2.0 * (0.8 * x - 0.6 * y) + 0.37, 2.0 * (0.6 * x + 0.8 * y) + 0.71]
 }
 
 /// The contrast of spots of one size, and the sum of those of larger ones.
@@ -96,10 +93,7 @@ impl Default for Sizes {
 impl Sizes {
     #[inline(always)]
     fn next(self) -> Self {
-        Self {
-            part: self.part * GAIN,
-            whole: self.whole + self.part,
-        }
+        Self { part: self.part * GAIN, whole: self.whole + self.part }
     }
 
     #[inline(always)]
@@ -120,10 +114,7 @@ fn value_noise(x: f32, y: f32) -> f32 {
 /// The interpolated value on a row of integers, between those at `left` and right of it.
 #[inline(always)]
 fn row_value(left: u32, u: f32, row: u32) -> f32 {
-    let ends = [
-        lattice_value(left, row),
-        lattice_value(left.wrapping_add(1), row),
-    ];
+    let ends = [lattice_value(left, row), lattice_value(left.wrapping_add(1), row)];
     ends[0] + u * (ends[1] - ends[0])
 }
 
@@ -134,10 +125,7 @@ fn split(value: f32) -> (u32, f32) {
     let shifted = value + ROUNDING;
     let nearest = shifted - ROUNDING;
     let is_above = nearest > value;
-    let integer = shifted
-        .to_bits()
-        .wrapping_sub(ROUNDING.to_bits())
-        .wrapping_sub(is_above as u32);
+    let integer = shifted.to_bits().wrapping_sub(ROUNDING.to_bits()).wrapping_sub(is_above as u32);
     let rest = value - (nearest - if is_above { 1.0 } else { 0.0 });
     (integer, rest * rest * (3.0 - 2.0 * rest))
 }

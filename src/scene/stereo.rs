@@ -42,10 +42,7 @@ impl StereoSettings {
         #[expect(clippy::cast_possible_truncation, reason = "the renderer works in f32")]
         let [half_distance, convergence] = [half_distance as f32, convergence as f32];
         match half_distance.is_finite() && convergence > 0.0 {
-            true => Ok(Stereo {
-                half_distance,
-                convergence,
-            }),
+            true => Ok(Stereo { half_distance, convergence }),
             false => Err(CameraError::Eyes),
         }
     }
@@ -66,10 +63,7 @@ mod tests {
             fov: 40.0,
         };
         let stereo = |eye_distance, convergence| {
-            let settings = StereoSettings {
-                eye_distance,
-                convergence,
-            };
+            let settings = StereoSettings { eye_distance, convergence };
             settings.stereo(&view)
         };
         for (eye_distance, convergence, wanted) in [

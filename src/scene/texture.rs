@@ -115,11 +115,7 @@ impl Texture {
             }
             texels.push(pixel.min(Vec3::ONE).to_array().map(f16::from_f32));
         }
-        let mut levels = vec![Level {
-            width,
-            height,
-            texels,
-        }];
+        let mut levels = vec![Level { width, height, texels }];
         while let Some(last) = levels.last().filter(|l| l.texels.len() > 1) {
             let half = last.halved();
             levels.push(half);
@@ -134,10 +130,7 @@ impl Texture {
 
     /// Memory in bytes.
     pub fn byte_len(&self) -> u64 {
-        let levels = self
-            .levels
-            .iter()
-            .map(|l| size_of_val(&l.texels[..]) as u64);
+        let levels = self.levels.iter().map(|l| size_of_val(&l.texels[..]) as u64);
         levels.sum()
     }
 
@@ -152,11 +145,7 @@ impl Texture {
         }
         let long = footprint.long.length();
         let probes = (long / footprint.short.max(1e-3 * long)).ceil();
-        let probes = if probes > 1.0 {
-            probes.min(MAX_PROBES)
-        } else {
-            1.0
-        };
+        let probes = if probes > 1.0 { probes.min(MAX_PROBES) } else { 1.0 };
         let width = footprint.short.max(long / probes);
         #[expect(
             clippy::cast_possible_truncation,
@@ -218,10 +207,7 @@ impl Level {
     fn bilinear(&self, position: Vec2, repeats: bool) -> Vec3 {
         let (columns, right) = neighbours(position.x, self.width, repeats);
         let (rows, below) = neighbours(position.y, self.height, repeats);
-        let row = |y: usize| {
-            self.texel(columns[0], y)
-                .lerp(self.texel(columns[1], y), right)
-        };
+        let row = |y: usize| self.texel(columns[0], y).lerp(self.texel(columns[1], y), right);
         row(rows[0]).lerp(row(rows[1]), below)
     }
 
@@ -238,14 +224,9 @@ impl Level {
             }
             sum.to_array().map(f16::from_f32)
         };
-        let texels = rows
-            .iter()
-            .flat_map(|row| columns.iter().map(move |column| mean(row, column)));
-        Self {
-            width,
-            height,
-            texels: texels.collect(),
-        }
+        let texels =
+            rows.iter().flat_map(|row| columns.iter().map(move |column| mean(row, column)));
+        Self { width, height, texels: texels.collect() }
     }
 }
 
@@ -273,20 +254,12 @@ fn overlaps(old: usize, new: usize) -> Vec<Vec<(usize, f32)>> {
 )]
 fn neighbours(position: f32, count: usize, repeats: bool) -> ([usize; 2], f32) {
     let size = count as f32;
-    let position = if repeats {
-        position - position.floor()
-    } else {
-        position.clamp(0.0, 1.0)
-    };
+    let position = if repeats { position - position.floor() } else { position.clamp(0.0, 1.0) };
     let at = position * size - 0.5;
     let first = at.floor();
     let weight = at - first;
     if repeats {
-        let first = if first < 0.0 {
-            count - 1
-        } else {
-            (first as usize).min(count - 1)
-        };
+        let first = if first < 0.0 { count - 1 } else { (first as usize).min(count - 1) };
         return ([first, (first + 1) % count], weight);
     }
     let index = |at: f32| (at.max(0.0) as usize).min(count - 1);
@@ -297,10 +270,7 @@ fn neighbours(position: f32, count: usize, repeats: bool) -> ([usize; 2], f32) {
 mod tests {
     use super::*;
 
-    const POINT: Footprint = Footprint {
-        long: Vec2::ZERO,
-        short: 0.0,
-    };
+    const POINT: Footprint = Footprint { long: Vec2::ZERO, short: 0.0 };
     const PLAIN: Beyond = Beyond::Plain(Vec3::X);
 
     fn gray(width: usize, height: usize, value: impl Fn(usize, usize) -> f32) -> Texture {
@@ -325,9 +295,7 @@ mod tests {
             assert_eq!(texture.color(tile, &POINT, PLAIN), Vec3::X);
         }
         // Between the last column and the first one
-        let edge = texture
-            .color(Vec2::new(0.0, 0.25), &POINT, Beyond::Repeat)
-            .x;
+        let edge = texture.color(Vec2::new(0.0, 0.25), &POINT, Beyond::Repeat).x;
         assert!((edge - 0.5 * 3.0 / 8.0).abs() < 1e-6, "{edge}");
     }
 
@@ -337,22 +305,13 @@ mod tests {
             let texture = gray(width, height, |x, y| ((x + y) % 2) as f32);
             let whole = (0..width * height).filter(|i| (i % width + i / width) % 2 == 1);
             let mean = whole.count() as f32 / (width * height) as f32;
-            let wide = Footprint {
-                long: Vec2::new(100.0, 0.0),
-                short: 100.0,
-            };
+            let wide = Footprint { long: Vec2::new(100.0, 0.0), short: 100.0 };
             let found = texture.color(Vec2::new(0.3, 0.6), &wide, Beyond::Repeat).x;
-            assert!(
-                (found - mean).abs() < 2e-3,
-                "{width}x{height}: {found} {mean}"
-            );
+            assert!((found - mean).abs() < 2e-3, "{width}x{height}: {found} {mean}");
         }
         // Four texels of a checkerboard, at any position
         let texture = gray(64, 64, |x, y| ((x + y) % 2) as f32);
-        let few = Footprint {
-            long: Vec2::new(4.0 / 64.0, 0.0),
-            short: 4.0 / 64.0,
-        };
+        let few = Footprint { long: Vec2::new(4.0 / 64.0, 0.0), short: 4.0 / 64.0 };
         for i in 0..100_u8 {
             let at = Vec2::new(0.013 * f32::from(i), 0.021 * f32::from(i));
             assert!((texture.color(at, &few, Beyond::Repeat).x - 0.5).abs() < 1e-2);
@@ -364,14 +323,8 @@ mod tests {
         // Stripes along x: a footprint along them sees their colour, one across them the mean
         let texture = gray(64, 64, |_, y| (y / 4 % 2) as f32);
         let at = Vec2::new(0.5, 2.0 / 64.0);
-        let along = Footprint {
-            long: Vec2::new(8.0 / 64.0, 0.0),
-            short: 1.0 / 64.0,
-        };
-        let across = Footprint {
-            long: Vec2::new(0.0, 16.0 / 64.0),
-            ..along
-        };
+        let along = Footprint { long: Vec2::new(8.0 / 64.0, 0.0), short: 1.0 / 64.0 };
+        let across = Footprint { long: Vec2::new(0.0, 16.0 / 64.0), ..along };
         assert!(texture.color(at, &along, Beyond::Repeat).x < 0.01);
         assert!((texture.color(at, &across, Beyond::Repeat).x - 0.5).abs() < 0.1);
     }
@@ -379,10 +332,7 @@ mod tests {
     #[test]
     fn edges_are_smooth_without_repetition() {
         let texture = gray(8, 4, |_, _| 0.0);
-        let footprint = Footprint {
-            long: Vec2::new(0.1, 0.0),
-            short: 0.1,
-        };
+        let footprint = Footprint { long: Vec2::new(0.1, 0.0), short: 0.1 };
         let red = |x: f32| texture.color(Vec2::new(x, 0.5), &footprint, PLAIN).x;
         assert_eq!([red(0.1), red(-0.1)], [0.0, 1.0]);
         assert!((red(0.0) - 0.5).abs() < 1e-6 && red(-0.025) > red(0.025));
@@ -404,10 +354,7 @@ mod tests {
         let place = (1, 1);
         let (column, row) = place;
         assert_eq!(with(f32::NAN), Err(TextureError::NotFinite { column, row }));
-        assert_eq!(
-            with(f32::INFINITY),
-            Err(TextureError::NotFinite { column, row })
-        );
+        assert_eq!(with(f32::INFINITY), Err(TextureError::NotFinite { column, row }));
         assert_eq!(with(-0.25), Err(TextureError::Negative { column, row }));
         let bright = with(7.0).unwrap();
         assert_eq!(bright.color(Vec2::new(0.5, 0.75), &POINT, PLAIN), Vec3::ONE);

@@ -96,10 +96,8 @@ impl Condition {
     /// The text has a syntax error, compares conditions as numbers, is too long or too deep.
     pub fn parse(text: &str) -> Result<Self, ConditionError> {
         if text.len() > MAX_LENGTH {
-            let what = format!(
-                "a condition may have {MAX_LENGTH} bytes, this one has {}",
-                text.len()
-            );
+            let what =
+                format!("a condition may have {MAX_LENGTH} bytes, this one has {}", text.len());
             return Err(ConditionError { column: 1, what });
         }
         let mut parser = Parser {
@@ -125,11 +123,7 @@ impl Condition {
                 "this is a number, not a condition; compare it, as in `speed > 2`".to_owned();
             return Err(parser.error(1, what));
         }
-        Ok(Self {
-            text: text.to_owned(),
-            operations: parser.operations,
-            names: parser.names,
-        })
+        Ok(Self { text: text.to_owned(), operations: parser.operations, names: parser.names })
     }
 
     /// The text as it was written.
@@ -165,17 +159,12 @@ type Level = fn(&mut Parser) -> Parsed;
 
 impl Parser {
     fn error(&self, column: usize, what: impl Into<String>) -> ConditionError {
-        ConditionError {
-            column,
-            what: what.into(),
-        }
+        ConditionError { column, what: what.into() }
     }
 
     /// Column of the next token.
     fn column(&self) -> usize {
-        self.tokens
-            .get(self.next)
-            .map_or(self.end, |placed| placed.column)
+        self.tokens.get(self.next).map_or(self.end, |placed| placed.column)
     }
 
     /// Takes the next token if it is one of `signs`.
@@ -234,8 +223,7 @@ impl Parser {
             self.check(column, first, kind, sign)?;
             self.part(kind, sign, level)?;
             let operation = signs.iter().find(|(name, _)| *name == sign);
-            self.operations
-                .extend(operation.map(|(_, operation)| *operation));
+            self.operations.extend(operation.map(|(_, operation)| *operation));
             result = kind;
         }
         Ok(result)
@@ -265,14 +253,12 @@ impl Parser {
         self.check(column, left, Kind::Number, sign)?;
         self.part(Kind::Number, sign, Self::sum)?;
         let found = SIGNS.iter().find(|(name, _)| *name == sign);
-        self.operations
-            .extend(found.map(|(_, comparison)| Operation::Compare(*comparison)));
+        self.operations.extend(found.map(|(_, comparison)| Operation::Compare(*comparison)));
         let column = self.column();
         match self.take(&names) {
-            Some(_) => Err(self.error(
-                column,
-                "comparisons have two sides; join two of them with &&",
-            )),
+            Some(_) => {
+                Err(self.error(column, "comparisons have two sides; join two of them with &&"))
+            }
             None => Ok(Kind::Truth),
         }
     }
@@ -324,10 +310,9 @@ impl Parser {
     fn primary(&mut self) -> Parsed {
         let column = self.column();
         let Some(placed) = self.tokens.get(self.next) else {
-            return Err(self.error(
-                column,
-                "the condition ends here; a number or a name is missing",
-            ));
+            return Err(
+                self.error(column, "the condition ends here; a number or a name is missing")
+            );
         };
         match placed.token.clone() {
             Token::Number(number) => {
@@ -345,10 +330,7 @@ impl Parser {
                 self.require(")", "after the part in parentheses")?;
                 Ok(kind)
             }
-            token => Err(self.error(
-                column,
-                format!("expected a number or a name, found {token}"),
-            )),
+            token => Err(self.error(column, format!("expected a number or a name, found {token}"))),
         }
     }
 

@@ -52,9 +52,7 @@ impl Stacks {
                 Operation::Compare(comparison) => self.compare(comparison),
                 Operation::Not => {
                     let top = self.used[1] - 1;
-                    self.truths[top]
-                        .iter_mut()
-                        .for_each(|truth| *truth = !*truth);
+                    self.truths[top].iter_mut().for_each(|truth| *truth = !*truth);
                 }
                 Operation::And => self.join(|a, b| a & b),
                 Operation::Or => self.join(|a, b| a | b),

@@ -56,10 +56,7 @@ impl Selection {
 
     /// The particles with centres in the regions that spheres are cut to.
     pub fn of_cuts(&self) -> Self {
-        Self {
-            regions: self.cuts.clone(),
-            ..Self::default()
-        }
+        Self { regions: self.cuts.clone(), ..Self::default() }
     }
 
     /// Checks that the names in the condition have values, for particles with `attributes`.
@@ -81,9 +78,7 @@ impl Selection {
         time: Option<f64>,
     ) -> Result<Vec<Value>, UnknownName> {
         let names = self.condition.iter().flat_map(|condition| &condition.names);
-        names
-            .map(|name| Value::of(name, attributes, time, self.up))
-            .collect()
+        names.map(|name| Value::of(name, attributes, time, self.up)).collect()
     }
 
     /// Indices of the particles that are drawn, ascending. The result does not depend on the number of threads.

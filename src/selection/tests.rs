@@ -1,7 +1,4 @@
-#![expect(
-    clippy::cast_possible_truncation,
-    reason = "small numbers that are made here"
-)]
+#![expect(clippy::cast_possible_truncation, reason = "small numbers that are made here")]
 
 use std::path::Path;
 
@@ -11,11 +8,7 @@ use spherule_formats::{Attribute, Positions, Sequence, SequenceInput};
 use super::*;
 
 fn attribute(name: &str, components: usize, data: AttributeData) -> Attribute {
-    Attribute {
-        name: name.to_owned(),
-        components,
-        data,
-    }
+    Attribute { name: name.to_owned(), components, data }
 }
 
 /// More particles than are in a run, with an integer, a vector and NaN among the values.
@@ -33,16 +26,8 @@ fn particles() -> RawParticles {
         attributes: vec![
             attribute("Vel", 3, AttributeData::F32(velocity.collect())),
             attribute("density", 1, AttributeData::F64(density.collect())),
-            attribute(
-                "type",
-                1,
-                AttributeData::U8((0..count).map(|i| (i % 4) as u8).collect()),
-            ),
-            attribute(
-                "Idp",
-                1,
-                AttributeData::I64((0..count).map(|i| i as i64 - 9).collect()),
-            ),
+            attribute("type", 1, AttributeData::U8((0..count).map(|i| (i % 4) as u8).collect())),
+            attribute("Idp", 1, AttributeData::I64((0..count).map(|i| i as i64 - 9).collect())),
             attribute(
                 "diameter",
                 1,
@@ -58,10 +43,7 @@ fn particles() -> RawParticles {
 }
 
 fn by(text: &str) -> Selection {
-    Selection {
-        condition: Some(Condition::parse(text).expect(text)),
-        ..Selection::default()
-    }
+    Selection { condition: Some(Condition::parse(text).expect(text)), ..Selection::default() }
 }
 
 #[track_caller]
@@ -69,11 +51,7 @@ fn assert_selects(selection: &Selection, all: &RawParticles, is_kept: impl Fn(us
     let found = selection.survivors(all).expect("known names");
     let count = all.positions.len();
     let expected = (0..count).filter(|i| is_kept(*i)).map(index_u32);
-    assert!(
-        found.iter().copied().eq(expected),
-        "{} of {count}",
-        found.len()
-    );
+    assert!(found.iter().copied().eq(expected), "{} of {count}", found.len());
 }
 
 #[test]
@@ -102,16 +80,12 @@ fn conditions_agree_with_a_plain_loop() {
         let p = position(i);
         p.x.abs().min(p.y) > p.z.max(-1.0) && value(1, i).sqrt() > 1.5
     });
-    check("radius == 0.5 && id - index == -9 && time > 2.4", &|i| {
-        i % 3 == 1
-    });
+    check("radius == 0.5 && id - index == -9 && time > 2.4", &|i| i % 3 == 1);
     check("`total energy`.y == 3 && `total energy` > 4", &|_| true);
     check("1e-3 > 2 && x > 0", &|_| false);
     // Operators of one level apply from the left
     check("8 / 4 / 2 - 1 - 1 == -1 && 2 + 3 * 2 == 8", &|_| true);
-    check("type == 0 || type == 1 && x > 0", &|i| {
-        i % 4 == 0 || i % 4 == 1 && position(i).x > 0.0
-    });
+    check("type == 0 || type == 1 && x > 0", &|i| i % 4 == 0 || i % 4 == 1 && position(i).x > 0.0);
 }
 
 #[test]
@@ -122,12 +96,8 @@ fn ids_and_regions_select() {
         every,
         ..Selection::default()
     };
-    assert_selects(&selection("1-100,200", 1), &all, |i| {
-        (10..=109).contains(&i) || i == 209
-    });
-    assert_selects(&selection("-9-1000", 10), &all, |i| {
-        i <= 1009 && (i as i64 - 9) % 10 == 0
-    });
+    assert_selects(&selection("1-100,200", 1), &all, |i| (10..=109).contains(&i) || i == 209);
+    assert_selects(&selection("-9-1000", 10), &all, |i| i <= 1009 && (i as i64 - 9) % 10 == 0);
     let mut without = all.clone();
     without.attributes.clear();
     assert_selects(&selection("0-9", 3), &without, |i| i <= 9 && i % 3 == 0);
@@ -138,22 +108,10 @@ fn ids_and_regions_select() {
     for (region, holds) in [
         (Region::Box { min, max }, &is_in as &dyn Fn(DVec3) -> bool),
         (Region::OutsideBox { min, max }, &|p| !is_in(p)),
-        (Region::HalfSpace { point, normal }, &|p| {
-            (p.x - 0.5) + 2.0 * p.y <= 0.0
-        }),
-        (
-            Region::Slab {
-                axis: 1,
-                low: -0.5,
-                high: 0.25,
-            },
-            &|p| p.y >= -0.5 && p.y <= 0.25,
-        ),
+        (Region::HalfSpace { point, normal }, &|p| (p.x - 0.5) + 2.0 * p.y <= 0.0),
+        (Region::Slab { axis: 1, low: -0.5, high: 0.25 }, &|p| p.y >= -0.5 && p.y <= 0.25),
     ] {
-        let selection = Selection {
-            regions: vec![region],
-            ..Selection::default()
-        };
+        let selection = Selection { regions: vec![region], ..Selection::default() };
         assert_selects(&selection, &all, |i| holds(all.positions.get(i)));
         assert!(!region.contains(DVec3::NAN));
     }
@@ -197,72 +155,27 @@ fn errors_say_where_and_what() {
         ("", "character 1: the condition ends here"),
         ("x", "character 1: this is a number, not a condition"),
         ("x > ", "character 5: the condition ends here"),
-        (
-            "x = 1",
-            "character 3: `=` is not a sign of conditions: write == to compare",
-        ),
-        (
-            "x > 1 & y > 2",
-            "character 7: `&` is not a sign of conditions: write &&",
-        ),
-        (
-            "x > 1 and y > 2",
-            "character 7: `and` is not a sign of conditions: write && or ||",
-        ),
-        (
-            "not x > 1",
-            "character 1: `not` is not a sign of conditions: write !",
-        ),
-        (
-            "0 < x < 1",
-            "character 7: comparisons have two sides; join two of them with &&",
-        ),
-        (
-            "(x > 1) == 2",
-            "character 1: `==` needs a number here, and this is a condition",
-        ),
-        (
-            "x > (y > 2)",
-            "character 5: `>` needs a number here, and this is a condition",
-        ),
-        (
-            "x && y > 1",
-            "character 1: `&&` needs a condition here, and this is a number",
-        ),
+        ("x = 1", "character 3: `=` is not a sign of conditions: write == to compare"),
+        ("x > 1 & y > 2", "character 7: `&` is not a sign of conditions: write &&"),
+        ("x > 1 and y > 2", "character 7: `and` is not a sign of conditions: write && or ||"),
+        ("not x > 1", "character 1: `not` is not a sign of conditions: write !"),
+        ("0 < x < 1", "character 7: comparisons have two sides; join two of them with &&"),
+        ("(x > 1) == 2", "character 1: `==` needs a number here, and this is a condition"),
+        ("x > (y > 2)", "character 5: `>` needs a number here, and this is a condition"),
+        ("x && y > 1", "character 1: `&&` needs a condition here, and this is a number"),
         ("x > 1 || y", "character 10: `||` needs a condition here"),
         ("!x > 1", "character 2: `!` needs a condition here"),
         ("-(x > 1)", "character 2: `-` needs a number here"),
-        (
-            "(x > 1",
-            "character 7: expected `)` after the part in parentheses",
-        ),
+        ("(x > 1", "character 7: expected `)` after the part in parentheses"),
         ("x > 1)", "character 6: unexpected `)`"),
-        (
-            "x ** 2 > 1",
-            "character 3: `**` is not a sign of conditions: multiply",
-        ),
-        (
-            "part == \"fluid\"",
-            "character 9: `\"` is not a sign of conditions: text",
-        ),
-        (
-            "cos(x) > 1",
-            "character 1: unknown function `cos`; there are abs, sqrt, min, max",
-        ),
-        (
-            "min(x) > 1",
-            "character 6: expected `,` between the two arguments of min",
-        ),
-        (
-            "sqrt(x, y) > 1",
-            "character 7: expected `)` after the arguments of sqrt",
-        ),
+        ("x ** 2 > 1", "character 3: `**` is not a sign of conditions: multiply"),
+        ("part == \"fluid\"", "character 9: `\"` is not a sign of conditions: text"),
+        ("cos(x) > 1", "character 1: unknown function `cos`; there are abs, sqrt, min, max"),
+        ("min(x) > 1", "character 6: expected `,` between the two arguments of min"),
+        ("sqrt(x, y) > 1", "character 7: expected `)` after the arguments of sqrt"),
         ("abs(x > 1) > 1", "character 5: `abs` needs a number here"),
         ("1e999 > x", "character 1: `1e999` is not a finite number"),
-        (
-            "v[x] > 1",
-            "character 3: expected the number of a component",
-        ),
+        ("v[x] > 1", "character 3: expected the number of a component"),
         ("x # 1", "character 3: unexpected character `#`"),
         ("`a > 1", "character 1: a backquote has no second one"),
         ("ä > 1 &", "character 7: `&`"),
@@ -292,10 +205,7 @@ fn names_without_a_value_are_found() {
         let unknown = by(text).survivors(&all).expect_err(text);
         assert_eq!((unknown.name.as_str(), unknown.column), (name, column));
     }
-    let tilted = Selection {
-        up: Some(DVec3::new(0.0, 0.6, 0.8)),
-        ..by("height > 0.5")
-    };
+    let tilted = Selection { up: Some(DVec3::new(0.0, 0.6, 0.8)), ..by("height > 0.5") };
     assert_selects(&tilted, &all, |i| {
         let place = all.positions.get(i);
         0.6 * place.y + 0.8 * place.z > 0.5

@@ -29,14 +29,8 @@ const FOREIGN: [(&str, &str); 6] = [
     ("&", "write &&"),
     ("|", "write ||"),
     ("=", "write == to compare"),
-    (
-        "\"",
-        "text cannot be compared; a name with spaces is written in backquotes",
-    ),
-    (
-        "'",
-        "text cannot be compared; a name with spaces is written in backquotes",
-    ),
+    ("\"", "text cannot be compared; a name with spaces is written in backquotes"),
+    ("'", "text cannot be compared; a name with spaces is written in backquotes"),
 ];
 
 /// Splits `text` into tokens.
@@ -82,12 +76,7 @@ fn token(text: &str, first: char) -> Result<(Token, &str), String> {
 
 fn number(text: &str) -> Result<(Token, &str), String> {
     let bytes = text.as_bytes();
-    let digits = |from: usize| {
-        bytes[from..]
-            .iter()
-            .take_while(|b| b.is_ascii_digit())
-            .count()
-    };
+    let digits = |from: usize| bytes[from..].iter().take_while(|b| b.is_ascii_digit()).count();
     let mut end = digits(0);
     if bytes.get(end) == Some(&b'.') {
         end += 1 + digits(end + 1);
@@ -114,9 +103,7 @@ fn is_name(c: char) -> bool {
 fn name(text: &str) -> Result<(Token, &str), String> {
     let is_part = |c: char| is_name(c) || c.is_numeric() || c == '.';
     if let Some(quoted) = text.strip_prefix('`') {
-        let (name, rest) = quoted
-            .split_once('`')
-            .ok_or("a backquote has no second one")?;
+        let (name, rest) = quoted.split_once('`').ok_or("a backquote has no second one")?;
         let end = match rest.starts_with('.') {
             true => rest.find(|c| !is_part(c)).unwrap_or(rest.len()),
             false => 0,

@@ -56,10 +56,7 @@ impl Value {
         let found = match ParticleValue::named(&used.name, attributes) {
             Some(ParticleValue::Magnitude(name)) => index_of(&name).map(Self::Magnitude),
             Some(ParticleValue::Component(name, component)) => {
-                index_of(&name).map(|attribute| Self::Component {
-                    attribute,
-                    component,
-                })
+                index_of(&name).map(|attribute| Self::Component { attribute, component })
             }
             Some(ParticleValue::Index) => Some(Self::Index),
             Some(ParticleValue::Radius) => radius(attributes),
@@ -70,10 +67,7 @@ impl Value {
             None if name == "time" => time.map(Self::Constant),
             None => None,
         };
-        found.ok_or_else(|| UnknownName {
-            name: used.name.clone(),
-            column: used.column,
-        })
+        found.ok_or_else(|| UnknownName { name: used.name.clone(), column: used.column })
     }
 
     /// The ids of particles, or their indices if they have none.
@@ -82,10 +76,7 @@ impl Value {
             let mut all = attributes.iter();
             all.position(|a| std::ptr::eq(a, ids))
         });
-        ids.map_or(Self::Index, |attribute| Self::Component {
-            attribute,
-            component: 0,
-        })
+        ids.map_or(Self::Index, |attribute| Self::Component { attribute, component: 0 })
     }
 
     /// Writes the values of the particles from `first` on.
@@ -96,14 +87,10 @@ impl Value {
             Self::Height(up) => fill(to, |i| up.dot(particles.positions.get(first + i))),
             Self::Index => fill(to, |i| (first + i) as f64),
             Self::Constant(value) => to.fill(value),
-            Self::Component {
-                attribute: index,
-                component,
-            } => load_component(attribute(index), component, first, to),
-            Self::Scaled {
-                attribute: index,
-                factor,
-            } => {
+            Self::Component { attribute: index, component } => {
+                load_component(attribute(index), component, first, to)
+            }
+            Self::Scaled { attribute: index, factor } => {
                 load_component(attribute(index), 0, first, to);
                 to.iter_mut().for_each(|value| *value *= factor);
             }
@@ -127,10 +114,7 @@ fn radius<A: Named>(attributes: &[A]) -> Option<Value> {
     };
     let mut found = names::RADII.iter();
     found.find_map(|(name, factor)| {
-        named(name).map(|attribute| Value::Scaled {
-            attribute,
-            factor: *factor,
-        })
+        named(name).map(|attribute| Value::Scaled { attribute, factor: *factor })
     })
 }
 

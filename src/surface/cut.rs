@@ -55,10 +55,7 @@ impl ConvexRegion {
     }
 
     fn span(&self, ray: &Ray) -> Span {
-        let mut span = Span {
-            ends: [f32::NEG_INFINITY, f32::INFINITY],
-            planes: [0; 2],
-        };
+        let mut span = Span { ends: [f32::NEG_INFINITY, f32::INFINITY], planes: [0; 2] };
         for (index, plane) in self.planes.iter().enumerate() {
             let height = plane.distance - plane.normal.dot(ray.origin);
             let slope = plane.normal.dot(ray.direction);
@@ -115,25 +112,21 @@ impl<'a, S: CutShape> CutSpheres<'a, S> {
             points.t_max[lane] = t[lane].next_up();
         }
         let spheres = &self.spheres;
-        spheres.visit_chords(
-            &points,
-            lanes,
-            &mut |lane, particle, radius, [near, far]| {
-                let t = t[lane];
-                let contains = near < t && t <= far;
-                if !contains {
-                    return;
-                }
-                let power = (t - near) * (t - far);
-                let is_first = particle < owners.particle[lane];
-                if power < owners.power[lane] || (power == owners.power[lane] && is_first) {
-                    owners.power[lane] = power;
-                    owners.particle[lane] = particle;
-                    owners.radius[lane] = radius;
-                    owners.mask |= 1 << lane;
-                }
-            },
-        );
+        spheres.visit_chords(&points, lanes, &mut |lane, particle, radius, [near, far]| {
+            let t = t[lane];
+            let contains = near < t && t <= far;
+            if !contains {
+                return;
+            }
+            let power = (t - near) * (t - far);
+            let is_first = particle < owners.particle[lane];
+            if power < owners.power[lane] || (power == owners.power[lane] && is_first) {
+                owners.power[lane] = power;
+                owners.particle[lane] = particle;
+                owners.radius[lane] = radius;
+                owners.mask |= 1 << lane;
+            }
+        });
         owners
     }
 
@@ -179,10 +172,7 @@ impl<'a, S: CutShape> CutSpheres<'a, S> {
     /// The spans of `rays`, the rays of `lanes` that enter the region between their ends, and those that leave it
     /// there. Shortens all rays to their spans, and disables those without one.
     fn shorten(&self, rays: &mut RayPacket, lanes: u32) -> ([Span; LANES], [u32; 2]) {
-        let empty = Span {
-            ends: [f32::INFINITY, f32::NEG_INFINITY],
-            planes: [0; 2],
-        };
+        let empty = Span { ends: [f32::INFINITY, f32::NEG_INFINITY], planes: [0; 2] };
         let (mut spans, mut crossing) = ([empty; LANES], [0; 2]);
         for lane in lanes_in(first_lanes(rays.len())) {
             let ray = rays.ray(lane);

@@ -49,19 +49,13 @@ impl Balls {
         let mut planes: Vec<_> = (0..number % 3).map(plane).collect();
         if number % 2 == 1 {
             let corner = 0.6 * vector(seed + 5).as_dvec3().abs() + 0.1;
-            let faces = DVec3::AXES
-                .into_iter()
-                .flat_map(|n| [(corner, n), (-corner, -n)]);
+            let faces = DVec3::AXES.into_iter().flat_map(|n| [(corner, n), (-corner, -n)]);
             planes.extend(faces);
         }
         Self {
             centers: (0..count).map(|i| vector(seed + 11 * i)).collect(),
-            radii: (0..count)
-                .map(|i| 0.05 + 0.25 * unit(seed + 7 * i + 3))
-                .collect(),
-            displacements: (0..count)
-                .map(|i| 0.5 * vector(seed + 13 * i + 5))
-                .collect(),
+            radii: (0..count).map(|i| 0.05 + 0.25 * unit(seed + 7 * i + 3)).collect(),
+            displacements: (0..count).map(|i| 0.5 * vector(seed + 13 * i + 5)).collect(),
             planes,
         }
     }
@@ -115,15 +109,7 @@ impl Balls {
             let chord = [middle - half, middle + half];
             for t in chord {
                 let normal = (o + t * d - center) / radius;
-                meet(
-                    Hit {
-                        t,
-                        particle,
-                        normal,
-                    },
-                    &mut best,
-                    &mut closeness,
-                );
+                meet(Hit { t, particle, normal }, &mut best, &mut closeness);
             }
             for (end, t) in span.into_iter().enumerate() {
                 if t <= chord[0] || t >= chord[1] {
@@ -135,11 +121,7 @@ impl Balls {
                 if power < powers[end] {
                     powers[end] = power;
                     let normal = faces[end];
-                    let hit = Hit {
-                        t,
-                        particle,
-                        normal,
-                    };
+                    let hit = Hit { t, particle, normal };
                     if best.is_some_and(|best| best.t == t) {
                         best = Some(hit);
                     }
@@ -207,31 +189,16 @@ fn compare(balls: &Balls, shape: &dyn Shape, time: f32, single: bool) -> usize {
                     continue;
                 };
                 let point = ray.origin.as_dvec3() + expected.t * ray.direction.as_dvec3();
-                assert!(
-                    (f64::from(found.t) - expected.t).abs() < CLOSE,
-                    "{}",
-                    what()
-                );
-                assert!(
-                    (found.point.as_dvec3() - point).length() < CLOSE,
-                    "{}",
-                    what()
-                );
-                assert!(
-                    (found.normal.as_dvec3() - expected.normal).length() < 1e-3,
-                    "{}",
-                    what()
-                );
+                assert!((f64::from(found.t) - expected.t).abs() < CLOSE, "{}", what());
+                assert!((found.point.as_dvec3() - point).length() < CLOSE, "{}", what());
+                assert!((found.normal.as_dvec3() - expected.normal).length() < 1e-3, "{}", what());
                 assert_eq!(found.particle as usize, expected.particle, "{}", what());
                 assert_eq!(found.radius, balls.radii[expected.particle]);
                 faces += usize::from(balls.planes.iter().any(|(_, n)| *n == expected.normal));
             }
         }
     }
-    assert!(
-        skipped < packets as usize * 32 / 10,
-        "{skipped} rays are not decided"
-    );
+    assert!(skipped < packets as usize * 32 / 10, "{skipped} rays are not decided");
     faces
 }
 
@@ -241,10 +208,7 @@ fn cut_spheres_are_those_of_brute_force() {
     for number in 1..7 {
         let balls = Balls::new(number);
         let region = balls.region();
-        let spheres = Spheres {
-            centers: &balls.centers,
-            radius: SphereRadius::Each(&balls.radii),
-        };
+        let spheres = Spheres { centers: &balls.centers, radius: SphereRadius::Each(&balls.radii) };
         for structure in Structure::ALL {
             let mut builder = TreeBuilder::new();
             builder.build(&spheres, &BuildSettings::new(structure));
@@ -264,15 +228,9 @@ fn cut_spheres_are_those_of_brute_force() {
 fn moving_spheres_are_cut_at_the_time_of_a_ray() {
     let balls = Balls::new(4);
     let region = balls.region();
-    let spheres = Spheres {
-        centers: &balls.centers,
-        radius: SphereRadius::Each(&balls.radii),
-    };
+    let spheres = Spheres { centers: &balls.centers, radius: SphereRadius::Each(&balls.radii) };
     let mut builder = TreeBuilder::new();
-    let settings = BuildSettings {
-        keep_indices: true,
-        ..BuildSettings::default()
-    };
+    let settings = BuildSettings { keep_indices: true, ..BuildSettings::default() };
     builder.build(&spheres, &settings);
     let mut tree = MovingTree::default();
     tree.build(&builder.tree().view(), &balls.displacements);
@@ -286,18 +244,14 @@ fn moving_spheres_are_cut_at_the_time_of_a_ray() {
 #[test]
 fn light_passes_a_half_ball() {
     let mut builder = TreeBuilder::new();
-    let spheres = Spheres {
-        centers: &[Vec3::ZERO],
-        radius: SphereRadius::Common(1.0),
-    };
+    let spheres = Spheres { centers: &[Vec3::ZERO], radius: SphereRadius::Common(1.0) };
     builder.build(&spheres, &BuildSettings::default());
     let mut region = ConvexRegion::default();
     region.cut(DVec3::ZERO, DVec3::Z);
     let cut = CutSpheres::new(SphereSurface::new(builder.tree().view()), &region);
-    for (height, direction, expected) in [
-        (3.0, -1.0, [(3.0, 1.0), (4.0, -1.0)]),
-        (-3.0, 1.0, [(2.0, -1.0), (3.0, 1.0)]),
-    ] {
+    for (height, direction, expected) in
+        [(3.0, -1.0, [(3.0, 1.0), (4.0, -1.0)]), (-3.0, 1.0, [(2.0, -1.0), (3.0, 1.0)])]
+    {
         let origin = Vec3::new(0.0, 0.0, height);
         let mut ray = Ray::new(origin, Vec3::new(0.0, 0.0, direction));
         for (t, z) in expected {

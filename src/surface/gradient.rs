@@ -71,11 +71,7 @@ mod tests {
     #[test]
     fn steepness_is_that_of_the_spline() {
         let spline = |q: f32| {
-            if q < 1.0 {
-                1.0 - 1.5 * q * q + 0.75 * q * q * q
-            } else {
-                0.25 * (2.0 - q).powi(3)
-            }
+            if q < 1.0 { 1.0 - 1.5 * q * q + 0.75 * q * q * q } else { 0.25 * (2.0 - q).powi(3) }
         };
         for q in [0.1, 0.5, 0.9, 1.1, 1.5, 1.9] {
             let slope = (spline(q + 1e-2) - spline(q - 1e-2)) / 2e-2;

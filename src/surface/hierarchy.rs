@@ -67,11 +67,7 @@ impl Hierarchy {
         let boxes: Vec<Aabb> = (0..count).into_par_iter().map(padded).collect();
         let bvh = match boxes.is_empty() {
             true => CwBvh::default(),
-            false => build_cwbvh(
-                &boxes,
-                BvhBuildParams::medium_build(),
-                &mut Duration::default(),
-            ),
+            false => build_cwbvh(&boxes, BvhBuildParams::medium_build(), &mut Duration::default()),
         };
         Self { bvh, space }
     }
@@ -97,19 +93,18 @@ impl Hierarchy {
     ) -> Option<(u32, H)> {
         let (traversal, start) = self.traversal(ray)?;
         let mut best: Option<(f32, u32, H)> = None;
-        self.bvh
-            .ray_traverse(traversal, &mut RayHit::none(), |_, slot| {
-                let primitive = self.bvh.primitive_indices[slot];
-                let Some((t, found)) = hit(primitive) else {
-                    return f32::INFINITY;
-                };
-                let place = (single(t), primitive);
-                let is_nearer = |(t, index, _): &(f32, u32, H)| place < (*t, *index);
-                if best.as_ref().is_none_or(is_nearer) {
-                    best = Some((place.0, primitive, found));
-                }
-                self.space.distance(t, start)
-            });
+        self.bvh.ray_traverse(traversal, &mut RayHit::none(), |_, slot| {
+            let primitive = self.bvh.primitive_indices[slot];
+            let Some((t, found)) = hit(primitive) else {
+                return f32::INFINITY;
+            };
+            let place = (single(t), primitive);
+            let is_nearer = |(t, index, _): &(f32, u32, H)| place < (*t, *index);
+            if best.as_ref().is_none_or(is_nearer) {
+                best = Some((place.0, primitive, found));
+            }
+            self.space.distance(t, start)
+        });
         best.map(|(_, primitive, found)| (primitive, found))
     }
 
@@ -145,11 +140,7 @@ impl Space {
     fn new(min: DVec3, max: DVec3) -> Self {
         let half = 0.5 * (max - min);
         let size = half.max_element();
-        Self {
-            center: 0.5 * (min + max),
-            half,
-            scale: if size > 0.0 { 1.0 / size } else { 1.0 },
-        }
+        Self { center: 0.5 * (min + max), half, scale: if size > 0.0 { 1.0 / size } else { 1.0 } }
     }
 
     fn point(&self, point: DVec3) -> Vec3 {
@@ -158,10 +149,7 @@ impl Space {
 
     /// The distances at which a ray enters and leaves the box of all primitives; None if it misses the box.
     fn range(&self, ray: &Ray) -> Option<[f64; 2]> {
-        let (origin, direction) = (
-            ray.origin.as_dvec3() - self.center,
-            ray.direction.as_dvec3(),
-        );
+        let (origin, direction) = (ray.origin.as_dvec3() - self.center, ray.direction.as_dvec3());
         let padding = f64::from(PADDING) / self.scale;
         let mut range = [f64::from(ray.t_min), f64::from(ray.t_max)];
         for axis in 0..3 {
@@ -192,10 +180,7 @@ impl Space {
         let direction = ray.direction + Vec3::ZERO;
         let length = single((end - start) * self.scale);
         let t_max = length + PADDING * (1.0 + length);
-        Some((
-            obvhs::ray::Ray::new(origin.into(), direction.into(), 0.0, t_max),
-            start,
-        ))
+        Some((obvhs::ray::Ray::new(origin.into(), direction.into(), 0.0, t_max), start))
     }
 
     /// The distance `t` along a ray as a distance along the ray of the hierarchy that starts at `start`. It is

@@ -25,9 +25,7 @@ impl MaterialId {
 
     /// The material of the mesh `index`; None from [`Self::MAX_MESHES`] on.
     pub fn of_mesh(index: usize) -> Option<Self> {
-        let index = u8::try_from(index)
-            .ok()
-            .filter(|i| usize::from(*i) < Self::MAX_MESHES)?;
+        let index = u8::try_from(index).ok().filter(|i| usize::from(*i) < Self::MAX_MESHES)?;
         Some(Self(Self::FIXED + index))
     }
 
@@ -42,9 +40,7 @@ impl MaterialId {
     /// meshes.
     pub fn of_part(index: usize) -> Option<Self> {
         let index = Some(index).filter(|i| *i < Self::MAX_PARTS)?;
-        u8::try_from(usize::from(Self::FIXED) + Self::MAX_MESHES + index)
-            .ok()
-            .map(Self)
+        u8::try_from(usize::from(Self::FIXED) + Self::MAX_MESHES + index).ok().map(Self)
     }
 
     /// The index of the material of a part.

@@ -20,11 +20,7 @@ pub struct MovingSpheres<'a> {
 impl<'a> MovingSpheres<'a> {
     /// The spheres of `tree`.
     pub fn new(tree: &'a MovingTree) -> Self {
-        Self {
-            tree,
-            owners: SphereOwners::PARTICLES,
-            simd: Supported::default(),
-        }
+        Self { tree, owners: SphereOwners::PARTICLES, simd: Supported::default() }
     }
 
     /// Sets what the spheres belong to.

@@ -15,10 +15,7 @@ const MAX_NEIGHBOURS: usize = 4096;
 pub(super) const UNIT: f32 = 1_099_511_627_776.0;
 
 /// `value` in fixed-point units of 2^-40.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "terms are at most 1, and saturate"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "terms are at most 1, and saturate")]
 pub(super) fn fixed(value: f32) -> i64 {
     (value * UNIT) as i64
 }

@@ -19,20 +19,13 @@ impl SphereOwners {
 
     /// Each sphere is a particle; `first` is the index in the frame of the tree's first one.
     pub const fn new(material: MaterialId, first: u32) -> Self {
-        Self {
-            material,
-            first,
-            spheres: 1,
-        }
+        Self { material, first, spheres: 1 }
     }
 
     /// Sets the number of spheres of each particle, one or more, which follow each other in the tree's numbers.
     #[must_use]
     pub fn with_spheres(self, spheres: u32) -> Self {
-        Self {
-            spheres: spheres.max(1),
-            ..self
-        }
+        Self { spheres: spheres.max(1), ..self }
     }
 
     /// Index in the frame of the particle of a sphere of the tree.
@@ -67,7 +60,5 @@ pub(super) fn cross_chord(
     lane: usize,
 ) -> bool {
     let is_within = |t: &f32| *t >= rays.t_min[lane] && *t < rays.t_max[lane];
-    ends.iter()
-        .filter(|t| is_within(t))
-        .all(|_| product.multiply(part))
+    ends.iter().filter(|t| is_within(t)).all(|_| product.multiply(part))
 }

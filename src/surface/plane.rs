@@ -17,10 +17,7 @@ pub struct Plane<'a> {
 impl<'a> Plane<'a> {
     /// The plane of `ground`.
     pub fn new(ground: &'a Ground) -> Self {
-        Self {
-            ground,
-            simd: Supported::default(),
-        }
+        Self { ground, simd: Supported::default() }
     }
 }
 
@@ -59,30 +56,18 @@ fn intersect_plane_body(
 ) {
     let up = ground.up;
     let span = ground.fade_end - ground.fade_start;
-    let span = if span > f32::MIN_POSITIVE {
-        span
-    } else {
-        f32::MIN_POSITIVE
-    };
+    let span = if span > f32::MIN_POSITIVE { span } else { f32::MIN_POSITIVE };
     let mut hit_lanes = 0;
     for l in 0..LANES {
         let o = [rays.origin[0][l], rays.origin[1][l], rays.origin[2][l]];
-        let d = [
-            rays.direction[0][l],
-            rays.direction[1][l],
-            rays.direction[2][l],
-        ];
+        let d = [rays.direction[0][l], rays.direction[1][l], rays.direction[2][l]];
         // Intersect the ray with the plane
         let slope = d[0] * up.x + d[1] * up.y + d[2] * up.z;
         let height = o[0] * up.x + o[1] * up.y + o[2] * up.z;
         let t = (ground.height - height) / slope;
         let p = [o[0] + d[0] * t, o[1] + d[1] * t, o[2] + d[2] * t];
         // Compute the opacity from the distance to the centre of the scene
-        let c = [
-            p[0] - ground.center.x,
-            p[1] - ground.center.y,
-            p[2] - ground.center.z,
-        ];
+        let c = [p[0] - ground.center.x, p[1] - ground.center.y, p[2] - ground.center.z];
         let distance = (c[0] * c[0] + c[1] * c[1] + c[2] * c[2]).sqrt();
         let x = (ground.fade_end - distance) / span;
         let x = if x < 0.0 { 0.0 } else { x };
@@ -108,11 +93,7 @@ fn intersect_plane_body(
         rays.t_max[l] = if is_hit { t } else { rays.t_max[l] };
         hits.offset[l] = if is_hit { offset } else { hits.offset[l] };
         hits.lift[l] = if is_hit { 0.0 } else { hits.lift[l] };
-        hits.radius[l] = if is_hit {
-            f32::INFINITY
-        } else {
-            hits.radius[l]
-        };
+        hits.radius[l] = if is_hit { f32::INFINITY } else { hits.radius[l] };
         hits.opacity[l] = if is_hit { opacity } else { hits.opacity[l] };
     }
     for lane in 0..LANES {
@@ -160,10 +141,7 @@ mod tests {
     use crate::scene::Bounds;
 
     fn ground() -> Ground {
-        let bounds = Bounds {
-            min: DVec3::new(-1.0, -1.0, 1.0),
-            max: DVec3::new(1.0, 1.0, 3.0),
-        };
+        let bounds = Bounds { min: DVec3::new(-1.0, -1.0, 1.0), max: DVec3::new(1.0, 1.0, 3.0) };
         Ground::under(&bounds, Vec3::Z, DVec3::ZERO)
     }
 

@@ -29,11 +29,7 @@ impl Side {
     /// The side of the ray in `lane`, from the mask of rays that are inside.
     #[inline(always)]
     pub(crate) const fn of_lane(inside: u32, lane: usize) -> Self {
-        if inside >> lane & 1 == 1 {
-            Self::Inside
-        } else {
-            Self::Outside
-        }
+        if inside >> lane & 1 == 1 { Self::Inside } else { Self::Outside }
     }
 }
 

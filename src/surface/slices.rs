@@ -23,10 +23,7 @@ impl<S: Shape> SlicedSurface<S> {
     /// If there are no slices.
     pub fn new(slices: Vec<S>, is_searched: bool) -> Self {
         assert!(!slices.is_empty(), "an exposure has at least one slice");
-        Self {
-            slices,
-            is_searched,
-        }
+        Self { slices, is_searched }
     }
 
     fn middle(&self) -> &S {
@@ -36,13 +33,7 @@ impl<S: Shape> SlicedSurface<S> {
     /// The surface to search for the particle of `hit`, and the intersection with it.
     fn searched(&self, hit: &Intersection) -> Option<(&S, Intersection)> {
         let slice = self.slices.get(hit.particle as usize)?;
-        self.is_searched.then_some((
-            slice,
-            Intersection {
-                particle: 0,
-                ..*hit
-            },
-        ))
+        self.is_searched.then_some((slice, Intersection { particle: 0, ..*hit }))
     }
 
     fn slice_at(&self, time: f32) -> usize {
@@ -55,9 +46,7 @@ impl<S: Shape> SlicedSurface<S> {
         while let Some(first) = lanes_in(left).next() {
             let slice = self.slice_at(rays.time[first]);
             let is_same = |lane: &usize| self.slice_at(rays.time[*lane]) == slice;
-            let same = lanes_in(left)
-                .filter(is_same)
-                .fold(0, |lanes, lane| lanes | 1 << lane);
+            let same = lanes_in(left).filter(is_same).fold(0, |lanes, lane| lanes | 1 << lane);
             each(slice, same);
             left &= !same;
         }

@@ -91,10 +91,7 @@ impl Shape for SphereSurface<'_> {
     fn crossing(&self, ray: &Ray, _side: Side) -> Option<Intersection> {
         let hit = self.tree.nearest(ray)?;
         let hit = sphere_hit(&self.tree, ray, hit, &self.normals);
-        Some(Intersection {
-            particle: self.owners.particle_of(hit.particle),
-            ..hit
-        })
+        Some(Intersection { particle: self.owners.particle_of(hit.particle), ..hit })
     }
 
     fn material(&self) -> MaterialId {
@@ -109,10 +106,7 @@ impl Shape for SphereSurface<'_> {
         hits: &mut Intersections,
     ) {
         // Find the nearest spheres
-        let mut found = TreeHits {
-            t: [0.0; LANES],
-            slot: [TreeHits::NO_SLOT; LANES],
-        };
+        let mut found = TreeHits { t: [0.0; LANES], slot: [TreeHits::NO_SLOT; LANES] };
         self.tree.nearest_lanes(rays, coherence, &mut found);
         let hit_lanes = found.mask() & first_lanes(rays.len());
         if hit_lanes == 0 {
@@ -121,8 +115,7 @@ impl Shape for SphereSurface<'_> {
         // Compute points and normals of all lanes
         let mut centers = [[0.0; LANES]; 3];
         let mut radii = [1.0; LANES];
-        self.tree
-            .gather_spheres(&found, hit_lanes, &mut centers, &mut radii);
+        self.tree.gather_spheres(&found, hit_lanes, &mut centers, &mut radii);
         intersections(self.simd, rays, &found.t, &centers, &radii, hit_lanes, hits);
         // End the rays at their hits
         for lane in lanes_in(hit_lanes) {
@@ -134,9 +127,7 @@ impl Shape for SphereSurface<'_> {
         if self.normals != ShadingNormals::Sphere {
             for lane in lanes_in(hit_lanes) {
                 let ray = rays.ray(lane);
-                let hit = self
-                    .normals
-                    .shade(&self.tree, &ray, hits.get(lane), radii[lane]);
+                let hit = self.normals.shade(&self.tree, &ray, hits.get(lane), radii[lane]);
                 hits.set(lane, &hit, self.owners.material);
             }
         }
@@ -168,10 +159,8 @@ impl Shape for SphereSurface<'_> {
                 self.each_crossing_once(&rays.ray(lane), |crossing| {
                     let radius = self.tree.sphere(crossing.slot).1;
                     let particle = self.owners.particle_of(self.tree.particle(crossing.slot));
-                    product[lane].multiply(fresnel_transmittance(
-                        crossing.half_chord / radius,
-                        particle,
-                    ))
+                    product[lane]
+                        .multiply(fresnel_transmittance(crossing.half_chord / radius, particle))
                 });
             }
         } else {
@@ -217,28 +206,16 @@ fn intersections_body(
     for l in 0..LANES {
         let is_hit = hit_lanes >> l & 1 == 1;
         let o = [rays.origin[0][l], rays.origin[1][l], rays.origin[2][l]];
-        let d = [
-            rays.direction[0][l],
-            rays.direction[1][l],
-            rays.direction[2][l],
-        ];
+        let d = [rays.direction[0][l], rays.direction[1][l], rays.direction[2][l]];
         let c = [centers[0][l], centers[1][l], centers[2][l]];
         // Compute the outward normal; it points against the ray if the sphere is too small to have one
-        let v = [
-            o[0] + d[0] * t[l] - c[0],
-            o[1] + d[1] * t[l] - c[1],
-            o[2] + d[2] * t[l] - c[2],
-        ];
+        let v = [o[0] + d[0] * t[l] - c[0], o[1] + d[1] * t[l] - c[1], o[2] + d[2] * t[l] - c[2]];
         let inverse = 1.0 / (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
         let has_direction = inverse > 0.0 && inverse < f32::INFINITY && radii[l] > 0.0;
         let mut n = [0.0; 3];
         let mut p = [0.0; 3];
         for axis in 0..3 {
-            n[axis] = if has_direction {
-                v[axis] * inverse
-            } else {
-                -d[axis]
-            };
+            n[axis] = if has_direction { v[axis] * inverse } else { -d[axis] };
             p[axis] = c[axis] + n[axis] * radii[l];
         }
         // Compute an offset above the rounding of the point
@@ -289,9 +266,5 @@ impl SphereSurface<'_> {
 
 /// Unit vector along `from_center`; points against the ray for a sphere too small to have a direction.
 fn outward(from_center: Vec3, radius: f32, direction: Vec3) -> Vec3 {
-    if radius > 0.0 {
-        from_center.try_normalize().unwrap_or(-direction)
-    } else {
-        -direction
-    }
+    if radius > 0.0 { from_center.try_normalize().unwrap_or(-direction) } else { -direction }
 }

@@ -59,10 +59,7 @@ pub fn soft_drop(id: u32, number: u32) -> SoftDrop {
     let corner = Vec3::new(x, y, z);
     let offset = corner * (SOFT_SPREAD * corner.abs().max_element() / corner.length().max(1e-6));
     let reach = offset.length() / SOFT_SPREAD;
-    SoftDrop {
-        offset: reach * offset,
-        radius: least + (greatest - least) * size * size,
-    }
+    SoftDrop { offset: reach * offset, radius: least + (greatest - least) * size * size }
 }
 
 #[cfg(test)]

@@ -18,11 +18,7 @@ fn built(centers: &[Vec3], radius: f32, settings: &BuildSettings) -> TreeBuilder
 /// A block of particles, two pairs far from it, and one that touches it.
 fn splash() -> Vec<Vec3> {
     let mut centers: Vec<Vec3> = (0..1000_i16)
-        .map(|i| {
-            [i % 10, i / 10 % 10, i / 100]
-                .map(|c| 2.0 * f32::from(c))
-                .into()
-        })
+        .map(|i| [i % 10, i / 10 % 10, i / 100].map(|c| 2.0 * f32::from(c)).into())
         .collect();
     for far in [30.0, 50.0] {
         centers.insert(500, Vec3::new(far, 1.0, 0.0));
@@ -46,18 +42,12 @@ fn by_pairs(centers: &[Vec3], reach: f32) -> Vec<u32> {
 #[test]
 fn spray_has_few_neighbours_in_every_structure() {
     let centers = splash();
-    let eager = SbvhSettings {
-        alpha: 0.0,
-        budget: 2.0,
-    };
+    let eager = SbvhSettings { alpha: 0.0, budget: 2.0 };
     for support in [1.0, 2.5, 4.0] {
         let expected = by_pairs(&centers, support);
         assert!(!expected.is_empty() && expected.len() < 1010);
         for structure in Structure::ALL {
-            let settings = BuildSettings {
-                sbvh: eager,
-                ..BuildSettings::new(structure)
-            };
+            let settings = BuildSettings { sbvh: eager, ..BuildSettings::new(structure) };
             let builder = built(&centers, 1.0, &settings);
             let spray = spray_of(&builder.tree().view(), support);
             assert_eq!(spray, expected, "{structure} {support}");
@@ -83,9 +73,7 @@ fn a_particle_has_many_soft_drops_of_different_sizes() {
     let radius = drops.iter().map(|drop| drop.radius).sum::<f32>() / count;
     let expected = SOFT_RADII[0] + (SOFT_RADII[1] - SOFT_RADII[0]) / 3.0;
     assert!((radius - expected).abs() < 0.01, "{radius}");
-    let near = drops
-        .iter()
-        .filter(|drop| drop.offset.length() < 0.5 * SOFT_SPREAD);
+    let near = drops.iter().filter(|drop| drop.offset.length() < 0.5 * SOFT_SPREAD);
     assert!(near.count() as f32 > 0.25 * count);
     for pair in drops.windows(2) {
         assert_ne!(pair[0], pair[1]);
@@ -114,11 +102,7 @@ fn all_spheres_of_a_particle_have_its_index() {
 #[test]
 fn spray_is_hit_beside_and_before_a_body() {
     let body = built(&[Vec3::ZERO, Vec3::X], 1.0, &BuildSettings::default());
-    let drops = [
-        Vec3::new(-4.0, 0.0, 0.0),
-        Vec3::new(0.5, 0.0, 0.0),
-        Vec3::new(0.0, 5.0, 0.0),
-    ];
+    let drops = [Vec3::new(-4.0, 0.0, 0.0), Vec3::new(0.5, 0.0, 0.0), Vec3::new(0.0, 5.0, 0.0)];
     let spray = built(&drops, 0.25, &BuildSettings::default());
     let medium = UnionSurface::new(body.tree().view());
     let drops = SphereSurface::new(spray.tree().view()).of(SphereOwners::new(MaterialId::SPRAY, 2));

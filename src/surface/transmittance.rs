@@ -34,11 +34,7 @@ impl TransmittanceProduct {
     /// The product.
     #[expect(clippy::cast_possible_truncation, reason = "light is f32")]
     pub(crate) fn value(self) -> f32 {
-        if self.loss > MAX_LOSS {
-            0.0
-        } else {
-            exp2((-(self.loss as f64) / UNIT) as f32)
-        }
+        if self.loss > MAX_LOSS { 0.0 } else { exp2((-(self.loss as f64) / UNIT) as f32) }
     }
 }
 
@@ -60,10 +56,7 @@ mod tests {
         let forwards = product(factors.iter().copied());
         let exact: f64 = factors.iter().map(|f| f64::from(*f)).product();
         assert!((f64::from(forwards) / exact - 1.0).abs() < 1e-6);
-        assert_eq!(
-            forwards.to_bits(),
-            product(factors.into_iter().rev()).to_bits()
-        );
+        assert_eq!(forwards.to_bits(), product(factors.into_iter().rev()).to_bits());
     }
 
     #[test]
@@ -72,10 +65,7 @@ mod tests {
         assert_eq!(product([1.0, 1.0].into_iter()), 1.0);
         assert_eq!(product([0.5, 0.0].into_iter()), 0.0);
         let mut transmittance = TransmittanceProduct::default();
-        assert!(
-            (0..31).all(|_| transmittance.multiply(0.5)),
-            "2^-31 is left"
-        );
+        assert!((0..31).all(|_| transmittance.multiply(0.5)), "2^-31 is left");
         assert!(!transmittance.multiply(0.25));
         assert_eq!(transmittance.value(), 0.0);
     }

@@ -27,21 +27,13 @@ pub struct UnionSurface<'a> {
 impl<'a> UnionSurface<'a> {
     /// The union of the spheres of `tree`.
     pub fn new(tree: TreeView<'a>) -> Self {
-        Self {
-            tree,
-            spheres: SphereSurface::new(tree),
-            normals: ShadingNormals::Sphere,
-        }
+        Self { tree, spheres: SphereSurface::new(tree), normals: ShadingNormals::Sphere }
     }
 
     /// Sets the shading normals.
     #[must_use]
     pub fn with_normals(self, normals: ShadingNormals) -> Self {
-        Self {
-            normals,
-            spheres: self.spheres.with_normals(normals),
-            ..self
-        }
+        Self { normals, spheres: self.spheres.with_normals(normals), ..self }
     }
 
     fn entry(&self, ray: &Ray) -> Option<Intersection> {
@@ -63,10 +55,7 @@ impl<'a> UnionSurface<'a> {
     /// Exit at the start of the ray, with the particle of the next sphere ahead or else behind it: the ray must have
     /// come from one of them.
     fn exit_at_start(&self, ray: &Ray) -> Option<Intersection> {
-        let forward = Ray {
-            t_max: f32::INFINITY,
-            ..*ray
-        };
+        let forward = Ray { t_max: f32::INFINITY, ..*ray };
         let backward = Ray::new(ray.at(ray.t_min), -ray.direction);
         let nearest_sphere = |ray: &Ray| self.spheres.crossing(ray, Side::Outside);
         let hit = nearest_sphere(&forward).or_else(|| nearest_sphere(&backward))?;
@@ -96,11 +85,7 @@ impl Shape for UnionSurface<'_> {
     }
 
     fn side_of(&self, point: Vec3) -> Side {
-        if self.tree.contains(point) {
-            Side::Inside
-        } else {
-            Side::Outside
-        }
+        if self.tree.contains(point) { Side::Inside } else { Side::Outside }
     }
 
     fn intersect(
@@ -130,8 +115,7 @@ impl UnionSurface<'_> {
         // Find the first spheres with packet traversal
         let mut shortened = *rays;
         let mut sphere_hits = Intersections::default();
-        self.spheres
-            .intersect(&mut shortened, Coherence::Coherent, 0, &mut sphere_hits);
+        self.spheres.intersect(&mut shortened, Coherence::Coherent, 0, &mut sphere_hits);
         let mut start = None;
         for lane in 0..rays.len() {
             let ray = rays.ray(lane);

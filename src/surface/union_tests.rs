@@ -43,12 +43,7 @@ fn spheres_inside_the_union_are_not_hit() {
     each_structure(&centers, SphereRadius::Common(1.0), |body| {
         let mut ray = Ray::new(Vec3::new(-5.0, 0.0, 0.0), Vec3::X);
         let mut side = Side::Outside;
-        let expected = [
-            (4.0, 0, -1.0),
-            (8.0, 2, 1.0),
-            (13.0, 3, -1.0),
-            (15.0, 3, 1.0),
-        ];
+        let expected = [(4.0, 0, -1.0), (8.0, 2, 1.0), (13.0, 3, -1.0), (15.0, 3, 1.0)];
         for (t, particle, x) in expected {
             let hit = body.crossing(&ray, side).expect("a crossing");
             assert_eq!((hit.t, hit.particle, hit.normal.x), (t, particle, x));
@@ -82,10 +77,7 @@ fn refracted_rays_leave_the_union() {
             let ray = Ray::new(start, inwards);
             let exit = body.crossing(&ray, Side::Inside);
             let exit = exit.unwrap_or_else(|| panic!("{ray:?} stays inside"));
-            assert!(
-                exit.t > 0.0 && exit.normal.dot(inwards) >= -1e-3,
-                "{exit:?}"
-            );
+            assert!(exit.t > 0.0 && exit.normal.dot(inwards) >= -1e-3, "{exit:?}");
             let outside = exit.anchor + exit.offset * exit.normal;
             in_creases += u32::from(body.side_of(outside) == Side::Inside);
             entered += 1;
@@ -101,21 +93,14 @@ fn rays_on_the_wrong_side_cross_at_once() {
         let hit = body.crossing(&Ray::new(start, Vec3::X), Side::Outside);
         assert_eq!(hit.map(|hit| (hit.t, hit.normal)), Some((0.0, -Vec3::X)));
         // After the last crossing, the ray is outside.
-        assert_eq!(
-            body.crossing(&Ray::new(start, -Vec3::X), Side::Outside),
-            None
-        );
+        assert_eq!(body.crossing(&Ray::new(start, -Vec3::X), Side::Outside), None);
         let start = Vec3::new(-1.000_01, 0.0, 0.0);
         for direction in [Vec3::X, -Vec3::X] {
             let hit = body.crossing(&Ray::new(start, direction), Side::Inside);
             assert_eq!(hit.map(|hit| (hit.t, hit.normal)), Some((0.0, direction)));
         }
         let far = Ray::new(Vec3::new(0.0, 5.0, 0.0), Vec3::X);
-        assert_eq!(
-            body.crossing(&far, Side::Inside),
-            None,
-            "nothing to come from"
-        );
+        assert_eq!(body.crossing(&far, Side::Inside), None, "nothing to come from");
     });
 }
 

@@ -130,12 +130,7 @@ impl ColorTotals {
                     return;
                 };
                 let is_length = attribute.components > 1;
-                self.add_values(
-                    attribute.count(),
-                    |i| attribute.magnitude(i),
-                    range,
-                    is_length,
-                );
+                self.add_values(attribute.count(), |i| attribute.magnitude(i), range, is_length);
             }
             ParticleValue::Component(name, c) => {
                 let Some(attribute) = frame.attribute(name) else {
@@ -187,10 +182,8 @@ impl ColorTotals {
             return self.add_categories((0..count).map(value));
         }
         let mut values = sorted_sample(count, value);
-        let is_positive = matches!(
-            question,
-            RangeQuestion::Positive | RangeQuestion::PositivePercentiles(_)
-        );
+        let is_positive =
+            matches!(question, RangeQuestion::Positive | RangeQuestion::PositivePercentiles(_));
         if is_positive {
             let below = values.partition_point(|value| *value <= 0.0);
             self.left_out |= below > 0;
@@ -248,12 +241,6 @@ impl ColorTotals {
             all if all.len() > MAX_CATEGORIES => Categories::TooMany,
             all => Categories::Values(all.into_iter().collect()),
         });
-        Some(ColorRange {
-            attribute,
-            low,
-            high,
-            left_out: self.left_out,
-            categories,
-        })
+        Some(ColorRange { attribute, low, high, left_out: self.left_out, categories })
     }
 }

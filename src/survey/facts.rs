@@ -18,9 +18,8 @@ use super::{ColorQuestion, Fit, Question, RadiusQuestion, RgbAttribute, velocity
 pub const ELEMENT: &str = "element";
 
 /// Names of attributes whose integers are categories, best first.
-const CATEGORIES: [&str; 8] = [
-    "type", "typeid", "species", "element", "phase", "part", "material", "mk",
-];
+const CATEGORIES: [&str; 8] =
+    ["type", "typeid", "species", "element", "phase", "part", "material", "mk"];
 
 /// Most values of an attribute that are categories unasked: more colours cannot be told apart in a legend.
 const MOST_CATEGORIES: usize = 12;
@@ -127,10 +126,7 @@ impl Facts {
             has_bonds: !raw.bonds.is_empty(),
             elements: integers(ELEMENT).and_then(elements),
             categories: categories.filter_map(|a| category(a, velocity)).collect(),
-            in_cell: raw
-                .cell
-                .as_ref()
-                .map_or(0.0, |cell| part_in(cell, &raw.positions)),
+            in_cell: raw.cell.as_ref().map_or(0.0, |cell| part_in(cell, &raw.positions)),
             cell: raw.cell,
             bounds: robust_bounds(&raw.positions, sample.extremes).map(|bounds| bounds.outer),
         }
@@ -188,9 +184,7 @@ fn elements(attribute: &Attribute) -> Option<Elements> {
         all += 1;
         known += usize::from(value >= 1.0 && value <= LAST_ELEMENT as f64);
     }
-    (2 * known > all).then_some(Elements {
-        has_others: known < all,
-    })
+    (2 * known > all).then_some(Elements { has_others: known < all })
 }
 
 /// The categories in `attribute`, if its values are few integers, and more than one.
@@ -201,10 +195,7 @@ fn category(attribute: &Attribute, velocity: Option<&Attribute>) -> Option<Categ
         if value.fract() != 0.0 || value.abs() > 1e15 {
             return None;
         }
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "an integer within the range"
-        )]
+        #[expect(clippy::cast_possible_truncation, reason = "an integer within the range")]
         let value = value as i64;
         all.insert(value);
         if all.len() > MOST_CATEGORIES {
@@ -214,11 +205,8 @@ fn category(attribute: &Attribute, velocity: Option<&Attribute>) -> Option<Categ
             moving.insert(value);
         }
     }
-    let at_rest = if moving.is_empty() {
-        Vec::new()
-    } else {
-        all.difference(&moving).copied().collect()
-    };
+    let at_rest =
+        if moving.is_empty() { Vec::new() } else { all.difference(&moving).copied().collect() };
     (all.len() > 1).then(|| Category {
         name: attribute.name.clone(),
         values: all.into_iter().collect(),

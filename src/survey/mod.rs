@@ -200,10 +200,7 @@ pub struct Question<'a> {
 impl Question<'_> {
     /// The selection, with heights along `up`.
     fn selection_with(&self, up: DVec3) -> Option<Selection> {
-        self.selection.map(|selection| Selection {
-            up: Some(up),
-            ..selection.clone()
-        })
+        self.selection.map(|selection| Selection { up: Some(up), ..selection.clone() })
     }
 }
 
@@ -228,10 +225,7 @@ impl RadiusQuestion<'_> {
     /// The estimates that it needs, of each of so many `frames`.
     fn spacing(&self, frames: usize) -> Option<SpacingRequest> {
         let needs_spacing = matches!(self, Self::Given | Self::Auto | Self::AutoOfBody);
-        needs_spacing.then_some(SpacingRequest {
-            needs_packed: *self == Self::AutoOfBody,
-            frames,
-        })
+        needs_spacing.then_some(SpacingRequest { needs_packed: *self == Self::AutoOfBody, frames })
     }
 
     /// The same for positions in a unit in which an angstrom has this length.
@@ -356,11 +350,7 @@ impl Survey {
     ) -> Result<Self, FrameError> {
         let angstrom = sequence.angstrom();
         let mut totals = Totals::new();
-        let format_up = if sequence.is_y_up() {
-            DVec3::Y
-        } else {
-            DVec3::Z
-        };
+        let format_up = if sequence.is_y_up() { DVec3::Y } else { DVec3::Z };
         let up = question.up.unwrap_or(format_up);
         let selection = question.selection_with(up);
         let question = Question {
@@ -387,10 +377,7 @@ impl Survey {
         // Fail only if no frame was readable
         match failure {
             Some(error) if totals.frames == 0 => Err(error),
-            _ => Ok(Self {
-                angstrom,
-                ..totals.finish(question, format_up)
-            }),
+            _ => Ok(Self { angstrom, ..totals.finish(question, format_up) }),
         }
     }
 }
@@ -409,10 +396,7 @@ impl Survey {
     ) -> Result<Self, FrameError> {
         let up = question.up.unwrap_or(DVec3::Z);
         let selection = question.selection_with(up);
-        let question = Question {
-            selection: selection.as_ref(),
-            ..question
-        };
+        let question = Question { selection: selection.as_ref(), ..question };
         let sample = FrameSample::of_memory(name, particles, question)?;
         let mut totals = Totals::new();
         totals.add(sample, question, up, true);
@@ -426,9 +410,8 @@ fn of_frames(
     spacings: &[(u64, Spacing)],
     estimate: impl Fn(&Spacing) -> Option<f32>,
 ) -> Option<f32> {
-    let estimates = spacings
-        .iter()
-        .filter_map(|(count, spacing)| Some((estimate(spacing)?, *count)));
+    let estimates =
+        spacings.iter().filter_map(|(count, spacing)| Some((estimate(spacing)?, *count)));
     let mut estimates: Vec<(f32, u64)> = estimates.collect();
     estimates.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let all: u64 = estimates.iter().map(|(_, count)| count).sum();
@@ -445,9 +428,7 @@ fn spread(count: usize) -> Vec<usize> {
     if count <= FRAMES {
         return (0..count).collect();
     }
-    (0..FRAMES)
-        .map(|i| i * (count - 1) / (FRAMES - 1))
-        .collect()
+    (0..FRAMES).map(|i| i * (count - 1) / (FRAMES - 1)).collect()
 }
 
 impl Totals {
@@ -477,14 +458,7 @@ impl Totals {
     fn add(&mut self, sample: FrameSample, question: Question, up: DVec3, is_framed: bool) {
         self.frames += 1;
         self.origin = self.origin.and(sample.origin);
-        let FrameSample {
-            particles: raw,
-            count,
-            extremes,
-            spacing,
-            mut weight,
-            ..
-        } = sample;
+        let FrameSample { particles: raw, count, extremes, spacing, mut weight, .. } = sample;
         for attribute in &raw.attributes {
             let components = self.attributes.entry(attribute.name.clone()).or_insert(0);
             *components = attribute.components.max(*components);
@@ -515,9 +489,8 @@ impl Totals {
                 ColorQuestion::Value(name, _) => RgbAttribute::of(&raw.attributes, Some(name)),
             };
         }
-        let origin = self.bounds.map_or(DVec3::ZERO, |bounds| {
-            choose_origin(bounds.outer.0, bounds.outer.1)
-        });
+        let origin =
+            self.bounds.map_or(DVec3::ZERO, |bounds| choose_origin(bounds.outer.0, bounds.outer.1));
         // Count particles, and remember the heaviest frame
         let sampled = raw.positions.len();
         let frame = ParticleFrame::from_raw(raw, origin);
@@ -531,12 +504,7 @@ impl Totals {
             self.weight = Some(weight);
         }
         // Update the ranges of colour and radius
-        let context = FrameContext {
-            count,
-            origin,
-            up,
-            radius: question.radius,
-        };
+        let context = FrameContext { count, origin, up, radius: question.radius };
         let velocity = self.velocity.as_deref();
         self.color.add(&frame, velocity, question.color, context);
         if question.points && is_framed {
@@ -546,8 +514,7 @@ impl Totals {
         match question.radius {
             RadiusQuestion::None => {}
             RadiusQuestion::Given => {
-                self.spacings
-                    .extend(spacing.map(|spacing| (weight.particles, spacing)));
+                self.spacings.extend(spacing.map(|spacing| (weight.particles, spacing)));
             }
             RadiusQuestion::Auto | RadiusQuestion::AutoOfBody => {
                 self.add_radius(&frame, weight.particles, spacing);
@@ -572,8 +539,7 @@ impl Totals {
                 self.reach = self.reach.max(robust_largest(radii.len(), |i| radii[i]));
             }
             None => {
-                self.spacings
-                    .extend(spacing.map(|spacing| (count, spacing)));
+                self.spacings.extend(spacing.map(|spacing| (count, spacing)));
             }
         }
     }

@@ -28,11 +28,7 @@ impl Moments {
     }
 
     /// Mean difference of the numbers of consecutive frames.
-    #[expect(
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        reason = "rounded"
-    )]
+    #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "rounded")]
     pub(super) fn number_step(&self) -> Option<i64> {
         let numbers = self.last?.1.checked_sub(self.first?.1)?;
         Some(((numbers as f64 / self.count()?).round() as i64).max(1))

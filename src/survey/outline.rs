@@ -84,9 +84,7 @@ impl Outermost {
         if sample.is_empty() {
             return;
         }
-        let points: Vec<DVec3> = sample_indices(sample.len(), KEPT)
-            .map(|i| sample[i])
-            .collect();
+        let points: Vec<DVec3> = sample_indices(sample.len(), KEPT).map(|i| sample[i]).collect();
         let each = count.div_ceil(points.len());
         self.kept.push(Kept { points, each });
         let extent = |axis: &DVec3| {
@@ -109,9 +107,7 @@ impl Outermost {
             sample.swap_remove(index);
         }
         // Join the ends with those of the frames before
-        let found: Vec<[End; 2]> = axes()
-            .filter_map(|axis| ends_along(&sample, axis))
-            .collect();
+        let found: Vec<[End; 2]> = axes().filter_map(|axis| ends_along(&sample, axis)).collect();
         if self.ends.is_empty() {
             self.ends.clone_from(&found);
         }
@@ -145,12 +141,7 @@ impl Outermost {
 impl Outermost {
     /// Finds the outermost particles of a `share` of all frames together.
     fn keep(&mut self, share: f64) {
-        let all: Vec<DVec3> = self
-            .kept
-            .iter()
-            .flat_map(|frame| &frame.points)
-            .copied()
-            .collect();
+        let all: Vec<DVec3> = self.kept.iter().flat_map(|frame| &frame.points).copied().collect();
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
@@ -172,10 +163,7 @@ impl Outermost {
         let found = axes().flat_map_iter(|axis| beyond(&all, axis, longest, (tail, SHARE_MARGIN)));
         let outliers: HashSet<usize> = farthest(found.collect(), most).into_iter().collect();
         let indices = 0..all.len();
-        let rest: Vec<DVec3> = indices
-            .filter(|i| !outliers.contains(i))
-            .map(|i| all[i])
-            .collect();
+        let rest: Vec<DVec3> = indices.filter(|i| !outliers.contains(i)).map(|i| all[i]).collect();
         let mut first = 0;
         self.outliers = 0;
         for frame in &self.kept {
@@ -254,10 +242,7 @@ fn farthest(mut outliers: Vec<Outlier>, most: usize) -> Vec<usize> {
 
 /// The lowest and the highest particle of a `sample` along `axis`, the first in a tie; `None` without particles.
 fn ends_along(sample: &[DVec3], axis: DVec3) -> Option<[End; 2]> {
-    let ends = sample.iter().map(|point| End {
-        along: point.dot(axis),
-        point: *point,
-    });
+    let ends = sample.iter().map(|point| End { along: point.dot(axis), point: *point });
     ends.map(|end| [end; 2]).reduce(|[low, high], [end, _]| {
         [
             if end.along < low.along { end } else { low },
@@ -300,9 +285,7 @@ mod tests {
     fn ball(count: usize) -> Vec<DVec3> {
         let mut state = 1_u64;
         let mut uniform = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
             (state >> 40) as f64 / f64::from(1 << 23) - 1.0
         };
         let mut points = Vec::new();
@@ -336,9 +319,7 @@ mod tests {
     fn corners_of_a_box_and_all_frames_are_in_an_outline() {
         let corners = |at: DVec3| -> Vec<DVec3> {
             let side = |bit: usize| if bit == 0 { 0.0 } else { 1.0 };
-            (0..8)
-                .map(|i| at + DVec3::new(side(i & 1), side(i & 2), side(i & 4)))
-                .collect()
+            (0..8).map(|i| at + DVec3::new(side(i & 1), side(i & 2), side(i & 4))).collect()
         };
         let (first, second) = (corners(DVec3::ZERO), corners(5.0 * DVec3::X));
         let outline = outline(&[&first, &second]);
@@ -358,9 +339,8 @@ mod tests {
             assert_eq!(outline.outliers, 1);
         }
         // One of a few that are in a plane belongs to them
-        let mut plane: Vec<DVec3> = (0..25)
-            .map(|i| DVec3::new(f64::from(i % 5), f64::from(i / 5), 0.0))
-            .collect();
+        let mut plane: Vec<DVec3> =
+            (0..25).map(|i| DVec3::new(f64::from(i % 5), f64::from(i / 5), 0.0)).collect();
         plane.push(DVec3::new(2.0, 2.0, 3.5));
         assert!(outline(&[&plane]).points.contains(&plane[25].as_vec3()));
     }
@@ -392,13 +372,7 @@ mod tests {
         // Nothing of a solid body is left out
         let mut outermost = Outermost::default();
         outermost.add(&Positions::F64(heap.clone()), heap.len());
-        assert_eq!(
-            outermost
-                .outline(Fit::Share(0.99), DVec3::ZERO)
-                .unwrap()
-                .outliers,
-            0
-        );
+        assert_eq!(outermost.outline(Fit::Share(0.99), DVec3::ZERO).unwrap().outliers, 0);
     }
 
     #[test]

@@ -76,10 +76,7 @@ mod tests {
     use super::*;
 
     fn spacing(positions: &[Vec3]) -> Option<Spacing> {
-        let request = SpacingRequest {
-            needs_packed: true,
-            frames: 1,
-        };
+        let request = SpacingRequest { needs_packed: true, frames: 1 };
         spacing_of(positions, request)
     }
 
@@ -134,9 +131,7 @@ mod tests {
         let whole = packed(&all).expect("a radius");
         // Three distant blocks, with more particles than the limit for inspecting each.
         let far = (0..3_u8).map(|i| 1e3 * f32::from(i) * Vec3::X);
-        let all = far
-            .flat_map(|offset| all.iter().map(move |p| *p + offset))
-            .collect();
+        let all = far.flat_map(|offset| all.iter().map(move |p| *p + offset)).collect();
         let raw = RawParticles {
             positions: Positions::F32(all),
             attributes: Vec::new(),

@@ -20,9 +20,7 @@ fn random(count: usize, mut state: u32) -> impl Iterator<Item = f32> {
 /// Particles at random places in a cube, which are dense where `x` is small.
 fn cloud(count: usize, seed: u32) -> Vec<Vec3> {
     let numbers: Vec<f32> = random(3 * count, seed).collect();
-    let places = numbers
-        .chunks(3)
-        .map(|c| Vec3::new(c[0] * c[0], c[1], c[2]));
+    let places = numbers.chunks(3).map(|c| Vec3::new(c[0] * c[0], c[1], c[2]));
     places.collect()
 }
 
@@ -105,10 +103,7 @@ fn the_radius_of_large_frames_is_the_same_for_all_selections() {
     let sequence = Sequence::open(&SequenceInput::from_path(&path)).expect("a frame");
     let particles = raw(PositionSlice::F32(&positions));
     let surveys = |selection| {
-        let question = Question {
-            radius: RadiusQuestion::Auto,
-            ..question(selection)
-        };
+        let question = Question { radius: RadiusQuestion::Auto, ..question(selection) };
         let of_file = Survey::of(&sequence, question).expect("readable");
         let of_memory = Survey::of_particles("memory", &particles, question);
         [of_file, of_memory.expect("readable")].map(|survey| survey.radius)

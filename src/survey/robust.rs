@@ -36,10 +36,7 @@ impl RobustBounds {
     /// The boxes of two frames.
     pub(super) fn and(self, other: Self) -> Self {
         let enclose = |a: (DVec3, DVec3), b: (DVec3, DVec3)| (a.0.min(b.0), a.1.max(b.1));
-        Self {
-            outer: enclose(self.outer, other.outer),
-            layers: enclose(self.layers, other.layers),
-        }
+        Self { outer: enclose(self.outer, other.outer), layers: enclose(self.layers, other.layers) }
     }
 }
 
@@ -67,8 +64,7 @@ pub(super) fn robust_bounds(
     let mut sample = sample_of(positions);
     let outermost = || {
         let all = (0..count).into_par_iter().filter_map(finite);
-        all.map(|p| (p, p))
-            .reduce_with(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+        all.map(|p| (p, p)).reduce_with(|a, b| (a.0.min(b.0), a.1.max(b.1)))
     };
     let (min, max) = extremes.or_else(outermost)?;
     let few = sample.len() < 100;
@@ -93,23 +89,14 @@ pub(super) fn robust_bounds(
     }
     // Limit the box to a margin around it
     let extent = last - first;
-    let margin = if few {
-        DVec3::splat(extent.max_element())
-    } else {
-        0.5 * extent
-    };
-    Some(RobustBounds {
-        outer: (min.max(first - margin), max.min(last + margin)),
-        layers,
-    })
+    let margin = if few { DVec3::splat(extent.max_element()) } else { 0.5 * extent };
+    Some(RobustBounds { outer: (min.max(first - margin), max.min(last + margin)), layers })
 }
 
 /// The 99th percentile of `count` radii; 0 without finite ones.
 pub(super) fn robust_largest(count: usize, radius: impl Fn(usize) -> f32) -> f32 {
-    let mut radii: Vec<f32> = sample_indices(count, SAMPLE)
-        .map(radius)
-        .filter(|r| r.is_finite() && *r > 0.0)
-        .collect();
+    let mut radii: Vec<f32> =
+        sample_indices(count, SAMPLE).map(radius).filter(|r| r.is_finite() && *r > 0.0).collect();
     radii.sort_unstable_by(f32::total_cmp);
     let place = (radii.len() - radii.len() / 100).saturating_sub(1);
     radii.get(place).copied().unwrap_or(0.0)
@@ -117,10 +104,8 @@ pub(super) fn robust_largest(count: usize, radius: impl Fn(usize) -> f32) -> f32
 
 /// Up to [`SAMPLE`] of the `count` values that are finite, rising.
 pub(super) fn sorted_sample(count: usize, value: impl Fn(usize) -> f64) -> Vec<f64> {
-    let mut values: Vec<f64> = sample_indices(count, SAMPLE)
-        .map(value)
-        .filter(|v| v.is_finite())
-        .collect();
+    let mut values: Vec<f64> =
+        sample_indices(count, SAMPLE).map(value).filter(|v| v.is_finite()).collect();
     values.sort_unstable_by(f64::total_cmp);
     values
 }
@@ -159,10 +144,7 @@ pub(super) fn spacing_of(positions: &[Vec3], request: SpacingRequest) -> Option<
     let query_count = neighbour_queries(positions.len(), request.frames);
     let touching = estimate_radius(positions, query_count)?;
     let packed = || estimate_packed(positions, touching, query_count);
-    Some(Spacing {
-        touching,
-        packed: request.needs_packed.then(packed).flatten(),
-    })
+    Some(Spacing { touching, packed: request.needs_packed.then(packed).flatten() })
 }
 
 /// The radius from the density, by this number of queries; `touching` is half the distance to the nearest neighbour.
@@ -171,9 +153,7 @@ fn estimate_packed(positions: &[Vec3], touching: f32, query_count: usize) -> Opt
     let count = |from: &Vec3| {
         let chunks = positions.par_chunks(64 * 1024);
         let near = |chunk: &[Vec3]| {
-            let near = chunk
-                .iter()
-                .filter(|to| from.distance_squared(**to) <= square);
+            let near = chunk.iter().filter(|to| from.distance_squared(**to) <= square);
             near.map(|_| 1_u32).sum::<u32>()
         };
         chunks.map(near).sum()
@@ -227,13 +207,9 @@ mod tests {
     fn percentiles_are_those_of_numpy() {
         // numpy.percentile([1, 2, 4, 8, 16], [0, 1, 50, 90, 100])
         let values = [1.0, 2.0, 4.0, 8.0, 16.0];
-        for (percent, expected) in [
-            (0.0, 1.0),
-            (1.0, 1.04),
-            (50.0, 4.0),
-            (90.0, 12.8),
-            (100.0, 16.0),
-        ] {
+        for (percent, expected) in
+            [(0.0, 1.0), (1.0, 1.04), (50.0, 4.0), (90.0, 12.8), (100.0, 16.0)]
+        {
             let found = percentile(&values, percent).unwrap();
             assert!((found - expected).abs() < 1e-12, "{percent}: {found}");
         }
@@ -242,9 +218,8 @@ mod tests {
 
     #[test]
     fn layers_contain_half_a_percent() {
-        let line: Vec<DVec3> = (0..1000)
-            .map(|i| f64::from(i) * DVec3::new(1.0, -2.0, 0.0))
-            .collect();
+        let line: Vec<DVec3> =
+            (0..1000).map(|i| f64::from(i) * DVec3::new(1.0, -2.0, 0.0)).collect();
         let layers = robust_bounds(&Positions::F64(line), None).unwrap().layers;
         assert_eq!(layers.0, DVec3::new(5.0, -1988.0, 0.0));
         assert_eq!(layers.1, DVec3::new(994.0, -10.0, 0.0));

@@ -141,9 +141,7 @@ fn around(
     let square = f64::from(packing::reach(touching)).powi(2);
     let of_run = |positions: &[DVec3]| {
         let count = |from: &DVec3| {
-            let near = positions
-                .iter()
-                .filter(|to| from.distance_squared(**to) <= square);
+            let near = positions.iter().filter(|to| from.distance_squared(**to) <= square);
             near.map(|_| 1_u32).sum::<u32>()
         };
         queries.iter().map(count).collect::<Vec<u32>>()
@@ -219,13 +217,9 @@ mod tests {
         let some = sample(&source, Path::new("box"), 4096).expect("there");
         assert!((3000..=4096).contains(&some.positions.len()));
         assert!((0..some.positions.len()).all(|i| all.contains(&some.positions.get(i))));
-        let request = |needs_packed| SpacingRequest {
-            needs_packed,
-            frames: 1,
-        };
-        let streamed = spacing(&source, &some.positions, request(true))
-            .expect("there")
-            .expect("some");
+        let request = |needs_packed| SpacingRequest { needs_packed, frames: 1 };
+        let streamed =
+            spacing(&source, &some.positions, request(true)).expect("there").expect("some");
         let single: Vec<Vec3> = all.iter().map(|p| p.as_vec3()).collect();
         let whole = spacing_of(&single, request(true)).expect("some");
         let near = |a: f32, b: f32| assert!((a / b - 1.0).abs() < 0.1, "{a} {b}");
@@ -235,13 +229,7 @@ mod tests {
         // Nearest neighbours of randomly placed particles are close, so the two estimates differ.
         assert!(packed > 1.5 * whole.touching, "{packed} {whole:?}");
         let without_packed = spacing(&source, &some.positions, request(false)).expect("there");
-        assert_eq!(
-            without_packed,
-            Some(Spacing {
-                packed: None,
-                ..streamed
-            })
-        );
+        assert_eq!(without_packed, Some(Spacing { packed: None, ..streamed }));
     }
 
     #[test]
@@ -256,10 +244,7 @@ mod tests {
         };
         let source = RawSource::new(Path::new("nan"), &raw).expect("whole");
         assert_eq!(extremes(&source).expect("there"), None);
-        let request = SpacingRequest {
-            needs_packed: true,
-            frames: 1,
-        };
+        let request = SpacingRequest { needs_packed: true, frames: 1 };
         let spacing = spacing(&source, &raw.positions, request).expect("there");
         assert_eq!(spacing, None);
     }

@@ -39,10 +39,7 @@ pub(super) fn vector<'a>(
 
 /// The length of the vector at sample `i`.
 pub(super) fn length(axes: &Axes<'_>, i: usize) -> f32 {
-    axes.iter()
-        .map(|axis| axis[i] * axis[i])
-        .sum::<f32>()
-        .sqrt()
+    axes.iter().map(|axis| axis[i] * axis[i]).sum::<f32>().sqrt()
 }
 
 impl ChannelKind {
@@ -79,11 +76,7 @@ impl ChannelKind {
     /// One value for each sample; NaN where there is none.
     fn values(&self, planes: &SampledPlanes) -> Option<Vec<f32>> {
         let count = planes.size[0] * planes.size[1];
-        let is_empty = |i: usize| {
-            planes
-                .integers("id.I")
-                .is_some_and(|ids| ids[i] == u32::MAX)
-        };
+        let is_empty = |i: usize| planes.integers("id.I").is_some_and(|ids| ids[i] == u32::MAX);
         let known = |value: f32, i: usize| if is_empty(i) { f32::NAN } else { value };
         let lengths = |name: &str| {
             let axes = vector(planes, name, ["X", "Y", "Z"])?;
@@ -105,33 +98,21 @@ impl ChannelRanges {
     /// The ranges in some frames.
     pub(super) fn of(frames: &[SampledPlanes], channels: &[ChannelKind]) -> Self {
         let range = |kind: &ChannelKind| {
-            let values = frames
-                .iter()
-                .filter_map(|planes| kind.values(planes))
-                .flatten();
+            let values = frames.iter().filter_map(|planes| kind.values(planes)).flatten();
             let finite = values.filter(|value| value.is_finite());
             let [low, high] = finite.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], v| {
                 [low.min(v), high.max(v)]
             });
             if low <= high { [low, high] } else { [0.0, 1.0] }
         };
-        Self(
-            channels
-                .iter()
-                .map(|kind| (kind.clone(), range(kind)))
-                .collect(),
-        )
+        Self(channels.iter().map(|kind| (kind.clone(), range(kind))).collect())
     }
 
     /// Where `value` is in the range, from 0 to 1.
     fn part(&self, kind: &ChannelKind, value: f32) -> f32 {
         let range = self.0.iter().find(|(other, _)| other == kind);
         let [low, high] = range.map_or([0.0, 1.0], |(_, range)| *range);
-        if high > low {
-            ((value - low) / (high - low)).clamp(0.0, 1.0)
-        } else {
-            0.5
-        }
+        if high > low { ((value - low) / (high - low)).clamp(0.0, 1.0) } else { 0.5 }
     }
 }
 
@@ -146,11 +127,7 @@ pub(super) fn channel_picture(
         ChannelKind::Normal => {
             let axes = kind.axes(planes)?;
             let byte = |v: f32, is_empty: bool| {
-                if is_empty {
-                    0
-                } else {
-                    unit_byte(0.5 + 0.5 * v)
-                }
+                if is_empty { 0 } else { unit_byte(0.5 + 0.5 * v) }
             };
             let color = |i: usize| {
                 let normal = axes.map(|axis| axis[i]);
@@ -175,9 +152,7 @@ pub(super) fn channel_picture(
         ChannelKind::Speed | ChannelKind::Attribute(_) => {
             let values = kind.values(planes)?;
             let color = |v: &f32| match v.is_finite() {
-                true => VIRIDIS
-                    .eval_continuous(f64::from(ranges.part(kind, *v)))
-                    .as_array(),
+                true => VIRIDIS.eval_continuous(f64::from(ranges.part(kind, *v))).as_array(),
                 false => [0; 3],
             };
             values.iter().flat_map(color).collect()

@@ -24,10 +24,7 @@ const NO_ID: u32 = u32::MAX;
 
 /// Names of the values in [`packed_ids`].
 pub(super) fn value_names(planes: &SampledPlanes, attributes: &[String]) -> Vec<String> {
-    columns(planes, attributes)
-        .into_iter()
-        .map(|(name, _)| name)
-        .collect()
+    columns(planes, attributes).into_iter().map(|(name, _)| name).collect()
 }
 
 /// A value at each sample.
@@ -79,22 +76,13 @@ pub(super) fn packed_ids(
     let columns = columns(planes, attributes);
     // Write the parts
     let mut file = ZlibEncoder::new(Vec::new(), Compression::new(7));
-    let header = [
-        planes.size[0],
-        planes.size[1],
-        firsts.len(),
-        columns.len(),
-        planes.step,
-    ];
+    let header = [planes.size[0], planes.size[1], firsts.len(), columns.len(), planes.step];
     for value in header {
         let value = u32::try_from(value).map_err(io::Error::other)?;
         file.write_all(&value.to_le_bytes())?;
     }
     for byte in 0..3 {
-        let plane: Vec<u8> = samples
-            .iter()
-            .map(|number| number.to_le_bytes()[byte])
-            .collect();
+        let plane: Vec<u8> = samples.iter().map(|number| number.to_le_bytes()[byte]).collect();
         file.write_all(&plane)?;
     }
     for first in &firsts {

@@ -168,15 +168,10 @@ fn source(
         let link = link::relative(page, &frame.picture);
         return link.ok_or_else(|| ViewerError::NoLink(frame.picture.clone()));
     }
-    let is_png = frame
-        .picture
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("png"));
+    let is_png = frame.picture.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"));
     if is_png && settings.width.is_none() {
-        let bytes = fs::read(&frame.picture).map_err(|source| PictureError::Io {
-            path: frame.picture.clone(),
-            source,
-        })?;
+        let bytes = fs::read(&frame.picture)
+            .map_err(|source| PictureError::Io { path: frame.picture.clone(), source })?;
         return Ok(data_url(&bytes));
     }
     let picture = Picture::read(&frame.picture, settings.exposure)?;
@@ -221,9 +216,7 @@ fn add_data(
             if bytes > 2 * MAX_DATA {
                 let number = frame.number;
                 let note = "ids and channels end before frame";
-                content
-                    .notes
-                    .push(format!("{note} {number}, to keep the page small"));
+                content.notes.push(format!("{note} {number}, to keep the page small"));
                 return Ok(content);
             }
             if let (Value::Object(into), Value::Object(data)) = (value, data) {
@@ -256,25 +249,14 @@ fn plan(
             if attempt == 1 {
                 channels.clear();
             }
-            let plan = DataPlan {
-                width,
-                channels: channels.clone(),
-                ranges: ranges.clone(),
-            };
-            let lengths = samples
-                .iter()
-                .map(|planes| Ok(frame_data(planes, &plan, settings)?.1));
-            let longest = lengths
-                .collect::<Result<Vec<usize>, ViewerError>>()?
-                .into_iter()
-                .max();
+            let plan = DataPlan { width, channels: channels.clone(), ranges: ranges.clone() };
+            let lengths = samples.iter().map(|planes| Ok(frame_data(planes, &plan, settings)?.1));
+            let longest = lengths.collect::<Result<Vec<usize>, ViewerError>>()?.into_iter().max();
             if longest.unwrap_or(0).saturating_mul(frames.len()) > MAX_DATA {
                 continue;
             }
             if attempt == 1 {
-                content
-                    .notes
-                    .push("channels are left out, to keep the page small".to_owned());
+                content.notes.push("channels are left out, to keep the page small".to_owned());
             }
             content.channels = channels.iter().map(|kind| kind.name().to_owned()).collect();
             content.id_width = has_ids.then_some(samples[0].size[0]);

@@ -23,16 +23,8 @@ fn frames(dir: &Path) -> Vec<ViewerFrame> {
     let frame = |number: i64| {
         let picture = dir.join(format!("f #{number}.png"));
         let red = u8::try_from(10 * number).unwrap();
-        fs::write(
-            &picture,
-            Picture::filled(8, 4, [red, 0, 0]).png("test").unwrap(),
-        )
-        .unwrap();
-        ViewerFrame {
-            number,
-            image: picture.clone(),
-            picture,
-        }
+        fs::write(&picture, Picture::filled(8, 4, [red, 0, 0]).png("test").unwrap()).unwrap();
+        ViewerFrame { number, image: picture.clone(), picture }
     };
     [3, 4].map(frame).to_vec()
 }
@@ -64,21 +56,11 @@ fn pictures_are_linked_or_embedded() {
     assert!(html.contains("default-src 'none'") && html.contains(MARKER));
     assert!(!html.contains("http:") && !html.contains("https:"));
 
-    let embedded = ViewerSettings {
-        embed: true,
-        ..settings()
-    };
+    let embedded = ViewerSettings { embed: true, ..settings() };
     let (html, _) = page(&embedded).unwrap();
-    let source = data(&html)["frames"][0]["source"]
-        .as_str()
-        .unwrap()
-        .to_owned();
+    let source = data(&html)["frames"][0]["source"].as_str().unwrap().to_owned();
     assert_eq!(source, data_url(&fs::read(&frames[0].picture).unwrap()));
-    let (html, _) = page(&ViewerSettings {
-        width: Some(4),
-        ..embedded
-    })
-    .unwrap();
+    let (html, _) = page(&ViewerSettings { width: Some(4), ..embedded }).unwrap();
     let small = Picture::filled(4, 2, [30, 0, 0]).png(MARKER).unwrap();
     assert_eq!(data(&html)["frames"][0]["source"], json!(data_url(&small)));
 }
@@ -86,15 +68,8 @@ fn pictures_are_linked_or_embedded() {
 #[test]
 fn pages_without_pictures_are_refused() {
     let page = Path::new("view.html");
-    assert!(matches!(
-        viewer_page(&[], &settings(), page, None, &[]),
-        Err(ViewerError::Empty)
-    ));
-    let lost = ViewerFrame {
-        number: 1,
-        picture: "lost.png".into(),
-        image: "lost.exr".into(),
-    };
+    assert!(matches!(viewer_page(&[], &settings(), page, None, &[]), Err(ViewerError::Empty)));
+    let lost = ViewerFrame { number: 1, picture: "lost.png".into(), image: "lost.exr".into() };
     let error = viewer_page(&[lost], &settings(), page, None, &[]).unwrap_err();
     assert!(error.to_string().starts_with("lost.png: "), "{error}");
 }
@@ -107,15 +82,9 @@ fn planes() -> SampledPlanes {
         image_size: [6, 4],
         step: 2,
         planes: vec![
-            (
-                "Z".to_owned(),
-                float([1.0, 1.5, f32::INFINITY, 3.0, 3.0, 1.0]),
-            ),
+            ("Z".to_owned(), float([1.0, 1.5, f32::INFINITY, 3.0, 3.0, 1.0])),
             ("density".to_owned(), float([5.0, 5.0, 0.0, 7.0, 7.0, 9.0])),
-            (
-                "id.I".to_owned(),
-                PlaneSamples::Integer(vec![70_000, 70_000, none, 4, 4, none]),
-            ),
+            ("id.I".to_owned(), PlaneSamples::Integer(vec![70_000, 70_000, none, 4, 4, none])),
         ],
     }
 }
@@ -135,29 +104,20 @@ fn ids_and_values_are_packed_by_particle() {
     };
     let mut zlib = Vec::new();
     for group in text.trim_end_matches('=').as_bytes().chunks(4) {
-        let bits = (0..4).fold(0_u32, |bits, i| {
-            bits << 6 | group.get(i).map_or(0, |c| u32::from(digit(*c)))
-        });
+        let bits = (0..4)
+            .fold(0_u32, |bits, i| bits << 6 | group.get(i).map_or(0, |c| u32::from(digit(*c))));
         zlib.extend(&bits.to_be_bytes()[1..group.len()]);
     }
     let mut bytes = Vec::new();
     ZlibDecoder::new(&zlib[..]).read_to_end(&mut bytes).unwrap();
     let words = |bytes: &[u8]| -> Vec<u32> {
-        bytes
-            .as_chunks()
-            .0
-            .iter()
-            .map(|word| u32::from_le_bytes(*word))
-            .collect()
+        bytes.as_chunks().0.iter().map(|word| u32::from_le_bytes(*word)).collect()
     };
     assert_eq!(words(&bytes[..20]), [3, 2, 2, 2, 2]);
     assert_eq!(bytes[20..26], [1, 1, 0, 2, 2, 0]);
     assert_eq!(bytes[26..38], [0; 12]);
     assert_eq!(words(&bytes[38..46]), [70_000, 4]);
-    let values: Vec<f32> = words(&bytes[46..])
-        .into_iter()
-        .map(f32::from_bits)
-        .collect();
+    let values: Vec<f32> = words(&bytes[46..]).into_iter().map(f32::from_bits).collect();
     assert_eq!(values, [5.0, 7.0, 1.0, 3.0]);
 }
 
@@ -173,13 +133,7 @@ fn channels_have_one_range() {
     assert_eq!(red, [255, 201, 0, 38, 38, 255]);
     // The pixel without a particle does not count
     let density = channel_picture(&planes, &channels[1], &ranges).unwrap();
-    assert_eq!(
-        density.pixels()[0],
-        colorous::VIRIDIS.eval_continuous(0.0).as_array()
-    );
-    assert_eq!(
-        density.pixels()[3],
-        colorous::VIRIDIS.eval_continuous(1.0).as_array()
-    );
+    assert_eq!(density.pixels()[0], colorous::VIRIDIS.eval_continuous(0.0).as_array());
+    assert_eq!(density.pixels()[3], colorous::VIRIDIS.eval_continuous(1.0).as_array());
     assert_eq!(density.pixels()[5], [0; 3]);
 }

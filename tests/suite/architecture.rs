@@ -22,9 +22,7 @@ fn root() -> &'static Path {
 /// The list in ARCHITECTURE.md: a line per module, `-` for none.
 fn documented() -> Uses {
     let text = fs::read_to_string(root().join("ARCHITECTURE.md")).expect("ARCHITECTURE.md");
-    let (_, after) = text
-        .split_once("Modules use only these others")
-        .expect("the list");
+    let (_, after) = text.split_once("Modules use only these others").expect("the list");
     let lines = after.lines().skip_while(|line| !line.starts_with("    "));
     lines
         .take_while(|line| line.starts_with("    "))
@@ -41,10 +39,7 @@ fn actual() -> Uses {
     let files = source::files(&root().join("src"));
     // Others than the root and `main`.
     let rooms: BTreeSet<&String> = files.iter().filter_map(|(path, _)| path.first()).collect();
-    let mut uses: Uses = rooms
-        .iter()
-        .map(|room| ((*room).clone(), BTreeSet::new()))
-        .collect();
+    let mut uses: Uses = rooms.iter().map(|room| ((*room).clone(), BTreeSet::new())).collect();
     for (path, code) in &files {
         let Some(room) = path.first() else { continue };
         for used in code.split("crate::").skip(1) {
@@ -64,15 +59,8 @@ fn modules_use_what_the_documentation_lists() {
     let cli = actual.remove(CLI).expect("the module of printing");
     assert!(cli.len() > 10, "{cli:?}");
     assert!(actual.len() > 12, "{actual:?}");
-    assert!(
-        !actual.values().any(|used| used.contains(CLI)),
-        "{actual:?}"
-    );
-    assert_eq!(
-        documented(),
-        actual,
-        "ARCHITECTURE.md (left) and src (right) differ"
-    );
+    assert!(!actual.values().any(|used| used.contains(CLI)), "{actual:?}");
+    assert_eq!(documented(), actual, "ARCHITECTURE.md (left) and src (right) differ");
 }
 
 #[test]
@@ -81,10 +69,7 @@ fn modules_have_no_dependency_cycles() {
     while !left.is_empty() {
         // Remove a module that uses none of those left; in a cycle there is none
         let is_leaf = |used: &BTreeSet<String>| used.is_disjoint(&left.keys().cloned().collect());
-        let leaf = left
-            .iter()
-            .find(|(_, used)| is_leaf(used))
-            .map(|(m, _)| m.clone());
+        let leaf = left.iter().find(|(_, used)| is_leaf(used)).map(|(m, _)| m.clone());
         let Some(leaf) = leaf else {
             panic!("these modules use each other: {left:#?}");
         };

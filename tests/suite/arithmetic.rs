@@ -11,9 +11,8 @@ const METHODS: [&str; 24] = [
 ];
 
 /// The rooms that decide pixels.
-const ROOMS: [&str; 9] = [
-    "math", "accel", "surface", "scene", "render", "output", "survey", "resolve", "ray.rs",
-];
+const ROOMS: [&str; 9] =
+    ["math", "accel", "surface", "scene", "render", "output", "survey", "resolve", "ray.rs"];
 
 fn rust_files(path: &Path, found: &mut Vec<PathBuf>) {
     if path.is_dir() {
@@ -21,9 +20,7 @@ fn rust_files(path: &Path, found: &mut Vec<PathBuf>) {
             rust_files(&entry.expect("an entry").path(), found);
         }
     } else {
-        let source = path
-            .strip_prefix(env!("CARGO_MANIFEST_DIR"))
-            .expect("below the root");
+        let source = path.strip_prefix(env!("CARGO_MANIFEST_DIR")).expect("below the root");
         let name = source.to_string_lossy();
         let is_test = name.ends_with("tests.rs") || name.contains("/tests/");
         // Test support.
@@ -37,18 +34,9 @@ fn rust_files(path: &Path, found: &mut Vec<PathBuf>) {
 /// Calls of one of the methods in `text`, up to its tests.
 fn calls(text: &str) -> Vec<String> {
     let code = text.split("#[cfg(test)]").next().unwrap_or_default();
-    let lines = code
-        .lines()
-        .filter(|line| !line.trim_start().starts_with("//"));
-    let calls = |line: &str| {
-        METHODS
-            .iter()
-            .any(|name| line.contains(&format!(".{name}(")))
-    };
-    lines
-        .filter(|line| calls(line))
-        .map(str::to_owned)
-        .collect()
+    let lines = code.lines().filter(|line| !line.trim_start().starts_with("//"));
+    let calls = |line: &str| METHODS.iter().any(|name| line.contains(&format!(".{name}(")));
+    lines.filter(|line| calls(line)).map(str::to_owned).collect()
 }
 
 #[test]
@@ -67,8 +55,5 @@ fn pixels_do_not_depend_on_the_c_library() {
             file.display()
         );
     }
-    assert_eq!(
-        calls("let a = b.sin();\n// c.cos()\n#[cfg(test)]\nd.tan()"),
-        ["let a = b.sin();"]
-    );
+    assert_eq!(calls("let a = b.sin();\n// c.cos()\n#[cfg(test)]\nd.tan()"), ["let a = b.sin();"]);
 }

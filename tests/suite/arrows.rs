@@ -96,10 +96,7 @@ fn arrows_begin_at_particles_and_follow_vectors() {
         let around = covered(&with("scale = 1, anchor = \"center\""));
         assert!(!around.contains(&HEAD) && around.iter().any(|pixel| pixel % 90 < 40));
         // Colours of the particle, and of a value; viridis ends yellow
-        near(
-            albedo(&with("scale = 1, color = \"auto\""), HEAD),
-            [0.1, 0.2, 0.7],
-        );
+        near(albedo(&with("scale = 1, color = \"auto\""), HEAD), [0.1, 0.2, 0.7]);
         let mapped =
             "scale = 1, color = { attribute = \"charge\", map = \"viridis\", range = [0, 1] }";
         let [red, _, blue] = albedo(&with(mapped), SHAFT);
@@ -122,9 +119,7 @@ fn only_some_particles_have_arrows() {
 #[test]
 fn native_frames_have_the_same_arrows() {
     let workshop = workshop();
-    workshop
-        .run(&["convert", "in.xyz", "-o", "native"])
-        .expect(0);
+    workshop.run(&["convert", "in.xyz", "-o", "native"]).expect(0);
     let arrows = "scale = 1, color = [0.8, 0.1, 0.05]";
     let original = picture(&workshop, "in.xyz", arrows, &[]);
     let native = picture(&workshop, "native", arrows, &[]);
@@ -155,7 +150,5 @@ fn impossible_arrows_are_refused_and_bad_vectors_are_noted() {
     ] {
         run(arrows).expect(2).prints(part);
     }
-    run("attribute = \"force\", scale = 1")
-        .expect(0)
-        .prints("1 vectors of `force` are not finite");
+    run("attribute = \"force\", scale = 1").expect(0).prints("1 vectors of `force` are not finite");
 }

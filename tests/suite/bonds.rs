@@ -94,13 +94,8 @@ fn covalent_bonds_have_halves_in_the_colours_of_their_atoms() {
 #[test]
 fn bonds_by_distance_have_a_radius_and_a_colour() {
     let workshop = workshop();
-    let options = [
-        "--bonds=1.5",
-        "--set",
-        "bonds.radius=0.05",
-        "--set",
-        "bonds.color=[0.1, 0.2, 0.3]",
-    ];
+    let options =
+        ["--bonds=1.5", "--set", "bonds.radius=0.05", "--set", "bonds.color=[0.1, 0.2, 0.3]"];
     let found = picture(&workshop, "in.xyz", &options);
     for x in [-0.7, 0.3, 0.7] {
         near(bond(&found, x), [0.1, 0.2, 0.3]);
@@ -117,14 +112,9 @@ fn bonds_by_distance_have_a_radius_and_a_colour() {
 fn bonds_go_on_at_the_other_side_of_a_periodic_cell() {
     let workshop = workshop();
     let found = picture(&workshop, "periodic.xyz", &["--bonds=covalent"]);
-    for (x, is_bond) in [
-        (-1.37, true),
-        (-1.45, false),
-        (-0.6, false),
-        (0.8, false),
-        (1.57, true),
-        (1.65, false),
-    ] {
+    for (x, is_bond) in
+        [(-1.37, true), (-1.45, false), (-0.6, false), (0.8, false), (1.57, true), (1.65, false)]
+    {
         assert_eq!(bond(&found, x).is_some(), is_bond, "{x}");
     }
     // Not where the cell does not repeat
@@ -133,12 +123,7 @@ fn bonds_go_on_at_the_other_side_of_a_periodic_cell() {
     let found = picture(&workshop, "once.xyz", &["--bonds=covalent"]);
     assert_eq!(bond(&found, 1.57), None);
     // In copies of the cell, the bond over their boundary is whole; seen from farther away
-    let options = [
-        "--bonds=covalent",
-        "--replicate=2,1,1",
-        "--set",
-        "camera.eye=[1.5, -8, 0]",
-    ];
+    let options = ["--bonds=covalent", "--replicate=2,1,1", "--set", "camera.eye=[1.5, -8, 0]"];
     let options = [&options[..], &["--set", "camera.look_at=[1.5, 0, 0]"]].concat();
     let found = picture(&workshop, "periodic.xyz", &options);
     // The middle of the bond from 1.2 to 2, 12 pixels per unit
@@ -162,21 +147,17 @@ fn impossible_bonds_are_refused() {
     }
     fs::write(workshop.join("plain.csv"), "x,y,z\n0,0,0\n1,0,0\n").expect("a file");
     let ran = run("plain.csv", &["--bonds=covalent"]);
-    ran.expect(2)
-        .prints("bonds.find: no attribute `element`")
-        .prints(
-            "give a file that has elements with --topology, or a distance, such as --bonds 1.8",
-        );
+    ran.expect(2).prints("bonds.find: no attribute `element`").prints(
+        "give a file that has elements with --topology, or a distance, such as --bonds 1.8",
+    );
     // Far too many, and none
     let line = |i: usize| format!("{},0,0\n", i);
     let many: String = (0..100).map(line).collect();
     fs::write(workshop.join("many.csv"), format!("x,y,z\n{many}")).expect("a file");
     let ran = run("many.csv", &["--bonds=50"]);
-    ran.expect(1)
-        .prints("bonds.find gives more than 8 bonds for each of 100 particles");
+    ran.expect(1).prints("bonds.find gives more than 8 bonds for each of 100 particles");
     let ran = run("many.csv", &["--bonds=0.5", "--force"]);
-    ran.expect(0)
-        .prints("no bonds: no particles are so near each other");
+    ran.expect(0).prints("no bonds: no particles are so near each other");
 }
 
 #[test]
@@ -197,13 +178,8 @@ fn bonds_of_a_file_are_drawn() {
     let command = ["still", polymer.to_str().expect("a path"), "-o", "out.exr"];
     let with = |bonds: &str| {
         let options = [bonds, "--radius=0.02", "--set", "bonds.radius=0.1"];
-        workshop
-            .run(&[&command[..], &VIEW[..3], &options].concat())
-            .expect(0);
-        Picture::open(&workshop.join("out.exr"))
-            .floats("A")
-            .iter()
-            .sum::<f32>()
+        workshop.run(&[&command[..], &VIEW[..3], &options].concat()).expect(0);
+        Picture::open(&workshop.join("out.exr")).floats("A").iter().sum::<f32>()
     };
     assert!(with("--bonds=file") > 2.0 * with("--bonds=none"));
 }

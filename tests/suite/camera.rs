@@ -66,29 +66,20 @@ fn turntable_has_a_constant_distance() {
     let messages = &check(&workshop, &[])["camera"]["look_at"];
     let look_at: [f64; 3] = std::array::from_fn(|i| messages[i].as_f64().expect("a number"));
     let look_at = DVec3::from_array(look_at);
-    assert!(
-        look_at.distance(DVec3::new(5.0, 5.95, 0.0)) < 0.1,
-        "{look_at}"
-    );
+    assert!(look_at.distance(DVec3::new(5.0, 5.95, 0.0)) < 0.1, "{look_at}");
     let mut distances = Vec::new();
     for (frame, matrix) in (1..).zip(&matrices) {
         let a = (10.0 + 52.0 * f64::from(frame)).to_radians();
         let e = 15.0_f64.to_radians();
         for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
             let found = matrix.transform_vector3(axis.as_vec3()).as_dvec3();
-            assert!(
-                found.distance(turned(a, e, axis)) < 1e-6,
-                "frame {frame}: {found}"
-            );
+            assert!(found.distance(turned(a, e, axis)) < 1e-6, "frame {frame}: {found}");
         }
         let at = matrix.transform_point3(look_at.as_vec3());
         assert!(at.truncate().length() < 1e-5, "frame {frame}: {at}");
         distances.push(at.z);
     }
-    assert!(
-        distances.iter().all(|d| (d - distances[0]).abs() < 1e-5),
-        "{distances:?}"
-    );
+    assert!(distances.iter().all(|d| (d - distances[0]).abs() < 1e-5), "{distances:?}");
     let mut first = None;
     for frame in 1..=7 {
         let picture = Picture::open(&workshop.join("out").join(image(frame)));
@@ -97,16 +88,10 @@ fn turntable_has_a_constant_distance() {
         let (right, bottom) = (picture.width - 1, picture.height - 1);
         let rows = (0..=right).flat_map(|x| [at(x, 0), at(x, bottom)]);
         let columns = (0..=bottom).flat_map(|y| [at(0, y), at(right, y)]);
-        assert!(
-            rows.chain(columns).all(|a| a == 0.0),
-            "frame {frame} is cut"
-        );
+        assert!(rows.chain(columns).all(|a| a == 0.0), "frame {frame} is cut");
         assert_eq!(at(right / 2, bottom / 2), 1.0, "frame {frame}");
         let first = first.get_or_insert_with(|| picture.clone());
-        assert!(
-            frame == 1 || *first != picture,
-            "frame {frame} is as frame 1"
-        );
+        assert!(frame == 1 || *first != picture, "frame {frame} is as frame 1");
     }
 }
 
@@ -169,24 +154,15 @@ fn keys_of_a_json_file_are_those_of_a_manifest() {
     }
     // The same keys as an object continue the job, others do not
     render(&json!({ "keys": keys }).to_string()).expect(0);
-    let moved = keys
-        .to_string()
-        .replace("30.0]", "31.0]")
-        .replace("14.5,30]", "14.5,32]");
+    let moved = keys.to_string().replace("30.0]", "31.0]").replace("14.5,30]", "14.5,32]");
     render(&moved).expect(2).prints("camera.key");
     for (text, part) in [
         ("{", "--camera-path shot.json: no JSON"),
         ("[]", "--camera-path shot.json: no keyframes"),
-        (
-            "{\"key\": []}",
-            "no keyframes; it must have a list of keyframes",
-        ),
+        ("{\"key\": []}", "no keyframes; it must have a list of keyframes"),
         ("[{\"frame\": null}]", "--camera-path shot.json: "),
         ("[{\"frame\": 1, \"eye\": [0, 0, 1]}]", "look_at"),
-        (
-            "[{\"frame\": 1, \"eye\": [0, 0], \"look_at\": [0, 0, 1]}]",
-            "camera.key.0.eye",
-        ),
+        ("[{\"frame\": 1, \"eye\": [0, 0], \"look_at\": [0, 0, 1]}]", "camera.key.0.eye"),
         ("[{\"frame\": 1, \"eyes\": [0, 0, 1]}]", "eyes"),
     ] {
         render(text).expect(2).prints(part);
@@ -203,9 +179,7 @@ fn keys_of_a_json_file_are_those_of_a_manifest() {
 fn moving_cameras_resume_deterministically() {
     for camera in [KEYS, "[camera]\nmode = \"turntable\"\n"] {
         let workshop = workshop(camera);
-        workshop
-            .run(&["render", "my.toml", "--threads", "1"])
-            .expect(0);
+        workshop.run(&["render", "my.toml", "--threads", "1"]).expect(0);
         let out = workshop.join("out");
         let whole = images(&out);
         assert_eq!(whole.len(), 14);
@@ -216,14 +190,7 @@ fn moving_cameras_resume_deterministically() {
         assert_eq!(again.rendered(), [1, 4]);
         assert!(images(&out) == whole, "{camera}");
         // Some frames alone, from the manifest that lies beside the images, are seen as among all.
-        let arguments = [
-            "render",
-            "out/job.toml",
-            "--frames",
-            "3",
-            "-o",
-            "one/f.####.exr",
-        ];
+        let arguments = ["render", "out/job.toml", "--frames", "3", "-o", "one/f.####.exr"];
         workshop.run(&arguments).expect(0);
         let one = fs::read(workshop.join("one/f.0003.exr")).expect("an image");
         assert!(one == whole[&image(3)], "{camera}");
@@ -233,9 +200,7 @@ fn moving_cameras_resume_deterministically() {
 #[test]
 fn changed_key_is_rejected_by_name() {
     let workshop = workshop(KEYS);
-    workshop
-        .run(&["render", "my.toml", "--frames", "2"])
-        .expect(0);
+    workshop.run(&["render", "my.toml", "--frames", "2"]).expect(0);
     workshop
         .run(&["render", "my.toml", "--set", "camera.key.0.up=[1,0,0]"])
         .expect(2)
@@ -253,29 +218,17 @@ fn check_reports_the_camera_path() {
     let camera = &check(&workshop, &["--frames", "3-9"])["camera"];
     assert_eq!(camera["mode"], "keys");
     assert_eq!(camera["moves"], json!(["eye", "look_at", "fov"]));
-    assert_eq!(
-        (&camera["frame"], &camera["eye"]),
-        (&json!(3), &json!([5.0, 7.75, 30.0]))
-    );
-    assert_eq!(
-        (&camera["last"]["frame"], &camera["last"]["fov"]),
-        (&json!(7), &json!(20.0))
-    );
+    assert_eq!((&camera["frame"], &camera["eye"]), (&json!(3), &json!([5.0, 7.75, 30.0])));
+    assert_eq!((&camera["last"]["frame"], &camera["last"]["fov"]), (&json!(7), &json!(20.0)));
     let text = workshop.run(&["check", "my.toml"]).expect(0).text();
     assert!(text.contains("at frame 7\n"), "{text}");
-    assert!(
-        text.contains("eye, look_at, fov move through 2 keys, frames 2 to 6"),
-        "{text}"
-    );
+    assert!(text.contains("eye, look_at, fov move through 2 keys, frames 2 to 6"), "{text}");
 
     let camera = &check(&workshop, &["--set", "camera.mode=turntable"])["camera"];
     assert_eq!(camera["moves"], json!(["eye"]));
     assert_eq!(camera["look_at"], camera["last"]["look_at"]);
     let still = &check(&workshop, &["--set", "camera.mode=auto"])["camera"];
-    assert_eq!(
-        (&still["moves"], &still["last"]),
-        (&json!([]), &Value::Null)
-    );
+    assert_eq!((&still["moves"], &still["last"]), (&json!([]), &Value::Null));
 }
 
 #[test]
@@ -323,14 +276,7 @@ fn focus_follows_a_particle_through_the_frames() {
     let render = |out: &str, focus: &str| {
         let output = format!("{out}/f.####.exr");
         let focus = format!("camera.focus={focus}");
-        let mut options = vec![
-            "render",
-            "in",
-            "-o",
-            output.as_str(),
-            "--set",
-            focus.as_str(),
-        ];
+        let mut options = vec!["render", "in", "-o", output.as_str(), "--set", focus.as_str()];
         for setting in [
             "input.radius=0.4",
             "image.width=64",
@@ -351,10 +297,8 @@ fn focus_follows_a_particle_through_the_frames() {
     for (frame, distance) in [(1, "4"), (2, "7")] {
         let out = format!("at{distance}");
         render(&out, distance).expect(0);
-        let (followed, fixed) = (
-            at(&format!("followed/{}", image(frame))),
-            at(&format!("{out}/{}", image(frame))),
-        );
+        let (followed, fixed) =
+            (at(&format!("followed/{}", image(frame))), at(&format!("{out}/{}", image(frame))));
         assert_eq!(followed.floats("R"), fixed.floats("R"));
         // The target is at distance 1
         let target = at(&format!("auto/{}", image(frame)));
@@ -369,19 +313,10 @@ fn focus_follows_a_particle_through_the_frames() {
 fn motion_blur_moves_particles_with_their_velocities() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 3..=4);
-    let blur = [
-        "--set",
-        "camera.shutter=0.5",
-        "--set",
-        "output.frame_time=0.1",
-    ];
+    let blur = ["--set", "camera.shutter=0.5", "--set", "output.frame_time=0.1"];
     let render = |out: &str, options: &[&str]| {
         let output = format!("{out}/f.####.exr");
-        let all = [
-            &["render", "in", "-o", output.as_str()][..],
-            &SMALL,
-            options,
-        ];
+        let all = [&["render", "in", "-o", output.as_str()][..], &SMALL, options];
         workshop.run(&all.concat()).expect(0);
         fs::read(workshop.join(out).join(image(3))).expect("an image")
     };
@@ -397,10 +332,7 @@ fn motion_blur_moves_particles_with_their_velocities() {
         assert!(blurred == other, "{surface}");
         // The shutter may be open before or after the frame
         let after = ["--set", "camera.shutter_offset=0"];
-        assert_ne!(
-            blurred,
-            render(&name("after"), &[&blur[..], &after].concat())
-        );
+        assert_ne!(blurred, render(&name("after"), &[&blur[..], &after].concat()));
     }
     // Spray moves, too
     let spray = ["--surface", "smooth", "--spray"];
@@ -415,11 +347,7 @@ fn motion_blur_without_velocities_takes_the_next_frame() {
     let frames = [("-0.2", "0.95"), ("0.2", "-0.95")];
     for (number, (x, periodic)) in (1..).zip(frames) {
         let rows = [format!("7 {x} 0 0"), format!("8 {periodic} 0.5 0")];
-        let rows = if number == 1 {
-            rows
-        } else {
-            [rows[1].clone(), rows[0].clone()]
-        };
+        let rows = if number == 1 { rows } else { [rows[1].clone(), rows[0].clone()] };
         let text = format!("2\nProperties=id:I:1:pos:R:3\n{}\n", rows.join("\n"));
         fs::write(workshop.join(format!("f_{number}.xyz")), text).expect("a file");
     }
@@ -436,12 +364,7 @@ fn motion_blur_without_velocities_takes_the_next_frame() {
         "--set",
         "output.transparent=true",
     ];
-    let shutter = [
-        "--set",
-        "camera.shutter=1",
-        "--set",
-        "camera.shutter_offset=0",
-    ];
+    let shutter = ["--set", "camera.shutter=1", "--set", "camera.shutter_offset=0"];
     let output = ["render", "f_*.xyz", "-o", "out/f.####.exr"];
     let all = [&output[..], &SMALL, &camera, &shutter];
     workshop.run(&all.concat()).expect(0);
@@ -470,14 +393,8 @@ fn motion_blur_without_velocities_takes_the_next_frame() {
     let checks: [(&[&str], &str); 4] = [
         (&["check", "f_1.xyz"], "needs another frame"),
         (&["check", "still"], "motion blur needs velocities, or ids"),
-        (
-            &["check", "f_*.xyz", "--set", "job.follow=true"],
-            "job.follow",
-        ),
-        (
-            &["check", "f_*.xyz", "--set", "render.normals=\"pca\""],
-            "render.normals",
-        ),
+        (&["check", "f_*.xyz", "--set", "job.follow=true"], "job.follow"),
+        (&["check", "f_*.xyz", "--set", "render.normals=\"pca\""], "render.normals"),
     ];
     for (arguments, what) in checks {
         let ran = workshop.run(&[arguments, &shutter].concat());

@@ -67,11 +67,7 @@ fn edges_of_a_tilted_cell_are_where_the_file_has_them() {
     for integrator in ["whitted", "path"] {
         let with = |name: &str, options: &[&str]| {
             let out = format!("{name}-{integrator}.exr");
-            picture(
-                &workshop,
-                &out,
-                &[options, &["--integrator", integrator]].concat(),
-            )
+            picture(&workshop, &out, &[options, &["--integrator", integrator]].concat())
         };
         let cell = with("cell", &["--cell", "--set", "cell.radius=0.15"]);
         let plain = with("plain", &[]);

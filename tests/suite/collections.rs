@@ -38,9 +38,7 @@ fn lines(text: &str) -> Vec<Value> {
 #[test]
 fn inspect_describes_lists_and_their_files() {
     let workshop = workshop();
-    let ran = workshop
-        .run(&["inspect", "--json", "in/parts.pvd"])
-        .expect(0);
+    let ran = workshop.run(&["inspect", "--json", "in/parts.pvd"]).expect(0);
     let objects = lines(&ran.text());
     let list = &objects[0];
     assert_eq!(list["list"], "ParaView collection");
@@ -48,10 +46,7 @@ fn inspect_describes_lists_and_their_files() {
     assert_eq!(list["parts"], serde_json::json!(["fluid", "wall"]));
     assert_eq!(list["times"], serde_json::json!([0.0, 0.125, 0.5]));
     assert_eq!(objects.len(), 10);
-    assert_eq!(
-        (&objects[9]["frame"], &objects[9]["time"]),
-        (&2.into(), &0.5.into())
-    );
+    assert_eq!((&objects[9]["frame"], &objects[9]["time"]), (&2.into(), &0.5.into()));
     let ran = workshop.run(&["inspect", "in/blocks.vtm.series"]).expect(0);
     let text = ran.text();
     assert!(
@@ -70,13 +65,8 @@ fn render_of_all_parts() -> Vec<&'static str> {
 #[test]
 fn render_check_convert_and_resume() {
     let workshop = workshop();
-    let check = workshop.run(
-        &[
-            &["check", "in/parts.pvd", "--json", "-o", "out/f.####.exr"],
-            &SMALL[..],
-        ]
-        .concat(),
-    );
+    let check = workshop
+        .run(&[&["check", "in/parts.pvd", "--json", "-o", "out/f.####.exr"], &SMALL[..]].concat());
     check.expect(0);
     let arguments = render_of_all_parts();
     let ran = workshop.run(&arguments).expect(0);
@@ -91,15 +81,10 @@ fn render_check_convert_and_resume() {
         .prints("inputs of finished frames have changed: frame 1: ")
         .prints("wall_10_1.vtu");
     // A conversion stores the times of the list
-    workshop
-        .run(&["convert", "in/drop.vtk.series", "-o", "native"])
-        .expect(0);
+    workshop.run(&["convert", "in/drop.vtk.series", "-o", "native"]).expect(0);
     assert_eq!(natives(&workshop.join("native")).len(), 2);
     let ran = workshop.run(&["inspect", "--json", "native"]).expect(0);
-    let times: Vec<Value> = lines(&ran.text())
-        .iter()
-        .map(|o| o["time"].clone())
-        .collect();
+    let times: Vec<Value> = lines(&ran.text()).iter().map(|o| o["time"].clone()).collect();
     assert_eq!(times, [0.0, 0.125]);
 }
 
@@ -112,11 +97,7 @@ fn faults_of_members_cost_their_frame() {
         "in/parts/wall_10.pvtu: line 11: it lists in/parts/wall_10_1.vtu, which does not exist",
     );
     let images = files(&workshop.join("out"));
-    assert!(
-        images.keys().any(|name| name.ends_with("f.0002.exr")),
-        "{:?}",
-        images.keys()
-    );
+    assert!(images.keys().any(|name| name.ends_with("f.0002.exr")), "{:?}", images.keys());
 }
 
 #[test]
@@ -131,21 +112,10 @@ fn files_outside_need_an_option() {
     for command in [
         &["inspect", "lists/all.pvd"][..],
         &["convert", "lists/all.pvd", "-o", "native"],
-        &[
-            "render",
-            "lists/all.pvd",
-            "-o",
-            "out/f.#.exr",
-            "--width",
-            "64",
-            "--samples",
-            "1",
-        ],
+        &["render", "lists/all.pvd", "-o", "out/f.#.exr", "--width", "64", "--samples", "1"],
     ] {
         let ran = workshop.run(command).prints(outside);
         assert!(ran.code().is_some_and(|code| code != 0), "{command:?}");
-        workshop
-            .run(&[command, &["--follow-links"]].concat())
-            .expect(0);
+        workshop.run(&[command, &["--follow-links"]].concat()).expect(0);
     }
 }

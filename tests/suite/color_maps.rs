@@ -68,10 +68,7 @@ fn assert_colors(shop: &Workshop, options: &[&str], map: &ColorMap, values: [f32
         for (found, value) in albedos(shop).into_iter().zip(values) {
             let expected = map.color(value);
             let error = (found - expected).abs().max_element();
-            assert!(
-                error < 2e-3,
-                "{input} {options:?} {value}: {found} instead of {expected}"
-            );
+            assert!(error < 2e-3, "{input} {options:?} {value}: {found} instead of {expected}");
         }
     }
 }
@@ -91,12 +88,7 @@ fn values_that_colour_particles() {
     let shop = shop();
     let linear = |low, high| ColorMap::new("viridis", low, high).expect("a map");
     let index = [0.0, 1.0, 2.0, 3.0, 4.0];
-    assert_colors(
-        &shop,
-        &["--color-by", "velocity.y"],
-        &linear(0.0, 4.0),
-        index,
-    );
+    assert_colors(&shop, &["--color-by", "velocity.y"], &linear(0.0, 4.0), index);
     let other = ["--color-by", "velocity[0]", "--range", "-1", "1"];
     assert_colors(&shop, &other, &linear(-1.0, 1.0), [0.0; 5]);
     assert_colors(&shop, &["--color-by", "index"], &linear(0.0, 4.0), index);
@@ -105,12 +97,7 @@ fn values_that_colour_particles() {
     // The distance along the view axis is that of the plane of the balls
     let depth = ["--color-by", "depth", "--range", "7", "9"];
     assert_colors(&shop, &depth, &linear(7.0, 9.0), [8.0; 5]);
-    let radius = [
-        "--color-by",
-        "radius",
-        "--set",
-        "input.radius.attribute=size",
-    ];
+    let radius = ["--color-by", "radius", "--set", "input.radius.attribute=size"];
     let sizes = index.map(|i| 0.2 + 0.05 * i);
     assert_colors(&shop, &radius, &linear(0.2, 0.4), sizes);
 }
@@ -124,39 +111,17 @@ fn scales_and_ranges() {
     let log = ["--color-by", "mass", "--color-scale", "log"];
     let map = scaled("viridis", [1e-2, 1e2], ColorScale::Log);
     assert_colors(&shop, &log, &map, mass);
-    let symlog = [
-        &log[..3],
-        &[
-            "symlog",
-            "--set",
-            "material.color.threshold=1",
-            "--map",
-            "batlow_r",
-        ],
-    ]
-    .concat();
-    let map = scaled(
-        "batlow_r",
-        [1e-2, 1e2],
-        ColorScale::SymLog { threshold: 1.0 },
-    );
+    let symlog =
+        [&log[..3], &["symlog", "--set", "material.color.threshold=1", "--map", "batlow_r"]]
+            .concat();
+    let map = scaled("batlow_r", [1e-2, 1e2], ColorScale::SymLog { threshold: 1.0 });
     assert_colors(&shop, &symlog, &map, mass);
     let charge = index.map(|i| i - 2.0);
-    let symmetric = [
-        "--color-by",
-        "charge",
-        "--set",
-        "material.color.range=symmetric",
-    ];
+    let symmetric = ["--color-by", "charge", "--set", "material.color.range=symmetric"];
     let vik = ColorMap::new("vik", -2.0, 2.0).expect("a map");
     assert_colors(&shop, &symmetric, &vik, charge);
     // numpy.percentile([0, 1, 2, 3, 4], [10, 75])
-    let percentiles = [
-        "--color-by",
-        "velocity",
-        "--set",
-        "material.color.range=10%-75%",
-    ];
+    let percentiles = ["--color-by", "velocity", "--set", "material.color.range=10%-75%"];
     let map = ColorMap::new("viridis", 0.4, 3.0).expect("a map");
     assert_colors(&shop, &percentiles, &map, index);
     let steps = [
@@ -179,16 +144,8 @@ fn categories() {
         .prints("colour by `type`, 3 categories");
     let map = ColorMap::of_categories("okabe-ito", &[1, 2, 3]).expect("a palette");
     assert_colors(&shop, &types, &map, [1.0, 2.0, 3.0, 1.0, 2.0]);
-    let named = [
-        &types[..],
-        &[
-            "--map",
-            "tol-bright",
-            "--set",
-            "material.color.names.7=walls",
-        ],
-    ]
-    .concat();
+    let named =
+        [&types[..], &["--map", "tol-bright", "--set", "material.color.names.7=walls"]].concat();
     let map = ColorMap::of_categories("tol-bright", &[1, 2, 3, 7]).expect("a palette");
     assert_colors(&shop, &named, &map, [1.0, 2.0, 3.0, 1.0, 2.0]);
 }
@@ -197,44 +154,19 @@ fn categories() {
 fn impossible_colours_are_refused() {
     let shop = shop();
     for (options, part) in [
-        (
-            &["--color-by", "charge", "--color-scale", "log"][..],
-            "`charge` has values of 0 or less",
-        ),
+        (&["--color-by", "charge", "--color-scale", "log"][..], "`charge` has values of 0 or less"),
         (&["--color-by", "mas"], "did you mean `mass`?"),
         (&["--color-by", "hight"], "did you mean `height`?"),
         (&["--color-by", "velocity.w"], "no attribute `velocity.w`"),
-        (
-            &["--color-by", "mass", "--color-scale", "categorical"],
-            "values that are no integers",
-        ),
+        (&["--color-by", "mass", "--color-scale", "categorical"], "values that are no integers"),
         (&["--range", "3", "3"], "two rising numbers"),
-        (
-            &[
-                "--color-by",
-                "mass",
-                "--color-scale",
-                "log",
-                "--range",
-                "0",
-                "1",
-            ],
-            "has no logarithm",
-        ),
+        (&["--color-by", "mass", "--color-scale", "log", "--range", "0", "1"], "has no logarithm"),
     ] {
         let ran = render(&shop, "in", &[options, &["--radius", "0.3"]].concat());
         ran.expect(2).prints(part);
     }
     // With a range, values that have no logarithm have the first colour
-    let log = [
-        "--color-by",
-        "charge",
-        "--color-scale",
-        "log",
-        "--range",
-        "1",
-        "2",
-    ];
+    let log = ["--color-by", "charge", "--color-scale", "log", "--range", "1", "2"];
     let map = ColorMap::with_scale("viridis", [1.0, 2.0], ColorScale::Log).expect("a map");
     assert_colors(&shop, &log, &map, [-2.0, -1.0, 0.0, 1.0, 2.0]);
 }

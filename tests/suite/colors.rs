@@ -19,8 +19,7 @@ fn table(shop: &Workshop, columns: &str, values: &str) {
 fn render(shop: &Workshop, input: &str, options: &[&str]) -> Ran {
     let arguments = ["render", input, "-o", "f.exr", "--force", "--radius", "0.5"];
     let channels = ["--channels", "RGBA,albedo"];
-    shop.run(&[&arguments[..], &channels, &SMALL, options].concat())
-        .expect(0)
+    shop.run(&[&arguments[..], &channels, &SMALL, options].concat()).expect(0)
 }
 
 /// The base colour that most of the covered pixels have.
@@ -35,10 +34,7 @@ fn albedo(shop: &Workshop) -> [f32; 3] {
 
 #[track_caller]
 fn assert_near(found: [f32; 3], expected: [f32; 3]) {
-    let near = found
-        .iter()
-        .zip(expected)
-        .all(|(a, b)| (a - b).abs() < 2e-3);
+    let near = found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 2e-3);
     assert!(near, "{found:?} instead of {expected:?}");
 }
 
@@ -123,11 +119,7 @@ fn native_frames_show_the_same_colours() {
         render(&shop, input, &["--accelerator", structure]).prints("RGB attribute `Cd`");
         assert_near(albedo(&shop), [0.25, 0.5, 0.75]);
         let made = images(shop.path());
-        assert_eq!(
-            *first.get_or_insert_with(|| made.clone()),
-            made,
-            "{input} {structure}"
-        );
+        assert_eq!(*first.get_or_insert_with(|| made.clone()), made, "{input} {structure}");
     }
     // A smooth surface blends them.
     render(&shop, "native", &["--surface", "smooth"]).prints("RGB attribute `Cd`");

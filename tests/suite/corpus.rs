@@ -11,27 +11,20 @@ use spherule_formats::native::{Bound, Encoding, StoreSettings, store};
 use spherule_formats::{ParticleFrame, Radius};
 
 #[path = "../../fuzz/src/program/mod.rs"]
-#[expect(
-    unreachable_pub,
-    reason = "part of a library of its own for the fuzz targets"
-)]
+#[expect(unreachable_pub, reason = "part of a library of its own for the fuzz targets")]
 mod targets;
 
 use crate::simd::tested_levels;
 use targets::{TARGETS, Target};
 
 fn fuzz(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("fuzz")
-        .join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz").join(name)
 }
 
 /// Files below `dir`, in order of their names.
 fn inputs(dir: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(dir).expect("every target has a corpus");
-    let mut paths: Vec<PathBuf> = entries
-        .map(|entry| entry.expect("readable").path())
-        .collect();
+    let mut paths: Vec<PathBuf> = entries.map(|entry| entry.expect("readable").path()).collect();
     paths.sort();
     paths
 }
@@ -39,11 +32,7 @@ fn inputs(dir: &Path) -> Vec<PathBuf> {
 /// Runs all inputs of a target; whether one of them was accepted.
 fn replay(name: &str, target: Target) -> bool {
     let accepts = |path: &PathBuf| target(&fs::read(path).expect("readable")) > 0;
-    inputs(&fuzz("corpus").join(name))
-        .iter()
-        .filter(|path| accepts(path))
-        .count()
-        > 0
+    inputs(&fuzz("corpus").join(name)).iter().filter(|path| accepts(path)).count() > 0
 }
 
 #[test]
@@ -76,18 +65,10 @@ fn write_images_and_frames() {
         write(folder, &name, choice, &bytes);
     }
     for path in inputs(&fuzz("corpus/native")) {
-        let name = path
-            .file_name()
-            .and_then(|name| name.to_str())
-            .expect("a name");
+        let name = path.file_name().and_then(|name| name.to_str()).expect("a name");
         // Frames without radii need one.
         write("trace", name, 1, &fs::read(&path).expect("readable"));
-        write(
-            "trace",
-            &format!("{name}_own"),
-            0x80,
-            &fs::read(&path).expect("readable"),
-        );
+        write("trace", &format!("{name}_own"), 0x80, &fs::read(&path).expect("readable"));
     }
     for (name, encoding) in [("deep_q10", Encoding::Q10), ("deep_f32", Encoding::F32)] {
         write("trace", name, 1, &frame(encoding));
@@ -113,30 +94,17 @@ fn images() -> Vec<(String, u8, Vec<u8>)> {
     };
     let mut images = Vec::new();
     let color = film(5, 3, Channels::COLOR);
-    for compression in [
-        Compression::None,
-        Compression::Rle,
-        Compression::Zip,
-        Compression::Zips,
-        Compression::Piz,
-    ] {
+    for compression in
+        [Compression::None, Compression::Rle, Compression::Zip, Compression::Zips, Compression::Piz]
+    {
         let name = format!("{compression:?}").to_lowercase();
         images.push((name, 0, exr(&color, compression)));
     }
-    images.push((
-        "all_channels".into(),
-        1,
-        exr(&film(5, 3, all), Compression::Zip),
-    ));
-    images.push((
-        "blocks".into(),
-        2,
-        exr(&film(40, 37, Channels::COLOR), Compression::Zip),
-    ));
-    for (name, choice, film) in [
-        ("small_png", 0, color),
-        ("large_png", 2, film(40, 37, Channels::COLOR)),
-    ] {
+    images.push(("all_channels".into(), 1, exr(&film(5, 3, all), Compression::Zip)));
+    images.push(("blocks".into(), 2, exr(&film(40, 37, Channels::COLOR), Compression::Zip)));
+    for (name, choice, film) in
+        [("small_png", 0, color), ("large_png", 2, film(40, 37, Channels::COLOR))]
+    {
         let bytes = encode_preview(&film, &PreviewOptions::default(), &[]).expect("an image");
         images.push((name.into(), choice, bytes));
     }
@@ -152,10 +120,7 @@ fn film(width: u32, height: u32, channels: Channels) -> Film {
 }
 
 fn exr(film: &Film, compression: Compression) -> Vec<u8> {
-    let options = ExrOptions {
-        compression,
-        ..ExrOptions::default()
-    };
+    let options = ExrOptions { compression, ..ExrOptions::default() };
     encode_exr(film, &options).expect("an image").bytes
 }
 
@@ -164,13 +129,7 @@ fn frame(encoding: Encoding) -> Vec<u8> {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let path = dir.path().join("a.spf");
     let count = if encoding == Encoding::F32 { 300 } else { 1100 };
-    let place = |i: u16| {
-        Vec3::new(
-            f32::from(i % 11),
-            f32::from(i / 11 % 10),
-            f32::from(i / 110),
-        )
-    };
+    let place = |i: u16| Vec3::new(f32::from(i % 11), f32::from(i / 11 % 10), f32::from(i / 110));
     let frame = ParticleFrame {
         positions: (0..count).map(place).collect(),
         origin: DVec3::ZERO,
@@ -182,11 +141,7 @@ fn frame(encoding: Encoding) -> Vec<u8> {
         dropped: 0,
         file_index: None,
     };
-    let settings = StoreSettings {
-        encoding: Some(encoding),
-        bound: Bound::None,
-        rounding: 0.0,
-    };
+    let settings = StoreSettings { encoding: Some(encoding), bound: Bound::None, rounding: 0.0 };
     store(&path, &frame, None, &settings).expect("writable");
     fs::read(path).expect("readable")
 }

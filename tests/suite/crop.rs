@@ -13,10 +13,7 @@ use crate::picture::Picture;
 fn windows(path: &Path) -> [IntegerBounds; 2] {
     let meta = MetaData::read_from_file(path, true).expect("an EXR");
     let header = &meta.headers[0];
-    [
-        header.data_window(),
-        header.shared_attributes.display_window,
-    ]
+    [header.data_window(), header.shared_attributes.display_window]
 }
 
 #[test]
@@ -45,21 +42,9 @@ fn a_crop_equals_its_part_of_the_whole_image() {
     let whole = render("whole", &[]);
     let crop = render("crop", &["--crop", "17,5,61,40"]);
     let wide = render("wide", &["--set", "image.overscan=7"]);
-    let corner = render(
-        "corner",
-        &["--set", "image.overscan=7", "--crop", "-7,-7,10,10"],
-    );
+    let corner = render("corner", &["--set", "image.overscan=7", "--crop", "-7,-7,10,10"]);
 
-    let options = [
-        "check",
-        "in",
-        "--width",
-        "96",
-        "--height",
-        "54",
-        "--crop",
-        "17,5,61,40",
-    ];
+    let options = ["check", "in", "--width", "96", "--height", "54", "--crop", "17,5,61,40"];
     let text = workshop.run(&options).expect(0).text();
     assert!(text.contains(": 96x54, part [17, 5, 61, 40], "), "{text}");
 
@@ -118,9 +103,6 @@ fn crops_without_pixels_or_beyond_the_image_are_errors() {
     ] {
         let ran = workshop.run(&["check", "in", "--crop", crop]).expect(2);
         let errors = ran.errors();
-        assert!(
-            errors.contains("--crop") && errors.contains(what),
-            "{errors}"
-        );
+        assert!(errors.contains("--crop") && errors.contains(what), "{errors}");
     }
 }

@@ -7,12 +7,8 @@ const STUDIO: [&str; 2] = ["--look", "studio"];
 
 /// Renders frame 11 of the dam break.
 fn picture(workshop: &Workshop, name: &str, options: &[&str]) -> Picture {
-    let arguments = [
-        "still", "in", "-o", name, "--width", "160", "--height", "90",
-    ];
-    workshop
-        .run(&[&arguments[..], &STUDIO, options].concat())
-        .expect(0);
+    let arguments = ["still", "in", "-o", name, "--width", "160", "--height", "90"];
+    workshop.run(&[&arguments[..], &STUDIO, options].concat()).expect(0);
     Picture::open(&workshop.join(name))
 }
 
@@ -34,10 +30,8 @@ fn noise_is_removed_from_colours_only() {
         let options = [&channels[..], &["--set", denoise]].concat();
         picture(&workshop, name, &options)
     };
-    let (noisy, denoised) = (
-        of("noisy.exr", "render.denoise=false"),
-        of("denoised.exr", "render.denoise=auto"),
-    );
+    let (noisy, denoised) =
+        (of("noisy.exr", "render.denoise=false"), of("denoised.exr", "render.denoise=auto"));
     let [before, after] = [&noisy, &denoised].map(|found| error(found, &reference));
     assert!(after < 0.8 * before, "{after} instead of {before}");
     // Features are no channels, and other channels stay
@@ -59,10 +53,7 @@ fn colours_do_not_depend_on_the_channels_beside_them() {
     for (name, channels) in [("color.exr", "RGBA"), ("some.exr", "RGBA,Z,N,id")] {
         let some = of(name, channels);
         for plane in ["R", "G", "B", "A"] {
-            assert!(
-                some.planes[plane] == all.planes[plane],
-                "{channels}: {plane}"
-            );
+            assert!(some.planes[plane] == all.planes[plane], "{channels}: {plane}");
         }
     }
 }
@@ -75,9 +66,7 @@ fn denoised_jobs_do_not_depend_on_threads() {
         let pattern = format!("{out}/f.####.exr");
         let arguments = ["render", "in", "-o", &pattern, "--threads", threads];
         let size = ["--width", "64", "--height", "36", "--samples", "4"];
-        workshop
-            .run(&[&arguments[..], &size, &STUDIO].concat())
-            .expect(0);
+        workshop.run(&[&arguments[..], &size, &STUDIO].concat()).expect(0);
         images(&workshop.join(out))
     };
     assert!(render("one", "1") == render("many", "3"));
@@ -88,8 +77,5 @@ fn one_sample_has_no_noise_to_measure() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 6..=6);
     let arguments = ["still", "in", "-o", "a.png", "--samples", "1", "--denoise"];
-    workshop
-        .run(&arguments)
-        .expect(2)
-        .prints("render.denoise: needs at least 2 samples per pixel");
+    workshop.run(&arguments).expect(2).prints("render.denoise: needs at least 2 samples per pixel");
 }

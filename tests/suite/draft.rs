@@ -45,11 +45,7 @@ fn drafts_have_few_samples_and_ambient_light() {
     let workshop = workshop();
     let draft = rays(&workshop, "draft", &["--draft", "--threads", "1"]);
     let text = fs::read_to_string(workshop.join("draft/job.toml")).expect("a manifest");
-    for line in [
-        "samples = 4 ",
-        "indirect = \"ambient\" ",
-        "denoise = \"auto\" ",
-    ] {
+    for line in ["samples = 4 ", "indirect = \"ambient\" ", "denoise = \"auto\" "] {
         assert!(text.contains(line), "{line}: {text}");
     }
     // The same bytes on any threads, and from the settings one by one
@@ -71,9 +67,7 @@ fn other_options_override_a_draft() {
     let workshop = workshop();
     let frame = ["still", "job.toml", "--draft", "--frame", "5", "-o"];
     let still = |name: &str, options: &[&str]| {
-        workshop
-            .run(&[&frame[..], &[name], options].concat())
-            .expect(0);
+        workshop.run(&[&frame[..], &[name], options].concat()).expect(0);
         fs::read(workshop.join(name)).expect("an image")
     };
     let draft = still("draft.png", &[]);

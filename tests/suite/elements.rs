@@ -60,16 +60,9 @@ fn atoms_have_radii_and_colours_of_their_elements() {
         ("--radius=vdw", [1.70, 1.52, 1.20]),
         ("--radius=covalent", [0.76, 0.66, 0.31]),
         ("input.radius={table=\"vdw\", scale=0.5}", [0.85, 0.76, 0.6]),
-        (
-            "input.radius={attribute=\"element\", values={6=1, 8=0.5, 1=0.25}}",
-            [1.0, 0.5, 0.25],
-        ),
+        ("input.radius={attribute=\"element\", values={6=1, 8=0.5, 1=0.25}}", [1.0, 0.5, 0.25]),
     ] {
-        let set = if radius.starts_with("--") {
-            &[][..]
-        } else {
-            &["--set"]
-        };
+        let set = if radius.starts_with("--") { &[][..] } else { &["--set"] };
         let options = [set, &[radius, "--color-by", "elements"]].concat();
         still(&shop, "in.xyz", &options).expect(0);
         assert_near(&radii(&shop), &expected);
@@ -94,10 +87,7 @@ fn radii_have_the_unit_of_the_format() {
     let shop = Workshop::new();
     // Coordinates in nm, and a site that is no element
     let atom = |number: i32, name: &str, x: f64| {
-        format!(
-            "{number:5}{:<5}{name:>5}{number:5}{x:8.3}{:8.3}{:8.3}\n",
-            "SOL", 0.0, 0.0
-        )
+        format!("{number:5}{:<5}{name:>5}{number:5}{x:8.3}{:8.3}{:8.3}\n", "SOL", 0.0, 0.0)
     };
     let atoms = atom(1, "OW", -6.0) + &atom(1, "HW1", 0.0) + &atom(1, "MW", 6.0);
     let text = format!("water\n    3\n{atoms}   9.0   9.0   9.0\n");
@@ -105,12 +95,7 @@ fn radii_have_the_unit_of_the_format() {
     let ran = still(
         &shop,
         "in.gro",
-        &[
-            "--look",
-            "none",
-            "--set",
-            "input.radius={table=\"vdw\", scale=10}",
-        ],
+        &["--look", "none", "--set", "input.radius={table=\"vdw\", scale=10}"],
     );
     ran.expect(0)
         .prints("van der Waals radii of elements in `element`, angstroms x 1")
@@ -126,13 +111,12 @@ fn absent_elements_and_radii_are_errors_with_a_remedy() {
     still(&shop, "in.csv", &["--set", table])
         .expect(1)
         .prints("input.radius.values has no radius for `type` = 3; add one, such as 3 = 0.5");
-    for (option, key) in [
-        ("--radius=vdw", "input.radius"),
-        ("--color-by=elements", "material.color.attribute"),
-    ] {
-        still(&shop, "in.csv", &[option]).expect(2).prints(&format!(
-            "{key}: no attribute `element` in the sampled frames"
-        ));
+    for (option, key) in
+        [("--radius=vdw", "input.radius"), ("--color-by=elements", "material.color.attribute")]
+    {
+        still(&shop, "in.csv", &[option])
+            .expect(2)
+            .prints(&format!("{key}: no attribute `element` in the sampled frames"));
     }
     for (set, message) in [
         (
@@ -140,17 +124,12 @@ fn absent_elements_and_radii_are_errors_with_a_remedy() {
             "the radii are in `table`; leave one of the two out",
         ),
         ("input.radius=vdv", "did you mean vdw?"),
-        (
-            "input.radius={attribute=\"type\", values={1=0}}",
-            "expected lengths above 0 of integers",
-        ),
+        ("input.radius={attribute=\"type\", values={1=0}}", "expected lengths above 0 of integers"),
         (
             "material.color={attribute=\"type\", values={1=[1, 0, 0]}, map=\"jmol\"}",
             "the colours are in `values`; leave one of the two out",
         ),
     ] {
-        still(&shop, "in.csv", &["--set", set])
-            .expect(2)
-            .prints(message);
+        still(&shop, "in.csv", &["--set", set]).expect(2).prints(message);
     }
 }

@@ -35,14 +35,8 @@ const VIEW: [&str; 20] = [
 ];
 
 /// Light that shows a matte surface in its base colour.
-const WHITE: [&str; 6] = [
-    "--set",
-    "environment.type=constant",
-    "--set",
-    "render.bounces=0",
-    "--samples",
-    "16",
-];
+const WHITE: [&str; 6] =
+    ["--set", "environment.type=constant", "--set", "render.bounces=0", "--samples", "16"];
 
 fn particles(frames: u32) -> Workshop {
     let workshop = Workshop::new();
@@ -192,9 +186,7 @@ fn water_stands_on_the_picture() {
     let command = ["render", "in", "-o", "out/f.####.exr", "--set", ground];
     let water = ["--look", "water", "--surface", "spheres", "--samples", "4"];
     let water = [&water[..], &["--set", "render.caustics.photons=10000"]].concat();
-    workshop
-        .run(&[&command[..], &VIEW, &water].concat())
-        .expect(0);
+    workshop.run(&[&command[..], &VIEW, &water].concat()).expect(0);
     for color in quarters(&workshop.join("out/f.0001.exr")) {
         assert!(color[0] > 0.1 && color[1] < 0.01 * color[0], "{color:?}");
     }
@@ -222,10 +214,7 @@ fn files_that_are_no_pictures_are_refused() {
         ("text.png", "text.png: is neither"),
         ("nan.exr", "column 2 and row 1 is NaN or infinite"),
         ("negative.exr", "column 1 and row 2 is negative"),
-        (
-            "huge.png",
-            "65536x65536 pixels; it needs at least 1x1 and at most",
-        ),
+        ("huge.png", "65536x65536 pixels; it needs at least 1x1 and at most"),
     ] {
         let ground = format!("{{ type = \"image\", image = \"{name}\" }}");
         let ran = render(&workshop, "out", &ground, &[]).expect(2);
@@ -261,11 +250,7 @@ fn a_changed_picture_stops_a_job_and_a_moved_one_does_not() {
     render(&workshop, "out", &ground("other/b.png"), &[]).expect(0);
     png16(&workshop.join("other/b.png"));
     let ran = render(&workshop, "out", &ground("other/b.png"), &[]).expect(2);
-    assert!(
-        ran.errors().contains("render.ground.image: "),
-        "{}",
-        ran.errors()
-    );
+    assert!(ran.errors().contains("render.ground.image: "), "{}", ran.errors());
     let turned = "{ type = \"image\", image = \"other/b.png\", rotation = 5 }";
     let ran = render(&workshop, "out", turned, &[]).expect(2);
     assert!(ran.errors().contains("render.ground: "), "{}", ran.errors());

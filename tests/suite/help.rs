@@ -10,25 +10,13 @@ fn help(arguments: &[&str]) -> String {
 fn options_come_in_groups_with_examples() {
     for command in ["render", "check"] {
         let text = help(&[command, "-h"]);
-        let headings = [
-            "Input:",
-            "Camera:",
-            "Image:",
-            "Look:",
-            "Output:",
-            "Job:",
-            "Examples:",
-        ];
+        let headings = ["Input:", "Camera:", "Image:", "Look:", "Output:", "Job:", "Examples:"];
         let places: Vec<usize> = headings
             .iter()
             .map(|heading| text.find(&format!("\n{heading}\n")).expect(heading))
             .collect();
         assert!(places.is_sorted(), "{text}");
-        for default in [
-            "[default: 1920]",
-            "[default: all]",
-            "[default: out/frame.####.exr]",
-        ] {
+        for default in ["[default: 1920]", "[default: all]", "[default: out/frame.####.exr]"] {
             assert!(text.contains(default), "{default}");
         }
     }
@@ -91,10 +79,7 @@ fn completions_know_every_command_and_option() {
     ] {
         assert!(script.contains(values), "{values}");
     }
-    let errors = Workshop::new()
-        .run(&["completions", "csh"])
-        .expect(2)
-        .errors();
+    let errors = Workshop::new().run(&["completions", "csh"]).expect(2).errors();
     assert!(errors.contains("[possible values: bash"), "{errors}");
 }
 
@@ -109,23 +94,12 @@ fn every_command_has_a_manual_page() {
     }
     let render = help(&["man", "render"]);
     assert!(render.contains("\\-\\-samples"));
-    assert!(
-        render.contains(concat!("\"spherule ", env!("CARGO_PKG_VERSION"), "\"")),
-        "{render}"
-    );
-    let (_, status) = render
-        .split_once(".SH \"EXIT STATUS\"\n")
-        .expect("the codes");
+    assert!(render.contains(concat!("\"spherule ", env!("CARGO_PKG_VERSION"), "\"")), "{render}");
+    let (_, status) = render.split_once(".SH \"EXIT STATUS\"\n").expect("the codes");
     let (_, examples) = status.split_once(".SH EXAMPLES\n.nf\n").expect("examples");
-    assert!(
-        examples.contains("\\&  spherule render run1 \\-o out/frame.####.exr\n"),
-        "{examples}"
-    );
+    assert!(examples.contains("\\&  spherule render run1 \\-o out/frame.####.exr\n"), "{examples}");
     let errors = Workshop::new().run(&["man", "rendr"]).expect(2).errors();
-    assert!(
-        errors.contains("`rendr`") && errors.contains("render, still"),
-        "{errors}"
-    );
+    assert!(errors.contains("`rendr`") && errors.contains("render, still"), "{errors}");
 }
 
 #[test]
@@ -150,10 +124,7 @@ fn the_manual_of_maps_is_complete() {
     let text = include_str!("../../docs/manual/looks.md");
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), [1]);
-    let errors = workshop
-        .run(&["render", "in", "--map", "xyzzy"])
-        .expect(2)
-        .errors();
+    let errors = workshop.run(&["render", "in", "--map", "xyzzy"]).expect(2).errors();
     let (_, list) = errors.split_once("choose one of ").expect("a list");
     let (names, _) = list.split_once(';').expect("an end");
     assert!(names.split(", ").count() > 50, "{names}");

@@ -13,11 +13,7 @@ use spherule_formats::{ParticleFrame, Positions, RawParticles};
 const FILE: &str = "examples/dam-break/ParticleData_Fluid_5.bgeo";
 
 fn manifest(path: &Path) -> Manifest {
-    let mut all = vec![Override::new(
-        "input.path",
-        path.to_str().expect("text"),
-        "test",
-    )];
+    let mut all = vec![Override::new("input.path", path.to_str().expect("text"), "test")];
     let settings = [
         "input.up=y",
         "image.width=32",
@@ -74,11 +70,7 @@ fn the_bytes_are_those_of_a_file() {
 fn a_raised_flag_stops() {
     let at = [Vec3::ZERO, Vec3::X];
     let settings = StillSettings::parse("input.radius = 0.4").expect("valid");
-    let stopped = render(
-        &settings,
-        particles(PositionSlice::F32(&at)),
-        &AtomicBool::new(true),
-    );
+    let stopped = render(&settings, particles(PositionSlice::F32(&at)), &AtomicBool::new(true));
     assert!(stopped.expect_err("stopped").is_interrupted());
 }
 

@@ -61,8 +61,7 @@ fn pictures_are_those_of_decoded_particles() {
     dam_break(&shop.join("in"), 1..=1);
     for encoding in ["f32", "q16", "q10"] {
         let options = ["--encoding", encoding, "--max-error", "0.05"];
-        shop.run(&[&["convert", "in", "-o", encoding][..], &options].concat())
-            .expect(0);
+        shop.run(&[&["convert", "in", "-o", encoding][..], &options].concat()).expect(0);
         same_as_decoded(&shop, encoding, &["--color-by", "velocity"]);
     }
 }
@@ -76,24 +75,15 @@ fn bodies_and_smooth_normals_are_those_of_decoded_particles() {
         (
             "water",
             // Light on the ground takes long, and does not depend on how particles are stored
-            &[
-                "--look",
-                "water",
-                "--surface",
-                "union",
-                "--set",
-                "render.caustics={photons=0}",
-            ][..],
+            &["--look", "water", "--surface", "union", "--set", "render.caustics={photons=0}"][..],
         ),
         ("pca", &["--set", "surface.normals=\"pca\""]),
     ] {
-        shop.run(&[&["convert", "in", "-o", name][..], &options].concat())
-            .expect(0);
+        shop.run(&[&["convert", "in", "-o", name][..], &options].concat()).expect(0);
         same_as_decoded(&shop, name, surface);
     }
     // Whatever the structure, that sorts a copy.
-    shop.run(&[&["convert", "in", "-o", "smooth"][..], &options].concat())
-        .expect(0);
+    shop.run(&[&["convert", "in", "-o", "smooth"][..], &options].concat()).expect(0);
     let smooth = ["--look", "water", "--color-by", "velocity"];
     same_in_all_ways(&shop, "smooth", &smooth, |_| true);
 }
@@ -105,25 +95,14 @@ fn per_particle_radii_and_ids() {
     let mut text = "x,y,z,radius,id\n".to_owned();
     for i in 0..3_000_u32 {
         let part = |salt: u32| f64::from((i * 7919 + salt).wrapping_mul(2_654_435_761) >> 8) / 2e7;
-        let radius = if i % 100 == 0 {
-            0.1
-        } else {
-            1e-3 + part(4) * 0.01
-        };
-        text += &format!(
-            "{},{},{},{radius},{}\n",
-            part(1),
-            part(2),
-            part(3),
-            100_000 - i
-        );
+        let radius = if i % 100 == 0 { 0.1 } else { 1e-3 + part(4) * 0.01 };
+        text += &format!("{},{},{},{radius},{}\n", part(1), part(2), part(3), 100_000 - i);
     }
     fs::create_dir_all(shop.join("in")).expect("a directory");
     fs::write(shop.join("in/p_1.csv"), text).expect("a file");
     for encoding in ["f32", "q16", "q10"] {
         let options = ["--encoding", encoding, "--max-error", "0.05"];
-        shop.run(&[&["convert", "in", "-o", encoding][..], &options].concat())
-            .expect(0);
+        shop.run(&[&["convert", "in", "-o", encoding][..], &options].concat()).expect(0);
         let glass = ["--set", "material.transmission=0.8"];
         same_as_decoded(&shop, encoding, &glass);
     }
@@ -138,15 +117,7 @@ fn coincident_particles_have_the_ids_of_the_source() {
     let part = |i: u32, salt: u32| {
         f64::from(((i % 150) * 7919 + salt).wrapping_mul(2_654_435_761) >> 22) / 1024.0
     };
-    let row = |i: u32| {
-        format!(
-            "{},{},{},{}\n",
-            part(i, 1),
-            part(i, 2),
-            part(i, 3),
-            5_000 + i
-        )
-    };
+    let row = |i: u32| format!("{},{},{},{}\n", part(i, 1), part(i, 2), part(i, 3), 5_000 + i);
     let rows: String = (0..3_000).map(row).collect();
     fs::create_dir_all(shop.join("in")).expect("a directory");
     fs::write(shop.join("in/p_1.csv"), format!("x,y,z,id\n{rows}")).expect("a file");
@@ -168,8 +139,7 @@ fn coincident_particles_have_the_ids_of_the_source() {
 fn damage_costs_the_frame_and_is_named() {
     let shop = Workshop::new();
     dam_break(&shop.join("in"), 1..=3);
-    shop.run(&["convert", "in", "-o", "native", "--encoding", "q10"])
-        .expect(0);
+    shop.run(&["convert", "in", "-o", "native", "--encoding", "q10"]).expect(0);
     let file = |number: u32| shop.join(format!("native/frame.{number:04}.spf"));
     // A byte of the positions, which begin behind the header; then of the attribute at the end.
     flip(&file(2), 4096 + 100);
@@ -182,9 +152,7 @@ fn damage_costs_the_frame_and_is_named() {
     // Cut off.
     let bytes = fs::read(file(3)).expect("readable");
     fs::write(file(3), &bytes[..bytes.len() / 2]).expect("writable");
-    render(&shop, "native", "cut", &[])
-        .expect(1)
-        .prints("frame.0003.spf");
+    render(&shop, "native", "cut", &[]).expect(1).prints("frame.0003.spf");
     assert_eq!(images(&shop.join("cut")).len(), 2);
 }
 
@@ -201,16 +169,14 @@ fn far_from_zero() {
         let path = shop.join(format!("in/f_{frame}.npy"));
         npy(&path, 500, frame, Vec3::splat(1e6));
     }
-    shop.run(&["convert", "in", "-o", "native", "--radius", "1"])
-        .expect(0);
+    shop.run(&["convert", "in", "-o", "native", "--radius", "1"]).expect(0);
     let ran = render(&shop, "native", "out", &[]).expect(0);
     assert!(!ran.errors().contains("decoded"), "{}", ran.errors());
     // Converted apart, each has an origin of its own.
     npy(&shop.join("in/f_2.npy"), 500, 2, Vec3::splat(-3e6));
     for frame in ["1", "2"] {
         let file = format!("in/f_{frame}.npy");
-        shop.run(&["convert", &file, "-o", frame, "--radius", "1"])
-            .expect(0);
+        shop.run(&["convert", &file, "-o", frame, "--radius", "1"]).expect(0);
     }
     for frame in ["1", "2"] {
         let found = fs::read_dir(shop.join(frame)).expect("readable");
@@ -220,9 +186,7 @@ fn far_from_zero() {
         fs::create_dir_all(shop.join("apart")).expect("a directory");
         fs::copy(native.expect("a frame"), &to).expect("copied");
     }
-    render(&shop, "apart", "apart-out", &[])
-        .expect(0)
-        .prints("another origin");
+    render(&shop, "apart", "apart-out", &[]).expect(0).prints("another origin");
 }
 
 /// Memory for the program and the image, not for two million particles: as plain numbers they and a tree
@@ -236,8 +200,7 @@ fn memory_does_not_grow_with_the_particles() {
     let shop = Workshop::new();
     npy(&shop.join("in/f_1.npy"), PARTICLES, 1, Vec3::ZERO);
     let options = ["--encoding", "q10", "--radius", "0.012"];
-    shop.run(&[&["convert", "in", "-o", "native"][..], &options].concat())
-        .expect(0);
+    shop.run(&[&["convert", "in", "-o", "native"][..], &options].concat()).expect(0);
     let limited = |out: &str, how: &str| {
         let program = env!("CARGO_BIN_EXE_spherule");
         let arguments = "--width 160 --height 90 --samples 1 --threads 2 --look whitted";

@@ -37,9 +37,8 @@ fn particles(frames: u32) -> Workshop {
     let workshop = Workshop::new();
     fs::create_dir_all(workshop.join("in")).expect("a directory");
     let at = |i: u32| 0.5 * (i as f32 - 1.0);
-    let centers: Vec<Vec3> = (0..27)
-        .map(|i| Vec3::new(at(i % 3), at(i / 3 % 3), at(i / 9)))
-        .collect();
+    let centers: Vec<Vec3> =
+        (0..27).map(|i| Vec3::new(at(i % 3), at(i / 3 % 3), at(i / 9))).collect();
     for frame in 1..=frames {
         let path = workshop.join(format!("in/f_{frame}.npy"));
         write::npy::write(&path, &centers).expect("a file");
@@ -68,10 +67,7 @@ fn stl(path: &Path, triangles: &[[Vec3; 3]]) {
 
 /// A wall at `y` across the left half of the view, facing the camera.
 fn wall(path: &Path, y: f32) {
-    stl(
-        path,
-        &side(Vec3::new(-9.0, y, -9.0), 9.0 * Vec3::X, 18.0 * Vec3::Z),
-    );
+    stl(path, &side(Vec3::new(-9.0, y, -9.0), 9.0 * Vec3::X, 18.0 * Vec3::Z));
 }
 
 /// A closed box from -2 to 2 with outward triangles.
@@ -132,10 +128,7 @@ fn a_wall_hides_particles_behind_it() {
         }
         assert!(without.integers("id.I").iter().any(|id| *id != NO_ID));
         // A holdout is a hole in front of the particles
-        let hole = with(
-            "hole",
-            &["--mesh", "wall.stl", "--set", "mesh.0.holdout=true"],
-        );
+        let hole = with("hole", &["--mesh", "wall.stl", "--set", "mesh.0.holdout=true"]);
         for pixel in 0..64 * 36 {
             let color = ["R", "G", "B", "A"].map(|name| hole.floats(name)[pixel]);
             let shown = ["R", "G", "B", "A"].map(|name| found.floats(name)[pixel]);
@@ -146,10 +139,7 @@ fn a_wall_hides_particles_behind_it() {
             }
         }
         // Through glass, the particles are there
-        let glass = with(
-            "glass",
-            &["--mesh", "wall.stl", "--set", "mesh.0.material=glass"],
-        );
+        let glass = with("glass", &["--mesh", "wall.stl", "--set", "mesh.0.material=glass"]);
         assert_eq!(glass.floats("Z"), without.floats("Z"));
     }
 }
@@ -163,19 +153,8 @@ fn the_camera_shows_all_of_the_meshes_on_request() {
         let set = format!("camera.frame_meshes={frame_meshes}");
         let scene = ["--radius", "0.3", "--mesh", "tank.stl", "--ground=none"];
         let image = ["--width", "64", "--height", "36", "--samples", "1"];
-        let command = [
-            "render",
-            "in",
-            "-o",
-            &out,
-            "--channels",
-            "RGBA,Z",
-            "--set",
-            &set,
-        ];
-        workshop
-            .run(&[&command[..], &scene, &image].concat())
-            .expect(0);
+        let command = ["render", "in", "-o", &out, "--channels", "RGBA,Z", "--set", &set];
+        workshop.run(&[&command[..], &scene, &image].concat()).expect(0);
         let image = Picture::open(&workshop.join(format!("{frame_meshes}/f.1.exr")));
         let is_mesh = |x: usize, y: usize| image.floats("Z")[64 * y + x].is_finite();
         // The tank reaches beyond the picture, or fills most of its height and touches no edge
@@ -219,21 +198,13 @@ fn units_and_places_are_those_of_the_manifest() {
     let mesh = "[[mesh]]\npath = \"meshes/wall.stl\"\nscale = 0.001\ntranslate = [0, -0.5, 0]\n";
     let job = format!("input.path = \"../in\"\noutput.path = \"../out/f.#.exr\"\n{mesh}");
     fs::write(workshop.join("jobs/a.toml"), job).expect("a file");
-    workshop
-        .run(&[&["render", "jobs/a.toml"][..], &VIEW].concat())
-        .expect(0);
+    workshop.run(&[&["render", "jobs/a.toml"][..], &VIEW].concat()).expect(0);
     let z = Picture::open(&workshop.join("out/f.1.exr"));
     assert!((z.floats("Z")[18 * 64 + 31] - 3.5).abs() < 1e-4);
     // The manifest next to the images names the same file
     let written = fs::read_to_string(workshop.join("out/job.toml")).expect("a manifest");
-    assert!(
-        written.contains("path = \"../jobs/meshes/wall.stl\""),
-        "{written}"
-    );
-    workshop
-        .run(&["render", "out/job.toml"])
-        .expect(0)
-        .prints("1 of 1 frames are done already");
+    assert!(written.contains("path = \"../jobs/meshes/wall.stl\""), "{written}");
+    workshop.run(&["render", "out/job.toml"]).expect(0).prints("1 of 1 frames are done already");
     // Without the factor, the unit is doubtful
     let note = "times larger than the particles; if it is in another unit, set mesh.scale";
     let mesh = ["--mesh", "jobs/meshes/wall.stl"];
@@ -278,19 +249,14 @@ fn each_frame_may_have_its_own_mesh() {
     // A frame without its mesh fails alone
     let ran = render(&workshop, "out", &options).expect(1);
     let message = ran.errors();
-    assert!(
-        message.contains("wall.003.stl: the mesh of the frame does not exist"),
-        "{message}"
-    );
+    assert!(message.contains("wall.003.stl: the mesh of the frame does not exist"), "{message}");
     assert!(message.contains("input.frames"), "{message}");
     assert!((z(1) - 4.0).abs() < 1e-5 && (z(2) - 3.0).abs() < 1e-5);
     wall(&workshop.join("wall.003.stl"), -4.0);
     let ran = render(&workshop, "out", &options).expect(0);
     assert_eq!(ran.rendered(), [3]);
     assert!((z(3) - 2.0).abs() < 1e-5);
-    render(&workshop, "out", &options)
-        .expect(0)
-        .prints("3 of 3 frames are done already");
+    render(&workshop, "out", &options).expect(0).prints("3 of 3 frames are done already");
     // Isolated frames read the same meshes
     let isolated = [&options[..], &["--isolate"]].concat();
     render(&workshop, "isolated", &isolated).expect(0);
@@ -299,10 +265,7 @@ fn each_frame_may_have_its_own_mesh() {
     fs::create_dir_all(workshop.join("other")).expect("a directory");
     write::npy::write(&workshop.join("other/f_1.npy"), &[Vec3::ZERO; 9]).expect("a file");
     let other = ["render", "other", "-o", "out/f.#.exr"];
-    workshop
-        .run(&[&other[..], &VIEW, &options].concat())
-        .expect(2)
-        .prints("other");
+    workshop.run(&[&other[..], &VIEW, &options].concat()).expect(2).prints("other");
     // One that changed after its image was made
     wall(&workshop.join("wall.002.stl"), -3.5);
     let ran = render(&workshop, "out", &options);
@@ -328,12 +291,8 @@ fn another_mesh_is_another_job() {
         .expect(0)
         .prints("1 of 1 frames are done already");
     wall(&workshop.join("wall.stl"), -3.0);
-    render(&workshop, "out", &options)
-        .expect(2)
-        .prints("mesh.0.path");
-    render(&workshop, "out", &[])
-        .expect(2)
-        .prints("mesh.0.path");
+    render(&workshop, "out", &options).expect(2).prints("mesh.0.path");
+    render(&workshop, "out", &[]).expect(2).prints("mesh.0.path");
 }
 
 #[test]
@@ -361,19 +320,8 @@ fn meshes_that_cannot_be_rendered_are_named() {
 fn images_depend_on_neither_threads_nor_structures() {
     let workshop = particles(1);
     tank(&workshop.join("tank.stl"));
-    let sets = [
-        "mesh.0.faces=back",
-        "mesh.1.material=glass",
-        "mesh.1.scale=0.5",
-    ];
-    let mut options = vec![
-        "--mesh",
-        "tank.stl",
-        "--mesh",
-        "tank.stl",
-        "--integrator",
-        "path",
-    ];
+    let sets = ["mesh.0.faces=back", "mesh.1.material=glass", "mesh.1.scale=0.5"];
+    let mut options = vec!["--mesh", "tank.stl", "--mesh", "tank.stl", "--integrator", "path"];
     options.extend(sets.iter().flat_map(|set| ["--set", set]));
     options.extend(["--set", "image.samples=8"]);
     let mut all = Vec::new();
@@ -437,10 +385,7 @@ fn meshes_move_to_those_of_the_next_frame() {
             let at = (f32::from(x) + 0.5 - 32.0) * pixel;
             let edge = frame as f32 - 2.0;
             let expected = (edge + 1.0 - at).clamp(0.0, 1.0);
-            assert!(
-                (found - expected).abs() < 0.1,
-                "{frame} {x}: {found} {expected}"
-            );
+            assert!((found - expected).abs() < 0.1, "{frame} {x}: {found} {expected}");
         }
     }
     // Meshes with other triangles stay where they are

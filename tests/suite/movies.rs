@@ -23,9 +23,8 @@ fn job(frames: &[usize], options: &[&str]) -> Workshop {
 
 /// Size and pixels of a PNG.
 fn png(path: &Path) -> ([u32; 2], Vec<u8>) {
-    let mut reader = png::Decoder::new(File::open(path).expect("a picture"))
-        .read_info()
-        .expect("a PNG");
+    let mut reader =
+        png::Decoder::new(File::open(path).expect("a picture")).read_info().expect("a PNG");
     let size = [reader.info().width, reader.info().height];
     let mut pixels = vec![0; reader.output_buffer_size()];
     let frame = reader.next_frame(&mut pixels).expect("pixels");
@@ -64,34 +63,18 @@ fn animations_have_all_frames() {
         assert!(ran.text().contains(line), "{}", ran.text());
         // Again, over the own file: the same bytes
         let bytes = fs::read(workshop.join(name)).expect("a movie");
-        workshop
-            .run(&["movie", "out/job.toml", "-o", name])
-            .expect(DONE);
+        workshop.run(&["movie", "out/job.toml", "-o", name]).expect(DONE);
         assert_eq!(fs::read(workshop.join(name)).expect("a movie"), bytes);
     }
     // The first picture of an animated PNG is the first preview
-    assert_eq!(
-        png(&workshop.join("new/a.png")),
-        png(&workshop.join("out/f.0001.png"))
-    );
-    let small = workshop
-        .run(&[
-            "movie", "out", "-o", "s.png", "--width", "32", "--fps", "10",
-        ])
-        .expect(DONE);
-    assert!(
-        small.text().contains("32x18, 3 frames in 0.30 s at 10 fps"),
-        "{}",
-        small.text()
-    );
+    assert_eq!(png(&workshop.join("new/a.png")), png(&workshop.join("out/f.0001.png")));
+    let small =
+        workshop.run(&["movie", "out", "-o", "s.png", "--width", "32", "--fps", "10"]).expect(DONE);
+    assert!(small.text().contains("32x18, 3 frames in 0.30 s at 10 fps"), "{}", small.text());
     // A GIF cannot be as fast
     let fast = ["movie", "out", "-o", "f.gif", "--fps", "100"];
     let fast = workshop.run(&fast).expect(DONE);
-    assert!(
-        fast.text().contains("3 frames in 0.06 s at 50 fps"),
-        "{}",
-        fast.text()
-    );
+    assert!(fast.text().contains("3 frames in 0.06 s at 50 fps"), "{}", fast.text());
     fast.prints("the movie is slower than 100 fps");
     no_leftovers(workshop.path());
     no_leftovers(&workshop.join("out"));
@@ -116,30 +99,14 @@ fn an_image_is_no_job() {
 fn gaps_are_held_or_left_out() {
     let workshop = job(&[1, 2, 3, 6], &[]);
     let held = workshop.run(&["movie", "out", "-o", "a.gif"]).expect(DONE);
-    assert!(
-        held.text().contains("6 frames in 0.24 s"),
-        "{}",
-        held.text()
-    );
+    assert!(held.text().contains("6 frames in 0.24 s"), "{}", held.text());
     let held = held.prints("2 frames are missing after frame 3, which is shown for");
     drop(held);
-    let skipped = workshop
-        .run(&["movie", "out", "-o", "a.gif", "--gaps", "skip"])
-        .expect(DONE);
-    assert!(
-        skipped.text().contains("4 frames in 0.16 s"),
-        "{}",
-        skipped.text()
-    );
+    let skipped = workshop.run(&["movie", "out", "-o", "a.gif", "--gaps", "skip"]).expect(DONE);
+    assert!(skipped.text().contains("4 frames in 0.16 s"), "{}", skipped.text());
     skipped.prints("2 frames are missing after frame 3, which is followed by the next");
-    let some = workshop
-        .run(&["movie", "out", "-o", "a.gif", "--frames", "1-6x5"])
-        .expect(DONE);
-    assert!(
-        some.text().contains("2 frames") && some.errors().is_empty(),
-        "{}",
-        some.errors()
-    );
+    let some = workshop.run(&["movie", "out", "-o", "a.gif", "--frames", "1-6x5"]).expect(DONE);
+    assert!(some.text().contains("2 frames") && some.errors().is_empty(), "{}", some.errors());
 }
 
 #[test]
@@ -151,26 +118,16 @@ fn unfinished_jobs_are_refused_unless_partial() {
         "out: 1 of 3 frames are done, missing: 2-3; the same `render` command continues the job, or",
     );
     assert!(!workshop.join("a.gif").exists());
-    let partial = workshop
-        .run(&["movie", "out", "-o", "a.gif", "--partial"])
-        .expect(DONE);
+    let partial = workshop.run(&["movie", "out", "-o", "a.gif", "--partial"]).expect(DONE);
     partial.prints("missing: 2-3; the movie shows what is there");
-    workshop
-        .run(&["movie", "out", "-o", "a.gif", "--frames", "1"])
-        .expect(DONE);
+    workshop.run(&["movie", "out", "-o", "a.gif", "--frames", "1"]).expect(DONE);
     let sheet = workshop.run(&["sheet", "out", "-o", "a.png"]).expect(DONE);
     sheet.prints("missing: 2-3; the sheet shows what is there");
     // A finished frame whose preview is lost
     fs::remove_file(workshop.join("out/f.0001.png")).expect("a preview");
-    refuses(
-        workshop.run(&["movie", "out", "-o", "b.gif", "--frames", "1"]),
-        "missing: 1",
-    );
+    refuses(workshop.run(&["movie", "out", "-o", "b.gif", "--frames", "1"]), "missing: 1");
     let ran = workshop.run(&["movie", "out", "-o", "b.gif", "--partial"]);
-    refuses(
-        ran,
-        "0 of 3 frames are done, missing: 1-3; there is nothing to show yet",
-    );
+    refuses(ran, "0 of 3 frames are done, missing: 1-3; there is nothing to show yet");
 }
 
 #[test]
@@ -184,26 +141,15 @@ fn only_own_files_are_replaced() {
             "already exists and was not made by this command;",
         );
         assert_eq!(fs::read(&path).expect("a file"), b"by hand");
-        workshop
-            .run(&[command, "out", "-o", name, "--force"])
-            .expect(DONE);
+        workshop.run(&[command, "out", "-o", name, "--force"]).expect(DONE);
         workshop.run(&[command, "out", "-o", name]).expect(DONE);
         fs::create_dir(workshop.join(format!("dir.{name}"))).expect("a directory");
         let dir = format!("dir.{name}");
-        refuses(
-            workshop.run(&[command, "out", "-o", &dir, "--force"]),
-            "is not a file;",
-        );
+        refuses(workshop.run(&[command, "out", "-o", &dir, "--force"]), "is not a file;");
     }
-    for (command, name) in [
-        ("movie", "out/f.0001.png"),
-        ("sheet", "out/../out/f.0002.png"),
-    ] {
+    for (command, name) in [("movie", "out/f.0001.png"), ("sheet", "out/../out/f.0002.png")] {
         let ran = workshop.run(&[command, "out", "-o", name, "--force"]);
-        refuses(
-            ran,
-            "is an image or an input of the job; choose another name",
-        );
+        refuses(ran, "is an image or an input of the job; choose another name");
     }
     workshop.run(&["verify", "out"]).expect(DONE);
 }
@@ -214,37 +160,20 @@ fn bad_requests_are_refused() {
     let movie = |options: &[&str], text: &str| {
         refuses(workshop.run(&[&["movie", "out"], options].concat()), text);
     };
-    movie(
-        &["-o", "a.avi"],
-        "--output a.avi: the name must end in .mp4,",
-    );
-    movie(
-        &["-o", "a.gif", "--codec", "h264"],
-        "--codec is for .mp4, .mov, .mkv and .webm",
-    );
+    movie(&["-o", "a.avi"], "--output a.avi: the name must end in .mp4,");
+    movie(&["-o", "a.gif", "--codec", "h264"], "--codec is for .mp4, .mov, .mkv and .webm");
     movie(
         &["-o", "a.webm", "--codec", "prores"],
         "webm files cannot have the codec prores; choose one of vp9",
     );
-    movie(
-        &["-o", "a.gif", "--fps", "0"],
-        "expected frames per second from 0.1 to 240",
-    );
-    movie(
-        &["-o", "a.gif", "--frames", "7"],
-        "--frames: 7 contains none of the job's frames: 1",
-    );
-    refuses(
-        workshop.run(&["movie", "in", "-o", "a.gif"]),
-        "in: no job here",
-    );
+    movie(&["-o", "a.gif", "--fps", "0"], "expected frames per second from 0.1 to 240");
+    movie(&["-o", "a.gif", "--frames", "7"], "--frames: 7 contains none of the job's frames: 1");
+    refuses(workshop.run(&["movie", "in", "-o", "a.gif"]), "in: no job here");
     refuses(
         workshop.run(&["sheet", "out", "-o", "a.jpg"]),
         "--output a.jpg: the name must end in .png",
     );
-    workshop
-        .run(&["convert", "in", "-o", "frames"])
-        .expect(DONE);
+    workshop.run(&["convert", "in", "-o", "frames"]).expect(DONE);
     refuses(
         workshop.run(&["movie", "frames", "-o", "a.gif"]),
         "this job has native frames, no pictures;",
@@ -253,14 +182,8 @@ fn bad_requests_are_refused() {
     let path = workshop.join("out/f.0001.png");
     let length = fs::read(&path).expect("a preview").len();
     fs::write(&path, vec![7; length]).expect("a file");
-    refuses(
-        workshop.run(&["movie", "out", "-o", "a.gif"]),
-        "f.0001.png: cannot be decoded",
-    );
-    refuses(
-        workshop.run(&["sheet", "out", "-o", "a.png"]),
-        "f.0001.png: cannot be decoded",
-    );
+    refuses(workshop.run(&["movie", "out", "-o", "a.gif"]), "f.0001.png: cannot be decoded");
+    refuses(workshop.run(&["sheet", "out", "-o", "a.png"]), "f.0001.png: cannot be decoded");
     no_leftovers(workshop.path());
 }
 
@@ -268,34 +191,11 @@ fn bad_requests_are_refused() {
 fn sheets_have_chosen_frames() {
     let workshop = job(&[1, 2, 3, 4, 5], &[]);
     let ran = workshop
-        .run(&[
-            "sheet",
-            "out",
-            "-o",
-            "a.png",
-            "--width",
-            "100",
-            "--columns",
-            "3",
-        ])
+        .run(&["sheet", "out", "-o", "a.png", "--width", "100", "--columns", "3"])
         .expect(DONE);
-    assert_eq!(
-        ran.text().trim(),
-        "a.png: 100x40, 3 columns of 28x16, frames 1-5"
-    );
+    assert_eq!(ran.text().trim(), "a.png: 100x40, 3 columns of 28x16, frames 1-5");
     // At full size the pictures are unchanged
-    let two = [
-        "sheet",
-        "out",
-        "-o",
-        "b.png",
-        "--count",
-        "2",
-        "--columns",
-        "1",
-        "--gap",
-        "0",
-    ];
+    let two = ["sheet", "out", "-o", "b.png", "--count", "2", "--columns", "1", "--gap", "0"];
     let ran = workshop.run(&two).expect(DONE);
     assert!(ran.text().contains("frames 1,5"), "{}", ran.text());
     let (size, pixels) = png(&workshop.join("b.png"));
@@ -316,11 +216,7 @@ fn images_without_previews_are_shown() {
     let (size, expected) = png(&workshop.join("out/f.0001.png"));
     let (found_size, found) = png(&workshop.join("a.png"));
     assert_eq!(size, found_size);
-    let differences: Vec<u8> = expected
-        .iter()
-        .zip(&found)
-        .map(|(a, b)| a.abs_diff(*b))
-        .collect();
+    let differences: Vec<u8> = expected.iter().zip(&found).map(|(a, b)| a.abs_diff(*b)).collect();
     let largest = differences.iter().max().expect("pixels");
     assert!(*largest <= 1, "{largest}");
     workshop.run(&["movie", "bare", "-o", "a.gif"]).expect(DONE);
@@ -338,24 +234,15 @@ fn images_without_previews_are_shown() {
 fn render_makes_a_movie_at_its_end() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), [1, 2]);
-    refuses(
-        workshop.render(&["--movie", "a.avi"]),
-        "--movie a.avi: the name must end in",
-    );
+    refuses(workshop.render(&["--movie", "a.avi"]), "--movie a.avi: the name must end in");
     fs::write(workshop.join("b.gif"), b"by hand").expect("a file");
     refuses(
         workshop.render(&["--movie", "b.gif"]),
         "already exists and was not made by this command",
     );
     assert!(!workshop.join("out").exists(), "refused before the render");
-    let ran = workshop
-        .render(&["--movie", "a.gif", "--progress", "json"])
-        .expect(DONE);
-    assert!(
-        ran.text().lines().all(|line| line.starts_with('{')),
-        "{}",
-        ran.text()
-    );
+    let ran = workshop.render(&["--movie", "a.gif", "--progress", "json"]).expect(DONE);
+    assert!(ran.text().lines().all(|line| line.starts_with('{')), "{}", ran.text());
     ran.prints("a.gif: GIF, 64x36, 2 frames");
     // Nothing is left to render, but the movie may be
     fs::remove_file(workshop.join("a.gif")).expect("a movie");

@@ -44,10 +44,9 @@ fn layers_cover_what_they_leave_of_each_other() {
     let native = ["convert", "in", "-o", "native", "--encoding", "f32"];
     workshop.run(&native).expect(0);
     let by_density = "{ attribute = \"density\", range = [1, 5] }";
-    for (name, opacity, expected) in [
-        ("half", "0.3", 1.0 - 0.7_f32.powi(4)),
-        ("each", by_density, 1.0 - 0.75 * 0.5 * 0.25),
-    ] {
+    for (name, opacity, expected) in
+        [("half", "0.3", 1.0 - 0.7_f32.powi(4)), ("each", by_density, 1.0 - 0.75 * 0.5 * 0.25)]
+    {
         for input in ["in", "native"] {
             let found = coverage(&workshop, input, &format!("{name}_{input}"), opacity);
             let error = (found - expected).abs();
@@ -60,42 +59,21 @@ fn layers_cover_what_they_leave_of_each_other() {
 fn impossible_opacities_are_explained() {
     let workshop = spheres();
     for (setting, message) in [
-        (
-            "material.opacity=1.5",
-            "--set material.opacity=1.5: expected a number from 0 to 1",
-        ),
-        (
-            "material.opacity={ attribute = \"density\" }",
-            "material.opacity.range: is missing",
-        ),
-        (
-            "material.opacity={ attribute = \"density\", range = [2, 2] }",
-            "two different numbers",
-        ),
+        ("material.opacity=1.5", "--set material.opacity=1.5: expected a number from 0 to 1"),
+        ("material.opacity={ attribute = \"density\" }", "material.opacity.range: is missing"),
+        ("material.opacity={ attribute = \"density\", range = [2, 2] }", "two different numbers"),
         (
             "material.opacity={ attribute = \"densty\", range = [1, 2] }",
             "material.opacity: no attribute `densty`",
         ),
     ] {
-        workshop
-            .render(&["--set", setting])
-            .expect(2)
-            .prints(message);
+        workshop.render(&["--set", setting]).expect(2).prints(message);
     }
     let half = ["--set", "material.opacity=0.5", "--radius", "1"];
     for (options, message) in [
-        (
-            ["--surface", "union"],
-            "only separate spheres have an opacity",
-        ),
-        (
-            ["--set", "material.type=\"glass\""],
-            "glass and water are transparent already",
-        ),
+        (["--surface", "union"], "only separate spheres have an opacity"),
+        (["--set", "material.type=\"glass\""], "glass and water are transparent already"),
     ] {
-        workshop
-            .render(&[&half[..], &options].concat())
-            .expect(2)
-            .prints(message);
+        workshop.render(&[&half[..], &options].concat()).expect(2).prints(message);
     }
 }

@@ -6,18 +6,8 @@ use crate::harness::{Workshop, images};
 use crate::picture::{Picture, Plane};
 
 /// Options of small pictures of balls in the middle.
-const OPTIONS: [&str; 10] = [
-    "--width",
-    "160",
-    "--height",
-    "90",
-    "--samples",
-    "2",
-    "--radius",
-    "0.3",
-    "--threads",
-    "1",
-];
+const OPTIONS: [&str; 10] =
+    ["--width", "160", "--height", "90", "--samples", "2", "--radius", "0.3", "--threads", "1"];
 
 fn shop() -> Workshop {
     let shop = Workshop::new();
@@ -45,10 +35,7 @@ fn preview(shop: &Workshop, out: &str, frame: u32) -> image::RgbImage {
 /// Columns and rows of the pixels in which two previews differ.
 fn differences(a: &image::RgbImage, b: &image::RgbImage) -> Vec<(u32, u32)> {
     let pixels = a.enumerate_pixels();
-    pixels
-        .filter(|(x, y, p)| *p != b.get_pixel(*x, *y))
-        .map(|(x, y, _)| (x, y))
-        .collect()
+    pixels.filter(|(x, y, p)| *p != b.get_pixel(*x, *y)).map(|(x, y, _)| (x, y)).collect()
 }
 
 #[test]
@@ -63,10 +50,7 @@ fn overlays_change_previews_but_no_image() {
     };
     for frame in 1..=3 {
         assert_eq!(exr("plain", frame), exr("drawn", frame));
-        let (plain, drawn) = (
-            preview(&shop, "plain", frame),
-            preview(&shop, "drawn", frame),
-        );
+        let (plain, drawn) = (preview(&shop, "plain", frame), preview(&shop, "drawn", frame));
         let changed = differences(&plain, &drawn);
         assert!(changed.len() > 200, "{}", changed.len());
         // The stamp is at the top left, the bar at the right, and nothing in the middle
@@ -77,10 +61,7 @@ fn overlays_change_previews_but_no_image() {
     }
     // The bar is the same in all frames
     let bars = [1, 2, 3].map(|frame| {
-        let (plain, drawn) = (
-            preview(&shop, "plain", frame),
-            preview(&shop, "drawn", frame),
-        );
+        let (plain, drawn) = (preview(&shop, "plain", frame), preview(&shop, "drawn", frame));
         let changed = differences(&plain, &drawn).into_iter();
         changed.filter(|(x, _)| *x > 110).collect::<Vec<_>>()
     });
@@ -99,10 +80,7 @@ fn the_channel_has_the_overlay_alone() {
     let open = |out: &str| Picture::open(&shop.join(format!("{out}/f.0002.exr"))).planes;
     let (plain, mut drawn) = (open("plain"), open("drawn"));
     let planes = ["overlay.R", "overlay.G", "overlay.B", "overlay.A"].map(|name| {
-        assert!(
-            matches!(&plain[name], Plane::Float(v) if v.iter().all(|v| *v == 0.0)),
-            "{name}"
-        );
+        assert!(matches!(&plain[name], Plane::Float(v) if v.iter().all(|v| *v == 0.0)), "{name}");
         match drawn.insert(name.to_owned(), plain[name].clone()) {
             Some(Plane::Float(values)) => values,
             other => panic!("{name}: {other:?}"),
@@ -166,14 +144,10 @@ fn impossible_overlays_are_refused_or_noted() {
         ("{tim}", "unknown variable `{tim}`"),
     ] {
         let set = format!(r#"overlay=[{{ type = "text", text = "{text}" }}]"#);
-        render(&shop, "out", &["--set", &set])
-            .expect(2)
-            .prints(part);
+        render(&shop, "out", &["--set", &set]).expect(2).prints(part);
     }
     let constant = ["--colorbar", "--set", "material.color=[1,0,0]"];
-    render(&shop, "out", &constant)
-        .expect(2)
-        .prints("there is no colour bar");
+    render(&shop, "out", &constant).expect(2).prints("there is no colour bar");
     let set = r#"overlay=[{ type = "text", text = "漢字 a" }]"#;
     render(&shop, "out", &["--set", set])
         .expect(0)
@@ -182,13 +156,7 @@ fn impossible_overlays_are_refused_or_noted() {
 
 /// A logo of 4 by 2 pixels: red at the left, clear at the right.
 fn write_logo(shop: &Workshop) {
-    let pixel = |x: u32, _| {
-        image::Rgba(if x < 2 {
-            [255, 0, 0, 255]
-        } else {
-            [0, 0, 255, 0]
-        })
-    };
+    let pixel = |x: u32, _| image::Rgba(if x < 2 { [255, 0, 0, 255] } else { [0, 0, 255, 0] });
     let logo = image::RgbaImage::from_fn(4, 2, pixel);
     logo.save(shop.join("logo.png")).expect("a logo");
 }
@@ -205,11 +173,7 @@ fn a_logo_is_drawn_with_its_alpha() {
     let changed = differences(&plain, &drawn);
     assert_eq!(changed.len(), 18 * 18);
     assert!(changed.iter().all(|(x, y)| *x < 18 && *y < 18));
-    assert!(
-        changed
-            .iter()
-            .all(|(x, y)| drawn.get_pixel(*x, *y).0 == [255, 0, 0])
-    );
+    assert!(changed.iter().all(|(x, y)| drawn.get_pixel(*x, *y).0 == [255, 0, 0]));
     // The manifest of the job names the file from where it is
     let manifest = fs::read_to_string(shop.join("logo/job.toml")).expect("a manifest");
     assert!(manifest.contains("path = \"../logo.png\""), "{manifest}");
@@ -220,10 +184,7 @@ fn a_logo_is_drawn_with_its_alpha() {
 fn a_logo_that_cannot_be_read_is_named() {
     let shop = shop();
     let logo = r#"overlay=[{ type = "text" }, { type = "image", path = "logo.png" }]"#;
-    for (content, part) in [
-        (None, "No such file"),
-        (Some(&b"GIF89a"[..]), "cannot be decoded"),
-    ] {
+    for (content, part) in [(None, "No such file"), (Some(&b"GIF89a"[..]), "cannot be decoded")] {
         if let Some(content) = content {
             fs::write(shop.join("logo.png"), content).expect("a file");
         }

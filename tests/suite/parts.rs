@@ -73,9 +73,8 @@ fn images_do_not_depend_on_how_particles_are_traced() {
     // Native frames have other ids of particles, and those of 16 bits other positions
     let mut first: BTreeMap<&str, _> = BTreeMap::new();
     for input in ["in", "f32", "q16"] {
-        let mut ways: Vec<Vec<&str>> = Structure::ALL
-            .map(|structure| vec!["--accelerator", structure.name()])
-            .to_vec();
+        let mut ways: Vec<Vec<&str>> =
+            Structure::ALL.map(|structure| vec!["--accelerator", structure.name()]).to_vec();
         ways.push(vec!["--threads", "1"]);
         ways.push(vec!["--threads", "3"]);
         ways.push(vec!["--isolate"]);
@@ -126,10 +125,7 @@ fn cryptomatte_names_the_materials_of_parts() {
 #[test]
 fn absent_parts_are_reported_and_missing_attributes_refused() {
     let workshop = particles(1);
-    job(
-        &workshop,
-        &format!("{PARTS}[[material.part]]\nparts = [1, 77]\n"),
-    );
+    job(&workshop, &format!("{PARTS}[[material.part]]\nparts = [1, 77]\n"));
     let absent = "frame 1: no particle is of part 77, which material.part.2 names";
     let ran = render(&workshop, "in", "absent", &[]).expect(0);
     assert!(ran.errors().contains(absent), "{}", ran.errors());
@@ -142,29 +138,18 @@ fn absent_parts_are_reported_and_missing_attributes_refused() {
             &["--integrator", "whitted"][..],
             "material.part: render.integrator = \"whitted\" has one material",
         ),
-        (
-            &["--surface", "union"],
-            "material.part: one body has one material",
-        ),
+        (&["--surface", "union"], "material.part: one body has one material"),
     ] {
         let ran = render(&workshop, "in", "refused", options).expect(2);
         assert!(ran.errors().contains(message), "{}", ran.errors());
     }
     fs::create_dir_all(workshop.join("plain")).expect("a directory");
-    fs::write(
-        workshop.join("plain/f_1.csv"),
-        "x,y,z,kind\n1,2,3,4\n2,3,4,5\n",
-    )
-    .expect("a file");
+    fs::write(workshop.join("plain/f_1.csv"), "x,y,z,kind\n1,2,3,4\n2,3,4,5\n").expect("a file");
     let ran = render(&workshop, "plain", "none", &[]).expect(2);
     let message = "no attribute says which part a particle is of: it would be called one of `part`, `type`, `phase`";
     assert!(ran.errors().contains(message), "{}", ran.errors());
     // Fractions are no parts, which only a frame shows
-    fs::write(
-        workshop.join("plain/f_1.csv"),
-        "x,y,z,type\n1,2,3,4.5\n2,3,4,5\n",
-    )
-    .expect("a file");
+    fs::write(workshop.join("plain/f_1.csv"), "x,y,z,type\n1,2,3,4.5\n2,3,4,5\n").expect("a file");
     let ran = render(&workshop, "plain", "fractions", &[]).expect(1);
     let message = "no attribute with the parts of particles for material.part";
     assert!(ran.errors().contains(message), "{}", ran.errors());
@@ -177,9 +162,5 @@ fn a_changed_part_stops_a_job() {
     render(&workshop, "in", "out", &["--frames", "1"]).expect(0);
     job(&workshop, &PARTS.replace("0.2", "0.3"));
     let ran = render(&workshop, "in", "out", &[]).expect(2);
-    assert!(
-        ran.errors().contains("material.part.0.roughness"),
-        "{}",
-        ran.errors()
-    );
+    assert!(ran.errors().contains("material.part.0.roughness"), "{}", ran.errors());
 }

@@ -72,12 +72,7 @@ impl Picture {
             };
             (channel.name.to_string(), plane)
         });
-        Self {
-            width: size.width(),
-            height: size.height(),
-            planes: planes.collect(),
-            facts,
-        }
+        Self { width: size.width(), height: size.height(), planes: planes.collect(), facts }
     }
 
     /// The channel `name`, which must hold floating-point numbers.

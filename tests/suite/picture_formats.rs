@@ -84,12 +84,8 @@ fn still_writes_jpeg_and_tiff() {
         // An image is replaced
         still(name, &["--dpi", "300"]).expect(0);
     }
-    let png = image::open(workshop.join("a.png"))
-        .expect("PNG")
-        .into_rgb8();
-    let jpeg = image::open(workshop.join("a.jpg"))
-        .expect("JPEG")
-        .into_rgb8();
+    let png = image::open(workshop.join("a.png")).expect("PNG").into_rgb8();
+    let jpeg = image::open(workshop.join("a.jpg")).expect("JPEG").into_rgb8();
     assert_eq!(jpeg.dimensions(), png.dimensions());
     let pairs = jpeg.as_raw().iter().zip(png.as_raw());
     let error: u64 = pairs.map(|(a, b)| u64::from(a.abs_diff(*b))).sum();

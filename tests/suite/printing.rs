@@ -66,12 +66,7 @@ fn external_names_are_printed_escaped() {
     assert_eq!(table["input"]["path"].as_str(), Some(HOSTILE));
     let status = workshop.run(&["status", &job, "--json"]).expect(1).text();
     let status: serde_json::Value = serde_json::from_str(&status).expect("JSON");
-    assert!(
-        status["directory"]
-            .as_str()
-            .expect("a path")
-            .contains(HOSTILE)
-    );
+    assert!(status["directory"].as_str().expect("a path").contains(HOSTILE));
 }
 
 #[test]

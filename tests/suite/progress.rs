@@ -24,10 +24,7 @@ fn events(ran: &Ran) -> Vec<Value> {
     let parse = |line: &str| serde_json::from_str(line).expect("nothing but JSON");
     let events: Vec<Value> = ran.text().lines().map(parse).collect();
     for event in &events {
-        let errors: Vec<String> = validator
-            .iter_errors(event)
-            .map(|e| e.to_string())
-            .collect();
+        let errors: Vec<String> = validator.iter_errors(event).map(|e| e.to_string()).collect();
         assert!(errors.is_empty(), "{event}: {errors:?}");
         for field in event.as_object().expect("an object").keys() {
             let is_explained = MANUAL
@@ -37,10 +34,7 @@ fn events(ran: &Ran) -> Vec<Value> {
         }
     }
     let errors = ran.errors();
-    assert!(
-        !errors.lines().any(|line| line.starts_with('{')),
-        "{errors}"
-    );
+    assert!(!errors.lines().any(|line| line.starts_with('{')), "{errors}");
     let last = events.last().expect("an event");
     assert_eq!(last["event"], "end");
     assert_eq!(last["exit_code"].as_i64(), ran.code().map(i64::from));
@@ -67,19 +61,11 @@ fn a_render_from_start_to_end() {
         let ran = workshop.render(&[&["--progress", "json"], options].concat());
         let ran = ran.expect(1).prints("error: frame 2: ");
         let events = events(&ran);
-        assert_eq!(
-            kinds(&events),
-            ["start", "frame_done", "frame_failed", "frame_done", "end"]
-        );
+        assert_eq!(kinds(&events), ["start", "frame_done", "frame_failed", "frame_done", "end"]);
         assert_eq!(events[0]["command"], "render");
         assert_eq!(events[0]["total"], 3);
         assert_eq!(events[0]["output"], "out/f.####.exr");
-        assert!(
-            events[2]["reason"]
-                .as_str()
-                .expect("why")
-                .contains("f_2.bgeo")
-        );
+        assert!(events[2]["reason"].as_str().expect("why").contains("f_2.bgeo"));
         assert_eq!(events[4]["done"], 2);
         assert_eq!(events[4]["failed"], serde_json::json!([2]));
         assert!(ran.errors().contains("2 of 3 frames done"));
@@ -96,12 +82,7 @@ fn notes_and_errors() {
     assert_eq!(kinds(&found).iter().filter(|k| **k == "start").count(), 1);
     let notes = found.iter().filter(|e| e["event"] == "note");
     let notes: Vec<&str> = notes.filter_map(|e| e["text"].as_str()).collect();
-    assert!(
-        notes
-            .iter()
-            .any(|note| note.starts_with("--threads 1000: ")),
-        "{notes:?}"
-    );
+    assert!(notes.iter().any(|note| note.starts_with("--threads 1000: ")), "{notes:?}");
 
     let ran = workshop.render(&["--progress", "json", "--force", "--color-by", "nosuch"]);
     let events = events(&ran.expect(2));
@@ -114,10 +95,7 @@ fn notes_and_errors() {
 fn manifest_can_enable_events() {
     let workshop = one_damaged();
     let ran = workshop.render(&["--set", "job.progress=json", "--frames", "1,3"]);
-    assert_eq!(
-        kinds(&events(&ran.expect(0))),
-        ["start", "frame_done", "frame_done", "end"]
-    );
+    assert_eq!(kinds(&events(&ran.expect(0))), ["start", "frame_done", "frame_done", "end"]);
 }
 
 #[test]
@@ -143,10 +121,7 @@ fn a_conversion_and_an_experiment() {
 
     let tiny = "scale --particles 100 --structures lbvh,kdtree --motions both --images 1 --width 16 --height 9";
     let arguments: Vec<&str> = tiny.split(' ').chain(["--progress", "json"]).collect();
-    let ran = workshop
-        .run(&arguments)
-        .expect(0)
-        .prints("Images per second");
+    let ran = workshop.run(&arguments).expect(0).prints("Images per second");
     let found = events(&ran);
     assert_eq!(kinds(&found), ["start", "cell_done", "cell_done", "end"]);
     assert_eq!(found[3]["done"], 2);

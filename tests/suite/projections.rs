@@ -57,22 +57,13 @@ fn same_bytes_from_all_structures_and_threads() {
 #[test]
 fn native_frames_in_place_give_the_same_pictures() {
     let shop = shop();
-    shop.run(&["convert", "in", "-o", "native", "--encoding", "f32"])
-        .expect(0);
+    shop.run(&["convert", "in", "-o", "native", "--encoding", "f32"]).expect(0);
     assert!(!natives(&shop.join("native")).is_empty());
     for (name, options) in KINDS {
         render(&shop, "native", name, options);
         let decoded = format!("{name}-decoded");
-        render(
-            &shop,
-            "native",
-            &decoded,
-            &[options, &["--accelerator", "bvh"]].concat(),
-        );
-        assert!(
-            images(&shop.join(name)) == images(&shop.join(&decoded)),
-            "{name}"
-        );
+        render(&shop, "native", &decoded, &[options, &["--accelerator", "bvh"]].concat());
+        assert!(images(&shop.join(name)) == images(&shop.join(&decoded)), "{name}");
     }
 }
 
@@ -80,30 +71,16 @@ fn native_frames_in_place_give_the_same_pictures() {
 fn stereo_pairs_have_two_images_and_two_overlays() {
     let shop = shop();
     let text = r#"overlay=[{ type = "text", text = "A", corner = "top-left", size = 0.2 }]"#;
-    render(
-        &shop,
-        "in",
-        "pair",
-        &["--set", "camera.stereo=true", "--set", text],
-    );
+    render(&shop, "in", "pair", &["--set", "camera.stereo=true", "--set", text]);
     let image = Picture::open(&shop.join("pair/f.0001.exr"));
     assert_eq!((image.width, image.height), (128, 36));
-    let preview = image::open(shop.join("pair/f.0001.png"))
-        .expect("a preview")
-        .into_rgb8();
+    let preview = image::open(shop.join("pair/f.0001.png")).expect("a preview").into_rgb8();
     assert_eq!((preview.width(), preview.height()), (128, 36));
     let dark = |from: u32| {
         let columns = (from..from + 12).flat_map(|x| (0..12).map(move |y| (x, y)));
-        columns
-            .filter(|(x, y)| preview.get_pixel(*x, *y)[1] < 60)
-            .count()
+        columns.filter(|(x, y)| preview.get_pixel(*x, *y)[1] < 60).count()
     };
-    assert!(
-        dark(0) > 4 && dark(0).abs_diff(dark(64)) < 3,
-        "{} {}",
-        dark(0),
-        dark(64)
-    );
+    assert!(dark(0) > 4 && dark(0).abs_diff(dark(64)) < 3, "{} {}", dark(0), dark(64));
     // Near particles are farther to the right in the image of the left eye, far ones farther to the left
     let Some(Plane::Uint(ids)) = image.planes.get("id.I") else {
         panic!("ids are integers");
@@ -121,10 +98,7 @@ fn panoramas_say_that_they_are_some() {
     render(&shop, "in", "around", KINDS[1].1);
     let meta = MetaData::read_from_file(shop.join("around/f.0001.exr"), false).expect("an EXR");
     let attributes = &meta.headers[0].own_attributes;
-    assert_eq!(
-        attributes.environment_map,
-        Some(EnvironmentMap::LatitudeLongitude)
-    );
+    assert_eq!(attributes.environment_map, Some(EnvironmentMap::LatitudeLongitude));
 }
 
 #[test]
@@ -136,14 +110,9 @@ fn print_sizes_are_in_the_files() {
     let image = Picture::open(&shop.join("paper/f.0001.exr"));
     assert_eq!((image.width, image.height), (79, 50));
     let meta = MetaData::read_from_file(shop.join("paper/f.0001.exr"), false).expect("an EXR");
-    assert_eq!(
-        meta.headers[0].own_attributes.horizontal_density,
-        Some(100.0)
-    );
+    assert_eq!(meta.headers[0].own_attributes.horizontal_density, Some(100.0));
     let file = fs::File::open(shop.join("paper/f.0001.png")).expect("a preview");
-    let reader = png::Decoder::new(std::io::BufReader::new(file))
-        .read_info()
-        .expect("a PNG");
+    let reader = png::Decoder::new(std::io::BufReader::new(file)).read_info().expect("a PNG");
     let density = reader.info().pixel_dims.expect("a density");
     assert_eq!((density.xppu, density.yppu), (3937, 3937));
     assert_eq!(density.unit, png::Unit::Meter);

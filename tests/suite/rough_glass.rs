@@ -48,10 +48,8 @@ fn mean(workshop: &Workshop, out: &str, options: &[&str]) -> f32 {
     render(workshop, out, &[options, &["--samples", "256"]].concat()).expect(0);
     let picture = Picture::open(&workshop.join(out).join("f.0001.exr"));
     let covered = picture.floats("R").iter().zip(picture.floats("A"));
-    let covered: Vec<f32> = covered
-        .filter(|(_, alpha)| **alpha > 0.999)
-        .map(|(red, _)| *red)
-        .collect();
+    let covered: Vec<f32> =
+        covered.filter(|(_, alpha)| **alpha > 0.999).map(|(red, _)| *red).collect();
     assert!(covered.len() > 300, "{}", covered.len());
     covered.iter().sum::<f32>() / covered.len() as f32
 }
@@ -68,11 +66,7 @@ fn a_rough_ball_in_white_surroundings_is_nearly_white() {
         ("1", 0.95, 1.05),
     ] {
         let key = format!("material.roughness={roughness}");
-        for (kind, surface) in [
-            ("glass", "spheres"),
-            ("glass", "union"),
-            ("water", "spheres"),
-        ] {
+        for (kind, surface) in [("glass", "spheres"), ("glass", "union"), ("water", "spheres")] {
             let out = format!("{kind}-{surface}-{roughness}");
             let material = format!("material.type={kind}");
             let white = "environment.type=constant";
@@ -91,27 +85,17 @@ fn glass_is_smooth_by_default_and_rough_images_do_not_depend_on_threads() {
     let made = |out: &str, options: &[&str]| {
         let glass = ["--set", "material.type=glass", "--samples", "4"];
         render(&workshop, out, &[&glass[..], options].concat()).expect(0);
-        images(&workshop.join(out))
-            .into_values()
-            .collect::<Vec<_>>()
+        images(&workshop.join(out)).into_values().collect::<Vec<_>>()
     };
     let smooth = made("smooth", &[]);
     assert!(smooth == made("default", &["--set", "material.roughness=0.55"]));
     assert!(smooth == made("zero", &["--set", "material.roughness=0"]));
-    let rough = [
-        "--set",
-        "material.roughness=0.3",
-        "--set",
-        "environment.type=studio",
-    ];
+    let rough = ["--set", "material.roughness=0.3", "--set", "environment.type=studio"];
     let one = made("one", &[&rough[..], &["--threads", "1"]].concat());
     let three = made("three", &[&rough[..], &["--threads", "3"]].concat());
     assert!(one == three && one != smooth);
     for structure in ["kdtree", "bvh", "sbvh"] {
-        let other = made(
-            structure,
-            &[&rough[..], &["--accelerator", structure]].concat(),
-        );
+        let other = made(structure, &[&rough[..], &["--accelerator", structure]].concat());
         assert!(other == one, "{structure}");
     }
 }

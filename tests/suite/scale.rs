@@ -10,17 +10,8 @@ use spherule_formats::write;
 use crate::harness::{Ran, Workshop, dam_break, files, no_leftovers};
 
 /// Cells that take a few milliseconds, one a structure.
-const TINY: [&str; 9] = [
-    "scale",
-    "--images",
-    "2",
-    "--width",
-    "64",
-    "--height",
-    "36",
-    "--motions",
-    "both",
-];
+const TINY: [&str; 9] =
+    ["scale", "--images", "2", "--width", "64", "--height", "36", "--motions", "both"];
 
 fn run(workshop: &Workshop, options: &[&str]) -> Ran {
     workshop.run(&[&TINY, options].concat())
@@ -46,17 +37,8 @@ fn refused(workshop: &Workshop, options: &[&str], expected: &str) {
 #[test]
 fn tables_and_files_of_a_tiny_run() {
     let workshop = Workshop::new();
-    let arguments = [
-        "scale",
-        "--particles",
-        "0,1,1e3",
-        "--images",
-        "2",
-        "--width",
-        "64",
-        "--height",
-        "36",
-    ];
+    let arguments =
+        ["scale", "--particles", "0,1,1e3", "--images", "2", "--width", "64", "--height", "36"];
     let ran = workshop.run(&arguments).expect(0);
     let text = ran.text();
     for heading in [
@@ -112,11 +94,7 @@ fn native_frames_are_traced_in_place() {
     let structures = ["--structures", "lbvh,kdtree"];
     let ran = run(&workshop, &[counts, representations, structures].concat()).expect(0);
     let ran = ran.prints("native frames (f32, q16, q10) are traced in place");
-    for expected in [
-        "kdtree, q10 file",
-        "Memory by part",
-        "Native frames: converted",
-    ] {
+    for expected in ["kdtree, q10 file", "Memory by part", "Native frames: converted"] {
         assert!(ran.text().contains(expected), "{}", ran.text());
     }
     let report = report(&workshop);
@@ -184,12 +162,7 @@ fn representations_need_a_structure() {
     let workshop = Workshop::new();
     refused(
         &workshop,
-        &[
-            "--structures",
-            "bvh,sbvh",
-            "--representations",
-            "memory,q10",
-        ],
+        &["--structures", "bvh,sbvh", "--representations", "memory,q10"],
         "--representations q10: native frames can only be traced with kdtree; add kdtree to --structures",
     );
 }
@@ -223,19 +196,8 @@ fn unwritable_frame_is_reported() {
 fn user_particles() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 1..=2);
-    let ran = run(
-        &workshop,
-        &[
-            "--input",
-            "in",
-            "--particles",
-            "1,500,1e6,1e7",
-            "--frame",
-            "2",
-        ],
-    );
-    ran.expect(0)
-        .prints("particles, which replace 1000000, 10000000");
+    let ran = run(&workshop, &["--input", "in", "--particles", "1,500,1e6,1e7", "--frame", "2"]);
+    ran.expect(0).prints("particles, which replace 1000000, 10000000");
     let report = report(&workshop);
     assert_eq!(report["settings"]["input"]["frame"], 2);
     let all = &report["settings"]["input"]["particles"];
@@ -243,10 +205,7 @@ fn user_particles() {
     assert_eq!(counts[..], [1.into(), 500.into(), all.clone()]);
     for cell in report["cells"].as_array().expect("cells") {
         assert_eq!(cell["status"], "done", "{cell}");
-        assert!(
-            cell["rays"]["shadow"].as_u64() > Some(0),
-            "no particle is visible: {cell}"
-        );
+        assert!(cell["rays"]["shadow"].as_u64() > Some(0), "no particle is visible: {cell}");
     }
     run(&workshop, &["--input", "in", "--particles", "1"])
         .expect(0)
@@ -264,10 +223,7 @@ fn one_particle_and_coincident_particles() {
         assert!(!cells.is_empty());
         for cell in cells {
             assert_eq!(cell["particles"], count);
-            assert!(
-                cell["rays"]["shadow"].as_u64() > Some(0),
-                "no particle is visible: {cell}"
-            );
+            assert!(cell["rays"]["shadow"].as_u64() > Some(0), "no particle is visible: {cell}");
         }
     }
 }
@@ -276,11 +232,7 @@ fn one_particle_and_coincident_particles() {
 fn options_have_ranges() {
     let workshop = Workshop::new();
     for (option, value, expected) in [
-        (
-            "--particles",
-            "-5",
-            "expected a particle count, such as 100000 or 1e5, found \"-5\"",
-        ),
+        ("--particles", "-5", "expected a particle count, such as 100000 or 1e5, found \"-5\""),
         (
             "--particles",
             "1e3,many",
@@ -289,28 +241,12 @@ fn options_have_ranges() {
         ("--particles", "", "expected a particle count"),
         ("--particles", "1e10", "expected fewer than 2^32 particles"),
         ("--structures", "lbhv", "did you mean lbvh?"),
-        (
-            "--motions",
-            "rotate",
-            "expected one of rotation, translation, both",
-        ),
-        (
-            "--representations",
-            "f16",
-            "expected one of memory, f32, q16, q10",
-        ),
+        ("--motions", "rotate", "expected one of rotation, translation, both"),
+        ("--representations", "f16", "expected one of memory, f32, q16, q10"),
         ("--images", "0", "0 is not in 1.."),
         ("--images", "-1", "-1 is not in 1.."),
-        (
-            "--width",
-            "0",
-            "expected a number of pixels from 1 to 65536",
-        ),
-        (
-            "--height",
-            "-1",
-            "expected a number of pixels from 1 to 65536",
-        ),
+        ("--width", "0", "expected a number of pixels from 1 to 65536"),
+        ("--height", "-1", "expected a number of pixels from 1 to 65536"),
         ("--samples", "0", "0 is not in 1..=4096"),
         ("--max-depth", "0", "0 is not in 1..=64"),
         ("--depth", "65", "65 is not in 1..=64"),
@@ -349,11 +285,7 @@ fn inputs_without_particles() {
     npy(&workshop.join("nan.npy"), &[[f32::NAN; 3]; 5]);
     refused(&workshop, &["--input", "nan.npy"], "has no particles");
     npy(&workshop.join("two.npy"), &[[0.0; 3], [1.0; 3]]);
-    refused(
-        &workshop,
-        &["--input", "two.npy", "--frame", "7"],
-        "--frame 7: ",
-    );
+    refused(&workshop, &["--input", "two.npy", "--frame", "7"], "--frame 7: ");
 }
 
 #[test]
@@ -365,11 +297,7 @@ fn unwritable_output_directories() {
         refused(&workshop, &["-o", place], expected);
     }
     if cfg!(target_os = "linux") {
-        refused(
-            &workshop,
-            &["-o", "/proc/nope"],
-            "/proc/nope: cannot be written",
-        );
+        refused(&workshop, &["-o", "/proc/nope"], "/proc/nope: cannot be written");
     }
     fs::create_dir(workshop.join("theirs")).expect("a directory");
     for name in ["scale.json", "scale.csv", "scale.html"] {
@@ -402,11 +330,7 @@ fn cell_beyond_memory_is_listed_as_failed() {
     let ran = Ran(output)
         .expect(1)
         .prints("error: 4000000000 particles, lbvh in memory, both: out of memory: ");
-    assert!(
-        ran.text().contains("failed: 4000000000 particles"),
-        "{}",
-        ran.text()
-    );
+    assert!(ran.text().contains("failed: 4000000000 particles"), "{}", ran.text());
     let report = report(&workshop);
     assert_eq!(report["cells"][0]["status"], "done");
     assert_eq!(report["cells"][1]["status"], "failed");
@@ -430,10 +354,7 @@ fn interrupted_runs_keep_finished_cells() {
     running.signal("TERM");
     let (errors, status) = running.end();
     assert_eq!(status.code(), Some(75), "{errors}");
-    assert!(
-        errors.contains("stopping; finished cells are kept"),
-        "{errors}"
-    );
+    assert!(errors.contains("stopping; finished cells are kept"), "{errors}");
     let report = report(&workshop);
     assert_eq!(report["planned"], 30);
     let cells = report["cells"].as_array().map_or(0, Vec::len);

@@ -32,39 +32,18 @@ fn job_settings_are_kept_and_may_change() {
     dam_break(&workshop.join("in"), 1..=2);
     let job = workshop.join("out/job.toml");
     let kept = || fs::read_to_string(&job).expect("a manifest");
-    let ask = [
-        "--frames",
-        "1",
-        "--threads",
-        "2",
-        "--progress",
-        "plain",
-        "--settle",
-        "3",
-    ];
+    let ask = ["--frames", "1", "--threads", "2", "--progress", "plain", "--settle", "3"];
     workshop.render(&ask).expect(0);
     let first = kept();
     for line in ["threads = 2 ", "progress = \"plain\" ", "settle = 3.0 "] {
         assert!(first.contains(&format!("\n{line}")), "{line}\n{first}");
     }
     // Other flags over the manifest that was written are no changed setting, and stay out of it.
-    let again = [
-        "render",
-        "out/job.toml",
-        "--frames",
-        "2",
-        "--threads",
-        "1",
-        "--progress",
-        "json",
-    ];
+    let again = ["render", "out/job.toml", "--frames", "2", "--threads", "1", "--progress", "json"];
     let ran = workshop.run(&again).expect(0);
     assert!(ran.text().contains("{\"done\":1,"), "{}", ran.text());
     assert_eq!(kept(), first);
-    workshop
-        .render(&["--progress", "sideways"])
-        .expect(2)
-        .prints("sideways");
+    workshop.render(&["--progress", "sideways"]).expect(2).prints("sideways");
     workshop
         .render(&["--threads", "-3"])
         .expect(2)

@@ -54,9 +54,7 @@ fn selected_particles_are_drawn_with_their_ids() {
     assert!(seen.iter().all(|id| id % 4 == 1 && *id < 1128), "{seen:?}");
     let native = ["render", "native", "-o", "of_native/f.####.exr"];
     let small = crate::harness::SMALL;
-    workshop
-        .run(&[&native[..], &small, &OPTIONS, &by].concat())
-        .expect(0);
+    workshop.run(&[&native[..], &small, &OPTIONS, &by].concat()).expect(0);
     assert_eq!(counts(&workshop, "of_native"), [32, 512]);
     let seen = ids(&workshop, "of_native");
     assert!(seen.len() > 10 && seen.iter().all(|id| id % 4 == 1 && *id < 1128));
@@ -66,27 +64,15 @@ fn selected_particles_are_drawn_with_their_ids() {
 fn clips_and_slices_leave_out_particles() {
     let workshop = particles(NAMES);
     for (name, text, count) in [
-        (
-            "slab",
-            "[select]\nslab = { axis = \"y\", center = 3, thickness = 2.5 }",
-            192,
-        ),
+        ("slab", "[select]\nslab = { axis = \"y\", center = 3, thickness = 2.5 }", 192),
         ("every", "[select]\nevery = 8\nids = \"1000-1255\"", 32),
-        (
-            "plane",
-            "[[clip]]\ntype = \"plane\"\nnormal = \"-x\"\noffset = -3",
-            320,
-        ),
+        ("plane", "[[clip]]\ntype = \"plane\"\nnormal = \"-x\"\noffset = -3", 320),
         (
             "box",
             "[[clip]]\ntype = \"box\"\nmin = [0, 0, 0]\nmax = [3, 3, 3]\nkeep = \"outside\"",
             448,
         ),
-        (
-            "height",
-            "input.up = \"y\"\n[select]\nwhere = \"height >= 6 && z < 2\"",
-            32,
-        ),
+        ("height", "input.up = \"y\"\n[select]\nwhere = \"height >= 6 && z < 2\"", 32),
         (
             "both",
             "[[clip]]\ntype = \"plane\"\nnormal = [1, 1, 0]\npoint = [1, 0, 0]\n\
@@ -97,9 +83,7 @@ fn clips_and_slices_leave_out_particles() {
         let text = format!("input.path = \"in\"\noutput.path = \"{name}/f.####.exr\"\n{text}\n");
         fs::write(workshop.join("job.toml"), text).expect("a manifest");
         let small = crate::harness::SMALL;
-        workshop
-            .run(&[&["render", "job.toml"][..], &small, &OPTIONS].concat())
-            .expect(0);
+        workshop.run(&[&["render", "job.toml"][..], &small, &OPTIONS].concat()).expect(0);
         assert_eq!(counts(&workshop, name), [count, 512], "{name}");
     }
 }
@@ -118,9 +102,7 @@ fn cuts_draw_the_same_picture_of_native_frames() {
             "input.path = \"{input}\"\noutput.path = \"{input}_out/f.####.exr\"\n{cut}\n{camera}\n"
         );
         fs::write(workshop.join("job.toml"), text).expect("a manifest");
-        workshop
-            .run(&[&["render", "job.toml"][..], &options].concat())
-            .expect(0);
+        workshop.run(&[&["render", "job.toml"][..], &options].concat()).expect(0);
         assert_eq!(counts(&workshop, &format!("{input}_out")), [512, 512]);
     }
     let report = fs::read_to_string(workshop.join("native_out/report.json")).expect("a report");
@@ -130,10 +112,7 @@ fn cuts_draw_the_same_picture_of_native_frames() {
     // Positions in native frames are rounded
     let pairs = [("in_out", "native_out")].map(|(a, b)| (picture(a), picture(b)));
     for (of_file, of_native) in pairs {
-        let ids = of_file
-            .integers("id.I")
-            .iter()
-            .zip(of_native.integers("id.I"));
+        let ids = of_file.integers("id.I").iter().zip(of_native.integers("id.I"));
         let different = ids.filter(|(a, b)| a != b).count();
         assert!(different < 5, "{different}");
     }
@@ -154,9 +133,7 @@ fn cuts_that_are_not_possible_are_explained() {
     let failed = workshop.run(&["render", "job.toml"]).expect(2);
     failed.prints("clip.keep: \"outside\" has no cut faces");
     with("type = \"plane\"\nnormal = \"x\"\nmode = \"cut\"");
-    let failed = workshop
-        .run(&["render", "job.toml", "--surface", "smooth"])
-        .expect(2);
+    let failed = workshop.run(&["render", "job.toml", "--surface", "smooth"]).expect(2);
     failed.prints("clip.mode: \"cut\" is for spheres");
     with("type = \"plane\"\nnormal = \"x\"\nmode = \"open\"");
     let failed = workshop.run(&["render", "job.toml"]).expect(2);
@@ -171,25 +148,16 @@ fn impossible_selections_are_explained() {
             "typ == 1",
             "select.where: character 1: no value `typ` in the sampled frames (did you mean `type`?)",
         ),
-        (
-            "x > 1 && velocity.x > 2",
-            "character 10: no value `velocity.x`",
-        ),
+        ("x > 1 && velocity.x > 2", "character 10: no value `velocity.x`"),
         (
             "depth > 1",
             "no value `depth` in the sampled frames (it depends on the camera, which depends on the particles; \
              conditions have x, y, z and height); available: `id`, `type`, `x`, `y`, `z`, `height`, `index`",
         ),
         ("x > (1", "--where: character 7: expected `)`"),
-        (
-            "(x > 1) > 2",
-            "character 1: `>` needs a number here, and this is a condition",
-        ),
+        ("(x > 1) > 2", "character 1: `>` needs a number here, and this is a condition"),
     ] {
-        workshop
-            .render(&["--where", condition])
-            .expect(2)
-            .prints(message);
+        workshop.render(&["--where", condition]).expect(2).prints(message);
     }
     // No particle at all
     workshop

@@ -15,17 +15,13 @@ fn frames_of_a_sequence_are_those_rendered_alone() {
         &["--set", "output.transparent=true"],
     ]
     .concat();
-    workshop
-        .run(&[&["render", "in", "-o", "out/f.####.exr"], &options[..]].concat())
-        .expect(0);
+    workshop.run(&[&["render", "in", "-o", "out/f.####.exr"], &options[..]].concat()).expect(0);
     let together = images(&workshop.join("out"));
     assert_eq!(together.len(), 10);
     for frame in ["5", "8", "9"] {
         let alone = ["render", "out/job.toml", "--frames", frame];
         let output = format!("alone-{frame}/f.####.exr");
-        workshop
-            .run(&[&alone[..], &["-o", &output]].concat())
-            .expect(0);
+        workshop.run(&[&alone[..], &["-o", &output]].concat()).expect(0);
         for name in [format!("f.000{frame}.exr"), format!("f.000{frame}.png")] {
             let image = fs::read(workshop.join(format!("alone-{frame}")).join(&name));
             assert!(image.expect("an image") == together[&name], "{name}");

@@ -15,10 +15,7 @@ fn status(workshop: &Workshop, code: i32) -> Value {
 fn status_from_first_to_last_frame() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 1..=6);
-    workshop
-        .run(&["status", "out"])
-        .expect(2)
-        .prints("out: no job here");
+    workshop.run(&["status", "out"]).expect(2).prints("out: no job here");
     let path = workshop.join("in/f_2.bgeo");
     let bytes = fs::read(&path).expect("a frame");
     fs::write(&path, &bytes[..bytes.len() / 2]).expect("a file");
@@ -28,12 +25,7 @@ fn status_from_first_to_last_frame() {
     assert_eq!(json["done"], serde_json::json!([1, 3]));
     assert_eq!(json["pending"], serde_json::json!([4, 5, 6]));
     assert_eq!(json["failed"][0]["frame"], 2);
-    assert!(
-        json["failed"][0]["reason"]
-            .as_str()
-            .expect("a reason")
-            .contains("f_2.bgeo")
-    );
+    assert!(json["failed"][0]["reason"].as_str().expect("a reason").contains("f_2.bgeo"));
     assert_eq!(json["workers"], serde_json::json!([]));
     assert!(json["seconds_left"].is_null());
 
@@ -64,28 +56,15 @@ fn status_lists_live_and_dead_workers() {
     let worker = &json["workers"][0];
     assert_eq!(worker["pid"], running.id());
     assert_eq!(worker["has_ended"], false);
-    assert!(
-        json["running"]
-            .as_array()
-            .is_some_and(|frames| !frames.is_empty()),
-        "{json}"
-    );
-    assert!(
-        json["frames_per_second"]
-            .as_f64()
-            .is_some_and(|rate| rate > 0.0),
-        "{json}"
-    );
+    assert!(json["running"].as_array().is_some_and(|frames| !frames.is_empty()), "{json}");
+    assert!(json["frames_per_second"].as_f64().is_some_and(|rate| rate > 0.0), "{json}");
     running.kill();
     running.end();
     let json = status(&workshop, 75);
     assert_eq!(json["workers"][0]["has_ended"], true, "{json}");
     assert_eq!(json["running"], serde_json::json!([]));
     let text = workshop.run(&["status", "out"]).expect(75).text();
-    assert!(
-        text.contains("has died; the next worker takes over"),
-        "{text}"
-    );
+    assert!(text.contains("has died; the next worker takes over"), "{text}");
 }
 
 #[test]
@@ -98,8 +77,5 @@ fn watching_ends_with_the_job() {
     let text = workshop.run(&["status", "out", "--watch", "--json"]).text();
     running.end();
     let last: Value = serde_json::from_str(text.lines().last().expect("a line")).expect("JSON");
-    assert!(
-        last["pending"].as_array().is_some_and(Vec::is_empty),
-        "{text}"
-    );
+    assert!(last["pending"].as_array().is_some_and(Vec::is_empty), "{text}");
 }

@@ -22,10 +22,7 @@ fn still_writes_only_the_image() {
     // The frame in the middle.
     let line = made.text();
     assert!(line.starts_with("looks/a.png: frame 3, "), "{line}");
-    assert!(
-        line.ends_with(" s\n") && line.lines().count() == 1,
-        "{line}"
-    );
+    assert!(line.ends_with(" s\n") && line.lines().count() == 1, "{line}");
     let first = still(&workshop, &["--frame", "1", "-o", "looks/b.png"]).expect(0);
     assert!(first.text().starts_with("looks/b.png: frame 1, "));
     still(&workshop, &["-o", "looks/c.exr"]).expect(0);
@@ -39,48 +36,22 @@ fn still_writes_only_the_image() {
 #[test]
 fn picture_equals_that_of_a_job() {
     let workshop = workshop();
-    let look = [
-        "--color-by",
-        "velocity",
-        "--map",
-        "turbo",
-        "--set",
-        "camera.fov=50",
-        "--fit",
-        "all",
-    ];
+    let look =
+        ["--color-by", "velocity", "--map", "turbo", "--set", "camera.fov=50", "--fit", "all"];
     workshop.render(&look).expect(0);
     for (name, image) in [("a.png", "f.0004.png"), ("a.exr", "f.0004.exr")] {
         let options = [&look[..], &["--frame", "4", "-o", name]].concat();
         still(&workshop, &options).expect(0);
         let job = fs::read(workshop.join("out").join(image)).expect("an image");
-        assert!(
-            fs::read(workshop.join(name)).expect("a picture") == job,
-            "{name}"
-        );
+        assert!(fs::read(workshop.join(name)).expect("a picture") == job, "{name}");
     }
     // By the job's own manifest, too; its frames are those to choose the middle from.
-    let made = workshop
-        .run(&["still", "out/job.toml", "-o", "b.exr"])
-        .expect(0);
+    let made = workshop.run(&["still", "out/job.toml", "-o", "b.exr"]).expect(0);
     assert!(made.text().starts_with("b.exr: frame 3, "));
     let job = fs::read(workshop.join("out/f.0003.exr")).expect("an image");
     assert!(fs::read(workshop.join("b.exr")).expect("a picture") == job);
-    let some = [
-        "still",
-        "out/job.toml",
-        "--set",
-        "input.frames=1-2",
-        "-o",
-        "b.exr",
-    ];
-    assert!(
-        workshop
-            .run(&some)
-            .expect(0)
-            .text()
-            .starts_with("b.exr: frame 2, ")
-    );
+    let some = ["still", "out/job.toml", "--set", "input.frames=1-2", "-o", "b.exr"];
+    assert!(workshop.run(&some).expect(0).text().starts_with("b.exr: frame 2, "));
 }
 
 #[test]
@@ -95,32 +66,17 @@ fn only_images_are_replaced() {
     let refused = |options: &[&str], why: &str| {
         still(&workshop, options).expect(2).prints(why);
     };
-    refused(
-        &["-o", "notes.png"],
-        "notes.png: is not an image and would be overwritten;",
-    );
-    assert_eq!(
-        fs::read(workshop.join("notes.png")).expect("a file"),
-        b"not a picture"
-    );
+    refused(&["-o", "notes.png"], "notes.png: is not an image and would be overwritten;");
+    assert_eq!(fs::read(workshop.join("notes.png")).expect("a file"), b"not a picture");
     fs::create_dir(workshop.join("dir.exr")).expect("a directory");
     refused(&["-o", "dir.exr"], "dir.exr: is not a file;");
     refused(
         &["-o", "look.svg"],
         "--output look.svg: the name must end in .png, .exr, .jpg or .tif",
     );
-    refused(
-        &["-o", "look"],
-        "the name must end in .png, .exr, .jpg or .tif",
-    );
-    refused(
-        &["--frame", "9", "-o", "a.png"],
-        "--frame 9: is not among the frames: 1-5",
-    );
-    refused(
-        &["--follow", "-o", "a.png"],
-        "--follow: is for jobs, and `spherule still` has none",
-    );
+    refused(&["-o", "look"], "the name must end in .png, .exr, .jpg or .tif");
+    refused(&["--frame", "9", "-o", "a.png"], "--frame 9: is not among the frames: 1-5");
+    refused(&["--follow", "-o", "a.png"], "--follow: is for jobs, and `spherule still` has none");
     refused(&[], "--output");
 
     // The input under the name of an image.
@@ -128,8 +84,7 @@ fn only_images_are_replaced() {
     fs::write(workshop.join("in.exr"), &frame).expect("a file");
     std::os::unix::fs::symlink("../a.png", workshop.join("in/f_6.bgeo")).expect("a link");
     let ran = still(&workshop, &["--frame", "1", "-o", "a.png"]);
-    ran.expect(2)
-        .prints("a.png: is an input and would be overwritten;");
+    ran.expect(2).prints("a.png: is an input and would be overwritten;");
 }
 
 #[test]
@@ -174,9 +129,7 @@ fn a_frame_that_cannot_be_read_has_failed() {
     let file = workshop.join("in/f_5.bgeo");
     let good = fs::read(&file).expect("a frame");
     fs::write(&file, &good[..good.len() / 2]).expect("a file");
-    still(&workshop, &["--frame", "5", "-o", "a.png"])
-        .expect(1)
-        .prints("error: frame 5: ");
+    still(&workshop, &["--frame", "5", "-o", "a.png"]).expect(1).prints("error: frame 5: ");
     assert!(!workshop.join("a.png").exists());
     still(&workshop, &["--frame", "4", "-o", "a.png"]).expect(0);
 }
@@ -185,12 +138,7 @@ fn a_frame_that_cannot_be_read_has_failed() {
 fn help_has_examples_and_no_job_options() {
     let workshop = Workshop::new();
     let help = workshop.run(&["still", "--help"]).expect(0).text();
-    for shown in [
-        "Examples:",
-        "spherule still dump -o look.png",
-        "--frame <NUMBER>",
-        "look.exr",
-    ] {
+    for shown in ["Examples:", "spherule still dump -o look.png", "--frame <NUMBER>", "look.exr"] {
         assert!(help.contains(shown), "no {shown} in\n{help}");
     }
     for hidden in ["--frames", "--follow ", "--isolate", "--retries"] {
@@ -223,51 +171,27 @@ fn pictures_without_background_have_alpha() {
         "--fit",
         "all",
     ];
-    still(
-        &workshop,
-        &[&options[..], &["--frame", "3", "-o", "a.png"]].concat(),
-    )
-    .expect(0);
+    still(&workshop, &[&options[..], &["--frame", "3", "-o", "a.png"]].concat()).expect(0);
     let picture = image::open(workshop.join("a.png")).expect("a picture");
     assert_eq!(picture.color(), image::ColorType::Rgba8);
     let pixels: Vec<[u8; 4]> = picture.into_rgba8().pixels().map(|p| p.0).collect();
     assert_eq!(pixels[0], [0; 4]);
     // Particles are opaque, and have the colours that they have in front of a background
-    still(
-        &workshop,
-        &[&options[2..], &["--frame", "3", "-o", "b.png"]].concat(),
-    )
-    .expect(0);
-    let opaque = image::open(workshop.join("b.png"))
-        .expect("a picture")
-        .into_rgb8();
-    let particles = pixels
-        .iter()
-        .zip(opaque.pixels())
-        .filter(|(pixel, _)| pixel[3] == 255);
+    still(&workshop, &[&options[2..], &["--frame", "3", "-o", "b.png"]].concat()).expect(0);
+    let opaque = image::open(workshop.join("b.png")).expect("a picture").into_rgb8();
+    let particles = pixels.iter().zip(opaque.pixels()).filter(|(pixel, _)| pixel[3] == 255);
     let mut count = 0;
     for ([r, g, b, _], other) in particles {
         count += 1;
-        let difference = [r, g, b]
-            .into_iter()
-            .zip(other.0)
-            .map(|(a, b)| a.abs_diff(b))
-            .max();
+        let difference = [r, g, b].into_iter().zip(other.0).map(|(a, b)| a.abs_diff(b)).max();
         assert!(difference <= Some(1), "{difference:?}");
     }
     assert!(count > 50, "{count}");
-    assert!(
-        pixels
-            .iter()
-            .all(|[r, g, b, a]| *a > 0 || [r, g, b] == [&0; 3])
-    );
+    assert!(pixels.iter().all(|[r, g, b, a]| *a > 0 || [r, g, b] == [&0; 3]));
     // Previews of jobs are the same, and other commands read them
     workshop.render(&options).expect(0);
     let preview = fs::read(workshop.join("out/f.0003.png")).expect("a preview");
-    assert_eq!(
-        preview,
-        fs::read(workshop.join("a.png")).expect("a picture")
-    );
+    assert_eq!(preview, fs::read(workshop.join("a.png")).expect("a picture"));
     for command in [
         &["verify", "out"][..],
         &["sheet", "out", "-o", "sheet.png"],

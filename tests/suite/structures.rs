@@ -9,17 +9,9 @@ use spherule::accel::Structure;
 use crate::harness::{Workshop, npy, sample};
 
 /// Transparent, so that rays go on inside, with light and shadows of several kinds.
-const GLASS: &[&str] = &[
-    "--set",
-    "material.transmission=0.8",
-    "--set",
-    "render.max_depth=5",
-];
+const GLASS: &[&str] = &["--set", "material.transmission=0.8", "--set", "render.max_depth=5"];
 /// Everything that can be in an image.
-const ALL_CHANNELS: &[&str] = &[
-    "--set",
-    r#"output.channels=["RGBA","Z","N","P","id","albedo"]"#,
-];
+const ALL_CHANNELS: &[&str] = &["--set", r#"output.channels=["RGBA","Z","N","P","id","albedo"]"#];
 
 /// Renders `input` with every structure and compares the images.
 #[track_caller]
@@ -28,14 +20,7 @@ fn same_from_all(workshop: &Workshop, input: &str, options: &[&str]) {
         let images = Structure::ALL.map(|structure| {
             let out = format!("{structure}-{samples}/f.####.exr");
             let image = [
-                &[
-                    "render",
-                    input,
-                    "-o",
-                    &out,
-                    "--accelerator",
-                    structure.name(),
-                ][..],
+                &["render", input, "-o", &out, "--accelerator", structure.name()][..],
                 &["--width", "112", "--height", "63", "--samples", samples],
                 options,
             ]
@@ -67,19 +52,12 @@ fn same_from_all(workshop: &Workshop, input: &str, options: &[&str]) {
 #[track_caller]
 fn same_on_sample(file: &str, options: &[&str]) {
     let path = sample(file);
-    same_from_all(
-        &Workshop::new(),
-        path.to_str().expect("a path in UTF-8"),
-        options,
-    );
+    same_from_all(&Workshop::new(), path.to_str().expect("a path in UTF-8"), options);
 }
 
 #[test]
 fn dam_break() {
-    let path = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/examples/dam-break/ParticleData_Fluid_9.bgeo"
-    );
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/dam-break/ParticleData_Fluid_9.bgeo");
     same_from_all(&Workshop::new(), path, ALL_CHANNELS);
 }
 
@@ -115,12 +93,7 @@ fn random_box() {
 #[test]
 fn random_glass_far_from_the_origin() {
     let workshop = Workshop::new();
-    npy(
-        &workshop.join("box.npy"),
-        3_000,
-        2,
-        Vec3::new(1e4, -2e4, 500.0),
-    );
+    npy(&workshop.join("box.npy"), 3_000, 2, Vec3::new(1e4, -2e4, 500.0));
     let wide = [GLASS, &["--radius", "0.15"]].concat();
     same_from_all(&workshop, "box.npy", &wide);
 }
@@ -132,11 +105,7 @@ fn radii_of_their_own() {
     let mut text = "x,y,z,r\n".to_owned();
     for i in 0..2_000_u32 {
         let part = |salt: u32| f64::from((i * 7919 + salt).wrapping_mul(2_654_435_761) >> 8) / 2e7;
-        let radius = if i % 100 == 0 {
-            0.1
-        } else {
-            1e-4 + part(4) * 0.01
-        };
+        let radius = if i % 100 == 0 { 0.1 } else { 1e-4 + part(4) * 0.01 };
         text += &format!("{},{},{},{radius}\n", part(1), part(2), part(3));
     }
     fs::write(workshop.join("p.csv"), text).expect("a file");
@@ -159,8 +128,5 @@ fn water_as_a_union() {
 #[test]
 fn normals_of_neighbours() {
     let smooth = ["--set", r#"surface.normals="pca""#];
-    same_on_sample(
-        "emitter_sph/ParticleData_Fluid_10.bgeo",
-        &[&smooth[..], ALL_CHANNELS].concat(),
-    );
+    same_on_sample("emitter_sph/ParticleData_Fluid_10.bgeo", &[&smooth[..], ALL_CHANNELS].concat());
 }

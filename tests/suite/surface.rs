@@ -35,24 +35,17 @@ fn jobs_with_spray(surface: &str, caustics: &[&str]) {
         let pattern = format!("{out}/f.####.exr");
         let arguments = ["render", "in", "-o", &pattern];
         let surface = ["--surface", surface];
-        shop.run(&[&arguments[..], &SMALL, &WATER, &surface, caustics, options].concat())
-            .expect(0)
+        shop.run(&[&arguments[..], &SMALL, &WATER, &surface, caustics, options].concat()).expect(0)
     };
     render("one", &["--threads", "1"]);
     render("many", &["--threads", "3"]);
     let expected = images(&shop.join("one"));
-    assert!(
-        expected == images(&shop.join("many")),
-        "threads change the image"
-    );
+    assert!(expected == images(&shop.join("many")), "threads change the image");
 
     // What is lost is made again.
     fs::remove_file(shop.join("many/f.0007.exr")).expect("an image");
     render("many", &["--threads", "3"]);
-    assert!(
-        expected == images(&shop.join("many")),
-        "resuming changes the image"
-    );
+    assert!(expected == images(&shop.join("many")), "resuming changes the image");
 
     let report = fs::read_to_string(shop.join("one/report.json")).expect("a report");
     let report: Value = serde_json::from_str(&report).expect("JSON");

@@ -22,21 +22,9 @@ struct Expected {
     lengths: f64,
 }
 
-const SMALL: Expected = Expected {
-    particles: 100_000,
-    hits: 614_870,
-    lengths: 4_319_062.67,
-};
-const MIDDLE: Expected = Expected {
-    particles: 1_000_000,
-    hits: 622_911,
-    lengths: 4_360_322.20,
-};
-const LARGE: Expected = Expected {
-    particles: 10_000_000,
-    hits: 626_647,
-    lengths: 4_378_820.36,
-};
+const SMALL: Expected = Expected { particles: 100_000, hits: 614_870, lengths: 4_319_062.67 };
+const MIDDLE: Expected = Expected { particles: 1_000_000, hits: 622_911, lengths: 4_360_322.20 };
+const LARGE: Expected = Expected { particles: 10_000_000, hits: 626_647, lengths: 4_378_820.36 };
 
 #[test]
 fn the_box_of_a_hundred_thousand() {
@@ -73,11 +61,7 @@ impl Expected {
         assert_eq!(covered, self.hits, "pixels with A above 0");
         let lengths = ray_lengths(depths);
         let off = (lengths - self.lengths).abs() / self.lengths;
-        assert!(
-            off <= 2e-6,
-            "{lengths} is off by {off:e} of {}",
-            self.lengths
-        );
+        assert!(off <= 2e-6, "{lengths} is off by {off:e} of {}", self.lengths);
     }
 
     /// The scene of the thesis; nothing but primary rays is needed here.

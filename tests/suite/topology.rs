@@ -30,25 +30,18 @@ const TOPOLOGY: [&str; 2] = ["--topology", "conf.gro"];
 fn inspect_shows_the_attributes_of_a_topology() {
     let shop = trajectory();
     let names = |options: &[&str]| -> Vec<String> {
-        let ran = shop
-            .run(&[&["inspect", "--json", "md.trr"], options].concat())
-            .expect(0);
+        let ran = shop.run(&[&["inspect", "--json", "md.trr"], options].concat()).expect(0);
         let text = ran.text();
         let first: Value =
             serde_json::from_str(text.lines().next().expect("a frame")).expect("an object");
         let attributes = first["attributes"].as_array().expect("attributes");
-        attributes
-            .iter()
-            .map(|a| a["name"].as_str().expect("a name").to_owned())
-            .collect()
+        attributes.iter().map(|a| a["name"].as_str().expect("a name").to_owned()).collect()
     };
     assert_eq!(names(&[]), ["velocity"]);
     assert_eq!(names(&TOPOLOGY), ["velocity", "element", "residue"]);
     let ran = shop.run(&["inspect", "md.trr", "--topology", "conf.gro"]);
     assert!(ran.expect(0).text().contains("element"));
-    shop.run(&["inspect", "md.trr", "--topology", "nothing.gro"])
-        .expect(2)
-        .prints("nothing.gro");
+    shop.run(&["inspect", "md.trr", "--topology", "nothing.gro"]).expect(2).prints("nothing.gro");
     // A topology of other atoms
     fs::copy(sample("molecules/quartz.xyz"), shop.join("other.xyz")).expect("a copy");
     shop.run(&["inspect", "md.trr", "--topology", "other.xyz"])
@@ -60,35 +53,16 @@ fn inspect_shows_the_attributes_of_a_topology() {
 fn jobs_notice_that_a_topology_has_changed() {
     let shop = trajectory();
     let convert = |options: &[&str]| {
-        shop.run(
-            &[
-                &["convert", "md.trr", "-o", "native"],
-                &TOPOLOGY[..],
-                options,
-            ]
-            .concat(),
-        )
+        shop.run(&[&["convert", "md.trr", "-o", "native"], &TOPOLOGY[..], options].concat())
     };
     let ran = convert(&[]).expect(0);
     let frames = ran.rendered();
     assert!(!frames.is_empty());
     convert(&[]).expect(0).prints("are done already");
-    let small = [
-        "--width=32",
-        "--height=18",
-        "--samples=1",
-        "--color-by",
-        "element",
-    ];
+    let small = ["--width=32", "--height=18", "--samples=1", "--color-by", "element"];
     let render = |options: &[&str]| {
         shop.run(
-            &[
-                &["render", "md.trr", "-o", "out/f.#.exr"],
-                &TOPOLOGY[..],
-                &small,
-                options,
-            ]
-            .concat(),
+            &[&["render", "md.trr", "-o", "out/f.#.exr"], &TOPOLOGY[..], &small, options].concat(),
         )
     };
     assert_eq!(render(&[]).expect(0).rendered(), frames);
@@ -109,12 +83,7 @@ fn jobs_notice_that_a_topology_has_changed() {
 fn jobs_notice_that_a_file_of_an_external_link_has_changed() {
     let shop = Workshop::new();
     fs::create_dir(shop.join("parts")).expect("writable");
-    for file in [
-        "linked.hdf5",
-        "parts/first.h5",
-        "parts/second.h5",
-        "parts/type.h5",
-    ] {
+    for file in ["linked.hdf5", "parts/first.h5", "parts/second.h5", "parts/type.h5"] {
         fs::copy(sample(&format!("hdf5_links/{file}")), shop.join(file)).expect("a copy");
     }
     let inspected = shop.run(&["inspect", "linked.hdf5"]).expect(0).text();

@@ -30,10 +30,7 @@ const CHANNELS: [&str; 2] = ["--set", "output.channels=[\"RGBA\", \"Z\", \"id\"]
 
 /// A frame of atoms with ids and places along x, at a height by id: 1 in the middle, 2 at z = 2.
 fn write(workshop: &Workshop, frame: u32, cell: &str, atoms: &[(u32, f32)]) {
-    let mut text = format!(
-        "{}\n{cell}Properties=species:S:1:pos:R:3:id:I:1\n",
-        atoms.len()
-    );
+    let mut text = format!("{}\n{cell}Properties=species:S:1:pos:R:3:id:I:1\n", atoms.len());
     for (id, x) in atoms {
         text += &format!("O {x} 0 {} {id}\n", 2 * (id - 1));
     }
@@ -62,11 +59,7 @@ fn picture(workshop: &Workshop, frame: &str, options: &[&str]) -> Picture {
 
 /// Whether there is something without an id where the atom 1 is at x.
 fn has_trail(picture: &Picture, x: f32) -> bool {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "in the picture"
-    )]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in the picture")]
     let column = (45.0 + 9.6 * x) as usize;
     // The axis is between two rows
     let is_trail = |pixel: usize| {
@@ -88,21 +81,10 @@ fn trails_pass_where_particles_were() {
     assert_eq!(at(&with("1", "4")), [true, false, false, false]);
     assert_eq!(at(&with("0", "4")), [false; 4]);
     // The trail gets thinner: how many pixels it covers 0.5 and 3.5 frames ago
-    let long = picture(
-        &workshop,
-        "4",
-        &["--set", "trails.frames=4", "--set", "trails.radius=0.6"],
-    );
-    let rows = |x: usize| {
-        (0..60)
-            .filter(|row| long.floats("A")[row * 90 + x] == 1.0)
-            .count()
-    };
+    let long = picture(&workshop, "4", &["--set", "trails.frames=4", "--set", "trails.radius=0.6"]);
+    let rows = |x: usize| (0..60).filter(|row| long.floats("A")[row * 90 + x] == 1.0).count();
     let [thin, thick] = [rows(16), rows(73)];
-    assert!(
-        (1..=3).contains(&thin) && (9..=11).contains(&thick),
-        "{thin} {thick}"
-    );
+    assert!((1..=3).contains(&thin) && (9..=11).contains(&thick), "{thin} {thick}");
 }
 
 #[test]
@@ -110,17 +92,8 @@ fn pictures_do_not_depend_on_the_other_frames_of_a_job() {
     let workshop = workshop();
     let render = |out: &str, options: &[&str]| {
         let output = format!("{out}/f.#.exr");
-        let command = [
-            "render",
-            "f_#.xyz",
-            "-o",
-            &output,
-            "--set",
-            "trails.frames=3",
-        ];
-        workshop
-            .run(&[&command[..], &VIEW, options].concat())
-            .expect(0);
+        let command = ["render", "f_#.xyz", "-o", &output, "--set", "trails.frames=3"];
+        workshop.run(&[&command[..], &VIEW, options].concat()).expect(0);
         images(&workshop.join(out))
     };
     let all = render("all", &[]);
@@ -144,32 +117,18 @@ fn jumps_over_a_boundary_are_cut() {
 #[test]
 fn particles_that_cannot_be_found_have_clear_messages() {
     let workshop = workshop();
-    let command = [
-        "still",
-        "f_#.xyz",
-        "--frame=4",
-        "-o",
-        "out.exr",
-        "--set",
-        "trails.frames=3",
-    ];
+    let command = ["still", "f_#.xyz", "--frame=4", "-o", "out.exr", "--set", "trails.frames=3"];
     let run = || workshop.run(&[&command[..], &VIEW, &CHANNELS].concat());
     // A damaged file is passed over, and the trail goes on behind it
     fs::write(workshop.join("f_3.xyz"), "2\nbroken").expect("a file");
-    run()
-        .expect(0)
-        .prints("trails pass over a frame that cannot be read");
+    run().expect(0).prints("trails pass over a frame that cannot be read");
     let found = Picture::open(&workshop.join("out.exr"));
     assert!(has_trail(&found, 3.0) && has_trail(&found, 1.0));
     fs::remove_file(workshop.join("f_3.xyz")).expect("a file");
-    run()
-        .expect(0)
-        .prints("trails cross a gap between the frames 2 and 4");
+    run().expect(0).prints("trails cross a gap between the frames 2 and 4");
     // Without ids, the number of particles must not change
     for (frame, atoms) in [(2, "1\n\nO 0 0 0\n"), (4, "2\n\nO 0 0 0\nO 0 0 2\n")] {
         fs::write(workshop.join(format!("f_{frame}.xyz")), atoms).expect("a file");
     }
-    run()
-        .expect(1)
-        .prints("no attribute `id` for trails, since the number of particles changes");
+    run().expect(1).prints("no attribute `id` for trails, since the number of particles changes");
 }

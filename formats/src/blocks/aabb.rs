@@ -19,10 +19,7 @@ impl Default for Aabb {
 
 impl Aabb {
     /// The empty box.
-    pub const EMPTY: Self = Self {
-        min: Vec3::INFINITY,
-        max: Vec3::NEG_INFINITY,
-    };
+    pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
 
     /// The smallest box around `points`.
     #[inline]
@@ -34,40 +31,28 @@ impl Aabb {
     #[must_use]
     #[inline]
     pub fn extend(self, point: Vec3) -> Self {
-        Self {
-            min: self.min.min(point),
-            max: self.max.max(point),
-        }
+        Self { min: self.min.min(point), max: self.max.max(point) }
     }
 
     /// The smallest box around both boxes.
     #[must_use]
     #[inline]
     pub fn union(self, other: Self) -> Self {
-        Self {
-            min: self.min.min(other.min),
-            max: self.max.max(other.max),
-        }
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
     /// The intersection of both boxes; empty if they are disjoint.
     #[must_use]
     #[inline]
     pub fn intersection(self, other: Self) -> Self {
-        Self {
-            min: self.min.max(other.min),
-            max: self.max.min(other.max),
-        }
+        Self { min: self.min.max(other.min), max: self.max.min(other.max) }
     }
 
     /// This box grown by `length` on every side.
     #[must_use]
     #[inline]
     pub fn padded(self, length: f32) -> Self {
-        Self {
-            min: self.min - length,
-            max: self.max + length,
-        }
+        Self { min: self.min - length, max: self.max + length }
     }
 
     /// This box with every face moved outwards by one step of f32, so that it contains everything that the
@@ -75,10 +60,7 @@ impl Aabb {
     #[must_use]
     #[inline]
     pub fn rounded_outwards(self) -> Self {
-        Self {
-            min: self.min.map(f32::next_down),
-            max: self.max.map(f32::next_up),
-        }
+        Self { min: self.min.map(f32::next_down), max: self.max.map(f32::next_up) }
     }
 
     /// True if the box is empty.

@@ -71,13 +71,7 @@ impl Block {
     pub fn sphere_bounds(&self, radii: &BlockRadii) -> Aabb {
         let rounded = (0..BLOCK_SIZE).fold(Aabb::EMPTY, |b, lane| {
             let center = self.center(lane);
-            b.union(
-                Aabb {
-                    min: center,
-                    max: center,
-                }
-                .padded(radii.0[lane]),
-            )
+            b.union(Aabb { min: center, max: center }.padded(radii.0[lane]))
         });
         rounded.rounded_outwards()
     }

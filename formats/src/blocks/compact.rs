@@ -26,10 +26,7 @@ impl Node {
     /// The grid of the block in child `slot`: from its lower to its upper planes.
     #[inline(always)]
     pub fn child_frame(&self, slot: usize) -> BlockFrame {
-        let mut frame = BlockFrame {
-            base: [0.0; 3],
-            extent: [0.0; 3],
-        };
+        let mut frame = BlockFrame { base: [0.0; 3], extent: [0.0; 3] };
         for axis in 0..3 {
             let step = f32::from_bits(u32::from(self.exponent[axis]) << 23);
             let [lower, upper] = [0, 1].map(|side| self.planes[axis][side][slot & 7]);
@@ -98,9 +95,7 @@ impl CompactBlock for Q10Block {
 
     fn from_codes(codes: &[[u32; BLOCK_SIZE]; 3]) -> Self {
         let [x, y, z] = codes;
-        Self(std::array::from_fn(|lane| {
-            x[lane] | y[lane] << 11 | z[lane] << 22
-        }))
+        Self(std::array::from_fn(|lane| x[lane] | y[lane] << 11 | z[lane] << 22))
     }
 
     #[inline(always)]
@@ -202,14 +197,8 @@ mod tests {
 
     #[test]
     fn the_grid_spans_the_quantised_box() {
-        let child = Aabb {
-            min: Vec3::new(1.0, -2.0, 100.0),
-            max: Vec3::new(1.5, -1.0, 100.0),
-        };
-        let other = Aabb {
-            min: Vec3::ZERO,
-            max: Vec3::splat(3.0),
-        };
+        let child = Aabb { min: Vec3::new(1.0, -2.0, 100.0), max: Vec3::new(1.5, -1.0, 100.0) };
+        let other = Aabb { min: Vec3::ZERO, max: Vec3::splat(3.0) };
         let node = Node::enclosing(&[other, child]);
         let frame = node.child_frame(1);
         for axis in 0..3 {

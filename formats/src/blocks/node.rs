@@ -136,10 +136,7 @@ mod tests {
 
     #[test]
     fn empty_extents_are_quantised_exactly() {
-        let point = Aabb {
-            min: Vec3::splat(1e4),
-            max: Vec3::splat(1e4),
-        };
+        let point = Aabb { min: Vec3::splat(1e4), max: Vec3::splat(1e4) };
         let node = Node::enclosing(&[point; 8]);
         assert!(node.child_holds(7, &point));
         let [lower, upper] = node.interval(7, 0);
@@ -149,20 +146,10 @@ mod tests {
     #[test]
     fn huge_boxes_contain_their_children() {
         // The differences of these values are rounded in f64.
-        let values = [
-            -147_573_952_589_676_412_928.0,
-            -8.27,
-            -1e-38,
-            0.0,
-            8.27,
-            3.0e19,
-        ];
+        let values = [-147_573_952_589_676_412_928.0, -8.27, -1e-38, 0.0, 8.27, 3.0e19];
         for low in 0..values.len() {
             for high in low..values.len() {
-                let child = Aabb {
-                    min: Vec3::splat(values[low]),
-                    max: Vec3::splat(values[high]),
-                };
+                let child = Aabb { min: Vec3::splat(values[low]), max: Vec3::splat(values[high]) };
                 let all = Aabb {
                     min: Vec3::splat(values[0]),
                     max: Vec3::splat(values[values.len() - 1]),

@@ -126,20 +126,13 @@ impl BlockDecoder {
         }
         let is_shuffled = header.has(IS_SHUFFLED) && header.type_size > 1;
         // Find the block
-        let place = self
-            .body
-            .get(4 * index..)
-            .and_then(|rest| rest.first_chunk());
+        let place = self.body.get(4 * index..).and_then(|rest| rest.first_chunk());
         let place = place.ok_or_else(|| damaged("a frame ends before its blocks"))?;
         let place = u32::from_le_bytes(*place) as usize;
         let rest = place.checked_sub(HEADER).and_then(|at| self.body.get(at..));
         let mut rest = rest.ok_or_else(|| damaged("a block is outside its frame"))?;
         // Decode its streams
-        let decoded = if is_shuffled {
-            &mut self.shuffled
-        } else {
-            &mut *output
-        };
+        let decoded = if is_shuffled { &mut self.shuffled } else { &mut *output };
         decoded.resize(len, 0);
         let stream_len = len / header.stream_count(len);
         for stream in decoded.chunks_mut(stream_len) {

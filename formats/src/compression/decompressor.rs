@@ -223,8 +223,7 @@ impl<R: BufRead + Seek> Decompressor<R> {
         }
         if !is_padding {
             let name = format.name();
-            self.notes
-                .push(format!("{count} bytes after the {name} stream are ignored"));
+            self.notes.push(format!("{count} bytes after the {name} stream are ignored"));
         }
         Ok(DecompressorState::Ended)
     }

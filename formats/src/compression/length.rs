@@ -51,10 +51,7 @@ pub fn unpacked_len(path: &Path) -> io::Result<u64> {
 /// first [`SAMPLE`] bytes of its content.
 fn by_header_or_sample(file: File, len: u64) -> u64 {
     let read = Rc::new(Cell::new(0));
-    let counted = CountingFile {
-        file,
-        read: Rc::clone(&read),
-    };
+    let counted = CountingFile { file, read: Rc::clone(&read) };
     let reader = BufReader::with_capacity(SAMPLE_BUFFER, counted);
     let Ok(mut stream) = Decompressor::new(reader, MemoryBudget::UNLIMITED) else {
         return len;

@@ -120,11 +120,7 @@ impl<R: Read> Lz4Frame<R> {
                 return Err(damaged("the checksum of the content differs"));
             }
         }
-        if self
-            .header
-            .content_len
-            .is_some_and(|len| len != self.content_len)
-        {
+        if self.header.content_len.is_some_and(|len| len != self.content_len) {
             return Err(damaged("the length of the content is not the stated one"));
         }
         self.is_ended = true;

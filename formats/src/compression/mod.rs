@@ -102,14 +102,7 @@ impl Compression {
 }
 
 impl StreamFormat {
-    const ALL: [Self; 6] = [
-        Self::Gzip,
-        Self::Zstd,
-        Self::Bzip2,
-        Self::Xz,
-        Self::Lz4,
-        Self::Scf,
-    ];
+    const ALL: [Self; 6] = [Self::Gzip, Self::Zstd, Self::Bzip2, Self::Xz, Self::Lz4, Self::Scf];
 
     /// The format of a file that begins with `head`.
     pub(crate) fn of(head: &[u8]) -> Option<Self> {
@@ -145,9 +138,7 @@ impl StreamFormat {
             Self::Bzip2 => {
                 let blocks = [*b"\x31\x41\x59\x26\x53\x59", *b"\x17\x72\x45\x38\x50\x90"];
                 bytes.starts_with(b"BZh")
-                    && bytes
-                        .get(3)
-                        .is_some_and(|level| (b'1'..=b'9').contains(level))
+                    && bytes.get(3).is_some_and(|level| (b'1'..=b'9').contains(level))
                     && blocks.iter().any(|block| bytes.get(4..10) == Some(block))
             }
             Self::Zstd | Self::Xz | Self::Lz4 | Self::Scf => bytes.starts_with(self.magic()),

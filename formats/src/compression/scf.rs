@@ -94,8 +94,7 @@ impl<R: BufRead> ScfReader<R> {
         if self.block_count == frame.block_count() {
             return self.next_frame(self.decoder_len);
         }
-        self.decoder
-            .decode(&frame, self.block_count, &mut self.block)?;
+        self.decoder.decode(&frame, self.block_count, &mut self.block)?;
         self.block_count += 1;
         self.content_len += self.block.len() as u64;
         Ok(())
@@ -104,10 +103,7 @@ impl<R: BufRead> ScfReader<R> {
     /// Reads the next frame, or the index. Decoding the frame may take `most` bytes.
     fn next_frame(&mut self, most: u64) -> io::Result<()> {
         let mut header = Vec::with_capacity(HEADER);
-        self.reader
-            .by_ref()
-            .take(HEADER as u64)
-            .read_to_end(&mut header)?;
+        self.reader.by_ref().take(HEADER as u64).read_to_end(&mut header)?;
         self.frame = FrameHeader::parse(&header);
         self.block_count = 0;
         let Some(frame) = self.frame else {
@@ -123,11 +119,7 @@ impl<R: BufRead> ScfReader<R> {
         let body_len = frame.body_len()?;
         self.decoder.body.clear();
         let body = &mut self.decoder.body;
-        let read = self
-            .reader
-            .by_ref()
-            .take(body_len as u64)
-            .read_to_end(body)?;
+        let read = self.reader.by_ref().take(body_len as u64).read_to_end(body)?;
         match read == body_len {
             true => Ok(()),
             false => Err(io::ErrorKind::UnexpectedEof.into()),
@@ -153,24 +145,16 @@ impl<R: BufRead> ScfReader<R> {
         if !end.ends_with(END_MAGIC) || end.len() < END_LEN {
             return Err(io::ErrorKind::UnexpectedEof.into());
         }
-        let mut numbers = end
-            .as_chunks::<8>()
-            .0
-            .iter()
-            .map(|bytes| u64::from_be_bytes(*bytes));
+        let mut numbers = end.as_chunks::<8>().0.iter().map(|bytes| u64::from_be_bytes(*bytes));
         let mut next = || numbers.next().unwrap_or(0);
         let (frame_len, last_len, index_len) = (next(), next(), next());
         if index_len.checked_add(FOOTER) != Some(len) || index_len < 16 {
-            return Err(damaged(
-                "what follows its frames is neither a frame nor the index",
-            ));
+            return Err(damaged("what follows its frames is neither a frame nor the index"));
         }
         let before = frame_len.checked_mul((index_len - 16) / 8);
         let stated = before.and_then(|before| before.checked_add(last_len));
         if self.content_len > 0 && stated != Some(self.content_len) {
-            return Err(damaged(
-                "its frames have another length than the index states",
-            ));
+            return Err(damaged("its frames have another length than the index states"));
         }
         Ok(())
     }

@@ -17,14 +17,8 @@ fn signatures_decide() {
         (b"BZh9\x17\x72\x45\x38\x50\x90", Some(StreamFormat::Bzip2)),
         (b"BZh01AY&SY", None),
         (b"BZhello you", None),
-        (
-            b"\x5a\x2a\x4d\x18\x02\0\0\0xx\x28\xb5\x2f\xfd",
-            Some(StreamFormat::Zstd),
-        ),
-        (
-            b"\x50\x2a\x4d\x18\0\0\0\0\x04\x22\x4d\x18",
-            Some(StreamFormat::Lz4),
-        ),
+        (b"\x5a\x2a\x4d\x18\x02\0\0\0xx\x28\xb5\x2f\xfd", Some(StreamFormat::Zstd)),
+        (b"\x50\x2a\x4d\x18\0\0\0\0\x04\x22\x4d\x18", Some(StreamFormat::Lz4)),
         (b"\x50\x2a\x4d\x18\xff\xff\xff\xff\x04\x22\x4d\x18", None),
         (b"", None),
     ] {

@@ -35,10 +35,7 @@ impl ParticleRange {
     pub(super) fn nth(number: u64, len: usize, count: u64) -> Self {
         let first = number * len as u64;
         let left = usize::try_from(count - first).unwrap_or(usize::MAX);
-        Self {
-            first,
-            len: left.min(len),
-        }
+        Self { first, len: left.min(len) }
     }
 }
 

@@ -23,10 +23,7 @@ pub(super) fn carry_last(
 }
 
 /// The indices of the `count` particles that are last on the curve.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "a part has fewer than 2^32 particles"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "a part has fewer than 2^32 particles")]
 fn last_on(positions: &[Vec3], curve: &Curve, count: usize) -> Vec<u32> {
     if count == 0 {
         return Vec::new();
@@ -100,12 +97,7 @@ mod tests {
     #[test]
     fn samples_include_the_end_of_the_curve() {
         let coincident = vec![Vec3::splat(2.0); 3000];
-        for all in [
-            clustered(10_000),
-            clustered(700),
-            clustered(2048),
-            coincident,
-        ] {
+        for all in [clustered(10_000), clustered(700), clustered(2048), coincident] {
             let curve = Curve::over(&all);
             let (part, carried) = carried_of(&all, &curve);
             // In a very full cell, any particles may be carried.

@@ -44,10 +44,7 @@ impl RadiusColumn {
     pub(super) const WIDTH: usize = size_of::<f32>();
 
     /// The radii of particles; `values` are their values in the source.
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "radii are f32 in the renderer"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "radii are f32 in the renderer")]
     pub(super) fn radii<'a>(&self, values: &'a [u8]) -> impl Iterator<Item = f32> + use<'a> {
         let Self { scalar, scale, .. } = *self;
         let stored = StoredType::Plain(scalar);
@@ -126,18 +123,10 @@ fn difference(value: f64, stored: f64) -> f64 {
     if is_same { 0.0 } else { (value - stored).abs() }
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a cast saturates"
-)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a cast saturates")]
 fn code_of(value: f64, range: [f64; 2]) -> u8 {
     let (low, step) = StoredType::ranged(range);
-    if step > 0.0 {
-        ((value - low) / step).round() as u8
-    } else {
-        0
-    }
+    if step > 0.0 { ((value - low) / step).round() as u8 } else { 0 }
 }
 
 impl StoredColumns {
@@ -188,21 +177,13 @@ impl StoredColumns {
         if settings.keep_ids && !has_ids {
             columns.push(place_column(source.count()));
         }
-        Ok(Self {
-            radius,
-            attributes: columns,
-        })
+        Ok(Self { radius, attributes: columns })
     }
 
     /// Bytes of a row.
     pub(super) fn width(&self) -> usize {
         let radius = self.radius.map_or(0, |_| RadiusColumn::WIDTH);
-        radius
-            + self
-                .attributes
-                .iter()
-                .map(StoredColumn::width)
-                .sum::<usize>()
+        radius + self.attributes.iter().map(StoredColumn::width).sum::<usize>()
     }
 
     /// The largest number of bytes that one particle has for one attribute of the source.
@@ -221,11 +202,7 @@ impl ConvertSettings {
 
 fn place_column(count: u64) -> StoredColumn {
     let is_short = u32::try_from(count).is_ok();
-    let scalar = if is_short {
-        ScalarType::U32
-    } else {
-        ScalarType::U64
-    };
+    let scalar = if is_short { ScalarType::U32 } else { ScalarType::U64 };
     StoredColumn {
         attribute: None,
         name: "id".to_owned(),
@@ -247,11 +224,7 @@ fn radius_of(attributes: &[SourceAttribute]) -> Option<RadiusColumn> {
         let is_it = |a: &SourceAttribute| is_float(a) && a.name.eq_ignore_ascii_case(name);
         let attribute = attributes.iter().position(is_it)?;
         let scalar = attributes[attribute].scalar;
-        Some(RadiusColumn {
-            attribute,
-            scalar,
-            scale,
-        })
+        Some(RadiusColumn { attribute, scalar, scale })
     };
     RADII.into_iter().find_map(named)
 }
@@ -289,10 +262,8 @@ fn check(
         }
     }
     // Check the common radius
-    if let RadiusRule::All(radius)
-    | RadiusRule::Source {
-        otherwise: Some(radius),
-    } = settings.radius
+    if let RadiusRule::All(radius) | RadiusRule::Source { otherwise: Some(radius) } =
+        settings.radius
         && !is_radius(radius)
     {
         let what = format!("{radius} is not a radius; give one above zero");

@@ -27,13 +27,7 @@ impl Curve {
     /// The curve position of `position`, 63 bits.
     #[inline]
     pub(super) fn place(&self, position: Vec3) -> u64 {
-        hilbert(
-            self.grid.morton(position),
-            0,
-            AXIS_BITS,
-            CurveState::default(),
-        )
-        .0
+        hilbert(self.grid.morton(position), 0, AXIS_BITS, CurveState::default()).0
     }
 
     /// The cell of `position`: the highest bits of its curve position, cheap to compute.
@@ -58,9 +52,7 @@ fn bulk(sample: &[Vec3]) -> (Vec3, Vec3) {
         let of_axis = |axis: usize| {
             let mut values: Vec<f32> = sample.iter().map(|p| p[axis]).collect();
             let low = *values.select_nth_unstable_by(trimmed, f32::total_cmp).1;
-            let high = *values
-                .select_nth_unstable_by(last - trimmed, f32::total_cmp)
-                .1;
+            let high = *values.select_nth_unstable_by(last - trimmed, f32::total_cmp).1;
             [low, high]
         };
         let [x, y, z] = [0, 1, 2].map(of_axis);
@@ -114,11 +106,7 @@ impl Cuts {
             part.unwrap_or(MIXED)
         };
         let parts = (0..curve.cells()).map(of_cell).collect();
-        Self {
-            curve,
-            starts,
-            parts,
-        }
+        Self { curve, starts, parts }
     }
 
     /// Number of parts.

@@ -56,10 +56,8 @@ pub(super) fn divide_source(
     let width = columns.width();
     let total = request.source.count();
     let stretches = total.div_ceil(limits.batch_len as u64);
-    let (batches, stages) = (
-        BufferPool::<Batch>::default(),
-        BufferPool::<PartitionedBatch>::default(),
-    );
+    let (batches, stages) =
+        (BufferPool::<Batch>::default(), BufferPool::<PartitionedBatch>::default());
     // Create an empty heap for each part
     let errors = Mutex::new(std::mem::take(&mut output.errors));
     let mut heaps: Vec<Heap> = (0..cuts.len()).map(|_| Heap::default()).collect();
@@ -143,14 +141,9 @@ fn append_all(
     width: usize,
     store: &ChunkStore,
 ) -> Result<(), FrameError> {
-    heaps
-        .par_iter_mut()
-        .enumerate()
-        .try_for_each(|(part, heap)| {
-            staged
-                .iter()
-                .try_for_each(|staged| heap.append(staged, staged.of(part), width, store))
-        })
+    heaps.par_iter_mut().enumerate().try_for_each(|(part, heap)| {
+        staged.iter().try_for_each(|staged| heap.append(staged, staged.of(part), width, store))
+    })
 }
 
 fn closed(
@@ -195,8 +188,7 @@ impl Heap {
             let room = store.chunk_len() - open.positions.len();
             let end = range.end.min(range.start + room);
             let own = range.start..end;
-            open.rows
-                .extend_from_slice(&staged.rows[own.start * width..own.end * width]);
+            open.rows.extend_from_slice(&staged.rows[own.start * width..own.end * width]);
             open.positions.extend_from_slice(&staged.positions[own]);
             // Store the chunk when it is full
             if open.positions.len() == store.chunk_len() {

@@ -50,11 +50,7 @@ pub(super) struct Limits {
 /// Bytes per particle while a part is ordered: positions before and after, cells, samples and tables of the
 /// order; with rows, also the rows and the particle indices.
 const fn order_bytes(width: usize) -> usize {
-    let followed = if width > 0 {
-        size_of::<u32>() + width
-    } else {
-        0
-    };
+    let followed = if width > 0 { size_of::<u32>() + width } else { 0 };
     34 + followed
 }
 
@@ -138,7 +134,4 @@ fn aimed(part_len: usize) -> usize {
     part_len / 8 * 7
 }
 
-const _: () = assert!(
-    kd::CELL_LEN >= SMALLEST_PART,
-    "the smallest part is one cell of the order"
-);
+const _: () = assert!(kd::CELL_LEN >= SMALLEST_PART, "the smallest part is one cell of the order");

@@ -56,12 +56,7 @@ pub fn convert(
     settings: &ConvertSettings,
     progress: &dyn Progress,
 ) -> Result<ConvertReport, ConvertError> {
-    let request = ConvertRequest {
-        source,
-        path,
-        settings,
-        progress,
-    };
+    let request = ConvertRequest { source, path, settings, progress };
     let columns = StoredColumns::choose(source, settings, path)?;
     let limits = Limits::of(settings, source.count(), columns.width(), columns.widest());
     convert_within(request, columns, limits)
@@ -78,12 +73,7 @@ pub fn convert_in_parts(
     path: &Path,
     settings: &ConvertSettings,
 ) -> Result<ConvertReport, ConvertError> {
-    let request = ConvertRequest {
-        source,
-        path,
-        settings,
-        progress: &(),
-    };
+    let request = ConvertRequest { source, path, settings, progress: &() };
     let columns = StoredColumns::choose(source, settings, path)?;
     convert_within(request, columns, Limits::SMALLEST)
 }
@@ -113,10 +103,7 @@ fn convert_within(
     // Order and write the particles
     let divided = if limits.is_whole {
         whole::convert(&mut output, &limits, &account)?;
-        PartCounts {
-            parts: 1,
-            spilled_bytes: 0,
-        }
+        PartCounts { parts: 1, spilled_bytes: 0 }
     } else {
         parts::convert(&mut output, &limits, &account, &mut clock)?
     };
@@ -141,10 +128,7 @@ struct Clock {
 
 impl Clock {
     fn new() -> Self {
-        Self {
-            last: Instant::now(),
-            seconds: Vec::new(),
-        }
+        Self { last: Instant::now(), seconds: Vec::new() }
     }
 
     /// Ends `phase` now.

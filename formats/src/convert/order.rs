@@ -29,10 +29,7 @@ impl PartData {
 
     /// Room for `len` particles with rows of `width` bytes.
     pub(super) fn with_room(len: usize, width: usize) -> Self {
-        Self {
-            positions: Vec::with_capacity(len),
-            rows: Vec::with_capacity(len * width),
-        }
+        Self { positions: Vec::with_capacity(len), rows: Vec::with_capacity(len * width) }
     }
 
     pub(super) fn clear(&mut self) {
@@ -58,9 +55,7 @@ impl PartData {
             let number = *number as usize;
             // Take out the particle
             taken.positions.push(self.positions[number]);
-            taken
-                .rows
-                .extend_from_slice(&self.rows[number * width..][..width]);
+            taken.rows.extend_from_slice(&self.rows[number * width..][..width]);
             let next = numbers.get(nth + 1).map_or(self.len(), |n| *n as usize);
             if nth == 0 {
                 kept = number;
@@ -68,8 +63,7 @@ impl PartData {
             // Close the gap up to the next one
             let staying = number + 1..next;
             self.positions.copy_within(staying.clone(), kept);
-            self.rows
-                .copy_within(staying.start * width..staying.end * width, kept * width);
+            self.rows.copy_within(staying.start * width..staying.end * width, kept * width);
             kept += staying.len();
         }
         let left = self.len() - numbers.len();
@@ -113,12 +107,8 @@ impl OrderedPart {
         self.indices.resize(if is_followed { len } else { 0 }, 0);
         let held = self.bytes();
         account.hold(held);
-        let scratch = kd::order_into(
-            &part.positions,
-            &mut self.positions,
-            &mut self.indices,
-            |_| (),
-        );
+        let scratch =
+            kd::order_into(&part.positions, &mut self.positions, &mut self.indices, |_| ());
         account.hold(scratch);
         account.let_go(scratch + held);
         arrange(&mut self.positions, &mut self.indices);
@@ -163,28 +153,25 @@ impl OrderedPart {
         if columns.radius.is_some() {
             self.radii.resize(run.len(), 0.0);
             let radii = self.radii.par_chunks_mut(TASK);
-            radii
-                .zip(rows.par_chunks(TASK * width))
-                .for_each(|(radii, rows)| {
-                    for (radius, row) in radii.iter_mut().zip(rows.chunks_exact(width)) {
-                        *radius = f32::from_le_bytes(std::array::from_fn(|i| row[i]));
-                    }
-                });
+            radii.zip(rows.par_chunks(TASK * width)).for_each(|(radii, rows)| {
+                for (radius, row) in radii.iter_mut().zip(rows.chunks_exact(width)) {
+                    *radius = f32::from_le_bytes(std::array::from_fn(|i| row[i]));
+                }
+            });
             at += RadiusColumn::WIDTH;
         }
         // Split the rows into attributes
         for (column, values) in columns.attributes.iter().zip(&mut self.attributes) {
             let own = at..at + column.width();
             values.resize(run.len() * own.len(), 0);
-            values
-                .par_chunks_mut(TASK * own.len())
-                .zip(rows.par_chunks(TASK * width))
-                .for_each(|(values, rows)| {
+            values.par_chunks_mut(TASK * own.len()).zip(rows.par_chunks(TASK * width)).for_each(
+                |(values, rows)| {
                     let values = values.chunks_exact_mut(own.len());
                     for (to, row) in values.zip(rows.chunks_exact(width)) {
                         to.copy_from_slice(&row[own.clone()]);
                     }
-                });
+                },
+            );
             at = own.end;
         }
     }

@@ -60,8 +60,7 @@ impl<'a> FrameOutput<'a> {
                 .push(part, self.columns, first..end, &mut writer)
                 .map_err(|e| FrameError::io(self.request.path, e))?;
             self.pushed += (end - first) as u64;
-            self.request
-                .advance(Phase::Order, self.pushed, self.survey.count)?;
+            self.request.advance(Phase::Order, self.pushed, self.survey.count)?;
             first = end;
         }
         self.writer = Some(writer);
@@ -83,12 +82,7 @@ impl<'a> FrameOutput<'a> {
 
     /// Starts the frame; `ordered` are its first particles.
     fn begin(&self, ordered: &OrderedPart) -> Result<FrameWriter, ConvertError> {
-        let ConvertRequest {
-            source,
-            settings,
-            path,
-            ..
-        } = self.request;
+        let ConvertRequest { source, settings, path, .. } = self.request;
         // Find the common radius
         let own = self.survey.radii.filter(|_| self.columns.radius.is_some());
         let common = match settings.radius {
@@ -118,9 +112,7 @@ impl<'a> FrameOutput<'a> {
                 (None, Some(radius)) => RadiusSpec::Common(radius),
                 (None, None) => RadiusSpec::None,
             },
-            attributes: attributes
-                .map(|(column, error)| column.spec(*error))
-                .collect(),
+            attributes: attributes.map(|(column, error)| column.spec(*error)).collect(),
             time: settings.time.or(source.time()),
             step: source.step(),
             dropped: source.count() - self.survey.count,

@@ -58,17 +58,9 @@ pub(super) fn convert(
     clock.lap(Phase::Divide);
     // Order and write the parts
     piles.reverse();
-    let waiting = PartQueue {
-        piles,
-        width,
-        limits,
-        store: &store,
-    };
+    let waiting = PartQueue { piles, width, limits, store: &store };
     let parts = order_all(output, waiting, account)?;
-    Ok(PartCounts {
-        parts,
-        spilled_bytes: store.spilled(),
-    })
+    Ok(PartCounts { parts, spilled_bytes: store.spilled() })
 }
 
 fn scratch_dir(output: &FrameOutput) -> PathBuf {
@@ -99,10 +91,8 @@ fn order_all(
     let room = waiting.limits.part_len + unit;
     let width = waiting.width;
     // Allocate two parts, to load one while the other is written
-    let (mut part, mut spare) = (
-        PartData::with_room(room, width),
-        PartData::with_room(room, width),
-    );
+    let (mut part, mut spare) =
+        (PartData::with_room(room, width), PartData::with_room(room, width));
     account.hold(part.bytes() + spare.bytes());
     let mut ordered = OrderedPart::with_room(room, width);
     let mut carried = PartData::default();
@@ -126,11 +116,8 @@ fn order_all(
                 scope.spawn(move || load(&mut next, store, spare).map(|()| next))
             });
             let written = write(output, &part, &mut ordered, account);
-            let loaded = loader.map(|loader| {
-                loader
-                    .join()
-                    .unwrap_or_else(|fault| panic::resume_unwind(fault))
-            });
+            let loaded = loader
+                .map(|loader| loader.join().unwrap_or_else(|fault| panic::resume_unwind(fault)));
             written.and(Ok(loaded.transpose()?))
         })?;
         // Go on with the loaded part

@@ -44,14 +44,12 @@ impl ScratchFile {
 
     /// Writes `bytes` at byte offset `at`.
     pub(super) fn write(&self, bytes: &[u8], at: u64) -> Result<(), FrameError> {
-        self.write_at(bytes, at)
-            .map_err(|e| FrameError::io(&self.dir, e))
+        self.write_at(bytes, at).map_err(|e| FrameError::io(&self.dir, e))
     }
 
     /// Reads data that was written, from byte offset `at`.
     pub(super) fn read(&self, bytes: &mut [u8], at: u64) -> Result<(), FrameError> {
-        self.read_at(bytes, at)
-            .map_err(|e| FrameError::io(&self.dir, e))
+        self.read_at(bytes, at).map_err(|e| FrameError::io(&self.dir, e))
     }
 
     #[cfg(unix)]

@@ -152,10 +152,7 @@ pub enum ConvertError {
 
 impl ConvertError {
     pub(super) fn refused(path: &Path, what: impl Into<String>) -> Self {
-        Self::Refused {
-            path: path.to_owned(),
-            what: what.into(),
-        }
+        Self::Refused { path: path.to_owned(), what: what.into() }
     }
 }
 

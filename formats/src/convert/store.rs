@@ -104,16 +104,8 @@ impl<'a> ChunkStore<'a> {
     pub(super) fn new(mut settings: StoreSettings, account: &'a MemoryAccount) -> Self {
         // Allow few chunks, but enough that the writer can always proceed.
         settings.chunks = settings.chunks.max(settings.open + ON_THE_WAY + 2);
-        let shared = SharedState {
-            settings,
-            state: Mutex::default(),
-            freed: Condvar::new(),
-        };
-        Self {
-            shared: Arc::new(shared),
-            account,
-            writer: Mutex::new(None),
-        }
+        let shared = SharedState { settings, state: Mutex::default(), freed: Condvar::new() };
+        Self { shared: Arc::new(shared), account, writer: Mutex::new(None) }
     }
 
     pub(super) fn chunk_len(&self) -> usize {
@@ -300,11 +292,7 @@ impl<'a> ChunkStore<'a> {
             .name("spherule-spill".to_owned())
             .spawn(move || shared.write_all(&file, &to_write))
             .map_err(|e| FrameError::io(dir, e))?;
-        Ok(Writer {
-            scratch,
-            chunks,
-            thread,
-        })
+        Ok(Writer { scratch, chunks, thread })
     }
 
     /// The error for a writer thread that stopped early.

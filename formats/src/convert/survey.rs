@@ -75,9 +75,7 @@ impl ConvertRequest<'_> {
     pub(super) fn changed(&self) -> ConvertError {
         let checked = self.source.check().map_err(ConvertError::from);
         let what = "the source changed while it was converted; convert again when it rests";
-        checked
-            .err()
-            .unwrap_or_else(|| ConvertError::refused(self.path, what))
+        checked.err().unwrap_or_else(|| ConvertError::refused(self.path, what))
     }
 }
 
@@ -246,11 +244,8 @@ impl Survey {
                 );
                 return Err(ConvertError::refused(path, what));
             }
-            column.ranges = if self.count > 0 {
-                ranges.clone()
-            } else {
-                vec![[0.0; 2]; column.components]
-            };
+            column.ranges =
+                if self.count > 0 { ranges.clone() } else { vec![[0.0; 2]; column.components] };
         }
         // Replace equal radii by a common one
         let common = self.radii.filter(|[low, high]| low == high);

@@ -32,10 +32,7 @@ fn tight(part_len: usize, chunks: usize) -> Limits {
 
 /// Limits that order all particles at once.
 fn whole() -> Limits {
-    Limits {
-        is_whole: true,
-        ..tight(0, 0)
-    }
+    Limits { is_whole: true, ..tight(0, 0) }
 }
 
 fn raw(positions: Vec<Vec3>) -> RawParticles {
@@ -77,12 +74,7 @@ fn request<'a>(
     path: &'a Path,
     settings: &'a ConvertSettings,
 ) -> ConvertRequest<'a> {
-    ConvertRequest {
-        source,
-        path,
-        settings,
-        progress: &(),
-    }
+    ConvertRequest { source, path, settings, progress: &() }
 }
 
 /// Converts within `limits`.
@@ -128,10 +120,7 @@ fn compare(path: &Path, raw: &RawParticles, settings: &ConvertSettings, index: &
     // Compare each stored particle with its source
     for slot in 0..usize::try_from(index.count).expect("few") {
         let place = id.low_bits(slot).expect("an id") as usize;
-        assert!(
-            !std::mem::replace(&mut visited[place], true),
-            "{place} twice"
-        );
+        assert!(!std::mem::replace(&mut visited[place], true), "{place} twice");
         // Among coincident particles, the first in the source is the first here.
         let point = (raw.positions.get(place) - settings.origin).as_vec3() + Vec3::ZERO;
         let before = last_at.insert(point.to_array().map(f32::to_bits), place);
@@ -144,14 +133,10 @@ fn compare(path: &Path, raw: &RawParticles, settings: &ConvertSettings, index: &
                 continue;
             };
             let error = file.index().attributes.iter();
-            let error = error
-                .filter(|a| a.name == attribute.name)
-                .map(|a| a.max_error);
+            let error = error.filter(|a| a.name == attribute.name).map(|a| a.max_error);
             let error = error.fold(0.0, f64::max);
             for component in 0..attribute.components {
-                let given = attribute
-                    .data
-                    .get_f64(place * attribute.components + component);
+                let given = attribute.data.get_f64(place * attribute.components + component);
                 let difference = (view.get(slot, component) - given).abs();
                 assert!(difference <= error, "{} {given}", attribute.name);
             }
@@ -161,10 +146,7 @@ fn compare(path: &Path, raw: &RawParticles, settings: &ConvertSettings, index: &
         let own = leaves.radii.load(slot / 16).map(|r| r.0[slot % 16]);
         if own.is_none() {
             let center = leaves.center(slot);
-            let point = crate::blocks::Aabb {
-                min: center,
-                max: center,
-            };
+            let point = crate::blocks::Aabb { min: center, max: center };
             assert!(node.child_holds(slot / 16 % 8, &point));
         }
     }
@@ -202,10 +184,7 @@ fn spilling_does_not_change_the_bytes() {
     let bytes = |threads: usize, chunks: usize, batch_len: usize| {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let path = dir.path().join("a.spf");
-        let limits = Limits {
-            batch_len,
-            ..tight(4096, chunks)
-        };
+        let limits = Limits { batch_len, ..tight(4096, chunks) };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let convert = || convert_to(&path, &source, &settings(), limits).expect("converted");
         pool.expect("threads").install(convert);
@@ -220,11 +199,7 @@ fn spilling_does_not_change_the_bytes() {
 #[test]
 fn oversized_parts_are_divided_again() {
     // A sample this small misses the quantiles by far, and two parts are far too few.
-    let limits = Limits {
-        sample_len: 40,
-        parts: 2,
-        ..tight(2048, 0)
-    };
+    let limits = Limits { sample_len: 40, parts: 2, ..tight(2048, 0) };
     let report = converted(&raw(clustered(60_000)), &settings(), limits);
     assert!(report.parts >= 60_000 / 2048, "{}", report.parts);
 }
@@ -252,10 +227,7 @@ fn coincident_particles_keep_the_order_of_the_source() {
         let all: Vec<Vec3> = (0..30_000).map(place).collect();
         for limits in [whole(), tight(4096, 10_000), tight(2048, 0)] {
             for encoding in Encoding::ALL {
-                let settings = ConvertSettings {
-                    encoding: Some(encoding),
-                    ..settings()
-                };
+                let settings = ConvertSettings { encoding: Some(encoding), ..settings() };
                 converted(&raw(all.clone()), &settings, limits);
             }
         }
@@ -295,10 +267,7 @@ fn far_particles_in_double_precision_keep_their_distance() {
     let all = clustered(10_000).into_iter();
     raw.positions = Positions::F64(all.map(|p| p.as_dvec3() / 64.0 + far).collect());
     raw.attributes.clear();
-    let settings = ConvertSettings {
-        origin: far,
-        ..settings()
-    };
+    let settings = ConvertSettings { origin: far, ..settings() };
     for limits in [whole(), tight(4096, 0)] {
         let report = converted(&raw, &settings, limits);
         assert!(report.index.max_error > 0.0);
@@ -395,14 +364,9 @@ fn radii_stay_with_their_particles() {
 #[test]
 fn eight_bit_floats_have_no_infinity() {
     let mut raw = raw(clustered(3000));
-    let AttributeData::F32(velocity) = &mut raw.attributes[0].data else {
-        panic!("made so")
-    };
+    let AttributeData::F32(velocity) = &mut raw.attributes[0].data else { panic!("made so") };
     velocity[4000] = f32::NAN;
-    let settings = ConvertSettings {
-        other_attributes: AttributeChoice::Ranged,
-        ..settings()
-    };
+    let settings = ConvertSettings { other_attributes: AttributeChoice::Ranged, ..settings() };
     refused(&raw, &settings, "velocity has values that are not finite");
 }
 
@@ -418,9 +382,7 @@ fn generated_boxes_are_those_of_the_generator() {
     assert_eq!(report.index.radius, RadiusIndex::Common(0.125));
     let file = NativeFile::open(&path, Access::Map).expect("whole");
     let raw = file.frame().expect("unchanged").to_raw().expect("whole");
-    let Positions::F32(mut found) = raw.positions else {
-        panic!("relative to zero")
-    };
+    let Positions::F32(mut found) = raw.positions else { panic!("relative to zero") };
     let bits = |p: &Vec3| p.to_array().map(f32::to_bits);
     expected.sort_unstable_by_key(bits);
     found.sort_unstable_by_key(bits);
@@ -460,9 +422,7 @@ struct Ends(AtomicU64);
 
 impl Progress for Ends {
     fn advanced(&self, _phase: Phase, _done: u64, _total: u64) -> ControlFlow<()> {
-        let left = self
-            .0
-            .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1));
+        let left = self.0.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1));
         match left {
             Ok(_) => ControlFlow::Continue(()),
             Err(_) => ControlFlow::Break(()),
@@ -481,10 +441,7 @@ fn interrupted_conversion_leaves_no_files() {
     let run = |calls: u64, limits: Limits| {
         let columns = StoredColumns::choose(&source, &settings, &path).expect("fit");
         let ends = Ends(AtomicU64::new(calls));
-        let request = ConvertRequest {
-            progress: &ends,
-            ..request(&source, &path, &settings)
-        };
+        let request = ConvertRequest { progress: &ends, ..request(&source, &path, &settings) };
         convert_within(request, columns, limits)
     };
     for limits in [whole(), tight(4096, 0)] {
@@ -506,10 +463,7 @@ fn full_spill_disk_is_an_error() {
     let source = RawSource::new(Path::new("raw"), &raw).expect("whole");
     let dir = tempfile::tempdir().expect("a temporary directory");
     let path = dir.path().join("a.spf");
-    let settings = ConvertSettings {
-        scratch_dir: Some(dir.path().join("none")),
-        ..settings()
-    };
+    let settings = ConvertSettings { scratch_dir: Some(dir.path().join("none")), ..settings() };
     let error = convert_to(&path, &source, &settings, tight(4096, 0)).expect_err("no directory");
     assert!(matches!(error, ConvertError::Frame(FrameError::Io { .. })));
     assert!(error.to_string().contains("none"), "{error}");
@@ -572,10 +526,7 @@ fn budgets_add_up_to_the_memory_limit() {
         (4_000_000, 64 << 20, 0),
         (u64::from(u32::MAX), 64 << 20, 400),
     ] {
-        let settings = ConvertSettings {
-            memory,
-            ..ConvertSettings::default()
-        };
+        let settings = ConvertSettings { memory, ..ConvertSettings::default() };
         let limits = Limits::of(&settings, count, width, 8);
         assert!(!limits.is_whole);
         let parts = limits.part_len * (58 + 2 * width);
@@ -587,10 +538,7 @@ fn budgets_add_up_to_the_memory_limit() {
     let small = Limits::of(&ConvertSettings::default(), 10_000_000, 12, 12);
     assert!(small.is_whole);
     // The showcase keeps all particles in memory.
-    let settings = ConvertSettings {
-        memory: 12 * gib,
-        ..ConvertSettings::default()
-    };
+    let settings = ConvertSettings { memory: 12 * gib, ..ConvertSettings::default() };
     let limits = Limits::of(&settings, 1_000_000_000, 0, 8);
     assert!(limits.chunks * limits.chunk_len > 1_000_000_000);
 }

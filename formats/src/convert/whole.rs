@@ -32,10 +32,7 @@ fn load(output: &mut FrameOutput, limits: &Limits) -> Result<PartData, ConvertEr
     let (count, width) = (output.survey.count, columns.width());
     let count = usize::try_from(count).unwrap_or(usize::MAX);
     // Allocate the particles
-    let mut part = PartData {
-        positions: vec![Vec3::ZERO; count],
-        rows: vec![0; count * width],
-    };
+    let mut part = PartData { positions: vec![Vec3::ZERO; count], rows: vec![0; count * width] };
     // Give each batch its own range of them
     let (mut positions, mut rows) = (&mut part.positions[..], &mut part.rows[..]);
     let mut places = Vec::with_capacity(kept.len());
@@ -46,33 +43,28 @@ fn load(output: &mut FrameOutput, limits: &Limits) -> Result<PartData, ConvertEr
         (own_rows, rows) = rows.split_at_mut(own.len() * width);
         places.push((number, own, own_rows));
     }
-    let (batches, errors) = (
-        BufferPool::<Batch>::default(),
-        Mutex::new(&mut output.errors),
-    );
+    let (batches, errors) = (BufferPool::<Batch>::default(), Mutex::new(&mut output.errors));
     // Read the batches in parallel
-    places
-        .into_par_iter()
-        .try_for_each(|(number, positions, rows)| {
-            let mut batch = batches.take();
-            let stretch = ParticleRange::nth(number, limits.batch_len, request.source.count());
-            batch.read_positions(request.source, request.settings.origin, stretch)?;
-            // Check that the source has not changed since the survey
-            if batch.positions.len() != positions.len() {
-                return Err(request.changed());
-            }
-            // Store the rows and the errors of the attributes
-            let mut own_errors = vec![0.0; columns.attributes.len()];
-            batch.read_rows(request.source, columns, stretch, &mut own_errors)?;
-            positions.copy_from_slice(&batch.positions);
-            rows.copy_from_slice(&batch.rows);
-            let mut errors = errors.lock().unwrap_or_else(|e| e.into_inner());
-            for (all, own) in errors.iter_mut().zip(own_errors) {
-                *all = all.max(own);
-            }
-            drop(errors);
-            batches.put(batch);
-            Ok(())
-        })?;
+    places.into_par_iter().try_for_each(|(number, positions, rows)| {
+        let mut batch = batches.take();
+        let stretch = ParticleRange::nth(number, limits.batch_len, request.source.count());
+        batch.read_positions(request.source, request.settings.origin, stretch)?;
+        // Check that the source has not changed since the survey
+        if batch.positions.len() != positions.len() {
+            return Err(request.changed());
+        }
+        // Store the rows and the errors of the attributes
+        let mut own_errors = vec![0.0; columns.attributes.len()];
+        batch.read_rows(request.source, columns, stretch, &mut own_errors)?;
+        positions.copy_from_slice(&batch.positions);
+        rows.copy_from_slice(&batch.rows);
+        let mut errors = errors.lock().unwrap_or_else(|e| e.into_inner());
+        for (all, own) in errors.iter_mut().zip(own_errors) {
+            *all = all.max(own);
+        }
+        drop(errors);
+        batches.put(batch);
+        Ok(())
+    })?;
     Ok(part)
 }

@@ -8,60 +8,24 @@ use crate::ParseError;
 
 /// Magic bytes at the start, and the message.
 const MAGICS: &[(&[u8], &str)] = &[
-    (
-        b"Ogawa",
-        "an Alembic file, which is not read; export the points as .ply or .bgeo",
-    ),
-    (
-        b"scf1",
-        "blosc inside another compression, which is not read; unpack it once with hsc",
-    ),
-    (
-        b"PGEOMETRY",
-        "a Houdini text .geo, which is not read; convert to classic .bgeo with partio",
-    ),
+    (b"Ogawa", "an Alembic file, which is not read; export the points as .ply or .bgeo"),
+    (b"scf1", "blosc inside another compression, which is not read; unpack it once with hsc"),
+    (b"PGEOMETRY", "a Houdini text .geo, which is not read; convert to classic .bgeo with partio"),
     (b"\x9e\x02\0\0", PDB),
     (b"\0\0\x02\x9e", PDB),
-    (
-        b"ATTRIBUTES",
-        "a PDA particle file, which is not read; convert to .bgeo with partio",
-    ),
-    (
-        b"PDC ",
-        "a Maya PDC cache, which is not read; convert to .bgeo with partio",
-    ),
-    (
-        b"\xc0PRT\r\n\x1a\n",
-        "a Krakatoa PRT file, which is not read; convert to .bgeo with partio",
-    ),
-    (
-        b"\x28\xb5\x2f\xfd",
-        "zstd inside another compression, which is not read; unpack it once",
-    ),
-    (
-        b"\xfd7zXZ\0",
-        "xz inside another compression, which is not read; unpack it once",
-    ),
-    (
-        b"BZh",
-        "bzip2 inside another compression, which is not read; unpack it once",
-    ),
-    (
-        b"\x04\x22\x4d\x18",
-        "LZ4 inside another compression, which is not read; unpack it once",
-    ),
-    (
-        b"\x1f\x8b",
-        "gzip inside gzip or another compression, which is not read; unpack it once",
-    ),
+    (b"ATTRIBUTES", "a PDA particle file, which is not read; convert to .bgeo with partio"),
+    (b"PDC ", "a Maya PDC cache, which is not read; convert to .bgeo with partio"),
+    (b"\xc0PRT\r\n\x1a\n", "a Krakatoa PRT file, which is not read; convert to .bgeo with partio"),
+    (b"\x28\xb5\x2f\xfd", "zstd inside another compression, which is not read; unpack it once"),
+    (b"\xfd7zXZ\0", "xz inside another compression, which is not read; unpack it once"),
+    (b"BZh", "bzip2 inside another compression, which is not read; unpack it once"),
+    (b"\x04\x22\x4d\x18", "LZ4 inside another compression, which is not read; unpack it once"),
+    (b"\x1f\x8b", "gzip inside gzip or another compression, which is not read; unpack it once"),
     (
         b"\x02\x21\x4c\x18",
         "the older LZ4 format, which is not read; compress with another version of `lz4`, or without -l",
     ),
-    (
-        b" BDV",
-        "an OpenVDB volume, which is not read; export the points as .ply or .bgeo",
-    ),
+    (b" BDV", "an OpenVDB volume, which is not read; export the points as .ply or .bgeo"),
     (b"\x76\x2f\x31\x01", IMAGE),
     (b"\x89PNG", IMAGE),
     (b"\xff\xd8\xff", IMAGE),
@@ -81,26 +45,11 @@ const MAGICS: &[(&[u8], &str)] = &[
         b"MATLAB ",
         "a MATLAB file, which is not read; write positions and attributes to .npz with SciPy and numpy",
     ),
-    (
-        b"PAR1",
-        "a Parquet file, which is not read; write .csv or .npz with pandas",
-    ),
-    (
-        b"SQLite format 3",
-        "an SQLite database, which is not read; write the particles as .csv",
-    ),
-    (
-        b"BLENDER",
-        "a Blender file, which is not read; export the points as .ply",
-    ),
-    (
-        b"Kaydara FBX",
-        "an FBX file, which is not read; export the points as .ply",
-    ),
-    (
-        b"glTF",
-        "a glTF file, which is not read; export the points as .ply",
-    ),
+    (b"PAR1", "a Parquet file, which is not read; write .csv or .npz with pandas"),
+    (b"SQLite format 3", "an SQLite database, which is not read; write the particles as .csv"),
+    (b"BLENDER", "a Blender file, which is not read; export the points as .ply"),
+    (b"Kaydara FBX", "an FBX file, which is not read; export the points as .ply"),
+    (b"glTF", "a glTF file, which is not read; export the points as .ply"),
     (
         b"LASF",
         "a LAS or LAZ point cloud, which is not read; write .ply or .csv with PDAL (`pdal translate in.las out.ply`)",
@@ -139,11 +88,7 @@ pub(super) fn refuse(head: &[u8], path: &Path, shortest: usize) -> Result<(), Pa
         .or_else(|| by_structure(head))
         .or_else(|| is_lammps_binary(head, path).then_some(LAMMPS_BINARY))
         .or_else(|| is_dualsphysics(head, path).then_some(DUALSPHYSICS))
-        .or_else(|| {
-            path.extension()
-                .is_some_and(|end| end == "bp")
-                .then_some(ADIOS)
-        })
+        .or_else(|| path.extension().is_some_and(|end| end == "bp").then_some(ADIOS))
         .or_else(|| is_houdini_json(head).then_some(HOUDINI_JSON))
         .or_else(|| is_xdmf(head).then_some(XDMF));
     what.map_or(Ok(()), |what| Err(ParseError::unsupported(what)))
@@ -172,9 +117,7 @@ fn by_structure(head: &[u8]) -> Option<&'static str> {
 fn is_dualsphysics(head: &[u8], path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let name = name.to_ascii_lowercase();
-    let named = [".ibi4", ".obi4", ".bi2"]
-        .iter()
-        .any(|end| name.ends_with(end));
+    let named = [".ibi4", ".obi4", ".bi2"].iter().any(|end| name.ends_with(end));
     named || (head.starts_with(b"#File ") && head.contains(&0))
 }
 

@@ -121,10 +121,7 @@ mod tests {
 
     #[test]
     fn content_has_precedence_over_the_name() {
-        assert_eq!(
-            detect("a.ply", b"# vtk DataFile Version 4.2\nx\n"),
-            vtk::FORMAT
-        );
+        assert_eq!(detect("a.ply", b"# vtk DataFile Version 4.2\nx\n"), vtk::FORMAT);
         assert_eq!(detect("a.vtk", b"ply\nformat ascii 1.0\n"), ply::FORMAT);
         assert_eq!(detect("a", b"BgeoV\0\0\0\x05"), bgeo::FORMAT);
         assert_eq!(detect("a", b"#FileJBD JPartDataBi4   "), bi4::FORMAT);
@@ -138,10 +135,7 @@ mod tests {
         assert_eq!(detect("a", b"PXR-USDC\0\x08\0"), usd::FORMAT);
         assert_eq!(detect("a.xyz", &[0xdf, 0x65].repeat(4)), gsd::FORMAT);
         #[cfg(feature = "hdf5")]
-        assert_eq!(
-            detect("a.xyz", b"\x89HDF\r\n\x1a\n"),
-            crate::read::hdf5::FORMAT
-        );
+        assert_eq!(detect("a.xyz", b"\x89HDF\r\n\x1a\n"), crate::read::hdf5::FORMAT);
         let vtu = b"<?xml version=\"1.0\"?>\n<VTKFile header_type=\"UInt64\" type=\"PolyData\">";
         assert_eq!(detect("a.vtk", vtu), vtk_xml::FORMAT);
     }
@@ -155,16 +149,9 @@ mod tests {
         assert_eq!(detect("a.txt", b"3\n\nH 0 0 0\n"), xyz::FORMAT);
         assert_eq!(detect("a.dat", b"# x y z\n0 1 2\n3 4 5\n"), xyz::FORMAT);
         assert_eq!(detect("a.txt", b"0,1,2\n3,4,5\n"), csv::FORMAT);
-        assert_eq!(
-            detect("a.dat", b"Pos.x [m];Pos.y [m];Pos.z [m];\n0;1;2;\n"),
-            csv::FORMAT
-        );
+        assert_eq!(detect("a.dat", b"Pos.x [m];Pos.y [m];Pos.z [m];\n0;1;2;\n"), csv::FORMAT);
         assert_eq!(detect("a.csv", b"\xef\xbb\xbfx,y,z\n"), csv::FORMAT);
-        refused(
-            "README.txt",
-            b"these are\nsome words\n",
-            "no particle format",
-        );
+        refused("README.txt", b"these are\nsome words\n", "no particle format");
         refused("a.dat", &[0, 1, 2, 3], "bytes 00 01 02 03");
     }
 
@@ -179,24 +166,12 @@ mod tests {
     fn known_unsupported_formats_have_a_remedy() {
         let collection = b"<VTKFile type=\"Collection\" version=\"0.1\">";
         refused("a.pvd", collection, "give one of the files");
-        refused(
-            "a.pvtu",
-            b"<VTKFile type='PUnstructuredGrid'>",
-            "lists other files",
-        );
-        refused(
-            "a.vtm",
-            b"<VTKFile type=\"vtkMultiBlockDataSet\">",
-            "lists other files",
-        );
+        refused("a.pvtu", b"<VTKFile type='PUnstructuredGrid'>", "lists other files");
+        refused("a.vtm", b"<VTKFile type=\"vtkMultiBlockDataSet\">", "lists other files");
         refused("a.vti", b"<VTKFile type=\"ImageData\">", "ImageData");
         let odd = b"<VTKFile type=\"a\n\x1b[2J\">";
         refused("a.vti", odd, r"type a\n\u{1b}[2J is not read");
-        refused(
-            "a.csv",
-            b"a title\n\n2 atoms\n1 atom types\n",
-            "LAMMPS data file",
-        );
+        refused("a.csv", b"a title\n\n2 atoms\n1 atom types\n", "LAMMPS data file");
         refused("a.gsd", &[0x65, 0xdf].repeat(4), "big-endian");
         refused("Part_0001.bi2", &[1, 2, 3], "DualSPHysics");
         refused("Part_0001", b"#File JPartDataBi4\0\0", "DualSPHysics");
@@ -227,11 +202,7 @@ mod tests {
         refused("a.exr", b"\x76\x2f\x31\x01", "image");
         refused("a.gz", b"\x1f\x8b\x08", "gzip inside gzip");
         refused("a.laz", b"LASF\0\0\0\0", "pdal");
-        refused(
-            "a.tpr",
-            b"\0\0\0\x0d\0\0\0\x0cVERSION 5.1.2",
-            "gmx editconf",
-        );
+        refused("a.tpr", b"\0\0\0\x0d\0\0\0\x0cVERSION 5.1.2", "gmx editconf");
         let mut tng = vec![1; 40];
         tng.extend(b"GENERAL INFO\0");
         refused("a.tng", &tng, "gmx trjconv");

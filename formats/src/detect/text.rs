@@ -36,9 +36,7 @@ const FORMATS: &[TextFormat] = &[
     ),
     (
         |lines| {
-            lines
-                .get(3)
-                .is_some_and(|line| line.ends_with(b"V2000") || line.ends_with(b"V3000"))
+            lines.get(3).is_some_and(|line| line.ends_with(b"V2000") || line.ends_with(b"V3000"))
         },
         "an MDL file (.mol, .sdf), which is not read; write .pdb or .xyz with Open Babel (`obabel in.sdf -O out.pdb`)",
     ),
@@ -85,14 +83,10 @@ const PQR: &str = "a PQR file, which is not read; write a table x,y,z,radius (.c
 
 /// The message for `head`, the beginning of the file `path`, if that is one of the formats.
 pub(super) fn what(head: &[u8], path: &Path) -> Option<&'static str> {
-    let lines: Vec<&[u8]> = head
-        .split(|b| *b == b'\n')
-        .map(|line| line.strip_suffix(b"\r").unwrap_or(line))
-        .collect();
+    let lines: Vec<&[u8]> =
+        head.split(|b| *b == b'\n').map(|line| line.strip_suffix(b"\r").unwrap_or(line)).collect();
     let format = FORMATS.iter().find(|(is_one, _)| is_one(&lines));
-    let is_named_pqr = path
-        .extension()
-        .is_some_and(|end| end.eq_ignore_ascii_case("pqr"));
+    let is_named_pqr = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("pqr"));
     format
         .map(|(_, what)| *what)
         .or_else(|| (is_named_pqr && has_only_remarks(&lines)).then_some(PQR))
@@ -167,9 +161,7 @@ fn is_count(word: &[u8]) -> bool {
 /// meant.
 fn is_poscar(lines: &Lines<'_>) -> bool {
     let has_edges = (2..5).all(|line| has_numbers(lines.get(line), 3));
-    let counts = [5, 6]
-        .into_iter()
-        .find(|line| has_integers(lines.get(*line)));
+    let counts = [5, 6].into_iter().find(|line| has_integers(lines.get(*line)));
     let mode = counts.and_then(|line| lines.get(line + 1)?.trim_ascii_start().first());
     let is_mode = mode.is_some_and(|mode| b"cCkKdDsS".contains(mode));
     has_numbers(lines.get(1), 1) && has_edges && is_mode
@@ -183,11 +175,7 @@ fn is_tinker(lines: &Lines<'_>) -> bool {
             && words.next().is_some_and(|word| number(word).is_none())
     };
     let is_atom = |line: Option<&&[u8]>| {
-        let words: Vec<&[u8]> = line
-            .into_iter()
-            .flat_map(|line| words(line))
-            .take(6)
-            .collect();
+        let words: Vec<&[u8]> = line.into_iter().flat_map(|line| words(line)).take(6).collect();
         let [index, name, place @ .., kind] = words.as_slice() else {
             return false;
         };
@@ -210,9 +198,8 @@ fn is_mdcrd(lines: &Lines<'_>) -> bool {
     };
     let is_row = |line: &&[u8]| line.len() == 10 * WIDTH && line.chunks(WIDTH).all(is_field);
     let title = numbers(lines.first());
-    let names_columns = first(lines, |line| {
-        line.starts_with(b"#") || crate::read::csv::finds_columns(line)
-    });
+    let names_columns =
+        first(lines, |line| line.starts_with(b"#") || crate::read::csv::finds_columns(line));
     title.is_none_or(|numbers| numbers.is_empty())
         && !names_columns
         && lines.get(1).is_some_and(is_row)
@@ -222,12 +209,8 @@ fn is_mdcrd(lines: &Lines<'_>) -> bool {
 fn is_charmm_card(lines: &Lines<'_>) -> bool {
     let is_title = |line: &&&[u8]| line.starts_with(b"*");
     let titles = lines.iter().take_while(is_title).count();
-    let atom: Vec<&[u8]> = lines
-        .get(titles + 1)
-        .into_iter()
-        .flat_map(|line| words(line))
-        .take(5)
-        .collect();
+    let atom: Vec<&[u8]> =
+        lines.get(titles + 1).into_iter().flat_map(|line| words(line)).take(5).collect();
     let is_atom = matches!(*atom.as_slice(), [index, residue, _, name, x]
         if is_count(index) && is_count(residue) && number(name).is_none() && number(x).is_some());
     let count = lines.get(titles).and_then(|line| words(line).next());
@@ -248,20 +231,14 @@ fn is_dl_poly(lines: &Lines<'_>) -> bool {
     let has_edges = *boundary > 0.0;
     let atom = if has_edges { 5 } else { 2 };
     let edges = (2..atom).all(|line| has_numbers(lines.get(line), 3));
-    let name: Vec<&[u8]> = lines
-        .get(atom)
-        .into_iter()
-        .flat_map(|line| words(line))
-        .take(3)
-        .collect();
+    let name: Vec<&[u8]> =
+        lines.get(atom).into_iter().flat_map(|line| words(line)).take(3).collect();
     let is_name = match *name.as_slice() {
         [name] => number(name).is_none(),
         [name, index, ..] => number(name).is_none() && integer(index).is_some(),
         [] => false,
     };
-    let is_history = lines
-        .get(2)
-        .is_some_and(|line| line.starts_with(b"timestep "));
+    let is_history = lines.get(2).is_some_and(|line| line.starts_with(b"timestep "));
     is_history || (edges && is_name && has_numbers(lines.get(atom + 1), 3))
 }
 
@@ -269,9 +246,7 @@ fn is_dl_poly(lines: &Lines<'_>) -> bool {
 fn is_pqr(lines: &Lines<'_>) -> bool {
     let is_atom = |line: &&&[u8]| line.starts_with(b"ATOM ") || line.starts_with(b"HETATM ");
     let has_places = |line: &[u8]| {
-        let mut fields = [30, 38, 46]
-            .into_iter()
-            .map(|start| line.get(start..start + 8));
+        let mut fields = [30, 38, 46].into_iter().map(|start| line.get(start..start + 8));
         fields.all(|field| field.is_some_and(|field| number(field.trim_ascii()).is_some()))
     };
     let is_pqr_atom = |line: &[u8]| {
@@ -279,10 +254,7 @@ fn is_pqr(lines: &Lines<'_>) -> bool {
         let real = words.iter().rev().take_while(|word| number(word).is_some());
         matches!(words.len(), 10 | 11) && real.count() >= 5 && !has_places(line)
     };
-    lines
-        .iter()
-        .find(is_atom)
-        .is_some_and(|line| is_pqr_atom(line))
+    lines.iter().find(is_atom).is_some_and(|line| is_pqr_atom(line))
 }
 
 #[cfg(test)]
@@ -309,16 +281,10 @@ mod tests {
              0 1 xlo xhi\n0 1 ylo yhi\n0 1 zlo zhi\n\nAtoms # atomic\n\n1 1 0 0 0\n",
             "write_dump",
         );
-        suggests(
-            "# made by hand\n\n  3  atoms # all\n-1 1.5 xlo xhi\n",
-            "LAMMPS data",
-        );
+        suggests("# made by hand\n\n  3  atoms # all\n-1 1.5 xlo xhi\n", "LAMMPS data");
         suggests("---\ncreator: LAMMPS\ntimestep: 0\n", "dump custom");
         suggests("PSF CMAP\n\n 1 !NTITLE\n", "--topology beside");
-        suggests(
-            "%VERSION  VERSION_STAMP = V0001.000\n%FLAG TITLE\n",
-            "prmtop",
-        );
+        suggests("%VERSION  VERSION_STAMP = V0001.000\n%FLAG TITLE\n", "prmtop");
         for before in ["", "\n", "%COMMENT from a script\n"] {
             let section =
                 "%FLAG TITLE\n%FORMAT(20a4)\nACE\n%FLAG POINTERS\n%FORMAT(10I8)\n       3       1";
@@ -334,18 +300,9 @@ mod tests {
             "PCD",
         );
         let cell = "4.0 0 0\n0 4.0 0\n0 0 4.0\n";
-        suggests(
-            &format!("Cr metal\n1.0\n{cell}Cr O\n1 1\nDirect\n0 0 0\n0.5 0.5 0.5\n"),
-            "VASP",
-        );
-        suggests(
-            &format!("Cr metal\n1.0\n{cell}2\nCartesian\n0 0 0\n0.5 0.5 0.5\n"),
-            "VASP",
-        );
-        suggests(
-            "  2  water\n  1  O  0.1 0.2 0.3  1  2\n  2  H  1.1 0.2 0.3  2  1\n",
-            "Tinker",
-        );
+        suggests(&format!("Cr metal\n1.0\n{cell}Cr O\n1 1\nDirect\n0 0 0\n0.5 0.5 0.5\n"), "VASP");
+        suggests(&format!("Cr metal\n1.0\n{cell}2\nCartesian\n0 0 0\n0.5 0.5 0.5\n"), "VASP");
+        suggests("  2  water\n  1  O  0.1 0.2 0.3  1  2\n  2  H  1.1 0.2 0.3  2  1\n", "Tinker");
         let row =
             "   1.000  -2.500   3.000   4.000   5.000   6.000   7.000   8.000   9.000  10.000\n";
         suggests(&format!("ACE\n{row}{row}   1.000\n"), "mdcrd");
@@ -354,15 +311,9 @@ mod tests {
             "* a title\n*\n    1\n    1    1 TIP3 OH2    1.00000   2.00000   3.00000 W    1      0.00000\n",
             "CHARMM",
         );
-        suggests(
-            "TITLE\n water\nEND\nTIMESTEP\n 0 0.0\nEND\nPOSITIONRED\n 1 2 3\n",
-            "GROMOS",
-        );
+        suggests("TITLE\n water\nEND\nTIMESTEP\n 0 0.0\nEND\nPOSITIONRED\n 1 2 3\n", "GROMOS");
         suggests("Number of particles = 2\nA = 1.0 Angstrom\n", "AtomEye");
-        suggests(
-            &format!("a title\n  0  1  2\n{cell}Na 1\n 1 2 3\n"),
-            "DL_POLY",
-        );
+        suggests(&format!("a title\n  0  1  2\n{cell}Na 1\n 1 2 3\n"), "DL_POLY");
         suggests("a title\n 0 0 2 0.5\nNa\n 1 2 3\nCl\n 4 5 6\n", "DL_POLY");
         suggests(
             &format!("a title\n 0 1 2 3 26\ntimestep 1 2 0 1 0.001\n{cell}Na 1 22.9 1.0\n 1 2 3\n"),

@@ -49,10 +49,7 @@ impl CornerRange {
     /// [`ParseError::Malformed`] if there is no such vertex.
     pub(crate) fn vertex(self, at: usize, index: Option<u64>) -> Result<u32, ParseError> {
         let Some(index) = index else {
-            return Err(ParseError::malformed(
-                at,
-                "a vertex index is negative or no integer",
-            ));
+            return Err(ParseError::malformed(at, "a vertex index is negative or no integer"));
         };
         let found = u32::try_from(index).ok().filter(|i| *i < self.count);
         found.map(|i| self.first + i).ok_or_else(|| {
@@ -67,10 +64,7 @@ impl MeshBuilder {
     /// A mesh without vertices, which may take as much memory as `budget`.
     pub(crate) const fn new(budget: MemoryBudget) -> Self {
         Self {
-            mesh: Mesh {
-                vertices: Vec::new(),
-                triangles: Vec::new(),
-            },
+            mesh: Mesh { vertices: Vec::new(), triangles: Vec::new() },
             corners: CornerRange { first: 0, count: 0 },
             budget,
             held: 0,
@@ -81,8 +75,7 @@ impl MeshBuilder {
     pub(super) const fn left(&self) -> MemoryBudget {
         let vertices = self.mesh.vertices.capacity() * size_of::<[f64; 3]>();
         let triangles = self.mesh.triangles.capacity() * size_of::<[u32; 3]>();
-        self.budget
-            .less(self.held.saturating_add((vertices + triangles) as u64))
+        self.budget.less(self.held.saturating_add((vertices + triangles) as u64))
     }
 
     /// Checks that the budget allows `more` bytes beside those of the mesh.
@@ -90,11 +83,7 @@ impl MeshBuilder {
     /// # Errors
     /// [`ParseError::TooLarge`].
     pub(crate) fn check(&self, more: u64) -> Result<(), ParseError> {
-        if more <= self.left().bytes() {
-            Ok(())
-        } else {
-            Err(self.budget.exceeded(TOO_LARGE))
-        }
+        if more <= self.left().bytes() { Ok(()) } else { Err(self.budget.exceeded(TOO_LARGE)) }
     }
 
     /// Counts `bytes` that are in memory beside the mesh.
@@ -121,10 +110,7 @@ impl MeshBuilder {
         let range = u32::try_from(first).ok().zip(u32::try_from(count).ok());
         let range = range.filter(|(first, count)| first.checked_add(*count).is_some());
         let Some((first, count)) = range else {
-            let what = format!(
-                "a mesh of {} vertices; at most 4294967295 are read",
-                first + count
-            );
+            let what = format!("a mesh of {} vertices; at most 4294967295 are read", first + count);
             return Err(ParseError::unsupported(what));
         };
         self.corners = CornerRange { first, count };
@@ -138,9 +124,7 @@ impl MeshBuilder {
                 }
             },
             Positions::F64(points) => {
-                self.mesh
-                    .vertices
-                    .extend(points.iter().map(|p| p.to_array()));
+                self.mesh.vertices.extend(points.iter().map(|p| p.to_array()));
             }
             Positions::F32(points) => {
                 let points = points.iter().map(|p| p.as_dvec3().to_array());

@@ -56,10 +56,7 @@ pub fn parse_mesh(bytes: &[u8], path: &Path, budget: MemoryBudget) -> Result<Mes
     } else if stl::is_ascii(bytes) {
         stl::read_ascii(bytes, budget)
     } else if bytes.is_empty() {
-        Err(ParseError::malformed(
-            0,
-            "the file is empty; perhaps it is still being written",
-        ))
+        Err(ParseError::malformed(0, "the file is empty; perhaps it is still being written"))
     } else if obj::is_obj(bytes) || is_named(path, ".obj") {
         obj::read(bytes, budget)
     } else if bytes.starts_with(b"solid") || is_named(path, ".stl") {

@@ -11,9 +11,8 @@ use crate::{MemoryBudget, ParseError};
 
 /// Whether the first statement is one that OBJ files begin with.
 pub(super) fn is_obj(bytes: &[u8]) -> bool {
-    const FIRST: [&[u8]; 12] = [
-        b"v", b"vt", b"vn", b"vp", b"f", b"l", b"p", b"o", b"g", b"s", b"mtllib", b"usemtl",
-    ];
+    const FIRST: [&[u8]; 12] =
+        [b"v", b"vt", b"vn", b"vp", b"f", b"l", b"p", b"o", b"g", b"s", b"mtllib", b"usemtl"];
     let first = Statements::new(bytes).find_map(|statement| statement.words().next());
     first.is_some_and(|keyword| FIRST.contains(&keyword))
 }
@@ -71,22 +70,13 @@ fn corner(
         let what = format!("has the corner {}; indices count from 1", shown(word));
         return Err(statement.fault(&what));
     };
-    let from_zero = if index > 0 {
-        index - 1
-    } else {
-        before.saturating_add(index)
-    };
+    let from_zero = if index > 0 { index - 1 } else { before.saturating_add(index) };
     let vertex = all.vertex(statement.at, u64::try_from(from_zero).ok());
     vertex.map_err(|_| {
         // With the index as the file has it.
-        let (there, count) = if index > 0 {
-            ("in the file", i64::from(all.count()))
-        } else {
-            ("before it", before)
-        };
-        statement.fault(&format!(
-            "refers to vertex {index}; vertices {there}: {count}"
-        ))
+        let (there, count) =
+            if index > 0 { ("in the file", i64::from(all.count())) } else { ("before it", before) };
+        statement.fault(&format!("refers to vertex {index}; vertices {there}: {count}"))
     })
 }
 
@@ -116,11 +106,7 @@ struct Statements<'a> {
 
 impl<'a> Statements<'a> {
     fn new(bytes: &'a [u8]) -> Self {
-        let mark = if bytes.starts_with(b"\xef\xbb\xbf") {
-            3
-        } else {
-            0
-        };
+        let mark = if bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
         Self { bytes, at: mark }
     }
 }

@@ -137,10 +137,7 @@ struct VertexMerger {
 
 impl VertexMerger {
     fn new(budget: MemoryBudget) -> Self {
-        Self {
-            builder: MeshBuilder::new(budget),
-            indices: HashMap::new(),
-        }
+        Self { builder: MeshBuilder::new(budget), indices: HashMap::new() }
     }
 
     fn add_triangle(&mut self, corners: [[f64; 3]; 3]) -> Result<(), ParseError> {
@@ -172,8 +169,7 @@ impl VertexMerger {
         const FIRST_ENTRIES: usize = 1792;
         let more = self.indices.len().max(FIRST_ENTRIES);
         // The old table is in memory until its entries are in the new one.
-        self.builder
-            .check((self.indices.len() + more) as u64 * ENTRY)?;
+        self.builder.check((self.indices.len() + more) as u64 * ENTRY)?;
         self.builder.hold(more as u64 * ENTRY);
         self.indices.try_reserve(more).map_err(|_| {
             ParseError::too_large("the table of its vertices is larger than free memory")

@@ -34,36 +34,12 @@ impl CellShape {
 
 const PIXEL: &[u8] = &[0, 1, 3, 2];
 const TETRA: &[&[u8]] = &[&[0, 1, 3], &[1, 2, 3], &[2, 0, 3], &[0, 2, 1]];
-const VOXEL: &[&[u8]] = &[
-    &[0, 4, 6, 2],
-    &[1, 3, 7, 5],
-    &[0, 1, 5, 4],
-    &[2, 6, 7, 3],
-    &[0, 2, 3, 1],
-    &[4, 5, 7, 6],
-];
-const HEXAHEDRON: &[&[u8]] = &[
-    &[0, 4, 7, 3],
-    &[1, 2, 6, 5],
-    &[0, 1, 5, 4],
-    &[3, 7, 6, 2],
-    &[0, 3, 2, 1],
-    &[4, 5, 6, 7],
-];
-const WEDGE: &[&[u8]] = &[
-    &[0, 1, 2],
-    &[3, 5, 4],
-    &[0, 3, 4, 1],
-    &[1, 4, 5, 2],
-    &[2, 5, 3, 0],
-];
-const PYRAMID: &[&[u8]] = &[
-    &[0, 3, 2, 1],
-    &[0, 1, 4],
-    &[1, 2, 4],
-    &[2, 3, 4],
-    &[3, 0, 4],
-];
+const VOXEL: &[&[u8]] =
+    &[&[0, 4, 6, 2], &[1, 3, 7, 5], &[0, 1, 5, 4], &[2, 6, 7, 3], &[0, 2, 3, 1], &[4, 5, 7, 6]];
+const HEXAHEDRON: &[&[u8]] =
+    &[&[0, 4, 7, 3], &[1, 2, 6, 5], &[0, 1, 5, 4], &[3, 7, 6, 2], &[0, 3, 2, 1], &[4, 5, 6, 7]];
+const WEDGE: &[&[u8]] = &[&[0, 1, 2], &[3, 5, 4], &[0, 3, 4, 1], &[1, 4, 5, 2], &[2, 5, 3, 0]];
+const PYRAMID: &[&[u8]] = &[&[0, 3, 2, 1], &[0, 1, 4], &[1, 2, 4], &[2, 3, 4], &[3, 0, 4]];
 
 /// The shape of cells of type `number` (`vtkCellType.h`); `None` for those that are not read.
 pub(super) const fn shape(number: u64) -> Option<CellShape> {
@@ -130,12 +106,7 @@ impl SurfaceFaces {
         if center.is_some_and(|center| is_inside_out(builder, &face[..count], center)) {
             face[..count].reverse();
         }
-        self.faces.push(Face {
-            corners: face,
-            key,
-            place,
-            is_of_volume: center.is_some(),
-        });
+        self.faces.push(Face { corners: face, key, place, is_of_volume: center.is_some() });
         Ok(())
     }
 

@@ -20,11 +20,7 @@ impl<'a> AttributeView<'a> {
         stored: StoredType,
         bytes: &'a [u8],
     ) -> Self {
-        Self {
-            index,
-            stored,
-            bytes,
-        }
+        Self { index, stored, bytes }
     }
 
     /// Name.
@@ -46,9 +42,8 @@ impl<'a> AttributeView<'a> {
     #[inline]
     pub fn get(&self, index: usize, component: usize) -> f64 {
         let range = self.index.ranges.get(component).copied();
-        self.bytes_of(index, component).map_or(f64::NAN, |bytes| {
-            self.stored.value(bytes, range.unwrap_or_default())
-        })
+        self.bytes_of(index, component)
+            .map_or(f64::NAN, |bytes| self.stored.value(bytes, range.unwrap_or_default()))
     }
 
     /// The value of particle `index`; the Euclidean length of a vector, as in [`Attribute::magnitude`].
@@ -111,11 +106,7 @@ impl<'a> AttributeView<'a> {
                 AttributeData::F32(self.decoded(self.bytes).collect())
             }
         };
-        Ok(Attribute {
-            name: self.index.name.clone(),
-            components: self.components(),
-            data,
-        })
+        Ok(Attribute { name: self.index.name.clone(), components: self.components(), data })
     }
 
     #[expect(
@@ -134,9 +125,7 @@ impl<'a> AttributeView<'a> {
     #[inline]
     fn bytes_of(&self, index: usize, component: usize) -> Option<&'a [u8]> {
         let size = self.stored.size();
-        let place = index
-            .checked_mul(self.components())?
-            .checked_add(component)?;
+        let place = index.checked_mul(self.components())?.checked_add(component)?;
         let start = place.checked_mul(size)?;
         self.bytes.get(start..start.checked_add(size)?)
     }

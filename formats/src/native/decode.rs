@@ -182,15 +182,9 @@ impl NativeFrame<'_> {
 }
 
 fn wants_radius(attributes: &[Attribute]) -> bool {
-    !attributes
-        .iter()
-        .any(|a| a.name.eq_ignore_ascii_case(RADIUS))
+    !attributes.iter().any(|a| a.name.eq_ignore_ascii_case(RADIUS))
 }
 
 fn radii(values: Vec<f32>) -> Attribute {
-    Attribute {
-        name: RADIUS.to_owned(),
-        components: 1,
-        data: AttributeData::F32(values),
-    }
+    Attribute { name: RADIUS.to_owned(), components: 1, data: AttributeData::F32(values) }
 }

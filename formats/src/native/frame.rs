@@ -28,11 +28,8 @@ pub struct StoreSettings {
 
 impl StoreSettings {
     /// Stores positions and radii without loss.
-    pub const EXACT: Self = Self {
-        encoding: Some(Encoding::F32),
-        bound: Bound::None,
-        rounding: 0.0,
-    };
+    pub const EXACT: Self =
+        Self { encoding: Some(Encoding::F32), bound: Bound::None, rounding: 0.0 };
 }
 
 /// Writes `frame` to `path` in tree order, without loss.
@@ -85,9 +82,8 @@ fn store_checked(
         Some(Radius::Common(radius)) => Some(*radius),
         _ => radii.as_deref().map(smallest),
     };
-    let encoding = settings
-        .encoding
-        .unwrap_or_else(|| smallest_encoding(&positions, settings.bound, common));
+    let encoding =
+        settings.encoding.unwrap_or_else(|| smallest_encoding(&positions, settings.bound, common));
     // Describe the frame
     let spec = FrameSpec {
         is_y_up: false,
@@ -150,10 +146,7 @@ fn smallest(radii: &[f32]) -> f32 {
 
 /// Whether readers take radii from this attribute first, so that the radii need not be stored again.
 fn holds_radii(attribute: &Attribute) -> bool {
-    let is_float = matches!(
-        attribute.data,
-        AttributeData::F32(_) | AttributeData::F64(_)
-    );
+    let is_float = matches!(attribute.data, AttributeData::F32(_) | AttributeData::F64(_));
     is_float && attribute.components == 1 && attribute.name.eq_ignore_ascii_case(RADIUS)
 }
 

@@ -272,10 +272,7 @@ pub fn parse(bytes: &[u8]) -> Result<FrameIndex, ParseError> {
     let mut aligned = AlignedVec::<16>::with_capacity(index.len());
     aligned.extend_from_slice(index);
     let damaged = |e: rancor::Error| {
-        ParseError::malformed(
-            offset,
-            format!("the index is damaged: {e}; convert it again"),
-        )
+        ParseError::malformed(offset, format!("the index is damaged: {e}; convert it again"))
     };
     let archived = rkyv::access::<ArchivedFrameIndex, rancor::Error>(&aligned).map_err(damaged)?;
     let index = rkyv::deserialize::<FrameIndex, rancor::Error>(archived).map_err(damaged)?;
@@ -296,10 +293,7 @@ fn index_range(bytes: &[u8]) -> Result<std::ops::Range<usize>, ParseError> {
     // Check the magic bytes and the checksum
     let header: &[u8; HEADER_LEN] = bytes.first_chunk().ok_or_else(short)?;
     if !header.starts_with(MAGIC) {
-        return Err(ParseError::malformed(
-            0,
-            "no native frame: the magic bytes are missing",
-        ));
+        return Err(ParseError::malformed(0, "no native frame: the magic bytes are missing"));
     }
     let word = |at: usize| u64::from_le_bytes(std::array::from_fn(|i| header[at + i]));
     if word(56) != xxh3_64(&header[..56]) {
@@ -319,9 +313,7 @@ fn index_range(bytes: &[u8]) -> Result<std::ops::Range<usize>, ParseError> {
     let (file_len, offset, len) = (word(16), word(24), word(32));
     if file_len != bytes.len() as u64 {
         return Err(ParseError::malformed(
-            bytes
-                .len()
-                .min(usize::try_from(file_len).unwrap_or(usize::MAX)),
+            bytes.len().min(usize::try_from(file_len).unwrap_or(usize::MAX)),
             format!(
                 "the file should have {file_len} bytes, but has {}; copy or convert it again",
                 bytes.len()
@@ -331,11 +323,7 @@ fn index_range(bytes: &[u8]) -> Result<std::ops::Range<usize>, ParseError> {
     // Find the index and check its checksum
     let index = usize::try_from(offset)
         .ok()
-        .zip(
-            offset
-                .checked_add(len)
-                .and_then(|end| usize::try_from(end).ok()),
-        )
+        .zip(offset.checked_add(len).and_then(|end| usize::try_from(end).ok()))
         .filter(|(start, end)| *start >= HEADER_LEN && *start <= *end && *end == bytes.len())
         .map(|(start, end)| start..end)
         .ok_or_else(|| {
@@ -363,10 +351,7 @@ fn check_index(index: &FrameIndex, end: usize) -> Result<(), ParseError> {
             ))
         })?;
     // Check the sections of the tree
-    let check = SectionCheck {
-        count: index.count,
-        end,
-    };
+    let check = SectionCheck { count: index.count, end };
     let positions = positions_len(index.count, encoding);
     check.length("the positions", &index.positions, positions)?;
     check.length("the nodes", &index.nodes, nodes_len(index.count))?;
@@ -376,11 +361,7 @@ fn check_index(index: &FrameIndex, end: usize) -> Result<(), ParseError> {
     };
     let wide = index.wide.len / size_of::<Block>() as u64;
     let is_whole = index.wide.len.is_multiple_of(size_of::<Block>() as u64) && wide <= most;
-    check.length(
-        "the wide blocks",
-        &index.wide,
-        is_whole.then_some(index.wide.len),
-    )?;
+    check.length("the wide blocks", &index.wide, is_whole.then_some(index.wide.len))?;
     // Check the origin and the bounds
     let numbers = index.origin.iter().chain([&index.max_error]);
     let is_box = |i: usize| index.min[i].is_finite() && index.min[i] <= index.max[i];
@@ -399,10 +380,7 @@ fn check_index(index: &FrameIndex, end: usize) -> Result<(), ParseError> {
         return Err(ParseError::malformed(end, what));
     }
     // Check the attributes
-    index
-        .attributes
-        .iter()
-        .try_for_each(|attribute| check_attribute(attribute, check))
+    index.attributes.iter().try_for_each(|attribute| check_attribute(attribute, check))
 }
 
 fn check_radius(index: &FrameIndex, check: SectionCheck) -> Result<(), ParseError> {

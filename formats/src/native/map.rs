@@ -3,10 +3,7 @@
 //! Another process may truncate a file while it is mapped; an access to a missing page then raises a signal
 //! that ends the process. This module replaces such pages with zeros and marks the file as lost. The caller
 //! detects the loss afterwards, and one frame fails instead of the whole job.
-#![expect(
-    unsafe_code,
-    reason = "mapping has no safe form; every block says why it is sound"
-)]
+#![expect(unsafe_code, reason = "mapping has no safe form; every block says why it is sound")]
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -140,11 +137,7 @@ impl NativeFile {
             Access::Read => FileBytes::Read(read(path)?),
         };
         let index = parse(bytes.as_slice()).map_err(|e| e.in_file(path))?;
-        Ok(Self {
-            path: path.to_owned(),
-            bytes,
-            index,
-        })
+        Ok(Self { path: path.to_owned(), bytes, index })
     }
 
     /// The path of the file.
@@ -283,9 +276,7 @@ mod guard {
             let start = map.as_ptr() as usize;
             let free = REGION.iter().position(|region| {
                 let taken =
-                    region
-                        .start
-                        .compare_exchange(0, 1, Ordering::AcqRel, Ordering::Relaxed);
+                    region.start.compare_exchange(0, 1, Ordering::AcqRel, Ordering::Relaxed);
                 taken.is_ok()
             });
             // Publish the addresses; the handler reads them once `start` is set
@@ -300,8 +291,7 @@ mod guard {
 
         /// Whether zeros replaced missing bytes.
         pub(super) fn has_lost(&self) -> bool {
-            self.place
-                .is_some_and(|place| REGION[place].lost.load(Ordering::Acquire))
+            self.place.is_some_and(|place| REGION[place].lost.load(Ordering::Acquire))
         }
     }
 
@@ -368,11 +358,7 @@ mod guard {
         // is repeated.
         // SAFETY: `before` is the action that the kernel returned for this signal.
         unsafe {
-            libc::sigaction(
-                libc::SIGBUS,
-                &raw const installed.before,
-                std::ptr::null_mut(),
-            );
+            libc::sigaction(libc::SIGBUS, &raw const installed.before, std::ptr::null_mut());
         }
     }
 }

@@ -161,12 +161,10 @@ impl CodeGrid {
         // `round` would be a function call on machines without an instruction for it.
         let nearest = ((exact + 0.5) as u32).min(self.largest);
         let lower = (nearest + 1).min(self.largest);
-        [nearest, nearest.saturating_sub(1), lower]
-            .into_iter()
-            .find(|code| {
-                let place = f64::from(self.base + *code as f32 * self.step);
-                self.planes[0] <= place && place <= self.planes[1]
-            })
+        [nearest, nearest.saturating_sub(1), lower].into_iter().find(|code| {
+            let place = f64::from(self.base + *code as f32 * self.step);
+            self.planes[0] <= place && place <= self.planes[1]
+        })
     }
 }
 
@@ -287,8 +285,7 @@ impl<B: StoredBlock> EncodedLeaves<B> {
         self.bounds = self.bounds.union(block.bounds());
         let reference = B::reference(index_u32(self.wide.len()));
         // Encodings without loss accept every block, so that this encoding has references.
-        self.blocks
-            .push(reference.expect("only coded blocks are refused"));
+        self.blocks.push(reference.expect("only coded blocks are refused"));
         self.wide.push(*block);
     }
 
@@ -322,10 +319,7 @@ fn room_for_spheres<B: StoredBlock>(block: &Block, radii: &BlockRadii) -> Aabb {
     let spheres = block.sphere_bounds(radii);
     // The stored box of the node exceeds this one by up to two steps of its planes, and so does the grid.
     let reach = 1.25 * B::half_steps() * spheres.size();
-    Aabb {
-        min: spheres.min - reach,
-        max: spheres.max + reach,
-    }
+    Aabb { min: spheres.min - reach, max: spheres.max + reach }
 }
 
 /// A block of up to 16 positions; the remaining lanes repeat the last one.

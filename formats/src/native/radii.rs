@@ -32,11 +32,7 @@ impl RadiusRange {
     pub fn within(low: f32, high: f32, bound: f64) -> Self {
         let is_fine = |code: &RadiusCode| f64::from(code.step(low, high)) * 0.5 <= bound * 0.999;
         let code = RadiusCode::ALL.into_iter().find(is_fine);
-        Self {
-            code: code.unwrap_or(RadiusCode::F32),
-            low,
-            high,
-        }
+        Self { code: code.unwrap_or(RadiusCode::F32), low, high }
     }
 
     /// The code of `radius`, and its decoded value.
@@ -52,11 +48,7 @@ impl RadiusRange {
             RadiusCode::U16 => 65_535.0,
             RadiusCode::U8 => 255.0,
         };
-        let exact = if step > 0.0 {
-            (radius - self.low) / step
-        } else {
-            0.0
-        };
+        let exact = if step > 0.0 { (radius - self.low) / step } else { 0.0 };
         let code = exact.round().clamp(0.0, largest) as u16;
         (code, self.low + f32::from(code) * step)
     }
@@ -78,11 +70,7 @@ impl RadiusRange {
             .with_min_len(1024)
             .map(error)
             .reduce(|| 0.0, f32::max);
-        CodedRadii {
-            bytes: self.bytes(radii),
-            blocks,
-            max_error,
-        }
+        CodedRadii { bytes: self.bytes(radii), blocks, max_error }
     }
 
     fn bytes(&self, radii: &[f32]) -> Vec<u8> {

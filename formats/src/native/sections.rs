@@ -41,11 +41,7 @@ impl SectionOffsets {
     pub(super) fn section(&mut self, len: u64) -> Option<SectionProgress> {
         let offset = self.next;
         self.next = offset.checked_add(len)?.checked_next_multiple_of(ALIGN)?;
-        Some(SectionProgress {
-            offset,
-            filled: 0,
-            hash: Xxh3::new(),
-        })
+        Some(SectionProgress { offset, filled: 0, hash: Xxh3::new() })
     }
 }
 
@@ -73,11 +69,7 @@ impl SectionProgress {
 
     /// The place and the checksum of the bytes written so far.
     pub(super) fn done(&self) -> Section {
-        Section {
-            offset: self.offset,
-            len: self.filled,
-            xxh3: self.hash.digest(),
-        }
+        Section { offset: self.offset, len: self.filled, xxh3: self.hash.digest() }
     }
 }
 
@@ -115,9 +107,7 @@ impl SectionWriter {
             .name("spherule-write".to_owned())
             .spawn(move || fill(filled, &to_write))?;
         let at_work = WriterThread { pieces, thread };
-        Ok(Self {
-            at_work: Some(at_work),
-        })
+        Ok(Self { at_work: Some(at_work) })
     }
 
     /// Appends `piece` to section number `section`.
@@ -139,8 +129,7 @@ impl SectionWriter {
     /// # Errors
     /// The system's error if a piece cannot be written.
     pub(super) fn finish(mut self) -> io::Result<WrittenSections> {
-        self.end()?
-            .ok_or_else(|| io::Error::other("an earlier part could not be written"))
+        self.end()?.ok_or_else(|| io::Error::other("an earlier part could not be written"))
     }
 
     fn end(&mut self) -> io::Result<Option<WrittenSections>> {
@@ -149,9 +138,7 @@ impl SectionWriter {
         };
         drop(pieces);
         let ended = thread.join();
-        ended
-            .unwrap_or_else(|fault| panic::resume_unwind(fault))
-            .map(Some)
+        ended.unwrap_or_else(|fault| panic::resume_unwind(fault)).map(Some)
     }
 }
 

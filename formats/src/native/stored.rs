@@ -89,10 +89,7 @@ impl StoredType {
         fn word<const N: usize>(bytes: &[u8]) -> [u8; N] {
             *bytes.first_chunk().expect("a whole value")
         }
-        #[expect(
-            clippy::cast_precision_loss,
-            reason = "values are looked at in double precision"
-        )]
+        #[expect(clippy::cast_precision_loss, reason = "values are looked at in double precision")]
         match self {
             Self::Plain(ScalarType::I8) => f64::from(i8::from_le_bytes(word(bytes))),
             Self::Plain(ScalarType::U8) => f64::from(bytes[0]),

@@ -14,9 +14,8 @@ use crate::{Attribute, AttributeData, FrameError, ParticleFrame, Positions, Radi
 const STRIDE: usize = if cfg!(miri) { 37 } else { 1 };
 
 fn frame(count: u8, origin: DVec3) -> ParticleFrame {
-    let positions: Vec<Vec3> = (0..count)
-        .map(|i| Vec3::new(f32::from(i), -0.0, 1.0 / f32::from(i + 1)))
-        .collect();
+    let positions: Vec<Vec3> =
+        (0..count).map(|i| Vec3::new(f32::from(i), -0.0, 1.0 / f32::from(i + 1))).collect();
     let ids = (0..u64::from(count)).map(|i| u64::MAX - i).collect();
     ParticleFrame {
         attributes: vec![
@@ -25,11 +24,7 @@ fn frame(count: u8, origin: DVec3) -> ParticleFrame {
                 components: 3,
                 data: AttributeData::F32(positions.iter().flat_map(Vec3::to_array).collect()),
             },
-            Attribute {
-                name: "id".into(),
-                components: 1,
-                data: AttributeData::U64(ids),
-            },
+            Attribute { name: "id".into(), components: 1, data: AttributeData::U64(ids) },
         ],
         positions,
         origin,
@@ -69,18 +64,12 @@ fn by_id(raw: &RawParticles, count: usize) -> Vec<(DVec3, [f64; 3])> {
         let found = raw.attributes.iter().find(|a| a.name == name);
         &found.expect("kept").data
     };
-    let AttributeData::U64(ids) = named("id") else {
-        panic!("ids changed their type")
-    };
+    let AttributeData::U64(ids) = named("id") else { panic!("ids changed their type") };
     let mut all = vec![None; count];
     for (i, id) in ids.iter().enumerate() {
         let velocity = [0, 1, 2].map(|c| named("velocity").get_f64(3 * i + c));
         let place = usize::try_from(u64::MAX - id).expect("an id of ours");
-        assert!(
-            all[place]
-                .replace((raw.positions.get(i), velocity))
-                .is_none()
-        );
+        assert!(all[place].replace((raw.positions.get(i), velocity)).is_none());
     }
     all.into_iter().map(|p| p.expect("every id once")).collect()
 }
@@ -121,9 +110,7 @@ fn radii_round_trip() {
     own.radius = Some(Radius::PerParticle(radii.clone()));
     let raw = read_back(&bytes(&own)).expect("whole");
     let again = ParticleFrame::from_raw(raw, DVec3::ZERO);
-    let Some(Radius::PerParticle(found)) = &again.radius else {
-        panic!("radii of their own")
-    };
+    let Some(Radius::PerParticle(found)) = &again.radius else { panic!("radii of their own") };
     // x is the index of the particle.
     for (position, radius) in again.positions.iter().zip(found) {
         assert_eq!(*radius, position.x + 1.0);
@@ -188,10 +175,7 @@ fn truncation_of_a_mapped_file_is_detected() {
 fn every_truncation_is_an_error() {
     let whole = bytes(&frame(17, DVec3::ZERO));
     for len in (0..whole.len()).step_by(STRIDE) {
-        assert!(
-            matches!(read_back(&whole[..len]), Err(ParseError::Malformed { .. })),
-            "{len}"
-        );
+        assert!(matches!(read_back(&whole[..len]), Err(ParseError::Malformed { .. })), "{len}");
     }
     let longer = [whole, vec![0]].concat();
     assert!(read_back(&longer).is_err());
@@ -328,20 +312,14 @@ fn stored_within(
     let path = dir.path().join("a.spf");
     let index = store(&path, &frame, None, &settings).expect("writable");
     // Read it back
-    let access = if cfg!(miri) {
-        Access::Read
-    } else {
-        Access::Map
-    };
+    let access = if cfg!(miri) { Access::Read } else { Access::Map };
     let file = NativeFile::open(&path, access).expect("whole");
     assert_eq!(file.index(), &index);
     let view = file.frame().expect("unchanged");
     view.verify().expect("undamaged");
     let leaves = view.leaves().expect("in place");
     let raw = view.to_raw().expect("whole");
-    let AttributeData::U64(ids) = &raw.attributes[0].data else {
-        panic!("ids changed their type")
-    };
+    let AttributeData::U64(ids) = &raw.attributes[0].data else { panic!("ids changed their type") };
     // Compare each particle with the given one
     let mut visited = vec![false; frame.len()];
     let mut largest = 0.0_f64;
@@ -355,16 +333,8 @@ fn stored_within(
         let (node, block) = (slot / 128, slot / 16);
         let center = leaves.center(slot);
         let own = leaves.radii.load(block).map_or(0.0, |r| r.0[slot % 16]);
-        let sphere = crate::blocks::Aabb {
-            min: center,
-            max: center,
-        }
-        .padded(own);
-        let sphere = if own > 0.0 {
-            sphere.rounded_outwards()
-        } else {
-            sphere
-        };
+        let sphere = crate::blocks::Aabb { min: center, max: center }.padded(own);
+        let sphere = if own > 0.0 { sphere.rounded_outwards() } else { sphere };
         assert!(leaves.nodes[node].child_holds(block % 8, &sphere), "{slot}");
         // Check the radius
         if let Some(Radius::PerParticle(radii)) = &frame.radius {
@@ -385,11 +355,7 @@ fn position_errors_are_within_the_stored_maximum() {
     for encoding in Encoding::ALL {
         for count in [0, 1, 2, 15, 16, 17, 127, 128, 129, 1025, 20_000] {
             for bound in [Bound::None, Bound::Length(1e-4), Bound::OfRadius(0.02)] {
-                let settings = StoreSettings {
-                    encoding: Some(encoding),
-                    bound,
-                    rounding: 0.0,
-                };
+                let settings = StoreSettings { encoding: Some(encoding), bound, rounding: 0.0 };
                 let radius = Some(Radius::Common(0.01));
                 let index = stored_within(clustered(count), radius, settings);
                 assert!(index.max_error <= bound.length(Some(0.01)));
@@ -405,11 +371,7 @@ fn per_particle_radii_are_stored_within_the_bound() {
     let radii = |count: u32| (0..count).map(|i| 0.001 * 100_f32.powf((i % 97) as f32 / 97.0));
     for encoding in Encoding::ALL {
         for bound in [Bound::None, Bound::OfRadius(0.1), Bound::OfRadius(0.001)] {
-            let settings = StoreSettings {
-                encoding: Some(encoding),
-                bound,
-                rounding: 0.0,
-            };
+            let settings = StoreSettings { encoding: Some(encoding), bound, rounding: 0.0 };
             let own = Some(Radius::PerParticle(radii(5000).collect()));
             let index = stored_within(clustered(5000), own, settings);
             let RadiusIndex::PerParticle(coded) = index.radius else {
@@ -426,20 +388,13 @@ fn per_particle_radii_are_stored_within_the_bound() {
 fn flat_and_coincident_particles_are_stored() {
     let sets = [
         vec![Vec3::splat(0.3); 300],
-        (0..300u16)
-            .map(|i| Vec3::new(f32::from(i), 0.1, 0.7))
-            .collect(),
-        (0..300u16)
-            .map(|i| Vec3::splat(1e6 + f32::from(i) * 1e-3))
-            .collect(),
+        (0..300u16).map(|i| Vec3::new(f32::from(i), 0.1, 0.7)).collect(),
+        (0..300u16).map(|i| Vec3::splat(1e6 + f32::from(i) * 1e-3)).collect(),
     ];
     for positions in sets {
         for encoding in Encoding::ALL {
-            let settings = StoreSettings {
-                encoding: Some(encoding),
-                bound: Bound::None,
-                rounding: 0.0,
-            };
+            let settings =
+                StoreSettings { encoding: Some(encoding), bound: Bound::None, rounding: 0.0 };
             stored_within(positions.clone(), None, settings);
         }
     }
@@ -450,16 +405,9 @@ fn flat_and_coincident_particles_are_stored() {
 fn smallest_encoding_within_the_bound_is_chosen() {
     let even = crate::generate::fill_box(&crate::generate::BoxSettings::thesis(50_000, 1));
     let taken = |bound: Bound| {
-        let settings = StoreSettings {
-            encoding: None,
-            bound,
-            rounding: 0.0,
-        };
+        let settings = StoreSettings { encoding: None, bound, rounding: 0.0 };
         let index = stored_within(even.clone(), Some(Radius::Common(0.05)), settings);
-        (
-            index.encoding(),
-            index.max_error <= bound.length(Some(0.05)),
-        )
+        (index.encoding(), index.max_error <= bound.length(Some(0.05)))
     };
     assert_eq!(taken(Bound::OfRadius(0.02)), (Encoding::Q10, true));
     assert_eq!(taken(Bound::OfRadius(2e-4)), (Encoding::Q16, true));
@@ -513,8 +461,5 @@ fn empty_frame_cannot_request_memory() {
     let whole = bytes(&frame(0, DVec3::ZERO));
     let mut index = layout::parse(&whole).expect("whole");
     index.attributes[0].components = u32::MAX;
-    assert!(matches!(
-        forge(&whole, &index),
-        Err(ParseError::Malformed { .. })
-    ));
+    assert!(matches!(forge(&whole, &index), Err(ParseError::Malformed { .. })));
 }

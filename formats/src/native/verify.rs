@@ -79,10 +79,7 @@ impl NativeFrame<'_> {
     pub fn verify_all(&self) -> Result<(), ParseError> {
         self.verify()?;
         self.verify_padding()?;
-        let contents = Contents {
-            index: self.index(),
-            leaves: self.leaves()?,
-        };
+        let contents = Contents { index: self.index(), leaves: self.leaves()? };
         contents.verify()
     }
 
@@ -90,14 +87,8 @@ impl NativeFrame<'_> {
     fn verify_padding(&self) -> Result<(), ParseError> {
         let (bytes, index) = (self.bytes(), self.index());
         // Check the reserved bytes of the header
-        if bytes
-            .get(RESERVED)
-            .is_none_or(|b| b.iter().any(|b| *b != 0))
-        {
-            return Err(fault(
-                RESERVED.start as u64,
-                "the header has numbers where zeros belong",
-            ));
+        if bytes.get(RESERVED).is_none_or(|b| b.iter().any(|b| *b != 0)) {
+            return Err(fault(RESERVED.start as u64, "the header has numbers where zeros belong"));
         }
         // Check the gaps between sections in file order
         let mut sections = index.sections();
@@ -117,17 +108,12 @@ impl NativeFrame<'_> {
 
     /// Checks that the bytes from `start` to `end` are zero.
     fn verify_zeros(&self, start: u64, end: u64) -> Result<(), ParseError> {
-        let gap = Section {
-            offset: start,
-            len: end - start,
-            xxh3: 0,
-        };
+        let gap = Section { offset: start, len: end - start, xxh3: 0 };
         let bytes = section_of(self.bytes(), &gap)?;
         match bytes.par_iter().position_first(|byte| *byte != 0) {
-            Some(at) => Err(fault(
-                start + at as u64,
-                "between the sections are numbers where zeros belong",
-            )),
+            Some(at) => {
+                Err(fault(start + at as u64, "between the sections are numbers where zeros belong"))
+            }
             None => Ok(()),
         }
     }
@@ -230,11 +216,7 @@ impl Contents<'_> {
         let here = |what: &str| {
             let (section, place, len) = match wide {
                 Some(wide) => (&self.index.wide, wide, size_of::<Block>()),
-                None => (
-                    &self.index.positions,
-                    block,
-                    self.index.encoding().block_len(),
-                ),
+                None => (&self.index.positions, block, self.index.encoding().block_len()),
             };
             let what = format!("the positions: block {block} {what}");
             Some(fault(section.offset + (place * len) as u64, &what))
@@ -270,10 +252,7 @@ impl Contents<'_> {
             return here("has a particle outside its box");
         }
         // Check the bounds of the frame
-        let all = Aabb {
-            min: self.index.min.into(),
-            max: self.index.max.into(),
-        };
+        let all = Aabb { min: self.index.min.into(), max: self.index.max.into() };
         if !all.contains(&bounds) {
             return here("has a particle outside the bounds of the frame");
         }

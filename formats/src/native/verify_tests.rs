@@ -13,11 +13,7 @@ fn stored(encoding: Encoding, own_radii: bool) -> Vec<u8> {
     let positions: Vec<Vec3> = (0..300_u16)
         .map(|i| {
             let far = if i % 50 == 0 { 40.0 } else { 1.0 };
-            Vec3::new(
-                f32::from(i) * 0.37 % 1.0,
-                f32::from(i) * 0.71 % far,
-                f32::from(i) * 1e-3,
-            )
+            Vec3::new(f32::from(i) * 0.37 % 1.0, f32::from(i) * 0.71 % far, f32::from(i) * 1e-3)
         })
         .collect();
     let radius = if own_radii {
@@ -44,11 +40,8 @@ fn stored(encoding: Encoding, own_radii: bool) -> Vec<u8> {
     // Store the frame and read its bytes
     let dir = tempfile::tempdir().expect("a temporary directory");
     let path = dir.path().join("a.spf");
-    let settings = StoreSettings {
-        encoding: Some(encoding),
-        bound: Bound::Length(1e-3),
-        rounding: 0.0,
-    };
+    let settings =
+        StoreSettings { encoding: Some(encoding), bound: Bound::Length(1e-3), rounding: 0.0 };
     store(&path, &frame, None, &settings).expect("writable");
     std::fs::read(path).expect("readable")
 }
@@ -95,10 +88,7 @@ fn fails_with(
     match super::super::verify(&bytes).expect_err(words) {
         ParseError::Malformed { at, what } => {
             assert_eq!(at, expected, "{what}");
-            assert!(
-                what.contains(words) && what.ends_with("convert again"),
-                "{what}"
-            );
+            assert!(what.contains(words) && what.ends_with("convert again"), "{what}");
         }
         other => panic!("{other}"),
     }
@@ -131,10 +121,7 @@ fn every_flipped_byte_of_a_frame_is_detected() {
         aligned[at] ^= 0x10;
         let index = layout::parse(&aligned).expect("header and index are whole");
         let result = NativeFrame::with_index(&aligned, &index).verify_all();
-        assert!(
-            matches!(result, Err(ParseError::Malformed { .. })),
-            "byte {at}"
-        );
+        assert!(matches!(result, Err(ParseError::Malformed { .. })), "byte {at}");
     }
 }
 
@@ -142,14 +129,9 @@ fn every_flipped_byte_of_a_frame_is_detected() {
 fn invalid_node_links() {
     let bytes = stored(Encoding::F32, false);
     let second = |i: &FrameIndex| i.nodes.offset + 64;
-    fails_with(
-        &bytes,
-        "node 1 has children 01111111 for 8 blocks",
-        second,
-        |i, b| {
-            b[at(&i.nodes, 64 + 15)] = 0x7f;
-        },
-    );
+    fails_with(&bytes, "node 1 has children 01111111 for 8 blocks", second, |i, b| {
+        b[at(&i.nodes, 64 + 15)] = 0x7f;
+    });
     fails_with(&bytes, "child 0 of node 1 has no box", second, |i, b| {
         b[at(&i.nodes, 64)..][..4].copy_from_slice(&f32::NAN.to_le_bytes());
     });
@@ -174,46 +156,21 @@ fn invalid_positions() {
             b[at(&i.positions, 2 * 192 + 4)..][..4].copy_from_slice(&value.to_le_bytes());
         }
     };
-    fails_with(
-        &bytes,
-        "block 2 has a position that is not finite",
-        third,
-        set(f32::NAN),
-    );
-    fails_with(
-        &bytes,
-        "block 2 has a position that is not finite",
-        third,
-        set(f32::INFINITY),
-    );
-    fails_with(
-        &bytes,
-        "block 2 has a particle outside its box",
-        third,
-        set(1e6),
-    );
+    fails_with(&bytes, "block 2 has a position that is not finite", third, set(f32::NAN));
+    fails_with(&bytes, "block 2 has a position that is not finite", third, set(f32::INFINITY));
+    fails_with(&bytes, "block 2 has a particle outside its box", third, set(1e6));
     // Positions outside the bounds of the frame
     let first = |i: &FrameIndex| i.positions.offset;
-    fails_with(
-        &bytes,
-        "block 0 has a particle outside the bounds",
-        first,
-        |i, _| {
-            i.max = i.min;
-        },
-    );
+    fails_with(&bytes, "block 0 has a particle outside the bounds", first, |i, _| {
+        i.max = i.min;
+    });
     // Of the 300 particles, 12 are in the last block, followed by four copies of the last one.
     let last = |i: &FrameIndex| i.positions.offset + 18 * 192;
-    fails_with(
-        &bytes,
-        "block 18 has particles beyond the last one",
-        last,
-        |i, b| {
-            let place = at(&i.positions, 18 * 192);
-            let first: [u8; 4] = b[place..place + 4].try_into().expect("4 bytes");
-            b[place + 4 * 15..][..4].copy_from_slice(&first);
-        },
-    );
+    fails_with(&bytes, "block 18 has particles beyond the last one", last, |i, b| {
+        let place = at(&i.positions, 18 * 192);
+        let first: [u8; 4] = b[place..place + 4].try_into().expect("4 bytes");
+        b[place + 4 * 15..][..4].copy_from_slice(&first);
+    });
 }
 
 #[test]
@@ -221,10 +178,7 @@ fn dangling_references() {
     let bytes = stored(Encoding::Q10, false);
     let index = layout::parse(&bytes).expect("whole");
     let wide = index.wide.len / 192;
-    assert!(
-        wide > 0 && wide < 19,
-        "{wide} of 19 blocks are kept as they are"
-    );
+    assert!(wide > 0 && wide < 19, "{wide} of 19 blocks are kept as they are");
     let reference = (0..19)
         .find(|block| {
             let lane = |lane: usize| {
@@ -249,10 +203,7 @@ fn invalid_radii() {
     };
     let second = |i: &FrameIndex| section(i).offset + 64;
     for (value, words) in [
-        (
-            f32::NAN,
-            "block 1 has a radius that is negative or no number",
-        ),
+        (f32::NAN, "block 1 has a radius that is negative or no number"),
         (-1.0, "block 1 has a radius that is negative or no number"),
     ] {
         fails_with(&bytes, words, second, |i, b| {
@@ -260,14 +211,9 @@ fn invalid_radii() {
         });
     }
     let positions = |i: &FrameIndex| i.positions.offset + 192;
-    fails_with(
-        &bytes,
-        "block 1 has a particle outside its box",
-        positions,
-        |i, b| {
-            b[at(&section(i), 64)..][..4].copy_from_slice(&9.0_f32.to_le_bytes());
-        },
-    );
+    fails_with(&bytes, "block 1 has a particle outside its box", positions, |i, b| {
+        b[at(&section(i), 64)..][..4].copy_from_slice(&9.0_f32.to_le_bytes());
+    });
 }
 
 #[test]

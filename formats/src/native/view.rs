@@ -58,11 +58,7 @@ impl<'a> NativeFrame<'a> {
     pub fn attribute(&self, name: &str) -> Option<AttributeView<'a>> {
         let attributes = &self.index.attributes;
         let exact = attributes.iter().find(|a| a.name == name);
-        let alike = || {
-            attributes
-                .iter()
-                .find(|a| a.name.eq_ignore_ascii_case(name))
-        };
+        let alike = || attributes.iter().find(|a| a.name.eq_ignore_ascii_case(name));
         self.view(exact.or_else(alike)?).ok()
     }
 
@@ -75,11 +71,7 @@ impl<'a> NativeFrame<'a> {
     fn view(&self, attribute: &'a AttributeIndex) -> Result<AttributeView<'a>, ParseError> {
         let stored = StoredType::of_code(attribute.stored)
             .ok_or_else(|| ParseError::unsupported("an attribute type that is not known"))?;
-        Ok(AttributeView::new(
-            attribute,
-            stored,
-            section_of(self.bytes, &attribute.section)?,
-        ))
+        Ok(AttributeView::new(attribute, stored, section_of(self.bytes, &attribute.section)?))
     }
 
     fn compact<B: Pod>(&self) -> Result<CompactBlocks<'a, B>, ParseError> {
@@ -95,24 +87,15 @@ impl<'a> NativeFrame<'a> {
         let (low, step) = (radii.low, code.step(radii.low, radii.high));
         Ok(match code {
             RadiusCode::F32 => StoredRadii::F32(self.plain(&radii.section)?),
-            RadiusCode::U16 => StoredRadii::U16 {
-                codes: self.plain(&radii.section)?,
-                low,
-                step,
-            },
-            RadiusCode::U8 => StoredRadii::U8 {
-                codes: self.plain(&radii.section)?,
-                low,
-                step,
-            },
+            RadiusCode::U16 => StoredRadii::U16 { codes: self.plain(&radii.section)?, low, step },
+            RadiusCode::U8 => StoredRadii::U8 { codes: self.plain(&radii.section)?, low, step },
         })
     }
 
     fn plain<T: Pod>(&self, section: &Section) -> Result<&'a [T], ParseError> {
         let bytes = section_of(self.bytes, section)?;
-        let slice = (!cfg!(target_endian = "big"))
-            .then(|| bytemuck::try_cast_slice(bytes).ok())
-            .flatten();
+        let slice =
+            (!cfg!(target_endian = "big")).then(|| bytemuck::try_cast_slice(bytes).ok()).flatten();
         slice.ok_or_else(|| {
             ParseError::unsupported(
                 "a native frame in memory that is not aligned, or on a big-endian machine",

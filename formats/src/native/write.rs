@@ -167,9 +167,7 @@ impl FrameWriter {
         let Self { pushed, .. } = self;
         if pushed != self.spec.count {
             let count = self.spec.count;
-            return Err(invalid(format!(
-                "{pushed} of {count} particles were written"
-            )));
+            return Err(invalid(format!("{pushed} of {count} particles were written")));
         }
         // Wait for the sections
         let mut filled = self.sections.finish()?;
@@ -268,9 +266,7 @@ impl FrameWriter {
 
 /// The sections at their offsets; `None` if the file would be too long.
 fn sections_of(spec: &FrameSpec) -> Option<Vec<SectionProgress>> {
-    let mut places = SectionOffsets {
-        next: HEADER_LEN as u64,
-    };
+    let mut places = SectionOffsets { next: HEADER_LEN as u64 };
     let radii = match spec.radius {
         RadiusSpec::PerParticle(range) => {
             blocks_of(spec.count).checked_mul((BLOCK_SIZE * range.code.size()) as u64)?

@@ -126,10 +126,7 @@ mod tests {
         assert_eq!(stepped.steps(), whole.steps());
         assert_eq!(stepped.steps().len(), FRAMES);
         assert_eq!(stepped.unpacked_len(), bytes.len() as u64);
-        assert!(
-            stepped.held_len() <= HEAD_LEN as u64,
-            "the file is in memory"
-        );
+        assert!(stepped.held_len() <= HEAD_LEN as u64, "the file is in memory");
         for step in [3, 0, 4] {
             let expected = whole.read(step).expect("a good step");
             assert_eq!(stepped.read(step).expect("a good step"), expected);

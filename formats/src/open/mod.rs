@@ -306,10 +306,8 @@ impl FrameFile {
     /// Bytes that are held beside content and numbers while `particles` are read: arrays that are compressed,
     /// or text in XML, in the content.
     pub fn unpacked_arrays_len(&self, particles: &RawParticles) -> u64 {
-        let file = FileExtent {
-            byte_len: self.unpacked_len(),
-            step_count: self.steps.len() as u64,
-        };
+        let file =
+            FileExtent { byte_len: self.unpacked_len(), step_count: self.steps.len() as u64 };
         let reader = self.format.reader();
         reader.unpacked_arrays_len(self.bytes(), file, particles)
     }
@@ -331,10 +329,7 @@ impl FrameFile {
     /// [`FrameError::TooLarge`] if its numbers need more memory than is allowed.
     pub fn read(&self, index: usize) -> Result<RawParticles, FrameError> {
         let step = self.steps.get(index).ok_or_else(|| {
-            let what = format!(
-                "step {index} does not exist, the file has {}",
-                self.steps.len()
-            );
+            let what = format!("step {index} does not exist, the file has {}", self.steps.len());
             ParseError::malformed(self.bytes().len(), what).in_file(&self.path)
         })?;
         let left = self.budget.less(self.held_len());
@@ -389,10 +384,7 @@ mod tests {
     #[track_caller]
     fn fails(bytes: Vec<u8>, words: &str) {
         let error = open(bytes).expect_err("damaged").to_string();
-        assert!(
-            error.starts_with("a.bgeo: ") && error.contains(words),
-            "{error}"
-        );
+        assert!(error.starts_with("a.bgeo: ") && error.contains(words), "{error}");
     }
 
     #[test]
@@ -439,10 +431,7 @@ mod tests {
         let error = FrameFile::open(dir.path()).expect_err("a directory");
         assert!(error.to_string().contains("a directory"), "{error}");
         let missing = dir.path().join("none.vtk");
-        assert!(matches!(
-            FrameFile::open(&missing),
-            Err(FrameError::Io { .. })
-        ));
+        assert!(matches!(FrameFile::open(&missing), Err(FrameError::Io { .. })));
         let path = dir.path().join("dump.7");
         fs::write(&path, gz(TEXT)).expect("writable");
         assert_eq!(detect_file(&path).expect("known"), lammps::FORMAT);

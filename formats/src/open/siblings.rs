@@ -21,10 +21,7 @@ pub(crate) struct SiblingFiles {
 impl SiblingFiles {
     /// The files beside the one at `path`.
     pub(crate) fn of(path: &Path) -> Self {
-        Self {
-            directory: directory_of(path),
-            opened: Opened::default(),
-        }
+        Self { directory: directory_of(path), opened: Opened::default() }
     }
 
     /// `bytes` of a file among these.
@@ -78,10 +75,7 @@ impl Siblings for SiblingFiles {
             }
         };
         // What that file refers to is in its own directory
-        let siblings = Self {
-            directory: directory_of(&path),
-            opened: Arc::clone(&self.opened),
-        };
+        let siblings = Self { directory: directory_of(&path), opened: Arc::clone(&self.opened) };
         Ok(siblings.around(SharedBytes::new(file)))
     }
 }
@@ -109,19 +103,8 @@ mod tests {
         let part = main.sibling("./parts/a").expect("a file");
         assert_eq!(&*part, b"first");
         assert_eq!(&*part.sibling("b").expect("beside it"), b"second");
-        assert_eq!(
-            &*part.sibling("/elsewhere/b").expect("beside it"),
-            b"second"
-        );
-        for name in [
-            "../secret",
-            "parts/../../secret",
-            "secret",
-            "",
-            "/",
-            ".",
-            "parts",
-        ] {
+        assert_eq!(&*part.sibling("/elsewhere/b").expect("beside it"), b"second");
+        for name in ["../secret", "parts/../../secret", "secret", "", "/", ".", "parts"] {
             let error = main.sibling(name).expect_err(name).to_string();
             assert!(error.contains(&format!("`{name}`")), "{error}");
         }
@@ -134,11 +117,6 @@ mod tests {
     #[test]
     fn bytes_in_memory_have_no_siblings() {
         let error = SharedBytes::new(Arc::new(Vec::new())).sibling("a");
-        assert!(
-            error
-                .expect_err("no file")
-                .to_string()
-                .contains("in memory")
-        );
+        assert!(error.expect_err("no file").to_string().contains("in memory"));
     }
 }

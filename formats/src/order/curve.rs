@@ -52,10 +52,7 @@ const fn direction(w: u8) -> u32 {
     }
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "values under 256 by construction"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "values under 256 by construction")]
 const fn one_level() -> [[u8; 8]; STATES] {
     let mut table = [[0; 8]; STATES];
     let mut state = 0;
@@ -110,11 +107,7 @@ impl Grid {
         Self {
             min,
             // Coincident particles, or a size too small to divide by: all points are in cell 0.
-            cells_per_length: if cells_per_length.is_finite() {
-                cells_per_length
-            } else {
-                0.0
-            },
+            cells_per_length: if cells_per_length.is_finite() { cells_per_length } else { 0.0 },
         }
     }
 
@@ -126,8 +119,7 @@ impl Grid {
             clippy::cast_possible_truncation,
             reason = "float to integer saturates, then clamped to the grid"
         )]
-        cell.to_array()
-            .map(|v| (v as u32).min((1 << AXIS_BITS) - 1))
+        cell.to_array().map(|v| (v as u32).min((1 << AXIS_BITS) - 1))
     }
 
     /// The interleaved cell coordinates of `point` (Morton order), 63 bits, x highest.
@@ -160,14 +152,8 @@ impl TopCells {
         let shift = 3 * (AXIS_BITS - levels);
         let place = |cell: u64| hilbert(cell << shift, 0, levels, CurveState::default()).0;
         #[expect(clippy::cast_possible_truncation, reason = "twelve bits")]
-        let places = (0..1 << (3 * levels))
-            .map(|cell| place(cell) as u16)
-            .collect();
-        Self {
-            grid,
-            levels,
-            places,
-        }
+        let places = (0..1 << (3 * levels)).map(|cell| place(cell) as u16).collect();
+        Self { grid, levels, places }
     }
 
     /// Number of cells.
@@ -189,18 +175,13 @@ impl TopCells {
     #[inline]
     pub fn cell_of(&self, point: Vec3) -> usize {
         let shift = AXIS_BITS - self.levels;
-        let [x, y, z] = self
-            .grid
-            .cell(point)
-            .map(|v| SPREAD_4[(v >> shift) as usize & 15]);
+        let [x, y, z] = self.grid.cell(point).map(|v| SPREAD_4[(v >> shift) as usize & 15]);
         usize::from(self.places[usize::from((x << 2) | (y << 1) | z)])
     }
 }
 
 /// Four bits with two zeros between them.
-const SPREAD_4: [u16; 16] = [
-    0, 1, 8, 9, 64, 65, 72, 73, 512, 513, 520, 521, 576, 577, 584, 585,
-];
+const SPREAD_4: [u16; 16] = [0, 1, 8, 9, 64, 65, 72, 73, 512, 513, 520, 521, 576, 577, 584, 585];
 
 /// Puts two zero bits between the low 21 bits of `v`.
 #[inline]
@@ -281,11 +262,7 @@ mod tests {
         for split in 0..=21 {
             let (upper, state) = hilbert(morton, 0, split, CurveState::default());
             let (lower, _) = hilbert(morton, split, 21 - split, state);
-            assert_eq!(
-                whole,
-                (upper << (3 * (21 - split))) | lower,
-                "split at {split}"
-            );
+            assert_eq!(whole, (upper << (3 * (21 - split))) | lower, "split at {split}");
         }
     }
 

@@ -51,9 +51,7 @@ impl Cells {
 
 /// Particles per task of the scatter.
 fn chunk_len(count: usize) -> usize {
-    count
-        .div_ceil(4 * rayon::current_num_threads())
-        .max(16 * 1024)
+    count.div_ceil(4 * rayon::current_num_threads()).max(16 * 1024)
 }
 
 /// Bytes of the tables for a scatter of `count` particles: a count and two slices for each chunk and cell.
@@ -98,12 +96,8 @@ pub fn scatter(
         split_by_cell(&mut indices[..centers.len()], &counts, cell_count)
     };
     // Move the particles of each chunk into its slices
-    centers
-        .par_chunks(chunk_len)
-        .zip(point_parts)
-        .zip(index_parts)
-        .enumerate()
-        .for_each(|(chunk_number, ((chunk, mut points), mut indices))| {
+    centers.par_chunks(chunk_len).zip(point_parts).zip(index_parts).enumerate().for_each(
+        |(chunk_number, ((chunk, mut points), mut indices))| {
             let first = chunk_number * chunk_len;
             let mut filled = vec![0_usize; cell_count];
             for (index, center) in (first..).zip(chunk) {
@@ -115,7 +109,8 @@ pub fn scatter(
                     part[slot] = index_u32(index);
                 }
             }
-        });
+        },
+    );
     Cells { starts }
 }
 
@@ -137,10 +132,8 @@ fn split_by_cell<'a, T>(
     counts: &[Vec<u32>],
     cell_count: usize,
 ) -> Vec<Vec<&'a mut [T]>> {
-    let mut parts: Vec<Vec<&mut [T]>> = counts
-        .iter()
-        .map(|_| Vec::with_capacity(cell_count))
-        .collect();
+    let mut parts: Vec<Vec<&mut [T]>> =
+        counts.iter().map(|_| Vec::with_capacity(cell_count)).collect();
     for cell in 0..cell_count {
         for (chunk_parts, chunk_counts) in parts.iter_mut().zip(counts) {
             let (part, rest) = whole.split_at_mut(chunk_counts[cell] as usize);

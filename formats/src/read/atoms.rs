@@ -29,14 +29,10 @@ impl AtomTable {
         real: &[(&'static str, usize)],
         budget: MemoryBudget,
     ) -> Self {
-        let attribute = |name: &str, components, data| Attribute {
-            name: name.to_owned(),
-            components,
-            data,
-        };
-        let whole_columns = whole
-            .iter()
-            .map(|name| attribute(name, 1, AttributeData::I32(Vec::new())));
+        let attribute =
+            |name: &str, components, data| Attribute { name: name.to_owned(), components, data };
+        let whole_columns =
+            whole.iter().map(|name| attribute(name, 1, AttributeData::I32(Vec::new())));
         let real_columns = real
             .iter()
             .map(|(name, components)| attribute(name, *components, AttributeData::F64(Vec::new())));
@@ -61,8 +57,7 @@ impl AtomTable {
     ) -> Result<(), ParseError> {
         // A vector that grows holds its old numbers and twice the room for new ones.
         let need = 3 * self.atom_len * (self.positions.len() + 1);
-        self.budget
-            .check(need as u64, "its numbers in memory are")?;
+        self.budget.check(need as u64, "its numbers in memory are")?;
         self.positions.push(DVec3::from_array(position));
         let (mut whole, mut real) = (whole.iter(), real.iter());
         for attribute in &mut self.attributes {
@@ -102,11 +97,7 @@ pub(super) fn field(line: &[u8], first: usize, end: usize) -> &[u8] {
 pub(super) fn residue(field: &[u8]) -> i64 {
     let is_digit =
         |(index, byte): (usize, &u8)| byte.is_ascii_digit() || (index == 0 && *byte == b'-');
-    let len = field
-        .iter()
-        .enumerate()
-        .take_while(|place| is_digit(*place))
-        .count();
+    let len = field.iter().enumerate().take_while(|place| is_digit(*place)).count();
     text::integer(field.get(..len).unwrap_or_default()).unwrap_or_default()
 }
 
@@ -127,13 +118,8 @@ pub(super) fn coordinate(line: Line<'_>, first: usize, end: usize) -> Result<f64
 }
 
 /// Names of ions in force fields that are not symbols.
-const ION_NAMES: [(&[u8], &[u8]); 5] = [
-    (b"SOD", b"Na"),
-    (b"CLA", b"Cl"),
-    (b"POT", b"K"),
-    (b"CAL", b"Ca"),
-    (b"CES", b"Cs"),
-];
+const ION_NAMES: [(&[u8], &[u8]); 5] =
+    [(b"SOD", b"Na"), (b"CLA", b"Cl"), (b"POT", b"K"), (b"CAL", b"Ca"), (b"CES", b"Cs")];
 
 /// The number of sites that are no atoms.
 const NO_ELEMENT: i64 = 0;
@@ -165,17 +151,13 @@ pub(super) fn element(symbol: &[u8], name: &[u8], residue: &[u8]) -> i64 {
     if is_any(prefix, &SITES) {
         return NO_ELEMENT;
     }
-    let ion = ION_NAMES
-        .iter()
-        .find(|(ion, _)| prefix.eq_ignore_ascii_case(ion));
+    let ion = ION_NAMES.iter().find(|(ion, _)| prefix.eq_ignore_ascii_case(ion));
     if let Some((_, symbol)) = ion {
         return category::code(symbol);
     }
     let is_ion = prefix.len() == 2 && prefix.eq_ignore_ascii_case(letters(residue));
     let first_two = prefix.get(..2).unwrap_or(prefix);
-    let is_long = LONG_SYMBOLS
-        .iter()
-        .any(|long| first_two.eq_ignore_ascii_case(*long));
+    let is_long = LONG_SYMBOLS.iter().any(|long| first_two.eq_ignore_ascii_case(*long));
     if is_ion || is_long {
         return category::code(first_two);
     }
@@ -220,30 +202,15 @@ mod tests {
             ("FE", "HEM", 26),
             ("SG", "CYS", 16),
         ] {
-            assert_eq!(
-                element(b"", name.as_bytes(), residue.as_bytes()),
-                number,
-                "{name}"
-            );
+            assert_eq!(element(b"", name.as_bytes(), residue.as_bytes()), number, "{name}");
         }
         assert_eq!(element(b"ZN", b"C1", b"X"), 30);
         assert_eq!(element(b"O1-", b"C1", b"X"), 8);
         for name in ["MW", "M", "EP1", "EPW", "LP2", "DUM", "mw4"] {
             assert_eq!(element(b"", name.as_bytes(), b"SOL"), 0, "{name}");
         }
-        for (symbol, number) in [
-            ("D", 1),
-            ("T", 1),
-            ("X", 0),
-            ("LP", 0),
-            ("MG", 12),
-            ("M", 0),
-        ] {
-            assert_eq!(
-                element(symbol.as_bytes(), b"CA", b"ALA"),
-                number,
-                "{symbol}"
-            );
+        for (symbol, number) in [("D", 1), ("T", 1), ("X", 0), ("LP", 0), ("MG", 12), ("M", 0)] {
+            assert_eq!(element(symbol.as_bytes(), b"CA", b"ALA"), number, "{symbol}");
         }
         assert!(element(b"", b"T3", b"") >= 1000);
         assert!(element(b"", b"7", b"") >= 1000);
@@ -252,15 +219,9 @@ mod tests {
 
     #[test]
     fn residues_may_have_codes_of_insertions() {
-        for (field, number) in [
-            ("52A", 52),
-            ("52", 52),
-            ("-5B", -5),
-            ("A", 0),
-            ("", 0),
-            ("1H2", 1),
-            ("5-6", 5),
-        ] {
+        for (field, number) in
+            [("52A", 52), ("52", 52), ("-5B", -5), ("A", 0), ("", 0), ("1H2", 1), ("5-6", 5)]
+        {
             assert_eq!(residue(field.as_bytes()), number, "{field}");
         }
     }

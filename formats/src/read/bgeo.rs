@@ -109,26 +109,17 @@ fn point_layout(bytes: &[u8]) -> Result<ParticleLayout, ParseError> {
     let axes = vec![column("P", ScalarType::F32, 3, start, stride)];
     let attributes = attribute_columns(definitions, start, stride);
     let weight = column("w of P", ScalarType::F32, 1, start + 12, stride);
-    Ok(ParticleLayout {
-        weight: Some(weight),
-        ..ParticleLayout::new(count, axes, attributes)
-    })
+    Ok(ParticleLayout { weight: Some(weight), ..ParticleLayout::new(count, axes, attributes) })
 }
 
 /// Tells classic BGEO of version 5 from its relatives.
 fn check_kind(bytes: &[u8]) -> Result<(), ParseError> {
     const CLASSIC: &str = "save as classic bgeo (.bhclassic) from houdini";
     let relatives: [(&[u8], &str); 5] = [
-        (
-            b"\x7fNSJ",
-            "houdini's binary json geometry, not bgeo version 5",
-        ),
+        (b"\x7fNSJ", "houdini's binary json geometry, not bgeo version 5"),
         (b"scf1", "blosc-compressed geometry (.bgeo.sc)"),
         (b"PGEOMETRY", "the text form of classic geometry (.geo)"),
-        (
-            b"[",
-            "houdini's text json geometry (.geo), not bgeo version 5",
-        ),
+        (b"[", "houdini's text json geometry (.geo), not bgeo version 5"),
         (b"bgeo", "an older houdini geometry file"),
     ];
     for (magic, what) in relatives {
@@ -137,10 +128,7 @@ fn check_kind(bytes: &[u8]) -> Result<(), ParseError> {
         }
     }
     if !bytes.starts_with(MAGIC) {
-        return Err(ParseError::malformed(
-            0,
-            "not a bgeo file: it does not begin with BgeoV",
-        ));
+        return Err(ParseError::malformed(0, "not a bgeo file: it does not begin with BgeoV"));
     }
     let mut cursor = HeaderCursor { bytes, at: 5 };
     match cursor.i32("the version")? {
@@ -177,12 +165,7 @@ fn attribute_columns(
 ) -> Vec<StridedColumn> {
     let mut at = start + POSITION_BYTES;
     let mut columns = Vec::with_capacity(definitions.len());
-    for AttributeDefinition {
-        name,
-        components,
-        scalar,
-    } in definitions
-    {
+    for AttributeDefinition { name, components, scalar } in definitions {
         columns.push(column(name, scalar, components, at, stride));
         at += 4 * components;
     }
@@ -258,11 +241,7 @@ impl HeaderCursor<'_> {
         } else {
             self.take(4 * components, "the default values of a point attribute")?;
         }
-        Ok(AttributeDefinition {
-            name,
-            components,
-            scalar,
-        })
+        Ok(AttributeDefinition { name, components, scalar })
     }
 
     /// The table of an indexed string; points hold indices into it.

@@ -91,9 +91,7 @@ pub(in crate::read) fn is_element(code: i64) -> bool {
 
 /// The hash of Fowler, Noll and Vo, 32 bits.
 fn fnv1a(bytes: &[u8]) -> u32 {
-    bytes.iter().fold(0x811c_9dc5, |hash, byte| {
-        (hash ^ u32::from(*byte)).wrapping_mul(0x0100_0193)
-    })
+    bytes.iter().fold(0x811c_9dc5, |hash, byte| (hash ^ u32::from(*byte)).wrapping_mul(0x0100_0193))
 }
 
 /// What a user should know of the attribute that holds the numbers of `names`; none if there are no names.
@@ -120,16 +118,9 @@ mod tests {
 
     #[test]
     fn elements_have_their_atomic_numbers() {
-        for (symbol, number) in [
-            ("H", 1),
-            ("O", 8),
-            ("Cu", 29),
-            ("CU", 29),
-            ("u", 92),
-            ("Og", 118),
-            ("D", 1),
-            ("T", 1),
-        ] {
+        for (symbol, number) in
+            [("H", 1), ("O", 8), ("Cu", 29), ("CU", 29), ("u", 92), ("Og", 118), ("D", 1), ("T", 1)]
+        {
             assert_eq!(code(symbol.as_bytes()), number, "{symbol}");
         }
         for (number, symbol) in (1..).zip(SYMBOLS) {

@@ -42,10 +42,7 @@ fn big_endian(numbers: &[f64]) -> Vec<u8> {
 
 #[expect(clippy::cast_possible_truncation, reason = "exact in f32")]
 fn big_endian_f32(numbers: &[f64]) -> Vec<u8> {
-    numbers
-        .iter()
-        .flat_map(|n| (*n as f32).to_be_bytes())
-        .collect()
+    numbers.iter().flat_map(|n| (*n as f32).to_be_bytes()).collect()
 }
 
 /// A triclinic cell as GROMACS has them.
@@ -88,28 +85,13 @@ fn gro_files_have_cells_in_their_last_line() {
         let text = format!("title\n1\n    1SOL     OW    1   0.100   0.200   0.300\n{box_line}\n");
         cells(gro::FORMAT, text.as_bytes())[0]
     };
-    assert_cell(
-        with("   3.00000   2.50000   2.00000"),
-        diagonal([3.0, 2.5, 2.0]),
-    );
+    assert_cell(with("   3.00000   2.50000   2.00000"), diagonal([3.0, 2.5, 2.0]));
     let tilted = "3.0 2.5 2.0 0.0 0.0 0.5 0.0 -0.25 0.75";
     assert_cell(with(tilted), TILTED_EDGES);
     // No blanks between the numbers of a large box
     let large = "1000.000002000.500003000.25000   0.00000   0.00000 500.00000   0.00000-250.00000 750.00000";
-    assert_cell(
-        with(large),
-        [
-            [1000.0, 0.0, 0.0],
-            [500.0, 2000.5, 0.0],
-            [-250.0, 750.0, 3000.25],
-        ],
-    );
-    for damaged in [
-        "0.0 0.0 0.0",
-        "3.0 2.5 2.0 1.0",
-        "3.0 2.5e 2.0",
-        "1e999 2.0 3.0",
-    ] {
+    assert_cell(with(large), [[1000.0, 0.0, 0.0], [500.0, 2000.5, 0.0], [-250.0, 750.0, 3000.25]]);
+    for damaged in ["0.0 0.0 0.0", "3.0 2.5 2.0 1.0", "3.0 2.5e 2.0", "1e999 2.0 3.0"] {
         assert_eq!(with(damaged), None, "{damaged}");
     }
 }
@@ -127,19 +109,11 @@ fn dcd_files_have_cells_with_angles_or_cosines() {
     // a, gamma, b, beta, alpha, c: gamma is 120 degrees
     let with =
         |numbers: [f64; 6]| cells(dcd::FORMAT, &replaced(&bytes, &old, &big_endian(&numbers)))[0];
-    let hexagonal = [
-        [3.0, 0.0, 0.0],
-        [-2.0, 12.0_f64.sqrt(), 0.0],
-        [0.0, 0.0, 5.0],
-    ];
+    let hexagonal = [[3.0, 0.0, 0.0], [-2.0, 12.0_f64.sqrt(), 0.0], [0.0, 0.0, 5.0]];
     assert_cell(with([3.0, 120.0, 4.0, 90.0, 90.0, 5.0]), hexagonal);
     assert_cell(with([3.0, -0.5, 4.0, 0.0, 0.0, 5.0]), hexagonal);
     // beta 60 degrees: c = 5 (1/2, 0, sqrt(3)/2)
-    let monoclinic = [
-        [3.0, 0.0, 0.0],
-        [0.0, 4.0, 0.0],
-        [2.5, 0.0, 18.75_f64.sqrt()],
-    ];
+    let monoclinic = [[3.0, 0.0, 0.0], [0.0, 4.0, 0.0], [2.5, 0.0, 18.75_f64.sqrt()]];
     assert_cell(with([3.0, 90.0, 4.0, 60.0, 90.0, 5.0]), monoclinic);
     assert_eq!(with([0.0; 6]), None);
     assert_eq!(with([3.0, 90.0, 4.0, 200.0, 90.0, 5.0]), None);
@@ -149,9 +123,7 @@ fn dcd_files_have_cells_with_angles_or_cosines() {
     }
     let has_remark = |bytes: &[u8]| {
         let remarks = dcd::FORMAT.reader().remarks(bytes);
-        remarks
-            .iter()
-            .any(|remark| remark.contains("simulation cell"))
+        remarks.iter().any(|remark| remark.contains("simulation cell"))
     };
     assert!(has_remark(&bytes) && !has_remark(&replaced(&bytes, &old, &big_endian(&[0.0; 6]))));
     // Symmetric matrices of newer versions of CHARMM. The last number of the header is the version, here 24
@@ -169,10 +141,7 @@ fn dcd_files_have_cells_with_angles_or_cosines() {
         with([4.0, 2.5, 5.0, -0.25, 0.75, 6.0]),
         [[4.0, 2.5, -0.25], [2.5, 5.0, 0.75], [-0.25, 0.75, 6.0]],
     );
-    assert_cell(
-        newer([300.0, 90.0, 250.0, 90.0, 90.0, 200.0]).0,
-        diagonal([300.0, 250.0, 200.0]),
-    );
+    assert_cell(newer([300.0, 90.0, 250.0, 90.0, 90.0, 200.0]).0, diagonal([300.0, 250.0, 200.0]));
     assert_cell(newer([3.0, 120.0, 4.0, 90.0, 90.0, 5.0]).0, hexagonal);
     assert_eq!(newer([f64::NAN; 6]), (None, false));
     assert_eq!(newer([4.0, 100.0, 5.0, 300.0, -7.0, 6.0]), (None, false));
@@ -189,16 +158,8 @@ fn amber_files_have_cells() {
         for cell in cells(amber::FORMAT, &bytes) {
             assert_cell(cell, diagonal([30.0, 25.0, 20.0]));
         }
-        let bytes = replaced(
-            &bytes,
-            &big_endian(&[90.0; 3]),
-            &big_endian(&[90.0, 90.0, 120.0]),
-        );
-        let hexagonal = [
-            [30.0, 0.0, 0.0],
-            [-12.5, 12.5 * 3.0_f64.sqrt(), 0.0],
-            [0.0, 0.0, 20.0],
-        ];
+        let bytes = replaced(&bytes, &big_endian(&[90.0; 3]), &big_endian(&[90.0, 90.0, 120.0]));
+        let hexagonal = [[30.0, 0.0, 0.0], [-12.5, 12.5 * 3.0_f64.sqrt(), 0.0], [0.0, 0.0, 20.0]];
         assert_cell(cells(amber::FORMAT, &bytes)[0], hexagonal);
         let bytes = replaced(&bytes, &old, &big_endian(&[30.0, f64::NAN, 20.0]));
         assert_eq!(cells(amber::FORMAT, &bytes)[0], None);
@@ -215,11 +176,7 @@ fn pdb_files_have_cells() {
     let atom = "ATOM      1  N   ALA A   1     362.864 -78.459 936.442  1.00 16.50           N\n";
     let record = |numbers: &str| format!("CRYST1{numbers} P 1           1\n");
     let hexagonal = record("    3.000    4.000    5.000  90.00  90.00 120.00");
-    let edges = [
-        [3.0, 0.0, 0.0],
-        [-2.0, 12.0_f64.sqrt(), 0.0],
-        [0.0, 0.0, 5.0],
-    ];
+    let edges = [[3.0, 0.0, 0.0], [-2.0, 12.0_f64.sqrt(), 0.0], [0.0, 0.0, 5.0]];
     // A model with a cell of its own, and one with that of the file
     let own = record("    6.000    7.000    8.000  90.00  90.00  90.00");
     let text =
@@ -249,18 +206,11 @@ fn mmcif_files_have_cells() {
     };
     let angles = "_cell.angle_alpha 90\n_cell.angle_beta  90.000\n_cell.angle_gamma 120(1)\n";
     let lengths = "_cell.length_a   3.0(2)\n_cell.length_b 4.0\n_cell.length_c 5\n";
-    let edges = [
-        [3.0, 0.0, 0.0],
-        [-2.0, 12.0_f64.sqrt(), 0.0],
-        [0.0, 0.0, 5.0],
-    ];
+    let edges = [[3.0, 0.0, 0.0], [-2.0, 12.0_f64.sqrt(), 0.0], [0.0, 0.0, 5.0]];
     assert_cell(with(&[lengths, angles].concat()), edges);
     assert_eq!(with(angles), None);
     assert_eq!(with(&lengths.replace("4.0", "?")), None);
-    assert_eq!(
-        with(&[&lengths.replace("4.0", "-4"), angles].concat()),
-        None
-    );
+    assert_eq!(with(&[&lengths.replace("4.0", "-4"), angles].concat()), None);
     assert_eq!(with(""), None);
 }
 
@@ -334,10 +284,12 @@ fn pdb_cells_behind_models_belong_to_the_model_before() {
             format!("CRYST1{edge:9.3}{edge:9.3}{edge:9.3}  90.00  90.00  90.00 P 1           1\n");
         (format!("MODEL        {edge}\n{atom}ENDMDL\n"), cell)
     };
-    let (behind, before) = [2.0, 3.0, 4.0].map(model).into_iter().fold(
-        (String::new(), String::new()),
-        |(behind, before), (model, cell)| (behind + &model + &cell, before + &cell + &model),
-    );
+    let (behind, before) = [2.0, 3.0, 4.0]
+        .map(model)
+        .into_iter()
+        .fold((String::new(), String::new()), |(behind, before), (model, cell)| {
+            (behind + &model + &cell, before + &cell + &model)
+        });
     for text in [behind, before] {
         let found = cells(pdb::FORMAT, format!("{text}END\n").as_bytes());
         assert_eq!(found.len(), 3);

@@ -131,14 +131,7 @@ impl ParticleLayout {
         mut attributes: Vec<StridedColumn>,
     ) -> Self {
         attributes.retain(|column| !column.component_strides.is_empty());
-        Self {
-            count,
-            axes: join_alike(axes),
-            weight: None,
-            attributes,
-            time: None,
-            step: None,
-        }
+        Self { count, axes: join_alike(axes), weight: None, attributes, time: None, step: None }
     }
 
     /// Rejects columns that reach past the end of a file of `len` bytes.
@@ -152,9 +145,7 @@ impl ParticleLayout {
 
     /// Bytes that the numbers take in memory.
     pub(super) fn byte_len(&self) -> u64 {
-        let each = self
-            .columns()
-            .map(|c| c.component_strides.len() * c.scalar.size());
+        let each = self.columns().map(|c| c.component_strides.len() * c.scalar.size());
         let each = each.fold(0, usize::saturating_add);
         (each as u64).saturating_mul(self.count as u64)
     }
@@ -216,26 +207,15 @@ pub(super) struct GrowingParticles {
 impl GrowingParticles {
     /// No particles yet, with capacity for an estimate of `room` if `budget` allows it.
     pub(super) fn new(layout: ParticleLayout, room: usize, budget: MemoryBudget) -> Self {
-        let each = layout
-            .columns()
-            .map(|c| c.component_strides.len() * c.scalar.size());
+        let each = layout.columns().map(|c| c.component_strides.len() * c.scalar.size());
         let need = each.fold(0, usize::saturating_add).saturating_mul(room);
-        let room = if need as u64 <= budget.bytes() {
-            room
-        } else {
-            0
-        };
+        let room = if need as u64 <= budget.bytes() { room } else { 0 };
         let empty = |column: &StridedColumn| {
             let mut data = zeros(column.scalar, 0);
             data.reserve(column.component_strides.len().saturating_mul(room));
             data
         };
-        Self {
-            data: layout.columns().map(empty).collect(),
-            layout,
-            count: 0,
-            budget,
-        }
+        Self { data: layout.columns().map(empty).collect(), layout, count: 0, budget }
     }
 
     /// Adds the `count` particles of `records`, which begin at its first byte.
@@ -245,14 +225,9 @@ impl GrowingParticles {
     pub(super) fn append(&mut self, records: &[u8], count: usize) -> Result<(), ParseError> {
         self.count += count;
         let held: u64 = self.data.iter().map(AttributeData::byte_len).sum();
-        let more = self
-            .layout
-            .columns()
-            .map(|c| c.component_strides.len() * c.scalar.size() * count);
-        self.budget.check(
-            held + more.sum::<usize>() as u64,
-            "its numbers in memory are",
-        )?;
+        let more =
+            self.layout.columns().map(|c| c.component_strides.len() * c.scalar.size() * count);
+        self.budget.check(held + more.sum::<usize>() as u64, "its numbers in memory are")?;
         for (column, data) in self.layout.columns().zip(&mut self.data) {
             let mut block = zeros(column.scalar, column.component_strides.len() * count);
             fill(&mut block, records, column, 0, count);
@@ -278,11 +253,7 @@ fn divide(positions: &mut Positions, weight: AttributeData) {
 }
 
 fn divided(position: Vec3, w: f32) -> Vec3 {
-    if w != 1.0 && w != 0.0 {
-        position / w
-    } else {
-        position
-    }
+    if w != 1.0 && w != 0.0 { position / w } else { position }
 }
 
 /// Reads one column by itself.
@@ -327,10 +298,8 @@ fn check_columns<'c>(
 
 /// Decodes all `columns` of `count` particles, which fit.
 fn gather(bytes: &[u8], count: usize, columns: &[StridedColumn]) -> Vec<AttributeData> {
-    let mut gathered: Vec<AttributeData> = columns
-        .iter()
-        .map(|c| zeros(c.scalar, c.component_strides.len() * count))
-        .collect();
+    let mut gathered: Vec<AttributeData> =
+        columns.iter().map(|c| zeros(c.scalar, c.component_strides.len() * count)).collect();
     for first in (0..count).step_by(BLOCK) {
         let end = count.min(first + BLOCK);
         for (column, data) in columns.iter().zip(&mut gathered) {
@@ -363,32 +332,18 @@ pub(super) fn positions(parts: Vec<AttributeData>, count: usize) -> Positions {
     let parts = match <[AttributeData; 1]>::try_from(parts) {
         Ok([AttributeData::F32(v)]) if v.len() == 3 * count => {
             return Positions::F32(bytemuck::allocation::try_cast_vec(v).unwrap_or_else(
-                |(_, v)| {
-                    v.as_chunks()
-                        .0
-                        .iter()
-                        .map(|p| Vec3::from_array(*p))
-                        .collect()
-                },
+                |(_, v)| v.as_chunks().0.iter().map(|p| Vec3::from_array(*p)).collect(),
             ));
         }
         Ok([AttributeData::F64(v)]) if v.len() == 3 * count => {
             return Positions::F64(bytemuck::allocation::try_cast_vec(v).unwrap_or_else(
-                |(_, v)| {
-                    v.as_chunks()
-                        .0
-                        .iter()
-                        .map(|p| DVec3::from_array(*p))
-                        .collect()
-                },
+                |(_, v)| v.as_chunks().0.iter().map(|p| DVec3::from_array(*p)).collect(),
             ));
         }
         Ok([part]) => vec![part],
         Err(parts) => parts,
     };
-    let exact_in_f32 = parts
-        .iter()
-        .all(|part| part.scalar_type().is_exact_in_f32());
+    let exact_in_f32 = parts.iter().all(|part| part.scalar_type().is_exact_in_f32());
     let wide = (0..count).map(|particle| {
         let mut axes = parts.iter().flat_map(|part| {
             let width = part.len() / count;
@@ -426,10 +381,8 @@ pub(super) fn group_vectors(mut columns: Vec<StridedColumn>) -> Vec<StridedColum
 
 /// Replaces the columns at `places` by one called `name`, where the earliest of them was.
 fn merge_columns(columns: &mut Vec<StridedColumn>, places: &[usize], name: &str) {
-    let parts: Vec<StridedColumn> = places
-        .iter()
-        .filter_map(|p| columns.get(*p).cloned())
-        .collect();
+    let parts: Vec<StridedColumn> =
+        places.iter().filter_map(|p| columns.get(*p).cloned()).collect();
     let (Some(first), Some(earliest)) = (parts.first(), places.iter().min()) else {
         return;
     };
@@ -440,10 +393,7 @@ fn merge_columns(columns: &mut Vec<StridedColumn>, places: &[usize], name: &str)
         name: name.to_owned(),
         scalar: first.scalar,
         endian: first.endian,
-        component_strides: parts
-            .iter()
-            .flat_map(|c| c.component_strides.clone())
-            .collect(),
+        component_strides: parts.iter().flat_map(|c| c.component_strides.clone()).collect(),
     };
     let mut index = 0;
     columns.retain_mut(|column| {

@@ -87,9 +87,7 @@ pub(super) fn sample(path: &str) -> Vec<u8> {
         return bytes;
     }
     let mut inflated = Vec::new();
-    MultiGzDecoder::new(bytes.as_slice())
-        .read_to_end(&mut inflated)
-        .expect("the sample is whole");
+    MultiGzDecoder::new(bytes.as_slice()).read_to_end(&mut inflated).expect("the sample is whole");
     inflated
 }
 
@@ -112,18 +110,12 @@ pub(super) fn attribute<'a>(particles: &'a RawParticles, name: &str) -> &'a Attr
 
 /// Names of all attributes.
 pub(super) fn names(particles: &RawParticles) -> Vec<&str> {
-    particles
-        .attributes
-        .iter()
-        .map(|a| a.name.as_str())
-        .collect()
+    particles.attributes.iter().map(|a| a.name.as_str()).collect()
 }
 
 /// All coordinates in f64.
 pub(super) fn coordinates(positions: &Positions) -> Vec<[f64; 3]> {
-    (0..positions.len())
-        .map(|i| positions.get(i).to_array())
-        .collect()
+    (0..positions.len()).map(|i| positions.get(i).to_array()).collect()
 }
 
 /// All numbers in f64.

@@ -48,10 +48,7 @@ fn bytes_of(name: &str) -> Vec<u8> {
 fn samples_are_recognised_and_read_in_pieces() {
     for (name, format, reader) in SAMPLES {
         let bytes = bytes_of(name);
-        assert!(
-            reader.all(&bytes).is_ok_and(|steps| steps.len() > 1),
-            "{name}"
-        );
+        assert!(reader.all(&bytes).is_ok_and(|steps| steps.len() > 1), "{name}");
         let without_name = Format::detect(&bytes, std::path::Path::new("file"));
         assert_eq!(without_name, Ok(*format), "{name}");
     }

@@ -29,10 +29,8 @@ impl<'a> NumberReader<'a> {
     pub(super) fn take(&mut self, len: usize) -> Result<&'a [u8], ParseError> {
         let rest = self.bytes.get(self.at..).unwrap_or_default();
         let Some(taken) = rest.get(..len) else {
-            let what = format!(
-                "{len} bytes expected here, file has {} left: {CUT_SHORT}",
-                rest.len()
-            );
+            let what =
+                format!("{len} bytes expected here, file has {} left: {CUT_SHORT}", rest.len());
             return Err(ParseError::malformed(self.at, what));
         };
         self.at += len;

@@ -20,10 +20,7 @@ fn is_text(format: Format, bytes: &[u8]) -> bool {
     if format == csv::FORMAT {
         true
     } else if format == xyz::FORMAT {
-        matches!(
-            xyz::kind(bytes),
-            Ok(xyz::XyzVariant::Molecular | xyz::XyzVariant::Bare)
-        )
+        matches!(xyz::kind(bytes), Ok(xyz::XyzVariant::Molecular | xyz::XyzVariant::Bare))
     } else {
         format.is_streamed(bytes)
     }

@@ -15,8 +15,7 @@ const BONDS: &[u8] = b"!NBOND";
 
 /// Whether a file that begins with `head` is a PSF file.
 pub(crate) fn is_psf(head: &[u8]) -> bool {
-    head.strip_prefix(b"PSF")
-        .is_some_and(|rest| rest.first().is_none_or(u8::is_ascii_whitespace))
+    head.strip_prefix(b"PSF").is_some_and(|rest| rest.first().is_none_or(u8::is_ascii_whitespace))
 }
 
 /// Reads the number of atoms, their properties, and their bonds.
@@ -45,9 +44,8 @@ pub(crate) fn read(
     let (mut charges, mut masses) = (Vec::new(), Vec::new());
     for index in 0..count {
         let line = lines.next();
-        let words: Vec<&[u8]> = line
-            .map(|line| text::words(line.text).take(8).collect())
-            .unwrap_or_default();
+        let words: Vec<&[u8]> =
+            line.map(|line| text::words(line.text).take(8).collect()).unwrap_or_default();
         let fields = words.get(if has_segment(&words) { 2 } else { 1 }..);
         let numbers = match fields {
             Some([residue, residue_name, name, _, charge, mass, ..]) => {
@@ -69,11 +67,7 @@ pub(crate) fn read(
         charges.push(charge);
         masses.push(mass);
     }
-    let attribute = |name: &str, data| Attribute {
-        name: name.to_owned(),
-        components: 1,
-        data,
-    };
+    let attribute = |name: &str, data| Attribute { name: name.to_owned(), components: 1, data };
     let attributes = vec![
         attribute(ELEMENT, AttributeData::I32(elements)),
         attribute(RESIDUE, AttributeData::I32(residues)),
@@ -184,10 +178,8 @@ mod tests {
         assert_eq!(data(&TEXT.replace(" SYS ", " ")), whole);
         assert_eq!(data(&TEXT.replace(" 7 SOL", " 7A SOL")), whole);
         // Types may be numbers, and more numbers may follow
-        let numbers = TEXT.replace(
-            "OT -0.834 15.9994 0",
-            "2 -0.834 15.9994 0 0.00000 -0.301140E-02",
-        );
+        let numbers =
+            TEXT.replace("OT -0.834 15.9994 0", "2 -0.834 15.9994 0 0.00000 -0.301140E-02");
         assert_eq!(data(&numbers), whole);
         assert_eq!(data(&numbers.replace(" SYS ", " ")), whole);
     }
@@ -201,11 +193,7 @@ mod tests {
         fails("15.9994", "heavy", "line 1 of them");
         fails("2 !NBOND", "x !NBOND", "not a number of bonds");
         fails("2 !NBOND", "3 !NBOND", "3 bonds expected, the file has 2");
-        fails(
-            "1 2 2",
-            "1 2 3",
-            "\"3\" in a bond is not the number of an atom, 1 to 2",
-        );
+        fails("1 2 2", "1 2 3", "\"3\" in a bond is not the number of an atom, 1 to 2");
         fails("1 2 2", "1 two 2", "\"two\" in a bond");
         fails("1 2 2", "0 2 2", "\"0\" in a bond");
         let tight = MemoryBudget::new(10, "take care");

@@ -2,9 +2,8 @@
 
 /// The remark that a file has a cell; `periodic` are the flags of its boundaries.
 pub(super) fn cell_remark(periodic: Option<&str>) -> String {
-    let boundaries = periodic.map_or_else(String::new, |flags| {
-        format!(" with periodic boundaries ({flags})")
-    });
+    let boundaries =
+        periodic.map_or_else(String::new, |flags| format!(" with periodic boundaries ({flags})"));
     format!(
         "the file has a simulation cell{boundaries}; particles are drawn where the file has them"
     )

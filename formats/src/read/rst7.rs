@@ -82,11 +82,7 @@ impl Reader for Rst7 {
     }
 
     fn remarks(&self, bytes: &[u8]) -> Vec<String> {
-        let mut remarks = vec![remarks::units(
-            "angstroms",
-            Some("angstroms/ps"),
-            Some("ps"),
-        )];
+        let mut remarks = vec![remarks::units("angstroms", Some("angstroms/ps"), Some("ps"))];
         if has_cell(bytes) {
             remarks.push(remarks::cell_remark(None));
         }
@@ -108,10 +104,9 @@ impl Heading {
         let count = count.and_then(|count| usize::try_from(count).ok());
         let rest: Option<Vec<f64>> = words.by_ref().take(6).map(text::number).collect();
         match (count, rest) {
-            (Some(count @ 1..), Some(rest)) if rest.len() < 6 => Ok(Self {
-                count,
-                time: rest.first().copied().filter(|time| time.is_finite()),
-            }),
+            (Some(count @ 1..), Some(rest)) if rest.len() < 6 => {
+                Ok(Self { count, time: rest.first().copied().filter(|time| time.is_finite()) })
+            }
             _ => {
                 let what = format!(
                     "the second line has {}, not a number of atoms, perhaps with the time",
@@ -234,18 +229,14 @@ struct RowNumbers {
 
 impl RowNumbers {
     const fn new(budget: MemoryBudget) -> Self {
-        Self {
-            numbers: Vec::new(),
-            budget,
-        }
+        Self { numbers: Vec::new(), budget }
     }
 
     /// Adds the numbers of a line.
     fn push(&mut self, row: &[f64]) -> Result<(), ParseError> {
         // A vector that grows holds its old numbers and twice the room for new ones.
         let need = 3 * size_of::<f64>() * (self.numbers.len() + row.len());
-        self.budget
-            .check(need as u64, "its numbers in memory are")?;
+        self.budget.check(need as u64, "its numbers in memory are")?;
         self.numbers.extend(row);
         Ok(())
     }
@@ -309,10 +300,7 @@ mod tests {
         pieces::read(FORMAT, bytes, step)
     }
 
-    const READER: TestedReader = TestedReader {
-        steps,
-        read: particles,
-    };
+    const READER: TestedReader = TestedReader { steps, read: particles };
 
     /// Lines of six numbers.
     fn rows(numbers: &[f64]) -> String {
@@ -342,16 +330,8 @@ mod tests {
         for (text, has_velocity, has_cell) in [
             (format!("{head}{positions}"), false, false),
             (format!("{head}{positions}{cell}\n\n"), false, true),
-            (
-                format!("{head}{positions}{}", rows(&velocities)),
-                true,
-                false,
-            ),
-            (
-                format!("{head}{positions}{}{cell}", rows(&velocities)),
-                true,
-                true,
-            ),
+            (format!("{head}{positions}{}", rows(&velocities)), true, false),
+            (format!("{head}{positions}{}{cell}", rows(&velocities)), true, true),
         ] {
             let found = one(&text);
             let Positions::F64(places) = &found.positions else {
@@ -395,43 +375,22 @@ mod tests {
     fn damage_is_named() {
         let good = format!("a\n    3\n{}", rows(&PLACES));
         for (from, to, message) in [
-            (
-                "    3\n",
-                "    5\n",
-                "byte 81: expected 6 numbers of 12 columns",
-            ),
-            (
-                "    3\n",
-                "    1\n",
-                "byte 8: expected 3 numbers of 12 columns",
-            ),
+            ("    3\n", "    5\n", "byte 81: expected 6 numbers of 12 columns"),
+            ("    3\n", "    1\n", "byte 8: expected 3 numbers of 12 columns"),
             ("    3\n", "    9000000000\n", "expected 6 numbers"),
             ("    3\n", "    0\n", "not a number of atoms"),
             ("    3\n", "    three\n", "not a number of atoms"),
-            (
-                "4.0000000",
-                "4.zero000",
-                "columns 1 to 12 of an atom have \"4.zero000\"",
-            ),
-            (
-                "6.5000000",
-                "6.50000001",
-                "expected 3 numbers of 12 columns",
-            ),
-            (
-                "6.5000000\n",
-                "6.5000000\n\n   1.0000000\n",
-                "9 components of velocities, 1 follow",
-            ),
+            ("4.0000000", "4.zero000", "columns 1 to 12 of an atom have \"4.zero000\""),
+            ("6.5000000", "6.50000001", "expected 3 numbers of 12 columns"),
+            ("6.5000000\n", "6.5000000\n\n   1.0000000\n", "9 components of velocities, 1 follow"),
         ] {
             let text = good.replace(from, to);
             let error = READER.error_inside(text.as_bytes()).to_string();
             assert!(error.contains(message), "{error} | {message}");
         }
-        for (rows_left, message) in [
-            (0, "4 atoms have 2 lines of positions, 1 follow"),
-            (1, "components of velocities"),
-        ] {
+        for (rows_left, message) in
+            [(0, "4 atoms have 2 lines of positions, 1 follow"), (1, "components of velocities")]
+        {
             let rows = rows(&[PLACES, PLACES].concat()[..12]);
             let len = 73 * (1 + 2 * rows_left);
             let text = format!("a\n    4\n{}", &[rows.clone(), rows].concat()[..len]);
@@ -443,11 +402,7 @@ mod tests {
         assert!(error.contains("more than positions"), "{error}");
         let tight = MemoryBudget::new(100, "take care");
         let mut source = ByteSource::whole(good.as_bytes());
-        assert!(
-            FORMAT
-                .read_within(&mut source, &Step::whole(0), tight)
-                .is_err()
-        );
+        assert!(FORMAT.read_within(&mut source, &Step::whole(0), tight).is_err());
         READER.survives_truncation(good.as_bytes(), &[0, 1, 5, 8, 9, 81, 82], 100);
     }
 }

@@ -47,10 +47,7 @@ pub(crate) fn is_text(head: &[u8]) -> bool {
         Ok(_) => true,
         Err(e) => e.error_len().is_none() && head.len() >= HEAD_LEN - 3,
     };
-    whole
-        && head
-            .iter()
-            .all(|b| *b >= 32 && *b != 127 || matches!(b, b'\t' | b'\n' | b'\r'))
+    whole && head.iter().all(|b| *b >= 32 && *b != 127 || matches!(b, b'\t' | b'\n' | b'\r'))
 }
 
 /// True if `text` is decimal digits and nothing else.

@@ -26,10 +26,7 @@ impl<'a> ByteSource<'a> {
 
     /// Content that is in memory or mapped, and can be shared.
     pub(crate) fn shared(bytes: &'a SharedBytes) -> Self {
-        Self {
-            shared: Some(bytes),
-            ..Self::whole(bytes)
-        }
+        Self { shared: Some(bytes), ..Self::whole(bytes) }
     }
 
     /// Content that is read through `text`.

@@ -83,8 +83,7 @@ impl<'a> Iterator for Lines<'a> {
 
 /// The parts of `text` between blanks and tabs.
 pub(crate) fn words(text: &[u8]) -> impl Iterator<Item = &[u8]> {
-    text.split(u8::is_ascii_whitespace)
-        .filter(|word| !word.is_empty())
+    text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
 }
 
 /// `bytes` as text of the same length, so that offsets in it are offsets in the file: each byte that is no
@@ -127,15 +126,9 @@ pub(crate) fn integer(token: &[u8]) -> Option<i64> {
         if !digit.is_ascii_digit() {
             return None;
         }
-        value = value
-            .checked_mul(10)?
-            .checked_sub(i64::from(digit - b'0'))?;
+        value = value.checked_mul(10)?.checked_sub(i64::from(digit - b'0'))?;
     }
-    if negative {
-        (value != 0).then_some(value)
-    } else {
-        value.checked_neg()
-    }
+    if negative { (value != 0).then_some(value) } else { value.checked_neg() }
 }
 
 /// `token` as a number: decimal and exponent forms, Fortran's `1.0D+00` and `1.0-105`, and NaN or
@@ -200,16 +193,11 @@ fn microsoft_number(before: &[u8], after: &[u8], negative: bool) -> Option<f64> 
     }
     let name = after.to_ascii_uppercase();
     let is = |keyword: &[u8]| {
-        name.strip_prefix(keyword)
-            .is_some_and(|rest| rest.iter().all(u8::is_ascii_digit))
+        name.strip_prefix(keyword).is_some_and(|rest| rest.iter().all(u8::is_ascii_digit))
     };
     // The short forms come from rounding `INF` and `QNAN` to few digits as if they were some.
     if is(b"INF") || is(b"J") || is(b"IO") {
-        return Some(if negative {
-            f64::NEG_INFINITY
-        } else {
-            f64::INFINITY
-        });
+        return Some(if negative { f64::NEG_INFINITY } else { f64::INFINITY });
     }
     let is_nan = is(b"IND") || is(b"QNAN") || is(b"SNAN") || is(b"NAN") || is(b"R");
     is_nan.then_some(f64::NAN)
@@ -219,16 +207,11 @@ fn microsoft_number(before: &[u8], after: &[u8], negative: bool) -> Option<f64> 
 fn fortran_number(token: &[u8]) -> Option<f64> {
     let digits_before = |at: usize| token[..at].iter().any(u8::is_ascii_digit);
     let mut buffer = [0; LONGEST];
-    if let Some(letter) = token
-        .iter()
-        .position(|b| matches!(b, b'd' | b'D' | b'q' | b'Q'))
-    {
+    if let Some(letter) = token.iter().position(|b| matches!(b, b'd' | b'D' | b'q' | b'Q')) {
         let copy = buffer.get_mut(..token.len())?;
         copy.copy_from_slice(token);
         copy[letter] = b'e';
-        return digits_before(letter)
-            .then(|| fast_float2::parse(&*copy).ok())
-            .flatten();
+        return digits_before(letter).then(|| fast_float2::parse(&*copy).ok()).flatten();
     }
     let sign = token.iter().rposition(|b| matches!(b, b'+' | b'-'))?;
     if !digits_before(sign) || !token[sign - 1].is_ascii_digit() && token[sign - 1] != b'.' {
@@ -272,11 +255,7 @@ mod tests {
         ];
         for (text, expected) in cases {
             let found = number(text.as_bytes());
-            assert_eq!(
-                found.map(f64::to_bits),
-                Some(expected.to_bits()),
-                "{text}: {found:?}"
-            );
+            assert_eq!(found.map(f64::to_bits), Some(expected.to_bits()), "{text}: {found:?}");
         }
         for text in [
             "nan",
@@ -327,9 +306,7 @@ mod tests {
     #[test]
     fn lines_have_their_offset() {
         let bytes = b"ab\r\n\n c\nlast";
-        let found: Vec<_> = Lines::new(bytes, 0..bytes.len())
-            .map(|l| (l.at, l.text))
-            .collect();
+        let found: Vec<_> = Lines::new(bytes, 0..bytes.len()).map(|l| (l.at, l.text)).collect();
         let expected: [(usize, &[u8]); 4] = [(0, b"ab"), (4, b""), (5, b" c"), (8, b"last")];
         assert_eq!(found, expected);
         assert_eq!(Lines::new(bytes, 40..70).next(), None);

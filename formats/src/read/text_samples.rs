@@ -15,11 +15,8 @@ pub(super) fn sample(name: &str) -> Vec<u8> {
         return bytes;
     }
     let mut plain = Vec::new();
-    std::io::Read::read_to_end(
-        &mut flate2::read::MultiGzDecoder::new(&bytes[..]),
-        &mut plain,
-    )
-    .expect("the sample is whole");
+    std::io::Read::read_to_end(&mut flate2::read::MultiGzDecoder::new(&bytes[..]), &mut plain)
+        .expect("the sample is whole");
     plain
 }
 

@@ -20,14 +20,8 @@ pub fn frames_of_names(
     names: &[&Path],
 ) -> Result<Vec<NumberedFile>, SequenceError> {
     let names = match pattern.map(Pattern::parse).transpose()? {
-        None => names
-            .iter()
-            .map(|name| FileName::parse(name, None))
-            .collect(),
-        Some(pattern) => names
-            .iter()
-            .filter_map(|name| fitting(&pattern, name))
-            .collect(),
+        None => names.iter().map(|name| FileName::parse(name, None)).collect(),
+        Some(pattern) => names.iter().filter_map(|name| fitting(&pattern, name)).collect(),
     };
     numbered(group::pick(Path::new("."), names, &mut Vec::new())?)
 }
@@ -38,10 +32,7 @@ pub fn frames_of_names(
 /// As [`super::Sequence::open`].
 #[doc(hidden)]
 pub fn frames_of_list(names: &[&Path]) -> Result<Vec<NumberedFile>, SequenceError> {
-    let names = names
-        .iter()
-        .map(|name| FileName::parse(name, None))
-        .collect();
+    let names = names.iter().map(|name| FileName::parse(name, None)).collect();
     numbered(group::listed(names, &mut Vec::new())?)
 }
 
@@ -52,7 +43,5 @@ fn fitting(pattern: &Pattern, path: &Path) -> Option<FileName> {
 
 fn numbered(group: FileGroup) -> Result<Vec<NumberedFile>, SequenceError> {
     let files = group.files.into_iter();
-    Ok(files
-        .map(|file| (file.path, file.number, file.part))
-        .collect())
+    Ok(files.map(|file| (file.path, file.number, file.part)).collect())
 }

@@ -52,11 +52,7 @@ impl LoneParts {
                 names.get(*part as usize).map_or("", String::as_str)
             )
         };
-        Self {
-            notes: parts.iter().map(note).collect(),
-            parts,
-            others,
-        }
+        Self { notes: parts.iter().map(note).collect(), parts, others }
     }
 }
 
@@ -90,10 +86,7 @@ impl NameSeries {
     }
 
     fn pattern(&self) -> String {
-        self.names
-            .first()
-            .map(|n| n.pattern(self.column, &self.free))
-            .unwrap_or_default()
+        self.names.first().map(|n| n.pattern(self.column, &self.free)).unwrap_or_default()
     }
 }
 
@@ -139,10 +132,7 @@ pub(super) fn pick(
     const CLEARLY_MORE: usize = 4;
     let mut by_extension = BTreeMap::<String, Vec<FileName>>::new();
     for name in names {
-        by_extension
-            .entry(name.extension.clone())
-            .or_default()
-            .push(name);
+        by_extension.entry(name.extension.clone()).or_default().push(name);
     }
     let mut candidates: Vec<SequenceCandidate> =
         by_extension.into_values().flat_map(candidates).collect();
@@ -162,11 +152,7 @@ pub(super) fn pick(
         });
     }
     for other in others.iter().map(SequenceCandidate::summary) {
-        notes.push(format!(
-            "`{}` ({}) is left out",
-            other.pattern,
-            counted(&other)
-        ));
+        notes.push(format!("`{}` ({}) is left out", other.pattern, counted(&other)));
     }
     into_group(candidates.swap_remove(0))
 }
@@ -190,9 +176,7 @@ pub(super) fn listed(
         .iter()
         .flat_map(|c| &c.runs)
         .flat_map(|run| {
-            run.names
-                .iter()
-                .filter_map(|n| run.number(n).map(|number| (number, n.path.clone())))
+            run.names.iter().filter_map(|n| run.number(n).map(|number| (number, n.path.clone())))
         })
         .collect();
     let files: Vec<(i64, PathBuf)> = if numbered.len() == order.len() {
@@ -210,11 +194,7 @@ pub(super) fn listed(
         number: Some(number),
         piece: None,
     });
-    Ok(FileGroup {
-        files: files.collect(),
-        parts: vec![String::new()],
-        lone: None,
-    })
+    Ok(FileGroup { files: files.collect(), parts: vec![String::new()], lone: None })
 }
 
 /// Notes listed files of several formats: these are seldom frames of one simulation.
@@ -225,9 +205,7 @@ fn note_mixed_formats(paths: &[PathBuf], notes: &mut Vec<String>) {
         Some(extension.to_owned())
     };
     let extensions: BTreeSet<String> = paths.iter().filter_map(extension).collect();
-    let topology = paths
-        .iter()
-        .find(|path| extension(path).as_deref() == Some("psf"));
+    let topology = paths.iter().find(|path| extension(path).as_deref() == Some("psf"));
     if extensions.len() < 2 {
         return;
     }
@@ -301,22 +279,14 @@ fn runs(names: Vec<FileName>) -> Vec<NameSeries> {
         .or_else(|| names.first().and_then(FileName::lone_column));
     let free: Vec<usize> = varying.into_iter().filter(|c| Some(*c) != column).collect();
     if free.is_empty() || column.is_some_and(distinct) {
-        return vec![NameSeries {
-            names,
-            column,
-            free,
-        }];
+        return vec![NameSeries { names, column, free }];
     }
     let mut split = BTreeMap::<Vec<i64>, Vec<FileName>>::new();
     for name in names {
         let key = free.iter().map(|c| name.numbers[*c]).collect();
         split.entry(key).or_default().push(name);
     }
-    let run = |names| NameSeries {
-        names,
-        column,
-        free: Vec::new(),
-    };
+    let run = |names| NameSeries { names, column, free: Vec::new() };
     split.into_values().map(run).collect()
 }
 
@@ -405,10 +375,7 @@ fn common_ends(texts: &[String]) -> (usize, usize) {
     let start = others.iter().map(start_with).min().unwrap_or(first.len());
     let start = first[..start].rfind(SEPARATORS).map_or(0, |i| i + 1);
     let end_with = |other: &String| {
-        let tails = first[start..]
-            .chars()
-            .rev()
-            .zip(other[start..].chars().rev());
+        let tails = first[start..].chars().rev().zip(other[start..].chars().rev());
         let same = tails.take_while(|(a, b)| a == b);
         same.map(|(a, _)| a.len_utf8()).sum::<usize>()
     };

@@ -98,12 +98,7 @@ impl Sequence {
             done.map_err(|e| e.in_file(&part.path))?;
         }
         particles.time = self.listed_time(index).or(particles.time);
-        Ok(Loaded {
-            particles,
-            notes,
-            all_bytes,
-            content_bytes,
-        })
+        Ok(Loaded { particles, notes, all_bytes, content_bytes })
     }
 
     /// Whether the file of several steps that was used last is mapped while a step is read.
@@ -143,10 +138,7 @@ impl Sequence {
         // Drop the old one first: two large files need not be in memory at once.
         *lock() = None;
         let file = Arc::new(FrameFile::open_within(&part.path, budget)?);
-        *lock() = Some(CachedFile {
-            file: Arc::clone(&file),
-            stamp,
-        });
+        *lock() = Some(CachedFile { file: Arc::clone(&file), stamp });
         Ok((file, step))
     }
 }

@@ -57,10 +57,7 @@ fn merge_bonds(parts: &[RawParticles]) -> Vec<Bond> {
     let mut first = 0_usize;
     for part in parts {
         let start = index_u32(first);
-        let moved = part
-            .bonds
-            .iter()
-            .map(|bond| bond.map(|i| i.saturating_add(start)));
+        let moved = part.bonds.iter().map(|bond| bond.map(|i| i.saturating_add(start)));
         bonds.extend(moved);
         first += part.positions.len();
     }
@@ -88,10 +85,8 @@ fn merge_positions(parts: Vec<Positions>) -> Positions {
 }
 
 fn merge_attributes(parts: &mut [RawParticles], notes: &mut Vec<String>) -> Vec<Attribute> {
-    let mut filled: Vec<&mut RawParticles> = parts
-        .iter_mut()
-        .filter(|p| !p.positions.is_empty())
-        .collect();
+    let mut filled: Vec<&mut RawParticles> =
+        parts.iter_mut().filter(|p| !p.positions.is_empty()).collect();
     let Some((first, others)) = filled.split_first_mut() else {
         // No particles at all: the longest list of names has the most information.
         let fullest = parts.iter_mut().max_by_key(|p| p.attributes.len());
@@ -103,10 +98,8 @@ fn merge_attributes(parts: &mut [RawParticles], notes: &mut Vec<String>) -> Vec<
     let mut lost: Vec<String> = Vec::new();
     for mut attribute in std::mem::take(&mut first.attributes) {
         let kind = (attribute.name, attribute.components);
-        let same: Vec<AttributeData> = others
-            .iter_mut()
-            .filter_map(|other| other.get_mut(&kind)?.pop_front())
-            .collect();
+        let same: Vec<AttributeData> =
+            others.iter_mut().filter_map(|other| other.get_mut(&kind)?.pop_front()).collect();
         attribute.name = kind.0;
         if same.len() == others.len() {
             attribute.data = join(attribute.data, same);
@@ -122,10 +115,7 @@ fn merge_attributes(parts: &mut [RawParticles], notes: &mut Vec<String>) -> Vec<
     lost.sort();
     lost.dedup();
     if !lost.is_empty() {
-        notes.push(one_line(format!(
-            "not in all parts, so left out: {}",
-            lost.join(", ")
-        )));
+        notes.push(one_line(format!("not in all parts, so left out: {}", lost.join(", "))));
     }
     merged
 }
@@ -138,21 +128,16 @@ fn by_kind(part: &mut RawParticles) -> ByKind {
     let mut attributes = ByKind::new();
     for attribute in std::mem::take(&mut part.attributes) {
         let kind = (attribute.name, attribute.components);
-        attributes
-            .entry(kind)
-            .or_default()
-            .push_back(attribute.data);
+        attributes.entry(kind).or_default().push_back(attribute.data);
     }
     attributes
 }
 
 fn join(first: AttributeData, others: Vec<AttributeData>) -> AttributeData {
-    let kind = others.iter().fold(first.scalar_type(), |kind, other| {
-        kind.common_with(other.scalar_type())
-    });
-    others.into_iter().fold(convert(first, kind), |all, other| {
-        append(all, convert(other, kind))
-    })
+    let kind = others
+        .iter()
+        .fold(first.scalar_type(), |kind, other| kind.common_with(other.scalar_type()));
+    others.into_iter().fold(convert(first, kind), |all, other| append(all, convert(other, kind)))
 }
 
 #[expect(
@@ -214,11 +199,7 @@ mod tests {
     }
 
     fn attribute(name: &str, components: usize, data: AttributeData) -> Attribute {
-        Attribute {
-            name: name.into(),
-            components,
-            data,
-        }
+        Attribute { name: name.into(), components, data }
     }
 
     #[test]
@@ -243,11 +224,7 @@ mod tests {
         let merged = merge(vec![(0, a), (3, b)], &mut notes);
         assert_eq!(merged.positions.len(), 3);
         let expected = [
-            attribute(
-                "id",
-                1,
-                AttributeData::I64(vec![i64::from(u32::MAX), -1, 5]),
-            ),
+            attribute("id", 1, AttributeData::I64(vec![i64::from(u32::MAX), -1, 5])),
             attribute(
                 "v",
                 3,
@@ -265,10 +242,7 @@ mod tests {
         let mut notes = Vec::new();
         let merged = merge(vec![(0, particles(0, vec![])), (1, full)], &mut notes);
         assert_eq!((merged.attributes.len(), notes.len()), (2, 0));
-        let none = merge(
-            vec![(0, particles(0, vec![])), (1, particles(0, vec![]))],
-            &mut notes,
-        );
+        let none = merge(vec![(0, particles(0, vec![])), (1, particles(0, vec![]))], &mut notes);
         assert!(none.positions.is_empty() && none.attributes.len() == 1);
     }
 
@@ -295,13 +269,7 @@ mod tests {
             positions: Positions::F64(vec![DVec3::splat(1e9)]),
             ..particles(0, vec![])
         };
-        let merged = merge(
-            vec![(0, particles(1, vec![])), (1, double)],
-            &mut Vec::new(),
-        );
-        assert_eq!(
-            merged.positions,
-            Positions::F64(vec![DVec3::ONE, DVec3::splat(1e9)])
-        );
+        let merged = merge(vec![(0, particles(1, vec![])), (1, double)], &mut Vec::new());
+        assert_eq!(merged.positions, Positions::F64(vec![DVec3::ONE, DVec3::splat(1e9)]));
     }
 }

@@ -142,10 +142,7 @@ impl Sequence {
     /// # Errors
     /// As [`Self::open_with`].
     pub fn open_within(input: &SequenceInput, budget: MemoryBudget) -> Result<Self, SequenceError> {
-        let settings = SequenceSettings {
-            budget,
-            ..SequenceSettings::default()
-        };
+        let settings = SequenceSettings { budget, ..SequenceSettings::default() };
         Self::open_with(input, settings)
     }
 
@@ -211,19 +208,14 @@ impl Sequence {
                 add_notes(&all, &group.parts, &mut all_notes);
                 notes.extend(lone.notes);
                 let some = without_parts(&all, &lone.parts);
-                let all_parts = AllParts {
-                    frames: all,
-                    parts: group.parts,
-                    notes: all_notes,
-                };
+                let all_parts = AllParts { frames: all, parts: group.parts, notes: all_notes };
                 (some, lone.others, Some(all_parts))
             }
         };
         add_notes(&frames, &parts, &mut notes);
-        let cache = last.filter(|f| f.steps().len() > 1).map(|file| CachedFile {
-            stamp: stamp(file.path()),
-            file: Arc::new(file),
-        });
+        let cache = last
+            .filter(|f| f.steps().len() > 1)
+            .map(|file| CachedFile { stamp: stamp(file.path()), file: Arc::new(file) });
         Self {
             frames,
             parts,
@@ -287,10 +279,7 @@ impl Sequence {
         let files = self.frames.iter().flat_map(|frame| &frame.parts);
         let kept: BTreeSet<u32> = files.map(|file| file.part).collect();
         let names = (0..).zip(&self.parts);
-        names
-            .filter(|(part, _)| kept.contains(part))
-            .map(|(_, name)| name.as_str())
-            .collect()
+        names.filter(|(part, _)| kept.contains(part)).map(|(_, name)| name.as_str()).collect()
     }
 
     /// Keeps only the parts that match `names`: those of the name in whatever case, else all whose names contain it.
@@ -348,10 +337,7 @@ impl Sequence {
             return;
         };
         let numbers = 0..i64::from(count);
-        let repeated = numbers.map(|number| SequenceFrame {
-            number,
-            parts: middle.parts.clone(),
-        });
+        let repeated = numbers.map(|number| SequenceFrame { number, parts: middle.parts.clone() });
         self.frames = repeated.collect();
         // Notes are about the frames that there were
         self.notes.clear();
@@ -413,9 +399,7 @@ fn frames_of(steps: Vec<NumberedStep>) -> Vec<SequenceFrame> {
         by_number.entry(entry.number).or_default().push(entry.file);
     }
     let frames = by_number.into_iter();
-    frames
-        .map(|(number, parts)| SequenceFrame { number, parts })
-        .collect()
+    frames.map(|(number, parts)| SequenceFrame { number, parts }).collect()
 }
 
 /// The `frames` without some parts; the others are numbered anew.

@@ -36,9 +36,8 @@ impl FileName {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let stem_len = stem_len(&name);
         let (stem, suffix) = name.split_at(stem_len);
-        let extension = strip_extension(&suffix.to_ascii_lowercase())
-            .trim_start_matches('.')
-            .to_owned();
+        let extension =
+            strip_extension(&suffix.to_ascii_lowercase()).trim_start_matches('.').to_owned();
         let mut parts = Splitter::default();
         let mut frame_column = None;
         match frame.filter(|range| range.end <= stem_len) {
@@ -118,13 +117,9 @@ impl FileName {
     pub(super) fn lone_column(&self) -> Option<usize> {
         let after_frame = self.literals.iter().take(self.numbers.len()).position(|l| {
             let literal = l.to_ascii_lowercase();
-            literal
-                .trim_end_matches(['_', '-', '.', ' '])
-                .ends_with("frame")
+            literal.trim_end_matches(['_', '-', '.', ' ']).ends_with("frame")
         });
-        self.frame_column
-            .or(after_frame)
-            .or(self.numbers.len().checked_sub(1))
+        self.frame_column.or(after_frame).or(self.numbers.len().checked_sub(1))
     }
 
     /// A pattern for names like this one: `#` for column `frame`, `*` for the columns in `free`,
@@ -170,9 +165,7 @@ struct Splitter {
 impl Splitter {
     fn split(&mut self, mut text: &str) {
         while !text.is_empty() {
-            let plain = text
-                .find(|c: char| c.is_ascii_digit())
-                .unwrap_or(text.len());
+            let plain = text.find(|c: char| c.is_ascii_digit()).unwrap_or(text.len());
             self.literal += &text[..plain];
             text = &text[plain..];
             let digits = text.bytes().take_while(u8::is_ascii_digit).count();
@@ -223,30 +216,18 @@ mod tests {
         assert_eq!(name.numbers, [23, 24389]);
         assert_eq!(name.extension, "bgeo");
         assert_eq!(name.lone_column(), Some(0));
-        assert_eq!(
-            name.pattern(Some(0), &[1]),
-            "dam_break_frame_#_*_particles.bgeo"
-        );
+        assert_eq!(name.pattern(Some(0), &[1]), "dam_break_frame_#_*_particles.bgeo");
     }
 
     #[test]
     fn double_extensions_and_none() {
         let gz = parse("dump.drop.1200.lammps.gz");
-        assert_eq!(
-            (gz.numbers.as_slice(), gz.extension.as_str()),
-            (&[1200][..], "lammps")
-        );
+        assert_eq!((gz.numbers.as_slice(), gz.extension.as_str()), (&[1200][..], "lammps"));
         assert_eq!(gz.pattern(Some(0), &[]), "dump.drop.#.lammps.gz");
         let bare = parse("dump.250");
-        assert_eq!(
-            (bare.numbers.as_slice(), bare.extension.as_str()),
-            (&[250][..], "")
-        );
+        assert_eq!((bare.numbers.as_slice(), bare.extension.as_str()), (&[250][..], ""));
         let long = parse("a99999999999999999999_7.vtk");
-        assert_eq!(
-            (long.literals.len(), long.numbers.as_slice()),
-            (2, &[7][..])
-        );
+        assert_eq!((long.literals.len(), long.numbers.as_slice()), (2, &[7][..]));
     }
 
     #[test]

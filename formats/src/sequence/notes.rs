@@ -13,9 +13,7 @@ pub(super) fn note_gaps(frames: &[SequenceFrame], notes: &mut Vec<String>) {
         *strides.entry(b.saturating_sub(a)).or_default() += 1;
     }
     // The most frequent one, the smallest of equals.
-    let usual = strides
-        .iter()
-        .max_by_key(|(stride, count)| (**count, std::cmp::Reverse(**stride)));
+    let usual = strides.iter().max_by_key(|(stride, count)| (**count, std::cmp::Reverse(**stride)));
     let Some((usual, _)) = usual else { return };
     let gaps: Vec<String> = pairs()
         .filter(|(a, b)| b.saturating_sub(*a) > *usual)
@@ -29,9 +27,7 @@ pub(super) fn note_gaps(frames: &[SequenceFrame], notes: &mut Vec<String>) {
         more => format!(" and {more} times more"),
     };
     let shown = gaps[..gaps.len().min(SHOWN)].join(", ");
-    notes.push(format!(
-        "frame numbers go up by {usual}, but jump from {shown}{more}"
-    ));
+    notes.push(format!("frame numbers go up by {usual}, but jump from {shown}{more}"));
 }
 
 pub(super) fn note_missing_parts(
@@ -86,11 +82,7 @@ pub(super) fn ranges(numbers: &[i64]) -> String {
         }
     }
     let text = |(first, last): &(i64, i64)| {
-        if first == last {
-            first.to_string()
-        } else {
-            format!("{first}-{last}")
-        }
+        if first == last { first.to_string() } else { format!("{first}-{last}") }
     };
     let mut texts: Vec<String> = runs.iter().take(SHOWN).map(text).collect();
     if runs.len() > SHOWN {

@@ -40,39 +40,25 @@ impl Pattern {
             pattern: text.display().to_string(),
             what: what.to_owned(),
         };
-        let name = text
-            .file_name()
-            .ok_or_else(|| bad("a pattern needs a file name at its end"))?;
+        let name = text.file_name().ok_or_else(|| bad("a pattern needs a file name at its end"))?;
         let directory = match text.parent() {
             Some(parent) if parent != Path::new("") => parent.to_owned(),
             _ => PathBuf::from("."),
         };
         if !directory.exists() && has_wildcards(&directory) {
-            return Err(bad(
-                "wildcards work in the file name only; give one directory at a time",
-            ));
+            return Err(bad("wildcards work in the file name only; give one directory at a time"));
         }
         let tokens = tokens(&name.to_string_lossy());
-        if tokens
-            .iter()
-            .filter(|t| **t == PatternToken::Number)
-            .count()
-            > 1
-        {
-            return Err(bad(
-                "only one # can be the frame number; write * for the other numbers",
-            ));
+        if tokens.iter().filter(|t| **t == PatternToken::Number).count() > 1 {
+            return Err(bad("only one # can be the frame number; write * for the other numbers"));
         }
         Ok(Self { directory, tokens })
     }
 
     /// Fits the pattern to a whole file name.
     pub(super) fn fit(&self, name: &str) -> Option<PatternMatch> {
-        let mut search = PatternSearch {
-            name,
-            fit: PatternMatch { number: None },
-            dead_ends: HashSet::new(),
-        };
+        let mut search =
+            PatternSearch { name, fit: PatternMatch { number: None }, dead_ends: HashSet::new() };
         search.fits(&self.tokens, 0).then_some(search.fit)
     }
 }
@@ -91,14 +77,8 @@ fn tokens(text: &str) -> Vec<PatternToken> {
     let mut rest = text;
     while let Some(first) = rest.chars().next() {
         let (token, len) = match first {
-            '#' => (
-                PatternToken::Number,
-                rest.len() - rest.trim_start_matches('#').len(),
-            ),
-            '*' => (
-                PatternToken::AnyText,
-                rest.len() - rest.trim_start_matches('*').len(),
-            ),
+            '#' => (PatternToken::Number, rest.len() - rest.trim_start_matches('#').len()),
+            '*' => (PatternToken::AnyText, rest.len() - rest.trim_start_matches('*').len()),
             '?' => (PatternToken::AnyChar, 1),
             '%' => match printf_len(rest) {
                 Some(len) => (PatternToken::Number, len),
@@ -145,9 +125,7 @@ impl PatternSearch<'_> {
                     return false;
                 }
                 let places = rest.char_indices().map(|(i, _)| i).chain([rest.len()]);
-                places
-                    .into_iter()
-                    .any(|skipped| self.fits(left, at + skipped))
+                places.into_iter().any(|skipped| self.fits(left, at + skipped))
             }
             PatternToken::Number => {
                 let unsigned = match rest.strip_prefix('-') {
@@ -172,20 +150,14 @@ mod tests {
 
     #[track_caller]
     fn number(pattern: &str, name: &str) -> Option<Option<String>> {
-        let fit = Pattern::parse(Path::new(pattern))
-            .expect("a pattern")
-            .fit(name)?;
+        let fit = Pattern::parse(Path::new(pattern)).expect("a pattern").fit(name)?;
         Some(fit.number.map(|range| name[range].to_owned()))
     }
 
     #[test]
     fn numbers_are_found_whatever_their_width() {
         for pattern in ["d_#.vtk", "d_####.vtk", "d_%d.vtk", "d_%04d.vtk"] {
-            assert_eq!(
-                number(pattern, "d_7.vtk"),
-                Some(Some("7".into())),
-                "{pattern}"
-            );
+            assert_eq!(number(pattern, "d_7.vtk"), Some(Some("7".into())), "{pattern}");
             assert_eq!(number(pattern, "d_00123.vtk"), Some(Some("00123".into())));
             assert_eq!(number(pattern, "d_.vtk"), None);
             assert_eq!(number(pattern, "d_7.vtk.gz"), None);
@@ -208,10 +180,7 @@ mod tests {
         assert_eq!(number("d_?.vtk", "d_17.vtk"), None);
         assert_eq!(number("*#.vtk", "a_123.vtk"), Some(Some("123".into())));
         let name = "dam_break_frame_23_24389_particles.bgeo";
-        assert_eq!(
-            number("dam_*_#_*_particles.bgeo", name),
-            Some(Some("23".into()))
-        );
+        assert_eq!(number("dam_*_#_*_particles.bgeo", name), Some(Some("23".into())));
         assert_eq!(number("100%.vtk", "100%.vtk"), Some(None));
     }
 
@@ -230,11 +199,8 @@ mod tests {
 
     #[test]
     fn useless_patterns_are_rejected() {
-        let error = |text: &str| {
-            Pattern::parse(Path::new(text))
-                .expect_err("no pattern")
-                .to_string()
-        };
+        let error =
+            |text: &str| Pattern::parse(Path::new(text)).expect_err("no pattern").to_string();
         assert!(error("a_#_#.vtk").contains("only one #"));
         assert!(error("none_*/a_#.vtk").contains("file name only"));
     }

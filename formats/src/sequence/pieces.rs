@@ -37,9 +37,7 @@ fn follow_references(names: &mut Vec<FileName>, notes: &mut Vec<String>) {
         1 => format!("`{path}` has"),
         count => format!("`{path}` and {} more have", count - 1),
     };
-    notes.push(format!(
-        "{which} virtual data sets: the files with the values are read instead"
-    ));
+    notes.push(format!("{which} virtual data sets: the files with the values are read instead"));
     let known: BTreeSet<PathBuf> = names.iter().map(|name| name.path.clone()).collect();
     for reference in &references {
         let count = reference.piece_path(0).map_or(0, |path| piece_count(&path));

@@ -47,11 +47,7 @@ pub(super) fn directory(path: &Path) -> Result<Vec<FileName>, SequenceError> {
 
 /// Whether `files` are those of a directory that ADIOS2 writes.
 fn is_adios(files: &[PathBuf]) -> bool {
-    let has = |name: &str| {
-        files
-            .iter()
-            .any(|file| file.file_name().is_some_and(|n| n == name))
-    };
+    let has = |name: &str| files.iter().any(|file| file.file_name().is_some_and(|n| n == name));
     has("md.idx") && has("data.0")
 }
 
@@ -62,10 +58,7 @@ fn lists_among(files: &[PathBuf]) -> Vec<FileName> {
         [only] => vec![*only],
         _ => files.iter().filter(|f| has_list_name(f)).collect(),
     };
-    lists
-        .into_iter()
-        .map(|f| FileName::parse(f, None))
-        .collect()
+    lists.into_iter().map(|f| FileName::parse(f, None)).collect()
 }
 
 /// The files that fit `pattern`; those with a known name if any has one.
@@ -93,24 +86,17 @@ impl SequenceError {
     /// The file `path` does not exist. The error names similar files in its directory.
     pub fn missing(path: &Path) -> Self {
         let hint = similar(path).unwrap_or_default();
-        Self::Missing {
-            path: path.to_owned(),
-            hint,
-        }
+        Self::Missing { path: path.to_owned(), hint }
     }
 }
 
 /// Files that are neither hidden nor unfinished, in the order of their names.
 fn list(path: &Path) -> Result<Vec<PathBuf>, SequenceError> {
     let io = |source: std::io::Error| match source.kind() {
-        std::io::ErrorKind::NotFound => SequenceError::Missing {
-            path: path.to_owned(),
-            hint: String::new(),
-        },
-        _ => SequenceError::Io {
-            path: path.to_owned(),
-            source,
-        },
+        std::io::ErrorKind::NotFound => {
+            SequenceError::Missing { path: path.to_owned(), hint: String::new() }
+        }
+        _ => SequenceError::Io { path: path.to_owned(), source },
     };
     let mut files = Vec::new();
     for entry in fs::read_dir(path).map_err(io)? {
@@ -172,12 +158,7 @@ fn closest(missing: &Path, directory: &Path, files: &[PathBuf]) -> String {
     let mut names: Vec<String> = files.iter().map(|f| name_of(f)).collect();
     names.sort_by_key(|name| std::cmp::Reverse(likeness(name, &missing)));
     names.truncate(3);
-    format!(
-        "closest of {} files in `{}`: {}",
-        files.len(),
-        directory.display(),
-        names.join(", ")
-    )
+    format!("closest of {} files in `{}`: {}", files.len(), directory.display(), names.join(", "))
 }
 
 fn name_of(path: &Path) -> String {
@@ -232,10 +213,7 @@ pub(super) fn number_steps(
     notes: &mut Vec<String>,
 ) -> (Vec<NumberedStep>, Option<FrameFile>) {
     let lone = files.len() == 1;
-    let mut scan = StepScan {
-        budget,
-        ..StepScan::default()
-    };
+    let mut scan = StepScan { budget, ..StepScan::default() };
     let several = files.iter().enumerate().any(|(i, f)| {
         may_hold_many(&f.path) && scan.is_suspect(&files, i) && scan.steps(i, &f.path).len() > 1
     });
@@ -246,24 +224,15 @@ pub(super) fn number_steps(
         };
         let numbered = files.iter().enumerate().map(|(index, f)| NumberedStep {
             number: own(index).or(f.number).unwrap_or(0),
-            file: PartFile {
-                path: f.path.clone(),
-                part: f.part,
-                step: None,
-                listed: None,
-            },
+            file: PartFile { path: f.path.clone(), part: f.part, step: None, listed: None },
         });
         return (numbered.collect(), scan.last);
     }
     let mut entries: Vec<(Option<i64>, PartFile)> = Vec::new();
     for (index, file) in files.iter().enumerate() {
         for (at, step) in scan.steps(index, &file.path).iter().enumerate() {
-            let part_file = PartFile {
-                path: file.path.clone(),
-                part: file.part,
-                step: Some(at),
-                listed: None,
-            };
+            let part_file =
+                PartFile { path: file.path.clone(), part: file.part, step: Some(at), listed: None };
             entries.push((step.number, part_file));
         }
     }
@@ -300,9 +269,7 @@ fn number_entries(
 
 fn may_hold_many(path: &Path) -> bool {
     let named = Format::by_name(path).filter(|f| !f.may_hold_many_steps());
-    named
-        .or_else(|| detect_file(path).ok())
-        .is_some_and(Format::may_hold_many_steps)
+    named.or_else(|| detect_file(path).ok()).is_some_and(Format::may_hold_many_steps)
 }
 
 #[derive(Default)]
@@ -349,30 +316,16 @@ mod tests {
 
     fn entry(number: Option<i64>, path: &str, step: usize) -> (Option<i64>, PartFile) {
         let path = path.into();
-        (
-            number,
-            PartFile {
-                path,
-                part: 0,
-                step: Some(step),
-                listed: None,
-            },
-        )
+        (number, PartFile { path, part: 0, step: Some(step), listed: None })
     }
 
     #[test]
     fn steps_are_numbered_as_written_and_the_last_wins() {
         let mut notes = Vec::new();
-        let steps = vec![
-            entry(Some(0), "a", 0),
-            entry(Some(250), "a", 1),
-            entry(Some(250), "b", 0),
-        ];
+        let steps =
+            vec![entry(Some(0), "a", 0), entry(Some(250), "a", 1), entry(Some(250), "b", 0)];
         let numbered = number_entries(steps, &mut notes);
-        assert_eq!(
-            numbered.iter().map(|n| n.number).collect::<Vec<_>>(),
-            [0, 250]
-        );
+        assert_eq!(numbered.iter().map(|n| n.number).collect::<Vec<_>>(), [0, 250]);
         assert_eq!(numbered[1].file.path, Path::new("b"));
         assert_eq!(notes.len(), 1);
     }
@@ -381,9 +334,6 @@ mod tests {
     fn steps_without_numbers_are_counted() {
         let steps = vec![entry(None, "a", 0), entry(Some(9), "a", 1)];
         let numbered = number_entries(steps, &mut Vec::new());
-        assert_eq!(
-            numbered.iter().map(|n| n.number).collect::<Vec<_>>(),
-            [0, 1]
-        );
+        assert_eq!(numbered.iter().map(|n| n.number).collect::<Vec<_>>(), [0, 1]);
     }
 }

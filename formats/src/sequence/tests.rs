@@ -66,10 +66,7 @@ fn a_directory_of_frames() {
     assert!(sequence.notes().is_empty(), "{:?}", sequence.notes());
     assert_eq!(sequence.inputs(1), [dir.path("ParticleData_Fluid_2.vtk")]);
     let error = sequence.load_raw(0).expect_err("empty file").to_string();
-    assert!(
-        error.contains("ParticleData_Fluid_1.vtk: byte 0: the file is empty"),
-        "{error}"
-    );
+    assert!(error.contains("ParticleData_Fluid_1.vtk: byte 0: the file is empty"), "{error}");
 }
 
 #[test]
@@ -83,10 +80,7 @@ fn part_names_match_fragments_in_any_case() {
     assert_eq!(meant("rig"), [4]);
     assert!(meant("gas").is_empty() && meant("").is_empty());
     assert_eq!(parts_meant(&["a".to_owned(), "A".to_owned()], "A"), [1]);
-    assert_eq!(
-        parts_meant(&["a".to_owned(), "A".to_owned(), "b".to_owned()], "B"),
-        [2]
-    );
+    assert_eq!(parts_meant(&["a".to_owned(), "A".to_owned(), "b".to_owned()], "B"), [2]);
     assert!(parts_meant(&[String::new()], "a").is_empty());
 }
 
@@ -96,14 +90,7 @@ fn patterns_choose() {
     names.extend(series(3, |i| format!("x_{i}.bgeo")));
     let dir = Dir::with(&names);
     assert!(dir.error("").contains("2 sequences are here"));
-    for pattern in [
-        "x_#.vtk",
-        "x_####.bgeo",
-        "x_%04d.vtk",
-        "x_*.vtk",
-        "x_?.bgeo",
-        "*.vtk",
-    ] {
+    for pattern in ["x_#.vtk", "x_####.bgeo", "x_%04d.vtk", "x_*.vtk", "x_?.bgeo", "*.vtk"] {
         assert_eq!(dir.numbers(pattern), [1, 2, 3], "{pattern}");
     }
 }
@@ -125,9 +112,7 @@ fn a_mixed_directory_by_pattern() {
 
 #[test]
 fn lammps_names() {
-    let mut names: Vec<String> = (0..10)
-        .map(|i| format!("dump.drop.{}.lammps", i * 400))
-        .collect();
+    let mut names: Vec<String> = (0..10).map(|i| format!("dump.drop.{}.lammps", i * 400)).collect();
     names[3] += ".gz";
     let dir = Dir::with(&names);
     let expected: Vec<i64> = (0..10).map(|i| i * 400).collect();
@@ -157,21 +142,12 @@ fn parts_and_gaps_are_reported() {
 fn missing_inputs_are_reported_with_a_remedy() {
     let dir = Dir::with(&owned(&["x_1.vtk", "y.png"]));
     let text = dir.error("x_#.vtu");
-    assert!(
-        text.contains("closest of 2 files") && text.contains("x_1.vtk"),
-        "{text}"
-    );
+    assert!(text.contains("closest of 2 files") && text.contains("x_1.vtk"), "{text}");
     let text = dir.error("x_2.vtk");
-    assert!(
-        text.contains("no such file") && text.contains("x_1.vtk"),
-        "{text}"
-    );
+    assert!(text.contains("no such file") && text.contains("x_1.vtk"), "{text}");
     // Nothing like it is there
     let text = dir.error("nothing");
-    assert!(
-        text.ends_with("nothing: no such file or directory"),
-        "{text}"
-    );
+    assert!(text.ends_with("nothing: no such file or directory"), "{text}");
     assert!(dir.error("none/x_#.vtk").contains("no such file"));
     fs::remove_file(dir.path("x_1.vtk")).expect("removable");
     assert!(dir.error("").contains("it has 1 .png"));
@@ -188,9 +164,7 @@ fn missing_inputs_are_reported_with_a_remedy() {
 #[test]
 fn lists_may_have_patterns() {
     let dir = Dir::with(&owned(&["a_1.vtk", "a_2.vtk", "b_7.vtk"]));
-    let paths = ["a_#.vtk", "b_7.vtk", "a_1.vtk"]
-        .map(|n| dir.path(n))
-        .to_vec();
+    let paths = ["a_#.vtk", "b_7.vtk", "a_1.vtk"].map(|n| dir.path(n)).to_vec();
     let sequence = Sequence::open(&SequenceInput::from_paths(paths)).expect("a sequence");
     let numbers: Vec<i64> = sequence.frames().iter().map(|f| f.number).collect();
     assert_eq!(numbers, [1, 2, 7]);
@@ -220,10 +194,7 @@ fn write_frame(path: &Path, positions: Vec<Vec3>, step: i64) {
 fn directories_of_adios_are_named() {
     let dir = Dir::with(&owned(&["data.0", "md.0", "md.idx", "mmd.0"]));
     let error = dir.error(".");
-    assert!(
-        error.contains("ADIOS2 data (.bp)") && error.contains("openpmd-pipe"),
-        "{error}"
-    );
+    assert!(error.contains("ADIOS2 data (.bp)") && error.contains("openpmd-pipe"), "{error}");
 }
 
 #[test]
@@ -236,35 +207,18 @@ fn a_part_of_one_step_is_drawn_if_it_is_named() {
     }
     let mut sequence = dir.open(".").expect("a sequence");
     let count = |sequence: &Sequence| sequence.load(0, DVec3::ZERO).expect("a frame").len();
-    assert_eq!(
-        (sequence.part_names(), count(&sequence)),
-        (&owned(&[""])[..], 1)
-    );
-    assert!(
-        sequence.notes()[0].contains("--parts Case"),
-        "{:?}",
-        sequence.notes()
-    );
+    assert_eq!((sequence.part_names(), count(&sequence)), (&owned(&[""])[..], 1));
+    assert!(sequence.notes()[0].contains("--parts Case"), "{:?}", sequence.notes());
     assert!(sequence.lone_file(1).is_some());
-    sequence
-        .keep_parts(&owned(&["Case", "Fluid"]))
-        .expect("both");
+    sequence.keep_parts(&owned(&["Case", "Fluid"])).expect("both");
     let notes = sequence.notes();
     assert!(!notes[0].contains("left out"), "{notes:?}");
     assert_eq!((sequence.frames().len(), count(&sequence)), (3, 2));
     let mut sequence = dir.open(".").expect("a sequence");
     sequence.keep_parts(&owned(&["Case"])).expect("the part");
     assert_eq!((sequence.frames().len(), count(&sequence)), (1, 1));
-    let error = dir
-        .open(".")
-        .expect("a sequence")
-        .keep_parts(&owned(&["Oil"]));
-    assert!(
-        error
-            .expect_err("no part")
-            .to_string()
-            .contains("Case, Fluid")
-    );
+    let error = dir.open(".").expect("a sequence").keep_parts(&owned(&["Oil"]));
+    assert!(error.expect_err("no part").to_string().contains("Case, Fluid"));
 }
 
 #[test]
@@ -295,10 +249,7 @@ fn frames_are_loaded_and_parts_merged() {
     // Every frame has the attribute, also where a part is missing.
     assert!(middle.attribute(PART_ATTRIBUTE).is_some());
     fs::write(dir.path("wall_1.spf"), b"SPHERULE").expect("writable");
-    let error = sequence
-        .load(0, DVec3::ZERO)
-        .expect_err("damaged")
-        .to_string();
+    let error = sequence.load(0, DVec3::ZERO).expect_err("damaged").to_string();
     assert!(error.contains("wall_1.spf: byte 8"), "{error}");
     assert!(sequence.load(2, DVec3::ZERO).is_ok());
 }
@@ -338,11 +289,7 @@ fn steps_of_one_file_are_frames() {
     let path = dir.path("all_7.npy");
     write_steps(&path, 3, 10);
     let sequence = dir.open("").expect("a sequence");
-    let steps: Vec<_> = sequence
-        .frames()
-        .iter()
-        .map(|f| (f.number, f.parts[0].step))
-        .collect();
+    let steps: Vec<_> = sequence.frames().iter().map(|f| (f.number, f.parts[0].step)).collect();
     assert_eq!(steps, [(0, Some(0)), (1, Some(1)), (2, Some(2))]);
     // Backwards and from several threads, as a pipeline may.
     std::thread::scope(|scope| {
@@ -358,10 +305,7 @@ fn steps_of_one_file_are_frames() {
     assert_eq!(first_x(&sequence, 1), 21.0);
     write_steps(&path, 1, 0);
     let error = sequence.load_raw(2).expect_err("gone").to_string();
-    assert!(
-        error.contains("step 2 does not exist, the file has 1"),
-        "{error}"
-    );
+    assert!(error.contains("step 2 does not exist, the file has 1"), "{error}");
 }
 
 #[test]
@@ -391,8 +335,5 @@ fn file_that_gained_steps_is_reported() {
     write_steps(&dir.path("a_2.npy"), 2, 0);
     assert_eq!(first_x(&sequence, 0), 1.0);
     let error = sequence.load_raw(1).expect_err("two steps").to_string();
-    assert!(
-        error.contains("2 time steps where one was expected"),
-        "{error}"
-    );
+    assert!(error.contains("2 time steps where one was expected"), "{error}");
 }

@@ -35,12 +35,7 @@ impl Topology {
             (count, particles.attributes, particles.bonds)
         };
         attributes.retain(|attribute| !CHANGING.contains(&attribute.name.as_str()));
-        Ok(Self {
-            path: path.to_owned(),
-            count,
-            attributes,
-            bonds,
-        })
+        Ok(Self { path: path.to_owned(), count, attributes, bonds })
     }
 
     /// The file of the topology.

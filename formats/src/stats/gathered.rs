@@ -60,11 +60,7 @@ impl Gathered {
         let some = self.count > 0;
         let stats = |(name, scalar_type, components): &(String, ScalarType, Vec<Sum>)| {
             let components = components.iter().map(Sum::stats).collect();
-            AttributeStats {
-                name: name.clone(),
-                scalar_type: *scalar_type,
-                components,
-            }
+            AttributeStats { name: name.clone(), scalar_type: *scalar_type, components }
         };
         FrameStats {
             count: self.count,
@@ -82,10 +78,7 @@ fn near(positions: &Positions) -> Vec<bool> {
     let farthest = DVec3::splat(FARTHEST.into());
     match positions {
         Positions::F32(v) => v.par_iter().map(is_near).collect(),
-        Positions::F64(v) => v
-            .par_iter()
-            .map(|p| p.abs().cmple(farthest).all())
-            .collect(),
+        Positions::F64(v) => v.par_iter().map(|p| p.abs().cmple(farthest).all()).collect(),
     }
 }
 
@@ -95,11 +88,10 @@ fn radius_range(attributes: &[Attribute], keep: &[bool]) -> Option<(f32, f32)> {
         Radius::Common(radius) => Some((radius, radius)),
         Radius::PerParticle(radii) => {
             let kept = radii.iter().zip(keep).filter(|(_, k)| **k);
-            kept.map(|(radius, _)| *radius)
-                .fold(None, |range: Option<(f32, f32)>, r| match range {
-                    Some((min, max)) => Some((min.min(r), max.max(r))),
-                    None => Some((r, r)),
-                })
+            kept.map(|(radius, _)| *radius).fold(None, |range: Option<(f32, f32)>, r| match range {
+                Some((min, max)) => Some((min.min(r), max.max(r))),
+                None => Some((r, r)),
+            })
         }
     }
 }

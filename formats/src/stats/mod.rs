@@ -171,32 +171,19 @@ mod tests {
             Positions::F32(positions),
             vec![
                 ("id", 1, AttributeData::I32(vec![-1, 50, 2, 60])),
-                (
-                    "v",
-                    2,
-                    AttributeData::F32(vec![1.0, 2.0, 9.0, 9.0, f32::NAN, 5.0, 9.0, 9.0]),
-                ),
+                ("v", 2, AttributeData::F32(vec![1.0, 2.0, 9.0, 9.0, f32::NAN, 5.0, 9.0, 9.0])),
                 ("pscale", 1, AttributeData::F32(vec![0.5, 9.0, 0.25, 9.0])),
             ],
         ));
         assert_eq!((stats.count, stats.dropped), (2, 2));
-        assert_eq!(
-            stats.bounds,
-            Some((DVec3::new(1.0, 2.0, -5.0), DVec3::new(3.0, 4.0, 3.0)))
-        );
+        assert_eq!(stats.bounds, Some((DVec3::new(1.0, 2.0, -5.0), DVec3::new(3.0, 4.0, 3.0))));
         assert_eq!(stats.mean, Some(DVec3::new(2.0, 3.0, -1.0)));
         assert_eq!(stats.radius, Some((0.25, 0.5)));
         let id = stats.attributes[0].components[0];
-        assert_eq!(
-            (id.min, id.max),
-            (Some(Number::Int(-1)), Some(Number::Int(2)))
-        );
+        assert_eq!((id.min, id.max), (Some(Number::Int(-1)), Some(Number::Int(2))));
         assert_eq!((id.sum, id.mean, id.nan), (Number::Int(1), Some(0.5), 0));
         let v = &stats.attributes[1].components;
-        assert_eq!(
-            (v[0].max, v[0].nan, v[0].mean),
-            (Some(Number::Float(1.0)), 1, Some(1.0))
-        );
+        assert_eq!((v[0].max, v[0].nan, v[0].mean), (Some(Number::Float(1.0)), 1, Some(1.0)));
         assert_eq!((v[1].sum, v[1].nan), (Number::Float(7.0), 0));
     }
 
@@ -216,10 +203,7 @@ mod tests {
 
     #[test]
     fn empty_frames_have_no_bounds() {
-        let ids = vec![
-            ("id", 1, AttributeData::U8(vec![])),
-            ("v", 3, AttributeData::F64(vec![])),
-        ];
+        let ids = vec![("id", 1, AttributeData::U8(vec![])), ("v", 3, AttributeData::F64(vec![]))];
         let stats = FrameStats::of(&raw(Positions::F32(vec![]), ids));
         assert_eq!((stats.count, stats.bounds, stats.mean), (0, None, None));
         assert_eq!(stats.attributes[0].components[0].sum.to_string(), "0");
@@ -248,9 +232,8 @@ mod tests {
     fn blocks_give_what_all_particles_give() {
         let count = BLOCK + 3 * PIECE + 7;
         let number = |i: usize| ((i * 7919) % 100_003) as f32 * 1e-3;
-        let mut positions: Vec<Vec3> = (0..count)
-            .map(|i| Vec3::splat(number(i)).with_y(0.1))
-            .collect();
+        let mut positions: Vec<Vec3> =
+            (0..count).map(|i| Vec3::splat(number(i)).with_y(0.1)).collect();
         positions[5].x = f32::NAN;
         let mut radii: Vec<f32> = (0..count).map(number).collect();
         radii[BLOCK + 1] = 1e4;
@@ -278,10 +261,7 @@ mod tests {
         let p = stats.attributes[0].components[0];
         assert_eq!(
             (p.max, p.sum),
-            (
-                Some(Number::Float(f64::INFINITY)),
-                Number::Float(f64::INFINITY)
-            )
+            (Some(Number::Float(f64::INFINITY)), Number::Float(f64::INFINITY))
         );
     }
 }

@@ -61,12 +61,7 @@ pub(super) struct IntSum {
 
 impl Default for IntSum {
     fn default() -> Self {
-        Self {
-            count: 0,
-            sum: 0,
-            min: i128::MAX,
-            max: i128::MIN,
-        }
+        Self { count: 0, sum: 0, min: i128::MAX, max: i128::MIN }
     }
 }
 
@@ -154,14 +149,7 @@ pub(super) struct FloatSum {
 
 impl FloatSum {
     pub(super) const fn new() -> Self {
-        Self {
-            count: 0,
-            nan: 0,
-            sum: 0.0,
-            error: 0.0,
-            min: f64::INFINITY,
-            max: f64::NEG_INFINITY,
-        }
+        Self { count: 0, nan: 0, sum: 0.0, error: 0.0, min: f64::INFINITY, max: f64::NEG_INFINITY }
     }
 
     fn add(&mut self, value: f64) {
@@ -197,11 +185,7 @@ impl FloatSum {
 
     fn total(&self) -> f64 {
         // With infinite values, the compensation is NaN and the plain sum is correct.
-        if self.sum.is_finite() {
-            self.sum + self.error
-        } else {
-            self.sum
-        }
+        if self.sum.is_finite() { self.sum + self.error } else { self.sum }
     }
 
     #[expect(clippy::cast_precision_loss, reason = "counts are below 2^53")]

@@ -68,10 +68,7 @@ mod tests {
             fill(&mut bytes, &vec![Vec3::new(1.0, 2.0, -3.0); count]).expect("memory");
             let data = bytes.len() - count * 12;
             assert_eq!((data % 64, bytes[data - 1]), (0, b'\n'));
-            assert_eq!(
-                usize::from(bytes[8]) + 256 * usize::from(bytes[9]) + 10,
-                data
-            );
+            assert_eq!(usize::from(bytes[8]) + 256 * usize::from(bytes[9]) + 10, data);
             let header = String::from_utf8_lossy(&bytes[10..data]).into_owned();
             let expected =
                 format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({count}, 3), }}");

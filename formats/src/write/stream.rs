@@ -70,9 +70,7 @@ fn write_pieces(
             make(place, len, bytes)
         })?;
         // Write them in order
-        made[..used]
-            .iter()
-            .try_for_each(|bytes| file.write_all(bytes))?;
+        made[..used].iter().try_for_each(|bytes| file.write_all(bytes))?;
         // Report the progress
         let done = count.min(end * PIECE as u64);
         if let ControlFlow::Break(()) = progress.advanced(Phase::Finish, done, count) {

@@ -33,11 +33,7 @@ pub fn stream(
     source: &dyn ParticleSource,
     progress: &dyn Progress,
 ) -> Result<(), ConvertError> {
-    let cells = if source.count() <= MOST_SHORT {
-        CellFormat::Short
-    } else {
-        CellFormat::Long
-    };
+    let cells = if source.count() <= MOST_SHORT { CellFormat::Short } else { CellFormat::Long };
     publish_stream(path, |file| fill_from(file, source, progress, cells))
 }
 
@@ -78,11 +74,7 @@ fn fill_from(
             write_numbers(file, count, progress, |i| ((1 << 32) | i).to_be_bytes())?;
         }
         CellFormat::Long => {
-            write!(
-                file,
-                "\nVERTICES {} {count}\nOFFSETS vtktypeint64\n",
-                count + 1
-            )?;
+            write!(file, "\nVERTICES {} {count}\nOFFSETS vtktypeint64\n", count + 1)?;
             write_numbers(file, count + 1, progress, u64::to_be_bytes)?;
             write!(file, "\nCONNECTIVITY vtktypeint64\n")?;
             write_numbers(file, count, progress, u64::to_be_bytes)?;
@@ -140,17 +132,10 @@ fn fill(file: &mut impl Write, positions: &[Vec3], attributes: &[Attribute]) -> 
     if attributes.is_empty() {
         return Ok(());
     }
-    write!(
-        file,
-        "POINT_DATA {count}\nFIELD FieldData {}\n",
-        attributes.len()
-    )?;
+    write!(file, "POINT_DATA {count}\nFIELD FieldData {}\n", attributes.len())?;
     for a in attributes {
         if a.components == 0 || count.checked_mul(a.components) != Some(a.data.len()) {
-            return Err(invalid(format!(
-                "attribute {} does not fit {count} particles",
-                a.name
-            )));
+            return Err(invalid(format!("attribute {} does not fit {count} particles", a.name)));
         }
         let name = word(&a.name);
         let kind = type_name(a.data.scalar_type());
@@ -185,22 +170,13 @@ mod tests {
     use crate::{AttributeData, Positions};
 
     fn attribute(values: Vec<u16>) -> Attribute {
-        Attribute {
-            name: "my id".into(),
-            components: 1,
-            data: AttributeData::U16(values),
-        }
+        Attribute { name: "my id".into(), components: 1, data: AttributeData::U16(values) }
     }
 
     #[test]
     fn one_particle_byte_for_byte() {
         let mut bytes = Vec::new();
-        fill(
-            &mut bytes,
-            &[Vec3::new(1.0, 0.0, -2.0)],
-            &[attribute(vec![258])],
-        )
-        .expect("memory");
+        fill(&mut bytes, &[Vec3::new(1.0, 0.0, -2.0)], &[attribute(vec![258])]).expect("memory");
         let expected = [
             b"# vtk DataFile Version 4.2\nparticles\nBINARY\nDATASET POLYDATA\n".as_slice(),
             b"POINTS 1 float\n\x3f\x80\0\0\0\0\0\0\xc0\0\0\0\n",
@@ -246,9 +222,7 @@ mod tests {
         let velocity = ScalarType::F32.decode(crate::Endian::Little, &values);
         assert_eq!(short.attributes[0].data, velocity.expect("whole"));
 
-        let Positions::F32(positions) = &short.positions else {
-            panic!("written in f32")
-        };
+        let Positions::F32(positions) = &short.positions else { panic!("written in f32") };
         let dir = tempfile::tempdir().expect("a temporary directory");
         let (whole, streamed) = (dir.path().join("a.vtk"), dir.path().join("b.vtk"));
         write(&whole, positions, &short.attributes).expect("writable");

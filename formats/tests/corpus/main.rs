@@ -22,9 +22,7 @@ fn corpus() -> PathBuf {
 /// The files below `dir`, sorted by name.
 fn inputs(dir: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(dir).expect("every target has a corpus");
-    let mut paths: Vec<PathBuf> = entries
-        .map(|entry| entry.expect("readable").path())
-        .collect();
+    let mut paths: Vec<PathBuf> = entries.map(|entry| entry.expect("readable").path()).collect();
     paths.sort();
     paths
 }
@@ -120,11 +118,7 @@ fn write_the_native_corpus() {
     let dir = corpus().join("native");
     fs::create_dir_all(&dir).expect("writable");
     let far = DVec3::new(1e6, 0.0, -3.0);
-    let coded = |encoding, bound| StoreSettings {
-        encoding: Some(encoding),
-        bound,
-        rounding: 0.0,
-    };
+    let coded = |encoding, bound| StoreSettings { encoding: Some(encoding), bound, rounding: 0.0 };
     let exact = StoreSettings::EXACT;
     let common = Some(Radius::Common(0.5));
     for (name, frame, settings) in [
@@ -132,11 +126,7 @@ fn write_the_native_corpus() {
         ("origin", frame(common.clone(), far, 2), exact),
         ("radii", frame(Some(own_radii(3)), DVec3::ZERO, 3), exact),
         ("zero", frame(None, DVec3::ZERO, 0), exact),
-        (
-            "wide",
-            frame(common, DVec3::ZERO, 50),
-            coded(Encoding::Q10, Bound::Length(1e-2)),
-        ),
+        ("wide", frame(common, DVec3::ZERO, 50), coded(Encoding::Q10, Bound::Length(1e-2))),
         (
             "coded_radii",
             frame(Some(own_radii(20)), DVec3::ZERO, 20),

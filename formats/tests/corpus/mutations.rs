@@ -111,10 +111,7 @@ fn overwrite(bytes: &mut [u8], at: usize, new: &[u8]) {
 #[test]
 fn mutated_inputs_keep_the_promises() {
     let is_long = std::env::var_os("PROPTEST_CASES").is_some();
-    let mut config = Config {
-        failure_persistence: None,
-        ..Config::default()
-    };
+    let mut config = Config { failure_persistence: None, ..Config::default() };
     if !is_long {
         config.cases = CASES;
     }

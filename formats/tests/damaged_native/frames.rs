@@ -74,22 +74,10 @@ pub(crate) fn all() -> Vec<Stored> {
     let frames = vec![
         Stored::new("f32", &frame(None, DVec3::ZERO), exact),
         Stored::new("f32, radii", &frame(Some(own(1.0)), far), exact),
-        Stored::new(
-            "q16",
-            &frame(Some(Radius::Common(0.1)), far),
-            coded(Encoding::Q16),
-        ),
-        Stored::new(
-            "q16, radii",
-            &frame(Some(own(100.0)), far),
-            coded(Encoding::Q16),
-        ),
+        Stored::new("q16", &frame(Some(Radius::Common(0.1)), far), coded(Encoding::Q16)),
+        Stored::new("q16, radii", &frame(Some(own(100.0)), far), coded(Encoding::Q16)),
         Stored::new("q10", &frame(None, DVec3::ZERO), coded(Encoding::Q10)),
-        Stored::new(
-            "q10, radii",
-            &frame(Some(own(1.0)), DVec3::ZERO),
-            coded(Encoding::Q10),
-        ),
+        Stored::new("q10, radii", &frame(Some(own(1.0)), DVec3::ZERO), coded(Encoding::Q10)),
     ];
     check_kinds(&frames);
     frames
@@ -125,11 +113,8 @@ fn frame(radius: Option<Radius>, origin: DVec3) -> ParticleFrame {
             inside * if i % 50 == 0 { 5e4 } else { 1.0 }
         })
         .collect();
-    let attribute = |name: &str, components, data| Attribute {
-        name: name.into(),
-        components,
-        data,
-    };
+    let attribute =
+        |name: &str, components, data| Attribute { name: name.into(), components, data };
     let velocities = positions.iter().flat_map(Vec3::to_array).collect();
     ParticleFrame {
         attributes: vec![

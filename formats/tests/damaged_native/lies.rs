@@ -65,10 +65,7 @@ fn overflowing_sizes_are_rejected() {
 #[test]
 fn inconsistent_counts_are_rejected() {
     for stored in frames::all() {
-        for count in HUGE
-            .into_iter()
-            .chain([0, 1, 151, 1000, u64::from(u32::MAX)])
-        {
+        for count in HUGE.into_iter().chain([0, 1, 151, 1000, u64::from(u32::MAX)]) {
             let mut index = stored.index.clone();
             index.count = count;
             let lanes = layout::blocks_of(count).wrapping_mul(16);
@@ -94,10 +91,7 @@ fn inconsistent_counts_are_rejected() {
 fn inconsistent_headers_are_rejected() {
     let stored = &frames::all()[0];
     let index = stored.index_range();
-    for lie in HUGE
-        .into_iter()
-        .chain([0, 1, 63, 64, index.start as u64 + 1])
-    {
+    for lie in HUGE.into_iter().chain([0, 1, 63, 64, index.start as u64 + 1]) {
         for at in [16, 24, 32] {
             let mut bytes = stored.bytes.clone();
             bytes[at..at + 8].copy_from_slice(&lie.to_le_bytes());

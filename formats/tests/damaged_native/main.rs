@@ -70,13 +70,8 @@ fn every_byte_of_header_and_index_is_covered() {
 /// Reads `damaged`, which differs from `stored` at `places` in its sections.
 #[track_caller]
 fn named_or_same(stored: &Stored, damaged: &[u8], places: &[usize]) {
-    let whole = FORMAT
-        .steps(&stored.bytes)
-        .and_then(|s| FORMAT.read(&stored.bytes, &s[0]));
-    let hit: Vec<_> = places
-        .iter()
-        .filter_map(|at| stored.section_at(*at))
-        .collect();
+    let whole = FORMAT.steps(&stored.bytes).and_then(|s| FORMAT.read(&stored.bytes, &s[0]));
+    let hit: Vec<_> = places.iter().filter_map(|at| stored.section_at(*at)).collect();
     let index = layout::parse(damaged).expect("header and index are whole");
     assert_eq!(index, stored.index);
     let step = &FORMAT.steps(damaged).expect("whole")[0];
@@ -159,9 +154,7 @@ fn truncation_at_section_borders_is_rejected() {
     let path = dir.path().join("a.spf");
     for stored in frames::all() {
         let sections = stored.index.sections();
-        let ends = sections
-            .iter()
-            .flat_map(|(_, s)| [s.offset, s.offset + s.len]);
+        let ends = sections.iter().flat_map(|(_, s)| [s.offset, s.offset + s.len]);
         let index = stored.index_range();
         let ends = ends.chain([0, 8, 16, 56, 64, index.start as u64, index.end as u64 - 1]);
         for len in ends {

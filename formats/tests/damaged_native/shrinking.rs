@@ -40,9 +40,7 @@ fn lost_pages_stay_lost() {
         handle.set_len(0).expect("writable");
         touch(frame);
         handle.set_len(stored.bytes.len() as u64).expect("writable");
-        handle
-            .set_modified(modified.expect("a time"))
-            .expect("writable");
+        handle.set_modified(modified.expect("a time")).expect("writable");
         let error = file.check().expect_err("lost").to_string();
         assert!(error.contains("cut short while it was mapped"), "{error}");
     }

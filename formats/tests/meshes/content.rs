@@ -27,17 +27,10 @@ fn fails(bytes: impl AsRef<[u8]>, words: &str) {
 fn whole_files_of_every_format_are_read() {
     for (name, extension, bytes) in make::whole() {
         let mesh = parse(&bytes).unwrap_or_else(|error| panic!("{name}: {error}"));
-        assert_eq!(
-            (mesh.vertices.len(), mesh.triangles.len()),
-            (4, 2),
-            "{name}"
-        );
+        assert_eq!((mesh.vertices.len(), mesh.triangles.len()), (4, 2), "{name}");
         assert_eq!(mesh.vertices[2], [1.0, 1.5, 0.25], "{name}");
-        let named = parse_mesh(
-            &bytes,
-            Path::new(&format!("a.{extension}")),
-            MemoryBudget::UNLIMITED,
-        );
+        let named =
+            parse_mesh(&bytes, Path::new(&format!("a.{extension}")), MemoryBudget::UNLIMITED);
         assert_eq!(named, Ok(mesh), "{name}");
     }
 }
@@ -93,10 +86,7 @@ fn the_length_decides_which_stl_it_is() {
     binary[..5].copy_from_slice(b"solid");
     assert_eq!(triangles(&binary), expected);
     binary.push(0);
-    fails(
-        &binary,
-        "byte 80: 2 triangles of a binary STL need 184 bytes, the file has 185",
-    );
+    fails(&binary, "byte 80: 2 triangles of a binary STL need 184 bytes, the file has 185");
 }
 
 #[test]
@@ -108,10 +98,7 @@ fn strips_turn_every_second_triangle() {
             count + 1
         )
     };
-    assert_eq!(
-        triangles(text("0 1 2 3 4", 5)),
-        [[0, 1, 2], [2, 1, 3], [2, 3, 4]]
-    );
+    assert_eq!(triangles(text("0 1 2 3 4", 5)), [[0, 1, 2], [2, 1, 3], [2, 3, 4]]);
     // Repeated corners join two parts.
     assert_eq!(triangles(text("0 1 2 2 2 3 4", 7)), [[0, 1, 2], [2, 3, 4]]);
 }
@@ -146,19 +133,13 @@ fn a_face_of_two_volumes_is_not_part_of_the_surface() {
     };
     let both = triangles(cells("4 0 1 2 3 3 0 1 2 4 0 1 2 4", "10 5 10"));
     assert_eq!(both.len(), 6);
-    assert!(
-        both.iter()
-            .all(|triangle| triangle.contains(&3) || triangle.contains(&4))
-    );
+    assert!(both.iter().all(|triangle| triangle.contains(&3) || triangle.contains(&4)));
     let one = triangles(cells("4 0 1 2 3 3 0 1 2 3 0 1 4", "10 5 5"));
     assert_eq!(one.len(), 5);
     // Without volumes, all polygons are kept.
     let none = triangles(cells("3 0 1 2 3 2 1 0 2 0 1 4 0 1 4 2", "5 7 3 8"));
     assert_eq!(none, [[0, 1, 2], [2, 1, 0], [0, 1, 2], [0, 2, 4]]);
-    fails(
-        cells("4 0 1 2 3", "24"),
-        "cells of VTK type 24 are not read",
-    );
+    fails(cells("4 0 1 2 3", "24"), "cells of VTK type 24 are not read");
     fails(cells("3 0 1 2", "10"), "cell 0 has 3 vertices");
 }
 
@@ -185,20 +166,9 @@ fn other_files_are_refused() {
         "not a mesh in a format that spherule reads, which are stl, obj, ply, vtk, vtp and vtu",
     );
     fails("1 2 3\n", "not a mesh in a format that spherule reads");
-    fails(
-        "<VTKFile type=\"PPolyData\">",
-        "give one of the files in it",
-    );
-    fails(
-        "<VTKFile type=\"ImageData\">",
-        "a VTK file of type ImageData is not read",
-    );
+    fails("<VTKFile type=\"PPolyData\">", "give one of the files in it");
+    fails("<VTKFile type=\"ImageData\">", "a VTK file of type ImageData is not read");
     let directory = tempfile::tempdir().expect("a temporary directory");
     let error = read_mesh(directory.path(), MemoryBudget::UNLIMITED).expect_err("a directory");
-    assert!(
-        error
-            .to_string()
-            .contains("a directory, where a file was expected"),
-        "{error}"
-    );
+    assert!(error.to_string().contains("a directory, where a file was expected"), "{error}");
 }

@@ -41,9 +41,7 @@ fn every_damaged_mesh_gives_its_named_error() {
         }
     }
     let table = fs::read_to_string(directory().join("table.tsv")).expect("the table");
-    let table = table
-        .lines()
-        .map(|line| line.split_once('\t').expect("a name, a tab, a message"));
+    let table = table.lines().map(|line| line.split_once('\t').expect("a name, a tab, a message"));
     let (mut wrong, mut listed) = (Vec::new(), Vec::new());
     for (name, expected) in table {
         let found = outcome(&directory().join(name));
@@ -54,11 +52,7 @@ fn every_damaged_mesh_gives_its_named_error() {
         }
         listed.push(name.to_owned());
     }
-    assert!(
-        wrong.is_empty(),
-        "these differ from the table:\n{}",
-        wrong.join("\n")
-    );
+    assert!(wrong.is_empty(), "these differ from the table:\n{}", wrong.join("\n"));
     let mut makeable: Vec<String> = made.into_iter().map(|(name, _)| name).collect();
     let entries = fs::read_dir(directory()).expect("the directory");
     let names = entries.map(|entry| entry.expect("an entry").file_name());
@@ -77,19 +71,13 @@ fn no_damage_of_any_byte_is_a_panic() {
     for (name, extension, bytes) in make::whole() {
         let path = format!("a.{extension}");
         let read = |bytes: &[u8]| {
-            let result = parse_mesh(
-                bytes,
-                Path::new(&path),
-                MemoryBudget::new(1 << 20, "raise it"),
-            );
+            let result =
+                parse_mesh(bytes, Path::new(&path), MemoryBudget::new(1 << 20, "raise it"));
             match result {
                 Ok(mesh) => {
                     let count = mesh.vertices.len();
                     let indices = mesh.triangles.as_flattened();
-                    assert!(
-                        indices.iter().all(|index| (*index as usize) < count),
-                        "{name}"
-                    );
+                    assert!(indices.iter().all(|index| (*index as usize) < count), "{name}");
                 }
                 Err(ParseError::Malformed { at, what }) => {
                     assert!(at <= bytes.len() as u64, "{name}: byte {at}: {what}");

@@ -55,10 +55,7 @@ fn every_format_keeps_its_budget() {
             match parse_mesh(&bytes, Path::new(&path), budget) {
                 Ok(mesh) => {
                     let held = mesh.vertices.len() * 24 + mesh.triangles.len() * 12;
-                    assert!(
-                        held as u64 <= budget.bytes(),
-                        "{name}: {held} bytes in 2^{bits}"
-                    );
+                    assert!(held as u64 <= budget.bytes(), "{name}: {held} bytes in 2^{bits}");
                 }
                 Err(ParseError::TooLarge { what }) => {
                     assert!(what.ends_with("raise the limit"), "{name}: {what}");
@@ -68,10 +65,7 @@ fn every_format_keeps_its_budget() {
                 Err(error) => panic!("{name}: {error}"),
             }
         }
-        assert!(
-            (5..20).contains(&failed),
-            "{name}: 2^{failed} bytes are enough"
-        );
+        assert!((5..20).contains(&failed), "{name}: 2^{failed} bytes are enough");
     }
 }
 
@@ -84,15 +78,10 @@ fn the_bytes_of_a_file_keep_the_budget() {
         read_mesh(&path, MemoryBudget::new(100_000, "raise the limit")).expect_err("too large");
     assert!(matches!(error, FrameError::TooLarge { .. }), "{error}");
     let mut packed = GzEncoder::new(Vec::new(), Compression::fast());
-    packed
-        .write_all(&vec![b'\n'; 10 << 20])
-        .expect("memory takes all");
+    packed.write_all(&vec![b'\n'; 10 << 20]).expect("memory takes all");
     let path = directory.path().join("b.obj");
     fs::write(&path, packed.finish().expect("memory takes all")).expect("writable");
     let error =
         read_mesh(&path, MemoryBudget::new(1 << 20, "raise the limit")).expect_err("too large");
-    assert!(
-        error.to_string().contains("decompressed it is larger"),
-        "{error}"
-    );
+    assert!(error.to_string().contains("decompressed it is larger"), "{error}");
 }

@@ -4,12 +4,8 @@
 pub(crate) type Made = (&'static str, &'static str, Vec<u8>);
 
 /// A unit square in a plane that is not flat.
-const VERTICES: [[f32; 3]; 4] = [
-    [0.0, 0.5, 0.0],
-    [1.0, 0.5, 0.0],
-    [1.0, 1.5, 0.25],
-    [0.0, 1.5, 0.25],
-];
+const VERTICES: [[f32; 3]; 4] =
+    [[0.0, 0.5, 0.0], [1.0, 0.5, 0.0], [1.0, 1.5, 0.25], [0.0, 1.5, 0.25]];
 const TRIANGLES: [[usize; 3]; 2] = [[0, 1, 2], [0, 2, 3]];
 
 /// All whole files.
@@ -57,10 +53,7 @@ fn stl_ascii() -> String {
 }
 
 fn obj() -> String {
-    let vertices: String = text(&VERTICES)
-        .lines()
-        .map(|line| format!("v {line}\n"))
-        .collect();
+    let vertices: String = text(&VERTICES).lines().map(|line| format!("v {line}\n")).collect();
     format!("# square\n{vertices}f 1 2 3 4\n")
 }
 
@@ -184,11 +177,7 @@ const PLY_ASCII: [Damage; 5] = [
 
 const PLY_BINARY: [Damage; 5] = [
     ("index-beyond", "\u{2}\0\0\0\u{3}", Some("\u{2}\0\0\0\u{4}")),
-    (
-        "list-absurd",
-        "\u{4}\0\0\0\0\u{1}",
-        Some("\u{7f}\0\0\0\0\u{1}"),
-    ),
+    ("list-absurd", "\u{4}\0\0\0\0\u{1}", Some("\u{7f}\0\0\0\0\u{1}")),
     ("absurd-vertices", "vertex 4", Some("vertex 4000000000")),
     ("absurd-faces", "face 1", Some("face 4000000000")),
     ("cut-in-faces", "\u{2}\0\0\0\u{3}", None),
@@ -199,25 +188,13 @@ const LEGACY: [Damage; 6] = [
     ("index-negative", "0 1 2 3\n", Some("0 1 2 -3\n")),
     ("offset-beyond", "0 4\n", Some("0 5\n")),
     ("offset-back", "0 4\n", Some("4 0\n")),
-    (
-        "absurd-cells",
-        "POLYGONS 2 4",
-        Some("POLYGONS 2 4000000000"),
-    ),
+    ("absurd-cells", "POLYGONS 2 4", Some("POLYGONS 2 4000000000")),
     ("cut-in-cells", "0 1 2 3\n", None),
 ];
 
 const LEGACY_BINARY: [Damage; 6] = [
-    (
-        "index-beyond",
-        "\0\0\0\u{2}\0\0\0\u{3}",
-        Some("\0\0\0\u{2}\0\0\u{1}\u{3}"),
-    ),
-    (
-        "count-absurd",
-        "\0\0\0\u{4}\0\0\0\0",
-        Some("\u{7f}\0\0\u{4}\0\0\0\0"),
-    ),
+    ("index-beyond", "\0\0\0\u{2}\0\0\0\u{3}", Some("\0\0\0\u{2}\0\0\u{1}\u{3}")),
+    ("count-absurd", "\0\0\0\u{4}\0\0\0\0", Some("\u{7f}\0\0\u{4}\0\0\0\0")),
     ("type-unknown", "\0\0\0\u{9}", Some("\0\0\0\u{42}")),
     ("type-of-volumes", "\0\0\0\u{9}", Some("\0\0\0\u{c}")),
     ("no-types", "\nCELL_TYPES", None),
@@ -230,35 +207,15 @@ const XML: [Damage; 6] = [
     ("offset-absurd", ">4<", Some(">4000000000<")),
     ("offset-negative", ">4<", Some(">-4<")),
     ("no-offsets", "\"offsets\"", Some("\"offset\"")),
-    (
-        "absurd-cells",
-        "NumberOfPolys=\"1\"",
-        Some("NumberOfPolys=\"9000000000000000000\""),
-    ),
+    ("absurd-cells", "NumberOfPolys=\"1\"", Some("NumberOfPolys=\"9000000000000000000\"")),
 ];
 
 const XML_APPENDED: [Damage; 6] = [
-    (
-        "index-beyond",
-        "\u{2}\0\0\0\u{3}\0\0\0",
-        Some("\u{2}\0\0\0\u{4}\0\0\0"),
-    ),
-    (
-        "offset-beyond",
-        "\u{4}\0\0\0\u{4}\0\0\0",
-        Some("\u{4}\0\0\0\u{5}\0\0\0"),
-    ),
-    (
-        "type-unknown",
-        "\u{1}\0\0\0\u{9}",
-        Some("\u{1}\0\0\0\u{2a}"),
-    ),
+    ("index-beyond", "\u{2}\0\0\0\u{3}\0\0\0", Some("\u{2}\0\0\0\u{4}\0\0\0")),
+    ("offset-beyond", "\u{4}\0\0\0\u{4}\0\0\0", Some("\u{4}\0\0\0\u{5}\0\0\0")),
+    ("type-unknown", "\u{1}\0\0\0\u{9}", Some("\u{1}\0\0\0\u{2a}")),
     ("no-types", "\"types\"", Some("\"type\"")),
-    (
-        "absurd-cells",
-        "NumberOfCells=\"1\"",
-        Some("NumberOfCells=\"4000000000\""),
-    ),
+    ("absurd-cells", "NumberOfCells=\"1\"", Some("NumberOfCells=\"4000000000\"")),
     ("cut-in-cells", "\u{2}\0\0\0\u{3}\0\0\0", None),
 ];
 
@@ -283,9 +240,7 @@ pub(crate) fn damaged() -> Vec<(String, Vec<u8>)> {
             }
         };
         for (what, old, new) in damages {
-            let found = bytes
-                .windows(old.len())
-                .position(|window| window == old.as_bytes());
+            let found = bytes.windows(old.len()).position(|window| window == old.as_bytes());
             let at = found.unwrap_or_else(|| panic!("{base} has no {old:?}"));
             let (before, after) = (&bytes[..at], &bytes[at + old.len()..]);
             let broken = match new {

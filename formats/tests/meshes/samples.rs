@@ -30,10 +30,7 @@ fn table() -> Vec<Expected> {
             name: cells[0].to_owned(),
             vertices: cells[1].parse().expect("a count"),
             triangles: cells[2].parse().expect("a count"),
-            numbers: cells[3..]
-                .iter()
-                .map(|cell| cell.parse().expect("a number"))
-                .collect(),
+            numbers: cells[3..].iter().map(|cell| cell.parse().expect("a number")).collect(),
         }
     };
     text.lines().map(line).collect()

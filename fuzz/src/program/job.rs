@@ -109,9 +109,7 @@ fn read_plan(bytes: &[u8]) -> usize {
             return 0;
         }
     }
-    let state = Job::read(&job_dir.job())
-        .expect("as it was")
-        .expect("as it was");
+    let state = Job::read(&job_dir.job()).expect("as it was").expect("as it was");
     report(&state);
     // The job is resumed or refused
     let _ = open(&job_dir.job());
@@ -191,17 +189,12 @@ pub fn claim(bytes: &[u8]) -> usize {
         }
     };
     write(&["a.worker", "frame.1.0", "frame.1.1", "frame.2.0"]);
-    let found = Job::workers(&job_dir.job())
-        .expect("a readable directory")
-        .len();
+    let found = Job::workers(&job_dir.job()).expect("a readable directory").len();
     if let Ok(job) = open(&job_dir.job()) {
         write(&["b.worker", "frame.1.0", "frame.1.1", "frame.2.0"]);
         claim_all(&job);
     }
-    assert!(
-        job_dir.bystander().exists(),
-        "a file outside the job is gone"
-    );
+    assert!(job_dir.bystander().exists(), "a file outside the job is gone");
     assert!(job_dir.job().join(PLAN_FILE).exists());
     found
 }

@@ -58,20 +58,9 @@ pub fn output(bytes: &[u8]) -> usize {
     assert!(pattern.as_str().ends_with(pattern.file_name()));
     let frames = [i64::MIN, -7, 0, 7, 99_999, i64::MAX];
     let images: HashSet<_> = frames.iter().map(|f| pattern.path_for(*f)).collect();
-    let previews: HashSet<_> = frames
-        .iter()
-        .map(|f| pattern.preview_path_for(*f))
-        .collect();
-    let count = if pattern.has_number() {
-        frames.len()
-    } else {
-        1
-    };
+    let previews: HashSet<_> = frames.iter().map(|f| pattern.preview_path_for(*f)).collect();
+    let count = if pattern.has_number() { frames.len() } else { 1 };
     assert_eq!((images.len(), previews.len()), (count, count));
-    assert!(
-        images
-            .iter()
-            .all(|path| path.parent() == Some(pattern.dir()))
-    );
+    assert!(images.iter().all(|path| path.parent() == Some(pattern.dir())));
     1
 }

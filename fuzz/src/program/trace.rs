@@ -72,28 +72,15 @@ fn traced(leaves: &StoredLeaves, settings: StoredSettings, is_sound: bool) -> us
 /// Rays from far off, from the middle, along the axes, and with ends.
 fn trace_rays(view: &TreeView, is_sound: bool) {
     let bounds = view.bounds();
-    let (center, reach) = (
-        (bounds.min + bounds.max) * 0.5,
-        (bounds.max - bounds.min).length(),
-    );
-    let axes = [
-        Vec3::X,
-        Vec3::NEG_Y,
-        Vec3::Z,
-        Vec3::new(0.6, 0.8, 0.0),
-        Vec3::splat(0.577_350_26),
-    ];
+    let (center, reach) = ((bounds.min + bounds.max) * 0.5, (bounds.max - bounds.min).length());
+    let axes = [Vec3::X, Vec3::NEG_Y, Vec3::Z, Vec3::new(0.6, 0.8, 0.0), Vec3::splat(0.577_350_26)];
     let starts = [center, bounds.min, Vec3::ZERO, center + Vec3::splat(reach)];
     let mut packet = RayPacket::default();
     let mut crossings = Vec::new();
     for direction in axes {
         for start in starts {
             let ray = Ray {
-                t_max: if packet.len() % 3 == 0 {
-                    f32::INFINITY
-                } else {
-                    reach
-                },
+                t_max: if packet.len() % 3 == 0 { f32::INFINITY } else { reach },
                 ..Ray::new(start - direction * reach, direction)
             };
             trace_ray(view, &ray, is_sound, &mut crossings);
@@ -112,11 +99,7 @@ fn trace_ray(view: &TreeView, ray: &Ray, is_sound: bool, crossings: &mut Vec<Tre
     let any = view.any_hit(ray);
     assert!(!is_sound || any == nearest.is_some(), "{ray:?}");
     view.crossings(ray, crossings);
-    for slot in nearest
-        .map(|hit| hit.slot)
-        .into_iter()
-        .chain(crossings.iter().map(|c| c.slot))
-    {
+    for slot in nearest.map(|hit| hit.slot).into_iter().chain(crossings.iter().map(|c| c.slot)) {
         view.sphere(slot);
         assert!((view.particle(slot) as usize) < view.len());
     }
@@ -131,10 +114,6 @@ fn trace_packet(view: &TreeView, packet: &RayPacket, is_sound: bool) {
     }
     for (lane, ray) in packet.rays().enumerate().filter(|_| is_sound) {
         assert_eq!(hits[lane], view.nearest(&ray), "lane {lane}: {ray:?}");
-        assert_eq!(
-            any >> lane & 1 != 0,
-            view.any_hit(&ray),
-            "lane {lane}: {ray:?}"
-        );
+        assert_eq!(any >> lane & 1 != 0, view.any_hit(&ray), "lane {lane}: {ray:?}");
     }
 }

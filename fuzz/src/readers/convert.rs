@@ -15,9 +15,7 @@ use spherule_formats::{FrameError, FrameFile, RawParticles};
 use super::check_message;
 
 /// Names of formats that can stream; the first byte picks one, and with its higher bits settings.
-const NAMES: [&str; 8] = [
-    "a.bgeo", "a.ply", "a.xyz", "a.npy", "a.vtk", "a", "a.csv", "a.vtu",
-];
+const NAMES: [&str; 8] = ["a.bgeo", "a.ply", "a.xyz", "a.npy", "a.vtk", "a", "a.csv", "a.vtu"];
 
 /// The first byte picks name and settings, the others are the file.
 pub fn convert(bytes: &[u8]) -> usize {
@@ -52,16 +50,10 @@ fn settings(choice: u8) -> ConvertSettings {
             (false, true) => Some(Encoding::Q10),
             (true, true) => None,
         },
-        bound: if is_set(0x20) {
-            Bound::Length(1e-3)
-        } else {
-            Bound::None
-        },
+        bound: if is_set(0x20) { Bound::Length(1e-3) } else { Bound::None },
         radius: match is_set(0x40) {
             true => RadiusRule::All(0.5),
-            false => RadiusRule::Source {
-                otherwise: Some(0.25),
-            },
+            false => RadiusRule::Source { otherwise: Some(0.25) },
         },
         other_attributes: match is_set(0x80) {
             true => AttributeChoice::Ranged,
@@ -82,24 +74,17 @@ fn same(source: &dyn ParticleSource, raw: &RawParticles) {
         (raw.time.map(f64::to_bits), raw.step)
     );
     let mut positions = vec![DVec3::NAN; count];
-    source
-        .read_positions(0, &mut positions)
-        .expect("as they were counted");
+    source.read_positions(0, &mut positions).expect("as they were counted");
     let bits = |p: DVec3| p.to_array().map(f64::to_bits);
     for (place, position) in positions.iter().enumerate() {
         assert_eq!(bits(*position), bits(raw.positions.get(place)), "{place}");
     }
     assert_eq!(source.attributes().len(), raw.attributes.len());
     for (number, (streamed, read)) in source.attributes().iter().zip(&raw.attributes).enumerate() {
-        assert_eq!(
-            (&streamed.name, streamed.components),
-            (&read.name, read.components)
-        );
+        assert_eq!((&streamed.name, streamed.components), (&read.name, read.components));
         assert_eq!(streamed.scalar, read.data.scalar_type());
         let mut values = vec![0; streamed.width() * count];
-        source
-            .read_values(number, 0, &mut values)
-            .expect("as they were counted");
+        source.read_values(number, 0, &mut values).expect("as they were counted");
     }
     let beyond = source.read_positions(count as u64, &mut [DVec3::ZERO]);
     assert!(beyond.is_err(), "a particle after the last");

@@ -106,11 +106,7 @@ pub fn lammps(bytes: &[u8]) -> usize {
 
 /// One NPY array.
 pub fn npy(bytes: &[u8]) -> usize {
-    let packing = if bytes.starts_with(b"PK") {
-        DEFLATE_RATIO
-    } else {
-        1
-    };
+    let packing = if bytes.starts_with(b"PK") { DEFLATE_RATIO } else { 1 };
     read_all(read::npy::NPY, bytes, packing)
 }
 
@@ -230,11 +226,7 @@ fn check_error(error: &ParseError, len: u64) {
 }
 
 fn check_message(what: &str) {
-    assert!(
-        !what.is_empty() && what.len() < 4000,
-        "{} bytes: {what:.200}",
-        what.len()
-    );
+    assert!(!what.is_empty() && what.len() < 4000, "{} bytes: {what:.200}", what.len());
     assert!(!what.contains(char::is_control), "{what:?}");
 }
 

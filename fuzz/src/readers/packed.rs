@@ -48,8 +48,7 @@ fn archive(bytes: &[u8]) -> Vec<u8> {
         let name = MEMBERS[usize::from(tag) % MEMBERS.len()];
         // A name that was there before is refused by the writer; the reader has targets for that.
         if zip.start_file(format!("{name}.npy"), options).is_ok() {
-            zip.write_all(&bytes[*start..end.max(*start)])
-                .expect("memory takes all");
+            zip.write_all(&bytes[*start..end.max(*start)]).expect("memory takes all");
         }
     }
     zip.finish().expect("memory takes all").into_inner()
@@ -132,9 +131,7 @@ pub fn open(bytes: &[u8]) -> usize {
     let path = Path::new(NAMES[usize::from(*name) % NAMES.len()]);
     let plain = opened(path, bytes.to_vec());
     // What is compressed already would be compressed twice
-    if !SIGNATURES
-        .iter()
-        .any(|signature| bytes.starts_with(&signature[..2]))
+    if !SIGNATURES.iter().any(|signature| bytes.starts_with(&signature[..2]))
         && !is_skippable(bytes)
     {
         match (&plain, &opened(path, gzip(bytes))) {

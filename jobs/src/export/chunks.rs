@@ -69,21 +69,14 @@ impl Chunks {
         if ranges.is_empty() {
             return Err(ExportError::NoFrames);
         }
-        Ok(Self {
-            ranges,
-            size,
-            choice,
-        })
+        Ok(Self { ranges, size, choice })
     }
 }
 
 impl fmt::Display for Chunks {
     /// `25 tasks of 10 frames, as requested`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (tasks, frames) = (
-            counted(self.ranges.len(), "task"),
-            counted(self.size, "frame"),
-        );
+        let (tasks, frames) = (counted(self.ranges.len(), "task"), counted(self.size, "frame"));
         write!(f, "{tasks} of {frames}, {}", self.choice)
     }
 }
@@ -100,11 +93,7 @@ impl fmt::Display for ChunkChoice {
         match self {
             Self::Requested => write!(f, "as requested"),
             Self::Default => write!(f, "the default, for at most {DEFAULT_TASKS} tasks"),
-            Self::Enlarged {
-                requested,
-                tasks,
-                max_tasks,
-            } => write!(
+            Self::Enlarged { requested, tasks, max_tasks } => write!(
                 f,
                 "because {requested} would give {tasks} tasks, and arrays are usually limited to {max_tasks}"
             ),
@@ -136,10 +125,7 @@ mod tests {
 
     #[test]
     fn gaps_and_order_are_kept() {
-        assert_eq!(
-            texts(&chunks(&[1, 3, 5, 100, 7, 2], 3, 1000)),
-            ["1-5x2", "2,7,100"]
-        );
+        assert_eq!(texts(&chunks(&[1, 3, 5, 100, 7, 2], 3, 1000)), ["1-5x2", "2,7,100"]);
         assert_eq!(texts(&chunks(&[9, 8, 7, 6], 2, 1000)), ["8-9", "6-7"]);
     }
 
@@ -148,11 +134,7 @@ mod tests {
         for (count, size, tasks) in [(1, 1, 1), (100, 1, 100), (101, 2, 51), (25_000, 250, 100)] {
             let frames: Vec<i64> = (0..count).collect();
             let found = chunks(&frames, 0, 1000);
-            assert_eq!(
-                (found.size, found.ranges.len()),
-                (size, tasks),
-                "{count} frames"
-            );
+            assert_eq!((found.size, found.ranges.len()), (size, tasks), "{count} frames");
             assert_eq!(found.choice, ChunkChoice::Default);
         }
     }

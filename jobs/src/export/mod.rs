@@ -63,10 +63,6 @@ pub enum ExportError {
 
 impl ExportError {
     fn text(what: &'static str, text: &str, why: impl Into<String>) -> Self {
-        Self::Text {
-            what,
-            text: text.to_owned(),
-            why: why.into(),
-        }
+        Self::Text { what, text: text.to_owned(), why: why.into() }
     }
 }

@@ -120,27 +120,18 @@ impl JobTemplate<'_> {
         let name: String = name.chars().take(MAX_NAME).collect();
         let description = one_line("description", &self.description)?;
         let description: String = description.chars().take(MAX_DESCRIPTION).collect();
-        let step = [
-            field("name", self.step),
-            field("parameterSpace", parameter_space()),
-        ];
+        let step = [field("name", self.step), field("parameterSpace", parameter_space())];
         let requirements = self.host.to_field();
         let script = [field("script", self.script()?)];
         let step = step.into_iter().chain(requirements).chain(script);
         Ok(YamlNode::Map(vec![
             field("specificationVersion", "jobtemplate-2023-09")
                 .with_comment("Paths are relative to the directory of this file."),
-            field(
-                "extensions",
-                YamlNode::FlowList(vec!["TASK_CHUNKING".into()]),
-            ),
+            field("extensions", YamlNode::FlowList(vec!["TASK_CHUNKING".into()])),
             field("name", name),
             field("description", description),
             field("parameterDefinitions", self.parameters()?),
-            field(
-                "steps",
-                YamlNode::BlockList(vec![YamlNode::Map(step.collect())]),
-            ),
+            field("steps", YamlNode::BlockList(vec![YamlNode::Map(step.collect())])),
         ]))
     }
 
@@ -169,15 +160,10 @@ impl JobTemplate<'_> {
         all.push(vec![
             field("name", name),
             field("type", "STRING"),
-            field(
-                "description",
-                "The program on the hosts: a path, or a name on the PATH.",
-            ),
+            field("description", "The program on the hosts: a path, or a name on the PATH."),
             field("default", value("program", path)?),
         ]);
-        Ok(YamlNode::BlockList(
-            all.into_iter().map(YamlNode::Map).collect(),
-        ))
+        Ok(YamlNode::BlockList(all.into_iter().map(YamlNode::Map).collect()))
     }
 
     fn script(&self) -> Result<YamlNode, ExportError> {
@@ -221,11 +207,7 @@ fn parameter_space() -> YamlNode {
 
 impl PathParameter {
     fn definition(&self) -> Result<Vec<Field>, ExportError> {
-        let kind = if self.is_directory {
-            "DIRECTORY"
-        } else {
-            "FILE"
-        };
+        let kind = if self.is_directory { "DIRECTORY" } else { "FILE" };
         let mut fields = vec![
             field("name", self.name),
             field("type", "PATH"),
@@ -245,9 +227,8 @@ impl HostRequirements {
         let mut amounts = Vec::new();
         let cpus = self.cpus.map(|n| ("amount.worker.vcpu", u64::from(n)));
         // In MiB
-        let memory = self
-            .memory
-            .map(|bytes| ("amount.worker.memory", bytes.div_ceil(1 << 20).max(1)));
+        let memory =
+            self.memory.map(|bytes| ("amount.worker.memory", bytes.div_ceil(1 << 20).max(1)));
         for (name, min) in cpus.into_iter().chain(memory) {
             amounts.push(YamlNode::Map(vec![field("name", name), field("min", min)]));
         }

@@ -49,15 +49,7 @@ mod tests {
 
     #[test]
     fn line_breaks_are_rejected() {
-        for text in [
-            "a\nb",
-            "a\rb",
-            "a\0b",
-            "a\tb",
-            "\u{85}",
-            "\u{2028}",
-            "\u{1b}[0m",
-        ] {
+        for text in ["a\nb", "a\rb", "a\0b", "a\tb", "\u{85}", "\u{2028}", "\u{1b}[0m"] {
             let error = shell_word("manifest", text).unwrap_err().to_string();
             assert!(error.starts_with("manifest: "), "{error}");
             assert!(!error.contains(char::is_control), "{error:?}");

@@ -86,16 +86,12 @@ impl ArrayScript<'_> {
     fn check_times(&self) -> Result<(), ExportError> {
         let ahead = self.signal_ahead;
         if !(1..=MAX_SIGNAL_AHEAD).contains(&ahead) {
-            return Err(ExportError::SignalAhead {
-                seconds: ahead,
-                max: MAX_SIGNAL_AHEAD,
-            });
+            return Err(ExportError::SignalAhead { seconds: ahead, max: MAX_SIGNAL_AHEAD });
         }
         match self.resources.time {
-            Some(time) if time.seconds <= u64::from(ahead) => Err(ExportError::NoTimeToWork {
-                limit: time,
-                signal_ahead: ahead,
-            }),
+            Some(time) if time.seconds <= u64::from(ahead) => {
+                Err(ExportError::NoTimeToWork { limit: time, signal_ahead: ahead })
+            }
             _ => Ok(()),
         }
     }
@@ -120,14 +116,7 @@ impl ArrayScript<'_> {
     }
 
     fn directives(&self) -> Result<String, ExportError> {
-        let Resources {
-            cpus,
-            memory,
-            time,
-            concurrent,
-            partition,
-            account,
-        } = &self.resources;
+        let Resources { cpus, memory, time, concurrent, partition, account } = &self.resources;
         let last = self.chunks.ranges.len().saturating_sub(1);
         let at_once = concurrent.map_or_else(String::new, |n| format!("%{n}"));
         let mut all = vec![

@@ -31,9 +31,7 @@ impl FromStr for TimeLimit {
     type Err = TimeLimitError;
 
     fn from_str(text: &str) -> Result<Self, TimeLimitError> {
-        let invalid = || TimeLimitError {
-            text: text.to_owned(),
-        };
+        let invalid = || TimeLimitError { text: text.to_owned() };
         let number = |part: &str| {
             let digits = !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit());
             let value = part.parse::<u64>().ok().filter(|_| digits);
@@ -43,10 +41,7 @@ impl FromStr for TimeLimit {
             Some((days, clock)) => (Some(number(days)?), clock),
             None => (None, text),
         };
-        let parts = clock
-            .split(':')
-            .map(number)
-            .collect::<Result<Vec<_>, _>>()?;
+        let parts = clock.split(':').map(number).collect::<Result<Vec<_>, _>>()?;
         let seconds = match (days, parts.as_slice()) {
             (None, [minutes]) => minutes * MINUTE,
             (None, [minutes, seconds]) => minutes * MINUTE + seconds,

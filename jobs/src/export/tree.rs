@@ -25,11 +25,7 @@ pub(super) struct Field {
 
 /// `key: value`.
 pub(super) fn field(key: &'static str, value: impl Into<YamlNode>) -> Field {
-    Field {
-        key,
-        value: value.into(),
-        comment: None,
-    }
+    Field { key, value: value.into(), comment: None }
 }
 
 impl Field {
@@ -121,9 +117,7 @@ impl YamlNode {
 /// Plain words are not quoted. Everything else is quoted as a JSON string, which is valid YAML.
 fn yaml_text(text: &str) -> String {
     let is_word = text.starts_with(|c: char| c.is_ascii_alphabetic())
-        && text
-            .chars()
-            .all(|c| c.is_ascii_alphanumeric() || "_-".contains(c));
+        && text.chars().all(|c| c.is_ascii_alphanumeric() || "_-".contains(c));
     // Words that are not strings in some version of YAML
     let is_same = |word: &&str| word.eq_ignore_ascii_case(text);
     let reserved = ["true", "false", "yes", "no", "on", "off", "null", "y", "n"];

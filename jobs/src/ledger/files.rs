@@ -45,11 +45,7 @@ pub(crate) fn ledger_files(dir: &Path) -> Result<Vec<LedgerFile>, JobError> {
                     Err(e) if e.kind() == io::ErrorKind::NotFound => continue,
                     Err(e) => return Err(e),
                 };
-                found.push(LedgerFile {
-                    path: entry.path(),
-                    worker: worker.to_owned(),
-                    length,
-                });
+                found.push(LedgerFile { path: entry.path(), worker: worker.to_owned(), length });
             }
         }
         found.sort();
@@ -85,11 +81,7 @@ pub(crate) fn read_entries(
     };
     read_lines(&mut reader, position, add).map_err(|(line, error)| match error {
         EntryError::Io(e) => failed(e),
-        source => JobError::LedgerDamaged {
-            path: path.to_owned(),
-            line,
-            source,
-        },
+        source => JobError::LedgerDamaged { path: path.to_owned(), line, source },
     })?;
     Ok(true)
 }
@@ -144,10 +136,7 @@ fn open_at(path: &Path, position: &mut ReadPosition) -> io::Result<BufReader<Fil
     let (mut file, metadata) = open_regular(path)?;
     let number = file_number(&metadata);
     if number != position.file || metadata.len() < position.bytes {
-        *position = ReadPosition {
-            file: number,
-            ..ReadPosition::default()
-        };
+        *position = ReadPosition { file: number, ..ReadPosition::default() };
     }
     file.seek(SeekFrom::Start(position.bytes))?;
     Ok(BufReader::with_capacity(1 << 16, file))

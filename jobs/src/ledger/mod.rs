@@ -46,11 +46,7 @@ impl Ledger {
             }
         }
         let not_found = std::io::ErrorKind::NotFound.into();
-        Err(JobError::io(
-            dir,
-            "reading ledgers, which are being removed",
-            not_found,
-        ))
+        Err(JobError::io(dir, "reading ledgers, which are being removed", not_found))
     }
 
     /// None if a file was removed meanwhile.

@@ -44,10 +44,7 @@ fn the_latest_entry_of_all_workers_counts() {
     let frames: Vec<i64> = ledger.entries().map(|e| e.frame).collect();
     assert_eq!(frames, [-2, 1]);
     assert_eq!(ledger.entry(1).unwrap().status, EntryStatus::Done);
-    assert_eq!(
-        ledger.entry(1).unwrap().details.value(),
-        json!({ "by": "2" })
-    );
+    assert_eq!(ledger.entry(1).unwrap().details.value(), json!({ "by": "2" }));
     assert_eq!(ledger.entry(-2).unwrap().status, EntryStatus::Failed);
 }
 
@@ -55,14 +52,9 @@ fn the_latest_entry_of_all_workers_counts() {
 fn of_two_concurrent_entries_the_finished_one_counts() {
     for names in [["a", "b"], ["b", "a"]] {
         let dir = tempfile::tempdir().unwrap();
-        for (worker, status) in names
-            .into_iter()
-            .zip([EntryStatus::Done, EntryStatus::Failed])
-        {
+        for (worker, status) in names.into_iter().zip([EntryStatus::Done, EntryStatus::Failed]) {
             let entry = LedgerEntry::new(5, 1, status, &json!(null));
-            LedgerWriter::new(dir.path(), worker)
-                .append(&entry, true)
-                .unwrap();
+            LedgerWriter::new(dir.path(), worker).append(&entry, true).unwrap();
         }
         let ledger = Ledger::read(dir.path()).unwrap();
         assert_eq!(ledger.entry(1).unwrap().status, EntryStatus::Done);
@@ -80,17 +72,10 @@ fn an_incomplete_last_line_is_ignored() {
     for length in one..two.len() {
         fs::write(ledger_path(dir.path(), "w"), &two[..length]).unwrap();
         let ledger = Ledger::read(dir.path()).unwrap();
-        assert!(
-            ledger.entry(1).is_some() && ledger.entry(2).is_none(),
-            "cut at {length}"
-        );
+        assert!(ledger.entry(1).is_some() && ledger.entry(2).is_none(), "cut at {length}");
     }
     // Power loss may leave zeros in place of the line
-    fs::write(
-        ledger_path(dir.path(), "w"),
-        format!("{}\0\0\0\0", &two[..one]),
-    )
-    .unwrap();
+    fs::write(ledger_path(dir.path(), "w"), format!("{}\0\0\0\0", &two[..one])).unwrap();
     assert_eq!(Ledger::read(dir.path()).unwrap().entries().count(), 1);
 }
 
@@ -140,11 +125,7 @@ fn the_watcher_reads_complete_lines() {
     let mut watcher = LedgerWatcher::new(dir.path(), "me", &ledger);
     let others = ["b".to_owned()];
     watcher.refresh(&others, Instant::now()).unwrap();
-    assert_eq!(
-        watcher.finished_by_other(1),
-        None,
-        "the entry is older than the watcher"
-    );
+    assert_eq!(watcher.finished_by_other(1), None, "the entry is older than the watcher");
 
     append(dir.path(), "2", "b", 1, EntryStatus::Done);
     let whole = text(dir.path(), "b");
@@ -186,10 +167,7 @@ fn a_line_beyond_the_limit_is_damage() {
     let file = fs::File::create(&path).unwrap();
     file.set_len(1 << 36).unwrap();
     let error = Ledger::read(dir.path()).unwrap_err().to_string();
-    assert!(
-        error.contains("line 1: not a ledger entry (longer"),
-        "{error}"
-    );
+    assert!(error.contains("line 1: not a ledger entry (longer"), "{error}");
 }
 
 #[test]
@@ -221,9 +199,7 @@ fn the_ledger_of_a_worker_that_came_and_went_is_found_at_the_next_scan() {
     watcher.refresh(&alone, start).unwrap();
     append(dir.path(), "1", "a", 1, EntryStatus::Done);
     let scan = start + RESCAN_INTERVAL;
-    watcher
-        .refresh(&alone, scan - Duration::from_millis(1))
-        .unwrap();
+    watcher.refresh(&alone, scan - Duration::from_millis(1)).unwrap();
     assert_eq!(watcher.finished_by_other(1), None);
     watcher.refresh(&alone, scan).unwrap();
     assert_eq!(watcher.finished_by_other(1), Some(EntryStatus::Done));

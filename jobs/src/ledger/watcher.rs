@@ -52,10 +52,8 @@ pub(crate) struct LedgerWatcher {
 impl LedgerWatcher {
     /// Starts with the entries of `ledger`.
     pub(crate) fn new(dir: &Path, worker: &str, ledger: &Ledger) -> Self {
-        let latest: HashMap<i64, EntrySummary> = ledger
-            .entries()
-            .map(|entry| (entry.frame, entry.into()))
-            .collect();
+        let latest: HashMap<i64, EntrySummary> =
+            ledger.entries().map(|entry| (entry.frame, entry.into())).collect();
         Self {
             dir: dir.to_owned(),
             own_path: ledger_path(dir, worker),

@@ -54,10 +54,7 @@ impl LedgerWriter {
             .set_len(self.length)
             .and_then(|()| file.seek(SeekFrom::Start(self.length)))
             .and_then(|_| file.write_all(&line));
-        let is_due = sync_now
-            || self
-                .last_sync
-                .is_none_or(|at| at.elapsed() >= SYNC_INTERVAL);
+        let is_due = sync_now || self.last_sync.is_none_or(|at| at.elapsed() >= SYNC_INTERVAL);
         self.is_synced = is_due;
         let written = written.and_then(|()| if is_due { file.sync_data() } else { Ok(()) });
         if is_due {
@@ -95,10 +92,8 @@ fn create(path: &Path) -> io::Result<File> {
 }
 
 fn to_line(path: &Path, entry: &LedgerEntry) -> Result<Vec<u8>, JobError> {
-    let mut line = serde_json::to_vec(entry).map_err(|source| JobError::Serialize {
-        path: path.to_owned(),
-        source,
-    })?;
+    let mut line = serde_json::to_vec(entry)
+        .map_err(|source| JobError::Serialize { path: path.to_owned(), source })?;
     line.push(b'\n');
     Ok(line)
 }

@@ -7,10 +7,7 @@ use super::*;
 fn plan() -> Plan {
     let frame = |number| PlannedFrame {
         number,
-        inputs: vec![PlannedInput {
-            path: format!("in/{number}.vtk"),
-            fingerprint: None,
-        }],
+        inputs: vec![PlannedInput { path: format!("in/{number}.vtk"), fingerprint: None }],
         outputs: vec![format!("f.{number}.exr")],
     };
     Plan::new(
@@ -55,19 +52,10 @@ fn damage_is_an_error() {
     refused("", "not a readable plan");
     refused("[]", "not a readable plan");
     refused(&text[..text.len() - 9], "not a readable plan");
-    refused(
-        &text.replace("\"version\": 2", "\"version\": 9"),
-        "version 9",
-    );
-    refused(
-        &text.replace("\"version\": 2", "\"version\": 1"),
-        "not a readable plan",
-    );
+    refused(&text.replace("\"version\": 2", "\"version\": 9"), "version 9");
+    refused(&text.replace("\"version\": 2", "\"version\": 1"), "not a readable plan");
     refused(&text.replace("f.4.exr", "f.5.exr"), "checksum");
-    refused(
-        &text.replace("\"blake3\": \"", "\"blake3\": \"0"),
-        "checksum",
-    );
+    refused(&text.replace("\"blake3\": \"", "\"blake3\": \"0"), "checksum");
 }
 
 /// With any bit flipped the plan is refused or still means the same.
@@ -95,10 +83,7 @@ fn plans_of_version_1_are_read() {
     assert_ne!(read, plan(), "it must be written again");
     let text = version_1();
     refused(&text.replace("\"1\"", "\"2\""), "fingerprint");
-    refused(
-        &text.replace("\"number\": -1", "\"number\": 5"),
-        "ascending",
-    );
+    refused(&text.replace("\"number\": -1", "\"number\": 5"), "ascending");
 }
 
 #[test]

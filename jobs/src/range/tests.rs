@@ -50,10 +50,7 @@ fn huge_ranges_stay_small() {
     let all = format!("{}-{}", i64::MIN, i64::MAX);
     let all: FrameRange = all.parse().unwrap();
     assert!(all.contains(0) && all.contains(i64::MAX) && all.has_several());
-    assert_eq!(
-        all.iter().take(2).collect::<Vec<_>>(),
-        [i64::MIN, i64::MIN + 1]
-    );
+    assert_eq!(all.iter().take(2).collect::<Vec<_>>(), [i64::MIN, i64::MIN + 1]);
     assert_eq!(all.select(&[5, -1, 5]), [-1, 5]);
     let top = format!("{}-{}x5", i64::MAX - 7, i64::MAX);
     assert_eq!(frames(&top), [i64::MAX - 7, i64::MAX - 2]);
@@ -67,18 +64,11 @@ fn select_keeps_the_order_of_the_range() {
 
 #[test]
 fn frames_become_a_short_range() {
-    let text = |f: &[i64]| {
-        FrameRange::from_frames(f.iter().copied())
-            .unwrap()
-            .to_string()
-    };
+    let text = |f: &[i64]| FrameRange::from_frames(f.iter().copied()).unwrap().to_string();
     assert_eq!(text(&[3, 1, 2, 7, 11, 15]), "1-3,7-15x4");
     assert_eq!(text(&[1, 2]), "1-2");
     assert_eq!(text(&[1, 5]), "1,5");
-    assert_eq!(
-        text(&[i64::MIN, i64::MAX]),
-        format!("{},{}", i64::MIN, i64::MAX)
-    );
+    assert_eq!(text(&[i64::MIN, i64::MAX]), format!("{},{}", i64::MIN, i64::MAX));
     assert_eq!(FrameRange::from_frames([]), None);
 }
 
@@ -147,12 +137,8 @@ proptest! {
 #[test]
 fn a_long_list_of_one_frame_is_one_frame() {
     let list = "7,".repeat(100_000);
-    let has_several = |last: &str| {
-        format!("{list}{last}")
-            .parse::<FrameRange>()
-            .unwrap()
-            .has_several()
-    };
+    let has_several =
+        |last: &str| format!("{list}{last}").parse::<FrameRange>().unwrap().has_several();
     assert!(!has_several("7"));
     assert!(!has_several("7-7x2"));
     assert!(!has_several("6-8y2"));

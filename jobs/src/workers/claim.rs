@@ -99,12 +99,7 @@ impl Claim {
     }
 
     fn new(registry: &Arc<WorkerRegistry>, name: String, generation: u32) -> Self {
-        Self {
-            registry: Arc::clone(registry),
-            name,
-            generation,
-            is_complete: false,
-        }
+        Self { registry: Arc::clone(registry), name, generation, is_complete: false }
     }
 
     /// A living worker with a claim of another generation. This happens if the dead claim before this one was

@@ -59,8 +59,7 @@ pub(super) fn list_files(work_dir: &Path) -> io::Result<Vec<PathBuf>> {
 /// The worker records in the directory `work_dir`; None for those that cannot be read.
 pub(super) fn list_records(work_dir: &Path) -> io::Result<Vec<(PathBuf, Option<WorkerRecord>)>> {
     let is_record = |path: &PathBuf| {
-        path.file_name()
-            .is_some_and(|name| name.to_string_lossy().ends_with(RECORD_SUFFIX))
+        path.file_name().is_some_and(|name| name.to_string_lossy().ends_with(RECORD_SUFFIX))
     };
     let paths = list_files(work_dir)?.into_iter().filter(is_record);
     let mut records = Vec::new();
@@ -103,13 +102,8 @@ impl ListedParts {
 
     /// Removes the files whose owner is not in `living_owners`; returns their count.
     pub(crate) fn remove_stale(&self, living_owners: &HashSet<String>) -> usize {
-        let stale = self
-            .parts
-            .iter()
-            .filter(|(_, owner)| !living_owners.contains(owner));
-        stale
-            .filter(|(path, _)| fs::remove_file(path).is_ok())
-            .count()
+        let stale = self.parts.iter().filter(|(_, owner)| !living_owners.contains(owner));
+        stale.filter(|(path, _)| fs::remove_file(path).is_ok()).count()
     }
 }
 

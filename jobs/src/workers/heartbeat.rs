@@ -43,11 +43,7 @@ pub fn start_heartbeat_thread() {
 impl HeartbeatSchedule {
     /// An empty schedule. Nobody keeps it but the caller, with [`Self::beat_due`].
     pub(super) const fn new(clock: Clock) -> Self {
-        Self {
-            heartbeats: Mutex::new(Vec::new()),
-            changed: Condvar::new(),
-            clock,
-        }
+        Self { heartbeats: Mutex::new(Vec::new()), changed: Condvar::new(), clock }
     }
 
     /// The schedule of this process, which a thread keeps.
@@ -78,8 +74,7 @@ impl HeartbeatSchedule {
 
     /// Stops the heartbeats of this record. The record is no longer written to when this returns.
     pub(super) fn remove(&self, record_path: &Path) {
-        self.heartbeats()
-            .retain(|heartbeat| heartbeat.record_path != record_path);
+        self.heartbeats().retain(|heartbeat| heartbeat.record_path != record_path);
     }
 
     /// Appends to the records whose time has come.
@@ -102,9 +97,7 @@ impl HeartbeatSchedule {
     }
 
     fn heartbeats(&self) -> MutexGuard<'_, Vec<Heartbeat>> {
-        self.heartbeats
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
+        self.heartbeats.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

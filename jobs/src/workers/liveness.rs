@@ -47,11 +47,7 @@ struct Observation {
 
 impl LivenessMonitor {
     pub(super) fn new(timeout: Duration, clock: Clock) -> Self {
-        Self {
-            timeout,
-            clock,
-            observed: Mutex::default(),
-        }
+        Self { timeout, clock, observed: Mutex::default() }
     }
 
     /// The liveness of the worker with this record in the directory `work_dir`.
@@ -59,9 +55,7 @@ impl LivenessMonitor {
         if record.process.has_ended() {
             return Liveness::Ended;
         }
-        let min_timeout = record
-            .heartbeat_interval()
-            .saturating_mul(MIN_MISSED_HEARTBEATS);
+        let min_timeout = record.heartbeat_interval().saturating_mul(MIN_MISSED_HEARTBEATS);
         let path = work_dir.join(record.file_name());
         self.observe(&path, self.timeout.max(min_timeout))
     }
@@ -87,17 +81,10 @@ impl LivenessMonitor {
         };
         let mut observed = self.observed.lock().unwrap_or_else(|e| e.into_inner());
         let now = self.clock.now();
-        let first = Observation {
-            length,
-            since: now,
-            has_beaten: false,
-        };
+        let first = Observation { length, since: now, has_beaten: false };
         let last = observed.entry(path.to_owned()).or_insert(first);
         if last.length != length {
-            *last = Observation {
-                has_beaten: true,
-                ..first
-            };
+            *last = Observation { has_beaten: true, ..first };
         }
         if now.duration_since(last.since) >= timeout {
             Liveness::Unresponsive
@@ -110,8 +97,5 @@ impl LivenessMonitor {
 /// Whether the error shows that no living worker created the path: it does not exist or is not a regular file.
 fn cannot_be_a_worker(error: &io::Error) -> bool {
     use io::ErrorKind as Kind;
-    matches!(
-        error.kind(),
-        Kind::NotFound | Kind::IsADirectory | Kind::InvalidInput
-    )
+    matches!(error.kind(), Kind::NotFound | Kind::IsADirectory | Kind::InvalidInput)
 }

@@ -70,10 +70,8 @@ impl WorkerRecord {
 
     /// The line that is written to the file.
     pub(super) fn to_line(&self) -> serde_json::Result<Vec<u8>> {
-        let checksummed = ChecksummedRecord {
-            record: self.clone(),
-            blake3: Some(self.checksum()?),
-        };
+        let checksummed =
+            ChecksummedRecord { record: self.clone(), blake3: Some(self.checksum()?) };
         let mut line = serde_json::to_vec(&checksummed)?;
         line.push(b'\n');
         Ok(line)
@@ -96,8 +94,7 @@ impl WorkerRecord {
 
     /// Whether `path` has the file name of this record.
     pub(super) fn is_at(&self, path: &Path) -> bool {
-        path.file_name()
-            .is_some_and(|name| *name == *self.file_name())
+        path.file_name().is_some_and(|name| *name == *self.file_name())
     }
 
     /// The worker as messages name it.
@@ -128,16 +125,7 @@ mod tests {
     #[test]
     fn names_that_leave_the_directory_are_rejected() {
         let long = "x".repeat(129);
-        let names = [
-            "../../victim",
-            "/victim",
-            "a/b",
-            "..",
-            "",
-            "a b",
-            "é",
-            &long,
-        ];
+        let names = ["../../victim", "/victim", "a/b", "..", "", "a b", "é", &long];
         for name in names {
             let line = record(name).to_line().unwrap();
             assert_eq!(WorkerRecord::parse(&line), None, "{name}");
@@ -149,10 +137,7 @@ mod tests {
         // As spherule 0.1.0 writes it
         let old = serde_json::to_vec(&good).unwrap();
         assert_eq!(WorkerRecord::parse(&old).as_ref(), Some(&good));
-        let forged = WorkerRecord {
-            heartbeat_interval_ms: u64::MAX,
-            ..good
-        };
+        let forged = WorkerRecord { heartbeat_interval_ms: u64::MAX, ..good };
         assert_eq!(forged.heartbeat_interval(), MAX_HEARTBEAT_INTERVAL);
     }
 

@@ -60,9 +60,7 @@ impl WorkerRegistry {
         heartbeats: &'static HeartbeatSchedule,
     ) -> io::Result<Arc<Self>> {
         let work_dir = dir.join(WORK_DIR);
-        let interval = HEARTBEAT_INTERVAL
-            .min(takeover_after / 4)
-            .max(MIN_HEARTBEAT_INTERVAL);
+        let interval = HEARTBEAT_INTERVAL.min(takeover_after / 4).max(MIN_HEARTBEAT_INTERVAL);
         let record = WorkerRecord {
             worker: new_worker_name(),
             process: Process::current().clone(),
@@ -124,9 +122,8 @@ impl WorkerRegistry {
     pub(crate) fn wait_for_others(&self) -> io::Result<Option<WorkerRecord>> {
         loop {
             let others = self.others()?;
-            let mut beating = others
-                .iter()
-                .filter(|record| self.monitor.has_beaten(&self.work_dir, record));
+            let mut beating =
+                others.iter().filter(|record| self.monitor.has_beaten(&self.work_dir, record));
             if let Some(record) = beating.next() {
                 return Ok(Some(record.clone()));
             }

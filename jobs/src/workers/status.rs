@@ -58,9 +58,8 @@ pub(crate) fn worker_statuses(dir: &Path) -> io::Result<Vec<WorkerStatus>> {
 impl WorkerStatus {
     fn new(path: &Path, record: WorkerRecord) -> Self {
         let modified = fs::metadata(path).and_then(|m| m.modified());
-        let since_heartbeat = modified
-            .ok()
-            .and_then(|at| SystemTime::now().duration_since(at).ok());
+        let since_heartbeat =
+            modified.ok().and_then(|at| SystemTime::now().duration_since(at).ok());
         Self {
             has_ended: record.process.has_ended(),
             worker: record.worker,

@@ -27,10 +27,7 @@ impl Machine {
     /// A machine with this clock. Machines may share one.
     fn new(clock: &Clock) -> Self {
         let heartbeats = Box::leak(Box::new(HeartbeatSchedule::new(clock.clone())));
-        Self {
-            clock: clock.clone(),
-            heartbeats,
-        }
+        Self { clock: clock.clone(), heartbeats }
     }
 
     fn register(&self, dir: &Path, takeover_after: Duration) -> Arc<WorkerRegistry> {
@@ -61,10 +58,7 @@ fn is_held(registry: &Arc<WorkerRegistry>, frame: i64) -> bool {
 
 fn file_names(dir: &Path) -> Vec<String> {
     let mut names: Vec<String> = fs::read_dir(dir.join(WORK_DIR))
-        .map(|list| {
-            list.map(|e| e.unwrap().file_name().into_string().unwrap())
-                .collect()
-        })
+        .map(|list| list.map(|e| e.unwrap().file_name().into_string().unwrap()).collect())
         .unwrap_or_default();
     names.sort();
     names
@@ -158,11 +152,7 @@ fn the_claim_of_an_ended_process_is_free_at_once() {
     let claim = acquired(a.claim_frame(3).unwrap());
     assert!(is_held(&b, 3), "a holds the next generation");
     claim.complete();
-    assert!(
-        !file_names(dir.path())
-            .iter()
-            .any(|n| n.starts_with("frame."))
-    );
+    assert!(!file_names(dir.path()).iter().any(|n| n.starts_with("frame.")));
     drop((a, b));
     assert!(!dir.path().join(WORK_DIR).exists());
 }
@@ -404,9 +394,7 @@ fn pipes_among_records_and_claims_are_ignored() {
     let work_dir = dir.path().join(WORK_DIR);
     fs::create_dir(&work_dir).unwrap();
     for name in ["frame.1.0", "lock.0", "pipe.worker"] {
-        let made = std::process::Command::new("mkfifo")
-            .arg(work_dir.join(name))
-            .status();
+        let made = std::process::Command::new("mkfifo").arg(work_dir.join(name)).status();
         assert!(made.unwrap().success());
     }
     let a = register(dir.path());

@@ -2,10 +2,7 @@
 //! them enter it, and a subtree that few rays enter is traversed by each of them alone. Spheres are always tested with
 //! single rays, so each ray finds what it would find alone, to the bit.
 
-#![expect(
-    clippy::needless_range_loop,
-    reason = "one index for the lanes of many arrays"
-)]
+#![expect(clippy::needless_range_loop, reason = "one index for the lanes of many arrays")]
 
 use super::super::hits::TreeHits;
 use super::super::simd::lanes_entering;
@@ -22,21 +19,10 @@ const MAX_SINGLE_RAYS: u32 = 5;
 impl MovingTree {
     /// The first intersections of the rays in `lanes` between their ends. Particles with a lower index win ties.
     pub fn nearest(&self, rays: &RayPacket, lanes: u32) -> TreeHits {
-        let mut hits = TreeHits {
-            t: rays.t_max,
-            slot: [TreeHits::NO_SLOT; LANES],
-        };
+        let mut hits = TreeHits { t: rays.t_max, slot: [TreeHits::NO_SLOT; LANES] };
         let lanes = lanes & self.lanes_entering(rays);
         if lanes != 0 {
-            nearest(
-                self.simd,
-                &self.nodes,
-                &self.blocks,
-                &self.indices,
-                rays,
-                lanes,
-                &mut hits,
-            );
+            nearest(self.simd, &self.nodes, &self.blocks, &self.indices, rays, lanes, &mut hits);
         }
         hits
     }
@@ -110,10 +96,7 @@ impl Query for Nearest<'_> {
     }
 
     #[inline(always)]
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "slots are counted in 32 bits"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "slots are counted in 32 bits")]
     fn visit(&mut self, index: usize, ray: &RayInTime, lane: usize) -> f32 {
         let t = ray.distances(&self.blocks[index]);
         let (mut limit, mut found) = (self.hits.t[lane], self.hits.slot[lane]);
@@ -174,11 +157,7 @@ fn nearest_body(
     lanes: u32,
     hits: &mut TreeHits,
 ) {
-    let mut query = Nearest {
-        blocks,
-        indices,
-        hits,
-    };
+    let mut query = Nearest { blocks, indices, hits };
     walk_packet(nodes, rays, lanes, &mut query);
 }
 
@@ -200,11 +179,7 @@ fn occluded_body(
     rays: &RayPacket,
     lanes: u32,
 ) -> u32 {
-    let mut query = Any {
-        blocks,
-        limits: rays.t_max,
-        occluded: 0,
-    };
+    let mut query = Any { blocks, limits: rays.t_max, occluded: 0 };
     walk_packet(nodes, rays, lanes, &mut query);
     query.occluded
 }
@@ -238,11 +213,7 @@ fn walk_packet(nodes: &[MovingNode], rays: &RayPacket, lanes: u32, query: &mut i
     let mut depth = 1;
     while depth > 0 {
         depth -= 1;
-        let Pending {
-            enter,
-            code,
-            mut lanes,
-        } = stack[depth];
+        let Pending { enter, code, mut lanes } = stack[depth];
         // Forget rays that have ended before the subtree begins
         for lane in lanes_in(lanes) {
             if query.limit(lane) < enter * (1.0 - ROUNDING) {
@@ -278,11 +249,7 @@ fn walk_packet(nodes: &[MovingNode], rays: &RayPacket, lanes: u32, query: &mut i
             for lane in lanes_in(entering) {
                 least = smaller(enter[lane], least);
             }
-            let pending = Pending {
-                enter: least,
-                code: node.children[child],
-                lanes: entering,
-            };
+            let pending = Pending { enter: least, code: node.children[child], lanes: entering };
             let mut place = depth;
             while place > first && stack[place - 1].enter < least {
                 stack[place] = stack[place - 1];

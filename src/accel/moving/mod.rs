@@ -62,10 +62,7 @@ impl MovingTree {
             block
         };
         let blocks = (0..indices.len() / BLOCK_SIZE).into_par_iter();
-        blocks
-            .with_min_len(256)
-            .map(block)
-            .collect_into_vec(&mut self.blocks);
+        blocks.with_min_len(256).map(block).collect_into_vec(&mut self.blocks);
         // Compute the boxes from the blocks up
         self.nodes = refit::nodes_over(tree, &self.blocks);
         self.bounds = (self.nodes.first()).map_or(Aabb::EMPTY, MovingNode::swept_bounds);

@@ -16,18 +16,11 @@ pub(super) struct MovingBounds {
 }
 
 impl MovingBounds {
-    pub(super) const EMPTY: Self = Self {
-        ends: [[Vec3::INFINITY, Vec3::NEG_INFINITY]; 2],
-    };
+    pub(super) const EMPTY: Self = Self { ends: [[Vec3::INFINITY, Vec3::NEG_INFINITY]; 2] };
 
     pub(super) fn union(self, other: Self) -> Self {
         let join = |a: [Vec3; 2], b: [Vec3; 2]| [a[0].min(b[0]), a[1].max(b[1])];
-        Self {
-            ends: [
-                join(self.ends[0], other.ends[0]),
-                join(self.ends[1], other.ends[1]),
-            ],
-        }
+        Self { ends: [join(self.ends[0], other.ends[0]), join(self.ends[1], other.ends[1])] }
     }
 }
 

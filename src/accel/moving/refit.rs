@@ -71,9 +71,8 @@ fn subtree<'a, T: Topology<'a>>(
     };
     // Compute the children
     let children = topology.children(code);
-    let codes: Vec<u32> = (0..index_u32(node.child_count()))
-        .map(|slot| topology.child(children, slot))
-        .collect();
+    let codes: Vec<u32> =
+        (0..index_u32(node.child_count())).map(|slot| topology.child(children, slot)).collect();
     let below = |code: &u32| subtree(topology, blocks, *code, level + 1);
     let subtrees: Vec<Subtree> = match level < PARALLEL_LEVELS {
         true => codes.par_iter().map(below).collect(),
@@ -92,9 +91,5 @@ fn subtree<'a, T: Topology<'a>>(
         nodes[0].set(slot, &child.bounds, code);
         bounds = bounds.union(child.bounds);
     }
-    Subtree {
-        nodes,
-        bounds,
-        code: 0,
-    }
+    Subtree { nodes, bounds, code: 0 }
 }

@@ -1,9 +1,6 @@
 //! Traversal by one ray, and its tests of boxes and spheres.
 
-#![expect(
-    clippy::needless_range_loop,
-    reason = "one index for the lanes of many arrays"
-)]
+#![expect(clippy::needless_range_loop, reason = "one index for the lanes of many arrays")]
 
 use super::super::levels::MAX_LEVELS;
 use super::super::walk::Pending;
@@ -84,11 +81,7 @@ impl RayInTime {
         let mut t = [f32::INFINITY; BLOCK_SIZE];
         for i in 0..BLOCK_SIZE {
             let leaving = if far[i] >= self.t_min { far[i] } else { t[i] };
-            t[i] = if near[i] >= self.t_min {
-                near[i]
-            } else {
-                leaving
-            };
+            t[i] = if near[i] >= self.t_min { near[i] } else { leaving };
         }
         t
     }

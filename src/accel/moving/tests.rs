@@ -42,15 +42,9 @@ impl Swarm {
     }
 
     fn tree(&self, structure: Structure, simd: SimdLevel) -> MovingTree {
-        let spheres = Spheres {
-            centers: &self.centers,
-            radius: SphereRadius::Each(&self.radii),
-        };
+        let spheres = Spheres { centers: &self.centers, radius: SphereRadius::Each(&self.radii) };
         let mut builder = TreeBuilder::new();
-        let settings = BuildSettings {
-            keep_indices: true,
-            ..BuildSettings::new(structure)
-        };
+        let settings = BuildSettings { keep_indices: true, ..BuildSettings::new(structure) };
         builder.build(&spheres, &settings);
         builder.tree_mut().set_simd(simd);
         let mut moving = MovingTree::default();

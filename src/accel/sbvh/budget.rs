@@ -18,9 +18,7 @@ pub(super) fn capacity(particles: usize, budget: f32) -> usize {
     let duplicates = (particles as f64 * f64::from(budget)) as u64;
     let most = u64::from(u32::MAX);
     let capacity = (particles as u64).saturating_add(duplicates).min(most);
-    usize::try_from(capacity)
-        .unwrap_or(usize::MAX)
-        .max(particles)
+    usize::try_from(capacity).unwrap_or(usize::MAX).max(particles)
 }
 
 /// Distributes `free` slots between two children in proportion to their reference counts.

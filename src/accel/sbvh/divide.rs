@@ -22,11 +22,7 @@ pub(super) struct BuildNode<'a> {
 impl<'a> BuildNode<'a> {
     fn with_bounds((storage, count): (&'a mut [Reference], usize)) -> Self {
         let bounds = bounds_of(&storage[..count]);
-        Self {
-            storage,
-            count,
-            bounds,
-        }
+        Self { storage, count, bounds }
     }
 }
 

@@ -57,11 +57,7 @@ impl Grown {
 
 /// An inner node with children at index `first`.
 pub(super) fn inner(bounds: Bounds, first: usize) -> BinaryNode {
-    BinaryNode {
-        bounds: bounds.to_aabb(),
-        first: index_u32(first),
-        count: 0,
-    }
+    BinaryNode { bounds: bounds.to_aabb(), first: index_u32(first), count: 0 }
 }
 
 /// Turns the node at index `at` into a leaf.
@@ -72,17 +68,13 @@ fn leaf(tree: &mut BinaryTree, at: usize, node: &BuildNode<'_>) {
         count: index_u32(node.count),
     };
     let references = &node.storage[..node.count];
-    tree.references
-        .extend(references.iter().map(|r| r.particle));
+    tree.references.extend(references.iter().map(|r| r.particle));
 }
 
 impl<'a> Grower<'a> {
     /// `alpha` is a fraction of the area of `root`.
     pub(super) fn new(parts: Parts<'a>, root: Bounds, alpha: f32) -> Self {
-        Self {
-            parts,
-            tolerated_overlap: f64::from(alpha) * root.area(),
-        }
+        Self { parts, tolerated_overlap: f64::from(alpha) * root.area() }
     }
 
     pub(super) fn grow(&self, node: BuildNode<'_>, depth: u32) -> Grown {
@@ -102,10 +94,8 @@ impl<'a> Grower<'a> {
             Some(split) => by_split(node, &split, self.parts),
             None => by_number(node),
         };
-        let (below, above) = rayon::join(
-            || self.grow(below, depth + 1),
-            || self.grow(above, depth + 1),
-        );
+        let (below, above) =
+            rayon::join(|| self.grow(below, depth + 1), || self.grow(above, depth + 1));
         Grown::Split(bounds, Box::new([below, above]))
     }
 

@@ -67,11 +67,7 @@ pub(super) fn build(
 
     // Split recursively, and concatenate the subtrees
     let grown = (particles > 0).then(|| {
-        let root = BuildNode {
-            storage: &mut storage,
-            count: particles,
-            bounds,
-        };
+        let root = BuildNode { storage: &mut storage, count: particles, bounds };
         Grower::new(parts, bounds, settings.sbvh.alpha).grow(root, 0)
     });
     let storage_bytes = size_of_val(&storage[..]) as u64;

@@ -27,9 +27,7 @@ impl SplitRule for BinnedObjectSplit {
 /// Bounding box of the doubled centres.
 fn centers(references: &[Reference]) -> Bounds {
     let of = |references: &[Reference]| {
-        references
-            .iter()
-            .fold(Bounds::EMPTY, |b, r| b.extend(r.bounds().doubled_center()))
+        references.iter().fold(Bounds::EMPTY, |b, r| b.extend(r.bounds().doubled_center()))
     };
     if is_large(references.len()) {
         let parts = references.par_chunks(CHUNK).map(of);
@@ -46,17 +44,11 @@ struct Bin {
 }
 
 impl Bin {
-    const EMPTY: Self = Self {
-        bounds: Bounds::EMPTY,
-        count: 0,
-    };
+    const EMPTY: Self = Self { bounds: Bounds::EMPTY, count: 0 };
 
     #[inline(always)]
     fn merged(self, other: Self) -> Self {
-        Self {
-            bounds: self.bounds.union(other.bounds),
-            count: self.count + other.count,
-        }
+        Self { bounds: self.bounds.union(other.bounds), count: self.count + other.count }
     }
 }
 

@@ -18,10 +18,8 @@ pub(super) fn partition(
         return partition_chunk(references, &is_first);
     }
     // Partition each chunk separately
-    let firsts: Vec<usize> = references
-        .par_chunks_mut(CHUNK)
-        .map(|chunk| partition_chunk(chunk, &is_first))
-        .collect();
+    let firsts: Vec<usize> =
+        references.par_chunks_mut(CHUNK).map(|chunk| partition_chunk(chunk, &is_first)).collect();
     let middle = firsts.iter().sum();
     let len = references.len();
     let chunks = firsts.iter().enumerate().map(|(number, first)| {
@@ -83,16 +81,10 @@ fn swap_runs(late: Vec<&mut [Reference]>, early: Vec<&mut [Reference]>) {
         let (x, x_rest) = x.split_at_mut(len);
         let (y, y_rest) = y.split_at_mut(len);
         pairs.push((x, y));
-        a = Some(x_rest)
-            .filter(|rest| !rest.is_empty())
-            .or_else(|| late.next());
-        b = Some(y_rest)
-            .filter(|rest| !rest.is_empty())
-            .or_else(|| early.next());
+        a = Some(x_rest).filter(|rest| !rest.is_empty()).or_else(|| late.next());
+        b = Some(y_rest).filter(|rest| !rest.is_empty()).or_else(|| early.next());
     }
-    pairs
-        .into_par_iter()
-        .for_each(|(x, y)| x.swap_with_slice(y));
+    pairs.into_par_iter().for_each(|(x, y)| x.swap_with_slice(y));
 }
 
 #[cfg(test)]
@@ -106,10 +98,7 @@ mod tests {
     fn large_set_is_partitioned_completely() {
         let count = 5 * CHUNK + 17;
         for modulus in [1, 2, 3, 1000, usize::MAX] {
-            let bounds = Bounds {
-                min: Vec3A::ZERO,
-                max: Vec3A::ONE,
-            };
+            let bounds = Bounds { min: Vec3A::ZERO, max: Vec3A::ONE };
             let mut references: Vec<Reference> = (0..count)
                 .map(|i| Reference::new(bounds, u32::try_from(i).expect("few")))
                 .collect();

@@ -20,19 +20,12 @@ pub(super) struct Reference {
 
 impl Reference {
     pub(super) fn new(bounds: Bounds, particle: u32) -> Self {
-        Self {
-            min: bounds.min.into(),
-            max: bounds.max.into(),
-            particle,
-        }
+        Self { min: bounds.min.into(), max: bounds.max.into(), particle }
     }
 
     #[inline(always)]
     pub(super) fn bounds(&self) -> Bounds {
-        Bounds {
-            min: self.min.into(),
-            max: self.max.into(),
-        }
+        Bounds { min: self.min.into(), max: self.max.into() }
     }
 }
 
@@ -44,16 +37,10 @@ pub(super) struct Bounds {
 }
 
 impl Bounds {
-    pub(super) const EMPTY: Self = Self {
-        min: Vec3A::INFINITY,
-        max: Vec3A::NEG_INFINITY,
-    };
+    pub(super) const EMPTY: Self = Self { min: Vec3A::INFINITY, max: Vec3A::NEG_INFINITY };
 
     /// All of space.
-    pub(super) const ALL: Self = Self {
-        min: Vec3A::NEG_INFINITY,
-        max: Vec3A::INFINITY,
-    };
+    pub(super) const ALL: Self = Self { min: Vec3A::NEG_INFINITY, max: Vec3A::INFINITY };
 
     /// Bounding box of `references`.
     pub(super) fn around(references: &[Reference]) -> Self {
@@ -63,26 +50,17 @@ impl Bounds {
 
     #[inline(always)]
     pub(super) fn union(self, other: Self) -> Self {
-        Self {
-            min: self.min.min(other.min),
-            max: self.max.max(other.max),
-        }
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
     #[inline(always)]
     pub(super) fn intersection(self, other: Self) -> Self {
-        Self {
-            min: self.min.max(other.min),
-            max: self.max.min(other.max),
-        }
+        Self { min: self.min.max(other.min), max: self.max.min(other.max) }
     }
 
     #[inline(always)]
     pub(super) fn extend(self, point: Vec3A) -> Self {
-        Self {
-            min: self.min.min(point),
-            max: self.max.max(point),
-        }
+        Self { min: self.min.min(point), max: self.max.max(point) }
     }
 
     /// Twice the centre: the same order, without a multiplication.
@@ -99,10 +77,7 @@ impl Bounds {
     }
 
     pub(super) fn to_aabb(self) -> Aabb {
-        Aabb {
-            min: self.min.into(),
-            max: self.max.into(),
-        }
+        Aabb { min: self.min.into(), max: self.max.into() }
     }
 }
 
@@ -119,10 +94,7 @@ const ROUNDING: f32 = 1e-6;
 
 impl Sphere {
     pub(super) fn new(center: Vec3, radius: f32) -> Self {
-        Self {
-            center: center.into(),
-            squared: radius * radius * (1.0 + ROUNDING),
-        }
+        Self { center: center.into(), squared: radius * radius * (1.0 + ROUNDING) }
     }
 
     /// The part of `bounds` around the sphere: the tightest box around their intersection, except for rounding. The
@@ -131,30 +103,20 @@ impl Sphere {
     #[inline(always)]
     pub(super) fn clip(&self, bounds: Bounds) -> Bounds {
         // Compute the squared distance from the centre to the box, per axis
-        let outside = (bounds.min - self.center)
-            .max(self.center - bounds.max)
-            .max(Vec3A::ZERO);
+        let outside = (bounds.min - self.center).max(self.center - bounds.max).max(Vec3A::ZERO);
         let squares = outside * outside;
         // Compute the extent of the sphere along each axis, at the nearest point of the other two
         let others = Vec3A::splat(squares.element_sum()) - squares;
-        let reach = (Vec3A::splat(self.squared) - others)
-            .max(Vec3A::ZERO)
-            .sqrt();
+        let reach = (Vec3A::splat(self.squared) - others).max(Vec3A::ZERO).sqrt();
         let common = bounds.intersection(self.rounded_out(reach));
         // Rounding can leave nothing if the box only touches the sphere; keep the box then.
-        if common.min.cmpgt(common.max).any() {
-            bounds
-        } else {
-            common
-        }
+        if common.min.cmpgt(common.max).any() { bounds } else { common }
     }
 
     /// Prepares the sphere for clipping to slabs of `bounds`.
     #[inline(always)]
     pub(super) fn in_slabs(self, bounds: Bounds) -> SlabClip {
-        let outside = (bounds.min - self.center)
-            .max(self.center - bounds.max)
-            .max(Vec3A::ZERO);
+        let outside = (bounds.min - self.center).max(self.center - bounds.max).max(Vec3A::ZERO);
         SlabClip {
             sphere: self,
             bounds,
@@ -167,10 +129,7 @@ impl Sphere {
     #[inline(always)]
     fn rounded_out(&self, reach: Vec3A) -> Bounds {
         let (min, max) = (self.center - reach, self.center + reach);
-        Bounds {
-            min: min - min.abs() * f32::EPSILON,
-            max: max + max.abs() * f32::EPSILON,
-        }
+        Bounds { min: min - min.abs() * f32::EPSILON, max: max + max.abs() * f32::EPSILON }
     }
 }
 
@@ -239,10 +198,7 @@ impl<'a> Parts<'a> {
         let index = particle as usize;
         let reach = Vec3A::splat(self.radius(index));
         // Rays hit nothing beyond the range of f32, and areas of infinite boxes cannot be compared.
-        let range = Bounds {
-            min: Vec3A::splat(f32::MIN),
-            max: Vec3A::splat(f32::MAX),
-        };
+        let range = Bounds { min: Vec3A::splat(f32::MIN), max: Vec3A::splat(f32::MAX) };
         let bounds = self.sphere(particle).rounded_out(reach);
         Reference::new(bounds.intersection(range), particle)
     }
@@ -269,10 +225,7 @@ mod tests {
     fn unit_sphere() -> (Sphere, Bounds) {
         let center = Vec3::new(1.0, 2.0, 3.0);
         let centers = [center];
-        let parts = Parts::of(Spheres {
-            centers: &centers,
-            radius: SphereRadius::Common(1.0),
-        });
+        let parts = Parts::of(Spheres { centers: &centers, radius: SphereRadius::Common(1.0) });
         (Sphere::new(center, 1.0), parts.whole(0).bounds())
     }
 

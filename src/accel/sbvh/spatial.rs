@@ -66,11 +66,7 @@ struct Bin {
 }
 
 impl Bin {
-    const EMPTY: Self = Self {
-        bounds: Bounds::EMPTY,
-        entries: 0,
-        exits: 0,
-    };
+    const EMPTY: Self = Self { bounds: Bounds::EMPTY, entries: 0, exits: 0 };
 }
 
 struct Bins([[Bin; BINS]; 3]);

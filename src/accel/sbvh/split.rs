@@ -61,11 +61,7 @@ impl BinGrid {
     #[expect(clippy::cast_precision_loss, reason = "a small constant")]
     pub(super) fn over(bounds: Bounds) -> Self {
         let width = (bounds.max - bounds.min) * (1.0 / BINS as f32);
-        Self {
-            origin: bounds.min,
-            width,
-            scale: width.recip(),
-        }
+        Self { origin: bounds.min, width, scale: width.recip() }
     }
 
     /// Bin of `point` on each axis; the first bin if the box has no extent on an axis.

@@ -68,13 +68,7 @@ fn sweep(references: &[Reference], axis: usize, best: &mut Option<Split>) {
         let (boxes, counts) = ([below, *upper], [at, count - at]);
         let cost = cost::of_pair(boxes, counts);
         if best.is_none_or(|best| cost < best.cost) {
-            *best = Some(Split {
-                cost,
-                boxes,
-                counts,
-                axis,
-                place: SplitPosition::Rank,
-            });
+            *best = Some(Split { cost, boxes, counts, axis, place: SplitPosition::Rank });
         }
     }
 }

@@ -19,11 +19,8 @@ pub(super) fn divide(
     plane: f32,
     parts: Parts,
 ) -> (usize, Vec<Reference>) {
-    let mut sides = Sides {
-        boxes: split.boxes,
-        areas: split.boxes.map(Bounds::area),
-        counts: split.counts,
-    };
+    let mut sides =
+        Sides { boxes: split.boxes, areas: split.boxes.map(Bounds::area), counts: split.counts };
     let (mut below, mut above) = (0, Vec::new());
     for at in 0..straddlers.len() {
         // Cut the reference, and keep the cheapest of the three choices

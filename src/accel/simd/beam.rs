@@ -54,11 +54,7 @@ pub(in super::super) struct Beam {
 pub(super) fn inverses(directions: &Lanes) -> Lanes {
     let mut inverses = *directions;
     for d in &mut inverses {
-        let clamped = if d.abs() < MIN_DIRECTION {
-            MIN_DIRECTION.copysign(*d)
-        } else {
-            *d
-        };
+        let clamped = if d.abs() < MIN_DIRECTION { MIN_DIRECTION.copysign(*d) } else { *d };
         *d = 1.0 / clamped;
     }
     inverses
@@ -70,11 +66,7 @@ fn fill_inactive(values: &Lanes, lanes: u32, first: usize) -> Lanes {
     let replacement = values[first];
     let mut filled = *values;
     for (lane, value) in filled.iter_mut().enumerate() {
-        *value = if lanes >> lane & 1 == 1 {
-            *value
-        } else {
-            replacement
-        };
+        *value = if lanes >> lane & 1 == 1 { *value } else { replacement };
     }
     filled
 }
@@ -186,11 +178,7 @@ impl Beam {
             let backward = high < 0.0;
             beam.near_side[axis] = usize::from(backward);
             beam.sign[axis] = if backward { -1.0 } else { 1.0 };
-            let ends = if backward {
-                [first, last]
-            } else {
-                [last, first]
-            };
+            let ends = if backward { [first, last] } else { [last, first] };
             [beam.origin_near[axis], beam.origin_far[axis]] = ends;
         }
         if !is_valid {
@@ -238,17 +226,11 @@ mod tests {
 
     #[test]
     fn near_lanes_intersect_the_box() {
-        let bounds = Aabb {
-            min: Vec3::splat(2.0),
-            max: Vec3::splat(3.0),
-        };
+        let bounds = Aabb { min: Vec3::splat(2.0), max: Vec3::splat(3.0) };
         let rays = packet(&[Vec3::ONE, -Vec3::ONE, Vec3::X, Vec3::new(1.0, 1.2, 1.1)]);
         assert_eq!(lanes_entering(&rays, &bounds), 0b1001);
         let mut short = RayPacket::default();
-        short.push(&Ray {
-            t_max: 1.0,
-            ..rays.ray(0)
-        });
+        short.push(&Ray { t_max: 1.0, ..rays.ray(0) });
         assert_eq!(lanes_entering(&short, &bounds), 0);
     }
 }

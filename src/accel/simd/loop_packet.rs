@@ -86,11 +86,8 @@ impl AxisSlabs {
     #[inline(always)]
     fn new(rays: &LaneSlabs, node: &Node, axis: usize) -> Self {
         let scale = f32::from_bits(u32::from(node.exponent[axis]) << 23);
-        let mut slabs = Self {
-            step: [0.0; PACKET_SIZE],
-            base: [0.0; PACKET_SIZE],
-            slack: [0.0; PACKET_SIZE],
-        };
+        let mut slabs =
+            Self { step: [0.0; PACKET_SIZE], base: [0.0; PACKET_SIZE], slack: [0.0; PACKET_SIZE] };
         for lane in 0..PACKET_SIZE {
             let inverse = rays.inverse[axis][lane];
             let step = scale * inverse;
@@ -174,11 +171,7 @@ impl<K: LoopPackets> PacketKernel for K {
             let mut any = false;
             for lane in 0..PACKET_SIZE {
                 let is_entered = alive >> lane & 1 == 1 && near[lane] <= far[lane];
-                near[lane] = if is_entered {
-                    near[lane]
-                } else {
-                    f32::INFINITY
-                };
+                near[lane] = if is_entered { near[lane] } else { f32::INFINITY };
                 any |= is_entered;
             }
             if any {

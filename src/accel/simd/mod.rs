@@ -35,15 +35,7 @@ const MIN_DIRECTION: f32 = 1e-7;
 
 /// Inverse direction with finite components.
 pub(super) fn finite_inverse(direction: Vec3) -> Vec3 {
-    direction
-        .map(|d| {
-            if d.abs() < MIN_DIRECTION {
-                MIN_DIRECTION.copysign(d)
-            } else {
-                d
-            }
-        })
-        .recip()
+    direction.map(|d| if d.abs() < MIN_DIRECTION { MIN_DIRECTION.copysign(d) } else { d }).recip()
 }
 
 /// The tests of a traversal, for one instruction set.
@@ -123,11 +115,7 @@ pub(super) struct BlockCrossings {
 
 impl BlockCrossings {
     /// No intersections.
-    const NONE: Self = Self {
-        lanes: 0,
-        near: [0.0; BLOCK_SIZE],
-        far: [0.0; BLOCK_SIZE],
-    };
+    const NONE: Self = Self { lanes: 0, near: [0.0; BLOCK_SIZE], far: [0.0; BLOCK_SIZE] };
 }
 
 /// Code that uses a kernel, compiled for each instruction set. `run` should be `inline(always)`, so that all of it is

@@ -43,9 +43,7 @@ impl NeonRay {
             origin: load(&[ray.origin.x, ray.origin.y, ray.origin.z, 0.0], 0),
             inverse: load(&[inverse.x, inverse.y, inverse.z, 0.0], 0),
             reach: load(&[reach.x, reach.y, reach.z, 0.0], 0),
-            near_side: inverse
-                .to_array()
-                .map(|d| usize::from(d.is_sign_negative())),
+            near_side: inverse.to_array().map(|d| usize::from(d.is_sign_negative())),
         }
     }
 
@@ -99,11 +97,7 @@ impl NeonRay {
         first: usize,
     ) -> (float32x4_t, float32x4_t) {
         let (o, d) = (self.ray.origin, self.ray.direction);
-        let (x, y, z) = (
-            load(&block.x, first),
-            load(&block.y, first),
-            load(&block.z, first),
-        );
+        let (x, y, z) = (load(&block.x, first), load(&block.y, first), load(&block.z, first));
         // SAFETY: NEON is part of every 64-bit Arm target of Rust's with floats.
         unsafe {
             // Find the points of the ray nearest to the centres, and the vectors between them
@@ -234,9 +228,7 @@ impl Kernel for Neon {
         radii: Option<&BlockRadii>,
         limit: f32,
     ) -> bool {
-        (0..BLOCK_SIZE)
-            .step_by(LANES)
-            .any(|first| ray.distances(block, radii, first, limit).1 != 0)
+        (0..BLOCK_SIZE).step_by(LANES).any(|first| ray.distances(block, radii, first, limit).1 != 0)
     }
 
     #[inline(always)]
@@ -252,11 +244,7 @@ impl Kernel for Neon {
             // SAFETY: NEON is part of every 64-bit Arm target of Rust's with floats.
             let (lanes, near, far) = unsafe {
                 let chord = vsqrtq_f32(vmaxnmq_f32(discriminant, vdupq_n_f32(0.0)));
-                (
-                    bits(vcgezq_f32(discriminant)),
-                    vsubq_f32(middle, chord),
-                    vaddq_f32(middle, chord),
-                )
+                (bits(vcgezq_f32(discriminant)), vsubq_f32(middle, chord), vaddq_f32(middle, chord))
             };
             found.lanes |= lanes << first;
             found.near[first..first + LANES].copy_from_slice(&store(near));
@@ -301,18 +289,13 @@ fn planes(bytes: &[u8; WIDTH]) -> [float32x4_t; 2] {
     // SAFETY: NEON is there; eight bytes are read from an array of eight.
     unsafe {
         let wide = vmovl_u8(vld1_u8(bytes.as_ptr()));
-        [
-            vcvtq_f32_u32(vmovl_u16(vget_low_u16(wide))),
-            vcvtq_f32_u32(vmovl_high_u16(wide)),
-        ]
+        [vcvtq_f32_u32(vmovl_u16(vget_low_u16(wide))), vcvtq_f32_u32(vmovl_high_u16(wide))]
     }
 }
 
 #[inline(always)]
 fn prefetch_line<T>(value: &T, line: usize) {
-    let address = std::ptr::from_ref(value)
-        .cast::<u8>()
-        .wrapping_add(LINE * line);
+    let address = std::ptr::from_ref(value).cast::<u8>().wrapping_add(LINE * line);
     // SAFETY: a prefetch never faults, whatever the address, and changes nothing that Rust sees.
     unsafe {
         asm!("prfm pldl1keep, [{0}]", in(reg) address, options(nostack, preserves_flags, readonly));

@@ -68,10 +68,8 @@ pub(in super::super) struct EnteredChildren {
 
 impl EnteredChildren {
     /// No children.
-    pub(in super::super) const NONE: Self = Self {
-        near: [[f32::INFINITY; PACKET_SIZE]; WIDTH],
-        keys: [0; WIDTH],
-    };
+    pub(in super::super) const NONE: Self =
+        Self { near: [[f32::INFINITY; PACKET_SIZE]; WIDTH], keys: [0; WIDTH] };
 }
 
 /// Key of the child in `slot` with the entry distance `distance`.

@@ -44,11 +44,7 @@ impl PreparedRay {
     fn distances(&self, block: &Block, radii: Option<&BlockRadii>) -> [f32; BLOCK_SIZE] {
         self.chords(block, radii).map(|(middle, half)| {
             let near = middle - half;
-            if near >= self.ray.t_min {
-                near
-            } else {
-                middle + half
-            }
+            if near >= self.ray.t_min { near } else { middle + half }
         })
     }
 }
@@ -62,12 +58,7 @@ impl Kernel for Portable {
     type Keys = [u32; WIDTH];
 
     fn prepare(self, ray: &Ray, radius: f32, padding: f32) -> PreparedRay {
-        PreparedRay {
-            ray: *ray,
-            inverse: finite_inverse(ray.direction),
-            radius,
-            padding,
-        }
+        PreparedRay { ray: *ray, inverse: finite_inverse(ray.direction), radius, padding }
     }
 
     fn test_node(self, ray: &PreparedRay, node: &Node, limit: f32) -> (usize, [u32; WIDTH]) {

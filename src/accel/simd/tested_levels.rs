@@ -9,28 +9,17 @@ use super::SimdLevel;
 ///
 /// # Panics
 /// If the levels that the crate supports are not those of the machine, so that a test would skip one.
-#[expect(
-    clippy::print_stdout,
-    reason = "test output shows which levels were tested"
-)]
+#[expect(clippy::print_stdout, reason = "test output shows which levels were tested")]
 #[track_caller]
 pub(crate) fn tested_levels() -> Vec<SimdLevel> {
     thread_local!(static IS_PRINTED: Cell<bool> = const { Cell::new(false) });
     let detected = detected_levels();
     let is_supported = |level: &SimdLevel| level.is_supported();
     let (offered, others): (Vec<_>, Vec<_>) = SimdLevel::ALL.into_iter().partition(is_supported);
-    assert_eq!(
-        offered, detected,
-        "levels of the crate (left) and of the machine (right) differ"
-    );
+    assert_eq!(offered, detected, "levels of the crate (left) and of the machine (right) differ");
     if !IS_PRINTED.replace(true) {
-        let names = |levels: &[SimdLevel]| {
-            levels
-                .iter()
-                .map(|l| l.name())
-                .collect::<Vec<_>>()
-                .join(", ")
-        };
+        let names =
+            |levels: &[SimdLevel]| levels.iter().map(|l| l.name()).collect::<Vec<_>>().join(", ");
         println!(
             "SIMD levels tested: {}; not on this machine: {}",
             names(&offered),

@@ -123,11 +123,7 @@ impl OwnedLeaves {
             Some(radius) => vec![radius],
             None => (0..count).map(|i| own(i).expect("stored")).collect(),
         };
-        Scene {
-            name,
-            centers,
-            radii,
-        }
+        Scene { name, centers, radii }
     }
 
     fn encode_radii(&mut self, form: Radii, values: Vec<BlockRadii>) {
@@ -175,9 +171,7 @@ impl OwnedLeaves {
         let mut coded = Vec::new();
         for (index, block) in blocks.iter().enumerate() {
             let (node, slot) = (&self.nodes[index / WIDTH], index % WIDTH);
-            let codes = (index % 5 != 3)
-                .then(|| codes_of::<B>(block, node, slot))
-                .flatten();
+            let codes = (index % 5 != 3).then(|| codes_of::<B>(block, node, slot)).flatten();
             coded.push(codes.unwrap_or_else(|| {
                 self.wide.push(*block);
                 B::referring_to(self.wide.len() as u32 - 1)

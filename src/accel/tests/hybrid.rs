@@ -6,15 +6,7 @@ use crate::accel::{Coherence, TreeHits};
 use crate::ray::{PACKET_SIZE, RayPacket};
 
 /// Invalid values for a component of a ray.
-const POISON: [f32; 7] = [
-    f32::NAN,
-    f32::INFINITY,
-    f32::NEG_INFINITY,
-    f32::MAX,
-    -1e30,
-    -1.0,
-    0.0,
-];
+const POISON: [f32; 7] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, -1e30, -1.0, 0.0];
 /// Invalid values for a direction. Any other value would violate the precondition of unit directions, without which
 /// distances to boxes and spheres differ.
 const DIRECTION_POISON: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
@@ -78,11 +70,8 @@ fn empty_ray_intervals_hit_nothing() {
     let mut builder = TreeBuilder::new();
     builder.build(&scene.spheres(), &BuildSettings::default());
     let view = builder.tree().view();
-    let ended = rays(&scene, PACKET_SIZE, 5).into_iter().map(|ray| Ray {
-        t_min: 4.0,
-        t_max: 3.0,
-        ..ray
-    });
+    let ended =
+        rays(&scene, PACKET_SIZE, 5).into_iter().map(|ray| Ray { t_min: 4.0, t_max: 3.0, ..ray });
     assert_eq!(check_packet(&view, &packet_of(ended), "ended"), 0);
 }
 

@@ -27,18 +27,15 @@ fn merged(scene: &Scene, ray: &Ray, tolerance: f64) -> Exact {
         }
     }
     let pieces = united(&all, 0.0);
-    is_clear &= [-tolerance, tolerance]
-        .iter()
-        .all(|grown| united(&all, *grown).len() == pieces.len());
+    is_clear &=
+        [-tolerance, tolerance].iter().all(|grown| united(&all, *grown).len() == pieces.len());
     Exact { pieces, is_clear }
 }
 
 /// The union of intervals, each extended by `grown` at both ends.
 fn united(all: &[(f64, f64)], grown: f64) -> Vec<(f64, f64)> {
-    let ends = all
-        .iter()
-        .map(|(near, far)| (near - grown, far + grown))
-        .filter(|(near, far)| near <= far);
+    let ends =
+        all.iter().map(|(near, far)| (near - grown, far + grown)).filter(|(near, far)| near <= far);
     let mut all: Vec<_> = ends.collect();
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut pieces: Vec<(f64, f64)> = Vec::new();
@@ -79,19 +76,12 @@ fn judge(scene: &Scene, tree: &TreeView, ray: &Ray) -> bool {
     if !is_clear || !starts {
         return false;
     }
-    let expected: Vec<f64> = pieces
-        .iter()
-        .filter(|p| p.0 > 0.0)
-        .flat_map(|p| [p.0, p.1])
-        .collect();
+    let expected: Vec<f64> = pieces.iter().filter(|p| p.0 > 0.0).flat_map(|p| [p.0, p.1]).collect();
     let found = crossings(tree, ray);
     let what = format!("{} {ray:?}: {found:?} should be {expected:?}", scene.name);
     assert_eq!(found.len(), expected.len(), "{what}");
     for (hit, t) in found.iter().zip(&expected) {
-        assert!(
-            (f64::from(hit.t) - t).abs() < 0.1 * tolerance + 1e-5 * t,
-            "{what}"
-        );
+        assert!((f64::from(hit.t) - t).abs() < 0.1 * tolerance + 1e-5 * t, "{what}");
         // The point lies on the surface of the sphere that was hit.
         let (center, radius) = tree.sphere(hit.slot);
         let (own, _) = exact(ray, center, radius);
@@ -119,9 +109,7 @@ fn nested() -> Scene {
     Scene {
         name: "nested and disjoint",
         centers,
-        radii: (0..300)
-            .map(|_| 0.01 + 0.4 * random.next().powi(4))
-            .collect(),
+        radii: (0..300).map(|_| 0.01 + 0.4 * random.next().powi(4)).collect(),
     }
 }
 
@@ -160,10 +148,7 @@ fn structures_and_kernels_agree_on_unions_to_the_bit() {
         let rays = rays(&scene, 200, 36);
         let of_all = |settings: &BuildSettings, level: SimdLevel| {
             let mut builder = TreeBuilder::new();
-            let settings = BuildSettings {
-                keep_indices: true,
-                ..*settings
-            };
+            let settings = BuildSettings { keep_indices: true, ..*settings };
             builder.build(&scene.spheres(), &settings);
             builder.tree_mut().set_simd(level);
             let view = builder.tree().view();
@@ -198,13 +183,9 @@ fn stored_spheres_form_a_union_as_stored() {
             let owned = OwnedLeaves::encode(&scene, positions, radii);
             let leaves = owned.leaves();
             let mut tree = StoredTree::new();
-            let settings = StoredSettings {
-                structure: Structure::Lbvh,
-                radius,
-                keep_indices: true,
-            };
-            tree.build(&leaves, settings)
-                .expect("nodes as they were made");
+            let settings =
+                StoredSettings { structure: Structure::Lbvh, radius, keep_indices: true };
+            tree.build(&leaves, settings).expect("nodes as they were made");
             let stored = owned.scene(scene.name, radius);
             let rays = rays(&stored, 200, 38);
             let view = tree.view(&leaves);
@@ -219,13 +200,7 @@ fn spheres_that_end_together_go_to_the_lower_index() {
     let scene = Scene::common("coincident", vec![Vec3::ZERO; 40], 1.0);
     for settings in all_settings() {
         let mut builder = TreeBuilder::new();
-        builder.build(
-            &scene.spheres(),
-            &BuildSettings {
-                keep_indices: true,
-                ..settings
-            },
-        );
+        builder.build(&scene.spheres(), &BuildSettings { keep_indices: true, ..settings });
         let view = builder.tree().view();
         let found = crossings(&view, &Ray::new(Vec3::new(-3.0, 0.1, 0.2), Vec3::X));
         let found: Vec<u32> = found.iter().map(|hit| view.particle(hit.slot)).collect();

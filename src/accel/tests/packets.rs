@@ -25,14 +25,8 @@ pub(super) enum Shape {
     Any,
 }
 
-pub(super) const SHAPES: [Shape; 6] = [
-    Shape::Camera,
-    Shape::Shadow,
-    Shape::Wide,
-    Shape::Inside,
-    Shape::Axis,
-    Shape::Any,
-];
+pub(super) const SHAPES: [Shape; 6] =
+    [Shape::Camera, Shape::Shadow, Shape::Wide, Shape::Inside, Shape::Axis, Shape::Any];
 
 /// 1 to 16 rays at a particle of `scene`.
 pub(super) fn packet(scene: &Scene, shape: Shape, random: &mut Random) -> RayPacket {
@@ -82,17 +76,11 @@ pub(super) fn packet(scene: &Scene, shape: Shape, random: &mut Random) -> RayPac
 pub(super) fn check_packet(tree: &TreeView, packet: &RayPacket, what: &str) -> usize {
     // The copy that is found depends on the leaves that were visited.
     let sphere = |slot| {
-        if tree.has_copies {
-            tree.particle(slot)
-        } else {
-            slot
-        }
+        if tree.has_copies { tree.particle(slot) } else { slot }
     };
     let bits = |hit: TreeHit| (hit.t.to_bits(), sphere(hit.slot));
-    let alone: Vec<_> = packet
-        .rays()
-        .map(|ray| (tree.nearest(&ray).map(bits), tree.any_hit(&ray)))
-        .collect();
+    let alone: Vec<_> =
+        packet.rays().map(|ray| (tree.nearest(&ray).map(bits), tree.any_hit(&ray))).collect();
     for coherence in [Coherence::Coherent, Coherence::Incoherent] {
         let mut hits = TreeHits::default();
         tree.nearest_lanes(packet, coherence, &mut hits);
@@ -101,15 +89,9 @@ pub(super) fn check_packet(tree: &TreeView, packet: &RayPacket, what: &str) -> u
             let (t, slot) = (hits.t[lane], hits.slot[lane]);
             let is_hit = slot != TreeHits::NO_SLOT;
             assert_eq!(is_hit, hits.mask() >> lane & 1 == 1);
-            let together = (
-                is_hit.then(|| bits(TreeHit { t, slot })),
-                occluded >> lane & 1 == 1,
-            );
+            let together = (is_hit.then(|| bits(TreeHit { t, slot })), occluded >> lane & 1 == 1);
             let expected = alone.get(lane).copied().unwrap_or((None, false));
-            assert_eq!(
-                together, expected,
-                "{what}, {coherence:?}, lane {lane} of {packet:?}"
-            );
+            assert_eq!(together, expected, "{what}, {coherence:?}, lane {lane} of {packet:?}");
         }
     }
     alone.iter().filter(|(hit, _)| hit.is_some()).count()
@@ -117,11 +99,7 @@ pub(super) fn check_packet(tree: &TreeView, packet: &RayPacket, what: &str) -> u
 
 /// The same tree with links.
 fn linked(tree: &WideTree) -> Vec<Link> {
-    let ends = tree
-        .level_starts
-        .iter()
-        .skip(1)
-        .map(|start| *start as usize);
+    let ends = tree.level_starts.iter().skip(1).map(|start| *start as usize);
     let ends = ends.chain([tree.nodes.len()]).take(tree.level_starts.len());
     let view = tree.view();
     let mut links = Vec::new();
@@ -143,10 +121,7 @@ fn packets_match_single_rays() {
     for scene in awkward_scenes() {
         for settings in all_settings() {
             for keep_indices in [true, false] {
-                let settings = BuildSettings {
-                    keep_indices,
-                    ..settings
-                };
+                let settings = BuildSettings { keep_indices, ..settings };
                 let mut builder = TreeBuilder::new();
                 builder.build(&scene.spheres(), &settings);
                 let mut hits = check_shapes(&scene, builder.tree_mut());
@@ -202,10 +177,7 @@ fn ties_in_a_packet_go_to_the_lower_index() {
     let mut packet = RayPacket::default();
     for lane in 0..PACKET_SIZE {
         let aim = Vec3::new(0.25, 0.2, 0.2 + 0.005 * lane as f32);
-        packet.push(&Ray::new(
-            Vec3::NEG_X * 5.0,
-            (aim + Vec3::X * 5.0).normalize(),
-        ));
+        packet.push(&Ray::new(Vec3::NEG_X * 5.0, (aim + Vec3::X * 5.0).normalize()));
     }
     for level in tested_levels() {
         builder.tree_mut().set_simd(level);

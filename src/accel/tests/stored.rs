@@ -15,11 +15,7 @@ use spherule_formats::blocks::{
 };
 
 fn settings(radius: Option<f32>) -> StoredSettings {
-    StoredSettings {
-        structure: Structure::Lbvh,
-        radius,
-        keep_indices: true,
-    }
+    StoredSettings { structure: Structure::Lbvh, radius, keep_indices: true }
 }
 
 /// Sets of `count` points: random, clustered, flat, coincident, tiny.
@@ -68,10 +64,7 @@ fn check_stored(owned: &OwnedLeaves, name: &'static str, radius: Option<f32>) ->
     let ray_count = (40_000 / scene.centers.len().max(1)).clamp(12, 60);
     let mut judged = 0;
     for keep_indices in [true, false] {
-        let settings = StoredSettings {
-            keep_indices,
-            ..settings(radius)
-        };
+        let settings = StoredSettings { keep_indices, ..settings(radius) };
         let report = tree.build(&leaves, settings).expect(name);
         assert_eq!(report.particles, owned.count);
         assert!(report.sah_cost >= 1.0 && report.file_bytes <= report.peak_bytes);
@@ -96,11 +89,7 @@ fn check_sets(count: usize) {
     for positions in Positions::ALL {
         let mut judged = 0;
         for (name, centers) in sets(count) {
-            let scene = Scene {
-                name,
-                radii: radii_of(&centers, name),
-                centers,
-            };
+            let scene = Scene { name, radii: radii_of(&centers, name), centers };
             for radii in Radii::ALL {
                 let owned = OwnedLeaves::encode(&scene, positions, radii);
                 let common = scene.radii.first().copied().unwrap_or(0.1);
@@ -148,11 +137,7 @@ impl TreeTask for LoadAll {
 #[test]
 fn spheres_of_slots_are_those_stored() {
     let centers = random_points(1025, 3);
-    let scene = Scene {
-        name: "random",
-        radii: radii_of(&centers, "random"),
-        centers,
-    };
+    let scene = Scene { name: "random", radii: radii_of(&centers, "random"), centers };
     for positions in Positions::ALL {
         for radii in [Radii::F32, Radii::U16, Radii::U8] {
             let owned = OwnedLeaves::encode(&scene, positions, radii);
@@ -171,10 +156,7 @@ fn spheres_of_slots_are_those_stored() {
             for slot in 0..1025 {
                 let (center, radius) = view.sphere(slot);
                 let index = slot as usize;
-                assert_eq!(
-                    (center, radius),
-                    (stored.centers[index], stored.radii[index])
-                );
+                assert_eq!((center, radius), (stored.centers[index], stored.radii[index]));
                 assert_eq!(view.particle(slot), slot);
             }
         }
@@ -187,8 +169,7 @@ fn stored_and_built_trees_agree() {
     let scene = Scene::common("cloud", random_points(20_000, 5), 0.02);
     let owned = OwnedLeaves::encode(&scene, Positions::F32, Radii::None);
     let mut tree = StoredTree::new();
-    tree.build(&owned.leaves(), settings(Some(0.02)))
-        .expect("sound");
+    tree.build(&owned.leaves(), settings(Some(0.02))).expect("sound");
     let view = tree.view(&owned.leaves());
     let stored = owned.scene("cloud", Some(0.02));
     let mut builder = TreeBuilder::new();
@@ -231,9 +212,7 @@ fn lowest_faulty_node_is_reported_for_any_threads() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         pool.expect("threads").install(|| {
             let mut tree = StoredTree::new();
-            let report = tree
-                .build(&owned.leaves(), settings(Some(0.1)))
-                .expect("sound");
+            let report = tree.build(&owned.leaves(), settings(Some(0.1))).expect("sound");
             (format!("{tree:?}"), report.sah_cost.to_bits())
         })
     });
@@ -242,11 +221,7 @@ fn lowest_faulty_node_is_reported_for_any_threads() {
 
 #[test]
 fn every_fault_has_its_message() {
-    let scene = Scene {
-        name: "cloud",
-        centers: random_points(1025, 2),
-        radii: vec![0.02; 1025],
-    };
+    let scene = Scene { name: "cloud", centers: random_points(1025, 2), radii: vec![0.02; 1025] };
     let good = OwnedLeaves::encode(&scene, Positions::Q10, Radii::U8);
     let mut tree = StoredTree::new();
     let mut fault_of = |change: &dyn Fn(&mut OwnedLeaves)| {
@@ -260,14 +235,8 @@ fn every_fault_has_its_message() {
         fault_of(&|owned| owned.count = 1 << 32),
         "4294967296 particles, but a tree holds fewer than 2^32"
     );
-    assert_eq!(
-        fault_of(&|owned| owned.count = 1024),
-        "9 nodes, should be 8"
-    );
-    assert_eq!(
-        fault_of(&|owned| owned.count = 1040 + 1),
-        "65 blocks, should be 66"
-    );
+    assert_eq!(fault_of(&|owned| owned.count = 1024), "9 nodes, should be 8");
+    assert_eq!(fault_of(&|owned| owned.count = 1040 + 1), "65 blocks, should be 66");
     assert_eq!(
         fault_of(&|owned| match &mut owned.radii {
             OwnedRadii::U8(codes) => codes.truncate(3),
@@ -298,12 +267,8 @@ fn every_fault_has_its_message() {
 }
 
 /// Leaves of no particles.
-const NOTHING: StoredLeaves = StoredLeaves {
-    count: 0,
-    nodes: &[],
-    blocks: StoredBlocks::F32(&[]),
-    radii: StoredRadii::None,
-};
+const NOTHING: StoredLeaves =
+    StoredLeaves { count: 0, nodes: &[], blocks: StoredBlocks::F32(&[]), radii: StoredRadii::None };
 
 /// Overwrites memory with noise.
 fn scramble<T: bytemuck::Pod>(values: &mut [T], seed: u64) {
@@ -352,11 +317,7 @@ fn trace_anything(owned: &OwnedLeaves, radius: Option<f32>) {
 fn noise_in_leaves_is_harmless() {
     for seed in 0..12 {
         let centers = random_points(1025, seed);
-        let scene = Scene {
-            name: "cloud",
-            radii: radii_of(&centers, "random"),
-            centers,
-        };
+        let scene = Scene { name: "cloud", radii: radii_of(&centers, "random"), centers };
         for positions in Positions::ALL {
             for radii in Radii::ALL {
                 let mut owned = OwnedLeaves::encode(&scene, positions, radii);

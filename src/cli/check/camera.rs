@@ -77,12 +77,7 @@ impl<'a> CameraSummary<'a> {
     }
 
     fn description(&self, frame: Option<i64>) -> String {
-        let CameraView {
-            eye,
-            look_at,
-            up,
-            fov,
-        } = self.view(frame);
+        let CameraView { eye, look_at, up, fov } = self.view(frame);
         let size = match self.projection {
             Projection::Perspective => format!("{fov} degrees"),
             Projection::Orthographic { height } => format!("orthographic, height {height:.4}"),

@@ -33,10 +33,7 @@ impl Check<'_> {
                 "too_large": self.too_large(),
             }),
         );
-        put(
-            "images",
-            self.tasks.iter().map(|t| json!(t.image)).collect(),
-        );
+        put("images", self.tasks.iter().map(|t| json!(t.image)).collect());
         put("directory", json!(self.render_job.dir()));
         let [width, height] = manifest.picture().size();
         let mut image = json!({
@@ -72,10 +69,7 @@ impl Check<'_> {
             }
             put("memory", memory);
         }
-        put(
-            "disk",
-            json!({"estimate": self.disk_bytes().map(whole), "free": self.free_disk}),
-        );
+        put("disk", json!({"estimate": self.disk_bytes().map(whole), "free": self.free_disk}));
         put(
             "time",
             json!({
@@ -98,18 +92,10 @@ impl Check<'_> {
             self.render_job.shown_output().display(),
             width,
             height,
-            manifest
-                .image
-                .part()
-                .map(|part| format!(", part {part:?}"))
-                .unwrap_or_default(),
+            manifest.image.part().map(|part| format!(", part {part:?}")).unwrap_or_default(),
             counted(manifest.image.samples as usize, "sample"),
             names.join(" "),
-            if manifest.output.has_previews() {
-                ", with previews"
-            } else {
-                ""
-            }
+            if manifest.output.has_previews() { ", with previews" } else { "" }
         ));
         if let Some((survey, setup)) = &self.setup {
             lines.push(format!(
@@ -170,9 +156,8 @@ impl Check<'_> {
 
     fn disk_line(&self) -> Option<String> {
         let needed = Bytes(whole(self.disk_bytes()?));
-        let free = self
-            .free_disk
-            .map_or_else(String::new, |free| format!(", {} are free", Bytes(free)));
+        let free =
+            self.free_disk.map_or_else(String::new, |free| format!(", {} are free", Bytes(free)));
         Some(format!("disk       about {needed}{free}"))
     }
 
@@ -212,19 +197,12 @@ fn channels(manifest: &Manifest) -> Vec<Cow<'static, str>> {
     let is_stored = |channel: &&Channel| {
         !output.path.is_png() || **channel == Channel::Named(NamedChannel::Rgba)
     };
-    output
-        .channels
-        .iter()
-        .filter(is_stored)
-        .map(Channel::name)
-        .collect()
+    output.channels.iter().filter(is_stored).map(Channel::name).collect()
 }
 
 fn structure(survey: &Survey, setup: &Setup) -> Structure {
     let has_values = setup.picture.color.is_by_particle();
-    setup
-        .build_settings(survey.most_particles, has_values)
-        .structure
+    setup.build_settings(survey.most_particles, has_values).structure
 }
 
 fn radius_json(setup: &Setup, survey: &Survey) -> Value {

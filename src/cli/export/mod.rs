@@ -123,13 +123,8 @@ impl ExportJob {
         }
         let inputs = (0..sequence.frames().len()).flat_map(|index| sequence.inputs(index));
         let lists = sequence.list_paths().iter().map(PathBuf::as_path);
-        let inputs: Vec<PathBuf> = inputs
-            .chain(lists)
-            .map(absolute)
-            .collect::<Result<_, _>>()?;
-        let out = requested
-            .absolute_base()?
-            .join(requested.manifest.output.path.dir());
+        let inputs: Vec<PathBuf> = inputs.chain(lists).map(absolute).collect::<Result<_, _>>()?;
+        let out = requested.absolute_base()?.join(requested.manifest.output.path.dir());
         let render_job = RenderJob::new(requested, &sequence, None)?;
         render_job.check_output_dir(ResumeMode::Resume)?;
         render_job.check_manifest_file()?;

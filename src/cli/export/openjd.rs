@@ -56,11 +56,7 @@ fn print_usage(args: &OpenjdArgs, export_job: &ExportJob, template_dir: &Path, p
         note!("its paths are relative to {}", template_dir.display());
     }
     let file = file.unwrap_or(Path::new("FILE"));
-    message!(
-        "try it with: openjd run {}{}",
-        file.display(),
-        options.concat()
-    );
+    message!("try it with: openjd run {}{}", file.display(), options.concat());
 }
 
 /// A path of the job, and its parameter in the template.
@@ -95,13 +91,7 @@ fn job_paths(export_job: &ExportJob, template_dir: &Path) -> Result<Vec<JobPath>
         })
     };
     let manifest = "The manifest of the job.";
-    let mut all = vec![job_path(
-        "Manifest",
-        manifest,
-        &export_job.manifest_file,
-        false,
-        false,
-    )?];
+    let mut all = vec![job_path("Manifest", manifest, &export_job.manifest_file, false, false)?];
     if let Some(dir) = &export_job.input_dir {
         let input = "Directory of the particles. Hosts read them from the path in the manifest. Farms that copy \
                      files copy this directory.";
@@ -165,11 +155,7 @@ fn template<'a>(
                 _ => None,
             },
             cpus: args.cpus,
-            memory: args
-                .common
-                .mem
-                .or(export_job.memory_limit)
-                .map(|size| size.0),
+            memory: args.common.mem.or(export_job.memory_limit).map(|size| size.0),
         },
     })
 }

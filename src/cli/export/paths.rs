@@ -11,11 +11,7 @@ pub(super) fn normalized(path: &Path) -> PathBuf {
     let plain = manifest::without_dots(path);
     // `..` after a link leads to another directory
     let real = real_dir(path);
-    if real_dir(&plain) == real {
-        plain
-    } else {
-        real
-    }
+    if real_dir(&plain) == real { plain } else { real }
 }
 
 /// The common ancestor directory of all `files`; None if it is the root.
@@ -42,27 +38,16 @@ pub(super) fn inside(path: &Path, dir: &Path) -> Option<PathBuf> {
     let relative = match path.strip_prefix(dir) {
         Ok(relative) => relative.to_owned(),
         // The paths may contain different links
-        Err(_) => named_place(path)
-            .strip_prefix(real_dir(dir))
-            .ok()?
-            .to_owned(),
+        Err(_) => named_place(path).strip_prefix(real_dir(dir)).ok()?.to_owned(),
     };
-    Some(if relative.as_os_str().is_empty() {
-        ".".into()
-    } else {
-        relative
-    })
+    Some(if relative.as_os_str().is_empty() { ".".into() } else { relative })
 }
 
 /// The name of a job in a queue: that of the manifest, or of its directory if the manifest is `job.toml`.
 pub(super) fn job_name(manifest: &Path) -> String {
     let stem = manifest.file_stem().unwrap_or_default();
     let dir = manifest.parent().and_then(Path::file_name);
-    let name = if stem == "job" {
-        dir.unwrap_or(stem)
-    } else {
-        stem
-    };
+    let name = if stem == "job" { dir.unwrap_or(stem) } else { stem };
     name.to_string_lossy().into_owned()
 }
 
@@ -94,10 +79,7 @@ mod tests {
             common_dir(&files)
         };
         assert_eq!(common(&["/a/b/1.vtk", "/a/b/2.vtk"]), Some("/a/b".into()));
-        assert_eq!(
-            common(&["/a/b/1", "/a/bc/1", "/a/b/c/2"]),
-            Some("/a".into())
-        );
+        assert_eq!(common(&["/a/b/1", "/a/bc/1", "/a/b/c/2"]), Some("/a".into()));
         assert_eq!(common(&["/a/1", "/b/1"]), None);
         assert_eq!(common(&[]), None);
     }
@@ -112,10 +94,7 @@ mod tests {
         let dir = temporary.path().canonicalize().unwrap();
         std::fs::create_dir(dir.join("real")).unwrap();
         std::os::unix::fs::symlink(dir.join("real"), dir.join("link")).unwrap();
-        assert_eq!(
-            inside(&dir.join("real/x"), &dir.join("link")),
-            Some("x".into())
-        );
+        assert_eq!(inside(&dir.join("real/x"), &dir.join("link")), Some("x".into()));
     }
 
     #[test]

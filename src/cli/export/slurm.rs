@@ -61,10 +61,7 @@ pub(super) fn run(args: &SlurmArgs) -> Result<Outcome, CliError> {
     match &args.common.output {
         // Without the directory the tasks fail without a message
         Some(_) => fs::create_dir_all(&logs).map_err(CliError::io(&logs))?,
-        None => message!(
-            "note: before you submit the script: mkdir -p '{}'",
-            logs.display()
-        ),
+        None => message!("note: before you submit the script: mkdir -p '{}'", logs.display()),
     }
     write_output(&args.common, &script)?;
     message!("{}", export_job.chunks);
@@ -86,12 +83,7 @@ fn script(args: &SlurmArgs, export_job: &ExportJob, logs: &str) -> Result<String
         command: FrameCommand {
             program: text(&export_job.program)?,
             variable: "SPHERULE",
-            arguments: &[
-                "render",
-                text(&export_job.manifest_file)?,
-                "--grace",
-                &grace,
-            ],
+            arguments: &["render", text(&export_job.manifest_file)?, "--grace", &grace],
             // Use the smaller one of both limits
             limit_memory: limit.is_none_or(|limit| requested.is_some_and(|size| size <= limit)),
         },

@@ -145,11 +145,7 @@ impl InspectedList {
         Some(Self {
             path: path.to_owned(),
             summary: sequence.list_summary()?.clone(),
-            parts: parts
-                .iter()
-                .filter(|part| !part.is_empty())
-                .cloned()
-                .collect(),
+            parts: parts.iter().filter(|part| !part.is_empty()).cloned().collect(),
             times: steps.map(|index| sequence.listed_time(index)).collect(),
         })
     }
@@ -159,10 +155,8 @@ impl InspectedList {
 fn expand(args: &InspectArgs) -> Vec<Meant> {
     let mut all = Vec::new();
     let mut known = HashSet::new();
-    let settings = SequenceSettings {
-        budget: read_budget(None, None),
-        follow_links: args.follow_links,
-    };
+    let settings =
+        SequenceSettings { budget: read_budget(None, None), follow_links: args.follow_links };
     for argument in &args.files {
         if is_manifest(argument) && argument.is_file() {
             let why = format!(
@@ -175,10 +169,7 @@ fn expand(args: &InspectArgs) -> Vec<Meant> {
         match SequenceInput::from_path(argument) {
             SequenceInput::Files(listed) if !listed.iter().any(|file| stands_for_others(file)) => {
                 for file in listed {
-                    let place = FramePlace {
-                        number: lone_frame_number(&file),
-                        time: None,
-                    };
+                    let place = FramePlace { number: lone_frame_number(&file), time: None };
                     known.insert(file.clone());
                     all.push(Meant::File(file, place));
                 }
@@ -240,11 +231,7 @@ fn inspect(
             verify(file.bytes()).map_err(|e| e.in_file(path))?;
         }
         inspected.verified = args.verify;
-        let printed = if args.json {
-            inspected.print(true)
-        } else {
-            lines.print(&inspected)
-        };
+        let printed = if args.json { inspected.print(true) } else { lines.print(&inspected) };
         match printed {
             Ok(Reader::Listening) => {}
             ended => return Ok(ended),
@@ -320,22 +307,16 @@ fn read<'a>(
     let mut stats = contents.stats;
     let step = &file.steps()[index];
     let running = i64::try_from(index).ok();
-    let number = if file.steps().len() > 1 {
-        running
-    } else {
-        number
-    };
+    let number = if file.steps().len() > 1 { running } else { number };
     // A native frame comes here packed by gzip.
-    let native = (file.format() == FORMAT)
-        .then(|| layout::parse(file.bytes()).ok())
-        .flatten();
+    let native = (file.format() == FORMAT).then(|| layout::parse(file.bytes()).ok()).flatten();
     let all = stats.count + stats.dropped;
     stats.dropped += native.as_ref().map_or(0, |index| index.dropped);
     let share = match file.steps().len() {
         1 => 1.0,
-        _ => step.byte_range().map_or(1.0, |range| {
-            range.len() as f64 / file.unpacked_len().max(1) as f64
-        }),
+        _ => step
+            .byte_range()
+            .map_or(1.0, |range| range.len() as f64 / file.unpacked_len().max(1) as f64),
     };
     let stored = file.stored_len() as f64 * share;
     Ok(Inspected {

@@ -67,13 +67,7 @@ fn summarise(file: &NativeFile, verify: bool) -> Result<(FrameStats, Option<usiz
         (false, true) => Ok(()),
         (false, false) => frame.verify(),
     };
-    let raw = checked.and_then(|()| {
-        if is_large {
-            frame.sample(SAMPLE)
-        } else {
-            frame.to_raw()
-        }
-    });
+    let raw = checked.and_then(|()| if is_large { frame.sample(SAMPLE) } else { frame.to_raw() });
     let raw = raw.map_err(|e| e.in_file(file.path()))?;
     let mut stats = FrameStats::of(&raw);
     stats.dropped += index.dropped;
@@ -117,11 +111,7 @@ struct Parts {
 
 impl NativeFacts {
     pub(super) const fn new(index: FrameIndex, bytes: u64, sample: Option<usize>) -> Self {
-        Self {
-            index,
-            bytes,
-            sample,
-        }
+        Self { index, bytes, sample }
     }
 
     fn parts(&self) -> Parts {
@@ -225,10 +215,7 @@ impl NativeFacts {
             format!(
                 "  version {VERSION}, k-d order, {blocks} blocks of {BLOCK_SIZE} ({wide} kept as f32), {nodes} nodes"
             ),
-            format!(
-                "  largest error {:e}, origin {:?}",
-                index.max_error, index.origin
-            ),
+            format!("  largest error {:e}, origin {:?}", index.max_error, index.origin),
         ];
         lines.extend(index.step.map(|step| format!("  step {step}")));
         lines.extend(self.bytes_lines());
@@ -239,16 +226,12 @@ impl NativeFacts {
         }
         if let RadiusIndex::PerParticle(radii) = &index.radius {
             let (stored, error) = (radius_name(radii.code), radii.max_error);
-            lines.push(format!(
-                "  radii stored as {stored}, largest error {error:e}"
-            ));
+            lines.push(format!("  radii stored as {stored}, largest error {error:e}"));
         }
         for attribute in &index.attributes {
             let (name, stored) = (&attribute.name, stored_name(attribute.stored));
             let error = attribute.max_error;
-            lines.push(format!(
-                "  {name} stored as {stored}, largest error {error:e}"
-            ));
+            lines.push(format!("  {name} stored as {stored}, largest error {error:e}"));
         }
         lines
     }

@@ -23,10 +23,7 @@ impl InspectedList {
                 "times": self.times,
             }));
         }
-        let mut lines = vec![
-            self.path.display().to_string(),
-            format!("  {}", self.summary),
-        ];
+        let mut lines = vec![self.path.display().to_string(), format!("  {}", self.summary)];
         if !self.parts.is_empty() {
             lines.push(format!("  parts {}", self.parts.join(", ")));
         }
@@ -37,11 +34,7 @@ impl InspectedList {
 impl Inspected<'_> {
     /// Prints one line of JSON, or several for people.
     pub(super) fn print(&self, as_json: bool) -> Result<Reader, CliError> {
-        if as_json {
-            print::json(&self.to_json())
-        } else {
-            print::lines(self.to_lines())
-        }
+        if as_json { print::json(&self.to_json()) } else { print::lines(self.to_lines()) }
     }
 
     fn to_json(&self) -> Value {
@@ -107,9 +100,7 @@ impl Inspected<'_> {
         });
         lines.extend(stats.attributes.iter().map(attribute_line));
         if let Some(sample) = self.native.as_ref().and_then(|native| native.sample) {
-            lines.push(format!(
-                "  values of attributes are from a sample of {sample} particles"
-            ));
+            lines.push(format!("  values of attributes are from a sample of {sample} particles"));
         }
         lines.extend(self.notes.iter().map(|note| format!("  note: {note}")));
         if self.verified {

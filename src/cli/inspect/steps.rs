@@ -35,9 +35,7 @@ impl StepShape {
         Self {
             count: step.stats.count,
             dropped: step.stats.dropped,
-            attributes: attributes
-                .map(|a| (a.name.clone(), a.components.len()))
-                .collect(),
+            attributes: attributes.map(|a| (a.name.clone(), a.components.len())).collect(),
             has_cell: step.cell.is_some(),
         }
     }
@@ -46,12 +44,7 @@ impl StepShape {
 impl StepLines {
     /// For a file of `count` steps.
     pub(super) const fn new(count: usize) -> Self {
-        Self {
-            count,
-            seen: 0,
-            shape: None,
-            skipped: 0,
-        }
+        Self { count, seen: 0, shape: None, skipped: 0 }
     }
 
     /// Prints the next step, unless it is like the one before and in the middle of many.

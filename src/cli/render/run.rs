@@ -53,29 +53,22 @@ impl Run {
             run.render_job().shown_output(),
         );
         report_kept(run.job(), task_count);
-        Ok(Self {
-            run,
-            progress,
-            start: Instant::now(),
-            task_count,
-        })
+        Ok(Self { run, progress, start: Instant::now(), task_count })
     }
 
     /// Renders the pending frames.
     pub(super) fn render_pending(&mut self, interrupt: &Interrupt) -> Result<(), RunError> {
         let progress = &self.progress;
-        self.run
-            .render_pending(interrupt, &|event| progress.show(&event))
+        self.run.render_pending(interrupt, &|event| progress.show(&event))
     }
 
     /// Renders the pending frames, and then those that `follower` finds.
     pub(super) fn follow(&mut self, follower: &mut Follower<'_>) -> Result<FollowEnd, RunError> {
         let (progress, task_count) = (&self.progress, &mut self.task_count);
-        self.run
-            .follow(follower, &|event| progress.show(&event), |count| {
-                progress.add_frames(count);
-                *task_count += count;
-            })
+        self.run.follow(follower, &|event| progress.show(&event), |count| {
+            progress.add_frames(count);
+            *task_count += count;
+        })
     }
 
     /// Writes and prints the reports. `result` is the error that ended the run, if any.

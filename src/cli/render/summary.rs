@@ -73,10 +73,7 @@ pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup:
     }
     if let (pipeline::ColorRule::Rgb { name, .. }, Some(rgb)) = (&setup.picture.color, &survey.rgb)
     {
-        message!(
-            "colour by the RGB attribute `{name}` ({})",
-            rgb.encoding.name()
-        );
+        message!("colour by the RGB attribute `{name}` ({})", rgb.encoding.name());
     }
     if let Some(text) = small_text(setup) {
         note!("{text}");
@@ -105,10 +102,9 @@ fn view_options(setup: &Setup) -> Option<String> {
     );
     match setup.picture.projection {
         Projection::Perspective => Some(format!("{place} --set camera.fov={}", short(view.fov))),
-        Projection::Orthographic { height } => Some(format!(
-            "{place} --projection orthographic --set camera.height={}",
-            short(height)
-        )),
+        Projection::Orthographic { height } => {
+            Some(format!("{place} --projection orthographic --set camera.height={}", short(height)))
+        }
         Projection::Equirectangular => None,
     }
 }

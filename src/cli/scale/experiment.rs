@@ -64,12 +64,7 @@ impl Experiment {
             source = Source::Frame(survey.source);
             stage = survey.stage;
         }
-        Ok(Self {
-            settings,
-            structures,
-            source,
-            stage,
-        })
+        Ok(Self { settings, structures, source, stage })
     }
 
     /// The cells in the order in which they run: the slowest ones last.
@@ -109,11 +104,8 @@ fn check_pairs(
     structures: &[Structure],
     representations: &[Representation],
 ) -> Result<(), CliError> {
-    let in_place: Vec<&str> = representations
-        .iter()
-        .filter(|r| r.encoding().is_some())
-        .map(|r| r.name())
-        .collect();
+    let in_place: Vec<&str> =
+        representations.iter().filter(|r| r.encoding().is_some()).map(|r| r.name()).collect();
     let goes = |s: &Structure| representations.iter().all(|r| r.goes_with(*s));
     let names = in_place.join(", ");
     if in_place.is_empty() || structures.iter().all(goes) {
@@ -173,10 +165,7 @@ fn at_most(available: usize, requested: &[usize]) -> Vec<usize> {
         requested.iter().partition(|count| **count <= available);
     if !above.is_empty() {
         let above: Vec<String> = above.iter().map(usize::to_string).collect();
-        note!(
-            "the input has {available} particles, which replace {}",
-            above.join(", ")
-        );
+        note!("the input has {available} particles, which replace {}", above.join(", "));
         if !fit.contains(&available) {
             fit.push(available);
         }

@@ -54,10 +54,7 @@ impl Frames {
                 remove(&self.dir);
                 match self.make(request, interrupt) {
                     ChildResult::Completed(made) => Now { key, made },
-                    ChildResult::Crashed(crash) => Now {
-                        key,
-                        made: Err(crash.to_string()),
-                    },
+                    ChildResult::Crashed(crash) => Now { key, made: Err(crash.to_string()) },
                     ChildResult::Interrupted => return ChildResult::Interrupted,
                 }
             }
@@ -71,10 +68,7 @@ impl Frames {
             return ChildResult::Completed(Err(format!("{dir}: {e}")));
         }
         let path = self.dir.join(FILE);
-        let task = Task::Convert {
-            request: request.clone(),
-            path: path.clone(),
-        };
+        let task = Task::Convert { request: request.clone(), path: path.clone() };
         let ended: ChildResult<Result<_, String>> = run_child(&task, || interrupt.is_raised());
         match ended {
             ChildResult::Completed(made) => {

@@ -44,7 +44,5 @@ fn do_task(task: &Task) -> Result<Value, String> {
             cell::measure(request, file.as_deref()).map(serde_json::to_value)
         }
     };
-    result
-        .map_err(|e| e.to_string())?
-        .map_err(|e| e.to_string())
+    result.map_err(|e| e.to_string())?.map_err(|e| e.to_string())
 }

@@ -94,13 +94,7 @@ pub(super) struct ScaleArgs {
     )]
     frame: Option<i64>,
     /// Directory for scale.json, scale.csv and scale.html.
-    #[arg(
-        short,
-        long,
-        value_name = "DIR",
-        default_value = "scale",
-        help_heading = "Output"
-    )]
+    #[arg(short, long, value_name = "DIR", default_value = "scale", help_heading = "Output")]
     output: PathBuf,
     /// Threads to use [default: all]; at most 4 per processor are used.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_THREADS)), help_heading = "Job")]
@@ -110,10 +104,8 @@ pub(super) struct ScaleArgs {
     progress: ProgressMode,
 }
 
-const SIGNAL_MESSAGES: signals::SignalMessages = signals::SignalMessages {
-    stopping: "stopping; finished cells are kept",
-    stopped: "stopped",
-};
+const SIGNAL_MESSAGES: signals::SignalMessages =
+    signals::SignalMessages { stopping: "stopping; finished cells are kept", stopped: "stopped" };
 
 pub(super) fn run(args: &ScaleArgs) -> Result<Outcome, CliError> {
     let signals = signals::listen(SIGNAL_MESSAGES)?;
@@ -132,18 +124,12 @@ pub(super) fn run(args: &ScaleArgs) -> Result<Outcome, CliError> {
     };
     message!("{}", table::subject(&report));
     let output = args.output.display().to_string();
-    events::send(
-        "start",
-        json!({"command": "scale", "total": cells.len(), "output": output}),
-    );
+    events::send("start", json!({"command": "scale", "total": cells.len(), "output": output}));
     let ended = measure_all(&cells, &mut report, args, signals.start_work());
     if report.cells.is_empty() {
         return Ok(Outcome::Interrupted);
     }
-    let failed: Vec<String> = report
-        .failed()
-        .map(|(cell, _)| table::cell_name(cell))
-        .collect();
+    let failed: Vec<String> = report.failed().map(|(cell, _)| table::cell_name(cell)).collect();
     events::add_to_end(json!({
         "done": report.cells.len() - failed.len(),
         "total": report.planned,
@@ -225,10 +211,7 @@ fn measure_one(
             }
         }
     }
-    let task = Task::Measure {
-        request: request.clone(),
-        file: made.map(|(path, _)| path.clone()),
-    };
+    let task = Task::Measure { request: request.clone(), file: made.map(|(path, _)| path.clone()) };
     let stop = || interrupt.is_raised();
     let measured: Result<CellMeasurement, String> = match measure::run_child(&task, stop) {
         ChildResult::Interrupted => return ChildResult::Interrupted,
@@ -307,10 +290,7 @@ impl Progress {
             CellOutcome::Done(_) => "cell_done",
             CellOutcome::Failed { .. } => "cell_failed",
         };
-        events::send(
-            event,
-            json!({"cell": cell, "done": done, "total": self.total}),
-        );
+        events::send(event, json!({"cell": cell, "done": done, "total": self.total}));
         let summary = match &cell.outcome {
             CellOutcome::Done(measured) => table::line(measured),
             CellOutcome::Failed { reason } => {
@@ -319,11 +299,9 @@ impl Progress {
             }
         };
         match self.mode {
-            ProgressMode::Auto | ProgressMode::Plain => message!(
-                "[{done}/{}] {name}: {summary}, {} left",
-                self.total,
-                self.remaining(done)
-            ),
+            ProgressMode::Auto | ProgressMode::Plain => {
+                message!("[{done}/{}] {name}: {summary}, {} left", self.total, self.remaining(done))
+            }
             ProgressMode::Openjd => openjd(done, self.total, &format!("{name}: {summary}")),
             ProgressMode::Json | ProgressMode::None => {}
         }

@@ -38,13 +38,10 @@ pub(super) fn representation(text: &str) -> Result<Representation, ValueError> {
 }
 
 fn one_of<T: Copy>(all: &[T], name: fn(T) -> &'static str, text: &str) -> Result<T, ValueError> {
-    all.iter()
-        .copied()
-        .find(|t| name(*t) == text)
-        .ok_or_else(|| {
-            let known: Vec<&str> = all.iter().copied().map(name).collect();
-            ValueError::one_of(&known, text).with_similar(nearest(text, &known))
-        })
+    all.iter().copied().find(|t| name(*t) == text).ok_or_else(|| {
+        let known: Vec<&str> = all.iter().copied().map(name).collect();
+        ValueError::one_of(&known, text).with_similar(nearest(text, &known))
+    })
 }
 
 #[cfg(test)]
@@ -70,11 +67,6 @@ mod tests {
             assert!(seconds(wrong).is_err(), "{wrong}");
         }
         assert_eq!(particles("1e6"), Ok(1_000_000));
-        assert!(
-            particles("4294967296")
-                .unwrap_err()
-                .expected
-                .contains("2^32")
-        );
+        assert!(particles("4294967296").unwrap_err().expected.contains("2^32"));
     }
 }

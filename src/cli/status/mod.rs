@@ -69,12 +69,7 @@ impl JobSnapshot {
         let Some(state) = Job::read(dir)? else {
             return Err(no_job(dir));
         };
-        Ok(Self {
-            dir: dir.to_owned(),
-            summary: state.summary(),
-            state,
-            workers,
-        })
+        Ok(Self { dir: dir.to_owned(), summary: state.summary(), state, workers })
     }
 
     /// Workers that have not certainly ended.
@@ -85,17 +80,12 @@ impl JobSnapshot {
     /// Frames of the plan in this state.
     fn frames(&self, state: FrameState) -> Vec<i64> {
         let numbers = self.state.plan().frames().iter().map(|f| f.number);
-        numbers
-            .filter(|frame| self.state.frame_state(*frame) == Some(state))
-            .collect()
+        numbers.filter(|frame| self.state.frame_state(*frame) == Some(state)).collect()
     }
 
     /// Frames that living workers are working on, ascending.
     fn running(&self) -> Vec<i64> {
-        let mut frames: Vec<i64> = self
-            .living_workers()
-            .flat_map(|w| w.frames.clone())
-            .collect();
+        let mut frames: Vec<i64> = self.living_workers().flat_map(|w| w.frames.clone()).collect();
         frames.retain(|frame| self.state.frame_state(*frame) != Some(FrameState::Done));
         frames.sort_unstable();
         frames

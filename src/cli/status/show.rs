@@ -86,9 +86,7 @@ fn worker_line(worker: &WorkerStatus) -> String {
     let liveness = if worker.has_ended {
         "has died; the next worker takes over".to_owned()
     } else {
-        let seconds = worker
-            .since_heartbeat
-            .map_or(0.0, |time| time.as_secs_f64());
+        let seconds = worker.since_heartbeat.map_or(0.0, |time| time.as_secs_f64());
         format!("last heartbeat {} ago", duration(seconds))
     };
     format!("{process}: {work}, {liveness}")

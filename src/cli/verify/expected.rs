@@ -68,9 +68,7 @@ impl ExpectedOutput {
             }
             // Settings have the groups only if there are layers for them
             let is_group = |key: &str| {
-                let light = key
-                    .strip_prefix("light.")
-                    .and_then(|key| key.split_once('.'));
+                let light = key.strip_prefix("light.").and_then(|key| key.split_once('.'));
                 key == "environment.group" || light.is_some_and(|(_, name)| name == "group")
             };
             let keys = settings.iter().filter(|(key, _)| is_group(key));
@@ -169,27 +167,17 @@ mod tests {
         let expected = ImageShape {
             width: 105,
             height: 40,
-            window: DataWindow {
-                left: -5,
-                top: 10,
-                image: [1920, 1080],
-            },
+            window: DataWindow { left: -5, top: 10, image: [1920, 1080] },
             ..shape.clone()
         };
-        assert_eq!(
-            ExpectedOutput::of_settings(&part),
-            Ok(ExpectedOutput::Images(expected))
-        );
+        assert_eq!(ExpectedOutput::of_settings(&part), Ok(ExpectedOutput::Images(expected)));
         for wrong in ["[1, 2, 3]", "[1, 2, 1, 4]", "7"] {
             set(&mut part, "image.crop", wrong);
             let error = ExpectedOutput::of_settings(&part).unwrap_err();
             assert_eq!(error.key, "image.crop", "{wrong}");
         }
         settings.retain(|(key, _)| key != "image.overscan");
-        assert_eq!(
-            ExpectedOutput::of_settings(&settings),
-            Ok(ExpectedOutput::Images(shape))
-        );
+        assert_eq!(ExpectedOutput::of_settings(&settings), Ok(ExpectedOutput::Images(shape)));
         settings.retain(|(key, _)| key != "image.width");
         assert!(ExpectedOutput::of_settings(&settings).is_err());
     }
@@ -197,9 +185,6 @@ mod tests {
     #[test]
     fn outputs_of_a_conversion() {
         let settings = [(KIND.to_owned(), "convert".to_owned())];
-        assert_eq!(
-            ExpectedOutput::of_settings(&settings),
-            Ok(ExpectedOutput::Frames)
-        );
+        assert_eq!(ExpectedOutput::of_settings(&settings), Ok(ExpectedOutput::Frames));
     }
 }

@@ -103,9 +103,7 @@ pub(super) fn run(args: &VerifyArgs) -> Result<Outcome, CliError> {
     let mut verdicts = Vec::with_capacity(frames.len());
     let mut damaged = Vec::new();
     for chunk in frames.chunks(FRAMES_PER_THREAD * rayon::current_num_threads()) {
-        let checked = chunk
-            .par_iter()
-            .map(|frame| check_frame(&state, frame, &expected));
+        let checked = chunk.par_iter().map(|frame| check_frame(&state, frame, &expected));
         let checked: Vec<FrameVerdict> = checked.collect();
         let reader = print::lines(checked.iter().flat_map(|f| f.lines(args.json)))?;
         damaged.extend(checked.iter().filter_map(FrameVerdict::damage));
@@ -123,11 +121,7 @@ pub(super) fn run(args: &VerifyArgs) -> Result<Outcome, CliError> {
         message!("error: {error}");
     }
     let is_bad = |(_, verdict): &(i64, Verdict)| *verdict >= Verdict::Length;
-    Ok(if verdicts.iter().any(is_bad) {
-        Outcome::SomeFailed
-    } else {
-        Outcome::Done
-    })
+    Ok(if verdicts.iter().any(is_bad) { Outcome::SomeFailed } else { Outcome::Done })
 }
 
 /// Requeues damaged frames.
@@ -137,10 +131,7 @@ fn requeue(state: &JobState, damaged: &[(i64, String)]) -> Result<(), CliError> 
     }
     let requeued = Job::requeue(state, damaged)?;
     if !requeued.is_empty() {
-        message!(
-            "requeued: {}; the next run of the job repeats them",
-            list(&requeued)
-        );
+        message!("requeued: {}; the next run of the job repeats them", list(&requeued));
     }
     Ok(())
 }
@@ -163,14 +154,10 @@ fn check_frame(
         }
         Some(entry) => {
             let outputs = planned.outputs.iter();
-            let files: Vec<FileVerdict> = outputs
-                .map(|path| check_file(state.dir(), path, entry, expected))
-                .collect();
+            let files: Vec<FileVerdict> =
+                outputs.map(|path| check_file(state.dir(), path, entry, expected)).collect();
             let worst = files.iter().map(|f| f.verdict).max();
-            FrameVerdict {
-                files,
-                ..without_files(worst.unwrap_or(Verdict::Sound), None)
-            }
+            FrameVerdict { files, ..without_files(worst.unwrap_or(Verdict::Sound), None) }
         }
     }
 }
@@ -189,11 +176,7 @@ fn check_file(
             Err(error) => (Verdict::Damaged, Some(error.reason(&file))),
         },
     };
-    FileVerdict {
-        path: path.to_owned(),
-        verdict,
-        reason,
-    }
+    FileVerdict { path: path.to_owned(), verdict, reason }
 }
 
 /// The path of the file, if it exists and has the recorded length.
@@ -249,9 +232,7 @@ fn decode(file: &Path, expected: &ExpectedOutput) -> Result<(), DecodeError> {
         ExpectedOutput::Images(shape) => shape,
     };
     let reader = BufReader::with_capacity(1 << 16, File::open(file)?);
-    let is_preview = file
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("png"));
+    let is_preview = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"));
     if is_preview {
         verify_preview(reader, shape)?;
     } else {
@@ -263,9 +244,7 @@ fn decode(file: &Path, expected: &ExpectedOutput) -> Result<(), DecodeError> {
 /// The same check as `inspect --verify`.
 fn decode_native(path: &Path) -> Result<(), FrameError> {
     let file = NativeFile::open(path, Access::Map)?;
-    let verified = file
-        .frame()
-        .and_then(|frame| frame.verify_all().map_err(|e| e.in_file(path)));
+    let verified = file.frame().and_then(|frame| frame.verify_all().map_err(|e| e.in_file(path)));
     // A change of the file meanwhile explains any other error
     file.check()?;
     verified

@@ -31,14 +31,9 @@ impl Value for FitSetting {
             Some(ALL) => Ok(Self::All),
             Some(THIS) => Ok(Self::This),
             Some(text) => {
-                let percent = text
-                    .strip_suffix('%')
-                    .and_then(|text| text.trim().parse().ok());
+                let percent = text.strip_suffix('%').and_then(|text| text.trim().parse().ok());
                 let usable = |percent: &f64| (50.0..=100.0).contains(percent);
-                percent
-                    .filter(usable)
-                    .map(Self::Percent)
-                    .ok_or(Fault::Unwanted)
+                percent.filter(usable).map(Self::Percent).ok_or(Fault::Unwanted)
             }
             None => Err(Fault::Unwanted),
         }
@@ -88,10 +83,7 @@ impl Value for BoxSetting {
             let what = "has no extent: its corners are equal".to_owned();
             return Err(Fault::Because(what));
         }
-        Ok(Self {
-            min: a.min(b),
-            max: a.max(b),
-        })
+        Ok(Self { min: a.min(b), max: a.max(b) })
     }
 
     fn toml(&self) -> String {

@@ -110,9 +110,7 @@ impl Camera {
             // The up direction is undefined for a view straight down; one degree makes no visible difference
             None => [
                 self.azimuth.unwrap_or(DEFAULT_AZIMUTH),
-                self.elevation
-                    .unwrap_or(DEFAULT_ELEVATION)
-                    .clamp(-89.0, 89.0),
+                self.elevation.unwrap_or(DEFAULT_ELEVATION).clamp(-89.0, 89.0),
             ],
         }
     }
@@ -128,8 +126,7 @@ impl Camera {
 
     /// Whether there is depth of field.
     fn has_lens(&self) -> bool {
-        self.aperture
-            .map_or(self.f_stop > 0.0, |aperture| aperture > 0.0)
+        self.aperture.map_or(self.f_stop > 0.0, |aperture| aperture > 0.0)
     }
 
     /// Checks that projection, view and stereo fit together and to the other keys.
@@ -145,15 +142,8 @@ impl Camera {
                 section.wrong("fov", &format!("is given, but {instead}; remove it"));
             }
             if self.has_lens() {
-                let key = if self.aperture.is_some() {
-                    "aperture"
-                } else {
-                    "f_stop"
-                };
-                section.wrong(
-                    key,
-                    "is given, but only perspective has depth of field; remove it",
-                );
+                let key = if self.aperture.is_some() { "aperture" } else { "f_stop" };
+                section.wrong(key, "is given, but only perspective has depth of field; remove it");
             }
         }
         if self.height.is_some() && self.projection != ProjectionKind::Orthographic {
@@ -202,16 +192,10 @@ impl Camera {
         if !self.stereo {
             for (key, is_given) in [
                 ("eye_distance", self.eye_distance.is_some()),
-                (
-                    "convergence",
-                    self.convergence != ConvergenceSetting::DEFAULT,
-                ),
+                ("convergence", self.convergence != ConvergenceSetting::DEFAULT),
             ] {
                 if is_given {
-                    section.wrong(
-                        key,
-                        "is given, but there is only one eye; set stereo = true",
-                    );
+                    section.wrong(key, "is given, but there is only one eye; set stereo = true");
                 }
             }
             return;
@@ -364,26 +348,14 @@ mod tests {
     fn cameras_have_a_projection() {
         let (plain, _) = read("").unwrap();
         assert_eq!(plain.camera.projection, ProjectionKind::Perspective);
-        assert_eq!(
-            plain.camera.angles(DVec3::Z),
-            [DEFAULT_AZIMUTH, DEFAULT_ELEVATION]
-        );
+        assert_eq!(plain.camera.angles(DVec3::Z), [DEFAULT_AZIMUTH, DEFAULT_ELEVATION]);
         assert_eq!(plain.picture(), plain.image);
         for (rest, size) in [
             ("projection = \"orthographic\"\nheight = 2", [1920, 1080]),
-            (
-                "projection = \"orthographic\"\nheight = \"auto\"\nview = \"top\"",
-                [1920, 1080],
-            ),
+            ("projection = \"orthographic\"\nheight = \"auto\"\nview = \"top\"", [1920, 1080]),
             ("stereo = true", [3840, 1080]),
-            (
-                "stereo = true\neye_distance = 2\nconvergence = \"parallel\"",
-                [3840, 1080],
-            ),
-            (
-                "stereo = true\nprojection = \"equirectangular\"\neye_distance = 2",
-                [1920, 2160],
-            ),
+            ("stereo = true\neye_distance = 2\nconvergence = \"parallel\"", [3840, 1080]),
+            ("stereo = true\nprojection = \"equirectangular\"\neye_distance = 2", [1920, 2160]),
         ] {
             let (manifest, _) = read(&format!("[camera]\n{rest}")).unwrap();
             assert_eq!(manifest.picture().size(), size, "{rest}");
@@ -410,61 +382,38 @@ mod tests {
         let (_, warnings) = read(panorama).unwrap();
         let expected = "camera.projection: equirectangular pictures are twice as wide as high, but this one is 1920x1080; \
                         --width 2160 --height 1080 makes it so";
-        assert!(
-            warnings.len() == 1 && warnings[0].ends_with(expected),
-            "{warnings:?}"
-        );
+        assert!(warnings.len() == 1 && warnings[0].ends_with(expected), "{warnings:?}");
         let (_, warnings) = read(&format!("{panorama}image.width = 2160")).unwrap();
         assert!(warnings.is_empty());
     }
 
     #[test]
     fn what_makes_no_sense_is_refused() {
-        let (ortho, panorama) = (
-            "projection = \"orthographic\"\n",
-            "projection = \"equirectangular\"\n",
-        );
+        let (ortho, panorama) =
+            ("projection = \"orthographic\"\n", "projection = \"equirectangular\"\n");
         for (rest, part) in [
             (
                 "height = 2".to_owned(),
                 "camera.height: is given, but only projection = \"orthographic\"",
             ),
-            (
-                format!("{ortho}height = 0"),
-                "camera.height: expected a length above 0",
-            ),
+            (format!("{ortho}height = 0"), "camera.height: expected a length above 0"),
             (
                 format!("{ortho}fov = 30"),
                 "camera.fov: is given, but an orthographic picture has a height",
             ),
-            (
-                format!("{panorama}fov = 30"),
-                "camera.fov: is given, but an equirectangular picture",
-            ),
+            (format!("{panorama}fov = 30"), "camera.fov: is given, but an equirectangular picture"),
             (
                 format!("{ortho}f_stop = 2"),
                 "camera.f_stop: is given, but only perspective has depth of field",
             ),
-            (
-                format!("{panorama}aperture = 2"),
-                "camera.aperture: is given, but only perspective",
-            ),
-            (
-                format!("{panorama}mode = \"turntable\""),
-                "camera.mode: is turntable",
-            ),
-            (
-                format!("{panorama}elevation = 3"),
-                "camera.elevation: is given, but the horizon",
-            ),
+            (format!("{panorama}aperture = 2"), "camera.aperture: is given, but only perspective"),
+            (format!("{panorama}mode = \"turntable\""), "camera.mode: is turntable"),
+            (format!("{panorama}elevation = 3"), "camera.elevation: is given, but the horizon"),
             (
                 format!("{panorama}view = \"top\""),
                 "camera.view: must be front, back, left or right",
             ),
-            (
-                "view = \"top\"\nmode = \"turntable\"".to_owned(),
-                "camera.view: is along the axis",
-            ),
+            ("view = \"top\"\nmode = \"turntable\"".to_owned(), "camera.view: is along the axis"),
             (
                 "view = \"top\"\nazimuth = 3".to_owned(),
                 "camera.view: is given, but so are azimuth or elevation",
@@ -474,10 +423,7 @@ mod tests {
                 "camera.view: is given, but eye and look_at place the camera",
             ),
             ("view = \"topp\"".to_owned(), "did you mean top?"),
-            (
-                format!("{ortho}stereo = true"),
-                "camera.stereo: is true, but both eyes see the same",
-            ),
+            (format!("{ortho}stereo = true"), "camera.stereo: is true, but both eyes see the same"),
             (
                 "stereo = true\nf_stop = 2".to_owned(),
                 "camera.stereo: is true, but stereo pairs have no depth of field",
@@ -490,10 +436,7 @@ mod tests {
                 "convergence = 2".to_owned(),
                 "camera.convergence: is given, but there is only one eye",
             ),
-            (
-                format!("{panorama}stereo = true"),
-                "camera.eye_distance: is missing",
-            ),
+            (format!("{panorama}stereo = true"), "camera.eye_distance: is missing"),
             (
                 format!("{panorama}stereo = true\neye_distance = 1\nconvergence = 3"),
                 "camera.convergence: is given, but the eyes of an equirectangular stereo pair",

@@ -18,13 +18,9 @@ pub const SCHEMA_FILE: &str = "job.schema.json";
 /// The schema of manifests (draft 2020-12).
 pub fn job_schema() -> Value {
     let entries = Manifest::examples().entries();
-    let outside = entries
-        .list()
-        .iter()
-        .filter(|entry| entry.section.is_empty());
-    let mut properties: Map<_, _> = outside
-        .map(|entry| (entry.name().to_owned(), property(entry)))
-        .collect();
+    let outside = entries.list().iter().filter(|entry| entry.section.is_empty());
+    let mut properties: Map<_, _> =
+        outside.map(|entry| (entry.name().to_owned(), property(entry))).collect();
     for section in sections(&entries).filter(|s| !s.is_empty() && !s.contains('.')) {
         let mut table = table(&entries, section);
         match section {
@@ -87,11 +83,7 @@ pub(super) fn sections(entries: &Entries) -> impl Iterator<Item = &str> {
 }
 
 fn table(entries: &Entries, section: &str) -> Value {
-    let keys: Vec<&Entry> = entries
-        .list()
-        .iter()
-        .filter(|e| e.section == section)
-        .collect();
+    let keys: Vec<&Entry> = entries.list().iter().filter(|e| e.section == section).collect();
     let required = keys.iter().filter(|e| e.declared.required.is_some());
     let required: Vec<&str> = required.map(|e| e.name()).collect();
     let properties = keys.iter().map(|e| (e.name().to_owned(), property(e)));
@@ -109,9 +101,8 @@ fn table(entries: &Entries, section: &str) -> Value {
 
 fn property(entry: &Entry) -> Value {
     // The type of a light or an overlay determines its keys.
-    let is_typed = ["clip.", "light.", "overlay."]
-        .iter()
-        .any(|list| entry.section.starts_with(list));
+    let is_typed =
+        ["clip.", "light.", "overlay."].iter().any(|list| entry.section.starts_with(list));
     let mut schema = match entry.name() {
         "type" if is_typed => {
             json!({ "const": json_of(entry.sample()) })
@@ -130,8 +121,7 @@ fn property(entry: &Entry) -> Value {
 
 /// Converts a TOML value of this program to JSON.
 fn json_of(value: &str) -> Value {
-    let table: toml::Table = format!("value = {value}")
-        .parse()
-        .expect("what is written as TOML is TOML");
+    let table: toml::Table =
+        format!("value = {value}").parse().expect("what is written as TOML is TOML");
     serde_json::to_value(&table["value"]).expect("it has no numbers that JSON lacks")
 }

@@ -32,9 +32,7 @@ job = { threads = 3, isolate = true, memory_ceiling = 1073741824, stop_file = ".
 "#;
 
 fn validator() -> Validator {
-    jsonschema::draft202012::options()
-        .build(&job_schema())
-        .expect("a good schema")
+    jsonschema::draft202012::options().build(&job_schema()).expect("a good schema")
 }
 
 fn read(text: &str) -> Result<Manifest, ManifestError> {
@@ -50,29 +48,20 @@ fn json(text: &str) -> Value {
 fn both_take(text: &str) {
     read(text).unwrap();
     let (json, validator) = (json(text), validator());
-    let errors: Vec<_> = validator
-        .iter_errors(&json)
-        .map(|e| e.to_string())
-        .collect();
+    let errors: Vec<_> = validator.iter_errors(&json).map(|e| e.to_string()).collect();
     assert!(errors.is_empty(), "{text}\n{errors:?}");
 }
 
 #[track_caller]
 fn both_refuse(text: &str) {
     assert!(read(text).is_err(), "the reader takes {text}");
-    assert!(
-        !validator().is_valid(&json(text)),
-        "the schema takes {text}"
-    );
+    assert!(!validator().is_valid(&json(text)), "the schema takes {text}");
 }
 
 #[test]
 fn it_is_a_schema_of_draft_2020_12() {
     let schema = job_schema();
-    assert_eq!(
-        schema["$schema"],
-        "https://json-schema.org/draft/2020-12/schema"
-    );
+    assert_eq!(schema["$schema"], "https://json-schema.org/draft/2020-12/schema");
     assert!(jsonschema::meta::is_valid(&schema));
 }
 
@@ -94,127 +83,49 @@ const TABLES: [(&str, &str); 43] = [
     ("", ""),
     ("/properties/input", "[input]\n"),
     ("/properties/camera", "[camera]\n"),
-    (
-        "/properties/camera/properties/key/items",
-        "[[camera.key]]\n",
-    ),
+    ("/properties/camera/properties/key/items", "[[camera.key]]\n"),
     ("/properties/cell", "[cell]\n"),
     ("/properties/image", "[image]\n"),
     ("/properties/render", "[render]\n"),
     ("/properties/surface", "[surface]\n"),
     ("/properties/material", "[material]\n"),
-    (
-        "/properties/light/items/oneOf/0",
-        "[[light]]\ntype = \"point\"\n",
-    ),
-    (
-        "/properties/light/items/oneOf/1",
-        "[[light]]\ntype = \"directional\"\n",
-    ),
-    (
-        "/properties/light/items/oneOf/2",
-        "[[light]]\ntype = \"sun\"\n",
-    ),
-    (
-        "/properties/light/items/oneOf/3",
-        "[[light]]\ntype = \"sphere\"\n",
-    ),
-    (
-        "/properties/light/items/oneOf/4",
-        "[[light]]\ntype = \"rect\"\n",
-    ),
-    (
-        "/properties/light/items/oneOf/5",
-        "[[light]]\ntype = \"disc\"\n",
-    ),
-    (
-        "/properties/overlay/items/oneOf/0",
-        "[[overlay]]\ntype = \"colorbar\"\n",
-    ),
-    (
-        "/properties/overlay/items/oneOf/1",
-        "[[overlay]]\ntype = \"text\"\n",
-    ),
-    (
-        "/properties/overlay/items/oneOf/2",
-        "[[overlay]]\ntype = \"scale_bar\"\n",
-    ),
-    (
-        "/properties/overlay/items/oneOf/3",
-        "[[overlay]]\ntype = \"axes\"\n",
-    ),
-    (
-        "/properties/overlay/items/oneOf/4",
-        "[[overlay]]\ntype = \"image\"\npath = \"logo.png\"\n",
-    ),
+    ("/properties/light/items/oneOf/0", "[[light]]\ntype = \"point\"\n"),
+    ("/properties/light/items/oneOf/1", "[[light]]\ntype = \"directional\"\n"),
+    ("/properties/light/items/oneOf/2", "[[light]]\ntype = \"sun\"\n"),
+    ("/properties/light/items/oneOf/3", "[[light]]\ntype = \"sphere\"\n"),
+    ("/properties/light/items/oneOf/4", "[[light]]\ntype = \"rect\"\n"),
+    ("/properties/light/items/oneOf/5", "[[light]]\ntype = \"disc\"\n"),
+    ("/properties/overlay/items/oneOf/0", "[[overlay]]\ntype = \"colorbar\"\n"),
+    ("/properties/overlay/items/oneOf/1", "[[overlay]]\ntype = \"text\"\n"),
+    ("/properties/overlay/items/oneOf/2", "[[overlay]]\ntype = \"scale_bar\"\n"),
+    ("/properties/overlay/items/oneOf/3", "[[overlay]]\ntype = \"axes\"\n"),
+    ("/properties/overlay/items/oneOf/4", "[[overlay]]\ntype = \"image\"\npath = \"logo.png\"\n"),
     ("/properties/mesh/items", "[[mesh]]\npath = \"a.stl\"\n"),
-    (
-        "/properties/material/properties/part/items",
-        "[[material.part]]\nparts = [1]\n",
-    ),
+    ("/properties/material/properties/part/items", "[[material.part]]\nparts = [1]\n"),
     ("/properties/environment", "[environment]\n"),
     ("/properties/output", "[output]\n"),
     ("/properties/job", "[job]\n"),
     ("/properties/trails", "[trails]\n"),
     ("/properties/bonds", "[bonds]\n"),
-    (
-        "/properties/bonds/properties/color/anyOf/2",
-        "[bonds.color]\n",
-    ),
-    (
-        "/properties/trails/properties/color/anyOf/2",
-        "[trails.color]\n",
-    ),
-    (
-        "/properties/arrows/items",
-        "[[arrows]]\nattribute = \"f\"\nscale = 1\n",
-    ),
+    ("/properties/bonds/properties/color/anyOf/2", "[bonds.color]\n"),
+    ("/properties/trails/properties/color/anyOf/2", "[trails.color]\n"),
+    ("/properties/arrows/items", "[[arrows]]\nattribute = \"f\"\nscale = 1\n"),
     (
         "/properties/arrows/items/properties/color/anyOf/2",
         "[[arrows]]\nattribute = \"f\"\nscale = 1\n[arrows.color]\n",
     ),
-    (
-        "/properties/input/properties/radius/anyOf/2",
-        "[input.radius]\n",
-    ),
-    (
-        "/properties/material/properties/color/anyOf/2",
-        "[material.color]\n",
-    ),
-    (
-        "/properties/render/properties/background/anyOf/2",
-        "[render.background]\n",
-    ),
-    (
-        "/properties/render/properties/ground/anyOf/3",
-        "[render.ground]\n",
-    ),
-    (
-        "/properties/render/properties/caustics",
-        "[render.caustics]\n",
-    ),
-    (
-        "/properties/camera/properties/focus/anyOf/2",
-        "[camera.focus]\n",
-    ),
-    (
-        "/properties/environment/properties/sun",
-        "[environment.sun]\n",
-    ),
+    ("/properties/input/properties/radius/anyOf/2", "[input.radius]\n"),
+    ("/properties/material/properties/color/anyOf/2", "[material.color]\n"),
+    ("/properties/render/properties/background/anyOf/2", "[render.background]\n"),
+    ("/properties/render/properties/ground/anyOf/3", "[render.ground]\n"),
+    ("/properties/render/properties/caustics", "[render.caustics]\n"),
+    ("/properties/camera/properties/focus/anyOf/2", "[camera.focus]\n"),
+    ("/properties/environment/properties/sun", "[environment.sun]\n"),
     ("/properties/select", "[select]\n"),
     ("/properties/select/properties/slab", "[select.slab]\n"),
-    (
-        "/properties/clip/items/oneOf/0",
-        "[[clip]]\ntype = \"plane\"\n",
-    ),
-    (
-        "/properties/clip/items/oneOf/1",
-        "[[clip]]\ntype = \"box\"\n",
-    ),
-    (
-        "/properties/material/properties/opacity/anyOf/1",
-        "[material.opacity]\n",
-    ),
+    ("/properties/clip/items/oneOf/0", "[[clip]]\ntype = \"plane\"\n"),
+    ("/properties/clip/items/oneOf/1", "[[clip]]\ntype = \"box\"\n"),
+    ("/properties/material/properties/opacity/anyOf/1", "[material.opacity]\n"),
 ];
 
 #[test]
@@ -278,20 +189,12 @@ fn comments_defaults_and_examples_are_those_of_init() {
 fn defaults_of_items_are_the_readers() {
     let schema = job_schema();
     for (pointer, text) in [
-        (
-            "/properties/light/items/oneOf/0",
-            "type = \"point\"\nposition = [1, 2, 3]\n",
-        ),
-        (
-            "/properties/light/items/oneOf/1",
-            "type = \"directional\"\ndirection = [1, 2, 3]\n",
-        ),
+        ("/properties/light/items/oneOf/0", "type = \"point\"\nposition = [1, 2, 3]\n"),
+        ("/properties/light/items/oneOf/1", "type = \"directional\"\ndirection = [1, 2, 3]\n"),
     ] {
         let head = format!("input.path = \"data\"\n[[light]]\n{text}");
         let plain = read(&head).unwrap();
-        for (name, property) in schema.pointer(pointer).unwrap()["properties"]
-            .as_object()
-            .unwrap()
+        for (name, property) in schema.pointer(pointer).unwrap()["properties"].as_object().unwrap()
         {
             if let Some(default) = property.get("default") {
                 let set = read(&format!("{head}{name} = {default}\n")).unwrap();

@@ -37,10 +37,7 @@ impl Value for Vec3 {
         let color = field.as_numbers().map(|c: [f64; 3]| c.map(narrow));
         let key = key.from(0);
         let holds = |c: &[f32; 3]| c.iter().all(|c| key.holds(f64::from(*c)));
-        color
-            .filter(holds)
-            .map(Self::from_array)
-            .ok_or(Fault::Unwanted)
+        color.filter(holds).map(Self::from_array).ok_or(Fault::Unwanted)
     }
 
     fn toml(&self) -> String {
@@ -149,12 +146,7 @@ mod tests {
     }
 
     fn background(value: &str) -> Vec3 {
-        match read(&format!("render.background = {value}"))
-            .unwrap()
-            .0
-            .render
-            .background
-        {
+        match read(&format!("render.background = {value}")).unwrap().0.render.background {
             Some(Background::Constant(color)) => color,
             other => panic!("{value}: {other:?}"),
         }
@@ -171,10 +163,7 @@ mod tests {
         assert!(background("\"#fc0\"").abs_diff_eq(pale, 1e-6));
         assert_eq!(background("\"white\""), Vec3::ONE);
         assert_eq!(background("\"Red\""), Vec3::X);
-        assert_eq!(
-            background("\"rebeccapurple\""),
-            background("[102, 51, 153]")
-        );
+        assert_eq!(background("\"rebeccapurple\""), background("[102, 51, 153]"));
         // Linear as before: fractions, and integers up to 1
         assert_eq!(background("[0.5, 0.25, 1]"), Vec3::new(0.5, 0.25, 1.0));
         assert_eq!(background("[1, 0, 1]"), Vec3::new(1.0, 0.0, 1.0));
@@ -235,10 +224,7 @@ mod tests {
     #[test]
     fn impossible_colors_are_refused() {
         for (value, part) in [
-            (
-                "\"#12345\"",
-                "invalid colour \"#12345\"; # needs 3 or 6 hexadecimal digits",
-            ),
+            ("\"#12345\"", "invalid colour \"#12345\"; # needs 3 or 6 hexadecimal digits"),
             ("\"#ggg\"", "invalid colour"),
             ("\"#+ff\"", "invalid colour"),
             ("\"#ä\"", "invalid colour"),
@@ -255,9 +241,6 @@ mod tests {
         let error = read("cell.color = [0.5, 2, 0]").unwrap_err();
         assert!(error.contains("linear RGB from 0 to 1"), "{error}");
         let (_, warnings) = read("render.background = [2, 1, 1]").unwrap();
-        assert!(
-            warnings[0].contains("[2.0, 1.0, 1.0] is linear RGB"),
-            "{warnings:?}"
-        );
+        assert!(warnings[0].contains("[2.0, 1.0, 1.0] is linear RGB"), "{warnings:?}");
     }
 }

@@ -100,10 +100,9 @@ impl Value for f32 {
 
 fn number_schema(kind: &str, key: &Key) -> Json {
     let mut range = json!({});
-    for (bound, names) in [
-        (key.low, ["minimum", "exclusiveMinimum"]),
-        (key.high, ["maximum", "exclusiveMaximum"]),
-    ] {
+    for (bound, names) in
+        [(key.low, ["minimum", "exclusiveMinimum"]), (key.high, ["maximum", "exclusiveMaximum"])]
+    {
         if let Some(bound) = bound {
             range[names[usize::from(bound.is_excluded)]] = json_number(bound.value);
         }
@@ -116,16 +115,9 @@ fn number_schema(kind: &str, key: &Key) -> Json {
 }
 
 /// Integers are written without a decimal point.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "checked to be whole and small"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "checked to be whole and small")]
 fn json_number(value: f64) -> Json {
-    if value.fract() == 0.0 && value.abs() < 1e15 {
-        json!(value as i64)
-    } else {
-        json!(value)
-    }
+    if value.fract() == 0.0 && value.abs() < 1e15 { json!(value as i64) } else { json!(value) }
 }
 
 /// Seconds, with a resolution of one nanosecond.

@@ -105,9 +105,7 @@ impl Value for Bytes {
     /// Exactly, in the largest unit that it is whole in.
     fn toml(&self) -> String {
         let units = [("GiB", 30), ("MiB", 20), ("KiB", 10)];
-        let mut whole = units
-            .iter()
-            .filter(|(_, shift)| self.0.trailing_zeros() >= *shift);
+        let mut whole = units.iter().filter(|(_, shift)| self.0.trailing_zeros() >= *shift);
         match whole.next() {
             Some((name, shift)) => quoted(&format!("{}{name}", self.0 >> shift)),
             None => self.0.to_string(),

@@ -50,11 +50,7 @@ pub(super) fn write_film(
     let job = Arc::new(PackJob::new(film, layout));
     let clamped = write_blocks(file, &job.layout, PackedInOrder::new(&job));
     // Take the film back; helpers that start later find nothing to do
-    let film = job
-        .film
-        .write()
-        .unwrap_or_else(PoisonError::into_inner)
-        .take();
+    let film = job.film.write().unwrap_or_else(PoisonError::into_inner).take();
     let film = film.expect("only this function takes the film");
     clamped.map(|clamped| (film, clamped))
 }
@@ -125,11 +121,7 @@ impl PackJob {
         let top = u32::try_from(band).expect("fewer bands than rows") * rows;
         let band = film.as_ref()?.rows().part(top, rows);
         let blocks = self.layout.blocks(band);
-        Some(
-            blocks
-                .map(|block| pack_block(&block, &self.layout, buffers))
-                .collect(),
-        )
+        Some(blocks.map(|block| pack_block(&block, &self.layout, buffers)).collect())
     }
 
     /// Packs at most one band. Only one, because a thread may also get here while it waits for tracing threads, and
@@ -154,9 +146,7 @@ impl PackJob {
     fn spawn_helpers(self: &Arc<Self>, queue: &mut Queue) {
         let end = self.band_count.min(queue.next_write + self.max_in_flight);
         // The calling thread packs one band itself
-        let useful = end
-            .saturating_sub(queue.next_pack + 1)
-            .min(self.max_helpers);
+        let useful = end.saturating_sub(queue.next_pack + 1).min(self.max_helpers);
         while queue.helper_count < useful {
             queue.helper_count += 1;
             let job = Arc::clone(self);
@@ -175,11 +165,7 @@ struct PackedInOrder<'a> {
 
 impl<'a> PackedInOrder<'a> {
     fn new(job: &'a Arc<PackJob>) -> Self {
-        Self {
-            job,
-            buffers: PackBuffers::default(),
-            band: Vec::new().into_iter(),
-        }
+        Self { job, buffers: PackBuffers::default(), band: Vec::new().into_iter() }
     }
 
     fn next_band(&mut self) -> Option<PackedBand> {
@@ -204,10 +190,7 @@ impl<'a> PackedInOrder<'a> {
                     queue
                 }
                 // A helper is packing it
-                None => job
-                    .band_packed
-                    .wait(queue)
-                    .unwrap_or_else(PoisonError::into_inner),
+                None => job.band_packed.wait(queue).unwrap_or_else(PoisonError::into_inner),
             };
         }
         None

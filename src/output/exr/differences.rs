@@ -86,10 +86,7 @@ mod tests {
     /// The algorithm of `ImfZip.cpp`, in two passes.
     fn reference(bytes: &[u8]) -> Vec<u8> {
         let even = bytes.iter().step_by(2);
-        let reordered: Vec<u8> = even
-            .chain(bytes.iter().skip(1).step_by(2))
-            .copied()
-            .collect();
+        let reordered: Vec<u8> = even.chain(bytes.iter().skip(1).step_by(2)).copied().collect();
         let others = reordered.windows(2);
         let others = others.map(|pair| pair[1].wrapping_sub(pair[0]).wrapping_add(128));
         reordered.iter().take(1).copied().chain(others).collect()
@@ -97,15 +94,8 @@ mod tests {
 
     #[test]
     fn line_predictor_equals_block_predictor() {
-        let bytes: Vec<u8> = (0..4000_u32)
-            .map(|at| (at * at / 7).to_le_bytes()[0])
-            .collect();
-        for lengths in [
-            &[4000][..],
-            &[2, 2, 0, 4, 60, 62, 64, 66, 130, 1000],
-            &[0],
-            &[2],
-        ] {
+        let bytes: Vec<u8> = (0..4000_u32).map(|at| (at * at / 7).to_le_bytes()[0]).collect();
+        for lengths in [&[4000][..], &[2, 2, 0, 4, 60, 62, 64, 66, 130, 1000], &[0], &[2]] {
             for level in SimdLevel::ALL {
                 let length: usize = lengths.iter().sum();
                 let mut differences = vec![1; length];
@@ -117,10 +107,7 @@ mod tests {
                     rest = others;
                 }
                 block.finish();
-                assert!(
-                    differences == reference(&bytes[..length]),
-                    "{level:?} {lengths:?}"
-                );
+                assert!(differences == reference(&bytes[..length]), "{level:?} {lengths:?}");
             }
         }
     }

@@ -54,12 +54,7 @@ impl<'a, W: Write + Seek> ScanLineFile<'a, W> {
         let offsets_at = start.len() as u64;
         start.resize(start.len() + 8 * count, 0);
         file.write_all(&start).map_err(io_error)?;
-        Ok(Self {
-            file,
-            offsets_at,
-            end: start.len() as u64,
-            parts,
-        })
+        Ok(Self { file, offsets_at, end: start.len() as u64, parts })
     }
 
     /// Writes the next block of a part.

@@ -95,10 +95,7 @@ impl ExrLayout {
         let rows: Vec<u32> = self.parts.iter().map(ExrPart::rows_per_block).collect();
         rows.into_iter().enumerate().flat_map(move |(part, rows)| {
             let tops = (band.top..band.top + band.height).step_by(rows as usize);
-            tops.map(move |top| ExrBlock {
-                part,
-                rows: band.part(top, rows),
-            })
+            tops.map(move |top| ExrBlock { part, rows: band.part(top, rows) })
         })
     }
 }

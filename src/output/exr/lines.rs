@@ -74,8 +74,7 @@ impl LineBuffer {
     /// Converts float `i` of the layers of each pixel as a colour.
     fn layer_halves(&mut self, layers: &[f32], floats: usize, i: usize) -> &[u8] {
         self.floats.clear();
-        self.floats
-            .extend(layers.chunks(floats).map(|pixel| pixel[i]));
+        self.floats.extend(layers.chunks(floats).map(|pixel| pixel[i]));
         for value in &mut self.floats {
             let fits = value.abs() <= HALF_MAX;
             self.clamped += u64::from(!fits);
@@ -144,9 +143,7 @@ mod tests {
         let mut buffer = LineBuffer::default();
         buffer.words.resize(values.len(), 0);
         let bytes = buffer.halves(&colors, 0).to_vec();
-        let bits = bytes
-            .chunks_exact(2)
-            .map(|b| u16::from_le_bytes([b[0], b[1]]));
+        let bits = bytes.chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]]));
         (bits.collect(), buffer.clamped)
     }
 
@@ -155,18 +152,9 @@ mod tests {
         // Every half-float, the midpoint to the next one, and the values just next to both, where rounding decides
         let mut values = Vec::new();
         for bits in 0..0x7bff_u16 {
-            let (low, high) = (
-                f16::from_bits(bits).to_f32(),
-                f16::from_bits(bits + 1).to_f32(),
-            );
+            let (low, high) = (f16::from_bits(bits).to_f32(), f16::from_bits(bits + 1).to_f32());
             let middle = low + 0.5 * (high - low);
-            for value in [
-                low,
-                middle.next_down(),
-                middle,
-                middle.next_up(),
-                high.next_down(),
-            ] {
+            for value in [low, middle.next_down(), middle, middle.next_up(), high.next_down()] {
                 values.extend([value, -value]);
             }
         }
@@ -180,13 +168,7 @@ mod tests {
 
     #[test]
     fn values_outside_the_range_of_half_floats_are_counted() {
-        let values = [
-            HALF_MAX.next_up(),
-            f32::NEG_INFINITY,
-            f32::NAN,
-            -f32::NAN,
-            1.0,
-        ];
+        let values = [HALF_MAX.next_up(), f32::NEG_INFINITY, f32::NAN, -f32::NAN, 1.0];
         let (bits, clamped) = converted(&values);
         assert_eq!(clamped, 4);
         assert_eq!(bits, [0x7bff, 0xfbff, 0, 0, 0x3c00]);

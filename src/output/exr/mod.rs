@@ -96,8 +96,7 @@ pub struct ExrOptions {
 impl ExrOptions {
     /// Whether data channels are in a part of their own.
     pub(super) fn has_data_part(&self) -> bool {
-        self.data_compression
-            .is_some_and(|data| data != self.compression)
+        self.data_compression.is_some_and(|data| data != self.compression)
     }
 }
 
@@ -159,10 +158,7 @@ impl OutputError {
 pub fn encode_exr(film: &Film, options: &ExrOptions) -> Result<EncodedExr, OutputError> {
     let mut file = Cursor::new(Vec::new());
     let (_, clamped) = write_exr(film.clone(), options, &mut file)?;
-    Ok(EncodedExr {
-        bytes: file.into_inner(),
-        clamped,
-    })
+    Ok(EncodedExr { bytes: file.into_inner(), clamped })
 }
 
 /// Writes `film` as an OpenEXR file, block by block, so that the file is never in memory as a whole. Idle threads of
@@ -186,26 +182,19 @@ fn attributes(options: &ExrOptions) -> Result<LayerAttributes, OutputError> {
         frames_per_second: options.frames_per_second,
         world_to_camera: options.world_to_camera,
         horizontal_density: options.dpi.map(|dpi| dpi as f32),
-        environment_map: options
-            .is_panorama
-            .then_some(EnvironmentMap::LatitudeLongitude),
+        environment_map: options.is_panorama.then_some(EnvironmentMap::LatitudeLongitude),
         ..LayerAttributes::default()
     };
     attributes.comments = options.comments.as_deref().map(text);
     if let Some(CustomAttribute { name, json }) = &options.custom {
-        let refuse = |why| OutputError::Attribute {
-            name: name.clone(),
-            why,
-        };
+        let refuse = |why| OutputError::Attribute { name: name.clone(), why };
         if name.is_empty() || name.len() > NAME_MAX {
             return Err(refuse("the name must have 1 to 255 bytes"));
         }
         if !name.is_ascii() || name.contains('\0') {
             return Err(refuse("the name must be ASCII"));
         }
-        attributes
-            .other
-            .insert(text(name), AttributeValue::Text(text(json)));
+        attributes.other.insert(text(name), AttributeValue::Text(text(json)));
     }
     Ok(attributes)
 }

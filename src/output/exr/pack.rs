@@ -69,12 +69,7 @@ pub fn pack_block(
         },
         Compression::Rle | Compression::Piz => compress_with_exr(rows, layout, &mut buffers.line)?,
     };
-    Ok(PackedBlock {
-        part: block.part,
-        y: rows.top,
-        bytes,
-        clamped: buffers.line.clamped,
-    })
+    Ok(PackedBlock { part: block.part, y: rows.top, bytes, clamped: buffers.line.clamped })
 }
 
 /// Calls `visit` with the samples of `rows`, line by line in the order of the file. Its arguments are the offset of the
@@ -114,9 +109,7 @@ fn compress_with_exr(
     for_each_line(rows, layout, buffer, |offset, line, sample_len| {
         bytes.extend_from_slice(line);
         if cfg!(target_endian = "big") {
-            bytes[offset..]
-                .chunks_exact_mut(sample_len)
-                .for_each(<[u8]>::reverse);
+            bytes[offset..].chunks_exact_mut(sample_len).for_each(<[u8]>::reverse);
         }
     });
     let top = i32::try_from(rows.top).expect("images have at most 65536 rows");
@@ -130,11 +123,7 @@ fn compress_with_exr(
 
 /// The zlib stream of `rows`, or None if it is no shorter than the samples.
 fn zip<'b>(rows: &FilmRows, layout: &ExrPart, buffers: &'b mut PackBuffers) -> Option<&'b [u8]> {
-    let PackBuffers {
-        line,
-        differences,
-        deflater,
-    } = buffers;
+    let PackBuffers { line, differences, deflater } = buffers;
     differences.resize(layout.bytes(rows.height), 0);
     let mut block = Differences::new(differences, Supported::default());
     for_each_line(rows, layout, line, |_, line, _| block.push(line));
@@ -154,9 +143,7 @@ impl ExrPart {
         let groups = self.planes.chunk_by(|a, b| a.kind() == b.kind());
         let groups: Vec<(PlaneKind, usize)> = groups
             .map(|group| {
-                let bytes = group
-                    .iter()
-                    .map(|plane| plane.sample_type().bytes_per_sample());
+                let bytes = group.iter().map(|plane| plane.sample_type().bytes_per_sample());
                 (group[0].kind(), bytes.sum::<usize>() * width / 2)
             })
             .collect();

@@ -51,12 +51,7 @@ fn wild_film(width: u32, height: u32, channels: Channels) -> Film {
     for color in &mut film.color[half..] {
         *color = std::array::from_fn(|_| numbers.wild());
     }
-    let vectors = [
-        &mut film.normal,
-        &mut film.position,
-        &mut film.velocity,
-        &mut film.albedo,
-    ];
+    let vectors = [&mut film.normal, &mut film.position, &mut film.velocity, &mut film.albedo];
     for plane in vectors.into_iter().flatten() {
         plane[half..].fill_with(|| numbers.wild_vector());
     }
@@ -140,16 +135,12 @@ fn decoded(file: &[u8]) -> Vec<(String, Vec<u32>)> {
         .from_buffered(Cursor::new(file))
         .unwrap();
     let list = image.layer_data.channel_data.list.into_iter();
-    list.map(|c| (c.name.to_string(), bits(&c.sample_data)))
-        .collect()
+    list.map(|c| (c.name.to_string(), bits(&c.sample_data))).collect()
 }
 
 #[track_caller]
 fn check(film: &Film, compression: Compression) {
-    let options = ExrOptions {
-        compression,
-        ..ExrOptions::default()
-    };
+    let options = ExrOptions { compression, ..ExrOptions::default() };
     let file = encode_exr(film, &options).unwrap().bytes;
     let reference = written_by_exr(film, &options);
     let size = (film.width, film.height);
@@ -223,18 +214,12 @@ fn colours_and_data_have_compressions_of_their_own() {
     for (width, height) in [(1, 1), (17, 33), (40, 16), (31, 65)] {
         let film = wild_film(width, height, Channels::ALL);
         for compression in COMPRESSIONS {
-            let plain = ExrOptions {
-                compression,
-                ..ExrOptions::default()
-            };
+            let plain = ExrOptions { compression, ..ExrOptions::default() };
             let single = encode_exr(&film, &plain).unwrap();
             let (names, expected) = decoded_parts(&single.bytes);
             assert!(names.is_empty() && version(&single.bytes) & 1 << 12 == 0);
             for data in COMPRESSIONS {
-                let options = ExrOptions {
-                    data_compression: Some(data),
-                    ..plain.clone()
-                };
+                let options = ExrOptions { data_compression: Some(data), ..plain.clone() };
                 let file = encode_exr(&film, &options).unwrap();
                 assert_eq!(file.clamped, single.clamped);
                 if data == compression {
@@ -248,10 +233,8 @@ fn colours_and_data_have_compressions_of_their_own() {
             }
         }
         // Without data, there is one part
-        let options = ExrOptions {
-            data_compression: Some(Compression::None),
-            ..ExrOptions::default()
-        };
+        let options =
+            ExrOptions { data_compression: Some(Compression::None), ..ExrOptions::default() };
         let film = wild_film(width, height, Channels::COLOR);
         let [with, without] = [options, ExrOptions::default()];
         assert!(encode_exr(&film, &with).unwrap() == encode_exr(&film, &without).unwrap());
@@ -293,9 +276,7 @@ fn pieces_follow_the_kinds_of_planes() {
         |width, channels| ExrLayout::new(width, 40, channels, &ExrOptions::default()).unwrap();
     let lengths = |layout: &ExrLayout, rows| -> Vec<(usize, bool)> {
         let pieces = layout.parts[0].pieces(rows);
-        pieces
-            .map(|piece| (piece.length, piece.is_searched))
-            .collect()
+        pieces.map(|piece| (piece.length, piece.is_searched)).collect()
     };
     let all = layout(10, Channels::ALL);
     // A B G, N, P, R, V, Z, albedo and id.
@@ -310,19 +291,11 @@ fn pieces_follow_the_kinds_of_planes() {
             (80, particles),
         ]
     };
-    let rows = [
-        row(false, true),
-        row(false, true),
-        row(true, true),
-        row(true, true),
-    ];
+    let rows = [row(false, true), row(false, true), row(true, true), row(true, true)];
     assert_eq!(lengths(&all, 2), rows.concat());
     assert_eq!(4 * 320, all.parts[0].bytes(2));
     // A block of one row has no row above
-    assert_eq!(
-        lengths(&all, 1),
-        [row(false, false), row(true, false)].concat()
-    );
+    assert_eq!(lengths(&all, 1), [row(false, false), row(true, false)].concat());
     assert_eq!(lengths(&layout(10, Channels::COLOR), 1), [(40, false); 2]);
     // In wide images, the row above is out of reach
     let wide = layout(1025, Channels::ALL);
@@ -360,9 +333,7 @@ fn blocks_that_do_not_shrink_are_stored_plain() {
 /// FNV-1a, written out so that no update of a crate can change it.
 fn fnv(bytes: &[u8]) -> u64 {
     let start = 0xcbf2_9ce4_8422_2325_u64;
-    bytes.iter().fold(start, |hash, byte| {
-        (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3)
-    })
+    bytes.iter().fold(start, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
 /// The bytes of a smooth picture do not depend on the instruction sets of the machine.
@@ -440,17 +411,10 @@ impl Seek for LimitedFile {
 #[test]
 fn a_full_disk_gives_the_error_of_the_operating_system() {
     let film = wild_film(64, 100, Channels::COLOR);
-    let length = encode_exr(&film, &ExrOptions::default())
-        .unwrap()
-        .bytes
-        .len() as u64;
+    let length = encode_exr(&film, &ExrOptions::default()).unwrap().bytes.len() as u64;
     for kind in [io::ErrorKind::StorageFull, io::ErrorKind::BrokenPipe] {
         for room in [0, 100, 500, length / 2, length - 1] {
-            let mut file = LimitedFile {
-                file: Cursor::new(Vec::new()),
-                room,
-                kind,
-            };
+            let mut file = LimitedFile { file: Cursor::new(Vec::new()), room, kind };
             let error = write_exr(film.clone(), &ExrOptions::default(), &mut file).unwrap_err();
             assert_eq!(error.into_io().unwrap().kind(), kind, "{room} of {length}");
         }

@@ -97,16 +97,9 @@ pub(in crate::output) fn planes(channels: Channels, names: &PlaneNames) -> Vec<P
     let mut all = color.to_vec();
     all.extend(channels.depth.then(|| Plane::new("Z", Source::Depth)));
     let axes = |is_present: bool, names: [&'static str; 3], source| {
-        is_present
-            .then(|| vectors(names, source))
-            .into_iter()
-            .flatten()
+        is_present.then(|| vectors(names, source)).into_iter().flatten()
     };
-    let [n, p, v] = [
-        ["N.X", "N.Y", "N.Z"],
-        ["P.X", "P.Y", "P.Z"],
-        ["V.X", "V.Y", "V.Z"],
-    ];
+    let [n, p, v] = [["N.X", "N.Y", "N.Z"], ["P.X", "P.Y", "P.Z"], ["V.X", "V.Y", "V.Z"]];
     let albedo = ["albedo.R", "albedo.G", "albedo.B"];
     all.extend(axes(channels.normal, n, Source::Normal));
     all.extend(axes(channels.position, p, Source::Position));
@@ -148,11 +141,7 @@ fn layers(layers: &Layers, names: &PlaneNames) -> Vec<Plane> {
         }));
     }
     // Data of surfaces and particles
-    all.extend(
-        layers
-            .shadow_at()
-            .map(|i| Plane::new("shadow", Source::Layer(i))),
-    );
+    all.extend(layers.shadow_at().map(|i| Plane::new("shadow", Source::Layer(i))));
     let motion = layers.motion_at().zip(["motion.U", "motion.V"]);
     all.extend(motion.map(|(i, name)| Plane::new(name, Source::Layer(i))));
     let named = layers.attributes_at().zip(&names.attributes);
@@ -183,18 +172,14 @@ pub fn layer_planes(channels: Channels, names: &PlaneNames) -> Vec<(String, usiz
         Source::LayerColor(i) | Source::Layer(i) | Source::ParticleLayer(i) => Some(i),
         _ => None,
     };
-    planes
-        .filter_map(|plane| Some((plane.name.into_owned(), float(plane.source)?)))
-        .collect()
+    planes.filter_map(|plane| Some((plane.name.into_owned(), float(plane.source)?))).collect()
 }
 
 /// The names of the planes of an attribute.
 pub fn attribute_planes(name: &str, components: usize) -> Vec<String> {
     match components {
         1 => vec![name.to_owned()],
-        2..=4 => (0..components)
-            .map(|c| format!("{name}.{}", ["X", "Y", "Z", "W"][c]))
-            .collect(),
+        2..=4 => (0..components).map(|c| format!("{name}.{}", ["X", "Y", "Z", "W"][c])).collect(),
         _ => (0..components).map(|c| format!("{name}.{c}")).collect(),
     }
 }

@@ -9,13 +9,8 @@ use super::*;
 use crate::render::Channels;
 
 /// All compression methods.
-pub(super) const COMPRESSIONS: [Compression; 5] = [
-    Compression::None,
-    Compression::Rle,
-    Compression::Zip,
-    Compression::Zips,
-    Compression::Piz,
-];
+pub(super) const COMPRESSIONS: [Compression; 5] =
+    [Compression::None, Compression::Rle, Compression::Zip, Compression::Zips, Compression::Piz];
 
 /// A film whose values depend on pixel and channel, so that misplaced samples are found.
 fn film(width: u32, height: u32, channels: Channels) -> Film {
@@ -24,12 +19,7 @@ fn film(width: u32, height: u32, channels: Channels) -> Film {
     for (i, color) in film.color.iter_mut().enumerate() {
         *color = [value(i), value(i) + 0.5, 1.0, 0.125];
     }
-    let vectors = [
-        &mut film.normal,
-        &mut film.position,
-        &mut film.velocity,
-        &mut film.albedo,
-    ];
+    let vectors = [&mut film.normal, &mut film.position, &mut film.velocity, &mut film.albedo];
     for (plane, add) in vectors.into_iter().zip([0.1, 0.2, 0.3, 0.4]) {
         for (i, v) in plane.iter_mut().flatten().enumerate() {
             *v = Vec3::new(value(i), value(i) * 3.0, -1.0) + add;
@@ -81,10 +71,7 @@ fn decode(bytes: &[u8]) -> (Vec<(String, FlatSamples)>, LayerAttributes, Encodin
 fn round_trips_with_types_and_values() {
     let film = film(37, 21, Channels::ALL);
     for compression in COMPRESSIONS {
-        let options = ExrOptions {
-            compression,
-            ..options()
-        };
+        let options = ExrOptions { compression, ..options() };
         let encoded = encode_exr(&film, &options).unwrap();
         assert_eq!(encoded.clamped, 0);
         let (channels, attributes, encoding) = decode(&encoded.bytes);
@@ -109,16 +96,8 @@ fn windows_are_those_of_the_options() {
     let film = film(37, 21, Channels::ALL);
     for compression in COMPRESSIONS {
         for [left, top] in [[100, 3], [-7, -20]] {
-            let window = DataWindow {
-                left,
-                top,
-                image: [160, 90],
-            };
-            let options = ExrOptions {
-                compression,
-                window: Some(window),
-                ..options()
-            };
+            let window = DataWindow { left, top, image: [160, 90] };
+            let options = ExrOptions { compression, window: Some(window), ..options() };
             let bytes = encode_exr(&film, &options).unwrap().bytes;
             let meta = MetaData::read_from_buffered(Cursor::new(&bytes), true).unwrap();
             let header = &meta.headers[0];
@@ -190,10 +169,7 @@ fn colours_without_options_are_encoded() {
 fn bytes_do_not_depend_on_threads() {
     let film = film(200, 300, Channels::ALL);
     for compression in COMPRESSIONS {
-        let options = ExrOptions {
-            compression,
-            ..options()
-        };
+        let options = ExrOptions { compression, ..options() };
         let first = encode_exr(&film, &options).unwrap();
         for threads in [1, 2, 7] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
@@ -225,17 +201,10 @@ fn values_outside_the_range_of_half_floats_are_clamped_and_counted() {
 
 #[test]
 fn texts_may_be_empty_long_or_not_ascii() {
-    for json in [
-        String::new(),
-        "\u{6c34}\u{e9}".to_owned(),
-        "x".repeat(100_000),
-    ] {
+    for json in [String::new(), "\u{6c34}\u{e9}".to_owned(), "x".repeat(100_000)] {
         let options = ExrOptions {
             comments: Some(json.clone()),
-            custom: Some(CustomAttribute {
-                name: "n".repeat(255),
-                json: json.clone(),
-            }),
+            custom: Some(CustomAttribute { name: "n".repeat(255), json: json.clone() }),
             ..ExrOptions::default()
         };
         let encoded = encode_exr(&film(1, 1, Channels::COLOR), &options).unwrap();
@@ -252,17 +221,10 @@ fn texts_may_be_empty_long_or_not_ascii() {
 fn oversized_attributes_are_rejected() {
     let film = film(1, 1, Channels::COLOR);
     let with = |name: &str, json: &str| ExrOptions {
-        custom: Some(CustomAttribute {
-            name: name.to_owned(),
-            json: json.to_owned(),
-        }),
+        custom: Some(CustomAttribute { name: name.to_owned(), json: json.to_owned() }),
         ..ExrOptions::default()
     };
-    for options in [
-        with("", "{}"),
-        with(&"x".repeat(256), "{}"),
-        with("\u{6c34}", "{}"),
-    ] {
+    for options in [with("", "{}"), with(&"x".repeat(256), "{}"), with("\u{6c34}", "{}")] {
         let error = encode_exr(&film, &options).unwrap_err();
         assert!(matches!(error, OutputError::Attribute { .. }), "{error}");
     }

@@ -81,11 +81,7 @@ impl ColorBar {
         let top = (corner[1] + layout.top).round();
         let bottom = top + (BAR_WIDTH * size).round().max(2.0);
         match &self.kind {
-            ColorBarKind::Numbers {
-                colors,
-                is_discrete,
-                ..
-            } => {
+            ColorBarKind::Numbers { colors, is_discrete, .. } => {
                 let title = [left.min(corner[0] + layout.ends[0]), corner[1]];
                 pen.text(canvas, &layout.heading, title);
                 frame(canvas, [left, top], [right, bottom], pen);
@@ -147,11 +143,7 @@ fn fill(
         }
         return;
     }
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "pixels"
-    )]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "pixels")]
     let columns = length as u32;
     for column in 0..columns {
         let x = left + column as f32;
@@ -169,16 +161,8 @@ fn draw_ticks(canvas: &mut Canvas, ticks: &Ticks, [left, right]: [f32; 2], botto
         let x = left + part * (right - left);
         // Marks at the ends continue the frame
         let edge = (x - 0.5 * line).round().clamp(left - line, right);
-        let length = if tick.label.is_some() {
-            TICK
-        } else {
-            SMALL_TICK
-        };
-        canvas.fill(
-            [edge, start],
-            [edge + line, start + (length * size).round()],
-            pen.color,
-        );
+        let length = if tick.label.is_some() { TICK } else { SMALL_TICK };
+        canvas.fill([edge, start], [edge + line, start + (length * size).round()], pen.color);
         if let Some(label) = &tick.label {
             let middle = bottom + LABEL_BELOW * size;
             let text = edge + 0.5 * line - 0.5 * pen.font.width(label);

@@ -60,18 +60,11 @@ pub(super) fn radii(
         Radius::Common(radius) => raise(radius),
         Radius::PerParticle(radii) => radii.iter_mut().for_each(raise),
     }
-    Ok(FrameRadii {
-        radius,
-        raised,
-        unknown,
-    })
+    Ok(FrameRadii { radius, raised, unknown })
 }
 
 /// Radii by the values of `attribute`, times `scale`, and the number of particles without one in the table.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "radii are f32 in the renderer"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "radii are f32 in the renderer")]
 fn from_table(
     attribute: &Attribute,
     table: &RadiusTable,

@@ -102,9 +102,8 @@ fn grid(side: u16) -> Vec<[f32; 2]> {
 fn random(count: usize) -> Vec<[f32; 2]> {
     let mut state = 1_u64;
     let mut next = || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 40) as f32 / (1 << 24) as f32
     };
     (0..count).map(|_| [next(), next()]).collect()
@@ -148,10 +147,7 @@ fn directions_can_be_exchanged() {
             let there = Point::new(a, albedo).value(&*bsdf, b) / b.z;
             let back = Point::new(b, albedo).value(&*bsdf, a) / a.z;
             let error = (there - back).abs().max_element();
-            assert!(
-                error <= 1e-4 * there.max_element(),
-                "{finish:?}: {there} {back}"
-            );
+            assert!(error <= 1e-4 * there.max_element(), "{finish:?}: {there} {back}");
         }
     }
 }
@@ -165,10 +161,7 @@ fn energy_is_kept() {
             for (albedo, range) in [(1.0, 0.985..1.01), (0.3, 0.0..1.0)] {
                 let point = Point::new(direction(angle, 0.0), Vec3::splat(albedo));
                 let samples = point.samples(Supported::default(), &*bsdf, &grid(256));
-                let sum: f64 = samples
-                    .iter()
-                    .map(|(_, weight, _)| f64::from(weight.y))
-                    .sum();
+                let sum: f64 = samples.iter().map(|(_, weight, _)| f64::from(weight.y)).sum();
                 let reflected = sum / samples.len() as f64;
                 assert!(
                     range.contains(&reflected),
@@ -192,10 +185,7 @@ fn densities_are_those_of_the_samples() {
             let total = integral(|into| point.eval(simd, &*bsdf, into).pdf);
             let left = samples.iter().filter(|(_, _, pdf)| *pdf > 0.0).count();
             let left = left as f64 / samples.len() as f64;
-            assert!(
-                (total - left).abs() < 0.01,
-                "{finish:?} at {angle}: {total} {left}"
-            );
+            assert!((total - left).abs() < 0.01, "{finish:?} at {angle}: {total} {left}");
             for (into, weight, pdf) in samples.iter().step_by(97).filter(|(_, _, pdf)| *pdf > 0.0) {
                 let values = point.eval(simd, &*bsdf, &splat3(*into));
                 assert!(
@@ -222,11 +212,7 @@ fn samples_follow_their_density() {
             let simd = Supported::default();
             // Count samples
             let samples = point.samples(simd, &*bsdf, &random(100_000));
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "cells"
-            )]
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "cells")]
             let cell = |v: Vec3| {
                 let row = ((v.z * ROWS as f32) as usize).min(ROWS - 1);
                 let turn = v.y.atan2(v.x) / std::f32::consts::TAU + 1.0;

@@ -4,10 +4,7 @@
 //!
 //! With the cosine `c` between light and normal, the value is `albedo * (c + w) / (pi * (1 + w)^2)` for `c` above `-w`.
 
-#![expect(
-    clippy::needless_range_loop,
-    reason = "one index for the lanes of many arrays"
-)]
+#![expect(clippy::needless_range_loop, reason = "one index for the lanes of many arrays")]
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
@@ -93,11 +90,7 @@ fn sample_foam_body(points: &SurfacePoints, u: &[Lanes; 2], lanes: u32, samples:
         let rest = 1.0 - z * z;
         let level = (if rest > 0.0 { rest } else { 0.0 }).sqrt();
         let (sin, cos) = sin_cos(2.0 * PI * u[1][l]);
-        let n = [
-            points.normal[0][l],
-            points.normal[1][l],
-            points.normal[2][l],
-        ];
+        let n = [points.normal[0][l], points.normal[1][l], points.normal[2][l]];
         let direction = to_world([level * cos, level * sin, z], n);
         let is_chosen = lanes >> l & 1 == 1;
         for axis in 0..3 {

@@ -1,9 +1,6 @@
 //! BSDFs that are written for one ray in the frame of the surface, whose z axis is the normal.
 
-#![expect(
-    clippy::needless_range_loop,
-    reason = "loops over lanes, several arrays at a time"
-)]
+#![expect(clippy::needless_range_loop, reason = "loops over lanes, several arrays at a time")]
 
 use super::microfacet::dot;
 use super::{BsdfSamples, BsdfValues, SurfacePoints};

@@ -1,9 +1,6 @@
 //! Matte surfaces: Lambert's law. The same fraction of the light, the albedo, leaves in every direction.
 
-#![expect(
-    clippy::needless_range_loop,
-    reason = "one index for the lanes of many arrays"
-)]
+#![expect(clippy::needless_range_loop, reason = "one index for the lanes of many arrays")]
 
 use std::f32::consts::FRAC_1_PI;
 
@@ -60,11 +57,7 @@ fn eval_matte_body(
         let is_chosen = lanes >> l & 1 == 1;
         for axis in 0..3 {
             let value = points.albedo[axis][l] * pdf;
-            values.value[axis][l] = if is_chosen {
-                value
-            } else {
-                values.value[axis][l]
-            };
+            values.value[axis][l] = if is_chosen { value } else { values.value[axis][l] };
         }
         values.pdf[l] = if is_chosen { pdf } else { values.pdf[l] };
     }
@@ -91,11 +84,7 @@ fn sample_matte_body(
         let [x, y] = disc([u[0][l], u[1][l]]);
         let rest = 1.0 - x * x - y * y;
         let z = (if rest > 0.0 { rest } else { 0.0 }).sqrt();
-        let n = [
-            points.normal[0][l],
-            points.normal[1][l],
-            points.normal[2][l],
-        ];
+        let n = [points.normal[0][l], points.normal[1][l], points.normal[2][l]];
         let direction = to_world([x, y, z], n);
         let mut above = 0.0;
         for axis in 0..3 {

@@ -23,10 +23,7 @@ impl Metal {
     /// A metal with a roughness of 0 to 1.
     pub(super) fn new(roughness: f32) -> Self {
         let ggx = Ggx::new(roughness);
-        Self {
-            albedo: Albedo::new(&ggx, 1.0),
-            ggx,
-        }
+        Self { albedo: Albedo::new(&ggx, 1.0), ggx }
     }
 
     /// The fraction of light that does not leave after one reflection if all of it is reflected. It is also the

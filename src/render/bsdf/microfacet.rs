@@ -28,10 +28,7 @@ impl Ggx {
     /// steps look equal (Burley, "Physically-Based Shading at Disney", 2012).
     pub(in crate::render) fn new(roughness: f32) -> Self {
         let alpha = larger(roughness * roughness, MIN_ALPHA);
-        Self {
-            alpha2: alpha * alpha,
-            alpha,
-        }
+        Self { alpha2: alpha * alpha, alpha }
     }
 
     /// The width of the distribution.
@@ -105,11 +102,7 @@ pub(in crate::render) fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
 #[inline(always)]
 pub(in crate::render) fn mirror(out: [f32; 3], h: [f32; 3]) -> [f32; 3] {
     let twice = 2.0 * dot(out, h);
-    [
-        twice * h[0] - out[0],
-        twice * h[1] - out[1],
-        twice * h[2] - out[2],
-    ]
+    [twice * h[0] - out[0], twice * h[1] - out[1], twice * h[2] - out[2]]
 }
 
 /// Whether a direction is sampled from the first of two distributions, which is chosen with probability `part`, and
@@ -117,15 +110,8 @@ pub(in crate::render) fn mirror(out: [f32; 3], h: [f32; 3]) -> [f32; 3] {
 #[inline(always)]
 pub(super) fn choose(part: f32, u: [f32; 2]) -> (bool, [f32; 2]) {
     let is_first = u[0] < part;
-    let (rest, size) = if is_first {
-        (u[0], part)
-    } else {
-        (u[0] - part, 1.0 - part)
-    };
-    (
-        is_first,
-        [smaller(rest / larger(size, 1e-9), BELOW_ONE), u[1]],
-    )
+    let (rest, size) = if is_first { (u[0], part) } else { (u[0] - part, 1.0 - part) };
+    (is_first, [smaller(rest / larger(size, 1e-9), BELOW_ONE), u[1]])
 }
 
 /// `a` or `b`.

@@ -3,10 +3,7 @@
 //!
 //! To add one, add a file with a [`Bsdf`] here and a line in [`bsdfs_of`].
 
-#![expect(
-    clippy::needless_range_loop,
-    reason = "one index for the lanes of many arrays"
-)]
+#![expect(clippy::needless_range_loop, reason = "one index for the lanes of many arrays")]
 
 use glam::Vec3;
 
@@ -192,21 +189,13 @@ fn reflect_samples_body(
         // A light without extent has an infinite density, and its radiance is that of the whole light
         let pdf = samples.pdf[l];
         let other = if competes { values.pdf[l] } else { 0.0 };
-        let factor = if pdf < f32::INFINITY {
-            1.0 / (pdf + other)
-        } else {
-            1.0
-        };
+        let factor = if pdf < f32::INFINITY { 1.0 / (pdf + other) } else { 1.0 };
         let mut brightest = 0.0;
         for axis in 0..3 {
             let reflected = values.value[axis][l] * (samples.radiance[axis][l] * factor);
             let reflected = throughput[axis][l] * reflected;
             samples.radiance[axis][l] = reflected;
-            brightest = if reflected > brightest {
-                reflected
-            } else {
-                brightest
-            };
+            brightest = if reflected > brightest { reflected } else { brightest };
         }
         let is_lit = brightest > 0.0 && lanes >> l & 1 == 1;
         lit_lanes |= u32::from(is_lit) << l;

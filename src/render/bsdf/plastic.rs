@@ -27,10 +27,7 @@ impl Plastic {
     /// Plastic with a roughness of 0 to 1.
     pub(super) fn new(roughness: f32) -> Self {
         let ggx = Ggx::new(roughness);
-        Self {
-            coat: Albedo::new(&ggx, COAT),
-            ggx,
-        }
+        Self { coat: Albedo::new(&ggx, COAT), ggx }
     }
 
     /// The probability with which a direction of the base is sampled.
@@ -70,11 +67,7 @@ impl LocalBsdf for Plastic {
         let cosine = into[2] * FRAC_1_PI;
         let part = self.base_part(base, out[2]);
         let pdf = part * cosine + (1.0 - part) * self.ggx.pdf(h[2], out[2]);
-        let value = [
-            base[0] * matte + coat,
-            base[1] * matte + coat,
-            base[2] * matte + coat,
-        ];
+        let value = [base[0] * matte + coat, base[1] * matte + coat, base[2] * matte + coat];
         (value, pdf)
     }
 

@@ -41,14 +41,7 @@ fn eval(
     }
     let mut values = BsdfValues::default();
     let rays = rays_along(-outgoing);
-    bsdf.eval(
-        Supported::default(),
-        &rays,
-        points,
-        &lanes,
-        0xffff,
-        &mut values,
-    );
+    bsdf.eval(Supported::default(), &rays, points, &lanes, 0xffff, &mut values);
     values
 }
 
@@ -81,11 +74,7 @@ fn bsdfs() -> Vec<Box<dyn Bsdf>> {
 
 /// Normals, and a direction in which light leaves.
 fn cases() -> [[Vec3; 2]; 3] {
-    let normals = [
-        Vec3::Z,
-        Vec3::new(0.36, 0.48, -0.8),
-        Vec3::new(-0.6, 0.8, 0.0),
-    ];
+    let normals = [Vec3::Z, Vec3::new(0.36, 0.48, -0.8), Vec3::new(-0.6, 0.8, 0.0)];
     normals.map(|normal| [normal, (normal + 0.7 * Vec3::X).normalize()])
 }
 
@@ -106,10 +95,7 @@ fn densities_integrate_to_one_and_no_light_is_created() {
         // The standard error of both is 0.003
         assert!((density * share - 1.0).abs() < 0.015, "{}", density * share);
         let reflected = share * reflected;
-        assert!(
-            (reflected / ALBEDO - 1.0).abs().max_element() < 0.015,
-            "{reflected}"
-        );
+        assert!((reflected / ALBEDO - 1.0).abs().max_element() < 0.015, "{reflected}");
     }
 }
 
@@ -136,11 +122,7 @@ fn reflection_is_reciprocal() {
 /// Bins of the sine of the elevation, and of the azimuth around the normal.
 const BINS: [usize; 2] = [8, 16];
 
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "in 0..bins"
-)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in 0..bins")]
 fn bin_of(direction: Vec3, normal: Vec3) -> Option<usize> {
     let [s, t] = crate::render::shading::tangents(normal.to_array()).map(Vec3::from_array);
     let height = direction.dot(normal);
@@ -161,14 +143,7 @@ fn samples_have_their_density() {
         let rays = rays_along(-outgoing);
         for _ in 0..packets {
             let u = [0, 1].map(|_| std::array::from_fn(|_| random.next()));
-            bsdf.sample(
-                Supported::default(),
-                &rays,
-                &points,
-                &u,
-                0xffff,
-                &mut samples,
-            );
+            bsdf.sample(Supported::default(), &rays, &points, &u, 0xffff, &mut samples);
             let directions = std::array::from_fn(|lane| lane3(&samples.direction, lane));
             let values = eval(&**bsdf, &points, outgoing, &directions);
             for (lane, direction) in directions.iter().enumerate() {
@@ -219,14 +194,7 @@ fn nothing_is_reflected_below_the_surface() {
         for _ in 0..64 {
             let u = [0, 1].map(|_| std::array::from_fn(|_| random.next()));
             let rays = rays_along(-normal);
-            bsdf.sample(
-                Supported::default(),
-                &rays,
-                &points,
-                &u,
-                0xffff,
-                &mut samples,
-            );
+            bsdf.sample(Supported::default(), &rays, &points, &u, 0xffff, &mut samples);
             for lane in 0..LANES {
                 let is_below = lane3(&samples.direction, lane).z <= 0.0;
                 assert_eq!(samples.pdf[lane] == 0.0, is_below);

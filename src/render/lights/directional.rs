@@ -36,11 +36,7 @@ impl Light for DirectionalLight {
     }
 
     fn photon_source(&self) -> Option<PhotonSource> {
-        let beam = Beam {
-            to_light: self.to_light,
-            cap: 0.0,
-            irradiance: self.irradiance,
-        };
+        let beam = Beam { to_light: self.to_light, cap: 0.0, irradiance: self.irradiance };
         self.casts_shadow.then_some(PhotonSource::Distant(beam))
     }
 }

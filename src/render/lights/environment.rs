@@ -1,9 +1,6 @@
 //! The environment for packets of rays.
 
-#![expect(
-    clippy::needless_range_loop,
-    reason = "one index for the lanes of many arrays"
-)]
+#![expect(clippy::needless_range_loop, reason = "one index for the lanes of many arrays")]
 
 use super::light::LightSamples;
 use crate::math::{LANES, Lanes, Lanes3, lane_kernel, set_lane3};
@@ -42,11 +39,7 @@ lane_kernel! {
 #[inline(always)]
 fn sample_directions_body(environment: &Environment, u: &[Lanes; 2], directions: &mut Lanes3) {
     for l in 0..LANES {
-        set_lane3(
-            directions,
-            l,
-            environment.sample_direction([u[0][l], u[1][l]]),
-        );
+        set_lane3(directions, l, environment.sample_direction([u[0][l], u[1][l]]));
     }
 }
 
@@ -72,11 +65,7 @@ fn environment_along_body(
     for l in 0..LANES {
         let along = Vec3::new(direction[0][l], direction[1][l], direction[2][l]);
         let (arriving, other) = environment.radiance_and_pdf(along);
-        let weight = if pdf[l] < f32::INFINITY {
-            pdf[l] / (pdf[l] + other)
-        } else {
-            1.0
-        };
+        let weight = if pdf[l] < f32::INFINITY { pdf[l] / (pdf[l] + other) } else { 1.0 };
         for axis in 0..3 {
             radiance[axis][l] = throughput[axis][l] * (weight * arriving[axis]);
         }

@@ -53,11 +53,7 @@ pub(in crate::render) enum PhotonSource {
     /// A point, with its radiant intensity, linear RGB.
     Point { position: Vec3, intensity: Vec3 },
     /// The outside of a sphere, with its radiance, linear RGB.
-    Sphere {
-        center: Vec3,
-        radius: f32,
-        radiance: Vec3,
-    },
+    Sphere { center: Vec3, radius: f32, radiance: Vec3 },
     /// One side of a rectangle or an ellipse.
     Panel {
         center: Vec3,
@@ -127,11 +123,6 @@ pub(in crate::render) struct Emission {
 
 impl Default for Emission {
     fn default() -> Self {
-        Self {
-            t: splat(0.0),
-            pdf: splat(0.0),
-            radiance: Vec3::ZERO,
-            lanes: 0,
-        }
+        Self { t: splat(0.0), pdf: splat(0.0), radiance: Vec3::ZERO, lanes: 0 }
     }
 }

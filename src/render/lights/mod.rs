@@ -39,15 +39,9 @@ pub(super) fn light_of(light: &scene::Light) -> Box<dyn Light> {
             irradiance: light.radiance,
             casts_shadow: light.casts_shadow,
         }),
-        LightKind::Sun {
-            to_light,
-            half_angle,
-        } => Box::new(SunLight::new(
-            to_light,
-            half_angle,
-            light.radiance,
-            light.is_visible,
-        )),
+        LightKind::Sun { to_light, half_angle } => {
+            Box::new(SunLight::new(to_light, half_angle, light.radiance, light.is_visible))
+        }
         LightKind::Sphere { center, radius } => Box::new(SphereLight {
             center,
             radius,
@@ -62,11 +56,7 @@ pub(super) fn light_of(light: &scene::Light) -> Box<dyn Light> {
             radiance: light.radiance,
             is_visible: light.is_visible,
         }),
-        LightKind::Disc {
-            center,
-            normal,
-            radius,
-        } => Box::new(PanelLight {
+        LightKind::Disc { center, normal, radius } => Box::new(PanelLight {
             outline: Outline::Ellipse,
             center,
             axes: disc_axes(normal),

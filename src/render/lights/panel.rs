@@ -3,10 +3,7 @@
 //! 2013), and discs, sampled uniformly in area. Small rectangles are sampled in area as well, where the solid angle
 //! would be inexact and the difference is small.
 
-#![expect(
-    clippy::needless_range_loop,
-    reason = "one index for the lanes of many arrays"
-)]
+#![expect(clippy::needless_range_loop, reason = "one index for the lanes of many arrays")]
 
 use std::f32::consts::PI;
 
@@ -124,15 +121,7 @@ impl SphericalRectangle {
         let g = |a: f32, b: f32| acos(bounded(-a * b));
         let [g2, g3] = [g(n[2], n[3]), g(n[3], n[0])];
         let k = 2.0 * PI - g2 - g3;
-        Self {
-            x,
-            y,
-            z,
-            b0: n[0],
-            b1: n[2],
-            k,
-            solid_angle: g(n[0], n[1]) + g(n[1], n[2]) - k,
-        }
+        Self { x, y, z, b0: n[0], b1: n[2], k, solid_angle: g(n[0], n[1]) + g(n[1], n[2]) - k }
     }
 
     /// The point at `u`, uniform in solid angle.
@@ -188,16 +177,9 @@ fn sample_panel_body(
         let center = light.center_from([start[0][l], start[1][l], start[2][l]]);
         // Choose a point in the area, or in the solid angle
         let u = [u[0][l], u[1][l]];
-        let [a, b] = if is_rectangle {
-            [2.0 * u[0] - 1.0, 2.0 * u[1] - 1.0]
-        } else {
-            disc(u)
-        };
-        let mut to_point = [
-            center[0] + a * light.half[0],
-            center[1] + b * light.half[1],
-            center[2],
-        ];
+        let [a, b] = if is_rectangle { [2.0 * u[0] - 1.0, 2.0 * u[1] - 1.0] } else { disc(u) };
+        let mut to_point =
+            [center[0] + a * light.half[0], center[1] + b * light.half[1], center[2]];
         let mut solid_angle = 0.0;
         if is_rectangle {
             let view = SphericalRectangle::new(center, light.half);
@@ -227,11 +209,7 @@ fn sample_panel_body(
         let height = -center[2];
         let is_in_front = height > 0.0;
         for axis in 0..3 {
-            samples.radiance[axis][l] = if is_in_front {
-                light.radiance[axis]
-            } else {
-                0.0
-            };
+            samples.radiance[axis][l] = if is_in_front { light.radiance[axis] } else { 0.0 };
         }
         let is_large = solid_angle >= MIN_SOLID_ANGLE;
         let of_area = pdf_of_area(distance2, height, area);
@@ -268,22 +246,15 @@ fn intersect_panel_body(light: &PanelLight, rays: &RayPacket, emission: &mut Emi
         let a = (along[0] * t - center[0]) / light.half[0];
         let b = (along[1] * t - center[1]) / light.half[1];
         // Accept hits in the outline from the front
-        let is_within = if is_rectangle {
-            a.abs() < 1.0 && b.abs() < 1.0
-        } else {
-            a * a + b * b < 1.0
-        };
+        let is_within =
+            if is_rectangle { a.abs() < 1.0 && b.abs() < 1.0 } else { a * a + b * b < 1.0 };
         let is_hit = is_within && along[2] < 0.0 && t > 0.0;
         lanes |= u32::from(is_hit) << l;
         emission.t[l] = t;
         let mut pdf = pdf_of_area(t * t, -center[2], area);
         if is_rectangle {
             let solid_angle = SphericalRectangle::new(center, light.half).solid_angle;
-            pdf = if solid_angle >= MIN_SOLID_ANGLE {
-                1.0 / solid_angle
-            } else {
-                pdf
-            };
+            pdf = if solid_angle >= MIN_SOLID_ANGLE { 1.0 / solid_angle } else { pdf };
         }
         emission.pdf[l] = pdf;
     }

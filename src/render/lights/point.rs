@@ -1,9 +1,6 @@
 //! Point lights.
 
-#![expect(
-    clippy::needless_range_loop,
-    reason = "one index for the lanes of many arrays"
-)]
+#![expect(clippy::needless_range_loop, reason = "one index for the lanes of many arrays")]
 
 use glam::Vec3;
 
@@ -38,10 +35,8 @@ impl Light for PointLight {
     fn photon_source(&self) -> Option<PhotonSource> {
         // Light that does not fall off with distance has no flux that is conserved
         let is_physical = self.falloff == Falloff::InverseSquare;
-        (self.casts_shadow && is_physical).then_some(PhotonSource::Point {
-            position: self.position,
-            intensity: self.intensity,
-        })
+        (self.casts_shadow && is_physical)
+            .then_some(PhotonSource::Point { position: self.position, intensity: self.intensity })
     }
 }
 
@@ -57,11 +52,7 @@ fn sample_point_light_body(light: &PointLight, start: &Lanes3, samples: &mut Lig
         }
         let distance = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
         let inverse = 1.0 / distance;
-        let falloff = if has_falloff {
-            1.0 / (distance * distance)
-        } else {
-            1.0
-        };
+        let falloff = if has_falloff { 1.0 / (distance * distance) } else { 1.0 };
         for axis in 0..3 {
             samples.rays.origin[axis][l] = start[axis][l];
             samples.rays.direction[axis][l] = v[axis] * inverse;
@@ -95,11 +86,7 @@ mod tests {
             let u = [splat(0.0); 2];
             light.sample_li(Supported::default(), &splat3(start), &u, &mut samples);
             let rays = &samples.rays;
-            (
-                lane3(&rays.direction, 3),
-                rays.t_max[3],
-                samples.radiance[2][3],
-            )
+            (lane3(&rays.direction, 3), rays.t_max[3], samples.radiance[2][3])
         };
         let below = Vec3::new(1.0, 0.0, 0.0);
         assert_eq!(sample(Falloff::None, below), (Vec3::Z, 4.0, 8.0));

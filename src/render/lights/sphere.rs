@@ -1,9 +1,6 @@
 //! Spheres that emit the same radiance in all directions, sampled uniformly in the solid angle that they cover.
 
-#![expect(
-    clippy::needless_range_loop,
-    reason = "one index for the lanes of many arrays"
-)]
+#![expect(clippy::needless_range_loop, reason = "one index for the lanes of many arrays")]
 
 use std::f32::consts::PI;
 
@@ -85,11 +82,7 @@ impl View {
         Self {
             axis: if has_axis { direction } else { [0.0, 0.0, 1.0] },
             distance2,
-            cap: if is_outside {
-                sin2 / (1.0 + cosine)
-            } else {
-                2.0
-            },
+            cap: if is_outside { sin2 / (1.0 + cosine) } else { 2.0 },
         }
     }
 
@@ -106,11 +99,7 @@ impl View {
         let middle = self.distance2.sqrt() * cosine;
         let half2 = radius * radius - self.distance2 + middle * middle;
         let half = (if half2 > 0.0 { half2 } else { 0.0 }).sqrt();
-        if self.cap < 2.0 {
-            middle - half
-        } else {
-            middle + half
-        }
+        if self.cap < 2.0 { middle - half } else { middle + half }
     }
 }
 

@@ -34,18 +34,11 @@ fn rectangle(height: f32, half: [f32; 2]) -> Box<dyn Light> {
 }
 
 fn disc_light(height: f32, radius: f32) -> Box<dyn Light> {
-    light(LightKind::Disc {
-        center: Vec3::Z * height,
-        normal: Vec3::NEG_Z,
-        radius,
-    })
+    light(LightKind::Disc { center: Vec3::Z * height, normal: Vec3::NEG_Z, radius })
 }
 
 fn sun(to_light: Vec3, degrees: f64) -> Box<dyn Light> {
-    light(LightKind::Sun {
-        to_light,
-        half_angle: degrees.to_radians(),
-    })
+    light(LightKind::Sun { to_light, half_angle: degrees.to_radians() })
 }
 
 /// Points in the unit square, evenly spread (Roberts, 2018).
@@ -69,11 +62,7 @@ fn irradiance(light: &dyn Light, point: Vec3, normal: Vec3) -> f32 {
         light.sample_li(Supported::default(), &splat3(point), &u, &mut samples);
         for lane in 0..LANES {
             let cosine = lane3(&samples.rays.direction, lane).dot(normal).max(0.0);
-            let pdf = if samples.pdf[lane].is_finite() {
-                samples.pdf[lane]
-            } else {
-                1.0
-            };
+            let pdf = if samples.pdf[lane].is_finite() { samples.pdf[lane] } else { 1.0 };
             sum += f64::from(samples.radiance[1][lane] * cosine / pdf);
             count += 1.0;
         }
@@ -86,10 +75,7 @@ fn irradiance(light: &dyn Light, point: Vec3, normal: Vec3) -> f32 {
 #[track_caller]
 fn check(light: &dyn Light, point: Vec3, normal: Vec3, wanted: f32) {
     let found = irradiance(light, point, normal);
-    assert!(
-        (found - wanted).abs() <= 2e-3 * wanted + 1e-6,
-        "{found} {wanted}"
-    );
+    assert!((found - wanted).abs() <= 2e-3 * wanted + 1e-6, "{found} {wanted}");
 }
 
 #[test]
@@ -104,12 +90,7 @@ fn spheres_have_their_irradiance() {
         }
     }
     // From inside it is everywhere.
-    check(
-        &*sphere(Vec3::ZERO, 2.0),
-        Vec3::new(0.5, 0.2, 0.1),
-        tilted,
-        PI * LIGHT,
-    );
+    check(&*sphere(Vec3::ZERO, 2.0), Vec3::new(0.5, 0.2, 0.1), tilted, PI * LIGHT);
 }
 
 /// Configuration factor times pi of a rectangle from a corner, parallel to the surface.
@@ -125,12 +106,9 @@ fn corner(width: f32, length: f32, height: f32) -> f32 {
 #[test]
 fn rectangles_have_their_irradiance() {
     // Large ones are sampled in solid angle, small ones in area.
-    for (height, half) in [
-        (1.0, [1.0, 2.0]),
-        (0.1, [1.0, 3.0]),
-        (2.0, [0.1, 0.2]),
-        (50.0, [1.0, 1.0]),
-    ] {
+    for (height, half) in
+        [(1.0, [1.0, 2.0]), (0.1, [1.0, 3.0]), (2.0, [0.1, 0.2]), (50.0, [1.0, 1.0])]
+    {
         let light = rectangle(height, half);
         let wanted = 4.0 * LIGHT * corner(half[0], half[1], height);
         check(&*light, Vec3::ZERO, Vec3::Z, wanted);
@@ -148,12 +126,7 @@ fn discs_have_their_irradiance() {
     for (height, radius) in [(1.0, 1.0_f32), (3.0, 0.5), (0.3, 1.0)] {
         let wanted = PI * LIGHT * radius.powi(2) / (radius.powi(2) + height * height);
         check(&*disc_light(height, radius), Vec3::ZERO, Vec3::Z, wanted);
-        check(
-            &*disc_light(height, radius),
-            Vec3::Z * 9.0,
-            Vec3::NEG_Z,
-            0.0,
-        );
+        check(&*disc_light(height, radius), Vec3::Z * 9.0, Vec3::NEG_Z, 0.0);
     }
 }
 
@@ -164,22 +137,9 @@ fn distant_lights_have_their_irradiance() {
         check(&*sun(to_light, degrees), Vec3::ONE, to_light, LIGHT);
         check(&*sun(to_light, degrees), Vec3::ONE, Vec3::Z, 0.8 * LIGHT);
     }
-    check(
-        &*light(LightKind::Directional { to_light }),
-        Vec3::ONE,
-        Vec3::Z,
-        0.8 * LIGHT,
-    );
-    let kind = LightKind::Point {
-        position: Vec3::Z * 2.0,
-        falloff: scene::Falloff::InverseSquare,
-    };
-    check(
-        &*light(kind),
-        Vec3::ZERO,
-        Vec3::new(0.6, 0.0, 0.8),
-        0.8 * LIGHT / 4.0,
-    );
+    check(&*light(LightKind::Directional { to_light }), Vec3::ONE, Vec3::Z, 0.8 * LIGHT);
+    let kind = LightKind::Point { position: Vec3::Z * 2.0, falloff: scene::Falloff::InverseSquare };
+    check(&*light(kind), Vec3::ZERO, Vec3::new(0.6, 0.0, 0.8), 0.8 * LIGHT / 4.0);
 }
 
 #[test]
@@ -208,15 +168,9 @@ fn rays_hit_lights_where_they_are_sampled() {
                 }
                 hits += 1;
                 let (t, wanted) = (emission.t[lane], samples.rays.t_max[lane]);
-                assert!(
-                    t == wanted || (t / wanted - 1.0).abs() < 5e-3,
-                    "{number}: {t} {wanted}"
-                );
+                assert!(t == wanted || (t / wanted - 1.0).abs() < 5e-3, "{number}: {t} {wanted}");
                 let (pdf, wanted) = (emission.pdf[lane], samples.pdf[lane]);
-                assert!(
-                    (pdf / wanted - 1.0).abs() < 2e-3,
-                    "{number}: {pdf} {wanted}"
-                );
+                assert!((pdf / wanted - 1.0).abs() < 2e-3, "{number}: {pdf} {wanted}");
                 assert_eq!(emission.radiance.x, samples.radiance[0][lane]);
             }
         }
@@ -250,10 +204,7 @@ fn the_density_of_hits_is_that_of_uniform_directions() {
                 let z = 1.0 - 2.0 * a;
                 let level = (1.0 - z * z).sqrt();
                 let (sin, cos) = (2.0 * PI * b).sin_cos();
-                rays.push(&Ray::new(
-                    Vec3::ZERO,
-                    Vec3::new(level * cos, level * sin, z),
-                ));
+                rays.push(&Ray::new(Vec3::ZERO, Vec3::new(level * cos, level * sin, z)));
             }
             light.intersect(Supported::default(), &rays, &mut emission);
             for lane in 0..LANES {

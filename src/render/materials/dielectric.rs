@@ -53,11 +53,7 @@ impl Dielectric {
 
     #[inline(always)]
     fn reflectance(&self, cosine: f32, ratio: f32) -> f32 {
-        if self.is_exact {
-            dielectric(cosine, ratio)
-        } else {
-            schlick(self.r0, cosine)
-        }
+        if self.is_exact { dielectric(cosine, ratio) } else { schlick(self.r0, cosine) }
     }
 }
 
@@ -69,11 +65,7 @@ fn attenuate_body(extinction: &Vec3, length: &Lanes, lanes: u32, throughput: &mu
             let length = if length[l] > 0.0 { length[l] } else { 0.0 };
             let attenuated = throughput[axis][l] * exp(-length * extinction[axis]);
             let is_inside = lanes >> l & 1 == 1;
-            throughput[axis][l] = if is_inside {
-                attenuated
-            } else {
-                throughput[axis][l]
-            };
+            throughput[axis][l] = if is_inside { attenuated } else { throughput[axis][l] };
         }
     }
 }
@@ -116,11 +108,7 @@ fn cross_straight_body(
     for l in 0..LANES {
         let along = d[0][l] * n[0][l] + d[1][l] * n[1][l] + d[2][l] * n[2][l];
         let fresnel_transmittance = boundary.straight_transmittance(along.abs());
-        let fresnel_transmittance = if lanes >> l & 1 == 1 {
-            fresnel_transmittance
-        } else {
-            1.0
-        };
+        let fresnel_transmittance = if lanes >> l & 1 == 1 { fresnel_transmittance } else { 1.0 };
         for transmittance in &mut *transmittance {
             transmittance[l] *= fresnel_transmittance;
         }

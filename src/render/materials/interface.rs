@@ -69,20 +69,12 @@ fn interface_points_body(
         let has_length = inverse > 0.0 && inverse < f32::INFINITY;
         let mut n = [0.0; 3];
         for axis in 0..3 {
-            let turned = if has_length {
-                turned[axis] * inverse
-            } else {
-                -d[axis]
-            };
+            let turned = if has_length { turned[axis] * inverse } else { -d[axis] };
             n[axis] = if is_facing { s[axis] } else { turned };
         }
         // Compute the Fresnel reflectance, and the directions of both rays
         let cosine = -(d[0] * n[0] + d[1] * n[1] + d[2] * n[2]);
-        let ratio = if is_inside {
-            material.dielectric.ior
-        } else {
-            1.0 / material.dielectric.ior
-        };
+        let ratio = if is_inside { material.dielectric.ior } else { 1.0 / material.dielectric.ior };
         let (r, sin2_out) = material.dielectric.fresnel(cosine, ratio);
         let rest = 1.0 - sin2_out;
         let along_normal = ratio * cosine - (if rest > 0.0 { rest } else { 0.0 }).sqrt();

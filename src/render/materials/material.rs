@@ -33,10 +33,7 @@ pub(in crate::render) trait Material: Sync {
 
     /// Converts the radiance that arrives from a light to the radiance reflected along the rays of the packet, times
     /// `throughput`, only for `lanes`; all other lanes are not lit.
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "arrays that do not overlap; see `lane_kernel!`"
-    )]
+    #[expect(clippy::too_many_arguments, reason = "arrays that do not overlap; see `lane_kernel!`")]
     fn reflect(
         &self,
         simd: Supported,
@@ -48,8 +45,6 @@ pub(in crate::render) trait Material: Sync {
         samples: &mut LightSamples,
     ) {
         let constants = self.constants();
-        reflect_lights(
-            simd, constants, rays, points, base, throughput, lanes, samples,
-        );
+        reflect_lights(simd, constants, rays, points, base, throughput, lanes, samples);
     }
 }

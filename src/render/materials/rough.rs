@@ -8,10 +8,7 @@
 //! (Turquin, "Practical Multiple Scattering Compensation for Microfacet Models", 2019). That loses no light, but is
 //! only reciprocal without it.
 
-#![expect(
-    clippy::needless_range_loop,
-    reason = "one index for the lanes of many arrays"
-)]
+#![expect(clippy::needless_range_loop, reason = "one index for the lanes of many arrays")]
 
 use super::points::ShadingPoints;
 use super::whitted::WhittedMaterial;
@@ -55,12 +52,7 @@ impl RoughInterface {
                 mean_over_square(|u| leave(&ggx, constants, out, ratio, u).weights.iter().sum())
             })
         });
-        Some(Self {
-            material: *constants,
-            ggx,
-            leaving,
-            is_connected,
-        })
+        Some(Self { material: *constants, ggx, leaving, is_connected })
     }
 
     /// Samples the rays that leave the intersections of a packet, by `u` in the unit square: `points.reflected` and
@@ -143,31 +135,18 @@ fn rough_rays_body(
         }
         // Find the side of the ray, and turn the normals to it
         let is_leaving = dot(out, n) <= 0.0;
-        let is_inside = if interface.is_connected {
-            inside >> l & 1 == 1
-        } else {
-            is_leaving
-        };
+        let is_inside = if interface.is_connected { inside >> l & 1 == 1 } else { is_leaving };
         let side = if is_inside { -1.0 } else { 1.0 };
         let mut normal = [0.0; 3];
         for axis in 0..3 {
             let shading = hits.shading_normal[axis][l];
-            normal[axis] = side
-                * if interface.is_connected {
-                    shading
-                } else {
-                    n[axis]
-                };
+            normal[axis] = side * if interface.is_connected { shading } else { n[axis] };
         }
         // Sample the rays in the frame of the normal
         let [s, t] = tangents(normal);
         let up = larger(dot(out, normal), MIN_COSINE);
         let local = normalized([dot(out, s), dot(out, t), up]);
-        let ratio = if is_inside {
-            material.dielectric.ior
-        } else {
-            1.0 / material.dielectric.ior
-        };
+        let ratio = if is_inside { material.dielectric.ior } else { 1.0 / material.dielectric.ior };
         let leaving = leave(&interface.ggx, material, local, ratio, [u[0][l], u[1][l]]);
         // Add the light that leaves after several microfacets
         let [outside, inside] = &interface.leaving;

@@ -94,11 +94,7 @@ fn direction_density(alpha: f64, ratio: f64, out: [f64; 3], into: [f64; 3]) -> f
 /// Bins of the height, and of the azimuth.
 const BINS: [usize; 2] = [12, 16];
 
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "in 0..bins"
-)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in 0..bins")]
 fn bin_of(direction: [f64; 3]) -> usize {
     let turns = direction[1].atan2(direction[0]) / (2.0 * PI) + 0.5;
     let row = ((0.5 * (direction[2] + 1.0) * BINS[0] as f64) as usize).min(BINS[0] - 1);
@@ -114,13 +110,7 @@ fn check_density(roughness: f32, degrees: f32, ratio: f32, reflected: bool) {
     let (mut random, samples) = (Random(7), 100_000_u32);
     let mut counts = [0_u32; BINS[0] * BINS[1]];
     for _ in 0..samples {
-        let rays = leave(
-            &interface.ggx,
-            &interface.material,
-            out,
-            ratio,
-            random.pair(),
-        );
+        let rays = leave(&interface.ggx, &interface.material, out, ratio, random.pair());
         let [of_reflected, of_refracted] = rays.weights;
         let (direction, weight) = match reflected {
             true => (rays.reflected, of_reflected),
@@ -156,18 +146,10 @@ fn check_density(roughness: f32, degrees: f32, ratio: f32, reflected: bool) {
     }
     // Five standard deviations
     let limit = freedom + 5.0 * f64::sqrt(2.0 * freedom);
-    assert!(
-        freedom > 3.0,
-        "{roughness} {degrees} {ratio}: {freedom} bins"
-    );
-    assert!(
-        chi2 < limit,
-        "{roughness} {degrees} {ratio} {reflected}: {chi2} of {limit}"
-    );
-    let [found, wanted] = [
-        counts.iter().map(|c| f64::from(*c)).sum::<f64>(),
-        expected.iter().sum::<f64>(),
-    ];
+    assert!(freedom > 3.0, "{roughness} {degrees} {ratio}: {freedom} bins");
+    assert!(chi2 < limit, "{roughness} {degrees} {ratio} {reflected}: {chi2} of {limit}");
+    let [found, wanted] =
+        [counts.iter().map(|c| f64::from(*c)).sum::<f64>(), expected.iter().sum::<f64>()];
     assert!((found / wanted - 1.0).abs() < 0.02, "{found} {wanted}");
 }
 
@@ -193,16 +175,9 @@ fn bsdf(interface: &RoughInterface, ratio: f64, out: [f64; 3], into: [f64; 3]) -
         false => unit64([0, 1, 2].map(|i| -(ratio * out[i] + into[i]))),
     };
     let h = if h[2] < 0.0 { h.map(|c| -c) } else { h };
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "the functions under test are f32"
-    )]
-    let (cosine, small, up, down) = (
-        dot64(out, h) as f32,
-        ratio as f32,
-        out[2] as f32,
-        into[2].abs() as f32,
-    );
+    #[expect(clippy::cast_possible_truncation, reason = "the functions under test are f32")]
+    let (cosine, small, up, down) =
+        (dot64(out, h) as f32, ratio as f32, out[2] as f32, into[2].abs() as f32);
     let (r, _) = interface.material.dielectric.fresnel(cosine, small);
     let fresnel = if into[2] > 0.0 { r } else { 1.0 - r };
     let weight = f64::from(fresnel * passed(&interface.ggx, up, down));
@@ -216,11 +191,7 @@ fn light_can_go_both_ways() {
         let [a, b] = random.pair().map(f64::from);
         let (z, turn) = (0.1 + 0.9 * a, 2.0 * PI * b);
         let level = (1.0 - z * z).sqrt();
-        [
-            level * turn.cos(),
-            level * turn.sin(),
-            if above { z } else { -z },
-        ]
+        [level * turn.cos(), level * turn.sin(), if above { z } else { -z }]
     };
     for roughness in [0.3, 0.6, 1.0] {
         let interface = rough(roughness);
@@ -228,25 +199,16 @@ fn light_can_go_both_ways() {
         for _ in 0..2000 {
             let (a, b, c) = (direction(true), direction(true), direction(false));
             let [forth, back] = [(a, b), (b, a)].map(|(o, i)| bsdf(&interface, 1.0 / ior, o, i));
-            assert!(
-                (forth - back).abs() <= 1e-4 * forth.max(back) + 1e-9,
-                "{forth} {back}"
-            );
+            assert!((forth - back).abs() <= 1e-4 * forth.max(back) + 1e-9, "{forth} {back}");
             reflections += u32::from(forth > 0.0);
             // Radiance grows by the square of the index, which paths leave out on both ways
             let turned = |v: [f64; 3]| v.map(|c| -c);
             let into = bsdf(&interface, 1.0 / ior, a, c) / (ior * ior);
             let out = bsdf(&interface, ior, turned(c), turned(a));
-            assert!(
-                (into - out).abs() <= 1e-3 * into.max(out) + 1e-5,
-                "{into} {out}"
-            );
+            assert!((into - out).abs() <= 1e-3 * into.max(out) + 1e-5, "{into} {out}");
             refractions += u32::from(into > 0.0);
         }
-        assert!(
-            reflections > 1000 && refractions > 100,
-            "{reflections} {refractions}"
-        );
+        assert!(reflections > 1000 && refractions > 100, "{reflections} {refractions}");
     }
 }
 
@@ -254,18 +216,8 @@ fn light_can_go_both_ways() {
 fn leaving(interface: &RoughInterface, degrees: f32, ratio: f32) -> f64 {
     let (mut random, out, samples) = (Random(11), towards(degrees), 20_000_u32);
     let weights = (0..samples).map(|_| {
-        let rays = leave(
-            &interface.ggx,
-            &interface.material,
-            out,
-            ratio,
-            random.pair(),
-        );
-        assert!(
-            rays.weights
-                .iter()
-                .all(|weight| (0.0..=1.0).contains(weight))
-        );
+        let rays = leave(&interface.ggx, &interface.material, out, ratio, random.pair());
+        assert!(rays.weights.iter().all(|weight| (0.0..=1.0).contains(weight)));
         f64::from(rays.weights.iter().sum::<f32>())
     });
     weights.sum::<f64>() / f64::from(samples)
@@ -283,10 +235,7 @@ fn single_microfacets_lose_light_which_the_tables_add() {
                     (found / known - 1.0).abs() < 0.03,
                     "{roughness} {degrees}: {found} {known}"
                 );
-                assert!(
-                    found <= 1.0 && (degrees > 70.0 || 1.0 - found < most),
-                    "{found}"
-                );
+                assert!(found <= 1.0 && (degrees > 70.0 || 1.0 - found < most), "{found}");
             }
         }
     }
@@ -316,10 +265,9 @@ fn a_slight_roughness_is_nearly_smooth() {
     let mut random = Random(3);
     for is_connected in [false, true] {
         let rough = RoughInterface::of(&material, &constants, is_connected).unwrap();
-        for (direction, inside) in [
-            (Vec3::new(0.6, 0.0, -0.8), 0),
-            (Vec3::new(0.3, 0.2, 0.9).normalize(), 0xffff),
-        ] {
+        for (direction, inside) in
+            [(Vec3::new(0.6, 0.0, -0.8), 0), (Vec3::new(0.3, 0.2, 0.9).normalize(), 0xffff)]
+        {
             let (rays, hits) = packet(direction);
             let [mut expected, mut found] = [ShadingPoints::default(), ShadingPoints::default()];
             for simd in tested_levels().into_iter().map(Supported::or_best) {

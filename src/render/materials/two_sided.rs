@@ -43,17 +43,9 @@ fn reflected_rays_body(
     points: &mut ShadingPoints,
 ) {
     for l in 0..LANES {
-        let d = [
-            rays.direction[0][l],
-            rays.direction[1][l],
-            rays.direction[2][l],
-        ];
+        let d = [rays.direction[0][l], rays.direction[1][l], rays.direction[2][l]];
         let n = [hits.normal[0][l], hits.normal[1][l], hits.normal[2][l]];
-        let s = [
-            hits.shading_normal[0][l],
-            hits.shading_normal[1][l],
-            hits.shading_normal[2][l],
-        ];
+        let s = [hits.shading_normal[0][l], hits.shading_normal[1][l], hits.shading_normal[2][l]];
         // Turn both normals to the side of the ray
         let along = d[0] * n[0] + d[1] * n[1] + d[2] * n[2];
         let is_entering = along < 0.0;
@@ -62,11 +54,8 @@ fn reflected_rays_body(
         let shading_along = d[0] * s[0] + d[1] * s[1] + d[2] * s[2];
         let shading_side = if shading_along < 0.0 { 1.0 } else { -1.0 };
         // Compute the Fresnel reflectance, 1 under total internal reflection
-        let ratio = if is_entering {
-            1.0 / material.dielectric.ior
-        } else {
-            material.dielectric.ior
-        };
+        let ratio =
+            if is_entering { 1.0 / material.dielectric.ior } else { material.dielectric.ior };
         let (r, _) = material.dielectric.fresnel(cosine, ratio);
         // Compute the reflected direction, normalised so that errors do not accumulate along a path
         let twice = 2.0 * -cosine;
@@ -122,11 +111,8 @@ fn refracted_rays_body(
         let is_entering = along < 0.0;
         let side = if is_entering { 1.0 } else { -1.0 };
         let cosine = if is_entering { -along } else { along };
-        let ratio = if is_entering {
-            1.0 / material.dielectric.ior
-        } else {
-            material.dielectric.ior
-        };
+        let ratio =
+            if is_entering { 1.0 / material.dielectric.ior } else { material.dielectric.ior };
         let (r, sin2_out) = material.dielectric.fresnel(cosine, ratio);
         // Compute the refracted direction by Snell's law
         let is_total = sin2_out >= 1.0;

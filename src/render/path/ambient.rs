@@ -75,32 +75,16 @@ impl PathIntegrator<'_> {
                 let light = lane3(&packet.weight, lane) * albedo * irradiance * FRAC_1_PI;
                 set_lane3(&mut reflected, lane, light);
             }
-            add(
-                simd,
-                &reflected,
-                &Vec3::ONE,
-                surface.lanes,
-                &mut packet.radiance,
-            );
+            add(simd, &reflected, &Vec3::ONE, surface.lanes, &mut packet.radiance);
             let group = context.environment_group();
             packet.groups.add(simd, group, &reflected, surface.lanes);
         }
         // Add the light of light sources
         for index in 0..context.lights.len() {
             self.reflect_light(index, false, surface, packet);
-            let PacketScratch {
-                light,
-                radiance,
-                groups,
-                ..
-            } = &mut *packet;
+            let PacketScratch { light, radiance, groups, .. } = &mut *packet;
             add(simd, &light.radiance, &Vec3::ONE, light.lanes, radiance);
-            groups.add(
-                simd,
-                context.light_group(index),
-                &light.radiance,
-                light.lanes,
-            );
+            groups.add(simd, context.light_group(index), &light.radiance, light.lanes);
         }
     }
 }

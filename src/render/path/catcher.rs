@@ -42,11 +42,7 @@ impl Catcher {
         let environment = scene.environment.as_deref().filter(|e| !e.is_black());
         let environment = environment.map(|e| e.times_cosine(ground.up));
         let irradiance = environment.as_ref().map_or(Vec3::ZERO, Environment::flux);
-        Some(Self {
-            strength,
-            environment,
-            whole: irradiance * FRAC_1_PI,
-        })
+        Some(Self { strength, environment, whole: irradiance * FRAC_1_PI })
     }
 }
 
@@ -71,10 +67,7 @@ impl PathIntegrator<'_> {
         let (simd, rays) = (self.context.simd, &surface.segments.rays);
         let points = &mut packet.surface;
         surface_points(simd, rays, &packet.hits, &packet.base, points);
-        let mut light = CaughtLight {
-            whole: splat3(catcher.whole),
-            lost: [splat(0.0); 3],
-        };
+        let mut light = CaughtLight { whole: splat3(catcher.whole), lost: [splat(0.0); 3] };
         if let Some(environment) = &catcher.environment {
             self.lose_environment(environment, surface, packet, &mut light);
         }
@@ -114,13 +107,7 @@ impl PathIntegrator<'_> {
         let (simd, path) = (self.context.simd, &surface.segments.path);
         let mut u = [splat(0.0); 2];
         get_2d_lanes(simd, path, ENVIRONMENT, &surface.sample, &mut u);
-        let PacketScratch {
-            light: samples,
-            crossings,
-            counts,
-            surface: points,
-            ..
-        } = packet;
+        let PacketScratch { light: samples, crossings, counts, surface: points, .. } = packet;
         sample_directions(simd, environment, &u, &mut samples.rays.direction);
         // Find out whether something is in their way
         let direction = |rays: &RayPacket, l: usize| lane3(&rays.direction, l);

@@ -62,16 +62,8 @@ impl PathIntegrator<'_> {
                 set_lane3(&mut directions, lane, lane3(&packet.surface.normal, lane));
             }
         }
-        if let Some(map) = self
-            .caustics
-            .surfaces
-            .as_ref()
-            .filter(|_| lanes & !ground != 0)
-        {
-            let surface = Surface {
-                lanes: lanes & !ground,
-                ..*surface
-            };
+        if let Some(map) = self.caustics.surfaces.as_ref().filter(|_| lanes & !ground != 0) {
+            let surface = Surface { lanes: lanes & !ground, ..*surface };
             self.add_photons(map, &surface, packet, &mut directions);
         }
         if packet.split.is_active {
@@ -89,13 +81,7 @@ impl PathIntegrator<'_> {
         directions: &mut Lanes3,
     ) {
         // Find the photons
-        let PacketScratch {
-            hits,
-            surface: points,
-            near,
-            found,
-            ..
-        } = &mut *packet;
+        let PacketScratch { hits, surface: points, near, found, .. } = &mut *packet;
         for photons in near.iter_mut() {
             photons.clear();
         }
@@ -119,11 +105,7 @@ impl PathIntegrator<'_> {
             }
             self.eval(&Surface { lanes, ..*surface }, packet);
             for lane in lanes_in(lanes) {
-                let NearPhoton {
-                    to_light,
-                    irradiance,
-                    group,
-                } = packet.near[lane][number];
+                let NearPhoton { to_light, irradiance, group } = packet.near[lane][number];
                 let cosine = to_light.dot(lane3(&packet.surface.geometric, lane));
                 let value = lane3(&packet.bsdf.value, lane) / cosine.max(MIN_COSINE);
                 let light = lane3(&packet.weight, lane) * value * irradiance;

@@ -109,14 +109,7 @@ impl PathIntegrator<'_> {
         let Some(environment) = self.environment else {
             return;
         };
-        let PacketScratch {
-            hits,
-            throughput,
-            radiance,
-            weight,
-            groups,
-            ..
-        } = packet;
+        let PacketScratch { hits, throughput, radiance, weight, groups, .. } = packet;
         let lanes = lanes & (!hits.mask | hits.lanes_of(MaterialId::GROUND));
         if lanes == 0 {
             return;
@@ -133,14 +126,7 @@ impl PathIntegrator<'_> {
         });
         let direction = &segments.rays.direction;
         let mut seen = [splat(0.0); 3];
-        environment_along(
-            context.simd,
-            environment,
-            direction,
-            &pdf,
-            weight,
-            &mut seen,
-        );
+        environment_along(context.simd, environment, direction, &pdf, weight, &mut seen);
         add(context.simd, &seen, &Vec3::ONE, lanes, radiance);
         groups.add(context.simd, context.environment_group(), &seen, lanes);
     }

@@ -73,10 +73,7 @@ mod tests {
                 let (x, y) = sampler.points(pixel, 7);
                 assert_eq!((x.len(), y.len()), (samples as usize, samples as usize));
                 let mean = y.iter().sum::<f32>() / samples as f32;
-                assert!(
-                    (mean - 0.5).abs() <= 0.5 / samples as f32 + 1e-5,
-                    "{samples}: {mean}"
-                );
+                assert!((mean - 0.5).abs() <= 0.5 / samples as f32 + 1e-5, "{samples}: {mean}");
                 sets.insert(x[0].to_bits());
             }
             assert!(samples == 1 || sets.len() > 12, "{samples}: {}", sets.len());
@@ -86,10 +83,7 @@ mod tests {
 
     #[test]
     fn filters_spread_samples_around_the_pixel() {
-        let filter = PixelFilter {
-            kind: FilterKind::Gaussian,
-            width: 3.0,
-        };
+        let filter = PixelFilter { kind: FilterKind::Gaussian, width: 3.0 };
         let centre = FilmSampler::with_filter(1, filter);
         assert_eq!(centre.points(3, 4), (&[0.5][..], &[0.5][..]));
         let sampler = FilmSampler::with_filter(64, filter);

@@ -43,10 +43,7 @@ pub struct PixelFilter {
 
 impl PixelFilter {
     /// The pixel itself.
-    pub const BOX: Self = Self {
-        kind: FilterKind::Box,
-        width: 1.0,
-    };
+    pub const BOX: Self = Self { kind: FilterKind::Box, width: 1.0 };
 
     /// The filter at distance `x` from its centre along one axis, relative to its maximum.
     pub(super) fn value(self, x: f64) -> f64 {
@@ -87,10 +84,7 @@ impl FilterTable {
             integral.push(sum);
         }
         integral.iter_mut().for_each(|part| *part /= sum);
-        Self {
-            integral,
-            half_width,
-        }
+        Self { integral, half_width }
     }
 
     /// The distance from the centre for `u` in 0..1; it grows with `u`.
@@ -113,18 +107,9 @@ mod tests {
     use super::*;
 
     const FILTERS: [PixelFilter; 3] = [
-        PixelFilter {
-            kind: FilterKind::Box,
-            width: 1.5,
-        },
-        PixelFilter {
-            kind: FilterKind::Gaussian,
-            width: 2.0,
-        },
-        PixelFilter {
-            kind: FilterKind::BlackmanHarris,
-            width: 3.0,
-        },
+        PixelFilter { kind: FilterKind::Box, width: 1.5 },
+        PixelFilter { kind: FilterKind::Gaussian, width: 2.0 },
+        PixelFilter { kind: FilterKind::BlackmanHarris, width: 3.0 },
     ];
 
     #[test]
@@ -137,11 +122,7 @@ mod tests {
                 let u = (number as f64 + 0.5) / count as f64;
                 #[expect(clippy::cast_possible_truncation, reason = "as the sampler has it")]
                 let position = f64::from(table.position(u as f32)) / f64::from(filter.width) + 0.5;
-                #[expect(
-                    clippy::cast_possible_truncation,
-                    clippy::cast_sign_loss,
-                    reason = "0..1"
-                )]
+                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0..1")]
                 let bin = (position * bins as f64) as usize;
                 found[bin.min(bins - 1)] += 1.0 / count as f64;
             }
@@ -155,10 +136,7 @@ mod tests {
             let total: f64 = (0..bins).map(part).sum();
             for (bin, found) in found.iter().enumerate() {
                 let expected = part(bin) / total;
-                assert!(
-                    (found - expected).abs() < 2e-4,
-                    "{filter:?} {bin}: {found} {expected}"
-                );
+                assert!((found - expected).abs() < 2e-4, "{filter:?} {bin}: {found} {expected}");
             }
         }
     }

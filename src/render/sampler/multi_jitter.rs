@@ -114,11 +114,7 @@ mod tests {
         parts.len()
     }
 
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "in 0..strata"
-    )]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in 0..strata")]
     fn stratum(value: f32, strata: u32) -> u32 {
         (value * strata as f32) as u32
     }

@@ -131,11 +131,7 @@ fn unit(fraction: u32) -> f32 {
 mod tests {
     use super::*;
 
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "in 0..parts"
-    )]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in 0..parts")]
     fn part(value: f32, parts: u32) -> u32 {
         (value * parts as f32) as u32
     }
@@ -163,9 +159,7 @@ mod tests {
             let points: Vec<_> = (0..1 << bits).map(|s| seed.get_2d(0, s)).collect();
             for across in 0..=bits {
                 let (columns, rows) = (1 << across, 1 << (bits - across));
-                let cells = points
-                    .iter()
-                    .map(|[x, y]| part(*x, columns) * rows + part(*y, rows));
+                let cells = points.iter().map(|[x, y]| part(*x, columns) * rows + part(*y, rows));
                 assert!(is_permutation(cells, 1 << bits), "{bits} {across}");
             }
         }

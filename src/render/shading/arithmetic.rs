@@ -10,11 +10,7 @@ fn add_body(added: &Lanes3, weight: &Vec3, lanes: u32, radiance: &mut Lanes3) {
     for axis in 0..3 {
         for l in 0..LANES {
             let sum = radiance[axis][l] + weight[axis] * added[axis][l];
-            radiance[axis][l] = if lanes >> l & 1 == 1 {
-                sum
-            } else {
-                radiance[axis][l]
-            };
+            radiance[axis][l] = if lanes >> l & 1 == 1 { sum } else { radiance[axis][l] };
         }
     }
 }

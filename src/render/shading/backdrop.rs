@@ -58,10 +58,8 @@ mod tests {
             fov: 60.0,
         };
         let camera = Camera::new(&view, 1.6, DVec3::ZERO).unwrap();
-        let camera = camera.with_lens(Lens {
-            radius: if lens.is_some() { 0.5 } else { 0.0 },
-            focus: 4.0,
-        });
+        let camera =
+            camera.with_lens(Lens { radius: if lens.is_some() { 0.5 } else { 0.0 }, focus: 4.0 });
         let (mut rays, mut radiance) = (RayPacket::default(), [splat(0.0); 3]);
         let ray = camera.ray(film);
         set_lane3(&mut rays.origin, 2, ray.origin);

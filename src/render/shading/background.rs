@@ -19,24 +19,15 @@ pub(in crate::render) struct BackgroundLanes {
 impl From<&Background> for BackgroundLanes {
     fn from(background: &Background) -> Self {
         match *background {
-            Background::Constant(color) => Self {
-                bottom: color,
-                top: color,
-                up: Vec3::Z,
-                is_constant: true,
-            },
-            Background::Gradient { bottom, top, up } => Self {
-                bottom,
-                top,
-                up,
-                is_constant: false,
-            },
-            Background::Studio { up } => Self {
-                bottom: STUDIO_BOTTOM,
-                top: STUDIO_TOP,
-                up,
-                is_constant: false,
-            },
+            Background::Constant(color) => {
+                Self { bottom: color, top: color, up: Vec3::Z, is_constant: true }
+            }
+            Background::Gradient { bottom, top, up } => {
+                Self { bottom, top, up, is_constant: false }
+            }
+            Background::Studio { up } => {
+                Self { bottom: STUDIO_BOTTOM, top: STUDIO_TOP, up, is_constant: false }
+            }
         }
     }
 }
@@ -66,17 +57,9 @@ fn add_background_body(
         let (bottom, top) = (background.bottom[axis], background.top[axis]);
         for l in 0..LANES {
             let color = bottom * (1.0 - part[l]) + top * part[l];
-            let color = if background.is_constant {
-                bottom
-            } else {
-                color
-            };
+            let color = if background.is_constant { bottom } else { color };
             let sum = radiance[axis][l] + weight[axis][l] * color;
-            radiance[axis][l] = if lanes >> l & 1 == 1 {
-                sum
-            } else {
-                radiance[axis][l]
-            };
+            radiance[axis][l] = if lanes >> l & 1 == 1 { sum } else { radiance[axis][l] };
         }
     }
 }

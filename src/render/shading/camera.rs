@@ -254,11 +254,7 @@ fn stereo_rays_body(camera: &CameraLanes, side: &Lanes, rays: &mut RayPacket) {
         let level = (along * along + across * across).sqrt();
         let inverse = if level > 0.0 { 1.0 / level } else { 0.0 };
         let is_turned = is_panorama && level > 0.0;
-        let (cos, sin) = if is_turned {
-            (along * inverse, across * inverse)
-        } else {
-            (1.0, 0.0)
-        };
+        let (cos, sin) = if is_turned { (along * inverse, across * inverse) } else { (1.0, 0.0) };
         let distance = stereo.convergence / along;
         let (mut turned, mut square) = ([0.0; 3], 0.0);
         for axis in 0..3 {
@@ -290,11 +286,7 @@ fn depths_body(camera: &CameraLanes, rays: &RayPacket, hits: &Intersections, z: 
         let along = d[0][l] * f.x + d[1][l] * f.y + d[2][l] * f.z;
         let along = if is_perspective { along } else { 1.0 };
         let is_hit = hits.mask >> l & 1 == 1;
-        z[l] = if is_hit {
-            hits.t[l] * along
-        } else {
-            f32::INFINITY
-        };
+        z[l] = if is_hit { hits.t[l] * along } else { f32::INFINITY };
     }
 }
 

@@ -11,10 +11,7 @@ pub(in crate::render) fn tangents(n: [f32; 3]) -> [[f32; 3]; 2] {
     let sign = if n[2] < 0.0 { -1.0 } else { 1.0 };
     let a = -1.0 / (sign + n[2]);
     let b = n[0] * n[1] * a;
-    [
-        [1.0 + sign * n[0] * n[0] * a, sign * b, -sign * n[0]],
-        [b, sign + n[1] * n[1] * a, -n[1]],
-    ]
+    [[1.0 + sign * n[0] * n[0] * a, sign * b, -sign * n[0]], [b, sign + n[1] * n[1] * a, -n[1]]]
 }
 
 /// A point of the unit disc, uniform if `u` is uniform in the unit square; neighbours stay neighbours (Shirley and
@@ -68,13 +65,8 @@ mod tests {
             let level = (1.0 - z * z).sqrt();
             let n = Vec3::new(level * angle.cos(), level * angle.sin(), z);
             let [s, t] = tangents(n.to_array()).map(Vec3::from_array);
-            for (a, b, wanted) in [
-                (s, s, 1.0),
-                (t, t, 1.0),
-                (s, t, 0.0),
-                (s, n, 0.0),
-                (t, n, 0.0),
-            ] {
+            for (a, b, wanted) in [(s, s, 1.0), (t, t, 1.0), (s, t, 0.0), (s, n, 0.0), (t, n, 0.0)]
+            {
                 assert!((a.dot(b) - wanted).abs() < 1e-5, "{n}");
             }
             let world = Vec3::from_array(to_world([0.0, 0.0, 1.0], n.to_array()));

@@ -77,11 +77,8 @@ impl JobReport {
     /// Adds all frames that were attempted.
     pub(super) fn put_frames(&self, page: &mut Page) {
         page.section("frames", "Frames");
-        let tried: Vec<&JobFrame> = self
-            .frames
-            .iter()
-            .filter(|frame| frame.status != Status::Pending)
-            .collect();
+        let tried: Vec<&JobFrame> =
+            self.frames.iter().filter(|frame| frame.status != Status::Pending).collect();
         if tried.is_empty() {
             page.text("No frame has been attempted yet.");
             return;

@@ -81,25 +81,17 @@ impl JobReport {
             ("Rays", count(rays.total())),
             (
                 "Primary, shadow, reflection, refraction rays",
-                [rays.primary, rays.shadow, rays.reflection, rays.refraction]
-                    .map(count)
-                    .join(", "),
+                [rays.primary, rays.shadow, rays.reflection, rays.refraction].map(count).join(", "),
             ),
         ];
         if let Some(rate) = totals.rays_per_second() {
-            list.push((
-                "Rays per second of tracing",
-                format!("{} million", short(rate / 1e6)),
-            ));
+            list.push(("Rays per second of tracing", format!("{} million", short(rate / 1e6))));
         }
         list.extend([
             ("Peak anonymous memory", bytes(totals.rss.anonymous_peak)),
             ("Peak file-backed memory", bytes(totals.rss.file_peak)),
             ("Peak resident memory", bytes(totals.rss.total_peak)),
-            (
-                "Dropped particles (not finite, or too far away)",
-                count(totals.dropped),
-            ),
+            ("Dropped particles (not finite, or too far away)", count(totals.dropped)),
             ("Clamped radii (too small)", count(totals.clamped_radii)),
             ("Clamped pixels (too bright)", count(totals.clamped_pixels)),
         ]);
@@ -114,10 +106,7 @@ impl JobReport {
         };
         let build = &report.build;
         // Properties of the tree and its memory
-        page.section(
-            "build",
-            &format!("Tree of the slowest frame ({})", frame.number),
-        );
+        page.section("build", &format!("Tree of the slowest frame ({})", frame.number));
         page.key_values(&[
             ("Structure", build.structure.clone()),
             ("Particle order", build.order.clone()),
@@ -132,14 +121,9 @@ impl JobReport {
             ("Attributes", bytes(report.bytes.attributes)),
             (
                 "Total in anonymous memory, in the mapped file",
-                [report.bytes.anonymous(), report.bytes.file.total()]
-                    .map(bytes)
-                    .join(", "),
+                [report.bytes.anonymous(), report.bytes.file.total()].map(bytes).join(", "),
             ),
-            (
-                "Total per particle, in anonymous memory, in the mapped file",
-                per_particle(report),
-            ),
+            ("Total per particle, in anonymous memory, in the mapped file", per_particle(report)),
             ("Build scratch memory", bytes(report.bytes.scratch)),
             ("Build peak memory", bytes(report.bytes.build_peak)),
         ]);
@@ -182,9 +166,5 @@ fn list_of(frames: &[i64]) -> String {
 fn per_particle(report: &FrameReport) -> String {
     let each = |bytes: u64| short(bytes as f64 / report.particles.max(1) as f64);
     let held = [report.bytes.anonymous(), report.bytes.file.total()].map(each);
-    format!(
-        "{} B (program of the thesis: about {} B)",
-        held.join(", "),
-        THESIS_BYTES_PER_PARTICLE
-    )
+    format!("{} B (program of the thesis: about {} B)", held.join(", "), THESIS_BYTES_PER_PARTICLE)
 }

@@ -74,10 +74,7 @@ struct Machine {
 
 impl Machine {
     fn this() -> Self {
-        Self {
-            threads: rayon::current_num_threads(),
-            simd: SimdLevel::best().name(),
-        }
+        Self { threads: rayon::current_num_threads(), simd: SimdLevel::best().name() }
     }
 }
 
@@ -95,18 +92,14 @@ impl JobReport {
     /// A report from plan, ledger and disk.
     pub fn new(state: &JobState, manifest: &Manifest) -> Self {
         let frames = state.plan().frames().iter();
-        let frames = frames
-            .map(|planned| JobFrame::new(state, planned))
-            .collect();
+        let frames = frames.map(|planned| JobFrame::new(state, planned)).collect();
         Self::of(frames, manifest.settings(), Machine::this())
     }
 
     /// A report of a job whose manifest is not needed: its settings are those of the plan.
     pub fn of_plan(state: &JobState) -> Self {
         let frames = state.plan().frames().iter();
-        let frames = frames
-            .map(|planned| JobFrame::new(state, planned))
-            .collect();
+        let frames = frames.map(|planned| JobFrame::new(state, planned)).collect();
         Self::of(frames, state.plan().settings().to_vec(), Machine::this())
     }
 
@@ -115,12 +108,7 @@ impl JobReport {
         for report in frames.iter().filter_map(|frame| frame.report.as_ref()) {
             totals.add(report);
         }
-        Self {
-            frames,
-            totals,
-            settings,
-            machine,
-        }
+        Self { frames, totals, settings, machine }
     }
 
     /// Names and contents of the report files. The page needs the feature `reports`.
@@ -163,12 +151,7 @@ impl JobFrame {
         };
         let entry = state.ledger().entry(planned.number);
         let entry = entry.filter(|_| status != Status::Pending);
-        Self::of(
-            planned.number,
-            planned.outputs.first().cloned(),
-            status,
-            entry,
-        )
+        Self::of(planned.number, planned.outputs.first().cloned(), status, entry)
     }
 
     fn of(number: i64, image: Option<String>, status: Status, entry: Option<&LedgerEntry>) -> Self {

@@ -30,11 +30,7 @@ pub(super) fn short(value: f64) -> String {
 
 /// Seconds in a table, with a resolution of 0.1 ms for short times.
 pub(super) fn seconds(value: f64) -> String {
-    if value < 0.9995 {
-        format!("{value:.4}")
-    } else {
-        short(value)
-    }
+    if value < 0.9995 { format!("{value:.4}") } else { short(value) }
 }
 
 /// A duration with a suitable unit.
@@ -45,11 +41,7 @@ pub(super) fn duration(seconds: f64) -> String {
     if seconds < 100.0 {
         return format!("{} s", short(seconds));
     }
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "saturates"
-    )]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
     let whole = seconds.round() as u64;
     let (hours, minutes, seconds) = (whole / 3600, whole / 60 % 60, whole % 60);
     if hours > 0 {
@@ -103,19 +95,14 @@ mod tests {
         let values = [0.0, 0.001_234, 0.0346, 1.0, 12.34, 99.96, 1234.6, f64::NAN];
         assert_eq!(
             values.map(short),
-            [
-                "0.000", "0.00123", "0.035", "1.00", "12.3", "100", "1235", ""
-            ]
+            ["0.000", "0.00123", "0.035", "1.00", "12.3", "100", "1235", ""]
         );
         assert_eq!([0.002_76, 1.5].map(seconds), ["0.0028", "1.50"]);
         assert_eq!(
             [0.002, 5.0, 125.0, 7260.0].map(duration),
             ["2.00 ms", "5.00 s", "2 min 5 s", "2 h 1 min"]
         );
-        assert_eq!(
-            [2048, 3 << 20, 5 << 30].map(bytes),
-            ["2.00 KiB", "3.00 MiB", "5.00 GiB"]
-        );
+        assert_eq!([2048, 3 << 20, 5 << 30].map(bytes), ["2.00 KiB", "3.00 MiB", "5.00 GiB"]);
         assert_eq!(shortened("a\u{e4}bc", 2), "a\u{e4}\u{2026}");
         assert_eq!(shortened("ab", 2), "ab");
     }

@@ -30,38 +30,24 @@ impl JobReport {
             curve("file-backed", |r| float(r.rss.file_peak) / MIB),
             curve("total resident", |r| float(r.rss.total_peak) / MIB),
         ];
-        let rays = vec![curve("all rays", |r| {
-            r.rays_per_second().map_or(f64::NAN, |rate| rate / 1e6)
-        })];
+        let rays =
+            vec![curve("all rays", |r| r.rays_per_second().map_or(f64::NAN, |rate| rate / 1e6))];
         let particles = vec![curve("particles", |r| float(r.particles))];
-        let per_particle = vec![curve("positions and tree", |r| {
-            r.bytes_per_particle().unwrap_or(f64::NAN)
-        })];
+        let per_particle =
+            vec![curve("positions and tree", |r| r.bytes_per_particle().unwrap_or(f64::NAN))];
         vec![
             self.times("plot-stages", "Time by stage", stages),
             self.times("plot-build", "Build time by phase", self.phases()),
             self.plot("plot-rays", "Ray throughput", "rays, M/s", rays),
             self.plot("plot-particles", "Particles", "particles", particles),
-            self.plot(
-                "plot-memory",
-                "Peak memory of the process",
-                "peak memory, MiB",
-                memory,
-            ),
-            self.plot(
-                "plot-bytes",
-                "Tree memory per particle",
-                "bytes per particle",
-                per_particle,
-            ),
+            self.plot("plot-memory", "Peak memory of the process", "peak memory, MiB", memory),
+            self.plot("plot-bytes", "Tree memory per particle", "bytes per particle", per_particle),
         ]
     }
 
     /// A plot of seconds, or of milliseconds for short times.
     fn times(&self, id: &str, title: &str, curves: Vec<Curve>) -> Plot {
-        let values = self
-            .done()
-            .flat_map(|(_, r)| curves.iter().map(|(_, value)| value(r)));
+        let values = self.done().flat_map(|(_, r)| curves.iter().map(|(_, value)| value(r)));
         if values.fold(0.0, f64::max) >= 0.1 {
             return self.plot(id, title, "time, s", curves);
         }
@@ -71,10 +57,7 @@ impl JobReport {
     }
 
     fn plot(&self, id: &str, title: &str, quantity: &str, curves: Vec<Curve>) -> Plot {
-        let axes = (
-            Axis::linear("frame").whole(),
-            Axis::linear(quantity).from_zero(),
-        );
+        let axes = (Axis::linear("frame").whole(), Axis::linear(quantity).from_zero());
         let plot = Plot::new(id, title, axes.0, axes.1);
         curves.into_iter().fold(plot, |plot, (name, value)| {
             let points = self.frames.iter().map(|frame| {
@@ -98,21 +81,12 @@ impl JobReport {
         }
         let of = |name: &str, report: &FrameReport| {
             let phases = report.build.phases.iter();
-            phases
-                .filter(|phase| phase.0 == name)
-                .map(|phase| phase.1)
-                .sum::<f64>()
+            phases.filter(|phase| phase.0 == name).map(|phase| phase.1).sum::<f64>()
         };
-        let single = if names.len() > MOST_PHASES {
-            MOST_PHASES - 1
-        } else {
-            names.len()
-        };
+        let single = if names.len() > MOST_PHASES { MOST_PHASES - 1 } else { names.len() };
         let rest = names.split_off(single);
-        let mut curves: Vec<Curve> = names
-            .into_iter()
-            .map(|name| curve(name, move |report| of(name, report)))
-            .collect();
+        let mut curves: Vec<Curve> =
+            names.into_iter().map(|name| curve(name, move |report| of(name, report))).collect();
         if !rest.is_empty() {
             let sum = move |report: &FrameReport| rest.iter().map(|name| of(name, report)).sum();
             curves.push(curve("others", sum));

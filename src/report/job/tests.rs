@@ -25,11 +25,7 @@ fn done(number: i64, particles: u64) -> JobFrame {
             build_peak: 20 * particles,
             ..FrameBytes::default()
         },
-        rays: RaySummary {
-            primary: 1000,
-            shadow: 500,
-            ..RaySummary::default()
-        },
+        rays: RaySummary { primary: 1000, shadow: 500, ..RaySummary::default() },
         ..FrameReport::default()
     };
     let mut details = json!(report);
@@ -47,12 +43,7 @@ fn of(number: i64, status: Status, reason: Option<&str>, details: Value) -> JobF
         "details": details,
     });
     let entry: LedgerEntry = serde_json::from_value(entry).expect("an entry");
-    JobFrame::of(
-        number,
-        Some(format!("f.{number}.exr")),
-        status,
-        Some(&entry),
-    )
+    JobFrame::of(number, Some(format!("f.{number}.exr")), status, Some(&entry))
 }
 
 fn pending(number: i64) -> JobFrame {
@@ -61,10 +52,7 @@ fn pending(number: i64) -> JobFrame {
 
 fn report(frames: Vec<JobFrame>) -> JobReport {
     let settings = vec![("output.path".to_owned(), "\"f.#.exr\"".to_owned())];
-    let machine = Machine {
-        threads: 2,
-        simd: "avx2",
-    };
+    let machine = Machine { threads: 2, simd: "avx2" };
     JobReport::of(frames, settings, machine)
 }
 
@@ -83,13 +71,7 @@ fn rows(section: &str) -> usize {
 
 #[test]
 fn derived_numbers_and_totals() {
-    let json = report(vec![
-        done(1, 100),
-        done(2, 300),
-        failed(3, "no"),
-        pending(4),
-    ])
-    .to_json();
+    let json = report(vec![done(1, 100), done(2, 300), failed(3, "no"), pending(4)]).to_json();
     assert_eq!(json["frames"][0]["bytes"]["per_particle"], 14.0);
     assert_eq!(json["frames"][0]["rays_per_second"], 1500.0 / 1.25);
     assert_eq!(json["frames"][2]["reason"], "no");
@@ -99,10 +81,7 @@ fn derived_numbers_and_totals() {
     assert_eq!(totals["seconds"]["wall"], 4.0);
     assert_eq!(totals["seconds"]["trace"], 2.75);
     assert_eq!(totals["rays_per_second"], 3000.0 / 2.75);
-    assert_eq!(
-        (&totals["frames"], &totals["pending"]),
-        (&json!(4), &json!(1))
-    );
+    assert_eq!((&totals["frames"], &totals["pending"]), (&json!(4), &json!(1)));
     assert_eq!(
         json["slowest"],
         json!([{"frame": 2, "seconds": 2.375}, {"frame": 1, "seconds": 2.125}])
@@ -111,21 +90,13 @@ fn derived_numbers_and_totals() {
 
 #[test]
 fn page_contains_all_sections() {
-    let frames = vec![
-        done(1, 100),
-        failed(2, "f_2.vtk: cut off"),
-        done(3, 0),
-        pending(4),
-    ];
+    let frames = vec![done(1, 100), failed(2, "f_2.vtk: cut off"), done(3, 0), pending(4)];
     let html = report(frames).to_html();
     assert!(html.contains("Job report: f.#.exr") && html.contains("2 of 4 done"));
     assert!(section(&html, "failed").contains("f_2.vtk: cut off"));
     let plots = section(&html, "plots");
     for id in ["stages", "build", "rays", "particles", "memory", "bytes"] {
-        assert!(
-            plots.contains(&format!("<svg class=\"plot\" id=\"plot-{id}\"")),
-            "{id}"
-        );
+        assert!(plots.contains(&format!("<svg class=\"plot\" id=\"plot-{id}\"")), "{id}");
     }
     assert!(plots.contains("<title>scatter</title>") && plots.contains("<title>sort</title>"));
     assert_eq!(rows(section(&html, "slowest")), 2);
@@ -137,25 +108,16 @@ fn page_contains_all_sections() {
 #[test]
 fn frames_without_particles_have_no_bytes_per_particle() {
     let report = report(vec![done(1, 0)]);
-    assert_eq!(
-        report.to_json()["frames"][0]["bytes"]["per_particle"],
-        Value::Null
-    );
+    assert_eq!(report.to_json()["frames"][0]["bytes"]["per_particle"], Value::Null);
     let html = report.to_html();
-    let bytes = section(&html, "plots")
-        .split("Tree memory per particle")
-        .nth(1);
+    let bytes = section(&html, "plots").split("Tree memory per particle").nth(1);
     assert!(bytes.expect("the figure").contains("No values to plot"));
     assert_eq!(rows(section(&html, "frames")), 1);
 }
 
 #[test]
 fn jobs_without_done_frames() {
-    for frames in [
-        vec![],
-        vec![pending(1), pending(2)],
-        vec![failed(1, "a"), failed(2, "b")],
-    ] {
+    for frames in [vec![], vec![pending(1), pending(2)], vec![failed(1, "a"), failed(2, "b")]] {
         let failures = frames.iter().filter(|f| f.status == Status::Failed).count();
         let report = report(frames);
         assert_eq!(report.to_json()["slowest"], json!([]));

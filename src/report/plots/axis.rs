@@ -26,20 +26,12 @@ pub struct Axis {
 impl Axis {
     /// A linear axis. `title` names the quantity and its unit.
     pub fn linear(title: impl Into<String>) -> Self {
-        Self {
-            title: title.into(),
-            scale: Scale::Linear,
-            from_zero: false,
-            whole: false,
-        }
+        Self { title: title.into(), scale: Scale::Linear, from_zero: false, whole: false }
     }
 
     /// A logarithmic axis.
     pub fn log(title: impl Into<String>) -> Self {
-        Self {
-            scale: Scale::Log,
-            ..Self::linear(title)
-        }
+        Self { scale: Scale::Log, ..Self::linear(title) }
     }
 
     /// Includes zero, so that heights can be compared; has no effect on a logarithmic axis.
@@ -90,11 +82,7 @@ impl Axis {
         }
         // Widen a range that is empty or too small for distinct ticks
         if high - low <= 1e-9 * high.abs().max(low.abs()) {
-            let half = if self.whole {
-                (1e-6 * high.abs()).max(1.0)
-            } else {
-                0.5 * high.abs()
-            };
+            let half = if self.whole { (1e-6 * high.abs()).max(1.0) } else { 0.5 * high.abs() };
             let half = if half > 0.0 { half } else { 1.0 };
             (low, high) = (low - half, high + half);
         }
@@ -140,10 +128,7 @@ impl Ranged for Span {
     fn map(&self, place: &f64, limit: (i32, i32)) -> i32 {
         let (start, end) = (f64::from(limit.0), f64::from(limit.1));
         let at = start + (place - self.low) / (self.high - self.low) * (end - start);
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "saturates, and the axis holds it"
-        )]
+        #[expect(clippy::cast_possible_truncation, reason = "saturates, and the axis holds it")]
         let at = at.round() as i32;
         at
     }
@@ -171,9 +156,7 @@ impl ValueFormatter<f64> for Span {
 /// 1, 2 or 5 times a power of ten, at least `least`.
 fn nice_step(least: f64) -> f64 {
     let power = 10f64.powf(least.log10().floor());
-    let factor = [1.0, 2.0, 5.0]
-        .into_iter()
-        .find(|f| f * power >= least * (1.0 - 1e-9));
+    let factor = [1.0, 2.0, 5.0].into_iter().find(|f| f * power >= least * (1.0 - 1e-9));
     factor.unwrap_or(10.0) * power
 }
 
@@ -182,31 +165,20 @@ fn label(value: f64, step: f64, largest: f64) -> String {
     // Rounding may leave a tiny or negative zero.
     let value = if value.abs() < 0.5 * step { 0.0 } else { value };
     if largest >= 1e6 || step < 1e-4 {
-        return if value == 0.0 {
-            "0".to_owned()
-        } else {
-            scientific(value, step)
-        };
+        return if value == 0.0 { "0".to_owned() } else { scientific(value, step) };
     }
     let decimals = (0..5).find(|d| {
         let scaled = step * 10f64.powi(*d);
         (scaled - scaled.round()).abs() < 1e-6
     });
-    let text = format!(
-        "{value:.*}",
-        usize::try_from(decimals.unwrap_or(5)).unwrap_or(5)
-    );
+    let text = format!("{value:.*}", usize::try_from(decimals.unwrap_or(5)).unwrap_or(5));
     minus(&text)
 }
 
 /// In the form `1.25e6`, with enough digits to distinguish it from its neighbours.
 fn scientific(value: f64, step: f64) -> String {
     let digits = (value.abs().log10().floor() - step.log10().floor()).clamp(0.0, 8.0);
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "0 to 8"
-    )]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 8")]
     let text = format!("{value:.*e}", digits as usize);
     match text.split_once('e') {
         Some((mantissa, power)) if mantissa.contains('.') => {
@@ -230,11 +202,7 @@ fn log_span(low: f64, high: f64, tick_count: f64) -> Span {
         let decade = (step / 3.0).floor();
         let factor = [1.0f64, 2.0, 5.0];
         let third = step - 3.0 * decade;
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "0, 1, 2"
-        )]
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0, 1, 2")]
         let factor = factor[third as usize];
         (decade + factor.log10(), decade, factor)
     };
@@ -266,21 +234,13 @@ fn log_span(low: f64, high: f64, tick_count: f64) -> Span {
         }
         step += 1.0;
     }
-    Span {
-        low: place(first).0,
-        high: place(last).0,
-        ticks,
-    }
+    Span { low: place(first).0, high: place(last).0, ticks }
 }
 
 /// `factor` times ten to the `decade`; written in full if that is short, or on the whole axis.
 fn log_label(decade: f64, factor: f64, is_plain: bool) -> String {
     if is_plain || (-3.0..=3.0).contains(&decade) {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "0 to 4"
-        )]
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 4")]
         let decimals = (-decade).max(0.0) as usize;
         let value = factor * 10f64.powf(decade);
         return format!("{value:.decimals$}");

@@ -10,10 +10,7 @@ fn labels(axis: &Axis, low: f64, high: f64) -> Vec<String> {
     }
     for (at, _) in &span.ticks {
         let slack = 1e-9 * (span.high - span.low);
-        assert!(
-            *at >= span.low - slack && *at <= span.high + slack,
-            "{span:?}"
-        );
+        assert!(*at >= span.low - slack && *at <= span.high + slack, "{span:?}");
     }
     assert!(span.low < span.high && !span.ticks.is_empty(), "{span:?}");
     span.ticks.into_iter().map(|(_, label)| label).collect()
@@ -22,41 +19,22 @@ fn labels(axis: &Axis, low: f64, high: f64) -> Vec<String> {
 #[test]
 fn ticks_are_round_numbers() {
     let axis = Axis::linear("t, s");
-    assert_eq!(
-        labels(&axis, 0.0, 1.0),
-        ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]
-    );
+    assert_eq!(labels(&axis, 0.0, 1.0), ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]);
     assert_eq!(labels(&axis, -3.0, 7.0), ["\u{2212}2", "0", "2", "4", "6"]);
     assert_eq!(labels(&axis, 0.0, 4e6), ["0", "1e6", "2e6", "3e6", "4e6"]);
     assert_eq!(
         labels(&axis, 5e-6, 1e-5),
-        [
-            "5e\u{2212}6",
-            "6e\u{2212}6",
-            "7e\u{2212}6",
-            "8e\u{2212}6",
-            "9e\u{2212}6",
-            "1e\u{2212}5"
-        ]
+        ["5e\u{2212}6", "6e\u{2212}6", "7e\u{2212}6", "8e\u{2212}6", "9e\u{2212}6", "1e\u{2212}5"]
     );
-    assert_eq!(
-        labels(&axis.clone().from_zero(), 3.0, 4.0),
-        ["0", "1", "2", "3", "4"]
-    );
+    assert_eq!(labels(&axis.clone().from_zero(), 3.0, 4.0), ["0", "1", "2", "3", "4"]);
     assert_eq!(labels(&axis.whole(), 1.0, 3.0), ["1", "2", "3"]);
 }
 
 #[test]
 fn log_ticks_are_decades_or_1_2_5_steps() {
     let axis = Axis::log("n");
-    assert_eq!(
-        labels(&axis, 1e5, 1e7),
-        ["1e5", "2e5", "5e5", "1e6", "2e6", "5e6", "1e7"]
-    );
-    assert_eq!(
-        labels(&axis, 0.01, 1000.0),
-        ["0.01", "0.1", "1", "10", "100", "1000"]
-    );
+    assert_eq!(labels(&axis, 1e5, 1e7), ["1e5", "2e5", "5e5", "1e6", "2e6", "5e6", "1e7"]);
+    assert_eq!(labels(&axis, 0.01, 1000.0), ["0.01", "0.1", "1", "10", "100", "1000"]);
     assert_eq!(labels(&axis, 3.0, 3.0), ["2", "5"]);
     assert_eq!(labels(&axis, 10.0, 10.0), ["5", "10", "20"]);
     assert!(labels(&axis, 1e-99, 1e99).len() < 12);
@@ -64,11 +42,7 @@ fn log_ticks_are_decades_or_1_2_5_steps() {
 
 #[test]
 fn unusual_ranges_have_distinct_ticks() {
-    for axis in [
-        Axis::linear("v"),
-        Axis::linear("v").from_zero(),
-        Axis::linear("v").whole(),
-    ] {
+    for axis in [Axis::linear("v"), Axis::linear("v").from_zero(), Axis::linear("v").whole()] {
         for value in [0.0, 1.0, -1.0, 1e9, -1e-9, 1e99, 1e-99] {
             labels(&axis, value, value);
             labels(&axis, value, value * (1.0 + 1e-15));

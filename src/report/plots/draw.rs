@@ -38,10 +38,7 @@ pub(super) fn svg_of(plot: &Plot, series: &[Drawn]) -> String {
         escaped(plot.x.title()),
         id = escaped(&plot.id),
     ));
-    let size = (
-        (WIDTH * FINE).cast_unsigned(),
-        (HEIGHT * FINE).cast_unsigned(),
-    );
+    let size = ((WIDTH * FINE).cast_unsigned(), (HEIGHT * FINE).cast_unsigned());
     let backend = SvgText { text: &text, size };
     draw(plot, series, spans(plot, series), backend, &text)
         .expect("our backend takes everything, and nobody else draws to it");
@@ -105,10 +102,7 @@ fn draw(
         if drawn.line != Line::None {
             put(key::part(drawn.line, false));
             for piece in drawn.pieces.iter().filter(|piece| piece.len() > 1) {
-                root.draw(&PathElement::new(
-                    piece.iter().map(at).collect::<Vec<_>>(),
-                    SERIES,
-                ))?;
+                root.draw(&PathElement::new(piece.iter().map(at).collect::<Vec<_>>(), SERIES))?;
             }
             put("</g>\n");
         }

@@ -26,12 +26,7 @@ impl<'a> Drawn<'a> {
             .filter(|piece| !piece.is_empty())
             .map(<[_]>::to_vec)
             .collect();
-        Self {
-            name: &series.name,
-            hue,
-            line: series.line,
-            pieces,
-        }
+        Self { name: &series.name, hue, line: series.line, pieces }
     }
 
     pub(super) fn point_count(&self) -> usize {
@@ -41,11 +36,7 @@ impl<'a> Drawn<'a> {
     /// Positions of markers: all isolated points, and some of many connected ones.
     pub(super) fn marked(&self) -> Vec<(f64, f64)> {
         let joined = self.line != Line::None;
-        let every = if joined {
-            self.point_count().div_ceil(MOST_MARKERS).max(1)
-        } else {
-            1
-        };
+        let every = if joined { self.point_count().div_ceil(MOST_MARKERS).max(1) } else { 1 };
         let mut marked = Vec::new();
         let mut place = 0;
         for piece in &self.pieces {

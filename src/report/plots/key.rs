@@ -12,9 +12,8 @@ use super::svg::FINE;
 use crate::report::escape::escaped;
 
 /// Colours on white, by hue.
-const COLORS: [&str; 7] = [
-    "#0072b2", "#d55e00", "#008f68", "#b0478a", "#8f6d00", "#3a96cf", "#444444",
-];
+const COLORS: [&str; 7] =
+    ["#0072b2", "#d55e00", "#008f68", "#b0478a", "#8f6d00", "#3a96cf", "#444444"];
 
 /// The style rules that plots need on their page: series colours in light and dark mode, text, grid, legend.
 pub const CSS: &str = "\
@@ -100,9 +99,8 @@ pub(super) fn legend(series: &[Drawn]) -> String {
             ),
             Some(corners) => {
                 let at = |fine: i32| f64::from(fine) / f64::from(FINE);
-                let corners = corners
-                    .iter()
-                    .map(|(x, y)| format!("{} {}", 16.0 + at(*x), 7.0 + at(*y)));
+                let corners =
+                    corners.iter().map(|(x, y)| format!("{} {}", 16.0 + at(*x), 7.0 + at(*y)));
                 format!("<path d=\"M{}Z\"/>", corners.collect::<Vec<_>>().join("L"))
             }
         };

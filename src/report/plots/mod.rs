@@ -84,13 +84,7 @@ pub struct Plot {
 impl Plot {
     /// An empty plot. `id` is the id of its element on the page: letters, digits and hyphens.
     pub fn new(id: impl Into<String>, title: impl Into<String>, x: Axis, y: Axis) -> Self {
-        Self {
-            id: id.into(),
-            title: title.into(),
-            x,
-            y,
-            series: Vec::new(),
-        }
+        Self { id: id.into(), title: title.into(), x, y, series: Vec::new() }
     }
 
     /// Adds a series.
@@ -117,11 +111,7 @@ impl Plot {
         if left_out > 0 {
             notes = format!(
                 "<p class=\"note\">{left_out} {} omitted: a logarithmic axis shows only values above zero.</p>\n",
-                if left_out == 1 {
-                    "value is"
-                } else {
-                    "values are"
-                }
+                if left_out == 1 { "value is" } else { "values are" }
             );
         }
         // Draw plot and legend
@@ -140,8 +130,6 @@ impl Plot {
     fn count_off_log_axis(&self) -> usize {
         let off = |axis: &Axis, value: f64| axis.is_log() && value.is_finite() && value <= 0.0;
         let points = self.series.iter().flat_map(|s| &s.points);
-        points
-            .filter(|(x, y)| off(&self.x, *x) || off(&self.y, *y))
-            .count()
+        points.filter(|(x, y)| off(&self.x, *x) || off(&self.y, *y)).count()
     }
 }

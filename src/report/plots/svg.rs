@@ -46,11 +46,7 @@ fn class(color: BackendColor) -> &'static str {
 fn units(fine: i32) -> String {
     let sign = if fine < 0 { "-" } else { "" };
     let (whole, tenth) = ((fine / FINE).abs(), (fine % FINE).abs());
-    if tenth == 0 {
-        format!("{sign}{whole}")
-    } else {
-        format!("{sign}{whole}.{tenth}")
-    }
+    if tenth == 0 { format!("{sign}{whole}") } else { format!("{sign}{whole}.{tenth}") }
 }
 
 fn path(points: impl IntoIterator<Item = BackendCoord>) -> String {
@@ -150,11 +146,7 @@ impl DrawingBackend for SvgText<'_> {
         points: I,
         style: &S,
     ) -> Drawn {
-        self.put(format_args!(
-            "<path{} d=\"{}Z\"/>",
-            class(style.color()),
-            path(points)
-        ))
+        self.put(format_args!("<path{} d=\"{}Z\"/>", class(style.color()), path(points)))
     }
 
     /// Supports only horizontal text.

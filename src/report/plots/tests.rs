@@ -8,9 +8,7 @@ fn plot(series: Vec<Series>) -> Plot {
 }
 
 fn plot_on((x, y): (Axis, Axis), series: Vec<Series>) -> Plot {
-    series
-        .into_iter()
-        .fold(Plot::new("p", "A plot", x, y), Plot::with)
+    series.into_iter().fold(Plot::new("p", "A plot", x, y), Plot::with)
 }
 
 fn line(values: &[f64]) -> Series {
@@ -53,13 +51,8 @@ fn drawn(html: &str) -> (usize, usize) {
 
 #[test]
 fn same_data_give_the_same_text() {
-    let make = || {
-        plot(vec![
-            line(&[1.0, 2.0, 1.5]),
-            line(&[0.5, 0.7, 0.1]).line(Line::Dashed),
-        ])
-        .figure()
-    };
+    let make =
+        || plot(vec![line(&[1.0, 2.0, 1.5]), line(&[0.5, 0.7, 0.1]).line(Line::Dashed)]).figure();
     let html = make();
     assert_eq!(html, make());
     check_geometry(&html);
@@ -71,15 +64,8 @@ fn same_data_give_the_same_text() {
 
 #[test]
 fn heights_are_in_proportion() {
-    let html = plot(vec![Series::new(
-        "one",
-        [(0.0, 0.0), (2.0, 5.0), (4.0, 10.0)],
-    )])
-    .figure();
-    let path = html
-        .split("<path fill=\"none\" d=\"M")
-        .nth(1)
-        .expect("a line");
+    let html = plot(vec![Series::new("one", [(0.0, 0.0), (2.0, 5.0), (4.0, 10.0)])]).figure();
+    let path = html.split("<path fill=\"none\" d=\"M").nth(1).expect("a line");
     let path = path.split('"').next().expect("its end");
     let points: Vec<(f64, f64)> = path
         .split('L')
@@ -89,32 +75,14 @@ fn heights_are_in_proportion() {
         })
         .collect();
     assert_eq!(points.len(), 3);
-    assert!(
-        (points[1].0 - f64::midpoint(points[0].0, points[2].0)).abs() < 0.11,
-        "{points:?}"
-    );
-    assert!(
-        (points[1].1 - f64::midpoint(points[0].1, points[2].1)).abs() < 0.11,
-        "{points:?}"
-    );
-    assert!(
-        points[0].0 < points[2].0 && points[0].1 > points[2].1,
-        "{points:?}"
-    );
+    assert!((points[1].0 - f64::midpoint(points[0].0, points[2].0)).abs() < 0.11, "{points:?}");
+    assert!((points[1].1 - f64::midpoint(points[0].1, points[2].1)).abs() < 0.11, "{points:?}");
+    assert!(points[0].0 < points[2].0 && points[0].1 > points[2].1, "{points:?}");
 }
 
 #[test]
 fn missing_values_leave_gaps() {
-    let html = plot(vec![line(&[
-        1.0,
-        2.0,
-        f64::NAN,
-        3.0,
-        f64::INFINITY,
-        1.0,
-        2.0,
-    ])])
-    .figure();
+    let html = plot(vec![line(&[1.0, 2.0, f64::NAN, 3.0, f64::INFINITY, 1.0, 2.0])]).figure();
     check_geometry(&html);
     // Two lines, and a marker for the isolated point between the gaps.
     assert_eq!(drawn(&html), (2, 5));
@@ -139,16 +107,9 @@ fn unusual_ranges_are_plotted() {
 
 #[test]
 fn empty_plots_have_a_message() {
-    for series in [
-        vec![],
-        vec![line(&[])],
-        vec![line(&[f64::NAN, f64::NEG_INFINITY, 1e300])],
-    ] {
+    for series in [vec![], vec![line(&[])], vec![line(&[f64::NAN, f64::NEG_INFINITY, 1e300])]] {
         let html = plot(series).figure();
-        assert!(
-            html.contains("No values to plot") && !html.contains("<svg"),
-            "{html}"
-        );
+        assert!(html.contains("No values to plot") && !html.contains("<svg"), "{html}");
     }
 }
 
@@ -160,10 +121,7 @@ fn values_up_to_zero_are_omitted_from_a_log_axis() {
     assert_eq!(drawn(&html), (0, 3));
     assert!(html.contains("2 values are omitted"));
     let html = plot_on(axes(), vec![line(&[0.0])]).figure();
-    assert!(
-        html.contains("No values to plot") && html.contains("1 value is omitted"),
-        "{html}"
-    );
+    assert!(html.contains("No values to plot") && html.contains("1 value is omitted"), "{html}");
 }
 
 #[test]
@@ -173,10 +131,7 @@ fn long_series_keep_their_peaks_and_stay_small() {
     let html = plot(vec![line(&values)]).figure();
     check_geometry(&html);
     assert!(html.len() < 30_000, "{}", html.len());
-    let points = html
-        .split("<path fill=\"none\" d=\"M")
-        .nth(1)
-        .expect("a line");
+    let points = html.split("<path fill=\"none\" d=\"M").nth(1).expect("a line");
     let points = points.split('"').next().expect("its end").split('L');
     let highest = points.filter_map(|p| p.split_once(' ')?.1.parse::<f64>().ok());
     let highest = highest.fold(f64::INFINITY, f64::min);

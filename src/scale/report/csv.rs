@@ -5,14 +5,7 @@ use super::{CellMeasurement, CellReport, ScaleReport};
 type Value = fn(&CellMeasurement) -> Option<f64>;
 
 /// Columns that identify a cell and its outcome.
-const CELL: [&str; 6] = [
-    "particles",
-    "structure",
-    "motion",
-    "representation",
-    "status",
-    "reason",
-];
+const CELL: [&str; 6] = ["particles", "structure", "motion", "representation", "status", "reason"];
 
 /// Columns of numbers in seconds and bytes; empty if a cell does not have them.
 const NUMBERS: [(&str, Value); 43] = [
@@ -36,58 +29,28 @@ const NUMBERS: [(&str, Value); 43] = [
     ("structure_bytes", |m| Some(m.bytes.structure as f64)),
     ("attribute_bytes", |m| Some(m.bytes.attributes as f64)),
     ("scratch_bytes", |m| Some(m.bytes.scratch as f64)),
-    ("file_position_bytes", |m| {
-        Some(m.bytes.file.positions as f64)
-    }),
-    ("file_structure_bytes", |m| {
-        Some(m.bytes.file.structure as f64)
-    }),
-    ("file_attribute_bytes", |m| {
-        Some(m.bytes.file.attributes as f64)
-    }),
+    ("file_position_bytes", |m| Some(m.bytes.file.positions as f64)),
+    ("file_structure_bytes", |m| Some(m.bytes.file.structure as f64)),
+    ("file_attribute_bytes", |m| Some(m.bytes.file.attributes as f64)),
     ("build_peak_bytes", |m| Some(m.bytes.build_peak as f64)),
-    ("position_bytes_per_particle", |m| {
-        Some(m.bytes_per_particle?.positions)
-    }),
-    ("structure_bytes_per_particle", |m| {
-        Some(m.bytes_per_particle?.structure)
-    }),
-    ("attribute_bytes_per_particle", |m| {
-        Some(m.bytes_per_particle?.attributes)
-    }),
-    ("scratch_bytes_per_particle", |m| {
-        Some(m.bytes_per_particle?.scratch)
-    }),
-    ("anonymous_bytes_per_particle", |m| {
-        Some(m.bytes_per_particle?.anonymous)
-    }),
-    ("file_bytes_per_particle", |m| {
-        Some(m.bytes_per_particle?.file)
-    }),
+    ("position_bytes_per_particle", |m| Some(m.bytes_per_particle?.positions)),
+    ("structure_bytes_per_particle", |m| Some(m.bytes_per_particle?.structure)),
+    ("attribute_bytes_per_particle", |m| Some(m.bytes_per_particle?.attributes)),
+    ("scratch_bytes_per_particle", |m| Some(m.bytes_per_particle?.scratch)),
+    ("anonymous_bytes_per_particle", |m| Some(m.bytes_per_particle?.anonymous)),
+    ("file_bytes_per_particle", |m| Some(m.bytes_per_particle?.file)),
     ("rss_anonymous_peak", |m| Some(m.rss.anonymous_peak as f64)),
     ("rss_file_peak", |m| Some(m.rss.file_peak as f64)),
     ("rss_total_peak", |m| Some(m.rss.total_peak as f64)),
-    ("conversion_load_seconds", |m| {
-        Some(m.conversion?.load_seconds)
-    }),
+    ("conversion_load_seconds", |m| Some(m.conversion?.load_seconds)),
     ("conversion_seconds", |m| Some(m.conversion?.seconds)),
-    ("conversion_file_bytes", |m| {
-        Some(m.conversion?.file_bytes as f64)
-    }),
+    ("conversion_file_bytes", |m| Some(m.conversion?.file_bytes as f64)),
     ("conversion_max_error", |m| Some(m.conversion?.max_error)),
-    ("conversion_max_error_of_radius", |m| {
-        m.conversion?.max_error_of_radius
-    }),
-    ("primary_rays_per_second", |m| {
-        Some(m.rays_per_second.primary)
-    }),
+    ("conversion_max_error_of_radius", |m| m.conversion?.max_error_of_radius),
+    ("primary_rays_per_second", |m| Some(m.rays_per_second.primary)),
     ("shadow_rays_per_second", |m| Some(m.rays_per_second.shadow)),
-    ("reflection_rays_per_second", |m| {
-        Some(m.rays_per_second.reflection)
-    }),
-    ("refraction_rays_per_second", |m| {
-        Some(m.rays_per_second.refraction)
-    }),
+    ("reflection_rays_per_second", |m| Some(m.rays_per_second.reflection)),
+    ("refraction_rays_per_second", |m| Some(m.rays_per_second.refraction)),
     ("rays_per_second", |m| Some(m.rays_per_second.total)),
 ];
 

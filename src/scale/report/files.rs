@@ -20,11 +20,7 @@ const OURS: [(&str, Mark); 3] = [(JSON, is_our_json), (CSV, is_our_csv), (HTML, 
 /// With the file that cannot be written.
 pub fn write(dir: &Path, report: &ScaleReport) -> Result<(), (PathBuf, io::Error)> {
     let json = format!("{:#}\n", serde_json::json!(report));
-    for (name, text) in [
-        (JSON, json),
-        (CSV, csv::text(report)),
-        (HTML, page::html(report)),
-    ] {
+    for (name, text) in [(JSON, json), (CSV, csv::text(report)), (HTML, page::html(report))] {
         let path = dir.join(name);
         publish(&path, text.as_bytes()).map_err(|e| (path, e))?;
     }

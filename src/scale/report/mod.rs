@@ -270,11 +270,7 @@ impl RayRates {
     /// `rays` divided by `seconds`.
     pub fn of(rays: RayCounts, seconds: f64) -> Self {
         let rate = |count: u64| {
-            if seconds > 0.0 {
-                count as f64 / seconds
-            } else {
-                0.0
-            }
+            if seconds > 0.0 { count as f64 / seconds } else { 0.0 }
         };
         Self {
             primary: rate(rays.primary),
@@ -303,8 +299,7 @@ impl ScaleReport {
         let pairs = structures.flat_map(|name| {
             let structure: Option<Structure> = name.parse().ok();
             let all = self.settings.representations.iter();
-            all.filter(move |r| structure.is_some_and(|s| r.goes_with(s)))
-                .map(move |r| (name, *r))
+            all.filter(move |r| structure.is_some_and(|s| r.goes_with(s))).map(move |r| (name, *r))
         });
         pairs
             .map(|(structure, representation)| Column {
@@ -334,34 +329,27 @@ impl ScaleReport {
     /// The median over all motions of the median build time, in seconds.
     pub fn build_seconds(&self, particles: usize, column: &Column) -> Option<f64> {
         let cells = self.cells_of(particles, column);
-        let medians: Vec<f64> = cells
-            .filter_map(|c| Some(c.measured()?.build_seconds.median))
-            .collect();
+        let medians: Vec<f64> =
+            cells.filter_map(|c| Some(c.measured()?.build_seconds.median)).collect();
         (!medians.is_empty()).then(|| BuildTimes::of(&medians).median)
     }
 
     /// The highest peak over all motions of resident memory, bytes.
     pub fn peak_bytes(&self, particles: usize, column: &Column) -> Option<u64> {
         let cells = self.cells_of(particles, column);
-        cells
-            .filter_map(|c| Some(c.measured()?.rss.total_peak))
-            .max()
+        cells.filter_map(|c| Some(c.measured()?.rss.total_peak)).max()
     }
 
     /// The highest peak over all motions of anonymous memory, bytes.
     pub fn anonymous_peak_bytes(&self, particles: usize, column: &Column) -> Option<u64> {
         let cells = self.cells_of(particles, column);
-        cells
-            .filter_map(|c| Some(c.measured()?.rss.anonymous_peak))
-            .max()
+        cells.filter_map(|c| Some(c.measured()?.rss.anonymous_peak)).max()
     }
 
     /// The highest peak over all motions of mapped files, bytes.
     pub fn file_peak_bytes(&self, particles: usize, column: &Column) -> Option<u64> {
         let cells = self.cells_of(particles, column);
-        cells
-            .filter_map(|c| Some(c.measured()?.rss.file_peak))
-            .max()
+        cells.filter_map(|c| Some(c.measured()?.rss.file_peak)).max()
     }
 
     /// The failed cells, with their reasons.

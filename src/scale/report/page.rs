@@ -11,9 +11,8 @@ use crate::scale::Motion;
 
 /// The whole file.
 pub fn html(report: &ScaleReport) -> String {
-    let mut page = Page::new(&format!(
-        "{MADE_BY}: frame rate, build time and memory by particle count"
-    ));
+    let mut page =
+        Page::new(&format!("{MADE_BY}: frame rate, build time and memory by particle count"));
     introduce(&mut page, report);
     page.section("plots", "Plots by particle count");
     page.text(
@@ -38,23 +37,13 @@ pub fn html(report: &ScaleReport) -> String {
         "Median over camera motions of the median over builds. The thesis reports about 2.5 s for lbvh and \
          kdtree, and more than 80 s for sbvh.",
     );
-    page.table(&figures(
-        report,
-        "build-table",
-        table::build_seconds,
-        &thesis::BUILD_SECONDS,
-    ));
+    page.table(&figures(report, "build-table", table::build_seconds, &thesis::BUILD_SECONDS));
     page.section("memory", "Peak memory, MiB");
     page.text(
         "Peak resident memory of the process (VmHWM), including the program itself. The thesis also counts \
          in units of 1024 x 1024 bytes; its values are for its own program on a graphics card.",
     );
-    page.table(&figures(
-        report,
-        "memory-table",
-        table::peak,
-        &thesis::PEAK_MIB,
-    ));
+    page.table(&figures(report, "memory-table", table::peak, &thesis::PEAK_MIB));
     put_parts(&mut page, report);
     // All measurements, folded
     page.section("cells", "All cells");
@@ -85,12 +74,7 @@ fn put_parts(page: &mut Page, report: &ScaleReport) {
              a separate process. The error of compact positions is at most 0.02 radii. The times above do not \
              include the conversion.",
         );
-        put_rows(
-            page,
-            "conversions-table",
-            &parts::CONVERSION_HEADS,
-            conversions,
-        );
+        put_rows(page, "conversions-table", &parts::CONVERSION_HEADS, conversions);
     }
 }
 
@@ -128,16 +112,11 @@ fn introduce(page: &mut Page, report: &ScaleReport) {
 /// One row per count; columns of this report, then those of the thesis.
 fn rates(report: &ScaleReport, motion: Motion) -> Table {
     let columns = report.columns();
-    let theirs: Vec<_> = thesis::RATES
-        .iter()
-        .filter(|r| r.motion == motion)
-        .collect();
+    let theirs: Vec<_> = thesis::RATES.iter().filter(|r| r.motion == motion).collect();
     let names: Vec<&str> = theirs.iter().map(|r| r.structure).collect();
     let mut table = table_with(&format!("rate-{motion}-table"), &columns, &names);
     for particles in counts(report, thesis::RATE_PARTICLES) {
-        let ours = columns
-            .iter()
-            .map(|c| table::rate(report, particles, c, motion));
+        let ours = columns.iter().map(|c| table::rate(report, particles, c, motion));
         let theirs = theirs.iter().map(|r| {
             if particles == thesis::RATE_PARTICLES {
                 format!("{:.2} ({:.2})", r.mean, r.sd)
@@ -145,11 +124,7 @@ fn rates(report: &ScaleReport, motion: Motion) -> Table {
                 MISSING.to_owned()
             }
         });
-        table.row(
-            std::iter::once(particles.to_string())
-                .chain(ours)
-                .chain(theirs),
-        );
+        table.row(std::iter::once(particles.to_string()).chain(ours).chain(theirs));
     }
     table
 }
@@ -174,16 +149,10 @@ fn figures(
             .iter()
             .map(|c| table::summed(report, particles, c, value(report, particles, c)));
         let theirs = names.iter().map(|name| {
-            let found = theirs
-                .iter()
-                .find(|f| f.particles == particles && f.structure == *name);
+            let found = theirs.iter().find(|f| f.particles == particles && f.structure == *name);
             found.map_or_else(|| MISSING.to_owned(), |f| format!("{:.1}", f.value))
         });
-        table.row(
-            std::iter::once(particles.to_string())
-                .chain(ours)
-                .chain(theirs),
-        );
+        table.row(std::iter::once(particles.to_string()).chain(ours).chain(theirs));
     }
     table
 }
@@ -199,10 +168,7 @@ fn counts(report: &ScaleReport, theirs: usize) -> Vec<usize> {
 
 /// A table with columns for the count, for this report and for the thesis.
 fn table_with(id: &str, columns: &[Column], theirs: &[&str]) -> Table {
-    let theirs: Vec<String> = theirs
-        .iter()
-        .map(|name| format!("thesis\n{name}"))
-        .collect();
+    let theirs: Vec<String> = theirs.iter().map(|name| format!("thesis\n{name}")).collect();
     let heads: Vec<&str> = std::iter::once("particles")
         .chain(columns.iter().map(|c| c.title.as_str()))
         .chain(theirs.iter().map(String::as_str))

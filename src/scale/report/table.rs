@@ -23,12 +23,7 @@ pub fn text(report: &ScaleReport) -> String {
     // Build time and memory
     let heading = "Build time, s: median";
     put(&mut text, report, heading, |particles, column| {
-        summed(
-            report,
-            particles,
-            column,
-            build_seconds(report, particles, column),
-        )
+        summed(report, particles, column, build_seconds(report, particles, column))
     });
     let heading = "Peak memory of the process, MiB";
     put(&mut text, report, heading, |particles, column| {
@@ -111,11 +106,7 @@ fn put(
     ];
     for &particles in &report.settings.particles {
         let cells = columns.iter().map(|column| value(particles, column));
-        rows.push(
-            std::iter::once(particles.to_string())
-                .chain(cells)
-                .collect(),
-        );
+        rows.push(std::iter::once(particles.to_string()).chain(cells).collect());
     }
     put_rows(text, heading, &rows);
 }
@@ -159,9 +150,9 @@ pub(super) fn rate(
     let mut cells = report.cells_of(particles, column);
     match cells.find(|cell| cell.motion == motion) {
         None => MISSING.to_owned(),
-        Some(cell) => cell
-            .measured()
-            .map_or_else(|| FAILED.to_owned(), |m| spread(&m.images_per_second)),
+        Some(cell) => {
+            cell.measured().map_or_else(|| FAILED.to_owned(), |m| spread(&m.images_per_second))
+        }
     }
 }
 
@@ -203,9 +194,7 @@ pub(super) fn bytes(report: &ScaleReport, particles: usize, column: &Column) -> 
 /// Mean and standard deviation, in the format of the thesis.
 pub(super) fn spread(values: &Spread) -> String {
     let mean = short(values.mean);
-    values
-        .sd
-        .map_or_else(|| mean.clone(), |sd| format!("{mean} ({})", short(sd)))
+    values.sd.map_or_else(|| mean.clone(), |sd| format!("{mean} ({})", short(sd)))
 }
 
 /// Two digits after the decimal point, fewer for large numbers.

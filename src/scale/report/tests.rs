@@ -20,10 +20,7 @@ fn measurement(rate: f64, build: f64, peak: u64) -> CellMeasurement {
         build: BuildSummary::default(),
         bytes_per_particle: PerParticle::of(&bytes, 1000),
         bytes,
-        rss: RssSummary {
-            total_peak: peak << 20,
-            ..RssSummary::default()
-        },
+        rss: RssSummary { total_peak: peak << 20, ..RssSummary::default() },
         rays: RaySummary::default(),
         rays_per_second: RayRates::default(),
     }
@@ -65,9 +62,7 @@ fn report() -> ScaleReport {
             cell(
                 10_000_000,
                 Motion::Both,
-                CellOutcome::Failed {
-                    reason: "out of memory: 3, \"4\"\nor more".to_owned(),
-                },
+                CellOutcome::Failed { reason: "out of memory: 3, \"4\"\nor more".to_owned() },
             ),
         ],
     }
@@ -97,11 +92,7 @@ fn tables_have_the_layout_of_the_thesis() {
     };
     assert_eq!(
         after("Images per second, rotation"),
-        [
-            "  particles           lbvh",
-            "       1000   20.00 (1.00)",
-            "   10000000              -"
-        ]
+        ["  particles           lbvh", "       1000   20.00 (1.00)", "   10000000              -"]
     );
     let both = after("Images per second, both");
     assert_eq!(both[1], "       1000   2000 (1.00)");
@@ -125,11 +116,7 @@ fn report_in_place() -> ScaleReport {
         positions: 4000,
         structure: 600,
         scratch: 70,
-        file: FileBytes {
-            positions: 4000,
-            structure: 500,
-            attributes: 0,
-        },
+        file: FileBytes { positions: 4000, structure: 500, attributes: 0 },
         ..FrameBytes::default()
     };
     measured.bytes_per_particle = PerParticle::of(&measured.bytes, 1000);
@@ -163,29 +150,16 @@ fn memory_by_part_separates_mapped_from_anonymous() {
     let row = |title: &str| rows.iter().rfind(|row| row[1] == title).expect("a row");
     assert_eq!(
         row("kdtree, q10 file")[2..],
-        [
-            "4.00", "0.00", "0.60", "4.60", "0.10", "4.50", "0.07", "7.0", "60.0"
-        ]
+        ["4.00", "0.00", "0.60", "4.60", "0.10", "4.50", "0.07", "7.0", "60.0"]
     );
-    assert_eq!(
-        rows[0][2..8],
-        ["12.00", "0.00", "0.60", "12.60", "12.60", "0.00"]
-    );
+    assert_eq!(rows[0][2..8], ["12.00", "0.00", "0.60", "12.60", "12.60", "0.00"]);
     // That count has no measurements.
     assert!(row("kdtree")[2..].iter().all(|cell| cell == MISSING));
     assert_eq!(row("thesis (about)")[5], "350");
     assert!(rows.iter().all(|row| row.len() == parts::HEADS.len()));
     assert_eq!(
         parts::conversions(&report),
-        [[
-            "10000000",
-            "kdtree, q10 file",
-            "0.250",
-            "1.500",
-            "46.0",
-            "0.0125",
-            "0.0"
-        ]]
+        [["10000000", "kdtree, q10 file", "0.250", "1.500", "46.0", "0.0125", "0.0"]]
     );
     let text = table::text(&report);
     assert!(text.contains("Native frames"), "{text}");
@@ -208,9 +182,7 @@ fn undefined_values_are_not_failures() {
     let (_, bytes) = text.split_once("Bytes per particle").unwrap();
     assert!(!bytes.contains("failed"), "{text}");
     // A row with failures only is marked as failed.
-    report.cells[0].outcome = CellOutcome::Failed {
-        reason: "it was late".to_owned(),
-    };
+    report.cells[0].outcome = CellOutcome::Failed { reason: "it was late".to_owned() };
     let text = table::text(&report);
     let (_, bytes) = text.split_once("Bytes per particle").unwrap();
     assert!(bytes.contains("failed"), "{text}");
@@ -266,11 +238,8 @@ fn page_compares_all_measurements_with_the_thesis() {
     assert!(html.contains("&quot;4&quot;"));
 
     let mut own = report();
-    own.settings.input = Some(InputSummary {
-        path: "<mine>.vtk".to_owned(),
-        frame: 7,
-        particles: 1000,
-    });
+    own.settings.input =
+        Some(InputSummary { path: "<mine>.vtk".to_owned(), frame: 7, particles: 1000 });
     let html = page::html(&own);
     assert!(html.contains("&lt;mine&gt;.vtk, frame 7"));
     assert!(!html.contains("thesis, lbvh"));

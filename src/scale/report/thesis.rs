@@ -35,20 +35,11 @@ pub struct Figure {
 pub const RATE_PARTICLES: usize = 10_000_000;
 
 const fn rate(structure: &'static str, motion: Motion, mean: f64, sd: f64) -> FrameRate {
-    FrameRate {
-        structure,
-        motion,
-        mean,
-        sd,
-    }
+    FrameRate { structure, motion, mean, sd }
 }
 
 const fn figure(structure: &'static str, particles: usize, value: f64) -> Figure {
-    Figure {
-        structure,
-        particles,
-        value,
-    }
+    Figure { structure, particles, value }
 }
 
 /// Tables 2 to 4.

@@ -82,11 +82,7 @@ mod tests {
 
     #[test]
     fn positions_lead_back_to_values() {
-        for scale in [
-            ColorScale::Linear,
-            ColorScale::Log,
-            ColorScale::SymLog { threshold: 0.01 },
-        ] {
+        for scale in [ColorScale::Linear, ColorScale::Log, ColorScale::SymLog { threshold: 0.01 }] {
             for value in [1e-9, 0.003, 0.01, 0.011, 1.0, 7.5, 1e12] {
                 let again = scale.inverse(scale.forward(value));
                 assert!((again / value - 1.0).abs() < 1e-12, "{scale:?} {value}");

@@ -60,10 +60,7 @@ const MAPS: [(&str, Table); 21] = [
     ("cool", Table::Colorous(colorous::COOL)),
     ("cubehelix", Table::Colorous(colorous::CUBEHELIX)),
     ("red-blue", Table::Colorous(colorous::RED_BLUE)),
-    (
-        "red-yellow-blue",
-        Table::Colorous(colorous::RED_YELLOW_BLUE),
-    ),
+    ("red-yellow-blue", Table::Colorous(colorous::RED_YELLOW_BLUE)),
     ("purple-orange", Table::Colorous(colorous::PURPLE_ORANGE)),
     ("spectral", Table::Colorous(colorous::SPECTRAL)),
     ("rainbow", Table::Colorous(colorous::RAINBOW)),

@@ -72,11 +72,7 @@ pub(super) fn entry(i: usize) -> Vec3 {
     let (from, to) = (knot(k), knot(k + 1));
     // Extrapolate linearly beyond the ends
     let before = if k == 0 { 2.0 * from - to } else { knot(k - 1) };
-    let after = if k + 2 < TURBO.len() {
-        knot(k + 2)
-    } else {
-        2.0 * to - from
-    };
+    let after = if k + 2 < TURBO.len() { knot(k + 2) } else { 2.0 * to - from };
     // Evaluate the cubic between the knots
     let (slope_from, slope_to) = (0.5 * (to - before), 0.5 * (after - from));
     let bend = to - from;

@@ -31,10 +31,7 @@ pub(super) struct Cell {
 impl Distribution {
     /// The distribution of cells with positive `weights`, row by row.
     pub(super) fn new(columns: usize, weights: &[f64]) -> Self {
-        let sums: Vec<f64> = weights
-            .chunks(columns)
-            .map(|row| row.iter().sum())
-            .collect();
+        let sums: Vec<f64> = weights.chunks(columns).map(|row| row.iter().sum()).collect();
         let rows = cumulative(&sums);
         let cells: Vec<f32> = weights.chunks(columns).flat_map(cumulative).collect();
         Self {
@@ -68,12 +65,7 @@ impl Distribution {
         let (row, down) = invert(&self.rows, &self.row_guide, u[1]);
         let guide = &self.cell_guide[row * GUIDES..(row + 1) * GUIDES];
         let (column, across) = invert(self.row(row), guide, u[0]);
-        Cell {
-            column,
-            row,
-            across,
-            down,
-        }
+        Cell { column, row, across, down }
     }
 
     #[inline(always)]
@@ -111,11 +103,7 @@ fn guide(ends: &[f32]) -> Vec<u16> {
 
 /// The cell of `u` and the position in it, in 0..1.
 #[inline(always)]
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "saturates"
-)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
 fn invert(ends: &[f32], guide: &[u16], u: f32) -> (usize, f32) {
     // Start at the guide, and step to the first cell that ends after `u`
     let interval = (u * GUIDES as f32) as usize;
@@ -129,14 +117,7 @@ fn invert(ends: &[f32], guide: &[u16], u: f32) -> (usize, f32) {
     let position = (u - low) / (ends[cell] - low);
     let position = if position > 0.0 { position } else { 0.0 };
     let below_one = 1.0 - 0.5 * f32::EPSILON;
-    (
-        cell,
-        if position < below_one {
-            position
-        } else {
-            below_one
-        },
-    )
+    (cell, if position < below_one { position } else { below_one })
 }
 
 #[cfg(test)]

@@ -14,9 +14,7 @@ const COUNT: usize = 9;
 /// Factors of the bands for the cosine over a hemisphere.
 const BANDS: [f32; COUNT] = {
     let (first, second, third) = (PI, 2.0 * PI / 3.0, PI / 4.0);
-    [
-        first, second, second, second, third, third, third, third, third,
-    ]
+    [first, second, second, second, third, third, third, third, third]
 };
 
 /// Irradiance by the direction of a surface, see the module.
@@ -33,10 +31,7 @@ impl Environment {
             let texels = self.weighted_texels(|direction| basis(direction)[i]);
             BANDS[i] * integral(&texels, |texel| *texel)
         };
-        IrradianceHarmonics {
-            axes: self.axes,
-            coefficients: std::array::from_fn(coefficient),
-        }
+        IrradianceHarmonics { axes: self.axes, coefficients: std::array::from_fn(coefficient) }
     }
 }
 
@@ -79,25 +74,14 @@ mod tests {
         let uniform = Environment::constant(Vec3::new(1.0, 2.0, 0.5));
         for (environment, tolerance) in [(uniform, 1e-4), (studio(axes, Vec3::ONE), 0.1)] {
             let harmonics = environment.irradiance_harmonics();
-            let normals = [
-                Vec3::X,
-                -Vec3::X,
-                Vec3::Y,
-                -Vec3::Y,
-                Vec3::Z,
-                -Vec3::Z,
-                Vec3::ONE,
-            ];
+            let normals = [Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z, Vec3::ONE];
             let normals = normals.map(Vec3::normalize);
             let exact = normals.map(|normal| environment.irradiance(normal));
             let brightest = exact.iter().fold(Vec3::ZERO, |a, b| a.max(*b));
             for (normal, exact) in normals.into_iter().zip(exact) {
                 let found = harmonics.at(normal);
                 let difference = (found - exact).abs() / brightest;
-                assert!(
-                    difference.max_element() < tolerance,
-                    "{normal}: {found}, {exact}"
-                );
+                assert!(difference.max_element() < tolerance, "{normal}: {found}, {exact}");
                 assert!(found.min_element() >= 0.0);
             }
         }

@@ -90,12 +90,7 @@ impl RadianceMap {
             negative += usize::from(pixel.min_element() < 0.0);
             *pixel = pixel.max(Vec3::ZERO);
         }
-        Ok(Self {
-            width,
-            height,
-            pixels,
-            negative,
-        })
+        Ok(Self { width, height, pixels, negative })
     }
 
     /// Width and height in pixels.
@@ -218,9 +213,6 @@ mod tests {
         assert!(RadianceMap::new(4, 2, pixels.clone()).is_err());
         pixels[6].y = -2.0;
         let map = RadianceMap::new(4, 2, pixels).unwrap();
-        assert_eq!(
-            (map.negative(), map.pixels[6]),
-            (1, Vec3::new(1.0, 0.0, 1.0))
-        );
+        assert_eq!((map.negative(), map.pixels[6]), (1, Vec3::new(1.0, 0.0, 1.0)));
     }
 }

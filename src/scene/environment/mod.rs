@@ -61,31 +61,21 @@ impl EnvironmentAxes {
         let up = up.try_normalize().unwrap_or(DVec3::Z);
         let level = forward - forward.dot(up) * up;
         // For a view straight down, any direction will do
-        let forward = level
-            .try_normalize()
-            .unwrap_or_else(|| up.any_orthonormal_vector());
+        let forward = level.try_normalize().unwrap_or_else(|| up.any_orthonormal_vector());
         let right = forward.cross(up);
         // Turn the axes
         let angle = rotation.to_radians();
         let (sin, cos) = (libm::sin(angle), libm::cos(angle));
         let turned_right = cos * right + sin * forward;
         let turned_back = sin * right - cos * forward;
-        Self {
-            right: turned_right.as_vec3(),
-            back: turned_back.as_vec3(),
-            up: up.as_vec3(),
-        }
+        Self { right: turned_right.as_vec3(), back: turned_back.as_vec3(), up: up.as_vec3() }
     }
 }
 
 impl EnvironmentAxes {
     /// The components of `world` along these axes.
     fn own(&self, world: Vec3) -> Vec3 {
-        Vec3::new(
-            world.dot(self.right),
-            world.dot(self.back),
-            world.dot(self.up),
-        )
+        Vec3::new(world.dot(self.right), world.dot(self.back), world.dot(self.up))
     }
 
     /// The world direction with the components `own` along these axes, normalised.
@@ -162,15 +152,10 @@ impl Environment {
         };
         let mut weights = smoothed_luminance(&radiance);
         let rows = || weights.chunks(COLUMNS).enumerate();
-        let total: f64 = rows()
-            .map(|(row, weights)| weights.iter().sum::<f64>() * solid_angle(row))
-            .sum();
+        let total: f64 =
+            rows().map(|(row, weights)| weights.iter().sum::<f64>() * solid_angle(row)).sum();
         let mean = total / (4.0 * std::f64::consts::PI);
-        let least = if mean > 0.0 {
-            LEAST_DENSITY * mean
-        } else {
-            1.0
-        };
+        let least = if mean > 0.0 { LEAST_DENSITY * mean } else { 1.0 };
         for (row, weights) in weights.chunks_mut(COLUMNS).enumerate() {
             for weight in weights {
                 *weight = (*weight + least) * solid_angle(row);
@@ -194,9 +179,7 @@ impl Environment {
 
     /// Whether no light comes from anywhere.
     pub fn is_black(&self) -> bool {
-        self.texels
-            .iter()
-            .all(|[r, g, b, _]| *r == 0.0 && *g == 0.0 && *b == 0.0)
+        self.texels.iter().all(|[r, g, b, _]| *r == 0.0 && *g == 0.0 && *b == 0.0)
     }
 
     /// Memory, bytes.
@@ -290,12 +273,9 @@ impl Environment {
         let rows = self.texels.chunks(COLUMNS).enumerate();
         let lit = rows.flat_map(|(row, texels)| {
             let polar = polar(row, 0.5);
-            texels
-                .iter()
-                .zip(&longitudes)
-                .map(move |([r, g, b, _], longitude)| {
-                    weight(direction_at(polar, *longitude)) * Vec3::new(*r, *g, *b)
-                })
+            texels.iter().zip(&longitudes).map(move |([r, g, b, _], longitude)| {
+                weight(direction_at(polar, *longitude)) * Vec3::new(*r, *g, *b)
+            })
         });
         lit.collect()
     }
@@ -321,10 +301,7 @@ impl Environment {
         let (column, row) = (index(x, COLUMNS + 1), index(y, ROWS + 1));
         let (across, down) = (x - column as f32, y - row as f32);
         let (left, right) = ((column + COLUMNS - 1) % COLUMNS, column % COLUMNS);
-        let (above, below) = (
-            row.saturating_sub(1),
-            if row < ROWS { row } else { ROWS - 1 },
-        );
+        let (above, below) = (row.saturating_sub(1), if row < ROWS { row } else { ROWS - 1 });
         let texel = |row: usize, column: usize| {
             let [r, g, b, _] = self.texels[row * COLUMNS + column];
             Vec3::new(r, g, b)
@@ -337,11 +314,7 @@ impl Environment {
 
 /// The cell of `0..count` that contains `position`; the nearest one for positions outside, the first for NaN.
 #[inline(always)]
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "saturates"
-)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
 fn index(position: f32, count: usize) -> usize {
     let cell = position as usize;
     if cell < count { cell } else { count - 1 }
@@ -394,11 +367,7 @@ fn smoothed_luminance(radiance: &[Vec3]) -> Vec<f64> {
     for row in 0..ROWS {
         let rows = [row.saturating_sub(1), row, (row + 1).min(ROWS - 1)];
         for column in 0..COLUMNS {
-            let columns = [
-                (column + COLUMNS - 1) % COLUMNS,
-                column,
-                (column + 1) % COLUMNS,
-            ];
+            let columns = [(column + COLUMNS - 1) % COLUMNS, column, (column + 1) % COLUMNS];
             let sum: f64 = rows
                 .iter()
                 .map(|row| columns.iter().map(|column| of(*row, *column)).sum::<f64>())

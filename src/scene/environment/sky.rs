@@ -54,10 +54,7 @@ pub fn sky(axes: EnvironmentAxes, direction: Vec3, scale: Vec3) -> Environment {
     let model = Model::new(direction);
     let radiance = |at: Vec3| model.radiance(at.with_z(at.z.max(HORIZON)).normalize());
     // Scale to the brightness on the ground
-    let raw = Environment::from_fn(
-        axes,
-        |at| if at.z > 0.0 { radiance(at) } else { Vec3::ZERO },
-    );
+    let raw = Environment::from_fn(axes, |at| if at.z > 0.0 { radiance(at) } else { Vec3::ZERO });
     let ground = raw.irradiance(axes.up) / std::f32::consts::PI;
     let factor = BRIGHTNESS / ground.dot(LUMINANCE).max(f32::MIN_POSITIVE);
     Environment::from_fn(axes, |at| {
@@ -152,10 +149,7 @@ mod tests {
             let sky = sky(axes(), sky_direction(elevation, 140.0), Vec3::ONE);
             let up = sky.irradiance(Vec3::Z) / std::f32::consts::PI;
             let luminance = up.dot(LUMINANCE);
-            assert!(
-                (luminance - BRIGHTNESS).abs() < 0.02,
-                "{elevation}: {luminance}"
-            );
+            assert!((luminance - BRIGHTNESS).abs() < 0.02, "{elevation}: {luminance}");
         }
     }
 
@@ -166,17 +160,11 @@ mod tests {
         let sky = sky(axes, sun, Vec3::ONE);
         let [there, away] = [sun, level * sun].map(|at| sky.radiance(axes.to_world(at)));
         assert!(away.z > 1.5 * away.x, "{away}");
-        assert!(
-            there.dot(LUMINANCE) > 2.0 * away.dot(LUMINANCE),
-            "{there} {away}"
-        );
+        assert!(there.dot(LUMINANCE) > 2.0 * away.dot(LUMINANCE), "{there} {away}");
         // No dark band at the horizon
         let [above, below] =
             [0.01, -0.01].map(|z| sky.radiance(Vec3::new(0.0, 1.0, z).normalize()));
-        assert!(
-            (above - below).abs().max_element() < 0.1 * above.max_element(),
-            "{above} {below}"
-        );
+        assert!((above - below).abs().max_element() < 0.1 * above.max_element(), "{above} {below}");
     }
 
     /// Values of the authors' RGB code (version 1.4a, as ported by the crate `hw-skymodel` 0.1.1) for turbidity 2.5,
@@ -187,10 +175,7 @@ mod tests {
         for (elevation, azimuth, expected) in REFERENCE {
             let found = model.radiance(sky_direction(elevation, azimuth));
             let error = (found - Vec3::from_array(expected)).abs().max_element();
-            assert!(
-                error < 1e-3 * found.max_element(),
-                "{elevation} {azimuth}: {found}"
-            );
+            assert!(error < 1e-3 * found.max_element(), "{elevation} {azimuth}: {found}");
         }
     }
 

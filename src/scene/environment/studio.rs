@@ -22,34 +22,17 @@ struct Cap {
 }
 
 const fn cap(direction: Vec3, [half_angle, softness]: [f32; 2], radiance: Vec3) -> Cap {
-    Cap {
-        direction,
-        half_angle,
-        softness,
-        radiance,
-    }
+    Cap { direction, half_angle, softness, radiance }
 }
 
 /// Daylight, slightly warm, from the left and above.
-const KEY: Cap = cap(
-    Vec3::new(-0.75, 0.55, 1.0),
-    [0.15, 0.05],
-    Vec3::new(36.0, 34.74, 33.12),
-);
+const KEY: Cap = cap(Vec3::new(-0.75, 0.55, 1.0), [0.15, 0.05], Vec3::new(36.0, 34.74, 33.12));
 
 /// A large cool light from the right.
-const FILL: Cap = cap(
-    Vec3::new(1.0, 0.7, 0.35),
-    [0.6, 0.3],
-    Vec3::new(0.68, 0.744, 0.8),
-);
+const FILL: Cap = cap(Vec3::new(1.0, 0.7, 0.35), [0.6, 0.3], Vec3::new(0.68, 0.744, 0.8));
 
 /// A light from behind, for outlines.
-const RIM: Cap = cap(
-    Vec3::new(0.35, -1.0, 0.6),
-    [0.35, 0.15],
-    Vec3::new(4.75, 4.85, 5.0),
-);
+const RIM: Cap = cap(Vec3::new(0.35, -1.0, 0.6), [0.35, 0.15], Vec3::new(4.75, 4.85, 5.0));
 
 /// The dome at the zenith, just above the horizon, just below it, and at the nadir.
 const DOME: [Vec3; 4] = [
@@ -61,10 +44,7 @@ const DOME: [Vec3; 4] = [
 
 /// The studio around a viewer, times `scale` per component.
 pub fn studio(axes: EnvironmentAxes, scale: Vec3) -> Environment {
-    let caps = [KEY, FILL, RIM].map(|cap| Cap {
-        direction: cap.direction.normalize(),
-        ..cap
-    });
+    let caps = [KEY, FILL, RIM].map(|cap| Cap { direction: cap.direction.normalize(), ..cap });
     Environment::from_fn(axes, |direction| {
         let lights: Vec3 = caps.iter().map(|cap| cap.radiance(direction)).sum();
         scale * (dome(direction.z) + lights)
@@ -84,9 +64,5 @@ impl Cap {
 /// Radiance of the dome at `height`, the sine of the elevation.
 fn dome(height: f32) -> Vec3 {
     let [zenith, above, below, nadir] = DOME;
-    if height > 0.0 {
-        above.lerp(zenith, height)
-    } else {
-        below.lerp(nadir, -height)
-    }
+    if height > 0.0 { above.lerp(zenith, height) } else { below.lerp(nadir, -height) }
 }

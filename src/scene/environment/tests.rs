@@ -63,14 +63,9 @@ fn the_density_integrates_to_one() {
     // By directions, where the density is smooth enough for that
     let studio = studio(tilted(), Vec3::ONE);
     let count = 400_000;
-    let mean: f64 = directions(count)
-        .map(|d| f64::from(studio.pdf(d)))
-        .sum::<f64>()
-        / f64::from(count);
-    assert!(
-        (mean * 4.0 * std::f64::consts::PI - 1.0).abs() < 0.01,
-        "{mean}"
-    );
+    let mean: f64 =
+        directions(count).map(|d| f64::from(studio.pdf(d))).sum::<f64>() / f64::from(count);
+    assert!((mean * 4.0 * std::f64::consts::PI - 1.0).abs() < 0.01, "{mean}");
 }
 
 #[test]
@@ -79,10 +74,7 @@ fn samples_agree_with_their_direction() {
         let (mut same, count) = (0, 20_000);
         for u in points(count) {
             let sample = environment.sample(u);
-            assert!(
-                (sample.direction.length() - 1.0).abs() < 1e-5,
-                "{name}: {u:?}"
-            );
+            assert!((sample.direction.length() - 1.0).abs() < 1e-5, "{name}: {u:?}");
             assert!(sample.pdf > 0.0, "{name}: {u:?}");
             // Rounding may move a direction to the next texel.
             let (radiance, pdf) = environment.radiance_and_pdf(sample.direction);
@@ -132,20 +124,15 @@ fn the_mean_of_samples_is_the_integral() {
             .sum::<f64>()
             / f64::from(count);
         let wanted = brute_force(&environment, axis);
-        assert!(
-            (mean - wanted).abs() <= 0.004 * wanted,
-            "{name}: {mean} {wanted}"
-        );
+        assert!((mean - wanted).abs() <= 0.004 * wanted, "{name}: {mean} {wanted}");
     }
 }
 
 #[test]
 fn one_bright_pixel_keeps_its_power_and_is_found() {
-    for (width, height, pixel) in [
-        (512, 256, 70 * 512 + 100),
-        (2048, 1024, 700 * 2048 + 99),
-        (16, 8, 50),
-    ] {
+    for (width, height, pixel) in
+        [(512, 256, 70 * 512 + 100), (2048, 1024, 700 * 2048 + 99), (16, 8, 50)]
+    {
         let environment = bright_pixel(width, height, pixel);
         // Power of the pixel alone
         let edge = |row: usize| (row as f64 * std::f64::consts::PI / height as f64).cos();
@@ -155,20 +142,13 @@ fn one_bright_pixel_keeps_its_power_and_is_found() {
         let faint = 0.01 * 4.0 * std::f64::consts::PI;
         let flat = |environment: &Environment| {
             let axes = [Vec3::X, Vec3::Y, Vec3::Z];
-            axes.iter()
-                .map(|axis| brute_force(environment, *axis))
-                .sum::<f64>()
+            axes.iter().map(|axis| brute_force(environment, *axis)).sum::<f64>()
         };
         let total = flat(&environment);
-        assert!(
-            (total - power - faint).abs() < 0.02 * (power + faint),
-            "{width}: {total} {power}"
-        );
+        assert!((total - power - faint).abs() < 0.02 * (power + faint), "{width}: {total} {power}");
         // Its share of the power is its share of the samples. The density covers 3x3
         // texels around one that is bright, and bilinear radiance 2x2 of them
-        let found = points(4096)
-            .filter(|u| environment.sample(*u).radiance.y > 1.0)
-            .count();
+        let found = points(4096).filter(|u| environment.sample(*u).radiance.y > 1.0).count();
         let wanted = 4096.0 * power / (power + faint) * 4.0 / 9.0;
         assert!(found as f64 > 0.9 * wanted, "{width}: {found} {wanted}");
     }
@@ -182,10 +162,7 @@ fn a_constant_environment_is_uniform() {
         assert!((radiance - Vec3::new(0.5, 1.0, 2.0)).abs().max_element() < 1e-6);
         assert!((pdf * 4.0 * PI - 1.0).abs() < 2e-3, "{direction}: {pdf}");
         let irradiance = environment.irradiance(direction);
-        assert!(
-            (irradiance.y / PI - 1.0).abs() < 1e-3,
-            "{direction}: {irradiance}"
-        );
+        assert!((irradiance.y / PI - 1.0).abs() < 1e-3, "{direction}: {irradiance}");
     }
     assert!(!environment.is_black());
     assert!(Environment::constant(Vec3::ZERO).is_black());
@@ -217,12 +194,7 @@ fn a_studio_has_its_key_light_on_the_left_of_the_viewer() {
     let environment = studio(axes, Vec3::ONE);
     let key = environment.radiance(Vec3::new(-0.75, -0.55, 1.0).normalize());
     assert!(key.x > 35.0, "{key}");
-    assert!(
-        environment
-            .radiance(Vec3::new(0.75, -0.55, 1.0).normalize())
-            .x
-            < 1.5
-    );
+    assert!(environment.radiance(Vec3::new(0.75, -0.55, 1.0).normalize()).x < 1.5);
     let share = |normal: Vec3| environment.irradiance(normal) / PI;
     let (up, down) = (share(Vec3::Z), share(Vec3::NEG_Z));
     let towards_viewer = share(Vec3::new(0.0, -1.0, 0.35).normalize());
@@ -231,10 +203,7 @@ fn a_studio_has_its_key_light_on_the_left_of_the_viewer() {
     assert!((down.y - 0.19).abs() < 0.03, "{down}");
     // Twice as bright, it is sampled in the same way.
     let twice = studio(axes, Vec3::splat(2.0));
-    assert_eq!(
-        twice.sample([0.3, 0.7]).direction,
-        environment.sample([0.3, 0.7]).direction
-    );
+    assert_eq!(twice.sample([0.3, 0.7]).direction, environment.sample([0.3, 0.7]).direction);
 }
 
 #[test]
@@ -244,20 +213,14 @@ fn extreme_values_stay_finite() {
         pixels[11] = Vec3::splat(value);
         RadianceMap::new(8, 4, pixels).unwrap()
     };
-    for (value, scale) in [
-        (f32::MAX, 1.0),
-        (f32::MAX, f32::MAX),
-        (1e-38, 1.0),
-        (f32::from_bits(1), 1e-3),
-    ] {
+    for (value, scale) in
+        [(f32::MAX, 1.0), (f32::MAX, f32::MAX), (1e-38, 1.0), (f32::from_bits(1), 1e-3)]
+    {
         let environment = Environment::from_map(tilted(), &map(value), Vec3::splat(scale));
         for u in points(64) {
             let sample = environment.sample(u);
             let estimate = sample.radiance / sample.pdf;
-            assert!(
-                estimate.is_finite() && sample.pdf > 0.0,
-                "{value} {scale}: {sample:?}"
-            );
+            assert!(estimate.is_finite() && sample.pdf > 0.0, "{value} {scale}: {sample:?}");
         }
         assert!(environment.irradiance(Vec3::Z).is_finite());
     }

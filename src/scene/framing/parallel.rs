@@ -77,9 +77,8 @@ impl Framed {
     /// The lowest and the highest position of a sphere along `axis`, from `center`.
     fn extent(&self, center: DVec3, axis: DVec3) -> [f64; 2] {
         let along = self.points.iter().map(|p| (*p - center).dot(axis));
-        let [low, high] = along.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
-            [low.min(x), high.max(x)]
-        });
+        let [low, high] = along
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)]);
         [low - self.radius, high + self.radius]
     }
 
@@ -122,9 +121,7 @@ mod tests {
                 assert!(camera.depth_of(point.as_vec3()) > 0.0);
                 [along - reach, along + reach].map(|x| x / (0.5 * height))
             });
-            ends.fold([9.0, -9.0], |[low, high]: [f64; 2], end| {
-                [low.min(end[0]), high.max(end[1])]
-            })
+            ends.fold([9.0, -9.0], |[low, high]: [f64; 2], end| [low.min(end[0]), high.max(end[1])])
         })
     }
 
@@ -134,10 +131,7 @@ mod tests {
         for (radius, aspect) in [(0.0, 1.5), (2.0, 1.5), (2.0, 0.4), (5.0, 3.0)] {
             let framed = Framed::spheres(points(), radius);
             for elevation in [0.0, 20.0, 90.0, -90.0] {
-                let framing = Framing {
-                    elevation,
-                    ..Framing::three_quarter(DVec3::Z, aspect)
-                };
+                let framing = Framing { elevation, ..Framing::three_quarter(DVec3::Z, aspect) };
                 let (view, height) = framed.parallel_view(&framing);
                 let sides = extents(&view, height, aspect, radius);
                 for [low, high] in sides {
@@ -156,10 +150,7 @@ mod tests {
     fn turntables_fit_from_all_sides() {
         let limit = 1.0 - SPHERES_MARGIN;
         for (elevation, aspect) in [(0.0, 1.5), (25.0, 0.6), (-40.0, 1.0)] {
-            let framing = Framing {
-                elevation,
-                ..Framing::three_quarter(DVec3::Z, aspect)
-            };
+            let framing = Framing { elevation, ..Framing::three_quarter(DVec3::Z, aspect) };
             let framed = Framed::spheres(points(), 0.5);
             let (path, height) = CameraPath::parallel_turntable(&framed, &framing, 1.0);
             let mut most = 0.0_f64;
@@ -168,20 +159,14 @@ mod tests {
                     most = most.max(high).max(-low);
                 }
             }
-            assert!(
-                most < limit + 1e-9 && most > limit - 1e-3,
-                "{framing:?}: {most}"
-            );
+            assert!(most < limit + 1e-9 && most > limit - 1e-3, "{framing:?}: {most}");
         }
     }
 
     /// Rounded components of the direction of a view, and of what is to the right in its image.
     fn axes(up: DVec3, angles: [f64; 2]) -> [[f64; 3]; 2] {
-        let framing = Framing {
-            azimuth: angles[0],
-            elevation: angles[1],
-            ..Framing::three_quarter(up, 1.0)
-        };
+        let framing =
+            Framing { azimuth: angles[0], elevation: angles[1], ..Framing::three_quarter(up, 1.0) };
         let (view, _) = Framed::spheres(points(), 1.0).parallel_view(&framing);
         let forward = (view.look_at - view.eye).normalize();
         let right = forward.cross(view.up).normalize();

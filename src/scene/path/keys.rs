@@ -138,11 +138,7 @@ impl<'a> Segment<'a> {
         CameraView {
             eye: point(|view| view.eye),
             look_at: point(|view| view.look_at),
-            up: if up.length() < MIN_UP {
-                DVec3::ZERO
-            } else {
-                up.normalize_or_zero()
-            },
+            up: if up.length() < MIN_UP { DVec3::ZERO } else { up.normalize_or_zero() },
             fov: self.value(t, |view| view.fov),
         }
     }
@@ -169,10 +165,7 @@ impl<'a> Segment<'a> {
 }
 
 /// Number of frames from `a` to `b`, which is not before `a`.
-#[expect(
-    clippy::cast_precision_loss,
-    reason = "beyond 2^53 frames a frame more is no other place"
-)]
+#[expect(clippy::cast_precision_loss, reason = "beyond 2^53 frames a frame more is no other place")]
 const fn gap(a: i64, b: i64) -> f64 {
     a.abs_diff(b) as f64
 }

@@ -5,19 +5,11 @@ use super::*;
 use crate::scene::{Camera, CameraPath};
 
 fn view(eye: [f64; 3]) -> CameraView {
-    CameraView {
-        eye: DVec3::from_array(eye),
-        look_at: DVec3::ZERO,
-        up: DVec3::Z,
-        fov: 40.0,
-    }
+    CameraView { eye: DVec3::from_array(eye), look_at: DVec3::ZERO, up: DVec3::Z, fov: 40.0 }
 }
 
 fn key(frame: i64, eye: [f64; 3]) -> CameraKey {
-    CameraKey {
-        frame,
-        view: view(eye),
-    }
+    CameraKey { frame, view: view(eye) }
 }
 
 /// A path with the given x of the eye at the given frames.

@@ -90,10 +90,7 @@ fn level(framing: &Framing) -> Framing {
 /// Sine and cosine of the elevation.
 fn slant(framing: &Framing) -> [f64; 2] {
     let direction = view_direction(framing.up, 0.0, framing.elevation);
-    [
-        -direction.dot(framing.up),
-        direction.cross(framing.up).length(),
-    ]
+    [-direction.dot(framing.up), direction.cross(framing.up).length()]
 }
 
 /// Height of the target point above the centre of `framed`, and its distance.
@@ -133,10 +130,7 @@ fn fit(framed: &Framed, framing: &Framing) -> (f64, f64) {
 }
 
 /// Rotation in degrees at `frame`, within one turn; exact to the last bit however far the frame is from 0.
-#[expect(
-    clippy::cast_precision_loss,
-    reason = "each part has no more than 32 bits that are not 0"
-)]
+#[expect(clippy::cast_precision_loss, reason = "each part has no more than 32 bits that are not 0")]
 fn rotation_at(degrees_per_frame: f64, frame: i64) -> f64 {
     // Whole turns per frame have no effect, and the remainder is exact.
     let step = degrees_per_frame % 360.0;

@@ -5,18 +5,11 @@ use super::*;
 use crate::scene::framing::BOX_MARGIN;
 use crate::scene::{Bounds, Camera, CameraPath};
 
-const BOX: Bounds = Bounds {
-    min: DVec3::new(3.0, 5.0, -2.0),
-    max: DVec3::new(7.0, 8.0, 2.0),
-};
+const BOX: Bounds = Bounds { min: DVec3::new(3.0, 5.0, -2.0), max: DVec3::new(7.0, 8.0, 2.0) };
 
 #[test]
 fn frame_0_of_a_turntable_is_at_its_azimuth() {
-    let framing = Framing {
-        azimuth: 0.0,
-        elevation: 0.0,
-        ..Framing::three_quarter(DVec3::Z, 1.0)
-    };
+    let framing = Framing { azimuth: 0.0, elevation: 0.0, ..Framing::three_quarter(DVec3::Z, 1.0) };
     let path = CameraPath::turntable(&Framed::corners(&BOX), &framing, 90.0);
     let toward = |frame| {
         let view = path.view(frame);
@@ -33,10 +26,7 @@ fn frame_0_of_a_turntable_is_at_its_azimuth() {
     near(toward(i64::MIN), DVec3::Y);
     assert_eq!(path.start(), path.view(0));
     // Equal to the automatic camera with that azimuth.
-    let auto = Framed::corners(&BOX).view(&Framing {
-        azimuth: 90.0,
-        ..framing
-    });
+    let auto = Framed::corners(&BOX).view(&Framing { azimuth: 90.0, ..framing });
     near(toward(1), (auto.look_at - auto.eye).normalize());
 }
 
@@ -55,11 +45,7 @@ fn distant_frame_numbers_rotate_alike() {
             assert!(path.view(frame).eye.is_finite(), "{degrees} {frame}");
         }
     }
-    assert!(
-        CameraPath::turntable(&Framed::corners(&BOX), &framing, -720.0)
-            .moving()
-            .is_empty()
-    );
+    assert!(CameraPath::turntable(&Framed::corners(&BOX), &framing, -720.0).moving().is_empty());
 }
 
 /// Film coordinates of a world point, -1 to 1, computed independently.
@@ -90,10 +76,7 @@ fn outermost(path: &CameraPath, bounds: &Bounds, aspect: f64, frames: i64) -> f6
 fn turntable_distance_is_minimal() {
     for up in [DVec3::X, DVec3::Y, DVec3::Z, DVec3::new(1.0, 2.0, 3.0)] {
         for (elevation, aspect) in [(20.0, 1.5), (-35.0, 0.5), (80.0, 1.0), (0.0, 4.0)] {
-            let framing = Framing {
-                elevation,
-                ..Framing::three_quarter(up, aspect)
-            };
+            let framing = Framing { elevation, ..Framing::three_quarter(up, aspect) };
             let path = CameraPath::turntable(&Framed::corners(&BOX), &framing, 0.25);
             let most = outermost(&path, &BOX, aspect, 1440);
             let limit = 1.0 - BOX_MARGIN;
@@ -112,10 +95,7 @@ fn turntable_around_a_point_or_a_line_is_valid() {
     ] {
         let bounds = Bounds { min, max };
         for elevation in [-90.0, -60.0, 0.0, 75.0, 90.0] {
-            let framing = Framing {
-                elevation,
-                ..Framing::three_quarter(DVec3::Z, 1.0)
-            };
+            let framing = Framing { elevation, ..Framing::three_quarter(DVec3::Z, 1.0) };
             let path = CameraPath::turntable(&Framed::corners(&bounds), &framing, 10.0);
             for frame in 0..36 {
                 let camera = Camera::new(&path.view(frame), 1.0, min);

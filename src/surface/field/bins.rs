@@ -59,11 +59,7 @@ enum RowLookup {
     #[default]
     Search,
     /// By a table over the rectangle of all rows.
-    Table {
-        low: [i32; 2],
-        width: i32,
-        rows: Vec<u32>,
-    },
+    Table { low: [i32; 2], width: i32, rows: Vec<u32> },
 }
 
 const NO_ROW: u32 = u32::MAX;
@@ -109,9 +105,7 @@ impl Bins {
         };
         // Divide the rows into pieces; one more piece takes the particles out of reach
         let width = i64::from(high[1]) - i64::from(low[1]) + 1;
-        let rows = (width * (i64::from(high[2]) - i64::from(low[2]) + 1))
-            .max(1)
-            .cast_unsigned();
+        let rows = (width * (i64::from(high[2]) - i64::from(low[2]) + 1)).max(1).cast_unsigned();
         let max_pieces = (centers.len() / PIECE_LEN).clamp(1, MAX_PIECES) as u64;
         let rows_each = rows.div_ceil(max_pieces);
         #[expect(clippy::cast_possible_truncation, reason = "at most MAX_PIECES")]
@@ -126,13 +120,7 @@ impl Bins {
             ((z * width + y).cast_unsigned() / rows_each) as usize
         };
         // Scatter the particles into pieces, and sort each piece by bin
-        let cells = scatter(
-            centers,
-            pieces + 1,
-            piece_of,
-            &mut bins.points,
-            &mut bins.indices,
-        );
+        let cells = scatter(centers, pieces + 1, piece_of, &mut bins.points, &mut bins.indices);
         let kept = cells.starts[pieces];
         let mut slices = cells.slices_of(&mut bins.points, &mut bins.indices);
         slices.truncate(pieces);
@@ -164,28 +152,14 @@ impl Bins {
             if before != Some(key >> 21) {
                 before = Some(key >> 21);
                 let first = index_u32(self.bins.len());
-                self.rows.push(Row {
-                    z: part(key >> 42),
-                    y: part(key >> 21),
-                    first,
-                });
+                self.rows.push(Row { z: part(key >> 42), y: part(key >> 21), first });
             }
-            self.bins.push(Bin {
-                x: part(*key),
-                start: *start,
-            });
+            self.bins.push(Bin { x: part(*key), start: *start });
         }
         // Append the end markers
         self.lookup = RowLookup::of(&self.rows);
-        self.rows.push(Row {
-            z: i32::MAX,
-            y: i32::MAX,
-            first: index_u32(self.bins.len()),
-        });
-        self.bins.push(Bin {
-            x: i32::MAX,
-            start: index_u32(self.points.len()),
-        });
+        self.rows.push(Row { z: i32::MAX, y: i32::MAX, first: index_u32(self.bins.len()) });
+        self.bins.push(Bin { x: i32::MAX, start: index_u32(self.points.len()) });
     }
 
     /// Removes all bins for which `is_needed` returns false.
@@ -309,8 +283,7 @@ impl Bins {
         match &self.lookup {
             RowLookup::Search => {
                 let rows = &self.rows[..self.row_count()];
-                rows.binary_search_by_key(&(z, y), |row| (row.z, row.y))
-                    .ok()
+                rows.binary_search_by_key(&(z, y), |row| (row.z, row.y)).ok()
             }
             RowLookup::Table { low, width, rows } => {
                 let (z, y) = (z.wrapping_sub(low[1]), y.wrapping_sub(low[0]));
@@ -366,44 +339,28 @@ impl RowLookup {
         }
         let place =
             |row: &Row| (row.z - low_z) as usize * width as usize + (row.y - low_y) as usize;
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "compared with the rows above"
-        )]
+        #[expect(clippy::cast_possible_truncation, reason = "compared with the rows above")]
         let mut table = vec![NO_ROW; area as usize];
         for (number, row) in (0..).zip(rows) {
             table[place(row)] = number;
         }
-        Self::Table {
-            low: [low_y, low_z],
-            width,
-            rows: table,
-        }
+        Self::Table { low: [low_y, low_z], width, rows: table }
     }
 }
 
 fn cell_bounds(centers: &[Vec3], inverse: f32) -> ([i32; 3], [i32; 3]) {
     let join = |(a, b): ([i32; 3], [i32; 3]), (c, d): ([i32; 3], [i32; 3])| {
-        (
-            std::array::from_fn(|i| a[i].min(c[i])),
-            std::array::from_fn(|i| b[i].max(d[i])),
-        )
+        (std::array::from_fn(|i| a[i].min(c[i])), std::array::from_fn(|i| b[i].max(d[i])))
     };
     let none = ([i32::MAX; 3], [i32::MIN; 3]);
     let (low, high) = centers
         .par_chunks(1 << 16)
         .map(|chunk| {
             let cells = chunk.iter().map(|center| cell_of(*center, inverse));
-            cells
-                .filter(|cell| is_in_range(*cell))
-                .fold(none, |all, cell| join(all, (cell, cell)))
+            cells.filter(|cell| is_in_range(*cell)).fold(none, |all, cell| join(all, (cell, cell)))
         })
         .reduce(|| none, join);
-    if low[0] > high[0] {
-        ([0; 3], [0; 3])
-    } else {
-        (low, high)
-    }
+    if low[0] > high[0] { ([0; 3], [0; 3]) } else { (low, high) }
 }
 
 /// Buffers of one thread for sorting pieces.

@@ -121,10 +121,7 @@ impl ArrayTask for Sum<'_> {
             for first in (0..x.len()).step_by(CHECK_LEN / LANES) {
                 let groups = first..(first + CHECK_LEN / LANES).min(x.len());
                 // Sum the kernel over some groups, in lanes
-                for ((x, y), z) in x[groups.clone()]
-                    .iter()
-                    .zip(&y[groups.clone()])
-                    .zip(&z[groups])
+                for ((x, y), z) in x[groups.clone()].iter().zip(&y[groups.clone()]).zip(&z[groups])
                 {
                     for lane in 0..LANES {
                         let (dx, dy, dz) =

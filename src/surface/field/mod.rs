@@ -44,10 +44,7 @@ impl FieldParticles {
 
     /// Sorts `centers` without computing volumes.
     pub(crate) fn sorted(centers: &[Vec3], support: f32, keep_indices: bool) -> Self {
-        Self {
-            bins: Bins::sort(centers, support, keep_indices),
-            volumes: Vec::new(),
-        }
+        Self { bins: Bins::sort(centers, support, keep_indices), volumes: Vec::new() }
     }
 
     /// Removes the particles of all bins with a false flag in `kept`.

@@ -24,9 +24,7 @@ impl FieldParticles {
         for z in z.saturating_sub(1)..=z.saturating_add(1) {
             for y in y.saturating_sub(1)..=y.saturating_add(1) {
                 // Visit the neighbouring bins of the row
-                let run = self
-                    .bins
-                    .run(z, y, x.saturating_sub(1)..x.saturating_add(2));
+                let run = self.bins.run(z, y, x.saturating_sub(1)..x.saturating_add(2));
                 for place in self.bins.particles_in(run) {
                     let offset = self.bins.points()[place] - point;
                     let squared = offset.length_squared();

@@ -27,14 +27,11 @@ fn exact_field(centers: &[Vec3], support: f32, at: DVec3) -> f64 {
 fn cloud(count: usize, seed: u64, edge: f32) -> Vec<Vec3> {
     let mut state = seed;
     let mut unit = move || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 40) as f32 / 16_777_216.0
     };
-    (0..count)
-        .map(|_| edge * Vec3::new(unit(), unit(), unit()) - 0.3 * edge)
-        .collect()
+    (0..count).map(|_| edge * Vec3::new(unit(), unit(), unit()) - 0.3 * edge).collect()
 }
 
 #[test]
@@ -51,10 +48,7 @@ fn is_the_sum_over_all_particles() {
             let at = at.as_dvec3();
             (exact(at + step * axis) - exact(at - step * axis)) / (2.0 * step)
         }));
-        assert!(
-            (sample.gradient.as_dvec3() - gradient).length() < 1e-3,
-            "{at}"
-        );
+        assert!((sample.gradient.as_dvec3() - gradient).length() < 1e-3, "{at}");
     }
 }
 

@@ -102,11 +102,7 @@ impl TriangleMesh {
             let corners = corners.map(|v| vertices[v as usize]);
             corners.iter().all(|p| p.is_finite()) && triangle::normal(&corners).is_some()
         });
-        let mut mesh = Self {
-            vertices,
-            triangles,
-            corner_normals: Vec::new(),
-        };
+        let mut mesh = Self { vertices, triangles, corner_normals: Vec::new() };
         if let MeshNormals::Smooth(angle) = normals {
             mesh.corner_normals = normals::smooth(&mesh, angle);
         }

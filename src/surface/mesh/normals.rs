@@ -28,9 +28,7 @@ pub(super) fn smooth(mesh: &TriangleMesh, angle: f32) -> Vec<[Vec3; 3]> {
         sum.sum::<Vec3>().try_normalize().unwrap_or(own)
     };
     let triangles = mesh.triangles.par_iter().enumerate();
-    triangles
-        .map(|(number, corners)| corners.map(|vertex| normal_at(number, vertex)))
-        .collect()
+    triangles.map(|(number, corners)| corners.map(|vertex| normal_at(number, vertex))).collect()
 }
 
 /// The angle of `triangle` at `vertex`, radians.

@@ -26,9 +26,7 @@ pub struct MeshTree {
 impl fmt::Debug for MeshTree {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let triangles = self.mesh.len();
-        f.debug_struct("MeshTree")
-            .field("triangles", &triangles)
-            .finish_non_exhaustive()
+        f.debug_struct("MeshTree").field("triangles", &triangles).finish_non_exhaustive()
     }
 }
 
@@ -40,14 +38,9 @@ impl MeshTree {
             [a.min(b).min(c), a.max(b).max(c)].map(|corner| corner.as_dvec3())
         };
         let hierarchy = Hierarchy::new(mesh.indices().end, box_of);
-        let extent = hierarchy
-            .bounds()
-            .map_or(0.0, |[min, max]| min.abs().max(max.abs()).max_element());
-        Self {
-            mesh,
-            hierarchy,
-            extent,
-        }
+        let extent =
+            hierarchy.bounds().map_or(0.0, |[min, max]| min.abs().max(max.abs()).max_element());
+        Self { mesh, hierarchy, extent }
     }
 
     /// The mesh.
@@ -116,11 +109,7 @@ pub struct MeshSurface<'a> {
 impl<'a> MeshSurface<'a> {
     /// The visible `faces` of a mesh with this material.
     pub const fn new(tree: &'a MeshTree, faces: VisibleFaces, material: MaterialId) -> Self {
-        Self {
-            tree,
-            faces,
-            material,
-        }
+        Self { tree, faces, material }
     }
 }
 

@@ -13,10 +13,8 @@ struct Random(u64);
 
 impl Random {
     fn next(&mut self) -> f32 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        self.0 =
+            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 40) as f32 / (1 << 23) as f32 - 1.0
     }
 
@@ -149,10 +147,7 @@ fn packets_find_what_single_rays_find() {
         for _ in 0..13 {
             rays.push(&Ray::new(random.vector() * 2.0, random.direction()));
         }
-        let expected: Vec<_> = rays
-            .rays()
-            .map(|ray| shape.crossing(&ray, Side::Outside))
-            .collect();
+        let expected: Vec<_> = rays.rays().map(|ray| shape.crossing(&ray, Side::Outside)).collect();
         let lanes = (1 << 13) - 1;
         let occluded = shape.occluded(&rays, Coherence::Incoherent, lanes);
         let mut hits = Intersections::default();
@@ -168,11 +163,9 @@ fn packets_find_what_single_rays_find() {
 /// from far away.
 #[test]
 fn no_ray_leaves_a_closed_mesh() {
-    for (center, distance) in [
-        (Vec3::ZERO, 0.5),
-        (Vec3::new(3e3, -2e3, 1e3), 0.5),
-        (Vec3::ZERO, 2e4),
-    ] {
+    for (center, distance) in
+        [(Vec3::ZERO, 0.5), (Vec3::new(3e3, -2e3, 1e3), 0.5), (Vec3::ZERO, 2e4)]
+    {
         let (vertices, triangles) = sphere(20, center);
         let mesh = TriangleMesh::new(vertices.clone(), triangles.clone(), MeshNormals::Flat);
         let tree = MeshTree::new(mesh.expect("a mesh"));
@@ -186,10 +179,7 @@ fn no_ray_leaves_a_closed_mesh() {
                 let is_inside = distance < 1.0;
                 // From outside, a ray to the silhouette may miss
                 let is_silhouette = (target - center).dot(ray.direction).abs() < 0.2;
-                assert!(
-                    hit.is_some() || (!is_inside && is_silhouette),
-                    "{ray:?} at {target}"
-                );
+                assert!(hit.is_some() || (!is_inside && is_silhouette), "{ray:?} at {target}");
             }
         }
     }
@@ -218,12 +208,7 @@ fn faces_are_told_apart_by_the_order_of_their_vertices() {
 #[test]
 fn equal_distances_go_to_the_lower_index() {
     let corner = |x, y| Vec3::new(x, y, 0.0);
-    let vertices = vec![
-        corner(0.0, 0.0),
-        corner(1.0, 0.0),
-        corner(1.0, 1.0),
-        corner(0.0, 1.0),
-    ];
+    let vertices = vec![corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)];
     for triangles in [[[0, 1, 2], [0, 2, 3]], [[0, 2, 3], [0, 1, 2]]] {
         let mesh = TriangleMesh::new(vertices.clone(), triangles.into(), MeshNormals::Flat);
         let tree = MeshTree::new(mesh.expect("a mesh"));
@@ -244,26 +229,15 @@ fn smooth_normals_are_those_of_the_sphere_and_creases_stay_sharp() {
     let mut flat_error = 0.0;
     for _ in 0..200 {
         let ray = Ray::new(random.direction() * 3.0, Vec3::X);
-        let ray = Ray {
-            direction: -ray.origin.normalize(),
-            ..ray
-        };
+        let ray = Ray { direction: -ray.origin.normalize(), ..ray };
         let hit = surface(&tree).crossing(&ray, Side::Outside).expect("a hit");
-        assert!(
-            hit.shading.dot(hit.point.normalize()) > 0.9995,
-            "{}",
-            hit.shading
-        );
+        assert!(hit.shading.dot(hit.point.normalize()) > 0.9995, "{}", hit.shading);
         flat_error = f32::max(flat_error, 1.0 - hit.normal.dot(hit.point.normalize()));
     }
     assert!(flat_error > 5e-4, "the triangles are flat: {flat_error}");
     // Two faces of a cube
     let vertices = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
-    let mesh = TriangleMesh::new(
-        vertices,
-        vec![[0, 1, 2], [0, 3, 1]],
-        MeshNormals::Smooth(0.7),
-    );
+    let mesh = TriangleMesh::new(vertices, vec![[0, 1, 2], [0, 3, 1]], MeshNormals::Smooth(0.7));
     let mesh = mesh.expect("a mesh");
     assert_eq!(mesh.shading_normal(0, [1.0, 0.0, 0.0], Vec3::X), Vec3::Z);
     assert_eq!(mesh.shading_normal(1, [1.0, 0.0, 0.0], Vec3::X), Vec3::Y);
@@ -280,18 +254,12 @@ fn damaged_triangles_are_refused_or_left_out() {
     assert!(tree.bytes() > tree.mesh().bytes());
     let error = TriangleMesh::new(vertices, vec![[0, 1, 2], [0, 5, 1]], MeshNormals::Flat);
     let message = error.expect_err("no such vertex").to_string();
-    assert_eq!(
-        message,
-        "triangle 1 refers to vertex 5, but there are only 5 vertices"
-    );
+    assert_eq!(message, "triangle 1 refers to vertex 5, but there are only 5 vertices");
     // An empty mesh, and rays that are not finite
     let empty = MeshTree::new(TriangleMesh::default());
     let ray = Ray::new(Vec3::ZERO, Vec3::X);
     assert_eq!(surface(&empty).crossing(&ray, Side::Outside), None);
-    for ray in [
-        Ray::new(Vec3::NAN, Vec3::X),
-        Ray::new(Vec3::ZERO, Vec3::INFINITY),
-    ] {
+    for ray in [Ray::new(Vec3::NAN, Vec3::X), Ray::new(Vec3::ZERO, Vec3::INFINITY)] {
         assert_eq!(surface(&tree).crossing(&ray, Side::Outside), None);
     }
 }

@@ -55,11 +55,7 @@ impl ShearedRay {
     fn transform(&self, point: Vec3) -> DVec3 {
         let [x, y, z] = self.axes;
         let p = point.as_dvec3() - self.origin;
-        DVec3::new(
-            p[x] - self.shear.x * p[z],
-            p[y] - self.shear.y * p[z],
-            self.shear.z * p[z],
-        )
+        DVec3::new(p[x] - self.shear.x * p[z], p[y] - self.shear.y * p[z], self.shear.z * p[z])
     }
 
     /// The intersection of the line of the ray with a triangle, its edges included.
@@ -76,11 +72,7 @@ impl ShearedRay {
         }
         let weights = [u / sum, v / sum, w / sum];
         let t = weights[0] * a.z + weights[1] * b.z + weights[2] * c.z;
-        Some(TriangleHit {
-            t,
-            weights,
-            is_front: sum > 0.0,
-        })
+        Some(TriangleHit { t, weights, is_front: sum > 0.0 })
     }
 }
 

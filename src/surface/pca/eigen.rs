@@ -59,14 +59,9 @@ pub(super) fn least_component(matrix: &SymmetricMatrix) -> Option<Least> {
         DVec3::new(xy, yy - least, yz),
         DVec3::new(xz, yz, zz - least),
     ];
-    let across = [
-        rows[0].cross(rows[1]),
-        rows[1].cross(rows[2]),
-        rows[2].cross(rows[0]),
-    ];
-    let longest = across
-        .into_iter()
-        .max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()))?;
+    let across = [rows[0].cross(rows[1]), rows[1].cross(rows[2]), rows[2].cross(rows[0])];
+    let longest =
+        across.into_iter().max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()))?;
     if longest.length() <= 1e-9 * scale * scale {
         return None;
     }

@@ -76,9 +76,7 @@ pub(super) fn towards_viewer(smooth: Vec3, normal: Vec3, direction: Vec3) -> Vec
     if cosine * side > 0.0 {
         return smooth;
     }
-    (smooth - direction * (cosine - side))
-        .try_normalize()
-        .unwrap_or(normal)
+    (smooth - direction * (cosine - side)).try_normalize().unwrap_or(normal)
 }
 
 /// Weighted sums over the neighbours of a point, in units of 2^-40; lengths are in supports.

@@ -11,10 +11,7 @@ const SUPPORT: f32 = 4.0;
 fn normals_at(centers: &[Vec3], rays: &[Ray]) -> Vec<Vec3> {
     let mut all = Structure::ALL.map(|structure| {
         let mut builder = TreeBuilder::new();
-        let spheres = Spheres {
-            centers,
-            radius: SphereRadius::Common(1.0),
-        };
+        let spheres = Spheres { centers, radius: SphereRadius::Common(1.0) };
         builder.build(&spheres, &BuildSettings::new(structure));
         let normals = ShadingNormals::Pca(PcaNormals::new(SUPPORT));
         let surface = SphereSurface::new(builder.tree().view()).with_normals(normals);
@@ -29,9 +26,7 @@ fn normals_at(centers: &[Vec3], rays: &[Ray]) -> Vec<Vec3> {
 fn lattice(counts: [i16; 3], spacing: f32) -> Vec<Vec3> {
     let [x, y, z] = counts;
     let points = (0..x).flat_map(|i| (0..y).flat_map(move |j| (0..z).map(move |k| [i, j, k])));
-    points
-        .map(|p| Vec3::from_array(p.map(f32::from)) * spacing)
-        .collect()
+    points.map(|p| Vec3::from_array(p.map(f32::from)) * spacing).collect()
 }
 
 fn downwards(x: f32, y: f32) -> Ray {
@@ -78,10 +73,7 @@ fn a_ball_of_spheres_is_round() {
         })
         .collect();
     let normals = normals_at(&centers, &rays);
-    let cosines = rays
-        .iter()
-        .zip(&normals)
-        .map(|(ray, n)| -n.dot(ray.direction));
+    let cosines = rays.iter().zip(&normals).map(|(ray, n)| -n.dot(ray.direction));
     let mean = cosines.sum::<f32>() / 300.0;
     assert!(mean > 0.92, "{mean}");
 }
@@ -91,24 +83,15 @@ fn isolated_spheres_have_sphere_normals() {
     let centers = [Vec3::ZERO, Vec3::new(100.0, 0.0, 0.0)];
     let ray = downwards(0.6, 0.0);
     let normal = normals_at(&centers, &[ray])[0];
-    assert!(
-        (normal - Vec3::new(0.6, 0.0, 0.8)).length() < 1e-5,
-        "{normal}"
-    );
+    assert!((normal - Vec3::new(0.6, 0.0, 0.8)).length() < 1e-5, "{normal}");
 }
 
 #[test]
 fn coincident_spheres_have_a_normal() {
     let normal = normals_at(&[Vec3::ZERO; 300], &[downwards(0.6, 0.0)])[0];
-    assert!(
-        (normal - Vec3::new(0.6, 0.0, 0.8)).length() < 1e-3,
-        "{normal}"
-    );
+    assert!((normal - Vec3::new(0.6, 0.0, 0.8)).length() < 1e-3, "{normal}");
     let normal = normals_at(&[Vec3::ZERO; 5000], &[downwards(0.6, 0.0)])[0];
-    assert!(
-        (normal - Vec3::new(0.6, 0.0, 0.8)).length() < 1e-5,
-        "{normal}"
-    );
+    assert!((normal - Vec3::new(0.6, 0.0, 0.8)).length() < 1e-5, "{normal}");
 }
 
 #[test]

@@ -38,15 +38,8 @@ pub fn arrow(
     };
     let radius = radius.min(length / (LEAST_LENGTH * HEAD_LENGTH));
     let neck = tail + (length - HEAD_LENGTH * radius) * axis;
-    let rod = |ends, radii| Rod {
-        ends,
-        radii,
-        particles: [color; 2],
-    };
-    Some([
-        rod([tail, neck], [radius; 2]),
-        rod([neck, tail + vector], [HEAD_RADIUS * radius, 0.0]),
-    ])
+    let rod = |ends, radii| Rod { ends, radii, particles: [color; 2] };
+    Some([rod([tail, neck], [radius; 2]), rod([neck, tail + vector], [HEAD_RADIUS * radius, 0.0])])
 }
 
 #[cfg(test)]

@@ -48,12 +48,7 @@ struct Frustum {
 impl Body {
     pub(super) fn new(rod: &Rod, caps: Caps) -> Self {
         let (ends, radii) = (rod.ends.map(double), rod.radii.map(f64::from));
-        Self {
-            ends,
-            radii,
-            caps,
-            side: Frustum::new(ends, radii, caps),
-        }
+        Self { ends, radii, caps, side: Frustum::new(ends, radii, caps) }
     }
 
     /// Lowest and highest corner of a box around the rod.
@@ -82,10 +77,7 @@ impl Body {
         // Start at the point of the ray closest to the rod, so that no digits are lost far from it
         let center = 0.5 * (self.ends[0] + self.ends[1]);
         let start = (center - origin).dot(direction) / direction.length_squared();
-        let line = Line {
-            origin: origin + start * direction,
-            direction,
-        };
+        let line = Line { origin: origin + start * direction, direction };
         let found = match self.caps {
             Caps::Open => self.open(&line),
             Caps::Flat => self.flat(&line),
@@ -93,10 +85,7 @@ impl Body {
         };
         found.map(|crossing| {
             let crossing = crossing.filter(|crossing| crossing.t.is_finite())?;
-            Some(Crossing {
-                t: crossing.t + start,
-                ..crossing
-            })
+            Some(Crossing { t: crossing.t + start, ..crossing })
         })
     }
 
@@ -149,10 +138,7 @@ fn sphere(line: &Line, center: DVec3, radius: f64) -> Option<Interval> {
         return None;
     }
     let half = half.sqrt();
-    let crossing = |t: f64| Crossing {
-        t: along + t,
-        normal: (across + t * direction) / radius,
-    };
+    let crossing = |t: f64| Crossing { t: along + t, normal: (across + t * direction) / radius };
     Some([crossing(-half), crossing(half)])
 }
 
@@ -200,14 +186,8 @@ impl Frustum {
     fn slab(&self, line: &Line) -> Option<Interval> {
         let height = (line.origin - self.start).dot(self.axis);
         let rise = line.direction.dot(self.axis);
-        let bottom = |t| Crossing {
-            t,
-            normal: -self.axis,
-        };
-        let top = |t| Crossing {
-            t,
-            normal: self.axis,
-        };
+        let bottom = |t| Crossing { t, normal: -self.axis };
+        let top = |t| Crossing { t, normal: self.axis };
         if rise == 0.0 {
             let is_inside = (0.0..=self.length).contains(&height);
             return is_inside.then(|| [bottom(f64::NEG_INFINITY), top(f64::INFINITY)]);
@@ -233,15 +213,9 @@ impl Frustum {
         let c = across.length_squared() - radius * radius;
         let crossing = |t: f64| {
             let out = (across + t * drift).normalize_or_zero();
-            Crossing {
-                t,
-                normal: (out - self.slope * self.axis).normalize_or(self.axis),
-            }
+            Crossing { t, normal: (out - self.slope * self.axis).normalize_or(self.axis) }
         };
-        let end = |t| Crossing {
-            t,
-            normal: self.axis,
-        };
+        let end = |t| Crossing { t, normal: self.axis };
         let discriminant = b * b - a * c;
         if discriminant < 0.0 {
             return None;

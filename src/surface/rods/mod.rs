@@ -50,11 +50,7 @@ pub struct Rod {
 impl Rod {
     /// A rod of one radius that belongs to no particle.
     pub const fn line(ends: [Vec3; 2], radius: f32) -> Self {
-        Self {
-            ends,
-            radii: [radius; 2],
-            particles: [0; 2],
-        }
+        Self { ends, radii: [radius; 2], particles: [0; 2] }
     }
 
     /// Whether rays can hit it: its values are finite, no radius is negative, one of them is positive, and it has a
@@ -105,16 +101,9 @@ impl RodTree {
         let owners: Vec<u32> = parts.iter().map(|part| part.rod).collect();
         let bounds = |part: u32| parts[part as usize].bounds(&rods, caps);
         let hierarchy = Hierarchy::of_parts(&owners, bounds);
-        let extent = hierarchy
-            .bounds()
-            .map_or(0.0, |[min, max]| min.abs().max(max.abs()).max_element());
-        Self {
-            rods,
-            colors: Vec::new(),
-            caps,
-            hierarchy,
-            extent,
-        }
+        let extent =
+            hierarchy.bounds().map_or(0.0, |[min, max]| min.abs().max(max.abs()).max_element());
+        Self { rods, colors: Vec::new(), caps, hierarchy, extent }
     }
 
     /// Gives each half of a rod the base colour at its index of [`Rod::particles`], linear RGB; halves without one keep

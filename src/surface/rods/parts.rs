@@ -95,13 +95,7 @@ mod tests {
     fn long_rods_have_small_boxes_and_short_ones_have_one() {
         let long = rods(1000);
         let parts = parts_of(&long, 1.0);
-        let whole: Vec<Part> = (0..1000)
-            .map(|rod| Part {
-                rod,
-                number: 0,
-                count: 1,
-            })
-            .collect();
+        let whole: Vec<Part> = (0..1000).map(|rod| Part { rod, number: 0, count: 1 }).collect();
         let ratio = area(&long, &parts) / area(&long, &whole);
         assert!(ratio < 0.1, "{ratio}");
         assert_eq!(parts_of(&long, 100.0), whole);
@@ -112,11 +106,7 @@ mod tests {
             at += own.len();
             let boxes = own.iter().map(|part| part.bounds(&long, Caps::Flat));
             let union = boxes.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
-            let whole = Part {
-                rod,
-                number: 0,
-                count: 1,
-            };
+            let whole = Part { rod, number: 0, count: 1 };
             assert_eq!(union, Some(whole.bounds(&long, Caps::Flat)));
         }
         assert_eq!(at, parts.len());

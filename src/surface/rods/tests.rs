@@ -14,10 +14,8 @@ struct Random(u64);
 
 impl Random {
     fn next(&mut self) -> f32 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        self.0 =
+            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 40) as f32 / (1 << 23) as f32 - 1.0
     }
 
@@ -29,11 +27,7 @@ impl Random {
         let mut end = || center + length * self.vector();
         let ends = [end(), end()];
         let mut size = || radius * (0.5 + 0.5 * self.next());
-        Rod {
-            ends,
-            radii: [size(), size()],
-            particles: [1, 2],
-        }
+        Rod { ends, radii: [size(), size()], particles: [1, 2] }
     }
 }
 
@@ -79,12 +73,7 @@ fn brute(rod: &Rod, caps: Caps, ray: &Ray, range: [f64; 2]) -> ([Option<f64>; 2]
         let p = o + t * d;
         match caps {
             Caps::Round => {
-                minimum(
-                    |h| (p - a - h * axis).length() - ra - h * (rb - ra),
-                    0.0,
-                    1.0,
-                )
-                .1
+                minimum(|h| (p - a - h * axis).length() - ra - h * (rb - ra), 0.0, 1.0).1
             }
             Caps::Flat => beside(p).max(-height(p)).max(height(p) - length),
             Caps::Open => beside(p),
@@ -136,21 +125,14 @@ fn compare(caps: Caps, center: Vec3, radius: f32, seed: u64) {
         let expected = expected.into_iter().flatten().find(|t| *t >= 0.0);
         let found = surface.crossing(&ray, Side::Outside);
         let exact = expected.filter(|t| *t > 1e-6);
-        assert_eq!(
-            found.is_some(),
-            expected.is_some(),
-            "{caps:?} {rod:?} {ray:?} {expected:?}"
-        );
+        assert_eq!(found.is_some(), expected.is_some(), "{caps:?} {rod:?} {ray:?} {expected:?}");
         let Some((hit, t)) = found.zip(exact) else {
             continue;
         };
         hits += 1;
         // Rounding to single precision is the only error
         let rounding = f64::from(f32::EPSILON);
-        assert!(
-            (f64::from(hit.t) - t).abs() <= rounding * t,
-            "{caps:?} {rod:?} {ray:?} {t}"
-        );
+        assert!((f64::from(hit.t) - t).abs() <= rounding * t, "{caps:?} {rod:?} {ray:?} {t}");
         let point = double(ray.origin) + t * double(ray.direction);
         let near = rounding * (point.abs().max_element() + 1e-3);
         assert!((double(hit.point) - point).abs().max_element() <= near);
@@ -158,10 +140,7 @@ fn compare(caps: Caps, center: Vec3, radius: f32, seed: u64) {
         let step = 1e-4 * f64::from(radius);
         let outside = probe(&rod, caps, point + step * double(hit.normal));
         let inside = probe(&rod, caps, point - step * double(hit.normal));
-        assert!(
-            (outside - step).abs() < 0.2 * step,
-            "{caps:?} {rod:?}: {outside} {step}"
-        );
+        assert!((outside - step).abs() < 0.2 * step, "{caps:?} {rod:?}: {outside} {step}");
         assert!(inside < 0.0 && (hit.normal.length() - 1.0).abs() < 1e-6);
     }
     assert!(hits > 50, "{caps:?}: {hits} hits");
@@ -208,33 +187,17 @@ fn cross(rod: Rod, caps: Caps, origin: [f32; 3], direction: [f32; 3]) -> Option<
 #[test]
 fn special_rods_are_those_computed_by_hand() {
     let pipe = Rod::line([Vec3::ZERO, 2.0 * Vec3::Z], 1.0);
-    let cone = Rod {
-        radii: [1.0, 0.0],
-        ..pipe
-    };
-    let ball = Rod {
-        ends: [Vec3::ZERO; 2],
-        radii: [1.0, 0.5],
-        ..pipe
-    };
+    let cone = Rod { radii: [1.0, 0.0], ..pipe };
+    let ball = Rod { ends: [Vec3::ZERO; 2], radii: [1.0, 0.5], ..pipe };
     let (x, z) = ([-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]);
     // Along the axis: the cap, nothing, the sphere
-    assert_eq!(
-        cross(pipe, Caps::Flat, [0.0, 0.0, 5.0], z),
-        Some((3.0, Vec3::Z))
-    );
+    assert_eq!(cross(pipe, Caps::Flat, [0.0, 0.0, 5.0], z), Some((3.0, Vec3::Z)));
     assert_eq!(cross(pipe, Caps::Open, [0.0, 0.0, 5.0], z), None);
-    assert_eq!(
-        cross(pipe, Caps::Round, [0.0, 0.0, 5.0], z),
-        Some((2.0, Vec3::Z))
-    );
+    assert_eq!(cross(pipe, Caps::Round, [0.0, 0.0, 5.0], z), Some((2.0, Vec3::Z)));
     // From the side, and from inside
     for caps in [Caps::Flat, Caps::Open, Caps::Round] {
         assert_eq!(cross(pipe, caps, [5.0, 0.0, 1.0], x), Some((4.0, Vec3::X)));
-        assert_eq!(
-            cross(pipe, caps, [0.0, 0.0, 1.0], x),
-            Some((1.0, Vec3::NEG_X))
-        );
+        assert_eq!(cross(pipe, caps, [0.0, 0.0, 1.0], x), Some((1.0, Vec3::NEG_X)));
         assert_eq!(cross(pipe, caps, [5.0, 0.0, 3.5], x), None);
     }
     // A cone of slope 1/2: at half its height, its radius is 1/2
@@ -243,15 +206,9 @@ fn special_rods_are_those_computed_by_hand() {
     assert!((normal - Vec3::new(2.0, 0.0, 1.0).normalize()).length() < 1e-7);
     let (t, _) = cross(cone, Caps::Flat, [0.0, 0.0, 5.0], z).expect("the apex");
     assert_eq!(t, 3.0);
-    assert_eq!(
-        cross(cone, Caps::Flat, [0.5, 0.0, 5.0], z).map(|(t, _)| t),
-        Some(4.0)
-    );
+    assert_eq!(cross(cone, Caps::Flat, [0.5, 0.0, 5.0], z).map(|(t, _)| t), Some(4.0));
     // One sphere contains the other
-    assert_eq!(
-        cross(ball, Caps::Round, [5.0, 0.0, 0.0], x),
-        Some((4.0, Vec3::X))
-    );
+    assert_eq!(cross(ball, Caps::Round, [5.0, 0.0, 0.0], x), Some((4.0, Vec3::X)));
     assert_eq!(cross(ball, Caps::Flat, [5.0, 0.0, 0.0], x), None);
 }
 
@@ -269,22 +226,13 @@ fn impossible_rods_are_left_out() {
     let tree = RodTree::new(Vec::new(), Caps::Round);
     assert_eq!(tree.bounds(), None);
     let ray = Ray::new(Vec3::ZERO, Vec3::Z);
-    assert!(
-        RodSurface::new(&tree, MaterialId::GROUND)
-            .nearest(&ray)
-            .is_none()
-    );
+    assert!(RodSurface::new(&tree, MaterialId::GROUND).nearest(&ray).is_none());
     // Rays that are not finite find nothing
     let tree = RodTree::new(vec![good], Caps::Round);
-    for ray in [
-        Ray::new(Vec3::splat(f32::NAN), Vec3::Z),
-        Ray::new(Vec3::Z, Vec3::splat(f32::INFINITY)),
-    ] {
-        assert!(
-            RodSurface::new(&tree, MaterialId::GROUND)
-                .nearest(&ray)
-                .is_none()
-        );
+    for ray in
+        [Ray::new(Vec3::splat(f32::NAN), Vec3::Z), Ray::new(Vec3::Z, Vec3::splat(f32::INFINITY))]
+    {
+        assert!(RodSurface::new(&tree, MaterialId::GROUND).nearest(&ray).is_none());
     }
 }
 
@@ -294,10 +242,7 @@ fn many_rods_are_those_of_brute_force() {
     let rods: Vec<Rod> = (0..400)
         .map(|number| {
             let center = random.vector();
-            Rod {
-                particles: [2 * number, 2 * number + 1],
-                ..random.rod(center, 0.2, 0.03)
-            }
+            Rod { particles: [2 * number, 2 * number + 1], ..random.rod(center, 0.2, 0.03) }
         })
         // Each rod twice: the first one wins
         .flat_map(|rod| [rod; 2])
@@ -333,10 +278,7 @@ fn many_rods_are_those_of_brute_force() {
         assert_eq!(occluded, found.mask);
         for (hit, expected) in found.all(16).into_iter().zip(expected) {
             let found = hit.map(|hit| (f64::from(hit.t), hit.particle));
-            assert_eq!(
-                found.map(|(_, p)| p),
-                expected.map(|(_, _, particle)| particle)
-            );
+            assert_eq!(found.map(|(_, p)| p), expected.map(|(_, _, particle)| particle));
             if let (Some((t, _)), Some((exact, ..))) = (found, expected) {
                 hits += 1;
                 assert!((t - exact).abs() <= f64::from(f32::EPSILON) * exact);
@@ -359,9 +301,6 @@ fn the_memory_of_many_rods_is_predicted() {
         let tree = RodTree::new(rods.collect(), Caps::Flat).with_colors(colors);
         let [_, predicted] = RodTree::predicted_bytes(count.into(), count.into());
         let bytes = tree.bytes() as u64;
-        assert!(
-            (predicted / 3..=predicted).contains(&bytes),
-            "{bytes} of {predicted}"
-        );
+        assert!((predicted / 3..=predicted).contains(&bytes), "{bytes} of {predicted}");
     }
 }

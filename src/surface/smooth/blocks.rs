@@ -42,10 +42,8 @@ impl Plan {
     pub(super) fn of(bins: &Bins, layout: &Layout) -> Self {
         // Find the band, and the bricks around it
         let blocks = near_particles(bins, layout);
-        let with_neighbours: Vec<Vec<(u64, u64)>> = blocks
-            .par_chunks(TASK_BLOCKS)
-            .map(neighbours_of_band)
-            .collect();
+        let with_neighbours: Vec<Vec<(u64, u64)>> =
+            blocks.par_chunks(TASK_BLOCKS).map(neighbours_of_band).collect();
         let with_neighbours = merge_by_key(with_neighbours.concat());
         let mut near = blocks.into_iter().peekable();
         let mut blocks = Vec::new();
@@ -86,12 +84,7 @@ impl BlockPlan {
     }
 
     fn empty(key: u64) -> Self {
-        Self {
-            position: position_of(key),
-            band: 0,
-            inside: 0,
-            raw: 0,
-        }
+        Self { position: position_of(key), band: 0, inside: 0, raw: 0 }
     }
 }
 
@@ -136,12 +129,7 @@ fn near_particles(bins: &Bins, layout: &Layout) -> Vec<BlockPlan> {
                 has_inside && near >> cell & 1 == 1 && is_deep(bins, layout, brick, filled)
             };
             let inside = (0..64).fold(0, |bits, cell| bits | u64::from(is_deep(cell)) << cell);
-            BlockPlan {
-                position,
-                band: near & !inside,
-                inside,
-                raw: 0,
-            }
+            BlockPlan { position, band: near & !inside, inside, raw: 0 }
         })
         .collect()
 }
@@ -159,9 +147,7 @@ pub(super) fn bins_near(
     blocks: &[BlockPlan],
     reach: f32,
 ) -> Vec<bool> {
-    let near: Vec<AtomicBool> = (0..bins.bin_count())
-        .map(|_| AtomicBool::new(false))
-        .collect();
+    let near: Vec<AtomicBool> = (0..bins.bin_count()).map(|_| AtomicBool::new(false)).collect();
     blocks.par_iter().for_each(|block| {
         for cell in cells(block.raw) {
             // Flag all bins within reach of the brick
@@ -212,10 +198,7 @@ pub(super) fn merge_by_key(mut found: Vec<(u64, u64)>) -> Vec<(u64, u64)> {
 
 fn occupied_by_row(bins: &Bins, layout: &Layout, row: usize, found: &mut Vec<(u64, u64)>) {
     let position = bins.row(row);
-    let (ys, zs) = (
-        layout.bricks_near(position.y),
-        layout.bricks_near(position.z),
-    );
+    let (ys, zs) = (layout.bricks_near(position.y), layout.bricks_near(position.z));
     for z in zs {
         for y in ys.clone() {
             // Bins are sorted by x, so entries of the same block are adjacent: combine them at once
@@ -267,9 +250,7 @@ fn is_deep(bins: &Bins, layout: &Layout, brick: [i32; 3], filled: usize) -> bool
         ys.clone().all(|y| {
             let run = bins.run(z, y, xs.clone());
             run.len() == xs.len()
-                && run
-                    .into_iter()
-                    .all(|bin| bins.particles_in(bin..bin + 1).len() >= filled)
+                && run.into_iter().all(|bin| bins.particles_in(bin..bin + 1).len() >= filled)
         })
     })
 }

@@ -15,9 +15,7 @@ pub(super) fn taps(layout: &Layout) -> Vec<f32> {
     };
     let total: f64 = (-layout.blur..=layout.blur).map(weight).sum();
     #[expect(clippy::cast_possible_truncation, reason = "the field is f32")]
-    (0..=layout.blur)
-        .map(|d| (weight(d) / total) as f32)
-        .collect()
+    (0..=layout.blur).map(|d| (weight(d) / total) as f32).collect()
 }
 
 /// One part (smooth or sharp) of the field over a brick.

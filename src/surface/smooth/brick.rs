@@ -39,10 +39,7 @@ pub(super) struct Brick {
 
 /// The brick made from samples, unless it is uniform.
 #[derive(Debug)]
-#[expect(
-    clippy::large_enum_variant,
-    reason = "bricks are moved into their place at once"
-)]
+#[expect(clippy::large_enum_variant, reason = "bricks are moved into their place at once")]
 pub(super) enum BrickKind {
     /// The surface passes through the brick.
     Brick(Brick),
@@ -204,23 +201,14 @@ impl Brick {
         }
         // Sum along x
         let mix = Vec4::from_array(mix_x);
-        Vec3::new(
-            along_x.dot(Vec4::from_array(slope_x)),
-            along_y.dot(mix),
-            along_z.dot(mix),
-        )
+        Vec3::new(along_x.dot(Vec4::from_array(slope_x)), along_y.dot(mix), along_z.dot(mix))
     }
 
     /// Four consecutive samples of a row.
     #[inline(always)]
     fn row(&self, first: usize) -> Vec4 {
         let row = &self.samples[first..first + 4];
-        Vec4::new(
-            f32::from(row[0]),
-            f32::from(row[1]),
-            f32::from(row[2]),
-            f32::from(row[3]),
-        )
+        Vec4::new(f32::from(row[0]), f32::from(row[1]), f32::from(row[2]), f32::from(row[3]))
     }
 }
 
@@ -229,9 +217,7 @@ impl Brick {
 #[expect(clippy::cast_possible_truncation, reason = "numbers from 0 to 8")]
 fn box_around(layers: &[u64; VOXELS]) -> [[u8; 4]; 2] {
     let all = layers.iter().fold(0, |all, layer| all | layer);
-    let rows = (0..8).fold(0_u32, |rows, y| {
-        rows | u32::from(all >> (8 * y) & 0xff != 0) << y
-    });
+    let rows = (0..8).fold(0_u32, |rows, y| rows | u32::from(all >> (8 * y) & 0xff != 0) << y);
     let columns = (0..8).fold(0, |columns, y| columns | all >> (8 * y) & 0xff) as u32;
     let deep = (0..8).fold(0_u32, |deep, z| deep | u32::from(layers[z] != 0) << z);
     let first = |bits: u32| bits.trailing_zeros() as u8;
@@ -254,10 +240,7 @@ fn codes(row: &[f32; 16]) -> [u16; 16] {
 
 /// The voxel of a brick that contains a position.
 #[inline(always)]
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "saturates, then is clamped"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "saturates, then is clamped")]
 pub(super) fn voxel_of(position: Vec3) -> [i32; 3] {
     [position.x, position.y, position.z].map(|x| (x as i32).clamp(0, VOXELS_I32 - 1))
 }
@@ -277,9 +260,6 @@ pub(super) fn trilinear(c: &[f32; 8], part: Vec3) -> f32 {
         mix(c[4], c[5], part.x),
         mix(c[6], c[7], part.x),
     ];
-    let along_y = [
-        mix(along_x[0], along_x[1], part.y),
-        mix(along_x[2], along_x[3], part.y),
-    ];
+    let along_y = [mix(along_x[0], along_x[1], part.y), mix(along_x[2], along_x[3], part.y)];
     mix(along_y[0], along_y[1], part.z)
 }

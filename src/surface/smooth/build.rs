@@ -76,13 +76,9 @@ pub(super) fn build(
     let layout = Layout::new(settings, radius);
     let count = centers.len() as u64;
     let check_memory = |need: u64| match left {
-        Some(left) if need > left => Err(SmoothError::TooLarge {
-            particles: count,
-            radius,
-            voxel: layout.voxel,
-            need,
-            left,
-        }),
+        Some(left) if need > left => {
+            Err(SmoothError::TooLarge { particles: count, radius, voxel: layout.voxel, need, left })
+        }
         _ => Ok(()),
     };
     // Sort the particles into bins
@@ -106,12 +102,7 @@ pub(super) fn build(
         field.find_volumes(|bin| needed[bin]);
     }
     // Sample the field, then assemble bricks and their tree
-    let work = Work {
-        field: &field,
-        layout: &layout,
-        plan: &plan,
-        lanes: ArrayLanes::default(),
-    };
+    let work = Work { field: &field, layout: &layout, plan: &plan, lanes: ArrayLanes::default() };
     let raw = work.raw();
     let (blocks, bricks) = work.bricks(&raw);
     let raw_bytes = raw.byte_len();
@@ -125,11 +116,8 @@ pub(super) fn build(
         left_out: field.bins().left_out(),
         is_empty: count > 0 && tree.is_empty(),
     };
-    let built = Built {
-        tree,
-        field: keep.then_some(field),
-        exact: settings.exact.then_some(layout),
-    };
+    let built =
+        Built { tree, field: keep.then_some(field), exact: settings.exact.then_some(layout) };
     Ok((built, report))
 }
 
@@ -152,10 +140,7 @@ struct MemoryNeed {
 impl MemoryNeed {
     fn of(plan: &Plan) -> Self {
         let count = |bits: fn(&BlockPlan) -> u64| -> u64 {
-            let counts = plan
-                .blocks
-                .iter()
-                .map(|block| u64::from(bits(block).count_ones()));
+            let counts = plan.blocks.iter().map(|block| u64::from(bits(block).count_ones()));
             counts.sum()
         };
         Self {
@@ -206,16 +191,9 @@ impl Work<'_> {
         }
         // Sum the particles of each brick
         let gather = |brick: &[i32; 3]| {
-            self.lanes.run(Gather {
-                field: self.field,
-                layout: self.layout,
-                brick: *brick,
-            })
+            self.lanes.run(Gather { field: self.field, layout: self.layout, brick: *brick })
         };
-        RawField {
-            bricks: places.par_iter().map(gather).collect(),
-            firsts,
-        }
+        RawField { bricks: places.par_iter().map(gather).collect(), firsts }
     }
 
     /// All blocks that are not outside, and their bricks in the same order.
@@ -261,9 +239,7 @@ struct Neighbours<'a> {
 impl<'a> Neighbours<'a> {
     fn of(plan: &'a Plan, raw: &'a RawField, block: usize) -> Self {
         let with_bricks = |number: usize| (&plan.blocks[number], &raw.bricks[raw.firsts[number]..]);
-        Self {
-            blocks: plan.around(block).map(|number| number.map(with_bricks)),
-        }
+        Self { blocks: plan.around(block).map(|number| number.map(with_bricks)) }
     }
 
     /// One part of the field over the brick at `cell` of the central block, and around it. `deep` is its value deep
@@ -279,11 +255,7 @@ impl<'a> Neighbours<'a> {
         for (number, found) in (0..27_u32).zip(&mut around) {
             // Compute the position of the brick in 3x3x3 blocks; one block is 4 bricks
             let along = |step: u32, shift: u32| 3 + step + (cell >> shift & 3);
-            let (x, y, z) = (
-                along(number % 3, 0),
-                along(number / 3 % 3, 2),
-                along(number / 9, 4),
-            );
+            let (x, y, z) = (along(number % 3, 0), along(number / 3 % 3, 2), along(number / 9, 4));
             let block = self.blocks[(x / 4 + 3 * (y / 4) + 9 * (z / 4)) as usize];
             let Some((plan, raw)) = block else {
                 continue;
@@ -311,10 +283,7 @@ struct BrickScratch {
 
 impl Default for BrickScratch {
     fn default() -> Self {
-        Self {
-            blur: Blur::default(),
-            field: Box::new([[[0.0; 16]; SAMPLES]; SAMPLES]),
-        }
+        Self { blur: Blur::default(), field: Box::new([[[0.0; 16]; SAMPLES]; SAMPLES]) }
     }
 }
 
@@ -339,14 +308,10 @@ impl ArrayTask for MakeBlock<'_> {
         for cell in blocks::cells(self.plan.band) {
             // Assemble the samples of the brick; all particles deep inside are crowded
             let (deep_sharp, deep_smooth) = if is_blurred { (0.0, 1.0) } else { (1.0, 0.0) };
-            let sharp = self
-                .neighbours
-                .around(cell, deep_sharp, |raw| raw.sharp.as_deref());
+            let sharp = self.neighbours.around(cell, deep_sharp, |raw| raw.sharp.as_deref());
             blur.copy_sharp(&sharp, field);
             if is_blurred {
-                let smooth = self
-                    .neighbours
-                    .around(cell, deep_smooth, |raw| raw.smooth.as_deref());
+                let smooth = self.neighbours.around(cell, deep_smooth, |raw| raw.smooth.as_deref());
                 blur.add_smooth(&smooth, self.taps, field);
             }
             // Quantise them, unless the brick is uniform
@@ -359,15 +324,8 @@ impl ArrayTask for MakeBlock<'_> {
                 BrickKind::Outside => {}
             }
         }
-        let node = BrickNode {
-            children,
-            inside,
-            first: 0,
-        };
-        let block = Block {
-            position: self.plan.position,
-            node,
-        };
+        let node = BrickNode { children, inside, first: 0 };
+        let block = Block { position: self.plan.position, node };
         (block, bricks)
     }
 }

@@ -37,16 +37,9 @@ pub(super) struct Layout {
 
 impl Layout {
     pub(super) fn new(settings: &SurfaceSettings, radius: f32) -> Self {
-        let smoothing = if settings.exact {
-            0.0
-        } else {
-            settings.smoothing
-        };
+        let smoothing = if settings.exact { 0.0 } else { settings.smoothing };
         let sigma = MAX_SIGMA * smoothing / settings.voxel;
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "settings are checked: below 30"
-        )]
+        #[expect(clippy::cast_possible_truncation, reason = "settings are checked: below 30")]
         let blur = ((BLUR_REACH * sigma).round() as i32).min(MAX_BLUR);
         Self {
             radius,

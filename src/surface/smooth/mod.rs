@@ -64,10 +64,7 @@ impl SmoothGrid {
 
     /// The surface as a shape.
     pub fn surface(&self) -> SmoothSurface<'_> {
-        SmoothSurface {
-            built: &self.built,
-            simd: Supported::default(),
-        }
+        SmoothSurface { built: &self.built, simd: Supported::default() }
     }
 }
 
@@ -92,9 +89,7 @@ impl SmoothSurface<'_> {
         let brick = crossings.brick(lane);
         let gradient =
             brick.map(|(brick, position)| tree.bricks[brick as usize].gradient(position));
-        let normal = gradient
-            .and_then(|gradient| (-gradient).try_normalize())
-            .unwrap_or(against);
+        let normal = gradient.and_then(|gradient| (-gradient).try_normalize()).unwrap_or(against);
         // Compute an offset above the rounding of the point
         let largest = point.abs().max(ray.origin.abs()).max_element();
         let hit = Intersection {

@@ -2,10 +2,7 @@
 //!
 //! Along a ray, a trilinear field is a cubic polynomial (Parker et al. 1998; Marmitt et al. 2004).
 
-#![expect(
-    clippy::needless_range_loop,
-    reason = "loops over lanes, each of many arrays"
-)]
+#![expect(clippy::needless_range_loop, reason = "loops over lanes, each of many arrays")]
 
 use crate::math::{Integers, LANES, Lanes, Lanes3, splat};
 
@@ -85,16 +82,8 @@ fn cubic_along(corners: &[Integers; 8], segments: &Segments, threshold: f32, l: 
     let yz = c(6) - c(4) - y;
     let xyz = c(7) - c(6) - (c(5) - c(4)) - xy;
     // Each product of two or three coordinates, as a polynomial of s
-    let [ax, ay, az] = [
-        segments.from[0][l],
-        segments.from[1][l],
-        segments.from[2][l],
-    ];
-    let [bx, by, bz] = [
-        segments.along[0][l],
-        segments.along[1][l],
-        segments.along[2][l],
-    ];
+    let [ax, ay, az] = [segments.from[0][l], segments.from[1][l], segments.from[2][l]];
+    let [bx, by, bz] = [segments.along[0][l], segments.along[1][l], segments.along[2][l]];
     let of_xy = [ax * ay, ax * by + bx * ay, bx * by];
     let of_xz = [ax * az, ax * bz + bx * az, bx * bz];
     let of_yz = [ay * az, ay * bz + by * az, by * bz];
@@ -125,23 +114,10 @@ fn maximum(c: &[f32; 4]) -> f32 {
     // Solve c1 + 2 c2 s + 3 c3 s^2 = 0 for the root with a falling slope; this form also works if c3 is 0
     let [_, a, b, c] = *c;
     let discriminant = b * b - 3.0 * a * c;
-    let root = if discriminant > 0.0 {
-        discriminant
-    } else {
-        0.0
-    }
-    .sqrt();
-    let (over, under) = if b <= 0.0 {
-        (a, root - b)
-    } else {
-        (-(b + root), 3.0 * c)
-    };
+    let root = if discriminant > 0.0 { discriminant } else { 0.0 }.sqrt();
+    let (over, under) = if b <= 0.0 { (a, root - b) } else { (-(b + root), 3.0 * c) };
     let s = over / under;
-    if (discriminant >= 0.0) & (s > 0.0) & (s < 1.0) {
-        s
-    } else {
-        0.0
-    }
+    if (discriminant >= 0.0) & (s > 0.0) & (s < 1.0) { s } else { 0.0 }
 }
 
 /// `c[0] + c[1] s + c[2] s^2 + c[3] s^3` for each lane.
@@ -210,11 +186,8 @@ mod tests {
         sign: f32,
     ) -> Option<f32> {
         let lane = 5;
-        let mut segments = Segments {
-            from: [splat(f32::NAN); 3],
-            along: [splat(f32::NAN); 3],
-            sign: splat(sign),
-        };
+        let mut segments =
+            Segments { from: [splat(f32::NAN); 3], along: [splat(f32::NAN); 3], sign: splat(sign) };
         set_lane3(&mut segments.from, lane, from);
         set_lane3(&mut segments.along, lane, to - from);
         let corners = corners.map(|code| [code as i32; LANES]);
@@ -241,10 +214,7 @@ mod tests {
             let back = first_crossing(&c, Vec3::ONE, Vec3::ZERO, threshold, -1.0).unwrap();
             assert!((1.0 - back - expected).abs() < 2e-3, "{back} {expected}");
         }
-        assert_eq!(
-            first_crossing(&c, Vec3::ZERO, Vec3::ONE, 50_000.0, 1.0),
-            None
-        );
+        assert_eq!(first_crossing(&c, Vec3::ZERO, Vec3::ONE, 50_000.0, 1.0), None);
     }
 
     #[test]

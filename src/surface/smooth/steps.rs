@@ -1,9 +1,6 @@
 //! The arithmetic of the traversal of a brick tree by a packet: plain loops over lanes, compiled for each instruction
 //! set.
-#![expect(
-    clippy::needless_range_loop,
-    reason = "loops over lanes, each of many arrays"
-)]
+#![expect(clippy::needless_range_loop, reason = "loops over lanes, each of many arrays")]
 
 use super::brick::{VOXEL_BITS, VOXELS, VOXELS_I32};
 use super::root::{Segments, first_roots};
@@ -79,11 +76,7 @@ fn enter_tree_body(
             let origin = (rays.origin[a][l] - corner[a]) * tree.inverse;
             let direction = rays.direction[a][l] * tree.inverse;
             let is_flat = direction.abs() < MIN_DIRECTION;
-            let least = if direction.is_sign_negative() {
-                -MIN_DIRECTION
-            } else {
-                MIN_DIRECTION
-            };
+            let least = if direction.is_sign_negative() { -MIN_DIRECTION } else { MIN_DIRECTION };
             let nonzero = if is_flat { least } else { direction };
             let inverse = 1.0 / nonzero;
             grid.origin[a][l] = origin;
@@ -147,11 +140,7 @@ fn leave_cells_body(
             let position = (progress.local[a][l] + grid.direction[a][l] * t) / VOXELS as f32;
             let beside = first + integer_part(smaller(larger(position, 0.0), last));
             // Along an exit axis, it moves to the adjacent brick
-            let beyond = if grid.ahead[a][l] > 0.0 {
-                first + size
-            } else {
-                first - 1
-            };
+            let beyond = if grid.ahead[a][l] > 0.0 { first + size } else { first - 1 };
             let is_exit = progress.exit_axes[l] >> a & 1 == 1;
             let next = if is_exit { beyond } else { beside };
             bits |= cell ^ next;
@@ -216,11 +205,7 @@ fn enter_boxes_body(grid: &GridRays, boxes: &Boxes, progress: &mut Progress, lan
         let is_in = (lanes >> l & 1 == 1) & (t <= t_marked);
         entered |= u32::from(is_in) << l;
         progress.t[l] = if is_in { t } else { progress.t[l] };
-        progress.t_marked[l] = if is_in {
-            t_marked
-        } else {
-            progress.t_marked[l]
-        };
+        progress.t_marked[l] = if is_in { t_marked } else { progress.t_marked[l] };
         for a in 0..3 {
             // Find the first voxel, and the next plane of voxels
             let local = progress.local[a][l];
@@ -250,11 +235,7 @@ lane_kernel! {
 fn step_voxels_body(grid: &GridRays, progress: &mut Progress, lanes: u32) -> u32 {
     let mut staying = 0;
     for l in 0..LANES {
-        let next = [
-            progress.next[0][l],
-            progress.next[1][l],
-            progress.next[2][l],
-        ];
+        let next = [progress.next[0][l], progress.next[1][l], progress.next[2][l]];
         let nearest = least(&next);
         let is_stepping = lanes >> l & 1 == 1;
         let t = larger(nearest, progress.t[l]);
@@ -266,11 +247,7 @@ fn step_voxels_body(grid: &GridRays, progress: &mut Progress, lanes: u32) -> u32
             let length = grid.inverse[a][l].abs();
             let direction = if grid.ahead[a][l] > 0.0 { 1 } else { -1 };
             let voxel = progress.voxel[a][l] + if is_stepped { direction } else { 0 };
-            progress.next[a][l] = if is_stepped {
-                next[a] + length
-            } else {
-                next[a]
-            };
+            progress.next[a][l] = if is_stepped { next[a] + length } else { next[a] };
             progress.voxel[a][l] = voxel;
             bits |= voxel;
         }
@@ -299,11 +276,7 @@ fn cross_voxels_body(
     let mut segments = Segments::default();
     let mut end = splat(0.0);
     for l in 0..LANES {
-        let next = [
-            progress.next[0][l],
-            progress.next[1][l],
-            progress.next[2][l],
-        ];
+        let next = [progress.next[0][l], progress.next[1][l], progress.next[2][l]];
         let nearest = least(&next);
         end[l] = larger(smaller(nearest, progress.t_marked[l]), progress.t[l]);
         segments.sign[l] = if inside >> l & 1 == 1 { -1.0 } else { 1.0 };
@@ -320,11 +293,7 @@ fn cross_voxels_body(
     let (crossed, part) = first_roots(corners, &segments, threshold, lanes);
     for l in 0..LANES {
         let t = progress.t[l] + part[l] * (end[l] - progress.t[l]);
-        progress.t[l] = if crossed >> l & 1 == 1 {
-            t
-        } else {
-            progress.t[l]
-        };
+        progress.t[l] = if crossed >> l & 1 == 1 { t } else { progress.t[l] };
     }
     crossed
 }

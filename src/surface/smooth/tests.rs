@@ -7,18 +7,12 @@ use crate::surface::SurfaceKind;
 const RADIUS: f32 = 0.5;
 
 fn settings(smoothing: f32, exact: bool) -> SurfaceSettings {
-    SurfaceSettings {
-        kind: SurfaceKind::Smooth,
-        smoothing,
-        exact,
-        ..SurfaceSettings::DEFAULT
-    }
+    SurfaceSettings { kind: SurfaceKind::Smooth, smoothing, exact, ..SurfaceSettings::DEFAULT }
 }
 
 fn grid(centers: &[Vec3], settings: &SurfaceSettings) -> SmoothGrid {
     let mut grid = SmoothGrid::default();
-    grid.build(centers, RADIUS, settings, true, None)
-        .expect("it fits");
+    grid.build(centers, RADIUS, settings, true, None).expect("it fits");
     grid
 }
 
@@ -26,10 +20,8 @@ struct Random(u64);
 
 impl Random {
     fn unit(&mut self) -> f32 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        self.0 =
+            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 40) as f32 / 16_777_216.0
     }
 
@@ -67,10 +59,7 @@ fn filled(edge: i32, is_in: impl Fn(Vec3) -> bool) -> Vec<Vec3> {
 fn bodies() -> Vec<(&'static str, Vec<Vec3>)> {
     vec![
         ("one", vec![Vec3::new(0.3, -0.2, 0.1)]),
-        (
-            "two",
-            vec![Vec3::new(-0.5, 0.1, 0.0), Vec3::new(0.4, 0.2, 0.3)],
-        ),
+        ("two", vec![Vec3::new(-0.5, 0.1, 0.0), Vec3::new(0.4, 0.2, 0.3)]),
         ("box", filled(5, |p| p.abs().max_element() < 4.5)),
         ("ball", filled(7, |p| p.length() < 6.0)),
     ]
@@ -99,19 +88,12 @@ fn exact_field(centers: &[Vec3], at: DVec3) -> (f64, DVec3) {
         q if q <= 1.0 => -6.0 * (1.0 - q).powi(2),
         _ => 0.0,
     };
-    let near = |a: DVec3| {
-        centers
-            .iter()
-            .map(|c| c.as_dvec3())
-            .filter(move |c| c.distance(a) < support)
-    };
+    let near =
+        |a: DVec3| centers.iter().map(|c| c.as_dvec3()).filter(move |c| c.distance(a) < support);
     let mut value = 0.0;
     let mut gradient = DVec3::ZERO;
     for j in near(at) {
-        let volume = 1.0
-            / near(j)
-                .map(|k| weight(j.distance(k) / support))
-                .sum::<f64>();
+        let volume = 1.0 / near(j).map(|k| weight(j.distance(k) / support)).sum::<f64>();
         let (offset, distance) = (at - j, at.distance(j));
         value += volume * weight(distance / support);
         gradient += volume * slope(distance / support) / (support * distance.max(1e-9)) * offset;
@@ -134,10 +116,7 @@ fn exact_places_and_normals_are_those_of_the_field() {
             hits += 1;
             let (value, gradient) = exact_field(&centers, hit.point.as_dvec3());
             let distance = (value - f64::from(settings.threshold)) / gradient.length();
-            assert!(
-                distance.abs() < 0.02 * f64::from(RADIUS),
-                "{name}: {distance}"
-            );
+            assert!(distance.abs() < 0.02 * f64::from(RADIUS), "{name}: {distance}");
             let cosine = -gradient.normalize().dot(hit.normal.as_dvec3());
             degrees = degrees.max(cosine.min(1.0).acos().to_degrees());
         }
@@ -149,10 +128,7 @@ fn exact_places_and_normals_are_those_of_the_field() {
 #[test]
 fn fine_grid_converges_to_the_field() {
     for (name, centers) in bodies() {
-        let settings = SurfaceSettings {
-            voxel: 0.25,
-            ..settings(0.0, false)
-        };
+        let settings = SurfaceSettings { voxel: 0.25, ..settings(0.0, false) };
         let grid = grid(&centers, &settings);
         let mut hits = 0;
         for ray in rays(100, 6, 0.8) {
@@ -162,10 +138,7 @@ fn fine_grid_converges_to_the_field() {
             hits += 1;
             let (value, gradient) = exact_field(&centers, hit.point.as_dvec3());
             let distance = (value - f64::from(settings.threshold)) / gradient.length();
-            assert!(
-                distance.abs() < 0.02 * f64::from(RADIUS),
-                "{name}: {distance}"
-            );
+            assert!(distance.abs() < 0.02 * f64::from(RADIUS), "{name}: {distance}");
             let cosine = -gradient.normalize().dot(hit.normal.as_dvec3());
             assert!(cosine > 3_f64.to_radians().cos(), "{name}: {cosine}");
         }
@@ -232,11 +205,7 @@ fn sides_are_those_of_the_field() {
         let (value, _) = exact_field(&centers, point.as_dvec3());
         // Skip points where the resolution of the grid may matter.
         if (value - 0.6).abs() > 0.15 {
-            let expected = if value > 0.6 {
-                Side::Inside
-            } else {
-                Side::Outside
-            };
+            let expected = if value > 0.6 { Side::Inside } else { Side::Outside };
             assert_eq!(grid.surface().side_of(point), expected, "{point}: {value}");
         }
     }
@@ -247,15 +216,9 @@ fn order_and_threads_change_nothing() {
     let centers = filled(8, |p| p.length() < 7.0 && p.x.sin() > -0.7);
     let mut reversed = centers.clone();
     reversed.reverse();
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(3)
-        .build()
-        .expect("threads");
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().expect("threads");
     for settings in [settings(0.75, false), settings(0.0, true)] {
-        let (a, b) = (
-            grid(&centers, &settings),
-            pool.install(|| grid(&reversed, &settings)),
-        );
+        let (a, b) = (grid(&centers, &settings), pool.install(|| grid(&reversed, &settings)));
         for ray in rays(2000, 9, 6.0) {
             assert_eq!(a.surface().nearest(&ray), b.surface().nearest(&ray));
             let inside = Ray { t_min: 28.0, ..ray };
@@ -268,20 +231,15 @@ fn order_and_threads_change_nothing() {
 #[test]
 fn grid_is_fixed_in_world_space() {
     // Move everything by whole bricks, and by distances that do not change the rounding.
-    let centers: Vec<Vec3> = filled(4, |p| p.length() < 3.5)
-        .iter()
-        .map(|c| (c * 1024.0).round() / 1024.0)
-        .collect();
+    let centers: Vec<Vec3> =
+        filled(4, |p| p.length() < 3.5).iter().map(|c| (c * 1024.0).round() / 1024.0).collect();
     let shift = Vec3::new(8.0, -16.0, 4.0);
     let moved: Vec<Vec3> = centers.iter().map(|c| *c + shift).collect();
     let settings = settings(0.75, false);
     let (a, b) = (grid(&centers, &settings), grid(&moved, &settings));
     assert_eq!(a.built.tree.bricks.len(), b.built.tree.bricks.len());
     for ray in rays(200, 4, 3.0) {
-        let there = Ray {
-            origin: ray.origin + shift,
-            ..ray
-        };
+        let there = Ray { origin: ray.origin + shift, ..ray };
         let (Some(p), Some(q)) = (a.surface().nearest(&ray), b.surface().nearest(&there)) else {
             continue;
         };
@@ -295,9 +253,7 @@ fn unusual_input_gives_a_surface_or_none() {
     let ray = Ray::new(Vec3::new(0.0, 0.0, 9.0), Vec3::NEG_Z);
     let build = |centers: &[Vec3], settings: &SurfaceSettings| {
         let mut grid = SmoothGrid::default();
-        let report = grid
-            .build(centers, RADIUS, settings, false, None)
-            .expect("it fits");
+        let report = grid.build(centers, RADIUS, settings, false, None).expect("it fits");
         (grid.surface().nearest(&ray), report)
     };
     let default = settings(0.75, false);
@@ -308,10 +264,7 @@ fn unusual_input_gives_a_surface_or_none() {
     assert!((hit.expect("a drop").t - (9.0 - 1.3 * RADIUS)).abs() < 0.15 * RADIUS);
     let (hit, _) = build(&vec![Vec3::ZERO; 20_000], &default);
     assert!(hit.is_some());
-    let unreachable = SurfaceSettings {
-        threshold: 3.0,
-        ..default
-    };
+    let unreachable = SurfaceSettings { threshold: 3.0, ..default };
     let (hit, report) = build(&filled(3, |_| true), &unreachable);
     assert_eq!((hit, report.is_empty), (None, true));
     let mut escaped = filled(3, |_| true);
@@ -323,8 +276,7 @@ fn unusual_input_gives_a_surface_or_none() {
     assert!(report.bytes < 8 << 20, "{}", report.bytes);
     let at_escaped = Ray::new(Vec3::new(1e5, 2e5, -3e5) + 3.0 * Vec3::Y, Vec3::NEG_Y);
     let mut grid = SmoothGrid::default();
-    grid.build(&escaped, RADIUS, &default, false, None)
-        .expect("it fits");
+    grid.build(&escaped, RADIUS, &default, false, None).expect("it fits");
     assert!(grid.surface().nearest(&at_escaped).is_some());
 }
 
@@ -332,13 +284,7 @@ fn unusual_input_gives_a_surface_or_none() {
 fn grid_beyond_memory_is_rejected() {
     let lonely: Vec<Vec3> = filled(6, |_| true).iter().map(|c| 40.0 * c).collect();
     let mut grid = SmoothGrid::default();
-    let refused = grid.build(
-        &lonely,
-        RADIUS,
-        &settings(0.75, false),
-        false,
-        Some(1 << 20),
-    );
+    let refused = grid.build(&lonely, RADIUS, &settings(0.75, false), false, Some(1 << 20));
     let message = refused.expect_err("it cannot fit").to_string();
     assert!(message.contains("radius 0.5 in voxels of 0.5"), "{message}");
 }
@@ -352,10 +298,7 @@ fn smoothing_removes_bumps() {
         for i in 0..400 {
             let (x, y) = ((i % 20) as f32, (i / 20) as f32);
             let from = Vec3::new(0.3 * (x - 10.0), 0.3 * (y - 10.0), 20.0);
-            let hit = grid
-                .surface()
-                .nearest(&Ray::new(from, Vec3::NEG_Z))
-                .expect("the lid");
+            let hit = grid.surface().nearest(&Ray::new(from, Vec3::NEG_Z)).expect("the lid");
             sum += hit.normal.angle_between(Vec3::Z).to_degrees();
         }
         sum / 400.0
@@ -386,11 +329,7 @@ fn shells(count: u8) -> Vec<Vec3> {
     let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
     let shell = |number: u8| {
         let radius = f64::from(number) + 0.5;
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "thousands"
-        )]
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "thousands")]
         let places = (4.0 * std::f64::consts::PI * radius * radius) as u32;
         (0..places).map(move |i| {
             let z = 1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(places);
@@ -410,10 +349,7 @@ fn ball_of_particles_refracts_as_a_glass_ball() {
     let chords: Vec<f32> = rays(200, 40, 0.01)
         .filter_map(|ray| {
             let enters = surface.nearest(&ray)?;
-            let inside = Ray {
-                t_min: enters.t + enters.offset,
-                ..ray
-            };
+            let inside = Ray { t_min: enters.t + enters.offset, ..ray };
             Some(surface.crossing(&inside, Side::Inside)?.t - enters.t)
         })
         .collect();
@@ -424,10 +360,8 @@ fn ball_of_particles_refracts_as_a_glass_ball() {
         let ior = 1.333;
         let enters = surface.nearest(&ray).expect("towards the middle");
         let inside = crate::scene::material::refract(ray.direction, enters.normal, 1.0 / ior);
-        let inside = Ray::new(
-            enters.anchor - enters.offset * enters.normal,
-            inside.expect("into glass"),
-        );
+        let inside =
+            Ray::new(enters.anchor - enters.offset * enters.normal, inside.expect("into glass"));
         let leaves = surface.crossing(&inside, Side::Inside).expect("a way out");
         let (Some(out), Some(expected)) = (
             crate::scene::material::refract(inside.direction, -leaves.normal, ior),
@@ -436,11 +370,7 @@ fn ball_of_particles_refracts_as_a_glass_ball() {
             continue;
         };
         degrees.push(expected.angle_between(out.as_dvec3()).to_degrees());
-        straight.push(
-            expected
-                .angle_between(ray.direction.as_dvec3())
-                .to_degrees(),
-        );
+        straight.push(expected.angle_between(ray.direction.as_dvec3()).to_degrees());
     }
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     assert!(degrees.len() > 380);
@@ -470,10 +400,7 @@ fn packets_match_single_rays() {
     let (_, centers) = bodies().remove(3);
     let grid = grid(&centers, &settings(0.75, false));
     for level in tested_levels() {
-        let surface = SmoothSurface {
-            built: &grid.built,
-            simd: Supported::or_best(level),
-        };
+        let surface = SmoothSurface { built: &grid.built, simd: Supported::or_best(level) };
         let mut found = 0;
         for (mut packet, inside) in packets(500) {
             let rays: Vec<Ray> = packet.rays().collect();
@@ -506,8 +433,7 @@ fn crossings_are_where_the_side_changes() {
         packet.t_min = [0.0; 16];
         let mut hits = Intersections::default();
         let rays: Vec<Ray> = packet.rays().collect();
-        grid.surface()
-            .intersect(&mut packet, Coherence::Incoherent, 0, &mut hits);
+        grid.surface().intersect(&mut packet, Coherence::Incoherent, 0, &mut hits);
         for (ray, hit) in rays.iter().zip(hits.all(16)) {
             let close = 0.05 * tree.voxel();
             let end = hit.map_or(60.0, |hit| hit.t - close);

@@ -94,16 +94,8 @@ impl BrickTree {
             return;
         }
         // Traverse the tree
-        crossings.mask = traverse(
-            simd,
-            simd,
-            self,
-            &grid,
-            entered,
-            inside,
-            &mut progress,
-            &mut crossings.brick,
-        );
+        crossings.mask =
+            traverse(simd, simd, self, &grid, entered, inside, &mut progress, &mut crossings.brick);
         // Compute the positions of the crossings in their bricks
         crossings.t = progress.t;
         for a in 0..3 {
@@ -140,10 +132,7 @@ fn traverse_body(
         level: [top; LANES],
         nodes,
         inside,
-        waiting: Waiting {
-            in_new_cell: entered,
-            ..Waiting::default()
-        },
+        waiting: Waiting { in_new_cell: entered, ..Waiting::default() },
         crossed: 0,
     };
     traversal.run();

@@ -44,19 +44,12 @@ enum Cell {
 
 impl Cell {
     fn of(node: BrickNode) -> Self {
-        if node.inside == !0 {
-            Self::Inside
-        } else {
-            Self::BrickNode(node)
-        }
+        if node.inside == !0 { Self::Inside } else { Self::BrickNode(node) }
     }
 
     fn node(self) -> BrickNode {
         match self {
-            Self::Inside => BrickNode {
-                inside: !0,
-                ..BrickNode::default()
-            },
+            Self::Inside => BrickNode { inside: !0, ..BrickNode::default() },
             Self::BrickNode(node) => node,
         }
     }
@@ -124,10 +117,8 @@ impl BrickTree {
         let extent = (0..3).map(|a| high[a].abs_diff(low[a])).max().unwrap_or(0);
         let bits = u32::BITS - extent.leading_zeros();
         let position = |block: &Block| std::array::from_fn(|a| block.position[a] - low[a]);
-        let mut cells: Vec<(u128, Cell)> = blocks
-            .iter()
-            .map(|block| (order_key(position(block)), Cell::of(block.node)))
-            .collect();
+        let mut cells: Vec<(u128, Cell)> =
+            blocks.iter().map(|block| (order_key(position(block)), Cell::of(block.node))).collect();
         cells.sort_unstable_by_key(|(key, _)| *key);
         // Build level after level, from the blocks up
         tree.levels = 1 + bits.div_ceil(LEVEL_BITS);
@@ -145,10 +136,8 @@ impl BrickTree {
         let siblings = cells.chunk_by(|(a, _), (b, _)| a >> 6 == b >> 6);
         siblings
             .map(|siblings| {
-                let mut parent = BrickNode {
-                    first: index_u32(self.nodes.len()),
-                    ..BrickNode::default()
-                };
+                let mut parent =
+                    BrickNode { first: index_u32(self.nodes.len()), ..BrickNode::default() };
                 for (key, cell) in siblings {
                     let bit = 1 << (key & 63);
                     match cell {

@@ -10,12 +10,8 @@ use super::root;
 use super::source::{ModulePath, code, files};
 
 /// Directories of crates, and how many files they have at least.
-const SOURCES: [(&str, usize); 4] = [
-    ("src", 100),
-    ("jobs/src", 30),
-    ("formats/src", 30),
-    ("publish/src", 4),
-];
+const SOURCES: [(&str, usize); 4] =
+    [("src", 100), ("jobs/src", 30), ("formats/src", 30), ("publish/src", 4)];
 
 /// The modules of a crate.
 struct Modules {
@@ -31,10 +27,7 @@ impl Modules {
             let named = imported.filter_map(|path| Some((path.last()?.clone(), path)));
             (module.clone(), named.collect())
         });
-        Self {
-            imports: imports.collect(),
-            code: files.into_iter().collect(),
-        }
+        Self { imports: imports.collect(), code: files.into_iter().collect() }
     }
 
     /// The module that defines the item at an absolute `path`.
@@ -55,12 +48,9 @@ impl Modules {
     fn used_by(&self, module: &ModulePath, code: &str) -> BTreeSet<ModulePath> {
         /// Limit for chains of re-exports.
         const STEPS: usize = 8;
-        let owners = rooted_paths(code)
-            .into_iter()
-            .map(|path| self.owner(&absolute(module, path), STEPS));
-        owners
-            .filter(|owner| !module.starts_with(owner) && !owner.starts_with(module))
-            .collect()
+        let owners =
+            rooted_paths(code).into_iter().map(|path| self.owner(&absolute(module, path), STEPS));
+        owners.filter(|owner| !module.starts_with(owner) && !owner.starts_with(module)).collect()
     }
 
     /// Sets of modules that depend on each other.
@@ -68,14 +58,10 @@ impl Modules {
         let used =
             |(module, code): (&ModulePath, &String)| (module.clone(), self.used_by(module, code));
         let uses: BTreeMap<_, _> = self.code.iter().map(used).collect();
-        let reached: BTreeMap<_, _> = uses
-            .keys()
-            .map(|module| (module, reached(module, &uses)))
-            .collect();
+        let reached: BTreeMap<_, _> =
+            uses.keys().map(|module| (module, reached(module, &uses))).collect();
         let cycle = |module: &&ModulePath| -> BTreeSet<String> {
-            let others = reached[*module]
-                .iter()
-                .filter(|other| reached[other].contains(*module));
+            let others = reached[*module].iter().filter(|other| reached[other].contains(*module));
             others.map(|other| other.join("::")).collect()
         };
         let cycles = reached.keys().map(cycle);
@@ -104,10 +90,7 @@ fn files_have_no_dependency_cycles() {
         let files = files(&root().join(source));
         assert!(files.len() >= min_count, "{source}: {} files", files.len());
         let found = Modules::new(files).cycles();
-        assert!(
-            found.is_empty(),
-            "{source}: files depend on each other: {found:?}"
-        );
+        assert!(found.is_empty(), "{source}: files depend on each other: {found:?}");
     }
 }
 
@@ -117,22 +100,13 @@ fn cycles(files: &[(&str, &str)]) -> Vec<String> {
         (names.map(str::to_owned).collect(), code(text))
     };
     let cycles = Modules::new(files.iter().map(file).collect()).cycles();
-    cycles
-        .into_iter()
-        .map(|cycle| Vec::from_iter(cycle).join(" "))
-        .collect()
+    cycles.into_iter().map(|cycle| Vec::from_iter(cycle).join(" ")).collect()
 }
 
 #[test]
 fn cycles_are_found() {
-    let root = (
-        "",
-        "mod a;\nmod b;\npub use a::{Thing, other::Thing as Other};\n",
-    );
-    let a = (
-        "a",
-        "use super::{\n    b::Number,\n};\nuse super::a::deep;\n",
-    );
+    let root = ("", "mod a;\nmod b;\npub use a::{Thing, other::Thing as Other};\n");
+    let a = ("a", "use super::{\n    b::Number,\n};\nuse super::a::deep;\n");
     let with_b = |code: &str| cycles(&[root, a, ("b", code)]);
     assert!(with_b("pub use crate::Unknown;\n").is_empty());
     assert!(with_b("// use crate::a::Thing;\n").is_empty());
@@ -149,9 +123,6 @@ fn cycles_are_found() {
     ];
     assert_eq!(cycles(&three), ["a b::d c"]);
     // A list ends at its own brace.
-    let two = [
-        ("b", "use crate::c::T;"),
-        ("c", "use crate::{n::{o}};\nuse glam::{x, b};"),
-    ];
+    let two = [("b", "use crate::c::T;"), ("c", "use crate::{n::{o}};\nuse glam::{x, b};")];
     assert!(cycles(&two).is_empty());
 }

@@ -69,9 +69,7 @@ fn paths_of_list(rest: &mut &str, path: &ModulePath, found: &mut Vec<ModulePath>
     while !rest.trim_start().starts_with('}') && !rest.is_empty() {
         paths_of_tree(rest, path.clone(), found);
         // Skip an alias and the comma
-        *rest = rest
-            .trim_start_matches(|c| c != ',' && c != '}')
-            .trim_start_matches(',');
+        *rest = rest.trim_start_matches(|c| c != ',' && c != '}').trim_start_matches(',');
     }
     let end = rest.trim_start();
     *rest = end.strip_prefix('}').unwrap_or(end);

@@ -12,11 +12,7 @@ fn one_frame() -> Workshop {
 #[test]
 fn misspelled_values_have_suggestions() {
     let workshop = one_frame();
-    refused(
-        &workshop,
-        &["rendr", "in"],
-        &["`render`", "rendr"].map(|w| w.trim_matches('`')),
-    );
+    refused(&workshop, &["rendr", "in"], &["`render`", "rendr"].map(|w| w.trim_matches('`')));
     not_rendered(&workshop, &["--widht", "64"], &["--widht", "'--width'"]);
     not_rendered(&workshop, &["--progress", "jsn"], &["jsn", "'json'"]);
     not_rendered(
@@ -34,18 +30,11 @@ fn misspelled_values_have_suggestions() {
         &["--accelerator", "lbhv"],
         &["--accelerator: expected one of ", "did you mean lbvh?"],
     );
-    not_rendered(
-        &workshop,
-        &["--channels", "RGBA,z"],
-        &["output.channels", "did you mean Z?"],
-    );
+    not_rendered(&workshop, &["--channels", "RGBA,z"], &["output.channels", "did you mean Z?"]);
     not_rendered(
         &workshop,
         &["--surface", "smoth"],
-        &[
-            "--surface: expected one of spheres, union, smooth",
-            "did you mean smooth?",
-        ],
+        &["--surface: expected one of spheres, union, smooth", "did you mean smooth?"],
     );
     not_rendered(
         &workshop,
@@ -62,18 +51,12 @@ fn misspelled_values_have_suggestions() {
 fn contradictory_surface_options_are_rejected() {
     let workshop = one_frame();
     for (options, expected) in [
-        (
-            ["--exact-surface", "--surface=union"],
-            "surface.exact: is for the smooth surface alone",
-        ),
+        (["--exact-surface", "--surface=union"], "surface.exact: is for the smooth surface alone"),
         (
             ["--spray", "--surface=spheres"],
             "surface.spray: lies beside one body; set render.surface",
         ),
-        (
-            ["--smoothing", "1.5"],
-            "--smoothing: expected a number from 0 to 1",
-        ),
+        (["--smoothing", "1.5"], "--smoothing: expected a number from 0 to 1"),
     ] {
         not_rendered(&workshop, &options, &[expected]);
     }
@@ -97,22 +80,10 @@ fn numbers_have_ranges() {
             "--height: expected a length on paper such as \"85mm\", or a whole number from 1 to 65536",
         ),
         (["--height", "99999999999"], "found 99999999999"),
-        (
-            ["--samples", "0"],
-            "--samples: expected a whole number from 1 to 4096, found 0",
-        ),
-        (
-            ["--samples", "-4"],
-            "--samples: expected a whole number from 1 to 4096, found -4",
-        ),
-        (
-            ["--max-depth", "0"],
-            "--max-depth: expected a whole number from 1 to 64, found 0",
-        ),
-        (
-            ["--max-depth", "-3"],
-            "--max-depth: expected a whole number from 1 to 64, found -3",
-        ),
+        (["--samples", "0"], "--samples: expected a whole number from 1 to 4096, found 0"),
+        (["--samples", "-4"], "--samples: expected a whole number from 1 to 4096, found -4"),
+        (["--max-depth", "0"], "--max-depth: expected a whole number from 1 to 64, found 0"),
+        (["--max-depth", "-3"], "--max-depth: expected a whole number from 1 to 64, found -3"),
         (["--radius", "0"], "--radius: expected a length above 0"),
         (["--radius", "-0.1"], "--radius: expected a length above 0"),
         (["--radius", "nan"], "found NaN"),
@@ -138,26 +109,14 @@ fn numbers_have_ranges() {
             ["--set", "material.reflection=1.5"],
             "--set material.reflection=1.5: expected a number from 0 to 1",
         ),
-        (
-            ["--set", "camera.eye=[nan,0,0]"],
-            "--set camera.eye=[nan,0,0]: expected three numbers",
-        ),
-        (
-            ["--set", "camera.eye=[1,2]"],
-            "--set camera.eye=[1,2]: expected three numbers",
-        ),
+        (["--set", "camera.eye=[nan,0,0]"], "--set camera.eye=[nan,0,0]: expected three numbers"),
+        (["--set", "camera.eye=[1,2]"], "--set camera.eye=[1,2]: expected three numbers"),
         (
             ["--set", "camera.up=[0,0,0]"],
             "--set camera.up=[0,0,0]: expected three numbers that are not all 0",
         ),
-        (
-            ["--set", "image.width"],
-            "--set image.width: no `=` (example: render.max_depth=5)",
-        ),
-        (
-            ["--set", "image=7"],
-            "--set image=7: expected a table, found 7",
-        ),
+        (["--set", "image.width"], "--set image.width: no `=` (example: render.max_depth=5)"),
+        (["--set", "image=7"], "--set image=7: expected a table, found 7"),
         (
             ["--width", "4k"],
             "--width: unknown unit `k`; write a whole number of pixels, or a length in mm, cm, in or pt",
@@ -181,14 +140,7 @@ fn all_invalid_options_are_reported_at_once() {
     let workshop = one_frame();
     not_rendered(
         &workshop,
-        &[
-            "--width",
-            "0",
-            "--samples",
-            "0",
-            "--set",
-            "output.previw=false",
-        ],
+        &["--width", "0", "--samples", "0", "--set", "output.previw=false"],
         &["--width: ", "--samples: ", "did you mean `output.preview`?"],
     );
 }
@@ -226,10 +178,7 @@ fn invalid_cameras() {
     not_rendered(
         &workshop,
         &["--set", "camera.mode=\"fixed\""],
-        &[
-            "camera.eye: is missing; a fixed camera needs it",
-            "camera.look_at: is missing",
-        ],
+        &["camera.eye: is missing; a fixed camera needs it", "camera.look_at: is missing"],
     );
 }
 
@@ -238,14 +187,8 @@ fn frame_ranges() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 1..=3);
     for (range, expected) in [
-        (
-            "900",
-            "input.frames: 900 contains none of the frames of the input: 1-3",
-        ),
-        (
-            "3-",
-            "--frames: frame range `3-`: character 3: a frame number is missing",
-        ),
+        ("900", "input.frames: 900 contains none of the frames of the input: 1-3"),
+        ("3-", "--frames: frame range `3-`: character 3: a frame number is missing"),
         ("", "--frames: frame range"),
         ("one", "`one`: character 1"),
         ("1-3x0", "`1-3x0`"),
@@ -293,34 +236,18 @@ fn map_applies_to_the_existing_colour() {
         line.expect("the key").to_owned()
     };
     // By speed, as nothing else is asked for.
-    workshop
-        .render(&["--map", "turbo"])
-        .expect(0)
-        .prints("colour by `speed`");
+    workshop.render(&["--map", "turbo"]).expect(0).prints("colour by `speed`");
     assert!(kept("color = ").starts_with("color = { map = \"turbo\" }"));
     let plain = workshop.render_to("plain", &[]).expect(0);
     drop(plain);
     let image = |dir: &str| std::fs::read(workshop.join(dir).join("f.0001.exr")).expect("an image");
     assert!(image("out") != image("plain"), "the map is used");
     // Over a manifest that says "auto", and over one that names an attribute.
-    workshop
-        .run(&["render", "plain/job.toml", "--map", "turbo", "--force"])
-        .expect(0);
+    workshop.run(&["render", "plain/job.toml", "--map", "turbo", "--force"]).expect(0);
     assert!(image("out") == image("plain"));
+    workshop.render(&["--color-by", "density", "--force"]).expect(0);
     workshop
-        .render(&["--color-by", "density", "--force"])
-        .expect(0);
-    workshop
-        .run(&[
-            "render",
-            "out/job.toml",
-            "--map",
-            "magma",
-            "--range",
-            "1",
-            "2",
-            "--force",
-        ])
+        .run(&["render", "out/job.toml", "--map", "magma", "--range", "1", "2", "--force"])
         .expect(0);
     let color = kept("color = ");
     assert!(
@@ -331,41 +258,23 @@ fn map_applies_to_the_existing_colour() {
     );
     std::fs::write(workshop.join("a.xyz"), "0 0 0\n1 1 1\n").expect("a file");
     let bare = ["render", "a.xyz", "-o", "bare/f.exr", "--map", "turbo"];
-    refused(
-        &workshop,
-        &bare,
-        &["material.color: no attribute `velocity` in the sampled frames"],
-    );
+    refused(&workshop, &bare, &["material.color: no attribute `velocity` in the sampled frames"]);
 }
 
 #[test]
 fn patterns_and_ranges_of_any_size() {
     let workshop = one_frame();
     for (pattern, expected) in [
-        (
-            "#".repeat(70_000),
-            "more than 32 digits for the frame number",
-        ),
+        ("#".repeat(70_000), "more than 32 digits for the frame number"),
         ("%0999999d".to_owned(), "more than 32 digits"),
-        (
-            "%099999999999999999999999d".to_owned(),
-            "more than 32 digits",
-        ),
+        ("%099999999999999999999999d".to_owned(), "more than 32 digits"),
     ] {
         let output = format!("out/f.{pattern}.exr");
         refused(&workshop, &["render", "in", "-o", &output], &[expected]);
     }
-    for pattern in [
-        "#".repeat(70_000),
-        "*?".repeat(60_000),
-        "%0999999d".to_owned(),
-    ] {
+    for pattern in ["#".repeat(70_000), "*?".repeat(60_000), "%0999999d".to_owned()] {
         let input = format!("in/{pattern}.nosuch");
-        refused(
-            &workshop,
-            &["render", &input],
-            &["no file name fits this pattern"],
-        );
+        refused(&workshop, &["render", &input], &["no file name fits this pattern"]);
     }
     for (range, expected) in [
         ("1-99999999999999999999", "does not fit in 64 bits"),
@@ -387,11 +296,7 @@ fn frame_numbers_at_both_ends() {
     for options in [&[][..], &["--set", "camera.mode=turntable"]] {
         let ran = workshop.render(&[options, &["--force"]].concat()).expect(0);
         assert!(!ran.errors().contains("fault"), "{}", ran.errors());
-        for name in [
-            "f.-9223372036854775808.exr",
-            "f.0001.exr",
-            "f.9223372036854775807.exr",
-        ] {
+        for name in ["f.-9223372036854775808.exr", "f.0001.exr", "f.9223372036854775807.exr"] {
             assert!(workshop.join("out").join(name).exists(), "{name}");
         }
     }
@@ -401,22 +306,14 @@ fn frame_numbers_at_both_ends() {
     workshop.run(&["inspect", "in"]).expect(0);
     workshop.run(&["convert", "in", "-o", "native"]).expect(0);
     workshop.run(&["export", "slurm", "out/job.toml"]).expect(0);
-    let shard = [
-        "--shard",
-        "2/3",
-        "--frames",
-        "-9223372036854775808-9223372036854775807",
-    ];
+    let shard = ["--shard", "2/3", "--frames", "-9223372036854775808-9223372036854775807"];
     workshop.render_to("shard", &shard).expect(0);
 }
 
 #[test]
 fn thread_count_is_limited() {
     let workshop = one_frame();
-    workshop
-        .render(&["--threads", "1000"])
-        .expect(0)
-        .prints("note: --threads 1000: ");
+    workshop.render(&["--threads", "1000"]).expect(0).prints("note: --threads 1000: ");
     for command in [
         &["verify", "out"][..],
         &["convert", "in", "-o", "native"],

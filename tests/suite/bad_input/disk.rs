@@ -122,11 +122,7 @@ fn whatever_is_there_is_whole(dir: &Path, made: &Files, whole: &Files) {
         assert!(whole.get(name) == Some(bytes), "{name} is not whole");
     }
     for (name, length) in ledger(dir).done() {
-        assert_eq!(
-            made.get(&name).map(|b| b.len() as u64),
-            Some(length),
-            "{name}"
-        );
+        assert_eq!(made.get(&name).map(|b| b.len() as u64), Some(length), "{name}");
     }
 }
 
@@ -145,10 +141,7 @@ fn an_image_that_cannot_be_written_costs_one_frame() {
     let whole = images(&workshop.join("whole"));
     let largest = whole.values().map(Vec::len).max().expect("images");
     // In blocks of 512 bytes; the signal about the limit is ignored.
-    let script = format!(
-        "trap '' XFSZ; ulimit -f {}; exec \"$@\"",
-        (largest - 1) / 512
-    );
+    let script = format!("trap '' XFSZ; ulimit -f {}; exec \"$@\"", (largest - 1) / 512);
     let output = Command::new("sh")
         .args(["-c", &script, "sh", env!("CARGO_BIN_EXE_spherule")])
         .args(["render", "in", "-o", "out/f.####.exr"])
@@ -162,10 +155,7 @@ fn an_image_that_cannot_be_written_costs_one_frame() {
         errors.contains("error: frame 9: ") && errors.contains("/out/f.0009.exr: "),
         "{errors}"
     );
-    assert!(
-        errors.contains("8 of 9 frames done") && errors.contains("failed: 9"),
-        "{errors}"
-    );
+    assert!(errors.contains("8 of 9 frames done") && errors.contains("failed: 9"), "{errors}");
     let out = workshop.join("out");
     whatever_is_there_is_whole(&out, &images(&out), &whole);
     let ran = render("out").expect(0);

@@ -32,17 +32,9 @@ pub(super) fn is_background(pixel: &[f32; 4]) -> bool {
 fn frames_without_particles_show_the_background() {
     let workshop = Workshop::new();
     for frame in 1..=3 {
-        npy(
-            &workshop.join(format!("in/f_{frame}.npy")),
-            0,
-            1,
-            Vec3::ZERO,
-        );
+        npy(&workshop.join(format!("in/f_{frame}.npy")), 0, 1, Vec3::ZERO);
     }
-    let ran = workshop
-        .render(&BACKGROUND)
-        .expect(0)
-        .prints("3 frames, up to 0 particles");
+    let ran = workshop.render(&BACKGROUND).expect(0).prints("3 frames, up to 0 particles");
     assert_eq!(ran.rendered(), [1, 2, 3]);
     assert!(!ran.errors().contains("radius"), "{}", ran.errors());
     let pixels = pixels(&workshop, "out/f.0002.exr");
@@ -54,25 +46,12 @@ fn frames_without_particles_show_the_background() {
 fn empty_frame_in_a_sequence_is_rendered() {
     let workshop = Workshop::new();
     for (frame, count) in [(1, 2000), (2, 0), (3, 2000)] {
-        npy(
-            &workshop.join(format!("in/f_{frame}.npy")),
-            count,
-            frame,
-            Vec3::ZERO,
-        );
+        npy(&workshop.join(format!("in/f_{frame}.npy")), count, frame, Vec3::ZERO);
     }
     workshop.render(&BACKGROUND).expect(0);
     assert_eq!(images(&workshop.join("out")).len(), 6);
-    assert!(
-        pixels(&workshop, "out/f.0002.exr")
-            .iter()
-            .all(is_background)
-    );
-    assert!(
-        !pixels(&workshop, "out/f.0003.exr")
-            .iter()
-            .all(is_background)
-    );
+    assert!(pixels(&workshop, "out/f.0002.exr").iter().all(is_background));
+    assert!(!pixels(&workshop, "out/f.0003.exr").iter().all(is_background));
 }
 
 #[test]
@@ -87,9 +66,7 @@ fn a_single_particle_is_in_the_middle() {
              distant particles; give a length with --radius",
         ],
     );
-    workshop
-        .render(&[&["--radius", "0.1"][..], &BACKGROUND].concat())
-        .expect(0);
+    workshop.render(&[&["--radius", "0.1"][..], &BACKGROUND].concat()).expect(0);
     let pixels = pixels(&workshop, "out/f.0001.exr");
     assert!(!is_background(&pixels[18 * 64 + 32]), "the middle");
     assert!(is_background(&pixels[0]), "the corner");
@@ -112,15 +89,9 @@ fn nan_particles_are_dropped_and_counted() {
     centers[3].x = f32::NAN;
     centers[5] = Vec3::INFINITY;
     write::npy::write(&workshop.join("in/f_1.npy"), &centers).expect("a file");
-    workshop
-        .render(&[])
-        .expect(0)
-        .prints("frame 1: 2 particles left out");
+    workshop.render(&[]).expect(0).prints("frame 1: 2 particles left out");
     write::npy::write(&workshop.join("in/f_1.npy"), &[Vec3::NAN; 9]).expect("a file");
-    workshop
-        .render(&["--force"])
-        .expect(0)
-        .prints("frame 1: 9 particles left out");
+    workshop.render(&["--force"]).expect(0).prints("frame 1: 9 particles left out");
 }
 
 #[test]
@@ -132,11 +103,7 @@ fn sequence_of_damaged_files_cannot_start() {
         let bytes = fs::read(&file).expect("a frame");
         fs::write(&file, &bytes[..bytes.len() / 2]).expect("a file");
     }
-    not_rendered(
-        &workshop,
-        &[],
-        &["error: no frame can be read: in/f_1.bgeo: byte "],
-    );
+    not_rendered(&workshop, &[], &["error: no frame can be read: in/f_1.bgeo: byte "]);
 }
 
 #[test]
@@ -147,16 +114,10 @@ fn truncated_file_may_still_be_growing() {
     let bytes = fs::read(&file).expect("a frame");
     for length in [bytes.len() - 1, bytes.len() / 3, 1, 0] {
         fs::write(&file, &bytes[..length]).expect("a file");
-        let ran = workshop
-            .render(&[])
-            .expect(1)
-            .prints("error: frame 3: in/f_3.bgeo: ");
+        let ran = workshop.render(&[]).expect(1).prints("error: frame 3: in/f_3.bgeo: ");
         assert!(ran.errors().contains("failed: 3"));
         if length > 1 {
-            assert!(
-                ran.errors().contains("perhaps it is still being written"),
-                "{length}"
-            );
+            assert!(ran.errors().contains("perhaps it is still being written"), "{length}");
         }
         assert!(!workshop.join("out/f.0003.exr").exists());
     }

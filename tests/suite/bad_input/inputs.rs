@@ -10,11 +10,7 @@ use crate::harness::{SMALL, Workshop, dam_break, npy};
 
 #[track_caller]
 fn no_sequence(workshop: &Workshop, input: &str, expected: &[&str]) {
-    refused(
-        workshop,
-        &["render", input, "-o", "out/f.####.exr"],
-        expected,
-    );
+    refused(workshop, &["render", input, "-o", "out/f.####.exr"], expected);
     assert!(!workshop.join("out").exists());
     refused(workshop, &["init", input], &expected[..1]);
 }
@@ -23,23 +19,12 @@ fn no_sequence(workshop: &Workshop, input: &str, expected: &[&str]) {
 fn missing_paths_are_named() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 1..=3);
-    no_sequence(
-        &workshop,
-        "no-such-place",
-        &["error: no-such-place: no such file or directory"],
-    );
-    no_sequence(
-        &workshop,
-        "in/f_7.bgeo",
-        &["in/f_7.bgeo: no such file", "f_1.bgeo"],
-    );
+    no_sequence(&workshop, "no-such-place", &["error: no-such-place: no such file or directory"]);
+    no_sequence(&workshop, "in/f_7.bgeo", &["in/f_7.bgeo: no such file", "f_1.bgeo"]);
     no_sequence(
         &workshop,
         "in/nothing_#.bgeo",
-        &[
-            "in/nothing_#.bgeo: no file name fits this pattern",
-            "f_1.bgeo",
-        ],
+        &["in/nothing_#.bgeo: no file name fits this pattern", "f_1.bgeo"],
     );
     no_sequence(&workshop, "nowhere/f_#.bgeo", &["nowhere"]);
     refused(&workshop, &["render", "in/job.toml"], &["in/job.toml: "]);
@@ -66,10 +51,7 @@ fn only_similar_names_are_suggested() {
         refused(
             &workshop,
             arguments,
-            &[
-                "tank.stl: no such file or directory; closest in `",
-                "`: tonk.stl",
-            ],
+            &["tank.stl: no such file or directory; closest in `", "`: tonk.stl"],
         );
     }
     let ran = workshop.run(&["inspect", "dump/f_9.bgeo"]).expect(1);
@@ -104,23 +86,15 @@ fn inspect_continues_after_a_missing_path() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), [1, 2]);
     let arguments = ["nowhere/f_#.bgeo", "in/f_7.bgeo", "in/f_#.bgeo"];
-    let ran = workshop
-        .run(&[&["inspect", "--json"], &arguments[..]].concat())
-        .expect(1);
-    let lines: Vec<Value> = ran
-        .text()
-        .lines()
-        .map(|line| serde_json::from_str(line).expect("JSON"))
-        .collect();
+    let ran = workshop.run(&[&["inspect", "--json"], &arguments[..]].concat()).expect(1);
+    let lines: Vec<Value> =
+        ran.text().lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
     assert_eq!(lines.len(), 4);
     for (line, argument) in lines.iter().zip(&arguments[..2]) {
         assert_eq!(line["file"], *argument);
         assert!(line["error"].is_string(), "{line}");
     }
-    assert_eq!(
-        (&lines[2]["frame"], &lines[3]["frame"]),
-        (&1.into(), &2.into())
-    );
+    assert_eq!((&lines[2]["frame"], &lines[3]["frame"]), (&1.into(), &2.into()));
 
     let ran = workshop
         .run(&[&["inspect"], &arguments[..]].concat())
@@ -134,11 +108,7 @@ fn inspect_continues_after_a_missing_path() {
 fn directories_without_particles_list_their_content() {
     let workshop = Workshop::new();
     fs::create_dir(workshop.join("empty")).expect("a directory");
-    no_sequence(
-        &workshop,
-        "empty",
-        &["empty: no particle files here; the directory is empty"],
-    );
+    no_sequence(&workshop, "empty", &["empty: no particle files here; the directory is empty"]);
     fs::create_dir(workshop.join("papers")).expect("a directory");
     for name in ["a.txt", "b.txt", "c.json"] {
         fs::write(workshop.join("papers").join(name), "words").expect("a file");
@@ -146,11 +116,7 @@ fn directories_without_particles_list_their_content() {
     no_sequence(
         &workshop,
         "papers",
-        &[
-            "papers: no particle files here; it has ",
-            "2 .txt",
-            "1 .json",
-        ],
+        &["papers: no particle files here; it has ", "2 .txt", "1 .json"],
     );
 }
 
@@ -161,10 +127,7 @@ fn unknown_formats_show_the_first_bytes() {
         refused(&workshop, &["render", file, "-o", "out/f.exr"], expected);
         assert!(!workshop.join("out").exists());
         let error = workshop.run(&["inspect", file]).expect(1).errors();
-        assert!(
-            expected[1..].iter().all(|text| error.contains(text)),
-            "{error}"
-        );
+        assert!(expected[1..].iter().all(|text| error.contains(text)), "{error}");
     };
     fs::write(workshop.join("words.dat"), "garbage here").expect("a file");
     render(
@@ -192,12 +155,7 @@ fn two_sequences_in_a_directory_need_a_pattern() {
     let workshop = Workshop::new();
     for (name, frames) in [("fluid", 1..4), ("snow", 50..55)] {
         for frame in frames {
-            npy(
-                &workshop.join(format!("in/{name}_{frame}.npy")),
-                50,
-                1,
-                Vec3::ZERO,
-            );
+            npy(&workshop.join(format!("in/{name}_{frame}.npy")), 50, 1, Vec3::ZERO);
         }
     }
     no_sequence(
@@ -211,11 +169,7 @@ fn two_sequences_in_a_directory_need_a_pattern() {
             "(3 frames)",
         ],
     );
-    let arguments = [
-        &["render", "in/fluid_#.npy", "-o", "out/f.####.exr"][..],
-        &SMALL,
-    ]
-    .concat();
+    let arguments = [&["render", "in/fluid_#.npy", "-o", "out/f.####.exr"][..], &SMALL].concat();
     assert_eq!(workshop.run(&arguments).expect(0).rendered(), [1, 2, 3]);
 }
 

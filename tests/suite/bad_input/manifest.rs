@@ -11,9 +11,7 @@ fn wrong(text: &str, expected: &[&str]) {
     dam_break(&workshop.join("in"), [1]);
     fs::write(workshop.join("my.toml"), text).expect("a file");
     refused(&workshop, &["render", "my.toml"], expected);
-    let left = fs::read_dir(workshop.path())
-        .expect("the directory")
-        .count();
+    let left = fs::read_dir(workshop.path()).expect("the directory").count();
     assert_eq!(left, 2, "a refused job leaves nothing");
 }
 
@@ -54,21 +52,12 @@ fn wrong_types_have_line_and_column() {
         "[input]\npath = 7\n",
         &["my.toml: line 2, column 8: input.path: expected a name in quotes, found 7"],
     );
-    wrong(
-        "image = 3\n[input]\npath = \"in\"\n",
-        &["line 1, column 9: image: expected a table"],
-    );
+    wrong("image = 3\n[input]\npath = \"in\"\n", &["line 1, column 9: image: expected a table"]);
 }
 
 #[test]
 fn missing_keys_are_named() {
-    wrong(
-        "",
-        &[
-            "my.toml: ",
-            "input.path: is missing; a directory, a pattern",
-        ],
-    );
+    wrong("", &["my.toml: ", "input.path: is missing; a directory, a pattern"]);
     wrong("[input]\nup = \"y\"\n", &["input.path: is missing"]);
     wrong(
         "[input]\npath = \"in\"\n[camera]\nmode = \"fixed\"\n",
@@ -83,10 +72,7 @@ fn missing_keys_are_named() {
 #[test]
 fn toml_errors_have_a_location() {
     wrong("[input]\npath = [\n", &["my.toml: line 2, column "]);
-    wrong(
-        "[input]\npath = \"a\"\npath = \"b\"\n",
-        &["my.toml: line 3, column 1: duplicate key"],
-    );
+    wrong("[input]\npath = \"a\"\npath = \"b\"\n", &["my.toml: line 3, column 1: duplicate key"]);
     wrong("\u{1}\u{2}", &["my.toml: line 1, column "]);
 }
 
@@ -128,11 +114,7 @@ fn keys_of_the_camera_have_line_and_column() {
 fn manifest_that_is_not_text_or_not_a_file() {
     let workshop = Workshop::new();
     fs::write(workshop.join("bytes.toml"), [0xff, 0xfe, 0, 9]).expect("a file");
-    refused(
-        &workshop,
-        &["render", "bytes.toml"],
-        &["error: bytes.toml: "],
-    );
+    refused(&workshop, &["render", "bytes.toml"], &["error: bytes.toml: "]);
     fs::create_dir(workshop.join("dir.toml")).expect("a directory");
     refused(&workshop, &["render", "dir.toml"], &["error: dir.toml: "]);
     refused(&workshop, &["render", "none.toml"], &["error: none.toml: "]);

@@ -40,8 +40,5 @@ fn refused(workshop: &Workshop, arguments: &[&str], expected: &[&str]) -> Ran {
 fn not_rendered(workshop: &Workshop, options: &[&str], expected: &[&str]) {
     let render = ["render", "in", "-o", "out/f.####.exr"];
     refused(workshop, &[&render, options].concat(), expected);
-    assert!(
-        !workshop.join("out").exists(),
-        "a refused job leaves nothing"
-    );
+    assert!(!workshop.join("out").exists(), "a refused job leaves nothing");
 }

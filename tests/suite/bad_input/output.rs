@@ -17,14 +17,10 @@ fn three_frames() -> Workshop {
 
 #[track_caller]
 fn not_there(workshop: &Workshop, pattern: &str, expected: &[&str]) {
-    let before = fs::read_dir(workshop.path())
-        .expect("the directory")
-        .count();
+    let before = fs::read_dir(workshop.path()).expect("the directory").count();
     let arguments = [&["render", "in", "-o", pattern][..], &SMALL].concat();
     refused(workshop, &arguments, expected);
-    let after = fs::read_dir(workshop.path())
-        .expect("the directory")
-        .count();
+    let after = fs::read_dir(workshop.path()).expect("the directory").count();
     assert_eq!(before, after, "a refused job leaves nothing");
 }
 
@@ -45,10 +41,7 @@ fn invalid_output_names() {
         &several("2-9"),
         &["output.path: one/f.exr for 2 frames: several frames would get the same name"],
     );
-    workshop
-        .run(&[&several("3-9")[..], &SMALL].concat())
-        .expect(0)
-        .prints("1 of 1 frames done");
+    workshop.run(&[&several("3-9")[..], &SMALL].concat()).expect(0).prints("1 of 1 frames done");
     assert!(workshop.join("one/f.exr").is_file());
     fs::remove_dir_all(workshop.join("one")).expect("the job");
     let ending = "--output: must end in .exr or .png (example: out/frame.####.exr)";
@@ -60,11 +53,7 @@ fn invalid_output_names() {
         "out/%q.exr",
         &["--output: invalid frame number `%q.exr`; use #### or %04d"],
     );
-    not_there(
-        &workshop,
-        "out/##.##.exr",
-        &["--output: has places for two numbers"],
-    );
+    not_there(&workshop, "out/##.##.exr", &["--output: has places for two numbers"]);
     not_there(
         &workshop,
         "out.####/f.####.exr",
@@ -87,10 +76,7 @@ fn one_frame_needs_no_number_in_its_name() {
     let made = image("one/f.exr");
     assert!(made == image("all/f.0002.exr"));
     // The same command finds it done, and so does its manifest.
-    workshop
-        .run(&arguments)
-        .expect(0)
-        .prints("1 of 1 frames are done already");
+    workshop.run(&arguments).expect(0).prints("1 of 1 frames are done already");
     workshop.run(&["render", "one/job.toml"]).expect(0);
     // Another frame would take the place of the first.
     let mut other = arguments.clone();
@@ -98,11 +84,7 @@ fn one_frame_needs_no_number_in_its_name() {
     refused(
         &workshop,
         &other,
-        &[
-            "one: this job was made from other files",
-            "f_3.bgeo",
-            "choose another output",
-        ],
+        &["one: this job was made from other files", "f_3.bgeo", "choose another output"],
     );
     assert!(made == image("one/f.exr"));
     for frames in ["1-2", "all"] {
@@ -117,15 +99,9 @@ fn one_frame_needs_no_number_in_its_name() {
 fn one_converted_frame_has_the_name_it_was_given() {
     let workshop = three_frames();
     let one = ["convert", "in", "-o", "native/one.spf"];
-    workshop
-        .run(&[&one[..], &["--frames", "2"]].concat())
-        .expect(0);
+    workshop.run(&[&one[..], &["--frames", "2"]].concat()).expect(0);
     assert!(workshop.join("native/one.spf").is_file());
-    refused(
-        &workshop,
-        &one,
-        &["one.spf: one file name for 3 frames", "--frames"],
-    );
+    refused(&workshop, &one, &["one.spf: one file name for 3 frames", "--frames"]);
 }
 
 #[test]
@@ -176,10 +152,7 @@ fn as_plain_user(command: Command) -> Option<Command> {
     let can = Command::new("setpriv").args(ids).arg("true").status();
     can.is_ok_and(|status| status.success()).then(|| {
         let mut plain = Command::new("setpriv");
-        plain
-            .args(ids)
-            .arg(command.get_program())
-            .args(command.get_args());
+        plain.args(ids).arg(command.get_program()).args(command.get_args());
         plain.current_dir(command.get_current_dir().expect("it is set"));
         plain
     })
@@ -218,10 +191,7 @@ fn a_directory_that_is_closed_while_a_job_runs() {
         open(0o777);
         assert_eq!(status.code(), Some(1), "{errors}");
         assert!(errors.contains("cannot be written") && errors.contains("check its permissions"));
-        assert!(
-            !errors.contains("failed:"),
-            "no frame is at fault: {errors}"
-        );
+        assert!(!errors.contains("failed:"), "no frame is at fault: {errors}");
         workshop.run(&arguments).expect(0);
         assert!(images(&out) == images(&workshop.join("whole")));
         no_leftovers(&out);

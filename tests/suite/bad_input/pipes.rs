@@ -13,12 +13,7 @@ fn closed_pipe_is_not_an_error() {
     let workshop = Workshop::new();
     // More than a pipe holds, so that the program does notice.
     for frame in 0..500 {
-        npy(
-            &workshop.join(format!("in/f_{frame}.npy")),
-            8,
-            frame,
-            Vec3::ZERO,
-        );
+        npy(&workshop.join(format!("in/f_{frame}.npy")), 8, frame, Vec3::ZERO);
     }
     for arguments in [&["inspect", "--json", "in"][..], &["inspect", "in"]] {
         let mut child = workshop
@@ -45,15 +40,7 @@ fn job_continues_without_standard_error() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 1..=4);
     for progress in ["plain", "json", "openjd"] {
-        let arguments = [
-            "render",
-            "in",
-            "-o",
-            "out/f.####.exr",
-            "--force",
-            "--progress",
-            progress,
-        ];
+        let arguments = ["render", "in", "-o", "out/f.####.exr", "--force", "--progress", progress];
         let mut child = workshop
             .command(&[&arguments[..], &SMALL].concat())
             .stdout(Stdio::piped())
@@ -71,12 +58,7 @@ fn job_continues_without_standard_error() {
 fn a_log_on_a_full_disk_does_not_end_a_job() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 1..=2);
-    let full = || {
-        File::options()
-            .write(true)
-            .open("/dev/full")
-            .expect("/dev/full")
-    };
+    let full = || File::options().write(true).open("/dev/full").expect("/dev/full");
     let arguments = [&["render", "in", "-o", "out/f.####.exr"][..], &SMALL].concat();
     let mut command = workshop.command(&arguments);
     let status = command.stderr(full()).status().expect("the program starts");
@@ -88,9 +70,6 @@ fn a_log_on_a_full_disk_does_not_end_a_job() {
         let output = command.stdout(full()).output().expect("the program starts");
         let errors = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{errors}");
-        assert!(
-            errors.contains("standard output: no space left"),
-            "{errors}"
-        );
+        assert!(errors.contains("standard output: no space left"), "{errors}");
     }
 }

@@ -28,27 +28,15 @@ fn pipes_as_manifests() {
     for command in ["render", "check", "init", "status", "verify"] {
         refused(&workshop, &[command, "job.toml"], &["job.toml: ", PIPE]);
     }
-    refused(
-        &workshop,
-        &["export", "openjd", "job.toml"],
-        &["job.toml: ", PIPE],
-    );
+    refused(&workshop, &["export", "openjd", "job.toml"], &["job.toml: ", PIPE]);
     fs::create_dir(workshop.join("out")).expect("a directory");
     pipe(&workshop.join("out/job.toml"));
     let render = ["render", "in", "-o", "out/f.####.exr"];
-    refused(
-        &workshop,
-        &render,
-        &["out/job.toml: this job would write its manifest here"],
-    );
+    refused(&workshop, &render, &["out/job.toml: this job would write its manifest here"]);
     // A manifest without an end.
     let endless = fs::File::create(workshop.join("long.toml")).expect("a file");
     endless.set_len(1 << 40).expect("a hole");
-    refused(
-        &workshop,
-        &["render", "long.toml"],
-        &["long.toml: has more than 16777216 bytes"],
-    );
+    refused(&workshop, &["render", "long.toml"], &["long.toml: has more than 16777216 bytes"]);
 }
 
 #[test]
@@ -104,10 +92,7 @@ fn pipes_among_the_particles() {
         assert_ne!(ran.code(), Some(0), "{}", ran.errors());
         assert!(ran.errors().contains("f_3.bgeo: "), "{}", ran.errors());
     }
-    for options in [
-        &["inspect", "in/f_3.bgeo"][..],
-        &["inspect", "--verify", "in/f_3.bgeo"],
-    ] {
+    for options in [&["inspect", "in/f_3.bgeo"][..], &["inspect", "--verify", "in/f_3.bgeo"]] {
         let ran = workshop.run(options);
         assert!(ran.errors().contains("regular file"), "{}", ran.errors());
     }

@@ -31,22 +31,14 @@ fn no_particles_one_and_many_in_one_place() {
 
     write::npy::write(&workshop.join("in/f_1.npy"), &[Vec3::ONE]).expect("a file");
     fs::remove_dir_all(workshop.join("out")).expect("the images");
-    not_rendered(
-        &workshop,
-        &SMOOTH,
-        &["input.radius: the frames contain no radius"],
-    );
+    not_rendered(&workshop, &SMOOTH, &["input.radius: the frames contain no radius"]);
     smooth(&workshop, &["--radius", "0.1"]).expect(0);
     assert!(!is_empty(&workshop, 1));
 
     let many = vec![Vec3::ONE; 100_000];
     write::npy::write(&workshop.join("in/f_1.npy"), &many).expect("a file");
     fs::remove_dir_all(workshop.join("out")).expect("the images");
-    not_rendered(
-        &workshop,
-        &SMOOTH,
-        &["input.radius: the frames contain no radius"],
-    );
+    not_rendered(&workshop, &SMOOTH, &["input.radius: the frames contain no radius"]);
     smooth(&workshop, &["--radius", "0.1"]).expect(0);
     assert!(!is_empty(&workshop, 1));
 }
@@ -67,13 +59,7 @@ fn radii_that_vary_a_thousandfold() {
     let workshop = Workshop::new();
     fs::create_dir(workshop.join("in")).expect("a directory");
     let centers: Vec<Vec3> = (0..1000_u16)
-        .map(|i| {
-            Vec3::new(
-                f32::from(i % 10),
-                f32::from(i / 10 % 10),
-                f32::from(i / 100),
-            )
-        })
+        .map(|i| Vec3::new(f32::from(i % 10), f32::from(i / 10 % 10), f32::from(i / 100)))
         .collect();
     let radii = (0..1000_u16).map(|i| 10_f32.powf(f32::from(i % 100) / 33.0 - 3.0));
     let radius = Attribute {

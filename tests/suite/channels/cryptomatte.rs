@@ -44,17 +44,11 @@ fn layers(path: &Path) -> BTreeMap<String, Layer> {
         assert_eq!(prefix.len(), 7);
         assert!(prefix.bytes().all(|b| b.is_ascii_hexdigit()));
         assert_eq!(attributes[&format!("{key}/hash")], "MurmurHash3_32");
-        assert_eq!(
-            attributes[&format!("{key}/conversion")],
-            "uint32_to_float32"
-        );
+        assert_eq!(attributes[&format!("{key}/conversion")], "uint32_to_float32");
         let manifest = attributes.get(&format!("{key}/manifest")).map(|json| {
             let names: BTreeMap<String, String> = serde_json::from_str(json).expect("JSON");
             let bits = |hex: &String| u32::from_str_radix(hex, 16).expect("hexadecimal digits");
-            names
-                .iter()
-                .map(|(name, hex)| (name.clone(), bits(hex)))
-                .collect()
+            names.iter().map(|(name, hex)| (name.clone(), bits(hex))).collect()
         });
         // Combine channel pairs to ranks
         let mut pixels = vec![Vec::new(); picture.width * picture.height];
@@ -108,15 +102,9 @@ fn check_layers(path: &Path) {
             // Ranks are sorted, and objects are there once
             for pair in pixel.windows(2) {
                 assert!(pair[0].1 >= pair[1].1, "{name}: {pixel:?}");
-                assert!(
-                    pair[1].1 == 0.0 || pair[0].0 != pair[1].0,
-                    "{name}: {pixel:?}"
-                );
+                assert!(pair[1].1 == 0.0 || pair[0].0 != pair[1].0, "{name}: {pixel:?}");
             }
-            let used: Vec<_> = pixel
-                .iter()
-                .filter(|(_, coverage)| *coverage > 0.0)
-                .collect();
+            let used: Vec<_> = pixel.iter().filter(|(_, coverage)| *coverage > 0.0).collect();
             for (object, _) in &used {
                 assert!(known.contains(object), "{name}: {object:08x}");
                 assert!(f32::from_bits(*object).is_normal());
@@ -153,21 +141,11 @@ fn coverage_adds_up_to_alpha_and_names_are_in_the_manifest() {
 #[test]
 fn layers_are_chosen_with_their_levels() {
     let workshop = Workshop::new();
-    let options = [
-        "--channels",
-        "crypto_particle",
-        "--set",
-        "output.cryptomatte_levels=3",
-    ];
+    let options = ["--channels", "crypto_particle", "--set", "output.cryptomatte_levels=3"];
     rendered(&workshop, "out", &options);
     let layers = layers(&workshop.join("out/f.0006.exr"));
     assert_eq!(layers.keys().collect::<Vec<_>>(), ["crypto_particle"]);
-    assert!(
-        layers["crypto_particle"]
-            .pixels
-            .iter()
-            .all(|pixel| pixel.len() == 4)
-    );
+    assert!(layers["crypto_particle"].pixels.iter().all(|pixel| pixel.len() == 4));
     workshop.run(&["verify", "out"]).expect(0);
 }
 
@@ -182,15 +160,8 @@ fn particles_have_the_names_of_their_ids_and_parts_those_of_their_attribute() {
     render(&workshop, "out", &[&channels[..], &size].concat());
     let path = workshop.join("out/f.0001.exr");
     let layers = layers(&path);
-    let names = |layer: &str| {
-        layers[layer]
-            .manifest
-            .as_ref()
-            .unwrap()
-            .keys()
-            .cloned()
-            .collect::<Vec<_>>()
-    };
+    let names =
+        |layer: &str| layers[layer].manifest.as_ref().unwrap().keys().cloned().collect::<Vec<_>>();
     assert_eq!(names("crypto_particle"), ["p4000000000", "p70"]);
     assert_eq!(names("crypto_part"), ["type2", "type5"]);
     assert_eq!(names("crypto_material"), ["particles", "spray"]);
@@ -215,12 +186,7 @@ fn particles_have_the_names_of_their_ids_and_parts_those_of_their_attribute() {
 #[test]
 fn large_manifests_are_left_out() {
     let workshop = Workshop::new();
-    crate::harness::npy(
-        &workshop.join("in/f.0001.npy"),
-        100_001,
-        3,
-        glam::Vec3::ZERO,
-    );
+    crate::harness::npy(&workshop.join("in/f.0001.npy"), 100_001, 3, glam::Vec3::ZERO);
     let channels = ["--channels", "cryptomatte"];
     let size = ["--width", "16", "--height", "9", "--samples", "4"];
     render(&workshop, "out", &[&channels[..], &size].concat());
@@ -234,41 +200,22 @@ fn layers_do_not_depend_on_threads_or_structures() {
     let workshop = Workshop::new();
     let channels = ["--channels", "RGBA,cryptomatte,lights,noisy,shadow"];
     let mut first = None;
-    for (out, threads, structure) in [
-        ("a", "1", "lbvh"),
-        ("b", "3", "kdtree"),
-        ("c", "2", "bvh"),
-        ("d", "2", "sbvh"),
-    ] {
-        let options = [
-            "--threads",
-            threads,
-            "--accelerator",
-            structure,
-            "--look",
-            "studio",
-        ];
+    for (out, threads, structure) in
+        [("a", "1", "lbvh"), ("b", "3", "kdtree"), ("c", "2", "bvh"), ("d", "2", "sbvh")]
+    {
+        let options = ["--threads", threads, "--accelerator", structure, "--look", "studio"];
         rendered(&workshop, out, &[&channels, &options[..]].concat());
         let found = images(&workshop.join(out));
-        assert!(
-            *first.get_or_insert_with(|| found.clone()) == found,
-            "{structure}"
-        );
+        assert!(*first.get_or_insert_with(|| found.clone()) == found, "{structure}");
     }
 }
 
 #[test]
 fn manifests_are_plain_json() {
     let workshop = Workshop::new();
-    rendered(
-        &workshop,
-        "out",
-        &["--channels", "crypto_material", "--ground"],
-    );
+    rendered(&workshop, "out", &["--channels", "crypto_material", "--ground"]);
     let attributes = attributes(&workshop.join("out/f.0006.exr"));
-    let manifest = attributes
-        .iter()
-        .find(|(name, _)| name.ends_with("/manifest"));
+    let manifest = attributes.iter().find(|(name, _)| name.ends_with("/manifest"));
     let manifest: Value = serde_json::from_str(manifest.expect("a manifest").1).expect("JSON");
     // Computed with the package mmh3 of Python, and the conversion of the specification
     assert_eq!(manifest["particles"], "0e1773d0");

@@ -48,9 +48,7 @@ fn attributes_are_channels_of_their_names() {
     // The same from a native frame that is traced in place
     workshop.run(&["convert", "in", "-o", "native"]).expect(0);
     let image = ["render", "native", "-o", "stored/f.####.exr"];
-    workshop
-        .run(&[&image[..], &SIZE, &channels].concat())
-        .expect(0);
+    workshop.run(&[&image[..], &SIZE, &channels].concat()).expect(0);
     let stored = Picture::open(&workshop.join("stored/f.0001.exr"));
     for name in ["density", "velocity.X", "velocity.Y", "velocity.Z"] {
         assert_eq!(stored.planes[name], picture.planes[name], "{name}");
@@ -68,33 +66,21 @@ fn unknown_attributes_are_refused_with_the_nearest_one() {
             assert!(ran.errors().contains(message), "{}", ran.errors());
         }
     };
-    let messages = [
-        "output.channels",
-        "`densty`",
-        "did you mean `density`?",
-        "`velocity`",
-    ];
+    let messages = ["output.channels", "`densty`", "did you mean `density`?", "`velocity`"];
     refused("attribute:densty", &messages);
     refused("shadows", &["output.channels", "did you mean shadow?"]);
     refused("motion", &["output.channels", "set output.frame_time"]);
     write(&workshop, &["x,y,z,radius\n0,0,0,1\n"]);
     refused("motion", &["output.channels", "motion needs velocities"]);
     write(&workshop, &["x,y,z,radius,A\n0,0,0,1,2\n"]);
-    refused(
-        "attribute:A",
-        &["two channels of the file would be called A"],
-    );
+    refused("attribute:A", &["two channels of the file would be called A"]);
 }
 
 /// The mean position of what covers the picture, pixels.
 fn centroid(picture: &Picture) -> [f32; 2] {
     let mut sum = [0.0; 3];
     for (pixel, alpha) in picture.floats("A").iter().enumerate() {
-        let place = [
-            (pixel % picture.width) as f32,
-            (pixel / picture.width) as f32,
-            1.0,
-        ];
+        let place = [(pixel % picture.width) as f32, (pixel / picture.width) as f32, 1.0];
         for (sum, place) in sum.iter_mut().zip(place) {
             *sum += alpha * place;
         }
@@ -110,16 +96,7 @@ fn motion_leads_to_the_next_frame() {
     write(&workshop, &[&frame("0,0,0"), &frame("1,0,0.5")]);
     let options = ["--channels", "motion,Z", "--set", "output.frame_time=0.25"];
     // From far away, where the front of a sphere moves like its centre
-    let still = [
-        "--samples",
-        "16",
-        "--width",
-        "256",
-        "--height",
-        "144",
-        "--set",
-        "camera.fov=10",
-    ];
+    let still = ["--samples", "16", "--width", "256", "--height", "144", "--set", "camera.fov=10"];
     let first = rendered(&workshop, "out", &[&options[..], &still].concat());
     let next = Picture::open(&workshop.join("out/f.0002.exr"));
     let (from, to) = (centroid(&first), centroid(&next));
@@ -130,10 +107,7 @@ fn motion_leads_to_the_next_frame() {
     for (axis, name) in ["motion.U", "motion.V"].iter().enumerate() {
         let plane = first.floats(name).iter().zip(&is_hit);
         count = is_hit.iter().filter(|hit| **hit).count() as f32;
-        mean[axis] = plane
-            .map(|(v, hit)| if *hit { *v } else { 0.0 })
-            .sum::<f32>()
-            / count;
+        mean[axis] = plane.map(|(v, hit)| if *hit { *v } else { 0.0 }).sum::<f32>() / count;
     }
     assert!(count > 20.0, "{count}");
     let length = expected[0].hypot(expected[1]);

@@ -62,10 +62,7 @@ fn check_sum(picture: &Picture, total: &str) {
             let sum: f32 = planes.iter().map(|plane| plane[pixel]).sum();
             let size: f32 = planes.iter().map(|plane| plane[pixel].abs()).sum();
             // All values are half-floats
-            assert!(
-                (sum - color).abs() <= 1e-3 * size + 1e-5,
-                "{sum} of {color}"
-            );
+            assert!((sum - color).abs() <= 1e-3 * size + 1e-5, "{sum} of {color}");
         }
     }
 }
@@ -127,9 +124,7 @@ fn groups_are_settings_of_jobs_with_their_channel() {
     let ran = workshop.run(&["render", "job.toml"]).expect(2);
     assert!(ran.errors().contains("light.1.group"), "{}", ran.errors());
     // Without the channel, no image depends on them
-    let text = text
-        .replace(", \"light_groups\"", "")
-        .replace("out/", "plain/");
+    let text = text.replace(", \"light_groups\"", "").replace("out/", "plain/");
     write(&text);
     workshop.run(&["render", "job.toml"]).expect(0);
     write(&text.replace("fill-2", "fill-3"));
@@ -141,10 +136,7 @@ fn names_that_cannot_be_layers_are_refused() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 6..=6);
     for (group, message) in [
-        (
-            "default",
-            "\"default\" is the layer of light without a group",
-        ),
+        ("default", "\"default\" is the layer of light without a group"),
         ("a b", "expected a name of 1 to 64 letters, digits"),
         ("key.R", "expected a name of 1 to 64 letters, digits"),
         ("", "expected a name of 1 to 64 letters, digits"),

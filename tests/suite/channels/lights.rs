@@ -3,22 +3,14 @@
 use crate::harness::{Workshop, dam_break};
 use crate::picture::Picture;
 
-const CLASSES: [&str; 6] = [
-    "diffuse",
-    "specular",
-    "reflection",
-    "refraction",
-    "emission",
-    "background",
-];
+const CLASSES: [&str; 6] =
+    ["diffuse", "specular", "reflection", "refraction", "emission", "background"];
 
 /// Renders frame 6 of the dam break as a still.
 fn picture(workshop: &Workshop, name: &str, channels: &str, options: &[&str]) -> Picture {
     let arguments = ["still", "in", "-o", name, "--width", "96", "--height", "54"];
     let more = ["--samples", "4", "--channels", channels];
-    workshop
-        .run(&[&arguments[..], &more, options].concat())
-        .expect(0);
+    workshop.run(&[&arguments[..], &more, options].concat()).expect(0);
     Picture::open(&workshop.join(name))
 }
 
@@ -39,16 +31,10 @@ fn check(workshop: &Workshop, options: &[&str], expected: &[&str]) {
             let sum: f32 = planes.iter().map(|plane| plane[pixel]).sum();
             let size: f32 = planes.iter().map(|plane| plane[pixel].abs()).sum();
             // All values are half-floats
-            assert!(
-                (sum - color).abs() <= 1e-3 * size + 1e-5,
-                "{options:?}: {sum} of {color}"
-            );
+            assert!((sum - color).abs() <= 1e-3 * size + 1e-5, "{options:?}: {sum} of {color}");
         }
     }
-    let lit: Vec<&str> = CLASSES
-        .into_iter()
-        .filter(|class| is_lit(&lights, class))
-        .collect();
+    let lit: Vec<&str> = CLASSES.into_iter().filter(|class| is_lit(&lights, class)).collect();
     assert_eq!(lit, expected, "{options:?}");
     // The colour does not depend on the channels
     let plain = picture(workshop, "plain.exr", "RGBA", &options);
@@ -73,20 +59,9 @@ fn light_channels_of_whitted_add_up() {
     check(&["--ground"], &with_background);
     check(&["--set", "output.transparent=true"], &usual);
     let glass = ["--set", "material.transmission=0.8"];
-    let classes = [
-        "diffuse",
-        "specular",
-        "reflection",
-        "refraction",
-        "background",
-    ];
+    let classes = ["diffuse", "specular", "reflection", "refraction", "background"];
     check(&glass, &classes);
-    let matte = [
-        "--set",
-        "material.reflection=0",
-        "--set",
-        "material.specular=0",
-    ];
+    let matte = ["--set", "material.reflection=0", "--set", "material.specular=0"];
     check(&matte, &["diffuse", "background"]);
 }
 
@@ -95,39 +70,17 @@ fn light_channels_of_path_add_up() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 6..=6);
     let studio = ["--look", "studio"];
-    check(
-        &workshop,
-        &[&studio[..], &MATTE].concat(),
-        &["diffuse", "background"],
-    );
+    check(&workshop, &[&studio[..], &MATTE].concat(), &["diffuse", "background"]);
     let plastic = ["--set", "material.type=\"plastic\""];
-    check(
-        &workshop,
-        &[&studio[..], &plastic].concat(),
-        &["diffuse", "specular", "background"],
-    );
-    let metal = [
-        "--set",
-        "material.type=\"metal\"",
-        "--set",
-        "output.transparent=true",
-    ];
+    check(&workshop, &[&studio[..], &plastic].concat(), &["diffuse", "specular", "background"]);
+    let metal = ["--set", "material.type=\"metal\"", "--set", "output.transparent=true"];
     check(&workshop, &[&studio[..], &metal].concat(), &["specular"]);
     let water = ["--look", "water"];
     // Wet ground is glossy
-    let clear = [
-        "diffuse",
-        "specular",
-        "reflection",
-        "refraction",
-        "background",
-    ];
+    let clear = ["diffuse", "specular", "reflection", "refraction", "background"];
     check(&workshop, &[&water[..], &PATH].concat(), &clear);
     // The last ray of a path leaves a pane, and sees the environment
-    let ball = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/tests/data/meshes/sphere-binary.stl"
-    );
+    let ball = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/meshes/sphere-binary.stl");
     let pane = [
         "--mesh",
         ball,
@@ -143,11 +96,7 @@ fn light_channels_of_path_add_up() {
     // Direct light only: the last ray of a path is a shadow ray
     let direct = ["--set", "render.bounces=0"];
     let classes = ["diffuse", "specular", "background"];
-    check(
-        &workshop,
-        &[&studio[..], &plastic, &direct].concat(),
-        &classes,
-    );
+    check(&workshop, &[&studio[..], &plastic, &direct].concat(), &classes);
 }
 
 #[test]
@@ -176,21 +125,12 @@ fn shadows_are_the_fraction_of_direct_light_that_arrives() {
     dam_break(&workshop.join("in"), 6..=6);
     for options in [
         &["--ground", "--integrator", "whitted"][..],
-        &[
-            "--ground",
-            "--integrator",
-            "path",
-            "--set",
-            "environment.type=\"sky\"",
-        ],
+        &["--ground", "--integrator", "path", "--set", "environment.type=\"sky\""],
         &["--look", "studio"],
     ] {
         let picture = picture(&workshop, "shadow.exr", "RGBA,shadow", options);
         let shadow = picture.floats("shadow");
-        assert!(
-            shadow.iter().all(|v| (0.0..=1.0).contains(v)),
-            "{options:?}"
-        );
+        assert!(shadow.iter().all(|v| (0.0..=1.0).contains(v)), "{options:?}");
         let count = |is: fn(f32) -> bool| shadow.iter().filter(|v| is(**v)).count();
         let (lit, dark) = (count(|v| v > 0.99), count(|v| v < 0.5));
         assert!(lit > 100 && dark > 20, "{options:?}: {lit}, {dark}");

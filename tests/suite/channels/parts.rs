@@ -15,12 +15,8 @@ const CHANNELS: [&str; 2] = [
 ];
 /// A part of the image, with overscan.
 const CROP: [&str; 3] = ["--crop=-5,10,90,52", "--set", "image.overscan=8"];
-const PARTS: [&str; 4] = [
-    "--set",
-    "output.compression=piz",
-    "--set",
-    "output.data_compression=zip",
-];
+const PARTS: [&str; 4] =
+    ["--set", "output.compression=piz", "--set", "output.data_compression=zip"];
 
 fn workshop() -> Workshop {
     let workshop = Workshop::new();
@@ -39,16 +35,8 @@ fn render(workshop: &Workshop, out: &str, options: &[&str]) {
 fn two_parts_have_the_pixels_of_one() {
     let workshop = workshop();
     render(&workshop, "single", &["--threads", "1"]);
-    render(
-        &workshop,
-        "parts",
-        &[&PARTS[..], &["--threads", "1"]].concat(),
-    );
-    render(
-        &workshop,
-        "again",
-        &[&PARTS[..], &["--threads", "4"]].concat(),
-    );
+    render(&workshop, "parts", &[&PARTS[..], &["--threads", "1"]].concat());
+    render(&workshop, "again", &[&PARTS[..], &["--threads", "4"]].concat());
     let [parts, again] = ["parts", "again"].map(|out| images(&workshop.join(out)));
     assert_eq!(parts.len(), 6);
     assert!(parts == again);
@@ -97,11 +85,7 @@ fn each_part_has_its_compression_and_attributes() {
 fn jobs_with_two_parts_resume() {
     let workshop = workshop();
     render(&workshop, "whole", &PARTS);
-    render(
-        &workshop,
-        "parts",
-        &[&PARTS[..], &["--frames", "5-6"]].concat(),
-    );
+    render(&workshop, "parts", &[&PARTS[..], &["--frames", "5-6"]].concat());
     render(&workshop, "parts", &[&PARTS[..], &["--force"]].concat());
     fs::remove_file(workshop.join("parts/f.0006.exr")).expect("removed");
     render(&workshop, "parts", &PARTS);
@@ -109,17 +93,8 @@ fn jobs_with_two_parts_resume() {
     assert!(whole == parts);
     // Another compression is another job
     let pattern = ["render", "in", "-o", "parts/f.####.exr"];
-    let other = [
-        "--set",
-        "output.compression=piz",
-        "--set",
-        "output.data_compression=rle",
-    ];
+    let other = ["--set", "output.compression=piz", "--set", "output.data_compression=rle"];
     let ran = workshop.run(&[&pattern[..], &SIZE, &CHANNELS, &CROP, &other].concat());
     let ran = ran.expect(2);
-    assert!(
-        ran.errors().contains("output.data_compression"),
-        "{}",
-        ran.errors()
-    );
+    assert!(ran.errors().contains("output.data_compression"), "{}", ran.errors());
 }

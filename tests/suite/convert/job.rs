@@ -52,18 +52,9 @@ fn changed_settings_are_rejected_with_both_values() {
     let before = stamps(&shop.join("out"));
     for (options, message) in [
         (&["--encoding", "q10"][..], "encoding: q16 -> q10;"),
-        (
-            &["--encoding", "q16", "--max-error", "0.1"],
-            "max-error: 0.02 -> 0.1;",
-        ),
-        (
-            &["--encoding", "q16", "--radius", "0.5"],
-            "radius: auto -> 0.5;",
-        ),
-        (
-            &["--encoding", "q16", "--no-attributes"],
-            "attributes: *:keep -> *:off;",
-        ),
+        (&["--encoding", "q16", "--max-error", "0.1"], "max-error: 0.02 -> 0.1;"),
+        (&["--encoding", "q16", "--radius", "0.5"], "radius: auto -> 0.5;"),
+        (&["--encoding", "q16", "--no-attributes"], "attributes: *:keep -> *:off;"),
     ] {
         let ran = convert(&shop, options)
             .expect(2)
@@ -206,8 +197,7 @@ fn any_number_of_threads_makes_the_same_frames() {
         let made = |threads: &str| {
             let out = format!("{input}-{threads}");
             let options = ["--max-error", "0.02", "--threads", threads];
-            shop.run(&[&["convert", input, "-o", &out][..], &options].concat())
-                .expect(0);
+            shop.run(&[&["convert", input, "-o", &out][..], &options].concat()).expect(0);
             natives(&shop.join(out))
         };
         let one = made("1");

@@ -39,10 +39,7 @@ fn native_frames_contain_the_source_data() {
         for frame in 1..=2 {
             let from = inspected(&shop, &format!("in/f_{frame}.bgeo"));
             let to = inspected(&shop, &format!("{encoding}/frame.000{frame}.spf"));
-            assert_eq!(
-                (&to["format"], &to["count"]),
-                (&"spf".into(), &from["count"])
-            );
+            assert_eq!((&to["format"], &to["count"]), (&"spf".into(), &from["count"]));
             assert_eq!(to["encoding"], encoding);
             let bound = number(&to["error_bound"]);
             assert_eq!(bound == 0.0, encoding == "f32");
@@ -66,8 +63,7 @@ fn native_frames_contain_the_source_data() {
 fn renders_of_exact_frames_are_those_of_the_originals() {
     let shop = Workshop::new();
     dam_break(&shop.join("in"), 1..=1);
-    shop.run(&["convert", "in", "-o", "native", "--radius", "0.02"])
-        .expect(0);
+    shop.run(&["convert", "in", "-o", "native", "--radius", "0.02"]).expect(0);
     let pixels = |input: &str| {
         let image = format!("{input}-out/f.#.exr");
         let size = ["--width", "64", "--height", "36", "--samples", "1"];

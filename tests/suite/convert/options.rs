@@ -27,10 +27,7 @@ fn attributes_are_omitted_by_name_or_wildcard() {
             all.retain(|name| name != "density");
             all
         }),
-        (
-            &["--attributes", "density:keep,*:off"],
-            vec!["density".to_owned(), "radius".to_owned()],
-        ),
+        (&["--attributes", "density:keep,*:off"], vec!["density".to_owned(), "radius".to_owned()]),
         (&["--no-attributes"], vec!["radius".to_owned()]),
     ] {
         convert(&shop, &[choices, &["--force"]].concat()).expect(0);
@@ -77,11 +74,7 @@ fn file_indices_are_stored_as_ids_on_request() {
     let object = inspected(&shop, "out/frame.0001.spf");
     let list = object["attributes"].as_array().expect("a list");
     let id = list.iter().find(|a| a["name"] == "id").expect("ids");
-    assert_eq!(
-        (&id["min"][0], &id["max"][0]),
-        (&0.into(), &2999.into()),
-        "{id}"
-    );
+    assert_eq!((&id["min"][0], &id["max"][0]), (&0.into(), &2999.into()), "{id}");
 }
 
 #[test]
@@ -94,15 +87,9 @@ fn contradictory_options_are_rejected() {
         (&["--max-error", "-1"], "-1"),
         (&["--attributes", "velocity"], "write NAME:HOW"),
         (&["--attributes", "velocity:f64"], "keep, f32, f16, u8, off"),
-        (
-            &["--no-attributes", "--attributes", "a:off"],
-            "cannot be used with",
-        ),
+        (&["--no-attributes", "--attributes", "a:off"], "cannot be used with"),
         (&["--memory", "much"], "expected a size, such as 4GiB"),
-        (
-            &["--frames", "7-9"],
-            "--frames: 7-9 contains none of the frames of the input: 1",
-        ),
+        (&["--frames", "7-9"], "--frames: 7-9 contains none of the frames of the input: 1"),
         (&["--frames", "x"], "--frames"),
         (&["--force", "--keep-done"], "cannot be used with"),
     ] {
@@ -144,9 +131,7 @@ fn foreign_output_directory_is_rejected() {
             "native/frame.0001.spf: the conversion would overwrite its own input",
         ),
     ] {
-        shop.run(&["convert", input, "-o", "native"])
-            .expect(2)
-            .prints(message);
+        shop.run(&["convert", input, "-o", "native"]).expect(2).prints(message);
     }
     assert!(natives(&shop.join("native")) == before);
 }
@@ -156,9 +141,7 @@ fn foreign_output_directory_is_rejected() {
 fn unwritable_file_system() {
     let shop = Workshop::new();
     dam_break(&shop.join("in"), 1..=1);
-    shop.run(&["convert", "in", "-o", "/proc/nope/frames"])
-        .expect(2)
-        .prints("error: /proc/nope");
+    shop.run(&["convert", "in", "-o", "/proc/nope/frames"]).expect(2).prints("error: /proc/nope");
 }
 
 #[test]
@@ -166,31 +149,19 @@ fn progress_modes() {
     let shop = Workshop::new();
     dam_break(&shop.join("in"), 1..=2);
     let text = convert(&shop, &["--progress", "json"]).expect(0).text();
-    let mut objects: Vec<serde_json::Value> = text
-        .lines()
-        .map(|line| serde_json::from_str(line).expect(line))
-        .collect();
+    let mut objects: Vec<serde_json::Value> =
+        text.lines().map(|line| serde_json::from_str(line).expect(line)).collect();
     objects.retain(|object| object["event"] == "frame_done");
     assert_eq!(objects.len(), 2, "{text}");
     for (object, frame) in objects.iter().zip(1..) {
         assert_eq!(object["frame"], frame);
-        assert_eq!(
-            (&object["done"], &object["total"]),
-            (&frame.into(), &2.into())
-        );
+        assert_eq!((&object["done"], &object["total"]), (&frame.into(), &2.into()));
         assert!(object["particles"].as_u64() > Some(0), "{object}");
         let output = object["output"].as_str().expect("a path");
-        assert!(
-            output.ends_with(&format!("/out/frame.000{frame}.spf")),
-            "{output}"
-        );
+        assert!(output.ends_with(&format!("/out/frame.000{frame}.spf")), "{output}");
     }
     let ran = convert(&shop, &["--progress", "openjd", "--force"]).expect(0);
-    assert!(
-        ran.text().contains("openjd_progress: 100.0"),
-        "{}",
-        ran.text()
-    );
+    assert!(ran.text().contains("openjd_progress: 100.0"), "{}", ran.text());
     let quiet = convert(&shop, &["--progress", "none", "--force"]).expect(0);
     assert!(quiet.rendered().is_empty());
 }

@@ -174,10 +174,7 @@ fn a_frame_that_cannot_be_written_costs_one_frame() {
     fs::remove_dir_all(shop.join("out")).expect("a directory");
     let smallest = whole.values().map(Vec::len).min().expect("frames");
     // In blocks of 512 bytes; the signal about the limit is ignored.
-    let script = format!(
-        "trap '' XFSZ; ulimit -f {}; exec \"$@\"",
-        (smallest - 1) / 512
-    );
+    let script = format!("trap '' XFSZ; ulimit -f {}; exec \"$@\"", (smallest - 1) / 512);
     let output = std::process::Command::new("sh")
         .args(["-c", &script, "sh", env!("CARGO_BIN_EXE_spherule")])
         .args(["convert", "in", "-o", "out"])

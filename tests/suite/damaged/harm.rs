@@ -26,10 +26,7 @@ enum Harm {
 fn harm() -> impl Strategy<Value = Harm> {
     let place = || any::<Index>();
     // Digits and separators are what text formats stumble over.
-    let byte = prop_oneof![
-        any::<u8>(),
-        prop::sample::select(&b"0123456789-+.eE \n,<>\"'"[..])
-    ];
+    let byte = prop_oneof![any::<u8>(), prop::sample::select(&b"0123456789-+.eE \n,<>\"'"[..])];
     prop_oneof![
         8 => (place(), byte).prop_map(|(at, byte)| Harm::Byte(at, byte)),
         1 => (place(), any::<u8>()).prop_map(|(at, length)| Harm::Lose(at, length)),
@@ -45,11 +42,7 @@ fn harmed(bytes: &[u8], harms: &[Harm], in_head: bool) -> Vec<u8> {
             break;
         }
         // Most of a file is numbers; what is believed stands at its start.
-        let reach = if in_head {
-            bytes.len().min(400)
-        } else {
-            bytes.len()
-        };
+        let reach = if in_head { bytes.len().min(400) } else { bytes.len() };
         let end = |at: usize, length: u8| (at + usize::from(length)).min(bytes.len());
         match harm {
             Harm::Byte(at, byte) => bytes[at.index(reach)] = *byte,
@@ -81,17 +74,9 @@ fn samples() -> Vec<(PathBuf, Vec<u8>)> {
         "single_frames",
     ] {
         let entries = fs::read_dir(sample(folder)).expect("a directory of samples");
-        all.extend(
-            entries
-                .map(|e| e.expect("an entry").path())
-                .filter(|p| p.is_file()),
-        );
+        all.extend(entries.map(|e| e.expect("an entry").path()).filter(|p| p.is_file()));
     }
-    all.extend(
-        make::files()
-            .into_iter()
-            .map(|(name, _)| directory().join(name)),
-    );
+    all.extend(make::files().into_iter().map(|(name, _)| directory().join(name)));
     all.sort();
     let mut samples = Vec::new();
     for path in all {

@@ -81,11 +81,7 @@ fn every_damaged_file_gives_its_expected_error() {
             wrong.push(format!("{name}\t{found}"));
         }
     }
-    assert!(
-        wrong.is_empty(),
-        "these differ from the table:\n{}",
-        wrong.join("\n")
-    );
+    assert!(wrong.is_empty(), "these differ from the table:\n{}", wrong.join("\n"));
 
     let sorted = |names: Vec<String>| {
         let mut names = names;
@@ -96,12 +92,7 @@ fn every_damaged_file_gives_its_expected_error() {
     let makeable = sorted(made.into_iter().map(|(name, _)| name).collect());
     assert_eq!(listed, makeable, "the table and the files that are made");
     let entries = fs::read_dir(directory()).expect("the directory");
-    let there = entries.map(|e| {
-        e.expect("an entry")
-            .file_name()
-            .to_string_lossy()
-            .into_owned()
-    });
+    let there = entries.map(|e| e.expect("an entry").file_name().to_string_lossy().into_owned());
     let there: Vec<String> = there.filter(|name| name != "table.tsv").collect();
     assert_eq!(sorted(there), listed, "the directory and the table");
 }
@@ -117,24 +108,16 @@ fn program_reports_every_error_in_bounded_memory() {
     // In KiB; the counts ask for 20 GB and more.
     let script = "ulimit -v 1500000 && exec \"$@\"";
     let mut command = Command::new("sh");
-    command
-        .args(["-c", script, "sh"])
-        .arg(program.get_program());
-    command
-        .env("RAYON_NUM_THREADS", "2")
-        .current_dir(directory());
-    command
-        .args(["inspect", "--json"])
-        .args(table.iter().map(|(name, _)| name));
+    command.args(["-c", script, "sh"]).arg(program.get_program());
+    command.env("RAYON_NUM_THREADS", "2").current_dir(directory());
+    command.args(["inspect", "--json"]).args(table.iter().map(|(name, _)| name));
     let output = command.output().expect("a shell");
     let errors = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{errors}");
     assert!(errors.is_empty(), "{errors}");
     let text = String::from_utf8(output.stdout).expect("UTF-8");
-    let objects: Vec<Value> = text
-        .lines()
-        .map(|line| serde_json::from_str(line).expect(line))
-        .collect();
+    let objects: Vec<Value> =
+        text.lines().map(|line| serde_json::from_str(line).expect(line)).collect();
     assert_eq!(objects.len(), table.len());
     for ((name, expected), object) in table.iter().zip(&objects) {
         assert_eq!(object["file"], name.as_str());
@@ -145,11 +128,7 @@ fn program_reports_every_error_in_bounded_memory() {
             let message = object["error"].as_str().expect("a message");
             assert!(message.starts_with(&format!("{name}: ")), "{message}");
             assert!(message.contains(expected), "{message}");
-            assert_eq!(
-                object.as_object().map(serde_json::Map::len),
-                Some(2),
-                "{name}"
-            );
+            assert_eq!(object.as_object().map(serde_json::Map::len), Some(2), "{name}");
         }
     }
 }
@@ -157,21 +136,12 @@ fn program_reports_every_error_in_bounded_memory() {
 /// For people the same goes to standard error, and nothing to standard output.
 #[test]
 fn program_prints_errors_as_text() {
-    let (name, expected) = table()
-        .into_iter()
-        .find(|(_, e)| !e.starts_with("reads"))
-        .expect("one");
+    let (name, expected) = table().into_iter().find(|(_, e)| !e.starts_with("reads")).expect("one");
     let mut command = Workshop::new().command(&["inspect", &name]);
-    let output = command
-        .current_dir(directory())
-        .output()
-        .expect("the program starts");
+    let output = command.current_dir(directory()).output().expect("the program starts");
     assert_eq!(output.status.code(), Some(1));
     let message = String::from_utf8_lossy(&output.stderr);
-    assert!(
-        message.starts_with(&format!("error: {name}: ")),
-        "{message}"
-    );
+    assert!(message.starts_with(&format!("error: {name}: ")), "{message}");
     assert!(message.contains(&expected), "{message}");
     assert_eq!(message.lines().count(), 1, "{message}");
     assert!(output.stdout.is_empty());

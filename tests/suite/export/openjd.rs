@@ -28,9 +28,7 @@ fn all_frames_are_in_the_template() {
     let workshop = Workshop::new();
     job(&workshop, "data", &FRAMES);
     let (found, _) = template(&workshop, "t.json", &["data/job.toml", "--chunk", "4"]);
-    let frames = parameter(&found, "Frames")["default"]
-        .as_str()
-        .expect("text");
+    let frames = parameter(&found, "Frames")["default"].as_str().expect("text");
     let range: FrameRange = frames.parse().expect("a range");
     assert_eq!(range.iter().collect::<Vec<_>>(), FRAMES);
     assert!(frames.contains(':') && !frames.contains('x'), "{frames}");
@@ -66,15 +64,9 @@ fn paths_are_relative_to_the_template() {
     let (found, ran) = template(&workshop, "elsewhere/t.json", &["data/job.toml"]);
     assert_eq!(defaults(&found), [Value::Null, Value::Null, Value::Null]);
     let place = workshop.path().canonicalize().expect("a path");
-    for (name, path) in [
-        ("Manifest", "job.toml"),
-        ("InputDir", "in"),
-        ("OutDir", "out"),
-    ] {
+    for (name, path) in [("Manifest", "job.toml"), ("InputDir", "in"), ("OutDir", "out")] {
         let errors = ran.errors();
-        let option = errors
-            .split(" -p ")
-            .find(|o| o.starts_with(&format!("'{name}=")));
+        let option = errors.split(" -p ").find(|o| o.starts_with(&format!("'{name}=")));
         let path = place.join("data").join(path);
         let message = option.unwrap_or_else(|| panic!("no {name} in {errors}"));
         assert!(message.contains(&path.display().to_string()), "{message}");
@@ -110,9 +102,7 @@ fn tasks_call_render() {
             "108"
         ])
     );
-    let program = parameter(&found, "Spherule")["default"]
-        .as_str()
-        .expect("text");
+    let program = parameter(&found, "Spherule")["default"].as_str().expect("text");
     assert!(fs::exists(program).expect("a path"), "{program}");
     assert_eq!(
         step["hostRequirements"]["amounts"],
@@ -138,11 +128,7 @@ fn default_output_is_yaml() {
     job(&workshop, "it's \"so\": {x}, y", &[1, 2]);
     let manifest = "it's \"so\": {x}, y/job.toml";
     let printed = export(&workshop, &[manifest]).expect(0);
-    assert!(
-        printed
-            .text()
-            .contains("specificationVersion: jobtemplate-2023-09\n")
-    );
+    assert!(printed.text().contains("specificationVersion: jobtemplate-2023-09\n"));
     // Named from the manifest's directory, where it may be put.
     assert!(printed.text().contains("    default: \"job.toml\"\n"));
     let name = "it's \\\"so\\\": {x}, y";

@@ -7,11 +7,7 @@ use crate::harness::Workshop;
 #[track_caller]
 fn refused(workshop: &Workshop, arguments: &[&str], expected: &str) {
     for engine in ["slurm", "openjd"] {
-        only(
-            workshop,
-            &[&["export", engine], arguments].concat(),
-            expected,
-        );
+        only(workshop, &[&["export", engine], arguments].concat(), expected);
     }
 }
 
@@ -31,22 +27,14 @@ fn jobs_that_cannot_be_exported() {
     let with = |more: &[&'static str]| [&job[..], more].concat();
     refused(&workshop, &["data/in"], "spherule init data/in > job.toml");
     refused(&workshop, &["none.toml"], "none.toml: ");
-    refused(
-        &workshop,
-        &with(&["--frames", "7-9"]),
-        "none of the frames of the input: 1-3",
-    );
+    refused(&workshop, &with(&["--frames", "7-9"]), "none of the frames of the input: 1-3");
     refused(&workshop, &with(&["--frames", "1-"]), "--frames");
     refused(
         &workshop,
         &with(&["--mem", "16"]),
         "expected at least 16.0 MiB, with a unit, such as 4GiB",
     );
-    refused(
-        &workshop,
-        &with(&["--mem", "lots"]),
-        "expected a size, such as 4GiB",
-    );
+    refused(&workshop, &with(&["--mem", "lots"]), "expected a size, such as 4GiB");
     refused(&workshop, &with(&["--chunk", "0"]), "--chunk");
     refused(&workshop, &with(&["--cpus", "0"]), "--cpus");
     let text = fs::read_to_string(&manifest).expect("a manifest");
@@ -79,21 +67,14 @@ fn unsupported_job_features() {
         only(&workshop, &[&arguments, options].concat(), expected);
     };
     slurm(&["--time", "2h"], "invalid time limit");
-    slurm(
-        &["--time", "2:00"],
-        "a time limit of 00:02:00 leaves no time",
-    );
+    slurm(&["--time", "2:00"], "a time limit of 00:02:00 leaves no time");
     slurm(&["--signal-ahead", "0"], "1 to 65535 seconds");
     slurm(&["--partition", "a b"], "partition: \"a b\"");
     slurm(&["--concurrent", "0"], "--concurrent");
     slurm(&["--logs", "a\"b"], "log directory: ");
     slurm(&["--logs", "a\nb"], "line break");
     let openjd = ["export", "openjd", "data/job.toml", "-o", "new.txt"];
-    only(
-        &workshop,
-        &openjd,
-        "new.txt: engines recognise a template by its name",
-    );
+    only(&workshop, &openjd, "new.txt: engines recognise a template by its name");
     job(&workshop, "%04d", &[1]);
     let openjd = ["export", "openjd", "%04d/job.toml"];
     only(&workshop, &openjd, "rename the directory");
@@ -112,8 +93,5 @@ fn the_manifest_is_not_overwritten() {
         let ran = workshop.run(&arguments).expect(2);
         let _ = ran.prints("is the manifest itself");
     }
-    assert_eq!(
-        fs::read(workshop.join("data/job.toml")).expect("a manifest"),
-        before
-    );
+    assert_eq!(fs::read(workshop.join("data/job.toml")).expect("a manifest"), before);
 }

@@ -30,9 +30,7 @@ fn sound(script: &str) {
     let checked = Command::new("bash").args(["-n", "-c", script]).output();
     let checked = checked.expect("bash");
     assert!(checked.status.success() && checked.stderr.is_empty());
-    let array = script
-        .lines()
-        .find_map(|l| l.strip_prefix("#SBATCH --array=0-"));
+    let array = script.lines().find_map(|l| l.strip_prefix("#SBATCH --array=0-"));
     let last = array.and_then(|a| a.split('%').next()?.parse::<usize>().ok());
     assert_eq!(last, Some(chunks(script).len() - 1));
 }
@@ -42,9 +40,7 @@ fn every_frame_is_in_one_task() {
     let workshop = Workshop::new();
     job(&workshop, "data", &FRAMES);
     for chunk in ["1", "2", "5", "13", "99"] {
-        let script = export(&workshop, &["data/job.toml", "--chunk", chunk])
-            .expect(0)
-            .text();
+        let script = export(&workshop, &["data/job.toml", "--chunk", chunk]).expect(0).text();
         sound(&script);
         let tasks = chunks(&script);
         assert_eq!(tasks.concat(), FRAMES, "--chunk {chunk}");
@@ -57,22 +53,15 @@ fn every_frame_is_in_one_task() {
 /// Options of the program in the script, which are on the lines that call it or set its arguments.
 fn options(script: &str) -> Vec<&str> {
     let is_call = |line: &&str| line.contains("set -- ") || line.contains("exec \"$program\"");
-    let words = script
-        .lines()
-        .filter(is_call)
-        .flat_map(str::split_whitespace);
-    words
-        .filter(|word| word.len() > 2 && word.starts_with("--"))
-        .collect()
+    let words = script.lines().filter(is_call).flat_map(str::split_whitespace);
+    words.filter(|word| word.len() > 2 && word.starts_with("--")).collect()
 }
 
 #[test]
 fn tasks_use_options_that_render_has() {
     let workshop = Workshop::new();
     job(&workshop, "data", &FRAMES);
-    let script = export(&workshop, &["data/job.toml", "--mem", "4GiB"])
-        .expect(0)
-        .text();
+    let script = export(&workshop, &["data/job.toml", "--mem", "4GiB"]).expect(0).text();
     let help = workshop.run(&["render", "--help"]).expect(0).text();
     let used = options(&script);
     assert_eq!(used, ["--frames", "--threads", "--memory-limit", "--grace"]);
@@ -90,19 +79,11 @@ fn frames_come_from_the_manifest_or_the_option() {
         let options = [options, &["--chunk", "2"]].concat();
         chunks(&export(&workshop, &options).expect(0).text())
     };
-    assert_eq!(
-        tasks(&["data/job.toml", "--frames=-4-0"]),
-        [vec![-4, -3], vec![-1, 0]]
-    );
+    assert_eq!(tasks(&["data/job.toml", "--frames=-4-0"]), [vec![-4, -3], vec![-1, 0]]);
     // The order asked for stays.
-    assert_eq!(
-        tasks(&["data/job.toml", "--frames", "1002,2-0x-1"]),
-        [vec![2, 1002], vec![0, 1]]
-    );
+    assert_eq!(tasks(&["data/job.toml", "--frames", "1002,2-0x-1"]), [vec![2, 1002], vec![0, 1]]);
     // The manifest beside the images is as good.
-    workshop
-        .run(&["render", "data/job.toml", "--frames", "10"])
-        .expect(0);
+    workshop.run(&["render", "data/job.toml", "--frames", "10"]).expect(0);
     assert_eq!(tasks(&["data/out/job.toml"]).concat(), FRAMES);
     let manifest = workshop.join("data/job.toml");
     let text = fs::read_to_string(&manifest).expect("a manifest");
@@ -115,17 +96,10 @@ fn frames_come_from_the_manifest_or_the_option() {
 fn tasks_are_few_enough_for_an_array() {
     let workshop = Workshop::new();
     job(&workshop, "data", &FRAMES);
-    let ran = export(
-        &workshop,
-        &["data/job.toml", "--max-tasks", "3", "--chunk", "2"],
-    )
-    .expect(0);
+    let ran = export(&workshop, &["data/job.toml", "--max-tasks", "3", "--chunk", "2"]).expect(0);
     let ran = ran.prints("3 tasks of 5 frames, because 2 would give 7 tasks");
     assert_eq!(chunks(&ran.text()).concat(), FRAMES);
-    assert!(
-        ran.text()
-            .contains("# 5 frames per task, because 2 would give 7 tasks")
-    );
+    assert!(ran.text().contains("# 5 frames per task, because 2 would give 7 tasks"));
     // Without an option for the count.
     let ran = export(&workshop, &["data/job.toml"]).expect(0);
     assert_eq!(chunks(&ran.text()).len(), FRAMES.len());
@@ -140,9 +114,7 @@ fn script_creates_the_log_directory() {
     assert!(!logs.exists(), "what only prints makes nothing");
     let ran = ran.prints("mkdir -p '");
     let options = ["data/job.toml", "-o", "array.sh"];
-    export(&workshop, &options)
-        .expect(0)
-        .prints("sbatch array.sh");
+    export(&workshop, &options).expect(0).prints("sbatch array.sh");
     assert!(logs.is_dir());
     let script = fs::read_to_string(workshop.join("array.sh")).expect("a script");
     assert_eq!(script, ran.text());
@@ -167,41 +139,14 @@ fn requested_resources() {
         script
     };
     let script = has(
-        &[
-            "--cpus",
-            "3",
-            "--mem",
-            "4GiB",
-            "--time",
-            "90",
-            "--concurrent",
-            "2",
-        ],
-        &[
-            "job-name=data",
-            "array=0-1%2",
-            "cpus-per-task=3",
-            "mem=4096M",
-            "time=01:30:00",
-        ],
+        &["--cpus", "3", "--mem", "4GiB", "--time", "90", "--concurrent", "2"],
+        &["job-name=data", "array=0-1%2", "cpus-per-task=3", "mem=4096M", "time=01:30:00"],
     );
     assert!(script.contains("--memory-limit"));
     assert!(script.contains("--grace 108"), "{script}");
     let script = has(
-        &[
-            "--partition",
-            "long",
-            "--account",
-            "sim",
-            "--signal-ahead",
-            "300",
-        ],
-        &[
-            "partition=long",
-            "account=sim",
-            "signal=B:TERM@300",
-            "requeue",
-        ],
+        &["--partition", "long", "--account", "sim", "--signal-ahead", "300"],
+        &["partition=long", "account=sim", "signal=B:TERM@300", "requeue"],
     );
     assert!(script.contains("--grace 270"), "{script}");
     // What the manifest limits itself to, and a little more.
@@ -231,19 +176,13 @@ fn tasks_give_the_same_files_as_one_run() {
     let workshop = Workshop::new();
     job(&workshop, ODD, &FRAMES);
     let manifest = format!("{ODD}/job.toml");
-    workshop
-        .run(&["render", &manifest, "-o", "whole/f.####.exr"])
-        .expect(0);
+    workshop.run(&["render", &manifest, "-o", "whole/f.####.exr"]).expect(0);
     let options = [&manifest, "--chunk", "4", "--logs", "logs"];
     let script = export(&workshop, &options).expect(0).text();
     sound(&script);
     for task in 0..4 {
         let ran = Ran(run(&script, task)).expect(0);
-        assert!(
-            ran.text().contains(&format!("task 7_{task}")),
-            "{}",
-            ran.text()
-        );
+        assert!(ran.text().contains(&format!("task 7_{task}")), "{}", ran.text());
     }
     let out = workshop.join(ODD).join("out");
     assert!(images(&out) == images(&workshop.join("whole")));
@@ -252,10 +191,7 @@ fn tasks_give_the_same_files_as_one_run() {
     // The manifest beside the images is that of the whole job, not of the last task.
     let kept = fs::read_to_string(out.join("job.toml")).expect("a manifest");
     let has = |line: &str| kept.lines().any(|l| l.starts_with(line));
-    assert!(
-        has("frames = \"all\"") && has("threads = \"all\""),
-        "{kept}"
-    );
+    assert!(has("frames = \"all\"") && has("threads = \"all\""), "{kept}");
     let again = workshop.run(&["render", out.join("job.toml").to_str().expect("UTF-8")]);
     assert!(again.expect(0).rendered().is_empty());
 }

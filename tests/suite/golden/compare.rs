@@ -23,11 +23,7 @@ pub(super) struct Limits {
 
 /// Machines differ in the last bit of a hit (the portable kernel) and of `powf`; at
 /// silhouettes that can turn a sample over.
-pub(super) const LIMITS: Limits = Limits {
-    color: 0.002,
-    data: 1e-5,
-    pixels: 3,
-};
+pub(super) const LIMITS: Limits = Limits { color: 0.002, data: 1e-5, pixels: 3 };
 
 /// A channel that is not the same.
 pub(super) struct Difference {
@@ -86,18 +82,13 @@ fn compare(name: &str, a: &Plane, b: &Plane, width: usize, limits: &Limits) -> O
         }
         (Plane::Uint(a), Plane::Uint(b)) => {
             let pairs = a.iter().zip(b).enumerate().filter(|(_, (a, b))| a != b);
-            pairs
-                .map(|(at, (a, b))| (at, format!("{b} for {a}")))
-                .collect()
+            pairs.map(|(at, (a, b))| (at, format!("{b} for {a}"))).collect()
         }
         _ => return Some("has another type".to_owned()),
     };
     let (at, example) = beyond.first().filter(|_| beyond.len() > limits.pixels)?;
     let (x, y) = (at % width, at / width);
-    Some(format!(
-        "{} pixels differ, as ({x}, {y}): {example}",
-        beyond.len()
-    ))
+    Some(format!("{} pixels differ, as ({x}, {y}): {example}", beyond.len()))
 }
 
 /// Writes both images and their difference as PNG: colours always, and every data channel that
@@ -109,35 +100,22 @@ pub(super) fn write_failure(
     differing: &[Difference],
 ) -> PathBuf {
     let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent();
-    let folder = target
-        .expect("the target directory")
-        .join("golden-failures");
+    let folder = target.expect("the target directory").join("golden-failures");
     fs::create_dir_all(&folder).expect("a folder for failures");
     let colors = [["R", "G", "B"].map(str::to_owned)];
     let data = differing.iter().map(|d| &d.channel);
     let data = data.filter(|c| !["R", "G", "B"].contains(&c.as_str()));
     let data = data.map(|c| [0; 3].map(|_| c.clone()));
     for channels in colors.into_iter().chain(data) {
-        let label = if channels[0] == "R" {
-            String::new()
-        } else {
-            format!("{}-", channels[0])
-        };
+        let label = if channels[0] == "R" { String::new() } else { format!("{}-", channels[0]) };
         let range = range(expected, &channels);
-        let (before, after) = (
-            shown(expected, &channels, range),
-            shown(actual, &channels, range),
-        );
+        let (before, after) = (shown(expected, &channels, range), shown(actual, &channels, range));
         let apart = before.iter().zip(&after).map(|(a, b)| {
             // Made visible: a hundredth is a clear grey.
             std::array::from_fn(|c| ((a[c] - b[c]).abs() * 16.0).min(1.0))
         });
         let apart: Vec<[f32; 3]> = apart.collect();
-        for (kind, pixels) in [
-            ("expected", &before),
-            ("actual", &after),
-            ("difference", &apart),
-        ] {
+        for (kind, pixels) in [("expected", &before), ("actual", &after), ("difference", &apart)] {
             let path = folder.join(format!("{name}-{label}{kind}.png"));
             fs::write(path, png(pixels, expected)).expect("a picture of a failure");
         }
@@ -153,11 +131,7 @@ fn range(picture: &Picture, channels: &[String; 3]) -> (f32, f32) {
     let values = values(picture, &channels[0]);
     let finite = values.iter().filter(|v| v.is_finite());
     let range = finite.fold((f32::MAX, f32::MIN), |(a, b), v| (a.min(*v), b.max(*v)));
-    if range.0 < range.1 {
-        range
-    } else {
-        (range.0, range.0 + 1.0)
-    }
+    if range.0 < range.1 { range } else { (range.0, range.0 + 1.0) }
 }
 
 fn values(picture: &Picture, channel: &str) -> Vec<f32> {

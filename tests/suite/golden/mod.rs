@@ -41,10 +41,7 @@ fn trace(shot: &Shot, simd: SimdLevel) -> Film {
         [one] => SphereRadius::Common(*one),
         each => SphereRadius::Each(each),
     };
-    let spheres = Spheres {
-        centers: &shot.centers,
-        radius,
-    };
+    let spheres = Spheres { centers: &shot.centers, radius };
     builder.build(&spheres, &BuildSettings::default());
     builder.tree_mut().set_simd(simd);
     let source = ParticleShading {
@@ -92,9 +89,7 @@ fn surface<'a>(
 
 /// As it stands in a file, so that both sides were rounded to half alike.
 fn encode(film: &Film) -> Vec<u8> {
-    encode_exr(film, &ExrOptions::default())
-        .expect("an image")
-        .bytes
+    encode_exr(film, &ExrOptions::default()).expect("an image").bytes
 }
 
 fn golden(name: &str) -> PathBuf {

@@ -91,12 +91,7 @@ pub(super) struct Shot {
 impl Shot {
     /// Matt grey balls before a plain dark background, seen along +y from `eye`.
     fn new(centers: Vec<Vec3>, radius: f32, eye: DVec3, look_at: DVec3) -> Self {
-        let view = CameraView {
-            eye,
-            look_at,
-            up: DVec3::Z,
-            fov: 35.0,
-        };
+        let view = CameraView { eye, look_at, up: DVec3::Z, fov: 35.0 };
         let aspect = f64::from(WIDTH) / f64::from(HEIGHT);
         Self {
             colors: Paint::Each(vec![GREY; centers.len()]),
@@ -131,11 +126,7 @@ impl Shot {
     fn project(&mut self, eye: DVec3, projection: Projection, eyes: Option<StereoSettings>) {
         let view = CameraView {
             eye,
-            look_at: if eye == DVec3::ZERO {
-                DVec3::Y
-            } else {
-                DVec3::ZERO
-            },
+            look_at: if eye == DVec3::ZERO { DVec3::Y } else { DVec3::ZERO },
             up: DVec3::Z,
             fov: 35.0,
         };
@@ -170,22 +161,10 @@ fn wall(columns: u16, rows: u16, spacing: f32) -> Vec<Vec3> {
 
 /// A layer of balls and three above it, lit from straight above: their shadows lie under them.
 pub(super) fn shadow() -> Shot {
-    let mut centers: Vec<Vec3> = wall(9, 7, 1.0)
-        .iter()
-        .map(|p| Vec3::new(p.x, p.z, 0.0))
-        .collect();
+    let mut centers: Vec<Vec3> = wall(9, 7, 1.0).iter().map(|p| Vec3::new(p.x, p.z, 0.0)).collect();
     centers.extend([(-2.5, 0.0), (0.0, 1.0), (2.5, -1.0)].map(|(x, y)| Vec3::new(x, y, 2.0)));
-    let mut shot = Shot::new(
-        centers,
-        0.5,
-        DVec3::new(0.0, -11.0, 6.5),
-        DVec3::new(0.0, 0.0, 0.4),
-    );
-    shot.scene.lights = vec![Light::point(
-        DVec3::new(0.0, 0.0, 50.0),
-        DVec3::ZERO,
-        Vec3::ONE,
-    )];
+    let mut shot = Shot::new(centers, 0.5, DVec3::new(0.0, -11.0, 6.5), DVec3::new(0.0, 0.0, 0.4));
+    shot.scene.lights = vec![Light::point(DVec3::new(0.0, 0.0, 50.0), DVec3::ZERO, Vec3::ONE)];
     let mut colors = vec![GREY; 63];
     colors.extend([RED, GREEN, BLUE]);
     shot.painted(&colors)
@@ -207,21 +186,14 @@ pub(super) fn cut() -> Shot {
     let normal = DVec3::new(2.0, -3.0, 1.0).normalize();
     shot.cut.cut(0.55 * normal, normal);
     let colors = [RED, GREEN, BLUE, GREY];
-    shot.settings.channels = Channels {
-        id: true,
-        normal: true,
-        ..Channels::COLOR
-    };
+    shot.settings.channels = Channels { id: true, normal: true, ..Channels::COLOR };
     shot.painted(&(0..46).map(|i| colors[i % 4]).collect::<Vec<_>>())
 }
 
 /// Metal balls that show each other and the sky.
 pub(super) fn reflection() -> Shot {
-    let centers = vec![
-        Vec3::new(0.0, 0.0, 0.0),
-        Vec3::new(-2.2, -0.3, 0.0),
-        Vec3::new(2.2, -0.3, 0.0),
-    ];
+    let centers =
+        vec![Vec3::new(0.0, 0.0, 0.0), Vec3::new(-2.2, -0.3, 0.0), Vec3::new(2.2, -0.3, 0.0)];
     let mut shot = Shot::new(centers, 1.0, DVec3::new(0.0, -8.0, 0.8), DVec3::ZERO);
     shot.scene.material = Material {
         diffuse: 0.35,
@@ -256,12 +228,7 @@ pub(super) fn refraction() -> Shot {
 }
 
 fn glass(ior: f32) -> Material {
-    Material {
-        ior,
-        reflection: 1.0,
-        transmission: 1.0,
-        ..MATT
-    }
+    Material { ior, reflection: 1.0, transmission: 1.0, ..MATT }
 }
 
 /// Bubbles of air in water: beyond the critical angle (48.6 degrees, 0.75 of the radius) they
@@ -278,16 +245,8 @@ pub(super) fn total_reflection() -> Shot {
 /// Glass dims light at each crossing: more at the rim of its shadow than in the middle.
 pub(super) fn shadow_through_glass() -> Shot {
     let centers = vec![Vec3::new(0.0, 0.0, 1.6), Vec3::new(2.2, 0.6, 1.0)];
-    let mut shot = Shot::new(
-        centers,
-        1.0,
-        DVec3::new(0.5, -9.0, 5.0),
-        DVec3::new(0.8, 0.0, 0.5),
-    );
-    shot.scene.material = Material {
-        transmission: 0.8,
-        ..glass(1.5)
-    };
+    let mut shot = Shot::new(centers, 1.0, DVec3::new(0.5, -9.0, 5.0), DVec3::new(0.8, 0.0, 0.5));
+    shot.scene.material = Material { transmission: 0.8, ..glass(1.5) };
     shot.scene.lights = vec![sun(Vec3::new(0.3, 0.1, -1.0), 1.2)];
     shot.scene.ground = Some(floor(0.0));
     shot.settings.max_depth = 5;
@@ -343,22 +302,11 @@ pub(super) fn radius_per_particle() -> Shot {
 
 /// A floor under the balls takes their shadows and fades into the background.
 pub(super) fn ground() -> Shot {
-    let centers = vec![
-        Vec3::new(-1.8, 0.0, 1.0),
-        Vec3::new(0.6, -0.8, 0.6),
-        Vec3::new(2.0, 0.5, 0.8),
-    ];
-    let mut shot = Shot::new(
-        centers,
-        1.0,
-        DVec3::new(0.0, -9.0, 3.0),
-        DVec3::new(0.0, 0.0, 0.8),
-    );
+    let centers =
+        vec![Vec3::new(-1.8, 0.0, 1.0), Vec3::new(0.6, -0.8, 0.6), Vec3::new(2.0, 0.5, 0.8)];
+    let mut shot = Shot::new(centers, 1.0, DVec3::new(0.0, -9.0, 3.0), DVec3::new(0.0, 0.0, 0.8));
     shot.radii = vec![1.0, 0.6, 0.8];
-    let bounds = Bounds {
-        min: DVec3::new(-2.8, -1.4, 0.0),
-        max: DVec3::new(2.8, 1.3, 2.0),
-    };
+    let bounds = Bounds { min: DVec3::new(-2.8, -1.4, 0.0), max: DVec3::new(2.8, 1.3, 2.0) };
     shot.scene.ground = Some(Ground {
         color: Vec3::new(0.135, 0.140, 0.150),
         ..Ground::under(&bounds, Vec3::Z, DVec3::ZERO)
@@ -397,21 +345,14 @@ pub(super) fn directional_lights() -> Shot {
     };
     let (left, right) = (Vec3::new(1.2, 0.3, 0.2), Vec3::new(0.2, 0.4, 1.2));
     shot.scene.lights = vec![light(1.0, left), light(-1.0, right)];
-    shot.scene.material = Material {
-        specular: 0.6,
-        shininess: 60.0,
-        ..MATT
-    };
+    shot.scene.material = Material { specular: 0.6, shininess: 60.0, ..MATT };
     shot
 }
 
 /// All planes, with a far origin so that `P` is seen to be in world units.
 pub(super) fn data_channels() -> Shot {
     let origin = DVec3::new(1000.0, -2000.0, 500.0);
-    let centers: Vec<Vec3> = wall(7, 4, 1.0)
-        .iter()
-        .map(|p| *p + Vec3::Y * (0.3 * p.x))
-        .collect();
+    let centers: Vec<Vec3> = wall(7, 4, 1.0).iter().map(|p| *p + Vec3::Y * (0.3 * p.x)).collect();
     let mut shot = Shot::new(centers, 0.5, DVec3::ZERO, DVec3::Y);
     let view = CameraView {
         eye: origin + DVec3::new(1.0, -8.0, 1.5),
@@ -424,12 +365,7 @@ pub(super) fn data_channels() -> Shot {
     shot.scene.origin = origin;
     shot.scene.ground = Some(floor(-2.0));
     shot.ids = Some((0..28).map(|i| 4_000_000_000 + 7 * i).collect());
-    shot.velocities = Some(
-        shot.centers
-            .iter()
-            .map(|p| 0.1 * p.cross(Vec3::Y))
-            .collect(),
-    );
+    shot.velocities = Some(shot.centers.iter().map(|p| 0.1 * p.cross(Vec3::Y)).collect());
     shot.settings.channels = Channels::ALL;
     let colors: Vec<Vec3> = shot.centers.iter().map(|p| 0.5 + 0.12 * *p).collect();
     shot.painted(&colors)
@@ -476,17 +412,11 @@ pub(super) fn equirectangular() -> Shot {
 
 /// Three balls: the middle one is at the distance of the screen, where both eyes see it in the same place.
 pub(super) fn stereo() -> Shot {
-    let centers = vec![
-        Vec3::new(-0.8, -3.0, 0.0),
-        Vec3::new(0.0, 0.0, 0.0),
-        Vec3::new(1.6, 5.0, 0.0),
-    ];
+    let centers =
+        vec![Vec3::new(-0.8, -3.0, 0.0), Vec3::new(0.0, 0.0, 0.0), Vec3::new(1.6, 5.0, 0.0)];
     let eye = DVec3::new(0.0, -8.0, 0.0);
     let mut shot = Shot::new(centers, 0.7, eye, DVec3::ZERO);
-    let eyes = StereoSettings {
-        eye_distance: Some(1.0),
-        convergence: Convergence::Target,
-    };
+    let eyes = StereoSettings { eye_distance: Some(1.0), convergence: Convergence::Target };
     shot.project(eye, Projection::Perspective, Some(eyes));
     shot.painted(&[RED, GREEN, BLUE])
 }

@@ -5,12 +5,8 @@ use std::fs;
 use crate::harness::{Workshop, dam_break, sample};
 
 /// Spelled out, so that new defaults of the program do not change these pictures.
-const IMAGE: [&str; 4] = [
-    "image.width=160",
-    "image.height=90",
-    "image.samples=4",
-    "output.channels=[\"RGBA\"]",
-];
+const IMAGE: [&str; 4] =
+    ["image.width=160", "image.height=90", "image.samples=4", "output.channels=[\"RGBA\"]"];
 
 /// A picture of one frame.
 pub(super) struct Still {
@@ -64,20 +60,10 @@ impl Still {
             }
             None => sample("emitter_sph/ParticleData_Fluid_10.bgeo"),
         };
-        let still = [
-            "still",
-            file.to_str().expect("a path in UTF-8"),
-            "-o",
-            "f.exr",
-        ];
-        let settings = IMAGE
-            .iter()
-            .chain(self.settings)
-            .flat_map(|set| ["--set", set]);
+        let still = ["still", file.to_str().expect("a path in UTF-8"), "-o", "f.exr"];
+        let settings = IMAGE.iter().chain(self.settings).flat_map(|set| ["--set", set]);
         let settings: Vec<&str> = settings.collect();
-        workshop
-            .run(&[&still, self.options, &settings].concat())
-            .expect(0);
+        workshop.run(&[&still, self.options, &settings].concat()).expect(0);
         fs::read(workshop.join("f.exr")).expect("an image")
     }
 }

@@ -26,9 +26,7 @@ pub(crate) struct Workshop {
 impl Workshop {
     /// An empty directory.
     pub(crate) fn new() -> Self {
-        Self {
-            dir: tempfile::tempdir().expect("a temporary directory"),
-        }
+        Self { dir: tempfile::tempdir().expect("a temporary directory") }
     }
 
     /// Its path.
@@ -50,10 +48,7 @@ impl Workshop {
 
     /// Runs the program to its end.
     pub(crate) fn run(&self, arguments: &[&str]) -> Ran {
-        Ran(self
-            .command(arguments)
-            .output()
-            .expect("the program starts"))
+        Ran(self.command(arguments).output().expect("the program starts"))
     }
 
     /// Renders `in` to small images in `out`, with these options.
@@ -96,44 +91,25 @@ impl Ran {
     /// Fails the test unless standard error has `text`.
     #[track_caller]
     pub(crate) fn prints(self, text: &str) -> Self {
-        assert!(
-            self.errors().contains(text),
-            "nothing of `{text}` in:\n{}",
-            self.errors()
-        );
+        assert!(self.errors().contains(text), "nothing of `{text}` in:\n{}", self.errors());
         self
     }
 
     /// The frames that this run made, by its lines on standard error.
     pub(crate) fn rendered(&self) -> Vec<i64> {
-        let frame = |line: &str| {
-            line.split_once("] frame ")?
-                .1
-                .split_once(':')?
-                .0
-                .parse()
-                .ok()
-        };
+        let frame = |line: &str| line.split_once("] frame ")?.1.split_once(':')?.0.parse().ok();
         self.errors().lines().filter_map(frame).collect()
     }
 
     /// Fails the test with what was printed unless the exit code is `code`.
     #[track_caller]
     pub(crate) fn expect(self, code: i32) -> Self {
-        assert_eq!(
-            self.code(),
-            Some(code),
-            "{}\n{}",
-            self.text(),
-            self.errors()
-        );
+        assert_eq!(self.code(), Some(code), "{}\n{}", self.text(), self.errors());
         self
     }
 }
 
 /// A file among the samples of the repository.
 pub(crate) fn sample(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("tests/data")
-        .join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
 }

@@ -87,10 +87,7 @@ pub(crate) fn ledger_path(dir: &Path) -> PathBuf {
 
 /// The content of all ledgers in `dir`.
 pub(crate) fn ledger(dir: &Path) -> Ledger {
-    let mut ledger = Ledger {
-        lines: Vec::new(),
-        torn: false,
-    };
+    let mut ledger = Ledger { lines: Vec::new(), torn: false };
     for path in ledger_paths(dir) {
         let text = fs::read_to_string(path).unwrap_or_default();
         let whole = text.rfind('\n').map_or(0, |at| at + 1);

@@ -28,11 +28,7 @@ impl Running {
         let errors = child.stderr.take().expect("it is piped");
         let (sender, lines) = channel();
         thread::spawn(move || send_lines(errors, &sender));
-        Self {
-            child,
-            lines,
-            stderr: String::new(),
-        }
+        Self { child, lines, stderr: String::new() }
     }
 
     /// Waits for a line on standard error that has `text`; false if the program ends before.
@@ -114,10 +110,7 @@ fn send_lines(errors: impl Read, lines: &Sender<String>) {
     let mut errors = BufReader::new(errors);
     let mut line = Vec::new();
     while errors.read_until(b'\n', &mut line).is_ok_and(|n| n > 0) {
-        if lines
-            .send(String::from_utf8_lossy(&line).into_owned())
-            .is_err()
-        {
+        if lines.send(String::from_utf8_lossy(&line).into_owned()).is_err() {
             return;
         }
         line.clear();

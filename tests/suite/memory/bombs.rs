@@ -14,16 +14,7 @@ use crate::harness::{Ran, Workshop, ledger};
 /// Data of the process in KiB: a third of what the bomb takes as text, a fifteenth as numbers.
 const ALLOWED: usize = 96 << 10;
 
-const SMALL: [&str; 8] = [
-    "--width",
-    "32",
-    "--height",
-    "18",
-    "--samples",
-    "1",
-    "--threads",
-    "2",
-];
+const SMALL: [&str; 8] = ["--width", "32", "--height", "18", "--samples", "1", "--threads", "2"];
 
 fn gz(bytes: &[u8]) -> Vec<u8> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::default());
@@ -41,11 +32,7 @@ fn frames(dir: &Path) {
     (0..48).for_each(|_| bomb.extend(&piece));
     bomb.extend(gz(b"1,2,3\n"));
     assert!(bomb.len() < 1 << 19, "{} bytes", bomb.len());
-    for (frame, bytes) in [
-        (1, gz(good(1).as_bytes())),
-        (2, bomb),
-        (3, gz(good(3).as_bytes())),
-    ] {
+    for (frame, bytes) in [(1, gz(good(1).as_bytes())), (2, bomb), (3, gz(good(3).as_bytes()))] {
         fs::write(dir.join(format!("f_{frame}.csv.gz")), bytes).expect("a file");
     }
 }
@@ -66,13 +53,7 @@ fn a_bomb_costs_one_frame() {
     for options in [
         &[][..],
         &["--memory-limit", "64MiB"],
-        &[
-            "--memory-limit",
-            "64MiB",
-            "--isolate",
-            "--memory-ceiling",
-            "64MiB",
-        ],
+        &["--memory-limit", "64MiB", "--isolate", "--memory-ceiling", "64MiB"],
     ] {
         let workshop = Workshop::new();
         frames(&workshop.join("in"));
@@ -98,10 +79,7 @@ fn check_and_inspect_name_a_bomb() {
     assert!(matches!(ran.code(), Some(0 | 1)), "{}", ran.errors());
     let ran = limited(&workshop, &["inspect", "in"]).expect(1);
     let output = ran.text() + &ran.errors();
-    assert!(
-        output.contains("f_2.csv.gz") && output.contains("larger than"),
-        "{output}"
-    );
+    assert!(output.contains("f_2.csv.gz") && output.contains("larger than"), "{output}");
 }
 
 /// The text of 400 000 particles in numbers of so many digits that it takes 80 MB, twenty times of what they take.
@@ -127,10 +105,7 @@ fn compressed_text_is_streamed() {
         ("a.ply.gz", [&ply, &rows].map(|s| &**s).concat()),
         ("a.vtk.gz", format!("{vtk}POINTS {count} float\n{rows}")),
         ("a.xyz.gz", format!("{count}\n\n{atoms}{count}\n\n{atoms}")),
-        (
-            "dump.0.gz",
-            [&dump(0), &rows, &dump(1), &rows].map(|s| &**s).concat(),
-        ),
+        ("dump.0.gz", [&dump(0), &rows, &dump(1), &rows].map(|s| &**s).concat()),
     ] {
         let workshop = Workshop::new();
         fs::write(workshop.join(name), gz(text.as_bytes())).expect("a file");
@@ -151,9 +126,7 @@ fn the_memory_of_a_conversion_bounds_reading() {
     }
     let convert = ["convert", "in", "-o", "out", "--radius", "0.1"];
     let ran = workshop.run(&[&convert[..], &["--memory", "1KiB"]].concat());
-    ran.expect(1)
-        .prints("f_2.csv: its numbers in memory are larger than")
-        .prints("raise --memory");
+    ran.expect(1).prints("f_2.csv: its numbers in memory are larger than").prints("raise --memory");
     assert!(workshop.join("out/frame.0001.spf").exists());
     assert!(!workshop.join("out/frame.0002.spf").exists());
 }

@@ -34,15 +34,7 @@ fn check_describes_a_new_job_without_starting_it() {
     let last = images[2].as_str().expect("a path");
     assert!(last.ends_with("out/f.0003.exr"), "{last}");
     let memory = &answer["memory"];
-    let parts = [
-        "program",
-        "reading",
-        "particles",
-        "tree",
-        "surface",
-        "images",
-        "encoding",
-    ];
+    let parts = ["program", "reading", "particles", "tree", "surface", "images", "encoding"];
     let sum: u64 = parts.iter().filter_map(|p| memory[p].as_u64()).sum();
     assert_eq!(memory["total"], sum);
     assert!(memory["images"].as_u64() >= Some(64 * 36 * 36));
@@ -51,12 +43,7 @@ fn check_describes_a_new_job_without_starting_it() {
     assert!(answer["camera"]["eye"].is_array() && answer["radius"].is_number());
 
     let text = check(&workshop, &[]).expect(0).text();
-    for line in [
-        "frames     3 (1-3)",
-        "64x36",
-        "memory     about",
-        "time       about",
-    ] {
+    for line in ["frames     3 (1-3)", "64x36", "memory     about", "time       about"] {
         assert!(text.contains(line), "nothing of `{line}` in:\n{text}");
     }
 }
@@ -128,9 +115,6 @@ fn a_directory_without_permission() {
     fs::set_permissions(&out, fs::Permissions::from_mode(0o555)).expect("permissions");
     // Root may write anywhere: then there is nothing to see here.
     if fs::write(out.join("probe"), "").is_err() {
-        check(&workshop, &[])
-            .expect(2)
-            .prints("cannot be written")
-            .prints("check its permissions");
+        check(&workshop, &[]).expect(2).prints("cannot be written").prints("check its permissions");
     }
 }

@@ -56,14 +56,7 @@ fn one_step_is_not_growth() {
 
 #[test]
 fn two_hundred_small_frames() {
-    let small = [
-        "--width",
-        "32",
-        "--height",
-        "18",
-        "--set",
-        "output.preview=false",
-    ];
+    let small = ["--width", "32", "--height", "18", "--set", "output.preview=false"];
     flat(1000, &[&small[..], &AWAY].concat());
 }
 

@@ -24,27 +24,11 @@ fn frames_beyond_memory_are_not_started() {
         .prints("render.memory_limit is 1.00 MiB")
         .prints("raise the limit");
     assert!(ran.errors().contains("images"), "{}", ran.errors());
-    assert!(
-        !workshop.join("out").exists(),
-        "a refused job leaves nothing"
-    );
-    let images = [
-        "--memory-limit",
-        "30MiB",
-        "--width",
-        "2000",
-        "--height",
-        "2000",
-    ];
+    assert!(!workshop.join("out").exists(), "a refused job leaves nothing");
+    let images = ["--memory-limit", "30MiB", "--width", "2000", "--height", "2000"];
     let images = [&["render", "in", "-o", "out/f.####.exr"][..], &images].concat();
-    workshop
-        .run(&images)
-        .expect(2)
-        .prints("make the image smaller or ask for fewer channels");
-    assert!(
-        !workshop.join("out").exists(),
-        "a refused job leaves nothing"
-    );
+    workshop.run(&images).expect(2).prints("make the image smaller or ask for fewer channels");
+    assert!(!workshop.join("out").exists(), "a refused job leaves nothing");
 }
 
 #[test]
@@ -60,18 +44,14 @@ fn invalid_sizes() {
     for size in ["2GiB", "2G", "2048m", "2147483648"] {
         workshop.render(&["--memory-limit", size]).expect(0);
     }
-    workshop
-        .render(&["--force", "--set", "render.memory_limit=2147483648"])
-        .expect(0);
+    workshop.render(&["--force", "--set", "render.memory_limit=2147483648"]).expect(0);
 }
 
 #[test]
 fn one_heavy_frame_costs_one_frame() {
     let workshop = one_heavy();
-    let ran = workshop
-        .render(&["--memory-limit", "16MiB"])
-        .expect(1)
-        .prints("frame 2: it needs about");
+    let ran =
+        workshop.render(&["--memory-limit", "16MiB"]).expect(1).prints("frame 2: it needs about");
     assert_eq!(ran.rendered(), [1, 3]);
     let lines = ledger(&workshop.join("out")).lines;
     let failed = lines.iter().find(|l| l["status"] == "failed");
@@ -99,10 +79,7 @@ fn frames_run_one_at_a_time_if_two_do_not_fit() {
     run("tight", &["--memory-limit", "65MiB"])
         .expect(0)
         .prints("one frame at a time, to reduce memory");
-    assert_eq!(
-        images(&workshop.join("free")),
-        images(&workshop.join("tight"))
-    );
+    assert_eq!(images(&workshop.join("free")), images(&workshop.join("tight")));
 }
 
 #[test]

@@ -51,11 +51,7 @@ fn vtk(path: &Path, count: usize, with_attributes: bool) {
         components: 1,
         data: AttributeData::I32((0..).take(count).collect()),
     };
-    let attributes = if with_attributes {
-        vec![velocity, id]
-    } else {
-        Vec::new()
-    };
+    let attributes = if with_attributes { vec![velocity, id] } else { Vec::new() };
     write::vtk::write(path, &particles(count), &attributes).expect("a file");
 }
 

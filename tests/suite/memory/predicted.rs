@@ -27,10 +27,7 @@ fn compare(name: &str, make: impl Fn(&Path), options: &[&str]) {
     let (predicted, measured) = peaks(name, make, options);
     let difference = (predicted - measured).abs();
     let limit = TOLERANCE.0 * measured + TOLERANCE.1;
-    assert!(
-        difference <= limit,
-        "{name} {options:?}: predicted {predicted}, measured {measured}"
-    );
+    assert!(difference <= limit, "{name} {options:?}: predicted {predicted}, measured {measured}");
 }
 
 /// The predicted and the measured peak in bytes, over three frames like the one that `make` makes.
@@ -43,19 +40,9 @@ fn peaks(name: &str, make: impl Fn(&Path), options: &[&str]) -> (f64, f64) {
     for other in [2, 3] {
         fs::hard_link(&first, workshop.join(format!("in/f_{other}.{name}"))).expect("a link");
     }
-    let common = [
-        "in",
-        "-o",
-        "out/f.####.exr",
-        "--samples",
-        "1",
-        "--threads",
-        "2",
-    ];
+    let common = ["in", "-o", "out/f.####.exr", "--samples", "1", "--threads", "2"];
     let arguments = |command| [&[command], &common[..], &AWAY, options].concat();
-    let check = workshop
-        .run(&[&arguments("check")[..], &["--json"]].concat())
-        .expect(0);
+    let check = workshop.run(&[&arguments("check")[..], &["--json"]].concat()).expect(0);
     workshop.run(&arguments("render")).expect(0);
     let predicted = &answer(&check)["memory"];
     let total = predicted["total"].as_f64().expect("bytes");
@@ -153,10 +140,8 @@ fn npy_bytes(path: &Path, count: usize) -> Vec<u8> {
 
 fn npz(path: &Path, count: usize) {
     let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
-    zip.start_file("positions.npy", SimpleFileOptions::default())
-        .expect("memory takes all");
-    zip.write_all(&npy_bytes(path, count))
-        .expect("memory takes all");
+    zip.start_file("positions.npy", SimpleFileOptions::default()).expect("memory takes all");
+    zip.write_all(&npy_bytes(path, count)).expect("memory takes all");
     let archive = zip.finish().expect("memory takes all").into_inner();
     fs::write(path, archive).expect("a file");
 }
@@ -209,39 +194,23 @@ fn every_structure() {
 #[test]
 fn every_particle_encoding() {
     const COUNT: usize = 250_000;
-    compare(
-        "csv",
-        |path| fs::write(path, csv(COUNT)).expect("a file"),
-        &SMALL,
-    );
+    compare("csv", |path| fs::write(path, csv(COUNT)).expect("a file"), &SMALL);
     compare("csv.gz", |path| gz(path, csv(COUNT).as_bytes()), &SMALL);
     compare("npy.gz", |path| gz(path, &npy_bytes(path, COUNT)), &SMALL);
     compare("npz", |path| npz(path, COUNT), &SMALL);
     compare("vtu", |path| vtu(path, COUNT), &SMALL);
-    compare(
-        "lammpstrj",
-        |path| fs::write(path, dump(COUNT)).expect("a file"),
-        &SMALL,
-    );
+    compare("lammpstrj", |path| fs::write(path, dump(COUNT)).expect("a file"), &SMALL);
 }
 
 #[test]
 fn every_text_format() {
     const COUNT: usize = 250_000;
-    compare(
-        "lammpstrj.gz",
-        |path| gz(path, dump(COUNT).as_bytes()),
-        &SMALL,
-    );
+    compare("lammpstrj.gz", |path| gz(path, dump(COUNT).as_bytes()), &SMALL);
     let write = |path: &Path, text: String| fs::write(path, text).expect("a file");
     compare("ply", |path| write(path, ply(COUNT)), &SMALL);
     compare("xyz", |path| write(path, xyz(COUNT)), &SMALL);
     compare("vtk", |path| write(path, vtk_text(COUNT)), &SMALL);
-    compare(
-        "vtk.gz",
-        |path| gz(path, vtk_text(COUNT).as_bytes()),
-        &SMALL,
-    );
+    compare("vtk.gz", |path| gz(path, vtk_text(COUNT).as_bytes()), &SMALL);
 }
 
 #[test]

@@ -13,18 +13,12 @@ fn run(workshop: &Workshop, script: Option<&str>, arguments: &[&str]) -> Ran {
     let program = bin.join("ffmpeg");
     let _ = fs::remove_file(&program);
     if let Some(script) = script {
-        fs::write(
-            &program,
-            format!("#!/bin/sh\nPATH=/usr/bin:/bin\n{script}\n"),
-        )
-        .expect("a script");
+        fs::write(&program, format!("#!/bin/sh\nPATH=/usr/bin:/bin\n{script}\n"))
+            .expect("a script");
         fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).expect("a script");
     }
     let mut command = workshop.command(arguments);
-    Ran(command
-        .env("PATH", &bin)
-        .output()
-        .expect("the program starts"))
+    Ran(command.env("PATH", &bin).output().expect("the program starts"))
 }
 
 /// Keeps what it gets in the file that the last argument names.
@@ -39,20 +33,11 @@ fn pictures_go_through_a_pipe() {
     let ran = run(
         &workshop,
         Some(KEEP),
-        &[
-            "movie",
-            "out",
-            "--output=-a:b.mp4",
-            "--fps",
-            "23.976",
-            "--width",
-            "63",
-        ],
+        &["movie", "out", "--output=-a:b.mp4", "--fps", "23.976", "--width", "63"],
     )
     .expect(DONE);
     assert!(
-        ran.text()
-            .contains("-a:b.mp4: H.264, 64x36, 4 frames in 0.17 s at 23.976 fps"),
+        ran.text().contains("-a:b.mp4: H.264, 64x36, 4 frames in 0.17 s at 23.976 fps"),
         "{}",
         ran.text()
     );
@@ -113,11 +98,7 @@ fn without_ffmpeg_the_message_helps() {
     no_leftovers(workshop.path());
     run(&workshop, None, &["movie", "out", "-o", "a.gif"]).expect(DONE);
     // Before the render, not after it
-    let ran = run(
-        &workshop,
-        None,
-        &["render", "in", "-o", "new/f.####.exr", "--movie", "a.mp4"],
-    );
+    let ran = run(&workshop, None, &["render", "in", "-o", "new/f.####.exr", "--movie", "a.mp4"]);
     ran.expect(REFUSED).prints("ffmpeg is not installed");
     assert!(!workshop.join("new").exists());
 }
@@ -126,11 +107,7 @@ fn without_ffmpeg_the_message_helps() {
 fn a_signal_stops_ffmpeg_and_leaves_nothing() {
     let workshop = job(&[1, 2], &[]);
     // It never ends by itself
-    run(
-        &workshop,
-        Some("echo $$ > started; cat > /dev/null; exec sleep 600"),
-        &["--version"],
-    );
+    run(&workshop, Some("echo $$ > started; cat > /dev/null; exec sleep 600"), &["--version"]);
     let mut command = workshop.command(&["movie", "out", "-o", "a.mp4"]);
     command.env("PATH", workshop.join("bin"));
     let mut running = crate::harness::Running::new(command);

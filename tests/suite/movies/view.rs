@@ -46,60 +46,34 @@ fn pages_link_or_embed_pictures() {
     let workshop = job(&[1, 2, 3], &[]);
     let ran = workshop.run(&["view", "out"]).expect(DONE);
     let line = "out/view.html: 3 frames, ids at 64 pixels with depth, channels depth, normal, ";
-    assert!(
-        ran.text().starts_with(line.trim_end_matches(", ")),
-        "{}",
-        ran.text()
-    );
+    assert!(ran.text().starts_with(line.trim_end_matches(", ")), "{}", ran.text());
     let linked = data(&workshop, "out/view.html");
     assert_eq!(linked["frames"][2]["number"], 3);
     assert_eq!(linked["frames"][2]["source"], "f.0003.png");
-    assert!(
-        linked["frames"][2]["ids"]
-            .as_str()
-            .is_some_and(|ids| ids.len() > 100)
-    );
+    assert!(linked["frames"][2]["ids"].as_str().is_some_and(|ids| ids.len() > 100));
     let html = fs::read_to_string(workshop.join("out/view.html")).expect("a page");
     assert!(html.contains("id=\"plot-stages\"") && html.contains("<h1>out/f.####.exr</h1>"));
 
-    workshop
-        .run(&["view", "out", "--embed", "--no-data", "-o", "pages/a.html"])
-        .expect(DONE);
+    workshop.run(&["view", "out", "--embed", "--no-data", "-o", "pages/a.html"]).expect(DONE);
     let embedded = data(&workshop, "pages/a.html");
     let source = embedded["frames"][0]["source"].as_str().expect("a picture");
     assert!(source.starts_with("data:image/png;base64,"));
     assert!(
         embedded["frames"][0]["ids"].is_null() && embedded["channels"] == serde_json::json!([])
     );
-    workshop
-        .run(&["view", "out", "-o", "pages/b.html"])
-        .expect(DONE);
-    assert_eq!(
-        data(&workshop, "pages/b.html")["frames"][0]["source"],
-        "../out/f.0001.png"
-    );
+    workshop.run(&["view", "out", "-o", "pages/b.html"]).expect(DONE);
+    assert_eq!(data(&workshop, "pages/b.html")["frames"][0]["source"], "../out/f.0001.png");
 }
 
 #[test]
 fn values_and_images_without_previews_are_embedded() {
     let channels = ["--channels", "RGBA,id,V,attribute:velocity"];
-    let workshop = job(
-        &[1],
-        &[&channels[..], &["--set", "output.preview=false"]].concat(),
-    );
+    let workshop = job(&[1], &[&channels[..], &["--set", "output.preview=false"]].concat());
     let ran = workshop.run(&["view", "out"]).expect(DONE);
-    assert!(
-        ran.text().contains("with |velocity|, speed"),
-        "{}",
-        ran.text()
-    );
+    assert!(ran.text().contains("with |velocity|, speed"), "{}", ran.text());
     ran.prints("the job has no previews: pictures are made from the images, into the page");
     let found = data(&workshop, "out/view.html");
-    assert!(
-        found["frames"][0]["source"]
-            .as_str()
-            .is_some_and(|s| s.starts_with("data:image/png"))
-    );
+    assert!(found["frames"][0]["source"].as_str().is_some_and(|s| s.starts_with("data:image/png")));
     assert_eq!(found["channels"], serde_json::json!(["speed", "velocity"]));
 }
 
@@ -115,8 +89,5 @@ fn unfinished_jobs_have_a_page_that_says_so() {
     // Pages do not change the job
     workshop.run(&["verify", "out"]).expect(DONE);
     fs::remove_file(workshop.join("out/f.0001.exr")).expect("an image");
-    refuses(
-        workshop.run(&["view", "out"]),
-        "there is nothing to show yet",
-    );
+    refuses(workshop.run(&["view", "out"]), "there is nothing to show yet");
 }

@@ -5,13 +5,7 @@ use std::fs;
 use crate::harness::{Ran, SMALL, Workshop, dam_break, images, ledger, stamps};
 
 /// As a shell gives them for `in/*`.
-const FIVE: [&str; 5] = [
-    "in/f_1.bgeo",
-    "in/f_2.bgeo",
-    "in/f_3.bgeo",
-    "in/f_4.bgeo",
-    "in/f_5.bgeo",
-];
+const FIVE: [&str; 5] = ["in/f_1.bgeo", "in/f_2.bgeo", "in/f_3.bgeo", "in/f_4.bgeo", "in/f_5.bgeo"];
 
 fn five_frames() -> Workshop {
     let workshop = Workshop::new();
@@ -58,14 +52,8 @@ fn the_directory_may_be_moved() {
     let workshop = five_frames();
     workshop.render(&[]).expect(0);
     fs::rename(workshop.join("out"), workshop.join("moved")).expect("a rename");
-    workshop
-        .run(&["render", "moved/job.toml"])
-        .expect(0)
-        .prints("5 of 5 frames are done already");
-    workshop
-        .render_to("moved", &[])
-        .expect(0)
-        .prints("5 of 5 frames are done already");
+    workshop.run(&["render", "moved/job.toml"]).expect(0).prints("5 of 5 frames are done already");
+    workshop.render_to("moved", &[]).expect(0).prints("5 of 5 frames are done already");
     assert!(!workshop.join("out").exists());
 }
 
@@ -76,13 +64,8 @@ fn images_may_go_through_a_link() {
     fs::create_dir_all(workshop.join("disk/deep")).expect("a directory");
     std::os::unix::fs::symlink("disk/deep", workshop.join("out")).expect("a link");
     workshop.render(&[]).expect(0);
-    workshop
-        .run(&["render", "out/job.toml"])
-        .expect(0)
-        .prints("5 of 5 frames are done already");
-    workshop
-        .render_to("out/../beside", &["--frames", "1"])
-        .expect(0);
+    workshop.run(&["render", "out/job.toml"]).expect(0).prints("5 of 5 frames are done already");
+    workshop.render_to("out/../beside", &["--frames", "1"]).expect(0);
     assert!(workshop.join("disk/beside/f.0001.exr").exists());
 }
 
@@ -102,10 +85,7 @@ fn changed_settings_are_refused_with_old_and_new_value() {
     let file = workshop.join("out/job.toml");
     let text = fs::read_to_string(&file).expect("the manifest");
     fs::write(&file, text.replace("max_depth = 3", "max_depth = 4")).expect("a file");
-    workshop
-        .run(&["render", "out/job.toml"])
-        .expect(2)
-        .prints("render.max_depth: 3 -> 4");
+    workshop.run(&["render", "out/job.toml"]).expect(2).prints("render.max_depth: 3 -> 4");
 }
 
 #[test]
@@ -119,14 +99,8 @@ fn force_starts_over() {
     let new = images(&workshop.join("out"));
     assert!(new != old && new == images(&workshop.join("fresh")));
     assert_eq!(ledger(&workshop.join("out")).lines.len(), 5);
-    workshop
-        .render(&[])
-        .expect(2)
-        .prints("render.bounces: 0 -> 6");
-    workshop
-        .render(&["--bounces", "0"])
-        .expect(0)
-        .prints("5 of 5 frames are done already");
+    workshop.render(&[]).expect(2).prints("render.bounces: 0 -> 6");
+    workshop.render(&["--bounces", "0"]).expect(0).prints("5 of 5 frames are done already");
 }
 
 #[test]
@@ -134,15 +108,9 @@ fn force_does_not_forget_a_job_for_one_that_cannot_be() {
     let workshop = five_frames();
     workshop.render(&[]).expect(0);
     let before = stamps(&workshop.join("out"));
-    workshop
-        .render(&["--force", "--color-by", "nosuch"])
-        .expect(2)
-        .prints("nosuch");
+    workshop.render(&["--force", "--color-by", "nosuch"]).expect(2).prints("nosuch");
     assert_eq!(stamps(&workshop.join("out")), before);
-    workshop
-        .render(&[])
-        .expect(0)
-        .prints("5 of 5 frames are done already");
+    workshop.render(&[]).expect(0).prints("5 of 5 frames are done already");
 }
 
 #[test]
@@ -152,9 +120,7 @@ fn keep_done_keeps_what_is_there_and_does_the_rest_anew() {
     let old = images(&workshop.join("out"));
     workshop.render_to("fresh", &["--max-depth", "1"]).expect(0);
     let fresh = images(&workshop.join("fresh"));
-    let ran = workshop
-        .render(&["--max-depth", "1", "--keep-done"])
-        .expect(0);
+    let ran = workshop.render(&["--max-depth", "1", "--keep-done"]).expect(0);
     assert_eq!(ran.rendered(), [4, 5]);
     let mixed = images(&workshop.join("out"));
     assert_eq!(mixed.len(), 10);
@@ -163,14 +129,8 @@ fn keep_done_keeps_what_is_there_and_does_the_rest_anew() {
         assert!(expected == Some(bytes), "{name}");
     }
     // From now on the new setting is the job's.
-    workshop
-        .render(&["--max-depth", "1"])
-        .expect(0)
-        .prints("5 of 5 frames are done already");
-    workshop
-        .render(&[])
-        .expect(2)
-        .prints("render.max_depth: 1 -> 3");
+    workshop.render(&["--max-depth", "1"]).expect(0).prints("5 of 5 frames are done already");
+    workshop.render(&[]).expect(2).prints("render.max_depth: 1 -> 3");
 }
 
 #[test]
@@ -207,10 +167,7 @@ fn a_manifest_that_a_user_wrote_stays_as_it_is() {
     let workshop = five_frames();
     workshop.render(&["--frames", "1"]).expect(0);
     let path = workshop.join("out/job.toml");
-    let mine = format!(
-        "# mine\n{}",
-        fs::read_to_string(&path).expect("the manifest")
-    );
+    let mine = format!("# mine\n{}", fs::read_to_string(&path).expect("the manifest"));
     fs::write(&path, &mine).expect("a file");
     let own = |options: &[&str]| workshop.run(&[&["render", "out/job.toml"], options].concat());
     let stays = || fs::read_to_string(&path).expect("the manifest") == mine;
@@ -220,9 +177,7 @@ fn a_manifest_that_a_user_wrote_stays_as_it_is() {
         let width = if option == "--force" { "80" } else { "90" };
         let messages =
             "out/job.toml: not written by spherule, or edited since, so it is not changed";
-        own(&["--frames", "2", "--width", width, option])
-            .expect(0)
-            .prints(messages);
+        own(&["--frames", "2", "--width", width, option]).expect(0).prints(messages);
         assert!(stays(), "{option}");
     }
     // Nor from elsewhere.
@@ -233,20 +188,14 @@ fn a_manifest_that_a_user_wrote_stays_as_it_is() {
     assert!(stays());
     let export = ["export", "slurm", "mine.toml", "-o", "out/job.toml"];
     fs::write(workshop.join("mine.toml"), "[input]\npath = \"in\"\n").expect("a file");
-    workshop
-        .run(&export)
-        .expect(2)
-        .prints("out/job.toml: is a manifest already");
+    workshop.run(&export).expect(2).prints("out/job.toml: is a manifest already");
     assert!(stays());
 }
 
 #[test]
 fn force_and_keep_done_exclude_each_other() {
     let workshop = five_frames();
-    workshop
-        .render(&["--force", "--keep-done"])
-        .expect(2)
-        .prints("cannot be used with");
+    workshop.render(&["--force", "--keep-done"]).expect(2).prints("cannot be used with");
     assert!(!workshop.join("out").exists());
 }
 
@@ -260,10 +209,7 @@ fn a_rewritten_input_is_refused_by_name() {
         .expect(2)
         .prints("inputs of finished frames have changed: frame 2: in/f_2.bgeo: ");
     // Other frames are not concerned.
-    workshop
-        .render(&["--frames", "3-5"])
-        .expect(0)
-        .prints("3 of 3 frames are done already");
+    workshop.render(&["--frames", "3-5"]).expect(0).prints("3 of 3 frames are done already");
     let ran = workshop.render(&["--keep-done"]).expect(0);
     assert!(ran.rendered().is_empty());
 }

@@ -35,10 +35,7 @@ fn frames_are_rendered_as_they_come_until_the_stop_file_appears() {
     let (messages, status) = running.end();
     assert_eq!(status.code(), Some(0), "{messages}");
     assert!(messages.contains("job.stop exists"), "{messages}");
-    assert!(
-        !messages.contains("error"),
-        "a file was taken before it was complete: {messages}"
-    );
+    assert!(!messages.contains("error"), "a file was taken before it was complete: {messages}");
     assert_eq!(ledger(&workshop.join("out")).lines.len(), 3);
     no_leftovers(&workshop.join("out"));
 
@@ -51,9 +48,7 @@ fn frames_are_rendered_as_they_come_until_the_stop_file_appears() {
     workshop.run(&render).expect(0);
     fs::remove_dir_all(&input).expect("a directory");
     fs::rename(workshop.join("later"), &input).expect("a directory");
-    workshop
-        .run(&[&render[..], &["--keep-done"]].concat())
-        .expect(0);
+    workshop.run(&[&render[..], &["--keep-done"]].concat()).expect(0);
     assert!(images(&workshop.join("out")) == images(&workshop.join("whole")));
 }
 
@@ -61,10 +56,7 @@ fn frames_are_rendered_as_they_come_until_the_stop_file_appears() {
 fn it_ends_when_nothing_new_comes_and_goes_on_from_there() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 1..=2);
-    let ran = workshop
-        .run(&arguments(&["--idle", "1"]))
-        .expect(0)
-        .prints("no new frames for 1 s");
+    let ran = workshop.run(&arguments(&["--idle", "1"])).expect(0).prints("no new frames for 1 s");
     assert_eq!(ran.rendered(), [1, 2]);
     dam_break(&workshop.join("in"), 3..=3);
     let ran = workshop.run(&arguments(&["--idle", "1"])).expect(0);
@@ -149,11 +141,7 @@ fn a_finished_frame_whose_file_grows_is_rendered_again() {
         assert!(messages.contains("since it was rendered; it is rendered again"));
         assert!(fs::read(workshop.join("out/f.0002.exr")).expect("an image") != half);
         let report = fs::read_to_string(workshop.join("out/report.json")).expect("a report");
-        assert_eq!(
-            report.matches("\"status\": \"done\"").count(),
-            3,
-            "{report}"
-        );
+        assert_eq!(report.matches("\"status\": \"done\"").count(), 3, "{report}");
         let again = workshop.run(&arguments(&["--idle", "0.5"])).expect(0);
         assert!(again.rendered().is_empty());
         fs::remove_dir_all(workshop.join("out")).expect("a directory");
@@ -179,10 +167,7 @@ fn a_frame_that_grew_between_two_runs_is_rendered_again() {
         .expect(2)
         .prints("inputs of finished frames have changed: frame 2: in/f_2.bgeo: length ");
     let check = [&["check"], &arguments(&["--idle", "0.5"])[1..]].concat();
-    let checked = workshop
-        .run(&check)
-        .expect(0)
-        .prints("note: frame 2: in/f_2.bgeo: length ");
+    let checked = workshop.run(&check).expect(0).prints("note: frame 2: in/f_2.bgeo: length ");
     assert!(checked.text().contains("to do 1 (2)"), "{}", checked.text());
     for (content, options) in [(&other, &[][..]), (&whole, &["--isolate"])] {
         fs::write(workshop.join("in/f_2.bgeo"), content).expect("a file");

@@ -32,12 +32,7 @@ fn appended_frames_are_seen_by_the_old_camera() {
     let settled = resolved();
     let before = stamps(&workshop.join("out"));
 
-    npy(
-        &workshop.join("in/f_4.npy"),
-        9000,
-        4,
-        Vec3::new(20.0, 0.0, 0.0),
-    );
+    npy(&workshop.join("in/f_4.npy"), 9000, 4, Vec3::new(20.0, 0.0, 0.0));
     let ran = workshop
         .render(&[])
         .expect(0)
@@ -136,10 +131,7 @@ fn frames_are_rendered_as_asked_for() {
         let ran = workshop.render(&["--frames", range]).expect(0);
         assert_eq!(ran.rendered(), frames, "{range}");
         let total = frames.len() + kept;
-        assert!(
-            ran.errors()
-                .contains(&format!("{total} of {total} frames done"))
-        );
+        assert!(ran.errors().contains(&format!("{total} of {total} frames done")));
     }
     assert_eq!(ledger(&workshop.join("out")).lines.len(), 8);
     // The same pictures as all at once.
@@ -154,9 +146,8 @@ fn the_manifest_beside_the_images_is_the_job() {
     workshop.render(&["--set", "camera.azimuth=77"]).expect(0);
     fs::copy(workshop.join("out/job.toml"), workshop.join("mine.toml")).expect("a copy");
     let text = fs::read_to_string(workshop.join("mine.toml")).expect("the manifest");
-    let text = text
-        .replace("\"../in\"", "\"in\"")
-        .replace("\"f.####.exr\"", "\"elsewhere/f.####.exr\"");
+    let text =
+        text.replace("\"../in\"", "\"in\"").replace("\"f.####.exr\"", "\"elsewhere/f.####.exr\"");
     fs::write(workshop.join("mine.toml"), text).expect("a file");
     workshop.run(&["render", "mine.toml"]).expect(0);
     assert!(images(&workshop.join("out")) == images(&workshop.join("elsewhere")));

@@ -20,21 +20,12 @@ fn interrupt(workshop: &Workshop, out: &str, signal: &str) -> bool {
         return false;
     }
     assert_eq!(status.code(), Some(75), "{messages}");
-    assert!(
-        messages.contains("stopping after the frames in progress"),
-        "{messages}"
-    );
+    assert!(messages.contains("stopping after the frames in progress"), "{messages}");
     // The frame in progress was finished, and the messages match the files
     let done = ledger(&workshop.join(out)).lines.len();
     assert!((1..FRAMES).contains(&done), "{messages}");
-    assert!(
-        messages.contains(&format!("{done} of {FRAMES} frames done")),
-        "{messages}"
-    );
-    assert!(
-        !messages.contains("error:") && !messages.contains("failed:"),
-        "{messages}"
-    );
+    assert!(messages.contains(&format!("{done} of {FRAMES} frames done")), "{messages}");
+    assert!(!messages.contains("error:") && !messages.contains("failed:"), "{messages}");
     assert_eq!(images(&workshop.join(out)).len(), 2 * done);
     no_leftovers(&workshop.join(out));
     true
@@ -76,10 +67,7 @@ fn an_interrupted_second_try_is_no_failure() {
             let good = fs::read(&file).expect("a frame");
             fs::write(&file, &good[..good.len() / 2]).expect("a file");
         }
-        workshop
-            .render_to(&out, &[])
-            .expect(1)
-            .prints(&format!("failed: 2-{FRAMES}"));
+        workshop.render_to(&out, &[]).expect(1).prints(&format!("failed: 2-{FRAMES}"));
         dam_break(&input, 2..=FRAMES);
         let pattern = format!("{out}/f.####.exr");
         let arguments = [&["render", "in", "-o", &pattern][..], &SMALL].concat();
@@ -141,9 +129,7 @@ fn a_frame_that_outlasts_the_grace_period_is_dropped() {
         assert!(in_hand, "no frame was ever in progress");
         let out = workshop.join(out);
         assert!(images(&out).is_empty() && ledger(&out).lines.is_empty());
-        let parts = files(&out)
-            .into_keys()
-            .filter(|name| name.ends_with(".part"));
+        let parts = files(&out).into_keys().filter(|name| name.ends_with(".part"));
         assert_eq!(parts.count(), 0);
     }
 }

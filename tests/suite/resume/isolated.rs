@@ -31,32 +31,17 @@ fn the_images_are_the_same() {
     no_leftovers(&workshop.join("out"));
     assert!(images(&workshop.join("out")) == images(&workshop.join("whole")));
     // How the work is gone about is no property of the job.
-    workshop
-        .render(&[])
-        .expect(0)
-        .prints("5 of 5 frames are done already");
+    workshop.render(&[]).expect(0).prints("5 of 5 frames are done already");
 }
 
 #[test]
 fn a_frame_beyond_the_ceiling_costs_one_frame() {
     let workshop = Workshop::new();
     for frame in 1..=3 {
-        npy(
-            &workshop.join(format!("in/f_{frame}.npy")),
-            2_000,
-            frame,
-            glam::Vec3::ZERO,
-        );
+        npy(&workshop.join(format!("in/f_{frame}.npy")), 2_000, frame, glam::Vec3::ZERO);
     }
     npy(&workshop.join("in/f_2.npy"), 6_000_000, 2, glam::Vec3::ZERO);
-    let options = [
-        "--memory-ceiling",
-        "64MiB",
-        "--radius",
-        "0.01",
-        "--threads",
-        "2",
-    ];
+    let options = ["--memory-ceiling", "64MiB", "--radius", "0.01", "--threads", "2"];
     let ran = workshop
         .run(&arguments(&options))
         .expect(1)
@@ -66,23 +51,12 @@ fn a_frame_beyond_the_ceiling_costs_one_frame() {
     assert_eq!(ran.rendered(), [1, 3]);
     no_leftovers(&workshop.join("out"));
     let lines = ledger(&workshop.join("out")).lines;
-    assert!(
-        lines
-            .iter()
-            .any(|l| l["status"] == "failed" && l["frame"] == 2)
-    );
+    assert!(lines.iter().any(|l| l["status"] == "failed" && l["frame"] == 2));
     // More room, and the same job goes on.
     let ran = workshop.run(&arguments(&["--radius", "0.01"])).expect(0);
     assert_eq!(ran.rendered(), [2]);
     workshop
-        .run(&[
-            "render",
-            "in",
-            "-o",
-            "x/f.####.exr",
-            "--memory-ceiling",
-            "1GiB",
-        ])
+        .run(&["render", "in", "-o", "x/f.####.exr", "--memory-ceiling", "1GiB"])
         .expect(2)
         .prints("--memory-ceiling: applies to the process of a frame");
 }
@@ -140,11 +114,7 @@ fn a_damaged_frame_is_reported_by_its_own_reason_and_not_tried_again() {
     fs::write(&path, &bytes[..bytes.len() / 2]).expect("a file");
     let ran = workshop.run(&arguments(&[])).expect(1);
     assert_eq!(ran.rendered(), [1, 3]);
-    assert!(
-        !ran.errors().contains("the process died"),
-        "{}",
-        ran.errors()
-    );
+    assert!(!ran.errors().contains("the process died"), "{}", ran.errors());
     assert_eq!(ledger(&workshop.join("out")).lines.len(), 3);
 }
 

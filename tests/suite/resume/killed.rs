@@ -106,10 +106,7 @@ fn torture(workers: usize) {
             lose_some(&out, kills);
         }
     }
-    assert!(
-        kills >= KILLS && done < 4 * KILLS,
-        "{kills} kills, {done} ends"
-    );
+    assert!(kills >= KILLS && done < 4 * KILLS, "{kills} kills, {done} ends");
     finish(team);
     workshop.run(&arguments).expect(0);
 
@@ -119,10 +116,7 @@ fn torture(workers: usize) {
     reported.sort();
     reported.dedup();
     assert_eq!(reported.len(), 2 * FRAMES);
-    assert!(
-        ledger_paths(&out).len() < 20,
-        "dead workers' ledgers are brought together"
-    );
+    assert!(ledger_paths(&out).len() < 20, "dead workers' ledgers are brought together");
     for name in ["job.toml", "job.plan.json"] {
         let read = |dir: &str| fs::read(workshop.join(dir).join(name)).expect(name);
         assert!(read("out") == read("whole"), "{name} differs");
@@ -170,9 +164,7 @@ fn wait(running: &mut Running, moment: Moment, out: &Path) {
         Moment::Reported => running.wait_for_line("] frame "),
         Moment::File(name) => running.wait_until(|| out.join(name).exists()),
         Moment::Writing => running.wait_until(|| {
-            files(out)
-                .keys()
-                .any(|name| name.starts_with(".f.") && name.ends_with(".part"))
+            files(out).keys().any(|name| name.starts_with(".f.") && name.ends_with(".part"))
         }),
         Moment::Claimed => running.wait_until(|| {
             let names = files(&out.join("job.work"));
@@ -191,19 +183,12 @@ fn all_is_whole(out: &Path, whole: &Files, moment: Moment) {
     let reported = ledger(out).done();
     let made = images(out);
     for (name, bytes) in &made {
-        assert!(
-            whole.get(name) == Some(bytes),
-            "{moment:?}: {name} is not whole"
-        );
+        assert!(whole.get(name) == Some(bytes), "{moment:?}: {name} is not whole");
     }
     for (name, length) in reported {
         let bytes = made.get(&name).map_or(length, |b| b.len() as u64);
         assert_eq!(bytes, length, "{moment:?}: {name} is reported done");
         let expected = whole.get(&name).map(|b| b.len() as u64);
-        assert_eq!(
-            expected,
-            Some(length),
-            "{moment:?}: {name} is reported done"
-        );
+        assert_eq!(expected, Some(length), "{moment:?}: {name} is reported done");
     }
 }

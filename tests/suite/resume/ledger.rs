@@ -72,10 +72,7 @@ fn a_damaged_or_missing_plan_is_no_fresh_start() {
         .prints("the ledger has lines but job.plan.json is missing")
         .prints("--force");
     fs::write(&plan, &text).expect("a file");
-    workshop
-        .render(&[])
-        .expect(0)
-        .prints("3 of 3 frames are done already");
+    workshop.render(&[]).expect(0).prints("3 of 3 frames are done already");
     let mut after = stamps(&workshop.join("out"));
     after.insert("job.plan.json".to_owned(), before["job.plan.json"]);
     assert_eq!(after, before);
@@ -93,10 +90,7 @@ fn one_damaged_byte_of_the_plan_is_no_other_camera() {
     let plan = workshop.join("out/job.plan.json");
     let text = fs::read_to_string(&plan).expect("a plan");
     let at = text.find("\"resolved\"").expect("resolved values");
-    let digit = at
-        + text[at..]
-            .find(|c: char| c.is_ascii_digit())
-            .expect("a number");
+    let digit = at + text[at..].find(|c: char| c.is_ascii_digit()).expect("a number");
     let mut damaged = text.clone().into_bytes();
     damaged[digit] = if damaged[digit] == b'7' { b'8' } else { b'7' };
     fs::write(&plan, &damaged).expect("a file");
@@ -124,18 +118,12 @@ fn a_plan_of_version_1_goes_on() {
         serde_json::from_value(plan["settings"].clone()).expect("settings");
     plan["version"] = 1.into();
     plan["settings_blake3"] = spherule_jobs::settings_hash(&pairs).into();
-    plan.as_object_mut()
-        .expect("an object")
-        .remove("input_dirs");
+    plan.as_object_mut().expect("an object").remove("input_dirs");
     fs::write(&path, format!("{plan:#}\n")).expect("a file");
     workshop.run(&["status", "out"]).expect(75);
     assert_eq!(workshop.render(&[]).expect(0).rendered(), [2]);
     assert!(images(&workshop.join("out")) == whole);
-    assert_eq!(
-        fs::read(&path).expect("a plan"),
-        bytes,
-        "it has a checksum now"
-    );
+    assert_eq!(fs::read(&path).expect("a plan"), bytes, "it has a checksum now");
 }
 
 /// Details are read when the report is written; by then it is too late to complain.
@@ -149,17 +137,10 @@ fn details_that_cannot_be_read_are_found_with_their_line() {
     let nested = "[".repeat(300) + &"]".repeat(300);
     for value in ["203E616", "1e999", "\"\\ud800\"", nested.as_str()] {
         fs::write(&path, format!("{start}\"particles\":{value},{rest}")).expect("a file");
-        for arguments in [
-            &["status", "out"][..],
-            &["verify", "out"],
-            &["render", "out/job.toml"],
-        ] {
+        for arguments in [&["status", "out"][..], &["verify", "out"], &["render", "out/job.toml"]] {
             let ran = workshop.run(arguments).expect(2);
             let errors = ran.errors();
-            assert!(
-                errors.contains(".jsonl: line 1: not a ledger entry"),
-                "{errors}"
-            );
+            assert!(errors.contains(".jsonl: line 1: not a ledger entry"), "{errors}");
             assert!(!errors.contains("panicked"), "{errors}");
         }
     }

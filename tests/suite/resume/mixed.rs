@@ -7,11 +7,7 @@ use crate::harness::{SMALL, Workshop, dam_break, files, images};
 
 /// Renders `input` to the images of `out`.
 fn render(workshop: &Workshop, input: &str, options: &[&str]) -> crate::harness::Ran {
-    let arguments = [
-        &["render", input, "-o", "out/f.####.exr"][..],
-        &SMALL,
-        options,
-    ];
+    let arguments = [&["render", input, "-o", "out/f.####.exr"][..], &SMALL, options];
     workshop.run(&arguments.concat())
 }
 
@@ -80,9 +76,7 @@ fn relative_paths_are_reported_apart_by_where_they_begin() {
         crate::harness::Ran(command.output().expect("the program starts"))
     };
     render("a").expect(0);
-    render("b")
-        .expect(2)
-        .prints("a/dump/f_1.bgeo, now dump/f_3.bgeo");
+    render("b").expect(2).prints("a/dump/f_1.bgeo, now dump/f_3.bgeo");
 }
 
 #[test]
@@ -95,9 +89,7 @@ fn another_pattern_in_the_same_directory_is_another_input() {
         dam_break(&workshop.join("more"), [number]);
         fs::rename(workshop.join(format!("more/f_{number}.bgeo")), to).expect("a rename");
     }
-    render(&workshop, "in/g_#.bgeo", &[])
-        .expect(2)
-        .prints("keep what is there with --keep-done");
+    render(&workshop, "in/g_#.bgeo", &[]).expect(2).prints("keep what is there with --keep-done");
     let ran = render(&workshop, "in/g_#.bgeo", &["--keep-done"]).expect(0);
     assert_eq!(ran.rendered(), [3, 4]);
 }
@@ -109,9 +101,7 @@ fn moved_data_with_the_same_contents_go_on() {
     render(&workshop, "in", &["--frames", "1-2"]).expect(0);
     fs::rename(workshop.join("in"), workshop.join("archive")).expect("a rename");
     later_frames(&workshop, "archive", 4);
-    let ran = render(&workshop, "archive", &[])
-        .expect(0)
-        .prints("2 of 6 frames are done already");
+    let ran = render(&workshop, "archive", &[]).expect(0).prints("2 of 6 frames are done already");
     assert_eq!(ran.rendered(), [3, 4, 5, 6]);
     let ran = render(&workshop, "archive/f_#.bgeo", &[]).expect(0);
     assert!(ran.rendered().is_empty());
@@ -135,9 +125,7 @@ fn copied_data_go_on() {
     let middle = bytes.len() / 2;
     bytes[middle] ^= 1;
     fs::write(long("copy"), bytes).expect("a file");
-    render(&workshop, "copy", &[])
-        .expect(2)
-        .prints("modification time has changed");
+    render(&workshop, "copy", &[]).expect(2).prints("modification time has changed");
 }
 
 #[test]
@@ -150,9 +138,7 @@ fn a_conversion_belongs_to_one_input_too() {
         .run(&["convert", "other", "-o", "out"])
         .expect(2)
         .prints("out: this job was made from other files (");
-    workshop
-        .run(&["convert", "other", "-o", "out", "--force"])
-        .expect(0);
+    workshop.run(&["convert", "other", "-o", "out", "--force"]).expect(0);
     // Not the directory with the input itself
     workshop
         .run(&["convert", "in", "-o", "./in"])
@@ -169,17 +155,10 @@ fn files_that_no_job_made_are_not_replaced() {
         fs::create_dir(workshop.join("out")).expect("a directory");
         fs::write(workshop.join("out").join(name), "mine").expect("a file");
         // Also where this run would not make that file.
-        for options in [
-            &[][..],
-            &["--frames", "1"],
-            &["--shard", "1/2"],
-            &["--keep-done"],
-        ] {
+        for options in [&[][..], &["--frames", "1"], &["--shard", "1/2"], &["--keep-done"]] {
             render(&workshop, "in", options)
                 .expect(2)
-                .prints(&format!(
-                    "out/{name}: already exists and was not written by this job; "
-                ))
+                .prints(&format!("out/{name}: already exists and was not written by this job; "))
                 .prints("or replace it with --force");
         }
         let check = ["check", "in", "-o", "out/f.####.exr"];
@@ -204,9 +183,7 @@ fn nor_are_files_in_the_way_of_frames_that_come_later() {
     fs::write(workshop.join("out/f.0003.exr"), "mine").expect("a file");
     fs::write(workshop.join("out/f.0001.png"), "mine").expect("a file");
     // The previews are new to the job.
-    render(&workshop, "in", &["--keep-done"])
-        .expect(2)
-        .prints("out/f.0001.png: already exists");
+    render(&workshop, "in", &["--keep-done"]).expect(2).prints("out/f.0001.png: already exists");
     dam_break(&workshop.join("in"), 3..=3);
     render(&workshop, "in", &["--set", "output.preview=false"])
         .expect(2)
@@ -246,7 +223,5 @@ fn native_frames_that_no_job_made_are_not_replaced() {
         .expect(2)
         .prints("out/frame.0002.spf: already exists");
     assert_eq!(files(&workshop.join("out")).len(), 1);
-    workshop
-        .run(&["convert", "in", "-o", "out", "--force"])
-        .expect(0);
+    workshop.run(&["convert", "in", "-o", "out", "--force"]).expect(0);
 }

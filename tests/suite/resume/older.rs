@@ -21,21 +21,14 @@ fn older(name: &str) -> Workshop {
     let out = workshop.join("out");
     fs::create_dir(&out).expect("a directory");
     for file in ["job.plan.json", "job.ledger.older.jsonl"] {
-        let from = sample(
-            Path::new("older_jobs")
-                .join(name)
-                .join(file)
-                .to_str()
-                .expect("UTF-8"),
-        );
+        let from = sample(Path::new("older_jobs").join(name).join(file).to_str().expect("UTF-8"));
         fs::copy(from, out.join(file)).expect("a file");
     }
     // Its images are known by their lengths.
     for output in ledger(&out).lines[0]["outputs"].as_array().expect("files") {
         let path = out.join(output["path"].as_str().expect("a name"));
         let file = File::create(path).expect("a file");
-        file.set_len(output["len"].as_u64().expect("a length"))
-            .expect("room");
+        file.set_len(output["len"].as_u64().expect("a length")).expect("room");
     }
     workshop
 }
@@ -50,10 +43,7 @@ fn goes_on(name: &str, options: &[&str]) {
         plan.get("plan").unwrap_or(&plan)["settings"].clone()
     };
     let before = plan(&workshop);
-    let ran = workshop
-        .render(options)
-        .expect(0)
-        .prints("1 of 2 frames are done already");
+    let ran = workshop.render(options).expect(0).prints("1 of 2 frames are done already");
     assert_eq!(ran.rendered(), [2]);
     assert_eq!(plan(&workshop), before);
     // Also by the manifest that lies there now.
@@ -101,12 +91,6 @@ fn glass_that_would_look_otherwise_is_refused() {
         "settings have changed since this job began: render.min_weight: (not set) -> 0.0009765625;",
     );
     // It followed both branches always.
-    goes_on(
-        "glass",
-        &[&GLASS[..], &["--set", "render.min_weight=0"]].concat(),
-    );
-    older("plain")
-        .render(&GLASS)
-        .expect(2)
-        .prints("material.transmission: 0.0 -> 1.0");
+    goes_on("glass", &[&GLASS[..], &["--set", "render.min_weight=0"]].concat());
+    older("plain").render(&GLASS).expect(2).prints("material.transmission: 0.0 -> 1.0");
 }

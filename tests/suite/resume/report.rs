@@ -35,14 +35,9 @@ fn frames_totals_settings_and_machine() {
     let file = workshop.join("in/f_2.bgeo");
     let good = fs::read(&file).expect("a frame");
     fs::write(&file, &good[..100]).expect("a file");
-    workshop
-        .render(&["--frames", "1-3", "--threads", "2"])
-        .expect(1);
+    workshop.render(&["--frames", "1-3", "--threads", "2"]).expect(1);
     let first = report(&workshop);
-    has(
-        &first,
-        &["frames", "totals", "slowest", "settings", "machine"],
-    );
+    has(&first, &["frames", "totals", "slowest", "settings", "machine"]);
     let frames = first["frames"].as_array().expect("frames");
     let status: Vec<&str> = frames.iter().filter_map(|f| f["status"].as_str()).collect();
     assert_eq!(status, ["done", "failed", "done", "pending"]);
@@ -64,10 +59,7 @@ fn frames_totals_settings_and_machine() {
         let sum: u64 = frames.iter().filter_map(|f| f["rays"][key].as_u64()).sum();
         assert_eq!(totals["rays"][key], sum, "{key}");
     }
-    let wall: f64 = frames
-        .iter()
-        .filter_map(|f| f["seconds"]["wall"].as_f64())
-        .sum();
+    let wall: f64 = frames.iter().filter_map(|f| f["seconds"]["wall"].as_f64()).sum();
     assert_eq!(totals["seconds"]["wall"], wall);
     assert_eq!(first["slowest"].as_array().map(Vec::len), Some(2));
     assert_eq!(first["settings"]["render.max_depth"], "3");
@@ -128,29 +120,18 @@ fn lost_images_are_not_called_done() {
 #[track_caller]
 fn done_frame(frame: &Value) {
     assert_eq!(frame["particles"], 10422);
-    has(
-        &frame["seconds"],
-        &["read", "build", "trace", "encode", "wall"],
-    );
+    has(&frame["seconds"], &["read", "build", "trace", "encode", "wall"]);
     has(&frame["build"], &["order", "nodes"]);
     let parts = ["positions", "structure", "attributes", "scratch"];
     has(&frame["bytes"], &parts);
     has(&frame["bytes"], &["build_peak", "file", "per_particle"]);
-    has(
-        &frame["rays"],
-        &["primary", "shadow", "reflection", "refraction"],
-    );
+    has(&frame["rays"], &["primary", "shadow", "reflection", "refraction"]);
     has(&frame["rss"], &["anonymous_peak", "file_peak"]);
     assert_eq!(frame["rays"]["primary"], 64 * 36);
     assert!(frame["bytes"]["positions"].as_u64() >= Some(10422 * 12));
-    let bytes = frame["bytes"]["positions"]
-        .as_f64()
-        .zip(frame["bytes"]["structure"].as_f64());
+    let bytes = frame["bytes"]["positions"].as_f64().zip(frame["bytes"]["structure"].as_f64());
     let (positions, structure) = bytes.expect("numbers");
-    assert_eq!(
-        frame["bytes"]["per_particle"],
-        (positions + structure) / 10422.0
-    );
+    assert_eq!(frame["bytes"]["per_particle"], (positions + structure) / 10422.0);
     assert!(frame["rays_per_second"].as_f64() > Some(0.0));
     assert!(frame["build"]["nodes"].as_u64() > Some(0));
     for stage in ["read", "build", "trace", "encode"] {
@@ -165,32 +146,17 @@ fn progress_for_programs_tells_each_frame() {
     let file = workshop.join("in/f_2.bgeo");
     fs::write(&file, &fs::read(&file).expect("a frame")[..100]).expect("a file");
     let ran = workshop.render(&["--progress", "json"]).expect(1);
-    let lines: Vec<Value> = ran
-        .text()
-        .lines()
-        .map(|line| serde_json::from_str(line).expect("JSON"))
-        .collect();
-    let messages: Vec<(i64, &str)> = lines
-        .iter()
-        .filter_map(|l| Some((l["frame"].as_i64()?, l["event"].as_str()?)))
-        .collect();
-    assert_eq!(
-        messages,
-        [(1, "frame_done"), (2, "frame_failed"), (3, "frame_done")]
-    );
+    let lines: Vec<Value> =
+        ran.text().lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    let messages: Vec<(i64, &str)> =
+        lines.iter().filter_map(|l| Some((l["frame"].as_i64()?, l["event"].as_str()?))).collect();
+    assert_eq!(messages, [(1, "frame_done"), (2, "frame_failed"), (3, "frame_done")]);
 
-    let ran = workshop
-        .render(&["--progress", "openjd", "--force"])
-        .expect(1);
+    let ran = workshop.render(&["--progress", "openjd", "--force"]).expect(1);
     let progress: Vec<String> = ran.text().lines().map(str::to_owned).collect();
-    assert!(
-        progress.contains(&"openjd_progress: 100.0".to_owned()),
-        "{progress:?}"
-    );
+    assert!(progress.contains(&"openjd_progress: 100.0".to_owned()), "{progress:?}");
 
-    let ran = workshop
-        .render(&["--progress", "none", "--force"])
-        .expect(1);
+    let ran = workshop.render(&["--progress", "none", "--force"]).expect(1);
     assert!(ran.rendered().is_empty());
     assert!(ran.errors().contains("error: frame 2: in/f_2.bgeo"));
 }

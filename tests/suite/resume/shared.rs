@@ -7,12 +7,7 @@ use crate::harness::{SMALL, Workshop, dam_break, images, ledger, no_leftovers};
 const FRAMES: usize = 12;
 
 fn arguments<'a>(options: &[&'a str]) -> Vec<&'a str> {
-    [
-        &["render", "in", "-o", "out/f.####.exr"][..],
-        &SMALL,
-        options,
-    ]
-    .concat()
+    [&["render", "in", "-o", "out/f.####.exr"][..], &SMALL, options].concat()
 }
 
 /// A workshop with the images of an unbroken run in `whole`.
@@ -40,10 +35,7 @@ fn workers_started_at_once_make_each_frame_once() {
     let report = fs::read_to_string(out.join("report.json")).expect("a report");
     let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
     let frames = report["frames"].as_array().expect("frames");
-    assert!(
-        frames.iter().all(|f| f["status"] == "done"),
-        "all workers' frames are in it"
-    );
+    assert!(frames.iter().all(|f| f["status"] == "done"), "all workers' frames are in it");
 }
 
 #[test]
@@ -60,10 +52,7 @@ fn parts_are_disjoint_and_together_everything() {
     assert!(images(&workshop.join("out")) == images(&workshop.join("whole")));
     // More parts than frames are no mistake.
     workshop.run(&arguments(&["--shard", "99/99"])).expect(0);
-    workshop
-        .run(&arguments(&["--shard", "6/5"]))
-        .expect(2)
-        .prints("from 1 to the number of parts");
+    workshop.run(&arguments(&["--shard", "6/5"])).expect(2).prints("from 1 to the number of parts");
 }
 
 #[test]
@@ -106,10 +95,8 @@ fn frames_of_an_unresponsive_worker_are_taken_over() {
 fn a_job_of_an_unresponsive_worker_starts_over() {
     let workshop = with_whole();
     workshop.run(&arguments(&[])).expect(0);
-    let cases = [
-        (&["--force"][..], FRAMES),
-        (&["--keep-done", "--set", "image.filter=gaussian"], 0),
-    ];
+    let cases =
+        [(&["--force"][..], FRAMES), (&["--keep-done", "--set", "image.filter=gaussian"], 0)];
     for (options, frames) in cases {
         let work = workshop.join("out/job.work");
         fs::create_dir_all(&work).expect("a directory");

@@ -15,14 +15,8 @@ const RICH: [&str; 8] = [
 ];
 
 /// Path tracing: many light paths a sample, and a shadow catcher.
-const STUDIO: [&str; 6] = [
-    "--samples",
-    "4",
-    "--look",
-    "studio",
-    "--set",
-    "output.transparent=true",
-];
+const STUDIO: [&str; 6] =
+    ["--samples", "4", "--look", "studio", "--set", "output.transparent=true"];
 
 #[test]
 fn any_number_of_threads_makes_the_same_images() {
@@ -38,12 +32,8 @@ fn same_on_any_threads(options: &[&str]) {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), [1, 5, 9]);
     let mut first = None;
-    let threads: [&[&str]; 4] = [
-        &["--threads", "1"],
-        &["--threads", "2"],
-        &["--threads", "5"],
-        &[],
-    ];
+    let threads: [&[&str]; 4] =
+        [&["--threads", "1"], &["--threads", "2"], &["--threads", "5"], &[]];
     for (count, threads) in threads.iter().enumerate() {
         // Twice each: what differs from run to run would differ here.
         for again in 0..2 {
@@ -51,13 +41,8 @@ fn same_on_any_threads(options: &[&str]) {
             // Each option may be given once, so small images come by `--set` here.
             let pattern = format!("{out}/f.####.exr");
             let size = ["--width", "64", "--height", "36"];
-            let arguments = [
-                &["render", "in", "-o", &pattern][..],
-                &size,
-                options,
-                threads,
-            ]
-            .concat();
+            let arguments =
+                [&["render", "in", "-o", &pattern][..], &size, options, threads].concat();
             let ran = workshop.run(&arguments).expect(0);
             assert_eq!(ran.rendered(), [1, 5, 9]);
             let made = images(&workshop.join(&out));

@@ -20,8 +20,7 @@ const SIDE: [u32; 3] = [12, 9, 7];
 fn lattice(offset: DVec3) -> Vec<DVec3> {
     let [x, y, z] = SIDE;
     let all = (0..z).flat_map(|k| (0..y).flat_map(move |j| (0..x).map(move |i| (i, j, k))));
-    all.map(|(i, j, k)| offset + SPACING * DVec3::new(i.into(), j.into(), k.into()))
-        .collect()
+    all.map(|(i, j, k)| offset + SPACING * DVec3::new(i.into(), j.into(), k.into())).collect()
 }
 
 /// Writes `points` as numpy does, `<f8` of shape (N, 3).
@@ -76,17 +75,8 @@ fn pictures_are_those_of_the_same_particles_at_zero() {
     write_npy(&workshop.join("far.npy"), &lattice(OFFSET));
     write_npy(&workshop.join("near.npy"), &lattice(DVec3::ZERO));
     let render = |input: &str, output: &str| {
-        let arguments = [
-            "render", input, "-o", output, "--width", "96", "--height", "54",
-        ];
-        let more = [
-            "--samples",
-            "1",
-            "--radius",
-            "0.0004",
-            "--channels",
-            "RGBA,Z,N,id",
-        ];
+        let arguments = ["render", input, "-o", output, "--width", "96", "--height", "54"];
+        let more = ["--samples", "1", "--radius", "0.0004", "--channels", "RGBA,Z,N,id"];
         let ran = workshop.run(&[&arguments[..], &more].concat()).expect(0);
         (Picture::open(&workshop.join(output)), ran.errors())
     };
@@ -99,18 +89,11 @@ fn pictures_are_those_of_the_same_particles_at_zero() {
     let origin = DVec3::from_slice(&origin);
     assert!((origin - OFFSET).length() < 0.1, "{origin}");
     assert!(errors.contains(&format!("origin {origin}")), "{errors}");
-    assert_eq!(
-        near.facts.as_ref().expect("facts")["origin"],
-        serde_json::json!([0.0, 0.0, 0.0])
-    );
+    assert_eq!(near.facts.as_ref().expect("facts")["origin"], serde_json::json!([0.0, 0.0, 0.0]));
 
     // f64 at three million has steps of 5e-10, half a millionth of the spacing: edges of a few
     // pixels may move.
-    let same = far
-        .integers("id.I")
-        .iter()
-        .zip(near.integers("id.I"))
-        .filter(|(a, b)| a == b);
+    let same = far.integers("id.I").iter().zip(near.integers("id.I")).filter(|(a, b)| a == b);
     assert!(same.count() + 10 >= 96 * 54);
     let depths = far.floats("Z").iter().zip(near.floats("Z"));
     let both = depths.filter(|(a, b)| a.is_finite() && b.is_finite());
@@ -118,9 +101,5 @@ fn pictures_are_those_of_the_same_particles_at_zero() {
     let mut off: Vec<f64> = off.collect();
     assert!(off.len() > 96 * 54 / 4, "{}", off.len());
     off.sort_by(f64::total_cmp);
-    assert!(
-        off[off.len() - 20] < 1e-3 * SPACING,
-        "{:e}",
-        off[off.len() - 20]
-    );
+    assert!(off[off.len() - 20] < 1e-3 * SPACING, "{:e}", off[off.len() - 20]);
 }

@@ -27,10 +27,8 @@ const ATTRIBUTE_KEYS: [&str; 7] = ["components", "max", "mean", "min", "name", "
 /// Runs `inspect --json` on `files` and parses each line.
 #[track_caller]
 fn inspect(files: &[String], code: i32) -> Vec<Value> {
-    let arguments: Vec<&str> = ["inspect", "--json"]
-        .into_iter()
-        .chain(files.iter().map(String::as_str))
-        .collect();
+    let arguments: Vec<&str> =
+        ["inspect", "--json"].into_iter().chain(files.iter().map(String::as_str)).collect();
     let ran = Workshop::new().run(&arguments).expect(code);
     let lines = ran.text();
     let parsed = lines.lines().map(|l| serde_json::from_str(l).expect(l));
@@ -91,11 +89,7 @@ fn one_frame_in_every_format() {
             assert!((found - expected).abs() < 1e-6, "{object}");
         }
         // The ids are 15..10421 with gaps; their sum is exact. LAMMPS counts from 1.
-        let expected = if object["format"] == "lammps" {
-            10_022_102
-        } else {
-            10_020_902
-        };
+        let expected = if object["format"] == "lammps" { 10_022_102 } else { 10_020_902 };
         let attributes = object["attributes"].as_array().expect("a list");
         let ids = attributes.iter().find(|a| {
             let name = a["name"].as_str().expect("a name");
@@ -136,21 +130,15 @@ fn frame_numbers_are_those_of_the_images() {
         ("lammps_drop/dump.drop.1200.lammps.gz", 1200),
         ("pysph/dam_break_3d_fluid_00100.vtu", 100),
         ("public_splashsurf/dam_break_frame_9_6859_particles.bgeo", 9),
-        (
-            "public_splashsurf/double_dam_break_frame_26_4732_particles.vtk",
-            26,
-        ),
+        ("public_splashsurf/double_dam_break_frame_26_4732_particles.vtk", 26),
     ] {
         let objects = inspect(&[sample(file).display().to_string()], 0);
         assert_eq!(objects.len(), 1);
         assert_eq!(objects[0]["frame"], frame, "{file}");
     }
     let workshop = Workshop::new();
-    std::fs::copy(
-        sample("lammps_drop/steps/dump.drop.400.lammps"),
-        workshop.join("dump.400"),
-    )
-    .expect("a copy");
+    std::fs::copy(sample("lammps_drop/steps/dump.drop.400.lammps"), workshop.join("dump.400"))
+        .expect("a copy");
     let ran = workshop.run(&["inspect", "--json", "dump.400"]).expect(0);
     let object: Value = serde_json::from_str(&ran.text()).expect("one object");
     assert_eq!(object["frame"], 400);
@@ -158,9 +146,7 @@ fn frame_numbers_are_those_of_the_images() {
 
 #[test]
 fn a_file_of_several_steps_gives_an_object_each() {
-    let file = sample("lammps_drop/drop_4frames.lammpstrj")
-        .display()
-        .to_string();
+    let file = sample("lammps_drop/drop_4frames.lammpstrj").display().to_string();
     let objects = inspect(&[file], 0);
     let frames: Vec<i64> = objects.iter().filter_map(|o| o["frame"].as_i64()).collect();
     assert_eq!(frames, [0, 400, 800, 1200]);
@@ -179,10 +165,7 @@ fn cells_and_notes_are_in_the_object() {
     let vectors = objects[0]["cell"]["vectors"].as_array().expect("vectors");
     assert_eq!(vectors.len(), 3);
     assert!(vectors[0][0].as_f64().is_some_and(|length| length > 0.0));
-    assert_eq!(
-        objects[0]["cell"]["periodic"],
-        serde_json::json!([true, true, true])
-    );
+    assert_eq!(objects[0]["cell"]["periodic"], serde_json::json!([true, true, true]));
     assert!(!objects[0]["notes"].as_array().expect("notes").is_empty());
     // Also of files that are read in blocks
     let objects = inspect(&[sample("hdf5/gadget.hdf5").display().to_string()], 0);
@@ -197,9 +180,8 @@ fn a_long_trajectory_has_its_first_and_last_step_as_text() {
         let atoms: String = (0..count).map(|i| format!("C {i} {number} 0\n")).collect();
         format!("{count}\nstep\n{atoms}")
     };
-    let steps: String = (0..40)
-        .map(|number| step(number, if number == 20 { 4 } else { 3 }))
-        .collect();
+    let steps: String =
+        (0..40).map(|number| step(number, if number == 20 { 4 } else { 3 })).collect();
     std::fs::write(workshop.join("long.xyz"), steps).expect("a file");
     let text = workshop.run(&["inspect", "long.xyz"]).expect(0).text();
     let shown = text.lines().filter(|line| line.starts_with("long.xyz"));
@@ -215,17 +197,9 @@ fn a_pattern_gives_its_sequence_with_frames_without_particles() {
     let objects = inspect(&[pattern.display().to_string()], 0);
     let found: Vec<(i64, u64)> = objects
         .iter()
-        .map(|o| {
-            (
-                o["frame"].as_i64().expect("a frame"),
-                o["count"].as_u64().expect("a count"),
-            )
-        })
+        .map(|o| (o["frame"].as_i64().expect("a frame"), o["count"].as_u64().expect("a count")))
         .collect();
-    assert_eq!(
-        found,
-        [(1, 0), (2, 0), (3, 90), (4, 300), (5, 480), (10, 1410)]
-    );
+    assert_eq!(found, [(1, 0), (2, 0), (3, 90), (4, 300), (5, 480), (10, 1410)]);
     for object in &objects {
         check_shape(object);
         let count = object["count"].as_i64().expect("a count");

@@ -55,10 +55,8 @@ fn index_is_printed_and_parts_add_up() {
         let sections = native["sections"].as_array().expect("a list");
         let names: Vec<&str> = sections.iter().filter_map(|s| s["name"].as_str()).collect();
         assert_eq!(names[..3], ["positions", "wide blocks", "nodes"]);
-        let mut places: Vec<(u64, u64)> = sections
-            .iter()
-            .map(|s| (whole(&s["offset"]), whole(&s["bytes"])))
-            .collect();
+        let mut places: Vec<(u64, u64)> =
+            sections.iter().map(|s| (whole(&s["offset"]), whole(&s["bytes"]))).collect();
         places.sort_unstable();
         for (offset, bytes) in places {
             assert!(offset >= ends && offset + bytes < length);
@@ -107,16 +105,10 @@ fn verify_detects_damage_that_reading_does_not() {
     let shop = converted(&["--encoding", "q16"]);
     assert_eq!(inspected(&shop, &["--verify"])["verified"], true);
     let text = shop.run(&["inspect", "--verify", FILE]).expect(0).text();
-    assert!(
-        text.contains("verified: checksums, nodes, positions"),
-        "{text}"
-    );
+    assert!(text.contains("verified: checksums, nodes, positions"), "{text}");
 
     let object = inspected(&shop, &[]);
-    let mut sections = object["native"]["sections"]
-        .as_array()
-        .expect("a list")
-        .clone();
+    let mut sections = object["native"]["sections"].as_array().expect("a list").clone();
     sections.retain(|s| whole(&s["bytes"]) > 0);
     let bytes = fs::read(shop.join(FILE)).expect("a frame");
     let padding = sections
@@ -165,8 +157,7 @@ fn large_frames_are_sampled() {
     let shop = Workshop::new();
     let count = 4_000_001;
     let particles = count.to_string();
-    shop.run(&["generate", "box", "--particles", &particles, "-o", "a.spf"])
-        .expect(0);
+    shop.run(&["generate", "box", "--particles", &particles, "-o", "a.spf"]).expect(0);
     let inspect = |options: &[&str]| shop.run(&[&["inspect", "a.spf"], options].concat());
     let json = |options: &[&str]| -> Value {
         let ran = inspect(&[&["--json"], options].concat()).expect(0);
@@ -177,10 +168,7 @@ fn large_frames_are_sampled() {
     let sample = whole(&object["native"]["sample"]);
     assert!((1000..40_000).contains(&sample), "{sample}");
     // Bounds are those of all particles, and the box is full; the mean is that of the sample.
-    for (axis, [low, high]) in [[3.0, 7.0], [5.0, 8.0], [-2.0, 2.0]]
-        .into_iter()
-        .enumerate()
-    {
+    for (axis, [low, high]) in [[3.0, 7.0], [5.0, 8.0], [-2.0, 2.0]].into_iter().enumerate() {
         let [min, max] = ["min", "max"].map(|side| number(&object["bounds"][side][axis]));
         assert!(min - low < 1e-5 && high - max < 1e-5, "{min} {max}");
         assert!((number(&object["mean"][axis]) - 0.5 * (low + high)).abs() < 0.1);
@@ -204,14 +192,10 @@ fn large_frames_are_sampled() {
 fn verify_reads_other_formats() {
     let shop = Workshop::new();
     let file = sample("single_frames/raw.xyz").display().to_string();
-    let ran = shop
-        .run(&["inspect", "--json", "--verify", &file])
-        .expect(0);
+    let ran = shop.run(&["inspect", "--json", "--verify", &file]).expect(0);
     let object: Value = serde_json::from_str(&ran.text()).expect("JSON");
     assert_eq!(object["verified"], true);
     assert!(object.get("native").is_none());
     fs::write(shop.join("a.xyz"), "2\n\nA 0 0 0\nA 0 x 0\n").expect("a file");
-    shop.run(&["inspect", "--verify", "a.xyz"])
-        .expect(1)
-        .prints("error: a.xyz: byte ");
+    shop.run(&["inspect", "--verify", "a.xyz"]).expect(1).prints("error: a.xyz: byte ");
 }

@@ -64,11 +64,7 @@ fn emitter_starts_without_particles() {
     let expected = [(1, 0), (2, 0), (3, 90), (4, 300), (5, 480), (10, 1410)];
     let note = "frame numbers go up by 1, but jump from 5 to 10";
     check("emitter_sph/ParticleData_Fluid_#.bgeo", &expected, &[note]);
-    check(
-        "emitter_sph/ParticleData_Fluid_#.vtk",
-        &[(1, 0), (3, 90)],
-        &[],
-    );
+    check("emitter_sph/ParticleData_Fluid_#.vtk", &[(1, 0), (3, 90)], &[]);
 }
 
 #[test]
@@ -77,10 +73,7 @@ fn two_formats_in_one_directory_are_not_mixed() {
     match Sequence::open(&input) {
         Err(SequenceError::Ambiguous { groups, .. }) => {
             let patterns: Vec<&str> = groups.iter().map(|g| g.pattern.as_str()).collect();
-            assert_eq!(
-                patterns,
-                ["ParticleData_Fluid_#.bgeo", "ParticleData_Fluid_#.vtk"]
-            );
+            assert_eq!(patterns, ["ParticleData_Fluid_#.bgeo", "ParticleData_Fluid_#.vtk"]);
         }
         other => panic!("{other:?}"),
     }
@@ -98,10 +91,7 @@ fn four_steps_in_one_file() {
     let expected = [0, 400, 800, 1200].map(|step| (step, 200));
     check("lammps_drop/drop_4frames.lammpstrj", &expected, &[]);
     // The same steps as files of their own, in whatever order.
-    let (whole, files) = (
-        open("lammps_drop/drop_4frames.lammpstrj"),
-        open("lammps_drop/steps"),
-    );
+    let (whole, files) = (open("lammps_drop/drop_4frames.lammpstrj"), open("lammps_drop/steps"));
     for index in 0..4 {
         assert_eq!(
             whole.load_raw(index).expect("a step").positions,
@@ -126,11 +116,7 @@ fn fluid_and_obstacle_are_parts_of_one_step() {
     let merged = sequence.load_raw(0).expect("both parts");
     let part = merged.attributes.iter().find(|a| a.name == PART_ATTRIBUTE);
     let part = part.expect("an attribute that tells the parts apart");
-    let of = |value: f64| {
-        (0..part.count())
-            .filter(|i| part.data.get_f64(*i) == value)
-            .count()
-    };
+    let of = |value: f64| (0..part.count()).filter(|i| part.data.get_f64(*i) == value).count();
     assert_eq!((of(0.0), of(1.0)), (2880, 36));
 
     let obstacle = FrameFile::open(&sample("pysph/dam_break_3d_obstacle_00100.vtu"))
@@ -142,13 +128,8 @@ fn fluid_and_obstacle_are_parts_of_one_step() {
     };
     assert!(all.ends_with(last));
 
-    sequence
-        .keep_parts(&["obstacle".to_owned()])
-        .expect("the part");
-    assert_eq!(
-        sequence.load_raw(0).expect("one part").positions,
-        obstacle.positions
-    );
+    sequence.keep_parts(&["obstacle".to_owned()]).expect("the part");
+    assert_eq!(sequence.load_raw(0).expect("one part").positions, obstacle.positions);
 }
 
 #[test]
@@ -171,10 +152,7 @@ fn part_can_be_selected_on_the_command_line() {
         .run(&arguments)
         .expect(2)
         .prints("no part is called `wall`; the parts are fluid, obstacle");
-    workshop
-        .run(&["inspect", &input])
-        .expect(0)
-        .prints("each step has the parts fluid, obstacle");
+    workshop.run(&["inspect", &input]).expect(0).prints("each step has the parts fluid, obstacle");
 }
 
 #[test]
@@ -189,14 +167,7 @@ fn file_metadata_is_reported() {
     assert!(text.contains(cell) && text.contains(names), "{text}");
     assert_eq!(text.matches(hint).count(), 1, "{text}");
     let size = ["--width", "48", "--height", "27", "--samples", "1"];
-    let arguments = [
-        "render",
-        "water.xyz",
-        "-o",
-        "f.exr",
-        "--color-by",
-        "element",
-    ];
+    let arguments = ["render", "water.xyz", "-o", "f.exr", "--color-by", "element"];
     workshop
         .run(&[&arguments[..], &size].concat())
         .expect(0)
@@ -205,10 +176,7 @@ fn file_metadata_is_reported() {
         .prints(names)
         .prints("colour by `element`, range 1 to 8");
     let drawn = ["still", "water.xyz", "-o", "c.png", "--cell"];
-    let errors = workshop
-        .run(&[&drawn[..], &size].concat())
-        .expect(0)
-        .errors();
+    let errors = workshop.run(&[&drawn[..], &size].concat()).expect(0).errors();
     assert!(errors.contains(cell) && !errors.contains(hint), "{errors}");
 }
 
@@ -218,18 +186,13 @@ fn ids_are_found_under_tool_specific_names() {
     let ids = |file: &str| {
         let input = sample(file).display().to_string();
         let size = ["--width", "48", "--height", "27", "--samples", "1"];
-        let arguments = [
-            "render", &input, "-o", "f.exr", "--radius", "0.02", "--force",
-        ];
+        let arguments = ["render", &input, "-o", "f.exr", "--radius", "0.02", "--force"];
         workshop.run(&[&arguments[..], &size].concat()).expect(0);
         let picture = Picture::open(&workshop.join("f.exr"));
         picture.integers("id.I").to_vec()
     };
     let expected = ids("single_frames/be.ply");
-    assert!(
-        expected.iter().any(|id| (1200..20_000).contains(id)),
-        "ids, not indices"
-    );
+    assert!(expected.iter().any(|id| (1200..20_000).contains(id)), "ids, not indices");
     for file in ["plain.npz", "dualsphysics.csv"] {
         let found = ids(&format!("single_frames/{file}"));
         let same = found.iter().zip(&expected).filter(|(a, b)| a == b);
@@ -264,11 +227,7 @@ fn frames_may_lack_unused_attributes() {
     assert!(picture.floats("A").iter().any(|a| *a > 0.0));
 
     let ran = render("named/f.#.exr", &["--color-by", "velocity"]).expect(1);
-    assert!(
-        ran.errors().contains("no attribute `velocity` for colour"),
-        "{}",
-        ran.errors()
-    );
+    assert!(ran.errors().contains("no attribute `velocity` for colour"), "{}", ran.errors());
     assert!(workshop.join("named/f.1.exr").exists());
     assert!(!workshop.join("named/f.2.exr").exists());
 }

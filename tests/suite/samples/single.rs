@@ -44,31 +44,16 @@ const SIX_DIGITS: Holds = Holds {
     density: ("density", Digits(6)),
     ..VTK
 };
-const PLY: Holds = Holds {
-    density: ("", Not),
-    ..VTK
-};
-const NPZ: Holds = Holds {
-    velocity: ("velocities", Exactly),
-    id: Some(("ids", 0)),
-    ..VTK
-};
+const PLY: Holds = Holds { density: ("", Not), ..VTK };
+const NPZ: Holds = Holds { velocity: ("velocities", Exactly), id: Some(("ids", 0)), ..VTK };
 const DUALSPHYSICS: Holds = Holds {
     positions: Digits(8),
     velocity: ("Vel", Digits(8)),
     density: ("Rhop", Digits(8)),
     id: Some(("Idp", 0)),
 };
-const BARE: Holds = Holds {
-    positions: Exactly,
-    velocity: ("", Not),
-    density: ("", Not),
-    id: None,
-};
-const BARE_TEXT: Holds = Holds {
-    positions: Digits(7),
-    ..BARE
-};
+const BARE: Holds = Holds { positions: Exactly, velocity: ("", Not), density: ("", Not), id: None };
+const BARE_TEXT: Holds = Holds { positions: Digits(7), ..BARE };
 
 /// Every file of the directory.
 const FILES: &[(&str, Holds)] = &[
@@ -129,13 +114,7 @@ const FILES: &[(&str, Holds)] = &[
     ("raw.vtp", VTK),
     ("raw.vtu", VTK),
     ("raw.xyz", BARE),
-    (
-        "struct.npy",
-        Holds {
-            velocity: ("vel", Exactly),
-            ..PLY
-        },
-    ),
+    ("struct.npy", Holds { velocity: ("vel", Exactly), ..PLY }),
 ];
 
 /// The particles, cut out of two files by hand.
@@ -162,10 +141,7 @@ impl Truth {
             words.into_iter().map(f32::from_be_bytes).collect()
         };
         Self {
-            positions: words(&raw, 3 * COUNT)
-                .into_iter()
-                .map(f32::from_le_bytes)
-                .collect(),
+            positions: words(&raw, 3 * COUNT).into_iter().map(f32::from_le_bytes).collect(),
             velocity: floats(b"velocity 3 1200 float\n", 3 * COUNT),
             density: floats(b"density 1 1200 float\n", COUNT),
             id: words(after(b"id 1 1200 unsigned_int\n"), COUNT)
@@ -202,20 +178,12 @@ fn all_files_contain_the_same_particles() {
 #[track_caller]
 fn check(name: &str, particles: &RawParticles, holds: &Holds, truth: &Truth) {
     assert_eq!(particles.positions.len(), COUNT, "{name}");
-    let positions: Vec<f64> = (0..COUNT)
-        .flat_map(|i| particles.positions.get(i).to_array())
-        .collect();
-    compare(
-        name,
-        "positions",
-        &positions,
-        &truth.positions,
-        holds.positions,
-    );
-    for (what, (attribute, kept), values) in [
-        ("velocity", holds.velocity, &truth.velocity),
-        ("density", holds.density, &truth.density),
-    ] {
+    let positions: Vec<f64> =
+        (0..COUNT).flat_map(|i| particles.positions.get(i).to_array()).collect();
+    compare(name, "positions", &positions, &truth.positions, holds.positions);
+    for (what, (attribute, kept), values) in
+        [("velocity", holds.velocity, &truth.velocity), ("density", holds.density, &truth.density)]
+    {
         if !matches!(kept, Not) {
             let found = find(name, particles, attribute);
             assert_eq!(found.components, values.len() / COUNT, "{name}: {what}");
@@ -236,9 +204,7 @@ fn find<'a>(name: &str, particles: &'a RawParticles, attribute: &str) -> &'a Att
 }
 
 fn numbers(attribute: &Attribute) -> Vec<f64> {
-    (0..attribute.data.len())
-        .map(|i| attribute.data.get_f64(i))
-        .collect()
+    (0..attribute.data.len()).map(|i| attribute.data.get_f64(i)).collect()
 }
 
 #[track_caller]
@@ -256,9 +222,6 @@ fn compare(name: &str, what: &str, found: &[f64], truth: &[f32], kept: Kept) {
         };
         let off = (found - truth).abs();
         // Also fails for NaN.
-        assert!(
-            off <= allowed,
-            "{name}: {what} {index} is {found}, not {truth}"
-        );
+        assert!(off <= allowed, "{name}: {what} {index} is {found}, not {truth}");
     }
 }

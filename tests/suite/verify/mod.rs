@@ -59,10 +59,7 @@ fn pending_frames_are_not_faults() {
     assert_eq!(ran.text(), "sound              1 (2)\n");
     let all = ["verify", "out", "--frames", "1-3"];
     let ran = workshop.run(&all).expect(0);
-    assert_eq!(
-        ran.text(),
-        "sound              1 (2)\npending            2 (1,3)\n"
-    );
+    assert_eq!(ran.text(), "sound              1 (2)\npending            2 (1,3)\n");
     let ran = workshop.run(&[&all[..], &["--json"]].concat()).expect(0);
     let states: Vec<Value> = objects(&ran).iter().map(|o| o["status"].clone()).collect();
     assert_eq!(states, ["pending", "sound", "pending"]);
@@ -82,23 +79,14 @@ fn each_fault_is_named() {
     let text = ran.text();
     let lines: Vec<&str> = text.lines().collect();
     assert_eq!(lines.len(), 6, "{text}");
-    assert!(
-        lines[0].starts_with("frame 1: f.0001.exr: damaged: cannot be decoded: "),
-        "{text}"
-    );
+    assert!(lines[0].starts_with("frame 1: f.0001.exr: damaged: cannot be decoded: "), "{text}");
     assert_eq!(lines[1], "frame 2: f.0002.png: missing: does not exist");
-    let longer = format!(
-        "frame 3: f.0003.exr: length: has {} bytes, {written} were written",
-        written + 1
-    );
+    let longer =
+        format!("frame 3: f.0003.exr: length: has {} bytes, {written} were written", written + 1);
     assert_eq!(lines[2], longer);
     assert_eq!(
         &lines[3..],
-        [
-            "damaged            1 (1)",
-            "missing            1 (2)",
-            "of another length  1 (3)"
-        ]
+        ["damaged            1 (1)", "missing            1 (2)", "of another length  1 (3)"]
     );
     let ran = workshop.run(&["verify", "out", "--json", "--frames", "2"]);
     let objects = objects(&ran.expect(1));
@@ -130,10 +118,7 @@ fn a_picture_of_another_job_is_damage() {
     fs::write(&to, bytes).expect("a file");
     let ran = workshop.run(&["verify", "out"]).expect(1);
     let text = ran.text();
-    assert!(
-        text.contains("f.0001.exr: damaged: has the channels"),
-        "{text}"
-    );
+    assert!(text.contains("f.0001.exr: damaged: has the channels"), "{text}");
 }
 
 #[test]
@@ -143,9 +128,7 @@ fn native_frames_are_verified_as_by_inspect() {
         let path = workshop.join(format!("in/p_{frame}.npy"));
         npy(&path, 500, frame, glam::Vec3::ZERO);
     }
-    workshop
-        .run(&["convert", "in", "-o", "frames", "--encoding", "q16"])
-        .expect(0);
+    workshop.run(&["convert", "in", "-o", "frames", "--encoding", "q16"]).expect(0);
     let ran = workshop.run(&["verify", "frames"]).expect(0);
     assert_eq!(ran.text(), "sound              2 (1-2)\n");
     flip(&workshop.join("frames/frame.0002.spf"));
@@ -168,10 +151,7 @@ fn directory_without_a_job() {
     refused(&["in"], "in: no job here (no job.plan.json)");
     refused(&["none"], "none: no job here");
     refused(&["none.toml"], "none.toml: ");
-    refused(
-        &["out", "--frames", "9"],
-        "--frames: 9 contains none of the job's frames: 1-3",
-    );
+    refused(&["out", "--frames", "9"], "--frames: 9 contains none of the job's frames: 1-3");
     fs::write(workshop.join("bad.toml"), "[inptu]\n").expect("a file");
     refused(&["bad.toml"], "did you mean `input`?");
     fs::write(workshop.join("out/job.plan.json"), "{").expect("a file");
@@ -190,8 +170,7 @@ fn damaged_frames_are_redone_on_request() {
     assert_eq!(workshop.render(&[]).expect(0).rendered(), [0_i64; 0]);
     let damaged = images(&out);
     let ran = workshop.run(&["verify", "out", "--requeue-bad"]);
-    ran.expect(1)
-        .prints("requeued: 1,3; the next run of the job repeats them");
+    ran.expect(1).prints("requeued: 1,3; the next run of the job repeats them");
     assert_eq!(images(&out), damaged);
     let ran = workshop.run(&["verify", "out", "--json"]).expect(0);
     let first = &objects(&ran)[0];

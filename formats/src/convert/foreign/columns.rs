@@ -25,11 +25,7 @@ impl ColumnSource {
             scalar: column.scalar,
         };
         file.advise_sequential();
-        Self {
-            attributes: layout.attributes.iter().map(attribute).collect(),
-            file,
-            layout,
-        }
+        Self { attributes: layout.attributes.iter().map(attribute).collect(), file, layout }
     }
 
     /// The index of particle `first`, if `count` particles follow.
@@ -41,9 +37,7 @@ impl ColumnSource {
         };
         place.filter(fits).ok_or_else(|| {
             let all = self.layout.count;
-            self.bad(format!(
-                "{count} particles from {first} on do not exist, the file has {all}"
-            ))
+            self.bad(format!("{count} particles from {first} on do not exist, the file has {all}"))
         })
     }
 

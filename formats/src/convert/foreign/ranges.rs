@@ -33,12 +33,7 @@ impl RangeSource {
             components: attribute.components,
             scalar: attribute.scalar,
         });
-        Self {
-            attributes: attributes.collect(),
-            file,
-            siblings,
-            ranges,
-        }
+        Self { attributes: attributes.collect(), file, siblings, ranges }
     }
 
     fn check_range(&self, first: u64, count: usize) -> Result<(), FrameError> {
@@ -78,10 +73,7 @@ impl ParticleSource for RangeSource {
     }
 
     fn read_values(&self, attribute: usize, first: u64, to: &mut [u8]) -> Result<(), FrameError> {
-        let width = self
-            .attributes
-            .get(attribute)
-            .map_or(1, SourceAttribute::width);
+        let width = self.attributes.get(attribute).map_or(1, SourceAttribute::width);
         self.check_range(first, to.len() / width.max(1))?;
         let read = self.ranges.read_values(attribute, first, to);
         read.map_err(|e| e.in_file(self.file.path()))

@@ -74,9 +74,7 @@ fn same(source: &dyn ParticleSource, raw: &RawParticles) {
     let described = |a: &crate::Attribute| (a.name.clone(), a.components, a.data.scalar_type());
     let expected: Vec<_> = raw.attributes.iter().map(described).collect();
     let found = source.attributes().iter();
-    let found: Vec<_> = found
-        .map(|a| (a.name.clone(), a.components, a.scalar))
-        .collect();
+    let found: Vec<_> = found.map(|a| (a.name.clone(), a.components, a.scalar)).collect();
     assert_eq!(found, expected);
     for run in [1009, 4097, 100_003] {
         same_in_runs(source, raw, run);
@@ -92,12 +90,7 @@ fn samples_stream_as_they_are_read() {
             continue;
         };
         same(&*source, &read_whole(&path).expect("a good file"));
-        streamed.push(
-            path.file_name()
-                .expect("a file")
-                .to_string_lossy()
-                .into_owned(),
-        );
+        streamed.push(path.file_name().expect("a file").to_string_lossy().into_owned());
     }
     for name in [
         "le.ply",
@@ -121,18 +114,8 @@ fn samples_stream_as_they_are_read() {
 
 #[test]
 fn unsupported_layouts_fall_back_to_the_readers() {
-    for name in [
-        "ascii.ply",
-        "legacy_ascii.vtk",
-        "plain.npz",
-        "mol.xyz",
-        "plain.csv",
-        "raw.vtu",
-    ] {
-        let path = format!(
-            "{}/../tests/data/single_frames/{name}",
-            env!("CARGO_MANIFEST_DIR")
-        );
+    for name in ["ascii.ply", "legacy_ascii.vtk", "plain.npz", "mol.xyz", "plain.csv", "raw.vtu"] {
+        let path = format!("{}/../tests/data/single_frames/{name}", env!("CARGO_MANIFEST_DIR"));
         let source = open_source(Path::new(&path));
         assert!(source.expect("a good file").is_none(), "{name}");
     }
@@ -140,18 +123,13 @@ fn unsupported_layouts_fall_back_to_the_readers() {
 
 #[test]
 fn run_beyond_the_end_is_rejected() {
-    let path = format!(
-        "{}/../tests/data/single_frames/le.ply",
-        env!("CARGO_MANIFEST_DIR")
-    );
+    let path = format!("{}/../tests/data/single_frames/le.ply", env!("CARGO_MANIFEST_DIR"));
     let source = open_source(Path::new(&path));
     let source = source.expect("a good file").expect("binary");
     let mut to = [DVec3::ZERO; 2];
     assert!(source.read_positions(1198, &mut to).is_ok());
     for first in [1199, 1200, u64::MAX] {
-        let error = source
-            .read_positions(first, &mut to)
-            .expect_err("beyond the end");
+        let error = source.read_positions(first, &mut to).expect_err("beyond the end");
         assert!(error.to_string().contains("the file has 1200"), "{error}");
     }
     assert!(source.read_values(0, 1199, &mut [0; 12]).is_ok());

@@ -67,21 +67,14 @@ impl BlockSource {
             slabs.push(Slab { first, height });
             first += columns * height;
         }
-        let velocity = SourceAttribute {
-            name: "velocity".to_owned(),
-            components: 3,
-            scalar: ScalarType::F32,
-        };
+        let velocity =
+            SourceAttribute { name: "velocity".to_owned(), components: 3, scalar: ScalarType::F32 };
         Self {
             settings,
             spacing,
             columns,
             slabs,
-            attributes: settings
-                .has_velocity
-                .then_some(velocity)
-                .into_iter()
-                .collect(),
+            attributes: settings.has_velocity.then_some(velocity).into_iter().collect(),
         }
     }
 
@@ -99,10 +92,8 @@ impl BlockSource {
         while place < end {
             let slab = self.slabs[number - 1];
             let after = slab.first + self.columns * slab.height;
-            let (mut y, mut z) = (
-                (place - slab.first) / slab.height,
-                (place - slab.first) % slab.height,
-            );
+            let (mut y, mut z) =
+                ((place - slab.first) / slab.height, (place - slab.first) % slab.height);
             while place < end.min(after) {
                 see(self.position([number as u64 - 1, y, z], place));
                 place += 1;
@@ -116,10 +107,7 @@ impl BlockSource {
     }
 
     #[inline]
-    #[expect(
-        clippy::cast_precision_loss,
-        reason = "far fewer than 2^53 along an axis"
-    )]
+    #[expect(clippy::cast_precision_loss, reason = "far fewer than 2^53 along an axis")]
     fn position(&self, cell: [u64; 3], place: u64) -> Vec3 {
         let noise = [1, 2, 3].map(|k| {
             let number = place.wrapping_mul(3).wrapping_add(k);
@@ -141,11 +129,7 @@ impl BlockSource {
 }
 
 /// The nearest whole number, at least 1.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a cast saturates"
-)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a cast saturates")]
 fn whole(value: f64) -> u64 {
     (value.round() as u64).max(1)
 }
@@ -231,12 +215,7 @@ mod tests {
         });
         let all = all(&source);
         let size = all.iter().copied().fold(DVec3::ZERO, DVec3::max);
-        assert!(
-            (size / size.z - DVec3::new(4.0, 2.0, 1.0))
-                .abs()
-                .max_element()
-                < 1.0
-        );
+        assert!((size / size.z - DVec3::new(4.0, 2.0, 1.0)).abs().max_element() < 1.0);
         for (i, p) in all.iter().enumerate() {
             let near = all[..i].iter().map(|q| q.distance(*p));
             assert!(near.fold(f64::INFINITY, f64::min) > 0.55);

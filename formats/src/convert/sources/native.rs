@@ -46,11 +46,7 @@ impl<'a> NativeSource<'a> {
                 scalar: ScalarType::F32,
             });
         }
-        Ok(Self {
-            file,
-            leaves,
-            attributes,
-        })
+        Ok(Self { file, leaves, attributes })
     }
 
     fn read_radii(&self, places: std::ops::Range<usize>, to: &mut [u8]) {

@@ -28,9 +28,7 @@ impl CellAssignment {
     /// The cell of the particle with this index.
     #[inline(always)]
     pub(super) fn cell(&self, index: usize) -> usize {
-        self.cells
-            .get(index)
-            .map_or(0, |cell| usize::from(cell.load(Ordering::Relaxed)))
+        self.cells.get(index).map_or(0, |cell| usize::from(cell.load(Ordering::Relaxed)))
     }
 }
 
@@ -38,11 +36,7 @@ impl CellAssignment {
 pub(super) fn assign(centers: &[Vec3], mut plan: CutPlan) -> CellAssignment {
     let cell_count = plan.brackets.len() + 1;
     if cell_count == 1 {
-        return CellAssignment {
-            cells: Vec::new(),
-            cell_count,
-            bytes: 0,
-        };
+        return CellAssignment { cells: Vec::new(), cell_count, bytes: 0 };
     }
     let cells: Vec<AtomicU16> = centers.par_iter().map(|_| AtomicU16::new(0)).collect();
     let undecided_bytes = loop {
@@ -52,11 +46,7 @@ pub(super) fn assign(centers: &[Vec3], mut plan: CutPlan) -> CellAssignment {
         }
     };
     let bytes = plan.bytes.max(size_of_val(&cells[..]) + undecided_bytes) as u64;
-    CellAssignment {
-        cells,
-        cell_count,
-        bytes,
-    }
+    CellAssignment { cells, cell_count, bytes }
 }
 
 /// The cuts whose medians are outside their brackets.
@@ -137,19 +127,11 @@ fn pass(first: usize, centers: &[Vec3], cells: &[AtomicU16], plan: &CutPlan) -> 
 
 #[inline(always)]
 fn keys_of(center: Vec3, index: u32) -> [i64; 4] {
-    [
-        key(center.x, index),
-        key(center.y, index),
-        key(center.z, index),
-        0,
-    ]
+    [key(center.x, index), key(center.y, index), key(center.z, index), 0]
 }
 
 #[inline(always)]
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "the plan has at most 2^15 cells"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "the plan has at most 2^15 cells")]
 fn cell_u16(cell: usize) -> u16 {
     cell as u16
 }
@@ -200,10 +182,7 @@ impl<'a> CutSubtree<'a> {
         high.take(&items[rank..], cells);
         drop(items);
         // Decide the cuts below
-        let (a, b) = rayon::join(
-            || low.decide(centers, cells),
-            || high.decide(centers, cells),
-        );
+        let (a, b) = rayon::join(|| low.decide(centers, cells), || high.decide(centers, cells));
         match (a, b) {
             (Err(mut a), Err(b)) => {
                 a.cuts.extend(b.cuts);
@@ -275,15 +254,11 @@ mod tests {
             let hash = (i * 3 + k).wrapping_mul(0x9e37_79b9).rotate_left(13);
             hash.wrapping_mul(0x85eb_ca6b) as f32 / u32::MAX as f32
         };
-        (0..200_000)
-            .map(|i| Vec3::new(unit(i, 0), unit(i, 1), unit(i, 2)))
-            .collect()
+        (0..200_000).map(|i| Vec3::new(unit(i, 0), unit(i, 1), unit(i, 2))).collect()
     }
 
     fn cells(assigned: &CellAssignment) -> Vec<usize> {
-        (0..assigned.cells.len())
-            .map(|i| assigned.cell(i))
-            .collect()
+        (0..assigned.cells.len()).map(|i| assigned.cell(i)).collect()
     }
 
     #[test]

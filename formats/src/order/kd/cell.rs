@@ -21,22 +21,14 @@ impl CellScratch {
     pub(super) fn sort(&mut self, points: &mut [Vec3], indices: &mut [u32]) {
         self.items.clear();
         if indices.is_empty() {
-            self.items
-                .extend(points.iter().map(|p| KeyedParticle::new(*p, 0)));
+            self.items.extend(points.iter().map(|p| KeyedParticle::new(*p, 0)));
         } else {
             let pairs = points.iter().zip(&*indices);
-            self.items
-                .extend(pairs.map(|(p, i)| KeyedParticle::new(*p, *i)));
+            self.items.extend(pairs.map(|(p, i)| KeyedParticle::new(*p, *i)));
         }
         self.spare.resize(points.len(), KeyedParticle::default());
         self.keys.resize(points.len(), 0);
-        cut(
-            &mut self.items,
-            &mut self.spare,
-            &mut self.keys,
-            points,
-            indices,
-        );
+        cut(&mut self.items, &mut self.spare, &mut self.keys, points, indices);
     }
 }
 
@@ -117,9 +109,8 @@ mod tests {
 
     #[test]
     fn ties_keep_their_order() {
-        let items: Vec<KeyedParticle> = (0..64)
-            .map(|i| KeyedParticle::new(Vec3::X * (i % 2) as f32, i))
-            .collect();
+        let items: Vec<KeyedParticle> =
+            (0..64).map(|i| KeyedParticle::new(Vec3::X * (i % 2) as f32, i)).collect();
         let mut to = vec![KeyedParticle::default(); 64];
         part(&items, &mut to, &mut [0; 64], 0, 48);
         let numbers: Vec<u32> = to.iter().map(KeyedParticle::number).collect();

@@ -12,10 +12,7 @@ pub(super) struct KeyedParticle {
 
 impl KeyedParticle {
     pub(super) fn new(center: Vec3, number: u32) -> Self {
-        Self {
-            center: center.to_array(),
-            number,
-        }
+        Self { center: center.to_array(), number }
     }
 
     #[inline(always)]
@@ -75,10 +72,8 @@ mod tests {
     #[test]
     fn keys_order_by_coordinate_then_number() {
         let values = [f32::NEG_INFINITY, -2.5, -1e-40, -0.0, 0.0, 1e-40, 1.0, 3e38];
-        let keys: Vec<i64> = values
-            .iter()
-            .flat_map(|v| [0, 7, u32::MAX].map(|number| key(*v, number)))
-            .collect();
+        let keys: Vec<i64> =
+            values.iter().flat_map(|v| [0, 7, u32::MAX].map(|number| key(*v, number))).collect();
         let (zeros, others): (Vec<i64>, Vec<i64>) =
             keys.into_iter().partition(|key| *key >> 32 == 0);
         assert!(others.is_sorted_by(|a, b| a < b), "{others:?}");

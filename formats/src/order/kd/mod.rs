@@ -75,12 +75,12 @@ fn middle_of(len: usize) -> usize {
 
 /// Cuts every cell into blocks.
 fn sort_cells(cells: &Cells, points: &mut [Vec3], indices: &mut [u32]) {
-    cells
-        .slices_of(points, indices)
-        .into_par_iter()
-        .for_each_init(CellScratch::default, |scratch, (points, indices)| {
+    cells.slices_of(points, indices).into_par_iter().for_each_init(
+        CellScratch::default,
+        |scratch, (points, indices)| {
             scratch.sort(points, indices);
-        });
+        },
+    );
 }
 
 #[cfg(test)]

@@ -45,11 +45,7 @@ pub(super) enum Side {
 
 impl MedianBracket {
     /// No cut: all particles are low.
-    const NONE: Self = Self {
-        low: i64::MAX,
-        width: 0,
-        axis: 0,
-    };
+    const NONE: Self = Self { low: i64::MAX, width: 0, axis: 0 };
 
     /// A bracket that contains all keys.
     fn everything(axis: u32) -> Self {
@@ -58,11 +54,7 @@ impl MedianBracket {
 
     /// A bracket that contains the keys from `low` up to `high` (exclusive).
     pub(super) fn between(low: i64, high: i64, axis: u32) -> Self {
-        Self {
-            low,
-            width: high.wrapping_sub(low).cast_unsigned(),
-            axis,
-        }
+        Self { low, width: high.wrapping_sub(low).cast_unsigned(), axis }
     }
 
     /// Whether there is a cut.
@@ -115,11 +107,8 @@ impl CutPlan {
             cell_len *= 2;
         }
         let cuts = (1 << depth_of(centers.len(), cell_len)) - 1;
-        let mut plan = Self {
-            brackets: vec![MedianBracket::NONE; cuts],
-            middles: vec![0; cuts],
-            bytes: 0,
-        };
+        let mut plan =
+            Self { brackets: vec![MedianBracket::NONE; cuts], middles: vec![0; cuts], bytes: 0 };
         // Bracket the medians by a sample
         if cuts > 0 {
             let mut sample = sample_of(centers);
@@ -200,16 +189,8 @@ impl BracketSubtree<'_> {
         let (brackets_low, brackets_high) = brackets.split_at_mut(half);
         let (middles_low, middles_high) = middles.split_at_mut(half);
         let cell_len = self.cell_len;
-        let low = BracketSubtree {
-            brackets: brackets_low,
-            middles: middles_low,
-            cell_len,
-        };
-        let high = BracketSubtree {
-            brackets: brackets_high,
-            middles: middles_high,
-            cell_len,
-        };
+        let low = BracketSubtree { brackets: brackets_low, middles: middles_low, cell_len };
+        let high = BracketSubtree { brackets: brackets_high, middles: middles_high, cell_len };
         rayon::join(
             || low.fill(middle, spare_low, sample_low),
             || high.fill(len - middle, spare_high, sample_high),
@@ -220,11 +201,7 @@ impl BracketSubtree<'_> {
 /// The axis with the largest extent of the bulk of the particles; a few outliers do not affect it.
 fn widest_axis(sample: &[KeyedParticle]) -> usize {
     let stride = sample.len().div_ceil(AXIS_LEN).max(1);
-    let points: Vec<Vec3> = sample
-        .iter()
-        .step_by(stride)
-        .map(KeyedParticle::center)
-        .collect();
+    let points: Vec<Vec3> = sample.iter().step_by(stride).map(KeyedParticle::center).collect();
     let Some(last) = points.len().checked_sub(1) else {
         return 0;
     };
@@ -246,10 +223,7 @@ fn bracket_for(sample: &[KeyedParticle], axis: usize, fraction: f64) -> (MedianB
     // Compute the rank and its uncertainty
     let count = keys.len() as f64;
     let deviation = (count * fraction * (1.0 - fraction)).sqrt();
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "under the length of the sample"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "under the length of the sample")]
     let [rank, spread] = [count * fraction, 1.0 + DEVIATIONS * deviation].map(|r| r as usize);
     if rank >= keys.len() {
         return (MedianBracket::everything(axis_number), i64::MAX);
@@ -260,11 +234,7 @@ fn bracket_for(sample: &[KeyedParticle], axis: usize, fraction: f64) -> (MedianB
         Some(rank) => *below.select_nth_unstable(rank).1,
         None => i64::MIN,
     };
-    let high = if spread < above.len() {
-        *above.select_nth_unstable(spread).1
-    } else {
-        i64::MAX
-    };
+    let high = if spread < above.len() { *above.select_nth_unstable(spread).1 } else { i64::MAX };
     (MedianBracket::between(low, high, axis_number), *guess)
 }
 

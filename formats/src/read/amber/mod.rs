@@ -76,9 +76,7 @@ impl Reader for Amber {
     /// `None` for several frames, and if numbers are stored in another unit.
     fn layout(&self, bytes: &[u8]) -> Result<Option<ParticleLayout>, ParseError> {
         let trajectory = Trajectory::parse(bytes)?;
-        let is_scaled = trajectory
-            .columns()
-            .any(|(_, variable)| variable.scale_factor.is_some());
+        let is_scaled = trajectory.columns().any(|(_, variable)| variable.scale_factor.is_some());
         match trajectory.frames {
             1 if !is_scaled => trajectory.layout(0).map(Some),
             _ => Ok(None),
@@ -119,9 +117,7 @@ const TIMES: [(&str, f64); 7] = [
 fn picoseconds(time: &Variable) -> Option<f64> {
     let units = String::from_utf8_lossy(&time.units).to_ascii_lowercase();
     let known = TIMES.iter().find(|(name, _)| units.starts_with(name));
-    known
-        .map(|(_, len)| *len)
-        .or(units.is_empty().then_some(1.0))
+    known.map(|(_, len)| *len).or(units.is_empty().then_some(1.0))
 }
 
 /// The variables of a file with the conventions.
@@ -180,10 +176,7 @@ impl<'a> Trajectory<'a> {
         Ok(Self {
             velocities: alike("velocities"),
             forces: alike("forces"),
-            time: file
-                .variable("time")
-                .filter(|time| time.check_real("time").is_ok())
-                .cloned(),
+            time: file.variable("time").filter(|time| time.check_real("time").is_ok()).cloned(),
             coordinates,
             count,
             frames,
@@ -217,12 +210,7 @@ impl<'a> Trajectory<'a> {
                 return Err(ParseError::malformed(len, what));
             }
             let first = ComponentStride { start, stride };
-            columns.push(StridedColumn::interleaved(
-                name,
-                (scalar, Endian::Big),
-                3,
-                first,
-            ));
+            columns.push(StridedColumn::interleaved(name, (scalar, Endian::Big), 3, first));
         }
         let axes = columns.drain(..1).collect();
         Ok(ParticleLayout {
@@ -247,11 +235,7 @@ impl<'a> Trajectory<'a> {
     fn units(&self) -> String {
         let units_of = |variable: &Variable, default: &str| {
             let own = String::from_utf8_lossy(&variable.units).into_owned();
-            if own.is_empty() {
-                default.to_owned()
-            } else {
-                own
-            }
+            if own.is_empty() { default.to_owned() } else { own }
         };
         let velocities = self.velocities.as_ref();
         let velocities = velocities.map(|velocities| units_of(velocities, "angstrom/picosecond"));
@@ -290,11 +274,7 @@ impl<'a> Trajectory<'a> {
             .variable("cell_angles")
             .is_some_and(|angles| angles.units.starts_with(b"radian"));
         let angles = triple("cell_angles")?;
-        let degrees = if are_radians {
-            angles.map(f64::to_degrees)
-        } else {
-            angles
-        };
+        let degrees = if are_radians { angles.map(f64::to_degrees) } else { angles };
         SimulationCell::from_angles(triple("cell_lengths")?, degrees)
     }
 
@@ -312,15 +292,10 @@ impl<'a> Trajectory<'a> {
     }
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "rounded to the precision of the file"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "rounded to the precision of the file")]
 fn scale_data(data: &mut AttributeData, factor: f64) {
     match data {
-        AttributeData::F32(v) => v
-            .iter_mut()
-            .for_each(|n| *n = (f64::from(*n) * factor) as f32),
+        AttributeData::F32(v) => v.iter_mut().for_each(|n| *n = (f64::from(*n) * factor) as f32),
         AttributeData::F64(v) => v.iter_mut().for_each(|n| *n *= factor),
         _ => {}
     }
@@ -328,9 +303,7 @@ fn scale_data(data: &mut AttributeData, factor: f64) {
 
 fn scale_positions(positions: &mut Positions, factor: f64) {
     match positions {
-        Positions::F32(v) => v
-            .iter_mut()
-            .for_each(|p| *p = (p.as_dvec3() * factor).as_vec3()),
+        Positions::F32(v) => v.iter_mut().for_each(|p| *p = (p.as_dvec3() * factor).as_vec3()),
         Positions::F64(v) => v.iter_mut().for_each(|p| *p *= factor),
     }
 }

@@ -80,10 +80,8 @@ impl<'a> NetCdf<'a> {
             let what = "a NetCDF classic file begins with CDF and its version: 1, 2 or 5";
             return Err(ParseError::malformed(0, what));
         };
-        let mut header = HeaderReader {
-            numbers: NumberReader::new(bytes, 4, Endian::Big),
-            version,
-        };
+        let mut header =
+            HeaderReader { numbers: NumberReader::new(bytes, 4, Endian::Big), version };
         let records = header.record_count()?;
         let lengths = header.dimensions()?;
         let (texts, _) = header.attributes()?;
@@ -96,34 +94,20 @@ impl<'a> NetCdf<'a> {
             _ => variables
                 .iter()
                 .filter(|variable| variable.is_record)
-                .fold(0_usize, |len, variable| {
-                    len.saturating_add(padded(variable))
-                }),
+                .fold(0_usize, |len, variable| len.saturating_add(padded(variable))),
         };
-        Ok(Self {
-            bytes,
-            version,
-            records,
-            texts,
-            variables,
-            record_len,
-        })
+        Ok(Self { bytes, version, records, texts, variables, record_len })
     }
 
     /// The text of an attribute of the file; empty if there is none.
     pub(super) fn text(&self, name: &str) -> &'a [u8] {
-        let found = self
-            .texts
-            .iter()
-            .find(|(known, _)| *known == name.as_bytes());
+        let found = self.texts.iter().find(|(known, _)| *known == name.as_bytes());
         found.map_or(b"", |(_, text)| *text)
     }
 
     /// The variable called `name`.
     pub(super) fn variable(&self, name: &str) -> Option<&Variable> {
-        self.variables
-            .iter()
-            .find(|variable| variable.name == name.as_bytes())
+        self.variables.iter().find(|variable| variable.name == name.as_bytes())
     }
 
     /// The length of the first dimension of `variable`. One more is counted than the file has room for, so that reading
@@ -135,10 +119,7 @@ impl<'a> NetCdf<'a> {
         match (variable.is_record, self.records) {
             (true, None) => most,
             (true, Some(records)) => records.min(left / stride + 1),
-            (false, _) => variable
-                .shape
-                .first()
-                .map_or(1, |len| (*len).min(left / stride + 1)),
+            (false, _) => variable.shape.first().map_or(1, |len| (*len).min(left / stride + 1)),
         }
     }
 
@@ -154,11 +135,7 @@ impl<'a> NetCdf<'a> {
             return self.record_len;
         }
         let size = variable.scalar.map_or(1, ScalarType::size);
-        variable
-            .shape
-            .iter()
-            .skip(1)
-            .fold(size, |len, axis| len.saturating_mul(*axis))
+        variable.shape.iter().skip(1).fold(size, |len, axis| len.saturating_mul(*axis))
     }
 
     /// The number of `variable` at byte `at`.
@@ -289,10 +266,7 @@ impl<'a> HeaderReader<'a> {
             10 => ScalarType::I64,
             11 => ScalarType::U64,
             kind => {
-                return Err(ParseError::malformed(
-                    at,
-                    format!("the type {kind} is unknown"),
-                ));
+                return Err(ParseError::malformed(at, format!("the type {kind} is unknown")));
             }
         }))
     }
@@ -312,10 +286,8 @@ impl<'a> HeaderReader<'a> {
             for _ in 0..axes {
                 let index = self.count("number of a dimension")?;
                 let length = lengths.get(index).copied().ok_or_else(|| {
-                    let what = format!(
-                        "dimension {index} does not exist, there are {}",
-                        lengths.len()
-                    );
+                    let what =
+                        format!("dimension {index} does not exist, there are {}", lengths.len());
                     ParseError::malformed(at, what)
                 })?;
                 shape.push(length);

@@ -38,10 +38,7 @@ fn file(variables: &[Written<'_>]) -> Vec<u8> {
     for (dimension, len) in [("frame", 1), ("atom", 2), ("spatial", 3)] {
         head.extend([name(dimension), integers(&[len])].concat());
     }
-    head.extend(attributes(
-        &[("Conventions", "AMBER"), ("program", "test")],
-        None,
-    ));
+    head.extend(attributes(&[("Conventions", "AMBER"), ("program", "test")], None));
     head.extend(integers(&[11, i32::try_from(variables.len()).unwrap()]));
     let entry = |(title, units, factor, values): &Written<'_>, begin: i32| {
         let axes: &[i32] = match values.len() {
@@ -49,19 +46,10 @@ fn file(variables: &[Written<'_>]) -> Vec<u8> {
             3 => &[2, 0, 2],
             _ => &[3, 0, 1, 2],
         };
-        let units: &[(&str, &str)] = if units.is_empty() {
-            &[]
-        } else {
-            &[("units", units)]
-        };
+        let units: &[(&str, &str)] = if units.is_empty() { &[] } else { &[("units", units)] };
         let len = i32::try_from(8 * values.len()).unwrap();
-        [
-            name(title),
-            integers(axes),
-            attributes(units, *factor),
-            integers(&[6, len, begin]),
-        ]
-        .concat()
+        [name(title), integers(axes), attributes(units, *factor), integers(&[6, len, begin])]
+            .concat()
     };
     let head_len = head.len() + variables.iter().map(|v| entry(v, 0).len()).sum::<usize>();
     let mut begin = i32::try_from(head_len).unwrap();
@@ -98,24 +86,9 @@ fn times_are_in_picoseconds() {
         ("picosecond", None, 8.0, "times in ps"),
         ("", None, 8.0, "times in ps"),
         ("picosecond", Some(0.005), 0.04, "times in ps"),
-        (
-            "femtosecond",
-            None,
-            0.008,
-            "times in ps (the file has femtosecond)",
-        ),
-        (
-            "femtosecond",
-            Some(0.5),
-            0.004,
-            "times in ps (the file has femtosecond)",
-        ),
-        (
-            "nanosecond",
-            None,
-            8000.0,
-            "times in ps (the file has nanosecond)",
-        ),
+        ("femtosecond", None, 0.008, "times in ps (the file has femtosecond)"),
+        ("femtosecond", Some(0.5), 0.004, "times in ps (the file has femtosecond)"),
+        ("nanosecond", None, 8000.0, "times in ps (the file has nanosecond)"),
         ("lj", None, 8.0, "times in lj"),
     ] {
         let (time, found) = time_and_remark(units, factor, "angstrom/femtosecond");
@@ -132,21 +105,11 @@ fn factors_scale_positions_velocities_and_cells() {
         ("coordinates", "nanometer", Some(10.0), &PLACES),
         ("velocities", "", Some(20.455), &PLACES),
         ("cell_lengths", "", Some(2.0), &[1.0, 2.0, 3.0]),
-        (
-            "cell_angles",
-            "radian",
-            Some(0.5),
-            &[std::f64::consts::PI; 3],
-        ),
+        ("cell_angles", "radian", Some(0.5), &[std::f64::consts::PI; 3]),
     ]);
-    let particles = FORMAT
-        .read(&bytes, &Step::with_key(0, 0))
-        .expect("a good frame");
+    let particles = FORMAT.read(&bytes, &Step::with_key(0, 0)).expect("a good frame");
     assert_eq!(coordinates(&particles.positions)[1], [40.0, 50.0, 60.0]);
-    assert_eq!(
-        numbers(&attribute(&particles, "velocity").data)[1],
-        2.0 * 20.455
-    );
+    assert_eq!(numbers(&attribute(&particles, "velocity").data)[1], 2.0 * 20.455);
     let cell = particles.cell.expect("a cell");
     let lengths = cell.vectors.map(glam::DVec3::length);
     assert!(

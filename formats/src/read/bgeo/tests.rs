@@ -39,15 +39,10 @@ fn floats(numbers: &[f32]) -> Vec<u8> {
 #[test]
 fn reads_files_of_partio() {
     let particles = READER.one(&sample("public_partio/test.bgeo"));
-    let expected: Vec<[f64; 3]> = [
-        [0.0, 0.1, 0.2],
-        [0.1, 0.2, 0.3],
-        [0.2, 0.3, 0.4],
-        [0.3, 0.4, 0.5],
-        [0.4, 0.5, 0.6],
-    ]
-    .map(|p: [f32; 3]| p.map(f64::from))
-    .to_vec();
+    let expected: Vec<[f64; 3]> =
+        [[0.0, 0.1, 0.2], [0.1, 0.2, 0.3], [0.2, 0.3, 0.4], [0.3, 0.4, 0.5], [0.4, 0.5, 0.6]]
+            .map(|p: [f32; 3]| p.map(f64::from))
+            .to_vec();
     assert_eq!(coordinates(&particles.positions), expected);
     let life = attribute(&particles, "life");
     assert_eq!(life.components, 2);
@@ -88,10 +83,7 @@ fn indexed_strings_are_their_indices() {
 #[cfg_attr(miri, ignore = "too many bytes for an interpreter")]
 fn names_keep_their_spaces_and_velocity_is_a_vector() {
     let particles = READER.one(&sample("emitter_sph/ParticleData_Fluid_3.bgeo"));
-    assert_eq!(
-        names(&particles),
-        ["id", "density", "velocity", "pressure acceleration"]
-    );
+    assert_eq!(names(&particles), ["id", "density", "velocity", "pressure acceleration"]);
     assert_eq!(particles.positions.len(), 90);
     let velocity = attribute(&particles, "velocity");
     assert_eq!((velocity.components, velocity.data.len()), (3, 270));
@@ -115,12 +107,7 @@ fn reads_the_splashsurf_dam_break() {
     let bytes = sample("public_splashsurf/dam_break_frame_9_6859_particles.bgeo");
     let particles = READER.one(&bytes);
     assert_eq!(particles.positions.len(), 6859);
-    assert!(
-        coordinates(&particles.positions)
-            .as_flattened()
-            .iter()
-            .all(|c| c.abs() < 10.0)
-    );
+    assert!(coordinates(&particles.positions).as_flattened().iter().all(|c| c.abs() < 10.0));
     let end_of_points = bytes.len() - 2;
     READER.survives_truncation(&bytes, &[5, 9, 13, 41, 42, end_of_points], end_of_points);
 }
@@ -174,15 +161,9 @@ fn related_formats_are_rejected_by_name() {
 #[test]
 fn string_attributes_are_rejected() {
     let error = READER.error(&file(0, 1, &definition("s", 1, 2), &[]));
-    assert!(
-        error.to_string().contains("`s` is of type string"),
-        "{error}"
-    );
+    assert!(error.to_string().contains("`s` is of type string"), "{error}");
     let error = READER.error(&file(0, 1, &definition("s", 1, 77), &[]));
-    assert!(
-        matches!(error, ParseError::Malformed { at: 46, .. }),
-        "{error}"
-    );
+    assert!(matches!(error, ParseError::Malformed { at: 46, .. }), "{error}");
 }
 
 #[test]
@@ -202,16 +183,10 @@ fn huge_counts_are_rejected() {
         (file(0, 1, &absurd_strings, &[]), 56),
     ] {
         let error = READER.error(&bytes);
-        assert!(
-            matches!(error, ParseError::Malformed { at: found, .. } if found == at),
-            "{error}"
-        );
+        assert!(matches!(error, ParseError::Malformed { at: found, .. } if found == at), "{error}");
     }
     let text = READER.error(&file(i32::MAX, 0, &[], &[])).to_string();
-    assert_eq!(
-        text,
-        "byte 41: 2147483647 particles need 34359738352 bytes, file has 2 left"
-    );
+    assert_eq!(text, "byte 41: 2147483647 particles need 34359738352 bytes, file has 2 left");
 }
 
 #[test]

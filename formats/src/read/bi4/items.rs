@@ -153,12 +153,7 @@ impl<'a> ItemReader<'a> {
         self.text()?;
         self.text()?;
         let [array_count, item_count, values_len] = [self.u32()?, self.u32()?, self.u32()?];
-        let mut item = Item {
-            at,
-            name,
-            item_count,
-            ..Item::default()
-        };
+        let mut item = Item { at, name, item_count, ..Item::default() };
         // Values
         if values_len > 0 {
             self.mark(b"\nVALUES")?;
@@ -243,12 +238,7 @@ impl<'a> ItemReader<'a> {
         }
         let start = self.reader.at();
         self.take(len)?;
-        Ok(ItemArray {
-            name,
-            element,
-            count,
-            range: start..self.reader.at(),
-        })
+        Ok(ItemArray { name, element, count, range: start..self.reader.at() })
     }
 
     fn take(&mut self, len: usize) -> Result<&'a [u8], ParseError> {
@@ -286,10 +276,7 @@ impl<'a> ItemReader<'a> {
             true => Ok(()),
             false => {
                 let expected = String::from_utf8_lossy(expected);
-                let what = format!(
-                    "{} expected here: the file is damaged here",
-                    expected.trim()
-                );
+                let what = format!("{} expected here: the file is damaged here", expected.trim());
                 Err(ParseError::malformed(at, what))
             }
         }
@@ -302,8 +289,5 @@ impl<'a> ItemReader<'a> {
 }
 
 fn unknown_type(at: usize, kind: u32) -> ParseError {
-    ParseError::malformed(
-        at,
-        format!("the type {kind} is not known: the file is damaged here"),
-    )
+    ParseError::malformed(at, format!("the type {kind} is not known: the file is damaged here"))
 }

@@ -102,11 +102,7 @@ impl<'a> PartFile<'a> {
             }
         })?;
         match (root, part) {
-            (Some(root), Some(part)) => Ok(Self {
-                endian: reader.endian,
-                root,
-                part,
-            }),
+            (Some(root), Some(part)) => Ok(Self { endian: reader.endian, root, part }),
             _ => Err(ParseError::malformed(
                 bytes.len(),
                 "the file has no item PART_####, and no particles",
@@ -116,10 +112,7 @@ impl<'a> PartFile<'a> {
 
     /// Number of particles, and their positions.
     fn positions(&self) -> Result<(usize, &ItemArray<'a>), ParseError> {
-        let count = self
-            .part
-            .count("Npok")
-            .and_then(|count| usize::try_from(count).ok());
+        let count = self.part.count("Npok").and_then(|count| usize::try_from(count).ok());
         let count = count.ok_or_else(|| {
             ParseError::malformed(self.part.at, "the item has no number of particles (Npok)")
         })?;
@@ -143,31 +136,19 @@ impl<'a> PartFile<'a> {
             };
             if array.count != count {
                 let name = String::from_utf8_lossy(array.name);
-                let what = format!(
-                    "the array `{name}` has {} elements of {count} particles",
-                    array.count
-                );
+                let what =
+                    format!("the array `{name}` has {} elements of {count} particles", array.count);
                 return Err(ParseError::malformed(array.range.start, what));
             }
-            check_room(
-                array.range.start,
-                count,
-                scalar.size() * components,
-                array.range.end,
-            )?;
+            check_room(array.range.start, count, scalar.size() * components, array.range.end)?;
             if !matches!(array.name, b"Pos" | b"Posd") {
                 attributes.push(self.column(array, scalar, components));
             }
         }
-        let axes = positions
-            .element
-            .map(|(scalar, n)| self.column(positions, scalar, n));
+        let axes = positions.element.map(|(scalar, n)| self.column(positions, scalar, n));
         let layout = ParticleLayout {
             time: self.part.real("TimeStep"),
-            step: self
-                .part
-                .count("Step")
-                .and_then(|step| i64::try_from(step).ok()),
+            step: self.part.count("Step").and_then(|step| i64::try_from(step).ok()),
             ..ParticleLayout::new(count, axes.into_iter().collect(), attributes)
         };
         // Radii and types have four bytes each
@@ -178,18 +159,11 @@ impl<'a> PartFile<'a> {
         let types = self.types(&particles);
         let mut add = |name: &str, data| {
             if !particles.attributes.iter().any(|a| a.name == name) {
-                particles.attributes.push(Attribute {
-                    name: name.to_owned(),
-                    components: 1,
-                    data,
-                });
+                particles.attributes.push(Attribute { name: name.to_owned(), components: 1, data });
             }
         };
         if let Some(radius) = self.radius() {
-            add(
-                crate::names::RADIUS,
-                AttributeData::F32(vec![radius; count]),
-            );
+            add(crate::names::RADIUS, AttributeData::F32(vec![radius; count]));
         }
         if let Some(types) = types {
             add(PART, AttributeData::U32(types));
@@ -203,10 +177,8 @@ impl<'a> PartFile<'a> {
         scalar: crate::ScalarType,
         components: usize,
     ) -> StridedColumn {
-        let first = ComponentStride {
-            start: array.range.start,
-            stride: scalar.size() * components,
-        };
+        let first =
+            ComponentStride { start: array.range.start, stride: scalar.size() * components };
         let name = String::from_utf8_lossy(array.name);
         StridedColumn::interleaved(name, (scalar, self.endian), components, first)
     }
@@ -232,10 +204,7 @@ impl<'a> PartFile<'a> {
     fn types(&self, particles: &RawParticles) -> Option<Vec<u32>> {
         let first_ids = self.first_ids()?;
         let of = |id: u64| first_ids.iter().map(|first| u32::from(id >= *first)).sum();
-        let ids = particles
-            .attributes
-            .iter()
-            .find(|a| matches!(a.name.as_str(), "Idp" | "Idpd"));
+        let ids = particles.attributes.iter().find(|a| matches!(a.name.as_str(), "Idp" | "Idpd"));
         match &ids?.data {
             AttributeData::U32(ids) => Some(ids.iter().map(|id| of((*id).into())).collect()),
             AttributeData::U64(ids) => Some(ids.iter().map(|id| of(*id)).collect()),

@@ -14,10 +14,7 @@ const READER: TestedReader = TestedReader {
 fn changed(name: &str, old: &str, new: &str) -> Vec<u8> {
     let mut bytes = sample(&format!("dualsphysics/{name}"));
     let places = bytes.windows(old.len());
-    let at = places
-        .into_iter()
-        .position(|w| w == old.as_bytes())
-        .expect("it is there");
+    let at = places.into_iter().position(|w| w == old.as_bytes()).expect("it is there");
     bytes.splice(at..at + old.len(), new.bytes());
     bytes
 }
@@ -37,10 +34,7 @@ fn types_follow_from_the_ids() {
         };
         assert_eq!(part, expected, "{id}");
     }
-    assert_eq!(
-        attribute(&particles, "radius").data,
-        AttributeData::F32(vec![0.01; 30])
-    );
+    assert_eq!(attribute(&particles, "radius").data, AttributeData::F32(vec![0.01; 30]));
     assert_eq!((particles.time, particles.step), (Some(0.0), Some(0)));
     // Without the numbers of the case
     let particles = READER.one(&changed("Part_0000.bi4", "CaseNmoving", "CaseMmoving"));
@@ -59,17 +53,9 @@ fn both_byte_orders_are_alike() {
 fn remarks_name_program_and_pieces() {
     let remarks = Bi4.remarks(&sample("dualsphysics/Part_p00_0003.bi4"));
     assert_eq!(remarks[0], "written by DualSPHysics5 v5.4.355");
-    assert!(
-        remarks[1].starts_with("attribute `part` is the type"),
-        "{}",
-        remarks[1]
-    );
+    assert!(remarks[1].starts_with("attribute `part` is the type"), "{}", remarks[1]);
     assert!(remarks[2].ends_with("Dp = 0.02"), "{}", remarks[2]);
-    assert!(
-        remarks[3].starts_with("the file is one of 2 pieces"),
-        "{}",
-        remarks[3]
-    );
+    assert!(remarks[3].starts_with("the file is one of 2 pieces"), "{}", remarks[3]);
     assert!(Bi4.remarks(b"#FileJBD JPartDataBi4").is_empty());
 }
 
@@ -82,10 +68,7 @@ fn other_content_is_refused_by_name() {
     ] {
         let head = format!("#FileJBD {content:49}\n\0");
         let error = Bi4.sniff(head.as_bytes()).expect_err(name).to_string();
-        assert!(
-            error.contains(content) && error.contains("Part_####.bi4"),
-            "{error}"
-        );
+        assert!(error.contains(content) && error.contains("Part_####.bi4"), "{error}");
     }
 }
 

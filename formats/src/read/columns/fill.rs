@@ -10,11 +10,9 @@ impl ParticleLayout {
     /// Reads the positions of the particles from `first` on. `bytes` are those of a file that
     /// [`Self::check`] was asked about, and it has the particles.
     pub(crate) fn read_positions(&self, bytes: &[u8], first: usize, to: &mut [DVec3]) {
-        to.par_chunks_mut(BLOCK)
-            .enumerate()
-            .for_each(|(block, to)| {
-                self.block_positions(bytes, first + block * BLOCK, to);
-            });
+        to.par_chunks_mut(BLOCK).enumerate().for_each(|(block, to)| {
+            self.block_positions(bytes, first + block * BLOCK, to);
+        });
     }
 
     fn block_positions(&self, bytes: &[u8], first: usize, to: &mut [DVec3]) {
@@ -33,9 +31,7 @@ impl ParticleLayout {
                 let mut numbers = [0.0; BLOCK];
                 let numbers = &mut numbers[..to.len()];
                 let component_strides = columns.iter().flat_map(|c| {
-                    c.component_strides
-                        .iter()
-                        .map(move |component_stride| (c, *component_stride))
+                    c.component_strides.iter().map(move |component_stride| (c, *component_stride))
                 });
                 for (axis, (column, component_stride)) in component_strides.take(3).enumerate() {
                     fill_f64(numbers, bytes, column, &[component_stride], first);
@@ -63,39 +59,29 @@ impl StridedColumn {
     /// next. `bytes` are those of a file in which the column fits, and `to` holds whole particles of it.
     pub(crate) fn read_values(&self, bytes: &[u8], first: usize, to: &mut [u8]) {
         let width = self.component_strides.len() * self.scalar.size();
-        to.par_chunks_mut(BLOCK * width.max(1))
-            .enumerate()
-            .for_each(|(block, to)| {
-                let first = first + block * BLOCK;
-                match self.scalar.size() {
-                    1 => self.block_values::<1>(bytes, first, to),
-                    2 => self.block_values::<2>(bytes, first, to),
-                    4 => self.block_values::<4>(bytes, first, to),
-                    _ => self.block_values::<8>(bytes, first, to),
-                }
-            });
+        to.par_chunks_mut(BLOCK * width.max(1)).enumerate().for_each(|(block, to)| {
+            let first = first + block * BLOCK;
+            match self.scalar.size() {
+                1 => self.block_values::<1>(bytes, first, to),
+                2 => self.block_values::<2>(bytes, first, to),
+                4 => self.block_values::<4>(bytes, first, to),
+                _ => self.block_values::<8>(bytes, first, to),
+            }
+        });
     }
 
     fn block_values<const S: usize>(&self, bytes: &[u8], first: usize, to: &mut [u8]) {
         let (numbers, _) = to.as_chunks_mut::<S>();
         match self.endian {
-            Endian::Little => fill_block(
-                numbers,
-                bytes,
-                &self.component_strides,
-                first,
-                |stored: [u8; S]| stored,
-            ),
-            Endian::Big => fill_block(
-                numbers,
-                bytes,
-                &self.component_strides,
-                first,
-                |mut stored: [u8; S]| {
+            Endian::Little => {
+                fill_block(numbers, bytes, &self.component_strides, first, |stored: [u8; S]| stored)
+            }
+            Endian::Big => {
+                fill_block(numbers, bytes, &self.component_strides, first, |mut stored: [u8; S]| {
                     stored.reverse();
                     stored
-                },
-            ),
+                })
+            }
         }
     }
 }
@@ -154,20 +140,12 @@ pub(super) fn fill(
                 .get_mut(first * width..end * width)
                 .expect("gather made room for every particle");
             match column.endian {
-                Endian::Little => fill_block(
-                    block,
-                    bytes,
-                    &column.component_strides,
-                    first,
-                    <$ty>::from_le_bytes,
-                ),
-                Endian::Big => fill_block(
-                    block,
-                    bytes,
-                    &column.component_strides,
-                    first,
-                    <$ty>::from_be_bytes,
-                ),
+                Endian::Little => {
+                    fill_block(block, bytes, &column.component_strides, first, <$ty>::from_le_bytes)
+                }
+                Endian::Big => {
+                    fill_block(block, bytes, &column.component_strides, first, <$ty>::from_be_bytes)
+                }
             }
         }};
     }
@@ -195,9 +173,7 @@ fn fill_block<T, const S: usize>(
 ) {
     let width = component_strides.len();
     let tail = |component_stride: &ComponentStride| {
-        bytes
-            .get(component_stride.start + first * component_stride.stride..)
-            .unwrap_or_default()
+        bytes.get(component_stride.start + first * component_stride.stride..).unwrap_or_default()
     };
     match adjacent_run::<S>(component_strides) {
         Some(run) if run.stride == width * S => {
@@ -230,12 +206,9 @@ fn fill_block<T, const S: usize>(
 /// The first component, if the others follow it byte by byte within a record.
 fn adjacent_run<const S: usize>(component_strides: &[ComponentStride]) -> Option<ComponentStride> {
     let first = *component_strides.first()?;
-    let adjacent = component_strides
-        .iter()
-        .enumerate()
-        .all(|(component, component_stride)| {
-            component_stride.stride == first.stride
-                && component_stride.start == first.start + component * S
-        });
+    let adjacent = component_strides.iter().enumerate().all(|(component, component_stride)| {
+        component_stride.stride == first.stride
+            && component_stride.start == first.start + component * S
+    });
     (adjacent && component_strides.len() * S <= first.stride).then_some(first)
 }

@@ -25,12 +25,8 @@ pub(super) struct TableLayout {
 }
 
 /// The separators to choose from; of those with the same evidence the first is taken.
-const SEPARATORS: [Separator; 4] = [
-    Separator::Byte(b';'),
-    Separator::Byte(b'\t'),
-    Separator::Byte(b','),
-    Separator::Blanks,
-];
+const SEPARATORS: [Separator; 4] =
+    [Separator::Byte(b';'), Separator::Byte(b'\t'), Separator::Byte(b','), Separator::Blanks];
 
 /// Lines and bytes to weigh separators on; many columns make long lines.
 const SAMPLE_LINES: usize = 200;
@@ -47,9 +43,7 @@ impl TableLayout {
     /// positions, [`ParseError::Unsupported`] for UTF-16.
     pub(super) fn find(bytes: &[u8]) -> Result<Self, ParseError> {
         if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
-            return Err(ParseError::unsupported(
-                "UTF-16 text: save the table as UTF-8",
-            ));
+            return Err(ParseError::unsupported("UTF-16 text: save the table as UTF-8"));
         }
         let start = match bytes.strip_prefix(BYTE_ORDER_MARK) {
             Some(_) => BYTE_ORDER_MARK.len(),
@@ -57,22 +51,13 @@ impl TableLayout {
         };
         let lines = Lines::new(bytes, start..bytes.len());
         let dialect = dialect(lines.clone());
-        LayoutSearch {
-            dialect,
-            time: None,
-            candidate: None,
-            comment: None,
-            passed: None,
-        }
-        .run(lines, bytes.len())
+        LayoutSearch { dialect, time: None, candidate: None, comment: None, passed: None }
+            .run(lines, bytes.len())
     }
 
     /// The error for `names` without positions.
     pub(super) fn no_positions(&self, names: &[String]) -> ParseError {
-        let listed = names
-            .iter()
-            .take(8)
-            .map(|name| text::shown(name.as_bytes()));
+        let listed = names.iter().take(8).map(|name| text::shown(name.as_bytes()));
         let what = format!(
             "no positions among the columns {}: name them x, y, z or Points:0, Points:1, Points:2",
             listed.collect::<Vec<_>>().join(", ")
@@ -145,12 +130,9 @@ impl<'a> LayoutSearch<'a> {
     /// True if positions are named soon: then the numbers so far belong to a table of facts about
     /// the run, as DualSPHysics may put before the particles.
     fn names_follow(&self, lines: Lines<'_>) -> bool {
-        lines
-            .take(LINES_OF_FACTS)
-            .filter(|line| !self.dialect.comments.include(line.text))
-            .any(|line| {
-                names::position(&clean(&split(line.text, self.dialect.separator))).is_some()
-            })
+        lines.take(LINES_OF_FACTS).filter(|line| !self.dialect.comments.include(line.text)).any(
+            |line| names::position(&clean(&split(line.text, self.dialect.separator))).is_some(),
+        )
     }
 
     /// Takes the time from a row of facts.
@@ -211,14 +193,7 @@ impl<'a> LayoutSearch<'a> {
         names_at: usize,
         rows: Range<usize>,
     ) -> TableLayout {
-        TableLayout {
-            dialect: self.dialect,
-            names,
-            columns,
-            rows,
-            time: self.time,
-            names_at,
-        }
+        TableLayout { dialect: self.dialect, names, columns, rows, time: self.time, names_at }
     }
 }
 
@@ -241,9 +216,7 @@ fn dialect(lines: Lines<'_>) -> Dialect {
         }
     }
     let named = |separator: &Separator| {
-        sample
-            .iter()
-            .any(|line| names::position(&clean(&split(line, *separator))).is_some())
+        sample.iter().any(|line| names::position(&clean(&split(line, *separator))).is_some())
     };
     let longest = |separator: &Separator| {
         let counts = sample.iter().map(|line| split(line, *separator).len());
@@ -256,21 +229,12 @@ fn dialect(lines: Lines<'_>) -> Dialect {
     } else {
         SEPARATORS.into_iter().max_by_key(longest).unwrap_or(best.1)
     };
-    Dialect {
-        separator,
-        decimal: decimal(separator),
-        comments,
-        surplus: ExtraCells::Empty,
-    }
+    Dialect { separator, decimal: decimal(separator), comments, surplus: ExtraCells::Empty }
 }
 
 /// A comma can only be the decimal point if it separates nothing.
 fn decimal(separator: Separator) -> Decimal {
-    if separator == Separator::Byte(b',') {
-        Decimal::Point
-    } else {
-        Decimal::Comma
-    }
+    if separator == Separator::Byte(b',') { Decimal::Point } else { Decimal::Comma }
 }
 
 /// Numbers, less cells of text, in the rows of the most frequent length.
@@ -308,8 +272,7 @@ fn split(line: &[u8], separator: Separator) -> Vec<&[u8]> {
 }
 
 fn is_time(name: &[u8]) -> bool {
-    name.get(..4)
-        .is_some_and(|start| start.eq_ignore_ascii_case(b"time"))
+    name.get(..4).is_some_and(|start| start.eq_ignore_ascii_case(b"time"))
 }
 
 fn clean(cells: &[&[u8]]) -> Vec<String> {

@@ -73,10 +73,7 @@ impl Reader for Csv {
 pub(super) fn remarks(head: &[u8]) -> Vec<String> {
     let has_no_names = TableLayout::find(head).is_ok_and(|layout| layout.names.is_none());
     let remark = "the table has no names of columns: columns 1 to 3 are the positions";
-    has_no_names
-        .then(|| remark.to_owned())
-        .into_iter()
-        .collect()
+    has_no_names.then(|| remark.to_owned()).into_iter().collect()
 }
 
 /// The only time step of `text`, with the time if a line before the names has it.
@@ -216,12 +213,7 @@ fn numbered_columns(columns: usize) -> TableColumns {
     for column in 4..=columns {
         fields.push(place(targets.len(), 0));
         let name = format!("column_{column}");
-        targets.push(TargetArray::attribute(
-            name,
-            1,
-            NumberKind::WholeIfAll,
-            TextPolicy::LeaveOut,
-        ));
+        targets.push(TargetArray::attribute(name, 1, NumberKind::WholeIfAll, TextPolicy::LeaveOut));
     }
     (fields, targets)
 }

@@ -25,9 +25,7 @@ pub(super) fn clean(raw: &[u8]) -> String {
     let name = String::from_utf8_lossy(raw);
     let name = name.trim().trim_matches(['"', '\'']).trim();
     for (open, close) in [('[', ']'), ('(', ')')] {
-        let unit = name
-            .strip_suffix(close)
-            .and_then(|rest| rest.rsplit_once(open));
+        let unit = name.strip_suffix(close).and_then(|rest| rest.rsplit_once(open));
         if let Some((stem, unit)) = unit
             && !stem.trim().is_empty()
             && (unit.is_empty() || !unit.bytes().all(|b| b.is_ascii_digit()))
@@ -53,11 +51,7 @@ pub(super) fn position(names: &[String]) -> Option<[Option<usize>; 3]> {
         }
     }
     let solid = found.iter().find(|axes| axes.iter().all(Option::is_some));
-    let flat = || {
-        found
-            .iter()
-            .find(|axes| axes[0].is_some() && axes[1].is_some())
-    };
+    let flat = || found.iter().find(|axes| axes[0].is_some() && axes[1].is_some());
     solid.or_else(flat).copied()
 }
 
@@ -78,10 +72,7 @@ pub(super) fn attributes(names: &[String], axes: [Option<usize>; 3]) -> Vec<Colu
         match grouped.remove(&column) {
             Some(group) => attributes.extend(group),
             None if axes.contains(&Some(column)) || name.is_empty() => {}
-            None => attributes.push(ColumnGroup {
-                name: name.clone(),
-                columns: vec![column],
-            }),
+            None => attributes.push(ColumnGroup { name: name.clone(), columns: vec![column] }),
         }
     }
     attributes
@@ -123,9 +114,7 @@ fn vectors(names: &[String], axes: [Option<usize>; 3]) -> Vec<ColumnGroup> {
 fn colors(names: &[String], axes: [Option<usize>; 3]) -> Option<ColumnGroup> {
     COLOR_COLUMNS.iter().find_map(|parts| {
         let column = |part: &&str| {
-            let found = names
-                .iter()
-                .position(|name| name.eq_ignore_ascii_case(part));
+            let found = names.iter().position(|name| name.eq_ignore_ascii_case(part));
             found.filter(|column| !axes.contains(&Some(*column)))
         };
         Some(ColumnGroup {
@@ -136,23 +125,16 @@ fn colors(names: &[String], axes: [Option<usize>; 3]) -> Option<ColumnGroup> {
 }
 
 fn vector_name(stem: &str) -> &str {
-    let known = JOINED_STEMS
-        .iter()
-        .find(|(joined, _)| joined.eq_ignore_ascii_case(stem));
+    let known = JOINED_STEMS.iter().find(|(joined, _)| joined.eq_ignore_ascii_case(stem));
     known.and_then(|(_, name)| *name).unwrap_or(stem)
 }
 
 /// The stem and the component of a name: `velocity:0`, `velocity_0`, `velocity[0]`, `Vel.x`,
 /// `vel_x`, `vx`; of a plain `x` the stem is empty.
 fn split(name: &str) -> Option<(&str, NameComponent)> {
-    let indexed = name
-        .strip_suffix([']', ')'])
-        .and_then(|rest| rest.rsplit_once(['[', '(']));
+    let indexed = name.strip_suffix([']', ')']).and_then(|rest| rest.rsplit_once(['[', '(']));
     if let Some((stem, index)) = indexed {
-        return Some((
-            stem.trim_end(),
-            NameComponent::Index(index.trim().parse().ok()?),
-        ));
+        return Some((stem.trim_end(), NameComponent::Index(index.trim().parse().ok()?)));
     }
     if let Some((stem, part)) = name.rsplit_once([':', '.', '_', ' '])
         && !stem.is_empty()
@@ -168,17 +150,13 @@ fn split(name: &str) -> Option<(&str, NameComponent)> {
     let (last, _) = name.char_indices().next_back()?;
     let (stem, part) = name.split_at(last);
     let axis = axis(part)?;
-    let known = stem.is_empty()
-        || JOINED_STEMS
-            .iter()
-            .any(|(joined, _)| joined.eq_ignore_ascii_case(stem));
+    let known =
+        stem.is_empty() || JOINED_STEMS.iter().any(|(joined, _)| joined.eq_ignore_ascii_case(stem));
     known.then_some((stem, NameComponent::Axis(axis)))
 }
 
 fn axis(part: &str) -> Option<usize> {
-    ["x", "y", "z"]
-        .iter()
-        .position(|axis| axis.eq_ignore_ascii_case(part))
+    ["x", "y", "z"].iter().position(|axis| axis.eq_ignore_ascii_case(part))
 }
 
 #[cfg(test)]
@@ -253,10 +231,8 @@ mod tests {
             "velocity:Magnitude",
         ]);
         let axes = position(&names).unwrap();
-        let found: Vec<_> = attributes(&names, axes)
-            .into_iter()
-            .map(|group| (group.name, group.columns))
-            .collect();
+        let found: Vec<_> =
+            attributes(&names, axes).into_iter().map(|group| (group.name, group.columns)).collect();
         let expected = [
             ("Vel", vec![3, 4, 5]),
             ("velocity", vec![8, 7, 6]),

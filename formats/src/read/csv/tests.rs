@@ -34,10 +34,7 @@ fn paraview_agrees_with_the_same_particles_raw() {
     assert_agrees_with_raw(&particles);
     assert_eq!(whole(&particles, "id")[..2], [9458, 9567]);
     assert_eq!(real(&particles, "density")[0], 1087.36);
-    assert_eq!(
-        real(&particles, "velocity")[3..6],
-        [-0.594408, -0.0141007, 2.33325]
-    );
+    assert_eq!(real(&particles, "velocity")[3..6], [-0.594408, -0.0141007, 2.33325]);
     assert_eq!(particles.attributes.len(), 3);
 }
 
@@ -51,10 +48,7 @@ fn dualsphysics_agrees_with_the_same_particles_raw() {
         assert_agrees_with_raw(&particles);
         assert_eq!(particles.time, Some(0.5));
         assert_eq!(whole(&particles, "Idp")[..2], [9458, 9567]);
-        assert_eq!(
-            real(&particles, "Vel")[..3],
-            [-4.7829986, 0.031453285, 0.28040573]
-        );
+        assert_eq!(real(&particles, "Vel")[..3], [-4.7829986, 0.031453285, 0.28040573]);
         assert_eq!(real(&particles, "Rhop")[1199], 1001.9382);
         assert_eq!(particles.attributes.len(), 3);
     }
@@ -90,11 +84,7 @@ fn equivalent_tables_read_alike() {
     ] {
         let particles = only(text);
         assert_eq!(f64_positions(&particles), TWO, "{text}");
-        assert!(
-            particles.attributes.is_empty(),
-            "{text} {:?}",
-            particles.attributes
-        );
+        assert!(particles.attributes.is_empty(), "{text} {:?}", particles.attributes);
     }
 }
 
@@ -149,13 +139,7 @@ fn tables_without_names_have_a_remark() {
         remarks("# run 7\n1 2 3 4\n5 6 7 8\n"),
         ["the table has no names of columns: columns 1 to 3 are the positions"]
     );
-    for text in [
-        "x,y,z\n1,2,3\n",
-        "# x y z\n1 2 3\n",
-        "a,b,c\n1,2,3\n",
-        "words\n",
-        "",
-    ] {
+    for text in ["x,y,z\n1,2,3\n", "# x y z\n1 2 3\n", "a,b,c\n1,2,3\n", "words\n", ""] {
         assert!(remarks(text).is_empty(), "{text}");
     }
 }
@@ -178,11 +162,8 @@ fn tables_without_rows() {
 fn thousands_of_columns() {
     let names: Vec<String> = (0..5000).map(|i| format!("q{i}")).collect();
     let row: Vec<String> = (0..5000).map(|i| i.to_string()).collect();
-    let text = format!(
-        "x,y,z,{}\n1,2,3,{row}\n4,5,6,{row}\n",
-        names.join(","),
-        row = row.join(",")
-    );
+    let text =
+        format!("x,y,z,{}\n1,2,3,{row}\n4,5,6,{row}\n", names.join(","), row = row.join(","));
     let particles = only(&text);
     assert_eq!(f64_positions(&particles), TWO);
     assert_eq!(particles.attributes.len(), 5000);
@@ -194,25 +175,13 @@ fn faults_are_described() {
     let cases = [
         ("", "byte 0: no row of 3 or more numbers"),
         ("hello\nworld\n", "byte 12: no row of 3 or more numbers"),
-        (
-            "a,b,c\n1,2,3\n",
-            "byte 0: no positions among the columns \"a\", \"b\", \"c\":",
-        ),
+        ("a,b,c\n1,2,3\n", "byte 0: no positions among the columns \"a\", \"b\", \"c\":"),
         ("x,y,z\n1,2,3\n1,2\n", "byte 12: line 3 has 2 of 3 columns"),
         ("x,y,z\n1,2,3\n1,2", "perhaps still being written"),
-        (
-            "x,y,z\n1,2,3,4\n",
-            "byte 12: line 2 has more than 3 columns",
-        ),
-        (
-            "x,y,z\n1,2,3\n1,b,3\n",
-            "byte 14: line 3: column \"y\" has \"b\", not a number",
-        ),
+        ("x,y,z\n1,2,3,4\n", "byte 12: line 2 has more than 3 columns"),
+        ("x,y,z\n1,2,3\n1,b,3\n", "byte 14: line 3: column \"y\" has \"b\", not a number"),
         ("# c\n\n1 2 3\n1 2 b\n", "line 4: column 3 has \"b\""),
-        (
-            "title\n1 2 3\n4 5 6\n",
-            "byte 0: numbers without names of columns follow \"title\"",
-        ),
+        ("title\n1 2 3\n4 5 6\n", "byte 0: numbers without names of columns follow \"title\""),
         ("title\n 2 0.5\n1 2 3 4 5 6\n", "follow \"title\""),
         ("2\n1,2,3\n4,5,6\n", "follow \"2\""),
         ("a,1,2,3\nb,4,5,6\n", "first three columns are not numbers"),

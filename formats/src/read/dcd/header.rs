@@ -31,11 +31,7 @@ pub(super) struct Records {
 pub(super) fn records(head: &[u8]) -> Option<Records> {
     let kinds = [Endian::Little, Endian::Big].map(|endian| [4, 8].map(|marker| (endian, marker)));
     kinds.into_iter().flatten().find_map(|(endian, marker)| {
-        let records = Records {
-            at: 0,
-            endian,
-            marker,
-        };
+        let records = Records { at: 0, endian, marker };
         let len = { records }.marker(head)?;
         let name = head.get(marker..marker + 4)?;
         (len == FIRST_LEN as u64 && matches!(name, b"CORD" | b"VELD")).then_some(records)
@@ -60,9 +56,7 @@ impl Records {
         let len =
             len.ok_or_else(|| cut_short(at.min(bytes.len()), &format!("no record of the {name}")))?;
         let start = self.at;
-        let end = usize::try_from(len)
-            .ok()
-            .and_then(|len| start.checked_add(len));
+        let end = usize::try_from(len).ok().and_then(|len| start.checked_add(len));
         let Some(end) = end.filter(|end| *end <= bytes.len().saturating_sub(self.marker)) else {
             let left = bytes.len().saturating_sub(start);
             let what = format!("the record of the {name} has {len} bytes, file has {left} left");
@@ -85,10 +79,7 @@ impl Records {
         let passed = self.next(bytes, "title");
         if passed.is_err() {
             let numbers = NumberReader::new(bytes, start.at + start.marker, start.endian);
-            let len = { numbers }
-                .i32()
-                .ok()
-                .and_then(|count| usize::try_from(count).ok());
+            let len = { numbers }.i32().ok().and_then(|count| usize::try_from(count).ok());
             let len = len.map(|count| count.saturating_mul(TITLE_LEN).saturating_add(4));
             let end = len.map(|len| start.at.saturating_add(start.whole_len(len)));
             self.at = match end.filter(|end| *end < bytes.len()) {
@@ -240,15 +231,9 @@ impl DcdHeader {
 
     /// Bytes of frame `index`.
     pub(super) fn frame_len(&self, index: usize) -> usize {
-        let cell = if self.has_cell {
-            self.records.whole_len(CELL_LEN)
-        } else {
-            0
-        };
+        let cell = if self.has_cell { self.records.whole_len(CELL_LEN) } else { 0 };
         let axes = if self.has_fourth_axis { 4_usize } else { 3 };
-        let axis = self
-            .records
-            .whole_len(self.frame_count(index).saturating_mul(4));
+        let axis = self.records.whole_len(self.frame_count(index).saturating_mul(4));
         axes.saturating_mul(axis).saturating_add(cell)
     }
 
@@ -280,9 +265,7 @@ impl DcdHeader {
 
     /// The time step of frame `index`.
     pub(super) fn number(&self, index: usize) -> Option<i64> {
-        let steps = i64::try_from(index)
-            .ok()?
-            .checked_mul(self.interval.into())?;
+        let steps = i64::try_from(index).ok()?.checked_mul(self.interval.into())?;
         (self.interval > 0).then(|| i64::from(self.first_step) + steps)
     }
 

@@ -53,9 +53,7 @@ impl Reader for Dcd {
         let mut steps = Vec::new();
         let mut at = header.frames_at;
         while at < bytes.len() {
-            let end = at
-                .saturating_add(header.frame_len(steps.len()))
-                .min(bytes.len());
+            let end = at.saturating_add(header.frame_len(steps.len())).min(bytes.len());
             Step::push(&mut steps, at..end, budget)?;
             at = end;
         }
@@ -94,20 +92,14 @@ impl Reader for Dcd {
         let (Positions::F32(mut positions), Positions::F32(moved)) =
             (first.positions, particles.positions)
         else {
-            return Err(ParseError::malformed(
-                at,
-                "positions are not in single precision",
-            ));
+            return Err(ParseError::malformed(at, "positions are not in single precision"));
         };
         for (index, position) in header.free_atoms(bytes).zip(moved) {
             if let Some(place) = positions.get_mut(index?) {
                 *place = position;
             }
         }
-        Ok(RawParticles {
-            positions: Positions::F32(positions),
-            ..particles
-        })
+        Ok(RawParticles { positions: Positions::F32(positions), ..particles })
     }
 
     /// `None` for several frames.

@@ -150,14 +150,7 @@ fn read(
         return Err(cut_short(text, format!("no box after {count} atoms")));
     };
     let (positions, attributes) = atoms.into_parts();
-    Ok(RawParticles {
-        positions,
-        attributes,
-        time,
-        step: number,
-        cell,
-        bonds: Vec::new(),
-    })
+    Ok(RawParticles { positions, attributes, time, step: number, cell, bonds: Vec::new() })
 }
 
 fn cut_short(text: &TextInput<'_>, what: String) -> ParseError {
@@ -191,9 +184,7 @@ fn cell(line: Line<'_>) -> Option<SimulationCell> {
             let mut points = memchr::memchr_iter(b'.', line.text);
             let width = points.next().zip(points.next()).map(|(x, y)| y - x)?;
             let columns = line.text.trim_ascii_end().chunks(width);
-            columns
-                .map(|column| text::number(column.trim_ascii()))
-                .collect()
+            columns.map(|column| text::number(column.trim_ascii())).collect()
         }
     };
     let numbers = numbers?;

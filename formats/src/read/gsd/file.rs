@@ -229,11 +229,9 @@ impl<'a> GsdFile<'a> {
             () if entry.scalar().is_none() && entry.kind != TEXT_KIND => {
                 format!("a chunk of the unknown type {}", entry.kind)
             }
-            () if usize::from(entry.name) >= self.names.len() => format!(
-                "a chunk with name {}, the file has {} names",
-                entry.name,
-                self.names.len()
-            ),
+            () if usize::from(entry.name) >= self.names.len() => {
+                format!("a chunk with name {}, the file has {} names", entry.name, self.names.len())
+            }
             () if entry.frame >= self.entries.len() as u64 => format!(
                 "a chunk of frame {}, the index has {} entries",
                 entry.frame,
@@ -242,10 +240,7 @@ impl<'a> GsdFile<'a> {
             () if entry.flags != 0 => format!("a chunk with the unknown flags {:#x}", entry.flags),
             () => return Ok(()),
         };
-        Err(ParseError::malformed(
-            entry.at,
-            format!("{what}: the index of the file is damaged"),
-        ))
+        Err(ParseError::malformed(entry.at, format!("{what}: the index of the file is damaged")))
     }
 
     /// The bytes of the file that hold the numbers of `entry`.
@@ -254,9 +249,7 @@ impl<'a> GsdFile<'a> {
     /// [`ParseError::Malformed`] at the entry if they are not all in the file.
     pub(super) fn range(&self, entry: &IndexEntry) -> Result<Range<usize>, ParseError> {
         let start = usize::try_from(entry.location).ok();
-        let end = start
-            .zip(entry.byte_len())
-            .and_then(|(start, len)| start.checked_add(len));
+        let end = start.zip(entry.byte_len()).and_then(|(start, len)| start.checked_add(len));
         match start.zip(end) {
             Some((start, end)) if end <= self.bytes.len() => Ok(start..end),
             _ => {
@@ -296,13 +289,7 @@ struct Section {
 impl Section {
     /// Its bytes in a file of `len` bytes.
     fn range(&self, len: usize) -> Result<Range<usize>, ParseError> {
-        let Self {
-            what,
-            at,
-            count,
-            each,
-            ..
-        } = self;
+        let Self { what, at, count, each, .. } = self;
         let end = count.checked_mul(*each as u64);
         let end = end.and_then(|bytes| usize::try_from(bytes.checked_add(*at)?).ok());
         match (usize::try_from(*at), end) {
@@ -321,16 +308,10 @@ impl Section {
 fn names_in(list: &[u8], version: Version) -> Vec<&[u8]> {
     if version.major() < 2 {
         let units = list.chunks(NAME_UNIT).map(until_zero);
-        return units
-            .take_while(|n| !n.is_empty())
-            .take(MOST_NAMES)
-            .collect();
+        return units.take_while(|n| !n.is_empty()).take(MOST_NAMES).collect();
     }
     let names = list.split(|b| *b == 0);
-    names
-        .take_while(|n| !n.is_empty())
-        .take(MOST_NAMES)
-        .collect()
+    names.take_while(|n| !n.is_empty()).take(MOST_NAMES).collect()
 }
 
 pub(super) fn until_zero(bytes: &[u8]) -> &[u8] {

@@ -50,11 +50,7 @@ pub(super) struct Field {
 
 impl Field {
     const fn new(name: &'static str, components: u32, default: DefaultValue) -> Self {
-        Self {
-            name,
-            components,
-            default,
-        }
+        Self { name, components, default }
     }
 
     fn chunk_name(&self) -> String {
@@ -143,9 +139,7 @@ pub(super) fn steps(file: &GsdFile<'_>, budget: MemoryBudget) -> Result<Vec<Step
         if Some(entry.name) == step_name
             && let Some(step) = steps.last_mut()
         {
-            step.number = number(file, &entry)
-                .ok()
-                .and_then(|n| i64::try_from(n).ok());
+            step.number = number(file, &entry).ok().and_then(|n| i64::try_from(n).ok());
         }
     }
     if let Some(first) = steps.first_mut() {
@@ -247,11 +241,7 @@ impl<'f, 'a> FrameChunks<'f, 'a> {
     /// The cell: three lengths and three tilt factors, around the origin, periodic.
     fn cell(&self) -> Option<SimulationCell> {
         let entry = self.chunk(self.file.name(BOX))?;
-        let bytes = self
-            .file
-            .numbers(&entry)
-            .ok()
-            .filter(|bytes| bytes.len() <= 48)?;
+        let bytes = self.file.numbers(&entry).ok().filter(|bytes| bytes.len() <= 48)?;
         let data = entry.scalar()?.decode(Endian::Little, bytes).ok()?;
         if data.len() != 6 {
             return None;
@@ -271,10 +261,7 @@ impl<'f, 'a> FrameChunks<'f, 'a> {
     /// # Errors
     /// [`ParseError::Malformed`] if they are no pairs of particles.
     fn bonds(&self) -> Result<Vec<Bond>, ParseError> {
-        let Some(entry) = self
-            .chunk(self.file.name(BONDS))
-            .filter(|entry| entry.rows > 0)
-        else {
+        let Some(entry) = self.chunk(self.file.name(BONDS)).filter(|entry| entry.rows > 0) else {
             return Ok(Vec::new());
         };
         let malformed = |what: String| {
@@ -289,10 +276,7 @@ impl<'f, 'a> FrameChunks<'f, 'a> {
         let (numbers, _) = self.file.numbers(&entry)?.as_chunks();
         let bond = |pair: &[[u8; 4]; 2]| pair.map(u32::from_le_bytes);
         let bonds: Vec<Bond> = numbers.as_chunks().0.iter().map(bond).collect();
-        let wrong = bonds
-            .iter()
-            .flatten()
-            .find(|index| **index as usize >= self.count);
+        let wrong = bonds.iter().flatten().find(|index| **index as usize >= self.count);
         match wrong {
             None => Ok(bonds),
             Some(index) => Err(malformed(format!(
@@ -308,12 +292,10 @@ impl<'f, 'a> FrameChunks<'f, 'a> {
     /// As [`Self::particles`].
     pub(super) fn stored_layout(self) -> Result<Option<ParticleLayout>, ParseError> {
         let (layout, missing) = self.layout()?;
-        Ok(
-            (missing.is_empty() && !layout.axes.is_empty()).then(|| ParticleLayout {
-                step: self.step.and_then(|step| i64::try_from(step).ok()),
-                ..layout
-            }),
-        )
+        Ok((missing.is_empty() && !layout.axes.is_empty()).then(|| ParticleLayout {
+            step: self.step.and_then(|step| i64::try_from(step).ok()),
+            ..layout
+        }))
     }
 
     /// Where the values are that the file has, and the properties whose value is that of the schema.
@@ -352,34 +334,22 @@ impl<'f, 'a> FrameChunks<'f, 'a> {
         let name = self.file.name_of(&entry);
         let what = match entry.scalar() {
             _ if entry.columns != field.components => {
-                format!(
-                    "{name} has {} columns, not {}",
-                    entry.columns, field.components
-                )
+                format!("{name} has {} columns, not {}", entry.columns, field.components)
             }
             _ if entry.rows != self.count as u64 => {
-                format!(
-                    "{name} has {} rows for {} particles",
-                    entry.rows, self.count
-                )
+                format!("{name} has {} rows for {} particles", entry.rows, self.count)
             }
             Some(scalar) if field.takes(scalar) => return Ok(Some(entry)),
             Some(scalar) => format!("{name} has numbers of type {}", scalar.name()),
             None => format!("{name} is text"),
         };
-        Err(ParseError::malformed(
-            entry.at,
-            format!("frame {}: {what}", self.frame),
-        ))
+        Err(ParseError::malformed(entry.at, format!("frame {}: {what}", self.frame)))
     }
 
     /// The chunk with a name of this number, of the frame or of frame 0.
     fn chunk(&self, name: Option<u16>) -> Option<IndexEntry> {
         let name = name?;
-        self.own
-            .get(&name)
-            .or_else(|| self.first.get(&name))
-            .copied()
+        self.own.get(&name).or_else(|| self.first.get(&name)).copied()
     }
 
     /// Logged values of the particles, with their names. Those of other shapes are left out.
@@ -406,10 +376,7 @@ impl<'f, 'a> FrameChunks<'f, 'a> {
         let range = self.file.range(entry)?;
         let scalar = entry.scalar().unwrap_or(ScalarType::U8);
         let components = entry.columns as usize;
-        let first = ComponentStride {
-            start: range.start,
-            stride: components * scalar.size(),
-        };
+        let first = ComponentStride { start: range.start, stride: components * scalar.size() };
         let scalar = (scalar, Endian::Little);
         Ok(StridedColumn::interleaved(name, scalar, components, first))
     }
@@ -434,9 +401,7 @@ impl<'f, 'a> FrameChunks<'f, 'a> {
     }
 
     fn no_positions(&self) -> ParseError {
-        let at = self
-            .chunk(self.file.name(COUNT))
-            .map_or(0, |entry| entry.at);
+        let at = self.chunk(self.file.name(COUNT)).map_or(0, |entry| entry.at);
         let what = format!(
             "frame {} has {} particles and no {POSITION}, which puts all of them at the origin; write positions",
             self.frame, self.count

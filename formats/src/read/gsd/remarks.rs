@@ -70,11 +70,7 @@ fn types(file: &GsdFile<'_>) -> Option<String> {
         .take(LISTED)
         .map(|(number, name)| format!("{number} = {}", text::shown(name)))
         .collect();
-    let more = if entry.rows > LISTED as u64 {
-        ", ..."
-    } else {
-        ""
-    };
+    let more = if entry.rows > LISTED as u64 { ", ..." } else { "" };
     let changed = match count {
         1 => "",
         _ => "; other frames have other names",
@@ -86,10 +82,7 @@ fn types(file: &GsdFile<'_>) -> Option<String> {
 /// The numbers of the first chunk called `name`, if there are not many.
 fn numbers(file: &GsdFile<'_>, name: &str) -> Option<Vec<f64>> {
     let (entry, _) = find(file, name)?;
-    let bytes = file
-        .numbers(&entry)
-        .ok()
-        .filter(|bytes| bytes.len() <= 64)?;
+    let bytes = file.numbers(&entry).ok().filter(|bytes| bytes.len() <= 64)?;
     let data = entry.scalar()?.decode(Endian::Little, bytes).ok()?;
     Some((0..data.len()).map(|i| data.get_f64(i)).collect())
 }
@@ -99,20 +92,11 @@ fn ignored(file: &GsdFile<'_>) -> Option<String> {
     let mut all: Vec<String> = Vec::new();
     for name in file.names() {
         let name = String::from_utf8_lossy(name);
-        let is_used = [
-            STEP,
-            BOX,
-            DIMENSIONS,
-            "particles/N",
-            TYPES,
-            "particles/position",
-        ]
-        .contains(&&*name)
+        let is_used = [STEP, BOX, DIMENSIONS, "particles/N", TYPES, "particles/position"]
+            .contains(&&*name)
             || name.starts_with(LOGGED)
             || name.starts_with("bonds/")
-            || FIELDS
-                .iter()
-                .any(|f| name.strip_prefix(PARTICLES) == Some(f.name));
+            || FIELDS.iter().any(|f| name.strip_prefix(PARTICLES) == Some(f.name));
         let shown = match name.split_once('/') {
             _ if is_used => continue,
             Some(("particles", property)) => text::shown(property.as_bytes()),

@@ -67,11 +67,7 @@ fn file(chunks: &[Chunk]) -> Vec<u8> {
     let header = [INDEX, entry_count, names_at, list.len() / 64].map(|n| n as u64);
     let mut bytes = MAGIC.to_vec();
     bytes.extend(header.into_iter().flat_map(u64::to_le_bytes));
-    bytes.extend(
-        [(1 << 16) + 4, (2_u32 << 16) + 1]
-            .into_iter()
-            .flat_map(u32::to_le_bytes),
-    );
+    bytes.extend([(1 << 16) + 4, (2_u32 << 16) + 1].into_iter().flat_map(u32::to_le_bytes));
     for (text, end) in [("tests", 112), ("hoomd", INDEX)] {
         bytes.extend(text.bytes());
         bytes.resize(end, 0);
@@ -93,13 +89,7 @@ fn file(chunks: &[Chunk]) -> Vec<u8> {
 }
 
 fn two_frames() -> Vec<u8> {
-    file(&[
-        step(0, 5),
-        count(0, 2),
-        positions(0, 2),
-        step(1, 9),
-        positions(1, 2),
-    ])
+    file(&[step(0, 5), count(0, 2), positions(0, 2), step(1, 9), positions(1, 2)])
 }
 
 #[track_caller]
@@ -112,10 +102,7 @@ fn fails(bytes: &[u8], words: &str) {
 fn frames_are_steps() {
     let bytes = two_frames();
     let listed = steps(&bytes).unwrap();
-    assert_eq!(
-        listed.iter().map(|s| s.number).collect::<Vec<_>>(),
-        [Some(5), Some(9)]
-    );
+    assert_eq!(listed.iter().map(|s| s.number).collect::<Vec<_>>(), [Some(5), Some(9)]);
     let all = READER.all(&bytes).unwrap();
     assert_eq!(coordinates(&all[1].positions), [[0.0; 3], [1.0, 0.0, 0.0]]);
     assert_eq!((all[1].step, all[1].time), (Some(9), None));
@@ -126,13 +113,7 @@ fn frames_are_steps() {
 #[test]
 fn missing_values_are_those_of_frame_0_or_of_the_schema() {
     let mass = |frame, values: &[f32]| {
-        Chunk(
-            frame,
-            "particles/mass",
-            F32,
-            (values.len() as u64, 1),
-            f32s(values),
-        )
+        Chunk(frame, "particles/mass", F32, (values.len() as u64, 1), f32s(values))
     };
     let bytes = file(&[
         count(0, 2),
@@ -143,11 +124,8 @@ fn missing_values_are_those_of_frame_0_or_of_the_schema() {
         positions(2, 3),
         mass(4, &[5.0, 6.0]),
     ]);
-    let all: Vec<RawParticles> = steps(&bytes)
-        .unwrap()
-        .iter()
-        .map(|step| read(&bytes, step).unwrap())
-        .collect();
+    let all: Vec<RawParticles> =
+        steps(&bytes).unwrap().iter().map(|step| read(&bytes, step).unwrap()).collect();
     let masses = |index: usize| numbers(&attribute(&all[index], "mass").data);
     assert_eq!(all.len(), 5);
     assert_eq!((masses(0), masses(1)), (vec![3.0, 4.0], vec![3.0, 4.0]));
@@ -162,10 +140,7 @@ fn steps_that_do_not_increase_do_not_number_frames() {
     assert!(listed.iter().all(|step| step.number.is_none()));
     // A step of 0 is left out by writers.
     let listed = steps(&file(&[count(0, 0), step(1, 7)])).unwrap();
-    assert_eq!(
-        listed.iter().map(|s| s.number).collect::<Vec<_>>(),
-        [Some(0), Some(7)]
-    );
+    assert_eq!(listed.iter().map(|s| s.number).collect::<Vec<_>>(), [Some(0), Some(7)]);
     let listed = steps(&file(&[step(0, u64::MAX)])).unwrap();
     assert_eq!(listed[0].number, Some(0));
     let none = steps(&file(&[count(0, 0)])).unwrap();
@@ -217,34 +192,18 @@ fn a_particle_at_the_origin_and_none_need_no_positions() {
 #[test]
 fn chunks_must_fit_the_particles() {
     let with = |name, kind, shape: (u64, u32), len| {
-        file(&[
-            count(0, 2),
-            positions(0, 2),
-            Chunk(0, name, kind, shape, vec![0; len]),
-        ])
+        file(&[count(0, 2), positions(0, 2), Chunk(0, name, kind, shape, vec![0; len])])
     };
     fails(
         &with("particles/mass", F32, (3, 1), 12),
         "frame 0: particles/mass has 3 rows for 2 particles",
     );
-    fails(
-        &with("particles/velocity", F32, (2, 2), 16),
-        "has 2 columns, not 3",
-    );
-    fails(
-        &with("particles/mass", I32, (2, 1), 8),
-        "has numbers of type i32",
-    );
-    fails(
-        &with("particles/typeid", F32, (2, 1), 8),
-        "has numbers of type f32",
-    );
+    fails(&with("particles/velocity", F32, (2, 2), 16), "has 2 columns, not 3");
+    fails(&with("particles/mass", I32, (2, 1), 8), "has numbers of type i32");
+    fails(&with("particles/typeid", F32, (2, 1), 8), "has numbers of type f32");
     fails(&with("particles/body", TEXT, (2, 1), 2), "is text");
     let integers = Chunk(0, "particles/position", I32, (1, 3), vec![0; 12]);
-    fails(
-        &file(&[count(0, 1), integers]),
-        "particles/position has numbers of type i32",
-    );
+    fails(&file(&[count(0, 1), integers]), "particles/position has numbers of type i32");
     let signed = Chunk(0, "particles/N", I32, (1, 1), vec![2, 0, 0, 0]);
     fails(&file(&[signed]), "particles/N is not one unsigned integer");
     let two = Chunk(0, "particles/N", U32, (2, 1), vec![0; 8]);
@@ -292,10 +251,7 @@ fn the_header_must_be_sound() {
     assert!(error(16, &[0xff; 8]).contains("the index has 18446744073709551615 times 32 bytes"));
     assert!(error(24, &[0xff; 8]).contains("the list of names has"));
     let short = steps(&two_frames()[..200]).expect_err("cut").to_string();
-    assert!(
-        short.contains("byte 200: file ends within the GSD header"),
-        "{short}"
-    );
+    assert!(short.contains("byte 200: file ends within the GSD header"), "{short}");
     // The last draft has the layout of version 1.
     let version_1 = sample("gsd/polymer-version-1.gsd");
     let mut draft = version_1.clone();
@@ -306,15 +262,10 @@ fn the_header_must_be_sound() {
 /// Many names for the same bytes: a small file must not become large.
 #[test]
 fn chunks_must_not_overlap() {
-    let names: Vec<&'static str> = (0..40)
-        .map(|i| &*Box::leak(format!("log/particles/{i}").into_boxed_str()))
-        .collect();
+    let names: Vec<&'static str> =
+        (0..40).map(|i| &*Box::leak(format!("log/particles/{i}").into_boxed_str())).collect();
     let mut chunks = vec![count(0, 200), positions(0, 200)];
-    chunks.extend(
-        names
-            .into_iter()
-            .map(|name| Chunk(0, name, F32, (200, 3), Vec::new())),
-    );
+    chunks.extend(names.into_iter().map(|name| Chunk(0, name, F32, (200, 3), Vec::new())));
     let mut bytes = file(&chunks);
     // All of them begin where the positions do.
     let start = bytes[INDEX + 32 + 16..][..8].to_vec();
@@ -373,10 +324,7 @@ fn remarks_report_what_is_not_in_the_particles() {
         ]
     );
     let flat = Gsd.remarks(&sample("gsd/varying.gsd"));
-    assert!(
-        flat.contains(&"the simulation has two dimensions".to_owned()),
-        "{flat:?}"
-    );
+    assert!(flat.contains(&"the simulation has two dimensions".to_owned()), "{flat:?}");
     assert!(flat.iter().any(|r| r.contains("no diameters")), "{flat:?}");
     // The beginning of a file, as it is known of a compressed one.
     assert_eq!(Gsd.remarks(&sample("gsd/polymer.gsd")[..256]).len(), 1);
@@ -388,10 +336,7 @@ fn remarks_report_what_is_not_in_the_particles() {
 fn remarks_of_a_file_are_those_of_all_its_bytes() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/data/gsd/polymer.gsd");
     let path = std::path::Path::new(path);
-    assert_eq!(
-        crate::open::remarks(path),
-        Gsd.remarks(&sample("gsd/polymer.gsd"))
-    );
+    assert_eq!(crate::open::remarks(path), Gsd.remarks(&sample("gsd/polymer.gsd")));
     let file = FrameFile::open(path).expect("a good file");
     assert_eq!((file.format(), file.steps().len()), (FORMAT, 5));
 }
@@ -410,19 +355,12 @@ fn default_values_count_against_the_budget() {
     let listed = steps(&bytes).unwrap();
     let read = |bytes_allowed| {
         let mut source = ByteSource::whole(&bytes);
-        Gsd.read(
-            &mut source,
-            &listed[0],
-            MemoryBudget::new(bytes_allowed, "get more"),
-        )
+        Gsd.read(&mut source, &listed[0], MemoryBudget::new(bytes_allowed, "get more"))
     };
     assert!(read(32).is_ok());
     assert!(matches!(read(31), Err(ParseError::TooLarge { .. })));
     let mut source = ByteSource::whole(&bytes);
-    assert!(
-        Gsd.steps(&mut source, MemoryBudget::new(8, "get more"))
-            .is_err()
-    );
+    assert!(Gsd.steps(&mut source, MemoryBudget::new(8, "get more")).is_err());
 }
 
 proptest! {

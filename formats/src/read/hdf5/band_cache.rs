@@ -30,10 +30,7 @@ struct Bands {
 impl BandCache {
     /// A cache of `most_bytes`. What is in use may take more, and so may the newest rows: the next range needs them.
     pub(super) fn new(most_bytes: usize) -> Self {
-        Self {
-            most_bytes,
-            bands: Mutex::default(),
-        }
+        Self { most_bytes, bands: Mutex::default() }
     }
 
     /// The rows of `key`. Calls `decode`, which may not wait for other threads, if they are not there.
@@ -85,10 +82,7 @@ mod tests {
             assert_eq!(rows.expect("decoded").len(), 4);
             decoded
         };
-        assert_eq!(
-            [get(0), get(1), get(0), get(2), get(1), get(0)],
-            [1, 2, 2, 3, 3, 4]
-        );
+        assert_eq!([get(0), get(1), get(0), get(2), get(1), get(0)], [1, 2, 2, 3, 3, 4]);
         // Rows that are larger than the cache are decoded once for all ranges
         let small = BandCache::new(3);
         let mut decoded = 0;

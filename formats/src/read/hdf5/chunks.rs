@@ -72,9 +72,7 @@ impl ChunkGrid {
         check_filters(stored, layout)?;
         let row_dimension = usize::from(selection.frame.is_some());
         let sizes = layout.chunk.iter().map(|size| u64::from(*size));
-        let chunk_len = sizes
-            .clone()
-            .try_fold(stored.element_len as u64, u64::checked_mul);
+        let chunk_len = sizes.clone().try_fold(stored.element_len as u64, u64::checked_mul);
         let chunk_len = chunk_len.and_then(|len| usize::try_from(len).ok());
         let chunk_len = chunk_len.filter(|len| u32::try_from(*len).is_ok());
         let chunk_len = chunk_len.ok_or_else(|| stored.bad("chunks of more than 4 GiB"))?;
@@ -94,10 +92,7 @@ impl ChunkGrid {
         first[row_dimension] = selection.rows.start / band_rows;
         last[row_dimension] = (selection.rows.end - 1) / band_rows;
         // No more chunks than bytes
-        let counts = first
-            .iter()
-            .zip(&last)
-            .map(|(first, last)| last - first + 1);
+        let counts = first.iter().zip(&last).map(|(first, last)| last - first + 1);
         let count = counts.clone().try_fold(1_u64, u64::checked_mul);
         let most = stored.file.bytes().len() as u64;
         let count = count.filter(|count| *count <= most);
@@ -156,15 +151,10 @@ impl ChunkGrid {
         (band, number): (u64, usize),
     ) -> Result<Cow<'a, [u8]>, ParseError> {
         let place = usize::try_from(band - self.first_band).unwrap_or(usize::MAX);
-        let place = place
-            .saturating_mul(self.band_chunks)
-            .saturating_add(number);
+        let place = place.saturating_mul(self.band_chunks).saturating_add(number);
         let chunk = self.chunks.get(place);
         let chunk = chunk.ok_or_else(|| stored.never_written())?;
-        let packed = stored
-            .file
-            .bytes()
-            .get(chunk.start..chunk.start + chunk.len);
+        let packed = stored.file.bytes().get(chunk.start..chunk.start + chunk.len);
         let packed = packed.unwrap_or_default();
         let is_filtered = (0..layout.filters.len()).any(|i| chunk.filter_mask >> i & 1 == 0);
         let len = self.chunk_len;
@@ -292,15 +282,9 @@ fn entries(
             let sizes = (offset_size, length_size);
             btree_v1(stored, layout, sizes, bounds)
         }
-        Some(ChunkIndexing::SingleChunk {
-            filtered_size,
-            filters,
-        }) => Ok(vec![single_chunk_entry(
-            index,
-            *filtered_size,
-            *filters,
-            rank,
-        )]),
+        Some(ChunkIndexing::SingleChunk { filtered_size, filters }) => {
+            Ok(vec![single_chunk_entry(index, *filtered_size, *filters, rank)])
+        }
         Some(ChunkIndexing::BTreeV2) => collect_v2_chunk_entries_storage(
             storage,
             index,
@@ -360,18 +344,9 @@ fn btree_v1(
         bounds,
     )?;
     let entries = leaves.into_iter().filter_map(|(key, address)| match key {
-        BTreeV1Key::RawData {
-            chunk_size,
-            filter_mask,
-            mut offsets,
-        } => {
+        BTreeV1Key::RawData { chunk_size, filter_mask, mut offsets } => {
             offsets.truncate(rank);
-            Some(ChunkEntry {
-                address,
-                size: u64::from(chunk_size),
-                filter_mask,
-                offsets,
-            })
+            Some(ChunkEntry { address, size: u64::from(chunk_size), filter_mask, offsets })
         }
         BTreeV1Key::Group { .. } => None,
     });

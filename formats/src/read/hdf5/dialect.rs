@@ -31,10 +31,7 @@ pub(super) trait Dialect {
 
 /// The error for a step that the file does not have.
 pub(super) fn no_step(step: usize, count: usize) -> ParseError {
-    ParseError::malformed(
-        0,
-        format!("step {step} is not among the {count} of the file"),
-    )
+    ParseError::malformed(0, format!("step {step} is not among the {count} of the file"))
 }
 
 /// A list of names for a remark, the first dozen of them.
@@ -49,9 +46,7 @@ pub(super) fn listed(names: &[String]) -> String {
 
 /// The remark that tells the values of the attribute `part`.
 pub(super) fn part_names<'a>(names: impl Iterator<Item = (u32, &'a str)>) -> String {
-    let names: Vec<String> = names
-        .map(|(value, name)| format!("{value} = {name}"))
-        .collect();
+    let names: Vec<String> = names.map(|(value, name)| format!("{value} = {name}")).collect();
     format!("attribute `part` tells parts apart: {}", listed(&names))
 }
 
@@ -65,9 +60,6 @@ pub(super) fn integer(value: f64) -> Option<i64> {
     /// From here on, f64 does not hold all integers.
     const MOST: f64 = 9_007_199_254_740_992.0;
     let is_integer = value.fract() == 0.0 && value.abs() <= MOST;
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "an integer of up to 53 bits"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "an integer of up to 53 bits")]
     is_integer.then_some(value as i64)
 }

@@ -122,13 +122,7 @@ impl H5File {
             let what = format!("the superblock states {stated} bytes: {CUT_SHORT}");
             return Err(ParseError::malformed(bytes.len(), what));
         }
-        Ok(Self {
-            bytes: bytes.clone(),
-            file,
-            storage,
-            name: None,
-            found: Arc::default(),
-        })
+        Ok(Self { bytes: bytes.clone(), file, storage, name: None, found: Arc::default() })
     }
 
     /// Whether `other` is this file.
@@ -175,10 +169,7 @@ impl H5File {
         let bytes = self.bytes.sibling(name)?;
         let other = Self::open(&bytes);
         let other = other.map_err(|e| e.map_message(|what| format!("in `{name}`: {what}")))?;
-        let other = Self {
-            name: Some(name.into()),
-            ..other
-        };
+        let other = Self { name: Some(name.into()), ..other };
         self.found().others.insert(name.to_owned(), other.clone());
         Ok(other)
     }

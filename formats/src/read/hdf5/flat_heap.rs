@@ -69,10 +69,7 @@ impl FlatHeaps {
             return buffer(&heap.block, len).map(Some);
         }
         let start = usize::try_from(place).unwrap_or(usize::MAX);
-        if !file
-            .get(start..)
-            .is_some_and(|b| b.starts_with(HEAP_SIGNATURE))
-        {
+        if !file.get(start..).is_some_and(|b| b.starts_with(HEAP_SIGNATURE)) {
             return Ok(None);
         }
         let known = self.heaps.get(&place).cloned();
@@ -124,10 +121,7 @@ fn flatten(file: &[u8], base: u64, place: u64, most: u64) -> Result<Option<FlatH
     let start = usize::try_from(place).unwrap_or(usize::MAX);
     let end = usize::try_from(cursor.position()).unwrap_or(usize::MAX);
     let mut header = file.get(start..end).unwrap_or_default().to_vec();
-    let shown = shown_fields(
-        block.len() as u64,
-        (FLAT_START + place).saturating_sub(base),
-    );
+    let shown = shown_fields(block.len() as u64, (FLAT_START + place).saturating_sub(base));
     for (at, bytes) in shown {
         header[at..at + bytes.len()].copy_from_slice(&bytes);
     }
@@ -138,10 +132,7 @@ fn flatten(file: &[u8], base: u64, place: u64, most: u64) -> Result<Option<FlatH
     // The library reads more than the header
     let rest = file.get(end..).unwrap_or_default();
     header.extend_from_slice(&rest[..rest.len().min(256)]);
-    Ok(Some(FlatHeap {
-        header: Arc::new(header),
-        block: Arc::new(block),
-    }))
+    Ok(Some(FlatHeap { header: Arc::new(header), block: Arc::new(block) }))
 }
 
 /// Places in a header with numbers of eight bytes, and what is shown there: size of the first block, address of the

@@ -47,9 +47,7 @@ pub(super) fn file_count(root: &Node) -> u64 {
     let header = root.group("Header").ok().flatten();
     let count = header.and_then(|header| header.number("NumFilesPerSnapshot"));
     let count = count.and_then(integer);
-    count
-        .and_then(|count| u64::try_from(count).ok())
-        .unwrap_or(1)
+    count.and_then(|count| u64::try_from(count).ok()).unwrap_or(1)
 }
 
 /// Whether the snapshot consists of virtual data sets: SWIFT writes such a file beside those with the values, and says
@@ -68,9 +66,8 @@ impl Snapshot {
         let number = |name: &str| name.strip_prefix(TYPE)?.parse::<u32>().ok();
         // SWIFT has links with other names to the groups
         let groups = root.distinct_groups(|name| number(name).is_some())?;
-        let named = groups
-            .into_iter()
-            .filter_map(|(name, node)| Some((number(&name)?, name, node)));
+        let named =
+            groups.into_iter().filter_map(|(name, node)| Some((number(&name)?, name, node)));
         let mut named: Vec<(u32, String, Node)> = named.collect();
         named.sort_by_key(|(number, _, _)| *number);
         if named.is_empty() {
@@ -90,10 +87,8 @@ impl Snapshot {
             }
         }
         if snapshot.types.is_empty() && snapshot.particle_count() > 0 {
-            let what = format!(
-                "none of {} has a data set {COORDINATES}",
-                listed(&snapshot.without)
-            );
+            let what =
+                format!("none of {} has a data set {COORDINATES}", listed(&snapshot.without));
             return Err(ParseError::malformed(0, what));
         }
         Ok(Some(snapshot))
@@ -141,9 +136,7 @@ impl Snapshot {
         let Some(positions) = positions.filter(|values| matches!(values.components(), 2 | 3))
         else {
             let shape = &stored.shape;
-            return Err(stored.bad(format!(
-                "shape {shape:?}, three numbers a particle are needed"
-            )));
+            return Err(stored.bad(format!("shape {shape:?}, three numbers a particle are needed")));
         };
         let count = positions.count();
         self.check_count(number, &stored, count)?;
@@ -197,9 +190,7 @@ impl Snapshot {
             && let Some(name) = code.text("Code")
         {
             let version = code.text("Code Version").unwrap_or_default();
-            return format!("snapshot of {name} {version}")
-                .trim_end()
-                .to_owned();
+            return format!("snapshot of {name} {version}").trim_end().to_owned();
         }
         if let Some(version) = self.header_number("GIZMO_version") {
             return format!("snapshot of GIZMO {version}");
@@ -227,10 +218,7 @@ impl Snapshot {
     fn units(&self) -> Vec<String> {
         let mut all = Vec::new();
         for name in [COORDINATES, "Velocities"] {
-            let dataset = self
-                .types
-                .first()
-                .and_then(|(_, node)| node.dataset(name).ok()?);
+            let dataset = self.types.first().and_then(|(_, node)| node.dataset(name).ok()?);
             let unit = dataset.and_then(|dataset| {
                 if let Some(expression) =
                     dataset_text(&dataset, "Expression for physical CGS units")
@@ -250,11 +238,7 @@ impl Snapshot {
         let parameters = self.root.group("Parameters").ok().flatten();
         let holders = [&unit_group, &parameters, &self.header];
         for (name, keys, unit) in [
-            (
-                "length",
-                ["Unit length in cgs (U_L)", "UnitLength_in_cm"],
-                "cm",
-            ),
+            ("length", ["Unit length in cgs (U_L)", "UnitLength_in_cm"], "cm"),
             ("time", ["Unit time in cgs (U_t)", "UnitTime_in_s"], "s"),
         ] {
             let mut holders = holders.into_iter().flatten();
@@ -267,10 +251,7 @@ impl Snapshot {
 
 impl Dialect for Snapshot {
     fn steps(&self, _budget: MemoryBudget) -> Result<Vec<StepInfo>, ParseError> {
-        Ok(vec![StepInfo {
-            number: None,
-            time: self.header_number("Time"),
-        }])
+        Ok(vec![StepInfo { number: None, time: self.header_number("Time") }])
     }
 
     fn table(&self, _step: usize, budget: MemoryBudget) -> Result<ParticleTable, ParseError> {

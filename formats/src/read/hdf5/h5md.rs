@@ -74,11 +74,7 @@ impl Element {
             return Err(stored.bad(format!("{} has no list of steps", group.path_of("step"))));
         };
         let times = sampled(&group, "time", count, budget)?;
-        Ok(Some(Self {
-            stored,
-            steps: Some(steps),
-            times,
-        }))
+        Ok(Some(Self { stored, steps: Some(steps), times }))
     }
 
     /// Which values are those of step `number`: all, those at an index, or none.
@@ -99,16 +95,10 @@ fn edges_of(numbers: &[f64]) -> Option<[DVec3; 3]> {
     Some(match *numbers {
         [a, b, c] => [a * DVec3::X, b * DVec3::Y, c * DVec3::Z],
         [a, b] => [a * DVec3::X, b * DVec3::Y, DVec3::ZERO],
-        [ax, ay, bx, by] => [
-            DVec3::new(ax, ay, 0.0),
-            DVec3::new(bx, by, 0.0),
-            DVec3::ZERO,
-        ],
-        [ax, ay, az, bx, by, bz, cx, cy, cz] => [
-            DVec3::new(ax, ay, az),
-            DVec3::new(bx, by, bz),
-            DVec3::new(cx, cy, cz),
-        ],
+        [ax, ay, bx, by] => [DVec3::new(ax, ay, 0.0), DVec3::new(bx, by, 0.0), DVec3::ZERO],
+        [ax, ay, az, bx, by, bz, cx, cy, cz] => {
+            [DVec3::new(ax, ay, az), DVec3::new(bx, by, bz), DVec3::new(cx, cy, cz)]
+        }
         _ => return None,
     })
 }
@@ -123,10 +113,7 @@ fn sampled(
     let Some(dataset) = group.dataset(name)? else {
         return Ok(None);
     };
-    budget.check(
-        count.saturating_mul(LIST_ENTRY_LEN),
-        "the list of its steps is",
-    )?;
+    budget.check(count.saturating_mul(LIST_ENTRY_LEN), "the list of its steps is")?;
     let Some(all) = numbers(group, name, budget)? else {
         return Ok(None);
     };
@@ -148,11 +135,7 @@ fn sampled(
         let stored = Stored::of(&group.path_of(name), &dataset)?;
         return Err(stored.bad(format!("{} numbers for {count} samples", all.len())));
     }
-    Ok(Some(
-        all.into_iter()
-            .take(usize::try_from(count).unwrap_or(usize::MAX))
-            .collect(),
-    ))
+    Ok(Some(all.into_iter().take(usize::try_from(count).unwrap_or(usize::MAX)).collect()))
 }
 
 impl Trajectory {
@@ -170,11 +153,7 @@ impl Trajectory {
         if let Some(particles) = particles {
             for (name, node) in particles.distinct_groups(|_| true)? {
                 if let Some(position) = Element::open(&node, POSITION, budget)? {
-                    groups.push(ParticleGroup {
-                        name,
-                        node,
-                        position,
-                    });
+                    groups.push(ParticleGroup { name, node, position });
                 }
             }
         }
@@ -201,9 +180,7 @@ impl Trajectory {
         Ok(Some(Self {
             root: root.clone(),
             groups,
-            steps: steps
-                .map(|(number, time)| SampledStep { number, time })
-                .collect(),
+            steps: steps.map(|(number, time)| SampledStep { number, time }).collect(),
         }))
     }
 
@@ -223,9 +200,7 @@ impl Trajectory {
         let positions = positions.filter(|values| matches!(values.components(), 2 | 3));
         let positions = positions.ok_or_else(|| {
             let shape = &stored.shape;
-            stored.bad(format!(
-                "shape {shape:?}, two or three numbers a particle are needed"
-            ))
+            stored.bad(format!("shape {shape:?}, two or three numbers a particle are needed"))
         })?;
         let mut finder = PropertyFinder::new(positions.count(), budget);
         let (groups, datasets) = group.node.members()?;
@@ -256,9 +231,7 @@ impl Trajectory {
             let slice = edges.slice(number)?;
             let values = Values::find(&edges.stored, &slice, budget).ok()??;
             // Three lengths, or a matrix whose rows are the edges
-            let count = usize::try_from(values.count())
-                .ok()
-                .filter(|count| *count <= 3)?;
+            let count = usize::try_from(values.count()).ok().filter(|count| *count <= 3)?;
             let numbers = Piece::Stored(values).all(count).ok()?;
             let vectors = edges_of(&numbers)?;
             let boundary = node.texts("boundary");
@@ -286,11 +259,7 @@ impl Trajectory {
                 true => unit("time").map(|unit| format!("time {unit}, ")),
                 false => None,
             };
-            Some(format!(
-                "{}{name} {}",
-                time.unwrap_or_default(),
-                unit("value")?
-            ))
+            Some(format!("{}{name} {}", time.unwrap_or_default(), unit("value")?))
         };
         elements.filter_map(unit).collect()
     }
@@ -298,10 +267,7 @@ impl Trajectory {
 
 impl Dialect for Trajectory {
     fn steps(&self, _budget: MemoryBudget) -> Result<Vec<StepInfo>, ParseError> {
-        let is_fixed = self
-            .groups
-            .iter()
-            .all(|group| group.position.steps.is_none());
+        let is_fixed = self.groups.iter().all(|group| group.position.steps.is_none());
         let info = |step: &SampledStep| StepInfo {
             number: (!is_fixed).then_some(step.number),
             time: step.time,
@@ -317,10 +283,7 @@ impl Dialect for Trajectory {
             parts.extend(self.part(value, group, found.number, budget)?);
         }
         let table = ParticleTable::new(parts, self.groups.len() > 1);
-        let is_fixed = self
-            .groups
-            .iter()
-            .all(|group| group.position.steps.is_none());
+        let is_fixed = self.groups.iter().all(|group| group.position.steps.is_none());
         let table = table.at(found.time, (!is_fixed).then_some(found.number));
         Ok(table.in_cell(self.cell(found.number, budget)))
     }

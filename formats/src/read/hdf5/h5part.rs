@@ -32,10 +32,7 @@ impl StepGroups {
         });
         let mut steps: Vec<(i64, String)> = numbered.collect();
         steps.sort();
-        Ok((!steps.is_empty()).then(|| Self {
-            root: root.clone(),
-            steps,
-        }))
+        Ok((!steps.is_empty()).then(|| Self { root: root.clone(), steps }))
     }
 
     fn node(&self, step: usize) -> Result<(i64, Node), ParseError> {
@@ -50,9 +47,7 @@ impl StepGroups {
 fn time(node: &Node, budget: MemoryBudget) -> Option<f64> {
     let attribute = TIMES.iter().find_map(|name| node.number(name));
     let stored = || {
-        let mut found = TIMES
-            .iter()
-            .filter_map(|name| numbers(node, name, budget).ok()?);
+        let mut found = TIMES.iter().filter_map(|name| numbers(node, name, budget).ok()?);
         found.find_map(|all| (all.len() == 1).then(|| all[0]))
     };
     attribute.or_else(stored)
@@ -71,10 +66,7 @@ fn axis(node: &Node, axis: &str, budget: MemoryBudget) -> Result<Option<Values>,
 
 impl Dialect for StepGroups {
     fn steps(&self, _budget: MemoryBudget) -> Result<Vec<StepInfo>, ParseError> {
-        let info = |(number, _): &(i64, String)| StepInfo {
-            number: Some(*number),
-            time: None,
-        };
+        let info = |(number, _): &(i64, String)| StepInfo { number: Some(*number), time: None };
         Ok(self.steps.iter().map(info).collect())
     }
 
@@ -89,30 +81,20 @@ impl Dialect for StepGroups {
             }
         }
         finder.join_vectors();
-        let part = Part {
-            value: 0,
-            count: finder.count,
-            positions,
-            attributes: finder.found,
-        };
+        let part = Part { value: 0, count: finder.count, positions, attributes: finder.found };
         let table = ParticleTable::new(vec![part], false);
         Ok(table.at(time(&node, budget), Some(number)))
     }
 
     fn remarks(&self) -> Vec<String> {
-        let mut remarks = vec![format!(
-            "HDF5, H5Part (or H5hut) with {} time steps",
-            self.steps.len()
-        )];
+        let mut remarks =
+            vec![format!("HDF5, H5Part (or H5hut) with {} time steps", self.steps.len())];
         if let Ok((_, node)) = self.node(0)
             && let Ok((groups, _)) = node.members()
             && !groups.is_empty()
         {
             let groups: Vec<String> = groups.iter().map(|name| node.path_of(name)).collect();
-            remarks.push(format!(
-                "groups within a step are not read: {}",
-                listed(&groups)
-            ));
+            remarks.push(format!("groups within a step are not read: {}", listed(&groups)));
         }
         let version = self.root.number("H5hutVersion").and_then(integer);
         remarks.extend(version.map(|version| format!("H5hut version {version}")));

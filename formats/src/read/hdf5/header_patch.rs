@@ -48,9 +48,7 @@ impl Patch {
     /// Changes the part of it that is in `bytes`, which begin at byte `start` of the file.
     pub(super) fn apply(&self, start: u64, bytes: &mut [u8]) {
         for (place, byte) in (self.start..).zip(&self.bytes) {
-            let index = place
-                .checked_sub(start)
-                .and_then(|i| usize::try_from(i).ok());
+            let index = place.checked_sub(start).and_then(|i| usize::try_from(i).ok());
             if let Some(to) = index.and_then(|index| bytes.get_mut(index)) {
                 *to = *byte;
             }
@@ -131,10 +129,7 @@ pub(super) fn virtual_layout(
             if kind == LAYOUT && data.get(1) == Some(&VIRTUAL) {
                 let list = list_place(&data[2..], addressing)?;
                 // Class 0, and a length of 0 in two bytes
-                let mut patches = vec![Patch {
-                    start: place + 1,
-                    bytes: vec![0; 3],
-                }];
+                let mut patches = vec![Patch { start: place + 1, bytes: vec![0; 3] }];
                 if matches!(version, Version::Second { .. }) {
                     patches.push(checksum(bytes, start..end, &patches[0])?);
                 }
@@ -211,8 +206,5 @@ fn checksum(bytes: &[u8], range: Range<u64>, patch: &Patch) -> Result<Patch, Err
         return Err(Error::InvalidData("wrong checksum of a header".into()));
     }
     patch.apply(range.start, &mut block);
-    Ok(Patch {
-        start: range.end,
-        bytes: jenkins_lookup3(&block).to_le_bytes().to_vec(),
-    })
+    Ok(Patch { start: range.end, bytes: jenkins_lookup3(&block).to_le_bytes().to_vec() })
 }

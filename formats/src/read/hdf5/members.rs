@@ -57,10 +57,7 @@ impl Members {
         let (groups, datasets) = group.members()?;
         let groups = groups.into_iter().map(|g| (g.name().to_owned(), g));
         let datasets = datasets.into_iter().map(|d| (d.name().to_owned(), d));
-        Ok(Self {
-            groups: groups.collect(),
-            datasets: datasets.collect(),
-        })
+        Ok(Self { groups: groups.collect(), datasets: datasets.collect() })
     }
 
     /// The group `name`.

@@ -64,9 +64,7 @@ impl Reader for Hdf5 {
     }
 
     fn extensions(&self) -> &'static [&'static str] {
-        &[
-            "hdf5", "h5", "hdf", "he5", "vtkhdf", "h5part", "h5p", "h5md",
-        ]
+        &["hdf5", "h5", "hdf", "he5", "vtkhdf", "h5part", "h5p", "h5md"]
     }
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
@@ -152,10 +150,8 @@ impl Reader for Hdf5 {
                 remarks.push("positions are stored as integers, and used as they are".to_owned());
             }
             if !table.left_out().is_empty() {
-                remarks.push(format!(
-                    "not in all parts, so left out: {}",
-                    listed(table.left_out())
-                ));
+                remarks
+                    .push(format!("not in all parts, so left out: {}", listed(table.left_out())));
             }
         }
         let others = Vec::from_iter(file.other_names());
@@ -195,10 +191,7 @@ impl OpenFile {
         let file = H5File::open(bytes)?;
         let dialect = dialect_in(&Node::root(&file)?);
         file.check_attributes()?;
-        Ok(Self {
-            dialect: dialect?,
-            file,
-        })
+        Ok(Self { dialect: dialect?, file })
     }
 
     /// `answer` of the layout, or damage of attributes that were looked up for it. These count as missing until here.

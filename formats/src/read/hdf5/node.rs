@@ -58,11 +58,7 @@ impl Node {
 
     /// `group` of `file`, whose path is `path`.
     fn new(file: &H5File, group: Group, path: String) -> Self {
-        Self {
-            file: file.clone(),
-            group,
-            path,
-        }
+        Self { file: file.clone(), group, path }
     }
 
     /// The file.
@@ -85,9 +81,7 @@ impl Node {
     /// # Errors
     /// [`ParseError`] if the group is damaged, or a link leads to nothing.
     pub(super) fn members(&self) -> Result<(Vec<String>, Vec<String>), ParseError> {
-        let names = self
-            .file
-            .with_virtual(self.shown_path(), || self.group.member_names())?;
+        let names = self.file.with_virtual(self.shown_path(), || self.group.member_names())?;
         let (mut groups, mut datasets) = names.map_err(|e| self.error(&e, self.shown_path()))?;
         for link in self.links()?.iter() {
             match self.follow(link)? {
@@ -179,10 +173,7 @@ impl Node {
             None => self.file.with_virtual(&path, || self.group.dataset(name))?,
         };
         match dataset {
-            Ok(dataset) => Ok(Some(NodeDataset {
-                file: self.file.clone(),
-                dataset,
-            })),
+            Ok(dataset) => Ok(Some(NodeDataset { file: self.file.clone(), dataset })),
             Err(Error::DatasetNotFound(_)) => match self.linked(name)? {
                 Some(Linked::Dataset(dataset)) => Ok(Some(*dataset)),
                 Some(Linked::Group(_)) | None => Ok(None),
@@ -249,9 +240,7 @@ impl Node {
 
     /// The texts of an attribute that is an array of them; empty if it is not.
     pub(super) fn texts(&self, name: &str) -> Vec<String> {
-        let texts = self
-            .attribute(name)
-            .and_then(|attribute| attribute.read_strings().ok());
+        let texts = self.attribute(name).and_then(|attribute| attribute.read_strings().ok());
         texts.unwrap_or_default()
     }
 
@@ -267,8 +256,7 @@ impl Node {
             Err(Error::AttributeNotFound(_)) => None,
             Err(error) => {
                 let address = self.group.address();
-                self.file
-                    .report_attribute(&error, address, self.shown_path());
+                self.file.report_attribute(&error, address, self.shown_path());
                 None
             }
         }
@@ -301,11 +289,7 @@ fn numbers(attribute: &Attribute) -> Option<Vec<f64>> {
     let bytes = attribute.raw_data.chunks_exact(scalar.size());
     let count = usize::try_from(attribute.num_elements().ok()?).ok()?;
     let numbers = bytes.take(count.min(MOST_ATTRIBUTE_NUMBERS));
-    Some(
-        numbers
-            .map(|number| scalar.decode_one(number, endian))
-            .collect(),
-    )
+    Some(numbers.map(|number| scalar.decode_one(number, endian)).collect())
 }
 
 fn text(attribute: &Attribute) -> Option<String> {

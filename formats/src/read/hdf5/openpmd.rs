@@ -49,9 +49,7 @@ impl OpenPmd {
         let Some(version) = root.text("openPMD") else {
             return Ok(None);
         };
-        let base = root
-            .text("basePath")
-            .unwrap_or_else(|| format!("/data/{ITERATION}/"));
+        let base = root.text("basePath").unwrap_or_else(|| format!("/data/{ITERATION}/"));
         let Some((before, after)) = base.split_once(ITERATION) else {
             let what =
                 format!("openPMD {version} with the basePath {base}, which has no {ITERATION}");
@@ -69,15 +67,8 @@ impl OpenPmd {
             }
         }
         iterations.sort_by_key(|(number, _)| *number);
-        let particles = root
-            .text("particlesPath")
-            .unwrap_or_else(|| "particles/".to_owned());
-        let mut file = Self {
-            root: root.clone(),
-            iterations,
-            particles,
-            species: Vec::new(),
-        };
+        let particles = root.text("particlesPath").unwrap_or_else(|| "particles/".to_owned());
+        let mut file = Self { root: root.clone(), iterations, particles, species: Vec::new() };
         for (_, iteration) in &file.iterations {
             if let Some(particles) = iteration.descend(&file.particles)? {
                 let species = particles.distinct_groups(|_| true)?.into_iter();
@@ -131,37 +122,22 @@ impl OpenPmd {
             }
             axes.push((position, offset));
         }
-        if axes
-            .iter()
-            .filter(|(position, _)| position.is_some())
-            .count()
-            < 2
-        {
-            let what = format!(
-                "{} has fewer than two of the components x, y, z",
-                record.path()
-            );
+        if axes.iter().filter(|(position, _)| position.is_some()).count() < 2 {
+            let what = format!("{} has fewer than two of the components x, y, z", record.path());
             return Err(ParseError::malformed(0, what));
         }
         // Positions that are all constant take no space, so that only their number could be wrong
-        let stated = axes
-            .iter()
-            .flat_map(|(position, _)| position)
-            .find_map(|p| p.count);
+        let stated = axes.iter().flat_map(|(position, _)| position).find_map(|p| p.count);
         let count = match (count, stated) {
             (Some(count), _) => count,
             (None, None | Some(0)) => 0,
             (None, Some(count)) => {
-                let what = format!(
-                    "all {count} positions of {} are the same constant",
-                    node.path()
-                );
+                let what =
+                    format!("all {count} positions of {} are the same constant", node.path());
                 return Err(ParseError::malformed(0, what));
             }
         };
-        let positions = axes
-            .into_iter()
-            .map(|(position, offset)| scaled(position, offset));
+        let positions = axes.into_iter().map(|(position, offset)| scaled(position, offset));
         let positions = positions.collect();
         // Other records
         let mut finder = PropertyFinder::new(count, budget);
@@ -174,12 +150,7 @@ impl OpenPmd {
                 add_record(&mut finder, node, &name)?;
             }
         }
-        let part = Part {
-            value,
-            count,
-            positions,
-            attributes: finder.found,
-        };
+        let part = Part { value, count, positions, attributes: finder.found };
         Ok((part, finder.left_out))
     }
 
@@ -208,9 +179,7 @@ impl OpenPmd {
                     return None;
                 }
                 let record = node.group(&name).ok()??;
-                let unit = Component::open(&record, "x", MemoryBudget::UNLIMITED)
-                    .ok()??
-                    .unit;
+                let unit = Component::open(&record, "x", MemoryBudget::UNLIMITED).ok()??.unit;
                 Some((name, unit))
             });
             let others = scalars.chain(vectors).filter(|(_, unit)| *unit != 1.0);
@@ -332,10 +301,7 @@ fn time(iteration: &Node) -> Option<f64> {
 
 impl Dialect for OpenPmd {
     fn steps(&self, _budget: MemoryBudget) -> Result<Vec<StepInfo>, ParseError> {
-        let info = |(number, _): &(i64, Node)| StepInfo {
-            number: Some(*number),
-            time: None,
-        };
+        let info = |(number, _): &(i64, Node)| StepInfo { number: Some(*number), time: None };
         Ok(self.iterations.iter().map(info).collect())
     }
 
@@ -363,9 +329,7 @@ impl Dialect for OpenPmd {
         )];
         match self.species.len() {
             1 => remarks.push(format!("species {}", listed(&self.species))),
-            _ => remarks.push(part_names(
-                (0..).zip(self.species.iter().map(String::as_str)),
-            )),
+            _ => remarks.push(part_names((0..).zip(self.species.iter().map(String::as_str)))),
         }
         remarks.extend(units(&self.units()));
         remarks

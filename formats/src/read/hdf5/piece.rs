@@ -18,12 +18,7 @@ pub(super) enum Piece {
     /// The same number for all particles.
     Constant(f64, ScalarType),
     /// `values * unit + offset * offset_unit`, in f64.
-    Scaled {
-        values: Box<Self>,
-        unit: f64,
-        offset: Box<Self>,
-        offset_unit: f64,
-    },
+    Scaled { values: Box<Self>, unit: f64, offset: Box<Self>, offset_unit: f64 },
 }
 
 impl Piece {
@@ -78,18 +73,11 @@ impl Piece {
                     to.copy_from_slice(&number[..size]);
                 }
             }
-            Self::Scaled {
-                values,
-                unit,
-                offset,
-                offset_unit,
-            } => {
+            Self::Scaled { values, unit, offset, offset_unit } => {
                 let (v, o) = (values.scalar(), offset.scalar());
                 let values = values.numbers(cache, first, count)?;
                 let offset = offset.numbers(cache, first, count)?;
-                let numbers = values
-                    .chunks_exact(v.size())
-                    .zip(offset.chunks_exact(o.size()));
+                let numbers = values.chunks_exact(v.size()).zip(offset.chunks_exact(o.size()));
                 for (to, (value, offset)) in bytes.as_chunks_mut().0.iter_mut().zip(numbers) {
                     let value = v.decode_one(value, Endian::Little) * unit;
                     let offset = o.decode_one(offset, Endian::Little) * offset_unit;
@@ -108,9 +96,7 @@ impl Piece {
         let scalar = self.scalar();
         let bytes = self.numbers(None, 0, count)?;
         let numbers = bytes.chunks_exact(scalar.size());
-        Ok(numbers
-            .map(|number| scalar.decode_one(number, Endian::Little))
-            .collect())
+        Ok(numbers.map(|number| scalar.decode_one(number, Endian::Little)).collect())
     }
 
     /// Writes the numbers of the rows from `first` on to component `component` of records of `width` numbers of
@@ -144,16 +130,14 @@ impl Piece {
             let from = self.scalar();
             let each = own * from.size();
             let blocks = to.par_chunks_mut(BLOCK * record);
-            blocks
-                .zip(numbers.par_chunks(BLOCK * each))
-                .for_each(|(to, numbers)| {
-                    let records = to.chunks_exact_mut(record);
-                    for (record, numbers) in records.zip(numbers.chunks_exact(each)) {
-                        let start = component * scalar.size();
-                        let to = &mut record[start..start + own * scalar.size()];
-                        convert(numbers, from, to, scalar);
-                    }
-                });
+            blocks.zip(numbers.par_chunks(BLOCK * each)).for_each(|(to, numbers)| {
+                let records = to.chunks_exact_mut(record);
+                for (record, numbers) in records.zip(numbers.chunks_exact(each)) {
+                    let start = component * scalar.size();
+                    let to = &mut record[start..start + own * scalar.size()];
+                    convert(numbers, from, to, scalar);
+                }
+            });
             first += block - first % block;
             left = rest;
         }
@@ -168,9 +152,7 @@ fn convert(numbers: &[u8], from: ScalarType, to: &mut [u8], scalar: ScalarType) 
         return;
     }
     let size = scalar.size();
-    let pairs = to
-        .chunks_exact_mut(size)
-        .zip(numbers.chunks_exact(from.size()));
+    let pairs = to.chunks_exact_mut(size).zip(numbers.chunks_exact(from.size()));
     for (to, number) in pairs {
         let bytes = match scalar {
             ScalarType::F32 | ScalarType::F64 => {
@@ -226,12 +208,7 @@ mod tests {
         use ScalarType::{F32, F64, I8, I16, I64, U8, U32, U64};
         converts(&[0xfe], I8, I16, &(-2_i16).to_le_bytes());
         converts(&[0xfe], U8, I16, &254_i16.to_le_bytes());
-        converts(
-            &u32::MAX.to_le_bytes(),
-            U32,
-            I64,
-            &i64::from(u32::MAX).to_le_bytes(),
-        );
+        converts(&u32::MAX.to_le_bytes(), U32, I64, &i64::from(u32::MAX).to_le_bytes());
         converts(&7_u64.to_le_bytes(), U64, F64, &7_f64.to_le_bytes());
         converts(&1.5_f32.to_le_bytes(), F32, F64, &1.5_f64.to_le_bytes());
         converts(&[0xff], I8, F32, &(-1_f32).to_le_bytes());

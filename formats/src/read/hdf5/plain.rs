@@ -115,17 +115,12 @@ impl PlainFile {
         let mut finder = PropertyFinder::new(count, budget);
         let mut positions = Vec::new();
         for data in &group.positions {
-            let slice = Slice {
-                frame,
-                field: data.field,
-                ..Slice::ALL
-            };
+            let slice = Slice { frame, field: data.field, ..Slice::ALL };
             let values = Values::find(&data.stored, &slice, budget)?;
             let values = values.filter(|values| values.count() == count);
             let values = values.ok_or_else(|| {
                 let shape = &data.stored.shape;
-                data.stored
-                    .bad(format!("shape {shape:?} for {count} particles"))
+                data.stored.bad(format!("shape {shape:?} for {count} particles"))
             })?;
             positions.push(Piece::Stored(values));
             if data.field.is_none() {
@@ -138,11 +133,7 @@ impl PlainFile {
         if let Some(first) = group.positions.first().filter(|data| data.field.is_some()) {
             for (name, field) in Field::of_compound(&first.stored.datatype) {
                 if !own.contains(&field) {
-                    let slice = Slice {
-                        frame,
-                        field: Some(field),
-                        ..Slice::ALL
-                    };
+                    let slice = Slice { frame, field: Some(field), ..Slice::ALL };
                     finder.add_stored(&first.stored, &name, &slice)?;
                 }
             }
@@ -155,19 +146,11 @@ impl PlainFile {
                 matches!(shape.as_deref(), Some([t, n, ..]) if Some(*t) == self.frames && *n == count)
             };
             let frame = frame.filter(|_| is_per_frame(&group.node));
-            let slice = Slice {
-                frame,
-                ..Slice::ALL
-            };
+            let slice = Slice { frame, ..Slice::ALL };
             finder.add(&group.node, &name, &name, &slice)?;
         }
         finder.join_vectors();
-        let part = Part {
-            value,
-            count,
-            positions,
-            attributes: finder.found,
-        };
+        let part = Part { value, count, positions, attributes: finder.found };
         Ok((part, finder.left_out))
     }
 }
@@ -208,21 +191,13 @@ impl PositionGroup {
 
     /// The positions among the data sets `names` of `node`.
     fn find(node: &Node, names: &[String]) -> Result<Option<Self>, ParseError> {
-        let group = |positions| {
-            Some(Self {
-                node: node.clone(),
-                positions,
-            })
-        };
+        let group = |positions| Some(Self { node: node.clone(), positions });
         // One data set with all axes
         for known in POSITION_ARRAYS {
             for name in names.iter().filter(|name| name.eq_ignore_ascii_case(known)) {
                 let stored = Stored::open(node, name)?.map(Arc::new);
                 if let Some(stored) = stored.filter(|stored| is_position_shape(stored)) {
-                    let data = PositionData {
-                        stored,
-                        field: None,
-                    };
+                    let data = PositionData { stored, field: None };
                     return Ok(group(vec![data]));
                 }
             }
@@ -244,10 +219,9 @@ impl PositionGroup {
                         stored.shape.len() == 1
                             && Field::of(&stored.datatype).is_some_and(|f| f.components == 1)
                     };
-                    positions.extend(stored.filter(is_axis).map(|stored| PositionData {
-                        stored,
-                        field: None,
-                    }));
+                    positions.extend(
+                        stored.filter(is_axis).map(|stored| PositionData { stored, field: None }),
+                    );
                 }
                 if positions.len() >= 2 {
                     return Ok(group(positions));
@@ -261,10 +235,9 @@ impl PositionGroup {
             };
             let fields = position_fields(&Field::of_compound(&stored.datatype));
             if stored.shape.len() == 1 && !fields.is_empty() {
-                let fields = fields.into_iter().map(|field| PositionData {
-                    stored: Arc::clone(&stored),
-                    field: Some(field),
-                });
+                let fields = fields
+                    .into_iter()
+                    .map(|field| PositionData { stored: Arc::clone(&stored), field: Some(field) });
                 return Ok(group(fields.collect()));
             }
         }
@@ -337,8 +310,7 @@ impl Search {
                     Ok(None) => continue,
                     Err(error) => error.to_string(),
                 };
-                self.datasets
-                    .push(format!("{} {shape}", node.path_of(name)));
+                self.datasets.push(format!("{} {shape}", node.path_of(name)));
             }
         }
         if depth > 0 {
@@ -398,10 +370,7 @@ impl Dialect for PlainFile {
         let paths = self.groups.iter().flat_map(|group| &group.positions);
         let mut paths: Vec<String> = paths.map(|data| data.stored.path.clone()).collect();
         paths.dedup();
-        remarks.push(format!(
-            "HDF5 of no known layout; positions are {}",
-            listed(&paths)
-        ));
+        remarks.push(format!("HDF5 of no known layout; positions are {}", listed(&paths)));
         if self.groups.len() > 1 {
             let names = self.groups.iter().map(|group| shown(group.node.path()));
             remarks.push(part_names((0..).zip(names)));

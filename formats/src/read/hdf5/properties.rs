@@ -36,13 +36,7 @@ pub(super) struct PropertyFinder {
 
 impl PropertyFinder {
     pub(super) const fn new(count: u64, budget: MemoryBudget) -> Self {
-        Self {
-            count,
-            budget,
-            found: Vec::new(),
-            left_out: Vec::new(),
-            used: BTreeSet::new(),
-        }
+        Self { count, budget, found: Vec::new(), left_out: Vec::new(), used: BTreeSet::new() }
     }
 
     /// Makes the data set a position, so that it does not become a property.
@@ -125,10 +119,7 @@ impl PropertyFinder {
         let fields = Field::of_compound(&stored.datatype);
         if !fields.is_empty() && slice.field.is_none() {
             for (field_name, field) in fields {
-                let slice = Slice {
-                    field: Some(field),
-                    ..slice.clone()
-                };
+                let slice = Slice { field: Some(field), ..slice.clone() };
                 let name = format!("{name}.{field_name}");
                 self.add_values(stored, &name, &slice)?;
             }

@@ -43,11 +43,7 @@ impl ParticleArrays {
                 "a PySPH file without particle arrays: /particles has no group with `arrays`",
             ));
         }
-        Ok(Some(Self {
-            root: root.clone(),
-            solver,
-            arrays,
-        }))
+        Ok(Some(Self { root: root.clone(), solver, arrays }))
     }
 
     fn time(&self) -> Option<f64> {
@@ -93,12 +89,7 @@ impl ParticleArrays {
             }
         }
         finder.join("velocity", &["u", "v", "w"]);
-        Ok(Part {
-            value,
-            count: finder.count,
-            positions,
-            attributes: finder.found,
-        })
+        Ok(Part { value, count: finder.count, positions, attributes: finder.found })
     }
 }
 
@@ -125,10 +116,7 @@ fn add_property(finder: &mut PropertyFinder, node: &Node, name: &str) -> Result<
         return Ok(());
     }
     if dataset.shape().len() == 1 {
-        let slice = Slice {
-            stride,
-            ..Slice::ALL
-        };
+        let slice = Slice { stride, ..Slice::ALL };
         finder.add(node, name, name, &slice)?;
     }
     Ok(())
@@ -136,10 +124,7 @@ fn add_property(finder: &mut PropertyFinder, node: &Node, name: &str) -> Result<
 
 impl Dialect for ParticleArrays {
     fn steps(&self, _budget: MemoryBudget) -> Result<Vec<StepInfo>, ParseError> {
-        Ok(vec![StepInfo {
-            number: self.step(),
-            time: self.time(),
-        }])
+        Ok(vec![StepInfo { number: self.step(), time: self.time() }])
     }
 
     fn table(&self, _step: usize, budget: MemoryBudget) -> Result<ParticleTable, ParseError> {

@@ -25,10 +25,7 @@ impl TableRanges {
     pub(super) fn new(table: ParticleTable) -> Self {
         let one_of_each = table.chunk_lens().fold(0, u64::saturating_add);
         let most = one_of_each.clamp(CACHE_BYTES, LARGE_CACHE_BYTES);
-        Self {
-            table,
-            cache: BandCache::new(usize::try_from(most).unwrap_or(usize::MAX)),
-        }
+        Self { table, cache: BandCache::new(usize::try_from(most).unwrap_or(usize::MAX)) }
     }
 
     const fn cache(&self) -> Cache<'_> {
@@ -77,9 +74,7 @@ impl ParticleRanges for TableRanges {
         self.table.read_positions(self.cache(), first, bytes)?;
         if cfg!(target_endian = "big") {
             for position in to {
-                let [x, y, z] = position
-                    .to_array()
-                    .map(|c| f64::from_le_bytes(c.to_ne_bytes()));
+                let [x, y, z] = position.to_array().map(|c| f64::from_le_bytes(c.to_ne_bytes()));
                 *position = DVec3::new(x, y, z);
             }
         }

@@ -19,26 +19,15 @@ pub(super) struct Slice {
 
 impl Slice {
     /// All rows.
-    pub(super) const ALL: Self = Self {
-        frame: None,
-        rows: None,
-        stride: None,
-        field: None,
-    };
+    pub(super) const ALL: Self = Self { frame: None, rows: None, stride: None, field: None };
 
     /// The rows at index `frame` of the first dimension.
     pub(super) fn frame(frame: u64) -> Self {
-        Self {
-            frame: Some(frame),
-            ..Self::ALL
-        }
+        Self { frame: Some(frame), ..Self::ALL }
     }
 
     /// `rows` of a data set.
     pub(super) fn rows(rows: Range<u64>) -> Self {
-        Self {
-            rows: Some(rows),
-            ..Self::ALL
-        }
+        Self { rows: Some(rows), ..Self::ALL }
     }
 }

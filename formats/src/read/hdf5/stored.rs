@@ -125,21 +125,14 @@ impl Stored {
                     let start = start.and_then(|start| usize::try_from(start).ok());
                     Storage::Contiguous(start.unwrap_or(usize::MAX))
                 }
-                Some(DataLayout::Chunked {
-                    address,
-                    dims,
-                    chunk_indexing,
-                    ..
-                }) => {
+                Some(DataLayout::Chunked { address, dims, chunk_indexing, .. }) => {
                     // Old versions add the size of an element to the shape of a chunk.
                     let rank = stored.shape.len();
                     let extra = usize::from(dims.len() == rank + 1);
                     let chunk = dims[..dims.len() - extra].to_vec();
                     if chunk.len() != rank || chunk.contains(&0) {
-                        return Err(stored.bad(format!(
-                            "a shape of {:?} in chunks of {chunk:?}",
-                            stored.shape
-                        )));
+                        return Err(stored
+                            .bad(format!("a shape of {:?} in chunks of {chunk:?}", stored.shape)));
                     }
                     Storage::Chunked(ChunkedLayout {
                         index: *address,
@@ -195,10 +188,7 @@ impl Stored {
 
     /// The error for values that were never written.
     pub(super) fn never_written(&self) -> ParseError {
-        self.bad(format!(
-            "shape {:?}, but its values were never written: {CUT_SHORT}",
-            self.shape
-        ))
+        self.bad(format!("shape {:?}, but its values were never written: {CUT_SHORT}", self.shape))
     }
 
     /// The error `what` at the object header.

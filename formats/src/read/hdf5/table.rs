@@ -62,19 +62,13 @@ impl ParticleTable {
     pub(super) fn new(mut parts: Vec<Part>, is_divided: bool) -> Self {
         parts.retain(|part| part.count > 0);
         let counts = parts.iter().map(|part| (part.value, part.count)).collect();
-        let cells: Vec<Vec<Piece>> = parts
-            .iter_mut()
-            .map(|part| with_three(std::mem::take(&mut part.positions)))
-            .collect();
+        let cells: Vec<Vec<Piece>> =
+            parts.iter_mut().map(|part| with_three(std::mem::take(&mut part.positions))).collect();
         let is_single = cells.iter().flatten().all(|p| p.scalar().is_exact_in_f32());
         let positions = Column {
             name: "positions".to_owned(),
             components: 3,
-            scalar: if is_single {
-                ScalarType::F32
-            } else {
-                ScalarType::F64
-            },
+            scalar: if is_single { ScalarType::F32 } else { ScalarType::F64 },
             cells,
         };
         // Collect the values of each name
@@ -312,12 +306,7 @@ impl Column {
         if !filled.all(|cell| width(cell) == components) || !(is_in_all || may_miss) {
             return Err(name);
         }
-        Ok(Self {
-            name,
-            components,
-            scalar,
-            cells,
-        })
+        Ok(Self { name, components, scalar, cells })
     }
 
     /// Bytes of its largest chunk.
@@ -376,9 +365,7 @@ fn together(cell: &[Piece], scalar: ScalarType) -> Option<(&H5File, StridedColum
     }
     let mut joined = first.clone();
     for (_, other) in others {
-        joined
-            .component_strides
-            .extend_from_slice(&other.component_strides);
+        joined.component_strides.extend_from_slice(&other.component_strides);
     }
     Some((file, joined))
 }

@@ -7,19 +7,9 @@ use crate::{Endian, ScalarType};
 /// The numbers that `datatype` stores; `None` if it stores anything but integers or floats of a usual size.
 pub(super) fn stored_scalar(datatype: &Datatype) -> Option<(ScalarType, Endian)> {
     let (scalar, order) = match datatype {
-        Datatype::FixedPoint {
-            size,
-            signed,
-            byte_order,
-        } => (integer(*size, *signed)?, byte_order),
-        Datatype::FloatingPoint {
-            size: 4,
-            byte_order,
-        } => (ScalarType::F32, byte_order),
-        Datatype::FloatingPoint {
-            size: 8,
-            byte_order,
-        } => (ScalarType::F64, byte_order),
+        Datatype::FixedPoint { size, signed, byte_order } => (integer(*size, *signed)?, byte_order),
+        Datatype::FloatingPoint { size: 4, byte_order } => (ScalarType::F32, byte_order),
+        Datatype::FloatingPoint { size: 8, byte_order } => (ScalarType::F64, byte_order),
         // Booleans of h5py, and named integers.
         Datatype::Enum { base, .. } => return stored_scalar(base),
         _ => return None,
@@ -66,12 +56,7 @@ impl Field {
             other => (other, 1),
         };
         let (scalar, endian) = stored_scalar(base)?;
-        Some(Self {
-            offset: 0,
-            scalar,
-            endian,
-            components,
-        })
+        Some(Self { offset: 0, scalar, endian, components })
     }
 
     /// The fields of numbers of a compound type, with their names.

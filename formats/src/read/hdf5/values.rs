@@ -96,10 +96,8 @@ impl Values {
             Storage::Virtual(parts) => values.find_sources(slice, parts, budget)?,
             Storage::Chunked(layout) => {
                 let stride = slice.stride.unwrap_or(1);
-                let selection = Selection {
-                    frame: slice.frame,
-                    rows: rows.start * stride..rows.end * stride,
-                };
+                let selection =
+                    Selection { frame: slice.frame, rows: rows.start * stride..rows.end * stride };
                 let grid = ChunkGrid::find(stored, layout, &selection, budget)?;
                 if grid.band_rows % stride != 0 {
                     return Ok(None);
@@ -126,12 +124,8 @@ impl Values {
         let stored = &self.stored;
         let elements = (self.row_len / stored.element_len.max(1)) as u64;
         let row = self.frame.unwrap_or(0) * self.all_rows + self.first;
-        let wanted = WantedRows {
-            field: slice.field,
-            first: row * elements,
-            count: self.count,
-            elements,
-        };
+        let wanted =
+            WantedRows { field: slice.field, first: row * elements, count: self.count, elements };
         let own = (self.scalar(), self.components());
         let mut sources = Vec::new();
         for found in source_rows(stored, parts, &wanted)? {
@@ -230,10 +224,7 @@ impl Values {
 
     /// The numbers of rows that begin at byte `start`.
     fn rows_at(&self, start: usize) -> StridedColumn {
-        let first = ComponentStride {
-            start: start + self.field.offset,
-            stride: self.row_len,
-        };
+        let first = ComponentStride { start: start + self.field.offset, stride: self.row_len };
         let scalar = (self.field.scalar, self.field.endian);
         StridedColumn::interleaved(&self.stored.path, scalar, self.field.components, first)
     }
@@ -271,9 +262,7 @@ impl Values {
         while left.len() >= width {
             let band = row / chunks.band_rows;
             let in_band = (band + 1) * chunks.band_rows - row;
-            let len = usize::try_from(in_band)
-                .unwrap_or(usize::MAX)
-                .saturating_mul(width);
+            let len = usize::try_from(in_band).unwrap_or(usize::MAX).saturating_mul(width);
             let (own, rest) = left.split_at_mut(len.min(left.len()));
             tasks.push((band, row - band * chunks.band_rows, own));
             row += in_band;
@@ -366,18 +355,11 @@ impl RowShape {
             None => {
                 let field = Field::of(&stored.datatype)?;
                 let components = field.components.checked_mul(elements)?;
-                Field {
-                    components,
-                    ..field
-                }
+                Field { components, ..field }
             }
         };
         let is_inside = field.end().is_some_and(|end| end <= row_len);
         let has_few = (1..=MOST_COMPONENTS).contains(&field.components);
-        (is_inside && has_few).then_some(Self {
-            rows,
-            row_len,
-            field,
-        })
+        (is_inside && has_few).then_some(Self { rows, row_len, field })
     }
 }

@@ -41,9 +41,7 @@ impl Selection {
     /// The elements as a range of all elements of a data set of this shape, in their order in memory; `None` if they
     /// are not one range of it.
     pub(super) fn range(&self, shape: &[u64]) -> Option<Range<u64>> {
-        let count = shape
-            .iter()
-            .try_fold(1_u64, |count, size| count.checked_mul(*size))?;
+        let count = shape.iter().try_fold(1_u64, |count, size| count.checked_mul(*size))?;
         let sides = match self {
             Self::None => return Some(0..0),
             Self::All => return Some(0..count),
@@ -94,9 +92,7 @@ pub(super) fn read_list(
         let mut name = |is_shared: bool, of: fn(&VirtualPart) -> &Arc<str>| match is_shared {
             true => {
                 let index = cursor.read_length(length_size)?;
-                let part = usize::try_from(index)
-                    .ok()
-                    .and_then(|index| parts.get(index));
+                let part = usize::try_from(index).ok().and_then(|index| parts.get(index));
                 let missing = || Error::InvalidData(format!("the name of part {index} is missing"));
                 part.map(|part| Arc::clone(of(part))).ok_or_else(missing)
             }
@@ -109,12 +105,7 @@ pub(super) fn read_list(
         let dataset = name(flags & 2 != 0, |part| &part.dataset)?;
         let source = read_selection(&mut cursor)?;
         let target = read_selection(&mut cursor)?;
-        parts.push(VirtualPart {
-            file,
-            dataset,
-            source,
-            target,
-        });
+        parts.push(VirtualPart { file, dataset, source, target });
     }
     Ok(parts)
 }
@@ -126,11 +117,7 @@ fn read_selection(cursor: &mut Cursor<'_>) -> Result<Selection, Error> {
     match (kind, version) {
         (0 | 3, 1) => {
             cursor.skip(8)?;
-            Ok(if kind == 0 {
-                Selection::None
-            } else {
-                Selection::All
-            })
+            Ok(if kind == 0 { Selection::None } else { Selection::All })
         }
         (1 | 2, 1) => {
             cursor.skip(4)?;
@@ -229,11 +216,7 @@ mod tests {
     fn boxes_of_whole_rows_are_ranges() {
         ranges(&[(2, Some(3)), (0, Some(3))], &[8, 3], Some(6..15));
         ranges(&[(2, None), (0, Some(3))], &[8, 3], Some(6..24));
-        ranges(
-            &[(1, Some(1)), (4, Some(2)), (0, Some(3))],
-            &[2, 8, 3],
-            Some(36..42),
-        );
+        ranges(&[(1, Some(1)), (4, Some(2)), (0, Some(3))], &[2, 8, 3], Some(36..42));
         ranges(&[(5, Some(3))], &[8], Some(5..8));
         ranges(&[(5, Some(1)), (1, Some(1))], &[8, 3], Some(16..17));
     }
@@ -242,11 +225,7 @@ mod tests {
     fn other_boxes_are_not() {
         // Columns, rows of several frames, more than there is, another number of dimensions
         ranges(&[(0, Some(8)), (0, Some(2))], &[8, 3], None);
-        ranges(
-            &[(0, Some(2)), (4, Some(2)), (0, Some(3))],
-            &[2, 8, 3],
-            None,
-        );
+        ranges(&[(0, Some(2)), (4, Some(2)), (0, Some(3))], &[2, 8, 3], None);
         ranges(&[(6, Some(3))], &[8], None);
         ranges(&[(9, Some(0))], &[8], None);
         ranges(&[(0, Some(1))], &[8, 3], None);

@@ -74,11 +74,7 @@ pub(super) fn source_rows(
         let from = part.source.range(&source.shape);
         let from = from.ok_or_else(|| not_rows(part))?;
         if from.end - from.start != target.end - target.start {
-            return Err(refused(
-                stored,
-                part,
-                "but another number of them; copy it with h5py",
-            ));
+            return Err(refused(stored, part, "but another number of them; copy it with h5py"));
         }
         let first = from.start + (wanted.first + rows.start * size - target.start);
         let len = (rows.end - rows.start) * size;
@@ -86,17 +82,9 @@ pub(super) fn source_rows(
         let slice = slice.ok_or_else(|| not_rows(part))?;
         let field = wanted.field;
         if field.is_some() && source.datatype != stored.datatype {
-            return Err(refused(
-                stored,
-                part,
-                "which has other fields; copy it with h5py",
-            ));
+            return Err(refused(stored, part, "which has other fields; copy it with h5py"));
         }
-        sources.push(SourceRows {
-            rows,
-            stored: source,
-            slice: Slice { field, ..slice },
-        });
+        sources.push(SourceRows { rows, stored: source, slice: Slice { field, ..slice } });
     }
     Ok(sources)
 }
@@ -139,11 +127,7 @@ fn open_source(stored: &Stored, part: &VirtualPart) -> Result<Arc<Stored>, Parse
     let dataset = dataset.ok_or_else(|| refused(stored, part, "where it is not"))?;
     let source = Stored::of(&part.dataset, &dataset)?;
     if matches!(source.place, Storage::Virtual(_)) {
-        return Err(refused(
-            stored,
-            part,
-            "which is virtual as well; copy it with h5py",
-        ));
+        return Err(refused(stored, part, "which is virtual as well; copy it with h5py"));
     }
     Ok(Arc::new(source))
 }
@@ -156,10 +140,7 @@ fn slice_of(shape: &[u64], first: u64, len: u64, size: u64) -> Option<Slice> {
     }
     let rows = first / size..(first + len) / size;
     match *shape {
-        [_] if size > 1 => Some(Slice {
-            stride: Some(size),
-            ..Slice::rows(rows)
-        }),
+        [_] if size > 1 => Some(Slice { stride: Some(size), ..Slice::rows(rows) }),
         [_] => Some(Slice::rows(rows)),
         [_, elements] if elements == size => Some(Slice::rows(rows)),
         // Frames of rows
@@ -174,10 +155,7 @@ fn framed(rows: Range<u64>, count: u64) -> Option<Slice> {
     let frame = rows.start.checked_div(count)?;
     let start = frame * count;
     let own = rows.start - start..rows.end - start;
-    (own.end <= count).then(|| Slice {
-        frame: Some(frame),
-        ..Slice::rows(own)
-    })
+    (own.end <= count).then(|| Slice { frame: Some(frame), ..Slice::rows(own) })
 }
 
 #[cfg(test)]

@@ -42,9 +42,7 @@ impl VtkHdf {
             return Err(ParseError::unsupported(what));
         }
         let steps = node.group(STEPS)?;
-        let stated = steps
-            .as_ref()
-            .map(|steps| steps.number("NSteps").and_then(integer));
+        let stated = steps.as_ref().map(|steps| steps.number("NSteps").and_then(integer));
         let step_count = match stated {
             None => 1,
             Some(stated) => {
@@ -54,12 +52,7 @@ impl VtkHdf {
                 })?
             }
         };
-        Ok(Some(Self {
-            node,
-            kind,
-            steps,
-            step_count,
-        }))
+        Ok(Some(Self { node, kind, steps, step_count }))
     }
 
     /// One number for each step from the group of steps.
@@ -106,9 +99,7 @@ impl VtkHdf {
             (Some(_), Some(part), parts) => (part, parts.unwrap_or(1)),
             (Some(_), None, parts) => (step as u64, parts.unwrap_or(1)),
         };
-        let end = part
-            .checked_add(parts)
-            .and_then(|end| usize::try_from(end).ok());
+        let end = part.checked_add(parts).and_then(|end| usize::try_from(end).ok());
         let start = usize::try_from(part).unwrap_or(usize::MAX);
         let own = end.and_then(|end| counts.get(start..end)).ok_or_else(|| {
             let what = format!(
@@ -138,10 +129,7 @@ impl Dialect for VtkHdf {
             let what = format!("/VTKHDF/Steps/Values has {count} times for {stated} steps");
             return Err(ParseError::malformed(0, what));
         }
-        let info = |step: usize| StepInfo {
-            number: None,
-            time: times.get(step).copied(),
-        };
+        let info = |step: usize| StepInfo { number: None, time: times.get(step).copied() };
         Ok((0..self.step_count).map(info).collect())
     }
 

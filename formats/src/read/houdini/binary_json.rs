@@ -302,11 +302,7 @@ impl<'a> JsonCursor<'a> {
             (ElementType::Number(scalar), _) => self.skip_numbers(count, scalar.size())?,
         }
         let bytes = self.bytes.get(start..self.reader.at()).unwrap_or_default();
-        Ok(UniformArray {
-            element,
-            count,
-            bytes,
-        })
+        Ok(UniformArray { element, count, bytes })
     }
 
     fn skip_numbers(&mut self, count: usize, size: usize) -> Result<(), ParseError> {
@@ -317,8 +313,5 @@ impl<'a> JsonCursor<'a> {
 
 /// The error for a token that the layout of geometry does not have at `at`.
 pub(super) fn unexpected(at: usize, what: &str) -> ParseError {
-    ParseError::malformed(
-        at,
-        format!("{what} expected here: the file is damaged here"),
-    )
+    ParseError::malformed(at, format!("{what} expected here: the file is damaged here"))
 }

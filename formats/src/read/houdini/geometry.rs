@@ -58,9 +58,8 @@ impl<'a> Geometry<'a> {
                     self.read_attribute(cursor, attribute, budget)
                 })
             }),
-            b"primitives" => cursor.elements(value, |cursor, _, primitive| {
-                self.read_primitive(cursor, primitive)
-            }),
+            b"primitives" => cursor
+                .elements(value, |cursor, _, primitive| self.read_primitive(cursor, primitive)),
             _ => cursor.skip(value),
         })
     }

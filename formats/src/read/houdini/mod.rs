@@ -35,9 +35,7 @@ impl Reader for Houdini {
     }
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
-        Ok(Confidence::signature_if(
-            binary_json::endian(head).is_some(),
-        ))
+        Ok(Confidence::signature_if(binary_json::endian(head).is_some()))
     }
 
     fn steps(
@@ -144,21 +142,14 @@ fn particles(
         }
         let data = attribute.values.decode(name, count, endian, left)?;
         if name != "P" {
-            particles.attributes.push(Attribute {
-                name: name.clone(),
-                components: size,
-                data,
-            });
+            particles.attributes.push(Attribute { name: name.clone(), components: size, data });
         } else if !has_positions {
             particles.positions = positions(data, size, count)?;
             has_positions = true;
         }
     }
     if !has_positions {
-        return Err(ParseError::malformed(
-            end,
-            "the points have no positions (attribute P)",
-        ));
+        return Err(ParseError::malformed(end, "the points have no positions (attribute P)"));
     }
     Ok(particles)
 }
@@ -170,22 +161,14 @@ fn positions(data: AttributeData, size: usize, count: usize) -> Result<Positions
         (4, AttributeData::F32(numbers)) => {
             let divided = numbers.as_chunks().0.iter().map(|[x, y, z, w]| {
                 let position = Vec3::new(*x, *y, *z);
-                if *w == 0.0 || *w == 1.0 {
-                    position
-                } else {
-                    position / *w
-                }
+                if *w == 0.0 || *w == 1.0 { position } else { position / *w }
             });
             Ok(Positions::F32(divided.collect()))
         }
         (4, AttributeData::F64(numbers)) => {
             let divided = numbers.as_chunks().0.iter().map(|[x, y, z, w]| {
                 let position = DVec3::new(*x, *y, *z);
-                if *w == 0.0 || *w == 1.0 {
-                    position
-                } else {
-                    position / *w
-                }
+                if *w == 0.0 || *w == 1.0 { position } else { position / *w }
             });
             Ok(Positions::F64(divided.collect()))
         }

@@ -162,15 +162,10 @@ pub(super) fn flags<'a>(
 
 /// The bits of words of 32, the lowest first.
 fn bits(array: UniformArray<'_>, endian: Endian) -> impl Iterator<Item = bool> {
-    let words = array
-        .bytes
-        .as_chunks()
-        .0
-        .iter()
-        .map(move |word| match endian {
-            Endian::Little => u32::from_le_bytes(*word),
-            Endian::Big => u32::from_be_bytes(*word),
-        });
+    let words = array.bytes.as_chunks().0.iter().map(move |word| match endian {
+        Endian::Little => u32::from_le_bytes(*word),
+        Endian::Big => u32::from_be_bytes(*word),
+    });
     let bits = words.flat_map(|word| (0..32).map(move |bit| word & (1 << bit) != 0));
     bits.take(array.count)
 }

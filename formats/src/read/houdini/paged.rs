@@ -111,10 +111,8 @@ impl<'a> StoredValues<'a> {
             b"int64" => ScalarType::I64,
             b"bool" => ScalarType::U8,
             other => {
-                let what = format!(
-                    "numbers of the unknown type `{}`",
-                    String::from_utf8_lossy(other)
-                );
+                let what =
+                    format!("numbers of the unknown type `{}`", String::from_utf8_lossy(other));
                 return Err(ParseError::malformed(self.at, what));
             }
         })
@@ -157,10 +155,7 @@ impl<'a> StoredValues<'a> {
         }
         let total = total.unwrap_or(usize::MAX);
         let need = (total as u64).saturating_add(numbers.len() as u64);
-        budget.check(
-            need.saturating_mul(scalar.size() as u64),
-            "its numbers in memory are",
-        )?;
+        budget.check(need.saturating_mul(scalar.size() as u64), "its numbers in memory are")?;
         // Decode, and put the numbers in order
         let stored = numbers.decode(endian, scalar, self.at)?;
         let is_in_order = match arrangement {
@@ -189,9 +184,7 @@ impl<'a> StoredValues<'a> {
             [] => &[self.size][..],
             packing => packing,
         };
-        let sum = widths
-            .iter()
-            .try_fold(0_usize, |sum, width| sum.checked_add(*width));
+        let sum = widths.iter().try_fold(0_usize, |sum, width| sum.checked_add(*width));
         if sum != Some(self.size) || widths.contains(&0) {
             let what = format!(
                 "the packing of attribute `{name}` is not that of {} components",
@@ -205,10 +198,8 @@ impl<'a> StoredValues<'a> {
         }
         let page_count = count.div_ceil(self.page_len.max(1));
         let flags = self.constant_pages.iter().map(Vec::as_slice);
-        let flags: Vec<&[bool]> = flags
-            .chain(std::iter::repeat(&[][..]))
-            .take(widths.len())
-            .collect();
+        let flags: Vec<&[bool]> =
+            flags.chain(std::iter::repeat(&[][..])).take(widths.len()).collect();
         let is_fit = |flags: &&[bool]| flags.is_empty() || flags.len() == page_count;
         if self.constant_pages.len() > widths.len() || !flags.iter().all(is_fit) {
             let what = format!(
@@ -218,10 +209,7 @@ impl<'a> StoredValues<'a> {
         }
         let vectors = widths.iter().zip(flags);
         Ok(vectors
-            .map(|(width, constant_pages)| PackedVector {
-                width: *width,
-                constant_pages,
-            })
+            .map(|(width, constant_pages)| PackedVector { width: *width, constant_pages })
             .collect())
     }
 
@@ -256,9 +244,7 @@ impl<'a> StoredValues<'a> {
             let count = total / self.size.max(1);
             for (component, numbers) in stored.chunks_exact(count.max(1)).enumerate() {
                 let places = all.iter_mut().skip(component).step_by(self.size.max(1));
-                places
-                    .zip(numbers)
-                    .for_each(|(place, number)| *place = *number);
+                places.zip(numbers).for_each(|(place, number)| *place = *number);
             }
             return all;
         }

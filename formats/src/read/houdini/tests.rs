@@ -51,28 +51,14 @@ fn numeric(name: &str, size: i32, storage: &str, values: &[Vec<u8>]) -> Vec<u8> 
 /// A file of `count` points with these attributes, and with `more` after them.
 fn file(count: i32, attributes: &[Vec<u8>], more: &[Vec<u8>]) -> Vec<u8> {
     let attributes = list(&[text("pointattributes"), list(attributes)]);
-    let head = [
-        text("pointcount"),
-        int(count),
-        text("attributes"),
-        attributes,
-    ];
-    [
-        b"\x7fNSJb".as_slice(),
-        &list(&[head.as_slice(), more].concat()),
-    ]
-    .concat()
+    let head = [text("pointcount"), int(count), text("attributes"), attributes];
+    [b"\x7fNSJb".as_slice(), &list(&[head.as_slice(), more].concat())].concat()
 }
 
 /// Positions of `count` points at 0.
 fn origin(count: usize) -> Vec<u8> {
     let zeros = floats(&vec![0.0; 3 * count]);
-    numeric(
-        "P",
-        3,
-        "fpreal32",
-        &[text("pagesize"), int(1024), text("rawpagedata"), zeros],
-    )
+    numeric("P", 3, "fpreal32", &[text("pagesize"), int(1024), text("rawpagedata"), zeros])
 }
 
 #[test]
@@ -102,31 +88,14 @@ fn numbers_take_the_stated_type_if_they_fit() {
         let bytes = file(2, &[origin(2), numeric("a", 1, storage, &values)], &[]);
         READER.all(&bytes).map(|mut all| all.remove(0))
     };
-    let data = |storage: &str, numbers| {
-        attribute(&read(storage, numbers).unwrap(), "a")
-            .data
-            .clone()
-    };
-    assert_eq!(
-        data("int64", ints(&[-1, 7])),
-        AttributeData::I64(vec![-1, 7])
-    );
-    assert_eq!(
-        data("uint8", ints(&[255, 0])),
-        AttributeData::U8(vec![255, 0])
-    );
-    assert_eq!(
-        data("fpreal64", floats(&[0.5, 2.0])),
-        AttributeData::F64(vec![0.5, 2.0])
-    );
-    assert_eq!(
-        data("fpreal16", floats(&[0.5, 2.0])),
-        AttributeData::F32(vec![0.5, 2.0])
-    );
+    let data =
+        |storage: &str, numbers| attribute(&read(storage, numbers).unwrap(), "a").data.clone();
+    assert_eq!(data("int64", ints(&[-1, 7])), AttributeData::I64(vec![-1, 7]));
+    assert_eq!(data("uint8", ints(&[255, 0])), AttributeData::U8(vec![255, 0]));
+    assert_eq!(data("fpreal64", floats(&[0.5, 2.0])), AttributeData::F64(vec![0.5, 2.0]));
+    assert_eq!(data("fpreal16", floats(&[0.5, 2.0])), AttributeData::F32(vec![0.5, 2.0]));
     for (storage, numbers) in [("uint8", ints(&[256, 0])), ("int32", floats(&[1.0, 2.0]))] {
-        let error = read(storage, numbers)
-            .expect_err("they do not fit")
-            .to_string();
+        let error = read(storage, numbers).expect_err("they do not fit").to_string();
         assert!(error.contains("do not fit into the stated type"), "{error}");
     }
 }
@@ -138,29 +107,16 @@ fn names_are_defined_anywhere_and_may_change() {
         b"+\x05\x0apointcount&\x05\x11\x01",
         b"+\x05\x0aattributes&\x05[\x27\x0fpointattributes+\x05\x01P[",
         &list(&[
-            list(&[
-                text("type"),
-                text("numeric"),
-                text("name"),
-                b"&\x05".to_vec(),
-            ]),
+            list(&[text("type"), text("numeric"), text("name"), b"&\x05".to_vec()]),
             list(&[
                 text("values"),
-                list(&[
-                    text("size"),
-                    int(3),
-                    text("tuples"),
-                    list(&[floats(&[1.0, 2.0, 3.0])]),
-                ]),
+                list(&[text("size"), int(3), text("tuples"), list(&[floats(&[1.0, 2.0, 3.0])])]),
             ]),
         ]),
         b"]]-\x05]",
     ]
     .concat();
-    assert_eq!(
-        coordinates(&READER.one(&bytes).positions),
-        [[1.0, 2.0, 3.0]]
-    );
+    assert_eq!(coordinates(&READER.one(&bytes).positions), [[1.0, 2.0, 3.0]]);
 }
 
 #[test]
@@ -180,38 +136,20 @@ fn packed_primitives_are_refused_by_name() {
         let definition = list(&[text("type"), text(kind)]);
         [text("primitives"), list(&[list(&[definition, list(&[])])])]
     };
-    for kind in [
-        "PackedGeometry",
-        "PackedDisk",
-        "PackedFragment_run",
-        "AlembicRef",
-    ] {
+    for kind in ["PackedGeometry", "PackedDisk", "PackedFragment_run", "AlembicRef"] {
         let error = READER.error(&file(1, &[origin(1)], &primitive(kind)));
         assert!(matches!(error, ParseError::Unsupported { .. }), "{error}");
         let name = kind.strip_suffix("_run").unwrap_or(kind);
         assert!(error.to_string().contains(&format!("({name})")), "{error}");
     }
-    let run = list(&[
-        text("type"),
-        text("run"),
-        text("runtype"),
-        text("PackedGeometry"),
-    ]);
+    let run = list(&[text("type"), text("run"), text("runtype"), text("PackedGeometry")]);
     let run = [text("primitives"), list(&[list(&[run, list(&[])])])];
-    assert!(
-        READER
-            .error(&file(1, &[origin(1)], &run))
-            .to_string()
-            .contains("Unpack node")
-    );
+    assert!(READER.error(&file(1, &[origin(1)], &run)).to_string().contains("Unpack node"));
     // Others leave the points
     let bytes = file(1, &[origin(1)], &primitive("Polygon_run"));
     assert_eq!(READER.one(&bytes).positions.len(), 1);
     let remarks = Houdini.remarks(&bytes);
-    assert_eq!(
-        remarks,
-        ["primitives (Polygon) are not used; their points are read as particles"]
-    );
+    assert_eq!(remarks, ["primitives (Polygon) are not used; their points are read as particles"]);
 }
 
 #[test]
@@ -233,14 +171,8 @@ fn remarks_have_version_and_what_is_not_read() {
 fn attributes_of_houdini_are_left_out() {
     let particles = READER.one(&sample("houdini/flip_12.bgeo"));
     assert_eq!(names(&particles), ["v", "pscale", "id", "Cd", "name"]);
-    assert_eq!(
-        numbers(&attribute(&particles, "pscale").data)[..2],
-        [f64::from(0.05_f32); 2]
-    );
-    assert_eq!(
-        numbers(&attribute(&particles, "name").data)[6..8],
-        [0.0, 1.0]
-    );
+    assert_eq!(numbers(&attribute(&particles, "pscale").data)[..2], [f64::from(0.05_f32); 2]);
+    assert_eq!(numbers(&attribute(&particles, "name").data)[6..8], [0.0, 1.0]);
 }
 
 #[test]
@@ -258,9 +190,7 @@ fn constant_pages_are_bounded_by_the_budget() {
     let step = Step::whole(bytes.len());
     let mut source = ByteSource::whole(&bytes);
     let budget = MemoryBudget::new(1 << 20, "take care");
-    let error = FORMAT
-        .read_within(&mut source, &step, budget)
-        .expect_err("a bomb");
+    let error = FORMAT.read_within(&mut source, &step, budget).expect_err("a bomb");
     assert!(matches!(error, ParseError::TooLarge { .. }), "{error}");
     assert_eq!(READER.one(&bytes).positions.len(), 64 << 16);
     let longer = file(
@@ -271,12 +201,7 @@ fn constant_pages_are_bounded_by_the_budget() {
                 "a",
                 1,
                 "int32",
-                &[
-                    text("pagesize"),
-                    int(1 << 17),
-                    text("rawpagedata"),
-                    ints(&[1]),
-                ],
+                &[text("pagesize"), int(1 << 17), text("rawpagedata"), ints(&[1])],
             ),
         ],
         &[],

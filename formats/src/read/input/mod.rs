@@ -57,9 +57,7 @@ struct Stream<'a> {
 
 impl fmt::Debug for TextInput<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("TextInput")
-            .field("at", &self.at())
-            .finish_non_exhaustive()
+        f.debug_struct("TextInput").field("at", &self.at()).finish_non_exhaustive()
     }
 }
 
@@ -104,14 +102,7 @@ impl<'a> TextInput<'a> {
     }
 
     const fn new(bytes: TextBytes<'a>) -> Self {
-        Self {
-            bytes,
-            start: 0,
-            next: 0,
-            end: usize::MAX,
-            pin: None,
-            fault: None,
-        }
+        Self { bytes, start: 0, next: 0, end: usize::MAX, pin: None, fault: None }
     }
 
     /// Returns the error of the byte stream, once.

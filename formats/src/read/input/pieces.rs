@@ -88,12 +88,7 @@ impl<'a> TextInput<'a> {
             }
         };
         let is_open = bytes.last() != Some(&b'\n');
-        Some(LinePiece {
-            at,
-            bytes,
-            lines: found,
-            ends_file: is_open && self.is_file_end(),
-        })
+        Some(LinePiece { at, bytes, lines: found, ends_file: is_open && self.is_file_end() })
     }
 
     /// Reuses the memory of `pieces` for later ones.

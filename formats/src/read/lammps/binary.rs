@@ -95,9 +95,7 @@ fn byte_order(head: &[u8]) -> Option<Endian> {
     [Endian::Little, Endian::Big].into_iter().find(|endian| {
         let len = NumberReader::new(head, 0, *endian).i64();
         let name = head.get(8..).unwrap_or_default();
-        MAGICS
-            .iter()
-            .any(|magic| name.starts_with(magic) && len == Ok(-(magic.len() as i64)))
+        MAGICS.iter().any(|magic| name.starts_with(magic) && len == Ok(-(magic.len() as i64)))
     })
 }
 
@@ -202,11 +200,8 @@ impl<'a> Frame<'a> {
             block(numbers.take(len.saturating_mul(F64))?, atoms)?;
         }
         if left > 0 {
-            let what = format!(
-                "{} atoms expected, {} in the blocks",
-                self.count,
-                self.count - left
-            );
+            let what =
+                format!("{} atoms expected, {} in the blocks", self.count, self.count - left);
             return Err(ParseError::malformed(self.count_at, what));
         }
         Ok(numbers.at())
@@ -259,9 +254,8 @@ impl<'a> Frame<'a> {
         let mut places = vec![[None; 3]; targets.len()];
         for (column, field) in columns.fields.iter().enumerate() {
             if let Some(field) = field
-                && let Some(place) = places
-                    .get_mut(field.target)
-                    .and_then(|places| places.get_mut(field.component))
+                && let Some(place) =
+                    places.get_mut(field.target).and_then(|places| places.get_mut(field.component))
             {
                 *place = Some(column);
             }
@@ -269,10 +263,7 @@ impl<'a> Frame<'a> {
         let stride = F64 * self.names.len();
         for (target, places) in targets.iter_mut().zip(places) {
             let places = places.into_iter().flatten();
-            let component = |column| ComponentStride {
-                start: F64 * column,
-                stride,
-            };
+            let component = |column| ComponentStride { start: F64 * column, stride };
             target.component_strides = places.map(component).collect();
         }
         let attributes = targets.split_off(1);

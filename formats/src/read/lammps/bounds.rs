@@ -25,10 +25,7 @@ impl Axis {
     pub(super) fn parse(line: Line<'_>) -> Self {
         // One more than allowed is enough to decide.
         let numbers: Option<Vec<f64>> = text::words(line.text).take(5).map(text::number).collect();
-        Self {
-            at: line.at,
-            numbers: numbers.unwrap_or_default(),
-        }
+        Self { at: line.at, numbers: numbers.unwrap_or_default() }
     }
 }
 
@@ -52,11 +49,9 @@ impl Bounds {
     pub(super) fn new(axes: [Axis; 3]) -> Result<Self, ParseError> {
         let [x, y, z] = axes.each_ref().map(|axis| &axis.numbers);
         match (&x[..], &y[..], &z[..]) {
-            (&[xlo, xhi], &[ylo, yhi], &[zlo, zhi]) => Ok(Self::triclinic(
-                DVec3::new(xlo, ylo, zlo),
-                DVec3::new(xhi, yhi, zhi),
-                [0.0; 3],
-            )),
+            (&[xlo, xhi], &[ylo, yhi], &[zlo, zhi]) => {
+                Ok(Self::triclinic(DVec3::new(xlo, ylo, zlo), DVec3::new(xhi, yhi, zhi), [0.0; 3]))
+            }
             (&[xlo, xhi, xy], &[ylo, yhi, xz], &[zlo, zhi, yz]) => Ok(Self::triclinic(
                 DVec3::new(xlo, ylo, zlo),
                 DVec3::new(xhi, yhi, zhi),
@@ -64,18 +59,13 @@ impl Bounds {
             )),
             (&[ax, ay, az, ox], &[bx, by, bz, oy], &[cx, cy, cz, oz]) => Ok(Self {
                 corner: DVec3::new(ox, oy, oz),
-                edges: [
-                    DVec3::new(ax, ay, az),
-                    DVec3::new(bx, by, bz),
-                    DVec3::new(cx, cy, cz),
-                ],
+                edges: [DVec3::new(ax, ay, az), DVec3::new(bx, by, bz), DVec3::new(cx, cy, cz)],
             }),
             _ => {
                 let what = "box bounds are 3 lines of 2, 3 or 4 numbers each";
                 let counts = [x.len(), y.len(), z.len()];
-                let wrong = counts
-                    .iter()
-                    .position(|count| !(2..=4).contains(count) || *count != counts[0]);
+                let wrong =
+                    counts.iter().position(|count| !(2..=4).contains(count) || *count != counts[0]);
                 Err(ParseError::malformed(axes[wrong.unwrap_or(0)].at, what))
             }
         }

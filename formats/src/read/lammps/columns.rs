@@ -111,22 +111,14 @@ fn real(name: &str, components: usize) -> TargetArray {
 /// The columns of x, y and z, and whether they are scaled. A 2D run may do without z.
 fn position_columns(column: impl Fn(&str) -> Option<usize>) -> Option<([Option<usize>; 3], bool)> {
     let found = POSITIONS.map(|(names, scaled)| (names.map(&column), scaled));
-    let solid = found
-        .iter()
-        .find(|(axes, _)| axes.iter().all(Option::is_some));
-    let flat = found
-        .iter()
-        .find(|(axes, scaled)| !scaled && axes[0].is_some() && axes[1].is_some());
+    let solid = found.iter().find(|(axes, _)| axes.iter().all(Option::is_some));
+    let flat =
+        found.iter().find(|(axes, scaled)| !scaled && axes[0].is_some() && axes[1].is_some());
     solid.or(flat).copied()
 }
 
 fn no_positions(header: &DumpHeader) -> ParseError {
-    let names: Vec<_> = header
-        .names
-        .iter()
-        .take(8)
-        .map(|n| text::shown(n))
-        .collect();
+    let names: Vec<_> = header.names.iter().take(8).map(|n| text::shown(n)).collect();
     let what = format!(
         "no positions among the columns {}: dump x y z, xu yu zu, xs ys zs or xsu ysu zsu",
         names.join(", ")

@@ -177,10 +177,7 @@ impl DumpHeader {
             }
         }
         header.count = count.ok_or_else(|| {
-            ParseError::malformed(
-                header.names_at,
-                "atoms without ITEM: NUMBER OF ATOMS before",
-            )
+            ParseError::malformed(header.names_at, "atoms without ITEM: NUMBER OF ATOMS before")
         })?;
         Ok(header)
     }

@@ -208,9 +208,7 @@ fn read(
         attributes,
         time: header.time,
         step: header.number,
-        cell: header
-            .bounds
-            .and_then(|bounds| bounds.cell(header.periodic)),
+        cell: header.bounds.and_then(|bounds| bounds.cell(header.periodic)),
         bonds: Vec::new(),
     })
 }
@@ -248,10 +246,7 @@ impl LinePair {
             let end = line.map(|line| line.at + line.text.len());
             let next = text.line().map(|line| {
                 let token = line.text.trim_ascii();
-                ItemValue {
-                    integer: text::integer(token),
-                    number: text::number(token),
-                }
+                ItemValue { integer: text::integer(token), number: text::number(token) }
             });
             // A value without a newline may lack digits.
             let next = next.filter(|_| text.is_behind_newline());
@@ -287,20 +282,13 @@ fn check_start(text: &mut TextInput<'_>) -> Result<(), ParseError> {
     }
     text.pass_blanks();
     text.want(ITEM.len());
-    if text.rest().starts_with(ITEM) {
-        Ok(())
-    } else {
-        Err(not_a_dump(text.head()))
-    }
+    if text.rest().starts_with(ITEM) { Ok(()) } else { Err(not_a_dump(text.head())) }
 }
 
 fn not_a_dump(bytes: &[u8]) -> ParseError {
     let head = bytes.get(..64).unwrap_or(bytes);
     // A binary dump may begin with the name of its style.
-    if MAGICS
-        .iter()
-        .any(|magic| memmem::find(head, magic).is_some())
-    {
+    if MAGICS.iter().any(|magic| memmem::find(head, magic).is_some()) {
         return ParseError::unsupported(
             "a binary LAMMPS dump: write it as text, or convert it with binary2txt",
         );
@@ -308,10 +296,7 @@ fn not_a_dump(bytes: &[u8]) -> ParseError {
     if ITEM.starts_with(bytes) {
         return ParseError::malformed(bytes.len(), format!("no step yet: {CUT_SHORT}"));
     }
-    let what = format!(
-        "a LAMMPS dump begins with ITEM: TIMESTEP, not {}",
-        text::shown(head)
-    );
+    let what = format!("a LAMMPS dump begins with ITEM: TIMESTEP, not {}", text::shown(head));
     ParseError::malformed(0, what)
 }
 

@@ -19,10 +19,8 @@ pub(in crate::read) fn remarks(head: &[u8]) -> Vec<String> {
             && matches!(DumpItem::of(line.text), DumpItem::Bounds | DumpItem::Atoms)
     });
     if let Some(bounds) = bounds.filter(|line| DumpItem::of(line.text) == DumpItem::Bounds) {
-        let flags: Vec<_> = boundary_flags(bounds.text)
-            .into_iter()
-            .map(String::from_utf8_lossy)
-            .collect();
+        let flags: Vec<_> =
+            boundary_flags(bounds.text).into_iter().map(String::from_utf8_lossy).collect();
         let is_periodic = flags.iter().any(|flag| flag.contains('p'));
         remarks.push(cell_remark(is_periodic.then(|| flags.join(" ")).as_deref()));
     }

@@ -44,10 +44,7 @@ fn agrees_with_the_same_particles_raw() {
     assert_agrees_with_raw(&particles);
     assert_eq!(whole(&particles, "id")[..2], [9459, 9568]);
     assert_eq!(whole(&particles, "type")[0], 1);
-    assert_eq!(
-        real(&particles, "velocity")[..4],
-        [-4.783, 0.0314533, 0.280406, -0.594408]
-    );
+    assert_eq!(real(&particles, "velocity")[..4], [-4.783, 0.0314533, 0.280406, -0.594408]);
     assert_eq!(attribute(&particles, "velocity").components, 3);
     assert_eq!(particles.attributes.len(), 3);
     assert_eq!((particles.step, particles.time), (Some(0), None));
@@ -64,10 +61,7 @@ fn steps_of_one_file() {
     assert_eq!(range(&steps[1]).end, bytes.len());
     let second = read(&bytes, &steps[1]).unwrap();
     assert_eq!(second.positions.len(), 200);
-    assert_eq!(
-        second.positions.get(0),
-        DVec3::new(-0.957812, -0.49793, 0.336167)
-    );
+    assert_eq!(second.positions.get(0), DVec3::new(-0.957812, -0.49793, 0.336167));
     assert_eq!(second.step, Some(400));
 }
 
@@ -85,17 +79,10 @@ fn dump_in_gzip() {
 #[test]
 fn scaled_positions_fill_the_box() {
     for columns in ["xs ys zs id", "xsu ysu zsu id"] {
-        let particles = only(&dump(
-            BOX,
-            columns,
-            &["0 0 0 1", "0.5 1 0.25 2", "1.5 -1 2 3"],
-        ))
-        .unwrap();
-        let expected = [
-            DVec3::new(-10., 0., 100.),
-            DVec3::new(0., 5., 101.),
-            DVec3::new(20., -5., 108.),
-        ];
+        let particles =
+            only(&dump(BOX, columns, &["0 0 0 1", "0.5 1 0.25 2", "1.5 -1 2 3"])).unwrap();
+        let expected =
+            [DVec3::new(-10., 0., 100.), DVec3::new(0., 5., 101.), DVec3::new(20., -5., 108.)];
         assert_eq!(f64_positions(&particles), expected);
     }
     let without = dump("", "xs ys zs", &["0 0 0"]);
@@ -189,11 +176,7 @@ fn columns_of_every_type() {
     ];
     assert_eq!(names, expected);
     assert_eq!(whole(&particles, "element")[0], 6);
-    assert!(
-        whole(&particles, "typelabel")
-            .iter()
-            .all(|code| *code >= 1000)
-    );
+    assert!(whole(&particles, "typelabel").iter().all(|code| *code >= 1000));
     let twice = only(&dump(BOX, "x y z vx vy vz vx", &["0 0 0 1 2 3 4"])).unwrap();
     assert_eq!(real(&twice, "velocity"), [1., 2., 3.]);
     assert_eq!(real(&twice, "vx"), [4.]);
@@ -236,14 +219,9 @@ fn remarks_name_the_cell_and_the_elements() {
     for end in 0..text.len() {
         remarks::remarks(&text.as_bytes()[..end]);
     }
-    let shrink = text
-        .replace("xy xz yz pp pp ff", "ss ss ss")
-        .replace("element", "c");
+    let shrink = text.replace("xy xz yz pp pp ff", "ss ss ss").replace("element", "c");
     let remarks = remarks::remarks(shrink.as_bytes());
-    assert!(
-        remarks.len() == 1 && !remarks[0].contains("periodic"),
-        "{remarks:?}"
-    );
+    assert!(remarks.len() == 1 && !remarks[0].contains("periodic"), "{remarks:?}");
 }
 
 #[test]
@@ -257,10 +235,7 @@ fn units_time_blanks_and_line_ends() {
         let bytes = text.as_bytes();
         let steps = steps(bytes).unwrap();
         let found: Vec<_> = steps.iter().map(|step| (step.number, step.time)).collect();
-        let expected = [
-            (Some(5_000_000_000), Some(0.5)),
-            (Some(5_000_000_001), Some(1.5)),
-        ];
+        let expected = [(Some(5_000_000_000), Some(0.5)), (Some(5_000_000_001), Some(1.5))];
         assert_eq!(found, expected);
         let first = read(bytes, &steps[0]).unwrap();
         assert_eq!(f64_positions(&first), [DVec3::new(1., 2., 3.)]);
@@ -276,14 +251,7 @@ fn last_copy_of_a_repeated_step_wins() {
     let step = |number: i64, x: i64| {
         dump(BOX, "x y z", &[&format!("{x} 0 0")]).replace("STEP\n0", &format!("STEP\n{number}"))
     };
-    let text = [
-        step(0, 1),
-        step(10, 2),
-        step(20, 3),
-        step(10, 4),
-        step(20, 5),
-    ]
-    .concat();
+    let text = [step(0, 1), step(10, 2), step(20, 3), step(10, 4), step(20, 5)].concat();
     let steps = steps(text.as_bytes()).unwrap();
     let found: Vec<_> = steps
         .iter()
@@ -292,10 +260,7 @@ fn last_copy_of_a_repeated_step_wins() {
             (step.index, step.number, particles.positions.get(0).x)
         })
         .collect();
-    assert_eq!(
-        found,
-        [(0, Some(0), 1.), (1, Some(10), 4.), (2, Some(20), 5.)]
-    );
+    assert_eq!(found, [(0, Some(0), 1.), (1, Some(10), 4.), (2, Some(20), 5.)]);
 }
 
 #[test]
@@ -310,10 +275,7 @@ fn truncated_last_step() {
         assert_eq!(read(cut, &found[0]).unwrap(), expected, "{len}");
         if let Some(last) = found.get(1) {
             let error = read(cut, last).unwrap_err();
-            assert!(
-                error.to_string().contains("perhaps still being written"),
-                "{len}: {error}"
-            );
+            assert!(error.to_string().contains("perhaps still being written"), "{len}: {error}");
         } else {
             assert!(len < second + 5, "{len}");
         }
@@ -324,11 +286,7 @@ fn truncated_last_step() {
     // A number without its last digits must not take the place of another step.
     let text =
         "ITEM: TIMESTEP\n12\nITEM: NUMBER OF ATOMS\n0\nITEM: ATOMS x y z\nITEM: TIMESTEP\n12";
-    let numbers: Vec<_> = steps(text.as_bytes())
-        .unwrap()
-        .iter()
-        .map(|s| s.number)
-        .collect();
+    let numbers: Vec<_> = steps(text.as_bytes()).unwrap().iter().map(|s| s.number).collect();
     assert_eq!(numbers, [Some(12), None]);
 }
 
@@ -355,38 +313,17 @@ fn faults_are_described() {
         (dump(BOX, "x y z", &["1 2"]), "line has 2 of 3 columns"),
         (dump(BOX, "x y z", &["1 2 3 4"]), "more than 3 columns"),
         (dump(BOX, "x y z", &["1 2 W"]), "column 3 has \"W\""),
-        (
-            dump(BOX, "id x y z", &["1 1 1 1", "b 1 2 3"]),
-            "column 1 has \"b\"",
-        ),
-        (
-            dump(BOX, "x y z", &["1 2 3"]) + "4 5 6\n",
-            "more lines than the 1 atoms",
-        ),
-        (
-            dump("ITEM: BOX BOUNDS\n0 1\n0\n0 1\n", "x y z", &[]),
-            "byte 62: box bounds",
-        ),
-        (
-            dump("ITEM: BOX BOUNDS\n0 1\n0 a\n0 1\n", "x y z", &[]),
-            "byte 62: box bounds",
-        ),
+        (dump(BOX, "id x y z", &["1 1 1 1", "b 1 2 3"]), "column 1 has \"b\""),
+        (dump(BOX, "x y z", &["1 2 3"]) + "4 5 6\n", "more lines than the 1 atoms"),
+        (dump("ITEM: BOX BOUNDS\n0 1\n0\n0 1\n", "x y z", &[]), "byte 62: box bounds"),
+        (dump("ITEM: BOX BOUNDS\n0 1\n0 a\n0 1\n", "x y z", &[]), "byte 62: box bounds"),
         (
             dump(BOX, "x y z", &[]).replace("ATOMS\n0", "ATOMS\n-1"),
             "\"-1\" is not a number of atoms",
         ),
-        (
-            dump(BOX, "x y z", &[]).replace("STEP\n0", "STEP\n0.5"),
-            "byte 15: the step is \"0.5\"",
-        ),
-        (
-            "ITEM: TIMESTEP\n0\nITEM: ATOMS x y z\n".into(),
-            "without ITEM: NUMBER OF ATOMS",
-        ),
-        (
-            "ITEM: TIMESTEP\n0\nITEM: NUMBER OF ENTRIES\n0\nITEM: ENTRIES a\n".into(),
-            "dump custom",
-        ),
+        (dump(BOX, "x y z", &[]).replace("STEP\n0", "STEP\n0.5"), "byte 15: the step is \"0.5\""),
+        ("ITEM: TIMESTEP\n0\nITEM: ATOMS x y z\n".into(), "without ITEM: NUMBER OF ATOMS"),
+        ("ITEM: TIMESTEP\n0\nITEM: NUMBER OF ENTRIES\n0\nITEM: ENTRIES a\n".into(), "dump custom"),
     ];
     for (text, expected) in cases {
         let found = fault(&text);
@@ -406,11 +343,7 @@ fn faults_are_described() {
 
 #[test]
 fn huge_counts_allocate_nothing() {
-    for count in [
-        "9000000000000000000",
-        "99999999999",
-        "99999999999999999999999",
-    ] {
+    for count in ["9000000000000000000", "99999999999", "99999999999999999999999"] {
         let text = dump(BOX, "x y z", &["1 2 3"]).replace("ATOMS\n1", &format!("ATOMS\n{count}"));
         let found = fault(&text);
         assert!(

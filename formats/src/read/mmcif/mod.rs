@@ -112,10 +112,7 @@ impl Reader for MmCif {
                 break;
             }
             let element = atoms::element(&row.symbol, &row.name, &row.residue_name);
-            let whole = [
-                element,
-                row.residue.or(row.label_residue).unwrap_or_default(),
-            ];
+            let whole = [element, row.residue.or(row.label_residue).unwrap_or_default()];
             let real = [row.occupancy.unwrap_or(1.0), row.b_factor.unwrap_or(0.0)];
             atoms.push(row.position, &whole, &real)?;
         }
@@ -131,10 +128,7 @@ impl Reader for MmCif {
     }
 
     fn remarks(&self, _head: &[u8]) -> Vec<String> {
-        vec![
-            remarks::units("angstroms", None, None),
-            remarks::cell_remark(None),
-        ]
+        vec![remarks::units("angstroms", None, None), remarks::cell_remark(None)]
     }
 }
 

@@ -233,11 +233,7 @@ impl AtomRows {
                 self.row.at = self.line_at + at;
             }
             let value = self.line.get(at..at + len).unwrap_or_default();
-            let token = Token {
-                text: value,
-                at,
-                is_quoted,
-            };
+            let token = Token { text: value, at, is_quoted };
             if let Some(column) = self.columns.get(index) {
                 self.row.set(*column, token, self.line_at + at)?;
             }
@@ -262,8 +258,7 @@ impl AtomRows {
             let Some(line) = text.line() else {
                 return Ok(None);
             };
-            self.budget
-                .check(2 * line.text.len() as u64, "it has a line that is")?;
+            self.budget.check(2 * line.text.len() as u64, "it has a line that is")?;
             self.line_at = line.at;
             if line.text.starts_with(b";") {
                 let what = "_atom_site has text of several lines, which is not read";

@@ -38,23 +38,12 @@ pub(super) fn next(line: &[u8], from: usize) -> Option<(Token<'_>, usize)> {
         let ends = |i: &usize| rest.get(i + 1).is_none_or(u8::is_ascii_whitespace);
         let end = memchr::memchr_iter(first, rest).skip(1).find(ends);
         if let Some(end) = end {
-            let token = Token {
-                text: rest.get(1..end).unwrap_or_default(),
-                at,
-                is_quoted: true,
-            };
+            let token = Token { text: rest.get(1..end).unwrap_or_default(), at, is_quoted: true };
             return Some((token, at + end + 1));
         }
     }
-    let end = rest
-        .iter()
-        .position(u8::is_ascii_whitespace)
-        .unwrap_or(rest.len());
-    let token = Token {
-        text: rest.get(..end).unwrap_or_default(),
-        at,
-        is_quoted: false,
-    };
+    let end = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
+    let token = Token { text: rest.get(..end).unwrap_or_default(), at, is_quoted: false };
     Some((token, at + end))
 }
 

@@ -51,20 +51,13 @@ impl<'a> Archive<'a> {
             return Err(ParseError::malformed(0, "npz members overlap"));
         }
         if zip.has_duplicate_names() {
-            return Err(ParseError::malformed(
-                0,
-                "npz with two arrays of one name; save it again",
-            ));
+            return Err(ParseError::malformed(0, "npz with two arrays of one name; save it again"));
         }
         let mut members = Vec::new();
         for index in 0..zip.len() {
             members.extend(member::open(&mut zip, index)?);
         }
-        Ok(Self {
-            bytes,
-            zip,
-            members,
-        })
+        Ok(Self { bytes, zip, members })
     }
 
     /// See [`super::steps`].
@@ -147,11 +140,7 @@ impl<'a> Archive<'a> {
         let Some([count]) = shapes.first() else {
             return None;
         };
-        let layout = ArrayLayout {
-            frames: None,
-            count: *count,
-            planes: false,
-        };
+        let layout = ArrayLayout { frames: None, count: *count, planes: false };
         let fits = |axis: &usize| {
             let member = self.members.get(*axis)?;
             layout.attribute(&member.name, &member.header, 0)
@@ -270,15 +259,8 @@ impl<'a> Archive<'a> {
         };
         // Read as one "particle" a step.
         let count: usize = found.header.shape.iter().product();
-        let list = ArrayLayout {
-            frames: None,
-            count,
-            planes: false,
-        };
-        let flat = NpyHeader {
-            shape: vec![count],
-            ..found.header.clone()
-        };
+        let list = ArrayLayout { frames: None, count, planes: false };
+        let flat = NpyHeader { shape: vec![count], ..found.header.clone() };
         let Some(column) = list.attribute(&found.name, &flat, 0) else {
             return Ok(None);
         };
@@ -306,9 +288,5 @@ fn decode(
         return Ok(None);
     }
     let data = columns::values(bytes, count, &column)?;
-    Ok(Some(Attribute {
-        name: column.name,
-        components,
-        data,
-    }))
+    Ok(Some(Attribute { name: column.name, components, data }))
 }

@@ -56,29 +56,14 @@ pub(super) fn parse(descr: &Literal, at: usize) -> Result<ItemType, ParseError> 
     match descr {
         Literal::Text(code) => parse_code(code, at),
         Literal::Sequence(fields) => {
-            let mut record = RecordBuilder {
-                at,
-                fields: Vec::new(),
-                size: 0,
-                pickled: false,
-            };
+            let mut record = RecordBuilder { at, fields: Vec::new(), size: 0, pickled: false };
             for field in fields {
                 record.add(field)?;
             }
-            let dtype = if record.pickled {
-                Dtype::Pickled
-            } else {
-                Dtype::Record(record.fields)
-            };
-            Ok(ItemType {
-                dtype,
-                size: record.size,
-            })
+            let dtype = if record.pickled { Dtype::Pickled } else { Dtype::Record(record.fields) };
+            Ok(ItemType { dtype, size: record.size })
         }
-        _ => Err(ParseError::malformed(
-            at,
-            "npy header: descr is not a dtype",
-        )),
+        _ => Err(ParseError::malformed(at, "npy header: descr is not a dtype")),
     }
 }
 
@@ -94,10 +79,7 @@ fn parse_code(code: &str, at: usize) -> Result<ItemType, ParseError> {
     let mut chars = rest.chars();
     let kind = chars.next().ok_or_else(bad)?;
     if kind == 'O' {
-        return Ok(ItemType {
-            dtype: Dtype::Pickled,
-            size: 0,
-        });
+        return Ok(ItemType { dtype: Dtype::Pickled, size: 0 });
     }
     // A unit may follow, as in `<M8[ns]`.
     let digits = chars.as_str().split('[').next().unwrap_or_default();
@@ -169,20 +151,14 @@ impl RecordBuilder {
         match item.dtype {
             Dtype::Pickled => self.pickled = true,
             Dtype::Plain(number) if (1..=MAX_COMPONENTS).contains(&components) => {
-                self.fields.push(RecordField {
-                    name: name.to_owned(),
-                    offset,
-                    number,
-                    components,
-                });
+                self.fields.push(RecordField { name: name.to_owned(), offset, number, components });
             }
             Dtype::Record(inner) if components == 1 => {
-                self.fields
-                    .extend(inner.into_iter().map(|field| RecordField {
-                        name: format!("{name}.{}", field.name),
-                        offset: offset + field.offset,
-                        ..field
-                    }));
+                self.fields.extend(inner.into_iter().map(|field| RecordField {
+                    name: format!("{name}.{}", field.name),
+                    offset: offset + field.offset,
+                    ..field
+                }));
             }
             Dtype::Plain(_) | Dtype::Record(_) | Dtype::Opaque(_) => {}
         }

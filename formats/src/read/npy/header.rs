@@ -35,10 +35,7 @@ pub(super) struct NpyHeader {
 /// [`ParseError::Unsupported`] for versions after 3.
 pub(super) fn length(bytes: &[u8]) -> Result<usize, ParseError> {
     let Some(rest) = bytes.strip_prefix(MAGIC) else {
-        return Err(ParseError::malformed(
-            0,
-            "not an npy file: it does not begin with \\x93NUMPY",
-        ));
+        return Err(ParseError::malformed(0, "not an npy file: it does not begin with \\x93NUMPY"));
     };
     let (start, text) = match rest {
         [1, _, a, b, ..] => (10, usize::from(u16::from_le_bytes([*a, *b]))),
@@ -86,10 +83,7 @@ impl NpyHeader {
         };
         let Literal::Dict(entries) = literal::parse(&text, |before| start + bytes_of(before))?
         else {
-            return Err(ParseError::malformed(
-                start,
-                "npy header is not a dictionary",
-            ));
+            return Err(ParseError::malformed(start, "npy header is not a dictionary"));
         };
         let entry = |name: &str| {
             let named = |(key, _): &&(Literal, Literal)| *key == Literal::Text(name.to_owned());
@@ -105,13 +99,7 @@ impl NpyHeader {
         let shape = shape.ok_or_else(|| bad("no shape of non-negative sizes"))?;
         let bytes = array_bytes(&shape, item.size)
             .ok_or_else(|| bad(&format!("an array of shape {} overflows", show(&shape))))?;
-        Ok(Self {
-            item,
-            fortran,
-            shape,
-            data,
-            bytes,
-        })
+        Ok(Self { item, fortran, shape, data, bytes })
     }
 
     /// Refuses an array whose items do not fit a file of `len` bytes.
@@ -160,9 +148,8 @@ impl NpyHeader {
 /// Bytes of all items. Dimensions of 0 count as 1 in the check for overflow, so that no partial
 /// product can overflow either.
 fn array_bytes(shape: &[usize], item: usize) -> Option<usize> {
-    let most = shape
-        .iter()
-        .try_fold(item, |bytes: usize, size| bytes.checked_mul((*size).max(1)))?;
+    let most =
+        shape.iter().try_fold(item, |bytes: usize, size| bytes.checked_mul((*size).max(1)))?;
     Some(if shape.contains(&0) { 0 } else { most })
 }
 

@@ -46,11 +46,7 @@ impl ArrayLayout {
 
     fn of_shape(header: &NpyHeader) -> Result<Self, ParseError> {
         let shape = header.shape.as_slice();
-        let layout = |frames, count, planes| Self {
-            frames,
-            count,
-            planes,
-        };
+        let layout = |frames, count, planes| Self { frames, count, planes };
         match (&header.item.dtype, shape) {
             (Dtype::Pickled, _) => Err(ParseError::unsupported(
                 "pickled python objects ('|O'), which are never unpickled; save plain arrays with \
@@ -110,20 +106,14 @@ impl ArrayLayout {
             _ => (header.data, header.item.size),
         };
         let column = |field: &RecordField| {
-            let first = ComponentStride {
-                start: start + field.offset,
-                stride,
-            };
+            let first = ComponentStride { start: start + field.offset, stride };
             let scalar = (field.number.scalar, field.number.endian);
             StridedColumn::interleaved(&field.name, scalar, field.components, first)
         };
         let places = position_fields(fields)?;
         let axes = places.iter().filter_map(|p| fields.get(*p)).map(column);
         let axes = axes.collect();
-        let others = fields
-            .iter()
-            .enumerate()
-            .filter(|(place, _)| !places.contains(place));
+        let others = fields.iter().enumerate().filter(|(place, _)| !places.contains(place));
         let attributes = columns::group_vectors(others.map(|(_, field)| column(field)).collect());
         Ok(ParticleLayout::new(self.count, axes, attributes))
     }
@@ -184,25 +174,16 @@ fn component_strides(
     stride: usize,
     dimensions: &[(usize, usize)],
 ) -> Option<Vec<ComponentStride>> {
-    let components = dimensions
-        .iter()
-        .try_fold(1, |n: usize, (size, _)| n.checked_mul(*size))?;
+    let components = dimensions.iter().try_fold(1, |n: usize, (size, _)| n.checked_mul(*size))?;
     if components > MAX_COMPONENTS {
         return None;
     }
     let mut starts = vec![start];
     for (size, step) in dimensions {
-        starts = starts
-            .iter()
-            .flat_map(|start| (0..*size).map(move |i| start + i * step))
-            .collect();
+        starts =
+            starts.iter().flat_map(|start| (0..*size).map(move |i| start + i * step)).collect();
     }
-    Some(
-        starts
-            .into_iter()
-            .map(|start| ComponentStride { start, stride })
-            .collect(),
-    )
+    Some(starts.into_iter().map(|start| ComponentStride { start, stride }).collect())
 }
 
 /// The fields that are the position: one with two or three components, or x, y and perhaps z.

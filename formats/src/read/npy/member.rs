@@ -31,30 +31,20 @@ pub(super) fn open(
     zip: &mut ZipArchive<Cursor<&[u8]>>,
     index: usize,
 ) -> Result<Option<ArrayMember>, ParseError> {
-    let mut file = zip
-        .by_index(index)
-        .map_err(|e| zip_error(&e, "npz member"))?;
+    let mut file = zip.by_index(index).map_err(|e| zip_error(&e, "npz member"))?;
     let full_name = String::from_utf8_lossy(file.name_raw()).into_owned();
     let Some(name) = full_name.strip_suffix(".npy") else {
         return Ok(None);
     };
     let method = file.compression();
-    if !matches!(
-        method,
-        CompressionMethod::Stored | CompressionMethod::Deflated
-    ) {
+    if !matches!(method, CompressionMethod::Stored | CompressionMethod::Deflated) {
         return Err(ParseError::unsupported(format!(
             "npz member {name}: compressed by {method}; save with numpy.savez_compressed"
         )));
     }
     let size = usize::try_from(file.size()).unwrap_or(usize::MAX);
     let start = place(file.header_start());
-    if file.size()
-        > file
-            .compressed_size()
-            .saturating_add(1)
-            .saturating_mul(MAX_DEFLATE_RATIO)
-    {
+    if file.size() > file.compressed_size().saturating_add(1).saturating_mul(MAX_DEFLATE_RATIO) {
         return Err(ParseError::malformed(
             start,
             format!(
@@ -74,11 +64,7 @@ pub(super) fn open(
     read_to(&mut text, len)?;
     let header = NpyHeader::parse(&text).map_err(|e| in_member(e, name))?;
     header.check_items(size).map_err(|e| in_member(e, name))?;
-    Ok(Some(ArrayMember {
-        index,
-        name: name.to_owned(),
-        header,
-    }))
+    Ok(Some(ArrayMember { index, name: name.to_owned(), header }))
 }
 
 /// All bytes of a member: a slice of the archive if it is stored, else inflated, if `budget` allows that and
@@ -89,9 +75,7 @@ pub(super) fn contents<'a>(
     member: &ArrayMember,
     budget: MemoryBudget,
 ) -> Result<Cow<'a, [u8]>, ParseError> {
-    let mut file = zip
-        .by_index(member.index)
-        .map_err(|e| zip_error(&e, &member.name))?;
+    let mut file = zip.by_index(member.index).map_err(|e| zip_error(&e, &member.name))?;
     let start = place(file.data_start().unwrap_or(0));
     let damaged =
         |what: String| ParseError::malformed(start, format!("member {}: {what}", member.name));
@@ -109,19 +93,14 @@ pub(super) fn contents<'a>(
     }
     let too_large = |e| in_member(e, &member.name);
     let need = file.size().saturating_mul(2);
-    budget
-        .check(need, "decompressed it is")
-        .map_err(too_large)?;
+    budget.check(need, "decompressed it is").map_err(too_large)?;
     let mut inflated = Vec::with_capacity(size.min(MAX_RESERVE));
     // One byte more than stated shows that the member continues.
     let bound = file.size().saturating_add(1);
     let read = file.by_ref().take(bound).read_to_end(&mut inflated);
     read.map_err(|e| damaged(e.to_string()))?;
     if inflated.len() != size {
-        return Err(damaged(format!(
-            "{size} bytes expected, {} or more found",
-            inflated.len()
-        )));
+        return Err(damaged(format!("{size} bytes expected, {} or more found", inflated.len())));
     }
     Ok(Cow::Owned(inflated))
 }

@@ -117,9 +117,7 @@ impl Reader for Npz {
     fn unpacked_arrays_len(&self, _head: &[u8], file: FileExtent, particles: &RawParticles) -> u64 {
         let all_steps = particles.byte_len().saturating_mul(file.step_count);
         if file.byte_len < all_steps {
-            particles
-                .largest_array_len()
-                .saturating_mul(file.step_count)
+            particles.largest_array_len().saturating_mul(file.step_count)
         } else {
             0
         }
@@ -129,9 +127,7 @@ impl Reader for Npz {
 /// True if `head` begins a ZIP of USD files.
 pub(crate) fn is_usdz(head: &[u8]) -> bool {
     // Local file header: name at 30, its length at 26.
-    let length = head
-        .get(26..28)
-        .map_or(0, |len| usize::from(len[0]) | usize::from(len[1]) << 8);
+    let length = head.get(26..28).map_or(0, |len| usize::from(len[0]) | usize::from(len[1]) << 8);
     let name = head.get(30..30 + length).unwrap_or_default();
     let is_usd = [&b".usd"[..], b".usda", b".usdc"]
         .iter()
@@ -192,16 +188,11 @@ fn check_frame(layout: &ArrayLayout, frame: usize) -> Result<(), ParseError> {
     if frame < frames {
         return Ok(());
     }
-    Err(ParseError::malformed(
-        0,
-        format!("step {frame} is not among the {frames} of the file"),
-    ))
+    Err(ParseError::malformed(0, format!("step {frame} is not among the {frames} of the file")))
 }
 
 /// One step for each index into the first dimension.
 fn frame_steps(layout: &ArrayLayout) -> Vec<Step> {
     let frames = layout.frames.unwrap_or(1);
-    (0..frames)
-        .map(|index| Step::with_key(index, index as u64))
-        .collect()
+    (0..frames).map(|index| Step::with_key(index, index as u64)).collect()
 }

@@ -182,11 +182,7 @@ fn read(
 ) -> Result<RawParticles, ParseError> {
     let range = step.byte_range().cloned().unwrap_or_default();
     // What precedes the first model is about all of them. Atoms are not passed: text in pieces only goes forward.
-    let mut cell = if text.at() > 0 {
-        header_cell(text.head())
-    } else {
-        None
-    };
+    let mut cell = if text.at() > 0 { header_cell(text.head()) } else { None };
     while text.at() < range.start {
         let Some(line) = text.peek_line().filter(|line| !is_atom(*line)) else {
             break;

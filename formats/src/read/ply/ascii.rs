@@ -29,16 +29,10 @@ pub(super) fn read(
         skip(text, element)?;
     }
     check_room(text, vertices)?;
-    let room = vertices
-        .count
-        .min(most_records(text.left_about(), vertices));
+    let room = vertices.count.min(most_records(text.left_about(), vertices));
     let mut growing = GrowingParticles::new(layout, room, budget);
     // Records without properties have no lines.
-    let lines = if vertices.properties.is_empty() {
-        0
-    } else {
-        vertices.count
-    };
+    let lines = if vertices.properties.is_empty() { 0 } else { vertices.count };
     let mut packed = Vec::new();
     let mut left = lines;
     while left > 0 {
@@ -105,18 +99,10 @@ pub(super) fn next_line<'t>(
         let Some(len) = text.line_len() else {
             return Err(ParseError::malformed(
                 at,
-                format!(
-                    "file ends before {} lines of element {}",
-                    element.count, element.name
-                ),
+                format!("file ends before {} lines of element {}", element.count, element.name),
             ));
         };
-        let is_blank = text
-            .rest()
-            .get(..len)
-            .unwrap_or_default()
-            .trim_ascii()
-            .is_empty();
+        let is_blank = text.rest().get(..len).unwrap_or_default().trim_ascii().is_empty();
         if !is_blank {
             return Ok((at, text.take_line(len)));
         }
@@ -219,10 +205,7 @@ fn whole_number(word: &[u8]) -> Option<i64> {
     /// Beyond this an f64 is no longer sure to be the number that was meant.
     const EXACT: f64 = 9_007_199_254_740_992.0;
     let number: f64 = parse(word)?;
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "checked to be whole and within 53 bits"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "checked to be whole and within 53 bits")]
     (number.fract() == 0.0 && number.abs() <= EXACT).then_some(number as i64)
 }
 

@@ -26,10 +26,7 @@ pub(super) fn vertex_records<'a>(
     header: &PlyHeader,
     vertices: &Element,
 ) -> Result<VertexRecords<'a>, ParseError> {
-    let before = header
-        .elements
-        .iter()
-        .take_while(|e| !std::ptr::eq(*e, vertices));
+    let before = header.elements.iter().take_while(|e| !std::ptr::eq(*e, vertices));
     let stride = vertices.scalar_bytes();
     let packed = match header.encoding {
         PlyEncoding::Ascii => Vec::new(),
@@ -40,20 +37,12 @@ pub(super) fn vertex_records<'a>(
             }
             check_room(at, vertices.count, vertices.least_bytes(), bytes.len())?;
             if !vertices.has_lists() {
-                return Ok(VertexRecords {
-                    bytes: Cow::Borrowed(bytes),
-                    start: at,
-                    stride,
-                });
+                return Ok(VertexRecords { bytes: Cow::Borrowed(bytes), start: at, stride });
             }
             pack(bytes, at, vertices, endian)?
         }
     };
-    Ok(VertexRecords {
-        bytes: Cow::Owned(packed),
-        start: 0,
-        stride,
-    })
+    Ok(VertexRecords { bytes: Cow::Owned(packed), start: 0, stride })
 }
 
 /// The byte after all records of `element`, which begin at `at`.
@@ -67,17 +56,12 @@ pub(super) fn skip(
     endian: Endian,
 ) -> Result<usize, ParseError> {
     let least = element.least_bytes();
-    let fits = element
-        .count
-        .checked_mul(least)
-        .is_some_and(|need| need <= bytes.len().saturating_sub(at));
+    let fits =
+        element.count.checked_mul(least).is_some_and(|need| need <= bytes.len().saturating_sub(at));
     if !fits {
         return Err(ParseError::malformed(
             at,
-            format!(
-                "{} records of element {} do not fit the file",
-                element.count, element.name
-            ),
+            format!("{} records of element {} do not fit the file", element.count, element.name),
         ));
     }
     if !element.has_lists() {
@@ -135,11 +119,7 @@ pub(super) fn walk<'a>(
     for property in &element.properties {
         let stored = property.length.unwrap_or(property.scalar);
         let number = take(at, stored.size())?;
-        let mut values = PropertyValues {
-            property,
-            at,
-            bytes: number,
-        };
+        let mut values = PropertyValues { property, at, bytes: number };
         if property.length.is_some() {
             let items = unsigned(number, stored, endian).ok_or_else(|| {
                 let what = format!("list {} has a negative or absurd length", property.name);
@@ -162,10 +142,8 @@ pub(super) fn unsigned(number: &[u8], stored: ScalarType, endian: Endian) -> Opt
     if endian == Endian::Big {
         used.reverse();
     }
-    let signed = matches!(
-        stored,
-        ScalarType::I8 | ScalarType::I16 | ScalarType::I32 | ScalarType::I64
-    );
+    let signed =
+        matches!(stored, ScalarType::I8 | ScalarType::I16 | ScalarType::I32 | ScalarType::I64);
     let negative = used.last().is_some_and(|top| *top >= 0x80);
     if signed && negative {
         return None;

@@ -90,11 +90,7 @@ impl PlyHeader {
         }
         let encoding =
             encoding.ok_or_else(|| ParseError::malformed(0, "ply header without a format line"))?;
-        Ok(Self {
-            encoding,
-            elements,
-            body: lines.at,
-        })
+        Ok(Self { encoding, elements, body: lines.at })
     }
 
     /// The first element called `name`.
@@ -117,17 +113,10 @@ impl<'a> HeaderLines<'a> {
         let is_space = |b: &u8| b.is_ascii_whitespace();
         let rest = bytes.strip_prefix(b"ply");
         let Some(rest) = rest.filter(|rest| rest.first().is_none_or(is_space)) else {
-            return Err(ParseError::malformed(
-                0,
-                "no ply file: the first line is not `ply`",
-            ));
+            return Err(ParseError::malformed(0, "no ply file: the first line is not `ply`"));
         };
         let old_mac = rest.first() == Some(&b'\r') && rest.get(1) != Some(&b'\n');
-        let mut lines = Self {
-            bytes,
-            at: 0,
-            end_of_line: if old_mac { b'\r' } else { b'\n' },
-        };
+        let mut lines = Self { bytes, at: 0, end_of_line: if old_mac { b'\r' } else { b'\n' } };
         lines.next()?;
         Ok(lines)
     }
@@ -171,40 +160,26 @@ fn parse_element<'w>(
             format!("the number of {} is `{}`", shorten(name), shorten(count)),
         )
     })?;
-    Ok(Element {
-        name: name.to_owned(),
-        count,
-        properties: Vec::new(),
-    })
+    Ok(Element { name: name.to_owned(), count, properties: Vec::new() })
 }
 
 fn parse_property<'w>(
     at: usize,
     mut words: impl Iterator<Item = &'w str>,
 ) -> Result<Property, ParseError> {
-    let mut next = || {
-        words
-            .next()
-            .ok_or_else(|| ParseError::malformed(at, "property without type and name"))
-    };
+    let mut next =
+        || words.next().ok_or_else(|| ParseError::malformed(at, "property without type and name"));
     let first = next()?;
     let (length, scalar) = if first == "list" {
         let length = scalar_type(at, next()?)?;
         if matches!(length, ScalarType::F32 | ScalarType::F64) {
-            return Err(ParseError::malformed(
-                at,
-                "a list is counted in floating point",
-            ));
+            return Err(ParseError::malformed(at, "a list is counted in floating point"));
         }
         (Some(length), scalar_type(at, next()?)?)
     } else {
         (None, scalar_type(at, first)?)
     };
-    Ok(Property {
-        name: next()?.to_owned(),
-        scalar,
-        length,
-    })
+    Ok(Property { name: next()?.to_owned(), scalar, length })
 }
 
 /// Both sets of type names; 64-bit integers are an extension that some writers use.
@@ -221,10 +196,7 @@ fn scalar_type(at: usize, word: &str) -> Result<ScalarType, ParseError> {
         "float" | "float32" => ScalarType::F32,
         "double" | "float64" => ScalarType::F64,
         _ => {
-            return Err(ParseError::malformed(
-                at,
-                format!("unknown ply type `{}`", shorten(word)),
-            ));
+            return Err(ParseError::malformed(at, format!("unknown ply type `{}`", shorten(word))));
         }
     })
 }

@@ -18,9 +18,7 @@ pub(crate) fn read_mesh(bytes: &[u8], budget: MemoryBudget) -> Result<Mesh, Pars
         return Err(ParseError::unsupported("ply without a vertex element"));
     };
     if header.element("face").is_none_or(|faces| faces.count == 0)
-        && header
-            .element("tristrips")
-            .is_some_and(|strips| strips.count > 0)
+        && header.element("tristrips").is_some_and(|strips| strips.count > 0)
     {
         return Err(ParseError::unsupported(
             "a ply of triangle strips (tristrips), which are not read; export faces",

@@ -133,9 +133,8 @@ fn is_named(column: &StridedColumn, name: &str) -> bool {
 
 /// The element that holds the particles.
 fn vertices(header: &PlyHeader) -> Result<&Element, ParseError> {
-    let faces = ["face", "tristrips"]
-        .iter()
-        .find_map(|name| header.element(name).filter(|e| e.count > 0));
+    let faces =
+        ["face", "tristrips"].iter().find_map(|name| header.element(name).filter(|e| e.count > 0));
     if let Some(faces) = faces {
         // Strips are counted as one, and are not drawn
         let (count, remedy) = match faces.name.as_str() {
@@ -166,10 +165,7 @@ fn vertex_columns(
     let mut columns = Vec::with_capacity(vertices.properties.len());
     for property in vertices.properties.iter().filter(|p| p.length.is_none()) {
         let name = property.name.strip_prefix("scalar_");
-        let first = ComponentStride {
-            start: offset,
-            stride,
-        };
+        let first = ComponentStride { start: offset, stride };
         let name = name.unwrap_or(&property.name);
         let column = StridedColumn::interleaved(name, (property.scalar, endian), 1, first);
         columns.push(column);

@@ -13,11 +13,7 @@ pub(in crate::read) struct Cell<'a> {
 
 /// The fields of `line`. What follows the last separator is a field, too, if empty.
 pub(in crate::read) fn cells(line: &[u8], separator: u8) -> Cells<'_> {
-    Cells {
-        line,
-        separator,
-        next: Some(0),
-    }
+    Cells { line, separator, next: Some(0) }
 }
 
 /// See [`cells`].
@@ -37,11 +33,7 @@ impl<'a> Iterator for Cells<'a> {
             let rest = self.line.get(from..).unwrap_or_default();
             memchr(self.separator, rest).map_or(self.line.len(), |separator| from + separator)
         };
-        while self
-            .line
-            .get(start)
-            .is_some_and(|b| is_blank(*b) && *b != self.separator)
-        {
+        while self.line.get(start).is_some_and(|b| is_blank(*b) && *b != self.separator) {
             start += 1;
         }
         let mut end = end_of_cell(start);
@@ -56,10 +48,7 @@ impl<'a> Iterator for Cells<'a> {
         self.next = (end < self.line.len()).then_some(end + 1);
         let slice = &self.line[start..text_end];
         let trimmed = slice.trim_ascii_start();
-        Some(Cell {
-            at: start + (slice.len() - trimmed.len()),
-            text: trimmed.trim_ascii_end(),
-        })
+        Some(Cell { at: start + (slice.len() - trimmed.len()), text: trimmed.trim_ascii_end() })
     }
 }
 

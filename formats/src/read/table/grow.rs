@@ -26,11 +26,7 @@ impl GrowingColumn {
                 NumberKind::WholeIfAll => ColumnValues::Whole(with_room(room)),
             }
         };
-        Self {
-            values: targets.iter().map(empty).collect(),
-            bytes: 0,
-            budget,
-        }
+        Self { values: targets.iter().map(empty).collect(), bytes: 0, budget }
     }
 
     /// Appends the values of the next piece.

@@ -115,12 +115,7 @@ impl TargetArray {
         numbers: NumberKind,
         on_text: TextPolicy,
     ) -> Self {
-        Self {
-            name: name.into(),
-            components,
-            numbers,
-            on_text,
-        }
+        Self { name: name.into(), components, numbers, on_text }
     }
 
     /// An attribute for a column of names.
@@ -187,10 +182,7 @@ pub(super) struct RowsRead<T = Particles> {
 impl RowsRead {
     /// Of up to `most` lines that are not looked into because of `error`.
     pub(super) fn without(error: ParseError, text: &mut TextInput<'_>, most: usize) -> Self {
-        Self {
-            lines: text.pass_lines(most),
-            content: Err(error),
-        }
+        Self { lines: text.pass_lines(most), content: Err(error) }
     }
 }
 
@@ -214,10 +206,8 @@ impl Table {
             if some.is_empty() {
                 break None;
             }
-            let parsed: Vec<Result<Vec<ColumnValues>, ParseError>> = some
-                .par_iter()
-                .map(|piece| self.rows_of(piece).parse())
-                .collect();
+            let parsed: Vec<Result<Vec<ColumnValues>, ParseError>> =
+                some.par_iter().map(|piece| self.rows_of(piece).parse()).collect();
             let mut before = lines;
             lines += some.iter().map(|piece| piece.lines).sum::<usize>();
             let fault = some.iter().zip(parsed).find_map(|(piece, parsed)| {
@@ -231,10 +221,7 @@ impl Table {
                 break fault;
             }
         };
-        RowsRead {
-            lines,
-            content: fault.map_or_else(|| Ok(values.into_values()), Err),
-        }
+        RowsRead { lines, content: fault.map_or_else(|| Ok(values.into_values()), Err) }
     }
 
     /// [`Self::parse`] with target 0 taken for the positions and the rest for attributes.
@@ -256,9 +243,7 @@ impl Table {
         let (Some(labels), ParseError::Malformed { at, .. }) = (&self.labels, &error) else {
             return error.behind(piece.at);
         };
-        let passed = usize::try_from(*at)
-            .ok()
-            .and_then(|at| piece.bytes.get(..at));
+        let passed = usize::try_from(*at).ok().and_then(|at| piece.bytes.get(..at));
         let passed = memchr::memchr_iter(b'\n', passed.unwrap_or_default()).count();
         let line = labels.first_line + before + passed;
         let message = |what: &str| match what.strip_prefix("line ") {
@@ -309,9 +294,7 @@ struct Rows<'t> {
 
 fn particles(targets: Vec<TargetArray>, values: Vec<ColumnValues>) -> Particles {
     let mut values = values.into_iter();
-    let positions = values
-        .next()
-        .map_or(Positions::F64(Vec::new()), ColumnValues::into_positions);
+    let positions = values.next().map_or(Positions::F64(Vec::new()), ColumnValues::into_positions);
     let attributes = targets.into_iter().skip(1).zip(values);
     let attributes = attributes
         .filter_map(|(target, values)| {
@@ -415,11 +398,7 @@ impl Rows<'_> {
         let Some(place) = self.fields[field] else {
             return Ok(());
         };
-        let TargetArray {
-            components,
-            on_text,
-            ..
-        } = self.targets[place.target];
+        let TargetArray { components, on_text, .. } = self.targets[place.target];
         let from_end = components - place.component;
         if on_text == TextPolicy::Category {
             values[place.target].set_whole(from_end, category::code(token));
@@ -442,17 +421,11 @@ impl Rows<'_> {
             return Ok(());
         }
         let what = format!("line has {found} of {} columns", self.fields.len());
-        Err(ParseError::malformed(
-            line.at,
-            self.with_cause(line.at, what),
-        ))
+        Err(ParseError::malformed(line.at, self.with_cause(line.at, what)))
     }
 
     fn surplus(&self, at: usize) -> ParseError {
-        ParseError::malformed(
-            at,
-            format!("line has more than {} columns", self.fields.len()),
-        )
+        ParseError::malformed(at, format!("line has more than {} columns", self.fields.len()))
     }
 
     /// Adds the likely cause if the fault at byte `at` is in an unfinished last line.

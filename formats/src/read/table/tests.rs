@@ -15,12 +15,7 @@ fn scalar(numbers: NumberKind, on_text: TextPolicy) -> TargetArray {
 
 /// A table of one column for each of `targets`.
 fn columns(bytes: &[u8], dialect: Dialect, targets: Vec<TargetArray>) -> WholeText<'_> {
-    let place = |target| {
-        Some(TargetComponent {
-            target,
-            component: 0,
-        })
-    };
+    let place = |target| Some(TargetComponent { target, component: 0 });
     let table = Table {
         dialect,
         fields: (0..targets.len()).map(place).collect(),
@@ -58,10 +53,7 @@ fn fields_are_assigned_by_name() {
     let table = Table {
         dialect: WORDS,
         fields: vec![place(1, 0), place(0, 2), place(0, 0), place(0, 1)],
-        targets: vec![
-            TargetArray::positions(),
-            scalar(NumberKind::WholeIfAll, TextPolicy::Fault),
-        ],
+        targets: vec![TargetArray::positions(), scalar(NumberKind::WholeIfAll, TextPolicy::Fault)],
         rows: 2,
         labels: None,
     };
@@ -78,9 +70,8 @@ fn fields_are_assigned_by_name() {
 fn integers_widen_to_floats_and_text() {
     let whole = || scalar(NumberKind::WholeIfAll, TextPolicy::LeaveOut);
     let parse = |text: &str| {
-        let mut values = columns(text.as_bytes(), WORDS, vec![whole()])
-            .parse(MemoryBudget::UNLIMITED)
-            .unwrap();
+        let mut values =
+            columns(text.as_bytes(), WORDS, vec![whole()]).parse(MemoryBudget::UNLIMITED).unwrap();
         values.pop().unwrap()
     };
     let big = "9007199254740993";
@@ -103,15 +94,10 @@ fn many_pieces_are_joined_in_order() {
         scalar(NumberKind::WholeIfAll, TextPolicy::Fault),
         scalar(NumberKind::WholeIfAll, TextPolicy::Fault),
     ];
-    let values = columns(text.as_bytes(), WORDS, targets)
-        .parse(MemoryBudget::UNLIMITED)
-        .unwrap();
+    let values = columns(text.as_bytes(), WORDS, targets).parse(MemoryBudget::UNLIMITED).unwrap();
     let ids = (0..rows).map(i64::from).collect();
     let halves = (0..rows).map(|i| f64::from(i) * 0.5).collect();
-    assert_eq!(
-        values,
-        [ColumnValues::Whole(ids), ColumnValues::Real(halves)]
-    );
+    assert_eq!(values, [ColumnValues::Whole(ids), ColumnValues::Real(halves)]);
 }
 
 #[test]
@@ -119,15 +105,8 @@ fn the_first_fault_is_reported() {
     let mut text = "1\n".repeat(PIECE);
     text.replace_range(10..11, "x");
     text.replace_range(PIECE + 100..PIECE + 101, "y");
-    let table = columns(
-        text.as_bytes(),
-        WORDS,
-        vec![scalar(NumberKind::Real, TextPolicy::Fault)],
-    );
-    let error = table
-        .parse(MemoryBudget::UNLIMITED)
-        .unwrap_err()
-        .to_string();
+    let table = columns(text.as_bytes(), WORDS, vec![scalar(NumberKind::Real, TextPolicy::Fault)]);
+    let error = table.parse(MemoryBudget::UNLIMITED).unwrap_err().to_string();
     assert_eq!(error, "byte 10: column 1 has \"x\", not a number");
 }
 
@@ -141,20 +120,11 @@ fn unfinished_last_line_is_described() {
     };
     let error = |text: &str| {
         let table = columns(text.as_bytes(), WORDS, two());
-        table
-            .parse(MemoryBudget::UNLIMITED)
-            .unwrap_err()
-            .to_string()
+        table.parse(MemoryBudget::UNLIMITED).unwrap_err().to_string()
     };
     let cut = "the file is cut short, perhaps still being written";
-    assert_eq!(
-        error("1 2\n3"),
-        format!("byte 4: line has 1 of 2 columns: {cut}")
-    );
-    assert_eq!(
-        error("1 2\n3 -"),
-        format!("byte 6: column 2 has \"-\", not a number: {cut}")
-    );
+    assert_eq!(error("1 2\n3"), format!("byte 4: line has 1 of 2 columns: {cut}"));
+    assert_eq!(error("1 2\n3 -"), format!("byte 6: column 2 has \"-\", not a number: {cut}"));
     assert_eq!(error("1\n3 4\n"), "byte 0: line has 1 of 2 columns");
     assert_eq!(error("1 2 3\n"), "byte 4: line has more than 2 columns");
 }
@@ -167,14 +137,8 @@ fn cells_are_trimmed_and_unquoted() {
             .collect();
         found
     };
-    assert_eq!(
-        split(" a ; b;;", b';'),
-        [(1, "a"), (5, "b"), (7, ""), (8, "")]
-    );
-    assert_eq!(
-        split(r#""x, y" ,"z",1"#, b','),
-        [(1, "x, y"), (9, "z"), (12, "1")]
-    );
+    assert_eq!(split(" a ; b;;", b';'), [(1, "a"), (5, "b"), (7, ""), (8, "")]);
+    assert_eq!(split(r#""x, y" ,"z",1"#, b','), [(1, "x, y"), (9, "z"), (12, "1")]);
     assert_eq!(split(r#""a""b",c"#, b','), [(1, r#"a""b"#), (7, "c")]);
     assert_eq!(split(r#""open,c"#, b','), [(0, r#""open"#), (6, "c")]);
     assert_eq!(split("a\t b\t", b'\t'), [(0, "a"), (3, "b"), (5, "")]);
@@ -194,12 +158,8 @@ fn empty_cells_are_nan_and_commas_may_be_points() {
         scalar(NumberKind::WholeIfAll, TextPolicy::LeaveOut),
     ];
     let text = b"# 1;2\n1,5;2;\n // 3\n;3;;\n";
-    let values = columns(text, dialect, targets)
-        .parse(MemoryBudget::UNLIMITED)
-        .unwrap();
-    let [ColumnValues::Real(a), b] = &values[..] else {
-        panic!("{values:?}")
-    };
+    let values = columns(text, dialect, targets).parse(MemoryBudget::UNLIMITED).unwrap();
+    let [ColumnValues::Real(a), b] = &values[..] else { panic!("{values:?}") };
     assert!(a[0] == 1.5 && a[1].is_nan() && a.len() == 2);
     assert_eq!(b.clone().into_data(), Some(AttributeData::I64(vec![2, 3])));
 }

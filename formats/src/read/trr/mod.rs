@@ -56,11 +56,7 @@ impl Reader for Trr {
         let frame = Frame::parse(bytes, step.start())?;
         let layout = frame.layout(bytes)?;
         budget.check(layout.byte_len(), "its numbers in memory are")?;
-        Ok(RawParticles {
-            cell: frame.cell(bytes),
-            bonds: Vec::new(),
-            ..layout.particles(bytes)?
-        })
+        Ok(RawParticles { cell: frame.cell(bytes), bonds: Vec::new(), ..layout.particles(bytes)? })
     }
 
     /// `None` for several frames.
@@ -158,12 +154,7 @@ impl Frame {
         Ok(Self {
             count,
             scalar,
-            summary: FrameSummary {
-                end,
-                number,
-                time,
-                has_positions: x > 0 || count == 0,
-            },
+            summary: FrameSummary { end, number, time, has_positions: x > 0 || count == 0 },
             box_at: block(box_len, box_at),
             blocks: [block(x, x_at), block(v, v_at), block(f, f_at)],
         })
@@ -195,9 +186,7 @@ impl Frame {
             let scalar = (self.scalar, Endian::Big);
             columns.push(StridedColumn::interleaved(name, scalar, 3, first));
         }
-        let axes = columns
-            .drain(..usize::from(self.blocks[0].is_some()))
-            .collect();
+        let axes = columns.drain(..usize::from(self.blocks[0].is_some())).collect();
         Ok(ParticleLayout {
             time: Some(self.summary.time),
             step: Some(self.summary.number.into()),
@@ -208,11 +197,9 @@ impl Frame {
 
 /// The type of the numbers, by the lengths of the box and of the blocks of `count` atoms.
 fn scalar(box_len: usize, blocks: [usize; 3], count: usize) -> Option<ScalarType> {
-    [ScalarType::F32, ScalarType::F64]
-        .into_iter()
-        .find(|scalar| {
-            let block = 3 * scalar.size() * count;
-            (box_len == 0 || box_len == 9 * scalar.size())
-                && blocks.iter().all(|length| *length == 0 || *length == block)
-        })
+    [ScalarType::F32, ScalarType::F64].into_iter().find(|scalar| {
+        let block = 3 * scalar.size() * count;
+        (box_len == 0 || box_len == 9 * scalar.size())
+            && blocks.iter().all(|length| *length == 0 || *length == block)
+    })
 }

@@ -40,17 +40,8 @@ impl<'a> Layer<'a> {
             let what = "not a USD file: it begins neither with PXR-USDC nor with #usda";
             return Err(ParseError::malformed(0, what));
         };
-        let PrimTree {
-            prims,
-            properties,
-            metadata,
-        } = tree;
-        Ok(Self {
-            source,
-            prims,
-            properties,
-            metadata,
-        })
+        let PrimTree { prims, properties, metadata } = tree;
+        Ok(Self { source, prims, properties, metadata })
     }
 }
 
@@ -66,9 +57,7 @@ impl Layer<'_> {
 
     /// The properties of a prim.
     pub(super) fn properties(&self, prim: &Prim) -> &[Property] {
-        self.properties
-            .get(prim.properties.clone())
-            .unwrap_or_default()
+        self.properties.get(prim.properties.clone()).unwrap_or_default()
     }
 
     /// The property `name` of a prim.
@@ -98,10 +87,7 @@ impl Layer<'_> {
         let prims = chain.iter().filter_map(|index| self.prims.get(*index));
         let names = prims.map(|prim| {
             let name = self.text(&prim.name);
-            format!(
-                "/{}",
-                String::from_utf8_lossy(name.get(..80).unwrap_or(name))
-            )
+            format!("/{}", String::from_utf8_lossy(name.get(..80).unwrap_or(name)))
         });
         names.collect()
     }

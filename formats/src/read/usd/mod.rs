@@ -90,9 +90,7 @@ impl Reader for Usd {
         step: &Step,
         budget: MemoryBudget,
     ) -> Result<RawParticles, ParseError> {
-        let time = Some(step.key())
-            .filter(|key| *key != NO_TIME)
-            .map(f64::from_bits);
+        let time = Some(step.key()).filter(|key| *key != NO_TIME).map(f64::from_bits);
         with_layer(source.bytes(), budget, |layer, _| {
             let prims = ParticlePrims::find(layer)?;
             let mut particles = particles::particles(layer, &prims, time, budget)?;
@@ -144,10 +142,7 @@ fn with_layer<T>(
 }
 
 /// A time code as the number of a frame, if it is whole.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "whole numbers of up to 53 bits"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "whole numbers of up to 53 bits")]
 fn whole(time: f64) -> Option<i64> {
     let is_whole = time.trunc() == time && time.abs() < 9e15;
     is_whole.then_some(time as i64)

@@ -25,19 +25,11 @@ pub(super) struct NumberType {
 
 impl NumberType {
     pub(super) const fn new(scalar: Scalar, components: usize) -> Self {
-        Self {
-            scalar,
-            components,
-            is_quaternion: false,
-        }
+        Self { scalar, components, is_quaternion: false }
     }
 
     pub(super) const fn quaternion(scalar: Scalar) -> Self {
-        Self {
-            scalar,
-            components: 4,
-            is_quaternion: true,
-        }
+        Self { scalar, components: 4, is_quaternion: true }
     }
 
     /// Type of the numbers in memory.
@@ -132,14 +124,9 @@ impl Numbers {
         }
         match (&mut self.data, &next.data) {
             (AttributeData::F32(v), AttributeData::F32(w)) => {
-                let between = if self.components == 1 {
-                    between_scalars
-                } else {
-                    between_components
-                };
-                v.iter_mut()
-                    .zip(w)
-                    .for_each(|(a, b)| *a = between(*a, *b, weight));
+                let between =
+                    if self.components == 1 { between_scalars } else { between_components };
+                v.iter_mut().zip(w).for_each(|(a, b)| *a = between(*a, *b, weight));
             }
             (AttributeData::F64(v), AttributeData::F64(w)) => {
                 let between = |a: f64, b: f64| (1.0 - weight) * a + weight * b;

@@ -11,12 +11,8 @@ const HEADER_LEN: usize = 30;
 /// # Errors
 /// [`ParseError::Malformed`] if it is not inside the archive; [`ParseError::Unsupported`] if it is compressed.
 pub(super) fn first_file(bytes: &[u8]) -> Result<std::ops::Range<usize>, ParseError> {
-    let cut = || {
-        ParseError::malformed(
-            bytes.len(),
-            format!("no USD file in the package: {CUT_SHORT}"),
-        )
-    };
+    let cut =
+        || ParseError::malformed(bytes.len(), format!("no USD file in the package: {CUT_SHORT}"));
     let header = bytes.get(..HEADER_LEN).ok_or_else(cut)?;
     let u16_at = |at: usize| usize::from(header[at]) | usize::from(header[at + 1]) << 8;
     let u32_at = |at: usize| u16_at(at) | u16_at(at + 2) << 16;

@@ -100,10 +100,7 @@ fn part(
     let Some(mut positions) = positions.filter(|positions| positions.len() > 0) else {
         return Ok(None);
     };
-    let is_float = matches!(
-        positions.data,
-        AttributeData::F32(_) | AttributeData::F64(_)
-    );
+    let is_float = matches!(positions.data, AttributeData::F32(_) | AttributeData::F64(_));
     if positions.components != 3 || !is_float {
         let path = layer.path(&chain);
         let what = format!("the positions of {path} are not vectors of three numbers");
@@ -139,17 +136,9 @@ fn part(
         }
         *budget = budget.less(data.byte_len());
         names.insert(name.clone());
-        columns.push(Column {
-            name,
-            components: values.components,
-            data,
-        });
+        columns.push(Column { name, components: values.components, data });
     }
-    Ok(Some(Part {
-        number,
-        positions,
-        columns,
-    }))
+    Ok(Some(Part { number, positions, columns }))
 }
 
 /// Whether a prim is hidden at a time code.
@@ -207,9 +196,7 @@ fn values(
         _ => return Ok(Some(values)),
     };
     let need = (indices.len() * values.components * values.data.scalar_type().size()) as u64;
-    budget
-        .less(4 * indices.len() as u64)
-        .check(need, "its numbers in memory are")?;
+    budget.less(4 * indices.len() as u64).check(need, "its numbers in memory are")?;
     // An index beyond the list: the values of the primvar are not known
     let data = at_indices(&values.data, values.components, &indices);
     Ok(data.map(|data| Numbers { data, ..values }))
@@ -260,9 +247,8 @@ fn for_each_particle(
 
 fn transformed(positions: &AttributeData, world: DAffine3) -> AttributeData {
     let points = (0..positions.len() / 3).flat_map(|index| {
-        let point = DVec3::from_array(std::array::from_fn(|axis| {
-            positions.get_f64(3 * index + axis)
-        }));
+        let point =
+            DVec3::from_array(std::array::from_fn(|axis| positions.get_f64(3 * index + axis)));
         world.transform_point3(point).to_array()
     });
     AttributeData::F64(points.collect())
@@ -280,16 +266,13 @@ fn transform_attribute(name: &str, data: &mut AttributeData, world: DAffine3) {
         }
         AttributeData::F64(v) if is_vector => {
             for vector in v.as_chunks_mut::<3>().0 {
-                *vector = world
-                    .transform_vector3(DVec3::from_array(*vector))
-                    .to_array();
+                *vector = world.transform_vector3(DVec3::from_array(*vector)).to_array();
             }
         }
         #[expect(clippy::cast_possible_truncation, reason = "to the type of the file")]
         AttributeData::F32(v) if name == DIAMETER => {
             let factor = libm::cbrt(world.matrix3.determinant().abs());
-            v.iter_mut()
-                .for_each(|width| *width = (f64::from(*width) * factor) as f32);
+            v.iter_mut().for_each(|width| *width = (f64::from(*width) * factor) as f32);
         }
         AttributeData::F64(v) if name == DIAMETER => {
             let factor = libm::cbrt(world.matrix3.determinant().abs());
@@ -300,14 +283,9 @@ fn transform_attribute(name: &str, data: &mut AttributeData, world: DAffine3) {
 }
 
 fn part_numbers(parts: &[Part]) -> Attribute {
-    let numbers = parts
-        .iter()
-        .flat_map(|part| std::iter::repeat_n(part.number, part.positions.len()));
-    Attribute {
-        name: PART.to_owned(),
-        components: 1,
-        data: AttributeData::U32(numbers.collect()),
-    }
+    let numbers =
+        parts.iter().flat_map(|part| std::iter::repeat_n(part.number, part.positions.len()));
+    Attribute { name: PART.to_owned(), components: 1, data: AttributeData::U32(numbers.collect()) }
 }
 
 /// The attributes of all parts. A scalar of floating point that some parts do not have is NaN there; other attributes
@@ -325,23 +303,14 @@ fn joined(parts: &mut [Part], is_divided: bool) -> Vec<Attribute> {
     for part in &mut *parts {
         part.columns.sort_by(|a, b| a.name.cmp(&b.name));
     }
-    names
-        .into_iter()
-        .filter_map(|name| joined_column(parts, name))
-        .collect()
+    names.into_iter().filter_map(|name| joined_column(parts, name)).collect()
 }
 
 fn joined_column(parts: &mut [Part], name: String) -> Option<Attribute> {
-    let find = |part: &Part| {
-        part.columns
-            .binary_search_by(|column| column.name.cmp(&name))
-            .ok()
-    };
+    let find = |part: &Part| part.columns.binary_search_by(|column| column.name.cmp(&name)).ok();
     let places: Vec<Option<usize>> = parts.iter().map(find).collect();
-    let mut there = parts
-        .iter()
-        .zip(&places)
-        .filter_map(|(part, place)| part.columns.get((*place)?));
+    let mut there =
+        parts.iter().zip(&places).filter_map(|(part, place)| part.columns.get((*place)?));
     let first = there.next()?;
     let (components, scalar) = (first.components, first.data.scalar_type());
     let is_float = matches!(scalar, ScalarType::F32 | ScalarType::F64);
@@ -367,23 +336,13 @@ fn joined_column(parts: &mut [Part], name: String) -> Option<Attribute> {
         };
         data.append(&mut own);
     }
-    Some(Attribute {
-        name,
-        components,
-        data,
-    })
+    Some(Attribute { name, components, data })
 }
 
 fn joined_positions(parts: Vec<AttributeData>) -> Positions {
-    let is_single = parts
-        .iter()
-        .all(|part| matches!(part, AttributeData::F32(_)));
+    let is_single = parts.iter().all(|part| matches!(part, AttributeData::F32(_)));
     let count = parts.iter().map(AttributeData::len).sum::<usize>() / 3;
-    let scalar = if is_single {
-        ScalarType::F32
-    } else {
-        ScalarType::F64
-    };
+    let scalar = if is_single { ScalarType::F32 } else { ScalarType::F64 };
     let mut all = columns::zeros(scalar, 0);
     for part in parts {
         let mut part = match part {

@@ -29,8 +29,7 @@ impl Metadata {
     /// Time codes of a second, with the default of USD.
     pub(super) fn rate(&self) -> f64 {
         let rate = self.time_codes_per_second.or(self.frames_per_second);
-        rate.filter(|rate| rate.is_finite() && *rate > 0.0)
-            .unwrap_or(24.0)
+        rate.filter(|rate| rate.is_finite() && *rate > 0.0).unwrap_or(24.0)
     }
 }
 
@@ -103,10 +102,7 @@ pub(super) struct TextValue {
 #[derive(Debug, Clone)]
 pub(super) enum Samples {
     /// Bytes of the times and of the values: 8 for each.
-    Binary {
-        times: Range<usize>,
-        values: Range<usize>,
-    },
+    Binary { times: Range<usize>, values: Range<usize> },
     /// Sorted by time.
     Text(Vec<(f64, TextValue)>),
 }

@@ -31,18 +31,11 @@ pub(super) fn remarks(layer: &Layer<'_>) -> Vec<String> {
     let path = |prim: &usize| layer.path(&layer.chain(*prim).unwrap_or_default());
     if prims.prims.len() > 1 {
         let parts = prims.prims.iter().take(LISTED).enumerate();
-        let parts: Vec<String> = parts
-            .map(|(number, prim)| format!("{number} = {}", path(prim)))
-            .collect();
-        let more = if prims.prims.len() > LISTED {
-            ", ..."
-        } else {
-            ""
-        };
-        remarks.push(format!(
-            "attribute `{PART}` has numbers for prims: {}{more}",
-            parts.join(", ")
-        ));
+        let parts: Vec<String> =
+            parts.map(|(number, prim)| format!("{number} = {}", path(prim))).collect();
+        let more = if prims.prims.len() > LISTED { ", ..." } else { "" };
+        remarks
+            .push(format!("attribute `{PART}` has numbers for prims: {}{more}", parts.join(", ")));
     }
     // Attributes whose meaning is not in their name
     let has = |name: &str| {
@@ -53,16 +46,10 @@ pub(super) fn remarks(layer: &Layer<'_>) -> Vec<String> {
         })
     };
     if has(DIAMETER) {
-        remarks.push(format!(
-            "the widths of points are the attribute `{DIAMETER}`"
-        ));
+        remarks.push(format!("the widths of points are the attribute `{DIAMETER}`"));
     }
-    let is_instancer = |prim: &usize| {
-        layer
-            .prims
-            .get(*prim)
-            .is_some_and(|prim| prim.kind == PrimKind::Instancer)
-    };
+    let is_instancer =
+        |prim: &usize| layer.prims.get(*prim).is_some_and(|prim| prim.kind == PrimKind::Instancer);
     if prims.prims.iter().any(is_instancer) {
         let what = "the instances of a PointInstancer are particles; its prototypes and orientations are not used";
         remarks.push(what.to_owned());
@@ -81,11 +68,7 @@ pub(super) fn remarks(layer: &Layer<'_>) -> Vec<String> {
 
 /// Whether prims with particles, or those above them, have transforms.
 fn is_transformed(layer: &Layer<'_>, prims: &ParticlePrims) -> bool {
-    let mut chains = prims
-        .prims
-        .iter()
-        .take(LISTED)
-        .filter_map(|prim| layer.chain(*prim));
+    let mut chains = prims.prims.iter().take(LISTED).filter_map(|prim| layer.chain(*prim));
     chains.any(|chain| {
         let mut all = chain.iter().filter_map(|index| layer.prims.get(*index));
         all.any(|prim| {

@@ -39,11 +39,7 @@ impl ParticlePrims {
     pub(super) fn find(layer: &Layer<'_>) -> Result<Self, ParseError> {
         let children = Children::of(layer);
         let mut found = Vec::new();
-        let mut pending = vec![Visit {
-            prim: 0,
-            level: 0,
-            has_arcs: false,
-        }];
+        let mut pending = vec![Visit { prim: 0, level: 0, has_arcs: false }];
         while let Some(visit) = pending.pop() {
             let Some(prim) = layer.prims.get(visit.prim) else {
                 continue;
@@ -75,10 +71,7 @@ impl ParticlePrims {
         }
         let has_arcs = layer.prims.iter().any(|prim| prim.has_arcs);
         match (found.is_empty(), has_arcs) {
-            (false, _) => Ok(Self {
-                prims: found,
-                has_arcs,
-            }),
+            (false, _) => Ok(Self { prims: found, has_arcs }),
             (true, true) => Err(ParseError::unsupported(format!(
                 "a USD file without points of its own, which refers to other files, variants or classes; {FLATTEN}"
             ))),
@@ -98,9 +91,8 @@ impl Children {
             let prim = layer.prims.get(*index)?;
             Some((prim.parent?, layer.text(&prim.name)))
         };
-        let mut all: Vec<usize> = (1..layer.prims.len())
-            .filter(|index| key(index).is_some())
-            .collect();
+        let mut all: Vec<usize> =
+            (1..layer.prims.len()).filter(|index| key(index).is_some()).collect();
         all.sort_by_key(key);
         Self(all)
     }
@@ -141,12 +133,7 @@ pub(super) fn times(
         return Ok(times);
     }
     let all = layer.properties.iter();
-    union(
-        layer,
-        all.filter_map(|property| property.samples.as_ref()),
-        len,
-        budget,
-    )
+    union(layer, all.filter_map(|property| property.samples.as_ref()), len, budget)
 }
 
 fn positions_samples<'l>(layer: &'l Layer<'_>, prim: usize) -> Option<&'l Samples> {
@@ -176,10 +163,7 @@ fn union<'l>(
         if times.len() + count > len {
             return Err(damaged("more times than the file has bytes"));
         }
-        budget.check(
-            (times.len() + count) as u64 * TIME_LEN,
-            "the list of its times is",
-        )?;
+        budget.check((times.len() + count) as u64 * TIME_LEN, "the list of its times is")?;
         let start = times.len();
         times.extend((0..count).map(|index| layer.sample_time(list, index)));
         let added = times.get(start..).unwrap_or_default();

@@ -56,19 +56,10 @@ fn older_names_of_types_read_alike() {
     let today = with("point3f", "vector3f", "color3f", "quath", "matrix4d");
     assert_eq!(today[0].positions.len(), 2);
     assert_eq!(today[0].attributes.len(), 3);
-    let older = with(
-        "PointFloat",
-        "VectorFloat",
-        "ColorFloat",
-        "Quath",
-        "Matrix4d",
-    );
+    let older = with("PointFloat", "VectorFloat", "ColorFloat", "Quath", "Matrix4d");
     assert_eq!(older, today);
     let older = with("Point", "Vector", "Color", "Quatd", "Frame");
-    assert_eq!(
-        older,
-        with("point3d", "vector3d", "color3d", "quatd", "frame4d")
-    );
+    assert_eq!(older, with("point3d", "vector3d", "color3d", "quatd", "frame4d"));
     assert_eq!(
         with("Vec3f", "Normal", "Vec3d", "Quatf", "Matrix4d")[0].positions,
         today[0].positions
@@ -188,47 +179,23 @@ fn text_has_comments_strings_and_separators_anywhere() {
 #[test]
 fn scenes_whose_positions_may_depend_on_other_files_are_refused() {
     let flatten = "usdcat --flatten";
-    refused(
-        &format!("( subLayers = [@other.usda@] )\n{POINTS}"),
-        flatten,
-    );
+    refused(&format!("( subLayers = [@other.usda@] )\n{POINTS}"), flatten);
     refused(
         &format!("def Xform \"A\" ( references = @a.usda@</B> (offset = 2) ) {{ {POINTS} }}"),
         flatten,
     );
-    refused(
-        &format!("def Xform \"A\" ( prepend payload = @a.usda@ ) {{ {POINTS} }}"),
-        flatten,
-    );
-    refused(
-        &format!("def \"A\" ( inherits = </C> ) {{ {POINTS} }}"),
-        flatten,
-    );
-    refused(
-        &format!("def \"A\" {{ variantSet \"x\" = {{ \"y\" {{ }} }} {POINTS} }}"),
-        flatten,
-    );
-    refused(
-        &format!("def \"A\" {{ variantSet \"x\" = {{ \"y\" {{ {POINTS} }} }} }}"),
-        flatten,
-    );
+    refused(&format!("def Xform \"A\" ( prepend payload = @a.usda@ ) {{ {POINTS} }}"), flatten);
+    refused(&format!("def \"A\" ( inherits = </C> ) {{ {POINTS} }}"), flatten);
+    refused(&format!("def \"A\" {{ variantSet \"x\" = {{ \"y\" {{ }} }} {POINTS} }}"), flatten);
+    refused(&format!("def \"A\" {{ variantSet \"x\" = {{ \"y\" {{ {POINTS} }} }} }}"), flatten);
     refused("def Mesh \"A\" { }", "without Points");
-    refused(
-        &format!("over \"A\" {{ {POINTS} }}\nclass \"B\" {{ {POINTS} }}"),
-        "without Points",
-    );
-    refused(
-        &format!("def \"A\" ( active = false ) {{ {POINTS} }}"),
-        "without Points",
-    );
+    refused(&format!("over \"A\" {{ {POINTS} }}\nclass \"B\" {{ {POINTS} }}"), "without Points");
+    refused(&format!("def \"A\" ( active = false ) {{ {POINTS} }}"), "without Points");
     // References elsewhere do not matter, and are reported
     let other = format!("#usda 1.0\ndef \"A\" ( references = @a.usda@ ) {{ }}\n{POINTS}");
     assert_eq!(READER.one(other.as_bytes()).positions.len(), 2);
     let remarks = FORMAT.reader().remarks(other.as_bytes());
-    assert!(
-        remarks.iter().any(|remark| remark.contains("are not read")),
-        "{remarks:?}"
-    );
+    assert!(remarks.iter().any(|remark| remark.contains("are not read")), "{remarks:?}");
 }
 
 #[test]
@@ -246,16 +213,8 @@ fn transforms_that_are_not_read_are_refused_by_name() {
             "/A: the transform xformOp:twist is not known",
         ),
         ("double xformOp:scale = 1", "xformOp:scale", "another type"),
-        (
-            "double3 xformOp:scale = (0, 1, 1)",
-            "!invert!xformOp:scale",
-            "cannot be inverted",
-        ),
-        (
-            "double3 xformOp:scale = (nan, 1, 1)",
-            "xformOp:scale",
-            "is not a number",
-        ),
+        ("double3 xformOp:scale = (0, 1, 1)", "!invert!xformOp:scale", "cannot be inverted"),
+        ("double3 xformOp:scale = (nan, 1, 1)", "xformOp:scale", "is not a number"),
         (
             "double xformOp:rotateX.spline = { bezier, 1: 2 }",
             "xformOp:rotateX",
@@ -279,10 +238,7 @@ fn transforms_that_are_not_read_are_refused_by_name() {
     let turning = "quatf xformOp:orient.timeSamples = { 0: (1, 0, 0, 0), 2: (0, 1, 0, 0) }\n\
                    uniform token[] xformOpOrder = [\"xformOp:orient\"]\n\
                    point3f[] points.timeSamples = { 0: [(1, 2, 3)], 1: [(1, 2, 3)] }";
-    refused(
-        &format!("def Points \"A\" {{ {turning} }}"),
-        "no sample at the time",
-    );
+    refused(&format!("def Points \"A\" {{ {turning} }}"), "no sample at the time");
     let many = vec!["\"xformOp:translate\""; 65].join(", ");
     refused(
         &format!(
@@ -302,20 +258,11 @@ fn widths_and_velocities_are_transformed_with_the_positions() {
     );
     let particles = &particles.expect("a good file")[0];
     let near = |found: &[f64], expected: &[f64]| {
-        found
-            .iter()
-            .zip(expected)
-            .all(|(a, b)| (a - b).abs() < 1e-12)
+        found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12)
     };
-    assert!(near(
-        &coordinates(&particles.positions)[0],
-        &[-4.0, 2.0, 6.0]
-    ));
+    assert!(near(&coordinates(&particles.positions)[0], &[-4.0, 2.0, 6.0]));
     assert_eq!(numbers(&attribute(particles, "diameter").data), [1.0]);
-    assert!(near(
-        &numbers(&attribute(particles, "velocities").data),
-        &[0.0, 2.0, 0.0]
-    ));
+    assert!(near(&numbers(&attribute(particles, "velocities").data), &[0.0, 2.0, 0.0]));
     assert_eq!(numbers(&attribute(particles, "v").data), [1.0, 0.0, 0.0]);
 }
 
@@ -351,12 +298,9 @@ fn prims_may_be_nested_up_to_a_limit() {
 
 #[test]
 fn up_axis_is_that_of_the_file() {
-    for (name, is_y_up) in [
-        ("drops.usda", true),
-        ("drops.usdc", true),
-        ("drops.usdz", true),
-        ("types.usdc", false),
-    ] {
+    for (name, is_y_up) in
+        [("drops.usda", true), ("drops.usdc", true), ("drops.usdz", true), ("types.usdc", false)]
+    {
         assert_eq!(FORMAT.reader().is_y_up(&usd(name)), is_y_up, "{name}");
     }
 }
@@ -376,20 +320,10 @@ fn remarks_have_units_and_parts() {
     }
     for name in ["moved.usda", "moved.usdc"] {
         let remarks = FORMAT.reader().remarks(&usd(name));
-        assert!(
-            remarks
-                .iter()
-                .any(|remark| remark.contains("are transformed")),
-            "{remarks:?}"
-        );
+        assert!(remarks.iter().any(|remark| remark.contains("are transformed")), "{remarks:?}");
     }
     let remarks = FORMAT.reader().remarks(&usd("instances.usdc"));
-    assert!(
-        remarks
-            .iter()
-            .any(|remark| remark.contains("PointInstancer")),
-        "{remarks:?}"
-    );
+    assert!(remarks.iter().any(|remark| remark.contains("PointInstancer")), "{remarks:?}");
 }
 
 proptest! {

@@ -116,28 +116,14 @@ fn operation(
         return Err(refused(name, why));
     }
     let wrong = || refused(name, "has a value of another type");
-    let one = || {
-        numbers
-            .single::<1>()
-            .map(|[number]| number)
-            .ok_or_else(wrong)
-    };
+    let one = || numbers.single::<1>().map(|[number]| number).ok_or_else(wrong);
     let three = || numbers.single::<3>().ok_or_else(wrong);
     let axis = |letter: u8| DVec3::AXES[usize::from(letter - b'X')];
     Ok(match kind {
         b"translate" => DAffine3::from_translation(three()?.into()),
-        [
-            b't',
-            b'r',
-            b'a',
-            b'n',
-            b's',
-            b'l',
-            b'a',
-            b't',
-            b'e',
-            letter @ b'X'..=b'Z',
-        ] => DAffine3::from_translation(one()? * axis(*letter)),
+        [b't', b'r', b'a', b'n', b's', b'l', b'a', b't', b'e', letter @ b'X'..=b'Z'] => {
+            DAffine3::from_translation(one()? * axis(*letter))
+        }
         b"scale" => DAffine3::from_scale(three()?.into()),
         [b's', b'c', b'a', b'l', b'e', letter @ b'X'..=b'Z'] => {
             DAffine3::from_scale(DVec3::ONE + (one()? - 1.0) * axis(*letter))
@@ -147,9 +133,8 @@ fn operation(
         }
         [b'r', b'o', b't', b'a', b't', b'e', letters @ ..] if is_order(letters) => {
             let angles = three()?;
-            let turns = letters
-                .iter()
-                .map(|letter| rotation(*letter, angles[usize::from(letter - b'X')]));
+            let turns =
+                letters.iter().map(|letter| rotation(*letter, angles[usize::from(letter - b'X')]));
             DAffine3::from_mat3(turns.fold(DMat3::IDENTITY, |all, turn| turn * all))
         }
         b"orient" => {

@@ -126,17 +126,11 @@ fn each_word(
 }
 
 fn too_few(at: usize, count: usize, left: usize) -> ParseError {
-    ParseError::malformed(
-        at,
-        format!("expected {count} numbers, {left} bytes are left"),
-    )
+    ParseError::malformed(at, format!("expected {count} numbers, {left} bytes are left"))
 }
 
 fn ends_after(at: usize, done: usize, count: usize) -> ParseError {
-    ParseError::malformed(
-        at,
-        format!("expected {count} numbers, the text ends after {done}"),
-    )
+    ParseError::malformed(at, format!("expected {count} numbers, the text ends after {done}"))
 }
 
 /// Words with a position: after each, `at` is the byte after it.
@@ -152,10 +146,7 @@ impl<'a> Iterator for Words<'a> {
         let rest = self.text.get(self.at..)?;
         let start = rest.iter().position(|b| !b.is_ascii_whitespace())?;
         let word = rest.get(start..)?;
-        let length = word
-            .iter()
-            .position(u8::is_ascii_whitespace)
-            .unwrap_or(word.len());
+        let length = word.iter().position(u8::is_ascii_whitespace).unwrap_or(word.len());
         self.at += start + length;
         word.get(..length)
     }
@@ -199,9 +190,7 @@ impl Number for f32 {
     const NAME: &str = "f32";
     fn parse(word: &str) -> Option<Self> {
         #[expect(clippy::cast_possible_truncation, reason = "rounds to the asked type")]
-        word.parse()
-            .ok()
-            .or_else(|| odd_float(word).map(|v| v as f32))
+        word.parse().ok().or_else(|| odd_float(word).map(|v| v as f32))
     }
 }
 
@@ -239,21 +228,12 @@ fn odd_float(word: &str) -> Option<f64> {
     let lower = word.to_ascii_lowercase();
     let negative = lower.starts_with('-');
     if lower.contains("#inf") {
-        return Some(if negative {
-            f64::NEG_INFINITY
-        } else {
-            f64::INFINITY
-        });
+        return Some(if negative { f64::NEG_INFINITY } else { f64::INFINITY });
     }
-    if ["#ind", "#qnan", "#snan", "nan("]
-        .iter()
-        .any(|m| lower.contains(m))
-    {
+    if ["#ind", "#qnan", "#snan", "nan("].iter().any(|m| lower.contains(m)) {
         return Some(f64::NAN);
     }
-    lower
-        .contains('d')
-        .then(|| lower.replace('d', "e").parse().ok())?
+    lower.contains('d').then(|| lower.replace('d', "e").parse().ok())?
 }
 
 #[cfg(test)]
@@ -264,14 +244,9 @@ mod tests {
     fn unusual_notations_are_parsed() {
         let text = b"nan -inf -1.#IND 1.#INF -1.#INF00 -nan(ind) 1.5D+01 Infinity";
         let (data, end) = parse_values(text, 0, 8, ScalarType::F32).unwrap();
-        let AttributeData::F32(v) = data else {
-            panic!("not f32")
-        };
+        let AttributeData::F32(v) = data else { panic!("not f32") };
         assert!(v[0].is_nan() && v[2].is_nan() && v[5].is_nan());
-        assert_eq!(
-            (v[1], v[3], v[4]),
-            (f32::NEG_INFINITY, f32::INFINITY, f32::NEG_INFINITY)
-        );
+        assert_eq!((v[1], v[3], v[4]), (f32::NEG_INFINITY, f32::INFINITY, f32::NEG_INFINITY));
         assert_eq!((v[6], v[7]), (15.0, f32::INFINITY));
         assert_eq!(end, text.len());
     }

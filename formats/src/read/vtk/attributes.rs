@@ -179,27 +179,15 @@ mod tests {
     use super::*;
 
     fn line(text: &str) -> VtkLine {
-        VtkLine {
-            at: 0,
-            text: text.as_bytes().to_vec(),
-        }
+        VtkLine { at: 0, text: text.as_bytes().to_vec() }
     }
 
     #[test]
     fn names_are_decoded_and_may_contain_blanks() {
-        assert_eq!(
-            field_array(&line("vel%20x 3 10 float")).unwrap().name,
-            "vel x"
-        );
-        assert_eq!(
-            field_array(&line("50%_%zz 3 10 float")).unwrap().name,
-            "50%_%zz"
-        );
+        assert_eq!(field_array(&line("vel%20x 3 10 float")).unwrap().name, "vel x");
+        assert_eq!(field_array(&line("50%_%zz 3 10 float")).unwrap().name, "50%_%zz");
         let spaced = field_array(&line("pressure acceleration 3 10 FLOAT\r")).unwrap();
-        assert_eq!(
-            (spaced.name.as_str(), spaced.components),
-            ("pressure acceleration", 3)
-        );
+        assert_eq!((spaced.name.as_str(), spaced.components), ("pressure acceleration", 3));
         assert_eq!(spaced.tuples, Some(10));
         assert_eq!(field_array(&line("VECTORS v float")), None);
         assert_eq!(field_array(&line("v -3 10 float")), None);

@@ -107,10 +107,7 @@ impl<'c, 'a> LineCursor<'c, 'a> {
 impl VtkLine {
     /// The words of the line.
     pub(super) fn words(&self) -> Vec<&[u8]> {
-        self.text
-            .split(u8::is_ascii_whitespace)
-            .filter(|w| !w.is_empty())
-            .collect()
+        self.text.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty()).collect()
     }
 
     /// True if the first word is `keyword`, in whatever case.
@@ -119,11 +116,7 @@ impl VtkLine {
     }
 
     pub(super) fn first_word(&self) -> &[u8] {
-        self.text
-            .trim_ascii_start()
-            .split(u8::is_ascii_whitespace)
-            .next()
-            .unwrap_or_default()
+        self.text.trim_ascii_start().split(u8::is_ascii_whitespace).next().unwrap_or_default()
     }
 
     /// The beginning of the line, fit for an error message.

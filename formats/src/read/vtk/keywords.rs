@@ -60,14 +60,10 @@ pub(super) fn is_keyword(word: &[u8]) -> bool {
         "EDGE_FLAGS",
         "METADATA",
     ];
-    KEYWORDS
-        .iter()
-        .any(|keyword| word.eq_ignore_ascii_case(keyword.as_bytes()))
+    KEYWORDS.iter().any(|keyword| word.eq_ignore_ascii_case(keyword.as_bytes()))
 }
 
 /// True for the names under which a FIELD holds the simulation time.
 pub(super) fn is_time_name(name: &str) -> bool {
-    ["time", "timevalue"]
-        .iter()
-        .any(|t| name.eq_ignore_ascii_case(t))
+    ["time", "timevalue"].iter().any(|t| name.eq_ignore_ascii_case(t))
 }

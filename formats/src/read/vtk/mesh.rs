@@ -46,18 +46,10 @@ fn add(
     let (count, extents) = match section.offsets {
         // An empty list of offsets is that of no cells.
         Some(_) if section.count == 0 => return Ok(()),
-        Some(offsets) => (
-            section.count - 1,
-            CellExtents::Starts(offsets.decode(bytes)?),
-        ),
+        Some(offsets) => (section.count - 1, CellExtents::Starts(offsets.decode(bytes)?)),
         None => (section.count, CellExtents::Counts),
     };
-    let cells = CellArray {
-        at,
-        count,
-        connectivity: section.connectivity.decode(bytes)?,
-        extents,
-    };
+    let cells = CellArray { at, count, connectivity: section.connectivity.decode(bytes)?, extents };
     let kind = match (section.section, types) {
         (CellSection::Polygons, _) => CellKind::Polygons,
         (CellSection::Strips, _) => CellKind::Strips,

@@ -135,12 +135,10 @@ impl Reader for LegacyVtk {
         let attributes: Option<Vec<StridedColumn>> =
             walker.arrays.into_iter().map(column).collect();
         let axes = points.numbers.column("POINTS".to_owned(), 3);
-        Ok(axes
-            .zip(attributes)
-            .map(|(axes, attributes)| ParticleLayout {
-                time: walker.time,
-                ..ParticleLayout::new(points.count, vec![axes], attributes)
-            }))
+        Ok(axes.zip(attributes).map(|(axes, attributes)| ParticleLayout {
+            time: walker.time,
+            ..ParticleLayout::new(points.count, vec![axes], attributes)
+        }))
     }
 
     /// SPlisHSPlasH signs its files in the title.

@@ -87,10 +87,7 @@ impl ArrayNumbers {
         let Self::Binary { at, scalar, .. } = *self else {
             return None;
         };
-        let first = ComponentStride {
-            start: at,
-            stride: components * scalar.size(),
-        };
+        let first = ComponentStride { start: at, stride: components * scalar.size() };
         let scalar = (scalar, Endian::Big);
         Some(StridedColumn::interleaved(name, scalar, components, first))
     }
@@ -177,11 +174,7 @@ fn likelier(
                 }
         })
     };
-    if !goes_on(usual) && goes_on(other) {
-        other
-    } else {
-        usual
-    }
+    if !goes_on(usual) && goes_on(other) { other } else { usual }
 }
 
 fn take_numbers(
@@ -213,10 +206,7 @@ fn read_bit_bytes(
     cursor.take(bytes).ok_or_else(|| {
         ParseError::malformed(
             cursor.at(),
-            format!(
-                "{what}: {count} bits need {bytes} bytes, {} are left",
-                cursor.rest().len()
-            ),
+            format!("{what}: {count} bits need {bytes} bytes, {} are left", cursor.rest().len()),
         )
     })
 }

@@ -11,21 +11,11 @@ pub(in crate::read) fn positions(data: AttributeData) -> Positions {
     match data {
         AttributeData::F32(v) => Positions::F32(match try_cast_vec(v) {
             Ok(points) => points,
-            Err((_, v)) => v
-                .as_chunks()
-                .0
-                .iter()
-                .map(|p| Vec3::from_array(*p))
-                .collect(),
+            Err((_, v)) => v.as_chunks().0.iter().map(|p| Vec3::from_array(*p)).collect(),
         }),
         AttributeData::F64(v) => Positions::F64(match try_cast_vec(v) {
             Ok(points) => points,
-            Err((_, v)) => v
-                .as_chunks()
-                .0
-                .iter()
-                .map(|p| DVec3::from_array(*p))
-                .collect(),
+            Err((_, v)) => v.as_chunks().0.iter().map(|p| DVec3::from_array(*p)).collect(),
         }),
         AttributeData::I8(v) => narrow(&v),
         AttributeData::U8(v) => narrow(&v),
@@ -42,20 +32,12 @@ pub(in crate::read) fn positions(data: AttributeData) -> Positions {
 
 fn narrow<T: Copy + Into<f32>>(values: &[T]) -> Positions {
     let points = values.as_chunks().0.iter();
-    Positions::F32(
-        points
-            .map(|p: &[T; 3]| Vec3::from_array(p.map(Into::into)))
-            .collect(),
-    )
+    Positions::F32(points.map(|p: &[T; 3]| Vec3::from_array(p.map(Into::into))).collect())
 }
 
 fn wide<T: Copy>(values: &[T], to: impl Fn(T) -> f64) -> Positions {
     let points = values.as_chunks().0.iter();
-    Positions::F64(
-        points
-            .map(|p: &[T; 3]| DVec3::from_array(p.map(&to)))
-            .collect(),
-    )
+    Positions::F64(points.map(|p: &[T; 3]| DVec3::from_array(p.map(&to))).collect())
 }
 
 #[cfg(test)]

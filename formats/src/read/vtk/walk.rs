@@ -176,11 +176,7 @@ impl<'c, 'a> Walker<'c, 'a> {
 
     fn dataset(&mut self, line: &VtkLine) -> Result<(), ParseError> {
         let words = line.words();
-        let kind = words
-            .get(1)
-            .copied()
-            .unwrap_or_default()
-            .to_ascii_uppercase();
+        let kind = words.get(1).copied().unwrap_or_default().to_ascii_uppercase();
         match kind.as_slice() {
             b"POLYDATA" | b"UNSTRUCTURED_GRID" => {
                 self.dataset_named = true;
@@ -251,13 +247,7 @@ impl<'c, 'a> Walker<'c, 'a> {
         if let (Some(mesh), Some(section), Some(connectivity)) =
             (&mut self.mesh, section, connectivity)
         {
-            mesh.sections.push(Cells {
-                section,
-                at: line.at,
-                count: first,
-                offsets,
-                connectivity,
-            });
+            mesh.sections.push(Cells { section, at: line.at, count: first, offsets, connectivity });
         }
         Ok(())
     }
@@ -383,12 +373,7 @@ impl<'c, 'a> Walker<'c, 'a> {
 
     /// Takes the payload of one array and keeps it if it is numeric and per particle.
     fn array(&mut self, line: &VtkLine, header: ArrayHeader) -> Result<(), ParseError> {
-        let ArrayHeader {
-            name,
-            components,
-            tuples,
-            stored,
-        } = header;
+        let ArrayHeader { name, components, tuples, stored } = header;
         let particles = self.points.as_ref().map(|points| points.count);
         // Some writers leave POINT_DATA out; outside a FIELD that is what they mean.
         let section = match self.section {
@@ -428,11 +413,7 @@ impl<'c, 'a> Walker<'c, 'a> {
         if is_time {
             self.time = Some(numbers.decode(self.cursor.bytes())?.get_f64(0));
         } else {
-            self.arrays.push(PointArray {
-                name,
-                components,
-                numbers,
-            });
+            self.arrays.push(PointArray { name, components, numbers });
         }
         Ok(())
     }

@@ -54,21 +54,13 @@ impl<'a> Appended<'a> {
         };
         let trimmed = rest.trim_ascii_start();
         if attributes.ends_with(b"/") {
-            return Ok(Self {
-                at: tag,
-                blob: &[],
-                is_base64,
-                spent,
-            });
+            return Ok(Self { at: tag, blob: &[], is_base64, spent });
         }
         let at = tag + open + 1 + (rest.len() - trimmed.len());
         let blob = match trimmed.split_first() {
             Some((b'_', blob)) => blob,
             Some(_) => {
-                return Err(ParseError::malformed(
-                    at,
-                    "no underscore before the appended data",
-                ));
+                return Err(ParseError::malformed(at, "no underscore before the appended data"));
             }
             None => return Err(ended()),
         };
@@ -133,10 +125,7 @@ mod tests {
             b"<AppendedData encoding = \"base64\">_AAAA\n</AppendedData>",
             Some((b"AAAA\n", true)),
         );
-        check(
-            b"<AppendedData encoding=\"raw\">_cut",
-            Some((b"cut", false)),
-        );
+        check(b"<AppendedData encoding=\"raw\">_cut", Some((b"cut", false)));
         check(b"<AppendedData encoding=\"raw\">", None);
         check(b"<AppendedData encoding=\"raw\">x", None);
         check(b"<AppendedData encoding=\"raw\"", None);

@@ -139,9 +139,7 @@ fn decode_run(chars: &[u8], count: usize) -> Result<(Vec<u8>, &[u8]), ArrayFault
     let needed = count.div_ceil(3).checked_mul(4);
     let needed = needed.ok_or_else(|| format!("{count} bytes are too many"))?;
     let (run, rest) = take_chars(chars, needed);
-    let bytes = BASE64
-        .decode(run)
-        .map_err(|error| format!("bad base64: {error}"))?;
+    let bytes = BASE64.decode(run).map_err(|error| format!("bad base64: {error}"))?;
     if bytes.len() < count {
         return Err(ArrayFault::too_short(count, bytes.len()));
     }
@@ -161,10 +159,7 @@ fn take_chars(chars: &[u8], count: usize) -> (Cow<'_, [u8]>, &[u8]) {
     let chars = chars.trim_ascii_start();
     let near = chars.get(..count).unwrap_or(chars.trim_ascii_end());
     if !near.iter().any(u8::is_ascii_whitespace) {
-        return (
-            Cow::Borrowed(near),
-            chars.get(near.len()..).unwrap_or_default(),
-        );
+        return (Cow::Borrowed(near), chars.get(near.len()..).unwrap_or_default());
     }
     let mut taken = Vec::with_capacity(near.len());
     let mut used = 0;
@@ -260,15 +255,12 @@ fn inflate<'a>(
     let mut header = integers(header, encoding);
     let (_, block_size, last) = (header.next(), header.next(), header.next());
     let block_size = block_size.unwrap_or(0);
-    let compressed_sizes: Vec<usize> = header
-        .map(|n| usize::try_from(n).unwrap_or(usize::MAX))
-        .collect();
+    let compressed_sizes: Vec<usize> =
+        header.map(|n| usize::try_from(n).unwrap_or(usize::MAX)).collect();
     // VTK writes 0 for a full last block, meshio the full size.
     let last = last.filter(|n| *n != 0).unwrap_or(block_size);
     let full_blocks = compressed_sizes.len().saturating_sub(1) as u64;
-    let total = full_blocks
-        .checked_mul(block_size)
-        .and_then(|full| full.checked_add(last));
+    let total = full_blocks.checked_mul(block_size).and_then(|full| full.checked_add(last));
     if total != Some(need as u64) || last > block_size || block_size == 0 {
         return Err(format!(
             "{need} bytes needed, but the header has {full_blocks} blocks of {block_size} and one of \
@@ -277,9 +269,7 @@ fn inflate<'a>(
         .into());
     }
     let block_size = usize::try_from(block_size).unwrap_or(usize::MAX).min(need);
-    let compressed_total = compressed_sizes
-        .iter()
-        .try_fold(0_usize, |sum, n| sum.checked_add(*n));
+    let compressed_total = compressed_sizes.iter().try_fold(0_usize, |sum, n| sum.checked_add(*n));
     let compressed_total = compressed_total.ok_or("the block sizes overflow")?;
     let (data, behind_data) = data.run(compressed_total)?;
     let mut blocks = Vec::with_capacity(compressed_sizes.len());
@@ -338,13 +328,11 @@ fn decoder_bytes(
 
 /// The integers of a header.
 fn integers(bytes: &[u8], encoding: ArrayEncoding) -> impl Iterator<Item = u64> + '_ {
-    bytes
-        .chunks_exact(encoding.header.size())
-        .map(move |chunk| {
-            let fold = |value: u64, byte: &u8| value << 8 | u64::from(*byte);
-            match encoding.endian {
-                Endian::Big => chunk.iter().fold(0, fold),
-                Endian::Little => chunk.iter().rev().fold(0, fold),
-            }
-        })
+    bytes.chunks_exact(encoding.header.size()).map(move |chunk| {
+        let fold = |value: u64, byte: &u8| value << 8 | u64::from(*byte);
+        match encoding.endian {
+            Endian::Big => chunk.iter().fold(0, fold),
+            Endian::Little => chunk.iter().rev().fold(0, fold),
+        }
+    })
 }

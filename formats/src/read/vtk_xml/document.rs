@@ -136,11 +136,7 @@ impl<'a> XmlDocument<'a> {
     /// Parses `head`, the XML in front of the appended data. `is_cut` is true if appended data
     /// follow, so that open elements at the end are right.
     pub(super) fn parse(head: &'a str, is_cut: bool, part: XmlPart) -> Result<Self, ParseError> {
-        let mut parser = XmlParser {
-            document: None,
-            path: Vec::new(),
-            part,
-        };
+        let mut parser = XmlParser { document: None, path: Vec::new(), part };
         let mut reader = Reader::from_str(head);
         let mut is_closed = false;
         loop {
@@ -173,9 +169,7 @@ impl<'a> XmlDocument<'a> {
                 Err(error) => return Err(bad_xml(at, &error)),
             }
         }
-        parser
-            .document
-            .ok_or_else(|| ParseError::malformed(0, "no <VTKFile> element"))
+        parser.document.ok_or_else(|| ParseError::malformed(0, "no <VTKFile> element"))
     }
 }
 
@@ -249,11 +243,7 @@ impl<'a> XmlParser<'a> {
             && let (Some(section), Some(piece)) =
                 (cell_section(self.part, name), document.pieces.last_mut())
         {
-            piece.cells.push(CellGroup {
-                at,
-                section,
-                arrays: Vec::new(),
-            });
+            piece.cells.push(CellGroup { at, section, arrays: Vec::new() });
         }
         if tag == XmlElement::DataArray {
             let array = array(start, at)?;
@@ -356,12 +346,7 @@ fn root(start: &BytesStart<'_>, at: usize) -> Result<ArrayEncoding, ParseError> 
         None | Some("") => None,
         Some(name) => Some(Compressor::from_name(name)?),
     };
-    Ok(ArrayEncoding {
-        endian,
-        header,
-        compressor,
-        decoders: MemoryBudget::UNLIMITED,
-    })
+    Ok(ArrayEncoding { endian, header, compressor, decoders: MemoryBudget::UNLIMITED })
 }
 
 fn array<'a>(start: &BytesStart<'_>, at: usize) -> Result<DataArray<'a>, ParseError> {
@@ -373,10 +358,7 @@ fn array<'a>(start: &BytesStart<'_>, at: usize) -> Result<DataArray<'a>, ParseEr
         _ => {
             return Err(ParseError::malformed(
                 at,
-                format!(
-                    "format `{}` is not ascii, binary or appended",
-                    short(&format)
-                ),
+                format!("format `{}` is not ascii, binary or appended", short(&format)),
             ));
         }
     };
@@ -404,9 +386,7 @@ pub(crate) fn attribute(
         return Ok(None);
     };
     let value = found.normalized_value(XmlVersion::Implicit1_0);
-    value
-        .map(|v| Some(v.trim().to_owned()))
-        .map_err(|error| bad_xml(at, &error))
+    value.map(|v| Some(v.trim().to_owned())).map_err(|error| bad_xml(at, &error))
 }
 
 fn optional_count(

@@ -33,10 +33,7 @@ pub(super) fn piece_positions(
         ));
     };
     if array.components.is_some_and(|k| k != 3) {
-        return Err(ParseError::malformed(
-            array.at,
-            "points without 3 components",
-        ));
+        return Err(ParseError::malformed(array.at, "points without 3 components"));
     }
     let count = value_count(array, piece.points, 3)?;
     let Some(data) = values(array, document.encoding, appended, count)? else {
@@ -93,10 +90,8 @@ pub(super) fn attributes(
         if components == 0 || !tried.insert(kind) || names.contains(array.name.as_str()) {
             continue;
         }
-        let everywhere: Option<Vec<&DataArray<'_>>> = others
-            .iter()
-            .map(|(_, arrays)| arrays.get(&kind).copied())
-            .collect();
+        let everywhere: Option<Vec<&DataArray<'_>>> =
+            others.iter().map(|(_, arrays)| arrays.get(&kind).copied()).collect();
         let Some(parts) = everywhere else {
             continue;
         };
@@ -112,11 +107,7 @@ pub(super) fn attributes(
             }
         }
         names.insert(array.name.as_str());
-        joined.push(Attribute {
-            name: array.name.clone(),
-            components,
-            data,
-        });
+        joined.push(Attribute { name: array.name.clone(), components, data });
     }
     Ok(joined)
 }
@@ -133,11 +124,7 @@ type AttributeKind<'p> = (&'p str, usize, Option<ScalarType>);
 type ArraysByKind<'p, 'a> = HashMap<AttributeKind<'p>, &'p DataArray<'a>>;
 
 fn kind<'p>(array: &'p DataArray<'_>) -> AttributeKind<'p> {
-    (
-        &array.name,
-        array.components.unwrap_or(1),
-        scalar_type(&array.type_name),
-    )
+    (&array.name, array.components.unwrap_or(1), scalar_type(&array.type_name))
 }
 
 fn by_kind<'p, 'a>(piece: &'p Piece<'a>) -> ArraysByKind<'p, 'a> {

@@ -71,12 +71,8 @@ impl CellReader<'_, '_> {
             (_, Some(types)) => CellKind::Types(types),
             (_, None) => CellKind::Polygons,
         };
-        let cells = CellArray {
-            at: group.at,
-            count,
-            connectivity,
-            extents: CellExtents::Ends(ends),
-        };
+        let cells =
+            CellArray { at: group.at, count, connectivity, extents: CellExtents::Ends(ends) };
         cells.add_to(builder, &kind)
     }
 

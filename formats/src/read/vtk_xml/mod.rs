@@ -78,22 +78,18 @@ impl Reader for XmlVtk {
         _step: &Step,
         budget: MemoryBudget,
     ) -> Result<RawParticles, ParseError> {
-        parse(
-            source.bytes(),
-            XmlPart::Particles,
-            |mut document, appended| {
-                check_shares(&document, appended)?;
-                document.encoding.decoders = check_memory(&document, budget)?;
-                Ok(RawParticles {
-                    positions: merge::positions(&document, appended)?,
-                    attributes: merge::attributes(&document, appended)?,
-                    time: time(&document, appended),
-                    step: None,
-                    cell: None,
-                    bonds: Vec::new(),
-                })
-            },
-        )
+        parse(source.bytes(), XmlPart::Particles, |mut document, appended| {
+            check_shares(&document, appended)?;
+            document.encoding.decoders = check_memory(&document, budget)?;
+            Ok(RawParticles {
+                positions: merge::positions(&document, appended)?,
+                attributes: merge::attributes(&document, appended)?,
+                time: time(&document, appended),
+                step: None,
+                cell: None,
+                bonds: Vec::new(),
+            })
+        })
     }
 
     fn unpacked_arrays_len(&self, head: &[u8], _file: FileExtent, particles: &RawParticles) -> u64 {
@@ -136,10 +132,8 @@ fn most_bytes(document: &XmlDocument<'_>, len: usize) -> usize {
 /// would get past the check of each array.
 fn check_total(document: &XmlDocument<'_>, file: usize) -> Result<(), ParseError> {
     let most = most_bytes(document, file);
-    let total = document
-        .pieces
-        .iter()
-        .try_fold(0_usize, |sum, piece| sum.checked_add(piece.points));
+    let total =
+        document.pieces.iter().try_fold(0_usize, |sum, piece| sum.checked_add(piece.points));
     // A coordinate takes a byte at least.
     match total.and_then(|n| n.checked_mul(3)) {
         Some(bytes) if bytes <= most => Ok(()),
@@ -217,9 +211,7 @@ const MOST_TIMES: usize = 1 << 16;
 /// The simulation time, if a field has it. It is optional: a damaged field costs only the time.
 fn time(document: &XmlDocument<'_>, appended: Option<Appended<'_>>) -> Option<f64> {
     let is_time = |array: &&DataArray<'_>| {
-        ["TimeValue", "TIME"]
-            .iter()
-            .any(|name| array.name.eq_ignore_ascii_case(name))
+        ["TimeValue", "TIME"].iter().any(|name| array.name.eq_ignore_ascii_case(name))
     };
     let array = document.fields.iter().find(is_time)?;
     let count = array
@@ -274,10 +266,9 @@ fn values(
             let bytes = text.text.as_bytes();
             let (data, end) =
                 parse_values(bytes, 0, count, scalar).map_err(|error| match error {
-                    ParseError::Malformed { at, what } => fault(
-                        text.at.saturating_add(usize::try_from(at).unwrap_or(0)),
-                        what,
-                    ),
+                    ParseError::Malformed { at, what } => {
+                        fault(text.at.saturating_add(usize::try_from(at).unwrap_or(0)), what)
+                    }
                     other => other,
                 })?;
             let rest = bytes.get(end..).unwrap_or_default();
@@ -327,21 +318,15 @@ fn value_count(
     points: usize,
     components: usize,
 ) -> Result<usize, ParseError> {
-    points
-        .checked_mul(components)
-        .filter(|_| components <= MOST_COMPONENTS)
-        .ok_or_else(|| {
-            ParseError::malformed(
-                array.at,
-                format!("{points} points of {components} components are too many"),
-            )
-        })
+    points.checked_mul(components).filter(|_| components <= MOST_COMPONENTS).ok_or_else(|| {
+        ParseError::malformed(
+            array.at,
+            format!("{points} points of {components} components are too many"),
+        )
+    })
 }
 
 /// A name from the file, short enough for a message.
 pub(crate) fn short(name: &str) -> String {
-    name.chars()
-        .take(40)
-        .flat_map(char::escape_default)
-        .collect()
+    name.chars().take(40).flat_map(char::escape_default).collect()
 }

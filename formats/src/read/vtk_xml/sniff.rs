@@ -23,9 +23,7 @@ pub(super) fn sniff(head: &[u8]) -> Result<Confidence, ParseError> {
             return Err(ParseError::unsupported(what));
         }
     };
-    Err(ParseError::unsupported(format!(
-        "{list}, which lists other files: {GIVE_LIST}"
-    )))
+    Err(ParseError::unsupported(format!("{list}, which lists other files: {GIVE_LIST}")))
 }
 
 /// What to do with a list where one file of particles was expected.
@@ -49,10 +47,8 @@ pub(crate) fn root_type(head: &[u8]) -> Option<String> {
 fn type_attribute(root: &str) -> Option<&str> {
     ["type=\"", "type='"].iter().find_map(|key| {
         // `header_type=` ends the same way, so white space must come before.
-        let at = root
-            .match_indices(key)
-            .find(|(at, _)| root[..*at].ends_with(char::is_whitespace))?
-            .0;
+        let at =
+            root.match_indices(key).find(|(at, _)| root[..*at].ends_with(char::is_whitespace))?.0;
         root[at + key.len()..].split(['"', '\'']).next()
     })
 }

@@ -31,21 +31,14 @@ impl PackedTriple {
 
     /// Three numbers below `range` in `bits`.
     pub(super) const fn cube(range: u32, bits: u32) -> Self {
-        Self {
-            ranges: [range; 3],
-            bits,
-        }
+        Self { ranges: [range; 3], bits }
     }
 }
 
 impl<'a> BitReader<'a> {
     /// The bits of `bytes`, which are at `start` in the file.
     pub(super) const fn new(bytes: &'a [u8], start: usize) -> Self {
-        Self {
-            bytes,
-            start,
-            at: 0,
-        }
+        Self { bytes, start, at: 0 }
     }
 
     /// The next `count` bits at the top of a word, up to 120.
@@ -77,11 +70,7 @@ impl<'a> BitReader<'a> {
     #[expect(clippy::cast_possible_truncation, reason = "up to 32 bits")]
     pub(super) fn number(&mut self, count: u32) -> Result<u32, ParseError> {
         let window = self.window(count)?;
-        Ok(if count == 0 {
-            0
-        } else {
-            (window >> (u128::BITS - count)) as u32
-        })
+        Ok(if count == 0 { 0 } else { (window >> (u128::BITS - count)) as u32 })
     }
 
     /// Three numbers. Their packed number is stored with its least significant byte first.
@@ -99,11 +88,7 @@ impl<'a> BitReader<'a> {
         let rest = packed.bits % 8;
         // The last byte is not full: its bits are the lowest of it.
         let swapped = window.swap_bytes() & !(u128::MAX << whole);
-        let last = if rest == 0 {
-            0
-        } else {
-            (window << whole) >> (u128::BITS - rest) << whole
-        };
+        let last = if rest == 0 { 0 } else { (window << whole) >> (u128::BITS - rest) << whole };
         let number = swapped | last;
         let [_, y, z] = packed.ranges.map(|range| range.max(1));
         Ok(match u64::try_from(number) {

@@ -130,13 +130,10 @@ impl<'a> Header<'a> {
         let mut ranges = [0; 3];
         for ((range, least), largest) in ranges.iter_mut().zip(least).zip(largest) {
             let size = i64::from(largest) - i64::from(least) + 1;
-            *range = u32::try_from(size)
-                .ok()
-                .filter(|size| *size > 0)
-                .ok_or_else(|| {
-                    let what = format!("positions from {least} to {largest}: the file is damaged");
-                    ParseError::malformed(at + 4, what)
-                })?;
+            *range = u32::try_from(size).ok().filter(|size| *size > 0).ok_or_else(|| {
+                let what = format!("positions from {least} to {largest}: the file is damaged");
+                ParseError::malformed(at + 4, what)
+            })?;
         }
         let small = stream.count("range of small distances")?;
         let len = packed_len(stream, is_large)?;

@@ -44,9 +44,8 @@ impl Reader for Xtc {
 
     /// The number of atoms comes twice.
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
-        let is_magic = [MAGIC, MAGIC_LARGE]
-            .iter()
-            .any(|magic| head.starts_with(&magic.to_be_bytes()));
+        let is_magic =
+            [MAGIC, MAGIC_LARGE].iter().any(|magic| head.starts_with(&magic.to_be_bytes()));
         let count = |at: usize| head.get(at..at + 4);
         Ok(match is_magic {
             true if count(4).is_some() && count(4) == count(52) => Confidence::Signature,
@@ -105,10 +104,7 @@ impl Reader for Xtc {
     }
 
     fn remarks(&self, _head: &[u8]) -> Vec<String> {
-        vec![
-            remarks::units("nm", None, Some("ps")),
-            remarks::cell_remark(None),
-        ]
+        vec![remarks::units("nm", None, Some("ps")), remarks::cell_remark(None)]
     }
 }
 
@@ -160,12 +156,7 @@ impl Frame {
         }
         Ok(Self {
             count,
-            summary: FrameSummary {
-                end,
-                number,
-                time: time.into(),
-                has_positions: true,
-            },
+            summary: FrameSummary { end, number, time: time.into(), has_positions: true },
             cell: SimulationCell::from_components(components),
             data_at,
             is_large,

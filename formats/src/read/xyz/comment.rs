@@ -63,10 +63,8 @@ fn item<'a>(text: &'a [u8], ends: &[u8], open: &mut Unclosed) -> (&'a [u8], &'a 
     {
         return (&text[1..end], &text[end + 1..]);
     }
-    let end = text
-        .iter()
-        .position(|b| b.is_ascii_whitespace() || ends.contains(b))
-        .unwrap_or(text.len());
+    let end =
+        text.iter().position(|b| b.is_ascii_whitespace() || ends.contains(b)).unwrap_or(text.len());
     // A stray `=` must not stop the walk.
     let next = end.max(usize::from(end == 0 && !ends.is_empty()));
     (&text[..end], &text[next.min(text.len())..])
@@ -159,9 +157,7 @@ mod tests {
 
     #[test]
     fn unusual_comments_end() {
-        for comment in [
-            "", "=", "= =", "a=", "\"", "a=\"b", "==a=1", "{", "a = ", "'", "\\",
-        ] {
+        for comment in ["", "=", "= =", "a=", "\"", "a=\"b", "==a=1", "{", "a = ", "'", "\\"] {
             assert_eq!(value(comment.as_bytes(), "nothing"), None, "{comment}");
         }
     }

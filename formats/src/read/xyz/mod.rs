@@ -173,17 +173,10 @@ pub fn kind(bytes: &[u8]) -> Result<XyzVariant, ParseError> {
 /// [`ParseError::Unsupported`] if the first ones cannot be positions.
 fn raw_layout(bytes: &[u8]) -> Result<ParticleLayout, ParseError> {
     check_plausible(bytes)?;
-    let first = ComponentStride {
-        start: 0,
-        stride: TRIPLE,
-    };
+    let first = ComponentStride { start: 0, stride: TRIPLE };
     let scalar = (ScalarType::F32, Endian::Little);
     let axes = StridedColumn::interleaved("the positions", scalar, 3, first);
-    Ok(ParticleLayout::new(
-        bytes.len() / TRIPLE,
-        vec![axes],
-        Vec::new(),
-    ))
+    Ok(ParticleLayout::new(bytes.len() / TRIPLE, vec![axes], Vec::new()))
 }
 
 /// Raw numbers that are looked at.
@@ -196,9 +189,8 @@ fn check_plausible(bytes: &[u8]) -> Result<(), ParseError> {
     let sizes = numbers.iter().take(SAMPLE);
     let sizes = sizes.map(|number| f32::from_le_bytes(*number).abs());
     let sizes = sizes.filter(|size| *size > 0.0 && size.is_finite());
-    let (smallest, largest) = sizes.fold((f32::INFINITY, 0.0_f32), |(low, high), size| {
-        (low.min(size), high.max(size))
-    });
+    let (smallest, largest) =
+        sizes.fold((f32::INFINITY, 0.0_f32), |(low, high), size| (low.min(size), high.max(size)));
     if smallest > 1e-20 || largest < 1e15 {
         return Ok(());
     }
@@ -211,11 +203,7 @@ fn check_plausible(bytes: &[u8]) -> Result<(), ParseError> {
 
 /// Offset of the text after a byte order mark.
 fn text_start(bytes: &[u8]) -> usize {
-    if bytes.starts_with(csv::BYTE_ORDER_MARK) {
-        csv::BYTE_ORDER_MARK.len()
-    } else {
-        0
-    }
+    if bytes.starts_with(csv::BYTE_ORDER_MARK) { csv::BYTE_ORDER_MARK.len() } else { 0 }
 }
 
 /// Offset of the first byte at the head of the file that text does not have. Comments may be any
@@ -277,9 +265,7 @@ fn first_row_has_numbers(bytes: &[u8], start: usize) -> bool {
         !text.is_empty() && !text.starts_with(b"#") && !text.starts_with(b"//")
     });
     let numbers = row.into_iter().flat_map(|line| {
-        line.text
-            .split(|b| b" \t,;".contains(b))
-            .filter(|word| text::number(word).is_some())
+        line.text.split(|b| b" \t,;".contains(b)).filter(|word| text::number(word).is_some())
     });
     numbers.take(3).count() == 3
 }

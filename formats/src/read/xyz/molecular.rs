@@ -112,14 +112,7 @@ pub(super) fn read(
         );
         return Err(ParseError::malformed(count_at, what));
     }
-    Ok(RawParticles {
-        positions,
-        attributes,
-        time,
-        step: number,
-        cell,
-        bonds: Vec::new(),
-    })
+    Ok(RawParticles { positions, attributes, time, step: number, cell, bonds: Vec::new() })
 }
 
 /// Bytes that a column takes on the way to its array, with its name.
@@ -195,10 +188,7 @@ fn plain_columns(
     };
     let columns = text::words(first.text).count();
     if columns < 4 {
-        let what = format!(
-            "an atom has an element and x y z, not {}",
-            text::shown(first.text)
-        );
+        let what = format!("an atom has an element and x y z, not {}", text::shown(first.text));
         return Err(ParseError::malformed(first.at, what));
     }
     budget.check((columns * COLUMN) as u64, "its columns in memory are")?;
@@ -208,12 +198,7 @@ fn plain_columns(
     for column in 5..=columns {
         fields.push(place(targets.len(), 0));
         let name = format!("column_{column}");
-        targets.push(TargetArray::attribute(
-            name,
-            1,
-            NumberKind::WholeIfAll,
-            TextPolicy::LeaveOut,
-        ));
+        targets.push(TargetArray::attribute(name, 1, NumberKind::WholeIfAll, TextPolicy::LeaveOut));
     }
     Ok((fields, targets))
 }
@@ -235,9 +220,7 @@ fn extended_columns(
     let (triples, rest) = parts.as_chunks::<3>();
     budget.check((triples.len() * COLUMN) as u64, "its columns in memory are")?;
     if !rest.is_empty() {
-        return Err(malformed(
-            "Properties are not name:type:count triples".into(),
-        ));
+        return Err(malformed("Properties are not name:type:count triples".into()));
     }
     for [name, kind, count] in triples {
         let components = text::integer(count).and_then(|count| usize::try_from(count).ok());
@@ -283,9 +266,7 @@ fn extended_columns(
 }
 
 fn is_position(name: &[u8]) -> bool {
-    POSITION_PROPERTIES
-        .iter()
-        .any(|known| name.eq_ignore_ascii_case(known.as_bytes()))
+    POSITION_PROPERTIES.iter().any(|known| name.eq_ignore_ascii_case(known.as_bytes()))
 }
 
 fn is_species(name: &[u8], kind: &[u8]) -> bool {

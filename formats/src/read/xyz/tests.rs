@@ -48,10 +48,7 @@ fn three_kinds() {
         (b"0\nnothing\n1\n\nW 1 2 3\n", XyzVariant::Molecular),
         (b"12\ncomm", XyzVariant::Molecular),
         (b"1\nProperties=pos:R:3\n1 2 3\n", XyzVariant::Molecular),
-        (
-            "1\nin \u{e5}ngstr\u{f6}m\nW 1 2 3\n".as_bytes(),
-            XyzVariant::Molecular,
-        ),
+        ("1\nin \u{e5}ngstr\u{f6}m\nW 1 2 3\n".as_bytes(), XyzVariant::Molecular),
     ];
     for (bytes, expected) in cases {
         let shown = String::from_utf8_lossy(bytes);
@@ -69,10 +66,7 @@ fn neither_dialect() {
         "-1\ncomment\nW 2 3 4\n",
         "1 2\n3 4\n",
     ] {
-        assert!(
-            matches!(kind(text.as_bytes()), Err(ParseError::Malformed { .. })),
-            "{text}"
-        );
+        assert!(matches!(kind(text.as_bytes()), Err(ParseError::Malformed { .. })), "{text}");
     }
 }
 
@@ -81,9 +75,7 @@ fn raw_triples() {
     let bytes = sample("single_frames/raw.xyz");
     assert_eq!(kind(&bytes), Ok(XyzVariant::Raw));
     let particles = only(&bytes);
-    let Positions::F32(v) = &particles.positions else {
-        panic!("raw files are f32")
-    };
+    let Positions::F32(v) = &particles.positions else { panic!("raw files are f32") };
     assert_eq!(v.len(), 1200);
     assert_eq!(v[0].x.to_le_bytes(), bytes[..4]);
     assert_eq!(v[1199].z.to_le_bytes(), bytes[14396..]);
@@ -160,10 +152,7 @@ fn elements_and_species_become_numbers() {
     assert_eq!(whole(&extended, "element")[1], 1);
     assert_eq!(whole(&extended, "id"), [7, 8, 9]);
     let notes = remarks::remarks(text.as_bytes());
-    assert!(
-        notes[0].contains("simulation cell with periodic boundaries (T T F)"),
-        "{notes:?}"
-    );
+    assert!(notes[0].contains("simulation cell with periodic boundaries (T T F)"), "{notes:?}");
     assert!(notes[1].contains("\"H\" = 1"), "{notes:?}");
     for end in 0..text.len() {
         remarks::remarks(&text.as_bytes()[..end]);
@@ -176,10 +165,8 @@ fn frames_one_after_another() {
     let text = "1\nTime=0\nW 1 2 3\n0\n\n2\r\nTime=2\r\nW 4 5 6\r\nW 7 8 9\r\n\n1\nlast\nW 0 0 0";
     let bytes = text.as_bytes();
     let steps = steps(bytes).unwrap();
-    let found: Vec<_> = steps
-        .iter()
-        .map(|step| (read(bytes, step).unwrap().positions.len(), step.time))
-        .collect();
+    let found: Vec<_> =
+        steps.iter().map(|step| (read(bytes, step).unwrap().positions.len(), step.time)).collect();
     assert_eq!(found, [(1, Some(0.)), (0, None), (2, Some(2.)), (1, None)]);
     assert_eq!(steps[2].index, 2);
 }
@@ -192,10 +179,7 @@ fn truncated_last_frame() {
         let found = steps(cut).unwrap();
         assert_eq!(read(cut, &found[0]).unwrap().positions.len(), 1);
         let error = read(cut, &found[1]).unwrap_err().to_string();
-        assert!(
-            error.contains("perhaps still being written"),
-            "{len}: {error}"
-        );
+        assert!(error.contains("perhaps still being written"), "{len}: {error}");
     }
 }
 
@@ -213,43 +197,22 @@ fn bare_points() {
     assert_eq!(whole(&particles, "column_4"), [4, 8]);
     // A domain far from the origin keeps its millimetres.
     let far = only(b"1000000.001 -2000000.002 0.003\n");
-    assert_eq!(
-        far.positions.get(0),
-        DVec3::new(1000000.001, -2000000.002, 0.003)
-    );
+    assert_eq!(far.positions.get(0), DVec3::new(1000000.001, -2000000.002, 0.003));
 }
 
 #[test]
 fn faults_are_described() {
     let cases = [
-        (
-            "2\n\nW 1 2 3\n",
-            "byte 0: 2 particles expected, 1 lines follow: the file is cut",
-        ),
+        ("2\n\nW 1 2 3\n", "byte 0: 2 particles expected, 1 lines follow: the file is cut"),
         ("2\n\nW 1 2 3\nW 1 2\n", "byte 11: line has 3 of 4 columns"),
         ("1\n\nW 1 b 3\n", "column 3 has \"b\""),
-        (
-            "1\n\nW 1 2 3\nW 1 2 3\n",
-            "byte 11: \"W 1 2 3\" is not a particle count",
-        ),
+        ("1\n\nW 1 2 3\nW 1 2 3\n", "byte 11: \"W 1 2 3\" is not a particle count"),
         ("1\nProperties=pos:R\n1 2 3 4\n", "name:type:count"),
-        (
-            "1\nProperties=pos:R:4\n1 2 3 4\n",
-            "\"pos\" is not a position",
-        ),
-        (
-            "1\nProperties=pos:R:x\n1 2 3 4\n",
-            "\"pos\" has \"x\" columns",
-        ),
+        ("1\nProperties=pos:R:4\n1 2 3 4\n", "\"pos\" is not a position"),
+        ("1\nProperties=pos:R:x\n1 2 3 4\n", "\"pos\" has \"x\" columns"),
         ("1\nProperties=velo:R:3\n1 2 3 4\n", "no positions"),
-        (
-            "1\nProperties=id:I:1:pos:R:3\n1 2 3\n",
-            "byte 28: line has 3 of 4 columns",
-        ),
-        (
-            "1\nProperties=pos:R:3:a:R:99999999999999\n1 2 3\n",
-            "has 99999999999999 columns",
-        ),
+        ("1\nProperties=id:I:1:pos:R:3\n1 2 3\n", "byte 28: line has 3 of 4 columns"),
+        ("1\nProperties=pos:R:3:a:R:99999999999999\n1 2 3\n", "has 99999999999999 columns"),
     ];
     for (text, expected) in cases {
         let found = fault(text);
@@ -260,18 +223,12 @@ fn faults_are_described() {
 #[test]
 fn formats_without_a_comment_are_named() {
     for (text, words) in [
-        (
-            "3\n1 2 3 -5 0 0 255\n4 5 6 7 1 1 1\n7 8 9 0 2 2 2\n",
-            "Leica",
-        ),
+        ("3\n1 2 3 -5 0 0 255\n4 5 6 7 1 1 1\n7 8 9 0 2 2 2\n", "Leica"),
         ("2\n1 2 3 4\n4 5 6 7\n", "Leica"),
         ("2\n1 O 0 0 0 1 2\n2 H 1 0 0 2 1\n", "Tinker"),
     ] {
         let found = fault(text);
-        assert!(
-            found.contains(words) && !found.contains("cut short"),
-            "{found}"
-        );
+        assert!(found.contains(words) && !found.contains("cut short"), "{found}");
     }
 }
 
@@ -286,31 +243,19 @@ fn text_of_zeros_has_no_particles() {
 #[test]
 fn binary_grids_are_not_taken_for_raw_triples() {
     // A grid of 2 x 2 x 1 points in the other byte order, then in double precision
-    let big: Vec<u8> = [2_i32, 2, 1]
-        .into_iter()
-        .flat_map(i32::to_be_bytes)
-        .collect();
-    let coordinates = [
-        0.5_f32, -3.25, 100.0, 7.5, 0.1, -0.2, 3.0, 8.0, 4.5, 1e-3, 2e4, -9.75,
-    ];
+    let big: Vec<u8> = [2_i32, 2, 1].into_iter().flat_map(i32::to_be_bytes).collect();
+    let coordinates = [0.5_f32, -3.25, 100.0, 7.5, 0.1, -0.2, 3.0, 8.0, 4.5, 1e-3, 2e4, -9.75];
     let swapped = coordinates.into_iter().flat_map(f32::to_be_bytes);
-    let doubles = coordinates
-        .into_iter()
-        .flat_map(|c| (1.7 * f64::from(c)).to_le_bytes());
+    let doubles = coordinates.into_iter().flat_map(|c| (1.7 * f64::from(c)).to_le_bytes());
     let little: Vec<u8> = coordinates.into_iter().flat_map(f32::to_le_bytes).collect();
-    for bytes in [
-        big.into_iter().chain(swapped).collect::<Vec<u8>>(),
-        doubles.collect(),
-    ] {
+    for bytes in [big.into_iter().chain(swapped).collect::<Vec<u8>>(), doubles.collect()] {
         let error = read(&bytes, &Step::whole(bytes.len())).expect_err("implausible");
         assert!(error.to_string().contains("not raw f32 triples"), "{error}");
         assert!(FORMAT.reader().layout(&bytes).is_err());
     }
     assert_eq!(only(&little).positions.len(), 4);
-    let missing: Vec<u8> = [f32::NAN, f32::INFINITY, 3e37]
-        .into_iter()
-        .flat_map(f32::to_le_bytes)
-        .collect();
+    let missing: Vec<u8> =
+        [f32::NAN, f32::INFINITY, 3e37].into_iter().flat_map(f32::to_le_bytes).collect();
     assert_eq!(only(&missing).positions.len(), 1);
 }
 

@@ -69,10 +69,8 @@ impl<'a> LineCounter<'a> {
         let passed = self.text.get(self.place.at..at).unwrap_or_default();
         let lines = memchr::memchr_iter(b'\n', passed).count();
         let lines = u32::try_from(lines).unwrap_or(u32::MAX);
-        self.place = TextPlace {
-            at: at.max(self.place.at),
-            line: self.place.line.saturating_add(lines),
-        };
+        self.place =
+            TextPlace { at: at.max(self.place.at), line: self.place.line.saturating_add(lines) };
         self.place
     }
 }

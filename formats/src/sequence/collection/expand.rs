@@ -72,13 +72,7 @@ pub(in crate::sequence) fn expand(
             "{count} lists of files are listed twice for one time step and used once"
         ));
     }
-    let Expander {
-        leaves,
-        lists,
-        parts,
-        faults,
-        ..
-    } = expander;
+    let Expander { leaves, lists, parts, faults, .. } = expander;
     let mut paths: Vec<PathBuf> = lists.into_keys().collect();
     paths.sort();
     let used = leaves.iter().zip(&numbers);
@@ -109,16 +103,7 @@ pub(in crate::sequence) fn expand(
         times: ends.map(|(first, last)| (*first, *last)),
     };
     notes.push(summary.to_string());
-    Ok(Expansion {
-        steps,
-        parts: names,
-        lists: ListedFiles {
-            summary,
-            paths,
-            times,
-            faults,
-        },
-    })
+    Ok(Expansion { steps, parts: names, lists: ListedFiles { summary, paths, times, faults } })
 }
 
 /// A file of particles that a list names.
@@ -157,10 +142,7 @@ impl LeafContext {
         Self {
             time: self.time.or(entry.time),
             part,
-            listed: Some(ListPlace {
-                list: Arc::clone(path),
-                line: entry.place.line,
-            }),
+            listed: Some(ListPlace { list: Arc::clone(path), line: entry.place.line }),
         }
     }
 }
@@ -216,10 +198,7 @@ impl Expander {
     ) -> Result<Option<ListKind>, SequenceError> {
         self.root = ListRoot::of(&file.path, self.settings.follow_links);
         let context = LeafContext {
-            part: PartKey {
-                group: file.part,
-                ..PartKey::default()
-            },
+            part: PartKey { group: file.part, ..PartKey::default() },
             ..LeafContext::default()
         };
         if !(is_list(&file.path) || stands_for_blocks(&file.path)) {
@@ -307,10 +286,7 @@ impl Expander {
                 let texts = list.entries.iter();
                 let texts = texts.map(|e| e.path.len() + size_of::<ListEntry>());
                 self.held += texts.sum::<usize>() as u64;
-                let opened = Arc::new(OpenedList {
-                    path: path.into(),
-                    list,
-                });
+                let opened = Arc::new(OpenedList { path: path.into(), list });
                 if opened.list.ghost_level > 0 && self.has_ghosts.is_none() {
                     self.has_ghosts = Some(Arc::clone(&opened.path));
                 }
@@ -348,12 +324,7 @@ impl Expander {
             SequenceError::List(e.in_file(list))
         })?;
         let part = self.parts.number(&context.part);
-        self.leaves.push(Leaf {
-            path,
-            time: context.time,
-            part,
-            listed: context.listed.clone(),
-        });
+        self.leaves.push(Leaf { path, time: context.time, part, listed: context.listed.clone() });
         Ok(())
     }
 
@@ -371,9 +342,7 @@ impl Expander {
 fn fault_of_chain(chain: &[Arc<Path>], target: &Path) -> Option<String> {
     if chain.len() >= MAX_DEPTH {
         let remedy = "list the files of particles directly";
-        return Some(format!(
-            "more than {MAX_DEPTH} lists of files in one another; {remedy}"
-        ));
+        return Some(format!("more than {MAX_DEPTH} lists of files in one another; {remedy}"));
     }
     let is_cycle = chain.iter().any(|list| **list == *target);
     is_cycle.then(|| {
@@ -418,10 +387,7 @@ fn number(
         return Ok(());
     }
     if !is_only {
-        return Err(SequenceError::SeveralLists {
-            path: file.path.clone(),
-            steps: times.len(),
-        });
+        return Err(SequenceError::SeveralLists { path: file.path.clone(), steps: times.len() });
     }
     let place = |leaf: &Leaf| {
         let time = leaf.time.unwrap_or_default();
@@ -450,8 +416,6 @@ fn drop_repeated(steps: &mut Vec<NumberedStep>, notes: &mut Vec<String>) {
     *steps = kept;
     let dropped = before - steps.len();
     if dropped > 0 {
-        notes.push(format!(
-            "{dropped} files are listed twice for one time step and used once"
-        ));
+        notes.push(format!("{dropped} files are listed twice for one time step and used once"));
     }
 }

@@ -58,11 +58,7 @@ impl List {
             ParseError::malformed(0, what)
         })?;
         let list = match kind {
-            ListKind::Series => Self {
-                kind,
-                entries: series::entries(bytes)?,
-                ghost_level: 0,
-            },
+            ListKind::Series => Self { kind, entries: series::entries(bytes)?, ghost_level: 0 },
             ListKind::Collection | ListKind::Pieces | ListKind::Blocks => xml::list(bytes, kind)?,
         };
         if list.entries.is_empty() {

@@ -27,11 +27,7 @@ pub(super) struct PartKey {
 impl PartKey {
     /// What always counts.
     fn plain(&self) -> Self {
-        Self {
-            stem: String::new(),
-            piece: None,
-            ..self.clone()
-        }
+        Self { stem: String::new(), piece: None, ..self.clone() }
     }
 }
 
@@ -68,11 +64,8 @@ impl PartTable {
         steps: impl Iterator<Item = (i64, u32)>,
         groups: &[String],
     ) -> (Vec<u32>, Vec<String>) {
-        let mut keys: Vec<(u32, PartKey)> = self
-            .numbers
-            .into_iter()
-            .map(|(key, number)| (number, key))
-            .collect();
+        let mut keys: Vec<(u32, PartKey)> =
+            self.numbers.into_iter().map(|(key, number)| (number, key)).collect();
         keys.sort_unstable_by_key(|(number, _)| *number);
         let keys: Vec<PartKey> = keys.into_iter().map(|(_, key)| key).collect();
         // Find the plain keys that are ambiguous: in some step, files with different names have the same one
@@ -91,10 +84,7 @@ impl PartTable {
             .iter()
             .zip(&plain)
             .map(|(key, plain)| match shared.contains(plain) {
-                true => PartKey {
-                    stem: key.stem.clone(),
-                    ..plain.clone()
-                },
+                true => PartKey { stem: key.stem.clone(), ..plain.clone() },
                 false => plain.clone(),
             })
             .collect();
@@ -107,10 +97,7 @@ impl PartTable {
         for (key, mut identity) in keys.iter().zip(named) {
             identity.piece = key.piece.filter(|_| are_pieces);
             let part = *of_key.entry(identity).or_insert_with(|| {
-                parts.push(PartKey {
-                    piece: key.piece.filter(|_| are_pieces),
-                    ..key.clone()
-                });
+                parts.push(PartKey { piece: key.piece.filter(|_| are_pieces), ..key.clone() });
                 u32::try_from(parts.len() - 1).unwrap_or(u32::MAX)
             });
             of_number.push(part);
@@ -129,22 +116,13 @@ fn names(parts: &[PartKey], groups: &[String]) -> Vec<String> {
     }
     let group = |key: &PartKey| groups.get(key.group as usize).cloned().unwrap_or_default();
     let schemes: [WordsOf<'_>; 6] = [
-        &|key| {
-            key.piece
-                .map(|piece| format!("piece {piece}"))
-                .into_iter()
-                .collect()
-        },
+        &|key| key.piece.map(|piece| format!("piece {piece}")).into_iter().collect(),
         &|key| vec![key.label.name.clone(), key.blocks.clone()],
         &|key| vec![key.stem.clone(), key.blocks.clone()],
         &|key| vec![group(key), key.blocks.clone()],
         &|key| vec![key.label.part.clone(), key.blocks.clone()],
         &|key| {
-            let PartLabel {
-                group: within,
-                part,
-                name,
-            } = &key.label;
+            let PartLabel { group: within, part, name } = &key.label;
             let all = [&group(key), within, part, name, &key.stem, &key.blocks];
             all.map(Clone::clone).to_vec()
         },

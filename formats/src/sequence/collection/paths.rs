@@ -14,10 +14,7 @@ impl ListRoot {
     /// The directory of `list`, the file that a user named.
     pub(super) fn of(list: &Path, may_leave: bool) -> Self {
         let directory = list.parent().unwrap_or(Path::new("")).to_owned();
-        Self {
-            directory,
-            may_leave,
-        }
+        Self { directory, may_leave }
     }
 
     /// The path of the file that `list` calls `name`; `None` if it is not inside the directory.
@@ -98,14 +95,8 @@ mod tests {
     fn names_may_leave_if_they_are_allowed_to() {
         let root = ListRoot::of(Path::new("run/all.pvd"), true);
         let resolve = |list: &str, name| root.resolve(Path::new(list), name);
-        assert_eq!(
-            resolve("run/all.pvd", "../a.vtu"),
-            Some("run/../a.vtu".into())
-        );
-        assert_eq!(
-            resolve("run/all.pvd", "/x/a.pvtu"),
-            Some("/x/a.pvtu".into())
-        );
+        assert_eq!(resolve("run/all.pvd", "../a.vtu"), Some("run/../a.vtu".into()));
+        assert_eq!(resolve("run/all.pvd", "/x/a.pvtu"), Some("/x/a.pvtu".into()));
         assert_eq!(resolve("/x/a.pvtu", "a_0.vtu"), Some("/x/a_0.vtu".into()));
         assert_eq!(resolve("run/all.pvd", "a.vtu"), Some("run/a.vtu".into()));
     }

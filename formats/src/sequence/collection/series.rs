@@ -46,10 +46,7 @@ pub(super) fn entries(bytes: &[u8]) -> Result<Vec<ListEntry>, ParseError> {
     let series: Series<'_> =
         serde_json::from_slice(json).map_err(|error| bad_json(bytes, start, &error))?;
     if !series.version.starts_with("1.") {
-        let what = format!(
-            "file series of version {}; version 1.0 is read",
-            series.version
-        );
+        let what = format!("file series of version {}; version 1.0 is read", series.version);
         return Err(ParseError::unsupported(what));
     }
     let mut lines = LineCounter::new(bytes);

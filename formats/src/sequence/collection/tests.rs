@@ -91,11 +91,8 @@ fn frame(sequence: &Sequence, index: usize) -> (Vec<f64>, Vec<u32>, Option<f64>)
 fn steps_are_in_the_order_of_their_times() {
     let lists = Lists::new();
     lists.particles(&["a_0.csv", "a_1.csv", "a_2.csv"]);
-    let entries = [
-        ("2.5", "file=\"a_2.csv\""),
-        ("-0", "file=\"a_0.csv\""),
-        ("1e0", "file=\"./a_1.csv\""),
-    ];
+    let entries =
+        [("2.5", "file=\"a_2.csv\""), ("-0", "file=\"a_0.csv\""), ("1e0", "file=\"./a_1.csv\"")];
     lists.file("run7.pvd", &pvd(&entries));
     let sequence = lists.good("run7.pvd");
     let numbers: Vec<i64> = sequence.frames().iter().map(|f| f.number).collect();
@@ -104,10 +101,7 @@ fn steps_are_in_the_order_of_their_times() {
         let x = index as f64;
         assert_eq!(frame(&sequence, index), (vec![x], vec![], Some(time)));
     }
-    assert_eq!(
-        sequence.notes(),
-        ["ParaView collection, 3 time steps, 3 files, times 0 to 2.5"]
-    );
+    assert_eq!(sequence.notes(), ["ParaView collection, 3 time steps, 3 files, times 0 to 2.5"]);
     // With one step, the number in the name of the list is not that of the step
     lists.file("run8.pvd", &pvd(&entries[..1]));
     assert_eq!(lists.good("run8.pvd").frames()[0].number, 0);
@@ -156,10 +150,7 @@ fn lists_may_be_in_lists_and_in_directories() {
     for step in ["t0", "t1"] {
         let blocks = "<DataSet name=\"a\" file=\"a.csv\"/>\n<Block name=\"in\">\n\
                       <DataSet name=\"b\" file=\"b.csv\"/>\n</Block>\n<DataSet name=\"none\"/>\n";
-        lists.file(
-            &format!("{step}/all.vtm"),
-            &vtk_file("vtkMultiBlockDataSet", blocks),
-        );
+        lists.file(&format!("{step}/all.vtm"), &vtk_file("vtkMultiBlockDataSet", blocks));
     }
     let series = "{\"file-series-version\": \"1.0\", \"files\": [\n{\"name\": \"t0/all.vtm\", \"time\": 3},\n\
                   {\"name\": \"t1/all.vtm\", \"time\": 4.5}]}";
@@ -182,13 +173,9 @@ fn numbered_lists_are_time_steps() {
     let lists = Lists::new();
     lists.particles(&["p_0_0.csv", "p_0_1.csv", "p_10_0.csv", "p_10_1.csv"]);
     for step in [0, 10] {
-        let pieces: String = (0..2)
-            .map(|i| format!("<Piece Source=\"p_{step}_{i}.csv\"/>\n"))
-            .collect();
-        lists.file(
-            &format!("p_{step}.pvtu"),
-            &vtk_file("PUnstructuredGrid", &pieces),
-        );
+        let pieces: String =
+            (0..2).map(|i| format!("<Piece Source=\"p_{step}_{i}.csv\"/>\n")).collect();
+        lists.file(&format!("p_{step}.pvtu"), &vtk_file("PUnstructuredGrid", &pieces));
     }
     let sequence = lists.good("p_#.pvtu");
     let numbers: Vec<i64> = sequence.frames().iter().map(|f| f.number).collect();
@@ -204,10 +191,7 @@ fn numbered_lists_are_time_steps() {
         "p_10.pvtu: byte 34: line 1: the file ends before </VTKFile>; it may still be being written"
     );
     // A list and a file of particles
-    let both = [
-        lists.path("p_0.pvtu"),
-        lists.file("q_3.csv", "x,y,z\n1,2,3\n"),
-    ];
+    let both = [lists.path("p_0.pvtu"), lists.file("q_3.csv", "x,y,z\n1,2,3\n")];
     let sequence = Sequence::open(&SequenceInput::from_paths(both.to_vec()));
     assert_eq!(sequence.expect("two frames").frames().len(), 2);
 }
@@ -216,11 +200,8 @@ fn numbered_lists_are_time_steps() {
 fn missing_files_cost_their_frame() {
     let lists = Lists::new();
     lists.particles(&["a_0.csv"]);
-    let entries = [
-        ("0", "file=\"a_0.csv\""),
-        ("1", "file=\"a_1.csv\""),
-        ("2", "file=\"t/a.pvtu\""),
-    ];
+    let entries =
+        [("0", "file=\"a_0.csv\""), ("1", "file=\"a_1.csv\""), ("2", "file=\"t/a.pvtu\"")];
     lists.file("all.pvd", &pvd(&entries));
     let sequence = lists.good("all.pvd");
     assert!(sequence.load_raw(0).is_ok());
@@ -246,10 +227,7 @@ fn files_outside_need_permission() {
             && error.contains("--follow-links"),
         "{error}"
     );
-    let settings = SequenceSettings {
-        follow_links: true,
-        ..SequenceSettings::default()
-    };
+    let settings = SequenceSettings { follow_links: true, ..SequenceSettings::default() };
     let input = SequenceInput::from_path(path);
     let sequence = Sequence::open_with(&input, settings).expect("allowed");
     assert_eq!(frame(&sequence, 1).0, [0.0]);
@@ -276,17 +254,11 @@ fn cycles_end() {
         "b.vtm: byte 61: line 3: it lists `a.vtm`, which lists this file: a cycle; remove one of the two"
     );
     for index in 0..20 {
-        lists.file(
-            &format!("c{index}.vtm"),
-            &blocks(&format!("c{}.vtm", index + 1)),
-        );
+        lists.file(&format!("c{index}.vtm"), &blocks(&format!("c{}.vtm", index + 1)));
     }
     let sequence = lists.good("c0.vtm");
     let error = lists.frame_error(&sequence, 0);
-    assert!(
-        error.contains("more than 16 lists of files in one another"),
-        "{error}"
-    );
+    assert!(error.contains("more than 16 lists of files in one another"), "{error}");
 }
 
 #[test]
@@ -300,10 +272,7 @@ fn time_and_memory_are_bounded() {
             _ => format!("l{}.vtm", depth + 1),
         };
         let blocks = format!("<DataSet file=\"{next}\"/>\n").repeat(1000);
-        lists.file(
-            &format!("l{depth}.vtm"),
-            &vtk_file("vtkMultiBlockDataSet", &blocks),
-        );
+        lists.file(&format!("l{depth}.vtm"), &vtk_file("vtkMultiBlockDataSet", &blocks));
     }
     let open = |name: &str, bytes| {
         let budget = MemoryBudget::new(bytes, "take care");
@@ -327,32 +296,20 @@ fn time_and_memory_are_bounded() {
     timed_lists(&lists, 3000);
     let error = open("times.pvd", 16 << 20).expect_err("too many");
     let error = error.to_string();
-    assert!(
-        error.ends_with("is larger than 16 MiB; take care"),
-        "{error}"
-    );
+    assert!(error.ends_with("is larger than 16 MiB; take care"), "{error}");
     // Many entries
     let many = "<DataSet timestep=\"0\" file=\"a.csv\"/>\n".repeat(20_000);
     lists.file("many.pvd", &vtk_file("Collection", &many));
     let error = open("many.pvd", 2 << 20).expect_err("too many").to_string();
-    assert!(
-        error.contains("list of its files is larger than"),
-        "{error}"
-    );
+    assert!(error.contains("list of its files is larger than"), "{error}");
     let sequence = lists.good("many.pvd");
     assert_eq!(sequence.frames()[0].parts.len(), 1);
-    assert_eq!(
-        sequence.notes()[0],
-        "19999 files are listed twice for one time step and used once"
-    );
+    assert_eq!(sequence.notes()[0], "19999 files are listed twice for one time step and used once");
     // The particles of all files of a step share the budget
     let budget = MemoryBudget::new(3000, "take care");
     let mut pieces = String::new();
     for index in 0..40 {
-        lists.file(
-            &format!("p{index}.csv"),
-            &format!("x,y,z\n{}", "1,2,3\n".repeat(20)),
-        );
+        lists.file(&format!("p{index}.csv"), &format!("x,y,z\n{}", "1,2,3\n".repeat(20)));
         let _ = writeln!(pieces, "<Piece Source=\"p{index}.csv\"/>");
     }
     let path = lists.file("p.pvtu", &vtk_file("PUnstructuredGrid", &pieces));
@@ -462,10 +419,7 @@ fn damaged_lists_name_the_place() {
     let latin = [head.as_bytes(), b"<DataSet file=\"\xfc.vtu\"/>"].concat();
     fs::write(lists.path("latin.pvd"), latin).expect("writable");
     let error = lists.error("latin.pvd");
-    assert!(
-        error.contains("byte 56: line 3: not text in UTF-8"),
-        "{error}"
-    );
+    assert!(error.contains("byte 56: line 3: not text in UTF-8"), "{error}");
 }
 
 #[test]
@@ -479,10 +433,7 @@ fn several_lists_with_times_are_refused() {
     let both = [lists.path("fluid.pvd"), lists.path("wall.pvd")];
     let error = Sequence::open(&SequenceInput::from_paths(both.to_vec()));
     let error = error.expect_err("two lists").to_string();
-    assert!(
-        error.contains("2 time steps in one of several lists"),
-        "{error}"
-    );
+    assert!(error.contains("2 time steps in one of several lists"), "{error}");
 }
 
 #[test]
@@ -493,8 +444,5 @@ fn inputs_of_a_frame_are_its_members() {
     lists.file("all.pvd", &pvd(&entries));
     let sequence = lists.good("all.pvd");
     let members = [lists.path("a.csv"), lists.path("b.csv")];
-    assert_eq!(
-        sequence.inputs(0),
-        members.each_ref().map(|p| -> &Path { p })
-    );
+    assert_eq!(sequence.inputs(0), members.each_ref().map(|p| -> &Path { p }));
 }

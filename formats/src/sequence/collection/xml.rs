@@ -22,14 +22,8 @@ pub(super) fn list(bytes: &[u8], kind: ListKind) -> Result<List, ParseError> {
         let place = lines.place(error.valid_up_to());
         place.malformed("not text in UTF-8; save the list as UTF-8")
     })?;
-    let mut parser = ListParser {
-        list: List {
-            kind,
-            entries: Vec::new(),
-            ghost_level: 0,
-        },
-        open: Vec::new(),
-    };
+    let mut parser =
+        ListParser { list: List { kind, entries: Vec::new(), ghost_level: 0 }, open: Vec::new() };
     let mut reader = Reader::from_str(text);
     loop {
         let start = usize::try_from(reader.buffer_position()).unwrap_or(usize::MAX);
@@ -104,11 +98,7 @@ impl ListParser {
             }
             _ => {}
         }
-        self.open.push(OpenElement {
-            block,
-            child_count: 0,
-            is_partitioned: name == "Partitions",
-        });
+        self.open.push(OpenElement { block, child_count: 0, is_partitioned: name == "Partitions" });
         Ok(())
     }
 
@@ -164,22 +154,14 @@ impl ListParser {
         // A block without data has no file.
         let file = text_of(tag, place, "file")?;
         if !file.is_empty() {
-            let part = PartLabel {
-                name: name.clone(),
-                ..PartLabel::default()
-            };
+            let part = PartLabel { name: name.clone(), ..PartLabel::default() };
             self.push(file, None, part, place);
         }
         Ok(name)
     }
 
     fn push(&mut self, path: String, time: Option<f64>, part: PartLabel, place: TextPlace) {
-        self.list.entries.push(ListEntry {
-            path,
-            time,
-            part,
-            place,
-        });
+        self.list.entries.push(ListEntry { path, time, part, place });
     }
 }
 

@@ -5,10 +5,7 @@ use std::path::Path;
 use super::*;
 
 fn names(names: &[String]) -> Vec<FileName> {
-    names
-        .iter()
-        .map(|n| FileName::parse(Path::new(n), None))
-        .collect()
+    names.iter().map(|n| FileName::parse(Path::new(n), None)).collect()
 }
 
 fn owned(texts: &[&str]) -> Vec<String> {
@@ -36,9 +33,8 @@ fn numbers(group: &FileGroup) -> Vec<i64> {
 
 #[test]
 fn unpadded_numbers_sort_as_numbers() {
-    let files: Vec<String> = [10, 9, 2, 1, 11]
-        .map(|i| format!("ParticleData_Fluid_{i}.vtk"))
-        .into();
+    let files: Vec<String> =
+        [10, 9, 2, 1, 11].map(|i| format!("ParticleData_Fluid_{i}.vtk")).into();
     let (group, notes) = picked(&files);
     assert_eq!(numbers(&group), [1, 2, 9, 10, 11]);
     assert_eq!(group.parts, [""]);
@@ -69,22 +65,15 @@ fn files_of_one_step_become_parts() {
     let (group, _) = picked(&files);
     assert_eq!(group.parts, ["boundary", "fluid"]);
     assert_eq!(numbers(&group), [0, 0, 100, 100, 200, 200, 300, 300]);
-    let one_step = owned(&[
-        "dam_break_3d_fluid_00100.vtu",
-        "dam_break_3d_obstacle_00100.vtu",
-    ]);
+    let one_step = owned(&["dam_break_3d_fluid_00100.vtu", "dam_break_3d_obstacle_00100.vtu"]);
     let (group, _) = picked(&one_step);
-    assert_eq!(
-        (numbers(&group), group.parts),
-        (vec![100, 100], owned(&["fluid", "obstacle"]))
-    );
+    assert_eq!((numbers(&group), group.parts), (vec![100, 100], owned(&["fluid", "obstacle"])));
 }
 
 #[test]
 fn objects_of_one_model_become_parts() {
-    let files: Vec<String> = (1..4)
-        .flat_map(|i| [0, 1].map(|o| format!("ParticleData_Fluid_{o}_{i}.vtk")))
-        .collect();
+    let files: Vec<String> =
+        (1..4).flat_map(|i| [0, 1].map(|o| format!("ParticleData_Fluid_{o}_{i}.vtk"))).collect();
     let (group, _) = picked(&files);
     assert_eq!(group.parts, ["0", "1"]);
     assert_eq!(numbers(&group), [1, 1, 2, 2, 3, 3]);
@@ -98,10 +87,7 @@ fn a_name_of_one_step_is_left_out_of_several() {
         let (group, _) = picked(&files);
         let lone = group.lone.expect("the initial state");
         let notes = lone.notes;
-        assert_eq!(
-            (lone.parts, lone.others),
-            (BTreeSet::from([0]), owned(&[""]))
-        );
+        assert_eq!((lone.parts, lone.others), (BTreeSet::from([0]), owned(&[""])));
         assert!(
             notes[0].starts_with("`CaseDam0.bi4` is left out")
                 && notes[0].contains("--parts CaseDam"),
@@ -117,24 +103,16 @@ fn parts_may_start_late() {
     let mut files: Vec<String> = (1..9).map(|i| format!("Fluid_{i}.vtk")).collect();
     files.extend((7..9).map(|i| format!("Oil_{i}.vtk")));
     let (group, _) = picked(&files);
-    assert_eq!(
-        (group.parts, group.files.len()),
-        (owned(&["Fluid", "Oil"]), 10)
-    );
+    assert_eq!((group.parts, group.files.len()), (owned(&["Fluid", "Oil"]), 10));
 }
 
 #[test]
 fn few_stray_files_are_skipped_and_reported() {
-    let mut files: Vec<String> = (0..10)
-        .map(|i| format!("dump.drop.{}.lammps", i * 400))
-        .collect();
+    let mut files: Vec<String> = (0..10).map(|i| format!("dump.drop.{}.lammps", i * 400)).collect();
     files[3] += ".gz";
     files.push("drop_4frames.lammpstrj".into());
     let (group, notes) = picked(&files);
-    assert_eq!(
-        numbers(&group),
-        (0..10).map(|i| i * 400).collect::<Vec<_>>()
-    );
+    assert_eq!(numbers(&group), (0..10).map(|i| i * 400).collect::<Vec<_>>());
     assert_eq!(notes, ["`drop_4frames.lammpstrj` (1 file) is left out"]);
     let files = owned(&["out_1.vtk", "out_2.vtk", "initial.vtk"]);
     let (group, notes) = picked(&files);
@@ -153,10 +131,7 @@ fn two_formats_are_reported_with_their_patterns() {
         "dam_break_3d_obstacle_00100.vtu",
         "dam_break_3d_00300.npz",
     ]);
-    assert!(
-        text.contains("`dam_break_3d_*_#.vtu` (1 frame, 2 files)"),
-        "{text}"
-    );
+    assert!(text.contains("`dam_break_3d_*_#.vtu` (1 frame, 2 files)"), "{text}");
 }
 
 #[test]
@@ -171,14 +146,8 @@ fn a_mixed_directory_names_every_sequence() {
         "dam_break_frame_23_24389_particles.bgeo",
         "cube_8_particles.vtu",
     ]);
-    assert!(
-        text.contains("`double_dam_break_frame_#_4732_particles.vtk`"),
-        "{text}"
-    );
-    assert!(
-        text.contains("`dam_break_frame_#_*_particles.bgeo`"),
-        "{text}"
-    );
+    assert!(text.contains("`double_dam_break_frame_#_4732_particles.vtk`"), "{text}");
+    assert!(text.contains("`dam_break_frame_#_*_particles.bgeo`"), "{text}");
 }
 
 #[test]
@@ -216,9 +185,7 @@ fn unrelated_names_are_grouped_in_linear_time() {
         }
         text
     };
-    let files: Vec<String> = (0..100_000)
-        .map(|i| format!("{}.vtk", letters(i)))
-        .collect();
+    let files: Vec<String> = (0..100_000).map(|i| format!("{}.vtk", letters(i))).collect();
     let found = candidates(names(&files));
     assert_eq!(found.len(), files.len());
 }

@@ -42,11 +42,7 @@ impl Avx2Ray {
             let cx = _mm256_sub_ps(load(&block.x), _mm256_set1_ps(o.x));
             let cy = _mm256_sub_ps(load(&block.y), _mm256_set1_ps(o.y));
             let cz = _mm256_sub_ps(load(&block.z), _mm256_set1_ps(o.z));
-            let (dx, dy, dz) = (
-                _mm256_set1_ps(d.x),
-                _mm256_set1_ps(d.y),
-                _mm256_set1_ps(d.z),
-            );
+            let (dx, dy, dz) = (_mm256_set1_ps(d.x), _mm256_set1_ps(d.y), _mm256_set1_ps(d.z));
             let middle = _mm256_fmadd_ps(cz, dz, _mm256_fmadd_ps(cy, dy, _mm256_mul_ps(cx, dx)));
             let ax = _mm256_fnmadd_ps(middle, dx, cx);
             let ay = _mm256_fnmadd_ps(middle, dy, cy);
@@ -106,11 +102,7 @@ impl Kernel for Avx2 {
 
     #[inline(always)]
     fn prepare(self, ray: &Ray, radius: f32, padding: f32) -> Avx2Ray {
-        Avx2Ray {
-            ray: *ray,
-            slab: SlabRay::new(ray, padding),
-            radius_squared: radius * radius,
-        }
+        Avx2Ray { ray: *ray, slab: SlabRay::new(ray, padding), radius_squared: radius * radius }
     }
 
     #[inline(always)]

@@ -156,14 +156,7 @@ pub(super) unsafe fn test_node(
         let boxes = ChildBoxes::of(node);
         let child = (node, &boxes);
         let low = test_half(rays, 0, child, alive, limits, &mut entered.near);
-        let high = test_half(
-            rays,
-            LANES,
-            child,
-            alive >> LANES,
-            limits,
-            &mut entered.near,
-        );
+        let high = test_half(rays, LANES, child, alive >> LANES, limits, &mut entered.near);
         // Make the keys of the entered children from the least entry distances
         let mut found = 0;
         for slot in 0..node.child_count() {

@@ -82,11 +82,7 @@ unsafe fn spheres_in_beam(
         let cx = _mm256_sub_ps(load(&block.x), _mm256_set1_ps(o.x));
         let cy = _mm256_sub_ps(load(&block.y), _mm256_set1_ps(o.y));
         let cz = _mm256_sub_ps(load(&block.z), _mm256_set1_ps(o.z));
-        let (dx, dy, dz) = (
-            _mm256_set1_ps(d.x),
-            _mm256_set1_ps(d.y),
-            _mm256_set1_ps(d.z),
-        );
+        let (dx, dy, dz) = (_mm256_set1_ps(d.x), _mm256_set1_ps(d.y), _mm256_set1_ps(d.z));
         let middle = _mm256_fmadd_ps(cz, dz, _mm256_fmadd_ps(cy, dy, _mm256_mul_ps(cx, dx)));
         let ax = _mm256_fnmadd_ps(middle, dx, cx);
         let ay = _mm256_fnmadd_ps(middle, dy, cy);

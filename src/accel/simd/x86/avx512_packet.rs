@@ -198,11 +198,7 @@ impl PacketKernel for Avx512 {
             let cx = _mm512_sub_ps(_mm512_load_ps(block.x.as_ptr()), _mm512_set1_ps(o.x));
             let cy = _mm512_sub_ps(_mm512_load_ps(block.y.as_ptr()), _mm512_set1_ps(o.y));
             let cz = _mm512_sub_ps(_mm512_load_ps(block.z.as_ptr()), _mm512_set1_ps(o.z));
-            let (dx, dy, dz) = (
-                _mm512_set1_ps(d.x),
-                _mm512_set1_ps(d.y),
-                _mm512_set1_ps(d.z),
-            );
+            let (dx, dy, dz) = (_mm512_set1_ps(d.x), _mm512_set1_ps(d.y), _mm512_set1_ps(d.z));
             let middle = _mm512_fmadd_ps(cz, dz, _mm512_fmadd_ps(cy, dy, _mm512_mul_ps(cx, dx)));
             let ax = _mm512_fnmadd_ps(middle, dx, cx);
             let ay = _mm512_fnmadd_ps(middle, dy, cy);

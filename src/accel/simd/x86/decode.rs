@@ -23,14 +23,10 @@ pub(super) unsafe fn q10_by_16(coded: &Q10Block, frame: &BlockFrame) -> Block {
         let x = _mm512_and_si512(words, low_11_bits);
         let y = _mm512_and_si512(_mm512_srli_epi32::<11>(words), low_11_bits);
         let z = _mm512_srli_epi32::<22>(words);
-        for (axis, (codes, lanes)) in [(x, &mut block.x), (y, &mut block.y), (z, &mut block.z)]
-            .into_iter()
-            .enumerate()
+        for (axis, (codes, lanes)) in
+            [(x, &mut block.x), (y, &mut block.y), (z, &mut block.z)].into_iter().enumerate()
         {
-            _mm512_store_ps(
-                lanes.as_mut_ptr(),
-                place_16(codes, frame.base[axis], steps[axis]),
-            );
+            _mm512_store_ps(lanes.as_mut_ptr(), place_16(codes, frame.base[axis], steps[axis]));
         }
     }
     block
@@ -42,19 +38,12 @@ pub(super) unsafe fn q10_by_16(coded: &Q10Block, frame: &BlockFrame) -> Block {
 pub(super) unsafe fn q16_by_16(coded: &Q16Block, frame: &BlockFrame) -> Block {
     let steps = Q16Block::steps(frame);
     let mut block = Block::zeroed();
-    let axes = [
-        (&coded.x, &mut block.x),
-        (&coded.y, &mut block.y),
-        (&coded.z, &mut block.z),
-    ];
+    let axes = [(&coded.x, &mut block.x), (&coded.y, &mut block.y), (&coded.z, &mut block.z)];
     for (axis, (codes, lanes)) in axes.into_iter().enumerate() {
         // SAFETY: AVX-512 by contract; loads and stores are of arrays of 16, aligned to 32 and 64 bytes.
         unsafe {
             let codes = _mm512_cvtepu16_epi32(_mm256_load_si256(codes.as_ptr().cast()));
-            _mm512_store_ps(
-                lanes.as_mut_ptr(),
-                place_16(codes, frame.base[axis], steps[axis]),
-            );
+            _mm512_store_ps(lanes.as_mut_ptr(), place_16(codes, frame.base[axis], steps[axis]));
         }
     }
     block
@@ -87,9 +76,8 @@ pub(super) unsafe fn q10_by_8(coded: &Q10Block, frame: &BlockFrame) -> Block {
             let x = _mm256_and_si256(words, low_11_bits);
             let y = _mm256_and_si256(_mm256_srli_epi32::<11>(words), low_11_bits);
             let z = _mm256_srli_epi32::<22>(words);
-            for (axis, (codes, lanes)) in [(x, &mut block.x), (y, &mut block.y), (z, &mut block.z)]
-                .into_iter()
-                .enumerate()
+            for (axis, (codes, lanes)) in
+                [(x, &mut block.x), (y, &mut block.y), (z, &mut block.z)].into_iter().enumerate()
             {
                 _mm256_store_ps(
                     lanes.as_mut_ptr().add(first),
@@ -107,11 +95,7 @@ pub(super) unsafe fn q10_by_8(coded: &Q10Block, frame: &BlockFrame) -> Block {
 pub(super) unsafe fn q16_by_8(coded: &Q16Block, frame: &BlockFrame) -> Block {
     let steps = Q16Block::steps(frame);
     let mut block = Block::zeroed();
-    let axes = [
-        (&coded.x, &mut block.x),
-        (&coded.y, &mut block.y),
-        (&coded.z, &mut block.z),
-    ];
+    let axes = [(&coded.x, &mut block.x), (&coded.y, &mut block.y), (&coded.z, &mut block.z)];
     for (axis, (codes, lanes)) in axes.into_iter().enumerate() {
         for first in [0, 8] {
             // SAFETY: AVX2 by contract; loads and stores are of lanes 0..8 or 8..16 of 16, aligned to 16

@@ -31,10 +31,7 @@ impl ChildBoxes {
     /// The caller's machine has AVX2.
     #[inline(always)]
     pub(super) unsafe fn of(node: &Node) -> Self {
-        let mut boxes = Self {
-            middle: [[0.0; WIDTH]; 3],
-            half: [[0.0; WIDTH]; 3],
-        };
+        let mut boxes = Self { middle: [[0.0; WIDTH]; 3], half: [[0.0; WIDTH]; 3] };
         for axis in 0..3 {
             // SAFETY: AVX2 by contract; stores fill arrays of eight.
             unsafe {
@@ -71,9 +68,7 @@ pub(super) fn prefetch<T>(value: &T) {
         // SAFETY: a prefetch never faults, whatever the address; the cast keeps within or just past
         // `value`, by wrapping arithmetic.
         unsafe {
-            let address = std::ptr::from_ref(value)
-                .cast::<i8>()
-                .wrapping_add(LINE * line);
+            let address = std::ptr::from_ref(value).cast::<i8>().wrapping_add(LINE * line);
             _mm_prefetch::<_MM_HINT_T0>(address);
         }
     }

@@ -37,9 +37,7 @@ impl SlabRay {
                 origin: _mm_setr_ps(ray.origin.x, ray.origin.y, ray.origin.z, 0.0),
                 inverse: _mm_setr_ps(inverse.x, inverse.y, inverse.z, 1.0),
                 reach: _mm_setr_ps(reach.x, reach.y, reach.z, 0.0),
-                near_side: inverse
-                    .to_array()
-                    .map(|d| usize::from(d.is_sign_negative())),
+                near_side: inverse.to_array().map(|d| usize::from(d.is_sign_negative())),
                 t_min: ray.t_min.max(0.0),
             }
         }

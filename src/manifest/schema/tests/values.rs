@@ -206,11 +206,8 @@ fn is_whole_float(value: &toml::Value) -> bool {
 #[test]
 fn schema_and_reader_accept_the_same_values() {
     let (schema, validator) = (job_schema(), validator());
-    let mut values: BTreeSet<String> = VALUES
-        .iter()
-        .chain(&COLORS)
-        .map(|v| (*v).to_owned())
-        .collect();
+    let mut values: BTreeSet<String> =
+        VALUES.iter().chain(&COLORS).map(|v| (*v).to_owned()).collect();
     words_and_slips(&schema, &mut values);
     let parsed = |text: String| {
         let value = format!("v = {text}").parse::<Table>().unwrap()["v"].clone();

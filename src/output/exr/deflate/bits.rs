@@ -14,12 +14,7 @@ pub(super) struct BitWriter<'a> {
 impl<'a> BitWriter<'a> {
     pub(super) fn new(bytes: &'a mut Vec<u8>) -> Self {
         let at = bytes.len();
-        Self {
-            bytes,
-            at,
-            bits: 0,
-            count: 0,
-        }
+        Self { bytes, at, bits: 0, count: 0 }
     }
 
     /// Number of complete bytes so far.

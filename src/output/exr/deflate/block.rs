@@ -20,9 +20,8 @@ const REPEAT: u8 = 16;
 const ZEROS: u8 = 17;
 const MANY_ZEROS: u8 = 18;
 /// The order in which the lengths of the codes for code lengths are written.
-const LENGTH_CODE_ORDER: [usize; LENGTH_CODES] = [
-    16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 2, 14, 1, 15,
-];
+const LENGTH_CODE_ORDER: [usize; LENGTH_CODES] =
+    [16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 2, 14, 1, 15];
 /// Maximum number of bytes in a stored block.
 const MAX_STORED: usize = 0xffff;
 
@@ -44,10 +43,8 @@ pub(super) fn write_block(
         distances[1] = distances[1].max(1);
     }
     // Make the codes, and store the data if that takes fewer bits
-    let codes = Codes {
-        symbols: codes(&symbols, MAX_SYMBOL_BITS),
-        distances: codes(&distances, MAX_BITS),
-    };
+    let codes =
+        Codes { symbols: codes(&symbols, MAX_SYMBOL_BITS), distances: codes(&distances, MAX_BITS) };
     let header = Header::of(&codes);
     let bits = 3 + header.bits() + codes.bits(&symbols, &distances);
     if stored_bits(data) <= bits {
@@ -87,10 +84,7 @@ fn stored_bits(data: &[u8]) -> u64 {
     8 * (data.len() as u64 + 5 * data.len().div_ceil(MAX_STORED) as u64)
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "stored blocks have at most 65535 bytes"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "stored blocks have at most 65535 bytes")]
 fn write_stored(data: &[u8], is_last: bool, out: &mut BitWriter) {
     let chunks = data.chunks(MAX_STORED);
     let count = chunks.len();
@@ -137,9 +131,7 @@ impl Header {
         };
         let symbols = used(&codes.symbols, END + 1);
         let distances = used(&codes.distances, 1);
-        let all = codes.symbols[..symbols]
-            .iter()
-            .chain(&codes.distances[..distances]);
+        let all = codes.symbols[..symbols].iter().chain(&codes.distances[..distances]);
         let mut lengths = [0; SYMBOLS + DISTANCES];
         for (length, code) in lengths.iter_mut().zip(all) {
             *length = code.length;
@@ -151,9 +143,7 @@ impl Header {
             counts[usize::from(code.symbol)] += 1;
         }
         let codes = self::codes(&counts, MAX_HEADER_BITS);
-        let last = LENGTH_CODE_ORDER
-            .iter()
-            .rposition(|symbol| codes[*symbol].length > 0);
+        let last = LENGTH_CODE_ORDER.iter().rposition(|symbol| codes[*symbol].length > 0);
         Self {
             symbols,
             distances,
@@ -191,18 +181,11 @@ impl Header {
 }
 
 /// Code lengths as symbols, with one symbol for a repetition.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "a repetition has at most 138 lengths"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "a repetition has at most 138 lengths")]
 fn length_codes(lengths: &[u8]) -> Vec<LengthCode> {
     let mut codes = Vec::with_capacity(lengths.len());
     let mut push = |symbol, extra: usize, extra_bits| {
-        codes.push(LengthCode {
-            symbol,
-            extra: extra as u8,
-            extra_bits,
-        });
+        codes.push(LengthCode { symbol, extra: extra as u8, extra_bits });
     };
     for equal in lengths.chunk_by(|a, b| a == b) {
         let length = equal[0];
@@ -244,10 +227,7 @@ struct Bits {
 
 impl Bits {
     fn of(code: Code) -> Self {
-        Self {
-            bits: u32::from(code.bits),
-            count: u32::from(code.length),
-        }
+        Self { bits: u32::from(code.bits), count: u32::from(code.length) }
     }
 
     #[inline(always)]
@@ -258,10 +238,7 @@ impl Bits {
 
     /// These bits, followed by `count` more.
     fn and(self, bits: u32, count: u32) -> Self {
-        Self {
-            bits: self.bits | bits << self.count,
-            count: self.count + count,
-        }
+        Self { bits: self.bits | bits << self.count, count: self.count + count }
     }
 }
 

@@ -15,11 +15,7 @@ pub(super) struct Histogram {
 
 impl Default for Histogram {
     fn default() -> Self {
-        Self {
-            symbols: [0; SYMBOLS],
-            distances: [0; DISTANCES],
-            counts: [0; 2],
-        }
+        Self { symbols: [0; SYMBOLS], distances: [0; DISTANCES], counts: [0; 2] }
     }
 }
 
@@ -139,10 +135,7 @@ mod tests {
         for count in (1..5000).chain([65_535, 65_536, 1 << 24, u32::MAX - 1]) {
             let expected = f64::from(count) * f64::from(count).log2();
             let found = count_log_count(count) as f64 / f64::from(1 << FRACTION);
-            assert!(
-                (found - expected).abs() <= 0.0015 * f64::from(count),
-                "{count}"
-            );
+            assert!((found - expected).abs() <= 0.0015 * f64::from(count), "{count}");
         }
         assert_eq!(count_log_count(0), 0);
     }

@@ -46,10 +46,7 @@ pub(super) fn codes<const N: usize>(counts: &[u32; N], limit: usize) -> [Code; N
 
 /// Replaces counts in ascending order by the lengths of their Huffman codes, in place (Moffat and Katajainen, "In-Place
 /// Calculation of Minimum-Redundancy Codes", 1995).
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "there are fewer than 300 symbols"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "there are fewer than 300 symbols")]
 fn code_lengths(counts: &mut [u32]) {
     let used = counts.len();
     // Repeatedly join the two lightest nodes. The entry of an internal node is its weight until it is joined itself,
@@ -118,10 +115,7 @@ fn limited(depths: &[u32], limit: usize) -> [u32; MAX_BITS + 1] {
 }
 
 /// Assigns consecutive numbers to the codes of each length (RFC 1951, section 3.2.2).
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "there are fewer than 300 symbols"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "there are fewer than 300 symbols")]
 fn number(codes: &mut [Code], lengths: &[u32; MAX_BITS + 1]) {
     let mut next = [0_u16; MAX_BITS + 1];
     for length in 1..=MAX_BITS {
@@ -176,10 +170,7 @@ mod tests {
         sorted.sort_by_key(|code| number(code));
         for pair in sorted.windows(2) {
             let width = 1_u32 << (16 - u32::from(pair[0].length));
-            assert_eq!(
-                u32::from(number(pair[1])),
-                u32::from(number(pair[0])) + width
-            );
+            assert_eq!(u32::from(number(pair[1])), u32::from(number(pair[0])) + width);
             assert!(pair[0].length <= pair[1].length);
         }
         bits
@@ -190,14 +181,9 @@ mod tests {
         // RFC 1951, section 3.2.2: lengths 3, 3, 3, 3, 3, 2, 4, 4.
         let counts = [20, 20, 20, 20, 20, 40, 10, 10];
         let codes = codes(&counts, MAX_BITS);
-        let bits: Vec<u16> = codes
-            .iter()
-            .map(|code| code.bits.reverse_bits() >> (16 - code.length))
-            .collect();
-        assert_eq!(
-            bits,
-            [0b010, 0b011, 0b100, 0b101, 0b110, 0b00, 0b1110, 0b1111]
-        );
+        let bits: Vec<u16> =
+            codes.iter().map(|code| code.bits.reverse_bits() >> (16 - code.length)).collect();
+        assert_eq!(bits, [0b010, 0b011, 0b100, 0b101, 0b110, 0b00, 0b1110, 0b1111]);
     }
 
     #[test]
@@ -214,10 +200,7 @@ mod tests {
             assert!(bits >= min_bits(&counts) && bits <= all * limit as u64);
         }
         assert_eq!(check(&[1; 128], 7), 7 * 128);
-        assert_eq!(
-            check(&[0, 1, 0, u32::MAX / 2, 0], 7),
-            1 + u64::from(u32::MAX / 2)
-        );
+        assert_eq!(check(&[0, 1, 0, u32::MAX / 2, 0], 7), 1 + u64::from(u32::MAX / 2));
     }
 
     proptest! {

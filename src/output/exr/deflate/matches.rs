@@ -67,10 +67,7 @@ impl MatchFinder for HashTable {
     const STEP: usize = 1;
 
     #[inline(always)]
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "blocks have less than 4 GiB"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "blocks have less than 4 GiB")]
     fn find(&mut self, data: &[u8], at: usize, end: usize) -> Option<(usize, usize)> {
         // Replace the entry of these four bytes; the multiplier is 2^32 divided by the golden ratio
         let four = first_four(eight_at(data, at - 2) >> 16);
@@ -152,10 +149,7 @@ fn match_length(data: &[u8], at: usize, distance: usize, end: usize) -> usize {
         }
         length += eight.len();
     }
-    let equal = rest
-        .iter()
-        .zip(rest_before)
-        .take_while(|(byte, before)| byte == before);
+    let equal = rest.iter().zip(rest_before).take_while(|(byte, before)| byte == before);
     length + equal.count()
 }
 
@@ -183,16 +177,9 @@ fn push(sequences: &mut Vec<Sequence>, literals: usize, length: usize, distance:
 }
 
 /// Appends the literals at the end of a piece.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "blocks have less than 4 GiB"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "blocks have less than 4 GiB")]
 fn push_literals(sequences: &mut Vec<Sequence>, literals: usize) {
-    sequences.push(Sequence {
-        literals: literals as u32,
-        length: 0,
-        distance: 1,
-    });
+    sequences.push(Sequence { literals: literals as u32, length: 0, distance: 1 });
 }
 
 #[inline(always)]

@@ -117,10 +117,7 @@ impl Piece {
     /// Splits the piece into pieces of at most [`MAX_PIECE`] bytes.
     fn split(self) -> impl Iterator<Item = Self> {
         let starts = (0..self.length).step_by(MAX_PIECE);
-        starts.map(move |start| Self {
-            length: MAX_PIECE.min(self.length - start),
-            ..self
-        })
+        starts.map(move |start| Self { length: MAX_PIECE.min(self.length - start), ..self })
     }
 }
 
@@ -138,12 +135,7 @@ struct Pending<'a> {
 impl<'a> Pending<'a> {
     fn new(sequences: &'a mut Vec<Sequence>) -> Self {
         sequences.clear();
-        Self {
-            sequences,
-            start: 0,
-            histogram: Histogram::default(),
-            cost: 0,
-        }
+        Self { sequences, start: 0, histogram: Histogram::default(), cost: 0 }
     }
 
     /// Adds `piece`, which begins at `piece_start` and whose sequences begin at index `first`. Writes the previous
@@ -173,13 +165,7 @@ impl<'a> Pending<'a> {
     /// Writes a block with the data before `end`, which the first `count` sequences describe.
     fn write(&mut self, data: &[u8], end: usize, count: usize, is_last: bool, out: &mut BitWriter) {
         let data = &data[self.start..end];
-        write_block(
-            data,
-            &self.sequences[..count],
-            &self.histogram,
-            is_last,
-            out,
-        );
+        write_block(data, &self.sequences[..count], &self.histogram, is_last, out);
         self.sequences.drain(..count);
         self.start = end;
     }

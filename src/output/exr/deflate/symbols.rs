@@ -30,15 +30,9 @@ pub(super) struct Value {
 /// Symbols and extra bits, by length.
 pub(super) static LENGTH_VALUES: [Value; MAX_LENGTH + 1] = length_values();
 
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "symbols are below 286, extra bits at most 5"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "symbols are below 286, extra bits at most 5")]
 const fn length_values() -> [Value; MAX_LENGTH + 1] {
-    let none = Value {
-        symbol: 0,
-        extra: 0,
-    };
+    let none = Value { symbol: 0, extra: 0 };
     let mut values = [none; MAX_LENGTH + 1];
     let (mut length, mut index) = (MIN_LENGTH, 0);
     while length <= MAX_LENGTH {
@@ -70,10 +64,7 @@ pub(super) const fn length_bits(symbol: usize) -> u32 {
 pub(super) const fn distance_value(distance: u16) -> Value {
     let offset = distance - 1;
     if offset < 4 {
-        return Value {
-            symbol: offset,
-            extra: 0,
-        };
+        return Value { symbol: offset, extra: 0 };
     }
     // Two symbols for each power of two
     let power = offset.ilog2();

@@ -24,17 +24,11 @@ fn compress(data: &[u8], ends: &[usize], is_searched: bool) -> Option<Vec<u8>> {
     let ends = ends.iter().copied().chain([data.len()]);
     let pieces = ends.scan(0, |start, end| {
         let length = end - std::mem::replace(start, end);
-        Some(Piece {
-            length,
-            is_searched,
-        })
+        Some(Piece { length, is_searched })
     });
     let mut deflater = Deflater::default();
     // Compress other data first: the previous content of the memory must not matter
-    let piece = Piece {
-        length: 500,
-        is_searched: true,
-    };
+    let piece = Piece { length: 500, is_searched: true };
     let before: Vec<u8> = noise(9).take(500).collect();
     deflater.compress(&before.repeat(2), [piece; 2]).unwrap();
     deflater.compress(data, pieces).map(<[u8]>::to_vec)
@@ -69,10 +63,7 @@ fn length(data: &[u8], ends: &[usize]) -> usize {
 #[test]
 fn runs_of_every_length_and_distance_round_trip() {
     let mut data: Vec<u8> = noise(1).take(5).collect();
-    for length in (0..40)
-        .chain(250..300)
-        .chain([515, 516, 517, 518, 519, 520, 5000])
-    {
+    for length in (0..40).chain(250..300).chain([515, 516, 517, 518, 519, 520, 5000]) {
         for period in 1..4 {
             let pattern: Vec<u8> = noise(length as u64).take(period).collect();
             data.extend(pattern.iter().cycle().take(length + period));
@@ -106,11 +97,7 @@ fn few_and_equal_bytes_round_trip() {
 fn noise_is_not_compressed() {
     for length in [0, 1, 2, 1000, 200_000] {
         let data: Vec<u8> = noise(3).take(length).collect();
-        assert_eq!(
-            check(&data, &[length / 3, length / 2]),
-            [None; 2],
-            "{length}"
-        );
+        assert_eq!(check(&data, &[length / 3, length / 2]), [None; 2], "{length}");
     }
 }
 
@@ -162,10 +149,7 @@ fn memory_for_sequences_is_bounded() {
     // As many runs as possible
     let data: Vec<u8> = noise(7).take(400_000).flat_map(|byte| [byte; 5]).collect();
     let mut deflater = Deflater::default();
-    let piece = Piece {
-        length: data.len(),
-        is_searched: true,
-    };
+    let piece = Piece { length: data.len(), is_searched: true };
     let stream = deflater.compress(&data, [piece]).unwrap();
     assert!(inflated(stream) == data);
     let bytes = deflater.sequences.capacity() * size_of::<Sequence>();
@@ -238,10 +222,7 @@ fn every_distance_has_its_symbol() {
         let values = 1_usize << symbols::distance_bits(symbol);
         for extra in 0..values {
             let value = symbols::distance_value(u16::try_from(first + extra).unwrap());
-            assert_eq!(
-                (usize::from(value.symbol), usize::from(value.extra)),
-                (symbol, extra)
-            );
+            assert_eq!((usize::from(value.symbol), usize::from(value.extra)), (symbol, extra));
         }
         first += values;
     }

@@ -35,10 +35,7 @@ pub(super) struct Cells {
 
 impl Cells {
     pub(super) fn new() -> Self {
-        Self {
-            side: SIDE,
-            cells: vec![[0.0; 4]; SIDE * SIDE],
-        }
+        Self { side: SIDE, cells: vec![[0.0; 4]; SIDE * SIDE] }
     }
 
     /// Adds a photon with `flux` at a position, unless that is outside the square.
@@ -74,10 +71,7 @@ impl Cells {
         };
         let rows = (0..side).into_par_iter();
         let cells = rows.flat_map_iter(|row| (0..side).map(move |column| sum(row, column)));
-        Self {
-            side,
-            cells: cells.collect(),
-        }
+        Self { side, cells: cells.collect() }
     }
 
     /// Flux and count of a cell, interpolated at a position.
@@ -105,10 +99,7 @@ impl Cells {
             (0..SIDE)
                 .map(move |x| density(levels, [center(x), center(y)]) * (FRAC_1_PI / (edge * edge)))
         });
-        Map {
-            side: SIDE,
-            texels: texels.collect(),
-        }
+        Map { side: SIDE, texels: texels.collect() }
     }
 }
 

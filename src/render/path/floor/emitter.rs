@@ -88,10 +88,7 @@ impl Emitter {
             photons: count(*power).max(1),
             seed: PathSeed::of_pixel(number, PHOTONS),
         };
-        (0..)
-            .zip(sources.into_iter().zip(&powers))
-            .map(emitter)
-            .collect()
+        (0..).zip(sources.into_iter().zip(&powers)).map(emitter).collect()
     }
 
     /// The ray of a photon, and its flux. `None` if no light leaves in its direction.
@@ -117,11 +114,7 @@ impl Source {
         let (center, half) = (0.5 * (min + max), 0.5 * (max - min));
         match light {
             PhotonSource::Distant(beam) => Self::Parallel(Parallel::new(beam, center, half)),
-            _ => Self::Local(Local {
-                light,
-                center,
-                radius: half.length(),
-            }),
+            _ => Self::Local(Local { light, center, radius: half.length() }),
         }
     }
 
@@ -132,11 +125,7 @@ impl Source {
             Self::Local(light) => light.flux(),
         };
         let power = f64::from(flux.dot(LUMINANCE));
-        if power.is_finite() {
-            power.max(0.0)
-        } else {
-            0.0
-        }
+        if power.is_finite() { power.max(0.0) } else { 0.0 }
     }
 }
 
@@ -147,12 +136,7 @@ impl Parallel {
         // A box reaches as far along an axis as its half edges do together
         let reach = |axis: Vec3| axis.abs().dot(half) + spread;
         let sides = tangents(beam.to_light.to_array()).map(Vec3::from_array);
-        Self {
-            beam,
-            center,
-            sides: sides.map(|axis| reach(axis) * axis),
-            distance,
-        }
+        Self { beam, center, sides: sides.map(|axis| reach(axis) * axis), distance }
     }
 
     /// The area of the rectangle.
@@ -176,11 +160,7 @@ impl Local {
         let axis = to_center.normalize_or(Vec3::Z);
         let sin2 = self.radius * self.radius / to_center.length_squared();
         // Written so that NaN counts as inside
-        let cap = if sin2 < 1.0 {
-            sin2 / (1.0 + (1.0 - sin2).sqrt())
-        } else {
-            2.0
-        };
+        let cap = if sin2 < 1.0 { sin2 / (1.0 + (1.0 - sin2).sqrt()) } else { 2.0 };
         (axis, cap)
     }
 
@@ -188,22 +168,11 @@ impl Local {
     fn flux(&self) -> Vec3 {
         let solid_angle = |origin: Vec3| 2.0 * PI * self.cone(origin).1;
         match self.light {
-            PhotonSource::Point {
-                position,
-                intensity,
-            } => solid_angle(position) * intensity,
-            PhotonSource::Sphere {
-                center,
-                radius,
-                radiance,
-            } => PI * radius * radius * solid_angle(center) * radiance,
-            PhotonSource::Panel {
-                center,
-                axes,
-                area,
-                radiance,
-                ..
-            } => {
+            PhotonSource::Point { position, intensity } => solid_angle(position) * intensity,
+            PhotonSource::Sphere { center, radius, radiance } => {
+                PI * radius * radius * solid_angle(center) * radiance
+            }
+            PhotonSource::Panel { center, axes, area, radiance, .. } => {
                 let cosine = axes[2].dot((self.center - center).normalize_or(axes[2]));
                 area * cosine.max(MIN_COSINE) * solid_angle(center) * radiance
             }
@@ -215,27 +184,13 @@ impl Local {
     fn ray(&self, position: [f32; 2], direction: [f32; 2]) -> Option<(Ray, Vec3)> {
         // Choose a point of the light; the power of a point does not depend on the direction
         let (origin, normal, power) = match self.light {
-            PhotonSource::Point {
-                position,
-                intensity,
-            } => (position, None, intensity),
-            PhotonSource::Sphere {
-                center,
-                radius,
-                radiance,
-            } => {
+            PhotonSource::Point { position, intensity } => (position, None, intensity),
+            PhotonSource::Sphere { center, radius, radiance } => {
                 let normal = Vec3::from_array(in_cone([0.0, 0.0, 1.0], 2.0, position));
                 let area = 4.0 * PI * radius * radius;
                 (center + radius * normal, Some(normal), area * radiance)
             }
-            PhotonSource::Panel {
-                center,
-                axes,
-                half,
-                is_ellipse,
-                area,
-                radiance,
-            } => {
+            PhotonSource::Panel { center, axes, half, is_ellipse, area, radiance } => {
                 let [x, y] = match is_ellipse {
                     true => disc(position),
                     false => position.map(|u| 2.0 * u - 1.0),

@@ -123,11 +123,7 @@ impl Map {
 
 /// The four texels around a position from 0 to 1 in a map of `side` by `side` texels, two or more, with weights that
 /// add up to 1.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "clamped to the map"
-)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the map")]
 fn corners(side: usize, position: [f32; 2]) -> [(usize, f32); 4] {
     let last = (side - 1) as f32;
     let [(x, right), (y, below)] = position.map(|p| {
@@ -255,9 +251,7 @@ impl<'a> PathIntegrator<'a> {
         // Make maps of them
         let [min, max] = scene.particles;
         self.caustics.surfaces = collector.map(|photons| photons.into_map((max - min).length()));
-        let caustics = square
-            .zip(cells)
-            .map(|(square, cells)| cells.into_map(square));
+        let caustics = square.zip(cells).map(|(square, cells)| cells.into_map(square));
         if catcher.is_some() {
             self.caustics.catcher = caustics;
             return Some((self, counts));
@@ -266,10 +260,8 @@ impl<'a> PathIntegrator<'a> {
         if let (Some(ground), Some(caustics)) = (floor, caustics) {
             let (sky, of_sky) = sky::sky(&self, &caustics.square, stop)?;
             counts = counts + of_sky;
-            let open = self
-                .environment
-                .map(|e| e.irradiance(ground.up) * FRAC_1_PI)
-                .unwrap_or_default();
+            let open =
+                self.environment.map(|e| e.irradiance(ground.up) * FRAC_1_PI).unwrap_or_default();
             let wet = match self.wet_scene(&caustics.square) {
                 Some(wet) => Some(wet.map(stop)?),
                 None => None,

@@ -67,12 +67,7 @@ impl Collector {
     }
 
     fn with_limit(limit: usize) -> Self {
-        Self {
-            photons: Vec::new(),
-            limit,
-            stride: 1,
-            count: 0,
-        }
+        Self { photons: Vec::new(), limit, stride: 1, count: 0 }
     }
 
     pub(super) fn add(&mut self, photon: &Photon) {
@@ -114,11 +109,7 @@ impl PhotonMap {
     fn new(mut photons: Vec<Photon>, max_distance: f32) -> Self {
         let mut axes = vec![0; photons.len()];
         arrange(&mut photons, &mut axes);
-        Self {
-            photons,
-            axes,
-            max_distance,
-        }
+        Self { photons, axes, max_distance }
     }
 
     /// Calls `each` with each photon that lights a `point` with the geometric `normal` on the lit side, on a sphere of
@@ -178,10 +169,7 @@ fn arrange(photons: &mut [Photon], axes: &mut [u8]) {
     axes[middle] = u8::try_from(axis).unwrap_or_default();
     let (below, above) = photons.split_at_mut(middle);
     let (axes_below, axes_above) = axes.split_at_mut(middle);
-    rayon::join(
-        || arrange(below, axes_below),
-        || arrange(&mut above[1..], &mut axes_above[1..]),
-    );
+    rayon::join(|| arrange(below, axes_below), || arrange(&mut above[1..], &mut axes_above[1..]));
 }
 
 /// A search for the photons nearest to a point.
@@ -235,10 +223,7 @@ impl Search<'_> {
         {
             return;
         }
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "the number of photons is limited"
-        )]
+        #[expect(clippy::cast_possible_truncation, reason = "the number of photons is limited")]
         let neighbour = (distance2, index as u32);
         if self.found.len() < NEIGHBOURS {
             self.found.push(neighbour);

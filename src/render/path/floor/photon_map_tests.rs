@@ -62,13 +62,9 @@ fn the_nearest_photons_are_found() {
 fn the_mean_of_the_density_is_that_of_the_photons() {
     let map = PhotonMap::new(on_square(20_000), 0.2);
     let points = (0..2000).map(|i| PathSeed::of_pixel(i, 7).get_2d(0, 0));
-    let points: Vec<Vec3> = points
-        .map(|[x, y]| Vec3::new(0.1 + 0.8 * x, 0.1 + 0.8 * y, 0.0))
-        .collect();
-    let all = points
-        .iter()
-        .map(|point| irradiance(&map, *point, Vec3::Z))
-        .collect::<Vec<f32>>();
+    let points: Vec<Vec3> =
+        points.map(|[x, y]| Vec3::new(0.1 + 0.8 * x, 0.1 + 0.8 * y, 0.0)).collect();
+    let all = points.iter().map(|point| irradiance(&map, *point, Vec3::Z)).collect::<Vec<f32>>();
     let mean = all.iter().sum::<f32>() / all.len() as f32;
     let variance = all.iter().map(|e| (e - mean).powi(2)).sum::<f32>() / all.len() as f32;
     assert!((mean - 1.0).abs() < 0.01, "{mean}");
@@ -116,10 +112,7 @@ fn a_full_map_keeps_the_flux() {
         assert!(map.photons.len() < limit, "{limit}");
         let flux: f32 = map.photons.iter().map(|photon| photon.flux.x).sum();
         let error = (flux - 1.0).abs();
-        assert!(
-            error < 2.5 / map.photons.len() as f32 + 1e-4,
-            "{limit}: {flux}"
-        );
+        assert!(error < 2.5 / map.photons.len() as f32 + 1e-4, "{limit}: {flux}");
         assert!(map.photons.len() > limit / 3, "{limit}");
     }
 }

@@ -34,11 +34,7 @@ const FIRST_DEPTH: u32 = 2;
 
 /// Memory for photons on surfaces before they are in the maps, with space to grow.
 pub(super) const fn bytes(has_surfaces: bool) -> u64 {
-    let each = if has_surfaces {
-        size_of::<Photon>()
-    } else {
-        size_of::<Landed>()
-    };
+    let each = if has_surfaces { size_of::<Photon>() } else { size_of::<Landed>() };
     2 * TASK as u64 * (ROUND * each) as u64
 }
 
@@ -99,15 +95,10 @@ impl GroundCells {
     pub(super) fn into_map(self, square: Square) -> CausticMap {
         let all = Arc::new(self.all.radiance(&square));
         let of_groups = self.groups.into_iter();
-        let mut groups: Vec<(usize, Arc<Map>)> = of_groups
-            .map(|(group, cells)| (group, Arc::new(cells.radiance(&square))))
-            .collect();
+        let mut groups: Vec<(usize, Arc<Map>)> =
+            of_groups.map(|(group, cells)| (group, Arc::new(cells.radiance(&square)))).collect();
         groups.extend(self.only_group.map(|group| (group, Arc::clone(&all))));
-        CausticMap {
-            square,
-            map: all,
-            groups,
-        }
+        CausticMap { square, map: all, groups }
     }
 }
 
@@ -126,12 +117,7 @@ pub(super) fn trace_photons(
             let has_surfaces = targets.surfaces.is_some();
             let trace = |first: &u32| {
                 let last = emitter.photons.min(first + TASK);
-                let task = Task {
-                    integrator,
-                    emitter,
-                    square,
-                    has_surfaces,
-                };
+                let task = Task { integrator, emitter, square, has_surfaces };
                 task.trace(*first..last, stop)
             };
             let arrived: Option<Vec<_>> = round.par_iter().map(trace).collect();

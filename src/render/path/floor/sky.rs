@@ -50,10 +50,8 @@ pub(super) fn sky(
     square: &Square,
     stop: &dyn Stop,
 ) -> Option<(SkyMaps, RayCounts)> {
-    let rows: Option<Vec<_>> = (0..SIDE)
-        .into_par_iter()
-        .map(|row| trace_row(integrator, square, row, stop))
-        .collect();
+    let rows: Option<Vec<_>> =
+        (0..SIDE).into_par_iter().map(|row| trace_row(integrator, square, row, stop)).collect();
     let (mut texels, mut counts) = (Vec::with_capacity(SIDE * SIDE), RayCounts::default());
     let count = usize::from(integrator.context.settings.channels.layers.light_groups);
     let mut groups = vec![Vec::with_capacity(SIDE * SIDE); count];
@@ -65,10 +63,7 @@ pub(super) fn sky(
         counts = counts + of_row;
     }
     let map = |texels| smoothed(&Map { side: SIDE, texels });
-    let maps = SkyMaps {
-        all: map(texels),
-        groups: groups.into_iter().map(map).collect(),
-    };
+    let maps = SkyMaps { all: map(texels), groups: groups.into_iter().map(map).collect() };
     Some((maps, counts))
 }
 
@@ -181,8 +176,5 @@ fn smoothed(map: &Map) -> Map {
         (0..texels.len()).map(mean).collect()
     };
     let across = pass(&map.texels, 1, |i| i % SIDE);
-    Map {
-        side: map.side,
-        texels: pass(&across, SIDE, |i| i / SIDE),
-    }
+    Map { side: map.side, texels: pass(&across, SIDE, |i| i / SIDE) }
 }

@@ -148,10 +148,7 @@ impl WetScene<'_> {
         };
         Some(WetMap {
             square: *self.square,
-            map: Map {
-                side: SIDE,
-                texels: wetness.into_iter().zip(&fluid).map(texel).collect(),
-            },
+            map: Map { side: SIDE, texels: wetness.into_iter().zip(&fluid).map(texel).collect() },
             film: Film::new(self.ior, self.wet.strength),
         })
     }
@@ -167,23 +164,11 @@ impl WetScene<'_> {
         }
         let above = point + START * self.square.edge * up;
         if self.body.side_of(above) == Side::Inside {
-            return Fluid {
-                near: 1.0,
-                covers: true,
-            };
+            return Fluid { near: 1.0, covers: true };
         }
-        let ray = Ray {
-            t_max: margin,
-            ..Ray::new(above, up)
-        };
-        let near = self
-            .body
-            .nearest(&ray)
-            .map_or(0.0, |hit| 2.0 * (1.0 - hit.t / margin));
-        Fluid {
-            near: near.clamp(0.0, 1.0),
-            covers: false,
-        }
+        let ray = Ray { t_max: margin, ..Ray::new(above, up) };
+        let near = self.body.nearest(&ray).map_or(0.0, |hit| 2.0 * (1.0 - hit.t / margin));
+        Fluid { near: near.clamp(0.0, 1.0), covers: false }
     }
 }
 
@@ -310,11 +295,7 @@ impl PathIntegrator<'_> {
             let part = gloss[lane] * schlick(map.film.r0, cosine);
             let light = part * environment.radiance_and_pdf(blurred).0;
             set_lane3(&mut samples.rays.direction, lane, blurred);
-            set_lane3(
-                &mut samples.radiance,
-                lane,
-                lane3(&packet.weight, lane) * light,
-            );
+            set_lane3(&mut samples.radiance, lane, lane3(&packet.weight, lane) * light);
             samples.rays.t_max[lane] = f32::INFINITY;
             samples.lanes |= 1 << lane;
         }

@@ -7,18 +7,11 @@ use crate::render::solid::Solid;
 const EDGE: f32 = 12.0;
 
 fn map(body: &dyn Shape, margin: f32) -> WetMap {
-    let square = Square {
-        center: Vec3::ZERO,
-        axes: [Vec3::X, Vec3::Y],
-        normal: Vec3::Z,
-        edge: EDGE,
-    };
+    let square =
+        Square { center: Vec3::ZERO, axes: [Vec3::X, Vec3::Y], normal: Vec3::Z, edge: EDGE };
     let scene = WetScene {
         body,
-        wet: &WetGround {
-            strength: 1.0,
-            margin,
-        },
+        wet: &WetGround { strength: 1.0, margin },
         square: &square,
         particles: [Vec3::new(-2.0, -2.0, -0.1), Vec3::new(2.0, 2.0, 3.0)],
         ior: 1.333,
@@ -68,11 +61,7 @@ fn wet_sand_is_darker() {
     assert!((film.outer - 0.0665).abs() < 0.001, "{}", film.outer);
     assert!((film.inner - 0.475).abs() < 0.002, "{}", film.inner);
     // By hand for 0.36: absorbed 0.64 * (0.36 * 1.077 + 0.64) = 0.6577, so 0.9335 * 0.3423 * 0.525 / 0.8374
-    assert!(
-        (film.wet(0.36) - 0.2003).abs() < 0.004,
-        "{}",
-        film.wet(0.36)
-    );
+    assert!((film.wet(0.36) - 0.2003).abs() < 0.004, "{}", film.wet(0.36));
     assert_eq!(film.wet(0.0), 0.0);
     for i in 1..=20_u8 {
         let albedo = f32::from(i) / 20.0;

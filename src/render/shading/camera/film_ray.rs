@@ -22,11 +22,7 @@ impl FilmRay for Pinhole {
     #[inline(always)]
     fn ray(camera: &CameraLanes, [a, b]: [f32; 2]) -> [[f32; 3]; 2] {
         let (r, u, f) = (camera.right, camera.up, camera.forward);
-        let direction = [
-            f.x + a * r.x + b * u.x,
-            f.y + a * r.y + b * u.y,
-            f.z + a * r.z + b * u.z,
-        ];
+        let direction = [f.x + a * r.x + b * u.x, f.y + a * r.y + b * u.y, f.z + a * r.z + b * u.z];
         [[camera.eye.x, camera.eye.y, camera.eye.z], direction]
     }
 }
@@ -35,11 +31,7 @@ impl FilmRay for Parallel {
     #[inline(always)]
     fn ray(camera: &CameraLanes, [a, b]: [f32; 2]) -> [[f32; 3]; 2] {
         let (e, r, u, f) = (camera.eye, camera.right, camera.up, camera.forward);
-        let origin = [
-            e.x + a * r.x + b * u.x,
-            e.y + a * r.y + b * u.y,
-            e.z + a * r.z + b * u.z,
-        ];
+        let origin = [e.x + a * r.x + b * u.x, e.y + a * r.y + b * u.y, e.z + a * r.z + b * u.z];
         [origin, [f.x, f.y, f.z]]
     }
 }

@@ -13,12 +13,7 @@ pub(super) struct Base {
 impl Base {
     pub(super) fn new(name: &'static str, extension: &'static str, bytes: Vec<u8>) -> Self {
         let made = Vec::new();
-        Self {
-            name,
-            extension,
-            bytes,
-            made,
-        }
+        Self { name, extension, bytes, made }
     }
 
     /// A file `<name>-<what>` with this content.

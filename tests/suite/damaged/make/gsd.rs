@@ -34,12 +34,7 @@ fn layers(chunks: &[Chunk<'_>]) -> Vec<u8> {
 fn gsd_bytes(points: &[[f32; 3]]) -> Vec<u8> {
     let n = points.len() as u64;
     layers(&[
-        (
-            "configuration/step",
-            4,
-            [1, 1],
-            7_u64.to_le_bytes().to_vec(),
-        ),
+        ("configuration/step", 4, [1, 1], 7_u64.to_le_bytes().to_vec()),
         ("particles/N", 3, [1, 1], n.to_le_bytes()[..4].to_vec()),
         ("particles/position", 9, [n, 3], little(points)),
         ("particles/velocity", 9, [n, 3], little(points)),

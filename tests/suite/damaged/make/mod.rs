@@ -28,9 +28,7 @@ const NAN: [[f32; 3]; 3] = [WHOLE[0], [f32::NAN, 0.5, 0.25], WHOLE[2]];
 /// All files.
 pub(super) fn files() -> Vec<Made> {
     let mut all = vec![("empty.vtk".to_owned(), Vec::new())];
-    for kind in [
-        vtk, vtk_ascii, vtu, bgeo, gzip, ply, xyz, lammps, npy, npz, csv, rst7, spf, gsd,
-    ] {
+    for kind in [vtk, vtk_ascii, vtu, bgeo, gzip, ply, xyz, lammps, npy, npz, csv, rst7, spf, gsd] {
         all.extend(kind());
     }
     all
@@ -53,12 +51,7 @@ fn vtk_bytes(points: &[[f32; 3]]) -> Vec<u8> {
         b"# vtk DataFile Version 4.1\ntitle\nBINARY\nDATASET UNSTRUCTURED_GRID\n".to_vec();
     file.extend(format!("POINTS {n} float\n").bytes().chain(big(points)));
     file.extend(format!("\nCELLS {n} {}\n", 2 * n).bytes());
-    file.extend(
-        (0_u32..)
-            .take(n)
-            .flat_map(|i| [1, i])
-            .flat_map(u32::to_be_bytes),
-    );
+    file.extend((0_u32..).take(n).flat_map(|i| [1, i]).flat_map(u32::to_be_bytes));
     file.extend(format!("\nCELL_TYPES {n}\n").bytes());
     file.extend([0, 0, 0, 1].repeat(n));
     file.extend(format!("\nPOINT_DATA {n}\nSCALARS id unsigned_int 1\nLOOKUP_TABLE t\n").bytes());
@@ -79,11 +72,7 @@ fn vtk() -> Vec<Made> {
         .cut("cut-in-scalars", "LOOKUP_TABLE t\n", 5)
         .cut("cut-in-field", "velocity 3 3 float\n", 35)
         .replace("absurd-points", "POINTS 3", "POINTS 2000000000")
-        .replace(
-            "overflowing-points",
-            "POINTS 3",
-            "POINTS 6148914691236517206",
-        )
+        .replace("overflowing-points", "POINTS 3", "POINTS 6148914691236517206")
         .replace("negative-points", "POINTS 3", "POINTS -3")
         .replace("absurd-cells", "CELLS 3 6", "CELLS 3 4000000000")
         .replace("absurd-components", "velocity 3 3", "velocity 4000000000 3")
@@ -132,17 +121,9 @@ fn vtu() -> Vec<Made> {
         .cut("cut-in-head", "<Points><DataArray", 0)
         .cut("cut-before-data", "<AppendedData encoding", 0)
         .cut("cut-in-data", "raw\">_", 25)
-        .replace(
-            "absurd-points",
-            "NumberOfPoints=\"3\"",
-            "NumberOfPoints=\"4000000000\"",
-        )
+        .replace("absurd-points", "NumberOfPoints=\"3\"", "NumberOfPoints=\"4000000000\"")
         .replace("no-count", "NumberOfPoints=\"3\"", "")
-        .replace(
-            "two-components",
-            "NumberOfComponents=\"3\"",
-            "NumberOfComponents=\"2\"",
-        )
+        .replace("two-components", "NumberOfComponents=\"3\"", "NumberOfComponents=\"2\"")
         .replace("far-offset", "offset=\"0\"", "offset=\"123456789\"")
         .replace("no-underscore", "raw\">_", "raw\"> ")
         .patch("absurd-blocks", data, &[0xff; 4])
@@ -157,11 +138,7 @@ fn vtu() -> Vec<Made> {
 fn bgeo_bytes(points: &[[f32; 3]]) -> Vec<u8> {
     let n = u32::try_from(points.len()).expect("a few points");
     let mut file = b"BgeoV".to_vec();
-    file.extend(
-        [5, n, 0, 0, 0, 2, 0, 0, 0]
-            .into_iter()
-            .flat_map(u32::to_be_bytes),
-    );
+    file.extend([5, n, 0, 0, 0, 2, 0, 0, 0].into_iter().flat_map(u32::to_be_bytes));
     for (name, size, kind) in [("id", 1_u16, 1_u32), ("velocity", 3, 5)] {
         let length = u16::try_from(name.len()).expect("a short name");
         file.extend(length.to_be_bytes().into_iter().chain(name.bytes()));
@@ -225,9 +202,7 @@ fn ply_bytes(points: &[[f32; 3]]) -> Vec<u8> {
 fn ply() -> Vec<Made> {
     let ascii = |numbers: &str| {
         let head = ply_bytes(&WHOLE[..0]);
-        let head = String::from_utf8(head)
-            .expect("text")
-            .replace("vertex 0", "vertex 3");
+        let head = String::from_utf8(head).expect("text").replace("vertex 0", "vertex 3");
         format!("{}{numbers}", head.replace("binary_little_endian", "ascii")).into_bytes()
     };
     Base::new("points", "ply", ply_bytes(&WHOLE))
@@ -236,17 +211,9 @@ fn ply() -> Vec<Made> {
         .cut("cut-in-head", "property float y\n", 0)
         .cut("cut-in-points", "end_header\n", 30)
         .replace("absurd-points", "vertex 3", "vertex 4000000000")
-        .replace(
-            "overflowing-points",
-            "vertex 3",
-            "vertex 99999999999999999999",
-        )
+        .replace("overflowing-points", "vertex 3", "vertex 99999999999999999999")
         .replace("no-z", "property float z\n", "")
-        .replace(
-            "mesh",
-            "vertex 3",
-            "face 2\nproperty list uchar int i\nelement vertex 3",
-        )
+        .replace("mesh", "vertex 3", "face 2\nproperty list uchar int i\nelement vertex 3")
         .file("ascii-cut", ascii("0 0 0\n1 0.5"))
         .file("ascii-word", ascii("0 0 0\n1 half 0\n2 1 0\n"))
         .file("nan", ply_bytes(&NAN))
@@ -283,8 +250,7 @@ fn npy() -> Vec<Made> {
 fn npz() -> Vec<Made> {
     let archive = |member: &[u8]| {
         let mut zip = ZipWriter::new(std::io::Cursor::new(Vec::new()));
-        zip.start_file("positions.npy", SimpleFileOptions::default())
-            .expect("memory takes it");
+        zip.start_file("positions.npy", SimpleFileOptions::default()).expect("memory takes it");
         zip.write_all(member).expect("memory takes it");
         zip.finish().expect("memory takes it").into_inner()
     };
@@ -297,10 +263,7 @@ fn npz() -> Vec<Made> {
         .patch("garbled-member", 50, &[0xff; 8])
         .patch("absurd-size", directory + 24, &[0xff, 0xff, 0xff, 0x7f])
         .file("absurd", archive(&npy_bytes(&WHOLE, "2000000000")))
-        .file(
-            "objects",
-            archive(&replace(&npy_bytes(&WHOLE, "3"), b"<f4", b"|O8")),
-        )
+        .file("objects", archive(&replace(&npy_bytes(&WHOLE, "3"), b"<f4", b"|O8")))
         .file("not-numpy", archive(b"no array at all"))
         .file("nan", archive(&npy_bytes(&NAN, "3")))
         .file("zero", archive(&npy_bytes(&[], "0")))

@@ -16,10 +16,7 @@ pub(super) fn vtk_ascii() -> Vec<Made> {
 
 pub(super) fn xyz() -> Vec<Made> {
     let molecular = |points: &[[f32; 3]]| {
-        let lines: String = points
-            .iter()
-            .map(|p| format!("W {}", text(&[*p])))
-            .collect();
+        let lines: String = points.iter().map(|p| format!("W {}", text(&[*p]))).collect();
         format!("{}\ncomment\n{lines}", points.len()).into_bytes()
     };
     let mut made = Base::new("molecular", "xyz", molecular(&WHOLE))
@@ -40,10 +37,7 @@ pub(super) fn xyz() -> Vec<Made> {
 pub(super) fn lammps() -> Vec<Made> {
     let dump = |points: &[[f32; 3]]| {
         let head = "ITEM: BOX BOUNDS ff ff ff\n0 9\n0 9\n0 9\nITEM: ATOMS id type x y z\n";
-        let lines = points
-            .iter()
-            .zip(7..)
-            .map(|(p, id)| format!("{id} 1 {}", text(&[*p])));
+        let lines = points.iter().zip(7..).map(|(p, id)| format!("{id} 1 {}", text(&[*p])));
         let lines: String = lines.collect();
         let n = points.len();
         format!("ITEM: TIMESTEP\n100\nITEM: NUMBER OF ATOMS\n{n}\n{head}{lines}").into_bytes()
@@ -78,12 +72,7 @@ pub(super) fn rst7() -> Vec<Made> {
         .replace("other-count", "    3  0", "    5  0")
         .replace("no-count", "    3  0", "three  0")
         .replace("word", "0.2500000", "0.25half0")
-        .file(
-            "nan",
-            overflow
-                .replace("   0.2500000", "************")
-                .into_bytes(),
-        )
+        .file("nan", overflow.replace("   0.2500000", "************").into_bytes())
         .file("zero", restart(&[]))
         .made
 }
@@ -97,10 +86,7 @@ pub(super) fn csv() -> Vec<Made> {
         .replace("word", "0.25", "half")
         .cut("cut", "1,0.5", 0)
         .replace("long-row", "0.25", "0.25,7,8,9")
-        .file(
-            "prose",
-            b"these are no particles\nbut two lines of words\n".to_vec(),
-        )
+        .file("prose", b"these are no particles\nbut two lines of words\n".to_vec())
         .file("nan", table(&NAN))
         .file("zero", table(&[]))
         .made

@@ -20,19 +20,11 @@ pub(in super::super) fn union() -> Shot {
         (Vec3::new(1.7, 0.5, 1.7), 0.6),
     ];
     let (centers, radii): (Vec<Vec3>, Vec<f32>) = balls.into_iter().unzip();
-    let mut shot = Shot::new(
-        centers,
-        1.0,
-        DVec3::new(0.0, -6.5, 2.6),
-        DVec3::new(0.0, 0.0, 1.05),
-    )
-    .sized(WIDTH);
+    let mut shot = Shot::new(centers, 1.0, DVec3::new(0.0, -6.5, 2.6), DVec3::new(0.0, 0.0, 1.05))
+        .sized(WIDTH);
     shot.radii = radii;
     shot.surface.kind = SurfaceKind::Union;
-    shot.scene.material = Material {
-        extinction: Vec3::new(0.6, 0.2, 0.06),
-        ..glass(1.33)
-    };
+    shot.scene.material = Material { extinction: Vec3::new(0.6, 0.2, 0.06), ..glass(1.33) };
     shot.scene.background = SUNSET;
     shot.scene.ground = Some(Ground {
         pattern: Pattern::Checker { tile: 1.0 },
@@ -58,11 +50,7 @@ fn tube() -> impl Iterator<Item = Vec3> {
     let layer = |i: u16| {
         turn((6 * i).max(1)).map(move |angle| SPACING * f32::from(i) * Vec2::from_angle(angle))
     };
-    let section = move || {
-        (0..4)
-            .flat_map(layer)
-            .map(|p| Vec3::new(1.4 + p.x, 0.0, p.y))
-    };
+    let section = move || (0..4).flat_map(layer).map(|p| Vec3::new(1.4 + p.x, 0.0, p.y));
     turn(72).flat_map(move |angle| section().map(move |p| Quat::from_rotation_z(angle) * p))
 }
 
@@ -85,18 +73,10 @@ fn ring() -> Shot {
     let all = tube().chain(ball(Vec3::new(0.8, -0.9, 0.6))).chain(drops);
     // Sines differ in the last bit from system to system.
     let centers = all.map(|p| (p * 1024.0).round() / 1024.0).collect();
-    let mut shot = Shot::new(
-        centers,
-        0.5 * SPACING,
-        DVec3::new(0.0, -4.2, 4.2),
-        DVec3::new(0.0, -0.1, 0.0),
-    )
-    .sized(WIDTH);
-    shot.scene.material = Material {
-        specular: 0.5,
-        shininess: 40.0,
-        ..MATT
-    };
+    let mut shot =
+        Shot::new(centers, 0.5 * SPACING, DVec3::new(0.0, -4.2, 4.2), DVec3::new(0.0, -0.1, 0.0))
+            .sized(WIDTH);
+    shot.scene.material = Material { specular: 0.5, shininess: 40.0, ..MATT };
     shot
 }
 

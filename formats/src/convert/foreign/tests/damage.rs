@@ -38,18 +38,10 @@ fn streams_as_read(name: &str, bytes: &[u8]) {
 }
 
 fn sample() -> impl Strategy<Value = (&'static str, Vec<u8>)> {
-    let names = [
-        "le.ply",
-        "color.ply",
-        "fortran.npy",
-        "struct.npy",
-        "legacy_polydata-5.1-meta.vtk",
-    ];
+    let names =
+        ["le.ply", "color.ply", "fortran.npy", "struct.npy", "legacy_polydata-5.1-meta.vtk"];
     prop::sample::select(names.to_vec()).prop_map(|name| {
-        let path = format!(
-            "{}/../tests/data/single_frames/{name}",
-            env!("CARGO_MANIFEST_DIR")
-        );
+        let path = format!("{}/../tests/data/single_frames/{name}", env!("CARGO_MANIFEST_DIR"));
         (name, fs::read(path).expect("a sample"))
     })
 }
@@ -84,13 +76,8 @@ fn truncation_during_streaming_is_detected() {
     let file = fs::OpenOptions::new().write(true).open(&path);
     file.and_then(|file| file.set_len(24)).expect("writable");
     let mut to = vec![DVec3::NAN; 10];
-    source
-        .read_positions(90_000, &mut to)
-        .expect("zeros stand for what is gone");
+    source.read_positions(90_000, &mut to).expect("zeros stand for what is gone");
     assert_eq!(to, [DVec3::ZERO; 10]);
     let error = source.check().expect_err("cut short").to_string();
-    assert!(
-        error.contains("points.xyz") && error.contains("mapped"),
-        "{error}"
-    );
+    assert!(error.contains("points.xyz") && error.contains("mapped"), "{error}");
 }

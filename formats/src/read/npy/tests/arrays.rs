@@ -7,26 +7,18 @@ fn all_single_arrays_contain_the_same_particles() {
     let expected = READER.one(&single("pos.npy"));
     assert_eq!(expected.positions.len(), 1200);
     assert!(expected.attributes.is_empty());
-    let ply = crate::read::ply::FORMAT
-        .read(&single("le.ply"), &Step::whole(0))
-        .unwrap();
+    let ply = crate::read::ply::FORMAT.read(&single("le.ply"), &Step::whole(0)).unwrap();
     assert_eq!(expected.positions, ply.positions);
     assert_eq!(READER.one(&single("fortran.npy")), expected);
 
     let wide = READER.one(&single("f64.npy"));
     assert!(matches!(wide.positions, Positions::F64(_)));
-    assert_eq!(
-        coordinates(&wide.positions),
-        coordinates(&expected.positions)
-    );
+    assert_eq!(coordinates(&wide.positions), coordinates(&expected.positions));
 
     let records = READER.one(&single("struct.npy"));
     assert_eq!(records.positions, expected.positions);
     assert_eq!(names(&records), ["vel", "id"]);
-    assert_eq!(
-        attribute(&records, "vel").data,
-        attribute(&ply, "velocity").data
-    );
+    assert_eq!(attribute(&records, "vel").data, attribute(&ply, "velocity").data);
     assert_eq!(attribute(&records, "id").data, attribute(&ply, "id").data);
 }
 
@@ -37,22 +29,9 @@ fn array_shapes_are_recognised() {
         ("(2, 3)", 6, vec![rows[0], rows[1]]),
         ("(3, 3)", 9, rows.to_vec()),
         ("(3, 1)", 3, vec![rows[0]]),
-        (
-            "(3, 4)",
-            12,
-            vec![
-                [0.0, 4.0, 8.0],
-                [1.0, 5.0, 9.0],
-                [2.0, 6.0, 10.0],
-                [3.0, 7.0, 11.0],
-            ],
-        ),
+        ("(3, 4)", 12, vec![[0.0, 4.0, 8.0], [1.0, 5.0, 9.0], [2.0, 6.0, 10.0], [3.0, 7.0, 11.0]]),
         ("(2, 2)", 4, vec![[0.0, 1.0, 0.0], [2.0, 3.0, 0.0]]),
-        (
-            "(3L, 2L)",
-            6,
-            vec![[0.0, 1.0, 0.0], [2.0, 3.0, 0.0], [4.0, 5.0, 0.0]],
-        ),
+        ("(3L, 2L)", 6, vec![[0.0, 1.0, 0.0], [2.0, 3.0, 0.0], [4.0, 5.0, 0.0]]),
         ("(0, 3)", 0, vec![]),
         ("(3, 0)", 0, vec![]),
         ("(0,)", 0, vec![]),
@@ -63,66 +42,35 @@ fn array_shapes_are_recognised() {
         assert_eq!(coordinates(&particles.positions), expected, "{shape}");
         assert!(matches!(particles.positions, Positions::F32(_)));
     }
-    for shape in [
-        "()",
-        "(3,)",
-        "(5, 7)",
-        "(2, 4)",
-        "(1, 2, 4)",
-        "(1, 1, 2, 3)",
-    ] {
+    for shape in ["()", "(3,)", "(5, 7)", "(2, 4)", "(1, 2, 4)", "(1, 1, 2, 3)"] {
         let error = READER.error(&npy("'<f4'", shape, &counting(64)));
-        assert!(
-            error.to_string().contains("save shape (N, 3)"),
-            "{shape}: {error}"
-        );
+        assert!(error.to_string().contains("save shape (N, 3)"), "{shape}: {error}");
     }
-    let text = READER
-        .error(&npy("'<f4'", "(3,)", &counting(3)))
-        .to_string();
-    assert!(
-        text.starts_with("an array of shape (3,) is not a list of positions"),
-        "{text}"
-    );
+    let text = READER.error(&npy("'<f4'", "(3,)", &counting(3))).to_string();
+    assert!(text.starts_with("an array of shape (3,) is not a list of positions"), "{text}");
 }
 
 #[test]
 fn leading_dimension_is_time() {
-    let expected = [
-        vec![[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]],
-        vec![[6.0, 7.0, 8.0], [9.0, 10.0, 11.0]],
-    ];
+    let expected =
+        [vec![[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]], vec![[6.0, 7.0, 8.0], [9.0, 10.0, 11.0]]];
     let check = |bytes: &[u8]| {
         let all = READER.all(bytes).unwrap();
         let found: Vec<_> = all.iter().map(|p| coordinates(&p.positions)).collect();
         assert_eq!(found, expected);
         let late = Step::with_key(2, 2);
-        assert!(matches!(
-            read(bytes, &late),
-            Err(ParseError::Malformed { .. })
-        ));
+        assert!(matches!(read(bytes, &late), Err(ParseError::Malformed { .. })));
     };
     check(&npy("'<f4'", "(2, 2, 3)", &counting(12)));
     // frame + 2 * particle + 4 * coordinate
     let fortran = [0, 6, 3, 9, 1, 7, 4, 10, 2, 8, 5, 11].map(|n: u8| f32::from(n));
     let dictionary = "{'descr': '<f4', 'fortran_order': True, 'shape': (2, 2, 3), }";
     check(&npy_version(1, dictionary, &f32s(fortran)));
-    check(&npy(
-        "[('x', '<f4'), ('y', '<f4'), ('z', '<f4')]",
-        "(2, 2)",
-        &counting(12),
-    ));
+    check(&npy("[('x', '<f4'), ('y', '<f4'), ('z', '<f4')]", "(2, 2)", &counting(12)));
 
     let archive = stored(&[
         ("pos.npy", npy("'<f4'", "(2, 2, 3)", &counting(12))),
-        (
-            "times.npy",
-            npy(
-                "'<f8'",
-                "(2,)",
-                &[1.5_f64, 2.5].map(f64::to_le_bytes).concat(),
-            ),
-        ),
+        ("times.npy", npy("'<f8'", "(2,)", &[1.5_f64, 2.5].map(f64::to_le_bytes).concat())),
         ("rho.npy", npy("'<f4'", "(2, 2)", &counting(4))),
         ("ids.npy", npy("'<u2'", "(2,)", &[7, 0, 9, 0])),
     ]);
@@ -134,10 +82,7 @@ fn leading_dimension_is_time() {
     assert_eq!(second.time, Some(2.5));
     assert_eq!(names(second), ["rho", "ids"]);
     assert_eq!(numbers(&attribute(second, "rho").data), [2.0, 3.0]);
-    assert_eq!(
-        attribute(second, "ids").data,
-        AttributeData::U16(vec![7, 9])
-    );
+    assert_eq!(attribute(second, "ids").data, AttributeData::U16(vec![7, 9]));
 }
 
 #[test]
@@ -149,36 +94,16 @@ fn number_types_and_versions_are_supported() {
     let big: Vec<u8> = [1.0_f64, -2.0, 3.5].map(f64::to_be_bytes).concat();
     assert_eq!(coordinates(&one("'>f8'", &big)), expected);
     let exact: Vec<u8> = [i64::from(i32::MAX), -1, 5].map(i64::to_le_bytes).concat();
-    assert_eq!(
-        coordinates(&one("'<i8'", &exact)),
-        [[2_147_483_647.0, -1.0, 5.0]]
-    );
-    assert_eq!(
-        one("'|u1'", &[1, 2, 255]),
-        Positions::F32(vec![Vec3::new(1.0, 2.0, 255.0)])
-    );
-    for descr in [
-        "'<f2'",
-        "'<c16'",
-        "'|S4'",
-        "'<U2'",
-        "'<f16'",
-        "'<M8[ns]'",
-        "'|V12'",
-    ] {
+    assert_eq!(coordinates(&one("'<i8'", &exact)), [[2_147_483_647.0, -1.0, 5.0]]);
+    assert_eq!(one("'|u1'", &[1, 2, 255]), Positions::F32(vec![Vec3::new(1.0, 2.0, 255.0)]));
+    for descr in ["'<f2'", "'<c16'", "'|S4'", "'<U2'", "'<f16'", "'<M8[ns]'", "'|V12'"] {
         let error = READER.error(&npy(descr, "(1, 3)", &[0; 64]));
-        assert!(
-            matches!(error, ParseError::Unsupported { .. }),
-            "{descr}: {error}"
-        );
+        assert!(matches!(error, ParseError::Unsupported { .. }), "{descr}: {error}");
     }
     let dictionary = r#"{"shape": (1, 3), "fortran_order": False, "descr": "<f4"}"#;
     for major in [1, 2, 3] {
         let bytes = npy_version(major, dictionary, &counting(3));
-        assert_eq!(
-            coordinates(&READER.one(&bytes).positions),
-            [[0.0, 1.0, 2.0]]
-        );
+        assert_eq!(coordinates(&READER.one(&bytes).positions), [[0.0, 1.0, 2.0]]);
     }
     let error = READER.error(&npy_version(4, dictionary, &counting(3)));
     assert!(error.to_string().contains("npy version 4"), "{error}");
@@ -198,14 +123,8 @@ fn structures_are_flattened() {
     item.extend([0xee; 2]);
     item.extend([4.0_f64, 5.0, 6.0].map(f64::to_le_bytes).concat());
     let particles = READER.one(&npy(descr, "(5000,)", &item.repeat(5000)));
-    assert_eq!(
-        coordinates(&particles.positions),
-        vec![[1.0, 2.0, 3.0]; 5000]
-    );
-    assert_eq!(
-        names(&particles),
-        ["id", "inner.a", "inner.b", "m", "velocity"]
-    );
+    assert_eq!(coordinates(&particles.positions), vec![[1.0, 2.0, 3.0]; 5000]);
+    assert_eq!(names(&particles), ["id", "inner.a", "inner.b", "m", "velocity"]);
     let last = |name| {
         let found = attribute(&particles, name);
         numbers(&found.data).split_off(4999 * found.components)
@@ -223,10 +142,7 @@ fn structures_are_flattened() {
     ));
     assert_eq!(coordinates(&plane.positions), [[0.0, 1.5, 0.0]]);
     let error = READER.error(&npy("[('a', '<f4'), ('b', '<f4')]", "(1,)", &[0; 8]));
-    assert!(
-        error.to_string().contains("among its fields [a, b]"),
-        "{error}"
-    );
+    assert!(error.to_string().contains("among its fields [a, b]"), "{error}");
 }
 
 #[test]
@@ -254,10 +170,7 @@ fn error_offsets_are_in_bytes() {
         let text = format!("{{'{}': ?", "\u{e9}".repeat(20));
         let mut bytes = npy_version(version, "", &[]);
         let text: Vec<u8> = match version {
-            1 => text
-                .chars()
-                .map(|c| u8::try_from(u32::from(c)).unwrap())
-                .collect(),
+            1 => text.chars().map(|c| u8::try_from(u32::from(c)).unwrap()).collect(),
             _ => [text.as_bytes(), b"\xff"].concat(),
         };
         let start = if version == 1 { 10 } else { 12 };

@@ -62,9 +62,7 @@ fn counting(count: u8) -> Vec<u8> {
 
 fn npz(members: &[(&str, Vec<u8>)], method: CompressionMethod) -> Vec<u8> {
     let mut writer = ZipWriter::new(Cursor::new(Vec::new()));
-    let options = SimpleFileOptions::default()
-        .compression_method(method)
-        .large_file(true);
+    let options = SimpleFileOptions::default().compression_method(method).large_file(true);
     for (name, contents) in members {
         writer.start_file(*name, options).unwrap();
         writer.write_all(contents).unwrap();
@@ -82,14 +80,7 @@ fn three() -> Vec<u8> {
 
 #[test]
 fn truncation_is_rejected() {
-    for name in [
-        "pos.npy",
-        "f64.npy",
-        "fortran.npy",
-        "struct.npy",
-        "plain.npz",
-        "compressed.npz",
-    ] {
+    for name in ["pos.npy", "f64.npy", "fortran.npy", "struct.npy", "plain.npz", "compressed.npz"] {
         let bytes = single(name);
         READER.survives_truncation(&bytes, &[6, 8, 10, 12, 127, 128, 129], bytes.len());
     }
@@ -109,29 +100,19 @@ fn huge_sizes_are_rejected() {
         let bytes = npy("'<f4'", shape, &[0; 64]);
         for bytes in [stored(&[("pos.npy", bytes.clone())]), bytes] {
             let error = READER.error(&bytes);
-            assert!(
-                matches!(error, ParseError::Malformed { .. }),
-                "{shape}: {error}"
-            );
+            assert!(matches!(error, ParseError::Malformed { .. }), "{shape}: {error}");
             assert_eq!(steps(&bytes), Err(error));
         }
     }
-    let text = READER
-        .error(&npy("'<f4'", "(2147483647, 3)", &[0; 64]))
-        .to_string();
+    let text = READER.error(&npy("'<f4'", "(2147483647, 3)", &[0; 64])).to_string();
     assert_eq!(
         text,
         "byte 128: an array of shape (2147483647, 3) needs 25769803764 bytes, file has 64 left"
     );
-    let fields = [
-        "[('pos', '<f4', (9223372036854775807, 9))]",
-        "[('pos', '<U9223372036854775807')]",
-    ];
+    let fields =
+        ["[('pos', '<f4', (9223372036854775807, 9))]", "[('pos', '<U9223372036854775807')]"];
     for descr in fields {
-        assert!(matches!(
-            READER.error(&npy(descr, "(0,)", &[])),
-            ParseError::Malformed { .. }
-        ));
+        assert!(matches!(READER.error(&npy(descr, "(0,)", &[])), ParseError::Malformed { .. }));
     }
     // No items bound the width of a field; it is left out, and so there is no position.
     let error = READER.error(&npy("[('pos', '<f4', (1099511627776,))]", "(0,)", &[]));
@@ -146,55 +127,25 @@ fn invalid_headers_are_described() {
         ("[]", "not a dictionary"),
         ("{'shape': (1, 3), 'fortran_order': False}", "no descr"),
         ("{'descr': '<f4', 'shape': (1, 3)}", "no fortran_order"),
-        (
-            "{'descr': '<f4', 'fortran_order': 0, 'shape': (1, 3)}",
-            "no fortran_order",
-        ),
+        ("{'descr': '<f4', 'fortran_order': 0, 'shape': (1, 3)}", "no fortran_order"),
         ("{'descr': '<f4', 'fortran_order': False}", "no shape"),
-        (
-            "{'descr': '<f4', 'fortran_order': False, 'shape': ('a',)}",
-            "no shape",
-        ),
-        (
-            "{'descr': '<q4', 'fortran_order': False, 'shape': (1, 3)}",
-            "`<q4` is not a dtype",
-        ),
-        (
-            "{'descr': '', 'fortran_order': False, 'shape': (1, 3)}",
-            "`` is not a dtype",
-        ),
-        (
-            "{'descr': [('a',)], 'fortran_order': False, 'shape': (1,)}",
-            "neither 2 nor 3",
-        ),
-        (
-            "{'descr': ['a'], 'fortran_order': False, 'shape': (1,)}",
-            "not a tuple",
-        ),
+        ("{'descr': '<f4', 'fortran_order': False, 'shape': ('a',)}", "no shape"),
+        ("{'descr': '<q4', 'fortran_order': False, 'shape': (1, 3)}", "`<q4` is not a dtype"),
+        ("{'descr': '', 'fortran_order': False, 'shape': (1, 3)}", "`` is not a dtype"),
+        ("{'descr': [('a',)], 'fortran_order': False, 'shape': (1,)}", "neither 2 nor 3"),
+        ("{'descr': ['a'], 'fortran_order': False, 'shape': (1,)}", "not a tuple"),
         ("{'descr' '<f4'}", "expected `:`"),
         ("{'descr': '<f4' 'shape'}", "expected `,`"),
-        (
-            "{'descr': __import__('os')}",
-            "expected a value, found `__import__",
-        ),
+        ("{'descr': __import__('os')}", "expected a value, found `__import__"),
         ("{'descr': 'unfinished", "the end of a string"),
         ("{} {}", "the end of the npy header"),
     ] {
-        let text = READER
-            .error(&npy_version(1, dictionary, &[0; 64]))
-            .to_string();
+        let text = READER.error(&npy_version(1, dictionary, &[0; 64])).to_string();
         assert!(text.contains(words), "{dictionary}: {text}");
     }
-    let deep = READER
-        .error(&npy_version(2, &"[".repeat(100_000), &[]))
-        .to_string();
+    let deep = READER.error(&npy_version(2, &"[".repeat(100_000), &[])).to_string();
     assert!(deep.contains("less nesting"), "{deep}");
-    assert!(
-        READER
-            .error(b"\x93NUMPX")
-            .to_string()
-            .contains("does not begin with")
-    );
+    assert!(READER.error(b"\x93NUMPX").to_string().contains("does not begin with"));
 }
 
 /// A small valid file of each kind.
@@ -206,11 +157,7 @@ fn kinds() -> [Vec<u8>; 4] {
     ];
     [
         three(),
-        npy(
-            "[('pos', '<f4', (3,)), ('', '|V2'), ('id', '>u2')]",
-            "(3,)",
-            &[5; 48],
-        ),
+        npy("[('pos', '<f4', (3,)), ('', '|V2'), ('id', '>u2')]", "(3,)", &[5; 48]),
         stored(&members),
         npz(&members, CompressionMethod::Deflated),
     ]

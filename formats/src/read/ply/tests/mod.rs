@@ -54,10 +54,7 @@ fn all_encodings_contain_the_same_particles() {
     let expected = READER.one(&single("le"));
     assert_eq!(expected.positions.len(), 1200);
     assert_eq!(names(&expected), ["velocity", "id"]);
-    assert!(matches!(
-        attribute(&expected, "id").data,
-        AttributeData::U32(_)
-    ));
+    assert!(matches!(attribute(&expected, "id").data, AttributeData::U32(_)));
     assert_eq!(attribute(&expected, "velocity").components, 3);
     assert_eq!(READER.one(&single("be")), expected);
     // Nine digits distinguish any two f32, so even the text is exact.
@@ -71,10 +68,7 @@ fn all_encodings_contain_the_same_particles() {
 
     let double = READER.one(&single("double"));
     assert!(matches!(double.positions, Positions::F64(_)));
-    let (wide, narrow) = (
-        coordinates(&double.positions),
-        coordinates(&expected.positions),
-    );
+    let (wide, narrow) = (coordinates(&double.positions), coordinates(&expected.positions));
     assert_eq!(wide, narrow);
     assert_eq!(double.attributes, expected.attributes);
 }
@@ -91,10 +85,7 @@ fn mesh_is_rejected() {
     );
     let strips = points(
         "1",
-        &[
-            "element tristrips 1",
-            "property list int int vertex_indices",
-        ],
+        &["element tristrips 1", "property list int int vertex_indices"],
         "1 2 3\n3 0 0 0\n",
     );
     let error = READER.error(&strips).to_string();
@@ -102,11 +93,8 @@ fn mesh_is_rejected() {
         error.starts_with("a mesh with triangle strips, not particles: save its vertices"),
         "{error}"
     );
-    let faceless = points(
-        "1",
-        &["element face 0", "property list uchar int vertex_indices"],
-        "1 2 3\n",
-    );
+    let faceless =
+        points("1", &["element face 0", "property list uchar int vertex_indices"], "1 2 3\n");
     assert_eq!(READER.one(&faceless).positions.len(), 1);
 }
 
@@ -137,20 +125,11 @@ fn properties_come_in_any_order_and_type() {
     assert!(found[1][0].is_nan() && found[1][2] == 1e300);
     assert_eq!(names(&particles), ["normal", "color", "Density"]);
     let normal = attribute(&particles, "normal");
-    assert_eq!(
-        normal.data,
-        AttributeData::F32(vec![0.1, 0.2, 0.3, -0.1, -0.2, -0.3])
-    );
+    assert_eq!(normal.data, AttributeData::F32(vec![0.1, 0.2, 0.3, -0.1, -0.2, -0.3]));
     let color = attribute(&particles, "color");
-    assert_eq!(
-        color.data,
-        AttributeData::U8(vec![10, 20, 30, 40, 11, 21, 31, 41])
-    );
+    assert_eq!(color.data, AttributeData::U8(vec![10, 20, 30, 40, 11, 21, 31, 41]));
     let density = attribute(&particles, "Density");
-    assert_eq!(
-        density.data,
-        AttributeData::F32(vec![1000.0, f32::NEG_INFINITY])
-    );
+    assert_eq!(density.data, AttributeData::F32(vec![1000.0, f32::NEG_INFINITY]));
 }
 
 #[test]
@@ -168,16 +147,10 @@ fn unrelated_components_are_not_joined() {
         "0 0 0 1 2 3 4 5 6",
     ));
     assert_eq!(names(&particles), ["u", "v", "w", "vx", "vy", "vz"]);
-    let open3d = [
-        "property float scalar_vx",
-        "property float scalar_vy",
-        "property float scalar_vz",
-    ];
+    let open3d =
+        ["property float scalar_vx", "property float scalar_vy", "property float scalar_vz"];
     let particles = READER.one(&points("1", &open3d, "0 0 0 4 5 6"));
-    assert_eq!(
-        numbers(&attribute(&particles, "velocity").data),
-        [4.0, 5.0, 6.0]
-    );
+    assert_eq!(numbers(&attribute(&particles, "velocity").data), [4.0, 5.0, 6.0]);
 }
 
 /// Two cameras with a list, then two vertices with a list in the middle.
@@ -195,18 +168,10 @@ fn with_lists(big: bool) -> Vec<u8> {
         "property float z",
     ]);
     let two = |n: u16| {
-        if big {
-            n.to_be_bytes()
-        } else {
-            n.to_le_bytes()
-        }
+        if big { n.to_be_bytes() } else { n.to_le_bytes() }
     };
     let four = |n: f32| {
-        if big {
-            n.to_be_bytes()
-        } else {
-            n.to_le_bytes()
-        }
+        if big { n.to_be_bytes() } else { n.to_le_bytes() }
     };
     bytes.extend(two(1));
     bytes.extend([7; 8]);
@@ -228,10 +193,7 @@ fn lists_before_and_within_vertices_are_skipped() {
     for big in [false, true] {
         let bytes = with_lists(big);
         let particles = READER.one(&bytes);
-        assert_eq!(
-            coordinates(&particles.positions),
-            [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]
-        );
+        assert_eq!(coordinates(&particles.positions), [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
         assert!(particles.attributes.is_empty());
         for cut in 0..bytes.len() {
             assert!(READER.all(&bytes[..cut]).is_err(), "cut at {cut}");
@@ -254,10 +216,8 @@ fn lists_before_and_within_vertices_are_skipped() {
 
 #[test]
 fn line_ends_do_not_shift_the_data() {
-    let body: Vec<u8> = [0x0a0d_0a0d_u32, 0x0d0a_0d0a, 0x0a0a_0a0a]
-        .iter()
-        .flat_map(|n| n.to_le_bytes())
-        .collect();
+    let body: Vec<u8> =
+        [0x0a0d_0a0d_u32, 0x0d0a_0d0a, 0x0a0a_0a0a].iter().flat_map(|n| n.to_le_bytes()).collect();
     let lines = "ply\nformat binary_little_endian 1.0  \nelement vertex 1\nproperty float x\n\
                  property float y\nproperty float z\nend_header\n";
     let expected: Vec<[f64; 3]> =
@@ -269,9 +229,7 @@ fn line_ends_do_not_shift_the_data() {
         assert_eq!(coordinates(&particles.positions), expected, "{end:?}");
     }
     let text = points("2", &[], "1 2 3\n4 5 6\n");
-    let dos = String::from_utf8(text.clone())
-        .unwrap()
-        .replace('\n', "\r\n");
+    let dos = String::from_utf8(text.clone()).unwrap().replace('\n', "\r\n");
     assert_eq!(READER.one(dos.as_bytes()), READER.one(&text));
 }
 

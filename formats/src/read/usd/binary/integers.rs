@@ -149,13 +149,7 @@ mod tests {
         assert_eq!(unpacked(&one, content.len(), 7), Ok(content.clone()));
         assert!(unpacked(&one, content.len() - 1, 7).is_err());
         let length = u8::try_from(block.len()).expect("short");
-        let two = [
-            &[2, length, 0, 0, 0][..],
-            &block,
-            &[length, 0, 0, 0],
-            &block,
-        ]
-        .concat();
+        let two = [&[2, length, 0, 0, 0][..], &block, &[length, 0, 0, 0], &block].concat();
         assert_eq!(unpacked(&two, 1000, 7), Ok(content.repeat(2)));
         for len in 0..two.len() {
             assert!(unpacked(&two[..len], 1000, 7).is_err(), "{len}");

@@ -59,12 +59,8 @@ struct PathEntry {
 }
 
 impl PathEntry {
-    const UNDEFINED: Self = Self {
-        parent: NO_PATH,
-        token: 0,
-        is_property: false,
-        is_defined: false,
-    };
+    const UNDEFINED: Self =
+        Self { parent: NO_PATH, token: 0, is_property: false, is_defined: false };
 }
 
 /// An object of the scene.
@@ -167,10 +163,7 @@ impl<'a> CrateFile<'a> {
                 return Ok(Section { start });
             }
         }
-        Err(ParseError::malformed(
-            at,
-            format!("the file has no section {name}"),
-        ))
+        Err(ParseError::malformed(at, format!("the file has no section {name}")))
     }
 
     /// The number of entries of a list.
@@ -184,14 +177,9 @@ impl<'a> CrateFile<'a> {
         let at = reader.at();
         let count = reader.u64()?;
         let len = self.bytes.len() as u64;
-        let count = usize::try_from(count)
-            .ok()
-            .filter(|_| count <= MOST_ENTRIES * len);
+        let count = usize::try_from(count).ok().filter(|_| count <= MOST_ENTRIES * len);
         let count = count.ok_or_else(|| {
-            ParseError::malformed(
-                at,
-                format!("more {name} than a file of {len} bytes can have"),
-            )
+            ParseError::malformed(at, format!("more {name} than a file of {len} bytes can have"))
         })?;
         let need = entry_len.saturating_mul(count as u64);
         budget.check(need, &format!("the list of its {name} is"))?;
@@ -234,9 +222,7 @@ impl<'a> CrateFile<'a> {
         // LZ4 cannot pack them better
         let most = self.bytes.len().saturating_mul(RATIO) as u64;
         let damaged = || format!("{len} bytes of tokens: the file is damaged");
-        let len = u32::try_from(len)
-            .ok()
-            .filter(|len| u64::from(*len) <= most);
+        let len = u32::try_from(len).ok().filter(|len| u64::from(*len) <= most);
         let len = len.ok_or_else(|| ParseError::malformed(at, damaged()))?;
         budget.check(len.into(), "the text of its tokens is")?;
         let (block, at) = Self::block(&mut reader)?;
@@ -265,10 +251,7 @@ impl<'a> CrateFile<'a> {
         let reps = unpacked(block, 8 * count, at)?;
         let reps = reps.as_chunks().0;
         if reps.len() != count {
-            let what = format!(
-                "{} values of {count} fields: the file is damaged",
-                reps.len()
-            );
+            let what = format!("{} values of {count} fields: the file is damaged", reps.len());
             return Err(ParseError::malformed(at, what));
         }
         let reps = reps.iter().map(|rep| ValueRep(u64::from_le_bytes(*rep)));
@@ -300,11 +283,7 @@ impl<'a> CrateFile<'a> {
         let elements = Self::integers::<u32>(&mut reader, coded_count)?;
         let jumps = Self::integers::<u32>(&mut reader, coded_count)?;
         self.paths = vec![PathEntry::UNDEFINED; count];
-        let tree = PathTree {
-            indices,
-            elements,
-            jumps,
-        };
+        let tree = PathTree { indices, elements, jumps };
         tree.define(&mut self.paths).ok_or_else(|| {
             ParseError::malformed(at, "the paths are not a tree: the file is damaged")
         })
@@ -317,11 +296,7 @@ impl<'a> CrateFile<'a> {
         let field_sets = Self::integers::<u32>(&mut reader, count)?;
         let kinds = Self::integers::<u32>(&mut reader, count)?;
         let specs = paths.into_iter().zip(field_sets).zip(kinds);
-        let specs = specs.map(|((path, field_set), kind)| Spec {
-            path,
-            field_set,
-            kind,
-        });
+        let specs = specs.map(|((path, field_set), kind)| Spec { path, field_set, kind });
         self.specs = specs.collect();
         Ok(())
     }

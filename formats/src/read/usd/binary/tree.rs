@@ -27,10 +27,7 @@ pub(in crate::read::usd) fn read(
 ) -> Result<(CrateFile<'_>, PrimTree), ParseError> {
     let file = CrateFile::open(bytes, budget)?;
     let count = (file.specs.len() + file.field_sets.len()) as u64;
-    budget.check(
-        count.saturating_mul(ENTRY_LEN),
-        "the list of its objects is",
-    )?;
+    budget.check(count.saturating_mul(ENTRY_LEN), "the list of its objects is")?;
     let sets = FieldSets::of(&file);
     let mut builder = Builder {
         prims: Vec::new(),
@@ -43,11 +40,7 @@ pub(in crate::read::usd) fn read(
     let properties = builder.properties()?;
     let (mut prims, metadata) = (builder.prims, builder.metadata);
     let properties = of_prims(properties, &mut prims, file.token_text());
-    let tree = PrimTree {
-        prims,
-        properties,
-        metadata,
-    };
+    let tree = PrimTree { prims, properties, metadata };
     Ok((file, tree))
 }
 
@@ -76,14 +69,8 @@ impl FieldSets {
         let mut sets = Vec::new();
         let mut start = 0;
         for fields in file.field_sets.split(|field| *field == NO_FIELD) {
-            let mut set = FieldSet {
-                start,
-                ..FieldSet::default()
-            };
-            for (token, rep) in fields
-                .iter()
-                .filter_map(|field| file.fields.get(*field as usize))
-            {
+            let mut set = FieldSet { start, ..FieldSet::default() };
+            for (token, rep) in fields.iter().filter_map(|field| file.fields.get(*field as usize)) {
                 set.add(file.token(*token), *rep);
             }
             let len = u32::try_from(fields.len()).unwrap_or(u32::MAX);
@@ -172,10 +159,9 @@ impl Builder<'_, '_> {
         let file = self.file;
         let mut paths = vec![0];
         for spec in file.specs.iter().filter(|spec| spec.kind == PRIM) {
-            let (Some(set), Some(path)) = (
-                self.sets.get(spec.field_set),
-                file.paths.get(spec.path as usize),
-            ) else {
+            let (Some(set), Some(path)) =
+                (self.sets.get(spec.field_set), file.paths.get(spec.path as usize))
+            else {
                 continue;
             };
             let prim_of_path = &mut self.prim_of_path[spec.path as usize];
@@ -196,10 +182,7 @@ impl Builder<'_, '_> {
             paths.push(spec.path);
         }
         for (prim, path) in self.prims.iter_mut().zip(&paths).skip(1) {
-            let parent = file
-                .paths
-                .get(*path as usize)
-                .map_or(NO_PATH, |path| path.parent);
+            let parent = file.paths.get(*path as usize).map_or(NO_PATH, |path| path.parent);
             prim.parent = self.prim_of_path.get(parent as usize).copied().flatten();
         }
     }
@@ -211,11 +194,7 @@ impl Builder<'_, '_> {
             let Some(path) = self.file.paths.get(spec.path as usize) else {
                 continue;
             };
-            let prim = self
-                .prim_of_path
-                .get(path.parent as usize)
-                .copied()
-                .flatten();
+            let prim = self.prim_of_path.get(path.parent as usize).copied().flatten();
             if let Some(prim) = prim
                 && path.is_property
                 && is_needed(self.file.token(path.token))

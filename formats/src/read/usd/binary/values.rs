@@ -42,11 +42,7 @@ impl ValueRep {
     /// The value itself, if it is in the word.
     const fn inlined(self) -> Option<[u8; 4]> {
         let [a, b, c, d, ..] = self.0.to_le_bytes();
-        if self.is_inlined() && !self.is_array() {
-            Some([a, b, c, d])
-        } else {
-            None
-        }
+        if self.is_inlined() && !self.is_array() { Some([a, b, c, d]) } else { None }
     }
 
     /// An enumerator or a boolean.
@@ -224,10 +220,8 @@ impl<'a> CrateFile<'a> {
                 })
             }
             code => {
-                let what = format!(
-                    "an array in the unknown encoding {:#x}: the file is damaged",
-                    code[0]
-                );
+                let what =
+                    format!("an array in the unknown encoding {:#x}: the file is damaged", code[0]);
                 Err(ParseError::malformed(at, what))
             }
         }
@@ -250,10 +244,7 @@ impl<'a> CrateFile<'a> {
             _ => return Ok(Vec::new()),
         };
         let indices = reader.take(count.saturating_mul(4))?.as_chunks().0;
-        Ok(indices
-            .iter()
-            .map(|index| self.token(u32::from_le_bytes(*index)))
-            .collect())
+        Ok(indices.iter().map(|index| self.token(u32::from_le_bytes(*index))).collect())
     }
 
     /// Where the samples of an attribute are; `None` if `rep` is another value.
@@ -279,9 +270,7 @@ impl<'a> CrateFile<'a> {
             DOUBLE_VECTOR if !times.is_inlined() => self.reader_at(times.payload(), at)?,
             DOUBLE if times.is_array() && !times.is_compressed() => {
                 let (count, list) = self.array_start(times)?;
-                return self
-                    .sample_ranges(count, list, skip(reader.at() as u64)?)
-                    .map(Some);
+                return self.sample_ranges(count, list, skip(reader.at() as u64)?).map(Some);
             }
             _ => {
                 let what = format!("a list of times that are not numbers: {CUT_OR_DAMAGED}");
@@ -289,8 +278,7 @@ impl<'a> CrateFile<'a> {
             }
         };
         let count = usize::try_from(list.u64()?).unwrap_or(usize::MAX);
-        self.sample_ranges(count, list, skip(reader.at() as u64)?)
-            .map(Some)
+        self.sample_ranges(count, list, skip(reader.at() as u64)?).map(Some)
     }
 
     /// The ranges of `count` times at `times` and of as many values, whose number is at `values`.
@@ -311,10 +299,7 @@ impl<'a> CrateFile<'a> {
         }
         let values_start = values.at();
         values.take(len)?;
-        Ok(Samples::Binary {
-            times: start..start + len,
-            values: values_start..values_start + len,
-        })
+        Ok(Samples::Binary { times: start..start + len, values: values_start..values_start + len })
     }
 
     /// A number of the metadata.
@@ -372,9 +357,7 @@ fn diagonal(bytes: &[u8; 4], len: usize) -> AttributeData {
 /// The numbers of `table` at `indices`; `None` if one is beyond it.
 fn looked_up(table: &AttributeData, indices: &[u32]) -> Option<AttributeData> {
     fn values<T: Copy>(table: &[T], indices: &[u32]) -> Option<Vec<T>> {
-        let values = indices
-            .iter()
-            .map(|index| table.get(*index as usize).copied());
+        let values = indices.iter().map(|index| table.get(*index as usize).copied());
         values.collect()
     }
     match table {

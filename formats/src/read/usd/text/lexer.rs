@@ -19,11 +19,7 @@ pub(super) struct Lexer<'a> {
 impl<'a> Lexer<'a> {
     /// The bytes of `range`.
     pub(super) fn new(bytes: &'a [u8], range: Range<usize>) -> Self {
-        Self {
-            bytes,
-            at: range.start,
-            end: range.end.min(bytes.len()),
-        }
+        Self { bytes, at: range.start, end: range.end.min(bytes.len()) }
     }
 
     pub(super) const fn at(&self) -> usize {
@@ -97,11 +93,7 @@ impl<'a> Lexer<'a> {
         let rest = self.rest();
         let len = rest.iter().take_while(|byte| is_word(**byte)).count();
         let after = rest.get(len..).unwrap_or_default();
-        let array = if len > 0 && after.starts_with(b"[]") {
-            2
-        } else {
-            0
-        };
+        let array = if len > 0 && after.starts_with(b"[]") { 2 } else { 0 };
         let start = self.at;
         self.at += len + array;
         start..self.at

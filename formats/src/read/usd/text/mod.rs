@@ -43,11 +43,7 @@ pub(super) fn read(
     };
     parser.run()?;
     let properties = of_prims(parser.properties, &mut parser.prims, bytes);
-    let tree = PrimTree {
-        prims: parser.prims,
-        properties,
-        metadata: parser.metadata,
-    };
+    let tree = PrimTree { prims: parser.prims, properties, metadata: parser.metadata };
     Ok((TextFile::new(bytes), tree))
 }
 
@@ -95,22 +91,14 @@ impl<'a> Parser<'a> {
         is_dormant: bool,
     ) -> Result<(), ParseError> {
         self.check_list()?;
-        self.prims.push(Prim {
-            name,
-            parent,
-            kind,
-            is_dormant,
-            has_arcs: false,
-            properties: 0..0,
-        });
+        self.prims.push(Prim { name, parent, kind, is_dormant, has_arcs: false, properties: 0..0 });
         Ok(())
     }
 
     /// Checks that another entry of the lists fits into the budget.
     fn check_list(&self) -> Result<(), ParseError> {
         let count = (self.prims.len() + self.properties.len()) as u64 + LEAST_LEN;
-        self.budget
-            .check(count * ENTRY_LEN, "the list of its prims is")
+        self.budget.check(count * ENTRY_LEN, "the list of its prims is")
     }
 
     /// The innermost prim.
@@ -226,10 +214,7 @@ impl<'a> Parser<'a> {
     /// A property, whose first word is `word`: an attribute or a relationship.
     fn property(&mut self, mut word: Range<usize>) -> Result<(), ParseError> {
         while is_list_edit(self.text(&word))
-            || matches!(
-                self.text(&word),
-                b"custom" | b"uniform" | b"varying" | b"config"
-            )
+            || matches!(self.text(&word), b"custom" | b"uniform" | b"varying" | b"config")
         {
             word = self.lexer.word();
         }
@@ -309,8 +294,5 @@ impl<'a> Parser<'a> {
 
 /// Whether a word says how a list is changed.
 fn is_list_edit(word: &[u8]) -> bool {
-    matches!(
-        word,
-        b"prepend" | b"append" | b"add" | b"delete" | b"reorder"
-    )
+    matches!(word, b"prepend" | b"append" | b"add" | b"delete" | b"reorder")
 }

@@ -69,11 +69,7 @@ impl<'a> TextFile<'a> {
         let size = number_type.in_memory().size() as u64;
         budget.check(most.saturating_mul(size), "its numbers in memory are")?;
         let lexer = Lexer::new(self.bytes, value.range.clone());
-        let mut words = Words {
-            lexer,
-            bytes: self.bytes,
-            data: empty(number_type.in_memory()),
-        };
+        let mut words = Words { lexer, bytes: self.bytes, data: empty(number_type.in_memory()) };
         if is_array {
             words.array(number_type)?;
         } else {
@@ -137,10 +133,7 @@ impl Words<'_> {
         self.lexer.expect(b')')
     }
 
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "as OpenUSD rounds numbers in text"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "as OpenUSD rounds numbers in text")]
     fn number(&mut self, scalar: Scalar) -> Result<(), ParseError> {
         let word = self.lexer.word();
         let word = self.bytes.get(word).unwrap_or_default();
@@ -252,7 +245,5 @@ fn number_type(name: &[u8]) -> Option<NumberType> {
         (b"point" | b"vector" | b"normal" | b"color" | b"texCoord", b"h") => Scalar::Half,
         _ => return None,
     };
-    (2..=4)
-        .contains(&components)
-        .then(|| NumberType::new(scalar, components))
+    (2..=4).contains(&components).then(|| NumberType::new(scalar, components))
 }

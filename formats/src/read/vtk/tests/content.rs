@@ -8,12 +8,7 @@ use crate::{AttributeData, ParseError, Positions, RawParticles};
 
 #[track_caller]
 fn nasty_points(found: &RawParticles) {
-    let points: Vec<Vec3> = NASTY
-        .as_chunks()
-        .0
-        .iter()
-        .map(|p| Vec3::from_array(*p))
-        .collect();
+    let points: Vec<Vec3> = NASTY.as_chunks().0.iter().map(|p| Vec3::from_array(*p)).collect();
     assert_eq!(found.positions, Positions::F32(points));
 }
 
@@ -31,10 +26,7 @@ fn payloads_may_contain_keywords() {
             .0,
     );
     nasty_points(&found);
-    assert_eq!(
-        attribute(&found, "v").data,
-        AttributeData::F32(NASTY.to_vec())
-    );
+    assert_eq!(attribute(&found, "v").data, AttributeData::F32(NASTY.to_vec()));
 }
 
 #[test]
@@ -52,11 +44,7 @@ fn cells_in_text_may_be_counted_wrongly() {
         "POLYGONS 1 3 3\n3 0 1 2\nLINES 1 2\n2 0 1",
     ] {
         let found = good(file(lines).as_bytes());
-        assert_eq!(
-            attribute(&found, "h").data,
-            AttributeData::F32(vec![1.0, 2.0, 3.0]),
-            "{lines}"
-        );
+        assert_eq!(attribute(&found, "h").data, AttributeData::F32(vec![1.0, 2.0, 3.0]), "{lines}");
     }
     let cut = file("LINES 1 4\n3 0 1 2")
         .replace("\nPOINT_DATA", "#")
@@ -86,10 +74,7 @@ fn no_or_any_white_space_may_follow_a_payload() {
                 .0,
         );
         nasty_points(&found);
-        assert_eq!(
-            attribute(&found, "Id").data,
-            AttributeData::I32(vec![10, 13, 32])
-        );
+        assert_eq!(attribute(&found, "Id").data, AttributeData::I32(vec![10, 13, 32]));
         assert_eq!(names(&found), ["Id", "n"], "{gap:?}");
     }
 }
@@ -125,26 +110,11 @@ fn every_kind_of_point_attribute_is_kept_and_cell_data_are_not() {
             .bytes(&[0b1010_0000, 0b1000_0000])
             .0,
     );
-    assert_eq!(
-        names(&found),
-        ["id", "rgb", "t", "g", "uv", "vel x", "flags"]
-    );
-    assert_eq!(
-        attribute(&found, "id").data,
-        AttributeData::I32(vec![7, 8, 9])
-    );
-    assert_eq!(
-        attribute(&found, "rgb").data,
-        AttributeData::U8(b"123456789".to_vec())
-    );
-    assert_eq!(
-        attribute(&found, "g").data,
-        AttributeData::I32(vec![4, 5, 6])
-    );
-    assert_eq!(
-        attribute(&found, "vel x").data,
-        AttributeData::I16(vec![1, -1, 3])
-    );
+    assert_eq!(names(&found), ["id", "rgb", "t", "g", "uv", "vel x", "flags"]);
+    assert_eq!(attribute(&found, "id").data, AttributeData::I32(vec![7, 8, 9]));
+    assert_eq!(attribute(&found, "rgb").data, AttributeData::U8(b"123456789".to_vec()));
+    assert_eq!(attribute(&found, "g").data, AttributeData::I32(vec![4, 5, 6]));
+    assert_eq!(attribute(&found, "vel x").data, AttributeData::I16(vec![1, -1, 3]));
     let flags = vec![1, 0, 1, 0, 0, 0, 0, 0, 1];
     assert_eq!(attribute(&found, "flags").data, AttributeData::U8(flags));
 }
@@ -154,11 +124,7 @@ fn long_may_have_four_bytes() {
     let start = || TestFile::new("4.0").three_points("POLYDATA");
     for wide in [true, false] {
         let made = start().text("POINT_DATA 3\nSCALARS id long\nLOOKUP_TABLE default\n");
-        let made = if wide {
-            made.longs([1, -2, 3])
-        } else {
-            made.ints([1, -2, 3])
-        };
+        let made = if wide { made.longs([1, -2, 3]) } else { made.ints([1, -2, 3]) };
         let found = good(&made.text("\nVECTORS v float\n").floats(&NASTY).0);
         let expected = if wide {
             AttributeData::I64(vec![1, -2, 3])
@@ -194,10 +160,7 @@ fn ascii_is_free_form() {
     assert_eq!(names(&found), ["a", "c", "n", "u", "v"]);
     let expected = AttributeData::I64(vec![5_000_000_000, -1]);
     assert_eq!(attribute(&found, "n").data, expected);
-    assert_eq!(
-        attribute(&found, "c").data,
-        AttributeData::U8(vec![128, 255, 0, 64])
-    );
+    assert_eq!(attribute(&found, "c").data, AttributeData::U8(vec![128, 255, 0, 64]));
     assert_eq!(attribute(&found, "u").data, AttributeData::U8(vec![255, 7]));
 }
 
@@ -227,12 +190,7 @@ fn zero_points() {
 
 #[test]
 fn data_sets_without_particles_are_rejected_by_name() {
-    for kind in [
-        "STRUCTURED_POINTS",
-        "STRUCTURED_GRID",
-        "RECTILINEAR_GRID",
-        "FIELD",
-    ] {
+    for kind in ["STRUCTURED_POINTS", "STRUCTURED_GRID", "RECTILINEAR_GRID", "FIELD"] {
         match parse(&TestFile::new("3.0").text(&format!("DATASET {kind}\n")).0) {
             Err(ParseError::Unsupported { what }) => assert!(what.contains(kind), "{what}"),
             other => panic!("{kind}: {other:?}"),

@@ -45,22 +45,12 @@ fn huge_counts_are_rejected_without_allocation() {
 #[test]
 fn errors_have_offset_and_required_size() {
     let (at, what) = malformed(
-        &TestFile::new("4.1")
-            .text("DATASET POLYDATA\nPOINTS 9 float\n")
-            .floats(&NASTY)
-            .0,
+        &TestFile::new("4.1").text("DATASET POLYDATA\nPOINTS 9 float\n").floats(&NASTY).0,
     );
     assert_eq!(at, 72);
-    assert_eq!(
-        what,
-        "POINTS: 27 numbers of type f32 need 108 bytes, 36 are left"
-    );
-    let (_, what) = malformed(
-        &TestFile::new("4.1")
-            .three_points("POLYDATA")
-            .text("POINT_DATA 4\n")
-            .0,
-    );
+    assert_eq!(what, "POINTS: 27 numbers of type f32 need 108 bytes, 36 are left");
+    let (_, what) =
+        malformed(&TestFile::new("4.1").three_points("POLYDATA").text("POINT_DATA 4\n").0);
     assert_eq!(what, "POINT_DATA for 4 points, POINTS has 3");
 }
 
@@ -74,10 +64,7 @@ fn check_cuts(bytes: &[u8], cuts: impl Iterator<Item = usize>) {
         match parse(&bytes[..cut]) {
             Ok(part) => {
                 assert_eq!(part.positions, whole.positions, "cut at {cut}");
-                assert!(
-                    whole.attributes.starts_with(&part.attributes),
-                    "cut at {cut}"
-                );
+                assert!(whole.attributes.starts_with(&part.attributes), "cut at {cut}");
             }
             Err(ParseError::Malformed { .. }) => refused += 1,
             Err(error) => panic!("cut at {cut}: {error}"),
@@ -90,10 +77,7 @@ fn check_cuts(bytes: &[u8], cuts: impl Iterator<Item = usize>) {
 fn truncation_is_detected() {
     let points: Vec<[f32; 3]> = (0..12).map(|i| [i as f32, 0.5, -1.0]).collect();
     let ids: Vec<u32> = (0..12).collect();
-    for bytes in [
-        splish(&points, &ids, &points),
-        modern(&points, &ids, &points),
-    ] {
+    for bytes in [splish(&points, &ids, &points), modern(&points, &ids, &points)] {
         check_cuts(&bytes, 0..bytes.len());
     }
     let large = sample("emitter_sph/ParticleData_Fluid_3.vtk");

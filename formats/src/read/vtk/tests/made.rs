@@ -40,9 +40,7 @@ impl TestFile {
 
     /// Three points whose bytes spell keywords and line ends.
     pub(super) fn three_points(self, dataset: &str) -> Self {
-        self.text(&format!("DATASET {dataset}\nPOINTS 3 float\n"))
-            .floats(&NASTY)
-            .text("\n")
+        self.text(&format!("DATASET {dataset}\nPOINTS 3 float\n")).floats(&NASTY).text("\n")
     }
 }
 
@@ -70,9 +68,7 @@ pub(super) fn splish(points: &[[f32; 3]], ids: &[u32], velocity: &[[f32; 3]]) ->
         .ints((0..count).flat_map(|i| [1, i]))
         .text(&format!("\nCELL_TYPES {n}\n"))
         .ints((0..count).map(|_| 1))
-        .text(&format!(
-            "\nPOINT_DATA {n}\nSCALARS id unsigned_int 1\nLOOKUP_TABLE id_table\n"
-        ))
+        .text(&format!("\nPOINT_DATA {n}\nSCALARS id unsigned_int 1\nLOOKUP_TABLE id_table\n"))
         .ints(ids.iter().map(|id| id.cast_signed()))
         .text(&format!("\nFIELD FieldData 2\nvelocity 3 {n} float\n"))
         .floats(velocity.as_flattened())

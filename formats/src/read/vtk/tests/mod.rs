@@ -84,10 +84,7 @@ fn every_variant_contains_the_same_particles() {
     ] {
         let found = good(&sample(&format!("single_frames/{name}")));
         assert_eq!(found.positions.len(), 1200, "{name}");
-        assert_eq!(
-            matches!(found.positions, Positions::F64(_)),
-            name == "legacy_double.vtk"
-        );
+        assert_eq!(matches!(found.positions, Positions::F64(_)), name == "legacy_double.vtk");
         for i in 0..1200 {
             let distance = found.positions.get(i).distance(truth.positions.get(i));
             assert!(distance <= tolerance, "{name}: {i}: {distance}");
@@ -98,10 +95,7 @@ fn every_variant_contains_the_same_particles() {
             assert_eq!(a.data.len(), b.data.len());
             for i in 0..a.data.len() {
                 let (a, b) = (a.data.get_f64(i), b.data.get_f64(i));
-                assert!(
-                    (a - b).abs() <= tolerance * b.abs().max(1.0),
-                    "{name} {other} {i}"
-                );
+                assert!((a - b).abs() <= tolerance * b.abs().max(1.0), "{name} {other} {i}");
             }
         }
     }
@@ -110,16 +104,8 @@ fn every_variant_contains_the_same_particles() {
 #[test]
 fn splashsurf_samples() {
     for (name, count, attributes) in [
-        (
-            "double_dam_break_frame_01_4732_particles",
-            4732,
-            &["id", "velocity"][..],
-        ),
-        (
-            "double_dam_break_frame_26_4732_particles",
-            4732,
-            &["id", "velocity"],
-        ),
+        ("double_dam_break_frame_01_4732_particles", 4732, &["id", "velocity"][..]),
+        ("double_dam_break_frame_26_4732_particles", 4732, &["id", "velocity"]),
         ("hilbert2_7954_particles", 7954, &["id"]),
         ("free_particles_125_particles", 125, &[]),
         ("cube_8_particles", 8, &[]),
@@ -129,9 +115,7 @@ fn splashsurf_samples() {
         assert_eq!(names(&found), attributes, "{name}");
     }
     let cube = good(&sample("public_splashsurf/cube_8_particles.vtk"));
-    let Positions::F64(points) = cube.positions else {
-        panic!("double points are f64")
-    };
+    let Positions::F64(points) = cube.positions else { panic!("double points are f64") };
     assert_eq!(points[1], DVec3::new(0.5, 0.499_509_5, 1.0));
 }
 

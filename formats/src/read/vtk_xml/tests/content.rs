@@ -22,11 +22,7 @@ fn every_encoding_of_every_size_is_read() {
             for &n in sizes {
                 let expected = vtk::positions(points(n));
                 for i in 0..n {
-                    assert_eq!(
-                        found.positions.get(at + i),
-                        expected.get(i),
-                        "{style:?} {sizes:?}"
-                    );
+                    assert_eq!(found.positions.get(at + i), expected.get(i), "{style:?} {sizes:?}");
                     let id = attribute(&found, "id").data.get_f64(at + i);
                     assert_eq!(id, 7.0 * i as f64);
                 }
@@ -34,10 +30,7 @@ fn every_encoding_of_every_size_is_read() {
             }
             if !sizes.is_empty() {
                 assert_eq!(names(&found), ["id", "a < b"]);
-                assert_eq!(
-                    attribute(&found, "a < b").data,
-                    AttributeData::U8(vec![65; total])
-                );
+                assert_eq!(attribute(&found, "a < b").data, AttributeData::U8(vec![65; total]));
             }
         }
     }
@@ -69,17 +62,10 @@ fn only_attributes_of_all_pieces_are_kept() {
         ],
     );
     let file = piece(file, 0, &[]);
-    let file = piece(
-        file,
-        1,
-        &[("d", 1, bytes(1)), ("c", 1, bytes(1)), ("a", 1, ids(1))],
-    );
+    let file = piece(file, 1, &[("d", 1, bytes(1)), ("c", 1, bytes(1)), ("a", 1, ids(1))]);
     let found = good(&file.end());
     assert_eq!(names(&found), ["a"]);
-    assert_eq!(
-        attribute(&found, "a").data,
-        AttributeData::U32(vec![0, 7, 0])
-    );
+    assert_eq!(attribute(&found, "a").data, AttributeData::U32(vec![0, 7, 0]));
 }
 
 #[test]
@@ -134,10 +120,7 @@ fn text_around_the_numbers_is_ignored() {
         </Piece></UnstructuredGrid></VTKFile>",
     );
     let found = good(&file);
-    assert_eq!(
-        found.positions,
-        Positions::F32(vec![Vec3::new(1.0, 2.0, 3.0)])
-    );
+    assert_eq!(found.positions, Positions::F32(vec![Vec3::new(1.0, 2.0, 3.0)]));
     assert_eq!(found.attributes[0].name, "H?he");
     assert_eq!(found.attributes[0].data, AttributeData::I16(vec![5]));
 }

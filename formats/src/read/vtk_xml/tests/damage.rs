@@ -23,10 +23,7 @@ fn huge_counts_are_rejected_without_allocation() {
             "2",
             "4",
         ] {
-            for from in [
-                "NumberOfPoints=\"3\"",
-                "Name=\"id\" NumberOfComponents=\"1\"",
-            ] {
+            for from in ["NumberOfPoints=\"3\"", "Name=\"id\" NumberOfComponents=\"1\""] {
                 let (key, _) = from.rsplit_once('=').unwrap();
                 let bad = replace(&file, from, &format!("{key}=\"{count}\""));
                 malformed(&bad);
@@ -37,10 +34,7 @@ fn huge_counts_are_rejected_without_allocation() {
 
 #[test]
 fn inconsistent_block_headers_are_rejected() {
-    let style = Style {
-        pack: Pack::Zlib(1 << 15, true),
-        ..Style::RAW
-    };
+    let style = Style { pack: Pack::Zlib(1 << 15, true), ..Style::RAW };
     let file = made(style, &[3]);
     let blob = blob_at(&file);
     // A single block may be called the last of any size above its own, or a full one.
@@ -71,10 +65,7 @@ fn inconsistent_block_headers_are_rejected() {
 fn compression_bombs_are_rejected() {
     // 64 KiB stored for what its header calls 12 bytes, and the other way round.
     let zeros = AttributeData::F32(vec![0.0; 1 << 14]);
-    let style = Style {
-        pack: Pack::Zlib(1 << 16, true),
-        ..Style::RAW
-    };
+    let style = Style { pack: Pack::Zlib(1 << 16, true), ..Style::RAW };
     let file = Made::new(style)
         .xml("<Piece NumberOfPoints=\"1\"><Points>")
         .array("p", 3, &zeros)
@@ -110,10 +101,7 @@ fn arrays_that_share_bytes_count_against_the_budget() {
     };
     assert_eq!(good(&share(0)).attributes.len(), 0);
     let what = malformed(&share(1));
-    assert!(
-        what.starts_with("array `a0` and those before it need 2400"),
-        "{what}"
-    );
+    assert!(what.starts_with("array `a0` and those before it need 2400"), "{what}");
     malformed(&share(1000));
 }
 
@@ -137,9 +125,7 @@ fn error_offsets_do_not_depend_on_names() {
 /// The first byte of the appended data.
 fn blob_at(file: &[u8]) -> usize {
     let tag = appended::find(file).unwrap();
-    Appended::parse(file, tag, &std::cell::Cell::new(0))
-        .unwrap()
-        .at
+    Appended::parse(file, tag, &std::cell::Cell::new(0)).unwrap().at
 }
 
 #[track_caller]
@@ -169,28 +155,16 @@ fn check_cuts(bytes: &[u8], cuts: impl Iterator<Item = usize>) {
 fn truncation_is_detected() {
     for place in [Where::Ascii, Where::Inline, Where::Base64, Where::Raw] {
         for pack in [Pack::Plain, Pack::Zlib(12, true)] {
-            let file = made(
-                Style {
-                    place,
-                    pack,
-                    ..Style::RAW
-                },
-                &[3, 2],
-            );
+            let file = made(Style { place, pack, ..Style::RAW }, &[3, 2]);
             check_cuts(&file, 0..file.len());
         }
     }
-    for name in [
-        "single_frames/raw-lzma.vtu",
-        "single_frames/raw-lz4.vtu",
-        "single_frames/inline-zlib.vtp",
-    ] {
+    for name in
+        ["single_frames/raw-lzma.vtu", "single_frames/raw-lz4.vtu", "single_frames/inline-zlib.vtp"]
+    {
         let file = sample(name);
-        let last_array = if name.contains("raw-") {
-            38_590.min(file.len() / 2)
-        } else {
-            file.len()
-        };
+        let last_array =
+            if name.contains("raw-") { 38_590.min(file.len() / 2) } else { file.len() };
         check_cuts(&file, (0..last_array).step_by(97));
     }
 }

@@ -38,12 +38,8 @@ pub(super) struct Style {
 }
 
 impl Style {
-    pub(super) const RAW: Self = Self {
-        place: Where::Raw,
-        pack: Pack::Plain,
-        endian: Endian::Little,
-        wide_header: false,
-    };
+    pub(super) const RAW: Self =
+        Self { place: Where::Raw, pack: Pack::Plain, endian: Endian::Little, wide_header: false };
 
     pub(super) fn integers(self, values: &[usize]) -> Vec<u8> {
         let size = if self.wide_header { 8 } else { 4 };
@@ -110,11 +106,7 @@ impl Made {
             Endian::Little => "LittleEndian",
             Endian::Big => "BigEndian",
         };
-        let header = if style.wide_header {
-            " header_type=\"UInt64\""
-        } else {
-            ""
-        };
+        let header = if style.wide_header { " header_type=\"UInt64\"" } else { "" };
         let compressor = match style.pack {
             Pack::Plain => "",
             Pack::Zlib(..) => " compressor=\"vtkZLibDataCompressor\"",
@@ -150,13 +142,10 @@ impl Made {
         let bytes = bytes_of(data, self.style.endian);
         match self.style.place {
             Where::Ascii => {
-                let text: Vec<String> = (0..data.len())
-                    .map(|i| data.get_f64(i).to_string())
-                    .collect();
-                self.xml += &format!(
-                    "{head} format=\"ascii\">\n{}\n{key}</DataArray>\n",
-                    text.join("\n ")
-                );
+                let text: Vec<String> =
+                    (0..data.len()).map(|i| data.get_f64(i).to_string()).collect();
+                self.xml +=
+                    &format!("{head} format=\"ascii\">\n{}\n{key}</DataArray>\n", text.join("\n "));
             }
             Where::Inline | Where::InlineBroken => {
                 let mut text = String::from_utf8(self.style.encoded(&bytes)).unwrap();
@@ -213,9 +202,7 @@ pub(super) fn bytes_of(data: &AttributeData, endian: Endian) -> Vec<u8> {
         other => panic!("{other:?} is not written"),
     };
     if endian == Endian::Big {
-        bytes
-            .chunks_mut(data.scalar_type().size())
-            .for_each(<[u8]>::reverse);
+        bytes.chunks_mut(data.scalar_type().size()).for_each(<[u8]>::reverse);
     }
     bytes
 }
@@ -224,9 +211,7 @@ pub(super) fn points(n: usize) -> AttributeData {
     // Bytes that spell markup; finite, and exact as decimal text.
     let nasty = f32::from_le_bytes(*b"<&</");
     AttributeData::F32(
-        (0..3 * n)
-            .map(|i| if i % 5 == 2 { nasty } else { i as f32 * 0.5 })
-            .collect(),
+        (0..3 * n).map(|i| if i % 5 == 2 { nasty } else { i as f32 * 0.5 }).collect(),
     )
 }
 
@@ -273,12 +258,7 @@ pub(super) fn all_styles() -> Vec<Style> {
         ] {
             for endian in [Endian::Little, Endian::Big] {
                 for wide_header in [false, true] {
-                    styles.push(Style {
-                        place,
-                        pack,
-                        endian,
-                        wide_header,
-                    });
+                    styles.push(Style { place, pack, endian, wide_header });
                 }
             }
         }

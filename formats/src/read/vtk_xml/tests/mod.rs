@@ -69,9 +69,7 @@ fn names(found: &RawParticles) -> Vec<&str> {
 #[test]
 fn every_variant_contains_the_same_particles() {
     let legacy = sample("single_frames/legacy_polydata-4.2.vtk");
-    let truth = crate::read::vtk::FORMAT
-        .read(&legacy, &Step::whole(legacy.len()))
-        .unwrap();
+    let truth = crate::read::vtk::FORMAT.read(&legacy, &Step::whole(legacy.len())).unwrap();
     let folder = format!("{}/../tests/data/single_frames", env!("CARGO_MANIFEST_DIR"));
     let mut checked = 0;
     for entry in std::fs::read_dir(folder).unwrap() {
@@ -89,11 +87,7 @@ fn every_variant_contains_the_same_particles() {
             let distance = found.positions.get(i).distance(truth.positions.get(i));
             assert!(distance <= tolerance, "{name}: {i}: {distance}");
         }
-        assert_eq!(
-            attribute(&found, "id").data,
-            attribute(&truth, "id").data,
-            "{name}"
-        );
+        assert_eq!(attribute(&found, "id").data, attribute(&truth, "id").data, "{name}");
         for other in ["density", "velocity"] {
             let (a, b) = (attribute(&found, other), attribute(&truth, other));
             assert_eq!((a.components, a.data.len()), (b.components, b.data.len()));
@@ -118,10 +112,7 @@ fn splashsurf_samples() {
     for found in [&meshio, &paraview] {
         assert_eq!(found.positions.len(), 250);
         assert_eq!(names(found), expected);
-        assert!(matches!(
-            attribute(found, "index").data,
-            AttributeData::I64(_)
-        ));
+        assert!(matches!(attribute(found, "index").data, AttributeData::I64(_)));
         assert!(matches!(found.positions, Positions::F64(_)));
     }
     assert_eq!(meshio.positions, paraview.positions);
