@@ -54,17 +54,14 @@
 //! input gives the same bytes in all patch versions, and the changelog names every change of an image.
 #![deny(unsafe_code)]
 
-pub mod accel;
 pub mod attributes;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod conversion;
 pub mod defaults;
-pub mod denoise;
 pub mod hdr;
 pub mod job;
 pub mod manifest;
-pub mod math;
 pub mod metrics;
 #[cfg(feature = "movies")]
 pub mod movie;
@@ -73,17 +70,16 @@ pub mod overlay;
 pub mod picture;
 pub mod pipeline;
 pub mod prelude;
-pub mod ray;
 pub mod reading;
-pub mod render;
 pub mod report;
 pub mod resolve;
 #[cfg(feature = "reports")]
 pub mod scale;
-pub mod scene;
 pub mod selection;
 pub mod still;
-pub mod surface;
 pub mod survey;
 #[cfg(feature = "reports")]
 pub mod viewer;
+
+pub use spherule_tracer::{denoise, render, scene, surface};
+pub use spherule_tree::{accel, math, ray};

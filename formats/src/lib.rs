@@ -36,58 +36,33 @@
 //! ```
 #![deny(unsafe_code)]
 
-mod attribute;
-mod bonds;
-mod budget;
-mod cell;
 mod compression;
-mod decode;
-mod error;
 mod format;
-mod frame;
-mod gather;
-mod images;
-mod message;
-mod origin;
 mod ranges;
 mod reader;
 mod registry;
 mod regular;
-mod sampling;
-mod scalar;
 mod shared;
 mod step;
-mod value_error;
 
-pub mod blocks;
 pub mod convert;
 pub mod detect;
-pub mod generate;
 pub mod mesh;
-pub mod names;
 pub mod native;
 pub mod open;
-pub mod order;
 pub mod read;
 pub mod sequence;
 pub mod stats;
 pub mod write;
 
-pub use attribute::{Attribute, AttributeData};
-pub use bonds::Bond;
-pub use budget::MemoryBudget;
-pub use cell::SimulationCell;
-pub use error::{FrameError, ParseError};
-pub use frame::{
-    FARTHEST, ParticleFrame, PositionSlice, Positions, Radius, RawParticles, find_radius, is_near,
-    is_radius,
-};
-pub use images::PeriodicImages;
-pub use message::{escape_controls, is_control};
 pub use open::FrameFile;
-pub use origin::choose_origin;
 pub use read::element_symbol;
-pub use sampling::sample_indices;
-pub use scalar::{Endian, ScalarType};
 pub use sequence::{Sequence, SequenceError, SequenceFrame, SequenceInput, SequenceSettings};
-pub use value_error::ValueError;
+pub use spherule_files::{ValueError, escape_controls, is_control};
+pub use spherule_frame::{
+    Attribute, AttributeData, Bond, Endian, FARTHEST, FrameError, MemoryBudget, ParseError,
+    ParticleFrame, PeriodicImages, PositionSlice, Positions, Radius, RawParticles, ScalarType,
+    SimulationCell, choose_origin, find_radius, generate, is_near, is_radius, names,
+    sample_indices,
+};
+pub use spherule_tree::{blocks, order};

@@ -85,10 +85,8 @@ mod file_error;
 mod fingerprint;
 mod fingerprint_cache;
 mod input;
-mod interrupt;
 mod job;
 mod ledger;
-mod panic;
 #[doc(hidden)]
 pub mod parse;
 mod plan;
@@ -96,7 +94,6 @@ mod planning;
 mod process;
 mod queue;
 mod range;
-mod regular;
 mod request;
 mod requeue;
 mod run;
@@ -109,21 +106,19 @@ pub use error::{EntryError, JobError, PlanError};
 pub use failure::{FailureKind, FrameFailure};
 pub use file_error::FileError;
 pub use fingerprint::{Fingerprint, compare_settings, contents_hash, settings_hash, text_hash};
-pub use interrupt::{Interrupt, InterruptLevel};
 pub use job::{DryRun, Job};
 pub use ledger::{Details, EntryStatus, Ledger, LedgerEntry, OutputFile};
-pub use panic::{Panic, catch_panic};
 pub use plan::{Plan, PlannedFrame, PlannedInput};
 pub use queue::{ClaimedFrame, FrameQueue, QueueEvent};
 pub use range::{FrameRange, RangeError};
-pub use regular::{open_regular, read_regular, read_regular_text};
 pub use request::{DEFAULT_TAKEOVER_AFTER, FrameRequest, JobRequest, ResumeMode};
 pub use run::{
     FinishedFrame, FrameEvent, FrameRecorder, FrameWork, OnFrameEvent, Recorded, RunContext,
     RunOptions, run_frames,
 };
-pub use spherule_publish::{
-    Publisher, discard_own_parts, discard_parts, owner, publish, publish_with, set_owner,
+pub use spherule_files::{
+    Interrupt, InterruptLevel, Panic, Publisher, catch_panic, discard_own_parts, discard_parts,
+    open_regular, owner, publish, publish_with, read_regular, read_regular_text, set_owner,
 };
 pub use state::{FrameState, JobState, JobSummary};
 pub use workers::{Claim, ClaimOutcome, WORK_DIR, WorkerStatus, start_heartbeat_thread};

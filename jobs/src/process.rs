@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
-use spherule_publish::{host_name, process_token};
+use spherule_files::{host_name, process_token};
 
 /// Identifies a process uniquely, even if its process number is reused later.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

@@ -1,8 +1,3 @@
 //! The SIMD levels that tests use: the same list as in unit tests.
 
-use spherule::accel::simd::SimdLevel;
-
-#[path = "../../src/accel/simd/tested_levels.rs"]
-mod levels;
-
-pub(crate) use levels::tested_levels;
+pub(crate) use spherule::accel::simd::tested_levels::tested_levels;

@@ -8,12 +8,12 @@ use rayon::prelude::*;
 
 use super::write::{AttributeSpec, FrameSpec, FrameWriter, RadiusSpec, Run};
 use super::{Bound, Encoding, FrameIndex, RadiusRange, StoredType, arrange, wide_blocks};
-use crate::attribute::with_values;
 use crate::blocks::Block;
-use crate::gather::gather;
 use crate::names::RADIUS;
 use crate::order::kd;
 use crate::{Attribute, AttributeData, FrameError, ParticleFrame, Radius, is_near, is_radius};
+use spherule_frame::gather::gather;
+use spherule_frame::with_values;
 
 /// How a frame is stored.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -11,7 +11,9 @@ use rayon::prelude::*;
 
 use super::Bound;
 use super::radii::CodedRadii;
-use crate::blocks::{Aabb, BLOCK_SIZE, Block, BlockFrame, BlockRadii, CompactBlock, Node, WIDTH};
+use crate::blocks::{
+    Aabb, BLOCK_SIZE, Block, BlockFrame, BlockRadii, CompactBlock, Node, Q10Block, Q16Block, WIDTH,
+};
 use crate::order::index_u32;
 
 /// Particles under one node.
@@ -91,52 +93,64 @@ impl StoredBlock for Block {
     }
 }
 
-impl<B: CompactBlock + Send + Sync> StoredBlock for B {
-    const IS_EXACT: bool = false;
+/// One implementation for all [`CompactBlock`]s would overlap with that for [`Block`], a type of another crate.
+macro_rules! stored_codes {
+    ($($block:ty),*) => {$(
+        impl StoredBlock for $block {
+            const IS_EXACT: bool = false;
 
-    fn encode(block: &Block, node: &Node, slot: usize) -> Option<(Self, f64)> {
-        let frame = node.child_frame(slot);
-        let steps = B::steps(&frame);
-        let mut codes = [[0; BLOCK_SIZE]; 3];
-        let axes = [&block.x, &block.y, &block.z];
-        for (axis, (codes, values)) in codes.iter_mut().zip(axes).enumerate() {
-            let grid = CodeGrid {
-                base: frame.base[axis],
-                step: steps[axis],
-                largest: B::LARGEST[axis],
-                planes: node.interval(slot, axis),
-            };
-            for (code, value) in codes.iter_mut().zip(values) {
-                *code = grid.code(*value)?;
+            fn encode(block: &Block, node: &Node, slot: usize) -> Option<(Self, f64)> {
+                encode_block(block, node, slot)
+            }
+
+            fn reference(index: u32) -> Option<Self> {
+                Some(Self::referring_to(index))
+            }
+
+            fn stored(&self, frame: &BlockFrame) -> Block {
+                self.decode(frame)
+            }
+
+            fn shifted(self, by: u32) -> Self {
+                match self.wide_index() {
+                    Some(index) => Self::referring_to(index + by),
+                    None => self,
+                }
+            }
+
+            fn half_steps() -> Vec3 {
+                Vec3::from_array(<$block>::LARGEST.map(|largest| 0.5 / largest as f32))
             }
         }
-        let coded = Self::from_codes(&codes);
-        if coded.wide_index().is_some() {
-            // The block is not arranged as coded blocks must be.
-            return None;
+    )*};
+}
+
+stored_codes!(Q10Block, Q16Block);
+
+/// See [`StoredBlock::encode`].
+fn encode_block<B: CompactBlock>(block: &Block, node: &Node, slot: usize) -> Option<(B, f64)> {
+    let frame = node.child_frame(slot);
+    let steps = B::steps(&frame);
+    let mut codes = [[0; BLOCK_SIZE]; 3];
+    let axes = [&block.x, &block.y, &block.z];
+    for (axis, (codes, values)) in codes.iter_mut().zip(axes).enumerate() {
+        let grid = CodeGrid {
+            base: frame.base[axis],
+            step: steps[axis],
+            largest: B::LARGEST[axis],
+            planes: node.interval(slot, axis),
+        };
+        for (code, value) in codes.iter_mut().zip(values) {
+            *code = grid.code(*value)?;
         }
-        let error = largest_distance(&coded.decode(&frame), block);
-        Some((coded, error))
     }
-
-    fn reference(index: u32) -> Option<Self> {
-        Some(Self::referring_to(index))
+    let coded = B::from_codes(&codes);
+    if coded.wide_index().is_some() {
+        // The block is not arranged as coded blocks must be.
+        return None;
     }
-
-    fn stored(&self, frame: &BlockFrame) -> Block {
-        self.decode(frame)
-    }
-
-    fn shifted(self, by: u32) -> Self {
-        match self.wide_index() {
-            Some(index) => Self::referring_to(index + by),
-            None => self,
-        }
-    }
-
-    fn half_steps() -> Vec3 {
-        Vec3::from_array(B::LARGEST.map(|largest| 0.5 / largest as f32))
-    }
+    let error = largest_distance(&coded.decode(&frame), block);
+    Some((coded, error))
 }
 
 /// The codes of a block on one axis.

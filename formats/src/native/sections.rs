@@ -8,7 +8,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 
 use bytemuck::Pod;
-use spherule_publish::Publisher;
+use spherule_files::Publisher;
 use xxhash_rust::xxh3::Xxh3;
 
 use super::layout::{ALIGN, Section};

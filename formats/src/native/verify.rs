@@ -16,7 +16,7 @@ use crate::blocks::{
     Aabb, BLOCK_SIZE, Block, BlockRadii, CompactBlock, FARTHEST_PLANE, Node, StoredBlocks,
     StoredLeaves, WIDTH,
 };
-use crate::message::one_line;
+use spherule_files::one_line;
 
 /// Reserved header bytes, zero in this version.
 const RESERVED: std::ops::Range<usize> = 48..56;

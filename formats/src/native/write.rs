@@ -7,7 +7,7 @@ use std::path::Path;
 use glam::DVec3;
 use glam::Vec3;
 use rkyv::rancor;
-use spherule_publish::Publisher;
+use spherule_files::Publisher;
 
 use super::layout::{
     ALIGN, AttributeIndex, Encoding, FrameIndex, HEADER_LEN, ORDER_KD, RadiiIndex, RadiusIndex,

@@ -9,12 +9,12 @@ use super::siblings::SiblingFiles;
 use super::streamed::decompressor;
 use crate::compression::{ByteStream, StreamError, is_compressed};
 use crate::detect::Format;
-use crate::message::one_line;
 use crate::native::{self, MappedFile};
 use crate::reader::{HEAD_LEN, Reader};
 use crate::regular::regular_len;
 use crate::shared::SharedBytes;
 use crate::{FrameError, MemoryBudget};
+use spherule_files::one_line;
 
 /// Whether the file at `path` begins as a native frame, without compression around it.
 ///

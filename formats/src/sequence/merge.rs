@@ -4,10 +4,10 @@ use std::collections::{BTreeMap, VecDeque};
 
 use glam::DVec3;
 
-use crate::attribute::with_values;
-use crate::message::one_line;
 use crate::order::index_u32;
 use crate::{Attribute, AttributeData, Bond, Positions, RawParticles, ScalarType};
+use spherule_files::one_line;
+use spherule_frame::with_values;
 
 /// Name of the attribute that distinguishes the parts: an index into the sequence's part names.
 pub const PART_ATTRIBUTE: &str = "part";

@@ -5,8 +5,8 @@ use rayon::prelude::*;
 
 use super::sums::{FloatSum, Sum};
 use super::{AttributeStats, FrameStats};
-use crate::frame::find_radius;
 use crate::{Attribute, FARTHEST, Positions, Radius, ScalarType, is_near};
+use spherule_frame::find_radius;
 
 /// The sums over the particles so far.
 pub(super) struct Gathered {

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use glam::Vec3;
-use spherule_publish::publish_with;
+use spherule_files::publish_with;
 
 use super::stream::{publish_stream, write_positions};
 use crate::FrameError;

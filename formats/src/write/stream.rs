@@ -7,7 +7,7 @@ use std::path::Path;
 
 use glam::DVec3;
 use rayon::prelude::*;
-use spherule_publish::{Publisher, publish_with};
+use spherule_files::{Publisher, publish_with};
 
 use crate::FrameError;
 use crate::convert::{ConvertError, ParticleSource, Phase, Progress};

@@ -5,12 +5,12 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use glam::Vec3;
-use spherule_publish::publish_with;
+use spherule_files::publish_with;
 
 use super::stream::{WriteError, publish_stream, write_numbers, write_positions, write_values};
-use crate::attribute::with_values;
 use crate::convert::{ConvertError, ParticleSource, Progress};
 use crate::{Attribute, FrameError, ScalarType};
+use spherule_frame::with_values;
 
 /// Writes `positions` and `attributes` (each with one value group per particle) to `path`. The file appears
 /// complete or not at all. Blanks in names become `_`, as the format requires.

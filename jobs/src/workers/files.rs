@@ -5,7 +5,7 @@ use std::fs::{self, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use spherule_publish::part_owner;
+use spherule_files::part_owner;
 
 use super::{RECORD_SUFFIX, WorkerRecord};
 

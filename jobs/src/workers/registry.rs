@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
-use spherule_publish::{owner, part_owner, publish};
+use spherule_files::{owner, part_owner, publish};
 
 use super::files::{ListedParts, list_files, list_records, remove_if_exists};
 use super::record::is_worker_name;

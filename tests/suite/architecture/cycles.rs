@@ -10,8 +10,15 @@ use super::root;
 use super::source::{ModulePath, code, files};
 
 /// Directories of crates, and how many files they have at least.
-const SOURCES: [(&str, usize); 4] =
-    [("src", 100), ("jobs/src", 30), ("formats/src", 30), ("publish/src", 4)];
+const SOURCES: [(&str, usize); 7] = [
+    ("src", 100),
+    ("jobs/src", 30),
+    ("formats/src", 30),
+    ("crates/files/src", 8),
+    ("crates/frame/src", 12),
+    ("crates/tree/src", 50),
+    ("crates/tracer/src", 100),
+];
 
 /// The modules of a crate.
 struct Modules {

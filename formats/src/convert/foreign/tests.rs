@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 
 use super::*;
-use crate::attribute::with_values;
 use crate::{FrameFile, RawParticles};
+use spherule_frame::with_values;
 
 /// The files in a folder of the repository's `tests`.
 fn files_under(folder: &str) -> Vec<PathBuf> {

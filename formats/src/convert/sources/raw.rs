@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 
 use super::places;
-use crate::attribute::with_values;
 use crate::convert::{ParticleSource, SourceAttribute};
 use crate::{Attribute, FrameError, PositionSlice, Positions, RawParticles};
+use spherule_frame::with_values;
 
 /// A step that is completely in memory.
 #[derive(Debug)]

@@ -12,7 +12,7 @@ use super::file::{H5File, ObjectKey};
 use super::links::ExternalLink;
 use super::types::stored_scalar;
 use crate::ParseError;
-use crate::message::one_line;
+use spherule_files::one_line;
 
 /// Most numbers of an attribute that are read.
 const MOST_ATTRIBUTE_NUMBERS: usize = 1 << 16;

@@ -7,8 +7,8 @@ use super::properties::{PropertyFinder, numbers, values};
 use super::slice::Slice;
 use super::stored::Stored;
 use super::table::{Part, ParticleTable};
-use crate::message::one_line;
 use crate::{MemoryBudget, ParseError};
+use spherule_files::one_line;
 
 /// Kinds of data that have points.
 const KINDS: [&str; 2] = ["PolyData", "UnstructuredGrid"];

@@ -330,7 +330,7 @@ impl Expander {
 
     fn note_ghosts(&self, notes: &mut Vec<String>) {
         if let Some(list) = &self.has_ghosts {
-            notes.push(crate::message::one_line(format!(
+            notes.push(spherule_files::one_line(format!(
                 "{}: its pieces share points (GhostLevel), which are used from each piece",
                 list.display()
             )));

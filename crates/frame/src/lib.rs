@@ -1,0 +1,57 @@
+//! One time step of a particle simulation in memory, whatever file it comes from.
+//!
+//! A reader returns [`RawParticles`]: positions in the type of the file, and [`Attribute`]s, which are named arrays with
+//! a number of components per particle. [`ParticleFrame`] is what the renderer needs of it: finite positions in f32,
+//! relative to the origin that a sequence has in common ([`choose_origin`]). A [`SimulationCell`] and [`Bond`]s come
+//! with molecular simulations; [`PeriodicImages`] wraps particles into the cell and copies it.
+//!
+//! This crate knows neither files nor rays. It uses only `spherule-files`.
+//!
+//! ```
+//! use glam::{DVec3, Vec3};
+//! use spherule_frame::{Attribute, AttributeData, ParticleFrame, Positions, RawParticles};
+//!
+//! let particles = RawParticles {
+//!     positions: Positions::F32(vec![Vec3::ZERO, Vec3::X, Vec3::NAN]),
+//!     attributes: vec![Attribute {
+//!         name: "density".to_owned(),
+//!         components: 1,
+//!         data: AttributeData::F32(vec![998.0, 1001.0, 1004.0]),
+//!     }],
+//!     ..RawParticles::default()
+//! };
+//! let frame = ParticleFrame::from_raw(particles, DVec3::ZERO);
+//! // A particle without a place is left out, with its attributes
+//! assert_eq!((frame.positions.len(), frame.dropped), (2, 1));
+//! assert_eq!(frame.attributes[0].data, AttributeData::F32(vec![998.0, 1001.0]));
+//! ```
+#![deny(unsafe_code)]
+
+mod attribute;
+pub mod bonds;
+mod budget;
+mod cell;
+mod decode;
+mod error;
+mod frame;
+pub mod gather;
+pub mod generate;
+mod images;
+pub mod names;
+mod origin;
+mod sampling;
+mod scalar;
+
+pub use attribute::{Attribute, AttributeData};
+pub use bonds::Bond;
+pub use budget::MemoryBudget;
+pub use cell::SimulationCell;
+pub use error::{FrameError, ParseError};
+pub use frame::{
+    FARTHEST, ParticleFrame, PositionSlice, Positions, Radius, RawParticles, find_radius, is_near,
+    is_radius,
+};
+pub use images::PeriodicImages;
+pub use origin::choose_origin;
+pub use sampling::sample_indices;
+pub use scalar::{Endian, ScalarType};

@@ -1,0 +1,288 @@
+//! Attributes at intersections: base colours, and for camera rays coverage and the data channels of pixels.
+
+use std::cell::LazyCell;
+
+use glam::Vec3;
+
+use super::{
+    aov::{DataSample, NO_ID},
+    context::RenderContext,
+    cryptomatte::{self, ObjectName},
+    film::FilmTile,
+    layers::MatteKind,
+    sample_layers::SampleLayers,
+    scratch::{PacketScratch, Pixel},
+    shading::depths,
+    stream::SegmentPacket,
+};
+use crate::scene::ground::GroundSample;
+use crate::surface::{Intersections, MaterialId};
+use spherule_tree::math::{Lanes, lane3, lanes_in, set_lane3, splat, splat3};
+use spherule_tree::ray::RayPacket;
+
+/// Colour of foam and spray, linear RGB.
+const SPRAY: Vec3 = Vec3::splat(0.9);
+
+/// Width of a diffusely reflected ray as a fraction of its length. Such rays sample a hemisphere, so each may stand for
+/// a part of it.
+const BOUNCED_SPREAD: f32 = 0.1;
+
+impl RenderContext<'_> {
+    /// Looks up the base colours at the intersections of a packet; colours of particles only if `has_color`.
+    pub(super) fn base_colors(
+        &self,
+        segments: &SegmentPacket,
+        has_color: bool,
+        packet: &mut PacketScratch,
+    ) {
+        let PacketScratch { hits, base, blend, .. } = packet;
+        // Look up the colours of particles
+        let particles = hits.lanes_of(MaterialId::PARTICLES);
+        if let Some(color) = self.color {
+            *base = splat3(color);
+        } else if has_color {
+            for lane in lanes_in(particles) {
+                set_lane3(base, lane, self.particle_color(hits, lane, blend));
+            }
+        }
+        // Look up the colours of all other surfaces
+        let ground = hits.lanes_of(MaterialId::GROUND);
+        let sand = self
+            .scene
+            .ground
+            .as_ref()
+            .map_or(0, |pattern| pattern.sand_colors(self.simd, &hits.point, ground, base));
+        for lane in lanes_in(hits.mask & !(particles | sand)) {
+            let ray = (&segments.rays, segments.bounces[lane]);
+            let color = self.fixed_color(ray, hits, lane);
+            set_lane3(base, lane, color);
+        }
+    }
+
+    /// Base colour of the particle in `lane`, or of a point between particles.
+    fn particle_color(
+        &self,
+        hits: &Intersections,
+        lane: usize,
+        blend: &mut Vec<(u32, f32)>,
+    ) -> Vec3 {
+        if let Some(color) = self.color {
+            return color;
+        }
+        let Some(particles) = self.connected_particles() else {
+            return self.source.color(hits.particle[lane]);
+        };
+        // Blend the colours of the particles around the point
+        blend.clear();
+        let hit = hits.get(lane);
+        particles.blend(&hit, &mut |particle, weight| blend.push((particle, weight)));
+        self.source.blended_color(blend)
+    }
+
+    /// Base colour of a part of the particles, of the ground, of a mesh or of spray, as a ray sees it after a number of
+    /// diffuse reflections.
+    fn fixed_color(&self, ray: (&RayPacket, u32), hits: &Intersections, lane: usize) -> Vec3 {
+        if let Some(mesh) = self.mesh(hits.material[lane]) {
+            let own = self.part_color(hits.material[lane], hits.particle[lane]);
+            return own.unwrap_or(mesh.color);
+        }
+        if let Some(part) = self.part(hits.material[lane]) {
+            let of_particle = || self.source.color(hits.particle[lane]);
+            return part.color.unwrap_or_else(of_particle);
+        }
+        match (hits.material[lane], &self.scene.ground) {
+            (MaterialId::GROUND, Some(ground)) => {
+                let (rays, bounces) = ray;
+                let point = lane3(&hits.point, lane);
+                ground.color(&GroundSample {
+                    point,
+                    direction: lane3(&rays.direction, lane),
+                    width: match bounces {
+                        0 => self.camera.pixel_width(point) * self.sample_width,
+                        _ => BOUNCED_SPREAD * hits.t[lane],
+                    },
+                })
+            }
+            _ => SPRAY,
+        }
+    }
+
+    /// Fraction of each sample that surfaces cover, or `otherwise` without a surface. A ground that fades out still
+    /// covers all of it, unless the background is transparent. Holdouts cover nothing.
+    pub(super) fn coverage(&self, hits: &Intersections, otherwise: &Lanes) -> Lanes {
+        std::array::from_fn(|lane| match hits.mask >> lane & 1 {
+            0 => otherwise[lane],
+            _ if self.is_holdout(hits.material[lane]) => 0.0,
+            _ if self.settings.transparent_background => hits.opacity[lane],
+            _ => 1.0,
+        })
+    }
+
+    fn is_holdout(&self, material: MaterialId) -> bool {
+        self.mesh(material).is_some_and(|mesh| mesh.is_holdout)
+    }
+
+    /// Stores the data of the nearest sample of each pixel, the first in a tie. The rays belong to the samples from
+    /// index `first` on.
+    pub(super) fn gather_data(
+        &self,
+        rays: &RayPacket,
+        first: usize,
+        packet: &mut PacketScratch,
+        pixels: &mut [Pixel],
+    ) {
+        if !self.settings.planes().needs_nearest() || packet.hits.mask == 0 {
+            return;
+        }
+        // Compute the depths of all samples
+        let mut z = splat(f32::INFINITY);
+        depths(self.simd, &self.camera, rays, &packet.hits, &mut z);
+        let samples = self.settings.samples as usize;
+        let mut lane = 0;
+        while lane < rays.len() {
+            // Find the lanes of the next pixel, and the nearest of its samples
+            let pixel = (first + lane) / samples;
+            let end = rays.len().min((pixel + 1) * samples - first);
+            let nearest = (lane..end).fold(lane, |best, l| if z[l] < z[best] { l } else { best });
+            let data = || self.data(rays, z[nearest], nearest, packet);
+            pixels[pixel].data.keep_nearest(z[nearest], data);
+            lane = end;
+        }
+    }
+
+    /// Stores the layers of `pixels` that come from their nearest sample.
+    pub(super) fn store_nearest(&self, pixels: &[Pixel], tile: &mut FilmTile<'_>) {
+        let layers = &self.settings.channels.layers;
+        let (attributes, motion) = (layers.attributes_at(), layers.motion_at());
+        if attributes.is_empty() && motion.is_empty() {
+            return;
+        }
+        for pixel in pixels {
+            let floats = tile.layers_mut(pixel.column, pixel.row);
+            match pixel.data.particle {
+                Some(particle) => {
+                    let values = &mut floats[attributes.clone()];
+                    self.source.attributes(particle, values);
+                }
+                None => floats[attributes.clone()].fill(0.0),
+            }
+            floats[motion.clone()].copy_from_slice(&pixel.data.motion[..motion.len()]);
+        }
+    }
+
+    /// Stores the objects of the samples of packet `number`.
+    pub(super) fn gather_objects(
+        &self,
+        hits: &Intersections,
+        number: usize,
+        layers: &mut SampleLayers,
+    ) {
+        let mattes = layers.layers.mattes;
+        if mattes.is_empty() {
+            return;
+        }
+        for lane in lanes_in(hits.mask) {
+            // On a liquid surface, this is a search
+            let particle = LazyCell::new(|| self.particle_at(hits, lane));
+            for kind in mattes.iter() {
+                let object = self.object(kind, hits.material[lane], || *particle);
+                layers.set_object(kind, number, lane, object);
+            }
+        }
+    }
+
+    /// The object of `kind` at an intersection with a surface of `material`, which belongs to `particle` if that has
+    /// particles.
+    fn object(&self, kind: MatteKind, material: MaterialId, particle: impl Fn() -> u32) -> u32 {
+        let object = |name: ObjectName| cryptomatte::object_of(name.as_bytes());
+        if material.is_of_particles() {
+            match kind {
+                MatteKind::Particle => {
+                    return object(ObjectName::of_particle(self.source.id(particle())));
+                }
+                MatteKind::Part => {
+                    let part = self.source.part(particle());
+                    return part.map_or(object_of_name(cryptomatte::PARTICLES), |(name, value)| {
+                        object(ObjectName::of_part(name, value))
+                    });
+                }
+                MatteKind::Material => {
+                    if let Some(index) = material.part_index() {
+                        return object(ObjectName::of_material(index));
+                    }
+                }
+            }
+        }
+        object_of_name(match material {
+            MaterialId::PARTICLES => cryptomatte::PARTICLES,
+            MaterialId::SPRAY => cryptomatte::SPRAY,
+            MaterialId::GROUND => cryptomatte::GROUND,
+            _ => {
+                return object(ObjectName::of_mesh(material.mesh_index().unwrap_or_default()));
+            }
+        })
+    }
+
+    /// The particle of the intersection in `lane`.
+    fn particle_at(&self, hits: &Intersections, lane: usize) -> u32 {
+        match (hits.material[lane], self.particles) {
+            (MaterialId::PARTICLES, Some(particles)) => particles.particle_at(&hits.get(lane)),
+            _ => hits.particle[lane],
+        }
+    }
+
+    /// Motion on the film of a point with this `velocity`, from this frame to the next, pixels; zero if it is or gets
+    /// behind the camera.
+    fn motion(&self, point: Vec3, velocity: Vec3) -> [f32; 2] {
+        let Some((next, time)) = &self.next_frame else {
+            return [0.0; 2];
+        };
+        let (from, to) = (self.camera.pixel_of(point), next.pixel_of(point + *time * velocity));
+        match (from, to) {
+            (Some(from), Some(to)) => [to[0] - from[0], from[1] - to[1]],
+            _ => [0.0; 2],
+        }
+    }
+
+    /// The data channels at the intersection of the camera ray in `lane`.
+    fn data(
+        &self,
+        rays: &RayPacket,
+        z: f32,
+        lane: usize,
+        packet: &mut PacketScratch,
+    ) -> DataSample {
+        let PacketScratch { hits, blend, .. } = packet;
+        let channels = self.settings.planes();
+        let is_particle = hits.material[lane].is_of_particles();
+        // Look up the particle only if a channel needs it
+        let needs_particle = is_particle && channels.needs_nearest_particle();
+        let particle = needs_particle.then(|| self.particle_at(hits, lane));
+        let normal = lane3(&hits.normal, lane);
+        let direction = lane3(&rays.direction, lane);
+        let albedo = |blend: &mut Vec<(u32, f32)>| match hits.material[lane] {
+            MaterialId::PARTICLES => self.particle_color(hits, lane, blend),
+            _ => self.fixed_color((rays, 0), hits, lane),
+        };
+        let point = lane3(&hits.point, lane);
+        let velocity = particle.map_or(Vec3::ZERO, |particle| self.source.velocity(particle));
+        let motion = match channels.layers.motion {
+            true => self.motion(point, velocity),
+            false => [0.0; 2],
+        };
+        DataSample {
+            z,
+            normal: if direction.dot(normal) < 0.0 { normal } else { -normal },
+            position: (self.scene.origin + point.as_dvec3()).as_vec3(),
+            velocity,
+            albedo: if channels.albedo { albedo(blend) } else { Vec3::ZERO },
+            id: particle.map_or(NO_ID, |particle| self.source.id(particle)),
+            particle,
+            motion,
+        }
+    }
+}
+
+fn object_of_name(name: &str) -> u32 {
+    cryptomatte::object_of(name.as_bytes())
+}

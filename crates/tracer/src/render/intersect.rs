@@ -1,0 +1,113 @@
+//! The intersect stage: the nearest intersections, the throughput up to them, and the background behind them.
+
+use glam::Vec3;
+
+use super::{
+    context::{Interior, RenderContext},
+    light_groups::NO_GROUP,
+    materials::{attenuate, leaving},
+    scratch::PacketScratch,
+    shading::{add_backdrop, add_background, scale},
+    stream::SegmentPacket,
+};
+use crate::scene::Background;
+use crate::surface::MaterialId;
+use spherule_tree::math::lanes_in;
+
+impl RenderContext<'_> {
+    /// Finds the nearest intersection of each ray with the shapes of the scene, ends the ray there, and computes the
+    /// throughput up to that point.
+    pub(super) fn intersect(
+        &self,
+        segments: &mut SegmentPacket,
+        depth: u32,
+        packet: &mut PacketScratch,
+    ) {
+        packet.hits.clear();
+        let (coherence, inside) = (self.coherence(depth), segments.inside);
+        for shape in &self.shapes {
+            shape.intersect(&mut segments.rays, coherence, inside, &mut packet.hits);
+        }
+        self.meet_translucent(segments, coherence, packet);
+        self.meet_spray(segments, coherence, packet);
+        self.assign_parts(packet);
+        packet.throughput = segments.throughput;
+        self.pass_panes(segments, packet);
+        self.absorb(segments, packet);
+    }
+
+    /// Replaces the material of particles by that of their part.
+    fn assign_parts(&self, packet: &mut PacketScratch) {
+        let Some(parts) = self.parts else {
+            return;
+        };
+        let hits = &mut packet.hits;
+        for lane in lanes_in(hits.lanes_of(MaterialId::PARTICLES)) {
+            hits.material[lane] = self.material_of(parts, hits.particle[lane]);
+        }
+    }
+
+    /// Multiplies the throughput by the transmittance of the medium between the origins of the rays and their
+    /// intersections.
+    fn absorb(&self, segments: &SegmentPacket, packet: &mut PacketScratch) {
+        let extinction = &self.boundary.extinction;
+        if *extinction == Vec3::ZERO {
+            return;
+        }
+        let hits = &packet.hits;
+        let lanes = match self.interior {
+            Interior::Opaque => 0,
+            // Only a ray that leaves a sphere has passed through its interior.
+            Interior::Spheres => {
+                hits.lanes_of(MaterialId::PARTICLES) & leaving(self.simd, &segments.rays, hits)
+            }
+            // A ray inside the body without an intersection has left through a crack in the surface; its length
+            // inside is unknown.
+            Interior::Body => segments.inside & hits.mask,
+        };
+        if lanes != 0 {
+            let throughput = &mut packet.throughput;
+            attenuate(self.simd, extinction, &hits.t, lanes, throughput);
+        }
+    }
+
+    /// Whether rays of `depth` without an intersection hit the background.
+    pub(super) fn sees_background(&self, depth: u32) -> bool {
+        depth > 1 || !self.settings.transparent_background
+    }
+
+    /// Adds the background for rays of `lanes` at `depth` without an intersection, and behind surfaces that are not
+    /// fully opaque.
+    pub(super) fn add_background(
+        &self,
+        segments: &SegmentPacket,
+        depth: u32,
+        lanes: u32,
+        packet: &mut PacketScratch,
+    ) {
+        let hits = &packet.hits;
+        let lanes = lanes & (!hits.mask | hits.lanes_of(MaterialId::GROUND));
+        if lanes == 0 {
+            return;
+        }
+        // Weight the background by the part of the light that the surface does not cover
+        let background_part = std::array::from_fn(|lane| match hits.mask >> lane & 1 {
+            0 => 1.0,
+            _ => 1.0 - hits.opacity[lane],
+        });
+        scale(self.simd, &packet.throughput, &background_part, &mut packet.weight);
+        let (rays, weight) = (&segments.rays, &packet.weight);
+        let is_backdrop = depth == 1
+            && matches!(self.scene.background, Background::Studio { .. })
+            && !self.scene.camera.projection().is_panorama();
+        let group = packet.groups.of_mut(NO_GROUP);
+        for radiance in [Some(&mut packet.radiance), group].into_iter().flatten() {
+            if is_backdrop {
+                add_backdrop(self.simd, &self.camera, rays, weight, lanes, radiance);
+                continue;
+            }
+            let (background, direction) = (&self.background, &rays.direction);
+            add_background(self.simd, background, direction, weight, lanes, radiance);
+        }
+    }
+}

@@ -1,0 +1,170 @@
+//! Light of one packet by its first interaction: what camera rays see is divided into classes, and direct light into
+//! what arrives and what is in shadow.
+
+#![expect(clippy::needless_range_loop, reason = "one index for the lanes of many arrays")]
+
+use glam::Vec3;
+
+use super::dimensions::{BOUNCED, REFLECTED, REFRACTED};
+use super::layers::{Layers, LightClass};
+use crate::scene::environment::LUMINANCE;
+use spherule_tree::math::{LANES, Lanes, Lanes3, lane3, lanes_in, splat};
+
+/// The light of a packet of camera rays. Inactive for all other rays, and if the film has no channels for it.
+#[derive(Default)]
+pub(super) struct LightSplit {
+    /// Whether light is divided into classes.
+    pub(super) is_active: bool,
+    /// Whether shadows are measured.
+    pub(super) has_shadow: bool,
+    /// Radiance of each class.
+    pub(super) lights: [Lanes3; LightClass::COUNT],
+    /// Radiance of all classes so far.
+    sum: Lanes3,
+    /// The diffuse part of the reflection of a direction, 0 to 1: of the last light sample, and at the end of the path.
+    pub(super) diffuse: Lanes3,
+    /// Luminance of direct light: if nothing is in the way, and what arrives.
+    pub(super) direct: [Lanes; 2],
+}
+
+impl LightSplit {
+    /// Prepares for a packet at `depth`.
+    pub(super) fn start(&mut self, layers: &Layers, depth: u32) {
+        self.is_active = depth == 1 && !layers.lights.is_empty();
+        self.has_shadow = depth == 1 && layers.shadow;
+        if self.is_active {
+            self.lights = [[splat(0.0); 3]; LightClass::COUNT];
+            self.sum = [splat(0.0); 3];
+            self.diffuse = [splat(1.0); 3];
+        }
+        if self.has_shadow {
+            self.direct = [splat(0.0); 2];
+        }
+    }
+
+    /// Counts what was added to `radiance` since the last call as light of `class`.
+    pub(super) fn take(&mut self, class: LightClass, radiance: &Lanes3) {
+        if !self.is_active {
+            return;
+        }
+        let light = &mut self.lights[class as usize];
+        for axis in 0..3 {
+            for lane in 0..LANES {
+                light[axis][lane] += radiance[axis][lane] - self.sum[axis][lane];
+            }
+        }
+        self.sum = *radiance;
+    }
+
+    /// Divides what was added to `radiance` since the last call between diffuse and specular light, by
+    /// [`Self::diffuse`].
+    pub(super) fn take_reflected(&mut self, radiance: &Lanes3) {
+        if !self.is_active {
+            return;
+        }
+        for axis in 0..3 {
+            for lane in 0..LANES {
+                let added = radiance[axis][lane] - self.sum[axis][lane];
+                let diffuse = self.diffuse[axis][lane] * added;
+                self.lights[LightClass::Diffuse as usize][axis][lane] += diffuse;
+                self.lights[LightClass::Specular as usize][axis][lane] += added - diffuse;
+            }
+        }
+        self.sum = *radiance;
+    }
+
+    /// Adds direct light: its radiance in `lanes` if nothing is in the way, and what arrives in the lanes `visible`.
+    pub(super) fn add_direct(
+        &mut self,
+        lanes: u32,
+        unoccluded: &Lanes3,
+        visible: u32,
+        arriving: &Lanes3,
+    ) {
+        if !self.has_shadow {
+            return;
+        }
+        let [whole, arrived] = &mut self.direct;
+        for lane in lanes_in(lanes) {
+            whole[lane] += lane3(unoccluded, lane).dot(LUMINANCE);
+        }
+        for lane in lanes_in(lanes & visible) {
+            arrived[lane] += lane3(arriving, lane).dot(LUMINANCE);
+        }
+    }
+
+    /// Sets the direct light in `lane`: all of it, and what is lost.
+    pub(super) fn set_lost(&mut self, lane: usize, whole: Vec3, lost: Vec3) {
+        if self.has_shadow {
+            self.direct[0][lane] = whole.dot(LUMINANCE);
+            self.direct[1][lane] = (whole - lost).dot(LUMINANCE);
+        }
+    }
+}
+
+/// `part / whole` per component, 1 where nothing is divided.
+pub(super) fn ratio(part: &Lanes3, whole: &Lanes3) -> Lanes3 {
+    let component = |axis: usize, lane: usize| match whole[axis][lane] > 0.0 {
+        true => part[axis][lane] / whole[axis][lane],
+        false => 1.0,
+    };
+    std::array::from_fn(|axis| std::array::from_fn(|lane| component(axis, lane)))
+}
+
+/// The part of the light along a path after its first interaction, by the continuation at that interaction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct FirstInteraction(u8);
+
+impl FirstInteraction {
+    /// The first interaction of a path whose ray is continuation `branch` of a ray with the first interaction `self`.
+    pub(super) fn continued(self, branch: u32) -> Self {
+        match (self.0, branch) {
+            (0, REFLECTED) => Self(1),
+            (0, REFRACTED) => Self(2),
+            (0, BOUNCED) => Self(3),
+            _ => self,
+        }
+    }
+
+    /// The class of the light; None for reflection at an opaque surface, which has two, and for camera rays.
+    pub(super) fn class(self) -> Option<LightClass> {
+        match self.0 {
+            1 => Some(LightClass::Reflection),
+            2 => Some(LightClass::Refraction),
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use spherule_tree::math::splat3;
+
+    #[test]
+    fn light_is_divided_without_loss() {
+        let mut split = LightSplit::default();
+        let mut layers = Layers::NONE;
+        layers.insert("lights").unwrap();
+        split.start(&layers, 1);
+        split.take(LightClass::Background, &splat3(Vec3::new(1.0, 2.0, 3.0)));
+        split.diffuse = splat3(Vec3::new(1.0, 0.5, 0.0));
+        split.take_reflected(&splat3(Vec3::new(2.0, 4.0, 6.0)));
+        let of = |class: LightClass| lane3(&split.lights[class as usize], 5);
+        assert_eq!(of(LightClass::Background), Vec3::new(1.0, 2.0, 3.0));
+        assert_eq!(of(LightClass::Diffuse), Vec3::new(1.0, 1.0, 0.0));
+        assert_eq!(of(LightClass::Specular), Vec3::new(0.0, 1.0, 3.0));
+        // Later rays keep the class of the first interaction
+        split.start(&layers, 2);
+        assert!(!split.is_active);
+    }
+
+    #[test]
+    fn the_first_interaction_counts() {
+        let first = FirstInteraction::default().continued(REFRACTED);
+        assert_eq!(first.class(), Some(LightClass::Refraction));
+        assert_eq!(first.continued(REFLECTED).continued(BOUNCED), first);
+        let first = FirstInteraction::default().continued(BOUNCED);
+        assert_eq!(first.continued(REFLECTED).class(), None);
+    }
+}

@@ -1,0 +1,238 @@
+//! Renders a [`Scene`] with a list of [`Shape`]s: samples every pixel and fills the planes of a [`Film`]. There is no
+//! I/O; `output` encodes films.
+//!
+//! The image is divided into tiles of 16x16 pixels, which rayon distributes over threads. A tile depends only on the
+//! coordinates of its pixels, and sums its samples in a fixed order, so the film is the same to the bit for any
+//! number of threads.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use rayon::prelude::*;
+
+use crate::{
+    scene::{Material, Scene},
+    surface::{Plane, Shape},
+};
+
+mod accumulate;
+mod aov;
+mod attributes;
+#[cfg(test)]
+pub(crate) mod brute;
+mod bsdf;
+mod context;
+pub mod cryptomatte;
+mod dimensions;
+mod film;
+mod film_rows;
+mod generate;
+mod integrator;
+mod intersect;
+pub mod layers;
+mod light_groups;
+mod light_split;
+mod lights;
+mod materials;
+mod near_photons;
+mod panes;
+mod path;
+mod ray_counts;
+mod roulette;
+mod sample_layers;
+mod sampler;
+mod scratch;
+mod settings;
+mod shading;
+mod source;
+mod specular;
+mod spray;
+mod stop;
+mod stream;
+mod tile;
+mod translucent;
+mod visibility;
+mod whitted;
+mod window;
+
+#[cfg(test)]
+mod body_tests;
+#[cfg(test)]
+mod branch_tests;
+#[cfg(test)]
+mod catcher_tests;
+#[cfg(test)]
+mod caustics_tests;
+#[cfg(test)]
+mod filter_tests;
+#[cfg(test)]
+mod floor_tests;
+#[cfg(test)]
+mod image_tests;
+#[cfg(test)]
+mod lens_tests;
+#[cfg(test)]
+mod light_groups_tests;
+#[cfg(test)]
+mod motion_tests;
+#[cfg(test)]
+mod opacity_tests;
+#[cfg(test)]
+mod panes_tests;
+#[cfg(test)]
+mod part_caustics_tests;
+#[cfg(test)]
+mod part_tests;
+#[cfg(test)]
+mod path_tests;
+#[cfg(test)]
+mod poison_tests;
+#[cfg(test)]
+mod projection_tests;
+#[cfg(test)]
+mod rods_tests;
+#[cfg(test)]
+pub(crate) mod solid;
+#[cfg(test)]
+mod spray_tests;
+#[cfg(test)]
+mod whitted_tests;
+
+pub use aov::{DataSample, NO_ID};
+pub use film::{Channels, Film, UnknownChannel};
+pub use film_rows::FilmRows;
+pub use ray_counts::RayCounts;
+pub use sampler::{FilmSampler, FilterKind, MAX_FILTER_WIDTH, MultiJitter, PathSeed, PixelFilter};
+pub use settings::{
+    DEFAULT_BOUNCES, DEFAULT_MIN_WEIGHT, DEFAULT_PHOTONS, IndirectLight, IntegratorKind,
+    MAX_BOUNCES, MAX_DEPTH, MAX_LITERAL_DEPTH, MAX_PHOTONS, MAX_SAMPLES, MAX_SIDE, MIN_WEIGHTS,
+    RenderError, RenderSettings,
+};
+pub use source::mean;
+pub use source::opacity_of;
+pub use source::{Colors, Opacities, ParticleShading, ShadeSource};
+pub use stop::{Deadline, Stop};
+pub use window::DataWindow;
+
+use context::{Interior, RenderContext};
+use integrator::Integrator;
+use path::PathIntegrator;
+use whitted::WhittedIntegrator;
+
+/// The available renderers. Images depend on the renderer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum RendererKind {
+    /// Ray tracing on the threads of the CPU.
+    #[default]
+    Cpu,
+}
+
+impl RendererKind {
+    /// The name in the settings of a job.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Cpu => "cpu",
+        }
+    }
+}
+
+/// Upper bound of the memory that each thread needs during rendering, without the film, in bytes. `is_body`: the
+/// particles form one connected body. `slices`: number of slices of the exposure in which surfaces differ.
+pub fn scratch_bytes(
+    settings: &RenderSettings,
+    material: &Material,
+    is_body: bool,
+    slices: u32,
+) -> u64 {
+    let max_paths = integrator::max_paths(settings, Interior::of(material, is_body));
+    let max_depth = integrator::max_depth(settings);
+    scratch::scratch_bytes(settings.samples, max_depth, max_paths, &settings.channels.layers)
+        + stream::bytes_of_slices(slices)
+}
+
+/// Upper bound of the memory for the light of photons and on the ground around transmissive particles, in bytes.
+pub fn floor_light_bytes(scene: &Scene, settings: &RenderSettings) -> u64 {
+    path::floor::bytes(scene, settings)
+}
+
+/// Renders one image on the current rayon pool.
+///
+/// The aspect ratio of the camera should be that of the image, `settings.width / settings.height` without a window. No
+/// light is created: `reflection` and `transmission` are at most 1, which is checked, so the background never
+/// contributes more to a ray than its brightest colour.
+///
+/// # Errors
+/// If `stop` is raised (checked for each packet of samples), or if a setting is out of range.
+pub fn render(
+    shapes: &[&dyn Shape],
+    scene: &Scene,
+    source: &dyn ShadeSource,
+    settings: &RenderSettings,
+    stop: &dyn Stop,
+) -> Result<(Film, RayCounts), RenderError> {
+    let mut film = Film::default();
+    let counts = render_into(&mut film, shapes, scene, source, settings, stop)?;
+    Ok((film, counts))
+}
+
+/// Same as [`render`], into an existing `film`. Its memory is reused if size and channels match; its content is
+/// ignored.
+///
+/// # Errors
+/// Same as [`render`]; the content of the film is unspecified then.
+pub fn render_into(
+    film: &mut Film,
+    shapes: &[&dyn Shape],
+    scene: &Scene,
+    source: &dyn ShadeSource,
+    settings: &RenderSettings,
+    stop: &dyn Stop,
+) -> Result<RayCounts, RenderError> {
+    // Check the settings
+    settings.validate()?;
+    settings.validate_light_groups(scene)?;
+    scene.material.validate()?;
+    if !shapes.iter().any(|shape| shape.is_connected()) {
+        settings.validate_branches(&scene.material)?;
+    }
+    // Prepare film, shapes and integrator
+    let RenderSettings { width, height, channels, has_features, .. } = *settings;
+    film.fit(width, height, channels, has_features);
+    let plane = scene.ground.as_ref().map(Plane::new);
+    let floor = plane.iter().map(|plane| plane as &dyn Shape);
+    let shapes = floor.chain(shapes.iter().copied()).collect();
+    let context = RenderContext::new(shapes, scene, source, settings);
+    let mut before = RayCounts::default();
+    let integrator: Box<dyn Integrator> = match settings.integrator {
+        IntegratorKind::Whitted => Box::new(WhittedIntegrator::new(context)),
+        IntegratorKind::Path => {
+            let integrator = PathIntegrator::new(context).with_photons(stop);
+            let (integrator, traced) = integrator.ok_or(RenderError::Interrupted)?;
+            before = traced;
+            Box::new(integrator)
+        }
+    };
+    let scratch = Mutex::new(Vec::new());
+    let render_tile = |tile: &mut film::FilmTile<'_>| {
+        // Reuse scratch memory: there is one per thread, and all are released at the end of the image
+        let mut own = lock(&scratch).pop().unwrap_or_default();
+        let counts = integrator.render_tile(tile, stop, &mut own);
+        lock(&scratch).push(own);
+        counts.ok_or(RenderError::Interrupted)
+    };
+    // Render bands and their tiles in parallel, so that a slow corner of the image keeps all threads busy
+    let counts = film
+        .bands_mut(tile::SIDE)
+        .into_par_iter()
+        .map(|mut band| {
+            let tiles = band.tiles(tile::SIDE).into_par_iter();
+            tiles
+                .map(|mut tile| render_tile(&mut tile))
+                .try_reduce(RayCounts::default, |a, b| Ok(a + b))
+        })
+        .try_reduce(RayCounts::default, |a, b| Ok(a + b))?;
+    Ok(before + counts)
+}
+
+fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
+}

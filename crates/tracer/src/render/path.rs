@@ -1,0 +1,609 @@
+//! Path tracing: light arrives from the environment and from light sources, directly and after any number of
+//! reflections.
+//!
+//! At each point of an opaque surface, a direction is sampled from the environment and one from the BSDF, weighted by
+//! the balance heuristic (Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997), and each light
+//! source is sampled. The path continues in the direction of the BSDF; from the third reflection on it ends at random
+//! (Russian roulette). Surfaces of transmissive particles are specular, or reflect and refract at single microfacets
+//! of a rough one: their rays split as in Whitted's model. Light is not sampled there: the environment and visible
+//! lights are found by the scattered rays alone.
+//!
+//! Shadow rays to the environment end at transmissive surfaces, because the paths of the BSDF find its light behind
+//! them. Shadow rays to light sources pass straight through: paths cannot find a light without extent. Where photons
+//! bring the light of a source through transmissive surfaces (`path/caustics.rs`), its shadow rays end there.
+
+use super::{
+    bsdf::{Bsdf, Foam, bsdfs_of, reflect_samples, surface_points},
+    context::{Interior, RenderContext},
+    dimensions::{BOUNCED, BSDF, CONTINUATION, ENVIRONMENT, LIGHTS},
+    integrator::Integrator,
+    layers::LightClass,
+    lights::{Light, environment_along, sample_environment},
+    materials::{Material, RoughInterface, materials_of},
+    roulette::SplitRule,
+    sampler::{get_1d_lanes, get_2d_lanes},
+    scratch::PacketScratch,
+    shading::{add, product, scale},
+    specular::{Escape, SpecularHits},
+    stream::{RayStreams, SegmentPacket},
+};
+use crate::scene::Environment;
+use crate::surface::MaterialId;
+use glam::Vec3;
+use spherule_tree::math::{LANES, Lanes3, lane3, lanes_in, set_lane3, splat};
+
+mod ambient;
+mod catcher;
+pub(super) mod caustics;
+mod emission;
+pub(super) mod floor;
+mod light_channels;
+
+use ambient::AmbientLight;
+use catcher::Catcher;
+use floor::{Caustics, FloorLight};
+
+/// Number of diffuse reflections from which on paths end at random.
+const ROULETTE_START: u32 = 2;
+
+/// Greatest probability with which a path continues then, so that paths between white surfaces end.
+const MAX_CONTINUATION: f32 = 0.95;
+
+/// See the module.
+pub(super) struct PathIntegrator<'a> {
+    context: RenderContext<'a>,
+    environment: Option<&'a Environment>,
+    /// Opaque surfaces, in the order of [`RenderContext::materials`].
+    bsdfs: Vec<Box<dyn Bsdf>>,
+    /// The specular surface of transmissive particles.
+    interface: Box<dyn Material>,
+    /// Replaces it if the particles are rough.
+    rough: Option<RoughInterface>,
+    split: SplitRule,
+    /// Whether rays can hit a light.
+    has_extents: bool,
+    catcher: Option<Catcher>,
+    /// The light of second surfaces, if paths end there.
+    ambient: Option<AmbientLight>,
+    /// The light on the ground, if paths end there.
+    floor: Option<FloorLight>,
+    /// The light of photons on other surfaces.
+    caustics: Caustics,
+}
+
+impl<'a> PathIntegrator<'a> {
+    pub(super) fn new(context: RenderContext<'a>) -> Self {
+        let is_connected = context.connected_particles().is_some();
+        let interface = materials_of(context.scene, is_connected).swap_remove(0);
+        let material = &context.scene.material;
+        let rough = RoughInterface::of(material, interface.constants(), is_connected);
+        let environment = context.scene.environment.as_deref();
+        let environment = environment.filter(|environment| !environment.is_black());
+        let mut bsdfs = bsdfs_of(
+            context.scene.material.finish,
+            &context.scene.meshes,
+            context.scene.parts.materials(),
+        );
+        if context.soft_spray.is_some() {
+            bsdfs[usize::from(MaterialId::SPRAY.0)] = Box::new(Foam);
+        }
+        Self {
+            ambient: AmbientLight::of(context.settings, environment),
+            environment,
+            bsdfs,
+            interface,
+            rough,
+            split: SplitRule::new(context.settings, context.interior),
+            catcher: Catcher::of(context.scene),
+            floor: None,
+            caustics: Caustics::default(),
+            has_extents: context.lights.iter().any(|light| light.has_extent()),
+            context,
+        }
+    }
+}
+
+impl Integrator for PathIntegrator<'_> {
+    fn context(&self) -> &RenderContext<'_> {
+        &self.context
+    }
+
+    fn is_stochastic(&self) -> bool {
+        true
+    }
+
+    fn shade(
+        &self,
+        segments: &SegmentPacket,
+        depth: u32,
+        packet: &mut PacketScratch,
+        next: &mut RayStreams,
+    ) {
+        // Add what rays see of lights, and infinitely far away
+        let ended = self.add_emitted(segments, packet);
+        packet.hits.mask &= !ended;
+        packet.take_light(LightClass::Emission);
+        if let Some(catcher) = self.catcher.as_ref().filter(|_| depth == 1) {
+            let lanes = packet.hits.lanes_of(MaterialId::GROUND);
+            if lanes != 0 {
+                self.catch_shadows(catcher, &self.surface(segments, depth, lanes), packet);
+            }
+        }
+        let held_out = self.context.holdout_lanes(depth, &packet.hits);
+        let lanes = segments.lanes() & !ended & !held_out;
+        self.add_escaped(segments, depth, lanes, packet);
+        packet.take_light(LightClass::Background);
+        if packet.hits.mask & !held_out == 0 {
+            return;
+        }
+        let panes = self.context.pane_lanes(&packet.hits);
+        if panes != 0 {
+            self.shade_panes(segments, depth, panes, packet, next);
+        }
+        // End paths at a ground whose light is known
+        let ground = packet.hits.lanes_of(MaterialId::GROUND);
+        let mut ended = 0;
+        if let Some(floor) = self.floor.as_ref().filter(|_| ground != 0) {
+            self.shade_floor(floor, &self.surface(segments, depth, ground), packet);
+            ended = ground;
+        }
+        // Reflect light at opaque surfaces
+        let clear = match self.context.interior {
+            Interior::Opaque => 0,
+            Interior::Spheres | Interior::Body => packet.hits.lanes_of(MaterialId::PARTICLES),
+        };
+        let max = self.context.settings.bounces;
+        let others = packet.hits.mask & !(clear | panes | held_out | ended);
+        let mut opaque = others & lanes_where(|l| segments.bounces[l] <= max);
+        if let Some(ambient) = &self.ambient {
+            let second = opaque & lanes_where(|l| segments.bounces[l] > 0);
+            if second != 0 {
+                self.shade_ambient(ambient, &self.surface(segments, depth, second), packet);
+            }
+            opaque &= !second;
+        }
+        if opaque != 0 {
+            self.shade_opaque(&self.surface(segments, depth, opaque), packet, next);
+        }
+        // Reflect and refract rays at transmissive surfaces
+        if clear != 0 {
+            self.shade_transmissive(segments, depth, clear, packet, next);
+        }
+    }
+}
+
+/// Path segments that end at opaque surfaces.
+#[derive(Clone, Copy)]
+struct Surface<'a> {
+    segments: &'a SegmentPacket,
+    depth: u32,
+    lanes: u32,
+    /// Index of each sample in its pixel.
+    sample: [u32; LANES],
+}
+
+/// What is in the way of light samples.
+#[derive(Debug, Clone, Copy)]
+enum Occlusion {
+    /// Nothing: the light casts no shadows.
+    None,
+    /// Opaque surfaces; light passes transmissive ones in a straight line.
+    Straight,
+    /// All surfaces.
+    Opaque,
+}
+
+impl Occlusion {
+    /// What is in the way of a light source, whose light no path finds behind transmissive surfaces.
+    fn of(light: &dyn Light) -> Self {
+        match light.casts_shadow() {
+            true => Self::Straight,
+            false => Self::None,
+        }
+    }
+
+    /// The same where photons bring the light that transmissive surfaces focus.
+    fn beside_photons(light: &dyn Light) -> Self {
+        match light.photon_source() {
+            Some(_) => Self::Opaque,
+            None => Self::of(light),
+        }
+    }
+}
+
+/// Bit mask of the lanes for which `holds`.
+fn lanes_where(holds: impl Fn(usize) -> bool) -> u32 {
+    (0..LANES).fold(0, |lanes, lane| lanes | u32::from(holds(lane)) << lane)
+}
+
+/// Dimension of the samples of a light source.
+#[expect(clippy::cast_possible_truncation, reason = "there are few lights")]
+const fn light_dimension(index: usize) -> u32 {
+    LIGHTS + index as u32
+}
+
+impl PathIntegrator<'_> {
+    fn surface<'s>(&self, segments: &'s SegmentPacket, depth: u32, lanes: u32) -> Surface<'s> {
+        Surface {
+            segments,
+            depth,
+            lanes,
+            sample: segments.sample.map(|s| s % self.context.settings.samples),
+        }
+    }
+
+    /// Whether rays of a BSDF sample light sources too, so that the balance heuristic weights both. Behind transmissive
+    /// surfaces, only shadow rays find light sources.
+    fn rays_hit_lights(&self) -> bool {
+        self.context.interior == Interior::Opaque
+    }
+
+    fn shade_opaque(
+        &self,
+        surface: &Surface<'_>,
+        packet: &mut PacketScratch,
+        next: &mut RayStreams,
+    ) {
+        self.prepare_surface(surface, packet);
+        self.add_environment_light(surface, packet);
+        self.add_lights(surface, packet);
+        self.bounce(surface, packet, next);
+    }
+
+    /// Computes the points of an opaque surface with their colours, and the weight of light from there.
+    fn prepare_surface(&self, surface: &Surface<'_>, packet: &mut PacketScratch) {
+        let (context, simd) = (&self.context, self.context.simd);
+        // Transmissive particles have no colour
+        context.base_colors(surface.segments, context.interior == Interior::Opaque, packet);
+        let (rays, points) = (&surface.segments.rays, &mut packet.surface);
+        surface_points(simd, rays, &packet.hits, &packet.base, points);
+        if context.soft_spray.is_some() {
+            // Light that foam scatters leaves from inside its drop, in all directions
+            for lane in lanes_in(packet.hits.lanes_of(MaterialId::SPRAY)) {
+                let inwards = -packet.hits.offset[lane] * lane3(&points.geometric, lane);
+                set_lane3(&mut points.start, lane, lane3(&packet.hits.anchor, lane) + inwards);
+            }
+        }
+        let opacity = &packet.hits.opacity;
+        scale(simd, &packet.throughput, opacity, &mut packet.weight);
+    }
+
+    /// Evaluates the BSDFs for the directions of the light samples.
+    fn eval(&self, surface: &Surface<'_>, packet: &mut PacketScratch) {
+        for (material, bsdf) in self.context.materials.iter().zip(&self.bsdfs) {
+            let lanes = surface.lanes & packet.hits.lanes_of(*material);
+            if lanes != 0 {
+                let (rays, direction) = (&surface.segments.rays, &packet.light.rays.direction);
+                let (points, values) = (&packet.surface, &mut packet.bsdf);
+                bsdf.eval(self.context.simd, rays, points, direction, lanes, values);
+            }
+        }
+    }
+
+    /// Adds the light from a direction that is sampled from the environment.
+    fn add_environment_light(&self, surface: &Surface<'_>, packet: &mut PacketScratch) {
+        // Paths inside a body only find the environment outside by refraction
+        let lanes = surface.lanes & !surface.segments.inside;
+        let Some(environment) = self.environment.filter(|_| lanes != 0) else {
+            return;
+        };
+        self.reflect_environment(environment, surface, lanes, packet);
+        let group = self.context.environment_group();
+        self.add_direct(Occlusion::Opaque, group, surface, packet);
+    }
+
+    /// Adds the light of the light samples, which are of a light `group`, also to the channels for light and shadow.
+    fn add_direct(
+        &self,
+        occlusion: Occlusion,
+        group: usize,
+        surface: &Surface<'_>,
+        packet: &mut PacketScratch,
+    ) {
+        if packet.light.lanes == 0 {
+            return;
+        }
+        self.scale_inside(surface, packet);
+        self.divide_samples(surface, packet);
+        let unoccluded = packet.unoccluded();
+        let visible = self.add_visible(occlusion, group, surface, packet);
+        let PacketScratch { split, light, radiance, .. } = packet;
+        split.take_reflected(radiance);
+        if let Some((lanes, unoccluded)) = unoccluded {
+            split.add_direct(lanes, &unoccluded, visible, &light.radiance);
+        }
+    }
+
+    /// Divides light that has entered a body straight by the square of its index. Radiance rises by this factor where
+    /// light enters the body and falls by it where light leaves, and paths leave out both. Light that enters straight
+    /// has not risen: its irradiance behind a flat interface is that in front of it.
+    fn scale_inside(&self, surface: &Surface<'_>, packet: &mut PacketScratch) {
+        let ior = self.context.scene.material.ior;
+        for lane in lanes_in(surface.segments.inside & packet.light.lanes) {
+            let leaving = lane3(&packet.light.radiance, lane) / (ior * ior);
+            set_lane3(&mut packet.light.radiance, lane, leaving);
+        }
+    }
+
+    /// Traces the shadow rays of the light samples, and adds the light that arrives. Returns the lanes that it reaches.
+    fn add_visible(
+        &self,
+        occlusion: Occlusion,
+        group: usize,
+        surface: &Surface<'_>,
+        packet: &mut PacketScratch,
+    ) -> u32 {
+        let visible = self.trace_samples(occlusion, surface, packet);
+        let PacketScratch { light: samples, radiance, groups, .. } = packet;
+        let simd = self.context.simd;
+        add(simd, &samples.radiance, &Vec3::ONE, visible, radiance);
+        groups.add(simd, group, &samples.radiance, visible);
+        visible
+    }
+
+    /// Traces the shadow rays of the light samples, and multiplies their radiance by the transmittance. Returns the
+    /// lanes in which the light arrives.
+    fn trace_samples(
+        &self,
+        occlusion: Occlusion,
+        surface: &Surface<'_>,
+        packet: &mut PacketScratch,
+    ) -> u32 {
+        let (context, segments, depth) = (&self.context, surface.segments, surface.depth);
+        let PacketScratch { light: samples, crossings, counts, .. } = packet;
+        match occlusion {
+            Occlusion::None => samples.lanes,
+            Occlusion::Straight => {
+                context.trace_shadow_rays(segments, depth, samples, crossings, counts)
+            }
+            Occlusion::Opaque => context.unoccluded(segments, depth, samples, counts),
+        }
+    }
+
+    /// Samples a direction from the environment, and the light from there that `lanes` reflect: `packet.light`.
+    fn reflect_environment(
+        &self,
+        environment: &Environment,
+        surface: &Surface<'_>,
+        lanes: u32,
+        packet: &mut PacketScratch,
+    ) {
+        // Sample a direction, and evaluate the BSDF for it
+        let (simd, path) = (self.context.simd, &surface.segments.path);
+        let mut u = [splat(0.0); 2];
+        get_2d_lanes(simd, path, ENVIRONMENT, &surface.sample, &mut u);
+        let start = &packet.surface.start;
+        sample_environment(simd, environment, start, &u, &mut packet.light);
+        self.eval(surface, packet);
+        let (values, weight) = (&packet.bsdf, &packet.weight);
+        reflect_samples(simd, values, weight, true, lanes, &mut packet.light);
+    }
+
+    /// Adds the light of each light source, and of photons.
+    fn add_lights(&self, surface: &Surface<'_>, packet: &mut PacketScratch) {
+        let with_photons = surface.lanes & self.photon_lanes(&packet.hits);
+        for (index, light) in self.context.lights.iter().enumerate() {
+            let competes = light.has_extent() && self.rays_hit_lights();
+            let group = self.context.light_group(index);
+            let opaque = match light.photon_source() {
+                Some(_) => with_photons,
+                None => 0,
+            };
+            for (lanes, occlusion) in
+                [(surface.lanes & !opaque, Occlusion::of(&**light)), (opaque, Occlusion::Opaque)]
+            {
+                if lanes != 0 {
+                    let surface = &Surface { lanes, ..*surface };
+                    self.reflect_light(index, competes, surface, packet);
+                    self.add_direct(occlusion, group, surface, packet);
+                }
+            }
+        }
+        if with_photons != 0 {
+            self.add_caustics(with_photons, surface, packet);
+        }
+    }
+
+    /// Samples a light source, and the light from there that the surface reflects: `packet.light`. `competes`: rays
+    /// of the BSDF find the light, too.
+    fn reflect_light(
+        &self,
+        index: usize,
+        competes: bool,
+        surface: &Surface<'_>,
+        packet: &mut PacketScratch,
+    ) {
+        let (simd, light) = (self.context.simd, &self.context.lights[index]);
+        let mut u = [splat(0.0); 2];
+        if light.has_extent() {
+            let path = &surface.segments.path;
+            let (dimension, sample) = (light_dimension(index), &surface.sample);
+            get_2d_lanes(simd, path, dimension, sample, &mut u);
+        }
+        light.sample_li(simd, &packet.surface.start, &u, &mut packet.light);
+        self.eval(surface, packet);
+        let (values, weight, lanes) = (&packet.bsdf, &packet.weight, surface.lanes);
+        reflect_samples(simd, values, weight, competes, lanes, &mut packet.light);
+    }
+
+    /// Continues the paths in directions that are sampled from the BSDFs.
+    fn bounce(&self, surface: &Surface<'_>, packet: &mut PacketScratch, next: &mut RayStreams) {
+        let segments = surface.segments;
+        let lanes = self.sample_bsdf(surface, packet);
+        if packet.split.is_active {
+            let direction = packet.points.reflected.direction;
+            self.divide(surface, &direction, packet);
+        }
+        let rays = &mut packet.points.reflected;
+        // The last segment of a path may be a shadow ray to the environment
+        let max = self.context.settings.bounces;
+        let is_last = |l: usize| segments.bounces[l] == max;
+        let last = match self.context.interior {
+            Interior::Opaque if !self.has_extents => lanes & lanes_where(is_last),
+            // It may hit a light, or pass through transmissive surfaces
+            _ => 0,
+        };
+        let deeper = self.roulette(surface, lanes & !last, &mut rays.throughput);
+        next.reflected.push(deeper, rays, segments, segments.inside, BOUNCED);
+        // Infinite densities mark specular rays
+        if last != 0 {
+            self.add_last(surface, last, packet);
+            packet.split.take_reflected(&packet.radiance);
+        }
+        packet.points.reflected.pdf = splat(f32::INFINITY);
+    }
+
+    /// Samples directions from the BSDFs: `packet.points.reflected`. Returns the lanes that have one.
+    fn sample_bsdf(&self, surface: &Surface<'_>, packet: &mut PacketScratch) -> u32 {
+        let (segments, simd) = (surface.segments, self.context.simd);
+        let mut u = [splat(0.0); 2];
+        get_2d_lanes(simd, &segments.path, BSDF, &surface.sample, &mut u);
+        for (material, bsdf) in self.context.materials.iter().zip(&self.bsdfs) {
+            let lanes = surface.lanes & packet.hits.lanes_of(*material);
+            if lanes != 0 {
+                let (points, samples) = (&packet.surface, &mut packet.bounce);
+                bsdf.sample(simd, &segments.rays, points, &u, lanes, samples);
+            }
+        }
+        let PacketScratch { bounce, points, weight, surface: at, .. } = &mut *packet;
+        let rays = &mut points.reflected;
+        rays.origin = at.start;
+        rays.direction = bounce.direction;
+        rays.pdf = bounce.pdf;
+        product(simd, weight, &bounce.weight, &mut rays.throughput);
+        let throughput = &rays.throughput;
+        let has_weight = |l| bounce.pdf[l] > 0.0 && lane3(throughput, l).max_element() > 0.0;
+        surface.lanes & lanes_where(has_weight)
+    }
+
+    /// Adds the light of the environment along the last segments of paths, which are `lanes` of the reflected rays.
+    fn add_last(&self, surface: &Surface<'_>, lanes: u32, packet: &mut PacketScratch) {
+        if let Some(environment) = self.environment {
+            self.aim_at_environment(environment, lanes, packet);
+            if packet.light.lanes != 0 {
+                let group = self.context.environment_group();
+                self.add_visible(Occlusion::Opaque, group, surface, packet);
+            }
+        }
+    }
+
+    /// Prepares the light of the environment along `lanes` of the reflected rays: `packet.light`.
+    fn aim_at_environment(
+        &self,
+        environment: &Environment,
+        lanes: u32,
+        packet: &mut PacketScratch,
+    ) {
+        let (rays, samples) = (&packet.points.reflected, &mut packet.light);
+        samples.rays.origin = rays.origin;
+        samples.rays.direction = rays.direction;
+        samples.rays.t_min = splat(0.0);
+        let (direction, throughput) = (&rays.direction, &rays.throughput);
+        let radiance = &mut samples.radiance;
+        let simd = self.context.simd;
+        environment_along(simd, environment, direction, &rays.pdf, throughput, radiance);
+        let is_bright = |l| lane3(&samples.radiance, l).max_element() > 0.0;
+        samples.lanes = lanes & lanes_where(is_bright);
+        let is_traced = |l: usize| samples.lanes >> l & 1 == 1;
+        samples.rays.t_max =
+            std::array::from_fn(|l| if is_traced(l) { f32::INFINITY } else { -1.0 });
+    }
+
+    /// Ends some of the long paths in `lanes` at random, and compensates the throughput of the others. Returns the
+    /// lanes of paths that continue.
+    fn roulette(&self, surface: &Surface<'_>, lanes: u32, throughput: &mut Lanes3) -> u32 {
+        let segments = surface.segments;
+        let long = lanes & lanes_where(|l| segments.bounces[l] >= ROULETTE_START);
+        if long == 0 {
+            return lanes;
+        }
+        let mut u = splat(0.0);
+        let simd = self.context.simd;
+        get_1d_lanes(simd, &segments.path, CONTINUATION, &surface.sample, &mut u);
+        let mut ended = 0;
+        for lane in lanes_in(long) {
+            let along = lane3(throughput, lane);
+            let chance = along.max_element().min(MAX_CONTINUATION);
+            if u[lane] < chance {
+                set_lane3(throughput, lane, along / chance);
+            } else {
+                ended |= 1 << lane;
+            }
+        }
+        lanes & !ended
+    }
+
+    /// Reflects the rays of `lanes` at panes.
+    fn shade_panes(
+        &self,
+        segments: &SegmentPacket,
+        depth: u32,
+        lanes: u32,
+        packet: &mut PacketScratch,
+        next: &mut RayStreams,
+    ) {
+        let last = lanes & self.last_specular(segments, depth);
+        (self.context).reflect_at_panes(segments, lanes, last, packet, next);
+        if last != 0 {
+            let PacketScratch { points, radiance, groups, .. } = &mut *packet;
+            let rays = &points.reflected;
+            let group = groups.of_mut(self.context.environment_group());
+            for sum in [Some(radiance), group].into_iter().flatten() {
+                self.add_seen(&rays.direction, &rays.throughput, last, sum);
+            }
+            packet.take_light(LightClass::Reflection);
+        }
+    }
+
+    /// Reflects and refracts the rays of `lanes` at transmissive particles.
+    fn shade_transmissive(
+        &self,
+        segments: &SegmentPacket,
+        depth: u32,
+        lanes: u32,
+        packet: &mut PacketScratch,
+        next: &mut RayStreams,
+    ) {
+        let context = &self.context;
+        let (rays, hits, inside) = (&segments.rays, &packet.hits, segments.inside);
+        let interface = &self.interface;
+        let (simd, points) = (context.simd, &mut packet.points);
+        match &self.rough {
+            None => interface.shading_points(simd, rays, hits, inside, points),
+            Some(rough) => {
+                let sample = segments.sample.map(|s| s % context.settings.samples);
+                let mut u = [splat(0.0); 2];
+                get_2d_lanes(simd, &segments.path, BSDF, &sample, &mut u);
+                rough.sample_rays(simd, rays, hits, inside, &u, points);
+            }
+        }
+        let hits = SpecularHits {
+            segments,
+            depth,
+            lanes,
+            last: lanes & self.last_specular(segments, depth),
+        };
+        let constants = interface.constants();
+        let escape = Escape {
+            add: &|along, weight, lanes, sum| self.add_seen(along, weight, lanes, sum),
+            group: context.environment_group(),
+        };
+        context.scatter(constants, &self.split, hits, packet, next, escape);
+    }
+
+    /// The lanes of rays that are not traced further at a specular surface: they see the environment.
+    fn last_specular(&self, segments: &SegmentPacket, depth: u32) -> u32 {
+        let max = self.context.settings.max_depth;
+        lanes_where(|l| depth >= max + segments.bounces[l])
+    }
+
+    /// Adds what specular rays in a direction with a throughput see of the environment, only for `lanes`.
+    fn add_seen(&self, along: &Lanes3, throughput: &Lanes3, lanes: u32, radiance: &mut Lanes3) {
+        if let Some(environment) = self.environment {
+            let simd = self.context.simd;
+            let (specular, mut seen) = (splat(f32::INFINITY), [splat(0.0); 3]);
+            environment_along(simd, environment, along, &specular, throughput, &mut seen);
+            add(simd, &seen, &Vec3::ONE, lanes, radiance);
+        }
+    }
+}

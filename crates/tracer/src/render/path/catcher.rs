@@ -1,0 +1,192 @@
+//! The shadow catcher: camera rays see nothing of the ground but shadows. The background behind it is multiplied by
+//! 1 minus the lost fraction of the light. Only occluded samples are lost, and the whole light of the environment is
+//! known: where nothing is in the way, the background is exact, without noise. In transparent images, the lost fraction
+//! is coverage by black.
+//!
+//! The fraction from a single sample may exceed 1, but not its mean; `accumulate` bounds pixels. Transmissive particles
+//! attenuate light in a straight line. The light of sources that emit photons ends at them instead, and caustics are a
+//! negative loss: they brighten the background, but add no coverage to transparent images. Light that opaque particles
+//! reflect to the ground is left out. All other rays see a matte ground.
+
+use std::f32::consts::FRAC_1_PI;
+
+use glam::Vec3;
+
+use super::{Occlusion, PathIntegrator, Surface, lanes_where};
+use crate::render::{
+    bsdf::surface_points, dimensions::ENVIRONMENT, lights::sample_directions,
+    sampler::get_2d_lanes, scratch::PacketScratch,
+};
+use crate::scene::environment::LUMINANCE;
+use crate::scene::{Environment, Scene};
+use spherule_tree::math::{Lanes3, lane3, lanes_in, set_lane3, splat, splat3};
+use spherule_tree::ray::RayPacket;
+
+/// A shadow catcher and its light.
+#[derive(Debug, Clone)]
+pub(super) struct Catcher {
+    /// Strength of the shadows, 0 to 1.
+    strength: f32,
+    /// The environment times the cosine with the ground: sampling it needs no BSDF, and a sample that is blocked loses
+    /// about the same light whatever its direction.
+    environment: Option<Environment>,
+    /// Radiance that a white ground reflects of the environment if nothing is in the way.
+    whole: Vec3,
+}
+
+impl Catcher {
+    /// The shadow catcher of `scene`, if there is one.
+    pub(super) fn of(scene: &Scene) -> Option<Self> {
+        let ground = scene.ground.as_ref()?;
+        let strength = ground.shadow_catcher?;
+        let environment = scene.environment.as_deref().filter(|e| !e.is_black());
+        let environment = environment.map(|e| e.times_cosine(ground.up));
+        let irradiance = environment.as_ref().map_or(Vec3::ZERO, Environment::flux);
+        Some(Self { strength, environment, whole: irradiance * FRAC_1_PI })
+    }
+}
+
+/// Radiance that a white ground reflects.
+struct CaughtLight {
+    /// If nothing is in the way.
+    whole: Lanes3,
+    /// The part of it that something takes away.
+    lost: Lanes3,
+}
+
+impl PathIntegrator<'_> {
+    /// Darkens the throughput of the rays of `surface`, which hit a shadow catcher, and lets them pass.
+    pub(super) fn catch_shadows(
+        &self,
+        catcher: &Catcher,
+        surface: &Surface<'_>,
+        packet: &mut PacketScratch,
+    ) {
+        // Reflect light as a white surface, and add up what does not arrive
+        (packet.base, packet.weight) = (splat3(Vec3::ONE), splat3(Vec3::ONE));
+        let (simd, rays) = (self.context.simd, &surface.segments.rays);
+        let points = &mut packet.surface;
+        surface_points(simd, rays, &packet.hits, &packet.base, points);
+        let mut light = CaughtLight { whole: splat3(catcher.whole), lost: [splat(0.0); 3] };
+        if let Some(environment) = &catcher.environment {
+            self.lose_environment(environment, surface, packet, &mut light);
+        }
+        self.lose_lights(surface, packet, &mut light);
+        if let Some(caustics) = &self.caustics.catcher {
+            for lane in lanes_in(surface.lanes) {
+                let caustics = caustics.white(lane3(&packet.hits.point, lane));
+                let lost = lane3(&light.lost, lane) - caustics;
+                set_lane3(&mut light.lost, lane, lost);
+            }
+        }
+        // Darken the background by the lost fraction
+        let is_transparent = self.context.settings.transparent_background;
+        for lane in lanes_in(surface.lanes) {
+            let (whole, lost) = (lane3(&light.whole, lane), lane3(&light.lost, lane));
+            let fraction = Vec3::select(whole.cmpgt(Vec3::ZERO), lost / whole, Vec3::ZERO);
+            packet.split.set_lost(lane, whole, lost);
+            let shadow = catcher.strength * packet.hits.opacity[lane] * fraction;
+            let throughput = lane3(&packet.throughput, lane) * (Vec3::ONE - shadow);
+            set_lane3(&mut packet.throughput, lane, throughput);
+            if is_transparent {
+                packet.coverage[lane] = shadow.dot(LUMINANCE);
+            }
+        }
+        packet.hits.mask &= !surface.lanes;
+    }
+
+    /// Adds the lost light of the `environment` of a catcher.
+    fn lose_environment(
+        &self,
+        environment: &Environment,
+        surface: &Surface<'_>,
+        packet: &mut PacketScratch,
+        light: &mut CaughtLight,
+    ) {
+        // Sample directions
+        let (simd, path) = (self.context.simd, &surface.segments.path);
+        let mut u = [splat(0.0); 2];
+        get_2d_lanes(simd, path, ENVIRONMENT, &surface.sample, &mut u);
+        let PacketScratch { light: samples, crossings, counts, surface: points, .. } = packet;
+        sample_directions(simd, environment, &u, &mut samples.rays.direction);
+        // Find out whether something is in their way
+        let direction = |rays: &RayPacket, l: usize| lane3(&rays.direction, l);
+        let is_above = |l| direction(&samples.rays, l).dot(lane3(&points.normal, l)) > 0.0;
+        let lanes = surface.lanes & lanes_where(is_above);
+        let is_traced = |l: usize| lanes >> l & 1 == 1;
+        samples.lanes = lanes;
+        samples.radiance = splat3(Vec3::ONE);
+        samples.rays.origin = points.start;
+        samples.rays.t_min = splat(0.0);
+        samples.rays.t_max =
+            std::array::from_fn(|l| if is_traced(l) { f32::INFINITY } else { -1.0 });
+        if lanes == 0 {
+            return;
+        }
+        let (context, segments, depth) = (&self.context, surface.segments, surface.depth);
+        let visible = context.trace_shadow_rays(segments, depth, samples, crossings, counts);
+        let transmittance = |l: usize| match visible >> l & 1 {
+            0 => Vec3::ZERO,
+            _ => lane3(&samples.radiance, l),
+        };
+        let blocked = lanes & lanes_where(|l| transmittance(l) != Vec3::ONE);
+        if blocked == 0 {
+            return;
+        }
+        // Add their light
+        for lane in lanes_in(blocked) {
+            let (arriving, pdf) = environment.radiance_and_pdf(direction(&samples.rays, lane));
+            let lost = (Vec3::ONE - transmittance(lane)) * arriving * (FRAC_1_PI / pdf);
+            let sum = lane3(&light.lost, lane) + lost;
+            set_lane3(&mut light.lost, lane, sum);
+        }
+    }
+
+    /// Adds the light of all light sources and its lost part.
+    fn lose_lights(
+        &self,
+        surface: &Surface<'_>,
+        packet: &mut PacketScratch,
+        light: &mut CaughtLight,
+    ) {
+        for index in 0..self.context.lights.len() {
+            self.reflect_light(index, false, surface, packet);
+            for lane in lanes_in(packet.light.lanes) {
+                let sum = lane3(&light.whole, lane) + lane3(&packet.light.radiance, lane);
+                set_lane3(&mut light.whole, lane, sum);
+            }
+            let source = &self.context.lights[index];
+            let occlusion = match self.caustics.catcher {
+                Some(_) => Occlusion::beside_photons(&**source),
+                None => Occlusion::of(&**source),
+            };
+            if !matches!(occlusion, Occlusion::None) {
+                self.add_lost(occlusion, surface, packet, light);
+            }
+        }
+    }
+
+    /// Traces the shadow rays of `packet.light`, and adds what does not arrive.
+    fn add_lost(
+        &self,
+        occlusion: Occlusion,
+        surface: &Surface<'_>,
+        packet: &mut PacketScratch,
+        light: &mut CaughtLight,
+    ) {
+        let (lanes, unoccluded) = (packet.light.lanes, packet.light.radiance);
+        if lanes == 0 {
+            return;
+        }
+        let visible = self.trace_samples(occlusion, surface, packet);
+        for lane in lanes_in(lanes) {
+            let arriving = match visible >> lane & 1 {
+                0 => Vec3::ZERO,
+                _ => lane3(&packet.light.radiance, lane),
+            };
+            let lost = lane3(&unoccluded, lane) - arriving;
+            let sum = lane3(&light.lost, lane) + lost;
+            set_lane3(&mut light.lost, lane, sum);
+        }
+    }
+}

@@ -1,0 +1,194 @@
+//! What the samples of a group contribute to the layers of a film, and their accumulation to pixels.
+
+use std::ops::Range;
+
+use super::cryptomatte::rank;
+use super::layers::{Layers, LightClass, MatteKind};
+use super::light_groups::GroupLight;
+use super::light_split::LightSplit;
+use super::stream::SegmentPacket;
+use glam::Vec3;
+use spherule_tree::math::{LANES, Lanes, Lanes3, lane3, lanes_in, splat};
+
+/// Contributions of samples to layers, packet by packet. Vectors of layers that the film does not have are empty.
+#[derive(Default)]
+pub(super) struct SampleLayers {
+    pub(super) layers: Layers,
+    /// The light group of the background.
+    pub(super) background_group: usize,
+    /// The object of each sample, of each kind; 0 for none.
+    objects: [Vec<[u32; LANES]>; MatteKind::ALL.len()],
+    /// Radiance of each sample by class.
+    lights: Vec<[Lanes3; LightClass::COUNT]>,
+    /// Radiance of each sample by light group: all groups of a packet, then those of the next.
+    groups: Vec<Lanes3>,
+    /// The diffuse part of the reflection at the first surface.
+    diffuse: Vec<Lanes3>,
+    /// Luminance of direct light: if nothing is in the way, and what arrives.
+    direct: Vec<[Lanes; 2]>,
+    /// Objects and coverage of the samples of a pixel.
+    covered: Vec<(u32, f32)>,
+}
+
+impl SampleLayers {
+    pub(super) fn is_empty(&self) -> bool {
+        self.layers.is_empty()
+    }
+
+    /// Removes all samples.
+    pub(super) fn clear(&mut self) {
+        self.objects.iter_mut().for_each(Vec::clear);
+        self.lights.clear();
+        self.groups.clear();
+        self.diffuse.clear();
+        self.direct.clear();
+    }
+
+    /// Adds a packet of samples.
+    pub(super) fn push_packet(&mut self) {
+        for kind in self.layers.mattes.iter() {
+            self.objects[kind as usize].push([0; LANES]);
+        }
+        if !self.layers.lights.is_empty() {
+            self.lights.push([[splat(0.0); 3]; LightClass::COUNT]);
+            self.diffuse.push([splat(0.0); 3]);
+        }
+        let groups = self.groups.len() + usize::from(self.layers.light_groups);
+        self.groups.resize(groups, [splat(0.0); 3]);
+        if self.layers.shadow {
+            self.direct.push([splat(0.0); 2]);
+        }
+    }
+
+    /// Memory for `samples`, bytes.
+    pub(super) fn bytes(layers: &Layers, samples: usize) -> usize {
+        let objects = layers.mattes.iter().count() * size_of::<[u32; LANES]>();
+        let lights = match layers.lights.is_empty() {
+            true => 0,
+            false => (LightClass::COUNT + 1) * size_of::<Lanes3>(),
+        };
+        let groups = usize::from(layers.light_groups) * size_of::<Lanes3>();
+        let direct = if layers.shadow { size_of::<[Lanes; 2]>() } else { 0 };
+        // Vectors grow by doubling
+        2 * samples.div_ceil(LANES) * (objects + lights + groups + direct)
+    }
+
+    /// Stores the light that camera rays of packet `number` see.
+    pub(super) fn store(&mut self, number: usize, split: &LightSplit, groups: &GroupLight) {
+        let all = groups.all();
+        self.groups[number * all.len()..(number + 1) * all.len()].copy_from_slice(all);
+        if split.is_active {
+            self.lights[number] = split.lights;
+            self.diffuse[number] = split.diffuse;
+        }
+        if split.has_shadow {
+            self.direct[number] = split.direct;
+        }
+    }
+
+    /// Adds the radiance along the rays of `segments`, which are not camera rays, to the classes of their samples.
+    pub(super) fn add(&mut self, segments: &SegmentPacket, radiance: &Lanes3) {
+        if self.layers.lights.is_empty() {
+            return;
+        }
+        for lane in lanes_in(segments.lanes()) {
+            let sample = segments.sample[lane] as usize;
+            let (packet, to) = (sample / LANES, sample % LANES);
+            let lights = &mut self.lights[packet];
+            for axis in 0..3 {
+                let added = radiance[axis][lane];
+                if let Some(class) = segments.first[lane].class() {
+                    lights[class as usize][axis][to] += added;
+                    continue;
+                }
+                let diffuse = self.diffuse[packet][axis][to] * added;
+                lights[LightClass::Diffuse as usize][axis][to] += diffuse;
+                lights[LightClass::Specular as usize][axis][to] += added - diffuse;
+            }
+        }
+    }
+
+    /// Adds the light of `groups` along the rays of `segments`, which are not camera rays, to the groups of their
+    /// samples.
+    pub(super) fn add_groups(&mut self, segments: &SegmentPacket, groups: &GroupLight) {
+        let count = groups.all().len();
+        for (group, radiance) in groups.all().iter().enumerate() {
+            for lane in lanes_in(segments.lanes()) {
+                let sample = segments.sample[lane] as usize;
+                let sum = &mut self.groups[sample / LANES * count + group];
+                for (sum, radiance) in sum.iter_mut().zip(radiance) {
+                    sum[sample % LANES] += radiance[lane];
+                }
+            }
+        }
+    }
+
+    /// The light of `group` at a sample, linear RGB.
+    pub(super) fn light_of_group(&self, group: usize, sample: usize) -> Vec3 {
+        let count = usize::from(self.layers.light_groups);
+        lane3(&self.groups[sample / LANES * count + group], sample % LANES)
+    }
+
+    /// Stores the object of `kind` of the sample in `lane` of `packet`.
+    pub(super) fn set_object(&mut self, kind: MatteKind, packet: usize, lane: usize, object: u32) {
+        self.objects[kind as usize][packet][lane] = object;
+    }
+
+    /// Stores the layers of the pixel with the samples in `range`, except for the data of its nearest sample. The
+    /// `mean` of the samples has been limited to `color`. `coverage`: that of all samples.
+    pub(super) fn accumulate(
+        &mut self,
+        range: Range<usize>,
+        coverage: &[Lanes],
+        (mean, color): ([f32; 4], [f32; 4]),
+        floats: &mut [f32],
+    ) {
+        let layers = self.layers;
+        let share = 1.0 / range.len() as f32;
+        if layers.noisy {
+            floats[layers.noisy_at()].copy_from_slice(&color[..3]);
+        }
+        for class in layers.lights.iter() {
+            let light = &mut floats[layers.light_at(class).unwrap_or_default()];
+            for (axis, light) in light.iter_mut().enumerate() {
+                let sample = |s: usize| self.lights[s / LANES][class as usize][axis][s % LANES];
+                let sum: f32 = range.clone().map(sample).sum();
+                // Shadows on the background may be darker than it is, until their mean is limited
+                let limited = match class {
+                    LightClass::Background => color[axis] - mean[axis],
+                    _ => 0.0,
+                };
+                *light = sum * share + limited;
+            }
+        }
+        for group in 0..usize::from(layers.light_groups) {
+            let samples = range.clone().map(|s| self.light_of_group(group, s));
+            let limited = match group == self.background_group {
+                true => Vec3::from_slice(&color) - Vec3::from_slice(&mean),
+                false => Vec3::ZERO,
+            };
+            let light = samples.sum::<Vec3>() * share + limited;
+            floats[layers.light_group_at(group)].copy_from_slice(&light.to_array());
+        }
+        if layers.shadow {
+            let sum = |part: usize| -> f32 {
+                let sample = |s: usize| self.direct[s / LANES][part][s % LANES];
+                range.clone().map(sample).sum()
+            };
+            let (whole, arriving) = (sum(0), sum(1));
+            let lit = if whole > 0.0 { arriving / whole } else { 1.0 };
+            floats[layers.shadow_at()].fill(lit.clamp(0.0, 1.0));
+        }
+        for kind in layers.mattes.iter() {
+            let Some(at) = layers.matte_at(kind) else {
+                continue;
+            };
+            let objects = &self.objects[kind as usize];
+            let sample = |s: usize| (objects[s / LANES][s % LANES], coverage[s / LANES][s % LANES]);
+            self.covered.clear();
+            let samples = range.clone().map(sample);
+            self.covered.extend(samples.filter(|(object, _)| *object != 0));
+            rank(&mut self.covered, share, &mut floats[at]);
+        }
+    }
+}

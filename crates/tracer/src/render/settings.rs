@@ -1,0 +1,263 @@
+//! Settings of an image, their valid ranges, and the errors for values out of range.
+
+use thiserror::Error;
+
+use super::film::Channels;
+use super::sampler::{MAX_FILTER_WIDTH, PixelFilter};
+use super::window::DataWindow;
+use crate::scene::{Material, MaterialError, Scene};
+
+/// Maximum number of samples per pixel: more than any picture needs, and few enough for counts in f32.
+pub const MAX_SAMPLES: u32 = 4096;
+
+/// Maximum recursion depth.
+pub const MAX_DEPTH: u32 = 64;
+
+/// Maximum recursion depth if both branches are always traced at transmissive spheres: the number of rays doubles at
+/// each level.
+pub const MAX_LITERAL_DEPTH: u32 = 8;
+
+/// Default path weight below which one of two branches is chosen at random.
+pub const DEFAULT_MIN_WEIGHT: f32 = 1.0 / 1024.0;
+
+/// Valid path weights apart from 0. A sample has at most `1 / min_weight` paths.
+pub const MIN_WEIGHTS: std::ops::RangeInclusive<f32> = 1e-5..=1.0;
+
+/// Maximum number of diffuse reflections of a path.
+pub const MAX_BOUNCES: u32 = 1000;
+
+/// Default number of diffuse reflections of a path. Russian roulette ends most paths earlier.
+pub const DEFAULT_BOUNCES: u32 = 6;
+
+/// Maximum number of photons.
+pub const MAX_PHOTONS: u32 = 1_000_000_000;
+
+/// Default number of photons.
+pub const DEFAULT_PHOTONS: u32 = 500_000;
+
+/// Longest side of an image in pixels.
+pub const MAX_SIDE: u32 = 65_536;
+
+/// Methods to compute the radiance along rays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum IntegratorKind {
+    /// Whitted ray tracing: ambient light, lights without extent, and specular rays.
+    #[default]
+    Whitted,
+    /// Path tracing: light of the environment, and light that diffuse surfaces reflect.
+    Path,
+}
+
+/// Light that surfaces receive from other surfaces, in path tracing.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum IndirectLight {
+    /// Paths follow it.
+    #[default]
+    Traced,
+    /// Paths end at the second opaque surface, with an estimate of its light.
+    Ambient {
+        /// Radius of a particle, scene units.
+        radius: f32,
+    },
+}
+
+/// Settings of an image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RenderSettings {
+    /// Width of the film in pixels.
+    pub width: u32,
+    /// Height of the film in pixels.
+    pub height: u32,
+    /// Samples per pixel; a single one is exactly at the centre of the pixel.
+    pub samples: u32,
+    /// How the samples are distributed around the centre of the pixel.
+    pub filter: PixelFilter,
+    /// The light transport.
+    pub integrator: IntegratorKind,
+    /// Path tracing: maximum number of diffuse reflections before the last one; 0 is direct light only.
+    pub bounces: u32,
+    /// Path tracing: light from other surfaces.
+    pub indirect: IndirectLight,
+    /// Path tracing: number of photons for caustics on the ground; 0 follows paths from the ground instead.
+    pub photons: u32,
+    /// Maximum depth: 1 is direct light only; each further level adds one level of reflections and refractions. Rays
+    /// beyond the last level see the background.
+    pub max_depth: u32,
+    /// At a transmissive sphere, both the reflected and the refracted branch are traced while each has at least this
+    /// path weight (the product of the weights along its path). Below it, one of the two is chosen at random, with
+    /// the weight of both. 0 always traces both: equation 4.1 taken literally, up to [`MAX_LITERAL_DEPTH`]. Surfaces
+    /// of a connected body have a separate rule.
+    pub min_weight: f32,
+    /// Removes the background from the colour of pixels and fades the ground out in `A`. By default `RGB` contains
+    /// the background where `A` is 0.
+    pub transparent_background: bool,
+    /// Planes to fill.
+    pub channels: Channels,
+    /// Also fills the planes that [denoising](crate::denoise) needs.
+    pub has_features: bool,
+    /// The part of the image that the film is; by default the whole image.
+    pub window: Option<DataWindow>,
+    /// If given, the film is a mosaic: its tiles of 16x16 pixels are tiles of a film with this width and height, evenly
+    /// distributed over it. The cost per pixel of a mosaic is an estimate for the whole film.
+    pub mosaic_of: Option<[u32; 2]>,
+}
+
+impl RenderSettings {
+    /// Whitted ray tracing with depth 3 as in the thesis, one sample per pixel, colour only.
+    pub const fn new(width: u32, height: u32) -> Self {
+        Self {
+            width,
+            height,
+            samples: 1,
+            filter: PixelFilter::BOX,
+            integrator: IntegratorKind::Whitted,
+            bounces: DEFAULT_BOUNCES,
+            indirect: IndirectLight::Traced,
+            photons: 0,
+            max_depth: 3,
+            min_weight: DEFAULT_MIN_WEIGHT,
+            transparent_background: false,
+            channels: Channels::COLOR,
+            has_features: false,
+            window: None,
+            mosaic_of: None,
+        }
+    }
+
+    /// Maximum number of diffuse reflections before the last one that paths follow.
+    pub const fn traced_bounces(&self) -> u32 {
+        match (self.indirect, self.bounces) {
+            (IndirectLight::Ambient { .. }, 1..) => 1,
+            (_, bounces) => bounces,
+        }
+    }
+
+    /// Width and height in pixels of the film, or of the film that it is a mosaic of.
+    fn full_size(&self) -> [u32; 2] {
+        self.mosaic_of.unwrap_or([self.width, self.height])
+    }
+
+    /// The position of the film in the image of the camera.
+    pub(super) fn data_window(&self) -> DataWindow {
+        let [width, height] = self.full_size();
+        self.window.unwrap_or(DataWindow::whole(width, height))
+    }
+
+    /// Width and height in pixels of the image of one eye, if a picture has `eyes` images beside and below each other.
+    pub(super) fn eye_size(&self, eyes: [u32; 2]) -> [u32; 2] {
+        let [width, height] = self.data_window().image;
+        [(width / eyes[0]).max(1), (height / eyes[1]).max(1)]
+    }
+
+    /// The channels of the film, with those that are features for denoising.
+    pub(super) const fn planes(&self) -> Channels {
+        self.channels.with_features(self.has_features)
+    }
+
+    pub(super) fn validate(&self) -> Result<(), RenderError> {
+        let [full_width, full_height] = self.full_size();
+        for (name, value, max) in [
+            ("width", self.width, MAX_SIDE),
+            ("height", self.height, MAX_SIDE),
+            ("width", full_width, MAX_SIDE),
+            ("height", full_height, MAX_SIDE),
+            ("samples", self.samples, MAX_SAMPLES),
+            ("max_depth", self.max_depth, MAX_DEPTH),
+        ] {
+            if !(1..=max).contains(&value) {
+                return Err(RenderError::OutOfRange { name, value, max });
+            }
+        }
+        let DataWindow { left, top, image } = self.data_window();
+        let is_near = |at: &i32| at.unsigned_abs() <= MAX_SIDE;
+        let is_side = |side: &u32| (1..=MAX_SIDE).contains(side);
+        if !([left, top].iter().all(is_near) && image.iter().all(is_side)) {
+            return Err(RenderError::Window);
+        }
+        let width = self.filter.width;
+        if !(width > 0.0 && width <= MAX_FILTER_WIDTH) {
+            return Err(RenderError::FilterWidth(width));
+        }
+        if self.bounces > MAX_BOUNCES {
+            return Err(RenderError::TooManyBounces(self.bounces));
+        }
+        if self.min_weight != 0.0 && !MIN_WEIGHTS.contains(&self.min_weight) {
+            return Err(RenderError::MinWeight(self.min_weight));
+        }
+        Ok(())
+    }
+
+    /// Checks that each light group of `scene` has a layer, if there are layers for light groups.
+    pub(super) fn validate_light_groups(&self, scene: &Scene) -> Result<(), RenderError> {
+        let count = self.channels.layers.light_groups;
+        let lights = scene.lights.iter().map(|light| light.group);
+        let group = lights.fold(scene.environment_group, u8::max);
+        if count > 0 && group >= count {
+            return Err(RenderError::LightGroup { group, count });
+        }
+        Ok(())
+    }
+
+    /// Checks that the number of rays at spheres of `material` does not double for too many levels.
+    pub(super) fn validate_branches(&self, material: &Material) -> Result<(), RenderError> {
+        let max_depth = self.max_depth;
+        if self.min_weight == 0.0 && material.branches() && max_depth > MAX_LITERAL_DEPTH {
+            return Err(RenderError::TooManyBranches { max_depth });
+        }
+        Ok(())
+    }
+}
+
+/// Reasons why there is no image.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+pub enum RenderError {
+    /// The caller asked to stop.
+    #[error("rendering was interrupted")]
+    Interrupted,
+    /// A setting is out of range.
+    #[error("{name} = {value} is out of range; it must be from 1 to {max}")]
+    OutOfRange {
+        /// The setting.
+        name: &'static str,
+        /// Its value.
+        value: u32,
+        /// Its maximum.
+        max: u32,
+    },
+    /// The position of the film in the image is out of range.
+    #[error(
+        "the window of the film is out of range; its sides and coordinates must be at most {MAX_SIDE} pixels"
+    )]
+    Window,
+    /// The width of the filter is out of range.
+    #[error(
+        "filter_width = {0} is out of range, it must be above 0 and at most {MAX_FILTER_WIDTH}"
+    )]
+    FilterWidth(f32),
+    /// `bounces` is out of range.
+    #[error("bounces = {0} is out of range, it must be at most {MAX_BOUNCES}")]
+    TooManyBounces(u32),
+    /// A light is in a group without a layer.
+    #[error("a light is in light group {group}, but there are only {count} light groups")]
+    LightGroup {
+        /// The group.
+        group: u8,
+        /// Number of groups with layers.
+        count: u8,
+    },
+    /// `min_weight` is out of range.
+    #[error("min_weight = {0} is out of range; it must be 0, or from {low:e} to {high}", low = MIN_WEIGHTS.start(), high = MIN_WEIGHTS.end())]
+    MinWeight(f32),
+    /// Both branches would be traced for too many levels.
+    #[error(
+        "min_weight = 0 follows both branches at transmissive spheres, which doubles the rays at each level; \
+         max_depth = {max_depth} is too deep for that, it must be at most {MAX_LITERAL_DEPTH}"
+    )]
+    TooManyBranches {
+        /// The depth.
+        max_depth: u32,
+    },
+    /// A constant of the material is out of range.
+    #[error(transparent)]
+    Material(#[from] MaterialError),
+}

@@ -1,0 +1,111 @@
+//! The scatter stage of transmissive and mirroring surfaces: the reflected and the refracted ray that leave a shading
+//! point.
+
+use super::{
+    context::{Interior, RenderContext},
+    dimensions::{REFLECTED, REFRACTED},
+    layers::LightClass,
+    materials::WhittedMaterial,
+    roulette::SplitRule,
+    scratch::PacketScratch,
+    shading::scale,
+    stream::{RayStreams, SegmentPacket},
+};
+use spherule_tree::math::{Lanes3, lane3, lanes_in};
+
+/// Path segments that end at specular surfaces.
+#[derive(Clone, Copy)]
+pub(super) struct SpecularHits<'a> {
+    pub(super) segments: &'a SegmentPacket,
+    pub(super) depth: u32,
+    /// Lanes at a specular surface.
+    pub(super) lanes: u32,
+    /// Lanes whose rays are not traced further, and see what is infinitely far away.
+    pub(super) last: u32,
+}
+
+/// What rays that are not traced further see infinitely far away.
+#[derive(Clone, Copy)]
+pub(super) struct Escape<'a> {
+    /// Adds the radiance for rays in a direction with a throughput, only for lanes in a mask.
+    pub(super) add: &'a dyn Fn(&Lanes3, &Lanes3, u32, &mut Lanes3),
+    /// The light group of the radiance.
+    pub(super) group: usize,
+}
+
+impl RenderContext<'_> {
+    /// Appends the rays that leave the shading points of `hits` to `next`.
+    pub(super) fn scatter(
+        &self,
+        material: &WhittedMaterial,
+        split: &SplitRule,
+        hits: SpecularHits<'_>,
+        packet: &mut PacketScratch,
+        next: &mut RayStreams,
+        escape: Escape<'_>,
+    ) {
+        // Choose which rays to trace
+        let SpecularHits { segments, last, .. } = hits;
+        if self.interior != Interior::Opaque {
+            self.split_weights(split, hits, packet);
+        }
+        let PacketScratch { points, throughput, radiance, split: lights, groups, .. } = packet;
+        // Describe both rays: weight, stream, side and branch of the path
+        let (inside, other_side) = match self.interior {
+            Interior::Opaque | Interior::Spheres => (0, 0),
+            Interior::Body => (segments.inside, !segments.inside),
+        };
+        let reflected = (
+            material.reflection,
+            &mut points.reflected,
+            &mut next.reflected,
+            inside,
+            (REFLECTED, LightClass::Reflection),
+        );
+        let refracted = (
+            material.dielectric.transmission,
+            &mut points.refracted,
+            &mut next.refracted,
+            other_side,
+            (REFRACTED, LightClass::Refraction),
+        );
+        for (weight, rays, stream, inside, (branch, class)) in [reflected, refracted] {
+            if weight <= 0.0 {
+                continue;
+            }
+            // Append the rays with a weight to their stream
+            let has_weight = |l: usize| u32::from(rays.weight[l] > 0.0) << l;
+            let lanes = lanes_in(hits.lanes).fold(0, |lanes, lane| lanes | has_weight(lane));
+            scale(self.simd, throughput, &rays.weight, &mut rays.throughput);
+            if lanes & last != 0 {
+                let group = groups.of_mut(escape.group);
+                for sum in [Some(&mut *radiance), group].into_iter().flatten() {
+                    (escape.add)(&rays.direction, &rays.throughput, lanes & last, sum);
+                }
+                lights.take(class, radiance);
+            }
+            if lanes & !last != 0 {
+                stream.push(lanes & !last, rays, segments, inside, branch);
+            }
+        }
+    }
+
+    /// Chooses which of the two rays that leave the shading points of `hits` are traced, and their weights.
+    fn split_weights(&self, split: &SplitRule, hits: SpecularHits<'_>, packet: &mut PacketScratch) {
+        let segments = hits.segments;
+        let points = &mut packet.points;
+        let (reflected, refracted) = (&mut points.reflected.weight, &mut points.refracted.weight);
+        for lane in lanes_in(hits.lanes & !hits.last) {
+            let arriving = match segments.bounces[lane] {
+                0 => lane3(&packet.throughput, lane).max_element(),
+                // One ray only: the weights of paths that ended by chance are in those of the others
+                _ => 0.0,
+            };
+            let (path, sample) = (segments.path[lane], segments.sample[lane]);
+            let sample = sample % self.settings.samples;
+            let weights = [reflected[lane], refracted[lane]];
+            let weights = split.weights(weights, arriving, hits.depth, path, sample);
+            [reflected[lane], refracted[lane]] = weights;
+        }
+    }
+}

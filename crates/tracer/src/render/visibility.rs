@@ -1,0 +1,206 @@
+//! The occlude stage: visibility of lights from shading points, and transmittance of shadow rays.
+//!
+//! Shadow rays pass straight through transmissive bodies, so there are no caustics. Each crossing of a surface
+//! multiplies their transmittance by `transmission*(1-r)`. `r` is for the angle outside on both sides of the surface
+//! (a refracted ray would have come from such an angle, and is never totally reflected). The medium of a connected
+//! body attenuates them as well. Panes (`panes.rs`), soft spray (`spray.rs`) and
+//! spheres that are not fully opaque (`translucent.rs`) attenuate all shadow rays.
+
+use super::{
+    context::{Interior, RenderContext},
+    lights::LightSamples,
+    materials::{attenuate, cross_straight},
+    ray_counts::RayCounts,
+    shading::product,
+    stream::SegmentPacket,
+};
+use crate::surface::{Intersections, MaterialId, Shape};
+use spherule_tree::accel::Coherence;
+use spherule_tree::math::{Lanes, Lanes3, first_lanes, lane3, lanes_in, splat};
+use spherule_tree::ray::RayPacket;
+
+/// Maximum number of crossings of one body along a shadow ray.
+const MAX_CROSSINGS: u32 = 64;
+
+/// Transmittance below which a shadow ray ends.
+const MIN_TRANSMITTANCE: f32 = 1.0 / 4096.0;
+
+impl RenderContext<'_> {
+    /// Traces shadow rays from the shading points of `segments` to a light, and multiplies the radiance of `samples`
+    /// by their transmittance. Returns the lanes that the light reaches.
+    pub(super) fn trace_shadow_rays(
+        &self,
+        segments: &SegmentPacket,
+        depth: u32,
+        samples: &mut LightSamples,
+        crossings: &mut Intersections,
+        counts: &mut RayCounts,
+    ) -> u32 {
+        samples.rays.set_len(segments.rays.len());
+        samples.rays.time = segments.rays.time;
+        counts.shadow += u64::from(samples.lanes.count_ones());
+        let coherence = self.coherence(depth);
+
+        // Trace opaque shapes first: occluded rays need no further tests
+        self.occlude(coherence, samples, |shape| {
+            self.interior == Interior::Opaque || shape.material() != MaterialId::PARTICLES
+        });
+        self.attenuate_by_panes(samples);
+        self.attenuate_by_spray(samples, coherence);
+        self.attenuate_by_opacity(samples, coherence);
+        let Some(particles) = self.particles.filter(|_| self.interior != Interior::Opaque) else {
+            return samples.lanes;
+        };
+        if samples.lanes == 0 {
+            return 0;
+        }
+
+        // Trace the transmissive particles
+        let mut transmittance = [splat(1.0); 3];
+        let reached = match self.interior {
+            Interior::Body => {
+                let inside = segments.inside;
+                let (samples, transmittance) = (&*samples, &mut transmittance);
+                self.cross_body(particles, samples, coherence, inside, crossings, transmittance)
+            }
+            _ => self.cross_spheres(particles, samples, &mut transmittance),
+        };
+        // Attenuate the light
+        let unoccluded = samples.radiance;
+        product(self.simd, &unoccluded, &transmittance, &mut samples.radiance);
+        reached
+    }
+
+    /// Traces shadow rays that no shape but panes and soft spray lets through, not even a transmissive one. Multiplies
+    /// the radiance of `samples` by the transmittance of these. Returns the lanes that arrive.
+    pub(super) fn unoccluded(
+        &self,
+        segments: &SegmentPacket,
+        depth: u32,
+        samples: &mut LightSamples,
+        counts: &mut RayCounts,
+    ) -> u32 {
+        samples.rays.set_len(segments.rays.len());
+        samples.rays.time = segments.rays.time;
+        counts.shadow += u64::from(samples.lanes.count_ones());
+        let coherence = self.coherence(depth);
+        self.occlude(coherence, samples, |_| true);
+        self.attenuate_by_panes(samples);
+        self.attenuate_by_spray(samples, coherence);
+        self.attenuate_by_opacity(samples, coherence);
+        samples.lanes
+    }
+
+    /// Removes the lanes of `samples` that shapes for which `is_opaque` occlude.
+    fn occlude(
+        &self,
+        coherence: Coherence,
+        samples: &mut LightSamples,
+        is_opaque: impl Fn(&dyn Shape) -> bool,
+    ) {
+        for shape in &self.shapes {
+            if samples.lanes != 0 && is_opaque(*shape) {
+                samples.lanes &= !shape.occluded(&samples.rays, coherence, samples.lanes);
+            }
+        }
+    }
+
+    /// Computes the transmittance of separate spheres; some may be opaque. Returns the lanes in which it is not 0.
+    fn cross_spheres(
+        &self,
+        spheres: &dyn Shape,
+        samples: &LightSamples,
+        transmittance: &mut Lanes3,
+    ) -> u32 {
+        let is_opaque = |particle: u32| {
+            let material = self.parts.map(|parts| self.material_of(parts, particle));
+            material.is_some_and(|material| material != MaterialId::PARTICLES)
+        };
+        let fresnel_transmittance = |cosine: f32, particle: u32| match is_opaque(particle) {
+            true => 0.0,
+            false => self.boundary.straight_transmittance(cosine),
+        };
+        spheres.transmittance(
+            &samples.rays,
+            samples.lanes,
+            &fresnel_transmittance,
+            &mut transmittance[0],
+        );
+        transmittance[1] = transmittance[0];
+        transmittance[2] = transmittance[0];
+        let is_reached = |lane: usize| u32::from(transmittance[0][lane] > 0.0) << lane;
+        lanes_in(samples.lanes).fold(0, |reached, lane| reached | is_reached(lane))
+    }
+
+    /// The transmittance of one connected body, crossing after crossing for all rays at once; rays of `inside` start
+    /// inside the body. Returns the lanes in which it is not 0.
+    fn cross_body(
+        &self,
+        body: &dyn Shape,
+        samples: &LightSamples,
+        mut coherence: Coherence,
+        mut inside: u32,
+        hits: &mut Intersections,
+        transmittance: &mut Lanes3,
+    ) -> u32 {
+        let (rays, boundary) = (&samples.rays, &self.boundary);
+        let mut remaining = *rays;
+        let (mut reached, mut alive) = (samples.lanes, samples.lanes);
+        // Distances of the previous crossings
+        let mut from = rays.t_min;
+        for _ in 0..MAX_CROSSINGS {
+            // Find the next crossing of each ray
+            for lane in lanes_in(!alive & first_lanes(rays.len())) {
+                remaining.t_max[lane] = -1.0;
+            }
+            hits.clear();
+            body.intersect(&mut remaining, coherence, inside & alive, hits);
+            let crossing = hits.mask & alive;
+
+            // Attenuate by the medium up to the crossing, and by the crossing
+            let lanes = alive & inside;
+            let length = inside_lengths(rays, hits, crossing, lanes, &from);
+            attenuate(self.simd, &boundary.extinction, &length, lanes, transmittance);
+            cross_straight(self.simd, boundary, rays, hits, crossing, transmittance);
+
+            // End rays without transmittance
+            let is_dark = |lane| lane3(transmittance, lane).max_element() < MIN_TRANSMITTANCE;
+            let dark =
+                lanes_in(crossing).fold(0, |dark, lane| dark | u32::from(is_dark(lane)) << lane);
+            reached &= !dark;
+            alive = crossing & !dark;
+            if alive == 0 {
+                break;
+            }
+
+            // Continue beyond the crossing
+            for lane in lanes_in(alive) {
+                from[lane] = hits.t[lane];
+                remaining.t_min[lane] = hits.t[lane] + hits.offset[lane];
+                remaining.t_max[lane] = rays.t_max[lane];
+            }
+            inside ^= alive;
+            coherence = Coherence::Incoherent;
+        }
+        reached
+    }
+}
+
+/// Lengths of the segments of `lanes` inside a body, `from` the previous crossing to the next one in `crossing`, or
+/// to the light. An unbounded segment has left through a crack in the surface, and gets length 0.
+fn inside_lengths(
+    rays: &RayPacket,
+    hits: &Intersections,
+    crossing: u32,
+    lanes: u32,
+    from: &Lanes,
+) -> Lanes {
+    let mut length = splat(0.0);
+    for lane in lanes_in(lanes) {
+        let end = if crossing >> lane & 1 == 1 { hits.t[lane] } else { rays.t_max[lane] };
+        if end.is_finite() {
+            length[lane] = end - from[lane];
+        }
+    }
+    length
+}
