@@ -36,27 +36,16 @@
 //! ```
 #![deny(unsafe_code)]
 
-mod compression;
-mod format;
-mod ranges;
-mod reader;
-mod registry;
-mod regular;
-mod shared;
-mod step;
-
 pub mod convert;
 pub mod detect;
-pub mod mesh;
 pub mod native;
 pub mod open;
-pub mod read;
+pub mod registry;
 pub mod sequence;
 pub mod stats;
 pub mod write;
 
 pub use open::FrameFile;
-pub use read::element_symbol;
 pub use sequence::{Sequence, SequenceError, SequenceFrame, SequenceInput, SequenceSettings};
 pub use spherule_files::{ValueError, escape_controls, is_control};
 pub use spherule_frame::{
@@ -65,4 +54,5 @@ pub use spherule_frame::{
     SimulationCell, choose_origin, find_radius, generate, is_near, is_radius, names,
     sample_indices,
 };
+pub use spherule_readers::{Format, mesh, read, read::element_symbol};
 pub use spherule_tree::{blocks, order};

@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use crate::compression::strip_extension;
-use crate::format::Format;
 use crate::native;
 use crate::read::{
     amber, bgeo, bi4, csv, dcd, gro, gsd, houdini, lammps, mmcif, npy, pdb, ply, rst7, trr, usd,
     vtk, vtk_xml, xtc, xyz,
 };
+use spherule_readers::Format;
+use spherule_readers::compression::strip_extension;
 
 /// All formats. If several formats match a file equally well, the first one wins. Messages list them in this order.
 const FORMATS: &[Format] = &[
@@ -39,19 +39,17 @@ const FORMATS: &[Format] = &[
     csv::FORMAT,
 ];
 
-impl Format {
-    /// All formats.
-    pub const fn all() -> &'static [Self] {
-        FORMATS
-    }
+/// All formats.
+pub const fn all() -> &'static [Format] {
+    FORMATS
+}
 
-    /// The format that the name of the file suggests, without the extension of a compression; `None` for other names.
-    pub fn by_name(path: &Path) -> Option<Self> {
-        let name = path.file_name()?.to_string_lossy().to_ascii_lowercase();
-        let (stem, extension) = strip_extension(&name).rsplit_once('.')?;
-        let matches = |format: &&Self| format.reader().matches_name(stem, extension);
-        FORMATS.iter().find(matches).copied()
-    }
+/// The format that the name of the file suggests, without the extension of a compression; `None` for other names.
+pub fn by_name(path: &Path) -> Option<Format> {
+    let name = path.file_name()?.to_string_lossy().to_ascii_lowercase();
+    let (stem, extension) = strip_extension(&name).rsplit_once('.')?;
+    let matches = |format: &&Format| format.reader().matches_name(stem, extension);
+    FORMATS.iter().find(matches).copied()
 }
 
 #[cfg(test)]
@@ -64,7 +62,7 @@ mod tests {
     fn names_and_extensions_are_unique() {
         let mut names = HashSet::new();
         let mut extensions = HashSet::new();
-        for format in Format::all() {
+        for format in all() {
             assert!(names.insert(format.name()), "{format:?}");
             for extension in format.reader().extensions() {
                 assert!(extensions.insert(*extension), "{format:?} {extension}");
@@ -74,7 +72,7 @@ mod tests {
 
     #[test]
     fn names_suggest_formats() {
-        let by_name = |name: &str| Format::by_name(Path::new(name));
+        let by_name = |name: &str| super::by_name(Path::new(name));
         assert_eq!(by_name("x/dump.drop.1200.lammps.gz"), Some(lammps::FORMAT));
         assert_eq!(by_name("a_7.vtu.zst"), Some(vtk_xml::FORMAT));
         assert_eq!(by_name("a_7.zip"), None);

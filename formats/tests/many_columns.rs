@@ -4,7 +4,7 @@
 
 use std::io::{Cursor, Write};
 
-use spherule_formats::detect::Format;
+use spherule_formats::Format;
 use spherule_formats::read::{bgeo, csv, lammps, npy, ply, vtk, vtk_xml, xyz};
 use spherule_formats::sequence::{Topology, merge};
 use spherule_formats::{

@@ -6,7 +6,6 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use serde_json::{Value, json};
 use spherule_formats::convert;
-use spherule_formats::detect::Format;
 use spherule_formats::native::{Bound, Encoding, FORMAT};
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{MemoryBudget, SequenceInput, SequenceSettings};
@@ -179,7 +178,7 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, CliError> {
 
 /// Refuses an output with the extension of another file format.
 fn guard_name(output: &Path) -> Result<(), CliError> {
-    let why = match Format::by_name(output) {
+    let why = match spherule_formats::registry::by_name(output) {
         None => return Ok(()),
         Some(format) if format == FORMAT => return Ok(()),
         Some(_) if output.is_dir() => return Ok(()),

@@ -22,6 +22,12 @@ pub enum Positions {
     F64(Vec<DVec3>),
 }
 
+impl Default for Positions {
+    fn default() -> Self {
+        Self::F32(Vec::new())
+    }
+}
+
 impl Positions {
     /// Particle count.
     pub fn len(&self) -> usize {
@@ -104,7 +110,7 @@ impl PositionSlice<'_> {
 
 /// All data of one step as a reader returns it: unfiltered, in file order. The positions may belong to a caller, as
 /// [`PositionSlice`].
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct RawParticles<P = Positions> {
     /// Positions in the precision of the file.
     pub positions: P,

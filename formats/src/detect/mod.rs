@@ -7,64 +7,57 @@
 
 use std::path::Path;
 
-use crate::ParseError;
-pub use crate::format::Format;
 use crate::read::sniff::is_text;
-use crate::reader::{Confidence, HEAD_LEN};
+use crate::{Format, ParseError, registry};
+use spherule_readers::{Confidence, HEAD_LEN};
 
 mod foreign;
 pub(crate) use foreign::ADIOS;
-pub(crate) mod hdf5;
 mod text;
 
-impl Format {
-    /// The format of an uncompressed file that begins with `bytes` (all of it, or at least
-    /// 4096 bytes) and is called `path`.
-    ///
-    /// # Errors
-    /// [`ParseError::Unsupported`] for a known format that is not read, with what to do;
-    /// [`ParseError::Malformed`] for an empty file (but not `.xyz`: that is zero raw particles),
-    /// for content that does not match its name, and for unknown content.
-    pub fn detect(bytes: &[u8], path: &Path) -> Result<Self, ParseError> {
-        let named = Self::by_name(path);
-        let head = &bytes[..bytes.len().min(HEAD_LEN)];
-        let mut likely = None;
-        for format in Self::all() {
-            match format.reader().sniff(head)? {
-                Confidence::Signature => return Ok(*format),
-                Confidence::Likely => likely = likely.or(Some(*format)),
-                Confidence::IfNamed | Confidence::No => {}
-            }
+/// The format of an uncompressed file that begins with `bytes` (all of it, or at least
+/// 4096 bytes) and is called `path`.
+///
+/// # Errors
+/// [`ParseError::Unsupported`] for a known format that is not read, with what to do;
+/// [`ParseError::Malformed`] for an empty file (but not `.xyz`: that is zero raw particles),
+/// for content that does not match its name, and for unknown content.
+pub fn detect_format(bytes: &[u8], path: &Path) -> Result<Format, ParseError> {
+    let named = registry::by_name(path);
+    let head = &bytes[..bytes.len().min(HEAD_LEN)];
+    let mut likely = None;
+    for format in registry::all() {
+        match format.reader().sniff(head)? {
+            Confidence::Signature => return Ok(*format),
+            Confidence::Likely => likely = likely.or(Some(*format)),
+            Confidence::IfNamed | Confidence::No => {}
         }
-        if !bytes.is_empty() {
-            refuse_foreign(head, path, named)?;
+    }
+    if !bytes.is_empty() {
+        refuse_foreign(head, path, named)?;
+    }
+    match named {
+        Some(format) if format.reader().sniff(head)? >= Confidence::IfNamed => Ok(format),
+        _ if bytes.is_empty() => {
+            Err(ParseError::malformed(0, "the file is empty; perhaps it is still being written"))
         }
-        match named {
-            Some(format) if format.reader().sniff(head)? >= Confidence::IfNamed => Ok(format),
-            _ if bytes.is_empty() => Err(ParseError::malformed(
-                0,
-                "the file is empty; perhaps it is still being written",
-            )),
-            Some(format) => {
-                let (name, opening) = (format.name(), opening(head));
-                let what =
-                    format!("named like a {name} file, but does not begin like one: {opening}");
-                Err(ParseError::malformed(0, what))
-            }
-            None => likely.ok_or_else(|| {
-                let (opening, names) = (opening(head), names());
-                let what =
-                    format!("no particle format begins with {opening}; supported are {names}");
-                ParseError::malformed(0, what)
-            }),
+        Some(format) => {
+            let (name, opening) = (format.name(), opening(head));
+            let what = format!("named like a {name} file, but does not begin like one: {opening}");
+            Err(ParseError::malformed(0, what))
         }
+        None => likely.ok_or_else(|| {
+            let (opening, names) = (opening(head), names());
+            let what = format!("no particle format begins with {opening}; supported are {names}");
+            ParseError::malformed(0, what)
+        }),
     }
 }
 
 /// Refuses files of known formats that are not read.
 fn refuse_foreign(head: &[u8], path: &Path, named: Option<Format>) -> Result<(), ParseError> {
     // Without the reader of the format
-    if hdf5::is_hdf5(head) {
+    if spherule_readers::hdf5_signature::is_hdf5(head) {
         let what = "an HDF5 file, and this program was built without the feature `hdf5`";
         return Err(ParseError::unsupported(what));
     }
@@ -79,7 +72,7 @@ fn refuse_foreign(head: &[u8], path: &Path, named: Option<Format>) -> Result<(),
 
 /// The names of all formats, as a list.
 fn names() -> String {
-    let names: Vec<&str> = Format::all().iter().map(|format| format.name()).collect();
+    let names: Vec<&str> = registry::all().iter().map(|format| format.name()).collect();
     names.join(", ")
 }
 
@@ -101,12 +94,12 @@ mod tests {
 
     #[track_caller]
     fn detect(name: &str, bytes: &[u8]) -> Format {
-        Format::detect(bytes, Path::new(name)).expect("a known format")
+        detect_format(bytes, Path::new(name)).expect("a known format")
     }
 
     #[track_caller]
     fn refused(name: &str, bytes: &[u8], words: &str) {
-        let error = Format::detect(bytes, Path::new(name)).expect_err("not readable");
+        let error = detect_format(bytes, Path::new(name)).expect_err("not readable");
         assert!(error.to_string().contains(words), "{error}");
     }
 

@@ -260,7 +260,6 @@ fn is_pqr(lines: &Lines<'_>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::format::Format;
 
     /// Whatever the name, the file is refused with `hint`.
     #[track_caller]
@@ -268,7 +267,8 @@ mod tests {
         let crlf = text.replace('\n', "\r\n");
         for text in [text, &crlf] {
             for name in ["a", "a.xyz", "a.csv", "a.txt", "a.pdb"] {
-                let error = Format::detect(text.as_bytes(), Path::new(name)).expect_err("refused");
+                let error = crate::detect::detect_format(text.as_bytes(), Path::new(name))
+                    .expect_err("refused");
                 assert!(error.to_string().contains(hint), "{name}: {error}: {text}");
             }
         }
@@ -331,12 +331,13 @@ mod tests {
                 .repeat(60);
         let text = format!("{remarks}ATOM 1 N ALA 1 1.5 2.5 3.5 -0.3 1.85\n");
         for name in ["a.pqr", "a.PQR"] {
-            let error = Format::detect(text.as_bytes(), Path::new(name)).expect_err("refused");
+            let error = crate::detect::detect_format(text.as_bytes(), Path::new(name))
+                .expect_err("refused");
             assert!(error.to_string().contains("PQR"), "{error}");
         }
-        let pdb = Format::detect(text.as_bytes(), Path::new("a.pdb"));
+        let pdb = crate::detect::detect_format(text.as_bytes(), Path::new("a.pdb"));
         assert_eq!(pdb.map(|format| format.name()), Ok("pdb"));
-        let other = Format::detect(b"x,y,z\n1,2,3\n", Path::new("a.pqr"));
+        let other = crate::detect::detect_format(b"x,y,z\n1,2,3\n", Path::new("a.pqr"));
         assert_eq!(other.map(|format| format.name()), Ok("csv"));
     }
 

@@ -15,8 +15,8 @@ use rkyv::util::AlignedVec;
 
 use super::NativeFrame;
 use super::layout::{FrameIndex, parse};
-use crate::regular::regular_len;
 use crate::{FrameError, ParseError};
+use spherule_readers::regular::regular_len;
 
 /// How to access the bytes of a native frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -5,11 +5,11 @@
 
 use rkyv::util::AlignedVec;
 
-use crate::format::Format;
 use crate::read::ByteSource;
-use crate::reader::{Confidence, Reader};
-use crate::step::Step;
 use crate::{MemoryBudget, ParseError, RawParticles};
+use spherule_readers::Format;
+use spherule_readers::Step;
+use spherule_readers::{Confidence, Reader};
 
 mod attribute;
 mod bound;

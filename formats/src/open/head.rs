@@ -6,15 +6,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::siblings::SiblingFiles;
-use super::streamed::decompressor;
-use crate::compression::{ByteStream, StreamError, is_compressed};
-use crate::detect::Format;
 use crate::native::{self, MappedFile};
-use crate::reader::{HEAD_LEN, Reader};
-use crate::regular::regular_len;
-use crate::shared::SharedBytes;
 use crate::{FrameError, MemoryBudget};
 use spherule_files::one_line;
+use spherule_readers::compression::{ByteStream, StreamError, is_compressed};
+use spherule_readers::regular::regular_len;
+use spherule_readers::shared::SharedBytes;
+use spherule_readers::{Format, decompressor};
+use spherule_readers::{HEAD_LEN, Reader};
 
 /// Whether the file at `path` begins as a native frame, without compression around it.
 ///
@@ -38,7 +37,7 @@ pub fn is_native(path: &Path) -> Result<bool, FrameError> {
 /// As [`super::FrameFile::open`], as far as the first bytes decide.
 pub fn detect_file(path: &Path) -> Result<Format, FrameError> {
     let head = head(path)?;
-    Format::detect(&head, path).map_err(|e| e.in_file(path))
+    crate::detect::detect_format(&head, path).map_err(|e| e.in_file(path))
 }
 
 /// What the file at `path` holds that is not in its particles: a cell and periodic boundaries, which are not used, and
@@ -46,7 +45,7 @@ pub fn detect_file(path: &Path) -> Result<Format, FrameError> {
 /// read.
 pub fn remarks(path: &Path) -> Vec<String> {
     let remarks = head(path).and_then(|head| {
-        let format = Format::detect(&head, path).map_err(|e| e.in_file(path))?;
+        let format = crate::detect::detect_format(&head, path).map_err(|e| e.in_file(path))?;
         let reader = format.reader();
         if !reader.remarks_need_whole_file() {
             return Ok(reader.remarks(&head));
@@ -79,7 +78,7 @@ pub(crate) fn refers_to_pieces(path: &Path) -> bool {
 /// of a format whose files may do so.
 pub(crate) fn referenced_files(path: &Path) -> Vec<PathBuf> {
     let may_refer = |format: Format| format.reader().may_refer_to_files();
-    if !Format::by_name(path).is_some_and(may_refer) {
+    if !crate::registry::by_name(path).is_some_and(may_refer) {
         return Vec::new();
     }
     let siblings = SiblingFiles::of(path);
@@ -98,7 +97,7 @@ fn with_reader_among<T>(
     ask: impl FnOnce(&dyn Reader, &SharedBytes) -> T,
 ) -> Option<T> {
     let map = Arc::new(MappedFile::open(path).ok()?);
-    let format = Format::detect(map.bytes(), path).ok()?;
+    let format = crate::detect::detect_format(map.bytes(), path).ok()?;
     let file = siblings.around(SharedBytes::new(map));
     Some(ask(format.reader(), &file))
 }

@@ -4,13 +4,13 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::siblings::SiblingFiles;
-use crate::detect::Format;
 use crate::native::MappedFile;
 use crate::read::{ByteSource, Step};
-use crate::reader::HEAD_LEN;
-use crate::regular::FileStamp;
-use crate::shared::SharedBytes;
 use crate::{FrameError, MemoryBudget, ParseError, RawParticles};
+use spherule_readers::Format;
+use spherule_readers::HEAD_LEN;
+use spherule_readers::regular::FileStamp;
+use spherule_readers::shared::SharedBytes;
 
 /// An uncompressed file that is not in memory.
 #[derive(Debug)]

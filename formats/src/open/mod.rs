@@ -11,29 +11,28 @@ use std::sync::Arc;
 
 use rkyv::util::AlignedVec;
 
-use crate::compression::{ByteStream, Decompressor, StreamError};
-use crate::detect::Format;
 use crate::native;
 use crate::read::{ByteSource, Step};
-use crate::reader::FileExtent;
-use crate::regular::{FileStamp, regular_len};
-use crate::shared::SharedBytes;
 use crate::{FrameError, MemoryBudget, ParseError, RawParticles};
+use spherule_readers::FileExtent;
+use spherule_readers::Format;
+use spherule_readers::compression::{ByteStream, Decompressor, StreamError};
+use spherule_readers::regular::{FileStamp, regular_len};
+use spherule_readers::shared::SharedBytes;
 
 mod head;
 mod mapped;
 mod siblings;
 mod streamed;
-mod whole;
 
-pub use crate::compression::unpacked_len;
 pub use head::{detect_file, is_native, remarks};
 pub(crate) use head::{head, piece_count, referenced_files, refers_to_pieces};
-pub(crate) use whole::read_whole;
+pub use spherule_readers::compression::unpacked_len;
 
 use mapped::SteppedFile;
 pub(crate) use siblings::SiblingFiles;
-use streamed::{StreamedFile, decompressor};
+use spherule_readers::decompressor;
+use streamed::StreamedFile;
 
 /// Files up to this length, decompressed, are always read as a whole. Of longer files, this many bytes decide whether
 /// they must be. More than the reader of tables needs to find the columns.
@@ -163,7 +162,7 @@ impl FrameFile {
         }
         let is_whole = stream.fill(&mut bytes, PREFIX_LEN).map_err(in_file)? < PREFIX_LEN;
         // Fail before more is decompressed than is of use.
-        let format = Format::detect(&bytes, path).map_err(|e| e.in_file(path))?;
+        let format = crate::detect::detect_format(&bytes, path).map_err(|e| e.in_file(path))?;
         if is_whole {
             return Ok((Content::whole(bytes), stamp, stream.into_notes()));
         }
@@ -233,7 +232,7 @@ impl FrameFile {
         budget: MemoryBudget,
     ) -> Result<Self, FrameError> {
         let in_file = |e: ParseError| e.in_file(path);
-        let format = Format::detect(content.head(), path).map_err(in_file)?;
+        let format = crate::detect::detect_format(content.head(), path).map_err(in_file)?;
         let left = budget.less(content.held_len(format));
         let steps = match &content {
             Content::Streamed(file) => file.steps(path, format, left)?,

@@ -5,8 +5,8 @@ use std::path::{Component, Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::native::MappedFile;
-use crate::shared::{SharedBytes, Siblings};
 use crate::{FrameError, ParseError};
+use spherule_readers::shared::{SharedBytes, Siblings};
 
 /// Files that were mapped, by their paths.
 type Opened = Arc<Mutex<BTreeMap<PathBuf, Arc<MappedFile>>>>;

@@ -1,15 +1,13 @@
 //! Text that is read from the disk in pieces, once for each step.
 
-use std::fs::File;
-use std::io::BufReader;
 use std::path::Path;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use crate::compression::{Decompressor, unpacked_len};
-use crate::detect::Format;
 use crate::read::{ByteSource, Step, TextInput};
-use crate::regular::FileStamp;
 use crate::{FrameError, MemoryBudget, ParseError, RawParticles};
+use spherule_readers::compression::unpacked_len;
+use spherule_readers::regular::FileStamp;
+use spherule_readers::{Format, decompressor};
 
 /// A text file that is not in memory.
 #[derive(Debug)]
@@ -151,17 +149,4 @@ impl StreamedFile {
         stream?;
         result.map_err(|e| e.in_file(path))
     }
-}
-
-/// The content of the file at `path`, decompressed, from its beginning. The decoder holds no more than `budget`.
-///
-/// # Errors
-/// [`FrameError`] if it cannot be read, or is compressed in a way that is not read.
-pub(super) fn decompressor(
-    path: &Path,
-    budget: MemoryBudget,
-) -> Result<Decompressor<BufReader<File>>, FrameError> {
-    let file = File::open(path).map(|file| BufReader::with_capacity(1 << 16, file));
-    let file = file.map_err(|e| FrameError::io(path, e))?;
-    Decompressor::new(file, budget).map_err(|e| e.in_file(path))
 }

@@ -12,7 +12,7 @@ use std::path::PathBuf;
 
 use super::error::{GroupSummary, SequenceError, counted};
 use super::name::FileName;
-use crate::compression::strip_extension;
+use spherule_readers::compression::strip_extension;
 
 /// The files of one sequence, sorted by number, then part.
 #[derive(Debug, Clone, PartialEq, Eq)]

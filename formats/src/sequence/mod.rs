@@ -10,12 +10,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
-use crate::compression::is_compressed;
-use crate::detect::Format;
 use crate::native::layout::UP_Y;
 use crate::native::{self, Access, MappedFile, NativeFile};
 use crate::order::index_u32;
 use crate::{MemoryBudget, PeriodicImages};
+use spherule_readers::compression::is_compressed;
 
 mod collection;
 mod error;
@@ -269,7 +268,7 @@ impl Sequence {
         let first = self.frames.first().and_then(|f| f.parts.first());
         let format = first.and_then(|part| {
             let head = crate::open::head(&part.path).ok()?;
-            Format::detect(&head, &part.path).ok()
+            crate::detect::detect_format(&head, &part.path).ok()
         });
         format.map_or(1.0, |format| format.reader().angstrom())
     }
@@ -440,7 +439,7 @@ fn y_is_up(path: &Path) -> bool {
     let Ok(head) = crate::open::head(path) else {
         return false;
     };
-    let Ok(format) = Format::detect(&head, path) else {
+    let Ok(format) = crate::detect::detect_format(&head, path) else {
         return false;
     };
     if format == native::FORMAT {

@@ -6,8 +6,8 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use crate::compression::strip_extension;
 use crate::read::sniff::is_digits;
+use spherule_readers::compression::strip_extension;
 
 /// A file name, split so that names of one sequence differ in `numbers` only.
 #[derive(Debug, Clone, PartialEq, Eq)]

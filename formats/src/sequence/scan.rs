@@ -10,15 +10,16 @@ use super::name::FileName;
 use super::pattern::Pattern;
 use super::{NumberedStep, PartFile, SequenceError};
 use crate::MemoryBudget;
-use crate::detect::{ADIOS, Format};
+use crate::detect::ADIOS;
 use crate::open::{FrameFile, detect_file};
 use crate::read::Step;
+use spherule_readers::Format;
 
 /// The particle files of a directory. Pictures, notes, hidden and unfinished files are passed
 /// over by name; only where no name is known are the files looked into.
 pub(super) fn directory(path: &Path) -> Result<Vec<FileName>, SequenceError> {
     let files = list(path)?;
-    let known = files.iter().filter(|f| Format::by_name(f).is_some());
+    let known = files.iter().filter(|f| crate::registry::by_name(f).is_some());
     let mut names: Vec<FileName> = known.map(|f| FileName::parse(f, None)).collect();
     if names.is_empty() {
         names = lists_among(&files);
@@ -76,8 +77,8 @@ pub(super) fn fitting(pattern: &Pattern, text: &Path) -> Result<Vec<FileName>, S
             found: closest(text, &pattern.directory, &files),
         });
     }
-    if names.iter().any(|n| Format::by_name(&n.path).is_some()) {
-        names.retain(|n| Format::by_name(&n.path).is_some());
+    if names.iter().any(|n| crate::registry::by_name(&n.path).is_some()) {
+        names.retain(|n| crate::registry::by_name(&n.path).is_some());
     }
     Ok(names)
 }
@@ -190,7 +191,7 @@ fn similar(missing: &Path) -> Option<String> {
         let alike = likeness(&name, &other);
         let length = name.chars().count().max(other.chars().count());
         if !other.starts_with('.') && 3 * alike >= 2 * length {
-            let is_input = path.is_dir() || Format::by_name(&path).is_some();
+            let is_input = path.is_dir() || crate::registry::by_name(&path).is_some();
             found.push((!is_input, std::cmp::Reverse(alike), other));
         }
     }
@@ -268,7 +269,7 @@ fn number_entries(
 }
 
 fn may_hold_many(path: &Path) -> bool {
-    let named = Format::by_name(path).filter(|f| !f.may_hold_many_steps());
+    let named = crate::registry::by_name(path).filter(|f| !f.may_hold_many_steps());
     named.or_else(|| detect_file(path).ok()).is_some_and(Format::may_hold_many_steps)
 }
 

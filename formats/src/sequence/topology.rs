@@ -3,9 +3,10 @@
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-use crate::open::{FrameFile, read_whole};
+use crate::open::FrameFile;
 use crate::read::psf;
 use crate::{Attribute, Bond, FrameError, MemoryBudget, ParseError, RawParticles};
+use spherule_readers::read_whole;
 
 /// Properties of a topology that change with time.
 const CHANGING: [&str; 2] = ["velocity", "force"];

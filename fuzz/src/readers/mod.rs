@@ -1,6 +1,6 @@
 //! Targets of `spherule-formats`. Each returns how many steps gave particles or meshes, or how many frames there are.
 
-use spherule_formats::detect::Format;
+use spherule_formats::Format;
 use spherule_formats::read;
 use spherule_formats::stats::FrameStats;
 use spherule_formats::{ParseError, ParticleFrame, RawParticles, choose_origin};

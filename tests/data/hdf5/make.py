@@ -469,7 +469,7 @@ def plain():
                                            "id": data["id"]})
 
 
-# Cells of H5MD: edges at each step, a matrix and three lengths; see formats/src/read/cell_tests.rs
+# Cells of H5MD: edges at each step, a matrix and three lengths; see crates/readers/src/read/cell_tests.rs
 def cells():
     steps, times = numpy.array([0, 10, 20]), numpy.array([0.0, 1.0, 2.0])
     moving = numpy.array([[[4 + step, 0, 0], [0.5, 3, 0], [0.25, 0.75, 2 - 0.5 * step]] for step in range(3)])

@@ -8,14 +8,13 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::ParticleSource;
-use crate::compression::is_compressed;
-use crate::detect::Format;
 use crate::native::MappedFile;
 use crate::open::SiblingFiles;
 use crate::read::columns::ParticleLayout;
-use crate::regular::regular_len;
-use crate::shared::SharedBytes;
 use crate::{FrameError, ParseError};
+use spherule_readers::compression::is_compressed;
+use spherule_readers::regular::regular_len;
+use spherule_readers::shared::SharedBytes;
 
 mod columns;
 mod ranges;
@@ -43,7 +42,8 @@ pub fn open_source(path: &Path) -> Result<Option<Box<dyn ParticleSource>>, Frame
     let file = Arc::new(file);
     let siblings = SiblingFiles::of(path);
     let bytes = siblings.around(SharedBytes::new(file.clone()));
-    let ranges = Format::detect(&bytes, path).and_then(|format| format.reader().ranges(&bytes));
+    let ranges = crate::detect::detect_format(&bytes, path)
+        .and_then(|format| format.reader().ranges(&bytes));
     file.check()?;
     siblings.check()?;
     let ranges = ranges.map_err(|e| e.in_file(path))?;
@@ -54,7 +54,7 @@ pub fn open_source(path: &Path) -> Result<Option<Box<dyn ParticleSource>>, Frame
 
 /// The layout of the particles in `bytes`, the contents of `path`; `None` if some numbers have no fixed stride.
 fn layout_of(bytes: &[u8], path: &Path) -> Result<Option<ParticleLayout>, ParseError> {
-    let layout = Format::detect(bytes, path)?.reader().layout(bytes)?;
+    let layout = crate::detect::detect_format(bytes, path)?.reader().layout(bytes)?;
     if let Some(layout) = &layout {
         layout.check(bytes.len())?;
     }

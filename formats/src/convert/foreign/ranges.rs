@@ -8,8 +8,8 @@ use crate::convert::sources::places;
 use crate::convert::{ParticleSource, SourceAttribute};
 use crate::native::MappedFile;
 use crate::open::SiblingFiles;
-use crate::ranges::ParticleRanges;
 use crate::{FrameError, SimulationCell};
+use spherule_readers::ranges::ParticleRanges;
 
 /// The particles of a mapped file.
 #[derive(Debug)]

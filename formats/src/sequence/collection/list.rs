@@ -4,10 +4,10 @@ use std::path::Path;
 
 use super::entry::{List, ListKind};
 use super::{series, xml};
-use crate::open::read_whole;
 use crate::read::vtk_xml::root_type;
-use crate::reader::HEAD_LEN;
 use crate::{FrameError, MemoryBudget, ParseError};
+use spherule_readers::HEAD_LEN;
+use spherule_readers::read_whole;
 
 /// Bytes in memory for a byte of a list: its text, its entries, and the steps made of them.
 const EXPANSION: u64 = 16;

@@ -16,9 +16,8 @@ mod xml;
 use std::ffi::OsStr;
 use std::path::Path;
 
-use crate::compression::strip_extension;
-use crate::detect::Format;
 use crate::read::vtk_xml;
+use spherule_readers::compression::strip_extension;
 
 pub(super) use expand::{Expansion, ListedFiles, expand};
 #[doc(hidden)]
@@ -86,7 +85,7 @@ fn has_extension(path: &Path, known: &[&str]) -> bool {
 
 /// Whether the file at `path` lists others: its name says so, or its content if the name says nothing.
 pub(super) fn is_list(path: &Path) -> bool {
-    has_list_name(path) || Format::by_name(path).is_none() && has_list_content(path)
+    has_list_name(path) || crate::registry::by_name(path).is_none() && has_list_content(path)
 }
 
 /// Whether one of the files of a sequence lists others. Some programs call lists of blocks `.vtp`. To open each of
@@ -98,7 +97,7 @@ pub(super) fn has_list<'a>(mut paths: impl Iterator<Item = &'a Path> + Clone) ->
 
 /// Whether the file at `path` is a list although its name is that of particles in XML.
 pub(super) fn stands_for_blocks(path: &Path) -> bool {
-    Format::by_name(path) == Some(vtk_xml::FORMAT) && has_list_content(path)
+    crate::registry::by_name(path) == Some(vtk_xml::FORMAT) && has_list_content(path)
 }
 
 fn has_list_content(path: &Path) -> bool {

@@ -1,0 +1,183 @@
+//! Geometry of Houdini 12 and later (`.bgeo`, and `.bgeo.sc` as `compression` decodes it), in binary JSON.
+//!
+//! `binary_json` reads tokens, `numbers` arrays of them, `paged` the values of an attribute, `geometry` the layout of
+//! the file. Only points are read. Classic files, which have the same extension, are read by [`super::bgeo`].
+
+use glam::{DVec3, Vec3};
+
+use super::{ByteSource, Step, columns};
+use crate::format::Format;
+use crate::reader::{Confidence, FileExtent, Reader};
+use spherule_frame::{Attribute, AttributeData, MemoryBudget, ParseError, Positions, RawParticles};
+
+mod binary_json;
+mod geometry;
+mod numbers;
+mod paged;
+#[cfg(test)]
+mod tests;
+
+use geometry::Geometry;
+
+/// Geometry of Houdini 12 and later.
+pub const FORMAT: Format = Format::new(&Houdini);
+
+struct Houdini;
+
+impl Reader for Houdini {
+    fn name(&self) -> &'static str {
+        "houdini"
+    }
+
+    /// Those with the name of their compression; `.bgeo` is in the list of classic files.
+    fn extensions(&self) -> &'static [&'static str] {
+        &["bgeosc", "bgeogz"]
+    }
+
+    fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
+        Ok(Confidence::signature_if(binary_json::endian(head).is_some()))
+    }
+
+    fn steps(
+        &self,
+        source: &mut ByteSource<'_>,
+        _budget: MemoryBudget,
+    ) -> Result<Vec<Step>, ParseError> {
+        Ok(vec![Step::whole(source.bytes().len())])
+    }
+
+    /// Reads all points with all their attributes of numbers and strings, under the names of the file.
+    ///
+    /// Numbers have the type of the file; half precision becomes f32, and strings are indices of their table.
+    /// Positions of four components are divided by the last one unless it is 0 or 1.
+    fn read(
+        &self,
+        source: &mut ByteSource<'_>,
+        _step: &Step,
+        budget: MemoryBudget,
+    ) -> Result<RawParticles, ParseError> {
+        let bytes = source.bytes();
+        let mut geometry = Geometry::default();
+        geometry.read(bytes, budget)?;
+        particles(bytes, &geometry, budget)
+    }
+
+    /// The numbers of the largest attribute as they are stored.
+    fn unpacked_arrays_len(
+        &self,
+        _head: &[u8],
+        _file: FileExtent,
+        particles: &RawParticles,
+    ) -> u64 {
+        // Positions may have a fourth component
+        let largest = particles.largest_array_len();
+        largest + largest / 3
+    }
+
+    fn remarks_need_whole_file(&self) -> bool {
+        true
+    }
+
+    fn remarks(&self, bytes: &[u8]) -> Vec<String> {
+        let mut geometry = Geometry::default();
+        // What is before a fault, or the end of the bytes, counts; reading the file reports the fault
+        let _ = geometry.read(bytes, MemoryBudget::UNLIMITED);
+        let mut remarks = Vec::new();
+        let version = geometry.version.as_ref();
+        remarks.extend(version.map(|version| format!("geometry of Houdini {version}")));
+        if !geometry.primitive_types.is_empty() {
+            let types = geometry.primitive_types.join(", ");
+            remarks.push(format!(
+                "primitives ({types}) are not used; their points are read as particles"
+            ));
+        }
+        if !geometry.unread.is_empty() {
+            let names = geometry.unread.join(", ");
+            remarks.push(format!(
+                "point attributes that are neither numbers nor strings are not read: {names}"
+            ));
+        }
+        remarks
+    }
+
+    /// Houdini's axes.
+    fn is_y_up(&self, _head: &[u8]) -> bool {
+        true
+    }
+}
+
+/// The points of `geometry`, which is that of `bytes`.
+fn particles(
+    bytes: &[u8],
+    geometry: &Geometry<'_>,
+    budget: MemoryBudget,
+) -> Result<RawParticles, ParseError> {
+    if let Some(kind) = geometry.packed_type() {
+        let what = format!(
+            "geometry with packed primitives ({kind}), whose points are not read; unpack it in Houdini before it is \
+             saved (Unpack node)"
+        );
+        return Err(ParseError::unsupported(what));
+    }
+    let end = bytes.len();
+    let count = geometry.point_count;
+    let count =
+        count.ok_or_else(|| ParseError::malformed(end, "the file has no number of points"))?;
+    let endian = binary_json::endian(bytes);
+    let endian = endian.ok_or_else(|| ParseError::malformed(0, "not Houdini's binary JSON"))?;
+    let mut particles = RawParticles {
+        positions: Positions::F32(Vec::new()),
+        attributes: Vec::new(),
+        time: None,
+        step: None,
+        cell: None,
+        bonds: Vec::new(),
+    };
+    let mut has_positions = false;
+    for attribute in &geometry.attributes {
+        let left = budget.less(particles.byte_len());
+        let (name, size) = (&attribute.name, attribute.values.size);
+        if size == 0 {
+            continue;
+        }
+        let data = attribute.values.decode(name, count, endian, left)?;
+        if name != "P" {
+            particles.attributes.push(Attribute { name: name.clone(), components: size, data });
+        } else if !has_positions {
+            particles.positions = positions(data, size, count)?;
+            has_positions = true;
+        }
+    }
+    if !has_positions {
+        return Err(ParseError::malformed(end, "the points have no positions (attribute P)"));
+    }
+    Ok(particles)
+}
+
+/// Positions from the attribute P with `size` components.
+fn positions(data: AttributeData, size: usize, count: usize) -> Result<Positions, ParseError> {
+    match (size, data) {
+        (3, data) => Ok(columns::positions(vec![data], count)),
+        (4, AttributeData::F32(numbers)) => {
+            let divided = numbers.as_chunks().0.iter().map(|[x, y, z, w]| {
+                let position = Vec3::new(*x, *y, *z);
+                if *w == 0.0 || *w == 1.0 { position } else { position / *w }
+            });
+            Ok(Positions::F32(divided.collect()))
+        }
+        (4, AttributeData::F64(numbers)) => {
+            let divided = numbers.as_chunks().0.iter().map(|[x, y, z, w]| {
+                let position = DVec3::new(*x, *y, *z);
+                if *w == 0.0 || *w == 1.0 { position } else { position / *w }
+            });
+            Ok(Positions::F64(divided.collect()))
+        }
+        (_, data) => {
+            let scalar = data.scalar_type().name();
+            let what = format!(
+                "positions (attribute P) of {size} components of the type {scalar}, which are not read"
+            );
+            Err(ParseError::unsupported(what))
+        }
+    }
+}

@@ -1,0 +1,47 @@
+//! Remarks about a dump: what is not in the particles.
+
+use super::ITEM;
+use super::bounds::boundary_flags;
+use super::header::{DumpHeader, DumpItem};
+use crate::read::category;
+use crate::read::input::TextInput;
+use crate::read::remarks::cell_remark;
+use crate::read::text::{self, Lines};
+use spherule_frame::MemoryBudget;
+use spherule_frame::names::LAMMPS_CATEGORIES;
+
+/// See [`crate::read::remarks`].
+pub(in crate::read) fn remarks(head: &[u8]) -> Vec<String> {
+    let mut remarks = Vec::new();
+    let mut items = Lines::new(head, 0..head.len());
+    let bounds = items.find(|line| {
+        line.text.starts_with(ITEM)
+            && matches!(DumpItem::of(line.text), DumpItem::Bounds | DumpItem::Atoms)
+    });
+    if let Some(bounds) = bounds.filter(|line| DumpItem::of(line.text) == DumpItem::Bounds) {
+        let flags: Vec<_> =
+            boundary_flags(bounds.text).into_iter().map(String::from_utf8_lossy).collect();
+        let is_periodic = flags.iter().any(|flag| flag.contains('p'));
+        remarks.push(cell_remark(is_periodic.then(|| flags.join(" ")).as_deref()));
+    }
+    let mut text = TextInput::whole(head);
+    let Ok(header) = DumpHeader::parse(&mut text, MemoryBudget::UNLIMITED) else {
+        return remarks;
+    };
+    let start = text.at();
+    // The last line may be cut off.
+    let end = head.iter().rposition(|b| *b == b'\n').unwrap_or(start);
+    for (column, name) in header.names.iter().enumerate() {
+        let name = String::from_utf8_lossy(name);
+        if !LAMMPS_CATEGORIES.contains(&&*name) {
+            continue;
+        }
+        let rows = Lines::new(head, start..end.max(start)).take(header.count);
+        let names = rows.map_while(|row| {
+            let is_row = !row.text.starts_with(ITEM);
+            is_row.then(|| text::words(row.text).nth(column)).flatten()
+        });
+        remarks.extend(category::note(&name, names));
+    }
+    remarks
+}

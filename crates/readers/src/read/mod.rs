@@ -1,0 +1,57 @@
+//! Readers of foreign formats, one file each: implementations of `Reader`.
+//!
+//! Readers of binary formats work on the whole uncompressed file (`&[u8]`), readers of text on a `TextInput`, which
+//! holds a window of the file in memory. They trust none of it: they check every count against the bytes that are
+//! there, or against a budget, before they allocate.
+
+pub mod amber;
+mod atoms;
+pub mod bgeo;
+pub mod bi4;
+mod category;
+#[cfg(test)]
+mod cell_tests;
+pub mod columns;
+pub mod csv;
+#[cfg(test)]
+mod damage;
+pub mod dcd;
+pub mod gro;
+pub mod gsd;
+#[cfg(feature = "hdf5")]
+pub mod hdf5;
+pub mod houdini;
+mod input;
+pub mod lammps;
+pub mod mmcif;
+#[cfg(test)]
+mod molecule_tests;
+pub mod npy;
+mod numbers;
+pub mod pdb;
+#[cfg(test)]
+mod pieces;
+pub mod ply;
+pub mod psf;
+mod remarks;
+pub mod rst7;
+pub mod sniff;
+mod source;
+mod table;
+pub mod text;
+#[cfg(test)]
+mod text_samples;
+pub mod trr;
+pub mod usd;
+pub mod vtk;
+pub mod vtk_xml;
+mod xdr;
+pub mod xtc;
+pub mod xyz;
+
+pub use category::element_symbol;
+pub use input::{TextInput, stream_bytes};
+pub use source::ByteSource;
+pub use table::CUT_SHORT;
+
+pub use crate::step::Step;

@@ -1,0 +1,231 @@
+//! Protein Data Bank files: the positions of their atoms, one or many models.
+//!
+//! Text with fixed columns: each line is a record that begins with its name. Models are between `MODEL` and `ENDMDL`,
+//! or end with `END`. Lengths are A. After version 3.3 of the format.
+
+use super::atoms::{self, AtomTable, ELEMENT, RESIDUE, coordinate, field};
+use super::input::TextInput;
+use super::sniff::is_text;
+use super::text::{self, Line};
+use super::{ByteSource, Step, remarks};
+use crate::format::Format;
+use crate::reader::{Confidence, Reader, StreamUnit};
+use spherule_frame::{MemoryBudget, ParseError, RawParticles, SimulationCell};
+
+/// Protein Data Bank files.
+pub const FORMAT: Format = Format::new(&Pdb);
+
+struct Pdb;
+
+/// Names of records that files begin with.
+const OPENINGS: [&[u8]; 10] = [
+    b"HEADER", b"TITLE ", b"REMARK", b"CRYST1", b"COMPND", b"MODEL ", b"ATOM  ", b"HETATM",
+    b"EXPDTA", b"AUTHOR",
+];
+
+impl Reader for Pdb {
+    fn name(&self) -> &'static str {
+        "pdb"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["pdb", "ent"]
+    }
+
+    fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
+        if !is_text(head) {
+            return Ok(Confidence::No);
+        }
+        let mut lines = text::Lines::new(head, 0..head.len());
+        let opens = lines
+            .clone()
+            .next()
+            .is_some_and(|line| OPENINGS.iter().any(|name| line.text.starts_with(name)));
+        let is_sure = head.starts_with(b"HEADER    ")
+            || lines.any(|line| is_atom(line) && position(line).is_ok());
+        Ok(match opens {
+            true if is_sure => Confidence::Signature,
+            true => Confidence::IfNamed,
+            false if is_sure => Confidence::Likely,
+            false => Confidence::IfNamed,
+        })
+    }
+
+    fn may_hold_many_steps(&self) -> bool {
+        true
+    }
+
+    fn stream_unit(&self, _head: &[u8]) -> Option<StreamUnit> {
+        Some(StreamUnit::Words)
+    }
+
+    /// The cell may be before all models.
+    fn reads_steps_alone(&self, head: &[u8]) -> bool {
+        text::Lines::new(head, 0..head.len()).any(is_atom)
+    }
+
+    fn steps(
+        &self,
+        source: &mut ByteSource<'_>,
+        budget: MemoryBudget,
+    ) -> Result<Vec<Step>, ParseError> {
+        steps(source.text(), budget)
+    }
+
+    fn read(
+        &self,
+        source: &mut ByteSource<'_>,
+        step: &Step,
+        budget: MemoryBudget,
+    ) -> Result<RawParticles, ParseError> {
+        read(source.text(), step, budget)
+    }
+
+    fn remarks(&self, head: &[u8]) -> Vec<String> {
+        let mut remarks = vec![remarks::units("angstroms", None, None)];
+        let mut lines = text::Lines::new(head, 0..head.len());
+        if lines.any(is_cell) {
+            remarks.push(remarks::cell_remark(None));
+        }
+        remarks
+    }
+}
+
+fn is_atom(line: Line<'_>) -> bool {
+    line.text.starts_with(b"ATOM  ") || line.text.starts_with(b"HETATM")
+}
+
+/// The position of an atom.
+fn position(line: Line<'_>) -> Result<[f64; 3], ParseError> {
+    let mut position = [0.0; 3];
+    for (number, start) in position.iter_mut().zip([30, 38, 46]) {
+        *number = coordinate(line, start, start + 8)?;
+    }
+    Ok(position)
+}
+
+fn is_cell(line: Line<'_>) -> bool {
+    line.text.starts_with(b"CRYST1")
+}
+
+/// The cell in a record `CRYST1`. None if a number is damaged, or for a unit cube, which stands for no cell.
+fn cell(line: Line<'_>) -> Option<SimulationCell> {
+    let number = |(start, end)| text::number(field(line.text, start, end)).unwrap_or(f64::NAN);
+    let lengths = [(6, 15), (15, 24), (24, 33)].map(number);
+    let angles = [(33, 40), (40, 47), (47, 54)].map(number);
+    SimulationCell::from_angles(lengths, angles).filter(|_| lengths != [1.0; 3])
+}
+
+/// Whether a model ends with `line`.
+fn ends_model(line: Line<'_>) -> bool {
+    matches!(line.text.trim_ascii_end(), b"END" | b"ENDMDL")
+}
+
+/// The cell in the records of `head` before the first atom.
+fn header_cell(head: &[u8]) -> Option<SimulationCell> {
+    let records = text::Lines::new(head, 0..head.len()).take_while(|line| !is_atom(*line));
+    records.filter(|line| is_cell(*line)).last().and_then(cell)
+}
+
+/// The models: parts of the file that have atoms, up to a record for their end or to the next model. Records between
+/// two models are about the second one, but cells about the first one if that had none before its atoms.
+fn steps(text: &mut TextInput<'_>, budget: MemoryBudget) -> Result<Vec<Step>, ParseError> {
+    let mut steps = Vec::new();
+    let mut start = text.at();
+    let (mut has_atoms, mut number) = (false, None);
+    let mut has_cell_first = false;
+    loop {
+        let at = text.at();
+        let line = text.line();
+        let (is_cell, is_behind) = (line.is_some_and(is_cell), !has_atoms && !has_cell_first);
+        let model = line.and_then(|line| line.text.strip_prefix(b"MODEL "));
+        let next_number = model.and_then(|model| text::integer(model.trim_ascii()));
+        let (is_model, is_file_end) = (model.is_some(), line.is_none());
+        let is_end = is_model || line.is_none_or(ends_model);
+        has_atoms |= line.is_some_and(is_atom);
+        if is_end && has_atoms {
+            // Some files have no record at the end of a model.
+            let end = if is_model { at } else { text.at() };
+            Step::push(&mut steps, start..end, budget)?;
+            if let Some(step) = steps.last_mut() {
+                step.number = number;
+            }
+            (has_atoms, number, start) = (false, None, end);
+        }
+        match steps.last_mut() {
+            None => has_cell_first |= is_cell && !has_atoms,
+            Some(last) if is_cell && is_behind => {
+                start = text.at();
+                last.end_at(start);
+            }
+            Some(_) => {}
+        }
+        if is_model {
+            number = next_number;
+        }
+        if is_file_end {
+            break;
+        }
+    }
+    if steps.is_empty() {
+        // Reading it gives the error.
+        Step::push(&mut steps, 0..text.at(), budget)?;
+    }
+    Step::keep_increasing_numbers(&mut steps);
+    Ok(steps)
+}
+
+fn read(
+    text: &mut TextInput<'_>,
+    step: &Step,
+    budget: MemoryBudget,
+) -> Result<RawParticles, ParseError> {
+    let range = step.byte_range().cloned().unwrap_or_default();
+    // What precedes the first model is about all of them. Atoms are not passed: text in pieces only goes forward.
+    let mut cell = if text.at() > 0 { header_cell(text.head()) } else { None };
+    while text.at() < range.start {
+        let Some(line) = text.peek_line().filter(|line| !is_atom(*line)) else {
+            break;
+        };
+        if is_cell(line) {
+            cell = self::cell(line);
+        }
+        text.line();
+    }
+    text.go_to(range.start);
+    text.end_at(range.end);
+    let real = [("occupancy", 1), ("b_factor", 1)];
+    let mut atoms = AtomTable::new(&[ELEMENT, RESIDUE], &real, budget);
+    while let Some(line) = text.line() {
+        if is_cell(line) {
+            cell = self::cell(line);
+        }
+        if !is_atom(line) {
+            continue;
+        }
+        let position = position(line)?;
+        let [name, residue, symbol] =
+            [(12, 16), (17, 21), (76, 78)].map(|(start, end)| field(line.text, start, end));
+        let whole = [
+            atoms::element(symbol, name, residue),
+            text::integer(field(line.text, 22, 26)).unwrap_or_default(),
+        ];
+        let real = [(54, 60, 1.0), (60, 66, 0.0)].map(|(start, end, default)| {
+            text::number(field(line.text, start, end)).unwrap_or(default)
+        });
+        atoms.push(position, &whole, &real)?;
+    }
+    if atoms.is_empty() {
+        let what = "no ATOM or HETATM records: the file has no positions";
+        return Err(ParseError::malformed(range.start, what));
+    }
+    let (positions, attributes) = atoms.into_parts();
+    Ok(RawParticles {
+        positions,
+        attributes,
+        time: None,
+        step: step.number,
+        cell,
+        bonds: Vec::new(),
+    })
+}

@@ -1,0 +1,196 @@
+//! The interface between a file format and the rest of the crate.
+//!
+//! Each format implements [`Reader`] in its own file. `registry.rs` lists the formats. Detection, opening,
+//! sequences and conversion use that list and refer to no format by name.
+
+use crate::ranges::ParticleRanges;
+use crate::read::ByteSource;
+use crate::read::columns::ParticleLayout;
+use crate::shared::SharedBytes;
+use crate::step::Step;
+use spherule_frame::{MemoryBudget, ParseError, RawParticles};
+
+/// Number of bytes that detection examines. A shorter file is passed as a whole.
+pub const HEAD_LEN: usize = 4096;
+
+/// How well the first bytes of a file match a format, from weakest to strongest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Confidence {
+    /// The file is not of this format.
+    No,
+    /// The file may be of this format; it is if its name has an extension of the format.
+    IfNamed,
+    /// The content looks like this format. The file is of this format unless its name has an extension of
+    /// another format.
+    Likely,
+    /// The file has the signature of this format. The name does not matter.
+    Signature,
+}
+
+impl Confidence {
+    /// [`Self::Signature`] if the file has one.
+    pub const fn signature_if(has_signature: bool) -> Self {
+        if has_signature { Self::Signature } else { Self::No }
+    }
+}
+
+/// The unit of a text format, which decides how much memory reading it in pieces needs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StreamUnit {
+    /// Rows of a table: several pieces are parsed in parallel.
+    Rows,
+    /// Numbers separated by white space: one piece is parsed at a time.
+    Words,
+}
+
+/// The size of a file.
+#[derive(Debug, Clone, Copy)]
+pub struct FileExtent {
+    /// Decompressed length, bytes.
+    pub byte_len: u64,
+    /// Number of time steps.
+    pub step_count: u64,
+}
+
+/// Reads the files of one format. A reader trusts nothing in a file: before it allocates, it checks every count
+/// against the available bytes or against a budget.
+pub trait Reader: Sync {
+    /// Name of the format in reports and messages, distinct for each format.
+    fn name(&self) -> &'static str;
+
+    /// File name extensions, in lower case without the dot.
+    fn extensions(&self) -> &'static [&'static str];
+
+    /// Whether a file name is typical of this format. `stem` and `extension` are in lower case and without the
+    /// extension of a compression.
+    fn matches_name(&self, _stem: &str, extension: &str) -> bool {
+        self.extensions().contains(&extension)
+    }
+
+    /// How well `head` matches: the first bytes of an uncompressed file, up to [`HEAD_LEN`].
+    ///
+    /// # Errors
+    /// [`ParseError::Unsupported`] for a related format that is not read, with a remedy.
+    fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError>;
+
+    /// True if files may begin with any bytes, so that short signatures of other formats prove nothing.
+    fn has_no_signature(&self) -> bool {
+        false
+    }
+
+    /// True if a file may hold several time steps. Such files are opened to count their steps, and large ones
+    /// are mapped instead of read as a whole.
+    fn may_hold_many_steps(&self) -> bool {
+        false
+    }
+
+    /// The unit in which a file that begins with `head` and is longer can be read in pieces; `None` if it
+    /// cannot. If it can, the reader may use nothing but [`ByteSource::text`].
+    fn stream_unit(&self, _head: &[u8]) -> Option<StreamUnit> {
+        None
+    }
+
+    /// Whether a step of a file that is read in pieces needs nothing of what is before it but `head`, the beginning of
+    /// the file.
+    fn reads_steps_alone(&self, _head: &[u8]) -> bool {
+        true
+    }
+
+    /// Lists the time steps of a file. A truncated step is listed too, so that reading it gives the error.
+    ///
+    /// # Errors
+    /// [`ParseError`]; [`ParseError::TooLarge`] if the list needs more memory than `budget` allows.
+    fn steps(
+        &self,
+        source: &mut ByteSource<'_>,
+        budget: MemoryBudget,
+    ) -> Result<Vec<Step>, ParseError>;
+
+    /// Reads one of the [`Self::steps`]. `budget` limits everything except the bytes of `source`.
+    ///
+    /// # Errors
+    /// [`ParseError`].
+    fn read(
+        &self,
+        source: &mut ByteSource<'_>,
+        step: &Step,
+        budget: MemoryBudget,
+    ) -> Result<RawParticles, ParseError>;
+
+    /// The layout of the numbers of the only step, if they have fixed strides in the uncompressed file `bytes`.
+    /// Conversion then reads them from the mapped file. The particles and the errors must be the same as with
+    /// [`Self::read`].
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    fn layout(&self, _bytes: &[u8]) -> Result<Option<ParticleLayout>, ParseError> {
+        Ok(None)
+    }
+
+    /// The particles of the only step as ranges of the mapped `file`, if they are not in a [`Self::layout`] but can be
+    /// read without decoding the whole file. Conversion then does so. The particles and the errors must be the same
+    /// as with [`Self::read`].
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    fn ranges(&self, _file: &SharedBytes) -> Result<Option<Box<dyn ParticleRanges>>, ParseError> {
+        Ok(None)
+    }
+
+    /// Bytes held beside the file and the numbers of `particles` while they are read: those of the largest array, if
+    /// the arrays of the file are compressed or encoded. `head` is the part of the file that is in memory.
+    fn unpacked_arrays_len(
+        &self,
+        _head: &[u8],
+        _file: FileExtent,
+        _particles: &RawParticles,
+    ) -> u64 {
+        0
+    }
+
+    /// Whether files may refer to others that are not steps of their own.
+    fn may_refer_to_files(&self) -> bool {
+        false
+    }
+
+    /// Opens the files beside `file` that have particles of it, as far as they exist.
+    fn open_referenced(&self, _file: &SharedBytes) {}
+
+    /// Whether [`Self::remarks`] needs all bytes of a file. It gets them if the file is not compressed.
+    fn remarks_need_whole_file(&self) -> bool {
+        false
+    }
+
+    /// Notes for the user about a file that begins with `head`, on things that are not in its particles: a
+    /// simulation cell, or names behind numbers.
+    fn remarks(&self, _head: &[u8]) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// [`Self::remarks`] of all bytes of a file.
+    fn remarks_of_file(&self, file: &SharedBytes) -> Vec<String> {
+        self.remarks(file)
+    }
+
+    /// Number of files that the step in `file` is divided among.
+    fn piece_count(&self, _file: &SharedBytes) -> u64 {
+        1
+    }
+
+    /// Whether `file` has no values of its own but those of the files that its step is divided among, which are beside
+    /// it.
+    fn refers_to_pieces(&self, _file: &SharedBytes) -> bool {
+        false
+    }
+
+    /// True if users of the program that wrote the file expect y to point up. `_bytes` are the first bytes of the file,
+    /// or all if [`Self::remarks_need_whole_file`] and the file is not compressed.
+    fn is_y_up(&self, _bytes: &[u8]) -> bool {
+        false
+    }
+
+    /// Length of an angstrom in the unit of positions, if that is fixed by the format.
+    fn angstrom(&self) -> f64 {
+        1.0
+    }
+}
