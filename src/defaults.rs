@@ -10,7 +10,8 @@ use crate::manifest::{
     CameraMode, ColorSetting, Look, Manifest, ManifestSource, Override, ProjectionKind,
 };
 use crate::render::IntegratorKind;
-use crate::survey::{Category, ELEMENT, Facts};
+use crate::surface::SurfaceKind;
+use crate::survey::{Category, ELEMENT, Facts, WallSign, WallValues};
 
 mod parts;
 mod planned;
@@ -19,8 +20,9 @@ pub use parts::{Walls, walls};
 pub use planned::planned;
 
 /// The keys that rules set, except overlays. A job that goes on has the values of its plan.
-const KEYS: [&str; 17] = [
+const KEYS: [&str; 18] = [
     "input.radius",
+    "input.up",
     "input.parts",
     "select.where",
     "camera.projection",
@@ -52,9 +54,9 @@ const FOV: f64 = 25.0;
 /// The side from which cells are seen, degrees: three faces show, and their edges remain nearly upright.
 const CELL_VIEW: [f64; 2] = [20.0, 12.0];
 
-/// A cell is drawn if the particles extend along at least this part of its longest edge; in a larger one they would be
-/// small.
-const FILLED: f64 = 0.4;
+/// A cell is drawn if the particles extend along at least this part of two of its edges, as in a crystal, a liquid or a
+/// slab; in a larger one they would be small.
+const FILLED: f64 = 0.7;
 
 /// The part of the particles that must be in a cell that is drawn: those of a molecule that was made whole, or moved, are
 /// not.
@@ -107,9 +109,13 @@ pub fn rules(
     if matches!(manifest.look, Look::None | Look::Whitted) || facts.particles == 0 {
         return rules.found;
     }
-    let left_out = rules.leave_out();
+    rules.up();
+    rules.lone();
+    rules.random();
+    let has_left_out = rules.leave_out();
     rules.elements();
-    rules.categories(&left_out);
+    rules.categories(has_left_out);
+    rules.scalar();
     rules.neutral();
     rules.cell();
     rules.floor();
@@ -151,9 +157,9 @@ impl Rules<'_> {
         is_own && self.manifest.integrator() == IntegratorKind::Path
     }
 
-    /// Leaves out virtual sites, and particles at rest around others that move.
-    fn leave_out(&mut self) -> Vec<(String, Vec<i64>)> {
-        let mut left_out = Vec::new();
+    /// Leaves out virtual sites and walls. Whether there are walls, and they are left out.
+    fn leave_out(&mut self) -> bool {
+        let mut has_left_out = false;
         if self.facts.elements.is_some_and(|elements| elements.has_others) {
             let line = "left out: virtual sites and other particles that are no atoms (--where 'element >= 0' \
                         shows them)";
@@ -166,21 +172,25 @@ impl Rules<'_> {
         // Parts with names are walls by these alone
         let has_names = |c: &&Category| c.name == PART_ATTRIBUTE && self.files.parts.len() > 1;
         let mut all = self.facts.categories.iter().filter(|c| !has_names(c));
-        let category = all.find(|c| !c.at_rest.is_empty());
-        if let Some(Category { name, at_rest, .. }) = category.filter(|_| !is_molecular) {
-            let all: Vec<String> = at_rest.iter().map(|v| format!("{name} != {v}")).collect();
-            let values: Vec<String> = at_rest.iter().map(i64::to_string).collect();
+        let found = all.find_map(|c| Some((c, c.walls.as_ref()?)));
+        if let Some((Category { name, .. }, walls)) = found.filter(|_| !is_molecular) {
+            let WallValues { values, sign } = walls;
+            let all: Vec<String> = values.iter().map(|v| format!("{name} != {v}")).collect();
+            let texts: Vec<String> = values.iter().map(i64::to_string).collect();
+            let why = match sign {
+                WallSign::Code(kind) => format!("walls by the codes of {kind}"),
+                WallSign::Rest => "which rest around the others".to_owned(),
+                WallSign::Around => "which surround the others".to_owned(),
+            };
             let line = format!(
-                "left out: particles with {name} {}, which rest around the others (--where '{name} >= {}' shows them)",
-                values.join(", "),
-                at_rest.first().copied().unwrap_or_default()
+                "left out: particles with {name} {}, {why} (--where '{name} >= {}' shows them)",
+                texts.join(", "),
+                values.first().copied().unwrap_or_default()
             );
-            if self.lacks("select.where") {
-                left_out.push((name.clone(), at_rest.clone()));
-            }
+            has_left_out = self.lacks("select.where");
             self.set([("select.where", all.join(" && ").into())], Some(line));
         }
-        left_out
+        has_left_out
     }
 
     /// Elements have their colours and radii, and the bonds of the file are drawn.
@@ -193,10 +203,16 @@ impl Rules<'_> {
             return;
         }
         let has_bonds = self.facts.has_bonds && self.source.lacks("bonds.find");
-        let (radius, name): (Value, _) = if has_bonds {
-            let keys = [("table", Value::from("covalent")), ("scale", 0.5.into())];
+        let covalent = |scale: f64| -> Value {
+            let keys = [("table", Value::from("covalent")), ("scale", scale.into())];
             let keys = keys.map(|(key, value)| (key.to_owned(), value));
-            (toml::Table::from_iter(keys).into(), "half their covalent radii")
+            toml::Table::from_iter(keys).into()
+        };
+        let is_solid = self.facts.elements.is_some_and(|elements| elements.is_solid);
+        let (radius, name) = if has_bonds {
+            (covalent(0.5), "half their covalent radii")
+        } else if is_solid {
+            (covalent(1.0), "their covalent radii")
         } else {
             ("vdw".into(), "their van der Waals radii")
         };
@@ -218,19 +234,18 @@ impl Rules<'_> {
     }
 
     /// Few integers are categories.
-    fn categories(&mut self, left_out: &[(String, Vec<i64>)]) {
-        let remaining = |category: &&Category| {
-            let gone = left_out.iter().find(|(name, _)| *name == category.name);
-            category.values.len() - gone.map_or(0, |(_, values)| values.len()) > 1
+    fn categories(&mut self, has_left_out: bool) {
+        let values = |category: &Category| {
+            if has_left_out { category.without_walls.len() } else { category.values.len() }
         };
-        let Some(category) = self.facts.categories.iter().find(remaining) else {
+        let Some(category) = self.facts.categories.iter().find(|c| values(c) > 1) else {
             return;
         };
         if self.facts.elements.is_none() && !self.facts.has_colors && self.has_open_colors() {
             let line = format!(
                 "coloured by `{}`, {} categories (--color-by gives another value)",
                 category.name,
-                category.values.len()
+                values(category)
             );
             self.set(
                 [
@@ -259,6 +274,57 @@ impl Rules<'_> {
         }
     }
 
+    /// Particles at one place have no spacing.
+    fn lone(&mut self) {
+        let is_point = self.facts.bounds.is_some_and(|(min, max)| min == max);
+        if is_point && !self.facts.has_radii && self.facts.elements.is_none() {
+            let line =
+                "radius 1, as particles at one place have no spacing (--radius gives another)";
+            self.set([("input.radius", 1.0.into())], Some(line.to_owned()));
+        }
+    }
+
+    /// Particles at random distances have the radius that follows from their density.
+    fn random(&mut self) {
+        let is_open = self.facts.elements.is_none() && self.facts.flat_axis().is_none();
+        if let Some(radius) = self.facts.random_radius.filter(|_| is_open && !self.draws_a_body()) {
+            let radius = three_digits(radius);
+            let line = format!(
+                "radius {radius}, from the density, as the particles are at random distances (--radius gives another)"
+            );
+            self.set([("input.radius", radius.into())], Some(line));
+        }
+    }
+
+    /// Whether the particles are drawn as one body.
+    fn draws_a_body(&self) -> bool {
+        self.manifest.surface.kind != SurfaceKind::Spheres
+    }
+
+    /// Which way is up, where neither the format nor the user says it.
+    fn up(&mut self) {
+        if self.facts.is_y_up
+            && !self.files.is_y_up
+            && self.facts.elements.is_none()
+            && !self.is_periodic()
+        {
+            let line =
+                "up is y: the particles lie on a plane at the lower end of the y axis (--up z)";
+            self.set([("input.up", "y".into())], Some(line.to_owned()));
+        }
+    }
+
+    /// Particles without velocities have the colours of a scalar.
+    fn scalar(&mut self) {
+        let facts = self.facts;
+        let is_open = !facts.has_velocities && !facts.has_colors && self.has_open_colors();
+        let name = facts.scalar.as_ref().filter(|_| is_open && !self.has_set(COLOR));
+        if let Some(name) = name {
+            let line = format!("coloured by `{name}` (--color-by gives another value)");
+            self.set([("material.color.attribute", name.clone().into())], Some(line));
+        }
+    }
+
     /// Particles without values for colours have a neutral one.
     fn neutral(&mut self) {
         if !self.facts.has_velocities && !self.facts.has_colors {
@@ -274,11 +340,8 @@ impl Rules<'_> {
 
     /// A simulation cell is drawn without perspective.
     fn cell(&mut self) {
-        let (Some(cell), Some((min, max))) = (&self.facts.cell, self.facts.bounds) else {
-            return;
-        };
-        let longest = cell.vectors.iter().map(|v| v.length()).fold(0.0, f64::max);
-        if (max - min).max_element() < FILLED * longest || self.facts.in_cell < INSIDE {
+        let filled = self.facts.cell_extent.iter().filter(|part| **part >= FILLED).count();
+        if self.facts.cell.is_none() || filled < 2 || self.facts.in_cell < INSIDE {
             return;
         }
         let line =
@@ -325,20 +388,26 @@ impl Rules<'_> {
         let (Some(axis), true) = (self.facts.flat_axis(), self.is_placed_automatically()) else {
             return;
         };
-        let usual = if self.files.is_y_up { DVec3::Y } else { DVec3::Z };
+        let is_y_up = self.files.is_y_up || self.has_set("input.up");
+        let usual = if is_y_up { DVec3::Y } else { DVec3::Z };
         let own = self.manifest.input.up.map(|up| DVec3::from_array(up.vector()));
         let side = side_along(axis, own.unwrap_or(usual));
         if self.lacks("camera.azimuth") && self.lacks("camera.elevation") {
             self.set([("camera.view", side.into())], None);
         }
+        // Atoms are told apart by their shading, and so are particles of one colour
+        let is_lit = self.facts.elements.is_some() || !self.has_mapped_colors();
+        let light = if is_lit { "" } else { " in flat light" };
         let line = format!(
-            "the particles lie in a plane: seen from the {side} in flat light (--view and --integrator path give \
-             others)"
+            "the particles lie in a plane: seen from the {side}{light} (--view and --integrator path give others)"
         );
         self.set(
             [("camera.projection", "orthographic".into()), ("render.ground", "none".into())],
             Some(line),
         );
+        if is_lit {
+            return;
+        }
         if self.is_white() && self.lacks("render.integrator") && self.has_plain_material() {
             self.set(
                 [
@@ -412,6 +481,11 @@ impl Rules<'_> {
             }
         }
     }
+}
+
+/// A positive number with three significant digits.
+fn three_digits(value: f64) -> f64 {
+    format!("{value:.2e}").parse().unwrap_or(value)
 }
 
 /// The side from which a plane without extent along `axis` is seen.

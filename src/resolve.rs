@@ -217,6 +217,7 @@ pub fn setup(
         origin: survey.origin,
         has_layer: survey.rests_on_floor(up),
         is_of_earlier_version: survey.standing.is_none(),
+        lowest: survey.lowest,
     };
     let ground = ground::ground(manifest, &floor)?;
     let wet_ground = ground::wet_ground(manifest, &floor);

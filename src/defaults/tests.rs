@@ -4,7 +4,7 @@ use spherule_formats::SimulationCell;
 
 use super::*;
 use crate::manifest::{AxisView, BondSearch, OverlayKind, RadiusSetting, TextSize};
-use crate::survey::Elements;
+use crate::survey::{Elements, WallSign, WallValues};
 
 /// Facts of a thousand particles in a unit cube without attributes.
 fn facts() -> Facts {
@@ -12,7 +12,11 @@ fn facts() -> Facts {
 }
 
 fn category(name: &str, values: &[i64], at_rest: &[i64]) -> Category {
-    Category { name: name.to_owned(), values: values.to_vec(), at_rest: at_rest.to_vec() }
+    let walls = WallValues { values: at_rest.to_vec(), sign: WallSign::Rest };
+    let walls = Some(walls).filter(|walls| !walls.values.is_empty());
+    let kept = values.iter().filter(|value| !at_rest.contains(value));
+    let without_walls = kept.copied().collect();
+    Category { name: name.to_owned(), values: values.to_vec(), walls, without_walls }
 }
 
 /// The manifest of `text` with the defaults that follow from `facts`, and the lines of the rules.
@@ -49,7 +53,7 @@ fn has_legend(manifest: &Manifest) -> bool {
 #[test]
 fn elements_have_their_colours_and_radii() {
     let mut atoms = facts();
-    atoms.elements = Some(Elements { has_others: true });
+    atoms.elements = Some(Elements { has_others: true, is_solid: false });
     atoms.has_velocities = true;
     atoms.has_time = true;
     let (manifest, lines) = completed("", &atoms, Files::default());
@@ -91,8 +95,11 @@ fn categories_come_before_speed_and_walls_are_left_out() {
     let condition = ("select.where".to_owned(), "\"type != 0 && type != 3\"".to_owned());
     assert!(manifest.settings().contains(&condition));
     assert!(lines.contains("left out: particles with type 0, 3"), "{lines}");
+    // Nor do other categories that the walls alone had
+    fluid.categories.push(Category { without_walls: vec![1], ..category("mk", &[1, 11], &[]) });
+    assert_eq!(attribute(&of("", &fluid)), None);
     // Frozen atoms are no walls
-    fluid.elements = Some(Elements { has_others: false });
+    fluid.elements = Some(Elements { has_others: false, is_solid: false });
     assert!(of("", &fluid).select.condition.is_none());
 }
 
@@ -119,22 +126,27 @@ fn cells_are_drawn_if_the_particles_fill_them() {
     let mut crystal = facts();
     crystal.cell = Some(cell(1.0));
     crystal.in_cell = 1.0;
+    crystal.cell_extent = [1.0; 3];
     let manifest = of("", &crystal);
     assert!(manifest.cell.visible);
     assert_eq!(manifest.camera.projection, ProjectionKind::Orthographic);
     assert_eq!(manifest.camera.angles(DVec3::Z), CELL_VIEW);
     let side = of("camera.view = \"front\"", &crystal);
     assert_eq!(side.camera.view, Some(AxisView::Front));
-    for (edge, in_cell) in [(10.0, 1.0), (1.0, 0.5)] {
-        crystal.cell = Some(cell(edge));
+    // A slab with empty space above it, a heap in a large domain, and molecules that were made whole
+    for (extent, in_cell, is_drawn) in
+        [([1.0, 1.0, 0.3], 1.0, true), ([0.9, 0.5, 0.5], 1.0, false), ([1.0; 3], 0.5, false)]
+    {
+        crystal.cell_extent = extent;
         crystal.in_cell = in_cell;
-        assert!(!of("", &crystal).cell.visible, "{edge} {in_cell}");
+        assert_eq!(of("", &crystal).cell.visible, is_drawn, "{extent:?} {in_cell}");
     }
 }
 
 #[test]
 fn planes_are_seen_from_their_front_in_flat_light() {
     let mut plane = facts();
+    plane.has_velocities = true;
     for (max, is_y_up, side) in [
         (DVec3::new(1.0, 0.0, 1.0), false, AxisView::Front),
         (DVec3::new(1.0, 1.0, 0.0), false, AxisView::Top),
@@ -148,6 +160,11 @@ fn planes_are_seen_from_their_front_in_flat_light() {
         assert_eq!(manifest.integrator(), IntegratorKind::Whitted);
         assert_eq!(manifest.camera.projection, ProjectionKind::Orthographic);
     }
+    // Shading tells atoms apart, and particles of one colour
+    let lit = |plane: &Facts| of("", plane).integrator() == IntegratorKind::Path;
+    let one_color = Facts { has_velocities: false, ..plane.clone() };
+    let elements = Some(Elements { has_others: false, is_solid: false });
+    assert!(lit(&one_color) && lit(&Facts { elements, ..plane.clone() }) && !lit(&plane));
     // Nor is anything but the light of a material that is given
     let glass = of("material.transmission = 1", &plane);
     assert_eq!(glass.material.constants.transmission, 1.0);
@@ -188,7 +205,7 @@ fn looks_have_their_own_rules() {
 #[test]
 fn jobs_that_go_on_have_the_defaults_of_their_plan() {
     let mut atoms = facts();
-    atoms.elements = Some(Elements { has_others: true });
+    atoms.elements = Some(Elements { has_others: true, is_solid: false });
     atoms.has_time = true;
     let begun = of("", &atoms);
     for text in [
@@ -212,4 +229,62 @@ fn jobs_that_go_on_have_the_defaults_of_their_plan() {
     let resumed = source.parse_over(planned(&source, &plain.settings())).unwrap();
     assert_eq!(resumed.settings(), plain.settings());
     assert_ne!(begun.settings(), plain.settings());
+}
+
+#[test]
+fn solids_have_covalent_radii() {
+    let mut crystal = facts();
+    crystal.elements = Some(Elements { has_others: false, is_solid: true });
+    let (manifest, lines) = completed("", &crystal, Files::default());
+    let expected = RadiusSetting::Table {
+        attribute: ELEMENT.to_owned(),
+        table: crate::scene::RadiusTable::Covalent,
+        scale: 1.0,
+    };
+    assert_eq!(manifest.input.radius, expected);
+    assert!(lines.contains("their covalent radii"), "{lines}");
+}
+
+#[test]
+fn scalars_colour_particles_without_velocities() {
+    let mut hot = facts();
+    hot.scalar = Some("Temperature".to_owned());
+    assert_eq!(attribute(&of("", &hot)), Some("Temperature"));
+    assert!(has_legend(&of("", &hot)));
+    assert_eq!(attribute(&of("material.color = [1, 0, 0]", &hot)), None);
+    hot.has_velocities = true;
+    assert_eq!(attribute(&of("", &hot)), None);
+    hot.has_velocities = false;
+    hot.categories = vec![category("type", &[1, 2], &[])];
+    assert_eq!(attribute(&of("", &hot)), Some("type"));
+}
+
+#[test]
+fn particles_on_a_plane_below_y_are_upright() {
+    let heap = Facts { is_y_up: true, ..facts() };
+    let up = |text: &str, facts: &Facts| of(text, facts).input.up.map(|up| up.vector());
+    assert_eq!(up("", &heap), Some([0.0, 1.0, 0.0]));
+    assert_eq!(up("input.up = \"z\"", &heap), Some([0.0, 0.0, 1.0]));
+    assert_eq!(up("", &facts()), None);
+    // A format that says so needs no rule
+    let files = Files { is_y_up: true, ..Files::default() };
+    assert_eq!(completed("", &heap, files).0.input.up, None);
+}
+
+#[test]
+fn particles_at_one_place_have_a_radius() {
+    let mut point = facts();
+    point.bounds = Some((DVec3::ONE, DVec3::ONE));
+    let (manifest, lines) = completed("", &point, Files::default());
+    assert_eq!(manifest.input.radius, RadiusSetting::Length(1.0));
+    assert!(lines.contains("radius 1"), "{lines}");
+}
+
+#[test]
+fn particles_at_random_distances_have_the_radius_of_their_density() {
+    let mut gas = facts();
+    gas.random_radius = Some(0.012_345);
+    assert_eq!(of("", &gas).input.radius, RadiusSetting::Length(0.0123));
+    assert_eq!(of("input.radius = 0.5", &gas).input.radius, RadiusSetting::Length(0.5));
+    assert_eq!(of("render.surface = \"smooth\"", &gas).input.radius, RadiusSetting::Auto);
 }

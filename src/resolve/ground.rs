@@ -40,6 +40,8 @@ pub(super) struct Floor<'a> {
     pub(super) has_layer: bool,
     /// Whether the job is of an earlier version: spheres are sunk in a shadow catcher, whose shadows reach far.
     pub(super) is_of_earlier_version: bool,
+    /// The lowest place of spheres with radii of their own along `up`, world units.
+    pub(super) lowest: Option<f64>,
 }
 
 /// The ground of `render.ground`, if there is one.
@@ -81,6 +83,10 @@ pub(super) fn ground(
         // Raise it to the lowest centres: between a body that only touched the ground and the ground itself would be
         // a thin layer of air, which reflects all light at grazing angles
         ground.raise(narrow(floor.reach));
+    } else if let Some(lowest) = floor.lowest {
+        // The lowest sphere may be smaller than most
+        let relative = narrow(lowest - origin.dot(up.normalize_or(DVec3::Z)));
+        ground.raise((relative - ground.height).max(0.0));
     } else if is_catcher && floor.is_of_earlier_version {
         let most = (SUNK * bounds.diagonal()).powi(2) / floor.reach;
         ground.raise(narrow(floor.reach.min(most)));
@@ -161,6 +167,7 @@ mod tests {
             origin: DVec3::ZERO,
             has_layer,
             is_of_earlier_version: true,
+            lowest: None,
         }
     }
 
@@ -195,6 +202,9 @@ mod tests {
         let mut manifest = Manifest::new("in");
         manifest.render.ground = Some(GroundSetting::of(GroundKind::ShadowCatcher));
         assert_eq!(ground(&manifest, &standing).unwrap().unwrap().height, 3.0);
+        // Spheres of different sizes: the lowest one is smaller than most
+        let mixed = Floor { lowest: Some(3.4), ..standing };
+        assert_eq!(ground(&manifest, &mixed).unwrap().unwrap().height, 3.4);
         let under_body = of(GroundKind::ShadowCatcher, |m| {
             m.surface.kind = SurfaceKind::Union;
         });

@@ -214,17 +214,24 @@ fn named(categories: &[(i64, Vec3)], manifest: &Manifest) -> Vec<(String, Color)
     all.map(|(value, color)| (name(*value), srgb(*color))).collect()
 }
 
-/// The time, with decimals for the time between frames, or the frame number.
+/// The time, with decimals for the time between frames or for three digits of the only time, or the frame number.
 fn time_stamp(survey: &Survey) -> Template {
-    let text = match survey.frame_time {
-        Some(step) if step > 0.0 => {
-            let decimals = (0..6).find(|decimals| {
-                let scale = f64::from(10_u32.pow(*decimals));
-                (step * scale).round() / scale >= 0.95 * step && (step * scale).round() >= 1.0
-            });
-            format!("t = {{time:.{}f}}", decimals.unwrap_or(6))
-        }
-        _ => "frame {frame}".to_owned(),
+    let decimals = |is_enough: &dyn Fn(f64) -> bool| {
+        (0..6).find(|decimals| is_enough(f64::from(10_u32.pow(*decimals)))).unwrap_or(6)
+    };
+    let step = survey.frame_time.filter(|step| *step > 0.0);
+    let decimals = match (step, survey.largest_time) {
+        (Some(step), _) => Some(decimals(&|scale| {
+            (step * scale).round() / scale >= 0.95 * step && (step * scale).round() >= 1.0
+        })),
+        (None, Some(time)) => Some(decimals(&|scale| {
+            time == 0.0 || time * scale >= 100.0 || (time * scale).fract() == 0.0
+        })),
+        (None, None) => None,
+    };
+    let text = match decimals {
+        Some(decimals) => format!("t = {{time:.{decimals}f}}"),
+        None => "frame {frame}".to_owned(),
     };
     Template::parse(&text).expect("a text with known variables")
 }

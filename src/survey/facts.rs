@@ -7,19 +7,35 @@ use glam::{DMat3, DVec3};
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{
     Attribute, FrameError, PositionSlice, Positions, RawParticles, SimulationCell, find_radius,
-    sample_indices,
+    names, sample_indices,
 };
 
-use super::robust::{robust_bounds, sample_of};
+use super::packing::Spacing;
+use super::robust::{robust_bounds, robust_range, sample_of, sorted_sample};
 use super::sample::FrameSample;
+use super::upright::is_y_up;
+use super::walls::{Member, WallValues, walls};
 use super::{ColorQuestion, Fit, Question, RadiusQuestion, RgbAttribute, velocity_of};
 
 /// The attribute with atomic numbers.
 pub const ELEMENT: &str = "element";
 
 /// Names of attributes whose integers are categories, best first.
-const CATEGORIES: [&str; 8] =
-    ["type", "typeid", "species", "element", "phase", "part", "material", "mk"];
+const CATEGORIES: [&str; 13] = [
+    "type",
+    "typeid",
+    "species",
+    "element",
+    "phase",
+    "part",
+    "material",
+    "mk",
+    "boundary",
+    "is_boundary",
+    "isboundary",
+    "is_wall",
+    "wall",
+];
 
 /// Most values of an attribute that are categories unasked: more colours cannot be told apart in a legend.
 const MOST_CATEGORIES: usize = 12;
@@ -30,6 +46,34 @@ const SAMPLE: usize = 1 << 17;
 /// An axis is flat if the particles extend along it by less than this part of their longest extent.
 const FLAT: f64 = 1e-3;
 
+/// Names of scalars by which particles without velocities are coloured, best first.
+const SCALARS: [&str; 24] = [
+    "temperature",
+    "temp",
+    "T",
+    "concentration",
+    "c",
+    "pressure",
+    "press",
+    "p",
+    "density",
+    "rho",
+    "rhop",
+    "energy",
+    "u",
+    "stress",
+    "strain",
+    "damage",
+    "porosity",
+    "saturation",
+    "volume_fraction",
+    "intensity",
+    "charge",
+    "q",
+    "b_factor",
+    "value",
+];
+
 /// The largest atomic number.
 const LAST_ELEMENT: i64 = 118;
 
@@ -38,12 +82,19 @@ const LAST_ELEMENT: i64 = 118;
 pub struct Facts {
     /// Particle count.
     pub particles: usize,
-    /// Whether there are velocities.
+    /// Whether there are velocities, and not all of them are zero.
     pub has_velocities: bool,
+    /// What colours particles without velocities: a velocity in a plane, or a scalar with a known name whose values differ.
+    pub scalar: Option<String>,
+    /// Whether the particles lie at the lower end of the y axis as on a floor, and not along z.
+    pub is_y_up: bool,
     /// Whether there is an attribute with colours.
     pub has_colors: bool,
     /// Whether there are radii.
     pub has_radii: bool,
+    /// The radius of particles at random distances, whose nearest neighbours are much nearer than others: it follows from
+    /// their density. Only without radii.
+    pub random_radius: Option<f64>,
     /// Whether there is a simulation time.
     pub has_time: bool,
     /// Whether the file lists bonds.
@@ -56,6 +107,8 @@ pub struct Facts {
     pub cell: Option<SimulationCell>,
     /// The part of the particles that are in the cell, or near it.
     pub in_cell: f64,
+    /// The part of each edge of the cell along which there are particles.
+    pub cell_extent: [f64; 3],
     /// Corners of the box of the particles, without outliers, world units.
     pub bounds: Option<(DVec3, DVec3)>,
 }
@@ -65,6 +118,8 @@ pub struct Facts {
 pub struct Elements {
     /// Whether some particles are of none, such as virtual sites.
     pub has_others: bool,
+    /// Whether many are of metals or other elements of solids, whose atoms touch at their covalent radii.
+    pub is_solid: bool,
 }
 
 /// An attribute with few integers.
@@ -74,13 +129,15 @@ pub struct Category {
     pub name: String,
     /// Its values, rising.
     pub values: Vec<i64>,
-    /// Those whose particles all rest while most of the others move, rising.
-    pub at_rest: Vec<i64>,
+    /// Those of walls, if there are some.
+    pub walls: Option<WallValues>,
+    /// The values without the particles that the first category with walls calls so, rising.
+    pub without_walls: Vec<i64>,
 }
 
 const QUESTION: Question<'static> = Question {
     color: ColorQuestion::None,
-    radius: RadiusQuestion::None,
+    radius: RadiusQuestion::AutoOfBody,
     up: None,
     points: false,
     selection: None,
@@ -117,16 +174,22 @@ impl Facts {
             raw.attributes.iter().find(named)
         };
         let categories = CATEGORIES.iter().filter_map(|name| integers(name));
+        let categories = categories.filter_map(|a| category(a, raw)).collect();
         Self {
             particles: sample.count,
-            has_velocities: velocity.is_some(),
+            has_velocities: velocity.is_some_and(is_moving),
+            scalar: plane_velocity(&raw.attributes)
+                .or_else(|| SCALARS.iter().find_map(|name| scalar(&raw.attributes, name))),
+            is_y_up: is_y_up(&sample_of(&raw.positions), sample.count, &velocities(velocity)),
             has_colors: RgbAttribute::of(&raw.attributes, None).is_some(),
             has_radii: find_radius(&raw.attributes).is_some(),
+            random_radius: sample.spacing.and_then(random_radius),
             has_time: raw.time.is_some(),
             has_bonds: !raw.bonds.is_empty(),
             elements: integers(ELEMENT).and_then(elements),
-            categories: categories.filter_map(|a| category(a, velocity)).collect(),
+            categories: without_walls(categories, &raw.attributes),
             in_cell: raw.cell.as_ref().map_or(0.0, |cell| part_in(cell, &raw.positions)),
+            cell_extent: raw.cell.as_ref().map_or([0.0; 3], |cell| extent_in(cell, &raw.positions)),
             cell: raw.cell,
             bounds: robust_bounds(&raw.positions, sample.extremes).map(|bounds| bounds.outer),
         }
@@ -153,23 +216,77 @@ pub(super) fn flat_axis(min: DVec3, max: DVec3) -> Option<usize> {
 /// How far particles may be outside of a cell that contains them, as a part of its edges.
 const MARGIN: f64 = 0.05;
 
-/// The part of the particles in `cell`, or within [`MARGIN`] of it.
-fn part_in(cell: &SimulationCell, positions: &Positions) -> f64 {
+/// Some of the particles in coordinates of `cell`: 0 to 1 along each edge; none in a cell without volume.
+fn in_coordinates(cell: &SimulationCell, positions: &Positions) -> Vec<DVec3> {
     let [a, b, c] = cell.vectors;
     let to_edges = DMat3::from_cols(a, b, c);
     if to_edges.determinant() == 0.0 {
-        return 0.0;
+        return Vec::new();
     }
     let inverse = to_edges.inverse();
-    let is_inside = |point: DVec3| {
-        let at = inverse * (point - cell.origin);
+    sample_of(positions).into_iter().map(|point| inverse * (point - cell.origin)).collect()
+}
+
+/// The part of the particles in `cell`, or within [`MARGIN`] of it.
+fn part_in(cell: &SimulationCell, positions: &Positions) -> f64 {
+    let is_inside = |at: &&DVec3| {
         at.cmpge(DVec3::splat(-MARGIN)).all() && at.cmple(DVec3::splat(1.0 + MARGIN)).all()
     };
-    let sample = sample_of(positions);
-    let inside = sample.iter().filter(|point| is_inside(**point)).count();
+    let sample = in_coordinates(cell, positions);
+    let inside = sample.iter().filter(is_inside).count();
     #[expect(clippy::cast_precision_loss, reason = "a part of a sample")]
     let part = inside as f64 / sample.len().max(1) as f64;
     part
+}
+
+/// How much larger the radius that follows from the density is than half the distance of nearest neighbours, from which
+/// on particles are at random distances: it is 1.05 times as large in a lattice, 1.2 times in a fluid.
+const RANDOM: f32 = 1.5;
+
+/// The radius of such particles in that of the density: they overlap a little.
+const OVERLAPPING: f32 = 0.85;
+
+fn random_radius(spacing: Spacing) -> Option<f64> {
+    let packed = spacing.packed.filter(|packed| *packed > RANDOM * spacing.touching)?;
+    Some((OVERLAPPING * packed).into())
+}
+
+/// The part of each edge of `cell` along which there are particles, without a few outliers.
+fn extent_in(cell: &SimulationCell, positions: &Positions) -> [f64; 3] {
+    let sample = in_coordinates(cell, positions);
+    [0, 1, 2].map(|axis| {
+        let along = sorted_sample(sample.len(), |i| sample[i][axis]);
+        robust_range(&along).map_or(0.0, |(low, high)| high - low)
+    })
+}
+
+/// Whether a particle of a sample moves.
+fn is_moving(velocity: &Attribute) -> bool {
+    sample_indices(velocity.count(), SAMPLE).any(|i| velocity.magnitude(i) != 0.0)
+}
+
+/// Velocities of some particles, if there are finite ones.
+fn velocities(velocity: Option<&Attribute>) -> Vec<DVec3> {
+    let Some(velocity) = velocity else { return Vec::new() };
+    let vector = |i: usize| DVec3::from_array([0, 1, 2].map(|c| velocity.data.get_f64(3 * i + c)));
+    let sample = sample_indices(velocity.count(), SAMPLE).map(vector);
+    sample.filter(|v| v.is_finite()).collect()
+}
+
+/// The name of a velocity in a plane, which has two components, if it is not zero everywhere.
+fn plane_velocity(attributes: &[Attribute]) -> Option<String> {
+    let is_velocity =
+        |a: &&Attribute| a.components == 2 && names::is_one_of(&a.name, &names::VELOCITY);
+    attributes.iter().find(is_velocity).filter(|a| is_moving(a)).map(|a| a.name.clone())
+}
+
+/// The name of the scalar `name` among `attributes`, if its values differ.
+fn scalar(attributes: &[Attribute], name: &str) -> Option<String> {
+    let named = |a: &&Attribute| a.components == 1 && a.name.eq_ignore_ascii_case(name);
+    let found = attributes.iter().find(named)?;
+    let values = sorted_sample(found.count(), |i| found.data.get_f64(i));
+    let (low, high) = robust_range(&values)?;
+    (low < high).then(|| found.name.clone())
 }
 
 /// The values of `attribute` for some particles, with their indices.
@@ -177,20 +294,31 @@ fn values(attribute: &Attribute) -> impl Iterator<Item = (usize, f64)> + '_ {
     sample_indices(attribute.count(), SAMPLE).map(|i| (i, attribute.data.get_f64(i)))
 }
 
+/// Atomic numbers of the elements of molecules and noble gases.
+const MOLECULAR: [i64; 14] = [1, 2, 6, 7, 8, 9, 10, 15, 16, 17, 18, 35, 36, 53];
+
+/// The part of all particles that others have in a solid.
+const SOLID: f64 = 0.1;
+
 /// The elements in `attribute`, if most particles have one.
+#[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "small numbers")]
 fn elements(attribute: &Attribute) -> Option<Elements> {
-    let (mut known, mut all) = (0_usize, 0_usize);
+    let (mut known, mut solid, mut all) = (0_usize, 0_usize, 0_usize);
     for (_, value) in values(attribute) {
+        let is_known = value >= 1.0 && value <= LAST_ELEMENT as f64;
         all += 1;
-        known += usize::from(value >= 1.0 && value <= LAST_ELEMENT as f64);
+        known += usize::from(is_known);
+        solid += usize::from(is_known && !MOLECULAR.contains(&(value as i64)));
     }
-    (2 * known > all).then_some(Elements { has_others: known < all })
+    let is_solid = solid as f64 > SOLID * all as f64;
+    (2 * known > all).then_some(Elements { has_others: known < all, is_solid })
 }
 
-/// The categories in `attribute`, if its values are few integers, and more than one.
-fn category(attribute: &Attribute, velocity: Option<&Attribute>) -> Option<Category> {
+/// The categories in `attribute` of `particles`, if its values are few integers, and more than one.
+fn category(attribute: &Attribute, particles: &RawParticles) -> Option<Category> {
+    let velocity = velocity_of(&particles.attributes);
     let mut all = BTreeSet::new();
-    let mut moving = BTreeSet::new();
+    let mut members = Vec::new();
     for (index, value) in values(attribute) {
         if value.fract() != 0.0 || value.abs() > 1e15 {
             return None;
@@ -201,15 +329,33 @@ fn category(attribute: &Attribute, velocity: Option<&Attribute>) -> Option<Categ
         if all.len() > MOST_CATEGORIES {
             return None;
         }
-        if velocity.is_some_and(|v| v.count() > index && v.magnitude(index) != 0.0) {
-            moving.insert(value);
-        }
+        let is_moving = velocity.is_some_and(|v| v.count() > index && v.magnitude(index) != 0.0);
+        let position = particles.positions.get(index);
+        members.push(Member { value, position, is_moving });
     }
-    let at_rest =
-        if moving.is_empty() { Vec::new() } else { all.difference(&moving).copied().collect() };
     (all.len() > 1).then(|| Category {
         name: attribute.name.clone(),
-        values: all.into_iter().collect(),
-        at_rest,
+        values: all.iter().copied().collect(),
+        without_walls: all.into_iter().collect(),
+        walls: walls(&attribute.name, &particles.attributes, &members),
     })
+}
+
+/// Finds the values of `categories` without the walls of the first one that has some.
+fn without_walls(mut categories: Vec<Category>, attributes: &[Attribute]) -> Vec<Category> {
+    let named = |name: &str| attributes.iter().find(|a| a.name == name);
+    let found = categories.iter().find_map(|c| Some((named(&c.name)?, c.walls.as_ref()?)));
+    let Some((of, walls)) = found.map(|(of, walls)| (of, walls.values.clone())) else {
+        return categories;
+    };
+    #[expect(clippy::cast_precision_loss, reason = "small integers")]
+    let is_wall = |index: usize| walls.iter().any(|wall| *wall as f64 == of.data.get_f64(index));
+    for category in &mut categories {
+        let Some(attribute) = named(&category.name) else { continue };
+        let kept = values(attribute).filter(|(index, _)| !is_wall(*index));
+        #[expect(clippy::cast_possible_truncation, reason = "integers within the range")]
+        let kept: BTreeSet<i64> = kept.map(|(_, value)| value as i64).collect();
+        category.without_walls = kept.into_iter().collect();
+    }
+    categories
 }

@@ -30,6 +30,8 @@ mod robust;
 mod sample;
 mod standing;
 mod stream;
+mod upright;
+mod walls;
 
 pub use color::{Categories, ColorQuestion, ColorRange, MAX_CATEGORIES, RangeQuestion, range_of};
 use color::{ColorTotals, FrameContext};
@@ -39,9 +41,10 @@ use moments::Moments;
 use outline::Outermost;
 pub use outline::{Fit, Outline};
 use packing::{Spacing, SpacingRequest, narrow};
-use robust::{RobustBounds, robust_bounds, robust_largest, sample_of};
+use robust::{RobustBounds, robust_bounds, robust_largest, sample_of, sorted_sample};
 use sample::FrameSample;
 use standing::standing;
+pub use walls::{WallSign, WallValues};
 
 /// Maximum number of frames to sample; evenly distributed, including the first and the last one.
 const FRAMES: usize = 24;
@@ -69,6 +72,10 @@ pub struct Survey {
     /// Jobs of earlier versions lack it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub standing: Option<f64>,
+    /// The lowest place of the spheres along the up direction, without a few outliers, world units, if they have radii of
+    /// their own. Jobs of earlier versions lack it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lowest: Option<f64>,
     /// The outermost particles, for the camera. Jobs of earlier versions lack them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outline: Option<Outline>,
@@ -106,6 +113,9 @@ pub struct Survey {
     /// Mean time between consecutive frames, if the files contain times.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frame_time: Option<f64>,
+    /// The largest time of the first and the last frame, without a sign, if the files contain times.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub largest_time: Option<f64>,
     /// Mean difference of the numbers of consecutive frames, if there are several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frame_numbers: Option<i64>,
@@ -257,6 +267,7 @@ struct Totals {
     bounds: Option<RobustBounds>,
     outermost: Outermost,
     standing: f64,
+    lowest: Option<f64>,
     cells: Vec<SimulationCell>,
     /// The spacing in each frame, with its number of particles.
     spacings: Vec<(u64, Spacing)>,
@@ -437,6 +448,7 @@ impl Totals {
             bounds: None,
             outermost: Outermost::default(),
             standing: 0.0,
+            lowest: None,
             cells: Vec::new(),
             spacings: Vec::new(),
             has_radii: false,
@@ -518,6 +530,15 @@ impl Totals {
             }
             RadiusQuestion::Auto | RadiusQuestion::AutoOfBody => {
                 self.add_radius(&frame, weight.particles, spacing);
+                if let Some(Radius::PerParticle(radii)) = &frame.radius {
+                    let bottom = |i: usize| {
+                        let center = origin + frame.positions[i].as_dvec3();
+                        center.dot(up) - f64::from(radii[i])
+                    };
+                    let bottoms = sorted_sample(frame.len(), bottom);
+                    let found = bottoms.get(bottoms.len() / 1000).copied();
+                    self.lowest = self.lowest.into_iter().chain(found).reduce(f64::min);
+                }
             }
             RadiusQuestion::Attribute(..) | RadiusQuestion::Table(..) => {
                 let radius = |i| question.radius.radius_by_attribute(&frame, i);
@@ -570,6 +591,7 @@ impl Totals {
             layers: self.bounds.map(|bounds| bounds.layers),
             is_flat: flat_axis(min, max).is_some(),
             standing: Some(self.standing),
+            lowest: self.lowest,
             outline: self.outermost.outline(question.fit, origin),
             cells: self.cells,
             radius: of_frames(&self.spacings, |spacing| Some(spacing.touching)),
@@ -583,6 +605,7 @@ impl Totals {
             components: self.attributes.values().copied().collect(),
             attributes: self.attributes.into_keys().collect(),
             frame_time: self.moments.time_step(),
+            largest_time: self.moments.largest_time(),
             frame_numbers: self.moments.number_step(),
             most_particles: self.most_particles,
             frames: self.frames,

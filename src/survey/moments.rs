@@ -27,6 +27,12 @@ impl Moments {
         (step > 0.0).then_some(step)
     }
 
+    /// The larger of the times of the first and the last frame, without a sign.
+    pub(super) fn largest_time(&self) -> Option<f64> {
+        let times = [self.first, self.last].map(|moment| moment.and_then(|(_, _, time)| time));
+        times.into_iter().flatten().map(f64::abs).reduce(f64::max)
+    }
+
     /// Mean difference of the numbers of consecutive frames.
     #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "rounded")]
     pub(super) fn number_step(&self) -> Option<i64> {

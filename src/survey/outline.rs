@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use spherule_formats::{Positions, sample_indices};
 
-use super::robust::{ESCAPE_MIN, sample_of};
+use super::robust::{ESCAPE_MIN, MAX_FAR, TOO_SMALL, sample_of};
 
 /// Number of axes along which the outermost particles are found, in both directions.
 const AXES: usize = 64;
@@ -87,16 +87,20 @@ impl Outermost {
         let points: Vec<DVec3> = sample_indices(sample.len(), KEPT).map(|i| sample[i]).collect();
         let each = count.div_ceil(points.len());
         self.kept.push(Kept { points, each });
-        let extent = |axis: &DVec3| {
-            let [low, high] = layers(&sample, *axis, outside(sample.len()));
-            high - low
-        };
-        let longest = DVec3::AXES.iter().map(extent).fold(0.0, f64::max);
+        let longest = longest_side(&sample, outside(sample.len()));
         // A particle that is far from the others along one axis is an outlier on all
         let axes = || (0..AXES).into_par_iter().map(axis);
-        let tail = (outside(sample.len()), MARGIN);
-        let found = axes().flat_map_iter(|axis| beyond(&sample, axis, longest, tail));
+        let is_scattered = is_scattered(&sample, longest);
+        let few = outside(sample.len());
+        let tail = if is_scattered {
+            few.max(sample.len().min(LAYER_SAMPLE) / (2 * MAX_FAR))
+        } else {
+            few
+        };
+        let longest = if is_scattered { longest_side(&sample, tail) } else { longest };
+        let found = axes().flat_map_iter(|axis| beyond(&sample, axis, longest, (tail, MARGIN)));
         let most = match sample.len() {
+            many if is_scattered => many.div_ceil(MAX_FAR),
             0..FEW => usize::MAX,
             many => many / MAX_OUTLIERS,
         };
@@ -149,16 +153,14 @@ impl Outermost {
             reason = "a part of a sample"
         )]
         let most = ((1.0 - share.clamp(0.0, 1.0)) * all.len() as f64) as usize;
+        let side = longest_side(&all, outside(all.len()));
+        let most = if is_scattered(&all, side) { most.max(all.len() / MAX_FAR) } else { most };
         if most == 0 {
             return;
         }
         // The layers must not be those of the particles that may be left out
         let tail = (most * LAYER_SAMPLE.min(all.len()) / all.len()).max(outside(all.len()));
-        let extents = DVec3::AXES.map(|axis| {
-            let [low, high] = layers(&all, axis, tail);
-            high - low
-        });
-        let longest = extents.into_iter().fold(0.0, f64::max);
+        let longest = longest_side(&all, tail);
         let axes = || (0..AXES).into_par_iter().map(axis);
         let found = axes().flat_map_iter(|axis| beyond(&all, axis, longest, (tail, SHARE_MARGIN)));
         let outliers: HashSet<usize> = farthest(found.collect(), most).into_iter().collect();
@@ -192,6 +194,21 @@ fn layers(sample: &[DVec3], axis: DVec3, outside: usize) -> [f64; 2] {
     let outside = outside.min((along.len() - 1) / 2);
     let last = along.len() - 1;
     [outside, last - outside].map(|place| *along.select_nth_unstable_by(place, f64::total_cmp).1)
+}
+
+/// The longest side of the box of a `sample` without the outermost particles, `outside` of [`LAYER_SAMPLE`] on each side.
+fn longest_side(sample: &[DVec3], outside: usize) -> f64 {
+    let sides = DVec3::AXES.map(|axis| {
+        let [low, high] = layers(sample, axis, outside);
+        high - low
+    });
+    sides.into_iter().fold(0.0, f64::max)
+}
+
+/// Whether the middle 90 % of a `sample` along each axis are within a small part of a box whose side is `longest`.
+fn is_scattered(sample: &[DVec3], longest: f64) -> bool {
+    let tail = sample.len().min(LAYER_SAMPLE) / (2 * MAX_FAR);
+    tail > 0 && longest_side(sample, tail) < TOO_SMALL * longest
 }
 
 /// A particle of a sample that is far from the others along an axis.
@@ -373,6 +390,23 @@ mod tests {
         let mut outermost = Outermost::default();
         outermost.add(&Positions::F64(heap.clone()), heap.len());
         assert_eq!(outermost.outline(Fit::Share(0.99), DVec3::ZERO).unwrap().outliers, 0);
+    }
+
+    #[test]
+    fn a_share_of_fliers_leaves_something_to_see() {
+        let mut all = ball(400);
+        for (index, point) in (0_u32..).zip(all.iter_mut().step_by(20)) {
+            *point *= 1e5 * f64::from(index + 1);
+        }
+        let outline = outline(&[&all]);
+        assert!(outline.points.iter().all(|p| p.length() < 2.0), "{outline:?}");
+        assert_eq!(outline.outliers, 20);
+        // A second body, which is not so far, belongs to the picture
+        let mut two = ball(400);
+        for point in two.iter_mut().step_by(20) {
+            point.x += 20.0;
+        }
+        assert!(doubles(&self::outline(&[&two])).iter().any(|p| p.x > 19.0));
     }
 
     #[test]

@@ -40,6 +40,13 @@ impl RobustBounds {
     }
 }
 
+/// If the middle 90 % of the particles would be smaller than this part of the box of the middle 98 %, the box is theirs: a
+/// share of particles at a great distance leaves nothing to see of the others.
+pub(super) const TOO_SMALL: f64 = 1.0 / 25.0;
+
+/// One particle of this many may be left out then.
+pub(super) const MAX_FAR: usize = 10;
+
 /// A frame's lowest layer is one of this many parts of its particles.
 const LAYER: usize = 200;
 
@@ -75,17 +82,31 @@ pub(super) fn robust_bounds(
     // Find the middle of each axis, and the outer layers
     let (mut first, mut last) = (min, max);
     let mut layers = (min, max);
+    let tail = sample.len() / (2 * MAX_FAR);
+    let (mut near_first, mut near_last) = (min, max);
+    let ends = |sample: &[DVec3], axis: usize, outside: usize| {
+        let above = (sample.len() - outside).saturating_sub(1);
+        Some([sample.get(outside)?[axis], sample.get(above)?[axis]])
+    };
     for axis in 0..3 {
         sample.sort_unstable_by(|a, b| a[axis].total_cmp(&b[axis]));
-        let above = (sample.len() - outside).saturating_sub(1);
-        if let (Some(low), Some(high)) = (sample.get(outside), sample.get(above)) {
-            (first[axis], last[axis]) = (low[axis], high[axis]);
+        if let Some(found) = ends(&sample, axis, outside) {
+            [first[axis], last[axis]] = found;
+        }
+        if let Some(found) = ends(&sample, axis, tail) {
+            [near_first[axis], near_last[axis]] = found;
         }
         let layer = sample.len() / LAYER;
         if let (Some(low), Some(high)) = (sample.get(layer), sample.iter().nth_back(layer)) {
             layers.0[axis] = low[axis];
             layers.1[axis] = high[axis];
         }
+    }
+    // A share of particles at a great distance
+    let is_scattered = tail > 0
+        && (near_last - near_first).max_element() < TOO_SMALL * (last - first).max_element();
+    if is_scattered {
+        (first, last) = (near_first, near_last);
     }
     // Limit the box to a margin around it
     let extent = last - first;
@@ -235,6 +256,17 @@ mod tests {
                 assert!(min.x <= 0.0 && min.y <= 0.0 && max.x >= 1.0 && max.y >= 1.0);
             }
         }
+    }
+
+    #[test]
+    fn bounds_exclude_a_share_at_a_great_distance() {
+        let at = |i: u32| {
+            let near = DVec3::new(f64::from(i % 10), f64::from(i / 10 % 10), f64::from(i / 100));
+            if i % 25 == 3 { near + 1e5 * near } else { near }
+        };
+        let all: Vec<DVec3> = (0..1000).map(at).collect();
+        let (min, max) = robust_bounds(&Positions::F64(all), None).unwrap().outer;
+        assert!(min.min_element() >= -5.0 && max.max_element() <= 14.0, "{min} {max}");
     }
 
     #[test]

@@ -1,0 +1,80 @@
+//! Which axis points up, where the format does not say: whether particles lie on a plane at the lower end of an axis, and
+//! not at its upper end.
+
+use glam::DVec3;
+
+use super::standing::standing;
+
+/// Largest measure of [`standing`] that counts: a thin layer on a floor says no more than a heap.
+const MAX_STANDING: f64 = 3.0;
+
+/// How much more particles lie at the lower end of an axis than at its upper end if it points up.
+const UPRIGHT: f64 = 0.5;
+
+/// The largest part of that which another axis may have: walls beside a fluid are on both sides of it.
+const OTHER: f64 = 0.25;
+
+/// The largest mean velocity along an axis, relative to the root mean square, if it points up: a fluid that leaves a wall
+/// flows away from it, one that lies on a floor does not.
+const MAX_RISE: f64 = 0.2;
+
+/// Whether y points up, and not z. `sample`: some of `count` particles, with their velocities if they have some.
+pub(super) fn is_y_up(sample: &[DVec3], count: usize, velocities: &[DVec3]) -> bool {
+    let lies = |axis: DVec3| standing(sample, count, axis).min(MAX_STANDING);
+    let upright = |axis: DVec3| lies(axis) - lies(-axis);
+    let [along_y, along_z] = [DVec3::Y, DVec3::Z].map(upright);
+    along_y >= UPRIGHT && along_z.abs() <= OTHER * along_y && rise(velocities, DVec3::Y) <= MAX_RISE
+}
+
+/// The mean velocity along `up`, relative to the root mean square of all.
+fn rise(velocities: &[DVec3], up: DVec3) -> f64 {
+    let squares: f64 = velocities.iter().map(|v| v.length_squared()).sum();
+    if squares <= 0.0 || !squares.is_finite() {
+        return 0.0;
+    }
+    #[expect(clippy::cast_precision_loss, reason = "a sample")]
+    let count = velocities.len() as f64;
+    let mean = velocities.iter().map(|v| v.dot(up)).sum::<f64>() / count;
+    mean / (squares / count).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Particles of a lattice with this number along each axis that are `inside`.
+    fn lattice(sides: [u32; 3], inside: impl Fn(DVec3) -> bool) -> Vec<DVec3> {
+        let [x, y, z] = sides;
+        let all = (0..x * y * z).map(|i| [i % x, i / x % y, i / (x * y)]);
+        all.map(|at| DVec3::from_array(at.map(f64::from))).filter(|p| inside(*p)).collect()
+    }
+
+    fn is_up(points: &[DVec3], velocity: DVec3) -> bool {
+        is_y_up(points, points.len(), &vec![velocity; points.len()])
+    }
+
+    #[test]
+    fn heaps_and_fluids_between_walls_show_the_way_up() {
+        // A heap, and a wedge of fluid that leans on the wall at x = 0
+        let heap = |p: DVec3| (p.x - 12.0).hypot(p.z - 12.0) < 12.0 - p.y;
+        let wedge = |p: DVec3| p.y < 12.0 - 0.5 * p.x;
+        let to_z = |points: &[DVec3]| -> Vec<DVec3> {
+            points.iter().map(|p| DVec3::new(p.x, p.z, p.y)).collect()
+        };
+        for shape in [lattice([25, 12, 25], heap), lattice([24, 12, 10], wedge)] {
+            assert!(is_up(&shape, DVec3::ZERO));
+            assert!(!is_up(&to_z(&shape), DVec3::ZERO));
+        }
+    }
+
+    #[test]
+    fn blocks_balls_and_flows_do_not() {
+        assert!(!is_up(&lattice([20, 12, 10], |_| true), DVec3::ZERO));
+        let ball = lattice([21, 21, 21], |p| p.distance(DVec3::splat(10.0)) < 10.0);
+        assert!(!is_up(&ball, DVec3::NEG_Y));
+        // Fluid that leaves a wall at y = 0, under gravity along z
+        let flow = lattice([10, 24, 8], |p| p.y < 20.0 - 0.8 * p.z || p.y < 3.0);
+        assert!(!is_up(&flow, DVec3::new(0.0, 1.0, -0.3)));
+        assert!(!is_up(&[], DVec3::ZERO));
+    }
+}
