@@ -13,6 +13,7 @@ use crate::render::IntegratorKind;
 use crate::surface::SurfaceKind;
 use crate::survey::{Category, ELEMENT, Facts, WallSign, WallValues};
 
+mod legend;
 mod parts;
 mod planned;
 
@@ -61,15 +62,6 @@ const FILLED: f64 = 0.7;
 /// The part of the particles that must be in a cell that is drawn: those of a molecule that was made whole, or moved, are
 /// not.
 const INSIDE: f64 = 0.9;
-
-/// Height of the text of a legend as a fraction of the picture.
-const TEXT_SIZE: f64 = 0.032;
-
-/// The same on paper: what journals ask for.
-const TEXT_ON_PAPER: &str = "7pt";
-
-/// Smaller pictures, in pixels of their shorter side, have no legend: its text could not be read.
-const LEAST_SIDE: u32 = 240;
 
 /// What the rules chose.
 #[derive(Debug, Clone, Default)]
@@ -123,8 +115,7 @@ pub fn rules(
     if rules.is_white() {
         rules.white();
     }
-    rules.legend();
-    rules.text_on_paper();
+    rules.overlays();
     rules.found
 }
 
@@ -426,49 +417,6 @@ impl Rules<'_> {
         let mut plain = Manifest::new("").material;
         plain.color.clone_from(&self.manifest.material.color);
         plain == self.manifest.material
-    }
-
-    /// A legend of the colours, and the time.
-    fn legend(&mut self) {
-        let [width, height] = self.manifest.image.size();
-        let is_plain = self.manifest.camera.projection != ProjectionKind::Equirectangular
-            && !self.manifest.camera.stereo
-            && self.manifest.image.crop.is_none();
-        if !self.manifest.look.has_legend() || !is_plain || width.min(height) < LEAST_SIDE {
-            return;
-        }
-        let mut overlays = Vec::new();
-        let size: Value = match self.manifest.image.dpi {
-            Some(_) => TEXT_ON_PAPER.into(),
-            None => TEXT_SIZE.into(),
-        };
-        let item = |kind: &str| {
-            let mut table = toml::Table::new();
-            table.insert("type".to_owned(), kind.into());
-            table.insert("size".to_owned(), size.clone());
-            Value::from(table)
-        };
-        if self.has_mapped_colors() {
-            overlays.push(item("colorbar"));
-        }
-        if self.facts.has_time {
-            overlays.push(item("text"));
-        }
-        if !overlays.is_empty() {
-            self.set([("overlay", overlays.into())], None);
-        }
-    }
-
-    /// Text of overlays that are given has the size of a journal's on paper.
-    fn text_on_paper(&mut self) {
-        if self.manifest.image.dpi.is_none() {
-            return;
-        }
-        let sizes = (0..self.manifest.overlays.len()).filter_map(|index| {
-            let key = format!("overlay.{index}.size");
-            Override::new(&key, TEXT_ON_PAPER, "the defaults").ok()
-        });
-        self.found.settings.extend(sizes);
     }
 
     /// Whether the colours are those of a map.

@@ -6,10 +6,10 @@ use glam::{DVec3, Vec3};
 use spherule_formats::native::Access;
 
 use crate::accel::{BvhSettings, SbvhSettings};
-use crate::manifest::{IndirectSetting, Manifest, RadiusSetting, nearest};
+use crate::manifest::{IndirectSetting, Manifest, RadiusSetting, Side, nearest};
 use crate::metrics::memory::available;
-use crate::output::{ExrOptions, PlaneNames, PreviewBackground, PreviewOptions};
-use crate::overlay::RgbaPixels;
+use crate::output::{ExrOptions, PlaneNames, PreviewBackground, PreviewOptions, PreviewPage};
+use crate::overlay::{Page, RgbaPixels};
 use crate::pipeline::{
     FrameSize, MemoryModel, Picture, RadiusRule, RunSettings, Setup, attribute_list,
 };
@@ -46,6 +46,7 @@ pub use camera::{check_views, with_framed_meshes};
 use ground::Floor;
 pub use ground::add_ground_image;
 pub use meshes::{add_meshes, mesh_settings};
+pub use overlay::color_bar_of;
 
 /// Minimum radius as a fraction of the diagonal of the bounds; smaller ones would be invisible in f32.
 const LEAST_RADIUS: f64 = 1e-6;
@@ -178,6 +179,26 @@ pub fn setup(
     survey: &Survey,
     images: &SceneImages<'_>,
 ) -> Result<Setup, ResolveError> {
+    let mut setup = setup_on(manifest, survey, images, None)?;
+    if manifest.has_strips() && !setup.picture.overlays.is_empty() {
+        // What the overlays show decides how much room they need
+        let page = overlay::page(&setup, manifest, survey)?;
+        let mut smaller = manifest.clone();
+        let [width, height] = page.picture.map(Side::Pixels);
+        (smaller.image.width, smaller.image.height) = (width, height);
+        setup = setup_on(&smaller, survey, images, Some(page))?;
+    }
+    check_image_size(&setup)?;
+    Ok(setup)
+}
+
+/// The same for a picture that fills its image, or for one on a `page`, whose size the manifest then has.
+fn setup_on(
+    manifest: &Manifest,
+    survey: &Survey,
+    images: &SceneImages<'_>,
+    page: Option<Page>,
+) -> Result<Setup, ResolveError> {
     // Determine surface, radius and colours
     let surface = surface::settings(manifest)?;
     let radius = radius_rule(manifest, survey)?;
@@ -198,7 +219,7 @@ pub fn setup(
         let stereo = stereo.map(|stereo| stereo.stereo(view)).transpose()?;
         Ok(camera.with_stereo(stereo))
     })?;
-    let color = color::rule(manifest, survey, &camera)?;
+    let color = color::rule(manifest, survey, Some(&camera))?;
     let lens = camera::lens(manifest, &path, aspect)?;
     let shutter = shutter::shutter(manifest, survey)?;
     // Set up lights and ground
@@ -334,6 +355,7 @@ pub fn setup(
             },
             first_pixel: window.map_or([0, 0], |window| [window.left, window.top]),
             dpi: image.dpi,
+            page: None,
         },
         has_opaque_previews: manifest.has_opaque_previews && output.transparent,
     };
@@ -354,8 +376,12 @@ pub fn setup(
         weight: survey.weight,
     };
     let mut setup = Setup { picture, run };
-    overlay::add_overlays(&mut setup, manifest, survey, &camera, images.overlays)?;
-    check_image_size(&setup)?;
+    let [columns, rows] = camera.eyes();
+    let render = &setup.picture.render;
+    let whole = Page::whole(render.width / columns, render.height / rows);
+    overlay::add_overlays(&mut setup, manifest, survey, &page.unwrap_or(whole), images.overlays)?;
+    setup.picture.preview.page =
+        page.map(|page| PreviewPage { page, paper: overlay::paper(&setup) });
     Ok(setup)
 }
 

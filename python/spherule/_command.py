@@ -94,9 +94,9 @@ def sheet(job, path, **options):
     job : path
         The directory of its images, such as `Job.dir`.
     path : path
-        The picture, .png.
+        The picture: .png, .pdf or .svg.
     **options
-        Options of `spherule sheet`, such as columns=3.
+        Options of `spherule sheet`, such as columns=3, letters=True or colorbar="below".
 
     Returns
     -------

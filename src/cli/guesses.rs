@@ -67,6 +67,16 @@ pub(super) const GUESSES: &[(&str, &str)] = &[
     ),
     // Overlays
     ("colorlegend showlegend scalarbar colormaplegend", "--colorbar"),
+    ("hidelegend withoutlegend hidecolorbar hideoverlays", "--no-legend"),
+    ("outside legendoutside colorbaroutside marginlegend", "--layout beside"),
+    (
+        "ticks nticks numticks tickvalues numberoflabels",
+        "--set 'overlay=[{type=\"colorbar\",ticks=5}]'",
+    ),
+    (
+        "tickformat labelformat numberformat colorbarformat",
+        "--set 'overlay=[{type=\"colorbar\",format=\".2f\"}]'",
+    ),
     (
         "label clabel cbarlabel cbartitle colorbarlabel colorbartitle legendtitle legendlabel barlabel maptitle",
         "--title TEXT",

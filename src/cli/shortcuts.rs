@@ -34,6 +34,12 @@ pub(super) struct Shortcuts {
     #[arg(long, visible_alias = "legend", aliases = ["colourbar", "color-bar", "colour-bar", "cbar"],
         help_heading = "Look", display_order = 0)]
     colorbar: bool,
+    /// Draw neither the colours nor the time unasked
+    ///
+    /// The same as legend = false in a manifest. Overlays that are asked for are drawn.
+    #[arg(long, aliases = ["no-colorbar", "no-colourbar", "no-overlay", "no-overlays"], help_heading = "Look",
+        display_order = 0)]
+    no_legend: bool,
     /// Title of the colours, which are then drawn as with --colorbar
     #[arg(long, value_name = "TEXT", help_heading = "Look", display_order = 0,
         value_parser = NonEmptyStringValueParser::new())]
@@ -189,6 +195,9 @@ impl Shortcuts {
         if let Some(Size { width, height }) = &self.size {
             list.push(over("image.width", side(width), "--size")?);
             list.push(over("image.height", side(height), "--size")?);
+        }
+        if self.no_legend {
+            list.push(over("legend", false, "--no-legend")?);
         }
         if self.ortho {
             list.push(over("camera.projection", "orthographic", "--ortho")?);

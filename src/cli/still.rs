@@ -20,12 +20,11 @@ use crate::output::{OutputError, PictureFormat};
 use crate::pipeline::{ImageError, WriteError, make_image};
 use crate::render::Channels;
 
-/// Signatures of the files that `still` may replace: OpenEXR, PNG, JPEG and TIFF.
-const IMAGE_SIGNATURES: [&[u8]; 4] =
-    [b"\x76\x2f\x31\x01", b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"II*\0"];
+/// Signatures of the files that `still` may replace: OpenEXR, PNG, JPEG, TIFF, PDF, and SVG as it writes it.
+const IMAGE_SIGNATURES: [&[u8]; 6] =
+    [b"\x76\x2f\x31\x01", b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"II*\0", b"%PDF-1.", b"<svg xml"];
 
-const OUTPUT_HELP: &str =
-    "Image to write: look.png, look.exr, look.jpg or look.tif; an existing image is replaced";
+const OUTPUT_HELP: &str = "Image to write: look.png, look.exr, look.jpg, look.tif, look.pdf or look.svg; an existing image is replaced";
 
 const EXAMPLES: &str = "Examples:
   spherule still dump -o look.png
@@ -168,7 +167,7 @@ pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
 fn format_of(path: &Path) -> Result<PictureFormat, CliError> {
     PictureFormat::of(path).ok_or_else(|| {
         CliError::other(format!(
-            "--output {}: the name must end in .png, .exr, .jpg or .tif; other programs convert PNG to other formats",
+            "--output {}: the name must end in .png, .exr, .jpg, .tif, .pdf or .svg; other programs convert PNG to other formats",
             path.display()
         ))
     })

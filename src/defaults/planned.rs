@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 
 use toml::{Table, Value};
 
+use super::legend::{COLORS, TIME};
 use super::{COLOR, KEYS};
 use crate::manifest::{ManifestSource, Override};
 
-/// The kinds of overlays that rules add.
-const OVERLAYS: [&str; 2] = ["colorbar", "text"];
+/// The types of overlays that rules add.
+const OVERLAYS: [&str; 2] = [COLORS, TIME];
 
 /// What the `planned` settings of a job (dotted keys, values in TOML) have for keys that rules set and that `source` does
 /// not give.
@@ -29,19 +30,18 @@ pub fn planned(source: &ManifestSource, planned: &[(String, String)]) -> Vec<Ove
             (_, None) => Vec::new(),
         })
         .collect();
-    if source.lacks("overlay")
-        && let Some(overlays) = overlays(planned)
-    {
-        layers.extend(layer("overlay", overlays));
-    }
-    // Sizes of overlays that are given
-    let given = source.parse().map_or(0, |(manifest, _)| manifest.overlays.len());
+    // Sizes of overlays that are given, and overlays after these
+    let manifest = source.parse().ok().map(|(manifest, _)| manifest);
+    let given = manifest.as_ref().map_or(0, |manifest| manifest.overlays.len());
     let sizes = (0..given).filter_map(|index| {
         let key = format!("overlay.{index}.size");
         let (_, text) = planned.iter().find(|(known, _)| *known == key)?;
         layer(&key, value(text)?)
     });
     layers.extend(sizes);
+    if manifest.is_some_and(|m| m.legend) && (source.lacks("overlay") || given > 0) {
+        layers.extend(overlays(planned, given));
+    }
     layers
 }
 
@@ -55,21 +55,26 @@ fn value(text: &str) -> Option<Value> {
     table.remove("value")
 }
 
-/// The overlays of a plan; None without any, and if there is one that no rule adds.
-fn overlays(planned: &[(String, String)]) -> Option<Value> {
+/// The overlays of a plan after the `given` ones; none if there is one among these that no rule adds.
+fn overlays(planned: &[(String, String)], given: usize) -> Vec<Override> {
     let mut items: BTreeMap<usize, Table> = BTreeMap::new();
     for (key, text) in planned {
-        let Some((index, name)) = key.strip_prefix("overlay.").and_then(|k| k.split_once('.'))
-        else {
-            continue;
-        };
-        let item = items.entry(index.parse().ok()?).or_default();
-        item.insert(name.to_owned(), value(text)?);
+        let place = key.strip_prefix("overlay.").and_then(|key| key.split_once('.'));
+        if let Some((index, name)) = place
+            && let Ok(index) = index.parse()
+            && index >= given
+            && let Some(value) = value(text)
+        {
+            items.entry(index).or_default().insert(name.to_owned(), value);
+        }
     }
     let is_ours = |item: &Table| {
         let kind = item.get("type").and_then(Value::as_str);
         kind.is_some_and(|kind| OVERLAYS.contains(&kind))
     };
-    let all: Vec<Table> = items.into_values().collect();
-    (!all.is_empty() && all.iter().all(is_ours)).then(|| all.into())
+    if !items.values().all(is_ours) {
+        return Vec::new();
+    }
+    let items = items.into_values();
+    items.filter_map(|item| Override::append("overlay", item, "the plan of the job").ok()).collect()
 }

@@ -202,6 +202,47 @@ fn looks_have_their_own_rules() {
     assert_eq!(nothing, of("look = \"auto\"", &Facts::default()));
 }
 
+/// The types of the overlays of a manifest.
+fn types(manifest: &Manifest) -> Vec<&'static str> {
+    manifest.overlays.iter().map(|overlay| overlay.kind.type_name()).collect()
+}
+
+#[test]
+fn overlays_that_are_given_replace_those_of_their_type() {
+    let mut fluid = facts();
+    (fluid.has_velocities, fluid.has_time) = (true, true);
+    let overlay = |kind: &str| format!("[[overlay]]\ntype = \"{kind}\"\n");
+    for (given, expected) in [
+        (String::new(), &["colorbar", "text"][..]),
+        (overlay("axes"), &["axes", "colorbar", "text"]),
+        (overlay("scale_bar"), &["scale_bar", "colorbar", "text"]),
+        (overlay("text"), &["text", "colorbar"]),
+        (overlay("colorbar"), &["colorbar", "text"]),
+        (overlay("text") + &overlay("colorbar"), &["text", "colorbar"]),
+        ("overlay = []".to_owned(), &[]),
+        ("legend = false".to_owned(), &[]),
+        (format!("legend = false\n{}", overlay("axes")), &["axes"]),
+        (format!("{}look = \"plain\"", overlay("axes")), &["axes"]),
+    ] {
+        assert_eq!(types(&of(&given, &fluid)), expected, "{given}");
+    }
+}
+
+#[test]
+fn all_text_has_one_size() {
+    let mut fluid = facts();
+    (fluid.has_velocities, fluid.has_time) = (true, true);
+    let sizes = |text: &str| -> Vec<TextSize> {
+        of(text, &fluid).overlays.iter().map(|overlay| overlay.size).collect()
+    };
+    let axes = "[[overlay]]\ntype = \"axes\"\n";
+    assert_eq!(sizes(axes), [TextSize::Fraction(0.032); 3]);
+    assert_eq!(sizes(&format!("{axes}size = 0.05\n{axes}")), [TextSize::Fraction(0.05); 4]);
+    assert_eq!(sizes(&format!("image.dpi = 300\n{axes}")), [TextSize::Points(7.0); 3]);
+    // Without a legend, overlays have the default of their key
+    assert_eq!(sizes(&format!("{axes}look = \"plain\"")), [TextSize::Fraction(0.026)]);
+}
+
 #[test]
 fn jobs_that_go_on_have_the_defaults_of_their_plan() {
     let mut atoms = facts();
@@ -213,6 +254,9 @@ fn jobs_that_go_on_have_the_defaults_of_their_plan() {
         "material.color.map = \"turbo\"",
         "image.samples = 4",
         "image.width = \"80mm\"\n[[overlay]]\ntype = \"axes\"",
+        "legend = false",
+        "overlay = []",
+        "[[overlay]]\ntype = \"text\"",
     ] {
         let begun = of(text, &atoms);
         let source = ManifestSource::new(

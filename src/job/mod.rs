@@ -40,6 +40,7 @@
 //! ```
 
 mod child;
+mod color_bar;
 mod complete;
 mod complete_frames;
 mod convert_job;
@@ -56,6 +57,7 @@ mod selection;
 mod target;
 
 pub use child::{ChildCommand, ChildResult, Crash};
+pub use color_bar::color_bar;
 pub use convert_job::ConvertJob;
 pub use error::RunError;
 pub use follow::{FollowEnd, Follower};

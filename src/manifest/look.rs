@@ -92,7 +92,7 @@ fn settings(text: &str, shown: &str) -> impl Iterator<Item = Override> {
     sections.into_iter().flat_map(key).map(set)
 }
 
-pub(super) fn keys(look: &mut Look, keys: &mut Keys<'_>) {
+pub(super) fn keys(look: &mut Look, legend: &mut bool, keys: &mut Keys<'_>) {
     keys!(keys:
         /// Defaults of the settings that are not given: auto | plain | paper | studio | water | whitted | none
         ///
@@ -100,6 +100,10 @@ pub(super) fn keys(look: &mut Look, keys: &mut Keys<'_>) {
         /// auto. studio is a grey room, water clear water on sand, whitted the model of the thesis. none leaves the
         /// defaults of the keys as this file has them.
         look => *look, affects(Affects::Nothing), flag("look", "NAME", "Look");
+        /// Whether the looks auto and paper add a legend: the colours with their values, and the time
+        ///
+        /// [[overlay]] with the type colorbar replaces the former, and with the type text the latter.
+        legend => *legend, affects(Affects::Nothing);
     );
 }
 

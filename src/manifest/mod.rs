@@ -9,6 +9,7 @@ use std::path::Path;
 
 use spherule_jobs::FrameRange;
 
+use crate::overlay::Layout;
 use crate::render::{IntegratorKind, MAX_LITERAL_DEPTH, MAX_SIDE, RendererKind};
 use crate::scene::Fresnel;
 use crate::selection::Selection;
@@ -22,6 +23,7 @@ use reader::Section;
 use tree::TomlNode;
 
 mod arrows;
+mod bar_ticks;
 mod bonds;
 mod by_integer;
 mod camera;
@@ -79,6 +81,7 @@ mod work;
 mod work_tests;
 
 pub use arrows::Arrows;
+pub use bar_ticks::LabelFormat;
 pub use bonds::{BondSearch, Bonds};
 pub use by_integer::ByInteger;
 pub use camera::{
@@ -132,6 +135,8 @@ pub struct LightGroup(String);
 pub struct Manifest {
     /// The defaults of the other settings.
     pub look: Look,
+    /// Whether looks add a legend.
+    pub legend: bool,
     /// The particles.
     pub input: Input,
     /// The particles that are drawn.
@@ -204,6 +209,7 @@ impl Manifest {
     pub fn new(path: impl Into<String>) -> Self {
         Self {
             look: Look::Auto,
+            legend: true,
             input: Input::new(path),
             select: Select::default(),
             clips: Vec::new(),
@@ -298,7 +304,7 @@ impl Manifest {
 
     /// Visits all keys, in the order of the commented file. No other place knows the tables.
     fn keys(&mut self, keys: &mut Keys<'_>) {
-        look::keys(&mut self.look, keys);
+        look::keys(&mut self.look, &mut self.legend, keys);
         keys.section("input", Input::ABOUT, |keys| self.input.keys(keys));
         keys.section("select", select::ABOUT, |keys| self.select.keys(keys));
         keys.section("camera", Camera::ABOUT, |keys| self.camera.all_keys(keys));
@@ -361,6 +367,7 @@ impl Manifest {
             root.wrong("overlay", &what);
         }
         self.image.check(root);
+        self.check_layout(root);
         self.check_camera(root);
         if self.branches_at_spheres()
             && self.render.min_weight == 0.0
@@ -374,6 +381,35 @@ impl Manifest {
                      max_depth = {depth} choose at least 1e-5, or a max_depth of at most {MAX_LITERAL_DEPTH}"
                 ),
             );
+        }
+    }
+
+    /// Where an overlay is: over the picture, or beside it.
+    pub fn layout_of(&self, overlay: &Overlay) -> Layout {
+        overlay.layout.unwrap_or(self.image.layout)
+    }
+
+    /// Whether the picture is smaller than the image, because overlays are beside it.
+    pub fn has_strips(&self) -> bool {
+        self.overlays.iter().any(|overlay| self.layout_of(overlay) == Layout::Beside)
+    }
+
+    /// Checks that there may be overlays beside the picture.
+    fn check_layout(&self, root: &mut Section<'_>) {
+        if !self.has_strips() {
+            return;
+        }
+        let image = &self.image;
+        let others = [
+            ("image.crop", image.crop.is_some()),
+            ("image.overscan", image.overscan > 0),
+            ("camera.stereo", self.camera.stereo),
+        ];
+        if let Some((key, _)) = others.iter().find(|(_, is_given)| *is_given) {
+            let what = format!(
+                "has overlays beside the picture (layout), which do not go with {key}; remove one of them"
+            );
+            root.wrong("overlay", &what);
         }
     }
 

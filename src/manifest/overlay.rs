@@ -3,12 +3,13 @@
 use glam::Vec3;
 use serde_json::{Value as Json, json};
 
+use super::bar_ticks::LabelFormat;
 use super::field::Field;
 use super::key::Key;
 use super::keys::{Keys, keys};
 use super::text_size::TextSize;
 use super::value::{Fault, Named, Value, named, numbers_schema, quoted};
-use crate::overlay::{Corner, Orientation, Template};
+use crate::overlay::{Corner, Layout, Orientation, Template, TickChoice};
 
 named!(
     Corner: TopLeft = "top-left",
@@ -16,6 +17,8 @@ named!(
     BottomLeft = "bottom-left",
     BottomRight = "bottom-right"
 );
+
+named!(Layout: Over = "over", Beside = "beside");
 
 named!(Orientation: Vertical = "vertical", Horizontal = "horizontal");
 
@@ -55,6 +58,12 @@ pub enum OverlayKind {
         length: f32,
         /// Its direction.
         orientation: Orientation,
+        /// Where ticks are; by default at round values and both ends.
+        ticks: Option<TickChoice>,
+        /// How numbers are written; by default as short as possible.
+        format: Option<LabelFormat>,
+        /// What values are multiplied by before they are shown.
+        factor: Option<f64>,
     },
     /// Text.
     Text {
@@ -91,6 +100,8 @@ pub struct OverlayText {
 pub struct Overlay {
     /// What it shows.
     pub kind: OverlayKind,
+    /// Whether it is over or beside the picture; by default as the image says.
+    pub layout: Option<Layout>,
     /// The corner; by default the one with the fewest particles.
     pub corner: Option<Corner>,
     /// Distance from the corner as fractions of the height of the picture.
@@ -108,6 +119,7 @@ impl Default for Overlay {
     fn default() -> Self {
         Self {
             kind: OverlayKind::of(OverlayType::ColorBar),
+            layout: None,
             corner: None,
             offset: [0.04, 0.04],
             size: TextSize::Fraction(SIZE),
@@ -144,12 +156,22 @@ impl OverlayKind {
                 unit: None,
                 length: 0.4,
                 orientation: Orientation::Vertical,
+                ticks: None,
+                format: None,
+                factor: None,
             },
             OverlayType::Text => Self::Text { text: None },
             OverlayType::ScaleBar => Self::ScaleBar { length: None, unit: None },
             OverlayType::Axes => Self::Axes,
             OverlayType::Image => Self::Image { path: "logo.png".to_owned(), height: 0.1 },
         }
+    }
+
+    /// The name of its type in a manifest.
+    pub fn type_name(&self) -> &'static str {
+        let all = OverlayType::names().into_iter();
+        let mut own = all.filter(|(kind, _)| *kind == self.overlay_type());
+        own.next().map_or("", |(_, name)| name)
     }
 
     const fn overlay_type(&self) -> OverlayType {
@@ -164,6 +186,11 @@ impl OverlayKind {
 }
 
 impl Overlay {
+    /// Whether the size of its text is the default.
+    pub fn has_default_size(&self) -> bool {
+        self.size == TextSize::Fraction(SIZE)
+    }
+
     /// One overlay of each type.
     pub(super) fn examples() -> Vec<Self> {
         let of_type = |(kind, _)| Self { kind: OverlayKind::of(kind), ..Self::default() };
@@ -183,18 +210,26 @@ impl Overlay {
             self.kind = OverlayKind::of(kind);
         }
         match &mut self.kind {
-            OverlayKind::ColorBar { title, unit, length, orientation } => keys!(keys:
-                /// Title above the bar
-                title => *title, example("\"Speed\""), unset("what the colours show");
-                /// Unit of the values, after the title
-                unit => *unit, example("\"m/s\""), unset("no unit");
-                /// Length of the bar as a fraction of the height of the picture
-                ///
-                /// Categories have swatches instead of a bar.
-                length => *length, above(0), to(1);
-                /// Direction: vertical | horizontal
-                orientation => *orientation;
-            ),
+            OverlayKind::ColorBar { title, unit, length, orientation, ticks, format, factor } => {
+                keys!(keys:
+                    /// Title above the bar
+                    title => *title, example("\"Speed\""), unset("what the colours show");
+                    /// Unit of the values, after the title
+                    unit => *unit, example("\"m/s\""), unset("no unit");
+                    /// Length of the bar as a fraction of the height of the picture
+                    ///
+                    /// Categories have swatches instead of a bar.
+                    length => *length, above(0), to(1);
+                    /// Direction: vertical | horizontal
+                    orientation => *orientation;
+                    /// Labels: about so many, or at these values in the unit that is shown
+                    ticks => *ticks, example("[0, 2, 4]"), unset("round values and both ends");
+                    /// Format of the numbers: ".2f", ".1e", "%.2e", ",.0f", as in texts
+                    format => *format, example("\".2f\""), unset("as short as possible");
+                    /// What values are multiplied by before they are shown: 0.001 for Pa as kPa
+                    factor => *factor, from(1e-30), to(1e30), example("0.001"), unset("1");
+                )
+            }
             OverlayKind::Text { text } => keys!(keys:
                 /// Text with {time:.2f}, {frame:04d}, {particles:,}, {file}, {density.min:.1f} or {density.max:.1f}
                 ///
@@ -221,6 +256,11 @@ impl Overlay {
             ),
         }
         keys!(keys:
+            /// Place: over | beside the picture, which is then smaller than the image
+            ///
+            /// Beside, overlays are at the right, or at the left if their corner is there; horizontal colour bars are
+            /// below, or above. offset has no effect then.
+            layout => self.layout, example("\"beside\""), unset("that of image.layout");
             /// Corner: auto | top-left | top-right | bottom-left | bottom-right
             ///
             /// auto is the corner where the fewest particles of the surveyed frames are. Overlays in the same corner

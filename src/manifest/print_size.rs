@@ -26,6 +26,18 @@ pub enum Side {
 }
 
 impl Side {
+    /// Reads a number of pixels, or a length on paper such as `80mm`.
+    ///
+    /// # Errors
+    /// It is neither.
+    pub fn of_text(text: &str) -> Result<Self, String> {
+        match text.trim().parse() {
+            Ok(pixels @ 1..=MAX_SIDE) => Ok(Self::Pixels(pixels)),
+            Ok(pixels) => Err(format!("{pixels} pixels; 1 to {MAX_SIDE} are possible")),
+            Err(_) => length(text.trim()).map(Self::Paper),
+        }
+    }
+
     /// The number of pixels; with `dpi`, also that of a length on paper.
     pub fn pixels(self, dpi: u32) -> u32 {
         match self {
@@ -39,7 +51,8 @@ impl Side {
         }
     }
 
-    pub(super) const fn is_on_paper(self) -> bool {
+    /// Whether it is a length on paper.
+    pub const fn is_on_paper(self) -> bool {
         matches!(self, Self::Paper(_))
     }
 }

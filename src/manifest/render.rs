@@ -12,6 +12,7 @@ use super::reader::Section;
 use super::value::{Named, named};
 use crate::accel::{BvhLeaves, BvhPreset, SbvhSettings, Structure};
 use crate::metrics::Bytes;
+use crate::overlay::Layout;
 use crate::render::{
     DEFAULT_BOUNCES, DEFAULT_MIN_WEIGHT, DataWindow, FilterKind, IntegratorKind, MAX_BOUNCES,
     MAX_DEPTH, MAX_FILTER_WIDTH, MAX_SAMPLES, MAX_SIDE, MIN_WEIGHTS,
@@ -55,6 +56,11 @@ section! {
             flag("crop", "X0,Y0,X1,Y1", "Image");
         /// Pixels to add on each side of the image; they extend the data window of the EXR
         overscan: u32 = 0, from(0), to(MAX_OVERSCAN), unit("pixels");
+        /// Place of overlays without a layout of their own: over | beside the picture
+        ///
+        /// Beside, the picture is smaller than the image and leaves room for them in previews and stills. OpenEXR images
+        /// then have the size of the picture alone.
+        layout: Layout = Layout::Over, flag("layout", "LAYOUT", "Image");
     }
 }
 

@@ -26,6 +26,14 @@ pub enum TextSize {
 }
 
 impl TextSize {
+    /// As a value of a manifest.
+    pub fn to_value(self) -> toml::Value {
+        match self {
+            Self::Fraction(fraction) => f64::from(fraction).into(),
+            Self::Points(points) => format!("{points}pt").into(),
+        }
+    }
+
     /// The fraction of a picture of `height` pixels, which has `dpi` dots per inch on paper.
     pub fn fraction(self, height: u32, dpi: Option<u32>) -> f32 {
         match self {

@@ -227,7 +227,7 @@ impl TomlNode {
 
     /// Applies `overlay` to this tree and creates the necessary tables, also in place of `"auto"`, which is
     /// equivalent to a missing value. `light.0.intensity` refers to an item of a list. A default does not change
-    /// existing values.
+    /// existing values, but may be another item of a list.
     pub(super) fn lay_over(&mut self, overlay: Override) -> Result<(), Problem> {
         let problem = |at: usize, what: &str| Problem {
             place: overlay.node.place.clone(),
@@ -245,7 +245,12 @@ impl TomlNode {
             // Descend to the next key
             let found = node.describe();
             node = match &mut node.kind {
-                Kind::Table(table) if is_last && overlay.is_under && table.contains_key(key) => {
+                Kind::Table(table)
+                    if is_last
+                        && overlay.is_under
+                        && !overlay.is_item
+                        && table.contains_key(key) =>
+                {
                     return Ok(());
                 }
                 Kind::Table(table) => {

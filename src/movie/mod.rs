@@ -19,6 +19,7 @@ mod ffmpeg;
 mod format;
 mod gif;
 mod palette;
+mod panels;
 mod rate;
 mod sheet;
 mod source;
@@ -28,8 +29,9 @@ mod webp;
 pub use codec::{Codec, CodecError};
 pub use ffmpeg::{FFMPEG, by_hand, ffmpeg_is_installed};
 pub use format::{Container, FormatError, MovieFormat};
+pub use panels::{LetterStyle, LetterStyleError, SheetBar};
 pub use rate::{FrameRate, FrameRateError};
-pub use sheet::{SheetLayout, SheetSettings, write_sheet};
+pub use sheet::{FinishedSheet, SheetFormat, SheetLayout, SheetSettings, SheetSource, write_sheet};
 pub use source::MovieSource;
 pub use timeline::{Gaps, MAX_HELD, Timeline};
 
@@ -71,6 +73,15 @@ pub enum MovieError {
         format: &'static str,
         /// The size.
         size: [usize; 2],
+    },
+    /// The colour bar needs more than half of a sheet.
+    #[error(
+        "a sheet of {width} pixels has no room for the colour bar beside its pictures; make it wider (--width), or put \
+         the bar below (--colorbar below)"
+    )]
+    NoRoom {
+        /// Width of the sheet, pixels.
+        width: usize,
     },
     /// There is no program `ffmpeg`.
     #[error("{FFMPEG} is not installed")]

@@ -1,9 +1,12 @@
-//! Contact sheets: small pictures side by side.
+//! Contact sheets and figures of several panels: pictures side by side, with letters and a common colour bar.
 
 use std::path::{Path, PathBuf};
 
+use super::panels::{Decoration, LetterStyle, SheetBar};
 use super::source::scaled_height;
 use super::{MovieError, Observer};
+use crate::output::{Figure, FigurePicture};
+use crate::overlay::{FrameView, Page, draw, marks};
 use crate::picture::{MARKER, Picture};
 
 /// Colour between the pictures.
@@ -11,6 +14,17 @@ const PAPER: [u8; 3] = [255; 3];
 
 /// Aspect ratio that sheets get if the number of columns is free.
 const ASPECT: f64 = 1.6;
+
+/// The format of a sheet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SheetFormat {
+    /// Pixels alone.
+    Png,
+    /// The pictures as they are in their files; letters and colour bar as text and shapes.
+    Pdf,
+    /// The same.
+    Svg,
+}
 
 /// Settings of a sheet.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,8 +35,36 @@ pub struct SheetSettings {
     pub width: usize,
     /// Distance between pictures in pixels.
     pub gap: usize,
+    /// Pixels per inch on paper, if they are stored.
+    pub dpi: Option<u32>,
+    /// Height of text in pixels.
+    pub text: f32,
+    /// How pictures are numbered, if they are.
+    pub letters: Option<LetterStyle>,
+    /// The colour bar for all pictures, if there is one.
+    pub bar: Option<SheetBar>,
+    /// The format of the file.
+    pub format: SheetFormat,
+}
+
+/// A picture of a sheet.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SheetSource {
+    /// A PNG or OpenEXR file.
+    pub path: PathBuf,
     /// Exposure of OpenEXR images, stops.
     pub exposure: f32,
+}
+
+/// A finished sheet.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FinishedSheet {
+    /// Width and height in pixels.
+    pub size: [usize; 2],
+    /// The layout of the pictures.
+    pub layout: SheetLayout,
+    /// Pictures with another aspect ratio than the first, which are smaller than their places.
+    pub narrower: Vec<PathBuf>,
 }
 
 /// Places of the pictures on a sheet.
@@ -72,49 +114,141 @@ fn free_columns(count: usize, [width, height]: [usize; 2]) -> usize {
     best.unwrap_or(1)
 }
 
-/// Writes a sheet of the pictures `paths` to `file`, as PNG, where it replaces an older file.
+/// A sheet that is being put together.
+struct Sheet {
+    layout: SheetLayout,
+    page: Page,
+    decoration: Decoration,
+    panels: Vec<Panel>,
+    narrower: Vec<PathBuf>,
+}
+
+/// A picture and its place.
+struct Panel {
+    picture: Picture,
+    at: [usize; 2],
+    /// Width and height on the sheet.
+    shown: [usize; 2],
+}
+
+/// Writes a sheet of the pictures `sources` to `file`, where it replaces an older file.
 ///
 /// # Errors
 /// See [`MovieError`]. There is no new file then.
 pub fn write_sheet(
-    paths: &[PathBuf],
+    sources: &[SheetSource],
     settings: &SheetSettings,
     file: &Path,
     observer: &dyn Observer,
-) -> Result<SheetLayout, MovieError> {
-    let mut sheet: Option<(Picture, SheetLayout)> = None;
-    for (index, path) in paths.iter().enumerate() {
+) -> Result<FinishedSheet, MovieError> {
+    let mut sheet: Option<Sheet> = None;
+    for (index, SheetSource { path, exposure }) in sources.iter().enumerate() {
         if observer.stops() {
             return Err(MovieError::Stopped);
         }
-        let picture = Picture::read(path, settings.exposure)?;
-        let (sheet, layout) = match &mut sheet {
+        let picture = Picture::read(path, *exposure)?;
+        let sheet = match &mut sheet {
             Some(sheet) => sheet,
-            empty => {
-                let layout = SheetLayout::new(paths.len(), picture.size(), settings);
-                check(&layout)?;
-                let [width, height] = layout.size;
-                empty.insert((Picture::filled(width, height, PAPER), layout))
-            }
+            empty => empty.insert(Sheet::new(sources.len(), picture.size(), settings)?),
         };
-        let [left, top] = layout.place(index, settings.gap);
-        sheet.put(&picture.scaled(layout.cell[0], layout.cell[1]), left, top);
+        sheet.add(index, path, picture, settings);
         observer.on_picture(index + 1);
     }
-    let (sheet, layout) = sheet.ok_or(MovieError::Empty)?;
+    let mut sheet = sheet.ok_or(MovieError::Empty)?;
     let io = |source| MovieError::Io { path: file.to_owned(), source };
-    let png = sheet.png(MARKER).map_err(io)?;
-    spherule_jobs::publish(file, &png).map_err(io)?;
-    Ok(layout)
+    let bytes = match settings.format {
+        SheetFormat::Png => sheet.drawn().png_on_paper(MARKER, settings.dpi),
+        SheetFormat::Pdf => sheet.figure(settings.dpi).to_pdf(),
+        SheetFormat::Svg => sheet.figure(settings.dpi).to_svg(),
+    };
+    spherule_jobs::publish(file, &bytes.map_err(io)?).map_err(io)?;
+    let size = sheet.page.size.map(|side| side as usize);
+    Ok(FinishedSheet { size, layout: sheet.layout, narrower: sheet.narrower })
+}
+
+impl Sheet {
+    fn new(
+        count: usize,
+        picture: [usize; 2],
+        settings: &SheetSettings,
+    ) -> Result<Self, MovieError> {
+        let (layout, decoration) = Decoration::around(count, picture, settings)?;
+        let page = decoration.page;
+        check(&page)?;
+        Ok(Self { layout, page, decoration, panels: Vec::new(), narrower: Vec::new() })
+    }
+
+    /// Adds picture number `index`, as large as its place allows.
+    fn add(&mut self, index: usize, path: &Path, picture: Picture, settings: &SheetSettings) {
+        let cell = self.layout.cell;
+        let shown = fitted(picture.size(), cell);
+        // A pixel is a matter of rounding
+        if (0..2).any(|axis| shown[axis] + 1 < cell[axis]) {
+            self.narrower.push(path.to_owned());
+        }
+        let place = self.layout.place(index, settings.gap);
+        let at = [0, 1]
+            .map(|axis| place[axis] + self.page.at[axis] as usize + (cell[axis] - shown[axis]) / 2);
+        let small = picture.scaled(shown[0], shown[1]);
+        self.decoration.add_letter(index, place, &small, settings);
+        let picture = if settings.format == SheetFormat::Png { small } else { picture };
+        self.panels.push(Panel { picture, at, shown });
+    }
+
+    /// The sheet as pixels.
+    fn drawn(&mut self) -> Picture {
+        let [width, height] = self.page.size.map(|side| side as usize);
+        let mut sheet = Picture::filled(width, height, PAPER);
+        for Panel { picture, at: [left, top], .. } in &self.panels {
+            sheet.put(picture, *left, *top);
+        }
+        let sprites = draw(&self.decoration.overlays, &self.page, &FrameView::default());
+        for y in 0..height {
+            for sprite in &sprites {
+                sprite.draw_over(i32::try_from(y).unwrap_or(i32::MAX), sheet.row_mut(y));
+            }
+        }
+        sheet
+    }
+
+    /// The sheet for formats with text and shapes.
+    fn figure(&mut self, dpi: Option<u32>) -> Figure {
+        let pixels = |v: [usize; 2]| v.map(|side| u32::try_from(side).unwrap_or(u32::MAX));
+        let pictures = self.panels.drain(..).map(|panel| FigurePicture {
+            size: pixels(panel.picture.size()),
+            bytes: panel.picture.rgb().to_vec(),
+            has_alpha: false,
+            at: pixels(panel.at),
+            shown: pixels(panel.shown),
+        });
+        Figure {
+            size: self.page.size,
+            dpi,
+            paper: Some(PAPER),
+            pictures: pictures.collect(),
+            drawings: marks(&self.decoration.overlays, &self.page, &FrameView::default()),
+        }
+    }
+}
+
+/// The largest size with the aspect ratio of `picture` in a place, without enlarging it.
+fn fitted(picture: [usize; 2], cell: [usize; 2]) -> [usize; 2] {
+    let width = cell[0].min(picture[0]);
+    let height = scaled_height(width, picture);
+    if height <= cell[1] {
+        return [width, height];
+    }
+    let width = (cell[1] * picture[0]).div_ceil(picture[1].max(1));
+    [width.clamp(1, cell[0]), cell[1]]
 }
 
 /// Refuses a sheet of more than 16384 pixels in a direction or 134 million pixels.
-fn check(layout: &SheetLayout) -> Result<(), MovieError> {
-    let [width, height] = layout.size;
+fn check(page: &Page) -> Result<(), MovieError> {
+    let [width, height] = page.size.map(|side| side as usize);
     if width.max(height) <= 1 << 14 && width * height <= 1 << 27 {
         return Ok(());
     }
-    Err(MovieError::TooLarge { format: "a sheet", size: layout.size })
+    Err(MovieError::TooLarge { format: "a sheet", size: [width, height] })
 }
 
 #[cfg(test)]
@@ -122,7 +256,16 @@ mod tests {
     use super::*;
 
     fn settings(columns: Option<usize>, width: usize) -> SheetSettings {
-        SheetSettings { columns, width, gap: 8, exposure: 0.0 }
+        SheetSettings {
+            columns,
+            width,
+            gap: 8,
+            dpi: None,
+            text: 12.0,
+            letters: None,
+            bar: None,
+            format: SheetFormat::Png,
+        }
     }
 
     #[test]

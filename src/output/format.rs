@@ -11,8 +11,10 @@ use tiff::encoder::{Compression, Rational, TiffEncoder};
 use tiff::tags::{ExtraSamples, ResolutionUnit};
 
 use super::OutputError;
-use super::preview::{PreviewBackground, PreviewOptions, SrgbPicture, encode_preview};
-use crate::overlay::Sprite;
+use super::figure::{Figure, FigurePicture};
+use super::preview::{PreviewBackground, PreviewOptions, PreviewPage, SrgbPicture, encode_preview};
+use super::view::byte_from_linear;
+use crate::overlay::{Drawing, Page, Sprite};
 use crate::render::Film;
 
 /// The format of a picture file.
@@ -26,6 +28,10 @@ pub enum PictureFormat {
     Jpeg,
     /// TIFF with 8 bits.
     Tiff,
+    /// PDF: the pixels of the particles, with overlays as text and shapes.
+    Pdf,
+    /// SVG: the same.
+    Svg,
 }
 
 /// Quality of JPEG files, 1 to 100: no visible loss.
@@ -40,9 +46,53 @@ impl PictureFormat {
             "png" => Self::Png,
             "jpg" | "jpeg" => Self::Jpeg,
             "tif" | "tiff" => Self::Tiff,
+            "pdf" => Self::Pdf,
+            "svg" => Self::Svg,
             _ => return None,
         })
     }
+}
+
+/// Encodes `film` as a PDF or SVG file after the view transform, with `drawings` over it. Other formats are PDF.
+///
+/// # Errors
+/// The encoder refuses the picture.
+pub fn encode_figure(
+    film: &Film,
+    options: &PreviewOptions,
+    drawings: Vec<Drawing>,
+    format: PictureFormat,
+) -> Result<Vec<u8>, OutputError> {
+    let figure = figure(SrgbPicture::of_film(film, options), options, drawings);
+    encoded(&figure, format)
+}
+
+fn encoded(figure: &Figure, format: PictureFormat) -> Result<Vec<u8>, OutputError> {
+    let encoded = match format {
+        PictureFormat::Svg => figure.to_svg(),
+        _ => figure.to_pdf(),
+    };
+    encoded.map_err(OutputError::Figure)
+}
+
+/// The page of a picture.
+fn figure(picture: SrgbPicture, options: &PreviewOptions, drawings: Vec<Drawing>) -> Figure {
+    let own = [picture.width, picture.height];
+    let (page, paper) = match options.page {
+        Some(PreviewPage { page, paper }) => {
+            let paper = paper.to_array().map(|v| byte_from_linear(v, 0.5));
+            (page, Some(paper).filter(|_| !picture.has_alpha))
+        }
+        None => (Page::whole(own[0], own[1]), None),
+    };
+    let picture = FigurePicture {
+        size: own,
+        bytes: picture.bytes,
+        has_alpha: picture.has_alpha,
+        at: page.at,
+        shown: own,
+    };
+    Figure { size: page.size, dpi: options.dpi, paper, pictures: vec![picture], drawings }
 }
 
 /// Encodes `film` as a PNG, JPEG or TIFF file after the view transform, with `overlays` over it.
@@ -63,6 +113,12 @@ pub fn encode_picture(
         PictureFormat::Jpeg => jpeg(&SrgbPicture::of(film, options, overlays), options.dpi),
         PictureFormat::Tiff => {
             tiff(&SrgbPicture::of(film, options, overlays), options.dpi).map_err(OutputError::Tiff)
+        }
+        PictureFormat::Pdf | PictureFormat::Svg => {
+            // Overlays that were drawn already are pixels
+            let picture = SrgbPicture::of(film, options, overlays);
+            let options = PreviewOptions { page: None, ..*options };
+            encoded(&figure(picture, &options, Vec::new()), format)
         }
     }
 }
@@ -121,7 +177,9 @@ mod tests {
             ("a.JPEG", Some(PictureFormat::Jpeg)),
             ("a.tif", Some(PictureFormat::Tiff)),
             ("a.tiff", Some(PictureFormat::Tiff)),
-            ("a.svg", None),
+            ("a.svg", Some(PictureFormat::Svg)),
+            ("a.pdf", Some(PictureFormat::Pdf)),
+            ("a.eps", None),
             ("png", None),
         ] {
             assert_eq!(PictureFormat::of(Path::new(name)), format, "{name}");

@@ -5,11 +5,11 @@ use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
 use super::{
     OutputError,
-    view::{bytes_from_linear, dither_threshold, view_transform},
+    view::{byte_from_linear, bytes_from_linear, dither_threshold, view_transform},
 };
 use crate::math::Supported;
 use crate::math::functions::exp2;
-use crate::overlay::Sprite;
+use crate::overlay::{Page, Sprite};
 use crate::render::Film;
 
 /// Settings of a preview.
@@ -23,6 +23,17 @@ pub struct PreviewOptions {
     pub first_pixel: [i32; 2],
     /// Pixels per inch on paper, if they are stored.
     pub dpi: Option<u32>,
+    /// The page that the film is on, if it is larger.
+    pub page: Option<PreviewPage>,
+}
+
+/// A page with a picture and overlays beside it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PreviewPage {
+    /// Where the film is.
+    pub page: Page,
+    /// The colour around the film, linear RGB; without it if the background is transparent.
+    pub paper: Vec3,
 }
 
 /// What is behind the film in a preview.
@@ -69,8 +80,48 @@ pub(super) struct SrgbPicture {
 }
 
 impl SrgbPicture {
-    /// The picture of `film`, with `overlays` over it.
+    /// The picture of `film` on its page, with `overlays` over it.
     pub(super) fn of(film: &Film, options: &PreviewOptions, overlays: &[Sprite]) -> Self {
+        let picture = Self::of_film(film, options);
+        let mut picture = match options.page {
+            Some(page) => picture.on(&page),
+            None => picture,
+        };
+        let pixel_len = if picture.has_alpha { 4 } else { 3 };
+        let rows = picture.bytes.chunks_mut(pixel_len * picture.width.max(1) as usize);
+        for (row, y) in rows.zip(0..) {
+            for overlay in overlays {
+                if picture.has_alpha {
+                    overlay.draw_over_rgba(y, row);
+                } else {
+                    overlay.draw_over(y, row);
+                }
+            }
+        }
+        picture
+    }
+
+    /// The same on paper.
+    fn on(&self, PreviewPage { page, paper }: &PreviewPage) -> Self {
+        let [width, height] = page.size;
+        let paper = paper.to_array().map(|v| byte_from_linear(v, 0.5));
+        let paper: &[u8] = if self.has_alpha { &[0; 4] } else { &paper };
+        let pixel_len = paper.len();
+        let mut bytes = paper.repeat(width as usize * height as usize);
+        let own = self.bytes.chunks(pixel_len * self.width.max(1) as usize);
+        let left = pixel_len * page.at[0] as usize;
+        let rows = bytes.chunks_mut(pixel_len * width.max(1) as usize).skip(page.at[1] as usize);
+        for (row, own) in rows.zip(own) {
+            let room = row.get_mut(left..).unwrap_or_default();
+            for (byte, own) in room.iter_mut().zip(own) {
+                *byte = *own;
+            }
+        }
+        Self { bytes, width, height, has_alpha: self.has_alpha }
+    }
+
+    /// The picture of `film` alone.
+    pub(super) fn of_film(film: &Film, options: &PreviewOptions) -> Self {
         let gain = exp2(options.exposure);
         let width = film.width.max(1) as usize;
         let is_transparent = options.background == PreviewBackground::Transparent;
@@ -96,13 +147,10 @@ impl SrgbPicture {
                 *pixel = [dither_threshold(left.wrapping_add(x), top.wrapping_add(y)); 3];
             }
             bytes_from_linear(Supported::default(), &linear, &thresholds, &mut colors);
-            let y = i32::try_from(y).unwrap_or(i32::MAX);
             if is_transparent {
                 add_alpha(&colors, row, &thresholds, bytes);
-                overlays.iter().for_each(|o| o.draw_over_rgba(y, bytes));
             } else {
                 bytes.copy_from_slice(&colors);
-                overlays.iter().for_each(|o| o.draw_over(y, bytes));
             }
         }
         Self { bytes, width: film.width, height: film.height, has_alpha: is_transparent }

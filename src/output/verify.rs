@@ -33,6 +33,8 @@ pub struct ImageShape {
     pub light_groups: Vec<String>,
     /// Whether channels that are no colours are in a part of their own.
     pub has_data_part: bool,
+    /// Whether the image may be smaller than its preview, which has overlays beside it.
+    pub is_on_page: bool,
 }
 
 /// What is wrong with an image.
@@ -137,8 +139,7 @@ fn check_header(
     expected: &ImageShape,
 ) -> Result<(), ImageFault> {
     let size = (header.layer_size.x(), header.layer_size.y());
-    check_size(size, expected)?;
-    check_window(header, &expected.window)?;
+    check_window(header, &picture_window(size, expected)?)?;
     let found = header.channels.list.iter();
     let found = found.map(|c| (c.name.to_string(), c.sample_type));
     let found: Vec<(String, SampleType)> = found.collect();
@@ -171,6 +172,16 @@ fn check_size(found: (usize, usize), expected: &ImageShape) -> Result<(), ImageF
         Ok(())
     } else {
         Err(ImageFault::Size { found, expected })
+    }
+}
+
+/// The window that an OpenEXR image of size `found` must have.
+fn picture_window(found: (usize, usize), expected: &ImageShape) -> Result<DataWindow, ImageFault> {
+    let side = |own: usize, page: u32| u32::try_from(own).ok().filter(|own| *own <= page);
+    let sides = side(found.0, expected.width).zip(side(found.1, expected.height));
+    match sides {
+        Some((width, height)) if expected.is_on_page => Ok(DataWindow::whole(width, height)),
+        _ => check_size(found, expected).map(|()| expected.window),
     }
 }
 

@@ -31,6 +31,7 @@ const fn shape(channels: Channels) -> ImageShape {
         attributes: Vec::new(),
         light_groups: Vec::new(),
         has_data_part: false,
+        is_on_page: false,
     }
 }
 
@@ -49,6 +50,20 @@ fn channel_sets() -> impl Iterator<Item = Channels> {
         id: bits & 32 != 0,
         ..Channels::COLOR
     })
+}
+
+#[test]
+fn images_with_overlays_beside_them_are_smaller_than_their_page() {
+    let (bytes, expected) = in_parts(Channels::COLOR);
+    let page = |width, height| ImageShape { width, height, is_on_page: true, ..expected.clone() };
+    let (width, height) = (expected.width, expected.height);
+    for larger in [page(width, height), page(width + 5, height), page(width, height + 9)] {
+        verify(&bytes, &larger).expect("a picture on a page");
+    }
+    let error = verify(&bytes, &page(width - 1, height + 9)).unwrap_err();
+    assert!(error.contains("expected"), "{error}");
+    let whole = ImageShape { is_on_page: false, ..page(width + 5, height) };
+    assert!(verify(&bytes, &whole).is_err());
 }
 
 #[test]

@@ -31,7 +31,13 @@ impl Axes {
         [2.0 * half.max(LABEL * pen.font.size + 0.5 * widest), 2.0 * half]
     }
 
-    pub(super) fn draw(&self, canvas: &mut Canvas, corner: [f32; 2], pen: &Pen, frame: &FrameView) {
+    pub(super) fn draw(
+        &self,
+        canvas: &mut dyn Canvas,
+        corner: [f32; 2],
+        pen: &Pen,
+        frame: &FrameView,
+    ) {
         let size = pen.font.size;
         let [width, height] = self.measure(pen);
         let center = [corner[0] + 0.5 * width, corner[1] + 0.5 * height];

@@ -1,7 +1,8 @@
 //! Colour bars: a bar with ticks, or swatches with the names of categories. This file has vertical ones.
 
 use super::canvas::{Canvas, Color};
-use super::ticks::{Ticks, power_text};
+use super::number_format::NumberFormat;
+use super::ticks::{TickChoice, TickSettings, Ticks, power_text};
 use super::{Pen, font};
 use crate::scene::ColorScale;
 
@@ -30,6 +31,12 @@ pub struct ColorBar {
     pub orientation: Orientation,
     /// The colours.
     pub kind: ColorBarKind,
+    /// Where ticks are wanted, if not at round values.
+    pub ticks: Option<TickChoice>,
+    /// How numbers are written, if not as short as possible.
+    pub format: Option<NumberFormat>,
+    /// What values are multiplied by before they are shown; above 0.
+    pub factor: f64,
 }
 
 /// Colours and their values.
@@ -71,22 +78,36 @@ impl ColorBar {
         names.chain([&*self.title, &*self.unit]).collect()
     }
 
+    /// What the ticks depend on; None for categories.
+    pub fn tick_settings(&self) -> Option<TickSettings<'_>> {
+        match &self.kind {
+            ColorBarKind::Categories(_) => None,
+            ColorBarKind::Numbers { colors, range, scale, is_discrete } => Some(TickSettings {
+                range: *range,
+                scale: *scale,
+                steps: is_discrete.then(|| u32::try_from(colors.len()).unwrap_or(u32::MAX)),
+                factor: self.factor,
+                choice: self.ticks.as_ref(),
+                format: self.format,
+            }),
+        }
+    }
+
     /// The ticks for a vertical bar of `length` pixels with text of `size` pixels.
-    fn ticks(&self, length: f32, size: f32) -> Ticks {
+    fn vertical_ticks(&self, length: f32, size: f32) -> Ticks {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few")]
-        let most = (length / (LABEL_PITCH * size)).floor().clamp(2.0, 9.0) as usize;
-        self.ticks_with(most)
+        let most = (length / (LABEL_PITCH * size)).floor().clamp(2.0, 100.0) as usize;
+        let mut ticks = self.ticks_with(most);
+        if matches!(self.ticks, Some(TickChoice::Values(_))) {
+            let line = f64::from(size / length);
+            ticks.thin(0.3 * line, |_| 0.5 * line);
+        }
+        ticks
     }
 
     /// The ticks with at most `most` labels.
     fn ticks_with(&self, most: usize) -> Ticks {
-        match &self.kind {
-            ColorBarKind::Categories(_) => Ticks::default(),
-            ColorBarKind::Numbers { colors, range, scale, is_discrete } => {
-                let steps = is_discrete.then(|| u32::try_from(colors.len()).unwrap_or(u32::MAX));
-                Ticks::of(*range, *scale, steps, most)
-            }
-        }
+        self.tick_settings().map(|settings| settings.ticks(most)).unwrap_or_default()
     }
 
     /// The title with unit and common exponent.
@@ -129,7 +150,7 @@ impl ColorBar {
         }
         let size = pen.font.size;
         let length = self.length(pen);
-        let ticks = self.ticks(length, size);
+        let ticks = self.vertical_ticks(length, size);
         let heading = self.heading(ticks.exponent);
         let labels = ticks.ticks.iter().filter_map(|tick| tick.label.as_deref());
         let names: Vec<&str> = match &self.kind {
@@ -146,14 +167,14 @@ impl ColorBar {
         [width.max(pen.font.width(&heading)), height]
     }
 
-    pub(super) fn draw(&self, canvas: &mut Canvas, corner: [f32; 2], pen: &Pen) {
+    pub(super) fn draw(&self, canvas: &mut dyn Canvas, corner: [f32; 2], pen: &Pen) {
         if self.orientation == Orientation::Horizontal {
             self.draw_horizontal(canvas, corner, pen);
             return;
         }
         let size = pen.font.size;
         let length = self.length(pen);
-        let ticks = self.ticks(length, size);
+        let ticks = self.vertical_ticks(length, size);
         let heading = self.heading(ticks.exponent);
         pen.text(canvas, &heading, corner);
         let top = (corner[1] + self.above(pen, &heading)).round();
@@ -172,51 +193,34 @@ impl ColorBar {
 }
 
 /// Draws a thin frame around a rectangle.
-fn frame(canvas: &mut Canvas, from: [f32; 2], to: [f32; 2], pen: &Pen) {
+fn frame(canvas: &mut dyn Canvas, from: [f32; 2], to: [f32; 2], pen: &Pen) {
     let line = pen.line;
     let outside = ([from[0] - line, from[1] - line], [to[0] + line, to[1] + line]);
     canvas.fill(outside.0, outside.1, pen.color);
 }
 
 /// Fills a bar from its first colour at the bottom to its last at the top.
-fn fill(canvas: &mut Canvas, colors: &[Color], is_discrete: bool, from: [f32; 2], to: [f32; 2]) {
+fn fill(
+    canvas: &mut dyn Canvas,
+    colors: &[Color],
+    is_discrete: bool,
+    from: [f32; 2],
+    to: [f32; 2],
+) {
+    if !is_discrete {
+        canvas.ramp(from, to, Orientation::Vertical, colors);
+        return;
+    }
     let length = to[1] - from[1];
     #[expect(clippy::cast_precision_loss, reason = "a few hundred")]
     let count = colors.len() as f32;
-    if is_discrete {
-        for (color, i) in colors.iter().zip(0_u16..) {
-            let edge = |i: u16| (to[1] - length * f32::from(i) / count).round();
-            canvas.fill([from[0], edge(i + 1)], [to[0], edge(i)], *color);
-        }
-        return;
-    }
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "pixels")]
-    let rows = length as u32;
-    for row in 0..rows {
-        let y = from[1] + row as f32;
-        let at = (to[1] - (y + 0.5)) / length * (count - 1.0);
-        canvas.fill([from[0], y], [to[0], y + 1.0], between(colors, at));
+    for (color, i) in colors.iter().zip(0_u16..) {
+        let edge = |i: u16| (to[1] - length * f32::from(i) / count).round();
+        canvas.fill([from[0], edge(i + 1)], [to[0], edge(i)], *color);
     }
 }
 
-/// The colour at a position between two entries.
-fn between(colors: &[Color], at: f32) -> Color {
-    let last = colors.len().saturating_sub(1);
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "limited to the entries"
-    )]
-    let index = (at.max(0.0) as usize).min(last);
-    let (Some(a), Some(b)) = (colors.get(index), colors.get((index + 1).min(last))) else {
-        return [0.0; 3];
-    };
-    #[expect(clippy::cast_precision_loss, reason = "a few hundred")]
-    let part = (at - index as f32).clamp(0.0, 1.0);
-    std::array::from_fn(|c| a[c] + part * (b[c] - a[c]))
-}
-
-fn draw_ticks(canvas: &mut Canvas, ticks: &Ticks, from: [f32; 2], to: [f32; 2], pen: &Pen) {
+fn draw_ticks(canvas: &mut dyn Canvas, ticks: &Ticks, from: [f32; 2], to: [f32; 2], pen: &Pen) {
     let (size, line) = (pen.font.size, pen.line);
     let start = to[0] + line;
     for tick in &ticks.ticks {
@@ -233,7 +237,7 @@ fn draw_ticks(canvas: &mut Canvas, ticks: &Ticks, from: [f32; 2], to: [f32; 2], 
     }
 }
 
-fn swatches(canvas: &mut Canvas, all: &[(String, Color)], corner: [f32; 2], pen: &Pen) {
+fn swatches(canvas: &mut dyn Canvas, all: &[(String, Color)], corner: [f32; 2], pen: &Pen) {
     let size = pen.font.size;
     let side = (SWATCH * size).round().max(2.0);
     for ((name, color), i) in all.iter().zip(0_u16..) {

@@ -34,7 +34,18 @@ impl RgbaPixels {
         Self { width, pixels }
     }
 
-    fn height(&self) -> usize {
+    /// Width in pixels.
+    pub const fn width(&self) -> usize {
+        self.width
+    }
+
+    /// The pixels, row by row from the top.
+    pub fn pixels(&self) -> &[[u8; 4]] {
+        &self.pixels
+    }
+
+    /// Height in pixels.
+    pub fn height(&self) -> usize {
         self.pixels.len() / self.width
     }
 
@@ -58,6 +69,30 @@ impl RgbaPixels {
             return ([0.0; 3], 0.0);
         }
         (color.map(|sum| sum / alpha), alpha / (255.0 * area))
+    }
+}
+
+impl RgbaPixels {
+    /// Calls `visit` with the place, colour and alpha of each pixel of the picture in the rectangle of `size` below
+    /// `corner`, which is at a pixel. Each is the mean of what it covers, in sRGB like the edges of text.
+    pub(super) fn draw_scaled(
+        &self,
+        corner: [f32; 2],
+        size: [f32; 2],
+        mut visit: impl FnMut(i32, i32, [f32; 3], f32),
+    ) {
+        let scale = [self.width as f32 / size[0], self.height() as f32 / size[1]];
+        #[expect(clippy::cast_possible_truncation, reason = "whole pixels")]
+        let [left, top, width, height] = [corner[0], corner[1], size[0], size[1]].map(|v| v as i32);
+        for y in 0..height {
+            for x in 0..width {
+                let at = [x as f32, y as f32];
+                let from = [at[0] * scale[0], at[1] * scale[1]];
+                let to = [from[0] + scale[0], from[1] + scale[1]];
+                let (color, alpha) = self.mean(from, to);
+                visit(left + x, top + y, color, alpha);
+            }
+        }
     }
 }
 
@@ -91,22 +126,8 @@ impl Image {
         [(height * aspect).round().max(1.0), height]
     }
 
-    /// Draws the picture below `corner`, which is at a pixel. Each pixel is the mean of what it covers, in sRGB like the
-    /// edges of text.
-    pub(super) fn draw(&self, canvas: &mut Canvas, corner: [f32; 2], pen: &Pen) {
-        let size = self.measure(pen);
-        let scale = [self.source.width as f32 / size[0], self.source.height() as f32 / size[1]];
-        #[expect(clippy::cast_possible_truncation, reason = "whole pixels")]
-        let [left, top, width, height] = [corner[0], corner[1], size[0], size[1]].map(|v| v as i32);
-        for y in 0..height {
-            for x in 0..width {
-                let at = [x as f32, y as f32];
-                let from = [at[0] * scale[0], at[1] * scale[1]];
-                let to = [from[0] + scale[0], from[1] + scale[1]];
-                let (color, alpha) = self.source.mean(from, to);
-                canvas.blend(left + x, top + y, color, alpha);
-            }
-        }
+    pub(super) fn draw(&self, canvas: &mut dyn Canvas, corner: [f32; 2], pen: &Pen) {
+        canvas.image(corner, self.measure(pen), &self.source);
     }
 }
 

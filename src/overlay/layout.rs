@@ -13,7 +13,17 @@ pub enum Corner {
     BottomRight,
 }
 
-/// The place of an overlay.
+/// Whether an overlay covers the picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Layout {
+    /// It is drawn over the picture.
+    #[default]
+    Over,
+    /// The picture leaves room for it.
+    Beside,
+}
+
+/// The place of an overlay over the picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placement {
     /// The corner.
@@ -29,33 +39,12 @@ impl Corner {
     /// All corners.
     pub const ALL: [Self; 4] = [Self::TopLeft, Self::TopRight, Self::BottomLeft, Self::BottomRight];
 
-    const fn is_left(self) -> bool {
+    pub(super) const fn is_left(self) -> bool {
         matches!(self, Self::TopLeft | Self::BottomLeft)
     }
 
-    const fn is_top(self) -> bool {
+    pub(super) const fn is_top(self) -> bool {
         matches!(self, Self::TopLeft | Self::TopRight)
-    }
-
-    /// The first of `corners`, best first, with the fewest `points` of a picture inside a box of `size` there. Points
-    /// and size are in pixels.
-    pub fn freest(
-        corners: &[Self],
-        offset: [f32; 2],
-        size: [i32; 2],
-        picture: [u32; 2],
-        points: &[[f32; 2]],
-    ) -> Self {
-        let covered = |corner: &&Self| {
-            let placement = Placement { corner: **corner, offset };
-            let [left, top] = placement.place(size, 0, picture).map(|v| v as f32);
-            let [right, bottom] = [left + size[0] as f32, top + size[1] as f32];
-            let is_inside =
-                |p: &&[f32; 2]| (left..=right).contains(&p[0]) && (top..=bottom).contains(&p[1]);
-            points.iter().filter(is_inside).count()
-        };
-        let best = corners.iter().min_by_key(covered);
-        best.copied().unwrap_or(Self::TopLeft)
     }
 }
 
@@ -88,23 +77,70 @@ impl Placement {
     }
 }
 
-/// The top left corners of boxes of these `sizes` in a picture. Boxes with the same placement are stacked, the first
-/// one nearest to the corner.
-pub(super) fn place(
-    placements: &[Placement],
-    sizes: &[[i32; 2]],
+/// Boxes that have been placed over a picture, pixels.
+#[derive(Debug, Clone)]
+pub struct Boxes {
     picture: [u32; 2],
-) -> Vec<[i32; 2]> {
-    #[expect(clippy::cast_possible_truncation, reason = "pixels")]
-    let gap = (GAP * picture[1] as f32).round() as i32;
-    let mut placed = Vec::with_capacity(placements.len());
-    for (i, placement) in placements.iter().enumerate() {
-        let before = placements[..i].iter().zip(sizes);
-        let before = before.filter(|(other, _)| *other == placement);
-        let below = before.fold(0_i32, |sum, (_, size)| sum.saturating_add(size[1] + gap));
-        placed.push(placement.place(sizes[i], below, picture));
+    placed: Vec<(Placement, [i32; 2], [i32; 2])>,
+}
+
+impl Boxes {
+    /// No boxes in a picture of this size.
+    pub const fn new(picture: [u32; 2]) -> Self {
+        Self { picture, placed: Vec::new() }
     }
-    placed
+
+    /// The top left corner of a box of `size` that would be added now. Boxes with the same placement are stacked, the
+    /// first one nearest to the corner.
+    fn next(&self, placement: Placement, size: [i32; 2]) -> [i32; 2] {
+        #[expect(clippy::cast_possible_truncation, reason = "pixels")]
+        let gap = (GAP * self.picture[1] as f32).round() as i32;
+        let before = self.placed.iter().filter(|(other, ..)| *other == placement);
+        let below = before.fold(0_i32, |sum, (_, _, size)| sum.saturating_add(size[1] + gap));
+        placement.place(size, below, self.picture)
+    }
+
+    /// Adds a box, and returns its top left corner.
+    pub fn add(&mut self, placement: Placement, size: [i32; 2]) -> [i32; 2] {
+        let corner = self.next(placement, size);
+        self.placed.push((placement, corner, size));
+        corner
+    }
+
+    /// The one of `corners`, best first, where a box of `size` covers no other box and the fewest `points`. A corner
+    /// with a box is worse than a free one with as many points.
+    pub fn freest(
+        &self,
+        corners: &[Corner],
+        offset: [f32; 2],
+        size: [i32; 2],
+        points: &[[f32; 2]],
+    ) -> Corner {
+        let rank = |corner: &&Corner| {
+            let placement = Placement { corner: **corner, offset };
+            let at = self.next(placement, size);
+            let [left, top] = at.map(|v| v as f32);
+            let [right, bottom] = [left + size[0] as f32, top + size[1] as f32];
+            let is_inside =
+                |p: &&[f32; 2]| (left..=right).contains(&p[0]) && (top..=bottom).contains(&p[1]);
+            let is_taken = self.placed.iter().any(|(other, ..)| other.corner == **corner);
+            (self.overlaps(at, size), points.iter().filter(is_inside).count(), is_taken)
+        };
+        corners.iter().min_by_key(rank).copied().unwrap_or(Corner::TopLeft)
+    }
+
+    /// Whether a box covers another one or leaves the picture.
+    fn overlaps(&self, at: [i32; 2], size: [i32; 2]) -> bool {
+        let far = |at: [i32; 2], size: [i32; 2], axis: usize| at[axis].saturating_add(size[axis]);
+        let leaves =
+            |axis: usize| at[axis] < 0 || far(at, size, axis) > self.picture[axis].cast_signed();
+        let covers = |(_, other, other_size): &(Placement, [i32; 2], [i32; 2])| {
+            (0..2).all(|axis| {
+                at[axis] < far(*other, *other_size, axis) && other[axis] < far(at, size, axis)
+            })
+        };
+        (0..2).any(leaves) || self.placed.iter().any(covers)
+    }
 }
 
 #[cfg(test)]
@@ -130,14 +166,16 @@ mod tests {
     fn boxes_in_one_corner_are_stacked() {
         let all = [Corner::BottomRight, Corner::TopLeft, Corner::BottomRight].map(placement);
         let sizes = [[50, 30], [10, 10], [20, 10]];
-        assert_eq!(place(&all, &sizes, PICTURE), [[340, 150], [10, 20], [370, 136]]);
+        let mut boxes = Boxes::new(PICTURE);
+        let places = all.into_iter().zip(sizes).map(|(placement, size)| boxes.add(placement, size));
+        assert_eq!(places.collect::<Vec<_>>(), [[340, 150], [10, 20], [370, 136]]);
     }
 
     #[test]
     fn the_free_corner_is_chosen() {
         let order = [Corner::BottomRight, Corner::TopRight, Corner::BottomLeft, Corner::TopLeft];
-        let free =
-            |points: &[[f32; 2]]| Corner::freest(&order, [0.05, 0.1], [50, 30], PICTURE, points);
+        let boxes = Boxes::new(PICTURE);
+        let free = |points: &[[f32; 2]]| boxes.freest(&order, [0.05, 0.1], [50, 30], points);
         assert_eq!(free(&[]), Corner::BottomRight);
         assert_eq!(free(&[[200.0, 100.0]]), Corner::BottomRight);
         assert_eq!(free(&[[350.0, 160.0]]), Corner::TopRight);
@@ -145,5 +183,23 @@ mod tests {
         // All are covered: the one with the fewest points
         let all = [[350.0, 160.0], [351.0, 161.0], [350.0, 30.0], [20.0, 160.0], [20.0, 30.0]];
         assert_eq!(free(&all), Corner::TopRight);
+    }
+
+    #[test]
+    fn boxes_share_a_corner_rather_than_cover_particles() {
+        let order = [Corner::TopLeft, Corner::BottomLeft, Corner::TopRight, Corner::BottomRight];
+        let mut boxes = Boxes::new(PICTURE);
+        boxes.add(placement(Corner::TopLeft), [50, 30]);
+        let free = |boxes: &Boxes, points: &[[f32; 2]]| {
+            boxes.freest(&order, [0.05, 0.1], [50, 30], points)
+        };
+        // An empty corner is better than a stack
+        assert_eq!(free(&boxes, &[]), Corner::BottomLeft);
+        // Below the first box is room
+        let lower_and_right = [[20.0, 160.0], [350.0, 160.0], [350.0, 30.0]];
+        assert_eq!(free(&boxes, &lower_and_right), Corner::TopLeft);
+        // Not over a box of another corner
+        boxes.add(placement(Corner::BottomLeft), [50, 100]);
+        assert_ne!(free(&boxes, &lower_and_right), Corner::TopLeft);
     }
 }

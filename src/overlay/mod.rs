@@ -3,26 +3,33 @@
 //! nor files.
 
 mod axes;
+mod beside;
 mod canvas;
 mod color_bar;
 mod font;
 mod image;
 mod layout;
+mod marks;
+mod number_format;
 mod scale_bar;
 mod template;
 mod ticks;
 
 pub use axes::Axes;
-use canvas::Canvas;
+pub use beside::Page;
 pub use canvas::Color;
+use canvas::{Canvas, Raster};
 pub use color_bar::{ColorBar, ColorBarKind, Orientation};
 use font::Font;
 use font::missing_glyphs;
+pub use font::{FONT_NAME, FontFile, Glyph, Stroke, font_file, outline};
 pub use image::{Image, RgbaPixels};
-pub use layout::{Corner, Placement};
+pub use layout::{Boxes, Corner, Layout, Placement};
+pub use marks::{Drawing, Mark, marks};
+pub use number_format::NumberFormat;
 pub use scale_bar::ScaleBar;
 pub use template::{FrameValues, Template};
-pub use ticks::{Tick, Ticks};
+pub use ticks::{Tick, TickChoice, TickSettings, Ticks};
 
 /// Smallest size of text in pixels; smaller text cannot be read.
 const LEAST_TEXT: f32 = 9.0;
@@ -35,9 +42,13 @@ const HALO: f32 = 0.12;
 pub struct Overlay {
     /// What is drawn.
     pub content: Content,
-    /// Where it is.
+    /// Whether it is over or beside the picture.
+    pub layout: Layout,
+    /// The corner that users name. Beside the picture, it chooses the side and the end of the strip.
+    pub corner: Option<Corner>,
+    /// Where it is over the picture.
     pub placement: Placement,
-    /// Height of text as a fraction of the height of the picture.
+    /// Height of text as a fraction of the height of the page.
     pub size: f32,
     /// Colour of text and lines.
     pub color: Color,
@@ -135,7 +146,7 @@ impl Overlay {
         let radius = (HALO * pen.font.size).max(1.0);
         #[expect(clippy::cast_possible_truncation, reason = "a few pixels")]
         let margin = radius.ceil() as i32 + 1;
-        let mut canvas = Canvas::new(size[0] + 2 * margin, size[1] + 2 * margin);
+        let mut canvas = Raster::new(size[0] + 2 * margin, size[1] + 2 * margin);
         let corner = [margin as f32; 2];
         self.content.draw(&mut canvas, corner, pen, frame);
         if !matches!(self.content, Content::Image(_)) {
@@ -145,24 +156,58 @@ impl Overlay {
     }
 }
 
-/// Draws `overlays` for a picture of `width` by `height` pixels.
-pub fn draw(overlays: &[Overlay], width: u32, height: u32, frame: &FrameView) -> Vec<Sprite> {
+/// The top left corners of `overlays` with these `sizes` on a page.
+fn place(overlays: &[Overlay], sizes: &[[i32; 2]], page: &Page) -> Vec<[i32; 2]> {
+    let [left, top] = page.at.map(u32::cast_signed);
+    let is_beside = |overlay: &Overlay| overlay.layout == Layout::Beside;
+    let all = || overlays.iter().zip(sizes.iter().copied());
+    let beside: Vec<_> = all().filter(|(overlay, _)| is_beside(overlay)).collect();
+    let mut beside = page.places(&beside).into_iter();
+    let mut boxes = Boxes::new(page.picture);
+    let places = all().map(|(overlay, size)| match overlay.layout {
+        Layout::Beside => beside.next().unwrap_or_default(),
+        Layout::Over => {
+            let [x, y] = boxes.add(overlay.placement, size);
+            [x + left, y + top]
+        }
+    });
+    places.collect()
+}
+
+/// The view of a frame for overlays, whose lengths are fractions of the height of the page.
+fn on_page(frame: &FrameView, page: &Page) -> FrameView {
+    let part = f64::from(page.picture[1]) / f64::from(page.size[1].max(1));
+    FrameView { units_per_height: frame.units_per_height / part, ..frame.clone() }
+}
+
+/// Draws `overlays` for a page.
+pub fn draw(overlays: &[Overlay], page: &Page, frame: &FrameView) -> Vec<Sprite> {
+    let frame = on_page(frame, page);
+    let [width, height] = page.size;
     let sizes: Vec<[i32; 2]> =
-        overlays.iter().map(|overlay| overlay.size_in(width, height, frame)).collect();
-    let placements: Vec<Placement> = overlays.iter().map(|overlay| overlay.placement).collect();
-    let corners = layout::place(&placements, &sizes, [width, height]);
+        overlays.iter().map(|overlay| overlay.size_in(width, height, &frame)).collect();
+    let corners = place(overlays, &sizes, page);
     let drawn = overlays.iter().zip(sizes).zip(corners);
     drawn
-        .map(|((overlay, size), corner)| overlay.draw(corner, size, &overlay.pen(height), frame))
+        .map(|((overlay, size), corner)| overlay.draw(corner, size, &overlay.pen(height), &frame))
         .collect()
 }
 
-/// Memory for drawing `overlays` over a picture, bytes. Variables of texts count as short.
+/// Memory for drawing `overlays` over a picture of the particles, bytes. Variables of texts count as short.
 pub fn bytes(overlays: &[Overlay], width: u32, height: u32) -> u64 {
     /// Bytes per pixel of a sprite, and of the canvas with its halo that it is drawn in.
     const PIXEL: [u64; 2] = [4, 20];
+    /// Bytes per pixel of the page beside the picture: with alpha; plain, filtered and compressed.
+    const PAGE: u64 = 12;
+    let frame = FrameView::default();
+    // The page is larger than the picture by its strips
+    let strips = |side: u32| side.saturating_mul(2);
+    let page = Page::with_room_for(overlays, [strips(width), strips(height)], &frame);
+    let [own_width, own_height] = page.picture;
+    let around = [strips(width) - own_width, strips(height) - own_height].map(u64::from);
+    let beside = around[0] * (u64::from(height) + around[1]) + around[1] * u64::from(width);
     let areas = overlays.iter().map(|overlay| {
-        let [width, height] = overlay.size_in(width, height, &FrameView::default());
+        let [width, height] = overlay.size_in(width, height, &frame);
         // Margins of the halo, and values of variables
         2 * u64::from(width.unsigned_abs()) * u64::from(height.unsigned_abs())
     });
@@ -171,7 +216,7 @@ pub fn bytes(overlays: &[Overlay], width: u32, height: u32) -> u64 {
         Content::Image(image) => image.bytes(),
         _ => 0,
     });
-    PIXEL[0] * sum + PIXEL[1] * most + files.sum::<u64>()
+    PAGE * beside + PIXEL[0] * sum + PIXEL[1] * most + files.sum::<u64>()
 }
 
 impl Sprite {
@@ -242,19 +287,19 @@ impl Pen {
     }
 
     /// Draws lines of text below `corner`.
-    fn text(&self, canvas: &mut Canvas, text: &str, corner: [f32; 2]) {
+    fn text(&self, canvas: &mut dyn Canvas, text: &str, corner: [f32; 2]) {
         // Capitals are in the middle of the line
         let mut baseline = corner[1] + 0.5 * (1.0 + font::CAP_HEIGHT) * self.font.size;
         for line in text.lines() {
-            self.font.draw(canvas, line, corner[0], baseline, self.color);
+            canvas.text(&self.font, line, corner[0], baseline, self.color);
             baseline += font::LINE * self.font.size;
         }
     }
 
     /// Draws a label whose capitals and digits have their middle at `middle`.
-    fn label(&self, canvas: &mut Canvas, text: &str, x: f32, middle: f32) {
+    fn label(&self, canvas: &mut dyn Canvas, text: &str, x: f32, middle: f32) {
         let baseline = middle + 0.5 * font::CAP_HEIGHT * self.font.size;
-        self.font.draw(canvas, text, x, baseline, self.color);
+        canvas.text(&self.font, text, x, baseline, self.color);
     }
 }
 
@@ -269,7 +314,7 @@ impl Content {
         }
     }
 
-    fn draw(&self, canvas: &mut Canvas, corner: [f32; 2], pen: &Pen, frame: &FrameView) {
+    fn draw(&self, canvas: &mut dyn Canvas, corner: [f32; 2], pen: &Pen, frame: &FrameView) {
         match self {
             Self::ColorBar(bar) => bar.draw(canvas, corner, pen),
             Self::Text(template) => pen.text(canvas, &template.expand(&frame.values), corner),

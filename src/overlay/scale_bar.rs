@@ -60,7 +60,13 @@ impl ScaleBar {
         [width.max(self.pixels(pen, frame)), height + (GAP + END) * size]
     }
 
-    pub(super) fn draw(&self, canvas: &mut Canvas, corner: [f32; 2], pen: &Pen, frame: &FrameView) {
+    pub(super) fn draw(
+        &self,
+        canvas: &mut dyn Canvas,
+        corner: [f32; 2],
+        pen: &Pen,
+        frame: &FrameView,
+    ) {
         let (label, length) = (self.label(), self.pixels(pen, frame));
         let [text_width, text_height] = pen.text_size(&label);
         let size = pen.font.size;

@@ -1,6 +1,6 @@
 //! Text with variables, such as `t = {time:.2f} s`.
 
-use super::ticks::number;
+use super::number_format::NumberFormat;
 
 /// What variables stand for in one frame.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -26,7 +26,7 @@ pub struct Template {
 #[derive(Debug, Clone, PartialEq)]
 enum Piece {
     Text(String),
-    Variable(Variable, Format),
+    Variable(Variable, NumberFormat),
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -38,20 +38,6 @@ enum Variable {
     Least(String),
     Greatest(String),
 }
-
-/// How a number is written.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-struct Format {
-    decimals: Option<usize>,
-    /// At least so many digits.
-    digits: usize,
-    /// With commas between groups of three digits.
-    is_grouped: bool,
-    is_scientific: bool,
-}
-
-/// Largest number of digits in a format.
-const MAX_DIGITS: usize = 30;
 
 /// Names of variables.
 const NAMES: [&str; 4] = ["time", "frame", "particles", "file"];
@@ -96,6 +82,11 @@ impl Template {
             Piece::Text(text) => Some(&**text),
             Piece::Variable(..) => None,
         })
+    }
+
+    /// Whether it has variables.
+    pub(super) fn varies(&self) -> bool {
+        self.pieces.iter().any(|piece| matches!(piece, Piece::Variable(..)))
     }
 
     /// Names of the values whose ranges are needed.
@@ -146,89 +137,10 @@ fn variable(text: &str) -> Result<Piece, String> {
             }
         },
     };
-    let format = Format::parse(format).ok_or_else(|| {
+    let format = NumberFormat::parse(format).ok_or_else(|| {
         format!("unknown format `{format}` of `{{{name}}}` (examples: .2f, .1e, 04d, and a comma for groups of digits)")
     })?;
     Ok(Piece::Variable(variable, format))
-}
-
-impl Format {
-    /// Reads a part of Python's formats: `.2f`, `.1e`, `04d`, `,`.
-    fn parse(text: &str) -> Option<Self> {
-        let mut format = Self::default();
-        let mut rest = text;
-        if let Some(after) = rest.strip_prefix('0') {
-            let end = after.find(|c: char| !c.is_ascii_digit()).unwrap_or(after.len());
-            format.digits = after[..end].parse().ok().filter(|digits| *digits <= MAX_DIGITS)?;
-            rest = &after[end..];
-        }
-        if let Some(after) = rest.strip_prefix(',') {
-            format.is_grouped = true;
-            rest = after;
-        }
-        if let Some(after) = rest.strip_prefix('.') {
-            let end = after.find(|c: char| !c.is_ascii_digit()).unwrap_or(after.len());
-            let decimals = after[..end].parse().ok().filter(|digits| *digits <= MAX_DIGITS)?;
-            format.decimals = Some(decimals);
-            rest = &after[end..];
-            format.is_scientific = rest == "e";
-            return matches!(rest, "f" | "e").then_some(format);
-        }
-        matches!(rest, "" | "d").then_some(format)
-    }
-
-    fn integer(self, value: i128) -> String {
-        let digits = format!("{:0width$}", value.unsigned_abs(), width = self.digits);
-        let sign = if value < 0 { "\u{2212}" } else { "" };
-        let digits = if self.is_grouped { grouped(&digits) } else { digits };
-        format!("{sign}{digits}")
-    }
-
-    fn real(self, value: Option<f64>) -> String {
-        let Some(value) = value.filter(|value| value.is_finite()) else {
-            return "\u{2013}".to_owned();
-        };
-        match self.decimals {
-            Some(decimals) if self.is_scientific => {
-                let text = format!("{value:.decimals$e}");
-                match text.split_once('e') {
-                    Some((mantissa, exponent)) => {
-                        let power = exponent
-                            .parse()
-                            .map_or_else(|_| String::new(), super::ticks::power_text);
-                        format!("{}\u{d7}{power}", mantissa.replace('-', "\u{2212}"))
-                    }
-                    None => text,
-                }
-            }
-            Some(decimals) => {
-                let text = number(value, decimals);
-                match (self.is_grouped, text.split_once('.')) {
-                    (true, Some((whole, part))) => format!("{}.{part}", grouped(whole)),
-                    (true, None) => grouped(&text),
-                    (false, _) => text,
-                }
-            }
-            None => value.to_string().replace('-', "\u{2212}"),
-        }
-    }
-}
-
-/// Digits with a comma after each group of three from the end.
-fn grouped(digits: &str) -> String {
-    let count = digits.chars().filter(char::is_ascii_digit).count();
-    let mut left = count;
-    let mut text = String::new();
-    for c in digits.chars() {
-        if c.is_ascii_digit() {
-            if left != count && left.is_multiple_of(3) {
-                text.push(',');
-            }
-            left -= 1;
-        }
-        text.push(c);
-    }
-    text
 }
 
 #[cfg(test)]

@@ -8,6 +8,8 @@ const BLACK: Color = [0.0; 3];
 fn overlay(content: Content) -> Overlay {
     Overlay {
         content,
+        layout: Layout::Over,
+        corner: None,
         placement: Placement { corner: Corner::TopLeft, offset: [0.05, 0.05] },
         size: 0.05,
         color: BLACK,
@@ -26,6 +28,9 @@ fn bar(title: &str) -> Overlay {
         unit: "m/s".to_owned(),
         length: 0.5,
         orientation: Orientation::Vertical,
+        ticks: None,
+        format: None,
+        factor: 1.0,
         kind: ColorBarKind::Numbers {
             colors: vec![[0.0, 0.0, 1.0], [1.0, 1.0, 0.0]],
             range: [0.0, 4.0],
@@ -37,7 +42,7 @@ fn bar(title: &str) -> Overlay {
 
 /// A white picture with the overlays.
 fn drawn(overlays: &[Overlay], width: u32, height: u32, frame: &FrameView) -> Vec<u8> {
-    let sprites = draw(overlays, width, height, frame);
+    let sprites = draw(overlays, &Page::whole(width, height), frame);
     let mut picture = vec![255; 3 * width as usize * height as usize];
     for (row, y) in picture.chunks_mut(3 * width as usize).zip(0..) {
         sprites.iter().for_each(|sprite| sprite.draw_over(y, row));
@@ -149,7 +154,7 @@ fn lengths_of_scale_bars_are_those_of_the_scene() {
     let scale_bar =
         |length: f64| overlay(Content::ScaleBar(ScaleBar { length, unit: "mm".to_owned() }));
     // An eighth of 400 pixels; the label is wider
-    let sprite = &draw(&[scale_bar(0.5)], 600, 400, &frame)[0];
+    let sprite = &draw(&[scale_bar(0.5)], &Page::whole(600, 400), &frame)[0];
     let dark = |x: &i32| {
         let at = usize::try_from(27 + 3 + 10 / 2).unwrap() * usize::try_from(sprite.width).unwrap();
         let pixel = sprite.pixels[at + usize::try_from(*x).unwrap()];

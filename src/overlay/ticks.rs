@@ -1,6 +1,14 @@
 //! Ticks of colour bars: round values with labels, for each scale.
 
+use super::number_format::NumberFormat;
 use crate::scene::ColorScale;
+
+mod bands;
+mod ends;
+mod given;
+mod linear;
+mod log;
+mod symlog;
 
 /// A mark of a colour bar.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,6 +26,8 @@ pub struct Ticks {
     pub ticks: Vec<Tick>,
     /// Power of ten that labels are multiplied by.
     pub exponent: i32,
+    /// Decimals of the labels.
+    decimals: usize,
 }
 
 /// A power of ten.
@@ -70,31 +80,84 @@ pub(super) fn power_text(exponent: i32) -> String {
 /// Exponents whose powers of ten are written with zeros: 0.001 to 10000.
 const PLAIN: std::ops::RangeInclusive<i32> = -3..=4;
 
-impl Ticks {
-    /// The ticks of a range with at most `most` labels, which is at least 2. With `steps`, they are at the borders of
-    /// the bands of a discrete map.
-    pub fn of(range: [f64; 2], scale: ColorScale, steps: Option<u32>, most: usize) -> Self {
-        let [low, high] = range;
-        if !(low < high && (high - low).is_normal()) {
-            return Self::of_one(low);
-        }
-        let axis = Axis { range, scale };
-        let most = most.max(2);
-        match (steps, scale) {
-            (Some(steps), _) => axis.bands(steps, most),
-            (None, ColorScale::Linear) => axis.linear(most),
-            (None, ColorScale::Log) => axis.log(most),
-            (None, ColorScale::SymLog { threshold }) => axis.symlog(threshold, most),
+/// Where ticks are wanted.
+#[derive(Debug, Clone, PartialEq)]
+pub enum TickChoice {
+    /// At round values, with about so many labels.
+    Count(u16),
+    /// At these values, in the unit that the bar shows.
+    Values(Vec<f64>),
+}
+
+/// What the ticks of a bar depend on.
+#[derive(Debug, Clone, Copy)]
+pub struct TickSettings<'a> {
+    /// Values at the ends.
+    pub range: [f64; 2],
+    /// The scale.
+    pub scale: ColorScale,
+    /// The number of bands of a discrete map.
+    pub steps: Option<u32>,
+    /// What values are multiplied by before they are shown; above 0.
+    pub factor: f64,
+    /// Where ticks are wanted, if not at round values.
+    pub choice: Option<&'a TickChoice>,
+    /// How labels are written, if not as short as possible.
+    pub format: Option<NumberFormat>,
+}
+
+impl TickSettings<'_> {
+    fn axis(&self) -> Axis {
+        let scale = match self.scale {
+            ColorScale::SymLog { threshold } => {
+                ColorScale::SymLog { threshold: threshold * self.factor }
+            }
+            scale => scale,
+        };
+        Axis { range: self.range.map(|value| value * self.factor), scale, format: self.format }
+    }
+
+    /// The values among those that are wanted which are not on the bar.
+    pub fn outside(&self) -> Vec<f64> {
+        let axis = self.axis();
+        match self.choice {
+            Some(TickChoice::Values(all)) => {
+                all.iter().copied().filter(|value| !axis.contains(*value)).collect()
+            }
+            _ => Vec::new(),
         }
     }
 
-    /// The tick of a range of one value.
-    fn of_one(value: f64) -> Self {
-        let exponent = common_exponent(value, value);
-        let label = significant(value / power(exponent));
-        Self { ticks: vec![Tick { position: 0.5, label: Some(label) }], exponent }
+    /// The ticks with at most `most` labels, which is at least 2.
+    pub fn ticks(&self, most: usize) -> Ticks {
+        let axis = self.axis();
+        let [low, high] = axis.range;
+        if !(low < high && (high - low).is_normal()) {
+            return axis.one(low);
+        }
+        let most = match self.choice {
+            Some(TickChoice::Values(values)) => return axis.given(values),
+            Some(TickChoice::Count(count)) => most.min(usize::from(*count)),
+            None => most.min(USUAL),
+        };
+        let most = most.max(2);
+        let ticks = match (self.steps, axis.scale) {
+            (Some(steps), _) => return axis.bands(steps, most),
+            (None, ColorScale::Linear) => axis.linear(most),
+            (None, ColorScale::Log) => axis.log(most),
+            (None, ColorScale::SymLog { threshold }) => axis.symlog(threshold, most),
+        };
+        #[expect(clippy::cast_precision_loss, reason = "a few")]
+        let gap = GAP / most as f64;
+        axis.label_ends(ticks, gap)
     }
 }
+
+/// Most labels unless a number is wanted.
+const USUAL: usize = 9;
+
+/// Distance of labels from those of the ends, in units of the distance of labels.
+const GAP: f64 = 0.8;
 
 /// The exponent to take out of the labels of a range.
 fn common_exponent(low: f64, high: f64) -> i32 {
@@ -125,6 +188,7 @@ fn significant(value: f64) -> String {
 struct Axis {
     range: [f64; 2],
     scale: ColorScale,
+    format: Option<NumberFormat>,
 }
 
 impl Axis {
@@ -138,166 +202,19 @@ impl Axis {
         Tick { position: self.position(value).clamp(0.0, 1.0), label }
     }
 
-    /// Multiples of 1, 2 or 5 times a power of ten.
-    fn linear(&self, most: usize) -> Ticks {
-        let [low, high] = self.range;
-        let exponent = common_exponent(low, high);
-        // Find the smallest step that gives few enough labels
-        #[expect(clippy::cast_precision_loss, reason = "a few")]
-        let raw = (high - low) / (most - 1).max(1) as f64;
-        let smallest = decade(raw);
-        let candidates = (smallest - 1..=smallest + 1)
-            .flat_map(|exponent| [1, 2, 5].map(|digit| (digit, exponent)));
-        let multiples = |digit: i32, exponent: i32| {
-            let step = f64::from(digit) * power(exponent);
-            let slack = 1e-9 * (high - low);
-            let first = ((low - slack) / step).ceil();
-            let last = ((high + slack) / step).floor();
-            (step, first, last)
-        };
-        #[expect(clippy::cast_precision_loss, reason = "a few")]
-        let fits = |(digit, exponent): &(i32, i32)| {
-            let (_, first, last) = multiples(*digit, *exponent);
-            last - first < most as f64
-        };
-        let mut candidates = candidates.filter(fits);
-        let (digit, step_exponent) = candidates.next().unwrap_or((1, smallest + 2));
-        let (step, first, last) = multiples(digit, step_exponent);
-        let decimals = usize::try_from(exponent - step_exponent).unwrap_or(0);
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a few: checked above"
-        )]
-        let count = (last - first + 1.0).clamp(0.0, 100.0) as usize;
-        let ticks = (0..count).map(|i| {
-            #[expect(clippy::cast_precision_loss, reason = "a few")]
-            let multiple = first + i as f64;
-            let label = number(multiple * step / power(exponent), decimals);
-            self.tick(multiple * step, Some(label))
-        });
-        Ticks { ticks: ticks.collect(), exponent }
+    /// `value` in the given format, or else as `usual`.
+    fn label(&self, value: f64, usual: impl Fn(f64) -> String) -> String {
+        self.format.map_or_else(|| usual(value), |format| format.write(value))
     }
 
-    /// Powers of ten with small marks between them; in short ranges, 1, 2 and 5 times powers of ten, or round values.
-    fn log(&self, most: usize) -> Ticks {
-        let [low, high] = self.range;
-        if low <= 0.0 {
-            return Ticks::default();
-        }
-        let slack = 1e-9;
-        let is_inside = |value: f64| value >= low * (1.0 - slack) && value <= high * (1.0 + slack);
-        let decades = decade(low)..=decade(high * (1.0 + slack));
-        let within = decades.clone().filter(|e| is_inside(power(*e))).count();
-        let is_plain = decades.clone().all(|e| PLAIN.contains(&e));
-        if within < 3 {
-            // Few powers of ten
-            let values =
-                decades.flat_map(|e| [1, 2, 5].map(|digit| (f64::from(digit) * power(e), e)));
-            let values: Vec<(f64, i32)> = values.filter(|(value, _)| is_inside(*value)).collect();
-            if values.len() < 3 || values.len() > most || !is_plain {
-                let few = self.linear(most.min(5));
-                return if within < 2 { few } else { self.decades(most, is_plain) };
-            }
-            let label = |(value, e): (f64, i32)| {
-                let decimals = usize::try_from(-e).unwrap_or(0);
-                self.tick(value, Some(number(value, decimals)))
-            };
-            return Ticks { ticks: values.into_iter().map(label).collect(), exponent: 0 };
-        }
-        self.decades(most, is_plain)
-    }
-
-    /// Powers of ten, with small marks at their multiples.
-    fn decades(&self, most: usize, is_plain: bool) -> Ticks {
-        let [low, high] = self.range;
-        let slack = 1e-9;
-        let is_inside = |value: f64| value >= low * (1.0 - slack) && value <= high * (1.0 + slack);
-        let all: Vec<i32> = (decade(low)..=decade(high * (1.0 + slack))).collect();
-        let stride = all.len().div_ceil(most).max(1);
-        let mut ticks = Vec::new();
-        for exponent in all {
-            let is_labelled = exponent.rem_euclid(i32::try_from(stride).unwrap_or(i32::MAX)) == 0;
-            let label = is_labelled.then(|| decade_text(exponent, is_plain));
-            let between = if stride == 1 { 2..10 } else { 2..2 };
-            let value = power(exponent);
-            let marks = between.map(|digit| (f64::from(digit) * value, None));
-            for (value, label) in std::iter::once((value, label)).chain(marks) {
-                if is_inside(value) {
-                    ticks.push(self.tick(value, label));
-                }
-            }
-        }
-        Ticks { ticks, exponent: 0 }
-    }
-
-    /// Zero, the ends of the linear part, and powers of ten beyond.
-    fn symlog(&self, threshold: f64, most: usize) -> Ticks {
-        let [low, high] = self.range;
-        let is_inside = |value: &f64| (low..=high).contains(value);
-        let largest = low.abs().max(high.abs());
-        let powers = decade(threshold)..=decade(largest);
-        let is_plain = powers.clone().all(|e| PLAIN.contains(&e));
-        let text = |size: f64| match decade(size) {
-            e if power(e) == size => decade_text(e, is_plain),
-            _ => significant(size),
+    /// The tick of a range of one value.
+    fn one(&self, value: f64) -> Ticks {
+        let exponent = match self.format {
+            Some(_) => 0,
+            None => common_exponent(value, value),
         };
-        // In order of importance: zero, the largest powers, the threshold
-        let powers = powers.rev().map(power).filter(|size| *size > threshold);
-        let sizes = powers.chain([threshold]);
-        let both = |size: f64| vec![(size, text(size)), (-size, format!("\u{2212}{}", text(size)))];
-        let groups = std::iter::once(vec![(0.0, "0".to_owned())]).chain(sizes.map(both));
-        #[expect(clippy::cast_precision_loss, reason = "a few")]
-        let gap = 0.8 / most as f64;
-        let mut kept: Vec<Tick> = Vec::new();
-        for group in groups {
-            let group = group.into_iter().filter(|(value, _)| is_inside(value));
-            let group: Vec<Tick> =
-                group.map(|(value, label)| self.tick(value, Some(label))).collect();
-            // Both signs have a tick, or none
-            let is_free = |tick: &Tick| {
-                let mut others = kept.iter();
-                others.all(|other| (other.position - tick.position).abs() >= gap)
-            };
-            if group.iter().all(is_free) && kept.len() + group.len() <= most {
-                kept.extend(group);
-            }
-        }
-        kept.sort_by(|a, b| a.position.total_cmp(&b.position));
-        Ticks { ticks: kept, exponent: 0 }
-    }
-
-    /// The borders of bands of one colour.
-    fn bands(&self, steps: u32, most: usize) -> Ticks {
-        let [low, high] = self.range.map(|value| self.scale.forward(value));
-        let exponent = common_exponent(self.range[0], self.range[1]);
-        let part = |i: u32| f64::from(i) / f64::from(steps);
-        let value = |i: u32| match i {
-            0 => self.range[0],
-            i if i == steps => self.range[1],
-            i => self.scale.inverse(low + part(i) * (high - low)),
-        };
-        let values: Vec<f64> = (0..=steps).map(|i| value(i) / power(exponent)).collect();
-        // Use the fewest decimals that show all values
-        let step = values.windows(2).map(|w| w[1] - w[0]).fold(f64::INFINITY, f64::min);
-        let stride = values.len().div_ceil(most).max(1);
-        let stride =
-            (stride..=values.len()).find(|stride| (values.len() - 1).is_multiple_of(*stride));
-        let stride = stride.unwrap_or(1);
-        let is_shown = |decimals: &usize| {
-            let scale = power(i32::try_from(*decimals).unwrap_or(0));
-            let error = |v: &f64| ((v * scale).round() / scale - v).abs();
-            values.iter().step_by(stride).all(|v| error(v) < 0.02 * step)
-        };
-        let decimals = (0..8).find(is_shown).unwrap_or(8);
-        let ticks = values.iter().enumerate().zip(0..=steps).map(|((at, value), i)| Tick {
-            position: part(i),
-            label: (at % stride == 0).then(|| match self.scale {
-                ColorScale::Linear => number(*value, decimals),
-                _ => significant(*value),
-            }),
-        });
-        Ticks { ticks: ticks.collect(), exponent }
+        let label = self.label(value, |value| significant(value / power(exponent)));
+        Ticks { ticks: vec![Tick { position: 0.5, label: Some(label) }], exponent, decimals: 0 }
     }
 }
 

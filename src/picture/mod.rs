@@ -118,6 +118,11 @@ impl Picture {
         &self.rgb[3 * self.width * y..][..3 * self.width]
     }
 
+    /// The bytes of row `y`, to draw over.
+    pub fn row_mut(&mut self, y: usize) -> &mut [u8] {
+        &mut self.rgb[3 * self.width * y..][..3 * self.width]
+    }
+
     /// Puts `other` into this picture with its first pixel at `left` and `top`. What is outside is left out.
     pub fn put(&mut self, other: &Self, left: usize, top: usize) {
         let count = other.width.min(self.width.saturating_sub(left));
@@ -149,7 +154,15 @@ impl Picture {
     /// # Errors
     /// The encoder refuses the picture.
     pub fn png(&self, software: &str) -> io::Result<Vec<u8>> {
-        png::encode(self, software)
+        png::encode(self, software, None)
+    }
+
+    /// The same with a number of pixels per inch on paper, if it is known.
+    ///
+    /// # Errors
+    /// The encoder refuses the picture.
+    pub fn png_on_paper(&self, software: &str, dpi: Option<u32>) -> io::Result<Vec<u8>> {
+        png::encode(self, software, dpi)
     }
 }
 
@@ -177,6 +190,14 @@ fn check_size(width: usize, height: usize) -> Result<(), Fault> {
 /// See [`PictureError`]; messages begin with the path.
 pub fn read_rgba(path: &Path) -> Result<(usize, Vec<[u8; 4]>), PictureError> {
     read(path, png::rgba)
+}
+
+/// The number of pixels per inch on paper that the PNG file at `path` stores; None for other files.
+///
+/// # Errors
+/// See [`PictureError`]; messages begin with the path.
+pub fn read_dpi(path: &Path) -> Result<Option<u32>, PictureError> {
+    read(path, |file| if is_exr(path) { Ok(None) } else { png::dpi(file) })
 }
 
 /// Reads the file at `path` by `decode`.

@@ -2,7 +2,10 @@
 
 use std::io::{self, Read};
 
-use png::{BitDepth, ColorType, Compression, DecodingError, Encoder, Limits, Transformations};
+use png::{
+    BitDepth, ColorType, Compression, DecodingError, Encoder, Limits, PixelDimensions,
+    Transformations, Unit,
+};
 
 use super::{Fault, Picture, check_size};
 
@@ -50,6 +53,25 @@ pub(super) fn rgba(file: impl Read) -> Result<(usize, Vec<[u8; 4]>), Fault> {
     Ok((width, pixels))
 }
 
+/// Pixels per inch on paper, if a file says so for both sides alike.
+pub(super) fn dpi(file: impl Read) -> Result<Option<u32>, Fault> {
+    let decoder = png::Decoder::new_with_limits(file, Limits { bytes: MAX_CHUNKS });
+    let reader = decoder.read_info()?;
+    let stored = reader.info().pixel_dims.filter(|d| d.unit == Unit::Meter && d.xppu == d.yppu);
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "positive; saturates"
+    )]
+    let dpi = stored.map(|stored| (f64::from(stored.xppu) * 0.0254).round() as u32);
+    Ok(dpi.filter(|dpi| *dpi > 0))
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "positive; saturates")]
+fn per_metre(dpi: u32) -> u32 {
+    (f64::from(dpi) / 0.0254).round() as u32
+}
+
 fn pixels_of<const N: usize>(bytes: &[u8], rgba: impl Fn(&[u8; N]) -> [u8; 4]) -> Vec<[u8; 4]> {
     bytes.as_chunks::<N>().0.iter().map(rgba).collect()
 }
@@ -61,7 +83,7 @@ fn over_white(value: u8, alpha: u8) -> u8 {
 }
 
 /// See [`Picture::png`].
-pub(super) fn encode(picture: &Picture, software: &str) -> io::Result<Vec<u8>> {
+pub(super) fn encode(picture: &Picture, software: &str, dpi: Option<u32>) -> io::Result<Vec<u8>> {
     let side = |side: usize| u32::try_from(side).map_err(io::Error::other);
     let mut file = Vec::new();
     let mut encoder = Encoder::new(&mut file, side(picture.width)?, side(picture.height)?);
@@ -70,6 +92,10 @@ pub(super) fn encode(picture: &Picture, software: &str) -> io::Result<Vec<u8>> {
     encoder.set_compression(Compression::Default);
     encoder.set_adaptive_filter(png::AdaptiveFilterType::Adaptive);
     encoder.add_text_chunk("Software".to_owned(), software.to_owned())?;
+    encoder.set_pixel_dims(dpi.map(|dpi| {
+        let per_metre = per_metre(dpi);
+        PixelDimensions { xppu: per_metre, yppu: per_metre, unit: Unit::Meter }
+    }));
     let mut writer = encoder.write_header()?;
     writer.write_image_data(&picture.rgb)?;
     writer.finish()?;
@@ -105,8 +131,9 @@ mod tests {
     fn written_files_read_back_and_name_their_origin() {
         let pixels: Vec<u8> = (0..3 * 7 * 5).map(|i: u8| i.wrapping_mul(37)).collect();
         let written = Picture::new(7, 5, pixels);
-        let file = encode(&written, "origin").unwrap();
+        let file = encode(&written, "origin", Some(300)).unwrap();
         assert_eq!(picture(&file[..]).unwrap(), written);
         assert!(file.windows(6).any(|bytes| bytes == b"origin"));
+        assert_eq!(dpi(&file[..]).unwrap(), Some(300));
     }
 }

@@ -13,8 +13,8 @@ use super::renderer::TracedFrame;
 use super::setup::Setup;
 use crate::metrics::{MemoryPeaks, MemoryUse};
 use crate::output::{
-    CustomAttribute, ExrOptions, OutputError, PictureFormat, encode_picture, encode_preview,
-    write_exr,
+    CustomAttribute, ExrOptions, OutputError, PictureFormat, encode_figure, encode_picture,
+    encode_preview, write_exr,
 };
 use crate::render::Film;
 use crate::report::FrameReport;
@@ -28,7 +28,7 @@ pub(super) fn write_frame(
 ) -> Result<(FrameReport, Film), WriteError> {
     let start = Instant::now();
     let sprites = setup.overlays_of(&frame);
-    overlays::store(&mut frame.film, &sprites);
+    overlays::store(&mut frame.film, &sprites, setup.film_at());
     let task = &frame.task;
     let mut report = frame.report.clone();
     // The preview first: users wait for the EXR, and the ledger entry covers both
@@ -39,6 +39,11 @@ pub(super) fn write_frame(
     let format = PictureFormat::of(&task.image).unwrap_or(PictureFormat::Exr);
     let picture = match format {
         PictureFormat::Exr => None,
+        PictureFormat::Pdf | PictureFormat::Svg if frame.camera.eyes() == [1, 1] => {
+            let options = setup.preview_from(&frame.camera);
+            let drawings = setup.drawings_of(&frame);
+            Some(encode_figure(&frame.film, &options, drawings, format)?)
+        }
         format => {
             let options = setup.preview_from(&frame.camera);
             Some(encode_picture(&frame.film, &options, &sprites, format)?)
@@ -103,7 +108,7 @@ impl TracedFrame {
     /// The encoder fails.
     pub fn to_exr(&self, setup: &Setup) -> Result<Vec<u8>, OutputError> {
         let mut film = self.film.clone();
-        overlays::store(&mut film, &setup.overlays_of(self));
+        overlays::store(&mut film, &setup.overlays_of(self), setup.film_at());
         let mut file = Cursor::new(Vec::new());
         write_exr(film, &exr_options(setup, self), &mut file)?;
         Ok(file.into_inner())

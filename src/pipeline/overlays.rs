@@ -2,7 +2,7 @@
 
 use super::renderer::TracedFrame;
 use super::setup::Setup;
-use crate::overlay::{FrameValues, FrameView, Sprite, draw};
+use crate::overlay::{Drawing, FrameValues, FrameView, Page, Sprite, draw, marks};
 use crate::render::Film;
 use crate::scene::{Camera, Projection, RgbEncoding};
 
@@ -36,6 +36,19 @@ impl Setup {
         }
     }
 
+    /// Where the film is on its page.
+    pub(super) fn film_at(&self) -> [u32; 2] {
+        self.picture.preview.page.map_or([0, 0], |own| own.page.at)
+    }
+
+    /// The drawing commands of the overlays of an image with one eye.
+    pub(super) fn drawings_of(&self, frame: &TracedFrame) -> Vec<Drawing> {
+        let (width, height) = (frame.film.width, frame.film.height);
+        let page = self.picture.preview.page.map(|own| own.page);
+        let page = page.unwrap_or(Page::whole(width, height));
+        marks(&self.picture.overlays, &page, &self.frame_view(frame))
+    }
+
     /// The overlays of an image.
     pub(super) fn overlays_of(&self, frame: &TracedFrame) -> Vec<Sprite> {
         let overlays = &self.picture.overlays;
@@ -45,7 +58,9 @@ impl Setup {
         // Each eye has its own, with which they appear at the distance of the screen
         let [columns, rows] = frame.camera.eyes();
         let (width, height) = (frame.film.width / columns, frame.film.height / rows);
-        let mut sprites = draw(overlays, width, height, &self.frame_view(frame));
+        let page = self.picture.preview.page.map(|own| own.page);
+        let page = page.unwrap_or(Page::whole(width, height));
+        let mut sprites = draw(overlays, &page, &self.frame_view(frame));
         if [columns, rows] != [1, 1] {
             let shift = [width * (columns - 1), height * (rows - 1)].map(u32::cast_signed);
             let right = sprites.clone().into_iter().map(|sprite| Sprite {
@@ -59,8 +74,8 @@ impl Setup {
     }
 }
 
-/// Stores overlays in their layer of `film`, if it has one.
-pub(super) fn store(film: &mut Film, sprites: &[Sprite]) {
+/// Stores overlays in their layer of `film`, if it has one. The film is at this place of the page of the sprites.
+pub(super) fn store(film: &mut Film, sprites: &[Sprite], [left, top]: [u32; 2]) {
     let layers = film.channels.layers;
     let (place, floats) = (layers.overlay_at(), layers.floats());
     if place.is_empty() {
@@ -70,12 +85,18 @@ pub(super) fn store(film: &mut Film, sprites: &[Sprite]) {
     let Some(planes) = &mut film.layers else {
         return;
     };
+    let moved = sprites.iter().map(|sprite| Sprite {
+        left: sprite.left - left.cast_signed(),
+        top: sprite.top - top.cast_signed(),
+        ..sprite.clone()
+    });
+    let sprites: Vec<Sprite> = moved.collect();
     for (row, y) in planes.chunks_mut((width * floats).max(1)).zip(0..) {
         // The planes may be those of another image
         for pixel in row.chunks_mut(floats) {
             pixel[place.clone()].fill(0.0);
         }
-        for sprite in sprites {
+        for sprite in &sprites {
             sprite.each_in_row(y, width, |x, pixel| {
                 let own = &mut row[x * floats..][..floats];
                 blend(&mut own[place.clone()], pixel);

@@ -15,7 +15,7 @@ use super::{
     BuiltFrame, FrameRenderer, FrameSize, ImageTask, LoadError, Overlap, Setup, TraceError,
     load_frame, renderer_of,
 };
-use crate::output::{OutputError, PictureFormat, encode_exr, encode_preview};
+use crate::output::{OutputError, PictureFormat, PreviewOptions, encode_exr, encode_preview};
 use crate::render::{Deadline, Film, RenderError};
 
 /// Width in pixels of the first mosaic of tiles; each further one is twice as wide.
@@ -252,7 +252,7 @@ impl Trial {
         }
         if task.preview.is_some() || !has_exr {
             let camera = full.camera_at(task.frame).map_err(TraceError::Camera)?;
-            let options = full.preview_from(&camera);
+            let options = PreviewOptions { page: None, ..full.preview_from(&camera) };
             let png = encode_preview(&self.film, &options, &[])?;
             bytes += png.len();
         }

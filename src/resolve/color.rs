@@ -52,7 +52,7 @@ pub(super) fn is_depth(setting: &ColorSetting) -> bool {
 pub(super) fn rule(
     manifest: &Manifest,
     survey: &Survey,
-    camera: &Camera,
+    camera: Option<&Camera>,
 ) -> Result<ColorRule, ResolveError> {
     let constant = ColorRule::Constant(material::DEFAULT_COLOR);
     let by = match &manifest.material.color {
@@ -89,6 +89,10 @@ pub(super) fn rule(
     });
     color.attribute.clone_from(name);
     if value == ParticleValue::Depth {
+        let camera = camera.ok_or_else(|| ResolveError::Unsupported {
+            key: ATTRIBUTE,
+            what: "the range of depth depends on the camera".to_owned(),
+        })?;
         let point = |p: &[f32; 3]| f64::from(camera.depth_of((*p).into()));
         let depths = survey.points.iter().map(point);
         let visible = depths.filter(|depth| *depth > 0.0).collect();

@@ -5,16 +5,16 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 use spherule_formats::element_symbol;
 
-use super::ResolveError;
-use crate::manifest::{self, ColorSetting, Manifest, MapName, OverlayKind};
+use super::{ResolveError, color};
+use crate::manifest::{ColorSetting, LabelFormat, Manifest, MapName, OverlayKind};
 use crate::math::functions::exp2;
 use crate::output::view::{srgb_from_linear, view_transform};
 use crate::overlay::{
-    Axes, Color, ColorBar, ColorBarKind, Content, Corner, FrameValues, FrameView, Image, Overlay,
-    Placement, RgbaPixels, ScaleBar, Template,
+    Axes, Boxes, Color, ColorBar, ColorBarKind, Content, Corner, FrameValues, FrameView, Image,
+    Layout, Orientation, Overlay, Page, Placement, RgbaPixels, ScaleBar, Template,
 };
 use crate::pipeline::{ColorRule, Setup};
-use crate::scene::Camera;
+use crate::scene::{Background, Camera};
 use crate::survey::{ParticleValue, Survey, shown_name};
 
 /// Colours of a continuous bar.
@@ -33,7 +33,8 @@ pub(super) fn needs_points(manifest: &Manifest) -> bool {
     manifest.overlays.iter().any(|overlay| overlay.corner.is_none())
 }
 
-/// Adds the overlays of `manifest` to `setup`; `pictures` are those of its overlays of the type image, in this order.
+/// Adds the overlays of `manifest` to `setup`, whose picture is on `page`; `pictures` are those of its overlays of the
+/// type image, in this order.
 ///
 /// # Errors
 /// One shows what the particles do not have.
@@ -41,32 +42,15 @@ pub(super) fn add_overlays(
     setup: &mut Setup,
     manifest: &Manifest,
     survey: &Survey,
-    camera: &Camera,
+    page: &Page,
     pictures: &[Arc<RgbaPixels>],
 ) -> Result<(), ResolveError> {
+    let camera = setup.picture.scene.camera;
     let mut pictures = pictures.iter();
-    let [columns, rows] = camera.eyes();
-    let render = &setup.picture.render;
-    let picture = [render.width / columns, render.height / rows];
-    let points = film_points(setup, survey, camera, picture);
-    // Values as long as those of most frames
-    let values = FrameValues {
-        time: Some(0.0),
-        particles: survey.most_particles as u64,
-        ..FrameValues::default()
-    };
-    let view = FrameView {
-        values,
-        units_per_height: setup.units_per_height(camera),
-        ..FrameView::default()
-    };
-    // Overlays without a corner leave those that others have
-    let given = manifest.overlays.iter().filter_map(|overlay| overlay.corner);
-    let mut taken: Vec<Corner> = given.collect();
-    let mut overlays = Vec::new();
+    let points = film_points(setup, survey, &camera, page.picture);
+    let view = first_view(setup, survey, &camera);
+    let (mut overlays, mut given) = (Vec::new(), Vec::new());
     for own in &manifest.overlays {
-        #[expect(clippy::cast_possible_truncation, reason = "a fraction of the picture")]
-        let offset = own.offset.map(|part| part as f32);
         let content = match &own.kind {
             OverlayKind::Image { height, .. } => pictures.next().map(|source| {
                 Content::Image(Image { source: Arc::clone(source), height: *height })
@@ -74,33 +58,103 @@ pub(super) fn add_overlays(
             kind => content(setup, manifest, survey, kind, view.units_per_height)?,
         };
         let Some(content) = content else { continue };
-        let mut overlay = Overlay {
-            content,
-            placement: Placement { corner: own.corner.unwrap_or(Corner::TopLeft), offset },
-            size: own.size.fraction(picture[1], manifest.image.dpi),
-            color: [0.0; 3],
-            halo: [1.0; 3],
-        };
-        let size = overlay.measure(picture[1], &view);
-        if own.corner.is_none() {
-            let is_bar =
-                matches!(own.kind, OverlayKind::ColorBar { .. } | OverlayKind::ScaleBar { .. });
-            let order = if is_bar { BAR_CORNERS } else { TEXT_CORNERS };
-            let free: Vec<Corner> =
-                (order.into_iter()).filter(|corner| !taken.contains(corner)).collect();
-            let choice = if free.is_empty() { &order[..] } else { &free };
-            overlay.placement.corner = Corner::freest(choice, offset, size, picture, &points);
-            taken.push(overlay.placement.corner);
-        }
-        let at = overlay.placement.center(size, picture);
-        (overlay.color, overlay.halo) = colors(setup, camera, own, at);
-        if let Content::Text(template) = &overlay.content {
+        #[expect(clippy::cast_possible_truncation, reason = "a fraction of the picture")]
+        let offset = own.offset.map(|part| part as f32);
+        if let Content::Text(template) = &content {
             setup.picture.overlay_values.extend(template.names().map(str::to_owned));
         }
-        overlays.push(overlay);
+        given.push(own.color);
+        overlays.push(Overlay {
+            content,
+            layout: manifest.layout_of(own),
+            corner: own.corner,
+            placement: Placement { corner: own.corner.unwrap_or(Corner::TopLeft), offset },
+            size: own.size.fraction(page.size[1], manifest.image.dpi),
+            color: [0.0; 3],
+            halo: [1.0; 3],
+        });
+    }
+    choose_corners(&mut overlays, page, &view, &points);
+    let behind = paper(setup);
+    for (overlay, color) in overlays.iter_mut().zip(given) {
+        let behind = match overlay.layout {
+            Layout::Beside => behind,
+            Layout::Over => {
+                let size = overlay.measure(page.size[1], &view);
+                backdrop(setup, &camera, overlay.placement.center(size, page.picture).into())
+            }
+        };
+        (overlay.color, overlay.halo) = colors(behind, color);
     }
     setup.picture.overlays = overlays;
     Ok(())
+}
+
+/// The view of the start of the camera path, with values as long as those of most frames.
+pub(super) fn first_view(setup: &Setup, survey: &Survey, camera: &Camera) -> FrameView {
+    let values = FrameValues {
+        time: Some(0.0),
+        particles: survey.most_particles as u64,
+        ..FrameValues::default()
+    };
+    FrameView { values, units_per_height: setup.units_per_height(camera), ..FrameView::default() }
+}
+
+/// Gives overlays without a corner one where they cover no other overlay, and the fewest `points`, pixels of the picture.
+fn choose_corners(overlays: &mut [Overlay], page: &Page, view: &FrameView, points: &[[f32; 2]]) {
+    let mut boxes = Boxes::new(page.picture);
+    let is_over = |overlay: &&mut Overlay| overlay.layout == Layout::Over;
+    let size = |overlay: &Overlay| overlay.measure(page.size[1], view);
+    let (open, given): (Vec<&mut Overlay>, Vec<&mut Overlay>) =
+        overlays.iter_mut().filter(is_over).partition(|overlay| overlay.corner.is_none());
+    for overlay in given {
+        boxes.add(overlay.placement, size(overlay));
+    }
+    for overlay in open {
+        let is_bar = matches!(overlay.content, Content::ColorBar(_) | Content::ScaleBar(_));
+        let order = if is_bar { BAR_CORNERS } else { TEXT_CORNERS };
+        let offset = overlay.placement.offset;
+        overlay.placement.corner = boxes.freest(&order, offset, size(overlay), points);
+        boxes.add(overlay.placement, size(overlay));
+    }
+}
+
+/// What is beside the picture on its page, linear RGB: the background if it has one colour, or else white.
+pub(super) fn paper(setup: &Setup) -> Vec3 {
+    match setup.picture.scene.background {
+        Background::Constant(color) => view_transform(color * exp2(setup.picture.preview.exposure)),
+        _ => Vec3::ONE,
+    }
+}
+
+/// The least part of the page, along both sides, that the picture has.
+const LEAST_PART: u32 = 4;
+
+/// The page of the image with room for the overlays beside the picture.
+///
+/// # Errors
+/// There is no room left for the picture.
+pub(super) fn page(
+    setup: &Setup,
+    manifest: &Manifest,
+    survey: &Survey,
+) -> Result<Page, ResolveError> {
+    let size = manifest.image.size();
+    let view = first_view(setup, survey, &setup.picture.scene.camera);
+    let page = Page::with_room_for(&setup.picture.overlays, size, &view);
+    let is_small = |axis: usize| page.picture[axis] < size[axis].div_ceil(LEAST_PART);
+    if is_small(0) || is_small(1) {
+        let [width, height] = size;
+        let [own_width, own_height] = page.picture;
+        return Err(ResolveError::Unsupported {
+            key: "image.layout",
+            what: format!(
+                "the overlays beside the picture leave {own_width}x{own_height} of {width}x{height} pixels for it; make \
+                 the image larger, or overlays smaller (overlay.size, overlay.length), or draw them over the picture"
+            ),
+        });
+    }
+    Ok(page)
 }
 
 /// The particles of the survey on the film, pixels.
@@ -131,8 +185,8 @@ fn content(
     units_per_height: f64,
 ) -> Result<Option<Content>, ResolveError> {
     Ok(match kind {
-        OverlayKind::ColorBar { title, unit, length, orientation } => {
-            let Some((name, kind)) = color_bar(setup, manifest) else {
+        OverlayKind::ColorBar { title, unit, length, orientation, ticks, format, factor } => {
+            let Some((name, kind)) = color_bar(&setup.picture.color, manifest) else {
                 if survey.most_particles == 0 {
                     return Ok(None);
                 }
@@ -149,6 +203,9 @@ fn content(
                 length: *length,
                 orientation: *orientation,
                 kind,
+                ticks: ticks.clone(),
+                format: format.as_ref().map(LabelFormat::format),
+                factor: factor.unwrap_or(1.0),
             }))
         }
         OverlayKind::Text { text } => {
@@ -172,9 +229,48 @@ fn content(
     })
 }
 
+/// The colour bar of pictures with the settings of `manifest`: its own, or one with the defaults. None if the colours are
+/// no values of a map.
+///
+/// # Errors
+/// The settings and the particles do not go together, or the range depends on the camera.
+pub fn color_bar_of(
+    manifest: &Manifest,
+    survey: &Survey,
+) -> Result<Option<ColorBar>, ResolveError> {
+    let rule = color::rule(manifest, survey, None)?;
+    let Some((name, kind)) = color_bar(&rule, manifest) else {
+        return Ok(None);
+    };
+    let mut bar = ColorBar {
+        title: name,
+        unit: String::new(),
+        length: 1.0,
+        orientation: Orientation::Vertical,
+        kind,
+        ticks: None,
+        format: None,
+        factor: 1.0,
+    };
+    let own = manifest.overlays.iter().find_map(|overlay| match &overlay.kind {
+        OverlayKind::ColorBar { title, unit, ticks, format, factor, .. } => {
+            Some((title, unit, ticks, format, factor))
+        }
+        _ => None,
+    });
+    if let Some((title, unit, ticks, format, factor)) = own {
+        bar.title = title.clone().unwrap_or(bar.title);
+        bar.unit = unit.clone().unwrap_or_default();
+        bar.ticks.clone_from(ticks);
+        bar.format = format.as_ref().map(LabelFormat::format);
+        bar.factor = factor.unwrap_or(1.0);
+    }
+    Ok(Some(bar))
+}
+
 /// The name of the value that colours the particles, and its colours; None if it is none.
-fn color_bar(setup: &Setup, manifest: &Manifest) -> Option<(String, ColorBarKind)> {
-    let ColorRule::Attribute { name, map, .. } = &setup.picture.color else {
+fn color_bar(rule: &ColorRule, manifest: &Manifest) -> Option<(String, ColorBarKind)> {
+    let ColorRule::Attribute { name, map, .. } = rule else {
         return None;
     };
     let kind = match (map.range(), map.categories()) {
@@ -248,14 +344,10 @@ fn check_value(survey: &Survey, name: &str) -> Result<(), ResolveError> {
     }
 }
 
-/// The colours of text and of its halo over what is behind the particles at a position of the film.
-fn colors(setup: &Setup, camera: &Camera, own: &manifest::Overlay, at: [f32; 2]) -> (Color, Color) {
-    let behind = backdrop(setup, camera, Vec2::from_array(at));
+/// The colours of text and of its halo in front of `behind`; `own` is the colour that is given.
+fn colors(behind: Vec3, own: Option<Vec3>) -> (Color, Color) {
     let is_light = behind.dot(LUMINANCE) > MIDDLE;
-    let text = own.color.unwrap_or(match is_light {
-        true => Vec3::ZERO,
-        false => Vec3::ONE,
-    });
+    let text = own.unwrap_or(if is_light { Vec3::ZERO } else { Vec3::ONE });
     // A halo in the colour of the backdrop is invisible over it
     let contrasts = (text.dot(LUMINANCE) > MIDDLE) != is_light;
     let halo = match contrasts {
@@ -292,6 +384,6 @@ fn backdrop(setup: &Setup, camera: &Camera, film: Vec2) -> Vec3 {
     view_transform(color * exp2(picture.preview.exposure))
 }
 
-fn srgb(linear: Vec3) -> Color {
+pub(super) fn srgb(linear: Vec3) -> Color {
     linear.to_array().map(|v| srgb_from_linear(v.clamp(0.0, 1.0)))
 }

@@ -15,8 +15,8 @@ use std::io::{self, Write};
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 
-use super::base64::base64;
 use super::channels::{length, vector};
+use crate::output::base64;
 use crate::picture::SampledPlanes;
 
 /// Id of pixels without particle.

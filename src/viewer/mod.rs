@@ -11,16 +11,15 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 use thiserror::Error;
 
+use crate::output::data_url;
 use crate::picture::{MARKER, Picture, PictureError, SampledPlanes, read_planes};
 use crate::report::page::Page;
 use crate::report::plots::Plot;
 
-mod base64;
 mod channels;
 mod ids;
 mod link;
 
-use base64::data_url;
 pub use channels::ChannelKind;
 use channels::{ChannelRanges, channel_picture};
 use ids::packed_ids;

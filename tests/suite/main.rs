@@ -24,6 +24,7 @@ mod denoise;
 mod draft;
 mod elements;
 mod export;
+mod figures;
 mod golden;
 mod ground_image;
 mod help;

@@ -22,6 +22,7 @@ const fn shape(width: u32, height: u32, channels: Channels) -> ImageShape {
         attributes: Vec::new(),
         light_groups: Vec::new(),
         has_data_part: false,
+        is_on_page: false,
     }
 }
 

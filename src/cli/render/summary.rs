@@ -78,6 +78,9 @@ pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup:
     if let Some(text) = small_text(setup) {
         note!("{text}");
     }
+    for text in ticks_outside(setup) {
+        note!("{text}");
+    }
     if let Some(options) = view_options(setup) {
         message!("camera: {options}");
     }
@@ -171,6 +174,27 @@ fn small_text(setup: &Setup) -> Option<String> {
             "text is {least:.1} points high on paper; from {LEAST_POINTS} on it can be read (size = \"7pt\" of [[overlay]])"
         )
     })
+}
+
+/// Says which ticks of colour bars are outside of the range, and so not drawn.
+fn ticks_outside(setup: &Setup) -> Vec<String> {
+    let bars = setup.picture.overlays.iter().filter_map(|overlay| match &overlay.content {
+        Content::ColorBar(bar) => bar.tick_settings(),
+        _ => None,
+    });
+    let lines = bars.filter_map(|settings| {
+        let outside = settings.outside();
+        let [low, high] = settings.range.map(|value| short(value * settings.factor));
+        let values: Vec<String> = outside.iter().take(5).map(|value| short(*value).to_string()).collect();
+        let more = if outside.len() > 5 { ", ..." } else { "" };
+        (!outside.is_empty()).then(|| {
+            format!(
+                "overlay.ticks: {}{more} not drawn: outside of the range {low} to {high} of the bar (--range sets it)",
+                values.join(", ")
+            )
+        })
+    });
+    lines.collect()
 }
 
 /// Factor between a given radius and half the distance of neighbours beyond which the unit is probably another one.

@@ -117,6 +117,11 @@ impl ExpectedOutput {
             light_groups,
             has_data_part: find("output.data_compression")
                 .is_some_and(|data| find("output.compression") != Some(data)),
+            is_on_page: settings.iter().any(|(key, value)| {
+                let is_layout = key == "image.layout"
+                    || (key.starts_with("overlay.") && key.ends_with(".layout"));
+                is_layout && value == "\"beside\""
+            }),
         }))
     }
 }
@@ -143,6 +148,7 @@ mod tests {
             attributes: Vec::new(),
             light_groups: Vec::new(),
             has_data_part: false,
+            is_on_page: false,
         };
         assert_eq!(
             ExpectedOutput::of_settings(&settings),

@@ -133,8 +133,11 @@ pub enum OutputError {
     /// The TIFF encoder failed.
     #[error("the picture cannot be encoded as TIFF: {0}")]
     Tiff(#[source] tiff::TiffError),
+    /// A figure cannot be encoded.
+    #[error("the figure cannot be encoded: {0}")]
+    Figure(#[source] io::Error),
     /// A picture without background needs alpha.
-    #[error("JPEG files have no alpha for a transparent background; choose .png or .tif")]
+    #[error("JPEG files have no alpha for a transparent background; choose .png, .tif or .pdf")]
     NoAlpha,
 }
 

@@ -1,10 +1,10 @@
 //! Horizontal colour bars: the title above, the labels below.
 
 use super::super::canvas::Canvas;
-use super::super::ticks::Ticks;
+use super::super::ticks::{TickChoice, Ticks};
 use super::super::{Pen, font};
 use super::{
-    BAR_WIDTH, ColorBar, ColorBarKind, LABEL_GAP, SMALL_TICK, SWATCH, TICK, TITLE_GAP, between,
+    BAR_WIDTH, ColorBar, ColorBarKind, LABEL_GAP, Orientation, SMALL_TICK, SWATCH, TICK, TITLE_GAP,
     frame,
 };
 
@@ -39,10 +39,15 @@ impl ColorBar {
             }
         };
         // As many labels as there is space for
-        let mut ticks = (2..=9).rev().map(|most| self.ticks_with(most));
+        let mut ticks = (2..=20).rev().map(|most| self.ticks_with(most));
         let fits = |ticks: &Ticks| is_spaced(ticks, length, pen);
-        let ticks = ticks.clone().find(fits).or_else(|| ticks.next_back());
-        let ticks = ticks.unwrap_or_default();
+        let fitting = ticks.clone().find(fits).or_else(|| ticks.next_back());
+        let mut ticks = fitting.unwrap_or_default();
+        if matches!(self.ticks, Some(TickChoice::Values(_))) {
+            let part = |pixels: f32| f64::from(pixels / length);
+            let half = |label: &str| part(0.5 * pen.font.width(label));
+            ticks.thin(part(LABEL_SPACE * size), half);
+        }
         // Labels may reach beyond the ends
         let (mut before, mut after) = (0.0_f32, 0.0_f32);
         for (middle, half) in labels(&ticks, length, pen) {
@@ -74,7 +79,7 @@ impl ColorBar {
         [width, height]
     }
 
-    pub(super) fn draw_horizontal(&self, canvas: &mut Canvas, corner: [f32; 2], pen: &Pen) {
+    pub(super) fn draw_horizontal(&self, canvas: &mut dyn Canvas, corner: [f32; 2], pen: &Pen) {
         let size = pen.font.size;
         let layout = self.layout(pen);
         let [left, right] = layout.ends.map(|x| (corner[0] + x).round());
@@ -127,32 +132,32 @@ fn is_spaced(ticks: &Ticks, length: f32, pen: &Pen) -> bool {
 
 /// Fills a bar from its first colour at the left to its last at the right.
 fn fill(
-    canvas: &mut Canvas,
+    canvas: &mut dyn Canvas,
     colors: &[super::Color],
     is_discrete: bool,
     [left, right]: [f32; 2],
     [top, bottom]: [f32; 2],
 ) {
+    if !is_discrete {
+        canvas.ramp([left, top], [right, bottom], Orientation::Horizontal, colors);
+        return;
+    }
     let length = right - left;
     #[expect(clippy::cast_precision_loss, reason = "a few hundred")]
     let count = colors.len() as f32;
-    if is_discrete {
-        for (color, i) in colors.iter().zip(0_u16..) {
-            let edge = |i: u16| (left + length * f32::from(i) / count).round();
-            canvas.fill([edge(i), top], [edge(i + 1), bottom], *color);
-        }
-        return;
-    }
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "pixels")]
-    let columns = length as u32;
-    for column in 0..columns {
-        let x = left + column as f32;
-        let at = (x + 0.5 - left) / length * (count - 1.0);
-        canvas.fill([x, top], [x + 1.0, bottom], between(colors, at));
+    for (color, i) in colors.iter().zip(0_u16..) {
+        let edge = |i: u16| (left + length * f32::from(i) / count).round();
+        canvas.fill([edge(i), top], [edge(i + 1), bottom], *color);
     }
 }
 
-fn draw_ticks(canvas: &mut Canvas, ticks: &Ticks, [left, right]: [f32; 2], bottom: f32, pen: &Pen) {
+fn draw_ticks(
+    canvas: &mut dyn Canvas,
+    ticks: &Ticks,
+    [left, right]: [f32; 2],
+    bottom: f32,
+    pen: &Pen,
+) {
     let (size, line) = (pen.font.size, pen.line);
     let start = bottom + line;
     for tick in &ticks.ticks {

@@ -134,6 +134,18 @@ const COLORS: [&str; 17] = [
     "{ scale = \"categorical\", names = { 01 = \"a\" } }",
 ];
 
+/// Values of colour bars.
+const BARS: [&str; 8] = [
+    "\".2f\"",
+    "\"%.2e\"",
+    "\",.0f\"",
+    "\".2g\"",
+    "\".31f\"",
+    "[0, 1.5]",
+    "[0, 1.5, 2, 3, 4]",
+    "21",
+];
+
 /// Values that the schema accepts and the reader rejects.
 const BEYOND: [(&str, &str); 2] = [
     // A size must be above 0.
@@ -207,7 +219,7 @@ fn is_whole_float(value: &toml::Value) -> bool {
 fn schema_and_reader_accept_the_same_values() {
     let (schema, validator) = (job_schema(), validator());
     let mut values: BTreeSet<String> =
-        VALUES.iter().chain(&COLORS).map(|v| (*v).to_owned()).collect();
+        VALUES.iter().chain(&COLORS).chain(&BARS).map(|v| (*v).to_owned()).collect();
     words_and_slips(&schema, &mut values);
     let parsed = |text: String| {
         let value = format!("v = {text}").parse::<Table>().unwrap()["v"].clone();
