@@ -19,7 +19,7 @@ use crate::scene::{
 };
 use crate::selection::Selection;
 use crate::surface::SurfaceKind;
-use crate::survey::{Question, RadiusQuestion, Survey};
+use crate::survey::{Question, RadiusQuestion, SurfaceQuestion, Survey};
 
 mod arrows;
 mod bonds;
@@ -153,7 +153,20 @@ pub fn question<'a>(manifest: &'a Manifest, selection: &'a Selection) -> Questio
         points: color::is_depth(&manifest.material.color) || overlay::needs_points(manifest),
         fit: camera::fit(manifest),
         framed: None,
+        surface: surface_question(manifest),
     }
+}
+
+/// What the survey has to determine about the surface, for predictions of memory. Invalid settings are reported by
+/// [`setup`].
+fn surface_question(manifest: &Manifest) -> Option<SurfaceQuestion> {
+    let settings = surface::settings(manifest).ok()?;
+    let radius = match manifest.input.radius {
+        RadiusSetting::Length(radius) => Some(narrow(radius)),
+        _ => None,
+    };
+    let is_needed = settings.spray || settings.kind == SurfaceKind::Smooth;
+    is_needed.then_some(SurfaceQuestion { settings, radius })
 }
 
 /// Whether [`setup`] needs the image of `environment.image`.
@@ -374,6 +387,7 @@ fn setup_on(
         },
         verify: manifest.input.verify,
         weight: survey.weight,
+        surfaces: survey.surfaces.clone(),
     };
     let mut setup = Setup { picture, run };
     let [columns, rows] = camera.eyes();

@@ -29,6 +29,14 @@ pub struct ClaimedFrame {
     pub(crate) claim: Claim,
 }
 
+impl ClaimedFrame {
+    /// Whether other workers still consider this worker alive. Check it before a file of the frame is published: a
+    /// worker that was suspended while others took over, or restarted with other settings, must not overwrite theirs.
+    pub fn is_held(&self) -> bool {
+        self.claim.is_valid()
+    }
+}
+
 /// What other workers do with the frames of a queue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum QueueEvent<'a> {

@@ -177,17 +177,9 @@ impl<'a, R: Serialize> FrameRecorder<'a, R> {
         self.context
     }
 
-    /// Checks that other workers still consider this worker alive. Call this before outputs are published: a worker
-    /// that was suspended while others took over, or restarted with other settings, must not overwrite theirs.
-    ///
-    /// # Errors
-    /// [`JobError::DeclaredDead`].
-    pub fn check_claim(&self, frame: &ClaimedFrame) -> Result<(), JobError> {
-        if frame.claim.is_valid() {
-            return Ok(());
-        }
-        let dir = self.job.state().dir().to_owned();
-        Err(JobError::DeclaredDead { dir })
+    /// The error of a worker that others consider dead, because a frame is no longer [held](ClaimedFrame::is_held).
+    pub fn declared_dead(&self) -> JobError {
+        JobError::DeclaredDead { dir: self.job.state().dir().to_owned() }
     }
 
     /// Records the result of a frame, and drops its claim.

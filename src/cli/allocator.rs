@@ -9,7 +9,7 @@
 )]
 
 /// Pieces from this size on have pages of their own, which go back to the system when they are freed.
-/// `pipeline/predict.rs` counts on it.
+/// `pipeline/predict` counts on it.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 const RETURNED: std::ffi::c_int = 1 << 20;
 

@@ -50,36 +50,42 @@ const EXAMPLES: &str = "Examples:
 pub(super) struct StillArgs {
     #[command(flatten)]
     manifest: ManifestArgs,
-    /// Number of the frame to render, first, or last [default: the middle one]
+    /// Number of the frame to render, first, last, or t=TIME for the nearest in time [default: the middle one]
     ///
-    /// -1 is the last frame and -2 the one before it, unless frames have these numbers.
+    /// -1 is the last frame and -2 the one before it, unless frames have these numbers. Times are those of the files and
+    /// must rise from frame to frame.
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, value_parser = FrameChoice::parse)]
     frame: Option<FrameChoice>,
 }
 
 /// The frame that is asked for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 enum FrameChoice {
     First,
     Last,
     Number(i64),
+    /// The one nearest to this simulation time.
+    Time(f64),
 }
 
 impl FrameChoice {
     fn parse(text: &str) -> Result<Self, String> {
-        match text {
-            "first" => Ok(Self::First),
-            "last" => Ok(Self::Last),
-            _ => text
-                .parse()
-                .map(Self::Number)
-                .map_err(|_| "expected the number of a frame, first or last".to_owned()),
-        }
+        let time = |time: &str| time.parse().ok().filter(|time: &f64| time.is_finite());
+        let choice = match (text, text.strip_prefix("t=")) {
+            ("first", _) => Some(Self::First),
+            ("last", _) => Some(Self::Last),
+            (_, Some(text)) => time(text).map(Self::Time),
+            (number, None) => number.parse().ok().map(Self::Number),
+        };
+        choice.ok_or_else(|| {
+            "expected the number of a frame, first, last, or a time (t=0.5)".to_owned()
+        })
     }
 
-    /// The frame among `numbers`, which rise.
+    /// The frame among `numbers`, which rise; None for a time.
     fn among(self, numbers: &[i64]) -> Option<i64> {
         match self {
+            Self::Time(_) => None,
             Self::First => numbers.first().copied(),
             Self::Last => numbers.last().copied(),
             Self::Number(number) if numbers.contains(&number) => Some(number),
@@ -186,14 +192,27 @@ fn frame(
         return Ok(frames[frames.len() / 2]);
     };
     let numbers: Vec<i64> = sequence.frames().iter().map(|f| f.number).collect();
+    let shown = match choice {
+        FrameChoice::Number(number) => number.to_string(),
+        FrameChoice::First => "first".to_owned(),
+        FrameChoice::Last => "last".to_owned(),
+        FrameChoice::Time(time) => return frame_at(time, sequence),
+    };
     choice.among(&numbers).ok_or_else(|| {
-        let shown = match choice {
-            FrameChoice::Number(number) => number.to_string(),
-            FrameChoice::First => "first".to_owned(),
-            FrameChoice::Last => "last".to_owned(),
-        };
         CliError::other(format!("--frame {shown}: is not among the frames: {}", list(&numbers)))
     })
+}
+
+/// The frame nearest to `time`.
+fn frame_at(time: f64, sequence: &Sequence) -> Result<i64, CliError> {
+    let failed = |why: String| CliError::other(format!("--frame t={time}: {why}"));
+    let found = sequence.frame_at(time).map_err(|error| failed(error.to_string()))?;
+    let (index, nearest) = found.ok_or_else(|| {
+        failed("the files have no times; give the number of a frame, first or last".to_owned())
+    })?;
+    let number = sequence.frames()[index].number;
+    note!("frame {number} is the nearest to t={time}: its time is {nearest}");
+    Ok(number)
 }
 
 /// Refuses to replace anything but an image, and images that belong to the input or to a job.
@@ -298,6 +317,10 @@ mod tests {
         }
         // Numbers of frames have precedence
         assert_eq!(FrameChoice::Number(-1).among(&[-1, 0]), Some(-1));
-        assert!(FrameChoice::parse("middle").is_err());
+        for invalid in ["middle", "t=", "t=nan", "t=inf", "t=1 s", "t", "0.5"] {
+            let error = FrameChoice::parse(invalid).expect_err("no choice");
+            assert!(error.contains("t=0.5"), "{invalid}: {error}");
+        }
+        assert_eq!(FrameChoice::parse("t=-1.5e-3"), Ok(FrameChoice::Time(-1.5e-3)));
     }
 }

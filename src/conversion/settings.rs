@@ -64,6 +64,7 @@ impl ConvertSettings {
             selection: None,
             fit: Fit::All,
             framed: None,
+            surface: None,
             radius: match self.radius {
                 Some(_) => RadiusQuestion::None,
                 None => RadiusQuestion::Auto,

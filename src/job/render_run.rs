@@ -146,6 +146,7 @@ impl RenderRun {
                 sequence: &self.sequence,
                 tasks: &tasks,
                 overlap: self.schedule.overlap,
+                encoders: self.schedule.encoders,
             };
             run_frames(&mut self.job, &work, &options, on_event)
         };

@@ -70,6 +70,15 @@ pub fn encode_preview(
     Ok(file)
 }
 
+/// Memory for encoding a preview: its bytes, plain, filtered and compressed.
+pub fn picture_bytes(width: u32, height: u32, options: &PreviewOptions) -> u64 {
+    let each = match options.background {
+        PreviewBackground::Transparent => 12,
+        PreviewBackground::Included | PreviewBackground::Color(_) => 9,
+    };
+    each * u64::from(width) * u64::from(height)
+}
+
 /// A finished picture: 8-bit sRGB, dithered.
 pub(super) struct SrgbPicture {
     /// RGB, or RGBA with colours that are not multiplied by alpha, row by row from the top.

@@ -2,6 +2,7 @@
 
 use std::io::{self, Cursor, Seek, Write};
 use std::path::Path;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use serde_json::json;
@@ -24,7 +25,7 @@ use crate::report::frame::RssSummary;
 pub(super) fn write_frame(
     setup: &Setup,
     mut frame: TracedFrame,
-    peaks: &mut MemoryPeaks,
+    peaks: &Mutex<MemoryPeaks>,
 ) -> Result<(FrameReport, Film), WriteError> {
     let start = Instant::now();
     let sprites = setup.overlays_of(&frame);
@@ -50,13 +51,16 @@ pub(super) fn write_frame(
         }
     };
     drop(sprites);
-    if report.bytes.file.total() > 0 {
-        peaks.use_samples_only();
+    {
+        let mut peaks = lock_peaks(peaks);
+        if report.bytes.file.total() > 0 {
+            peaks.use_samples_only();
+        }
+        peaks.update(frame.memory);
     }
-    peaks.update(frame.memory);
     let (film, clamped) = match picture {
         Some(picture) => {
-            peaks.update(MemoryUse::now());
+            lock_peaks(peaks).update(MemoryUse::now());
             publish(&task.image, &picture).map_err(at(&task.image))?;
             (frame.film, 0)
         }
@@ -66,6 +70,7 @@ pub(super) fn write_frame(
     report.clamped_pixels = clamped;
     report.seconds.encode = start.elapsed().as_secs_f64();
     let now = MemoryUse::now();
+    let mut peaks = lock_peaks(peaks);
     peaks.update(now);
     report.rss = RssSummary {
         anonymous_peak: peaks.anonymous,
@@ -76,11 +81,16 @@ pub(super) fn write_frame(
     Ok((report, film))
 }
 
+/// The peaks, which all encoders update.
+pub(super) fn lock_peaks(peaks: &Mutex<MemoryPeaks>) -> MutexGuard<'_, MemoryPeaks> {
+    peaks.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// Encodes the EXR of `frame` and publishes it. Returns its planes, and the number of clamped values.
 fn publish_exr(
     setup: &Setup,
     frame: TracedFrame,
-    peaks: &mut MemoryPeaks,
+    peaks: &Mutex<MemoryPeaks>,
 ) -> Result<(Film, u64), WriteError> {
     let task = &frame.task;
     let mut file = Publisher::create(&task.image).map_err(at(&task.image))?;
@@ -127,7 +137,7 @@ impl TracedFrame {
 /// Samples memory use during the first writes, when all buffers of the encoder exist.
 struct MemorySampler<'a, W> {
     out: &'a mut W,
-    peaks: &'a mut MemoryPeaks,
+    peaks: &'a Mutex<MemoryPeaks>,
     samples: u32,
 }
 
@@ -138,7 +148,7 @@ impl<W: Write> Write for MemorySampler<'_, W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         if self.samples < MAX_SAMPLES {
             self.samples += 1;
-            self.peaks.update(MemoryUse::now());
+            lock_peaks(self.peaks).update(MemoryUse::now());
         }
         self.out.write(bytes)
     }

@@ -21,6 +21,8 @@ pub struct Schedule {
     pub need: MemoryNeed,
     /// Whether frames overlap.
     pub overlap: Overlap,
+    /// How many images are encoded at the same time at most.
+    pub encoders: u32,
     /// Frames that do not fit, by their index in the input.
     pub too_large: Vec<(usize, MemoryLimitError)>,
 }
@@ -47,15 +49,19 @@ impl MemoryModel<'_> {
                 None => fitting.push(*frame),
             }
         }
-        // Overlap the others if that fits
+        // Overlap the others if that fits, with as many encoders as fit
         let bound = limit.map_or(u64::MAX, |limit| limit.0).min(free.unwrap_or(u64::MAX));
-        let (overlap, need) = if self.bound(&fitting).total() <= bound {
-            (Overlap::Stages, self.peak(&fitting))
-        } else {
-            let alone = fitting.iter().map(|frame| self.alone(frame));
-            let need = alone.fold(MemoryNeed::default(), MemoryNeed::larger);
-            (Overlap::None, need)
-        };
-        Schedule { need, overlap, too_large }
+        let fits = |encoders: &u32| self.bound(&fitting, *encoders).total() <= bound;
+        match (1..=self.setup.useful_encoders()).rev().find(fits) {
+            Some(encoders) => {
+                let need = self.peak(&fitting, encoders);
+                Schedule { need, overlap: Overlap::Stages, encoders, too_large }
+            }
+            None => {
+                let alone = fitting.iter().map(|frame| self.alone(frame));
+                let need = alone.fold(MemoryNeed::default(), MemoryNeed::larger);
+                Schedule { need, overlap: Overlap::None, encoders: 1, too_large }
+            }
+        }
     }
 }

@@ -20,7 +20,7 @@ use crate::selection::Selection;
 use crate::surface::cut::ConvexRegion;
 use crate::surface::rods::Anchor;
 use crate::surface::{MaterialId, SurfaceKind, SurfaceSettings};
-use crate::survey::FrameWeight;
+use crate::survey::{FrameWeight, SurfaceWeight};
 
 /// Source of the radii.
 #[derive(Debug, Clone, PartialEq)]
@@ -291,6 +291,8 @@ pub struct RunSettings {
     pub verify: Option<bool>,
     /// Size of the heaviest frame, if known.
     pub weight: Option<FrameWeight>,
+    /// Sizes of the surfaces of some frames, by their index.
+    pub surfaces: Vec<SurfaceWeight>,
 }
 
 impl Picture {

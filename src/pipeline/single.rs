@@ -1,5 +1,6 @@
 //! Renders one image, with no other frame in memory.
 
+use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
 
 use spherule_formats::{PositionSlice, RawParticles, Sequence};
@@ -13,7 +14,6 @@ use super::load_error::LoadError;
 use super::renderer::TracedFrame;
 use super::setup::Setup;
 use super::trace::renderer_of;
-use crate::metrics::MemoryPeaks;
 use crate::render::Stop;
 use crate::report::FrameReport;
 
@@ -29,7 +29,7 @@ pub fn make_image(
 ) -> Result<FrameReport, ImageError> {
     let traced = trace_single(setup, sequence, task, note)?;
     catch_panic(|| {
-        let (report, _) = write_frame(setup, traced, &mut MemoryPeaks::default())?;
+        let (report, _) = write_frame(setup, traced, &Mutex::default())?;
         Ok(report)
     })
 }

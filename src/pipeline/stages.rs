@@ -1,17 +1,18 @@
 //! The stages of a run, which pass frames on. See [`super::work`].
 
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, SyncSender};
-use std::time::Instant;
 
 use spherule_formats::sequence::Sequence;
 use spherule_jobs::{
-    ClaimedFrame, FinishedFrame, FrameFailure, FrameQueue, FrameRecorder, Interrupt, JobError,
-    Recorded, RunContext, catch_panic,
+    ClaimedFrame, FinishedFrame, FrameFailure, FrameQueue, Interrupt, JobError, RunContext,
+    catch_panic,
 };
 
-use super::encode::write_frame;
+use super::encode::{lock_peaks, write_frame};
 use super::read_threads::ReadThreads;
+use super::record::{AtEncoder, EncodedFrame, NotEncoded, ToEncoders};
 use super::{
     FrameSize, ImageError, ImageTask, LoadedFrame, Setup, TracedFrame, load_frame, renderer_of,
 };
@@ -107,7 +108,7 @@ impl TraceStage<'_> {
         loaded: Receiver<StagedFrame<LoadedFrame<'static>>>,
         spare: Receiver<Film>,
         is_built: Option<SyncSender<()>>,
-        next: SyncSender<StagedFrame<TracedFrame>>,
+        mut next: ToEncoders,
     ) {
         let mut tracer = renderer_of(self.setup.picture.renderer);
         for StagedFrame { claimed, result } in loaded {
@@ -146,75 +147,56 @@ impl TraceStage<'_> {
                 tracer = renderer_of(self.setup.picture.renderer);
             }
             let result = traced;
-            if next.send(StagedFrame { claimed, result }).is_err() {
+            if !next.send(StagedFrame { claimed, result }) {
                 return;
             }
         }
     }
 }
 
-/// Channels to earlier stages, for use after an image is written. The receivers may have ended.
-pub(super) struct AfterWrite {
-    /// To the reader, without overlap: read the next frame.
-    pub(super) is_written: Option<SyncSender<()>>,
-    /// To the tracer: reuse the planes.
+/// The third stage: encodes images and publishes their files, several at the same time.
+pub(super) struct EncodeStage<'a> {
+    pub(super) setup: &'a Setup,
+    pub(super) context: &'a RunContext<'a, FrameReport>,
+    /// Whether the sequence maps its files.
+    pub(super) maps_files: bool,
+    pub(super) peaks: &'a Mutex<MemoryPeaks>,
+    /// To the tracer: reuse the planes. Without overlap their memory is released.
     pub(super) films: Option<Sender<Film>>,
 }
 
-/// The third stage: writes images, and records frames.
-pub(super) struct WriteStage<'a> {
-    pub(super) setup: &'a Setup,
-    /// Whether the sequence maps its files.
-    pub(super) maps_files: bool,
-    pub(super) next: AfterWrite,
-}
-
-impl WriteStage<'_> {
+impl EncodeStage<'_> {
+    /// Runs on the thread of an encoder; ends when there are no more images, or when nothing can be recorded.
     pub(super) fn run(
         &self,
-        traced: Receiver<StagedFrame<TracedFrame>>,
-        recorder: &mut FrameRecorder<'_, FrameReport>,
-    ) -> Result<(), JobError> {
-        let mut peaks = MemoryPeaks::default();
-        let mut image_before = Instant::now();
-        for StagedFrame { claimed, result } in traced {
-            let result = match result {
-                Ok(frame) => {
-                    recorder.context().report_stage(claimed.frame, "writing");
-                    recorder.check_claim(&claimed)?;
-                    self.write(frame, &mut peaks).map(|mut finished| {
-                        let wall = image_before.elapsed();
-                        image_before = Instant::now();
-                        finished.report.seconds.wall = wall.as_secs_f64();
-                        finished
-                    })
+        traced: Receiver<AtEncoder<StagedFrame<TracedFrame>>>,
+        next: Sender<AtEncoder<EncodedFrame>>,
+    ) {
+        for AtEncoder { place, encoder, frame: StagedFrame { claimed, result } } in traced {
+            let result = result.map_err(NotEncoded::Failed).and_then(|frame| {
+                self.context.report_stage(claimed.frame, "writing");
+                if !claimed.is_held() {
+                    return Err(NotEncoded::NotHeld);
                 }
-                Err(failure) => Err(failure),
-            };
-            if recorder.record(claimed, result)? == Recorded::Stopped {
-                break;
-            }
-            if let Some(is_written) = &self.next.is_written {
-                let _ = is_written.send(());
+                self.write(frame).map_err(NotEncoded::Failed)
+            });
+            let frame = EncodedFrame { claimed, result };
+            if next.send(AtEncoder { place, encoder, frame }).is_err() {
+                return;
             }
         }
-        Ok(())
     }
 
     /// Writes the image, and returns its planes to the tracer.
-    fn write(
-        &self,
-        frame: TracedFrame,
-        peaks: &mut MemoryPeaks,
-    ) -> Result<FinishedFrame<FrameReport>, FrameFailure> {
+    fn write(&self, frame: TracedFrame) -> Result<FinishedFrame<FrameReport>, FrameFailure> {
         let (number, outputs) = (frame.task.frame, frame.task.outputs());
         if self.maps_files {
-            peaks.use_samples_only();
+            lock_peaks(self.peaks).use_samples_only();
         }
-        let write = || Ok(write_frame(self.setup, frame, peaks)?);
+        let write = || Ok(write_frame(self.setup, frame, self.peaks)?);
         let (report, film) =
             catch_panic(write).map_err(|error: ImageError| error.into_failure(number))?;
-        if let Some(films) = &self.next.films {
+        if let Some(films) = &self.films {
             let _ = films.send(film);
         }
         Ok(FinishedFrame { outputs, report })

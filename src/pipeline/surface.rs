@@ -220,7 +220,7 @@ impl SurfaceBuilder {
     fn find_spray(&mut self, setup: &Setup, frame: &mut DecodedFrame<'_>, trees: &mut TreeBuilder) {
         // Use the tree that is fastest to build; the result does not depend on the structure
         trees.build(&spheres(frame), &BuildSettings::new(Structure::Lbvh));
-        let spray = spray_of(&trees.tree().view(), support(&setup.picture.surface));
+        let spray = spray_of(&trees.tree().view(), setup.picture.surface.support());
         let body = frame.move_to_end(&spray, setup.picture.needs_ids());
         self.body = u32::try_from(body).unwrap_or(u32::MAX);
     }
@@ -419,16 +419,11 @@ fn memory_left(limit: Option<u64>) -> Option<u64> {
     }
 }
 
-/// Support of the SPH kernel in particle radii.
-fn support(surface: &SurfaceSettings) -> f32 {
-    2.0 * surface.smoothing_length
-}
-
 fn shading_normals(surface: &SurfaceSettings) -> ShadingNormals {
     match surface.normals {
         NormalKind::Auto | NormalKind::Sphere => ShadingNormals::Sphere,
-        NormalKind::Field => ShadingNormals::Gradient(GradientNormals::new(support(surface))),
-        NormalKind::Pca => ShadingNormals::Pca(PcaNormals::new(support(surface))),
+        NormalKind::Field => ShadingNormals::Gradient(GradientNormals::new(surface.support())),
+        NormalKind::Pca => ShadingNormals::Pca(PcaNormals::new(surface.support())),
     }
 }
 

@@ -33,6 +33,7 @@ pub(in crate::resolve) fn survey() -> Survey {
         frames: 1,
         angstrom: 1.0,
         weight: None,
+        surfaces: Vec::new(),
     }
 }
 

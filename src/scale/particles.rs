@@ -167,6 +167,7 @@ impl FrameSurvey {
             selection: None,
             fit: Fit::All,
             framed: None,
+            surface: None,
             radius: RadiusQuestion::Auto,
         };
         let survey = Survey::of_frames(sequence, [index], question)?;

@@ -154,7 +154,7 @@ impl ColorTotals {
             }
             ParticleValue::Radius => match (&frame.radius, context.radius) {
                 (_, RadiusQuestion::Attribute(..) | RadiusQuestion::Table(..)) => {
-                    let radius = |i| context.radius.radius_by_attribute(frame, i);
+                    let radius = |i| context.radius.radius_by_attribute(&frame.attributes, i);
                     let radius = |i| radius(i).unwrap_or(f64::NAN);
                     self.add_values(frame.len(), radius, range, false);
                 }

@@ -143,6 +143,7 @@ const QUESTION: Question<'static> = Question {
     selection: None,
     fit: Fit::All,
     framed: None,
+    surface: None,
 };
 
 impl Facts {

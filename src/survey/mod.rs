@@ -32,6 +32,7 @@ mod standing;
 mod stream;
 mod upright;
 mod walls;
+mod weight;
 
 pub use color::{Categories, ColorQuestion, ColorRange, MAX_CATEGORIES, RangeQuestion, range_of};
 use color::{ColorTotals, FrameContext};
@@ -45,6 +46,8 @@ use robust::{RobustBounds, robust_bounds, robust_largest, sample_of, sorted_samp
 use sample::FrameSample;
 use standing::standing;
 pub use walls::{WallSign, WallValues};
+use weight::has_surface;
+pub use weight::{FrameWeight, SurfaceQuestion, SurfaceWeight};
 
 /// Maximum number of frames to sample; evenly distributed, including the first and the last one.
 const FRAMES: usize = 24;
@@ -129,6 +132,9 @@ pub struct Survey {
     /// Size of the heaviest sampled frame. Jobs of the first versions lack it.
     #[serde(default)]
     pub weight: Option<FrameWeight>,
+    /// The surfaces of some of the sampled frames, if they were requested.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub surfaces: Vec<SurfaceWeight>,
 }
 
 const fn one() -> f64 {
@@ -138,32 +144,6 @@ const fn one() -> f64 {
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
 fn is_one(angstrom: &f64) -> bool {
     *angstrom == 1.0
-}
-
-/// Sizes and counts of a frame that was read, from which those of other frames are estimated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct FrameWeight {
-    /// Particle count, including particles that are not finite.
-    pub particles: u64,
-    /// Total size of its files in bytes, after decompression of gzip.
-    pub stored: u64,
-    /// Size of its largest file in bytes, uncompressed.
-    pub content: u64,
-    /// Size of the numbers in its files, bytes.
-    pub raw: u64,
-    /// Size of the positions among them, bytes.
-    pub positions: u64,
-    /// Number of files.
-    pub files: u64,
-    /// Whether it has a radius per particle.
-    pub own_radii: bool,
-    /// Whether it has ids.
-    pub ids: bool,
-    /// Whether it has velocities.
-    pub velocities: bool,
-    /// Whether it is a native frame relative to the origin of the sequence, so that it can be traced in place.
-    #[serde(default)]
-    pub in_place: bool,
 }
 
 /// An attribute with colours.
@@ -205,6 +185,8 @@ pub struct Question<'a> {
     pub fit: Fit,
     /// Index of the only frame whose particles the camera shows, if there is one.
     pub framed: Option<usize>,
+    /// The surface, if its memory depends on the places of the particles.
+    pub surface: Option<SurfaceQuestion>,
 }
 
 impl Question<'_> {
@@ -248,9 +230,13 @@ impl RadiusQuestion<'_> {
         }
     }
 
-    /// The radius of particle `index` of `frame` by an attribute, if the question is about one and it has a radius.
-    fn radius_by_attribute(&self, frame: &ParticleFrame, index: usize) -> Option<f64> {
-        let value = |name: &str| frame.attribute(name).map(|a| a.magnitude(index));
+    /// The radius of particle `index` by one of `attributes`, if the question is about one and it has a radius.
+    fn radius_by_attribute(&self, attributes: &[Attribute], index: usize) -> Option<f64> {
+        let value = |name: &str| {
+            let exact = attributes.iter().find(|a| a.name == name);
+            let any_case = || attributes.iter().find(|a| a.name.eq_ignore_ascii_case(name));
+            exact.or_else(any_case).map(|a| a.magnitude(index))
+        };
         match self {
             Self::Attribute(name, scale) => Some(value(name)? * scale),
             Self::Table(name, table, scale) => {
@@ -281,6 +267,7 @@ struct Totals {
     most_particles: usize,
     frames: usize,
     weight: Option<FrameWeight>,
+    surfaces: Vec<SurfaceWeight>,
     origin: Origins,
     moments: Moments,
 }
@@ -372,9 +359,16 @@ impl Survey {
         let mut failure = None;
         let indices: Vec<usize> = indices.into_iter().collect();
         let frames = indices.len();
-        for index in indices {
+        for (place, index) in indices.into_iter().enumerate() {
             match FrameSample::of(sequence, index, (question, frames)) {
                 Ok(sample) => {
+                    let is_weighed = match question.framed {
+                        Some(framed) => framed == index,
+                        None => has_surface(place, frames),
+                    };
+                    if is_weighed {
+                        totals.add_surface(sequence, index, &sample, question);
+                    }
                     let number = sequence.frames().get(index).map_or(0, |frame| frame.number);
                     totals.moments.add(index, number, sample.particles.time);
                     let is_framed = question.framed.is_none_or(|framed| framed == index);
@@ -461,6 +455,7 @@ impl Totals {
             most_particles: 0,
             frames: 0,
             weight: None,
+            surfaces: Vec::new(),
             origin: Origins::None,
             moments: Moments::default(),
         }
@@ -541,11 +536,34 @@ impl Totals {
                 }
             }
             RadiusQuestion::Attribute(..) | RadiusQuestion::Table(..) => {
-                let radius = |i| question.radius.radius_by_attribute(&frame, i);
+                let radius = |i| question.radius.radius_by_attribute(&frame.attributes, i);
                 let radius = |i| narrow(radius(i).unwrap_or_default());
                 self.reach = self.reach.max(robust_largest(frame.len(), radius));
             }
         }
+    }
+
+    /// Adds the size of the surface of frame `index`. Large frames are read as a whole for it, as they are when they are
+    /// rendered; nothing is known of one that cannot be read.
+    fn add_surface(
+        &mut self,
+        sequence: &Sequence,
+        index: usize,
+        sample: &FrameSample,
+        question: Question,
+    ) {
+        let Some(surface) = question.surface else {
+            return;
+        };
+        let place = (index, sample.weight.particles);
+        let weight = |raw: &RawParticles| {
+            SurfaceWeight::of(raw, place, sample.spacing, surface, question.radius)
+        };
+        let found = match sample.is_part() {
+            true => sequence.load_raw(index).ok().and_then(|raw| weight(&raw)),
+            false => weight(&sample.particles),
+        };
+        self.surfaces.extend(found);
     }
 
     /// Adds the radii of `frame`, which has `count` particles before the selection.
@@ -611,6 +629,7 @@ impl Totals {
             frames: self.frames,
             angstrom: 1.0,
             weight,
+            surfaces: self.surfaces,
         }
     }
 }

@@ -157,6 +157,7 @@ mod tests {
                     selection: None,
                     fit: Fit::All,
                     framed: None,
+                    surface: None,
                 },
             )
             .expect("readable")

@@ -49,6 +49,7 @@ fn question(selection: Option<&Selection>) -> Question<'_> {
         selection,
         fit: Fit::All,
         framed: None,
+        surface: None,
     }
 }
 

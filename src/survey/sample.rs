@@ -78,6 +78,11 @@ impl FrameSample {
         Ok(sample.and_then(|sample| sample.spacing))
     }
 
+    /// Whether there are more particles than those that were sampled.
+    pub(super) fn is_part(&self) -> bool {
+        self.particles.positions.len() < self.count
+    }
+
     fn of_source(
         sequence: &Sequence,
         index: usize,

@@ -23,6 +23,7 @@ mod damaged;
 mod denoise;
 mod draft;
 mod elements;
+mod encoders;
 mod export;
 mod figures;
 mod golden;

@@ -107,7 +107,7 @@ fn the_first_and_last_frames_have_names() {
     }
     still(&workshop, &["--frame", "middle", "-o", "a.png"])
         .expect(2)
-        .prints("expected the number of a frame, first or last");
+        .prints("expected the number of a frame, first, last, or a time (t=0.5)");
 }
 
 #[test]
@@ -121,6 +121,27 @@ fn images_of_a_job_are_not_replaced() {
     }
     still(&workshop, &["-o", "out/look.png"]).expect(0);
     workshop.run(&["verify", "out"]).expect(0);
+}
+
+#[test]
+fn a_frame_is_chosen_by_its_time() {
+    let workshop = Workshop::new();
+    fs::create_dir(workshop.join("in")).expect("a directory");
+    for (frame, time) in [(1, "0"), (4, "0.2"), (9, "0.5")] {
+        let text =
+            format!("2\nTime={time} Properties=species:S:1:pos:R:3\nHe 0 0 0\nHe 1 0 {frame}\n");
+        fs::write(workshop.join(format!("in/f_{frame}.xyz")), text).expect("a file");
+    }
+    for (time, number, found) in [("t=0.3", 4, "0.2"), ("t=0.36", 9, "0.5"), ("t=-1", 1, "0")] {
+        let made = still(&workshop, &["--frame", time, "-o", "a.png"]).expect(0);
+        assert!(made.text().starts_with(&format!("a.png: frame {number}, ")), "{}", made.text());
+        made.prints(&format!("frame {number} is the nearest to {time}: its time is {found}"));
+    }
+    fs::write(workshop.join("in/f_4.xyz"), "1\n\nHe 0 0 0\n").expect("a file");
+    still(&workshop, &["--frame", "t=0.3", "-o", "b.png"]).expect(2).prints(
+        "--frame t=0.3: the files have no times; give the number of a frame, first or last",
+    );
+    assert!(!workshop.join("b.png").exists());
 }
 
 #[test]

@@ -29,6 +29,7 @@ mod pattern;
 mod pieces;
 mod references;
 mod scan;
+mod times;
 mod topology;
 
 pub use collection::ListSummary;

@@ -10,10 +10,10 @@ use std::io::{Seek, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, RwLock};
 
-use super::OutputError;
 use super::file::ScanLineFile;
 use super::layout::ExrLayout;
 use super::pack::{PackBuffers, PackedBlock, pack_block};
+use super::{Compression, ExrOptions, OutputError};
 use crate::render::Film;
 
 /// Writes an image with `layout` to `file`, block by block. `blocks` are all blocks of the image, from top to bottom.
@@ -53,6 +53,27 @@ pub(super) fn write_film(
     let film = job.film.write().unwrap_or_else(PoisonError::into_inner).take();
     let film = film.expect("only this function takes the film");
     clamped.map(|clamped| (film, clamped))
+}
+
+/// The part of a band that is left after compression, in quarters: what noisy images with few samples have.
+const PACKED_QUARTERS: u64 = 3;
+
+/// Memory for encoding a film with so many bytes of `channels`, without the film itself: each thread packs a band, and
+/// one more each waits to be written.
+pub fn encoder_bytes(channels: u64, width: u32, height: u32, options: &ExrOptions) -> u64 {
+    let pixels = u64::from(width) * u64::from(height);
+    // Colours are in half precision
+    let samples = channels - 8 * pixels;
+    let band_rows = u64::from(options.rows_per_band());
+    let rows = u64::from(height).max(1);
+    let band = band_rows.min(rows) * samples / rows;
+    let packed = match options.compression {
+        Compression::None => band,
+        _ => PACKED_QUARTERS * band / 4,
+    };
+    let threads = rayon::current_num_threads() as u64;
+    let busy = threads.min(rows.div_ceil(band_rows));
+    busy * PackBuffers::predicted_bytes(band, packed) + (busy + 1) * packed
 }
 
 /// The blocks of one band, or the reason why it could not be packed.

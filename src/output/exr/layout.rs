@@ -143,8 +143,7 @@ impl ExrPart {
 
     /// Number of rows in a block: 1, 16 or 32. The last block of an image may have fewer.
     fn rows_per_block(&self) -> u32 {
-        let rows = self.compression.codec().scan_lines_per_block();
-        u32::try_from(rows).expect("blocks have at most 256 rows")
+        self.compression.rows_per_block()
     }
 
     /// Number of bytes of all samples in `rows` rows.
@@ -153,7 +152,21 @@ impl ExrPart {
     }
 }
 
+impl ExrOptions {
+    /// Number of rows in a band of a film with these options, see [`ExrLayout::rows_per_band`].
+    pub(super) fn rows_per_band(&self) -> u32 {
+        let data = self.data_compression.map_or(0, Compression::rows_per_block);
+        BAND_ROWS.max(self.compression.rows_per_block()).max(data)
+    }
+}
+
 impl Compression {
+    /// Number of rows that are compressed together.
+    fn rows_per_block(self) -> u32 {
+        let rows = self.codec().scan_lines_per_block();
+        u32::try_from(rows).expect("blocks have at most 256 rows")
+    }
+
     pub(super) const fn codec(self) -> Codec {
         match self {
             Self::None => Codec::Uncompressed,

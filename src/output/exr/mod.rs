@@ -23,7 +23,7 @@ mod lines;
 mod pack;
 pub(super) mod planes;
 
-pub use blocks::write_blocks;
+pub use blocks::{encoder_bytes, write_blocks};
 pub use layout::{ExrBlock, ExrLayout};
 pub use pack::{PackBuffers, PackedBlock, pack_block};
 pub use planes::{DEFAULT_LIGHT_GROUP, PlaneNames, ambiguous_name, attribute_planes, layer_planes};

@@ -37,9 +37,9 @@ pub struct PackBuffers {
 }
 
 impl PackBuffers {
-    /// Maximum size of the buffers in bytes, after they have packed a block with `samples` bytes of samples.
-    pub fn predicted_bytes(samples: u64) -> u64 {
-        samples + Deflater::predicted_bytes(samples)
+    /// Size of the buffers in bytes, after they have packed blocks with `samples` bytes of samples to `packed` bytes.
+    pub fn predicted_bytes(samples: u64, packed: u64) -> u64 {
+        samples + Deflater::predicted_bytes(samples, packed)
     }
 }
 

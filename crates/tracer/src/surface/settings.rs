@@ -36,6 +36,15 @@ pub enum SprayStyle {
     Spheres,
 }
 
+/// Memory of a surface, without trees of spheres.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct SurfaceBytes {
+    /// During its build.
+    pub building: u64,
+    /// During tracing.
+    pub kept: u64,
+}
+
 /// Everything that defines a surface apart from particles and radii. Lengths are in particle radii, as in splashsurf,
 /// so that its parameters can be used here.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,6 +82,11 @@ impl SurfaceSettings {
         spray: false,
         spray_style: SprayStyle::Soft,
     };
+
+    /// Support of the SPH kernel in particle radii.
+    pub const fn support(&self) -> f32 {
+        2.0 * self.smoothing_length
+    }
 }
 
 impl Default for SurfaceSettings {

@@ -1,7 +1,10 @@
 //! Foam and spray: particles with few neighbours, drawn as white drops that are not part of the body of the others.
 
 use glam::Vec3;
+use rayon::prelude::*;
 
+use super::field::FieldParticles;
+use super::field::bins::Bins;
 use spherule_tree::accel::view::TreeView;
 
 /// A particle with fewer neighbours is spray (Ihmsen et al. 2012, "Unified spray, foam and air bubbles for
@@ -13,6 +16,9 @@ pub const DROP_RADIUS: f32 = 0.5;
 
 /// Number of soft drops of a particle.
 pub const SOFT_DROPS: u32 = 12;
+
+/// Bytes of a soft drop before it is in a tree: centre and radius.
+pub const SOFT_DROP_BYTES: u64 = 16;
 
 /// Least and greatest radius of a soft drop in radii of its particle, tuned by eye. A soft drop is hardly visible near
 /// its silhouette, so it looks smaller than a sphere.
@@ -26,6 +32,37 @@ const SOFT_SPREAD: f32 = 1.4;
 #[must_use]
 pub fn spray_of(tree: &TreeView, support: f32) -> Vec<u32> {
     tree.isolated(support, ENOUGH_NEIGHBOURS)
+}
+
+/// The `centers` without those of spray, in another order. `reach` is the support times the radius of all particles.
+pub(super) fn without_spray(centers: &[Vec3], reach: f32) -> Vec<Vec3> {
+    let field = FieldParticles::sorted(centers, reach, false);
+    let bins = field.bins();
+    let is_body = |place: &usize| has_neighbours(bins, *place, reach);
+    let places = (0..bins.points().len()).into_par_iter().with_min_len(1 << 10);
+    places.filter(is_body).map(|place| bins.points()[place]).collect()
+}
+
+/// Whether the particle at `place` in `bins` of the size `reach` has enough others within that distance.
+fn has_neighbours(bins: &Bins, place: usize, reach: f32) -> bool {
+    let point = bins.points()[place];
+    let [x, y, z] = bins.cell_of(point);
+    let is_near = |other: &usize| {
+        *other != place && bins.points()[*other].distance_squared(point) <= reach * reach
+    };
+    let mut count = 0;
+    // Its own row of bins first
+    for z in [z, z - 1, z + 1] {
+        for y in [y, y - 1, y + 1] {
+            let run = bins.run(z, y, x - 1..x + 2);
+            let near = bins.particles_in(run).filter(is_near);
+            count += near.take(ENOUGH_NEIGHBOURS - count).count();
+            if count >= ENOUGH_NEIGHBOURS {
+                return true;
+            }
+        }
+    }
+    false
 }
 
 /// A soft drop of a particle, in radii of the particle.

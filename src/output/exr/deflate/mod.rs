@@ -65,11 +65,11 @@ pub(super) struct Piece {
 }
 
 impl Deflater {
-    /// Maximum size of its memory in bytes, after it has compressed `data` bytes.
-    pub(super) fn predicted_bytes(data: u64) -> u64 {
+    /// Size of its memory in bytes, after it has compressed `data` bytes to `packed` bytes.
+    pub(super) fn predicted_bytes(data: u64, packed: u64) -> u64 {
         let sequences =
             (MAX_SEQUENCE_BYTES as u64).min(2 * size_of::<Sequence>() as u64 * (data / 4));
-        data + sequences + HashTable::BYTES as u64
+        packed + sequences + HashTable::BYTES as u64
     }
 
     /// The zlib stream of `data`, or `None` if it is no shorter. `pieces` cover all of `data`.

@@ -76,6 +76,46 @@ impl Plan {
     pub(super) fn byte_len(&self) -> u64 {
         size_of_val(&self.blocks[..]) as u64
     }
+
+    /// Number of bricks that the surface may pass through.
+    pub(super) fn band_count(&self) -> u64 {
+        self.blocks.iter().map(|block| u64::from(block.band.count_ones())).sum()
+    }
+
+    /// Number of bricks in which the field is needed.
+    pub(super) fn raw_count(&self) -> u64 {
+        self.blocks.iter().map(|block| u64::from(block.raw.count_ones())).sum()
+    }
+
+    /// The plan of a part of the bricks: those of some blocks, distributed over all, about `most` in total.
+    pub(super) fn sample(&self, most: u64) -> Self {
+        let every = self.band_count().div_ceil(most).max(1);
+        let is_chosen = |block: &BlockPlan| (mixed(block.key()) >> 32).is_multiple_of(every);
+        let with_band = self.blocks.iter().filter(|block| block.band != 0);
+        let mut chosen: Vec<BlockPlan> = with_band.clone().copied().filter(is_chosen).collect();
+        if chosen.is_empty() {
+            chosen.extend(with_band.max_by_key(|block| block.band.count_ones()));
+        }
+        // Find the bricks around them, which are in blocks of the plan
+        let around = neighbours_of_band(&chosen);
+        let bits_of = |entries: &[(u64, u64)], key: u64| {
+            entries.binary_search_by_key(&key, |entry| entry.0).map_or(0, |found| entries[found].1)
+        };
+        let bands: Vec<(u64, u64)> = chosen.iter().map(|block| (block.key(), block.band)).collect();
+        let blocks = self.blocks.iter().map(|block| BlockPlan {
+            band: bits_of(&bands, block.key()),
+            raw: bits_of(&around, block.key()) & block.raw,
+            ..*block
+        });
+        Self { blocks: blocks.collect() }
+    }
+}
+
+/// Mixes the bits of `key`, so that equal distances in a grid do not show (finalizer of SplitMix64).
+const fn mixed(key: u64) -> u64 {
+    let key = (key ^ key >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let key = (key ^ key >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+    key ^ key >> 31
 }
 
 impl BlockPlan {

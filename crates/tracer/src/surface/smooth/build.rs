@@ -123,7 +123,11 @@ pub(super) fn build(
 
 /// Removes all particles that do not affect the surface. Returns a flag for each remaining bin: whether its volumes
 /// contribute to the field. The other bins are neighbours of those.
-fn discard_unused(field: &mut FieldParticles, layout: &Layout, plan: &Plan) -> Vec<bool> {
+pub(super) fn discard_unused(
+    field: &mut FieldParticles,
+    layout: &Layout,
+    plan: &Plan,
+) -> Vec<bool> {
     let near = |reach: f32| blocks::bins_near(field.bins(), layout, &plan.blocks, reach);
     let (needed, kept) = (near(layout.support), near(2.0 * layout.support));
     field.retain(&kept);
@@ -139,13 +143,9 @@ struct MemoryNeed {
 
 impl MemoryNeed {
     fn of(plan: &Plan) -> Self {
-        let count = |bits: fn(&BlockPlan) -> u64| -> u64 {
-            let counts = plan.blocks.iter().map(|block| u64::from(bits(block).count_ones()));
-            counts.sum()
-        };
         Self {
-            raw: count(|block| block.raw) * (size_of::<Codes>() + size_of::<RawBrick>()) as u64,
-            bricks: count(|block| block.band) * size_of::<Brick>() as u64,
+            raw: plan.raw_count() * (size_of::<Codes>() + size_of::<RawBrick>()) as u64,
+            bricks: plan.band_count() * size_of::<Brick>() as u64,
         }
     }
 
@@ -155,22 +155,22 @@ impl MemoryNeed {
 }
 
 /// Input for making bricks.
-struct Work<'a> {
-    field: &'a FieldParticles,
-    layout: &'a Layout,
-    plan: &'a Plan,
-    lanes: ArrayLanes,
+pub(super) struct Work<'a> {
+    pub(super) field: &'a FieldParticles,
+    pub(super) layout: &'a Layout,
+    pub(super) plan: &'a Plan,
+    pub(super) lanes: ArrayLanes,
 }
 
 /// The field of all bricks that need it, block by block in the order of their bits.
-struct RawField {
+pub(super) struct RawField {
     bricks: Vec<RawBrick>,
     /// Index of the first brick of each block.
     firsts: Vec<usize>,
 }
 
 impl RawField {
-    fn byte_len(&self) -> u64 {
+    pub(super) fn byte_len(&self) -> u64 {
         let codes = self
             .bricks
             .iter()
@@ -180,7 +180,7 @@ impl RawField {
 }
 
 impl Work<'_> {
-    fn raw(&self) -> RawField {
+    pub(super) fn raw(&self) -> RawField {
         let mut firsts = Vec::with_capacity(self.plan.blocks.len());
         let mut places = Vec::new();
         for block in &self.plan.blocks {
@@ -197,7 +197,7 @@ impl Work<'_> {
     }
 
     /// All blocks that are not outside, and their bricks in the same order.
-    fn bricks(&self, raw: &RawField) -> (Vec<Block>, Vec<Brick>) {
+    pub(super) fn bricks(&self, raw: &RawField) -> (Vec<Block>, Vec<Brick>) {
         let taps = taps(self.layout);
         let (mut blocks, mut bricks) = (Vec::new(), Vec::new());
         let indices: Vec<usize> = (0..self.plan.blocks.len()).collect();

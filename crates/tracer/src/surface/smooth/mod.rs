@@ -22,12 +22,14 @@ mod exact;
 mod layout;
 mod raw;
 mod root;
+mod size;
 mod steps;
 mod traversal;
 mod tree;
 
 use build::Built;
 pub use build::{SmoothError, SmoothReport};
+pub use size::GridSize;
 use traversal::Crossings;
 
 /// Step off the surface in voxels, larger than the rounding of positions in a voxel.

@@ -3,15 +3,19 @@
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
-use spherule_formats::MemoryBudget;
+use spherule_formats::{MemoryBudget, Sequence};
 
+use super::super::bonds::MAX_BONDS_EACH;
 use super::*;
+use crate::metrics::Bytes;
 use crate::pipeline::{
     ArrowStyle, BondRule, BondStyle, MeshSettings, Overlap, PictureMesh, TrailStyle,
 };
-use crate::surface::MaterialId;
 use crate::surface::mesh::{MeshNormals, MeshTree, TriangleMesh, VisibleFaces};
 use crate::surface::rods::Anchor;
+use crate::surface::smooth::GridSize;
+use crate::surface::{MaterialId, SurfaceKind};
+use crate::survey::FrameWeight;
 
 /// A frame of plain single-precision positions.
 fn plain(particles: u64) -> FrameSize {
@@ -23,6 +27,7 @@ fn plain(particles: u64) -> FrameSize {
         files: 1,
         is_shared: false,
         meshes: 0,
+        surface: None,
     }
 }
 
@@ -47,7 +52,7 @@ fn setup() -> Setup {
 fn more_of_anything_needs_more() {
     let setup = setup();
     let model = MemoryModel::new(&setup);
-    let total = |frames: &[FrameSize]| model.peak(frames).total();
+    let total = |frames: &[FrameSize]| model.peak(frames, 1).total();
     assert!(total(&[plain(4_000_000)]) < total(&[plain(8_000_000)]));
     assert!(total(&[plain(8_000_000)]) < total(&[plain(8_000_000); 2]));
     // Memory is constant over a sequence.
@@ -72,7 +77,7 @@ fn a_smooth_surface_has_a_grid_and_no_tree() {
     assert!(need(&finer, 1_000_000).surface > 2 * some.surface);
     finer.picture.surface.voxel = 0.25;
     // Too little to affect the peak.
-    let few = smooth_bytes(&finer, 1).building;
+    let few = GridSize::of_splash(1, &finer.picture.surface).bytes(true).building;
     assert!((1 << 10..1 << 16).contains(&few), "{few}");
     assert_eq!(need(&smooth, 0).surface, 0);
     let mut medium = setup();
@@ -87,7 +92,7 @@ fn meshes_of_a_frame_are_counted() {
     let with = |meshes| FrameSize { meshes, ..plain(1000) };
     let one = model.alone(&with(10_000_000));
     assert!(one.reading >= 160_000_000, "{one}");
-    let two = model.peak(&[with(10_000_000); 2]);
+    let two = model.peak(&[with(10_000_000); 2], 1);
     assert_eq!(two.surface, 50_000_000);
     assert!(two.reading >= 160_000_000, "{two}");
     assert_eq!(FrameSize::estimate(1200, false, None).meshes, 0);
@@ -98,7 +103,7 @@ fn limits_leave_out_what_does_not_fit_alone() {
     let setup = setup();
     let model = MemoryModel::new(&setup);
     let frames = [plain(1000), plain(20_000_000), plain(1000)];
-    let small = model.peak(&[frames[0], frames[2]]).total();
+    let small = model.peak(&[frames[0], frames[2]], 1).total();
     let schedule = model.schedule(&frames, Some(Bytes(small)), None);
     let left_out: Vec<usize> = schedule.too_large.iter().map(|(place, _)| *place).collect();
     assert_eq!(left_out, [1]);

@@ -1,0 +1,56 @@
+//! Decides how many images are worth encoding at the same time.
+//!
+//! The preview is encoded by one thread, and so is everything around it: files are synced, the ledger is written. On
+//! many cores, small images with few samples take longer there than they take to trace. The decision follows from the
+//! settings and the number of threads, and never from the clock, so that predictions of memory hold.
+
+use super::rays::expected_rays;
+use super::setup::Setup;
+
+/// Maximum number of images that are encoded at the same time: beyond it, storage is the limit.
+const MAX_ENCODERS: u32 = 8;
+
+/// Seconds of one thread per pixel of an image and its preview.
+const PIXEL_SECONDS: f64 = 1.5e-7;
+/// Seconds per image, whatever its size, mostly for files to reach the disk.
+const IMAGE_SECONDS: f64 = 4e-3;
+/// Seconds of one thread per ray in a frame of few particles.
+const RAY_SECONDS: f64 = 2.5e-7;
+
+impl Setup {
+    /// Number of images to encode at the same time, so that encoding keeps up with tracing.
+    pub(super) fn useful_encoders(&self) -> u32 {
+        let render = &self.picture.render;
+        let pixels = f64::from(render.width) * f64::from(render.height);
+        let rays = expected_rays(render, &self.picture.scene);
+        encoders_for(pixels, rays, rayon::current_num_threads())
+    }
+}
+
+/// The number of encoders for images of so many `pixels` and `rays`, on so many `threads`.
+fn encoders_for(pixels: f64, rays: f64, threads: usize) -> u32 {
+    let encoding = IMAGE_SECONDS + pixels * PIXEL_SECONDS;
+    let tracing = rays * RAY_SECONDS / threads as f64;
+    let most = u32::try_from(threads).unwrap_or(u32::MAX).min(MAX_ENCODERS);
+    // The smallest number that keeps up, found without a division by zero
+    let keeps_up = |count: &u32| encoding <= f64::from(*count) * tracing;
+    (1..most).find(keeps_up).unwrap_or(most).max(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_images_with_few_samples_have_several_encoders_on_many_cores() {
+        let pixels = 640.0 * 360.0;
+        // A ray, and one for its light
+        let draft = 1.4 * pixels;
+        assert_eq!(encoders_for(pixels, draft, 1), 1);
+        assert!(encoders_for(pixels, draft, 16) > 4);
+        // Many samples and reflections
+        assert_eq!(encoders_for(pixels, 100.0 * pixels, 16), 1);
+        assert_eq!(encoders_for(pixels, 0.0, 64), MAX_ENCODERS);
+        assert_eq!(encoders_for(0.0, 0.0, 1), 1);
+    }
+}
