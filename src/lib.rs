@@ -1,8 +1,10 @@
 //! Renders particle-simulation time steps by CPU ray tracing: acceleration structures, surfaces, shading, images, and
 //! the pipeline and commands that connect them.
 //!
-//! `spherule-formats` turns bytes into frames and knows nothing about rays. `spherule-jobs` plans, records and resumes
-//! work and does not know what the work is. This crate connects the two; neither depends on it.
+//! `spherule-formats` turns bytes into frames and knows nothing about rays. `spherule-tracer` turns slices into images
+//! and knows nothing about files. `spherule-jobs` plans, records and resumes work and does not know what the work is.
+//! This crate connects them; none depends on it. Its modules [`accel`], [`math`] and [`ray`] are those of
+//! `spherule-tree`, its modules [`scene`], [`surface`], [`render`] and [`denoise`] those of `spherule-tracer`.
 //!
 //! This example renders positions in memory to planes, and to the bytes of an EXR and a PNG, without files:
 //!

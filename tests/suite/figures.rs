@@ -46,7 +46,8 @@ fn text_sizes(path: &Path) -> Vec<f32> {
         let mut text = Vec::new();
         if ZlibDecoder::new(&pdf[at + 7..]).read_to_end(&mut text).is_ok() {
             let text = String::from_utf8_lossy(&text).into_owned();
-            let size = |line: &str| line.strip_prefix("/F1 ")?.strip_suffix(" Tf")?.parse().ok();
+            let size =
+                |line: &str| line.strip_prefix("/F1 ")?.strip_suffix(" Tf")?.parse::<f64>().ok();
             sizes.extend(text.lines().filter_map(size));
         }
     }

@@ -41,6 +41,7 @@ pub mod names;
 mod origin;
 mod sampling;
 mod scalar;
+mod vectors;
 
 pub use attribute::{Attribute, AttributeData};
 pub use bonds::Bond;
@@ -55,3 +56,4 @@ pub use images::PeriodicImages;
 pub use origin::choose_origin;
 pub use sampling::sample_indices;
 pub use scalar::{Endian, ScalarType};
+pub use vectors::join_vectors;

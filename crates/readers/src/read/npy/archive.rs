@@ -15,7 +15,9 @@ use super::{check_frame, frame_steps, read_array};
 use crate::read::Step;
 use crate::read::columns::{self, StridedColumn};
 use spherule_frame::names::POSITION_ARRAYS;
-use spherule_frame::{Attribute, AttributeData, MemoryBudget, ParseError, RawParticles};
+use spherule_frame::{
+    Attribute, AttributeData, MemoryBudget, ParseError, RawParticles, join_vectors,
+};
 
 /// Whether `bytes` begin like a zip archive, an empty one included.
 pub(super) fn is_zip(bytes: &[u8]) -> bool {
@@ -94,6 +96,7 @@ impl<'a> Archive<'a> {
                 particles.attributes.extend(attribute);
             }
         }
+        join_vectors(&mut particles.attributes, budget.less(held));
         particles.time = time_of(self.times(&layout, budget)?.as_ref(), frame);
         Ok(particles)
     }
