@@ -47,12 +47,10 @@ const SAMPLE: usize = 1 << 17;
 const FLAT: f64 = 1e-3;
 
 /// Names of scalars by which particles without velocities are coloured, best first.
-const SCALARS: [&str; 24] = [
+const SCALARS: [&str; 20] = [
     "temperature",
     "temp",
-    "T",
     "concentration",
-    "c",
     "pressure",
     "press",
     "p",
@@ -60,7 +58,6 @@ const SCALARS: [&str; 24] = [
     "rho",
     "rhop",
     "energy",
-    "u",
     "stress",
     "strain",
     "damage",
@@ -69,7 +66,6 @@ const SCALARS: [&str; 24] = [
     "volume_fraction",
     "intensity",
     "charge",
-    "q",
     "b_factor",
     "value",
 ];
@@ -240,6 +236,9 @@ fn part_in(cell: &SimulationCell, positions: &Positions) -> f64 {
     part
 }
 
+/// Thickness of a layer of atoms as a part of the edge of a cell.
+const LAYER: f64 = 1e-3;
+
 /// How much larger the radius that follows from the density is than half the distance of nearest neighbours, from which
 /// on particles are at random distances: it is 1.05 times as large in a lattice, 1.2 times in a fluid.
 const RANDOM: f32 = 1.5;
@@ -257,8 +256,29 @@ fn extent_in(cell: &SimulationCell, positions: &Positions) -> [f64; 3] {
     let sample = in_coordinates(cell, positions);
     [0, 1, 2].map(|axis| {
         let along = sorted_sample(sample.len(), |i| sample[i][axis]);
-        robust_range(&along).map_or(0.0, |(low, high)| high - low)
+        if cell.periodic[axis] {
+            periodic_extent(along.iter().map(|at| at.rem_euclid(1.0)).collect())
+        } else {
+            robust_range(&along).map_or(0.0, |(low, high)| high - low)
+        }
     })
+}
+
+/// The part of a period along which there are layers, each with the distance to the next one: all of a crystal's, of which
+/// the cell may have only one layer, and not the empty part above a slab.
+fn periodic_extent(mut layers: Vec<f64>) -> f64 {
+    layers.sort_unstable_by(f64::total_cmp);
+    let (Some(first), Some(last)) = (layers.first(), layers.last()) else {
+        return 0.0;
+    };
+    let around = first + 1.0 - last;
+    let mut gaps: Vec<f64> = layers.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    gaps.push(around);
+    gaps.sort_unstable_by(|a, b| b.total_cmp(a));
+    let largest = gaps[0];
+    // Atoms of one layer are not exactly in a plane
+    let next = gaps.get(1).copied().filter(|gap| *gap > LAYER).unwrap_or(largest);
+    1.0 - largest + next
 }
 
 /// Whether a particle of a sample moves.
@@ -359,4 +379,23 @@ fn without_walls(mut categories: Vec<Category>, attributes: &[Attribute]) -> Vec
         category.without_walls = kept.into_iter().collect();
     }
     categories
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unit_cells_are_full_and_slabs_are_not() {
+        for (layers, extent) in [
+            (vec![0.0], 1.0),
+            (vec![0.0, 0.0005], 1.0),
+            (vec![0.0, 0.5, 0.5, 0.0], 1.0),
+            (vec![0.2, 0.25, 0.3], 0.15),
+            (vec![], 0.0),
+        ] {
+            let found = periodic_extent(layers.clone());
+            assert!((found - extent).abs() < 2e-3, "{layers:?}: {found}");
+        }
+    }
 }

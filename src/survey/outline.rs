@@ -146,6 +146,9 @@ impl Outermost {
     /// Finds the outermost particles of a `share` of all frames together.
     fn keep(&mut self, share: f64) {
         let all: Vec<DVec3> = self.kept.iter().flat_map(|frame| &frame.points).copied().collect();
+        if all.is_empty() {
+            return;
+        }
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
@@ -414,5 +417,6 @@ mod tests {
         let mut outermost = Outermost::default();
         outermost.add(&Positions::F64(vec![DVec3::NAN]), 1);
         assert_eq!(outermost.outline(Fit::All, DVec3::ZERO), None);
+        assert_eq!(Outermost::default().outline(Fit::Share(0.99), DVec3::ZERO), None);
     }
 }

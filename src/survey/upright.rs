@@ -14,16 +14,20 @@ const UPRIGHT: f64 = 0.5;
 /// The largest part of that which another axis may have: walls beside a fluid are on both sides of it.
 const OTHER: f64 = 0.25;
 
-/// The largest mean velocity along an axis, relative to the root mean square, if it points up: a fluid that leaves a wall
-/// flows away from it, one that lies on a floor does not.
-const MAX_RISE: f64 = 0.2;
+/// The smallest mean velocity away from a wall, relative to the root mean square, of a fluid that leaves it.
+const LEAVES: f64 = 0.2;
+
+/// The smallest mean velocity downwards of such a fluid, which falls as it leaves. A splash that rises does not.
+const FALLS: f64 = 0.1;
 
 /// Whether y points up, and not z. `sample`: some of `count` particles, with their velocities if they have some.
 pub(super) fn is_y_up(sample: &[DVec3], count: usize, velocities: &[DVec3]) -> bool {
     let lies = |axis: DVec3| standing(sample, count, axis).min(MAX_STANDING);
     let upright = |axis: DVec3| lies(axis) - lies(-axis);
     let [along_y, along_z] = [DVec3::Y, DVec3::Z].map(upright);
-    along_y >= UPRIGHT && along_z.abs() <= OTHER * along_y && rise(velocities, DVec3::Y) <= MAX_RISE
+    let leaves_a_wall =
+        rise(velocities, DVec3::Y) > LEAVES && rise(velocities, DVec3::NEG_Z) > FALLS;
+    along_y >= UPRIGHT && along_z.abs() <= OTHER * along_y && !leaves_a_wall
 }
 
 /// The mean velocity along `up`, relative to the root mean square of all.
@@ -62,7 +66,7 @@ mod tests {
             points.iter().map(|p| DVec3::new(p.x, p.z, p.y)).collect()
         };
         for shape in [lattice([25, 12, 25], heap), lattice([24, 12, 10], wedge)] {
-            assert!(is_up(&shape, DVec3::ZERO));
+            assert!(is_up(&shape, DVec3::ZERO) && is_up(&shape, DVec3::Y));
             assert!(!is_up(&to_z(&shape), DVec3::ZERO));
         }
     }
