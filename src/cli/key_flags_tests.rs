@@ -14,7 +14,7 @@ const ACTIONS: [&str; 7] = ["input", "set", "look", "draft", "force", "keep_done
 const COLORS: [&str; 4] = ["color_by", "map", "range", "color_scale"];
 
 /// Options for several keys.
-const SHORT: [&str; 6] = ["size", "ortho", "vmin", "vmax", "slice", "turntable"];
+const SHORT: [&str; 7] = ["size", "ortho", "no_legend", "vmin", "vmax", "slice", "turntable"];
 
 /// Options for items of lists. Their tests are below.
 const LISTS: [&str; 11] = [
@@ -166,6 +166,7 @@ fn options_of_lists_add_items() {
         ("--slice z=0.5:0.1", "select.slab={axis=\"z\",center=0.5,thickness=0.1}"),
         ("--cmap turbo", "material.color.map=turbo"),
         ("--colour-by v", "material.color={attribute=\"v\"}"),
+        ("--no-legend", "legend=false"),
         (
             "--turntable 36",
             "camera.mode=turntable --set camera.degrees_per_frame=10.0 --set input.repeat=36",

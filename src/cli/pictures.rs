@@ -204,6 +204,15 @@ fn real(path: &Path) -> Result<PathBuf, CliError> {
     Ok(dir.canonicalize().unwrap_or_else(|_| dir.to_owned()).join(name))
 }
 
+/// Whether the settings of a plan put overlays beside the pictures, so that previews are larger than images.
+pub(super) fn has_strips(settings: &[(String, String)]) -> bool {
+    settings.iter().any(|(key, value)| {
+        let is_layout =
+            key == "image.layout" || (key.starts_with("overlay.") && key.ends_with(".layout"));
+        is_layout && value == "\"beside\""
+    })
+}
+
 fn is_png(path: &String) -> bool {
     PictureFormat::of(Path::new(path)) == Some(PictureFormat::Png)
 }

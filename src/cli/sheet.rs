@@ -22,11 +22,7 @@ const EXAMPLES: &str = "\
 Examples:
   spherule sheet out -o sheet.png
       All frames
-  spherule sheet out -o sheet.png --count 12 --columns 4 --width 2400
-      Twelve frames, evenly chosen from the first to the last
-  spherule sheet out/job.toml --frames 100-200x10 -o sheet.png
-      Every tenth of some frames
-  spherule sheet out --count 4 --columns 2 --width 80mm --letters --colorbar -o figure.pdf
+  spherule sheet out --frames 100-200x10 --count 4 --columns 2 --width 80mm --letters --colorbar -o figure.pdf
       A figure for a column of a journal: panels (a) to (d) with one colour bar
   spherule sheet coarse.png fine.png --letters=A -o both.png
       Pictures of `still`";

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use spherule_jobs::publish;
 
-use super::pictures::{JobPictures, PicturesArgs};
+use super::pictures::{JobPictures, PicturesArgs, has_strips};
 use super::{CliError, Outcome, print};
 use crate::manifest::ATTRIBUTE_CHANNEL;
 use crate::movie::FrameRate;
@@ -73,13 +73,19 @@ pub(super) fn run(args: &ViewArgs) -> Result<Outcome, CliError> {
     }
     let format_of = |frame: &ViewerFrame| PictureFormat::of(&frame.image);
     let has_exr = frames.iter().any(|frame| format_of(frame) == Some(PictureFormat::Exr));
+    let has_strips = has_strips(pictures.state.plan().settings());
+    if has_exr && has_strips && !args.no_data {
+        message!(
+            "overlays are beside the pictures, which the channels of the images would not fit: the page has none"
+        );
+    }
     let settings = ViewerSettings {
         title: title(&pictures),
         rate: args.fps.per_second(),
         embed: args.embed || !pictures.has_previews,
         width: args.width.map(usize::from),
         exposure: pictures.exposure,
-        data: !args.no_data && has_exr,
+        data: !args.no_data && has_exr && !has_strips,
         attributes: attributes(&pictures),
     };
     let report = JobReport::of_plan(&pictures.state);

@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
+use super::Sprite;
 use super::font::Font;
-use super::image::RgbaPixels;
-use super::{Orientation, Sprite};
+use super::layout::Orientation;
+use super::pixels::RgbaPixels;
 
 /// A colour as sRGB from 0 to 1. Edges are blended in sRGB, so that thin strokes of dark text look as heavy as those of
 /// light text.

@@ -1,22 +1,13 @@
 //! Colour bars: a bar with ticks, or swatches with the names of categories. This file has vertical ones.
 
 use super::canvas::{Canvas, Color};
-use super::number_format::NumberFormat;
-use super::ticks::{TickChoice, TickSettings, Ticks, power_text};
+use super::layout::Orientation;
+use super::number_format::{NumberFormat, power_text};
+use super::ticks::{TickChoice, TickSettings, Ticks};
 use super::{Pen, font};
 use crate::scene::ColorScale;
 
 mod horizontal;
-
-/// The direction of a colour bar.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Orientation {
-    /// Values rise upwards; labels are at the right.
-    #[default]
-    Vertical,
-    /// Values rise to the right; labels are below.
-    Horizontal,
-}
 
 /// A colour bar.
 #[derive(Debug, Clone, PartialEq)]

@@ -13,6 +13,16 @@ pub enum Corner {
     BottomRight,
 }
 
+/// The direction of a colour bar.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Orientation {
+    /// Values rise upwards; labels are at the right.
+    #[default]
+    Vertical,
+    /// Values rise to the right; labels are below.
+    Horizontal,
+}
+
 /// Whether an overlay covers the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Layout {

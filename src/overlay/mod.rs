@@ -11,6 +11,7 @@ mod image;
 mod layout;
 mod marks;
 mod number_format;
+mod pixels;
 mod scale_bar;
 mod template;
 mod ticks;
@@ -19,14 +20,15 @@ pub use axes::Axes;
 pub use beside::Page;
 pub use canvas::Color;
 use canvas::{Canvas, Raster};
-pub use color_bar::{ColorBar, ColorBarKind, Orientation};
+pub use color_bar::{ColorBar, ColorBarKind};
 use font::Font;
 use font::missing_glyphs;
 pub use font::{FONT_NAME, FontFile, Glyph, Stroke, font_file, outline};
-pub use image::{Image, RgbaPixels};
-pub use layout::{Boxes, Corner, Layout, Placement};
+pub use image::Image;
+pub use layout::{Boxes, Corner, Layout, Orientation, Placement};
 pub use marks::{Drawing, Mark, marks};
 pub use number_format::NumberFormat;
+pub use pixels::RgbaPixels;
 pub use scale_bar::ScaleBar;
 pub use template::{FrameValues, Template};
 pub use ticks::{Tick, TickChoice, TickSettings, Ticks};
@@ -156,22 +158,24 @@ impl Overlay {
     }
 }
 
-/// The top left corners of `overlays` with these `sizes` on a page.
+/// The top left corners of `overlays` with these `sizes` on a page. In a corner that users name, overlays that have no
+/// corner of their own come last.
 fn place(overlays: &[Overlay], sizes: &[[i32; 2]], page: &Page) -> Vec<[i32; 2]> {
     let [left, top] = page.at.map(u32::cast_signed);
-    let is_beside = |overlay: &Overlay| overlay.layout == Layout::Beside;
-    let all = || overlays.iter().zip(sizes.iter().copied());
-    let beside: Vec<_> = all().filter(|(overlay, _)| is_beside(overlay)).collect();
-    let mut beside = page.places(&beside).into_iter();
+    let mut places = vec![[0, 0]; overlays.len()];
+    let with = |layout: Layout| (0..overlays.len()).filter(move |i| overlays[*i].layout == layout);
+    let beside: Vec<_> = with(Layout::Beside).map(|i| (&overlays[i], sizes[i])).collect();
+    for (i, place) in with(Layout::Beside).zip(page.places(&beside)) {
+        places[i] = place;
+    }
     let mut boxes = Boxes::new(page.picture);
-    let places = all().map(|(overlay, size)| match overlay.layout {
-        Layout::Beside => beside.next().unwrap_or_default(),
-        Layout::Over => {
-            let [x, y] = boxes.add(overlay.placement, size);
-            [x + left, y + top]
-        }
-    });
-    places.collect()
+    let mut over: Vec<usize> = with(Layout::Over).collect();
+    over.sort_by_key(|i| overlays[*i].corner.is_none());
+    for i in over {
+        let [x, y] = boxes.add(overlays[i].placement, sizes[i]);
+        places[i] = [x + left, y + top];
+    }
+    places
 }
 
 /// The view of a frame for overlays, whose lengths are fractions of the height of the page.

@@ -1,7 +1,5 @@
 //! How numbers are written: a part of Python's formats.
 
-use super::ticks::{number, power_text};
-
 /// How a number is written.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct NumberFormat {
@@ -85,6 +83,30 @@ impl NumberFormat {
             None => value.to_string().replace('-', "\u{2212}"),
         }
     }
+}
+
+/// `value` with `decimals`, with the sign that mathematics uses.
+pub(super) fn number(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    let is_zero = text.bytes().all(|b| matches!(b, b'-' | b'0' | b'.'));
+    match text.strip_prefix('-') {
+        Some(digits) if is_zero => digits.to_owned(),
+        Some(digits) => format!("\u{2212}{digits}"),
+        None => text,
+    }
+}
+
+/// `10` to the power of `exponent`, as text.
+pub(super) fn power_text(exponent: i32) -> String {
+    let superscript = |c: char| match c {
+        '-' => '⁻',
+        '1' => '¹',
+        '2' => '²',
+        '3' => '³',
+        digit => char::from_u32(0x2070 + digit.to_digit(10).unwrap_or(0)).unwrap_or(digit),
+    };
+    let digits = exponent.to_string();
+    format!("10{}", digits.chars().map(superscript).collect::<String>())
 }
 
 /// Digits with a comma after each group of three from the end.

@@ -1,7 +1,7 @@
 //! Scale bars: a horizontal line of a known length in the scene.
 
 use super::canvas::Canvas;
-use super::ticks::number;
+use super::number_format::number;
 use super::{FrameView, Pen};
 
 /// A scale bar.

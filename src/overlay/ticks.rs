@@ -1,6 +1,6 @@
 //! Ticks of colour bars: round values with labels, for each scale.
 
-use super::number_format::NumberFormat;
+use super::number_format::{NumberFormat, number, power_text};
 use crate::scene::ColorScale;
 
 mod bands;
@@ -51,30 +51,6 @@ fn decade(value: f64) -> i32 {
         exponent += 1;
     }
     exponent
-}
-
-/// `value` with `decimals`, with the sign that mathematics uses.
-pub(super) fn number(value: f64, decimals: usize) -> String {
-    let text = format!("{value:.decimals$}");
-    let is_zero = text.bytes().all(|b| matches!(b, b'-' | b'0' | b'.'));
-    match text.strip_prefix('-') {
-        Some(digits) if is_zero => digits.to_owned(),
-        Some(digits) => format!("\u{2212}{digits}"),
-        None => text,
-    }
-}
-
-/// `10` to the power of `exponent`, as text.
-pub(super) fn power_text(exponent: i32) -> String {
-    let superscript = |c: char| match c {
-        '-' => '⁻',
-        '1' => '¹',
-        '2' => '²',
-        '3' => '³',
-        digit => char::from_u32(0x2070 + digit.to_digit(10).unwrap_or(0)).unwrap_or(digit),
-    };
-    let digits = exponent.to_string();
-    format!("10{}", digits.chars().map(superscript).collect::<String>())
 }
 
 /// Exponents whose powers of ten are written with zeros: 0.001 to 10000.

@@ -47,7 +47,7 @@ fn text_sizes(path: &Path) -> Vec<f32> {
         if ZlibDecoder::new(&pdf[at + 7..]).read_to_end(&mut text).is_ok() {
             let text = String::from_utf8_lossy(&text).into_owned();
             let size =
-                |line: &str| line.strip_prefix("/F1 ")?.strip_suffix(" Tf")?.parse::<f64>().ok();
+                |line: &str| line.strip_prefix("/F1 ")?.strip_suffix(" Tf")?.parse::<f32>().ok();
             sizes.extend(text.lines().filter_map(size));
         }
     }
@@ -112,8 +112,15 @@ fn text_of_a_figure_for_a_column_has_seven_points() {
     let sizes = text_sizes(&shop.join("a.pdf"));
     assert!(sizes.len() > 5 && sizes.iter().all(|size| (size - 7.0).abs() < 1e-3), "{sizes:?}");
     let pdf = fs::read(shop.join("a.pdf")).expect("a file");
+    let text = String::from_utf8_lossy(&pdf).into_owned();
+    let page = text.split("/MediaBox [").nth(1).and_then(|s| s.split(']').next()).expect("a page");
+    let page: Vec<f32> = page.split(' ').filter_map(|number| number.parse().ok()).collect();
     // 945 x 591 pixels
-    assert!(String::from_utf8_lossy(&pdf).contains("/MediaBox [0 0 226.8 141.84]"));
+    let millimetres = [page[2], page[3]].map(|points| points / 72.0 * 25.4);
+    assert!(
+        (millimetres[0] - 80.0).abs() < 0.05 && (millimetres[1] - 50.0).abs() < 0.05,
+        "{page:?}"
+    );
     let svg = fs::read_to_string(shop.join("a.svg")).expect("a file");
     let sizes = svg.split("data-size=\"").skip(1);
     let sizes: Vec<f32> = sizes.filter_map(|s| s.split('"').next()?.parse().ok()).collect();
@@ -215,9 +222,12 @@ fn impossible_figures_are_refused_or_noted() {
         still(&shop, "x.png", options).expect(2).prints(text);
         assert!(!shop.join("x.png").exists());
     };
-    // Text of 8 points on 100 pixels
+    // Text of 8 points on 100 pixels is smaller, which is noted, and text without room is refused
     let large = bar("size = \"8pt\", layout = \"beside\"");
-    refused(&[&small[..], &["--set", &large]].concat(), "image.layout: the overlays beside the");
+    let noted = still(&shop, "w.png", &[&small[..], &["--set", &large]].concat()).expect(0);
+    noted.prints("text is 3.6 points high on paper");
+    let long = bar("title = \"A very long title\", layout = \"beside\"");
+    refused(&[&small[..], &["--set", &long]].concat(), "image.layout: the overlays beside the");
     let size = ["--width", "320", "--height", "240"];
     let with = |keys: &str| [&size[..], &["--set", &bar(keys)]].concat().join("\u{1}");
     for (keys, text) in [

@@ -100,6 +100,6 @@ fn still_writes_jpeg_and_tiff() {
     still("b.tif", &["--transparent"]).expect(0);
     still("b.jpg", &["--transparent"])
         .expect(2)
-        .prints("JPEG files have no alpha for a transparent background; choose .png or .tif");
+        .prints("JPEG files have no alpha for a transparent background; choose .png, .tif or .pdf");
     assert!(!workshop.join("b.jpg").exists());
 }

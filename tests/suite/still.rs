@@ -71,8 +71,8 @@ fn only_images_are_replaced() {
     fs::create_dir(workshop.join("dir.exr")).expect("a directory");
     refused(&["-o", "dir.exr"], "dir.exr: is not a file;");
     refused(
-        &["-o", "look.svg"],
-        "--output look.svg: the name must end in .png, .exr, .jpg or .tif",
+        &["-o", "look.eps"],
+        "--output look.eps: the name must end in .png, .exr, .jpg, .tif, .pdf or .svg",
     );
     refused(&["-o", "look"], "the name must end in .png, .exr, .jpg or .tif");
     refused(&["--frame", "9", "-o", "a.png"], "--frame 9: is not among the frames: 1-5");

@@ -167,7 +167,9 @@ fn small_text(setup: &Setup) -> Option<String> {
     let dpi = picture.exr.dpi?;
     let has_text = |overlay: &&Overlay| !matches!(overlay.content, Content::Image(_));
     let sizes = picture.overlays.iter().filter(has_text);
-    let points = sizes.map(|overlay| points_on_paper(overlay.size, picture.render.height, dpi));
+    let page = picture.preview.page.map(|own| own.page.size[1]);
+    let height = page.unwrap_or(picture.render.height);
+    let points = sizes.map(|overlay| points_on_paper(overlay.size, height, dpi));
     let least = points.fold(f64::INFINITY, f64::min);
     (least < LEAST_POINTS - 1e-3).then(|| {
         format!(

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use spherule_jobs::Plan;
 
+use crate::cli::pictures::has_strips;
 use crate::job::KIND;
 use crate::manifest::{
     ATTRIBUTE_CHANNEL as ATTRIBUTE, Camera, Image, PixelBounds, ProjectionKind, Side,
@@ -117,11 +118,7 @@ impl ExpectedOutput {
             light_groups,
             has_data_part: find("output.data_compression")
                 .is_some_and(|data| find("output.compression") != Some(data)),
-            is_on_page: settings.iter().any(|(key, value)| {
-                let is_layout = key == "image.layout"
-                    || (key.starts_with("overlay.") && key.ends_with(".layout"));
-                is_layout && value == "\"beside\""
-            }),
+            is_on_page: has_strips(settings),
         }))
     }
 }
