@@ -4,8 +4,8 @@ use super::super::mattes;
 use super::{FrameSize, MemoryModel, MemoryNeed, Neighbours};
 use crate::denoise;
 use crate::render::floor_light_bytes;
+use crate::scene::Ground;
 use crate::scene::ground::Pattern;
-use crate::scene::{Environment, Ground};
 use crate::surface::SurfaceKind;
 use crate::surface::mesh::MeshTree;
 
@@ -76,10 +76,11 @@ impl MemoryModel<'_> {
     fn idle(&self, frame: &FrameSize, after: Option<&FrameSize>) -> MemoryNeed {
         let scene = &self.setup.picture.scene;
         // A shadow catcher has a table of its own
-        let tables =
-            1 + u64::from(scene.ground.as_ref().is_some_and(|g| g.shadow_catcher.is_some()));
-        let environment = scene.environment.as_deref();
-        let environment = tables * environment.map_or(0, Environment::byte_len);
+        let catches = scene.ground.as_ref().is_some_and(|g| g.shadow_catcher.is_some());
+        let environment = scene.environment.as_deref().map_or(0, |environment| {
+            let of_catcher = if catches { environment.table().byte_len() } else { 0 };
+            environment.byte_len() + of_catcher
+        });
         let picture = scene.ground.as_ref().map_or(0, ground_image_bytes);
         // Count the threads, including those for reading
         let threads = rayon::current_num_threads() as u64;

@@ -373,7 +373,7 @@ impl PathIntegrator<'_> {
         let mut u = [splat(0.0); 2];
         get_2d_lanes(simd, path, ENVIRONMENT, &surface.sample, &mut u);
         let start = &packet.surface.start;
-        sample_environment(simd, environment, start, &u, &mut packet.light);
+        sample_environment(simd, environment.table(), start, &u, &mut packet.light);
         self.eval(surface, packet);
         let (values, weight) = (&packet.bsdf, &packet.weight);
         reflect_samples(simd, values, weight, true, lanes, &mut packet.light);
@@ -498,10 +498,9 @@ impl PathIntegrator<'_> {
         samples.rays.origin = rays.origin;
         samples.rays.direction = rays.direction;
         samples.rays.t_min = splat(0.0);
-        let (direction, throughput) = (&rays.direction, &rays.throughput);
-        let radiance = &mut samples.radiance;
-        let simd = self.context.simd;
-        environment_along(simd, environment, direction, &rays.pdf, throughput, radiance);
+        let along = [&rays.direction, &rays.throughput];
+        let (simd, radiance) = (self.context.simd, &mut samples.radiance);
+        environment_along(simd, environment, along, &rays.pdf, lanes, radiance);
         let is_bright = |l| lane3(&samples.radiance, l).max_element() > 0.0;
         samples.lanes = lanes & lanes_where(is_bright);
         let is_traced = |l: usize| samples.lanes >> l & 1 == 1;
@@ -602,7 +601,7 @@ impl PathIntegrator<'_> {
         if let Some(environment) = self.environment {
             let simd = self.context.simd;
             let (specular, mut seen) = (splat(f32::INFINITY), [splat(0.0); 3]);
-            environment_along(simd, environment, along, &specular, throughput, &mut seen);
+            environment_along(simd, environment, [along, throughput], &specular, lanes, &mut seen);
             add(simd, &seen, &Vec3::ONE, lanes, radiance);
         }
     }

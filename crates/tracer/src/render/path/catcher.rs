@@ -17,9 +17,9 @@ use crate::render::{
     bsdf::surface_points, dimensions::ENVIRONMENT, lights::sample_directions,
     sampler::get_2d_lanes, scratch::PacketScratch,
 };
-use crate::scene::environment::LUMINANCE;
-use crate::scene::{Environment, Scene};
-use spherule_tree::math::{Lanes3, lane3, lanes_in, set_lane3, splat, splat3};
+use crate::scene::Scene;
+use crate::scene::environment::{EnvironmentTable, LUMINANCE};
+use spherule_tree::math::{LANES, Lanes3, lane3, lanes_in, set_lane3, splat, splat3};
 use spherule_tree::ray::RayPacket;
 
 /// A shadow catcher and its light.
@@ -29,7 +29,7 @@ pub(super) struct Catcher {
     strength: f32,
     /// The environment times the cosine with the ground: sampling it needs no BSDF, and a sample that is blocked loses
     /// about the same light whatever its direction.
-    environment: Option<Environment>,
+    environment: Option<EnvironmentTable>,
     /// Radiance that a white ground reflects of the environment if nothing is in the way.
     whole: Vec3,
 }
@@ -40,8 +40,8 @@ impl Catcher {
         let ground = scene.ground.as_ref()?;
         let strength = ground.shadow_catcher?;
         let environment = scene.environment.as_deref().filter(|e| !e.is_black());
-        let environment = environment.map(|e| e.times_cosine(ground.up));
-        let irradiance = environment.as_ref().map_or(Vec3::ZERO, Environment::flux);
+        let environment = environment.map(|e| e.table().times_cosine(ground.up));
+        let irradiance = environment.as_ref().map_or(Vec3::ZERO, EnvironmentTable::flux);
         Some(Self { strength, environment, whole: irradiance * FRAC_1_PI })
     }
 }
@@ -98,7 +98,7 @@ impl PathIntegrator<'_> {
     /// Adds the lost light of the `environment` of a catcher.
     fn lose_environment(
         &self,
-        environment: &Environment,
+        environment: &EnvironmentTable,
         surface: &Surface<'_>,
         packet: &mut PacketScratch,
         light: &mut CaughtLight,
@@ -108,7 +108,8 @@ impl PathIntegrator<'_> {
         let mut u = [splat(0.0); 2];
         get_2d_lanes(simd, path, ENVIRONMENT, &surface.sample, &mut u);
         let PacketScratch { light: samples, crossings, counts, surface: points, .. } = packet;
-        sample_directions(simd, environment, &u, &mut samples.rays.direction);
+        let mut texel = [0; LANES];
+        sample_directions(simd, environment, &u, &mut samples.rays.direction, &mut texel);
         // Find out whether something is in their way
         let direction = |rays: &RayPacket, l: usize| lane3(&rays.direction, l);
         let is_above = |l| direction(&samples.rays, l).dot(lane3(&points.normal, l)) > 0.0;
@@ -135,7 +136,7 @@ impl PathIntegrator<'_> {
         }
         // Add their light
         for lane in lanes_in(blocked) {
-            let (arriving, pdf) = environment.radiance_and_pdf(direction(&samples.rays, lane));
+            let (arriving, pdf) = environment.texel(texel[lane]);
             let lost = (Vec3::ONE - transmittance(lane)) * arriving * (FRAC_1_PI / pdf);
             let sum = lane3(&light.lost, lane) + lost;
             set_lane3(&mut light.lost, lane, sum);

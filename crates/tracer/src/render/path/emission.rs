@@ -124,9 +124,8 @@ impl PathIntegrator<'_> {
             0 => segments.pdf[lane],
             _ => f32::INFINITY,
         });
-        let direction = &segments.rays.direction;
-        let mut seen = [splat(0.0); 3];
-        environment_along(context.simd, environment, direction, &pdf, weight, &mut seen);
+        let (along, mut seen) = ([&segments.rays.direction, &*weight], [splat(0.0); 3]);
+        environment_along(context.simd, environment, along, &pdf, lanes, &mut seen);
         add(context.simd, &seen, &Vec3::ONE, lanes, radiance);
         groups.add(context.simd, context.environment_group(), &seen, lanes);
     }

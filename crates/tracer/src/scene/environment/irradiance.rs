@@ -6,7 +6,7 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 
-use super::{Environment, EnvironmentAxes, integral};
+use super::{Environment, EnvironmentAxes};
 
 /// Number of functions in the first three bands.
 const COUNT: usize = 9;
@@ -27,10 +27,7 @@ pub struct IrradianceHarmonics {
 impl Environment {
     /// The irradiance on surfaces in any direction, approximately.
     pub fn irradiance_harmonics(&self) -> IrradianceHarmonics {
-        let coefficient = |i: usize| {
-            let texels = self.weighted_texels(|direction| basis(direction)[i]);
-            BANDS[i] * integral(&texels, |texel| *texel)
-        };
+        let coefficient = |i: usize| BANDS[i] * self.image.integral(|at| basis(at)[i]);
         IrradianceHarmonics { axes: self.axes, coefficients: std::array::from_fn(coefficient) }
     }
 }

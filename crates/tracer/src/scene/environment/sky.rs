@@ -7,6 +7,7 @@
 
 use glam::{DVec3, Vec3};
 
+use super::image::EnvironmentImage;
 use super::{Environment, EnvironmentAxes, LUMINANCE};
 use spherule_tree::math::functions::{acos, exp, pow};
 
@@ -54,8 +55,8 @@ pub fn sky(axes: EnvironmentAxes, direction: Vec3, scale: Vec3) -> Environment {
     let model = Model::new(direction);
     let radiance = |at: Vec3| model.radiance(at.with_z(at.z.max(HORIZON)).normalize());
     // Scale to the brightness on the ground
-    let raw = Environment::from_fn(axes, |at| if at.z > 0.0 { radiance(at) } else { Vec3::ZERO });
-    let ground = raw.irradiance(axes.up) / std::f32::consts::PI;
+    let raw = EnvironmentImage::from_fn(|at| if at.z > 0.0 { radiance(at) } else { Vec3::ZERO });
+    let ground = raw.integral(|at| at.z.max(0.0)) / std::f32::consts::PI;
     let factor = BRIGHTNESS / ground.dot(LUMINANCE).max(f32::MIN_POSITIVE);
     Environment::from_fn(axes, |at| {
         let rgb = (factor * radiance(at)).min(Vec3::splat(LIMIT));

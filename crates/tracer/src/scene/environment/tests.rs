@@ -1,3 +1,5 @@
+use std::f32::consts::PI;
+
 use super::*;
 
 /// Points in the unit square, evenly spread (Roberts, 2018).
@@ -48,44 +50,50 @@ fn all() -> Vec<(&'static str, Environment)> {
 fn the_density_integrates_to_one() {
     for (name, environment) in all() {
         // Exactly, texel by texel
-        let sum: f64 = environment
-            .texels
-            .chunks(COLUMNS)
-            .enumerate()
-            .map(|(row, texels)| {
-                let height = edge_cosine(row) - edge_cosine(row + 1);
-                let sum: f64 = texels.iter().map(|t| f64::from(t[3])).sum();
-                sum * height * 2.0 * std::f64::consts::PI / COLUMNS as f64
-            })
-            .sum();
+        let table = environment.table();
+        let count = (table.texels_per_steradian() * 4.0 * PI).round() as u32;
+        let sum: f64 = (0..count).map(|texel| f64::from(table.texel(texel).1)).sum();
+        let sum = sum * 4.0 * std::f64::consts::PI / f64::from(count);
         assert!((sum - 1.0).abs() < 1e-5, "{name}: {sum}");
     }
     // By directions, where the density is smooth enough for that
     let studio = studio(tilted(), Vec3::ONE);
     let count = 400_000;
-    let mean: f64 =
-        directions(count).map(|d| f64::from(studio.pdf(d))).sum::<f64>() / f64::from(count);
+    let pdf = |direction| f64::from(studio.table().radiance_and_pdf(direction).1);
+    let mean: f64 = directions(count).map(pdf).sum::<f64>() / f64::from(count);
     assert!((mean * 4.0 * std::f64::consts::PI - 1.0).abs() < 0.01, "{mean}");
 }
 
 #[test]
 fn samples_agree_with_their_direction() {
     for (name, environment) in all() {
-        let (mut same, count) = (0, 20_000);
+        let (table, mut same, count) = (environment.table(), 0, 20_000);
         for u in points(count) {
-            let sample = environment.sample(u);
+            let sample = table.sample(u);
             assert!((sample.direction.length() - 1.0).abs() < 1e-5, "{name}: {u:?}");
             assert!(sample.pdf > 0.0, "{name}: {u:?}");
-            // Rounding may move a direction to the next texel.
-            let (radiance, pdf) = environment.radiance_and_pdf(sample.direction);
-            let difference = (radiance - sample.radiance).abs().max_element();
-            let is_same = difference <= 2e-2 * (0.01 + radiance.max_element());
-            same += u32::from(is_same && (pdf / sample.pdf - 1.0).abs() < 1e-3);
-            assert_eq!(radiance, environment.radiance(sample.direction));
-            assert_eq!(pdf, environment.pdf(sample.direction));
+            // Rounding may move a direction to the next texel
+            let (radiance, pdf) = table.radiance_and_pdf(sample.direction);
+            same += u32::from(radiance == sample.radiance && pdf == sample.pdf);
         }
-        assert!(same > count * 97 / 100, "{name}: {same} of {count}");
+        assert!(same > count * 99 / 100, "{name}: {same} of {count}");
     }
+}
+
+#[test]
+fn the_table_has_the_radiance_of_the_image() {
+    let studio = studio(tilted(), Vec3::ONE);
+    let (mut differences, count) = (0.0, 20_000);
+    for direction in directions(count) {
+        let (radiance, pdf) = studio.table().radiance_and_pdf(direction);
+        differences += f64::from((radiance - studio.radiance(direction)).abs().max_element());
+        // The density is proportional to the luminance
+        let luminance = radiance.dot(LUMINANCE);
+        let flux = studio.table().flux().dot(LUMINANCE);
+        assert!((pdf * flux / luminance - 1.0).abs() < 5e-3, "{direction}: {pdf} {luminance}");
+    }
+    // The mean radiance is about 0.7; only the edges of lights differ
+    assert!(differences / f64::from(count) < 0.04, "{differences}");
 }
 
 /// The integral of radiance times the squared cosine with an axis, by directions on a fine grid.
@@ -117,14 +125,16 @@ fn the_mean_of_samples_is_the_integral() {
         let count = 200_000;
         let mean: f64 = points(count)
             .map(|u| {
-                let sample = environment.sample(u);
+                let sample = environment.table().sample(u);
                 let part = sample.radiance.y * sample.direction.dot(axis).powi(2);
                 f64::from(part / sample.pdf)
             })
             .sum::<f64>()
             / f64::from(count);
         let wanted = brute_force(&environment, axis);
-        assert!((mean - wanted).abs() <= 0.004 * wanted, "{name}: {mean} {wanted}");
+        // A single pixel has another shape in the image than in the table, where it is up to four texels
+        let tolerance = if ["constant", "black", "studio"].contains(&name) { 0.002 } else { 0.015 };
+        assert!((mean - wanted).abs() <= tolerance * wanted, "{name}: {mean} {wanted}");
     }
 }
 
@@ -146,11 +156,11 @@ fn one_bright_pixel_keeps_its_power_and_is_found() {
         };
         let total = flat(&environment);
         assert!((total - power - faint).abs() < 0.02 * (power + faint), "{width}: {total} {power}");
-        // Its share of the power is its share of the samples. The density covers 3x3
-        // texels around one that is bright, and bilinear radiance 2x2 of them
-        let found = points(4096).filter(|u| environment.sample(*u).radiance.y > 1.0).count();
-        let wanted = 4096.0 * power / (power + faint) * 4.0 / 9.0;
-        assert!(found as f64 > 0.9 * wanted, "{width}: {found} {wanted}");
+        // Its share of the power is its share of the samples
+        let found =
+            points(4096).filter(|u| environment.table().sample(*u).radiance.y > 1.0).count();
+        let wanted = 4096.0 * power / (power + faint);
+        assert!(found as f64 > 0.98 * wanted, "{width}: {found} {wanted}");
     }
 }
 
@@ -158,7 +168,8 @@ fn one_bright_pixel_keeps_its_power_and_is_found() {
 fn a_constant_environment_is_uniform() {
     let environment = Environment::constant(Vec3::new(0.5, 1.0, 2.0));
     for direction in directions(500) {
-        let (radiance, pdf) = environment.radiance_and_pdf(direction);
+        let (radiance, pdf) = environment.table().radiance_and_pdf(direction);
+        assert_eq!(environment.radiance(direction), radiance);
         assert!((radiance - Vec3::new(0.5, 1.0, 2.0)).abs().max_element() < 1e-6);
         assert!((pdf * 4.0 * PI - 1.0).abs() < 2e-3, "{direction}: {pdf}");
         let irradiance = environment.irradiance(direction);
@@ -203,7 +214,8 @@ fn a_studio_has_its_key_light_on_the_left_of_the_viewer() {
     assert!((down.y - 0.19).abs() < 0.03, "{down}");
     // Twice as bright, it is sampled in the same way.
     let twice = studio(axes, Vec3::splat(2.0));
-    assert_eq!(twice.sample([0.3, 0.7]).direction, environment.sample([0.3, 0.7]).direction);
+    let direction = |e: &Environment| e.table().sample([0.3, 0.7]).direction;
+    assert_eq!(direction(&twice), direction(&environment));
 }
 
 #[test]
@@ -218,7 +230,7 @@ fn extreme_values_stay_finite() {
     {
         let environment = Environment::from_map(tilted(), &map(value), Vec3::splat(scale));
         for u in points(64) {
-            let sample = environment.sample(u);
+            let sample = environment.table().sample(u);
             let estimate = sample.radiance / sample.pdf;
             assert!(estimate.is_finite() && sample.pdf > 0.0, "{value} {scale}: {sample:?}");
         }
@@ -227,7 +239,8 @@ fn extreme_values_stay_finite() {
     // Directions that are not numbers have some radiance, and no panic.
     let environment = studio(tilted(), Vec3::ONE);
     for direction in [Vec3::NAN, Vec3::INFINITY, Vec3::ZERO, Vec3::splat(-1e30)] {
-        let _ = environment.radiance_and_pdf(direction);
+        let _ = environment.radiance(direction);
+        let _ = environment.table().radiance_and_pdf(direction);
     }
     assert!(environment.byte_len() < 4 << 20);
 }

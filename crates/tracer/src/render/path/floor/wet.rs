@@ -293,7 +293,7 @@ impl PathIntegrator<'_> {
                 continue;
             }
             let part = gloss[lane] * schlick(map.film.r0, cosine);
-            let light = part * environment.radiance_and_pdf(blurred).0;
+            let light = part * environment.radiance(blurred);
             set_lane3(&mut samples.rays.direction, lane, blurred);
             set_lane3(&mut samples.radiance, lane, lane3(&packet.weight, lane) * light);
             samples.rays.t_max[lane] = f32::INFINITY;

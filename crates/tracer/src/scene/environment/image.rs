@@ -1,0 +1,130 @@
+//! The picture of an environment in latitude and longitude: what mirrors and the camera see. It is bilinear between
+//! the centres of its pixels.
+
+use std::f32::consts::FRAC_1_PI;
+
+use glam::{DVec3, Vec3};
+
+use super::{COLUMNS, MAX_RADIANCE, ROWS};
+use spherule_tree::math::functions::{acos, atan2};
+
+/// Radiance (linear RGB) of [`COLUMNS`] x [`ROWS`] directions, row by row from the zenith, in the axes of an
+/// environment (x right, y back, z up).
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct EnvironmentImage {
+    pixels: Vec<[f32; 3]>,
+}
+
+impl EnvironmentImage {
+    /// An image with these pixels. Their radiance is bounded; NaN counts as 0.
+    pub(super) fn new(radiance: impl Iterator<Item = Vec3>) -> Self {
+        let bounded = |v: f32| if v > 0.0 { v.min(MAX_RADIANCE) } else { 0.0 };
+        let pixels: Vec<_> = radiance.map(|rgb| rgb.to_array().map(bounded)).collect();
+        assert_eq!(pixels.len(), COLUMNS * ROWS, "one value per pixel");
+        Self { pixels }
+    }
+
+    /// The image of a function of the direction: the mean over four points of a pixel.
+    pub(super) fn from_fn(of: impl Fn(Vec3) -> Vec3) -> Self {
+        let pixel = |row: usize, column: usize| {
+            let points = [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75)];
+            let sum: Vec3 =
+                points.map(|(across, down)| of(direction(column, row, across, down))).iter().sum();
+            0.25 * sum
+        };
+        let places = (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column)));
+        Self::new(places.map(|(row, column)| pixel(row, column)))
+    }
+
+    /// The pixels of each row, from the zenith.
+    pub(super) fn rows(&self) -> impl Iterator<Item = &[[f32; 3]]> {
+        self.pixels.chunks(COLUMNS)
+    }
+
+    /// Whether no light comes from anywhere.
+    pub(super) fn is_black(&self) -> bool {
+        self.pixels.iter().all(|rgb| *rgb == [0.0; 3])
+    }
+
+    /// Memory, bytes.
+    pub(super) fn byte_len(&self) -> u64 {
+        size_of_val(&*self.pixels) as u64
+    }
+
+    /// The radiance from a unit vector, linear RGB.
+    #[inline(always)]
+    pub(super) fn radiance(&self, own: Vec3) -> Vec3 {
+        let z = if own.z > -1.0 { own.z } else { -1.0 };
+        let z = if z < 1.0 { z } else { 1.0 };
+        let turns = atan2(own.y, own.x) * (0.5 * FRAC_1_PI);
+        let turns = if turns < 0.0 { turns + 1.0 } else { turns };
+        self.bilinear(turns * COLUMNS as f32, acos(z) * (FRAC_1_PI * ROWS as f32))
+    }
+
+    /// Radiance at a position in columns and rows, bilinear between the centres of pixels.
+    #[inline(always)]
+    fn bilinear(&self, x: f32, y: f32) -> Vec3 {
+        // Shift by one pixel to keep positions positive
+        let (x, y) = (x + 0.5, y + 0.5);
+        let (column, row) = (index(x, COLUMNS + 1), index(y, ROWS + 1));
+        let (across, down) = (x - column as f32, y - row as f32);
+        let (left, right) = ((column + COLUMNS - 1) % COLUMNS, column % COLUMNS);
+        let (above, below) = (row.saturating_sub(1), if row < ROWS { row } else { ROWS - 1 });
+        let pixel =
+            |row: usize, column: usize| Vec3::from_array(self.pixels[row * COLUMNS + column]);
+        let above = pixel(above, left) * (1.0 - across) + pixel(above, right) * across;
+        let below = pixel(below, left) * (1.0 - across) + pixel(below, right) * across;
+        above * (1.0 - down) + below * down
+    }
+
+    /// The integral over all directions of the radiance times a `weight` of the direction of each pixel's centre.
+    pub(super) fn integral(&self, weight: impl Fn(Vec3) -> f32) -> Vec3 {
+        let longitudes: Vec<[f64; 2]> = (0..COLUMNS).map(|x| longitude(x, 0.5)).collect();
+        let mut sum = DVec3::ZERO;
+        for (row, pixels) in self.rows().enumerate() {
+            let height = edge_cosine(row, ROWS) - edge_cosine(row + 1, ROWS);
+            let polar = polar(row, 0.5);
+            let terms = pixels.iter().zip(&longitudes).map(|(rgb, longitude)| {
+                let weighted = weight(direction_at(polar, *longitude)) * Vec3::from_array(*rgb);
+                weighted.as_dvec3()
+            });
+            sum += height * terms.sum::<DVec3>();
+        }
+        (sum * (2.0 * std::f64::consts::PI / COLUMNS as f64)).as_vec3()
+    }
+}
+
+/// The cell of `0..count` that contains `position`; the nearest one for positions outside, the first for NaN.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+fn index(position: f32, count: usize) -> usize {
+    let cell = position as usize;
+    if cell < count { cell } else { count - 1 }
+}
+
+/// The direction of a point of a pixel.
+fn direction(column: usize, row: usize, across: f64, down: f64) -> Vec3 {
+    direction_at(polar(row, down), longitude(column, across))
+}
+
+/// Sine and cosine of the polar angle at a height in `row`.
+fn polar(row: usize, down: f64) -> [f64; 2] {
+    let polar = (row as f64 + down) * std::f64::consts::PI / ROWS as f64;
+    [libm::sin(polar), libm::cos(polar)]
+}
+
+/// Sine and cosine of the longitude at a position in `column`.
+fn longitude(column: usize, across: f64) -> [f64; 2] {
+    let longitude = (column as f64 + across) * 2.0 * std::f64::consts::PI / COLUMNS as f64;
+    [libm::sin(longitude), libm::cos(longitude)]
+}
+
+/// The direction of a polar angle and a longitude, given by their sines and cosines.
+fn direction_at([level, z]: [f64; 2], [sin, cos]: [f64; 2]) -> Vec3 {
+    DVec3::new(level * cos, level * sin, z).as_vec3()
+}
+
+/// Cosine of the polar angle at the upper edge of a row, of `rows` rows.
+pub(super) fn edge_cosine(row: usize, rows: usize) -> f64 {
+    libm::cos(row as f64 * std::f64::consts::PI / rows as f64)
+}

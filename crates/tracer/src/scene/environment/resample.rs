@@ -1,0 +1,124 @@
+//! From latitude and longitude to the equal-area octahedral map: the mean radiance of each texel.
+//!
+//! Each pixel is divided into parts that are much smaller than texels. A part becomes a square of its area in the map,
+//! and is shared out among the up to four texels below it. The map takes a row of parts, which have the same distance
+//! to the pole, to a square around the centre or the corners, along which the longitude is linear.
+
+use glam::DVec3;
+
+use super::image::{EnvironmentImage, edge_cosine};
+use super::{COLUMNS, ROWS, narrow};
+
+/// Radiance times area, and area, in texels.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sum {
+    radiance: DVec3,
+    area: f64,
+}
+
+/// The mean radiance of each texel of a map with edges of `side` texels, row by row.
+pub(super) fn octahedral(image: &EnvironmentImage, side: usize) -> Vec<[f32; 3]> {
+    // Parts along the edge of a pixel: about 100 for each texel
+    let parts = (side / 32).max(1);
+    let mut sums = vec![Sum::default(); side * side];
+    for (row, pixels) in image.rows().enumerate() {
+        for part in 0..parts {
+            add_row(&mut sums, side, [row * parts + part, parts], pixels);
+        }
+    }
+    let mean = |sum: &Sum| (sum.radiance / sum.area).to_array().map(narrow);
+    sums.iter().map(mean).collect()
+}
+
+/// Adds a row of parts of `pixels`.
+fn add_row(sums: &mut [Sum], side: usize, [row, parts]: [usize; 2], pixels: &[[f32; 3]]) {
+    let (rows, columns) = (ROWS * parts, COLUMNS * parts);
+    let [top, bottom] = [row, row + 1].map(|row| edge_cosine(row, rows));
+    let z = 0.5 * (top + bottom);
+    let r = (1.0 - z.abs()).sqrt();
+    let scale = 0.5 * side as f64;
+    // The sphere has the area of the whole map
+    let area = 0.5 * (top - bottom) / columns as f64 * (side * side) as f64;
+    let edge = area.sqrt();
+    for (column, rgb) in pixels.iter().enumerate() {
+        let radiance = DVec3::from_array(rgb.map(f64::from));
+        for part in 0..parts {
+            // The quadrant, and the position in it from the x axis to the y axis
+            let turn = ((column * parts + part) as f64 + 0.5) * 4.0 / columns as f64;
+            let quadrant = turn.floor();
+            let along = turn - quadrant;
+            let (x_sign, y_sign, along) = match quadrant {
+                0.0 => (1.0, 1.0, along),
+                1.0 => (-1.0, 1.0, 1.0 - along),
+                2.0 => (-1.0, -1.0, along),
+                _ => (1.0, -1.0, 1.0 - along),
+            };
+            let (x, y) = ((1.0 - along) * r, along * r);
+            let (x, y) = if z < 0.0 { (1.0 - y, 1.0 - x) } else { (x, y) };
+            let center = [x_sign * x, y_sign * y].map(|v| (v + 1.0) * scale);
+            add_square(sums, side, center, edge, radiance);
+        }
+    }
+}
+
+/// Adds a square with this center and edge, in texels, to the texels below it. Beyond the border of the map, it counts
+/// for those at the border.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+fn add_square(sums: &mut [Sum], side: usize, center: [f64; 2], edge: f64, radiance: DVec3) {
+    // The texels at both ends along an axis, with their parts of the edge
+    let ends = |center: f64| {
+        let (low, high) = (center - 0.5 * edge, center + 0.5 * edge);
+        let [first, last] = [low, high].map(|v| (v as usize).min(side - 1));
+        let before = if first == last { edge } else { last as f64 - low };
+        [(first, before), (last, edge - before)]
+    };
+    let [columns, rows] = center.map(ends);
+    for (row, height) in rows {
+        for (column, width) in columns {
+            let area = width * height;
+            let sum = &mut sums[row * side + column];
+            sum.radiance += area * radiance;
+            sum.area += area;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+    use crate::scene::environment::octahedral::square_to_sphere;
+
+    #[test]
+    fn texels_have_the_radiance_of_their_direction() {
+        let of = |d: Vec3| Vec3::new(1.0, 2.0 + d.x + 0.5 * d.y, (1.0 + d.z).powi(2));
+        let image = EnvironmentImage::from_fn(of);
+        for side in [16, 128, 256] {
+            let tolerance = 3.0 / side as f32;
+            for (i, rgb) in octahedral(&image, side).iter().enumerate() {
+                let at = |i: usize| (i as f32 + 0.5) / side as f32 * 2.0 - 1.0;
+                let direction = Vec3::from_array(square_to_sphere(at(i % side), at(i / side)));
+                let difference = (Vec3::from_array(*rgb) - of(direction)).abs().max_element();
+                assert!(difference < tolerance, "{side} {i}: {rgb:?} {}", of(direction));
+                assert!((rgb[0] - 1.0).abs() < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn single_pixels_keep_their_power() {
+        for side in [128_usize, 256] {
+            for (row, column) in [(0, 5), (40, 511), (127, 0), (128, 64), (200, 129), (255, 300)] {
+                let pixel = row * COLUMNS + column;
+                let white = |i: usize| if i == pixel { Vec3::ONE } else { Vec3::ZERO };
+                let image = EnvironmentImage::new((0..COLUMNS * ROWS).map(white));
+                let texels = octahedral(&image, side);
+                let found: f64 = texels.iter().map(|rgb| f64::from(rgb[0])).sum();
+                let found = found * 4.0 * std::f64::consts::PI / (side * side) as f64;
+                let wanted = f64::from(image.integral(|_| 1.0).x);
+                assert!((found / wanted - 1.0).abs() < 0.01, "{side} {row}: {found} {wanted}");
+            }
+        }
+    }
+}
