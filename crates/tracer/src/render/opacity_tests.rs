@@ -13,7 +13,10 @@ use super::{
     *,
 };
 use crate::scene::{Background, Camera, CameraView, Environment, Light};
+use crate::surface::{Intersection, Side, spheres::SphereSurface};
+use spherule_tree::accel::{BuildSettings, SphereRadius, Spheres, Structure, TreeBuilder};
 use spherule_tree::math::{SimdLevel, Supported};
+use spherule_tree::ray::Ray;
 
 const SIDE: u32 = 16;
 
@@ -160,5 +163,63 @@ fn opacities_are_the_same_on_any_number_of_threads_and_for_all_instruction_sets(
     let portable = by(SimdLevel::Portable);
     for level in [SimdLevel::Avx2, SimdLevel::Avx512, SimdLevel::Neon] {
         assert!(by(level) == portable, "{level:?}");
+    }
+}
+
+/// Spheres that are found one after the other along a ray.
+struct StepByStep<'a>(SphereSurface<'a>);
+
+impl Shape for StepByStep<'_> {
+    fn crossing(&self, ray: &Ray, side: Side) -> Option<Intersection> {
+        self.0.crossing(ray, side)
+    }
+}
+
+/// A cloud of overlapping balls around the origin.
+fn cloud(count: u32) -> Vec<Vec3> {
+    let part = |i: u32, step: u32| (i.wrapping_mul(step) >> 8) as f32 / 16_777_216.0 - 0.5;
+    let center =
+        |i: u32| Vec3::new(part(i, 3_430_631_191), part(i, 2_739_110_765), part(i, 2_186_918_459));
+    (0..count).map(center).collect()
+}
+
+#[test]
+fn entries_in_any_order_give_the_picture_of_steps_along_the_ray() {
+    let centers = cloud(400);
+    let values: Vec<f32> = (0..400_u16).map(|i| f32::from(i % 10) / 9.0).collect();
+    let mapped = ParticleShading {
+        opacities: Opacities::Mapped { values: &values, range: [0.0, 1.0] },
+        ..ParticleShading::constant(Vec3::ONE)
+    };
+    let settings = RenderSettings { transparent_background: true, ..settings(SIDE, 4, 3) };
+    let view = CameraView {
+        eye: DVec3::new(0.0, 0.0, 3.0),
+        look_at: DVec3::ZERO,
+        up: DVec3::Y,
+        fov: 12.0,
+    };
+    let mut scene = scene();
+    scene.camera = Camera::new(&view, 1.0, DVec3::ZERO).unwrap();
+    scene.lights = vec![Light::directional(Vec3::new(-0.4, 0.3, -1.0), Vec3::splat(PI)).unwrap()];
+    let (mut builder, never) = (TreeBuilder::new(), AtomicBool::new(false));
+    for structure in [Structure::Kdtree, Structure::Sbvh] {
+        let spheres = Spheres { centers: &centers, radius: SphereRadius::Common(0.05) };
+        builder.build(
+            &spheres,
+            &BuildSettings { structure, keep_indices: true, ..BuildSettings::default() },
+        );
+        let surface = SphereSurface::new(builder.tree().view());
+        for source in [&translucent(0.02), &translucent(0.5), &mapped] {
+            let of = |shape: &dyn Shape| render(&[shape], &scene, source, &settings, &never);
+            let (packets, steps) = (of(&surface).unwrap().0, of(&StepByStep(surface)).unwrap().0);
+            assert!(mean(&packets, 3) > 0.03);
+            // Steps leave out spheres that a ray enters just behind the end of another one
+            let pixels = packets.color.iter().zip(&steps.color);
+            let differs = |(a, b): &(&[f32; 4], &[f32; 4])| {
+                a.iter().zip(*b).any(|(a, b)| (a - b).abs() > 1e-4)
+            };
+            let different = pixels.filter(differs).count();
+            assert!(different < 6, "{structure:?}: {different} of {} pixels", SIDE * SIDE);
+        }
     }
 }

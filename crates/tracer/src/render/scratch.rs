@@ -15,6 +15,7 @@ use super::{
     sampler::PathSeed,
     stream::{RayStreams, SegmentPacket},
     tile::SIDE,
+    translucent::Entries,
 };
 
 use crate::surface::Intersections;
@@ -87,6 +88,8 @@ pub(super) struct PacketScratch {
     pub(super) light: LightSamples,
     /// Intersections of shadow rays with transmissive surfaces.
     pub(super) crossings: Intersections,
+    /// Spheres that are not fully opaque along each ray.
+    pub(super) entries: [Entries; LANES],
     pub(super) weight: Lanes3,
     /// Coverage of samples by what leaves no intersection: visible lights, and shadows on a transparent background.
     pub(super) coverage: Lanes,

@@ -31,6 +31,6 @@ pub use owners::SphereOwners;
 pub use pca::PcaNormals;
 pub use plane::Plane;
 pub use settings::{NormalKind, SprayStyle, SurfaceBytes, SurfaceKind, SurfaceSettings};
-pub use shape::{CutShape, Shape, Side};
+pub use shape::{CutShape, Shape, Side, SphereEntries, SphereEntry};
 pub use size::SurfaceSize;
 pub(crate) use transmittance::TransmittanceProduct;

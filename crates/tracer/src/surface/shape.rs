@@ -119,6 +119,11 @@ pub trait Shape: Sync {
         }
     }
 
+    /// The shape as spheres whose entries are found in one traversal, if it can do that.
+    fn sphere_entries(&self) -> Option<&dyn SphereEntries> {
+        None
+    }
+
     /// The particle of an intersection, for shapes that need an additional search to find it.
     fn particle_at(&self, hit: &Intersection) -> u32 {
         hit.particle
@@ -129,6 +134,33 @@ pub trait Shape: Sync {
     fn blend(&self, hit: &Intersection, each: &mut dyn FnMut(u32, f32)) {
         each(hit.particle, 1.0);
     }
+}
+
+/// The point where a ray enters a sphere.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SphereEntry {
+    /// Distance along the ray.
+    pub t: f32,
+    /// Index of the particle in the frame.
+    pub particle: u32,
+    /// Slot in tree order.
+    pub(crate) slot: u32,
+}
+
+/// Separate spheres that find all of those that rays enter in one traversal.
+pub trait SphereEntries {
+    /// Calls `visit` with a lane and an entry for each sphere that a ray in `lanes` enters between its ends, in any
+    /// order but nearer boxes first. `visit` returns the distance behind which further spheres do not matter to the
+    /// ray, or None if that stays the same: at most the current one, or a negative one to end the ray.
+    fn visit_entries(
+        &self,
+        rays: &RayPacket,
+        lanes: u32,
+        visit: &mut dyn FnMut(usize, SphereEntry) -> Option<f32>,
+    );
+
+    /// The intersection of a ray with the surface at an entry.
+    fn intersection(&self, ray: &Ray, entry: &SphereEntry) -> Intersection;
 }
 
 /// Spheres that can be cut.

@@ -7,7 +7,8 @@ use glam::Vec3;
 use super::owners::{SphereOwners, cross_chord};
 use super::shape::CutShape;
 use super::{
-    Intersection, Intersections, MaterialId, ShadingNormals, Shape, Side, TransmittanceProduct,
+    Intersection, Intersections, MaterialId, ShadingNormals, Shape, Side, SphereEntries,
+    SphereEntry, TransmittanceProduct,
 };
 use spherule_tree::accel::traverse::{TreeCrossing, TreeHit};
 use spherule_tree::accel::view::TreeView;
@@ -147,6 +148,11 @@ impl Shape for SphereSurface<'_> {
         self.tree.occluded_lanes(&rest, coherence)
     }
 
+    fn sphere_entries(&self) -> Option<&dyn SphereEntries> {
+        // Copies of spheres would be entered several times
+        (!self.tree.has_copies()).then_some(self)
+    }
+
     fn transmittance(
         &self,
         rays: &RayPacket,
@@ -176,6 +182,26 @@ impl Shape for SphereSurface<'_> {
         for lane in lanes_in(lanes) {
             transmittance[lane] = product[lane].value();
         }
+    }
+}
+
+impl SphereEntries for SphereSurface<'_> {
+    fn visit_entries(
+        &self,
+        rays: &RayPacket,
+        lanes: u32,
+        visit: &mut dyn FnMut(usize, SphereEntry) -> Option<f32>,
+    ) {
+        self.tree.visit_entries(rays, lanes, |lane, TreeHit { t, slot }| {
+            let particle = self.owners.particle_of(self.tree.particle(slot));
+            visit(lane, SphereEntry { t, particle, slot })
+        });
+    }
+
+    fn intersection(&self, ray: &Ray, entry: &SphereEntry) -> Intersection {
+        let hit = TreeHit { t: entry.t, slot: entry.slot };
+        let intersection = sphere_hit(&self.tree, ray, hit, &self.normals);
+        Intersection { particle: entry.particle, ..intersection }
     }
 }
 

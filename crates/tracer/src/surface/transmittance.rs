@@ -31,6 +31,12 @@ impl TransmittanceProduct {
         self.loss <= MAX_LOSS
     }
 
+    /// The negated base-2 logarithm of the product.
+    #[expect(clippy::cast_possible_truncation, reason = "few digits are enough")]
+    pub(crate) fn digits(self) -> f32 {
+        (self.loss as f64 / UNIT) as f32
+    }
+
     /// The product.
     #[expect(clippy::cast_possible_truncation, reason = "light is f32")]
     pub(crate) fn value(self) -> f32 {

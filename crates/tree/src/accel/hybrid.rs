@@ -9,7 +9,7 @@ use super::hits::TreeHits;
 use super::leaves::Leaves;
 use super::simd::{EnteredChildren, LaneSlabs, PacketKernel, lanes_entering};
 use super::topology::{NodeRef, Topology};
-use super::traverse::{AnyOfRay, ChordsOfRay, NearestOfRay, TreeChord, TreeHit};
+use super::traverse::{AnyOfRay, ChordsOfRay, EntriesOfRay, NearestOfRay, TreeChord, TreeHit};
 use super::view::{Resolved, TreeTask, TreeView};
 use super::walk::{Below, STACK_SIZE, WalkStack, Walker, sort_descending, walk_from};
 use crate::math::{first_lanes, lanes_in};
@@ -60,6 +60,25 @@ impl TreeView<'_> {
             rays,
             lanes,
             query: Chords { visit },
+            hits: &mut TreeHits::default(),
+        });
+    }
+}
+
+impl TreeView<'_> {
+    /// Calls `visit` for the spheres that rays in `lanes` enter between their ends, nearer boxes first. It returns the
+    /// distance behind which further spheres do not matter to the ray: at most the current one, or a negative one to
+    /// end the ray. Spheres of trees with copies may be visited several times.
+    pub(crate) fn visit_entries(
+        &self,
+        rays: &RayPacket,
+        lanes: u32,
+        visit: impl FnMut(usize, TreeHit) -> Option<f32>,
+    ) {
+        self.run(LaneQuery {
+            rays,
+            lanes,
+            query: Entries { t_min: &rays.t_min, visit },
             hits: &mut TreeHits::default(),
         });
     }
@@ -194,6 +213,30 @@ impl<F: FnMut(usize, TreeChord) -> bool> Query for Chords<F> {
         if is_finished {
             hits.t[lane] = -1.0;
         }
+    }
+}
+
+/// Visits the spheres that the rays enter.
+struct Entries<'r, F> {
+    t_min: &'r [f32; PACKET_SIZE],
+    /// Called with a lane and an entry; returns the new limit of the ray, if it changes.
+    visit: F,
+}
+
+impl<F: FnMut(usize, TreeHit) -> Option<f32>> Query for Entries<'_, F> {
+    #[inline(always)]
+    fn search<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
+        &mut self,
+        subtree: Subtree<'_, 'a, K, T, L>,
+        ray: &K::Ray,
+        hits: &mut TreeHits,
+        lane: usize,
+    ) {
+        let (tree, limit) = (subtree.tree, hits.t[lane]);
+        let visit = |hit| (self.visit)(lane, hit);
+        let mut search = EntriesOfRay { tree, ray, t_min: self.t_min[lane], limit, visit };
+        subtree.walk(&mut search, limit);
+        hits.t[lane] = search.limit;
     }
 }
 

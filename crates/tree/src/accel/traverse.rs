@@ -9,6 +9,7 @@ use super::topology::Topology;
 use super::view::{Resolved, TreeTask, TreeView};
 use super::walk::{Walker, walk_with};
 use crate::blocks::{BLOCK_SIZE, Node};
+use crate::math::lanes_in;
 use crate::ray::Ray;
 
 /// Intersection of a ray with a sphere of the tree.
@@ -320,5 +321,46 @@ where
             }
         }
         limit
+    }
+}
+
+/// A ray that searches for the spheres that it enters up to a limit, which may fall with each one.
+pub(super) struct EntriesOfRay<'r, 'a, R, T, L, F> {
+    pub(super) tree: Resolved<'a, T, L>,
+    pub(super) ray: &'r R,
+    pub(super) t_min: f32,
+    pub(super) limit: f32,
+    /// Called with every entry; returns a new limit, or None to keep it. A negative limit ends the traversal.
+    pub(super) visit: F,
+}
+
+impl<'a, K, T, L, F> Walker<K> for EntriesOfRay<'_, 'a, K::Ray, T, L, F>
+where
+    K: PacketKernel,
+    T: Topology<'a>,
+    L: Leaves,
+    F: FnMut(TreeHit) -> Option<f32>,
+{
+    #[inline(always)]
+    fn test(&self, kernel: K, node: &Node, limit: f32) -> (usize, K::Keys) {
+        kernel.test_node(self.ray, node, limit)
+    }
+
+    #[inline(always)]
+    fn visit(&mut self, kernel: K, block: usize, _limit: f32) -> f32 {
+        let view = self.tree.view;
+        let centers = self.tree.leaves.load(kernel, block);
+        let radii = LoadedRadii::of(&view.radii, block);
+        let found = kernel.all_in_block(self.ray, centers.borrow(), radii.as_ref());
+        for lane in lanes_in(found.lanes) {
+            let (t, slot) = (found.near[lane], block * BLOCK_SIZE + lane);
+            // Spheres in which the ray starts, and padding after the last one, do not count
+            let is_entry = t >= self.t_min && t <= self.limit && slot < view.slot_count();
+            #[expect(clippy::cast_possible_truncation, reason = "slots are counted in 32 bits")]
+            if is_entry && let Some(limit) = (self.visit)(TreeHit { t, slot: slot as u32 }) {
+                self.limit = limit;
+            }
+        }
+        self.limit
     }
 }
