@@ -146,9 +146,19 @@ impl Facts {
     /// The facts of the middle frame of `sequence`: the first one is often a lattice at rest. Nothing is known of a
     /// frame that cannot be read, which is reported later.
     pub fn of(sequence: &Sequence) -> Self {
-        let index = sequence.frames().len() / 2;
-        let sample = FrameSample::of(sequence, index, (QUESTION, 1));
-        sample.map_or_else(|_| Self::default(), |sample| Self::of_sample(&sample))
+        let count = sequence.frames().len();
+        let read = |index: usize| FrameSample::of(sequence, index, (QUESTION, 1)).ok();
+        let mut facts =
+            read(count / 2).map_or_else(Self::default, |sample| Self::of_sample(&sample));
+        // Of a single frame, a fluid or grains may be told from a model that was cut
+        if count == 1 {
+            facts.is_y_up &= facts.has_velocities;
+        } else if !facts.is_y_up && facts.elements.is_none() && !sequence.is_y_up() {
+            // Later, more of it lies on the floor
+            let last = read(count - 1);
+            facts.is_y_up = last.is_some_and(|sample| Self::of_sample(&sample).is_y_up);
+        }
+        facts
     }
 
     /// The facts of particles in memory; `name` stands for their file.
@@ -180,7 +190,7 @@ impl Facts {
             is_y_up: is_y_up(&sample_of(&raw.positions), sample.count, &velocities(velocity)),
             has_colors: RgbAttribute::of(&raw.attributes, None).is_some(),
             has_radii: find_radius(&raw.attributes).is_some(),
-            random_radius: sample.spacing.and_then(random_radius),
+            random_radius: sample.spacing.and_then(|spacing| random_radius(spacing, sample.count)),
             has_time: raw.time.is_some(),
             has_bonds: !raw.bonds.is_empty(),
             elements: integers(ELEMENT).and_then(elements),
@@ -240,15 +250,25 @@ fn part_in(cell: &SimulationCell, positions: &Positions) -> f64 {
 const LAYER: f64 = 1e-3;
 
 /// How much larger the radius that follows from the density is than half the distance of nearest neighbours, from which
-/// on particles are at random distances: it is 1.05 times as large in a lattice, 1.2 times in a fluid.
+/// on particles may be at random distances: it is 1.05 times as large in a lattice, 1.2 times in a fluid, and 1.5 times in
+/// a sheet.
 const RANDOM: f32 = 1.5;
+
+/// The closest of a hundred neighbours of particles at random distances, relative to the median: 0.25 in a random cloud,
+/// 0.5 in a gas of atoms, 1 in an even line or sheet.
+const CLOSE: f32 = 0.4;
+
+/// Fewest particles whose distances say something.
+const MIN_RANDOM: usize = 100;
 
 /// The radius of such particles in that of the density: they overlap a little.
 const OVERLAPPING: f32 = 0.85;
 
-fn random_radius(spacing: Spacing) -> Option<f64> {
+/// See [`Facts::random_radius`].
+fn random_radius(spacing: Spacing, count: usize) -> Option<f64> {
     let packed = spacing.packed.filter(|packed| *packed > RANDOM * spacing.touching)?;
-    Some((OVERLAPPING * packed).into())
+    let is_random = spacing.closest < CLOSE * spacing.touching && count >= MIN_RANDOM;
+    is_random.then(|| (OVERLAPPING * packed).into())
 }
 
 /// The part of each edge of `cell` along which there are particles, without a few outliers.

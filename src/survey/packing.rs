@@ -32,6 +32,8 @@ pub(super) struct SpacingRequest {
 pub(super) struct Spacing {
     /// Half the median distance to the nearest neighbour.
     pub(super) touching: f32,
+    /// Half the distance that one of a hundred particles has to its nearest neighbour at most.
+    pub(super) closest: f32,
     /// Half the edge of the cube that each particle occupies inside a body, if it was requested.
     pub(super) packed: Option<f32>,
 }

@@ -163,9 +163,9 @@ fn queries(positions: &[Vec3], count: usize) -> impl Iterator<Item = &Vec3> {
 /// The spacing of neighbours among `positions`.
 pub(super) fn spacing_of(positions: &[Vec3], request: SpacingRequest) -> Option<Spacing> {
     let query_count = neighbour_queries(positions.len(), request.frames);
-    let touching = estimate_radius(positions, query_count)?;
+    let (touching, closest) = half_median_and_least(nearest_distances(positions, query_count))?;
     let packed = || estimate_packed(positions, touching, query_count);
-    Some(Spacing { touching, packed: request.needs_packed.then(packed).flatten() })
+    Some(Spacing { touching, closest, packed: request.needs_packed.then(packed).flatten() })
 }
 
 /// The radius from the density, by this number of queries; `touching` is half the distance to the nearest neighbour.
@@ -183,25 +183,24 @@ fn estimate_packed(positions: &[Vec3], touching: f32, query_count: usize) -> Opt
     packing::packed_radius(touching, counts.collect())
 }
 
-/// Half the median distance to the nearest neighbour, by this number of queries. None for fewer than two distinct
-/// particles.
-fn estimate_radius(positions: &[Vec3], query_count: usize) -> Option<f32> {
-    let distances: Vec<f32> = queries(positions, query_count)
-        .filter_map(|from| {
-            let nearest = positions
-                .par_chunks(64 * 1024)
-                .map(|chunk| {
-                    chunk
-                        .iter()
-                        .map(|to| from.distance_squared(*to))
-                        .filter(|d| *d > 0.0)
-                        .fold(f32::INFINITY, f32::min)
-                })
-                .reduce(|| f32::INFINITY, f32::min);
-            nearest.is_finite().then(|| nearest.sqrt())
-        })
-        .collect();
-    median(distances).map(|d| 0.5 * d)
+/// The distances of this number of particles to their nearest neighbours; none for fewer than two distinct particles.
+fn nearest_distances(positions: &[Vec3], query_count: usize) -> Vec<f32> {
+    let nearest = |from: &Vec3| {
+        let chunks = positions.par_chunks(64 * 1024).map(|chunk| {
+            let distances = chunk.iter().map(|to| from.distance_squared(*to));
+            distances.filter(|d| *d > 0.0).fold(f32::INFINITY, f32::min)
+        });
+        chunks.reduce(|| f32::INFINITY, f32::min)
+    };
+    let squares = queries(positions, query_count).map(nearest).filter(|d| d.is_finite());
+    squares.map(f32::sqrt).collect()
+}
+
+/// Half the median of `distances`, and half of what one of a hundred has at most.
+pub(super) fn half_median_and_least(mut distances: Vec<f32>) -> Option<(f32, f32)> {
+    distances.sort_unstable_by(f32::total_cmp);
+    let at = |place: usize| distances.get(place).map(|d| 0.5 * d);
+    Some((at(distances.len() / 2)?, at(distances.len() / 100)?))
 }
 
 /// The median of `values`.

@@ -14,7 +14,7 @@ use spherule_formats::{
 };
 
 use super::packing::{self, Spacing, SpacingRequest};
-use super::robust::{self, NEIGHBOUR_QUERIES, median, robust_bounds};
+use super::robust::{self, NEIGHBOUR_QUERIES, half_median_and_least, robust_bounds};
 use super::stream;
 use super::{FrameWeight, Question, id_of, velocity_of};
 use crate::selection::Selection;
@@ -278,8 +278,8 @@ fn stored_spacing(
     frame: &NativeFrame<'_>,
     request: SpacingRequest,
 ) -> Result<Option<Spacing>, ParseError> {
-    let nearest = median(frame.neighbour_distances(NEIGHBOUR_QUERIES)?);
-    let Some(touching) = nearest.map(|d| 0.5 * d) else {
+    let distances = frame.neighbour_distances(NEIGHBOUR_QUERIES)?;
+    let Some((touching, closest)) = half_median_and_least(distances) else {
         return Ok(None);
     };
     let packed = match request.needs_packed {
@@ -289,7 +289,7 @@ fn stored_spacing(
         }
         false => None,
     };
-    Ok(Some(Spacing { touching, packed }))
+    Ok(Some(Spacing { touching, closest, packed }))
 }
 
 /// Size of a native frame as if it were read, because some settings require that.

@@ -10,7 +10,7 @@ use spherule_formats::{
 };
 
 use super::packing::{self, Spacing, SpacingRequest};
-use super::robust::{median, neighbour_queries};
+use super::robust::{half_median_and_least, neighbour_queries};
 
 /// Particles per read.
 const RUN: usize = 1 << 16;
@@ -122,14 +122,14 @@ pub(super) fn spacing(
     request: SpacingRequest,
 ) -> Result<Option<Spacing>, FrameError> {
     let queries = query_points(source, sample, request.frames);
-    let Some(touching) = half_nearest(source, &queries)? else {
+    let Some((touching, closest)) = half_nearest(source, &queries)? else {
         return Ok(None);
     };
     let packed = match request.needs_packed {
         true => packing::packed_radius(touching, around(source, &queries, touching)?),
         false => None,
     };
-    Ok(Some(Spacing { touching, packed }))
+    Ok(Some(Spacing { touching, closest, packed }))
 }
 
 /// Number of particles around each of `queries`.
@@ -153,8 +153,12 @@ fn around(
     each_run(source, of_run, || vec![0; queries.len()], join)
 }
 
-/// Half the median distance from `queries` to the nearest neighbour among all particles.
-fn half_nearest(source: &dyn ParticleSource, queries: &[DVec3]) -> Result<Option<f32>, FrameError> {
+/// Half the median distance from `queries` to the nearest neighbour among all particles, and half of what one of a hundred
+/// has at most.
+fn half_nearest(
+    source: &dyn ParticleSource,
+    queries: &[DVec3],
+) -> Result<Option<(f32, f32)>, FrameError> {
     let of_run = |positions: &[DVec3]| {
         let nearest = |from: &DVec3| {
             let squares = positions.iter().map(|to| from.distance_squared(*to));
@@ -171,7 +175,7 @@ fn half_nearest(source: &dyn ParticleSource, queries: &[DVec3]) -> Result<Option
     let finite = nearest.into_iter().filter(|d| d.is_finite());
     #[expect(clippy::cast_possible_truncation, reason = "radii are f32")]
     let distances = finite.map(|square| square.sqrt() as f32).collect();
-    Ok(median(distances).map(|distance| 0.5 * distance))
+    Ok(half_median_and_least(distances))
 }
 
 /// Reads all positions in runs, and combines the results of `of_run`.

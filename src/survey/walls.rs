@@ -43,6 +43,12 @@ const CELLS: usize = 8;
 /// Largest part of the cells inside the box of walls that have particles.
 const MAX_FILLED: f64 = 0.35;
 
+/// How many times the part of the cells at the sides that have particles is that of the cells inside, at least.
+const CONTRAST: f64 = 2.0;
+
+/// Fewest particles that surround others: of a few at random, one may be outside on each side.
+const MIN_AROUND: usize = 200;
+
 /// The walls among the values of the attribute `name`, in particles with these `attributes`.
 pub(super) fn walls(
     name: &str,
@@ -58,16 +64,17 @@ pub(super) fn walls(
         is_some.then_some(WallValues { values, sign })
     };
     let all = || groups.keys().copied();
+    let rests = |value: &i64| groups[value].iter().all(|member| !member.is_moving);
     if is_dualsphysics(attributes) {
         let is_wall: Option<fn(i64) -> bool> = match &*name.to_ascii_lowercase() {
-            // mkbound + 11 and mkfluid + 1; fixed, moving, floating and fluid
+            // mkbound + 11, of floating bodies too, and mkfluid + 1; fixed, moving, floating and fluid
             "mk" => Some(|mk| mk > 10),
             "type" => Some(|kind| kind < 2),
             _ => None,
         };
         if let Some(is_wall) = is_wall {
-            let sign = WallSign::Code("DualSPHysics");
-            return found(all().filter(|value| is_wall(*value)).collect(), sign);
+            let is_wall = |value: &i64| is_wall(*value) && (name != "Mk" || rests(value));
+            return found(all().filter(is_wall).collect(), WallSign::Code("DualSPHysics"));
         }
     }
     if is_boundary_flag(name) {
@@ -75,14 +82,21 @@ pub(super) fn walls(
         return found(all().filter(|value| *value != 0).collect(), sign);
     }
     // At rest around others that move
-    let rests = |value: &i64| groups[value].iter().all(|member| !member.is_moving);
     let is_any_moving = members.iter().any(|member| member.is_moving);
     let (candidates, sign): (Vec<i64>, _) = if is_any_moving {
-        (all().filter(rests).collect(), WallSign::Rest)
+        let resting: Vec<i64> = all().filter(|value| rests(value)).collect();
+        let contains = |value: &i64| {
+            contains(&groups[value], members.iter().filter(|member| member.is_moving))
+        };
+        // Walls of several kinds are around the others together; an obstacle among them is not
+        let alone: Vec<i64> = resting.iter().copied().filter(contains).collect();
+        (if alone.is_empty() { resting } else { alone }, WallSign::Rest)
     } else {
         let others = |value: i64| members.iter().filter(move |member| member.value != value);
-        let contains = |value: &i64| contains(&groups[value], others(*value));
-        (all().filter(contains).collect(), WallSign::Around)
+        let surrounds = |value: &i64| {
+            groups[value].len() >= MIN_AROUND && contains(&groups[value], others(*value))
+        };
+        (all().filter(surrounds).collect(), WallSign::Around)
     };
     // A bed of grains rests, too
     let shell: Vec<DVec3> =
@@ -136,7 +150,7 @@ fn is_shell(points: &[DVec3]) -> bool {
     if axes.len() < 2 {
         return true;
     }
-    let mut filled = BTreeSet::new();
+    let [mut inside, mut at_sides] = [BTreeSet::new(), BTreeSet::new()];
     for point in points {
         let cell = axes.iter().map(|axis| {
             let at = (point[*axis] - min[*axis]) / (max[*axis] - min[*axis]) * CELLS as f64;
@@ -149,15 +163,17 @@ fn is_shell(points: &[DVec3]) -> bool {
             cell
         });
         let cell: Vec<usize> = cell.collect();
-        // Those at the sides are walls in any case
-        if cell.iter().all(|at| (1..CELLS - 1).contains(at)) {
-            filled.insert(cell);
-        }
+        let is_inside = cell.iter().all(|at| (1..CELLS - 1).contains(at));
+        let filled = if is_inside { &mut inside } else { &mut at_sides };
+        filled.insert(cell);
     }
-    let inside = (CELLS - 2).pow(u32::try_from(axes.len()).unwrap_or(3));
+    let power = u32::try_from(axes.len()).unwrap_or(3);
+    let [all, inner] = [CELLS, CELLS - 2].map(|side| side.pow(power));
     #[expect(clippy::cast_precision_loss, reason = "few cells")]
-    let part = filled.len() as f64 / inside as f64;
-    part <= MAX_FILLED
+    let [inside, at_sides] = [(inside.len(), inner), (at_sides.len(), all - inner)]
+        .map(|(some, of)| some as f64 / of as f64);
+    // A few particles at random fill few cells, but as many inside as at the sides
+    inside <= MAX_FILLED && at_sides >= CONTRAST * inside
 }
 
 #[cfg(test)]
@@ -231,6 +247,26 @@ mod tests {
         });
         let all: Vec<Member> = bed.chain(full).chain((0..4).map(ball)).collect();
         assert_eq!(walls("type", &[], &all), None);
+    }
+
+    #[test]
+    fn mixtures_at_random_have_no_walls() {
+        let mut state = 1_u64;
+        let mut uniform = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (state >> 40) as f64 / f64::from(1 << 24)
+        };
+        for count in [300, 3000] {
+            for _ in 0..20 {
+                let member = |index: i64| Member {
+                    value: index % 2,
+                    position: DVec3::new(uniform(), uniform(), uniform()),
+                    is_moving: false,
+                };
+                let all: Vec<Member> = (0..count).map(member).collect();
+                assert_eq!(walls("type", &[], &all), None);
+            }
+        }
     }
 
     #[test]

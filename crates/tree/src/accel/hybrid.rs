@@ -69,7 +69,7 @@ impl TreeView<'_> {
     /// Calls `visit` for the spheres that rays in `lanes` enter between their ends, nearer boxes first. It returns the
     /// distance behind which further spheres do not matter to the ray: at most the current one, or a negative one to
     /// end the ray. Spheres of trees with copies may be visited several times.
-    pub(crate) fn visit_entries(
+    pub fn visit_entries(
         &self,
         rays: &RayPacket,
         lanes: u32,
