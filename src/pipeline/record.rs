@@ -10,8 +10,13 @@ use std::time::Instant;
 use spherule_jobs::{ClaimedFrame, FinishedFrame, FrameFailure, FrameRecorder, JobError, Recorded};
 
 use super::renderer::TracedFrame;
-use super::stages::StagedFrame;
 use crate::report::FrameReport;
+
+/// A frame between two stages, or the reason why it failed.
+pub(super) struct StagedFrame<T> {
+    pub(super) claimed: ClaimedFrame,
+    pub(super) result: Result<T, FrameFailure>,
+}
 
 /// A frame at an encoder.
 pub(super) struct AtEncoder<T> {

@@ -6,25 +6,18 @@ use std::sync::mpsc::{Receiver, Sender, SyncSender};
 
 use spherule_formats::sequence::Sequence;
 use spherule_jobs::{
-    ClaimedFrame, FinishedFrame, FrameFailure, FrameQueue, Interrupt, JobError, RunContext,
-    catch_panic,
+    FinishedFrame, FrameFailure, FrameQueue, Interrupt, JobError, RunContext, catch_panic,
 };
 
 use super::encode::{lock_peaks, write_frame};
 use super::read_threads::ReadThreads;
-use super::record::{AtEncoder, EncodedFrame, NotEncoded, ToEncoders};
+use super::record::{AtEncoder, EncodedFrame, NotEncoded, StagedFrame, ToEncoders};
 use super::{
     FrameSize, ImageError, ImageTask, LoadedFrame, Setup, TracedFrame, load_frame, renderer_of,
 };
 use crate::metrics::MemoryPeaks;
 use crate::render::{Film, Stop};
 use crate::report::FrameReport;
-
-/// A frame between two stages, or the reason why it failed.
-pub(super) struct StagedFrame<T> {
-    pub(super) claimed: ClaimedFrame,
-    pub(super) result: Result<T, FrameFailure>,
-}
 
 /// The first stage.
 pub(super) struct ReadStage<'a> {

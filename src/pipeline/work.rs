@@ -19,8 +19,8 @@ use spherule_jobs::{
 };
 
 use super::read_threads::ReadThreads;
-use super::record::{RecordStage, ToEncoders};
-use super::stages::{DropFrame, EncodeStage, ReadStage, StagedFrame, ToTrace, TraceStage};
+use super::record::{RecordStage, StagedFrame, ToEncoders};
+use super::stages::{DropFrame, EncodeStage, ReadStage, ToTrace, TraceStage};
 use super::{ImageTask, LoadedFrame, Overlap, Setup, make_image};
 use crate::report::FrameReport;
 

@@ -79,10 +79,11 @@ impl<'a> MemoryModel<'a> {
     fn peak_of(&self, frames: &[FrameSize], neighbours: Neighbours) -> MemoryNeed {
         let mut need = MemoryNeed::default();
         let mut tree = 0;
-        for (before, frame) in (0..).zip(frames) {
+        for (place, frame) in frames.iter().enumerate() {
             // The memory of the tree is reused from frame to frame, and never shrinks.
             tree = self.tree(frame).max(tree);
-            let after = frames.get(before as usize + 1);
+            let after = frames.get(place + 1);
+            let before = place as u64;
             need = need.larger(self.peak_around(before, frame, after, tree, neighbours));
         }
         need

@@ -3,7 +3,7 @@
 use super::super::mattes;
 use super::{FrameSize, MemoryModel, MemoryNeed, Neighbours};
 use crate::denoise;
-use crate::render::floor_light_bytes;
+use crate::render::{FloorBytes, floor_light_bytes};
 use crate::scene::Ground;
 use crate::scene::ground::Pattern;
 use crate::surface::SurfaceKind;
@@ -49,6 +49,7 @@ impl MemoryModel<'_> {
             self.starting(),
             MemoryNeed { reading: self.reading_with_meshes(frame), surface: self.meshes, ..idle },
             self.building(&place),
+            self.lighting(&place, tracing),
             tracing,
             self.denoising(&place, tracing),
             MemoryNeed {
@@ -125,7 +126,7 @@ impl MemoryModel<'_> {
         let encoded = place.before.min(place.neighbours.encoders);
         let reading = place.after.map(|after| self.reading_with_meshes(after));
         MemoryNeed {
-            program: idle.program + floor_light_bytes(&picture.scene, &picture.render),
+            program: idle.program + self.floor().kept,
             reading: reading.map_or(idle.reading, |reading| reading.max(idle.reading)),
             particles: self.shading(frame),
             // Spheres in motion have a tree of their own instead
@@ -137,6 +138,33 @@ impl MemoryModel<'_> {
             images: self.film() * (1 + encoded) + self.tracing_scratch() * threads,
             encoding: encoded * self.encoding() + self.names(frame),
         }
+    }
+
+    /// Before `tracing`: the light of photons is computed. Of the planes of the image, only those of an earlier one are
+    /// in memory, and the next frame is usually read by the time the maps are made.
+    fn lighting(&self, place: &Place<'_>, tracing: MemoryNeed) -> MemoryNeed {
+        let computing = self.floor().computing;
+        if computing == 0 {
+            return MemoryNeed::default();
+        }
+        let Neighbours { encoders, are_slow } = place.neighbours;
+        let new_film = if place.before > encoders { 0 } else { self.film() };
+        MemoryNeed {
+            program: place.idle.program + computing,
+            reading: if are_slow { tracing.reading } else { self.next_kept(place) },
+            images: tracing.images - new_film,
+            ..tracing
+        }
+    }
+
+    /// What is kept of the next frame after it was read.
+    fn next_kept(&self, place: &Place<'_>) -> u64 {
+        place.after.map_or(0, |next| self.kept(next)).max(place.idle.reading)
+    }
+
+    /// Memory of the light on the ground.
+    fn floor(&self) -> FloorBytes {
+        floor_light_bytes(&self.setup.picture.scene, &self.setup.picture.render)
     }
 
     /// After `tracing`: the frames before and after are usually done, except with several encoders, which are there
@@ -151,10 +179,9 @@ impl MemoryModel<'_> {
         let Neighbours { encoders, are_slow } = place.neighbours;
         let encoded = place.before.min(encoders);
         let filtering = denoise::predicted_bytes(render.width, render.height, &settings, threads);
-        let next = place.after.map_or(0, |next| self.kept(next)).max(place.idle.reading);
         MemoryNeed {
             program: place.idle.program,
-            reading: if are_slow { tracing.reading } else { next },
+            reading: if are_slow { tracing.reading } else { self.next_kept(place) },
             images: self.film() * (1 + encoded) + filtering,
             encoding: if are_slow || encoders > 1 {
                 tracing.encoding

@@ -258,7 +258,8 @@ fn spray_is_predicted_from_the_survey() {
     let options = [&SMALL[..], &spray].concat();
     compare_bound("npy", |path| splash(path, 60_000), &options);
     // All of it is spray
-    let all = [&SMALL[..], &["--set", "surface.spray=true", "--radius", "0.0001"]].concat();
+    let tiny = ["--surface", "smooth", "--set", "surface.spray=true", "--radius", "0.0001"];
+    let all = [&SMALL[..], &tiny].concat();
     compare_bound("npy", |path| block(path, 60_000), &all);
 }
 

@@ -100,6 +100,7 @@ mod whitted_tests;
 pub use aov::{DataSample, NO_ID};
 pub use film::{Channels, Film, UnknownChannel};
 pub use film_rows::FilmRows;
+pub use path::floor::FloorBytes;
 pub use ray_counts::RayCounts;
 pub use sampler::{FilmSampler, FilterKind, MAX_FILTER_WIDTH, MultiJitter, PathSeed, PixelFilter};
 pub use settings::{
@@ -149,8 +150,8 @@ pub fn scratch_bytes(
         + stream::bytes_of_slices(slices)
 }
 
-/// Upper bound of the memory for the light of photons and on the ground around transmissive particles, in bytes.
-pub fn floor_light_bytes(scene: &Scene, settings: &RenderSettings) -> u64 {
+/// Upper bounds of the memory for the light of photons and on the ground around transmissive particles.
+pub fn floor_light_bytes(scene: &Scene, settings: &RenderSettings) -> FloorBytes {
     path::floor::bytes(scene, settings)
 }
 

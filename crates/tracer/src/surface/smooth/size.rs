@@ -145,7 +145,7 @@ mod tests {
         let source = BlockSource::new(BlockSettings {
             count: count as u64,
             seed: 1,
-            radius: Some(RADIUS.into()),
+            radius: Some(RADIUS),
             has_velocity: false,
         });
         let mut positions = vec![DVec3::ZERO; count];

@@ -99,9 +99,9 @@ impl MovingTree {
     /// Estimate of [`Self::byte_len`] for `particles`, rounded up.
     pub fn predicted_bytes(particles: u64) -> u64 {
         let block = size_of::<MovingBlock>() + BLOCK_SIZE * size_of::<u32>();
-        // Blocks may be partly empty, and nodes may have fewer than eight children
-        let blocks = particles.div_ceil(BLOCK_SIZE as u64) * 4 / 3 + 1;
-        let nodes = blocks.div_ceil(4) + 1;
+        // A ninth of the places in blocks may be empty, with `bvh`, and nodes may have fewer than eight children
+        let blocks = particles.div_ceil(BLOCK_SIZE as u64) * 9 / 8 + 1;
+        let nodes = blocks.div_ceil(6) + 1;
         blocks * block as u64 + nodes * size_of::<MovingNode>() as u64
     }
 }

@@ -25,6 +25,9 @@ const TOO_FEW: f32 = 3.0;
 pub(super) const BYTES: u64 =
     (SIDE * SIDE * (size_of::<[f32; 4]>() * 4 / 3 + size_of::<Vec3>())) as u64;
 
+/// Memory of the map.
+pub(super) const MAP_BYTES: u64 = (SIDE * SIDE * size_of::<Vec3>()) as u64;
+
 /// Flux and number of the photons in each cell.
 #[derive(Debug, Clone)]
 pub(super) struct Cells {

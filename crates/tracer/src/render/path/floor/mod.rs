@@ -187,24 +187,29 @@ fn is_catcher(ground: &Ground) -> bool {
     ground.shadow_catcher.is_some()
 }
 
-/// Upper bound of the memory for the light of photons and of the sky while it is computed, in bytes.
-pub(in crate::render) fn bytes(scene: &Scene, settings: &RenderSettings) -> u64 {
+/// Upper bounds of the memory for the light of photons and of the sky.
+pub(in crate::render) fn bytes(scene: &Scene, settings: &RenderSettings) -> FloorBytes {
     if !has_photons(scene, settings) {
-        return 0;
+        return FloorBytes::default();
     }
     let emits = !scene.lights.is_empty();
     // Layers of light groups have maps of their own
     let groups = u64::from(settings.channels.layers.light_groups);
     let of_lights: BTreeSet<u8> = scene.lights.iter().map(|light| light.group).collect();
-    let caustics = match of_lights.len() as u64 {
-        0 | 1 => density::BYTES,
-        several => (1 + several.min(groups)) * density::BYTES,
+    let maps = match of_lights.len() as u64 {
+        0 | 1 => 1,
+        several => 1 + several.min(groups),
     };
-    let of_ground = match &scene.ground {
+    let (caustics, kept) = (maps * density::BYTES, maps * density::MAP_BYTES);
+    let (of_ground, kept) = match &scene.ground {
         // The cells of the photons are freed when the other maps are made
-        Some(ground) if !is_catcher(ground) => caustics.max((1 + groups) * sky::BYTES + wet::BYTES),
-        Some(_) if emits => caustics,
-        _ => 0,
+        Some(ground) if !is_catcher(ground) => {
+            let others = (1 + groups) * sky::BYTES + wet::BYTES;
+            let kept_others = (1 + groups) * sky::MAP_BYTES + wet::BYTES;
+            (caustics.max(kept + others), kept + kept_others)
+        }
+        Some(_) if emits => (caustics, kept),
+        _ => (0, 0),
     };
     let has_opaque = scene.meshes.iter().any(|mesh| !mesh.is_pane()) || !scene.parts.is_empty();
     let has_surfaces = emits && has_opaque;
@@ -213,9 +218,21 @@ pub(in crate::render) fn bytes(scene: &Scene, settings: &RenderSettings) -> u64 
         false => 0,
     };
     match of_ground + of_surfaces {
-        0 => 0,
-        stored => stored + photons::bytes(has_surfaces),
+        0 => FloorBytes::default(),
+        stored => FloorBytes {
+            computing: stored + photons::bytes(has_surfaces),
+            kept: kept + of_surfaces,
+        },
     }
+}
+
+/// Memory for the light of photons and of the sky, bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct FloorBytes {
+    /// While it is computed, before the first tile.
+    pub computing: u64,
+    /// While the image is traced.
+    pub kept: u64,
 }
 
 impl<'a> PathIntegrator<'a> {

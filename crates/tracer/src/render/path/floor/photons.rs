@@ -32,10 +32,11 @@ const ROUND: usize = 64;
 /// Depth of the photons of a light. They count as reflected once, so that none splits at the first surface.
 const FIRST_DEPTH: u32 = 2;
 
-/// Memory for photons on surfaces before they are in the maps, with space to grow.
+/// Memory for photons before they are in the maps: those on surfaces with space to grow, of those on the ground one for
+/// each that is emitted.
 pub(super) const fn bytes(has_surfaces: bool) -> u64 {
-    let each = if has_surfaces { size_of::<Photon>() } else { size_of::<Landed>() };
-    2 * TASK as u64 * (ROUND * each) as u64
+    let each = if has_surfaces { 2 * size_of::<Photon>() } else { size_of::<Landed>() };
+    TASK as u64 * (ROUND * each) as u64
 }
 
 /// A photon on the ground.

@@ -31,6 +31,9 @@ const START: f32 = 1e-5;
 /// Memory for the map before and after it is smoothed, and for the paths of a row on each of up to 64 threads.
 pub(super) const BYTES: u64 = (SIDE * (4 * SIDE + 64 * PATHS) * size_of::<Vec3>()) as u64;
 
+/// Memory of a map.
+pub(super) const MAP_BYTES: u64 = (SIDE * SIDE * size_of::<Vec3>()) as u64;
+
 /// Random numbers of texels; no pixel has these rows.
 const TEXELS: u32 = u32::MAX - 1;
 
