@@ -260,7 +260,7 @@ impl Overlay {
             ///
             /// Beside, overlays are at the right, or at the left if their corner is there; horizontal colour bars are
             /// below, or above. offset has no effect then.
-            layout => self.layout, example("\"beside\""), unset("that of image.layout");
+            layout => self.layout, example("\"over\""), unset("that of image.layout");
             /// Corner: auto | top-left | top-right | bottom-left | bottom-right
             ///
             /// auto is the corner where the fewest particles of the surveyed frames are. Overlays in the same corner

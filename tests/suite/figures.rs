@@ -240,7 +240,7 @@ fn impossible_figures_are_refused_or_noted() {
         let options: Vec<&str> = options.split('\u{1}').collect();
         refused(&options, text);
     }
-    refused(&["--zoom", "0"], "camera.zoom");
+    refused(&["--zoom", "0"], "--zoom: expected a number above 0");
     let crop = ["--layout", "beside", "--crop", "0,0,50,50", "--colorbar"];
     refused(&[&size[..], &crop].concat(), "overlay: has overlays beside the picture (layout)");
     // Ticks outside of the range are left out
