@@ -23,6 +23,7 @@ mod bsdf;
 mod context;
 pub mod cryptomatte;
 mod dimensions;
+mod entries;
 mod film;
 mod film_rows;
 mod generate;

@@ -4,6 +4,7 @@
 use super::{
     aov::DataSample,
     bsdf::{BsdfSamples, BsdfValues, SurfacePoints},
+    entries::Entries,
     layers::{Layers, LightClass},
     light_groups::GroupLight,
     light_split::LightSplit,
@@ -15,7 +16,6 @@ use super::{
     sampler::PathSeed,
     stream::{RayStreams, SegmentPacket},
     tile::SIDE,
-    translucent::Entries,
 };
 
 use crate::surface::Intersections;

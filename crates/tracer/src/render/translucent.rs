@@ -6,24 +6,24 @@
 //! spheres that they enter. A sphere in which a ray starts does not count.
 
 use super::{
-    context::RenderContext, dimensions::OPACITY, lights::LightSamples, sampler::get_1d_lanes,
-    scratch::PacketScratch, source::ShadeSource, stream::SegmentPacket,
+    context::RenderContext,
+    dimensions::OPACITY,
+    entries::{MAX_CROSSINGS, ends},
+    lights::LightSamples,
+    sampler::get_1d_lanes,
+    scratch::PacketScratch,
+    source::ShadeSource,
+    stream::SegmentPacket,
 };
-use crate::surface::{
-    Intersection, MaterialId, Shape, SphereEntries, SphereEntry, TransmittanceProduct,
-};
+use crate::surface::{Intersection, MaterialId, Shape, SphereEntries, TransmittanceProduct};
 use spherule_tree::accel::Coherence;
-use spherule_tree::math::functions::log2;
 use spherule_tree::math::{LANES, lane3, lanes_in, set_lane3, splat};
 use spherule_tree::ray::{Ray, RayPacket};
-
-/// Maximum number of surfaces of spheres along a ray; further ones are not there.
-const MAX_CROSSINGS: usize = 4096;
 
 /// Binary digits of the transmittance at which a shadow ray ends: 1/4096.
 const DARK: f32 = 12.0;
 
-/// The spheres that `ray` enters, in order: for shapes without [`SphereEntries`].
+/// The spheres that `ray` enters, in order, for shapes without [`SphereEntries`].
 fn entries(spheres: &dyn Shape, mut ray: Ray) -> impl Iterator<Item = Intersection> {
     let crossings = std::iter::from_fn(move || {
         let hit = spheres.nearest(&ray)?;
@@ -32,67 +32,6 @@ fn entries(spheres: &dyn Shape, mut ray: Ray) -> impl Iterator<Item = Intersecti
     });
     let entries = crossings.take(MAX_CROSSINGS);
     entries.filter_map(|(hit, enters)| enters.then_some(hit))
-}
-
-/// Whether a ray with the random number `u` ends at a surface of this `opacity`. The rest of the number is random, too.
-#[inline(always)]
-fn ends(u: &mut f32, opacity: f32) -> bool {
-    if *u < opacity {
-        return true;
-    }
-    *u = (*u - opacity) / (1.0 - opacity);
-    false
-}
-
-/// Spheres that a ray enters, in order, as far as it may come: found in any order.
-#[derive(Debug, Default)]
-pub(super) struct Entries {
-    /// With their opacity, and the binary digits that they take from the transmittance.
-    spheres: Vec<(SphereEntry, f32, f32)>,
-    /// The sum of these digits.
-    digits: f32,
-    /// Digits after which the ray has certainly ended.
-    enough: f32,
-}
-
-impl Entries {
-    /// Starts the search for a ray with the random number `u`, which ends where the transmittance falls below `1 - u`.
-    fn start(&mut self, u: f32) {
-        self.spheres.clear();
-        // A margin covers all rounding: few spheres more cost little
-        *self = Self {
-            enough: 0.001 - 1.05 * log2(1.0 - u),
-            digits: 0.0,
-            spheres: std::mem::take(&mut self.spheres),
-        };
-    }
-
-    /// Adds a sphere. Returns the distance behind which others do not matter, if it is known.
-    #[inline]
-    fn add(&mut self, entry: SphereEntry, opacity: f32) -> Option<f32> {
-        // Without this, full opacity would have infinitely many digits
-        let digits = if opacity < 1.0 { -log2(1.0 - opacity) } else { 127.0 };
-        let is_before =
-            |other: &SphereEntry| (other.t, other.particle) <= (entry.t, entry.particle);
-        let before = self.spheres.iter().rposition(|(other, ..)| is_before(other));
-        self.spheres.insert(before.map_or(0, |i| i + 1), (entry, opacity, digits));
-        self.digits += digits;
-        // Remove those that the ray does not reach
-        while let Some((_, _, last)) = self.spheres.last()
-            && (self.digits - last > self.enough || self.spheres.len() > MAX_CROSSINGS / 2)
-        {
-            self.digits -= last;
-            self.spheres.pop();
-        }
-        let is_complete = self.digits > self.enough || self.spheres.len() == MAX_CROSSINGS / 2;
-        self.spheres.last().filter(|_| is_complete).map(|(last, ..)| last.t)
-    }
-
-    /// The sphere at which the ray with the random number `u` ends.
-    fn end(&self, mut u: f32) -> Option<&SphereEntry> {
-        let end = self.spheres.iter().find(|(_, opacity, _)| ends(&mut u, *opacity));
-        end.map(|(entry, ..)| entry)
-    }
 }
 
 /// The transmittance of the spheres that the rays of `lanes` enter.
@@ -199,54 +138,6 @@ impl RenderContext<'_> {
         match coherence {
             Coherence::Incoherent if spheres.sphere_entries().is_some() => lanes,
             _ => spheres.occluded(rays, coherence, lanes),
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn entry(t: f32, particle: u32) -> SphereEntry {
-        SphereEntry { t, particle, slot: particle }
-    }
-
-    #[test]
-    fn the_end_does_not_depend_on_the_order_in_which_spheres_are_found() {
-        let spheres: Vec<(SphereEntry, f32)> = (0..40_u16)
-            .map(|i| {
-                let t = f32::from(i * 7 % 40 / 2);
-                (entry(t, i.into()), f32::from(i * 11 % 17) / 16.0 * 0.3)
-            })
-            .collect();
-        let mut sorted = spheres.clone();
-        sorted.sort_by(|(a, _), (b, _)| a.t.total_cmp(&b.t).then(a.particle.cmp(&b.particle)));
-        for i in 0..200_u16 {
-            let u = f32::from(i) / 200.0;
-            let mut rest = u;
-            let expected = sorted.iter().find(|(_, opacity)| ends(&mut rest, *opacity));
-            for turn in 0..spheres.len() {
-                let mut entries = Entries::default();
-                entries.start(u);
-                let mut limit = f32::INFINITY;
-                for (entry, opacity) in spheres[turn..].iter().chain(&spheres[..turn]) {
-                    if entry.t <= limit && *opacity > 0.0 {
-                        limit = entries.add(*entry, *opacity).unwrap_or(limit);
-                    }
-                }
-                assert_eq!(entries.end(u), expected.map(|(entry, _)| entry), "{u} {turn}");
-            }
-        }
-    }
-
-    #[test]
-    fn opaque_spheres_end_all_rays() {
-        for u in [0.0, 0.5, 1.0 - 0.5 * f32::EPSILON] {
-            let mut entries = Entries::default();
-            entries.start(u);
-            assert_eq!(entries.add(entry(3.0, 0), 1.0), Some(3.0));
-            assert_eq!(entries.add(entry(2.0, 1), 1.0), Some(2.0));
-            assert_eq!(entries.end(u), Some(&entry(2.0, 1)));
         }
     }
 }

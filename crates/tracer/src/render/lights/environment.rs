@@ -2,8 +2,6 @@
 //!
 //! Bodies store each component on its own: loops over the components would be vectorised instead of those over lanes.
 
-#![expect(clippy::needless_range_loop, reason = "one index for the lanes of many arrays")]
-
 use super::light::LightSamples;
 use crate::scene::Environment;
 use crate::scene::environment::{EnvironmentAxes, EnvironmentTable, TableSize, Texels};
@@ -11,8 +9,8 @@ use spherule_tree::math::{
     LANES, Lanes, Lanes3, Supported, lane_kernel, lane3, lanes_in, set_lane3, splat,
 };
 
-/// Rays whose density is above that of a texel by this factor see the image: their lobe is so narrow that texels
-/// would be visible.
+/// Rays whose density is above this factor times the number of texels per steradian see the image: their lobe is so
+/// narrow that texels would be visible.
 const SHARP: f32 = 1.0 / 16.0;
 
 /// Samples a direction towards the environment for each lane. The numbers `u` are in 0..1.
@@ -227,7 +225,7 @@ mod tests {
                 let u = numbers(i);
                 let mut samples = LightSamples::default();
                 sample_environment(level, table, &splat3(Vec3::ONE), &u, &mut samples);
-                for lane in 0..LANES {
+                for lane in lanes_in(u32::MAX >> 16) {
                     let alone = table.sample([u[0][lane], u[1][lane]]);
                     assert_eq!(lane3(&samples.rays.direction, lane), alone.direction, "{level:?}");
                     assert_eq!(lane3(&samples.radiance, lane), alone.radiance, "{level:?}");

@@ -105,10 +105,14 @@ impl EnvironmentTable {
         (Vec3::new(r, g, b), pdf)
     }
 
-    /// The mean of the probability densities of all texels: that of uniform sampling, times the number of texels.
+    /// Number of texels.
+    pub(crate) fn texel_count(&self) -> usize {
+        with_texels!(self, texels => texels.records.len())
+    }
+
+    /// Number of texels per steradian.
     pub(crate) fn texels_per_steradian(&self) -> f32 {
-        let count = with_texels!(self, texels => texels.records.len());
-        narrow(count as f64 / (4.0 * PI))
+        narrow(self.texel_count() as f64 / (4.0 * PI))
     }
 
     /// The integral of the radiance over all directions, linear RGB.
