@@ -132,8 +132,8 @@ fn scaled(value: u64, of: u64, part: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use glam::DVec3;
-    use spherule_frame::convert::{BlockSettings, BlockSource, ParticleSource};
-    use spherule_frame::{Sequence, SequenceInput};
+    use spherule_formats::convert::{BlockSettings, BlockSource, ParticleSource};
+    use spherule_formats::{Sequence, SequenceInput};
 
     use super::super::SmoothGrid;
     use super::*;
@@ -181,7 +181,7 @@ mod tests {
             compare(&centers, RADIUS, &smooth, true);
             compare(&centers, RADIUS, &sharp, false);
         }
-        let directory = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/dam-break");
+        let directory = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/dam-break");
         let frames = Sequence::open(&SequenceInput::from_path(directory)).expect("frames");
         for index in [0, 4, 8] {
             let frame = frames.load(index, DVec3::ZERO).expect("readable");
