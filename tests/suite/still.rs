@@ -74,7 +74,7 @@ fn only_images_are_replaced() {
         &["-o", "look.eps"],
         "--output look.eps: the name must end in .png, .exr, .jpg, .tif, .pdf or .svg",
     );
-    refused(&["-o", "look"], "the name must end in .png, .exr, .jpg or .tif");
+    refused(&["-o", "look"], "the name must end in .png, .exr, .jpg, .tif, .pdf or .svg");
     refused(&["--frame", "9", "-o", "a.png"], "--frame 9: is not among the frames: 1-5");
     refused(&["--follow", "-o", "a.png"], "--follow: is for jobs, and `spherule still` has none");
     refused(&[], "--output");
