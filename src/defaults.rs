@@ -268,7 +268,8 @@ impl Rules<'_> {
     /// Particles at one place have no spacing.
     fn lone(&mut self) {
         let is_point = self.facts.bounds.is_some_and(|(min, max)| min == max);
-        if is_point && !self.facts.has_radii && self.facts.elements.is_none() {
+        let has_size = self.facts.has_radii || self.facts.elements.is_some();
+        if is_point && !has_size && !self.draws_a_body() {
             let line =
                 "radius 1, as particles at one place have no spacing (--radius gives another)";
             self.set([("input.radius", 1.0.into())], Some(line.to_owned()));

@@ -279,7 +279,7 @@ mod tests {
     fn codes_of_dualsphysics_are_known() {
         let attributes = named(&["Idp", "Vel", "Rhop", "Type", "Mk"]);
         for (name, codes) in [("Mk", [11, 1]), ("Type", [0, 3])] {
-            let found = walls(name, &attributes, &tank(3, codes, false)).expect("walls");
+            let found = walls(name, &attributes, &tank(6, codes, false)).expect("walls");
             assert_eq!(found.values, [codes[0]]);
             assert_eq!(found.sign, WallSign::Code("DualSPHysics"));
         }

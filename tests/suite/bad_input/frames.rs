@@ -60,12 +60,15 @@ fn a_single_particle_is_in_the_middle() {
     npy(&workshop.join("in/f_1.npy"), 1, 1, Vec3::ZERO);
     not_rendered(
         &workshop,
-        &[],
+        &["--look", "none"],
         &[
             "input.radius: the frames contain no radius, and it cannot be estimated from so few, coincident or \
              distant particles; give a length with --radius",
         ],
     );
+    let ran = workshop.render(&BACKGROUND).expect(0);
+    ran.prints("radius 1, as particles at one place have no spacing (--radius gives another)");
+    fs::remove_dir_all(workshop.join("out")).expect("the images");
     workshop.render(&[&["--radius", "0.1"][..], &BACKGROUND].concat()).expect(0);
     let pixels = pixels(&workshop, "out/f.0001.exr");
     assert!(!is_background(&pixels[18 * 64 + 32]), "the middle");
@@ -77,7 +80,7 @@ fn coincident_particles_render_with_a_radius() {
     let workshop = Workshop::new();
     fs::create_dir(workshop.join("in")).expect("a directory");
     write::npy::write(&workshop.join("in/f_1.npy"), &[Vec3::ONE; 500]).expect("a file");
-    not_rendered(&workshop, &[], &["input.radius"]);
+    not_rendered(&workshop, &["--look", "none"], &["input.radius"]);
     workshop.render(&["--radius", "0.5"]).expect(0);
 }
 

@@ -75,7 +75,7 @@ impl GridSize {
     pub fn of_splash(particles: u64, settings: &SurfaceSettings) -> Self {
         #[expect(clippy::cast_precision_loss, reason = "an estimate")]
         let count = particles as f64;
-        let faces = f64::from(settings.voxel).powi(-2) / count.cbrt().max(1.0);
+        let faces = f64::from(settings.voxel).powi(-2) / libm::cbrt(count).max(1.0);
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
