@@ -196,7 +196,10 @@ impl Facts {
             elements: integers(ELEMENT).and_then(elements),
             categories: without_walls(categories, &raw.attributes),
             in_cell: raw.cell.as_ref().map_or(0.0, |cell| part_in(cell, &raw.positions)),
-            cell_extent: raw.cell.as_ref().map_or([0.0; 3], |cell| extent_in(cell, &raw.positions)),
+            cell_extent: raw.cell.as_ref().map_or([0.0; 3], |cell| {
+                let is_full = is_unit_cell(cell, sample.count, sample.spacing);
+                if is_full { [1.0; 3] } else { extent_in(cell, &raw.positions) }
+            }),
             cell: raw.cell,
             bounds: robust_bounds(&raw.positions, sample.extremes).map(|bounds| bounds.outer),
         }
@@ -246,9 +249,6 @@ fn part_in(cell: &SimulationCell, positions: &Positions) -> f64 {
     part
 }
 
-/// Thickness of a layer of atoms as a part of the edge of a cell.
-const LAYER: f64 = 1e-3;
-
 /// How much larger the radius that follows from the density is than half the distance of nearest neighbours, from which
 /// on particles may be at random distances: it is 1.05 times as large in a lattice, 1.2 times in a fluid, and 1.5 times in
 /// a sheet.
@@ -276,29 +276,25 @@ fn extent_in(cell: &SimulationCell, positions: &Positions) -> [f64; 3] {
     let sample = in_coordinates(cell, positions);
     [0, 1, 2].map(|axis| {
         let along = sorted_sample(sample.len(), |i| sample[i][axis]);
-        if cell.periodic[axis] {
-            periodic_extent(along.iter().map(|at| at.rem_euclid(1.0)).collect())
-        } else {
-            robust_range(&along).map_or(0.0, |(low, high)| high - low)
-        }
+        robust_range(&along).map_or(0.0, |(low, high)| high - low)
     })
 }
 
-/// The part of a period along which there are layers, each with the distance to the next one: all of a crystal's, of which
-/// the cell may have only one layer, and not the empty part above a slab.
-fn periodic_extent(mut layers: Vec<f64>) -> f64 {
-    layers.sort_unstable_by(f64::total_cmp);
-    let (Some(first), Some(last)) = (layers.first(), layers.last()) else {
-        return 0.0;
-    };
-    let around = first + 1.0 - last;
-    let mut gaps: Vec<f64> = layers.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    gaps.push(around);
-    gaps.sort_unstable_by(|a, b| b.total_cmp(a));
-    let largest = gaps[0];
-    // Atoms of one layer are not exactly in a plane
-    let next = gaps.get(1).copied().filter(|gap| *gap > LAYER).unwrap_or(largest);
-    1.0 - largest + next
+/// Number of particles below which the layers of a crystal do not extend along the edges of its cell.
+const FEW: usize = 100;
+
+/// The smallest distance of nearest neighbours in a cell that a few atoms fill, relative to that of a cubic lattice: those
+/// of a molecule in a large cell are nearer.
+const CUBIC: f64 = 0.5;
+
+/// Whether a few particles fill a periodic `cell`, as those of a unit cell do: the cell has about the volume that they
+/// need at the distance of nearest neighbours.
+fn is_unit_cell(cell: &SimulationCell, count: usize, spacing: Option<Spacing>) -> bool {
+    let [a, b, c] = cell.vectors;
+    #[expect(clippy::cast_precision_loss, reason = "a few")]
+    let cubic = libm::cbrt(a.cross(b).dot(c).abs() / count.max(1) as f64);
+    let nearest = spacing.map_or(cubic, |spacing| 2.0 * f64::from(spacing.touching));
+    count > 0 && count < FEW && cell.periodic == [true; 3] && nearest >= CUBIC * cubic
 }
 
 /// Whether a particle of a sample moves.
@@ -406,16 +402,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn unit_cells_are_full_and_slabs_are_not() {
-        for (layers, extent) in [
-            (vec![0.0], 1.0),
-            (vec![0.0, 0.0005], 1.0),
-            (vec![0.0, 0.5, 0.5, 0.0], 1.0),
-            (vec![0.2, 0.25, 0.3], 0.15),
-            (vec![], 0.0),
-        ] {
-            let found = periodic_extent(layers.clone());
-            assert!((found - extent).abs() < 2e-3, "{layers:?}: {found}");
-        }
+    fn unit_cells_are_full_and_cells_around_a_molecule_are_not() {
+        let cell = |edge: f64| {
+            SimulationCell::new(DVec3::ZERO, DVec3::AXES.map(|axis| edge * axis), [true; 3])
+                .expect("a cell")
+        };
+        let nearest = |distance: f32| {
+            let touching = 0.5 * distance;
+            Some(Spacing { touching, closest: touching, packed: None })
+        };
+        // Polonium, copper, rock salt
+        assert!(is_unit_cell(&cell(3.35), 1, None));
+        assert!(is_unit_cell(&cell(3.61), 4, nearest(2.55)));
+        assert!(is_unit_cell(&cell(5.64), 8, nearest(2.82)));
+        // A diatomic molecule in a box, and many particles
+        assert!(!is_unit_cell(&cell(9.0), 2, nearest(1.0)));
+        assert!(!is_unit_cell(&cell(100.0), 1000, nearest(10.0)));
     }
 }

@@ -16,6 +16,8 @@ pub fn join_vectors(attributes: &mut Vec<Attribute>, budget: MemoryBudget) {
             let named = |a: &Attribute| a.components == 1 && a.name.eq_ignore_ascii_case(component);
             attributes.iter().position(named)
         };
+        // A velocity in space is not one in a plane
+        let is_free = is_free && (components != PLANE.1 || scalar(&"vz").is_none());
         let places: Option<Vec<usize>> = components.iter().map(scalar).collect();
         let Some(places) = places.filter(|_| is_free) else { continue };
         let parts: Vec<&AttributeData> =
