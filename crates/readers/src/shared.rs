@@ -49,10 +49,6 @@ impl SharedBytes {
     ///
     /// # Errors
     /// As [`Siblings::open`]; also if these bytes are not from a file.
-    #[cfg_attr(
-        not(feature = "hdf5"),
-        expect(dead_code, reason = "only HDF5 files refer to others")
-    )]
     pub fn sibling(&self, name: &str) -> Result<Self, ParseError> {
         match &self.siblings {
             Some(siblings) => siblings.open(name),
