@@ -7,7 +7,7 @@ use crate::reader::{Reader, StreamUnit};
 use crate::step::Step;
 use spherule_frame::{MemoryBudget, ParseError, RawParticles};
 
-/// A file format that this crate reads. [`Self::all`] lists all formats; constants such as `read::ply::FORMAT`
+/// A file format that this crate reads. `spherule_formats::registry::all` lists all formats; constants such as `read::ply::FORMAT`
 /// name one.
 #[derive(Clone, Copy)]
 pub struct Format(&'static dyn Reader);

@@ -1,7 +1,7 @@
 //! What the readers of text share: lines with their byte offsets, and numbers in all the spellings
 //! that simulation programs print.
 //!
-//! [`super::table`] builds the parallel row parser on this; which line means what is left to the
+//! The module `table` builds the parallel row parser on this; which line means what is left to the
 //! format's own module.
 
 use std::borrow::Cow;

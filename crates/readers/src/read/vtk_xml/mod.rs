@@ -3,7 +3,7 @@
 //!
 //! `document` reads the XML, `appended` finds the blob after it, `blocks` gets the bytes of
 //! an array out of either, `compressor` unpacks them, `merge` puts pieces together, `mesh` reads cells. Lists
-//! of files (`.pvtu`, `.vtm`, `.pvd`) are left to [`crate::sequence`]; grids are refused by name. Layout after "VTK
+//! of files (`.pvtu`, `.vtm`, `.pvd`) are left to `spherule_formats::sequence`; grids are refused by name. Layout after "VTK
 //! File Formats" (the VTK user's guide) and after files of VTK 9, ParaView, meshio and PySPH.
 
 mod appended;
