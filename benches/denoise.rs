@@ -48,10 +48,7 @@ fn main() {
         return;
     }
     let is_quick = has("--test") || !has("--bench");
-    let (turns, [width, height]) = match is_quick {
-        true => (1, [96, 54]),
-        false => (TURNS, [1920, 1080]),
-    };
+    let (turns, [width, height]) = if is_quick { (1, [96, 54]) } else { (TURNS, [1920, 1080]) };
     let picture = Picture::new(width, height);
     let simd = SimdLevel::best().name();
     println!("{width}x{height}, CPU seconds of one thread, best of {turns} turns, {simd}");
@@ -91,14 +88,8 @@ impl Picture {
         let half = SPACING as f32 / 2.0;
         let [x, y] = position.map(|x| (x % SPACING) as f32 / half - 1.0);
         let is_ball = x * x + y * y < 0.8;
-        let normal = match is_ball {
-            true => Vec3::new(x, y, (1.0 - x * x - y * y).sqrt()),
-            false => Vec3::Z,
-        };
-        let albedo = match is_ball {
-            true => Vec3::new(0.2, 0.6, 0.5),
-            false => Vec3::splat(0.5),
-        };
+        let normal = if is_ball { Vec3::new(x, y, (1.0 - x * x - y * y).sqrt()) } else { Vec3::Z };
+        let albedo = if is_ball { Vec3::new(0.2, 0.6, 0.5) } else { Vec3::splat(0.5) };
         let light = 0.3 + 0.7 * normal.dot(Vec3::new(0.48, 0.6, 0.64)).max(0.0);
         let expected = albedo * light;
         let [even, odd] = [0, 1].map(|_| expected + albedo * (AMPLITUDE * random.next()));

@@ -66,9 +66,10 @@ fn rendered(place: &Path, is_quick: bool) -> Vec<PathBuf> {
     let dam = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/dam-break");
     let cubes = path(place.join("box.npy"));
     run(&["generate", "box", "--particles", "1e5", "-o", &cubes]);
-    let size: &[&str] = match is_quick {
-        true => &["--width", "96", "--height", "54", "--samples", "1"],
-        false => &["--width", "1920", "--height", "1080", "--samples", "16"],
+    let size: &[&str] = if is_quick {
+        &["--width", "96", "--height", "54", "--samples", "1"]
+    } else {
+        &["--width", "1920", "--height", "1080", "--samples", "16"]
     };
     let inputs = [("box", cubes, "0"), ("dam", path(dam), "9")];
     let image = |(name, input, frame): (&str, String, &str)| {

@@ -35,10 +35,7 @@ fn main() {
         return;
     }
     let is_quick = has("--test") || !has("--bench");
-    let (turns, count) = match is_quick {
-        true => (1, 10_000),
-        false => (TURNS, 10_000_000),
-    };
+    let (turns, count) = if is_quick { (1, 10_000) } else { (TURNS, 10_000_000) };
     let particles = particles(count);
     let threads = rayon::current_num_threads();
     println!("{count} particles, {threads} threads, best of {turns} turns, milliseconds");

@@ -348,9 +348,10 @@ fn setup_on(
             dpi: image.dpi,
             is_panorama: projection.is_panorama() && stereo.is_none(),
             world_to_camera: None,
-            comments: Some(match projection.is_panorama() {
-                true => COMMENTS.replace("along the view axis", "from the eye"),
-                false => COMMENTS.to_owned(),
+            comments: Some(if projection.is_panorama() {
+                COMMENTS.replace("along the view axis", "from the eye")
+            } else {
+                COMMENTS.to_owned()
             }),
             custom: None,
             texts: Vec::new(),
@@ -381,10 +382,7 @@ fn setup_on(
             alpha: manifest.render.sbvh_alpha,
             budget: manifest.render.sbvh_budget,
         },
-        access: match manifest.input.mmap {
-            true => Access::Map,
-            false => Access::Read,
-        },
+        access: if manifest.input.mmap { Access::Map } else { Access::Read },
         verify: manifest.input.verify,
         weight: survey.weight,
         surfaces: survey.surfaces.clone(),

@@ -65,10 +65,8 @@ impl FrameFailure {
     /// The failure to write the output at `path`. Its kind depends on the error: a full disk stops the run, an
     /// error that concerns this file alone does not.
     pub fn writing(frame: i64, path: &Path, source: io::Error) -> Self {
-        let kind = match is_output_unavailable(&source) {
-            true => FailureKind::Output,
-            false => FailureKind::Frame,
-        };
+        let kind =
+            if is_output_unavailable(&source) { FailureKind::Output } else { FailureKind::Frame };
         Self::new(kind, frame, FileError::new(path, "writing", source))
     }
 }

@@ -189,10 +189,7 @@ impl FinishedRun<'_> {
                 let error = CliError::from(error).to_string();
                 message!("error: {error}");
                 events::add_to_end(json!({"errors": [error]}));
-                match is_temporary {
-                    true => Outcome::Interrupted,
-                    false => Outcome::SomeFailed,
-                }
+                if is_temporary { Outcome::Interrupted } else { Outcome::SomeFailed }
             }
             Ok(()) if self.interrupt.is_raised() && self.frames.count < self.task_count => {
                 Outcome::Interrupted

@@ -90,9 +90,10 @@ pub(super) fn run(args: &MovieArgs) -> Result<Outcome, CliError> {
     pictures.require_any()?;
     if let Some(gaps) = pictures.gaps() {
         if !args.partial {
-            let wait = match pictures.is_running {
-                true => "wait for it",
-                false => "the same `render` command continues the job",
+            let wait = if pictures.is_running {
+                "wait for it"
+            } else {
+                "the same `render` command continues the job"
             };
             return Err(CliError::other(format!(
                 "{gaps}; {wait}, or make a movie of what is there with --partial"

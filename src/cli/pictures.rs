@@ -122,9 +122,10 @@ impl JobPictures {
 
     /// Adds how to get previews to an error of reading images.
     pub(super) fn explain(&self, error: &dyn std::fmt::Display) -> CliError {
-        let remedy = match self.has_previews {
-            true => "",
-            false => "; this job has no previews: render it with --set output.preview=true",
+        let remedy = if self.has_previews {
+            ""
+        } else {
+            "; this job has no previews: render it with --set output.preview=true"
         };
         CliError::other(format!("{error}{remedy}"))
     }

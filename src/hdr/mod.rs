@@ -93,9 +93,10 @@ pub fn read_radiance_map(path: &Path) -> Result<RadianceMap, HdrError> {
 pub fn read_texture(path: &Path, behind: Vec3) -> Result<Texture, HdrError> {
     read(path, |mut file| {
         let check = |width, height| Ok(Texture::check_size(width, height)?);
-        let image = match first_bytes(&mut file)?[..] == PNG_MAGIC {
-            true => png::decode(file, check, behind)?,
-            false => decode_radiance(file, check)?,
+        let image = if first_bytes(&mut file)?[..] == PNG_MAGIC {
+            png::decode(file, check, behind)?
+        } else {
+            decode_radiance(file, check)?
         };
         Ok(Texture::new(image.width, image.height, &image.pixels)?)
     })

@@ -56,10 +56,8 @@ pub(super) fn decode(file: impl Read, check: Check, behind: Vec3) -> Result<Pixe
             1 | 2 => Vec3::splat(value(0)),
             _ => Vec3::new(value(0), value(1), value(2)),
         };
-        let alpha = match has_alpha {
-            true => f32::from(codes_of(channels - 1)) / f32::from(codes),
-            false => 1.0,
-        };
+        let alpha =
+            if has_alpha { f32::from(codes_of(channels - 1)) / f32::from(codes) } else { 1.0 };
         behind.lerp(color, alpha)
     };
     let pixels: Vec<Vec3> = match encoding {

@@ -70,10 +70,7 @@ impl ChildCommand {
     /// The executable is unknown.
     pub fn own_program(arguments: impl IntoIterator<Item = impl Into<String>>) -> io::Result<Self> {
         let link = PathBuf::from("/proc/self/exe");
-        let program = match link.exists() {
-            true => link,
-            false => std::env::current_exe()?,
-        };
+        let program = if link.exists() { link } else { std::env::current_exe()? };
         Ok(Self::new(program, arguments))
     }
 

@@ -51,10 +51,7 @@ impl ConvertJob {
         shard: Option<Shard>,
     ) -> Result<Self, RunError> {
         let (dir, name) = split_output(output);
-        let dir = match dir.as_os_str().is_empty() {
-            true => PathBuf::from("."),
-            false => dir,
-        };
+        let dir = if dir.as_os_str().is_empty() { PathBuf::from(".") } else { dir };
         let dir =
             std::path::absolute(&dir).map_err(RunError::file(&dir, "cannot be made absolute"))?;
         let job = Self {

@@ -176,10 +176,7 @@ impl RenderJob {
         // Settings that are resolved again must be the new ones
         let resolves_again =
             mode == ResumeMode::KeepDone && !planned.changes_to(&as_planned).is_empty();
-        Ok(match resolves_again {
-            true => settings,
-            false => as_planned,
-        })
+        Ok(if resolves_again { settings } else { as_planned })
     }
 
     /// The files of the meshes that only `frame` has.

@@ -137,10 +137,7 @@ impl Value for GroundSetting {
 
     fn parse(field: &Field<'_>, key: &Key) -> Result<Self, Fault> {
         if let Some(is_on) = field.as_bool() {
-            return Ok(Self::of(match is_on {
-                true => GroundKind::Plain,
-                false => GroundKind::None,
-            }));
+            return Ok(Self::of(if is_on { GroundKind::Plain } else { GroundKind::None }));
         }
         let Some(mut section) = field.as_table() else {
             let kind = GroundKind::parse(field, key)?;

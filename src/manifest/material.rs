@@ -114,16 +114,14 @@ impl Material {
         let clear = |ior| scene::Material {
             reflection: 1.0,
             transmission: 1.0,
-            ior: match self.constants.ior == scene::Material::DEFAULT.ior {
-                true => ior,
-                false => self.constants.ior,
+            ior: if self.constants.ior == scene::Material::DEFAULT.ior {
+                ior
+            } else {
+                self.constants.ior
             },
             fresnel: Fresnel::Exact,
             // Glass and water of manifests that name every key with its default stay smooth
-            interface_roughness: match roughness == ROUGHNESS {
-                true => 0.0,
-                false => roughness,
-            },
+            interface_roughness: if roughness == ROUGHNESS { 0.0 } else { roughness },
             ..self.constants
         };
         let usual = scene::Material { fresnel, ..self.constants };

@@ -101,9 +101,10 @@ impl MemoryPeaks {
         self.file = self.file.max(now.file);
         self.total = self.total.max(now.peak);
         self.sampled_anonymous = self.sampled_anonymous.max(now.anonymous);
-        self.anonymous = match self.use_samples_only {
-            true => self.sampled_anonymous,
-            false => self.sampled_anonymous.max(self.total.saturating_sub(self.file)),
+        self.anonymous = if self.use_samples_only {
+            self.sampled_anonymous
+        } else {
+            self.sampled_anonymous.max(self.total.saturating_sub(self.file))
         };
     }
 }

@@ -139,10 +139,7 @@ impl MovieFormat {
 
     /// The size of the movie for pictures of this `size`: codecs that halve the resolution of colours need even sides.
     pub fn padded(self, size: [usize; 2]) -> [usize; 2] {
-        match self.needs_ffmpeg() {
-            true => size.map(|side| side.next_multiple_of(2)),
-            false => size,
-        }
+        if self.needs_ffmpeg() { size.map(|side| side.next_multiple_of(2)) } else { size }
     }
 
     /// Largest width and height.

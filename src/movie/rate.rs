@@ -23,10 +23,7 @@ impl FrameRate {
     /// # Errors
     /// [`FrameRateError`].
     pub fn new(rate: f64) -> Result<Self, FrameRateError> {
-        match (Self::MIN..=Self::MAX).contains(&rate) {
-            true => Ok(Self(rate)),
-            false => Err(FrameRateError),
-        }
+        if (Self::MIN..=Self::MAX).contains(&rate) { Ok(Self(rate)) } else { Err(FrameRateError) }
     }
 
     /// Frames per second.

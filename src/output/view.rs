@@ -102,10 +102,8 @@ mod tests {
     fn white_is_white_and_exact_bytes_keep_their_value_at_every_threshold() {
         let linear_from_byte = |byte: u8| {
             let value = f64::from(byte) / 255.0;
-            let linear = match value <= 0.04045 {
-                true => value / 12.92,
-                false => ((value + 0.055) / 1.055).powf(2.4),
-            };
+            let linear =
+                if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) };
             #[expect(clippy::cast_possible_truncation, reason = "a value in 0 to 1")]
             let linear = linear as f32;
             linear

@@ -66,9 +66,10 @@ impl Axes {
             }
             // Names of axes along the view would hide each other
             let reach = if flat > 0.2 { LABEL } else { LABEL - ARM };
-            let [x, y] = match flat > 0.2 {
-                true => at([axis[0] / flat, axis[1] / flat, 0.0], ARM * flat + reach - ARM),
-                false => [center[0] - 0.6 * size, center[1] + 0.6 * size],
+            let [x, y] = if flat > 0.2 {
+                at([axis[0] / flat, axis[1] / flat, 0.0], ARM * flat + reach - ARM)
+            } else {
+                [center[0] - 0.6 * size, center[1] + 0.6 * size]
             };
             let name = &self.names[i];
             pen.label(canvas, name, x - 0.5 * pen.font.width(name), y);

@@ -167,9 +167,10 @@ impl Canvas for Raster {
         for y in pixels(from[1].min(to[1]) - reach, from[1].max(to[1]) + reach, self.height) {
             for x in pixels(from[0].min(to[0]) - reach, from[0].max(to[0]) + reach, self.width) {
                 let at = [x as f32 + 0.5 - from[0], y as f32 + 0.5 - from[1]];
-                let t = match square > 0.0 {
-                    true => ((at[0] * along[0] + at[1] * along[1]) / square).clamp(0.0, 1.0),
-                    false => 0.0,
+                let t = if square > 0.0 {
+                    ((at[0] * along[0] + at[1] * along[1]) / square).clamp(0.0, 1.0)
+                } else {
+                    0.0
                 };
                 let away = [at[0] - t * along[0], at[1] - t * along[1]];
                 let distance = (away[0] * away[0] + away[1] * away[1]).sqrt();

@@ -75,13 +75,11 @@ impl Placement {
         let [width, height] = picture.map(|side| i32::try_from(side).unwrap_or(i32::MAX));
         let far =
             |length: i32, own: i32, offset: i32| length.saturating_sub(own).saturating_sub(offset);
-        let x = match self.corner.is_left() {
-            true => offset[0],
-            false => far(width, size[0], offset[0]),
-        };
-        let y = match self.corner.is_top() {
-            true => offset[1].saturating_add(below),
-            false => far(height, size[1], offset[1]).saturating_sub(below),
+        let x = if self.corner.is_left() { offset[0] } else { far(width, size[0], offset[0]) };
+        let y = if self.corner.is_top() {
+            offset[1].saturating_add(below)
+        } else {
+            far(height, size[1], offset[1]).saturating_sub(below)
         };
         [x, y]
     }

@@ -154,9 +154,10 @@ fn significant(value: f64) -> String {
     }
     let decimals = usize::try_from(2 - decade(value.abs())).unwrap_or(0);
     let text = number(value, decimals);
-    match text.contains('.') {
-        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
-        false => text,
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
     }
 }
 
@@ -196,9 +197,10 @@ impl Axis {
 
 /// A power of ten with zeros or with an exponent.
 fn decade_text(exponent: i32, is_plain: bool) -> String {
-    match is_plain {
-        true => number(power(exponent), usize::try_from(-exponent).unwrap_or(0)),
-        false => power_text(exponent),
+    if is_plain {
+        number(power(exponent), usize::try_from(-exponent).unwrap_or(0))
+    } else {
+        power_text(exponent)
     }
 }
 

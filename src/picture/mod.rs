@@ -82,10 +82,10 @@ impl Picture {
     /// # Errors
     /// See [`PictureError`]; messages begin with the path.
     pub fn read(path: &Path, exposure: f32) -> Result<Self, PictureError> {
-        read(path, |file| match is_exr(path) {
-            true => exr::picture(file, exposure),
-            false => png::picture(file),
-        })
+        read(
+            path,
+            |file| if is_exr(path) { exr::picture(file, exposure) } else { png::picture(file) },
+        )
     }
 
     /// Width in pixels.

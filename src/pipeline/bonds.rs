@@ -230,10 +230,12 @@ impl<'a> Search<'a> {
 
 /// Where the images of `cell` next to it are, without itself.
 fn images_around(cell: &SimulationCell) -> Vec<Vec3> {
-    let steps = |edge: usize| match cell.periodic[edge] && cell.vectors[edge].length_squared() > 0.0
-    {
-        true => -1..=1,
-        false => 0..=0,
+    let steps = |edge: usize| {
+        if cell.periodic[edge] && cell.vectors[edge].length_squared() > 0.0 {
+            -1..=1
+        } else {
+            0..=0
+        }
     };
     let mut images = Vec::new();
     for a in steps(0) {

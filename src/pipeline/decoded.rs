@@ -84,19 +84,18 @@ impl<'a> DecodedFrame<'a> {
         let ids = if setup.picture.needs_ids() { ids(&frame) } else { None };
         let shutter = setup.picture.shutter.as_ref();
         let is_moved = shutter.is_some_and(|shutter| shutter.has_velocities);
-        let velocities = match channels.needs_velocities() || is_moved {
-            true => velocity_of(&frame.attributes).map(vectors),
-            false => None,
+        let velocities = if channels.needs_velocities() || is_moved {
+            velocity_of(&frame.attributes).map(vectors)
+        } else {
+            None
         };
         if is_moved && velocities.is_none() && !frame.is_empty() {
             let has = frame.attributes.iter().map(|a| a.name.as_str());
             let purpose = "motion blur, which camera.shutter = 0 turns off";
             return Err(missing("velocity", purpose, file, has));
         }
-        let parts = match setup.needs_parts() {
-            true => part_of(&frame.attributes).and_then(parts),
-            false => None,
-        };
+        let parts =
+            if setup.needs_parts() { part_of(&frame.attributes).and_then(parts) } else { None };
         if parts.is_none() && !setup.picture.scene.parts.is_empty() && !frame.is_empty() {
             let has = frame.attributes.iter().map(|a| a.name.as_str());
             return Err(no_parts(file, has));
@@ -207,9 +206,10 @@ fn color_values(
     Ok(match rule {
         ColorRule::Constant(_) => (Vec::new(), Vec::new()),
         ColorRule::Rgb { name, required } => {
-            let found = match *required {
-                true => attribute(frame, name, "colour", file)?,
-                false => frame.attribute(name),
+            let found = if *required {
+                attribute(frame, name, "colour", file)?
+            } else {
+                frame.attribute(name)
             };
             (Vec::new(), found.map(colors_of).unwrap_or_default())
         }
@@ -337,9 +337,8 @@ fn values_of(
 fn colors_of(attribute: &Attribute) -> Vec<Vec3> {
     let encoding = RgbEncoding::of(attribute.data.scalar_type());
     let components = attribute.components;
-    let value = |i: usize, c: usize| match c < components {
-        true => attribute.data.get_f64(i * components + c),
-        false => 0.0,
+    let value = |i: usize, c: usize| {
+        if c < components { attribute.data.get_f64(i * components + c) } else { 0.0 }
     };
     (0..attribute.count())
         .into_par_iter()
@@ -363,9 +362,8 @@ fn component(attribute: Option<&Attribute>, c: usize) -> Vec<f32> {
         return Vec::new();
     };
     let components = attribute.components;
-    let value = |i: usize| match c < components {
-        true => attribute.data.get_f64(i * components + c) as f32,
-        false => 0.0,
+    let value = |i: usize| {
+        if c < components { attribute.data.get_f64(i * components + c) as f32 } else { 0.0 }
     };
     (0..attribute.count()).into_par_iter().map(value).collect()
 }

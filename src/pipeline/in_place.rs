@@ -231,9 +231,10 @@ impl StoredFrame {
     fn verify(&self, all: Option<bool>) -> Result<(), FrameError> {
         let used = self.names.all();
         let frame = self.frame();
-        let verified = match all.unwrap_or(frame.used_bytes(&used) <= MAX_VERIFIED) {
-            true => frame.verify_used(&used),
-            false => frame.verify_nodes(),
+        let verified = if all.unwrap_or(frame.used_bytes(&used) <= MAX_VERIFIED) {
+            frame.verify_used(&used)
+        } else {
+            frame.verify_nodes()
         };
         verified.map_err(|e| e.in_file(self.path()))?;
         // A truncated file would otherwise be reported as damaged.

@@ -154,9 +154,10 @@ pub fn load_particles<'a>(
 ) -> Result<LoadedFrame<'a>, LoadError> {
     let start = Instant::now();
     let read = particles.positions.len() as u64;
-    let frame = match setup.picture.selection.is_all() {
-        true => ParticleFrame::borrowed(particles, setup.picture.origin),
-        false => selected(setup, particles.to_owned_particles(), name)?.with_positions(Cow::Owned),
+    let frame = if setup.picture.selection.is_all() {
+        ParticleFrame::borrowed(particles, setup.picture.origin)
+    } else {
+        selected(setup, particles.to_owned_particles(), name)?.with_positions(Cow::Owned)
     };
     let mut loaded = decoded(setup, task, frame, read, name, Vec::new())?;
     loaded.finish(setup)?;

@@ -173,10 +173,7 @@ fn ratio_note(path: &Path, tree: &MeshTree, particles: f64) -> Option<String> {
         return None;
     }
     let path = path.display();
-    let (factor, size) = match ratio > 1.0 {
-        true => (ratio, "larger"),
-        false => (1.0 / ratio, "smaller"),
-    };
+    let (factor, size) = if ratio > 1.0 { (ratio, "larger") } else { (1.0 / ratio, "smaller") };
     Some(format!(
         "{path}: the mesh is {factor:.0} times {size} than the particles; if it is in another unit, set mesh.scale \
          (0.001 for millimetres to metres)"

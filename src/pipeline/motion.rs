@@ -18,9 +18,10 @@ use crate::accel::moving::bounded;
 /// Moves the particles of `frame` to their places in the middle of the exposure. Returns by how far each of them moves
 /// from the opening of the shutter to its closing. Takes the velocities of the frame unless a channel needs them.
 pub(super) fn expose(setup: &Setup, shutter: Shutter, frame: &mut DecodedFrame<'_>) -> Vec<Vec3> {
-    let velocities = match setup.picture.render.channels.needs_velocities() {
-        true => frame.shading.velocities.clone(),
-        false => frame.shading.velocities.take(),
+    let velocities = if setup.picture.render.channels.needs_velocities() {
+        frame.shading.velocities.clone()
+    } else {
+        frame.shading.velocities.take()
     };
     // An empty frame has none
     let mut displacements = velocities.unwrap_or_default();
@@ -65,10 +66,7 @@ pub(super) fn velocities_to_next(
         ParticleFrame::from_raw(loaded.particles, setup.picture.origin).with_positions(Cow::Owned);
     // Determine the time between the frames; files know it best
     let known = frame.time.zip(other.time).map(|(a, b)| b - a);
-    let usual = match is_last {
-        true => -f64::from(shutter.step.time),
-        false => f64::from(shutter.step.time),
-    };
+    let usual = if is_last { -f64::from(shutter.step.time) } else { f64::from(shutter.step.time) };
     let time = known.filter(|time| *time != 0.0).unwrap_or(usual);
     // Find each particle there
     let ids_of = |frame: &SharedFrame<'_>, index: usize| match ids(frame) {
@@ -82,19 +80,17 @@ pub(super) fn velocities_to_next(
     let (own, others) = (ids_of(frame, task.index)?, ids_of(&other, other_index)?);
     let places = Places::new(&others, &own);
     // Those that are drawn may be few
-    let half_extent = match setup.picture.selection.is_all() {
-        true => 0.5 * extent(&frame.positions),
-        false => 0.5 * extent(&other.positions),
+    let half_extent = if setup.picture.selection.is_all() {
+        0.5 * extent(&frame.positions)
+    } else {
+        0.5 * extent(&other.positions)
     };
     let velocity = |(place, id): (usize, &u32)| {
         let Some(at) = places.find(place, *id) else {
             return Vec3::ZERO;
         };
         let way = other.positions[at].as_dvec3() - frame.positions[place].as_dvec3();
-        match way.abs().cmple(half_extent).all() {
-            true => (way / time).as_vec3(),
-            false => Vec3::ZERO,
-        }
+        if way.abs().cmple(half_extent).all() { (way / time).as_vec3() } else { Vec3::ZERO }
     };
     Ok(own.par_iter().enumerate().map(velocity).collect())
 }

@@ -286,9 +286,10 @@ impl SurfaceBuilder {
         let body = self.body(setup, tree);
         let owners =
             SphereOwners::new(MaterialId::SPRAY, self.body).with_spheres(self.drops_per_particle);
-        let spray: Box<dyn Shape> = match setup.has_motion() {
-            true => Box::new(MovingSpheres::new(&self.moving[1]).of(owners)),
-            false => Box::new(SphereSurface::new(self.spray.tree().view()).of(owners)),
+        let spray: Box<dyn Shape> = if setup.has_motion() {
+            Box::new(MovingSpheres::new(&self.moving[1]).of(owners))
+        } else {
+            Box::new(SphereSurface::new(self.spray.tree().view()).of(owners))
         };
         let mut shapes: Vec<&dyn Shape> = vec![&*body];
         if !self.spray.tree().view().is_empty() {
@@ -326,9 +327,10 @@ impl SurfaceBuilder {
 
 /// The part of `spheres` in `region`.
 fn cut<'a, S: CutShape + 'a>(spheres: S, region: &'a ConvexRegion) -> Box<dyn Shape + 'a> {
-    match region.is_everywhere() {
-        true => Box::new(spheres),
-        false => Box::new(CutSpheres::new(spheres, region)),
+    if region.is_everywhere() {
+        Box::new(spheres)
+    } else {
+        Box::new(CutSpheres::new(spheres, region))
     }
 }
 

@@ -25,9 +25,7 @@ pub(super) fn settings(
         });
     }
     let is_wanted = manifest.render.denoise.unwrap_or(is_path && has_samples);
-    let settings = match material.transmission > 0.0 {
-        true => DenoiseSettings::WATER,
-        false => DenoiseSettings::OPAQUE,
-    };
+    let settings =
+        if material.transmission > 0.0 { DenoiseSettings::WATER } else { DenoiseSettings::OPAQUE };
     Ok(is_wanted.then_some(settings))
 }

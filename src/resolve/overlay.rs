@@ -352,10 +352,12 @@ fn colors(behind: Vec3, own: Option<Vec3>) -> (Color, Color) {
     let text = own.unwrap_or(if is_light { Vec3::ZERO } else { Vec3::ONE });
     // A halo in the colour of the backdrop is invisible over it
     let contrasts = (text.dot(LUMINANCE) > MIDDLE) != is_light;
-    let halo = match contrasts {
-        true => behind,
-        false if is_light => Vec3::ZERO,
-        false => Vec3::ONE,
+    let halo = if contrasts {
+        behind
+    } else if is_light {
+        Vec3::ZERO
+    } else {
+        Vec3::ONE
     };
     (srgb(text), srgb(halo))
 }

@@ -104,9 +104,10 @@ fn name(text: &str) -> Result<(Token, &str), String> {
     let is_part = |c: char| is_name(c) || c.is_numeric() || c == '.';
     if let Some(quoted) = text.strip_prefix('`') {
         let (name, rest) = quoted.split_once('`').ok_or("a backquote has no second one")?;
-        let end = match rest.starts_with('.') {
-            true => rest.find(|c| !is_part(c)).unwrap_or(rest.len()),
-            false => 0,
+        let end = if rest.starts_with('.') {
+            rest.find(|c| !is_part(c)).unwrap_or(rest.len())
+        } else {
+            0
         };
         let name = format!("{name}{}", &rest[..end]);
         return Ok((Token::Name(name), &rest[end..]));

@@ -303,10 +303,7 @@ const STANDING: f64 = 0.3;
 impl Survey {
     /// Length of the unit of a table of radii in the unit of the positions.
     pub fn unit_of(&self, table: &RadiusTable) -> f64 {
-        match table.is_of_elements() {
-            true => self.angstrom,
-            false => 1.0,
-        }
+        if table.is_of_elements() { self.angstrom } else { 1.0 }
     }
 
     /// Whether particles lie on a floor at the lower end of the axis `up` at some time: a whole layer of them is at the
@@ -559,9 +556,10 @@ impl Totals {
         let weight = |raw: &RawParticles| {
             SurfaceWeight::of(raw, place, sample.spacing, surface, question.radius)
         };
-        let found = match sample.is_part() {
-            true => sequence.load_raw(index).ok().and_then(|raw| weight(&raw)),
-            false => weight(&sample.particles),
+        let found = if sample.is_part() {
+            sequence.load_raw(index).ok().and_then(|raw| weight(&raw))
+        } else {
+            weight(&sample.particles)
         };
         self.surfaces.extend(found);
     }

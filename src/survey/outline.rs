@@ -231,10 +231,7 @@ fn beyond(
     (outside, part): (usize, f64),
 ) -> Vec<Outlier> {
     let [low, high] = layers(sample, axis, outside);
-    let margin = match sample.len() < FEW {
-        true => longest,
-        false => part * (high - low),
-    };
+    let margin = if sample.len() < FEW { longest } else { part * (high - low) };
     let outliers = sample.iter().enumerate().map(|(index, p)| {
         let along = p.dot(axis);
         let distance = (low - along).max(along - high);

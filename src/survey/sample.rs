@@ -282,12 +282,11 @@ fn stored_spacing(
     let Some((touching, closest)) = half_median_and_least(distances) else {
         return Ok(None);
     };
-    let packed = match request.needs_packed {
-        true => {
-            let counts = frame.neighbour_counts(NEIGHBOUR_QUERIES, packing::reach(touching))?;
-            packing::packed_radius(touching, counts)
-        }
-        false => None,
+    let packed = if request.needs_packed {
+        let counts = frame.neighbour_counts(NEIGHBOUR_QUERIES, packing::reach(touching))?;
+        packing::packed_radius(touching, counts)
+    } else {
+        None
     };
     Ok(Some(Spacing { touching, closest, packed }))
 }

@@ -125,9 +125,10 @@ pub(super) fn spacing(
     let Some((touching, closest)) = half_nearest(source, &queries)? else {
         return Ok(None);
     };
-    let packed = match request.needs_packed {
-        true => packing::packed_radius(touching, around(source, &queries, touching)?),
-        false => None,
+    let packed = if request.needs_packed {
+        packing::packed_radius(touching, around(source, &queries, touching)?)
+    } else {
+        None
     };
     Ok(Some(Spacing { touching, closest, packed }))
 }

@@ -143,17 +143,23 @@ pub(super) fn channel_picture(
         }
         ChannelKind::Depth => {
             let values = kind.values(planes)?;
-            let gray = |v: &f32| match v.is_finite() {
-                true => [unit_byte(1.0 - 0.85 * ranges.part(kind, *v)); 3],
-                false => [0; 3],
+            let gray = |v: &f32| {
+                if v.is_finite() {
+                    [unit_byte(1.0 - 0.85 * ranges.part(kind, *v)); 3]
+                } else {
+                    [0; 3]
+                }
             };
             values.iter().flat_map(gray).collect()
         }
         ChannelKind::Speed | ChannelKind::Attribute(_) => {
             let values = kind.values(planes)?;
-            let color = |v: &f32| match v.is_finite() {
-                true => VIRIDIS.eval_continuous(f64::from(ranges.part(kind, *v))).as_array(),
-                false => [0; 3],
+            let color = |v: &f32| {
+                if v.is_finite() {
+                    VIRIDIS.eval_continuous(f64::from(ranges.part(kind, *v))).as_array()
+                } else {
+                    [0; 3]
+                }
             };
             values.iter().flat_map(color).collect()
         }

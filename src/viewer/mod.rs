@@ -130,10 +130,8 @@ pub fn viewer_page(
         }
         all.push(json!({ "number": frame.number, "source": source }));
     }
-    let content = match settings.data {
-        true => add_data(frames, settings, &mut all)?,
-        false => PageContent::default(),
-    };
+    let content =
+        if settings.data { add_data(frames, settings, &mut all)? } else { PageContent::default() };
     let data = json!({
         "generator": MARKER,
         "rate": settings.rate,
@@ -259,9 +257,10 @@ fn plan(
             }
             content.channels = channels.iter().map(|kind| kind.name().to_owned()).collect();
             content.id_width = has_ids.then_some(samples[0].size[0]);
-            content.values = match has_ids {
-                true => ids::value_names(&samples[0], &settings.attributes),
-                false => Vec::new(),
+            content.values = if has_ids {
+                ids::value_names(&samples[0], &settings.attributes)
+            } else {
+                Vec::new()
             };
             return Ok(Some(plan));
         }

@@ -59,10 +59,8 @@ fn albedos(shop: &Workshop) -> [Vec3; COUNT as usize] {
 
 #[track_caller]
 fn assert_colors(shop: &Workshop, options: &[&str], map: &ColorMap, values: [f32; COUNT as usize]) {
-    let radius: &[&str] = match options.contains(&"input.radius.attribute=size") {
-        true => &[],
-        false => &["--radius", "0.3"],
-    };
+    let radius: &[&str] =
+        if options.contains(&"input.radius.attribute=size") { &[] } else { &["--radius", "0.3"] };
     for input in ["in", "native"] {
         render(shop, input, &[radius, options].concat()).expect(0);
         for (found, value) in albedos(shop).into_iter().zip(values) {

@@ -126,10 +126,8 @@ impl PeriodicImages {
         for bond in &particles.bonds {
             let [from, to] = bond.map(|index| particles.positions.get(index as usize));
             let way = (inverse * (to - from)).round().to_array();
-            let cells: [i64; 3] = std::array::from_fn(|edge| match cell.periodic[edge] {
-                true => way[edge] as i64,
-                false => 0,
-            });
+            let cells: [i64; 3] =
+                std::array::from_fn(|edge| if cell.periodic[edge] { way[edge] as i64 } else { 0 });
             for image in 0..self.count() as usize {
                 let along = self.along(image);
                 let other: [usize; 3] = std::array::from_fn(|edge| {

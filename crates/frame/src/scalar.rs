@@ -63,10 +63,8 @@ impl ScalarType {
             let fits_f32 = self.is_exact_in_f32() && other.is_exact_in_f32();
             return if fits_f32 { Self::F32 } else { Self::F64 };
         }
-        let (large, small) = match self.size() >= other.size() {
-            true => (self, other),
-            false => (other, self),
-        };
+        let (large, small) =
+            if self.size() >= other.size() { (self, other) } else { (other, self) };
         match (is_signed(large), is_signed(small)) {
             (true, true) | (false, false) => large,
             (true, false) if large.size() > small.size() => large,

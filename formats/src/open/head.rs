@@ -107,10 +107,7 @@ fn with_reader_among<T>(
 pub(crate) fn head(path: &Path) -> Result<Vec<u8>, FrameError> {
     regular_len(path)?;
     let mut stream = decompressor(path, MemoryBudget::UNLIMITED)?;
-    let most = match stream.is_compressed() {
-        true => HEAD_LEN,
-        false => 4 * HEAD_LEN,
-    };
+    let most = if stream.is_compressed() { HEAD_LEN } else { 4 * HEAD_LEN };
     let mut head = Vec::new();
     match stream.fill(&mut head, most) {
         Err(StreamError::Io(error)) => Err(FrameError::io(path, error)),

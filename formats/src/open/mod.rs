@@ -211,14 +211,13 @@ impl FrameFile {
         let in_file = |e: StreamError| e.in_file(path);
         let mut notes = Vec::new();
         let stream = Decompressor::new(Cursor::new(&bytes), budget).map_err(in_file)?;
-        let unpacked = match stream.is_compressed() {
-            true => {
-                let mut unpacked = Vec::new();
-                let left = stream.finish(&mut unpacked, budget.for_content());
-                notes.extend(left.map_err(in_file)?);
-                Some(unpacked)
-            }
-            false => None,
+        let unpacked = if stream.is_compressed() {
+            let mut unpacked = Vec::new();
+            let left = stream.finish(&mut unpacked, budget.for_content());
+            notes.extend(left.map_err(in_file)?);
+            Some(unpacked)
+        } else {
+            None
         };
         let bytes = unpacked.unwrap_or(bytes);
         Self::new(path, Content::whole(bytes), stored_len, notes, budget)

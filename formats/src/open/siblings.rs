@@ -53,9 +53,10 @@ impl Siblings for SiblingFiles {
         };
         let written = Path::new(name);
         // Directories move with all their files, so only the name counts of an absolute path
-        let inside = match written.is_absolute() {
-            true => Path::new(written.file_name().unwrap_or_default()),
-            false => written,
+        let inside = if written.is_absolute() {
+            Path::new(written.file_name().unwrap_or_default())
+        } else {
+            written
         };
         let is_inside = |part| matches!(part, Component::Normal(_) | Component::CurDir);
         if !inside.components().all(is_inside) {

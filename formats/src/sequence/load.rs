@@ -71,10 +71,7 @@ impl Sequence {
         for part in &frame.parts {
             // A list can name any number of files for one step, and a step may be divided among files
             let is_divided = part.listed.is_some() || self.parts.len() < 2;
-            let budget = match is_divided {
-                true => self.budget.less(read_bytes),
-                false => self.budget,
-            };
+            let budget = if is_divided { self.budget.less(read_bytes) } else { self.budget };
             let (file, step) = self.file_of(part, budget)?;
             let mut particles = file.read(step)?;
             if let Some(topology) = &self.topology {

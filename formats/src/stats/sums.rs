@@ -18,10 +18,7 @@ pub(super) enum Sum {
 impl Sum {
     /// No values of the type of `is_float`.
     pub(super) fn new(is_float: bool) -> Self {
-        match is_float {
-            true => Self::Float(FloatSum::new()),
-            false => Self::Int(IntSum::default()),
-        }
+        if is_float { Self::Float(FloatSum::new()) } else { Self::Int(IntSum::default()) }
     }
 
     /// Adds the values of `component` of the particles that `keep` marks.

@@ -125,12 +125,11 @@ fn mutated_inputs_keep_the_promises() {
             .iter()
             .map(|path| fs::read(path).expect("readable"))
             .collect();
-        let mut runner = match is_long {
-            true => TestRunner::new(config.clone()),
-            false => {
-                let random = TestRng::deterministic_rng(RngAlgorithm::ChaCha);
-                TestRunner::new_with_rng(config.clone(), random)
-            }
+        let mut runner = if is_long {
+            TestRunner::new(config.clone())
+        } else {
+            let random = TestRng::deterministic_rng(RngAlgorithm::ChaCha);
+            TestRunner::new_with_rng(config.clone(), random)
         };
         let edited = (any::<Index>(), vec(Edit::any(), 1..6));
         let kept = runner.run(&edited, |(input, edits)| {

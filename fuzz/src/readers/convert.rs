@@ -51,13 +51,15 @@ fn settings(choice: u8) -> ConvertSettings {
             (true, true) => None,
         },
         bound: if is_set(0x20) { Bound::Length(1e-3) } else { Bound::None },
-        radius: match is_set(0x40) {
-            true => RadiusRule::All(0.5),
-            false => RadiusRule::Source { otherwise: Some(0.25) },
+        radius: if is_set(0x40) {
+            RadiusRule::All(0.5)
+        } else {
+            RadiusRule::Source { otherwise: Some(0.25) }
         },
-        other_attributes: match is_set(0x80) {
-            true => AttributeChoice::Ranged,
-            false => AttributeChoice::AsIs,
+        other_attributes: if is_set(0x80) {
+            AttributeChoice::Ranged
+        } else {
+            AttributeChoice::AsIs
         },
         keep_ids: is_set(0x80),
         memory: ConvertSettings::LEAST_MEMORY,

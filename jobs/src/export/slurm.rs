@@ -170,10 +170,7 @@ impl ArrayScript<'_> {
         let words = words
             .map(|word| Ok(format!(" {}", shell_word("argument", word)?)))
             .collect::<Result<String, ExportError>>()?;
-        let limit = match self.command.limit_memory {
-            true => LIMIT_MEMORY,
-            false => "",
-        };
+        let limit = if self.command.limit_memory { LIMIT_MEMORY } else { "" };
         Ok(format!(
             "\n\
              set -- --frames \"$frames\" --threads \"${{SLURM_CPUS_PER_TASK:-1}}\"\n\

@@ -66,9 +66,10 @@ pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
     let movie = args.movie.as_deref();
     let movie = movie.map(|path| MovieAfter::new(path, &requested, args.run.job.force));
     let movie = movie.transpose()?;
-    let outcome = match settings.follow {
-        true => follow::run(&args.run.job, requested, &signals)?,
-        false => run_once(&args.run.job, requested, &signals)?,
+    let outcome = if settings.follow {
+        follow::run(&args.run.job, requested, &signals)?
+    } else {
+        run_once(&args.run.job, requested, &signals)?
     };
     match movie {
         Some(movie) if outcome == Outcome::Done => Ok(movie.make(signals.start_work())),

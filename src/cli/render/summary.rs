@@ -118,9 +118,10 @@ pub(in crate::cli) fn parts_text(sequence: &Sequence) -> Option<String> {
     if all.len() < 2 {
         return None;
     }
-    let used = match kept.len() == all.len() {
-        true => "; --parts selects some of them".to_owned(),
-        false => format!("; used: {}", kept.join(", ")),
+    let used = if kept.len() == all.len() {
+        "; --parts selects some of them".to_owned()
+    } else {
+        format!("; used: {}", kept.join(", "))
     };
     Some(format!("each step has the parts {}{used}", all.join(", ")))
 }

@@ -134,9 +134,10 @@ impl Camera {
         let is_perspective = self.projection == ProjectionKind::Perspective;
         let is_panorama = self.projection == ProjectionKind::Equirectangular;
         if !is_perspective {
-            let instead = match is_panorama {
-                true => "an equirectangular picture shows all directions",
-                false => "an orthographic picture has a height instead",
+            let instead = if is_panorama {
+                "an equirectangular picture shows all directions"
+            } else {
+                "an orthographic picture has a height instead"
             };
             if self.fov != DEFAULT_FOV {
                 section.wrong("fov", &format!("is given, but {instead}; remove it"));

@@ -150,9 +150,10 @@ impl Value for DVec3 {
     const FLAG: FlagKind = FlagKind::Numbers;
 
     fn kind(key: &Key) -> String {
-        let kind = match key.is_direction {
-            true => "three numbers that are not all 0, such as [0.0, 0.0, 1.0]",
-            false => "three numbers, such as [0.0, 1.0, 2.0]",
+        let kind = if key.is_direction {
+            "three numbers that are not all 0, such as [0.0, 0.0, 1.0]"
+        } else {
+            "three numbers, such as [0.0, 1.0, 2.0]"
         };
         kind.to_owned()
     }

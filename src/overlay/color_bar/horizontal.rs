@@ -56,9 +56,10 @@ impl ColorBar {
         }
         let before = before.ceil();
         let heading = self.heading(ticks.exponent);
-        let top = match heading.is_empty() {
-            true => pen.line,
-            false => (pen.text_size(&heading)[1] + TITLE_GAP * size).round(),
+        let top = if heading.is_empty() {
+            pen.line
+        } else {
+            (pen.text_size(&heading)[1] + TITLE_GAP * size).round()
         };
         let below = match &self.kind {
             ColorBarKind::Numbers { .. } => LABEL_BELOW + 0.5 * font::CAP_HEIGHT,

@@ -93,9 +93,10 @@ impl MemoryModel<'_> {
         let keeping = attributes + self.kept(frame) + n;
         // Indices of those that are drawn, with a mark for each particle while they are found; and a copy of one array
         // after the other, for allocators that cannot shrink one in its place
-        let selecting = match self.setup.picture.selection.is_all() {
-            true => 0,
-            false => frame.raw + (4 * n + frame.positions.max(attributes)).max(5 * n),
+        let selecting = if self.setup.picture.selection.is_all() {
+            0
+        } else {
+            frame.raw + (4 * n + frame.positions.max(attributes)).max(5 * n)
         };
         let held = rounding.max(keeping) + self.file_indices(frame);
         let reading = (files + frame.raw).max(shared + held.max(selecting));
@@ -111,10 +112,7 @@ impl MemoryModel<'_> {
 
     /// Bytes of the places of particles in their file, if some of them are not drawn.
     fn file_indices(&self, frame: &FrameSize) -> u64 {
-        match self.setup.picture.selection.is_all() {
-            true => 0,
-            false => 4 * frame.particles,
-        }
+        if self.setup.picture.selection.is_all() { 0 } else { 4 * frame.particles }
     }
 
     /// Memory that the allocator retains after the buffers for reading a frame are freed: all of it, if there are

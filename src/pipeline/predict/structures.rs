@@ -64,10 +64,7 @@ impl MemoryModel<'_> {
 
     /// Memory of a tree of moving spheres; none without motion blur.
     fn moving_tree(&self, particles: u64) -> u64 {
-        match self.setup.has_motion() {
-            true => MovingTree::predicted_bytes(particles),
-            false => 0,
-        }
+        if self.setup.has_motion() { MovingTree::predicted_bytes(particles) } else { 0 }
     }
 
     /// Memory of the surface of a frame: normals need none, spray has a tree, and a smooth surface has its grid. With

@@ -73,9 +73,10 @@ fn surface<'a>(
     match shot.surface.kind {
         SurfaceKind::Spheres => {
             let spheres = SphereSurface::new(tree).with_normals(normals);
-            match shot.cut.is_everywhere() {
-                true => Box::new(spheres),
-                false => Box::new(CutSpheres::new(spheres, &shot.cut)),
+            if shot.cut.is_everywhere() {
+                Box::new(spheres)
+            } else {
+                Box::new(CutSpheres::new(spheres, &shot.cut))
             }
         }
         SurfaceKind::Union => Box::new(UnionSurface::new(tree).with_normals(normals)),

@@ -63,9 +63,10 @@ impl FrameHeader {
     /// [`io::Error`] if a frame of so much content cannot be so long.
     pub(super) fn body_len(&self) -> io::Result<usize> {
         let body_len = self.frame_len - HEADER;
-        match body_len <= self.len {
-            true => Ok(body_len),
-            false => Err(damaged("a frame is longer than its content")),
+        if body_len <= self.len {
+            Ok(body_len)
+        } else {
+            Err(damaged("a frame is longer than its content"))
         }
     }
 
@@ -182,10 +183,7 @@ fn decompress(codec: u8, compressed: &[u8], output: &mut [u8]) -> io::Result<()>
         4 => return Err(unsupported("compressed with zstd")),
         _ => return Err(damaged("an unknown codec")),
     };
-    match written == output.len() {
-        true => Ok(()),
-        false => Err(damaged("a stream has another length")),
-    }
+    if written == output.len() { Ok(()) } else { Err(damaged("a stream has another length")) }
 }
 
 /// Puts the bytes of each element together again: `shuffled` has the first bytes of all elements, then the second ones.

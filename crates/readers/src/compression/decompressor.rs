@@ -251,13 +251,10 @@ impl<R: BufRead + Seek> Decompressor<R> {
         } else {
             String::new()
         };
-        let what = match is_early_end(&error) {
-            true => {
-                format!(
-                    "the {name} stream ends early here{place}; perhaps it is still being written"
-                )
-            }
-            false => format!("the {name} stream is damaged: {error}"),
+        let what = if is_early_end(&error) {
+            format!("the {name} stream ends early here{place}; perhaps it is still being written")
+        } else {
+            format!("the {name} stream is damaged: {error}")
         };
         ParseError::malformed(at, what).into()
     }

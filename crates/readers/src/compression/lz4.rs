@@ -72,10 +72,7 @@ impl<R: Read> Lz4Frame<R> {
     /// Decodes the next block, or checks the end of the frame.
     fn next_block(&mut self) -> io::Result<()> {
         // Keep what the block may refer to
-        let kept = match self.header.has_linked_blocks {
-            true => self.decoded.len().min(WINDOW),
-            false => 0,
-        };
+        let kept = if self.header.has_linked_blocks { self.decoded.len().min(WINDOW) } else { 0 };
         self.decoded.drain(..self.decoded.len() - kept);
         self.returned = kept;
         // Read the block

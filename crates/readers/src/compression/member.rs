@@ -140,10 +140,7 @@ impl<R: BufRead> Read for StreamDecoder<R> {
 }
 
 fn check(need: u64, most: u64) -> io::Result<()> {
-    match need <= most {
-        true => Ok(()),
-        false => Err(io::ErrorKind::OutOfMemory.into()),
-    }
+    if need <= most { Ok(()) } else { Err(io::ErrorKind::OutOfMemory.into()) }
 }
 
 /// The window of the zstd frame that `head` begins with; `None` if the frame has none but holds its content as a whole.
@@ -164,10 +161,7 @@ fn zstd_error(error: FrameDecoderError, most: u64) -> io::Error {
         FrameDecoderError::FrameHeaderError(FrameHeaderError::WindowTooBig { .. }) => true,
         _ => false,
     };
-    match is_window {
-        true => io::ErrorKind::OutOfMemory.into(),
-        false => io::Error::other(error),
-    }
+    if is_window { io::ErrorKind::OutOfMemory.into() } else { io::Error::other(error) }
 }
 
 /// Whether the file ended within the stream.

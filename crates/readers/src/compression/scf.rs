@@ -120,10 +120,7 @@ impl<R: BufRead> ScfReader<R> {
         self.decoder.body.clear();
         let body = &mut self.decoder.body;
         let read = self.reader.by_ref().take(body_len as u64).read_to_end(body)?;
-        match read == body_len {
-            true => Ok(()),
-            false => Err(io::ErrorKind::UnexpectedEof.into()),
-        }
+        if read == body_len { Ok(()) } else { Err(io::ErrorKind::UnexpectedEof.into()) }
     }
 
     /// Checks the index at which the reader is, behind its bytes `end`, without keeping it.

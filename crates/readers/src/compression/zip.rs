@@ -113,9 +113,10 @@ impl<R: BufRead + Seek> ZipReader<R> {
     pub(super) fn new(mut reader: R, file: ZippedFile) -> io::Result<Self> {
         reader.seek(SeekFrom::Start(file.start))?;
         let stored = reader.take(file.stored_len);
-        let source = match file.is_deflated {
-            true => ZipSource::Deflated(DeflateDecoder::new(stored)),
-            false => ZipSource::Stored(stored),
+        let source = if file.is_deflated {
+            ZipSource::Deflated(DeflateDecoder::new(stored))
+        } else {
+            ZipSource::Stored(stored)
         };
         let crc = Crc::new();
         Ok(Self { source, file, crc })

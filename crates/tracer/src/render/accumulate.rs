@@ -18,9 +18,10 @@ impl SampleGroup {
             let sum = pixel_sum(&self.radiance, &self.coverage, range.clone());
             let mean = sum.map(|v| v * share);
             let [r, g, b, a] = mean;
-            let color = match is_bounded {
-                true => [r.max(0.0), g.max(0.0), b.max(0.0), a.clamp(0.0, 1.0)],
-                false => [r, g, b, a],
+            let color = if is_bounded {
+                [r.max(0.0), g.max(0.0), b.max(0.0), a.clamp(0.0, 1.0)]
+            } else {
+                [r, g, b, a]
             };
             tile.set_color(pixel.column, pixel.row, color);
             tile.set_data(pixel.column, pixel.row, &pixel.data);

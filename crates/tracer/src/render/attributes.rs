@@ -266,10 +266,7 @@ impl RenderContext<'_> {
         };
         let point = lane3(&hits.point, lane);
         let velocity = particle.map_or(Vec3::ZERO, |particle| self.source.velocity(particle));
-        let motion = match channels.layers.motion {
-            true => self.motion(point, velocity),
-            false => [0.0; 2],
-        };
+        let motion = if channels.layers.motion { self.motion(point, velocity) } else { [0.0; 2] };
         DataSample {
             z,
             normal: if direction.dot(normal) < 0.0 { normal } else { -normal },

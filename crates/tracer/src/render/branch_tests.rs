@@ -67,10 +67,7 @@ fn equation_4_1(surface: &Balls, scene: &Scene, ray: &Ray, levels: u32) -> Vec3 
     };
     let enters = ray.direction.dot(hit.normal) < 0.0;
     let ior = scene.material.ior;
-    let (normal, ratio) = match enters {
-        true => (hit.normal, 1.0 / ior),
-        false => (-hit.normal, ior),
-    };
+    let (normal, ratio) = if enters { (hit.normal, 1.0 / ior) } else { (-hit.normal, ior) };
     let step = hit.offset * normal;
     let below = |from, to| equation_4_1(surface, scene, &Ray::new(from, to), levels - 1);
     let mirrored = below(hit.anchor + step, reflect(ray.direction, normal));

@@ -48,10 +48,7 @@ impl RenderContext<'_> {
                 data: DataSample::MISS,
             });
             let points = self.sampler.points(column_number, row_number);
-            let [x, y] = match is_right {
-                true => [x % eye_size[0], y % eye_size[1]],
-                false => [x, y],
-            };
+            let [x, y] = if is_right { [x % eye_size[0], y % eye_size[1]] } else { [x, y] };
             group.push_pixel(x as f32, y as f32, points);
         }
     }

@@ -104,9 +104,8 @@ impl LightSplit {
 
 /// `part / whole` per component, 1 where nothing is divided.
 pub(super) fn ratio(part: &Lanes3, whole: &Lanes3) -> Lanes3 {
-    let component = |axis: usize, lane: usize| match whole[axis][lane] > 0.0 {
-        true => part[axis][lane] / whole[axis][lane],
-        false => 1.0,
+    let component = |axis: usize, lane: usize| {
+        if whole[axis][lane] > 0.0 { part[axis][lane] / whole[axis][lane] } else { 1.0 }
     };
     std::array::from_fn(|axis| std::array::from_fn(|lane| component(axis, lane)))
 }

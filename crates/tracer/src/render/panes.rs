@@ -139,17 +139,15 @@ impl RenderContext<'_> {
 
     /// The lanes of rays that panes reflect.
     pub(super) fn pane_lanes(&self, hits: &Intersections) -> u32 {
-        match self.panes.is_empty() {
-            true => 0,
-            false => self.lanes_of_meshes(hits, MeshMaterial::is_pane),
-        }
+        if self.panes.is_empty() { 0 } else { self.lanes_of_meshes(hits, MeshMaterial::is_pane) }
     }
 
     /// The lanes of camera rays that end at meshes which only hide what is behind them.
     pub(super) fn holdout_lanes(&self, depth: u32, hits: &Intersections) -> u32 {
-        match depth == 1 && self.has_holdouts {
-            true => self.lanes_of_meshes(hits, |mesh| mesh.is_holdout),
-            false => 0,
+        if depth == 1 && self.has_holdouts {
+            self.lanes_of_meshes(hits, |mesh| mesh.is_holdout)
+        } else {
+            0
         }
     }
 
@@ -179,10 +177,7 @@ impl RenderContext<'_> {
             };
             // A smooth normal may reflect to the other side of the surface
             let smooth = mirrored(hit.shading);
-            let reflected = match smooth.dot(geometric) > 0.0 {
-                true => smooth,
-                false => mirrored(geometric),
-            };
+            let reflected = if smooth.dot(geometric) > 0.0 { smooth } else { mirrored(geometric) };
             set_lane3(&mut rays.origin, lane, hit.anchor + hit.offset * geometric);
             set_lane3(&mut rays.direction, lane, reflected);
             set_lane3(&mut rays.throughput, lane, lane3(&packet.throughput, lane));

@@ -196,10 +196,7 @@ enum Occlusion {
 impl Occlusion {
     /// What is in the way of a light source, whose light no path finds behind transmissive surfaces.
     fn of(light: &dyn Light) -> Self {
-        match light.casts_shadow() {
-            true => Self::Straight,
-            false => Self::None,
-        }
+        if light.casts_shadow() { Self::Straight } else { Self::None }
     }
 
     /// The same where photons bring the light that transmissive surfaces focus.

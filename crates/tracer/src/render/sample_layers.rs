@@ -63,9 +63,10 @@ impl SampleLayers {
     /// Memory for `samples`, bytes.
     pub(super) fn bytes(layers: &Layers, samples: usize) -> usize {
         let objects = layers.mattes.iter().count() * size_of::<[u32; LANES]>();
-        let lights = match layers.lights.is_empty() {
-            true => 0,
-            false => (LightClass::COUNT + 1) * size_of::<Lanes3>(),
+        let lights = if layers.lights.is_empty() {
+            0
+        } else {
+            (LightClass::COUNT + 1) * size_of::<Lanes3>()
         };
         let groups = usize::from(layers.light_groups) * size_of::<Lanes3>();
         let direct = if layers.shadow { size_of::<[Lanes; 2]>() } else { 0 };
@@ -163,9 +164,10 @@ impl SampleLayers {
         }
         for group in 0..usize::from(layers.light_groups) {
             let samples = range.clone().map(|s| self.light_of_group(group, s));
-            let limited = match group == self.background_group {
-                true => Vec3::from_slice(&color) - Vec3::from_slice(&mean),
-                false => Vec3::ZERO,
+            let limited = if group == self.background_group {
+                Vec3::from_slice(&color) - Vec3::from_slice(&mean)
+            } else {
+                Vec3::ZERO
             };
             let light = samples.sum::<Vec3>() * share + limited;
             floats[layers.light_group_at(group)].copy_from_slice(&light.to_array());

@@ -116,9 +116,8 @@ impl RenderContext<'_> {
             let material = self.parts.map(|parts| self.material_of(parts, particle));
             material.is_some_and(|material| material != MaterialId::PARTICLES)
         };
-        let fresnel_transmittance = |cosine: f32, particle: u32| match is_opaque(particle) {
-            true => 0.0,
-            false => self.boundary.straight_transmittance(cosine),
+        let fresnel_transmittance = |cosine: f32, particle: u32| {
+            if is_opaque(particle) { 0.0 } else { self.boundary.straight_transmittance(cosine) }
         };
         spheres.transmittance(
             &samples.rays,

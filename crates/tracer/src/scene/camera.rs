@@ -35,9 +35,10 @@ impl CameraView {
     /// The direction of the view; for one along `up`, the direction that points up in the image.
     pub fn heading(&self, up: DVec3) -> DVec3 {
         let forward = self.look_at - self.eye;
-        match forward.cross(up).length() < STEEP * forward.length() * up.length() {
-            true => self.up,
-            false => forward,
+        if forward.cross(up).length() < STEEP * forward.length() * up.length() {
+            self.up
+        } else {
+            forward
         }
     }
 }
@@ -166,9 +167,10 @@ impl Camera {
             return Err(CameraError::NoUp);
         }
         let right = right.normalize();
-        let (up, forward) = match projection.is_panorama() {
-            true => (up_hint, up_hint.cross(right)),
-            false => (right.cross(forward), forward),
+        let (up, forward) = if projection.is_panorama() {
+            (up_hint, up_hint.cross(right))
+        } else {
+            (right.cross(forward), forward)
         };
         Ok(Self {
             eye: (view.eye - origin).as_vec3(),
@@ -202,9 +204,10 @@ impl Camera {
         let d = Vec2::new(2.0 * film.x - 1.0, 1.0 - 2.0 * film.y) * self.half_extent;
         let on_axes = self.projection.direction(d.to_array());
         let direction = on_axes.z * self.forward + on_axes.x * self.right + on_axes.y * self.up;
-        let origin = match self.projection.has_one_origin() {
-            true => self.eye,
-            false => self.eye + d.x * self.right + d.y * self.up,
+        let origin = if self.projection.has_one_origin() {
+            self.eye
+        } else {
+            self.eye + d.x * self.right + d.y * self.up
         };
         Ray::new(origin, direction.normalize())
     }
@@ -253,9 +256,10 @@ impl Camera {
 
     /// Distance of `point` from the eye along the view axis; in a panorama, in any direction.
     pub fn depth_of(&self, point: Vec3) -> f32 {
-        match self.projection.is_panorama() {
-            true => (point - self.eye).length(),
-            false => (point - self.eye).dot(self.forward),
+        if self.projection.is_panorama() {
+            (point - self.eye).length()
+        } else {
+            (point - self.eye).dot(self.forward)
         }
     }
 

@@ -101,10 +101,7 @@ impl ColorMap {
         scale: ColorScale,
     ) -> Result<Self, UnknownColorMap> {
         let (table, is_reversed) = table(name)?;
-        let entry = |i| match is_reversed {
-            true => table.entry(ENTRIES - 1 - i),
-            false => table.entry(i),
-        };
+        let entry = |i| if is_reversed { table.entry(ENTRIES - 1 - i) } else { table.entry(i) };
         let last = (ENTRIES - 1) as f32;
         let [low, high] = range.map(|value| narrow(scale.forward(value)));
         let span = high - low;

@@ -127,10 +127,7 @@ impl Framed {
 
     /// The part of the height or the width of the image that the particles may fill.
     fn used_part(&self) -> f64 {
-        match self.is_centred {
-            true => 1.0 - SPHERES_MARGIN,
-            false => 1.0 - BOX_MARGIN,
-        }
+        if self.is_centred { 1.0 - SPHERES_MARGIN } else { 1.0 - BOX_MARGIN }
     }
 
     /// Minimum distance for a single point, which would otherwise be fitted at distance 0.
@@ -179,10 +176,7 @@ fn centred(places: &[[f64; 2]], reach: f64, distance: f64, start: f64) -> f64 {
         xs.fold((start, start), |(low, high), x| (low.min(x - reach), high.max(x + reach)));
     for _ in 0..HALVINGS {
         let middle = 0.5 * (low + high);
-        match difference(middle) > 0.0 {
-            true => low = middle,
-            false => high = middle,
-        }
+        if difference(middle) > 0.0 { low = middle } else { high = middle }
     }
     0.5 * (low + high)
 }

@@ -223,10 +223,7 @@ impl Ground {
         let length = sample.width / cosine.abs().max(MIN_COSINE);
         let footprint =
             Footprint { long: on_image(length * forward), short: sample.width / image.width };
-        let beyond = match image.repeats {
-            true => Beyond::Repeat,
-            false => Beyond::Plain(self.color),
-        };
+        let beyond = if image.repeats { Beyond::Repeat } else { Beyond::Plain(self.color) };
         image.texture.color(position, &footprint, beyond)
     }
 

@@ -49,10 +49,7 @@ impl RgbEncoding {
                 Self::Srgb8 => value / 255.0,
                 Self::Srgb16 => value / 65535.0,
             };
-            let part = match part.is_nan() {
-                true => 0.0,
-                false => part.clamp(0.0, 1.0) as f32,
-            };
+            let part = if part.is_nan() { 0.0 } else { part.clamp(0.0, 1.0) as f32 };
             match self {
                 Self::Linear => part,
                 Self::Srgb8 | Self::Srgb16 => linear_from_srgb(part),

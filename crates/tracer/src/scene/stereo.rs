@@ -41,9 +41,10 @@ impl StereoSettings {
         let half_distance = 0.5 * self.eye_distance.unwrap_or(EYE_DISTANCE * target);
         #[expect(clippy::cast_possible_truncation, reason = "the renderer works in f32")]
         let [half_distance, convergence] = [half_distance as f32, convergence as f32];
-        match half_distance.is_finite() && convergence > 0.0 {
-            true => Ok(Stereo { half_distance, convergence }),
-            false => Err(CameraError::Eyes),
+        if half_distance.is_finite() && convergence > 0.0 {
+            Ok(Stereo { half_distance, convergence })
+        } else {
+            Err(CameraError::Eyes)
         }
     }
 }

@@ -88,9 +88,10 @@ impl Texture {
     /// [`TextureError::Size`].
     pub fn check_size(width: usize, height: usize) -> Result<(), TextureError> {
         let count = width as u128 * height as u128;
-        match (1..=u128::from(MAX_TEXTURE_PIXELS)).contains(&count) {
-            true => Ok(()),
-            false => Err(TextureError::Size { width, height }),
+        if (1..=u128::from(MAX_TEXTURE_PIXELS)).contains(&count) {
+            Ok(())
+        } else {
+            Err(TextureError::Size { width, height })
         }
     }
 

@@ -65,9 +65,10 @@ impl Hierarchy {
             Aabb::new((min - padding).into(), (max + padding).into())
         };
         let boxes: Vec<Aabb> = (0..count).into_par_iter().map(padded).collect();
-        let bvh = match boxes.is_empty() {
-            true => CwBvh::default(),
-            false => build_cwbvh(&boxes, BvhBuildParams::medium_build(), &mut Duration::default()),
+        let bvh = if boxes.is_empty() {
+            CwBvh::default()
+        } else {
+            build_cwbvh(&boxes, BvhBuildParams::medium_build(), &mut Duration::default())
         };
         Self { bvh, space }
     }
@@ -114,10 +115,7 @@ impl Hierarchy {
             return false;
         };
         !self.bvh.ray_traverse_miss(traversal, |_, slot| {
-            match is_hit(self.bvh.primitive_indices[slot]) {
-                true => 0.0,
-                false => f32::INFINITY,
-            }
+            if is_hit(self.bvh.primitive_indices[slot]) { 0.0 } else { f32::INFINITY }
         })
     }
 

@@ -129,10 +129,7 @@ impl StoredTree {
         let cost = self.build_levels(leaves, &shape, &counts, padding)?;
         self.shape = shape;
         self.radius = settings.radius;
-        self.ties = match settings.keep_indices {
-            true => TieOrder::Index,
-            false => TieOrder::Center,
-        };
+        self.ties = if settings.keep_indices { TieOrder::Index } else { TieOrder::Center };
         clock.lap("nodes");
         Ok(self.report(leaves, settings.structure, cost, clock))
     }

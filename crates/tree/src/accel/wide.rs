@@ -194,9 +194,10 @@ impl WideTree {
         let nodes = &mut self.nodes[..];
         let built = build_levels(nodes, &counts, mapped_level, self.padding, child);
         self.mapped = built.mapped;
-        self.bounds = match blocks.is_empty() {
-            true => Aabb::EMPTY,
-            false => built.bounds.padded(self.padding).rounded_outwards(),
+        self.bounds = if blocks.is_empty() {
+            Aabb::EMPTY
+        } else {
+            built.bounds.padded(self.padding).rounded_outwards()
         };
         sah_cost(built.child_areas, self.bounds)
     }

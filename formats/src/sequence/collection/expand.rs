@@ -347,11 +347,10 @@ fn fault_of_chain(chain: &[Arc<Path>], target: &Path) -> Option<String> {
     let is_cycle = chain.iter().any(|list| **list == *target);
     is_cycle.then(|| {
         let name = target.file_name().unwrap_or_default().to_string_lossy();
-        match chain.last().is_some_and(|last| **last == *target) {
-            true => "the file lists itself; remove this entry".to_owned(),
-            false => {
-                format!("it lists `{name}`, which lists this file: a cycle; remove one of the two")
-            }
+        if chain.last().is_some_and(|last| **last == *target) {
+            "the file lists itself; remove this entry".to_owned()
+        } else {
+            format!("it lists `{name}`, which lists this file: a cycle; remove one of the two")
         }
     })
 }

@@ -83,9 +83,12 @@ impl PartTable {
         let named: Vec<PartKey> = keys
             .iter()
             .zip(&plain)
-            .map(|(key, plain)| match shared.contains(plain) {
-                true => PartKey { stem: key.stem.clone(), ..plain.clone() },
-                false => plain.clone(),
+            .map(|(key, plain)| {
+                if shared.contains(plain) {
+                    PartKey { stem: key.stem.clone(), ..plain.clone() }
+                } else {
+                    plain.clone()
+                }
             })
             .collect();
         // Pieces count if all files are pieces of one part

@@ -23,16 +23,13 @@ impl ListRoot {
     pub(super) fn resolve(&self, list: &Path, name: &str) -> Option<PathBuf> {
         let around = list.parent().unwrap_or(Path::new(""));
         let written = around.join(name);
-        let inside = match Path::new(name).is_absolute() {
-            true => {
-                let directory = normalized(&std::path::absolute(&self.directory).ok()?)?;
-                let path = normalized(&written)?;
-                path.strip_prefix(directory).ok().map(Path::to_owned)
-            }
-            false => {
-                let around = around.strip_prefix(&self.directory).ok();
-                around.and_then(|around| normalized(&around.join(name)))
-            }
+        let inside = if Path::new(name).is_absolute() {
+            let directory = normalized(&std::path::absolute(&self.directory).ok()?)?;
+            let path = normalized(&written)?;
+            path.strip_prefix(directory).ok().map(Path::to_owned)
+        } else {
+            let around = around.strip_prefix(&self.directory).ok();
+            around.and_then(|around| normalized(&around.join(name)))
         };
         match inside {
             Some(inside) => Some(self.directory.join(inside)),

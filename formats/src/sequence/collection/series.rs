@@ -38,10 +38,7 @@ pub(super) fn is_series(head: &[u8]) -> bool {
 /// # Errors
 /// [`ParseError`] at the fault in the JSON.
 pub(super) fn entries(bytes: &[u8]) -> Result<Vec<ListEntry>, ParseError> {
-    let start = match bytes.starts_with(BYTE_ORDER_MARK) {
-        true => BYTE_ORDER_MARK.len(),
-        false => 0,
-    };
+    let start = if bytes.starts_with(BYTE_ORDER_MARK) { BYTE_ORDER_MARK.len() } else { 0 };
     let json = bytes.get(start..).unwrap_or_default();
     let series: Series<'_> =
         serde_json::from_slice(json).map_err(|error| bad_json(bytes, start, &error))?;

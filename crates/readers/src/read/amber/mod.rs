@@ -169,10 +169,7 @@ impl<'a> Trajectory<'a> {
             let variable = variable.filter(|variable| variable.shape == coordinates.shape);
             variable.filter(|variable| variable.check_real(name).is_ok())
         };
-        let frames = match has_frames {
-            true => file.outer_len(&coordinates),
-            false => 1,
-        };
+        let frames = if has_frames { file.outer_len(&coordinates) } else { 1 };
         Ok(Self {
             velocities: alike("velocities"),
             forces: alike("forces"),
@@ -200,9 +197,10 @@ impl<'a> Trajectory<'a> {
         for (name, variable) in self.columns() {
             let scalar = variable.scalar.unwrap_or(ScalarType::F32);
             let stride = 3 * scalar.size();
-            let start = match self.has_frames {
-                true => self.file.outer_start(variable, frame),
-                false => variable.begin,
+            let start = if self.has_frames {
+                self.file.outer_start(variable, frame)
+            } else {
+                variable.begin
             };
             let end = start.saturating_add(stride.saturating_mul(self.count));
             if end > len {

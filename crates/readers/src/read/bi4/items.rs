@@ -261,10 +261,7 @@ impl<'a> ItemReader<'a> {
     /// The count or the length of an array.
     fn length(&mut self) -> Result<usize, ParseError> {
         let at = self.reader.at();
-        let length = match self.is_long {
-            true => self.reader.u64()?,
-            false => self.u32()?.into(),
-        };
+        let length = if self.is_long { self.reader.u64()? } else { self.u32()?.into() };
         usize::try_from(length)
             .map_err(|_| ParseError::malformed(at, format!("the length {length}")))
     }
@@ -272,13 +269,12 @@ impl<'a> ItemReader<'a> {
     /// Reads the text that begins a part of an item.
     fn mark(&mut self, expected: &[u8]) -> Result<(), ParseError> {
         let at = self.reader.at();
-        match self.text()? == expected {
-            true => Ok(()),
-            false => {
-                let expected = String::from_utf8_lossy(expected);
-                let what = format!("{} expected here: the file is damaged here", expected.trim());
-                Err(ParseError::malformed(at, what))
-            }
+        if self.text()? == expected {
+            Ok(())
+        } else {
+            let expected = String::from_utf8_lossy(expected);
+            let what = format!("{} expected here: the file is damaged here", expected.trim());
+            Err(ParseError::malformed(at, what))
         }
     }
 

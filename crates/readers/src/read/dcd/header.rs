@@ -184,10 +184,7 @@ impl DcdHeader {
         let version = number(19)?;
         let is_charmm = version != 0;
         let mut delta = NumberReader::new(bytes, first + 4 + 4 * 9, records.endian);
-        let delta = match is_charmm {
-            true => delta.f32()?.into(),
-            false => delta.f64()?,
-        };
+        let delta = if is_charmm { delta.f32()?.into() } else { delta.f64()? };
         let (first_step, interval, fixed) = (number(1)?, number(2)?, number(8)?);
         let flag = |index| Ok::<_, ParseError>(is_charmm && number(index)? == 1);
         let (has_cell, has_fourth_axis) = (flag(10)?, flag(11)?);

@@ -39,12 +39,13 @@ impl Reader for Gro {
             numbers.iter().all(|number| text::integer(number).is_some())
                 && Columns::of(line).is_ok_and(|columns| columns.position(line).is_ok())
         });
-        Ok(match has_count {
-            true if is_atom && !title_is_count => Confidence::Signature,
-            true => Confidence::IfNamed,
-            // A damaged count, or a file that is still being written.
-            false if is_atom || text.is_at_end() => Confidence::IfNamed,
-            false => Confidence::No,
+        Ok(if has_count && is_atom && !title_is_count {
+            Confidence::Signature
+        } else if has_count || is_atom || text.is_at_end() {
+            // Without a count: a damaged one, or a file that is still being written.
+            Confidence::IfNamed
+        } else {
+            Confidence::No
         })
     }
 

@@ -158,9 +158,10 @@ impl ChunkGrid {
         let packed = packed.unwrap_or_default();
         let is_filtered = (0..layout.filters.len()).any(|i| chunk.filter_mask >> i & 1 == 0);
         let len = self.chunk_len;
-        let unpacked = match is_filtered {
-            false => Ok(Cow::Borrowed(packed)),
-            true => unpack(packed, stored, layout, chunk.filter_mask, len).map(Cow::Owned),
+        let unpacked = if is_filtered {
+            unpack(packed, stored, layout, chunk.filter_mask, len).map(Cow::Owned)
+        } else {
+            Ok(Cow::Borrowed(packed))
         };
         let fault = match unpacked {
             Ok(unpacked) if unpacked.len() == len => return Ok(unpacked),

@@ -196,9 +196,10 @@ impl Snapshot {
             return format!("snapshot of GIZMO {version}");
         }
         let has = |name: &str| matches!(self.root.group(name), Ok(Some(_)));
-        match has("Parameters") && has("Config") {
-            true => "snapshot of AREPO or GADGET-4".to_owned(),
-            false => "snapshot of the GADGET family".to_owned(),
+        if has("Parameters") && has("Config") {
+            "snapshot of AREPO or GADGET-4".to_owned()
+        } else {
+            "snapshot of the GADGET family".to_owned()
         }
     }
 

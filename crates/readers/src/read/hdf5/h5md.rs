@@ -255,9 +255,10 @@ impl Trajectory {
                 let dataset = element.dataset(what).ok()??;
                 dataset_text(&dataset, "unit")
             };
-            let time = match name == POSITION {
-                true => unit("time").map(|unit| format!("time {unit}, ")),
-                false => None,
+            let time = if name == POSITION {
+                unit("time").map(|unit| format!("time {unit}, "))
+            } else {
+                None
             };
             Some(format!("{}{name} {}", time.unwrap_or_default(), unit("value")?))
         };

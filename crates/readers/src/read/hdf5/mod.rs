@@ -120,10 +120,7 @@ impl Reader for Hdf5 {
     fn unpacked_arrays_len(&self, _head: &[u8], file: FileExtent, particles: &RawParticles) -> u64 {
         const CHUNKS_LEN: u64 = 32 << 20;
         let all_steps = particles.byte_len().saturating_mul(file.step_count);
-        match file.byte_len < all_steps {
-            true => particles.largest_array_len().min(CHUNKS_LEN),
-            false => 0,
-        }
+        if file.byte_len < all_steps { particles.largest_array_len().min(CHUNKS_LEN) } else { 0 }
     }
 
     fn piece_count(&self, file: &SharedBytes) -> u64 {

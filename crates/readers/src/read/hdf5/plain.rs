@@ -326,9 +326,10 @@ impl Search {
     /// The error for a file without positions.
     fn nothing(self) -> ParseError {
         let what = "an HDF5 file of no known layout, and without a data set for positions";
-        let found = match self.datasets.is_empty() {
-            true => "no data sets".to_owned(),
-            false => listed(&self.datasets),
+        let found = if self.datasets.is_empty() {
+            "no data sets".to_owned()
+        } else {
+            listed(&self.datasets)
         };
         ParseError::unsupported(format!(
             "{what}; it has {found}; name positions of shape (N, 3) `positions`, or its axes `x`, `y` and `z`"
@@ -346,10 +347,7 @@ impl Dialect for PlainFile {
             time: self.time(0, budget).filter(|_| is_alone),
         };
         let count = usize::try_from(frames).unwrap_or(usize::MAX);
-        Ok(match is_alone {
-            true => vec![info(0)],
-            false => vec![StepInfo::default(); count],
-        })
+        Ok(if is_alone { vec![info(0)] } else { vec![StepInfo::default(); count] })
     }
 
     fn table(&self, step: usize, budget: MemoryBudget) -> Result<ParticleTable, ParseError> {

@@ -89,19 +89,18 @@ pub(super) fn read_list(
     for _ in 0..count {
         let flags = if version == 1 { cursor.read_u8()? } else { 0 };
         // Names may be those of an earlier part
-        let mut name = |is_shared: bool, of: fn(&VirtualPart) -> &Arc<str>| match is_shared {
-            true => {
+        let mut name = |is_shared: bool, of: fn(&VirtualPart) -> &Arc<str>| {
+            if is_shared {
                 let index = cursor.read_length(length_size)?;
                 let part = usize::try_from(index).ok().and_then(|index| parts.get(index));
                 let missing = || Error::InvalidData(format!("the name of part {index} is missing"));
                 part.map(|part| Arc::clone(of(part))).ok_or_else(missing)
+            } else {
+                cursor.read_null_terminated_string().map(Arc::from)
             }
-            false => cursor.read_null_terminated_string().map(Arc::from),
         };
-        let file = match flags & 4 != 0 {
-            true => ".".into(),
-            false => name(flags & 1 != 0, |part| &part.file)?,
-        };
+        let file =
+            if flags & 4 != 0 { ".".into() } else { name(flags & 1 != 0, |part| &part.file)? };
         let dataset = name(flags & 2 != 0, |part| &part.dataset)?;
         let source = read_selection(&mut cursor)?;
         let target = read_selection(&mut cursor)?;

@@ -136,15 +136,9 @@ impl<'a> StoredValues<'a> {
         };
         // Check the number of numbers before memory is taken for them
         let is_paged = *arrangement == Arrangement::Pages;
-        let vectors = match is_paged {
-            true => self.vectors(name, count)?,
-            false => Vec::new(),
-        };
+        let vectors = if is_paged { self.vectors(name, count)? } else { Vec::new() };
         let total = count.checked_mul(self.size);
-        let expected = match is_paged {
-            true => self.stored_count(&vectors, count),
-            false => total,
-        };
+        let expected = if is_paged { self.stored_count(&vectors, count) } else { total };
         if expected != Some(numbers.len()) {
             let what = format!(
                 "attribute `{name}` has {} numbers, which do not fit {count} points of {} components",

@@ -175,11 +175,10 @@ impl AtomRows {
             text.line();
         }
         let Some(columns_at) = columns_at else {
-            let what = match is_core {
-                true => {
-                    "a CIF file of a crystal, which is not read; write .xyz with Open Babel, ASE or OVITO"
-                }
-                false => "a CIF file without the loop _atom_site, so it has no positions",
+            let what = if is_core {
+                "a CIF file of a crystal, which is not read; write .xyz with Open Babel, ASE or OVITO"
+            } else {
+                "a CIF file without the loop _atom_site, so it has no positions"
             };
             return Err(ParseError::unsupported(what));
         };

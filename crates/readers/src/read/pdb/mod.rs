@@ -43,11 +43,10 @@ impl Reader for Pdb {
             .is_some_and(|line| OPENINGS.iter().any(|name| line.text.starts_with(name)));
         let is_sure = head.starts_with(b"HEADER    ")
             || lines.any(|line| is_atom(line) && position(line).is_ok());
-        Ok(match opens {
-            true if is_sure => Confidence::Signature,
-            true => Confidence::IfNamed,
-            false if is_sure => Confidence::Likely,
-            false => Confidence::IfNamed,
+        Ok(match (is_sure, opens) {
+            (true, true) => Confidence::Signature,
+            (true, false) => Confidence::Likely,
+            (false, _) => Confidence::IfNamed,
         })
     }
 

@@ -132,10 +132,7 @@ fn with_layer<T>(
     budget: MemoryBudget,
     read: impl FnOnce(&Layer<'_>, usize) -> Result<T, ParseError>,
 ) -> Result<T, ParseError> {
-    let range = match is_usdz(bytes) {
-        true => package::first_file(bytes)?,
-        false => 0..bytes.len(),
-    };
+    let range = if is_usdz(bytes) { package::first_file(bytes)? } else { 0..bytes.len() };
     let file = bytes.get(range.clone()).unwrap_or_default();
     let result = Layer::open(file, budget).and_then(|layer| read(&layer, file.len()));
     result.map_err(|error| error.behind(range.start))

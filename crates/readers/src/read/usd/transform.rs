@@ -140,9 +140,10 @@ fn operation(
         b"orient" => {
             let [w, x, y, z] = numbers.single::<4>().ok_or_else(wrong)?;
             let quaternion = DQuat::from_xyzw(x, y, z, w);
-            match quaternion.length() > 0.0 {
-                true => DAffine3::from_quat(quaternion.normalize()),
-                false => DAffine3::IDENTITY,
+            if quaternion.length() > 0.0 {
+                DAffine3::from_quat(quaternion.normalize())
+            } else {
+                DAffine3::IDENTITY
             }
         }
         b"transform" => {

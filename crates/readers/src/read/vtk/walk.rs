@@ -406,9 +406,10 @@ impl<'c, 'a> Walker<'c, 'a> {
             return skip_values(&mut self.cursor, self.encoding, stored, values, &what);
         }
         let numbers = self.take(stored, values, &what)?;
-        let numbers = match line.first_word().eq_ignore_ascii_case(b"COLOR_SCALARS") {
-            true => numbers.into_color_codes(),
-            false => numbers,
+        let numbers = if line.first_word().eq_ignore_ascii_case(b"COLOR_SCALARS") {
+            numbers.into_color_codes()
+        } else {
+            numbers
         };
         if is_time {
             self.time = Some(numbers.decode(self.cursor.bytes())?.get_f64(0));

@@ -47,10 +47,12 @@ impl Reader for Xtc {
         let is_magic =
             [MAGIC, MAGIC_LARGE].iter().any(|magic| head.starts_with(&magic.to_be_bytes()));
         let count = |at: usize| head.get(at..at + 4);
-        Ok(match is_magic {
-            true if count(4).is_some() && count(4) == count(52) => Confidence::Signature,
-            true => Confidence::IfNamed,
-            false => Confidence::No,
+        Ok(if !is_magic {
+            Confidence::No
+        } else if count(4).is_some() && count(4) == count(52) {
+            Confidence::Signature
+        } else {
+            Confidence::IfNamed
         })
     }
 

@@ -81,9 +81,10 @@ impl LocalBsdf for Plastic {
 
     fn diffuse_part(&self, base: [f32; 3], out: [f32; 3], into: [f32; 3]) -> [f32; 3] {
         let (coat, matte) = self.lobes(out, into, half_vector(out, into));
-        base.map(|base| match base * matte + coat > 0.0 {
-            true => base * matte / (base * matte + coat),
-            false => 1.0,
-        })
+        base.map(
+            |base| {
+                if base * matte + coat > 0.0 { base * matte / (base * matte + coat) } else { 1.0 }
+            },
+        )
     }
 }

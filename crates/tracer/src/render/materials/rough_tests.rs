@@ -112,10 +112,8 @@ fn check_density(roughness: f32, degrees: f32, ratio: f32, reflected: bool) {
     for _ in 0..samples {
         let rays = leave(&interface.ggx, &interface.material, out, ratio, random.pair());
         let [of_reflected, of_refracted] = rays.weights;
-        let (direction, weight) = match reflected {
-            true => (rays.reflected, of_reflected),
-            false => (rays.refracted, of_refracted),
-        };
+        let (direction, weight) =
+            if reflected { (rays.reflected, of_reflected) } else { (rays.refracted, of_refracted) };
         // Rays without weight are not traced
         if weight > 0.0 {
             counts[bin_of(direction.map(f64::from))] += 1;
@@ -170,9 +168,10 @@ fn directions_have_the_densities_of_the_paper() {
 /// The BSDF without its cosine, from samples' weights by their density: `f = weight * density / |cosine|`.
 fn bsdf(interface: &RoughInterface, ratio: f64, out: [f64; 3], into: [f64; 3]) -> f64 {
     let alpha = f64::from(interface.ggx.width());
-    let h = match into[2] > 0.0 {
-        true => unit64([0, 1, 2].map(|i| out[i] + into[i])),
-        false => unit64([0, 1, 2].map(|i| -(ratio * out[i] + into[i]))),
+    let h = if into[2] > 0.0 {
+        unit64([0, 1, 2].map(|i| out[i] + into[i]))
+    } else {
+        unit64([0, 1, 2].map(|i| -(ratio * out[i] + into[i])))
     };
     let h = if h[2] < 0.0 { h.map(|c| -c) } else { h };
     #[expect(clippy::cast_possible_truncation, reason = "the functions under test are f32")]

@@ -20,9 +20,10 @@ impl PathIntegrator<'_> {
         if !self.has_extents {
             return 0;
         }
-        let sampled = match self.rays_hit_lights() {
-            true => segments.lanes() & lanes_where(|l| segments.pdf[l] < f32::INFINITY),
-            false => 0,
+        let sampled = if self.rays_hit_lights() {
+            segments.lanes() & lanes_where(|l| segments.pdf[l] < f32::INFINITY)
+        } else {
+            0
         };
         let seen = segments.lanes() & lanes_where(|l| segments.bounces[l] == 0);
         let mut emission = Emission::default();
@@ -81,9 +82,10 @@ impl PathIntegrator<'_> {
         packet: &PacketScratch,
     ) -> Vec3 {
         let is_before_panes = !self.context.panes.is_empty() && t < packet.first_pane[lane];
-        match is_before_panes {
-            true => lane3(&segments.throughput, lane),
-            false => lane3(&packet.throughput, lane),
+        if is_before_panes {
+            lane3(&segments.throughput, lane)
+        } else {
+            lane3(&packet.throughput, lane)
         }
     }
 

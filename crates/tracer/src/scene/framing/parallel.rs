@@ -84,10 +84,7 @@ impl Framed {
 
     /// The height of an image in which the particles have a height of `used`. A point alone has no size.
     fn with_margin(&self, used: f64) -> f64 {
-        match used > 0.0 {
-            true => used / self.used_part(),
-            false => 2.0 * self.far(),
-        }
+        if used > 0.0 { used / self.used_part() } else { 2.0 * self.far() }
     }
 }
 

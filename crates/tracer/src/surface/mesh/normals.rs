@@ -20,10 +20,7 @@ pub(super) fn smooth(mesh: &TriangleMesh, angle: f32) -> Vec<[Vec3; 3]> {
         let own = faces[number];
         let sum = adjacent.triangles_at(vertex).iter().map(|&other| {
             let face = faces[other as usize];
-            match face.dot(own) >= limit {
-                true => face * angle_at(mesh, other, vertex),
-                false => Vec3::ZERO,
-            }
+            if face.dot(own) >= limit { face * angle_at(mesh, other, vertex) } else { Vec3::ZERO }
         });
         sum.sum::<Vec3>().try_normalize().unwrap_or(own)
     };

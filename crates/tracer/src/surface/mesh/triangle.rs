@@ -34,10 +34,12 @@ impl ShearedRay {
         let direction = ray.direction.as_dvec3();
         let size = direction.abs();
         // Choose the axes; the order of the others keeps the orientation of triangles
-        let z = match size.x > size.y && size.x > size.z {
-            true => 0,
-            false if size.y > size.z => 1,
-            false => 2,
+        let z = if size.x > size.y && size.x > size.z {
+            0
+        } else if size.y > size.z {
+            1
+        } else {
+            2
         };
         let (mut x, mut y) = ((z + 1) % 3, (z + 2) % 3);
         if direction[z] < 0.0 {

@@ -193,10 +193,7 @@ impl Frustum {
             return is_inside.then(|| [bottom(f64::NEG_INFINITY), top(f64::INFINITY)]);
         }
         let [low, high] = [-height / rise, (self.length - height) / rise];
-        Some(match rise > 0.0 {
-            true => [bottom(low), top(high)],
-            false => [top(high), bottom(low)],
-        })
+        Some(if rise > 0.0 { [bottom(low), top(high)] } else { [top(high), bottom(low)] })
     }
 
     /// The interval inside the double cone that contains the frustum, where it may be between the planes of the ends.
@@ -238,9 +235,10 @@ impl Frustum {
         }
         // A line steeper than the cone is inside before its first crossing on one side, and behind its last one on
         // the other
-        Some(match growth > 0.0 {
-            true => [crossing(last), end(f64::INFINITY)],
-            false => [end(f64::NEG_INFINITY), crossing(first)],
+        Some(if growth > 0.0 {
+            [crossing(last), end(f64::INFINITY)]
+        } else {
+            [end(f64::NEG_INFINITY), crossing(first)]
         })
     }
 }

@@ -35,10 +35,7 @@ impl Random {
 fn minimum(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> (f64, f64) {
     for _ in 0..60 {
         let third = (high - low) / 3.0;
-        match f(low + third) < f(high - third) {
-            true => high -= third,
-            false => low += third,
-        }
+        if f(low + third) < f(high - third) { high -= third } else { low += third }
     }
     let middle = 0.5 * (low + high);
     (middle, f(middle))
@@ -48,10 +45,7 @@ fn minimum(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> (f64, f64) {
 fn root(f: impl Fn(f64) -> f64, mut outside: f64, mut inside: f64) -> f64 {
     for _ in 0..60 {
         let middle = 0.5 * (outside + inside);
-        match f(middle) > 0.0 {
-            true => outside = middle,
-            false => inside = middle,
-        }
+        if f(middle) > 0.0 { outside = middle } else { inside = middle }
     }
     0.5 * (outside + inside)
 }

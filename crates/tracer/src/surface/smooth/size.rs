@@ -49,9 +49,10 @@ impl GridSize {
         let layout = Layout::new(settings, radius);
         let mut field = FieldParticles::sorted(centers, layout.support, false);
         let plan = Plan::of(field.bins(), &layout);
-        let near = match settings.exact {
-            true => field.bins().points().len() as u64,
-            false => near(&field, &layout, &plan),
+        let near = if settings.exact {
+            field.bins().points().len() as u64
+        } else {
+            near(&field, &layout, &plan)
         };
         let sample = plan.sample(MAX_BRICKS);
         let needed = discard_unused(&mut field, &layout, &sample);

@@ -37,9 +37,10 @@ impl MovingTree {
 
     /// The rays that may hit something. Rays with values that are not finite are not among them.
     fn lanes_entering(&self, rays: &RayPacket) -> u32 {
-        match self.is_empty() {
-            true => 0,
-            false => lanes_entering(rays, &self.bounds) & first_lanes(rays.len()),
+        if self.is_empty() {
+            0
+        } else {
+            lanes_entering(rays, &self.bounds) & first_lanes(rays.len())
         }
     }
 

@@ -109,8 +109,9 @@ impl MovingTree {
 /// `displacement`, or zero if it is too large or not a number.
 pub fn bounded(displacement: Vec3) -> Vec3 {
     // NaN is not below anything
-    match displacement.abs().max_element() < MAX_DISPLACEMENT && !displacement.is_nan() {
-        true => displacement,
-        false => Vec3::ZERO,
+    if displacement.abs().max_element() < MAX_DISPLACEMENT && !displacement.is_nan() {
+        displacement
+    } else {
+        Vec3::ZERO
     }
 }

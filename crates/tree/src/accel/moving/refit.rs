@@ -74,9 +74,10 @@ fn subtree<'a, T: Topology<'a>>(
     let codes: Vec<u32> =
         (0..index_u32(node.child_count())).map(|slot| topology.child(children, slot)).collect();
     let below = |code: &u32| subtree(topology, blocks, *code, level + 1);
-    let subtrees: Vec<Subtree> = match level < PARALLEL_LEVELS {
-        true => codes.par_iter().map(below).collect(),
-        false => codes.iter().map(below).collect(),
+    let subtrees: Vec<Subtree> = if level < PARALLEL_LEVELS {
+        codes.par_iter().map(below).collect()
+    } else {
+        codes.iter().map(below).collect()
     };
     // Append their nodes to the parent
     let mut nodes = vec![MovingNode::EMPTY];

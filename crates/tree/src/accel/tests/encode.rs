@@ -134,9 +134,12 @@ impl OwnedLeaves {
         let codes = |largest: f32| {
             let step = step(largest);
             values.iter().map(move |block| {
-                block.0.map(|radius| match step > 0.0 {
-                    true => ((radius - low) / step).round().clamp(0.0, largest),
-                    false => 0.0,
+                block.0.map(|radius| {
+                    if step > 0.0 {
+                        ((radius - low) / step).round().clamp(0.0, largest)
+                    } else {
+                        0.0
+                    }
                 })
             })
         };
@@ -212,10 +215,8 @@ fn code_of<B: CompactBlock>(
     [lower, upper]: [f64; 2],
 ) -> Option<u32> {
     let (base, step) = (frame.base[axis], B::steps(frame)[axis]);
-    let nearest = match step > 0.0 {
-        true => (f64::from(value) - f64::from(base)) / f64::from(step),
-        false => 0.0,
-    };
+    let nearest =
+        if step > 0.0 { (f64::from(value) - f64::from(base)) / f64::from(step) } else { 0.0 };
     let nearest = nearest.round().clamp(0.0, f64::from(B::LARGEST[axis])) as u32;
     let position = |code: &u32| f64::from(base + *code as f32 * step);
     let near = [nearest, nearest.saturating_sub(1), nearest + 1];

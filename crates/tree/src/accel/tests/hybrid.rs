@@ -50,9 +50,8 @@ fn nan_rays_do_not_affect_other_lanes() {
                         let part = if turn % 2 == 0 { 0.1 } else { 0.6 };
                         let rays: Vec<Ray> = sound
                             .rays()
-                            .map(|ray| match random.next() < part {
-                                true => poisoned(&ray, &mut random),
-                                false => ray,
+                            .map(|ray| {
+                                if random.next() < part { poisoned(&ray, &mut random) } else { ray }
                             })
                             .collect();
                         let what = format!("{} {structure:?} {level:?} {shape:?}", scene.name);

@@ -72,10 +72,8 @@ impl Emitter {
         let sources: Vec<(usize, Source)> = lights.iter().map(source).collect();
         let powers: Vec<f64> = sources.iter().map(|(_, source)| source.power()).collect();
         let whole: f64 = powers.iter().sum();
-        let share = |power: f64| match whole > 0.0 {
-            true => power / whole,
-            false => 1.0 / powers.len() as f64,
-        };
+        let share =
+            |power: f64| if whole > 0.0 { power / whole } else { 1.0 / powers.len() as f64 };
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
@@ -191,10 +189,8 @@ impl Local {
                 (center + radius * normal, Some(normal), area * radiance)
             }
             PhotonSource::Panel { center, axes, half, is_ellipse, area, radiance } => {
-                let [x, y] = match is_ellipse {
-                    true => disc(position),
-                    false => position.map(|u| 2.0 * u - 1.0),
-                };
+                let [x, y] =
+                    if is_ellipse { disc(position) } else { position.map(|u| 2.0 * u - 1.0) };
                 let origin = center + x * half[0] * axes[0] + y * half[1] * axes[1];
                 (origin, Some(axes[2]), area * radiance)
             }

@@ -213,10 +213,7 @@ pub(in crate::render) fn bytes(scene: &Scene, settings: &RenderSettings) -> Floo
     };
     let has_opaque = scene.meshes.iter().any(|mesh| !mesh.is_pane()) || !scene.parts.is_empty();
     let has_surfaces = emits && has_opaque;
-    let of_surfaces = match has_surfaces {
-        true => photon_map::bytes(settings.photons),
-        false => 0,
-    };
+    let of_surfaces = if has_surfaces { photon_map::bytes(settings.photons) } else { 0 };
     match of_ground + of_surfaces {
         0 => FloorBytes::default(),
         stored => FloorBytes {
@@ -286,10 +283,7 @@ impl<'a> PathIntegrator<'a> {
             let of_environment = self.context.environment_group();
             let group = |(number, sky)| GroupSky {
                 sky,
-                open: match number == of_environment {
-                    true => open,
-                    false => Vec3::ZERO,
-                },
+                open: if number == of_environment { open } else { Vec3::ZERO },
             };
             self.floor = Some(FloorLight {
                 caustics,

@@ -197,9 +197,10 @@ impl Search<'_> {
         let middle = first + (end - first) / 2;
         let axis = usize::from(self.axes[middle]);
         let across = self.point[axis] - self.photons[middle].point[axis];
-        let (near, far) = match across < 0.0 {
-            true => ((first, middle), (middle + 1, end)),
-            false => ((middle + 1, end), (first, middle)),
+        let (near, far) = if across < 0.0 {
+            ((first, middle), (middle + 1, end))
+        } else {
+            ((middle + 1, end), (first, middle))
         };
         self.visit(near.0, near.1);
         self.test(middle);

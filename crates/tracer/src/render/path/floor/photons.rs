@@ -84,10 +84,7 @@ impl GroundCells {
         self.all.add(photon.position, photon.flux);
         for (other, cells) in &mut self.groups {
             // The filters of a group are those of all photons
-            let flux = match *other == group {
-                true => photon.flux,
-                false => Vec3::ZERO,
-            };
+            let flux = if *other == group { photon.flux } else { Vec3::ZERO };
             cells.add(photon.position, flux);
         }
     }
