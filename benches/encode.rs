@@ -132,8 +132,7 @@ fn print_row(name: &str, film: &Film, turns: usize) {
 fn packed_here(film: &Film) -> usize {
     let layout = ExrLayout::of(film, &ExrOptions::default()).expect("a layout");
     let mut buffers = PackBuffers::default();
-    let blocks = layout.blocks(film.rows());
-    let blocks = blocks.map(|rows| pack_block(&rows, &layout, &mut buffers));
+    let blocks = layout.blocks(film.rows()).map(|rows| pack_block(&rows, &layout, &mut buffers));
     let mut file = Cursor::new(Vec::new());
     write_blocks(&mut file, &layout, blocks).expect("an image");
     file.into_inner().len()

@@ -195,8 +195,8 @@ impl Rules<'_> {
         }
         let has_bonds = self.facts.has_bonds && self.source.lacks("bonds.find");
         let covalent = |scale: f64| -> Value {
-            let keys = [("table", Value::from("covalent")), ("scale", scale.into())];
-            let keys = keys.map(|(key, value)| (key.to_owned(), value));
+            let keys = [("table", Value::from("covalent")), ("scale", scale.into())]
+                .map(|(key, value)| (key.to_owned(), value));
             toml::Table::from_iter(keys).into()
         };
         let is_solid = self.facts.elements.is_some_and(|elements| elements.is_solid);
@@ -246,9 +246,12 @@ impl Rules<'_> {
                 Some(line),
             );
             if category.name == PART_ATTRIBUTE && self.files.parts.len() > 1 {
-                let names = self.files.parts.iter().enumerate();
-                let names = names.map(|(number, name)| (number.to_string(), name.clone().into()));
-                let names: toml::Table = names
+                let names: toml::Table = self
+                    .files
+                    .parts
+                    .iter()
+                    .enumerate()
+                    .map(|(number, name)| (number.to_string(), name.clone().into()))
                     .filter(|(number, _)| category.values.iter().any(|v| v.to_string() == *number))
                     .collect();
                 self.set([("material.color.names", names.into())], None);

@@ -49,7 +49,7 @@ pub use meshes::{add_meshes, mesh_settings};
 pub use overlay::color_bar_of;
 
 /// Minimum radius as a fraction of the diagonal of the bounds; smaller ones would be invisible in f32.
-const LEAST_RADIUS: f64 = 1e-6;
+const MIN_RADIUS: f64 = 1e-6;
 
 /// Reasons why there can be no images.
 #[derive(Debug, thiserror::Error)]
@@ -312,7 +312,7 @@ fn setup_on(
     let bonds = bonds::bonds(&mut scene, manifest, survey, &color, reach.x)?;
     let picture = Picture {
         origin: survey.origin,
-        least_radius: narrow(bounds.diagonal() * LEAST_RADIUS).max(f32::MIN_POSITIVE),
+        least_radius: narrow(bounds.diagonal() * MIN_RADIUS).max(f32::MIN_POSITIVE),
         selection: select::selection(manifest, survey)?,
         cut: select::cut(manifest, survey)?,
         radius,

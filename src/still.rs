@@ -55,8 +55,7 @@ impl StillSettings {
     /// # Panics
     /// Never: the key of the input is valid.
     pub fn parse(toml: &str) -> Result<Self, ManifestError> {
-        let input = Override::new("input.path", MEMORY, MEMORY);
-        let input = input.expect("the key is valid");
+        let input = Override::new("input.path", MEMORY, MEMORY).expect("the key is valid");
         Self::of_source(ManifestSource::new(toml, Path::new("settings"), vec![input]))
     }
 
@@ -165,14 +164,14 @@ pub fn render(
             what: what.to_owned(),
         })));
     }
-    let base = std::path::absolute(Path::new(".").join(base));
-    let base = base.map_err(RunError::file(Path::new("."), "cannot be found"))?;
+    let base = std::path::absolute(Path::new(".").join(base))
+        .map_err(RunError::file(Path::new("."), "cannot be found"))?;
     let files = SceneFiles::new(base);
     // Determine the automatic settings
     let (survey, setup) = catch_panic(|| -> Result<_, StillError> {
         let selection = manifest.selection();
-        let survey = Survey::of_particles(name, &particles, question(manifest, &selection));
-        let survey = survey.map_err(RunError::from)?;
+        let survey = Survey::of_particles(name, &particles, question(manifest, &selection))
+            .map_err(RunError::from)?;
         let setup = files.setup(manifest, &survey, std::iter::once(*frame))?;
         Ok((survey, setup))
     })?;

@@ -56,8 +56,8 @@ fn bomb(name: &str, bytes: &[u8], words: &str) {
     assert!(bytes.len() < LARGE / 40, "{name}: {} bytes", bytes.len());
     let dir = Dir::new();
     let path = dir.file(name, bytes);
-    let in_memory = FrameFile::from_bytes_within(&path, bytes.to_vec(), BUDGET);
-    let in_memory = in_memory.and_then(|file| file.read(0));
+    let in_memory =
+        FrameFile::from_bytes_within(&path, bytes.to_vec(), BUDGET).and_then(|file| file.read(0));
     for (from, result) in [("disk", read(&path, BUDGET)), ("memory", in_memory)] {
         let error = result.expect_err("a bomb");
         assert!(matches!(error, FrameError::TooLarge { .. }), "{from}: {error}");
@@ -248,8 +248,8 @@ fn errors_in_chunked_text_have_the_file_offset() {
             let whole = FrameFile::from_bytes(Path::new(name), bad.clone().into_bytes());
             let expected = all(whole).map_err(|e| e.to_string());
             let plain = dir.file(name, bad.as_bytes());
-            let found = all(FrameFile::open(&plain));
-            let found = found.map_err(|e| e.to_string().replace(&*plain.to_string_lossy(), name));
+            let found = all(FrameFile::open(&plain))
+                .map_err(|e| e.to_string().replace(&*plain.to_string_lossy(), name));
             assert!(found == expected, "{name}: {:?} {:?}", found.err(), expected.err());
         }
         // A truncated stream, a damaged checksum, and a stream with trailing bytes.

@@ -98,8 +98,8 @@ fn truncated_copies_are_detected() {
         for len in (40..bytes.len()).step_by(step).chain([bytes.len() - 1]) {
             let Err(error) = read_bytes(name, &bytes[..len]) else {
                 // Between two streams, and where only padding or frames to skip are missing
-                let file = FrameFile::from_bytes(Path::new(name), bytes[..len].to_vec());
-                let file = file.expect("was read");
+                let file = FrameFile::from_bytes(Path::new(name), bytes[..len].to_vec())
+                    .expect("was read");
                 let has_several = name.contains("frames") || name.contains("streams");
                 let is_between = has_several && plain.starts_with(file.bytes());
                 let is_complete = file.bytes() == plain;

@@ -274,8 +274,7 @@ fn virtual_data_sets_of_a_snapshot_give_the_files_with_the_values() {
     // All are
     let dir = directory_of(&ALL[..1]);
     let sequence = Sequence::open(&SequenceInput::Directory(dir.path().into()));
-    let error = sequence.expect("one frame").load_raw(0);
-    let error = error.expect_err("no values").to_string();
+    let error = sequence.expect("one frame").load_raw(0).expect_err("no values").to_string();
     assert!(error.contains("refers to the file `snap_003.0.hdf5`"), "{error}");
 }
 
@@ -307,9 +306,12 @@ fn damaged_heaps_with_several_levels_are_refused() {
     let path = data("../hdf5_names").join("deep_heaps.h5.xz");
     let file = FrameFile::open(&path).expect("a good file");
     let good = file.bytes();
-    let blocks = good.windows(4).enumerate();
-    let blocks = blocks.filter(|(_, bytes)| bytes == b"FHIB");
-    let blocks: Vec<usize> = blocks.map(|(at, _)| at + FIRST).collect();
+    let blocks: Vec<usize> = good
+        .windows(4)
+        .enumerate()
+        .filter(|(_, bytes)| bytes == b"FHIB")
+        .map(|(at, _)| at + FIRST)
+        .collect();
     assert!(blocks.len() >= 4, "two heaps with two levels");
     let mut is_attribute = Vec::new();
     for at in blocks {
@@ -318,8 +320,8 @@ fn damaged_heaps_with_several_levels_are_refused() {
             let mut bytes = good.to_vec();
             bytes[at..at + 8].copy_from_slice(wrong);
             let name = Path::new("deep_heaps.h5");
-            let error = read(FrameFile::from_bytes(name, bytes)).expect_err("a damaged heap");
-            let error = error.to_string();
+            let error =
+                read(FrameFile::from_bytes(name, bytes)).expect_err("a damaged heap").to_string();
             assert!(error.contains("deep_heaps.h5: byte"), "{error}");
             assert!(error.contains("/run"), "{error}");
             is_attribute.push(error.contains("attributes of /run: damaged HDF5"));

@@ -70,8 +70,8 @@ fn outcome(name: &str, bytes: Vec<u8>) -> (usize, Option<String>) {
         Err(error) => (0, Some(shown(error))),
         Ok(file) => {
             let mut read: Vec<_> = (0..file.steps().len()).map(|step| file.read(step)).collect();
-            let fault = read.iter().position(Result::is_err);
-            let fault = fault.map(|step| read.remove(step).map(|_| ()));
+            let fault =
+                read.iter().position(Result::is_err).map(|step| read.remove(step).map(|_| ()));
             let good = read.iter().filter(|step| step.is_ok()).count();
             (good, fault.and_then(Result::err).map(shown))
         }
@@ -641,8 +641,7 @@ fn steps_of_large_texts_are_read_in_any_order() {
         assert_eq!(file.steps().len(), MODELS, "{name}");
         assert!(file.bytes().len() < text.len(), "{name} is read in pieces");
         for index in [0, 10, 19, 5, 6, 7, 15, 2, 2] {
-            let particles = file.read(index);
-            let particles = particles.unwrap_or_else(|error| panic!("{index}: {error}"));
+            let particles = file.read(index).unwrap_or_else(|error| panic!("{index}: {error}"));
             assert_eq!(particles.positions.len(), ATOMS, "{name}: {index}");
             let last = particles.positions.get(ATOMS - 1);
             assert_eq!(last.x, (index + 1) as f64, "{name}");

@@ -189,8 +189,7 @@ pub enum EntryError {
 
 /// The first of `paths`, and the number of the others.
 fn first_of(paths: &[PathBuf]) -> String {
-    let first = paths.first().map(|path| path.display().to_string());
-    let first = first.unwrap_or_default();
+    let first = paths.first().map(|path| path.display().to_string()).unwrap_or_default();
     match paths.len() {
         0 | 1 => first,
         2 => format!("{first} and 1 more file"),

@@ -14,8 +14,8 @@ impl JobRequest {
     /// # Errors
     /// [`JobError::OutputsExist`].
     pub(crate) fn refuse_existing_outputs(&self) -> Result<(), JobError> {
-        let outputs = self.frames.iter().flat_map(|f| &f.outputs);
-        let outputs = outputs.chain(&self.extra_outputs).cloned();
+        let outputs =
+            self.frames.iter().flat_map(|f| &f.outputs).chain(&self.extra_outputs).cloned();
         refuse(existing(outputs))
     }
 }

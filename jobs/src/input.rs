@@ -134,8 +134,10 @@ impl DirCache {
         if let Some(known) = self.known.get(dir) {
             return known.clone();
         }
-        let real = dir.canonicalize().or_else(|_| std::path::absolute(dir));
-        let real = real.unwrap_or_else(|_| dir.to_owned());
+        let real = dir
+            .canonicalize()
+            .or_else(|_| std::path::absolute(dir))
+            .unwrap_or_else(|_| dir.to_owned());
         self.known.insert(dir.to_owned(), real.clone());
         real
     }

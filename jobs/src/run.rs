@@ -136,8 +136,7 @@ impl<R> RunContext<'_, R> {
 
     /// Reports a note for the user, unless it was reported in this run.
     pub fn report_note(&self, note: String) {
-        let reported = self.reported_notes.lock();
-        let mut reported = reported.unwrap_or_else(PoisonError::into_inner);
+        let mut reported = self.reported_notes.lock().unwrap_or_else(PoisonError::into_inner);
         if !reported.contains(&note) {
             (self.on_event)(FrameEvent::Note(&note));
             reported.insert(note);

@@ -116,8 +116,7 @@ fn frame_states(dir: &Path, frames: &[PlannedFrame], ledger: &Ledger) -> BTreeMa
         let state = |f: &PlannedFrame| (f.number, frame_state(dir, f, ledger.entry(f.number)));
         chunk.iter().map(state).collect()
     };
-    let chunk_size = frames.len().div_ceil(MAX_THREADS);
-    let chunk_size = chunk_size.max(MIN_FRAMES_PER_THREAD);
+    let chunk_size = frames.len().div_ceil(MAX_THREADS).max(MIN_FRAMES_PER_THREAD);
     thread::scope(|scope| {
         let threads: Vec<_> =
             frames.chunks(chunk_size).map(|chunk| scope.spawn(move || check(chunk))).collect();

@@ -172,7 +172,6 @@ fn texts_that_a_template_cannot_contain_are_rejected() {
 fn a_frame_list_beyond_the_length_limit_is_rejected() {
     let frames: Vec<i64> = (0..2000).filter(|n| n % 7 < 2 && n % 11 != 0).collect();
     let chunks = chunks(&frames, 1);
-    let error = template(&frames, &chunks).text(TemplateFormat::Yaml);
-    let error = error.unwrap_err().to_string();
+    let error = template(&frames, &chunks).text(TemplateFormat::Yaml).unwrap_err().to_string();
     assert!(error.contains("exceeds the 1024 characters"), "{error}");
 }

@@ -136,8 +136,7 @@ pub(crate) fn write_spf(
     time: Option<f64>,
 ) -> PyResult<()> {
     let positions = PositionArray::new(positions)?;
-    let attributes = attributes.into_iter();
-    let attributes = attributes.map(|(name, array)| attribute(name, &array));
+    let attributes = attributes.into_iter().map(|(name, array)| attribute(name, &array));
     let raw = RawParticles {
         positions: positions.slice()?,
         attributes: attributes.collect::<PyResult<_>>()?,

@@ -42,8 +42,7 @@ pub(crate) fn render(
 ) -> PyResult<NativeImage> {
     let settings = raised(py, read_settings(settings, base, frame, name))?;
     let positions = PositionArray::new(positions)?;
-    let attributes = attributes.into_iter();
-    let attributes = attributes.map(|(name, array)| attribute(name, &array));
+    let attributes = attributes.into_iter().map(|(name, array)| attribute(name, &array));
     let particles = Particles {
         positions: positions.slice()?,
         attributes: attributes.collect::<PyResult<_>>()?,
@@ -177,8 +176,9 @@ impl NativeImage {
 
     /// The pixels of the PNG: 8-bit sRGB.
     fn srgb<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let pixels = py.detach(|| self.image.to_srgb());
-        let pixels = pixels.map_err(|error| Failure::new(Class::Output, error).raise(py))?;
+        let pixels = py
+            .detach(|| self.image.to_srgb())
+            .map_err(|error| Failure::new(Class::Output, error).raise(py))?;
         let film = self.image.film();
         let shape = [film.height as usize, film.width as usize, pixels.channels];
         let array = PyArray1::from_vec(py, pixels.bytes).reshape(shape)?;

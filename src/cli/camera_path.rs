@@ -34,8 +34,9 @@ pub(super) fn camera_keys(path: &Path) -> Result<toml::Value, CliError> {
         serde_json::Value::Object(mut object) => object.remove("keys"),
         other => Some(other),
     };
-    let list = list.filter(|list| list.as_array().is_some_and(|keys| !keys.is_empty()));
-    let list = list.ok_or_else(|| wrong("no keyframes"))?;
+    let list = list
+        .filter(|list| list.as_array().is_some_and(|keys| !keys.is_empty()))
+        .ok_or_else(|| wrong("no keyframes"))?;
     let count = list.as_array().map_or(0, Vec::len);
     if count > MAX_KEYS {
         return Err(CliError::other(format!(

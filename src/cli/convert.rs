@@ -118,7 +118,7 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, CliError> {
     let input = SequenceInput::from_paths(args.input.clone());
     // The conversion itself holds as much
     let limit = |memory: Bytes| {
-        let bytes = memory.0.max(convert::ConvertSettings::LEAST_MEMORY);
+        let bytes = memory.0.max(convert::ConvertSettings::MIN_MEMORY);
         MemoryBudget::new(bytes, MEMORY_REMEDY)
     };
     let settings = SequenceSettings {

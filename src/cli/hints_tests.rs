@@ -211,8 +211,7 @@ fn natural_guesses_lead_to_the_right_option() {
             }
         }
     }
-    let nothing = GUESSED.iter().filter(|(_, right)| *right == NOTHING);
-    let nothing = nothing.count();
+    let nothing = GUESSED.iter().filter(|(_, right)| *right == NOTHING).count();
     assert!(GUESSED.len() >= 88 && nothing <= 10);
     assert_eq!(wrong.len(), nothing, "{}", wrong.join("\n"));
 }

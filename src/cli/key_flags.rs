@@ -252,8 +252,7 @@ fn value(key: &KeyFlag, matches: &ArgMatches) -> Option<Value> {
 
 /// The items between the commas of `text`, or else the text.
 fn items<T: FromStr + Into<Value>>(text: String) -> Value {
-    let items = text.split(',').map(|item| item.trim().parse::<T>());
-    let items: Result<Vec<T>, _> = items.collect();
+    let items: Result<Vec<T>, _> = text.split(',').map(|item| item.trim().parse::<T>()).collect();
     items.map_or_else(|_| Value::from(text), Value::from)
 }
 

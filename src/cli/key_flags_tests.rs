@@ -228,8 +228,7 @@ fn wrong_values_of_short_options_are_refused() {
 fn defaults_in_the_help_are_those_of_the_manifest() {
     let mut checked = 0;
     for argument in command().get_arguments() {
-        let help = argument.get_help().map(ToString::to_string);
-        let help = help.unwrap_or_default();
+        let help = argument.get_help().map(ToString::to_string).unwrap_or_default();
         let Some((_, rest)) = help.split_once("[default: ") else {
             continue;
         };
@@ -253,8 +252,11 @@ fn defaults_in_the_help_are_those_of_the_manifest() {
 #[test]
 fn no_option_is_forgotten() {
     let of_keys: Vec<&str> = key_flags().iter().map(|key| key.flag.name).collect();
-    let tried = FLAGS.iter().flat_map(|(flags, _)| flags.split_whitespace());
-    let tried: BTreeSet<&str> = tried.filter_map(|flag| flag.strip_prefix("--")).collect();
+    let tried: BTreeSet<&str> = FLAGS
+        .iter()
+        .flat_map(|(flags, _)| flags.split_whitespace())
+        .filter_map(|flag| flag.strip_prefix("--"))
+        .collect();
     for argument in command().get_arguments() {
         let name = argument.get_id().as_str();
         assert!(

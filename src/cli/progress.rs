@@ -122,8 +122,8 @@ impl Progress {
 
     fn done<R: ShowReport>(&self, frame: i64, finished: &FinishedFrame<R>) {
         let done = self.count(None);
-        let output = finished.outputs.first();
-        let output = output.map_or_else(String::new, |path| path.display().to_string());
+        let output =
+            finished.outputs.first().map_or_else(String::new, |path| path.display().to_string());
         let summary = finished.report.summary();
         let plain = format!("frame {frame}: {output} ({summary})");
         let facts = finished.report.facts(output);

@@ -102,8 +102,9 @@ struct Arrows {
 
 impl Size {
     fn parse(text: &str) -> Result<Self, ValueError> {
-        let sides = text.split_once(['x', 'X']);
-        let sides = sides.filter(|(width, height)| [width, height].iter().all(|s| !s.is_empty()));
+        let sides = text
+            .split_once(['x', 'X'])
+            .filter(|(width, height)| [width, height].iter().all(|s| !s.is_empty()));
         let (width, height) = sides
             .ok_or_else(|| ValueError::new("the width and the height, such as 1280x720", text))?;
         Ok(Self { width: width.to_owned(), height: height.to_owned() })

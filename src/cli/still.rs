@@ -108,8 +108,12 @@ const SIGNAL_MESSAGES: signals::SignalMessages =
 pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
     let start = Instant::now();
     let _signals = signals::listen(SIGNAL_MESSAGES)?;
-    let shown = args.manifest.keys.take("output").map(PathBuf::from);
-    let shown = shown.ok_or_else(|| CliError::other("--output: is missing"))?;
+    let shown = args
+        .manifest
+        .keys
+        .take("output")
+        .map(PathBuf::from)
+        .ok_or_else(|| CliError::other("--output: is missing"))?;
     let format = format_of(&shown)?;
     let output = absolute(&shown)?;
     let mut requested = args.manifest.manifest()?;

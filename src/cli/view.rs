@@ -126,8 +126,9 @@ fn describe(content: &PageContent) -> String {
 /// Directory and name of the images, by which users know the job.
 fn title(pictures: &JobPictures) -> String {
     let path = setting(pictures, "output.path");
-    let name = path.and_then(|value| value.as_str().map(str::to_owned));
-    let name = name.unwrap_or_else(|| "Pictures".to_owned());
+    let name = path
+        .and_then(|value| value.as_str().map(str::to_owned))
+        .unwrap_or_else(|| "Pictures".to_owned());
     let dir = pictures.state.dir().canonicalize().ok();
     let dir = dir.as_deref().and_then(|dir| dir.file_name());
     match dir {

@@ -12,7 +12,7 @@ const TEXT_SIZE: TextSize = TextSize::Fraction(0.032);
 const TEXT_ON_PAPER: TextSize = TextSize::Points(7.0);
 
 /// Smaller pictures, in pixels of their shorter side, have no legend: its text could not be read.
-const LEAST_SIDE: u32 = 240;
+const MIN_SIDE: u32 = 240;
 
 /// The type of overlay that shows the colours.
 pub(super) const COLORS: &str = "colorbar";
@@ -58,7 +58,7 @@ impl Rules<'_> {
         // An empty list is given, too
         let is_open = self.source.lacks("overlay") || !manifest.overlays.is_empty();
         let is_wanted = manifest.legend && manifest.look.has_legend();
-        is_wanted && is_open && is_plain && width.min(height) >= LEAST_SIDE
+        is_wanted && is_open && is_plain && width.min(height) >= MIN_SIDE
     }
 
     /// The size of all text that has none of its own: that of the first overlay with one. None if there is no reason to

@@ -30,8 +30,11 @@ pub(super) fn decode(file: impl Read + Seek, check_size: Check) -> Result<Pixels
     let reader = exr::block::read(file, false)?;
     let meta = reader.meta_data().clone();
     // Find the part and its channels, and check their size
-    let found = meta.headers.iter().zip(0_usize..);
-    let mut found = found.filter_map(|(header, part)| Some((part, header, components(header)?)));
+    let mut found = meta
+        .headers
+        .iter()
+        .zip(0_usize..)
+        .filter_map(|(header, part)| Some((part, header, components(header)?)));
     let Some((part, header, components)) = found.next() else {
         return Err(Fault::Other("has no part with the channels R, G and B".to_owned()));
     };

@@ -130,8 +130,7 @@ impl RenderRun {
             interrupt: interrupt.clone(),
         };
         let result: Result<(), JobError> = if settings.isolate {
-            let command = self.child_command.as_ref();
-            let command = command.ok_or(RunError::NoChildCommand)?;
+            let command = self.child_command.as_ref().ok_or(RunError::NoChildCommand)?;
             let work = IsolatedRender {
                 render_job: &self.render_job,
                 sequence: &self.sequence,

@@ -133,8 +133,8 @@ impl SceneFiles {
             Ok((width, pixels)) => Ok(Arc::new(RgbaPixels::new(width, pixels))),
             Err(source) => Err(RunError::OverlayImage { index, source }),
         };
-        let images = overlay_paths(manifest, &self.dir).map(read);
-        let images = images.collect::<Result<Vec<_>, RunError>>()?;
+        let images =
+            overlay_paths(manifest, &self.dir).map(read).collect::<Result<Vec<_>, RunError>>()?;
         Ok(self.overlay_images.get_or_init(|| images))
     }
 

@@ -103,8 +103,7 @@ pub(super) fn frame_requests(
     let request = |(index, number)| {
         let inputs = sequence.inputs(index);
         let topology = sequence.topology().map(|topology| topology.path().to_owned());
-        let referenced = inputs.iter().filter_map(|path| references.get(path));
-        let referenced = referenced.flatten().cloned();
+        let referenced = inputs.iter().filter_map(|path| references.get(path)).flatten().cloned();
         let beside = topology.into_iter().chain(referenced);
         FrameRequest {
             number,

@@ -68,8 +68,8 @@ impl Value for LabelFormat {
     }
 
     fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {
-        let text = field.as_text().filter(|text| !matches!(*text, "" | "%"));
-        let text = text.ok_or(Fault::Unwanted)?;
+        let text =
+            field.as_text().filter(|text| !matches!(*text, "" | "%")).ok_or(Fault::Unwanted)?;
         let format = NumberFormat::parse(text).ok_or(Fault::Unwanted)?;
         Ok(Self { text: text.to_owned(), format })
     }

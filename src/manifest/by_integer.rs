@@ -50,8 +50,7 @@ impl<T: TableValue> Value for ByInteger<T> {
     }
 
     fn toml(&self) -> String {
-        let pairs = self.0.iter();
-        let pairs = pairs.map(|(integer, value)| format!("{integer} = {}", value.toml()));
+        let pairs = self.0.iter().map(|(integer, value)| format!("{integer} = {}", value.toml()));
         format!("{{ {} }}", pairs.collect::<Vec<_>>().join(", "))
     }
 

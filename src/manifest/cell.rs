@@ -44,7 +44,7 @@ impl Cell {
 pub struct Replicate(pub [u32; 3]);
 
 /// Most cells along an edge.
-const MOST_CELLS: u32 = 1000;
+const MAX_CELLS: u32 = 1000;
 
 impl Default for Replicate {
     fn default() -> Self {
@@ -56,14 +56,14 @@ impl Value for Replicate {
     const FLAG: FlagKind = FlagKind::Integers;
 
     fn kind(_: &Key) -> String {
-        format!("three whole numbers from 1 to {MOST_CELLS}, such as [2, 2, 1]")
+        format!("three whole numbers from 1 to {MAX_CELLS}, such as [2, 2, 1]")
     }
 
     fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {
         let items = field.items().ok_or(Fault::Unwanted)?;
         let number = |item: &Field<'_>| {
             let number = item.as_integer().and_then(|n| u32::try_from(n).ok())?;
-            (1..=MOST_CELLS).contains(&number).then_some(number)
+            (1..=MAX_CELLS).contains(&number).then_some(number)
         };
         let numbers: Option<Vec<u32>> = items.iter().map(number).collect();
         let numbers = numbers.and_then(|numbers| numbers.try_into().ok());
@@ -77,7 +77,7 @@ impl Value for Replicate {
     fn schema(_: &Key) -> Json {
         json!({
             "type": "array",
-            "items": { "type": "integer", "minimum": 1, "maximum": MOST_CELLS },
+            "items": { "type": "integer", "minimum": 1, "maximum": MAX_CELLS },
             "minItems": 3,
             "maxItems": 3,
         })

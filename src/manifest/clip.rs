@@ -199,8 +199,7 @@ impl Value for PlaneNormal {
 
     fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {
         if let Some(text) = field.as_text() {
-            let axes = UpAxis::names().into_iter();
-            let mut axes = axes.filter(|(_, name)| *name == text);
+            let mut axes = UpAxis::names().into_iter().filter(|(_, name)| *name == text);
             return axes.next().map(|(axis, _)| Self::Axis(axis)).ok_or(Fault::Unwanted);
         }
         let vector = DVec3::parse(field, &direction())?;

@@ -228,7 +228,7 @@ impl Value for ColorSetting {
         fn pair<S: Slot>(key: &str, slot: &S) -> Option<String> {
             slot.get().map(|value| format!("{key} = {}", value.toml()))
         }
-        let pairs = [
+        let pairs: Vec<String> = [
             pair("attribute", &by.attribute),
             pair("map", &by.map),
             pair("range", &by.range),
@@ -238,8 +238,10 @@ impl Value for ColorSetting {
             pair("steps", &by.steps),
             pair("names", &by.names),
             pair("values", &by.values),
-        ];
-        let pairs: Vec<String> = pairs.into_iter().flatten().collect();
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
         format!("{{ {} }}", pairs.join(", "))
     }
 

@@ -86,8 +86,7 @@ impl GroundSetting {
             return kind;
         };
         let path = has_path.then(|| format!("image = {}", image.path.toml()));
-        let pairs = path.into_iter().chain(image.pairs());
-        let pairs: Vec<String> = pairs.collect();
+        let pairs: Vec<String> = path.into_iter().chain(image.pairs()).collect();
         format!("{{ type = {kind}, {} }}", pairs.join(", "))
     }
 }

@@ -178,8 +178,10 @@ impl Key {
         let zero = self.zero.map(|zero| format!(" ({zero})")).unwrap_or_default();
         let low = self.low.map(|b| (shown(b.value) + &zero, b.is_excluded));
         // The limit of single precision is not worth mentioning.
-        let high = self.high.filter(|b| b.value < f64::from(f32::MAX));
-        let high = high.map(|b| (shown(b.value), b.is_excluded));
+        let high = self
+            .high
+            .filter(|b| b.value < f64::from(f32::MAX))
+            .map(|b| (shown(b.value), b.is_excluded));
         match (low, high) {
             (None, None) => String::new(),
             (Some((low, false)), None) => format!(" from {low}"),

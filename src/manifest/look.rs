@@ -146,8 +146,8 @@ mod tests {
     use crate::surface::SurfaceKind;
 
     fn water(text: &str, sets: &[&str]) -> Manifest {
-        let sets = sets.iter().chain(&["look=water"]);
-        let sets = sets.map(|set| Override::parse(set).unwrap()).collect();
+        let sets =
+            sets.iter().chain(&["look=water"]).map(|set| Override::parse(set).unwrap()).collect();
         Manifest::parse_with(text, Path::new("job.toml"), sets).unwrap()
     }
 

@@ -713,7 +713,7 @@ pub(crate) fn keys_called(name: &str) -> Vec<String> {
 }
 
 /// Maximum number of problems that are reported at once.
-const MOST_SHOWN: usize = 50;
+const MAX_SHOWN: usize = 50;
 
 impl ManifestError {
     /// Messages in the order of the file; those for options come first.
@@ -724,9 +724,9 @@ impl ManifestError {
             Place::Nowhere => usize::MAX,
         });
         // The work depends only on the length of the text, not on the number of problems.
-        let shown = problems.iter().take(MOST_SHOWN);
+        let shown = problems.iter().take(MAX_SHOWN);
         let mut lines: Vec<String> = shown.map(|problem| message(problem, text, path)).collect();
-        if problems.len() > MOST_SHOWN {
+        if problems.len() > MAX_SHOWN {
             lines.push(format!("{}: and more like these", path.display()));
         }
         let key = problems.first().map(|problem| problem.key.clone());

@@ -29,8 +29,8 @@ impl Value for OpacitySetting {
 
     fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {
         let Some(mut section) = field.as_table() else {
-            let number = field.as_number().filter(|v| (0.0..=1.0).contains(v));
-            let number = number.map(super::field::narrow);
+            let number =
+                field.as_number().filter(|v| (0.0..=1.0).contains(v)).map(super::field::narrow);
             return number.map(Self::Constant).ok_or(Fault::Unwanted);
         };
         let (mut attribute, mut range) = (String::new(), Ends([0.0, 1.0]));

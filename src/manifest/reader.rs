@@ -167,7 +167,7 @@ impl<'a> Section<'a> {
             if self.known.contains(&key.as_str()) {
                 continue;
             }
-            if self.problems.errors.borrow().len() > super::MOST_SHOWN {
+            if self.problems.errors.borrow().len() > super::MAX_SHOWN {
                 break;
             }
             let what = match nearest(key, &self.known) {

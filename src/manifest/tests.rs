@@ -496,8 +496,9 @@ fn commented_file_round_trips_with_every_key() {
         .collect();
     let error = Manifest::parse(&uncommented, path()).unwrap_err().to_string();
     assert!(error.contains("camera.eye: is given"), "{error}");
-    let all = uncommented.replace("mode = \"auto\"", "mode = \"fixed\"");
-    let all = all.replace("type = \"studio\"", "type = \"image\"");
+    let all = uncommented
+        .replace("mode = \"auto\"", "mode = \"fixed\"")
+        .replace("type = \"studio\"", "type = \"image\"");
     // A fixed camera has its own view
     let all = all.replace("\nview = ", "\n# view = ");
     let all = parse(&all.replace("isolate = false", "isolate = true"));

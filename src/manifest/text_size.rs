@@ -8,10 +8,10 @@ use super::print_size::DEFAULT_DPI;
 use super::value::{Fault, Value, quoted};
 
 /// The largest part of the height of a picture.
-const MOST: f32 = 0.25;
+const MAX: f32 = 0.25;
 
 /// The largest text, points.
-const MOST_POINTS: f64 = 1000.0;
+const MAX_POINTS: f64 = 1000.0;
 
 /// Points in an inch, as in PostScript and PDF.
 const POINTS_PER_INCH: f64 = 72.0;
@@ -42,7 +42,7 @@ impl TextSize {
                 let pixels = points / POINTS_PER_INCH * f64::from(dpi.unwrap_or(DEFAULT_DPI));
                 #[expect(clippy::cast_possible_truncation, reason = "a fraction")]
                 let fraction = (pixels / f64::from(height.max(1))) as f32;
-                fraction.min(MOST)
+                fraction.min(MAX)
             }
         }
     }
@@ -64,7 +64,7 @@ impl Value for TextSize {
         };
         let number = text.trim().strip_suffix("pt").map(str::trim);
         let points = number.and_then(|number| number.parse().ok());
-        let usable = |points: &f64| *points > 0.0 && *points <= MOST_POINTS;
+        let usable = |points: &f64| *points > 0.0 && *points <= MAX_POINTS;
         points.filter(usable).map(Self::Points).ok_or(Fault::Unwanted)
     }
 
@@ -94,7 +94,7 @@ mod tests {
         assert!((points_on_paper(found, 531, 300) - 7.0).abs() < 1e-4);
         assert_eq!(size.fraction(531, None), found);
         // Large text in a small picture
-        assert_eq!(TextSize::Points(8.0).fraction(100, Some(300)), MOST);
+        assert_eq!(TextSize::Points(8.0).fraction(100, Some(300)), MAX);
         assert_eq!(TextSize::Fraction(0.03).fraction(100, None), 0.03);
     }
 }

@@ -202,8 +202,10 @@ impl Process {
     fn finish(mut self, observer: &dyn Observer) -> Result<(), MovieError> {
         drop(self.input.take());
         loop {
-            let ended = self.child.try_wait();
-            let ended = ended.map_err(|source| MovieError::Io { path: FFMPEG.into(), source })?;
+            let ended = self
+                .child
+                .try_wait()
+                .map_err(|source| MovieError::Io { path: FFMPEG.into(), source })?;
             match ended {
                 Some(status) if status.success() => return Ok(()),
                 Some(status) => return Err(self.failure(status)),
@@ -228,8 +230,8 @@ impl Process {
 
     /// The error of an `ffmpeg` that has ended too early or without success.
     fn failure(&mut self, status: ExitStatus) -> MovieError {
-        let lines = self.errors.take().and_then(|errors| errors.join().ok());
-        let mut lines = lines.unwrap_or_default();
+        let mut lines =
+            self.errors.take().and_then(|errors| errors.join().ok()).unwrap_or_default();
         if lines.is_empty() {
             lines.push("it printed nothing".to_owned());
         }

@@ -95,8 +95,11 @@ impl MovieFormat {
     /// # Errors
     /// See [`FormatError`].
     pub fn of(path: &Path, codec: Option<Codec>) -> Result<Self, FormatError> {
-        let extension = path.extension().and_then(|extension| extension.to_str());
-        let extension = extension.unwrap_or_default().to_ascii_lowercase();
+        let extension = path
+            .extension()
+            .and_then(|extension| extension.to_str())
+            .unwrap_or_default()
+            .to_ascii_lowercase();
         let container = match extension.as_str() {
             "mp4" | "m4v" => Container::Mp4,
             "mov" => Container::Mov,

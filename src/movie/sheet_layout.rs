@@ -72,8 +72,8 @@ impl SheetLayout {
     /// The layout of `count` pictures of this size, at least one.
     pub fn new(count: usize, picture: [usize; 2], settings: &SheetSettings) -> Self {
         let count = count.max(1);
-        let columns = settings.columns.unwrap_or_else(|| free_columns(count, picture));
-        let columns = columns.clamp(1, count);
+        let columns =
+            settings.columns.unwrap_or_else(|| free_columns(count, picture)).clamp(1, count);
         let rows = count.div_ceil(columns);
         let gaps = settings.gap * (columns - 1);
         let width = settings.width.saturating_sub(gaps) / columns;

@@ -140,9 +140,8 @@ fn check_header(
 ) -> Result<(), ImageFault> {
     let size = (header.layer_size.x(), header.layer_size.y());
     check_window(header, &picture_window(size, expected)?)?;
-    let found = header.channels.list.iter();
-    let found = found.map(|c| (c.name.to_string(), c.sample_type));
-    let found: Vec<(String, SampleType)> = found.collect();
+    let found: Vec<(String, SampleType)> =
+        header.channels.list.iter().map(|c| (c.name.to_string(), c.sample_type)).collect();
     let planes: Vec<_> =
         planes.iter().map(|plane| (plane.name.to_string(), plane.sample_type())).collect();
     let has_all_pixels = |c: &ChannelDescription| c.sampling.x() == 1 && c.sampling.y() == 1;

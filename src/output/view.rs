@@ -19,8 +19,8 @@ const DESATURATION: f32 = 0.15;
 /// Converts linear scene light to linear display light in 0 to 1.
 pub fn view_transform(color: Vec3) -> Vec3 {
     // Replace NaN by 0, and negative light, which a display cannot show
-    let color = Vec3::select(color.is_nan_mask(), Vec3::ZERO, color);
-    let color = color.clamp(Vec3::ZERO, Vec3::splat(f32::MAX));
+    let color = Vec3::select(color.is_nan_mask(), Vec3::ZERO, color)
+        .clamp(Vec3::ZERO, Vec3::splat(f32::MAX));
     let peak = color.max_element();
     if peak <= 1.0 {
         return color;
@@ -121,8 +121,8 @@ mod tests {
     fn conversion_in_lanes_equals_single_conversion() {
         let linear: Vec<f32> = (0..5000_u16).map(|i| f32::from(i) / 4900.0 - 0.01).collect();
         let thresholds: Vec<f32> = (0..5000).map(|i| dither_threshold(i, i / 7)).collect();
-        let expected = linear.iter().zip(&thresholds);
-        let expected: Vec<u8> = expected.map(|(l, t)| byte_from_linear(*l, *t)).collect();
+        let expected: Vec<u8> =
+            linear.iter().zip(&thresholds).map(|(l, t)| byte_from_linear(*l, *t)).collect();
         for level in SimdLevel::ALL {
             let mut bytes = vec![7; linear.len()];
             bytes_from_linear(Supported::or_best(level), &linear, &thresholds, &mut bytes);

@@ -104,8 +104,10 @@ impl ColorBar {
     /// The title with unit and common exponent.
     fn heading(&self, exponent: i32) -> String {
         let factor = (exponent != 0).then(|| power_text(exponent));
-        let unit = [factor, Some(self.unit.clone()).filter(|unit| !unit.is_empty())];
-        let unit: Vec<String> = unit.into_iter().flatten().collect();
+        let unit: Vec<String> = [factor, Some(self.unit.clone()).filter(|unit| !unit.is_empty())]
+            .into_iter()
+            .flatten()
+            .collect();
         match (self.title.is_empty(), unit.is_empty()) {
             (_, true) => self.title.clone(),
             (true, false) => unit.join(" "),

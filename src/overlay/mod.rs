@@ -34,7 +34,7 @@ pub use template::{FrameValues, Template};
 pub use ticks::{Tick, TickChoice, TickSettings, Ticks};
 
 /// Smallest size of text in pixels; smaller text cannot be read.
-const LEAST_TEXT: f32 = 9.0;
+const MIN_TEXT: f32 = 9.0;
 
 /// Radius of the halo around text and lines, in units of the size of text.
 const HALO: f32 = 0.12;
@@ -135,7 +135,7 @@ impl Overlay {
 
     fn pen(&self, height: u32) -> Pen {
         let picture = height as f32;
-        let size = (self.size * picture).max(LEAST_TEXT);
+        let size = (self.size * picture).max(MIN_TEXT);
         Pen {
             font: Font::new(size),
             picture,

@@ -59,8 +59,7 @@ impl Template {
                 rest = doubled;
                 continue;
             }
-            let end = after.find('}').filter(|_| brace == "{");
-            let end = end.ok_or_else(|| {
+            let end = after.find('}').filter(|_| brace == "{").ok_or_else(|| {
                 format!("`{brace}` has no partner; write {brace}{brace} for a brace")
             })?;
             if !plain.is_empty() {

@@ -37,12 +37,12 @@ fn power(exponent: i32) -> f64 {
 }
 
 /// The smallest exponent of a normal number.
-const LEAST: i32 = -307;
+const MIN: i32 = -307;
 
 /// The exponent of the largest power of ten that is at most `value`, which is above 0.
 fn decade(value: f64) -> i32 {
     #[expect(clippy::cast_possible_truncation, reason = "below 400")]
-    let mut exponent = libm::floor(libm::log10(value)).clamp(LEAST.into(), 308.0) as i32;
+    let mut exponent = libm::floor(libm::log10(value)).clamp(MIN.into(), 308.0) as i32;
     // The logarithm is rounded
     if power(exponent) > value {
         exponent -= 1;

@@ -376,8 +376,7 @@ pub(super) fn ids(frame: &SharedFrame<'_>) -> Option<Vec<u32>> {
 
 /// The name of an attribute with parts, and the parts.
 fn parts(attribute: &Attribute) -> Option<(String, Vec<i32>)> {
-    let parts = low_bits(&attribute.data)?;
-    let parts = parts.into_iter().map(u32::cast_signed).collect();
+    let parts = low_bits(&attribute.data)?.into_iter().map(u32::cast_signed).collect();
     Some((attribute.name.clone(), parts))
 }
 

@@ -134,8 +134,8 @@ impl StoredFrame {
             ColorRule::Rgb { .. } => view(&self.names.rgb)
                 .map(|values| StoredColor::Rgb { encoding: encoding(&values), values }),
             ColorRule::Attribute { map, .. } => {
-                let values = self.names.values.as_ref();
-                let values = values.and_then(|value| StoredValues::of(&frame, value));
+                let values =
+                    self.names.values.as_ref().and_then(|value| StoredValues::of(&frame, value));
                 values.map(|values| StoredColor::Mapped { values, map })
             }
         };
@@ -143,8 +143,7 @@ impl StoredFrame {
         let opacity = match (&picture.opacity, &self.names.opacity) {
             (OpacityRule::Constant(opacity), _) => StoredOpacity::Constant(*opacity),
             (OpacityRule::Value { range, .. }, value) => {
-                let values = value.as_ref();
-                let values = values.and_then(|value| StoredValues::of(&frame, value));
+                let values = value.as_ref().and_then(|value| StoredValues::of(&frame, value));
                 let of = |values| StoredOpacity::Mapped(values, *range);
                 values.map_or(StoredOpacity::Constant(1.0), of)
             }
@@ -247,8 +246,10 @@ impl Names {
         let all = [&self.rgb, &self.ids, &self.velocities, &self.parts];
         let channels = self.channels.iter().map(|(name, _)| name);
         let all = all.into_iter().chain(channels);
-        let values = [&self.values, &self.opacity].into_iter().flatten();
-        let values = values.filter_map(ParticleValue::attribute);
+        let values = [&self.values, &self.opacity]
+            .into_iter()
+            .flatten()
+            .filter_map(ParticleValue::attribute);
         let mut names: Vec<&str> = all.filter_map(Option::as_deref).chain(values).collect();
         names.sort_unstable();
         names.dedup();
@@ -285,11 +286,15 @@ impl Names {
                 find(name, "opacity", true)?;
             }
         }
-        let with_channels = setup.picture.attributes.iter().map(|channel| {
-            let found = find(&channel.name, "a channel", true)?;
-            Ok((found, channel.components))
-        });
-        let with_channels = with_channels.collect::<Result<_, LoadError>>()?;
+        let with_channels = setup
+            .picture
+            .attributes
+            .iter()
+            .map(|channel| {
+                let found = find(&channel.name, "a channel", true)?;
+                Ok((found, channel.components))
+            })
+            .collect::<Result<_, LoadError>>()?;
         let channels = setup.picture.render.channels;
         let name = |found: Option<&AttributeView>| found.map(|a| a.name().to_owned());
         Ok(Self {

@@ -120,8 +120,9 @@ fn decode(
     mut notes: Vec<String>,
 ) -> Result<LoadedFrame<'static>, LoadError> {
     check_memory(setup, sequence, task)?;
-    let loaded = sequence.load_measured(task.index);
-    let loaded = loaded.map_err(|e| newest(LoadError::Frame(e), sequence, task))?;
+    let loaded = sequence
+        .load_measured(task.index)
+        .map_err(|e| newest(LoadError::Frame(e), sequence, task))?;
     notes.extend(loaded.notes);
     let file = first_file(sequence, task.index);
     let read = loaded.particles.positions.len() as u64;
@@ -219,8 +220,9 @@ fn selected(
     if selection.is_all() {
         return Ok(ParticleFrame::from_raw(particles, *origin));
     }
-    let survivors = selection.survivors(&particles);
-    let survivors = survivors.map_err(|e| unknown_name(&e, file, &particles.attributes))?;
+    let survivors = selection
+        .survivors(&particles)
+        .map_err(|e| unknown_name(&e, file, &particles.attributes))?;
     if survivors.len() == particles.positions.len() {
         return Ok(ParticleFrame::from_raw(particles, *origin));
     }

@@ -143,8 +143,8 @@ fn build_mesh(
     };
     let total = file.triangles.len();
     let not_finite = total - file.triangles.iter().filter(|t| is_finite(t)).count();
-    let mesh = TriangleMesh::new(vertices, file.triangles, settings.normals);
-    let mesh = mesh.map_err(|source| MeshLoadError::Mesh { path: path.to_owned(), source })?;
+    let mesh = TriangleMesh::new(vertices, file.triangles, settings.normals)
+        .map_err(|source| MeshLoadError::Mesh { path: path.to_owned(), source })?;
     let degenerate = total - mesh.len() - not_finite;
     if mesh.is_empty() {
         return Err(MeshLoadError::Invisible { path: path.to_owned(), not_finite, degenerate });
@@ -230,8 +230,10 @@ fn moving_mesh(
     let not_blurred = match RawMesh::read(next, settings) {
         Ok(other) if other.triangles == file.triangles => {
             #[expect(clippy::cast_possible_truncation, reason = "fractions of a step")]
-            let slices = times.into_iter().map(|time| file.towards(&other, time as f32));
-            let slices = slices.map(|slice| build_mesh(path, slice, settings));
+            let slices = times
+                .into_iter()
+                .map(|time| file.towards(&other, time as f32))
+                .map(|slice| build_mesh(path, slice, settings));
             return slices.collect();
         }
         Ok(_) => format!("{} has other triangles", next.display()),

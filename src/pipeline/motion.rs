@@ -60,8 +60,7 @@ pub(super) fn velocities_to_next(
         (true, 0) => return Ok(vec![Vec3::ZERO; frame.positions.len()]),
         (true, index) => index - 1,
     };
-    let loaded = sequence.load_measured(other_index);
-    let loaded = loaded.map_err(LoadError::Frame)?;
+    let loaded = sequence.load_measured(other_index).map_err(LoadError::Frame)?;
     let other =
         ParticleFrame::from_raw(loaded.particles, setup.picture.origin).with_positions(Cow::Owned);
     // Determine the time between the frames; files know it best

@@ -44,8 +44,8 @@ impl Setup {
     /// The drawing commands of the overlays of an image with one eye.
     pub(super) fn drawings_of(&self, frame: &TracedFrame) -> Vec<Drawing> {
         let (width, height) = (frame.film.width, frame.film.height);
-        let page = self.picture.preview.page.map(|own| own.page);
-        let page = page.unwrap_or(Page::whole(width, height));
+        let page =
+            self.picture.preview.page.map(|own| own.page).unwrap_or(Page::whole(width, height));
         marks(&self.picture.overlays, &page, &self.frame_view(frame))
     }
 
@@ -58,8 +58,8 @@ impl Setup {
         // Each eye has its own, with which they appear at the distance of the screen
         let [columns, rows] = frame.camera.eyes();
         let (width, height) = (frame.film.width / columns, frame.film.height / rows);
-        let page = self.picture.preview.page.map(|own| own.page);
-        let page = page.unwrap_or(Page::whole(width, height));
+        let page =
+            self.picture.preview.page.map(|own| own.page).unwrap_or(Page::whole(width, height));
         let mut sprites = draw(overlays, &page, &self.frame_view(frame));
         if [columns, rows] != [1, 1] {
             let shift = [width * (columns - 1), height * (rows - 1)].map(u32::cast_signed);

@@ -137,12 +137,12 @@ material.color = { attribute = "mass", range = [0, 240] }
 
 /// Renders frame 2 with `settings` in addition to the common ones.
 fn rendered(sequence: &Sequence, settings: &str) -> (Setup, Film) {
-    let manifest = Manifest::parse(&format!("{COMMON}{settings}"), Path::new("job.toml"));
-    let manifest = manifest.expect("valid");
+    let manifest =
+        Manifest::parse(&format!("{COMMON}{settings}"), Path::new("job.toml")).expect("valid");
     let selection = manifest.selection();
     let survey = Survey::of(sequence, question(&manifest, &selection)).expect("readable");
-    let setup = crate::resolve::setup(&manifest, &survey, &SceneImages::default());
-    let setup = setup.expect("possible");
+    let setup =
+        crate::resolve::setup(&manifest, &survey, &SceneImages::default()).expect("possible");
     let task = ImageTask {
         frame: 2,
         index: 1,

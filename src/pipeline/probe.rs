@@ -241,8 +241,7 @@ impl Trial {
     /// Estimated cost of the full image.
     fn cost(&self, full: &Setup, task: &ImageTask) -> Result<ImageCost, ProbeError> {
         // Images are encoded by one thread while the pool traces, so measure with one thread.
-        let pool = ThreadPoolBuilder::new().num_threads(1).build();
-        let pool = pool?;
+        let pool = ThreadPoolBuilder::new().num_threads(1).build()?;
         let start = Instant::now();
         let has_exr = matches!(PictureFormat::of(&task.image), Some(PictureFormat::Exr) | None);
         let mut bytes = 0;

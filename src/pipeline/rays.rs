@@ -8,14 +8,14 @@ use crate::scene::Scene;
 const HIT_FRACTION: f64 = 0.4;
 
 /// Number of diffuse reflections after which few paths remain.
-const MOST_BOUNCES: u32 = 4;
+const MAX_BOUNCES: u32 = 4;
 
 /// Estimated number of rays of one image.
 pub(super) fn expected_rays(image: &RenderSettings, scene: &Scene) -> f64 {
     let paths = f64::from(image.width) * f64::from(image.height) * f64::from(image.samples);
     if image.integrator == IntegratorKind::Path {
         let lights = scene.lights.len() + usize::from(scene.environment.is_some());
-        return paths * rays_per_path(lights, 1, 1 + image.traced_bounces().min(MOST_BOUNCES));
+        return paths * rays_per_path(lights, 1, 1 + image.traced_bounces().min(MAX_BOUNCES));
     }
     let material = &scene.material;
     let branches =

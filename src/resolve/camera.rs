@@ -55,8 +55,8 @@ pub(super) fn path(
             (CameraPath::Still(view), framed.height_around(&view, aspect))
         }
         (CameraMode::Keys, _) => {
-            let keys = camera.keys.iter().map(|key| keyed(key, up, camera.fov));
-            let keys: Vec<CameraKey> = keys.collect();
+            let keys: Vec<CameraKey> =
+                camera.keys.iter().map(|key| keyed(key, up, camera.fov)).collect();
             let heights = keys.iter().map(|key| framed.height_around(&key.view, aspect));
             let height = heights.fold(0.0, f64::max);
             (CameraPath::through(keys)?, height)

@@ -79,8 +79,8 @@ fn each_frame_has_its_camera_and_all_have_the_same_light() {
     let setup = setup(|camera| {
         camera.mode = CameraMode::Turntable;
         camera.degrees_per_frame = 120.0;
-    });
-    let setup = setup.unwrap();
+    })
+    .unwrap();
     check_views(&setup, [0, 1, 2, i64::MAX]).unwrap();
     let scenes = [0, 1].map(|frame| setup.scene_at(frame, None).unwrap());
     assert_eq!(scenes[0].camera, setup.picture.scene.camera);

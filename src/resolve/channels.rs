@@ -31,8 +31,8 @@ pub(super) fn channels(
     // Find the channels with fixed names
     let is_named = |channel: &&Channel| matches!(channel, Channel::Named(_));
     let names: Vec<_> = output.channels.iter().filter(is_named).map(Channel::name).collect();
-    let channels = Channels::from_names(names.iter().map(|name| &**name));
-    let mut channels = channels.map_err(|e| unsupported(e.to_string()))?;
+    let mut channels = Channels::from_names(names.iter().map(|name| &**name))
+        .map_err(|e| unsupported(e.to_string()))?;
     channels.layers.mattes.set_levels(output.cryptomatte_levels);
     // Find the light groups
     let light_groups = manifest.light_groups();
@@ -83,8 +83,7 @@ fn attribute(name: &str, survey: &Survey) -> Result<AttributeChannel, ResolveErr
         ));
     }
     let index = survey.attributes.iter().position(|a| a.eq_ignore_ascii_case(name));
-    let components = index.and_then(|index| survey.components.get(index));
-    let components = components.copied().unwrap_or(1);
+    let components = index.and_then(|index| survey.components.get(index)).copied().unwrap_or(1);
     Ok(AttributeChannel {
         name: name.to_owned(),
         components: components.clamp(1, MAX_ATTRIBUTE_FLOATS + 1),
@@ -110,8 +109,8 @@ pub(super) fn frame_step(
             attribute_list(survey.attributes.iter().map(String::as_str))
         )));
     }
-    let step = step_to_next(output, survey);
-    let step = step.ok_or_else(|| unsupported(format!("motion needs {UNKNOWN_STEP}")))?;
+    let step = step_to_next(output, survey)
+        .ok_or_else(|| unsupported(format!("motion needs {UNKNOWN_STEP}")))?;
     Ok(Some(step))
 }
 
@@ -121,8 +120,7 @@ pub(super) const UNKNOWN_STEP: &str =
 
 /// The step to the next frame, if the time until then is known.
 pub(super) fn step_to_next(output: &Output, survey: &Survey) -> Option<FrameStep> {
-    let time = output.frame_time.or(survey.frame_time);
-    let time = time.or_else(|| output.fps.map(f64::recip))?;
+    let time = output.frame_time.or(survey.frame_time).or_else(|| output.fps.map(f64::recip))?;
     Some(FrameStep { time: narrow(time), numbers: survey.frame_numbers.unwrap_or(1) })
 }
 

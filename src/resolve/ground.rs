@@ -195,8 +195,8 @@ mod tests {
         assert_eq!(of(GroundKind::Plain, pattern).unwrap(), Some(checker));
         // A shadow catcher goes through the lowest centres, but not far above the lowest points of large spheres, and
         // fades from 2 to 8 diagonals, which are 6 long
-        let catcher = of(GroundKind::ShadowCatcher, |m| m.render.ground_shadow = 0.5);
-        let catcher = catcher.unwrap().unwrap();
+        let catcher =
+            of(GroundKind::ShadowCatcher, |m| m.render.ground_shadow = 0.5).unwrap().unwrap();
         assert_eq!((catcher.height, catcher.shadow_catcher), (3.0144, Some(0.5)));
         let standing = Floor { is_of_earlier_version: false, ..floor(true) };
         let mut manifest = Manifest::new("in");

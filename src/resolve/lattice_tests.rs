@@ -49,8 +49,8 @@ fn is_shown(counts: [u16; 3], order: [usize; 3]) {
         bonds: Vec::new(),
     };
     let selection = manifest.selection();
-    let survey = Survey::of_particles("lattice", &raw, question(&manifest, &selection));
-    let survey = survey.expect("readable");
+    let survey =
+        Survey::of_particles("lattice", &raw, question(&manifest, &selection)).expect("readable");
     let top = counts.map(|count| STEP * f32::from(count - 1));
     let [width, depth, height] = top.map(f64::from);
     // No particle is an outlier

@@ -128,7 +128,7 @@ pub(super) fn paper(setup: &Setup) -> Vec3 {
 }
 
 /// The least part of the page, along both sides, that the picture has.
-const LEAST_PART: u32 = 4;
+const MIN_PART: u32 = 4;
 
 /// The page of the image with room for the overlays beside the picture.
 ///
@@ -142,7 +142,7 @@ pub(super) fn page(
     let size = manifest.image.size();
     let view = first_view(setup, survey, &setup.picture.scene.camera);
     let page = Page::with_room_for(&setup.picture.overlays, size, &view);
-    let is_small = |axis: usize| page.picture[axis] < size[axis].div_ceil(LEAST_PART);
+    let is_small = |axis: usize| page.picture[axis] < size[axis].div_ceil(MIN_PART);
     if is_small(0) || is_small(1) {
         let [width, height] = size;
         let [own_width, own_height] = page.picture;

@@ -35,8 +35,7 @@ pub(super) fn parts(manifest: &Manifest, survey: &Survey) -> Result<PartMaterial
         components.is_none_or(|components| *components == 1)
             && PART_NAMES.iter().any(|part| name.eq_ignore_ascii_case(part))
     };
-    let components = survey.components.iter().map(Some);
-    let components = components.chain(std::iter::repeat(None));
+    let components = survey.components.iter().map(Some).chain(std::iter::repeat(None));
     if survey.most_particles > 0 && !survey.attributes.iter().zip(components).any(is_part) {
         let names = PART_NAMES.map(|name| format!("`{name}`")).join(", ");
         return Err(unsupported(format!(

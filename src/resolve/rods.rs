@@ -47,8 +47,7 @@ fn mapped(
 ) -> Result<ColorRule, ResolveError> {
     let name = by.attribute.as_deref().unwrap_or(own);
     let value = color::value_of(survey, name, key)?;
-    let surveyed = survey.color.as_ref();
-    let surveyed = surveyed.filter(|range| range.attribute.eq_ignore_ascii_case(name));
+    let surveyed = survey.color.as_ref().filter(|range| range.attribute.eq_ignore_ascii_case(name));
     let is_given = matches!(by.range, Some(RangeSetting::Values(_)));
     let range = match surveyed {
         Some(range) if by.range.is_none() => range.clone(),

@@ -56,8 +56,9 @@ pub(super) fn shutter(
     // Without velocities, particles move from one frame to the next whatever the time is
     let without_time = (!has_velocities)
         .then(|| FrameStep { time: 1.0, numbers: survey.frame_numbers.unwrap_or(1) });
-    let step = step_to_next(&manifest.output, survey).or(without_time);
-    let step = step.ok_or_else(|| unsupported(format!("motion blur needs {UNKNOWN_STEP}")))?;
+    let step = step_to_next(&manifest.output, survey)
+        .or(without_time)
+        .ok_or_else(|| unsupported(format!("motion blur needs {UNKNOWN_STEP}")))?;
     let open = camera.shutter_offset.unwrap_or(-0.5 * camera.shutter);
     Ok(Some(Shutter {
         open,

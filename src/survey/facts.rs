@@ -38,7 +38,7 @@ const CATEGORIES: [&str; 13] = [
 ];
 
 /// Most values of an attribute that are categories unasked: more colours cannot be told apart in a legend.
-const MOST_CATEGORIES: usize = 12;
+const MAX_CATEGORIES: usize = 12;
 
 /// Number of particles from which the values of attributes are taken.
 const SAMPLE: usize = 1 << 17;
@@ -180,8 +180,11 @@ impl Facts {
             let named = |a: &&Attribute| a.components == 1 && a.name.eq_ignore_ascii_case(name);
             raw.attributes.iter().find(named)
         };
-        let categories = CATEGORIES.iter().filter_map(|name| integers(name));
-        let categories = categories.filter_map(|a| category(a, raw)).collect();
+        let categories = CATEGORIES
+            .iter()
+            .filter_map(|name| integers(name))
+            .filter_map(|a| category(a, raw))
+            .collect();
         Self {
             particles: sample.count,
             has_velocities: velocity.is_some_and(is_moving),
@@ -363,7 +366,7 @@ fn category(attribute: &Attribute, particles: &RawParticles) -> Option<Category>
         #[expect(clippy::cast_possible_truncation, reason = "an integer within the range")]
         let value = value as i64;
         all.insert(value);
-        if all.len() > MOST_CATEGORIES {
+        if all.len() > MAX_CATEGORIES {
             return None;
         }
         let is_moving = velocity.is_some_and(|v| v.count() > index && v.magnitude(index) != 0.0);

@@ -597,8 +597,9 @@ impl Totals {
             Origins::None | Origins::Mixed => choose_origin(min, max),
         };
         let in_place = self.origin == Origins::Shared(origin);
-        let points = sample_indices(self.points.len(), POINTS).map(|i| self.points[i]);
-        let points = points.map(|point| (point - origin).as_vec3().to_array());
+        let points = sample_indices(self.points.len(), POINTS)
+            .map(|i| self.points[i])
+            .map(|point| (point - origin).as_vec3().to_array());
         let weight = self.weight.map(|weight| FrameWeight { in_place, ..weight });
         Survey {
             origin,

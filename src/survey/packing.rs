@@ -16,7 +16,7 @@ const BULK: f64 = 0.75;
 const RATHER_LARGE: f64 = 1.05;
 /// Maximum radius in half distances to the nearest neighbour, so that particles that are not a body, such as a line
 /// or a few particles, do not become too large.
-const MOST: f64 = 2.0;
+const MAX: f64 = 2.0;
 
 /// Which estimates a survey of some frames needs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,7 +57,7 @@ pub(super) fn packed_radius(touching: f32, mut counts: Vec<u32>) -> Option<f32> 
     let reach = f64::from(reach(touching));
     let volume = 4.0 / 3.0 * std::f64::consts::PI * reach.powi(3);
     let spacing = libm::cbrt(volume / f64::from(count));
-    let most = MOST * f64::from(touching);
+    let most = MAX * f64::from(touching);
     Some(narrow((0.5 * RATHER_LARGE * spacing).min(most)))
 }
 

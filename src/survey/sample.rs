@@ -123,8 +123,7 @@ impl FrameSample {
         let attributes = count.saturating_mul(widths.sum());
         // The length of the file shows whether positions are in double precision.
         let is_double = stored >= attributes.saturating_add(count.saturating_mul(24));
-        let position_len = source.position_len();
-        let position_len = position_len.unwrap_or(if is_double { 24 } else { 12 });
+        let position_len = source.position_len().unwrap_or(if is_double { 24 } else { 12 });
         let positions = count.saturating_mul(position_len);
         Ok(Some(Self {
             weight: FrameWeight {

@@ -152,17 +152,19 @@ fn is_shell(points: &[DVec3]) -> bool {
     }
     let [mut inside, mut at_sides] = [BTreeSet::new(), BTreeSet::new()];
     for point in points {
-        let cell = axes.iter().map(|axis| {
-            let at = (point[*axis] - min[*axis]) / (max[*axis] - min[*axis]) * CELLS as f64;
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "within the box"
-            )]
-            let cell = (at as usize).min(CELLS - 1);
-            cell
-        });
-        let cell: Vec<usize> = cell.collect();
+        let cell: Vec<usize> = axes
+            .iter()
+            .map(|axis| {
+                let at = (point[*axis] - min[*axis]) / (max[*axis] - min[*axis]) * CELLS as f64;
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "within the box"
+                )]
+                let cell = (at as usize).min(CELLS - 1);
+                cell
+            })
+            .collect();
         let is_inside = cell.iter().all(|at| (1..CELLS - 1).contains(at));
         let filled = if is_inside { &mut inside } else { &mut at_sides };
         filled.insert(cell);
@@ -231,20 +233,23 @@ mod tests {
 
     #[test]
     fn a_bed_at_rest_is_no_wall() {
-        let bed = tank(12, [1, 1], false).into_iter().filter(|m| m.position.z < 6.0);
-        let bed = bed.map(|m| Member { value: 0, ..m });
+        let bed = tank(12, [1, 1], false)
+            .into_iter()
+            .filter(|m| m.position.z < 6.0)
+            .map(|m| Member { value: 0, ..m });
         let ball = |i: i32| Member {
             value: 1,
             position: DVec3::new(5.0, 5.0, 8.0 + f64::from(i)),
             is_moving: true,
         };
         // Filled, as the tank is hollow
-        let full = (0..8).flat_map(|x| (0..8).flat_map(move |y| (0..4).map(move |z| [x, y, z])));
-        let full = full.map(|at| Member {
-            value: 0,
-            position: DVec3::from_array(at.map(f64::from)),
-            is_moving: false,
-        });
+        let full = (0..8)
+            .flat_map(|x| (0..8).flat_map(move |y| (0..4).map(move |z| [x, y, z])))
+            .map(|at| Member {
+                value: 0,
+                position: DVec3::from_array(at.map(f64::from)),
+                is_moving: false,
+            });
         let all: Vec<Member> = bed.chain(full).chain((0..4).map(ball)).collect();
         assert_eq!(walls("type", &[], &all), None);
     }

@@ -233,8 +233,10 @@ fn plan(
 ) -> Result<Option<DataPlan>, ViewerError> {
     let picks = [0, frames.len() / 2, frames.len() - 1].map(|i| &frames[i]);
     for width in DATA_WIDTHS {
-        let samples = picks.map(|frame| planes(frame, settings, width));
-        let samples: Vec<SampledPlanes> = samples.into_iter().collect::<Result<_, _>>()?;
+        let samples: Vec<SampledPlanes> = picks
+            .map(|frame| planes(frame, settings, width))
+            .into_iter()
+            .collect::<Result<_, _>>()?;
         let mut channels = ChannelKind::in_planes(&samples[0], &settings.attributes);
         let has_ids = samples[0].integers("id.I").is_some();
         if channels.is_empty() && !has_ids {

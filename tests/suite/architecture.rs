@@ -34,8 +34,8 @@ fn list_after(heading: &str) -> Vec<String> {
 /// A list of names and what they use, `-` for nothing.
 fn documented(heading: &str) -> Uses {
     let lines = list_after(heading).into_iter().map(|line| {
-        let names = line.split_whitespace().filter(|name| !matches!(*name, "-" | "->"));
-        let mut names = names.map(str::to_owned);
+        let mut names =
+            line.split_whitespace().filter(|name| !matches!(*name, "-" | "->")).map(str::to_owned);
         (names.next().expect("a name"), names.collect())
     });
     lines.collect()

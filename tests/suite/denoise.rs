@@ -14,8 +14,8 @@ fn picture(workshop: &Workshop, name: &str, options: &[&str]) -> Picture {
 
 /// Root of the mean squared difference of the green channels.
 fn error(a: &Picture, b: &Picture) -> f32 {
-    let squares = a.floats("G").iter().zip(b.floats("G"));
-    let squares = squares.map(|(a, b)| (a.min(1.0) - b.min(1.0)).powi(2));
+    let squares =
+        a.floats("G").iter().zip(b.floats("G")).map(|(a, b)| (a.min(1.0) - b.min(1.0)).powi(2));
     (squares.sum::<f32>() / a.floats("G").len() as f32).sqrt()
 }
 

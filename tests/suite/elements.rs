@@ -47,8 +47,7 @@ fn radii(shop: &Workshop) -> [f32; 3] {
 #[track_caller]
 fn assert_near(found: &[f32], expected: &[f32]) {
     assert_eq!(found.len(), expected.len());
-    let near = found.iter().zip(expected);
-    let near = near.into_iter().all(|(a, b)| (a - b).abs() < 2e-3);
+    let near = found.iter().zip(expected).into_iter().all(|(a, b)| (a - b).abs() < 2e-3);
     assert!(near, "{found:?} instead of {expected:?}");
 }
 

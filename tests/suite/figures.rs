@@ -113,8 +113,14 @@ fn text_of_a_figure_for_a_column_has_seven_points() {
     assert!(sizes.len() > 5 && sizes.iter().all(|size| (size - 7.0).abs() < 1e-3), "{sizes:?}");
     let pdf = fs::read(shop.join("a.pdf")).expect("a file");
     let text = String::from_utf8_lossy(&pdf).into_owned();
-    let page = text.split("/MediaBox [").nth(1).and_then(|s| s.split(']').next()).expect("a page");
-    let page: Vec<f32> = page.split(' ').filter_map(|number| number.parse().ok()).collect();
+    let page: Vec<f32> = text
+        .split("/MediaBox [")
+        .nth(1)
+        .and_then(|s| s.split(']').next())
+        .expect("a page")
+        .split(' ')
+        .filter_map(|number| number.parse().ok())
+        .collect();
     // 945 x 591 pixels
     let millimetres = [page[2], page[3]].map(|points| points / 72.0 * 25.4);
     assert!(
@@ -122,8 +128,11 @@ fn text_of_a_figure_for_a_column_has_seven_points() {
         "{page:?}"
     );
     let svg = fs::read_to_string(shop.join("a.svg")).expect("a file");
-    let sizes = svg.split("data-size=\"").skip(1);
-    let sizes: Vec<f32> = sizes.filter_map(|s| s.split('"').next()?.parse().ok()).collect();
+    let sizes: Vec<f32> = svg
+        .split("data-size=\"")
+        .skip(1)
+        .filter_map(|s| s.split('"').next()?.parse().ok())
+        .collect();
     assert!(sizes.iter().all(|size| (size * 72.0 / 300.0 - 7.0).abs() < 1e-3), "{sizes:?}");
     // A file of another program is not replaced, an own one is
     still(&shop, "a.pdf", &column).expect(0);

@@ -179,8 +179,9 @@ fn far_from_zero() {
         shop.run(&["convert", &file, "-o", frame, "--radius", "1"]).expect(0);
     }
     for frame in ["1", "2"] {
-        let found = fs::read_dir(shop.join(frame)).expect("readable");
-        let mut found = found.map(|entry| entry.expect("readable").path());
+        let mut found = fs::read_dir(shop.join(frame))
+            .expect("readable")
+            .map(|entry| entry.expect("readable").path());
         let native = found.find(|p| p.extension().is_some_and(|e| e == "spf"));
         let to = shop.join(format!("apart/frame.{frame}.spf"));
         fs::create_dir_all(shop.join("apart")).expect("a directory");

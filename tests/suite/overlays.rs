@@ -88,8 +88,8 @@ fn the_channel_has_the_overlay_alone() {
     });
     assert_eq!(plain, drawn);
     // The square is red and opaque, in the corner
-    let solid = (0..160 * 90).filter(|at| planes[0][*at] == 1.0 && planes[3][*at] == 1.0);
-    let solid: Vec<usize> = solid.collect();
+    let solid: Vec<usize> =
+        (0..160 * 90).filter(|at| planes[0][*at] == 1.0 && planes[3][*at] == 1.0).collect();
     assert!(solid.len() > 10, "{}", solid.len());
     for at in solid {
         assert!(at % 160 < 40 && at / 160 > 60, "{at}");
@@ -101,8 +101,8 @@ fn the_channel_has_the_overlay_alone() {
 fn previews_do_not_depend_on_threads() {
     let shop = shop();
     render(&shop, "one", &["--colorbar", "--time-stamp"]).expect(0);
-    let base = OPTIONS.iter().filter(|o| !["--threads", "1"].contains(o));
-    let base: Vec<&str> = base.copied().collect();
+    let base: Vec<&str> =
+        OPTIONS.iter().filter(|o| !["--threads", "1"].contains(o)).copied().collect();
     let more = ["--threads", "4", "--colorbar", "--time-stamp"];
     let arguments = ["render", "in", "-o", "four/f.####.exr"];
     shop.run(&[&arguments[..], &base, &more].concat()).expect(0);

@@ -58,8 +58,10 @@ fn one_damaged() -> Workshop {
 fn a_render_from_start_to_end() {
     for options in [&[][..], &["--isolate"]] {
         let workshop = one_damaged();
-        let ran = workshop.render(&[&["--progress", "json"], options].concat());
-        let ran = ran.expect(1).prints("error: frame 2: ");
+        let ran = workshop
+            .render(&[&["--progress", "json"], options].concat())
+            .expect(1)
+            .prints("error: frame 2: ");
         let events = events(&ran);
         assert_eq!(kinds(&events), ["start", "frame_done", "frame_failed", "frame_done", "end"]);
         assert_eq!(events[0]["command"], "render");
@@ -80,8 +82,8 @@ fn notes_and_errors() {
     let ran = workshop.render(&["--progress", "json", "--frames", "7", "--threads", "1000"]);
     let found = events(&ran.expect(0));
     assert_eq!(kinds(&found).iter().filter(|k| **k == "start").count(), 1);
-    let notes = found.iter().filter(|e| e["event"] == "note");
-    let notes: Vec<&str> = notes.filter_map(|e| e["text"].as_str()).collect();
+    let notes: Vec<&str> =
+        found.iter().filter(|e| e["event"] == "note").filter_map(|e| e["text"].as_str()).collect();
     assert!(notes.iter().any(|note| note.starts_with("--threads 1000: ")), "{notes:?}");
 
     let ran = workshop.render(&["--progress", "json", "--force", "--color-by", "nosuch"]);

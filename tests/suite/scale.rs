@@ -92,8 +92,9 @@ fn native_frames_are_traced_in_place() {
     let counts = ["--particles", "0,1,1e4"];
     let representations = ["--representations", "memory,f32,q16,q10"];
     let structures = ["--structures", "lbvh,kdtree"];
-    let ran = run(&workshop, &[counts, representations, structures].concat()).expect(0);
-    let ran = ran.prints("native frames (f32, q16, q10) are traced in place");
+    let ran = run(&workshop, &[counts, representations, structures].concat())
+        .expect(0)
+        .prints("native frames (f32, q16, q10) are traced in place");
     for expected in ["kdtree, q10 file", "Memory by part", "Native frames: converted"] {
         assert!(ran.text().contains(expected), "{}", ran.text());
     }

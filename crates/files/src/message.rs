@@ -8,7 +8,7 @@ const START: usize = 560;
 const END: usize = 240;
 /// Messages of up to this many characters are not shortened. A shortened message, including its note about the
 /// gap, is not longer.
-const MOST: usize = START + END + 60;
+const MAX: usize = START + END + 60;
 
 /// `text` as one line of bounded length that is safe to show in a terminal: characters that control the
 /// terminal, break the line or change its direction become escapes.
@@ -48,11 +48,11 @@ pub fn is_control(c: char) -> bool {
 }
 
 fn shortened(text: String) -> String {
-    if text.len() <= MOST {
+    if text.len() <= MAX {
         return text;
     }
     let count = text.chars().count();
-    if count <= MOST {
+    if count <= MAX {
         return text;
     }
     let gap = format!(" [{} characters left out] ", count - START - END);
@@ -88,9 +88,9 @@ mod tests {
         let line = one_line(text);
         assert!(line.starts_with("start \u{3b1}\\n") && line.ends_with("\\n; remedy"));
         assert!(line.contains("414 characters left out"), "{line}");
-        assert!(line.chars().count() < MOST);
+        assert!(line.chars().count() < MAX);
         shown(&line, &line);
-        let fits = "\u{3b1}".repeat(MOST);
+        let fits = "\u{3b1}".repeat(MAX);
         shown(&fits, &fits);
     }
 }

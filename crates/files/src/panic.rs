@@ -20,8 +20,8 @@ pub fn catch_panic<T, E: From<Panic>>(work: impl FnOnce() -> Result<T, E>) -> Re
             .downcast_ref::<String>()
             .map(String::as_str)
             .or_else(|| payload.downcast_ref::<&str>().copied())
-            .unwrap_or("no reason given");
-        let message = message.to_owned();
+            .unwrap_or("no reason given")
+            .to_owned();
         Err(Panic { message }.into())
     })
 }

@@ -10,7 +10,7 @@ use crate::{
 };
 
 /// Most particles after copying: indices have 32 bits.
-const MOST_PARTICLES: u64 = u32::MAX as u64;
+const MAX_PARTICLES: u64 = u32::MAX as u64;
 
 /// What is done with the particles of periodic cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,11 +76,11 @@ impl PeriodicImages {
         budget: MemoryBudget,
     ) -> Result<(), ParseError> {
         let count = particles.positions.len();
-        let most = MOST_PARTICLES / (count as u64).max(1);
+        let most = MAX_PARTICLES / (count as u64).max(1);
         let copies = usize::try_from(self.count()).ok();
         let Some(copies) = copies.filter(|copies| *copies as u64 <= most) else {
             let what = format!(
-                "cell.replicate makes {} copies of {count} particles, more than {MOST_PARTICLES} particles",
+                "cell.replicate makes {} copies of {count} particles, more than {MAX_PARTICLES} particles",
                 self.count()
             );
             return Err(ParseError::unsupported(what));

@@ -43,13 +43,12 @@ fn interleaved(parts: &[&AttributeData]) -> Option<AttributeData> {
         ($($variant:ident)*) => {
             match parts.first()? {
                 $(AttributeData::$variant(first) => {
-                    let same = parts.iter().map(|part| match part {
+                    let same: Vec<&Vec<_>> = parts.iter().map(|part| match part {
                         AttributeData::$variant(values) if values.len() == first.len() => {
                             Some(values)
                         }
                         _ => None,
-                    });
-                    let same: Vec<&Vec<_>> = same.collect::<Option<_>>()?;
+                    }).collect::<Option<_>>()?;
                     let row = |index: usize| same.iter().map(move |values| values[index]);
                     AttributeData::$variant((0..first.len()).flat_map(row).collect())
                 })*

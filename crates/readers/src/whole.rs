@@ -42,7 +42,8 @@ pub fn decompressor(
     path: &Path,
     budget: MemoryBudget,
 ) -> Result<Decompressor<BufReader<File>>, FrameError> {
-    let file = File::open(path).map(|file| BufReader::with_capacity(1 << 16, file));
-    let file = file.map_err(|e| FrameError::io(path, e))?;
+    let file = File::open(path)
+        .map(|file| BufReader::with_capacity(1 << 16, file))
+        .map_err(|e| FrameError::io(path, e))?;
     Decompressor::new(file, budget).map_err(|e| e.in_file(path))
 }

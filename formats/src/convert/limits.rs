@@ -18,7 +18,7 @@ const LARGEST_BATCH: usize = 1 << 14;
 const LARGEST_CHUNK: usize = 1 << 16;
 const SMALLEST_CHUNK: usize = 1 << 8;
 /// Largest number of parts that one division makes; larger parts are divided again.
-const MOST_PARTS: u64 = 512;
+const MAX_PARTS: u64 = 512;
 /// Largest number of particles in the sample for the quantiles of a division.
 const LARGEST_SAMPLE: u64 = 1 << 19;
 
@@ -77,7 +77,7 @@ impl Limits {
     /// The limits for `count` particles with rows of `width` bytes. `widest` is the largest number of bytes
     /// that the source has for one attribute of a particle.
     pub(super) fn of(settings: &ConvertSettings, count: u64, width: usize, widest: usize) -> Self {
-        let memory = settings.memory.max(ConvertSettings::LEAST_MEMORY);
+        let memory = settings.memory.max(ConvertSettings::MIN_MEMORY);
         let memory = usize::try_from(memory).unwrap_or(usize::MAX);
         let record = 12 + width;
         // Size the parts: one part is ordered while the next one is loaded
@@ -90,9 +90,9 @@ impl Limits {
         let batch_len = (memory / 16 / window / batch_bytes).clamp(256, LARGEST_BATCH);
         // Size the parts of a division and the chunks
         let aimed = aimed(part_len) as u64;
-        let parts = count.div_ceil(aimed).clamp(2, MOST_PARTS) as usize;
-        let chunk_len = (memory / 32 / parts / record).clamp(SMALLEST_CHUNK, LARGEST_CHUNK);
-        let chunk_len = chunk_len.min(part_len / 2);
+        let parts = count.div_ceil(aimed).clamp(2, MAX_PARTS) as usize;
+        let chunk_len =
+            (memory / 32 / parts / record).clamp(SMALLEST_CHUNK, LARGEST_CHUNK).min(part_len / 2);
         let window_bytes = window * batch_len * batch_bytes;
         let fixed = part_len * part_bytes + run_len * run_bytes(width) + window_bytes + memory / 32;
         let chunks = memory.saturating_sub(fixed) / (chunk_len * record);

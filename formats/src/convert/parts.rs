@@ -21,7 +21,7 @@ use crate::FrameError;
 /// Largest number of times that a part is divided. Each division spans its curve over the particles of this
 /// part alone. A part that is still too large is cut at any place, because nearly all of its particles are at
 /// one position.
-const MOST_DIVISIONS: u32 = 8;
+const MAX_DIVISIONS: u32 = 8;
 /// Sampled particles of a part that is divided again.
 const SAMPLE: usize = 1 << 14;
 
@@ -170,7 +170,7 @@ impl PartQueue<'_> {
     }
 
     fn divided(&self, mut pile: UnorderedPart) -> Result<Vec<UnorderedPart>, ConvertError> {
-        if pile.depth < MOST_DIVISIONS {
+        if pile.depth < MAX_DIVISIONS {
             let sample = self.sample(&mut pile)?;
             let parts = pile.len.div_ceil(self.limits.aimed_len());
             let cuts = Cuts::quantiles(&sample, parts.clamp(2, self.limits.parts));

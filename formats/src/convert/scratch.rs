@@ -29,8 +29,7 @@ impl ScratchFile {
         let path = dir.join(format!(".spherule.{}-{count}.part", std::process::id()));
         let io = |e| FrameError::io(&path, e);
         let mut options = OpenOptions::new();
-        let file = options.read(true).write(true).create_new(true).open(&path);
-        let file = file.map_err(io)?;
+        let file = options.read(true).write(true).create_new(true).open(&path).map_err(io)?;
         if cfg!(unix) {
             fs::remove_file(&path).map_err(io)?;
         }

@@ -22,7 +22,7 @@ pub struct ConvertSettings {
     pub is_y_up: bool,
     /// The radii that the frame gets.
     pub radius: RadiusRule,
-    /// Memory that the conversion may hold, bytes; at least [`Self::LEAST_MEMORY`] is used. The memory of the
+    /// Memory that the conversion may hold, bytes; at least [`Self::MIN_MEMORY`] is used. The memory of the
     /// source itself is not counted, nor are the pages of mapped files.
     pub memory: u64,
     /// How to store attributes that `attributes` does not name.
@@ -42,7 +42,7 @@ impl ConvertSettings {
     /// Default memory limit, bytes.
     pub const USUAL_MEMORY: u64 = 2 << 30;
     /// Smallest memory limit, bytes.
-    pub const LEAST_MEMORY: u64 = 64 << 20;
+    pub const MIN_MEMORY: u64 = 64 << 20;
 }
 
 impl Default for ConvertSettings {

@@ -132,9 +132,13 @@ fn compare(path: &Path, raw: &RawParticles, settings: &ConvertSettings, index: &
             let Some(view) = frame.attribute(&attribute.name) else {
                 continue;
             };
-            let error = file.index().attributes.iter();
-            let error = error.filter(|a| a.name == attribute.name).map(|a| a.max_error);
-            let error = error.fold(0.0, f64::max);
+            let error = file
+                .index()
+                .attributes
+                .iter()
+                .filter(|a| a.name == attribute.name)
+                .map(|a| a.max_error)
+                .fold(0.0, f64::max);
             for component in 0..attribute.components {
                 let given = attribute.data.get_f64(place * attribute.components + component);
                 let difference = (view.get(slot, component) - given).abs();

@@ -115,8 +115,7 @@ fn by_structure(head: &[u8]) -> Option<&'static str> {
 
 /// Their first text names the content. Not all versions have it, so the file name counts, too.
 fn is_dualsphysics(head: &[u8], path: &Path) -> bool {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let name = name.to_ascii_lowercase();
+    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     let named = [".ibi4", ".obi4", ".bi2"].iter().any(|end| name.ends_with(end));
     named || (head.starts_with(b"#File ") && head.contains(&0))
 }
@@ -124,8 +123,7 @@ fn is_dualsphysics(head: &[u8], path: &Path) -> bool {
 /// Newer versions open with minus the length of a name, then the name; older ones with a bare
 /// step number, where only the file name helps.
 fn is_lammps_binary(head: &[u8], path: &Path) -> bool {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let name = name.to_ascii_lowercase();
+    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     let named = name.ends_with(".bin") && (name.contains("dump") || name.contains("lammps"));
     let opens = head
         .split_at_checked(8)

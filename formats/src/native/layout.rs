@@ -31,7 +31,7 @@ pub const VERSION: u32 = 2;
 /// Length of the header in bytes.
 pub const HEADER_LEN: usize = 64;
 /// Largest number of components of an attribute: far more than any attribute has.
-const MOST_COMPONENTS: u32 = 4096;
+const MAX_COMPONENTS: u32 = 4096;
 /// Alignment of sections, bytes: a cache line, and an AVX-512 vector.
 pub const ALIGN: u64 = 64;
 
@@ -419,7 +419,7 @@ fn check_attribute(attribute: &AttributeIndex, check: SectionCheck) -> Result<()
     };
     // Check the number of components
     let width = u64::from(attribute.components) * stored.size() as u64;
-    if width == 0 || attribute.components > MOST_COMPONENTS {
+    if width == 0 || attribute.components > MAX_COMPONENTS {
         return bad("has no components, or absurdly many");
     }
     // Check the ranges

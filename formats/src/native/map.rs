@@ -87,8 +87,7 @@ impl MappedFile {
     /// # Errors
     /// [`FrameError::Malformed`] if the length or the modification time differs, or if bytes were lost.
     pub fn check(&self) -> Result<(), FrameError> {
-        let meta = self.file.metadata();
-        let meta = meta.map_err(|e| FrameError::io(&self.path, e))?;
+        let meta = self.file.metadata().map_err(|e| FrameError::io(&self.path, e))?;
         let (now, then) = (meta.len(), self.map.len() as u64);
         let what = if now != then {
             format!("the file had {then} bytes when it was mapped and has {now} now")

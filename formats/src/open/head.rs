@@ -44,23 +44,25 @@ pub fn detect_file(path: &Path) -> Result<Format, FrameError> {
 /// the names behind numbers. Looks at the first bytes unless the format needs more. Empty for a file that cannot be
 /// read.
 pub fn remarks(path: &Path) -> Vec<String> {
-    let remarks = head(path).and_then(|head| {
-        let format = crate::detect::detect_format(&head, path).map_err(|e| e.in_file(path))?;
-        let reader = format.reader();
-        if !reader.remarks_need_whole_file() {
-            return Ok(reader.remarks(&head));
-        }
-        let map = Arc::new(MappedFile::open(path)?);
-        if is_compressed(map.bytes()) {
-            return Ok(reader.remarks(&head));
-        }
-        let siblings = SiblingFiles::of(path);
-        let remarks = reader.remarks_of_file(&siblings.around(SharedBytes::new(map.clone())));
-        map.check()?;
-        siblings.check()?;
-        Ok(remarks)
-    });
-    let remarks = remarks.unwrap_or_default().into_iter();
+    let remarks = head(path)
+        .and_then(|head| {
+            let format = crate::detect::detect_format(&head, path).map_err(|e| e.in_file(path))?;
+            let reader = format.reader();
+            if !reader.remarks_need_whole_file() {
+                return Ok(reader.remarks(&head));
+            }
+            let map = Arc::new(MappedFile::open(path)?);
+            if is_compressed(map.bytes()) {
+                return Ok(reader.remarks(&head));
+            }
+            let siblings = SiblingFiles::of(path);
+            let remarks = reader.remarks_of_file(&siblings.around(SharedBytes::new(map.clone())));
+            map.check()?;
+            siblings.check()?;
+            Ok(remarks)
+        })
+        .unwrap_or_default()
+        .into_iter();
     remarks.map(one_line).collect()
 }
 

@@ -140,8 +140,7 @@ mod tests {
         let step = (COUNT * 12) as u64;
         let file = open(step + HEAD_LEN as u64).expect("steps fit one by one");
         assert!(file.read(FRAMES - 1).is_ok());
-        let error = open(step).expect("the steps fit").read(0);
-        let error = error.expect_err("too large").to_string();
+        let error = open(step).expect("the steps fit").read(0).expect_err("too large").to_string();
         assert!(error.contains("get more"), "{error}");
     }
 

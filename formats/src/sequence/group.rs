@@ -294,12 +294,12 @@ fn into_group(candidate: SequenceCandidate) -> Result<FileGroup, SequenceError> 
     let mut others: Vec<String> = candidate.runs.iter().map(NameSeries::pattern).collect();
     others.sort();
     let lone = candidate.lone.into_iter().map(|run| (run, true));
-    let runs = candidate.runs.into_iter().map(|run| (run, false));
-    let mut runs: Vec<(NameSeries, bool)> = runs.chain(lone).collect();
+    let mut runs: Vec<(NameSeries, bool)> =
+        candidate.runs.into_iter().map(|run| (run, false)).chain(lone).collect();
     runs.sort_by_cached_key(|(run, _)| run.pattern());
     let patterns: Vec<String> = runs.iter().map(|(run, _)| run.pattern()).collect();
-    let lone = (0..).zip(&runs).filter(|(_, (_, is_lone))| *is_lone);
-    let lone: BTreeSet<u32> = lone.map(|(part, _)| part).collect();
+    let lone: BTreeSet<u32> =
+        (0..).zip(&runs).filter(|(_, (_, is_lone))| *is_lone).map(|(part, _)| part).collect();
     let mut files: Vec<GroupFile> = Vec::new();
     for (part, (run, _)) in (0..).zip(&runs) {
         files.extend(run.names.iter().map(|name| GroupFile {

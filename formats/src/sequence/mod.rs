@@ -424,8 +424,8 @@ fn parts_meant(parts: &[String], name: &str) -> Vec<u32> {
         found.map(|(index, _)| index).collect()
     };
     // An exact match wins over names that differ in case only.
-    let as_written = (0..).zip(parts).filter(|(_, part)| *part == name);
-    let as_written: Vec<u32> = as_written.map(|(index, _)| index).collect();
+    let as_written: Vec<u32> =
+        (0..).zip(parts).filter(|(_, part)| *part == name).map(|(index, _)| index).collect();
     let whole = matching(&|part| part == lower);
     match (as_written.is_empty(), whole.is_empty()) {
         (false, _) => as_written,

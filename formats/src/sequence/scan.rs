@@ -170,8 +170,7 @@ fn name_of(path: &Path) -> String {
 /// Number of characters that two names have in common at the start and at the end.
 fn likeness(a: &str, b: &str) -> usize {
     let start = a.chars().zip(b.chars()).take_while(|(a, b)| a == b).count();
-    let end = a.chars().rev().zip(b.chars().rev());
-    let end = end.take_while(|(a, b)| a == b).count();
+    let end = a.chars().rev().zip(b.chars().rev()).take_while(|(a, b)| a == b).count();
     // `aaa` is as long as its common start and end with `aa`
     (start + end).min(a.chars().count().min(b.chars().count()))
 }

@@ -47,8 +47,7 @@ impl Gathered {
                 sum.add(attribute, component, &keep);
             }
         }
-        let ranges = [self.radius, radius_range(attributes, &keep)];
-        let ranges = ranges.into_iter().flatten();
+        let ranges = [self.radius, radius_range(attributes, &keep)].into_iter().flatten();
         self.radius = ranges.reduce(|(a, b), (c, d)| (a.min(c), b.max(d)));
     }
 

@@ -33,12 +33,12 @@ pub fn stream(
     source: &dyn ParticleSource,
     progress: &dyn Progress,
 ) -> Result<(), ConvertError> {
-    let cells = if source.count() <= MOST_SHORT { CellFormat::Short } else { CellFormat::Long };
+    let cells = if source.count() <= MAX_SHORT { CellFormat::Short } else { CellFormat::Long };
     publish_stream(path, |file| fill_from(file, source, progress, cells))
 }
 
 /// Largest number of particles for version 4.2: the list of cells has two i32 per particle, and its length is an i32.
-const MOST_SHORT: u64 = (i32::MAX / 2) as u64;
+const MAX_SHORT: u64 = (i32::MAX / 2) as u64;
 
 /// The format of the cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -35,8 +35,7 @@ fn lost_pages_stay_lost() {
         let file = NativeFile::open(&path, Access::Map).expect("whole");
         let modified = fs::metadata(&path).and_then(|m| m.modified());
         let frame = file.frame().expect("unchanged");
-        let handle = fs::OpenOptions::new().write(true).open(&path);
-        let handle = handle.expect("writable");
+        let handle = fs::OpenOptions::new().write(true).open(&path).expect("writable");
         handle.set_len(0).expect("writable");
         touch(frame);
         handle.set_len(stored.bytes.len() as u64).expect("writable");

@@ -55,8 +55,9 @@ fn every_damaged_mesh_gives_its_named_error() {
     assert!(wrong.is_empty(), "these differ from the table:\n{}", wrong.join("\n"));
     let mut makeable: Vec<String> = made.into_iter().map(|(name, _)| name).collect();
     let entries = fs::read_dir(directory()).expect("the directory");
-    let names = entries.map(|entry| entry.expect("an entry").file_name());
-    let names = names.map(|name| name.to_string_lossy().into_owned());
+    let names = entries
+        .map(|entry| entry.expect("an entry").file_name())
+        .map(|name| name.to_string_lossy().into_owned());
     let mut there: Vec<String> = names.filter(|name| name != "table.tsv").collect();
     for names in [&mut listed, &mut makeable, &mut there] {
         names.sort();

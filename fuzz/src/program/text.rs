@@ -6,7 +6,7 @@ use spherule::manifest::OutputPattern;
 use spherule_jobs::FrameRange;
 
 /// Frames that are counted of a range: it may have more than can be.
-const MOST: usize = 100;
+const MAX: usize = 100;
 
 /// Bytes of the longest text whose frames are counted: that takes time by the square of the number of commas.
 const LONGEST: usize = 4096;
@@ -28,11 +28,11 @@ pub fn range(bytes: &[u8]) -> usize {
     if text.len() > LONGEST {
         return 1;
     }
-    let frames: Vec<i64> = range.iter().take(MOST).collect();
+    let frames: Vec<i64> = range.iter().take(MAX).collect();
     let each: HashSet<i64> = frames.iter().copied().collect();
     assert!(each.len() == frames.len() && frames.iter().all(|f| range.contains(*f)));
     assert_eq!(has_several, frames.len() > 1);
-    if frames.len() < MOST {
+    if frames.len() < MAX {
         let mut available = frames.clone();
         available.sort_unstable();
         assert_eq!(range.select(&available), frames);

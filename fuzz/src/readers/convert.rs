@@ -62,7 +62,7 @@ fn settings(choice: u8) -> ConvertSettings {
             AttributeChoice::AsIs
         },
         keep_ids: is_set(0x80),
-        memory: ConvertSettings::LEAST_MEMORY,
+        memory: ConvertSettings::MIN_MEMORY,
         ..ConvertSettings::default()
     }
 }

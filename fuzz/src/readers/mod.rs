@@ -57,7 +57,7 @@ pub const TARGETS: [(&str, Target); 30] = [
 ];
 
 /// Steps read of one input: the rest goes the same way.
-const MOST_STEPS: usize = 4;
+const MAX_STEPS: usize = 4;
 /// Bytes of particles for a byte of the file: text of one digit and a blank becomes eight bytes.
 const EXPANSION: u64 = 8;
 /// What the tightest packing that is read gives for a byte: xz, then deflate.
@@ -199,7 +199,7 @@ fn read_all(format: Format, bytes: &[u8], packing: u64) -> usize {
         if let Some(range) = step.byte_range() {
             assert!(range.start <= range.end && range.end <= bytes.len());
         }
-        if place >= MOST_STEPS && place + 1 != steps.len() {
+        if place >= MAX_STEPS && place + 1 != steps.len() {
             continue;
         }
         match format.read(bytes, step) {

@@ -116,10 +116,9 @@ impl JobTemplate<'_> {
     }
 
     fn tree(&self) -> Result<YamlNode, ExportError> {
-        let name = literal("name", self.name)?;
-        let name: String = name.chars().take(MAX_NAME).collect();
-        let description = one_line("description", &self.description)?;
-        let description: String = description.chars().take(MAX_DESCRIPTION).collect();
+        let name: String = literal("name", self.name)?.chars().take(MAX_NAME).collect();
+        let description: String =
+            one_line("description", &self.description)?.chars().take(MAX_DESCRIPTION).collect();
         let step = [field("name", self.step), field("parameterSpace", parameter_space())];
         let requirements = self.host.to_field();
         let script = [field("script", self.script()?)];

@@ -166,8 +166,10 @@ impl ArrayScript<'_> {
     }
 
     fn call(&self) -> Result<String, ExportError> {
-        let words = self.command.arguments.iter();
-        let words = words
+        let words = self
+            .command
+            .arguments
+            .iter()
             .map(|word| Ok(format!(" {}", shell_word("argument", word)?)))
             .collect::<Result<String, ExportError>>()?;
         let limit = if self.command.limit_memory { LIMIT_MEMORY } else { "" };

@@ -47,8 +47,7 @@ fn errors_name_the_position() {
 
 #[test]
 fn huge_ranges_stay_small() {
-    let all = format!("{}-{}", i64::MIN, i64::MAX);
-    let all: FrameRange = all.parse().unwrap();
+    let all: FrameRange = format!("{}-{}", i64::MIN, i64::MAX).parse().unwrap();
     assert!(all.contains(0) && all.contains(i64::MAX) && all.has_several());
     assert_eq!(all.iter().take(2).collect::<Vec<_>>(), [i64::MIN, i64::MIN + 1]);
     assert_eq!(all.select(&[5, -1, 5]), [-1, 5]);

@@ -89,8 +89,9 @@ impl HeartbeatSchedule {
             let now = self.clock.now();
             beat_due(&mut heartbeats, now);
             let next = heartbeats.iter().map(|heartbeat| heartbeat.next).min();
-            let wait = next.map_or(Duration::MAX, |next| next.saturating_duration_since(now));
-            let wait = wait.min(Duration::from_secs(3600));
+            let wait = next
+                .map_or(Duration::MAX, |next| next.saturating_duration_since(now))
+                .min(Duration::from_secs(3600));
             let woken = self.changed.wait_timeout(heartbeats, wait);
             heartbeats = woken.unwrap_or_else(PoisonError::into_inner).0;
         }

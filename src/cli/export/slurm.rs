@@ -55,8 +55,12 @@ const fn default_max_tasks() -> NonZeroUsize {
 pub(super) fn run(args: &SlurmArgs) -> Result<Outcome, CliError> {
     let export_job = ExportJob::read(&args.common, args.max_tasks)?;
     let default = || export_job.manifest_file.with_file_name("slurm-logs");
-    let logs = args.logs.as_deref().map(absolute).transpose()?;
-    let logs = logs.map_or_else(default, |dir| normalized(&dir));
+    let logs = args
+        .logs
+        .as_deref()
+        .map(absolute)
+        .transpose()?
+        .map_or_else(default, |dir| normalized(&dir));
     let script = script(args, &export_job, text(&logs)?)?;
     match &args.common.output {
         // Without the directory the tasks fail without a message

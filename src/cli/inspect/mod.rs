@@ -79,9 +79,12 @@ struct Inspected<'a> {
 
 pub(super) fn run(args: &InspectArgs) -> Result<Outcome, CliError> {
     let mut outcome = Outcome::Done;
-    let topology = args.topology.as_ref();
-    let topology = topology.map(|path| Topology::open(path, read_budget(None, None)));
-    let topology = topology.transpose().map_err(SequenceError::Topology)?;
+    let topology = args
+        .topology
+        .as_ref()
+        .map(|path| Topology::open(path, read_budget(None, None)))
+        .transpose()
+        .map_err(SequenceError::Topology)?;
     for meant in expand(args) {
         let inspected = match meant {
             Meant::List(list) => Ok(list.print(args.json)),

@@ -67,8 +67,9 @@ fn summarise(file: &NativeFile, verify: bool) -> Result<(FrameStats, Option<usiz
         (false, true) => Ok(()),
         (false, false) => frame.verify(),
     };
-    let raw = checked.and_then(|()| if is_large { frame.sample(SAMPLE) } else { frame.to_raw() });
-    let raw = raw.map_err(|e| e.in_file(file.path()))?;
+    let raw = checked
+        .and_then(|()| if is_large { frame.sample(SAMPLE) } else { frame.to_raw() })
+        .map_err(|e| e.in_file(file.path()))?;
     let mut stats = FrameStats::of(&raw);
     stats.dropped += index.dropped;
     if is_large {

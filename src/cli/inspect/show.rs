@@ -139,8 +139,12 @@ impl Inspected<'_> {
 fn cell_line(cell: &SimulationCell) -> String {
     let [a, b, c] = cell.vectors;
     let mut line = format!("  cell {a} {b} {c} from {}", cell.origin);
-    let names = ["a", "b", "c"].iter().zip(cell.periodic);
-    let names: Vec<&str> = names.filter(|(_, is)| *is).map(|(name, _)| *name).collect();
+    let names: Vec<&str> = ["a", "b", "c"]
+        .iter()
+        .zip(cell.periodic)
+        .filter(|(_, is)| *is)
+        .map(|(name, _)| *name)
+        .collect();
     if !names.is_empty() {
         line += &format!(", periodic along {}", names.join(", "));
     }

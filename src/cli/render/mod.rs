@@ -63,9 +63,11 @@ pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
         events::start();
     }
     use_threads(settings.threads)?;
-    let movie = args.movie.as_deref();
-    let movie = movie.map(|path| MovieAfter::new(path, &requested, args.run.job.force));
-    let movie = movie.transpose()?;
+    let movie = args
+        .movie
+        .as_deref()
+        .map(|path| MovieAfter::new(path, &requested, args.run.job.force))
+        .transpose()?;
     let outcome = if settings.follow {
         follow::run(&args.run.job, requested, &signals)?
     } else {

@@ -38,8 +38,8 @@ impl Run {
             message!("surveying the sequence");
             report_wait(job.dir(), job.manifest().job.takeover_after)?;
         }
-        let command = ChildCommand::own_program([COMMAND]);
-        let command = command.map_err(|e| CliError::other(format!("spherule: {e}")))?;
+        let command = ChildCommand::own_program([COMMAND])
+            .map_err(|e| CliError::other(format!("spherule: {e}")))?;
         let run = RenderRun::open(job, sequence, mode)?.with_child_command(command);
         for note in run.notes() {
             note!("{note}");

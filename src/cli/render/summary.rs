@@ -160,7 +160,7 @@ pub(in crate::cli) fn radius_text(setup: &Setup, survey: &Survey) -> String {
 }
 
 /// Height in points below which text cannot be read on paper.
-const LEAST_POINTS: f64 = 6.0;
+const MIN_POINTS: f64 = 6.0;
 
 /// Says that text is too small on paper, if it is.
 fn small_text(setup: &Setup) -> Option<String> {
@@ -172,9 +172,9 @@ fn small_text(setup: &Setup) -> Option<String> {
     let height = page.unwrap_or(picture.render.height);
     let points = sizes.map(|overlay| points_on_paper(overlay.size, height, dpi));
     let least = points.fold(f64::INFINITY, f64::min);
-    (least < LEAST_POINTS - 1e-3).then(|| {
+    (least < MIN_POINTS - 1e-3).then(|| {
         format!(
-            "text is {least:.1} points high on paper; from {LEAST_POINTS} on it can be read (size = \"7pt\" of [[overlay]])"
+            "text is {least:.1} points high on paper; from {MIN_POINTS} on it can be read (size = \"7pt\" of [[overlay]])"
         )
     })
 }

@@ -8,7 +8,7 @@ use crate::manifest::nearest;
 use crate::scale::{Motion, Representation};
 
 /// Maximum time per cell in seconds: one day.
-const MOST_SECONDS: f64 = 86_400.0;
+const MAX_SECONDS: f64 = 86_400.0;
 
 pub(super) fn particles(text: &str) -> Result<usize, ValueError> {
     let count = generate::count(text)?;
@@ -21,8 +21,8 @@ pub(super) fn particles(text: &str) -> Result<usize, ValueError> {
 pub(super) fn seconds(text: &str) -> Result<f64, ValueError> {
     let seconds = text.parse().ok();
     seconds
-        .filter(|s| *s > 0.0 && *s <= MOST_SECONDS)
-        .ok_or_else(|| ValueError::new(format!("seconds above 0, at most {MOST_SECONDS}"), text))
+        .filter(|s| *s > 0.0 && *s <= MAX_SECONDS)
+        .ok_or_else(|| ValueError::new(format!("seconds above 0, at most {MAX_SECONDS}"), text))
 }
 
 pub(super) fn structure(text: &str) -> Result<Structure, ValueError> {

@@ -56,10 +56,13 @@ impl ExpectedOutput {
         };
         let channels = || {
             let list = value("output.channels")?;
-            let names = list.as_array()?.iter().map(|name| name.as_str());
-            let names = names.collect::<Option<Vec<_>>>()?;
-            let attributes = names.iter().filter_map(|name| name.strip_prefix(ATTRIBUTE));
-            let attributes: Vec<String> = attributes.map(str::to_owned).collect();
+            let names =
+                list.as_array()?.iter().map(|name| name.as_str()).collect::<Option<Vec<_>>>()?;
+            let attributes: Vec<String> = names
+                .iter()
+                .filter_map(|name| name.strip_prefix(ATTRIBUTE))
+                .map(str::to_owned)
+                .collect();
             let is_named = |name: &&str| !name.starts_with(ATTRIBUTE);
             let mut channels = Channels::from_names(names.into_iter().filter(is_named)).ok()?;
             // Jobs of earlier versions have no levels

@@ -103,8 +103,8 @@ pub(super) fn run(args: &VerifyArgs) -> Result<Outcome, CliError> {
     let mut verdicts = Vec::with_capacity(frames.len());
     let mut damaged = Vec::new();
     for chunk in frames.chunks(FRAMES_PER_THREAD * rayon::current_num_threads()) {
-        let checked = chunk.par_iter().map(|frame| check_frame(&state, frame, &expected));
-        let checked: Vec<FrameVerdict> = checked.collect();
+        let checked: Vec<FrameVerdict> =
+            chunk.par_iter().map(|frame| check_frame(&state, frame, &expected)).collect();
         let reader = print::lines(checked.iter().flat_map(|f| f.lines(args.json)))?;
         damaged.extend(checked.iter().filter_map(FrameVerdict::damage));
         verdicts.extend(checked.iter().map(|f| (f.frame, f.verdict)));

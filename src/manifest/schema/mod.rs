@@ -84,8 +84,8 @@ pub(super) fn sections(entries: &Entries) -> impl Iterator<Item = &str> {
 
 fn table(entries: &Entries, section: &str) -> Value {
     let keys: Vec<&Entry> = entries.list().iter().filter(|e| e.section == section).collect();
-    let required = keys.iter().filter(|e| e.declared.required.is_some());
-    let required: Vec<&str> = required.map(|e| e.name()).collect();
+    let required: Vec<&str> =
+        keys.iter().filter(|e| e.declared.required.is_some()).map(|e| e.name()).collect();
     let properties = keys.iter().map(|e| (e.name().to_owned(), property(e)));
     let mut table = json!({
         "description": keys[0].about,

@@ -132,11 +132,14 @@ const TABLES: [(&str, &str); 43] = [
 fn the_reader_knows_the_same_keys() {
     let schema = job_schema();
     for (pointer, text) in TABLES {
-        let error = read(&format!("{text}zzzzzzzzzzzzzzzz = 1\n")).unwrap_err();
-        let error = error.to_string();
-        let known = error.split("known here: ").nth(1);
-        let known = known.and_then(|rest| rest.lines().next());
-        let known: BTreeSet<&str> = known.expect(&error).split(", ").collect();
+        let error = read(&format!("{text}zzzzzzzzzzzzzzzz = 1\n")).unwrap_err().to_string();
+        let known: BTreeSet<&str> = error
+            .split("known here: ")
+            .nth(1)
+            .and_then(|rest| rest.lines().next())
+            .expect(&error)
+            .split(", ")
+            .collect();
         let table = schema.pointer(pointer).expect(pointer);
         let properties = table["properties"].as_object().expect(pointer);
         let described: BTreeSet<&str> = properties.keys().map(String::as_str).collect();

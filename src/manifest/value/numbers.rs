@@ -159,8 +159,10 @@ impl Value for DVec3 {
     }
 
     fn parse(field: &Field<'_>, key: &Key) -> Result<Self, Fault> {
-        let value = field.as_numbers().map(Self::from_array);
-        let value = value.filter(|v| !key.is_direction || *v != Self::ZERO);
+        let value = field
+            .as_numbers()
+            .map(Self::from_array)
+            .filter(|v| !key.is_direction || *v != Self::ZERO);
         value.ok_or(Fault::Unwanted)
     }
 

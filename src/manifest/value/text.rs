@@ -39,8 +39,7 @@ impl Value for Vec<String> {
     }
 
     fn parse(field: &Field<'_>, key: &Key) -> Result<Self, Fault> {
-        let items = field.items().filter(|items| !items.is_empty());
-        let items = items.ok_or(Fault::Unwanted)?;
+        let items = field.items().filter(|items| !items.is_empty()).ok_or(Fault::Unwanted)?;
         let names = items.iter().map(|item| item.value(key));
         names.collect::<Option<_>>().ok_or(Fault::Noted)
     }

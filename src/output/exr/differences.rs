@@ -87,8 +87,8 @@ mod tests {
     fn reference(bytes: &[u8]) -> Vec<u8> {
         let even = bytes.iter().step_by(2);
         let reordered: Vec<u8> = even.chain(bytes.iter().skip(1).step_by(2)).copied().collect();
-        let others = reordered.windows(2);
-        let others = others.map(|pair| pair[1].wrapping_sub(pair[0]).wrapping_add(128));
+        let others =
+            reordered.windows(2).map(|pair| pair[1].wrapping_sub(pair[0]).wrapping_add(128));
         reordered.iter().take(1).copied().chain(others).collect()
     }
 

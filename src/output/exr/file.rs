@@ -61,8 +61,9 @@ impl<'a, W: Write + Seek> ScanLineFile<'a, W> {
     pub(super) fn write(&mut self, block: PackedBlock) -> Result<(), OutputError> {
         let has_parts = self.parts.len() > 1;
         let part = self.parts.get_mut(block.part);
-        let part = part.filter(|part| part.offsets.len() < part.count);
-        let part = part.ok_or_else(|| invalid("there are more blocks than in the layout"))?;
+        let part = part
+            .filter(|part| part.offsets.len() < part.count)
+            .ok_or_else(|| invalid("there are more blocks than in the layout"))?;
         part.offsets.push(self.end);
         // In a file with several parts, a block begins with the number of its part
         let long = |_| invalid("a block is too long");
@@ -83,8 +84,12 @@ impl<'a, W: Write + Seek> ScanLineFile<'a, W> {
         if !self.parts.iter().all(is_complete) {
             return Err(invalid("some blocks are missing"));
         }
-        let offsets = self.parts.iter().flat_map(|part| &part.offsets);
-        let offsets: Vec<u8> = offsets.flat_map(|offset| offset.to_le_bytes()).collect();
+        let offsets: Vec<u8> = self
+            .parts
+            .iter()
+            .flat_map(|part| &part.offsets)
+            .flat_map(|offset| offset.to_le_bytes())
+            .collect();
         let to = SeekFrom::Start(self.offsets_at);
         self.file.seek(to).map_err(io_error)?;
         self.file.write_all(&offsets).map_err(io_error)?;

@@ -140,8 +140,9 @@ impl ExrPart {
         // and odd bytes are separate.
         let is_row_above_in_reach = rows > 1 && self.bytes(1) / 2 <= WINDOW;
         // Group adjacent planes of the same kind
-        let groups = self.planes.chunk_by(|a, b| a.kind() == b.kind());
-        let groups: Vec<(PlaneKind, usize)> = groups
+        let groups: Vec<(PlaneKind, usize)> = self
+            .planes
+            .chunk_by(|a, b| a.kind() == b.kind())
             .map(|group| {
                 let bytes = group.iter().map(|plane| plane.sample_type().bytes_per_sample());
                 (group[0].kind(), bytes.sum::<usize>() * width / 2)

@@ -426,8 +426,7 @@ fn a_missing_block_is_an_error() {
     let film = wild_film(8, 40, Channels::COLOR);
     let layout = ExrLayout::of(&film, &ExrOptions::default()).unwrap();
     let mut buffers = PackBuffers::default();
-    let blocks = layout.blocks(film.rows());
-    let blocks = blocks.map(|rows| pack_block(&rows, &layout, &mut buffers));
+    let blocks = layout.blocks(film.rows()).map(|rows| pack_block(&rows, &layout, &mut buffers));
     let mut file = Cursor::new(Vec::new());
     assert!(write_blocks(&mut file, &layout, blocks.take(2)).is_err());
 }

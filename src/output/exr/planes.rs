@@ -124,8 +124,10 @@ pub(in crate::output) fn parts(planes: Vec<Plane>, has_data_part: bool) -> Vec<V
 fn layers(layers: &Layers, names: &PlaneNames) -> Vec<Plane> {
     let mut all = Vec::new();
     // Colours
-    let lights = layers.lights.iter();
-    let lights = lights.map(|class| (class.name(), layers.light_at(class).unwrap_or_default()));
+    let lights = layers
+        .lights
+        .iter()
+        .map(|class| (class.name(), layers.light_at(class).unwrap_or_default()));
     for (name, at) in lights.chain([("noisy", layers.noisy_at())]) {
         let planes = at.zip(["R", "G", "B"]);
         all.extend(

@@ -173,8 +173,7 @@ fn bytes_do_not_depend_on_threads() {
         let first = encode_exr(&film, &options).unwrap();
         for threads in [1, 2, 7] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
-            let again = pool.build().unwrap();
-            let again = again.install(|| encode_exr(&film, &options).unwrap());
+            let again = pool.build().unwrap().install(|| encode_exr(&film, &options).unwrap());
             assert!(again == first, "{compression:?} on {threads} threads");
         }
     }

@@ -89,8 +89,14 @@ fn text_of_pdf_files_has_its_size_in_points() {
     let pdf = figure(false).to_pdf().unwrap();
     let text = String::from_utf8_lossy(&pdf);
     // 945 pixels are 80 mm
-    let page = text.split("/MediaBox [").nth(1).and_then(|s| s.split(']').next()).unwrap();
-    let page: Vec<f32> = page.split(' ').filter_map(|number| number.parse().ok()).collect();
+    let page: Vec<f32> = text
+        .split("/MediaBox [")
+        .nth(1)
+        .and_then(|s| s.split(']').next())
+        .unwrap()
+        .split(' ')
+        .filter_map(|number| number.parse().ok())
+        .collect();
     let expected = [0.0, 0.0, 80.01 / 25.4 * 72.0, 50.8 / 25.4 * 72.0];
     assert!(
         page.len() == 4 && page.iter().zip(expected).all(|(a, b)| (a - b).abs() < 0.01),
@@ -107,8 +113,12 @@ fn text_of_pdf_files_has_its_size_in_points() {
     assert_eq!(sizes.len(), 10, "{content}");
     assert!(sizes.iter().all(|size| (size - 7.0).abs() < 1e-3), "{sizes:?}");
     // Glyphs have their characters
-    let map = streams.iter().find(|stream| stream.contains("beginbfchar"));
-    let map = map.cloned().or_else(|| Some(text.clone().into_owned())).unwrap();
+    let map = streams
+        .iter()
+        .find(|stream| stream.contains("beginbfchar"))
+        .cloned()
+        .or_else(|| Some(text.clone().into_owned()))
+        .unwrap();
     for character in "Speed(m/s)01234aρµxyz".chars() {
         let code = format!("<{:04X}>", u32::from(character));
         assert!(map.contains(&code), "{character} {code}");
@@ -146,8 +156,10 @@ fn svg_files_have_outlines_with_their_words() {
         .split("aria-label=\"Speed (m/s)\"")
         .nth(1)
         .and_then(|s| s.split(" d=\"").nth(1))
+        .unwrap()
+        .split('"')
+        .next()
         .unwrap();
-    let path = path.split('"').next().unwrap();
     let numbers: Vec<f32> = path
         .split(|c: char| c.is_ascii_alphabetic() || c == ' ')
         .filter_map(|number| number.parse().ok())

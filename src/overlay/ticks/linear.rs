@@ -53,8 +53,10 @@ impl Axis {
             let fits = |multiples: &Multiples| multiples.count() <= most as f64;
             all.map(|step| self.multiples(step)).filter(fits).collect()
         };
-        let usual = steps(&[1.0, 2.0, 5.0]).into_iter().next();
-        let usual = usual.unwrap_or_else(|| self.multiples((1.0, smallest + 2)));
+        let usual = steps(&[1.0, 2.0, 5.0])
+            .into_iter()
+            .next()
+            .unwrap_or_else(|| self.multiples((1.0, smallest + 2)));
         // One with ticks at both ends is better, unless it has far fewer
         let is_better =
             |own: &Multiples| own.reaches_ends(self.range) && 2.0 * own.count() >= usual.count();

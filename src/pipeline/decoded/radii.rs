@@ -74,15 +74,17 @@ fn from_table(
     let mut unknown = 0;
     let radius = |index| {
         let value = attribute.magnitude(index);
-        let found = table.radius(value).or_else(|| {
-            unknown += 1;
-            table.other_radius()
-        });
-        let found = found.ok_or_else(|| LoadError::NoRadius {
-            file: file.to_owned(),
-            name: attribute.name.clone(),
-            value,
-        })?;
+        let found = table
+            .radius(value)
+            .or_else(|| {
+                unknown += 1;
+                table.other_radius()
+            })
+            .ok_or_else(|| LoadError::NoRadius {
+                file: file.to_owned(),
+                name: attribute.name.clone(),
+                value,
+            })?;
         Ok((found * scale) as f32)
     };
     let radii: Result<Vec<f32>, LoadError> = (0..attribute.count()).map(radius).collect();

@@ -5,11 +5,11 @@ use super::{JobFrame, JobReport, Status};
 use crate::report::page::{Page, Table};
 
 /// Maximum number of rows in the table of frames.
-const MOST_FRAMES: usize = 300;
+const MAX_FRAMES: usize = 300;
 /// Maximum number of rows in the table of failures.
-const MOST_FAILURES: usize = 50;
+const MAX_FAILURES: usize = 50;
 /// Maximum length of a message, in characters.
-const MOST_TEXT: usize = 500;
+const MAX_TEXT: usize = 500;
 
 const HEADS: [&str; 18] = [
     "frame",
@@ -46,16 +46,16 @@ impl JobReport {
             total => format!("{total} frames failed."),
         });
         let mut table = Table::new("failed-frames", &["frame", "image", "reason"]);
-        for frame in failed().take(MOST_FAILURES) {
+        for frame in failed().take(MAX_FAILURES) {
             table.bad_row([
                 frame.number.to_string(),
                 frame.image.clone().unwrap_or_default(),
-                shortened(frame.reason.as_deref().unwrap_or("not recorded"), MOST_TEXT),
+                shortened(frame.reason.as_deref().unwrap_or("not recorded"), MAX_TEXT),
             ]);
         }
         page.table(&table);
-        if total > MOST_FAILURES {
-            let note = format!("The first {MOST_FAILURES} are listed; all are in");
+        if total > MAX_FAILURES {
+            let note = format!("The first {MAX_FAILURES} are listed; all are in");
             page.link(&note, super::JSON_FILE);
         }
     }
@@ -85,7 +85,7 @@ impl JobReport {
         }
         // Choose frames at equal distances, to limit the size of the page
         let mut table = Table::new("all-frames", &HEADS);
-        let chosen = evenly(tried.len(), MOST_FRAMES);
+        let chosen = evenly(tried.len(), MAX_FRAMES);
         let all = chosen.len() == tried.len();
         for index in chosen {
             let frame = tried[index];
@@ -101,7 +101,7 @@ impl JobReport {
         );
         if !all {
             let tried = count(tried.len() as u64);
-            let note = format!("{MOST_FRAMES} of {tried} frames, evenly spaced; all are in");
+            let note = format!("{MAX_FRAMES} of {tried} frames, evenly spaced; all are in");
             page.link(&note, super::JSON_FILE);
         }
         page.table(&table);

@@ -9,7 +9,7 @@ use crate::report::THESIS_BYTES_PER_PARTICLE;
 use crate::report::page::{Page, Table};
 
 /// Maximum length of a list of frame numbers or of a setting, in characters.
-const MOST_TEXT: usize = 300;
+const MAX_TEXT: usize = 300;
 
 impl JobReport {
     /// The report as a page.
@@ -139,7 +139,7 @@ impl JobReport {
         page.fold(&format!("All {} settings", self.settings.len()));
         let mut table = Table::new("all-settings", &["setting", "value"]);
         for (key, value) in &self.settings {
-            table.row([key.clone(), shortened(value, MOST_TEXT)]);
+            table.row([key.clone(), shortened(value, MAX_TEXT)]);
         }
         page.table(&table);
         page.end_fold();
@@ -159,7 +159,7 @@ fn phases(report: &FrameReport) -> Table {
 /// Frame numbers as ranges.
 fn list_of(frames: &[i64]) -> String {
     let range = FrameRange::from_frames(frames.iter().copied());
-    range.map_or_else(String::new, |r| shortened(&r.to_string(), MOST_TEXT))
+    range.map_or_else(String::new, |r| shortened(&r.to_string(), MAX_TEXT))
 }
 
 /// Bytes per particle in anonymous memory and in the mapped file.

@@ -8,8 +8,8 @@ impl JobReport {
     /// The report as JSON.
     pub fn to_json(&self) -> Value {
         let frames: Vec<Value> = self.frames.iter().map(JobFrame::to_json).collect();
-        let settings = self.settings.iter();
-        let settings: Map<String, Value> = settings.map(|(k, v)| (k.clone(), json!(v))).collect();
+        let settings: Map<String, Value> =
+            self.settings.iter().map(|(k, v)| (k.clone(), json!(v))).collect();
         let slowest: Vec<Value> = self
             .slowest()
             .into_iter()

@@ -91,15 +91,15 @@ impl Status {
 impl JobReport {
     /// A report from plan, ledger and disk.
     pub fn new(state: &JobState, manifest: &Manifest) -> Self {
-        let frames = state.plan().frames().iter();
-        let frames = frames.map(|planned| JobFrame::new(state, planned)).collect();
+        let frames =
+            state.plan().frames().iter().map(|planned| JobFrame::new(state, planned)).collect();
         Self::of(frames, manifest.settings(), Machine::this())
     }
 
     /// A report of a job whose manifest is not needed: its settings are those of the plan.
     pub fn of_plan(state: &JobState) -> Self {
-        let frames = state.plan().frames().iter();
-        let frames = frames.map(|planned| JobFrame::new(state, planned)).collect();
+        let frames =
+            state.plan().frames().iter().map(|planned| JobFrame::new(state, planned)).collect();
         Self::of(frames, state.plan().settings().to_vec(), Machine::this())
     }
 
@@ -149,8 +149,7 @@ impl JobFrame {
             Some(FrameState::Failed) => Status::Failed,
             Some(FrameState::Pending | FrameState::Lost) | None => Status::Pending,
         };
-        let entry = state.ledger().entry(planned.number);
-        let entry = entry.filter(|_| status != Status::Pending);
+        let entry = state.ledger().entry(planned.number).filter(|_| status != Status::Pending);
         Self::of(planned.number, planned.outputs.first().cloned(), status, entry)
     }
 

@@ -6,7 +6,7 @@ use crate::report::FrameReport;
 use crate::report::plots::{Axis, Plot, Series};
 
 /// Number of distinct colours.
-const MOST_PHASES: usize = 7;
+const MAX_PHASES: usize = 7;
 
 type Curve<'a> = (String, Box<dyn Fn(&FrameReport) -> f64 + 'a>);
 
@@ -51,8 +51,7 @@ impl JobReport {
         if values.fold(0.0, f64::max) >= 0.1 {
             return self.plot(id, title, "time, s", curves);
         }
-        let scaled = curves.into_iter();
-        let scaled = scaled.map(|(name, value)| curve(&name, move |r| 1e3 * value(r)));
+        let scaled = curves.into_iter().map(|(name, value)| curve(&name, move |r| 1e3 * value(r)));
         self.plot(id, title, "time, ms", scaled.collect())
     }
 
@@ -83,7 +82,7 @@ impl JobReport {
             let phases = report.build.phases.iter();
             phases.filter(|phase| phase.0 == name).map(|phase| phase.1).sum::<f64>()
         };
-        let single = if names.len() > MOST_PHASES { MOST_PHASES - 1 } else { names.len() };
+        let single = if names.len() > MAX_PHASES { MAX_PHASES - 1 } else { names.len() };
         let rest = names.split_off(single);
         let mut curves: Vec<Curve> =
             names.into_iter().map(|name| curve(name, move |report| of(name, report))).collect();

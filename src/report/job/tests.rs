@@ -60,8 +60,7 @@ fn report(frames: Vec<JobFrame>) -> JobReport {
 #[track_caller]
 fn section<'a>(html: &'a str, id: &str) -> &'a str {
     let start = format!("<h2 id=\"{id}\">");
-    let rest = html.split(&start).nth(1);
-    let rest = rest.unwrap_or_else(|| panic!("no section {id} in {html}"));
+    let rest = html.split(&start).nth(1).unwrap_or_else(|| panic!("no section {id} in {html}"));
     rest.split("<h2").next().expect("a first part")
 }
 

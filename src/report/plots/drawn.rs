@@ -4,9 +4,9 @@ use super::{Line, Plot, Series};
 
 /// Maximum number of points, about one per unit of width. Longer series are divided into half as many intervals, and
 /// the smallest and the largest value of each are kept.
-const MOST_POINTS: usize = 800;
+const MAX_POINTS: usize = 800;
 /// Maximum number of markers; longer series have markers at some points only.
-const MOST_MARKERS: usize = 24;
+const MAX_MARKERS: usize = 24;
 
 /// A series in positions of its axes, split at gaps.
 pub(super) struct Drawn<'a> {
@@ -18,8 +18,7 @@ pub(super) struct Drawn<'a> {
 
 impl<'a> Drawn<'a> {
     pub(super) fn new(plot: &Plot, series: &'a Series, hue: usize) -> Self {
-        let placed = series.points.iter();
-        let placed = placed.map(|(x, y)| (plot.x.place(*x), plot.y.place(*y)));
+        let placed = series.points.iter().map(|(x, y)| (plot.x.place(*x), plot.y.place(*y)));
         let placed = thinned(placed.collect());
         let pieces = placed
             .split(|point| !is_finite(*point))
@@ -36,7 +35,7 @@ impl<'a> Drawn<'a> {
     /// Positions of markers: all isolated points, and some of many connected ones.
     pub(super) fn marked(&self) -> Vec<(f64, f64)> {
         let joined = self.line != Line::None;
-        let every = if joined { self.point_count().div_ceil(MOST_MARKERS).max(1) } else { 1 };
+        let every = if joined { self.point_count().div_ceil(MAX_MARKERS).max(1) } else { 1 };
         let mut marked = Vec::new();
         let mut place = 0;
         for piece in &self.pieces {
@@ -58,11 +57,11 @@ fn is_finite((x, y): (f64, f64)) -> bool {
 /// Reduces a long series to the smallest and the largest value of each section, in their order. A
 /// section without values remains a gap.
 fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
-    if points.len() <= MOST_POINTS {
+    if points.len() <= MAX_POINTS {
         return points;
     }
-    let stretches = MOST_POINTS / 2;
-    let mut kept = Vec::with_capacity(MOST_POINTS);
+    let stretches = MAX_POINTS / 2;
+    let mut kept = Vec::with_capacity(MAX_POINTS);
     for i in 0..stretches {
         let range = i * points.len() / stretches..(i + 1) * points.len() / stretches;
         let of = |index: &usize| points[*index].1;

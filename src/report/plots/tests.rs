@@ -65,8 +65,13 @@ fn same_data_give_the_same_text() {
 #[test]
 fn heights_are_in_proportion() {
     let html = plot(vec![Series::new("one", [(0.0, 0.0), (2.0, 5.0), (4.0, 10.0)])]).figure();
-    let path = html.split("<path fill=\"none\" d=\"M").nth(1).expect("a line");
-    let path = path.split('"').next().expect("its end");
+    let path = html
+        .split("<path fill=\"none\" d=\"M")
+        .nth(1)
+        .expect("a line")
+        .split('"')
+        .next()
+        .expect("its end");
     let points: Vec<(f64, f64)> = path
         .split('L')
         .map(|p| {
@@ -131,10 +136,17 @@ fn long_series_keep_their_peaks_and_stay_small() {
     let html = plot(vec![line(&values)]).figure();
     check_geometry(&html);
     assert!(html.len() < 30_000, "{}", html.len());
-    let points = html.split("<path fill=\"none\" d=\"M").nth(1).expect("a line");
-    let points = points.split('"').next().expect("its end").split('L');
-    let highest = points.filter_map(|p| p.split_once(' ')?.1.parse::<f64>().ok());
-    let highest = highest.fold(f64::INFINITY, f64::min);
+    let points = html
+        .split("<path fill=\"none\" d=\"M")
+        .nth(1)
+        .expect("a line")
+        .split('"')
+        .next()
+        .expect("its end")
+        .split('L');
+    let highest = points
+        .filter_map(|p| p.split_once(' ')?.1.parse::<f64>().ok())
+        .fold(f64::INFINITY, f64::min);
     assert!(highest < 40.0, "the peak is lost: {highest}");
 }
 

@@ -47,13 +47,13 @@ pub fn foreign(dir: &Path) -> Option<PathBuf> {
 
 /// Text up to a length that no report exceeds.
 fn read(path: &Path) -> Option<String> {
-    const MOST: u64 = 64 << 20;
+    const MAX: u64 = 64 << 20;
     let mut text = String::new();
     let file = fs::File::open(path).ok()?;
     if !file.metadata().ok()?.is_file() {
         return None;
     }
-    file.take(MOST).read_to_string(&mut text).ok()?;
+    file.take(MAX).read_to_string(&mut text).ok()?;
     Some(text)
 }
 

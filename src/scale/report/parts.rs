@@ -60,8 +60,8 @@ fn our_rows(report: &ScaleReport) -> Vec<Vec<String>> {
         let peaks = [
             report.anonymous_peak_bytes(particles, column),
             report.file_peak_bytes(particles, column),
-        ];
-        let peaks = peaks.map(|bytes| bytes.map_or_else(|| MISSING.to_owned(), mib));
+        ]
+        .map(|bytes| bytes.map_or_else(|| MISSING.to_owned(), mib));
         Some(shares(measured).into_iter().chain(peaks).collect())
     })
 }

@@ -134,8 +134,8 @@ fn put_rows(text: &mut String, heading: &str, rows: &[Vec<String>]) {
     let widths: Vec<usize> = (0..columns).map(width).collect();
     let _ = writeln!(text, "\n{heading}");
     for row in rows {
-        let cells = row.iter().zip(&widths);
-        let cells: Vec<String> = cells.map(|(c, width)| format!("{c:>width$}")).collect();
+        let cells: Vec<String> =
+            row.iter().zip(&widths).map(|(c, width)| format!("{c:>width$}")).collect();
         let _ = writeln!(text, "  {}", cells.join("   "));
     }
 }

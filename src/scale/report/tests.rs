@@ -86,8 +86,10 @@ fn tables_have_the_layout_of_the_thesis() {
     let text = table::text(&report());
     let lines: Vec<&str> = text.lines().collect();
     let after = |heading: &str| {
-        let at = lines.iter().position(|l| l.starts_with(heading));
-        let at = at.unwrap_or_else(|| panic!("no {heading} in\n{text}"));
+        let at = lines
+            .iter()
+            .position(|l| l.starts_with(heading))
+            .unwrap_or_else(|| panic!("no {heading} in\n{text}"));
         [1, 2, 3].map(|i| lines[at + i])
     };
     assert_eq!(

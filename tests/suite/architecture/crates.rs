@@ -11,8 +11,9 @@ const MAX_LINES: usize = 60_000;
 
 /// Directories of the crates, by their names without `spherule-`.
 fn crates() -> BTreeMap<String, PathBuf> {
-    let below = fs::read_dir(root().join("crates")).expect("a directory");
-    let below = below.map(|entry| entry.expect("an entry").path());
+    let below = fs::read_dir(root().join("crates"))
+        .expect("a directory")
+        .map(|entry| entry.expect("an entry").path());
     let others = ["formats", "jobs", "python", "."].map(|name| root().join(name));
     below.chain(others).map(|dir| (name_of(&dir), dir)).collect()
 }

@@ -37,8 +37,8 @@ fn collect(dir: &Path, parents: &[String], found: &mut Vec<(ModulePath, String)>
 
 /// `text` without comments and without the tests at the end.
 pub(super) fn code(text: &str) -> String {
-    let lines = text.lines().map(|line| line.split("//").next().unwrap_or_default());
-    let lines: Vec<&str> = lines.collect();
+    let lines: Vec<&str> =
+        text.lines().map(|line| line.split("//").next().unwrap_or_default()).collect();
     let code = lines.join("\n");
     let end = code.find("#[cfg(test)]\nmod tests {").unwrap_or(code.len());
     code[..end].to_owned()

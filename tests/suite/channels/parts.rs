@@ -65,8 +65,8 @@ fn each_part_has_its_compression_and_attributes() {
         let mattes = own.other.iter().filter(|(name, value)| {
             is_matte(&name.to_string()) && matches!(value, AttributeValue::Text(_))
         });
-        let channels = header.channels.list.iter();
-        let channels: Vec<String> = channels.map(|c| c.name.to_string()).collect();
+        let channels: Vec<String> =
+            header.channels.list.iter().map(|c| c.name.to_string()).collect();
         let has = |name: &str| channels.iter().any(|channel| channel == name);
         if names.len() == 1 {
             assert_eq!(header.compression, exr::compression::Compression::PIZ);
@@ -94,7 +94,6 @@ fn jobs_with_two_parts_resume() {
     // Another compression is another job
     let pattern = ["render", "in", "-o", "parts/f.####.exr"];
     let other = ["--set", "output.compression=piz", "--set", "output.data_compression=rle"];
-    let ran = workshop.run(&[&pattern[..], &SIZE, &CHANNELS, &CROP, &other].concat());
-    let ran = ran.expect(2);
+    let ran = workshop.run(&[&pattern[..], &SIZE, &CHANNELS, &CROP, &other].concat()).expect(2);
     assert!(ran.errors().contains("output.data_compression"), "{}", ran.errors());
 }

@@ -33,8 +33,7 @@ fn repeated_command_does_nothing() {
         &["--encoding", "q16", "--threads", "1", "--memory", "2GiB"],
         &["--encoding", "q16", "--attributes", "*:keep"],
     ] {
-        let ran = convert(&shop, options).expect(0);
-        let ran = ran.prints("5 of 5 frames are done already");
+        let ran = convert(&shop, options).expect(0).prints("5 of 5 frames are done already");
         assert!(ran.rendered().is_empty());
         assert_eq!(stamps(&out), before, "{options:?}");
     }
@@ -123,8 +122,7 @@ fn appended_frames_are_converted_as_the_first_ones_were() {
     let settled = resolved();
     // Alone it would have another origin and another radius.
     npy(&shop.join("in/f_3.npy"), 9000, 3, 3.0 * far);
-    let ran = convert(&shop, &Q16).expect(0);
-    let ran = ran.prints("2 of 3 frames are done already");
+    let ran = convert(&shop, &Q16).expect(0).prints("2 of 3 frames are done already");
     assert_eq!(ran.rendered(), [3]);
     assert_eq!(resolved(), settled);
     let radius = |file: &str| number(&inspected(&shop, file)["radius"]);

@@ -53,8 +53,10 @@ fn attributes_are_stored_in_fewer_bits() {
         let object = inspected(&shop, "out/frame.0001.spf");
         let list = object["native"]["attributes"].as_array().expect("a list");
         for (name, expected) in ["id", "density", "velocity"].into_iter().zip(stored) {
-            let found = list.iter().find(|a| a["name"] == name);
-            let found = found.map_or("", |a| a["stored"].as_str().expect("a name"));
+            let found = list
+                .iter()
+                .find(|a| a["name"] == name)
+                .map_or("", |a| a["stored"].as_str().expect("a name"));
             assert_eq!(found, expected, "{choices}: {name}");
         }
     }

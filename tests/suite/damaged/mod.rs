@@ -92,8 +92,10 @@ fn every_damaged_file_gives_its_expected_error() {
     let makeable = sorted(made.into_iter().map(|(name, _)| name).collect());
     assert_eq!(listed, makeable, "the table and the files that are made");
     let entries = fs::read_dir(directory()).expect("the directory");
-    let there = entries.map(|e| e.expect("an entry").file_name().to_string_lossy().into_owned());
-    let there: Vec<String> = there.filter(|name| name != "table.tsv").collect();
+    let there: Vec<String> = entries
+        .map(|e| e.expect("an entry").file_name().to_string_lossy().into_owned())
+        .filter(|name| name != "table.tsv")
+        .collect();
     assert_eq!(sorted(there), listed, "the directory and the table");
 }
 

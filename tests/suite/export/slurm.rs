@@ -27,8 +27,7 @@ fn export(workshop: &Workshop, options: &[&str]) -> Ran {
 /// The script as the shell sees it.
 #[track_caller]
 fn sound(script: &str) {
-    let checked = Command::new("bash").args(["-n", "-c", script]).output();
-    let checked = checked.expect("bash");
+    let checked = Command::new("bash").args(["-n", "-c", script]).output().expect("bash");
     assert!(checked.status.success() && checked.stderr.is_empty());
     let array = script.lines().find_map(|l| l.strip_prefix("#SBATCH --array=0-"));
     let last = array.and_then(|a| a.split('%').next()?.parse::<usize>().ok());
@@ -96,8 +95,9 @@ fn frames_come_from_the_manifest_or_the_option() {
 fn tasks_are_few_enough_for_an_array() {
     let workshop = Workshop::new();
     job(&workshop, "data", &FRAMES);
-    let ran = export(&workshop, &["data/job.toml", "--max-tasks", "3", "--chunk", "2"]).expect(0);
-    let ran = ran.prints("3 tasks of 5 frames, because 2 would give 7 tasks");
+    let ran = export(&workshop, &["data/job.toml", "--max-tasks", "3", "--chunk", "2"])
+        .expect(0)
+        .prints("3 tasks of 5 frames, because 2 would give 7 tasks");
     assert_eq!(chunks(&ran.text()).concat(), FRAMES);
     assert!(ran.text().contains("# 5 frames per task, because 2 would give 7 tasks"));
     // Without an option for the count.

@@ -103,9 +103,11 @@ pub(super) fn write_failure(
     let folder = target.expect("the target directory").join("golden-failures");
     fs::create_dir_all(&folder).expect("a folder for failures");
     let colors = [["R", "G", "B"].map(str::to_owned)];
-    let data = differing.iter().map(|d| &d.channel);
-    let data = data.filter(|c| !["R", "G", "B"].contains(&c.as_str()));
-    let data = data.map(|c| [0; 3].map(|_| c.clone()));
+    let data = differing
+        .iter()
+        .map(|d| &d.channel)
+        .filter(|c| !["R", "G", "B"].contains(&c.as_str()))
+        .map(|c| [0; 3].map(|_| c.clone()));
     for channels in colors.into_iter().chain(data) {
         let label = if channels[0] == "R" { String::new() } else { format!("{}-", channels[0]) };
         let range = range(expected, &channels);

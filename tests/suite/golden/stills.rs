@@ -61,8 +61,8 @@ impl Still {
             None => sample("emitter_sph/ParticleData_Fluid_10.bgeo"),
         };
         let still = ["still", file.to_str().expect("a path in UTF-8"), "-o", "f.exr"];
-        let settings = IMAGE.iter().chain(self.settings).flat_map(|set| ["--set", set]);
-        let settings: Vec<&str> = settings.collect();
+        let settings: Vec<&str> =
+            IMAGE.iter().chain(self.settings).flat_map(|set| ["--set", set]).collect();
         workshop.run(&[&still, self.options, &settings].concat()).expect(0);
         fs::read(workshop.join("f.exr")).expect("an image")
     }

@@ -58,8 +58,7 @@ fn a_bomb_costs_one_frame() {
         let workshop = Workshop::new();
         frames(&workshop.join("in"));
         let render = ["render", "in", "-o", "out/f.####.exr", "--radius", "0.1"];
-        let ran = limited(&workshop, &[&render[..], &SMALL, &AWAY, options].concat());
-        let ran = ran
+        let ran = limited(&workshop, &[&render[..], &SMALL, &AWAY, options].concat())
             .expect(1)
             .prints("f_2.csv.gz: its numbers in memory are larger than")
             .prints("failed: 2");

@@ -8,7 +8,7 @@ use crate::harness::{Workshop, npy};
 /// Bytes that each frame may take for good: the job keeps what the report will say of it, as text of
 /// over a kibibyte; 2 to 6 KiB a frame were measured, pieces that the allocator keeps included. The
 /// smallest image or particles here are larger.
-const MOST: f64 = 8192.0;
+const MAX: f64 = 8192.0;
 
 /// Frames of which only the smallest value counts: others are caught with pieces in flight.
 const WINDOW: usize = 10;
@@ -27,11 +27,14 @@ fn flat(particles: usize, options: &[&str]) {
     workshop.run(&[&common[..], options].concat()).expect(0);
     let report = report(&workshop);
     let frames = report["frames"].as_array().expect("frames");
-    let after = frames.iter().map(|f| f["rss"]["anonymous"].as_f64());
-    let after: Vec<f64> = after.collect::<Option<_>>().expect("bytes");
+    let after: Vec<f64> = frames
+        .iter()
+        .map(|f| f["rss"]["anonymous"].as_f64())
+        .collect::<Option<_>>()
+        .expect("bytes");
     assert_eq!(after.len(), 200);
     let growth = growth(&after[50..]);
-    assert!(growth < MOST, "{growth} bytes a frame: {after:?}");
+    assert!(growth < MAX, "{growth} bytes a frame: {after:?}");
 }
 
 /// Median growth a frame from window to window. What leaks does so in each window; a thread that

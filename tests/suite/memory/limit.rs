@@ -18,8 +18,9 @@ fn frames_beyond_memory_are_not_started() {
     let workshop = Workshop::new();
     vtk(&workshop.join("in/f_1.vtk"), 1000, false);
     vtk(&workshop.join("in/f_2.vtk"), 1000, false);
-    let ran = workshop.render(&["--memory-limit", "1MiB"]).expect(2);
-    let ran = ran
+    let ran = workshop
+        .render(&["--memory-limit", "1MiB"])
+        .expect(2)
         .prints("no frame fits into memory: frame 1: it needs about")
         .prints("render.memory_limit is 1.00 MiB")
         .prints("raise the limit");

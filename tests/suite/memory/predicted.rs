@@ -46,8 +46,7 @@ fn peaks(name: &str, make: impl Fn(&Path), options: &[&str]) -> (f64, f64) {
     workshop.run(&arguments("render")).expect(0);
     let predicted = &answer(&check)["memory"];
     let total = predicted["total"].as_f64().expect("bytes");
-    let measured = report(&workshop)["totals"]["rss"]["anonymous_peak"].as_f64();
-    let measured = measured.expect("bytes");
+    let measured = report(&workshop)["totals"]["rss"]["anonymous_peak"].as_f64().expect("bytes");
     (total, measured)
 }
 
@@ -233,8 +232,12 @@ fn compare_bound(name: &str, make: impl Fn(&Path), options: &[&str]) {
 fn splash(path: &Path, count: usize) {
     block(path, count);
     let bytes = fs::read(path).expect("a file");
-    let values = bytes[bytes.len() - 12 * count..].as_chunks::<4>().0.iter();
-    let values: Vec<f32> = values.map(|bytes| f32::from_le_bytes(*bytes)).collect();
+    let values: Vec<f32> = bytes[bytes.len() - 12 * count..]
+        .as_chunks::<4>()
+        .0
+        .iter()
+        .map(|bytes| f32::from_le_bytes(*bytes))
+        .collect();
     let points = values.as_chunks::<3>().0.iter().map(|point| Vec3::from_array(*point));
     let apart = points.enumerate().map(|(i, point)| if i % 3 == 0 { 4.0 * point } else { point });
     write::npy::write(path, &apart.collect::<Vec<Vec3>>()).expect("a file");

@@ -88,9 +88,10 @@ fn a_failing_ffmpeg_leaves_no_movie() {
 #[test]
 fn without_ffmpeg_the_message_helps() {
     let workshop = job(&[1, 2], &[]);
-    let ran = run(&workshop, None, &["movie", "out", "-o", "a.mp4"]).expect(REFUSED);
-    let ran = ran.prints("ffmpeg is not installed");
-    let ran = ran.prints("sudo apt install ffmpeg");
+    let ran = run(&workshop, None, &["movie", "out", "-o", "a.mp4"])
+        .expect(REFUSED)
+        .prints("ffmpeg is not installed")
+        .prints("sudo apt install ffmpeg");
     ran.prints(
         "Or run by hand elsewhere: ffmpeg -framerate 25 -start_number 1 -i 'out/f.%04d.png' -vf",
     );

@@ -39,8 +39,8 @@ fn term_and_interrupt_end_with_75_and_the_job_goes_on() {
     let whole = images(&workshop.join("whole"));
     for signal in ["TERM", "INT"] {
         let tried = |n: &usize| interrupt(&workshop, &format!("{signal}{n}"), signal);
-        let out = (0..TRIES).find(tried).map(|n| format!("{signal}{n}"));
-        let out = out.expect("a signal comes in time");
+        let out =
+            (0..TRIES).find(tried).map(|n| format!("{signal}{n}")).expect("a signal comes in time");
         let done = ledger(&workshop.join(&out)).lines.len();
         // By the same command after one signal, by the job's own manifest after the other.
         let ran = if signal == "TERM" {

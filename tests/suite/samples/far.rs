@@ -97,8 +97,7 @@ fn pictures_are_those_of_the_same_particles_at_zero() {
     assert!(same.count() + 10 >= 96 * 54);
     let depths = far.floats("Z").iter().zip(near.floats("Z"));
     let both = depths.filter(|(a, b)| a.is_finite() && b.is_finite());
-    let off = both.map(|(a, b)| f64::from((a - b).abs()));
-    let mut off: Vec<f64> = off.collect();
+    let mut off: Vec<f64> = both.map(|(a, b)| f64::from((a - b).abs())).collect();
     assert!(off.len() > 96 * 54 / 4, "{}", off.len());
     off.sort_by(f64::total_cmp);
     assert!(off[off.len() - 20] < 1e-3 * SPACING, "{:e}", off[off.len() - 20]);

@@ -114,8 +114,11 @@ fn fluid_and_obstacle_are_parts_of_one_step() {
     let mut sequence = open(path);
     assert_eq!(sequence.part_names(), ["fluid", "obstacle"]);
     let merged = sequence.load_raw(0).expect("both parts");
-    let part = merged.attributes.iter().find(|a| a.name == PART_ATTRIBUTE);
-    let part = part.expect("an attribute that tells the parts apart");
+    let part = merged
+        .attributes
+        .iter()
+        .find(|a| a.name == PART_ATTRIBUTE)
+        .expect("an attribute that tells the parts apart");
     let of = |value: f64| (0..part.count()).filter(|i| part.data.get_f64(*i) == value).count();
     assert_eq!((of(0.0), of(1.0)), (2880, 36));
 

@@ -40,8 +40,7 @@ fn intact_job_by_directory_or_manifest() {
     let mine = "input.path = \"../in\"\noutput.path = \"../out/f.####.exr\"\n";
     fs::create_dir(workshop.join("mine")).expect("a directory");
     fs::write(workshop.join("mine/my.toml"), mine).expect("a file");
-    let ran = workshop.run(&["verify", "mine/my.toml", "--json", "--threads", "1"]);
-    let ran = ran.expect(0);
+    let ran = workshop.run(&["verify", "mine/my.toml", "--json", "--threads", "1"]).expect(0);
     let objects = objects(&ran);
     assert_eq!(objects.len(), 3);
     assert_eq!(objects[0]["frame"], 1);

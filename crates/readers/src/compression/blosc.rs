@@ -17,9 +17,9 @@ const IS_BIT_SHUFFLED: u8 = 4;
 const IS_NOT_SPLIT: u8 = 0x10;
 
 /// A block is split into a stream for each byte of its elements only if these have no more bytes.
-const MOST_SPLITS: usize = 16;
+const MAX_SPLITS: usize = 16;
 /// And only if each stream has at least so many bytes.
-const LEAST_STREAM: usize = 128;
+const MIN_STREAM: usize = 128;
 
 /// The header of a frame.
 #[derive(Debug, Clone, Copy)]
@@ -88,8 +88,8 @@ impl FrameHeader {
     const fn stream_count(&self, len: usize) -> usize {
         let is_split = !self.has(IS_NOT_SPLIT)
             && len == self.block_len
-            && self.type_size <= MOST_SPLITS
-            && self.block_len / self.type_size >= LEAST_STREAM;
+            && self.type_size <= MAX_SPLITS
+            && self.block_len / self.type_size >= MIN_STREAM;
         if is_split { self.type_size } else { 1 }
     }
 }
@@ -116,8 +116,10 @@ impl BlockDecoder {
         let first = index * header.block_len;
         let len = header.block_len.min(header.len - first);
         if header.has(IS_STORED) {
-            let content = self.body.get(first..first + len);
-            let content = content.ok_or_else(|| damaged("a stored frame is too short"))?;
+            let content = self
+                .body
+                .get(first..first + len)
+                .ok_or_else(|| damaged("a stored frame is too short"))?;
             output.clear();
             output.extend_from_slice(content);
             return Ok(());
@@ -127,11 +129,16 @@ impl BlockDecoder {
         }
         let is_shuffled = header.has(IS_SHUFFLED) && header.type_size > 1;
         // Find the block
-        let place = self.body.get(4 * index..).and_then(|rest| rest.first_chunk());
-        let place = place.ok_or_else(|| damaged("a frame ends before its blocks"))?;
+        let place = self
+            .body
+            .get(4 * index..)
+            .and_then(|rest| rest.first_chunk())
+            .ok_or_else(|| damaged("a frame ends before its blocks"))?;
         let place = u32::from_le_bytes(*place) as usize;
-        let rest = place.checked_sub(HEADER).and_then(|at| self.body.get(at..));
-        let mut rest = rest.ok_or_else(|| damaged("a block is outside its frame"))?;
+        let mut rest = place
+            .checked_sub(HEADER)
+            .and_then(|at| self.body.get(at..))
+            .ok_or_else(|| damaged("a block is outside its frame"))?;
         // Decode its streams
         let decoded = if is_shuffled { &mut self.shuffled } else { &mut *output };
         decoded.resize(len, 0);

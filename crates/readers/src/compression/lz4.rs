@@ -98,8 +98,8 @@ impl<R: Read> Lz4Frame<R> {
         } else {
             self.decoded.resize(kept + self.header.most_block, 0);
             let (window, output) = self.decoded.split_at_mut(kept);
-            let written = lz4_flex::block::decompress_into_with_dict(&self.block, output, window);
-            let written = written.map_err(|error| damaged(&error.to_string()))?;
+            let written = lz4_flex::block::decompress_into_with_dict(&self.block, output, window)
+                .map_err(|error| damaged(&error.to_string()))?;
             self.decoded.truncate(kept + written);
         }
         let new = self.decoded.get(kept..).unwrap_or_default();

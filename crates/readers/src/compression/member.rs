@@ -17,7 +17,7 @@ use spherule_frame::MemoryBudget;
 
 /// Most bytes that a decoder may hold beside its output, whatever the budget: the window of zstd's `--long` has
 /// 128 MiB, the largest preset of xz 64 MiB.
-const MOST_DECODER: u64 = 130 << 20;
+const MAX_DECODER: u64 = 130 << 20;
 
 /// Bytes that a decoder of bzip2 holds.
 const BZIP2_DECODER: u64 = 4 << 20;
@@ -51,13 +51,13 @@ impl<R: BufRead> StreamDecoder<R> {
         mut reader: R,
         budget: MemoryBudget,
     ) -> io::Result<(Self, u64)> {
-        let most = budget.bytes().min(MOST_DECODER);
+        let most = budget.bytes().min(MAX_DECODER);
         Ok(match format {
             StreamFormat::Gzip => (Self::Gzip(GzDecoder::new(reader)), 0),
             StreamFormat::Zstd => {
                 let window = zstd_window(reader.fill_buf()?);
-                let decoder = StreamingDecoder::new_with_max_window_size(reader, most);
-                let decoder = decoder.map_err(|error| zstd_error(error, most))?;
+                let decoder = StreamingDecoder::new_with_max_window_size(reader, most)
+                    .map_err(|error| zstd_error(error, most))?;
                 let held = window.unwrap_or(decoder.decoder.content_size());
                 (Self::Zstd(Box::new(decoder)), held)
             }

@@ -43,8 +43,8 @@ pub(super) fn content<R: Read + Seek>(reader: &mut R) -> ZipContent {
     };
     // Directories, and what macOS adds beside files, are no files of the user
     let is_file = |name: &String| !name.ends_with('/') && !name.starts_with("__MACOSX/");
-    let names = archive.file_names().filter_map(Result::ok);
-    let mut names: Vec<String> = names.map(Cow::into_owned).filter(is_file).collect();
+    let mut names: Vec<String> =
+        archive.file_names().filter_map(Result::ok).map(Cow::into_owned).filter(is_file).collect();
     let is_other = |name: &String| {
         let name = name.to_ascii_lowercase();
         let others = [".npy", ".usd", ".usda", ".usdc"];

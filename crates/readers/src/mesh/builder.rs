@@ -107,8 +107,10 @@ impl MeshBuilder {
     /// [`ParseError::TooLarge`]; [`ParseError::Unsupported`] for more vertices than indices can tell apart.
     pub fn add_vertices(&mut self, positions: Positions) -> Result<(), ParseError> {
         let (first, count) = (self.mesh.vertices.len(), positions.len());
-        let range = u32::try_from(first).ok().zip(u32::try_from(count).ok());
-        let range = range.filter(|(first, count)| first.checked_add(*count).is_some());
+        let range = u32::try_from(first)
+            .ok()
+            .zip(u32::try_from(count).ok())
+            .filter(|(first, count)| first.checked_add(*count).is_some());
         let Some((first, count)) = range else {
             let what = format!("a mesh of {} vertices; at most 4294967295 are read", first + count);
             return Err(ParseError::unsupported(what));

@@ -71,7 +71,6 @@ pub fn parse_mesh(bytes: &[u8], path: &Path, budget: MemoryBudget) -> Result<Mes
 
 /// Whether the file name ends with `extension`, which may be followed by that of a compression.
 fn is_named(path: &Path, extension: &str) -> bool {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let name = name.to_ascii_lowercase();
+    let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     strip_extension(&name).ends_with(extension)
 }

@@ -89,8 +89,9 @@ struct Statement<'a> {
 impl<'a> Statement<'a> {
     /// The words up to a comment.
     fn words(&self) -> impl Iterator<Item = &'a [u8]> + use<'a> {
-        let words = words(self.text).map(|word| word.strip_suffix(b"\\").unwrap_or(word));
-        let words = words.filter(|word| !word.is_empty());
+        let words = words(self.text)
+            .map(|word| word.strip_suffix(b"\\").unwrap_or(word))
+            .filter(|word| !word.is_empty());
         words.take_while(|word| !word.starts_with(b"#"))
     }
 

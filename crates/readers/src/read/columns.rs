@@ -141,8 +141,10 @@ impl ParticleLayout {
 
     /// Bytes that the numbers take in memory.
     pub(super) fn byte_len(&self) -> u64 {
-        let each = self.columns().map(|c| c.component_strides.len() * c.scalar.size());
-        let each = each.fold(0, usize::saturating_add);
+        let each = self
+            .columns()
+            .map(|c| c.component_strides.len() * c.scalar.size())
+            .fold(0, usize::saturating_add);
         (each as u64).saturating_mul(self.count as u64)
     }
 
@@ -168,8 +170,10 @@ impl ParticleLayout {
         let axes = self.axes.len();
         let data = gathered.split_off(axes + usize::from(self.weight.is_some()));
         let weight = gathered.split_off(axes).pop();
-        let attributes = self.attributes.into_iter().zip(data);
-        let attributes = attributes
+        let attributes = self
+            .attributes
+            .into_iter()
+            .zip(data)
             .map(|(column, data)| Attribute {
                 name: column.name,
                 components: column.component_strides.len(),

@@ -139,8 +139,11 @@ fn is_row(row: &[u8]) -> bool {
 
 fn read(text: &mut TextInput<'_>, budget: MemoryBudget) -> Result<RawParticles, ParseError> {
     text.line();
-    let heading = text.line().map(Heading::of).transpose()?;
-    let heading = heading.ok_or_else(|| cut_short(text, "no number of atoms".into()))?;
+    let heading = text
+        .line()
+        .map(Heading::of)
+        .transpose()?
+        .ok_or_else(|| cut_short(text, "no number of atoms".into()))?;
     let (count, rows) = (heading.count, heading.rows());
     let len = count.saturating_mul(3);
     let mut positions = RowNumbers::new(budget);

@@ -104,8 +104,8 @@ impl Picture<'_> {
             even.max(odd)
         };
         let around = square(p, i64::try_from(RADIUS).expect("few"));
-        let others = around.filter(|q| *q != p && self.is_inside(*q));
-        let mut others: Vec<f64> = others.map(brightness).collect();
+        let mut others: Vec<f64> =
+            around.filter(|q| *q != p && self.is_inside(*q)).map(brightness).collect();
         others.sort_by(|a, b| b.total_cmp(a));
         let Some(last) = others.len().min(ALIKE).checked_sub(1) else {
             return f64::INFINITY;

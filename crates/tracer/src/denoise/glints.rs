@@ -17,8 +17,8 @@ pub(super) const ALIKE: usize = 4;
 pub(super) fn limits(input: &DenoiseInput<'_>) -> Vec<f32> {
     let (width, height) = (input.width as usize, input.height as usize);
     let shares = Shares::of(input.samples);
-    let brightness = (0..width * height).into_par_iter();
-    let brightness: Vec<f32> = brightness.map(|i| brightness_of(input, shares, i)).collect();
+    let brightness: Vec<f32> =
+        (0..width * height).into_par_iter().map(|i| brightness_of(input, shares, i)).collect();
     let view = input.view();
     let mut limits = vec![f32::INFINITY; brightness.len()];
     let rows = limits.par_chunks_mut(width.max(1)).enumerate();

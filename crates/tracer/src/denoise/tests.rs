@@ -441,8 +441,8 @@ fn views_are_filtered_as_pictures_of_their_own() {
         for tile in [[usize::MAX, TILE_ROWS], [7, 5], [16, 1]] {
             let execution = Execution { tile, ..Execution::default() };
             let input = DenoiseInput { views, ..pair.input() };
-            let filtered = denoise_with(&input, &DenoiseSettings::OPAQUE, &execution);
-            let filtered = filtered.expect("valid input");
+            let filtered =
+                denoise_with(&input, &DenoiseSettings::OPAQUE, &execution).expect("valid input");
             assert_eq!(bits(&filtered), bits(&expected), "{views:?} {tile:?}");
         }
         // As one view, pixels at the seam are averaged

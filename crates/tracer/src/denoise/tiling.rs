@@ -102,8 +102,7 @@ pub(super) fn tiles(
             }));
         }
         for row in pixels.chunks_mut(width) {
-            let pieces = row.chunks_mut(view[0]);
-            let pieces = pieces.flat_map(|part| part.chunks_mut(columns));
+            let pieces = row.chunks_mut(view[0]).flat_map(|part| part.chunks_mut(columns));
             for ((_, tile), piece) in all[first..].iter_mut().zip(pieces) {
                 tile.push(piece);
             }

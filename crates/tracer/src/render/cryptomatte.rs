@@ -164,8 +164,7 @@ mod tests {
         let mut samples = vec![(7, 1.0), (9, 0.5), (3, 1.0), (7, 1.0), (9, 0.5), (4, 0.0)];
         let mut ranks = [9.0; 8];
         rank(&mut samples, 0.25, &mut ranks);
-        let objects = ranks.chunks(2).map(|r| (r[0].to_bits(), r[1]));
-        let objects: Vec<_> = objects.collect();
+        let objects: Vec<_> = ranks.chunks(2).map(|r| (r[0].to_bits(), r[1])).collect();
         assert_eq!(objects, [(7, 0.5), (3, 0.25), (9, 0.25), (0, 0.0)]);
         // Objects beyond the last level are left out
         let mut samples = vec![(1, 1.0), (2, 3.0), (3, 2.0)];

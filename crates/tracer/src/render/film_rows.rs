@@ -39,8 +39,10 @@ impl<'a> FilmRows<'a> {
     /// # Panics
     /// If row `top` is not among these rows.
     pub fn part(&self, top: u32, height: u32) -> FilmRows<'a> {
-        let skipped = top.checked_sub(self.top).filter(|rows| *rows < self.height);
-        let skipped = skipped.expect("the part begins in these rows");
+        let skipped = top
+            .checked_sub(self.top)
+            .filter(|rows| *rows < self.height)
+            .expect("the part begins in these rows");
         let height = height.min(self.height - skipped);
         let width = self.width as usize;
         let range = skipped as usize * width..(skipped + height) as usize * width;

@@ -34,12 +34,19 @@ fn poisoned(width: u32, height: u32, channels: Channels) -> Film {
 
 /// All numbers of all planes.
 fn bits(film: &Film) -> Vec<u32> {
-    let vectors = [&film.normal, &film.position, &film.velocity, &film.albedo];
-    let vectors = vectors.into_iter().flatten().flatten();
-    let floats = film.color.iter().flatten().chain(film.depth.iter().flatten());
-    let floats = floats.copied().chain(vectors.flat_map(|v| v.to_array()));
-    let floats = floats.chain(film.layers.iter().flatten().copied());
-    let floats = floats.map(f32::to_bits);
+    let vectors = [&film.normal, &film.position, &film.velocity, &film.albedo]
+        .into_iter()
+        .flatten()
+        .flatten();
+    let floats = film
+        .color
+        .iter()
+        .flatten()
+        .chain(film.depth.iter().flatten())
+        .copied()
+        .chain(vectors.flat_map(|v| v.to_array()))
+        .chain(film.layers.iter().flatten().copied())
+        .map(f32::to_bits);
     floats.chain(film.id.iter().flatten().copied()).collect()
 }
 

@@ -28,8 +28,7 @@ impl RenderContext<'_> {
         group.layers.layers = self.settings.channels.layers;
         group.layers.background_group = self.background_group();
         let [left, top] = self.first_pixel(tile);
-        let eye_size = self.settings.eye_size(self.scene.camera.eyes());
-        let eye_size = eye_size.map(u32::cast_signed);
+        let eye_size = self.settings.eye_size(self.scene.camera.eyes()).map(u32::cast_signed);
         for (column, row) in pixels {
             let (x, y) = (left + column.cast_signed(), top + row.cast_signed());
             // Numbers of pixels beyond the left or top border wrap around; they only select random numbers

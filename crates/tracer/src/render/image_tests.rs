@@ -123,8 +123,7 @@ fn the_same_film_on_any_number_of_threads() {
     for transmission in [0.0, 0.8] {
         let scene = heap_scene(transmission);
         let on = |threads: usize| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
-            let pool = pool.build().unwrap();
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let never = AtomicBool::new(false);
             pool.install(|| render(&[&heap], &scene, &source, &settings(), &never).unwrap())
         };

@@ -153,8 +153,7 @@ impl Camera {
         if !(aspect > 0.0 && aspect.is_finite()) {
             return Err(CameraError::Aspect);
         }
-        let half_extent = projection.half_extent(view.fov, aspect);
-        let half_extent = half_extent.ok_or(match projection {
+        let half_extent = projection.half_extent(view.fov, aspect).ok_or(match projection {
             Projection::Orthographic { .. } => CameraError::Height,
             _ => CameraError::FieldOfView,
         })?;

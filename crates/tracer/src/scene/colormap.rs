@@ -163,8 +163,8 @@ impl ColorMap {
                 Ok(table.entry(if is_reversed { ENTRIES - 1 - at } else { at }))
             }
         };
-        let colors = values.iter().enumerate().map(color);
-        let colors: Result<Vec<Vec3>, UnknownColorMap> = colors.collect();
+        let colors: Result<Vec<Vec3>, UnknownColorMap> =
+            values.iter().enumerate().map(color).collect();
         let categories = values.iter().copied().zip(colors?);
         Ok(Self::of_colors(categories.collect()))
     }

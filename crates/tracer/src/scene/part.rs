@@ -26,8 +26,10 @@ pub struct PartMaterials {
 impl PartMaterials {
     /// A part that several materials name has the first of them.
     pub fn new(materials: Vec<PartMaterial>) -> Self {
-        let named = materials.iter().enumerate();
-        let named = named.flat_map(|(index, m)| m.parts.iter().map(move |part| (*part, index)));
+        let named = materials
+            .iter()
+            .enumerate()
+            .flat_map(|(index, m)| m.parts.iter().map(move |part| (*part, index)));
         let mut by_part: Vec<(i32, usize)> = named.collect();
         by_part.sort_unstable();
         by_part.dedup_by_key(|(part, _)| *part);

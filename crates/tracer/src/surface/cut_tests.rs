@@ -268,8 +268,7 @@ fn light_passes_a_half_ball() {
         assert_eq!(transmittance[0], 0.25);
     }
     // Shadow rays from the face see no sphere
-    let hit = cut.nearest(&Ray::new(Vec3::new(0.3, 0.2, 5.0), -Vec3::Z));
-    let hit = hit.expect("the face");
+    let hit = cut.nearest(&Ray::new(Vec3::new(0.3, 0.2, 5.0), -Vec3::Z)).expect("the face");
     for i in 0..50 {
         let direction = vector(3 * i).with_z(unit(i) + 1e-3).normalize();
         let origin = hit.anchor + hit.offset * hit.normal;

@@ -66,8 +66,8 @@ mod tests {
     /// A cube of particles two radii apart, and a line of single ones.
     fn flow() -> Vec<Vec3> {
         let cube = (0..12_u8)
-            .flat_map(|z| (0..12_u8).flat_map(move |y| (0..12_u8).map(move |x| [x, y, z])));
-        let cube = cube.map(|place| Vec3::from(place.map(f32::from)));
+            .flat_map(|z| (0..12_u8).flat_map(move |y| (0..12_u8).map(move |x| [x, y, z])))
+            .map(|place| Vec3::from(place.map(f32::from)));
         let line = (1..=200_u8).map(|x| Vec3::new(20.0 * f32::from(x), -3.0, 5.0));
         cube.chain(line).collect()
     }

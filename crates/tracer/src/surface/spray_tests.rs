@@ -61,8 +61,8 @@ fn spray_has_few_neighbours_in_every_structure() {
 
 #[test]
 fn a_particle_has_many_soft_drops_of_different_sizes() {
-    let drops = (0..500).flat_map(|id| (0..SOFT_DROPS).map(move |number| soft_drop(id, number)));
-    let drops: Vec<SoftDrop> = drops.collect();
+    let drops: Vec<SoftDrop> =
+        (0..500).flat_map(|id| (0..SOFT_DROPS).map(move |number| soft_drop(id, number))).collect();
     let count = drops.len() as f32;
     let in_range = |drop: &SoftDrop| {
         drop.offset.length() <= SOFT_SPREAD + 1e-5

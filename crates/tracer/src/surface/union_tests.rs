@@ -75,8 +75,8 @@ fn refracted_rays_leave_the_union() {
             let mut inwards = random.direction();
             inwards *= -1.0_f32.copysign(inwards.dot(hit.normal));
             let ray = Ray::new(start, inwards);
-            let exit = body.crossing(&ray, Side::Inside);
-            let exit = exit.unwrap_or_else(|| panic!("{ray:?} stays inside"));
+            let exit =
+                body.crossing(&ray, Side::Inside).unwrap_or_else(|| panic!("{ray:?} stays inside"));
             assert!(exit.t > 0.0 && exit.normal.dot(inwards) >= -1e-3, "{exit:?}");
             let outside = exit.anchor + exit.offset * exit.normal;
             in_creases += u32::from(body.side_of(outside) == Side::Inside);
@@ -117,8 +117,8 @@ fn packets_match_single_rays() {
                     let aim = aim + 0.05 * random.direction();
                     packet.push(&Ray::new(origin, (aim - origin).normalize_or(Vec3::X)));
                 }
-                let single = packet.rays().map(|ray| body.crossing(&ray, Side::Outside));
-                let single: Vec<_> = single.collect();
+                let single: Vec<_> =
+                    packet.rays().map(|ray| body.crossing(&ray, Side::Outside)).collect();
                 for coherence in [Coherence::Coherent, Coherence::Incoherent] {
                     let mut hits = Intersections::default();
                     body.intersect(&mut packet.clone(), coherence, 0, &mut hits);

@@ -27,7 +27,7 @@ use crate::order::index_u32;
 /// areas.
 const SHIFT: f32 = 1.0 / 512.0;
 /// Minimum shift as a fraction of the coordinates, from the resolution of f32.
-const LEAST_SHIFT: f32 = 1.0 / (1 << 21) as f32;
+const MIN_SHIFT: f32 = 1.0 / (1 << 21) as f32;
 /// Absolute minimum of the shift, in scaled coordinates.
 const SMALLEST_SHIFT: f32 = 1e-12;
 /// Passes of reinsertion: over the whole batch first, then over 1/3, 1/5... of it, as in obvhs.
@@ -185,7 +185,7 @@ impl Scale {
         let (min, max) = (scaled(bounds.min), scaled(bounds.max));
         let far = min.abs().max(max.abs()).max_element();
         let edge = (max - min).max_element();
-        let shift = (SHIFT * edge).max(LEAST_SHIFT * far).max(SMALLEST_SHIFT) * unit_vector(place);
+        let shift = (SHIFT * edge).max(MIN_SHIFT * far).max(SMALLEST_SHIFT) * unit_vector(place);
         Aabb { min: min + shift, max: max + shift }
     }
 

@@ -230,8 +230,7 @@ pub(super) fn split_levels<'a>(
     starts: &[u32],
     levels: &mut [&'a [Node]; LEVEL_CODES],
 ) {
-    let ends = starts.iter().skip(1).map(|start| *start as usize);
-    let ends = ends.chain([nodes.len()]);
+    let ends = starts.iter().skip(1).map(|start| *start as usize).chain([nodes.len()]);
     for (level, (start, end)) in levels.iter_mut().zip(starts.iter().zip(ends)) {
         *level = &nodes[*start as usize..end];
     }

@@ -27,8 +27,7 @@ impl RangeSource {
         siblings: SiblingFiles,
         ranges: Box<dyn ParticleRanges>,
     ) -> Self {
-        let attributes = ranges.attributes().into_iter();
-        let attributes = attributes.map(|attribute| SourceAttribute {
+        let attributes = ranges.attributes().into_iter().map(|attribute| SourceAttribute {
             name: attribute.name,
             components: attribute.components,
             scalar: attribute.scalar,

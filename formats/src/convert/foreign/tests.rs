@@ -73,8 +73,8 @@ fn same(source: &dyn ParticleSource, raw: &RawParticles) {
     assert_eq!(source.step(), raw.step);
     let described = |a: &crate::Attribute| (a.name.clone(), a.components, a.data.scalar_type());
     let expected: Vec<_> = raw.attributes.iter().map(described).collect();
-    let found = source.attributes().iter();
-    let found: Vec<_> = found.map(|a| (a.name.clone(), a.components, a.scalar)).collect();
+    let found: Vec<_> =
+        source.attributes().iter().map(|a| (a.name.clone(), a.components, a.scalar)).collect();
     assert_eq!(found, expected);
     for run in [1009, 4097, 100_003] {
         same_in_runs(source, raw, run);
@@ -124,8 +124,7 @@ fn unsupported_layouts_fall_back_to_the_readers() {
 #[test]
 fn run_beyond_the_end_is_rejected() {
     let path = format!("{}/../tests/data/single_frames/le.ply", env!("CARGO_MANIFEST_DIR"));
-    let source = open_source(Path::new(&path));
-    let source = source.expect("a good file").expect("binary");
+    let source = open_source(Path::new(&path)).expect("a good file").expect("binary");
     let mut to = [DVec3::ZERO; 2];
     assert!(source.read_positions(1198, &mut to).is_ok());
     for first in [1199, 1200, u64::MAX] {

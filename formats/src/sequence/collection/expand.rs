@@ -75,8 +75,7 @@ pub(in crate::sequence) fn expand(
     let Expander { leaves, lists, parts, faults, .. } = expander;
     let mut paths: Vec<PathBuf> = lists.into_keys().collect();
     paths.sort();
-    let used = leaves.iter().zip(&numbers);
-    let used = used.map(|(leaf, number)| (*number, leaf.part));
+    let used = leaves.iter().zip(&numbers).map(|(leaf, number)| (*number, leaf.part));
     let (of_number, names) = parts.finish(used, &group.parts);
     let mut steps: Vec<NumberedStep> = leaves
         .into_iter()
@@ -227,11 +226,12 @@ impl Expander {
     ) -> Result<(), SequenceError> {
         chain.push(Arc::clone(&opened.path));
         for (index, entry) in opened.list.entries.iter().enumerate() {
-            let target = self.root.resolve(&opened.path, &entry.path);
-            let target = target.ok_or_else(|| SequenceError::Outside {
-                list: opened.path.to_path_buf(),
-                line: entry.place.line,
-                file: entry.path.clone(),
+            let target = self.root.resolve(&opened.path, &entry.path).ok_or_else(|| {
+                SequenceError::Outside {
+                    list: opened.path.to_path_buf(),
+                    line: entry.place.line,
+                    file: entry.path.clone(),
+                }
             })?;
             let context = context.of(&opened.list, &opened.path, index, entry);
             self.count_entry(opened)?;
@@ -283,8 +283,7 @@ impl Expander {
         }
         match List::open(path, self.settings.budget.less(self.held)) {
             Ok(list) => {
-                let texts = list.entries.iter();
-                let texts = texts.map(|e| e.path.len() + size_of::<ListEntry>());
+                let texts = list.entries.iter().map(|e| e.path.len() + size_of::<ListEntry>());
                 self.held += texts.sum::<usize>() as u64;
                 let opened = Arc::new(OpenedList { path: path.into(), list });
                 if opened.list.ghost_level > 0 && self.has_ghosts.is_none() {

@@ -77,8 +77,8 @@ pub(super) fn has_list_name(path: &Path) -> bool {
 }
 
 fn has_extension(path: &Path, known: &[&str]) -> bool {
-    let name = path.file_name().map(OsStr::to_string_lossy);
-    let name = name.unwrap_or_default().to_ascii_lowercase();
+    let name =
+        path.file_name().map(OsStr::to_string_lossy).unwrap_or_default().to_ascii_lowercase();
     let extension = strip_extension(&name).rsplit_once('.');
     extension.is_some_and(|(_, extension)| known.contains(&extension))
 }

@@ -162,8 +162,7 @@ fn lists_may_be_in_lists_and_in_directories() {
         sequence.keep_parts(&["b".to_owned()]).expect("a part");
         assert_eq!(frame(&sequence, 0), (vec![1.0], vec![1], Some(3.0)));
     }
-    let summary = lists.good("all.vtm.series").list_summary().cloned();
-    let summary = summary.expect("a list");
+    let summary = lists.good("all.vtm.series").list_summary().cloned().expect("a list");
     assert_eq!((summary.step_count, summary.file_count), (2, 4));
     assert_eq!(summary.times, Some((3.0, 4.5)));
 }
@@ -294,8 +293,7 @@ fn time_and_memory_are_bounded() {
     assert!(lists.frame_error(&sequence, 0).contains("l4.vtm"));
     // Lists are followed once for each time
     timed_lists(&lists, 3000);
-    let error = open("times.pvd", 16 << 20).expect_err("too many");
-    let error = error.to_string();
+    let error = open("times.pvd", 16 << 20).expect_err("too many").to_string();
     assert!(error.ends_with("is larger than 16 MiB; take care"), "{error}");
     // Many entries
     let many = "<DataSet timestep=\"0\" file=\"a.csv\"/>\n".repeat(20_000);
@@ -431,8 +429,9 @@ fn several_lists_with_times_are_refused() {
         lists.file(name, &pvd(&entries));
     }
     let both = [lists.path("fluid.pvd"), lists.path("wall.pvd")];
-    let error = Sequence::open(&SequenceInput::from_paths(both.to_vec()));
-    let error = error.expect_err("two lists").to_string();
+    let error = Sequence::open(&SequenceInput::from_paths(both.to_vec()))
+        .expect_err("two lists")
+        .to_string();
     assert!(error.contains("2 time steps in one of several lists"), "{error}");
 }
 

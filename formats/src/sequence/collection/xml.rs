@@ -167,8 +167,7 @@ impl ListParser {
 
 /// The value of an attribute, or nothing if it is not there.
 fn text_of(tag: &BytesStart<'_>, place: TextPlace, name: &str) -> Result<String, ParseError> {
-    let value = attribute(tag, place.at, name);
-    let value = value.map_err(|error| match error {
+    let value = attribute(tag, place.at, name).map_err(|error| match error {
         ParseError::Malformed { what, .. } => place.malformed(what),
         other => other,
     })?;

@@ -21,8 +21,8 @@ fn picked(files: &[String]) -> (FileGroup, Vec<String>) {
 
 #[track_caller]
 fn ambiguous(files: &[&str]) -> String {
-    let error = pick(Path::new("dir"), names(&owned(files)), &mut Vec::new());
-    let error = error.expect_err("several sequences");
+    let error = pick(Path::new("dir"), names(&owned(files)), &mut Vec::new())
+        .expect_err("several sequences");
     assert!(matches!(error, SequenceError::Ambiguous { .. }), "{error}");
     error.to_string()
 }

@@ -167,8 +167,8 @@ fn check_sequences<F: MatchFinder>(
     for ends in [0, 1, 2, 3, 700, 701, 5000, data.len()].windows(2) {
         let first = sequences.len();
         find_sequences(data, ends[0]..ends[1], &mut finder, &mut sequences);
-        let lengths = sequences[first..].iter();
-        let lengths = lengths.map(|s| s.literals as usize + usize::from(s.length));
+        let lengths =
+            sequences[first..].iter().map(|s| s.literals as usize + usize::from(s.length));
         assert_eq!(lengths.sum::<usize>(), ends[1] - ends[0]);
     }
     let mut at = 0;

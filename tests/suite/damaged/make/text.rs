@@ -37,8 +37,8 @@ pub(super) fn xyz() -> Vec<Made> {
 pub(super) fn lammps() -> Vec<Made> {
     let dump = |points: &[[f32; 3]]| {
         let head = "ITEM: BOX BOUNDS ff ff ff\n0 9\n0 9\n0 9\nITEM: ATOMS id type x y z\n";
-        let lines = points.iter().zip(7..).map(|(p, id)| format!("{id} 1 {}", text(&[*p])));
-        let lines: String = lines.collect();
+        let lines: String =
+            points.iter().zip(7..).map(|(p, id)| format!("{id} 1 {}", text(&[*p]))).collect();
         let n = points.len();
         format!("ITEM: TIMESTEP\n100\nITEM: NUMBER OF ATOMS\n{n}\n{head}{lines}").into_bytes()
     };

@@ -184,8 +184,7 @@ impl<'a> Trajectory<'a> {
 
     /// Variables with three numbers an atom, positions first.
     fn columns(&self) -> impl Iterator<Item = (&'static str, &Variable)> {
-        let attributes = [("velocity", &self.velocities), ("force", &self.forces)];
-        let attributes = attributes.into_iter();
+        let attributes = [("velocity", &self.velocities), ("force", &self.forces)].into_iter();
         std::iter::once(("positions", &self.coordinates))
             .chain(attributes.filter_map(|(name, variable)| Some((name, variable.as_ref()?))))
     }

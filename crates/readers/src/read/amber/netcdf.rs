@@ -12,9 +12,9 @@ const DIMENSIONS: i32 = 10;
 const VARIABLES: i32 = 11;
 const ATTRIBUTES: i32 = 12;
 /// Most entries of a list: more than the library allows in its default build.
-const MOST_ENTRIES: usize = 8192;
+const MAX_ENTRIES: usize = 8192;
 /// Most dimensions of a variable.
-const MOST_AXES: usize = 1024;
+const MAX_AXES: usize = 1024;
 
 /// A variable.
 #[derive(Debug, Clone)]
@@ -192,10 +192,10 @@ impl<'a> HeaderReader<'a> {
         let count = self.count(&format!("number of {name}"))?;
         match (found, count) {
             (0, 0) => Ok(0),
-            (found, count) if found == tag && count <= MOST_ENTRIES => Ok(count),
+            (found, count) if found == tag && count <= MAX_ENTRIES => Ok(count),
             (found, count) => {
                 let what = format!(
-                    "the list of {name} has the tag {found} and {count} entries, {tag} and up to {MOST_ENTRIES} expected"
+                    "the list of {name} has the tag {found} and {count} entries, {tag} and up to {MAX_ENTRIES} expected"
                 );
                 Err(ParseError::malformed(at, what))
             }
@@ -278,7 +278,7 @@ impl<'a> HeaderReader<'a> {
             let at = self.numbers.at();
             let name = self.name()?.to_vec();
             let axes = self.count("number of dimensions of a variable")?;
-            if axes > MOST_AXES {
+            if axes > MAX_AXES {
                 let what = format!("a variable has {axes} dimensions");
                 return Err(ParseError::malformed(at, what));
             }

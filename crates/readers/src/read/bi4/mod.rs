@@ -112,10 +112,13 @@ impl<'a> PartFile<'a> {
 
     /// Number of particles, and their positions.
     fn positions(&self) -> Result<(usize, &ItemArray<'a>), ParseError> {
-        let count = self.part.count("Npok").and_then(|count| usize::try_from(count).ok());
-        let count = count.ok_or_else(|| {
-            ParseError::malformed(self.part.at, "the item has no number of particles (Npok)")
-        })?;
+        let count = self
+            .part
+            .count("Npok")
+            .and_then(|count| usize::try_from(count).ok())
+            .ok_or_else(|| {
+                ParseError::malformed(self.part.at, "the item has no number of particles (Npok)")
+            })?;
         let is_positions = |array: &&ItemArray<'_>| {
             matches!(array.name, b"Pos" | b"Posd") && matches!(array.element, Some((_, 3)))
         };

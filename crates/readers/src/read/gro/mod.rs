@@ -129,8 +129,8 @@ fn read(
         return Err(cut_short(text, "no number of atoms after the title".into()));
     };
     let count = count(line)?;
-    let columns = text.peek_line().filter(|_| count > 0).map(Columns::of);
-    let columns = columns.transpose()?.unwrap_or_default();
+    let columns =
+        text.peek_line().filter(|_| count > 0).map(Columns::of).transpose()?.unwrap_or_default();
     let velocity = [("velocity", 3)];
     let real = &velocity[..usize::from(columns.has_velocity)];
     let mut atoms = AtomTable::new(&[ELEMENT, RESIDUE], real, budget);

@@ -15,7 +15,7 @@ const ENTRY_LEN: usize = 32;
 /// Unit of the length of the list of names. In files of version 1 each name takes one unit.
 const NAME_UNIT: usize = 64;
 /// Most names of a file: an entry of the index has 16 bits for the number of its name.
-const MOST_NAMES: usize = 1 << 16;
+const MAX_NAMES: usize = 1 << 16;
 
 /// A version: major in the upper half, minor in the lower.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -290,8 +290,9 @@ impl Section {
     /// Its bytes in a file of `len` bytes.
     fn range(&self, len: usize) -> Result<Range<usize>, ParseError> {
         let Self { what, at, count, each, .. } = self;
-        let end = count.checked_mul(*each as u64);
-        let end = end.and_then(|bytes| usize::try_from(bytes.checked_add(*at)?).ok());
+        let end = count
+            .checked_mul(*each as u64)
+            .and_then(|bytes| usize::try_from(bytes.checked_add(*at)?).ok());
         match (usize::try_from(*at), end) {
             (Ok(start), Some(end)) if end <= len => Ok(start..end),
             _ => {
@@ -308,10 +309,10 @@ impl Section {
 fn names_in(list: &[u8], version: Version) -> Vec<&[u8]> {
     if version.major() < 2 {
         let units = list.chunks(NAME_UNIT).map(until_zero);
-        return units.take_while(|n| !n.is_empty()).take(MOST_NAMES).collect();
+        return units.take_while(|n| !n.is_empty()).take(MAX_NAMES).collect();
     }
     let names = list.split(|b| *b == 0);
-    names.take_while(|n| !n.is_empty()).take(MOST_NAMES).collect()
+    names.take_while(|n| !n.is_empty()).take(MAX_NAMES).collect()
 }
 
 pub(super) fn until_zero(bytes: &[u8]) -> &[u8] {

@@ -29,7 +29,7 @@ pub(super) const PARTICLES: &str = "particles/";
 /// What the names of logged values of particles begin with.
 pub(super) const LOGGED: &str = "log/particles/";
 /// Most numbers a particle of a logged value.
-const MOST_LOGGED_COMPONENTS: u32 = 16;
+const MAX_LOGGED_COMPONENTS: u32 = 16;
 
 /// What stands for values that are not in the file.
 #[derive(Debug, Clone, Copy)]
@@ -361,7 +361,7 @@ impl<'f, 'a> FrameChunks<'f, 'a> {
             };
             let entry = self.chunk(Some(number)).filter(|entry| {
                 entry.rows == self.count as u64
-                    && (1..=MOST_LOGGED_COMPONENTS).contains(&entry.columns)
+                    && (1..=MAX_LOGGED_COMPONENTS).contains(&entry.columns)
                     && entry.scalar().is_some()
             });
             if let Some(entry) = entry {

@@ -23,7 +23,7 @@ use crate::read::CUT_SHORT;
 use spherule_frame::{MemoryBudget, ParseError};
 
 /// Most filters of a pipeline: shuffle, compression and a checksum are usual.
-const MOST_FILTERS: usize = 4;
+const MAX_FILTERS: usize = 4;
 
 /// The chunks of some rows of a data set, by place. A *band* is the chunks that hold the same rows.
 #[derive(Debug)]
@@ -72,10 +72,12 @@ impl ChunkGrid {
         check_filters(stored, layout)?;
         let row_dimension = usize::from(selection.frame.is_some());
         let sizes = layout.chunk.iter().map(|size| u64::from(*size));
-        let chunk_len = sizes.clone().try_fold(stored.element_len as u64, u64::checked_mul);
-        let chunk_len = chunk_len.and_then(|len| usize::try_from(len).ok());
-        let chunk_len = chunk_len.filter(|len| u32::try_from(*len).is_ok());
-        let chunk_len = chunk_len.ok_or_else(|| stored.bad("chunks of more than 4 GiB"))?;
+        let chunk_len = sizes
+            .clone()
+            .try_fold(stored.element_len as u64, u64::checked_mul)
+            .and_then(|len| usize::try_from(len).ok())
+            .filter(|len| u32::try_from(*len).is_ok())
+            .ok_or_else(|| stored.bad("chunks of more than 4 GiB"))?;
         budget.check(chunk_len as u64, "one of its chunks is")?;
         // Range of chunks along each dimension
         let sizes: Vec<u64> = sizes.collect();
@@ -95,8 +97,7 @@ impl ChunkGrid {
         let counts = first.iter().zip(&last).map(|(first, last)| last - first + 1);
         let count = counts.clone().try_fold(1_u64, u64::checked_mul);
         let most = stored.file.bytes().len() as u64;
-        let count = count.filter(|count| *count <= most);
-        let count = count.ok_or_else(|| stored.never_written())?;
+        let count = count.filter(|count| *count <= most).ok_or_else(|| stored.never_written())?;
         let list_len = count.saturating_mul(160);
         budget.check(list_len, "the list of its chunks is")?;
         let entries = entries(stored, layout, (&first, &last))?;
@@ -150,12 +151,13 @@ impl ChunkGrid {
         layout: &ChunkedLayout,
         (band, number): (u64, usize),
     ) -> Result<Cow<'a, [u8]>, ParseError> {
-        let place = usize::try_from(band - self.first_band).unwrap_or(usize::MAX);
-        let place = place.saturating_mul(self.band_chunks).saturating_add(number);
-        let chunk = self.chunks.get(place);
-        let chunk = chunk.ok_or_else(|| stored.never_written())?;
-        let packed = stored.file.bytes().get(chunk.start..chunk.start + chunk.len);
-        let packed = packed.unwrap_or_default();
+        let place = usize::try_from(band - self.first_band)
+            .unwrap_or(usize::MAX)
+            .saturating_mul(self.band_chunks)
+            .saturating_add(number);
+        let chunk = self.chunks.get(place).ok_or_else(|| stored.never_written())?;
+        let packed =
+            stored.file.bytes().get(chunk.start..chunk.start + chunk.len).unwrap_or_default();
         let is_filtered = (0..layout.filters.len()).any(|i| chunk.filter_mask >> i & 1 == 0);
         let len = self.chunk_len;
         let unpacked = if is_filtered {
@@ -234,9 +236,9 @@ fn check_filters(stored: &Stored, layout: &ChunkedLayout) -> Result<(), ParseErr
             stored.path, filter.id
         )));
     }
-    if layout.filters.len() > MOST_FILTERS {
+    if layout.filters.len() > MAX_FILTERS {
         let count = layout.filters.len();
-        return Err(stored.bad(format!("{count} filters, at most {MOST_FILTERS} are read")));
+        return Err(stored.bad(format!("{count} filters, at most {MAX_FILTERS} are read")));
     }
     Ok(())
 }

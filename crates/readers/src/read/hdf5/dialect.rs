@@ -58,8 +58,8 @@ pub(super) fn units(units: &[String]) -> Option<String> {
 /// An integer from an attribute or a small data set, which are read as f64.
 pub(super) fn integer(value: f64) -> Option<i64> {
     /// From here on, f64 does not hold all integers.
-    const MOST: f64 = 9_007_199_254_740_992.0;
-    let is_integer = value.fract() == 0.0 && value.abs() <= MOST;
+    const MAX: f64 = 9_007_199_254_740_992.0;
+    let is_integer = value.fract() == 0.0 && value.abs() <= MAX;
     #[expect(clippy::cast_possible_truncation, reason = "an integer of up to 53 bits")]
     is_integer.then_some(value as i64)
 }

@@ -20,11 +20,11 @@ use crate::shared::SharedBytes;
 use spherule_frame::ParseError;
 
 /// Most bytes of the header of one object. Those of simulations have some kibibytes.
-const MOST_HEADER_BYTES: usize = 16 << 20;
+const MAX_HEADER_BYTES: usize = 16 << 20;
 /// Most virtual data sets of a file. The group is listed again for each of them, so time grows with the square.
-const MOST_VIRTUAL: usize = 512;
+const MAX_VIRTUAL: usize = 512;
 /// Most parts of all virtual data sets of a file. Simulations have one for each file of a step and data set.
-const MOST_PARTS: usize = 1 << 15;
+const MAX_PARTS: usize = 1 << 15;
 
 /// Tells the groups and data sets of open files apart, whatever their names: address of the file in memory, place of
 /// the object header in the file.
@@ -71,8 +71,7 @@ impl Storage for PatchedStorage {
     }
 
     fn read_range(&self, offset: u64, len: usize) -> Result<StorageBuffer, Error> {
-        let heaps = self.heaps.lock();
-        let mut heaps = heaps.unwrap_or_else(PoisonError::into_inner);
+        let mut heaps = self.heaps.lock().unwrap_or_else(PoisonError::into_inner);
         let base = self.base.get().copied().unwrap_or(0);
         if let Some(shown) = heaps.shown(&self.bytes, base, offset, len)? {
             return Ok(shown);
@@ -107,15 +106,15 @@ impl H5File {
     pub(super) fn open(bytes: &SharedBytes) -> Result<Self, ParseError> {
         let options = OpenOptions::default()
             .with_chunk_cache_bytes(0)
-            .with_max_object_header_bytes(MOST_HEADER_BYTES);
+            .with_max_object_header_bytes(MAX_HEADER_BYTES);
         let storage = Arc::new(PatchedStorage {
             bytes: bytes.clone(),
             patches: RwLock::default(),
             heaps: Mutex::default(),
             base: OnceLock::new(),
         });
-        let file = Hdf5File::from_storage_with_options(storage.clone(), options);
-        let file = file.map_err(|e| parse_error(&e, bytes.len(), 0))?;
+        let file = Hdf5File::from_storage_with_options(storage.clone(), options)
+            .map_err(|e| parse_error(&e, bytes.len(), 0))?;
         storage.base.get_or_init(|| file.superblock().base_address);
         let stated = file.superblock().eof_address;
         if stated > bytes.len() as u64 {
@@ -167,8 +166,8 @@ impl H5File {
             return Ok(other.clone());
         }
         let bytes = self.bytes.sibling(name)?;
-        let other = Self::open(&bytes);
-        let other = other.map_err(|e| e.map_message(|what| format!("in `{name}`: {what}")))?;
+        let other =
+            Self::open(&bytes).map_err(|e| e.map_message(|what| format!("in `{name}`: {what}")))?;
         let other = Self { name: Some(name.into()), ..other };
         self.found().others.insert(name.to_owned(), other.clone());
         Ok(other)
@@ -183,8 +182,11 @@ impl H5File {
     /// Names of the files that were met, as they are called in this one.
     pub(super) fn other_names(&self) -> BTreeSet<String> {
         let found = self.found();
-        let parts = found.virtual_parts.values().flat_map(|parts| parts.iter());
-        let parts = parts.map(|part| part.file.to_string());
+        let parts = found
+            .virtual_parts
+            .values()
+            .flat_map(|parts| parts.iter())
+            .map(|part| part.file.to_string());
         let names = parts.chain(found.others.keys().cloned());
         names.filter(|name| name != ".").collect()
     }
@@ -295,13 +297,13 @@ impl H5File {
             let all = &self.found().virtual_parts;
             (all.len(), all.values().map(|parts| parts.len()).sum())
         };
-        if known >= MOST_VIRTUAL {
-            let what = format!("more than {MOST_VIRTUAL} virtual data sets");
+        if known >= MAX_VIRTUAL {
+            let what = format!("more than {MAX_VIRTUAL} virtual data sets");
             return Err(Error::UnsupportedEncoding(what));
         }
         let list = heap_object(&self.bytes, place, addressing)?;
         let missing = || Error::InvalidData("the list of a virtual data set is missing".into());
-        let left = MOST_PARTS.saturating_sub(used);
+        let left = MAX_PARTS.saturating_sub(used);
         let parts = read_list(list.ok_or_else(missing)?, addressing.length_size, left)?;
         // Show another header
         let shown = &self.storage.patches;

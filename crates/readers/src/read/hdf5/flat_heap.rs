@@ -20,9 +20,9 @@ pub(super) const HEAP_SIGNATURE: &[u8] = b"FRHP";
 /// Addresses from here on are those of flat heaps. No file is so long.
 const FLAT_START: u64 = 1 << 62;
 /// Most levels of indirect blocks. The library has a limit of 64; each level has at least twice the size of the next.
-const MOST_LEVELS: u32 = 64;
+const MAX_LEVELS: u32 = 64;
 /// Most rows of an indirect block: heaps have at most 64 bits of addresses.
-const MOST_ROWS: u16 = 64;
+const MAX_ROWS: u16 = 64;
 /// Bytes of numbers in files of the sizes that are shown otherwise: nobody writes such large heaps with others.
 const NUMBER_LEN: u8 = 8;
 /// Flag of a heap whose direct blocks have checksums.
@@ -64,8 +64,11 @@ impl FlatHeaps {
         len: usize,
     ) -> Result<Option<StorageBuffer>, Error> {
         if let Some(header) = place.checked_sub(FLAT_START) {
-            let heap = self.heaps.get(&header).and_then(Option::as_ref);
-            let heap = heap.ok_or(Error::OffsetOutOfBounds(place))?;
+            let heap = self
+                .heaps
+                .get(&header)
+                .and_then(Option::as_ref)
+                .ok_or(Error::OffsetOutOfBounds(place))?;
             return buffer(&heap.block, len).map(Some);
         }
         let start = usize::try_from(place).unwrap_or(usize::MAX);
@@ -165,7 +168,7 @@ impl DoublingTable {
             direct_rows: 0,
         };
         let is_direct = |size: u64| size <= heap.max_direct_block_size;
-        while table.direct_rows < u32::from(MOST_ROWS)
+        while table.direct_rows < u32::from(MAX_ROWS)
             && table.block_len(table.direct_rows).is_some_and(is_direct)
         {
             table.direct_rows += 1;
@@ -182,7 +185,7 @@ impl DoublingTable {
     fn rows_of(&self, len: u64) -> Option<u16> {
         let mut left = len;
         let mut rows = 0;
-        while rows < MOST_ROWS {
+        while rows < MAX_ROWS {
             let row = self.block_len(u32::from(rows))?.checked_mul(self.width)?;
             match left.checked_sub(row) {
                 Some(rest) if row > 0 => left = rest,
@@ -218,7 +221,7 @@ impl Blocks<'_> {
         offset: u64,
         level: u32,
     ) -> Result<(), Error> {
-        if level >= MOST_LEVELS || rows > MOST_ROWS || !self.visited.insert(address) {
+        if level >= MAX_LEVELS || rows > MAX_ROWS || !self.visited.insert(address) {
             return Err(damaged("too many levels or rows, or a block twice"));
         }
         let mut cursor = Cursor::new(self.file);
@@ -231,8 +234,7 @@ impl Blocks<'_> {
             .skip(1 + usize::from(NUMBER_LEN) + usize::from(self.heap.max_heap_size).div_ceil(8))?;
         let mut start = offset;
         for row in 0..u32::from(rows) {
-            let len = self.doubling.block_len(row);
-            let len = len.ok_or_else(|| damaged("too long"))?;
+            let len = self.doubling.block_len(row).ok_or_else(|| damaged("too long"))?;
             for _ in 0..self.doubling.width {
                 let child = cursor.read_offset(NUMBER_LEN)?;
                 if Cursor::is_undefined_offset(child, NUMBER_LEN) {
@@ -240,8 +242,7 @@ impl Blocks<'_> {
                 } else if row < self.doubling.direct_rows {
                     self.add_direct(child, start, len)?;
                 } else {
-                    let rows = self.doubling.rows_of(len);
-                    let rows = rows.ok_or_else(|| damaged("too long"))?;
+                    let rows = self.doubling.rows_of(len).ok_or_else(|| damaged("too long"))?;
                     self.add_indirect((child, rows), start, level + 1)?;
                 }
                 start = start.checked_add(len).ok_or_else(|| damaged("too long"))?;
@@ -252,8 +253,10 @@ impl Blocks<'_> {
 
     /// Adds the `len` bytes of the direct block at `address`, at `offset` of the heap.
     fn add_direct(&mut self, address: u64, offset: u64, len: u64) -> Result<(), Error> {
-        let end = offset.checked_add(len).filter(|end| *end <= self.most);
-        let end = end.ok_or_else(|| damaged("longer than the file"))?;
+        let end = offset
+            .checked_add(len)
+            .filter(|end| *end <= self.most)
+            .ok_or_else(|| damaged("longer than the file"))?;
         if !self.visited.insert(address) {
             return Err(damaged("a block twice"));
         }
@@ -278,8 +281,9 @@ impl Blocks<'_> {
         let offset_len = usize::from(self.heap.max_heap_size).div_ceil(8);
         let place = 5 + usize::from(NUMBER_LEN) + offset_len;
         let mut zeroed = block.to_vec();
-        let stored = zeroed.get_mut(place..place + 4);
-        let stored = stored.ok_or_else(|| damaged("a direct block is too short"))?;
+        let stored = zeroed
+            .get_mut(place..place + 4)
+            .ok_or_else(|| damaged("a direct block is too short"))?;
         let expected = Cursor::new(stored).read_u32_le()?;
         stored.fill(0);
         if expected == jenkins_lookup3(&zeroed) {

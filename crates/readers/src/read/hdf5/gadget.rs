@@ -45,8 +45,7 @@ pub(super) struct Snapshot {
 /// Number of files that a snapshot is divided among.
 pub(super) fn file_count(root: &Node) -> u64 {
     let header = root.group("Header").ok().flatten();
-    let count = header.and_then(|header| header.number("NumFilesPerSnapshot"));
-    let count = count.and_then(integer);
+    let count = header.and_then(|header| header.number("NumFilesPerSnapshot")).and_then(integer);
     count.and_then(|count| u64::try_from(count).ok()).unwrap_or(1)
 }
 
@@ -130,8 +129,9 @@ impl Snapshot {
         node: &Node,
         budget: MemoryBudget,
     ) -> Result<(Part, Vec<String>), ParseError> {
-        let stored = Stored::open(node, COORDINATES)?.map(Arc::new);
-        let stored = stored.ok_or_else(|| ParseError::malformed(0, "Coordinates are missing"))?;
+        let stored = Stored::open(node, COORDINATES)?
+            .map(Arc::new)
+            .ok_or_else(|| ParseError::malformed(0, "Coordinates are missing"))?;
         let positions = Values::find(&stored, &Slice::ALL, budget)?;
         let Some(positions) = positions.filter(|values| matches!(values.components(), 2 | 3))
         else {
@@ -208,8 +208,12 @@ impl Snapshot {
         let described = self.types.iter().map(|(number, node)| {
             let usual = USUAL.get(*number as usize);
             let usual = usual.map_or(String::new(), |usual| format!(", usually {usual}"));
-            let count = node.dataset(COORDINATES).ok().flatten();
-            let count = count.and_then(|c| c.shape().first().copied()).unwrap_or(0);
+            let count = node
+                .dataset(COORDINATES)
+                .ok()
+                .flatten()
+                .and_then(|c| c.shape().first().copied())
+                .unwrap_or(0);
             format!("{number} = {TYPE}{number} ({count} particles{usual})")
         });
         described.collect::<Vec<String>>().join(", ")

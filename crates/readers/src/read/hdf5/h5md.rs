@@ -82,8 +82,10 @@ impl Element {
         match &self.steps {
             None => Some(Slice::ALL),
             Some(steps) => {
-                let index = steps.binary_search(&number).ok();
-                let index = index.or_else(|| steps.iter().position(|step| *step == number))?;
+                let index = steps
+                    .binary_search(&number)
+                    .ok()
+                    .or_else(|| steps.iter().position(|step| *step == number))?;
                 Some(Slice::frame(index as u64))
             }
         }
@@ -196,12 +198,12 @@ impl Trajectory {
             return Ok(None);
         };
         let stored = &group.position.stored;
-        let positions = Values::find(stored, &slice, budget)?;
-        let positions = positions.filter(|values| matches!(values.components(), 2 | 3));
-        let positions = positions.ok_or_else(|| {
-            let shape = &stored.shape;
-            stored.bad(format!("shape {shape:?}, two or three numbers a particle are needed"))
-        })?;
+        let positions = Values::find(stored, &slice, budget)?
+            .filter(|values| matches!(values.components(), 2 | 3))
+            .ok_or_else(|| {
+                let shape = &stored.shape;
+                stored.bad(format!("shape {shape:?}, two or three numbers a particle are needed"))
+            })?;
         let mut finder = PropertyFinder::new(positions.count(), budget);
         let (groups, datasets) = group.node.members()?;
         for name in groups.iter().chain(&datasets) {
@@ -247,8 +249,8 @@ impl Trajectory {
         let Some(group) = self.groups.first() else {
             return Vec::new();
         };
-        let elements = group.node.members().map(|(groups, _)| groups);
-        let elements = elements.unwrap_or_default().into_iter();
+        let elements =
+            group.node.members().map(|(groups, _)| groups).unwrap_or_default().into_iter();
         let unit = |name: String| {
             let element = group.node.group(&name).ok()??;
             let unit = |what: &str| {
@@ -277,8 +279,7 @@ impl Dialect for Trajectory {
     }
 
     fn table(&self, step: usize, budget: MemoryBudget) -> Result<ParticleTable, ParseError> {
-        let found = self.steps.get(step);
-        let found = found.ok_or_else(|| no_step(step, self.steps.len()))?;
+        let found = self.steps.get(step).ok_or_else(|| no_step(step, self.steps.len()))?;
         let mut parts = Vec::new();
         for (value, group) in (0..).zip(&self.groups) {
             parts.extend(self.part(value, group, found.number, budget)?);
@@ -292,14 +293,17 @@ impl Dialect for Trajectory {
     fn remarks(&self) -> Vec<String> {
         let mut remarks = Vec::new();
         if let Ok(Some(h5md)) = self.root.group("h5md") {
-            let version = h5md.numbers("version").unwrap_or_default();
-            let version: Vec<String> = version.iter().map(f64::to_string).collect();
-            let creator = h5md.group("creator").ok().flatten();
-            let creator = creator.and_then(|c| {
-                let version = c.text("version").unwrap_or_default();
-                Some(format!(", written by {} {version}", c.text("name")?))
-            });
-            let creator = creator.unwrap_or_default();
+            let version: Vec<String> =
+                h5md.numbers("version").unwrap_or_default().iter().map(f64::to_string).collect();
+            let creator = h5md
+                .group("creator")
+                .ok()
+                .flatten()
+                .and_then(|c| {
+                    let version = c.text("version").unwrap_or_default();
+                    Some(format!(", written by {} {version}", c.text("name")?))
+                })
+                .unwrap_or_default();
             remarks.push(format!(
                 "HDF5, H5MD {} with {} time steps{}",
                 version.join("."),

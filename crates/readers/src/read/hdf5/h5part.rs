@@ -38,8 +38,10 @@ impl StepGroups {
     fn node(&self, step: usize) -> Result<(i64, Node), ParseError> {
         let found = self.steps.get(step);
         let (number, name) = found.ok_or_else(|| no_step(step, self.steps.len()))?;
-        let node = self.root.group(name)?;
-        let node = node.ok_or_else(|| ParseError::malformed(0, format!("/{name} is no group")))?;
+        let node = self
+            .root
+            .group(name)?
+            .ok_or_else(|| ParseError::malformed(0, format!("/{name} is no group")))?;
         Ok((*number, node))
     }
 }

@@ -17,7 +17,7 @@ const CONTINUATION: u16 = 0x10;
 /// Class of the layout of a virtual data set.
 const VIRTUAL: u8 = 3;
 /// Most parts of a header. Simulations have one or two.
-const MOST_BLOCKS: usize = 1024;
+const MAX_BLOCKS: usize = 1024;
 
 /// Sizes of numbers in a file, and where its addresses begin.
 #[derive(Debug, Clone, Copy)]
@@ -135,7 +135,7 @@ pub(super) fn virtual_layout(
                 }
                 return Ok(Some((list, patches)));
             }
-            if kind == CONTINUATION && blocks.len() < MOST_BLOCKS {
+            if kind == CONTINUATION && blocks.len() < MAX_BLOCKS {
                 blocks.push(continuation(data, version, addressing)?);
             }
         }
@@ -156,8 +156,7 @@ fn list_place(fields: &[u8], addressing: Addressing) -> Result<ListPlace, Error>
 /// The part of a header that the `data` of a continuation message refers to.
 fn continuation(data: &[u8], version: Version, addressing: Addressing) -> Result<Block, Error> {
     let mut fields = Cursor::new(data);
-    let start = fields.read_offset(addressing.offset_size)?;
-    let start = start.saturating_add(addressing.base);
+    let start = fields.read_offset(addressing.offset_size)?.saturating_add(addressing.base);
     let end = start.saturating_add(fields.read_length(addressing.length_size)?);
     let messages = match version {
         Version::First => start..end,

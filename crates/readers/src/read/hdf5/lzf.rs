@@ -17,8 +17,10 @@ pub(super) fn decompress(data: &[u8], most: usize) -> Result<Vec<u8>, Error> {
     while let Some(control) = rest.next() {
         let control = usize::from(*control);
         if control < 32 {
-            let literals = rest.as_slice().get(..=control);
-            let literals = literals.ok_or_else(|| damaged("it ends within literal bytes"))?;
+            let literals = rest
+                .as_slice()
+                .get(..=control)
+                .ok_or_else(|| damaged("it ends within literal bytes"))?;
             out.extend_from_slice(literals);
             rest = rest.as_slice()[control + 1..].iter();
         } else {

@@ -15,7 +15,7 @@ use spherule_files::one_line;
 use spherule_frame::ParseError;
 
 /// Most numbers of an attribute that are read.
-const MOST_ATTRIBUTE_NUMBERS: usize = 1 << 16;
+const MAX_ATTRIBUTE_NUMBERS: usize = 1 << 16;
 
 /// A group.
 #[derive(Clone)]
@@ -51,8 +51,7 @@ impl Node {
     /// # Errors
     /// [`ParseError::Malformed`].
     pub(super) fn root(file: &H5File) -> Result<Self, ParseError> {
-        let group = file.inner().root_group();
-        let group = group.map_err(|e| file.error(&e, 0, "/"))?;
+        let group = file.inner().root_group().map_err(|e| file.error(&e, 0, "/"))?;
         Ok(Self::new(file, group, String::new()))
     }
 
@@ -216,8 +215,10 @@ impl Node {
                 "in a file that a link led to, and is not followed; link to the data itself",
             ));
         }
-        let other = self.file.other(&link.file);
-        let other = other.map_err(|e| e.map_message(|what| format!("{path} {what}")))?;
+        let other = self
+            .file
+            .other(&link.file)
+            .map_err(|e| e.map_message(|what| format!("{path} {what}")))?;
         let root = Self::root(&other)?;
         if let Some(node) = root.descend(&link.path)? {
             return Ok(Linked::Group(Self { path, ..node }));
@@ -288,7 +289,7 @@ fn numbers(attribute: &Attribute) -> Option<Vec<f64>> {
     let (scalar, endian) = stored_scalar(&attribute.datatype)?;
     let bytes = attribute.raw_data.chunks_exact(scalar.size());
     let count = usize::try_from(attribute.num_elements().ok()?).ok()?;
-    let numbers = bytes.take(count.min(MOST_ATTRIBUTE_NUMBERS));
+    let numbers = bytes.take(count.min(MAX_ATTRIBUTE_NUMBERS));
     Some(numbers.map(|number| scalar.decode_one(number, endian)).collect())
 }
 

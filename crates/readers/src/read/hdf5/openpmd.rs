@@ -137,8 +137,8 @@ impl OpenPmd {
                 return Err(ParseError::malformed(0, what));
             }
         };
-        let positions = axes.into_iter().map(|(position, offset)| scaled(position, offset));
-        let positions = positions.collect();
+        let positions =
+            axes.into_iter().map(|(position, offset)| scaled(position, offset)).collect();
         // Other records
         let mut finder = PropertyFinder::new(count, budget);
         let (groups, datasets) = node.members()?;
@@ -321,8 +321,8 @@ impl Dialect for OpenPmd {
 
     fn remarks(&self) -> Vec<String> {
         let version = self.root.text("openPMD").unwrap_or_default();
-        let software = self.root.text("software");
-        let software = software.map_or(String::new(), |name| format!(", written by {name}"));
+        let software =
+            self.root.text("software").map_or(String::new(), |name| format!(", written by {name}"));
         let mut remarks = vec![format!(
             "HDF5, openPMD {version} with {} iterations{software}",
             self.iterations.len()

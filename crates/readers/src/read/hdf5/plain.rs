@@ -19,9 +19,9 @@ use spherule_frame::{MemoryBudget, ParseError};
 /// Groups within groups that are looked at.
 const DEPTH: usize = 4;
 /// Most groups that are looked at.
-const MOST_GROUPS: usize = 1 << 10;
+const MAX_GROUPS: usize = 1 << 10;
 /// Most time steps of a file that has fewer bytes.
-const MOST_STEPS: u64 = 1 << 16;
+const MAX_STEPS: u64 = 1 << 16;
 /// Separators between the stem of a name and its axis.
 const SEPARATORS: [&str; 4] = ["", "_", ".", "-"];
 
@@ -70,7 +70,7 @@ impl PlainFile {
             return Err(ParseError::unsupported(what));
         }
         // Steps without particles take no bytes, so nothing else bounds their number
-        let most = MOST_STEPS.max(root.file().bytes().len() as u64);
+        let most = MAX_STEPS.max(root.file().bytes().len() as u64);
         if let Some(frames) = frames.filter(|frames| *frames > most) {
             let what = format!("{frames} time steps, at most {most} are read");
             return Err(groups[0].positions[0].stored.bad(what));
@@ -117,8 +117,7 @@ impl PlainFile {
         for data in &group.positions {
             let slice = Slice { frame, field: data.field, ..Slice::ALL };
             let values = Values::find(&data.stored, &slice, budget)?;
-            let values = values.filter(|values| values.count() == count);
-            let values = values.ok_or_else(|| {
+            let values = values.filter(|values| values.count() == count).ok_or_else(|| {
                 let shape = &data.stored.shape;
                 data.stored.bad(format!("shape {shape:?} for {count} particles"))
             })?;
@@ -128,8 +127,7 @@ impl PlainFile {
             }
         }
         // The other fields of a compound type, then the other data sets
-        let own = group.positions.iter().filter_map(|data| data.field);
-        let own: Vec<Field> = own.collect();
+        let own: Vec<Field> = group.positions.iter().filter_map(|data| data.field).collect();
         if let Some(first) = group.positions.first().filter(|data| data.field.is_some()) {
             for (name, field) in Field::of_compound(&first.stored.datatype) {
                 if !own.contains(&field) {
@@ -294,7 +292,7 @@ struct Search {
 impl Search {
     /// Looks at a group and those in it, unless it was met before under another name.
     fn visit(&mut self, node: &Node, depth: usize) -> Result<(), ParseError> {
-        if self.visited.len() >= MOST_GROUPS || !self.visited.insert(node.key()) {
+        if self.visited.len() >= MAX_GROUPS || !self.visited.insert(node.key()) {
             return Ok(());
         }
         let (groups, datasets) = node.members()?;
@@ -365,8 +363,12 @@ impl Dialect for PlainFile {
 
     fn remarks(&self) -> Vec<String> {
         let mut remarks = Vec::new();
-        let paths = self.groups.iter().flat_map(|group| &group.positions);
-        let mut paths: Vec<String> = paths.map(|data| data.stored.path.clone()).collect();
+        let mut paths: Vec<String> = self
+            .groups
+            .iter()
+            .flat_map(|group| &group.positions)
+            .map(|data| data.stored.path.clone())
+            .collect();
         paths.dedup();
         remarks.push(format!("HDF5 of no known layout; positions are {}", listed(&paths)));
         if self.groups.len() > 1 {

@@ -14,7 +14,7 @@ use spherule_frame::names::RECORD_VECTORS;
 use spherule_frame::{MemoryBudget, ParseError};
 
 /// Most numbers of a data set that is read beside the particles, such as a list of times.
-const MOST_NUMBERS: u64 = 1 << 24;
+const MAX_NUMBERS: u64 = 1 << 24;
 
 /// Names of data sets that each have the positions along one axis.
 pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
@@ -220,8 +220,8 @@ pub(super) fn numbers(
         return Ok(None);
     };
     let count = values.count().saturating_mul(values.components() as u64);
-    if count > MOST_NUMBERS {
-        return Err(stored.bad(format!("{count} numbers, at most {MOST_NUMBERS} are read")));
+    if count > MAX_NUMBERS {
+        return Err(stored.bad(format!("{count} numbers, at most {MAX_NUMBERS} are read")));
     }
     budget.check(count.saturating_mul(16), "its lists are")?;
     let rows = usize::try_from(values.count()).unwrap_or(0);

@@ -76,8 +76,8 @@ impl Stored {
     pub(super) fn of(path: &str, dataset: &NodeDataset) -> Result<Self, ParseError> {
         let file = &dataset.file;
         let address = dataset.address();
-        let element_len = dtype_element_size(dataset.dtype());
-        let element_len = element_len.map_err(|e| file.error(&e, address, path))?;
+        let element_len =
+            dtype_element_size(dataset.dtype()).map_err(|e| file.error(&e, address, path))?;
         let mut stored = Self {
             file: file.clone(),
             at: file.place(address),

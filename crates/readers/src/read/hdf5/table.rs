@@ -348,14 +348,16 @@ impl Column {
 
 /// All pieces as one column of a file, if each is one range of it and they have the type `scalar`.
 fn together(cell: &[Piece], scalar: ScalarType) -> Option<(&H5File, StridedColumn)> {
-    let columns = cell.iter().map(|piece| match piece {
-        Piece::Stored(values) => {
-            let column = values.column().filter(|column| column.scalar == scalar);
-            column.map(|column| (&values.stored().file, column))
-        }
-        _ => None,
-    });
-    let columns: Vec<(&H5File, StridedColumn)> = columns.collect::<Option<_>>()?;
+    let columns: Vec<(&H5File, StridedColumn)> = cell
+        .iter()
+        .map(|piece| match piece {
+            Piece::Stored(values) => {
+                let column = values.column().filter(|column| column.scalar == scalar);
+                column.map(|column| (&values.stored().file, column))
+            }
+            _ => None,
+        })
+        .collect::<Option<_>>()?;
     let ((file, first), others) = columns.split_first()?;
     let fits = |(other, column): &(&H5File, StridedColumn)| {
         column.endian == first.endian && other.is_same(file)

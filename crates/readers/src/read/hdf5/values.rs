@@ -16,7 +16,7 @@ use crate::read::columns::{ComponentStride, StridedColumn};
 use spherule_frame::{MemoryBudget, ParseError, ScalarType};
 
 /// Most numbers in a row.
-pub(super) const MOST_COMPONENTS: usize = 64;
+pub(super) const MAX_COMPONENTS: usize = 64;
 
 /// Numbers of some rows.
 #[derive(Debug, Clone)]
@@ -167,16 +167,14 @@ impl Values {
 
     /// Rows of a chunk, if there are chunks.
     pub(super) fn band_rows(&self) -> Option<u64> {
-        let sources = self.sources.iter();
-        let sources = sources.filter_map(|source| source.values.band_rows());
+        let sources = self.sources.iter().filter_map(|source| source.values.band_rows());
         let own = self.chunks.as_ref().map(|chunks| chunks.band_rows);
         own.into_iter().chain(sources).max()
     }
 
     /// Bytes of a decoded chunk, 0 without chunks.
     pub(super) fn chunk_len(&self) -> u64 {
-        let own = self.chunks.as_ref();
-        let own = own.map_or(0, |chunks| chunks.grid.chunk_len as u64);
+        let own = self.chunks.as_ref().map_or(0, |chunks| chunks.grid.chunk_len as u64);
         let sources = self.sources.iter().map(|source| source.values.chunk_len());
         sources.fold(own, u64::max)
     }
@@ -359,7 +357,7 @@ impl RowShape {
             }
         };
         let is_inside = field.end().is_some_and(|end| end <= row_len);
-        let has_few = (1..=MOST_COMPONENTS).contains(&field.components);
+        let has_few = (1..=MAX_COMPONENTS).contains(&field.components);
         (is_inside && has_few).then_some(Self { rows, row_len, field })
     }
 }

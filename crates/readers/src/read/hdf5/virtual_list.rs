@@ -9,7 +9,7 @@ use hdf5_reader::error::Error;
 use hdf5_reader::io::Cursor;
 
 /// Most dimensions that HDF5 has.
-const MOST_DIMENSIONS: u32 = 32;
+const MAX_DIMENSIONS: u32 = 32;
 
 /// Elements of a virtual data set that are those of another one.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -179,8 +179,7 @@ fn blocks(cursor: &mut Cursor<'_>, size: usize) -> Result<Selection, Error> {
     let rank = dimensions(cursor)? as usize;
     let count = cursor.read_uvar(size)?;
     if count != 1 {
-        let len = usize::try_from(count).ok();
-        let len = len.and_then(|count| count.checked_mul(2 * rank * size));
+        let len = usize::try_from(count).ok().and_then(|count| count.checked_mul(2 * rank * size));
         cursor.skip(len.unwrap_or(usize::MAX))?;
         return Ok(Selection::Scattered);
     }
@@ -196,7 +195,7 @@ fn blocks(cursor: &mut Cursor<'_>, size: usize) -> Result<Selection, Error> {
 
 fn dimensions(cursor: &mut Cursor<'_>) -> Result<u32, Error> {
     let rank = cursor.read_u32_le()?;
-    if rank > MOST_DIMENSIONS {
+    if rank > MAX_DIMENSIONS {
         return Err(Error::InvalidData(format!("{rank} dimensions")));
     }
     Ok(rank)

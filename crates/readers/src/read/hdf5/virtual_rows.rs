@@ -53,8 +53,7 @@ pub(super) fn source_rows(
     // Find the wanted elements of each part
     let mut found = Vec::new();
     for part in parts {
-        let target = part.target.range(&stored.shape);
-        let target = target.ok_or_else(|| not_rows(part))?;
+        let target = part.target.range(&stored.shape).ok_or_else(|| not_rows(part))?;
         let start = target.start.max(wanted.first);
         let len = target.end.min(end).saturating_sub(start);
         if len == 0 {
@@ -71,15 +70,13 @@ pub(super) fn source_rows(
     let mut sources = Vec::with_capacity(found.len());
     for (rows, part, target) in found {
         let source = open_source(stored, part)?;
-        let from = part.source.range(&source.shape);
-        let from = from.ok_or_else(|| not_rows(part))?;
+        let from = part.source.range(&source.shape).ok_or_else(|| not_rows(part))?;
         if from.end - from.start != target.end - target.start {
             return Err(refused(stored, part, "but another number of them; copy it with h5py"));
         }
         let first = from.start + (wanted.first + rows.start * size - target.start);
         let len = (rows.end - rows.start) * size;
-        let slice = slice_of(&source.shape, first, len, size);
-        let slice = slice.ok_or_else(|| not_rows(part))?;
+        let slice = slice_of(&source.shape, first, len, size).ok_or_else(|| not_rows(part))?;
         let field = wanted.field;
         if field.is_some() && source.datatype != stored.datatype {
             return Err(refused(stored, part, "which has other fields; copy it with h5py"));
@@ -121,10 +118,13 @@ fn check_once(stored: &Stored, found: &mut [PartRows<'_>], count: u64) -> Result
 
 /// Opens the data set of `part`.
 fn open_source(stored: &Stored, part: &VirtualPart) -> Result<Arc<Stored>, ParseError> {
-    let file = stored.file.other(&part.file);
-    let file = file.map_err(|e| e.map_message(|what| format!("{}: {what}", stored.path)))?;
-    let dataset = Node::root(&file)?.dataset_at(&part.dataset)?;
-    let dataset = dataset.ok_or_else(|| refused(stored, part, "where it is not"))?;
+    let file = stored
+        .file
+        .other(&part.file)
+        .map_err(|e| e.map_message(|what| format!("{}: {what}", stored.path)))?;
+    let dataset = Node::root(&file)?
+        .dataset_at(&part.dataset)?
+        .ok_or_else(|| refused(stored, part, "where it is not"))?;
     let source = Stored::of(&part.dataset, &dataset)?;
     if matches!(source.place, Storage::Virtual(_)) {
         return Err(refused(stored, part, "which is virtual as well; copy it with h5py"));

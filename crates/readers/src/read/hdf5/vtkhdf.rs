@@ -89,8 +89,7 @@ impl VtkHdf {
 
     /// First point of a step, and their number.
     fn points(&self, step: usize, budget: MemoryBudget) -> Result<(u64, u64), ParseError> {
-        let counts = numbers(&self.node, "NumberOfPoints", budget)?;
-        let counts = counts
+        let counts = numbers(&self.node, "NumberOfPoints", budget)?
             .ok_or_else(|| ParseError::malformed(0, "/VTKHDF has no data set NumberOfPoints"))?;
         let part = self.offset("PartOffsets", step, budget)?;
         let parts = self.offset("NumberOfParts", step, budget)?;
@@ -109,13 +108,15 @@ impl VtkHdf {
             );
             ParseError::malformed(0, what)
         })?;
-        let count = own.iter().try_fold(0_u64, |sum, count| {
-            let count = integer(*count).and_then(|count| u64::try_from(count).ok());
-            sum.checked_add(count?)
-        });
-        let count = count.ok_or_else(|| {
-            ParseError::malformed(0, "/VTKHDF/NumberOfPoints has numbers that are no counts")
-        })?;
+        let count = own
+            .iter()
+            .try_fold(0_u64, |sum, count| {
+                let count = integer(*count).and_then(|count| u64::try_from(count).ok());
+                sum.checked_add(count?)
+            })
+            .ok_or_else(|| {
+                ParseError::malformed(0, "/VTKHDF/NumberOfPoints has numbers that are no counts")
+            })?;
         let first = self.offset("PointOffsets", step, budget)?;
         Ok((first.unwrap_or(0), count))
     }
@@ -181,8 +182,8 @@ impl Dialect for VtkHdf {
     }
 
     fn remarks(&self) -> Vec<String> {
-        let version = self.node.numbers("Version").unwrap_or_default();
-        let version: Vec<String> = version.iter().map(f64::to_string).collect();
+        let version: Vec<String> =
+            self.node.numbers("Version").unwrap_or_default().iter().map(f64::to_string).collect();
         let steps = match self.steps {
             Some(_) => format!(" with {} time steps", self.step_count),
             None => String::new(),

@@ -78,8 +78,7 @@ impl<'a> JsonCursor<'a> {
     /// # Errors
     /// [`ParseError::Malformed`] if `bytes` are no binary JSON.
     pub(super) fn new(bytes: &'a [u8], budget: MemoryBudget) -> Result<Self, ParseError> {
-        let endian = endian(bytes);
-        let endian = endian.ok_or_else(|| {
+        let endian = endian(bytes).ok_or_else(|| {
             ParseError::malformed(
                 0,
                 "not Houdini's binary JSON: the file does not begin with \\x7fNSJb",

@@ -9,7 +9,7 @@ use super::paged::{StoredValues, count};
 use spherule_frame::{MemoryBudget, ParseError};
 
 /// Most types of primitives that are listed.
-const MOST_TYPES: usize = 64;
+const MAX_TYPES: usize = 64;
 
 /// What a file says of its points.
 #[derive(Debug, Default)]
@@ -142,7 +142,7 @@ impl<'a> Geometry<'a> {
         if let Some(kind) = run_kind.or(kind) {
             let kind = String::from_utf8_lossy(kind.strip_suffix(b"_run").unwrap_or(kind));
             let is_new = !self.primitive_types.iter().any(|known| *known == kind);
-            if is_new && self.primitive_types.len() < MOST_TYPES {
+            if is_new && self.primitive_types.len() < MAX_TYPES {
                 self.primitive_types.push(kind.into_owned());
             }
         }

@@ -123,8 +123,8 @@ fn particles(
     let count = geometry.point_count;
     let count =
         count.ok_or_else(|| ParseError::malformed(end, "the file has no number of points"))?;
-    let endian = binary_json::endian(bytes);
-    let endian = endian.ok_or_else(|| ParseError::malformed(0, "not Houdini's binary JSON"))?;
+    let endian = binary_json::endian(bytes)
+        .ok_or_else(|| ParseError::malformed(0, "not Houdini's binary JSON"))?;
     let mut particles = RawParticles {
         positions: Positions::F32(Vec::new()),
         attributes: Vec::new(),

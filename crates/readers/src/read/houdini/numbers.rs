@@ -94,8 +94,7 @@ impl<'a> Numbers<'a> {
         let AttributeData::I64(numbers) = self.decode(endian, ScalarType::I64, at)? else {
             return Err(unexpected(at, "integers"));
         };
-        let counts = numbers.into_iter().map(usize::try_from);
-        let counts: Result<Vec<usize>, _> = counts.collect();
+        let counts: Result<Vec<usize>, _> = numbers.into_iter().map(usize::try_from).collect();
         counts.map_err(|_| unexpected(at, "positive integers"))
     }
 

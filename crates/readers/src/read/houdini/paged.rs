@@ -10,7 +10,7 @@ use spherule_frame::{AttributeData, Endian, MemoryBudget, ParseError, ScalarType
 
 /// Most elements of a page; Houdini writes 1024. The limit keeps a few constant pages from standing for any number of
 /// elements.
-const MOST_PAGE: usize = 1 << 16;
+const MAX_PAGE: usize = 1 << 16;
 
 /// How the numbers are arranged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -186,7 +186,7 @@ impl<'a> StoredValues<'a> {
             );
             return Err(ParseError::malformed(self.at, what));
         }
-        if count > 0 && !(1..=MOST_PAGE).contains(&self.page_len) {
+        if count > 0 && !(1..=MAX_PAGE).contains(&self.page_len) {
             let what = format!("attribute `{name}` has pages of {} points", self.page_len);
             return Err(ParseError::malformed(self.at, what));
         }

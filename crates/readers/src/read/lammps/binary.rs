@@ -57,8 +57,8 @@ impl Reader for LammpsBinary {
         let mut at = 0;
         while at < bytes.len() {
             let frame = Frame::parse(bytes, at, budget);
-            let end = frame.as_ref().ok().and_then(|frame| frame.end(bytes).ok());
-            let end = end.unwrap_or(bytes.len());
+            let end =
+                frame.as_ref().ok().and_then(|frame| frame.end(bytes).ok()).unwrap_or(bytes.len());
             Step::push(&mut steps, at..end, budget)?;
             if let (Some(step), Ok(frame)) = (steps.last_mut(), frame) {
                 (step.number, step.time) = (Some(frame.number), frame.time);

@@ -145,9 +145,11 @@ mod tests {
     /// Residues of two atoms whose rows have `columns` with `values`.
     #[track_caller]
     fn residues(columns: &str, values: [&str; 2]) -> Vec<f64> {
-        let names = ["Cartn_x", "Cartn_y", "Cartn_z"].into_iter();
-        let names = names.chain(columns.split(' '));
-        let names: String = names.map(|name| format!("_atom_site.{name}\n")).collect();
+        let names: String = ["Cartn_x", "Cartn_y", "Cartn_z"]
+            .into_iter()
+            .chain(columns.split(' '))
+            .map(|name| format!("_atom_site.{name}\n"))
+            .collect();
         let rows: String = values.map(|value| format!("1 2 3 {value}\n")).concat();
         let text = format!("data_a\nloop_\n{names}{rows}");
         let steps = pieces::steps(FORMAT, text.as_bytes()).expect("steps");

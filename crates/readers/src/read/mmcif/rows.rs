@@ -124,7 +124,7 @@ fn read_cell(line: &[u8], cell: &mut [f64; 6]) {
 }
 
 /// Most columns: the dictionary has about a hundred.
-const MOST_COLUMNS: usize = 1024;
+const MAX_COLUMNS: usize = 1024;
 
 /// The rows of the loop from front to back.
 #[derive(Debug)]
@@ -153,7 +153,7 @@ impl AtomRows {
         while let Some(line) = text.peek_line() {
             let name = line.text.trim_ascii();
             match name.strip_prefix(PREFIX) {
-                Some(name) if columns.len() < MOST_COLUMNS => {
+                Some(name) if columns.len() < MAX_COLUMNS => {
                     columns_at.get_or_insert(line.at);
                     // A file of one atom may have the values behind the names, without a loop.
                     if text::words(name).nth(1).is_some() {
@@ -163,7 +163,7 @@ impl AtomRows {
                     columns.push(Column::of(name));
                 }
                 Some(_) => {
-                    let what = format!("_atom_site has more than {MOST_COLUMNS} columns");
+                    let what = format!("_atom_site has more than {MAX_COLUMNS} columns");
                     return Err(ParseError::malformed(line.at, what));
                 }
                 None if columns_at.is_some() => break,

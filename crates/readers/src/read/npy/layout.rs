@@ -111,8 +111,7 @@ impl ArrayLayout {
             StridedColumn::interleaved(&field.name, scalar, field.components, first)
         };
         let places = position_fields(fields)?;
-        let axes = places.iter().filter_map(|p| fields.get(*p)).map(column);
-        let axes = axes.collect();
+        let axes = places.iter().filter_map(|p| fields.get(*p)).map(column).collect();
         let others = fields.iter().enumerate().filter(|(place, _)| !places.contains(place));
         let attributes = columns::group_vectors(others.map(|(_, field)| column(field)).collect());
         Ok(ParticleLayout::new(self.count, axes, attributes))

@@ -144,8 +144,11 @@ impl LiteralParser<'_> {
         let digits_from = usize::from(self.peek() == Some(b'-'));
         let digits = self.rest().bytes().skip(digits_from);
         let len = digits_from + digits.take_while(u8::is_ascii_digit).count();
-        let number = self.rest().get(..len).and_then(|n| n.parse().ok());
-        let number = number.ok_or_else(|| self.error("an integer"))?;
+        let number = self
+            .rest()
+            .get(..len)
+            .and_then(|n| n.parse().ok())
+            .ok_or_else(|| self.error("an integer"))?;
         self.at += len;
         // Python 2 wrote long integers as `2000L`.
         self.eat("L");

@@ -82,8 +82,9 @@ pub(super) fn contents<'a>(
     let size = usize::try_from(file.size()).unwrap_or(usize::MAX);
     if file.compression() == CompressionMethod::Stored && !file.encrypted() {
         let end = start.checked_add(size);
-        let stored = end.and_then(|end| bytes.get(start..end));
-        let stored = stored.ok_or_else(|| damaged(format!("{size} bytes are missing")))?;
+        let stored = end
+            .and_then(|end| bytes.get(start..end))
+            .ok_or_else(|| damaged(format!("{size} bytes are missing")))?;
         let mut sum = flate2::Crc::new();
         sum.update(stored);
         if sum.sum() != file.crc32() {

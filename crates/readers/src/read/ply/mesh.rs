@@ -146,8 +146,9 @@ fn add_text_faces(
             if property.length.is_none() {
                 continue;
             }
-            let items = integer(first).and_then(|items| usize::try_from(items).ok());
-            let items = items.ok_or_else(|| ascii::bad_word(at, first, property))?;
+            let items = integer(first)
+                .and_then(|items| usize::try_from(items).ok())
+                .ok_or_else(|| ascii::bad_word(at, first, property))?;
             if has_corners(property) {
                 let index = |word| integer(word).and_then(|index| u64::try_from(index).ok());
                 builder.add_polygon((0..items).map(|_| all.vertex(at, index(next()?))))?;

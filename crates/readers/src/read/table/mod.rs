@@ -295,8 +295,10 @@ struct Rows<'t> {
 fn particles(targets: Vec<TargetArray>, values: Vec<ColumnValues>) -> Particles {
     let mut values = values.into_iter();
     let positions = values.next().map_or(Positions::F64(Vec::new()), ColumnValues::into_positions);
-    let attributes = targets.into_iter().skip(1).zip(values);
-    let attributes = attributes
+    let attributes = targets
+        .into_iter()
+        .skip(1)
+        .zip(values)
         .filter_map(|(target, values)| {
             Some(Attribute {
                 name: target.name,

@@ -1,9 +1,7 @@
 //! One layer of a scene: its prims, and their values in a binary or text file.
 
 use super::number_type::Numbers;
-use super::prim::{
-    MOST_LEVELS, Metadata, Name, Prim, PrimTree, Property, Samples, Value, ValueRep,
-};
+use super::prim::{MAX_LEVELS, Metadata, Name, Prim, PrimTree, Property, Samples, Value, ValueRep};
 use super::{binary, text};
 use spherule_frame::{MemoryBudget, ParseError};
 
@@ -72,7 +70,7 @@ impl Layer<'_> {
         let mut chain = Vec::new();
         let mut at = prim;
         while at != 0 {
-            if chain.len() == MOST_LEVELS {
+            if chain.len() == MAX_LEVELS {
                 return None;
             }
             chain.push(at);

@@ -72,8 +72,7 @@ impl Scalar {
     pub(super) fn decode(self, bytes: &[u8]) -> AttributeData {
         match self {
             Self::Half => {
-                let numbers = bytes.as_chunks().0.iter();
-                let numbers = numbers.map(|b| f16::from_le_bytes(*b).to_f32());
+                let numbers = bytes.as_chunks().0.iter().map(|b| f16::from_le_bytes(*b).to_f32());
                 AttributeData::F32(numbers.collect())
             }
             Self::Plain(scalar) => {

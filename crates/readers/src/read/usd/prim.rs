@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 /// Most levels of prims in one another.
-pub(super) const MOST_LEVELS: usize = 256;
+pub(super) const MAX_LEVELS: usize = 256;
 
 /// The prims of a file.
 #[derive(Debug)]

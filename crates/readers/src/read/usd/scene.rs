@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::METADATA_BUDGET;
 use super::layer::Layer;
 use super::number_type::Numbers;
-use super::prim::{MOST_LEVELS, PrimKind, Property, Samples};
+use super::prim::{MAX_LEVELS, PrimKind, Property, Samples};
 use spherule_frame::{AttributeData, MemoryBudget, ParseError};
 
 /// How to make a file that is read.
@@ -44,7 +44,7 @@ impl ParticlePrims {
             let Some(prim) = layer.prims.get(visit.prim) else {
                 continue;
             };
-            if prim.is_dormant || visit.level > MOST_LEVELS {
+            if prim.is_dormant || visit.level > MAX_LEVELS {
                 continue;
             }
             let has_arcs = visit.has_arcs || prim.has_arcs;
@@ -126,8 +126,7 @@ pub(super) fn times(
     len: usize,
     budget: MemoryBudget,
 ) -> Result<Vec<f64>, ParseError> {
-    let positions = prims.prims.iter();
-    let positions = positions.filter_map(|prim| positions_samples(layer, *prim));
+    let positions = prims.prims.iter().filter_map(|prim| positions_samples(layer, *prim));
     let times = union(layer, positions, len, budget)?;
     if !times.is_empty() {
         return Ok(times);

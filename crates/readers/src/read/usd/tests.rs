@@ -167,8 +167,7 @@ fn text_has_comments_strings_and_separators_anywhere() {
          asset file = @a}b@ ( doc = \")\" )\n\
          def Points \"P\" { point3f[] points.timeSamples = { 10 : [(1,2,3)], 2: [(4, 5 , 6 )], }\n\
          float[] primvars:a = [1.5e1] ( interpolation = \"vertex\" ) ; int[] primvars:b.connect = </x.y> }\n }",
-    );
-    let particles = particles.expect("a good file");
+    ).expect("a good file");
     assert_eq!(particles.len(), 2);
     assert_eq!(coordinates(&particles[0].positions), [[4.0, 5.0, 6.0]]);
     assert_eq!(particles[1].time, Some(10.0 / 24.0));

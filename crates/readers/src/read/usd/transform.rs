@@ -10,7 +10,7 @@ use super::scene::{changes_around, numbers_at, tokens_at};
 use spherule_frame::{MemoryBudget, ParseError};
 
 /// Most operations of a prim.
-const MOST_OPERATIONS: usize = 64;
+const MAX_OPERATIONS: usize = 64;
 
 /// The operation that makes a prim independent of those above.
 const RESET: &[u8] = b"!resetXformStack!";
@@ -55,8 +55,8 @@ fn apply(
         return Ok(());
     };
     let order = tokens_at(layer, order, time)?;
-    if order.len() > MOST_OPERATIONS {
-        let what = format!("more than {MOST_OPERATIONS} transforms of a prim are not read");
+    if order.len() > MAX_OPERATIONS {
+        let what = format!("more than {MAX_OPERATIONS} transforms of a prim are not read");
         return Err(ParseError::unsupported(what));
     }
     for name in order {

@@ -33,7 +33,7 @@ use walk::{PointArray, WalkEnd, Walker};
 
 /// More than any tensor or spectrum has. With no particles nothing else bounds the number, and
 /// callers keep something for each component.
-pub(in crate::read) const MOST_COMPONENTS: usize = 1 << 16;
+pub(in crate::read) const MAX_COMPONENTS: usize = 1 << 16;
 
 /// A particle may have this many numbers, however few particles there are.
 const FEW_COMPONENTS: usize = 4096;

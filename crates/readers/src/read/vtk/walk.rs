@@ -1,6 +1,6 @@
 //! The walk through a legacy file, from keyword line to keyword line, and what it finds.
 
-use super::MOST_COMPONENTS;
+use super::MAX_COMPONENTS;
 use super::ascii::skip_integers;
 use super::attributes::{ArrayHeader, count, field_array, keyword_array};
 use super::cursor::{LineCursor, VtkLine, shown};
@@ -101,8 +101,7 @@ impl<'c, 'a> Walker<'c, 'a> {
         let first = cursor.line()?.ok_or_else(ended(cursor.at()))?;
         let major = parse_version(&first)?;
         let _title = cursor.line()?.ok_or_else(ended(cursor.at()))?;
-        let kind = cursor.keyword_line()?;
-        let kind = kind.ok_or_else(ended(cursor.at()))?;
+        let kind = cursor.keyword_line()?.ok_or_else(ended(cursor.at()))?;
         let encoding = if kind.starts_with("BINARY") {
             VtkEncoding::Binary
         } else if kind.starts_with("ASCII") {
@@ -392,7 +391,7 @@ impl<'c, 'a> Walker<'c, 'a> {
             ArrayOwner::Dataset => is_keyword(line.first_word()) && particles == Some(tuples),
         };
         let values = value_count(line.at, tuples, components)?;
-        if components > MOST_COMPONENTS {
+        if components > MAX_COMPONENTS {
             return Err(ParseError::malformed(
                 line.at,
                 format!("{components} components are too many"),

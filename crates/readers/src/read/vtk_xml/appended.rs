@@ -9,7 +9,7 @@ use spherule_frame::ParseError;
 
 /// How often all appended bytes may be read. Writers give each array bytes of its own; a file whose arrays
 /// share them could ask for work that grows with the square of its length.
-const MOST_READS: usize = 4;
+const MAX_READS: usize = 4;
 
 /// The blob after the underscore.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -82,15 +82,18 @@ impl<'a> Appended<'a> {
     pub(super) fn spend(&self, used: usize) -> bool {
         let spent = self.spent.get().saturating_add(used);
         self.spent.set(spent);
-        spent <= self.blob.len().saturating_mul(MOST_READS)
+        spent <= self.blob.len().saturating_mul(MAX_READS)
     }
 }
 
 /// The value of `encoding="..."` in a tag.
 fn encoding(tag: &[u8]) -> Option<&[u8]> {
     let name = memmem::find(tag, b"encoding")?;
-    let value = tag.get(name + b"encoding".len()..)?.trim_ascii_start();
-    let value = value.strip_prefix(b"=")?.trim_ascii_start();
+    let value = tag
+        .get(name + b"encoding".len()..)?
+        .trim_ascii_start()
+        .strip_prefix(b"=")?
+        .trim_ascii_start();
     let (quote, value) = value.split_first()?;
     let end = memchr::memchr(*quote, value)?;
     value.get(..end)

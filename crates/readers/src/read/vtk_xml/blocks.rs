@@ -136,8 +136,8 @@ impl<'a> EncodedBytes<'a> {
 
 /// Decodes the characters that hold `count` bytes, up to two bytes more; and what follows them.
 fn decode_run(chars: &[u8], count: usize) -> Result<(Vec<u8>, &[u8]), ArrayFault> {
-    let needed = count.div_ceil(3).checked_mul(4);
-    let needed = needed.ok_or_else(|| format!("{count} bytes are too many"))?;
+    let needed =
+        count.div_ceil(3).checked_mul(4).ok_or_else(|| format!("{count} bytes are too many"))?;
     let (run, rest) = take_chars(chars, needed);
     let bytes = BASE64.decode(run).map_err(|error| format!("bad base64: {error}"))?;
     if bytes.len() < count {
@@ -210,8 +210,8 @@ fn plain<'a>(
     match data {
         DataRun::New(source) => source.run(need),
         DataRun::Same(source) => {
-            let whole = need.checked_add(header);
-            let whole = whole.ok_or_else(|| format!("{need} bytes are too many"))?;
+            let whole =
+                need.checked_add(header).ok_or_else(|| format!("{need} bytes are too many"))?;
             let (bytes, rest) = source.run(whole)?;
             let mut bytes = bytes.into_owned();
             bytes.drain(..header);
@@ -269,8 +269,10 @@ fn inflate<'a>(
         .into());
     }
     let block_size = usize::try_from(block_size).unwrap_or(usize::MAX).min(need);
-    let compressed_total = compressed_sizes.iter().try_fold(0_usize, |sum, n| sum.checked_add(*n));
-    let compressed_total = compressed_total.ok_or("the block sizes overflow")?;
+    let compressed_total = compressed_sizes
+        .iter()
+        .try_fold(0_usize, |sum, n| sum.checked_add(*n))
+        .ok_or("the block sizes overflow")?;
     let (data, behind_data) = data.run(compressed_total)?;
     let mut blocks = Vec::with_capacity(compressed_sizes.len());
     let mut rest: &[u8] = &data;
@@ -287,9 +289,12 @@ fn inflate<'a>(
     }
     let each = decoder_bytes(&blocks, compressor, encoding.decoders)?;
     // As many at a time as may take that much.
-    let at_once = encoding.decoders.bytes().checked_div(each);
-    let at_once = at_once.map_or(usize::MAX, |n| usize::try_from(n).unwrap_or(usize::MAX));
-    let at_once = at_once.clamp(1, blocks.len());
+    let at_once = encoding
+        .decoders
+        .bytes()
+        .checked_div(each)
+        .map_or(usize::MAX, |n| usize::try_from(n).unwrap_or(usize::MAX))
+        .clamp(1, blocks.len());
     let mut output = vec![0; need];
     let groups = output.chunks_mut(block_size.saturating_mul(at_once));
     for (chunks, blocks) in groups.zip(blocks.chunks(at_once)) {
@@ -311,10 +316,9 @@ fn decoder_bytes(
     compressor: Compressor,
     budget: MemoryBudget,
 ) -> Result<u64, ArrayFault> {
-    let each = blocks.iter().map(|block| compressor.memory(block));
-    let each = each.max().unwrap_or(0);
+    let each = blocks.iter().map(|block| compressor.memory(block)).max().unwrap_or(0);
     let what = format!("a compressed block needs {} MiB", each.div_ceil(1 << 20));
-    let most = Compressor::MOST_MEMORY;
+    let most = Compressor::MAX_MEMORY;
     if each > most {
         return Err(ArrayFault::Damaged(format!(
             "{what} for its dictionary, presets of xz no more than {} MiB; write it with a preset",

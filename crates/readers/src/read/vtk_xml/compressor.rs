@@ -38,7 +38,7 @@ pub(super) enum Compressor {
 impl Compressor {
     /// Bytes that no block may take beside its output: LZMA decoders allocate the dictionary that the block asks for;
     /// the largest preset of xz (64 MiB) stays below this.
-    pub(super) const MOST_MEMORY: u64 = 80 << 20;
+    pub(super) const MAX_MEMORY: u64 = 80 << 20;
 
     /// The compressor that VTK calls `name`.
     ///
@@ -99,7 +99,7 @@ impl Compressor {
             }
             Self::Lz4 => lz4_flex::block::decompress_into(block, output)?,
             Self::Xz => {
-                let kib = memory.min(Self::MOST_MEMORY) >> 10;
+                let kib = memory.min(Self::MAX_MEMORY) >> 10;
                 let kib = u32::try_from(kib).unwrap_or(u32::MAX);
                 let mut xz = XzReader::new_mem_limit(block, false, kib);
                 xz.read_exact(output)?;

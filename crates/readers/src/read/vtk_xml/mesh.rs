@@ -57,10 +57,10 @@ impl CellReader<'_, '_> {
             Ok::<AttributeData, ParseError>(data)
         };
         let ends = array("offsets", count)?;
-        let indices = unsigned(&ends, last).and_then(|end| usize::try_from(end).ok());
-        let indices = indices.ok_or_else(|| {
-            ParseError::malformed(group.at, "the last of the offsets of cells is negative")
-        })?;
+        let indices =
+            unsigned(&ends, last).and_then(|end| usize::try_from(end).ok()).ok_or_else(|| {
+                ParseError::malformed(group.at, "the last of the offsets of cells is negative")
+            })?;
         let connectivity = array("connectivity", indices)?;
         let types = match group.section {
             CellSection::Typed => Some(array("types", count)?),

@@ -25,7 +25,7 @@ use std::cell::Cell;
 use memchr::memmem;
 
 use super::text::same_length;
-use super::vtk::{MOST_COMPONENTS, parse_values};
+use super::vtk::{MAX_COMPONENTS, parse_values};
 use super::{ByteSource, Step};
 use crate::format::Format;
 use crate::reader::{Confidence, FileExtent, Reader};
@@ -115,8 +115,7 @@ fn parse<T>(
     let document = XmlDocument::parse(&head, cut.is_some(), part)?;
     check_total(&document, bytes.len())?;
     let spent = Cell::new(0);
-    let appended = cut.map(|tag| Appended::parse(bytes, tag, &spent));
-    let appended = appended.transpose()?;
+    let appended = cut.map(|tag| Appended::parse(bytes, tag, &spent)).transpose()?;
     then(document, appended)
 }
 
@@ -195,8 +194,7 @@ fn array_sizes<'d, 'a>(
 ) -> impl Iterator<Item = (&'d DataArray<'a>, usize)> {
     document.pieces.iter().flat_map(|piece| {
         let coordinates = piece.coordinates.iter().map(|array| (array, 3));
-        let data = piece.point_data.iter();
-        let data = data.map(|array| (array, array.components.unwrap_or(1)));
+        let data = piece.point_data.iter().map(|array| (array, array.components.unwrap_or(1)));
         coordinates.chain(data).filter_map(|(array, components)| {
             let scalar = scalar_type(&array.type_name)?;
             let values = piece.points.saturating_mul(components);
@@ -206,7 +204,7 @@ fn array_sizes<'d, 'a>(
 }
 
 /// A field of times has no more numbers: it is read before anything is known of the rest.
-const MOST_TIMES: usize = 1 << 16;
+const MAX_TIMES: usize = 1 << 16;
 
 /// The simulation time, if a field has it. It is optional: a damaged field costs only the time.
 fn time(document: &XmlDocument<'_>, appended: Option<Appended<'_>>) -> Option<f64> {
@@ -218,7 +216,7 @@ fn time(document: &XmlDocument<'_>, appended: Option<Appended<'_>>) -> Option<f6
         .tuples
         .unwrap_or(1)
         .checked_mul(array.components.unwrap_or(1))
-        .filter(|count| *count <= MOST_TIMES)?;
+        .filter(|count| *count <= MAX_TIMES)?;
     let data = values(array, document.encoding, appended, count).ok()??;
     (!data.is_empty()).then(|| data.get_f64(0))
 }
@@ -259,8 +257,9 @@ fn values(
     let fault = |at: usize, what: String| {
         ParseError::malformed(at, format!("array `{}`: {what}", short(&array.name)))
     };
-    let need = count.checked_mul(scalar.size());
-    let need = need.ok_or_else(|| fault(array.at, format!("{count} numbers are too many")))?;
+    let need = count
+        .checked_mul(scalar.size())
+        .ok_or_else(|| fault(array.at, format!("{count} numbers are too many")))?;
     let (at, source) = match &array.place {
         ArrayLocation::Ascii(text) => {
             let bytes = text.text.as_bytes();
@@ -318,7 +317,7 @@ fn value_count(
     points: usize,
     components: usize,
 ) -> Result<usize, ParseError> {
-    points.checked_mul(components).filter(|_| components <= MOST_COMPONENTS).ok_or_else(|| {
+    points.checked_mul(components).filter(|_| components <= MAX_COMPONENTS).ok_or_else(|| {
         ParseError::malformed(
             array.at,
             format!("{points} points of {components} components are too many"),

@@ -27,7 +27,7 @@ const RANGES: [u32; 73] = [
 const FIRST_RANGE: usize = 9;
 
 /// Ranges up to this one are packed together.
-const MOST_PACKED: u32 = 0xff_ffff;
+const MAX_PACKED: u32 = 0xff_ffff;
 
 /// Bits of the number of small atoms in a run, with the change of their range.
 const RUN_BITS: u32 = 5;
@@ -158,7 +158,7 @@ enum FullRange {
 
 impl FullRange {
     fn new(ranges: [u32; 3]) -> Self {
-        if ranges.iter().all(|range| *range <= MOST_PACKED) {
+        if ranges.iter().all(|range| *range <= MAX_PACKED) {
             Self::Packed(PackedTriple::new(ranges))
         } else {
             Self::Apart(ranges.map(|range| u32::BITS - range.leading_zeros()))

@@ -93,8 +93,10 @@ pub(super) fn cell(comment: &[u8]) -> Option<SimulationCell> {
         .collect::<Vec<_>>()
         .try_into()
         .ok()?;
-    let origin = value(comment, "Origin").or_else(|| value(comment, "cell_origin"));
-    let origin = origin.and_then(numbers::<3>).unwrap_or_default();
+    let origin = value(comment, "Origin")
+        .or_else(|| value(comment, "cell_origin"))
+        .and_then(numbers::<3>)
+        .unwrap_or_default();
     let flags = value(comment, "pbc").map(|flags| text::words(flags).collect::<Vec<_>>());
     let is_periodic = |axis: usize| {
         let flag = flags.as_ref().and_then(|flags| flags.get(axis)?.first());

@@ -186,9 +186,11 @@ const SAMPLE: usize = 1 << 14;
 /// look like coordinates both far smaller and far larger than any simulation has together.
 fn check_plausible(bytes: &[u8]) -> Result<(), ParseError> {
     let (numbers, _) = bytes.as_chunks::<4>();
-    let sizes = numbers.iter().take(SAMPLE);
-    let sizes = sizes.map(|number| f32::from_le_bytes(*number).abs());
-    let sizes = sizes.filter(|size| *size > 0.0 && size.is_finite());
+    let sizes = numbers
+        .iter()
+        .take(SAMPLE)
+        .map(|number| f32::from_le_bytes(*number).abs())
+        .filter(|size| *size > 0.0 && size.is_finite());
     let (smallest, largest) =
         sizes.fold((f32::INFINITY, 0.0_f32), |(low, high), size| (low.min(size), high.max(size)));
     if smallest > 1e-20 || largest < 1e15 {

@@ -161,8 +161,9 @@ pub(super) fn name_column(comment: &[u8], first: &[u8]) -> Option<usize> {
                 is_species(name, kind) && text::integer(count) == Some(1)
             })?;
             let before = triples.iter().take(place);
-            let widths = before.map(|[_, _, count]| text::integer(count));
-            let widths = widths.map(|width| usize::try_from(width?).ok());
+            let widths = before
+                .map(|[_, _, count]| text::integer(count))
+                .map(|width| usize::try_from(width?).ok());
             widths.sum::<Option<usize>>()?
         }
         None => 0,

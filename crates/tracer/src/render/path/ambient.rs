@@ -19,7 +19,7 @@ use crate::scene::{Environment, IrradianceHarmonics};
 use spherule_tree::math::{lane3, lanes_in, set_lane3, splat3};
 
 /// The part of the light that arrives at a surface far away.
-const MOST: f32 = 0.8;
+const MAX: f32 = 0.8;
 
 /// Distance, in radii of a particle, at which half of that part arrives.
 const REACH: f32 = 0.8;
@@ -47,7 +47,7 @@ impl AmbientLight {
 
     /// The part of the light that arrives at a surface at `distance` from the first one.
     fn part(&self, distance: f32) -> f32 {
-        MOST * (distance / (distance + self.reach))
+        MAX * (distance / (distance + self.reach))
     }
 }
 

@@ -39,8 +39,11 @@ impl Catcher {
     pub(super) fn of(scene: &Scene) -> Option<Self> {
         let ground = scene.ground.as_ref()?;
         let strength = ground.shadow_catcher?;
-        let environment = scene.environment.as_deref().filter(|e| !e.is_black());
-        let environment = environment.map(|e| e.table().times_cosine(ground.up));
+        let environment = scene
+            .environment
+            .as_deref()
+            .filter(|e| !e.is_black())
+            .map(|e| e.table().times_cosine(ground.up));
         let irradiance = environment.as_ref().map_or(Vec3::ZERO, EnvironmentTable::flux);
         Some(Self { strength, environment, whole: irradiance * FRAC_1_PI })
     }

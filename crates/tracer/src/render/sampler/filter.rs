@@ -93,8 +93,7 @@ impl FilterTable {
         let u = 2.0 * f64::from(u) - 1.0;
         let part = u.abs();
         // Find the interval that the integral reaches `part` in
-        let end = self.integral.partition_point(|sum| *sum < part);
-        let end = end.clamp(1, INTERVALS);
+        let end = self.integral.partition_point(|sum| *sum < part).clamp(1, INTERVALS);
         let (low, high) = (self.integral[end - 1], self.integral[end]);
         let inside = ((part - low) / (high - low)).clamp(0.0, 1.0);
         let distance = self.half_width * ((end - 1) as f64 + inside) / INTERVALS as f64;

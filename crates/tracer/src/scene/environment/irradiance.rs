@@ -71,8 +71,8 @@ mod tests {
         let uniform = Environment::constant(Vec3::new(1.0, 2.0, 0.5));
         for (environment, tolerance) in [(uniform, 1e-4), (studio(axes, Vec3::ONE), 0.1)] {
             let harmonics = environment.irradiance_harmonics();
-            let normals = [Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z, Vec3::ONE];
-            let normals = normals.map(Vec3::normalize);
+            let normals = [Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z, Vec3::ONE]
+                .map(Vec3::normalize);
             let exact = normals.map(|normal| environment.irradiance(normal));
             let brightest = exact.iter().fold(Vec3::ZERO, |a, b| a.max(*b));
             for (normal, exact) in normals.into_iter().zip(exact) {

@@ -15,7 +15,7 @@ use super::octahedral::{sphere_to_square, square_to_sphere};
 use super::{EnvironmentAxes, EnvironmentSample, LUMINANCE, narrow, resample};
 
 /// Least density of a texel, as a fraction of the density of uniform sampling.
-const LEAST_DENSITY: f64 = 1e-4;
+const MIN_DENSITY: f64 = 1e-4;
 
 /// See the module.
 #[derive(Debug, Clone, PartialEq)]
@@ -139,7 +139,7 @@ impl<const SIDE: usize, const COUNT: usize> Texels<SIDE, COUNT> {
         let luminance = |rgb: &[f32; 3]| f64::from(Vec3::from_array(*rgb).dot(LUMINANCE));
         let mut weights: Vec<f64> = radiance.iter().map(luminance).collect();
         let mean = weights.iter().sum::<f64>() / COUNT as f64;
-        let least = if mean > 0.0 { LEAST_DENSITY * mean } else { 1.0 };
+        let least = if mean > 0.0 { MIN_DENSITY * mean } else { 1.0 };
         for weight in &mut weights {
             *weight += least;
         }

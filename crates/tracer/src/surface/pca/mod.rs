@@ -121,8 +121,7 @@ impl Moments {
         let total = self.weight as f64;
         let mean = DVec3::from_array(self.first.map(|sum| sum as f64 / total));
         let away = -mean.normalize_or(-own);
-        let base = own.lerp(away, smoothstep(OFFSET_RANGE, mean.length()));
-        let base = base.normalize_or(own);
+        let base = own.lerp(away, smoothstep(OFFSET_RANGE, mean.length())).normalize_or(own);
         // Turn to the direction of least variance, if that is distinct
         let spread = SymmetricMatrix(self.second.map(|sum| sum as f64 / total)) - mean;
         let flat = match least_component(&spread) {

@@ -11,7 +11,7 @@ const HEAD_RADIUS: f32 = 2.4;
 const HEAD_LENGTH: f32 = 6.0;
 
 /// Least length of an arrow in lengths of its head. Shorter ones are thinner in proportion, so that they are arrows too.
-const LEAST_LENGTH: f32 = 1.5;
+const MIN_LENGTH: f32 = 1.5;
 
 /// The point of an arrow that is at its particle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,7 +36,7 @@ pub fn arrow(
         Anchor::Tail => point,
         Anchor::Center => point - 0.5 * vector,
     };
-    let radius = radius.min(length / (LEAST_LENGTH * HEAD_LENGTH));
+    let radius = radius.min(length / (MIN_LENGTH * HEAD_LENGTH));
     let neck = tail + (length - HEAD_LENGTH * radius) * axis;
     let rod = |ends, radii| Rod { ends, radii, particles: [color; 2] };
     Some([rod([tail, neck], [radius; 2]), rod([neck, tail + vector], [HEAD_RADIUS * radius, 0.0])])

@@ -256,8 +256,8 @@ fn many_rods_are_those_of_brute_force() {
             packet.push(&ray);
             let all = (0..800).filter_map(|rod| {
                 let body = tree.body(rod);
-                let crossings = body.crossings(double(ray.origin), double(ray.direction));
-                let mut crossings = crossings.into_iter().flatten();
+                let mut crossings =
+                    body.crossings(double(ray.origin), double(ray.direction)).into_iter().flatten();
                 let hit = crossings.find(|hit| hit.t >= 0.0 && hit.t < 3.0)?;
                 let point = double(ray.origin) + hit.t * double(ray.direction);
                 let half = u32::from(body.half_of(point) == 1);

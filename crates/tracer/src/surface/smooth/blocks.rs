@@ -52,8 +52,8 @@ impl Plan {
             while let Some(earlier) = near.next_if(|block| block.key() < key) {
                 blocks.push(earlier);
             }
-            let block = near.next_if(|block| block.key() == key);
-            let block = block.unwrap_or_else(|| BlockPlan::empty(key));
+            let block =
+                near.next_if(|block| block.key() == key).unwrap_or_else(|| BlockPlan::empty(key));
             let raw = raw & !block.inside;
             blocks.push(BlockPlan { raw, ..block });
         }

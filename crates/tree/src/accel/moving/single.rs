@@ -16,13 +16,13 @@ pub(super) const STACK_SIZE: usize = (MAX_LEVELS + 1) * (WIDTH - 1) + 1;
 pub(super) const ROUNDING: f32 = 4.0 * f32::EPSILON;
 
 /// Least absolute component of a direction in tests of boxes, so that no distance is infinite times zero.
-pub(super) const LEAST_COMPONENT: f32 = 1e-18;
+pub(super) const MIN_COMPONENT: f32 = 1e-18;
 
 /// The inverse of a component of a direction, for tests of boxes.
 #[inline(always)]
 pub(super) fn inverse(component: f32) -> f32 {
-    let is_small = component.abs() < LEAST_COMPONENT;
-    1.0 / if is_small { LEAST_COMPONENT } else { component }
+    let is_small = component.abs() < MIN_COMPONENT;
+    1.0 / if is_small { MIN_COMPONENT } else { component }
 }
 
 /// A ray at its time.

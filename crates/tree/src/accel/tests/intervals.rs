@@ -202,8 +202,10 @@ fn spheres_that_end_together_go_to_the_lower_index() {
         let mut builder = TreeBuilder::new();
         builder.build(&scene.spheres(), &BuildSettings { keep_indices: true, ..settings });
         let view = builder.tree().view();
-        let found = crossings(&view, &Ray::new(Vec3::new(-3.0, 0.1, 0.2), Vec3::X));
-        let found: Vec<u32> = found.iter().map(|hit| view.particle(hit.slot)).collect();
+        let found: Vec<u32> = crossings(&view, &Ray::new(Vec3::new(-3.0, 0.1, 0.2), Vec3::X))
+            .iter()
+            .map(|hit| view.particle(hit.slot))
+            .collect();
         assert_eq!(found, [0, 0], "{settings:?}");
     }
 }

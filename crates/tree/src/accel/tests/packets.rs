@@ -99,8 +99,13 @@ pub(super) fn check_packet(tree: &TreeView, packet: &RayPacket, what: &str) -> u
 
 /// The same tree with links.
 fn linked(tree: &WideTree) -> Vec<Link> {
-    let ends = tree.level_starts.iter().skip(1).map(|start| *start as usize);
-    let ends = ends.chain([tree.nodes.len()]).take(tree.level_starts.len());
+    let ends = tree
+        .level_starts
+        .iter()
+        .skip(1)
+        .map(|start| *start as usize)
+        .chain([tree.nodes.len()])
+        .take(tree.level_starts.len());
     let view = tree.view();
     let mut links = Vec::new();
     for (level, end) in ends.enumerate() {

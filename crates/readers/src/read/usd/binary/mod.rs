@@ -20,9 +20,9 @@ pub(super) const MAGIC: &[u8] = b"PXR-USDC";
 /// Bytes of the header.
 const HEADER_LEN: usize = 88;
 /// Most sections of a file; OpenUSD writes six.
-const MOST_SECTIONS: u64 = 64;
+const MAX_SECTIONS: u64 = 64;
 /// Most entries of a list for each byte of the file. Lists of similar entries take few bits each.
-const MOST_ENTRIES: u64 = 64;
+const MAX_ENTRIES: u64 = 64;
 /// Newest minor version whose layout is known.
 const NEWEST: u8 = 13;
 
@@ -152,7 +152,7 @@ impl<'a> CrateFile<'a> {
     fn section(&self, mut table: NumberReader<'a>, name: &str) -> Result<Section, ParseError> {
         let at = table.at();
         let count = table.u64()?;
-        if count > MOST_SECTIONS {
+        if count > MAX_SECTIONS {
             let what = format!("a table of {count} sections: the file is damaged");
             return Err(ParseError::malformed(at, what));
         }
@@ -177,10 +177,14 @@ impl<'a> CrateFile<'a> {
         let at = reader.at();
         let count = reader.u64()?;
         let len = self.bytes.len() as u64;
-        let count = usize::try_from(count).ok().filter(|_| count <= MOST_ENTRIES * len);
-        let count = count.ok_or_else(|| {
-            ParseError::malformed(at, format!("more {name} than a file of {len} bytes can have"))
-        })?;
+        let count = usize::try_from(count).ok().filter(|_| count <= MAX_ENTRIES * len).ok_or_else(
+            || {
+                ParseError::malformed(
+                    at,
+                    format!("more {name} than a file of {len} bytes can have"),
+                )
+            },
+        )?;
         let need = entry_len.saturating_mul(count as u64);
         budget.check(need, &format!("the list of its {name} is"))?;
         Ok(count)
@@ -222,8 +226,10 @@ impl<'a> CrateFile<'a> {
         // LZ4 cannot pack them better
         let most = self.bytes.len().saturating_mul(RATIO) as u64;
         let damaged = || format!("{len} bytes of tokens: the file is damaged");
-        let len = u32::try_from(len).ok().filter(|len| u64::from(*len) <= most);
-        let len = len.ok_or_else(|| ParseError::malformed(at, damaged()))?;
+        let len = u32::try_from(len)
+            .ok()
+            .filter(|len| u64::from(*len) <= most)
+            .ok_or_else(|| ParseError::malformed(at, damaged()))?;
         budget.check(len.into(), "the text of its tokens is")?;
         let (block, at) = Self::block(&mut reader)?;
         if count == 0 {
@@ -295,8 +301,11 @@ impl<'a> CrateFile<'a> {
         let paths = Self::integers::<u32>(&mut reader, count)?;
         let field_sets = Self::integers::<u32>(&mut reader, count)?;
         let kinds = Self::integers::<u32>(&mut reader, count)?;
-        let specs = paths.into_iter().zip(field_sets).zip(kinds);
-        let specs = specs.map(|((path, field_set), kind)| Spec { path, field_set, kind });
+        let specs = paths
+            .into_iter()
+            .zip(field_sets)
+            .zip(kinds)
+            .map(|((path, field_set), kind)| Spec { path, field_set, kind });
         self.specs = specs.collect();
         Ok(())
     }

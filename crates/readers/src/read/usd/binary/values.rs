@@ -16,7 +16,7 @@ const DOUBLE_VECTOR: u8 = 48;
 const BLOCK: u8 = 51;
 
 /// Shortest arrays that are compressed.
-const LEAST_COMPRESSED: usize = 16;
+const MIN_COMPRESSED: usize = 16;
 
 impl ValueRep {
     const fn kind(self) -> u8 {
@@ -149,7 +149,7 @@ impl<'a> CrateFile<'a> {
         let (count, mut reader) = self.array_start(rep)?;
         let each = number_type.components * number_type.in_memory().size();
         let need = count.saturating_mul(each) as u64;
-        if !rep.is_compressed() || count < LEAST_COMPRESSED {
+        if !rep.is_compressed() || count < MIN_COMPRESSED {
             let len = count.saturating_mul(number_type.stored_len());
             let bytes = reader.take(len)?;
             budget.check(need, "its numbers in memory are")?;
@@ -165,16 +165,16 @@ impl<'a> CrateFile<'a> {
         }
         match number_type.scalar {
             Scalar::Plain(ScalarType::I32) => {
-                let numbers = Self::integers::<u32>(&mut reader, count)?;
-                let numbers = numbers.into_iter().map(u32::cast_signed);
+                let numbers =
+                    Self::integers::<u32>(&mut reader, count)?.into_iter().map(u32::cast_signed);
                 Ok(AttributeData::I32(numbers.collect()))
             }
             Scalar::Plain(ScalarType::U32) => {
                 Ok(AttributeData::U32(Self::integers(&mut reader, count)?))
             }
             Scalar::Plain(ScalarType::I64) => {
-                let numbers = Self::integers::<u64>(&mut reader, count)?;
-                let numbers = numbers.into_iter().map(u64::cast_signed);
+                let numbers =
+                    Self::integers::<u64>(&mut reader, count)?.into_iter().map(u64::cast_signed);
                 Ok(AttributeData::I64(numbers.collect()))
             }
             Scalar::Plain(ScalarType::U64) => {
@@ -199,8 +199,8 @@ impl<'a> CrateFile<'a> {
         let at = reader.at();
         match reader.take(1)? {
             b"i" => {
-                let numbers = Self::integers::<u32>(&mut reader, count)?;
-                let numbers = numbers.into_iter().map(u32::cast_signed);
+                let numbers =
+                    Self::integers::<u32>(&mut reader, count)?.into_iter().map(u32::cast_signed);
                 Ok(match scalar {
                     Scalar::Plain(ScalarType::F64) => {
                         AttributeData::F64(numbers.map(f64::from).collect())

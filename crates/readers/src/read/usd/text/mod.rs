@@ -11,8 +11,8 @@ use std::ops::Range;
 use self::lexer::Lexer;
 pub(super) use self::values::TextFile;
 use super::prim::{
-    MOST_LEVELS, Metadata, Prim, PrimKind, PrimTree, Property, Samples, TextValue, Value,
-    is_needed, of_prims,
+    MAX_LEVELS, Metadata, Prim, PrimKind, PrimTree, Property, Samples, TextValue, Value, is_needed,
+    of_prims,
 };
 use crate::read::text::number;
 use spherule_frame::{MemoryBudget, ParseError};
@@ -21,7 +21,7 @@ use spherule_frame::{MemoryBudget, ParseError};
 pub(super) const MAGIC: &[u8] = b"#usda ";
 
 /// Least bytes of a prim or property, and most memory for it.
-const LEAST_LEN: u64 = 8;
+const MIN_LEN: u64 = 8;
 const ENTRY_LEN: u64 = 200;
 
 /// Reads the text file `bytes`.
@@ -97,7 +97,7 @@ impl<'a> Parser<'a> {
 
     /// Checks that another entry of the lists fits into the budget.
     fn check_list(&self) -> Result<(), ParseError> {
-        let count = (self.prims.len() + self.properties.len()) as u64 + LEAST_LEN;
+        let count = (self.prims.len() + self.properties.len()) as u64 + MIN_LEN;
         self.budget.check(count * ENTRY_LEN, "the list of its prims is")
     }
 
@@ -136,8 +136,8 @@ impl<'a> Parser<'a> {
         let kind = PrimKind::of(self.text(&type_name));
         let at = self.lexer.at();
         let name = self.lexer.string()?;
-        if self.open.len() > MOST_LEVELS {
-            let what = format!("prims in more than {MOST_LEVELS} others are not read");
+        if self.open.len() > MAX_LEVELS {
+            let what = format!("prims in more than {MAX_LEVELS} others are not read");
             return Err(ParseError::malformed(at, what));
         }
         let prim = self.prims.len();

@@ -50,8 +50,9 @@ fn cells_in_text_may_be_counted_wrongly() {
         .replace("\nPOINT_DATA", "#")
         .split('#')
         .next()
-        .map(str::to_owned);
-    let cut = cut.expect("a beginning").replace("1 2", "1");
+        .map(str::to_owned)
+        .expect("a beginning")
+        .replace("1 2", "1");
     assert!(parse(cut.as_bytes()).is_err());
 }
 
