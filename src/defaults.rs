@@ -152,7 +152,7 @@ impl Rules<'_> {
     fn leave_out(&mut self) -> bool {
         let mut has_left_out = false;
         if self.facts.elements.is_some_and(|elements| elements.has_others) {
-            let line = "left out: virtual sites and other particles that are no atoms (--where 'element >= 0' \
+            let line = "left out: virtual sites and other particles that are not atoms (--where 'element >= 0' \
                         shows them)";
             self.set(
                 [("select.where", "element >= 1 && element <= 118".into())],

@@ -98,6 +98,9 @@ fn run_remedy(error: &RunError) -> Option<&'static str> {
     Some(match error {
         RunError::Job(error) => return job_remedy(error),
         RunError::Resolve(error) => return resolve_remedy(error),
+        RunError::Sequence(SequenceError::Outside { .. }) => {
+            "--follow-links (input.follow_links = true) allows them"
+        }
         RunError::File(error) => return file_remedy(error),
         RunError::OutputIsFile { .. } => "choose another output",
         RunError::OtherKind { .. } => "choose another directory, or discard that job with --force",

@@ -190,7 +190,7 @@ impl Inputs {
             let bar =
                 color_bar(&job.state).map_err(|e| error(format!("{}: {e}", dir.display())))?;
             let bar = bar.ok_or_else(|| {
-                let text = "the colours of the particles are no values of a map; render it with --color-by";
+                let text = "the colours of the particles do not follow a colour map; render it with --color-by";
                 error(format!("{}: {text}", dir.display()))
             })?;
             match &first {

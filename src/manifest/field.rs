@@ -67,8 +67,3 @@ impl<'a> Field<'a> {
         Some(items.iter().enumerate().map(item).collect())
     }
 }
-
-#[expect(clippy::cast_possible_truncation, reason = "callers check that it is finite")]
-pub(super) const fn narrow(value: f64) -> f32 {
-    value as f32
-}

@@ -266,7 +266,7 @@ mod tests {
         assert_eq!(paths, ["a.stl", "b.stl", "c.#.stl"]);
         assert_eq!(parse("", &["b.stl"]).unwrap().meshes.len(), 1);
         let error = parse("mesh = 3", &["b.stl"]).unwrap_err().to_string();
-        assert!(error.contains("--mesh: mesh: is 3, which is no list"), "{error}");
+        assert!(error.contains("--mesh: mesh: expected a list, found 3"), "{error}");
         let error = parse("", &["##.##.stl"]).unwrap_err().to_string();
         assert!(error.starts_with("--mesh: mesh.0.path: "), "{error}");
     }

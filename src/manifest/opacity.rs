@@ -1,5 +1,6 @@
 //! `material.opacity`: how much each sphere covers of what is behind it.
 
+use crate::math::narrow;
 use serde_json::{Value as Json, json};
 
 use super::field::Field;
@@ -29,8 +30,7 @@ impl Value for OpacitySetting {
 
     fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {
         let Some(mut section) = field.as_table() else {
-            let number =
-                field.as_number().filter(|v| (0.0..=1.0).contains(v)).map(super::field::narrow);
+            let number = field.as_number().filter(|v| (0.0..=1.0).contains(v)).map(narrow);
             return number.map(Self::Constant).ok_or(Fault::Unwanted);
         };
         let (mut attribute, mut range) = (String::new(), Ends([0.0, 1.0]));

@@ -41,7 +41,7 @@ section! {
         cryptomatte_levels: u32 = u32::from(Mattes::DEFAULT_LEVELS), from(2), to(Mattes::MAX_LEVELS);
         /// Lossless compression of the EXR: none | rle | zip | zips | piz
         compression: Compression = Compression::Zip;
-        /// Lossless compression of channels that are no colours: none | rle | zip | zips | piz
+        /// Lossless compression of data channels: none | rle | zip | zips | piz
         ///
         /// If it differs from `compression`, the EXR has two parts: `color` (RGBA, light channels, light groups, noisy)
         /// and `data` (all other channels).

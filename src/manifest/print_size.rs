@@ -73,7 +73,7 @@ fn length(text: &str) -> Result<f64, String> {
     let millimetres = value.map(|value| value * factor);
     millimetres
         .filter(|length| (0.1..=1e5).contains(length))
-        .ok_or_else(|| format!("\"{text}\" is no length on paper from 0.1mm to 100m"))
+        .ok_or_else(|| format!("\"{text}\" is not a length on paper (0.1mm to 100m)"))
 }
 
 impl Value for Side {
@@ -152,8 +152,8 @@ mod tests {
             ("width = \"85\"", "image.width: \"85\" has no unit; write \"85mm\""),
             ("width = \"85px\"", "image.width: unknown unit `px`; write a whole number of pixels"),
             ("width = \"85 m\"", "unknown unit `m`"),
-            ("width = \"8.5.1cm\"", "\"8.5.1cm\" is no length on paper"),
-            ("height = \"0mm\"", "image.height: \"0mm\" is no length on paper"),
+            ("width = \"8.5.1cm\"", "\"8.5.1cm\" is not a length on paper"),
+            ("height = \"0mm\"", "image.height: \"0mm\" is not a length on paper"),
             (
                 "width = \"wide\"",
                 "image.width: expected a length on paper such as \"85mm\", or a whole number from 1 to 65536",

@@ -293,7 +293,7 @@ impl TomlNode {
                 return Err(Problem {
                     place: overlay.node.place.clone(),
                     key: overlay.keys.join("."),
-                    what: format!("is {found}, which is no list"),
+                    what: format!("expected a list, found {found}"),
                 });
             }
         }

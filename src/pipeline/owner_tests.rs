@@ -19,7 +19,7 @@ use crate::manifest::Manifest;
 use crate::render::cryptomatte::{ObjectName, object_of};
 use crate::render::layers::MatteKind;
 use crate::render::{Film, NO_ID};
-use crate::resolve::{SceneImages, question};
+use crate::resolve::{SceneInputs, question};
 use crate::scene::ColorMap;
 use crate::survey::Survey;
 
@@ -142,7 +142,7 @@ fn rendered(sequence: &Sequence, settings: &str) -> (Setup, Film) {
     let selection = manifest.selection();
     let survey = Survey::of(sequence, question(&manifest, &selection)).expect("readable");
     let setup =
-        crate::resolve::setup(&manifest, &survey, &SceneImages::default()).expect("possible");
+        crate::resolve::setup(&manifest, &survey, SceneInputs::default()).expect("possible");
     let task = ImageTask {
         frame: 2,
         index: 1,

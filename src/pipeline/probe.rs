@@ -314,7 +314,7 @@ mod tests {
         let question = crate::resolve::question(&manifest, &selection);
         let survey = crate::survey::Survey::of(&sequence, question).expect("readable");
         let setup =
-            crate::resolve::setup(&manifest, &survey, &crate::resolve::SceneImages::default())
+            crate::resolve::setup(&manifest, &survey, crate::resolve::SceneInputs::default())
                 .expect("pictures");
         let task = ImageTask {
             frame: 1,

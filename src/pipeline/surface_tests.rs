@@ -40,7 +40,7 @@ fn opened(file: &Path) -> (Setup, Sequence) {
     let question = crate::resolve::question(&manifest, &selection);
     let survey = crate::survey::Survey::of(&sequence, question).expect("readable");
     let mut setup =
-        crate::resolve::setup(&manifest, &survey, &crate::resolve::SceneImages::default())
+        crate::resolve::setup(&manifest, &survey, crate::resolve::SceneInputs::default())
             .expect("pictures");
     setup.picture.render.width = 48;
     setup.picture.render.height = 27;

@@ -1,8 +1,9 @@
 //! Arrows of vector attributes, and trails.
 
 use super::rods::{add_material, rule};
-use super::{ResolveError, narrow, require_attribute};
+use super::{ResolveError, require_attribute};
 use crate::manifest::Manifest;
+use crate::math::narrow;
 use crate::pipeline::{ArrowStyle, ColorRule, TrailStyle};
 use crate::scene::Scene;
 use crate::survey::Survey;

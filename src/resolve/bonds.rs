@@ -1,8 +1,9 @@
 //! Bonds between particles.
 
 use super::rods::{add_material, rule};
-use super::{ResolveError, narrow, require_attribute};
+use super::{ResolveError, require_attribute};
 use crate::manifest::{BondSearch, Manifest};
+use crate::math::narrow;
 use crate::pipeline::{BondRule, BondStyle, ColorRule};
 use crate::scene::Scene;
 use crate::survey::{ELEMENT, Survey};

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use glam::DVec3;
 use spherule_formats::SimulationCell;
 
-use super::ResolveError;
+use super::{Extent, ResolveError};
 use crate::manifest::{
     self, BoxSetting, CameraMode, FitSetting, FocusSetting, Manifest, ProjectionKind,
 };
@@ -16,8 +16,45 @@ use crate::scene::{
 };
 use crate::survey::{Fit, Survey};
 
+/// The camera, and what it follows from.
+pub(super) struct PlacedCamera {
+    /// The camera path, in world units.
+    pub path: CameraPath,
+    pub projection: Projection,
+    /// The eyes, if images are stereo pairs.
+    pub stereo: Option<StereoSettings>,
+    /// The camera at the start of the path, without its lens.
+    pub camera: Camera,
+    pub lens: Option<LensSettings>,
+    /// Width of the image of an eye divided by its height.
+    pub aspect: f64,
+}
+
+/// The camera that the manifest describes.
+///
+/// # Errors
+/// There is no view, or a key of the path is invalid.
+pub(super) fn placed(
+    manifest: &Manifest,
+    survey: &Survey,
+    extent: &Extent,
+) -> Result<PlacedCamera, ResolveError> {
+    let [width, height] = manifest.image.size();
+    let aspect = f64::from(width) / f64::from(height);
+    let framed = framed(manifest, survey, &extent.bounds, extent.reach);
+    let (path, projection) = path(manifest, &framed, extent.up, aspect)?;
+    let stereo = stereo(manifest);
+    let camera = at_start(&path, |view| {
+        let camera = Camera::projected(view, projection, aspect, survey.origin)?;
+        let stereo = stereo.map(|stereo| stereo.stereo(view)).transpose()?;
+        Ok(camera.with_stereo(stereo))
+    })?;
+    let lens = lens(manifest, &path, aspect)?;
+    Ok(PlacedCamera { path, projection, stereo, camera, lens, aspect })
+}
+
 /// The path and the projection that the manifest describes; `up` is the default upward direction.
-pub(super) fn path(
+fn path(
     manifest: &Manifest,
     framed: &Framed,
     up: DVec3,
@@ -78,7 +115,7 @@ pub(super) fn path(
 }
 
 /// The eyes of stereo pairs.
-pub(super) fn stereo(manifest: &Manifest) -> Option<StereoSettings> {
+fn stereo(manifest: &Manifest) -> Option<StereoSettings> {
     let camera = &manifest.camera;
     camera.stereo.then_some(StereoSettings {
         eye_distance: camera.eye_distance,
@@ -92,7 +129,7 @@ pub(super) fn stereo(manifest: &Manifest) -> Option<StereoSettings> {
 /// The survey with the corners of `meshes` among the outermost particles, if `manifest` says that the camera shows
 /// them.
 /// `meshes` has one for each entry of the manifest.
-pub fn with_framed_meshes<'a>(
+pub(super) fn with_framed_meshes<'a>(
     survey: &'a Survey,
     manifest: &Manifest,
     meshes: &[PictureMesh],
@@ -127,7 +164,7 @@ pub(super) fn fit(manifest: &Manifest) -> Fit {
 
 /// What an automatic camera shows: the box that is given, or the outermost particles of `survey`, or in jobs of earlier versions their `bounds`;
 /// and the simulation cell if it is visible.
-pub(super) fn framed(manifest: &Manifest, survey: &Survey, bounds: &Bounds, reach: f64) -> Framed {
+fn framed(manifest: &Manifest, survey: &Survey, bounds: &Bounds, reach: f64) -> Framed {
     if let Some(BoxSetting { min, max }) = manifest.camera.bounds {
         return Framed::corners(&Bounds { min, max });
     }
@@ -167,7 +204,7 @@ fn keyed(key: &manifest::CameraKey, up: DVec3, fov: f64) -> CameraKey {
 }
 
 /// The camera at the start of `path`. All keys of a path are checked. `camera` makes one of a view.
-pub(super) fn at_start(
+fn at_start(
     path: &CameraPath,
     camera: impl Fn(&CameraView) -> Result<Camera, CameraError>,
 ) -> Result<Camera, ResolveError> {
@@ -183,7 +220,7 @@ pub(super) fn at_start(
 }
 
 /// The lens that the manifest describes, if its aperture is not 0.
-pub(super) fn lens(
+fn lens(
     manifest: &Manifest,
     path: &CameraPath,
     aspect: f64,

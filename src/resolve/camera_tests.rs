@@ -49,7 +49,7 @@ fn setup(change: impl FnOnce(&mut manifest::Camera)) -> Result<Setup, ResolveErr
     manifest.image.height = Side::Pixels(36);
     manifest.output.transparent = true;
     change(&mut manifest.camera);
-    super::super::setup(&manifest, &survey(), &super::super::SceneImages::default())
+    super::super::setup(&manifest, &survey(), super::super::SceneInputs::default())
 }
 
 fn keyed_setup(keys: impl Into<Vec<Key>>) -> Result<Setup, ResolveError> {

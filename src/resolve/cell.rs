@@ -1,5 +1,6 @@
 //! The simulation cell.
 
+use crate::math::narrow;
 use glam::{DVec3, Vec3};
 use spherule_formats::SimulationCell;
 
@@ -27,7 +28,7 @@ pub(super) fn add_cell(
     let radius = cell.radius.unwrap_or_else(|| {
         let diagonals = survey.cells.iter().map(SimulationCell::diagonal);
         let diagonal = diagonals.reduce(f64::max);
-        super::narrow(RADIUS * diagonal.unwrap_or(survey.min.distance(survey.max)))
+        narrow(RADIUS * diagonal.unwrap_or(survey.min.distance(survey.max)))
     });
     Some(CellStyle { radius, material })
 }

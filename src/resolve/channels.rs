@@ -1,8 +1,9 @@
 //! The channels of the images, with the attributes among them.
 
+use crate::math::narrow;
 use spherule_formats::names;
 
-use super::{ResolveError, narrow, require_attribute};
+use super::{ResolveError, require_attribute};
 use crate::manifest::{Channel, Manifest, Output};
 use crate::output::{PlaneNames, attribute_planes as planes_of};
 use crate::pipeline::{AttributeChannel, FrameStep, attribute_list};

@@ -1,7 +1,9 @@
 //! Colours of particles: which value they show, and through which map.
 
-use super::{ResolveError, narrow, require_attribute, similar};
+use super::ResolveError;
+use super::error::{require_attribute, similar};
 use crate::manifest::{ColorMapping, ColorSetting, Manifest, RangeSetting, ScaleKind};
+use crate::math::narrow;
 use crate::pipeline::{ColorRule, attribute_list};
 use crate::scene::{Camera, ColorMap, ColorScale, UnknownColorMap, material};
 use crate::survey::{
@@ -201,7 +203,7 @@ fn categories(by: &ColorMapping, color: &ColorRange) -> Result<ColorMap, Resolve
     let values = match &color.categories {
         Some(Categories::Values(values)) => values,
         Some(Categories::Fractional) => {
-            let what = format!("`{name}` has values that are no integers; choose another scale");
+            let what = format!("`{name}` has values that are not integers; choose another scale");
             return Err(unsupported_scale(what));
         }
         Some(Categories::TooMany) => {

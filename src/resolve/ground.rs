@@ -1,10 +1,11 @@
 //! The ground under the particles.
 
+use crate::math::narrow;
 use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::{ResolveError, narrow, surface};
+use super::{ResolveError, surface};
 use crate::manifest::{GroundKind, GroundPattern, Manifest};
 use crate::pipeline::Setup;
 use crate::render::IntegratorKind;
@@ -113,7 +114,7 @@ pub(super) fn ground(
 }
 
 /// Lays `texture` on the ground of `setup`, if `manifest` says so.
-pub fn add_ground_image(setup: &mut Setup, manifest: &Manifest, texture: &Arc<Texture>) {
+pub(super) fn add_image(setup: &mut Setup, manifest: &Manifest, texture: &Arc<Texture>) {
     let scene = &mut setup.picture.scene;
     let (Some(image), Some(ground)) = (manifest.ground_image(), &mut scene.ground) else {
         return;

@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::{DVec3, Vec2, Vec3};
 use spherule_formats::{PositionSlice, RawParticles};
 
-use super::{SceneImages, question, setup};
+use super::{SceneInputs, question, setup};
 use crate::manifest::Manifest;
 use crate::survey::Survey;
 
@@ -63,7 +63,7 @@ fn is_shown(counts: [u16; 3], order: [usize; 3]) {
     assert!(color.low.abs() <= 0.01 * height, "{name}: {}", color.low);
     assert!((color.high / height - 1.0).abs() <= 0.01, "{name}: {}", color.high);
     // All corners are in the picture
-    let setup = setup(&manifest, &survey, &SceneImages::default()).expect("possible");
+    let setup = setup(&manifest, &survey, SceneInputs::default()).expect("possible");
     let camera = setup.camera_at(0).expect("a camera");
     for corner in 0..8 {
         let corner =

@@ -1,8 +1,9 @@
 //! The light sources of the scene.
 
+use crate::math::narrow;
 use glam::{DVec3, Vec3};
 
-use super::{ResolveError, narrow};
+use super::ResolveError;
 use crate::manifest::{self, LightGroup, LightKind, Manifest};
 use crate::render::IntegratorKind;
 use crate::scene::{self, Light};

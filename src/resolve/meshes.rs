@@ -49,7 +49,7 @@ pub(super) fn materials(manifest: &Manifest) -> Vec<MeshMaterial> {
 
 /// Adds the `meshes` of the manifest, one for each of its entries, to the pictures of `setup`. Lowers an automatic ground
 /// below the cell, and below meshes that are the same in all frames.
-pub fn add_meshes(
+pub(super) fn add(
     setup: &mut Setup,
     manifest: &Manifest,
     survey: &Survey,

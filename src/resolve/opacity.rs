@@ -1,7 +1,8 @@
 //! How much each sphere covers of what is behind it.
 
-use super::{ResolveError, color, narrow};
+use super::{ResolveError, color};
 use crate::manifest::{Manifest, OpacitySetting};
+use crate::math::narrow;
 use crate::pipeline::OpacityRule;
 use crate::surface::SurfaceKind;
 use crate::survey::Survey;

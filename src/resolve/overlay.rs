@@ -192,7 +192,7 @@ fn content(
                 }
                 return Err(ResolveError::Unsupported {
                     key: "overlay.type",
-                    what: "the colours of the particles are no values of a map, so that there is no colour bar; \
+                    what: "the colours of the particles do not follow a colour map, so there is no colour bar; \
                            choose an attribute (--color-by)"
                         .to_owned(),
                 });
@@ -230,7 +230,7 @@ fn content(
 }
 
 /// The colour bar of pictures with the settings of `manifest`: its own, or one with the defaults. None if the colours are
-/// no values of a map.
+/// not those of a colour map.
 ///
 /// # Errors
 /// The settings and the particles do not go together, or the range depends on the camera.

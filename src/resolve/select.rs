@@ -1,6 +1,7 @@
 //! Which particles are drawn.
 
-use super::{ResolveError, color, similar};
+use super::error::similar;
+use super::{ResolveError, color};
 use crate::manifest::Manifest;
 use crate::pipeline::attribute_list;
 use crate::selection::{OTHER_NAMES, Selection};

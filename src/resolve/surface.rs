@@ -1,7 +1,8 @@
 //! Surface and material, with checks for settings that contradict each other.
 
-use super::{ResolveError, narrow};
+use super::ResolveError;
 use crate::manifest::Manifest;
+use crate::math::narrow;
 use crate::scene::{Bounds, Fresnel, Material, material};
 use crate::surface::{NormalKind, SurfaceKind, SurfaceSettings};
 use crate::survey::Survey;

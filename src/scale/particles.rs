@@ -1,5 +1,6 @@
 //! The particles of a cell: the box at any count, or a part of a frame of the user.
 
+use crate::math::narrow;
 use glam::Vec3;
 use spherule_formats::generate::{BoxSettings, fill_box, splitmix64};
 use spherule_formats::sequence::{Sequence, SequenceInput};
@@ -192,11 +193,6 @@ impl FrameSurvey {
             stage,
         })
     }
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "the renderer works in f32")]
-fn narrow(value: f64) -> f32 {
-    value as f32
 }
 
 #[cfg(test)]

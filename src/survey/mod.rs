@@ -4,6 +4,7 @@
 //! It uses percentiles and not extremes, so that a single outlier neither shrinks the picture nor reduces the
 //! contrast of colours. The result is stored with the job, so that all frames, runs and machines use the same values.
 
+use crate::math::narrow;
 use std::collections::BTreeMap;
 
 use glam::DVec3;
@@ -41,7 +42,7 @@ pub use facts::{Category, ELEMENT, Elements, Facts};
 use moments::Moments;
 use outline::Outermost;
 pub use outline::{Fit, Outline};
-use packing::{Spacing, SpacingRequest, narrow};
+use packing::{Spacing, SpacingRequest};
 use robust::{RobustBounds, robust_bounds, robust_largest, sample_of, sorted_sample};
 use sample::FrameSample;
 use standing::standing;

@@ -5,6 +5,8 @@
 //! and the nearest of a dozen neighbours is closer than the average one: the radius would be about a fifth too small,
 //! and the field of such particles would have holes inside the fluid.
 
+use crate::math::narrow;
+
 /// Radius within which neighbours are counted, in median distances to the nearest neighbour. In a fluid it contains
 /// about 30 particles: enough for a density, and few enough not to extend beyond thin sheets.
 const REACH: f32 = 2.5;
@@ -59,11 +61,6 @@ pub(super) fn packed_radius(touching: f32, mut counts: Vec<u32>) -> Option<f32> 
     let spacing = libm::cbrt(volume / f64::from(count));
     let most = MAX * f64::from(touching);
     Some(narrow((0.5 * RATHER_LARGE * spacing).min(most)))
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "radii are f32")]
-pub(super) fn narrow(value: f64) -> f32 {
-    value as f32
 }
 
 #[cfg(test)]

@@ -1,12 +1,13 @@
 //! What a sampled frame takes, from which the memory of other frames is predicted.
 
+use crate::math::narrow;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use spherule_formats::{Positions, Radius, RawParticles, choose_origin, find_radius, is_near};
 
+use super::RadiusQuestion;
 use super::packing::Spacing;
 use super::robust::{median, robust_bounds};
-use super::{RadiusQuestion, narrow};
 use crate::surface::{SurfaceSettings, SurfaceSize};
 
 /// Maximum number of frames whose surface is surveyed.

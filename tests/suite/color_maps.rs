@@ -156,7 +156,7 @@ fn impossible_colours_are_refused() {
         (&["--color-by", "mas"], "did you mean `mass`?"),
         (&["--color-by", "hight"], "did you mean `height`?"),
         (&["--color-by", "velocity.w"], "no attribute `velocity.w`"),
-        (&["--color-by", "mass", "--color-scale", "categorical"], "values that are no integers"),
+        (&["--color-by", "mass", "--color-scale", "categorical"], "values that are not integers"),
         (&["--range", "3", "3"], "two rising numbers"),
         (&["--color-by", "mass", "--color-scale", "log", "--range", "0", "1"], "has no logarithm"),
     ] {

@@ -177,7 +177,7 @@ fn panels_have_letters_and_one_colour_bar() {
     for (jobs, text) in [
         (&["out", "wide"][..], "out and wide have different ranges"),
         (&["out", "other"], "out and other have different titles: speed and x"),
-        (&["out", "red"], "red: the colours of the particles are no values of a map"),
+        (&["out", "red"], "red: the colours of the particles do not follow a colour map"),
         (&["out", "out/f.0001.png"], "pictures from files do not say what their colours mean"),
     ] {
         let arguments = [&["sheet"][..], jobs, &["-o", "bad.png", "--colorbar"]].concat();

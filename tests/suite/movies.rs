@@ -161,7 +161,10 @@ fn bad_requests_are_refused() {
         refuses(workshop.run(&[&["movie", "out"], options].concat()), text);
     };
     movie(&["-o", "a.avi"], "--output a.avi: the name must end in .mp4,");
-    movie(&["-o", "a.gif", "--codec", "h264"], "--codec is for .mp4, .mov, .mkv and .webm");
+    movie(
+        &["-o", "a.gif", "--codec", "h264"],
+        "a codec can be chosen for .mp4, .mov, .mkv and .webm only",
+    );
     movie(
         &["-o", "a.webm", "--codec", "prores"],
         "webm files cannot have the codec prores; choose one of vp9",

@@ -54,9 +54,9 @@ impl PeriodicImages {
             return Ok(());
         }
         let unsupported = |what: &str| ParseError::unsupported(what);
-        let cell = particles.cell.ok_or_else(|| {
-            unsupported("no simulation cell, which cell.replicate and cell.wrap need")
-        })?;
+        let cell = particles
+            .cell
+            .ok_or_else(|| unsupported("no simulation cell, which copies and wrapping need"))?;
         if self.wrap {
             let inverse = inverse(&cell).ok_or_else(|| {
                 unsupported("the simulation cell has no volume, so that nothing can be wrapped")
@@ -80,7 +80,7 @@ impl PeriodicImages {
         let copies = usize::try_from(self.count()).ok();
         let Some(copies) = copies.filter(|copies| *copies as u64 <= most) else {
             let what = format!(
-                "cell.replicate makes {} copies of {count} particles, more than {MAX_PARTICLES} particles",
+                "{} copies of {count} particles are more than {MAX_PARTICLES} particles",
                 self.count()
             );
             return Err(ParseError::unsupported(what));
@@ -326,7 +326,7 @@ mod tests {
         let mut none = one();
         none.cell = None;
         let error = fails(wrap, none, unlimited);
-        assert!(error.contains("no simulation cell, which cell.replicate"), "{error}");
+        assert!(error.contains("no simulation cell, which copies"), "{error}");
         let mut flat = one();
         flat.cell = SimulationCell::new(ORIGIN, [EDGES[0], EDGES[1], DVec3::ZERO], [true; 3]);
         let error = fails(wrap, flat, unlimited);

@@ -83,8 +83,8 @@ pub enum SequenceError {
     Topology(FrameError),
     /// A list names a file outside its directory.
     #[error(
-        "{}: line {line}: `{}` is outside the directory of the list; allow it with --follow-links \
-         (input.follow_links = true), or copy the file there",
+        "{}: line {line}: `{}` is outside the directory of the list; allow such files, or copy the \
+         file there",
         list.display(), escape_controls(file)
     )]
     Outside {

@@ -10,7 +10,7 @@ use serde_json::Value;
 use spherule::conversion::Conversion;
 use spherule::manifest::Manifest;
 use spherule::report::job::JobReport;
-use spherule::resolve::{SceneImages, check_views, setup};
+use spherule::resolve::{SceneInputs, check_views, setup};
 use spherule::survey::Survey;
 use spherule_jobs::{
     ClaimOutcome, FrameRequest, Job, JobRequest, JobState, PLAN_FILE, Plan, ResumeMode,
@@ -123,7 +123,7 @@ fn check_plan(plan: &Plan) {
     let Ok(survey) = serde_json::from_value::<Survey>(plan.resolved().clone()) else {
         return;
     };
-    let _ = setup(&Manifest::new("in"), &survey, &SceneImages::default())
+    let _ = setup(&Manifest::new("in"), &survey, SceneInputs::default())
         .map(|setup| check_views(&setup, numbers).is_ok());
     let _ = Conversion::new(conversion(), &survey);
 }

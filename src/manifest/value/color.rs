@@ -1,11 +1,12 @@
 //! Colours. They are stored as linear RGB, and may be written as sRGB: a name, hexadecimal digits, or 8-bit integers.
 
+use crate::math::narrow;
 use glam::Vec3;
 use serde_json::{Value as Json, json};
 
 use super::color_names::COLOR_NAMES;
 use super::{Fault, FlagKind, Value, list, numbers_schema};
-use crate::manifest::field::{Field, narrow};
+use crate::manifest::field::Field;
 use crate::manifest::key::Key;
 use crate::scene::RgbEncoding;
 

@@ -1,12 +1,13 @@
 //! Numbers, times and vectors.
 
+use crate::math::narrow;
 use std::time::Duration;
 
 use glam::DVec3;
 use serde_json::{Value as Json, json};
 
 use super::{Fault, FlagKind, Value, list};
-use crate::manifest::field::{Field, narrow};
+use crate::manifest::field::Field;
 use crate::manifest::key::Key;
 
 impl Value for u32 {

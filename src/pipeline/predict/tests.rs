@@ -44,7 +44,7 @@ fn setup() -> Setup {
     let selection = manifest.selection();
     let question = crate::resolve::question(&manifest, &selection);
     let survey = crate::survey::Survey::of(&sequence, question).expect("readable");
-    crate::resolve::setup(&manifest, &survey, &crate::resolve::SceneImages::default())
+    crate::resolve::setup(&manifest, &survey, crate::resolve::SceneInputs::default())
         .expect("pictures")
 }
 

@@ -121,7 +121,7 @@ pub(super) fn coordinate(line: Line<'_>, first: usize, end: usize) -> Result<f64
 const ION_NAMES: [(&[u8], &[u8]); 5] =
     [(b"SOD", b"Na"), (b"CLA", b"Cl"), (b"POT", b"K"), (b"CAL", b"Ca"), (b"CES", b"Cs")];
 
-/// The number of sites that are no atoms.
+/// The number of sites that are not atoms.
 const NO_ELEMENT: i64 = 0;
 
 /// Letters in the names of such sites: charges of water models, lone pairs, masses of rigid groups, dummies.

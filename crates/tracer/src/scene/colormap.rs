@@ -3,6 +3,7 @@
 //! The maps of matplotlib and d3 are those of `colorous`, except turbo; those of Fabio Crameri are data.
 
 use glam::Vec3;
+use spherule_tree::math::narrow;
 use thiserror::Error;
 
 mod crameri;
@@ -289,11 +290,6 @@ fn table(name: &str) -> Result<(Table, bool), UnknownColorMap> {
 fn nearest_name(name: &str) -> &'static str {
     let distance = |known: &str| strsim::damerau_levenshtein(known, &name.to_lowercase());
     ColorMap::names().min_by_key(|known| distance(known)).unwrap_or("viridis")
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "colours need no more than f32")]
-fn narrow(value: f64) -> f32 {
-    value as f32
 }
 
 /// Inverse of the sRGB transfer function (IEC 61966-2-1).

@@ -23,6 +23,12 @@ pub type Lanes3 = [Lanes; 3];
 /// An integer per lane.
 pub type Integers = [i32; LANES];
 
+/// `value` in single precision, in which everything is traced.
+#[expect(clippy::cast_possible_truncation, reason = "what is traced is f32")]
+pub const fn narrow(value: f64) -> f32 {
+    value as f32
+}
+
 /// The same number in all lanes.
 pub const fn splat(value: f32) -> Lanes {
     [value; LANES]

@@ -223,7 +223,7 @@ fn files_outside_need_permission() {
     let error = lists.error("run/all.pvd");
     assert!(
         error.starts_with("run/all.pvd: line 4: `../a.csv` is outside")
-            && error.contains("--follow-links"),
+            && error.contains("allow such files"),
         "{error}"
     );
     let settings = SequenceSettings { follow_links: true, ..SequenceSettings::default() };

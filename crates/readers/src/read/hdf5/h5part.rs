@@ -41,7 +41,7 @@ impl StepGroups {
         let node = self
             .root
             .group(name)?
-            .ok_or_else(|| ParseError::malformed(0, format!("/{name} is no group")))?;
+            .ok_or_else(|| ParseError::malformed(0, format!("/{name} is not a group")))?;
         Ok((*number, node))
     }
 }

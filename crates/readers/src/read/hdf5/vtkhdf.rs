@@ -114,9 +114,7 @@ impl VtkHdf {
                 let count = integer(*count).and_then(|count| u64::try_from(count).ok());
                 sum.checked_add(count?)
             })
-            .ok_or_else(|| {
-                ParseError::malformed(0, "/VTKHDF/NumberOfPoints has numbers that are no counts")
-            })?;
+            .ok_or_else(|| ParseError::malformed(0, "/VTKHDF/NumberOfPoints has invalid counts"))?;
         let first = self.offset("PointOffsets", step, budget)?;
         Ok((first.unwrap_or(0), count))
     }

@@ -5,6 +5,7 @@
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
 use super::layer::Layer;
+use super::number_type::Numbers;
 use super::prim::Prim;
 use super::scene::{changes_around, numbers_at, tokens_at};
 use spherule_frame::{MemoryBudget, ParseError};
@@ -115,29 +116,34 @@ fn operation(
         let why = "has no sample at the time of the positions, and rotations are not interpolated";
         return Err(refused(name, why));
     }
+    matrix_of(kind, name, &numbers)
+}
+
+/// The transform of an operation of this kind with these numbers; `name` is its name in messages.
+fn matrix_of(kind: &[u8], name: &[u8], numbers: &Numbers) -> Result<DAffine3, ParseError> {
     let wrong = || refused(name, "has a value of another type");
     let one = || numbers.single::<1>().map(|[number]| number).ok_or_else(wrong);
     let three = || numbers.single::<3>().ok_or_else(wrong);
     let axis = |letter: u8| DVec3::AXES[usize::from(letter - b'X')];
-    Ok(match kind {
-        b"translate" => DAffine3::from_translation(three()?.into()),
-        [b't', b'r', b'a', b'n', b's', b'l', b'a', b't', b'e', letter @ b'X'..=b'Z'] => {
+    // `translateX` has a value for one axis, `rotateXYZ` one for each letter
+    let (kind, letters) = kind.split_at(kind.iter().take_while(|c| c.is_ascii_lowercase()).count());
+    Ok(match (kind, letters) {
+        (b"translate", []) => DAffine3::from_translation(three()?.into()),
+        (b"translate", [letter @ b'X'..=b'Z']) => {
             DAffine3::from_translation(one()? * axis(*letter))
         }
-        b"scale" => DAffine3::from_scale(three()?.into()),
-        [b's', b'c', b'a', b'l', b'e', letter @ b'X'..=b'Z'] => {
+        (b"scale", []) => DAffine3::from_scale(three()?.into()),
+        (b"scale", [letter @ b'X'..=b'Z']) => {
             DAffine3::from_scale(DVec3::ONE + (one()? - 1.0) * axis(*letter))
         }
-        [b'r', b'o', b't', b'a', b't', b'e', letter @ b'X'..=b'Z'] => {
-            DAffine3::from_mat3(rotation(*letter, one()?))
-        }
-        [b'r', b'o', b't', b'a', b't', b'e', letters @ ..] if is_order(letters) => {
+        (b"rotate", [letter @ b'X'..=b'Z']) => DAffine3::from_mat3(rotation(*letter, one()?)),
+        (b"rotate", letters) if is_order(letters) => {
             let angles = three()?;
             let turns =
                 letters.iter().map(|letter| rotation(*letter, angles[usize::from(letter - b'X')]));
             DAffine3::from_mat3(turns.fold(DMat3::IDENTITY, |all, turn| turn * all))
         }
-        b"orient" => {
+        (b"orient", []) => {
             let [w, x, y, z] = numbers.single::<4>().ok_or_else(wrong)?;
             let quaternion = DQuat::from_xyzw(x, y, z, w);
             if quaternion.length() > 0.0 {
@@ -146,7 +152,7 @@ fn operation(
                 DAffine3::IDENTITY
             }
         }
-        b"transform" => {
+        (b"transform", []) => {
             let rows = numbers.single::<16>().ok_or_else(wrong)?;
             if [rows[3], rows[7], rows[11], rows[15]] != [0.0, 0.0, 0.0, 1.0] {
                 return Err(refused(name, "is a projection"));

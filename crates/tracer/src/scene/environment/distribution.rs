@@ -2,6 +2,8 @@
 //! (Pharr, Jakob and Humphreys, "Physically Based Rendering", 4th edition, A.5.6). The search takes the same number of
 //! steps for all numbers, so that loops over lanes vectorise, and is monotone: strata stay together.
 
+use spherule_tree::math::narrow;
+
 /// See the module. `SIDE` is a power of two, and `COUNT` its square: lengths that the compiler knows make it drop the
 /// checks of bounds.
 #[derive(Debug, Clone, PartialEq)]
@@ -68,7 +70,7 @@ fn cumulative(weights: &[f64]) -> Vec<f32> {
         .iter()
         .map(|weight| {
             sum += weight;
-            super::narrow((sum / total).min(1.0))
+            narrow((sum / total).min(1.0))
         })
         .collect();
     if let Some(last) = ends.last_mut() {

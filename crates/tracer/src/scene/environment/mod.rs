@@ -172,8 +172,3 @@ impl Environment {
         self.image.integral(|direction| direction.dot(own).max(0.0))
     }
 }
-
-#[expect(clippy::cast_possible_truncation, reason = "tables are f32")]
-fn narrow(value: f64) -> f32 {
-    value as f32
-}

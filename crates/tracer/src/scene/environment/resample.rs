@@ -5,9 +5,10 @@
 //! to the pole, to a square around the centre or the corners, along which the longitude is linear.
 
 use glam::DVec3;
+use spherule_tree::math::narrow;
 
 use super::image::{EnvironmentImage, edge_cosine};
-use super::{COLUMNS, ROWS, narrow};
+use super::{COLUMNS, ROWS};
 
 /// Radiance times area, and area, in texels.
 #[derive(Debug, Clone, Copy, Default)]

@@ -5,6 +5,7 @@
 //! All functions of a lane are free of calls and branches, and of loops over the components of vectors: compilers
 //! would vectorise those instead of the loops over lanes.
 
+use spherule_tree::math::narrow;
 use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3};
@@ -12,7 +13,7 @@ use glam::{DVec3, Vec3};
 use super::distribution::{Distribution, boxed};
 use super::image::EnvironmentImage;
 use super::octahedral::{sphere_to_square, square_to_sphere};
-use super::{EnvironmentAxes, EnvironmentSample, LUMINANCE, narrow, resample};
+use super::{EnvironmentAxes, EnvironmentSample, LUMINANCE, resample};
 
 /// Least density of a texel, as a fraction of the density of uniform sampling.
 const MIN_DENSITY: f64 = 1e-4;

@@ -1,0 +1,69 @@
+//! What the camera sees, apart from meshes and rods.
+
+use glam::Vec3;
+
+use super::camera::PlacedCamera;
+use super::ground::Floor;
+use super::{Extent, ResolveError, environment, ground, lights, meshes, parts, surface};
+use crate::manifest::Manifest;
+use crate::render::IntegratorKind;
+use crate::scene::{Background, DEFAULT_AMBIENT_LIGHT, RadianceMap, Scene, default_lights};
+use crate::survey::Survey;
+
+/// The scene at the start of the camera path.
+///
+/// # Errors
+/// Light, ground or parts are not possible with the other settings.
+pub(super) fn scene(
+    manifest: &Manifest,
+    survey: &Survey,
+    image: Option<&RadianceMap>,
+    placed: &PlacedCamera,
+    extent: &Extent,
+) -> Result<Scene, ResolveError> {
+    let (up, bounds, view) = (extent.up, &extent.bounds, placed.path.start());
+    let environment = environment::environment(manifest, image, &view, up)?;
+    let mut lights = match (manifest.lights.is_empty(), manifest.integrator()) {
+        (false, _) => lights::lights(manifest, survey.origin, up)?,
+        (true, IntegratorKind::Whitted) => default_lights(bounds, up, &view),
+        // The environment is the light
+        (true, IntegratorKind::Path) => Vec::new(),
+    };
+    lights.extend(environment::sun(manifest, &view, up));
+    let floor = Floor {
+        bounds,
+        reach: extent.reach,
+        up,
+        origin: survey.origin,
+        has_layer: survey.rests_on_floor(up),
+        is_of_earlier_version: survey.standing.is_none(),
+        lowest: survey.lowest,
+    };
+    Ok(Scene {
+        origin: survey.origin,
+        camera: placed.camera,
+        lights,
+        ambient_light: DEFAULT_AMBIENT_LIGHT,
+        material: surface::material(manifest, bounds),
+        parts: parts::parts(manifest, survey)?,
+        background: background(manifest, up.as_vec3()),
+        ground: ground::ground(manifest, &floor)?,
+        wet_ground: ground::wet_ground(manifest, &floor),
+        meshes: meshes::materials(manifest),
+        particles: [bounds.min, bounds.max].map(|corner| (corner - survey.origin).as_vec3()),
+        is_spray_soft: manifest.draws_soft_spray(),
+        environment,
+        is_environment_visible: manifest.environment.visible,
+        environment_group: lights::group_index(manifest, manifest.environment.group.as_ref()),
+        next_frame: None,
+        exposure: None,
+    })
+}
+
+fn background(manifest: &Manifest, up: Vec3) -> Background {
+    match (manifest.render.background, manifest.integrator()) {
+        (Some(background), _) => background.with_up(up),
+        (None, IntegratorKind::Path) => Background::Studio { up },
+        (None, IntegratorKind::Whitted) => Background::default_for(up),
+    }
+}
