@@ -4,7 +4,8 @@
 //! `spherule-formats` turns bytes into frames and knows nothing about rays. `spherule-tracer` turns slices into images
 //! and knows nothing about files. `spherule-jobs` plans, records and resumes work and does not know what the work is.
 //! This crate connects them; none depends on it. Its modules [`accel`], [`math`] and [`ray`] are those of
-//! `spherule-tree`, its modules [`scene`], [`surface`], [`render`] and [`denoise`] those of `spherule-tracer`.
+//! `spherule-tree`, its modules [`scene`], [`surface`], [`render`] and [`denoise`] those of `spherule-tracer`,
+//! and [`hdr`], [`output`], [`overlay`], [`picture`] and `movie` those of `spherule-images`.
 //!
 //! This example renders positions in memory to planes, and to the bytes of an EXR and a PNG, without files:
 //!
@@ -61,15 +62,9 @@ pub mod attributes;
 pub mod cli;
 pub mod conversion;
 pub mod defaults;
-pub mod hdr;
 pub mod job;
 pub mod manifest;
 pub mod metrics;
-#[cfg(feature = "movies")]
-pub mod movie;
-pub mod output;
-pub mod overlay;
-pub mod picture;
 pub mod pipeline;
 pub mod prelude;
 pub mod reading;
@@ -83,5 +78,8 @@ pub mod survey;
 #[cfg(feature = "reports")]
 pub mod viewer;
 
+#[cfg(feature = "movies")]
+pub use spherule_images::movie;
+pub use spherule_images::{hdr, output, overlay, picture};
 pub use spherule_tracer::{denoise, render, scene, surface};
 pub use spherule_tree::{accel, math, ray};

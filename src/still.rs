@@ -9,7 +9,7 @@ use spherule_jobs::{Panic, catch_panic};
 use crate::defaults::{Files, rules};
 use crate::job::{RunError, SceneFiles};
 use crate::manifest::{Manifest, ManifestError, ManifestSource, Override};
-use crate::output::OutputError;
+use crate::output::{OutputError, SrgbPixels};
 use crate::pipeline::{ImageError, ImageTask, Setup, TracedFrame, trace_particles};
 use crate::render::{Film, RenderError, Stop};
 use crate::resolve::{ResolveError, question};
@@ -134,15 +134,6 @@ pub struct StillImage {
     notes: Vec<String>,
 }
 
-/// Pixels in 8-bit sRGB, row by row from the top left.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct SrgbPixels {
-    /// Bytes of each pixel: 3 for red, green and blue, 4 with alpha.
-    pub channels: usize,
-    /// The bytes of all pixels.
-    pub bytes: Vec<u8>,
-}
-
 /// Renders `particles`, on the threads of the current pool. Positions that are in single precision, near zero and
 /// finite are not copied; the tree takes 18 bytes per particle for 1e7 of them, and more for fewer.
 ///
@@ -252,7 +243,6 @@ impl StillImage {
     /// The encoder fails.
     pub fn to_srgb(&self) -> Result<SrgbPixels, OutputError> {
         // Whatever viewers of the file show
-        let image = image::load_from_memory(&self.to_png()?).map_err(OutputError::Png)?;
-        Ok(SrgbPixels { channels: image.color().channel_count().into(), bytes: image.into_bytes() })
+        SrgbPixels::decode(&self.to_png()?)
     }
 }

@@ -9,7 +9,7 @@ use crate::manifest::{ManifestSource, Override};
 use crate::overlay::ColorBar;
 use crate::resolve::color_bar_of;
 
-/// The colour bar of the pictures of a job, or None if their colours are no values of a map. No other file is read.
+/// The colour bar of the pictures of a job, or None if their colours are not those of a colour map. No other file is read.
 ///
 /// # Errors
 /// The plan has no valid survey, or the range of the colours depends on the camera.

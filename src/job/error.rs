@@ -8,11 +8,10 @@ use spherule_formats::sequence::SequenceError;
 use spherule_jobs::{FileError, FrameRange, JobError};
 
 use crate::conversion::UnknownAttribute;
-use crate::hdr::HdrError;
 use crate::manifest::{ManifestError, RebaseError};
-use crate::picture::PictureError;
 use crate::pipeline::{MemoryLimitError, MeshLoadError};
 use crate::resolve::ResolveError;
+use spherule_images::file::ImageReadError;
 
 /// Why a job cannot start or continue. Messages say what is wrong. Remedies that depend on a command line are the
 /// caller's.
@@ -35,17 +34,17 @@ pub enum RunError {
     Resolve(#[from] ResolveError),
     /// The image of the environment cannot be read.
     #[error("environment.image: {0}")]
-    Environment(#[from] HdrError),
+    Environment(#[from] ImageReadError),
     /// The picture on the ground cannot be read.
     #[error("render.ground.image: {0}")]
-    GroundImage(HdrError),
+    GroundImage(ImageReadError),
     /// A picture among the overlays cannot be read.
     #[error("overlay.{index}.path: {source}")]
     OverlayImage {
         /// The index of the overlay in the manifest.
         index: usize,
         /// Why.
-        source: PictureError,
+        source: ImageReadError,
     },
     /// A mesh cannot be read.
     #[error("mesh.{index}.path: {source}")]

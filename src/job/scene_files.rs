@@ -6,17 +6,15 @@ use std::sync::{Arc, OnceLock};
 
 use super::RunError;
 use super::meshes::{self, JobMeshes, identity};
-use crate::hdr::{HdrError, read_radiance_map, read_texture};
+use crate::hdr::{read_radiance_map, read_texture};
 use crate::manifest::{GROUND_IMAGE, Manifest, OverlayKind, named_place};
 use crate::overlay::RgbaPixels;
-use crate::picture::{PictureError, read_rgba};
+use crate::picture::read_rgba;
 use crate::pipeline::Setup;
-use crate::resolve::{
-    self, SceneImages, add_ground_image, add_meshes, check_views, needs_environment_image,
-    with_framed_meshes,
-};
+use crate::resolve::{self, SceneInputs, check_views, needs_environment_image};
 use crate::scene::{RadianceMap, Texture};
 use crate::survey::Survey;
+use spherule_images::file::ImageReadError;
 
 /// See the module. One value belongs to one manifest, whose paths are relative to `dir`.
 #[derive(Debug, Clone)]
@@ -53,17 +51,13 @@ impl SceneFiles {
         survey: &Survey,
         frames: impl Iterator<Item = i64>,
     ) -> Result<Setup, RunError> {
-        let images = SceneImages {
+        let inputs = SceneInputs {
             environment: self.environment_image(manifest)?,
             overlays: self.overlay_images(manifest)?,
+            ground: self.ground_image(manifest)?,
+            meshes: self.meshes.get(manifest, &self.dir, survey)?,
         };
-        let meshes = self.meshes.get(manifest, &self.dir, survey)?;
-        let survey = with_framed_meshes(survey, manifest, &meshes);
-        let mut setup = resolve::setup(manifest, &survey, &images)?;
-        if let Some(texture) = self.ground_image(manifest)? {
-            add_ground_image(&mut setup, manifest, texture);
-        }
-        add_meshes(&mut setup, manifest, &survey, meshes);
+        let setup = resolve::setup(manifest, survey, inputs)?;
         check_views(&setup, frames)?;
         Ok(setup)
     }
@@ -94,19 +88,19 @@ impl SceneFiles {
     ) -> Result<Vec<(String, String)>, RunError> {
         let mut identities = meshes::identities(manifest, &self.dir)?;
         if let Some(path) = environment_path(manifest, &self.dir) {
-            let found = identity(&path).map_err(|source| HdrError::Io { path, source })?;
+            let found = identity(&path).map_err(|source| ImageReadError::Io { path, source })?;
             identities.push(("environment.image".to_owned(), found));
         }
         if let Some(path) = ground_path(manifest, &self.dir) {
             let found = identity(&path);
-            let found =
-                found.map_err(|source| RunError::GroundImage(HdrError::Io { path, source }))?;
+            let found = found
+                .map_err(|source| RunError::GroundImage(ImageReadError::Io { path, source }))?;
             identities.push((GROUND_IMAGE.to_owned(), found));
         }
         for (index, path) in overlay_paths(manifest, &self.dir) {
             let found = identity(&path).map_err(|source| RunError::OverlayImage {
                 index,
-                source: PictureError::Io { path, source },
+                source: ImageReadError::Io { path, source },
             })?;
             identities.push((format!("overlay.{index}.path"), found));
         }

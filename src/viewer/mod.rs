@@ -12,9 +12,10 @@ use serde_json::{Value, json};
 use thiserror::Error;
 
 use crate::output::data_url;
-use crate::picture::{MARKER, Picture, PictureError, SampledPlanes, read_planes};
+use crate::picture::{MARKER, Picture, SampledPlanes, read_planes};
 use crate::report::page::Page;
 use crate::report::plots::Plot;
+use spherule_images::file::ImageReadError;
 
 mod channels;
 mod ids;
@@ -94,7 +95,7 @@ pub enum ViewerError {
     Empty,
     /// A picture cannot be read.
     #[error(transparent)]
-    Picture(#[from] PictureError),
+    Picture(#[from] ImageReadError),
     /// The pictures are too large for one page.
     #[error("the pictures have more than {} MiB, too much for one page; choose a smaller width, fewer frames, or \
         link them", MAX_EMBEDDED >> 20)]
@@ -168,7 +169,7 @@ fn source(
     let is_png = frame.picture.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"));
     if is_png && settings.width.is_none() {
         let bytes = fs::read(&frame.picture)
-            .map_err(|source| PictureError::Io { path: frame.picture.clone(), source })?;
+            .map_err(|source| ImageReadError::Io { path: frame.picture.clone(), source })?;
         return Ok(data_url(&bytes));
     }
     let picture = Picture::read(&frame.picture, settings.exposure)?;
@@ -277,7 +278,7 @@ fn planes(
     frame: &ViewerFrame,
     settings: &ViewerSettings,
     width: usize,
-) -> Result<SampledPlanes, PictureError> {
+) -> Result<SampledPlanes, ImageReadError> {
     let attributes = settings.attributes.clone();
     let is_wanted = move |name: &str| {
         let base = name.split_once('.').map_or(name, |(base, _)| base);

@@ -11,8 +11,13 @@ const METHODS: [&str; 24] = [
 ];
 
 /// The rooms that decide pixels.
-const ROOMS: [&str; 5] =
-    ["crates/tree/src", "crates/tracer/src", "src/output", "src/survey", "src/resolve"];
+const ROOMS: [&str; 5] = [
+    "crates/tree/src",
+    "crates/tracer/src",
+    "crates/images/src/output",
+    "src/survey",
+    "src/resolve",
+];
 
 fn rust_files(path: &Path, found: &mut Vec<PathBuf>) {
     if path.is_dir() {

@@ -10,7 +10,7 @@ use super::root;
 use super::source::{ModulePath, code, files};
 
 /// Directories of crates, and how many files they have at least.
-const SOURCES: [(&str, usize); 8] = [
+const SOURCES: [(&str, usize); 9] = [
     ("src", 100),
     ("jobs/src", 30),
     ("formats/src", 30),
@@ -19,6 +19,7 @@ const SOURCES: [(&str, usize); 8] = [
     ("crates/readers/src", 100),
     ("crates/tree/src", 50),
     ("crates/tracer/src", 100),
+    ("crates/images/src", 40),
 ];
 
 /// The modules of a crate.

@@ -3,17 +3,15 @@
 //!
 //! Sizes are checked before memory for pixels is allocated. The content decides on the format, not the name.
 
-use std::fs::File;
-use std::io::{self, BufReader, Read, Seek, SeekFrom};
-use std::path::{Path, PathBuf};
+use std::io::{BufRead, Seek};
+use std::path::Path;
 
 use glam::Vec3;
-use thiserror::Error;
 
+use crate::file::{Fault, ImageFormat, ImageReadError, read};
 use crate::scene::environment::MapError;
 use crate::scene::texture::TextureError;
 use crate::scene::{RadianceMap, Texture};
-use spherule_jobs::{Panic, catch_panic};
 
 mod openexr;
 mod png;
@@ -21,47 +19,16 @@ mod radiance;
 #[cfg(test)]
 mod tests;
 
-/// First bytes of OpenEXR files.
-const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
-
-/// First bytes of Radiance files.
-const RADIANCE_MAGIC: [u8; 2] = *b"#?";
-
-/// First bytes of PNG files.
-const PNG_MAGIC: [u8; 4] = *b"\x89PNG";
-
-/// Reasons why a file is not an image that can be used.
-#[derive(Debug, Error)]
-pub enum HdrError {
-    /// It cannot be read.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// The error of the system.
-        source: io::Error,
-    },
-    /// It is no image that can be used.
-    #[error("{}: {what}", path.display())]
-    Unusable {
-        /// The file.
-        path: PathBuf,
-        /// The reason, and the remedy.
-        what: String,
-    },
+impl From<MapError> for Fault {
+    fn from(error: MapError) -> Self {
+        Self::Other(error.to_string())
+    }
 }
 
-/// Reasons without the name of the file.
-#[derive(Debug, Error)]
-enum Fault {
-    #[error(transparent)]
-    Io(#[from] io::Error),
-    #[error(transparent)]
-    Map(#[from] MapError),
-    #[error(transparent)]
-    Texture(#[from] TextureError),
-    #[error("{0}")]
-    Other(String),
+impl From<TextureError> for Fault {
+    fn from(error: TextureError) -> Self {
+        Self::Other(error.to_string())
+    }
 }
 
 /// Decoded pixels, row by row from the top, linear RGB.
@@ -77,8 +44,8 @@ type Check = fn(usize, usize) -> Result<(), Fault>;
 /// Reads the equirectangular image at `path`.
 ///
 /// # Errors
-/// See [`HdrError`]; messages begin with the path.
-pub fn read_radiance_map(path: &Path) -> Result<RadianceMap, HdrError> {
+/// See [`ImageReadError`]; messages begin with the path.
+pub fn read_radiance_map(path: &Path) -> Result<RadianceMap, ImageReadError> {
     read(path, |file| {
         let image =
             decode_radiance(file, |width, height| Ok(RadianceMap::check_size(width, height)?))?;
@@ -89,53 +56,24 @@ pub fn read_radiance_map(path: &Path) -> Result<RadianceMap, HdrError> {
 /// Reads the picture at `path`, for base colours. Transparent pixels of a PNG file show the colour `behind`.
 ///
 /// # Errors
-/// See [`HdrError`]; messages begin with the path.
-pub fn read_texture(path: &Path, behind: Vec3) -> Result<Texture, HdrError> {
+/// See [`ImageReadError`]; messages begin with the path.
+pub fn read_texture(path: &Path, behind: Vec3) -> Result<Texture, ImageReadError> {
     read(path, |mut file| {
         let check = |width, height| Ok(Texture::check_size(width, height)?);
-        let image = if first_bytes(&mut file)?[..] == PNG_MAGIC {
-            png::decode(file, check, behind)?
-        } else {
-            decode_radiance(file, check)?
+        let image = match ImageFormat::of(&mut file)? {
+            ImageFormat::Png => png::decode(file, check, behind)?,
+            _ => decode_radiance(file, check)?,
         };
         Ok(Texture::new(image.width, image.height, &image.pixels)?)
     })
 }
 
-/// Reads the image at `path` by `decode`.
-fn read<T>(
-    path: &Path,
-    decode: impl FnOnce(BufReader<File>) -> Result<T, Fault> + std::panic::UnwindSafe,
-) -> Result<T, HdrError> {
-    let unusable = |what: String| HdrError::Unusable { path: path.to_owned(), what };
-    let file = spherule_jobs::open_regular(path)
-        .map_err(|source| HdrError::Io { path: path.to_owned(), source })?;
-    // Decoders of files from elsewhere may panic
-    match catch_panic(|| Ok::<_, Panic>(decode(BufReader::new(file.0)))) {
-        Ok(Ok(image)) => Ok(image),
-        Ok(Err(Fault::Io(source))) => Err(HdrError::Io { path: path.to_owned(), source }),
-        Ok(Err(fault)) => Err(unusable(fault.to_string())),
-        Err(_) => Err(unusable("the image is damaged".to_owned())),
-    }
-}
-
-/// The first four bytes, or fewer.
-fn first_bytes(file: &mut BufReader<File>) -> Result<Vec<u8>, Fault> {
-    let mut start = Vec::new();
-    file.by_ref().take(4).read_to_end(&mut start)?;
-    file.seek(SeekFrom::Start(0))?;
-    Ok(start)
-}
-
-fn decode_radiance(mut file: BufReader<File>, check: Check) -> Result<Pixels, Fault> {
-    let start = first_bytes(&mut file)?;
-    if start == EXR_MAGIC {
-        openexr::decode(file, check)
-    } else if start.starts_with(&RADIANCE_MAGIC) {
-        radiance::decode(file, check)
-    } else {
-        Err(Fault::Other(
+fn decode_radiance(mut file: impl BufRead + Seek, check: Check) -> Result<Pixels, Fault> {
+    match ImageFormat::of(&mut file)? {
+        ImageFormat::OpenExr => openexr::decode(file, check),
+        ImageFormat::Radiance => radiance::decode(file, check),
+        ImageFormat::Png | ImageFormat::Other => Err(Fault::Other(
             "is neither an OpenEXR nor a Radiance HDR image; convert it to one of them".to_owned(),
-        ))
+        )),
     }
 }

@@ -8,22 +8,14 @@ use exr::meta::attribute::{ChannelDescription, SampleType};
 use exr::meta::header::Header;
 use glam::Vec3;
 
-use super::{Check, Fault, Pixels};
+use super::{Check, Pixels};
+use crate::file::Fault;
 
 /// Maximum size of an uncompressed block, bytes.
 const MAX_BLOCK_BYTES: u64 = 1 << 28;
 
 /// Names of the components.
 const COMPONENTS: [&str; 3] = ["R", "G", "B"];
-
-impl From<exr::error::Error> for Fault {
-    fn from(error: exr::error::Error) -> Self {
-        match error {
-            exr::error::Error::Io(error) => Self::Io(error),
-            other => Self::Other(format!("cannot be decoded: {other}")),
-        }
-    }
-}
 
 /// Decodes the first part of a file with the channels R, G and B, in full resolution.
 pub(super) fn decode(file: impl Read + Seek, check_size: Check) -> Result<Pixels, Fault> {

@@ -6,7 +6,8 @@ use glam::Vec3;
 use image::codecs::hdr::HdrDecoder;
 use image::{ImageDecoder, ImageError};
 
-use super::{Check, Fault, Pixels};
+use super::{Check, Pixels};
+use crate::file::Fault;
 
 impl From<ImageError> for Fault {
     fn from(error: ImageError) -> Self {

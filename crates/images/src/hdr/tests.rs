@@ -104,8 +104,8 @@ fn bad_images_are_refused_by_name_and_reason() {
         std::fs::write(&path, bytes).unwrap();
         path
     };
-    assert!(matches!(read_radiance_map(&dir.path().join("none")), Err(HdrError::Io { .. })));
-    assert!(matches!(read_radiance_map(dir.path()), Err(HdrError::Io { .. })));
+    assert!(matches!(read_radiance_map(&dir.path().join("none")), Err(ImageReadError::Io { .. })));
+    assert!(matches!(read_radiance_map(dir.path()), Err(ImageReadError::Io { .. })));
     assert!(message(&at("a.hdr", b"")).contains("neither an OpenEXR nor"));
     assert!(message(&at("b.hdr", b"\x89PNG\r\n\x1a\n")).contains("convert it"));
     assert!(message(&at("c.hdr", &radiance_bytes(12, 11))).contains("twice as wide"));

@@ -10,7 +10,7 @@ use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use spherule_jobs::Publisher;
+use spherule_files::Publisher;
 
 use super::{Codec, Container, MovieError, MovieFormat, MovieSource, Observer, quoted, shell_line};
 use crate::picture::{EXR_EXTENSION, MARKER};

@@ -55,7 +55,7 @@ pub enum FormatError {
         possible: String,
     },
     /// The format needs no codec.
-    #[error("--codec is for .mp4, .mov, .mkv and .webm")]
+    #[error("a codec can be chosen for .mp4, .mov, .mkv and .webm only")]
     NoCodec,
 }
 

@@ -8,10 +8,11 @@ use std::ffi::OsString;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use spherule_jobs::Publisher;
+use spherule_files::Publisher;
 use thiserror::Error;
 
-use crate::picture::{Picture, PictureError};
+use crate::file::ImageReadError;
+use crate::picture::Picture;
 
 mod apng;
 mod codec;
@@ -57,7 +58,7 @@ pub enum MovieError {
     Empty,
     /// A picture cannot be read.
     #[error(transparent)]
-    Picture(#[from] PictureError),
+    Picture(#[from] ImageReadError),
     /// A picture has another size than the first.
     #[error("{}: has {}x{} pixels, but the first picture has {}x{}", path.display(), found[0], found[1],
         expected[0], expected[1])]
@@ -70,7 +71,7 @@ pub enum MovieError {
         expected: [usize; 2],
     },
     /// The format cannot have pictures of this size.
-    #[error("{format} cannot have {}x{} pixels; choose another --width or format", size[0], size[1])]
+    #[error("{format} cannot have {}x{} pixels; choose another width or format", size[0], size[1])]
     TooLarge {
         /// The format.
         format: &'static str,
@@ -79,8 +80,8 @@ pub enum MovieError {
     },
     /// The colour bar needs more than half of a sheet.
     #[error(
-        "a sheet of {width} pixels has no room for the colour bar beside its pictures; make it wider (--width), or put \
-         the bar below (--colorbar below)"
+        "a sheet of {width} pixels has no room for the colour bar beside its pictures; make it wider, or put \
+         the bar below"
     )]
     NoRoom {
         /// Width of the sheet, pixels.

@@ -71,7 +71,7 @@ pub fn write_sheet(
         SheetFormat::Pdf => sheet.figure(settings.dpi).to_pdf(),
         SheetFormat::Svg => sheet.figure(settings.dpi).to_svg(),
     };
-    spherule_jobs::publish(file, &bytes.map_err(io)?).map_err(io)?;
+    spherule_files::publish(file, &bytes.map_err(io)?).map_err(io)?;
     let size = sheet.page.size.map(|side| side as usize);
     Ok(FinishedSheet { size, layout: sheet.layout, narrower: sheet.narrower })
 }

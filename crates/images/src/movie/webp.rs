@@ -91,7 +91,7 @@ fn write_frame(
 fn finish(file: &mut (impl Write + Seek)) -> io::Result<()> {
     write_chunk(file, MARKER_CHUNK, MARKER.as_bytes())?;
     let length = file.stream_position()?;
-    let too_long = |_| io::Error::other("WebP files have at most 4 GiB; choose a smaller --width");
+    let too_long = |_| io::Error::other("WebP files have at most 4 GiB; choose a smaller width");
     let riff = u32::try_from(length - 8).map_err(too_long)?;
     file.seek(SeekFrom::Start(4))?;
     file.write_all(&riff.to_le_bytes())?;

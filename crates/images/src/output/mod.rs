@@ -7,6 +7,7 @@ mod exr;
 mod figure;
 mod format;
 mod preview;
+mod srgb;
 mod verify;
 pub mod view;
 
@@ -19,4 +20,5 @@ pub use exr::{
 pub use figure::{Figure, FigurePicture};
 pub use format::{PictureFormat, encode_figure, encode_picture};
 pub use preview::{PreviewBackground, PreviewOptions, PreviewPage, encode_preview, picture_bytes};
+pub use srgb::SrgbPixels;
 pub use verify::{ImageFault, ImageShape, verify_exr, verify_preview};

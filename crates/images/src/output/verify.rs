@@ -31,7 +31,7 @@ pub struct ImageShape {
     pub attributes: Vec<String>,
     /// Names of the light groups with layers.
     pub light_groups: Vec<String>,
-    /// Whether channels that are no colours are in a part of their own.
+    /// Whether data channels are in a part of their own.
     pub has_data_part: bool,
     /// Whether the image may be smaller than its preview, which has overlays beside it.
     pub is_on_page: bool,

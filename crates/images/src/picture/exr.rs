@@ -10,7 +10,8 @@ use exr::meta::attribute::{ChannelDescription, SampleType};
 use exr::meta::header::Header;
 use glam::Vec3;
 
-use super::{Fault, Picture, PictureError, check_size, read};
+use super::{Picture, check_size};
+use crate::file::{Fault, ImageReadError, read};
 use crate::math::functions::exp2;
 use crate::output::view::{byte_from_linear, dither_threshold, view_transform};
 
@@ -66,25 +67,16 @@ impl SampledPlanes {
     }
 }
 
-impl From<exr::error::Error> for Fault {
-    fn from(error: exr::error::Error) -> Self {
-        match error {
-            exr::error::Error::Io(error) => Self::Io(error),
-            other => Self::Other(format!("cannot be decoded: {other}")),
-        }
-    }
-}
-
 /// Reads those planes of the image at `path` that `is_wanted` selects by their name, with the smallest step that
 /// gives at most `max_width` samples in a row.
 ///
 /// # Errors
-/// See [`PictureError`]; messages begin with the path.
+/// See [`ImageReadError`]; messages begin with the path.
 pub fn read_planes(
     path: &Path,
     is_wanted: impl Fn(&str) -> bool + std::panic::UnwindSafe,
     max_width: usize,
-) -> Result<SampledPlanes, PictureError> {
+) -> Result<SampledPlanes, ImageReadError> {
     read(path, |file| decode(file, is_wanted, |width| width.div_ceil(max_width.max(1))))
 }
 

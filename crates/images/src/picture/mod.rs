@@ -3,12 +3,10 @@
 //!
 //! Sizes are checked before memory for pixels is allocated. `hdr` reads images that light a scene or lie in it.
 
-use std::fs::File;
-use std::io::{self, BufReader};
-use std::path::{Path, PathBuf};
+use std::io;
+use std::path::Path;
 
-use spherule_jobs::{Panic, catch_panic};
-use thiserror::Error;
+use crate::file::{Fault, ImageFormat, ImageReadError, read};
 
 mod exr;
 mod origin;
@@ -32,36 +30,6 @@ pub struct Picture {
     rgb: Vec<u8>,
 }
 
-/// Reasons why a file cannot be used as a picture.
-#[derive(Debug, Error)]
-pub enum PictureError {
-    /// It cannot be read.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// The error of the system.
-        source: io::Error,
-    },
-    /// It is damaged, or of a kind that cannot be used.
-    #[error("{}: {what}", path.display())]
-    Unusable {
-        /// The file.
-        path: PathBuf,
-        /// The reason, with the remedy if there is one.
-        what: String,
-    },
-}
-
-/// Reasons without the name of the file.
-#[derive(Debug, Error)]
-enum Fault {
-    #[error(transparent)]
-    Io(#[from] io::Error),
-    #[error("{0}")]
-    Other(String),
-}
-
 impl Picture {
     /// A picture of these bytes: three for each pixel.
     ///
@@ -80,12 +48,12 @@ impl Picture {
     /// Reads the picture at `path`: a PNG file, or the colours of an OpenEXR image, with this exposure in stops.
     ///
     /// # Errors
-    /// See [`PictureError`]; messages begin with the path.
-    pub fn read(path: &Path, exposure: f32) -> Result<Self, PictureError> {
-        read(
-            path,
-            |file| if is_exr(path) { exr::picture(file, exposure) } else { png::picture(file) },
-        )
+    /// See [`ImageReadError`]; messages begin with the path.
+    pub fn read(path: &Path, exposure: f32) -> Result<Self, ImageReadError> {
+        read(path, |mut file| match ImageFormat::of(&mut file)? {
+            ImageFormat::OpenExr => exr::picture(file, exposure),
+            _ => png::picture(file),
+        })
     }
 
     /// Width in pixels.
@@ -166,11 +134,6 @@ impl Picture {
     }
 }
 
-/// Whether the name is that of an OpenEXR image.
-fn is_exr(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(EXR_EXTENSION))
-}
-
 /// Checks a size before memory for its pixels is allocated.
 fn check_size(width: usize, height: usize) -> Result<(), Fault> {
     let pixels = width.checked_mul(height);
@@ -187,34 +150,20 @@ fn check_size(width: usize, height: usize) -> Result<(), Fault> {
 /// not multiplied by alpha.
 ///
 /// # Errors
-/// See [`PictureError`]; messages begin with the path.
-pub fn read_rgba(path: &Path) -> Result<(usize, Vec<[u8; 4]>), PictureError> {
+/// See [`ImageReadError`]; messages begin with the path.
+pub fn read_rgba(path: &Path) -> Result<(usize, Vec<[u8; 4]>), ImageReadError> {
     read(path, png::rgba)
 }
 
 /// The number of pixels per inch on paper that the PNG file at `path` stores; None for other files.
 ///
 /// # Errors
-/// See [`PictureError`]; messages begin with the path.
-pub fn read_dpi(path: &Path) -> Result<Option<u32>, PictureError> {
-    read(path, |file| if is_exr(path) { Ok(None) } else { png::dpi(file) })
-}
-
-/// Reads the file at `path` by `decode`.
-fn read<T>(
-    path: &Path,
-    decode: impl FnOnce(BufReader<File>) -> Result<T, Fault> + std::panic::UnwindSafe,
-) -> Result<T, PictureError> {
-    let io = |source| PictureError::Io { path: path.to_owned(), source };
-    let unusable = |what: String| PictureError::Unusable { path: path.to_owned(), what };
-    let (file, _) = spherule_jobs::open_regular(path).map_err(io)?;
-    // Decoders of damaged files may panic
-    match catch_panic(|| Ok::<_, Panic>(decode(BufReader::new(file)))) {
-        Ok(Ok(read)) => Ok(read),
-        Ok(Err(Fault::Io(source))) => Err(io(source)),
-        Ok(Err(Fault::Other(what))) => Err(unusable(what)),
-        Err(_) => Err(unusable("the image is damaged".to_owned())),
-    }
+/// See [`ImageReadError`]; messages begin with the path.
+pub fn read_dpi(path: &Path) -> Result<Option<u32>, ImageReadError> {
+    read(path, |mut file| match ImageFormat::of(&mut file)? {
+        ImageFormat::OpenExr => Ok(None),
+        _ => png::dpi(file),
+    })
 }
 
 #[cfg(test)]
@@ -255,7 +204,7 @@ mod tests {
             assert!(error.contains(name), "{error}");
         }
         let error = Picture::read(&dir.path().join("none.png"), 0.0).unwrap_err();
-        assert!(matches!(error, PictureError::Io { .. }), "{error}");
+        assert!(matches!(error, ImageReadError::Io { .. }), "{error}");
     }
 
     #[test]

@@ -18,7 +18,7 @@ pub fn is_own_file(path: &Path) -> bool {
 }
 
 fn find_marker(path: &Path) -> io::Result<bool> {
-    let (mut file, metadata) = spherule_jobs::open_regular(path)?;
+    let (mut file, metadata) = spherule_files::open_regular(path)?;
     let mut has_marker = |from: u64, length: u64| {
         let mut bytes = Vec::new();
         file.seek(SeekFrom::Start(from))?;

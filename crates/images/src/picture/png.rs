@@ -2,24 +2,11 @@
 
 use std::io::{self, Read};
 
-use png::{
-    BitDepth, ColorType, Compression, DecodingError, Encoder, Limits, PixelDimensions,
-    Transformations, Unit,
-};
+use png::{BitDepth, ColorType, Compression, Encoder, PixelDimensions, Unit};
 
-use super::{Fault, Picture, check_size};
-
-/// Maximum memory of the decoder for chunks other than pixels, bytes.
-const MAX_CHUNKS: usize = 64 << 20;
-
-impl From<DecodingError> for Fault {
-    fn from(error: DecodingError) -> Self {
-        match error {
-            DecodingError::IoError(error) => Self::Io(error),
-            other => Self::Other(format!("cannot be decoded: {other}")),
-        }
-    }
-}
+use super::{Picture, check_size};
+use crate::file::Fault;
+use crate::file::png::{PngSamples, decoder};
 
 /// Decodes a file. Transparent pixels show white.
 pub(super) fn picture(file: impl Read) -> Result<Picture, Fault> {
@@ -30,33 +17,15 @@ pub(super) fn picture(file: impl Read) -> Result<Picture, Fault> {
 
 /// Decodes a file: the width, and the pixels, whose colours are not multiplied by alpha.
 pub(super) fn rgba(file: impl Read) -> Result<(usize, Vec<[u8; 4]>), Fault> {
-    let mut decoder = png::Decoder::new_with_limits(file, Limits { bytes: MAX_CHUNKS });
-    decoder.set_transformations(Transformations::EXPAND | Transformations::STRIP_16);
-    let mut reader = decoder.read_info()?;
-    let (width, height) = (reader.info().width as usize, reader.info().height as usize);
-    check_size(width, height)?;
-    let mut bytes = vec![0; reader.output_buffer_size()];
-    let frame = reader.next_frame(&mut bytes)?;
-    bytes.truncate(frame.buffer_size());
-    let pixels = match frame.color_type {
-        ColorType::Rgb => pixels_of(&bytes, |&[r, g, b]| [r, g, b, 255]),
-        ColorType::Rgba => bytes.as_chunks().0.to_vec(),
-        ColorType::Grayscale => pixels_of(&bytes, |&[v]| [v, v, v, 255]),
-        ColorType::GrayscaleAlpha => pixels_of(&bytes, |&[v, a]| [v, v, v, a]),
-        ColorType::Indexed => {
-            return Err(Fault::Other("has colours that cannot be expanded".into()));
-        }
-    };
-    if pixels.len() != width * height {
-        return Err(Fault::Other("has not all of its pixels".to_owned()));
-    }
-    Ok((width, pixels))
+    let samples = PngSamples::decode(file, check_size)?;
+    let byte =
+        |code: u16| if samples.is_deep { code.to_be_bytes()[0] } else { code.to_be_bytes()[1] };
+    Ok((samples.width, samples.rgba().map(|pixel| pixel.map(byte)).collect()))
 }
 
 /// Pixels per inch on paper, if a file says so for both sides alike.
 pub(super) fn dpi(file: impl Read) -> Result<Option<u32>, Fault> {
-    let decoder = png::Decoder::new_with_limits(file, Limits { bytes: MAX_CHUNKS });
-    let reader = decoder.read_info()?;
+    let reader = decoder(file).read_info()?;
     let stored = reader.info().pixel_dims.filter(|d| d.unit == Unit::Meter && d.xppu == d.yppu);
     #[expect(
         clippy::cast_possible_truncation,
@@ -70,10 +39,6 @@ pub(super) fn dpi(file: impl Read) -> Result<Option<u32>, Fault> {
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "positive; saturates")]
 fn per_metre(dpi: u32) -> u32 {
     (f64::from(dpi) / 0.0254).round() as u32
-}
-
-fn pixels_of<const N: usize>(bytes: &[u8], rgba: impl Fn(&[u8; N]) -> [u8; 4]) -> Vec<[u8; 4]> {
-    bytes.as_chunks::<N>().0.iter().map(rgba).collect()
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "at most 255")]

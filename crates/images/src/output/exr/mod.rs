@@ -71,7 +71,7 @@ pub struct TextAttribute {
 pub struct ExrOptions {
     /// Compression of all channels, or of colours.
     pub compression: Compression,
-    /// Compression of channels that are no colours. If it is another one, they are in a part of their own.
+    /// Compression of data channels. If it is another one, they are in a part of their own.
     pub data_compression: Option<Compression>,
     /// Data window and display window; by default both are the size of the film.
     pub window: Option<DataWindow>,
