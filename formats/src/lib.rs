@@ -51,7 +51,7 @@ pub use spherule_files::{ValueError, escape_controls, is_control};
 pub use spherule_frame::{
     Attribute, AttributeData, Bond, Endian, FARTHEST, FrameError, MemoryBudget, ParseError,
     ParticleFrame, PeriodicImages, PositionSlice, Positions, Radius, RawParticles, ScalarType,
-    SimulationCell, choose_origin, find_radius, generate, is_near, is_radius, names,
+    SimulationCell, choose_origin, find_radius, generate, is_near, is_radius, join, names,
     sample_indices,
 };
 pub use spherule_readers::{Format, mesh, read, read::element_symbol};
