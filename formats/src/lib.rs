@@ -52,7 +52,7 @@ pub use spherule_frame::{
     Attribute, AttributeData, Bond, Endian, FARTHEST, FrameError, MemoryBudget, ParseError,
     ParticleFrame, PeriodicImages, PositionSlice, Positions, Radius, RawParticles, ScalarType,
     SimulationCell, choose_origin, find_radius, generate, is_near, is_radius, join, names,
-    sample_indices,
+    sample_indices, with_values,
 };
 pub use spherule_readers::{Format, mesh, read, read::element_symbol};
 pub use spherule_tree::{blocks, order};

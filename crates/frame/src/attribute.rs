@@ -29,21 +29,22 @@ pub enum AttributeData {
     F64(Vec<f64>),
 }
 
-/// Runs `$body` with `$v` bound to the vector inside, whatever its type.
+/// Runs `$body` with `$v` bound to the vector inside [`AttributeData`], and `$number` to the type of its numbers.
 #[macro_export]
 macro_rules! with_values {
     ($data:expr, $v:ident => $body:expr) => {
+        $crate::with_values!($data, $v: _Number => $body)
+    };
+    ($data:expr, $v:ident: $number:ident => $body:expr) => {
+        $crate::with_values!(@ $data, $v, $number, $body,
+            I8 i8 U8 u8 I16 i16 U16 u16 I32 i32 U32 u32 I64 i64 U64 u64 F32 f32 F64 f64)
+    };
+    (@ $data:expr, $v:ident, $number:ident, $body:expr, $($variant:ident $type:ty)*) => {
         match $data {
-            $crate::AttributeData::I8($v) => $body,
-            $crate::AttributeData::U8($v) => $body,
-            $crate::AttributeData::I16($v) => $body,
-            $crate::AttributeData::U16($v) => $body,
-            $crate::AttributeData::I32($v) => $body,
-            $crate::AttributeData::U32($v) => $body,
-            $crate::AttributeData::I64($v) => $body,
-            $crate::AttributeData::U64($v) => $body,
-            $crate::AttributeData::F32($v) => $body,
-            $crate::AttributeData::F64($v) => $body,
+            $($crate::AttributeData::$variant($v) => {
+                type $number = $type;
+                $body
+            })*
         }
     };
 }
@@ -52,18 +53,10 @@ macro_rules! with_values {
 #[macro_export]
 macro_rules! map_values {
     ($data:expr, $v:ident => $body:expr) => {
-        match $data {
-            $crate::AttributeData::I8($v) => $crate::AttributeData::I8($body),
-            $crate::AttributeData::U8($v) => $crate::AttributeData::U8($body),
-            $crate::AttributeData::I16($v) => $crate::AttributeData::I16($body),
-            $crate::AttributeData::U16($v) => $crate::AttributeData::U16($body),
-            $crate::AttributeData::I32($v) => $crate::AttributeData::I32($body),
-            $crate::AttributeData::U32($v) => $crate::AttributeData::U32($body),
-            $crate::AttributeData::I64($v) => $crate::AttributeData::I64($body),
-            $crate::AttributeData::U64($v) => $crate::AttributeData::U64($body),
-            $crate::AttributeData::F32($v) => $crate::AttributeData::F32($body),
-            $crate::AttributeData::F64($v) => $crate::AttributeData::F64($body),
-        }
+        $crate::with_values!($data, $v: Number => {
+            let numbers: Vec<Number> = $body;
+            $crate::AttributeData::from(numbers)
+        })
     };
 }
 
@@ -71,10 +64,10 @@ macro_rules! map_values {
 #[macro_export]
 macro_rules! with_number_type {
     ($scalar:expr, $number:ident => $body:expr) => {
-        $crate::with_number_type!(@ $scalar, $number => $body,
+        $crate::with_number_type!(@ $scalar, $number, $body,
             I8 i8 U8 u8 I16 i16 U16 u16 I32 i32 U32 u32 I64 i64 U64 u64 F32 f32 F64 f64)
     };
-    (@ $scalar:expr, $number:ident => $body:expr, $($variant:ident $type:ty)*) => {
+    (@ $scalar:expr, $number:ident, $body:expr, $($variant:ident $type:ty)*) => {
         match $scalar {
             $($crate::ScalarType::$variant => {
                 type $number = $type;
@@ -112,7 +105,6 @@ impl AttributeData {
         clippy::cast_sign_loss,
         clippy::cast_precision_loss,
         clippy::cast_lossless,
-        clippy::unnecessary_cast,
         reason = "one body for ten types"
     )]
     #[must_use]
