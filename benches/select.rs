@@ -83,9 +83,6 @@ fn particles(count: usize) -> RawParticles {
             attribute("type", 1, AttributeData::I32(kind)),
             attribute("id", 1, AttributeData::U32((0..).take(count).collect())),
         ],
-        time: None,
-        step: None,
-        cell: None,
-        bonds: Vec::new(),
+        ..RawParticles::default()
     }
 }

@@ -84,14 +84,7 @@ pub type Particles<'a> = RawParticles<PositionSlice<'a>>;
 
 /// Particles without attributes.
 pub fn particles(positions: PositionSlice<'_>) -> Particles<'_> {
-    RawParticles {
-        positions,
-        attributes: Vec::new(),
-        time: None,
-        step: None,
-        cell: None,
-        bonds: Vec::new(),
-    }
+    RawParticles { positions, ..RawParticles::default() }
 }
 
 /// A scalar attribute, such as `radius`.

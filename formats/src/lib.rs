@@ -51,8 +51,8 @@ pub use spherule_files::{ValueError, escape_controls, is_control};
 pub use spherule_frame::{
     Attribute, AttributeData, Bond, Endian, FARTHEST, FrameError, MemoryBudget, ParseError,
     ParticleFrame, PeriodicImages, PositionSlice, Positions, Radius, RawParticles, ScalarType,
-    SimulationCell, choose_origin, find_radius, generate, is_near, is_radius, names,
-    sample_indices,
+    SimulationCell, choose_origin, find_radius, generate, is_near, is_radius, join, names,
+    sample_indices, with_values,
 };
 pub use spherule_readers::{Format, mesh, read, read::element_symbol};
 pub use spherule_tree::{blocks, order};

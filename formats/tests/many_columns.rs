@@ -5,8 +5,9 @@
 use std::io::{Cursor, Write};
 
 use spherule_formats::Format;
+use spherule_formats::join::{Part, join_numbered};
 use spherule_formats::read::{bgeo, csv, lammps, npy, ply, vtk, vtk_xml, xyz};
-use spherule_formats::sequence::{Topology, merge};
+use spherule_formats::sequence::Topology;
 use spherule_formats::{
     Attribute, AttributeData, MemoryBudget, ParseError, Positions, RawParticles,
 };
@@ -71,7 +72,13 @@ fn vtk_xml_of_repeated_names_that_the_last_piece_lacks() {
     pieces.extend((0..20_000).map(|_| piece(std::iter::once("a".to_owned()))));
     pieces.push(piece(std::iter::empty()));
     let particles = read(vtk_xml::FORMAT, &vtu(&pieces)).expect("a good file");
-    assert_eq!(particles.attributes.len(), 0);
+    assert_eq!(particles.attributes.len(), 1);
+    assert!(particles.attributes[0].data.get_f64(20_001).is_nan());
+    let notes = [
+        "part `piece 20001` without `a`: NaN there",
+        "several columns `a` in part `piece 0`: the first is used",
+    ];
+    assert_eq!(particles.notes, notes);
 }
 
 #[test]
@@ -240,26 +247,25 @@ fn npz_of_many_members() {
 
 #[test]
 fn parts_of_a_step() {
-    let part = |names: &mut dyn Iterator<Item = String>| RawParticles {
-        positions: Positions::F32(vec![glam::Vec3::ZERO]),
-        attributes: names
-            .map(|name| Attribute { name, components: 1, data: AttributeData::U8(vec![7]) })
-            .collect(),
-        time: None,
-        step: None,
-        cell: None,
-        bonds: Vec::new(),
+    let part = |number: u32, names: &mut dyn Iterator<Item = String>| {
+        let column = |name| Attribute { name, components: 1, data: AttributeData::U8(vec![7]) };
+        let particles = RawParticles {
+            positions: Positions::F32(vec![glam::Vec3::ZERO]),
+            attributes: names.map(column).collect(),
+            ..RawParticles::default()
+        };
+        Part { number, name: number.to_string(), particles }
     };
-    let mut notes = Vec::new();
-    let backwards = &mut (0..MANY).rev().map(|i| format!("a{i}"));
-    let merged = merge(vec![(0, part(&mut numbered(MANY))), (1, part(backwards))], &mut notes);
-    assert_eq!(merged.attributes.len(), MANY + 1);
-    assert_eq!(merged.attributes[3].name, "a3");
-    assert!(notes.is_empty());
-    let others = &mut (0..MANY).map(|i| format!("b{i}"));
-    let merged = merge(vec![(0, part(&mut numbered(MANY))), (1, part(others))], &mut notes);
-    assert_eq!(merged.attributes.len(), 1);
-    assert_eq!(notes.len(), 1);
+    let join = |others: &mut dyn Iterator<Item = String>| {
+        let parts = vec![part(0, &mut numbered(MANY)), part(1, others)];
+        join_numbered(parts, MemoryBudget::UNLIMITED).expect("no limit")
+    };
+    let joined = join(&mut (0..MANY).rev().map(|i| format!("a{i}")));
+    assert_eq!(joined.attributes.len(), MANY + 1);
+    assert_eq!(joined.attributes[3].name, "a3");
+    assert!(joined.notes.is_empty());
+    let joined = join(&mut (0..MANY).map(|i| format!("b{i}")));
+    assert_eq!((joined.attributes.len(), joined.notes.len()), (2 * MANY + 1, 2));
 }
 
 #[test]

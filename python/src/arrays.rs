@@ -8,7 +8,7 @@ use numpy::{
 };
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use spherule_formats::{Attribute, AttributeData, PositionSlice, Positions};
+use spherule_formats::{Attribute, AttributeData, PositionSlice, Positions, with_values};
 
 /// Positions that an array owns; the array cannot be borrowed for writing meanwhile.
 pub(crate) enum PositionArray<'py> {
@@ -45,17 +45,15 @@ impl<'py> PositionArray<'py> {
 /// A copy of the attribute in `array`: one row of numbers for each particle.
 pub(crate) fn attribute(name: String, array: &Bound<'_, PyAny>) -> PyResult<Attribute> {
     macro_rules! try_types {
-        ($($variant:ident: $number:ty),*) => {
+        ($($number:ty),*) => {
             $(if let Ok(array) = array.extract::<PyReadonlyArrayDyn<'_, $number>>() {
                 let components = array.shape().get(1).copied().unwrap_or(1);
-                let data = AttributeData::$variant(array.as_slice()?.to_vec());
+                let data = AttributeData::from(array.as_slice()?.to_vec());
                 return Ok(Attribute { name, components, data });
             })*
         };
     }
-    try_types!(
-        F32: f32, F64: f64, I32: i32, I64: i64, U32: u32, U64: u64, I16: i16, U16: u16, I8: i8, U8: u8
-    );
+    try_types!(f32, f64, i32, i64, u32, u64, i16, u16, i8, u8);
     Err(PyTypeError::new_err(format!("attribute {name}: its type of numbers is not supported")))
 }
 
@@ -65,21 +63,14 @@ pub(crate) fn numbers<'py>(
     data: AttributeData,
     components: usize,
 ) -> PyResult<Bound<'py, PyAny>> {
-    macro_rules! each_type {
-        ($($variant:ident),*) => {
-            match data {
-                $(AttributeData::$variant(values) => {
-                    let rows = values.len() / components.max(1);
-                    let array = numpy::PyArray1::from_vec(py, values);
-                    match components {
-                        1 => Ok(array.into_any()),
-                        _ => Ok(array.reshape([rows, components])?.into_any()),
-                    }
-                })*
-            }
-        };
-    }
-    each_type!(F32, F64, I32, I64, U32, U64, I16, U16, I8, U8)
+    with_values!(data, values => {
+        let rows = values.len() / components.max(1);
+        let array = numpy::PyArray1::from_vec(py, values);
+        match components {
+            1 => Ok(array.into_any()),
+            _ => Ok(array.reshape([rows, components])?.into_any()),
+        }
+    })
 }
 
 /// An array of positions, one row each.

@@ -141,9 +141,7 @@ pub(crate) fn write_spf(
         positions: positions.slice()?,
         attributes: attributes.collect::<PyResult<_>>()?,
         time,
-        step: None,
-        cell: None,
-        bonds: Vec::new(),
+        ..RawParticles::default()
     };
     threads::run(py, None, || {}, || write(&path, raw, radius))
 }

@@ -47,9 +47,8 @@ pub(crate) fn render(
         positions: positions.slice()?,
         attributes: attributes.collect::<PyResult<_>>()?,
         time,
-        step: None,
         cell: cell.and_then(simulation_cell),
-        bonds: Vec::new(),
+        ..Particles::default()
     };
     let stop = AtomicBool::new(false);
     let on_signal = || stop.store(true, Ordering::Relaxed);

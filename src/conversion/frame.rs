@@ -74,7 +74,7 @@ pub fn convert_frame(
     // Stream a binary file
     let streamed = sequence.lone_file(task.index).map(open_source).transpose()?;
     if let Some(source) = streamed.flatten() {
-        return convert(&*source, Vec::new());
+        return convert(&*source, source.notes().to_vec());
     }
     // Read everything else into memory
     let loaded = sequence.load_measured(task.index)?;

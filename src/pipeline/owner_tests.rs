@@ -113,10 +113,7 @@ impl Particles {
                 attribute("mass", 1, AttributeData::F32(masses.collect())),
                 attribute("part", 1, integers(Self::part)),
             ],
-            time: None,
-            step: None,
-            cell: None,
-            bonds: Vec::new(),
+            ..RawParticles::default()
         }
     }
 }

@@ -40,14 +40,7 @@ fn is_shown(counts: [u16; 3], order: [usize; 3]) {
                     material.color = { attribute = \"height\" }";
     let manifest = Manifest::parse(manifest, Path::new("job.toml")).expect("valid");
     let particles = lattice(counts, order);
-    let raw = RawParticles {
-        positions: PositionSlice::F32(&particles),
-        attributes: Vec::new(),
-        time: None,
-        step: None,
-        cell: None,
-        bonds: Vec::new(),
-    };
+    let raw = RawParticles { positions: PositionSlice::F32(&particles), ..RawParticles::default() };
     let selection = manifest.selection();
     let survey =
         Survey::of_particles("lattice", &raw, question(&manifest, &selection)).expect("readable");

@@ -36,9 +36,7 @@ fn particles() -> RawParticles {
             attribute("total energy", 2, AttributeData::I16(vec![3; 2 * count])),
         ],
         time: Some(2.5),
-        step: None,
-        cell: None,
-        bonds: Vec::new(),
+        ..RawParticles::default()
     }
 }
 
@@ -246,14 +244,8 @@ fn counts_are_those_of_numpy() {
 #[test]
 fn nothing_else_is_selected_by_default() {
     assert!(Selection::default().is_all());
-    let all = RawParticles {
-        positions: Positions::F32(vec![Vec3::NAN; 3]),
-        attributes: Vec::new(),
-        time: None,
-        step: None,
-        cell: None,
-        bonds: Vec::new(),
-    };
+    let all =
+        RawParticles { positions: Positions::F32(vec![Vec3::NAN; 3]), ..RawParticles::default() };
     assert_eq!(Selection::default().survivors(&all), Ok(vec![0, 1, 2]));
     assert_eq!(by("x < 0 || x >= 0").survivors(&all), Ok(Vec::new()));
 }

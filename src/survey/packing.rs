@@ -131,14 +131,7 @@ mod tests {
         // Three distant blocks, with more particles than the limit for inspecting each.
         let far = (0..3_u8).map(|i| 1e3 * f32::from(i) * Vec3::X);
         let all = far.flat_map(|offset| all.iter().map(move |p| *p + offset)).collect();
-        let raw = RawParticles {
-            positions: Positions::F32(all),
-            attributes: Vec::new(),
-            time: None,
-            step: None,
-            cell: None,
-            bonds: Vec::new(),
-        };
+        let raw = RawParticles { positions: Positions::F32(all), ..RawParticles::default() };
         let directory = tempfile::tempdir().expect("a directory");
         let path = directory.path().join("f_1.spf");
         let frame = ParticleFrame::from_raw(raw, DVec3::ZERO);

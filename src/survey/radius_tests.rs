@@ -29,15 +29,8 @@ fn lattice() -> Vec<Vec3> {
     (0..1000).map(place).collect()
 }
 
-fn raw<P>(positions: P) -> RawParticles<P> {
-    RawParticles {
-        positions,
-        attributes: Vec::new(),
-        time: None,
-        step: None,
-        cell: None,
-        bonds: Vec::new(),
-    }
+fn raw<P: Default>(positions: P) -> RawParticles<P> {
+    RawParticles { positions, ..RawParticles::default() }
 }
 
 fn question(selection: Option<&Selection>) -> Question<'_> {

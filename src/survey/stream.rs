@@ -93,8 +93,7 @@ pub(super) fn sample(
         attributes,
         time: source.time(),
         step: source.step(),
-        cell: None,
-        bonds: Vec::new(),
+        ..RawParticles::default()
     })
 }
 
@@ -241,11 +240,7 @@ mod tests {
     fn nan_positions_have_no_extremes_and_no_spacing() {
         let raw = RawParticles {
             positions: Positions::F64(vec![DVec3::NAN; 3]),
-            attributes: Vec::new(),
-            time: None,
-            step: None,
-            cell: None,
-            bonds: Vec::new(),
+            ..RawParticles::default()
         };
         let source = RawSource::new(Path::new("nan"), &raw).expect("whole");
         assert_eq!(extremes(&source).expect("there"), None);

@@ -168,3 +168,37 @@ fn impossible_colours_are_refused() {
     let map = ColorMap::with_scale("viridis", [1.0, 2.0], ColorScale::Log).expect("a map");
     assert_colors(&shop, &log, &map, [-2.0, -1.0, 0.0, 1.0, 2.0]);
 }
+
+/// Balls of `row` from `range` as XML, with `Vel` of 1 and more along y if `has_velocity`.
+fn vtu(range: std::ops::Range<u8>, has_velocity: bool) -> String {
+    let list = |text: &dyn Fn(u8) -> String| range.clone().map(text).collect::<String>();
+    let velocity = format!(
+        "<DataArray type=\"Float32\" Name=\"Vel\" NumberOfComponents=\"3\">{}</DataArray>",
+        list(&|i| format!("0 {} 0 ", i + 1))
+    );
+    format!(
+        "<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid><Piece NumberOfPoints=\"{}\"><PointData>{}</PointData>\
+         <Points><DataArray type=\"Float32\" NumberOfComponents=\"3\">{}</DataArray></Points></Piece>\
+         </UnstructuredGrid></VTKFile>",
+        range.len(),
+        if has_velocity { &velocity } else { "" },
+        list(&|i| format!("{i} 0 0 ")),
+    )
+}
+
+#[test]
+fn parts_without_the_value_are_grey() {
+    let shop = Workshop::new();
+    fs::create_dir_all(shop.join("in")).expect("a directory");
+    fs::write(shop.join("in/fluid_1.vtu"), vtu(0..3, true)).expect("a file");
+    fs::write(shop.join("in/wall_1.vtu"), vtu(3..5, false)).expect("a file");
+    for name in ["Vel", "Vel.y", "speed"] {
+        let options = ["--radius", "0.4", "--parts", "fluid,wall", "--color-by", name];
+        let ran = render(&shop, "in", &options).expect(0);
+        ran.prints("part `wall` without `Vel`: NaN there");
+        let [slow, _, fast, wall, other] = albedos(&shop);
+        let is_grey = |color: Vec3| color.x == color.y && color.y == color.z;
+        assert!(is_grey(wall) && wall == other, "{name}: {wall} {other}");
+        assert!(!is_grey(slow) && !is_grey(fast) && slow != fast, "{name}: {slow} {fast}");
+    }
+}

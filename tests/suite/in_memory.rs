@@ -57,9 +57,7 @@ fn the_bytes_are_those_of_a_file() {
         positions: PositionSlice::F32(positions),
         attributes: raw.attributes,
         time: raw.time,
-        step: None,
-        cell: None,
-        bonds: Vec::new(),
+        ..Particles::default()
     };
     let image = render(&settings, particles, &AtomicBool::new(false)).expect("a picture");
     assert!(image.to_exr().expect("bytes") == expected, "bytes differ");
@@ -80,9 +78,7 @@ fn positions_are_copied_only_if_they_change() {
         positions: Positions::F32(positions.to_vec()),
         attributes: vec![scalar("a", (0..3_u8).map(f32::from).collect())],
         time: Some(2.0),
-        step: None,
-        cell: None,
-        bonds: Vec::new(),
+        ..RawParticles::default()
     };
     let near = [Vec3::X, Vec3::Y, Vec3::Z];
     let with_nan = [Vec3::X, Vec3::NAN, Vec3::Z];

@@ -29,26 +29,96 @@ pub enum AttributeData {
     F64(Vec<f64>),
 }
 
-/// Runs `$body` with `$v` bound to the vector inside, whatever its type.
+/// Runs `$body` with `$v` bound to the vector inside [`AttributeData`], and `$number` to the type of its numbers.
 #[macro_export]
 macro_rules! with_values {
     ($data:expr, $v:ident => $body:expr) => {
+        $crate::with_values!($data, $v: _Number => $body)
+    };
+    ($data:expr, $v:ident: $number:ident => $body:expr) => {
+        $crate::with_values!(@ $data, $v, $number, $body,
+            I8 i8 U8 u8 I16 i16 U16 u16 I32 i32 U32 u32 I64 i64 U64 u64 F32 f32 F64 f64)
+    };
+    (@ $data:expr, $v:ident, $number:ident, $body:expr, $($variant:ident $type:ty)*) => {
         match $data {
-            $crate::AttributeData::I8($v) => $body,
-            $crate::AttributeData::U8($v) => $body,
-            $crate::AttributeData::I16($v) => $body,
-            $crate::AttributeData::U16($v) => $body,
-            $crate::AttributeData::I32($v) => $body,
-            $crate::AttributeData::U32($v) => $body,
-            $crate::AttributeData::I64($v) => $body,
-            $crate::AttributeData::U64($v) => $body,
-            $crate::AttributeData::F32($v) => $body,
-            $crate::AttributeData::F64($v) => $body,
+            $($crate::AttributeData::$variant($v) => {
+                type $number = $type;
+                $body
+            })*
         }
     };
 }
 
+/// Runs `$body` with `$v` bound to the vector inside, and puts the vector that it gives into the same variant.
+#[macro_export]
+macro_rules! map_values {
+    ($data:expr, $v:ident => $body:expr) => {
+        $crate::with_values!($data, $v: Number => {
+            let numbers: Vec<Number> = $body;
+            $crate::AttributeData::from(numbers)
+        })
+    };
+}
+
+/// Runs `$body` with `$number` as the type of a [`ScalarType`].
+#[macro_export]
+macro_rules! with_number_type {
+    ($scalar:expr, $number:ident => $body:expr) => {
+        $crate::with_number_type!(@ $scalar, $number, $body,
+            I8 i8 U8 u8 I16 i16 U16 u16 I32 i32 U32 u32 I64 i64 U64 u64 F32 f32 F64 f64)
+    };
+    (@ $scalar:expr, $number:ident, $body:expr, $($variant:ident $type:ty)*) => {
+        match $scalar {
+            $($crate::ScalarType::$variant => {
+                type $number = $type;
+                $body
+            })*
+        }
+    };
+}
+
+macro_rules! from_vectors {
+    ($($variant:ident $type:ty),*) => {
+        $(impl From<Vec<$type>> for AttributeData {
+            fn from(numbers: Vec<$type>) -> Self {
+                Self::$variant(numbers)
+            }
+        })*
+    };
+}
+
+from_vectors!(
+    I8 i8, U8 u8, I16 i16, U16 u16, I32 i32, U32 u32, I64 i64, U64 u64, F32 f32, F64 f64
+);
+
 impl AttributeData {
+    /// `len` zeros; pages that are not touched cost nothing yet.
+    pub fn zeros(scalar: ScalarType, len: usize) -> Self {
+        with_number_type!(scalar, Number => vec![Number::default(); len].into())
+    }
+
+    /// The numbers in another type, which [`ScalarType::common_with`] gives: it holds them, except that integers beyond
+    /// 2^53 round in f64.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_possible_wrap,
+        clippy::cast_sign_loss,
+        clippy::cast_precision_loss,
+        clippy::cast_lossless,
+        reason = "one body for ten types"
+    )]
+    #[must_use]
+    pub fn into_type(self, scalar: ScalarType) -> Self {
+        if self.scalar_type() == scalar {
+            return self;
+        }
+        with_number_type!(scalar, Number => {
+            let numbers: Vec<Number> =
+                with_values!(self, v => v.into_iter().map(|number| number as Number).collect());
+            numbers.into()
+        })
+    }
+
     /// Reserves space for `more` numbers if the system allows it; pages that are not used cost nothing.
     pub fn reserve(&mut self, more: usize) {
         with_values!(self, v => {
@@ -56,17 +126,33 @@ impl AttributeData {
         });
     }
 
-    /// Appends the numbers of `more` if it has the same type; otherwise does nothing.
-    pub fn append(&mut self, more: &mut Self) {
+    /// Appends the numbers of `more` if it has the same type; otherwise does nothing. Its memory is used if there are
+    /// no numbers before it.
+    pub fn append(&mut self, more: Self) {
         macro_rules! append {
             ($($variant:ident),*) => {
                 match (self, more) {
-                    $((Self::$variant(all), Self::$variant(more)) => all.append(more),)*
+                    $((Self::$variant(all), Self::$variant(mut more)) => {
+                        if all.capacity() == 0 {
+                            *all = more;
+                        } else {
+                            all.append(&mut more);
+                        }
+                    })*
                     _ => {}
                 }
             };
         }
         append!(I8, U8, I16, U16, I32, U32, I64, U64, F32, F64);
+    }
+
+    /// Appends `count` NaN; zeros to integers.
+    pub fn append_nan(&mut self, count: usize) {
+        match self {
+            Self::F32(v) => v.resize(v.len() + count, f32::NAN),
+            Self::F64(v) => v.resize(v.len() + count, f64::NAN),
+            integers => integers.append(Self::zeros(integers.scalar_type(), count)),
+        }
     }
 
     /// The numbers as bytes, to be filled with little-endian ones before [`Self::decode_little_endian`].

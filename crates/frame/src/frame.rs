@@ -42,6 +42,31 @@ impl Positions {
         self.len() == 0
     }
 
+    /// `parts` after one another: in single precision if all are.
+    pub(crate) fn joined(mut parts: Vec<Self>) -> Self {
+        if parts.len() == 1 {
+            return parts.remove(0);
+        }
+        let count = parts.iter().map(Self::len).sum();
+        if parts.iter().all(|part| matches!(part, Self::F32(_))) {
+            let mut all = Vec::with_capacity(count);
+            for part in parts {
+                if let Self::F32(v) = part {
+                    all.extend(v);
+                }
+            }
+            return Self::F32(all);
+        }
+        let mut all: Vec<DVec3> = Vec::with_capacity(count);
+        for part in parts {
+            match part {
+                Self::F32(v) => all.extend(v.iter().map(|p| p.as_dvec3())),
+                Self::F64(v) => all.extend(v),
+            }
+        }
+        Self::F64(all)
+    }
+
     /// Bytes of the positions in memory.
     pub fn byte_len(&self) -> u64 {
         match self {
@@ -85,6 +110,12 @@ pub enum PositionSlice<'a> {
     F64(&'a [DVec3]),
 }
 
+impl Default for PositionSlice<'_> {
+    fn default() -> Self {
+        Self::F32(&[])
+    }
+}
+
 impl PositionSlice<'_> {
     /// Particle count.
     pub const fn len(&self) -> usize {
@@ -124,6 +155,8 @@ pub struct RawParticles<P = Positions> {
     pub cell: Option<SimulationCell>,
     /// Bonds, if the file lists them, by indices of the particles.
     pub bonds: Vec<Bond>,
+    /// What the user should know, such as columns that only some parts have.
+    pub notes: Vec<String>,
 }
 
 impl<P> RawParticles<P> {
@@ -136,6 +169,7 @@ impl<P> RawParticles<P> {
             step: self.step,
             cell: self.cell,
             bonds: self.bonds,
+            notes: self.notes,
         }
     }
 }
@@ -150,6 +184,7 @@ impl RawParticles<PositionSlice<'_>> {
             step: self.step,
             cell: self.cell,
             bonds: self.bonds.clone(),
+            notes: self.notes.clone(),
         }
     }
 }

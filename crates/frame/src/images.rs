@@ -224,10 +224,8 @@ mod tests {
                 data: AttributeData::F32(speeds),
             }],
             positions: Positions::F64(positions),
-            time: None,
-            step: None,
             cell: SimulationCell::new(ORIGIN, EDGES, periodic),
-            bonds: Vec::new(),
+            ..RawParticles::default()
         }
     }
 

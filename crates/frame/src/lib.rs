@@ -37,6 +37,7 @@ mod frame;
 pub mod gather;
 pub mod generate;
 mod images;
+pub mod join;
 pub mod names;
 mod origin;
 mod sampling;

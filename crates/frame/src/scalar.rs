@@ -1,5 +1,7 @@
 //! Scalar types of numbers in files.
 
+use crate::with_number_type;
+
 /// Byte order of stored numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Endian {
@@ -89,28 +91,13 @@ impl ScalarType {
     #[expect(
         clippy::cast_precision_loss,
         clippy::cast_lossless,
+        clippy::unnecessary_cast,
         reason = "one body for ten types, and no wider type to keep integers of 64 bits in"
     )]
     pub fn decode_one(self, bytes: &[u8], endian: Endian) -> f64 {
-        macro_rules! decode {
-            ($ty:ty) => {
-                bytes.try_into().map_or(0.0, |bytes| match endian {
-                    Endian::Little => <$ty>::from_le_bytes(bytes) as f64,
-                    Endian::Big => <$ty>::from_be_bytes(bytes) as f64,
-                })
-            };
-        }
-        match self {
-            Self::I8 => decode!(i8),
-            Self::U8 => decode!(u8),
-            Self::I16 => decode!(i16),
-            Self::U16 => decode!(u16),
-            Self::I32 => decode!(i32),
-            Self::U32 => decode!(u32),
-            Self::I64 => decode!(i64),
-            Self::U64 => decode!(u64),
-            Self::F32 => decode!(f32),
-            Self::F64 => decode!(f64),
-        }
+        with_number_type!(self, Number => bytes.try_into().map_or(0.0, |bytes| match endian {
+            Endian::Little => Number::from_le_bytes(bytes) as f64,
+            Endian::Big => Number::from_be_bytes(bytes) as f64,
+        }))
     }
 }

@@ -34,6 +34,9 @@ pub trait ParticleRanges: Send + Sync + fmt::Debug {
     /// The simulation cell, if the file has it.
     fn cell(&self) -> Option<SimulationCell>;
 
+    /// What the user should know, such as columns that only some parts have.
+    fn notes(&self) -> &[String];
+
     /// Bytes of the positions of one particle in the precision of the file.
     fn position_len(&self) -> u64;
 

@@ -33,6 +33,11 @@ pub trait ParticleSource: Sync {
         None
     }
 
+    /// What the user should know, such as columns that only some parts have.
+    fn notes(&self) -> &[String] {
+        &[]
+    }
+
     /// Bytes of the positions of one particle in the precision of the source, if that is known.
     fn position_len(&self) -> Option<u64> {
         None

@@ -54,8 +54,7 @@ fn raw(positions: Vec<Vec3>) -> RawParticles {
         positions: Positions::F32(positions),
         time: Some(0.5),
         step: Some(9),
-        cell: None,
-        bonds: Vec::new(),
+        ..RawParticles::default()
     }
 }
 

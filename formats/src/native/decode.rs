@@ -27,8 +27,7 @@ impl NativeFrame<'_> {
             attributes,
             time: self.index().time,
             step: self.index().step,
-            cell: None,
-            bonds: Vec::new(),
+            ..RawParticles::default()
         })
     }
 
@@ -70,8 +69,7 @@ impl NativeFrame<'_> {
             attributes,
             time: self.index().time,
             step: self.index().step,
-            cell: None,
-            bonds: Vec::new(),
+            ..RawParticles::default()
         })
     }
 

@@ -8,7 +8,8 @@ use std::time::SystemTime;
 
 use glam::DVec3;
 
-use super::{PartFile, Sequence, merge};
+use super::{PartFile, Sequence};
+use crate::join::{PART, Part, join, join_numbered};
 use crate::open::FrameFile;
 use crate::{FrameError, MemoryBudget, ParseError, ParticleFrame, RawParticles, escape_controls};
 
@@ -82,20 +83,38 @@ impl Sequence {
             all_bytes += file.unpacked_len();
             let held = file.held_len() + file.unpacked_arrays_len(&particles);
             content_bytes = content_bytes.max(held);
-            parts.push((part.part, particles));
+            parts.push(Part { number: part.part, name: self.part_name(part), particles });
         }
-        let only = if self.parts.len() < 2 && parts.len() == 1 {
-            parts.pop().map(|(_, only)| only)
-        } else {
-            None
+        let in_first = |error: ParseError| {
+            error.in_file(frame.parts.first().map_or(Path::new(""), |part| &part.path))
         };
-        let mut particles = only.unwrap_or_else(|| merge(parts, &mut notes));
-        if let (false, Some(part)) = (self.images.is_none(), frame.parts.first()) {
-            let done = self.images.apply(&mut particles, self.budget);
-            done.map_err(|e| e.in_file(&part.path))?;
+        let mut particles = self.joined(parts).map_err(in_first)?;
+        notes.append(&mut particles.notes);
+        if !self.images.is_none() {
+            self.images.apply(&mut particles, self.budget).map_err(in_first)?;
         }
         particles.time = self.listed_time(index).or(particles.time);
         Ok(Loaded { particles, notes, all_bytes, content_bytes })
+    }
+
+    /// The parts of a frame as one. Files of one part may have parts of their own, which keep their numbers.
+    fn joined(&self, parts: Vec<Part>) -> Result<RawParticles, ParseError> {
+        let has_own = |part: &Part| part.particles.attributes.iter().any(|a| a.name == PART);
+        let is_one = parts.windows(2).all(|pair| pair[0].number == pair[1].number);
+        let keeps_own = is_one && (parts.iter().any(has_own) || parts.len() == 1);
+        if self.parts.len() < 2 && keeps_own {
+            join(parts, self.budget)
+        } else {
+            join_numbered(parts, self.budget)
+        }
+    }
+
+    /// The name of a part in messages: that of its file, if it is one of several files of one part.
+    fn part_name(&self, part: &PartFile) -> String {
+        match self.parts.get(part.part as usize).filter(|name| !name.is_empty()) {
+            Some(name) if self.parts.len() > 1 => name.clone(),
+            _ => part.path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        }
     }
 
     /// Whether the file of several steps that was used last is mapped while a step is read.

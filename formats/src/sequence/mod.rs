@@ -22,7 +22,6 @@ mod from_names;
 mod group;
 mod input;
 mod load;
-mod merge;
 mod name;
 mod notes;
 mod pattern;
@@ -40,7 +39,7 @@ pub use error::{GroupSummary, SequenceError};
 pub use from_names::{frames_of_list, frames_of_names};
 pub use input::SequenceInput;
 pub use load::Loaded;
-pub use merge::{PART_ATTRIBUTE, merge};
+pub use spherule_frame::join::PART as PART_ATTRIBUTE;
 pub use topology::Topology;
 
 use collection::{Expansion, ListedFiles};

@@ -181,10 +181,7 @@ fn write_frame(path: &Path, positions: Vec<Vec3>, step: i64) {
     let raw = RawParticles {
         positions: crate::Positions::F32(positions),
         attributes: vec![],
-        time: None,
-        step: None,
-        cell: None,
-        bonds: Vec::new(),
+        ..RawParticles::default()
     };
     let frame = ParticleFrame::from_raw(raw, DVec3::ZERO);
     native::write(path, &frame, Some(step)).expect("writable");

@@ -10,8 +10,7 @@ use glam::DVec3;
 use self::gathered::Gathered;
 use self::sums::PIECE;
 use crate::convert::{ParticleSource, SourceAttribute};
-use crate::read::columns::zeros;
-use crate::{Attribute, FrameError, Positions, RawParticles, ScalarType};
+use crate::{Attribute, AttributeData, FrameError, Positions, RawParticles, ScalarType};
 
 mod gathered;
 mod sums;
@@ -116,7 +115,8 @@ impl FrameStats {
             source.read_positions(first, &mut positions)?;
             let mut attributes = Vec::new();
             for (index, attribute) in source.attributes().iter().enumerate() {
-                let mut data = zeros(attribute.scalar, attribute.components * len_here);
+                let mut data =
+                    AttributeData::zeros(attribute.scalar, attribute.components * len_here);
                 source.read_values(index, first, data.as_bytes_mut())?;
                 data.decode_little_endian();
                 attributes.push(Attribute {
@@ -152,10 +152,7 @@ mod tests {
         RawParticles {
             positions,
             attributes: attributes.into_iter().map(attribute).collect(),
-            time: None,
-            step: None,
-            cell: None,
-            bonds: Vec::new(),
+            ..RawParticles::default()
         }
     }
 

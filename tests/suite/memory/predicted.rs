@@ -65,14 +65,8 @@ fn block(path: &Path, count: usize) {
 }
 
 fn spf(path: &Path, count: usize) {
-    let raw = RawParticles {
-        positions: Positions::F32(particles(count)),
-        attributes: Vec::new(),
-        time: None,
-        cell: None,
-        bonds: Vec::new(),
-        step: None,
-    };
+    let raw =
+        RawParticles { positions: Positions::F32(particles(count)), ..RawParticles::default() };
     native::write(path, &ParticleFrame::from_raw(raw, DVec3::ZERO), None).expect("a file");
 }
 

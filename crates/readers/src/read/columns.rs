@@ -189,8 +189,7 @@ impl ParticleLayout {
             attributes,
             time: self.time,
             step: self.step,
-            cell: None,
-            bonds: Vec::new(),
+            ..RawParticles::default()
         }
     }
 }
@@ -211,7 +210,7 @@ impl GrowingParticles {
         let need = each.fold(0, usize::saturating_add).saturating_mul(room);
         let room = if need as u64 <= budget.bytes() { room } else { 0 };
         let empty = |column: &StridedColumn| {
-            let mut data = zeros(column.scalar, 0);
+            let mut data = AttributeData::zeros(column.scalar, 0);
             data.reserve(column.component_strides.len().saturating_mul(room));
             data
         };
@@ -229,9 +228,10 @@ impl GrowingParticles {
             self.layout.columns().map(|c| c.component_strides.len() * c.scalar.size() * count);
         self.budget.check(held + more.sum::<usize>() as u64, "its numbers in memory are")?;
         for (column, data) in self.layout.columns().zip(&mut self.data) {
-            let mut block = zeros(column.scalar, column.component_strides.len() * count);
+            let mut block =
+                AttributeData::zeros(column.scalar, column.component_strides.len() * count);
             fill(&mut block, records, column, 0, count);
-            data.append(&mut block);
+            data.append(block);
         }
         Ok(())
     }
@@ -298,8 +298,10 @@ fn check_columns<'c>(
 
 /// Decodes all `columns` of `count` particles, which fit.
 fn gather(bytes: &[u8], count: usize, columns: &[StridedColumn]) -> Vec<AttributeData> {
-    let mut gathered: Vec<AttributeData> =
-        columns.iter().map(|c| zeros(c.scalar, c.component_strides.len() * count)).collect();
+    let mut gathered: Vec<AttributeData> = columns
+        .iter()
+        .map(|c| AttributeData::zeros(c.scalar, c.component_strides.len() * count))
+        .collect();
     for first in (0..count).step_by(BLOCK) {
         let end = count.min(first + BLOCK);
         for (column, data) in columns.iter().zip(&mut gathered) {
@@ -307,22 +309,6 @@ fn gather(bytes: &[u8], count: usize, columns: &[StridedColumn]) -> Vec<Attribut
         }
     }
     gathered
-}
-
-/// The storage of a column; untouched pages cost nothing yet.
-pub fn zeros(scalar: ScalarType, len: usize) -> AttributeData {
-    match scalar {
-        ScalarType::I8 => AttributeData::I8(vec![0; len]),
-        ScalarType::U8 => AttributeData::U8(vec![0; len]),
-        ScalarType::I16 => AttributeData::I16(vec![0; len]),
-        ScalarType::U16 => AttributeData::U16(vec![0; len]),
-        ScalarType::I32 => AttributeData::I32(vec![0; len]),
-        ScalarType::U32 => AttributeData::U32(vec![0; len]),
-        ScalarType::I64 => AttributeData::I64(vec![0; len]),
-        ScalarType::U64 => AttributeData::U64(vec![0; len]),
-        ScalarType::F32 => AttributeData::F32(vec![0.0; len]),
-        ScalarType::F64 => AttributeData::F64(vec![0.0; len]),
-    }
 }
 
 /// Positions from decoded components, x first; two components lie in the plane z = 0.

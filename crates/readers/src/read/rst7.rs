@@ -176,9 +176,8 @@ fn read(text: &mut TextInput<'_>, budget: MemoryBudget) -> Result<RawParticles, 
         positions: ColumnValues::Real(positions.numbers).into_positions(),
         attributes: velocity.into_iter().collect(),
         time: heading.time,
-        step: None,
         cell,
-        bonds: Vec::new(),
+        ..RawParticles::default()
     })
 }
 

@@ -61,6 +61,10 @@ impl ParticleSource for RangeSource {
         self.ranges.step()
     }
 
+    fn notes(&self) -> &[String] {
+        self.ranges.notes()
+    }
+
     fn position_len(&self) -> Option<u64> {
         Some(self.ranges.position_len())
     }

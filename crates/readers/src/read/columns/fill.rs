@@ -4,7 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{BLOCK, ComponentStride, ParticleLayout, StridedColumn, divided};
-use spherule_frame::{AttributeData, Endian, ScalarType};
+use spherule_frame::{AttributeData, Endian, with_number_type, with_values};
 
 impl ParticleLayout {
     /// Reads the positions of the particles from `first` on. `bytes` are those of a file that
@@ -90,6 +90,7 @@ impl StridedColumn {
 #[expect(
     clippy::cast_precision_loss,
     clippy::cast_lossless,
+    clippy::unnecessary_cast,
     reason = "one body for ten types, and no wider type to keep integers of 64 bits in"
 )]
 fn fill_f64(
@@ -99,30 +100,14 @@ fn fill_f64(
     component_strides: &[ComponentStride],
     first: usize,
 ) {
-    macro_rules! fill {
-        ($ty:ty) => {
-            match column.endian {
-                Endian::Little => fill_block(to, bytes, component_strides, first, |b| {
-                    <$ty>::from_le_bytes(b) as f64
-                }),
-                Endian::Big => fill_block(to, bytes, component_strides, first, |b| {
-                    <$ty>::from_be_bytes(b) as f64
-                }),
-            }
-        };
-    }
-    match column.scalar {
-        ScalarType::I8 => fill!(i8),
-        ScalarType::U8 => fill!(u8),
-        ScalarType::I16 => fill!(i16),
-        ScalarType::U16 => fill!(u16),
-        ScalarType::I32 => fill!(i32),
-        ScalarType::U32 => fill!(u32),
-        ScalarType::I64 => fill!(i64),
-        ScalarType::U64 => fill!(u64),
-        ScalarType::F32 => fill!(f32),
-        ScalarType::F64 => fill!(f64),
-    }
+    with_number_type!(column.scalar, Number => match column.endian {
+        Endian::Little => {
+            fill_block(to, bytes, component_strides, first, |b| Number::from_le_bytes(b) as f64);
+        }
+        Endian::Big => {
+            fill_block(to, bytes, component_strides, first, |b| Number::from_be_bytes(b) as f64);
+        }
+    });
 }
 
 /// Decodes particles `first..end` of a column that [`StridedColumn::fits`].
@@ -133,34 +118,16 @@ pub(super) fn fill(
     first: usize,
     end: usize,
 ) {
-    macro_rules! fill {
-        ($v:expr, $ty:ty) => {{
-            let width = column.component_strides.len();
-            let block = $v
-                .get_mut(first * width..end * width)
-                .expect("gather made room for every particle");
-            match column.endian {
-                Endian::Little => {
-                    fill_block(block, bytes, &column.component_strides, first, <$ty>::from_le_bytes)
-                }
-                Endian::Big => {
-                    fill_block(block, bytes, &column.component_strides, first, <$ty>::from_be_bytes)
-                }
-            }
-        }};
-    }
-    match data {
-        AttributeData::I8(v) => fill!(v, i8),
-        AttributeData::U8(v) => fill!(v, u8),
-        AttributeData::I16(v) => fill!(v, i16),
-        AttributeData::U16(v) => fill!(v, u16),
-        AttributeData::I32(v) => fill!(v, i32),
-        AttributeData::U32(v) => fill!(v, u32),
-        AttributeData::I64(v) => fill!(v, i64),
-        AttributeData::U64(v) => fill!(v, u64),
-        AttributeData::F32(v) => fill!(v, f32),
-        AttributeData::F64(v) => fill!(v, f64),
-    }
+    let width = column.component_strides.len();
+    with_values!(data, v: Number => {
+        let block =
+            v.get_mut(first * width..end * width).expect("gather made room for every particle");
+        let strides = &column.component_strides;
+        match column.endian {
+            Endian::Little => fill_block(block, bytes, strides, first, Number::from_le_bytes),
+            Endian::Big => fill_block(block, bytes, strides, first, Number::from_be_bytes),
+        }
+    });
 }
 
 /// Writes the block that starts at particle `first`; `S` is the size of a stored number.

@@ -129,14 +129,7 @@ pub(super) fn read(
     };
     text.go_to(layout.rows.start);
     let (positions, attributes) = table.particles(text, usize::MAX, budget).content?;
-    Ok(RawParticles {
-        positions,
-        attributes,
-        time: layout.time,
-        step: None,
-        cell: None,
-        bonds: Vec::new(),
-    })
+    Ok(RawParticles { positions, attributes, time: layout.time, ..RawParticles::default() })
 }
 
 /// Lines that decide the layout of a table: more than are searched for the first row, and for separators.

@@ -151,7 +151,7 @@ fn read(
         return Err(cut_short(text, format!("no box after {count} atoms")));
     };
     let (positions, attributes) = atoms.into_parts();
-    Ok(RawParticles { positions, attributes, time, step: number, cell, bonds: Vec::new() })
+    Ok(RawParticles { positions, attributes, time, step: number, cell, ..RawParticles::default() })
 }
 
 fn cut_short(text: &TextInput<'_>, what: String) -> ParseError {

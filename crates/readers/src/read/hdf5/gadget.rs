@@ -155,6 +155,7 @@ impl Snapshot {
         finder.join_vectors();
         let part = Part {
             value: number,
+            name: format!("PartType{number}"),
             count,
             positions: vec![Piece::Stored(positions)],
             attributes: finder.found,

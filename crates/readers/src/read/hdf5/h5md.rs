@@ -219,6 +219,7 @@ impl Trajectory {
         }
         Ok(Some(Part {
             value,
+            name: group.name.clone(),
             count: finder.count,
             positions: vec![Piece::Stored(positions)],
             attributes: finder.found,

@@ -83,7 +83,13 @@ impl Dialect for StepGroups {
             }
         }
         finder.join_vectors();
-        let part = Part { value: 0, count: finder.count, positions, attributes: finder.found };
+        let part = Part {
+            value: 0,
+            name: String::new(),
+            count: finder.count,
+            positions,
+            attributes: finder.found,
+        };
         let table = ParticleTable::new(vec![part], false);
         Ok(table.at(time(&node, budget), Some(number)))
     }

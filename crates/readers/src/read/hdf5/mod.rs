@@ -146,10 +146,7 @@ impl Reader for Hdf5 {
             if table.has_integer_positions() {
                 remarks.push("positions are stored as integers, and used as they are".to_owned());
             }
-            if !table.left_out().is_empty() {
-                remarks
-                    .push(format!("not in all parts, so left out: {}", listed(table.left_out())));
-            }
+            remarks.extend_from_slice(table.notes());
         }
         let others = Vec::from_iter(file.other_names());
         if !others.is_empty() {

@@ -93,7 +93,7 @@ impl OpenPmd {
     /// The particles of a species.
     fn part(
         &self,
-        value: u32,
+        (value, name): (u32, &str),
         node: &Node,
         budget: MemoryBudget,
     ) -> Result<(Part, Vec<String>), ParseError> {
@@ -150,7 +150,8 @@ impl OpenPmd {
                 add_record(&mut finder, node, &name)?;
             }
         }
-        let part = Part { value, count, positions, attributes: finder.found };
+        let part =
+            Part { value, name: name.to_owned(), count, positions, attributes: finder.found };
         Ok((part, finder.left_out))
     }
 
@@ -311,7 +312,7 @@ impl Dialect for OpenPmd {
         if let Some(particles) = iteration.descend(&self.particles)? {
             for (value, name) in (0..).zip(&self.species) {
                 if let Some(node) = particles.group(name)? {
-                    parts.push(self.part(value, &node, budget)?.0);
+                    parts.push(self.part((value, name), &node, budget)?.0);
                 }
             }
         }

@@ -148,7 +148,13 @@ impl PlainFile {
             finder.add(&group.node, &name, &name, &slice)?;
         }
         finder.join_vectors();
-        let part = Part { value, count, positions, attributes: finder.found };
+        let part = Part {
+            value,
+            name: shown(group.node.path()).to_owned(),
+            count,
+            positions,
+            attributes: finder.found,
+        };
         Ok((part, finder.left_out))
     }
 }

@@ -71,7 +71,7 @@ impl ParticleArrays {
     /// The particles of one array. `names` are those of properties that some array stores.
     fn part(
         &self,
-        value: u32,
+        (value, array): (u32, &str),
         node: &Node,
         names: &BTreeSet<String>,
         budget: MemoryBudget,
@@ -89,7 +89,13 @@ impl ParticleArrays {
             }
         }
         finder.join("velocity", &["u", "v", "w"]);
-        Ok(Part { value, count: finder.count, positions, attributes: finder.found })
+        Ok(Part {
+            value,
+            name: array.to_owned(),
+            count: finder.count,
+            positions,
+            attributes: finder.found,
+        })
     }
 }
 
@@ -130,8 +136,8 @@ impl Dialect for ParticleArrays {
     fn table(&self, _step: usize, budget: MemoryBudget) -> Result<ParticleTable, ParseError> {
         let mut parts = Vec::new();
         let names = self.stored_names()?;
-        for (value, (_, node)) in (0..).zip(&self.arrays) {
-            parts.push(self.part(value, node, &names, budget)?);
+        for (value, (name, node)) in (0..).zip(&self.arrays) {
+            parts.push(self.part((value, name), node, &names, budget)?);
         }
         let is_divided = self.arrays.len() > 1;
         Ok(ParticleTable::new(parts, is_divided).at(self.time(), self.step()))

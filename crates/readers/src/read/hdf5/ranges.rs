@@ -3,9 +3,10 @@
 use glam::DVec3;
 
 use super::band_cache::BandCache;
-use super::table::{Column, PART, ParticleTable};
+use super::table::{Column, ParticleTable};
 use super::values::Cache;
 use crate::ranges::{ParticleRanges, RangeAttribute};
+use spherule_frame::join::PART;
 use spherule_frame::{ParseError, ScalarType, SimulationCell};
 
 /// Bytes of decoded chunks that are kept, as neighbouring ranges need the same ones.
@@ -63,6 +64,10 @@ impl ParticleRanges for TableRanges {
 
     fn cell(&self) -> Option<SimulationCell> {
         self.table.cell()
+    }
+
+    fn notes(&self) -> &[String] {
+        self.table.notes()
     }
 
     fn position_len(&self) -> u64 {

@@ -1,24 +1,21 @@
 //! The particles of one time step as columns over all parts: which values they have and where these are.
 
-use std::collections::BTreeMap;
-
 use super::file::H5File;
 use super::piece::{Piece, encoded};
 use super::values::Cache;
-use crate::read::columns::{StridedColumn, positions, zeros};
-use spherule_frame::names::is_radius_name;
+use crate::read::columns::{StridedColumn, positions};
+use spherule_frame::join::{self, ColumnShape, JoinedColumn, PART, PartColumns};
 use spherule_frame::{
     Attribute, AttributeData, MemoryBudget, ParseError, RawParticles, ScalarType, SimulationCell,
 };
-
-/// The attribute that tells parts apart.
-pub(super) const PART: &str = "part";
 
 /// Particles that belong together in a file: a species, a type, an array.
 #[derive(Debug)]
 pub(super) struct Part {
     /// Value of the attribute `part`.
     pub(super) value: u32,
+    /// Name in the file.
+    pub(super) name: String,
     /// Number of particles.
     pub(super) count: u64,
     /// Three components in all, or two for particles in a plane.
@@ -50,15 +47,12 @@ pub(super) struct ParticleTable {
     time: Option<f64>,
     step: Option<i64>,
     cell: Option<SimulationCell>,
-    /// Names of attributes that are in some parts only, and left out.
-    left_out: Vec<String>,
+    /// Which attributes are not in all parts.
+    notes: Vec<String>,
 }
 
 impl ParticleTable {
-    /// The particles of `parts`; `is_divided` if the file may have several parts.
-    ///
-    /// A scalar of floating point that some parts do not have is NaN there. Other attributes that are not in all
-    /// parts with particles are left out: a velocity, radius or number of NaN would do harm.
+    /// The particles of `parts`; `is_divided` if the file may have several parts, which get numbers then.
     pub(super) fn new(mut parts: Vec<Part>, is_divided: bool) -> Self {
         parts.retain(|part| part.count > 0);
         let counts = parts.iter().map(|part| (part.value, part.count)).collect();
@@ -71,38 +65,21 @@ impl ParticleTable {
             scalar: if is_single { ScalarType::F32 } else { ScalarType::F64 },
             cells,
         };
-        // Collect the values of each name
-        let mut names: Vec<String> = Vec::new();
-        let mut by_name: BTreeMap<String, Vec<Vec<Piece>>> = BTreeMap::new();
-        let part_count = parts.len();
-        for (index, part) in parts.into_iter().enumerate() {
-            for (name, pieces) in part.attributes {
-                let cells = by_name.entry(name.clone()).or_insert_with(|| {
-                    names.push(name);
-                    vec![Vec::new(); part_count]
-                });
-                cells[index] = pieces;
-            }
+        if is_divided {
+            parts.iter_mut().for_each(|part| part.attributes.retain(|(name, _)| name != PART));
         }
-        let mut attributes = Vec::new();
-        let mut left_out = Vec::new();
-        for name in names {
-            let cells = by_name.remove(&name).unwrap_or_default();
-            match Column::of(name, cells) {
-                Ok(column) if is_divided && column.name == PART => left_out.push(column.name),
-                Ok(column) => attributes.push(column),
-                Err(name) => left_out.push(name),
-            }
-        }
+        let layouts: Vec<PartColumns<'_>> = parts.iter().map(Part::columns).collect();
+        let plan = join::plan(&layouts);
+        let attributes = plan.columns.into_iter().map(|column| Column::of(column, &mut parts));
         Self {
+            attributes: attributes.collect(),
             parts: counts,
             positions,
-            attributes,
             is_divided,
             time: None,
             step: None,
             cell: None,
-            left_out,
+            notes: plan.notes,
         }
     }
 
@@ -144,9 +121,9 @@ impl ParticleTable {
         self.cell
     }
 
-    /// Names of attributes that are in some parts only, and left out.
-    pub(super) fn left_out(&self) -> &[String] {
-        &self.left_out
+    /// Which attributes are not in all parts.
+    pub(super) fn notes(&self) -> &[String] {
+        &self.notes
     }
 
     /// Bytes of the largest chunk of each column.
@@ -184,7 +161,7 @@ impl ParticleTable {
         budget.check(need, "its numbers in memory are")?;
         let count = usize::try_from(count).unwrap_or(usize::MAX);
         let read = |column: &Column| {
-            let mut data = zeros(column.scalar, column.components * count);
+            let mut data = AttributeData::zeros(column.scalar, column.components * count);
             let to = data.as_bytes_mut();
             self.read(column, None, 0, to, column.scalar)?;
             data.decode_little_endian();
@@ -216,7 +193,8 @@ impl ParticleTable {
             time: self.time,
             step: self.step,
             cell: self.cell,
-            bonds: Vec::new(),
+            notes: self.notes.clone(),
+            ..RawParticles::default()
         })
     }
 
@@ -279,6 +257,23 @@ impl ParticleTable {
     }
 }
 
+impl Part {
+    /// Its attributes without their values.
+    fn columns(&self) -> PartColumns<'_> {
+        let columns = self.attributes.iter().filter(|(_, pieces)| !pieces.is_empty());
+        let columns = columns.map(|(name, pieces)| ColumnShape {
+            name,
+            components: pieces.iter().map(Piece::components).sum(),
+            scalar: pieces
+                .iter()
+                .map(Piece::scalar)
+                .reduce(ScalarType::common_with)
+                .unwrap_or(ScalarType::F32),
+        });
+        PartColumns { name: &self.name, count: self.count, columns: columns.collect() }
+    }
+}
+
 /// Positions with three components.
 fn with_three(mut pieces: Vec<Piece>) -> Vec<Piece> {
     let components: usize = pieces.iter().map(Piece::components).sum();
@@ -290,23 +285,14 @@ fn with_three(mut pieces: Vec<Piece>) -> Vec<Piece> {
 }
 
 impl Column {
-    /// The property `name` with these values, or its name if it is left out.
-    fn of(name: String, cells: Vec<Vec<Piece>>) -> Result<Self, String> {
-        let width = |cell: &Vec<Piece>| cell.iter().map(Piece::components).sum::<usize>();
-        let mut filled = cells.iter().filter(|cell| !cell.is_empty());
-        let Some(components) = filled.clone().map(width).next() else {
-            return Err(name);
-        };
-        let mut scalars = cells.iter().flatten().map(Piece::scalar);
-        let scalar = scalars.next().unwrap_or(ScalarType::F32);
-        let scalar = scalars.fold(scalar, ScalarType::common_with);
-        let is_float = matches!(scalar, ScalarType::F32 | ScalarType::F64);
-        let may_miss = components == 1 && is_float && !is_radius_name(&name);
-        let is_in_all = cells.iter().all(|cell| !cell.is_empty());
-        if !filled.all(|cell| width(cell) == components) || !(is_in_all || may_miss) {
-            return Err(name);
+    /// A joined property with its values, which are taken from `parts`.
+    fn of(column: JoinedColumn, parts: &mut [Part]) -> Self {
+        let JoinedColumn { name, components, scalar, cells: places } = column;
+        let mut cells = vec![Vec::new(); parts.len()];
+        for (part, place) in places {
+            cells[part] = std::mem::take(&mut parts[part].attributes[place].1);
         }
-        Ok(Self { name, components, scalar, cells })
+        Self { name, components, scalar, cells }
     }
 
     /// Bytes of its largest chunk.

@@ -171,6 +171,7 @@ impl Dialect for VtkHdf {
         }
         let part = Part {
             value: 0,
+            name: String::new(),
             count,
             positions: vec![Piece::Stored(positions)],
             attributes: finder.found,

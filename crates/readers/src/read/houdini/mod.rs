@@ -125,14 +125,8 @@ fn particles(
         count.ok_or_else(|| ParseError::malformed(end, "the file has no number of points"))?;
     let endian = binary_json::endian(bytes)
         .ok_or_else(|| ParseError::malformed(0, "not Houdini's binary JSON"))?;
-    let mut particles = RawParticles {
-        positions: Positions::F32(Vec::new()),
-        attributes: Vec::new(),
-        time: None,
-        step: None,
-        cell: None,
-        bonds: Vec::new(),
-    };
+    let mut particles =
+        RawParticles { positions: Positions::F32(Vec::new()), ..RawParticles::default() };
     let mut has_positions = false;
     for attribute in &geometry.attributes {
         let left = budget.less(particles.byte_len());

@@ -209,7 +209,7 @@ fn read(
         time: header.time,
         step: header.number,
         cell: header.bounds.and_then(|bounds| bounds.cell(header.periodic)),
-        bonds: Vec::new(),
+        ..RawParticles::default()
     })
 }
 

@@ -120,10 +120,9 @@ impl Reader for MmCif {
         Ok(RawParticles {
             positions,
             attributes,
-            time: None,
             step: step.number,
             cell: rows.cell(),
-            bonds: Vec::new(),
+            ..RawParticles::default()
         })
     }
 

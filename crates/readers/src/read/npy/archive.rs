@@ -207,11 +207,7 @@ impl<'a> Archive<'a> {
         }
         Ok(RawParticles {
             positions: columns::positions(parts, layout.count),
-            attributes: Vec::new(),
-            time: None,
-            step: None,
-            cell: None,
-            bonds: Vec::new(),
+            ..RawParticles::default()
         })
     }
 

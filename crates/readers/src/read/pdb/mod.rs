@@ -219,12 +219,5 @@ fn read(
         return Err(ParseError::malformed(range.start, what));
     }
     let (positions, attributes) = atoms.into_parts();
-    Ok(RawParticles {
-        positions,
-        attributes,
-        time: None,
-        step: step.number,
-        cell,
-        bonds: Vec::new(),
-    })
+    Ok(RawParticles { positions, attributes, step: step.number, cell, ..RawParticles::default() })
 }

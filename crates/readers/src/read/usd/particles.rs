@@ -10,32 +10,16 @@ use super::prim::{Prim, PrimKind, Property};
 use super::scene::{ParticlePrims, numbers_at, positions, tokens_at};
 use super::transform::world_from_prim;
 use crate::read::columns;
-use spherule_frame::names::is_radius_name;
+use spherule_frame::join::{Part, join, join_numbered};
 use spherule_frame::{
-    Attribute, AttributeData, MemoryBudget, ParseError, Positions, RawParticles, ScalarType,
+    Attribute, AttributeData, MemoryBudget, ParseError, RawParticles, map_values,
 };
 
-/// The attribute that tells prims apart.
-pub(super) const PART: &str = "part";
 /// The attribute that widths become: that of a sphere is its diameter.
 pub(super) const DIAMETER: &str = "diameter";
 
 const PRIMVARS: &[u8] = b"primvars:";
 const INDICES: &[u8] = b":indices";
-
-/// The particles of a prim.
-struct Part {
-    number: u32,
-    positions: Numbers,
-    columns: Vec<Column>,
-}
-
-/// A property of the particles of a prim.
-struct Column {
-    name: String,
-    components: usize,
-    data: AttributeData,
-}
 
 /// Reads the particles of all prims at a time code.
 ///
@@ -51,33 +35,25 @@ pub(super) fn particles(
     let mut left = MemoryBudget::less(budget, budget.bytes() / 2);
     let mut parts = Vec::new();
     for (number, prim) in (0..).zip(&prims.prims) {
-        if let Some(part) = part(layer, *prim, number, time, &mut left)? {
-            parts.push(part);
+        if let Some(particles) = particles_of(layer, *prim, time, &mut left)? {
+            let name = layer.path(&layer.chain(*prim).unwrap_or_default());
+            parts.push(Part { number, name, particles });
         }
     }
-    let is_divided = prims.prims.len() > 1;
-    let part_numbers = is_divided.then(|| part_numbers(&parts));
-    let mut attributes = joined(&mut parts, is_divided);
-    attributes.extend(part_numbers);
-    let positions = parts.into_iter().map(|part| part.positions.data);
-    Ok(RawParticles {
-        positions: joined_positions(positions.collect()),
-        attributes,
-        time: time.map(|time| time / layer.metadata.rate()),
-        step: None,
-        cell: None,
-        bonds: Vec::new(),
-    })
+    let joined = match prims.prims.len() {
+        0 | 1 => join(parts, budget),
+        _ => join_numbered(parts, budget),
+    }?;
+    Ok(RawParticles { time: time.map(|time| time / layer.metadata.rate()), ..joined })
 }
 
 /// The particles of the prim with index `prim`; `None` if it has none, or is not drawn.
-fn part(
+fn particles_of(
     layer: &Layer<'_>,
     prim: usize,
-    number: u32,
     time: Option<f64>,
     budget: &mut MemoryBudget,
-) -> Result<Option<Part>, ParseError> {
+) -> Result<Option<RawParticles>, ParseError> {
     let chain = layer.chain(prim).unwrap_or_default();
     let (Some(own), Some(property)) = (layer.prims.get(prim), positions(layer, prim)) else {
         return Ok(None);
@@ -115,7 +91,7 @@ fn part(
     *budget = budget.less(positions.data.byte_len());
     // Read everything else
     let mut names = BTreeSet::new();
-    let mut columns = Vec::new();
+    let mut attributes = Vec::new();
     for property in layer.properties(own) {
         let Some(name) = attribute_name(layer, own, property) else {
             continue;
@@ -136,9 +112,11 @@ fn part(
         }
         *budget = budget.less(data.byte_len());
         names.insert(name.clone());
-        columns.push(Column { name, components: values.components, data });
+        attributes.push(Attribute { name, components: values.components, data });
     }
-    Ok(Some(Part { number, positions, columns }))
+    let count = positions.len();
+    let positions = columns::positions(vec![positions.data], count);
+    Ok(Some(RawParticles { positions, attributes, ..RawParticles::default() }))
 }
 
 /// Whether a prim is hidden at a time code.
@@ -202,18 +180,6 @@ fn values(
     Ok(data.map(|data| Numbers { data, ..values }))
 }
 
-/// Runs `$body` for the vector in `$data`, and puts the vector that it gives into the same variant.
-macro_rules! mapped {
-    ($data:expr, $v:ident => $body:expr) => {
-        mapped!(@ $data, $v => $body, I8 U8 I16 U16 I32 U32 I64 U64 F32 F64)
-    };
-    (@ $data:expr, $v:ident => $body:expr, $($variant:ident)*) => {
-        match $data {
-            $(AttributeData::$variant($v) => AttributeData::$variant($body),)*
-        }
-    };
-}
-
 fn at_indices(data: &AttributeData, components: usize, indices: &[i32]) -> Option<AttributeData> {
     let most = data.len() / components.max(1);
     let is_inside = |index: &i32| usize::try_from(*index).is_ok_and(|index| index < most);
@@ -224,7 +190,7 @@ fn at_indices(data: &AttributeData, components: usize, indices: &[i32]) -> Optio
         let start = components * index.unsigned_abs() as usize;
         start..start + components
     });
-    Some(mapped!(data, v => places.map(|place| v[place]).collect()))
+    Some(map_values!(data, v => places.map(|place| v[place]).collect()))
 }
 
 /// The values if there is one for each of `count` particles; a single one is repeated. `None` for other lengths.
@@ -242,7 +208,7 @@ fn for_each_particle(
     }
     let need = (count as u64).saturating_mul(data.byte_len());
     budget.check(need, "its numbers in memory are")?;
-    Ok(Some(mapped!(data, v => v.repeat(count))))
+    Ok(Some(map_values!(data, v => v.repeat(count))))
 }
 
 fn transformed(positions: &AttributeData, world: DAffine3) -> AttributeData {
@@ -280,82 +246,4 @@ fn transform_attribute(name: &str, data: &mut AttributeData, world: DAffine3) {
         }
         _ => {}
     }
-}
-
-fn part_numbers(parts: &[Part]) -> Attribute {
-    let numbers =
-        parts.iter().flat_map(|part| std::iter::repeat_n(part.number, part.positions.len()));
-    Attribute { name: PART.to_owned(), components: 1, data: AttributeData::U32(numbers.collect()) }
-}
-
-/// The attributes of all parts. A scalar of floating point that some parts do not have is NaN there; other attributes
-/// that are not in all parts are left out.
-fn joined(parts: &mut [Part], is_divided: bool) -> Vec<Attribute> {
-    let mut names: Vec<String> = Vec::new();
-    let mut known = BTreeSet::new();
-    for column in parts.iter().flat_map(|part| &part.columns) {
-        let is_new = known.insert(column.name.clone());
-        if is_new && !(is_divided && column.name == PART) {
-            names.push(column.name.clone());
-        }
-    }
-    // Columns in the order of `names`, so that each is found at once
-    for part in &mut *parts {
-        part.columns.sort_by(|a, b| a.name.cmp(&b.name));
-    }
-    names.into_iter().filter_map(|name| joined_column(parts, name)).collect()
-}
-
-fn joined_column(parts: &mut [Part], name: String) -> Option<Attribute> {
-    let find = |part: &Part| part.columns.binary_search_by(|column| column.name.cmp(&name)).ok();
-    let places: Vec<Option<usize>> = parts.iter().map(find).collect();
-    let mut there =
-        parts.iter().zip(&places).filter_map(|(part, place)| part.columns.get((*place)?));
-    let first = there.next()?;
-    let (components, scalar) = (first.components, first.data.scalar_type());
-    let is_float = matches!(scalar, ScalarType::F32 | ScalarType::F64);
-    let may_miss = components == 1 && is_float && !is_radius_name(&name);
-    let is_alike =
-        there.all(|column| column.components == components && column.data.scalar_type() == scalar);
-    if !is_alike || !(may_miss || places.iter().all(Option::is_some)) {
-        return None;
-    }
-    let mut data = columns::zeros(scalar, 0);
-    if parts.len() > 1 {
-        let count: usize = parts.iter().map(|part| part.positions.len()).sum();
-        data.reserve(components * count);
-    }
-    for (part, place) in parts.iter_mut().zip(places) {
-        let none = || match scalar {
-            ScalarType::F32 => AttributeData::F32(vec![f32::NAN; part.positions.len()]),
-            _ => AttributeData::F64(vec![f64::NAN; part.positions.len()]),
-        };
-        let mut own = match place.and_then(|place| part.columns.get_mut(place)) {
-            Some(column) => std::mem::replace(&mut column.data, AttributeData::U8(Vec::new())),
-            None => none(),
-        };
-        data.append(&mut own);
-    }
-    Some(Attribute { name, components, data })
-}
-
-fn joined_positions(parts: Vec<AttributeData>) -> Positions {
-    let is_single = parts.iter().all(|part| matches!(part, AttributeData::F32(_)));
-    let count = parts.iter().map(AttributeData::len).sum::<usize>() / 3;
-    let scalar = if is_single { ScalarType::F32 } else { ScalarType::F64 };
-    let mut all = columns::zeros(scalar, 0);
-    for part in parts {
-        let mut part = match part {
-            AttributeData::F32(v) if !is_single => {
-                AttributeData::F64(v.into_iter().map(f64::from).collect())
-            }
-            part => part,
-        };
-        if all.is_empty() {
-            all = part;
-        } else {
-            all.append(&mut part);
-        }
-    }
-    columns::positions(vec![all], count)
 }

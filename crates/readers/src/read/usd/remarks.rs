@@ -1,10 +1,11 @@
 //! Remarks about a USD file: units, parts, and what is not in its particles.
 
 use super::layer::Layer;
-use super::particles::{DIAMETER, PART, attribute_name};
+use super::particles::{DIAMETER, attribute_name};
 use super::prim::PrimKind;
 use super::scene::{ParticlePrims, numbers_at};
 use spherule_frame::MemoryBudget;
+use spherule_frame::join::PART;
 
 /// Most parts that a remark lists.
 const LISTED: usize = 12;

@@ -2,7 +2,7 @@
 //! line, with the odd spellings of NaN and infinity that C libraries print.
 
 use crate::read::input::TextInput;
-use spherule_frame::{AttributeData, MemoryBudget, ParseError, ScalarType};
+use spherule_frame::{AttributeData, MemoryBudget, ParseError, ScalarType, with_number_type};
 
 /// [`read_values`] of `text` from byte `at` on; returns them and the byte after the last.
 ///
@@ -32,22 +32,8 @@ pub(super) fn read_values(
     budget: MemoryBudget,
 ) -> Result<AttributeData, ParseError> {
     check_room(text, count)?;
-    macro_rules! read {
-        ($variant:ident, $ty:ty) => {
-            AttributeData::$variant(read_numbers::<$ty>(text, count, budget)?)
-        };
-    }
-    Ok(match scalar {
-        ScalarType::I8 => read!(I8, i8),
-        ScalarType::U8 => read!(U8, u8),
-        ScalarType::I16 => read!(I16, i16),
-        ScalarType::U16 => read!(U16, u16),
-        ScalarType::I32 => read!(I32, i32),
-        ScalarType::U32 => read!(U32, u32),
-        ScalarType::I64 => read!(I64, i64),
-        ScalarType::U64 => read!(U64, u64),
-        ScalarType::F32 => read!(F32, f32),
-        ScalarType::F64 => read!(F64, f64),
+    with_number_type!(scalar, Number => {
+        Ok(read_numbers::<Number>(text, count, budget)?.into())
     })
 }
 

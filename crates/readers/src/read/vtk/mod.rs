@@ -111,9 +111,7 @@ impl Reader for LegacyVtk {
             positions: positions(points.numbers.decode(bytes)?),
             attributes: attributes?,
             time,
-            step: None,
-            cell: None,
-            bonds: Vec::new(),
+            ..RawParticles::default()
         })
     }
 

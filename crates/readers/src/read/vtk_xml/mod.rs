@@ -68,7 +68,7 @@ impl Reader for XmlVtk {
         Ok(vec![step])
     }
 
-    /// Reads all pieces. Attributes that not all pieces have, with one type, are left out.
+    /// Reads all pieces.
     ///
     /// [`ParseError::Malformed`] if the file is cut short or breaks the format,
     /// [`ParseError::Unsupported`] if it is a grid, a list of files, or of an unknown compressor.
@@ -81,14 +81,8 @@ impl Reader for XmlVtk {
         parse(source.bytes(), XmlPart::Particles, |mut document, appended| {
             check_shares(&document, appended)?;
             document.encoding.decoders = check_memory(&document, budget)?;
-            Ok(RawParticles {
-                positions: merge::positions(&document, appended)?,
-                attributes: merge::attributes(&document, appended)?,
-                time: time(&document, appended),
-                step: None,
-                cell: None,
-                bonds: Vec::new(),
-            })
+            let particles = merge::particles(&document, appended, budget)?;
+            Ok(RawParticles { time: time(&document, appended), ..particles })
         })
     }
 

@@ -93,11 +93,10 @@ impl Reader for Xtc {
         };
         Ok(RawParticles {
             positions: Positions::F32(positions),
-            attributes: Vec::new(),
             time: Some(frame.summary.time),
             step: Some(frame.summary.number.into()),
             cell: frame.cell,
-            bonds: Vec::new(),
+            ..RawParticles::default()
         })
     }
 

@@ -112,7 +112,7 @@ pub(super) fn read(
         );
         return Err(ParseError::malformed(count_at, what));
     }
-    Ok(RawParticles { positions, attributes, time, step: number, cell, bonds: Vec::new() })
+    Ok(RawParticles { positions, attributes, time, step: number, cell, ..RawParticles::default() })
 }
 
 /// Bytes that a column takes on the way to its array, with its name.

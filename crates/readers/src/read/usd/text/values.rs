@@ -69,7 +69,11 @@ impl<'a> TextFile<'a> {
         let size = number_type.in_memory().size() as u64;
         budget.check(most.saturating_mul(size), "its numbers in memory are")?;
         let lexer = Lexer::new(self.bytes, value.range.clone());
-        let mut words = Words { lexer, bytes: self.bytes, data: empty(number_type.in_memory()) };
+        let mut words = Words {
+            lexer,
+            bytes: self.bytes,
+            data: AttributeData::zeros(number_type.in_memory(), 0),
+        };
         if is_array {
             words.array(number_type)?;
         } else {
@@ -82,10 +86,6 @@ impl<'a> TextFile<'a> {
             is_quaternion: number_type.is_quaternion,
         }))
     }
-}
-
-fn empty(scalar: ScalarType) -> AttributeData {
-    crate::read::columns::zeros(scalar, 0)
 }
 
 /// Reads the numbers of a value.

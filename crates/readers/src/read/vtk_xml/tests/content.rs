@@ -37,7 +37,7 @@ fn every_encoding_of_every_size_is_read() {
 }
 
 #[test]
-fn only_attributes_of_all_pieces_are_kept() {
+fn pieces_have_nan_for_what_they_lack() {
     let piece = |made: Made, n: usize, extra: &[(&str, usize, AttributeData)]| {
         let mut made = made
             .xml(&format!("<Piece NumberOfPoints=\"{n}\"><Points>"))
@@ -64,8 +64,16 @@ fn only_attributes_of_all_pieces_are_kept() {
     let file = piece(file, 0, &[]);
     let file = piece(file, 1, &[("d", 1, bytes(1)), ("c", 1, bytes(1)), ("a", 1, ids(1))]);
     let found = good(&file.end());
-    assert_eq!(names(&found), ["a"]);
+    assert_eq!(names(&found), ["a", "b", "c"]);
     assert_eq!(attribute(&found, "a").data, AttributeData::U32(vec![0, 7, 0]));
+    assert_eq!(attribute(&found, "c").data, AttributeData::U32(vec![0, 7, 1]));
+    assert!(attribute(&found, "b").data.get_f64(2).is_nan());
+    let notes = [
+        "part `piece 2` without `b`: NaN there",
+        "`d` with different numbers of components in parts `piece 0`, `piece 2`: left out",
+        "several columns `a` in part `piece 0`: the first is used",
+    ];
+    assert_eq!(found.notes, notes);
 }
 
 #[test]

@@ -1,0 +1,136 @@
+//! Parts of a time step become one set of particles, by one rule wherever the parts come from: files, pieces of a file,
+//! blocks, prims or groups.
+//!
+//! Columns of one name are one column, in the smallest type that holds the numbers of all parts. Where a part lacks a
+//! column, its particles have NaN there, and integers become floating point. [`plan`] says which columns there are and
+//! what is reported; [`join`] also copies the numbers.
+
+mod notes;
+mod plan;
+
+pub use plan::{ColumnShape, JoinPlan, JoinedColumn, PartColumns, plan};
+
+use crate::bonds::Bond;
+use crate::{Attribute, AttributeData, MemoryBudget, ParseError, Positions, RawParticles};
+
+/// The column that tells parts apart by their numbers.
+pub const PART: &str = "part";
+
+/// Most notes of joined particles.
+const MAX_NOTES: usize = 100;
+
+/// One of the parts of a time step.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Part {
+    /// Value of the column [`PART`].
+    pub number: u32,
+    /// Name in messages, and in conditions.
+    pub name: String,
+    /// Its particles.
+    pub particles: RawParticles,
+}
+
+/// Puts `parts` after one another. Notes of the result say what not all of them have.
+///
+/// # Errors
+/// [`ParseError::TooLarge`] if the joined columns do not fit into `budget`.
+pub fn join(mut parts: Vec<Part>, budget: MemoryBudget) -> Result<RawParticles, ParseError> {
+    // Find out which columns there are
+    let layouts: Vec<PartColumns<'_>> = parts.iter().map(PartColumns::of).collect();
+    let count = layouts.iter().map(|part| part.count).fold(0, u64::saturating_add);
+    let JoinPlan { columns, notes } = plan(&layouts);
+    let width = |column: &JoinedColumn| (column.components * column.scalar.size()) as u64;
+    let need = columns.iter().map(width).fold(0, u64::saturating_add).saturating_mul(count);
+    budget.check(need, "the joined columns of its parts are")?;
+    // Copy the numbers, column by column: those of the parts are freed on the way
+    let counts: Vec<usize> = parts.iter().map(|part| part.particles.positions.len()).collect();
+    let attributes =
+        columns.into_iter().map(|column| filled(column, &mut parts, &counts)).collect();
+    let mut joined = RawParticles { attributes, notes, ..RawParticles::default() };
+    joined.bonds = joined_bonds(&parts);
+    let mut positions = Vec::with_capacity(parts.len());
+    for Part { particles, .. } in parts {
+        joined.time = joined.time.or(particles.time);
+        joined.step = joined.step.or(particles.step);
+        joined.cell = joined.cell.or(particles.cell);
+        for note in particles.notes {
+            if !joined.notes.contains(&note) && joined.notes.len() < MAX_NOTES {
+                joined.notes.push(note);
+            }
+        }
+        positions.push(particles.positions);
+    }
+    joined.positions = Positions::joined(positions);
+    Ok(joined)
+}
+
+/// [`join`], with the numbers of the parts as a column [`PART`] in place of columns of this name.
+///
+/// # Errors
+/// As [`join`].
+pub fn join_numbered(
+    mut parts: Vec<Part>,
+    budget: MemoryBudget,
+) -> Result<RawParticles, ParseError> {
+    let mut numbers = Vec::new();
+    for Part { number, particles, .. } in &mut parts {
+        particles.attributes.retain(|attribute| attribute.name != PART);
+        numbers.resize(numbers.len() + particles.positions.len(), *number);
+    }
+    let mut joined = join(parts, budget)?;
+    joined.attributes.push(Attribute {
+        name: PART.to_owned(),
+        components: 1,
+        data: AttributeData::U32(numbers),
+    });
+    Ok(joined)
+}
+
+impl<'a> PartColumns<'a> {
+    fn of(part: &'a Part) -> Self {
+        let columns = part.particles.attributes.iter().map(|attribute| ColumnShape {
+            name: &attribute.name,
+            components: attribute.components,
+            scalar: attribute.data.scalar_type(),
+        });
+        let count = part.particles.positions.len() as u64;
+        Self { name: &part.name, count, columns: columns.collect() }
+    }
+}
+
+/// The numbers of `column`, taken from `parts` with these `counts` of particles.
+fn filled(column: JoinedColumn, parts: &mut [Part], counts: &[usize]) -> Attribute {
+    let JoinedColumn { name, components, scalar, cells } = column;
+    let mut data = AttributeData::zeros(scalar, 0);
+    if counts.len() > 1 {
+        data.reserve(components * counts.iter().sum::<usize>());
+    }
+    let mut cells = cells.into_iter().peekable();
+    for (index, (part, count)) in parts.iter_mut().zip(counts).enumerate() {
+        match cells.next_if(|(part, _)| *part == index) {
+            Some((_, place)) => {
+                let own = &mut part.particles.attributes[place].data;
+                let own = std::mem::replace(own, AttributeData::U8(Vec::new()));
+                data.append(own.into_type(scalar));
+            }
+            None => data.append_nan(components * count),
+        }
+    }
+    Attribute { name, components, data }
+}
+
+/// The bonds of all parts, by the indices that their particles have behind one another.
+fn joined_bonds(parts: &[Part]) -> Vec<Bond> {
+    let mut bonds = Vec::new();
+    let mut first = 0_usize;
+    for Part { particles, .. } in parts {
+        let start = u32::try_from(first).unwrap_or(u32::MAX);
+        let moved = particles.bonds.iter().map(|bond| bond.map(|i| i.saturating_add(start)));
+        bonds.extend(moved);
+        first += particles.positions.len();
+    }
+    bonds
+}
+
+#[cfg(test)]
+mod tests;
