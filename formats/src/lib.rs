@@ -54,5 +54,5 @@ pub use spherule_frame::{
     SimulationCell, choose_origin, find_radius, generate, is_near, is_radius, names,
     sample_indices,
 };
-pub use spherule_readers::{Format, mesh, read, read::element_symbol};
+pub use spherule_readers::{Format, ValueNames, mesh, read, read::element_symbol};
 pub use spherule_tree::{blocks, order};
