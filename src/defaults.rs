@@ -2,31 +2,34 @@
 //! data. Each rule gives settings under those of the manifest and its look, so that naming a key overrides it, and a
 //! line that says what it did. `docs/manual/defaults.md` lists the rules.
 
-use glam::DVec3;
+use spherule_formats::read::bead_name;
 use spherule_formats::sequence::PART_ATTRIBUTE;
+use spherule_formats::{ValueNames, element_symbol};
 use toml::Value;
 
-use crate::manifest::{
-    CameraMode, ColorSetting, Look, Manifest, ManifestSource, Override, ProjectionKind,
-};
+use crate::manifest::{ColorSetting, Look, Manifest, ManifestSource, Override, ProjectionKind};
 use crate::render::IntegratorKind;
+use crate::scene::ColorMap;
 use crate::surface::SurfaceKind;
-use crate::survey::{Category, ELEMENT, Facts, WallSign, WallValues};
+use crate::survey::{BEAD, Category, ELEMENT, Facts, GrainRadius, Tank, WallSign, WallValues};
 
 mod legend;
 mod parts;
 mod planned;
+mod view;
 
 pub use parts::{Walls, walls};
 pub use planned::planned;
 
 /// The keys that rules set, except overlays. A job that goes on has the values of its plan.
-const KEYS: [&str; 18] = [
+const KEYS: [&str; 20] = [
     "input.radius",
     "input.up",
     "input.parts",
     "select.where",
     "camera.projection",
+    "camera.fit",
+    "camera.up",
     "camera.view",
     "camera.azimuth",
     "camera.elevation",
@@ -45,6 +48,10 @@ const KEYS: [&str; 18] = [
 /// The key of the colours of particles.
 const COLOR: &str = "material.color";
 
+/// The colours of elements, and those with white atoms that can be seen in front of white.
+const ELEMENTS: &str = ColorMap::ELEMENTS;
+const ON_WHITE: &str = ColorMap::ELEMENTS_ON_WHITE;
+
 /// The colour of particles without elements, categories, colours and velocities, linear RGB: light, so that shading shows
 /// their form.
 const NEUTRAL: [f64; 3] = [0.42, 0.47, 0.54];
@@ -58,6 +65,9 @@ const CELL_VIEW: [f64; 2] = [20.0, 12.0];
 /// A cell is drawn if the particles extend along at least this part of two of its edges, as in a crystal, a liquid or a
 /// slab; in a larger one they would be small.
 const FILLED: f64 = 0.7;
+
+/// The least extent of particles along each edge of a cell without periodic boundaries that is drawn.
+const LEAST_FILLED: f64 = 0.4;
 
 /// The part of the particles that must be in a cell that is drawn: those of a molecule that was made whole, or moved, are
 /// not.
@@ -86,6 +96,8 @@ struct Rules<'a> {
 pub struct Files<'a> {
     /// Names of the parts of a step, by the numbers in the attribute `part`.
     pub parts: &'a [String],
+    /// Names behind the numbers of other attributes.
+    pub names: &'a [ValueNames],
     /// Whether y is up, and not z.
     pub is_y_up: bool,
 }
@@ -102,7 +114,9 @@ pub fn rules(
         return rules.found;
     }
     rules.up();
+    rules.grains();
     rules.lone();
+    rules.sheet();
     rules.random();
     let has_left_out = rules.leave_out();
     rules.elements();
@@ -111,7 +125,9 @@ pub fn rules(
     rules.neutral();
     rules.cell();
     rules.floor();
+    rules.molecule();
     rules.flat();
+    rules.tails();
     if rules.is_white() {
         rules.white();
     }
@@ -159,7 +175,7 @@ impl Rules<'_> {
                 Some(line.to_owned()),
             );
         }
-        let is_molecular = self.facts.elements.is_some() || self.is_periodic();
+        let is_molecular = self.is_molecular() || self.is_periodic();
         // Parts with names are walls by these alone
         let has_names = |c: &&Category| c.name == PART_ATTRIBUTE && self.files.parts.len() > 1;
         let mut all = self.facts.categories.iter().filter(|c| !has_names(c));
@@ -180,6 +196,10 @@ impl Rules<'_> {
             );
             has_left_out = self.lacks("select.where");
             self.set([("select.where", all.join(" && ").into())], Some(line));
+        } else if let Some(tank) = self.facts.tank.as_ref().filter(|_| !is_molecular) {
+            let Tank { condition, why, all } = tank;
+            let line = format!("left out: walls, {why} (--where '{all}' shows them)");
+            self.set([("select.where", condition.clone().into())], Some(line));
         }
         has_left_out
     }
@@ -189,6 +209,11 @@ impl Rules<'_> {
         if self.facts.has_bonds {
             let line = "bonds of the file are drawn (--bonds none leaves them out)";
             self.set([("bonds.find", "file".into())], Some(line.to_owned()));
+        }
+        if self.facts.has_beads {
+            let line = "the particles are beads: neighbours are farther apart than atoms (--color-by element --radius \
+                        vdw draws atoms)";
+            self.found.lines.push(line.to_owned());
         }
         if self.facts.elements.is_none() {
             return;
@@ -212,7 +237,10 @@ impl Rules<'_> {
             self.set(
                 [
                     ("material.color.attribute", ELEMENT.into()),
-                    ("material.color.map", "jmol".into()),
+                    (
+                        "material.color.map",
+                        if self.is_white() { ON_WHITE } else { ELEMENTS }.into(),
+                    ),
                     ("material.color.scale", "categorical".into()),
                 ],
                 Some(line.to_owned()),
@@ -229,7 +257,10 @@ impl Rules<'_> {
         let values = |category: &Category| {
             if has_left_out { category.without_walls.len() } else { category.values.len() }
         };
-        let Some(category) = self.facts.categories.iter().find(|c| values(c) > 1) else {
+        // Numbers of beads that are no elements mean nothing without their names
+        let is_told = |c: &&Category| !self.facts.has_beads || c.name != ELEMENT;
+        let mut all = self.facts.categories.iter().filter(is_told);
+        let Some(category) = all.find(|c| values(c) > 1) else {
             return;
         };
         if self.facts.elements.is_none() && !self.facts.has_colors && self.has_open_colors() {
@@ -245,18 +276,31 @@ impl Rules<'_> {
                 ],
                 Some(line),
             );
-            if category.name == PART_ATTRIBUTE && self.files.parts.len() > 1 {
-                let names: toml::Table = self
-                    .files
-                    .parts
-                    .iter()
-                    .enumerate()
-                    .map(|(number, name)| (number.to_string(), name.clone().into()))
-                    .filter(|(number, _)| category.values.iter().any(|v| v.to_string() == *number))
-                    .collect();
+            let names = self.names_of(category);
+            if !names.is_empty() {
                 self.set([("material.color.names", names.into())], None);
             }
         }
+    }
+
+    /// The names of the values of `category` that the files give.
+    fn names_of(&self, category: &Category) -> toml::Table {
+        let name = |value: i64| -> Option<String> {
+            if category.name == PART_ATTRIBUTE && self.files.parts.len() > 1 {
+                return self.files.parts.get(usize::try_from(value).ok()?).cloned();
+            }
+            if category.name == BEAD {
+                return bead_name(value).map(str::to_owned);
+            }
+            let mut all = self.files.names.iter();
+            let names = all.find(|names| names.attribute.eq_ignore_ascii_case(&category.name))?;
+            let known = names.names.iter().find(|(known, _)| *known == value);
+            known.map(|(_, name)| name.clone()).or_else(|| {
+                element_symbol(value).filter(|_| category.name == ELEMENT).map(str::to_owned)
+            })
+        };
+        let named = category.values.iter().filter_map(|value| Some((*value, name(*value)?)));
+        named.map(|(value, name)| (value.to_string(), name.into())).collect()
     }
 
     /// Whether no value or colour is given for the particles; a map may be.
@@ -268,14 +312,48 @@ impl Rules<'_> {
         }
     }
 
+    /// Columns whose values are plausible radii are radii.
+    fn grains(&mut self) {
+        let is_open = !self.facts.has_radii && !self.is_molecular() && !self.draws_a_body();
+        if let Some(grains) = self.facts.grain_radius.as_ref().filter(|_| is_open) {
+            let GrainRadius { attribute, scale } = grains;
+            let what = if *scale == 1.0 { "radii" } else { "diameters" };
+            let line =
+                format!("`{attribute}` has the {what} (--radius auto follows the distances)");
+            let keys = [("attribute", attribute.clone().into()), ("scale", Value::from(*scale))];
+            let keys = keys.map(|(key, value)| (key.to_owned(), value));
+            let radius: Value = toml::Table::from_iter(keys).into();
+            self.set([("input.radius", radius)], Some(line));
+        }
+    }
+
     /// Particles at one place have no spacing.
     fn lone(&mut self) {
         let is_point = self.facts.bounds.is_some_and(|(min, max)| min == max);
-        let has_size = self.facts.has_radii || self.facts.elements.is_some();
+        let has_size =
+            self.facts.has_radii || self.facts.elements.is_some() || self.has_set("input.radius");
         if is_point && !has_size && !self.draws_a_body() {
             let line =
                 "radius 1, as particles at one place have no spacing (--radius gives another)";
             self.set([("input.radius", 1.0.into())], Some(line.to_owned()));
+        }
+    }
+
+    /// Particles in a plane or on a surface have the radius that covers it.
+    fn sheet(&mut self) {
+        let is_open = !self.facts.has_radii && !self.is_molecular() && !self.draws_a_body();
+        if let Some(radius) = self.facts.covering_radius.filter(|_| is_open) {
+            let radius = three_digits(radius);
+            let is_flat = self.facts.flat_axis().is_some();
+            let what = if is_flat { "plane" } else { "surface" };
+            let line = format!(
+                "radius {radius}, large enough to cover the {what} of the particles (--radius gives another)"
+            );
+            self.set([("input.radius", radius.into())], Some(line));
+            // Nothing falls on the floor under a surface, but thin layers of a fluid lie on it
+            if !is_flat && !self.facts.has_velocities {
+                self.set([("render.ground", "none".into())], None);
+            }
         }
     }
 
@@ -298,14 +376,19 @@ impl Rules<'_> {
 
     /// Which way is up, where neither the format nor the user says it.
     fn up(&mut self) {
-        if self.facts.is_y_up
-            && !self.files.is_y_up
-            && self.facts.elements.is_none()
-            && !self.is_periodic()
-        {
-            let line =
-                "up is y: the particles lie on a plane at the lower end of the y axis (--up z)";
-            self.set([("input.up", "y".into())], Some(line.to_owned()));
+        let is_open = !self.files.is_y_up && !self.is_molecular() && !self.is_periodic();
+        if let Some(up) = self.facts.up.filter(|_| is_open) {
+            let (name, end) = match up.to_array().map(|part| part as i8) {
+                [1, ..] => ("x", "lower"),
+                [-1, ..] => ("-x", "upper"),
+                [_, -1, _] => ("-y", "upper"),
+                _ => ("y", "lower"),
+            };
+            let axis = name.trim_start_matches('-');
+            let line = format!(
+                "up is {name}: the particles lie on a plane at the {end} end of the {axis} axis (--up z)"
+            );
+            self.set([("input.up", name.into())], Some(line));
         }
     }
 
@@ -328,6 +411,11 @@ impl Rules<'_> {
         }
     }
 
+    /// Whether the particles are atoms, or groups of them.
+    fn is_molecular(&self) -> bool {
+        self.facts.elements.is_some() || self.facts.has_beads
+    }
+
     fn is_periodic(&self) -> bool {
         let cell = self.facts.cell.as_ref();
         cell.is_some_and(|cell| cell.periodic.contains(&true))
@@ -335,8 +423,11 @@ impl Rules<'_> {
 
     /// A simulation cell is drawn without perspective.
     fn cell(&mut self) {
-        let filled = self.facts.cell_extent.iter().filter(|part| **part >= FILLED).count();
-        if self.facts.cell.is_none() || filled < 2 || self.facts.in_cell < INSIDE {
+        let extent = self.facts.cell_extent;
+        let filled = extent.iter().filter(|part| **part >= FILLED).count();
+        // A box of walls may be much larger than what has come to rest in it
+        let is_empty = !self.is_periodic() && extent.iter().any(|part| *part < LEAST_FILLED);
+        if self.facts.cell.is_none() || filled < 2 || self.facts.in_cell < INSIDE || is_empty {
             return;
         }
         let line =
@@ -357,7 +448,7 @@ impl Rules<'_> {
 
     /// Molecules and periodic cells stand on nothing.
     fn floor(&mut self) {
-        if self.facts.elements.is_some() || self.is_periodic() {
+        if self.is_molecular() || self.is_periodic() {
             self.set([("render.ground", "none".into())], None);
         }
     }
@@ -371,48 +462,6 @@ impl Rules<'_> {
             && !self.has_set("camera.projection")
         {
             self.set([("camera.fov", FOV.into())], None);
-        }
-    }
-
-    fn is_placed_automatically(&self) -> bool {
-        matches!(self.manifest.camera.mode, CameraMode::Auto | CameraMode::Turntable)
-    }
-
-    /// Two-dimensional data are seen from the front, in flat light.
-    fn flat(&mut self) {
-        let (Some(axis), true) = (self.facts.flat_axis(), self.is_placed_automatically()) else {
-            return;
-        };
-        let is_y_up = self.files.is_y_up || self.has_set("input.up");
-        let usual = if is_y_up { DVec3::Y } else { DVec3::Z };
-        let own = self.manifest.input.up.map(|up| DVec3::from_array(up.vector()));
-        let side = side_along(axis, own.unwrap_or(usual));
-        if self.lacks("camera.azimuth") && self.lacks("camera.elevation") {
-            self.set([("camera.view", side.into())], None);
-        }
-        // Atoms are told apart by their shading, and so are particles of one colour
-        let is_lit = self.facts.elements.is_some() || !self.has_mapped_colors();
-        let light = if is_lit { "" } else { " in flat light" };
-        let line = format!(
-            "the particles lie in a plane: seen from the {side}{light} (--view and --integrator path give others)"
-        );
-        self.set(
-            [("camera.projection", "orthographic".into()), ("render.ground", "none".into())],
-            Some(line),
-        );
-        if is_lit {
-            return;
-        }
-        if self.is_white() && self.lacks("render.integrator") && self.has_plain_material() {
-            self.set(
-                [
-                    ("render.integrator", "whitted".into()),
-                    ("material.ambient", 1.0.into()),
-                    ("material.diffuse", 0.0.into()),
-                    ("material.specular", 0.0.into()),
-                ],
-                None,
-            );
         }
     }
 
@@ -438,16 +487,6 @@ impl Rules<'_> {
 /// A positive number with three significant digits.
 fn three_digits(value: f64) -> f64 {
     format!("{value:.2e}").parse().unwrap_or(value)
-}
-
-/// The side from which a plane without extent along `axis` is seen.
-fn side_along(axis: usize, up: DVec3) -> &'static str {
-    if up[axis] != 0.0 {
-        return "top";
-    }
-    // The front looks along y if z is up, and along z if y is up
-    let front = if up.y != 0.0 { 2 } else { 1 };
-    if axis == front { "front" } else { "right" }
 }
 
 #[cfg(test)]

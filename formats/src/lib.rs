@@ -54,5 +54,5 @@ pub use spherule_frame::{
     SimulationCell, choose_origin, find_radius, generate, is_near, is_radius, join, names,
     sample_indices, with_values,
 };
-pub use spherule_readers::{Format, mesh, read, read::element_symbol};
+pub use spherule_readers::{Format, ValueNames, mesh, read, read::element_symbol};
 pub use spherule_tree::{blocks, order};

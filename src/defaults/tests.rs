@@ -1,10 +1,11 @@
 use std::path::Path;
 
+use glam::DVec3;
 use spherule_formats::SimulationCell;
 
 use super::*;
 use crate::manifest::{AxisView, BondSearch, OverlayKind, RadiusSetting, TextSize};
-use crate::survey::{Elements, WallSign, WallValues};
+use crate::survey::{Axes, Elements, WallSign, WallValues};
 
 /// Facts of a thousand particles in a unit cube without attributes.
 fn facts() -> Facts {
@@ -108,7 +109,7 @@ fn parts_have_their_names_in_the_legend() {
     let mut two = facts();
     two.categories = vec![category("part", &[0, 2], &[])];
     let parts = ["water", "wall", "ship"].map(str::to_owned);
-    let files = Files { parts: &parts, is_y_up: false };
+    let files = Files { parts: &parts, ..Files::default() };
     let (manifest, _) = completed("", &two, files);
     let ColorSetting::Mapped(by) = &manifest.material.color else {
         panic!("no map");
@@ -305,7 +306,7 @@ fn scalars_colour_particles_without_velocities() {
 
 #[test]
 fn particles_on_a_plane_below_y_are_upright() {
-    let heap = Facts { is_y_up: true, ..facts() };
+    let heap = Facts { up: Some(DVec3::Y), ..facts() };
     let up = |text: &str, facts: &Facts| of(text, facts).input.up.map(|up| up.vector());
     assert_eq!(up("", &heap), Some([0.0, 1.0, 0.0]));
     assert_eq!(up("input.up = \"z\"", &heap), Some([0.0, 0.0, 1.0]));
@@ -331,4 +332,126 @@ fn particles_at_random_distances_have_the_radius_of_their_density() {
     assert_eq!(of("", &gas).input.radius, RadiusSetting::Length(0.0123));
     assert_eq!(of("input.radius = 0.5", &gas).input.radius, RadiusSetting::Length(0.5));
     assert_eq!(of("render.surface = \"smooth\"", &gas).input.radius, RadiusSetting::Auto);
+}
+
+#[test]
+fn columns_with_plausible_radii_are_radii() {
+    let grain_radius = Some(GrainRadius { attribute: "d".to_owned(), scale: 0.5 });
+    let mut grains = Facts { grain_radius, random_radius: Some(0.1), ..facts() };
+    let (manifest, lines) = completed("", &grains, Files::default());
+    let expected = RadiusSetting::Attribute { attribute: "d".to_owned(), scale: 0.5 };
+    assert_eq!(manifest.input.radius, expected);
+    assert!(lines.contains("`d` has the diameters"), "{lines}");
+    assert_eq!(of("input.radius = 2.0", &grains).input.radius, RadiusSetting::Length(2.0));
+    grains.elements = Some(Elements { has_others: false, is_solid: false });
+    assert!(matches!(of("", &grains).input.radius, RadiusSetting::Table { .. }));
+}
+
+#[test]
+fn walls_without_an_attribute_are_left_out() {
+    let tank = Tank { condition: "speed > 0".to_owned(), why: "at rest", all: "speed >= 0" };
+    let mut fluid = Facts { tank: Some(tank), has_velocities: true, ..facts() };
+    let (manifest, lines) = completed("", &fluid, Files::default());
+    let condition = ("select.where".to_owned(), "\"speed > 0\"".to_owned());
+    assert!(manifest.settings().contains(&condition));
+    assert!(lines.contains("walls, at rest (--where 'speed >= 0' shows them)"), "{lines}");
+    // Frozen atoms are none
+    fluid.elements = Some(Elements { has_others: false, is_solid: true });
+    assert!(of("", &fluid).select.condition.is_none());
+}
+
+#[test]
+fn molecules_show_their_broad_side() {
+    let axes = Axes { directions: [DVec3::Z, DVec3::X, DVec3::Y], deviations: [5.0, 3.0, 0.5] };
+    let elements = Some(Elements { has_others: false, is_solid: false });
+    let mut molecule = Facts { axes: Some(axes), elements, ..facts() };
+    let view = |facts: &Facts| of("", facts).camera;
+    assert_eq!(view(&molecule).up, Some(DVec3::X));
+    let direction = |camera: &crate::manifest::Camera| {
+        let [azimuth, elevation] = camera.angles(DVec3::X);
+        crate::scene::view_direction(DVec3::X, azimuth, elevation)
+    };
+    let toward = direction(&view(&molecule)).dot(DVec3::NEG_Y);
+    assert!((0.9..0.99).contains(&toward), "{toward}");
+    // A flat one is seen from there, too, and not from the top
+    molecule.bounds = Some((DVec3::ZERO, DVec3::new(1.0, 0.0, 2.0)));
+    assert_eq!(view(&molecule).view, None);
+    assert_eq!(view(&molecule).projection, ProjectionKind::Perspective);
+    // Balls, grains, and what has a side of its own, are not turned
+    assert_eq!(of("camera.view = \"front\"", &molecule).camera.up, None);
+    let round = Axes { deviations: [5.0, 5.0, 4.8], ..axes };
+    assert_eq!(view(&Facts { axes: Some(round), elements, ..facts() }).up, None);
+    assert_eq!(view(&Facts { axes: Some(axes), ..facts() }).up, None);
+}
+
+#[test]
+fn beads_are_no_atoms() {
+    let mut beads = Facts { has_beads: true, ..facts() };
+    beads.categories = vec![category("element", &[5, 16], &[])];
+    let (manifest, lines) = completed("", &beads, Files::default());
+    assert_eq!(attribute(&manifest), None);
+    assert!(lines.contains("farther apart than atoms"), "{lines}");
+    assert_eq!(manifest.render.ground.map(|g| g.kind), Some(crate::manifest::GroundKind::None));
+    beads.categories.insert(0, category("bead", &[1, 8], &[]));
+    let ColorSetting::Mapped(by) = of("", &beads).material.color else { panic!("no map") };
+    let names = by.names.expect("names").0;
+    assert_eq!(names, [(1, "backbone".to_owned()), (8, "water".to_owned())]);
+}
+
+#[test]
+fn values_have_the_names_of_the_files() {
+    let mut two = facts();
+    two.categories = vec![category("element", &[6, 4711], &[])];
+    let names = vec![(4711, "colloid".to_owned())];
+    let names = [ValueNames { attribute: "element".to_owned(), names }];
+    let (manifest, _) = completed("", &two, Files { names: &names, ..Files::default() });
+    let ColorSetting::Mapped(by) = manifest.material.color else { panic!("no map") };
+    let names = by.names.expect("names").0;
+    assert_eq!(names, [(6, "C".to_owned()), (4711, "colloid".to_owned())]);
+}
+
+#[test]
+fn most_of_a_cloud_without_an_end_is_in_the_picture() {
+    let galaxy = Facts { has_heavy_tails: true, ..facts() };
+    let fit = |text: &str| of(text, &galaxy).camera.fit;
+    assert_eq!(fit(""), Some(crate::manifest::FitSetting::Percent(90.0)));
+    assert_eq!(fit("camera.fit = \"all\""), Some(crate::manifest::FitSetting::All));
+}
+
+#[test]
+fn boxes_that_are_nearly_empty_are_not_drawn() {
+    let cell = SimulationCell::new(DVec3::ZERO, DVec3::AXES, [false; 3]).expect("a cell");
+    let mut grains = Facts { cell: Some(cell), in_cell: 1.0, ..facts() };
+    for (height, is_drawn) in [(0.2, false), (0.6, true)] {
+        grains.cell_extent = [1.0, 1.0, height];
+        assert_eq!(of("", &grains).cell.visible, is_drawn, "{height}");
+    }
+}
+
+#[test]
+fn legends_make_room_beside_planes_and_below_wide_bodies() {
+    let legend = |size: DVec3| {
+        let mut wide = facts();
+        wide.has_velocities = true;
+        wide.bounds = Some((DVec3::ZERO, size));
+        let manifest = of("image.width = 800\nimage.height = 400", &wide);
+        let overlay = manifest.overlays[0].clone();
+        let OverlayKind::ColorBar { orientation, .. } = overlay.kind else { panic!("no bar") };
+        (overlay.layout, orientation)
+    };
+    use crate::overlay::{Layout, Orientation};
+    assert_eq!(legend(DVec3::ONE), (None, Orientation::Vertical));
+    assert_eq!(legend(DVec3::new(30.0, 3.0, 1.0)), (None, Orientation::Horizontal));
+    assert_eq!(legend(DVec3::new(2.0, 1.0, 0.0)), (Some(Layout::Beside), Orientation::Vertical));
+    assert_eq!(legend(DVec3::new(1.0, 1.0, 0.0)), (None, Orientation::Vertical));
+}
+
+#[test]
+fn surfaces_are_covered_and_have_no_floor() {
+    let scan = Facts { covering_radius: Some(0.25), random_radius: Some(0.1), ..facts() };
+    let manifest = of("", &scan);
+    assert_eq!(manifest.input.radius, RadiusSetting::Length(0.25));
+    assert_eq!(manifest.render.ground.map(|g| g.kind), Some(crate::manifest::GroundKind::None));
+    let layer = Facts { has_velocities: true, ..scan };
+    assert_eq!(of("", &layer).render.ground, None);
 }

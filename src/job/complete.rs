@@ -72,7 +72,10 @@ impl JobManifest {
             defaults.settings.extend(parts);
         }
         let facts = in_thread(|| Facts::of(sequence));
-        let files = Files { parts: sequence.part_names(), is_y_up: sequence.is_y_up() };
+        // Files are opened for names only where there are numbers to name
+        let names = if facts.categories.is_empty() { Vec::new() } else { sequence.value_names() };
+        let files =
+            Files { parts: sequence.part_names(), names: &names, is_y_up: sequence.is_y_up() };
         let found = rules(&self.manifest, source, &facts, files);
         defaults.settings.extend(found.settings);
         defaults.lines.extend(found.lines);

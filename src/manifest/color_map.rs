@@ -25,6 +25,11 @@ impl MapName {
     /// The colours of chemical elements, by atomic number.
     pub const ELEMENTS: Self = Self::plain(ColorMap::ELEMENTS);
 
+    /// Whether its colours are those of chemical elements.
+    pub fn is_of_elements(self) -> bool {
+        [ColorMap::ELEMENTS, ColorMap::ELEMENTS_ON_WHITE].contains(&self.name)
+    }
+
     const fn plain(name: &'static str) -> Self {
         Self { name, is_reversed: false }
     }

@@ -13,6 +13,7 @@ pub(in crate::resolve) fn survey() -> Survey {
         layers: None,
         is_flat: false,
         standing: None,
+        bottom_standing: None,
         lowest: None,
         outline: None,
         cells: Vec::new(),

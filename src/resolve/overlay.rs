@@ -6,7 +6,7 @@ use glam::{Vec2, Vec3};
 use spherule_formats::element_symbol;
 
 use super::{ResolveError, color};
-use crate::manifest::{ColorSetting, LabelFormat, Manifest, MapName, OverlayKind};
+use crate::manifest::{ColorSetting, LabelFormat, Manifest, OverlayKind};
 use crate::math::functions::exp2;
 use crate::output::view::{srgb_from_linear, view_transform};
 use crate::overlay::{
@@ -296,7 +296,7 @@ fn color_bar(rule: &ColorRule, manifest: &Manifest) -> Option<(String, ColorBarK
 /// Categories with their names, or their numbers.
 fn named(categories: &[(i64, Vec3)], manifest: &Manifest) -> Vec<(String, Color)> {
     let (names, is_elements) = match &manifest.material.color {
-        ColorSetting::Mapped(by) => (by.names.as_ref(), by.map() == MapName::ELEMENTS),
+        ColorSetting::Mapped(by) => (by.names.as_ref(), by.map().is_of_elements()),
         _ => (None, false),
     };
     let name = |value: i64| {

@@ -24,13 +24,17 @@ use crate::selection::Selection;
 
 mod color;
 mod facts;
+mod grains;
 mod moments;
 mod outline;
 mod packing;
 mod robust;
 mod sample;
+mod shape;
+mod sheet;
 mod standing;
 mod stream;
+mod tank;
 mod upright;
 mod walls;
 mod weight;
@@ -38,14 +42,17 @@ mod weight;
 pub use color::{Categories, ColorQuestion, ColorRange, MAX_CATEGORIES, RangeQuestion, range_of};
 use color::{ColorTotals, FrameContext};
 use facts::flat_axis;
-pub use facts::{Category, ELEMENT, Elements, Facts};
+pub use facts::{BEAD, Category, ELEMENT, Elements, Facts};
+pub use grains::GrainRadius;
 use moments::Moments;
 use outline::Outermost;
 pub use outline::{Fit, Outline};
 use packing::{Spacing, SpacingRequest};
 use robust::{RobustBounds, robust_bounds, robust_largest, sample_of, sorted_sample};
 use sample::FrameSample;
+pub use shape::Axes;
 use standing::standing;
+pub use tank::Tank;
 pub use walls::{WallSign, WallValues};
 use weight::has_surface;
 pub use weight::{FrameWeight, SurfaceQuestion, SurfaceWeight};
@@ -76,6 +83,9 @@ pub struct Survey {
     /// Jobs of earlier versions lack it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub standing: Option<f64>,
+    /// The same for the lowest points of spheres with radii of their own. Jobs of earlier versions lack it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bottom_standing: Option<f64>,
     /// The lowest place of the spheres along the up direction, without a few outliers, world units, if they have radii of
     /// their own. Jobs of earlier versions lack it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -254,6 +264,7 @@ struct Totals {
     bounds: Option<RobustBounds>,
     outermost: Outermost,
     standing: f64,
+    bottom_standing: Option<f64>,
     lowest: Option<f64>,
     cells: Vec<SimulationCell>,
     /// The spacing in each frame, with its number of particles.
@@ -310,6 +321,9 @@ impl Survey {
     /// Whether particles lie on a floor at the lower end of the axis `up` at some time: a whole layer of them is at the
     /// lower end.
     pub fn rests_on_floor(&self, up: DVec3) -> bool {
+        if self.bottom_standing.is_some_and(|standing| standing >= STANDING) {
+            return true;
+        }
         if self.standing.is_some_and(|standing| standing < STANDING) {
             return false;
         }
@@ -440,6 +454,7 @@ impl Totals {
             bounds: None,
             outermost: Outermost::default(),
             standing: 0.0,
+            bottom_standing: None,
             lowest: None,
             cells: Vec::new(),
             spacings: Vec::new(),
@@ -524,21 +539,37 @@ impl Totals {
             RadiusQuestion::Auto | RadiusQuestion::AutoOfBody => {
                 self.add_radius(&frame, weight.particles, spacing);
                 if let Some(Radius::PerParticle(radii)) = &frame.radius {
-                    let bottom = |i: usize| {
-                        let center = origin + frame.positions[i].as_dvec3();
-                        center.dot(up) - f64::from(radii[i])
-                    };
-                    let bottoms = sorted_sample(frame.len(), bottom);
-                    let found = bottoms.get(bottoms.len() / 1000).copied();
-                    self.lowest = self.lowest.into_iter().chain(found).reduce(f64::min);
+                    self.add_lowest(&frame, origin, up, |i| radii[i]);
                 }
             }
             RadiusQuestion::Attribute(..) | RadiusQuestion::Table(..) => {
                 let radius = |i| question.radius.radius_by_attribute(&frame.attributes, i);
                 let radius = |i| narrow(radius(i).unwrap_or_default());
                 self.reach = self.reach.max(robust_largest(frame.len(), radius));
+                self.add_lowest(&frame, origin, up, radius);
             }
         }
+    }
+
+    /// Adds the lowest place of the spheres of a frame, whose particles have these radii.
+    fn add_lowest(
+        &mut self,
+        frame: &ParticleFrame,
+        origin: DVec3,
+        up: DVec3,
+        radius: impl Fn(usize) -> f32,
+    ) {
+        let bottom = |i: usize| {
+            let center = origin + frame.positions[i].as_dvec3();
+            center.dot(up) - f64::from(radius(i))
+        };
+        let bottoms = sorted_sample(frame.len(), bottom);
+        let found = bottoms.get(bottoms.len() / 1000).copied();
+        self.lowest = self.lowest.into_iter().chain(found).reduce(f64::min);
+        // Grains of different sizes stand on their lowest points
+        let sample: Vec<DVec3> = bottoms.into_iter().map(|bottom| bottom * up).collect();
+        let standing = standing(&sample, frame.len(), up);
+        self.bottom_standing = Some(self.bottom_standing.unwrap_or(0.0).max(standing));
     }
 
     /// Adds the size of the surface of frame `index`. Large frames are read as a whole for it, as they are when they are
@@ -609,6 +640,7 @@ impl Totals {
             layers: self.bounds.map(|bounds| bounds.layers),
             is_flat: flat_axis(min, max).is_some(),
             standing: Some(self.standing),
+            bottom_standing: self.bottom_standing,
             lowest: self.lowest,
             outline: self.outermost.outline(question.fit, origin),
             cells: self.cells,

@@ -7,7 +7,7 @@ use spherule_formats::{Positions, sample_indices};
 use super::packing::{self, Spacing, SpacingRequest};
 
 /// Number of particles of a frame from which percentiles are computed.
-const SAMPLE: usize = 20_000;
+pub(super) const SAMPLE: usize = 20_000;
 /// Minimum number of particles for which a single one may be treated as an outlier.
 pub(super) const ESCAPE_MIN: usize = 16;
 /// Number of nearest-neighbour distances from which the radius is estimated.

@@ -1,5 +1,5 @@
-//! Which axis points up, where the format does not say: whether particles lie on a plane at the lower end of an axis, and
-//! not at its upper end.
+//! Which axis points up, where the format does not say: whether particles lie on a plane at one end of an axis, and not at
+//! the other.
 
 use glam::DVec3;
 
@@ -11,6 +11,9 @@ const MAX_STANDING: f64 = 3.0;
 /// How much more particles lie at the lower end of an axis than at its upper end if it points up.
 const UPRIGHT: f64 = 0.5;
 
+/// The same for axes that seldom point up.
+const CLEAR: f64 = 0.8;
+
 /// The largest part of that which another axis may have: walls beside a fluid are on both sides of it.
 const OTHER: f64 = 0.25;
 
@@ -20,14 +23,38 @@ const LEAVES: f64 = 0.2;
 /// The smallest mean velocity downwards of such a fluid, which falls as it leaves. A splash that rises does not.
 const FALLS: f64 = 0.1;
 
-/// Whether y points up, and not z. `sample`: some of `count` particles, with their velocities if they have some.
-pub(super) fn is_y_up(sample: &[DVec3], count: usize, velocities: &[DVec3]) -> bool {
+/// The axis that points up, if it is not the `usual` one. `sample`: some of `count` particles, with their velocities if they
+/// have some.
+///
+/// Particles lie on a plane at the lower end of the axis that points up. A fluid also leans on the wall that it leaves as
+/// it falls.
+pub(super) fn up_of(
+    sample: &[DVec3],
+    count: usize,
+    velocities: &[DVec3],
+    usual: DVec3,
+) -> Option<DVec3> {
     let lies = |axis: DVec3| standing(sample, count, axis).min(MAX_STANDING);
     let upright = |axis: DVec3| lies(axis) - lies(-axis);
-    let [along_y, along_z] = [DVec3::Y, DVec3::Z].map(upright);
-    let leaves_a_wall =
-        rise(velocities, DVec3::Y) > LEAVES && rise(velocities, DVec3::NEG_Z) > FALLS;
-    along_y >= UPRIGHT && along_z.abs() <= OTHER * along_y && !leaves_a_wall
+    let leaves = |wall: DVec3, floor: DVec3| {
+        rise(velocities, wall) > LEAVES && rise(velocities, -floor) > FALLS
+    };
+    let along_usual = upright(usual);
+    // y alone is common enough to follow from a plane that is not very clear
+    let is_up = |axis: &DVec3| {
+        let along = upright(*axis);
+        let is_clear = match *axis {
+            DVec3::Y => along >= UPRIGHT,
+            other => along >= CLEAR && rise(velocities, other) <= LEAVES,
+        };
+        is_clear && along_usual.abs() <= OTHER * along && !leaves(*axis, usual)
+    };
+    // Grains in a funnel have a plane above them: nothing says that z points down
+    let axes = [DVec3::Y, DVec3::Z, DVec3::X, DVec3::NEG_Y, DVec3::NEG_X];
+    let found: Vec<DVec3> = axes.into_iter().filter(|axis| *axis != usual).filter(is_up).collect();
+    // Of a floor and a wall, the wall is the one that the particles leave
+    let is_floor = |axis: &&DVec3| !found.iter().any(|other| leaves(**axis, *other));
+    found.iter().find(is_floor).copied()
 }
 
 /// The mean velocity along `up`, relative to the root mean square of all.
@@ -54,7 +81,7 @@ mod tests {
     }
 
     fn is_up(points: &[DVec3], velocity: DVec3) -> bool {
-        is_y_up(points, points.len(), &vec![velocity; points.len()])
+        up_of(points, points.len(), &vec![velocity; points.len()], DVec3::Z) == Some(DVec3::Y)
     }
 
     #[test]
@@ -69,6 +96,26 @@ mod tests {
             assert!(is_up(&shape, DVec3::ZERO) && is_up(&shape, DVec3::Y));
             assert!(!is_up(&to_z(&shape), DVec3::ZERO));
         }
+    }
+
+    #[test]
+    fn heaps_show_any_way_up() {
+        let of = |points: &[DVec3], velocity: DVec3| {
+            up_of(points, points.len(), &vec![velocity; points.len()], DVec3::Z)
+        };
+        let heap = lattice([25, 12, 25], |p| (p.x - 12.0).hypot(p.z - 12.0) < 12.0 - p.y);
+        let turned = |turn: fn(DVec3) -> DVec3| heap.iter().map(|p| turn(*p)).collect::<Vec<_>>();
+        assert_eq!(of(&turned(|p| DVec3::new(p.y, p.x, p.z)), DVec3::ZERO), Some(DVec3::X));
+        assert_eq!(of(&turned(|p| DVec3::new(p.x, -p.y, p.z)), DVec3::ZERO), Some(DVec3::NEG_Y));
+        assert_eq!(of(&turned(|p| DVec3::new(p.x, p.z, -p.y)), DVec3::ZERO), None);
+        assert_eq!(of(&turned(|p| DVec3::new(p.x, p.z, p.y)), DVec3::ZERO), None);
+        // A dam that breaks: the wall that it leaves is not its floor
+        let dam = lattice([12, 24, 10], |p| p.x < 12.0 - 0.5 * p.y);
+        assert_eq!(of(&dam, DVec3::new(-0.4, 1.0, 0.0)), Some(DVec3::X));
+        assert_eq!(of(&dam, DVec3::new(1.0, -0.4, 0.0)), Some(DVec3::Y));
+        // It may also be a wave that climbs up a wall
+        let wave = lattice([12, 10, 24], |p| p.x < 12.0 - 0.5 * p.z);
+        assert_eq!(of(&wave, DVec3::new(-0.4, 0.0, 1.0)), None);
     }
 
     #[test]

@@ -52,6 +52,15 @@ pub struct FileExtent {
     pub step_count: u64,
 }
 
+/// Names behind the numbers of an attribute.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ValueNames {
+    /// The attribute.
+    pub attribute: String,
+    /// Its numbers, rising, with their names.
+    pub names: Vec<(i64, String)>,
+}
+
 /// Reads the files of one format. A reader trusts nothing in a file: before it allocates, it checks every count
 /// against the available bytes or against a budget.
 pub trait Reader: Sync {
@@ -170,6 +179,11 @@ pub trait Reader: Sync {
     /// [`Self::remarks`] of all bytes of a file.
     fn remarks_of_file(&self, file: &SharedBytes) -> Vec<String> {
         self.remarks(file)
+    }
+
+    /// The names behind the numbers of attributes in the first step of an uncompressed file: of types, species, parts.
+    fn value_names(&self, _file: &SharedBytes) -> Vec<ValueNames> {
+        Vec::new()
     }
 
     /// Number of files that the step in `file` is divided among.

@@ -13,7 +13,7 @@ use spherule_readers::compression::{ByteStream, StreamError, is_compressed};
 use spherule_readers::regular::regular_len;
 use spherule_readers::shared::SharedBytes;
 use spherule_readers::{Format, decompressor};
-use spherule_readers::{HEAD_LEN, Reader};
+use spherule_readers::{HEAD_LEN, Reader, ValueNames};
 
 /// Whether the file at `path` begins as a native frame, without compression around it.
 ///
@@ -64,6 +64,21 @@ pub fn remarks(path: &Path) -> Vec<String> {
         .unwrap_or_default()
         .into_iter();
     remarks.map(one_line).collect()
+}
+
+/// The names behind the numbers of attributes in the file at `path`. Empty for a file that cannot be read, and of a
+/// compressed one, whose names are those of its first bytes.
+pub fn value_names(path: &Path) -> Vec<ValueNames> {
+    let names = || {
+        let map = Arc::new(MappedFile::open(path).ok()?);
+        let bytes: Arc<dyn AsRef<[u8]> + Send + Sync> =
+            if is_compressed(map.bytes()) { Arc::new(head(path).ok()?) } else { map.clone() };
+        let format = crate::detect::detect_format((*bytes).as_ref(), path).ok()?;
+        let names = format.reader().value_names(&SharedBytes::new(bytes));
+        map.check().ok()?;
+        Some(names)
+    };
+    names().unwrap_or_default()
 }
 
 /// Number of files that the step in the file at `path` is divided among, as the file states; 1 if it does not.

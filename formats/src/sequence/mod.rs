@@ -13,7 +13,7 @@ use std::sync::{Arc, Mutex};
 use crate::native::layout::UP_Y;
 use crate::native::{self, Access, MappedFile, NativeFile};
 use crate::order::index_u32;
-use crate::{MemoryBudget, PeriodicImages};
+use crate::{MemoryBudget, PeriodicImages, ValueNames};
 use spherule_readers::compression::is_compressed;
 
 mod collection;
@@ -363,6 +363,11 @@ impl Sequence {
             }
         }
         all
+    }
+
+    /// The names behind the numbers of attributes in the files of the first frame ([`crate::open::value_names`]).
+    pub fn value_names(&self) -> Vec<ValueNames> {
+        self.inputs(0).into_iter().flat_map(crate::open::value_names).collect()
     }
 
     /// The files that frame `index` is read from.

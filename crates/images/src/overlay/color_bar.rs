@@ -56,6 +56,10 @@ const LABEL_GAP: f32 = 0.5;
 const TITLE_GAP: f32 = 0.5;
 const SWATCH: f32 = 0.9;
 const SWATCH_PITCH: f32 = 1.4;
+/// Distance of columns of categories.
+const COLUMN_GAP: f32 = 1.0;
+/// Greatest height of a column of categories as a fraction of the picture: more would leave it.
+const MAX_HEIGHT: f32 = 0.85;
 /// Least distance of labels.
 const LABEL_PITCH: f32 = 2.0;
 
@@ -120,8 +124,8 @@ impl ColorBar {
             ColorBarKind::Numbers { .. } => (self.length * pen.picture).round().max(1.0),
             ColorBarKind::Categories(all) => {
                 #[expect(clippy::cast_precision_loss, reason = "a few")]
-                let count = all.len() as f32;
-                ((count - 1.0).max(0.0) * SWATCH_PITCH + SWATCH) * pen.font.size
+                let rows = rows(all.len(), pen) as f32;
+                ((rows - 1.0).max(0.0) * SWATCH_PITCH + SWATCH) * pen.font.size
             }
         }
     }
@@ -151,7 +155,16 @@ impl ColorBar {
             ColorBarKind::Categories(all) => all.iter().map(|(name, _)| &**name).collect(),
         };
         let widest = names.iter().map(|name| pen.font.width(name)).fold(0.0, f32::max);
-        let width = (BAR_WIDTH + LABEL_GAP) * size + widest;
+        let own = (BAR_WIDTH + LABEL_GAP) * size + widest;
+        let width = match &self.kind {
+            ColorBarKind::Numbers { .. } => own,
+            ColorBarKind::Categories(all) => {
+                let columns = all.len().div_ceil(rows(all.len(), pen)).max(1);
+                #[expect(clippy::cast_precision_loss, reason = "a few")]
+                let others = (columns - 1) as f32;
+                own + others * column_width(all, pen)
+            }
+        };
         let below = match &self.kind {
             ColorBarKind::Numbers { .. } => 0.5 * font::CAP_HEIGHT * size,
             ColorBarKind::Categories(_) => 0.0,
@@ -230,14 +243,33 @@ fn draw_ticks(canvas: &mut dyn Canvas, ticks: &Ticks, from: [f32; 2], to: [f32; 
     }
 }
 
+/// Rows of the columns of so many categories: as many as the picture has room for.
+fn rows(count: usize, pen: &Pen) -> usize {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few")]
+    let most = (MAX_HEIGHT * pen.picture / (SWATCH_PITCH * pen.font.size)).max(1.0) as usize;
+    // Columns of about equal length
+    count.div_ceil(count.div_ceil(most).max(1)).max(1)
+}
+
+/// Distance of the columns of categories.
+fn column_width(all: &[(String, Color)], pen: &Pen) -> f32 {
+    let widest = all.iter().map(|(name, _)| pen.font.width(name)).fold(0.0, f32::max);
+    (SWATCH + LABEL_GAP + COLUMN_GAP) * pen.font.size + widest
+}
+
 fn swatches(canvas: &mut dyn Canvas, all: &[(String, Color)], corner: [f32; 2], pen: &Pen) {
     let size = pen.font.size;
     let side = (SWATCH * size).round().max(2.0);
-    for ((name, color), i) in all.iter().zip(0_u16..) {
-        let top = (corner[1] + f32::from(i) * SWATCH_PITCH * size).round();
-        let (from, to) = ([corner[0], top], [corner[0] + side, top + side]);
-        frame(canvas, from, to, pen);
-        canvas.fill(from, to, *color);
-        pen.label(canvas, name, corner[0] + (SWATCH + LABEL_GAP) * size, top + 0.5 * side);
+    let column_width = column_width(all, pen);
+    let columns = all.chunks(rows(all.len(), pen)).zip(0_u16..);
+    for (column, x) in columns {
+        let left = (corner[0] + f32::from(x) * column_width).round();
+        for ((name, color), i) in column.iter().zip(0_u16..) {
+            let top = (corner[1] + f32::from(i) * SWATCH_PITCH * size).round();
+            let (from, to) = ([left, top], [left + side, top + side]);
+            frame(canvas, from, to, pen);
+            canvas.fill(from, to, *color);
+            pen.label(canvas, name, left + (SWATCH + LABEL_GAP) * size, top + 0.5 * side);
+        }
     }
 }

@@ -195,3 +195,19 @@ fn all_machines_draw_the_same_bytes() {
     let picture = drawn(&[corner, axes, text("t = 0.35 s")], 480, 270, &frame);
     assert_eq!(blake3::hash(&picture).to_hex()[..16].to_owned(), "f724e44a97c2398b");
 }
+
+#[test]
+fn many_categories_have_columns_that_fit_the_picture() {
+    let height = |count: usize| {
+        let all = (0..count).map(|i| (format!("M{i}"), BLACK)).collect();
+        let mut many = bar("");
+        if let Content::ColorBar(bar) = &mut many.content {
+            (bar.unit, bar.kind) = (String::new(), ColorBarKind::Categories(all));
+        }
+        many.measure(400, &FrameView::default())
+    };
+    let [one, two] = [height(12), height(40)];
+    // 20 pixels of text: rows of 28 pixels
+    assert_eq!(one[1], 11 * 28 + 18);
+    assert!(two[1] <= 340 && two[0] > 3 * one[0], "{one:?} {two:?}");
+}

@@ -175,7 +175,7 @@ fn is_any(name: &[u8], names: &[&[u8]]) -> bool {
 }
 
 /// The letters at the start of a name, after digits.
-fn letters(name: &[u8]) -> &[u8] {
+pub(super) fn letters(name: &[u8]) -> &[u8] {
     let start = name.iter().position(|b| !b.is_ascii_digit());
     let rest = name.get(start.unwrap_or(name.len())..).unwrap_or_default();
     let end = rest.iter().position(|b| !b.is_ascii_alphabetic());

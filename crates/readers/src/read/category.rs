@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 
 use super::text;
+use crate::reader::ValueNames;
 
 /// Symbols by atomic number, from 1.
 const SYMBOLS: [&str; 118] = [
@@ -93,6 +94,29 @@ pub(in crate::read) fn is_element(code: i64) -> bool {
 fn fnv1a(bytes: &[u8]) -> u32 {
     bytes.iter().fold(0x811c_9dc5, |hash, byte| (hash ^ u32::from(*byte)).wrapping_mul(0x0100_0193))
 }
+
+/// The numbers of those of the `names` in `attribute` that are not symbols of elements; none if all are.
+pub(in crate::read) fn value_names<'a>(
+    attribute: &str,
+    names: impl Iterator<Item = &'a [u8]>,
+) -> Option<ValueNames> {
+    let mut last: &[u8] = b"";
+    let mut codes: BTreeMap<i64, &[u8]> = BTreeMap::new();
+    for name in names {
+        // Neighbours often have the same name
+        if name != last && codes.len() <= MAX_NAMES {
+            codes.insert(code(name), name);
+            last = name;
+        }
+    }
+    let others = codes.into_iter().filter(|(code, _)| !is_element(*code));
+    let text = |(code, name): (i64, &[u8])| (code, String::from_utf8_lossy(name).into_owned());
+    let names: Vec<(i64, String)> = others.map(text).collect();
+    (!names.is_empty()).then(|| ValueNames { attribute: attribute.to_owned(), names })
+}
+
+/// Most names of one attribute; legends have fewer.
+const MAX_NAMES: usize = 256;
 
 /// What a user should know of the attribute that holds the numbers of `names`; none if there are no names.
 pub(in crate::read) fn note<'a>(

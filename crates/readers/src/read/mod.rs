@@ -6,6 +6,7 @@
 
 pub mod amber;
 mod atoms;
+mod beads;
 pub mod bgeo;
 pub mod bi4;
 mod category;
@@ -49,6 +50,7 @@ mod xdr;
 pub mod xtc;
 pub mod xyz;
 
+pub use beads::bead_name;
 pub use category::element_symbol;
 pub use input::{TextInput, stream_bytes};
 pub use source::ByteSource;

@@ -13,7 +13,7 @@ mod scale;
 mod tables;
 mod turbo;
 
-use elements::element_color;
+use elements::{color_on_white, element_color};
 use palette::{PALETTES, palette};
 pub use scale::ColorScale;
 use tables::Table;
@@ -46,6 +46,19 @@ enum Others {
     Unknown,
     /// Values are atomic numbers.
     Elements,
+    /// The same, with the colours for pictures in front of white.
+    ElementsOnWhite,
+}
+
+impl Others {
+    /// The colour of a value.
+    fn color(self, value: i64) -> Vec3 {
+        match self {
+            Self::Unknown => NO_VALUE,
+            Self::Elements => element_color(value),
+            Self::ElementsOnWhite => color_on_white(value),
+        }
+    }
 }
 
 /// A map of real numbers.
@@ -81,6 +94,9 @@ impl ColorMap {
 
     /// The palette with the colours of chemical elements, whose categories are atomic numbers.
     pub const ELEMENTS: &str = "jmol";
+
+    /// The same with a light grey instead of white, for pictures in front of white.
+    pub const ELEMENTS_ON_WHITE: &str = "jmol-on-white";
 
     /// The map `name`, stretched over the range `low` to `high`; values outside get the colours at the ends. `low >
     /// high` reverses the map; with `low == high` every number gets the middle colour. Names that end in `_r` are
@@ -137,10 +153,14 @@ impl ColorMap {
     /// If the name is unknown.
     pub fn of_categories(name: &str, values: &[i64]) -> Result<Self, UnknownColorMap> {
         let (base, is_reversed) = base_name(name);
-        if base == Self::ELEMENTS {
-            let colors = values.iter().map(|value| (*value, element_color(*value)));
-            let kind = Kind::Categories(colors.collect(), Others::Elements);
-            return Ok(Self { kind });
+        let elements = match base {
+            Self::ELEMENTS => Some(Others::Elements),
+            Self::ELEMENTS_ON_WHITE => Some(Others::ElementsOnWhite),
+            _ => None,
+        };
+        if let Some(others) = elements {
+            let colors = values.iter().map(|value| (*value, others.color(*value)));
+            return Ok(Self { kind: Kind::Categories(colors.collect(), others) });
         }
         let last = values.len().saturating_sub(1).max(1);
         let is_index = |count: usize| {
@@ -182,7 +202,8 @@ impl ColorMap {
 
     /// Names of the palettes for categories, the default first.
     pub fn palette_names() -> impl Iterator<Item = &'static str> {
-        (PALETTES.iter().map(|palette| palette.name)).chain([Self::ELEMENTS])
+        let elements = [Self::ELEMENTS, Self::ELEMENTS_ON_WHITE];
+        PALETTES.iter().map(|palette| palette.name).chain(elements)
     }
 
     /// Linear RGB of `value`, interpolated between table entries; [`NO_VALUE`] for NaN.
@@ -196,11 +217,7 @@ impl ColorMap {
                 #[expect(clippy::cast_possible_truncation, reason = "an integer, or saturated")]
                 let value = value as i64;
                 let found = all.binary_search_by_key(&value, |(known, _)| *known);
-                match (found, others) {
-                    (Ok(index), _) => all[index].1,
-                    (Err(_), Others::Unknown) => NO_VALUE,
-                    (Err(_), Others::Elements) => element_color(value),
-                }
+                found.map_or_else(|_| others.color(value), |index| all[index].1)
             }
         }
     }

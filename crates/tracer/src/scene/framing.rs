@@ -219,6 +219,12 @@ pub fn view_direction(up: DVec3, azimuth: f64, elevation: f64) -> DVec3 {
     -(libm::cos(elevation) * level + libm::sin(elevation) * up)
 }
 
+/// The azimuth in degrees, about `up`, of the side from which a camera looks against the direction `toward` it.
+pub fn azimuth_toward(up: DVec3, toward: DVec3) -> f64 {
+    let [front, right] = [0.0, 90.0].map(|azimuth| -view_direction(up, azimuth, 0.0));
+    libm::atan2(toward.dot(right), toward.dot(front)).to_degrees()
+}
+
 #[cfg(test)]
 #[path = "framing_tests.rs"]
 mod tests;

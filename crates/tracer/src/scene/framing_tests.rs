@@ -101,3 +101,13 @@ fn spheres_fit_and_their_image_is_centred() {
         }
     }
 }
+
+#[test]
+fn azimuths_toward_a_side_look_from_it() {
+    for up in [DVec3::Z, DVec3::Y, DVec3::X, DVec3::new(1.0, 2.0, -1.0).normalize()] {
+        for azimuth in [-150.0, -20.0, 0.0, 77.0, 170.0] {
+            let side = -view_direction(up, azimuth, 25.0);
+            assert!((azimuth_toward(up, side) - azimuth).abs() < 1e-9, "{up} {azimuth}");
+        }
+    }
+}

@@ -33,7 +33,9 @@ pub use camera::{Camera, CameraError, CameraView, Lens, Stereo};
 pub use colormap::{ColorMap, ColorScale, UnknownColorMap};
 pub use elements::RadiusTable;
 pub use environment::{Environment, EnvironmentAxes, IrradianceHarmonics, RadianceMap};
-pub use framing::{Framed, Framing};
+pub use framing::{
+    DEFAULT_AZIMUTH, DEFAULT_ELEVATION, Framed, Framing, azimuth_toward, view_direction,
+};
 pub use ground::{Ground, WetGround};
 pub use lens::{Aperture, Focus, LensSettings};
 pub use light::{Falloff, Light, LightKind, default_lights};

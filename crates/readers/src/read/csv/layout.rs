@@ -159,8 +159,12 @@ impl<'a> LayoutSearch<'a> {
         if let Some(line) = self.comment {
             let text = line.text.trim_ascii_start();
             let marks = text.iter().take_while(|b| b"#/ \t".contains(b)).count();
-            for separator in [self.dialect.separator].into_iter().chain(SEPARATORS) {
-                let names = clean(&split(&text[marks..], separator));
+            // Yade writes `#format x_y_z_r`
+            let text = &text[marks..];
+            let text = text.strip_prefix(b"format ").map_or(text, <[u8]>::trim_ascii);
+            let separators = [self.dialect.separator].into_iter().chain(SEPARATORS);
+            for separator in separators.chain([Separator::Byte(b'_')]) {
+                let names = clean(&split(text, separator));
                 if names.len() == columns && names::position(&names).is_some() {
                     return Ok(self.layout(Some(names), columns, line.at, rows));
                 }

@@ -4,6 +4,7 @@
 //! the page `gro` of the GROMACS manual. Lengths are nm, velocities nm/ps, times ps.
 
 use super::atoms::{self, AtomTable, ELEMENT, RESIDUE, coordinate, field};
+use super::beads::Beads;
 use super::input::TextInput;
 use super::sniff::is_text;
 use super::text::{self, Line};
@@ -134,6 +135,7 @@ fn read(
     let velocity = [("velocity", 3)];
     let real = &velocity[..usize::from(columns.has_velocity)];
     let mut atoms = AtomTable::new(&[ELEMENT, RESIDUE], real, budget);
+    let mut beads = Beads::default();
     for index in 0..count {
         let Some(line) = text.line() else {
             let what = format!("{count} atoms expected, {index} lines follow");
@@ -143,14 +145,17 @@ fn read(
         let velocity = columns.velocity(line)?;
         let real = &velocity[..if columns.has_velocity { 3 } else { 0 }];
         let name = field(line.text, 10, 15);
-        let element = atoms::element(b"", name, field(line.text, 5, 10));
+        let residue_name = field(line.text, 5, 10);
+        let element = atoms::element(b"", name, residue_name);
         let residue = text::integer(field(line.text, 0, 5)).unwrap_or_default();
         atoms.push(position, &[element, residue], real)?;
+        beads.push(name, residue_name);
     }
     let Some(cell) = text.line().filter(|line| is_box(*line)).map(cell) else {
         return Err(cut_short(text, format!("no box after {count} atoms")));
     };
-    let (positions, attributes) = atoms.into_parts();
+    let (positions, mut attributes) = atoms.into_parts();
+    attributes.extend(beads.attribute());
     Ok(RawParticles { positions, attributes, time, step: number, cell, ..RawParticles::default() })
 }
 

@@ -15,7 +15,8 @@ use self::frame::FrameChunks;
 use super::columns::ParticleLayout;
 use super::{ByteSource, Step};
 use crate::format::Format;
-use crate::reader::{Confidence, Reader};
+use crate::reader::{Confidence, Reader, ValueNames};
+use crate::shared::SharedBytes;
 use spherule_frame::{MemoryBudget, ParseError, RawParticles};
 
 /// GSD files with the schema `hoomd`.
@@ -81,5 +82,9 @@ impl Reader for Gsd {
 
     fn remarks(&self, bytes: &[u8]) -> Vec<String> {
         remarks::remarks(bytes)
+    }
+
+    fn value_names(&self, file: &SharedBytes) -> Vec<ValueNames> {
+        remarks::value_names(file).into_iter().collect()
     }
 }

@@ -4,6 +4,7 @@ use super::file::{GsdFile, GsdHeader, IndexEntry, until_zero};
 use super::frame::{BOX, DIAMETER, FIELDS, LOGGED, PARTICLES, STEP};
 use crate::read::remarks::cell_remark;
 use crate::read::text;
+use crate::reader::ValueNames;
 use spherule_frame::{Endian, ScalarType};
 
 const TYPES: &str = "particles/types";
@@ -58,6 +59,22 @@ fn find(file: &GsdFile<'_>, name: &str) -> Option<(IndexEntry, usize)> {
     let first = named.next()?;
     Some((first, 1 + named.count()))
 }
+
+/// The names of types, by their numbers in the attribute `typeid`.
+pub(super) fn value_names(bytes: &[u8]) -> Option<ValueNames> {
+    let file = GsdFile::parse(bytes).ok()?;
+    let (entry, _) = find(&file, TYPES)?;
+    let width = entry.columns as usize;
+    let bytes = file.numbers(&entry).ok().filter(|_| width > 0)?;
+    let is_text = matches!(entry.scalar(), Some(ScalarType::I8 | ScalarType::U8));
+    let names =
+        bytes.chunks(width).map(|row| String::from_utf8_lossy(until_zero(row)).into_owned());
+    let names = (0..).zip(names).take(MAX_NAMES).collect();
+    is_text.then(|| ValueNames { attribute: "typeid".to_owned(), names })
+}
+
+/// Most names; legends have fewer.
+const MAX_NAMES: usize = 256;
 
 /// The names behind the numbers of types.
 fn types(file: &GsdFile<'_>) -> Option<String> {

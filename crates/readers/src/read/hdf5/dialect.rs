@@ -1,6 +1,7 @@
 //! What the layouts of groups and data sets of different programs have in common.
 
 use super::table::ParticleTable;
+use crate::reader::ValueNames;
 use spherule_frame::{MemoryBudget, ParseError};
 
 /// A time step as its dialect lists it.
@@ -27,6 +28,11 @@ pub(super) trait Dialect {
 
     /// What users should know: the layout and its version first, then parts and units.
     fn remarks(&self) -> Vec<String>;
+
+    /// Names behind the numbers of attributes, beside those of parts.
+    fn value_names(&self) -> Vec<ValueNames> {
+        Vec::new()
+    }
 }
 
 /// The error for a step that the file does not have.

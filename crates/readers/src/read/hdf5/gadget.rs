@@ -14,6 +14,7 @@ use super::stored::Stored;
 use super::table::{Part, ParticleTable};
 use super::values::Values;
 use crate::read::remarks::cell_remark;
+use crate::reader::ValueNames;
 use spherule_frame::{MemoryBudget, ParseError, ScalarType, SimulationCell};
 
 /// What the names of the groups of types begin with.
@@ -269,6 +270,16 @@ impl Dialect for Snapshot {
         // Also with one type: later snapshots may have more.
         let table = ParticleTable::new(parts, true).at(time, None);
         Ok(table.in_cell(self.cell()))
+    }
+
+    fn value_names(&self) -> Vec<ValueNames> {
+        let name = |number: u32| match number {
+            0 | 1 | 4 | 5 => USUAL[number as usize].to_owned(),
+            // They differ from code to code
+            _ => format!("{TYPE}{number}"),
+        };
+        let names = self.types.iter().map(|(number, _)| (i64::from(*number), name(*number)));
+        vec![ValueNames { attribute: "part".to_owned(), names: names.collect() }]
     }
 
     fn remarks(&self) -> Vec<String> {

@@ -49,7 +49,7 @@ use super::{ByteSource, Step};
 use crate::format::Format;
 use crate::hdf5_signature::is_hdf5;
 use crate::ranges::ParticleRanges;
-use crate::reader::{Confidence, FileExtent, Reader};
+use crate::reader::{Confidence, FileExtent, Reader, ValueNames};
 use crate::shared::SharedBytes;
 use spherule_frame::{MemoryBudget, ParseError, RawParticles};
 
@@ -131,6 +131,10 @@ impl Reader for Hdf5 {
     fn refers_to_pieces(&self, file: &SharedBytes) -> bool {
         let root = H5File::open(file).and_then(|file| Node::root(&file));
         root.is_ok_and(|root| gadget::is_virtual(&root))
+    }
+
+    fn value_names(&self, file: &SharedBytes) -> Vec<ValueNames> {
+        OpenFile::open(file).map_or_else(|_| Vec::new(), |open| open.dialect.value_names())
     }
 
     fn remarks_need_whole_file(&self) -> bool {

@@ -15,7 +15,8 @@ use super::table::{
 };
 use super::{ByteSource, Step, text};
 use crate::format::Format;
-use crate::reader::{Confidence, Reader, StreamUnit};
+use crate::reader::{Confidence, Reader, StreamUnit, ValueNames};
+use crate::shared::SharedBytes;
 use spherule_frame::{MemoryBudget, ParseError, Positions, RawParticles};
 
 mod binary;
@@ -89,6 +90,10 @@ impl Reader for Lammps {
 
     fn remarks(&self, head: &[u8]) -> Vec<String> {
         remarks::remarks(head)
+    }
+
+    fn value_names(&self, file: &SharedBytes) -> Vec<ValueNames> {
+        remarks::value_names(file)
     }
 }
 

@@ -7,6 +7,7 @@ use crate::read::category;
 use crate::read::input::TextInput;
 use crate::read::remarks::cell_remark;
 use crate::read::text::{self, Lines};
+use crate::reader::ValueNames;
 use spherule_frame::MemoryBudget;
 use spherule_frame::names::LAMMPS_CATEGORIES;
 
@@ -24,24 +25,40 @@ pub(in crate::read) fn remarks(head: &[u8]) -> Vec<String> {
         let is_periodic = flags.iter().any(|flag| flag.contains('p'));
         remarks.push(cell_remark(is_periodic.then(|| flags.join(" ")).as_deref()));
     }
-    let mut text = TextInput::whole(head);
+    let notes = columns(head, |name, names| category::note(name, names));
+    remarks.extend(notes);
+    remarks
+}
+
+/// The names in the first step that are not symbols of elements.
+pub(in crate::read) fn value_names(bytes: &[u8]) -> Vec<ValueNames> {
+    columns(bytes, |name, names| category::value_names(name, names))
+}
+
+/// What `of` makes of each column with names: its own name, and those in it.
+fn columns<'a, T>(
+    bytes: &'a [u8],
+    of: impl Fn(&str, &mut dyn Iterator<Item = &'a [u8]>) -> Option<T>,
+) -> Vec<T> {
+    let mut text = TextInput::whole(bytes);
     let Ok(header) = DumpHeader::parse(&mut text, MemoryBudget::UNLIMITED) else {
-        return remarks;
+        return Vec::new();
     };
     let start = text.at();
     // The last line may be cut off.
-    let end = head.iter().rposition(|b| *b == b'\n').unwrap_or(start);
+    let end = bytes.iter().rposition(|b| *b == b'\n').unwrap_or(start);
+    let mut all = Vec::new();
     for (column, name) in header.names.iter().enumerate() {
         let name = String::from_utf8_lossy(name);
         if !LAMMPS_CATEGORIES.contains(&&*name) {
             continue;
         }
-        let rows = Lines::new(head, start..end.max(start)).take(header.count);
-        let names = rows.map_while(|row| {
+        let rows = Lines::new(bytes, start..end.max(start)).take(header.count);
+        let mut names = rows.map_while(|row| {
             let is_row = !row.text.starts_with(ITEM);
             is_row.then(|| text::words(row.text).nth(column)).flatten()
         });
-        remarks.extend(category::note(&name, names));
+        all.extend(of(&name, &mut names));
     }
-    remarks
+    all
 }

@@ -4,6 +4,7 @@
 //! or end with `END`. Lengths are A. After version 3.3 of the format.
 
 use super::atoms::{self, AtomTable, ELEMENT, RESIDUE, coordinate, field};
+use super::beads::Beads;
 use super::input::TextInput;
 use super::sniff::is_text;
 use super::text::{self, Line};
@@ -195,6 +196,7 @@ fn read(
     text.end_at(range.end);
     let real = [("occupancy", 1), ("b_factor", 1)];
     let mut atoms = AtomTable::new(&[ELEMENT, RESIDUE], &real, budget);
+    let mut beads = Beads::default();
     while let Some(line) = text.line() {
         if is_cell(line) {
             cell = self::cell(line);
@@ -213,11 +215,13 @@ fn read(
             text::number(field(line.text, start, end)).unwrap_or(default)
         });
         atoms.push(position, &whole, &real)?;
+        beads.push(name, residue);
     }
     if atoms.is_empty() {
         let what = "no ATOM or HETATM records: the file has no positions";
         return Err(ParseError::malformed(range.start, what));
     }
-    let (positions, attributes) = atoms.into_parts();
+    let (positions, mut attributes) = atoms.into_parts();
+    attributes.extend(beads.attribute());
     Ok(RawParticles { positions, attributes, step: step.number, cell, ..RawParticles::default() })
 }

@@ -9,7 +9,8 @@ use super::sniff::{TextShape, text_shape};
 use super::text::{self, Lines};
 use super::{ByteSource, Step, csv};
 use crate::format::Format;
-use crate::reader::{Confidence, Reader, StreamUnit};
+use crate::reader::{Confidence, Reader, StreamUnit, ValueNames};
+use crate::shared::SharedBytes;
 use spherule_frame::{Endian, MemoryBudget, ParseError, RawParticles, ScalarType};
 
 mod comment;
@@ -103,6 +104,11 @@ impl Reader for Xyz {
             Ok(XyzVariant::Bare) => csv::remarks(head),
             Ok(XyzVariant::Raw) | Err(_) => Vec::new(),
         }
+    }
+
+    fn value_names(&self, file: &SharedBytes) -> Vec<ValueNames> {
+        let is_molecular = matches!(kind(file), Ok(XyzVariant::Molecular));
+        is_molecular.then(|| remarks::value_names(file)).flatten().into_iter().collect()
     }
 }
 

@@ -3,7 +3,9 @@
 use super::molecular::{self, NAME};
 use super::{Lines, comment, text_start};
 use crate::read::remarks::cell_remark;
+use crate::read::text::Line;
 use crate::read::{category, text};
+use crate::reader::ValueNames;
 
 /// Remarks about molecular text that begins with `head`.
 pub(in crate::read) fn remarks(head: &[u8]) -> Vec<String> {
@@ -19,15 +21,28 @@ pub(in crate::read) fn remarks(head: &[u8]) -> Vec<String> {
         let is_periodic = |flags: &&String| flags.contains(['T', 't', '1']);
         remarks.push(cell_remark(flags.as_ref().filter(is_periodic).map(String::as_str)));
     }
-    // The last line may be cut off.
-    let end = head.iter().rposition(|b| *b == b'\n').unwrap_or(lines.at());
-    let rows = Lines::new(head, lines.at()..end.max(lines.at()));
-    let rows: Vec<&[u8]> =
-        rows.take(usize::try_from(count).unwrap_or(0)).map(|row| row.text).collect();
-    let column = rows.first().and_then(|row| molecular::name_column(comment.text, row));
-    if let Some(column) = column {
-        let names = rows.iter().filter_map(|row| text::words(row).nth(column));
-        remarks.extend(category::note(NAME, names));
-    }
+    remarks.extend(category::note(NAME, names(head, lines.at(), (count, comment.text))));
     remarks
+}
+
+/// The names in the first frame of molecular text that are not symbols of elements.
+pub(in crate::read) fn value_names(bytes: &[u8]) -> Option<ValueNames> {
+    let mut lines = Lines::new(bytes, text_start(bytes)..bytes.len());
+    let count = text::integer(lines.next()?.text.trim_ascii())?;
+    let comment = lines.next()?;
+    category::value_names(NAME, names(bytes, lines.at(), (count, comment.text)))
+}
+
+/// The names of the atoms of a frame, whose rows begin at `start`, by its number of atoms and its comment.
+fn names<'a>(
+    bytes: &'a [u8],
+    start: usize,
+    (count, comment): (i64, &[u8]),
+) -> impl Iterator<Item = &'a [u8]> {
+    // The last line may be cut off.
+    let end = bytes.iter().rposition(|b| *b == b'\n').unwrap_or(start).max(start);
+    let rows = || Lines::new(bytes, start..end).take(usize::try_from(count).unwrap_or(0));
+    let column = rows().next().and_then(|row| molecular::name_column(comment, row.text));
+    let name = move |row: Line<'a>| column.and_then(|column| text::words(row.text).nth(column));
+    rows().filter_map(name)
 }

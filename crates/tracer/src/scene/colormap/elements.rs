@@ -12,6 +12,21 @@ pub(super) fn element_color(number: i64) -> Vec3 {
     Vec3::from_array(rgb.map(|byte| linear_from_srgb(f32::from(byte) / 255.0)))
 }
 
+/// The same for pictures in front of white: colours without a dark channel, which are white and light greys, are no
+/// lighter than [`LIGHTEST`].
+pub(super) fn color_on_white(number: i64) -> Vec3 {
+    let color = element_color(number);
+    let lightest = linear_from_srgb(LIGHTEST);
+    let is_nearly_white = color.min_element() > linear_from_srgb(NEARLY_WHITE);
+    if is_nearly_white { color * (lightest / color.max_element()).min(1.0) } else { color }
+}
+
+/// The lightest grey that stands out from white in the light of the default environment, sRGB.
+const LIGHTEST: f32 = 0.82;
+
+/// A channel above which a colour may look white, sRGB.
+const NEARLY_WHITE: f32 = 0.78;
+
 /// Colour of what is no element, sRGB.
 const OTHER_COLOR: u32 = 0xff_14_93;
 
@@ -37,6 +52,18 @@ const COLORS: [u32; 109] = [
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn white_atoms_are_grey_in_front_of_white() {
+        for number in [1, 20, 78] {
+            let [own, on_white] = [element_color(number), color_on_white(number)];
+            assert!(on_white.max_element() < 0.65 && on_white.cmple(own).all(), "{number}");
+        }
+        assert_eq!(color_on_white(1).x, color_on_white(1).z);
+        for number in [2, 6, 8, 16, 79] {
+            assert_eq!(color_on_white(number), element_color(number), "{number}");
+        }
+    }
 
     #[test]
     fn elements_have_the_colours_of_jmol() {

@@ -1,0 +1,87 @@
+//! The principal axes of a cloud of particles: from which side most of it is seen.
+
+use glam::{DMat3, DVec3};
+
+/// Principal axes with the extents along them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Axes {
+    /// Unit vectors: along the largest extent, the middle one and the smallest.
+    pub directions: [DVec3; 3],
+    /// The standard deviations along these.
+    pub deviations: [f64; 3],
+}
+
+/// Rotations of a sweep, and sweeps: the method converges quadratically.
+const PAIRS: [(usize, usize); 3] = [(0, 1), (0, 2), (1, 2)];
+const SWEEPS: usize = 12;
+
+impl Axes {
+    /// The axes of `points`; none of fewer than two.
+    pub(super) fn of(points: &[DVec3]) -> Option<Self> {
+        #[expect(clippy::cast_precision_loss, reason = "a sample")]
+        let count = points.len() as f64;
+        let mean = points.iter().sum::<DVec3>() / count;
+        let mut covariance = DMat3::ZERO;
+        for point in points {
+            let d = *point - mean;
+            covariance += DMat3::from_cols(d * d.x, d * d.y, d * d.z);
+        }
+        covariance *= 1.0 / count;
+        if points.len() < 2 || !covariance.is_finite() {
+            return None;
+        }
+        let (variances, vectors) = eigen(covariance);
+        let mut order = [0, 1, 2];
+        order.sort_by(|a, b| variances[*b].total_cmp(&variances[*a]));
+        Some(Self {
+            directions: order.map(|axis| vectors.col(axis)),
+            deviations: order.map(|axis| variances[axis].max(0.0).sqrt()),
+        })
+    }
+}
+
+/// Eigenvalues and eigenvectors of a symmetric matrix, by Jacobi's rotations (Golub and Van Loan, "Matrix Computations",
+/// section 8.5).
+fn eigen(mut matrix: DMat3) -> (DVec3, DMat3) {
+    let mut vectors = DMat3::IDENTITY;
+    for (p, q) in (0..SWEEPS).flat_map(|_| PAIRS) {
+        let off = matrix.col(q)[p];
+        if off == 0.0 {
+            continue;
+        }
+        let theta = 0.5 * (matrix.col(q)[q] - matrix.col(p)[p]) / off;
+        let sign = if theta < 0.0 { -1.0 } else { 1.0 };
+        let t = sign / (theta.abs() + libm::hypot(theta, 1.0));
+        let cos = 1.0 / libm::hypot(t, 1.0);
+        let sin = t * cos;
+        let mut rotation = DMat3::IDENTITY;
+        rotation.col_mut(p)[p] = cos;
+        rotation.col_mut(q)[q] = cos;
+        rotation.col_mut(q)[p] = sin;
+        rotation.col_mut(p)[q] = -sin;
+        matrix = rotation.transpose() * matrix * rotation;
+        vectors *= rotation;
+    }
+    (DVec3::new(matrix.x_axis.x, matrix.y_axis.y, matrix.z_axis.z), vectors)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn axes_are_those_of_a_turned_box() {
+        let turn = DMat3::from_rotation_z(0.4) * DMat3::from_rotation_x(1.1);
+        let points = (0..1000).map(|i| [i % 10, i / 10 % 10, i / 100].map(f64::from));
+        let size = DVec3::new(1.0, 5.0, 2.0);
+        let points: Vec<DVec3> = points.map(|p| turn * (DVec3::from_array(p) * size)).collect();
+        let axes = Axes::of(&points).expect("axes");
+        for (found, axis) in axes.directions.into_iter().zip([DVec3::Y, DVec3::Z, DVec3::X]) {
+            assert!((found.dot(turn * axis).abs() - 1.0).abs() < 1e-12, "{found}");
+        }
+        let [first, .., last] = axes.deviations;
+        assert!((first / last - 5.0).abs() < 1e-9);
+        assert_eq!(Axes::of(&[DVec3::ONE]), None);
+        assert_eq!(Axes::of(&[DVec3::ONE; 3]).expect("axes").deviations, [0.0; 3]);
+    }
+}
