@@ -64,7 +64,7 @@ mod tests {
         let mut extensions = HashSet::new();
         for format in all() {
             assert!(names.insert(format.name()), "{format:?}");
-            for extension in format.reader().extensions() {
+            for extension in format.reader().info().extensions {
                 assert!(extensions.insert(*extension), "{format:?} {extension}");
             }
         }

@@ -39,12 +39,12 @@ impl Format {
 
     /// The name in reports.
     pub fn name(self) -> &'static str {
-        self.0.name()
+        self.0.info().name
     }
 
     /// True if one file of this format may hold several time steps.
     pub fn may_hold_many_steps(self) -> bool {
-        self.0.may_hold_many_steps()
+        self.0.info().may_hold_many_steps
     }
 
     /// Lists the time steps of the uncompressed file `bytes`.
@@ -61,7 +61,8 @@ impl Format {
         source: &mut ByteSource<'_>,
         budget: MemoryBudget,
     ) -> Result<Vec<Step>, ParseError> {
-        self.0.steps(source, budget)
+        source.limit(budget);
+        self.0.steps(source)
     }
 
     /// Reads one of the [`Self::steps`] of `bytes`.
@@ -89,7 +90,8 @@ impl Format {
             let what = format!("the step ends at {}: {CUT_SHORT}", range.end);
             return Err(ParseError::malformed(bytes.len(), what));
         }
-        self.0.read(source, step, budget)
+        source.limit(budget);
+        self.0.read(source, step)
     }
 
     /// Bytes held beside the numbers while a file that begins with `head` is read in pieces.

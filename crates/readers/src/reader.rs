@@ -8,7 +8,7 @@ use crate::read::ByteSource;
 use crate::read::columns::ParticleLayout;
 use crate::shared::SharedBytes;
 use crate::step::Step;
-use spherule_frame::{MemoryBudget, ParseError, RawParticles};
+use spherule_frame::{ParseError, RawParticles};
 
 /// Number of bytes that detection examines. A shorter file is passed as a whole.
 pub const HEAD_LEN: usize = 4096;
@@ -61,19 +61,51 @@ pub struct ValueNames {
     pub names: Vec<(i64, String)>,
 }
 
+/// What all files of a format have in common.
+#[derive(Debug, Clone, Copy)]
+pub struct FormatInfo {
+    /// Name of the format in reports and messages, distinct for each format.
+    pub name: &'static str,
+    /// File name extensions, in lower case without the dot.
+    pub extensions: &'static [&'static str],
+    /// Whether a file may hold several time steps. Such files are opened to count their steps, and large ones are mapped
+    /// instead of read as a whole.
+    pub may_hold_many_steps: bool,
+    /// Whether files may begin with any bytes, so that short signatures of other formats prove nothing.
+    pub has_no_signature: bool,
+    /// Whether files may refer to others that are not steps of their own.
+    pub may_refer_to_files: bool,
+    /// Whether [`Reader::remarks`] needs all bytes of a file. It gets them if the file is not compressed.
+    pub remarks_need_whole_file: bool,
+    /// Length of an angstrom in the unit of positions, if that is fixed by the format.
+    pub angstrom: f64,
+}
+
+impl FormatInfo {
+    /// A format whose files hold one step and nothing special.
+    pub const fn new(name: &'static str, extensions: &'static [&'static str]) -> Self {
+        Self {
+            name,
+            extensions,
+            may_hold_many_steps: false,
+            has_no_signature: false,
+            may_refer_to_files: false,
+            remarks_need_whole_file: false,
+            angstrom: 1.0,
+        }
+    }
+}
+
 /// Reads the files of one format. A reader trusts nothing in a file: before it allocates, it checks every count
 /// against the available bytes or against a budget.
 pub trait Reader: Sync {
-    /// Name of the format in reports and messages, distinct for each format.
-    fn name(&self) -> &'static str;
-
-    /// File name extensions, in lower case without the dot.
-    fn extensions(&self) -> &'static [&'static str];
+    /// What all files of the format have in common.
+    fn info(&self) -> FormatInfo;
 
     /// Whether a file name is typical of this format. `stem` and `extension` are in lower case and without the
     /// extension of a compression.
     fn matches_name(&self, _stem: &str, extension: &str) -> bool {
-        self.extensions().contains(&extension)
+        self.info().extensions.contains(&extension)
     }
 
     /// How well `head` matches: the first bytes of an uncompressed file, up to [`HEAD_LEN`].
@@ -81,17 +113,6 @@ pub trait Reader: Sync {
     /// # Errors
     /// [`ParseError::Unsupported`] for a related format that is not read, with a remedy.
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError>;
-
-    /// True if files may begin with any bytes, so that short signatures of other formats prove nothing.
-    fn has_no_signature(&self) -> bool {
-        false
-    }
-
-    /// True if a file may hold several time steps. Such files are opened to count their steps, and large ones
-    /// are mapped instead of read as a whole.
-    fn may_hold_many_steps(&self) -> bool {
-        false
-    }
 
     /// The unit in which a file that begins with `head` and is longer can be read in pieces; `None` if it
     /// cannot. If it can, the reader may use nothing but [`ByteSource::text`].
@@ -108,23 +129,14 @@ pub trait Reader: Sync {
     /// Lists the time steps of a file. A truncated step is listed too, so that reading it gives the error.
     ///
     /// # Errors
-    /// [`ParseError`]; [`ParseError::TooLarge`] if the list needs more memory than `budget` allows.
-    fn steps(
-        &self,
-        source: &mut ByteSource<'_>,
-        budget: MemoryBudget,
-    ) -> Result<Vec<Step>, ParseError>;
+    /// [`ParseError`]; [`ParseError::TooLarge`] if the list needs more memory than the budget of `source` allows.
+    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError>;
 
-    /// Reads one of the [`Self::steps`]. `budget` limits everything except the bytes of `source`.
+    /// Reads one of the [`Self::steps`]. The budget of `source` limits everything except its bytes.
     ///
     /// # Errors
     /// [`ParseError`].
-    fn read(
-        &self,
-        source: &mut ByteSource<'_>,
-        step: &Step,
-        budget: MemoryBudget,
-    ) -> Result<RawParticles, ParseError>;
+    fn read(&self, source: &mut ByteSource<'_>, step: &Step) -> Result<RawParticles, ParseError>;
 
     /// The layout of the numbers of the only step, if they have fixed strides in the uncompressed file `bytes`.
     /// Conversion then reads them from the mapped file. The particles and the errors must be the same as with
@@ -157,18 +169,8 @@ pub trait Reader: Sync {
         0
     }
 
-    /// Whether files may refer to others that are not steps of their own.
-    fn may_refer_to_files(&self) -> bool {
-        false
-    }
-
     /// Opens the files beside `file` that have particles of it, as far as they exist.
     fn open_referenced(&self, _file: &SharedBytes) {}
-
-    /// Whether [`Self::remarks`] needs all bytes of a file. It gets them if the file is not compressed.
-    fn remarks_need_whole_file(&self) -> bool {
-        false
-    }
 
     /// Notes for the user about a file that begins with `head`, on things that are not in its particles: a
     /// simulation cell, or names behind numbers.
@@ -198,13 +200,8 @@ pub trait Reader: Sync {
     }
 
     /// True if users of the program that wrote the file expect y to point up. `_bytes` are the first bytes of the file,
-    /// or all if [`Self::remarks_need_whole_file`] and the file is not compressed.
+    /// or all if [`FormatInfo::remarks_need_whole_file`] and the file is not compressed.
     fn is_y_up(&self, _bytes: &[u8]) -> bool {
         false
-    }
-
-    /// Length of an angstrom in the unit of positions, if that is fixed by the format.
-    fn angstrom(&self) -> f64 {
-        1.0
     }
 }

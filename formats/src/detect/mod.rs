@@ -65,7 +65,7 @@ fn refuse_foreign(head: &[u8], path: &Path, named: Option<Format>) -> Result<(),
         return Err(ParseError::unsupported(what));
     }
     // Two or three bytes of raw floats may look like any short signature.
-    let has_no_signature = named.is_some_and(|format| format.reader().has_no_signature());
+    let has_no_signature = named.is_some_and(|format| format.reader().info().has_no_signature);
     let shortest = if has_no_signature { 4 } else { 0 };
     foreign::refuse(head, path, shortest)
 }

@@ -6,10 +6,10 @@
 use rkyv::util::AlignedVec;
 
 use crate::read::ByteSource;
-use crate::{MemoryBudget, ParseError, RawParticles};
+use crate::{ParseError, RawParticles};
 use spherule_readers::Format;
 use spherule_readers::Step;
-use spherule_readers::{Confidence, Reader};
+use spherule_readers::{Confidence, FormatInfo, Reader};
 
 mod attribute;
 mod bound;
@@ -46,23 +46,15 @@ pub const FORMAT: Format = Format::new(&Spf);
 struct Spf;
 
 impl Reader for Spf {
-    fn name(&self) -> &'static str {
-        "spf"
-    }
-
-    fn extensions(&self) -> &'static [&'static str] {
-        &["spf"]
+    fn info(&self) -> FormatInfo {
+        FormatInfo::new("spf", &["spf"])
     }
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
         Ok(Confidence::signature_if(head.starts_with(MAGIC)))
     }
 
-    fn steps(
-        &self,
-        source: &mut ByteSource<'_>,
-        _budget: MemoryBudget,
-    ) -> Result<Vec<Step>, ParseError> {
+    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
         let index = layout::parse(source.bytes())?;
         let mut step = Step::whole(source.bytes().len());
         (step.number, step.time) = (index.step, index.time);
@@ -70,12 +62,7 @@ impl Reader for Spf {
     }
 
     /// Verifies every section.
-    fn read(
-        &self,
-        source: &mut ByteSource<'_>,
-        _step: &Step,
-        _budget: MemoryBudget,
-    ) -> Result<RawParticles, ParseError> {
+    fn read(&self, source: &mut ByteSource<'_>, _step: &Step) -> Result<RawParticles, ParseError> {
         with_frame(source.bytes(), |frame| {
             frame.verify()?;
             frame.to_raw()

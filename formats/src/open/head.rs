@@ -48,7 +48,7 @@ pub fn remarks(path: &Path) -> Vec<String> {
         .and_then(|head| {
             let format = crate::detect::detect_format(&head, path).map_err(|e| e.in_file(path))?;
             let reader = format.reader();
-            if !reader.remarks_need_whole_file() {
+            if !reader.info().remarks_need_whole_file {
                 return Ok(reader.remarks(&head));
             }
             let map = Arc::new(MappedFile::open(path)?);
@@ -94,7 +94,7 @@ pub(crate) fn refers_to_pieces(path: &Path) -> bool {
 /// The files that the one at `path` refers to, in its directory or below it, if they exist; empty unless its name is that
 /// of a format whose files may do so.
 pub(crate) fn referenced_files(path: &Path) -> Vec<PathBuf> {
-    let may_refer = |format: Format| format.reader().may_refer_to_files();
+    let may_refer = |format: Format| format.reader().info().may_refer_to_files;
     if !crate::registry::by_name(path).is_some_and(may_refer) {
         return Vec::new();
     }

@@ -270,7 +270,7 @@ impl Sequence {
             let head = crate::open::head(&part.path).ok()?;
             crate::detect::detect_format(&head, &part.path).ok()
         });
-        format.map_or(1.0, |format| format.reader().angstrom())
+        format.map_or(1.0, |format| format.reader().info().angstrom)
     }
 
     /// Names of the parts that the frames have, which are fewer after [`Self::keep_parts`].
@@ -452,7 +452,7 @@ fn y_is_up(path: &Path) -> bool {
         let file = NativeFile::open(path, Access::Map);
         return file.is_ok_and(|file| file.index().up == UP_Y);
     }
-    if format.reader().remarks_need_whole_file()
+    if format.reader().info().remarks_need_whole_file
         && let Ok(map) = MappedFile::open(path)
         && !is_compressed(map.bytes())
     {

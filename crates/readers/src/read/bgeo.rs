@@ -8,8 +8,8 @@
 use super::columns::{self, ComponentStride, ParticleLayout, StridedColumn};
 use super::{ByteSource, Step};
 use crate::format::Format;
-use crate::reader::{Confidence, Reader};
-use spherule_frame::{Endian, MemoryBudget, ParseError, RawParticles, ScalarType};
+use crate::reader::{Confidence, FormatInfo, Reader};
+use spherule_frame::{Endian, ParseError, RawParticles, ScalarType};
 
 #[cfg(test)]
 mod tests;
@@ -31,12 +31,8 @@ pub const FORMAT: Format = Format::new(&Bgeo);
 struct Bgeo;
 
 impl Reader for Bgeo {
-    fn name(&self) -> &'static str {
-        "bgeo"
-    }
-
-    fn extensions(&self) -> &'static [&'static str] {
-        &["bgeo", "bhclassic"]
+    fn info(&self) -> FormatInfo {
+        FormatInfo::new("bgeo", &["bgeo", "bhclassic"])
     }
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
@@ -45,11 +41,7 @@ impl Reader for Bgeo {
 
     /// [`ParseError::Unsupported`] for other geometry files, [`ParseError::Malformed`] for
     /// anything else that is not classic BGEO.
-    fn steps(
-        &self,
-        source: &mut ByteSource<'_>,
-        _budget: MemoryBudget,
-    ) -> Result<Vec<Step>, ParseError> {
+    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
         check_kind(source.bytes())?;
         Ok(vec![Step::whole(source.bytes().len())])
     }
@@ -58,12 +50,7 @@ impl Reader for Bgeo {
     ///
     /// Floats and vectors become f32, integers and indices of indexed strings i32. Positions are divided
     /// by their homogeneous coordinate unless it is 0 or 1.
-    fn read(
-        &self,
-        source: &mut ByteSource<'_>,
-        _step: &Step,
-        _budget: MemoryBudget,
-    ) -> Result<RawParticles, ParseError> {
+    fn read(&self, source: &mut ByteSource<'_>, _step: &Step) -> Result<RawParticles, ParseError> {
         let bytes = source.bytes();
         point_layout(bytes)?.particles(bytes)
     }

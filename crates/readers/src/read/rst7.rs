@@ -11,7 +11,7 @@ use super::table::ColumnValues;
 use super::text::{self, Line, Lines};
 use super::{ByteSource, CUT_SHORT, Step, remarks};
 use crate::format::Format;
-use crate::reader::{Confidence, Reader, StreamUnit};
+use crate::reader::{Confidence, FormatInfo, Reader, StreamUnit};
 use spherule_frame::{
     Attribute, AttributeData, MemoryBudget, ParseError, RawParticles, SimulationCell,
 };
@@ -32,12 +32,11 @@ const VELOCITY_UNIT: f64 = 20.455;
 const MIN_BOX: f64 = 2.0;
 
 impl Reader for Rst7 {
-    fn name(&self) -> &'static str {
-        "rst7"
-    }
-
-    fn extensions(&self) -> &'static [&'static str] {
-        &["rst7", "inpcrd", "restrt"]
+    fn info(&self) -> FormatInfo {
+        FormatInfo {
+            remarks_need_whole_file: true,
+            ..FormatInfo::new("rst7", &["rst7", "inpcrd", "restrt"])
+        }
     }
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
@@ -58,11 +57,7 @@ impl Reader for Rst7 {
         Some(StreamUnit::Words)
     }
 
-    fn steps(
-        &self,
-        source: &mut ByteSource<'_>,
-        _budget: MemoryBudget,
-    ) -> Result<Vec<Step>, ParseError> {
+    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
         let text = source.text();
         let mut step = Step::whole(text.left_about());
         let heading = Lines::new(text.head(), 0..text.head().len()).nth(1);
@@ -70,17 +65,9 @@ impl Reader for Rst7 {
         Ok(vec![step])
     }
 
-    fn read(
-        &self,
-        source: &mut ByteSource<'_>,
-        _step: &Step,
-        budget: MemoryBudget,
-    ) -> Result<RawParticles, ParseError> {
+    fn read(&self, source: &mut ByteSource<'_>, _step: &Step) -> Result<RawParticles, ParseError> {
+        let budget = source.budget();
         read(source.text(), budget)
-    }
-
-    fn remarks_need_whole_file(&self) -> bool {
-        true
     }
 
     fn remarks(&self, bytes: &[u8]) -> Vec<String> {

@@ -2,6 +2,7 @@
 
 use super::input::TextInput;
 use crate::shared::SharedBytes;
+use spherule_frame::MemoryBudget;
 
 /// The uncompressed content of a file.
 ///
@@ -10,6 +11,7 @@ use crate::shared::SharedBytes;
 #[derive(Debug)]
 pub struct ByteSource<'a> {
     text: TextInput<'a>,
+    budget: MemoryBudget,
     /// The owner of all bytes, if there is one that can be shared.
     #[cfg_attr(
         not(feature = "hdf5"),
@@ -31,7 +33,17 @@ impl<'a> ByteSource<'a> {
 
     /// Content that is read through `text`.
     pub const fn from_text(text: TextInput<'a>) -> Self {
-        Self { text, shared: None }
+        Self { text, budget: MemoryBudget::UNLIMITED, shared: None }
+    }
+
+    /// Limits what is read from here, except the bytes themselves.
+    pub const fn limit(&mut self, budget: MemoryBudget) {
+        self.budget = budget;
+    }
+
+    /// How much memory all that is read from here may take.
+    pub const fn budget(&self) -> MemoryBudget {
+        self.budget
     }
 
     /// All bytes with their owner. Copies them if they have none that can be shared.

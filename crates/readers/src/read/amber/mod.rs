@@ -7,10 +7,9 @@
 use super::columns::{ComponentStride, ParticleLayout, StridedColumn};
 use super::{ByteSource, CUT_SHORT, Step, remarks, text};
 use crate::format::Format;
-use crate::reader::{Confidence, Reader};
+use crate::reader::{Confidence, FormatInfo, Reader};
 use spherule_frame::{
-    AttributeData, Endian, MemoryBudget, ParseError, Positions, RawParticles, ScalarType,
-    SimulationCell,
+    AttributeData, Endian, ParseError, Positions, RawParticles, ScalarType, SimulationCell,
 };
 
 mod netcdf;
@@ -23,12 +22,11 @@ pub const FORMAT: Format = Format::new(&Amber);
 struct Amber;
 
 impl Reader for Amber {
-    fn name(&self) -> &'static str {
-        "amber"
-    }
-
-    fn extensions(&self) -> &'static [&'static str] {
-        &["nc", "ncdf", "ncrst"]
+    fn info(&self) -> FormatInfo {
+        FormatInfo {
+            may_hold_many_steps: true,
+            ..FormatInfo::new("amber", &["nc", "ncdf", "ncrst"])
+        }
     }
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
@@ -36,15 +34,8 @@ impl Reader for Amber {
         Ok(Confidence::signature_if(is_netcdf))
     }
 
-    fn may_hold_many_steps(&self) -> bool {
-        true
-    }
-
-    fn steps(
-        &self,
-        source: &mut ByteSource<'_>,
-        budget: MemoryBudget,
-    ) -> Result<Vec<Step>, ParseError> {
+    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
+        let budget = source.budget();
         let trajectory = Trajectory::parse(source.bytes())?;
         let mut steps = Vec::new();
         for frame in 0..trajectory.frames {
@@ -56,12 +47,8 @@ impl Reader for Amber {
         Ok(steps)
     }
 
-    fn read(
-        &self,
-        source: &mut ByteSource<'_>,
-        step: &Step,
-        budget: MemoryBudget,
-    ) -> Result<RawParticles, ParseError> {
+    fn read(&self, source: &mut ByteSource<'_>, step: &Step) -> Result<RawParticles, ParseError> {
+        let budget = source.budget();
         let bytes = source.bytes();
         let trajectory = Trajectory::parse(bytes)?;
         let frame = usize::try_from(step.key()).unwrap_or(usize::MAX);

@@ -7,7 +7,7 @@
 use super::columns::{ComponentStride, ParticleLayout, StridedColumn, check_room};
 use super::{ByteSource, Step};
 use crate::format::Format;
-use crate::reader::{Confidence, Reader};
+use crate::reader::{Confidence, FormatInfo, Reader};
 use spherule_frame::{Attribute, AttributeData, MemoryBudget, ParseError, RawParticles};
 
 mod items;
@@ -28,12 +28,8 @@ const PART_DATA: &str = "JPartDataBi4";
 const PART: &str = "part";
 
 impl Reader for Bi4 {
-    fn name(&self) -> &'static str {
-        "bi4"
-    }
-
-    fn extensions(&self) -> &'static [&'static str] {
-        &["bi4"]
+    fn info(&self) -> FormatInfo {
+        FormatInfo { remarks_need_whole_file: true, ..FormatInfo::new("bi4", &["bi4"]) }
     }
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
@@ -46,11 +42,8 @@ impl Reader for Bi4 {
         }
     }
 
-    fn steps(
-        &self,
-        source: &mut ByteSource<'_>,
-        budget: MemoryBudget,
-    ) -> Result<Vec<Step>, ParseError> {
+    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
+        let budget = source.budget();
         let bytes = source.bytes();
         let mut step = Step::whole(bytes.len());
         // A damaged file has a step, too, so that reading it gives the error
@@ -61,18 +54,10 @@ impl Reader for Bi4 {
 
     /// Reads all particles with all their arrays, under the names of the file. Adds `radius`, which is half of the
     /// distance of particles `Dp`, and `part`, if their ids tell it: 0 fixed, 1 moving, 2 floating, 3 fluid.
-    fn read(
-        &self,
-        source: &mut ByteSource<'_>,
-        _step: &Step,
-        budget: MemoryBudget,
-    ) -> Result<RawParticles, ParseError> {
+    fn read(&self, source: &mut ByteSource<'_>, _step: &Step) -> Result<RawParticles, ParseError> {
+        let budget = source.budget();
         let bytes = source.bytes();
         PartFile::read(bytes, budget)?.particles(bytes, budget)
-    }
-
-    fn remarks_need_whole_file(&self) -> bool {
-        true
     }
 
     fn remarks(&self, bytes: &[u8]) -> Vec<String> {

@@ -9,7 +9,7 @@ use super::sniff::{TextShape, is_text, text_shape};
 use super::table::{NumberKind, RowLabels, Table, TargetArray, TargetComponent, TextPolicy};
 use super::{ByteSource, Step};
 use crate::format::Format;
-use crate::reader::{Confidence, Reader, StreamUnit};
+use crate::reader::{Confidence, FormatInfo, Reader, StreamUnit};
 use spherule_frame::names::{COLOR_CODES, is_one_of, is_radius_name};
 use spherule_frame::{MemoryBudget, ParseError, RawParticles};
 
@@ -27,12 +27,8 @@ pub const FORMAT: Format = Format::new(&Csv);
 struct Csv;
 
 impl Reader for Csv {
-    fn name(&self) -> &'static str {
-        "csv"
-    }
-
-    fn extensions(&self) -> &'static [&'static str] {
-        &["csv", "tsv"]
+    fn info(&self) -> FormatInfo {
+        FormatInfo::new("csv", &["csv", "tsv"])
     }
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
@@ -47,20 +43,12 @@ impl Reader for Csv {
         stream_unit(head)
     }
 
-    fn steps(
-        &self,
-        source: &mut ByteSource<'_>,
-        _budget: MemoryBudget,
-    ) -> Result<Vec<Step>, ParseError> {
+    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
         steps(source.text())
     }
 
-    fn read(
-        &self,
-        source: &mut ByteSource<'_>,
-        _step: &Step,
-        budget: MemoryBudget,
-    ) -> Result<RawParticles, ParseError> {
+    fn read(&self, source: &mut ByteSource<'_>, _step: &Step) -> Result<RawParticles, ParseError> {
+        let budget = source.budget();
         read(source.text(), budget)
     }
 

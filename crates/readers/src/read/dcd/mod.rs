@@ -9,8 +9,8 @@ use glam::Vec3;
 use super::columns::{ComponentStride, ParticleLayout, StridedColumn};
 use super::{ByteSource, CUT_SHORT, Step, remarks};
 use crate::format::Format;
-use crate::reader::{Confidence, Reader};
-use spherule_frame::{MemoryBudget, ParseError, Positions, RawParticles, ScalarType};
+use crate::reader::{Confidence, FormatInfo, Reader};
+use spherule_frame::{ParseError, Positions, RawParticles, ScalarType};
 
 mod header;
 
@@ -25,29 +25,18 @@ struct Dcd;
 const F32: usize = 4;
 
 impl Reader for Dcd {
-    fn name(&self) -> &'static str {
-        "dcd"
-    }
-
-    fn extensions(&self) -> &'static [&'static str] {
-        &["dcd"]
+    fn info(&self) -> FormatInfo {
+        FormatInfo { may_hold_many_steps: true, ..FormatInfo::new("dcd", &["dcd"]) }
     }
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
         Ok(Confidence::signature_if(header::records(head).is_some()))
     }
 
-    fn may_hold_many_steps(&self) -> bool {
-        true
-    }
-
     /// As many frames as the file has room for: a simulation that was killed has not updated their number in the
     /// header.
-    fn steps(
-        &self,
-        source: &mut ByteSource<'_>,
-        budget: MemoryBudget,
-    ) -> Result<Vec<Step>, ParseError> {
+    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
+        let budget = source.budget();
         let bytes = source.bytes();
         let header = DcdHeader::parse(bytes)?;
         let mut steps = Vec::new();
@@ -64,12 +53,8 @@ impl Reader for Dcd {
         Ok(steps)
     }
 
-    fn read(
-        &self,
-        source: &mut ByteSource<'_>,
-        step: &Step,
-        budget: MemoryBudget,
-    ) -> Result<RawParticles, ParseError> {
+    fn read(&self, source: &mut ByteSource<'_>, step: &Step) -> Result<RawParticles, ParseError> {
+        let budget = source.budget();
         let bytes = source.bytes();
         let header = DcdHeader::parse(bytes)?;
         let (at, index) = match step.start() {

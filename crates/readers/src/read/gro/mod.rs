@@ -10,7 +10,7 @@ use super::sniff::is_text;
 use super::text::{self, Line};
 use super::{ByteSource, CUT_SHORT, Step, remarks};
 use crate::format::Format;
-use crate::reader::{Confidence, Reader, StreamUnit};
+use crate::reader::{Confidence, FormatInfo, Reader, StreamUnit};
 use spherule_frame::{MemoryBudget, ParseError, RawParticles, SimulationCell};
 
 /// GROMACS `.gro` files.
@@ -19,12 +19,8 @@ pub const FORMAT: Format = Format::new(&Gro);
 struct Gro;
 
 impl Reader for Gro {
-    fn name(&self) -> &'static str {
-        "gro"
-    }
-
-    fn extensions(&self) -> &'static [&'static str] {
-        &["gro"]
+    fn info(&self) -> FormatInfo {
+        FormatInfo { may_hold_many_steps: true, angstrom: 0.1, ..FormatInfo::new("gro", &["gro"]) }
     }
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
@@ -50,33 +46,18 @@ impl Reader for Gro {
         })
     }
 
-    fn may_hold_many_steps(&self) -> bool {
-        true
-    }
-
     fn stream_unit(&self, _head: &[u8]) -> Option<StreamUnit> {
         Some(StreamUnit::Words)
     }
 
-    fn steps(
-        &self,
-        source: &mut ByteSource<'_>,
-        budget: MemoryBudget,
-    ) -> Result<Vec<Step>, ParseError> {
+    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
+        let budget = source.budget();
         steps(source.text(), budget)
     }
 
-    fn read(
-        &self,
-        source: &mut ByteSource<'_>,
-        step: &Step,
-        budget: MemoryBudget,
-    ) -> Result<RawParticles, ParseError> {
+    fn read(&self, source: &mut ByteSource<'_>, step: &Step) -> Result<RawParticles, ParseError> {
+        let budget = source.budget();
         read(source.text(), step, budget)
-    }
-
-    fn angstrom(&self) -> f64 {
-        0.1
     }
 
     fn remarks(&self, _head: &[u8]) -> Vec<String> {

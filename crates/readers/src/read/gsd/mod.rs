@@ -15,7 +15,7 @@ use self::frame::FrameChunks;
 use super::columns::ParticleLayout;
 use super::{ByteSource, Step};
 use crate::format::Format;
-use crate::reader::{Confidence, Reader, ValueNames};
+use crate::reader::{Confidence, FormatInfo, Reader, ValueNames};
 use crate::shared::SharedBytes;
 use spherule_frame::{MemoryBudget, ParseError, RawParticles};
 
@@ -25,12 +25,12 @@ pub const FORMAT: Format = Format::new(&Gsd);
 struct Gsd;
 
 impl Reader for Gsd {
-    fn name(&self) -> &'static str {
-        "gsd"
-    }
-
-    fn extensions(&self) -> &'static [&'static str] {
-        &["gsd"]
+    fn info(&self) -> FormatInfo {
+        FormatInfo {
+            may_hold_many_steps: true,
+            remarks_need_whole_file: true,
+            ..FormatInfo::new("gsd", &["gsd"])
+        }
     }
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
@@ -44,25 +44,14 @@ impl Reader for Gsd {
         Ok(Confidence::signature_if(head.starts_with(MAGIC)))
     }
 
-    fn may_hold_many_steps(&self) -> bool {
-        true
-    }
-
     /// One step for each frame. The key of a step is the index entry with which its frame begins.
-    fn steps(
-        &self,
-        source: &mut ByteSource<'_>,
-        budget: MemoryBudget,
-    ) -> Result<Vec<Step>, ParseError> {
+    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
+        let budget = source.budget();
         frame::steps(&GsdFile::parse(source.bytes())?, budget)
     }
 
-    fn read(
-        &self,
-        source: &mut ByteSource<'_>,
-        step: &Step,
-        budget: MemoryBudget,
-    ) -> Result<RawParticles, ParseError> {
+    fn read(&self, source: &mut ByteSource<'_>, step: &Step) -> Result<RawParticles, ParseError> {
+        let budget = source.budget();
         let file = GsdFile::parse(source.bytes())?;
         FrameChunks::find(&file, step)?.particles(budget)
     }
@@ -74,10 +63,6 @@ impl Reader for Gsd {
             [step] => FrameChunks::find(&file, step)?.stored_layout(),
             _ => Ok(None),
         }
-    }
-
-    fn remarks_need_whole_file(&self) -> bool {
-        true
     }
 
     fn remarks(&self, bytes: &[u8]) -> Vec<String> {

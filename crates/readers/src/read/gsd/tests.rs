@@ -345,12 +345,14 @@ fn default_values_count_against_the_budget() {
     let listed = steps(&bytes).unwrap();
     let read = |bytes_allowed| {
         let mut source = ByteSource::whole(&bytes);
-        Gsd.read(&mut source, &listed[0], MemoryBudget::new(bytes_allowed, "get more"))
+        source.limit(MemoryBudget::new(bytes_allowed, "get more"));
+        Gsd.read(&mut source, &listed[0])
     };
     assert!(read(32).is_ok());
     assert!(matches!(read(31), Err(ParseError::TooLarge { .. })));
     let mut source = ByteSource::whole(&bytes);
-    assert!(Gsd.steps(&mut source, MemoryBudget::new(8, "get more")).is_err());
+    source.limit(MemoryBudget::new(8, "get more"));
+    assert!(Gsd.steps(&mut source).is_err());
 }
 
 proptest! {

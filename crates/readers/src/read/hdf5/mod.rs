@@ -49,7 +49,7 @@ use super::{ByteSource, Step};
 use crate::format::Format;
 use crate::hdf5_signature::is_hdf5;
 use crate::ranges::ParticleRanges;
-use crate::reader::{Confidence, FileExtent, Reader, ValueNames};
+use crate::reader::{Confidence, FileExtent, FormatInfo, Reader, ValueNames};
 use crate::shared::SharedBytes;
 use spherule_frame::{MemoryBudget, ParseError, RawParticles};
 
@@ -59,27 +59,24 @@ pub const FORMAT: Format = Format::new(&Hdf5);
 struct Hdf5;
 
 impl Reader for Hdf5 {
-    fn name(&self) -> &'static str {
-        "hdf5"
-    }
-
-    fn extensions(&self) -> &'static [&'static str] {
-        &["hdf5", "h5", "hdf", "he5", "vtkhdf", "h5part", "h5p", "h5md"]
+    fn info(&self) -> FormatInfo {
+        FormatInfo {
+            may_hold_many_steps: true,
+            remarks_need_whole_file: true,
+            may_refer_to_files: true,
+            ..FormatInfo::new(
+                "hdf5",
+                &["hdf5", "h5", "hdf", "he5", "vtkhdf", "h5part", "h5p", "h5md"],
+            )
+        }
     }
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
         Ok(Confidence::signature_if(is_hdf5(head)))
     }
 
-    fn may_hold_many_steps(&self) -> bool {
-        true
-    }
-
-    fn steps(
-        &self,
-        source: &mut ByteSource<'_>,
-        budget: MemoryBudget,
-    ) -> Result<Vec<Step>, ParseError> {
+    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
+        let budget = source.budget();
         let file = OpenFile::open(&source.to_shared())?;
         let infos = file.checked(file.dialect.steps(budget))?;
         // Numbers that do not increase say nothing about the order
@@ -96,12 +93,8 @@ impl Reader for Hdf5 {
         Ok(steps)
     }
 
-    fn read(
-        &self,
-        source: &mut ByteSource<'_>,
-        step: &Step,
-        budget: MemoryBudget,
-    ) -> Result<RawParticles, ParseError> {
+    fn read(&self, source: &mut ByteSource<'_>, step: &Step) -> Result<RawParticles, ParseError> {
+        let budget = source.budget();
         let file = OpenFile::open(&source.to_shared())?;
         let table = file.checked(file.dialect.table(step.index, budget))?;
         table.read_all(budget)
@@ -137,10 +130,6 @@ impl Reader for Hdf5 {
         OpenFile::open(file).map_or_else(|_| Vec::new(), |open| open.dialect.value_names())
     }
 
-    fn remarks_need_whole_file(&self) -> bool {
-        true
-    }
-
     fn remarks_of_file(&self, file: &SharedBytes) -> Vec<String> {
         let Ok(OpenFile { file, dialect }) = OpenFile::open(file) else {
             return Vec::new();
@@ -157,10 +146,6 @@ impl Reader for Hdf5 {
             remarks.push(format!("refers to other files: {}", listed(&others)));
         }
         remarks
-    }
-
-    fn may_refer_to_files(&self) -> bool {
-        true
     }
 
     fn open_referenced(&self, file: &SharedBytes) {

@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 
 use super::{ByteSource, Step, columns};
 use crate::format::Format;
-use crate::reader::{Confidence, FileExtent, Reader};
+use crate::reader::{Confidence, FileExtent, FormatInfo, Reader};
 use spherule_frame::{Attribute, AttributeData, MemoryBudget, ParseError, Positions, RawParticles};
 
 mod binary_json;
@@ -25,24 +25,19 @@ pub const FORMAT: Format = Format::new(&Houdini);
 struct Houdini;
 
 impl Reader for Houdini {
-    fn name(&self) -> &'static str {
-        "houdini"
-    }
-
     /// Those with the name of their compression; `.bgeo` is in the list of classic files.
-    fn extensions(&self) -> &'static [&'static str] {
-        &["bgeosc", "bgeogz"]
+    fn info(&self) -> FormatInfo {
+        FormatInfo {
+            remarks_need_whole_file: true,
+            ..FormatInfo::new("houdini", &["bgeosc", "bgeogz"])
+        }
     }
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
         Ok(Confidence::signature_if(binary_json::endian(head).is_some()))
     }
 
-    fn steps(
-        &self,
-        source: &mut ByteSource<'_>,
-        _budget: MemoryBudget,
-    ) -> Result<Vec<Step>, ParseError> {
+    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
         Ok(vec![Step::whole(source.bytes().len())])
     }
 
@@ -50,12 +45,8 @@ impl Reader for Houdini {
     ///
     /// Numbers have the type of the file; half precision becomes f32, and strings are indices of their table.
     /// Positions of four components are divided by the last one unless it is 0 or 1.
-    fn read(
-        &self,
-        source: &mut ByteSource<'_>,
-        _step: &Step,
-        budget: MemoryBudget,
-    ) -> Result<RawParticles, ParseError> {
+    fn read(&self, source: &mut ByteSource<'_>, _step: &Step) -> Result<RawParticles, ParseError> {
+        let budget = source.budget();
         let bytes = source.bytes();
         let mut geometry = Geometry::default();
         geometry.read(bytes, budget)?;
@@ -72,10 +63,6 @@ impl Reader for Houdini {
         // Positions may have a fourth component
         let largest = particles.largest_array_len();
         largest + largest / 3
-    }
-
-    fn remarks_need_whole_file(&self) -> bool {
-        true
     }
 
     fn remarks(&self, bytes: &[u8]) -> Vec<String> {

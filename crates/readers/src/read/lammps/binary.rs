@@ -14,7 +14,7 @@ use crate::read::columns::{ComponentStride, GrowingParticles, ParticleLayout, St
 use crate::read::numbers::NumberReader;
 use crate::read::remarks::cell_remark;
 use crate::read::{ByteSource, Step, text};
-use crate::reader::{Confidence, Reader};
+use crate::reader::{Confidence, FormatInfo, Reader};
 use spherule_frame::names::{LAMMPS_CATEGORIES, LAMMPS_INTEGERS};
 use spherule_frame::{
     Attribute, AttributeData, Endian, MemoryBudget, ParseError, Positions, RawParticles, ScalarType,
@@ -31,27 +31,16 @@ const F64: usize = 8;
 const REVISION: i32 = 2;
 
 impl Reader for LammpsBinary {
-    fn name(&self) -> &'static str {
-        "lammps-binary"
-    }
-
-    fn extensions(&self) -> &'static [&'static str] {
-        &["lammpsbin"]
+    fn info(&self) -> FormatInfo {
+        FormatInfo { may_hold_many_steps: true, ..FormatInfo::new("lammps-binary", &["lammpsbin"]) }
     }
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
         Ok(Confidence::signature_if(byte_order(head).is_some()))
     }
 
-    fn may_hold_many_steps(&self) -> bool {
-        true
-    }
-
-    fn steps(
-        &self,
-        source: &mut ByteSource<'_>,
-        budget: MemoryBudget,
-    ) -> Result<Vec<Step>, ParseError> {
+    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
+        let budget = source.budget();
         let bytes = source.bytes();
         let mut steps: Vec<Step> = Vec::new();
         let mut at = 0;
@@ -69,12 +58,8 @@ impl Reader for LammpsBinary {
         Ok(steps)
     }
 
-    fn read(
-        &self,
-        source: &mut ByteSource<'_>,
-        step: &Step,
-        budget: MemoryBudget,
-    ) -> Result<RawParticles, ParseError> {
+    fn read(&self, source: &mut ByteSource<'_>, step: &Step) -> Result<RawParticles, ParseError> {
+        let budget = source.budget();
         let bytes = source.bytes();
         Frame::parse(bytes, step.start(), budget)?.particles(bytes, budget)
     }

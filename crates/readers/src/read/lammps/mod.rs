@@ -15,7 +15,7 @@ use super::table::{
 };
 use super::{ByteSource, Step, text};
 use crate::format::Format;
-use crate::reader::{Confidence, Reader, StreamUnit, ValueNames};
+use crate::reader::{Confidence, FormatInfo, Reader, StreamUnit, ValueNames};
 use crate::shared::SharedBytes;
 use spherule_frame::{MemoryBudget, ParseError, Positions, RawParticles};
 
@@ -42,19 +42,18 @@ pub const FORMAT: Format = Format::new(&Lammps);
 struct Lammps;
 
 impl Reader for Lammps {
-    fn name(&self) -> &'static str {
-        "lammps"
-    }
-
-    fn extensions(&self) -> &'static [&'static str] {
-        &["lammps", "lammpstrj", "dump"]
+    fn info(&self) -> FormatInfo {
+        FormatInfo {
+            may_hold_many_steps: true,
+            ..FormatInfo::new("lammps", &["lammps", "lammpstrj", "dump"])
+        }
     }
 
     /// Also `dump.250` and `dump.drop.250`, names without an extension.
     fn matches_name(&self, stem: &str, extension: &str) -> bool {
         let is_numbered_dump =
             is_digits(extension) && (stem == "dump" || stem.starts_with("dump."));
-        is_numbered_dump || self.extensions().contains(&extension)
+        is_numbered_dump || self.info().extensions.contains(&extension)
     }
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
@@ -63,28 +62,17 @@ impl Reader for Lammps {
         Ok(Confidence::signature_if(is_dump))
     }
 
-    fn may_hold_many_steps(&self) -> bool {
-        true
-    }
-
     fn stream_unit(&self, _head: &[u8]) -> Option<StreamUnit> {
         Some(StreamUnit::Rows)
     }
 
-    fn steps(
-        &self,
-        source: &mut ByteSource<'_>,
-        budget: MemoryBudget,
-    ) -> Result<Vec<Step>, ParseError> {
+    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
+        let budget = source.budget();
         steps(source.text(), budget)
     }
 
-    fn read(
-        &self,
-        source: &mut ByteSource<'_>,
-        step: &Step,
-        budget: MemoryBudget,
-    ) -> Result<RawParticles, ParseError> {
+    fn read(&self, source: &mut ByteSource<'_>, step: &Step) -> Result<RawParticles, ParseError> {
+        let budget = source.budget();
         read(source.text(), step, budget)
     }
 

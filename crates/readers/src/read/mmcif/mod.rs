@@ -9,7 +9,7 @@ use super::sniff::is_text;
 use super::text;
 use super::{ByteSource, CUT_SHORT, Step, remarks};
 use crate::format::Format;
-use crate::reader::{Confidence, Reader, StreamUnit};
+use crate::reader::{Confidence, FormatInfo, Reader, StreamUnit};
 use spherule_frame::{MemoryBudget, ParseError, RawParticles};
 
 mod rows;
@@ -23,12 +23,8 @@ pub const FORMAT: Format = Format::new(&MmCif);
 struct MmCif;
 
 impl Reader for MmCif {
-    fn name(&self) -> &'static str {
-        "mmcif"
-    }
-
-    fn extensions(&self) -> &'static [&'static str] {
-        &["cif", "mmcif"]
+    fn info(&self) -> FormatInfo {
+        FormatInfo { may_hold_many_steps: true, ..FormatInfo::new("mmcif", &["cif", "mmcif"]) }
     }
 
     /// Files of the older dictionary, for crystals, begin alike; reading them gives the error.
@@ -42,10 +38,6 @@ impl Reader for MmCif {
         Ok(Confidence::signature_if(is_cif))
     }
 
-    fn may_hold_many_steps(&self) -> bool {
-        true
-    }
-
     fn stream_unit(&self, _head: &[u8]) -> Option<StreamUnit> {
         Some(StreamUnit::Words)
     }
@@ -56,11 +48,8 @@ impl Reader for MmCif {
     }
 
     /// One step for each model, whose atoms are one after another.
-    fn steps(
-        &self,
-        source: &mut ByteSource<'_>,
-        budget: MemoryBudget,
-    ) -> Result<Vec<Step>, ParseError> {
+    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
+        let budget = source.budget();
         let text = source.text();
         let mut steps: Vec<Step> = Vec::new();
         let mut rows = AtomRows::find(text, budget)?;
@@ -86,12 +75,8 @@ impl Reader for MmCif {
         Ok(steps)
     }
 
-    fn read(
-        &self,
-        source: &mut ByteSource<'_>,
-        step: &Step,
-        budget: MemoryBudget,
-    ) -> Result<RawParticles, ParseError> {
+    fn read(&self, source: &mut ByteSource<'_>, step: &Step) -> Result<RawParticles, ParseError> {
+        let budget = source.budget();
         let text = source.text();
         let is_inside = text.at() > 0;
         let mut rows = if is_inside {

@@ -19,7 +19,7 @@ use self::layout::ArrayLayout;
 use super::columns::ParticleLayout;
 use super::{ByteSource, Step};
 use crate::format::Format;
-use crate::reader::{Confidence, FileExtent, Reader};
+use crate::reader::{Confidence, FileExtent, FormatInfo, Reader};
 use spherule_frame::{MemoryBudget, ParseError, RawParticles};
 
 /// One numpy array.
@@ -33,36 +33,21 @@ struct Npy;
 struct Npz;
 
 impl Reader for Npy {
-    fn name(&self) -> &'static str {
-        "npy"
-    }
-
-    fn extensions(&self) -> &'static [&'static str] {
-        &["npy"]
+    fn info(&self) -> FormatInfo {
+        FormatInfo { may_hold_many_steps: true, ..FormatInfo::new("npy", &["npy"]) }
     }
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
         Ok(Confidence::signature_if(head.starts_with(b"\x93NUMPY")))
     }
 
-    fn may_hold_many_steps(&self) -> bool {
-        true
-    }
-
-    fn steps(
-        &self,
-        source: &mut ByteSource<'_>,
-        budget: MemoryBudget,
-    ) -> Result<Vec<Step>, ParseError> {
+    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
+        let budget = source.budget();
         steps(source.bytes(), budget)
     }
 
-    fn read(
-        &self,
-        source: &mut ByteSource<'_>,
-        step: &Step,
-        budget: MemoryBudget,
-    ) -> Result<RawParticles, ParseError> {
+    fn read(&self, source: &mut ByteSource<'_>, step: &Step) -> Result<RawParticles, ParseError> {
+        let budget = source.budget();
         read(source.bytes(), step, budget)
     }
 
@@ -78,12 +63,8 @@ impl Reader for Npy {
 }
 
 impl Reader for Npz {
-    fn name(&self) -> &'static str {
-        "npz"
-    }
-
-    fn extensions(&self) -> &'static [&'static str] {
-        &["npz"]
+    fn info(&self) -> FormatInfo {
+        FormatInfo { may_hold_many_steps: true, ..FormatInfo::new("npz", &["npz"]) }
     }
 
     /// Any ZIP but one of USD files: the reader reports what is missing in it.
@@ -92,24 +73,13 @@ impl Reader for Npz {
         Ok(Confidence::signature_if(is_npz))
     }
 
-    fn may_hold_many_steps(&self) -> bool {
-        true
-    }
-
-    fn steps(
-        &self,
-        source: &mut ByteSource<'_>,
-        budget: MemoryBudget,
-    ) -> Result<Vec<Step>, ParseError> {
+    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
+        let budget = source.budget();
         steps(source.bytes(), budget)
     }
 
-    fn read(
-        &self,
-        source: &mut ByteSource<'_>,
-        step: &Step,
-        budget: MemoryBudget,
-    ) -> Result<RawParticles, ParseError> {
+    fn read(&self, source: &mut ByteSource<'_>, step: &Step) -> Result<RawParticles, ParseError> {
+        let budget = source.budget();
         read(source.bytes(), step, budget)
     }
 

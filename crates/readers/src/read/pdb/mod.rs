@@ -10,7 +10,7 @@ use super::sniff::is_text;
 use super::text::{self, Line};
 use super::{ByteSource, Step, remarks};
 use crate::format::Format;
-use crate::reader::{Confidence, Reader, StreamUnit};
+use crate::reader::{Confidence, FormatInfo, Reader, StreamUnit};
 use spherule_frame::{MemoryBudget, ParseError, RawParticles, SimulationCell};
 
 /// Protein Data Bank files.
@@ -25,12 +25,8 @@ const OPENINGS: [&[u8]; 10] = [
 ];
 
 impl Reader for Pdb {
-    fn name(&self) -> &'static str {
-        "pdb"
-    }
-
-    fn extensions(&self) -> &'static [&'static str] {
-        &["pdb", "ent"]
+    fn info(&self) -> FormatInfo {
+        FormatInfo { may_hold_many_steps: true, ..FormatInfo::new("pdb", &["pdb", "ent"]) }
     }
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
@@ -51,10 +47,6 @@ impl Reader for Pdb {
         })
     }
 
-    fn may_hold_many_steps(&self) -> bool {
-        true
-    }
-
     fn stream_unit(&self, _head: &[u8]) -> Option<StreamUnit> {
         Some(StreamUnit::Words)
     }
@@ -64,20 +56,13 @@ impl Reader for Pdb {
         text::Lines::new(head, 0..head.len()).any(is_atom)
     }
 
-    fn steps(
-        &self,
-        source: &mut ByteSource<'_>,
-        budget: MemoryBudget,
-    ) -> Result<Vec<Step>, ParseError> {
+    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
+        let budget = source.budget();
         steps(source.text(), budget)
     }
 
-    fn read(
-        &self,
-        source: &mut ByteSource<'_>,
-        step: &Step,
-        budget: MemoryBudget,
-    ) -> Result<RawParticles, ParseError> {
+    fn read(&self, source: &mut ByteSource<'_>, step: &Step) -> Result<RawParticles, ParseError> {
+        let budget = source.budget();
         read(source.text(), step, budget)
     }
 

@@ -18,8 +18,8 @@ use self::header::{Element, PlyEncoding, PlyHeader};
 use super::columns::{self, ComponentStride, ParticleLayout, StridedColumn};
 use super::{ByteSource, Step};
 use crate::format::Format;
-use crate::reader::{Confidence, Reader, StreamUnit};
-use spherule_frame::{Endian, MemoryBudget, ParseError, RawParticles};
+use crate::reader::{Confidence, FormatInfo, Reader, StreamUnit};
+use spherule_frame::{Endian, ParseError, RawParticles};
 
 /// PLY, text or binary.
 pub const FORMAT: Format = Format::new(&Ply);
@@ -27,12 +27,8 @@ pub const FORMAT: Format = Format::new(&Ply);
 struct Ply;
 
 impl Reader for Ply {
-    fn name(&self) -> &'static str {
-        "ply"
-    }
-
-    fn extensions(&self) -> &'static [&'static str] {
-        &["ply"]
+    fn info(&self) -> FormatInfo {
+        FormatInfo::new("ply", &["ply"])
     }
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
@@ -48,11 +44,7 @@ impl Reader for Ply {
 
     /// [`ParseError::Malformed`] for a broken header, [`ParseError::Unsupported`] for a mesh or a file
     /// without vertices.
-    fn steps(
-        &self,
-        source: &mut ByteSource<'_>,
-        _budget: MemoryBudget,
-    ) -> Result<Vec<Step>, ParseError> {
+    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
         let text = source.text();
         let header = PlyHeader::parse(text.head())?;
         vertices(&header)?;
@@ -64,12 +56,8 @@ impl Reader for Ply {
     /// `vx vy vz` become `velocity`, `nx ny nz` `normal`, `red green blue [alpha]` `color`; a leading
     /// `scalar_` is dropped from names; list properties are skipped. Positions are f64 if a coordinate is
     /// `double` (or a 32-bit integer), else f32.
-    fn read(
-        &self,
-        source: &mut ByteSource<'_>,
-        _step: &Step,
-        budget: MemoryBudget,
-    ) -> Result<RawParticles, ParseError> {
+    fn read(&self, source: &mut ByteSource<'_>, _step: &Step) -> Result<RawParticles, ParseError> {
+        let budget = source.budget();
         let text = source.text();
         let bytes = text.head();
         let header = PlyHeader::parse(bytes)?;

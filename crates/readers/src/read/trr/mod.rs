@@ -9,7 +9,7 @@ use super::numbers::NumberReader;
 use super::xdr::{self, FrameSummary};
 use super::{ByteSource, Step, remarks};
 use crate::format::Format;
-use crate::reader::{Confidence, Reader};
+use crate::reader::{Confidence, FormatInfo, Reader};
 use spherule_frame::{Endian, MemoryBudget, ParseError, RawParticles, ScalarType, SimulationCell};
 
 /// GROMACS `.trr` trajectories.
@@ -21,37 +21,22 @@ struct Trr;
 const SIGNATURE: &[u8] = b"\0\0\x07\xc9\0\0\0\x0d\0\0\0\x0cGMX_trn_file";
 
 impl Reader for Trr {
-    fn name(&self) -> &'static str {
-        "trr"
-    }
-
-    fn extensions(&self) -> &'static [&'static str] {
-        &["trr"]
+    fn info(&self) -> FormatInfo {
+        FormatInfo { may_hold_many_steps: true, angstrom: 0.1, ..FormatInfo::new("trr", &["trr"]) }
     }
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
         Ok(Confidence::signature_if(head.starts_with(SIGNATURE)))
     }
 
-    fn may_hold_many_steps(&self) -> bool {
-        true
-    }
-
-    fn steps(
-        &self,
-        source: &mut ByteSource<'_>,
-        budget: MemoryBudget,
-    ) -> Result<Vec<Step>, ParseError> {
+    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
+        let budget = source.budget();
         let summary = |bytes: &[u8], at| Frame::parse(bytes, at).map(|frame| frame.summary);
         xdr::steps(source.bytes(), SIGNATURE, summary, budget)
     }
 
-    fn read(
-        &self,
-        source: &mut ByteSource<'_>,
-        step: &Step,
-        budget: MemoryBudget,
-    ) -> Result<RawParticles, ParseError> {
+    fn read(&self, source: &mut ByteSource<'_>, step: &Step) -> Result<RawParticles, ParseError> {
+        let budget = source.budget();
         let bytes = source.bytes();
         let frame = Frame::parse(bytes, step.start())?;
         let layout = frame.layout(bytes)?;
@@ -67,10 +52,6 @@ impl Reader for Trr {
             [step] => Frame::parse(bytes, step.start())?.layout(bytes).map(Some),
             _ => Ok(None),
         }
-    }
-
-    fn angstrom(&self) -> f64 {
-        0.1
     }
 
     fn remarks(&self, head: &[u8]) -> Vec<String> {

@@ -24,7 +24,7 @@ use self::scene::ParticlePrims;
 use super::npy::is_usdz;
 use super::{ByteSource, Step};
 use crate::format::Format;
-use crate::reader::{Confidence, FileExtent, Reader};
+use crate::reader::{Confidence, FileExtent, FormatInfo, Reader};
 use spherule_frame::{MemoryBudget, ParseError, RawParticles};
 
 /// USD files: binary, text, and packages of them.
@@ -40,12 +40,12 @@ const NO_TIME: u64 = u64::MAX;
 const METADATA_BUDGET: MemoryBudget = MemoryBudget::new(1 << 30, "write fewer prims into one file");
 
 impl Reader for Usd {
-    fn name(&self) -> &'static str {
-        "usd"
-    }
-
-    fn extensions(&self) -> &'static [&'static str] {
-        &["usd", "usda", "usdc", "usdz"]
+    fn info(&self) -> FormatInfo {
+        FormatInfo {
+            may_hold_many_steps: true,
+            remarks_need_whole_file: true,
+            ..FormatInfo::new("usd", &["usd", "usda", "usdc", "usdz"])
+        }
     }
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
@@ -53,16 +53,9 @@ impl Reader for Usd {
         Ok(Confidence::signature_if(is_usd || is_usdz(head)))
     }
 
-    fn may_hold_many_steps(&self) -> bool {
-        true
-    }
-
     /// One step for each time. The key of a step is its time code.
-    fn steps(
-        &self,
-        source: &mut ByteSource<'_>,
-        budget: MemoryBudget,
-    ) -> Result<Vec<Step>, ParseError> {
+    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
+        let budget = source.budget();
         with_layer(source.bytes(), budget, |layer, len| {
             let prims = ParticlePrims::find(layer)?;
             let times = scene::times(layer, &prims, len, budget)?;
@@ -84,12 +77,8 @@ impl Reader for Usd {
         })
     }
 
-    fn read(
-        &self,
-        source: &mut ByteSource<'_>,
-        step: &Step,
-        budget: MemoryBudget,
-    ) -> Result<RawParticles, ParseError> {
+    fn read(&self, source: &mut ByteSource<'_>, step: &Step) -> Result<RawParticles, ParseError> {
+        let budget = source.budget();
         let time = Some(step.key()).filter(|key| *key != NO_TIME).map(f64::from_bits);
         with_layer(source.bytes(), budget, |layer, _| {
             let prims = ParticlePrims::find(layer)?;
@@ -107,10 +96,6 @@ impl Reader for Usd {
         particles: &RawParticles,
     ) -> u64 {
         2 * particles.largest_array_len()
-    }
-
-    fn remarks_need_whole_file(&self) -> bool {
-        true
     }
 
     fn remarks(&self, bytes: &[u8]) -> Vec<String> {

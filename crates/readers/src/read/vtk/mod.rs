@@ -27,7 +27,7 @@ use super::columns::{ParticleLayout, StridedColumn};
 use super::input::TextInput;
 use super::{ByteSource, Step};
 use crate::format::Format;
-use crate::reader::{Confidence, Reader, StreamUnit};
+use crate::reader::{Confidence, FormatInfo, Reader, StreamUnit};
 use spherule_frame::{Attribute, MemoryBudget, ParseError, RawParticles};
 use walk::{PointArray, WalkEnd, Walker};
 
@@ -44,12 +44,8 @@ pub const FORMAT: Format = Format::new(&LegacyVtk);
 struct LegacyVtk;
 
 impl Reader for LegacyVtk {
-    fn name(&self) -> &'static str {
-        "vtk"
-    }
-
-    fn extensions(&self) -> &'static [&'static str] {
-        &["vtk"]
+    fn info(&self) -> FormatInfo {
+        FormatInfo::new("vtk", &["vtk"])
     }
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
@@ -69,11 +65,8 @@ impl Reader for LegacyVtk {
 
     /// One step, with the time if a dataset-level FIELD before the points has it. Faults are reported by
     /// `read`, not here.
-    fn steps(
-        &self,
-        source: &mut ByteSource<'_>,
-        budget: MemoryBudget,
-    ) -> Result<Vec<Step>, ParseError> {
+    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
+        let budget = source.budget();
         let text = source.text();
         let mut step = Step::whole(text.left_about());
         step.time = Walker::begin(text, budget).ok().and_then(|mut walker| {
@@ -86,12 +79,8 @@ impl Reader for LegacyVtk {
 
     /// [`ParseError::Malformed`] if the file is cut short or breaks the format,
     /// [`ParseError::Unsupported`] if it holds a grid or is of a later version.
-    fn read(
-        &self,
-        source: &mut ByteSource<'_>,
-        _step: &Step,
-        budget: MemoryBudget,
-    ) -> Result<RawParticles, ParseError> {
+    fn read(&self, source: &mut ByteSource<'_>, _step: &Step) -> Result<RawParticles, ParseError> {
+        let budget = source.budget();
         let bytes = source.bytes();
         let text = source.text();
         let mut walker = Walker::begin(text, budget)?;

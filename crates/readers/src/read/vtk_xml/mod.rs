@@ -28,7 +28,7 @@ use super::text::same_length;
 use super::vtk::{MAX_COMPONENTS, parse_values};
 use super::{ByteSource, Step};
 use crate::format::Format;
-use crate::reader::{Confidence, FileExtent, Reader};
+use crate::reader::{Confidence, FileExtent, FormatInfo, Reader};
 use appended::Appended;
 use blocks::{ArrayEncoding, ArrayFault, EncodedBytes, payload};
 use document::{ArrayLocation, DataArray, XmlDocument, XmlPart};
@@ -40,12 +40,8 @@ pub const FORMAT: Format = Format::new(&XmlVtk);
 struct XmlVtk;
 
 impl Reader for XmlVtk {
-    fn name(&self) -> &'static str {
-        "vtk-xml"
-    }
-
-    fn extensions(&self) -> &'static [&'static str] {
-        &["vtu", "vtp"]
+    fn info(&self) -> FormatInfo {
+        FormatInfo::new("vtk-xml", &["vtu", "vtp"])
     }
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
@@ -53,11 +49,8 @@ impl Reader for XmlVtk {
     }
 
     /// One step, with the time if a `TimeValue` before the pieces has it. Faults are reported by `read`, not here.
-    fn steps(
-        &self,
-        source: &mut ByteSource<'_>,
-        budget: MemoryBudget,
-    ) -> Result<Vec<Step>, ParseError> {
+    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
+        let budget = source.budget();
         let bytes = source.bytes();
         let mut step = Step::whole(bytes.len());
         step.time = parse(bytes, XmlPart::Fields, |mut document, appended| {
@@ -72,12 +65,8 @@ impl Reader for XmlVtk {
     ///
     /// [`ParseError::Malformed`] if the file is cut short or breaks the format,
     /// [`ParseError::Unsupported`] if it is a grid, a list of files, or of an unknown compressor.
-    fn read(
-        &self,
-        source: &mut ByteSource<'_>,
-        _step: &Step,
-        budget: MemoryBudget,
-    ) -> Result<RawParticles, ParseError> {
+    fn read(&self, source: &mut ByteSource<'_>, _step: &Step) -> Result<RawParticles, ParseError> {
+        let budget = source.budget();
         parse(source.bytes(), XmlPart::Particles, |mut document, appended| {
             check_shares(&document, appended)?;
             document.encoding.decoders = check_memory(&document, budget)?;

@@ -9,8 +9,8 @@ use super::numbers::NumberReader;
 use super::xdr::{self, FrameSummary};
 use super::{ByteSource, Step, remarks};
 use crate::format::Format;
-use crate::reader::{Confidence, Reader};
-use spherule_frame::{Endian, MemoryBudget, ParseError, Positions, RawParticles, SimulationCell};
+use crate::reader::{Confidence, FormatInfo, Reader};
+use spherule_frame::{Endian, ParseError, Positions, RawParticles, SimulationCell};
 
 mod bits;
 mod coordinates;
@@ -34,12 +34,8 @@ const SIGNATURE_LEN: usize = 8;
 const ATOMS_PER_BYTE: usize = 4;
 
 impl Reader for Xtc {
-    fn name(&self) -> &'static str {
-        "xtc"
-    }
-
-    fn extensions(&self) -> &'static [&'static str] {
-        &["xtc"]
+    fn info(&self) -> FormatInfo {
+        FormatInfo { may_hold_many_steps: true, angstrom: 0.1, ..FormatInfo::new("xtc", &["xtc"]) }
     }
 
     /// The number of atoms comes twice.
@@ -56,27 +52,16 @@ impl Reader for Xtc {
         })
     }
 
-    fn may_hold_many_steps(&self) -> bool {
-        true
-    }
-
-    fn steps(
-        &self,
-        source: &mut ByteSource<'_>,
-        budget: MemoryBudget,
-    ) -> Result<Vec<Step>, ParseError> {
+    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
+        let budget = source.budget();
         let bytes = source.bytes();
         let signature = bytes.get(..SIGNATURE_LEN).unwrap_or(bytes);
         let summary = |bytes: &[u8], at| Frame::parse(bytes, at).map(|frame| frame.summary);
         xdr::steps(bytes, signature, summary, budget)
     }
 
-    fn read(
-        &self,
-        source: &mut ByteSource<'_>,
-        step: &Step,
-        budget: MemoryBudget,
-    ) -> Result<RawParticles, ParseError> {
+    fn read(&self, source: &mut ByteSource<'_>, step: &Step) -> Result<RawParticles, ParseError> {
+        let budget = source.budget();
         let bytes = source.bytes();
         let frame = Frame::parse(bytes, step.start())?;
         let need = (size_of::<Vec3>() as u64).saturating_mul(frame.count as u64);
@@ -98,10 +83,6 @@ impl Reader for Xtc {
             cell: frame.cell,
             ..RawParticles::default()
         })
-    }
-
-    fn angstrom(&self) -> f64 {
-        0.1
     }
 
     fn remarks(&self, _head: &[u8]) -> Vec<String> {

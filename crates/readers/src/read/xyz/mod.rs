@@ -9,9 +9,9 @@ use super::sniff::{TextShape, text_shape};
 use super::text::{self, Lines};
 use super::{ByteSource, Step, csv};
 use crate::format::Format;
-use crate::reader::{Confidence, Reader, StreamUnit, ValueNames};
+use crate::reader::{Confidence, FormatInfo, Reader, StreamUnit, ValueNames};
 use crate::shared::SharedBytes;
-use spherule_frame::{Endian, MemoryBudget, ParseError, RawParticles, ScalarType};
+use spherule_frame::{Endian, ParseError, RawParticles, ScalarType};
 
 mod comment;
 mod foreign;
@@ -24,12 +24,12 @@ pub const FORMAT: Format = Format::new(&Xyz);
 struct Xyz;
 
 impl Reader for Xyz {
-    fn name(&self) -> &'static str {
-        "xyz"
-    }
-
-    fn extensions(&self) -> &'static [&'static str] {
-        &["xyz", "extxyz"]
+    fn info(&self) -> FormatInfo {
+        FormatInfo {
+            may_hold_many_steps: true,
+            has_no_signature: true,
+            ..FormatInfo::new("xyz", &["xyz", "extxyz"])
+        }
     }
 
     /// Raw triples may be any bytes, so the name counts. An empty file has no raw triples.
@@ -38,14 +38,6 @@ impl Reader for Xyz {
             Some(TextShape::Counted | TextShape::Numbers) => Confidence::Likely,
             _ => Confidence::IfNamed,
         })
-    }
-
-    fn has_no_signature(&self) -> bool {
-        true
-    }
-
-    fn may_hold_many_steps(&self) -> bool {
-        true
     }
 
     fn stream_unit(&self, head: &[u8]) -> Option<StreamUnit> {
@@ -57,11 +49,8 @@ impl Reader for Xyz {
     }
 
     /// One step for each frame of molecular text.
-    fn steps(
-        &self,
-        source: &mut ByteSource<'_>,
-        budget: MemoryBudget,
-    ) -> Result<Vec<Step>, ParseError> {
+    fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
+        let budget = source.budget();
         let text = source.text();
         let head = text.head();
         match kind(head)? {
@@ -74,12 +63,8 @@ impl Reader for Xyz {
         }
     }
 
-    fn read(
-        &self,
-        source: &mut ByteSource<'_>,
-        step: &Step,
-        budget: MemoryBudget,
-    ) -> Result<RawParticles, ParseError> {
+    fn read(&self, source: &mut ByteSource<'_>, step: &Step) -> Result<RawParticles, ParseError> {
+        let budget = source.budget();
         let text = source.text();
         let head = text.head();
         match kind(head)? {
