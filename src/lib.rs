@@ -57,7 +57,6 @@
 //! input gives the same bytes in all patch versions, and the changelog names every change of an image.
 #![deny(unsafe_code)]
 
-pub mod attributes;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod conversion;

@@ -2,17 +2,18 @@
 
 use std::borrow::Cow;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use spherule_formats::order::index_u32;
 use spherule_formats::{Attribute, AttributeData, Radius};
 
 use super::SharedFrame;
-use super::load_error::{LoadError, missing, no_parts};
+use super::load_error::{LoadError, missing, missing_value, no_parts};
 use super::setup::{ColorRule, OpacityRule, Setup};
 use crate::scene::material::DEFAULT_COLOR;
-use crate::scene::{ColorMap, PartMaterials, RgbEncoding};
-use crate::survey::{ParticleValue, id_of, part_of, velocity_of};
+use crate::scene::{Camera, ColorMap, PartMaterials, RgbEncoding};
+use crate::survey::{id_of, part_of, velocity_of};
+use spherule_frame::values::{BoundValue, Context, Value};
 
 mod radii;
 
@@ -73,10 +74,8 @@ impl<'a> DecodedFrame<'a> {
         if let OpacityRule::Value { name, .. } = &setup.picture.opacity
             && !frame.is_empty()
         {
-            let value = ParticleValue::named(name, &frame.attributes).ok_or_else(|| {
-                let has = frame.attributes.iter().map(|a| a.name.as_str());
-                missing(name, "opacity", file, has)
-            })?;
+            let value = Value::named(name, &frame.attributes)
+                .ok_or_else(|| missing_value(name, "opacity", file, &frame.attributes))?;
             opacities = values_of(setup, &frame, number, &radius, &value);
         }
         // Extract ids and velocities for the channels
@@ -214,10 +213,9 @@ fn color_values(
             (Vec::new(), found.map(colors_of).unwrap_or_default())
         }
         ColorRule::Attribute { name, required, .. } => {
-            let found = ParticleValue::named(name, &frame.attributes);
+            let found = Value::named(name, &frame.attributes);
             if found.is_none() && *required && !frame.is_empty() {
-                let has = frame.attributes.iter().map(|a| a.name.as_str());
-                return Err(missing(name, "colour", file, has));
+                return Err(missing_value(name, "colour", file, &frame.attributes));
             }
             let values = found.map(|value| values_of(setup, frame, number, radius, &value));
             (values.unwrap_or_default(), Vec::new())
@@ -291,45 +289,61 @@ fn magnitudes(attribute: &Attribute, scale: f64) -> Vec<f32> {
 }
 
 /// The values that colour the particles of frame `number`.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_precision_loss,
-    reason = "colours need no more than f32"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "colours need no more than f32")]
 fn values_of(
     setup: &Setup,
     frame: &SharedFrame<'_>,
     number: i64,
     radius: &Radius,
-    value: &ParticleValue,
+    value: &Value,
 ) -> Vec<f32> {
-    let particles = 0..frame.len();
-    let particles = particles.into_par_iter();
-    match value {
-        ParticleValue::Magnitude(name) => {
-            let found = frame.attribute(name);
-            found.map_or_else(Vec::new, |attribute| magnitudes(attribute, 1.0))
+    let Some(value) = value.bind(|name| frame.attribute(name)) else {
+        return Vec::new();
+    };
+    // The view is checked in advance
+    let is_depth = matches!(value, BoundValue::Depth);
+    let camera = if is_depth { setup.camera_at(number).ok() } else { None };
+    let context = DrawnContext { setup, frame, radius, camera };
+    let particles = (0..frame.len()).into_par_iter();
+    particles.map(|i| value.get(i, &context) as f32).collect()
+}
+
+/// The particles that are drawn.
+struct DrawnContext<'a, 'f> {
+    setup: &'a Setup,
+    frame: &'a SharedFrame<'f>,
+    radius: &'a Radius,
+    camera: Option<Camera>,
+}
+
+impl Context for DrawnContext<'_, '_> {
+    fn position(&self, particle: usize) -> DVec3 {
+        self.setup.picture.origin + self.frame.positions[particle].as_dvec3()
+    }
+
+    fn file_index(&self, particle: usize) -> usize {
+        let indices = self.frame.file_index.as_ref();
+        indices.map_or(particle, |indices| indices[particle] as usize)
+    }
+
+    fn radius(&self, particle: usize) -> f64 {
+        match self.radius {
+            Radius::Common(radius) => (*radius).into(),
+            Radius::PerParticle(radii) => radii[particle].into(),
         }
-        ParticleValue::Component(name, c) => component(frame.attribute(name), *c),
-        ParticleValue::Position(_) | ParticleValue::Height => {
-            let picture = &setup.picture;
-            let direction = value.direction(picture.up).unwrap_or(picture.up);
-            let along = |i: usize| direction.dot(picture.origin + frame.positions[i].as_dvec3());
-            particles.map(|i| along(i) as f32).collect()
-        }
-        // The view is checked in advance
-        ParticleValue::Depth => setup.camera_at(number).map_or_else(
-            |_| Vec::new(),
-            |camera| particles.map(|i| camera.depth_of(frame.positions[i])).collect(),
-        ),
-        ParticleValue::Index => match &frame.file_index {
-            Some(indices) => indices.par_iter().map(|i| *i as f32).collect(),
-            None => particles.map(|i| i as f32).collect(),
-        },
-        ParticleValue::Radius => match radius {
-            Radius::Common(radius) => vec![*radius; frame.len()],
-            Radius::PerParticle(radii) => radii.clone(),
-        },
+    }
+
+    fn depth(&self, particle: usize) -> f64 {
+        let depth = |camera: &Camera| camera.depth_of(self.frame.positions[particle]).into();
+        self.camera.as_ref().map_or(f64::NAN, depth)
+    }
+
+    fn up(&self) -> DVec3 {
+        self.setup.picture.up
+    }
+
+    fn time(&self) -> f64 {
+        self.frame.time.unwrap_or(f64::NAN)
     }
 }
 

@@ -1,11 +1,10 @@
 //! What overlays show of the file of a frame.
 
 use rayon::prelude::*;
-use spherule_formats::Attribute;
+use spherule_frame::values::{BoundValue, Column, Value};
 
 use super::SharedFrame;
 use super::setup::Setup;
-use crate::survey::ParticleValue;
 
 /// What overlays show of the file of a frame.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -19,28 +18,29 @@ pub struct FileFacts {
 impl FileFacts {
     /// The facts of a decoded frame.
     pub(super) fn of_decoded(setup: &Setup, frame: &SharedFrame<'_>, file: String) -> Self {
-        let range = |name: &String| match ParticleValue::named(name, &frame.attributes)? {
-            ParticleValue::Magnitude(name) => {
-                let attribute = frame.attribute(&name)?;
-                range_of(attribute.count(), |i| attribute.magnitude(i))
-            }
-            ParticleValue::Component(name, c) => {
-                let attribute: &Attribute = frame.attribute(&name)?;
-                let value = |i: usize| attribute.data.get_f64(i * attribute.components + c);
-                range_of(attribute.count(), value)
-            }
-            _ => None,
+        let range = |name: &String| {
+            let value = Value::named(name, &frame.attributes)?;
+            column_range(&value.bind(|name| frame.attribute(name))?, frame.len())
         };
         let names = setup.picture.overlay_values.iter();
         Self { file, ranges: names.map(range).collect() }
     }
 }
 
-/// Smallest and largest of `count` values that are finite.
-pub(super) fn range_of(
+/// Smallest and largest value in a column of `count` particles.
+pub(super) fn column_range<C: Column + Sync>(
+    value: &BoundValue<C>,
     count: usize,
-    value: impl Fn(usize) -> f64 + Sync + Send,
 ) -> Option<[f64; 2]> {
+    match value {
+        BoundValue::Magnitude(column) => range_of(count, |i| column.magnitude(i)),
+        BoundValue::Component(column, component) => range_of(count, |i| column.get(i, *component)),
+        _ => None,
+    }
+}
+
+/// Smallest and largest of `count` values that are finite.
+fn range_of(count: usize, value: impl Fn(usize) -> f64 + Sync + Send) -> Option<[f64; 2]> {
     let values = (0..count).into_par_iter().map(value);
     let finite = values.filter(|value| value.is_finite());
     let pairs = finite.map(|value| [value, value]);

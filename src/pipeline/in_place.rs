@@ -9,13 +9,14 @@ use spherule_formats::native::{AttributeView, FrameIndex, NativeFile, NativeFram
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{FrameError, ScalarType, is_radius};
 
-use super::facts::{FileFacts, range_of};
-use super::load_error::{LoadError, missing, no_parts};
+use super::facts::{FileFacts, column_range};
+use super::load_error::{LoadError, missing, missing_value, no_parts};
 use super::setup::{ColorRule, OpacityRule, Picture, RadiusRule, Setup};
 use crate::accel::Structure;
 use crate::render::{NO_ID, ShadeSource, mean, opacity_of};
 use crate::scene::{ColorMap, PartMaterials, RgbEncoding};
-use crate::survey::{Named, ParticleValue, id_of, part_of, velocity_of};
+use crate::survey::{id_of, part_of, velocity_of};
+use spherule_frame::values::{BoundValue, Context, Named, Value};
 
 /// In frames up to this size (bytes), all data in use are verified with their checksums before tracing. In larger
 /// frames only the nodes are, which are read anyway; rays touch little of the rest.
@@ -41,9 +42,9 @@ struct Names {
     /// The attribute with colours.
     rgb: Option<String>,
     /// The value that is mapped to colours.
-    values: Option<ParticleValue>,
+    values: Option<Value>,
     /// The value that opacities follow from.
-    opacity: Option<ParticleValue>,
+    opacity: Option<Value>,
     ids: Option<String>,
     velocities: Option<String>,
     parts: Option<String>,
@@ -134,8 +135,11 @@ impl StoredFrame {
             ColorRule::Rgb { .. } => view(&self.names.rgb)
                 .map(|values| StoredColor::Rgb { encoding: encoding(&values), values }),
             ColorRule::Attribute { map, .. } => {
-                let values =
-                    self.names.values.as_ref().and_then(|value| StoredValues::of(&frame, value));
+                let values = self
+                    .names
+                    .values
+                    .as_ref()
+                    .and_then(|value| StoredValues::of(&frame, value, self.time()));
                 values.map(|values| StoredColor::Mapped { values, map })
             }
         };
@@ -143,7 +147,8 @@ impl StoredFrame {
         let opacity = match (&picture.opacity, &self.names.opacity) {
             (OpacityRule::Constant(opacity), _) => StoredOpacity::Constant(*opacity),
             (OpacityRule::Value { range, .. }, value) => {
-                let values = value.as_ref().and_then(|value| StoredValues::of(&frame, value));
+                let values =
+                    value.as_ref().and_then(|value| StoredValues::of(&frame, value, self.time()));
                 let of = |values| StoredOpacity::Mapped(values, *range);
                 values.map_or(StoredOpacity::Constant(1.0), of)
             }
@@ -187,17 +192,8 @@ impl StoredFrame {
     fn range(&self, name: &str) -> Option<[f64; 2]> {
         let frame = self.frame();
         let count = usize::try_from(self.particles()).ok()?;
-        match ParticleValue::named(name, &frame.attributes())? {
-            ParticleValue::Magnitude(name) => {
-                let values = frame.attribute(&name)?;
-                range_of(count, |i| values.magnitude(i))
-            }
-            ParticleValue::Component(name, c) => {
-                let values = frame.attribute(&name)?;
-                range_of(count, |i| values.get(i, c))
-            }
-            _ => None,
-        }
+        let value = Value::named(name, &frame.attributes())?;
+        column_range(&value.bind(|name| frame.attribute(name))?, count)
     }
 
     /// Whether the file is mapped and not read.
@@ -246,10 +242,7 @@ impl Names {
         let all = [&self.rgb, &self.ids, &self.velocities, &self.parts];
         let channels = self.channels.iter().map(|(name, _)| name);
         let all = all.into_iter().chain(channels);
-        let values = [&self.values, &self.opacity]
-            .into_iter()
-            .flatten()
-            .filter_map(ParticleValue::attribute);
+        let values = [&self.values, &self.opacity].into_iter().flatten().filter_map(Value::column);
         let mut names: Vec<&str> = all.filter_map(Option::as_deref).chain(values).collect();
         names.sort_unstable();
         names.dedup();
@@ -268,23 +261,25 @@ impl Names {
             }
             Ok(found)
         };
+        let value = |name: &str, purpose, required| {
+            let found = Value::named(name, &attributes);
+            if found.is_none() && required && file.index().count > 0 {
+                let path = file.path().display().to_string();
+                return Err(missing_value(name, purpose, &path, &attributes));
+            }
+            Ok(found)
+        };
         let (mut rgb, mut values) = (None, None);
         match &setup.picture.color {
             ColorRule::Constant(_) => {}
             ColorRule::Rgb { name, required } => rgb = find(name, "colour", *required)?,
             ColorRule::Attribute { name, required, .. } => {
-                values = ParticleValue::named(name, &attributes);
-                if values.is_none() {
-                    find(name, "colour", *required)?;
-                }
+                values = value(name, "colour", *required)?;
             }
         }
         let mut opacity = None;
         if let OpacityRule::Value { name, .. } = &setup.picture.opacity {
-            opacity = ParticleValue::named(name, &attributes);
-            if opacity.is_none() {
-                find(name, "opacity", true)?;
-            }
+            opacity = value(name, "opacity", true)?;
         }
         let with_channels = setup
             .picture
@@ -403,42 +398,36 @@ enum StoredColor<'a> {
     Mapped { values: StoredValues<'a>, map: &'a ColorMap },
 }
 
-/// Values of particles in place.
+/// Values of particles in place, none of those that need a copy of the particles.
 #[derive(Debug, Clone, Copy)]
-enum StoredValues<'a> {
-    Magnitude(AttributeView<'a>),
-    Component(AttributeView<'a>, usize),
-    Index,
+struct StoredValues<'a> {
+    value: BoundValue<AttributeView<'a>>,
+    time: f64,
 }
 
 impl<'a> StoredValues<'a> {
-    /// None for values that need a copy of the particles.
-    fn of(frame: &NativeFrame<'a>, value: &ParticleValue) -> Option<Self> {
-        match value {
-            ParticleValue::Magnitude(name) => frame.attribute(name).map(Self::Magnitude),
-            ParticleValue::Component(name, component) => {
-                let view = frame.attribute(name)?;
-                Some(Self::Component(view, *component))
-            }
-            ParticleValue::Index => Some(Self::Index),
-            ParticleValue::Position(_)
-            | ParticleValue::Height
-            | ParticleValue::Depth
-            | ParticleValue::Radius => None,
-        }
+    fn of(frame: &NativeFrame<'a>, value: &Value, time: Option<f64>) -> Option<Self> {
+        let value = value.bind(|name| frame.attribute(name)).filter(|_| !value.needs_geometry())?;
+        Some(Self { value, time: time.unwrap_or(f64::NAN) })
     }
 
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_precision_loss,
-        reason = "colours need no more than f32"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "colours need no more than f32")]
     fn get(&self, index: u32) -> f32 {
-        match self {
-            Self::Magnitude(values) => values.magnitude(index as usize) as f32,
-            Self::Component(values, component) => values.get(index as usize, *component) as f32,
-            Self::Index => index as f32,
-        }
+        self.value.get(index as usize, self) as f32
+    }
+}
+
+impl Context for StoredValues<'_> {
+    fn position(&self, _particle: usize) -> DVec3 {
+        DVec3::NAN
+    }
+
+    fn up(&self) -> DVec3 {
+        DVec3::NAN
+    }
+
+    fn time(&self) -> f64 {
+        self.time
     }
 }
 

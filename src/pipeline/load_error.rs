@@ -2,6 +2,7 @@
 
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{Attribute, FrameError};
+use spherule_frame::values::{Named, Value, value_names};
 
 use super::meshes::MeshLoadError;
 use crate::selection::UnknownName;
@@ -121,6 +122,17 @@ pub(super) fn missing<'a>(
     }
 }
 
+/// The error for a value that particles with the columns that the file `has` do not have.
+pub(super) fn missing_value<C: Named>(
+    name: &str,
+    purpose: &'static str,
+    file: &str,
+    has: &[C],
+) -> LoadError {
+    let names = value_names(has, |_| true);
+    missing(name, purpose, file, names.iter().map(String::as_str))
+}
+
 /// The error for a name in a selection that particles with `attributes` have no value for.
 pub(super) fn unknown_name(
     unknown: &UnknownName,
@@ -131,7 +143,10 @@ pub(super) fn unknown_name(
         file: file.to_owned(),
         name: unknown.name.clone(),
         column: unknown.column,
-        has: attribute_list(attributes.iter().map(|a| a.name.as_str())),
+        has: {
+            let names = value_names(attributes, |value| *value != Value::Depth);
+            attribute_list(names.iter().map(String::as_str))
+        },
     }
 }
 

@@ -59,7 +59,7 @@ pub enum ColorRule {
         /// As for [`Self::Attribute`].
         required: bool,
     },
-    /// A value of each particle through a map: see [`crate::survey::ParticleValue::named`].
+    /// A value of each particle through a map: see [`spherule_frame::values::Value::named`].
     Attribute {
         /// Name of the value.
         name: String,
@@ -94,7 +94,7 @@ impl ColorRule {
 pub enum OpacityRule {
     /// The same for all particles, 0 to 1.
     Constant(f32),
-    /// By a value of each particle: see [`crate::survey::ParticleValue::named`].
+    /// By a value of each particle: see [`spherule_frame::values::Value::named`].
     Value {
         /// Name of the value.
         name: String,

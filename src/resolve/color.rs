@@ -7,9 +7,11 @@ use crate::math::narrow;
 use crate::pipeline::{ColorRule, attribute_list};
 use crate::scene::{Camera, ColorMap, ColorScale, UnknownColorMap, material};
 use crate::survey::{
-    Categories, ColorQuestion, ColorRange, GEOMETRIC_VALUES, MAX_CATEGORIES, Named, ParticleValue,
-    RangeQuestion, SPEED, Survey, range_of, velocity_of,
+    Categories, ColorQuestion, ColorRange, MAX_CATEGORIES, RangeQuestion, Survey, range_of,
 };
+use spherule_formats::ScalarType;
+use spherule_frame::join::ColumnShape;
+use spherule_frame::values::{Value, value_names};
 
 const ATTRIBUTE: &str = "material.color.attribute";
 const SCALE: &str = "material.color.scale";
@@ -47,7 +49,7 @@ pub(super) fn is_depth(setting: &ColorSetting) -> bool {
         return false;
     };
     let name = by.attribute.as_deref();
-    name.and_then(ParticleValue::geometric) == Some(ParticleValue::Depth)
+    name.and_then(|name| Value::named::<ColumnShape<'_>>(name, &[])) == Some(Value::Depth)
 }
 
 /// The source of the colours; "auto" depends on the attributes that exist.
@@ -90,7 +92,7 @@ pub(super) fn rule(
         categories: None,
     });
     color.attribute.clone_from(name);
-    if value == ParticleValue::Depth {
+    if value == Value::Depth {
         let camera = camera.ok_or_else(|| ResolveError::Unsupported {
             key: ATTRIBUTE,
             what: "the range of depth depends on the camera".to_owned(),
@@ -113,14 +115,14 @@ pub(super) fn value_of(
     survey: &Survey,
     name: &str,
     key: &'static str,
-) -> Result<ParticleValue, ResolveError> {
+) -> Result<Value, ResolveError> {
     let known = known_attributes(survey);
-    let by_name = || ParticleValue::Magnitude(name.to_owned());
-    match ParticleValue::named(name, &known) {
+    let is_known = |value: &Value| *value != Value::Time || survey.largest_time.is_some();
+    match Value::named(name, &known).filter(is_known) {
         Some(value) => Ok(value),
-        None if survey.most_particles == 0 => Ok(by_name()),
+        None if survey.most_particles == 0 => Ok(Value::Magnitude(name.to_owned())),
         None => {
-            let all = value_names(survey, &GEOMETRIC_VALUES);
+            let all = value_names(&known, is_known);
             Err(ResolveError::MissingAttribute {
                 key,
                 name: name.to_owned(),
@@ -131,45 +133,13 @@ pub(super) fn value_of(
     }
 }
 
-/// The attributes in the survey and the `other` values of particles, each once.
-pub(super) fn value_names(survey: &Survey, other: &[&str]) -> Vec<String> {
-    let speed = velocity_of(&known_attributes(survey)).map(|_| SPEED);
-    let mut all = survey.attributes.clone();
-    for name in speed.iter().chain(other) {
-        if !all.iter().any(|known| known.eq_ignore_ascii_case(name)) {
-            all.push((*name).to_owned());
-        }
-    }
-    all
-}
-
-/// The attributes in the survey.
-pub(super) fn known_attributes(survey: &Survey) -> Vec<SurveyedAttribute<'_>> {
+/// The attributes in the survey, whose types it does not know.
+pub(super) fn known_attributes(survey: &Survey) -> Vec<ColumnShape<'_>> {
     let components = survey.components.iter().copied();
     (survey.attributes.iter())
         .zip(components.chain(std::iter::repeat(3)))
-        .map(|(name, components)| SurveyedAttribute { name, components })
+        .map(|(name, components)| ColumnShape { name, components, scalar: ScalarType::F32 })
         .collect()
-}
-
-/// An attribute in the survey.
-pub(super) struct SurveyedAttribute<'a> {
-    name: &'a str,
-    components: usize,
-}
-
-impl Named for SurveyedAttribute<'_> {
-    fn name(&self) -> &str {
-        self.name
-    }
-
-    fn components(&self) -> usize {
-        self.components
-    }
-
-    fn is_integer(&self) -> bool {
-        false
-    }
 }
 
 /// Colours by a value with the range in `color`, unless `by` has another one.

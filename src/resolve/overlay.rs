@@ -15,7 +15,8 @@ use crate::overlay::{
 };
 use crate::pipeline::{ColorRule, Setup};
 use crate::scene::{Background, Camera};
-use crate::survey::{ParticleValue, Survey, shown_name};
+use crate::survey::{Survey, shown_name};
+use spherule_frame::values::Value;
 
 /// Colours of a continuous bar.
 const COLORS: u16 = 256;
@@ -338,7 +339,7 @@ fn time_stamp(survey: &Survey) -> Template {
 fn check_value(survey: &Survey, name: &str) -> Result<(), ResolveError> {
     let value = super::color::value_of(survey, name, "overlay.text")?;
     match value {
-        ParticleValue::Magnitude(_) | ParticleValue::Component(..) => Ok(()),
+        Value::Magnitude(_) | Value::Component(..) => Ok(()),
         _ => Err(ResolveError::Unsupported {
             key: "overlay.text",
             what: format!("{name} is no attribute, and only attributes have a range here"),

@@ -4,10 +4,11 @@ use super::error::similar;
 use super::{ResolveError, color};
 use crate::manifest::Manifest;
 use crate::pipeline::attribute_list;
-use crate::selection::{OTHER_NAMES, Selection};
+use crate::selection::Selection;
 use crate::surface::SurfaceKind;
 use crate::surface::cut::ConvexRegion;
 use crate::survey::Survey;
+use spherule_frame::values::{Value, value_names};
 
 /// The selection of `manifest`.
 ///
@@ -19,14 +20,17 @@ pub(super) fn selection(manifest: &Manifest, survey: &Survey) -> Result<Selectio
         return Ok(selection);
     }
     // Whether files have times shows when they are read
-    let checked = selection.check_names(&color::known_attributes(survey), Some(0.0));
+    let known = color::known_attributes(survey);
+    let checked = selection.check_names(&known, Some(0.0));
     match checked {
         Ok(()) => Ok(selection),
         Err(unknown) => {
-            let radius = survey.has_radii.then_some("radius");
-            let time = survey.frame_time.map(|_| "time");
-            let others: Vec<&str> = OTHER_NAMES.into_iter().chain(radius).chain(time).collect();
-            let all = color::value_names(survey, &others);
+            let all = value_names(&known, |value| match value {
+                Value::Radius => survey.has_radii,
+                Value::Time => survey.largest_time.is_some(),
+                Value::Depth => false,
+                _ => true,
+            });
             let name = unknown.name.split(['.', '[']).next().unwrap_or_default();
             let hint = match name.to_ascii_lowercase().as_str() {
                 "depth" => {

@@ -1,10 +1,11 @@
 //! Evaluates a condition for blocks of particles: each operation runs over a whole block before the next one, so that
 //! its loop is the same for all conditions and the compiler makes vector instructions of it.
 
-use spherule_formats::RawParticles;
+use spherule_formats::Attribute;
+use spherule_frame::values::BoundValue;
 
 use super::condition::{Arithmetic, Comparison, Operation};
-use super::values::Value;
+use super::values::FileContext;
 
 /// Particles in a block; its values stay in the cache.
 pub(super) const BLOCK: usize = 1024;
@@ -24,8 +25,8 @@ impl Stacks {
     pub(super) fn evaluate(
         &mut self,
         operations: &[Operation],
-        values: &[Value],
-        particles: &RawParticles,
+        values: &[BoundValue<&Attribute>],
+        context: FileContext<'_>,
         first: usize,
         to: &mut [bool],
     ) {
@@ -43,7 +44,7 @@ impl Stacks {
                 Operation::Value(index) => {
                     let count = to.len();
                     let block = self.push_number();
-                    values[index].load(particles, first, &mut block[..count]);
+                    context.load(values[index], first, &mut block[..count]);
                 }
                 Operation::Negate => self.change(|a| -a),
                 Operation::Abs => self.change(f64::abs),

@@ -5,7 +5,8 @@
 use glam::DVec3;
 use rayon::prelude::*;
 use spherule_formats::order::index_u32;
-use spherule_formats::{AttributeData, RawParticles};
+use spherule_formats::{Attribute, AttributeData, RawParticles};
+use spherule_frame::values::{BoundValue, Named, Value, id_of};
 use spherule_jobs::FrameRange;
 
 mod condition;
@@ -20,11 +21,10 @@ mod values;
 pub use condition::Condition;
 pub use error::ConditionError;
 pub use region::Region;
-pub use values::{OTHER_NAMES, UnknownName};
+pub use values::UnknownName;
 
-use crate::attributes::Named;
 use evaluate::{BLOCK, Stacks};
-use values::Value;
+use values::{FileContext, value_of};
 
 /// Particles that one task tests.
 const RUN: usize = 64 * BLOCK;
@@ -78,7 +78,7 @@ impl Selection {
         time: Option<f64>,
     ) -> Result<Vec<Value>, UnknownName> {
         let names = self.condition.iter().flat_map(|condition| &condition.names);
-        names.map(|name| Value::of(name, attributes, time, self.up)).collect()
+        names.map(|name| value_of(name, attributes, time, self.up)).collect()
     }
 
     /// Indices of the particles that are drawn, ascending. The result does not depend on the number of threads.
@@ -91,7 +91,10 @@ impl Selection {
             return Ok(Vec::new());
         }
         let values = self.values(&particles.attributes, particles.time)?;
-        let ids = Value::id(&particles.attributes);
+        let context = FileContext::new(particles, self.up);
+        let values: Vec<BoundValue<&Attribute>> =
+            values.iter().filter_map(|value| context.bind(value)).collect();
+        let ids = id_of(&particles.attributes);
         // Mark the particles that are drawn, and count them
         let mut marks = vec![false; count];
         let runs = marks.par_chunks_mut(RUN).enumerate();
@@ -101,9 +104,9 @@ impl Selection {
                     let first = run * RUN + block * BLOCK;
                     keep.fill(true);
                     if let Some(condition) = &self.condition {
-                        stacks.evaluate(&condition.operations, &values, particles, first, keep);
+                        stacks.evaluate(&condition.operations, &values, context, first, keep);
                     }
-                    self.test_ids(particles, ids, first, keep);
+                    self.test_ids(ids, first, keep);
                     self.test_regions(particles, first, keep);
                 }
                 marks.iter().map(|mark| usize::from(*mark)).sum()
@@ -132,15 +135,13 @@ impl Selection {
     }
 
     /// Clears the marks of particles without a selected id.
-    fn test_ids(&self, particles: &RawParticles, ids: Value, first: usize, keep: &mut [bool]) {
+    fn test_ids(&self, ids: Option<&Attribute>, first: usize, keep: &mut [bool]) {
         if self.ids.is_none() && self.every <= 1 {
             return;
         }
         let id = |i: usize| match ids {
-            Value::Component { attribute, .. } => {
-                integer(&particles.attributes[attribute].data, first + i)
-            }
-            _ => i64::try_from(first + i).ok(),
+            Some(attribute) => integer(&attribute.data, first + i),
+            None => i64::try_from(first + i).ok(),
         };
         let every = i64::from(self.every.max(1));
         let is_selected = |id: i64| {

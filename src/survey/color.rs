@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use spherule_formats::{ParticleFrame, Radius};
+use spherule_frame::values::{BoundValue, Context, Value};
 
-use super::ParticleValue;
 use super::RadiusQuestion;
 use super::robust::{percentile, robust_range, sorted_sample};
 
@@ -20,7 +20,7 @@ pub enum ColorQuestion<'a> {
     None,
     /// The velocity if there is one, otherwise an attribute with colours if there is one.
     Speed(RangeQuestion),
-    /// This value: see [`ParticleValue::named`].
+    /// This value: see [`Value::named`].
     Value(&'a str, RangeQuestion),
 }
 
@@ -97,6 +97,7 @@ pub(super) struct ColorTotals {
 /// What values need beside the particles.
 #[derive(Clone, Copy)]
 pub(super) struct FrameContext<'a> {
+    pub(super) frame: &'a ParticleFrame,
     /// Particle count of the frame, which may be sampled.
     pub(super) count: usize,
     /// Origin of the positions.
@@ -105,10 +106,34 @@ pub(super) struct FrameContext<'a> {
     pub(super) radius: RadiusQuestion<'a>,
 }
 
+impl Context for FrameContext<'_> {
+    fn position(&self, particle: usize) -> DVec3 {
+        self.origin + self.frame.positions[particle].as_dvec3()
+    }
+
+    fn radius(&self, particle: usize) -> f64 {
+        match (self.radius, &self.frame.radius) {
+            (question @ (RadiusQuestion::Attribute(..) | RadiusQuestion::Table(..)), _) => {
+                question.radius_by_attribute(&self.frame.attributes, particle).unwrap_or(f64::NAN)
+            }
+            (_, Some(Radius::PerParticle(radii))) => radii[particle].into(),
+            (_, Some(Radius::Common(radius))) => (*radius).into(),
+            (_, None) => f64::NAN,
+        }
+    }
+
+    fn up(&self) -> DVec3 {
+        self.up
+    }
+
+    fn time(&self) -> f64 {
+        self.frame.time.unwrap_or(f64::NAN)
+    }
+}
+
 impl ColorTotals {
     pub(super) fn add(
         &mut self,
-        frame: &ParticleFrame,
         velocity: Option<&str>,
         question: ColorQuestion,
         context: FrameContext<'_>,
@@ -120,55 +145,21 @@ impl ColorTotals {
         };
         let Some(name) = name else { return };
         self.name = Some(name.to_owned());
-        let Some(value) = ParticleValue::named(name, &frame.attributes) else {
-            return;
-        };
-        // Find the values
-        match &value {
-            ParticleValue::Magnitude(name) => {
-                let Some(attribute) = frame.attribute(name) else {
-                    return;
-                };
-                let is_length = attribute.components > 1;
-                self.add_values(attribute.count(), |i| attribute.magnitude(i), range, is_length);
-            }
-            ParticleValue::Component(name, c) => {
-                let Some(attribute) = frame.attribute(name) else {
-                    return;
-                };
-                let value = |i: usize| attribute.data.get_f64(i * attribute.components + c);
-                self.add_values(attribute.count(), value, range, false);
-            }
-            ParticleValue::Position(_) | ParticleValue::Height => {
-                let Some(direction) = value.direction(context.up) else {
-                    return;
-                };
-                let along =
-                    |i: usize| direction.dot(context.origin + frame.positions[i].as_dvec3());
-                self.add_values(frame.len(), along, range, false);
-            }
-            ParticleValue::Index => {
-                #[expect(clippy::cast_precision_loss, reason = "a range of colours")]
-                let last = context.count.saturating_sub(1) as f64;
-                self.add_values(2, |i| if i == 0 { 0.0 } else { last }, range, false);
-            }
-            ParticleValue::Radius => match (&frame.radius, context.radius) {
-                (_, RadiusQuestion::Attribute(..) | RadiusQuestion::Table(..)) => {
-                    let radius = |i| context.radius.radius_by_attribute(&frame.attributes, i);
-                    let radius = |i| radius(i).unwrap_or(f64::NAN);
-                    self.add_values(frame.len(), radius, range, false);
-                }
-                (Some(Radius::PerParticle(radii)), _) => {
-                    self.add_values(radii.len(), |i| radii[i].into(), range, false);
-                }
-                (Some(Radius::Common(radius)), _) => {
-                    self.add_values(1, |_| (*radius).into(), range, false);
-                }
-                (None, _) => {}
-            },
+        let frame = context.frame;
+        let value = Value::named(name, &frame.attributes)
+            .and_then(|value| value.bind(|name| frame.attribute(name)));
+        let Some(value) = value else { return };
+        let is_length = value.is_length();
+        let (count, value): (usize, &dyn Fn(usize) -> f64) = match value {
             // It depends on the camera, which is placed later
-            ParticleValue::Depth => {}
-        }
+            BoundValue::Depth => return,
+            // The frame may be sampled, without its last index
+            #[expect(clippy::cast_precision_loss, reason = "a range of colours")]
+            BoundValue::Index => (2, &|i| (i * context.count.saturating_sub(1)) as f64),
+            BoundValue::Time => (frame.len().min(1), &|i| value.get(i, &context)),
+            _ => (frame.len(), &|i| value.get(i, &context)),
+        };
+        self.add_values(count, value, range, is_length);
     }
 
     fn add_values(

@@ -15,10 +15,8 @@ use spherule_formats::{
     choose_origin, sample_indices,
 };
 
-pub use crate::attributes::{
-    GEOMETRIC_VALUES, Named, PART_NAMES, ParticleValue, SPEED, id_of, part_of, shown_name,
-    velocity_of,
-};
+pub use spherule_frame::values::{PART_NAMES, id_of, part_of, shown_name, velocity_of};
+
 use crate::scene::{RadiusTable, RgbEncoding, is_rgb};
 use crate::selection::Selection;
 
@@ -524,9 +522,9 @@ impl Totals {
             self.weight = Some(weight);
         }
         // Update the ranges of colour and radius
-        let context = FrameContext { count, origin, up, radius: question.radius };
+        let context = FrameContext { frame: &frame, count, origin, up, radius: question.radius };
         let velocity = self.velocity.as_deref();
-        self.color.add(&frame, velocity, question.color, context);
+        self.color.add(velocity, question.color, context);
         if question.points && is_framed {
             let some = sample_indices(frame.len(), POINTS).map(|i| frame.positions[i]);
             self.points.extend(some.map(|p| origin + p.as_dvec3()));

@@ -202,3 +202,38 @@ fn parts_without_the_value_are_grey() {
         assert!(!is_grey(slow) && !is_grey(fast) && slow != fast, "{name}: {slow} {fast}");
     }
 }
+
+#[test]
+fn names_of_values_work_everywhere() {
+    let shop = Workshop::new();
+    let time = "<UnstructuredGrid><FieldData><DataArray type=\"Float64\" Name=\"TimeValue\" NumberOfTuples=\"1\">2.5\
+                </DataArray></FieldData>";
+    let text = vtu(0..5, true).replace("<UnstructuredGrid>", time);
+    fs::create_dir_all(shop.join("in")).expect("a directory");
+    fs::write(shop.join("in/p_1.vtu"), &text).expect("a file");
+    let radius =
+        "<PointData><DataArray type=\"Float32\" Name=\"radius\">.3 .3 .3 .3 .3</DataArray>";
+    fs::write(shop.join("p.vtu"), text.replace("<PointData>", radius)).expect("a file");
+    shop.run(&["convert", "in", "-o", "native"]).expect(0);
+    let all = ["x", "z", "speed", "vy", "vel.y", "vel[1]", "height", "index", "id", "time"];
+    for name in all {
+        let is_all = format!("{name} > -9");
+        let options = ["--radius", "0.3", "--where", &is_all, "--color-by", name];
+        for input in ["in", "native"] {
+            let ran = render(&shop, input, &options).expect(0);
+            assert!(!ran.errors().contains("NaN"), "{}", ran.errors());
+        }
+        let opacity = ["--radius", "0.3", "--set", "material.opacity.range=[-9,-8]"];
+        let by = format!("material.opacity.attribute={name}");
+        render(&shop, "in", &[&opacity[..], &["--set", &by]].concat()).expect(0);
+    }
+    render(&shop, "p.vtu", &["--where", "radius > 0.2", "--color-by", "radius"]).expect(0);
+    // Each name is listed once, in their order
+    let list = "available: `height`, `id`, `index`, `speed`, `time`, `Vel`, `vx`, `vy`, `vz`, `x`, `y`, `z`";
+    let unknown = ["--radius", "0.3", "--where", "sped > 1"];
+    render(&shop, "in", &unknown).expect(2).prints("(did you mean `speed`?)").prints(list);
+    let unknown = ["--radius", "0.3", "--color-by", "sped"];
+    let list =
+        list.replace("`height`", "`depth`, `height`").replace("`speed`", "`radius`, `speed`");
+    render(&shop, "in", &unknown).expect(2).prints("(did you mean `speed`?)").prints(&list);
+}

@@ -152,7 +152,7 @@ fn impossible_selections_are_explained() {
         (
             "depth > 1",
             "no value `depth` in the sampled frames (it depends on the camera, which depends on the particles; \
-             conditions have x, y, z and height); available: `id`, `type`, `x`, `y`, `z`, `height`, `index`",
+             conditions have x, y, z and height); available: `height`, `id`, `index`, `part`, `type`, `x`, `y`, `z`",
         ),
         ("x > (1", "--where: character 7: expected `)`"),
         ("(x > 1) > 2", "character 1: `>` needs a number here, and this is a condition"),

@@ -42,6 +42,7 @@ pub mod names;
 mod origin;
 mod sampling;
 mod scalar;
+pub mod values;
 mod vectors;
 
 pub use attribute::{Attribute, AttributeData};

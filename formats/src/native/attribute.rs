@@ -4,7 +4,33 @@ use std::ops::Range;
 
 use super::layout::AttributeIndex;
 use super::stored::StoredType;
+use spherule_frame::values::{Column, Named};
+
 use crate::{Attribute, AttributeData, Endian, ParseError, ScalarType};
+
+impl Named for AttributeView<'_> {
+    fn name(&self) -> &str {
+        self.name()
+    }
+
+    fn components(&self) -> usize {
+        self.components()
+    }
+
+    fn is_integer(&self) -> bool {
+        matches!(self.stored(), StoredType::Plain(kind) if !matches!(kind, ScalarType::F32 | ScalarType::F64))
+    }
+}
+
+impl Column for AttributeView<'_> {
+    fn get(&self, index: usize, component: usize) -> f64 {
+        self.get(index, component)
+    }
+
+    fn magnitude(&self, index: usize) -> f64 {
+        self.magnitude(index)
+    }
+}
 
 /// The values of an attribute, in place.
 #[derive(Debug, Clone, Copy)]

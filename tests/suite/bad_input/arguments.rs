@@ -204,8 +204,8 @@ fn missing_colour_attribute() {
         &workshop,
         &["--color-by", "nosuch"],
         &[
-            "material.color.attribute: no attribute `nosuch` in the sampled frames; available: `density`, `id`, `velocity`, \
-             `speed`, `x`, `y`, `z`, `height`, `depth`, `index`, `radius`",
+            "material.color.attribute: no attribute `nosuch` in the sampled frames; available: `density`, `depth`, \
+             `height`, `id`, `index`, `radius`, `speed`, `velocity`, `vx`, `vy`, `vz`, `x`, `y`, `z`",
         ],
     );
     not_rendered(

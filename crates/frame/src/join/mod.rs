@@ -5,10 +5,12 @@
 //! column, its particles have NaN there, and integers become floating point. [`plan`] says which columns there are and
 //! what is reported; [`join`] also copies the numbers.
 
+mod columns;
 mod notes;
 mod plan;
 
-pub use plan::{ColumnShape, JoinPlan, JoinedColumn, PartColumns, plan};
+pub use columns::{ColumnShape, PartColumns};
+pub use plan::{JoinPlan, JoinedColumn, plan};
 
 use crate::bonds::Bond;
 use crate::{Attribute, AttributeData, MemoryBudget, ParseError, Positions, RawParticles};

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use spherule_files::one_line;
 
-use super::plan::PartColumns;
+use super::columns::PartColumns;
 
 /// Most names that a note lists, of columns and of parts.
 const LISTED: usize = 8;

@@ -2,31 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::columns::PartColumns;
 use super::notes::{Omission, Omitted};
 use crate::ScalarType;
 use crate::names::{ID, is_one_of, is_radius_name};
-
-/// A column of a part without its numbers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ColumnShape<'a> {
-    /// The name.
-    pub name: &'a str,
-    /// Numbers per particle.
-    pub components: usize,
-    /// Type of the numbers.
-    pub scalar: ScalarType,
-}
-
-/// The columns of a part.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct PartColumns<'a> {
-    /// Name of the part in messages.
-    pub name: &'a str,
-    /// Number of particles.
-    pub count: u64,
-    /// Its columns; of several with one name, only the first counts.
-    pub columns: Vec<ColumnShape<'a>>,
-}
 
 /// A column of all parts.
 #[derive(Debug, Clone, PartialEq, Eq)]
