@@ -1,4 +1,4 @@
-//! A hierarchy of boxes around primitives that are intersected one at a time, in f64: triangles and rods.
+//! A hierarchy of boxes around primitives that are intersected one at a time, in f64: triangles.
 //!
 //! It is a compressed wide BVH of the crate `obvhs`. Results do not depend on it: at equal distances, the primitive
 //! with the lower index wins.
@@ -23,8 +23,8 @@ const PADDING: f32 = 8.0 * f32::EPSILON;
 /// the first 1e-4 of a ray.
 const LEAD: f64 = 1e-3;
 
-/// Memory of `obvhs` for a box while a hierarchy is built, with its share of the hierarchy, bytes. Measured on triangles
-/// and rods, as the remainder of what they hold themselves.
+/// Memory of `obvhs` for a box while a hierarchy is built, with its share of the hierarchy, bytes. Measured on triangles,
+/// as the remainder of what they hold themselves.
 pub(super) const BUILT_BYTES: u64 = 296;
 
 /// `value` in single precision.
@@ -40,19 +40,6 @@ pub(super) struct Hierarchy {
 }
 
 impl Hierarchy {
-    /// The hierarchy of primitives that are in several boxes each: primitive `owners[i]` is in the box `box_of(i)`.
-    pub(super) fn of_parts(owners: &[u32], box_of: impl Fn(u32) -> [DVec3; 2] + Sync) -> Self {
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "the caller limits the number of parts"
-        )]
-        let mut hierarchy = Self::new(owners.len() as u32, box_of);
-        for index in &mut hierarchy.bvh.primitive_indices {
-            *index = owners[*index as usize];
-        }
-        hierarchy
-    }
-
     /// The hierarchy of `count` primitives in the boxes `box_of`: lowest and highest corner.
     pub(super) fn new(count: u32, box_of: impl Fn(u32) -> [DVec3; 2] + Sync) -> Self {
         let nothing = || [DVec3::INFINITY, DVec3::NEG_INFINITY];

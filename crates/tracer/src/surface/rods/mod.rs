@@ -11,6 +11,7 @@ use glam::{DVec3, Vec3};
 
 mod arrow;
 mod interval;
+mod part_tree;
 mod parts;
 mod shape;
 
@@ -20,8 +21,8 @@ mod tests;
 pub use arrow::{Anchor, arrow};
 pub use shape::RodSurface;
 
-use super::hierarchy::{self, Hierarchy};
 use interval::Body;
+use part_tree::PartTree;
 use parts::parts_of;
 
 /// The shape of both ends of a rod.
@@ -67,18 +68,13 @@ impl Rod {
 /// Greatest number of rods; long ones have several parts each.
 pub const MAX_RODS: usize = u32::MAX as usize / 2;
 
-/// Memory of a rod with its share of the hierarchy, bytes.
-const KEPT_BYTES: u64 = size_of::<Rod>() as u64 + 48;
-/// The same while the hierarchy is built: the rod, its part, and what the hierarchy needs.
-const BUILT_BYTES: u64 = size_of::<Rod>() as u64 + 16 + hierarchy::BUILT_BYTES;
-
-/// Rods with caps of one kind, and their hierarchy.
+/// Rods with caps of one kind, and a tree of their parts.
 pub struct RodTree {
     rods: Vec<Rod>,
     /// Base colours, linear RGB; empty if all rods have that of their material.
     colors: Vec<Vec3>,
     caps: Caps,
-    hierarchy: Hierarchy,
+    parts: PartTree,
     /// The largest coordinate of their boxes.
     extent: f32,
 }
@@ -93,17 +89,15 @@ impl fmt::Debug for RodTree {
 }
 
 impl RodTree {
-    /// Builds the hierarchy of `rods`, without those that no ray can hit, and of at most [`MAX_RODS`].
+    /// Builds the tree of `rods`, without those that no ray can hit, and of at most [`MAX_RODS`].
     pub fn new(mut rods: Vec<Rod>, caps: Caps) -> Self {
         rods.retain(|rod| rod.is_visible(caps));
         rods.truncate(MAX_RODS);
         let parts = parts_of(&rods, extent_of(&rods));
-        let owners: Vec<u32> = parts.iter().map(|part| part.rod).collect();
-        let bounds = |part: u32| parts[part as usize].bounds(&rods, caps);
-        let hierarchy = Hierarchy::of_parts(&owners, bounds);
+        let parts = PartTree::new(&parts, &rods, caps);
         let extent =
-            hierarchy.bounds().map_or(0.0, |[min, max]| min.abs().max(max.abs()).max_element());
-        Self { rods, colors: Vec::new(), caps, hierarchy, extent }
+            parts.bounds().map_or(0.0, |[min, max]| min.abs().max(max.abs()).max_element());
+        Self { rods, colors: Vec::new(), caps, parts, extent }
     }
 
     /// Gives each half of a rod the base colour at its index of [`Rod::particles`], linear RGB; halves without one keep
@@ -125,22 +119,20 @@ impl RodTree {
 
     /// The lowest and the highest corner of their box; None without rods.
     pub fn bounds(&self) -> Option<[Vec3; 2]> {
-        self.hierarchy.bounds()
+        self.parts.bounds()
     }
 
-    /// Memory of the rods, their colours and their hierarchy, bytes.
+    /// Memory of the rods, their colours and their tree, bytes.
     pub const fn bytes(&self) -> usize {
         let colors = size_of_val(self.colors.as_slice());
-        size_of_val(self.rods.as_slice()) + colors + self.hierarchy.bytes()
+        size_of_val(self.rods.as_slice()) + colors + self.parts.bytes()
     }
 
     /// Upper bounds of the memory of `rods` rods with so many `colors`, bytes: while the tree is built, and afterwards.
-    pub const fn predicted_bytes(rods: u64, colors: u64) -> [u64; 2] {
+    pub fn predicted_bytes(rods: u64, colors: u64) -> [u64; 2] {
+        let own = rods.saturating_mul(size_of::<Rod>() as u64);
         let colors = colors.saturating_mul(size_of::<Vec3>() as u64);
-        [
-            rods.saturating_mul(BUILT_BYTES).saturating_add(colors),
-            rods.saturating_mul(KEPT_BYTES).saturating_add(colors),
-        ]
+        PartTree::predicted_bytes(rods).map(|tree| tree.saturating_add(own).saturating_add(colors))
     }
 
     /// The body of the rod with this index.

@@ -52,15 +52,34 @@ impl Part {
         if self.count == 1 {
             return [min, max];
         }
-        let [a, b] = rod.ends.map(double);
-        let [r, s] = rod.radii.map(f64::from);
-        let ends = [self.number, self.number + 1].map(|number| {
-            let along = f64::from(number) / f64::from(self.count);
-            (a.lerp(b, along), r + along * (s - r))
-        });
+        let ends = self.ends(rod);
         let [low, high] =
             [-1.0, 1.0].map(|side| ends.map(|(center, radius)| center + side * radius));
         [low[0].min(low[1]).max(min), high[0].max(high[1]).min(max)]
+    }
+
+    /// Centre and radius of a sphere around it.
+    pub(super) fn sphere(&self, rods: &[Rod], caps: Caps) -> (DVec3, f64) {
+        let [(a, r), (b, s)] = self.ends(&rods[self.rod as usize]);
+        let (half, radius) = (0.5 * a.distance(b), r.max(s));
+        let reach = match caps {
+            Caps::Round => half + radius,
+            // Around the circles at both ends
+            Caps::Open | Caps::Flat if self.count == 1 => half.hypot(radius),
+            // A frustum is within the spheres along its axis
+            Caps::Open | Caps::Flat => half + radius,
+        };
+        (0.5 * (a + b), reach)
+    }
+
+    /// The points of the axis at its ends, and the radii there.
+    fn ends(&self, rod: &Rod) -> [(DVec3, f64); 2] {
+        let [a, b] = rod.ends.map(double);
+        let [r, s] = rod.radii.map(f64::from);
+        [self.number, self.number + 1].map(|number| {
+            let along = f64::from(number) / f64::from(self.count);
+            (a.lerp(b, along), r + along * (s - r))
+        })
     }
 }
 

@@ -1,13 +1,16 @@
 //! Rods as a shape.
 
+use std::array;
+
 use glam::{DVec3, Vec3};
 
 use super::interval::Crossing;
 use super::{Rod, RodTree, double};
 use crate::surface::hierarchy::single;
-use crate::surface::{Intersection, MaterialId, Shape, Side};
+use crate::surface::shape::crossing_of_packet;
+use crate::surface::{Intersection, Intersections, MaterialId, Shape, Side};
 use spherule_tree::accel::Coherence;
-use spherule_tree::math::lanes_in;
+use spherule_tree::math::{LANES, first_lanes};
 use spherule_tree::ray::{Ray, RayPacket};
 
 /// Distance by which rays step off a surface, in units of the rounding of the largest coordinate.
@@ -72,20 +75,24 @@ impl DoubleRay {
     }
 }
 
-impl Shape for RodSurface<'_> {
-    fn crossing(&self, ray: &Ray, _side: Side) -> Option<Intersection> {
-        let tree = self.tree;
-        let exact = DoubleRay::new(ray);
-        let (rod, hit) = tree.hierarchy.nearest(ray, |rod| {
-            let crossing = exact.first(tree, rod)?;
-            Some((crossing.t, crossing))
-        })?;
-        let point = exact.origin + hit.t * exact.direction;
+/// The rods that are hit.
+struct Nearest {
+    /// Distance, as it is stored, and index: at equal distances, the lower index wins.
+    place: (f32, u32),
+    crossing: Crossing,
+}
+
+impl RodSurface<'_> {
+    /// The intersection of a ray with the rod that it hits first.
+    fn intersection(&self, ray: &DoubleRay, hit: &Nearest) -> Intersection {
+        let (tree, Crossing { t, normal }) = (self.tree, hit.crossing);
+        let (t_stored, rod) = hit.place;
+        let point = ray.origin + t * ray.direction;
         let half = tree.body(rod).half_of(point);
-        let normal = hit.normal.as_vec3();
-        let largest = tree.extent.max(ray.origin.abs().max_element());
-        Some(Intersection {
-            t: single(hit.t),
+        let normal = normal.as_vec3();
+        let largest = tree.extent.max(ray.origin.as_vec3().abs().max_element());
+        Intersection {
+            t: t_stored,
             point: point.as_vec3(),
             normal,
             shading: normal,
@@ -94,7 +101,19 @@ impl Shape for RodSurface<'_> {
             particle: tree.rods[rod as usize].particles[half],
             offset: OFFSET * largest,
             anchor: point.as_vec3(),
-        })
+        }
+    }
+}
+
+/// The rays of a packet in double precision; the last one again in lanes without one.
+fn double_rays(rays: &RayPacket) -> [DoubleRay; LANES] {
+    let last = rays.len().saturating_sub(1);
+    array::from_fn(|lane| DoubleRay::new(&rays.ray(lane.min(last))))
+}
+
+impl Shape for RodSurface<'_> {
+    fn crossing(&self, ray: &Ray, side: Side) -> Option<Intersection> {
+        crossing_of_packet(self, ray, side)
     }
 
     fn material(&self) -> MaterialId {
@@ -105,13 +124,46 @@ impl Shape for RodSurface<'_> {
         &self.tree.colors
     }
 
+    fn intersect(
+        &self,
+        rays: &mut RayPacket,
+        _coherence: Coherence,
+        _inside: u32,
+        hits: &mut Intersections,
+    ) {
+        if rays.is_empty() {
+            return;
+        }
+        let exact = double_rays(rays);
+        let mut found: [Option<Nearest>; LANES] = [const { None }; LANES];
+        self.tree.parts.visit(rays, first_lanes(rays.len()), |lane, rod| {
+            let crossing = exact[lane].first(self.tree, rod)?;
+            let place = (single(crossing.t), rod);
+            if found[lane].as_ref().is_none_or(|nearest| place < nearest.place) {
+                found[lane] = Some(Nearest { place, crossing });
+            }
+            Some(crossing.t)
+        });
+        for (lane, nearest) in found.iter().enumerate() {
+            if let Some(nearest) = nearest {
+                let hit = self.intersection(&exact[lane], nearest);
+                hits.end_ray(rays, lane, &hit, self.material);
+            }
+        }
+    }
+
     fn occluded(&self, rays: &RayPacket, _coherence: Coherence, lanes: u32) -> u32 {
-        lanes_in(lanes).fold(0, |hit_lanes, lane| {
-            let ray = rays.ray(lane);
-            let exact = DoubleRay::new(&ray);
-            let is_hit = |rod| exact.first(self.tree, rod).is_some();
-            let is_hit = ray.t_max > ray.t_min && self.tree.hierarchy.is_hit(&ray, is_hit);
-            hit_lanes | u32::from(is_hit) << lane
-        })
+        if rays.is_empty() {
+            return 0;
+        }
+        let exact = double_rays(rays);
+        let mut occluded = 0;
+        self.tree.parts.visit(rays, lanes, |lane, rod| {
+            exact[lane].first(self.tree, rod)?;
+            occluded |= 1 << lane;
+            // Nothing else matters to the ray
+            Some(-1.0)
+        });
+        occluded
     }
 }
