@@ -345,14 +345,17 @@ fn soft_drops(
         Radius::Common(radius) => *radius,
         Radius::PerParticle(radii) => radii[particle],
     };
-    let drops = (body..centers.len()).flat_map(|particle| {
+    // Their number is known, but the iterator does not tell it
+    let count = (centers.len() - body) * SOFT_DROPS as usize;
+    let mut drops = (Vec::with_capacity(count), Vec::with_capacity(count));
+    drops.extend((body..centers.len()).flat_map(|particle| {
         let (center, radius) = (centers[particle], radius_of(particle));
         (0..SOFT_DROPS).map(move |number| {
             let drop = soft_drop(ids[particle], number);
             (center + radius * drop.offset, radius * drop.radius)
         })
-    });
-    drops.unzip()
+    }));
+    drops
 }
 
 /// The shapes of `trees`, which are `meshes` of a picture, and of `rods`.

@@ -143,7 +143,10 @@ impl MemoryModel<'_> {
     /// Before `tracing`: the light of photons is computed. Of the planes of the image, only those of an earlier one are
     /// in memory, and the next frame is usually read by the time the maps are made.
     fn lighting(&self, place: &Place<'_>, tracing: MemoryNeed) -> MemoryNeed {
-        let computing = self.floor().computing;
+        let floor = self.floor();
+        // Photons are focused by the body, not by drops
+        let is_dark = self.is_spray_alone(place.frame);
+        let computing = if is_dark { floor.without_photons } else { floor.computing };
         if computing == 0 {
             return MemoryNeed::default();
         }

@@ -2,7 +2,9 @@
 
 use super::{FrameSize, MemoryModel};
 use crate::accel::moving::MovingTree;
-use crate::accel::{BuildBytes, BuildSettings, Structure, predicted_bytes, predicted_stored_bytes};
+use crate::accel::{
+    BuildBytes, BuildSettings, Structure, predicted_bytes, predicted_stored_bytes, sorting_bytes,
+};
 use crate::surface::smooth::GridSize;
 use crate::surface::spray::{SOFT_DROP_BYTES, SOFT_DROPS};
 use crate::surface::{SurfaceBytes, SurfaceKind};
@@ -57,7 +59,7 @@ impl MemoryModel<'_> {
         };
         let moving = self.moving_tree(drops);
         SurfaceBytes {
-            building: listed + tree.tree + tree.scratch.max(moving),
+            building: listed + tree.tree + (tree.scratch + sorting_bytes(drops)).max(moving),
             kept: tree.tree + moving,
         }
     }
@@ -86,6 +88,12 @@ impl MemoryModel<'_> {
         }
         let assumed = frame.particles / PARTICLES_PER_DROP;
         self.spray(frame.surface.map_or(assumed, |surface| surface.spray))
+    }
+
+    /// Whether a frame is known to have drops only, and no smooth surface.
+    pub(super) fn is_spray_alone(&self, frame: &FrameSize) -> bool {
+        let grid = frame.surface.and_then(|surface| surface.grid);
+        self.setup.picture.surface.spray && grid.is_some_and(|grid| grid.bricks == 0)
     }
 
     /// Memory of the surface of a frame without its spray.

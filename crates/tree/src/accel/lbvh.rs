@@ -21,7 +21,7 @@ const CELL_LEVELS: u32 = 12;
 /// Bits for the index of a particle in its cell, next to 3 * `CELL_LEVELS` bits of the key.
 const CELL_INDEX_BITS: u32 = 64 - 3 * CELL_LEVELS;
 /// Larger cells are sorted by all threads together, so that a clustered frame is not sorted by one thread.
-const LARGE_CELL: usize = 1 << 18;
+pub(super) const LARGE_CELL: usize = 1 << 18;
 /// Number of positions sampled to place the grid.
 const SAMPLE: usize = 4096;
 
@@ -143,13 +143,14 @@ fn sort_scratch_bytes(cells: &Cells, indexed: bool) -> u64 {
     (crowded * each) as u64
 }
 
+/// Bytes for each particle of a cell in [`CellScratch`].
+pub(super) const CELL_SCRATCH: u64 = 16;
+
 /// Buffers of one thread for sorting cells; a cell fits into the cache.
 #[derive(Default)]
 struct CellScratch {
     keys: Vec<u64>,
     sorted: Vec<u64>,
-    points: Vec<Vec3>,
-    indices: Vec<u32>,
     starts: Vec<u32>,
 }
 
@@ -167,16 +168,32 @@ impl CellScratch {
             (place << CELL_INDEX_BITS) | i as u64
         }));
         self.sort_keys();
-        // Move points and indices into the sorted order
-        self.points.clear();
-        self.points.extend_from_slice(points);
-        self.indices.clear();
-        self.indices.extend_from_slice(indices);
-        for (slot, key) in self.sorted.iter().enumerate() {
-            let from = local_index(*key);
-            points[slot] = self.points[from];
-            if let Some(index) = indices.get_mut(slot) {
-                *index = self.indices[from];
+        self.move_to_order(points, indices);
+    }
+
+    /// Moves points and indices into the order of the sorted keys: cycle by cycle of the permutation, without copies of
+    /// a cell.
+    fn move_to_order(&mut self, points: &mut [Vec3], indices: &mut [u32]) {
+        for first in 0..self.sorted.len() {
+            let point = points[first];
+            let index = indices.get(first).copied();
+            let mut slot = first;
+            loop {
+                let from = local_index(self.sorted[slot]);
+                // The slot is done
+                self.sorted[slot] = slot as u64;
+                if from == first || from == slot {
+                    break;
+                }
+                points[slot] = points[from];
+                if index.is_some() {
+                    indices[slot] = indices[from];
+                }
+                slot = from;
+            }
+            points[slot] = point;
+            if let Some(index) = index {
+                indices[slot] = index;
             }
         }
     }
@@ -257,3 +274,31 @@ fn sort_large_cell(grid: &Grid, top_levels: u32, points: &mut [Vec3], indices: &
 }
 
 const _: () = assert!(LARGE_CELL <= 1 << CELL_INDEX_BITS);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cell_is_sorted_by_key_and_points_keep_their_indices() {
+        let mut state = 1_u32;
+        let mut random = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            // Few places, so that many particles have the same key
+            (state >> 28) as f32 / 16.0
+        };
+        let input: Vec<Vec3> = (0..5000).map(|_| Vec3::new(random(), random(), random())).collect();
+        let grid = Grid::new(Vec3::ZERO, Vec3::ONE);
+        let key =
+            |point: Vec3| hilbert(grid.morton(point), 0, CELL_LEVELS, CurveState::default()).0;
+        let mut expected: Vec<u32> = (0..5000).collect();
+        expected.sort_by_key(|index| key(input[*index as usize]));
+        let (mut points, mut indices) = (input.clone(), (0..5000).collect::<Vec<u32>>());
+        CellScratch::default().sort(&grid, 0, &mut points, &mut indices);
+        assert_eq!(indices, expected);
+        assert!(points.iter().zip(&indices).all(|(point, index)| *point == input[*index as usize]));
+        let mut alone = input;
+        CellScratch::default().sort(&grid, 0, &mut alone, &mut []);
+        assert_eq!(alone, points);
+    }
+}

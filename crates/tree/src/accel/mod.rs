@@ -65,7 +65,7 @@ pub use crate::blocks::Aabb;
 pub use builder::TreeBuilder;
 pub use choose::choose;
 pub use hits::{Coherence, TreeHits};
-pub use predict::{BuildBytes, predicted_bytes, predicted_stored_bytes};
+pub use predict::{BuildBytes, predicted_bytes, predicted_stored_bytes, sorting_bytes};
 pub use preset::BvhPreset;
 pub use report::{BuildReport, Phase};
 pub use settings::{BuildSettings, BvhLeaves, BvhSettings, SbvhSettings, Structure};

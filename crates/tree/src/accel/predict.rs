@@ -3,6 +3,7 @@
 //! The sums are those of [`super::BuildReport`], computed from counts alone. If the memory of a builder depends on
 //! the distribution of the particles, an even distribution is assumed.
 
+use super::lbvh::{CELL_SCRATCH, LARGE_CELL};
 use super::topology::Link;
 use super::{Aabb, BuildSettings, BvhLeaves, BvhPreset, Structure};
 use crate::blocks::{BLOCK_SIZE, Block, BlockRadii};
@@ -30,6 +31,15 @@ pub fn predicted_bytes(settings: &BuildSettings, particles: u64, own_radii: bool
         },
         Structure::Sbvh => size.sbvh(settings.sbvh.budget),
     }
+}
+
+/// Upper bound of the memory of the threads that sort the cells of a [`Structure::Lbvh`] over `particles` that fill an
+/// eighth of the cube around them, such as the drops of a block of water. For an even distribution it is negligible.
+pub fn sorting_bytes(particles: u64) -> u64 {
+    let count = usize::try_from(particles).unwrap_or(usize::MAX);
+    let levels = partition::Cells::levels_for(count).saturating_sub(1);
+    let cell = (particles >> (3 * levels)).min(LARGE_CELL as u64);
+    CELL_SCRATCH * particles.min(cell * rayon::current_num_threads() as u64)
 }
 
 /// Predicted memory of a [`super::stored::StoredTree`] over `particles`, without the frame.

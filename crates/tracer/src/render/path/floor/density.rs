@@ -25,6 +25,9 @@ const TOO_FEW: f32 = 3.0;
 pub(super) const BYTES: u64 =
     (SIDE * SIDE * (size_of::<[f32; 4]>() * 4 / 3 + size_of::<Vec3>())) as u64;
 
+/// The part of it that is untouched, and needs no memory, as long as there are no photons: the finest cells.
+pub(super) const CELL_BYTES: u64 = (SIDE * SIDE * size_of::<[f32; 4]>()) as u64;
+
 /// Memory of the map.
 pub(super) const MAP_BYTES: u64 = (SIDE * SIDE * size_of::<Vec3>()) as u64;
 

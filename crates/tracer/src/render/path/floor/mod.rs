@@ -201,15 +201,16 @@ pub(in crate::render) fn bytes(scene: &Scene, settings: &RenderSettings) -> Floo
         several => 1 + several.min(groups),
     };
     let (caustics, kept) = (maps * density::BYTES, maps * density::MAP_BYTES);
-    let (of_ground, kept) = match &scene.ground {
+    let dark = caustics - maps * density::CELL_BYTES;
+    let (of_ground, dark, kept) = match &scene.ground {
         // The cells of the photons are freed when the other maps are made
         Some(ground) if !is_catcher(ground) => {
-            let others = (1 + groups) * sky::BYTES + wet::BYTES;
+            let others = kept + (1 + groups) * sky::BYTES + wet::BYTES;
             let kept_others = (1 + groups) * sky::MAP_BYTES + wet::BYTES;
-            (caustics.max(kept + others), kept + kept_others)
+            (caustics.max(others), dark.max(others), kept + kept_others)
         }
-        Some(_) if emits => (caustics, kept),
-        _ => (0, 0),
+        Some(_) if emits => (caustics, dark, kept),
+        _ => (0, 0, 0),
     };
     let has_opaque = scene.meshes.iter().any(|mesh| !mesh.is_pane()) || !scene.parts.is_empty();
     let has_surfaces = emits && has_opaque;
@@ -218,6 +219,7 @@ pub(in crate::render) fn bytes(scene: &Scene, settings: &RenderSettings) -> Floo
         0 => FloorBytes::default(),
         stored => FloorBytes {
             computing: stored + photons::bytes(has_surfaces),
+            without_photons: dark + of_surfaces + photons::bytes(has_surfaces),
             kept: kept + of_surfaces,
         },
     }
@@ -228,6 +230,8 @@ pub(in crate::render) fn bytes(scene: &Scene, settings: &RenderSettings) -> Floo
 pub struct FloorBytes {
     /// While it is computed, before the first tile.
     pub computing: u64,
+    /// The same if no photon reaches the ground.
+    pub without_photons: u64,
     /// While the image is traced.
     pub kept: u64,
 }
