@@ -21,6 +21,7 @@ pub use crate::attributes::{
 use crate::scene::{RadiusTable, RgbEncoding, is_rgb};
 use crate::selection::Selection;
 
+mod beads;
 mod color;
 mod facts;
 mod grains;
