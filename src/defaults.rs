@@ -2,6 +2,7 @@
 //! data. Each rule gives settings under those of the manifest and its look, so that naming a key overrides it, and a
 //! line that says what it did. `docs/manual/defaults.md` lists the rules.
 
+use glam::DVec3;
 use spherule_formats::read::bead_name;
 use spherule_formats::sequence::PART_ATTRIBUTE;
 use spherule_formats::{ValueNames, element_symbol};
@@ -10,12 +11,12 @@ use toml::Value;
 use crate::manifest::{ColorSetting, Look, Manifest, ManifestSource, Override, ProjectionKind};
 use crate::render::IntegratorKind;
 use crate::scene::ColorMap;
-use crate::surface::SurfaceKind;
-use crate::survey::{BEAD, Category, ELEMENT, Facts, GrainRadius, Tank, WallSign, WallValues};
+use crate::survey::{BEAD, Category, ELEMENT, Facts, Tank, WallSign, WallValues};
 
 mod legend;
 mod parts;
 mod planned;
+mod radius;
 mod view;
 
 pub use parts::{Walls, walls};
@@ -258,8 +259,8 @@ impl Rules<'_> {
             if has_left_out { category.without_walls.len() } else { category.values.len() }
         };
         // Numbers of beads that are no elements mean nothing without their names
-        let is_told = |c: &&Category| !self.facts.has_beads || c.name != ELEMENT;
-        let mut all = self.facts.categories.iter().filter(is_told);
+        let has_meaning = |c: &&Category| !self.facts.has_beads || c.name != ELEMENT;
+        let mut all = self.facts.categories.iter().filter(has_meaning);
         let Some(category) = all.find(|c| values(c) > 1) else {
             return;
         };
@@ -312,78 +313,13 @@ impl Rules<'_> {
         }
     }
 
-    /// Columns whose values are plausible radii are radii.
-    fn grains(&mut self) {
-        let is_open = !self.facts.has_radii && !self.is_molecular() && !self.draws_a_body();
-        if let Some(grains) = self.facts.grain_radius.as_ref().filter(|_| is_open) {
-            let GrainRadius { attribute, scale } = grains;
-            let what = if *scale == 1.0 { "radii" } else { "diameters" };
-            let line =
-                format!("`{attribute}` has the {what} (--radius auto follows the distances)");
-            let keys = [("attribute", attribute.clone().into()), ("scale", Value::from(*scale))];
-            let keys = keys.map(|(key, value)| (key.to_owned(), value));
-            let radius: Value = toml::Table::from_iter(keys).into();
-            self.set([("input.radius", radius)], Some(line));
-        }
-    }
-
-    /// Particles at one place have no spacing.
-    fn lone(&mut self) {
-        let is_point = self.facts.bounds.is_some_and(|(min, max)| min == max);
-        let has_size =
-            self.facts.has_radii || self.facts.elements.is_some() || self.has_set("input.radius");
-        if is_point && !has_size && !self.draws_a_body() {
-            let line =
-                "radius 1, as particles at one place have no spacing (--radius gives another)";
-            self.set([("input.radius", 1.0.into())], Some(line.to_owned()));
-        }
-    }
-
-    /// Particles in a plane or on a surface have the radius that covers it.
-    fn sheet(&mut self) {
-        let is_open = !self.facts.has_radii && !self.is_molecular() && !self.draws_a_body();
-        if let Some(radius) = self.facts.covering_radius.filter(|_| is_open) {
-            let radius = three_digits(radius);
-            let is_flat = self.facts.flat_axis().is_some();
-            let what = if is_flat { "plane" } else { "surface" };
-            let line = format!(
-                "radius {radius}, large enough to cover the {what} of the particles (--radius gives another)"
-            );
-            self.set([("input.radius", radius.into())], Some(line));
-            // Nothing falls on the floor under a surface, but thin layers of a fluid lie on it
-            if !is_flat && !self.facts.has_velocities {
-                self.set([("render.ground", "none".into())], None);
-            }
-        }
-    }
-
-    /// Particles at random distances have the radius that follows from their density.
-    fn random(&mut self) {
-        let is_open = self.facts.elements.is_none() && self.facts.flat_axis().is_none();
-        if let Some(radius) = self.facts.random_radius.filter(|_| is_open && !self.draws_a_body()) {
-            let radius = three_digits(radius);
-            let line = format!(
-                "radius {radius}, from the density, as the particles are at random distances (--radius gives another)"
-            );
-            self.set([("input.radius", radius.into())], Some(line));
-        }
-    }
-
-    /// Whether the particles are drawn as one body.
-    fn draws_a_body(&self) -> bool {
-        self.manifest.surface.kind != SurfaceKind::Spheres
-    }
-
     /// Which way is up, where neither the format nor the user says it.
     fn up(&mut self) {
         let is_open = !self.files.is_y_up && !self.is_molecular() && !self.is_periodic();
         if let Some(up) = self.facts.up.filter(|_| is_open) {
-            let (name, end) = match up.to_array().map(|part| part as i8) {
-                [1, ..] => ("x", "lower"),
-                [-1, ..] => ("-x", "upper"),
-                [_, -1, _] => ("-y", "upper"),
-                _ => ("y", "lower"),
-            };
+            let names = [(DVec3::X, "x"), (DVec3::NEG_X, "-x"), (DVec3::NEG_Y, "-y")];
+            let name = names.iter().find(|(axis, _)| *axis == up).map_or("y", |(_, name)| name);
+            let end = if name.starts_with('-') { "upper" } else { "lower" };
             let axis = name.trim_start_matches('-');
             let line = format!(
                 "up is {name}: the particles lie on a plane at the {end} end of the {axis} axis (--up z)"
@@ -482,11 +418,6 @@ impl Rules<'_> {
             }
         }
     }
-}
-
-/// A positive number with three significant digits.
-fn three_digits(value: f64) -> f64 {
-    format!("{value:.2e}").parse().unwrap_or(value)
 }
 
 #[cfg(test)]

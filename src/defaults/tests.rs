@@ -1,11 +1,10 @@
 use std::path::Path;
 
-use glam::DVec3;
 use spherule_formats::SimulationCell;
 
 use super::*;
 use crate::manifest::{AxisView, BondSearch, OverlayKind, RadiusSetting, TextSize};
-use crate::survey::{Axes, Elements, WallSign, WallValues};
+use crate::survey::{Axes, Elements, GrainRadius, WallSign, WallValues};
 
 /// Facts of a thousand particles in a unit cube without attributes.
 fn facts() -> Facts {

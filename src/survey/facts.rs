@@ -10,17 +10,18 @@ use spherule_formats::{
     names, sample_indices,
 };
 
+use super::beads::are_beads;
 use super::grains::GrainRadius;
 use super::packing::Spacing;
 use super::robust::{robust_bounds, robust_range, sample_of, sorted_sample};
 use super::sample::FrameSample;
-use super::shape::Axes;
+use super::shape::{Axes, has_heavy_tails};
 use super::sheet::covering_radius;
-use super::tank::{Contents, Tank};
+
+use super::tank::{Tank, tank_of};
 use super::upright::up_of;
 use super::walls::{Member, WallValues, walls};
 use super::{ColorQuestion, Fit, Question, RadiusQuestion, RgbAttribute, velocity_of};
-use crate::scene::RadiusTable;
 
 /// The attribute with atomic numbers.
 pub const ELEMENT: &str = "element";
@@ -221,7 +222,7 @@ impl Facts {
         let tank = touching.filter(|_| may_have_tank);
         let positions = sample_of(&raw.positions);
         Self {
-            tank: tank.and_then(|touching| tank_of(sample, touching, place)),
+            tank: tank.and_then(|touching| tank_of(sample, touching, place.is_only_frame)),
             grain_radius: touching.and_then(|touching| GrainRadius::of(&raw.attributes, touching)),
             covering_radius: touching
                 .and_then(|touching| covering_radius(&positions, sample.count, touching)),
@@ -265,63 +266,6 @@ struct Place {
     /// Length of an angstrom in the unit of the positions.
     angstrom: f64,
 }
-
-/// Walls that no attribute marks, in a frame that was read as a whole.
-fn tank_of(sample: &FrameSample, touching: f64, place: Place) -> Option<Tank> {
-    let positions = &sample.particles.positions;
-    let velocity = velocity_of(&sample.particles.attributes);
-    let all: Vec<DVec3> =
-        sample_indices(positions.len(), SAMPLE).map(|i| positions.get(i)).collect();
-    // Places in the file are those of a frame without gaps
-    let is_whole = !sample.is_part() && all.len() == positions.len();
-    if !all.iter().all(|p| p.is_finite()) || !(is_whole || place.is_only_frame) {
-        return None;
-    }
-    let moves = |velocity: &Attribute| -> Vec<bool> {
-        let indices = sample_indices(positions.len(), SAMPLE);
-        indices.map(|i| i < velocity.count() && velocity.magnitude(i) != 0.0).collect()
-    };
-    let is_moving = velocity.map(moves).unwrap_or_default();
-    let is_only_frame = place.is_only_frame;
-    Contents { positions: &all, is_moving: &is_moving, is_only_frame, touching }.tank()
-}
-
-/// How many times the distance that holds 90 % of a cloud must be that which holds half of it, and the one of 99 % that of
-/// 90 %: in a galaxy 2.5 to 10, in an exponential disc 2.3 and 1.7, in a normal distribution 1.6 and 1.3.
-const TAIL: f64 = 1.9;
-
-/// See [`Facts::has_heavy_tails`].
-fn has_heavy_tails(sample: &[DVec3]) -> bool {
-    let middle = DVec3::from_array([0, 1, 2].map(|axis| {
-        let along = sorted_sample(sample.len(), |i| sample[i][axis]);
-        along.get(along.len() / 2).copied().unwrap_or_default()
-    }));
-    let distances = sorted_sample(sample.len(), |i| sample[i].distance(middle));
-    let at = |part: usize| distances.get(distances.len() * part / 100).copied().unwrap_or_default();
-    let [half, most, nearly_all] = [50, 90, 99].map(at);
-    distances.len() >= MIN_RANDOM && most > TAIL * half && nearly_all > TAIL * most
-}
-
-/// How many times the distance of bonded atoms that of neighbours is in coarse-grained models; it is at most 1.2 in metals.
-const APART: f64 = 1.3;
-
-/// Whether particles with these elements are too far apart for atoms: `touching` is half the distance of neighbours in
-/// angstroms. Noble gases have no bonds.
-fn are_beads(elements: &Attribute, touching: f64) -> bool {
-    let is_noble = |element: f64| NOBLE.iter().any(|noble| f64::from(*noble) == element);
-    let bonded = sorted_sample(elements.count(), |i| {
-        let element = elements.data.get_f64(i);
-        let radius = RadiusTable::Covalent.radius(element).filter(|_| !is_noble(element));
-        radius.unwrap_or(f64::NAN)
-    });
-    let is_most = 2 * bonded.len() > elements.count().min(super::robust::SAMPLE);
-    // Hydrogen is bonded to larger atoms
-    let large = bonded.get(bonded.len() * 9 / 10);
-    is_most && large.is_some_and(|large| touching > APART * large)
-}
-
-/// Atomic numbers of the noble gases.
-const NOBLE: [u8; 6] = [2, 10, 18, 36, 54, 86];
 
 /// The axis along which a box has no extent, if it is a rectangle.
 pub(super) fn flat_axis(min: DVec3, max: DVec3) -> Option<usize> {
@@ -511,40 +455,6 @@ fn without_walls(mut categories: Vec<Category>, attributes: &[Attribute]) -> Vec
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn atoms_are_near_each_other_and_beads_are_not() {
-        let of = |elements: &[i32], touching: f64| {
-            let data = spherule_formats::AttributeData::I32(elements.to_vec());
-            are_beads(&Attribute { name: ELEMENT.to_owned(), components: 1, data }, touching)
-        };
-        // Beads called C1A and SC1, methane, water, copper, caesium, argon
-        assert!(of(&[6, 6, 6, 16], 2.1));
-        assert!(!of(&[6, 1, 1, 1, 1], 0.55));
-        assert!(!of(&[8, 1, 1], 0.48));
-        assert!(!of(&[29; 4], 1.28) && !of(&[55; 4], 2.62) && !of(&[18; 4], 1.9));
-    }
-
-    #[test]
-    fn galaxies_have_no_end_and_balls_have_one() {
-        // Distances of a sphere of Plummer's, and of a ball, in all directions
-        let cloud = |distance: fn(f64) -> f64| -> Vec<DVec3> {
-            let point = |i: i32| {
-                let (part, angle) = ((f64::from(i) + 0.5) / 2000.0, 2.4 * f64::from(i));
-                let z = 2.0 * (f64::from(i) * 0.618_034).fract() - 1.0;
-                let r = (1.0 - z * z).sqrt();
-                distance(part) * DVec3::new(r * libm::cos(angle), r * libm::sin(angle), z)
-            };
-            (0..2000).map(point).collect()
-        };
-        assert!(has_heavy_tails(&cloud(|part| (libm::pow(part, -2.0 / 3.0) - 1.0).powf(-0.5))));
-        assert!(!has_heavy_tails(&cloud(libm::cbrt)));
-        assert!(!has_heavy_tails(&[]));
-        // A ball and another one far away
-        let mut two = cloud(libm::cbrt);
-        two.iter_mut().take(100).for_each(|p| p.x += 30.0);
-        assert!(!has_heavy_tails(&two));
-    }
 
     #[test]
     fn unit_cells_are_full_and_cells_around_a_molecule_are_not() {

@@ -20,6 +20,7 @@ pub use spherule_frame::values::{PART_NAMES, id_of, part_of, shown_name, velocit
 use crate::scene::{RadiusTable, RgbEncoding, is_rgb};
 use crate::selection::Selection;
 
+mod beads;
 mod color;
 mod facts;
 mod grains;

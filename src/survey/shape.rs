@@ -1,6 +1,8 @@
-//! The principal axes of a cloud of particles: from which side most of it is seen.
+//! The shape of a cloud of particles: its principal axes, and whether it has an end.
 
 use glam::{DMat3, DVec3};
+
+use super::robust::sorted_sample;
 
 /// Principal axes with the extents along them.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -65,6 +67,25 @@ fn eigen(mut matrix: DMat3) -> (DVec3, DMat3) {
     (DVec3::new(matrix.x_axis.x, matrix.y_axis.y, matrix.z_axis.z), vectors)
 }
 
+/// Fewest particles of a cloud.
+const MIN_CLOUD: usize = 100;
+
+/// How many times the distance that holds 90 % of a cloud must be that which holds half of it, and the one of 99 % that of
+/// 90 %: in a galaxy 2.5 to 10, in an exponential disc 2.3 and 1.7, in a normal distribution 1.6 and 1.3.
+const TAIL: f64 = 1.9;
+
+/// Whether most particles are near the middle of a cloud that has no end, such as a galaxy.
+pub(super) fn has_heavy_tails(sample: &[DVec3]) -> bool {
+    let middle = DVec3::from_array([0, 1, 2].map(|axis| {
+        let along = sorted_sample(sample.len(), |i| sample[i][axis]);
+        along.get(along.len() / 2).copied().unwrap_or_default()
+    }));
+    let distances = sorted_sample(sample.len(), |i| sample[i].distance(middle));
+    let at = |part: usize| distances.get(distances.len() * part / 100).copied().unwrap_or_default();
+    let [half, most, nearly_all] = [50, 90, 99].map(at);
+    distances.len() >= MIN_CLOUD && most > TAIL * half && nearly_all > TAIL * most
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -83,5 +104,26 @@ mod tests {
         assert!((first / last - 5.0).abs() < 1e-9);
         assert_eq!(Axes::of(&[DVec3::ONE]), None);
         assert_eq!(Axes::of(&[DVec3::ONE; 3]).expect("axes").deviations, [0.0; 3]);
+    }
+
+    #[test]
+    fn galaxies_have_no_end_and_balls_have_one() {
+        // Distances of a sphere of Plummer's, and of a ball, in all directions
+        let cloud = |distance: fn(f64) -> f64| -> Vec<DVec3> {
+            let point = |i: i32| {
+                let (part, angle) = ((f64::from(i) + 0.5) / 2000.0, 2.4 * f64::from(i));
+                let z = 2.0 * (f64::from(i) * 0.618_034).fract() - 1.0;
+                let r = (1.0 - z * z).sqrt();
+                distance(part) * DVec3::new(r * libm::cos(angle), r * libm::sin(angle), z)
+            };
+            (0..2000).map(point).collect()
+        };
+        assert!(has_heavy_tails(&cloud(|part| (libm::pow(part, -2.0 / 3.0) - 1.0).powf(-0.5))));
+        assert!(!has_heavy_tails(&cloud(libm::cbrt)));
+        assert!(!has_heavy_tails(&[]));
+        // A ball and another one far away
+        let mut two = cloud(libm::cbrt);
+        two.iter_mut().take(100).for_each(|p| p.x += 30.0);
+        assert!(!has_heavy_tails(&two));
     }
 }

@@ -3,18 +3,44 @@
 
 use glam::DVec3;
 
-use super::walls::{Member, walls};
+use spherule_formats::{Attribute, sample_indices};
+
+use super::sample::FrameSample;
+use super::velocity_of;
+use super::walls::{Member, contains, is_shell};
+
+/// Largest number of particles that are examined.
+const SAMPLE: usize = 1 << 17;
+
+/// Walls that no attribute marks, in a frame that was read as a whole.
+pub(super) fn tank_of(sample: &FrameSample, touching: f64, is_only_frame: bool) -> Option<Tank> {
+    let positions = &sample.particles.positions;
+    let velocity = velocity_of(&sample.particles.attributes);
+    let all: Vec<DVec3> =
+        sample_indices(positions.len(), SAMPLE).map(|i| positions.get(i)).collect();
+    // Places in the file are those of a frame without gaps
+    let is_whole = !sample.is_part() && all.len() == positions.len();
+    if !all.iter().all(|p| p.is_finite()) || !(is_whole || is_only_frame) {
+        return None;
+    }
+    let moves = |velocity: &Attribute| -> Vec<bool> {
+        let indices = sample_indices(positions.len(), SAMPLE);
+        indices.map(|i| i < velocity.count() && velocity.magnitude(i) != 0.0).collect()
+    };
+    let is_moving = velocity.map(moves).unwrap_or_default();
+    Contents { positions: &all, is_moving: &is_moving, is_only_frame, touching }.tank()
+}
 
 /// Particles of a frame, and what tells them apart.
-pub(super) struct Contents<'a> {
+struct Contents<'a> {
     /// Positions of particles, all finite, in file order.
-    pub(super) positions: &'a [DVec3],
+    positions: &'a [DVec3],
     /// Whether each of them moves; none without velocities.
-    pub(super) is_moving: &'a [bool],
+    is_moving: &'a [bool],
     /// Whether there are no other frames, and no other particles.
-    pub(super) is_only_frame: bool,
+    is_only_frame: bool,
     /// Half the distance of neighbours.
-    pub(super) touching: f64,
+    touching: f64,
 }
 
 /// Walls without an attribute of their own.
@@ -33,7 +59,7 @@ const MOVING: f64 = 0.1;
 
 impl Contents<'_> {
     /// The tank, if there is one.
-    pub(super) fn tank(&self) -> Option<Tank> {
+    fn tank(&self) -> Option<Tank> {
         if self.is_moving.contains(&true) { self.at_rest() } else { self.open_box() }
     }
 
@@ -44,10 +70,15 @@ impl Contents<'_> {
             Member { value: i64::from(*is_moving), position: *position, is_moving: *is_moving }
         });
         let members: Vec<Member> = members.collect();
-        let moving = members.iter().filter(|m| m.is_moving).count();
+        let (moving, resting): (Vec<Member>, Vec<Member>) =
+            members.into_iter().partition(|member| member.is_moving);
+        let places: Vec<DVec3> = resting.iter().map(|member| member.position).collect();
         #[expect(clippy::cast_precision_loss, reason = "counts")]
-        let is_many = moving as f64 >= MOVING * members.len() as f64;
-        walls("", &[], &members).filter(|_| is_many)?;
+        let is_many = moving.len() as f64 >= MOVING * self.positions.len() as f64;
+        let is_around = is_many && resting.len() >= MIN_WALLS && contains(&resting, moving.iter());
+        if !is_around || !is_shell(&places) {
+            return None;
+        }
         let why = "particles at rest around the others";
         if self.is_only_frame {
             return Some(Tank { condition: "speed > 0".to_owned(), why, all: "speed >= 0" });
@@ -104,7 +135,7 @@ impl OpenBox {
         // At the top are only the walls
         let height = |p: &&DVec3| p[up] > max[up] - TOP * extent[up];
         let thickness = positions.iter().filter(height).map(|p| own.depth(*p)).fold(0.0, f64::max);
-        if !(thickness <= THICKNESS * shorter) {
+        if thickness > THICKNESS * shorter {
             return None;
         }
         let margin = thickness + touching;
@@ -141,7 +172,7 @@ impl OpenBox {
             |p: &DVec3, axis: usize| (p[axis] - self.min[axis]) / (self.max[axis] - self.min[axis]);
         [(a, b, false), (a, b, true), (b, a, false), (b, a, true)].into_iter().all(
             |(axis, along, is_high)| {
-                let mut squares = vec![false; SQUARES * SQUARES];
+                let mut squares = [false; SQUARES * SQUARES];
                 let distance = |p: &DVec3| {
                     if is_high { self.max[axis] - p[axis] } else { p[axis] - self.min[axis] }
                 };
@@ -197,6 +228,17 @@ mod tests {
         let moving: Vec<bool> =
             is_moving.iter().rev().step_by(2).chain(is_moving.iter().step_by(2)).copied().collect();
         assert_eq!(Contents { is_only_frame: false, ..contents(&mixed, &moving) }.tank(), None);
+    }
+
+    #[test]
+    fn a_few_particles_at_rest_are_no_walls() {
+        let row: Vec<DVec3> = (0..5).map(|i| f64::from(i) * DVec3::X).collect();
+        assert_eq!(contents(&row, &[false, true, true, true, true]).tank(), None);
+        // A layer that has come to rest under others
+        let (positions, fluid) = tank(|_| 12);
+        let fluid = &positions[..fluid];
+        let is_moving: Vec<bool> = fluid.iter().map(|p| p.z > 3.0).collect();
+        assert_eq!(contents(fluid, &is_moving).tank(), None);
     }
 
     #[test]

@@ -40,12 +40,13 @@ pub(super) fn up_of(
         rise(velocities, wall) > LEAVES && rise(velocities, -floor) > FALLS
     };
     let along_usual = upright(usual);
-    // y alone is common enough to follow from a plane that is not very clear
+    // y alone is common enough to follow from a plane that is not very clear, and particles that move. A jet ends in a plane
+    let is_at_rest = |axis: DVec3| !velocities.is_empty() && rise(velocities, axis).abs() <= LEAVES;
     let is_up = |axis: &DVec3| {
         let along = upright(*axis);
         let is_clear = match *axis {
             DVec3::Y => along >= UPRIGHT,
-            other => along >= CLEAR && rise(velocities, other) <= LEAVES,
+            other => along >= CLEAR && is_at_rest(other),
         };
         is_clear && along_usual.abs() <= OTHER * along && !leaves(*axis, usual)
     };
@@ -111,8 +112,11 @@ mod tests {
         assert_eq!(of(&turned(|p| DVec3::new(p.x, p.z, p.y)), DVec3::ZERO), None);
         // A dam that breaks: the wall that it leaves is not its floor
         let dam = lattice([12, 24, 10], |p| p.x < 12.0 - 0.5 * p.y);
-        assert_eq!(of(&dam, DVec3::new(-0.4, 1.0, 0.0)), Some(DVec3::X));
+        assert_eq!(of(&dam, DVec3::new(-0.15, 1.0, 0.0)), Some(DVec3::X));
         assert_eq!(of(&dam, DVec3::new(1.0, -0.4, 0.0)), Some(DVec3::Y));
+        // A jet along x that becomes denser
+        let jet = lattice([24, 10, 10], |p| (p.y - 5.0).hypot(p.z - 5.0) < 0.2 * p.x);
+        assert_eq!(of(&jet, DVec3::X), None);
         // It may also be a wave that climbs up a wall
         let wave = lattice([12, 10, 24], |p| p.x < 12.0 - 0.5 * p.z);
         assert_eq!(of(&wave, DVec3::new(-0.4, 0.0, 1.0)), None);

@@ -128,7 +128,7 @@ fn axes((min, max): (DVec3, DVec3)) -> Vec<usize> {
 }
 
 /// Whether the box of a `wall` contains that of the `others` on all sides but one.
-fn contains<'a>(wall: &[Member], others: impl Iterator<Item = &'a Member>) -> bool {
+pub(super) fn contains<'a>(wall: &[Member], others: impl Iterator<Item = &'a Member>) -> bool {
     let own = bounds(wall.iter().map(|member| member.position));
     let (Some(own), Some(theirs)) = (own, bounds(others.map(|member| member.position))) else {
         return false;
@@ -142,7 +142,7 @@ fn contains<'a>(wall: &[Member], others: impl Iterator<Item = &'a Member>) -> bo
 }
 
 /// Whether points are the walls of their box, or a single layer, and not a body that fills it.
-fn is_shell(points: &[DVec3]) -> bool {
+pub(super) fn is_shell(points: &[DVec3]) -> bool {
     let Some((min, max)) = bounds(points.iter().copied()) else {
         return false;
     };

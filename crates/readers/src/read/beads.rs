@@ -118,9 +118,8 @@ mod tests {
         for (name, residue) in names {
             beads.push(name.as_bytes(), residue.as_bytes());
         }
-        let attribute = beads.attribute()?;
-        let number = |i: usize| attribute.data.get_f64(i) as i64;
-        Some((0..names.len()).filter_map(|i| bead_name(number(i))).collect())
+        let AttributeData::U8(kinds) = beads.attribute()?.data else { return None };
+        Some(kinds.into_iter().filter_map(|kind| bead_name(kind.into())).collect())
     }
 
     #[test]
