@@ -67,6 +67,16 @@ pub enum LoadError {
         /// The attributes of the frame.
         has: String,
     },
+    /// It lacks a text that a selection compares a value with.
+    #[error("{file}: select.where: character {column}: {what}")]
+    UnknownText {
+        /// The frame's first file.
+        file: String,
+        /// Its place in the condition, in characters from 1.
+        column: usize,
+        /// The text, and those that there are.
+        what: String,
+    },
     /// It lacks the parts that materials are for.
     #[error(
         "{file}: no attribute with the parts of particles for material.part: it needs integers called `part`, \
@@ -139,6 +149,9 @@ pub(super) fn unknown_name(
     file: &str,
     attributes: &[Attribute],
 ) -> LoadError {
+    if let Some(what) = unknown.text_fault("") {
+        return LoadError::UnknownText { file: file.to_owned(), column: unknown.column, what };
+    }
     LoadError::UnknownName {
         file: file.to_owned(),
         name: unknown.name.clone(),

@@ -30,6 +30,7 @@ pub(in crate::resolve) fn survey() -> Survey {
         largest_time: None,
         frame_numbers: None,
         attributes: Vec::new(),
+        labels: spherule_formats::Labels::new(),
         most_particles: 8,
         frames: 1,
         angstrom: 1.0,

@@ -42,6 +42,14 @@ pub enum ResolveError {
         /// The existing values.
         has: String,
     },
+    /// No frame has a text that a selection compares a value with.
+    #[error("select.where: character {column}: {what}")]
+    UnknownText {
+        /// Its place in the condition, in characters from 1.
+        column: usize,
+        /// The text, and those that there are.
+        what: String,
+    },
     /// There is no radius in the frames, and no estimate from the spacing of particles.
     #[error(
         "input.radius: the frames contain no radius, and it cannot be estimated from so few, coincident or \

@@ -187,7 +187,7 @@ fn content(
 ) -> Result<Option<Content>, ResolveError> {
     Ok(match kind {
         OverlayKind::ColorBar { title, unit, length, orientation, ticks, format, factor } => {
-            let Some((name, kind)) = color_bar(&setup.picture.color, manifest) else {
+            let Some((name, kind)) = color_bar(&setup.picture.color, manifest, survey) else {
                 if survey.most_particles == 0 {
                     return Ok(None);
                 }
@@ -240,7 +240,7 @@ pub fn color_bar_of(
     survey: &Survey,
 ) -> Result<Option<ColorBar>, ResolveError> {
     let rule = color::rule(manifest, survey, None)?;
-    let Some((name, kind)) = color_bar(&rule, manifest) else {
+    let Some((name, kind)) = color_bar(&rule, manifest, survey) else {
         return Ok(None);
     };
     let mut bar = ColorBar {
@@ -270,7 +270,11 @@ pub fn color_bar_of(
 }
 
 /// The name of the value that colours the particles, and its colours; None if it is none.
-fn color_bar(rule: &ColorRule, manifest: &Manifest) -> Option<(String, ColorBarKind)> {
+fn color_bar(
+    rule: &ColorRule,
+    manifest: &Manifest,
+    survey: &Survey,
+) -> Option<(String, ColorBarKind)> {
     let ColorRule::Attribute { name, map, .. } = rule else {
         return None;
     };
@@ -289,13 +293,20 @@ fn color_bar(rule: &ColorRule, manifest: &Manifest) -> Option<(String, ColorBarK
                 is_discrete: steps.is_some(),
             }
         }
-        (None, categories) => ColorBarKind::Categories(named(categories?, manifest)),
+        (None, categories) => {
+            ColorBarKind::Categories(named(categories?, (manifest, survey), name))
+        }
     };
     Some((shown_name(name).to_owned(), kind))
 }
 
 /// Categories with their names, or their numbers.
-fn named(categories: &[(i64, Vec3)], manifest: &Manifest) -> Vec<(String, Color)> {
+fn named(
+    categories: &[(i64, Vec3)],
+    (manifest, survey): (&Manifest, &Survey),
+    attribute: &str,
+) -> Vec<(String, Color)> {
+    let labels = survey.labels.iter().find(|(column, _)| column.eq_ignore_ascii_case(attribute));
     let (names, is_elements) = match &manifest.material.color {
         ColorSetting::Mapped(by) => (by.names.as_ref(), by.map().is_of_elements()),
         _ => (None, false),
@@ -304,7 +315,8 @@ fn named(categories: &[(i64, Vec3)], manifest: &Manifest) -> Vec<(String, Color)
         let mut all = names.iter().flat_map(|names| &names.0);
         let found = all.find(|(known, _)| *known == value);
         let symbol = || element_symbol(value).filter(|_| is_elements);
-        let name = found.map(|(_, name)| name.clone());
+        let label = || labels.and_then(|(_, labels)| labels.get(&value).cloned());
+        let name = found.map(|(_, name)| name.clone()).or_else(label);
         name.or_else(|| symbol().map(str::to_owned)).unwrap_or_else(|| value.to_string())
     };
     let all = categories.iter();

@@ -21,9 +21,15 @@ pub(super) fn selection(manifest: &Manifest, survey: &Survey) -> Result<Selectio
     }
     // Whether files have times shows when they are read
     let known = color::known_attributes(survey);
-    let checked = selection.check_names(&known, Some(0.0));
+    let checked = selection.check_names(&known, Some(0.0), &survey.labels);
     match checked {
         Ok(()) => Ok(selection),
+        Err(unknown) if unknown.texts.is_some() => {
+            let known = unknown.texts.iter().flat_map(|(_, known)| known.iter().cloned());
+            let hint = similar(&unknown.name, &known.collect::<Vec<_>>());
+            let what = unknown.text_fault(&hint).unwrap_or_default();
+            Err(ResolveError::UnknownText { column: unknown.column, what })
+        }
         Err(unknown) => {
             let all = value_names(&known, |value| match value {
                 Value::Radius => survey.has_radii,

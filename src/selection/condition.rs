@@ -6,7 +6,10 @@
 //! ```text
 //! condition  = and { "||" and }
 //! and        = comparison { "&&" comparison }
-//! comparison = sum [ ("<" | "<=" | ">" | ">=" | "==" | "!=") sum ]
+//! comparison = sum [ ("<" | "<=" | ">" | ">=" | "==" | "!=") sum ] | name ("==" | "!=") text | name "in" list
+//! list       = "(" item { "," item } ")"
+//! item       = text | number
+//! text       = "'" ... "'" | name without a value
 //! sum        = product { ("+" | "-") product }
 //! product    = unary { ("*" | "/") unary }
 //! unary      = [ "-" | "+" | "!" ] unary | primary
@@ -34,6 +37,19 @@ pub struct Condition {
     /// Operations in postfix order.
     pub(super) operations: Vec<Operation>,
     pub(super) names: Vec<NameUse>,
+    pub(super) texts: Vec<TextUse>,
+}
+
+/// A text that a value is compared with.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct TextUse {
+    /// Index of the name of the value.
+    pub(super) of: usize,
+    pub(super) text: String,
+    /// In characters, from 1.
+    pub(super) column: usize,
+    /// Whether it may be the name of a value: it is not in quotes.
+    pub(super) may_be_value: bool,
 }
 
 /// A name in a condition, and where it appears first.
@@ -72,6 +88,8 @@ pub(super) enum Operation {
     Number(f64),
     /// The value with this index among the names.
     Value(usize),
+    /// The number of the text with this index.
+    Text(usize),
     Negate,
     Abs,
     Sqrt,
@@ -107,6 +125,7 @@ impl Condition {
             depth: 0,
             operations: Vec::new(),
             names: Vec::new(),
+            texts: Vec::new(),
         };
         let kind = parser.any()?;
         if let Some(found) = parser.tokens.get(parser.next) {
@@ -123,7 +142,8 @@ impl Condition {
                 "this is a number, not a condition; compare it, as in `speed > 2`".to_owned();
             return Err(parser.error(1, what));
         }
-        Ok(Self { text: text.to_owned(), operations: parser.operations, names: parser.names })
+        let Parser { operations, names, texts, .. } = parser;
+        Ok(Self { text: text.to_owned(), operations, names, texts })
     }
 
     /// The text as it was written.
@@ -137,6 +157,7 @@ impl fmt::Display for Token {
         match self {
             Self::Number(number) => write!(f, "`{number}`"),
             Self::Name(name) => write!(f, "`{name}`"),
+            Self::Text(text) => write!(f, "the text '{text}'"),
             Self::Sign(sign) => write!(f, "`{sign}`"),
         }
     }
@@ -150,6 +171,7 @@ struct Parser {
     depth: usize,
     operations: Vec<Operation>,
     names: Vec<NameUse>,
+    texts: Vec<TextUse>,
 }
 
 type Parsed = Result<Kind, ConditionError>;
@@ -246,12 +268,27 @@ impl Parser {
         ];
         let names = SIGNS.map(|(name, _)| name);
         let column = self.column();
+        let start = self.operations.len();
         let left = self.sum()?;
+        let of = match self.operations[start..] {
+            [Operation::Value(of)] => Some(of),
+            _ => None,
+        };
+        if let Some(of) = of
+            && matches!(self.token(0), Some(Token::Name(name)) if name == "in")
+        {
+            self.next += 1;
+            return self.list(of);
+        }
         let Some(sign) = self.take(&names) else {
             return Ok(left);
         };
         self.check(column, left, Kind::Number, sign)?;
-        self.part(Kind::Number, sign, Self::sum)?;
+        let is_equality = ["==", "!="].contains(&sign);
+        match of.filter(|_| is_equality) {
+            Some(of) if self.is_text() => self.text(of, true),
+            _ => self.part(Kind::Number, sign, Self::sum)?,
+        }
         let found = SIGNS.iter().find(|(name, _)| *name == sign);
         self.operations.extend(found.map(|(_, comparison)| Operation::Compare(*comparison)));
         let column = self.column();
@@ -261,6 +298,60 @@ impl Parser {
             }
             None => Ok(Kind::Truth),
         }
+    }
+
+    /// The token that is this many after the next.
+    fn token(&self, after: usize) -> Option<&Token> {
+        self.tokens.get(self.next + after).map(|placed| &placed.token)
+    }
+
+    /// Whether the next token is text, or a name that may be text: it is not part of a sum.
+    fn is_text(&self) -> bool {
+        let is_part =
+            |token: &Token| matches!(token, Token::Sign("+" | "-" | "*" | "/" | "(" | "["));
+        match self.token(0) {
+            Some(Token::Text(_)) => true,
+            Some(Token::Name(_)) => !self.token(1).is_some_and(is_part),
+            _ => false,
+        }
+    }
+
+    /// Takes the next token as text that the value `of` is compared with.
+    fn text(&mut self, of: usize, may_be_value: bool) {
+        let column = self.column();
+        if let Some(Placed { token: token @ (Token::Text(text) | Token::Name(text)), .. }) =
+            self.tokens.get(self.next)
+        {
+            let may_be_value = may_be_value && matches!(token, Token::Name(_));
+            self.texts.push(TextUse { of, text: text.clone(), column, may_be_value });
+            self.operations.push(Operation::Text(self.texts.len() - 1));
+            self.next += 1;
+        }
+    }
+
+    /// The list of texts and numbers behind `in`, one of which the value `of` is equal to.
+    fn list(&mut self, of: usize) -> Parsed {
+        self.require("(", "after `in`, as in `element in (C, N)`")?;
+        for item in 0.. {
+            if item > 0 {
+                self.operations.push(Operation::Value(of));
+            }
+            match self.token(0) {
+                Some(Token::Text(_) | Token::Name(_)) => self.text(of, false),
+                _ => {
+                    self.within(Self::unary)?;
+                }
+            }
+            self.operations.push(Operation::Compare(Comparison::Equal));
+            if item > 0 {
+                self.operations.push(Operation::Or);
+            }
+            if self.take(&[","]).is_none() {
+                break;
+            }
+        }
+        self.require(")", "after the list")?;
+        Ok(Kind::Truth)
     }
 
     fn sum(&mut self) -> Parsed {
@@ -329,6 +420,10 @@ impl Parser {
                 let kind = self.within(Self::any)?;
                 self.require(")", "after the part in parentheses")?;
                 Ok(kind)
+            }
+            Token::Text(_) => {
+                let what = "text is compared by == or != behind a name, as in `part == 'wall'`";
+                Err(self.error(column, what))
             }
             token => Err(self.error(column, format!("expected a number or a name, found {token}"))),
         }

@@ -5,6 +5,7 @@ use spherule_formats::Attribute;
 use spherule_frame::values::BoundValue;
 
 use super::condition::{Arithmetic, Comparison, Operation};
+use super::texts::TextValue;
 use super::values::FileContext;
 
 /// Particles in a block; its values stay in the cache.
@@ -25,7 +26,7 @@ impl Stacks {
     pub(super) fn evaluate(
         &mut self,
         operations: &[Operation],
-        values: &[BoundValue<&Attribute>],
+        (values, texts): (&[BoundValue<&Attribute>], &[TextValue<BoundValue<&Attribute>>]),
         context: FileContext<'_>,
         first: usize,
         to: &mut [bool],
@@ -46,6 +47,13 @@ impl Stacks {
                     let block = self.push_number();
                     context.load(values[index], first, &mut block[..count]);
                 }
+                Operation::Text(index) => match texts[index] {
+                    TextValue::Code(code) => self.push_number().fill(code),
+                    TextValue::Value(value) => {
+                        let count = to.len();
+                        context.load(value, first, &mut self.push_number()[..count]);
+                    }
+                },
                 Operation::Negate => self.change(|a| -a),
                 Operation::Abs => self.change(f64::abs),
                 Operation::Sqrt => self.change(f64::sqrt),

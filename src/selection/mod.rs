@@ -5,7 +5,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 use spherule_formats::order::index_u32;
-use spherule_formats::{Attribute, AttributeData, RawParticles};
+use spherule_formats::{Attribute, AttributeData, Labels, RawParticles};
 use spherule_frame::values::{BoundValue, Named, Value, id_of};
 use spherule_jobs::FrameRange;
 
@@ -15,6 +15,7 @@ mod evaluate;
 mod region;
 #[cfg(test)]
 mod tests;
+mod texts;
 mod token;
 mod values;
 
@@ -23,7 +24,9 @@ pub use error::ConditionError;
 pub use region::Region;
 pub use values::UnknownName;
 
+use condition::{NameUse, TextUse};
 use evaluate::{BLOCK, Stacks};
+use texts::{TextValue, code_of};
 use values::{FileContext, value_of};
 
 /// Particles that one task tests.
@@ -67,18 +70,35 @@ impl Selection {
         &self,
         attributes: &[A],
         time: Option<f64>,
+        labels: &Labels,
     ) -> Result<(), UnknownName> {
-        self.values(attributes, time).map(|_| ())
+        self.values(attributes, time, labels).map(|_| ())
     }
 
-    /// The values of the names in the condition.
+    /// The values of the names in the condition, and what its texts stand for.
     fn values<A: Named>(
         &self,
         attributes: &[A],
         time: Option<f64>,
-    ) -> Result<Vec<Value>, UnknownName> {
-        let names = self.condition.iter().flat_map(|condition| &condition.names);
-        names.map(|name| value_of(name, attributes, time, self.up)).collect()
+        labels: &Labels,
+    ) -> Result<(Vec<Value>, Vec<TextValue<Value>>), UnknownName> {
+        let Some(Condition { names, texts, .. }) = &self.condition else {
+            return Ok(Default::default());
+        };
+        let value = |name: &NameUse| value_of(name, attributes, time, self.up);
+        let values: Vec<Value> = names.iter().map(value).collect::<Result<_, _>>()?;
+        let text = |used: &TextUse| {
+            let name = NameUse { name: used.text.clone(), column: used.column };
+            match value(&name) {
+                Ok(value) if used.may_be_value => Ok(TextValue::Value(value)),
+                _ => {
+                    let of = (names[used.of].name.as_str(), &values[used.of]);
+                    code_of(of, (&used.text, used.column), labels).map(TextValue::Code)
+                }
+            }
+        };
+        let texts = texts.iter().map(text).collect::<Result<_, _>>()?;
+        Ok((values, texts))
     }
 
     /// Indices of the particles that are drawn, ascending. The result does not depend on the number of threads.
@@ -90,10 +110,17 @@ impl Selection {
         if count == 0 {
             return Ok(Vec::new());
         }
-        let values = self.values(&particles.attributes, particles.time)?;
+        let (values, texts) =
+            self.values(&particles.attributes, particles.time, &particles.labels)?;
         let context = FileContext::new(particles, self.up);
         let values: Vec<BoundValue<&Attribute>> =
             values.iter().filter_map(|value| context.bind(value)).collect();
+        let bound = |text: &TextValue<Value>| match text {
+            TextValue::Code(code) => Some(TextValue::Code(*code)),
+            TextValue::Value(value) => context.bind(value).map(TextValue::Value),
+        };
+        let texts: Vec<TextValue<BoundValue<&Attribute>>> =
+            texts.iter().filter_map(bound).collect();
         let ids = id_of(&particles.attributes);
         // Mark the particles that are drawn, and count them
         let mut marks = vec![false; count];
@@ -104,7 +131,8 @@ impl Selection {
                     let first = run * RUN + block * BLOCK;
                     keep.fill(true);
                     if let Some(condition) = &self.condition {
-                        stacks.evaluate(&condition.operations, &values, context, first, keep);
+                        let operations = &condition.operations;
+                        stacks.evaluate(operations, (&values, &texts), context, first, keep);
                     }
                     self.test_ids(ids, first, keep);
                     self.test_regions(particles, first, keep);

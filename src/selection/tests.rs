@@ -167,7 +167,6 @@ fn errors_say_where_and_what() {
         ("(x > 1", "character 7: expected `)` after the part in parentheses"),
         ("x > 1)", "character 6: unexpected `)`"),
         ("x ** 2 > 1", "character 3: `**` is not a sign of conditions: multiply"),
-        ("part == \"fluid\"", "character 9: `\"` is not a sign of conditions: text"),
         ("cos(x) > 1", "character 1: unknown function `cos`; there are abs, sqrt, min, max"),
         ("min(x) > 1", "character 6: expected `,` between the two arguments of min"),
         ("sqrt(x, y) > 1", "character 7: expected `)` after the arguments of sqrt"),
@@ -248,4 +247,68 @@ fn nothing_else_is_selected_by_default() {
         RawParticles { positions: Positions::F32(vec![Vec3::NAN; 3]), ..RawParticles::default() };
     assert_eq!(Selection::default().survivors(&all), Ok(vec![0, 1, 2]));
     assert_eq!(by("x < 0 || x >= 0").survivors(&all), Ok(Vec::new()));
+}
+
+/// Particles of the parts 0, 2 and 7, which are elements.
+fn with_text() -> RawParticles {
+    let attribute = |name: &str, values: Vec<i32>| Attribute {
+        name: name.to_owned(),
+        components: 1,
+        data: AttributeData::I32(values),
+    };
+    let parts = [(0, "fluid"), (2, "/World/Wall"), (7, "8")];
+    let parts = parts.map(|(number, name)| (number, name.to_owned())).into_iter().collect();
+    let water = i32::try_from(spherule_formats::name_code("water")).expect("small");
+    RawParticles {
+        positions: Positions::F32(vec![Vec3::ZERO; 4]),
+        attributes: vec![
+            attribute("part", vec![0, 2, 7, 2]),
+            attribute("element", vec![6, 8, 17, water]),
+        ],
+        labels: [("part".to_owned(), parts)].into_iter().collect(),
+        ..RawParticles::default()
+    }
+}
+
+#[test]
+fn text_is_compared_with_names() {
+    let all = with_text();
+    for (text, expected) in [
+        ("part == 'fluid'", &[0][..]),
+        ("part == fluid", &[0]),
+        ("part != FLUID", &[1, 2, 3]),
+        ("part == \"wall\" && element == O", &[1]),
+        ("part == '/World/Wall'", &[1, 3]),
+        // A number is a number, and text may look like one
+        ("part == 2", &[1, 3]),
+        ("part == '8'", &[2]),
+        ("part in (fluid, 7)", &[0, 2]),
+        ("!(part in ('wall'))", &[0, 2]),
+        ("element in (C, cl) || element == 'water'", &[0, 2, 3]),
+        ("element == part + 6", &[0, 1]),
+        ("element == part", &[]),
+        ("element in (-1, 6)", &[0]),
+    ] {
+        assert_eq!(by(text).survivors(&all).expect(text), expected, "{text}");
+    }
+    for (text, message) in [
+        ("part == wal", "`part` has no value `wal`; it has `fluid`, `/World/Wall`, `8`"),
+        ("element == Xx", "`element` has no value `Xx`; it has `H`, `He`"),
+        ("x == 'wall'", "`x` has numbers, and none of them is called `wall`"),
+    ] {
+        let unknown = by(text).survivors(&all).expect_err(text);
+        assert!(unknown.text_fault("").expect(text).starts_with(message), "{unknown:?}");
+    }
+    for (text, expected) in [
+        ("part < 'wall'", "character 8: text is compared by == or !="),
+        ("'wall' == part", "character 1: text is compared by == or !="),
+        ("part + 1 == 'wall'", "character 13: text is compared"),
+        ("part == 'wall", "character 9: a quote has no second one"),
+        ("part in wall", "character 9: expected `(` after `in`"),
+        ("part in (wall", "character 14: expected `)` after the list"),
+        ("part in ()", "character 10: expected a number or a name"),
+    ] {
+        let error = Condition::parse(text).expect_err(text).to_string();
+        assert!(error.contains(expected), "{text}: {error}");
+    }
 }

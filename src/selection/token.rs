@@ -8,6 +8,8 @@ pub(super) enum Token {
     Number(f64),
     /// A name of a value, or of a function.
     Name(String),
+    /// Text in quotes.
+    Text(String),
     Sign(&'static str),
 }
 
@@ -24,13 +26,11 @@ const SIGNS: [&str; 18] = [
 ];
 
 /// Signs of other languages, and what to write instead.
-const FOREIGN: [(&str, &str); 6] = [
+const FOREIGN: [(&str, &str); 4] = [
     ("**", "multiply instead"),
     ("&", "write &&"),
     ("|", "write ||"),
     ("=", "write == to compare"),
-    ("\"", "text cannot be compared; a name with spaces is written in backquotes"),
-    ("'", "text cannot be compared; a name with spaces is written in backquotes"),
 ];
 
 /// Splits `text` into tokens.
@@ -59,6 +59,10 @@ fn token(text: &str, first: char) -> Result<(Token, &str), String> {
     }
     if is_name(first) || first == '`' {
         return name(text);
+    }
+    if let Some(rest) = text.strip_prefix(['"', '\'']) {
+        let (quoted, rest) = rest.split_once(first).ok_or("a quote has no second one")?;
+        return Ok((Token::Text(quoted.to_owned()), rest));
     }
     let foreign = FOREIGN.iter().find(|(sign, _)| text.starts_with(sign));
     let sign = SIGNS.iter().find(|sign| text.starts_with(**sign));

@@ -14,6 +14,25 @@ pub struct UnknownName {
     pub name: String,
     /// Where the condition has it, in characters from 1.
     pub column: usize,
+    /// If it is text: the value that it is compared with, and the texts that this has.
+    pub texts: Option<(String, Vec<String>)>,
+}
+
+impl UnknownName {
+    /// What is wrong with text; None if it is the name of a value.
+    pub fn text_fault(&self, hint: &str) -> Option<String> {
+        const LISTED: usize = 12;
+        let (of, known) = self.texts.as_ref()?;
+        let name = &self.name;
+        let listed: Vec<String> =
+            known.iter().take(LISTED).map(|text| format!("`{text}`")).collect();
+        let more = if known.len() > LISTED { ", ..." } else { "" };
+        Some(if known.is_empty() {
+            format!("`{of}` has numbers, and none of them is called `{name}`")
+        } else {
+            format!("`{of}` has no value `{name}`{hint}; it has {}{more}", listed.join(", "))
+        })
+    }
 }
 
 /// The value of `used` of particles with `attributes` at `time`, with heights along `up`.
@@ -32,7 +51,7 @@ pub(super) fn value_of<A: Named>(
         _ => true,
     };
     let found = Value::named(&used.name, attributes).filter(is_known);
-    found.ok_or_else(|| UnknownName { name: used.name.clone(), column: used.column })
+    found.ok_or_else(|| UnknownName { name: used.name.clone(), column: used.column, texts: None })
 }
 
 /// The column with the radii that files have, and the factor that makes radii of them.

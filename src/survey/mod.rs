@@ -11,8 +11,8 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{
-    Attribute, FrameError, ParticleFrame, PositionSlice, Radius, RawParticles, SimulationCell,
-    choose_origin, sample_indices,
+    Attribute, FrameError, Labels, ParticleFrame, PositionSlice, Radius, RawParticles,
+    SimulationCell, choose_origin, sample_indices,
 };
 
 pub use spherule_frame::values::{PART_NAMES, id_of, part_of, shown_name, velocity_of};
@@ -123,6 +123,9 @@ pub struct Survey {
     /// Components per particle of each of [`Self::attributes`]. Jobs of earlier versions lack them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub components: Vec<usize>,
+    /// Names of parts and of other values. Jobs of earlier versions lack them.
+    #[serde(default, skip_serializing_if = "Labels::is_empty")]
+    pub labels: Labels,
     /// Mean time between consecutive frames, if the files contain times.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frame_time: Option<f64>,
@@ -271,6 +274,7 @@ struct Totals {
     has_radii: bool,
     reach: f32,
     color: ColorTotals,
+    labels: Labels,
     points: Vec<DVec3>,
     velocity: Option<String>,
     rgb: Option<RgbAttribute>,
@@ -460,6 +464,7 @@ impl Totals {
             has_radii: false,
             reach: 0.0,
             color: ColorTotals::default(),
+            labels: Labels::new(),
             points: Vec::new(),
             velocity: None,
             rgb: None,
@@ -481,6 +486,9 @@ impl Totals {
         for attribute in &raw.attributes {
             let components = self.attributes.entry(attribute.name.clone()).or_insert(0);
             *components = attribute.components.max(*components);
+        }
+        for (column, labels) in &raw.labels {
+            self.labels.entry(column.clone()).or_default().extend(labels.clone());
         }
         // Extend the bounds
         let found = robust_bounds(&raw.positions, extremes);
@@ -653,6 +661,7 @@ impl Totals {
             up,
             components: self.attributes.values().copied().collect(),
             attributes: self.attributes.into_keys().collect(),
+            labels: self.labels,
             frame_time: self.moments.time_step(),
             largest_time: self.moments.largest_time(),
             frame_numbers: self.moments.number_step(),

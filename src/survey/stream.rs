@@ -93,6 +93,7 @@ pub(super) fn sample(
         attributes,
         time: source.time(),
         step: source.step(),
+        labels: source.labels(),
         ..RawParticles::default()
     })
 }

@@ -6,7 +6,7 @@ use std::fs;
 use glam::Vec3;
 use spherule::scene::{ColorMap, ColorScale};
 
-use crate::harness::{Ran, SMALL, Workshop};
+use crate::harness::{Ran, SMALL, Workshop, sample};
 use crate::picture::Picture;
 
 /// Balls next to each other in a row along x, seen from -y. Ball `i` has the speed `i` along y, the mass `10^(i - 2)`,
@@ -236,4 +236,35 @@ fn names_of_values_work_everywhere() {
     let list =
         list.replace("`height`", "`depth`, `height`").replace("`speed`", "`radius`, `speed`");
     render(&shop, "in", &unknown).expect(2).prints("(did you mean `speed`?)").prints(&list);
+}
+
+#[test]
+fn parts_are_selected_by_name() {
+    let shop = Workshop::new();
+    fs::create_dir_all(shop.join("in")).expect("a directory");
+    fs::write(shop.join("in/fluid_1.vtu"), vtu(0..3, true)).expect("a file");
+    fs::write(shop.join("in/rock_1.vtu"), vtu(3..5, true)).expect("a file");
+    fs::copy(sample("join/parts.h5"), shop.join("parts.h5")).expect("a file");
+    let none = "particles is selected";
+    for (input, condition, is_empty) in [
+        ("in", "part == rock && x > 2.5", false),
+        ("in", "part == 'rock' && x < 2.5", true),
+        ("in", "part in (fluid, rock) && part != fluid && x < 2.5", true),
+        ("parts.h5", "part == wall && y > 0.5", false),
+        ("parts.h5", "part == wall && y < 0.5", true),
+    ] {
+        let ran = render(&shop, input, &["--radius", "0.3", "--where", condition]).expect(0);
+        assert_eq!(ran.errors().contains(none), is_empty, "{condition}: {}", ran.errors());
+    }
+    let unknown = ["--radius", "0.3", "--where", "part == rok"];
+    let message =
+        "character 9: `part` has no value `rok` (did you mean `rock`?); it has `fluid`, `rock`";
+    render(&shop, "in", &unknown).expect(2).prints(message);
+    // A file alone has the same note
+    let both = vtu(0..3, true).replace("</Piece>", "</Piece>@");
+    let other = vtu(3..5, false);
+    let piece = other.find("<Piece").expect("a piece")..other.find("</Unst").expect("an end");
+    fs::write(shop.join("both.vtu"), both.replace('@', &other[piece])).expect("a file");
+    let ran = shop.run(&["inspect", "both.vtu"]).expect(0);
+    assert!(ran.text().contains("note: part `piece 1` without `Vel`: NaN there"), "{}", ran.text());
 }

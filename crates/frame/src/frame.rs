@@ -11,7 +11,7 @@ use crate::bonds::{self, Bond};
 use crate::gather::keep;
 use crate::names::RADII;
 use crate::with_values;
-use crate::{Attribute, AttributeData, SimulationCell};
+use crate::{Attribute, AttributeData, Labels, SimulationCell};
 
 /// Positions in the precision of the file, world units.
 #[derive(Debug, Clone, PartialEq)]
@@ -157,6 +157,8 @@ pub struct RawParticles<P = Positions> {
     pub bonds: Vec<Bond>,
     /// What the user should know, such as columns that only some parts have.
     pub notes: Vec<String>,
+    /// Names of parts and of other values.
+    pub labels: Labels,
 }
 
 impl<P> RawParticles<P> {
@@ -170,6 +172,7 @@ impl<P> RawParticles<P> {
             cell: self.cell,
             bonds: self.bonds,
             notes: self.notes,
+            labels: self.labels,
         }
     }
 }
@@ -185,6 +188,7 @@ impl RawParticles<PositionSlice<'_>> {
             cell: self.cell,
             bonds: self.bonds.clone(),
             notes: self.notes.clone(),
+            labels: self.labels.clone(),
         }
     }
 }

@@ -38,6 +38,7 @@ pub mod gather;
 pub mod generate;
 mod images;
 pub mod join;
+mod labels;
 pub mod names;
 mod origin;
 mod sampling;
@@ -55,6 +56,7 @@ pub use frame::{
     is_radius,
 };
 pub use images::PeriodicImages;
+pub use labels::Labels;
 pub use origin::choose_origin;
 pub use sampling::sample_indices;
 pub use scalar::{Endian, ScalarType};

@@ -4,7 +4,7 @@ use std::fmt;
 
 use glam::DVec3;
 
-use spherule_frame::{ParseError, ScalarType, SimulationCell};
+use spherule_frame::{Labels, ParseError, ScalarType, SimulationCell};
 
 /// Name, components and scalar type of an attribute.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -36,6 +36,9 @@ pub trait ParticleRanges: Send + Sync + fmt::Debug {
 
     /// What the user should know, such as columns that only some parts have.
     fn notes(&self) -> &[String];
+
+    /// Names of parts and of other values.
+    fn labels(&self) -> &Labels;
 
     /// Bytes of the positions of one particle in the precision of the file.
     fn position_len(&self) -> u64;

@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 
-use crate::{FrameError, ScalarType, SimulationCell};
+use crate::{FrameError, Labels, ScalarType, SimulationCell};
 
 /// The particles of one frame, by their index in the source. Many threads read ranges at the same time.
 pub trait ParticleSource: Sync {
@@ -36,6 +36,11 @@ pub trait ParticleSource: Sync {
     /// What the user should know, such as columns that only some parts have.
     fn notes(&self) -> &[String] {
         &[]
+    }
+
+    /// Names of parts and of other values.
+    fn labels(&self) -> Labels {
+        Labels::new()
     }
 
     /// Bytes of the positions of one particle in the precision of the source, if that is known.

@@ -90,6 +90,11 @@ impl Sequence {
         };
         let mut particles = self.joined(parts).map_err(in_first)?;
         notes.append(&mut particles.notes);
+        if self.parts.len() > 1 {
+            // A frame may lack a part
+            let names = (0..).zip(self.parts.iter().cloned());
+            particles.labels.insert(PART.to_owned(), names.collect());
+        }
         if !self.images.is_none() {
             self.images.apply(&mut particles, self.budget).map_err(in_first)?;
         }

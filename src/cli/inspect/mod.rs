@@ -229,7 +229,8 @@ fn inspect(
     for index in 0..file.steps().len() {
         let mut inspected = read(&file, index, place.number, topology)?;
         inspected.time = place.time.or(inspected.time);
-        inspected.notes = std::mem::take(&mut remarks);
+        inspected.notes.retain(|note| !remarks.contains(note));
+        inspected.notes.splice(..0, remarks.drain(..));
         if args.verify && inspected.native.is_some() {
             verify(file.bytes()).map_err(|e| e.in_file(path))?;
         }
@@ -249,6 +250,7 @@ struct Contents {
     time: Option<f64>,
     cell: Option<SimulationCell>,
     encoding: &'static str,
+    notes: Vec<String>,
 }
 
 impl Contents {
@@ -262,6 +264,7 @@ impl Contents {
             stats: FrameStats::of_source(&*source)?,
             time: source.time(),
             cell: source.cell(),
+            notes: source.notes().to_vec(),
             encoding: match source.position_len() {
                 Some(12) => "f32",
                 _ => "f64",
@@ -282,6 +285,7 @@ impl Contents {
         }
         Ok(Self {
             stats: FrameStats::of(&raw),
+            notes: raw.notes,
             time: raw.time,
             cell: raw.cell,
             encoding: match raw.positions {
@@ -335,7 +339,7 @@ fn read<'a>(
         bytes_per_particle: (all > 0).then(|| stored / all as f64),
         native: native.map(|index| NativeFacts::new(index, file.bytes().len() as u64, None)),
         cell: contents.cell,
-        notes: Vec::new(),
+        notes: contents.notes,
         verified: false,
     })
 }

@@ -12,6 +12,8 @@ mod plan;
 pub use columns::{ColumnShape, PartColumns};
 pub use plan::{JoinPlan, JoinedColumn, plan};
 
+use std::collections::BTreeMap;
+
 use crate::bonds::Bond;
 use crate::{Attribute, AttributeData, MemoryBudget, ParseError, Positions, RawParticles};
 
@@ -55,6 +57,9 @@ pub fn join(mut parts: Vec<Part>, budget: MemoryBudget) -> Result<RawParticles, 
         joined.time = joined.time.or(particles.time);
         joined.step = joined.step.or(particles.step);
         joined.cell = joined.cell.or(particles.cell);
+        for (column, labels) in particles.labels {
+            joined.labels.entry(column).or_default().extend(labels);
+        }
         for note in particles.notes {
             if !joined.notes.contains(&note) && joined.notes.len() < MAX_NOTES {
                 joined.notes.push(note);
@@ -75,8 +80,10 @@ pub fn join_numbered(
     budget: MemoryBudget,
 ) -> Result<RawParticles, ParseError> {
     let mut numbers = Vec::new();
+    let labels = part_labels(&parts);
     for Part { number, particles, .. } in &mut parts {
         particles.attributes.retain(|attribute| attribute.name != PART);
+        particles.labels.remove(PART);
         numbers.resize(numbers.len() + particles.positions.len(), *number);
     }
     let mut joined = join(parts, budget)?;
@@ -85,7 +92,18 @@ pub fn join_numbered(
         components: 1,
         data: AttributeData::U32(numbers),
     });
+    joined.labels.insert(PART.to_owned(), labels);
     Ok(joined)
+}
+
+/// The names of parts by their numbers; none of those that are divided among several of `parts`.
+fn part_labels(parts: &[Part]) -> BTreeMap<i64, String> {
+    let mut labels = BTreeMap::new();
+    for part in parts {
+        let label = labels.entry(i64::from(part.number)).or_insert(Some(&part.name));
+        *label = label.filter(|name| **name == part.name);
+    }
+    labels.into_iter().filter_map(|(number, name)| Some((number, name?.clone()))).collect()
 }
 
 impl<'a> PartColumns<'a> {

@@ -85,6 +85,11 @@ pub(in crate::read) fn code(name: &[u8]) -> i64 {
     }
 }
 
+/// The number that readers give to the name of an element or of another species.
+pub fn name_code(name: &str) -> i64 {
+    code(name.as_bytes())
+}
+
 /// Whether `code` is that of a chemical element.
 pub(in crate::read) fn is_element(code: i64) -> bool {
     code < i64::from(FIRST_OTHER)

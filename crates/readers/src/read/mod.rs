@@ -51,7 +51,7 @@ pub mod xtc;
 pub mod xyz;
 
 pub use beads::bead_name;
-pub use category::element_symbol;
+pub use category::{element_symbol, name_code};
 pub use input::{TextInput, stream_bytes};
 pub use source::ByteSource;
 pub use table::CUT_SHORT;

@@ -8,7 +8,7 @@ use crate::convert::sources::places;
 use crate::convert::{ParticleSource, SourceAttribute};
 use crate::native::MappedFile;
 use crate::open::SiblingFiles;
-use crate::{FrameError, SimulationCell};
+use crate::{FrameError, Labels, SimulationCell};
 use spherule_readers::ranges::ParticleRanges;
 
 /// The particles of a mapped file.
@@ -63,6 +63,10 @@ impl ParticleSource for RangeSource {
 
     fn notes(&self) -> &[String] {
         self.ranges.notes()
+    }
+
+    fn labels(&self) -> Labels {
+        self.ranges.labels().clone()
     }
 
     fn position_len(&self) -> Option<u64> {

@@ -7,7 +7,7 @@ use super::table::{Column, ParticleTable};
 use super::values::Cache;
 use crate::ranges::{ParticleRanges, RangeAttribute};
 use spherule_frame::join::PART;
-use spherule_frame::{ParseError, ScalarType, SimulationCell};
+use spherule_frame::{Labels, ParseError, ScalarType, SimulationCell};
 
 /// Bytes of decoded chunks that are kept, as neighbouring ranges need the same ones.
 const CACHE_BYTES: u64 = 48 << 20;
@@ -68,6 +68,10 @@ impl ParticleRanges for TableRanges {
 
     fn notes(&self) -> &[String] {
         self.table.notes()
+    }
+
+    fn labels(&self) -> &Labels {
+        self.table.labels()
     }
 
     fn position_len(&self) -> u64 {

@@ -6,7 +6,8 @@ use super::values::Cache;
 use crate::read::columns::{StridedColumn, positions};
 use spherule_frame::join::{self, ColumnShape, JoinedColumn, PART, PartColumns};
 use spherule_frame::{
-    Attribute, AttributeData, MemoryBudget, ParseError, RawParticles, ScalarType, SimulationCell,
+    Attribute, AttributeData, Labels, MemoryBudget, ParseError, RawParticles, ScalarType,
+    SimulationCell,
 };
 
 /// Particles that belong together in a file: a species, a type, an array.
@@ -49,11 +50,15 @@ pub(super) struct ParticleTable {
     cell: Option<SimulationCell>,
     /// Which attributes are not in all parts.
     notes: Vec<String>,
+    /// Names of parts.
+    labels: Labels,
 }
 
 impl ParticleTable {
     /// The particles of `parts`; `is_divided` if the file may have several parts, which get numbers then.
     pub(super) fn new(mut parts: Vec<Part>, is_divided: bool) -> Self {
+        let names = parts.iter().map(|part| (i64::from(part.value), part.name.clone())).collect();
+        let labels = is_divided.then(|| (PART.to_owned(), names));
         parts.retain(|part| part.count > 0);
         let counts = parts.iter().map(|part| (part.value, part.count)).collect();
         let cells: Vec<Vec<Piece>> =
@@ -80,6 +85,7 @@ impl ParticleTable {
             step: None,
             cell: None,
             notes: plan.notes,
+            labels: labels.into_iter().collect(),
         }
     }
 
@@ -124,6 +130,11 @@ impl ParticleTable {
     /// Which attributes are not in all parts.
     pub(super) fn notes(&self) -> &[String] {
         &self.notes
+    }
+
+    /// Names of parts.
+    pub(super) const fn labels(&self) -> &Labels {
+        &self.labels
     }
 
     /// Bytes of the largest chunk of each column.
@@ -194,6 +205,7 @@ impl ParticleTable {
             step: self.step,
             cell: self.cell,
             notes: self.notes.clone(),
+            labels: self.labels.clone(),
             ..RawParticles::default()
         })
     }
