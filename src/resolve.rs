@@ -9,7 +9,10 @@ use crate::manifest::{Manifest, Side};
 use crate::metrics::memory::available;
 use crate::output::PreviewPage;
 use crate::overlay::{Page, RgbaPixels};
-use crate::pipeline::{FrameSize, MemoryModel, Picture, PictureMesh, RadiusRule, Setup};
+use crate::pipeline::{
+    FileSettings, FrameSize, MemoryModel, ParticleRules, Picture, PictureMesh, RadiusRule, Setup,
+    Things,
+};
 use crate::render::{RenderSettings, RendererKind};
 use crate::scene::{Bounds, RadianceMap, Texture};
 use crate::survey::Survey;
@@ -79,7 +82,7 @@ pub fn setup(
 ) -> Result<Setup, ResolveError> {
     let survey = camera::with_framed_meshes(survey, manifest, &inputs.meshes);
     let mut setup = setup_on(manifest, &survey, &inputs, None)?;
-    if manifest.has_strips() && !setup.picture.overlays.is_empty() {
+    if manifest.has_strips() && !setup.picture.files.overlays.is_empty() {
         // What the overlays show decides how much room they need
         let page = overlay::page(&setup, manifest, &survey)?;
         let mut smaller = manifest.clone();
@@ -133,7 +136,6 @@ fn setup_on(
     let extent = Extent::of(manifest, survey, &radius);
     let placed = camera::placed(manifest, survey, &extent)?;
     let color = color::rule(manifest, survey, Some(&placed.camera))?;
-    let shutter = shutter::shutter(manifest, survey)?;
     // Set up what it sees. The materials of rods follow those of meshes
     let mut scene = scene::scene(manifest, survey, inputs.environment, &placed, &extent)?;
     let cell = cell::add_cell(&mut scene, manifest, survey);
@@ -150,37 +152,30 @@ fn setup_on(
     };
     let picture = Picture {
         origin: survey.origin,
-        least_radius: narrow(extent.bounds.diagonal() * MIN_RADIUS).max(f32::MIN_POSITIVE),
-        selection: select::selection(manifest, survey)?,
-        cut: select::cut(manifest, survey)?,
-        radius,
-        color,
-        opacity: opacity::opacity(manifest, survey, scene.material.transmission > 0.0)?,
-        up: extent.up,
-        path: placed.path,
-        projection: placed.projection,
-        stereo: placed.stereo,
-        unframed: camera::unframed(manifest, survey),
-        lens: placed.lens,
-        shutter,
-        aspect: placed.aspect,
+        particles: ParticleRules {
+            selection: select::selection(manifest, survey)?,
+            cut: select::cut(manifest, survey)?,
+            radius,
+            least_radius: narrow(extent.bounds.diagonal() * MIN_RADIUS).max(f32::MIN_POSITIVE),
+            color,
+            opacity: opacity::opacity(manifest, survey, scene.material.transmission > 0.0)?,
+        },
+        files: FileSettings {
+            exr: images::exr_options(manifest, &attributes, &render, placed.view.projection),
+            attributes,
+            overlays: Vec::new(),
+            overlay_values: Vec::new(),
+            preview: images::preview_options(manifest, &render),
+            has_opaque_previews: manifest.has_opaque_previews && manifest.output.transparent,
+        },
+        view: placed.view,
         scene,
-        meshes: Vec::new(),
-        cell,
-        arrows,
-        trails,
-        bonds,
-        renderer: RendererKind::default(),
-        denoise,
+        things: Things { meshes: Vec::new(), cell, arrows, trails, bonds },
         surface,
-        exr: images::exr_options(manifest, &attributes, &render, placed.projection),
-        step: channels::frame_step(&channels, &manifest.output, survey)?,
-        attributes,
-        overlays: Vec::new(),
-        overlay_values: Vec::new(),
-        preview: images::preview_options(manifest, &render),
-        has_opaque_previews: manifest.has_opaque_previews && manifest.output.transparent,
+        renderer: RendererKind::default(),
+        step: channels::frame_step(&render.channels, &manifest.output, survey)?,
         render,
+        denoise,
     };
     let mut setup = Setup { picture, run: images::run_settings(manifest, survey) };
     // Add what is drawn over them
@@ -188,7 +183,7 @@ fn setup_on(
     let render = &setup.picture.render;
     let whole = Page::whole(render.width / columns, render.height / rows);
     overlay::add_overlays(&mut setup, manifest, survey, &page.unwrap_or(whole), inputs.overlays)?;
-    setup.picture.preview.page =
+    setup.picture.files.preview.page =
         page.map(|page| PreviewPage { page, paper: overlay::paper(&setup) });
     Ok(setup)
 }

@@ -186,7 +186,7 @@ impl StillImage {
     /// The view and the projection of the picture, from which another one can be made.
     pub fn view(&self) -> (CameraView, Projection) {
         let picture = &self.setup.picture;
-        (picture.path.view(self.frame.task.frame), picture.projection)
+        (picture.view.path.view(self.frame.task.frame), picture.view.projection)
     }
 
     /// The camera.

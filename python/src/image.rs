@@ -115,7 +115,7 @@ impl NativeImage {
     /// Smallest and largest value of the colour map, if there is one.
     #[getter]
     fn color_range(&self) -> Option<(f64, f64)> {
-        match &self.image.setup().picture.color {
+        match &self.image.setup().picture.particles.color {
             spherule::pipeline::ColorRule::Attribute { map, .. } => {
                 map.range().map(|([low, high], _)| (low, high))
             }
@@ -164,7 +164,7 @@ impl NativeImage {
         };
         let (width, height) = (film.width as usize, film.height as usize);
         let shape = [height, width, film.channels.layers.floats()];
-        let names = layer_planes(film.channels, &image.setup().picture.exr.names);
+        let names = layer_planes(film.channels, &image.setup().picture.files.exr.names);
         Ok(Some((view(slf.as_any(), layers, &shape)?, names)))
     }
 

@@ -21,7 +21,7 @@ pub(super) fn arrows_of(
     notes: &mut Vec<String>,
 ) -> Result<Vec<FrameRods>, LoadError> {
     let mut all = Vec::new();
-    for style in &setup.picture.arrows {
+    for style in &setup.picture.things.arrows {
         if frame.is_empty() {
             continue;
         }

@@ -36,7 +36,7 @@ pub(super) fn bonds_of(
     (number, file): (i64, &str),
     notes: &mut Vec<String>,
 ) -> Result<Option<FrameRods>, LoadError> {
-    let Some(style) = setup.picture.bonds.as_ref().filter(|_| !frame.is_empty()) else {
+    let Some(style) = setup.picture.things.bonds.as_ref().filter(|_| !frame.is_empty()) else {
         return Ok(None);
     };
     let near = |reach: Reach| {

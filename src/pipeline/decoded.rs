@@ -68,10 +68,10 @@ impl<'a> DecodedFrame<'a> {
                  radius of 1 angstrom"
             ));
         }
-        let rule = &setup.picture.color;
+        let rule = &setup.picture.particles.color;
         let (values, colors) = color_values(setup, &frame, (number, file), &radius, rule)?;
         let mut opacities = Vec::new();
-        if let OpacityRule::Value { name, .. } = &setup.picture.opacity
+        if let OpacityRule::Value { name, .. } = &setup.picture.particles.opacity
             && !frame.is_empty()
         {
             let value = Value::named(name, &frame.attributes)
@@ -81,7 +81,7 @@ impl<'a> DecodedFrame<'a> {
         // Extract ids and velocities for the channels
         let channels = setup.picture.render.channels;
         let ids = if setup.picture.needs_ids() { ids(&frame) } else { None };
-        let shutter = setup.picture.shutter.as_ref();
+        let shutter = setup.picture.view.shutter.as_ref();
         let is_moved = shutter.is_some_and(|shutter| shutter.has_velocities);
         let velocities = if channels.needs_velocities() || is_moved {
             velocity_of(&frame.attributes).map(vectors)
@@ -100,7 +100,7 @@ impl<'a> DecodedFrame<'a> {
             return Err(no_parts(file, has));
         }
         let mut planes = Vec::new();
-        for channel in &setup.picture.attributes {
+        for channel in &setup.picture.files.attributes {
             let found = attribute(&frame, &channel.name, "a channel", file)?;
             planes.extend((0..channel.components).map(|c| component(found, c)));
         }
@@ -339,7 +339,7 @@ impl Context for DrawnContext<'_, '_> {
     }
 
     fn up(&self) -> DVec3 {
-        self.setup.picture.up
+        self.setup.picture.view.up
     }
 
     fn time(&self) -> f64 {

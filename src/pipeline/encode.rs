@@ -176,6 +176,6 @@ fn exr_options(setup: &Setup, frame: &TracedFrame) -> ExrOptions {
         custom: Some(CustomAttribute { name: "spherule".to_owned(), json: facts.to_string() }),
         world_to_camera: Some(frame.camera.world_to_camera()),
         texts: frame.texts.clone(),
-        ..setup.picture.exr.clone()
+        ..setup.picture.files.exr.clone()
     }
 }

@@ -22,7 +22,7 @@ impl FileFacts {
             let value = Value::named(name, &frame.attributes)?;
             column_range(&value.bind(|name| frame.attribute(name))?, frame.len())
         };
-        let names = setup.picture.overlay_values.iter();
+        let names = setup.picture.files.overlay_values.iter();
         Self { file, ranges: names.map(range).collect() }
     }
 }

@@ -130,7 +130,7 @@ impl StoredFrame {
     pub fn shading<'a>(&'a self, picture: &'a Picture, default: Vec3) -> StoredShading<'a> {
         let frame = self.frame();
         let view = |name: &Option<String>| frame.attribute(name.as_deref()?);
-        let color = match &picture.color {
+        let color = match &picture.particles.color {
             ColorRule::Constant(color) => Some(StoredColor::Constant(*color)),
             ColorRule::Rgb { .. } => view(&self.names.rgb)
                 .map(|values| StoredColor::Rgb { encoding: encoding(&values), values }),
@@ -144,7 +144,7 @@ impl StoredFrame {
             }
         };
         let color = color.unwrap_or(StoredColor::Constant(default));
-        let opacity = match (&picture.opacity, &self.names.opacity) {
+        let opacity = match (&picture.particles.opacity, &self.names.opacity) {
             (OpacityRule::Constant(opacity), _) => StoredOpacity::Constant(*opacity),
             (OpacityRule::Value { range, .. }, value) => {
                 let values =
@@ -183,7 +183,7 @@ impl StoredFrame {
 
     /// What overlays show of the frame; `file` is the name of its file.
     pub(super) fn facts(&self, setup: &Setup, file: String) -> FileFacts {
-        let names = setup.picture.overlay_values.iter();
+        let names = setup.picture.files.overlay_values.iter();
         let ranges = names.map(|name| self.range(name)).collect();
         FileFacts { file, ranges }
     }
@@ -270,7 +270,7 @@ impl Names {
             Ok(found)
         };
         let (mut rgb, mut values) = (None, None);
-        match &setup.picture.color {
+        match &setup.picture.particles.color {
             ColorRule::Constant(_) => {}
             ColorRule::Rgb { name, required } => rgb = find(name, "colour", *required)?,
             ColorRule::Attribute { name, required, .. } => {
@@ -278,11 +278,12 @@ impl Names {
             }
         }
         let mut opacity = None;
-        if let OpacityRule::Value { name, .. } = &setup.picture.opacity {
+        if let OpacityRule::Value { name, .. } = &setup.picture.particles.opacity {
             opacity = value(name, "opacity", true)?;
         }
         let with_channels = setup
             .picture
+            .files
             .attributes
             .iter()
             .map(|channel| {
@@ -347,7 +348,7 @@ fn particles_in_place(setup: &Setup, index: &FrameIndex) -> Result<PlacedRadius,
         );
     }
     // Find the radii
-    let common = match (&setup.picture.radius, &index.radius) {
+    let common = match (&setup.picture.particles.radius, &index.radius) {
         (RadiusRule::Attribute { .. } | RadiusRule::Table { .. }, _) => {
             return Err("the radius is an attribute, for 12 bytes per particle and more".to_owned());
         }
@@ -356,7 +357,7 @@ fn particles_in_place(setup: &Setup, index: &FrameIndex) -> Result<PlacedRadius,
         }
         (RadiusRule::FileOr(_), RadiusIndex::Common(radius)) => *radius,
         (RadiusRule::FileOr(_), RadiusIndex::PerParticle(radii))
-            if radii.low >= setup.picture.least_radius =>
+            if radii.low >= setup.picture.particles.least_radius =>
         {
             return Ok(PlacedRadius { common: None, raised: 0 });
         }
@@ -365,9 +366,9 @@ fn particles_in_place(setup: &Setup, index: &FrameIndex) -> Result<PlacedRadius,
         }
     };
     // Raise a common radius that is too small or NaN
-    let is_visible = common >= setup.picture.least_radius && is_radius(common);
+    let is_visible = common >= setup.picture.particles.least_radius && is_radius(common);
     Ok(PlacedRadius {
-        common: Some(if is_visible { common } else { setup.picture.least_radius }),
+        common: Some(if is_visible { common } else { setup.picture.particles.least_radius }),
         raised: if is_visible { 0 } else { index.count },
     })
 }

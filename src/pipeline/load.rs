@@ -19,7 +19,7 @@ use super::meshes::{MeshSlices, meshes_of};
 use super::motion::velocities_to_next;
 use super::predict::{FrameSize, MemoryModel};
 use super::rods::{CellStyle, FrameRods, rods_of};
-use super::setup::{Picture, Setup};
+use super::setup::{ParticleRules, Picture, Setup};
 use super::trails::trails_of;
 use super::{ImageTask, SharedFrame};
 use crate::metrics::counted;
@@ -127,7 +127,7 @@ fn decode(
     let file = first_file(sequence, task.index);
     let read = loaded.particles.positions.len() as u64;
     let frame = selected(setup, loaded.particles, &file)?.with_positions(Cow::Owned);
-    let moving = match setup.picture.shutter {
+    let moving = match setup.picture.view.shutter {
         Some(shutter) if !shutter.has_velocities => {
             Some(velocities_to_next(setup, shutter, sequence, task, &frame)?)
         }
@@ -155,7 +155,7 @@ pub fn load_particles<'a>(
 ) -> Result<LoadedFrame<'a>, LoadError> {
     let start = Instant::now();
     let read = particles.positions.len() as u64;
-    let frame = if setup.picture.selection.is_all() {
+    let frame = if setup.picture.particles.selection.is_all() {
         ParticleFrame::borrowed(particles, setup.picture.origin)
     } else {
         selected(setup, particles.to_owned_particles(), name)?.with_positions(Cow::Owned)
@@ -207,7 +207,7 @@ fn decoded<'a>(
 
 /// How the simulation cell is drawn, if it is, and the origin.
 fn cell_style(setup: &Setup) -> (Option<&CellStyle>, DVec3) {
-    (setup.picture.cell.as_ref(), setup.picture.origin)
+    (setup.picture.things.cell.as_ref(), setup.picture.origin)
 }
 
 /// The particles that are drawn.
@@ -216,7 +216,7 @@ fn selected(
     particles: RawParticles,
     file: &str,
 ) -> Result<ParticleFrame, LoadError> {
-    let Picture { selection, origin, .. } = &setup.picture;
+    let Picture { particles: ParticleRules { selection, .. }, origin, .. } = &setup.picture;
     if selection.is_all() {
         return Ok(ParticleFrame::from_raw(particles, *origin));
     }
@@ -231,7 +231,7 @@ fn selected(
 
 /// A note on the characters that the font of overlays does not have.
 fn missing_glyphs(setup: &Setup) -> Option<String> {
-    let overlays = setup.picture.overlays.iter();
+    let overlays = setup.picture.files.overlays.iter();
     let missing: BTreeSet<char> = overlays.flat_map(Overlay::missing_glyphs).collect();
     let shown: Vec<String> = missing.iter().map(|c| format!("`{c}`")).collect();
     (!shown.is_empty()).then(|| {
@@ -274,8 +274,12 @@ impl LoadedFrame<'_> {
         );
         self.note_absent_parts(setup);
         self.notes.extend(missing_glyphs(setup));
-        self.meshes =
-            meshes_of(&setup.picture.meshes, setup.picture.shutter, &self.task, &mut self.notes)?;
+        self.meshes = meshes_of(
+            &setup.picture.things.meshes,
+            setup.picture.view.shutter,
+            &self.task,
+            &mut self.notes,
+        )?;
         Ok(())
     }
 

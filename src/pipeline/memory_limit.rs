@@ -75,7 +75,7 @@ fn surface_text(setup: &Setup) -> String {
         return String::new();
     }
     let voxel = setup.picture.surface.voxel;
-    match setup.picture.radius {
+    match setup.picture.particles.radius {
         RadiusRule::Common(radius) | RadiusRule::FileOr(radius) if radius > 0.0 => format!(
             " for a smooth surface of particles of radius {radius} in voxels of {}",
             voxel * radius

@@ -57,8 +57,8 @@ pub use renderer::{BuiltFrame, FrameRenderer, TraceError, TracedFrame};
 pub use rods::{CellStyle, FrameRods};
 pub use schedule::{Overlap, Schedule};
 pub use setup::{
-    ArrowStyle, AttributeChannel, BondRule, BondStyle, ColorRule, OpacityRule, Picture, RadiusRule,
-    RunSettings, Setup, TrailStyle,
+    ArrowStyle, AttributeChannel, BondRule, BondStyle, ColorRule, FileSettings, OpacityRule,
+    ParticleRules, Picture, RadiusRule, RunSettings, Setup, Things, TrailStyle, ViewSettings,
 };
 pub use shutter::{FrameStep, Shutter};
 pub use single::{make_image, trace_particles};

@@ -79,7 +79,7 @@ pub(super) fn velocities_to_next(
     let (own, others) = (ids_of(frame, task.index)?, ids_of(&other, other_index)?);
     let places = Places::new(&others, &own);
     // Those that are drawn may be few
-    let half_extent = if setup.picture.selection.is_all() {
+    let half_extent = if setup.picture.particles.selection.is_all() {
         0.5 * extent(&frame.positions)
     } else {
         0.5 * extent(&other.positions)

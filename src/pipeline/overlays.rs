@@ -20,7 +20,7 @@ impl Setup {
 
     /// What overlays show of an image.
     fn frame_view(&self, frame: &TracedFrame) -> FrameView {
-        let names = self.picture.overlay_values.iter().cloned();
+        let names = self.picture.files.overlay_values.iter().cloned();
         let [right, up, forward] = frame.camera.axes();
         let axis = |i: usize| [right[i], up[i], forward[i]];
         FrameView {
@@ -38,28 +38,38 @@ impl Setup {
 
     /// Where the film is on its page.
     pub(super) fn film_at(&self) -> [u32; 2] {
-        self.picture.preview.page.map_or([0, 0], |own| own.page.at)
+        self.picture.files.preview.page.map_or([0, 0], |own| own.page.at)
     }
 
     /// The drawing commands of the overlays of an image with one eye.
     pub(super) fn drawings_of(&self, frame: &TracedFrame) -> Vec<Drawing> {
         let (width, height) = (frame.film.width, frame.film.height);
-        let page =
-            self.picture.preview.page.map(|own| own.page).unwrap_or(Page::whole(width, height));
-        marks(&self.picture.overlays, &page, &self.frame_view(frame))
+        let page = self
+            .picture
+            .files
+            .preview
+            .page
+            .map(|own| own.page)
+            .unwrap_or(Page::whole(width, height));
+        marks(&self.picture.files.overlays, &page, &self.frame_view(frame))
     }
 
     /// The overlays of an image.
     pub(super) fn overlays_of(&self, frame: &TracedFrame) -> Vec<Sprite> {
-        let overlays = &self.picture.overlays;
+        let overlays = &self.picture.files.overlays;
         if overlays.is_empty() {
             return Vec::new();
         }
         // Each eye has its own, with which they appear at the distance of the screen
         let [columns, rows] = frame.camera.eyes();
         let (width, height) = (frame.film.width / columns, frame.film.height / rows);
-        let page =
-            self.picture.preview.page.map(|own| own.page).unwrap_or(Page::whole(width, height));
+        let page = self
+            .picture
+            .files
+            .preview
+            .page
+            .map(|own| own.page)
+            .unwrap_or(Page::whole(width, height));
         let mut sprites = draw(overlays, &page, &self.frame_view(frame));
         if [columns, rows] != [1, 1] {
             let shift = [width * (columns - 1), height * (rows - 1)].map(u32::cast_signed);

@@ -246,7 +246,7 @@ impl Trial {
         let has_exr = matches!(PictureFormat::of(&task.image), Some(PictureFormat::Exr) | None);
         let mut bytes = 0;
         if has_exr {
-            let exr = pool.install(|| encode_exr(&self.film, &full.picture.exr));
+            let exr = pool.install(|| encode_exr(&self.film, &full.picture.files.exr));
             bytes += exr?.bytes.len();
         }
         if task.preview.is_some() || !has_exr {

@@ -208,18 +208,49 @@ pub struct Setup {
 pub struct Picture {
     /// World position that all coordinates are relative to.
     pub origin: DVec3,
-    /// Minimum radius; smaller ones would be invisible, and are raised to it.
-    pub least_radius: f32,
+    /// Which particles are drawn, and how.
+    pub particles: ParticleRules,
+    /// What the camera shows.
+    pub view: ViewSettings,
+    /// Lights, material, background, ground; with the camera at the start of the path. [`Setup::scene_at`] returns
+    /// the scene of a frame.
+    pub scene: Scene,
+    /// What is drawn beside the particles.
+    pub things: Things,
+    /// The surface.
+    pub surface: SurfaceSettings,
+    /// The renderer.
+    pub renderer: RendererKind,
+    /// Image size, samples, depth, channels.
+    pub render: RenderSettings,
+    /// How noise is removed from the images, if it is. The settings for rendering then have features.
+    pub denoise: Option<DenoiseSettings>,
+    /// The next frame, if there is a channel for motion.
+    pub step: Option<FrameStep>,
+    /// What is written.
+    pub files: FileSettings,
+}
+
+/// Which particles are drawn, and how.
+#[derive(Debug, Clone)]
+pub struct ParticleRules {
     /// Which particles are drawn.
     pub selection: Selection,
     /// The region that spheres are cut to.
     pub cut: ConvexRegion,
     /// Source of the radii.
     pub radius: RadiusRule,
+    /// Minimum radius; smaller ones would be invisible, and are raised to it.
+    pub least_radius: f32,
     /// Source of the colours.
     pub color: ColorRule,
     /// How much each sphere covers of what is behind it.
     pub opacity: OpacityRule,
+}
+
+/// What the camera shows.
+#[derive(Debug, Clone)]
+pub struct ViewSettings {
     /// The up direction, unit vector.
     pub up: DVec3,
     /// The camera path, in world units.
@@ -236,9 +267,11 @@ pub struct Picture {
     pub shutter: Option<Shutter>,
     /// Width of the image of an eye divided by its height; also used if fewer pixels are traced in a trial.
     pub aspect: f64,
-    /// Lights, material, background, ground; with the camera at the start of the path. [`Setup::scene_at`] returns
-    /// the scene of a frame.
-    pub scene: Scene,
+}
+
+/// What is drawn beside the particles; its materials are in the scene.
+#[derive(Debug, Clone)]
+pub struct Things {
     /// The meshes; their materials are in the scene.
     pub meshes: Vec<PictureMesh>,
     /// How the simulation cell is drawn, if it is.
@@ -249,18 +282,13 @@ pub struct Picture {
     pub trails: Option<TrailStyle>,
     /// Bonds between particles, if they are drawn.
     pub bonds: Option<BondStyle>,
-    /// The renderer.
-    pub renderer: RendererKind,
-    /// Image size, samples, depth, channels.
-    pub render: RenderSettings,
-    /// How noise is removed from the images, if it is. The settings for rendering then have features.
-    pub denoise: Option<DenoiseSettings>,
-    /// The surface.
-    pub surface: SurfaceSettings,
+}
+
+/// What is written of a picture.
+#[derive(Debug, Clone)]
+pub struct FileSettings {
     /// Attributes with channels, in the order of their floats in the film.
     pub attributes: Vec<AttributeChannel>,
-    /// The next frame, if there is a channel for motion.
-    pub step: Option<FrameStep>,
     /// Options of the EXR; the camera is added for each frame.
     pub exr: ExrOptions,
     /// What is drawn over previews.
@@ -313,14 +341,15 @@ impl Setup {
     /// # Errors
     /// The view is invalid; [`crate::resolve::check_views`] detects that in advance.
     pub fn camera_at(&self, frame: i64) -> Result<Camera, CameraError> {
-        self.camera_with(&self.picture.path.view(frame))
+        self.camera_with(&self.picture.view.path.view(frame))
     }
 
     /// The camera at `view`, without its lens.
     fn camera_with(&self, view: &CameraView) -> Result<Camera, CameraError> {
         let picture = &self.picture;
-        let camera = Camera::projected(view, picture.projection, picture.aspect, picture.origin)?;
-        let stereo = picture.stereo.map(|stereo| stereo.stereo(view));
+        let camera =
+            Camera::projected(view, picture.view.projection, picture.view.aspect, picture.origin)?;
+        let stereo = picture.view.stereo.map(|stereo| stereo.stereo(view));
         Ok(camera.with_stereo(stereo.transpose()?))
     }
 
@@ -331,10 +360,10 @@ impl Setup {
     /// Same as [`Self::camera_at`], or the focus is not in front of the camera.
     pub fn scene_at(&self, frame: i64, focus: Option<Vec3>) -> Result<Scene, CameraError> {
         let mut camera = self.camera_at(frame)?;
-        if let Some(lens) = self.picture.lens {
-            let view = self.picture.path.view(frame);
+        if let Some(lens) = self.picture.view.lens {
+            let view = self.picture.view.path.view(frame);
             let point = focus.map(|point| self.picture.origin + point.as_dvec3());
-            camera = camera.with_lens(lens.lens(&view, self.picture.aspect, point)?);
+            camera = camera.with_lens(lens.lens(&view, self.picture.view.aspect, point)?);
         }
         let next_frame = match self.picture.step {
             Some(step) => {
@@ -358,11 +387,11 @@ impl Setup {
     /// The exposure of `frame`. `camera` is that of the frame, with its lens.
     fn exposure(&self, frame: i64, camera: &Camera) -> Option<Exposure> {
         let picture = &self.picture;
-        let shutter = picture.shutter?;
+        let shutter = picture.view.shutter?;
         #[expect(clippy::cast_precision_loss, reason = "frame numbers of neighbours differ little")]
         let numbers = shutter.step.numbers as f64;
         let at = |part: f64| {
-            let view = picture.path.view_between(frame, part * numbers);
+            let view = picture.view.path.view_between(frame, part * numbers);
             let moved = self.camera_with(&view);
             // Only views of frames are checked in advance
             moved.map_or(*camera, |moved| match camera.lens() {
@@ -375,8 +404,8 @@ impl Setup {
 
     /// Options for the PNG of an image from `camera`.
     pub fn preview_from(&self, camera: &Camera) -> PreviewOptions {
-        let mut options = self.picture.preview;
-        if self.picture.has_opaque_previews {
+        let mut options = self.picture.files.preview;
+        if self.picture.files.has_opaque_previews {
             let behind = self.picture.scene.background.color(camera.forward());
             options.background = PreviewBackground::Color(behind);
         }
@@ -412,13 +441,15 @@ impl Setup {
     pub(super) fn needs_particles(&self) -> bool {
         let picture = &self.picture;
         let is_for_channels = picture.render.channels.needs_particles();
-        is_for_channels || picture.opacity.is_by_particle() || self.needs_parts()
+        is_for_channels || picture.particles.opacity.is_by_particle() || self.needs_parts()
     }
 
     /// Whether native frames relative to [`Picture::origin`] are traced in place.
     pub fn traces_in_place(&self) -> bool {
-        let is_by_attribute =
-            matches!(self.picture.radius, RadiusRule::Attribute { .. } | RadiusRule::Table { .. });
+        let is_by_attribute = matches!(
+            self.picture.particles.radius,
+            RadiusRule::Attribute { .. } | RadiusRule::Table { .. }
+        );
         self.needs_copy().is_none() && !is_by_attribute
     }
 
@@ -431,13 +462,13 @@ impl Setup {
                 "{structure} builds over a copy of them, 12 bytes per particle and more; lbvh and kdtree do not"
             ));
         }
-        if !self.picture.selection.is_all() {
+        if !self.picture.particles.selection.is_all() {
             return Some(
                 "[select] and [[clip]] take those that are drawn from a copy of them, 12 bytes per particle and more"
                     .to_owned(),
             );
         }
-        let Picture { arrows, trails, bonds, .. } = &self.picture;
+        let Things { arrows, trails, bonds, .. } = &self.picture.things;
         if !arrows.is_empty() || trails.is_some() || bonds.is_some() {
             return Some(
                 "arrows, trails and bonds are made from a copy of them, 12 bytes per particle and more"
@@ -452,9 +483,13 @@ impl Setup {
         if self.focused_particle().is_some() {
             return Some("camera.focus searches for a particle in a copy of them".to_owned());
         }
-        if matches!(&self.picture.color, ColorRule::Attribute { needs_geometry: true, .. })
-            || matches!(&self.picture.opacity, OpacityRule::Value { needs_geometry: true, .. })
-        {
+        if matches!(
+            &self.picture.particles.color,
+            ColorRule::Attribute { needs_geometry: true, .. }
+        ) || matches!(
+            &self.picture.particles.opacity,
+            OpacityRule::Value { needs_geometry: true, .. }
+        ) {
             return Some(
                 "their colours or opacities are computed from a copy of them, 16 bytes per particle and more"
                     .to_owned(),
@@ -474,9 +509,9 @@ impl Setup {
 
     /// Number of slices of the exposure in which surfaces differ.
     pub(super) fn slices(&self) -> u32 {
-        let has_moving_meshes = self.picture.meshes.iter().any(|mesh| mesh.tree.is_none());
+        let has_moving_meshes = self.picture.things.meshes.iter().any(|mesh| mesh.tree.is_none());
         let is_continuous = self.picture.surface.kind == SurfaceKind::Spheres && !has_moving_meshes;
-        match self.picture.shutter {
+        match self.picture.view.shutter {
             Some(shutter) if !is_continuous => shutter.slices,
             _ => 1,
         }
@@ -484,17 +519,17 @@ impl Setup {
 
     /// Whether there is motion blur.
     pub(super) const fn has_motion(&self) -> bool {
-        self.picture.shutter.is_some()
+        self.picture.view.shutter.is_some()
     }
 
     /// Whether particles move to their places in the next frame, which is read too.
     pub(super) fn moves_to_next_frame(&self) -> bool {
-        self.picture.shutter.is_some_and(|shutter| !shutter.has_velocities)
+        self.picture.view.shutter.is_some_and(|shutter| !shutter.has_velocities)
     }
 
     /// The id of the particle in focus.
     pub(super) fn focused_particle(&self) -> Option<u32> {
-        self.picture.lens.as_ref().and_then(LensSettings::particle)
+        self.picture.view.lens.as_ref().and_then(LensSettings::particle)
     }
 
     /// The structure to report for a native frame in place: its order is that of k-d cells.

@@ -80,7 +80,7 @@ impl SurfaceBuilder {
         if has_spray {
             self.find_spray(setup, frame, trees);
         }
-        if let Some(shutter) = setup.picture.shutter {
+        if let Some(shutter) = setup.picture.view.shutter {
             self.displacements = expose(setup, shutter, frame);
         }
         if has_spray {
@@ -102,7 +102,7 @@ impl SurfaceBuilder {
         }
         if kind == SurfaceKind::Smooth || has_unions {
             frame.centers = Cow::Borrowed(&[]);
-            frame.radius = Radius::Common(setup.picture.least_radius);
+            frame.radius = Radius::Common(setup.picture.particles.least_radius);
             self.displacements = Vec::new();
         }
         report.seconds.surface = start.elapsed().as_secs_f64();
@@ -129,7 +129,7 @@ impl SurfaceBuilder {
         frame: &mut DecodedFrame<'_>,
         mut build: impl FnMut(&mut Self, &DecodedFrame<'_>) -> Result<(), SmoothError>,
     ) -> Result<(), SmoothError> {
-        let times = match setup.picture.shutter {
+        let times = match setup.picture.view.shutter {
             Some(shutter) => slice_times(shutter.slices).collect(),
             None => vec![0.0],
         };
@@ -176,7 +176,7 @@ impl SurfaceBuilder {
             Radius::PerParticle(radii) => median_radius(radii, notes),
         };
         let channels = setup.picture.render.channels;
-        let is_colored = setup.picture.color.is_by_particle();
+        let is_colored = setup.picture.particles.color.is_by_particle();
         // Keep the particles if attributes are looked up at points of the surface
         let keep = channels.needs_particles() || is_colored;
         let settings = &setup.picture.surface;
@@ -303,7 +303,7 @@ impl SurfaceBuilder {
 impl SurfaceBuilder {
     /// The surface of the body, over the spheres of `tree` unless it has its own structures.
     fn body<'a>(&'a self, setup: &'a Setup, tree: TreeView<'a>) -> Box<dyn Shape + 'a> {
-        let region = &setup.picture.cut;
+        let region = &setup.picture.particles.cut;
         let normals = shading_normals(&setup.picture.surface);
         let union = |tree| UnionSurface::new(tree).with_normals(normals);
         match (setup.picture.surface.kind, setup.has_motion()) {

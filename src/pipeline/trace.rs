@@ -164,7 +164,7 @@ impl CpuRenderer {
     ) -> Result<RayCounts, TraceError> {
         let scene = setup.scene_at(frame.task.frame, frame.focus)?;
         let surface = &self.surface;
-        let others = surface::others(&setup.picture.meshes, &frame.meshes, &frame.rods);
+        let others = surface::others(&setup.picture.things.meshes, &frame.meshes, &frame.rods);
         match &frame.particles {
             BuiltParticles::Decoded(shading) => {
                 let source = particle_shading(&setup.picture, shading);
@@ -228,7 +228,7 @@ fn denoise_film(setup: &Setup, film: &mut Film) -> Result<f64, DenoiseError> {
 
 fn particle_shading<'a>(picture: &'a Picture, shading: &'a DecodedShading) -> ParticleShading<'a> {
     let values = &shading.values;
-    let colors = match &picture.color {
+    let colors = match &picture.particles.color {
         ColorRule::Constant(color) => Colors::Constant(*color),
         ColorRule::Rgb { .. } if shading.colors.is_empty() => Colors::Constant(DEFAULT_COLOR),
         ColorRule::Rgb { .. } => Colors::PerParticle(&shading.colors),
@@ -237,7 +237,7 @@ fn particle_shading<'a>(picture: &'a Picture, shading: &'a DecodedShading) -> Pa
     };
     ParticleShading {
         colors,
-        opacities: match picture.opacity {
+        opacities: match picture.particles.opacity {
             OpacityRule::Constant(opacity) => Opacities::Constant(opacity),
             OpacityRule::Value { range, .. } => {
                 Opacities::Mapped { values: &shading.opacities, range }

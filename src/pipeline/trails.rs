@@ -30,7 +30,7 @@ pub(super) fn trails_of(
     (frame, read): (&SharedFrame<'_>, u64),
     notes: &mut Vec<String>,
 ) -> Result<Option<FrameRods>, LoadError> {
-    let Some(style) = setup.picture.trails.as_ref().filter(|_| !frame.is_empty()) else {
+    let Some(style) = setup.picture.things.trails.as_ref().filter(|_| !frame.is_empty()) else {
         return Ok(None);
     };
     let file = first_file(sequence, task.index);

@@ -5,11 +5,11 @@ use std::borrow::Cow;
 use glam::DVec3;
 use spherule_formats::SimulationCell;
 
-use super::{Extent, ResolveError};
+use super::{Extent, ResolveError, shutter};
 use crate::manifest::{
     self, BoxSetting, CameraMode, FitSetting, FocusSetting, Manifest, ProjectionKind,
 };
-use crate::pipeline::{PictureMesh, Setup};
+use crate::pipeline::{PictureMesh, Setup, ViewSettings};
 use crate::scene::{
     Aperture, Bounds, Camera, CameraError, CameraKey, CameraPath, CameraView, Convergence, Focus,
     Framed, Framing, KeyedPath, LensSettings, Projection, StereoSettings,
@@ -18,16 +18,9 @@ use crate::survey::{Fit, Survey};
 
 /// The camera, and what it follows from.
 pub(super) struct PlacedCamera {
-    /// The camera path, in world units.
-    pub path: CameraPath,
-    pub projection: Projection,
-    /// The eyes, if images are stereo pairs.
-    pub stereo: Option<StereoSettings>,
+    pub view: ViewSettings,
     /// The camera at the start of the path, without its lens.
     pub camera: Camera,
-    pub lens: Option<LensSettings>,
-    /// Width of the image of an eye divided by its height.
-    pub aspect: f64,
 }
 
 /// The camera that the manifest describes.
@@ -49,8 +42,17 @@ pub(super) fn placed(
         let stereo = stereo.map(|stereo| stereo.stereo(view)).transpose()?;
         Ok(camera.with_stereo(stereo))
     })?;
-    let lens = lens(manifest, &path, aspect)?;
-    Ok(PlacedCamera { path, projection, stereo, camera, lens, aspect })
+    let view = ViewSettings {
+        up: extent.up,
+        projection,
+        stereo,
+        unframed: unframed(manifest, survey),
+        lens: lens(manifest, &path, aspect)?,
+        shutter: shutter::shutter(manifest, survey)?,
+        aspect,
+        path,
+    };
+    Ok(PlacedCamera { view, camera })
 }
 
 /// The path and the projection that the manifest describes; `up` is the default upward direction.
@@ -180,7 +182,7 @@ fn framed(manifest: &Manifest, survey: &Survey, bounds: &Bounds, reach: f64) -> 
 }
 
 /// Number of particles of a frame that an automatic camera may leave out.
-pub(super) fn unframed(manifest: &Manifest, survey: &Survey) -> u64 {
+fn unframed(manifest: &Manifest, survey: &Survey) -> u64 {
     let is_panorama = manifest.camera.projection == ProjectionKind::Equirectangular;
     match (manifest.camera.mode, &survey.outline) {
         (CameraMode::Auto | CameraMode::Turntable, Some(outline)) if !is_panorama => {
@@ -251,12 +253,12 @@ pub fn check_views(
     setup: &Setup,
     frames: impl IntoIterator<Item = i64>,
 ) -> Result<(), ResolveError> {
-    if setup.picture.path.moving().is_empty() {
+    if setup.picture.view.path.moving().is_empty() {
         return Ok(());
     }
     for frame in frames {
         setup.camera_at(frame).map_err(|source| ResolveError::View {
-            place: place(&setup.picture.path, frame),
+            place: place(&setup.picture.view.path, frame),
             source,
         })?;
     }

@@ -71,7 +71,7 @@ fn keys_inherit_missing_values_from_the_camera() {
         camera.keys[1].up = Some(DVec3::Z);
         camera.keys[1].fov = Some(50.0);
     });
-    let path = setup.unwrap().picture.path;
+    let path = setup.unwrap().picture.view.path;
     assert_eq!((path.view(1).up, path.view(1).fov), (DVec3::Y, 33.0));
     assert_eq!((path.view(2).up, path.view(2).fov), (DVec3::Z, 50.0));
 }
@@ -101,7 +101,7 @@ fn each_frame_has_its_camera_and_all_have_the_same_light() {
 fn previews_of_older_jobs_have_a_background_that_follows_the_camera() {
     let keys = [key(1, [5.0, 0.0, -4.0]), key(2, [5.0, 0.0, 4.0])];
     let mut setup = keyed_setup(keys).unwrap();
-    setup.picture.has_opaque_previews = true;
+    setup.picture.files.has_opaque_previews = true;
     let behind = |frame| {
         let camera = setup.camera_at(frame).unwrap();
         let shown = setup.preview_from(&camera).background;
@@ -110,7 +110,7 @@ fn previews_of_older_jobs_have_a_background_that_follows_the_camera() {
         shown
     };
     assert_ne!(behind(1), behind(2));
-    setup.picture.has_opaque_previews = false;
+    setup.picture.files.has_opaque_previews = false;
     let camera = setup.camera_at(1).unwrap();
     let background = setup.preview_from(&camera).background;
     assert_eq!(background, PreviewBackground::Transparent);

@@ -61,7 +61,7 @@ pub(super) fn add(
     {
         let trees = meshes.iter().filter_map(|mesh| mesh.tree.as_ref());
         let boxes = trees.filter_map(|tree| tree.bounds());
-        let cells = cell::boxes(setup.picture.cell.as_ref(), survey);
+        let cells = cell::boxes(setup.picture.things.cell.as_ref(), survey);
         for [min, max] in boxes.chain(cells) {
             let lowest = Vec3::select(ground.up.cmpgt(Vec3::ZERO), min, max).dot(ground.up);
             let below = lowest - GROUND_GAP * (max - min).length();
@@ -70,7 +70,7 @@ pub(super) fn add(
             }
         }
     }
-    setup.picture.meshes = meshes;
+    setup.picture.things.meshes = meshes;
 }
 
 fn material(mesh: &manifest::Mesh) -> MeshMaterial {

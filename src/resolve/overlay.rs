@@ -62,7 +62,7 @@ pub(super) fn add_overlays(
         #[expect(clippy::cast_possible_truncation, reason = "a fraction of the picture")]
         let offset = own.offset.map(|part| part as f32);
         if let Content::Text(template) = &content {
-            setup.picture.overlay_values.extend(template.names().map(str::to_owned));
+            setup.picture.files.overlay_values.extend(template.names().map(str::to_owned));
         }
         given.push(own.color);
         overlays.push(Overlay {
@@ -87,7 +87,7 @@ pub(super) fn add_overlays(
         };
         (overlay.color, overlay.halo) = colors(behind, color);
     }
-    setup.picture.overlays = overlays;
+    setup.picture.files.overlays = overlays;
     Ok(())
 }
 
@@ -123,7 +123,9 @@ fn choose_corners(overlays: &mut [Overlay], page: &Page, view: &FrameView, point
 /// What is beside the picture on its page, linear RGB: the background if it has one colour, or else white.
 pub(super) fn paper(setup: &Setup) -> Vec3 {
     match setup.picture.scene.background {
-        Background::Constant(color) => view_transform(color * exp2(setup.picture.preview.exposure)),
+        Background::Constant(color) => {
+            view_transform(color * exp2(setup.picture.files.preview.exposure))
+        }
         _ => Vec3::ONE,
     }
 }
@@ -142,7 +144,7 @@ pub(super) fn page(
 ) -> Result<Page, ResolveError> {
     let size = manifest.image.size();
     let view = first_view(setup, survey, &setup.picture.scene.camera);
-    let page = Page::with_room_for(&setup.picture.overlays, size, &view);
+    let page = Page::with_room_for(&setup.picture.files.overlays, size, &view);
     let is_small = |axis: usize| page.picture[axis] < size[axis].div_ceil(MIN_PART);
     if is_small(0) || is_small(1) {
         let [width, height] = size;
@@ -187,7 +189,8 @@ fn content(
 ) -> Result<Option<Content>, ResolveError> {
     Ok(match kind {
         OverlayKind::ColorBar { title, unit, length, orientation, ticks, format, factor } => {
-            let Some((name, kind)) = color_bar(&setup.picture.color, manifest, survey) else {
+            let Some((name, kind)) = color_bar(&setup.picture.particles.color, manifest, survey)
+            else {
                 if survey.most_particles == 0 {
                     return Ok(None);
                 }
@@ -398,7 +401,7 @@ fn backdrop(setup: &Setup, camera: &Camera, film: Vec2) -> Vec3 {
             _ => scene.background.color_on_film(ray.direction, film),
         },
     };
-    view_transform(color * exp2(picture.preview.exposure))
+    view_transform(color * exp2(picture.files.preview.exposure))
 }
 
 pub(super) fn srgb(linear: Vec3) -> Color {

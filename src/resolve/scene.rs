@@ -21,7 +21,7 @@ pub(super) fn scene(
     placed: &PlacedCamera,
     extent: &Extent,
 ) -> Result<Scene, ResolveError> {
-    let (up, bounds, view) = (extent.up, &extent.bounds, placed.path.start());
+    let (up, bounds, view) = (extent.up, &extent.bounds, placed.view.path.start());
     let environment = environment::environment(manifest, image, &view, up)?;
     let mut lights = match (manifest.lights.is_empty(), manifest.integrator()) {
         (false, _) => lights::lights(manifest, survey.origin, up)?,

@@ -19,8 +19,8 @@ pub(super) struct CameraSummary<'a> {
 impl<'a> CameraSummary<'a> {
     pub(super) fn new(setup: &'a Setup, mode: CameraMode, frames: &[i64]) -> Self {
         Self {
-            path: &setup.picture.path,
-            projection: setup.picture.projection,
+            path: &setup.picture.view.path,
+            projection: setup.picture.view.projection,
             mode,
             first: frames.first().copied(),
             last: frames.last().copied(),

@@ -51,7 +51,7 @@ impl Check<'_> {
             put("structure", json!(structure(survey, setup).name()));
             put("most_particles", json!(survey.most_particles));
             put("radius", radius_json(setup, survey));
-            if let ColorRule::Attribute { name, map, .. } = &setup.picture.color {
+            if let ColorRule::Attribute { name, map, .. } = &setup.picture.particles.color {
                 let range = map.range().map(|(range, _)| range);
                 put("range", json!({"value": shown_name(name), "ends": range}));
             }
@@ -201,12 +201,12 @@ fn channels(manifest: &Manifest) -> Vec<Cow<'static, str>> {
 }
 
 fn structure(survey: &Survey, setup: &Setup) -> Structure {
-    let has_values = setup.picture.color.is_by_particle();
+    let has_values = setup.picture.particles.color.is_by_particle();
     setup.build_settings(survey.most_particles, has_values).structure
 }
 
 fn radius_json(setup: &Setup, survey: &Survey) -> Value {
-    match &setup.picture.radius {
+    match &setup.picture.particles.radius {
         RadiusRule::Common(radius) => json!(radius),
         RadiusRule::FileOr(_) if survey.has_radii => json!("file"),
         RadiusRule::FileOr(radius) => json!(radius),

@@ -45,7 +45,7 @@ pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup:
     for remark in sequence.remarks() {
         note!("{remark}");
     }
-    if setup.picture.cell.is_none() && !survey.cells.is_empty() {
+    if setup.picture.things.cell.is_none() && !survey.cells.is_empty() {
         note!("{CELL_HINT}");
     }
     if survey.most_particles == 0 {
@@ -58,7 +58,7 @@ pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup:
     if let Some(text) = unframed_text(setup) {
         message!("{text}");
     }
-    if let pipeline::ColorRule::Attribute { name, map, .. } = &setup.picture.color {
+    if let pipeline::ColorRule::Attribute { name, map, .. } = &setup.picture.particles.color {
         let shown = shown_name(name);
         match (map.range(), map.categories()) {
             (Some(([low, high], _)), _) => {
@@ -71,7 +71,8 @@ pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup:
             }
         }
     }
-    if let (pipeline::ColorRule::Rgb { name, .. }, Some(rgb)) = (&setup.picture.color, &survey.rgb)
+    if let (pipeline::ColorRule::Rgb { name, .. }, Some(rgb)) =
+        (&setup.picture.particles.color, &survey.rgb)
     {
         message!("colour by the RGB attribute `{name}` ({})", rgb.encoding.name());
     }
@@ -94,7 +95,7 @@ pub(in crate::cli) const CELL_HINT: &str = "--cell draws the simulation cell";
 
 /// The options that place a camera which stands still where it is; None for those that move, and panoramas.
 fn view_options(setup: &Setup) -> Option<String> {
-    let CameraPath::Still(view) = &setup.picture.path else {
+    let CameraPath::Still(view) = &setup.picture.view.path else {
         return None;
     };
     let point = |p: DVec3| format!("[{},{},{}]", short(p.x), short(p.y), short(p.z));
@@ -103,7 +104,7 @@ fn view_options(setup: &Setup) -> Option<String> {
         point(view.eye),
         point(view.look_at)
     );
-    match setup.picture.projection {
+    match setup.picture.view.projection {
         Projection::Perspective => Some(format!("{place} --set camera.fov={}", short(view.fov))),
         Projection::Orthographic { height } => {
             Some(format!("{place} --projection orthographic --set camera.height={}", short(height)))
@@ -128,7 +129,7 @@ pub(in crate::cli) fn parts_text(sequence: &Sequence) -> Option<String> {
 
 /// Describes the radius.
 pub(in crate::cli) fn radius_text(setup: &Setup, survey: &Survey) -> String {
-    match &setup.picture.radius {
+    match &setup.picture.particles.radius {
         RadiusRule::Common(radius) => format!("radius {radius}"),
         RadiusRule::FileOr(_) if survey.has_radii => "radius from the files".to_owned(),
         RadiusRule::FileOr(radius) => {
@@ -165,10 +166,10 @@ const MIN_POINTS: f64 = 6.0;
 /// Says that text is too small on paper, if it is.
 fn small_text(setup: &Setup) -> Option<String> {
     let picture = &setup.picture;
-    let dpi = picture.exr.dpi?;
+    let dpi = picture.files.exr.dpi?;
     let has_text = |overlay: &&Overlay| !matches!(overlay.content, Content::Image(_));
-    let sizes = picture.overlays.iter().filter(has_text);
-    let page = picture.preview.page.map(|own| own.page.size[1]);
+    let sizes = picture.files.overlays.iter().filter(has_text);
+    let page = picture.files.preview.page.map(|own| own.page.size[1]);
     let height = page.unwrap_or(picture.render.height);
     let points = sizes.map(|overlay| points_on_paper(overlay.size, height, dpi));
     let least = points.fold(f64::INFINITY, f64::min);
@@ -181,7 +182,7 @@ fn small_text(setup: &Setup) -> Option<String> {
 
 /// Says which ticks of colour bars are outside of the range, and so not drawn.
 fn ticks_outside(setup: &Setup) -> Vec<String> {
-    let bars = setup.picture.overlays.iter().filter_map(|overlay| match &overlay.content {
+    let bars = setup.picture.files.overlays.iter().filter_map(|overlay| match &overlay.content {
         Content::ColorBar(bar) => bar.tick_settings(),
         _ => None,
     });
@@ -205,7 +206,7 @@ const DOUBTFUL: f64 = 10.0;
 
 /// Says that a given radius is far from the spacing of the particles, if it is.
 fn doubtful_radius(setup: &Setup, survey: &Survey) -> Option<String> {
-    let RadiusRule::Common(radius) = setup.picture.radius else {
+    let RadiusRule::Common(radius) = setup.picture.particles.radius else {
         return None;
     };
     let spacing = f64::from(survey.radius?);
@@ -223,7 +224,7 @@ fn doubtful_radius(setup: &Setup, survey: &Survey) -> Option<String> {
 
 /// Says how many particles the camera may leave out, if there are any.
 pub(in crate::cli) fn unframed_text(setup: &Setup) -> Option<String> {
-    let particles = match setup.picture.unframed {
+    let particles = match setup.picture.view.unframed {
         0 => return None,
         1 => "1 particle is".to_owned(),
         some => format!("up to {some} particles of a frame are"),

@@ -24,9 +24,9 @@ pub(super) fn radii(
     file: &str,
 ) -> Result<FrameRadii, LoadError> {
     // Select the source of the radii
-    let least = setup.picture.least_radius;
+    let least = setup.picture.particles.least_radius;
     let mut unknown = 0;
-    let mut radius = match &setup.picture.radius {
+    let mut radius = match &setup.picture.particles.radius {
         RadiusRule::Common(radius) => Radius::Common(*radius),
         RadiusRule::FileOr(radius) => frame.radius.clone().unwrap_or(Radius::Common(*radius)),
         RadiusRule::Attribute { name, scale } => {

@@ -31,9 +31,9 @@ impl MemoryModel<'_> {
         let render = &picture.render;
         // Features are not in the file
         let channels = Film::bytes_for(render.width, render.height, render.channels, false);
-        let bands = encoder_bytes(channels, render.width, render.height, &picture.exr);
-        let preview = picture_bytes(render.width, render.height, &picture.preview);
-        let overlays = overlay::bytes(&picture.overlays, render.width, render.height);
+        let bands = encoder_bytes(channels, render.width, render.height, &picture.files.exr);
+        let preview = picture_bytes(render.width, render.height, &picture.files.preview);
+        let overlays = overlay::bytes(&picture.files.overlays, render.width, render.height);
         (preview + overlays).max(bands)
     }
 }

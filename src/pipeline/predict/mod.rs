@@ -52,7 +52,7 @@ impl<'a> MemoryModel<'a> {
         let known = setup.run.weight.unwrap_or_default();
         Self {
             setup,
-            own_radii: match setup.picture.radius {
+            own_radii: match setup.picture.particles.radius {
                 RadiusRule::Common(_) => false,
                 RadiusRule::FileOr(_) => known.own_radii,
                 RadiusRule::Attribute { .. } | RadiusRule::Table { .. } => true,

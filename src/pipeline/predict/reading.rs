@@ -23,16 +23,16 @@ impl MemoryModel<'_> {
         let share = |every: u32| frame.particles.div_ceil(u64::from(every.max(1)));
         let none = [0_u64; 2];
         // Rods, and their colours
-        let arrows = picture.arrows.iter().map(|style| {
+        let arrows = picture.things.arrows.iter().map(|style| {
             let arrows = share(style.every);
             [2 * arrows, style.color.as_ref().map_or(0, |_| arrows)]
         });
-        let trails = picture.trails.as_ref().map_or(none, |style| {
+        let trails = picture.things.trails.as_ref().map_or(none, |style| {
             let trails = share(style.every);
             let rods = trails.saturating_mul(style.frames.into());
             [rods, style.color.as_ref().map_or(0, |_| trails)]
         });
-        let bonds = picture.bonds.as_ref().map_or(none, |_| {
+        let bonds = picture.things.bonds.as_ref().map_or(none, |_| {
             let rods = frame.particles.saturating_mul(MAX_BONDS_EACH);
             [rods, frame.particles]
         });
@@ -93,7 +93,7 @@ impl MemoryModel<'_> {
         let keeping = attributes + self.kept(frame) + n;
         // Indices of those that are drawn, with a mark for each particle while they are found; and a copy of one array
         // after the other, for allocators that cannot shrink one in its place
-        let selecting = if self.setup.picture.selection.is_all() {
+        let selecting = if self.setup.picture.particles.selection.is_all() {
             0
         } else {
             frame.raw + (4 * n + frame.positions.max(attributes)).max(5 * n)
@@ -102,7 +102,7 @@ impl MemoryModel<'_> {
         let reading = (files + frame.raw).max(shared + held.max(selecting));
         // Neighbouring frames are read beside it one at a time, and their ids are sorted
         let beside = frame.raw + 12 * n + reading + 16 * n;
-        match (self.setup.moves_to_next_frame(), &self.setup.picture.trails) {
+        match (self.setup.moves_to_next_frame(), &self.setup.picture.things.trails) {
             // Ids of the frame, and the ends of trails
             (_, Some(_)) => beside + 32 * n,
             (true, None) => beside,
@@ -112,7 +112,7 @@ impl MemoryModel<'_> {
 
     /// Bytes of the places of particles in their file, if some of them are not drawn.
     fn file_indices(&self, frame: &FrameSize) -> u64 {
-        if self.setup.picture.selection.is_all() { 0 } else { 4 * frame.particles }
+        if self.setup.picture.particles.selection.is_all() { 0 } else { 4 * frame.particles }
     }
 
     /// Memory that the allocator retains after the buffers for reading a frame are freed: all of it, if there are
@@ -138,14 +138,15 @@ impl MemoryModel<'_> {
             return self.held_file(frame);
         }
         let channels = self.setup.picture.render.channels;
-        let color = self.setup.picture.color.bytes();
+        let color = self.setup.picture.particles.color.bytes();
         // Particles that are moved need an explicit id.
         let picture = &self.setup.picture;
-        let has_ids = self.has_ids || picture.surface.spray || !picture.selection.is_all();
+        let has_ids =
+            self.has_ids || picture.surface.spray || !picture.particles.selection.is_all();
         let ids = picture.needs_ids() && has_ids;
         let each = [
             (true, color),
-            (picture.opacity.is_by_particle(), 4),
+            (picture.particles.opacity.is_by_particle(), 4),
             (ids, 4),
             (channels.needs_velocities() && self.has_velocities, 12),
             // Whether there are parts is not known in advance

@@ -154,7 +154,7 @@ fn arrows_trails_and_bonds_are_counted() {
     let mut setup = setup();
     let alone = |setup: &Setup| MemoryModel::new(setup).alone(&plain(1_000_000));
     let none = alone(&setup);
-    setup.picture.arrows.push(ArrowStyle {
+    setup.picture.things.arrows.push(ArrowStyle {
         attribute: "velocity".to_owned(),
         scale: 1.0,
         radius: 0.1,
@@ -167,12 +167,12 @@ fn arrows_trails_and_bonds_are_counted() {
     let each = |rods: u64, bytes: u64| rods * 1_000_000 * bytes;
     let all = alone(&setup);
     assert!(all.total() >= none.total() + each(2, 100), "{none}\n{all}");
-    setup.picture.arrows[0].every = 100;
+    setup.picture.things.arrows[0].every = 100;
     let few = alone(&setup);
     assert!(few.total() < none.total() + each(2, 100) / 10, "{none}\n{few}");
     // A rod for each frame, and another frame beside the one that is read
-    setup.picture.arrows.clear();
-    setup.picture.trails = Some(TrailStyle {
+    setup.picture.things.arrows.clear();
+    setup.picture.things.trails = Some(TrailStyle {
         frames: 5,
         radius: 0.1,
         every: 1,
@@ -181,8 +181,8 @@ fn arrows_trails_and_bonds_are_counted() {
     });
     let trails = alone(&setup);
     assert!(trails.total() >= none.total() + each(5, 100), "{none}\n{trails}");
-    setup.picture.trails = None;
-    setup.picture.bonds = Some(BondStyle {
+    setup.picture.things.trails = None;
+    setup.picture.things.bonds = Some(BondStyle {
         rule: BondRule::Distance(1.0),
         radius: 0.1,
         color: None,
@@ -215,7 +215,7 @@ fn shared_meshes_are_built_before_the_first_frame() {
     };
     setup.picture.render.width = 8;
     setup.picture.render.height = 8;
-    setup.picture.meshes = vec![picture.clone(), picture];
+    setup.picture.things.meshes = vec![picture.clone(), picture];
     // The second one is built next to the first
     let building = MemoryModel::new(&setup).alone(&plain(10));
     assert_eq!(building.surface, tree.bytes() as u64 + tree.building_bytes());
