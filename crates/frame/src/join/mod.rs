@@ -14,6 +14,8 @@ pub use plan::{JoinPlan, JoinedColumn, plan};
 
 use std::collections::BTreeMap;
 
+use spherule_files::one_line;
+
 use crate::bonds::Bond;
 use crate::{Attribute, AttributeData, MemoryBudget, ParseError, Positions, RawParticles};
 
@@ -39,10 +41,16 @@ pub struct Part {
 /// # Errors
 /// [`ParseError::TooLarge`] if the joined columns do not fit into `budget`.
 pub fn join(mut parts: Vec<Part>, budget: MemoryBudget) -> Result<RawParticles, ParseError> {
+    // Leave out columns whose numbers belong to nothing
+    let mut notes = Vec::new();
+    for part in &mut parts {
+        remove_ragged(part, &mut notes);
+    }
     // Find out which columns there are
     let layouts: Vec<PartColumns<'_>> = parts.iter().map(PartColumns::of).collect();
     let count = layouts.iter().map(|part| part.count).fold(0, u64::saturating_add);
-    let JoinPlan { columns, notes } = plan(&layouts);
+    let JoinPlan { columns, notes: of_plan } = plan(&layouts);
+    notes.extend(of_plan);
     let width = |column: &JoinedColumn| (column.components * column.scalar.size()) as u64;
     let need = columns.iter().map(width).fold(0, u64::saturating_add).saturating_mul(count);
     budget.check(need, "the joined columns of its parts are")?;
@@ -116,6 +124,22 @@ impl<'a> PartColumns<'a> {
         let count = part.particles.positions.len() as u64;
         Self { name: &part.name, count, columns: columns.collect() }
     }
+}
+
+/// Removes columns of `part` that have more or fewer numbers than its particles.
+fn remove_ragged(part: &mut Part, notes: &mut Vec<String>) {
+    let Part { name, particles, .. } = part;
+    let count = particles.positions.len();
+    particles.attributes.retain(|attribute| {
+        let (len, need) = (attribute.data.len(), attribute.components.saturating_mul(count));
+        if len != need && notes.len() < MAX_NOTES {
+            notes.push(one_line(format!(
+                "`{}` of part `{name}` has {len} numbers, and {count} particles need {need}: left out",
+                attribute.name
+            )));
+        }
+        len == need
+    });
 }
 
 /// The numbers of `column`, taken from `parts` with these `counts` of particles.

@@ -48,6 +48,8 @@ fn columns_are_joined_in_a_wide_enough_type() {
     ];
     assert_eq!(all.attributes, expected);
     assert_eq!(all.notes, Vec::<String>::new());
+    let names = [(0, "a".to_owned()), (3, "b".to_owned())];
+    assert_eq!(all.labels[PART], names.into_iter().collect());
 }
 
 #[test]
@@ -93,6 +95,14 @@ fn the_first_of_two_columns_of_one_name_is_used() {
         assert_eq!(all.attributes[0].data.get_f64(0), 1.0);
         assert_eq!(all.notes, ["several columns `a` in part `p`: the first is used"]);
     }
+}
+
+#[test]
+fn columns_of_another_length_are_left_out() {
+    let ragged = vec![attribute("a", 1, vec![1_u8, 2]), attribute("v", 3, vec![0_f32; 3])];
+    let all = joined(vec![part(0, "p", 1, ragged)]);
+    assert_eq!((all.attributes.len(), all.attributes[0].name.as_str()), (1, "v"));
+    assert_eq!(all.notes, ["`a` of part `p` has 2 numbers, and 1 particles need 1: left out"]);
 }
 
 #[test]
