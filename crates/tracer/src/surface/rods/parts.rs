@@ -65,7 +65,7 @@ impl Part {
         let reach = match caps {
             Caps::Round => half + radius,
             // Around the circles at both ends
-            Caps::Open | Caps::Flat if self.count == 1 => half.hypot(radius),
+            Caps::Open | Caps::Flat if self.count == 1 => (half * half + radius * radius).sqrt(),
             // A frustum is within the spheres along its axis
             Caps::Open | Caps::Flat => half + radius,
         };
