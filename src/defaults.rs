@@ -413,6 +413,8 @@ impl Rules<'_> {
         match &self.manifest.material.color {
             ColorSetting::Rgb(_) => false,
             ColorSetting::Mapped(_) => true,
+            // Glass and water are not seen in the colours of their particles
+            ColorSetting::Auto if self.manifest.material.is_clear() => false,
             ColorSetting::Auto => {
                 self.has_set("material.color.attribute") || self.facts.has_velocities
             }

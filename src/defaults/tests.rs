@@ -172,6 +172,15 @@ fn planes_are_seen_from_their_front_in_flat_light() {
 }
 
 #[test]
+fn clear_particles_have_no_legend_of_colours_that_are_not_seen() {
+    let fluid = Facts { has_velocities: true, ..facts() };
+    assert!(has_legend(&of("", &fluid)) && has_legend(&of("material.type = \"metal\"", &fluid)));
+    for clear in ["type = \"glass\"", "type = \"water\"", "transmission = 0.5"] {
+        assert!(!has_legend(&of(&format!("material.{clear}"), &fluid)), "{clear}");
+    }
+}
+
+#[test]
 fn looks_have_their_own_rules() {
     let mut fluid = facts();
     fluid.has_velocities = true;

@@ -90,6 +90,11 @@ const GLASS: f32 = 1.5;
 const WATER: f32 = 1.333;
 
 impl Material {
+    /// Whether light passes through the particles.
+    pub fn is_clear(&self) -> bool {
+        self.resolved(Fresnel::Exact).transmission > 0.0
+    }
+
     /// The first term of the thesis's model with another value than its default. All but `transmission` have no effect
     /// on opaque surfaces in path tracing.
     pub(super) fn changed_term(&self) -> Option<&'static str> {
