@@ -138,6 +138,10 @@ fn compare(name: &str) -> usize {
                 compare_array(&place, expected, components, &data);
                 count += 1;
             }
+            // What only some parts have is NaN in the others, and not in the lists of the references
+            let is_whole =
+                |data: &AttributeData| (0..data.len()).all(|i| !data.get_f64(i).is_nan());
+            found.retain(|_, (_, data)| is_whole(data));
             let more: Vec<String> = found.into_keys().collect();
             assert!(more.is_empty(), "{place} also has {more:?}");
         }
