@@ -79,7 +79,7 @@ pub struct ImageTask {
     pub image: PathBuf,
     /// Path of the optional PNG.
     pub preview: Option<PathBuf>,
-    /// The files of the meshes that each frame has for itself, in the order of [`Picture::meshes`].
+    /// The files of the meshes that each frame has for itself, in the order of [`Things::meshes`].
     pub meshes: Vec<PathBuf>,
     /// The meshes that those of the frame move to, with motion blur.
     pub next_meshes: Option<NextMeshes>,
