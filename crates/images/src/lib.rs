@@ -1,6 +1,6 @@
 //! Pictures in and out of files.
 //!
-//! - [`file`]: which format an image file has, and what may be wrong with it.
+//! - [`file`](mod@file): which format an image file has, and what may be wrong with it.
 //! - [`hdr`]: images as input, in linear values: environments and pictures on the ground.
 //! - [`picture`]: finished pictures as input: rows of 8 bits, planes of OpenEXR, scaling.
 //! - [`overlay`]: colour bars, text, scale bars and axes over a finished picture.
