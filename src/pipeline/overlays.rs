@@ -41,16 +41,16 @@ impl Setup {
         self.picture.files.preview.page.map_or([0, 0], |own| own.page.at)
     }
 
+    /// The page of a film of this size.
+    fn page_of(&self, width: u32, height: u32) -> Page {
+        let own = self.picture.files.preview.page;
+        own.map_or_else(|| Page::whole(width, height), |own| own.page)
+    }
+
     /// The drawing commands of the overlays of an image with one eye.
     pub(super) fn drawings_of(&self, frame: &TracedFrame) -> Vec<Drawing> {
         let (width, height) = (frame.film.width, frame.film.height);
-        let page = self
-            .picture
-            .files
-            .preview
-            .page
-            .map(|own| own.page)
-            .unwrap_or(Page::whole(width, height));
+        let page = self.page_of(width, height);
         marks(&self.picture.files.overlays, &page, &self.frame_view(frame))
     }
 
@@ -63,13 +63,7 @@ impl Setup {
         // Each eye has its own, with which they appear at the distance of the screen
         let [columns, rows] = frame.camera.eyes();
         let (width, height) = (frame.film.width / columns, frame.film.height / rows);
-        let page = self
-            .picture
-            .files
-            .preview
-            .page
-            .map(|own| own.page)
-            .unwrap_or(Page::whole(width, height));
+        let page = self.page_of(width, height);
         let mut sprites = draw(overlays, &page, &self.frame_view(frame));
         if [columns, rows] != [1, 1] {
             let shift = [width * (columns - 1), height * (rows - 1)].map(u32::cast_signed);

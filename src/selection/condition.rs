@@ -329,7 +329,7 @@ impl Parser {
         }
     }
 
-    /// The list of texts and numbers behind `in`, one of which the value `of` is equal to.
+    /// The list of texts and numbers after `in`: the value `of` must equal one of them.
     fn list(&mut self, of: usize) -> Parsed {
         self.require("(", "after `in`, as in `element in (C, N)`")?;
         for item in 0.. {

@@ -169,7 +169,7 @@ impl Facts {
     /// frame that cannot be read, which is reported later.
     pub fn of(sequence: &Sequence) -> Self {
         let count = sequence.frames().len();
-        let place = Place { is_only_frame: count == 1, angstrom: sequence.angstrom() };
+        let place = FrameContext { is_only_frame: count == 1, angstrom: sequence.angstrom() };
         let read = |index: usize| FrameSample::of(sequence, index, (QUESTION, 1)).ok();
         let mut facts =
             read(count / 2).map_or_else(Self::default, |sample| Self::of_sample(&sample, place));
@@ -192,10 +192,10 @@ impl Facts {
         particles: &RawParticles<PositionSlice<'_>>,
     ) -> Result<Self, FrameError> {
         let sample = FrameSample::of_memory(name, particles, QUESTION)?;
-        Ok(Self::of_sample(&sample, Place { is_only_frame: true, angstrom: 1.0 }))
+        Ok(Self::of_sample(&sample, FrameContext { is_only_frame: true, angstrom: 1.0 }))
     }
 
-    fn of_sample(sample: &FrameSample, place: Place) -> Self {
+    fn of_sample(sample: &FrameSample, place: FrameContext) -> Self {
         let raw = &sample.particles;
         let touching = sample.spacing.map(|spacing| f64::from(spacing.touching));
         let velocity = velocity_of(&raw.attributes);
@@ -260,7 +260,7 @@ impl Facts {
 
 /// What is known of a frame beside its particles.
 #[derive(Debug, Clone, Copy)]
-struct Place {
+struct FrameContext {
     /// Whether the sequence has no other frames.
     is_only_frame: bool,
     /// Length of an angstrom in the unit of the positions.

@@ -64,7 +64,7 @@ impl Contents<'_> {
     }
 
     /// Walls that rest around others that move. In several frames, the particles that rest at first may move later; walls
-    /// are told by their places in the file.
+    /// are identified by their index in the file.
     fn at_rest(&self) -> Option<Tank> {
         let members = self.positions.iter().zip(self.is_moving).map(|(position, is_moving)| {
             Member { value: i64::from(*is_moving), position: *position, is_moving: *is_moving }

@@ -113,6 +113,31 @@ impl Hierarchy {
     }
 }
 
+/// The distances at which `ray` enters and leaves the box around `center`, which reaches `half` its size and `padding` in
+/// each direction; None if it misses the box.
+pub(super) fn range_in_box(
+    ray: &Ray,
+    center: DVec3,
+    half: DVec3,
+    padding: f64,
+) -> Option<[f64; 2]> {
+    let (origin, direction) = (ray.origin.as_dvec3() - center, ray.direction.as_dvec3());
+    let mut range = [f64::from(ray.t_min), f64::from(ray.t_max)];
+    for axis in 0..3 {
+        let half = half[axis] + padding;
+        let slab = [-half - origin[axis], half - origin[axis]];
+        if direction[axis] == 0.0 {
+            if slab[0] > 0.0 || slab[1] < 0.0 {
+                return None;
+            }
+            continue;
+        }
+        let [a, b] = slab.map(|x| x / direction[axis]);
+        range = [range[0].max(a.min(b)), range[1].min(a.max(b))];
+    }
+    (range[0] <= range[1]).then_some(range)
+}
+
 /// The coordinates of the hierarchy: the box of all primitives is centred, and its longest side is 2.
 struct Space {
     center: DVec3,
@@ -132,33 +157,14 @@ impl Space {
         ((point - self.center) * self.scale).as_vec3()
     }
 
-    /// The distances at which a ray enters and leaves the box of all primitives; None if it misses the box.
-    fn range(&self, ray: &Ray) -> Option<[f64; 2]> {
-        let (origin, direction) = (ray.origin.as_dvec3() - self.center, ray.direction.as_dvec3());
-        let padding = f64::from(PADDING) / self.scale;
-        let mut range = [f64::from(ray.t_min), f64::from(ray.t_max)];
-        for axis in 0..3 {
-            let half = self.half[axis] + padding;
-            let slab = [-half - origin[axis], half - origin[axis]];
-            if direction[axis] == 0.0 {
-                if slab[0] > 0.0 || slab[1] < 0.0 {
-                    return None;
-                }
-                continue;
-            }
-            let [a, b] = slab.map(|x| x / direction[axis]);
-            range = [range[0].max(a.min(b)), range[1].min(a.max(b))];
-        }
-        (range[0] <= range[1]).then_some(range)
-    }
-
     /// The ray in these coordinates. It starts close to the box of all primitives, since its rounding grows with the
     /// distance from its origin. The second value is the distance at which it starts.
     fn ray(&self, ray: &Ray) -> Option<(obvhs::ray::Ray, f64)> {
         if !(ray.origin.is_finite() && ray.direction.is_finite()) {
             return None;
         }
-        let [start, end] = self.range(ray)?;
+        let padding = f64::from(PADDING) / self.scale;
+        let [start, end] = range_in_box(ray, self.center, self.half, padding)?;
         let start = start - LEAD / self.scale;
         let origin = self.point(ray.origin.as_dvec3() + ray.direction.as_dvec3() * start);
         // Without negative zeros, whose reciprocal has the wrong sign for `obvhs`

@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 
 use super::parts::Part;
 use super::{Caps, Rod, double};
-use crate::surface::hierarchy::single;
+use crate::surface::hierarchy::{range_in_box, single};
 use spherule_tree::accel::{
     BuildBytes, BuildSettings, SphereRadius, Spheres, Structure, TreeBuilder, predicted_bytes,
 };
@@ -140,22 +140,7 @@ impl PartTree {
         if !(ray.origin.is_finite() && ray.direction.is_finite() && ray.t_max > ray.t_min) {
             return None;
         }
-        let (origin, direction) = (double(ray.origin) - self.center, double(ray.direction));
-        let padding = PADDING * self.half.length();
-        let mut range = [f64::from(ray.t_min), f64::from(ray.t_max)];
-        for axis in 0..3 {
-            let half = self.half[axis] + padding;
-            let slab = [-half - origin[axis], half - origin[axis]];
-            if direction[axis] == 0.0 {
-                if slab[0] > 0.0 || slab[1] < 0.0 {
-                    return None;
-                }
-                continue;
-            }
-            let [a, b] = slab.map(|x| x / direction[axis]);
-            range = [range[0].max(a.min(b)), range[1].min(a.max(b))];
-        }
-        (range[0] <= range[1]).then_some(range)
+        range_in_box(ray, self.center, self.half, PADDING * self.half.length())
     }
 }
 
