@@ -287,7 +287,8 @@ fn walk_lanes<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
             // Few rays enter the node, or it is a block: traverse the subtree with each ray alone
             _ => {
                 for lane in lanes_in(alive) {
-                    let ray = kernel.prepare(&rays.ray(lane), view.radius, view.padding);
+                    let (ray, inverse) = (rays.ray(lane), slabs.inverse(lane));
+                    let ray = kernel.prepare(&ray, inverse, view.radius, view.padding);
                     let subtree = Subtree { kernel, tree, code, stack: &mut single_stack };
                     query.search(subtree, &ray, hits, lane);
                 }

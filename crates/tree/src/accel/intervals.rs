@@ -110,7 +110,7 @@ impl TreeTask for Entry<'_> {
         tree: Resolved<'a, T, L>,
     ) -> Option<TreeHit> {
         let (ray, view) = (self.ray, tree.view);
-        let prepared = kernel.prepare(ray, view.radius, view.padding);
+        let prepared = view.prepare(kernel, ray);
         let slots = view.slot_count();
         let mut best: Option<TreeHit> = None;
         walk(
@@ -171,7 +171,7 @@ impl TreeTask for Contains<'_> {
         tree: Resolved<'a, T, L>,
     ) -> bool {
         let view = tree.view;
-        let prepared = kernel.prepare(self.ray, view.radius, view.padding);
+        let prepared = view.prepare(kernel, self.ray);
         let slots = view.slot_count();
         let mut is_inside = false;
         walk(
@@ -290,7 +290,7 @@ impl TreeTask for Exit<'_> {
             return TreeExit::NotInside;
         }
         // Prepare the ray with the current end as `t_min`, so that boxes that lie before it are culled.
-        let from = |t_min: f32| kernel.prepare(&Ray { t_min, ..*ray }, view.radius, view.padding);
+        let from = |t_min: f32| view.prepare(kernel, &Ray { t_min, ..*ray });
         let limit = ray.t_max.next_down();
         let mut union = UnionEnd { end: ray.t_min, slot: None };
         let mut prepared = from(union.end);

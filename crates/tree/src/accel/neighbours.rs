@@ -5,7 +5,7 @@ use std::borrow::Borrow;
 use glam::Vec3;
 
 use super::leaves::Leaves;
-use super::simd::PacketKernel;
+use super::simd::{PacketKernel, finite_inverse};
 use super::topology::Topology;
 use super::view::{Resolved, TreeTask, TreeView};
 use super::walk::walk;
@@ -40,7 +40,7 @@ impl<F: FnMut(u32, Vec3) -> bool> TreeTask for Neighbours<F> {
         // Use a ray of length zero and boxes padded by `reach`: all boxes contain the centres of their particles, so
         // the ray enters every box with a centre within `reach`
         let ray = Ray::new(point, Vec3::X);
-        let prepared = kernel.prepare(&ray, 0.0, reach);
+        let prepared = kernel.prepare(&ray, finite_inverse(ray.direction), 0.0, reach);
         let slots = tree.view.slot_count();
         walk(
             kernel,

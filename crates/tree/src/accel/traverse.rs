@@ -43,6 +43,12 @@ impl TreeView<'_> {
         self.run(Nearest { ray })
     }
 
+    /// `ray` as the kernel needs it.
+    #[inline(always)]
+    pub(super) fn prepare<K: PacketKernel>(&self, kernel: K, ray: &Ray) -> K::Ray {
+        kernel.prepare(ray, finite_inverse(ray.direction), self.radius, self.padding)
+    }
+
     /// Whether the ray enters the box of all spheres: true for all rays that hit any sphere, and for some others.
     pub(super) fn may_intersect(&self, ray: &Ray) -> bool {
         let inverse = finite_inverse(ray.direction);
@@ -119,7 +125,7 @@ impl TreeTask for Nearest<'_> {
         let (ray, view) = (self.ray, tree.view);
         let mut search = NearestOfRay {
             tree,
-            ray: &kernel.prepare(ray, view.radius, view.padding),
+            ray: &view.prepare(kernel, ray),
             best: TreeHit {
                 // `t_max` is exclusive, but limits are inclusive because of ties.
                 t: ray.t_max.next_down(),
@@ -200,8 +206,7 @@ impl TreeTask for AnyHit<'_> {
         tree: Resolved<'a, T, L>,
     ) -> bool {
         let (ray, view) = (self.ray, tree.view);
-        let mut search =
-            AnyOfRay { tree, ray: &kernel.prepare(ray, view.radius, view.padding), found: false };
+        let mut search = AnyOfRay { tree, ray: &view.prepare(kernel, ray), found: false };
         walk_with(kernel, tree, &mut search, ray.t_max.next_down());
         search.found
     }
@@ -265,7 +270,7 @@ impl<F: FnMut(TreeCrossing) -> bool> TreeTask for Crossings<'_, F> {
         // Visit both ends of each chord that lie within the ray
         let mut search = ChordsOfRay {
             tree,
-            ray: &kernel.prepare(ray, tree.view.radius, tree.view.padding),
+            ray: &tree.view.prepare(kernel, ray),
             visit: |chord: TreeChord| {
                 chord.ends.into_iter().all(|t| {
                     let is_within = t >= ray.t_min && t < ray.t_max;

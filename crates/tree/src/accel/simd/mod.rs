@@ -34,6 +34,7 @@ const LINE: usize = 64;
 const MIN_DIRECTION: f32 = 1e-7;
 
 /// Inverse direction with finite components.
+#[inline(always)]
 pub(super) fn finite_inverse(direction: Vec3) -> Vec3 {
     direction.map(|d| if d.abs() < MIN_DIRECTION { MIN_DIRECTION.copysign(d) } else { d }).recip()
 }
@@ -46,9 +47,9 @@ pub(super) trait Kernel: Copy {
     /// are replaced by the slot of the child.
     type Keys: Copy;
 
-    /// Prepares `ray` for spheres of a common `radius` (0 for a radius per sphere) in boxes that must be extended by
-    /// `padding` on every side.
-    fn prepare(self, ray: &Ray, radius: f32, padding: f32) -> Self::Ray;
+    /// Prepares `ray` with its [`finite_inverse`] direction for spheres of a common `radius` (0 for a radius per
+    /// sphere) in boxes that must be extended by `padding` on every side.
+    fn prepare(self, ray: &Ray, inverse: Vec3, radius: f32, padding: f32) -> Self::Ray;
 
     /// Tests the children of `node` up to distance `limit`. Returns the number of children that the ray enters, and
     /// their keys in slot order.

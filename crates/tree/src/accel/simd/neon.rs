@@ -8,8 +8,10 @@
 use std::arch::aarch64::*;
 use std::arch::asm;
 
+use glam::Vec3;
+
 use super::loop_packet::LoopPackets;
-use super::{BlockCrossings, Kernel, LINE, SLAB_SLACK, finite_inverse};
+use super::{BlockCrossings, Kernel, LINE, SLAB_SLACK};
 use crate::blocks::{BLOCK_SIZE, Block, BlockRadii};
 use crate::blocks::{Node, WIDTH};
 use crate::ray::Ray;
@@ -34,8 +36,7 @@ pub(super) struct NeonRay {
 }
 
 impl NeonRay {
-    fn new(ray: &Ray, radius: f32, padding: f32) -> Self {
-        let inverse = finite_inverse(ray.direction);
+    fn new(ray: &Ray, inverse: Vec3, radius: f32, padding: f32) -> Self {
         let reach = inverse.abs() * padding;
         Self {
             ray: *ray,
@@ -159,8 +160,8 @@ impl Kernel for Neon {
     type Keys = [u32; WIDTH];
 
     #[inline(always)]
-    fn prepare(self, ray: &Ray, radius: f32, padding: f32) -> NeonRay {
-        NeonRay::new(ray, radius, padding)
+    fn prepare(self, ray: &Ray, inverse: Vec3, radius: f32, padding: f32) -> NeonRay {
+        NeonRay::new(ray, inverse, radius, padding)
     }
 
     #[inline(always)]

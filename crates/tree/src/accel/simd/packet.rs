@@ -1,5 +1,7 @@
 //! Tests of a packet of 16 rays, for one instruction set.
 
+use glam::Vec3;
+
 use super::super::hits::TreeHits;
 use super::beam::inverses;
 use super::{Beam, Kernel};
@@ -52,6 +54,12 @@ impl LaneSlabs {
             *t_min = larger(*t_min, 0.0);
         }
         slabs
+    }
+
+    /// The inverse direction of the ray in `lane`.
+    #[inline(always)]
+    pub(in super::super) fn inverse(&self, lane: usize) -> Vec3 {
+        self.inverse.map(|axis| axis[lane]).into()
     }
 }
 

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::loop_packet::{LoopPackets, keys_of};
-use super::{BlockCrossings, Kernel, SLAB_SLACK, finite_inverse};
+use super::{BlockCrossings, Kernel, SLAB_SLACK};
 use crate::blocks::{BLOCK_SIZE, Block, BlockRadii};
 use crate::blocks::{Node, WIDTH};
 use crate::ray::Ray;
@@ -57,8 +57,8 @@ impl Kernel for Portable {
     type Ray = PreparedRay;
     type Keys = [u32; WIDTH];
 
-    fn prepare(self, ray: &Ray, radius: f32, padding: f32) -> PreparedRay {
-        PreparedRay { ray: *ray, inverse: finite_inverse(ray.direction), radius, padding }
+    fn prepare(self, ray: &Ray, inverse: Vec3, radius: f32, padding: f32) -> PreparedRay {
+        PreparedRay { ray: *ray, inverse, radius, padding }
     }
 
     fn test_node(self, ray: &PreparedRay, node: &Node, limit: f32) -> (usize, [u32; WIDTH]) {

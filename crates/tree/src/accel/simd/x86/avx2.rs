@@ -2,6 +2,8 @@
 
 use std::arch::x86_64::*;
 
+use glam::Vec3;
+
 use super::super::{BlockCrossings, Kernel};
 use super::decode;
 use super::lanes::{first_two, keys_of, keys_to_array, prefetch};
@@ -99,8 +101,12 @@ impl Kernel for Avx2 {
     type Keys = __m256i;
 
     #[inline(always)]
-    fn prepare(self, ray: &Ray, radius: f32, padding: f32) -> Avx2Ray {
-        Avx2Ray { ray: *ray, slab: SlabRay::new(ray, padding), radius_squared: radius * radius }
+    fn prepare(self, ray: &Ray, inverse: Vec3, radius: f32, padding: f32) -> Avx2Ray {
+        Avx2Ray {
+            ray: *ray,
+            slab: SlabRay::new(ray, inverse, padding),
+            radius_squared: radius * radius,
+        }
     }
 
     #[inline(always)]

@@ -2,6 +2,8 @@
 
 use std::arch::x86_64::*;
 
+use glam::Vec3;
+
 use super::super::{BlockCrossings, Kernel};
 use super::decode;
 use super::lanes::{first_two, keys_of, keys_to_array, prefetch};
@@ -91,8 +93,12 @@ impl Kernel for Avx512 {
     type Keys = __m256i;
 
     #[inline(always)]
-    fn prepare(self, ray: &Ray, radius: f32, padding: f32) -> Avx512Ray {
-        Avx512Ray { ray: *ray, slab: SlabRay::new(ray, padding), radius_squared: radius * radius }
+    fn prepare(self, ray: &Ray, inverse: Vec3, radius: f32, padding: f32) -> Avx512Ray {
+        Avx512Ray {
+            ray: *ray,
+            slab: SlabRay::new(ray, inverse, padding),
+            radius_squared: radius * radius,
+        }
     }
 
     /// Uses 256 bits as AVX2 does: a node has eight children, and the 512-bit form (both sides of an axis in one

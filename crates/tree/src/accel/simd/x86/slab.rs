@@ -2,7 +2,9 @@
 
 use std::arch::x86_64::*;
 
-use super::super::{SLAB_SLACK, finite_inverse};
+use glam::Vec3;
+
+use super::super::SLAB_SLACK;
 use super::lanes::{absolute, broadcast, planes};
 use crate::blocks::Node;
 use crate::ray::Ray;
@@ -28,8 +30,7 @@ struct SlabNode {
 
 impl SlabRay {
     #[inline(always)]
-    pub(super) fn new(ray: &Ray, padding: f32) -> Self {
-        let inverse = finite_inverse(ray.direction);
+    pub(super) fn new(ray: &Ray, inverse: Vec3, padding: f32) -> Self {
         let reach = inverse.abs() * padding;
         // SAFETY: SSE2 is part of x86-64.
         unsafe {
