@@ -15,8 +15,18 @@ use super::{Caps, Rod, double};
 pub(super) struct Crossing {
     /// Distance along the ray; -infinity or infinity where an interval has no end.
     pub(super) t: f64,
-    /// Outward unit normal.
-    pub(super) normal: DVec3,
+    face: Face,
+}
+
+/// A part of the surface of a rod. Its normal is computed only at the nearest crossing of a ray.
+#[derive(Debug, Clone, Copy)]
+enum Face {
+    /// The cone.
+    Side,
+    /// The disc at an end.
+    Disc(usize),
+    /// The sphere around an end.
+    Ball(usize),
 }
 
 /// Where a ray enters a body and where it leaves it.
@@ -74,10 +84,7 @@ impl Body {
 
     /// The crossings of a ray with the surface, in the order of distance.
     pub(super) fn crossings(&self, origin: DVec3, direction: DVec3) -> [Option<Crossing>; 2] {
-        // Start at the point of the ray closest to the rod, so that no digits are lost far from it
-        let center = 0.5 * (self.ends[0] + self.ends[1]);
-        let start = (center - origin).dot(direction) / direction.length_squared();
-        let line = Line { origin: origin + start * direction, direction };
+        let (line, start) = self.line(origin, direction);
         let found = match self.caps {
             Caps::Open => self.open(&line),
             Caps::Flat => self.flat(&line),
@@ -87,6 +94,30 @@ impl Body {
             let crossing = crossing.filter(|crossing| crossing.t.is_finite())?;
             Some(Crossing { t: crossing.t + start, ..crossing })
         })
+    }
+
+    /// The outward unit normal at a crossing of the ray.
+    pub(super) fn normal(&self, origin: DVec3, direction: DVec3, crossing: &Crossing) -> DVec3 {
+        let (line, start) = self.line(origin, direction);
+        let t = crossing.t - start;
+        match (crossing.face, &self.side) {
+            (Face::Side, Some(side)) => side.normal(&line, t),
+            (Face::Disc(0), Some(side)) => -side.axis,
+            (Face::Disc(_), Some(side)) => side.axis,
+            (Face::Ball(end), _) => {
+                (line.origin + t * direction - self.ends[end]) / self.radii[end]
+            }
+            // Only the frustum has sides and discs
+            (Face::Side | Face::Disc(_), None) => DVec3::ZERO,
+        }
+    }
+
+    /// The line of a ray, from the point closest to the rod, so that no digits are lost far from it; and the distance
+    /// of that point along the ray.
+    fn line(&self, origin: DVec3, direction: DVec3) -> (Line, f64) {
+        let center = 0.5 * (self.ends[0] + self.ends[1]);
+        let start = (center - origin).dot(direction) / direction.length_squared();
+        (Line { origin: origin + start * direction, direction }, start)
     }
 
     fn open(&self, line: &Line) -> [Option<Crossing>; 2] {
@@ -106,7 +137,10 @@ impl Body {
     }
 
     fn round(&self, line: &Line) -> Option<Interval> {
-        let sphere = |end: usize| sphere(line, self.ends[end], self.radii[end]);
+        let sphere = |end: usize| {
+            let [enter, leave] = sphere(line, self.ends[end], self.radii[end])?;
+            Some([enter, leave].map(|t| Crossing { t, face: Face::Ball(end) }))
+        };
         let side = self.side.as_ref().and_then(|side| side.interval(line));
         let parts = [sphere(0), sphere(1), side].into_iter().flatten();
         parts.reduce(|a, b| [nearer(a[0], b[0]), farther(a[1], b[1])])
@@ -127,8 +161,8 @@ fn farther(a: Crossing, b: Crossing) -> Crossing {
     if b.t > a.t { b } else { a }
 }
 
-/// The interval inside a sphere.
-fn sphere(line: &Line, center: DVec3, radius: f64) -> Option<Interval> {
+/// The distances between which a line is inside a sphere.
+fn sphere(line: &Line, center: DVec3, radius: f64) -> Option<[f64; 2]> {
     let offset = line.origin - center;
     let direction = line.direction;
     let along = -offset.dot(direction) / direction.length_squared();
@@ -138,8 +172,7 @@ fn sphere(line: &Line, center: DVec3, radius: f64) -> Option<Interval> {
         return None;
     }
     let half = half.sqrt();
-    let crossing = |t: f64| Crossing { t: along + t, normal: (across + t * direction) / radius };
-    Some([crossing(-half), crossing(half)])
+    Some([along - half, along + half])
 }
 
 impl Frustum {
@@ -175,6 +208,20 @@ impl Frustum {
         })
     }
 
+    /// The parts of a line along the axis, of its origin and its direction, and the parts across.
+    fn along_and_across(&self, line: &Line) -> ([f64; 2], [DVec3; 2]) {
+        let offset = line.origin - self.start;
+        let (height, rise) = (offset.dot(self.axis), line.direction.dot(self.axis));
+        ([height, rise], [offset - height * self.axis, line.direction - rise * self.axis])
+    }
+
+    /// The outward unit normal of the cone at a point of a line.
+    fn normal(&self, line: &Line, t: f64) -> DVec3 {
+        let (_, [across, drift]) = self.along_and_across(line);
+        let out = (across + t * drift).normalize_or_zero();
+        (out - self.slope * self.axis).normalize_or(self.axis)
+    }
+
     /// The interval between the planes of its ends and inside its cone.
     fn interval(&self, line: &Line) -> Option<Interval> {
         let (cone, slab) = (self.cone(line)?, self.slab(line)?);
@@ -186,8 +233,8 @@ impl Frustum {
     fn slab(&self, line: &Line) -> Option<Interval> {
         let height = (line.origin - self.start).dot(self.axis);
         let rise = line.direction.dot(self.axis);
-        let bottom = |t| Crossing { t, normal: -self.axis };
-        let top = |t| Crossing { t, normal: self.axis };
+        let bottom = |t| Crossing { t, face: Face::Disc(0) };
+        let top = |t| Crossing { t, face: Face::Disc(1) };
         if rise == 0.0 {
             let is_inside = (0.0..=self.length).contains(&height);
             return is_inside.then(|| [bottom(f64::NEG_INFINITY), top(f64::INFINITY)]);
@@ -198,28 +245,20 @@ impl Frustum {
 
     /// The interval inside the double cone that contains the frustum, where it may be between the planes of the ends.
     fn cone(&self, line: &Line) -> Option<Interval> {
-        // Divide the line into its parts along the axis and across
-        let offset = line.origin - self.start;
-        let (height, rise) = (offset.dot(self.axis), line.direction.dot(self.axis));
-        let across = offset - height * self.axis;
-        let drift = line.direction - rise * self.axis;
+        let ([height, rise], [across, drift]) = self.along_and_across(line);
         // The squared distance from the axis minus the squared radius: a t^2 + 2 b t + c
         let (radius, growth) = (self.radius + self.slope * height, self.slope * rise);
         let a = drift.length_squared() - growth * growth;
         let b = across.dot(drift) - radius * growth;
         let c = across.length_squared() - radius * radius;
-        let crossing = |t: f64| {
-            let out = (across + t * drift).normalize_or_zero();
-            Crossing { t, normal: (out - self.slope * self.axis).normalize_or(self.axis) }
-        };
-        let end = |t| Crossing { t, normal: self.axis };
+        let crossing = |t| Crossing { t, face: Face::Side };
         let discriminant = b * b - a * c;
         if discriminant < 0.0 {
             return None;
         }
         // A line along the axis of a cylinder never leaves it
         if a == 0.0 && b == 0.0 {
-            return (c <= 0.0).then(|| [end(f64::NEG_INFINITY), end(f64::INFINITY)]);
+            return (c <= 0.0).then(|| [crossing(f64::NEG_INFINITY), crossing(f64::INFINITY)]);
         }
         // The roots without cancellation
         let q = -(b + discriminant.sqrt().copysign(b));
@@ -236,9 +275,9 @@ impl Frustum {
         // A line steeper than the cone is inside before its first crossing on one side, and behind its last one on
         // the other
         Some(if growth > 0.0 {
-            [crossing(last), end(f64::INFINITY)]
+            [crossing(last), crossing(f64::INFINITY)]
         } else {
-            [end(f64::NEG_INFINITY), crossing(first)]
+            [crossing(f64::NEG_INFINITY), crossing(first)]
         })
     }
 }

@@ -85,11 +85,12 @@ struct Nearest {
 impl RodSurface<'_> {
     /// The intersection of a ray with the rod that it hits first.
     fn intersection(&self, ray: &DoubleRay, hit: &Nearest) -> Intersection {
-        let (tree, Crossing { t, normal }) = (self.tree, hit.crossing);
+        let tree = self.tree;
         let (t_stored, rod) = hit.place;
-        let point = ray.origin + t * ray.direction;
-        let half = tree.body(rod).half_of(point);
-        let normal = normal.as_vec3();
+        let body = tree.body(rod);
+        let point = ray.origin + hit.crossing.t * ray.direction;
+        let half = body.half_of(point);
+        let normal = body.normal(ray.origin, ray.direction, &hit.crossing).as_vec3();
         let largest = tree.extent.max(ray.origin.as_vec3().abs().max_element());
         Intersection {
             t: t_stored,
