@@ -3,7 +3,7 @@
 use crate::math::narrow;
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use super::{ResolveError, surface};
 use crate::manifest::{GroundKind, GroundPattern, Manifest};
@@ -21,11 +21,11 @@ const TILE: f64 = 1.0 / 8.0;
 /// Spheres with a greater radius are less deep, in proportion.
 const SUNK: f64 = 1.0 / 100.0;
 
-/// Distances from the middle at which shadows start to fade and have faded out, in diagonals of the bounds: the ground is
-/// white beside the particles.
-const NEAR_FADE: [f32; 2] = [0.5, 1.1];
+/// Distance from the box of the particles at which shadows have faded out, in its diagonals: the ground is white at the
+/// edges of the picture.
+const SHADOW: f32 = 0.25;
 
-/// The same in jobs of earlier versions.
+/// Distances from the middle at which shadows start to fade and have faded out in jobs of earlier versions, in diagonals.
 const FAR_FADE: [f32; 2] = [2.0, 8.0];
 
 /// Where the ground is.
@@ -93,9 +93,15 @@ pub(super) fn ground(
         ground.raise(narrow(floor.reach.min(most)));
     }
     if is_catcher {
-        let fade = if floor.is_of_earlier_version { FAR_FADE } else { NEAR_FADE };
-        let catcher = ground.into_shadow_catcher(bounds, render.ground_shadow, fade);
-        return Ok(Some(catcher));
+        let size = (bounds.max - bounds.min).as_vec3();
+        let far = || FAR_FADE.map(|part| part * size.length());
+        let (base, [fade_start, fade_end]) = if floor.is_of_earlier_version {
+            (Vec3::ZERO, far())
+        } else {
+            (0.5 * size, [0.0, SHADOW * size.length()])
+        };
+        let catcher = ground.into_shadow_catcher(render.ground_shadow);
+        return Ok(Some(Ground { base, fade_start, fade_end, ..catcher }));
     }
     // Colour it
     ground.color = render.ground_color;

@@ -256,6 +256,7 @@ pub(super) fn shadow_through_glass() -> Shot {
 /// A light floor at `height` that ends 12 units out.
 fn floor(height: f32) -> Ground {
     Ground {
+        base: Vec3::ZERO,
         up: Vec3::Z,
         height,
         color: GREY,

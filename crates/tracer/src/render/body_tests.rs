@@ -56,6 +56,7 @@ fn floor(height: f32) -> Ground {
         height,
         color: Vec3::splat(0.5),
         center: Vec3::Z * height,
+        base: Vec3::ZERO,
         fade_start: 1e4,
         fade_end: 2e4,
         pattern: ground::Pattern::Plain,

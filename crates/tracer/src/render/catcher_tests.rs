@@ -26,6 +26,7 @@ fn scene(environment: Environment) -> Scene {
             height: 0.0,
             color: Vec3::splat(0.5),
             center: Vec3::ZERO,
+            base: Vec3::ZERO,
             fade_start: 1e3,
             fade_end: 2e3,
             pattern: crate::scene::ground::Pattern::Plain,

@@ -238,6 +238,7 @@ fn a_shadow_catcher_is_seen_through_panes() {
         height: -5.0,
         color: Vec3::splat(0.5),
         center: Vec3::new(0.0, 5.0, 0.0),
+        base: Vec3::ZERO,
         fade_start: 1e3,
         fade_end: 2e3,
         pattern: crate::scene::ground::Pattern::Plain,

@@ -153,6 +153,7 @@ pub(super) fn floor_from_above(environment: Environment, color: Vec3) -> Scene {
             height: 0.0,
             color,
             center: Vec3::ZERO,
+            base: Vec3::ZERO,
             fade_start: 1e4,
             fade_end: 2e4,
             pattern: crate::scene::ground::Pattern::Plain,

@@ -325,6 +325,7 @@ fn ground_receives_shadows_and_blocks_light_from_below() {
         height: -1.0,
         color: Vec3::splat(0.5),
         center: Vec3::new(0.0, 0.0, -1.0),
+        base: Vec3::ZERO,
         fade_start: 100.0,
         fade_end: 200.0,
         pattern: crate::scene::ground::Pattern::Plain,

@@ -49,7 +49,9 @@ pub struct Ground {
     pub color: Vec3,
     /// Centre of the fading.
     pub center: Vec3,
-    /// Distance from `center` up to which the ground is opaque.
+    /// Half the size of a box around `center` from which the distances of the fading count; zero for the centre itself.
+    pub base: Vec3,
+    /// Distance from the box up to which the ground is opaque.
     pub fade_start: f32,
     /// Distance from which on only the background is visible.
     pub fade_end: f32,
@@ -128,6 +130,7 @@ impl Ground {
             height,
             color: DEFAULT_COLOR,
             center: center + (height - center.dot(up)) * up,
+            base: Vec3::ZERO,
             fade_start: FADE_START * diagonal,
             fade_end: FADE_END * diagonal,
             pattern: Pattern::Plain,
@@ -135,19 +138,25 @@ impl Ground {
         }
     }
 
-    /// A shadow catcher with shadows of a `strength` from 0 to 1, in place of this ground under `bounds`.
+    /// A shadow catcher with shadows of a `strength` from 0 to 1, in place of this ground.
     #[must_use]
-    pub fn into_shadow_catcher(self, bounds: &Bounds, strength: f32, fade: [f32; 2]) -> Self {
-        let diagonal = (bounds.max - bounds.min).as_vec3().length();
-        let [fade_start, fade_end] = fade.map(|part| part * diagonal);
+    pub fn into_shadow_catcher(self, strength: f32) -> Self {
         Self {
             color: CATCHER_COLOR,
-            fade_start,
-            fade_end,
             pattern: Pattern::Plain,
             shadow_catcher: Some(strength),
             ..self
         }
+    }
+
+    /// Distance of a point of the ground from the box around its centre.
+    fn distance(&self, point: Vec3) -> f32 {
+        ((point - self.center).abs() - self.base).max(Vec3::ZERO).length()
+    }
+
+    /// Edge of a square around the centre, for what is computed on a part of the ground that does not fade.
+    pub fn map_edge(&self) -> f32 {
+        self.fade_start + 2.0 * self.base.max_element()
     }
 
     /// Whether a ray meets the ground where it has not begun to fade.
@@ -155,7 +164,7 @@ impl Ground {
         let along = ray.direction.dot(self.up);
         let distance = (self.height - ray.origin.dot(self.up)) / along;
         let point = ray.origin + distance * ray.direction;
-        distance > 0.0 && (point - self.center).length() < self.fade_start
+        distance > 0.0 && self.distance(point) <= self.fade_start
     }
 
     /// The colour at a `point` of the ground.

@@ -66,8 +66,11 @@ fn intersect_plane_body(
         let height = o[0] * up.x + o[1] * up.y + o[2] * up.z;
         let t = (ground.height - height) / slope;
         let p = [o[0] + d[0] * t, o[1] + d[1] * t, o[2] + d[2] * t];
-        // Compute the opacity from the distance to the centre of the scene
-        let c = [p[0] - ground.center.x, p[1] - ground.center.y, p[2] - ground.center.z];
+        // Compute the opacity from the distance to the middle of the scene
+        let mut c = [p[0] - ground.center.x, p[1] - ground.center.y, p[2] - ground.center.z];
+        for axis in 0..3 {
+            c[axis] = larger(c[axis].abs() - ground.base[axis], 0.0);
+        }
         let distance = (c[0] * c[0] + c[1] * c[1] + c[2] * c[2]).sqrt();
         let x = (ground.fade_end - distance) / span;
         let x = if x < 0.0 { 0.0 } else { x };
@@ -167,17 +170,21 @@ mod tests {
     #[test]
     fn fades_smoothly() {
         let ground = ground();
-        let opacity = |distance: f32| {
+        let opacity = |ground: &Ground, distance: f32| {
             let mut packet = RayPacket::default();
             let above = ground.center + Vec3::new(0.0, distance, 1.0);
             packet.push(&Ray::new(above, Vec3::NEG_Z));
             let mut hits = Intersections::default();
-            Plane::new(&ground).intersect(&mut packet, Coherence::Coherent, 0, &mut hits);
+            Plane::new(ground).intersect(&mut packet, Coherence::Coherent, 0, &mut hits);
             (hits.mask == 1).then(|| hits.opacity[0])
         };
-        assert_eq!(opacity(0.0), Some(1.0));
+        assert_eq!(opacity(&ground, 0.0), Some(1.0));
         let middle = 0.5 * (ground.fade_start + ground.fade_end);
-        assert!((opacity(middle).expect("half of it") - 0.5).abs() < 1e-4);
-        assert_eq!(opacity(1.01 * ground.fade_end), None);
+        assert!((opacity(&ground, middle).expect("half of it") - 0.5).abs() < 1e-4);
+        assert_eq!(opacity(&ground, 1.01 * ground.fade_end), None);
+        // Around a box, distances are those from its sides
+        let wide = Ground { base: Vec3::new(1.0, 7.0, 3.0), ..ground };
+        assert_eq!(opacity(&wide, 6.0), Some(1.0));
+        assert!((opacity(&wide, 7.0 + middle).expect("half of it") - 0.5).abs() < 1e-4);
     }
 }

@@ -82,7 +82,7 @@ impl Square {
             center: ground.center,
             axes: ground.axes(),
             normal: ground.up,
-            edge: ground.fade_start,
+            edge: ground.map_edge(),
         }
     }
 
