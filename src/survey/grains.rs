@@ -1,6 +1,7 @@
 //! Radii of grains: columns whose names mean a radius in the files of some programs, and something else in those of
 //! others. Their values decide.
 
+use spherule_formats::names::without_unit;
 use spherule_formats::{Attribute, AttributeData};
 
 use super::robust::sorted_sample;
@@ -38,6 +39,11 @@ pub struct GrainRadius {
 }
 
 impl GrainRadius {
+    /// Whether an attribute of this name may have radii.
+    pub(super) fn is_name(name: &str) -> bool {
+        NAMES.iter().any(|(known, _)| without_unit(name).eq_ignore_ascii_case(known))
+    }
+
     /// The first of `attributes` with positive numbers that fit half the distance of neighbours, `touching`.
     pub(super) fn of(attributes: &[Attribute], touching: f64) -> Option<Self> {
         let is_float = |a: &&Attribute| {
@@ -45,7 +51,7 @@ impl GrainRadius {
         };
         let found = |(name, scale): &(&str, f64)| {
             let mut named = attributes.iter().filter(is_float);
-            let attribute = named.find(|a| a.name.eq_ignore_ascii_case(name))?;
+            let attribute = named.find(|a| without_unit(&a.name).eq_ignore_ascii_case(name))?;
             let values = sorted_sample(attribute.count(), |i| attribute.data.get_f64(i));
             let median = values.get(values.len() / 2)? * scale;
             let is_positive = values.first().is_some_and(|least| *least > 0.0);

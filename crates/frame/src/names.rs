@@ -44,6 +44,17 @@ pub const POSITION_STEMS: [&str; 11] = [
     "p",
 ];
 
+/// Units of length at the end of names.
+const LENGTHS: [&str; 12] =
+    ["m", "cm", "mm", "um", "nm", "km", "ang", "angstrom", "au", "pc", "kpc", "mpc"];
+
+/// A name without the unit of length that follows `_`, as in `pos_x_mm`.
+pub fn without_unit(name: &str) -> &str {
+    let is_unit = |unit: &str| LENGTHS.iter().any(|known| known.eq_ignore_ascii_case(unit));
+    let unit = name.rsplit_once('_').filter(|(stem, unit)| !stem.is_empty() && is_unit(unit));
+    unit.map_or(name, |(stem, _)| stem)
+}
+
 /// Names of positions among the `Properties` of extended XYZ.
 pub const POSITION_PROPERTIES: [&str; 4] = ["pos", "position", "positions", "coordinates"];
 

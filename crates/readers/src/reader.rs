@@ -79,6 +79,10 @@ pub struct FormatInfo {
     pub remarks_need_whole_file: bool,
     /// Length of an angstrom in the unit of positions, if that is fixed by the format.
     pub angstrom: f64,
+    /// Whether the particles are atoms or groups of them, whatever their names are.
+    pub is_molecular: bool,
+    /// The unit of times, if that is fixed by the format.
+    pub time_unit: Option<&'static str>,
 }
 
 impl FormatInfo {
@@ -92,7 +96,14 @@ impl FormatInfo {
             may_refer_to_files: false,
             remarks_need_whole_file: false,
             angstrom: 1.0,
+            is_molecular: false,
+            time_unit: None,
         }
+    }
+
+    /// A format of molecules, with several steps in a file.
+    pub const fn molecular(name: &'static str, extensions: &'static [&'static str]) -> Self {
+        Self { is_molecular: true, may_hold_many_steps: true, ..Self::new(name, extensions) }
     }
 }
 

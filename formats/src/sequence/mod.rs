@@ -14,6 +14,7 @@ use crate::native::layout::UP_Y;
 use crate::native::{self, Access, MappedFile, NativeFile};
 use crate::order::index_u32;
 use crate::{MemoryBudget, PeriodicImages, ValueNames};
+use spherule_readers::FormatInfo;
 use spherule_readers::compression::is_compressed;
 
 mod collection;
@@ -262,15 +263,18 @@ impl Sequence {
         first.is_some_and(|part| y_is_up(&part.path))
     }
 
+    /// What is known of the format of the first file, if it has one. Looks into the file.
+    pub fn format_info(&self) -> Option<FormatInfo> {
+        let part = self.frames.first().and_then(|f| f.parts.first())?;
+        let head = crate::open::head(&part.path).ok()?;
+        let format = crate::detect::detect_format(&head, &part.path).ok()?;
+        Some(format.reader().info())
+    }
+
     /// Length of an angstrom in the unit of positions: 0.1 for formats of GROMACS, which have nanometres, otherwise 1.
     /// Looks into the first file.
     pub fn angstrom(&self) -> f64 {
-        let first = self.frames.first().and_then(|f| f.parts.first());
-        let format = first.and_then(|part| {
-            let head = crate::open::head(&part.path).ok()?;
-            crate::detect::detect_format(&head, &part.path).ok()
-        });
-        format.map_or(1.0, |format| format.reader().info().angstrom)
+        self.format_info().map_or(1.0, |info| info.angstrom)
     }
 
     /// Names of the parts that the frames have, which are fewer after [`Self::keep_parts`].

@@ -34,8 +34,10 @@ const MIN_BOX: f64 = 2.0;
 impl Reader for Rst7 {
     fn info(&self) -> FormatInfo {
         FormatInfo {
+            may_hold_many_steps: false,
             remarks_need_whole_file: true,
-            ..FormatInfo::new("rst7", &["rst7", "inpcrd", "restrt"])
+            time_unit: Some("ps"),
+            ..FormatInfo::molecular("rst7", &["rst7", "inpcrd", "restrt"])
         }
     }
 

@@ -24,8 +24,8 @@ struct Amber;
 impl Reader for Amber {
     fn info(&self) -> FormatInfo {
         FormatInfo {
-            may_hold_many_steps: true,
-            ..FormatInfo::new("amber", &["nc", "ncdf", "ncrst"])
+            time_unit: Some("ps"),
+            ..FormatInfo::molecular("amber", &["nc", "ncdf", "ncrst"])
         }
     }
 

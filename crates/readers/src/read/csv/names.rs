@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use spherule_frame::names::{COLOR_COLUMNS, JOINED_STEMS, POSITION_STEMS};
+use spherule_frame::names::{COLOR_COLUMNS, JOINED_STEMS, POSITION_STEMS, without_unit};
 
 /// Columns that are one attribute.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -38,10 +38,22 @@ pub(super) fn clean(raw: &[u8]) -> String {
 
 /// The columns of x, y and z among cleaned `names`. 2D runs may have no z.
 pub(super) fn position(names: &[String]) -> Option<[Option<usize>; 3]> {
+    let plain = names.iter().map(String::as_str);
+    let without_units = names.iter().map(|name| without_unit(name));
+    // x before xp: what follows the axis may be anything else in files that have both
+    let after = names.iter().map(|name| without_unit(name));
+    position_of(plain.map(split))
+        .or_else(|| position_of(without_units.map(split)))
+        .or_else(|| position_of(after.map(split_after)))
+}
+
+/// The columns of x, y and z among stems and components of names.
+fn position_of<'a>(
+    names: impl Iterator<Item = Option<(&'a str, NameComponent)>>,
+) -> Option<[Option<usize>; 3]> {
     let mut found = [[None; 3]; POSITION_STEMS.len()];
-    for (column, name) in names.iter().enumerate() {
-        let Some((stem, NameComponent::Axis(part) | NameComponent::Index(part))) = split(name)
-        else {
+    for (column, name) in names.enumerate() {
+        let Some((stem, NameComponent::Axis(part) | NameComponent::Index(part))) = name else {
             continue;
         };
         let stem = stem.to_ascii_lowercase();
@@ -155,6 +167,13 @@ fn split(name: &str) -> Option<(&str, NameComponent)> {
     known.then_some((stem, NameComponent::Axis(axis)))
 }
 
+/// The component that a name begins with, and its stem: `Xp`, `x_pos`, `X_coord`.
+fn split_after(name: &str) -> Option<(&str, NameComponent)> {
+    let (part, stem) = name.split_at_checked(1)?;
+    let stem = stem.trim_start_matches(['_', '.', ' ', ':']);
+    Some((stem, NameComponent::Axis(axis(part)?)))
+}
+
 fn axis(part: &str) -> Option<usize> {
     ["x", "y", "z"].iter().position(|axis| axis.eq_ignore_ascii_case(part))
 }
@@ -196,6 +215,10 @@ mod tests {
             ["x(m)", "y(m)", "z(m)"],
             ["PosX", "PosY", "PosZ"],
             ["coordinates[0]", "coordinates[1]", "coordinates[2]"],
+            ["pos_x_mm", "pos_y_mm", "pos_z_mm"],
+            ["x_m", "y_m", "z_m"],
+            ["Xp", "Yp", "Zp"],
+            ["x_pos", "y_pos", "z_pos"],
         ] {
             let found = position(&cleaned(&names));
             assert_eq!(found, Some([Some(0), Some(1), Some(2)]), "{names:?}");

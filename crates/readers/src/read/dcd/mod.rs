@@ -26,7 +26,7 @@ const F32: usize = 4;
 
 impl Reader for Dcd {
     fn info(&self) -> FormatInfo {
-        FormatInfo { may_hold_many_steps: true, ..FormatInfo::new("dcd", &["dcd"]) }
+        FormatInfo { time_unit: Some("ps"), ..FormatInfo::molecular("dcd", &["dcd"]) }
     }
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {

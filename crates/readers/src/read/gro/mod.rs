@@ -20,7 +20,11 @@ struct Gro;
 
 impl Reader for Gro {
     fn info(&self) -> FormatInfo {
-        FormatInfo { may_hold_many_steps: true, angstrom: 0.1, ..FormatInfo::new("gro", &["gro"]) }
+        FormatInfo {
+            angstrom: 0.1,
+            time_unit: Some("ps"),
+            ..FormatInfo::molecular("gro", &["gro"])
+        }
     }
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {

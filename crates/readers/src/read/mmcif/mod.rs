@@ -24,7 +24,7 @@ struct MmCif;
 
 impl Reader for MmCif {
     fn info(&self) -> FormatInfo {
-        FormatInfo { may_hold_many_steps: true, ..FormatInfo::new("mmcif", &["cif", "mmcif"]) }
+        FormatInfo::molecular("mmcif", &["cif", "mmcif"])
     }
 
     /// Files of the older dictionary, for crystals, begin alike; reading them gives the error.

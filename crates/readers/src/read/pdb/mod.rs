@@ -26,7 +26,7 @@ const OPENINGS: [&[u8]; 10] = [
 
 impl Reader for Pdb {
     fn info(&self) -> FormatInfo {
-        FormatInfo { may_hold_many_steps: true, ..FormatInfo::new("pdb", &["pdb", "ent"]) }
+        FormatInfo::molecular("pdb", &["pdb", "ent"])
     }
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {

@@ -22,7 +22,11 @@ const SIGNATURE: &[u8] = b"\0\0\x07\xc9\0\0\0\x0d\0\0\0\x0cGMX_trn_file";
 
 impl Reader for Trr {
     fn info(&self) -> FormatInfo {
-        FormatInfo { may_hold_many_steps: true, angstrom: 0.1, ..FormatInfo::new("trr", &["trr"]) }
+        FormatInfo {
+            angstrom: 0.1,
+            time_unit: Some("ps"),
+            ..FormatInfo::molecular("trr", &["trr"])
+        }
     }
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {

@@ -35,7 +35,11 @@ const ATOMS_PER_BYTE: usize = 4;
 
 impl Reader for Xtc {
     fn info(&self) -> FormatInfo {
-        FormatInfo { may_hold_many_steps: true, angstrom: 0.1, ..FormatInfo::new("xtc", &["xtc"]) }
+        FormatInfo {
+            angstrom: 0.1,
+            time_unit: Some("ps"),
+            ..FormatInfo::molecular("xtc", &["xtc"])
+        }
     }
 
     /// The number of atoms comes twice.
