@@ -74,8 +74,12 @@ impl JobManifest {
         let facts = in_thread(|| Facts::of(sequence));
         // Files are opened for names only where there are numbers to name
         let names = if facts.categories.is_empty() { Vec::new() } else { sequence.value_names() };
-        let files =
-            Files { parts: sequence.part_names(), names: &names, is_y_up: sequence.is_y_up() };
+        let files = Files {
+            parts: sequence.part_names(),
+            names: &names,
+            is_y_up: sequence.is_y_up(),
+            is_molecular: sequence.format_info().is_some_and(|format| format.is_molecular),
+        };
         let found = rules(&self.manifest, source, &facts, files);
         defaults.settings.extend(found.settings);
         defaults.lines.extend(found.lines);

@@ -34,6 +34,7 @@ pub(in crate::resolve) fn survey() -> Survey {
         most_particles: 8,
         frames: 1,
         angstrom: 1.0,
+        time_unit: None,
         weight: None,
         surfaces: Vec::new(),
     }

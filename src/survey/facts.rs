@@ -6,11 +6,12 @@ use std::collections::BTreeSet;
 use glam::{DMat3, DVec3};
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{
-    Attribute, FrameError, PositionSlice, Positions, RawParticles, SimulationCell, find_radius,
-    names, sample_indices,
+    Attribute, AttributeData, FrameError, PositionSlice, Positions, RawParticles, SimulationCell,
+    find_radius, names, sample_indices,
 };
 
 use super::beads::are_beads;
+use super::gas::{Order, is_gas};
 use super::grains::GrainRadius;
 use super::packing::Spacing;
 use super::robust::{robust_bounds, robust_range, sample_of, sorted_sample};
@@ -33,7 +34,7 @@ pub const BEAD: &str = "bead";
 const CATEGORIES: [&str; 14] = [
     BEAD,
     "type",
-    "typeid",
+    "ptype",
     "species",
     "element",
     "phase",
@@ -90,6 +91,8 @@ pub struct Facts {
     pub particles: usize,
     /// Whether there are velocities, and not all of them are zero.
     pub has_velocities: bool,
+    /// Whether all particles have nearly the same speed.
+    pub has_even_speed: bool,
     /// What colours particles without velocities: a velocity in a plane, or a scalar with a known name whose values differ.
     pub scalar: Option<String>,
     /// The axis at whose lower end the particles lie as on a floor, if it is not z.
@@ -109,6 +112,8 @@ pub struct Facts {
     pub has_heavy_tails: bool,
     /// The principal axes of the particles.
     pub axes: Option<Axes>,
+    /// Whether the particles fill a box as a gas does, or a liquid without gravity.
+    pub is_gas: bool,
     /// Whether the particles are groups of atoms with names like those of elements: they are farther apart than atoms.
     pub has_beads: bool,
     /// The radius with which spheres cover the plane or the surface in which the particles lie.
@@ -151,6 +156,8 @@ pub struct Category {
     pub walls: Option<WallValues>,
     /// The values without the particles that the first category with walls calls so, rising.
     pub without_walls: Vec<i64>,
+    /// Those of its values whose particles do not move, while others do, rising.
+    pub resting: Vec<i64>,
 }
 
 const QUESTION: Question<'static> = Question {
@@ -200,7 +207,7 @@ impl Facts {
         let touching = sample.spacing.map(|spacing| f64::from(spacing.touching));
         let velocity = velocity_of(&raw.attributes);
         let integers = |name: &str| {
-            let named = |a: &&Attribute| a.components == 1 && a.name.eq_ignore_ascii_case(name);
+            let named = |a: &&Attribute| a.components == 1 && kind_name(&a.name) == kind_name(name);
             raw.attributes.iter().find(named)
         };
         let categories = CATEGORIES.iter().filter_map(|name| integers(name));
@@ -221,6 +228,8 @@ impl Facts {
         let may_have_tank = elements.is_none() && !has_beads && !is_periodic && !has_walls;
         let tank = touching.filter(|_| may_have_tank);
         let positions = sample_of(&raw.positions);
+        let velocities = velocities(velocity);
+        let random_radius = sample.spacing.and_then(|spacing| random_radius(spacing, sample.count));
         Self {
             tank: tank.and_then(|touching| tank_of(sample, touching, place.is_only_frame)),
             grain_radius: touching.and_then(|touching| GrainRadius::of(&raw.attributes, touching)),
@@ -228,22 +237,30 @@ impl Facts {
                 .and_then(|touching| covering_radius(&positions, sample.count, touching)),
             has_heavy_tails: has_heavy_tails(&positions),
             axes: Axes::of(&positions),
+            is_gas: is_gas(
+                &positions,
+                sample.count,
+                &velocities,
+                order(sample.spacing, random_radius),
+            ),
             has_beads,
             particles: sample.count,
             has_velocities: velocity.is_some_and(is_moving),
+            has_even_speed: velocity.is_some_and(is_even),
             scalar: plane_velocity(&raw.attributes)
-                .or_else(|| SCALARS.iter().find_map(|name| scalar(&raw.attributes, name))),
-            up: up_of(&positions, sample.count, &velocities(velocity), DVec3::Z),
+                .or_else(|| SCALARS.iter().find_map(|name| scalar(&raw.attributes, name)))
+                .or_else(|| only_scalar(&raw.attributes)),
+            up: up_of(&positions, sample.count, &velocities, DVec3::Z),
             has_colors: RgbAttribute::of(&raw.attributes, None).is_some(),
             has_radii: find_radius(&raw.attributes).is_some(),
-            random_radius: sample.spacing.and_then(|spacing| random_radius(spacing, sample.count)),
+            random_radius,
             has_time: raw.time.is_some(),
             has_bonds: !raw.bonds.is_empty(),
             elements,
             categories: without_walls(categories, &raw.attributes),
             in_cell: raw.cell.as_ref().map_or(0.0, |cell| part_in(cell, &raw.positions)),
             cell_extent: raw.cell.as_ref().map_or([0.0; 3], |cell| {
-                let is_full = is_unit_cell(cell, sample.count, sample.spacing);
+                let is_full = is_unit_cell(cell, sample.count, sample.spacing, place.angstrom);
                 if is_full { [1.0; 3] } else { extent_in(cell, &raw.positions) }
             }),
             cell: raw.cell,
@@ -326,6 +343,18 @@ fn random_radius(spacing: Spacing, count: usize) -> Option<f64> {
     is_random.then(|| (OVERLAPPING * packed).into())
 }
 
+/// The closest of a hundred neighbours, relative to the median, up to which particles are no lattice.
+const UNEVEN: f32 = 0.97;
+
+/// How the places of particles with this `spacing` are related.
+fn order(spacing: Option<Spacing>, random_radius: Option<f64>) -> Order {
+    match (random_radius, spacing) {
+        (Some(_), _) => Order::Random,
+        (None, Some(spacing)) if spacing.closest < UNEVEN * spacing.touching => Order::Liquid,
+        _ => Order::Lattice,
+    }
+}
+
 /// The part of each edge of `cell` along which there are particles, without a few outliers.
 fn extent_in(cell: &SimulationCell, positions: &Positions) -> [f64; 3] {
     let sample = in_coordinates(cell, positions);
@@ -342,13 +371,22 @@ const FEW: usize = 100;
 /// of a molecule in a large cell are nearer.
 const CUBIC: f64 = 0.5;
 
+/// The longest edge of a cell that one atom fills, in angstroms.
+const LONE: f64 = 10.0;
+
 /// Whether a few particles fill a periodic `cell`, as those of a unit cell do: the cell has about the volume that they
 /// need at the distance of nearest neighbours.
-fn is_unit_cell(cell: &SimulationCell, count: usize, spacing: Option<Spacing>) -> bool {
+fn is_unit_cell(
+    cell: &SimulationCell,
+    count: usize,
+    spacing: Option<Spacing>,
+    angstrom: f64,
+) -> bool {
     let [a, b, c] = cell.vectors;
     #[expect(clippy::cast_precision_loss, reason = "a few")]
     let cubic = libm::cbrt(a.cross(b).dot(c).abs() / count.max(1) as f64);
-    let nearest = spacing.map_or(cubic, |spacing| 2.0 * f64::from(spacing.touching));
+    let lone = if cubic <= LONE * angstrom { cubic } else { 0.0 };
+    let nearest = spacing.map_or(lone, |spacing| 2.0 * f64::from(spacing.touching));
     count > 0 && count < FEW && cell.periodic == [true; 3] && nearest >= CUBIC * cubic
 }
 
@@ -357,11 +395,20 @@ fn is_moving(velocity: &Attribute) -> bool {
     sample_indices(velocity.count(), SAMPLE).any(|i| velocity.magnitude(i) != 0.0)
 }
 
+/// The range of speeds, as a part of the largest, below which they say nothing.
+const EVEN: f64 = 0.1;
+
+/// Whether all particles of a sample are nearly as fast.
+fn is_even(velocity: &Attribute) -> bool {
+    let speeds = sorted_sample(velocity.count(), |i| velocity.magnitude(i));
+    robust_range(&speeds).is_some_and(|(low, high)| high > 0.0 && high - low < EVEN * high)
+}
+
 /// Velocities of some particles, if there are finite ones.
 fn velocities(velocity: Option<&Attribute>) -> Vec<DVec3> {
     let Some(velocity) = velocity else { return Vec::new() };
     let vector = |i: usize| DVec3::from_array([0, 1, 2].map(|c| velocity.data.get_f64(3 * i + c)));
-    let sample = sample_indices(velocity.count(), SAMPLE).map(vector);
+    let sample = sample_indices(velocity.count(), super::robust::SAMPLE).map(vector);
     sample.filter(|v| v.is_finite()).collect()
 }
 
@@ -369,7 +416,11 @@ fn velocities(velocity: Option<&Attribute>) -> Vec<DVec3> {
 fn plane_velocity(attributes: &[Attribute]) -> Option<String> {
     let is_velocity =
         |a: &&Attribute| a.components == 2 && names::is_one_of(&a.name, &names::VELOCITY);
-    attributes.iter().find(is_velocity).filter(|a| is_moving(a)).map(|a| a.name.clone())
+    attributes
+        .iter()
+        .find(is_velocity)
+        .filter(|a| is_moving(a) && !is_even(a))
+        .map(|a| a.name.clone())
 }
 
 /// The name of the scalar `name` among `attributes`, if its values differ.
@@ -379,6 +430,48 @@ fn scalar(attributes: &[Attribute], name: &str) -> Option<String> {
     let values = sorted_sample(found.count(), |i| found.data.get_f64(i));
     let (low, high) = robust_range(&values)?;
     (low < high).then(|| found.name.clone())
+}
+
+/// Names of scalars that do not tell anything of a particle, as far as colours go.
+const DULL: [&str; 12] = [
+    "mass",
+    "m",
+    "masses",
+    "h",
+    "hsml",
+    "smoothing_length",
+    "volume",
+    "vol",
+    "time",
+    "step",
+    "index",
+    "id",
+];
+
+/// The name of the only scalar with real numbers that differ, if there is one alone.
+fn only_scalar(attributes: &[Attribute]) -> Option<String> {
+    let is_dull = |name: &str| {
+        names::is_radius_name(name)
+            || GrainRadius::is_name(name)
+            || DULL.iter().any(|dull| dull.eq_ignore_ascii_case(name))
+    };
+    let is_real = |a: &&Attribute| {
+        a.components == 1 && matches!(a.data, AttributeData::F32(_) | AttributeData::F64(_))
+    };
+    let mut real = attributes.iter().filter(is_real).filter(|a| !is_dull(&a.name));
+    let only = real.next().filter(|_| real.next().is_none())?;
+    scalar(attributes, &only.name)
+}
+
+/// The name of a category without what programs add to it: `typeIds`, `type_id` and `particle_type` are `type`.
+fn kind_name(name: &str) -> String {
+    let name = name.to_ascii_lowercase().replace(['_', '-'], "");
+    let name = name.strip_prefix("particle").unwrap_or(&name);
+    let without = |name: &str, endings: &[&str]| {
+        let stem = endings.iter().find_map(|ending| name.strip_suffix(ending));
+        stem.filter(|stem| !stem.is_empty()).unwrap_or(name).to_owned()
+    };
+    without(&without(name, &["ids", "id"]), &["s"])
 }
 
 /// The values of `attribute` for some particles, with their indices.
@@ -425,11 +518,15 @@ fn category(attribute: &Attribute, particles: &RawParticles) -> Option<Category>
         let position = particles.positions.get(index);
         members.push(Member { value, position, is_moving });
     }
+    let moving: BTreeSet<i64> =
+        members.iter().filter(|member| member.is_moving).map(|member| member.value).collect();
+    let resting = all.difference(&moving).filter(|_| !moving.is_empty()).copied().collect();
     (all.len() > 1).then(|| Category {
         name: attribute.name.clone(),
         values: all.iter().copied().collect(),
-        without_walls: all.into_iter().collect(),
+        resting,
         walls: walls(&attribute.name, &particles.attributes, &members),
+        without_walls: all.into_iter().collect(),
     })
 }
 
@@ -457,6 +554,43 @@ mod tests {
     use super::*;
 
     #[test]
+    fn categories_have_many_names() {
+        for name in ["type", "typeId", "type_ids", "Types", "particle_type"] {
+            assert_eq!(kind_name(name), kind_name("type"), "{name}");
+        }
+        assert_eq!(kind_name("material_id"), kind_name("material"));
+        assert_eq!(kind_name("Species"), kind_name("species_id"));
+        assert_ne!(kind_name("id"), kind_name("type"));
+        assert_ne!(kind_name("prototype"), kind_name("type"));
+    }
+
+    #[test]
+    fn a_scalar_alone_means_something() {
+        let scalar = |name: &str, values: Vec<f32>| Attribute {
+            name: name.to_owned(),
+            components: 1,
+            data: AttributeData::F32(values),
+        };
+        let differing = || (0_u8..100).map(f32::from).collect::<Vec<f32>>();
+        let [damage, mass, radius] = ["c_1", "mass", "r"].map(|name| scalar(name, differing()));
+        let all = [mass.clone(), damage.clone(), radius];
+        assert_eq!(only_scalar(&all).as_deref(), Some("c_1"));
+        assert_eq!(only_scalar(&[damage.clone(), scalar("c_2", differing())]), None);
+        assert_eq!(only_scalar(&[scalar("c_1", vec![2.0; 100])]), None);
+        assert_eq!(only_scalar(&[mass]), None);
+    }
+
+    #[test]
+    fn speeds_that_are_alike_say_nothing() {
+        let of = |speeds: [f32; 3]| {
+            let data = speeds.iter().flat_map(|speed| [0.0, *speed, 0.0]).collect();
+            let data = AttributeData::F32(data);
+            is_even(&Attribute { name: "velocity".to_owned(), components: 3, data })
+        };
+        assert!(of([0.5, 0.51, 0.5]) && !of([0.0, 0.51, 0.5]) && !of([0.0; 3]));
+    }
+
+    #[test]
     fn unit_cells_are_full_and_cells_around_a_molecule_are_not() {
         let cell = |edge: f64| {
             SimulationCell::new(DVec3::ZERO, DVec3::AXES.map(|axis| edge * axis), [true; 3])
@@ -466,12 +600,13 @@ mod tests {
             let touching = 0.5 * distance;
             Some(Spacing { touching, closest: touching, packed: None })
         };
-        // Polonium, copper, rock salt
-        assert!(is_unit_cell(&cell(3.35), 1, None));
-        assert!(is_unit_cell(&cell(3.61), 4, nearest(2.55)));
-        assert!(is_unit_cell(&cell(5.64), 8, nearest(2.82)));
+        // Polonium, copper, rock salt, and an atom in a large cell
+        assert!(!is_unit_cell(&cell(40.0), 1, None, 1.0));
+        assert!(is_unit_cell(&cell(3.35), 1, None, 1.0));
+        assert!(is_unit_cell(&cell(3.61), 4, nearest(2.55), 1.0));
+        assert!(is_unit_cell(&cell(5.64), 8, nearest(2.82), 1.0));
         // A diatomic molecule in a box, and many particles
-        assert!(!is_unit_cell(&cell(9.0), 2, nearest(1.0)));
-        assert!(!is_unit_cell(&cell(100.0), 1000, nearest(10.0)));
+        assert!(!is_unit_cell(&cell(9.0), 2, nearest(1.0), 1.0));
+        assert!(!is_unit_cell(&cell(100.0), 1000, nearest(10.0), 1.0));
     }
 }

@@ -23,6 +23,7 @@ use crate::selection::Selection;
 mod beads;
 mod color;
 mod facts;
+mod gas;
 mod grains;
 mod moments;
 mod outline;
@@ -50,7 +51,7 @@ use packing::{Spacing, SpacingRequest};
 use robust::{RobustBounds, robust_bounds, robust_largest, sample_of, sorted_sample};
 use sample::FrameSample;
 pub use shape::Axes;
-use standing::standing;
+use standing::{is_falling, standing};
 pub use tank::Tank;
 pub use walls::{WallSign, WallValues};
 use weight::has_surface;
@@ -92,7 +93,7 @@ pub struct Survey {
     /// The outermost particles, for the camera. Jobs of earlier versions lack them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outline: Option<Outline>,
-    /// The simulation cells of the sampled frames, each once; none of files that were only sampled.
+    /// The simulation cells of the frames that the camera shows, each once; none of files that were only sampled.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cells: Vec<SimulationCell>,
     /// Radius for frames without radii: half the median distance of neighbours, whichever particles are drawn; the
@@ -132,6 +133,9 @@ pub struct Survey {
     /// The largest time of the first and the last frame, without a sign, if the files contain times.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub largest_time: Option<f64>,
+    /// The unit of times, if the format has one. Jobs of earlier versions lack it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_unit: Option<String>,
     /// Mean difference of the numbers of consecutive frames, if there are several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frame_numbers: Option<i64>,
@@ -361,7 +365,9 @@ impl Survey {
         indices: impl IntoIterator<Item = usize>,
         question: Question,
     ) -> Result<Self, FrameError> {
-        let angstrom = sequence.angstrom();
+        let format = sequence.format_info();
+        let angstrom = format.map_or(1.0, |format| format.angstrom);
+        let time_unit = format.and_then(|format| format.time_unit).map(str::to_owned);
         let mut totals = Totals::new();
         let format_up = if sequence.is_y_up() { DVec3::Y } else { DVec3::Z };
         let up = question.up.unwrap_or(format_up);
@@ -397,7 +403,7 @@ impl Survey {
         // Fail only if no frame was readable
         match failure {
             Some(error) if totals.frames == 0 => Err(error),
-            _ => Ok(Self { angstrom, ..totals.finish(question, format_up) }),
+            _ => Ok(Self { angstrom, time_unit, ..totals.finish(question, format_up) }),
         }
     }
 }
@@ -499,10 +505,13 @@ impl Totals {
         if is_framed {
             self.outermost.add(&raw.positions, count);
         }
-        let standing = standing(&sample_of(&raw.positions), count, up);
-        self.standing = self.standing.max(standing);
+        let velocity = velocity_of(&raw.attributes);
+        if !velocity.is_some_and(|velocity| is_falling(&raw.positions, velocity, up)) {
+            let standing = standing(&sample_of(&raw.positions), count, up);
+            self.standing = self.standing.max(standing);
+        }
         let is_new = |cell: &SimulationCell| !self.cells.contains(cell);
-        if let Some(cell) = raw.cell.filter(is_new) {
+        if is_framed && let Some(cell) = raw.cell.filter(is_new) {
             self.cells.push(cell);
         }
         // Find velocity and colours
@@ -668,6 +677,7 @@ impl Totals {
             most_particles: self.most_particles,
             frames: self.frames,
             angstrom: 1.0,
+            time_unit: None,
             weight,
             surfaces: self.surfaces,
         }

@@ -18,14 +18,14 @@ const FEW: usize = 5;
 /// Greatest standard deviation along the normal, relative to those along the surface: 0.55 at the face of a body.
 const THIN: f64 = 0.25;
 
-/// Radius relative to the edge of the square that each particle has: a little more than half its diagonal.
+/// Radius relative to the edge of the square that each particle of a lattice has: a little more than half its diagonal.
 const COVERING: f64 = 0.75;
 
 /// The same for particles at random, which cover 98 % of the surface.
 const COVERING_AT_RANDOM: f64 = 1.1;
 
-/// The distance of nearest neighbours relative to that edge, below which particles are at random: there it is 0.47.
-const RANDOM: f64 = 0.6;
+/// The distance of nearest neighbours relative to that edge, for particles at random.
+const RANDOM: f64 = 0.5;
 
 /// The quantile of the densities that is used: those near an edge are too low.
 const BULK: f64 = 0.75;
@@ -60,8 +60,9 @@ pub(super) fn covering_radius(sample: &[DVec3], count: usize, touching: f64) -> 
     )]
     let typical = *counts.get((BULK * counts.len() as f64) as usize)? as f64;
     let edge = (std::f64::consts::PI * reach * reach * part / typical).sqrt();
-    let is_random = 2.0 * touching < RANDOM * edge;
-    Some(edge * if is_random { COVERING_AT_RANDOM } else { COVERING })
+    // The less even the distances are, the larger are the holes
+    let order = ((2.0 * touching / edge - RANDOM) / (1.0 - RANDOM)).clamp(0.0, 1.0);
+    Some(edge * (COVERING_AT_RANDOM + order * (COVERING - COVERING_AT_RANDOM)))
 }
 
 #[cfg(test)]

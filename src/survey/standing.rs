@@ -1,6 +1,7 @@
 //! Whether particles stand on a floor.
 
 use glam::DVec3;
+use spherule_formats::{Attribute, Positions, sample_indices};
 
 /// Part of the particles at each end that may be below a floor or far above.
 const OUTSIDE: usize = 1000;
@@ -24,8 +25,45 @@ pub(super) fn standing(sample: &[DVec3], count: usize, up: DVec3) -> f64 {
     part * layers
 }
 
+/// Number of particles whose velocities are examined.
+const SAMPLE: usize = 1 << 14;
+
+/// The lowest particles, as a part of all.
+const LOWEST: f64 = 0.02;
+
+/// Their mean velocity downwards, relative to the root mean square of all velocities, from which on they fall.
+const FALLS: f64 = 0.5;
+
+/// Whether the lowest particles along `up` move down as a whole: they do not stand on a floor yet.
+pub(super) fn is_falling(positions: &Positions, velocity: &Attribute, up: DVec3) -> bool {
+    let motion = |i: usize| {
+        let component = |axis: usize| velocity.data.get_f64(velocity.components * i + axis);
+        let velocity = DVec3::new(component(0), component(1), component(2));
+        (positions.get(i).dot(up), velocity.dot(up), velocity.length_squared())
+    };
+    let count = positions.len().min(velocity.count());
+    let mut all: Vec<(f64, f64, f64)> = if velocity.components == 3 {
+        sample_indices(count, SAMPLE).map(motion).collect()
+    } else {
+        Vec::new()
+    };
+    all.retain(|(height, _, square)| height.is_finite() && square.is_finite());
+    all.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    #[expect(clippy::cast_precision_loss, reason = "a sample")]
+    let all_count = all.len() as f64;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of them")]
+    let lowest = (LOWEST * all_count).ceil() as usize;
+    let squares: f64 = all.iter().map(|(.., square)| square).sum();
+    let rise: f64 = all.iter().take(lowest).map(|(_, rise, _)| rise).sum();
+    #[expect(clippy::cast_precision_loss, reason = "a part of a sample")]
+    let rise = rise / lowest.max(1) as f64;
+    squares > 0.0 && rise < -FALLS * (squares / all_count).sqrt()
+}
+
 #[cfg(test)]
 mod tests {
+    use spherule_formats::AttributeData;
+
     use super::*;
 
     /// The points of a lattice with this number of layers on each side that are `inside`.
@@ -33,6 +71,21 @@ mod tests {
         let all = (0..layers.pow(3)).map(|i| [i % layers, i / layers % layers, i / layers.pow(2)]);
         let points = all.map(|at| DVec3::from_array(at.map(|i| f64::from(2 * i - layers + 1))));
         points.filter(|p| inside(*p)).collect()
+    }
+
+    #[test]
+    fn jets_fall_and_fluids_on_a_floor_do_not() {
+        let points = lattice(8, |_| true);
+        let falls = |velocity: fn(DVec3) -> DVec3| {
+            let values = points.iter().flat_map(|p| velocity(*p).to_array()).collect();
+            let data = AttributeData::F64(values);
+            let velocity = Attribute { name: "velocity".to_owned(), components: 3, data };
+            is_falling(&Positions::F64(points.clone()), &velocity, DVec3::Z)
+        };
+        assert!(falls(|_| DVec3::new(0.3, 0.0, -1.0)));
+        assert!(!falls(|_| DVec3::ZERO) && !falls(|_| DVec3::Z) && !falls(|_| DVec3::X));
+        // A column that collapses on its floor
+        assert!(!falls(|p| DVec3::new(1.0, 0.0, -0.1 * (p.z + 7.0))));
     }
 
     #[test]

@@ -74,7 +74,12 @@ pub(super) fn walls(
         };
         if let Some(is_wall) = is_wall {
             let is_wall = |value: &i64| is_wall(*value) && (name != "Mk" || rests(value));
-            return found(all().filter(is_wall).collect(), WallSign::Code("DualSPHysics"));
+            // A body in the fluid is not in front of it
+            let others: Vec<Member> =
+                members.iter().filter(|member| !is_wall(&member.value)).copied().collect();
+            let is_around = |value: &i64| !is_within(&groups[value], &others);
+            let values = all().filter(is_wall).filter(is_around).collect();
+            return found(values, WallSign::Code("DualSPHysics"));
         }
     }
     if is_boundary_flag(name) {
@@ -139,6 +144,18 @@ pub(super) fn contains<'a>(wall: &[Member], others: impl Iterator<Item = &'a Mem
     };
     let around: usize = axes.iter().map(beyond).sum();
     axes.len() >= 2 && around + 1 >= 2 * axes.len()
+}
+
+/// Whether the box of a `body` is within that of the `others`, with others on all sides.
+fn is_within(body: &[Member], others: &[Member]) -> bool {
+    let [own, theirs] =
+        [body, others].map(|members| bounds(members.iter().map(|member| member.position)));
+    let (Some(own), Some(theirs)) = (own, theirs) else {
+        return false;
+    };
+    let is_between =
+        |axis: &usize| own.0[*axis] > theirs.0[*axis] && own.1[*axis] < theirs.1[*axis];
+    axes(theirs).iter().all(is_between)
 }
 
 /// Whether points are the walls of their box, or a single layer, and not a body that fills it.
@@ -288,6 +305,11 @@ mod tests {
             assert_eq!(found.values, [codes[0]]);
             assert_eq!(found.sign, WallSign::Code("DualSPHysics"));
         }
+        // A body that the fluid surrounds
+        let mut all = tank(12, [0, 3], false);
+        let inside = DVec3::new(5.0, 5.0, 3.0);
+        all.iter_mut().filter(|m| m.position.distance(inside) < 1.5).for_each(|m| m.value = 1);
+        assert_eq!(walls("Type", &attributes, &all).expect("walls").values, [0]);
         // All of one kind
         assert_eq!(walls("Mk", &attributes, &tank(3, [1, 2], false)), None);
     }
