@@ -101,6 +101,8 @@ pub struct Files<'a> {
     pub names: &'a [ValueNames],
     /// Whether y is up, and not z.
     pub is_y_up: bool,
+    /// Whether the particles are atoms or groups of them in files of this format.
+    pub is_molecular: bool,
 }
 
 /// The rules that act on particles with these `facts` from `files`, for the manifest that `source` gives.
@@ -261,7 +263,13 @@ impl Rules<'_> {
         // Numbers of beads that are no elements mean nothing without their names
         let has_meaning = |c: &&Category| !self.facts.has_beads || c.name != ELEMENT;
         let mut all = self.facts.categories.iter().filter(has_meaning);
-        let Some(category) = all.find(|c| values(c) > 1) else {
+        // What rests beside one kind that moves needs no colour of its own: speed says more
+        let is_moving = |value: &&i64, c: &Category| !c.resting.contains(value);
+        let tells = |c: &&Category| {
+            let moving = c.without_walls.iter().filter(|value| is_moving(value, c)).count();
+            values(c) > 1 && (c.resting.is_empty() || moving != 1)
+        };
+        let Some(category) = all.find(tells) else {
             return;
         };
         if self.facts.elements.is_none() && !self.facts.has_colors && self.has_open_colors() {
@@ -331,7 +339,8 @@ impl Rules<'_> {
     /// Particles without velocities have the colours of a scalar.
     fn scalar(&mut self) {
         let facts = self.facts;
-        let is_open = !facts.has_velocities && !facts.has_colors && self.has_open_colors();
+        let says_more = !facts.has_velocities || facts.has_even_speed;
+        let is_open = says_more && !facts.has_colors && self.has_open_colors();
         let name = facts.scalar.as_ref().filter(|_| is_open && !self.has_set(COLOR));
         if let Some(name) = name {
             let line = format!("coloured by `{name}` (--color-by gives another value)");
@@ -363,7 +372,14 @@ impl Rules<'_> {
         let filled = extent.iter().filter(|part| **part >= FILLED).count();
         // A box of walls may be much larger than what has come to rest in it
         let is_empty = !self.is_periodic() && extent.iter().any(|part| *part < LEAST_FILLED);
-        if self.facts.cell.is_none() || filled < 2 || self.facts.in_cell < INSIDE || is_empty {
+        // A cloud without an end is framed without its outer parts
+        let is_cloud = self.facts.has_heavy_tails;
+        if self.facts.cell.is_none()
+            || filled < 2
+            || self.facts.in_cell < INSIDE
+            || is_empty
+            || is_cloud
+        {
             return;
         }
         let line =
@@ -382,9 +398,10 @@ impl Rules<'_> {
         }
     }
 
-    /// Molecules and periodic cells stand on nothing.
+    /// Molecules, gases and periodic cells stand on nothing.
     fn floor(&mut self) {
-        if self.is_molecular() || self.is_periodic() {
+        let is_free = self.files.is_molecular || self.facts.is_gas;
+        if self.is_molecular() || self.is_periodic() || is_free {
             self.set([("render.ground", "none".into())], None);
         }
     }

@@ -13,7 +13,7 @@ use super::signals::SignalMessages;
 use crate::job::KIND;
 use crate::movie::Observer;
 use crate::output::PictureFormat;
-use crate::picture::is_own_file;
+use crate::picture::{Picture, is_own_file};
 use crate::report::job::{HTML_FILE, JSON_FILE};
 
 /// The job, and the frames to show.
@@ -53,6 +53,15 @@ pub(super) struct JobPictures {
 }
 
 impl JobPictures {
+    /// Whether previews are larger than images, because overlays are beside the pictures.
+    pub(super) fn have_strips(&self) -> bool {
+        let both = self.pictures.iter().find(|picture| picture.picture != picture.image);
+        let size =
+            |path: &Path| Picture::read(path, self.exposure).ok().map(|picture| picture.size());
+        may_have_strips(self.state.plan().settings())
+            && both.is_some_and(|both| size(&both.picture) != size(&both.image))
+    }
+
     /// Reads the state of the job.
     pub(super) fn read(args: &PicturesArgs) -> Result<Self, CliError> {
         let dir = job_directory(&args.job)?;
@@ -205,12 +214,12 @@ fn real(path: &Path) -> Result<PathBuf, CliError> {
     Ok(dir.canonicalize().unwrap_or_else(|_| dir.to_owned()).join(name))
 }
 
-/// Whether the settings of a plan put overlays beside the pictures, so that previews are larger than images.
-pub(super) fn has_strips(settings: &[(String, String)]) -> bool {
+/// Whether the settings of a plan may put overlays beside the pictures, so that previews are larger than images.
+pub(super) fn may_have_strips(settings: &[(String, String)]) -> bool {
     settings.iter().any(|(key, value)| {
         let is_layout =
             key == "image.layout" || (key.starts_with("overlay.") && key.ends_with(".layout"));
-        is_layout && value == "\"beside\""
+        is_layout && ["\"beside\"", "\"auto\""].contains(&&**value)
     })
 }
 

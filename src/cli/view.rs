@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use spherule_jobs::publish;
 
-use super::pictures::{JobPictures, PicturesArgs, has_strips};
+use super::pictures::{JobPictures, PicturesArgs};
 use super::{CliError, Outcome, print};
 use crate::manifest::ATTRIBUTE_CHANNEL;
 use crate::movie::FrameRate;
@@ -73,8 +73,8 @@ pub(super) fn run(args: &ViewArgs) -> Result<Outcome, CliError> {
     }
     let format_of = |frame: &ViewerFrame| PictureFormat::of(&frame.image);
     let has_exr = frames.iter().any(|frame| format_of(frame) == Some(PictureFormat::Exr));
-    let has_strips = has_strips(pictures.state.plan().settings());
-    if has_exr && has_strips && !args.no_data {
+    let has_strips = has_exr && pictures.have_strips();
+    if has_strips && !args.no_data {
         message!(
             "overlays are beside the pictures, which the channels of the images would not fit: the page has none"
         );

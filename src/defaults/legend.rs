@@ -51,6 +51,9 @@ impl Rules<'_> {
                 let mut item = Table::new();
                 item.insert("type".to_owned(), kind.into());
                 item.extend(size.map(|size| ("size".to_owned(), size.to_value())));
+                if self.has_auto_layout(kind) {
+                    item.insert("layout".to_owned(), "auto".into());
+                }
                 item.extend(self.place_of(kind).map(|(key, value)| (key.to_owned(), value.into())));
                 let item = Override::append("overlay", item, "the defaults");
                 self.found.settings.extend(item);
@@ -75,6 +78,11 @@ impl Rules<'_> {
             return None;
         }
         Some(("orientation", "horizontal")).filter(|_| aspect > WIDE && kind == COLORS)
+    }
+
+    /// Whether the colours are beside the picture if they would cover particles.
+    fn has_auto_layout(&self, kind: &str) -> bool {
+        kind == COLORS && self.manifest.against_strips().is_none()
     }
 
     /// Width of the particles in the picture, divided by their height; none if they are not seen from the side of the rules.

@@ -16,7 +16,8 @@ fn category(name: &str, values: &[i64], at_rest: &[i64]) -> Category {
     let walls = Some(walls).filter(|walls| !walls.values.is_empty());
     let kept = values.iter().filter(|value| !at_rest.contains(value));
     let without_walls = kept.copied().collect();
-    Category { name: name.to_owned(), values: values.to_vec(), walls, without_walls }
+    let resting = at_rest.to_vec();
+    Category { name: name.to_owned(), values: values.to_vec(), walls, without_walls, resting }
 }
 
 /// The manifest of `text` with the defaults that follow from `facts`, and the lines of the rules.
@@ -447,11 +448,12 @@ fn legends_make_room_beside_planes_and_below_wide_bodies() {
         let OverlayKind::ColorBar { orientation, .. } = overlay.kind else { panic!("no bar") };
         (overlay.layout, orientation)
     };
-    use crate::overlay::{Layout, Orientation};
-    assert_eq!(legend(DVec3::ONE), (None, Orientation::Vertical));
-    assert_eq!(legend(DVec3::new(30.0, 3.0, 1.0)), (None, Orientation::Horizontal));
-    assert_eq!(legend(DVec3::new(2.0, 1.0, 0.0)), (Some(Layout::Beside), Orientation::Vertical));
-    assert_eq!(legend(DVec3::new(1.0, 1.0, 0.0)), (None, Orientation::Vertical));
+    use crate::manifest::OverlayLayout::{Auto, Beside};
+    use crate::overlay::Orientation::{Horizontal, Vertical};
+    assert_eq!(legend(DVec3::ONE), (Some(Auto), Vertical));
+    assert_eq!(legend(DVec3::new(30.0, 3.0, 1.0)), (Some(Auto), Horizontal));
+    assert_eq!(legend(DVec3::new(2.0, 1.0, 0.0)), (Some(Beside), Vertical));
+    assert_eq!(legend(DVec3::new(1.0, 1.0, 0.0)), (Some(Auto), Vertical));
 }
 
 #[test]

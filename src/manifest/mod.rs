@@ -108,7 +108,7 @@ pub use mesh::{Mesh, MeshMaterial, MeshPath, MeshShading};
 pub(crate) use nearest::nearest;
 pub use opacity::OpacitySetting;
 pub use output::Output;
-pub use overlay::{Overlay, OverlayKind, OverlayText};
+pub use overlay::{Overlay, OverlayKind, OverlayLayout, OverlayText};
 pub use part::{Part, PartKind};
 pub use pattern::{FramePattern, OutputPattern};
 pub use print_size::Side;
@@ -386,7 +386,11 @@ impl Manifest {
 
     /// Where an overlay is: over the picture, or beside it.
     pub fn layout_of(&self, overlay: &Overlay) -> Layout {
-        overlay.layout.unwrap_or(self.image.layout)
+        match overlay.layout {
+            Some(OverlayLayout::Beside) => Layout::Beside,
+            Some(OverlayLayout::Auto | OverlayLayout::Over) => Layout::Over,
+            None => self.image.layout,
+        }
     }
 
     /// Whether the picture is smaller than the image, because overlays are beside it.
@@ -394,18 +398,23 @@ impl Manifest {
         self.overlays.iter().any(|overlay| self.layout_of(overlay) == Layout::Beside)
     }
 
-    /// Checks that there may be overlays beside the picture.
-    fn check_layout(&self, root: &mut Section<'_>) {
-        if !self.has_strips() {
-            return;
-        }
+    /// A setting that does not go with overlays beside the picture, if one is given.
+    pub fn against_strips(&self) -> Option<&'static str> {
         let image = &self.image;
         let others = [
             ("image.crop", image.crop.is_some()),
             ("image.overscan", image.overscan > 0),
             ("camera.stereo", self.camera.stereo),
         ];
-        if let Some((key, _)) = others.iter().find(|(_, is_given)| *is_given) {
+        others.into_iter().find(|(_, is_given)| *is_given).map(|(key, _)| key)
+    }
+
+    /// Checks that there may be overlays beside the picture.
+    fn check_layout(&self, root: &mut Section<'_>) {
+        if !self.has_strips() {
+            return;
+        }
+        if let Some(key) = self.against_strips() {
             let what = format!(
                 "has overlays beside the picture (layout), which do not go with {key}; remove one of them"
             );

@@ -20,6 +20,19 @@ named!(
 
 named!(Layout: Over = "over", Beside = "beside");
 
+/// The place of one overlay.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OverlayLayout {
+    /// Over the picture where it covers no particles, otherwise beside it.
+    Auto,
+    /// Over the picture.
+    Over,
+    /// Beside the picture.
+    Beside,
+}
+
+named!(OverlayLayout: Auto = "auto", Over = "over", Beside = "beside");
+
 named!(Orientation: Vertical = "vertical", Horizontal = "horizontal");
 
 pub(super) const ABOUT: &[&str] = &[
@@ -101,7 +114,7 @@ pub struct Overlay {
     /// What it shows.
     pub kind: OverlayKind,
     /// Whether it is over or beside the picture; by default as the image says.
-    pub layout: Option<Layout>,
+    pub layout: Option<OverlayLayout>,
     /// The corner; by default the one with the fewest particles.
     pub corner: Option<Corner>,
     /// Distance from the corner as fractions of the height of the picture.
@@ -256,8 +269,9 @@ impl Overlay {
             ),
         }
         keys!(keys:
-            /// Place: over | beside the picture, which is then smaller than the image
+            /// Place: auto | over | beside the picture, which is then smaller than the image
             ///
+            /// auto is over the picture in a corner without particles, and beside it if there is none.
             /// Beside, overlays are at the right, or at the left if their corner is there; horizontal colour bars are
             /// below, or above. offset has no effect then.
             layout => self.layout, example("\"over\""), unset("that of image.layout");

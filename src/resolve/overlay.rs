@@ -1,12 +1,15 @@
 //! Overlays: what they show, where they are, and whether they are dark or light.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 use spherule_formats::element_symbol;
 
 use super::{ResolveError, color};
-use crate::manifest::{ColorSetting, LabelFormat, Manifest, OverlayKind};
+use crate::manifest::{
+    ColorSetting, LabelFormat, Manifest, Overlay as ManifestOverlay, OverlayKind, OverlayLayout,
+};
 use crate::math::functions::exp2;
 use crate::output::view::{srgb_from_linear, view_transform};
 use crate::overlay::{
@@ -118,6 +121,47 @@ fn choose_corners(overlays: &mut [Overlay], page: &Page, view: &FrameView, point
         overlay.placement.corner = boxes.freest(&order, offset, size(overlay), points);
         boxes.add(overlay.placement, size(overlay));
     }
+}
+
+/// Distance of particles from an overlay that covers none, as a fraction of the height of the picture.
+const MARGIN: f32 = 0.015;
+
+/// The manifest with a place for overlays whose layout is `auto`: beside the picture if they cover particles in `setup`.
+pub(super) fn placed<'m>(
+    manifest: &'m Manifest,
+    survey: &Survey,
+    setup: &Setup,
+) -> Cow<'m, Manifest> {
+    let is_open = |overlay: &ManifestOverlay| overlay.layout == Some(OverlayLayout::Auto);
+    let overlays = &setup.picture.files.overlays;
+    // Overlays that show nothing are left out
+    let are_all = overlays.len() == manifest.overlays.len();
+    if !are_all || manifest.against_strips().is_some() || !manifest.overlays.iter().any(is_open) {
+        return Cow::Borrowed(manifest);
+    }
+    // Which of them cover particles
+    let (render, camera) = (&setup.picture.render, &setup.picture.scene.camera);
+    let page = Page::whole(render.width, render.height);
+    let view = first_view(setup, survey, camera);
+    let points = film_points(setup, survey, camera, page.picture);
+    let mut boxes = Boxes::new(page.picture);
+    let covers = overlays.iter().map(|overlay| {
+        let size = overlay.measure(page.size[1], &view);
+        let at = boxes.add(overlay.placement, size).map(|x| x as f32);
+        let margin = MARGIN * page.size[1] as f32;
+        let is_covered = |point: &&[f32; 2]| {
+            (0..2).all(|i| (at[i] - margin..=at[i] + size[i] as f32 + margin).contains(&point[i]))
+        };
+        points.iter().any(|point| is_covered(&point))
+    });
+    let mut placed = manifest.clone();
+    for (overlay, covers) in placed.overlays.iter_mut().zip(covers) {
+        if is_open(overlay) {
+            let layout = if covers { OverlayLayout::Beside } else { OverlayLayout::Over };
+            overlay.layout = Some(layout);
+        }
+    }
+    Cow::Owned(placed)
 }
 
 /// What is beside the picture on its page, linear RGB: the background if it has one colour, or else white.
@@ -347,6 +391,8 @@ fn time_stamp(survey: &Survey) -> Template {
         Some(decimals) => format!("t = {{time:.{decimals}f}}"),
         None => "frame {frame}".to_owned(),
     };
+    let unit = survey.time_unit.as_ref().filter(|_| decimals.is_some());
+    let text = unit.map_or(text.clone(), |unit| format!("{text} {unit}"));
     Template::parse(&text).expect("a text with known variables")
 }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use spherule_jobs::Plan;
 
-use crate::cli::pictures::has_strips;
+use crate::cli::pictures::may_have_strips;
 use crate::job::KIND;
 use crate::manifest::{
     ATTRIBUTE_CHANNEL as ATTRIBUTE, Camera, Image, PixelBounds, ProjectionKind, Side,
@@ -121,7 +121,7 @@ impl ExpectedOutput {
             light_groups,
             has_data_part: find("output.data_compression")
                 .is_some_and(|data| find("output.compression") != Some(data)),
-            is_on_page: has_strips(settings),
+            is_on_page: may_have_strips(settings),
         }))
     }
 }

@@ -54,6 +54,8 @@ const TICK: f32 = 0.3;
 const SMALL_TICK: f32 = 0.16;
 const LABEL_GAP: f32 = 0.5;
 const TITLE_GAP: f32 = 0.5;
+/// The same above a bar with a label at its upper end.
+const GAP_ABOVE_LABEL: f32 = 0.9;
 const SWATCH: f32 = 0.9;
 const SWATCH_PITCH: f32 = 1.4;
 /// Distance of columns of categories.
@@ -137,7 +139,15 @@ impl ColorBar {
             // Half a label may be above the bar
             (true, ColorBarKind::Numbers { .. }) => (0.5 * font::CAP_HEIGHT * size).ceil(),
             (true, ColorBarKind::Categories(_)) => 0.0,
-            (false, _) => (pen.text_size(heading)[1] + TITLE_GAP * size).round(),
+            (false, kind) => {
+                let is_numbers = matches!(kind, ColorBarKind::Numbers { .. });
+                let gap = if is_numbers && self.orientation == Orientation::Vertical {
+                    GAP_ABOVE_LABEL
+                } else {
+                    TITLE_GAP
+                };
+                (pen.text_size(heading)[1] + gap * size).round()
+            }
         }
     }
 
