@@ -387,7 +387,7 @@ fn time_stamp(survey: &Survey) -> Template {
     };
     let is_tiny = |time: f64| step.is_none() && time > 0.0 && time < 1e-4;
     let text = match decimals {
-        Some(_) if survey.largest_time.is_some_and(is_tiny) => "t = {time}".to_owned(),
+        Some(_) if survey.largest_time.is_some_and(is_tiny) => "t = {time:.2e}".to_owned(),
         Some(decimals) => format!("t = {{time:.{decimals}f}}"),
         None => "frame {frame}".to_owned(),
     };
