@@ -63,7 +63,6 @@ pub mod conversion;
 pub mod defaults;
 pub mod job;
 pub mod manifest;
-pub mod metrics;
 pub mod pipeline;
 pub mod prelude;
 pub mod reading;

@@ -2,7 +2,7 @@
 
 use spherule_formats::MemoryBudget;
 
-use crate::metrics::memory::{available, process_room};
+use spherule_files::memory::{available, process_room};
 
 /// Minimum budget, bytes. The survey needs it: a job with a tiny limit should be rejected because of the memory that
 /// its frames need, not because they cannot be surveyed.

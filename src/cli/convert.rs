@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use serde_json::{Value, json};
+use spherule_files::Bytes;
 use spherule_formats::convert;
 use spherule_formats::native::{Bound, Encoding, FORMAT};
 use spherule_formats::sequence::Sequence;
@@ -19,7 +20,6 @@ use super::{CliError, Outcome, events, signals};
 use crate::conversion::{AttributeChoices, ConvertSettings, ConvertedFrame};
 use crate::job::{ConvertJob, RunError, in_thread};
 use crate::manifest::{MAX_THREADS, ProgressMode};
-use crate::metrics::Bytes;
 use crate::reading::conversion_budget;
 
 /// What the user can do if a frame does not fit into the memory limit.

@@ -1,6 +1,7 @@
 //! `[image]` and `[render]`: the size of images, and the settings of tracing.
 
 use glam::Vec3;
+use spherule_files::Bytes;
 
 use super::caustics::Caustics;
 use super::crop::PixelBounds;
@@ -11,7 +12,6 @@ use super::print_size::{DEFAULT_DPI, Side, wrong_size};
 use super::reader::Section;
 use super::value::{Named, named};
 use crate::accel::{BvhLeaves, BvhPreset, SbvhSettings, Structure};
-use crate::metrics::Bytes;
 use crate::overlay::Layout;
 use crate::render::{
     DEFAULT_BOUNCES, DEFAULT_MIN_WEIGHT, DataWindow, FilterKind, IntegratorKind, MAX_BOUNCES,

@@ -8,11 +8,11 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use serde_json::{Value as Json, json};
+use spherule_files::Bytes;
 
 use super::key::Affects;
 use super::keys::{Keys, section};
 use super::value::named;
-use crate::metrics::Bytes;
 
 /// Default name of the file that ends following, next to the images.
 pub const STOP_FILE: &str = "job.stop";

@@ -116,7 +116,7 @@ pub struct RaySummary {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct RssSummary {
-    /// Heap and stacks: [`crate::metrics::MemoryPeaks::anonymous`].
+    /// Heap and stacks: [`spherule_files::memory::MemoryPeaks::anonymous`].
     pub anonymous_peak: u64,
     /// Mapped files.
     pub file_peak: u64,

@@ -4,9 +4,9 @@ use std::fs;
 use std::thread;
 
 use serde::{Deserialize, Serialize};
+use spherule_files::memory;
 
 use crate::accel::simd::SimdLevel;
-use crate::metrics::memory;
 
 /// Hardware and program.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -3,11 +3,12 @@
 use std::path::Path;
 use std::time::Instant;
 
+use spherule_files::memory;
+
 use super::measure::{Builds, Measured, render_settings, trace};
 use super::peaks::Peaks;
 use super::{CellError, CellRequest, Particles, stored};
 use crate::accel::{BuildSettings, TreeBuilder};
-use crate::metrics::memory;
 use crate::render::Film;
 use crate::scale::report::CellMeasurement;
 

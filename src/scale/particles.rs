@@ -1,14 +1,15 @@
 //! The particles of a cell: the box at any count, or a part of a frame of the user.
 
-use crate::math::narrow;
-use glam::Vec3;
+use spherule_files::memory;
 use spherule_formats::generate::{BoxSettings, fill_box, splitmix64};
 use spherule_formats::sequence::{Sequence, SequenceInput};
 use spherule_formats::{ParticleFrame, Radius, is_radius};
 
+use crate::math::narrow;
+use glam::Vec3;
+
 use super::{CellError, CellRequest, FrameSource, Source, Stage};
 use crate::accel::{SphereRadius, Spheres};
-use crate::metrics::memory;
 use crate::reading::read_budget;
 use crate::scene::Bounds;
 use crate::survey::{ColorQuestion, Fit, Question, RadiusQuestion, Survey};

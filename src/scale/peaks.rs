@@ -6,7 +6,8 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use crate::metrics::MemoryUse;
+use spherule_files::memory::MemoryUse;
+
 use crate::report::frame::RssSummary;
 
 /// Sampling interval: short enough for allocations that last as long as a phase of a build of 1e6.

@@ -1,12 +1,12 @@
 //! Names, frame ranges and sizes.
 
 use serde_json::{Value as Json, json};
+use spherule_files::Bytes;
 use spherule_jobs::FrameRange;
 
 use super::{Fault, FlagKind, Value, list, quoted};
 use crate::manifest::field::Field;
 use crate::manifest::key::Key;
-use crate::metrics::Bytes;
 
 /// A name is text that is not blank.
 const NAME_PATTERN: &str = r"\S";

@@ -2,12 +2,12 @@
 
 use std::fmt::Write as _;
 
+use spherule_files::counted;
 use spherule_formats::escape_controls;
 
 use super::{
     CellMeasurement, CellReport, Column, FAILED, MIB, MISSING, ScaleReport, Spread, parts,
 };
-use crate::metrics::counted;
 use crate::scale::{Budget, Motion};
 
 /// All tables with their headings.
