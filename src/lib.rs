@@ -70,7 +70,6 @@ pub mod report;
 pub mod resolve;
 #[cfg(feature = "reports")]
 pub mod scale;
-pub mod selection;
 pub mod still;
 pub mod survey;
 #[cfg(feature = "reports")]
@@ -79,5 +78,6 @@ pub mod viewer;
 #[cfg(feature = "movies")]
 pub use spherule_images::movie;
 pub use spherule_images::{hdr, output, overlay, picture};
+pub use spherule_selection as selection;
 pub use spherule_tracer::{denoise, render, scene, surface};
 pub use spherule_tree::{accel, math, ray};

@@ -1,9 +1,9 @@
 //! The values that names in a condition stand for, loaded for blocks of particles.
 
 use glam::DVec3;
-use spherule_formats::{Attribute, Positions, RawParticles, names};
 use spherule_frame::values::{BoundValue, Column, Context, Named, Value};
 use spherule_frame::with_values;
+use spherule_frame::{Attribute, Positions, RawParticles, names};
 
 use super::condition::NameUse;
 

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use glam::{DVec3, Vec3};
-use spherule_formats::{Attribute, Positions, Sequence, SequenceInput};
+use spherule_formats::{Sequence, SequenceInput, name_code};
+use spherule_frame::{Attribute, Positions};
 
 use super::*;
 
@@ -218,7 +219,7 @@ fn names_without_a_value_are_found() {
 /// Counts and sums of indices by numpy: tests/data/selection/make.py.
 #[test]
 fn counts_are_those_of_numpy() {
-    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/selection");
+    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/selection");
     let input = SequenceInput::from_path(directory.join("particles.npz"));
     let sequence = Sequence::open(&input).expect("a frame");
     let all = sequence.load_raw(0).expect("readable");
@@ -258,7 +259,7 @@ fn with_text() -> RawParticles {
     };
     let parts = [(0, "fluid"), (2, "/World/Wall"), (7, "8")];
     let parts = parts.map(|(number, name)| (number, name.to_owned())).into_iter().collect();
-    let water = i32::try_from(spherule_formats::name_code("water")).expect("small");
+    let water = i32::try_from(name_code("water")).expect("small");
     RawParticles {
         positions: Positions::F32(vec![Vec3::ZERO; 4]),
         attributes: vec![

@@ -1,7 +1,7 @@
 //! Evaluates a condition for blocks of particles: each operation runs over a whole block before the next one, so that
 //! its loop is the same for all conditions and the compiler makes vector instructions of it.
 
-use spherule_formats::Attribute;
+use spherule_frame::Attribute;
 use spherule_frame::values::BoundValue;
 
 use super::condition::{Arithmetic, Comparison, Operation};

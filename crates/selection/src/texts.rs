@@ -1,9 +1,10 @@
 //! The numbers that texts in a condition stand for: names of parts, symbols of elements, and species.
 
-use spherule_formats::{Labels, element_symbol, name_code, names};
+use spherule_formats::{element_symbol, name_code};
+use spherule_frame::values::Value;
+use spherule_frame::{Labels, names};
 
 use super::values::UnknownName;
-use spherule_frame::values::Value;
 
 /// Columns whose numbers readers make from names of elements and species.
 const SPECIES: [&str; 4] = ["element", "species", "symbol", "typelabel"];

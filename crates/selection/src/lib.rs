@@ -1,12 +1,41 @@
-//! Selects the particles of a frame that are drawn: by a condition on their values, by their ids, and by regions.
+//! Which particles of a frame are drawn: by a condition on their values, by their ids, and by regions.
 //!
-//! The others are left out after a frame has been read, before anything is computed from it.
+//! - [`Condition`]: a comparison of values such as `speed > 2 && z < 0.5`, parsed from text. Errors name the character.
+//! - [`Region`]: half-spaces, boxes and slabs.
+//! - [`Selection`]: those that must hold for a particle. [`Selection::survivors`] finds the particles of a frame, in
+//!   blocks and in parallel; the result does not depend on the number of threads.
+//!
+//! The other particles are left out after a frame has been read, before anything is computed from it. This crate knows
+//! no settings, and opens no files; `spherule-frame` says what the names of values mean.
+//!
+//! ```
+//! use spherule_frame::{Attribute, AttributeData, Positions, RawParticles};
+//! use spherule_selection::{Condition, Selection};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let particles = RawParticles {
+//!     positions: Positions::F32(vec![glam::Vec3::ZERO; 3]),
+//!     attributes: vec![Attribute {
+//!         name: "density".to_owned(),
+//!         components: 1,
+//!         data: AttributeData::F32(vec![998.0, 1001.0, 1004.0]),
+//!     }],
+//!     ..RawParticles::default()
+//! };
+//! let selection =
+//!     Selection { condition: Some(Condition::parse("density > 1000")?), ..Selection::default() };
+//! let survivors = selection.survivors(&particles).expect("the frame has densities");
+//! assert_eq!(survivors, [1, 2]);
+//! # Ok(())
+//! # }
+//! ```
+#![deny(unsafe_code)]
 
 use glam::DVec3;
 use rayon::prelude::*;
 use spherule_formats::order::index_u32;
-use spherule_formats::{Attribute, AttributeData, Labels, RawParticles};
 use spherule_frame::values::{BoundValue, Named, Value, id_of};
+use spherule_frame::{Attribute, AttributeData, Labels, RawParticles};
 use spherule_jobs::FrameRange;
 
 mod condition;
@@ -122,7 +151,6 @@ impl Selection {
         let texts: Vec<TextValue<BoundValue<&Attribute>>> =
             texts.iter().filter_map(bound).collect();
         let ids = id_of(&particles.attributes);
-        // Mark the particles that are drawn, and count them
         let mut marks = vec![false; count];
         let runs = marks.par_chunks_mut(RUN).enumerate();
         let counts: Vec<usize> = runs
@@ -140,26 +168,7 @@ impl Selection {
                 marks.iter().map(|mark| usize::from(*mark)).sum()
             })
             .collect();
-        // Store their indices
-        let mut survivors = vec![0; counts.iter().sum()];
-        let mut rest = &mut survivors[..];
-        let mut parts = Vec::with_capacity(counts.len());
-        for count in counts {
-            let (part, after) = rest.split_at_mut(count);
-            parts.push(part);
-            rest = after;
-        }
-        let runs = marks.par_chunks(RUN).zip(parts).enumerate();
-        runs.for_each(|(run, (marks, mut to))| {
-            for (block, keep) in marks.chunks(BLOCK).enumerate() {
-                let mut kept = [0; BLOCK];
-                let count = indices_of(run * RUN + block * BLOCK, keep, &mut kept);
-                let (part, after) = to.split_at_mut(count);
-                part.copy_from_slice(&kept[..count]);
-                to = after;
-            }
-        });
-        Ok(survivors)
+        Ok(marked_indices(&marks, &counts))
     }
 
     /// Clears the marks of particles without a selected id.
@@ -189,6 +198,29 @@ impl Selection {
             }
         }
     }
+}
+
+/// The indices of the marked particles, with the `counts` of marks in each run.
+fn marked_indices(marks: &[bool], counts: &[usize]) -> Vec<u32> {
+    let mut indices = vec![0; counts.iter().sum()];
+    let mut rest = &mut indices[..];
+    let mut parts = Vec::with_capacity(counts.len());
+    for count in counts {
+        let (part, after) = rest.split_at_mut(*count);
+        parts.push(part);
+        rest = after;
+    }
+    let runs = marks.par_chunks(RUN).zip(parts).enumerate();
+    runs.for_each(|(run, (marks, mut to))| {
+        for (block, keep) in marks.chunks(BLOCK).enumerate() {
+            let mut kept = [0; BLOCK];
+            let count = indices_of(run * RUN + block * BLOCK, keep, &mut kept);
+            let (part, after) = to.split_at_mut(count);
+            part.copy_from_slice(&kept[..count]);
+            to = after;
+        }
+    });
+    indices
 }
 
 /// Writes the indices of the marked particles of a block, and returns their number.
