@@ -62,7 +62,6 @@ pub mod cli;
 pub mod conversion;
 pub mod defaults;
 pub mod job;
-pub mod manifest;
 pub mod pipeline;
 pub mod prelude;
 pub mod reading;
@@ -78,6 +77,7 @@ pub mod viewer;
 #[cfg(feature = "movies")]
 pub use spherule_images::movie;
 pub use spherule_images::{hdr, output, overlay, picture};
+pub use spherule_manifest as manifest;
 pub use spherule_selection as selection;
 pub use spherule_tracer::{denoise, render, scene, surface};
 pub use spherule_tree::{accel, math, ray};
