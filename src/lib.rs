@@ -65,19 +65,19 @@ pub mod job;
 pub mod pipeline;
 pub mod prelude;
 pub mod reading;
-pub mod report;
 pub mod resolve;
 #[cfg(feature = "reports")]
 pub mod scale;
 pub mod still;
 pub mod survey;
-#[cfg(feature = "reports")]
-pub mod viewer;
 
 #[cfg(feature = "movies")]
 pub use spherule_images::movie;
 pub use spherule_images::{hdr, output, overlay, picture};
 pub use spherule_manifest as manifest;
+pub use spherule_report as report;
+#[cfg(feature = "reports")]
+pub use spherule_report::viewer;
 pub use spherule_selection as selection;
 pub use spherule_tracer::{denoise, render, scene, surface};
 pub use spherule_tree::{accel, math, ray};

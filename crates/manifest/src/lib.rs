@@ -5,8 +5,8 @@
 //! ([`key_flags`]) all come from these declarations.
 //!
 //! - [`Manifest`]: the settings. [`Manifest::settings`] are those that images depend on, which a job stores.
-//! - [`ManifestSource`]: a file that can be read again with other defaults. [`Override`]s, such as options of the command
-//!   line, replace its values; a [`Look`] is a named set of defaults.
+//! - [`ManifestSource`]: a file that can be read again with other defaults. [`Override`]s, such as options of the
+//!   command line, replace its values; a [`Look`] is a named set of defaults.
 //! - [`ManifestError`]: all problems at once, each with line and column (or the option), key and remedy.
 //!
 //! This crate opens no file but manifests, and never sees a particle: `spherule::resolve` determines the meaning of

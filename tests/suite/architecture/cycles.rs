@@ -10,7 +10,7 @@ use super::root;
 use super::source::{ModulePath, code, files};
 
 /// Directories of crates, and how many files they have at least.
-const SOURCES: [(&str, usize); 11] = [
+const SOURCES: [(&str, usize); 12] = [
     ("src", 100),
     ("jobs/src", 30),
     ("formats/src", 30),
@@ -22,6 +22,7 @@ const SOURCES: [(&str, usize); 11] = [
     ("crates/images/src", 40),
     ("crates/selection/src", 8),
     ("crates/manifest/src", 40),
+    ("crates/report/src", 15),
 ];
 
 /// The modules of a crate.

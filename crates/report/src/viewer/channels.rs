@@ -2,8 +2,8 @@
 
 use colorous::VIRIDIS;
 
-use crate::output::view::byte_from_linear;
-use crate::picture::{Picture, SampledPlanes};
+use spherule_images::output::view::byte_from_linear;
+use spherule_images::picture::{Picture, SampledPlanes};
 
 /// A channel that can be shown.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -2,8 +2,8 @@
 
 use super::JobReport;
 use super::numbers::{MIB, float};
-use crate::report::FrameReport;
-use crate::report::plots::{Axis, Plot, Series};
+use crate::FrameReport;
+use crate::plots::{Axis, Plot, Series};
 
 /// Number of distinct colours.
 const MAX_PHASES: usize = 7;

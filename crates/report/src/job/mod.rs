@@ -1,14 +1,14 @@
 //! The current state of a job, from its ledger: `report.json` for scripts and `report.html` for people, both from one
 //! [`JobReport`].
 
-#[cfg(feature = "reports")]
+#[cfg(feature = "pages")]
 mod frames;
-#[cfg(feature = "reports")]
+#[cfg(feature = "pages")]
 mod html;
 mod json;
-#[cfg(feature = "reports")]
+#[cfg(feature = "pages")]
 mod numbers;
-#[cfg(feature = "reports")]
+#[cfg(feature = "pages")]
 mod plots;
 #[cfg(test)]
 mod tests;
@@ -19,10 +19,9 @@ use std::path::Path;
 
 use serde_json::Value;
 use spherule_jobs::{FrameState, JobState, LedgerEntry, PlannedFrame, publish, read_regular_text};
+use spherule_tree::accel::simd::SimdLevel;
 
 use super::frame::FrameReport;
-use crate::accel::simd::SimdLevel;
-use crate::manifest::Manifest;
 
 /// Name of the report for scripts, next to the images.
 pub const JSON_FILE: &str = "report.json";
@@ -39,7 +38,7 @@ pub struct JobReport {
     frames: Vec<JobFrame>,
     /// Sums over the finished frames; for memory, the largest value.
     totals: FrameReport,
-    /// Keys and values of the manifest.
+    /// Keys and values.
     settings: Vec<(String, String)>,
     machine: Machine,
 }
@@ -89,18 +88,16 @@ impl Status {
 }
 
 impl JobReport {
-    /// A report from plan, ledger and disk.
-    pub fn new(state: &JobState, manifest: &Manifest) -> Self {
+    /// A report from plan, ledger and disk, with the `settings` of this run.
+    pub fn new(state: &JobState, settings: Vec<(String, String)>) -> Self {
         let frames =
             state.plan().frames().iter().map(|planned| JobFrame::new(state, planned)).collect();
-        Self::of(frames, manifest.settings(), Machine::this())
+        Self::of(frames, settings, Machine::this())
     }
 
-    /// A report of a job whose manifest is not needed: its settings are those of the plan.
+    /// A report whose settings are those of the plan.
     pub fn of_plan(state: &JobState) -> Self {
-        let frames =
-            state.plan().frames().iter().map(|planned| JobFrame::new(state, planned)).collect();
-        Self::of(frames, state.plan().settings().to_vec(), Machine::this())
+        Self::new(state, state.plan().settings().to_vec())
     }
 
     fn of(frames: Vec<JobFrame>, settings: Vec<(String, String)>, machine: Machine) -> Self {
@@ -111,11 +108,11 @@ impl JobReport {
         Self { frames, totals, settings, machine }
     }
 
-    /// Names and contents of the report files. The page needs the feature `reports`.
+    /// Names and contents of the report files. The page needs the feature `pages`.
     pub fn files(&self) -> Vec<(&'static str, String)> {
         vec![
             (JSON_FILE, format!("{:#}\n", self.to_json())),
-            #[cfg(feature = "reports")]
+            #[cfg(feature = "pages")]
             (HTML_FILE, self.to_html()),
         ]
     }

@@ -13,7 +13,7 @@ use plotters_backend::{
     BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingBackend, DrawingErrorKind,
 };
 
-use crate::report::escape::escaped;
+use crate::escape::escaped;
 
 /// Represents the colour of text.
 pub(super) const INK: RGBColor = RGBColor(0, 0, 0);

@@ -3,7 +3,7 @@
 use serde_json::json;
 
 use super::*;
-use crate::report::frame::{FrameBytes, RaySummary, StageSeconds};
+use crate::frame::{FrameBytes, RaySummary, StageSeconds};
 
 fn done(number: i64, particles: u64) -> JobFrame {
     #[expect(clippy::cast_precision_loss, reason = "small numbers")]

@@ -2,7 +2,7 @@
 
 use super::numbers::{count, float, mib, seconds, short, shortened};
 use super::{JobFrame, JobReport, Status};
-use crate::report::page::{Page, Table};
+use crate::page::{Page, Table};
 
 /// Maximum number of rows in the table of frames.
 const MAX_FRAMES: usize = 300;

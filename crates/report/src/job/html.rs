@@ -4,9 +4,9 @@ use spherule_jobs::FrameRange;
 
 use super::numbers::{bytes, count, duration, seconds as time, short, shortened};
 use super::{JobReport, Status};
-use crate::report::FrameReport;
-use crate::report::THESIS_BYTES_PER_PARTICLE;
-use crate::report::page::{Page, Table};
+use crate::FrameReport;
+use crate::THESIS_BYTES_PER_PARTICLE;
+use crate::page::{Page, Table};
 
 /// Maximum length of a list of frame numbers or of a setting, in characters.
 const MAX_TEXT: usize = 300;

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use spherule_formats::is_control;
+use spherule_files::is_control;
 
 /// Text for elements and quoted attributes of HTML. Control characters, which HTML forbids, and characters that
 /// change the direction of text are replaced by escape sequences.

@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 use super::Line;
 use super::drawn::Drawn;
 use super::svg::FINE;
-use crate::report::escape::escaped;
+use crate::escape::escaped;
 
 /// Colours on white, by hue.
 const COLORS: [&str; 7] =

@@ -2,10 +2,11 @@
 
 use std::io::Read;
 
+use spherule_images::picture::PlaneSamples;
+
 use flate2::read::ZlibDecoder;
 
 use super::*;
-use crate::picture::PlaneSamples;
 
 fn settings() -> ViewerSettings {
     ViewerSettings {

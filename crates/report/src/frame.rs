@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use crate::accel::BuildReport;
-use crate::render::RayCounts;
+use spherule_tracer::render::RayCounts;
+use spherule_tree::accel::BuildReport;
 
 /// Measurements of one image. Times are wall-clock seconds, sizes are bytes.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -266,7 +266,7 @@ const fn float(count: u64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::Structure;
+    use spherule_tree::accel::Structure;
 
     fn built(file_bytes: u64) -> BuildReport {
         BuildReport {

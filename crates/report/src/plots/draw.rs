@@ -9,7 +9,7 @@ use super::axis::Span;
 use super::drawn::Drawn;
 use super::svg::{FINE, GRID, INK, SERIES, SvgText};
 use super::{Line, Plot, key};
-use crate::report::escape::escaped;
+use crate::escape::escaped;
 
 /// Width of a plot, in units in which a line of text is [`FONT`] high.
 const WIDTH: i32 = 440;

@@ -9,13 +9,13 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use serde_json::{Value, json};
+use spherule_images::file::ImageReadError;
+use spherule_images::output::data_url;
+use spherule_images::picture::{MARKER, Picture, SampledPlanes, read_planes};
 use thiserror::Error;
 
-use crate::output::data_url;
-use crate::picture::{MARKER, Picture, SampledPlanes, read_planes};
-use crate::report::page::Page;
-use crate::report::plots::Plot;
-use spherule_images::file::ImageReadError;
+use crate::page::Page;
+use crate::plots::Plot;
 
 mod channels;
 mod ids;

@@ -12,12 +12,13 @@
 use std::collections::HashMap;
 use std::io::{self, Write};
 
+use spherule_images::output::base64;
+use spherule_images::picture::SampledPlanes;
+
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 
 use super::channels::{length, vector};
-use crate::output::base64;
-use crate::picture::SampledPlanes;
 
 /// Id of pixels without particle.
 const NO_ID: u32 = u32::MAX;

@@ -6,7 +6,7 @@ use std::thread;
 use serde::{Deserialize, Serialize};
 use spherule_files::memory;
 
-use crate::accel::simd::SimdLevel;
+use spherule_tree::accel::simd::SimdLevel;
 
 /// Hardware and program.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
