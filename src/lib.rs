@@ -69,7 +69,6 @@ pub mod resolve;
 #[cfg(feature = "reports")]
 pub mod scale;
 pub mod still;
-pub mod survey;
 
 #[cfg(feature = "movies")]
 pub use spherule_images::movie;
@@ -79,5 +78,6 @@ pub use spherule_report as report;
 #[cfg(feature = "reports")]
 pub use spherule_report::viewer;
 pub use spherule_selection as selection;
+pub use spherule_survey as survey;
 pub use spherule_tracer::{denoise, render, scene, surface};
 pub use spherule_tree::{accel, math, ray};

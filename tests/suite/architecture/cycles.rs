@@ -10,7 +10,7 @@ use super::root;
 use super::source::{ModulePath, code, files};
 
 /// Directories of crates, and how many files they have at least.
-const SOURCES: [(&str, usize); 12] = [
+const SOURCES: [(&str, usize); 13] = [
     ("src", 100),
     ("jobs/src", 30),
     ("formats/src", 30),
@@ -23,6 +23,7 @@ const SOURCES: [(&str, usize); 12] = [
     ("crates/selection/src", 8),
     ("crates/manifest/src", 40),
     ("crates/report/src", 15),
+    ("crates/survey/src", 15),
 ];
 
 /// The modules of a crate.

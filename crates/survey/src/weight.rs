@@ -1,14 +1,14 @@
 //! What a sampled frame takes, from which the memory of other frames is predicted.
 
-use crate::math::narrow;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use spherule_formats::{Positions, Radius, RawParticles, choose_origin, find_radius, is_near};
+use spherule_tracer::surface::{SurfaceSettings, SurfaceSize};
+use spherule_tree::math::narrow;
 
 use super::RadiusQuestion;
 use super::packing::Spacing;
 use super::robust::{median, robust_bounds};
-use crate::surface::{SurfaceSettings, SurfaceSize};
 
 /// Maximum number of frames whose surface is surveyed.
 const MAX_SURFACES: usize = 6;
@@ -147,8 +147,12 @@ mod tests {
         // Half the particles are drawn
         let scaled = weight.scaled(200, 1.0, Some(2.0));
         assert_eq!((scaled.particles, scaled.spray), (100, 20));
-        let grid =
-            crate::surface::smooth::GridSize { particles: 40, near: 40, bricks: 4000, field: 400 };
+        let grid = spherule_tracer::surface::smooth::GridSize {
+            particles: 40,
+            near: 40,
+            bricks: 4000,
+            field: 400,
+        };
         let size = SurfaceSize { grid: Some(grid), ..size };
         let smooth = SurfaceWeight { size, ..weight };
         let bricks = |voxel, radius| smooth.scaled(100, voxel, radius).grid.map(|g| g.bricks);

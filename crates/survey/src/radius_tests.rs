@@ -5,9 +5,9 @@ use spherule_formats::sequence::Sequence;
 use spherule_formats::{
     ParticleFrame, PositionSlice, Positions, RawParticles, SequenceInput, native, write,
 };
+use spherule_selection::Condition;
 
 use super::*;
-use crate::selection::Condition;
 
 /// Numbers from 0 to 1.
 fn random(count: usize, mut state: u32) -> impl Iterator<Item = f32> {

@@ -1,9 +1,9 @@
 //! Coarse-grained beads, whose names are like those of elements: they are farther apart than atoms.
 
 use spherule_formats::Attribute;
+use spherule_tracer::scene::RadiusTable;
 
 use super::robust::{SAMPLE, sorted_sample};
-use crate::scene::RadiusTable;
 
 /// How many times the distance of bonded atoms that of neighbours is in coarse-grained models; it is at most 1.2 in metals.
 const APART: f64 = 1.3;

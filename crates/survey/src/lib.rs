@@ -1,24 +1,54 @@
-//! Determines the meaning of "auto" for a sequence, once, from a sample of its frames: the origin, the box that the
-//! camera frames, the particle radius, the range of the colour map.
+//! What a sequence of frames contains, from a sample of them: it determines the meaning of "auto", once for all frames.
 //!
-//! It uses percentiles and not extremes, so that a single outlier neither shrinks the picture nor reduces the
-//! contrast of colours. The result is stored with the job, so that all frames, runs and machines use the same values.
-
-use crate::math::narrow;
-use std::collections::BTreeMap;
+//! - [`Survey`]: the origin, the box that the camera frames, the particle radius, the range of the colour map, and how
+//!   much memory a frame needs. A [`Question`] says which of them, and for which particles.
+//! - [`Facts`]: what the particles look like (elements, grains, categories, walls, tanks), from which defaults follow.
+//!
+//! A survey uses percentiles and not extremes, so that a single outlier neither shrinks the picture nor reduces the
+//! contrast of colours. It is stored with the job, so that all frames, runs and machines use the same values. This crate
+//! decides nothing: it knows no settings, and `spherule` makes scenes and defaults of what it finds.
+//!
+//! ```
+//! use spherule_formats::{PositionSlice, RawParticles};
+//! use spherule_survey::{ColorQuestion, Fit, Question, RadiusQuestion, Survey};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! // A cube of 1000 particles
+//! let at = |i: u16| glam::Vec3::new(f32::from(i % 10), f32::from(i / 10 % 10), f32::from(i / 100));
+//! let positions: Vec<glam::Vec3> = (0..1000).map(at).collect();
+//! let particles = RawParticles {
+//!     positions: PositionSlice::F32(&positions),
+//!     attributes: Vec::new(),
+//!     ..RawParticles::default()
+//! };
+//! let question = Question {
+//!     color: ColorQuestion::None,
+//!     radius: RadiusQuestion::Auto,
+//!     up: None,
+//!     points: false,
+//!     selection: None,
+//!     fit: Fit::All,
+//!     framed: None,
+//!     surface: None,
+//! };
+//! let survey = Survey::of_particles("cube", &particles, question)?;
+//! assert_eq!(survey.radius, Some(0.5));
+//! # Ok(())
+//! # }
+//! ```
+#![deny(unsafe_code)]
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{
-    Attribute, FrameError, Labels, ParticleFrame, PositionSlice, Radius, RawParticles,
-    SimulationCell, choose_origin, sample_indices,
+    Attribute, FrameError, Labels, PositionSlice, RawParticles, SimulationCell,
 };
 
-pub use spherule_frame::values::{PART_NAMES, id_of, part_of, shown_name, velocity_of};
+use spherule_selection::Selection;
+use spherule_tracer::scene::{RadiusTable, RgbEncoding, is_rgb};
 
-use crate::scene::{RadiusTable, RgbEncoding, is_rgb};
-use crate::selection::Selection;
+pub use spherule_frame::values::{PART_NAMES, id_of, part_of, shown_name, velocity_of};
 
 mod beads;
 mod color;
@@ -34,33 +64,26 @@ mod sheet;
 mod standing;
 mod stream;
 mod tank;
+mod totals;
 mod upright;
 mod walls;
 mod weight;
 
 pub use color::{Categories, ColorQuestion, ColorRange, MAX_CATEGORIES, RangeQuestion, range_of};
-use color::{ColorTotals, FrameContext};
-use facts::flat_axis;
 pub use facts::{BEAD, Category, ELEMENT, Elements, Facts};
 pub use grains::GrainRadius;
-use moments::Moments;
-use outline::Outermost;
 pub use outline::{Fit, Outline};
-use packing::{Spacing, SpacingRequest};
-use robust::{RobustBounds, robust_bounds, robust_largest, sample_of, sorted_sample};
+use packing::SpacingRequest;
 use sample::FrameSample;
 pub use shape::Axes;
-use standing::standing;
 pub use tank::Tank;
+use totals::Totals;
 pub use walls::{WallSign, WallValues};
 use weight::has_surface;
 pub use weight::{FrameWeight, SurfaceQuestion, SurfaceWeight};
 
 /// Maximum number of frames to sample; evenly distributed, including the first and the last one.
 const FRAMES: usize = 24;
-
-/// Maximum number of positions to keep.
-const POINTS: usize = 2048;
 
 /// Result of a survey.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -261,53 +284,6 @@ impl RadiusQuestion<'_> {
     }
 }
 
-/// Running totals over the frames.
-struct Totals {
-    bounds: Option<RobustBounds>,
-    outermost: Outermost,
-    standing: f64,
-    bottom_standing: Option<f64>,
-    lowest: Option<f64>,
-    cells: Vec<SimulationCell>,
-    /// The spacing in each frame, with its number of particles.
-    spacings: Vec<(u64, Spacing)>,
-    has_radii: bool,
-    reach: f32,
-    color: ColorTotals,
-    labels: Labels,
-    points: Vec<DVec3>,
-    velocity: Option<String>,
-    rgb: Option<RgbAttribute>,
-    attributes: BTreeMap<String, usize>,
-    most_particles: usize,
-    frames: usize,
-    weight: Option<FrameWeight>,
-    surfaces: Vec<SurfaceWeight>,
-    origin: Origins,
-    moments: Moments,
-}
-
-/// Origins of the coordinates in native frames.
-#[derive(Clone, Copy, PartialEq)]
-enum Origins {
-    /// No frame so far.
-    None,
-    /// All frames have this origin.
-    Shared(DVec3),
-    /// Origins differ, or there are frames of other formats.
-    Mixed,
-}
-
-impl Origins {
-    fn and(self, origin: Option<DVec3>) -> Self {
-        match (self, origin) {
-            (Self::None, Some(origin)) => Self::Shared(origin),
-            (Self::Shared(shared), Some(origin)) if shared == origin => self,
-            _ => Self::Mixed,
-        }
-    }
-}
-
 /// Fraction of the extent along an axis within which the outermost layer of particles lies if they rest on a floor: a
 /// ball has much less of its volume there, a box or a heap more.
 const FLOOR: f64 = 0.02;
@@ -424,254 +400,12 @@ impl Survey {
     }
 }
 
-/// The median of an estimate over the frames, weighted by their particle counts: neither frames with few particles nor
-/// a lattice at the start decides.
-fn of_frames(
-    spacings: &[(u64, Spacing)],
-    estimate: impl Fn(&Spacing) -> Option<f32>,
-) -> Option<f32> {
-    let estimates =
-        spacings.iter().filter_map(|(count, spacing)| Some((estimate(spacing)?, *count)));
-    let mut estimates: Vec<(f32, u64)> = estimates.collect();
-    estimates.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-    let all: u64 = estimates.iter().map(|(_, count)| count).sum();
-    let mut below = 0;
-    let median = estimates.iter().find(|(_, count)| {
-        below += count;
-        2 * below >= all
-    });
-    median.map(|(estimate, _)| *estimate)
-}
-
 /// Up to [`FRAMES`] indices below `count`, evenly distributed.
 fn spread(count: usize) -> Vec<usize> {
     if count <= FRAMES {
         return (0..count).collect();
     }
     (0..FRAMES).map(|i| i * (count - 1) / (FRAMES - 1)).collect()
-}
-
-impl Totals {
-    fn new() -> Self {
-        Self {
-            bounds: None,
-            outermost: Outermost::default(),
-            standing: 0.0,
-            bottom_standing: None,
-            lowest: None,
-            cells: Vec::new(),
-            spacings: Vec::new(),
-            has_radii: false,
-            reach: 0.0,
-            color: ColorTotals::default(),
-            labels: Labels::new(),
-            points: Vec::new(),
-            velocity: None,
-            rgb: None,
-            attributes: BTreeMap::new(),
-            most_particles: 0,
-            frames: 0,
-            weight: None,
-            surfaces: Vec::new(),
-            origin: Origins::None,
-            moments: Moments::default(),
-        }
-    }
-
-    /// Adds a frame, which the camera shows if it `is_framed`.
-    fn add(&mut self, sample: FrameSample, question: Question, up: DVec3, is_framed: bool) {
-        self.frames += 1;
-        self.origin = self.origin.and(sample.origin);
-        let FrameSample { particles: raw, count, extremes, spacing, mut weight, .. } = sample;
-        for attribute in &raw.attributes {
-            let components = self.attributes.entry(attribute.name.clone()).or_insert(0);
-            *components = attribute.components.max(*components);
-        }
-        for (column, labels) in &raw.labels {
-            self.labels.entry(column.clone()).or_default().extend(labels.clone());
-        }
-        // Extend the bounds
-        let found = robust_bounds(&raw.positions, extremes);
-        self.bounds = match (self.bounds, found) {
-            (Some(before), Some(found)) => Some(before.and(found)),
-            (before, found) => before.or(found),
-        };
-        if is_framed {
-            self.outermost.add(&raw.positions, count);
-        }
-        let standing = standing(&sample_of(&raw.positions), count, up);
-        self.standing = self.standing.max(standing);
-        let is_new = |cell: &SimulationCell| !self.cells.contains(cell);
-        if let Some(cell) = raw.cell.filter(is_new) {
-            self.cells.push(cell);
-        }
-        // Find velocity and colours
-        if self.velocity.is_none() {
-            self.velocity = velocity_of(&raw.attributes).map(|a| a.name.clone());
-        }
-        if self.rgb.is_none() {
-            self.rgb = match question.color {
-                ColorQuestion::None => None,
-                ColorQuestion::Speed(_) => RgbAttribute::of(&raw.attributes, None),
-                ColorQuestion::Value(name, _) => RgbAttribute::of(&raw.attributes, Some(name)),
-            };
-        }
-        let origin =
-            self.bounds.map_or(DVec3::ZERO, |bounds| choose_origin(bounds.outer.0, bounds.outer.1));
-        // Count particles, and remember the heaviest frame
-        let sampled = raw.positions.len();
-        let frame = ParticleFrame::from_raw(raw, origin);
-        // In a sample, only the sampled particles are checked for being finite.
-        let count = count - (sampled - frame.len());
-        self.most_particles = self.most_particles.max(count);
-        if !weight.in_place {
-            weight.own_radii = matches!(frame.radius, Some(Radius::PerParticle(_)));
-        }
-        if self.weight.is_none_or(|heaviest| weight.raw > heaviest.raw) {
-            self.weight = Some(weight);
-        }
-        // Update the ranges of colour and radius
-        let context = FrameContext { frame: &frame, count, origin, up, radius: question.radius };
-        let velocity = self.velocity.as_deref();
-        self.color.add(velocity, question.color, context);
-        if question.points && is_framed {
-            let some = sample_indices(frame.len(), POINTS).map(|i| frame.positions[i]);
-            self.points.extend(some.map(|p| origin + p.as_dvec3()));
-        }
-        match question.radius {
-            RadiusQuestion::None => {}
-            RadiusQuestion::Given => {
-                self.spacings.extend(spacing.map(|spacing| (weight.particles, spacing)));
-            }
-            RadiusQuestion::Auto | RadiusQuestion::AutoOfBody => {
-                self.add_radius(&frame, weight.particles, spacing);
-                if let Some(Radius::PerParticle(radii)) = &frame.radius {
-                    self.add_lowest(&frame, origin, up, |i| radii[i]);
-                }
-            }
-            RadiusQuestion::Attribute(..) | RadiusQuestion::Table(..) => {
-                let radius = |i| question.radius.radius_by_attribute(&frame.attributes, i);
-                let radius = |i| narrow(radius(i).unwrap_or_default());
-                self.reach = self.reach.max(robust_largest(frame.len(), radius));
-                self.add_lowest(&frame, origin, up, radius);
-            }
-        }
-    }
-
-    /// Adds the lowest place of the spheres of a frame, whose particles have these radii.
-    fn add_lowest(
-        &mut self,
-        frame: &ParticleFrame,
-        origin: DVec3,
-        up: DVec3,
-        radius: impl Fn(usize) -> f32,
-    ) {
-        let bottom = |i: usize| {
-            let center = origin + frame.positions[i].as_dvec3();
-            center.dot(up) - f64::from(radius(i))
-        };
-        let bottoms = sorted_sample(frame.len(), bottom);
-        let found = bottoms.get(bottoms.len() / 1000).copied();
-        self.lowest = self.lowest.into_iter().chain(found).reduce(f64::min);
-        // Grains of different sizes stand on their lowest points
-        let sample: Vec<DVec3> = bottoms.into_iter().map(|bottom| bottom * up).collect();
-        let standing = standing(&sample, frame.len(), up);
-        self.bottom_standing = Some(self.bottom_standing.unwrap_or(0.0).max(standing));
-    }
-
-    /// Adds the size of the surface of frame `index`. Large frames are read as a whole for it, as they are when they are
-    /// rendered; nothing is known of one that cannot be read.
-    fn add_surface(
-        &mut self,
-        sequence: &Sequence,
-        index: usize,
-        sample: &FrameSample,
-        question: Question,
-    ) {
-        let Some(surface) = question.surface else {
-            return;
-        };
-        let place = (index, sample.weight.particles);
-        let weight = |raw: &RawParticles| {
-            SurfaceWeight::of(raw, place, sample.spacing, surface, question.radius)
-        };
-        let found = if sample.is_part() {
-            sequence.load_raw(index).ok().and_then(|raw| weight(&raw))
-        } else {
-            weight(&sample.particles)
-        };
-        self.surfaces.extend(found);
-    }
-
-    /// Adds the radii of `frame`, which has `count` particles before the selection.
-    fn add_radius(&mut self, frame: &ParticleFrame, count: u64, spacing: Option<Spacing>) {
-        match &frame.radius {
-            Some(Radius::Common(radius)) => {
-                self.has_radii = true;
-                self.reach = self.reach.max(*radius);
-            }
-            Some(Radius::PerParticle(radii)) => {
-                self.has_radii = true;
-                self.reach = self.reach.max(robust_largest(radii.len(), |i| radii[i]));
-            }
-            None => {
-                self.spacings.extend(spacing.map(|spacing| (count, spacing)));
-            }
-        }
-    }
-
-    fn finish(self, question: Question, up: DVec3) -> Survey {
-        let bounds = self.bounds.map(|bounds| bounds.outer);
-        let (min, max) = bounds.unwrap_or((DVec3::splat(-0.5), DVec3::splat(0.5)));
-        let color = self.color.finish(question.color);
-        // Speed has precedence over colours.
-        let rgb = self.rgb.filter(|rgb| {
-            let is_colored_by =
-                |color: &ColorRange| rgb.attribute.eq_ignore_ascii_case(&color.attribute);
-            color.as_ref().is_none_or(is_colored_by)
-        });
-        // Use the origin of native frames: with a different one, they could not be traced in place.
-        let origin = match self.origin {
-            Origins::Shared(origin) => origin,
-            Origins::None | Origins::Mixed => choose_origin(min, max),
-        };
-        let in_place = self.origin == Origins::Shared(origin);
-        let points = sample_indices(self.points.len(), POINTS)
-            .map(|i| self.points[i])
-            .map(|point| (point - origin).as_vec3().to_array());
-        let weight = self.weight.map(|weight| FrameWeight { in_place, ..weight });
-        Survey {
-            origin,
-            min,
-            max,
-            layers: self.bounds.map(|bounds| bounds.layers),
-            is_flat: flat_axis(min, max).is_some(),
-            standing: Some(self.standing),
-            bottom_standing: self.bottom_standing,
-            lowest: self.lowest,
-            outline: self.outermost.outline(question.fit, origin),
-            cells: self.cells,
-            radius: of_frames(&self.spacings, |spacing| Some(spacing.touching)),
-            packed_radius: of_frames(&self.spacings, |spacing| spacing.packed),
-            has_radii: self.has_radii,
-            reach: self.reach,
-            color,
-            rgb,
-            points: points.collect(),
-            up,
-            components: self.attributes.values().copied().collect(),
-            attributes: self.attributes.into_keys().collect(),
-            labels: self.labels,
-            frame_time: self.moments.time_step(),
-            largest_time: self.moments.largest_time(),
-            frame_numbers: self.moments.number_step(),
-            most_particles: self.most_particles,
-            frames: self.frames,
-            angstrom: 1.0,
-            weight,
-            surfaces: self.surfaces,
-        }
-    }
 }
 
 #[cfg(test)]

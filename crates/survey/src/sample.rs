@@ -12,12 +12,12 @@ use spherule_formats::{
     FrameError, ParseError, PositionSlice, Positions, RawParticles, choose_origin, find_radius,
     is_near,
 };
+use spherule_selection::Selection;
 
 use super::packing::{self, Spacing, SpacingRequest};
 use super::robust::{self, NEIGHBOUR_QUERIES, half_median_and_least, robust_bounds};
 use super::stream;
 use super::{FrameWeight, Question, id_of, velocity_of};
-use crate::selection::Selection;
 
 /// Number of particles to sample in a native frame; smaller frames are read completely.
 const MAX_SAMPLE: usize = 1 << 17;

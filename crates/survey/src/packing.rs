@@ -5,7 +5,7 @@
 //! and the nearest of a dozen neighbours is closer than the average one: the radius would be about a fifth too small,
 //! and the field of such particles would have holes inside the fluid.
 
-use crate::math::narrow;
+use spherule_tree::math::narrow;
 
 /// Radius within which neighbours are counted, in median distances to the nearest neighbour. In a fluid it contains
 /// about 30 particles: enough for a density, and few enough not to extend beyond thin sheets.
