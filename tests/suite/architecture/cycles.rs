@@ -10,7 +10,7 @@ use super::root;
 use super::source::{ModulePath, code, files};
 
 /// Directories of crates, and how many files they have at least.
-const SOURCES: [(&str, usize); 13] = [
+const SOURCES: [(&str, usize); 14] = [
     ("src", 100),
     ("jobs/src", 30),
     ("formats/src", 30),
@@ -24,6 +24,7 @@ const SOURCES: [(&str, usize); 13] = [
     ("crates/manifest/src", 40),
     ("crates/report/src", 15),
     ("crates/survey/src", 15),
+    ("crates/scale/src", 15),
 ];
 
 /// The modules of a crate.

@@ -1,8 +1,9 @@
 //! The results of the thesis (tables 2 to 5): i7-7700HQ at 2.8 GHz, 16 GB, GeForce GTX 1050 Ti with 4 GB, OptiX; the
 //! same box, camera and depth as here, 1920x1080.
 
-use crate::report::THESIS_BYTES_PER_PARTICLE;
-use crate::scale::Motion;
+use spherule_report::THESIS_BYTES_PER_PARTICLE;
+
+use crate::Motion;
 
 /// The machine and settings of the thesis.
 pub const MACHINE: &str = "GeForce GTX 1050 Ti 4 GB, OptiX (i7-7700HQ); 1920x1080, depth 3, 60 s";

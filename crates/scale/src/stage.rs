@@ -3,12 +3,12 @@
 
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
-
-use super::Motion;
-use crate::scene::{
+use spherule_tracer::scene::{
     Background, Bounds, Camera, CameraError, CameraView, DEFAULT_AMBIENT_LIGHT, Framed, Framing,
     Light, Scene, camera, default_lights,
 };
+
+use super::Motion;
 
 /// The bounds that the camera moves around, and its still view.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -5,11 +5,11 @@ use std::time::Instant;
 
 use spherule_formats::native::layout::RadiusIndex;
 use spherule_formats::native::{Access, NativeFile};
+use spherule_tree::accel::stored::{StoredSettings, StoredTree};
 
 use super::measure::{Builds, Measured, trace};
 use super::peaks::Peaks;
 use super::{CellError, CellRequest};
-use crate::accel::stored::{StoredSettings, StoredTree};
 
 /// Maps the native frame at `path`, builds the levels above its nodes, and traces images.
 ///

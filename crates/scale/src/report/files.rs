@@ -5,7 +5,7 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
-use spherule_jobs::{Publisher, publish};
+use spherule_files::{Publisher, publish};
 
 use super::{CSV, HTML, JSON, MADE_BY, ScaleReport, csv, page};
 

@@ -1,8 +1,8 @@
 //! Memory budget for reading a file: the smallest of the limits of the job, the process and the machine.
 
-use spherule_formats::MemoryBudget;
-
 use spherule_files::memory::{available, process_room};
+
+use super::MemoryBudget;
 
 /// Minimum budget, bytes. The survey needs it: a job with a tiny limit should be rejected because of the memory that
 /// its frames need, not because they cannot be surveyed.

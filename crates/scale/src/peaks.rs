@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use spherule_files::memory::MemoryUse;
 
-use crate::report::frame::RssSummary;
+use spherule_report::frame::RssSummary;
 
 /// Sampling interval: short enough for allocations that last as long as a phase of a build of 1e6.
 const INTERVAL: Duration = Duration::from_millis(4);

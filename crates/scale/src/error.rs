@@ -6,9 +6,9 @@ use std::path::PathBuf;
 use spherule_formats::FrameError;
 use spherule_formats::sequence::SequenceError;
 
-use crate::accel::stored::StoredFault;
-use crate::render::RenderError;
-use crate::scene::CameraError;
+use spherule_tracer::render::RenderError;
+use spherule_tracer::scene::CameraError;
+use spherule_tree::accel::stored::StoredFault;
 
 /// Why a cell cannot be measured.
 #[derive(Debug, thiserror::Error)]

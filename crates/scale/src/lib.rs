@@ -2,9 +2,37 @@
 //! moving camera, and measures time and memory.
 //!
 //! The unit is a *cell*: one particle count, one structure, one motion, one representation. A [`CellRequest`]
-//! describes a cell, `scale::report` its result. A cell measures the memory of its whole process, so callers should
-//! run each cell in a separate process, and also make native frames for cells in place in a separate process.
-//! Processes and printing are left to the caller.
+//! describes a cell, [`cell::measure`] measures it, and [`report`] has its result and the tables, files and pages of
+//! many. A cell measures the memory of its whole process, so callers should run each cell in a separate process, and also
+//! make native frames for cells in place ([`convert::convert`]) in a separate process.
+//!
+//! Arguments, processes and printing are left to the caller, which is `spherule scale`.
+//!
+//! ```
+//! use spherule_scale::{Budget, CellRequest, Motion, Representation, Source, Stage, cell};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let request = CellRequest {
+//!     source: Source::Box,
+//!     particles: 500,
+//!     seed: 1,
+//!     structure: "kdtree".parse()?,
+//!     motion: Motion::Both,
+//!     representation: Representation::Memory,
+//!     stage: Stage::THESIS,
+//!     budget: Budget::Images(2),
+//!     width: 32,
+//!     height: 18,
+//!     samples: 1,
+//!     max_depth: 3,
+//!     threads: 1,
+//! };
+//! let measured = cell::measure(&request, None)?;
+//! assert_eq!((measured.images, measured.rays.primary), (2, 2 * 32 * 18));
+//! # Ok(())
+//! # }
+//! ```
+#![deny(unsafe_code)]
 
 use std::fmt;
 use std::path::PathBuf;
@@ -14,7 +42,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use spherule_formats::native::Encoding;
 
-use crate::accel::Structure;
+use spherule_tree::accel::Structure;
 
 pub mod cell;
 pub mod convert;

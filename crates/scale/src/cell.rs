@@ -4,13 +4,13 @@ use std::path::Path;
 use std::time::Instant;
 
 use spherule_files::memory;
+use spherule_tracer::render::Film;
+use spherule_tree::accel::{BuildSettings, TreeBuilder};
 
 use super::measure::{Builds, Measured, render_settings, trace};
 use super::peaks::Peaks;
 use super::{CellError, CellRequest, Particles, stored};
-use crate::accel::{BuildSettings, TreeBuilder};
-use crate::render::Film;
-use crate::scale::report::CellMeasurement;
+use crate::report::CellMeasurement;
 
 /// Makes or reads the particles, builds the tree, and traces images; or traces in place the native frame `file`,
 /// which [`super::convert::convert`] has made.
@@ -73,9 +73,9 @@ fn check_image(request: &CellRequest) -> Result<(), CellError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::Structure;
-    use crate::scale::measure::MIN_IMAGES;
-    use crate::scale::{Budget, Motion, Representation, Source, Stage, convert};
+    use crate::measure::MIN_IMAGES;
+    use crate::{Budget, Motion, Representation, Source, Stage, convert};
+    use spherule_tree::accel::Structure;
 
     fn request(particles: usize, structure: Structure) -> CellRequest {
         CellRequest {

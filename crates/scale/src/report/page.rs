@@ -1,13 +1,14 @@
 //! `scale.html`: the tables, including the results of the thesis, and plots over the particle count on logarithmic
 //! axes.
 
+use spherule_report::page::{Page, Table};
+use spherule_report::plots::{Axis, Line, Plot, Series};
+
 use super::table;
 use super::{
     CSV, CellMeasurement, Column, FAILED, JSON, MADE_BY, MIB, MISSING, ScaleReport, parts, thesis,
 };
-use crate::report::page::{Page, Table};
-use crate::report::plots::{Axis, Line, Plot, Series};
-use crate::scale::Motion;
+use crate::Motion;
 
 /// The whole file.
 pub fn html(report: &ScaleReport) -> String {

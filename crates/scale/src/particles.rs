@@ -4,15 +4,15 @@ use spherule_files::memory;
 use spherule_formats::generate::{BoxSettings, fill_box, splitmix64};
 use spherule_formats::sequence::{Sequence, SequenceInput};
 use spherule_formats::{ParticleFrame, Radius, is_radius};
+use spherule_frame::reading::read_budget;
+use spherule_survey::{ColorQuestion, Fit, Question, RadiusQuestion, Survey};
+use spherule_tracer::scene::Bounds;
+use spherule_tree::accel::{SphereRadius, Spheres};
 
-use crate::math::narrow;
 use glam::Vec3;
+use spherule_tree::math::narrow;
 
 use super::{CellError, CellRequest, FrameSource, Source, Stage};
-use crate::accel::{SphereRadius, Spheres};
-use crate::reading::read_budget;
-use crate::scene::Bounds;
-use crate::survey::{ColorQuestion, Fit, Question, RadiusQuestion, Survey};
 
 /// Minimum radius as a fraction of the diagonal of the bounds; smaller ones would be invisible in f32.
 const MIN_RADIUS: f64 = 1e-6;

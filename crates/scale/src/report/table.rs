@@ -8,7 +8,7 @@ use spherule_formats::escape_controls;
 use super::{
     CellMeasurement, CellReport, Column, FAILED, MIB, MISSING, ScaleReport, Spread, parts,
 };
-use crate::scale::{Budget, Motion};
+use crate::{Budget, Motion};
 
 /// All tables with their headings.
 pub fn text(report: &ScaleReport) -> String {

@@ -8,7 +8,7 @@ use std::fmt;
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
-use crate::scene::CameraView;
+use spherule_tracer::scene::CameraView;
 
 /// Motion of the camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]

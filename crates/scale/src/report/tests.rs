@@ -1,7 +1,8 @@
 //! Constructed reports, with the expected tables and files.
 
+use spherule_report::frame::{FileBytes, FrameBytes};
+
 use super::*;
-use crate::report::frame::{FileBytes, FrameBytes};
 
 fn measurement(rate: f64, build: f64, peak: u64) -> CellMeasurement {
     let bytes = FrameBytes {

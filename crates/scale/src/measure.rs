@@ -3,16 +3,17 @@
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
+use spherule_report::FrameReport;
+use spherule_tracer::render::{ParticleShading, RayCounts, RenderSettings, render};
+use spherule_tracer::scene::material::DEFAULT_COLOR;
+use spherule_tracer::surface::spheres::SphereSurface;
+use spherule_tree::accel::BuildReport;
+use spherule_tree::accel::view::TreeView;
+
 use super::motion::path_position;
 use super::peaks::Peaks;
 use super::{Budget, CellError, CellRequest};
-use crate::accel::BuildReport;
-use crate::accel::view::TreeView;
-use crate::render::{ParticleShading, RayCounts, RenderSettings, render};
-use crate::report::FrameReport;
-use crate::scale::report::{BuildTimes, CellMeasurement, PerParticle, RayRates, Spread};
-use crate::scene::material::DEFAULT_COLOR;
-use crate::surface::spheres::SphereSurface;
+use crate::report::{BuildTimes, CellMeasurement, PerParticle, RayRates, Spread};
 
 /// Maximum number of builds of a cell; an odd number has a median.
 const BUILDS: usize = 11;

@@ -2,12 +2,12 @@
 //! are made.
 
 use serde::{Deserialize, Serialize};
+use spherule_report::frame::{BuildSummary, FrameBytes, RaySummary, RssSummary};
+use spherule_report::machine::Machine;
+use spherule_tracer::render::RayCounts;
+use spherule_tree::accel::Structure;
 
 use super::{Budget, Motion, Representation};
-use crate::accel::Structure;
-use crate::render::RayCounts;
-use crate::report::frame::{BuildSummary, FrameBytes, RaySummary, RssSummary};
-use crate::report::machine::Machine;
 
 pub mod csv;
 pub mod files;

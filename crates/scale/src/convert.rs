@@ -9,7 +9,7 @@ use spherule_formats::native::{self, Bound, StoreSettings};
 
 use super::peaks::Peaks;
 use super::{CellError, CellRequest, Particles};
-use crate::scale::report::Conversion;
+use crate::report::Conversion;
 
 /// Maximum error of compact positions, equal to the default of `convert`.
 const BOUND: Bound = Bound::OfRadius(0.02);
@@ -26,9 +26,9 @@ pub fn convert(request: &CellRequest, path: &Path) -> Result<Conversion, CellErr
     let particles = peaks.during(|| Particles::of(request))?;
     let load_seconds = start.elapsed().as_secs_f64();
     let frame = frame_of(particles, request);
-    let start = Instant::now();
+    let store_start = Instant::now();
     let index = peaks.during(|| native::store(path, &frame, None, &settings))?;
-    let seconds = start.elapsed().as_secs_f64();
+    let seconds = store_start.elapsed().as_secs_f64();
     let length =
         path.metadata().map_err(|source| CellError::Io { path: path.to_owned(), source })?.len();
     // The maximum error is also given relative to the smallest radius
