@@ -77,6 +77,18 @@ impl Manifest {
     ) -> Vec<(String, String)> {
         let value = |key: &str| planned.iter().find(|(k, _)| k == key).map(|(_, v)| v);
         let mut settings = self.settings();
+        self.leave_out_unplanned(&mut settings, value);
+        self.write_as_planned(&mut settings, value, has_rgb);
+        settings
+    }
+
+    /// Leaves out settings that the version of a plan did not know, if it made the same images. `value`: those of the
+    /// plan.
+    fn leave_out_unplanned<'p>(
+        &self,
+        settings: &mut Vec<(String, String)>,
+        value: impl Fn(&str) -> Option<&'p String>,
+    ) {
         match (self.literal_min_weight(), value(MIN_WEIGHT)) {
             // No image depends on it. If those of the job did, the material has changed as well.
             (None, Some(old)) => settings.push((MIN_WEIGHT.to_owned(), old.clone())),
@@ -100,6 +112,15 @@ impl Manifest {
         if value(RENDERER).is_none() {
             settings.retain(|(key, _)| key != RENDERER);
         }
+    }
+
+    /// Writes settings as the plan does if that means the same images.
+    fn write_as_planned<'p>(
+        &self,
+        settings: &mut [(String, String)],
+        value: impl Fn(&str) -> Option<&'p String>,
+        has_rgb: bool,
+    ) {
         // The usual integrator may be written by name
         if let Some(old) = value(INTEGRATOR)
             && old != OLD_INTEGRATOR
@@ -121,7 +142,6 @@ impl Manifest {
         {
             new.clone_from(old);
         }
-        settings
     }
 
     /// [`super::Render::min_weight`], if images depend on it.

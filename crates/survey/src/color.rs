@@ -185,8 +185,8 @@ impl ColorTotals {
                 self.pool.append(&mut values);
             }
             _ => {
-                if let Some((low, high)) = robust_range(&values) {
-                    let low = if is_length && !is_positive { 0.0 } else { low };
+                if let Some((lowest, high)) = robust_range(&values) {
+                    let low = if is_length && !is_positive { 0.0 } else { lowest };
                     let (a, b) = self.range.unwrap_or((low, high));
                     self.range = Some((a.min(low), b.max(high)));
                 }

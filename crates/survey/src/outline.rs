@@ -87,17 +87,17 @@ impl Outermost {
         let points: Vec<DVec3> = sample_indices(sample.len(), KEPT).map(|i| sample[i]).collect();
         let each = count.div_ceil(points.len());
         self.kept.push(Kept { points, each });
-        let longest = longest_side(&sample, outside(sample.len()));
         // A particle that is far from the others along one axis is an outlier on all
         let axes = || (0..AXES).into_par_iter().map(axis);
-        let is_scattered = is_scattered(&sample, longest);
         let few = outside(sample.len());
-        let tail = if is_scattered {
-            few.max(sample.len().min(LAYER_SAMPLE) / (2 * MAX_FAR))
+        let side = longest_side(&sample, few);
+        let is_scattered = is_scattered(&sample, side);
+        let (tail, longest) = if is_scattered {
+            let tail = few.max(sample.len().min(LAYER_SAMPLE) / (2 * MAX_FAR));
+            (tail, longest_side(&sample, tail))
         } else {
-            few
+            (few, side)
         };
-        let longest = if is_scattered { longest_side(&sample, tail) } else { longest };
         let found = axes().flat_map_iter(|axis| beyond(&sample, axis, longest, (tail, MARGIN)));
         let most = match sample.len() {
             many if is_scattered => many.div_ceil(MAX_FAR),
@@ -155,9 +155,10 @@ impl Outermost {
             clippy::cast_precision_loss,
             reason = "a part of a sample"
         )]
-        let most = ((1.0 - share.clamp(0.0, 1.0)) * all.len() as f64) as usize;
+        let left_out = ((1.0 - share.clamp(0.0, 1.0)) * all.len() as f64) as usize;
         let side = longest_side(&all, outside(all.len()));
-        let most = if is_scattered(&all, side) { most.max(all.len() / MAX_FAR) } else { most };
+        let most =
+            if is_scattered(&all, side) { left_out.max(all.len() / MAX_FAR) } else { left_out };
         if most == 0 {
             return;
         }

@@ -94,9 +94,8 @@ impl SurfaceWeight {
     /// is the radius of all particles, if they have one.
     pub fn scaled(&self, particles: u64, voxel: f32, radius: Option<f32>) -> SurfaceSize {
         let radii = self.radius.zip(radius).map_or(1.0, |(own, other)| other / own);
-        let drawn = u128::from(self.size.particles) * u128::from(particles);
-        let drawn = drawn / u128::from(self.particles.max(1));
-        let drawn = u64::try_from(drawn).unwrap_or(u64::MAX);
+        let product = u128::from(self.size.particles) * u128::from(particles);
+        let drawn = u64::try_from(product / u128::from(self.particles.max(1))).unwrap_or(u64::MAX);
         self.size.scaled(drawn, radii * voxel / self.voxel)
     }
 }

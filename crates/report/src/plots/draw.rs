@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 
+use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters_backend::text_anchor::{HPos, Pos, VPos};
 
@@ -93,30 +94,39 @@ fn draw(
     let corner = ((WIDTH - 2) * FINE, (HEIGHT - 4) * FINE);
     root.draw_text(plot.x.title(), &font.pos(bottom_right), corner)?;
 
-    // Draw each series: lines, then markers
-    let put = |piece: &str| text.borrow_mut().push_str(piece);
     for drawn in series {
-        put(&key::group(drawn.hue, "series"));
-        put(&format!("<title>{}</title>\n", escaped(drawn.name)));
-        let at = |point: &(f64, f64)| chart.backend_coord(point);
-        if drawn.line != Line::None {
-            put(key::part(drawn.line, false));
-            for piece in drawn.pieces.iter().filter(|piece| piece.len() > 1) {
-                root.draw(&PathElement::new(piece.iter().map(at).collect::<Vec<_>>(), SERIES))?;
-            }
-            put("</g>\n");
-        }
-        put(key::part(drawn.line, true));
-        for (x, y) in drawn.marked().iter().map(at) {
-            match key::marker(drawn.hue) {
-                None => root.draw(&Circle::new((x, y), key::MARKER_RADIUS, SERIES.filled()))?,
-                Some(corners) => {
-                    let corners = corners.iter().map(|(dx, dy)| (x + dx, y + dy));
-                    root.draw(&Polygon::new(corners.collect::<Vec<_>>(), SERIES))?;
-                }
-            }
-        }
-        put("</g></g>\n");
+        draw_series(drawn, &root, |point| chart.backend_coord(point), text)?;
     }
     root.present()
+}
+
+/// Draws lines, then markers. `at` maps values to places in the SVG, whose elements go to `text`.
+fn draw_series(
+    series: &Drawn,
+    root: &DrawingArea<SvgText, Shift>,
+    at: impl Fn(&(f64, f64)) -> (i32, i32),
+    text: &RefCell<String>,
+) -> Result<(), DrawError> {
+    let put = |piece: &str| text.borrow_mut().push_str(piece);
+    put(&key::group(series.hue, "series"));
+    put(&format!("<title>{}</title>\n", escaped(series.name)));
+    if series.line != Line::None {
+        put(key::part(series.line, false));
+        for piece in series.pieces.iter().filter(|piece| piece.len() > 1) {
+            root.draw(&PathElement::new(piece.iter().map(&at).collect::<Vec<_>>(), SERIES))?;
+        }
+        put("</g>\n");
+    }
+    put(key::part(series.line, true));
+    for (x, y) in series.marked().iter().map(at) {
+        match key::marker(series.hue) {
+            None => root.draw(&Circle::new((x, y), key::MARKER_RADIUS, SERIES.filled()))?,
+            Some(corners) => {
+                let corners = corners.iter().map(|(dx, dy)| (x + dx, y + dy));
+                root.draw(&Polygon::new(corners.collect::<Vec<_>>(), SERIES))?;
+            }
+        }
+    }
+    put("</g></g>\n");
+    Ok(())
 }

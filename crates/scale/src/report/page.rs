@@ -207,30 +207,32 @@ fn plots(report: &ScaleReport) -> Vec<Plot> {
             &thesis::BYTES_PER_PARTICLE,
         ),
     ];
-    // Image times, one plot per motion
-    for &motion in &report.settings.motions {
-        let theirs: Vec<thesis::Figure> = thesis::RATES
-            .iter()
-            .filter(|r| r.motion == motion)
-            .map(|r| thesis::Figure {
-                structure: r.structure,
-                particles: thesis::RATE_PARTICLES,
-                value: 1e3 / r.mean,
-            })
-            .collect();
-        all.push(plot(
-            report,
-            &format!("plot-image-{motion}"),
-            &format!("Image time: {motion}"),
-            "time, ms",
-            |r, n, c| {
-                let rate = measured(r, n, c, Some(motion))?.images_per_second.mean;
-                (rate > 0.0).then(|| 1e3 / rate)
-            },
-            &theirs,
-        ));
-    }
+    all.extend(report.settings.motions.iter().map(|motion| image_plot(report, *motion)));
     all
+}
+
+/// The times of images while the camera has this `motion`.
+fn image_plot(report: &ScaleReport, motion: Motion) -> Plot {
+    let theirs: Vec<thesis::Figure> = thesis::RATES
+        .iter()
+        .filter(|r| r.motion == motion)
+        .map(|r| thesis::Figure {
+            structure: r.structure,
+            particles: thesis::RATE_PARTICLES,
+            value: 1e3 / r.mean,
+        })
+        .collect();
+    plot(
+        report,
+        &format!("plot-image-{motion}"),
+        &format!("Image time: {motion}"),
+        "time, ms",
+        |r, n, c| {
+            let rate = measured(r, n, c, Some(motion))?.images_per_second.mean;
+            (rate > 0.0).then(|| 1e3 / rate)
+        },
+        &theirs,
+    )
 }
 
 /// One line per column, and that of the thesis in the same colour.
