@@ -5,7 +5,8 @@
 //! and knows nothing about files. `spherule-jobs` plans, records and resumes work and does not know what the work is.
 //! This crate connects them; none depends on it. Its modules [`accel`], [`math`] and [`ray`] are those of
 //! `spherule-tree`, its modules [`scene`], [`surface`], [`render`] and [`denoise`] those of `spherule-tracer`,
-//! and [`hdr`], [`output`], [`overlay`], [`picture`] and `movie` those of `spherule-images`.
+//! and [`hdr`], [`output`], [`overlay`], [`picture`] and `movie` those of `spherule-images`. [`manifest`], [`survey`],
+//! [`selection`], [`report`] and `scale` are the crates of these names.
 //!
 //! This example renders positions in memory to planes, and to the bytes of an EXR and a PNG, without files:
 //!
@@ -62,23 +63,22 @@ pub mod cli;
 pub mod conversion;
 pub mod defaults;
 pub mod job;
-pub mod manifest;
-pub mod metrics;
 pub mod pipeline;
 pub mod prelude;
-pub mod reading;
-pub mod report;
 pub mod resolve;
-#[cfg(feature = "reports")]
-pub mod scale;
-pub mod selection;
 pub mod still;
-pub mod survey;
-#[cfg(feature = "reports")]
-pub mod viewer;
 
+pub use spherule_frame::reading;
 #[cfg(feature = "movies")]
 pub use spherule_images::movie;
 pub use spherule_images::{hdr, output, overlay, picture};
+pub use spherule_manifest as manifest;
+pub use spherule_report as report;
+#[cfg(feature = "reports")]
+pub use spherule_report::viewer;
+#[cfg(feature = "reports")]
+pub use spherule_scale as scale;
+pub use spherule_selection as selection;
+pub use spherule_survey as survey;
 pub use spherule_tracer::{denoise, render, scene, surface};
 pub use spherule_tree::{accel, math, ray};

@@ -5,9 +5,9 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use glam::DVec3;
+use spherule_files::memory::available;
 
 use crate::manifest::{Manifest, Side};
-use crate::metrics::memory::available;
 use crate::output::PreviewPage;
 use crate::overlay::{Page, RgbaPixels};
 use crate::pipeline::{

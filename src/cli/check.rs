@@ -3,6 +3,8 @@
 use std::time::{Duration, Instant};
 
 use clap::Args;
+use spherule_files::Bytes;
+use spherule_files::memory::available;
 use spherule_formats::Sequence;
 use spherule_jobs::{DryRun, FrameState, Job, ResumeMode};
 
@@ -11,8 +13,6 @@ use super::manifest_args::{complete, open_sequence};
 use super::render::RunArgs;
 use super::{CliError, Outcome, disk, print};
 use crate::job::{RenderJob, require_one_fits};
-use crate::metrics::Bytes;
-use crate::metrics::memory::available;
 use crate::pipeline::{FrameSize, ImageTask, Probe, Schedule, Setup, probe};
 use crate::survey::Survey;
 

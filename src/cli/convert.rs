@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use serde_json::{Value, json};
+use spherule_files::Bytes;
 use spherule_formats::convert;
 use spherule_formats::native::{Bound, Encoding, FORMAT};
 use spherule_formats::sequence::Sequence;
@@ -14,12 +15,11 @@ use spherule_jobs::{DEFAULT_TAKEOVER_AFTER, FrameRange, ResumeMode};
 use super::job::{FinishedRun, JobArgs, report_kept, report_wait, use_threads};
 use super::key_flags::encodings;
 use super::numbers::{DEFAULT_BOUND, duration, not_negative, positive};
-use super::progress::{Progress, ShowReport};
+use super::progress::{Progress, ShowReport, mode_parser};
 use super::{CliError, Outcome, events, signals};
 use crate::conversion::{AttributeChoices, ConvertSettings, ConvertedFrame};
 use crate::job::{ConvertJob, RunError, in_thread};
 use crate::manifest::{MAX_THREADS, ProgressMode};
-use crate::metrics::Bytes;
 use crate::reading::conversion_budget;
 
 /// What the user can do if a frame does not fit into the memory limit.
@@ -98,7 +98,7 @@ pub(super) struct ConvertArgs {
     #[arg(long, value_name = "SECONDS", value_parser = duration, default_value = "30", allow_negative_numbers = true)]
     grace: Duration,
     /// Progress display.
-    #[arg(long, value_enum, default_value = "auto", help_heading = "Job")]
+    #[arg(long, value_parser = mode_parser(), default_value = "auto", help_heading = "Job")]
     progress: ProgressMode,
 }
 

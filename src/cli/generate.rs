@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
+use spherule_files::Bytes;
 use spherule_formats::convert::{
     BlockSettings, BlockSource, BoxSource, ConvertError, ConvertSettings, ParticleSource, Phase,
     Progress, convert,
@@ -16,7 +17,6 @@ use spherule_jobs::Interrupt;
 use super::key_flags::encodings;
 use super::numbers::{DEFAULT_BOUND, not_negative, positive};
 use super::{CliError, Outcome, signals};
-use crate::metrics::Bytes;
 
 const SIGNAL_MESSAGES: signals::SignalMessages =
     signals::SignalMessages { stopping: "stopping", stopped: "stopped" };

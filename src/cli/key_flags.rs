@@ -4,7 +4,7 @@ use std::ffi::{OsStr, OsString};
 use std::path::Path;
 use std::str::FromStr;
 
-use clap::builder::{EnumValueParser, PossibleValue, StringValueParser, TypedValueParser};
+use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
 use spherule_formats::native::Encoding;
 use toml::Value;
@@ -12,7 +12,8 @@ use toml::Value;
 use super::CliError;
 use super::numbers::{number, seconds, whole};
 use super::paths::path_as_typed;
-use crate::manifest::{FlagKind, KeyFlag, Override, ProgressMode, key_flags, nearest};
+use super::progress::mode_parser;
+use crate::manifest::{FlagKind, KeyFlag, Override, key_flags, nearest};
 
 /// Headings of the help, in this order.
 const HEADINGS: [&str; 6] = ["Input", "Camera", "Image", "Look", "Output", "Job"];
@@ -182,8 +183,7 @@ fn argument(key: &KeyFlag) -> Arg {
         FlagKind::List => argument.value_delimiter(',').action(ArgAction::Append),
         // These names are explained in the help.
         FlagKind::Text(_) if key.flag.name == "progress" => {
-            let modes = EnumValueParser::<ProgressMode>::new();
-            argument.value_parser(modes.map(|mode| mode.name().to_owned()))
+            argument.value_parser(mode_parser().map(|mode| mode.name().to_owned()))
         }
         FlagKind::Text(may_begin_with_hyphen) => {
             let argument = argument.allow_hyphen_values(may_begin_with_hyphen);

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use clap::ValueEnum;
-use clap::builder::PossibleValue;
+use clap::builder::{EnumValueParser, PossibleValue, TypedValueParser};
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use serde_json::{Value, json};
 use spherule_jobs::{EntryStatus, FinishedFrame, FrameEvent, FrameFailure, QueueEvent};
@@ -16,20 +16,35 @@ use spherule_jobs::{EntryStatus, FinishedFrame, FrameEvent, FrameFailure, QueueE
 use super::{events, print};
 use crate::manifest::ProgressMode;
 
-impl ValueEnum for ProgressMode {
+/// A [`ProgressMode`] on the command line, with help.
+#[derive(Clone, Copy)]
+struct ModeArgument(ProgressMode);
+
+impl ValueEnum for ModeArgument {
     fn value_variants<'a>() -> &'a [Self] {
-        &[Self::Auto, Self::Plain, Self::Json, Self::Openjd, Self::None]
+        &[
+            Self(ProgressMode::Auto),
+            Self(ProgressMode::Plain),
+            Self(ProgressMode::Json),
+            Self(ProgressMode::Openjd),
+            Self(ProgressMode::None),
+        ]
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(PossibleValue::new(self.name()).help(match self {
-            Self::Auto => "Bars on a terminal, plain lines elsewhere",
-            Self::Plain => "One line per frame",
-            Self::Json => "JSON events, one per line, on standard output",
-            Self::Openjd => "Messages for Open Job Description engines",
-            Self::None => "Only warnings and errors",
+        Some(PossibleValue::new(self.0.name()).help(match self.0 {
+            ProgressMode::Auto => "Bars on a terminal, plain lines elsewhere",
+            ProgressMode::Plain => "One line per frame",
+            ProgressMode::Json => "JSON events, one per line, on standard output",
+            ProgressMode::Openjd => "Messages for Open Job Description engines",
+            ProgressMode::None => "Only warnings and errors",
         }))
     }
+}
+
+/// Parses the argument of `--progress`.
+pub(super) fn mode_parser() -> impl TypedValueParser<Value = ProgressMode> {
+    EnumValueParser::<ModeArgument>::new().map(|argument| argument.0)
 }
 
 /// A report of a finished frame that can be shown.

@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use spherule_files::counted;
 use spherule_jobs::FrameRange;
 
 use super::pictures::{JobPicture, JobPictures, PicturesArgs, SIGNAL_MESSAGES, Watch, guard};
 use super::{CliError, Outcome, print, signals};
 use crate::job::color_bar;
 use crate::manifest::Side;
-use crate::metrics::counted;
 use crate::movie::{
     FinishedSheet, LetterStyle, MovieError, SheetBar, SheetFormat, SheetSettings, SheetSource,
     write_sheet,

@@ -1,12 +1,12 @@
 //! The settings of a conversion: those of the user, and those from the survey of the sequence.
 
 use glam::DVec3;
+use spherule_files::Bytes;
 use spherule_formats::native::layout::VERSION;
 use spherule_formats::native::{Bound, Encoding};
 
 use super::attributes::AttributeChoices;
 use super::error::UnknownAttribute;
-use crate::metrics::Bytes;
 use crate::survey::{ColorQuestion, Fit, Question, RadiusQuestion, Survey};
 
 /// The settings of the user.

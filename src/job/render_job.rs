@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
+use spherule_files::memory::available;
 use spherule_formats::Sequence;
 use spherule_jobs::{FrameRequest, Job, JobRequest, Plan, ResumeMode};
 
@@ -12,7 +13,6 @@ use super::selection::{frame_requests, frames_in, indices, select};
 use super::target::{check_output_dir, stored_survey};
 use super::{RunError, Shard, in_thread};
 use crate::manifest::{FitSetting, Manifest};
-use crate::metrics::memory::available;
 use crate::pipeline::{FrameSize, ImageTask, MemoryModel, NextMeshes, Schedule, Setup};
 use crate::report::job::{HTML_FILE, JSON_FILE};
 use crate::resolve::question;

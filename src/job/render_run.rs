@@ -205,7 +205,7 @@ impl RenderRun {
     /// The files of the job cannot be read, or a report cannot be written.
     pub fn write_reports(&mut self) -> Result<(), RunError> {
         let refreshed = self.job.refresh();
-        let report = JobReport::new(self.job.state(), self.render_job.manifest());
+        let report = JobReport::new(self.job.state(), self.render_job.manifest().settings());
         let dir = self.render_job.dir();
         let written = report.files().iter().try_for_each(|(name, text)| {
             job::write(dir, name, text)

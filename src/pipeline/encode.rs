@@ -6,13 +6,13 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use serde_json::json;
+use spherule_files::memory::{MemoryPeaks, MemoryUse};
 use spherule_jobs::{Publisher, publish};
 
 use super::error::WriteError;
 use super::overlays;
 use super::renderer::TracedFrame;
 use super::setup::Setup;
-use crate::metrics::{MemoryPeaks, MemoryUse};
 use crate::output::{
     CustomAttribute, ExrOptions, OutputError, PictureFormat, encode_figure, encode_picture,
     encode_preview, write_exr,

@@ -6,6 +6,8 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use glam::{DVec3, Vec3};
+use spherule_files::counted;
+use spherule_files::memory::{available, process_room};
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{FrameError, ParticleFrame, PositionSlice, RawParticles};
 
@@ -22,8 +24,6 @@ use super::rods::{CellStyle, FrameRods, rods_of};
 use super::setup::{ParticleRules, Picture, Setup};
 use super::trails::trails_of;
 use super::{ImageTask, SharedFrame};
-use crate::metrics::counted;
-use crate::metrics::memory::{available, process_room};
 use crate::overlay::Overlay;
 
 /// A frame before its tree is built.

@@ -2,10 +2,11 @@
 
 use std::fmt;
 
+use spherule_files::Bytes;
+
 use super::predict::{FrameSize, MemoryModel, MemoryNeed};
 use super::setup::{RadiusRule, Setup};
 use crate::accel::Structure;
-use crate::metrics::Bytes;
 use crate::surface::SurfaceKind;
 
 /// A frame needs more memory than `render.memory_limit`.

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use glam::Vec3;
+use spherule_files::memory::MemoryUse;
 use spherule_formats::FrameError;
 
 use super::ImageTask;
@@ -15,7 +16,6 @@ use super::rods::FrameRods;
 use super::setup::Setup;
 use crate::accel::stored::StoredFault;
 use crate::denoise::DenoiseError;
-use crate::metrics::MemoryUse;
 use crate::output::TextAttribute;
 use crate::render::{Film, RayCounts, RenderError, Stop};
 use crate::report::FrameReport;

@@ -1,8 +1,9 @@
 //! Schedules the frames of a job within memory: overlapping, one at a time, or not at all.
 
+use spherule_files::Bytes;
+
 use super::memory_limit::MemoryLimitError;
 use super::predict::{FrameSize, MemoryModel, MemoryNeed};
-use crate::metrics::Bytes;
 
 /// Whether several frames are in flight.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -4,6 +4,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, SyncSender};
 
+use spherule_files::memory::MemoryPeaks;
 use spherule_formats::sequence::Sequence;
 use spherule_jobs::{
     FinishedFrame, FrameFailure, FrameQueue, Interrupt, JobError, RunContext, catch_panic,
@@ -15,7 +16,6 @@ use super::record::{AtEncoder, EncodedFrame, NotEncoded, StagedFrame, ToEncoders
 use super::{
     FrameSize, ImageError, ImageTask, LoadedFrame, Setup, TracedFrame, load_frame, renderer_of,
 };
-use crate::metrics::MemoryPeaks;
 use crate::render::{Film, Stop};
 use crate::report::FrameReport;
 

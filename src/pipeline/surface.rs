@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use glam::Vec3;
+use spherule_files::memory::{MemoryUse, available};
 use spherule_formats::Radius;
 
 use super::decoded::DecodedFrame;
@@ -16,8 +17,6 @@ use super::setup::Setup;
 use crate::accel::moving::MovingTree;
 use crate::accel::view::TreeView;
 use crate::accel::{BuildReport, BuildSettings, SphereRadius, Spheres, Structure, TreeBuilder};
-use crate::metrics::MemoryUse;
-use crate::metrics::memory::available;
 use crate::render::{Film, RayCounts, RenderError, ShadeSource, Stop, render_into};
 use crate::report::FrameReport;
 use crate::scene::Scene;

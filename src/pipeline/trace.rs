@@ -2,6 +2,8 @@
 
 use std::time::{Duration, Instant};
 
+use spherule_files::memory::MemoryUse;
+
 use super::decoded::{DecodedFrame, DecodedShading};
 use super::in_place::StoredFrame;
 use super::load::{LoadedFrame, LoadedParticles};
@@ -13,7 +15,6 @@ use super::surface::{self, SurfaceBuilder, spheres};
 use crate::accel::stored::{StoredSettings, StoredTree};
 use crate::accel::{BuildReport, TreeBuilder};
 use crate::denoise::{DenoiseError, DenoiseInput, denoise};
-use crate::metrics::MemoryUse;
 use crate::output::TextAttribute;
 use crate::render::{Colors, Film, Opacities, ParticleShading, RayCounts, RendererKind, Stop};
 use crate::report::FrameReport;

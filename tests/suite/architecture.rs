@@ -22,7 +22,7 @@ fn root() -> &'static Path {
 
 /// Crates whose modules ARCHITECTURE.md lists, and how many modules each has at least.
 const LISTED: [(&str, usize); 4] =
-    [("crates/tree", 4), ("crates/tracer", 4), ("crates/images", 5), ("src", 12)];
+    [("crates/tree", 4), ("crates/tracer", 4), ("crates/images", 5), ("src", 7)];
 
 /// The lines of ARCHITECTURE.md that are indented by four spaces, the first after `heading`.
 fn list_after(heading: &str) -> Vec<String> {
@@ -68,7 +68,7 @@ fn modules_use_what_the_documentation_lists() {
     for (directory, min_count) in LISTED {
         let mut actual = actual(directory);
         if let Some(cli) = actual.remove(CLI) {
-            assert!(cli.len() > 10, "{cli:?}");
+            assert!(cli.len() > 3, "{cli:?}");
         }
         assert!(actual.len() >= min_count, "{actual:?}");
         assert!(!actual.values().any(|used| used.contains(CLI)), "{actual:?}");

@@ -7,6 +7,7 @@
 //! - [`open_regular`], [`read_regular`]: regular files only, up to a limit. A name may lead to a pipe or a device.
 //! - [`catch_panic`]: a panic in the work on one file becomes an error of that file.
 //! - [`Interrupt`]: requests to stop.
+//! - [`memory`]: memory of the process and of the machine, which limits how much of a file may be read.
 //! - [`Bytes`], [`counted`], [`one_line`], [`escape_controls`], [`ValueError`]: sizes, counts and foreign text in
 //!   messages.
 //!
@@ -28,6 +29,7 @@ mod bytes;
 mod counted;
 mod directory;
 mod interrupt;
+pub mod memory;
 mod message;
 mod owner;
 mod panic;

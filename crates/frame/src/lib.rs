@@ -41,6 +41,7 @@ pub mod join;
 mod labels;
 pub mod names;
 mod origin;
+pub mod reading;
 mod sampling;
 mod scalar;
 pub mod values;

@@ -141,7 +141,7 @@ fn conversion() -> spherule::conversion::ConvertSettings {
 
 /// Both files of the report, of which the one for scripts can be read.
 fn report(state: &JobState) {
-    let files = JobReport::new(state, &Manifest::new("in")).files();
+    let files = JobReport::new(state, Manifest::new("in").settings()).files();
     let [(_, json), (_, html)] = &files[..] else {
         panic!("two files");
     };

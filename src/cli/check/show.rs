@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use serde_json::{Map, Value, json};
+use spherule_files::{Bytes, counted};
 use spherule_jobs::FrameState;
 
 use super::camera::CameraSummary;
@@ -12,7 +13,6 @@ use crate::cli::job::list;
 use crate::cli::progress::duration;
 use crate::cli::render::{radius_text, unframed_text};
 use crate::manifest::{Channel, Manifest, NamedChannel};
-use crate::metrics::{Bytes, counted};
 use crate::pipeline::{ColorRule, Overlap, Probe, RadiusRule, Setup};
 use crate::scene::RadiusTable;
 use crate::survey::{Survey, shown_name};

@@ -5,6 +5,7 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
+use spherule_files::Bytes;
 use spherule_formats::ValueError;
 use spherule_jobs::export::Chunks;
 use spherule_jobs::{ResumeMode, publish};
@@ -14,7 +15,6 @@ use super::paths::absolute;
 use super::{CliError, Outcome, print};
 use crate::job::{JobManifest, RenderJob};
 use crate::manifest::{Manifest, Override, named_place};
-use crate::metrics::Bytes;
 
 mod openjd;
 mod paths;

@@ -5,6 +5,7 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::Args;
+use spherule_files::Bytes;
 use spherule_jobs::export::TimeLimit;
 use spherule_jobs::export::slurm::{ArrayScript, FrameCommand, MAX_TASKS, Resources};
 
@@ -12,7 +13,6 @@ use super::super::paths::absolute;
 use super::super::{CliError, Outcome};
 use super::{CommonArgs, ExportJob, grace, normalized, text, write_output};
 use crate::manifest::MAX_THREADS;
-use crate::metrics::Bytes;
 
 #[derive(Debug, Args)]
 pub(super) struct SlurmArgs {

@@ -1,9 +1,10 @@
 //! The steps of a file as text: of a long trajectory the first and the last, and those that are unlike the one before.
 
+use spherule_files::counted;
+
 use super::Inspected;
 use crate::cli::CliError;
 use crate::cli::print::{self, Reader};
-use crate::metrics::counted;
 
 /// Most steps that are all printed.
 const ALL: usize = 4;

@@ -2,11 +2,11 @@
 
 use glam::DVec3;
 use serde_json::{Value, json};
+use spherule_files::counted;
 use spherule_formats::Sequence;
 
 use crate::cli::progress::ShowReport;
 use crate::manifest::points_on_paper;
-use crate::metrics::counted;
 use crate::overlay::{Content, Overlay};
 use crate::pipeline::{self, RadiusRule, Setup};
 use crate::report::FrameReport;

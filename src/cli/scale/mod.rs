@@ -9,7 +9,7 @@ use serde_json::json;
 use spherule_jobs::Interrupt;
 
 use super::numbers::pixels_to;
-use super::progress::{duration, openjd};
+use super::progress::{duration, mode_parser, openjd};
 use super::{CliError, Outcome, events, print, signals};
 use crate::accel::Structure;
 use crate::job::ChildResult;
@@ -100,7 +100,7 @@ pub(super) struct ScaleArgs {
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_THREADS)), help_heading = "Job")]
     threads: Option<u32>,
     /// How progress is shown.
-    #[arg(long, value_enum, default_value = "auto", help_heading = "Job")]
+    #[arg(long, value_parser = mode_parser(), default_value = "auto", help_heading = "Job")]
     progress: ProgressMode,
 }
 

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use crate::metrics::Bytes;
+use spherule_files::Bytes;
 
 /// Anonymous memory by purpose, bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
+use spherule_files::Bytes;
 use spherule_formats::{MemoryBudget, Sequence};
 
 use super::super::bonds::MAX_BONDS_EACH;
 use super::*;
-use crate::metrics::Bytes;
 use crate::pipeline::{
     ArrowStyle, BondRule, BondStyle, MeshSettings, Overlap, PictureMesh, TrailStyle,
 };

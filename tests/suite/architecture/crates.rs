@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::{Uses, documented, root, source};
 
 /// Most lines of a crate, without comments at the end of lines and without tests.
-const MAX_LINES: usize = 45_000;
+const MAX_LINES: usize = 30_000;
 
 /// Directories of the crates, by their names without `spherule-`.
 fn crates() -> BTreeMap<String, PathBuf> {

@@ -10,7 +10,7 @@ use super::root;
 use super::source::{ModulePath, code, files};
 
 /// Directories of crates, and how many files they have at least.
-const SOURCES: [(&str, usize); 9] = [
+const SOURCES: [(&str, usize); 14] = [
     ("src", 100),
     ("jobs/src", 30),
     ("formats/src", 30),
@@ -20,6 +20,11 @@ const SOURCES: [(&str, usize); 9] = [
     ("crates/tree/src", 50),
     ("crates/tracer/src", 100),
     ("crates/images/src", 40),
+    ("crates/selection/src", 8),
+    ("crates/manifest/src", 40),
+    ("crates/report/src", 15),
+    ("crates/survey/src", 15),
+    ("crates/scale/src", 15),
 ];
 
 /// The modules of a crate.

@@ -67,10 +67,9 @@ fn intersect_plane_body(
         let t = (ground.height - height) / slope;
         let p = [o[0] + d[0] * t, o[1] + d[1] * t, o[2] + d[2] * t];
         // Compute the opacity from the distance to the middle of the scene
-        let mut c = [p[0] - ground.center.x, p[1] - ground.center.y, p[2] - ground.center.z];
-        for axis in 0..3 {
-            c[axis] = larger(c[axis].abs() - ground.base[axis], 0.0);
-        }
+        let outside =
+            |axis: usize| larger((p[axis] - ground.center[axis]).abs() - ground.base[axis], 0.0);
+        let c = [outside(0), outside(1), outside(2)];
         let distance = (c[0] * c[0] + c[1] * c[1] + c[2] * c[2]).sqrt();
         let x = (ground.fade_end - distance) / span;
         let x = if x < 0.0 { 0.0 } else { x };

@@ -1,0 +1,85 @@
+//! `[cell]`: the simulation cell.
+
+use glam::Vec3;
+use serde_json::{Value as Json, json};
+use spherule_frame::PeriodicImages;
+
+use super::field::Field;
+use super::key::Key;
+use super::keys::section;
+use super::value::{Fault, FlagKind, Value, list};
+
+/// Default colour of the edges, linear RGB: nearly black.
+const COLOR: Vec3 = Vec3::splat(0.02);
+
+section! {
+    /// The simulation cell, in files that have one: extended XYZ, LAMMPS dumps, and molecular formats
+    Cell {
+        /// Draw the edges of the cell
+        ///
+        /// An automatic camera then shows the whole cell.
+        visible: bool = false, flag("cell", "", "Look");
+        /// Radius of the edges, or auto: 0.0015 times the diagonal of the cell
+        radius: Option<f32> = None, or("auto"), unit("a length"), above(0), single();
+        /// Colour of the edges, linear RGB
+        color: Vec3 = COLOR, from(0), to(1);
+        /// Number of cells along each edge, with copies of all particles: [2, 2, 1]
+        ///
+        /// Copies have the ids of their originals, and the cell that is drawn encloses them.
+        replicate: Replicate = Replicate::default(), flag("replicate", "A,B,C", "Input");
+        /// Move particles into the cell, along the edges along which it repeats
+        wrap: bool = false, flag("wrap", "", "Input");
+    }
+}
+
+impl Cell {
+    /// What is done with the particles.
+    pub const fn images(&self) -> PeriodicImages {
+        PeriodicImages { replicate: self.replicate.0, wrap: self.wrap }
+    }
+}
+
+/// Number of cells along each edge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Replicate(pub [u32; 3]);
+
+/// Most cells along an edge.
+const MAX_CELLS: u32 = 1000;
+
+impl Default for Replicate {
+    fn default() -> Self {
+        Self([1; 3])
+    }
+}
+
+impl Value for Replicate {
+    const FLAG: FlagKind = FlagKind::Integers;
+
+    fn kind(_: &Key) -> String {
+        format!("three whole numbers from 1 to {MAX_CELLS}, such as [2, 2, 1]")
+    }
+
+    fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {
+        let items = field.items().ok_or(Fault::Unwanted)?;
+        let number = |item: &Field<'_>| {
+            let number = item.as_integer().and_then(|n| u32::try_from(n).ok())?;
+            (1..=MAX_CELLS).contains(&number).then_some(number)
+        };
+        let numbers: Option<Vec<u32>> = items.iter().map(number).collect();
+        let numbers = numbers.and_then(|numbers| numbers.try_into().ok());
+        numbers.map(Self).ok_or(Fault::Unwanted)
+    }
+
+    fn toml(&self) -> String {
+        list(self.0.iter().map(u32::to_string))
+    }
+
+    fn schema(_: &Key) -> Json {
+        json!({
+            "type": "array",
+            "items": { "type": "integer", "minimum": 1, "maximum": MAX_CELLS },
+            "minItems": 3,
+            "maxItems": 3,
+        })
+    }
+}
