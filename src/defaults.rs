@@ -366,20 +366,23 @@ impl Rules<'_> {
         cell.is_some_and(|cell| cell.periodic.contains(&true))
     }
 
+    /// Whether the boundaries in the plane of flat data are periodic.
+    fn is_periodic_in_plane(&self) -> bool {
+        let flat = self.facts.flat_axis();
+        let periodic = self.facts.cell.as_ref().map_or([false; 3], |cell| cell.periodic);
+        (0..3).all(|axis| Some(axis) == flat || periodic[axis])
+    }
+
     /// A simulation cell is drawn without perspective.
     fn cell(&mut self) {
         let extent = self.facts.cell_extent;
         let filled = extent.iter().filter(|part| **part >= FILLED).count();
         // A box of walls may be much larger than what has come to rest in it
         let is_empty = !self.is_periodic() && extent.iter().any(|part| *part < LEAST_FILLED);
-        // A cloud without an end is framed without its outer parts
-        let is_cloud = self.facts.has_heavy_tails;
-        if self.facts.cell.is_none()
-            || filled < 2
-            || self.facts.in_cell < INSIDE
-            || is_empty
-            || is_cloud
-        {
+        // A cloud without an end is framed without its outer parts, and walls around a plane say where its sides are
+        let is_walled = self.facts.flat_axis().is_some() && !self.is_periodic_in_plane();
+        let is_needless = is_empty || is_walled || self.facts.has_heavy_tails;
+        if self.facts.cell.is_none() || filled < 2 || self.facts.in_cell < INSIDE || is_needless {
             return;
         }
         let line =

@@ -3,7 +3,10 @@ use std::path::Path;
 use spherule_formats::SimulationCell;
 
 use super::*;
-use crate::manifest::{AxisView, BondSearch, OverlayKind, RadiusSetting, TextSize};
+use crate::manifest::{
+    AxisView, BondSearch, ColorSetting, GroundKind, GroundSetting, OverlayKind, RadiusSetting,
+    TextSize,
+};
 use crate::survey::{Axes, Elements, GrainRadius, WallSign, WallValues};
 
 /// Facts of a thousand particles in a unit cube without attributes.
@@ -391,6 +394,11 @@ fn molecules_show_their_broad_side() {
     let round = Axes { deviations: [5.0, 5.0, 4.8], ..axes };
     assert_eq!(view(&Facts { axes: Some(round), elements, ..facts() }).up, None);
     assert_eq!(view(&Facts { axes: Some(axes), ..facts() }).up, None);
+    // A slab of a solid lies
+    let slab = Axes { directions: [DVec3::X, DVec3::Y, DVec3::Z], ..axes };
+    let solid = Some(Elements { has_others: false, is_solid: true });
+    assert_eq!(view(&Facts { axes: Some(slab), elements: solid, ..facts() }).up, None);
+    assert!(view(&Facts { axes: Some(axes), elements: solid, ..facts() }).up.is_some());
 }
 
 #[test]
@@ -435,6 +443,41 @@ fn boxes_that_are_nearly_empty_are_not_drawn() {
         grains.cell_extent = [1.0, 1.0, height];
         assert_eq!(of("", &grains).cell.visible, is_drawn, "{height}");
     }
+    // Nor one around a plane with walls
+    grains.bounds = Some((DVec3::ZERO, DVec3::new(1.0, 1.0, 0.0)));
+    assert!(!of("", &grains).cell.visible);
+    let periodic = SimulationCell::new(DVec3::ZERO, DVec3::AXES, [true, true, false]);
+    grains.cell = Some(periodic.expect("a cell"));
+    assert!(of("", &grains).cell.visible);
+}
+
+#[test]
+fn gases_and_molecules_have_no_floor() {
+    let ground = |facts: &Facts, files: Files<'_>| completed("", facts, files).0.render.ground;
+    let none = Some(GroundSetting::of(GroundKind::None));
+    assert_eq!(ground(&facts(), Files::default()), None);
+    assert_eq!(ground(&Facts { is_gas: true, ..facts() }, Files::default()), none);
+    assert_eq!(ground(&facts(), Files { is_molecular: true, ..Files::default() }), none);
+}
+
+#[test]
+fn what_differs_gives_the_colours() {
+    let by = |facts: &Facts| match of("", facts).material.color {
+        ColorSetting::Mapped(by) => by.attribute,
+        _ => None,
+    };
+    let mut fluid = Facts { has_velocities: true, scalar: Some("rho".to_owned()), ..facts() };
+    assert_eq!(by(&fluid), None);
+    fluid.has_even_speed = true;
+    assert_eq!(by(&fluid).as_deref(), Some("rho"));
+    // One kind that moves around an obstacle, and two kinds
+    fluid.has_even_speed = false;
+    let types = Category { walls: None, ..category("type", &[1, 2], &[2]) };
+    let types = Category { without_walls: vec![1, 2], ..types };
+    fluid.categories = vec![types.clone()];
+    assert_eq!(by(&fluid), None);
+    fluid.categories = vec![Category { resting: Vec::new(), ..types }];
+    assert_eq!(by(&fluid).as_deref(), Some("type"));
 }
 
 #[test]

@@ -9,6 +9,9 @@ use crate::scene::azimuth_toward;
 /// A molecule is turned if its extent along the view would be more than this part of its largest one.
 const ROUND: f64 = 0.85;
 
+/// The least cosine between the smallest extent of a slab that lies and the direction that points up.
+const LIES: f64 = 0.95;
+
 /// Angles by which a molecule is turned from its broad side, degrees: they show its depth.
 const TILT: [f64; 2] = [14.0, 12.0];
 
@@ -27,6 +30,11 @@ impl Rules<'_> {
         let Some(axes) = axes.filter(|axes| axes.deviations[2] < ROUND * axes.deviations[0]) else {
             return;
         };
+        // A slab lies flat
+        let is_solid = self.facts.elements.is_some_and(|elements| elements.is_solid);
+        if is_solid && axes.directions[2].dot(self.up_direction()).abs() > LIES {
+            return;
+        }
         // Of both signs, those that are nearest to the usual axes
         let [_, up, toward] = axes.directions;
         let up = if up.dot(self.up_direction()) < 0.0 { -up } else { up };
