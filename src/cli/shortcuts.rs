@@ -225,7 +225,9 @@ impl Shortcuts {
     fn add_overlays(&self, list: &mut Vec<Override>) -> Result<(), CliError> {
         let (title, unit) = (self.title.as_ref(), self.unit.as_ref());
         if self.colorbar || title.is_some() || unit.is_some() {
-            let table = overlay("colorbar", &[("title", title), ("unit", unit)]);
+            let layout = String::from("auto");
+            let keys = [("layout", Some(&layout)), ("title", title), ("unit", unit)];
+            let table = overlay("colorbar", &keys);
             list.push(append("overlay", table, "--colorbar")?);
         }
         if self.time_stamp {

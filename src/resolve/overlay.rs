@@ -132,7 +132,9 @@ pub(super) fn placed<'m>(
     survey: &Survey,
     setup: &Setup,
 ) -> Cow<'m, Manifest> {
-    let is_open = |overlay: &ManifestOverlay| overlay.layout == Some(OverlayLayout::Auto);
+    let is_open = |overlay: &ManifestOverlay| {
+        overlay.layout == Some(OverlayLayout::Auto) && manifest.image.layout == Layout::Over
+    };
     let overlays = &setup.picture.files.overlays;
     // Overlays that show nothing are left out
     let are_all = overlays.len() == manifest.overlays.len();

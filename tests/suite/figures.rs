@@ -84,6 +84,28 @@ fn overlays_beside_the_picture_leave_it_alone() {
 }
 
 #[test]
+fn the_legend_moves_beside_a_picture_full_of_particles() {
+    let shop = Workshop::new();
+    let numbers = (0..1000).map(|i| [i % 10, i / 10 % 10, i / 100]);
+    let rows = numbers.map(|[x, y, z]| format!("{x},{y},{z},{x},0,0\n"));
+    let text = format!("x,y,z,vx,vy,vz\n{}", rows.collect::<String>());
+    fs::write(shop.join("p_1.csv"), text).expect("a file");
+    for (out, zoom, is_full) in [("far", "0.4", false), ("near", "3", true)] {
+        let pattern = format!("{out}/f.####.exr");
+        let size = ["--width", "320", "--height", "240", "--zoom", zoom];
+        let arguments = ["render", "p_1.csv", "-o", &pattern];
+        shop.run(&[&arguments[..], &QUICK, &size].concat()).expect(0);
+        let width = Picture::open(&shop.join(format!("{out}/f.0001.exr"))).width;
+        assert_eq!(width < 300, is_full, "{out}: {width}");
+        assert_eq!(picture(&shop.join(format!("{out}/f.0001.png"))).dimensions(), (320, 240));
+        shop.run(&["verify", out]).expect(0);
+        // Pages have the channels of images that fit their pictures
+        let page = shop.run(&["view", out, "-o", &format!("{out}.html")]).expect(0);
+        assert_eq!(page.errors().contains("the page has none"), is_full, "{out}");
+    }
+}
+
+#[test]
 fn the_legend_stays_beside_other_overlays() {
     let shop = shop();
     let size = ["--width", "320", "--height", "240"];

@@ -342,8 +342,8 @@ impl Manifest {
     pub fn layout_of(&self, overlay: &Overlay) -> Layout {
         match overlay.layout {
             Some(OverlayLayout::Beside) => Layout::Beside,
-            Some(OverlayLayout::Auto | OverlayLayout::Over) => Layout::Over,
-            None => self.image.layout,
+            Some(OverlayLayout::Over) => Layout::Over,
+            Some(OverlayLayout::Auto) | None => self.image.layout,
         }
     }
 
