@@ -4,11 +4,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::{BVec3, Vec3};
 use rayon::prelude::*;
-use spherule_formats::SimulationCell;
+use spherule_formats::{Lattice, SimulationCell};
 
 use super::SharedFrame;
 use super::decoded::colors_by;
-use super::lattice::Lattice;
 use super::load_error::{LoadError, missing};
 use super::rods::FrameRods;
 use super::setup::{BondRule, Setup};
@@ -166,7 +165,7 @@ impl<'a> Search<'a> {
         Self {
             radius,
             bins: FieldParticles::sorted(positions, size, true),
-            images: frame.cell.as_ref().map(images_around).unwrap_or_default(),
+            images: frame.cell.as_ref().map(SimulationCell::images_around).unwrap_or_default(),
             bounds: [min - reach.greatest, max + reach.greatest],
             reach,
             positions,
@@ -228,30 +227,6 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Where the images of `cell` next to it are, without itself.
-fn images_around(cell: &SimulationCell) -> Vec<Vec3> {
-    let steps = |edge: usize| {
-        if cell.periodic[edge] && cell.vectors[edge].length_squared() > 0.0 {
-            -1..=1
-        } else {
-            0..=0
-        }
-    };
-    let mut images = Vec::new();
-    for a in steps(0) {
-        for b in steps(1) {
-            for c in steps(2) {
-                if [a, b, c] != [0; 3] {
-                    let edges = cell.vectors.into_iter().zip([a, b, c].map(f64::from));
-                    let offset: glam::DVec3 = edges.map(|(edge, number)| number * edge).sum();
-                    images.push(offset.as_vec3());
-                }
-            }
-        }
-    }
-    images
-}
-
 #[cfg(test)]
 mod tests {
     use glam::DVec3;
@@ -298,7 +273,7 @@ mod tests {
         length: impl Fn(usize, usize) -> Option<f64>,
     ) -> (Vec<[u32; 2]>, Vec<u32>) {
         let cell = frame.cell.unwrap();
-        let images = images_around(&cell);
+        let images = cell.images_around();
         let (mut pairs, mut halves) = (Vec::new(), Vec::new());
         for a in 0..frame.len() {
             for b in 0..frame.len() {

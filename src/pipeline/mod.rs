@@ -16,7 +16,6 @@ mod encoders;
 mod error;
 mod facts;
 mod in_place;
-mod lattice;
 mod load;
 mod load_error;
 mod mattes;

@@ -5,11 +5,10 @@ use std::borrow::Cow;
 use glam::Vec3;
 use spherule_formats::order::index_u32;
 use spherule_formats::sequence::Sequence;
-use spherule_formats::{ParticleFrame, SimulationCell};
+use spherule_formats::{Lattice, ParticleFrame, SimulationCell};
 
 use super::arrows::every_nth;
 use super::decoded::{colors_by, ids};
-use super::lattice::Lattice;
 use super::load_error::{LoadError, first_file, missing};
 use super::motion::Places;
 use super::rods::FrameRods;

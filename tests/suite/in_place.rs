@@ -126,7 +126,8 @@ fn coincident_particles_have_the_ids_of_the_source() {
     for input in ["in", "native"] {
         for structure in ["lbvh", "kdtree", "bvh", "sbvh"] {
             let out = format!("{input}-{structure}");
-            let how = ["--accelerator", structure, "--radius", "0.02"];
+            // Whether so few places are those of a gas, which has no floor, depends on their order
+            let how = ["--accelerator", structure, "--radius", "0.02", "--ground", "none"];
             render(&shop, input, &out, &[&ALL[..], &how].concat()).expect(0);
             let made: Vec<Vec<u8>> = images(&shop.join(&out)).into_values().collect();
             let expected = first.get_or_insert_with(|| made.clone());

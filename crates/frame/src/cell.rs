@@ -1,6 +1,6 @@
 //! The simulation cell: the parallelepiped in which a molecular simulation takes place.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 /// A corner, and the three edges that meet there; not necessarily at right angles.
@@ -74,6 +74,37 @@ impl SimulationCell {
             let start = (rest - low) << 1 | low;
             [corners[start], corners[start | 1 << edge]]
         })
+    }
+
+    /// The matrix from places relative to the corner to fractions of the edges; none without a volume.
+    pub fn fractions(&self) -> Option<DMat3> {
+        let [a, b, c] = self.vectors;
+        let inverse = DMat3::from_cols(a, b, c).inverse();
+        inverse.is_finite().then_some(inverse)
+    }
+
+    /// Where the images of the cell next to it are, without itself.
+    pub fn images_around(&self) -> Vec<Vec3> {
+        let steps = |edge: usize| {
+            if self.periodic[edge] && self.vectors[edge].length_squared() > 0.0 {
+                -1..=1
+            } else {
+                0..=0
+            }
+        };
+        let mut images = Vec::new();
+        for a in steps(0) {
+            for b in steps(1) {
+                for c in steps(2) {
+                    if [a, b, c] != [0; 3] {
+                        let edges = self.vectors.into_iter().zip([a, b, c].map(f64::from));
+                        let offset: DVec3 = edges.map(|(edge, number)| number * edge).sum();
+                        images.push(offset.as_vec3());
+                    }
+                }
+            }
+        }
+        images
     }
 
     /// Length of the longest diagonal.

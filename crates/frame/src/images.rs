@@ -58,7 +58,7 @@ impl PeriodicImages {
             .cell
             .ok_or_else(|| unsupported("no simulation cell, which copies and wrapping need"))?;
         if self.wrap {
-            let inverse = inverse(&cell).ok_or_else(|| {
+            let inverse = cell.fractions().ok_or_else(|| {
                 unsupported("the simulation cell has no volume, so that nothing can be wrapped")
             })?;
             each_position(&mut particles.positions, |p| wrapped(&cell, inverse, p));
@@ -119,7 +119,7 @@ impl PeriodicImages {
     /// of the cell, or in that on the other side of all copies.
     #[expect(clippy::cast_possible_truncation, reason = "indices fit into 32 bits")]
     fn copied_bonds(&self, particles: &RawParticles, cell: &SimulationCell) -> Vec<Bond> {
-        let inverse = inverse(cell).unwrap_or(DMat3::ZERO);
+        let inverse = cell.fractions().unwrap_or(DMat3::ZERO);
         let count = particles.positions.len();
         let counts = self.replicate.map(i64::from);
         let mut bonds = Vec::with_capacity(particles.bonds.len() * self.count() as usize);
@@ -186,13 +186,6 @@ fn each_position(positions: &mut Positions, mut moved: impl FnMut(DVec3) -> DVec
             }
         }
     }
-}
-
-/// The matrix from positions relative to the corner to fractions of the edges; none without a volume.
-fn inverse(cell: &SimulationCell) -> Option<DMat3> {
-    let [a, b, c] = cell.vectors;
-    let inverse = DMat3::from_cols(a, b, c).inverse();
-    inverse.is_finite().then_some(inverse)
 }
 
 /// The image of `position` in the cell. Whole edges are subtracted, so that a particle in the cell stays where it is.

@@ -39,6 +39,7 @@ pub mod generate;
 mod images;
 pub mod join;
 mod labels;
+mod lattice;
 pub mod names;
 mod origin;
 pub mod reading;
@@ -58,6 +59,7 @@ pub use frame::{
 };
 pub use images::PeriodicImages;
 pub use labels::Labels;
+pub use lattice::Lattice;
 pub use origin::choose_origin;
 pub use sampling::sample_indices;
 pub use scalar::{Endian, ScalarType};

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{
     Attribute, AttributeData, FrameError, PositionSlice, Positions, RawParticles, SimulationCell,
@@ -300,13 +300,10 @@ const MARGIN: f64 = 0.05;
 
 /// Some of the particles in coordinates of `cell`: 0 to 1 along each edge; none in a cell without volume.
 fn in_coordinates(cell: &SimulationCell, positions: &Positions) -> Vec<DVec3> {
-    let [a, b, c] = cell.vectors;
-    let to_edges = DMat3::from_cols(a, b, c);
-    if to_edges.determinant() == 0.0 {
+    let Some(fractions) = cell.fractions() else {
         return Vec::new();
-    }
-    let inverse = to_edges.inverse();
-    sample_of(positions).into_iter().map(|point| inverse * (point - cell.origin)).collect()
+    };
+    sample_of(positions).into_iter().map(|point| fractions * (point - cell.origin)).collect()
 }
 
 /// The part of the particles in `cell`, or within [`MARGIN`] of it.

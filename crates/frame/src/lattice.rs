@@ -1,10 +1,11 @@
-//! The lattice of a periodic cell: which image of a particle is the nearest one.
+//! The lattice of a periodic cell: its images, and which image of a particle is the nearest one.
 
 use glam::{DMat3, DVec3, Vec3};
-use spherule_formats::SimulationCell;
+
+use crate::SimulationCell;
 
 /// The edges along which a cell repeats.
-pub(super) struct Lattice {
+pub struct Lattice {
     /// The edges.
     edges: [DVec3; 3],
     /// The product with a way is its length along each edge, in edges; 0 along edges that do not repeat.
@@ -12,13 +13,10 @@ pub(super) struct Lattice {
 }
 
 impl Lattice {
-    pub(super) fn new(cell: &SimulationCell) -> Self {
+    /// The lattice of `cell`.
+    pub fn new(cell: &SimulationCell) -> Self {
         let [a, b, c] = cell.vectors;
-        let matrix = DMat3::from_cols(a, b, c);
-        let inverse = match matrix.determinant() {
-            0.0 => DMat3::from_cols(a, b, c).transpose(),
-            _ => matrix.inverse(),
-        };
+        let inverse = cell.fractions().unwrap_or(DMat3::from_cols(a, b, c).transpose());
         let of_edge = |edge: usize| {
             let row = inverse.row(edge);
             // In a flat cell, edges are assumed to be perpendicular
@@ -33,7 +31,7 @@ impl Lattice {
 
     /// What must be subtracted from the way to a particle for the way to its nearest image; None if it is the nearest
     /// one itself. A way of exactly half an edge is not changed.
-    pub(super) fn image(&self, way: Vec3) -> Option<Vec3> {
+    pub fn image(&self, way: Vec3) -> Option<Vec3> {
         let edges = self.edges.into_iter().zip(self.fractions);
         let offset: DVec3 = edges
             .map(|(edge, fraction)| {
