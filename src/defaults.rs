@@ -113,6 +113,7 @@ pub fn rules(
     files: Files<'_>,
 ) -> Defaults {
     let mut rules = Rules { manifest, source, facts, files, found: Defaults::default() };
+    rules.texts();
     if matches!(manifest.look, Look::None | Look::Whitted) || facts.particles == 0 {
         return rules.found;
     }
@@ -252,6 +253,18 @@ impl Rules<'_> {
         if !self.facts.has_radii {
             let line = format!("elements have {name} (--radius gives another)");
             self.set([("input.radius", radius)], Some(line));
+        }
+    }
+
+    /// Text that colours particles has categories: its numbers mean nothing.
+    fn texts(&mut self) {
+        let ColorSetting::Mapped(by) = &self.manifest.material.color else {
+            return;
+        };
+        let mut texts = self.facts.texts.iter();
+        let is_text = |name: &String| texts.any(|text| text.eq_ignore_ascii_case(name));
+        if by.values.is_none() && by.attribute.as_ref().is_some_and(is_text) {
+            self.set([("material.color.scale", "categorical".into())], None);
         }
     }
 

@@ -551,7 +551,8 @@ fn frames_of_a_trajectory_have_the_properties_of_its_topology() {
     for index in 0..2 {
         let particles = sequence.load_raw(index).expect("as many atoms");
         let names: Vec<&str> = particles.attributes.iter().map(|a| a.name.as_str()).collect();
-        assert_eq!(names, ["velocity", "element", "residue"]);
+        assert_eq!(names, ["velocity", "element", "residue", "residue_name", "atom_name"]);
+        assert_eq!(particles.labels["residue_name"].values().collect::<Vec<_>>(), ["SOL"]);
         assert_eq!(particles.attributes[1].data.get_f64(3), 8.0);
     }
     // Of the first frame of a topology and of one file of several

@@ -183,7 +183,7 @@ fn dualsphysics_parts_are_what_was_written() {
 
 #[test]
 fn molecules_are_what_the_reference_readers_give() {
-    assert_eq!(compare("molecules"), 98);
+    assert_eq!(compare("molecules"), 118);
 }
 
 #[test]

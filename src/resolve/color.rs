@@ -11,6 +11,7 @@ use crate::survey::{
 };
 use spherule_formats::ScalarType;
 use spherule_frame::join::ColumnShape;
+use spherule_frame::names;
 use spherule_frame::values::{Value, value_names};
 
 const ATTRIBUTE: &str = "material.color.attribute";
@@ -80,6 +81,7 @@ pub(super) fn rule(
         };
     };
     let value = value_of(survey, name, ATTRIBUTE)?;
+    require_categories(survey, by, name, SCALE)?;
     // Any other key means that vectors are mapped by their length
     if by.is_plain() && survey.rgb.is_some() {
         return Ok(ColorRule::Rgb { name: name.clone(), required: true });
@@ -133,6 +135,29 @@ pub(super) fn value_of(
     }
 }
 
+/// Whether `name` is a column of text in the survey.
+pub(super) fn is_text(survey: &Survey, name: &str) -> bool {
+    names::is_one_of(name, &names::TEXTS)
+        && survey.labels.keys().any(|column| column.eq_ignore_ascii_case(name))
+}
+
+/// Checks that `by` does not map text as if it were numbers.
+///
+/// # Errors
+/// It does, which is a problem of `key`.
+pub(super) fn require_categories(
+    survey: &Survey,
+    by: &ColorMapping,
+    name: &str,
+    key: &'static str,
+) -> Result<(), ResolveError> {
+    if by.scale() == ScaleKind::Categorical || !is_text(survey, name) {
+        return Ok(());
+    }
+    let what = format!("`{name}` is text, which has no range; set scale = \"categorical\"");
+    Err(ResolveError::Unsupported { key, what })
+}
+
 /// The attributes in the survey, whose types it does not know.
 pub(super) fn known_attributes(survey: &Survey) -> Vec<ColumnShape<'_>> {
     let components = survey.components.iter().copied();
@@ -177,9 +202,10 @@ fn categories(by: &ColorMapping, color: &ColorRange) -> Result<ColorMap, Resolve
             return Err(unsupported_scale(what));
         }
         Some(Categories::TooMany) => {
-            let what = format!(
-                "`{name}` has more than {MAX_CATEGORIES} different values; choose another scale"
-            );
+            let is_text = names::is_one_of(name, &names::TEXTS);
+            let remedy = if is_text { "colour by another value" } else { "choose another scale" };
+            let what =
+                format!("`{name}` has more than {MAX_CATEGORIES} different values; {remedy}");
             return Err(unsupported_scale(what));
         }
         None => &none,

@@ -364,12 +364,17 @@ fn named(
         let mut all = names.iter().flat_map(|names| &names.0);
         let found = all.find(|(known, _)| *known == value);
         let symbol = || element_symbol(value).filter(|_| is_elements);
-        let label = || labels.and_then(|(_, labels)| labels.get(&value).cloned());
+        let label = || labels.and_then(|(_, labels)| labels.get(&value)).map(|label| shown(label));
         let name = found.map(|(_, name)| name.clone()).or_else(label);
         name.or_else(|| symbol().map(str::to_owned)).unwrap_or_else(|| value.to_string())
     };
     let all = categories.iter();
     all.map(|(value, color)| (name(*value), srgb(*color))).collect()
+}
+
+/// A label in a legend, where an empty one would look like a mistake.
+fn shown(label: &str) -> String {
+    if label.is_empty() { "none".to_owned() } else { label.to_owned() }
 }
 
 /// The time, with decimals for the time between frames or for three digits of the only time, or the frame number.

@@ -1,5 +1,6 @@
 //! The radii of the particles, and how far they reach.
 
+use super::color::is_text;
 use super::error::require_attribute;
 use super::{ResolveError, surface};
 use crate::manifest::{Manifest, RadiusSetting};
@@ -19,6 +20,12 @@ pub(super) fn rule(manifest: &Manifest, survey: &Survey) -> Result<RadiusRule, R
         RadiusSetting::Length(radius) => RadiusRule::Common(narrow(*radius)),
         RadiusSetting::Attribute { attribute, scale } => {
             require_attribute(survey, "input.radius", attribute)?;
+            if is_text(survey, attribute) {
+                let what = format!(
+                    "`{attribute}` is text, not a number; give radii by numbers or by elements"
+                );
+                return Err(ResolveError::Unsupported { key: "input.radius", what });
+            }
             RadiusRule::Attribute { name: attribute.clone(), scale: narrow(*scale) }
         }
         RadiusSetting::Table { attribute, table, scale } => {

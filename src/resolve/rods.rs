@@ -47,6 +47,7 @@ fn mapped(
 ) -> Result<ColorRule, ResolveError> {
     let name = by.attribute.as_deref().unwrap_or(own);
     let value = color::value_of(survey, name, key)?;
+    color::require_categories(survey, by, name, key)?;
     let surveyed = survey.color.as_ref().filter(|range| range.attribute.eq_ignore_ascii_case(name));
     let is_given = matches!(by.range, Some(RangeSetting::Values(_)));
     let range = match surveyed {

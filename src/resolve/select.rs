@@ -4,7 +4,7 @@ use super::error::similar;
 use super::{ResolveError, color};
 use crate::manifest::Manifest;
 use crate::pipeline::attribute_list;
-use crate::selection::Selection;
+use crate::selection::{NameFault, Selection};
 use crate::surface::SurfaceKind;
 use crate::surface::cut::ConvexRegion;
 use crate::survey::Survey;
@@ -16,17 +16,20 @@ use spherule_frame::values::{Value, value_names};
 /// The particles have no value with a name in the condition.
 pub(super) fn selection(manifest: &Manifest, survey: &Survey) -> Result<Selection, ResolveError> {
     let selection = Selection { up: Some(super::up(manifest, survey)), ..manifest.selection() };
-    if survey.most_particles == 0 {
-        return Ok(selection);
-    }
     // Whether files have times shows when they are read
     let known = color::known_attributes(survey);
     let checked = selection.check_names(&known, Some(0.0), &survey.labels);
     match checked {
         Ok(()) => Ok(selection),
-        Err(unknown) if unknown.texts.is_some() => {
-            let known = unknown.texts.iter().flat_map(|(_, known)| known.iter().cloned());
-            let hint = similar(&unknown.name, &known.collect::<Vec<_>>());
+        // Empty frames need no attributes, but no particle may also be left because of a text that none has
+        Err(unknown) if survey.most_particles == 0 && !is_known_text(&unknown.fault) => {
+            Ok(selection)
+        }
+        Err(unknown) if unknown.fault != NameFault::NoValue => {
+            let hint = match &unknown.fault {
+                NameFault::NoText { known, .. } => similar(&unknown.name, known),
+                NameFault::NoValue | NameFault::NotNumber { .. } => String::new(),
+            };
             let what = unknown.text_fault(&hint).unwrap_or_default();
             Err(ResolveError::UnknownText { column: unknown.column, what })
         }
@@ -52,6 +55,15 @@ pub(super) fn selection(manifest: &Manifest, survey: &Survey) -> Result<Selectio
                 name: unknown.name,
             })
         }
+    }
+}
+
+/// Whether a fault is about a value whose texts are known.
+const fn is_known_text(fault: &NameFault) -> bool {
+    match fault {
+        NameFault::NoValue => false,
+        NameFault::NoText { known, .. } => !known.is_empty(),
+        NameFault::NotNumber { .. } => true,
     }
 }
 

@@ -34,6 +34,7 @@ mod in_place;
 mod memory;
 mod meshes;
 mod movies;
+mod names_of_atoms;
 mod opacity;
 mod overlays;
 mod parts;

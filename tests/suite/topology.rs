@@ -38,7 +38,8 @@ fn inspect_shows_the_attributes_of_a_topology() {
         attributes.iter().map(|a| a["name"].as_str().expect("a name").to_owned()).collect()
     };
     assert_eq!(names(&[]), ["velocity"]);
-    assert_eq!(names(&TOPOLOGY), ["velocity", "element", "residue"]);
+    let all = ["velocity", "element", "residue", "residue_name", "atom_name"];
+    assert_eq!(names(&TOPOLOGY), all);
     let ran = shop.run(&["inspect", "md.trr", "--topology", "conf.gro"]);
     assert!(ran.expect(0).text().contains("element"));
     shop.run(&["inspect", "md.trr", "--topology", "nothing.gro"]).expect(2).prints("nothing.gro");

@@ -58,7 +58,7 @@ pub use frame::{
     is_radius,
 };
 pub use images::PeriodicImages;
-pub use labels::Labels;
+pub use labels::{Labels, label_code, next_label_code};
 pub use lattice::Lattice;
 pub use origin::choose_origin;
 pub use sampling::sample_indices;

@@ -58,6 +58,18 @@ pub fn without_unit(name: &str) -> &str {
 /// Names of positions among the `Properties` of extended XYZ.
 pub const POSITION_PROPERTIES: [&str; 4] = ["pos", "position", "positions", "coordinates"];
 
+/// The column with the names of chains, which are letters in most files.
+pub const CHAIN: &str = "chain";
+/// The column with the names of segments, by which CHARMM divides a system.
+pub const SEGMENT: &str = "segment";
+/// The column with the names of residues: `ALA`, `HOH`.
+pub const RESIDUE_NAME: &str = "residue_name";
+/// The column with the names of atoms in their residues: `CA`, `OW`.
+pub const ATOM_NAME: &str = "atom_name";
+
+/// Columns of molecular files with text. Readers give them as numbers ([`label_code`](crate::label_code)) with labels.
+pub const TEXTS: [&str; 4] = [CHAIN, SEGMENT, RESIDUE_NAME, ATOM_NAME];
+
 /// Names of elements or species among the `Properties` of extended XYZ.
 pub const SPECIES_PROPERTIES: [&str; 3] = ["species", "element", "symbol"];
 

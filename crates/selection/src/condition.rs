@@ -50,6 +50,8 @@ pub(super) struct TextUse {
     pub(super) column: usize,
     /// Whether it may be the name of a value: it is not in quotes.
     pub(super) may_be_value: bool,
+    /// The list after `in` that it is in, by the place of this in the condition.
+    pub(super) list: Option<usize>,
 }
 
 /// A name in a condition, and where it appears first.
@@ -286,7 +288,7 @@ impl Parser {
         self.check(column, left, Kind::Number, sign)?;
         let is_equality = ["==", "!="].contains(&sign);
         match of.filter(|_| is_equality) {
-            Some(of) if self.is_text() => self.text(of, true),
+            Some(of) if self.is_text() => self.text(of, None),
             _ => self.part(Kind::Number, sign, Self::sum)?,
         }
         let found = SIGNS.iter().find(|(name, _)| *name == sign);
@@ -316,14 +318,14 @@ impl Parser {
         }
     }
 
-    /// Takes the next token as text that the value `of` is compared with.
-    fn text(&mut self, of: usize, may_be_value: bool) {
+    /// Takes the next token as text that the value `of` is compared with, perhaps in a list.
+    fn text(&mut self, of: usize, list: Option<usize>) {
         let column = self.column();
         if let Some(Placed { token: token @ (Token::Text(text) | Token::Name(text)), .. }) =
             self.tokens.get(self.next)
         {
-            let may_be_value = may_be_value && matches!(token, Token::Name(_));
-            self.texts.push(TextUse { of, text: text.clone(), column, may_be_value });
+            let may_be_value = list.is_none() && matches!(token, Token::Name(_));
+            self.texts.push(TextUse { of, text: text.clone(), column, may_be_value, list });
             self.operations.push(Operation::Text(self.texts.len() - 1));
             self.next += 1;
         }
@@ -331,13 +333,14 @@ impl Parser {
 
     /// The list of texts and numbers after `in`: the value `of` must equal one of them.
     fn list(&mut self, of: usize) -> Parsed {
+        let start = self.column();
         self.require("(", "after `in`, as in `element in (C, N)`")?;
         for item in 0.. {
             if item > 0 {
                 self.operations.push(Operation::Value(of));
             }
             match self.token(0) {
-                Some(Token::Text(_) | Token::Name(_)) => self.text(of, false),
+                Some(Token::Text(_) | Token::Name(_)) => self.text(of, Some(start)),
                 _ => {
                     self.within(Self::unary)?;
                 }

@@ -31,6 +31,8 @@
 //! ```
 #![deny(unsafe_code)]
 
+use std::collections::HashSet;
+
 use glam::DVec3;
 use rayon::prelude::*;
 use spherule_formats::order::index_u32;
@@ -51,11 +53,11 @@ mod values;
 pub use condition::Condition;
 pub use error::ConditionError;
 pub use region::Region;
-pub use values::UnknownName;
+pub use values::{NameFault, UnknownName};
 
-use condition::{NameUse, TextUse};
+use condition::{NameUse, Operation, TextUse};
 use evaluate::{BLOCK, Stacks};
-use texts::{TextValue, code_of};
+use texts::{MissingText, TextValue, code_of};
 use values::{FileContext, value_of};
 
 /// Particles that one task tests.
@@ -91,17 +93,17 @@ impl Selection {
         Self { regions: self.cuts.clone(), ..Self::default() }
     }
 
-    /// Checks that the names in the condition have values, for particles with `attributes`.
+    /// Checks that the names in the condition have values, for particles with `attributes` and the `labels` of a sequence.
     ///
     /// # Errors
-    /// The first name that has none.
+    /// The first name that has none, or is text where a number is needed.
     pub fn check_names<A: Named>(
         &self,
         attributes: &[A],
         time: Option<f64>,
         labels: &Labels,
     ) -> Result<(), UnknownName> {
-        self.values(attributes, time, labels).map(|_| ())
+        self.values(attributes, time, (labels, MissingText::Error)).map(|_| ())
     }
 
     /// The values of the names in the condition, and what its texts stand for.
@@ -109,20 +111,41 @@ impl Selection {
         &self,
         attributes: &[A],
         time: Option<f64>,
-        labels: &Labels,
+        (labels, missing): (&Labels, MissingText),
     ) -> Result<(Vec<Value>, Vec<TextValue<Value>>), UnknownName> {
-        let Some(Condition { names, texts, .. }) = &self.condition else {
+        let Some(Condition { names, texts, operations, .. }) = &self.condition else {
             return Ok(Default::default());
         };
         let value = |name: &NameUse| value_of(name, attributes, time, self.up);
         let values: Vec<Value> = names.iter().map(value).collect::<Result<_, _>>()?;
+        // Numbers of text mean nothing
+        for (index, operation) in operations.iter().enumerate() {
+            if let Operation::Value(of) = *operation
+                && !matches!(operations.get(index + 1), Some(Operation::Text(_)))
+                && let Some(example) = texts::example(&values[of], labels)
+            {
+                let NameUse { name, column } = names[of].clone();
+                let fault = NameFault::NotNumber { example: example.to_owned() };
+                return Err(UnknownName { name, column, fault });
+            }
+        }
+        // Programs have different names for water: one of a list is enough
+        let listed = texts
+            .iter()
+            .filter(|used| used.list.is_some() && texts::has(&values[used.of], &used.text, labels));
+        let known_lists: HashSet<Option<usize>> = listed.map(|used| used.list).collect();
         let text = |used: &TextUse| {
             let name = NameUse { name: used.text.clone(), column: used.column };
             match value(&name) {
-                Ok(value) if used.may_be_value => Ok(TextValue::Value(value)),
+                Ok(value) if used.may_be_value && !texts::is_text(&values[used.of]) => {
+                    Ok(TextValue::Value(value))
+                }
                 _ => {
                     let of = (names[used.of].name.as_str(), &values[used.of]);
-                    code_of(of, (&used.text, used.column), labels).map(TextValue::Code)
+                    let text = (used.text.as_str(), used.column);
+                    let is_listed = known_lists.contains(&used.list);
+                    let missing = if is_listed { MissingText::NoParticle } else { missing };
+                    code_of(of, text, labels, missing).map(TextValue::Code)
                 }
             }
         };
@@ -139,8 +162,8 @@ impl Selection {
         if count == 0 {
             return Ok(Vec::new());
         }
-        let (values, texts) =
-            self.values(&particles.attributes, particles.time, &particles.labels)?;
+        let labels = (&particles.labels, MissingText::NoParticle);
+        let (values, texts) = self.values(&particles.attributes, particles.time, labels)?;
         let context = FileContext::new(particles, self.up);
         let values: Vec<BoundValue<&Attribute>> =
             values.iter().filter_map(|value| context.bind(value)).collect();

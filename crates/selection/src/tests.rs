@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::{DVec3, Vec3};
 use spherule_formats::{Sequence, SequenceInput, name_code};
-use spherule_frame::{Attribute, Positions};
+use spherule_frame::{Attribute, Positions, label_code};
 
 use super::*;
 
@@ -268,6 +268,66 @@ fn with_text() -> RawParticles {
         ],
         labels: [("part".to_owned(), parts)].into_iter().collect(),
         ..RawParticles::default()
+    }
+}
+
+/// Particles with names of chains and atoms.
+fn with_names() -> RawParticles {
+    let columns =
+        [("chain", ["A", "a", "X", "1", ""]), ("atom_name", ["CA", "C1'", "1HB", "LONGER", "O+"])];
+    let mut all =
+        RawParticles { positions: Positions::F32(vec![Vec3::ONE; 5]), ..RawParticles::default() };
+    for (name, texts) in columns {
+        let codes = texts.map(label_code);
+        let labels =
+            codes.iter().zip(texts).map(|(code, text)| (i64::from(*code), text.to_owned()));
+        all.labels.insert(name.to_owned(), labels.collect());
+        let data = AttributeData::I32(codes.to_vec());
+        all.attributes.push(Attribute { name: name.to_owned(), components: 1, data });
+    }
+    all
+}
+
+#[test]
+fn names_of_chains_and_atoms_are_text() {
+    let (all, mut native) = (with_names(), with_names());
+    native.labels.clear();
+    for (text, expected) in [
+        ("chain == A", &[0][..]),
+        ("chain == a", &[1]),
+        ("chain != A", &[1, 2, 3, 4]),
+        // Not the position
+        ("chain == X", &[2]),
+        ("chain in (X, '1')", &[2, 3]),
+        ("chain == ''", &[4]),
+        ("atom_name == \"C1'\"", &[1]),
+        ("atom_name == '1HB' || Atom_Name == LONGER", &[2, 3]),
+        ("atom_name in (CA, 'O+') && x > 0", &[0, 4]),
+        // Other frames may have them
+        ("atom_name == OXT", &[]),
+        ("atom_name != OXT", &[0, 1, 2, 3, 4]),
+    ] {
+        assert_eq!(by(text).survivors(&all).expect(text), expected, "{text}");
+        assert_eq!(by(text).survivors(&native).expect(text), expected, "{text}");
+    }
+    // One of a list is enough
+    let known = by("atom_name in (OXT, CA)");
+    assert_eq!(known.check_names(&all.attributes, None, &all.labels), Ok(()));
+    // Case does not matter where labels tell what is meant
+    assert_eq!(by("atom_name == ca").survivors(&all), Ok(vec![0]));
+    for (text, message) in [
+        ("chain in (A, Z) && chain in (Q, Z)", "`chain` has no value `Q`"),
+        ("chain == Z", "`chain` has no value `Z`; it has `A`, `X`, `a`, `1`"),
+        (
+            "chain == 1",
+            "`chain` is text, not a number; compare it with text in quotes by ==, != or",
+        ),
+        ("x > 0 && chain in (A, 1)", "`chain` is text, not a number"),
+        ("abs(chain) > 2", "`chain` is text, not a number"),
+        ("chain > 2", "`chain` is text, not a number"),
+    ] {
+        let unknown = by(text).check_names(&all.attributes, None, &all.labels).expect_err(text);
+        assert!(unknown.text_fault("").expect(text).starts_with(message), "{unknown:?}");
     }
 }
 

@@ -14,16 +14,44 @@ pub struct UnknownName {
     pub name: String,
     /// Where the condition has it, in characters from 1.
     pub column: usize,
-    /// If it is text: the value that it is compared with, and the texts that this has.
-    pub texts: Option<(String, Vec<String>)>,
+    /// Why it has none.
+    pub fault: NameFault,
+}
+
+/// Why a name in a condition has no value.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum NameFault {
+    /// It is not the name of a value.
+    NoValue,
+    /// It is text that no particle has.
+    NoText {
+        /// The value that it is compared with.
+        of: String,
+        /// The texts of this value.
+        known: Vec<String>,
+    },
+    /// It is a column of text, and a number is needed.
+    NotNumber {
+        /// A text of the column.
+        example: String,
+    },
 }
 
 impl UnknownName {
-    /// What is wrong with text; None if it is the name of a value.
+    /// What is wrong with text; None if the name should be that of a value.
     pub fn text_fault(&self, hint: &str) -> Option<String> {
         const LISTED: usize = 12;
-        let (of, known) = self.texts.as_ref()?;
         let name = &self.name;
+        let (of, known) = match &self.fault {
+            NameFault::NoValue => return None,
+            NameFault::NoText { of, known } => (of, known),
+            NameFault::NotNumber { example } => {
+                return Some(format!(
+                    "`{name}` is text, not a number; compare it with text in quotes by ==, != or in, as in {name} == \
+                     '{example}'"
+                ));
+            }
+        };
         let listed: Vec<String> =
             known.iter().take(LISTED).map(|text| format!("`{text}`")).collect();
         let more = if known.len() > LISTED { ", ..." } else { "" };
@@ -51,7 +79,11 @@ pub(super) fn value_of<A: Named>(
         _ => true,
     };
     let found = Value::named(&used.name, attributes).filter(is_known);
-    found.ok_or_else(|| UnknownName { name: used.name.clone(), column: used.column, texts: None })
+    found.ok_or_else(|| UnknownName {
+        name: used.name.clone(),
+        column: used.column,
+        fault: NameFault::NoValue,
+    })
 }
 
 /// The column with the radii that files have, and the factor that makes radii of them.

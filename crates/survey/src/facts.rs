@@ -6,8 +6,8 @@ use std::collections::BTreeSet;
 use glam::DVec3;
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{
-    Attribute, AttributeData, FrameError, PositionSlice, Positions, RawParticles, SimulationCell,
-    find_radius, names, sample_indices,
+    Attribute, AttributeData, FrameError, Labels, PositionSlice, Positions, RawParticles,
+    SimulationCell, find_radius, names, sample_indices,
 };
 
 use super::beads::are_beads;
@@ -126,6 +126,8 @@ pub struct Facts {
     pub elements: Option<Elements>,
     /// Attributes with few integers, best first.
     pub categories: Vec<Category>,
+    /// Attributes of text: names of chains, residues and atoms.
+    pub texts: Vec<String>,
     /// The simulation cell.
     pub cell: Option<SimulationCell>,
     /// The part of the particles that are in the cell, or near it.
@@ -258,6 +260,7 @@ impl Facts {
             has_bonds: !raw.bonds.is_empty(),
             elements,
             categories: without_walls(categories, &raw.attributes),
+            texts: texts(&raw.labels),
             in_cell: raw.cell.as_ref().map_or(0.0, |cell| part_in(cell, &raw.positions)),
             cell_extent: raw.cell.as_ref().map_or([0.0; 3], |cell| {
                 let is_full = is_unit_cell(cell, sample.count, sample.spacing, place.angstrom);
@@ -273,6 +276,11 @@ impl Facts {
         let (min, max) = self.bounds?;
         flat_axis(min, max)
     }
+}
+
+/// The columns of text among those with `labels`.
+fn texts(labels: &Labels) -> Vec<String> {
+    labels.keys().filter(|column| names::is_one_of(column, &names::TEXTS)).cloned().collect()
 }
 
 /// What is known of a frame beside its particles.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::open::FrameFile;
 use crate::read::psf;
-use crate::{Attribute, Bond, FrameError, MemoryBudget, ParseError, RawParticles};
+use crate::{Attribute, FrameError, MemoryBudget, ParseError, Positions, RawParticles};
 use spherule_readers::read_whole;
 
 /// Properties of a topology that change with time.
@@ -17,8 +17,8 @@ pub struct Topology {
     path: PathBuf,
     /// Atoms.
     count: usize,
-    attributes: Vec<Attribute>,
-    bonds: Vec<Bond>,
+    /// Their attributes with labels, their bonds, and notes.
+    atoms: RawParticles,
 }
 
 impl Topology {
@@ -27,16 +27,17 @@ impl Topology {
     /// # Errors
     /// [`FrameError`] if it cannot be read.
     pub fn open(path: &Path, budget: MemoryBudget) -> Result<Self, FrameError> {
-        let (count, mut attributes, bonds) = if psf::is_psf(&crate::open::head(path)?) {
+        let (count, mut atoms) = if psf::is_psf(&crate::open::head(path)?) {
             let bytes = read_whole(path, budget.for_content())?;
             psf::read(&bytes, budget).map_err(|e| e.in_file(path))?
         } else {
-            let particles = FrameFile::open_within(path, budget)?.read(0)?;
+            let mut particles = FrameFile::open_within(path, budget)?.read(0)?;
             let count = particles.positions.len();
-            (count, particles.attributes, particles.bonds)
+            particles.positions = Positions::default();
+            (count, particles)
         };
-        attributes.retain(|attribute| !CHANGING.contains(&attribute.name.as_str()));
-        Ok(Self { path: path.to_owned(), count, attributes, bonds })
+        atoms.attributes.retain(|attribute| !CHANGING.contains(&attribute.name.as_str()));
+        Ok(Self { path: path.to_owned(), count, atoms })
     }
 
     /// The file of the topology.
@@ -62,11 +63,15 @@ impl Topology {
         let own = particles.attributes.iter();
         let known: HashSet<String> = own.map(|attribute| attribute.name.clone()).collect();
         let is_new = |attribute: &&Attribute| !known.contains(&attribute.name);
-        let new = self.attributes.iter().filter(is_new).cloned();
-        particles.attributes.extend(new);
-        if particles.bonds.is_empty() {
-            particles.bonds.clone_from(&self.bonds);
+        for attribute in self.atoms.attributes.iter().filter(is_new) {
+            let labels = self.atoms.labels.get_key_value(&attribute.name);
+            particles.labels.extend(labels.map(|(name, labels)| (name.clone(), labels.clone())));
+            particles.attributes.push(attribute.clone());
         }
+        if particles.bonds.is_empty() {
+            particles.bonds.clone_from(&self.atoms.bonds);
+        }
+        particles.notes.extend_from_slice(&self.atoms.notes);
         Ok(())
     }
 }

@@ -12,7 +12,9 @@ use spherule_formats::sequence::{
     ListSummary, SequenceError, SequenceSettings, Topology, lone_frame_number, stands_for_others,
 };
 use spherule_formats::stats::FrameStats;
-use spherule_formats::{FrameError, FrameFile, Positions, Sequence, SequenceInput, SimulationCell};
+use spherule_formats::{
+    FrameError, FrameFile, Labels, Positions, Sequence, SequenceInput, SimulationCell,
+};
 
 use super::errors::frame_message;
 use super::manifest_args::is_manifest;
@@ -71,6 +73,8 @@ struct Inspected<'a> {
     /// Summary of a native frame.
     native: Option<NativeFacts>,
     cell: Option<SimulationCell>,
+    /// Texts behind the numbers of attributes.
+    labels: Labels,
     /// Metadata of the file that is not per particle.
     notes: Vec<String>,
     /// Whether a full verification was requested and done.
@@ -251,6 +255,7 @@ struct Contents {
     cell: Option<SimulationCell>,
     encoding: &'static str,
     notes: Vec<String>,
+    labels: Labels,
 }
 
 impl Contents {
@@ -265,6 +270,7 @@ impl Contents {
             time: source.time(),
             cell: source.cell(),
             notes: source.notes().to_vec(),
+            labels: source.labels(),
             encoding: match source.position_len() {
                 Some(12) => "f32",
                 _ => "f64",
@@ -286,6 +292,7 @@ impl Contents {
         Ok(Self {
             stats: FrameStats::of(&raw),
             notes: raw.notes,
+            labels: raw.labels,
             time: raw.time,
             cell: raw.cell,
             encoding: match raw.positions {
@@ -339,6 +346,7 @@ fn read<'a>(
         bytes_per_particle: (all > 0).then(|| stored / all as f64),
         native: native.map(|index| NativeFacts::new(index, file.bytes().len() as u64, None)),
         cell: contents.cell,
+        labels: contents.labels,
         notes: contents.notes,
         verified: false,
     })

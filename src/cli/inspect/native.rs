@@ -7,7 +7,7 @@ use spherule_formats::blocks::{BLOCK_SIZE, Block, Node};
 use spherule_formats::native::layout::{RadiusIndex, UP_Y, VERSION, blocks_of};
 use spherule_formats::native::{Access, FrameIndex, NativeFile, RadiusCode, StoredType};
 use spherule_formats::stats::FrameStats;
-use spherule_formats::{FrameError, ScalarType};
+use spherule_formats::{FrameError, Labels, ScalarType};
 
 use super::Inspected;
 use crate::report::THESIS_BYTES_PER_PARTICLE;
@@ -52,6 +52,7 @@ pub(super) fn inspect(
         bytes_per_particle: (index.count > 0).then(|| bytes as f64 / index.count as f64),
         native: Some(NativeFacts::new(index, bytes, sample)),
         cell: None,
+        labels: Labels::new(),
         notes: Vec::new(),
         verified: verify,
     })

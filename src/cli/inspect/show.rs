@@ -1,6 +1,9 @@
 //! Prints the result of `inspect`.
 
+use std::collections::BTreeMap;
+
 use serde_json::{Value, json};
+use spherule_files::{counted, one_line};
 use spherule_formats::SimulationCell;
 use spherule_formats::stats::{AttributeStats, Number};
 
@@ -98,7 +101,8 @@ impl Inspected<'_> {
             Some((low, high)) if low == high => format!("  radius {low}"),
             Some((low, high)) => format!("  radius {low} to {high}"),
         });
-        lines.extend(stats.attributes.iter().map(attribute_line));
+        let attributes = stats.attributes.iter();
+        lines.extend(attributes.map(|a| attribute_line(a, self.labels.get(&a.name))));
         if let Some(sample) = self.native.as_ref().and_then(|native| native.sample) {
             lines.push(format!("  values of attributes are from a sample of {sample} particles"));
         }
@@ -128,6 +132,7 @@ impl Inspected<'_> {
     /// One value per component.
     fn attribute_json(&self, attribute: &AttributeStats) -> Value {
         let mut object = attribute_json(attribute);
+        object["labels"] = json!(self.labels.get(&attribute.name));
         // That of a sample means nothing.
         if self.native.as_ref().is_some_and(|n| n.sample.is_some()) {
             object["sum"] = Value::Null;
@@ -151,7 +156,10 @@ fn cell_line(cell: &SimulationCell) -> String {
     line + &format!(" ({CELL_HINT})")
 }
 
-fn attribute_line(attribute: &AttributeStats) -> String {
+/// Most labels of an attribute that are printed.
+const MAX_LABELS: usize = 12;
+
+fn attribute_line(attribute: &AttributeStats, labels: Option<&BTreeMap<i64, String>>) -> String {
     let mut line = format!(
         "  {} ({} x {}):",
         attribute.name,
@@ -163,6 +171,13 @@ fn attribute_line(attribute: &AttributeStats) -> String {
             (Some(min), Some(max)) => format!(" [{min} .. {max}]"),
             _ => " [no values]".to_owned(),
         };
+    }
+    if let Some(labels) = labels {
+        let all: Vec<&String> = labels.values().filter(|label| !label.is_empty()).collect();
+        let shown = all.iter().take(MAX_LABELS).map(|label| one_line((*label).clone()));
+        let shown = shown.collect::<Vec<_>>().join(", ");
+        let more = if all.len() > MAX_LABELS { ", ..." } else { "" };
+        line += &format!(" {shown}{more} ({})", counted(all.len(), "name"));
     }
     line
 }

@@ -28,6 +28,14 @@ BOX = numpy.diag([3.0, 2.5, 2.0]).astype("f4")
 lines = []
 
 
+ALPHABET = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789'"
+
+
+def codes(names):
+    """The numbers of names of up to four characters: those of the characters to the base 64."""
+    return numpy.array([sum((1 + ALPHABET.index(c)) << 6 * i for i, c in enumerate(name)) for name in names], "i4")
+
+
 def expect(file, index, number, time, **arrays):
     for name, array in arrays.items():
         lines.append(reference.line(file, index, number, time, name, numpy.asarray(array)))
@@ -124,6 +132,8 @@ def expect_gro(name, index, number, time, text, digits, has_velocities):
               "residue": numpy.array([1 + i // 3 for i in range(len(rows))], "i4")}
     if has_velocities:
         arrays["velocity"] = numbers[:, 3:]
+    arrays["residue_name"] = codes("SOL" for _ in rows)
+    arrays["atom_name"] = codes(["OW", "HW1", "HW2"][i % 3] for i in range(len(rows)))
     expect(name, index, number, time, **arrays)
     return numbers
 
@@ -261,7 +271,8 @@ ATOMS = [("N", "ALA", 1, "N", 7), ("CA", "ALA", 1, "C", 6), ("HB1", "ALA", 1, "H
 def expect_structure(name, index, number, positions, occupancies, factors):
     expect(name, index, number, None, positions=numpy.array(positions, "f8"),
            element=numpy.array([a[4] for a in ATOMS], "i4"), residue=numpy.array([a[2] for a in ATOMS], "i4"),
-           occupancy=numpy.array(occupancies, "f8"), b_factor=numpy.array(factors, "f8"))
+           occupancy=numpy.array(occupancies, "f8"), b_factor=numpy.array(factors, "f8"),
+           chain=codes("A" for _ in ATOMS), residue_name=codes(a[1] for a in ATOMS), atom_name=codes(a[0] for a in ATOMS))
 
 
 def pdb_atom(i, atom, x, occupancy, factor):

@@ -22,7 +22,8 @@ const KEYS: [&str; 15] = [
     "radius",
     "time",
 ];
-const ATTRIBUTE_KEYS: [&str; 7] = ["components", "max", "mean", "min", "name", "sum", "type"];
+const ATTRIBUTE_KEYS: [&str; 8] =
+    ["components", "labels", "max", "mean", "min", "name", "sum", "type"];
 
 /// Runs `inspect --json` on `files` and parses each line.
 #[track_caller]

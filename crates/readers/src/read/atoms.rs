@@ -4,7 +4,8 @@ use glam::DVec3;
 
 use super::category;
 use super::text::{self, Line};
-use spherule_frame::{Attribute, AttributeData, MemoryBudget, ParseError, Positions};
+use super::texts::{CODE_LEN, TextColumn};
+use spherule_frame::{Attribute, AttributeData, MemoryBudget, ParseError, Positions, RawParticles};
 
 /// Attribute for the chemical element.
 pub(super) const ELEMENT: &str = "element";
@@ -16,17 +17,19 @@ pub(super) const RESIDUE: &str = "residue";
 pub(super) struct AtomTable {
     positions: Vec<DVec3>,
     attributes: Vec<Attribute>,
+    texts: Vec<TextColumn>,
     budget: MemoryBudget,
     /// Bytes of an atom.
     atom_len: usize,
 }
 
 impl AtomTable {
-    /// No atoms yet. They have attributes of one integer each, called `whole`, and of real numbers: names and
-    /// components.
+    /// No atoms yet. They have attributes of one integer each, called `whole`, of real numbers: names and components, and
+    /// of text.
     pub(super) fn new(
         whole: &[&'static str],
         real: &[(&'static str, usize)],
+        texts: &[&'static str],
         budget: MemoryBudget,
     ) -> Self {
         let attribute =
@@ -40,12 +43,13 @@ impl AtomTable {
         Self {
             positions: Vec::new(),
             attributes: whole_columns.chain(real_columns).collect(),
+            texts: texts.iter().map(|name| TextColumn::new(name)).collect(),
             budget,
-            atom_len: size_of::<DVec3>() + 4 * whole.len() + 8 * real_len,
+            atom_len: size_of::<DVec3>() + 4 * whole.len() + 8 * real_len + CODE_LEN * texts.len(),
         }
     }
 
-    /// Adds an atom with the numbers of its attributes, in the order of [`Self::new`]. Integers beyond i32 become 0.
+    /// Adds an atom with the numbers and texts of its attributes, in the order of [`Self::new`]. Integers beyond i32 become 0.
     ///
     /// # Errors
     /// [`ParseError::TooLarge`] beyond the budget.
@@ -54,6 +58,7 @@ impl AtomTable {
         position: [f64; 3],
         whole: &[i64],
         real: &[f64],
+        texts: &[&[u8]],
     ) -> Result<(), ParseError> {
         // A vector that grows holds its old numbers and twice the room for new ones.
         let need = 3 * self.atom_len * (self.positions.len() + 1);
@@ -69,6 +74,9 @@ impl AtomTable {
                 _ => {}
             }
         }
+        for (column, text) in self.texts.iter_mut().zip(texts) {
+            column.push(text);
+        }
         Ok(())
     }
 
@@ -77,13 +85,21 @@ impl AtomTable {
         self.positions.is_empty()
     }
 
-    /// The atoms.
-    pub(super) fn into_parts(mut self) -> (Positions, Vec<Attribute>) {
+    /// The atoms. Attributes of text follow the others; those without any text are left out.
+    pub(super) fn into_particles(mut self) -> RawParticles {
         for attribute in &mut self.attributes {
             attribute.data.shrink();
         }
         self.positions.shrink_to_fit();
-        (Positions::F64(self.positions), self.attributes)
+        let mut particles = RawParticles {
+            positions: Positions::F64(self.positions),
+            attributes: self.attributes,
+            ..RawParticles::default()
+        };
+        for column in self.texts {
+            column.add_to(&mut particles);
+        }
+        particles
     }
 }
 

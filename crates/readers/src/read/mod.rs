@@ -42,6 +42,7 @@ mod table;
 pub mod text;
 #[cfg(test)]
 mod text_samples;
+mod texts;
 pub mod trr;
 pub mod usd;
 pub mod vtk;

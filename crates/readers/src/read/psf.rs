@@ -6,7 +6,10 @@
 
 use super::atoms::{self, ELEMENT, RESIDUE};
 use super::text::{self, Line, Lines};
-use spherule_frame::{Attribute, AttributeData, Bond, MemoryBudget, ParseError};
+use super::texts::{CODE_LEN, TextColumn};
+use spherule_frame::{
+    Attribute, AttributeData, Bond, MemoryBudget, ParseError, RawParticles, names,
+};
 
 /// What follows the count in the heading of the atoms.
 const ATOMS: &[u8] = b"!NATOM";
@@ -18,14 +21,11 @@ pub fn is_psf(head: &[u8]) -> bool {
     head.strip_prefix(b"PSF").is_some_and(|rest| rest.first().is_none_or(u8::is_ascii_whitespace))
 }
 
-/// Reads the number of atoms, their properties, and their bonds.
+/// Reads the number of atoms, and particles with their properties and bonds, but without positions.
 ///
 /// # Errors
 /// [`ParseError`] if the file is damaged, or its atoms need more memory than `budget` allows.
-pub fn read(
-    bytes: &[u8],
-    budget: MemoryBudget,
-) -> Result<(usize, Vec<Attribute>, Vec<Bond>), ParseError> {
+pub fn read(bytes: &[u8], budget: MemoryBudget) -> Result<(usize, RawParticles), ParseError> {
     let mut lines = Lines::new(bytes, 0..bytes.len());
     let heading = lines.find(|line| text::words(line.text).nth(1).is_some_and(|w| w == ATOMS));
     let Some(heading) = heading else {
@@ -39,18 +39,25 @@ pub fn read(
     };
     // A line of an atom has 15 bytes at least.
     let most = count.min(bytes.len() / 15);
-    budget.check(24 * most as u64, "its numbers in memory are")?;
+    let mut texts = [names::SEGMENT, names::RESIDUE_NAME, names::ATOM_NAME].map(TextColumn::new);
+    let atom_len = 24 + CODE_LEN * texts.len();
+    budget.check((atom_len * most) as u64, "its numbers in memory are")?;
     let (mut elements, mut residues) = (Vec::new(), Vec::new());
     let (mut charges, mut masses) = (Vec::new(), Vec::new());
     for index in 0..count {
         let line = lines.next();
         let words: Vec<&[u8]> =
             line.map(|line| text::words(line.text).take(8).collect()).unwrap_or_default();
-        let fields = words.get(if has_segment(&words) { 2 } else { 1 }..);
+        let segment = words.get(1).filter(|_| has_segment(&words));
+        let fields = words.get(if segment.is_some() { 2 } else { 1 }..);
         let numbers = match fields {
             Some([residue, residue_name, name, _, charge, mass, ..]) => {
                 elements.push(code(atoms::element(b"", name, residue_name)));
                 residues.push(code(atoms::residue(residue)));
+                let segment = segment.copied().unwrap_or_default();
+                for (column, text) in texts.iter_mut().zip([segment, residue_name, name]) {
+                    column.push(text);
+                }
                 text::number(charge).zip(text::number(mass))
             }
             _ => None,
@@ -74,7 +81,12 @@ pub fn read(
         attribute("charge", AttributeData::F64(charges)),
         attribute("mass", AttributeData::F64(masses)),
     ];
-    Ok((count, attributes, bonds(&mut lines, count, budget)?))
+    let bonds = bonds(&mut lines, count, budget)?;
+    let mut particles = RawParticles { attributes, bonds, ..RawParticles::default() };
+    for column in texts {
+        column.add_to(&mut particles);
+    }
+    Ok((count, particles))
 }
 
 /// Whether the `words` of an atom have a segment. Without one, charge and mass come one word earlier, and an integer
@@ -156,12 +168,13 @@ mod tests {
     #[test]
     fn atoms_have_elements_charges_and_masses() {
         assert!(is_psf(TEXT.as_bytes()) && !is_psf(b"PSFX"));
-        let (count, attributes, bonds) = read(TEXT.as_bytes(), MemoryBudget::UNLIMITED).unwrap();
+        let (count, particles) = read(TEXT.as_bytes(), MemoryBudget::UNLIMITED).unwrap();
+        let RawParticles { attributes, bonds, labels, .. } = particles;
         assert_eq!(count, 2);
         assert_eq!(bonds, [[0, 1], [1, 0]]);
         let without = TEXT.split_once(" 2 !NBOND").unwrap().0;
         assert_eq!(
-            read(without.as_bytes(), MemoryBudget::UNLIMITED).unwrap().2,
+            read(without.as_bytes(), MemoryBudget::UNLIMITED).unwrap().1.bonds,
             Vec::<Bond>::new()
         );
         let data = |i: usize| &attributes[i].data;
@@ -169,19 +182,30 @@ mod tests {
         assert_eq!(data(1), &AttributeData::I32(vec![7, 7]));
         assert_eq!(data(2), &AttributeData::F64(vec![-0.834, 0.417]));
         assert_eq!(data(3), &AttributeData::F64(vec![15.9994, 1.008]));
+        let texts = |name: &str| -> Vec<&str> {
+            let attribute = attributes.iter().find(|a| a.name == name).expect("text");
+            let AttributeData::I32(codes) = &attribute.data else { panic!("integers") };
+            codes.iter().map(|code| labels[name][&i64::from(*code)].as_str()).collect()
+        };
+        assert_eq!(texts("segment"), ["SYS", "SYS"]);
+        assert_eq!(texts("residue_name"), ["SOL", "SOL"]);
+        assert_eq!(texts("atom_name"), ["OW", "HW1"]);
     }
 
     #[test]
     fn segments_may_be_missing_and_residues_have_letters() {
         let data = |text: &str| read(text.as_bytes(), MemoryBudget::UNLIMITED).unwrap().1;
         let whole = data(TEXT);
-        assert_eq!(data(&TEXT.replace(" SYS ", " ")), whole);
+        let mut without = whole.clone();
+        without.attributes.retain(|attribute| attribute.name != "segment");
+        without.labels.remove("segment");
+        assert_eq!(data(&TEXT.replace(" SYS ", " ")), without);
         assert_eq!(data(&TEXT.replace(" 7 SOL", " 7A SOL")), whole);
         // Types may be numbers, and more numbers may follow
         let numbers =
             TEXT.replace("OT -0.834 15.9994 0", "2 -0.834 15.9994 0 0.00000 -0.301140E-02");
         assert_eq!(data(&numbers), whole);
-        assert_eq!(data(&numbers.replace(" SYS ", " ")), whole);
+        assert_eq!(data(&numbers.replace(" SYS ", " ")), without);
     }
 
     #[test]

@@ -11,7 +11,7 @@ use super::text::{self, Line};
 use super::{ByteSource, CUT_SHORT, Step, remarks};
 use crate::format::Format;
 use crate::reader::{Confidence, FormatInfo, Reader, StreamUnit};
-use spherule_frame::{MemoryBudget, ParseError, RawParticles, SimulationCell};
+use spherule_frame::{MemoryBudget, ParseError, RawParticles, SimulationCell, names};
 
 /// GROMACS `.gro` files.
 pub const FORMAT: Format = Format::new(&Gro);
@@ -119,7 +119,8 @@ fn read(
         text.peek_line().filter(|_| count > 0).map(Columns::of).transpose()?.unwrap_or_default();
     let velocity = [("velocity", 3)];
     let real = &velocity[..usize::from(columns.has_velocity)];
-    let mut atoms = AtomTable::new(&[ELEMENT, RESIDUE], real, budget);
+    let texts = [names::RESIDUE_NAME, names::ATOM_NAME];
+    let mut atoms = AtomTable::new(&[ELEMENT, RESIDUE], real, &texts, budget);
     let mut beads = Beads::default();
     for index in 0..count {
         let Some(line) = text.line() else {
@@ -133,15 +134,15 @@ fn read(
         let residue_name = field(line.text, 5, 10);
         let element = atoms::element(b"", name, residue_name);
         let residue = text::integer(field(line.text, 0, 5)).unwrap_or_default();
-        atoms.push(position, &[element, residue], real)?;
+        atoms.push(position, &[element, residue], real, &[residue_name, name])?;
         beads.push(name, residue_name);
     }
     let Some(cell) = text.line().filter(|line| is_box(*line)).map(cell) else {
         return Err(cut_short(text, format!("no box after {count} atoms")));
     };
-    let (positions, mut attributes) = atoms.into_parts();
-    attributes.extend(beads.attribute());
-    Ok(RawParticles { positions, attributes, time, step: number, cell, ..RawParticles::default() })
+    let mut particles = atoms.into_particles();
+    particles.attributes.extend(beads.attribute());
+    Ok(RawParticles { time, step: number, cell, ..particles })
 }
 
 fn cut_short(text: &TextInput<'_>, what: String) -> ParseError {

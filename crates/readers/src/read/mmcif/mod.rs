@@ -10,7 +10,7 @@ use super::text;
 use super::{ByteSource, CUT_SHORT, Step, remarks};
 use crate::format::Format;
 use crate::reader::{Confidence, FormatInfo, Reader, StreamUnit};
-use spherule_frame::{MemoryBudget, ParseError, RawParticles};
+use spherule_frame::{MemoryBudget, ParseError, RawParticles, names};
 
 mod rows;
 mod tokens;
@@ -90,7 +90,8 @@ impl Reader for MmCif {
         }
         text.end_at(range.end);
         let real = [("occupancy", 1), ("b_factor", 1)];
-        let mut atoms = AtomTable::new(&[ELEMENT, RESIDUE], &real, budget);
+        let texts = [names::CHAIN, names::RESIDUE_NAME, names::ATOM_NAME];
+        let mut atoms = AtomTable::new(&[ELEMENT, RESIDUE], &real, &texts, budget);
         let mut model = None;
         while let Some(row) = rows.next(text)? {
             if *model.get_or_insert(row.model) != row.model {
@@ -99,16 +100,11 @@ impl Reader for MmCif {
             let element = atoms::element(&row.symbol, &row.name, &row.residue_name);
             let whole = [element, row.residue.or(row.label_residue).unwrap_or_default()];
             let real = [row.occupancy.unwrap_or(1.0), row.b_factor.unwrap_or(0.0)];
-            atoms.push(row.position, &whole, &real)?;
+            let texts = [row.chain(), &row.residue_name, &row.name];
+            atoms.push(row.position, &whole, &real, &texts)?;
         }
-        let (positions, attributes) = atoms.into_parts();
-        Ok(RawParticles {
-            positions,
-            attributes,
-            step: step.number,
-            cell: rows.cell(),
-            ..RawParticles::default()
-        })
+        let particles = atoms.into_particles();
+        Ok(RawParticles { step: step.number, cell: rows.cell(), ..particles })
     }
 
     fn remarks(&self, _head: &[u8]) -> Vec<String> {

@@ -13,6 +13,10 @@ enum Column {
     Symbol,
     Name,
     ResidueName,
+    /// The name of the chain by the author.
+    Chain,
+    /// The name by which the dictionary tells chains apart; ligands and water have names of their own.
+    LabelChain,
     Residue,
     /// The number of the residue by which the dictionary counts.
     LabelResidue,
@@ -38,6 +42,8 @@ impl Column {
             () if is("type_symbol") => Self::Symbol,
             () if is("label_atom_id") => Self::Name,
             () if is("label_comp_id") => Self::ResidueName,
+            () if is("auth_asym_id") => Self::Chain,
+            () if is("label_asym_id") => Self::LabelChain,
             () if is("auth_seq_id") => Self::Residue,
             () if is("label_seq_id") => Self::LabelResidue,
             () if is("occupancy") => Self::Occupancy,
@@ -57,6 +63,8 @@ pub(super) struct AtomRow {
     pub(super) symbol: Vec<u8>,
     pub(super) name: Vec<u8>,
     pub(super) residue_name: Vec<u8>,
+    chain: Vec<u8>,
+    label_chain: Vec<u8>,
     pub(super) residue: Option<i64>,
     pub(super) label_residue: Option<i64>,
     pub(super) occupancy: Option<f64>,
@@ -65,6 +73,11 @@ pub(super) struct AtomRow {
 }
 
 impl AtomRow {
+    /// The name of the chain: that of the author, as in PDB files, if there is one.
+    pub(super) fn chain(&self) -> &[u8] {
+        if self.chain.is_empty() { &self.label_chain } else { &self.chain }
+    }
+
     /// Stores a value of the row; `at` is its offset in the file.
     fn set(&mut self, column: Column, token: Token<'_>, at: usize) -> Result<(), ParseError> {
         let value = token.text;
@@ -87,6 +100,8 @@ impl AtomRow {
             Column::Symbol => store(&mut self.symbol),
             Column::Name => store(&mut self.name),
             Column::ResidueName => store(&mut self.residue_name),
+            Column::Chain => store(&mut self.chain),
+            Column::LabelChain => store(&mut self.label_chain),
             Column::Residue => self.residue = text::integer(value),
             Column::LabelResidue => self.label_residue = text::integer(value),
             Column::Occupancy => self.occupancy = text::number(value),

@@ -11,7 +11,7 @@ use super::text::{self, Line};
 use super::{ByteSource, Step, remarks};
 use crate::format::Format;
 use crate::reader::{Confidence, FormatInfo, Reader, StreamUnit};
-use spherule_frame::{MemoryBudget, ParseError, RawParticles, SimulationCell};
+use spherule_frame::{MemoryBudget, ParseError, RawParticles, SimulationCell, names};
 
 /// Protein Data Bank files.
 pub const FORMAT: Format = Format::new(&Pdb);
@@ -180,7 +180,8 @@ fn read(
     text.go_to(range.start);
     text.end_at(range.end);
     let real = [("occupancy", 1), ("b_factor", 1)];
-    let mut atoms = AtomTable::new(&[ELEMENT, RESIDUE], &real, budget);
+    let texts = [names::CHAIN, names::SEGMENT, names::RESIDUE_NAME, names::ATOM_NAME];
+    let mut atoms = AtomTable::new(&[ELEMENT, RESIDUE], &real, &texts, budget);
     let mut beads = Beads::default();
     while let Some(line) = text.line() {
         if is_cell(line) {
@@ -190,8 +191,10 @@ fn read(
             continue;
         }
         let position = position(line)?;
-        let [name, residue, symbol] =
-            [(12, 16), (17, 21), (76, 78)].map(|(start, end)| field(line.text, start, end));
+        // Names of residues have three letters in the format, and four in many programs
+        let [name, residue, chain, segment, symbol] =
+            [(12, 16), (17, 21), (21, 22), (72, 76), (76, 78)]
+                .map(|(start, end)| field(line.text, start, end));
         let whole = [
             atoms::element(symbol, name, residue),
             text::integer(field(line.text, 22, 26)).unwrap_or_default(),
@@ -199,14 +202,14 @@ fn read(
         let real = [(54, 60, 1.0), (60, 66, 0.0)].map(|(start, end, default)| {
             text::number(field(line.text, start, end)).unwrap_or(default)
         });
-        atoms.push(position, &whole, &real)?;
+        atoms.push(position, &whole, &real, &[chain, segment, residue, name])?;
         beads.push(name, residue);
     }
     if atoms.is_empty() {
         let what = "no ATOM or HETATM records: the file has no positions";
         return Err(ParseError::malformed(range.start, what));
     }
-    let (positions, mut attributes) = atoms.into_parts();
-    attributes.extend(beads.attribute());
-    Ok(RawParticles { positions, attributes, step: step.number, cell, ..RawParticles::default() })
+    let mut particles = atoms.into_particles();
+    particles.attributes.extend(beads.attribute());
+    Ok(RawParticles { step: step.number, cell, ..particles })
 }
