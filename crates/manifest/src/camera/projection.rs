@@ -276,14 +276,11 @@ impl Value for ConvergenceSetting {
 
 /// Dependencies between keys, as JSON schema.
 pub(super) fn conditions() -> Vec<Json> {
-    let is = |key: &str, value: Json| json!({ "required": [key], "properties": { key: { "const": value } } });
     let not_perspective = json!({
         "required": ["projection"],
         "properties": { "projection": { "enum": ["orthographic", "equirectangular"] } },
     });
-    let number =
-        |key: &str| json!({ "required": [key], "properties": { key: { "type": "number" } } });
-    vec![
+    let mut conditions = vec![
         json!({
             "if": not_perspective,
             "then": { "properties": { "fov": { "const": DEFAULT_FOV }, "f_stop": { "const": 0 }, "aperture": { "const": 0 } } },
@@ -311,6 +308,14 @@ pub(super) fn conditions() -> Vec<Json> {
                 },
             },
         }),
+    ];
+    conditions.extend(stereo_conditions());
+    conditions
+}
+
+/// Dependencies between the keys of stereo pairs.
+fn stereo_conditions() -> [Json; 3] {
+    [
         json!({ "if": number("eye_distance"), "then": is("stereo", json!(true)) }),
         json!({
             "if": {
@@ -330,6 +335,16 @@ pub(super) fn conditions() -> Vec<Json> {
             },
         }),
     ]
+}
+
+/// The condition that `key` has this value.
+fn is(key: &str, value: Json) -> Json {
+    json!({ "required": [key], "properties": { key: { "const": value } } })
+}
+
+/// The condition that `key` is a number.
+fn number(key: &str) -> Json {
+    json!({ "required": [key], "properties": { key: { "type": "number" } } })
 }
 
 #[cfg(test)]
