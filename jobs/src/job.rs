@@ -189,6 +189,7 @@ impl Job {
         };
         let mut fingerprints = FingerprintCache::prefetch(&request, &selected, known.as_ref());
         let registry = WorkerRegistry::register(dir, request.takeover_after)
+            // Take the lock, and remove what earlier runs left behind
             .map_err(|e| JobError::io(dir, "registering a worker", e))?;
         let lock_failed = |e| JobError::io(dir, "locking the job", e);
         let lock = registry.lock().map_err(lock_failed)?;
@@ -197,6 +198,7 @@ impl Job {
             refuse_other_workers(dir, &registry)?;
             remove_ledgers(dir)?;
         }
+        // Read plan and ledgers again: other workers may have changed them before the lock was taken
         let old = match request.mode {
             ResumeMode::Force => None,
             _ => Plan::load(dir)?,
@@ -210,12 +212,7 @@ impl Job {
                 resume(old, merged.plan, &registry)?
             }
         };
-        let watcher = if compact_ledgers(dir, &state.ledger, &registry)? {
-            // Lines have moved to another file
-            LedgerWatcher::new(dir, registry.worker(), &Ledger::read(dir)?)
-        } else {
-            LedgerWatcher::new(dir, registry.worker(), &state.ledger)
-        };
+        let watcher = watcher_of(dir, &state.ledger, &registry)?;
         lock.complete();
         Ok(Self {
             writer: LedgerWriter::new(dir, registry.worker()),
@@ -423,6 +420,19 @@ fn compact_ledgers(
     }
     compact(dir, ledger, &files)?;
     Ok(true)
+}
+
+/// Compacts the ledgers if there are many, and returns a watcher of what is added to them from now on.
+fn watcher_of(
+    dir: &Path,
+    ledger: &Ledger,
+    registry: &WorkerRegistry,
+) -> Result<LedgerWatcher, JobError> {
+    if compact_ledgers(dir, ledger, registry)? {
+        // Lines have moved to another file
+        return Ok(LedgerWatcher::new(dir, registry.worker(), &Ledger::read(dir)?));
+    }
+    Ok(LedgerWatcher::new(dir, registry.worker(), ledger))
 }
 
 /// Removes incomplete files of killed runs, from the job's directory and from those of its outputs.

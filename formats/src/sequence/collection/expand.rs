@@ -55,6 +55,7 @@ pub(in crate::sequence) fn expand(
 ) -> Result<Expansion, SequenceError> {
     let mut expander = Expander::new(settings);
     let is_only = group.files.len() == 1;
+    // Follow each list to the files of particles, and number their time steps
     let mut numbers = Vec::new();
     let mut times = BTreeMap::new();
     let mut kind = None;
@@ -72,26 +73,15 @@ pub(in crate::sequence) fn expand(
             "{count} lists of files are listed twice for one time step and used once"
         ));
     }
+    // Sort the files by time step and part
     let Expander { leaves, lists, parts, faults, .. } = expander;
     let mut paths: Vec<PathBuf> = lists.into_keys().collect();
     paths.sort();
     let used = leaves.iter().zip(&numbers).map(|(leaf, number)| (*number, leaf.part));
     let (of_number, names) = parts.finish(used, &group.parts);
-    let mut steps: Vec<NumberedStep> = leaves
-        .into_iter()
-        .zip(numbers)
-        .map(|(leaf, number)| NumberedStep {
-            number,
-            file: PartFile {
-                path: leaf.path,
-                part: of_number.get(leaf.part as usize).copied().unwrap_or(0),
-                step: None,
-                listed: leaf.listed,
-            },
-        })
-        .collect();
-    steps.sort_by_key(|step| (step.number, step.file.part));
+    let mut steps = numbered_steps(leaves, numbers, &of_number);
     drop_repeated(&mut steps, notes);
+    // Summarise what was found
     let step_count = steps.chunk_by(|a, b| a.number == b.number).count();
     let ends = times.values().next().zip(times.values().next_back());
     let summary = ListSummary {
@@ -103,6 +93,25 @@ pub(in crate::sequence) fn expand(
     };
     notes.push(summary.to_string());
     Ok(Expansion { steps, parts: names, lists: ListedFiles { summary, paths, times, faults } })
+}
+
+/// The files in the order of their time steps and parts; `parts` has the part of each number in the table of parts.
+fn numbered_steps(leaves: Vec<Leaf>, numbers: Vec<i64>, parts: &[u32]) -> Vec<NumberedStep> {
+    let mut steps: Vec<NumberedStep> = leaves
+        .into_iter()
+        .zip(numbers)
+        .map(|(leaf, number)| NumberedStep {
+            number,
+            file: PartFile {
+                path: leaf.path,
+                part: parts.get(leaf.part as usize).copied().unwrap_or(0),
+                step: None,
+                listed: leaf.listed,
+            },
+        })
+        .collect();
+    steps.sort_by_key(|step| (step.number, step.file.part));
+    steps
 }
 
 /// A file of particles that a list names.
