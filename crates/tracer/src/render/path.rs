@@ -152,9 +152,28 @@ impl Integrator for PathIntegrator<'_> {
             Interior::Opaque => 0,
             Interior::Spheres | Interior::Body => packet.hits.lanes_of(MaterialId::PARTICLES),
         };
-        let max = self.context.settings.bounces;
         let others = packet.hits.mask & !(clear | panes | held_out | ended);
-        let mut opaque = others & lanes_where(|l| segments.bounces[l] <= max);
+        self.shade_reflecting(segments, depth, others, packet, next);
+        // Reflect and refract rays at transmissive surfaces
+        if clear != 0 {
+            self.shade_transmissive(segments, depth, clear, packet, next);
+        }
+    }
+}
+
+impl PathIntegrator<'_> {
+    /// Reflects light at the opaque surfaces of `lanes`, whose paths end at the last bounce, or already at the second
+    /// intersection if ambient occlusion replaces the rest of them.
+    fn shade_reflecting(
+        &self,
+        segments: &SegmentPacket,
+        depth: u32,
+        lanes: u32,
+        packet: &mut PacketScratch,
+        next: &mut RayStreams,
+    ) {
+        let max = self.context.settings.bounces;
+        let mut opaque = lanes & lanes_where(|l| segments.bounces[l] <= max);
         if let Some(ambient) = &self.ambient {
             let second = opaque & lanes_where(|l| segments.bounces[l] > 0);
             if second != 0 {
@@ -164,10 +183,6 @@ impl Integrator for PathIntegrator<'_> {
         }
         if opaque != 0 {
             self.shade_opaque(&self.surface(segments, depth, opaque), packet, next);
-        }
-        // Reflect and refract rays at transmissive surfaces
-        if clear != 0 {
-            self.shade_transmissive(segments, depth, clear, packet, next);
         }
     }
 }

@@ -60,15 +60,8 @@ impl PathIntegrator<'_> {
                 }
             }
         }
-        // Add the visible lights
         let ended = lanes_where(|l| nearest[l].is_some());
-        for lane in lanes_in(ended) {
-            packet.coverage[lane] = 1.0;
-            let (color, group) = color[lane];
-            let sum = lane3(&packet.radiance, lane) + color;
-            set_lane3(&mut packet.radiance, lane, sum);
-            packet.groups.add_lane(group, lane, color);
-        }
+        add_visible(ended, &color, packet);
         ended
     }
 
@@ -130,5 +123,16 @@ impl PathIntegrator<'_> {
         environment_along(context.simd, environment, along, &pdf, lanes, &mut seen);
         add(context.simd, &seen, &Vec3::ONE, lanes, radiance);
         groups.add(context.simd, context.environment_group(), &seen, lanes);
+    }
+}
+
+/// Adds the light of visible lights, with its light group, for the lanes whose rays `ended` at them.
+fn add_visible(ended: u32, color: &[(Vec3, usize); LANES], packet: &mut PacketScratch) {
+    for lane in lanes_in(ended) {
+        packet.coverage[lane] = 1.0;
+        let (color, group) = color[lane];
+        let sum = lane3(&packet.radiance, lane) + color;
+        set_lane3(&mut packet.radiance, lane, sum);
+        packet.groups.add_lane(group, lane, color);
     }
 }

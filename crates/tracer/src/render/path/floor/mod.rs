@@ -276,28 +276,35 @@ impl<'a> PathIntegrator<'a> {
         }
         // Add the light of the environment on a visible ground
         if let (Some(ground), Some(caustics)) = (floor, caustics) {
-            let (sky, of_sky) = sky::sky(&self, &caustics.square, stop)?;
+            let (light, of_sky) = self.floor_light(ground, caustics, stop)?;
             counts = counts + of_sky;
-            let open =
-                self.environment.map(|e| e.irradiance(ground.up) * FRAC_1_PI).unwrap_or_default();
-            let wet = match self.wet_scene(&caustics.square) {
-                Some(wet) => Some(wet.map(stop)?),
-                None => None,
-            };
-            let of_environment = self.context.environment_group();
-            let group = |(number, sky)| GroupSky {
-                sky,
-                open: if number == of_environment { open } else { Vec3::ZERO },
-            };
-            self.floor = Some(FloorLight {
-                caustics,
-                sky: sky.all,
-                wet,
-                open,
-                groups: sky.groups.into_iter().enumerate().map(group).collect(),
-            });
+            self.floor = Some(light);
         }
         Some((self, counts))
+    }
+
+    /// The light of photons, of the sky and of wetness on a visible `ground`, and the rays that were traced for the sky.
+    /// `None` if `stop` is raised.
+    fn floor_light(
+        &self,
+        ground: &Ground,
+        caustics: CausticMap,
+        stop: &dyn Stop,
+    ) -> Option<(FloorLight, RayCounts)> {
+        let (sky, of_sky) = sky::sky(self, &caustics.square, stop)?;
+        let open =
+            self.environment.map(|e| e.irradiance(ground.up) * FRAC_1_PI).unwrap_or_default();
+        let wet = match self.wet_scene(&caustics.square) {
+            Some(wet) => Some(wet.map(stop)?),
+            None => None,
+        };
+        let of_environment = self.context.environment_group();
+        let group = |(number, sky)| GroupSky {
+            sky,
+            open: if number == of_environment { open } else { Vec3::ZERO },
+        };
+        let groups = sky.groups.into_iter().enumerate().map(group).collect();
+        Some((FloorLight { caustics, sky: sky.all, wet, open, groups }, of_sky))
     }
 
     /// What wets the ground, if something does.
