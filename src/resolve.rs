@@ -11,11 +11,11 @@ use crate::manifest::{Manifest, Side};
 use crate::output::PreviewPage;
 use crate::overlay::{Page, RgbaPixels};
 use crate::pipeline::{
-    FileSettings, FrameSize, MemoryModel, ParticleRules, Picture, PictureMesh, RadiusRule, Setup,
-    Things,
+    ColorRule, FileSettings, FrameSize, MemoryModel, ParticleRules, Picture, PictureMesh,
+    RadiusRule, Setup, Things,
 };
 use crate::render::{RenderSettings, RendererKind};
-use crate::scene::{Bounds, RadianceMap, Texture};
+use crate::scene::{Bounds, RadianceMap, Scene, Texture};
 use crate::survey::Survey;
 
 mod arrows;
@@ -158,14 +158,7 @@ fn setup_on(
     };
     let picture = Picture {
         origin: survey.origin,
-        particles: ParticleRules {
-            selection: select::selection(manifest, survey)?,
-            cut: select::cut(manifest, survey)?,
-            radius,
-            least_radius: narrow(extent.bounds.diagonal() * MIN_RADIUS).max(f32::MIN_POSITIVE),
-            color,
-            opacity: opacity::opacity(manifest, survey, scene.material.transmission > 0.0)?,
-        },
+        particles: particle_rules(manifest, survey, &extent, (radius, color), &scene)?,
         files: FileSettings {
             exr: images::exr_options(manifest, &attributes, &render, placed.view.projection),
             attributes,
@@ -192,6 +185,24 @@ fn setup_on(
     setup.picture.files.preview.page =
         page.map(|page| PreviewPage { page, paper: overlay::paper(&setup) });
     Ok(setup)
+}
+
+/// Which particles are drawn, and how each of them looks in the scene.
+fn particle_rules(
+    manifest: &Manifest,
+    survey: &Survey,
+    extent: &Extent,
+    (radius, color): (RadiusRule, ColorRule),
+    scene: &Scene,
+) -> Result<ParticleRules, ResolveError> {
+    Ok(ParticleRules {
+        selection: select::selection(manifest, survey)?,
+        cut: select::cut(manifest, survey)?,
+        radius,
+        least_radius: narrow(extent.bounds.diagonal() * MIN_RADIUS).max(f32::MIN_POSITIVE),
+        color,
+        opacity: opacity::opacity(manifest, survey, scene.material.transmission > 0.0)?,
+    })
 }
 
 /// Rejects images that cannot fit into memory, whatever the particles.

@@ -156,11 +156,13 @@ pub(super) fn encodings() -> impl TypedValueParser<Value = Encoding> {
     KnownWords(names.to_vec()).try_map(|name| name.parse::<Encoding>())
 }
 
+/// The option of a key.
 fn argument(key: &KeyFlag) -> Arg {
+    // Write its help; an option that may stand without a value shows no default
     let is_switch = key.kind == FlagKind::Switch;
     let needs_value = !is_switch && usual_value(key.kind).is_none();
-    let default = key.default.as_ref().filter(|_| needs_value);
-    let default = default.map(|default| format!(" [default: {default}]"));
+    let shown_default = key.default.as_ref().filter(|_| needs_value);
+    let default = shown_default.map(|default| format!(" [default: {default}]"));
     let help = format!("{}{}", key.help, default.unwrap_or_default());
     let mut argument = Arg::new(key.flag.name)
         .long(key.flag.name)
@@ -175,7 +177,16 @@ fn argument(key: &KeyFlag) -> Arg {
     if is_switch {
         return argument.action(ArgAction::SetTrue);
     }
-    argument = argument.value_name(key.flag.value_name);
+    with_parser(argument.value_name(key.flag.value_name), key)
+        .hide_possible_values(key.flag.name != "progress")
+        .allow_negative_numbers(!matches!(
+            key.kind,
+            FlagKind::Text(_) | FlagKind::List | FlagKind::Integers | FlagKind::Numbers
+        ))
+}
+
+/// The argument with the parser of values of this kind.
+fn with_parser(argument: Arg, key: &KeyFlag) -> Arg {
     match key.kind {
         FlagKind::Integer => argument.value_parser(whole),
         FlagKind::Seconds => argument.value_parser(seconds),
@@ -206,11 +217,6 @@ fn argument(key: &KeyFlag) -> Arg {
         }
         FlagKind::NumberOrText | FlagKind::Switch => argument,
     }
-    .hide_possible_values(key.flag.name != "progress")
-    .allow_negative_numbers(!matches!(
-        key.kind,
-        FlagKind::Text(_) | FlagKind::List | FlagKind::Integers | FlagKind::Numbers
-    ))
 }
 
 /// The value that was given; of a switch, the opposite of the default.

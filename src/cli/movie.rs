@@ -162,15 +162,8 @@ fn played_rate(request: &Request<'_>) -> FrameRate {
     limit.filter(|_| is_limited).unwrap_or(request.rate)
 }
 
-/// The pictures in their order, with notes about gaps, odd sizes and rates that the format changes.
-fn source(
-    request: &Request<'_>,
-    pictures: &[JobPicture],
-    all: &[i64],
-    exposure: f32,
-) -> MovieSource {
-    let frames: Vec<i64> = pictures.iter().map(|picture| picture.number).collect();
-    let timeline = Timeline::new(&frames, all, request.gaps);
+/// Prints after which frames others are missing, and what the movie shows there.
+fn report_gaps(timeline: &Timeline) {
     for (what, gaps) in [
         ("is shown for longer (--gaps skip leaves gaps out)", &timeline.held),
         ("is followed by the next (the movie jumps)", &timeline.skipped),
@@ -185,6 +178,18 @@ fn source(
             message!("{missing} {are} missing after frame {frame}, which {what}{more}");
         }
     }
+}
+
+/// The pictures in their order, with notes about gaps, odd sizes and rates that the format changes.
+fn source(
+    request: &Request<'_>,
+    pictures: &[JobPicture],
+    all: &[i64],
+    exposure: f32,
+) -> MovieSource {
+    let frames: Vec<i64> = pictures.iter().map(|picture| picture.number).collect();
+    let timeline = Timeline::new(&frames, all, request.gaps);
+    report_gaps(&timeline);
     if played_rate(request) != request.rate {
         message!(
             "GIF has at most {MAX_GIF_RATE} frames per second: the movie is slower than {} fps",

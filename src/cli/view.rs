@@ -71,23 +71,7 @@ pub(super) fn run(args: &ViewArgs) -> Result<Outcome, CliError> {
     if !pictures.has_previews && !args.embed {
         message!("the job has no previews: pictures are made from the images, into the page");
     }
-    let format_of = |frame: &ViewerFrame| PictureFormat::of(&frame.image);
-    let has_exr = frames.iter().any(|frame| format_of(frame) == Some(PictureFormat::Exr));
-    let has_strips = has_exr && pictures.have_strips();
-    if has_strips && !args.no_data {
-        message!(
-            "overlays are beside the pictures, which the channels of the images would not fit: the page has none"
-        );
-    }
-    let settings = ViewerSettings {
-        title: title(&pictures),
-        rate: args.fps.per_second(),
-        embed: args.embed || !pictures.has_previews,
-        width: args.width.map(usize::from),
-        exposure: pictures.exposure,
-        data: !args.no_data && has_exr && !has_strips,
-        attributes: attributes(&pictures),
-    };
+    let settings = settings(args, &pictures, &frames);
     let report = JobReport::of_plan(&pictures.state);
     let made = viewer_page(&frames, &settings, &output, gaps.as_deref(), &report.plots());
     let (html, content) = made.map_err(|error| match error {
@@ -106,6 +90,27 @@ pub(super) fn run(args: &ViewArgs) -> Result<Outcome, CliError> {
         html.len()
     )])?;
     Ok(Outcome::Done)
+}
+
+/// How the page is made. Overlays in strips, which no channel fits, are reported.
+fn settings(args: &ViewArgs, pictures: &JobPictures, frames: &[ViewerFrame]) -> ViewerSettings {
+    let format_of = |frame: &ViewerFrame| PictureFormat::of(&frame.image);
+    let has_exr = frames.iter().any(|frame| format_of(frame) == Some(PictureFormat::Exr));
+    let has_strips = has_exr && pictures.have_strips();
+    if has_strips && !args.no_data {
+        message!(
+            "overlays are beside the pictures, which the channels of the images would not fit: the page has none"
+        );
+    }
+    ViewerSettings {
+        title: title(pictures),
+        rate: args.fps.per_second(),
+        embed: args.embed || !pictures.has_previews,
+        width: args.width.map(usize::from),
+        exposure: pictures.exposure,
+        data: !args.no_data && has_exr && !has_strips,
+        attributes: attributes(pictures),
+    }
 }
 
 /// What the page has besides the pictures.

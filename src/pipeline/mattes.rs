@@ -48,6 +48,18 @@ pub(super) fn attributes(
     all
 }
 
+/// The parts of the particles: attributes and their values; None if there are too many.
+fn parts_of(source: &dyn ShadeSource, count: u32) -> Option<BTreeSet<(&str, i32)>> {
+    let mut parts = BTreeSet::new();
+    for part in (0..count).map_while(|index| source.part(index)) {
+        parts.insert(part);
+        if parts.len() > MAX_NAMES {
+            return None;
+        }
+    }
+    Some(parts)
+}
+
 /// The manifest of a layer of `kind`; None if there are too many names.
 fn manifest(
     setup: &Setup,
@@ -80,13 +92,7 @@ fn manifest(
             }
         }
         MatteKind::Part => {
-            let mut parts = BTreeSet::new();
-            for part in (0..count).map_while(|index| source.part(index)) {
-                parts.insert(part);
-                if parts.len() > MAX_NAMES {
-                    return None;
-                }
-            }
+            let parts = parts_of(source, count)?;
             for (attribute, value) in &parts {
                 add(ObjectName::of_part(attribute, *value).as_bytes());
             }

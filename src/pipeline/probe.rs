@@ -128,12 +128,8 @@ fn probe_for(
         if start.elapsed() > TIME_FOR_OTHERS {
             break;
         }
-        // A frame that cannot be rendered takes no time.
         let deadline = Instant::now() + time_box;
-        let trial = prepare(&mut *renderer, setup, sequence, task)
-            .and_then(|frame| Trial::of(&*renderer, setup, &frame, trial_size, deadline));
-        let trial = trial.ok().filter(|trial| !trial.is_interrupted);
-        costs.extend(trial.and_then(|trial| trial.cost(setup, task).ok()));
+        costs.extend(trial_cost(&mut *renderer, setup, sequence, task, (trial_size, deadline)));
     }
     // Average the costs
     let frames = 1 + u32::try_from(costs.len()).unwrap_or(0);
@@ -154,6 +150,22 @@ fn probe_for(
         traced_part: traced_part.unwrap_or(0.0),
         is_lower_bound: traced_part.is_none(),
     })
+}
+
+/// The cost of the image of `task`, from a trial of the given size before the deadline; None if it cannot be measured.
+fn trial_cost(
+    renderer: &mut dyn FrameRenderer,
+    setup: &Setup,
+    sequence: &Sequence,
+    task: &ImageTask,
+    (size, deadline): ([u32; 2], Instant),
+) -> Option<ImageCost> {
+    let frame = prepare(renderer, setup, sequence, task).ok()?;
+    let trial = Trial::of(renderer, setup, &frame, size, deadline).ok()?;
+    if trial.is_interrupted {
+        return None;
+    }
+    trial.cost(setup, task).ok()
 }
 
 fn prepare(

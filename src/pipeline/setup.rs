@@ -483,13 +483,7 @@ impl Setup {
         if self.focused_particle().is_some() {
             return Some("camera.focus searches for a particle in a copy of them".to_owned());
         }
-        if matches!(
-            &self.picture.particles.color,
-            ColorRule::Attribute { needs_geometry: true, .. }
-        ) || matches!(
-            &self.picture.particles.opacity,
-            OpacityRule::Value { needs_geometry: true, .. }
-        ) {
+        if self.colors_need_geometry() {
             return Some(
                 "their colours or opacities are computed from a copy of them, 16 bytes per particle and more"
                     .to_owned(),
@@ -505,6 +499,13 @@ impl Setup {
             _ => return None,
         };
         Some(why.to_owned())
+    }
+
+    /// Whether colours or opacities are computed from more than attributes.
+    fn colors_need_geometry(&self) -> bool {
+        let ParticleRules { color, opacity, .. } = &self.picture.particles;
+        matches!(color, ColorRule::Attribute { needs_geometry: true, .. })
+            || matches!(opacity, OpacityRule::Value { needs_geometry: true, .. })
     }
 
     /// Number of slices of the exposure in which surfaces differ.

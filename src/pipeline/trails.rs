@@ -33,6 +33,7 @@ pub(super) fn trails_of(
     let Some(style) = setup.picture.things.trails.as_ref().filter(|_| !frame.is_empty()) else {
         return Ok(None);
     };
+    // Extend the trails frame by frame into the past
     let file = first_file(sequence, task.index);
     let (has_ids, own) = identities(frame);
     let mut trails = Trails::new(style, frame);
@@ -56,12 +57,7 @@ pub(super) fn trails_of(
         let is_native = [task.index, index].map(|index| sequence.native_file(index).is_some());
         let has_order = count == read && is_native == [false; 2];
         if !(has_ids && has_others || has_order || earlier.is_empty()) {
-            let has = frame.attributes.iter().map(|a| a.name.as_str());
-            let purpose = match is_native {
-                [false, false] => "trails, since the number of particles changes",
-                _ => "trails, since native frames have an order of their own",
-            };
-            return Err(missing("id", purpose, &file, has));
+            return Err(unidentified(frame, &file, is_native));
         }
         let places = Places::new(&others, &own);
         let find = |particle: usize| {
@@ -70,6 +66,7 @@ pub(super) fn trails_of(
         };
         trails.extend(age, frame.cell.as_ref(), find);
     }
+    // Colour each trail like its particle in the current frame
     notes.extend(gap_note(sequence, task, style.frames));
     let mut colors = Vec::new();
     if let Some(rule) = &style.color {
@@ -78,6 +75,16 @@ pub(super) fn trails_of(
     }
     let tree = RodTree::new(trails.rods, Caps::Round).with_colors(colors);
     Ok(Some(FrameRods::new(tree, style.material)))
+}
+
+/// The error of particles that cannot be found in an earlier frame; `is_native` is of this frame and of that one.
+fn unidentified(frame: &SharedFrame<'_>, file: &str, is_native: [bool; 2]) -> LoadError {
+    let has = frame.attributes.iter().map(|a| a.name.as_str());
+    let purpose = match is_native {
+        [false, false] => "trails, since the number of particles changes",
+        _ => "trails, since native frames have an order of their own",
+    };
+    missing("id", purpose, file, has)
 }
 
 /// Whether particles have ids, and the ids; without them, their places in the file.

@@ -66,22 +66,45 @@ fn path(
     let up = camera.up.unwrap_or(up);
     let [azimuth, elevation] = camera.angles(up);
     let framing = Framing { up, azimuth, elevation, fov: camera.fov, aspect };
-    let (path, fitted) = match (camera.mode, camera.projection) {
+    let (path, fitted) = fitted_path(camera, framed, &framing)?;
+    let zoomed = path.zoomed(camera.zoom);
+    let path = match camera.center {
+        Some(center) => zoomed.centered(center),
+        None => zoomed,
+    };
+    let projection = match camera.projection {
+        ProjectionKind::Perspective => Projection::Perspective,
+        ProjectionKind::Orthographic => {
+            Projection::Orthographic { height: camera.height.unwrap_or(fitted) / camera.zoom }
+        }
+        ProjectionKind::Equirectangular => Projection::Equirectangular,
+    };
+    Ok((path, projection))
+}
+
+/// The path before the zoom, and the height of a parallel projection that shows all; 0 for other projections.
+fn fitted_path(
+    camera: &manifest::Camera,
+    framed: &Framed,
+    framing: &Framing,
+) -> Result<(CameraPath, f64), ResolveError> {
+    let Framing { up, aspect, .. } = *framing;
+    Ok(match (camera.mode, camera.projection) {
         (CameraMode::Auto, ProjectionKind::Perspective) => {
-            (CameraPath::Still(framed.view(&framing)), 0.0)
+            (CameraPath::Still(framed.view(framing)), 0.0)
         }
         (CameraMode::Auto, ProjectionKind::Orthographic) => {
-            let (view, height) = framed.parallel_view(&framing);
+            let (view, height) = framed.parallel_view(framing);
             (CameraPath::Still(view), height)
         }
         (CameraMode::Auto, ProjectionKind::Equirectangular) => {
-            (CameraPath::Still(framed.panorama(&framing)), 0.0)
+            (CameraPath::Still(framed.panorama(framing)), 0.0)
         }
         (CameraMode::Turntable, ProjectionKind::Orthographic) => {
-            CameraPath::parallel_turntable(framed, &framing, camera.degrees_per_frame)
+            CameraPath::parallel_turntable(framed, framing, camera.degrees_per_frame)
         }
         (CameraMode::Turntable, _) => {
-            let path = CameraPath::turntable(framed, &framing, camera.degrees_per_frame);
+            let path = CameraPath::turntable(framed, framing, camera.degrees_per_frame);
             (path, 0.0)
         }
         (CameraMode::Fixed, _) => {
@@ -100,20 +123,7 @@ fn path(
             let height = heights.fold(0.0, f64::max);
             (CameraPath::through(keys)?, height)
         }
-    };
-    let path = path.zoomed(camera.zoom);
-    let path = match camera.center {
-        Some(center) => path.centered(center),
-        None => path,
-    };
-    let projection = match camera.projection {
-        ProjectionKind::Perspective => Projection::Perspective,
-        ProjectionKind::Orthographic => {
-            Projection::Orthographic { height: camera.height.unwrap_or(fitted) / camera.zoom }
-        }
-        ProjectionKind::Equirectangular => Projection::Equirectangular,
-    };
-    Ok((path, projection))
+    })
 }
 
 /// The eyes of stereo pairs.

@@ -52,12 +52,21 @@ pub(super) fn is_depth(setting: &ColorSetting) -> bool {
     name.and_then(|name| Value::named::<ColumnShape<'_>>(name, &[])) == Some(Value::Depth)
 }
 
+/// The range of the distances of the surveyed particles from the camera, as far as they are in front of it.
+fn depth_range(survey: &Survey, camera: &Camera, by: &ColorMapping) -> Option<(f64, f64)> {
+    let point = |p: &[f32; 3]| f64::from(camera.depth_of((*p).into()));
+    let depths = survey.points.iter().map(point);
+    let visible = depths.filter(|depth| *depth > 0.0).collect();
+    range_of(visible, range_question(by))
+}
+
 /// The source of the colours; "auto" depends on the attributes that exist.
 pub(super) fn rule(
     manifest: &Manifest,
     survey: &Survey,
     camera: Option<&Camera>,
 ) -> Result<ColorRule, ResolveError> {
+    // Find which keys describe the mapping: constant colours and colours of the file need none
     let constant = ColorRule::Constant(material::DEFAULT_COLOR);
     let by = match &manifest.material.color {
         ColorSetting::Rgb(rgb) => return Ok(ColorRule::Constant(*rgb)),
@@ -70,6 +79,7 @@ pub(super) fn rule(
         },
         ColorSetting::Mapped(by) => by,
     };
+    // Without a name, the attribute is the one that the survey chose
     let Some(name) = &by.attribute else {
         return match &survey.color {
             Some(color) => mapped(by, color, false, false),
@@ -84,6 +94,7 @@ pub(super) fn rule(
     if by.is_plain() && survey.rgb.is_some() {
         return Ok(ColorRule::Rgb { name: name.clone(), required: true });
     }
+    // Map the named value: over the range in the survey, or for depths over that from the camera
     let mut color = survey.color.clone().unwrap_or_else(|| ColorRange {
         attribute: name.clone(),
         low: 0.0,
@@ -97,11 +108,8 @@ pub(super) fn rule(
             key: ATTRIBUTE,
             what: "the range of depth depends on the camera".to_owned(),
         })?;
-        let point = |p: &[f32; 3]| f64::from(camera.depth_of((*p).into()));
-        let depths = survey.points.iter().map(point);
-        let visible = depths.filter(|depth| *depth > 0.0).collect();
-        if let Some((low, high)) = range_of(visible, range_question(by)) {
-            (color.low, color.high) = (low, high);
+        if let Some(ends) = depth_range(survey, camera, by) {
+            (color.low, color.high) = ends;
         }
     }
     mapped(by, &color, true, value.needs_geometry())

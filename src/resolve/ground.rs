@@ -73,10 +73,31 @@ pub(super) fn ground(
                 .to_owned(),
         });
     }
-    // Place it under the particles
+    let mut ground = placed(manifest, floor, is_catcher);
+    if is_catcher {
+        return Ok(Some(shadow_catcher(ground, floor, render.ground_shadow)));
+    }
+    // Colour it
+    ground.color = render.ground_color;
+    let tile = || match render.ground_tile {
+        Some(tile) => narrow(tile),
+        None => surface::round(floor.bounds.diagonal() * TILE),
+    };
+    ground.pattern = match (kind, render.ground_pattern) {
+        // `add_image` adds the picture
+        (GroundKind::Image, _) => Pattern::Plain,
+        (GroundKind::Checker, _) | (_, GroundPattern::Checker) => Pattern::Checker { tile: tile() },
+        (_, GroundPattern::Sand) => Pattern::Sand { tile: tile() },
+        (_, GroundPattern::Plain) => Pattern::Plain,
+    };
+    Ok(Some(ground))
+}
+
+/// The ground under the particles or at its height, without colour.
+fn placed(manifest: &Manifest, floor: &Floor<'_>, is_catcher: bool) -> Ground {
     let Floor { bounds, up, origin, .. } = *floor;
     let mut ground = Ground::under(bounds, up.as_vec3(), origin);
-    if let Some(height) = render.ground_height {
+    if let Some(height) = manifest.render.ground_height {
         let relative = narrow(height - origin.dot(up.normalize_or(DVec3::Z)));
         ground.center += (relative - ground.height) * ground.up;
         ground.height = relative;
@@ -92,31 +113,18 @@ pub(super) fn ground(
         let most = (SUNK * bounds.diagonal()).powi(2) / floor.reach;
         ground.raise(narrow(floor.reach.min(most)));
     }
-    if is_catcher {
-        let size = (bounds.max - bounds.min).as_vec3();
-        let far = || FAR_FADE.map(|part| part * size.length());
-        let (base, [fade_start, fade_end]) = if floor.is_of_earlier_version {
-            (Vec3::ZERO, far())
-        } else {
-            (0.5 * size, [0.0, SHADOW * size.length()])
-        };
-        let catcher = ground.into_shadow_catcher(render.ground_shadow);
-        return Ok(Some(Ground { base, fade_start, fade_end, ..catcher }));
-    }
-    // Colour it
-    ground.color = render.ground_color;
-    let tile = || match render.ground_tile {
-        Some(tile) => narrow(tile),
-        None => surface::round(bounds.diagonal() * TILE),
+    ground
+}
+
+/// The ground as a shadow catcher of this strength. Its shadows fade out at a distance from the particles.
+fn shadow_catcher(ground: Ground, floor: &Floor<'_>, strength: f32) -> Ground {
+    let size = (floor.bounds.max - floor.bounds.min).as_vec3();
+    let (base, [fade_start, fade_end]) = if floor.is_of_earlier_version {
+        (Vec3::ZERO, FAR_FADE.map(|part| part * size.length()))
+    } else {
+        (0.5 * size, [0.0, SHADOW * size.length()])
     };
-    ground.pattern = match (kind, render.ground_pattern) {
-        // `add_image` adds the picture
-        (GroundKind::Image, _) => Pattern::Plain,
-        (GroundKind::Checker, _) | (_, GroundPattern::Checker) => Pattern::Checker { tile: tile() },
-        (_, GroundPattern::Sand) => Pattern::Sand { tile: tile() },
-        (_, GroundPattern::Plain) => Pattern::Plain,
-    };
-    Ok(Some(ground))
+    Ground { base, fade_start, fade_end, ..ground.into_shadow_catcher(strength) }
 }
 
 /// Lays `texture` on the ground of `setup`, if `manifest` says so.

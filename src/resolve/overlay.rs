@@ -53,6 +53,7 @@ pub(super) fn add_overlays(
     let mut pictures = pictures.iter();
     let points = film_points(setup, survey, &camera, page.picture);
     let view = first_view(setup, survey, &camera);
+    // Collect what each overlay shows
     let (mut overlays, mut given) = (Vec::new(), Vec::new());
     for own in &manifest.overlays {
         let content = match &own.kind {
@@ -78,20 +79,33 @@ pub(super) fn add_overlays(
             halo: [1.0; 3],
         });
     }
+    // Place them, then choose colours that contrast with what is behind them
     choose_corners(&mut overlays, page, &view, &points);
-    let behind = paper(setup);
-    for (overlay, color) in overlays.iter_mut().zip(given) {
-        let behind = match overlay.layout {
-            Layout::Beside => behind,
-            Layout::Over => {
-                let size = overlay.measure(page.size[1], &view);
-                backdrop(setup, &camera, overlay.placement.center(size, page.picture).into())
-            }
-        };
-        (overlay.color, overlay.halo) = colors(behind, color);
-    }
+    choose_colors(setup, &mut overlays, &given, page, &view);
     setup.picture.files.overlays = overlays;
     Ok(())
+}
+
+/// Gives each overlay its `given` colour, or one that contrasts with the paper or with the picture behind it.
+fn choose_colors(
+    setup: &Setup,
+    overlays: &mut [Overlay],
+    given: &[Option<Vec3>],
+    page: &Page,
+    view: &FrameView,
+) {
+    let paper = paper(setup);
+    let camera = &setup.picture.scene.camera;
+    for (overlay, color) in overlays.iter_mut().zip(given) {
+        let behind = match overlay.layout {
+            Layout::Beside => paper,
+            Layout::Over => {
+                let size = overlay.measure(page.size[1], view);
+                backdrop(setup, camera, overlay.placement.center(size, page.picture).into())
+            }
+        };
+        (overlay.color, overlay.halo) = colors(behind, *color);
+    }
 }
 
 /// The view of the start of the camera path, with values as long as those of most frames.
@@ -238,12 +252,7 @@ fn content(
                 if survey.most_particles == 0 {
                     return Ok(None);
                 }
-                return Err(ResolveError::Unsupported {
-                    key: "overlay.type",
-                    what: "the colours of the particles do not follow a colour map, so there is no colour bar; \
-                           choose an attribute (--color-by)"
-                        .to_owned(),
-                });
+                return Err(without_color_map());
             };
             Some(Content::ColorBar(ColorBar {
                 title: title.clone().unwrap_or(name),
@@ -275,6 +284,13 @@ fn content(
         }
         OverlayKind::Image { .. } => None,
     })
+}
+
+/// The error of a colour bar in pictures whose colours are not those of a colour map.
+fn without_color_map() -> ResolveError {
+    let what = "the colours of the particles do not follow a colour map, so there is no colour bar; choose an \
+                attribute (--color-by)";
+    ResolveError::Unsupported { key: "overlay.type", what: what.to_owned() }
 }
 
 /// The colour bar of pictures with the settings of `manifest`: its own, or one with the defaults. None if the colours are

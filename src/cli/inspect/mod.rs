@@ -179,34 +179,39 @@ fn expand(args: &InspectArgs) -> Vec<Meant> {
             }
             input => match Sequence::open_with(&input, settings) {
                 Err(error) => all.push(Meant::Nothing(argument.clone(), error.to_string())),
-                Ok(sequence) => {
-                    if let Some(list) = InspectedList::of(argument, &sequence) {
-                        all.push(Meant::List(list));
-                    } else if let Some(parts) = parts_text(&sequence) {
-                        message!("{}: {parts}", argument.display());
-                    }
-                    for (index, frame) in sequence.frames().iter().enumerate() {
-                        let place = FramePlace {
-                            number: Some(frame.number),
-                            time: sequence.listed_time(index),
-                        };
-                        // A file with many steps is in many frames.
-                        for part in &frame.parts {
-                            if !known.insert(part.path.clone()) {
-                                continue;
-                            }
-                            let path = part.path.clone();
-                            all.push(match sequence.check_listed(part) {
-                                Ok(()) => Meant::File(path, place),
-                                Err(error) => Meant::Nothing(path, error.to_string()),
-                            });
-                        }
-                    }
-                }
+                Ok(sequence) => add_sequence(argument, &sequence, &mut known, &mut all),
             },
         }
     }
     all
+}
+
+/// Adds the files of `sequence`, which `argument` stands for, that are not `known` yet.
+fn add_sequence(
+    argument: &Path,
+    sequence: &Sequence,
+    known: &mut HashSet<PathBuf>,
+    all: &mut Vec<Meant>,
+) {
+    if let Some(list) = InspectedList::of(argument, sequence) {
+        all.push(Meant::List(list));
+    } else if let Some(parts) = parts_text(sequence) {
+        message!("{}: {parts}", argument.display());
+    }
+    for (index, frame) in sequence.frames().iter().enumerate() {
+        let place = FramePlace { number: Some(frame.number), time: sequence.listed_time(index) };
+        // A file with many steps is in many frames.
+        for part in &frame.parts {
+            if !known.insert(part.path.clone()) {
+                continue;
+            }
+            let path = part.path.clone();
+            all.push(match sequence.check_listed(part) {
+                Ok(()) => Meant::File(path, place),
+                Err(error) => Meant::Nothing(path, error.to_string()),
+            });
+        }
+    }
 }
 
 /// Inspects one file, whose particles get the properties of `topology`. The outer error is of the file, the inner one of
