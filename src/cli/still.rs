@@ -17,7 +17,7 @@ use super::{CliError, Outcome, disk, print, signals};
 use crate::job::{JobManifest, RenderJob, frames_in, require_one_fits};
 use crate::manifest::Look;
 use crate::output::{OutputError, PictureFormat};
-use crate::pipeline::{ImageError, WriteError, make_image};
+use crate::pipeline::{ImageError, ImageTask, Setup, WriteError, make_image};
 use crate::render::Channels;
 
 /// Signatures of the files that `still` may replace: OpenEXR, PNG, JPEG, TIFF, PDF, and SVG as it writes it.
@@ -108,6 +108,7 @@ const SIGNAL_MESSAGES: signals::SignalMessages =
 pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
     let start = Instant::now();
     let _signals = signals::listen(SIGNAL_MESSAGES)?;
+    // Check the options and open the sequence
     let shown = args
         .manifest
         .keys
@@ -145,17 +146,12 @@ pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
         setup.picture.render.channels = Channels::COLOR;
     }
     print_summary(&sequence, &survey, &setup);
-    let mut tasks = render_job.tasks(&sequence, &[frame]);
-    for task in &mut tasks {
-        task.image.clone_from(&output);
-        task.preview = None;
-    }
-    render_job.schedule(&sequence, &setup, &mut tasks);
+    // Render the frame
+    let tasks = tasks(&render_job, &sequence, &setup, (frame, &output));
     require_one_fits(&tasks)?;
     let task = tasks.first().expect("the frame is in the sequence");
     make_directory(&output)?;
-    let rendered = make_image(&setup, &sequence, task, |note| note!("{note}"));
-    match rendered {
+    match make_image(&setup, &sequence, task, |note| note!("{note}")) {
         Ok(report) => {
             print::lines([format!(
                 "{}: frame {frame}, {} particles, {:.2} s",
@@ -171,6 +167,22 @@ pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
             Ok(Outcome::SomeFailed)
         }
     }
+}
+
+/// The task of the frame, whose image is the `output` and not one in the directory of a job.
+fn tasks(
+    render_job: &RenderJob,
+    sequence: &Sequence,
+    setup: &Setup,
+    (frame, output): (i64, &Path),
+) -> Vec<ImageTask> {
+    let mut tasks = render_job.tasks(sequence, &[frame]);
+    for task in &mut tasks {
+        output.clone_into(&mut task.image);
+        task.preview = None;
+    }
+    render_job.schedule(sequence, setup, &mut tasks);
+    tasks
 }
 
 /// The file format of the extension.
