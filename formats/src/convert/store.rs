@@ -195,12 +195,14 @@ impl<'a> ChunkStore<'a> {
     ) -> Result<T, FrameError> {
         match held {
             StoredChunk::Here(chunk) => {
+                // It is in memory: visit it there
                 let result = visit(&chunk);
                 self.shared.state().kept -= 1;
                 self.shared.free(chunk);
                 Ok(result)
             }
             StoredChunk::Away { slot, len } => {
+                // It is on the disk: read it into a chunk that is free, and give its slot back
                 let mut chunk = self.take()?;
                 let read = self.read(&mut chunk, slot, len);
                 let result = read.map(|()| visit(&chunk));

@@ -88,6 +88,7 @@ pub(super) fn survey(
     let total = request.source.count();
     let stretches = total.div_ceil(reading.batch_len as u64);
     let (batches, done) = (BufferPool::<Batch>::default(), AtomicU64::new(0));
+    // Survey batches in parallel; the results keep the order of the source
     let found: Vec<BatchSurvey> = (0..stretches)
         .into_par_iter()
         .map(|number| {

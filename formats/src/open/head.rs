@@ -51,6 +51,7 @@ pub fn remarks(path: &Path) -> Vec<String> {
             if !reader.info().remarks_need_whole_file {
                 return Ok(reader.remarks(&head));
             }
+            // Some notes need the whole file, which is mapped unless it is compressed
             let map = Arc::new(MappedFile::open(path)?);
             if is_compressed(map.bytes()) {
                 return Ok(reader.remarks(&head));

@@ -63,6 +63,7 @@ impl Siblings for SiblingFiles {
             let why = "which is not in its directory; copy it there, and refer to it by its name";
             return Err(refused(why.to_owned()));
         }
+        // Open each file once: several readers may refer to it
         let path = self.directory.join(inside);
         let mut opened = self.opened.lock().unwrap_or_else(PoisonError::into_inner);
         let file = match opened.get(&path) {

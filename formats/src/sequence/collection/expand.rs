@@ -235,6 +235,7 @@ impl Expander {
     ) -> Result<(), SequenceError> {
         chain.push(Arc::clone(&opened.path));
         for (index, entry) in opened.list.entries.iter().enumerate() {
+            // Find the file, which must be within the directory of the first list
             let target = self.root.resolve(&opened.path, &entry.path).ok_or_else(|| {
                 SequenceError::Outside {
                     list: opened.path.to_path_buf(),
@@ -244,6 +245,7 @@ impl Expander {
             })?;
             let context = context.of(&opened.list, &opened.path, index, entry);
             self.count_entry(opened)?;
+            // Add files of particles, and follow lists
             if !is_list(&target) {
                 self.push(target, &context)?;
             } else if let Some(what) = fault_of_chain(chain, &target) {
@@ -291,6 +293,7 @@ impl Expander {
             return None;
         }
         match List::open(path, self.settings.budget.less(self.held)) {
+            // Count its memory, and remember a list with ghost cells for a note
             Ok(list) => {
                 let texts = list.entries.iter().map(|e| e.path.len() + size_of::<ListEntry>());
                 self.held += texts.sum::<usize>() as u64;
@@ -381,11 +384,13 @@ fn number(
     is_only: bool,
     (numbers, step_times): (&mut Vec<i64>, &mut BTreeMap<i64, f64>),
 ) -> Result<(), SequenceError> {
+    // Find the distinct times of the files
     let mut times: Vec<f64> = leaves.iter().filter_map(|leaf| leaf.time).collect();
     times.sort_by(f64::total_cmp);
     times.dedup();
     // From 0 with one step, too: a collection may still grow
     let is_counted = is_only && kind.is_some_and(ListKind::has_times);
+    // A single time is one step, with the number in the name
     if times.len() < 2 {
         let named = file.number.filter(|_| !is_counted);
         let number = named.unwrap_or(0);
@@ -393,6 +398,7 @@ fn number(
         step_times.extend(times.first().map(|time| (number, *time)));
         return Ok(());
     }
+    // Several times are steps of one list, numbered in the order of their times
     if !is_only {
         return Err(SequenceError::SeveralLists { path: file.path.clone(), steps: times.len() });
     }
