@@ -73,12 +73,15 @@ pub(super) struct PathIntegrator<'a> {
 
 impl<'a> PathIntegrator<'a> {
     pub(super) fn new(context: RenderContext<'a>) -> Self {
+        // Prepare the surface of transmissive particles
         let is_connected = context.connected_particles().is_some();
         let interface = materials_of(context.scene, is_connected).swap_remove(0);
         let material = &context.scene.material;
         let rough = RoughInterface::of(material, interface.constants(), is_connected);
+        // Black environments need no samples
         let environment = context.scene.environment.as_deref();
         let environment = environment.filter(|environment| !environment.is_black());
+        // Prepare the BSDFs of opaque surfaces
         let mut bsdfs = bsdfs_of(
             context.scene.material.finish,
             &context.scene.meshes,
@@ -123,12 +126,14 @@ impl Integrator for PathIntegrator<'_> {
         let ended = self.add_emitted(segments, packet);
         packet.hits.mask &= !ended;
         packet.take_light(LightClass::Emission);
+        // A catcher darkens what is behind it
         if let Some(catcher) = self.catcher.as_ref().filter(|_| depth == 1) {
             let lanes = packet.hits.lanes_of(MaterialId::GROUND);
             if lanes != 0 {
                 self.catch_shadows(catcher, &self.surface(segments, depth, lanes), packet);
             }
         }
+        // Add the background of rays that hit nothing, and end the rays at holdouts
         let held_out = self.context.holdout_lanes(depth, &packet.hits);
         let lanes = segments.lanes() & !ended & !held_out;
         self.add_escaped(segments, depth, lanes, packet);
@@ -136,6 +141,7 @@ impl Integrator for PathIntegrator<'_> {
         if packet.hits.mask & !held_out == 0 {
             return;
         }
+        // Reflect rays at panes; the others have passed them already
         let panes = self.context.pane_lanes(&packet.hits);
         if panes != 0 {
             self.shade_panes(segments, depth, panes, packet, next);
@@ -393,9 +399,11 @@ impl PathIntegrator<'_> {
 
     /// Adds the light of each light source, and of photons.
     fn add_lights(&self, surface: &Surface<'_>, packet: &mut PacketScratch) {
+        // Light that photons bring is not sampled through transmissive particles as well
         let with_photons = surface.lanes & self.photon_lanes(&packet.hits);
         for (index, light) in self.context.lights.iter().enumerate() {
             let competes = light.has_extent() && self.rays_hit_lights();
+            // Sample the light twice where only some of the lanes have photons
             let group = self.context.light_group(index);
             let opaque = match light.photon_source() {
                 Some(_) => with_photons,
@@ -411,6 +419,7 @@ impl PathIntegrator<'_> {
                 }
             }
         }
+        // Add the light that the photons bring
         if with_photons != 0 {
             self.add_caustics(with_photons, surface, packet);
         }
@@ -578,6 +587,7 @@ impl PathIntegrator<'_> {
         let context = &self.context;
         let (rays, hits, inside) = (&segments.rays, &packet.hits, segments.inside);
         let interface = &self.interface;
+        // Find the reflected and refracted rays
         let (simd, points) = (context.simd, &mut packet.points);
         match &self.rough {
             None => interface.shading_points(simd, rays, hits, inside, points),
@@ -588,6 +598,7 @@ impl PathIntegrator<'_> {
                 rough.sample_rays(simd, rays, hits, inside, &u, points);
             }
         }
+        // Trace them; the last ones see the environment
         let hits = SpecularHits {
             segments,
             depth,

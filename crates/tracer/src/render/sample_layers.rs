@@ -195,6 +195,7 @@ impl SampleLayers {
                 *light = sum * share + limited;
             }
         }
+        // Do the same for each light group, in place of classes
         for group in 0..usize::from(layers.light_groups) {
             let samples = range.clone().map(|s| self.light_of_group(group, s));
             let limited = if group == self.background_group {

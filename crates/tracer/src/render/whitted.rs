@@ -160,6 +160,7 @@ impl WhittedIntegrator<'_> {
             ..
         } = packet;
         for (index, light) in self.context.lights.iter().enumerate() {
+            // Sample the light, and reflect it
             light.sample_li(simd, &points.start, &[splat(0.0); 2], samples);
             let rays = &segments.rays;
             let arriving = split.is_active.then(|| samples.clone());
@@ -173,7 +174,7 @@ impl WhittedIntegrator<'_> {
                 reflect_lights(simd, constants, rays, points, base, weight, lanes, &mut matte);
                 split.diffuse = ratio(&matte.radiance, &samples.radiance);
             }
-            //             // Test which light arrives, and add it to the picture and its layers
+            // Test which light arrives, and add it to the picture and its layers
             let unoccluded = split.has_shadow.then_some((samples.lanes, samples.radiance));
             let visible = if light.casts_shadow() {
                 let context = &self.context;

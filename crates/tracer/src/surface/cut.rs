@@ -106,12 +106,14 @@ impl<'a, S: CutShape> CutSpheres<'a, S> {
         if lanes == 0 {
             return owners;
         }
+        // Cut each ray down to its point
         let mut points = *rays;
         for lane in lanes_in(lanes) {
             points.t_min[lane] = t[lane];
             points.t_max[lane] = t[lane].next_up();
         }
         let spheres = &self.spheres;
+        // Among spheres that contain it, choose that with the least power; equal ones by index
         spheres.visit_chords(&points, lanes, &mut |lane, particle, radius, [near, far]| {
             let t = t[lane];
             let contains = near < t && t <= far;

@@ -179,6 +179,7 @@ impl Shape for SphereSurface<'_> {
                 cross_chord(&mut product[lane], part, chord.ends, rays, lane)
             });
         }
+        // Read the products
         for lane in lanes_in(lanes) {
             transmittance[lane] = product[lane].value();
         }

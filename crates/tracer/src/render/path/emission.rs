@@ -20,6 +20,7 @@ impl PathIntegrator<'_> {
         if !self.has_extents {
             return 0;
         }
+        // Find the rays whose light is weighted against light samples, and those that see visible lights
         let sampled = if self.rays_hit_lights() {
             segments.lanes() & lanes_where(|l| segments.pdf[l] < f32::INFINITY)
         } else {
@@ -60,6 +61,7 @@ impl PathIntegrator<'_> {
                 }
             }
         }
+        // Add the light of the nearest ones
         let ended = lanes_where(|l| nearest[l].is_some());
         add_visible(ended, &color, packet);
         ended
@@ -92,6 +94,7 @@ impl PathIntegrator<'_> {
         packet: &mut PacketScratch,
     ) {
         let context = &self.context;
+        // Camera rays see the background in place of a hidden environment
         if depth == 1 && !context.scene.is_environment_visible {
             if context.sees_background(depth) {
                 context.add_background(segments, depth, lanes, packet);
@@ -104,6 +107,7 @@ impl PathIntegrator<'_> {
         let Some(environment) = self.environment else {
             return;
         };
+        // Weight the environment by what surfaces do not cover
         let PacketScratch { hits, throughput, radiance, weight, groups, .. } = packet;
         let lanes = lanes & (!hits.mask | hits.lanes_of(MaterialId::GROUND));
         if lanes == 0 {
@@ -119,6 +123,7 @@ impl PathIntegrator<'_> {
             0 => segments.pdf[lane],
             _ => f32::INFINITY,
         });
+        // Add its radiance
         let (along, mut seen) = ([&segments.rays.direction, &*weight], [splat(0.0); 3]);
         environment_along(context.simd, environment, along, &pdf, lanes, &mut seen);
         add(context.simd, &seen, &Vec3::ONE, lanes, radiance);

@@ -93,6 +93,7 @@ impl Model {
             }
             sum
         };
+        // The data have a block for each colour channel, and those of the radiance behind them
         let channel = 2 * TURBIDITIES * POINTS;
         Self {
             sun,

@@ -192,6 +192,7 @@ pub(in crate::render) fn bytes(scene: &Scene, settings: &RenderSettings) -> Floo
     if !has_photons(scene, settings) {
         return FloorBytes::default();
     }
+    // Caustics have one map, and one for each light group of several
     let emits = !scene.lights.is_empty();
     // Layers of light groups have maps of their own
     let groups = u64::from(settings.channels.layers.light_groups);
@@ -202,6 +203,7 @@ pub(in crate::render) fn bytes(scene: &Scene, settings: &RenderSettings) -> Floo
     };
     let (caustics, kept) = (maps * density::BYTES, maps * density::MAP_BYTES);
     let dark = caustics - maps * density::CELL_BYTES;
+    // Other maps of a visible ground are made after those
     let (of_ground, dark, kept) = match &scene.ground {
         // The cells of the photons are freed when the other maps are made
         Some(ground) if !is_catcher(ground) => {
@@ -212,6 +214,7 @@ pub(in crate::render) fn bytes(scene: &Scene, settings: &RenderSettings) -> Floo
         Some(_) if emits => (caustics, dark, kept),
         _ => (0, 0, 0),
     };
+    // Photons at surfaces are stored one by one
     let has_opaque = scene.meshes.iter().any(|mesh| !mesh.is_pane()) || !scene.parts.is_empty();
     let has_surfaces = emits && has_opaque;
     let of_surfaces = if has_surfaces { photon_map::bytes(settings.photons) } else { 0 };
@@ -244,6 +247,7 @@ impl<'a> PathIntegrator<'a> {
         if !has_photons(scene, settings) {
             return Some((self, RayCounts::default()));
         }
+        // Find out what needs light from photons
         let sources = self.photon_sources();
         let ground = scene.ground.as_ref();
         let floor = ground.filter(|ground| !is_catcher(ground));
@@ -341,6 +345,7 @@ impl<'a> PathIntegrator<'a> {
         surface: &Surface<'_>,
         packet: &mut PacketScratch,
     ) {
+        // Darken the ground where it is wet
         self.prepare_surface(surface, packet);
         let gloss = match &floor.wet {
             Some(wet) => wet.darken(surface, packet),
@@ -358,6 +363,7 @@ impl<'a> PathIntegrator<'a> {
         }
         let (simd, radiance) = (self.context.simd, &mut packet.radiance);
         add(simd, &reflected, &Vec3::ONE, surface.lanes, radiance);
+        // Add what wet ground mirrors, and light that arrives straight from its source
         packet.take_light(LightClass::Diffuse);
         if let Some(wet) = &floor.wet {
             self.add_gloss(wet, &gloss, surface, packet);
