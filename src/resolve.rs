@@ -156,6 +156,7 @@ fn setup_on(
         has_features: denoise.is_some(),
         ..images::render_settings(manifest, &extent)?
     };
+    // Put it all together, without overlays
     let picture = Picture {
         origin: survey.origin,
         particles: particle_rules(manifest, survey, &extent, (radius, color), &scene)?,

@@ -105,6 +105,7 @@ pub(super) fn with_equals(arguments: impl IntoIterator<Item = OsString>) -> Vec<
         let flag = flags.iter().find(|flag| flag.flag.name == name)?;
         usual_value(flag.kind).is_some().then_some(flag)
     };
+    // Join a value to the option before it, up to `--`
     let mut joined: Vec<OsString> = Vec::new();
     let mut has_options = true;
     for argument in arguments {
@@ -223,6 +224,7 @@ fn with_parser(argument: Arg, key: &KeyFlag) -> Arg {
 fn value(key: &KeyFlag, matches: &ArgMatches) -> Option<Value> {
     let name = key.flag.name;
     let text = || matches.get_one::<String>(name).cloned();
+    // Read the value by the kind of the key; texts that are not of the kind are refused with the manifest
     match key.kind {
         FlagKind::Switch => {
             let usual = key.default.as_deref() == Some("true");

@@ -242,6 +242,7 @@ fn guard(
         let text = format!("{}: {why}; choose another name", shown.display());
         Err(CliError::Other(text))
     };
+    // Refuse an image of a job, even if it does not exist yet
     if is_planned(output)? {
         return refused("is an image of the job in that directory");
     }
@@ -252,12 +253,14 @@ fn guard(
         }
         Err(error) => return Err(CliError::io(shown)(error)),
     };
+    // Refuse an input, under whatever name
     let real = output.canonicalize().map_err(CliError::io(shown))?;
     let inputs = (0..sequence.frames().len()).flat_map(|index| sequence.inputs(index));
     let is_output = |path: &Path| path.canonicalize().is_ok_and(|path| path == real);
     if inputs.chain(manifest).any(is_output) {
         return refused("is an input and would be overwritten");
     }
+    // Refuse what is not an image
     if !existing.is_file() {
         return refused("is not a file");
     }

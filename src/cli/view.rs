@@ -51,6 +51,7 @@ pub(super) struct ViewArgs {
 }
 
 pub(super) fn run(args: &ViewArgs) -> Result<Outcome, CliError> {
+    // Read the finished frames
     let pictures = JobPictures::read(&args.pictures)?;
     pictures.require_any()?;
     let gaps = pictures.gaps();
@@ -59,6 +60,7 @@ pub(super) fn run(args: &ViewArgs) -> Result<Outcome, CliError> {
     }
     let output = args.output.clone().unwrap_or_else(|| pictures.state.dir().join(FILE));
     pictures.guard(&output, args.force)?;
+    // Collect their pictures
     let frames: Vec<ViewerFrame> = pictures
         .pictures
         .iter()
@@ -71,6 +73,7 @@ pub(super) fn run(args: &ViewArgs) -> Result<Outcome, CliError> {
     if !pictures.has_previews && !args.embed {
         message!("the job has no previews: pictures are made from the images, into the page");
     }
+    // Make the page, with the plots of the job's report
     let settings = settings(args, &pictures, &frames);
     let report = JobReport::of_plan(&pictures.state);
     let made = viewer_page(&frames, &settings, &output, gaps.as_deref(), &report.plots());
@@ -78,6 +81,7 @@ pub(super) fn run(args: &ViewArgs) -> Result<Outcome, CliError> {
         ViewerError::Picture(_) => pictures.explain(&error),
         error => CliError::other(format!("{}: {error}", output.display())),
     })?;
+    // Publish it, and say what it has
     publish(&output, html.as_bytes()).map_err(CliError::io(&output))?;
     for note in &content.notes {
         message!("{note}");

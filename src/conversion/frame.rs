@@ -88,6 +88,7 @@ impl Conversion {
     /// The settings of the conversion library for a frame from `source`.
     fn engine_settings(&self, source: &dyn ParticleSource) -> convert::ConvertSettings {
         let settings = &self.settings;
+        // Choose how to store each attribute of the source
         let choice = |attribute: &SourceAttribute| {
             let choice = settings.attributes.choice(attribute);
             (attribute.name.clone(), choice)
@@ -133,6 +134,7 @@ impl ConvertedFrame {
     fn new(report: &ConvertReport, start: Instant, notes: Vec<String>) -> Self {
         let index = &report.index;
         let stored = [&index.positions, &index.wide, &index.nodes];
+        // Find the smallest radius, for the error in radii
         let radius = match &index.radius {
             RadiusIndex::None => None,
             RadiusIndex::Common(radius) => Some(*radius),

@@ -86,6 +86,7 @@ impl SceneFiles {
         &self,
         manifest: &Manifest,
     ) -> Result<Vec<(String, String)>, RunError> {
+        // Add each file that pictures use, with the key of its path
         let mut identities = meshes::identities(manifest, &self.dir)?;
         if let Some(path) = environment_path(manifest, &self.dir) {
             let found = identity(&path).map_err(|source| ImageReadError::Io { path, source })?;

@@ -39,6 +39,7 @@ pub(super) fn bonds_of(
     let Some(style) = setup.picture.things.bonds.as_ref().filter(|_| !frame.is_empty()) else {
         return Ok(None);
     };
+    // Find the bonds, by the rule of the manifest
     let near = |reach: Reach| {
         let search = Search::new(style.radius, reach, frame);
         (search.bonds(), "no particles are so near each other")
@@ -55,6 +56,7 @@ pub(super) fn bonds_of(
     if rods.is_empty() {
         notes.push(format!("frame {number}: no bonds: {none}"));
     }
+    // Colour each half like its particle
     let mut colors = Vec::new();
     if let Some(rule) = &style.color {
         let of_particles = colors_by(setup, frame, (number, file), rule)?;
@@ -72,6 +74,7 @@ const fn most_bonds(particles: usize) -> u64 {
 /// The bonds that the file of `frame` lists; None if there are too many. Where the cell is periodic, each end goes to
 /// the nearest image of the other particle: one that is across the boundary is drawn up to the middle from both sides.
 fn listed(radius: f32, frame: &SharedFrame<'_>) -> Option<Vec<Rod>> {
+    // Refuse more bonds than were planned for
     if frame.bonds.len() as u64 > most_bonds(frame.len()) {
         return None;
     }
@@ -82,6 +85,7 @@ fn listed(radius: f32, frame: &SharedFrame<'_>) -> Option<Vec<Rod>> {
         else {
             continue;
         };
+        // Draw a bond, or two halves where it leaves the cell
         let image = lattice.as_ref().and_then(|lattice| lattice.image(b - a));
         let mut rod = |ends, particles| {
             rods.push(Rod { ends, radii: [radius; 2], particles });
@@ -197,6 +201,7 @@ impl<'a> Search<'a> {
     /// Adds the bonds of a particle to those with greater indices, and its halves of the bonds that leave the periodic
     /// cell. Each end of these is drawn from its particle to the middle.
     fn add_bonds_of(&self, particle: usize, rods: &mut Vec<Rod>) {
+        // A bond belongs to the particle with the lower index
         let point = self.positions[particle];
         let Ok(own) = u32::try_from(particle) else {
             return;
@@ -208,11 +213,13 @@ impl<'a> Search<'a> {
                 particles: [own, other],
             });
         };
+        // Add bonds within the cell
         self.bins.each_offset(point, |other, offset| {
             if other > own && offset.length_squared() <= self.reach.squared(particle, other) {
                 bond(offset, 1.0, other);
             }
         });
+        // Add halves of those across its boundary, which the other particle has too
         for image in &self.images {
             let moved = point + *image;
             let [min, max] = self.bounds;
@@ -230,6 +237,7 @@ impl<'a> Search<'a> {
 
 /// Where the images of `cell` next to it are, without itself.
 fn images_around(cell: &SimulationCell) -> Vec<Vec3> {
+    // Step to both sides along periodic edges only
     let steps = |edge: usize| {
         if cell.periodic[edge] && cell.vectors[edge].length_squared() > 0.0 {
             -1..=1
@@ -237,6 +245,7 @@ fn images_around(cell: &SimulationCell) -> Vec<Vec3> {
             0..=0
         }
     };
+    // Combine the steps, and leave out the cell itself
     let mut images = Vec::new();
     for a in steps(0) {
         for b in steps(1) {

@@ -156,11 +156,13 @@ impl DecodedFrame<'_> {
     /// the number of particles before them. If `ids` are needed, particles without an id get their position in the
     /// file as one.
     pub(super) fn move_to_end(&mut self, chosen: &[u32], ids: bool) -> usize {
+        // Give particles ids before their order changes
         let count = self.centers.len();
         let shading = &mut self.shading;
         if ids && shading.ids.is_none() && !chosen.is_empty() {
             shading.ids = Some((0..index_u32(count)).collect());
         }
+        // Move everything that there is one of for each particle
         if !chosen.is_empty() {
             move_to_end(self.centers.to_mut(), chosen);
         }
@@ -232,6 +234,7 @@ fn color_values(
     radius: &Radius,
     rule: &ColorRule,
 ) -> Result<(Vec<f32>, Vec<Vec3>), LoadError> {
+    // Look up colours, or scalars for the map
     Ok(match rule {
         ColorRule::Constant(_) => (Vec::new(), Vec::new()),
         ColorRule::Rgb { name, required } => {

@@ -128,6 +128,7 @@ impl StoredFrame {
 
     /// Attributes for shading, in the file.
     pub fn shading<'a>(&'a self, picture: &'a Picture, default: Vec3) -> StoredShading<'a> {
+        // Look up the attributes by the names that were found when the frame was opened
         let frame = self.frame();
         let view = |name: &Option<String>| frame.attribute(name.as_deref()?);
         let color = match &picture.particles.color {
@@ -144,6 +145,7 @@ impl StoredFrame {
             }
         };
         let color = color.unwrap_or(StoredColor::Constant(default));
+        // Choose how opacities are looked up
         let opacity = match (&picture.particles.opacity, &self.names.opacity) {
             (OpacityRule::Constant(opacity), _) => StoredOpacity::Constant(*opacity),
             (OpacityRule::Value { range, .. }, value) => {
@@ -264,6 +266,7 @@ impl Names {
         if let OpacityRule::Value { name, .. } = &setup.picture.particles.opacity {
             opacity = columns.value(name, "opacity", true)?;
         }
+        // Find the attributes with channels
         let with_channels = setup
             .picture
             .files

@@ -74,6 +74,7 @@ fn manifest(
         let text = String::from_utf8_lossy(name);
         let _ = write!(json, "{comma}\"{text}\":\"{:08x}\"", object_of(name));
     };
+    // Name the particles as the kind divides them
     match kind {
         MatteKind::Material => {
             add(PARTICLES.as_bytes());
@@ -101,6 +102,7 @@ fn manifest(
             }
         }
     }
+    // Name the ground, unless it is invisible, and the meshes
     let ground = setup.picture.scene.ground.as_ref();
     if ground.is_some_and(|ground| ground.shadow_catcher.is_none()) {
         add(GROUND.as_bytes());

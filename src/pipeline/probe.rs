@@ -224,6 +224,7 @@ impl Trial {
         (settings.width, settings.height) = (width, height);
         settings.samples = settings.samples.min(MAX_SAMPLES);
         let channels = settings.channels;
+        // Trace it until the deadline
         let start = Instant::now();
         let traced = renderer.image(&setup, frame, &Deadline(deadline));
         let seconds = start.elapsed().as_secs_f64();
@@ -254,6 +255,7 @@ impl Trial {
     fn cost(&self, full: &Setup, task: &ImageTask) -> Result<ImageCost, ProbeError> {
         // Images are encoded by one thread while the pool traces, so measure with one thread.
         let pool = ThreadPoolBuilder::new().num_threads(1).build()?;
+        // Encode the trial as a job encodes its image
         let start = Instant::now();
         let has_exr = matches!(PictureFormat::of(&task.image), Some(PictureFormat::Exr) | None);
         let mut bytes = 0;
@@ -267,6 +269,7 @@ impl Trial {
             let png = encode_preview(&self.film, &options, &[])?;
             bytes += png.len();
         }
+        // Scale the costs to the full image
         let encode = start.elapsed().as_secs_f64();
         Ok(ImageCost {
             trace: self.seconds / self.part(full),

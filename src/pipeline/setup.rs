@@ -456,12 +456,14 @@ impl Setup {
     /// The reason why the particles of a native frame must be copied, whatever radii they have; None if they need not
     /// be.
     pub(super) fn needs_copy(&self) -> Option<String> {
+        // Trees over objects need positions in memory
         let structure = self.stored_structure();
         if matches!(structure, Structure::Bvh | Structure::Sbvh) {
             return Some(format!(
                 "{structure} builds over a copy of them, 12 bytes per particle and more; lbvh and kdtree do not"
             ));
         }
+        // So does everything that chooses, moves or searches particles
         if !self.picture.particles.selection.is_all() {
             return Some(
                 "[select] and [[clip]] take those that are drawn from a copy of them, 12 bytes per particle and more"
@@ -489,6 +491,7 @@ impl Setup {
                     .to_owned(),
             );
         }
+        // So do surfaces that are made from all of them
         let why = match self.picture.surface {
             SurfaceSettings { kind: SurfaceKind::Smooth, .. } => {
                 "a smooth surface sorts a copy of them, 12 bytes per particle and more"

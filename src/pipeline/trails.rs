@@ -66,8 +66,8 @@ pub(super) fn trails_of(
         };
         trails.extend(age, frame.cell.as_ref(), find);
     }
-    // Colour each trail like its particle in the current frame
     notes.extend(gap_note(sequence, task, style.frames));
+    // Colour each trail like its particle in the current frame
     let mut colors = Vec::new();
     if let Some(rule) = &style.color {
         let of_particles = colors_by(setup, frame, (task.frame, &file), rule)?;
@@ -134,12 +134,14 @@ impl<'a> Trails<'a> {
         find: impl Fn(usize) -> Option<Vec3>,
     ) {
         let lattice = cell.map(Lattice::new);
+        // Extend the trail of each particle that was there in the frame after this one
         for ((trail, owner), end) in (0..).zip(&self.owners).zip(&mut self.ends) {
             let Some((newer, newer_age)) = *end else {
                 continue;
             };
             let older = find(*owner);
             *end = older.map(|point| (point, age));
+            // End it where the particle is missing, and interrupt it where it jumps
             let Some(older) = older else { continue };
             let image = lattice.as_ref().and_then(|lattice| lattice.image(newer - older));
             if image.is_some() {

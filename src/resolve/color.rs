@@ -173,9 +173,11 @@ fn unsupported_scale(what: String) -> ResolveError {
 }
 
 fn categories(by: &ColorMapping, color: &ColorRange) -> Result<ColorMap, ResolveError> {
+    // Given colours need no survey
     if let Some(values) = &by.values {
         return Ok(ColorMap::of_colors(values.0.clone()));
     }
+    // Find the categories, or say why there are none
     let name = &color.attribute;
     let none = Vec::new();
     let values = match &color.categories {
@@ -201,6 +203,7 @@ fn categories(by: &ColorMapping, color: &ColorRange) -> Result<ColorMap, Resolve
 }
 
 fn continuous(by: &ColorMapping, color: &ColorRange) -> Result<ColorMap, ResolveError> {
+    // Choose the ends of the map
     let range = match by.range {
         Some(RangeSetting::Values(range)) => range,
         Some(RangeSetting::Symmetric) => {
@@ -209,6 +212,7 @@ fn continuous(by: &ColorMapping, color: &ColorRange) -> Result<ColorMap, Resolve
         }
         Some(RangeSetting::Percentiles(_)) | None => [color.low, color.high],
     };
+    // Choose the scale
     let scale = match by.scale() {
         ScaleKind::Linear | ScaleKind::Categorical => ColorScale::Linear,
         ScaleKind::Log => {
@@ -229,6 +233,7 @@ fn continuous(by: &ColorMapping, color: &ColorRange) -> Result<ColorMap, Resolve
             ColorScale::SymLog { threshold: by.threshold.unwrap_or(usual) }
         }
     };
+    // Make the map
     let name = by.map().name();
     let map = match scale {
         ColorScale::Linear => ColorMap::new(&name, narrow(range[0]), narrow(range[1])),

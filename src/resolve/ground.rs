@@ -73,6 +73,7 @@ pub(super) fn ground(
                 .to_owned(),
         });
     }
+    // Put it under the particles, as a catcher or as a surface
     let mut ground = placed(manifest, floor, is_catcher);
     if is_catcher {
         return Ok(Some(shadow_catcher(ground, floor, render.ground_shadow)));

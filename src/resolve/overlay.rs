@@ -49,6 +49,7 @@ pub(super) fn add_overlays(
     page: &Page,
     pictures: &[Arc<RgbaPixels>],
 ) -> Result<(), ResolveError> {
+    // Find what automatic corners and lengths depend on
     let camera = setup.picture.scene.camera;
     let mut pictures = pictures.iter();
     let points = film_points(setup, survey, &camera, page.picture);
@@ -168,6 +169,7 @@ pub(super) fn placed<'m>(
         };
         points.iter().any(|point| is_covered(&point))
     });
+    // Put those beside the picture that cover something
     let mut placed = manifest.clone();
     for (overlay, covers) in placed.overlays.iter_mut().zip(covers) {
         if is_open(overlay) {
@@ -200,6 +202,7 @@ pub(super) fn page(
     manifest: &Manifest,
     survey: &Survey,
 ) -> Result<Page, ResolveError> {
+    // Make room, but not at the cost of most of the picture
     let size = manifest.image.size();
     let view = first_view(setup, survey, &setup.picture.scene.camera);
     let page = Page::with_room_for(&setup.picture.files.overlays, size, &view);
@@ -302,6 +305,7 @@ pub fn color_bar_of(
     manifest: &Manifest,
     survey: &Survey,
 ) -> Result<Option<ColorBar>, ResolveError> {
+    // Take the colours of the particles
     let rule = color::rule(manifest, survey, None)?;
     let Some((name, kind)) = color_bar(&rule, manifest, survey) else {
         return Ok(None);
@@ -316,6 +320,7 @@ pub fn color_bar_of(
         format: None,
         factor: 1.0,
     };
+    // Take texts and numbers of the first colour bar, if there is one
     let own = manifest.overlays.iter().find_map(|overlay| match &overlay.kind {
         OverlayKind::ColorBar { title, unit, ticks, format, factor, .. } => {
             Some((title, unit, ticks, format, factor))
@@ -341,6 +346,7 @@ fn color_bar(
     let ColorRule::Attribute { name, map, .. } = rule else {
         return None;
     };
+    // Sample the map, or list its categories
     let kind = match (map.range(), map.categories()) {
         (Some((range, scale)), _) => {
             let steps = map.steps();
@@ -388,6 +394,7 @@ fn named(
 
 /// The time, with decimals for the time between frames or for three digits of the only time, or the frame number.
 fn time_stamp(survey: &Survey) -> Template {
+    // Find decimals that tell frames apart
     let decimals = |is_enough: &dyn Fn(f64) -> bool| {
         (0..6).find(|decimals| is_enough(f64::from(10_u32.pow(*decimals)))).unwrap_or(6)
     };
@@ -401,12 +408,14 @@ fn time_stamp(survey: &Survey) -> Template {
         })),
         (None, None) => None,
     };
+    // Write tiny times in powers of ten
     let is_tiny = |time: f64| step.is_none() && time > 0.0 && time < 1e-4;
     let text = match decimals {
         Some(_) if survey.largest_time.is_some_and(is_tiny) => "t = {time:.2e}".to_owned(),
         Some(decimals) => format!("t = {{time:.{decimals}f}}"),
         None => "frame {frame}".to_owned(),
     };
+    // Add the unit
     let unit = survey.time_unit.as_ref().filter(|_| decimals.is_some());
     let text = unit.map_or(text.clone(), |unit| format!("{text} {unit}"));
     Template::parse(&text).expect("a text with known variables")

@@ -21,6 +21,7 @@ pub(super) fn scene(
     placed: &PlacedCamera,
     extent: &Extent,
 ) -> Result<Scene, ResolveError> {
+    // Find the lights: those of the manifest, the environment, and its sun
     let (up, bounds, view) = (extent.up, &extent.bounds, placed.view.path.start());
     let environment = environment::environment(manifest, image, &view, up)?;
     let mut lights = match (manifest.lights.is_empty(), manifest.integrator()) {
@@ -30,6 +31,7 @@ pub(super) fn scene(
         (true, IntegratorKind::Path) => Vec::new(),
     };
     lights.extend(environment::sun(manifest, &view, up));
+    // Collect what the ground depends on
     let floor = Floor {
         bounds,
         reach: extent.reach,

@@ -23,6 +23,7 @@ pub(super) fn selection(manifest: &Manifest, survey: &Survey) -> Result<Selectio
     let known = color::known_attributes(survey);
     let checked = selection.check_names(&known, Some(0.0), &survey.labels);
     match checked {
+        // Explain names that are not known, with similar ones
         Ok(()) => Ok(selection),
         Err(unknown) if unknown.texts.is_some() => {
             let known = unknown.texts.iter().flat_map(|(_, known)| known.iter().cloned());

@@ -55,6 +55,7 @@ fn check_motion_source(
     has_velocities: bool,
 ) -> Result<(), ResolveError> {
     let unsupported = |what: String| ResolveError::Unsupported { key: "camera.shutter", what };
+    // Particles have to be found in the next frame
     let is_id = |name: &String| names::ID.iter().any(|known| name.eq_ignore_ascii_case(known));
     if survey.most_particles > 0 && !has_velocities && !survey.attributes.iter().any(is_id) {
         return Err(unsupported(format!(
@@ -63,6 +64,7 @@ fn check_motion_source(
             attribute_list(survey.attributes.iter().map(String::as_str))
         )));
     }
+    // There has to be a next frame, unless only the camera moves
     let mode = manifest.camera.mode;
     let is_camera_still = matches!(mode, CameraMode::Auto | CameraMode::Fixed);
     if survey.frames == 1 && survey.frame_numbers.is_none() && !has_velocities && is_camera_still {
@@ -70,6 +72,7 @@ fn check_motion_source(
             "motion blur without velocities needs another frame, and there is only one".to_owned(),
         ));
     }
+    // It has to exist already
     if manifest.job.follow && !has_velocities {
         return Err(unsupported(
             "motion blur without velocities needs the next frame, which is not there yet when job.follow is set; \

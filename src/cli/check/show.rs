@@ -22,11 +22,13 @@ impl Check<'_> {
         let manifest = self.render_job.manifest();
         let mut all = Map::new();
         let mut put = |key: &str, value: Value| all.insert(key.to_owned(), value);
+        // What is certain without particles
         put("problems", json!(self.problems));
         put("frames", self.frames_json());
         put("images", self.tasks.iter().map(|t| json!(t.image)).collect());
         put("directory", json!(self.render_job.dir()));
         put("image", image_json(manifest));
+        // What follows from the survey
         if let Some((survey, setup)) = &self.setup {
             put("structure", json!(structure(survey, setup).name()));
             put("most_particles", json!(survey.most_particles));
@@ -37,6 +39,7 @@ impl Check<'_> {
             }
             put("camera", self.camera(setup).to_json());
         }
+        // Estimates
         if let Some(schedule) = &self.schedule {
             put("memory", self.memory_json(schedule));
         }

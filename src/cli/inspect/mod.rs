@@ -79,6 +79,7 @@ struct Inspected<'a> {
 
 pub(super) fn run(args: &InspectArgs) -> Result<Outcome, CliError> {
     let mut outcome = Outcome::Done;
+    // Read the topology once for all files
     let topology = args
         .topology
         .as_ref()
@@ -92,6 +93,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<Outcome, CliError> {
                 .map_err(|e| (file, frame_message(&e))),
             Meant::Nothing(argument, why) => Err((argument, why)),
         };
+        // Print the errors of files among the results, so that every file has one
         let printed = match inspected {
             Ok(printed) => printed,
             Err((file, error)) => {
@@ -161,6 +163,7 @@ fn expand(args: &InspectArgs) -> Vec<Meant> {
     let settings =
         SequenceSettings { budget: read_budget(None, None), follow_links: args.follow_links };
     for argument in &args.files {
+        // A manifest is often given by mistake
         if is_manifest(argument) && argument.is_file() {
             let why = format!(
                 "{}: a manifest, not particles; check it with: spherule check {0}",
@@ -169,6 +172,7 @@ fn expand(args: &InspectArgs) -> Vec<Meant> {
             all.push(Meant::Nothing(argument.clone(), why));
             continue;
         }
+        // Files stand for themselves; lists, directories and patterns are opened as a sequence
         match SequenceInput::from_path(argument) {
             SequenceInput::Files(listed) if !listed.iter().any(|file| stands_for_others(file)) => {
                 for file in listed {
@@ -222,6 +226,7 @@ fn inspect(
     args: &InspectArgs,
     topology: Option<&Topology>,
 ) -> Result<Result<Reader, CliError>, FrameError> {
+    // The index of a native frame has most of what is printed
     if topology.is_none() && is_native(path)? {
         let mut inspected = native::inspect(path, place.number, args.verify)?;
         inspected.time = place.time.or(inspected.time);
@@ -308,6 +313,7 @@ fn read<'a>(
     number: Option<i64>,
     topology: Option<&Topology>,
 ) -> Result<Inspected<'a>, FrameError> {
+    // Large files are read in blocks; a topology needs all particles at once
     let contents = match topology {
         None if file.steps().len() == 1 => Contents::in_blocks(file.path())?,
         _ => None,
@@ -317,6 +323,7 @@ fn read<'a>(
         None => Contents::at_once(file, index, topology)?,
     };
     let mut stats = contents.stats;
+    // Number the frame
     let step = &file.steps()[index];
     let running = i64::try_from(index).ok();
     let number = if file.steps().len() > 1 { running } else { number };
@@ -324,6 +331,7 @@ fn read<'a>(
     let native = (file.format() == FORMAT).then(|| layout::parse(file.bytes()).ok()).flatten();
     let all = stats.count + stats.dropped;
     stats.dropped += native.as_ref().map_or(0, |index| index.dropped);
+    // Share the bytes of the file among its steps
     let share = match file.steps().len() {
         1 => 1.0,
         _ => step

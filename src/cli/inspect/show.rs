@@ -77,6 +77,7 @@ impl Inspected<'_> {
 
     pub(super) fn to_lines(&self) -> Vec<String> {
         let stats = &self.stats;
+        // Start with what every frame has
         let mut lines = vec![self.heading()];
         let dropped = match stats.dropped {
             0 => String::new(),
@@ -99,6 +100,7 @@ impl Inspected<'_> {
             Some((low, high)) => format!("  radius {low} to {high}"),
         });
         lines.extend(stats.attributes.iter().map(attribute_line));
+        // End with what limits or confirms the rest
         if let Some(sample) = self.native.as_ref().and_then(|native| native.sample) {
             lines.push(format!("  values of attributes are from a sample of {sample} particles"));
         }

@@ -34,6 +34,7 @@ impl ShowReport for FrameReport {
 
 /// Prints the resolved settings.
 pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup: &Setup) {
+    // Say what was found
     message!(
         "{}, up to {}",
         counted(sequence.frames().len(), "frame"),
@@ -48,6 +49,7 @@ pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup:
     if setup.picture.things.cell.is_none() && !survey.cells.is_empty() {
         note!("{CELL_HINT}");
     }
+    // Without particles, the rest means nothing
     if survey.most_particles == 0 {
         return;
     }

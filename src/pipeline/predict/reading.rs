@@ -36,6 +36,7 @@ impl MemoryModel<'_> {
             let rods = frame.particles.saturating_mul(MAX_BONDS_EACH);
             [rods, frame.particles]
         });
+        // Sum them, and estimate the tree
         let [rods, colors] = arrows
             .chain([trails, bonds])
             .fold(none, |sum, more| [0, 1].map(|i| sum[i].saturating_add(more[i])));
