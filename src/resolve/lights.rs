@@ -19,7 +19,7 @@ pub(super) fn lights(
 ) -> Result<Vec<Light>, ResolveError> {
     let mut lights = Vec::new();
     for light in &manifest.lights {
-        // Lights without a direction or radiance are left out
+        // A light without a direction lights nothing
         let Some(mut found) = light_of(light, origin, up) else {
             continue;
         };

@@ -32,6 +32,7 @@ fn manual() -> String {
         )
     };
     tables.sort_by_key(is_list);
+    // Describe each table and its keys
     for table in tables {
         let about = match &*table[0].about {
             "" => "It stands before all tables",

@@ -261,6 +261,7 @@ impl TomlNode {
         };
         let is_last = at + 1 == overlay.keys.len();
         let found = self.describe();
+        // Take the node that is there, or make an empty table
         match &mut self.kind {
             Kind::Table(table)
                 if is_last && overlay.is_under && !overlay.is_item && table.contains_key(key) =>

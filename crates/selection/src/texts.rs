@@ -30,6 +30,7 @@ pub(super) fn code_of(
     (text, column): (&str, usize),
     labels: &Labels,
 ) -> Result<f64, UnknownName> {
+    // Find the names of the values
     let values = match value {
         Value::Magnitude(values) => values.as_str(),
         _ => "",
@@ -41,6 +42,7 @@ pub(super) fn code_of(
         label.eq_ignore_ascii_case(text) || last.eq_ignore_ascii_case(text)
     };
     let found = own.and_then(|own| own.iter().find(|(_, label)| is_own(label)));
+    // Find the text among them; elements have names without a file
     let is_symbol = text.len() <= 2 && text.bytes().all(|byte| byte.is_ascii_alphabetic());
     let code = match found {
         Some((code, _)) => Some(*code),
@@ -49,6 +51,7 @@ pub(super) fn code_of(
         }
         None => None,
     };
+    // Or say which texts are known
     #[expect(clippy::cast_precision_loss, reason = "values are compared in f64")]
     code.map(|code| code as f64).ok_or_else(|| {
         let symbols = (1..=LAST_ELEMENT).filter_map(element_symbol).map(str::to_owned);

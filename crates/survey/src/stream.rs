@@ -160,6 +160,7 @@ fn half_nearest(
     source: &dyn ParticleSource,
     queries: &[DVec3],
 ) -> Result<Option<(f32, f32)>, FrameError> {
+    // Find the nearest neighbours within each run
     let of_run = |positions: &[DVec3]| {
         let nearest = |from: &DVec3| {
             let squares = positions.iter().map(|to| from.distance_squared(*to));
@@ -167,6 +168,7 @@ fn half_nearest(
         };
         queries.iter().map(nearest).collect::<Vec<f64>>()
     };
+    // Join the runs: the nearest of all counts
     let join = |mut a: Vec<f64>, b: Vec<f64>| {
         a.iter_mut().zip(&b).for_each(|(a, b)| *a = a.min(*b));
         a

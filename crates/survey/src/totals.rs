@@ -272,6 +272,7 @@ impl Totals {
 
     /// The survey of all frames that were added, in the unit of their positions.
     pub(super) fn finish(self, question: Question, up: DVec3) -> Survey {
+        // Suppose a box of size 1 without particles
         let bounds = self.bounds.map(|bounds| bounds.outer);
         let (min, max) = bounds.unwrap_or((DVec3::splat(-0.5), DVec3::splat(0.5)));
         let color = self.color.finish(question.color);
@@ -282,6 +283,7 @@ impl Totals {
             Origins::None | Origins::Mixed => choose_origin(min, max),
         };
         let in_place = self.origin == Origins::Shared(origin);
+        // Keep some of the points, relative to the origin
         let points = sample_indices(self.points.len(), POINTS)
             .map(|i| self.points[i])
             .map(|point| (point - origin).as_vec3().to_array());

@@ -184,10 +184,12 @@ pub(super) fn is_shell(points: &[DVec3]) -> bool {
     let Some((min, max)) = bounds(points.iter().copied()) else {
         return false;
     };
+    // A layer or a line has no inside
     let axes = axes((min, max));
     if axes.len() < 2 {
         return true;
     }
+    // Find the cells with particles, inside the box and at its sides
     let [mut inside, mut at_sides] = [BTreeSet::new(), BTreeSet::new()];
     for point in points {
         let cell: Vec<usize> = axes
@@ -207,6 +209,7 @@ pub(super) fn is_shell(points: &[DVec3]) -> bool {
         let filled = if is_inside { &mut inside } else { &mut at_sides };
         filled.insert(cell);
     }
+    // Compare how many of them there are with how many there could be
     let power = u32::try_from(axes.len()).unwrap_or(3);
     let [all, inner] = [CELLS, CELLS - 2].map(|side| side.pow(power));
     #[expect(clippy::cast_precision_loss, reason = "few cells")]

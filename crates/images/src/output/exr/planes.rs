@@ -160,6 +160,7 @@ fn layers(layers: &Layers, names: &PlaneNames) -> Vec<Plane> {
             all.push(Plane::new(name, source));
         }
     }
+    // Overlays come last
     let overlay = ["overlay.R", "overlay.G", "overlay.B", "overlay.A"];
     let overlay = layers.overlay_at().zip(overlay);
     all.extend(overlay.map(|(i, name)| Plane::new(name, Source::LayerColor(i))));
