@@ -111,8 +111,8 @@ fn is_same_frame(
 pub(crate) fn merged_input_dirs(old: &[String], request: &JobRequest) -> Vec<String> {
     let mut dirs = DirCache::default();
     let inputs = request.frames.iter().flat_map(|f| &f.inputs);
-    let given: BTreeSet<PathBuf> = inputs.map(|path| dirs.get(path)).collect();
-    let given = given.iter().filter_map(|dir| dir.to_str()).take(MAX_DIRS);
+    let found: BTreeSet<PathBuf> = inputs.map(|path| dirs.get(path)).collect();
+    let given = found.iter().filter_map(|dir| dir.to_str()).take(MAX_DIRS);
     let mut all = old.to_vec();
     for dir in given {
         if !old.iter().any(|known| known == dir) {

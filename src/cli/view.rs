@@ -138,8 +138,8 @@ fn title(pictures: &JobPictures) -> String {
     let name = path
         .and_then(|value| value.as_str().map(str::to_owned))
         .unwrap_or_else(|| "Pictures".to_owned());
-    let dir = pictures.state.dir().canonicalize().ok();
-    let dir = dir.as_deref().and_then(|dir| dir.file_name());
+    let real = pictures.state.dir().canonicalize().ok();
+    let dir = real.as_deref().and_then(|dir| dir.file_name());
     match dir {
         Some(dir) => format!("{}/{name}", dir.to_string_lossy()),
         None => name,
@@ -148,8 +148,8 @@ fn title(pictures: &JobPictures) -> String {
 
 /// Attributes among the channels.
 fn attributes(pictures: &JobPictures) -> Vec<String> {
-    let channels = setting(pictures, "output.channels");
-    let channels = channels.as_ref().and_then(|value| value.as_array());
+    let stored = setting(pictures, "output.channels");
+    let channels = stored.as_ref().and_then(|value| value.as_array());
     let names = channels.into_iter().flatten().filter_map(|channel| channel.as_str());
     names.filter_map(|name| name.strip_prefix(ATTRIBUTE_CHANNEL)).map(str::to_owned).collect()
 }

@@ -135,12 +135,12 @@ impl ConvertedFrame {
         let index = &report.index;
         let stored = [&index.positions, &index.wide, &index.nodes];
         // Find the smallest radius, for the error in radii
-        let radius = match &index.radius {
+        let smallest = match &index.radius {
             RadiusIndex::None => None,
             RadiusIndex::Common(radius) => Some(*radius),
             RadiusIndex::PerParticle(radii) => Some(radii.low),
         };
-        let radius = radius.map(f64::from).filter(|radius| *radius > 0.0);
+        let radius = smallest.map(f64::from).filter(|radius| *radius > 0.0);
         Self {
             particles: index.count,
             dropped: index.dropped,

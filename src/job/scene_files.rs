@@ -93,8 +93,8 @@ impl SceneFiles {
             identities.push(("environment.image".to_owned(), found));
         }
         if let Some(path) = ground_path(manifest, &self.dir) {
-            let found = identity(&path);
-            let found = found
+            let identified = identity(&path);
+            let found = identified
                 .map_err(|source| RunError::GroundImage(ImageReadError::Io { path, source }))?;
             identities.push((GROUND_IMAGE.to_owned(), found));
         }

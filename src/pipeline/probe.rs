@@ -191,8 +191,8 @@ fn largest_trial(
     let mut last: Option<Trial> = None;
     loop {
         // Trace a mosaic with the aspect ratio of the image
-        let height = u64::from(full.height) * u64::from(width) / u64::from(full.width);
-        let height = u32::try_from(height).unwrap_or(full.height).max(1);
+        let exact = u64::from(full.height) * u64::from(width) / u64::from(full.width);
+        let height = u32::try_from(exact).unwrap_or(full.height).max(1);
         let trial = Trial::of(renderer, setup, frame, [width, height], deadline)?;
         if trial.is_interrupted {
             return Ok(last.unwrap_or(trial));

@@ -48,7 +48,7 @@ impl FrameSample {
         (question, frames): (Question, usize),
     ) -> Result<Self, FrameError> {
         let request = question.radius.spacing(frames);
-        let sample = match question.selection {
+        let whole = match question.selection {
             // Few of the particles of a sample may be drawn; the spacing is the same as without a selection
             Some(selection) if !selection.is_all() => Self {
                 spacing: Self::spacing_of_large(sequence, index, request)?,
@@ -56,7 +56,7 @@ impl FrameSample {
             },
             _ => Self::of_source(sequence, index, request)?,
         };
-        let mut sample = sample.of_question(question, request);
+        let mut sample = whole.of_question(question, request);
         let time = &mut sample.particles.time;
         *time = sequence.listed_time(index).or(*time);
         Ok(sample)

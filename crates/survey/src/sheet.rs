@@ -40,8 +40,8 @@ pub(super) fn covering_radius(sample: &[DVec3], count: usize, touching: f64) -> 
     let queries: Vec<DVec3> = sample_indices(sample.len(), QUERIES).map(|i| sample[i]).collect();
     // Find out whether the surroundings of particles are thin
     let surroundings = queries.par_iter().map(|query| {
-        let near = sample.iter().filter(|p| p.distance_squared(*query) <= reach * reach);
-        let near: Vec<DVec3> = near.copied().collect();
+        let found = sample.iter().filter(|p| p.distance_squared(*query) <= reach * reach);
+        let near: Vec<DVec3> = found.copied().collect();
         let axes = Axes::of(&near).filter(|_| near.len() >= FEW)?;
         let [_, across, normal] = axes.deviations;
         Some((near.len(), normal <= THIN * across))

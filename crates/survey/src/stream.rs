@@ -61,8 +61,8 @@ pub(super) fn sample(
     most: usize,
 ) -> Result<RawParticles, FrameError> {
     // Distribute the runs over the file
-    let runs = source.count().div_ceil(SAMPLE_RUN as u64);
-    let runs = usize::try_from(runs).unwrap_or(usize::MAX);
+    let run_count = source.count().div_ceil(SAMPLE_RUN as u64);
+    let runs = usize::try_from(run_count).unwrap_or(usize::MAX);
     let starts = || sample_indices(runs, (most / SAMPLE_RUN).max(1)).map(|run| run as u64);
     let run = |number: u64| {
         let first = number * SAMPLE_RUN as u64;
@@ -195,8 +195,8 @@ fn each_run<T: Send>(
             || vec![DVec3::ZERO; RUN],
             |positions, number| {
                 let first = number * RUN as u64;
-                let len = (source.count() - first).min(RUN as u64);
-                let len = usize::try_from(len).unwrap_or(RUN);
+                let left = (source.count() - first).min(RUN as u64);
+                let len = usize::try_from(left).unwrap_or(RUN);
                 source.read_positions(first, &mut positions[..len])?;
                 Ok(of_run(&positions[..len]))
             },

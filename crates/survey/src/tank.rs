@@ -67,10 +67,12 @@ impl Contents<'_> {
     /// are identified by their index in the file.
     fn at_rest(&self) -> Option<Tank> {
         // Divide the particles into those at rest and those that move
-        let members = self.positions.iter().zip(self.is_moving).map(|(position, is_moving)| {
-            Member { value: i64::from(*is_moving), position: *position, is_moving: *is_moving }
+        let found = self.positions.iter().zip(self.is_moving).map(|(position, is_moving)| Member {
+            value: i64::from(*is_moving),
+            position: *position,
+            is_moving: *is_moving,
         });
-        let members: Vec<Member> = members.collect();
+        let members: Vec<Member> = found.collect();
         let (moving, resting): (Vec<Member>, Vec<Member>) =
             members.into_iter().partition(|member| member.is_moving);
         let places: Vec<DVec3> = resting.iter().map(|member| member.position).collect();

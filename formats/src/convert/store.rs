@@ -277,8 +277,8 @@ impl<'a> ChunkStore<'a> {
 
     /// The scratch file and its writer thread, both created on first use.
     fn with_writer<T>(&self, ask: impl FnOnce(&Writer) -> T) -> Result<T, FrameError> {
-        let mut writer = self.writer.lock().unwrap_or_else(|e| e.into_inner());
-        let writer = match &mut *writer {
+        let mut guard = self.writer.lock().unwrap_or_else(|e| e.into_inner());
+        let writer = match &mut *guard {
             Some(writer) => writer,
             none => none.insert(self.start()?),
         };

@@ -69,9 +69,9 @@ impl Siblings for SiblingFiles {
         let file = match opened.get(&path) {
             Some(file) => Arc::clone(file),
             None => {
-                let file = MappedFile::open(&path)
+                let map = MappedFile::open(&path)
                     .map_err(|e| refused(format!("which cannot be opened: {e}; copy it there")))?;
-                let file = Arc::new(file);
+                let file = Arc::new(map);
                 opened.insert(path.clone(), Arc::clone(&file));
                 file
             }

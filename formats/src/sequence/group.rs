@@ -44,8 +44,8 @@ impl LoneParts {
         names: &[String],
     ) -> Self {
         let note = |part: &u32| {
-            let file = files.iter().find(|file| file.part == *part);
-            let file = file.and_then(|file| file.path.file_name());
+            let first = files.iter().find(|file| file.part == *part);
+            let file = first.and_then(|file| file.path.file_name());
             format!(
                 "`{}` is left out, since no other step has a file of this name; --parts {} draws its particles",
                 file.unwrap_or_default().to_string_lossy(),
@@ -388,8 +388,8 @@ fn common_ends(texts: &[String]) -> (usize, usize) {
         let same = first.chars().zip(other.chars()).take_while(|(a, b)| a == b);
         same.map(|(a, _)| a.len_utf8()).sum::<usize>()
     };
-    let start = others.iter().map(start_with).min().unwrap_or(first.len());
-    let start = first[..start].rfind(SEPARATORS).map_or(0, |i| i + 1);
+    let shared = others.iter().map(start_with).min().unwrap_or(first.len());
+    let start = first[..shared].rfind(SEPARATORS).map_or(0, |i| i + 1);
     let end_with = |other: &String| {
         let tails = first[start..].chars().rev().zip(other[start..].chars().rev());
         let same = tails.take_while(|(a, b)| a == b);

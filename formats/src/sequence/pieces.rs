@@ -54,8 +54,8 @@ fn split_pieces(names: &mut [FileName], notes: &mut Vec<String>) {
     // Ask the first file of each series how many files a step has
     let mut counts = BTreeMap::<Vec<String>, u64>::new();
     for name in names.iter_mut().filter(|name| name.may_be_piece()) {
-        let count = counts.entry(name.literals.clone());
-        let count = *count.or_insert_with(|| piece_count(&name.path));
+        let entry = counts.entry(name.literals.clone());
+        let count = *entry.or_insert_with(|| piece_count(&name.path));
         if count > 1 {
             name.split_piece();
         }

@@ -134,10 +134,10 @@ impl ExportJob {
         let frames = render_job.selected(&sequence);
         let chunks = Chunks::of(&frames, args.chunk, max_tasks)?;
         // The name of the manifest stays as it is, in a directory without links and dots
-        let manifest_file = absolute(&args.manifest)?;
-        let manifest_file = match (manifest_file.parent(), manifest_file.file_name()) {
+        let given = absolute(&args.manifest)?;
+        let manifest_file = match (given.parent(), given.file_name()) {
             (Some(dir), Some(name)) => normalized(dir).join(name),
-            _ => manifest_file,
+            _ => given,
         };
         Ok(Self {
             name: paths::job_name(&manifest_file),

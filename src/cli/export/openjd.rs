@@ -29,11 +29,11 @@ pub(super) fn run(args: &OpenjdArgs) -> Result<Outcome, CliError> {
     let format = template_format(output)?;
     // Engines have no common limit on the number of tasks
     let export_job = ExportJob::read(&args.common, NonZeroUsize::MAX)?;
-    let template_dir = match output {
+    let place = match output {
         Some(path) => absolute(path)?,
         None => export_job.manifest_file.clone(),
     };
-    let template_dir = normalized(template_dir.parent().unwrap_or(Path::new("/")));
+    let template_dir = normalized(place.parent().unwrap_or(Path::new("/")));
     let paths = job_paths(&export_job, &template_dir)?;
     let template = template(args, &export_job, &paths)?;
     write_output(&args.common, &template.text(format)?)?;

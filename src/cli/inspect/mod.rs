@@ -314,11 +314,11 @@ fn read<'a>(
     topology: Option<&Topology>,
 ) -> Result<Inspected<'a>, FrameError> {
     // Large files are read in blocks; a topology needs all particles at once
-    let contents = match topology {
+    let in_blocks = match topology {
         None if file.steps().len() == 1 => Contents::in_blocks(file.path())?,
         _ => None,
     };
-    let contents = match contents {
+    let contents = match in_blocks {
         Some(contents) => contents,
         None => Contents::at_once(file, index, topology)?,
     };

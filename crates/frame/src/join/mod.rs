@@ -155,8 +155,8 @@ fn filled(column: JoinedColumn, parts: &mut [Part], counts: &[usize]) -> Attribu
     for (index, (part, count)) in parts.iter_mut().zip(counts).enumerate() {
         match cells.next_if(|(part, _)| *part == index) {
             Some((_, place)) => {
-                let own = &mut part.particles.attributes[place].data;
-                let own = std::mem::replace(own, AttributeData::U8(Vec::new()));
+                let slot = &mut part.particles.attributes[place].data;
+                let own = std::mem::replace(slot, AttributeData::U8(Vec::new()));
                 data.append(own.into_type(scalar));
             }
             None => data.append_nan(components * count),

@@ -36,8 +36,8 @@ impl Timeline {
         for (pair, repeats) in frames.windows(2).zip(&mut timeline.repeats) {
             // Count the frames that are missing between two pictures
             let distance = pair[1].abs_diff(pair[0]);
-            let missing = distance.saturating_add(step / 2) / step;
-            let missing = missing.saturating_sub(1);
+            let steps = distance.saturating_add(step / 2) / step;
+            let missing = steps.saturating_sub(1);
             if missing == 0 {
                 continue;
             }

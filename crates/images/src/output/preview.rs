@@ -91,10 +91,10 @@ pub(super) struct SrgbPicture {
 impl SrgbPicture {
     /// The picture of `film` on its page, with `overlays` over it.
     pub(super) fn of(film: &Film, options: &PreviewOptions, overlays: &[Sprite]) -> Self {
-        let picture = Self::of_film(film, options);
+        let plain = Self::of_film(film, options);
         let mut picture = match options.page {
-            Some(page) => picture.on(&page),
-            None => picture,
+            Some(page) => plain.on(&page),
+            None => plain,
         };
         let pixel_len = if picture.has_alpha { 4 } else { 3 };
         let rows = picture.bytes.chunks_mut(pixel_len * picture.width.max(1) as usize);
@@ -113,8 +113,8 @@ impl SrgbPicture {
     /// The same on paper.
     fn on(&self, PreviewPage { page, paper }: &PreviewPage) -> Self {
         let [width, height] = page.size;
-        let paper = paper.to_array().map(|v| byte_from_linear(v, 0.5));
-        let paper: &[u8] = if self.has_alpha { &[0; 4] } else { &paper };
+        let srgb = paper.to_array().map(|v| byte_from_linear(v, 0.5));
+        let paper: &[u8] = if self.has_alpha { &[0; 4] } else { &srgb };
         let pixel_len = paper.len();
         let mut bytes = paper.repeat(width as usize * height as usize);
         let own = self.bytes.chunks(pixel_len * self.width.max(1) as usize);

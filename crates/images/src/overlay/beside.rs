@@ -145,14 +145,14 @@ impl Page {
         let [gap, edge] = largest_margins(stack.iter().map(|i| items[*i].0), self.size[1]);
         let total: i32 = stack.iter().map(|i| items[*i].1[1] + gap).sum::<i32>() - gap;
         // Align it with the picture
-        let y = match (side, is_top) {
+        let wanted = match (side, is_top) {
             (Side::Top, _) => edge,
             (Side::Bottom, _) => top + own_height + gap,
             (_, Some(true)) => top + edge,
             (_, Some(false)) => top + own_height - total - edge,
             (_, None) => top + (own_height - total) / 2,
         };
-        let mut y = y.min(height - total).max(0);
+        let mut y = wanted.min(height - total).max(0);
         // Place the items from top to bottom
         for i in stack {
             let size = items[*i].1;

@@ -67,11 +67,11 @@ const LABEL_PITCH: f32 = 2.0;
 
 impl ColorBar {
     pub(super) fn texts(&self) -> Vec<&str> {
-        let names = match &self.kind {
+        let categories = match &self.kind {
             ColorBarKind::Numbers { .. } => &[][..],
             ColorBarKind::Categories(all) => all,
         };
-        let names = names.iter().map(|(name, _)| &**name);
+        let names = categories.iter().map(|(name, _)| &**name);
         names.chain([&*self.title, &*self.unit]).collect()
     }
 

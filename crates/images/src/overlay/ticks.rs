@@ -113,12 +113,12 @@ impl TickSettings<'_> {
             return axis.one(low);
         }
         // Choose how many labels there are
-        let most = match self.choice {
+        let wanted = match self.choice {
             Some(TickChoice::Values(values)) => return axis.given(values),
             Some(TickChoice::Count(count)) => most.min(usize::from(*count)),
             None => most.min(USUAL),
         };
-        let most = most.max(2);
+        let most = wanted.max(2);
         // Choose their places by the scale
         let ticks = match (self.steps, axis.scale) {
             (Some(steps), _) => return axis.bands(steps, most),

@@ -79,8 +79,8 @@ impl<'a> PathIntegrator<'a> {
         let material = &context.scene.material;
         let rough = RoughInterface::of(material, interface.constants(), is_connected);
         // Black environments need no samples
-        let environment = context.scene.environment.as_deref();
-        let environment = environment.filter(|environment| !environment.is_black());
+        let given = context.scene.environment.as_deref();
+        let environment = given.filter(|environment| !environment.is_black());
         // Prepare the BSDFs of opaque surfaces
         let mut bsdfs = bsdfs_of(
             context.scene.material.finish,

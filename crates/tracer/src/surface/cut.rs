@@ -135,8 +135,8 @@ impl<'a, S: CutShape> CutSpheres<'a, S> {
     /// The intersection of a ray with the face on `plane` at distance `t`.
     fn face(&self, ray: &Ray, t: f32, plane: usize, particle: u32, radius: f32) -> Intersection {
         let Plane { normal, distance } = self.region.planes[plane];
-        let point = ray.at(t);
-        let point = point - normal * (normal.dot(point) - distance);
+        let on_ray = ray.at(t);
+        let point = on_ray - normal * (normal.dot(on_ray) - distance);
         Intersection {
             t,
             point,

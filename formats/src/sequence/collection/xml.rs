@@ -74,8 +74,8 @@ impl ListParser {
             return Err(place.malformed(what));
         }
         // Add the files that the element names; which elements do depends on the kind of list
-        let name = tag.local_name();
-        let name: &str = name.as_ref();
+        let local = tag.local_name();
+        let name: &str = local.as_ref();
         let mut block = String::new();
         match (self.list.kind, name) {
             (ListKind::Collection, "DataSet") => self.timed(tag, place)?,
@@ -106,13 +106,13 @@ impl ListParser {
 
     /// A file of a collection, with its time.
     fn timed(&mut self, tag: &BytesStart<'_>, place: TextPlace) -> Result<(), ParseError> {
-        let time = text_of(tag, place, "timestep")?;
-        let time = match time.parse::<f64>() {
-            _ if time.is_empty() => None,
+        let written = text_of(tag, place, "timestep")?;
+        let time = match written.parse::<f64>() {
+            _ if written.is_empty() => None,
             // Zero is the same time with either sign.
             Ok(value) if value.is_finite() => Some(value + 0.0),
             _ => {
-                let what = format!("timestep=\"{}\" is not a number", short(&time));
+                let what = format!("timestep=\"{}\" is not a number", short(&written));
                 return Err(place.malformed(what));
             }
         };

@@ -54,8 +54,8 @@ impl ExrLayout {
         options: &ExrOptions,
     ) -> Result<Self, OutputError> {
         // Divide the planes into parts
-        let planes = planes_in_file(channels, &options.names);
-        let planes = parts(planes, options.has_data_part());
+        let in_file = planes_in_file(channels, &options.names);
+        let planes = parts(in_file, options.has_data_part());
         let count = planes.len();
         let data = options.data_compression.unwrap_or(options.compression);
         let names = PART_NAMES.into_iter().zip([options.compression, data]);

@@ -161,8 +161,8 @@ fn layers(layers: &Layers, names: &PlaneNames) -> Vec<Plane> {
         }
     }
     // Overlays come last
-    let overlay = ["overlay.R", "overlay.G", "overlay.B", "overlay.A"];
-    let overlay = layers.overlay_at().zip(overlay);
+    let axes = ["overlay.R", "overlay.G", "overlay.B", "overlay.A"];
+    let overlay = layers.overlay_at().zip(axes);
     all.extend(overlay.map(|(i, name)| Plane::new(name, Source::LayerColor(i))));
     all
 }

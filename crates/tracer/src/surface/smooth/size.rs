@@ -122,8 +122,8 @@ impl GridSize {
 /// Number of particles that affect the surface.
 fn near(field: &FieldParticles, layout: &Layout, plan: &Plan) -> u64 {
     let bins = field.bins();
-    let near = blocks::bins_near(bins, layout, &plan.blocks, 2.0 * layout.support);
-    let near = (0..bins.bin_count()).filter(|bin| near[*bin]);
+    let is_near = blocks::bins_near(bins, layout, &plan.blocks, 2.0 * layout.support);
+    let near = (0..bins.bin_count()).filter(|bin| is_near[*bin]);
     near.map(|bin| bins.particles_in(bin..bin + 1).len() as u64).sum()
 }
 

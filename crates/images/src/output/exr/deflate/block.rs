@@ -259,8 +259,8 @@ fn write_symbols(data: &[u8], sequences: &[Sequence], codes: &Codes, out: &mut B
         if sequence.length > 0 {
             let length = lengths[usize::from(sequence.length)];
             out.put(u64::from(length.bits), length.count);
-            let distance = distance_value(sequence.distance);
-            let distance = Bits::of_value(distance, &codes.distances, distance_bits);
+            let value = distance_value(sequence.distance);
+            let distance = Bits::of_value(value, &codes.distances, distance_bits);
             out.put(u64::from(distance.bits), distance.count);
             out.flush();
         }
