@@ -128,7 +128,7 @@ pub fn rules(
     rules.scalar();
     rules.neutral();
     rules.cell();
-    rules.floor();
+    rules.ground();
     rules.molecule();
     rules.flat();
     rules.tails();
@@ -413,7 +413,7 @@ impl Rules<'_> {
     }
 
     /// Molecules, gases and periodic cells stand on nothing.
-    fn floor(&mut self) {
+    fn ground(&mut self) {
         let is_free = self.files.is_molecular || self.facts.is_gas;
         if self.is_molecular() || self.is_periodic() || is_free {
             self.set([("render.ground", "none".into())], None);

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::camera::PlacedCamera;
-use super::ground::Floor;
+use super::ground::GroundPlace;
 use super::{Extent, ResolveError, environment, ground, lights, meshes, parts, surface};
 use crate::manifest::Manifest;
 use crate::render::IntegratorKind;
@@ -32,7 +32,7 @@ pub(super) fn scene(
     };
     lights.extend(environment::sun(manifest, &view, up));
     // Collect what the ground depends on
-    let floor = Floor {
+    let place = GroundPlace {
         bounds,
         reach: extent.reach,
         up,
@@ -49,8 +49,8 @@ pub(super) fn scene(
         material: surface::material(manifest, bounds),
         parts: parts::parts(manifest, survey)?,
         background: background(manifest, up.as_vec3()),
-        ground: ground::ground(manifest, &floor)?,
-        wet_ground: ground::wet_ground(manifest, &floor),
+        ground: ground::ground(manifest, &place)?,
+        wet_ground: ground::wet_ground(manifest, &place),
         meshes: meshes::materials(manifest),
         particles: [bounds.min, bounds.max].map(|corner| (corner - survey.origin).as_vec3()),
         is_spray_soft: manifest.draws_soft_spray(),

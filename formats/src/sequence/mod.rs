@@ -368,9 +368,9 @@ impl Sequence {
     pub fn remarks(&self) -> Vec<String> {
         let mut all: Vec<String> = Vec::new();
         for path in self.inputs(0) {
-            for remark in crate::open::remarks(path) {
-                if !all.contains(&remark) {
-                    all.push(remark);
+            for note in crate::open::remarks(path) {
+                if !all.contains(&note) {
+                    all.push(note);
                 }
             }
         }

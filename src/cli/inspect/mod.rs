@@ -234,13 +234,13 @@ fn inspect(
     }
     let file = FrameFile::open_mapped(path, read_budget(None, None))?;
     // For several steps, the metadata come from the first one.
-    let mut remarks = remarks(path);
+    let mut of_file = remarks(path);
     let mut lines = StepLines::new(file.steps().len());
     for index in 0..file.steps().len() {
         let mut inspected = read(&file, index, place.number, topology)?;
         inspected.time = place.time.or(inspected.time);
-        inspected.notes.retain(|note| !remarks.contains(note));
-        inspected.notes.splice(..0, remarks.drain(..));
+        inspected.notes.retain(|note| !of_file.contains(note));
+        inspected.notes.splice(..0, of_file.drain(..));
         if args.verify && inspected.native.is_some() {
             verify(file.bytes()).map_err(|e| e.in_file(path))?;
         }

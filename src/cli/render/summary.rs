@@ -43,8 +43,8 @@ pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup:
     if let Some(parts) = parts_text(sequence) {
         message!("{parts}");
     }
-    for remark in sequence.remarks() {
-        note!("{remark}");
+    for text in sequence.remarks() {
+        note!("{text}");
     }
     if setup.picture.things.cell.is_none() && !survey.cells.is_empty() {
         note!("{CELL_HINT}");

@@ -200,8 +200,8 @@ pub fn render_into(
     let RenderSettings { width, height, channels, has_features, .. } = *settings;
     film.fit(width, height, channels, has_features);
     let plane = scene.ground.as_ref().map(Plane::new);
-    let floor = plane.iter().map(|plane| plane as &dyn Shape);
-    let shapes = floor.chain(shapes.iter().copied()).collect();
+    let ground = plane.iter().map(|plane| plane as &dyn Shape);
+    let shapes = ground.chain(shapes.iter().copied()).collect();
     let context = RenderContext::new(shapes, scene, source, settings);
     let (integrator, before) = integrator_of(context, settings, stop)?;
     let scratch = Mutex::new(Vec::new());

@@ -41,7 +41,7 @@ mod light_channels;
 
 use ambient::AmbientLight;
 use catcher::Catcher;
-use floor::{Caustics, FloorLight};
+use floor::{Caustics, GroundLight};
 
 /// Number of diffuse reflections from which on paths end at random.
 const ROULETTE_START: u32 = 2;
@@ -66,7 +66,7 @@ pub(super) struct PathIntegrator<'a> {
     /// The light of second surfaces, if paths end there.
     ambient: Option<AmbientLight>,
     /// The light on the ground, if paths end there.
-    floor: Option<FloorLight>,
+    ground_light: Option<GroundLight>,
     /// The light of photons on other surfaces.
     caustics: Caustics,
 }
@@ -98,7 +98,7 @@ impl<'a> PathIntegrator<'a> {
             rough,
             split: SplitRule::new(context.settings, context.interior),
             catcher: Catcher::of(context.scene),
-            floor: None,
+            ground_light: None,
             caustics: Caustics::default(),
             has_extents: context.lights.iter().any(|light| light.has_extent()),
             context,
@@ -149,8 +149,8 @@ impl Integrator for PathIntegrator<'_> {
         // End paths at a ground whose light is known
         let ground = packet.hits.lanes_of(MaterialId::GROUND);
         let mut ended = 0;
-        if let Some(floor) = self.floor.as_ref().filter(|_| ground != 0) {
-            self.shade_floor(floor, &self.surface(segments, depth, ground), packet);
+        if let Some(light) = self.ground_light.as_ref().filter(|_| ground != 0) {
+            self.shade_ground(light, &self.surface(segments, depth, ground), packet);
             ended = ground;
         }
         // Reflect light at opaque surfaces

@@ -49,7 +49,7 @@ use wet::{WetMap, WetScene};
 
 /// See the module. All maps contain the radiance of a white ground.
 #[derive(Debug, Clone)]
-pub(super) struct FloorLight {
+pub(super) struct GroundLight {
     caustics: CausticMap,
     sky: Map,
     wet: Option<WetMap>,
@@ -250,11 +250,11 @@ impl<'a> PathIntegrator<'a> {
         // Find out what needs light from photons
         let sources = self.photon_sources();
         let ground = scene.ground.as_ref();
-        let floor = ground.filter(|ground| !is_catcher(ground));
+        let visible = ground.filter(|ground| !is_catcher(ground));
         let catcher = ground.filter(|g| is_catcher(g) && !sources.is_empty());
         let has_surfaces = !sources.is_empty() && self.has_opaque_surfaces();
         // Trace the photons
-        let square = floor.or(catcher).map(Square::of);
+        let square = visible.or(catcher).map(Square::of);
         let groups: BTreeSet<usize> = match settings.channels.layers.light_groups {
             0 => BTreeSet::new(),
             _ => sources.iter().map(|(group, _)| *group).collect(),
@@ -279,22 +279,22 @@ impl<'a> PathIntegrator<'a> {
             return Some((self, counts));
         }
         // Add the light of the environment on a visible ground
-        if let (Some(ground), Some(caustics)) = (floor, caustics) {
-            let (light, of_sky) = self.floor_light(ground, caustics, stop)?;
+        if let (Some(ground), Some(caustics)) = (visible, caustics) {
+            let (light, of_sky) = self.ground_light(ground, caustics, stop)?;
             counts = counts + of_sky;
-            self.floor = Some(light);
+            self.ground_light = Some(light);
         }
         Some((self, counts))
     }
 
     /// The light of photons, of the sky and of wetness on a visible `ground`, and the rays that were traced for the sky.
     /// `None` if `stop` is raised.
-    fn floor_light(
+    fn ground_light(
         &self,
         ground: &Ground,
         caustics: CausticMap,
         stop: &dyn Stop,
-    ) -> Option<(FloorLight, RayCounts)> {
+    ) -> Option<(GroundLight, RayCounts)> {
         let (sky, of_sky) = sky::sky(self, &caustics.square, stop)?;
         let open =
             self.environment.map(|e| e.irradiance(ground.up) * FRAC_1_PI).unwrap_or_default();
@@ -308,7 +308,7 @@ impl<'a> PathIntegrator<'a> {
             open: if number == of_environment { open } else { Vec3::ZERO },
         };
         let groups = sky.groups.into_iter().enumerate().map(group).collect();
-        Some((FloorLight { caustics, sky: sky.all, wet, open, groups }, of_sky))
+        Some((GroundLight { caustics, sky: sky.all, wet, open, groups }, of_sky))
     }
 
     /// What wets the ground, if something does.
@@ -339,15 +339,15 @@ impl<'a> PathIntegrator<'a> {
     }
 
     /// Adds the light that the ground reflects, where the paths of `surface` end.
-    pub(super) fn shade_floor(
+    pub(super) fn shade_ground(
         &self,
-        floor: &FloorLight,
+        light: &GroundLight,
         surface: &Surface<'_>,
         packet: &mut PacketScratch,
     ) {
         // Darken the ground where it is wet
         self.prepare_surface(surface, packet);
-        let gloss = match &floor.wet {
+        let gloss = match &light.wet {
             Some(wet) => wet.darken(surface, packet),
             None => splat(0.0),
         };
@@ -356,8 +356,8 @@ impl<'a> PathIntegrator<'a> {
         for lane in lanes_in(surface.lanes) {
             let point = lane3(&packet.hits.point, lane);
             let weight = lane3(&packet.weight, lane) * lane3(&packet.surface.albedo, lane);
-            set_lane3(&mut reflected, lane, weight * floor.white(point));
-            floor.each_group(point, |group, white| {
+            set_lane3(&mut reflected, lane, weight * light.white(point));
+            light.each_group(point, |group, white| {
                 packet.groups.add_lane(group, lane, weight * white);
             });
         }
@@ -365,7 +365,7 @@ impl<'a> PathIntegrator<'a> {
         add(simd, &reflected, &Vec3::ONE, surface.lanes, radiance);
         // Add what wet ground mirrors, and light that arrives straight from its source
         packet.take_light(LightClass::Diffuse);
-        if let Some(wet) = &floor.wet {
+        if let Some(wet) = &light.wet {
             self.add_gloss(wet, &gloss, surface, packet);
         }
         self.add_straight_light(surface, packet);
@@ -382,7 +382,7 @@ impl<'a> PathIntegrator<'a> {
     }
 }
 
-impl FloorLight {
+impl GroundLight {
     /// Radiance of a white ground at `point`.
     fn white(&self, point: Vec3) -> Vec3 {
         let Some((position, weight)) = self.caustics.square.place(point) else {
