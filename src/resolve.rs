@@ -178,14 +178,25 @@ fn setup_on(
         denoise,
     };
     let mut setup = Setup { picture, run: images::run_settings(manifest, survey) };
-    // Add what is drawn over them
-    let [columns, rows] = placed.camera.eyes();
+    add_overlays(&mut setup, manifest, survey, inputs, page)?;
+    Ok(setup)
+}
+
+/// Adds the overlays of a picture that fills its image, or is on a `page`.
+fn add_overlays(
+    setup: &mut Setup,
+    manifest: &Manifest,
+    survey: &Survey,
+    inputs: &SceneInputs<'_>,
+    page: Option<Page>,
+) -> Result<(), ResolveError> {
+    let [columns, rows] = setup.picture.scene.camera.eyes();
     let render = &setup.picture.render;
     let whole = Page::whole(render.width / columns, render.height / rows);
-    overlay::add_overlays(&mut setup, manifest, survey, &page.unwrap_or(whole), inputs.overlays)?;
+    overlay::add_overlays(setup, manifest, survey, &page.unwrap_or(whole), inputs.overlays)?;
     setup.picture.files.preview.page =
-        page.map(|page| PreviewPage { page, paper: overlay::paper(&setup) });
-    Ok(setup)
+        page.map(|page| PreviewPage { page, paper: overlay::paper(setup) });
+    Ok(())
 }
 
 /// Which particles are drawn, and how each of them looks in the scene.

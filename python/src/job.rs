@@ -26,11 +26,7 @@ pub(crate) fn run_job<'py>(
     progress: Option<Py<PyAny>>,
     threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let mode = match mode {
-        "force" => ResumeMode::Force,
-        "keep_done" => ResumeMode::KeepDone,
-        _ => ResumeMode::Resume,
-    };
+    let mode = mode_of(mode);
     let interrupt = Interrupt::new();
     // Pass events to Python; the first exception stops the job
     let exception: Mutex<Option<PyErr>> = Mutex::new(None);
@@ -71,6 +67,14 @@ pub(crate) fn run_job<'py>(
     }
     let (dir, summary) = done?;
     summary_dict(py, &dir, summary)
+}
+
+fn mode_of(name: &str) -> ResumeMode {
+    match name {
+        "force" => ResumeMode::Force,
+        "keep_done" => ResumeMode::KeepDone,
+        _ => ResumeMode::Resume,
+    }
 }
 
 /// The directory of a job and the counts of its frames, as Python receives them.

@@ -129,19 +129,11 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, CliError> {
         args.frames.clone(),
         args.job.shard,
     )
-    .map_err(|error| match error {
-        RunError::NoFrames { range, available } => CliError::other(format!(
-            "--frames: {range} contains none of the frames of the input: {available}"
-        )),
-        error => error.into(),
-    })?;
+    .map_err(explained)?;
     if mode != ResumeMode::Resume {
         report_wait(convert_job.dir(), DEFAULT_TAKEOVER_AFTER)?;
     }
-    let (mut job, conversion) = convert_job.open(mode).map_err(|error| match error {
-        RunError::UnknownAttribute(error) => CliError::other(format!("--attributes: {error}")),
-        error => error.into(),
-    })?;
+    let (mut job, conversion) = convert_job.open(mode).map_err(explained)?;
     // Report what is known before the first frame, then convert
     let task_count = job.pending().len();
     if let Some(radius) = conversion.estimate {
@@ -164,6 +156,17 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, CliError> {
         output: &args.output,
     };
     Ok(finished.report(result))
+}
+
+/// The error of a conversion, with the option that is at fault.
+fn explained(error: RunError) -> CliError {
+    match error {
+        RunError::NoFrames { range, available } => CliError::other(format!(
+            "--frames: {range} contains none of the frames of the input: {available}"
+        )),
+        RunError::UnknownAttribute(error) => CliError::other(format!("--attributes: {error}")),
+        error => error.into(),
+    }
 }
 
 /// Opens the input, with the memory of the conversion.

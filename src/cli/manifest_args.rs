@@ -138,13 +138,8 @@ impl ManifestArgs {
         over("input.path", value, "INPUT")
     }
 
-    fn add_overrides(&self, list: &mut Vec<Override>, from_file: bool) -> Result<(), CliError> {
-        // Presets first, so that other options replace their values
-        if self.draft {
-            list.extend(draft("--draft"));
-        }
-        self.keys.add_overrides(list, from_file)?;
-        // Add options for colours
+    /// Adds the options for colours.
+    fn add_colors(&self, list: &mut Vec<Override>) -> Result<(), CliError> {
         if let Some(attribute) = &self.color_by {
             let mut table = toml::Table::new();
             table.insert("attribute".to_owned(), attribute.clone().into());
@@ -164,6 +159,16 @@ impl ManifestArgs {
             let value = scale.clone();
             list.push(over("material.color.scale", value, "--color-scale")?);
         }
+        Ok(())
+    }
+
+    fn add_overrides(&self, list: &mut Vec<Override>, from_file: bool) -> Result<(), CliError> {
+        // Presets first, so that other options replace their values
+        if self.draft {
+            list.extend(draft("--draft"));
+        }
+        self.keys.add_overrides(list, from_file)?;
+        self.add_colors(list)?;
         // Add options for the camera
         if let Some(count) = self.turntable {
             let shown = format!("--turntable {count}");

@@ -19,6 +19,7 @@ use crate::manifest::Look;
 use crate::output::{OutputError, PictureFormat};
 use crate::pipeline::{ImageError, ImageTask, Setup, WriteError, make_image};
 use crate::render::Channels;
+use crate::report::FrameReport;
 
 /// Signatures of the files that `still` may replace: OpenEXR, PNG, JPEG, TIFF, PDF, and SVG as it writes it.
 const IMAGE_SIGNATURES: [&[u8]; 6] =
@@ -127,6 +128,7 @@ pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
         note!("{note}");
     }
     guard(&shown, &output, requested.file.as_deref(), &sequence)?;
+    // Choose the frame and its settings
     let frame = frame(args.frame, &requested, &sequence)?;
     // The manifest of a job has the camera of the job
     let is_of_job = requested.manifest.look == Look::None;
@@ -151,7 +153,18 @@ pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
     require_one_fits(&tasks)?;
     let task = tasks.first().expect("the frame is in the sequence");
     make_directory(&output)?;
-    match make_image(&setup, &sequence, task, |note| note!("{note}")) {
+    let rendered = make_image(&setup, &sequence, task, |note| note!("{note}"));
+    report(rendered, frame, &shown, start)
+}
+
+/// Prints what was rendered, or why it was not.
+fn report(
+    rendered: Result<FrameReport, ImageError>,
+    frame: i64,
+    shown: &Path,
+    start: Instant,
+) -> Result<Outcome, CliError> {
+    match rendered {
         Ok(report) => {
             print::lines([format!(
                 "{}: frame {frame}, {} particles, {:.2} s",
@@ -161,7 +174,7 @@ pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
             )])?;
             Ok(Outcome::Done)
         }
-        Err(ImageError::Write(WriteError::Io { source, .. })) => Err(CliError::io(&shown)(source)),
+        Err(ImageError::Write(WriteError::Io { source, .. })) => Err(CliError::io(shown)(source)),
         Err(error) => {
             message!("error: frame {frame}: {error}");
             Ok(Outcome::SomeFailed)

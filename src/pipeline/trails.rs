@@ -67,12 +67,7 @@ pub(super) fn trails_of(
         trails.extend(age, frame.cell.as_ref(), find);
     }
     notes.extend(gap_note(sequence, task, style.frames));
-    // Colour each trail like its particle in the current frame
-    let mut colors = Vec::new();
-    if let Some(rule) = &style.color {
-        let of_particles = colors_by(setup, frame, (task.frame, &file), rule)?;
-        colors = trails.owners.iter().map(|i| of_particles.get(*i)).collect();
-    }
+    let colors = trails.colors(setup, frame, (task.frame, &file))?;
     let tree = RodTree::new(trails.rods, Caps::Round).with_colors(colors);
     Ok(Some(FrameRods::new(tree, style.material)))
 }
@@ -123,6 +118,20 @@ impl<'a> Trails<'a> {
         let owners = every_nth(frame, style.every);
         let ends = owners.iter().map(|particle| Some((frame.positions[*particle], 0)));
         Self { style, rods: Vec::new(), ends: ends.collect(), owners }
+    }
+
+    /// The colour of each trail, which is that of its particle in the current frame; empty if all have the same.
+    fn colors(
+        &self,
+        setup: &Setup,
+        frame: &SharedFrame<'_>,
+        place: (i64, &str),
+    ) -> Result<Vec<Vec3>, LoadError> {
+        let Some(rule) = &self.style.color else {
+            return Ok(Vec::new());
+        };
+        let of_particles = colors_by(setup, frame, place, rule)?;
+        Ok(self.owners.iter().map(|i| of_particles.get(*i)).collect())
     }
 
     /// Adds the points that `find` has for particles, `age` frames earlier. Trails of particles without one end. Jumps

@@ -94,16 +94,26 @@ pub(super) fn rule(
     if by.is_plain() && survey.rgb.is_some() {
         return Ok(ColorRule::Rgb { name: name.clone(), required: true });
     }
-    // Map the named value: over the range in the survey, or for depths over that from the camera
+    mapped_value(by, name, &value, survey, camera)
+}
+
+/// Maps the value `name`: over the range in the survey, or for depths over that from the camera.
+fn mapped_value(
+    by: &ColorMapping,
+    name: &str,
+    value: &Value,
+    survey: &Survey,
+    camera: Option<&Camera>,
+) -> Result<ColorRule, ResolveError> {
     let mut color = survey.color.clone().unwrap_or_else(|| ColorRange {
-        attribute: name.clone(),
+        attribute: name.to_owned(),
         low: 0.0,
         high: 1.0,
         left_out: false,
         categories: None,
     });
-    color.attribute.clone_from(name);
-    if value == Value::Depth {
+    name.clone_into(&mut color.attribute);
+    if *value == Value::Depth {
         let camera = camera.ok_or_else(|| ResolveError::Unsupported {
             key: ATTRIBUTE,
             what: "the range of depth depends on the camera".to_owned(),
