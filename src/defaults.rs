@@ -117,6 +117,7 @@ pub fn rules(
     if matches!(manifest.look, Look::None | Look::Whitted) || facts.particles == 0 {
         return rules.found;
     }
+    // The order matters: later rules see what earlier ones have set
     rules.up();
     rules.grains();
     rules.lone();
@@ -128,7 +129,7 @@ pub fn rules(
     rules.scalar();
     rules.neutral();
     rules.cell();
-    rules.floor();
+    rules.ground();
     rules.molecule();
     rules.flat();
     rules.tails();
@@ -171,6 +172,7 @@ impl Rules<'_> {
     /// Leaves out virtual sites and walls. Whether there are walls, and they are left out.
     fn leave_out(&mut self) -> bool {
         let mut has_left_out = false;
+        // Leave out what is not an atom
         if self.facts.elements.is_some_and(|elements| elements.has_others) {
             let line = "left out: virtual sites and other particles that are not atoms (--where 'element >= 0' \
                         shows them)";
@@ -179,6 +181,7 @@ impl Rules<'_> {
                 Some(line.to_owned()),
             );
         }
+        // Leave out walls by category, or by their shape
         let is_molecular = self.is_molecular() || self.is_periodic();
         // Parts with names are walls by these alone
         let has_names = |c: &&Category| c.name == PART_ATTRIBUTE && self.files.parts.len() > 1;
@@ -210,10 +213,12 @@ impl Rules<'_> {
 
     /// Elements have their colours and radii, and the bonds of the file are drawn.
     fn elements(&mut self) {
+        // Draw the bonds that the file has
         if self.facts.has_bonds {
             let line = "bonds of the file are drawn (--bonds none leaves them out)";
             self.set([("bonds.find", "file".into())], Some(line.to_owned()));
         }
+        // Say why beads do not look like atoms
         if self.facts.has_beads {
             let line = "the particles are beads: neighbours are farther apart than atoms (--color-by element --radius \
                         vdw draws atoms)";
@@ -222,6 +227,7 @@ impl Rules<'_> {
         if self.facts.elements.is_none() {
             return;
         }
+        // Choose the radii
         let has_bonds = self.facts.has_bonds && self.source.lacks("bonds.find");
         let covalent = |scale: f64| -> Value {
             let keys = [("table", Value::from("covalent")), ("scale", scale.into())]
@@ -236,6 +242,7 @@ impl Rules<'_> {
         } else {
             ("vdw".into(), "their van der Waals radii")
         };
+        // Set colours and radii, as far as nothing else does
         if self.has_open_colors() {
             let line = "elements have their usual colours (--color-by gives others)";
             self.set(
@@ -270,6 +277,7 @@ impl Rules<'_> {
 
     /// Few integers are categories.
     fn categories(&mut self, has_left_out: bool) {
+        // Choose the category that says most
         let values = |category: &Category| {
             if has_left_out { category.without_walls.len() } else { category.values.len() }
         };
@@ -285,6 +293,7 @@ impl Rules<'_> {
         let Some(category) = all.find(tells) else {
             return;
         };
+        // Colour by it, with its names
         if self.facts.elements.is_none() && !self.facts.has_colors && self.has_open_colors() {
             let line = format!(
                 "coloured by `{}`, {} categories (--color-by gives another value)",
@@ -387,6 +396,7 @@ impl Rules<'_> {
     }
 
     /// A simulation cell is drawn without perspective.
+    // Decide whether the cell shows where the particles are
     fn cell(&mut self) {
         let extent = self.facts.cell_extent;
         let filled = extent.iter().filter(|part| **part >= FILLED).count();
@@ -401,6 +411,7 @@ impl Rules<'_> {
         let line =
             "the simulation cell of the file is drawn (--set cell.visible=false leaves it out)";
         self.set([("cell.visible", true.into())], Some(line.to_owned()));
+        // Look at it without perspective, from a side that shows its depth
         if self.is_placed_automatically() && self.facts.flat_axis().is_none() {
             let [azimuth, elevation] = CELL_VIEW;
             if self.lacks("camera.view") {
@@ -415,7 +426,7 @@ impl Rules<'_> {
     }
 
     /// Molecules, gases and periodic cells stand on nothing.
-    fn floor(&mut self) {
+    fn ground(&mut self) {
         let is_free = self.files.is_molecular || self.facts.is_gas;
         if self.is_molecular() || self.is_periodic() || is_free {
             self.set([("render.ground", "none".into())], None);

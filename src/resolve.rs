@@ -11,11 +11,11 @@ use crate::manifest::{Manifest, Side};
 use crate::output::PreviewPage;
 use crate::overlay::{Page, RgbaPixels};
 use crate::pipeline::{
-    FileSettings, FrameSize, MemoryModel, ParticleRules, Picture, PictureMesh, RadiusRule, Setup,
-    Things,
+    ColorRule, FileSettings, FrameSize, MemoryModel, ParticleRules, Picture, PictureMesh,
+    RadiusRule, Setup, Things,
 };
 use crate::render::{RenderSettings, RendererKind};
-use crate::scene::{Bounds, RadianceMap, Texture};
+use crate::scene::{Bounds, RadianceMap, Scene, Texture};
 use crate::survey::Survey;
 
 mod arrows;
@@ -156,16 +156,10 @@ fn setup_on(
         has_features: denoise.is_some(),
         ..images::render_settings(manifest, &extent)?
     };
+    // Put it all together, without overlays
     let picture = Picture {
         origin: survey.origin,
-        particles: ParticleRules {
-            selection: select::selection(manifest, survey)?,
-            cut: select::cut(manifest, survey)?,
-            radius,
-            least_radius: narrow(extent.bounds.diagonal() * MIN_RADIUS).max(f32::MIN_POSITIVE),
-            color,
-            opacity: opacity::opacity(manifest, survey, scene.material.transmission > 0.0)?,
-        },
+        particles: particle_rules(manifest, survey, &extent, (radius, color), &scene)?,
         files: FileSettings {
             exr: images::exr_options(manifest, &attributes, &render, placed.view.projection),
             attributes,
@@ -184,14 +178,43 @@ fn setup_on(
         denoise,
     };
     let mut setup = Setup { picture, run: images::run_settings(manifest, survey) };
-    // Add what is drawn over them
-    let [columns, rows] = placed.camera.eyes();
+    add_overlays(&mut setup, manifest, survey, inputs, page)?;
+    Ok(setup)
+}
+
+/// Adds the overlays of a picture that fills its image, or is on a `page`.
+fn add_overlays(
+    setup: &mut Setup,
+    manifest: &Manifest,
+    survey: &Survey,
+    inputs: &SceneInputs<'_>,
+    page: Option<Page>,
+) -> Result<(), ResolveError> {
+    let [columns, rows] = setup.picture.scene.camera.eyes();
     let render = &setup.picture.render;
     let whole = Page::whole(render.width / columns, render.height / rows);
-    overlay::add_overlays(&mut setup, manifest, survey, &page.unwrap_or(whole), inputs.overlays)?;
+    overlay::add_overlays(setup, manifest, survey, &page.unwrap_or(whole), inputs.overlays)?;
     setup.picture.files.preview.page =
-        page.map(|page| PreviewPage { page, paper: overlay::paper(&setup) });
-    Ok(setup)
+        page.map(|page| PreviewPage { page, paper: overlay::paper(setup) });
+    Ok(())
+}
+
+/// Which particles are drawn, and how each of them looks in the scene.
+fn particle_rules(
+    manifest: &Manifest,
+    survey: &Survey,
+    extent: &Extent,
+    (radius, color): (RadiusRule, ColorRule),
+    scene: &Scene,
+) -> Result<ParticleRules, ResolveError> {
+    Ok(ParticleRules {
+        selection: select::selection(manifest, survey)?,
+        cut: select::cut(manifest, survey)?,
+        radius,
+        least_radius: narrow(extent.bounds.diagonal() * MIN_RADIUS).max(f32::MIN_POSITIVE),
+        color,
+        opacity: opacity::opacity(manifest, survey, scene.material.transmission > 0.0)?,
+    })
 }
 
 /// Rejects images that cannot fit into memory, whatever the particles.

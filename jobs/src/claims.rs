@@ -80,8 +80,8 @@ impl FrameClaims {
 
     /// Reads new entries of the other workers.
     pub(crate) fn refresh(&self) -> Result<(), JobError> {
-        let workers = self.registry.worker_names();
-        let workers = workers.map_err(|e| JobError::io(&self.dir, "listing workers", e))?;
+        let names = self.registry.worker_names();
+        let workers = names.map_err(|e| JobError::io(&self.dir, "listing workers", e))?;
         self.has_other_workers.store(workers.len() > 1, Ordering::Relaxed);
         let now = self.clock().now();
         self.watcher().refresh(&workers, now)

@@ -27,11 +27,13 @@ pub(crate) fn check_input(
     request: &JobRequest,
     fingerprints: &mut FingerprintCache,
 ) -> Result<(), JobError> {
+    // Without files before or now, there is nothing to compare
     let planned = state.plan.frames().iter().flat_map(|f| &f.inputs);
     let mut given = request.frames.iter().flat_map(|f| &f.inputs);
     let (Some(old), Some(new)) = (planned.clone().next(), given.clone().next()) else {
         return Ok(());
     };
+    // Files of known names in known directories belong to the same input
     let mut dirs = DirCache::default();
     let known_dirs: HashSet<PathBuf> = match state.plan.input_dirs() {
         [] => planned.clone().map(|i| dirs.get(Path::new(&i.path))).collect(),
@@ -44,6 +46,7 @@ pub(crate) fn check_input(
         is_same_dir |= is_in_known_dir;
         is_in_known_dir && names.contains(&path.file_name())
     });
+    // So do other files of these directories if done frames are kept, and copies elsewhere
     let is_kept = request.mode == ResumeMode::KeepDone && is_same_dir;
     if is_known || is_kept || has_same_contents(state, request, fingerprints) {
         return Ok(());
@@ -108,8 +111,8 @@ fn is_same_frame(
 pub(crate) fn merged_input_dirs(old: &[String], request: &JobRequest) -> Vec<String> {
     let mut dirs = DirCache::default();
     let inputs = request.frames.iter().flat_map(|f| &f.inputs);
-    let given: BTreeSet<PathBuf> = inputs.map(|path| dirs.get(path)).collect();
-    let given = given.iter().filter_map(|dir| dir.to_str()).take(MAX_DIRS);
+    let found: BTreeSet<PathBuf> = inputs.map(|path| dirs.get(path)).collect();
+    let given = found.iter().filter_map(|dir| dir.to_str()).take(MAX_DIRS);
     let mut all = old.to_vec();
     for dir in given {
         if !old.iter().any(|known| known == dir) {

@@ -107,6 +107,7 @@ impl Job {
         let dir = or_current_dir(dir);
         request.check()?;
         let selected = request.selected();
+        // Read the state, which a fresh start ignores
         let mut fingerprints = FingerprintCache::default();
         let starts_over = request.mode == ResumeMode::Force || !dir.exists();
         let (old, ledger) = if starts_over {
@@ -114,6 +115,7 @@ impl Job {
         } else {
             (Plan::load(dir)?, Ledger::read(dir)?)
         };
+        // Plan the frames, with the checks of a real start
         let (plan, ledger, resolves_again, requeued) = match old {
             None => {
                 if !starts_over {
@@ -137,6 +139,7 @@ impl Job {
                 (plan, state.ledger, resolves_again, changes)
             }
         };
+        // Apply what would be requeued
         let resolved = (!resolves_again).then(|| plan.resolved().clone());
         let mut state = JobState::new(dir, plan, ledger);
         for change in &requeued {
@@ -188,6 +191,7 @@ impl Job {
             _ => Plan::load(dir)?,
         };
         let mut fingerprints = FingerprintCache::prefetch(&request, &selected, known.as_ref());
+        // Take the lock, and remove what killed runs left behind
         let registry = WorkerRegistry::register(dir, request.takeover_after)
             .map_err(|e| JobError::io(dir, "registering a worker", e))?;
         let lock_failed = |e| JobError::io(dir, "locking the job", e);
@@ -197,6 +201,7 @@ impl Job {
             refuse_other_workers(dir, &registry)?;
             remove_ledgers(dir)?;
         }
+        // Read plan and ledgers again: other workers may have changed them before the lock was taken
         let old = match request.mode {
             ResumeMode::Force => None,
             _ => Plan::load(dir)?,
@@ -210,12 +215,7 @@ impl Job {
                 resume(old, merged.plan, &registry)?
             }
         };
-        let watcher = if compact_ledgers(dir, &state.ledger, &registry)? {
-            // Lines have moved to another file
-            LedgerWatcher::new(dir, registry.worker(), &Ledger::read(dir)?)
-        } else {
-            LedgerWatcher::new(dir, registry.worker(), &state.ledger)
-        };
+        let watcher = watcher_of(dir, &state.ledger, &registry)?;
         lock.complete();
         Ok(Self {
             writer: LedgerWriter::new(dir, registry.worker()),
@@ -425,18 +425,33 @@ fn compact_ledgers(
     Ok(true)
 }
 
+/// Compacts the ledgers if there are many, and returns a watcher of what is added to them from now on.
+fn watcher_of(
+    dir: &Path,
+    ledger: &Ledger,
+    registry: &WorkerRegistry,
+) -> Result<LedgerWatcher, JobError> {
+    if compact_ledgers(dir, ledger, registry)? {
+        // Lines have moved to another file
+        return Ok(LedgerWatcher::new(dir, registry.worker(), &Ledger::read(dir)?));
+    }
+    Ok(LedgerWatcher::new(dir, registry.worker(), ledger))
+}
+
 /// Removes incomplete files of killed runs, from the job's directory and from those of its outputs.
 fn remove_leftovers(
     dir: &Path,
     request: &JobRequest,
     registry: &WorkerRegistry,
 ) -> Result<(), JobError> {
+    // Find all directories with files of the job
     let failed = |e| JobError::io(dir, "removing incomplete files of a killed run", e);
     let outputs = request.frames.iter().flat_map(|f| &f.outputs);
     let mut dirs: Vec<&Path> = outputs.filter_map(|path| path.parent()).collect();
     dirs.push(dir);
     dirs.sort_unstable();
     dirs.dedup();
+    // Look for incomplete files; a directory that does not exist has none
     let mut parts = ListedParts::default();
     for dir in &dirs {
         match parts.add(dir) {
@@ -447,6 +462,7 @@ fn remove_leftovers(
             _ => {}
         }
     }
+    // Remove those of dead workers
     parts.remove_stale(&registry.remove_dead().map_err(failed)?);
     registry.set_output_dirs(dirs.into_iter().map(Path::to_owned).collect());
     Ok(())

@@ -215,11 +215,13 @@ impl PlannedFrame {
         now: &Self,
         copies: &mut Copies,
     ) -> Option<(PathBuf, String)> {
+        // Other numbers of files differ without a look into them
         if self.inputs.len() != now.inputs.len() {
             let path = now.inputs.first().or(self.inputs.first())?.path.clone();
             let what = format!("{} -> {} input files", self.inputs.len(), now.inputs.len());
             return Some((path.into(), what));
         }
+        // Compare fingerprints; a copy with another time counts as the same
         self.inputs.iter().zip(&now.inputs).find_map(|(old, new)| {
             let what = match (&old.fingerprint, &new.fingerprint) {
                 (Some(before), Some(after))

@@ -36,12 +36,14 @@ pub(crate) fn merged_plan<E: Into<Box<dyn Error + Send + Sync>>>(
     fingerprints: &mut FingerprintCache,
     resolve: impl FnOnce(Option<&Value>) -> Result<Value, E>,
 ) -> Result<ExtendedPlan, JobError> {
+    // Refuse another input, and other settings unless they may change
     check_input(state, request, fingerprints)?;
     let dir = state.dir.clone();
     let changes = state.plan.changes_to(&request.settings);
     if request.mode != ResumeMode::KeepDone && !changes.is_empty() {
         return Err(JobError::SettingsChanged { dir, changes });
     }
+    // Compare the inputs of planned frames with their files
     let mut frames = planned_frames(
         fingerprints,
         &dir,
@@ -61,6 +63,7 @@ pub(crate) fn merged_plan<E: Into<Box<dyn Error + Send + Sync>>>(
         }
         ResumeMode::Force | ResumeMode::KeepDone => {}
     }
+    // Resolve automatic settings again only if others have changed
     let resolved = if changes.is_empty() {
         state.plan.resolved().clone()
     } else {
@@ -68,6 +71,7 @@ pub(crate) fn merged_plan<E: Into<Box<dyn Error + Send + Sync>>>(
     };
     let settings =
         if changes.is_empty() { state.plan.settings().to_vec() } else { request.settings.clone() };
+    // Merge the frames into the plan
     let dirs = merged_input_dirs(state.plan.input_dirs(), request);
     let mut plan = Plan::new(settings, resolved, dirs, state.plan.frames().to_vec());
     plan.merge(frames);

@@ -74,6 +74,7 @@ impl<'a> FrameQueue<'a> {
         let mut has_reported = false;
         loop {
             let mut waiting_for = None;
+            // Try each frame once
             for _ in 0..self.untried.len() + self.held.len() {
                 if self.interrupt.is_raised() {
                     return Ok(None);
@@ -93,6 +94,7 @@ impl<'a> FrameQueue<'a> {
                     }
                 }
             }
+            // Frames are left that others hold: wait longer each time
             let Some((frame, holder)) = waiting_for else {
                 return Ok(None);
             };

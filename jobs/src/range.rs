@@ -247,6 +247,7 @@ impl Scanner<'_> {
             return Ok(Part::single(first));
         }
         let last = self.number()?;
+        // Find the step, or what stands for it
         let fill = match self.peek() {
             Some('x' | ':') => false,
             Some('y') => true,
@@ -258,6 +259,7 @@ impl Scanner<'_> {
                 });
             }
         };
+        // Read the step, with its place for errors
         self.at += 1;
         let _ = self.peek();
         let at = self.at;

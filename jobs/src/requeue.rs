@@ -14,12 +14,14 @@ impl Job {
     pub fn requeue(seen: &JobState, frames: &[(i64, String)]) -> Result<Vec<i64>, JobError> {
         let dir = seen.dir();
         let failed = |e| JobError::io(dir, "requeueing frames", e);
+        // Take the lock, so that no other worker writes in between
         let registry = WorkerRegistry::register(dir, DEFAULT_TAKEOVER_AFTER).map_err(failed)?;
         let lock = registry.lock().map_err(failed)?;
         let ledger = Ledger::read(dir)?;
         let mut watcher = LedgerWatcher::new(dir, registry.worker(), &ledger);
         let mut writer = LedgerWriter::new(dir, registry.worker());
         let mut requeued = Vec::new();
+        // Requeue each frame, unless its last entry is newer than the one that was seen
         for (frame, reason) in frames {
             let now = ledger.entry(*frame).map(|entry| (entry.seq, entry.status));
             let then = seen.ledger().entry(*frame).map(|entry| entry.seq);

@@ -44,6 +44,7 @@ pub trait FrameWork: Sync {
         while let Some(frame) = queue.next()? {
             let mut attempt = 1;
             let result = loop {
+                // Repeat an attempt that failed, as far as the settings allow
                 let process = || Ok::<_, Panic>(self.process(&frame, recorder.context));
                 let result = catch_panic(process).unwrap_or_else(|panic| {
                     Err(FrameFailure::new(FailureKind::Bug, frame.frame, panic))
@@ -56,6 +57,7 @@ pub trait FrameWork: Sync {
                     result => break result,
                 }
             };
+            // Record the result; it may end the run
             if recorder.record(frame, result)? == Recorded::Stopped {
                 break;
             }

@@ -81,9 +81,11 @@ impl FrameList {
             let what = format!("no frame has the index {index}");
             return Err(Failure::new(Class::Input, what).raise(py));
         }
+        // Read the frame while other threads of Python continue
         let read = || Ok(self.sequence.load_measured(index)?);
         let loaded = threads::run(py, threads, || {}, read)?;
         let raw = loaded.particles;
+        // Find radius and origin as the renderer does
         let dict = PyDict::new(py);
         match find_radius(&raw.attributes) {
             Some(Radius::Common(radius)) => dict.set_item("radius", radius)?,
@@ -99,6 +101,7 @@ impl FrameList {
         dict.set_item("origin", origin.to_array())?;
         dict.set_item("time", raw.time)?;
         dict.set_item("notes", loaded.notes)?;
+        // Hand over the cell and the arrays
         let cell = raw.cell.map(|cell| -> Cell {
             let vectors = cell.vectors.map(|vector| vector.to_array());
             (cell.origin.to_array(), vectors, cell.periodic)

@@ -129,11 +129,13 @@ impl NativeImage {
         let film = slf.get().image.film();
         let (width, height) = (film.width as usize, film.height as usize);
         let planes = PyDict::new(py);
+        // Colours are always there
         let colors = bytemuck::cast_slice::<[f32; 4], f32>(&film.color);
         planes.set_item("rgba", view(owner, colors, &[height, width, 4])?)?;
         if let Some(depth) = film.depth.as_ref().filter(|_| film.channels.depth) {
             planes.set_item("Z", view(owner, depth, &[height, width])?)?;
         }
+        // Vectors, if they were requested: the denoiser may have needed others
         let vectors = [
             ("N", &film.normal, film.channels.normal),
             ("P", &film.position, film.channels.position),

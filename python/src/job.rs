@@ -8,7 +8,7 @@ use pyo3::types::PyDict;
 use spherule::job::{JobManifest, RenderJob, RenderRun};
 use spherule::manifest::{Manifest, ManifestSource, read_manifest, real_dir};
 use spherule::report::FrameReport;
-use spherule_jobs::{FrameEvent, Interrupt, ResumeMode};
+use spherule_jobs::{FrameEvent, Interrupt, JobSummary, ResumeMode};
 
 use crate::errors::{Class, Failure};
 use crate::settings::{overrides, raised};
@@ -26,12 +26,9 @@ pub(crate) fn run_job<'py>(
     progress: Option<Py<PyAny>>,
     threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let mode = match mode {
-        "force" => ResumeMode::Force,
-        "keep_done" => ResumeMode::KeepDone,
-        _ => ResumeMode::Resume,
-    };
+    let mode = mode_of(mode);
     let interrupt = Interrupt::new();
+    // Pass events to Python; the first exception stops the job
     let exception: Mutex<Option<PyErr>> = Mutex::new(None);
     let on_event = |event: FrameEvent<'_, FrameReport>| {
         let Some(progress) = &progress else {
@@ -49,6 +46,7 @@ pub(crate) fn run_job<'py>(
         }
     };
     let on_signal = || interrupt.raise();
+    // Run the job while other threads of Python continue
     let done = threads::run(py, threads, on_signal, || {
         let mut manifest = manifest(file.as_deref(), settings, base)?;
         let mut sequence = manifest.open_sequence()?;
@@ -68,6 +66,23 @@ pub(crate) fn run_job<'py>(
         return Err(error);
     }
     let (dir, summary) = done?;
+    summary_dict(py, &dir, summary)
+}
+
+fn mode_of(name: &str) -> ResumeMode {
+    match name {
+        "force" => ResumeMode::Force,
+        "keep_done" => ResumeMode::KeepDone,
+        _ => ResumeMode::Resume,
+    }
+}
+
+/// The directory of a job and the counts of its frames, as Python receives them.
+fn summary_dict<'py>(
+    py: Python<'py>,
+    dir: &Path,
+    summary: JobSummary,
+) -> PyResult<Bound<'py, PyDict>> {
     let result = PyDict::new(py);
     result.set_item("dir", dir)?;
     result.set_item("total", summary.total)?;

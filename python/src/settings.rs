@@ -27,8 +27,9 @@ pub(crate) fn overrides(json: &str) -> Result<Vec<Override>, Failure> {
         }
     }
     let convert = |(key, value): (String, Value)| {
-        let value = toml::Value::try_from(value);
-        let value = value.map_err(|_| refused(format!("{key}: None is no value; leave it out")))?;
+        let converted = toml::Value::try_from(value);
+        let value =
+            converted.map_err(|_| refused(format!("{key}: None is no value; leave it out")))?;
         Override::new(&key, value, "settings").map_err(|error| refused(error.to_string()))
     };
     all.into_iter().map(convert).collect()

@@ -24,6 +24,7 @@ pub(crate) fn run<T: Send>(
         .num_threads(threads.unwrap_or(0))
         .build()
         .map_err(|error| Failure::new(Class::Internal, error).raise(py))?;
+    // Work without the lock, and look for signals meanwhile
     let (result, signal) = py.detach(|| {
         thread::scope(|scope| {
             let (ended, has_ended) = mpsc::channel::<()>();
@@ -41,6 +42,7 @@ pub(crate) fn run<T: Send>(
             (worker.join(), signal)
         })
     });
+    // A signal takes precedence over the result
     if let Some(signal) = signal {
         return Err(signal);
     }

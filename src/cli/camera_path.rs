@@ -30,11 +30,11 @@ pub(super) fn camera_keys(path: &Path) -> Result<toml::Value, CliError> {
     let parsed: serde_json::Value =
         serde_json::from_slice(&text).map_err(|error| wrong(&format!("no JSON: {error}")))?;
     // Take the list
-    let list = match parsed {
+    let found = match parsed {
         serde_json::Value::Object(mut object) => object.remove("keys"),
         other => Some(other),
     };
-    let list = list
+    let list = found
         .filter(|list| list.as_array().is_some_and(|keys| !keys.is_empty()))
         .ok_or_else(|| wrong("no keyframes"))?;
     let count = list.as_array().map_or(0, Vec::len);

@@ -105,6 +105,7 @@ impl<'a> Check<'a> {
     }
 
     fn run(&mut self, args: &RunArgs) {
+        // Find out what a run would do; a directory that cannot be used leaves no state to look at
         if self.check_output_dir(args.job.mode()) {
             let request = self.render_job.request(self.sequence, args.job.mode());
             let dry_run = request.and_then(|r| Ok(Job::dry_run(self.render_job.dir(), &r)?));
@@ -113,6 +114,7 @@ impl<'a> Check<'a> {
                 note!("{change} since it was rendered; it would be rendered again");
             }
         }
+        // Resolve the settings: those of the job, or new ones
         let start = Instant::now();
         let setup = match self.dry_run.as_ref().and_then(|d| d.resolved.as_ref()) {
             Some(resolved) => self.render_job.stored_setup(resolved, self.sequence),
@@ -129,6 +131,7 @@ impl<'a> Check<'a> {
             }
         }
         self.survey_time = start.elapsed();
+        // Schedule the frames that are left
         let frames = match &self.dry_run {
             Some(dry_run) => dry_run.pending(),
             None => self.render_job.selected(self.sequence),

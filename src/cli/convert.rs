@@ -112,26 +112,15 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, CliError> {
     if args.progress == ProgressMode::Json {
         events::start();
     }
+    // Check the output before anything is read
     guard_name(&args.output)?;
     guard_input(&args.input, &args.output)?;
     use_threads(args.threads)?;
-    let input = SequenceInput::from_paths(args.input.clone());
-    // The conversion itself holds as much
-    let limit = |memory: Bytes| {
-        let bytes = memory.0.max(convert::ConvertSettings::MIN_MEMORY);
-        MemoryBudget::new(bytes, MEMORY_REMEDY)
-    };
-    let settings = SequenceSettings {
-        budget: conversion_budget(args.memory.map(limit)),
-        follow_links: args.follow_links,
-    };
-    let mut sequence = in_thread(|| Sequence::open_with(&input, settings))?;
-    if let Some(path) = &args.topology {
-        in_thread(|| sequence.add_topology(path))?;
-    }
+    let sequence = open_sequence(args)?;
     for note in sequence.notes() {
         note!("{note}");
     }
+    // Open the job
     let mode = args.job.mode();
     let convert_job = ConvertJob::new(
         &args.output,
@@ -140,19 +129,12 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, CliError> {
         args.frames.clone(),
         args.job.shard,
     )
-    .map_err(|error| match error {
-        RunError::NoFrames { range, available } => CliError::other(format!(
-            "--frames: {range} contains none of the frames of the input: {available}"
-        )),
-        error => error.into(),
-    })?;
+    .map_err(explained)?;
     if mode != ResumeMode::Resume {
         report_wait(convert_job.dir(), DEFAULT_TAKEOVER_AFTER)?;
     }
-    let (mut job, conversion) = convert_job.open(mode).map_err(|error| match error {
-        RunError::UnknownAttribute(error) => CliError::other(format!("--attributes: {error}")),
-        error => error.into(),
-    })?;
+    let (mut job, conversion) = convert_job.open(mode).map_err(explained)?;
+    // Report what is known before the first frame, then convert
     let task_count = job.pending().len();
     if let Some(radius) = conversion.estimate {
         message!("radius {radius}, half the typical distance of neighbours (--radius sets it)");
@@ -174,6 +156,36 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, CliError> {
         output: &args.output,
     };
     Ok(finished.report(result))
+}
+
+/// The error of a conversion, with the option that is at fault.
+fn explained(error: RunError) -> CliError {
+    match error {
+        RunError::NoFrames { range, available } => CliError::other(format!(
+            "--frames: {range} contains none of the frames of the input: {available}"
+        )),
+        RunError::UnknownAttribute(error) => CliError::other(format!("--attributes: {error}")),
+        error => error.into(),
+    }
+}
+
+/// Opens the input, with the memory of the conversion.
+fn open_sequence(args: &ConvertArgs) -> Result<Sequence, CliError> {
+    let input = SequenceInput::from_paths(args.input.clone());
+    // The conversion itself holds as much
+    let limit = |memory: Bytes| {
+        let bytes = memory.0.max(convert::ConvertSettings::MIN_MEMORY);
+        MemoryBudget::new(bytes, MEMORY_REMEDY)
+    };
+    let settings = SequenceSettings {
+        budget: conversion_budget(args.memory.map(limit)),
+        follow_links: args.follow_links,
+    };
+    let mut sequence = in_thread(|| Sequence::open_with(&input, settings))?;
+    if let Some(path) = &args.topology {
+        in_thread(|| sequence.add_topology(path))?;
+    }
+    Ok(sequence)
 }
 
 /// Refuses an output with the extension of another file format.

@@ -116,6 +116,7 @@ fn run_remedy(error: &RunError) -> Option<&'static str> {
 
 /// What the user can do about an error of a job.
 fn job_remedy(error: &JobError) -> Option<&'static str> {
+    // Remedies name options, which libraries do not know
     Some(match error {
         JobError::SettingsChanged { .. } | JobError::InputChanged { .. } => {
             "--force starts over, --keep-done keeps what is there"

@@ -97,10 +97,12 @@ pub(super) fn run(args: &GenerateArgs) -> Result<Outcome, CliError> {
         What::Box(args) => (&args.common, args.radius),
         What::Block(args) => (&args.common, args.radius),
     };
+    // Check the options before anything is written
     let format = Format::of(&common.output)?;
     if common.max_error.is_some() && matches!(args.what, What::Box(_)) && radius.is_none() {
         return Err(CliError::other("--max-error is a fraction of the radius and needs --radius"));
     }
+    // Choose the source
     let settings = BoxSettings::thesis(common.particles, common.seed);
     let source: Box<dyn ParticleSource> = match &args.what {
         What::Box(_) => Box::new(BoxSource::new(settings, radius)),
@@ -111,6 +113,7 @@ pub(super) fn run(args: &GenerateArgs) -> Result<Outcome, CliError> {
             has_velocity: args.velocity,
         })),
     };
+    // Write it until it ends or is interrupted
     let signals = signals::listen(SIGNAL_MESSAGES)?;
     let until = Until(signals.start_work());
     match write(format, &*source, common, &until) {

@@ -105,6 +105,7 @@ pub(super) fn selected_frames(
     range: Option<&FrameRange>,
 ) -> Result<Vec<i64>, CliError> {
     let numbers: Vec<i64> = state.plan().frames().iter().map(|f| f.number).collect();
+    // Without a range, take what renders have asked for
     let Some(range) = range else {
         let requested = requested_frames(state);
         if requested.len() < numbers.len() {
@@ -117,6 +118,7 @@ pub(super) fn selected_frames(
         }
         return Ok(requested);
     };
+    // A range without frames of the job is probably a mistake
     let selected = range.select(&numbers);
     if selected.is_empty() {
         return Err(CliError::other(format!(

@@ -105,6 +105,7 @@ pub(super) fn with_equals(arguments: impl IntoIterator<Item = OsString>) -> Vec<
         let flag = flags.iter().find(|flag| flag.flag.name == name)?;
         usual_value(flag.kind).is_some().then_some(flag)
     };
+    // Join a value to the option before it, up to `--`
     let mut joined: Vec<OsString> = Vec::new();
     let mut has_options = true;
     for argument in arguments {
@@ -156,11 +157,13 @@ pub(super) fn encodings() -> impl TypedValueParser<Value = Encoding> {
     KnownWords(names.to_vec()).try_map(|name| name.parse::<Encoding>())
 }
 
+/// The option of a key.
 fn argument(key: &KeyFlag) -> Arg {
+    // Write its help; an option that may stand without a value shows no default
     let is_switch = key.kind == FlagKind::Switch;
     let needs_value = !is_switch && usual_value(key.kind).is_none();
-    let default = key.default.as_ref().filter(|_| needs_value);
-    let default = default.map(|default| format!(" [default: {default}]"));
+    let shown_default = key.default.as_ref().filter(|_| needs_value);
+    let default = shown_default.map(|default| format!(" [default: {default}]"));
     let help = format!("{}{}", key.help, default.unwrap_or_default());
     let mut argument = Arg::new(key.flag.name)
         .long(key.flag.name)
@@ -175,7 +178,16 @@ fn argument(key: &KeyFlag) -> Arg {
     if is_switch {
         return argument.action(ArgAction::SetTrue);
     }
-    argument = argument.value_name(key.flag.value_name);
+    with_parser(argument.value_name(key.flag.value_name), key)
+        .hide_possible_values(key.flag.name != "progress")
+        .allow_negative_numbers(!matches!(
+            key.kind,
+            FlagKind::Text(_) | FlagKind::List | FlagKind::Integers | FlagKind::Numbers
+        ))
+}
+
+/// The argument with the parser of values of this kind.
+fn with_parser(argument: Arg, key: &KeyFlag) -> Arg {
     match key.kind {
         FlagKind::Integer => argument.value_parser(whole),
         FlagKind::Seconds => argument.value_parser(seconds),
@@ -206,17 +218,13 @@ fn argument(key: &KeyFlag) -> Arg {
         }
         FlagKind::NumberOrText | FlagKind::Switch => argument,
     }
-    .hide_possible_values(key.flag.name != "progress")
-    .allow_negative_numbers(!matches!(
-        key.kind,
-        FlagKind::Text(_) | FlagKind::List | FlagKind::Integers | FlagKind::Numbers
-    ))
 }
 
 /// The value that was given; of a switch, the opposite of the default.
 fn value(key: &KeyFlag, matches: &ArgMatches) -> Option<Value> {
     let name = key.flag.name;
     let text = || matches.get_one::<String>(name).cloned();
+    // Read the value by the kind of the key; texts that are not of the kind are refused with the manifest
     match key.kind {
         FlagKind::Switch => {
             let usual = key.default.as_deref() == Some("true");

@@ -93,6 +93,7 @@ impl ManifestArgs {
     /// Reads the manifest, or makes one from the arguments.
     pub(super) fn manifest(&self) -> Result<JobManifest, CliError> {
         let mut overrides = Vec::new();
+        // Read the manifest, or start from the input
         let file = self.manifest_file()?;
         let (text, base) = match &file {
             Some(path) => {
@@ -104,6 +105,7 @@ impl ManifestArgs {
                 (String::new(), PathBuf::new())
             }
         };
+        // Apply the options over it
         self.add_overrides(&mut overrides, file.is_some())?;
         let shown = file.clone().unwrap_or_else(|| PathBuf::from("command line"));
         let source = ManifestSource::new(text.clone(), &shown, overrides);
@@ -111,6 +113,7 @@ impl ManifestArgs {
         for warning in warnings {
             note!("{warning}");
         }
+        // Keep the manifest without options, which the job file has
         let unchanged = file.as_ref().and_then(|path| Manifest::parse(&text, path).ok());
         Ok(JobManifest { manifest, base, file, unchanged, source: Some(source) })
     }
@@ -135,11 +138,8 @@ impl ManifestArgs {
         over("input.path", value, "INPUT")
     }
 
-    fn add_overrides(&self, list: &mut Vec<Override>, from_file: bool) -> Result<(), CliError> {
-        if self.draft {
-            list.extend(draft("--draft"));
-        }
-        self.keys.add_overrides(list, from_file)?;
+    /// Adds the options for colours.
+    fn add_colors(&self, list: &mut Vec<Override>) -> Result<(), CliError> {
         if let Some(attribute) = &self.color_by {
             let mut table = toml::Table::new();
             table.insert("attribute".to_owned(), attribute.clone().into());
@@ -159,6 +159,17 @@ impl ManifestArgs {
             let value = scale.clone();
             list.push(over("material.color.scale", value, "--color-scale")?);
         }
+        Ok(())
+    }
+
+    fn add_overrides(&self, list: &mut Vec<Override>, from_file: bool) -> Result<(), CliError> {
+        // Presets first, so that other options replace their values
+        if self.draft {
+            list.extend(draft("--draft"));
+        }
+        self.keys.add_overrides(list, from_file)?;
+        self.add_colors(list)?;
+        // Add options for the camera
         if let Some(count) = self.turntable {
             let shown = format!("--turntable {count}");
             list.push(over("input.repeat", i64::from(count), &shown)?);
@@ -172,6 +183,7 @@ impl ManifestArgs {
             let shown = format!("--camera-path {}", path.display());
             list.push(over("camera.key", keys, &shown)?);
         }
+        // Add meshes, behind those of the manifest
         for mesh in &self.mesh {
             let mut table = toml::Table::new();
             let path = path_as_typed(&text(mesh)?, from_file)?;
@@ -179,6 +191,7 @@ impl ManifestArgs {
             let append = Override::append("mesh", table, "--mesh");
             list.push(append.map_err(|e| CliError::other(e.to_string()))?);
         }
+        // Assignments last: they replace everything else
         for assignment in &self.set {
             list.push(Override::parse(assignment).map_err(|e| CliError::other(e.to_string()))?);
         }

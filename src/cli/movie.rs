@@ -86,6 +86,7 @@ pub(super) fn run(args: &MovieArgs) -> Result<Outcome, CliError> {
             GapChoice::Skip => Gaps::Skip,
         },
     };
+    // Refuse a movie with gaps, unless it was asked for
     let pictures = JobPictures::read(&args.pictures)?;
     pictures.require_any()?;
     if let Some(gaps) = pictures.gaps() {
@@ -102,6 +103,7 @@ pub(super) fn run(args: &MovieArgs) -> Result<Outcome, CliError> {
         message!("{gaps}; the movie shows what is there");
     }
     pictures.guard(&args.output, args.force)?;
+    // Make it
     match make(&request, &pictures, &Watch(signals.start_work()))? {
         Some(line) => {
             print::lines([line])?;
@@ -123,6 +125,7 @@ fn make(
     pictures: &JobPictures,
     observer: &dyn Observer,
 ) -> Result<Option<String>, CliError> {
+    // Write the movie, and explain what went wrong
     let source = source(request, &pictures.pictures, &pictures.selected, pictures.exposure);
     let made = write_movie(&source, request.format, request.output, observer);
     let finished = match made {
@@ -139,6 +142,7 @@ fn make(
             return Err(CliError::other(format!("{}: {error}", request.output.display())));
         }
     };
+    // Describe it
     let [width, height] = finished.size;
     let rate = played_rate(request);
     Ok(Some(format!(
@@ -162,15 +166,8 @@ fn played_rate(request: &Request<'_>) -> FrameRate {
     limit.filter(|_| is_limited).unwrap_or(request.rate)
 }
 
-/// The pictures in their order, with notes about gaps, odd sizes and rates that the format changes.
-fn source(
-    request: &Request<'_>,
-    pictures: &[JobPicture],
-    all: &[i64],
-    exposure: f32,
-) -> MovieSource {
-    let frames: Vec<i64> = pictures.iter().map(|picture| picture.number).collect();
-    let timeline = Timeline::new(&frames, all, request.gaps);
+/// Prints after which frames others are missing, and what the movie shows there.
+fn report_gaps(timeline: &Timeline) {
     for (what, gaps) in [
         ("is shown for longer (--gaps skip leaves gaps out)", &timeline.held),
         ("is followed by the next (the movie jumps)", &timeline.skipped),
@@ -185,12 +182,26 @@ fn source(
             message!("{missing} {are} missing after frame {frame}, which {what}{more}");
         }
     }
+}
+
+/// The pictures in their order, with notes about gaps, odd sizes and rates that the format changes.
+fn source(
+    request: &Request<'_>,
+    pictures: &[JobPicture],
+    all: &[i64],
+    exposure: f32,
+) -> MovieSource {
+    // Arrange the frames in time
+    let frames: Vec<i64> = pictures.iter().map(|picture| picture.number).collect();
+    let timeline = Timeline::new(&frames, all, request.gaps);
+    report_gaps(&timeline);
     if played_rate(request) != request.rate {
         message!(
             "GIF has at most {MAX_GIF_RATE} frames per second: the movie is slower than {} fps",
             request.rate
         );
     }
+    // Take pictures as they are, and report a size that the format changes
     let source = MovieSource {
         paths: pictures.iter().map(|picture| picture.picture.clone()).collect(),
         repeats: timeline.repeats,
@@ -271,6 +282,7 @@ impl MovieAfter {
     }
 
     fn try_make(&self, interrupt: &Interrupt) -> Result<Outcome, CliError> {
+        // Read the finished frames, and refuse gaps
         let pictures = JobPictures::read(&self.pictures)?;
         if let Some(gaps) = pictures.gaps() {
             return Err(CliError::other(format!(
@@ -278,6 +290,7 @@ impl MovieAfter {
             )));
         }
         pictures.guard(&self.output, self.force)?;
+        // Make the movie with the usual settings
         let rate = DEFAULT_RATE.parse();
         let request = Request {
             output: &self.output,

@@ -70,6 +70,7 @@ impl JobPictures {
         let Some(state) = Job::read(&dir)? else {
             return Err(no_job(&dir));
         };
+        // Refuse jobs without pictures
         let settings = state.plan().settings();
         let find =
             |name: &str| settings.iter().find(|(key, _)| key == name).map(|(_, value)| value);
@@ -79,6 +80,7 @@ impl JobPictures {
                 dir.display()
             )));
         }
+        // Find out how pictures are made from images without previews
         let exposure = find("output.preview_exposure").and_then(|value| value.parse().ok());
         let mut frames = state.plan().frames().iter();
         let has_previews = frames.any(|frame| frame.outputs.iter().any(is_png));
@@ -90,6 +92,7 @@ impl JobPictures {
                 dir.display()
             )));
         }
+        // Select the finished frames
         let selected = selected_frames(&state, args.frames.as_ref())?;
         let is_done = |frame: &i64| state.frame_state(*frame) == Some(FrameState::Done);
         let (done, missing): (Vec<i64>, Vec<i64>) =
@@ -141,13 +144,16 @@ impl JobPictures {
 
     /// Refuses an output that is a file of the job, that is not a file, or that another program has written.
     pub(super) fn guard(&self, output: &Path, force: bool) -> Result<(), CliError> {
+        // Refuse what no command may replace
         guard(output, force)?;
         let wanted = real(output)?;
         let (dir, name) = (wanted.parent(), wanted.file_name());
+        // Inputs are compared by name only if the output is in their directory
         let plan = self.state.plan();
         let is_in =
             |input_dir: &Path| dir.is_some() && input_dir.canonicalize().ok().as_deref() == dir;
         let may_be_input = plan.input_dirs().iter().any(|dir| is_in(Path::new(dir)));
+        // Refuse files of the job
         for frame in plan.frames() {
             let mut inputs = frame.inputs.iter().map(|input| Path::new(&input.path));
             let is_input = may_be_input && inputs.any(|input| input.file_name() == name);

@@ -179,12 +179,14 @@ impl Inputs {
     /// The colour bar of all jobs.
     fn color_bar(&self) -> Result<ColorBar, CliError> {
         let error = |text: String| CliError::other(format!("--colorbar: {text}"));
+        // Pictures alone do not say what their colours mean
         if self.has_files {
             let text = "pictures from files do not say what their colours mean; give the jobs of all panels, or draw \
                         the colour bar in the pictures (still --colorbar)";
             return Err(error(text.to_owned()));
         }
         let mut first: Option<(&Path, ColorBar)> = None;
+        // Compare the colour bars of all jobs
         for job in &self.jobs {
             let dir = job.state.dir();
             let bar =
@@ -211,6 +213,7 @@ impl Inputs {
 
 /// In what two colour bars differ, and how to make them equal; None if they show the same.
 fn difference(a: &ColorBar, b: &ColorBar) -> Option<String> {
+    // Titles first: other values have other ranges as well
     if a.title != b.title {
         return Some(format!("titles: {} and {} (--title of render)", a.title, b.title));
     }
@@ -250,10 +253,12 @@ impl SheetArgs {
     }
 
     fn settings(&self, inputs: &Inputs) -> Result<SheetSettings, CliError> {
+        // Find the resolution and the width, which may be given on paper
         let own = self.dpi.map_or_else(|| inputs.dpi(), |dpi| Ok(Some(dpi)))?;
         let side = self.width.unwrap_or(Side::Pixels(WIDTH));
         let dpi = own.or_else(|| side.is_on_paper().then_some(DPI));
         let width = side.pixels(dpi.unwrap_or(DPI)).max(1);
+        // Make the colour bar
         let bar = self.colorbar.map(|place| {
             let mut bar = inputs.color_bar()?;
             bar.title = self.title.clone().unwrap_or(bar.title);
@@ -282,10 +287,12 @@ impl SheetArgs {
 
 pub(super) fn run(args: &SheetArgs) -> Result<Outcome, CliError> {
     let signals = signals::listen(SIGNAL_MESSAGES)?;
+    // Check everything before pictures are read
     args.format()?;
     let inputs = Inputs::read(args)?;
     inputs.guard(&args.output, args.force)?;
     let settings = args.settings(&inputs)?;
+    // Write the sheet
     let watch = Watch(signals.start_work());
     let sheet = match write_sheet(&inputs.sources, &settings, &args.output, &watch) {
         Ok(sheet) => sheet,
@@ -313,6 +320,7 @@ fn report(
     settings: &SheetSettings,
     sheet: &FinishedSheet,
 ) -> Result<(), CliError> {
+    // Note pictures of another shape
     if let [first, ..] = &sheet.narrower[..] {
         note!(
             "{} and {} others have another aspect ratio than the first picture, so that there is white around them",
@@ -320,6 +328,7 @@ fn report(
             sheet.narrower.len() - 1
         );
     }
+    // Describe the sheet, with its size on paper if that is known
     let paper = settings.dpi.map(|dpi| {
         let [width, height] = sheet.size.map(|side| side as f64 / f64::from(dpi) * 25.4);
         format!(" ({width:.1} x {height:.1} mm)")

@@ -193,6 +193,7 @@ fn overlay(kind: &str, keys: &[(&str, Option<&String>)]) -> Table {
 impl Shortcuts {
     /// Adds the given options.
     pub(super) fn add_overrides(&self, list: &mut Vec<Override>) -> Result<(), CliError> {
+        // Each shortcut stands for one or two keys
         if let Some(Size { width, height }) = &self.size {
             list.push(over("image.width", side(width), "--size")?);
             list.push(over("image.height", side(height), "--size")?);

@@ -17,8 +17,9 @@ use super::{CliError, Outcome, disk, print, signals};
 use crate::job::{JobManifest, RenderJob, frames_in, require_one_fits};
 use crate::manifest::Look;
 use crate::output::{OutputError, PictureFormat};
-use crate::pipeline::{ImageError, WriteError, make_image};
+use crate::pipeline::{ImageError, ImageTask, Setup, WriteError, make_image};
 use crate::render::Channels;
+use crate::report::FrameReport;
 
 /// Signatures of the files that `still` may replace: OpenEXR, PNG, JPEG, TIFF, PDF, and SVG as it writes it.
 const IMAGE_SIGNATURES: [&[u8]; 6] =
@@ -108,6 +109,7 @@ const SIGNAL_MESSAGES: signals::SignalMessages =
 pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
     let start = Instant::now();
     let _signals = signals::listen(SIGNAL_MESSAGES)?;
+    // Check the options and open the sequence
     let shown = args
         .manifest
         .keys
@@ -126,6 +128,7 @@ pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
         note!("{note}");
     }
     guard(&shown, &output, requested.file.as_deref(), &sequence)?;
+    // Choose the frame and its settings
     let frame = frame(args.frame, &requested, &sequence)?;
     // The manifest of a job has the camera of the job
     let is_of_job = requested.manifest.look == Look::None;
@@ -145,16 +148,22 @@ pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
         setup.picture.render.channels = Channels::COLOR;
     }
     print_summary(&sequence, &survey, &setup);
-    let mut tasks = render_job.tasks(&sequence, &[frame]);
-    for task in &mut tasks {
-        task.image.clone_from(&output);
-        task.preview = None;
-    }
-    render_job.schedule(&sequence, &setup, &mut tasks);
+    // Render the frame
+    let tasks = tasks(&render_job, &sequence, &setup, (frame, &output));
     require_one_fits(&tasks)?;
     let task = tasks.first().expect("the frame is in the sequence");
     make_directory(&output)?;
     let rendered = make_image(&setup, &sequence, task, |note| note!("{note}"));
+    report(rendered, frame, &shown, start)
+}
+
+/// Prints what was rendered, or why it was not.
+fn report(
+    rendered: Result<FrameReport, ImageError>,
+    frame: i64,
+    shown: &Path,
+    start: Instant,
+) -> Result<Outcome, CliError> {
     match rendered {
         Ok(report) => {
             print::lines([format!(
@@ -165,12 +174,28 @@ pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
             )])?;
             Ok(Outcome::Done)
         }
-        Err(ImageError::Write(WriteError::Io { source, .. })) => Err(CliError::io(&shown)(source)),
+        Err(ImageError::Write(WriteError::Io { source, .. })) => Err(CliError::io(shown)(source)),
         Err(error) => {
             message!("error: frame {frame}: {error}");
             Ok(Outcome::SomeFailed)
         }
     }
+}
+
+/// The task of the frame, whose image is the `output` and not one in the directory of a job.
+fn tasks(
+    render_job: &RenderJob,
+    sequence: &Sequence,
+    setup: &Setup,
+    (frame, output): (i64, &Path),
+) -> Vec<ImageTask> {
+    let mut tasks = render_job.tasks(sequence, &[frame]);
+    for task in &mut tasks {
+        output.clone_into(&mut task.image);
+        task.preview = None;
+    }
+    render_job.schedule(sequence, setup, &mut tasks);
+    tasks
 }
 
 /// The file format of the extension.
@@ -230,6 +255,7 @@ fn guard(
         let text = format!("{}: {why}; choose another name", shown.display());
         Err(CliError::Other(text))
     };
+    // Refuse an image of a job, even if it does not exist yet
     if is_planned(output)? {
         return refused("is an image of the job in that directory");
     }
@@ -240,12 +266,14 @@ fn guard(
         }
         Err(error) => return Err(CliError::io(shown)(error)),
     };
+    // Refuse an input, under whatever name
     let real = output.canonicalize().map_err(CliError::io(shown))?;
     let inputs = (0..sequence.frames().len()).flat_map(|index| sequence.inputs(index));
     let is_output = |path: &Path| path.canonicalize().is_ok_and(|path| path == real);
     if inputs.chain(manifest).any(is_output) {
         return refused("is an input and would be overwritten");
     }
+    // Refuse what is not an image
     if !existing.is_file() {
         return refused("is not a file");
     }

@@ -51,6 +51,7 @@ pub(super) struct ViewArgs {
 }
 
 pub(super) fn run(args: &ViewArgs) -> Result<Outcome, CliError> {
+    // Read the finished frames
     let pictures = JobPictures::read(&args.pictures)?;
     pictures.require_any()?;
     let gaps = pictures.gaps();
@@ -59,6 +60,7 @@ pub(super) fn run(args: &ViewArgs) -> Result<Outcome, CliError> {
     }
     let output = args.output.clone().unwrap_or_else(|| pictures.state.dir().join(FILE));
     pictures.guard(&output, args.force)?;
+    // Collect their pictures
     let frames: Vec<ViewerFrame> = pictures
         .pictures
         .iter()
@@ -71,29 +73,15 @@ pub(super) fn run(args: &ViewArgs) -> Result<Outcome, CliError> {
     if !pictures.has_previews && !args.embed {
         message!("the job has no previews: pictures are made from the images, into the page");
     }
-    let format_of = |frame: &ViewerFrame| PictureFormat::of(&frame.image);
-    let has_exr = frames.iter().any(|frame| format_of(frame) == Some(PictureFormat::Exr));
-    let has_strips = has_exr && pictures.have_strips();
-    if has_strips && !args.no_data {
-        message!(
-            "overlays are beside the pictures, which the channels of the images would not fit: the page has none"
-        );
-    }
-    let settings = ViewerSettings {
-        title: title(&pictures),
-        rate: args.fps.per_second(),
-        embed: args.embed || !pictures.has_previews,
-        width: args.width.map(usize::from),
-        exposure: pictures.exposure,
-        data: !args.no_data && has_exr && !has_strips,
-        attributes: attributes(&pictures),
-    };
+    // Make the page, with the plots of the job's report
+    let settings = settings(args, &pictures, &frames);
     let report = JobReport::of_plan(&pictures.state);
     let made = viewer_page(&frames, &settings, &output, gaps.as_deref(), &report.plots());
     let (html, content) = made.map_err(|error| match error {
         ViewerError::Picture(_) => pictures.explain(&error),
         error => CliError::other(format!("{}: {error}", output.display())),
     })?;
+    // Publish it, and say what it has
     publish(&output, html.as_bytes()).map_err(CliError::io(&output))?;
     for note in &content.notes {
         message!("{note}");
@@ -106,6 +94,27 @@ pub(super) fn run(args: &ViewArgs) -> Result<Outcome, CliError> {
         html.len()
     )])?;
     Ok(Outcome::Done)
+}
+
+/// How the page is made. Overlays in strips, which no channel fits, are reported.
+fn settings(args: &ViewArgs, pictures: &JobPictures, frames: &[ViewerFrame]) -> ViewerSettings {
+    let format_of = |frame: &ViewerFrame| PictureFormat::of(&frame.image);
+    let has_exr = frames.iter().any(|frame| format_of(frame) == Some(PictureFormat::Exr));
+    let has_strips = has_exr && pictures.have_strips();
+    if has_strips && !args.no_data {
+        message!(
+            "overlays are beside the pictures, which the channels of the images would not fit: the page has none"
+        );
+    }
+    ViewerSettings {
+        title: title(pictures),
+        rate: args.fps.per_second(),
+        embed: args.embed || !pictures.has_previews,
+        width: args.width.map(usize::from),
+        exposure: pictures.exposure,
+        data: !args.no_data && has_exr && !has_strips,
+        attributes: attributes(pictures),
+    }
 }
 
 /// What the page has besides the pictures.
@@ -129,8 +138,8 @@ fn title(pictures: &JobPictures) -> String {
     let name = path
         .and_then(|value| value.as_str().map(str::to_owned))
         .unwrap_or_else(|| "Pictures".to_owned());
-    let dir = pictures.state.dir().canonicalize().ok();
-    let dir = dir.as_deref().and_then(|dir| dir.file_name());
+    let real = pictures.state.dir().canonicalize().ok();
+    let dir = real.as_deref().and_then(|dir| dir.file_name());
     match dir {
         Some(dir) => format!("{}/{name}", dir.to_string_lossy()),
         None => name,
@@ -139,8 +148,8 @@ fn title(pictures: &JobPictures) -> String {
 
 /// Attributes among the channels.
 fn attributes(pictures: &JobPictures) -> Vec<String> {
-    let channels = setting(pictures, "output.channels");
-    let channels = channels.as_ref().and_then(|value| value.as_array());
+    let stored = setting(pictures, "output.channels");
+    let channels = stored.as_ref().and_then(|value| value.as_array());
     let names = channels.into_iter().flatten().filter_map(|channel| channel.as_str());
     names.filter_map(|name| name.strip_prefix(ATTRIBUTE_CHANNEL)).map(str::to_owned).collect()
 }

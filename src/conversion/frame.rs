@@ -88,6 +88,7 @@ impl Conversion {
     /// The settings of the conversion library for a frame from `source`.
     fn engine_settings(&self, source: &dyn ParticleSource) -> convert::ConvertSettings {
         let settings = &self.settings;
+        // Choose how to store each attribute of the source
         let choice = |attribute: &SourceAttribute| {
             let choice = settings.attributes.choice(attribute);
             (attribute.name.clone(), choice)
@@ -133,12 +134,13 @@ impl ConvertedFrame {
     fn new(report: &ConvertReport, start: Instant, notes: Vec<String>) -> Self {
         let index = &report.index;
         let stored = [&index.positions, &index.wide, &index.nodes];
-        let radius = match &index.radius {
+        // Find the smallest radius, for the error in radii
+        let smallest = match &index.radius {
             RadiusIndex::None => None,
             RadiusIndex::Common(radius) => Some(*radius),
             RadiusIndex::PerParticle(radii) => Some(radii.low),
         };
-        let radius = radius.map(f64::from).filter(|radius| *radius > 0.0);
+        let radius = smallest.map(f64::from).filter(|radius| *radius > 0.0);
         Self {
             particles: index.count,
             dropped: index.dropped,

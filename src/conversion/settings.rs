@@ -46,6 +46,7 @@ impl ConvertSettings {
                 settings.push(("max-error-length".to_owned(), length.to_string()));
             }
         }
+        // Add what all conversions have
         let radius = self.radius.map_or_else(|| "auto".to_owned(), |r| r.to_string());
         settings.push(("radius".to_owned(), radius));
         settings.push(("attributes".to_owned(), self.attributes.to_string()));

@@ -31,6 +31,7 @@ impl Rules<'_> {
     /// Adds what a legend has and the manifest lacks: an overlay that is given replaces that of the same type.
     pub(super) fn overlays(&mut self) {
         let has_legend = self.has_legend();
+        // The size of texts follows from the picture
         let size = self.text_size(has_legend);
         if let Some(size) = size {
             self.set_text_size(size);
@@ -38,6 +39,7 @@ impl Rules<'_> {
         if !has_legend {
             return;
         }
+        // Add a colour bar and the time where they mean something
         let mut kinds = Vec::new();
         if self.has_mapped_colors() {
             kinds.push(COLORS);

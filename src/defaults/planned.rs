@@ -57,6 +57,7 @@ fn value(text: &str) -> Option<Value> {
 
 /// The overlays of a plan after the `given` ones; none if there is one among these that no rule adds.
 fn overlays(planned: &[(String, String)], given: usize) -> Vec<Override> {
+    // Collect the keys of each overlay
     let mut items: BTreeMap<usize, Table> = BTreeMap::new();
     for (key, text) in planned {
         let place = key.strip_prefix("overlay.").and_then(|key| key.split_once('.'));
@@ -68,6 +69,7 @@ fn overlays(planned: &[(String, String)], given: usize) -> Vec<Override> {
             items.entry(index).or_default().insert(name.to_owned(), value);
         }
     }
+    // Take them only if rules made all of them
     let is_ours = |item: &Table| {
         let kind = item.get("type").and_then(Value::as_str);
         kind.is_some_and(|kind| OVERLAYS.contains(&kind))

@@ -15,8 +15,8 @@ impl Rules<'_> {
             let what = if *scale == 1.0 { "radii" } else { "diameters" };
             let line =
                 format!("`{attribute}` has the {what} (--radius auto follows the distances)");
-            let keys = [("attribute", attribute.clone().into()), ("scale", Value::from(*scale))];
-            let keys = keys.map(|(key, value)| (key.to_owned(), value));
+            let pairs = [("attribute", attribute.clone().into()), ("scale", Value::from(*scale))];
+            let keys = pairs.map(|(key, value)| (key.to_owned(), value));
             let radius: Value = toml::Table::from_iter(keys).into();
             self.set([("input.radius", radius)], Some(line));
         }

@@ -21,6 +21,7 @@ const SHARE: &str = "90%";
 impl Rules<'_> {
     /// Molecules show their broad side, with their largest extent from left to right.
     pub(super) fn molecule(&mut self) {
+        // Leave the camera alone if the user has set any of it
         let is_alone = self.is_molecular() && !self.has_set("cell.visible");
         let is_open = ["view", "azimuth", "elevation", "up"]
             .iter()
@@ -39,6 +40,7 @@ impl Rules<'_> {
         let [_, up, toward] = axes.directions;
         let up = if up.dot(self.up_direction()) < 0.0 { -up } else { up };
         let toward = if toward.element_sum() < 0.0 { -toward } else { toward };
+        // Turn it a little, so that depth is visible
         let [azimuth, elevation] = TILT;
         let round = |value: f64| (1e4 * value).round() / 1e4;
         let up = up.to_array().map(round);
@@ -79,10 +81,12 @@ impl Rules<'_> {
 
     /// Two-dimensional data are seen from the front, in flat light.
     pub(super) fn flat(&mut self) {
+        // Leave the camera alone if the user has set it
         let flat = self.facts.flat_axis().filter(|_| !self.has_set("camera.up"));
         let (Some(axis), true) = (flat, self.is_placed_automatically()) else {
             return;
         };
+        // Choose the side
         let side = side_along(axis, self.up_direction());
         if self.lacks("camera.azimuth") && self.lacks("camera.elevation") {
             self.set([("camera.view", side.into())], None);
@@ -100,6 +104,7 @@ impl Rules<'_> {
         if is_lit {
             return;
         }
+        // Flat light shows colours exactly as in the map
         if self.is_white() && self.lacks("render.integrator") && self.has_plain_material() {
             self.set(
                 [

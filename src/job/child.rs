@@ -83,6 +83,7 @@ impl ChildCommand {
         if stop() {
             return ChildResult::Interrupted;
         }
+        // Start the child, and give it the task
         let line = match serde_json::to_string(task) {
             Ok(line) => line,
             Err(e) => return ChildResult::Crashed(e.into()),
@@ -91,6 +92,7 @@ impl ChildCommand {
             Ok(child) => child,
             Err(e) => return ChildResult::Crashed(Crash::Start(e)),
         };
+        // Read its output in threads: full pipes would block it
         let output = reader(child.stdout.take());
         let errors = reader(child.stderr.take());
         let mut input = child.stdin.take();
@@ -98,6 +100,7 @@ impl ChildCommand {
             // If the child is dead already, its status says why
             let _ = writeln!(input, "{line}");
         }
+        // Wait for its end
         let status = loop {
             match child.try_wait() {
                 Ok(Some(status)) => break status,
@@ -111,6 +114,7 @@ impl ChildCommand {
             }
             thread::sleep(POLL_INTERVAL);
         };
+        // Read the result
         drop(input);
         let text = |reader: JoinHandle<String>| reader.join().unwrap_or_default();
         let (output, errors) = (text(output), text(errors));

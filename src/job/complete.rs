@@ -27,6 +27,7 @@ impl JobManifest {
         if self.manifest.look == Look::None {
             return Ok(Vec::new());
         }
+        // A job that goes on keeps the defaults in its plan
         let plan = match mode {
             Some(ResumeMode::Force) | None => None,
             Some(_) => {
@@ -38,12 +39,14 @@ impl JobManifest {
                 }
             }
         };
+        // Otherwise the particles decide
         let defaults = match plan {
             Some(plan) => {
                 Defaults { settings: planned(&source, plan.settings()), lines: Vec::new() }
             }
             None => self.defaults(&source, sequence)?,
         };
+        // Apply them below what the user gave
         let mut manifest = source.parse_over(defaults.settings)?;
         if let Some(parts) = manifest.input.parts.as_ref().filter(|_| source.lacks("input.parts")) {
             self.keep_parts(sequence, Some(parts))?;

@@ -130,6 +130,7 @@ impl<'a> Follower<'a> {
             // Check before the scan: frames that were complete when the file appeared are still rendered
             let is_stopped = self.stop_file.has_appeared();
             let start = Instant::now();
+            // Look for frames that are complete by now
             if let Some(mut sequence) = self.scan()? {
                 let now = Instant::now();
                 self.complete.update(&sequence, now);
@@ -141,6 +142,7 @@ impl<'a> Follower<'a> {
                     return Ok(Ok((sequence, new)));
                 }
             }
+            // Decide whether there will be more
             if is_stopped && self.complete.all_complete(Instant::now()) {
                 return Ok(Err(FollowEnd::StopFile(self.stop_file.path.clone())));
             }

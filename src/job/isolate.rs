@@ -75,6 +75,7 @@ pub fn render_task(task: IsolatedTask) -> Result<IsolatedResult, RunError> {
 }
 
 fn render(task: IsolatedTask) -> Result<Outcome, RunError> {
+    // Set up the image as the parent did, from the stored settings
     let mut manifest = Manifest::parse(&task.manifest, &task.dir.join("job.toml"))?;
     manifest.has_opaque_previews = task.has_opaque_previews;
     let manifest = JobManifest::new(manifest, task.dir);
@@ -85,6 +86,7 @@ fn render(task: IsolatedTask) -> Result<Outcome, RunError> {
     let Some(image) = images.first() else {
         return Ok(Outcome::Missing);
     };
+    // Render it; errors travel to the parent as text
     let mut notes = Vec::new();
     Ok(match make_image(&setup, &sequence, image, |note| notes.push(note)) {
         Ok(report) => Outcome::Done { report: Box::new(report), notes },
@@ -115,11 +117,13 @@ impl FrameWork for IsolatedRender<'_> {
         frame: &ClaimedFrame,
         context: &RunContext<'_, FrameReport>,
     ) -> Result<FinishedFrame<FrameReport>, FrameFailure> {
+        // Refuse a frame that does not fit into memory
         let (image, number) = (&self.images[frame.index], frame.frame);
         context.report_stage(number, "rendering");
         if let Some(error) = &image.refused {
             return Err(ImageError::from(error.clone()).into_failure(number));
         }
+        // Render it in a child process, and discard what a dead child leaves
         let start = Instant::now();
         let stop = || context.interrupt().stop_now();
         let failure = |kind, source| {

@@ -168,9 +168,11 @@ impl ManifestFile {
             manifest.job = unchanged.job.clone();
             manifest.render.memory_limit = unchanged.render.memory_limit;
         }
+        // The given manifest is left alone unless options have changed it
         if self.is_given() && (!resolves_again || self.unchanged.as_ref() == Some(&manifest)) {
             return Ok(Vec::new());
         }
+        // So is a file that somebody edited
         if path.exists() {
             let text = read_manifest(&path).unwrap_or_default();
             if !is_marked(&text) {
@@ -183,6 +185,7 @@ impl ManifestFile {
                 return Ok(if is_same { Vec::new() } else { vec![note] });
             }
         }
+        // Write it, with its schema
         write_if_changed(&path, &marked(&manifest.to_commented_toml()))?;
         Ok(self.write_schema().into_iter().collect())
     }

@@ -64,6 +64,7 @@ impl JobMeshes {
                 loaded
             }
         };
+        // Join settings and triangles
         let meshes = settings.into_iter().zip(shared.meshes);
         let picture_mesh = |(settings, loaded): (_, Option<LoadedMesh>)| PictureMesh {
             settings,

@@ -41,15 +41,18 @@ impl RenderRun {
         sequence: Sequence,
         mode: ResumeMode,
     ) -> Result<Self, RunError> {
+        // Open the job
         render_job.check_output_dir(mode)?;
         render_job.check_manifest_file()?;
         let render_job = render_job.resuming(mode)?;
         let job = render_job.open(&sequence, mode)?;
         let mut notes: Vec<String> = job.requeued().iter().map(repeat_note).collect();
+        // Schedule the frames with the settings that it has stored
         let (survey, setup) = render_job.stored_setup(job.resolved(), &sequence)?;
         let mut tasks = render_job.tasks(&sequence, &job.pending());
         let schedule = render_job.schedule(&sequence, &setup, &mut tasks);
         require_one_fits(&tasks)?;
+        // Write the manifest, and collect what the user should know
         notes.extend(render_job.scene_notes()?);
         notes.extend(render_job.write_manifest(mode)?);
         if schedule.overlap == Overlap::None && tasks.len() > 1 {
@@ -119,6 +122,7 @@ impl RenderRun {
     /// without [`RenderRun::with_child_command`].
     pub fn render_pending(
         &mut self,
+        // The frames, and how often one is tried
         interrupt: &Interrupt,
         on_event: OnFrameEvent<'_, FrameReport>,
     ) -> Result<(), RunError> {
@@ -126,6 +130,7 @@ impl RenderRun {
         let settings = &self.render_job.manifest().job;
         let options = RunOptions {
             frames: tasks.iter().map(|task| task.frame).collect(),
+            // Render in child processes, or in stages that overlap
             retries: settings.retries,
             interrupt: interrupt.clone(),
         };

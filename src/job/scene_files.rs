@@ -86,14 +86,15 @@ impl SceneFiles {
         &self,
         manifest: &Manifest,
     ) -> Result<Vec<(String, String)>, RunError> {
+        // Add each file that pictures use, with the key of its path
         let mut identities = meshes::identities(manifest, &self.dir)?;
         if let Some(path) = environment_path(manifest, &self.dir) {
             let found = identity(&path).map_err(|source| ImageReadError::Io { path, source })?;
             identities.push(("environment.image".to_owned(), found));
         }
         if let Some(path) = ground_path(manifest, &self.dir) {
-            let found = identity(&path);
-            let found = found
+            let identified = identity(&path);
+            let found = identified
                 .map_err(|source| RunError::GroundImage(ImageReadError::Io { path, source }))?;
             identities.push((GROUND_IMAGE.to_owned(), found));
         }

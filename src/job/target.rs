@@ -19,12 +19,14 @@ pub(super) fn check_output_dir(
     kind: Option<&str>,
     mode: ResumeMode,
 ) -> Result<(), RunError> {
+    // Refuse a path that leads to a file
     if let Some(path) = dir.ancestors().find(|p| p.exists())
         && !path.is_dir()
     {
         let path = path.to_owned();
         return Err(RunError::OutputIsFile { path, purpose });
     }
+    // Refuse a job of another kind, unless it is to be overwritten
     if mode == ResumeMode::Force {
         return Ok(());
     }

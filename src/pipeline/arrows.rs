@@ -25,6 +25,7 @@ pub(super) fn arrows_of(
         if frame.is_empty() {
             continue;
         }
+        // Find the vectors
         let found = frame.attribute(&style.attribute);
         let vectors = found.filter(|attribute| attribute.components == 3);
         let Some(vectors) = vectors else {
@@ -32,6 +33,7 @@ pub(super) fn arrows_of(
             let purpose = "arrows, with three components";
             return Err(missing(&style.attribute, purpose, file, has));
         };
+        // Make an arrow for each of the chosen particles
         let arrows = Arrows::new(style, frame, vectors);
         if arrows.not_finite > 0 {
             notes.push(format!(
@@ -39,6 +41,7 @@ pub(super) fn arrows_of(
                 arrows.not_finite, style.attribute
             ));
         }
+        // Colour them like their particles
         let mut colors = Vec::new();
         if let Some(rule) = &style.color {
             let of_particles = colors_by(setup, frame, (number, file), rule)?;

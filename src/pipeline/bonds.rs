@@ -38,6 +38,7 @@ pub(super) fn bonds_of(
     let Some(style) = setup.picture.things.bonds.as_ref().filter(|_| !frame.is_empty()) else {
         return Ok(None);
     };
+    // Find the bonds, by the rule of the manifest
     let near = |reach: Reach| {
         let search = Search::new(style.radius, reach, frame);
         (search.bonds(), "no particles are so near each other")
@@ -54,6 +55,7 @@ pub(super) fn bonds_of(
     if rods.is_empty() {
         notes.push(format!("frame {number}: no bonds: {none}"));
     }
+    // Colour each half like its particle
     let mut colors = Vec::new();
     if let Some(rule) = &style.color {
         let of_particles = colors_by(setup, frame, (number, file), rule)?;
@@ -71,6 +73,7 @@ const fn most_bonds(particles: usize) -> u64 {
 /// The bonds that the file of `frame` lists; None if there are too many. Where the cell is periodic, each end goes to
 /// the nearest image of the other particle: one that is across the boundary is drawn up to the middle from both sides.
 fn listed(radius: f32, frame: &SharedFrame<'_>) -> Option<Vec<Rod>> {
+    // Refuse more bonds than were planned for
     if frame.bonds.len() as u64 > most_bonds(frame.len()) {
         return None;
     }
@@ -81,6 +84,7 @@ fn listed(radius: f32, frame: &SharedFrame<'_>) -> Option<Vec<Rod>> {
         else {
             continue;
         };
+        // Draw a bond, or two halves where it leaves the cell
         let image = lattice.as_ref().and_then(|lattice| lattice.image(b - a));
         let mut rod = |ends, particles| {
             rods.push(Rod { ends, radii: [radius; 2], particles });
@@ -196,6 +200,7 @@ impl<'a> Search<'a> {
     /// Adds the bonds of a particle to those with greater indices, and its halves of the bonds that leave the periodic
     /// cell. Each end of these is drawn from its particle to the middle.
     fn add_bonds_of(&self, particle: usize, rods: &mut Vec<Rod>) {
+        // A bond belongs to the particle with the lower index
         let point = self.positions[particle];
         let Ok(own) = u32::try_from(particle) else {
             return;
@@ -207,11 +212,13 @@ impl<'a> Search<'a> {
                 particles: [own, other],
             });
         };
+        // Add bonds within the cell
         self.bins.each_offset(point, |other, offset| {
             if other > own && offset.length_squared() <= self.reach.squared(particle, other) {
                 bond(offset, 1.0, other);
             }
         });
+        // Add halves of those across its boundary, which the other particle has too
         for image in &self.images {
             let moved = point + *image;
             let [min, max] = self.bounds;

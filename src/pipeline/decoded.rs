@@ -70,35 +70,12 @@ impl<'a> DecodedFrame<'a> {
         }
         let rule = &setup.picture.particles.color;
         let (values, colors) = color_values(setup, &frame, (number, file), &radius, rule)?;
-        let mut opacities = Vec::new();
-        if let OpacityRule::Value { name, .. } = &setup.picture.particles.opacity
-            && !frame.is_empty()
-        {
-            let value = Value::named(name, &frame.attributes)
-                .ok_or_else(|| missing_value(name, "opacity", file, &frame.attributes))?;
-            opacities = values_of(setup, &frame, number, &radius, &value);
-        }
+        let opacities = opacities_of(setup, &frame, (number, file), &radius)?;
         // Extract ids and velocities for the channels
-        let channels = setup.picture.render.channels;
         let ids = if setup.picture.needs_ids() { ids(&frame) } else { None };
-        let shutter = setup.picture.view.shutter.as_ref();
-        let is_moved = shutter.is_some_and(|shutter| shutter.has_velocities);
-        let velocities = if channels.needs_velocities() || is_moved {
-            velocity_of(&frame.attributes).map(vectors)
-        } else {
-            None
-        };
-        if is_moved && velocities.is_none() && !frame.is_empty() {
-            let has = frame.attributes.iter().map(|a| a.name.as_str());
-            let purpose = "motion blur, which camera.shutter = 0 turns off";
-            return Err(missing("velocity", purpose, file, has));
-        }
-        let parts =
-            if setup.needs_parts() { part_of(&frame.attributes).and_then(parts) } else { None };
-        if parts.is_none() && !setup.picture.scene.parts.is_empty() && !frame.is_empty() {
-            let has = frame.attributes.iter().map(|a| a.name.as_str());
-            return Err(no_parts(file, has));
-        }
+        let velocities = velocities_of(setup, &frame, file)?;
+        let parts = parts_of(setup, &frame, file)?;
+        // Extract the planes of attribute channels
         let mut planes = Vec::new();
         for channel in &setup.picture.files.attributes {
             let found = attribute(&frame, &channel.name, "a channel", file)?;
@@ -121,16 +98,71 @@ impl<'a> DecodedFrame<'a> {
     }
 }
 
+/// The scalars that the opacities of `frame` follow from; empty if all particles have the same.
+fn opacities_of(
+    setup: &Setup,
+    frame: &SharedFrame<'_>,
+    (number, file): (i64, &str),
+    radius: &Radius,
+) -> Result<Vec<f32>, LoadError> {
+    let OpacityRule::Value { name, .. } = &setup.picture.particles.opacity else {
+        return Ok(Vec::new());
+    };
+    if frame.is_empty() {
+        return Ok(Vec::new());
+    }
+    let value = Value::named(name, &frame.attributes)
+        .ok_or_else(|| missing_value(name, "opacity", file, &frame.attributes))?;
+    Ok(values_of(setup, frame, number, radius, &value))
+}
+
+/// The velocities, if channels or motion blur need them.
+fn velocities_of(
+    setup: &Setup,
+    frame: &SharedFrame<'_>,
+    file: &str,
+) -> Result<Option<Vec<Vec3>>, LoadError> {
+    let shutter = setup.picture.view.shutter.as_ref();
+    let is_moved = shutter.is_some_and(|shutter| shutter.has_velocities);
+    let velocities = if setup.picture.render.channels.needs_velocities() || is_moved {
+        velocity_of(&frame.attributes).map(vectors)
+    } else {
+        None
+    };
+    if is_moved && velocities.is_none() && !frame.is_empty() {
+        let has = frame.attributes.iter().map(|a| a.name.as_str());
+        let purpose = "motion blur, which camera.shutter = 0 turns off";
+        return Err(missing("velocity", purpose, file, has));
+    }
+    Ok(velocities)
+}
+
+/// The attribute with parts, and the parts, if they are needed.
+fn parts_of(
+    setup: &Setup,
+    frame: &SharedFrame<'_>,
+    file: &str,
+) -> Result<Option<(String, Vec<i32>)>, LoadError> {
+    let parts = if setup.needs_parts() { part_of(&frame.attributes).and_then(parts) } else { None };
+    if parts.is_none() && !setup.picture.scene.parts.is_empty() && !frame.is_empty() {
+        let has = frame.attributes.iter().map(|a| a.name.as_str());
+        return Err(no_parts(file, has));
+    }
+    Ok(parts)
+}
+
 impl DecodedFrame<'_> {
     /// Moves the particles `chosen` (ascending indices) behind all others; the order is otherwise unchanged. Returns
     /// the number of particles before them. If `ids` are needed, particles without an id get their position in the
     /// file as one.
     pub(super) fn move_to_end(&mut self, chosen: &[u32], ids: bool) -> usize {
+        // Give particles ids before their order changes
         let count = self.centers.len();
         let shading = &mut self.shading;
         if ids && shading.ids.is_none() && !chosen.is_empty() {
             shading.ids = Some((0..index_u32(count)).collect());
         }
+        // Move everything that there is one of for each particle
         if !chosen.is_empty() {
             move_to_end(self.centers.to_mut(), chosen);
         }
@@ -202,6 +234,7 @@ fn color_values(
     radius: &Radius,
     rule: &ColorRule,
 ) -> Result<(Vec<f32>, Vec<Vec3>), LoadError> {
+    // Look up colours, or scalars for the map
     Ok(match rule {
         ColorRule::Constant(_) => (Vec::new(), Vec::new()),
         ColorRule::Rgb { name, required } => {

@@ -37,6 +37,7 @@ pub(super) fn write_frame(
         let png = encode_preview(&frame.film, &setup.preview_from(&frame.camera), &sprites)?;
         publish(path, &png).map_err(at(path))?;
     }
+    // Encode the picture, unless it is an EXR, which is written while it is encoded
     let format = PictureFormat::of(&task.image).unwrap_or(PictureFormat::Exr);
     let picture = match format {
         PictureFormat::Exr => None,
@@ -51,6 +52,7 @@ pub(super) fn write_frame(
         }
     };
     drop(sprites);
+    // Measure the memory while the picture is still there
     {
         let mut peaks = lock_peaks(peaks);
         if report.bytes.file.total() > 0 {
@@ -58,6 +60,7 @@ pub(super) fn write_frame(
         }
         peaks.update(frame.memory);
     }
+    // Publish it under its final name
     let (film, clamped) = match picture {
         Some(picture) => {
             lock_peaks(peaks).update(MemoryUse::now());
@@ -69,16 +72,21 @@ pub(super) fn write_frame(
     // Complete the report
     report.clamped_pixels = clamped;
     report.seconds.encode = start.elapsed().as_secs_f64();
+    report.rss = rss_summary(peaks);
+    Ok((report, film))
+}
+
+/// The memory in use, and its peaks including it.
+fn rss_summary(peaks: &Mutex<MemoryPeaks>) -> RssSummary {
     let now = MemoryUse::now();
     let mut peaks = lock_peaks(peaks);
     peaks.update(now);
-    report.rss = RssSummary {
+    RssSummary {
         anonymous_peak: peaks.anonymous,
         file_peak: peaks.file,
         total_peak: peaks.total,
         anonymous: now.anonymous,
-    };
-    Ok((report, film))
+    }
 }
 
 /// The peaks, which all encoders update.

@@ -128,6 +128,7 @@ impl StoredFrame {
 
     /// Attributes for shading, in the file.
     pub fn shading<'a>(&'a self, picture: &'a Picture, default: Vec3) -> StoredShading<'a> {
+        // Look up the attributes by the names that were found when the frame was opened
         let frame = self.frame();
         let view = |name: &Option<String>| frame.attribute(name.as_deref()?);
         let color = match &picture.particles.color {
@@ -144,6 +145,7 @@ impl StoredFrame {
             }
         };
         let color = color.unwrap_or(StoredColor::Constant(default));
+        // Choose how opacities are looked up
         let opacity = match (&picture.particles.opacity, &self.names.opacity) {
             (OpacityRule::Constant(opacity), _) => StoredOpacity::Constant(*opacity),
             (OpacityRule::Value { range, .. }, value) => {
@@ -250,47 +252,33 @@ impl Names {
     }
 
     fn of(setup: &Setup, file: &NativeFile) -> Result<Self, LoadError> {
-        let frame = file.frame_unchecked();
-        let attributes = frame.attributes();
-        let find = |name: &str, purpose, required| {
-            let found = frame.attribute(name).map(|a| a.name().to_owned());
-            if found.is_none() && required && file.index().count > 0 {
-                let path = file.path().display().to_string();
-                let has = attributes.iter().map(Named::name);
-                return Err(missing(name, purpose, &path, has));
-            }
-            Ok(found)
-        };
-        let value = |name: &str, purpose, required| {
-            let found = Value::named(name, &attributes);
-            if found.is_none() && required && file.index().count > 0 {
-                let path = file.path().display().to_string();
-                return Err(missing_value(name, purpose, &path, &attributes));
-            }
-            Ok(found)
-        };
+        let columns = Columns::of(file);
+        // Find the attributes that settings name
         let (mut rgb, mut values) = (None, None);
         match &setup.picture.particles.color {
             ColorRule::Constant(_) => {}
-            ColorRule::Rgb { name, required } => rgb = find(name, "colour", *required)?,
+            ColorRule::Rgb { name, required } => rgb = columns.find(name, "colour", *required)?,
             ColorRule::Attribute { name, required, .. } => {
-                values = value(name, "colour", *required)?;
+                values = columns.value(name, "colour", *required)?;
             }
         }
         let mut opacity = None;
         if let OpacityRule::Value { name, .. } = &setup.picture.particles.opacity {
-            opacity = value(name, "opacity", true)?;
+            opacity = columns.value(name, "opacity", true)?;
         }
+        // Find the attributes with channels
         let with_channels = setup
             .picture
             .files
             .attributes
             .iter()
             .map(|channel| {
-                let found = find(&channel.name, "a channel", true)?;
+                let found = columns.find(&channel.name, "a channel", true)?;
                 Ok((found, channel.components))
             })
             .collect::<Result<_, LoadError>>()?;
+        // Find those with usual names
+        let attributes = columns.attributes;
         let channels = setup.picture.render.channels;
         let name = |found: Option<&AttributeView>| found.map(|a| a.name().to_owned());
         Ok(Self {
@@ -305,6 +293,49 @@ impl Names {
             parts: parts_for(setup, &attributes, file)?,
             channels: with_channels,
         })
+    }
+}
+
+/// The attributes of a native frame, by the names in settings.
+struct Columns<'a> {
+    file: &'a NativeFile,
+    attributes: Vec<AttributeView<'a>>,
+}
+
+impl<'a> Columns<'a> {
+    fn of(file: &'a NativeFile) -> Self {
+        Self { file, attributes: file.frame_unchecked().attributes() }
+    }
+
+    /// The name of the attribute in the file. It may be missing if it is not `required`, or without particles.
+    fn find(
+        &self,
+        name: &str,
+        purpose: &'static str,
+        required: bool,
+    ) -> Result<Option<String>, LoadError> {
+        let found = self.file.frame_unchecked().attribute(name).map(|a| a.name().to_owned());
+        if found.is_none() && required && self.file.index().count > 0 {
+            let path = self.file.path().display().to_string();
+            let has = self.attributes.iter().map(Named::name);
+            return Err(missing(name, purpose, &path, has));
+        }
+        Ok(found)
+    }
+
+    /// The value of particles. It may be missing like an attribute.
+    fn value(
+        &self,
+        name: &str,
+        purpose: &'static str,
+        required: bool,
+    ) -> Result<Option<Value>, LoadError> {
+        let found = Value::named(name, &self.attributes);
+        if found.is_none() && required && self.file.index().count > 0 {
+            let path = self.file.path().display().to_string();
+            return Err(missing_value(name, purpose, &path, &self.attributes));
+        }
+        Ok(found)
     }
 }
 

@@ -107,6 +107,7 @@ pub fn load_frame(
             decode(setup, sequence, task, notes)?
         }
     };
+    // Both ways end alike, with meshes and what belongs to this image
     loaded.finish(setup)?;
     loaded.read_time = start.elapsed();
     Ok(loaded)
@@ -119,14 +120,17 @@ fn decode(
     task: &ImageTask,
     mut notes: Vec<String>,
 ) -> Result<LoadedFrame<'static>, LoadError> {
+    // Refuse a frame that does not fit, before it is read
     check_memory(setup, sequence, task)?;
     let loaded = sequence
         .load_measured(task.index)
         .map_err(|e| newest(LoadError::Frame(e), sequence, task))?;
     notes.extend(loaded.notes);
+    // Select particles
     let file = first_file(sequence, task.index);
     let read = loaded.particles.positions.len() as u64;
     let frame = selected(setup, loaded.particles, &file)?.with_positions(Cow::Owned);
+    // Read other frames, for motion and for trails
     let moving = match setup.picture.view.shutter {
         Some(shutter) if !shutter.has_velocities => {
             Some(velocities_to_next(setup, shutter, sequence, task, &frame)?)
@@ -134,6 +138,7 @@ fn decode(
         _ => None,
     };
     let trails = trails_of(setup, sequence, task, (&frame, read), &mut notes)?;
+    // Extract what pictures need
     let mut loaded = decoded(setup, task, frame, read, &file, notes)?;
     loaded.rods.extend(trails);
     if let (Some(moving), LoadedParticles::Decoded(frame)) = (moving, &mut loaded.particles) {
@@ -176,6 +181,7 @@ fn decoded<'a>(
     file: &str,
     mut notes: Vec<String>,
 ) -> Result<LoadedFrame<'a>, LoadError> {
+    // Say why nothing is drawn
     if frame.is_empty() && read > 0 && frame.dropped == 0 {
         notes.push(format!(
             "frame {}: none of {read} particles is selected; see [select] and [[clip]]",
@@ -183,11 +189,13 @@ fn decoded<'a>(
         ));
     }
     let (time, dropped) = (frame.time, frame.dropped);
+    // Extract what needs all attributes, before they are dropped
     let focus = focus_point(setup, &frame, file)?;
     let mut rods = rods_of(cell_style(setup), frame.cell.as_ref(), task.frame, &mut notes);
     rods.extend(arrows_of(setup, &frame, (task.frame, file), &mut notes)?);
     rods.extend(bonds_of(setup, &frame, (task.frame, file), &mut notes)?);
     let facts = FileFacts::of_decoded(setup, &frame, without_directory(file));
+    // Extract particles and shading
     let (particles, clamped_radii) = DecodedFrame::of(setup, frame, task.frame, file, &mut notes)?;
     Ok(LoadedFrame {
         task: task.clone(),

@@ -48,6 +48,18 @@ pub(super) fn attributes(
     all
 }
 
+/// The parts of the particles: attributes and their values; None if there are too many.
+fn parts_of(source: &dyn ShadeSource, count: u32) -> Option<BTreeSet<(&str, i32)>> {
+    let mut parts = BTreeSet::new();
+    for part in (0..count).map_while(|index| source.part(index)) {
+        parts.insert(part);
+        if parts.len() > MAX_NAMES {
+            return None;
+        }
+    }
+    Some(parts)
+}
+
 /// The manifest of a layer of `kind`; None if there are too many names.
 fn manifest(
     setup: &Setup,
@@ -62,6 +74,7 @@ fn manifest(
         let text = String::from_utf8_lossy(name);
         let _ = write!(json, "{comma}\"{text}\":\"{:08x}\"", object_of(name));
     };
+    // Name the particles as the kind divides them
     match kind {
         MatteKind::Material => {
             add(PARTICLES.as_bytes());
@@ -80,13 +93,7 @@ fn manifest(
             }
         }
         MatteKind::Part => {
-            let mut parts = BTreeSet::new();
-            for part in (0..count).map_while(|index| source.part(index)) {
-                parts.insert(part);
-                if parts.len() > MAX_NAMES {
-                    return None;
-                }
-            }
+            let parts = parts_of(source, count)?;
             for (attribute, value) in &parts {
                 add(ObjectName::of_part(attribute, *value).as_bytes());
             }
@@ -95,6 +102,7 @@ fn manifest(
             }
         }
     }
+    // Name the ground, unless it is invisible, and the meshes
     let ground = setup.picture.scene.ground.as_ref();
     if ground.is_some_and(|ground| ground.shadow_catcher.is_none()) {
         add(GROUND.as_bytes());

@@ -143,6 +143,7 @@ fn build_mesh(
     };
     let total = file.triangles.len();
     let not_finite = total - file.triangles.iter().filter(|t| is_finite(t)).count();
+    // Build the mesh and its tree
     let mesh = TriangleMesh::new(vertices, file.triangles, settings.normals)
         .map_err(|source| MeshLoadError::Mesh { path: path.to_owned(), source })?;
     let degenerate = total - mesh.len() - not_finite;
@@ -150,6 +151,7 @@ fn build_mesh(
         return Err(MeshLoadError::Invisible { path: path.to_owned(), not_finite, degenerate });
     }
     let tree = MeshTree::new(mesh);
+    // Report what is left out
     let mut notes = Vec::new();
     for (count, why) in
         [(not_finite, "a coordinate is not finite or too large"), (degenerate, "without an area")]
@@ -196,6 +198,7 @@ pub(super) fn meshes_of(
 ) -> Result<Vec<MeshSlices>, MeshLoadError> {
     let mut own = (0..).zip(&task.meshes);
     let mut all = Vec::with_capacity(meshes.len());
+    // Take the common mesh, or read that of the frame
     for mesh in meshes {
         if let Some(tree) = &mesh.tree {
             all.push(vec![Arc::clone(tree)]);

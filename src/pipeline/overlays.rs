@@ -80,6 +80,7 @@ impl Setup {
 
 /// Stores overlays in their layer of `film`, if it has one. The film is at this place of the page of the sprites.
 pub(super) fn store(film: &mut Film, sprites: &[Sprite], [left, top]: [u32; 2]) {
+    // Nothing to do without a layer
     let layers = film.channels.layers;
     let (place, floats) = (layers.overlay_at(), layers.floats());
     if place.is_empty() {
@@ -89,12 +90,14 @@ pub(super) fn store(film: &mut Film, sprites: &[Sprite], [left, top]: [u32; 2]) 
     let Some(planes) = &mut film.layers else {
         return;
     };
+    // Move sprites from the page to the film
     let moved = sprites.iter().map(|sprite| Sprite {
         left: sprite.left - left.cast_signed(),
         top: sprite.top - top.cast_signed(),
         ..sprite.clone()
     });
     let sprites: Vec<Sprite> = moved.collect();
+    // Blend them row by row over an empty layer
     for (row, y) in planes.chunks_mut((width * floats).max(1)).zip(0..) {
         // The planes may be those of another image
         for pixel in row.chunks_mut(floats) {

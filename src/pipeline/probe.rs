@@ -128,12 +128,8 @@ fn probe_for(
         if start.elapsed() > TIME_FOR_OTHERS {
             break;
         }
-        // A frame that cannot be rendered takes no time.
         let deadline = Instant::now() + time_box;
-        let trial = prepare(&mut *renderer, setup, sequence, task)
-            .and_then(|frame| Trial::of(&*renderer, setup, &frame, trial_size, deadline));
-        let trial = trial.ok().filter(|trial| !trial.is_interrupted);
-        costs.extend(trial.and_then(|trial| trial.cost(setup, task).ok()));
+        costs.extend(trial_cost(&mut *renderer, setup, sequence, task, (trial_size, deadline)));
     }
     // Average the costs
     let frames = 1 + u32::try_from(costs.len()).unwrap_or(0);
@@ -154,6 +150,22 @@ fn probe_for(
         traced_part: traced_part.unwrap_or(0.0),
         is_lower_bound: traced_part.is_none(),
     })
+}
+
+/// The cost of the image of `task`, from a trial of the given size before the deadline; None if it cannot be measured.
+fn trial_cost(
+    renderer: &mut dyn FrameRenderer,
+    setup: &Setup,
+    sequence: &Sequence,
+    task: &ImageTask,
+    (size, deadline): ([u32; 2], Instant),
+) -> Option<ImageCost> {
+    let frame = prepare(renderer, setup, sequence, task).ok()?;
+    let trial = Trial::of(renderer, setup, &frame, size, deadline).ok()?;
+    if trial.is_interrupted {
+        return None;
+    }
+    trial.cost(setup, task).ok()
 }
 
 fn prepare(
@@ -179,8 +191,8 @@ fn largest_trial(
     let mut last: Option<Trial> = None;
     loop {
         // Trace a mosaic with the aspect ratio of the image
-        let height = u64::from(full.height) * u64::from(width) / u64::from(full.width);
-        let height = u32::try_from(height).unwrap_or(full.height).max(1);
+        let exact = u64::from(full.height) * u64::from(width) / u64::from(full.width);
+        let height = u32::try_from(exact).unwrap_or(full.height).max(1);
         let trial = Trial::of(renderer, setup, frame, [width, height], deadline)?;
         if trial.is_interrupted {
             return Ok(last.unwrap_or(trial));
@@ -212,6 +224,7 @@ impl Trial {
         (settings.width, settings.height) = (width, height);
         settings.samples = settings.samples.min(MAX_SAMPLES);
         let channels = settings.channels;
+        // Trace it until the deadline
         let start = Instant::now();
         let traced = renderer.image(&setup, frame, &Deadline(deadline));
         let seconds = start.elapsed().as_secs_f64();
@@ -242,6 +255,7 @@ impl Trial {
     fn cost(&self, full: &Setup, task: &ImageTask) -> Result<ImageCost, ProbeError> {
         // Images are encoded by one thread while the pool traces, so measure with one thread.
         let pool = ThreadPoolBuilder::new().num_threads(1).build()?;
+        // Encode the trial as a job encodes its image
         let start = Instant::now();
         let has_exr = matches!(PictureFormat::of(&task.image), Some(PictureFormat::Exr) | None);
         let mut bytes = 0;
@@ -255,6 +269,7 @@ impl Trial {
             let png = encode_preview(&self.film, &options, &[])?;
             bytes += png.len();
         }
+        // Scale the costs to the full image
         let encode = start.elapsed().as_secs_f64();
         Ok(ImageCost {
             trace: self.seconds / self.part(full),

@@ -456,12 +456,14 @@ impl Setup {
     /// The reason why the particles of a native frame must be copied, whatever radii they have; None if they need not
     /// be.
     pub(super) fn needs_copy(&self) -> Option<String> {
+        // Trees over objects need positions in memory
         let structure = self.stored_structure();
         if matches!(structure, Structure::Bvh | Structure::Sbvh) {
             return Some(format!(
                 "{structure} builds over a copy of them, 12 bytes per particle and more; lbvh and kdtree do not"
             ));
         }
+        // So does everything that chooses, moves or searches particles
         if !self.picture.particles.selection.is_all() {
             return Some(
                 "[select] and [[clip]] take those that are drawn from a copy of them, 12 bytes per particle and more"
@@ -483,18 +485,13 @@ impl Setup {
         if self.focused_particle().is_some() {
             return Some("camera.focus searches for a particle in a copy of them".to_owned());
         }
-        if matches!(
-            &self.picture.particles.color,
-            ColorRule::Attribute { needs_geometry: true, .. }
-        ) || matches!(
-            &self.picture.particles.opacity,
-            OpacityRule::Value { needs_geometry: true, .. }
-        ) {
+        if self.colors_need_geometry() {
             return Some(
                 "their colours or opacities are computed from a copy of them, 16 bytes per particle and more"
                     .to_owned(),
             );
         }
+        // So do surfaces that are made from all of them
         let why = match self.picture.surface {
             SurfaceSettings { kind: SurfaceKind::Smooth, .. } => {
                 "a smooth surface sorts a copy of them, 12 bytes per particle and more"
@@ -505,6 +502,13 @@ impl Setup {
             _ => return None,
         };
         Some(why.to_owned())
+    }
+
+    /// Whether colours or opacities are computed from more than attributes.
+    fn colors_need_geometry(&self) -> bool {
+        let ParticleRules { color, opacity, .. } = &self.picture.particles;
+        matches!(color, ColorRule::Attribute { needs_geometry: true, .. })
+            || matches!(opacity, OpacityRule::Value { needs_geometry: true, .. })
     }
 
     /// Number of slices of the exposure in which surfaces differ.

@@ -99,6 +99,7 @@ impl SurfaceBuilder {
         if has_unions {
             report.bytes.surface += self.build_unions(setup, frame)?;
         }
+        // The surface stands for the particles, which are not needed any more
         if kind == SurfaceKind::Smooth || has_unions {
             frame.centers = Cow::Borrowed(&[]);
             frame.radius = Radius::Common(setup.picture.particles.least_radius);
@@ -128,10 +129,12 @@ impl SurfaceBuilder {
         frame: &mut DecodedFrame<'_>,
         mut build: impl FnMut(&mut Self, &DecodedFrame<'_>) -> Result<(), SmoothError>,
     ) -> Result<(), SmoothError> {
+        // Find the times; without motion there is one
         let times = match setup.picture.view.shutter {
             Some(shutter) => slice_times(shutter.slices).collect(),
             None => vec![0.0],
         };
+        // Move the particles on from one time to the next
         let mut now = 0.0;
         for time in times {
             if !self.displacements.is_empty() {
@@ -226,6 +229,7 @@ impl SurfaceBuilder {
 
     /// Builds the tree of the drops, and leaves only the body in `frame`.
     fn build_spray(&mut self, setup: &Setup, frame: &mut DecodedFrame<'_>) -> BuildReport {
+        // Find radii and places of the drops
         let body = frame.centers.len().min(self.body as usize);
         let is_soft = setup.picture.scene.is_spray_soft;
         let ids = frame.shading.ids.as_deref().filter(|_| is_soft);
@@ -241,6 +245,7 @@ impl SurfaceBuilder {
             Some((centers, radii)) => Spheres { centers, radius: SphereRadius::Each(radii) },
             None => Spheres { centers: &frame.centers[body..], radius: radius_of(&plain) },
         };
+        // Build their tree
         let is_moving = !self.displacements.is_empty();
         let settings = BuildSettings {
             // A drop has the attributes of its particle
@@ -248,6 +253,7 @@ impl SurfaceBuilder {
             ..BuildSettings::default()
         };
         let built = self.spray.build(&built, &settings);
+        // Add their motion
         if is_moving {
             let count = self.drops_per_particle as usize;
             let of_spray = self.displacements[body..].iter();
@@ -256,6 +262,7 @@ impl SurfaceBuilder {
                 .collect();
             self.moving[1].build(&self.spray.tree().view(), &of_drops);
         }
+        // Leave the body in the frame
         match &mut frame.centers {
             Cow::Borrowed(all) => *all = &all[..body],
             Cow::Owned(all) => all.truncate(body),

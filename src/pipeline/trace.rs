@@ -68,6 +68,7 @@ impl FrameRenderer for CpuRenderer {
                 BuiltParticles::Stored(stored)
             }
         };
+        // Hand over what tracing needs
         report.bytes.surface += frame.rods.iter().map(FrameRods::bytes).sum::<u64>();
         Ok(BuiltFrame {
             task: frame.task,
@@ -98,12 +99,15 @@ impl FrameRenderer for CpuRenderer {
         frame: BuiltFrame,
         stop: &dyn Stop,
     ) -> Result<TracedFrame, TraceError> {
+        // Trace the image
         let start = Instant::now();
         let mut film = std::mem::take(&mut self.film);
         let rays = self.draw(setup, &frame, &mut film, stop)?;
         let memory = MemoryUse::now();
+        // Name its objects while the particles are there
         let texts = matte_attributes(setup, &frame);
         let BuiltFrame { task, facts, time, mut report, .. } = frame;
+        // Denoise it, and complete the report
         report.seconds.trace = seconds(start.elapsed());
         report.seconds.denoise = denoise_film(setup, &mut film)?;
         report.rays = rays.into();
@@ -203,6 +207,7 @@ fn matte_attributes(setup: &Setup, frame: &BuiltFrame) -> Vec<TextAttribute> {
 
 /// Denoises `film` if the setup says so. Returns the time, seconds.
 fn denoise_film(setup: &Setup, film: &mut Film) -> Result<f64, DenoiseError> {
+    // Without settings, or without features to compare, there is nothing to do
     let (Some(settings), Some(odd), Some(albedo), Some(normal), Some(depth)) =
         (&setup.picture.denoise, &film.odd, &film.albedo, &film.normal, &film.depth)
     else {
@@ -220,6 +225,7 @@ fn denoise_film(setup: &Setup, film: &mut Film) -> Result<f64, DenoiseError> {
         normal,
         depth,
     };
+    // Replace the colours, and keep the coverage
     let filtered = denoise(&input, settings)?;
     for (color, filtered) in film.color.iter_mut().zip(filtered) {
         [color[0], color[1], color[2]] = filtered.to_array();
@@ -228,6 +234,7 @@ fn denoise_film(setup: &Setup, film: &mut Film) -> Result<f64, DenoiseError> {
 }
 
 fn particle_shading<'a>(picture: &'a Picture, shading: &'a DecodedShading) -> ParticleShading<'a> {
+    // Choose the source of the colours; without an attribute it is a constant
     let values = &shading.values;
     let colors = match &picture.particles.color {
         ColorRule::Constant(color) => Colors::Constant(*color),

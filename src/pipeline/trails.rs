@@ -32,6 +32,7 @@ pub(super) fn trails_of(
     let Some(style) = setup.picture.things.trails.as_ref().filter(|_| !frame.is_empty()) else {
         return Ok(None);
     };
+    // Extend the trails frame by frame into the past
     let file = first_file(sequence, task.index);
     let (has_ids, own) = identities(frame);
     let mut trails = Trails::new(style, frame);
@@ -55,12 +56,7 @@ pub(super) fn trails_of(
         let is_native = [task.index, index].map(|index| sequence.native_file(index).is_some());
         let has_order = count == read && is_native == [false; 2];
         if !(has_ids && has_others || has_order || earlier.is_empty()) {
-            let has = frame.attributes.iter().map(|a| a.name.as_str());
-            let purpose = match is_native {
-                [false, false] => "trails, since the number of particles changes",
-                _ => "trails, since native frames have an order of their own",
-            };
-            return Err(missing("id", purpose, &file, has));
+            return Err(unidentified(frame, &file, is_native));
         }
         let places = Places::new(&others, &own);
         let find = |particle: usize| {
@@ -70,13 +66,19 @@ pub(super) fn trails_of(
         trails.extend(age, frame.cell.as_ref(), find);
     }
     notes.extend(gap_note(sequence, task, style.frames));
-    let mut colors = Vec::new();
-    if let Some(rule) = &style.color {
-        let of_particles = colors_by(setup, frame, (task.frame, &file), rule)?;
-        colors = trails.owners.iter().map(|i| of_particles.get(*i)).collect();
-    }
+    let colors = trails.colors(setup, frame, (task.frame, &file))?;
     let tree = RodTree::new(trails.rods, Caps::Round).with_colors(colors);
     Ok(Some(FrameRods::new(tree, style.material)))
+}
+
+/// The error of particles that cannot be found in an earlier frame; `is_native` is of this frame and of that one.
+fn unidentified(frame: &SharedFrame<'_>, file: &str, is_native: [bool; 2]) -> LoadError {
+    let has = frame.attributes.iter().map(|a| a.name.as_str());
+    let purpose = match is_native {
+        [false, false] => "trails, since the number of particles changes",
+        _ => "trails, since native frames have an order of their own",
+    };
+    missing("id", purpose, file, has)
 }
 
 /// Whether particles have ids, and the ids; without them, their places in the file.
@@ -117,6 +119,20 @@ impl<'a> Trails<'a> {
         Self { style, rods: Vec::new(), ends: ends.collect(), owners }
     }
 
+    /// The colour of each trail, which is that of its particle in the current frame; empty if all have the same.
+    fn colors(
+        &self,
+        setup: &Setup,
+        frame: &SharedFrame<'_>,
+        place: (i64, &str),
+    ) -> Result<Vec<Vec3>, LoadError> {
+        let Some(rule) = &self.style.color else {
+            return Ok(Vec::new());
+        };
+        let of_particles = colors_by(setup, frame, place, rule)?;
+        Ok(self.owners.iter().map(|i| of_particles.get(*i)).collect())
+    }
+
     /// Adds the points that `find` has for particles, `age` frames earlier. Trails of particles without one end. Jumps
     /// over a periodic boundary of `cell` are left out.
     fn extend(
@@ -126,12 +142,14 @@ impl<'a> Trails<'a> {
         find: impl Fn(usize) -> Option<Vec3>,
     ) {
         let lattice = cell.map(Lattice::new);
+        // Extend the trail of each particle that was there in the frame after this one
         for ((trail, owner), end) in (0..).zip(&self.owners).zip(&mut self.ends) {
             let Some((newer, newer_age)) = *end else {
                 continue;
             };
             let older = find(*owner);
             *end = older.map(|point| (point, age));
+            // End it where the particle is missing, and interrupt it where it jumps
             let Some(older) = older else { continue };
             let image = lattice.as_ref().and_then(|lattice| lattice.image(newer - older));
             if image.is_some() {

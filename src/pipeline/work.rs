@@ -73,6 +73,7 @@ impl FrameWork for RenderWork<'_> {
             Overlap::Stages => (Some(continue_reading), None),
             Overlap::None => (None, Some(continue_reading)),
         };
+        // Read in a thread, and trace in this one
         let (starts, has_started) = sync_channel(0);
         let reader = ReadStage {
             setup: self.setup,

@@ -62,6 +62,7 @@ pub(super) fn trails(
     reach: f64,
 ) -> Result<Option<TrailStyle>, ResolveError> {
     let own = &manifest.trails;
+    // Refuse trails that may change later
     if own.frames == 0 {
         return Ok(None);
     }
@@ -73,6 +74,7 @@ pub(super) fn trails(
                 .to_owned(),
         });
     }
+    // Choose colours, and a radius in proportion to the particles
     let color = rule(&own.color, particles, survey, "velocity", TRAIL_COLOR)?;
     let style = |material| TrailStyle {
         frames: own.frames,

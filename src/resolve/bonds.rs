@@ -23,6 +23,7 @@ pub(super) fn bonds(
     reach: f64,
 ) -> Result<Option<BondStyle>, ResolveError> {
     let own = &manifest.bonds;
+    // Choose how bonds are found
     let search = match own.find {
         BondSearch::None => return Ok(None),
         BondSearch::File => BondRule::File,
@@ -32,6 +33,7 @@ pub(super) fn bonds(
             BondRule::Covalent { name: ELEMENT.to_owned(), angstrom: survey.angstrom }
         }
     };
+    // Choose their colour and radius
     let color = rule(&own.color, particles, survey, ELEMENT, "bonds.color")?;
     let style = |material| BondStyle {
         rule: search,

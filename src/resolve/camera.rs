@@ -32,16 +32,19 @@ pub(super) fn placed(
     survey: &Survey,
     extent: &Extent,
 ) -> Result<PlacedCamera, ResolveError> {
+    // Find the path and the projection
     let [width, height] = manifest.image.size();
     let aspect = f64::from(width) / f64::from(height);
     let framed = framed(manifest, survey, &extent.bounds, extent.reach);
     let (path, projection) = path(manifest, &framed, extent.up, aspect)?;
     let stereo = stereo(manifest);
+    // Check the first view
     let camera = at_start(&path, |view| {
         let camera = Camera::projected(view, projection, aspect, survey.origin)?;
         let stereo = stereo.map(|stereo| stereo.stereo(view)).transpose()?;
         Ok(camera.with_stereo(stereo))
     })?;
+    // Collect what holds for all views
     let view = ViewSettings {
         up: extent.up,
         projection,
@@ -63,25 +66,51 @@ fn path(
     aspect: f64,
 ) -> Result<(CameraPath, Projection), ResolveError> {
     let camera = &manifest.camera;
+    // Fit the particles, or take the given path
     let up = camera.up.unwrap_or(up);
     let [azimuth, elevation] = camera.angles(up);
     let framing = Framing { up, azimuth, elevation, fov: camera.fov, aspect };
-    let (path, fitted) = match (camera.mode, camera.projection) {
+    let (path, fitted) = fitted_path(camera, framed, &framing)?;
+    // Apply zoom and centre to the path
+    let zoomed = path.zoomed(camera.zoom);
+    let path = match camera.center {
+        Some(center) => zoomed.centered(center),
+        None => zoomed,
+    };
+    // Zoom a parallel projection by its height
+    let projection = match camera.projection {
+        ProjectionKind::Perspective => Projection::Perspective,
+        ProjectionKind::Orthographic => {
+            Projection::Orthographic { height: camera.height.unwrap_or(fitted) / camera.zoom }
+        }
+        ProjectionKind::Equirectangular => Projection::Equirectangular,
+    };
+    Ok((path, projection))
+}
+
+/// The path before the zoom, and the height of a parallel projection that shows all; 0 for other projections.
+fn fitted_path(
+    camera: &manifest::Camera,
+    framed: &Framed,
+    framing: &Framing,
+) -> Result<(CameraPath, f64), ResolveError> {
+    let Framing { up, aspect, .. } = *framing;
+    Ok(match (camera.mode, camera.projection) {
         (CameraMode::Auto, ProjectionKind::Perspective) => {
-            (CameraPath::Still(framed.view(&framing)), 0.0)
+            (CameraPath::Still(framed.view(framing)), 0.0)
         }
         (CameraMode::Auto, ProjectionKind::Orthographic) => {
-            let (view, height) = framed.parallel_view(&framing);
+            let (view, height) = framed.parallel_view(framing);
             (CameraPath::Still(view), height)
         }
         (CameraMode::Auto, ProjectionKind::Equirectangular) => {
-            (CameraPath::Still(framed.panorama(&framing)), 0.0)
+            (CameraPath::Still(framed.panorama(framing)), 0.0)
         }
         (CameraMode::Turntable, ProjectionKind::Orthographic) => {
-            CameraPath::parallel_turntable(framed, &framing, camera.degrees_per_frame)
+            CameraPath::parallel_turntable(framed, framing, camera.degrees_per_frame)
         }
         (CameraMode::Turntable, _) => {
-            let path = CameraPath::turntable(framed, &framing, camera.degrees_per_frame);
+            let path = CameraPath::turntable(framed, framing, camera.degrees_per_frame);
             (path, 0.0)
         }
         (CameraMode::Fixed, _) => {
@@ -100,20 +129,7 @@ fn path(
             let height = heights.fold(0.0, f64::max);
             (CameraPath::through(keys)?, height)
         }
-    };
-    let path = path.zoomed(camera.zoom);
-    let path = match camera.center {
-        Some(center) => path.centered(center),
-        None => path,
-    };
-    let projection = match camera.projection {
-        ProjectionKind::Perspective => Projection::Perspective,
-        ProjectionKind::Orthographic => {
-            Projection::Orthographic { height: camera.height.unwrap_or(fitted) / camera.zoom }
-        }
-        ProjectionKind::Equirectangular => Projection::Equirectangular,
-    };
-    Ok((path, projection))
+    })
 }
 
 /// The eyes of stereo pairs.
@@ -228,6 +244,7 @@ fn lens(
     aspect: f64,
 ) -> Result<Option<LensSettings>, ResolveError> {
     let camera = &manifest.camera;
+    // Find the aperture; without one everything is in focus
     let aperture = match (camera.aperture, camera.f_stop) {
         (Some(diameter), _) if diameter > 0.0 => Aperture::Diameter(diameter),
         (None, f_stop) if f_stop > 0.0 => {
@@ -235,11 +252,13 @@ fn lens(
         }
         _ => return Ok(None),
     };
+    // Find the plane in focus
     let focus = match camera.focus {
         FocusSetting::Auto => Focus::Target,
         FocusSetting::Distance(distance) => Focus::Distance(distance),
         FocusSetting::Particle(id) => Focus::Particle(id),
     };
+    // Check the lens at the start of the path
     let settings = LensSettings { aperture, focus };
     settings.lens(&path.start(), aspect, None)?;
     Ok(Some(settings))

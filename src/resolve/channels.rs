@@ -59,6 +59,7 @@ pub(super) fn channels(
         )));
     }
     channels.layers.attributes = u8::try_from(names.len()).unwrap_or(u8::MAX);
+    // Check that the channels have different names in the file
     let names = PlaneNames {
         attributes: names,
         light_groups: light_groups.into_iter().map(str::to_owned).collect(),

@@ -53,12 +53,21 @@ pub(super) fn is_depth(setting: &ColorSetting) -> bool {
     name.and_then(|name| Value::named::<ColumnShape<'_>>(name, &[])) == Some(Value::Depth)
 }
 
+/// The range of the distances of the surveyed particles from the camera, as far as they are in front of it.
+fn depth_range(survey: &Survey, camera: &Camera, by: &ColorMapping) -> Option<(f64, f64)> {
+    let point = |p: &[f32; 3]| f64::from(camera.depth_of((*p).into()));
+    let depths = survey.points.iter().map(point);
+    let visible = depths.filter(|depth| *depth > 0.0).collect();
+    range_of(visible, range_question(by))
+}
+
 /// The source of the colours; "auto" depends on the attributes that exist.
 pub(super) fn rule(
     manifest: &Manifest,
     survey: &Survey,
     camera: Option<&Camera>,
 ) -> Result<ColorRule, ResolveError> {
+    // Find which keys describe the mapping: constant colours and colours of the file need none
     let constant = ColorRule::Constant(material::DEFAULT_COLOR);
     let by = match &manifest.material.color {
         ColorSetting::Rgb(rgb) => return Ok(ColorRule::Constant(*rgb)),
@@ -71,6 +80,7 @@ pub(super) fn rule(
         },
         ColorSetting::Mapped(by) => by,
     };
+    // Without a name, the attribute is the one that the survey chose
     let Some(name) = &by.attribute else {
         return match &survey.color {
             Some(color) => mapped(by, color, false, false),
@@ -86,24 +96,32 @@ pub(super) fn rule(
     if by.is_plain() && survey.rgb.is_some() {
         return Ok(ColorRule::Rgb { name: name.clone(), required: true });
     }
+    mapped_value(by, name, &value, survey, camera)
+}
+
+/// Maps the value `name`: over the range in the survey, or for depths over that from the camera.
+fn mapped_value(
+    by: &ColorMapping,
+    name: &str,
+    value: &Value,
+    survey: &Survey,
+    camera: Option<&Camera>,
+) -> Result<ColorRule, ResolveError> {
     let mut color = survey.color.clone().unwrap_or_else(|| ColorRange {
-        attribute: name.clone(),
+        attribute: name.to_owned(),
         low: 0.0,
         high: 1.0,
         left_out: false,
         categories: None,
     });
-    color.attribute.clone_from(name);
-    if value == Value::Depth {
+    name.clone_into(&mut color.attribute);
+    if *value == Value::Depth {
         let camera = camera.ok_or_else(|| ResolveError::Unsupported {
             key: ATTRIBUTE,
             what: "the range of depth depends on the camera".to_owned(),
         })?;
-        let point = |p: &[f32; 3]| f64::from(camera.depth_of((*p).into()));
-        let depths = survey.points.iter().map(point);
-        let visible = depths.filter(|depth| *depth > 0.0).collect();
-        if let Some((low, high)) = range_of(visible, range_question(by)) {
-            (color.low, color.high) = (low, high);
+        if let Some(ends) = depth_range(survey, camera, by) {
+            (color.low, color.high) = ends;
         }
     }
     mapped(by, &color, true, value.needs_geometry())
@@ -190,9 +208,11 @@ fn unsupported_scale(what: String) -> ResolveError {
 }
 
 fn categories(by: &ColorMapping, color: &ColorRange) -> Result<ColorMap, ResolveError> {
+    // Given colours need no survey
     if let Some(values) = &by.values {
         return Ok(ColorMap::of_colors(values.0.clone()));
     }
+    // Find the categories, or say why there are none
     let name = &color.attribute;
     let none = Vec::new();
     let values = match &color.categories {
@@ -219,6 +239,7 @@ fn categories(by: &ColorMapping, color: &ColorRange) -> Result<ColorMap, Resolve
 }
 
 fn continuous(by: &ColorMapping, color: &ColorRange) -> Result<ColorMap, ResolveError> {
+    // Choose the ends of the map
     let range = match by.range {
         Some(RangeSetting::Values(range)) => range,
         Some(RangeSetting::Symmetric) => {
@@ -227,6 +248,7 @@ fn continuous(by: &ColorMapping, color: &ColorRange) -> Result<ColorMap, Resolve
         }
         Some(RangeSetting::Percentiles(_)) | None => [color.low, color.high],
     };
+    // Choose the scale
     let scale = match by.scale() {
         ScaleKind::Linear | ScaleKind::Categorical => ColorScale::Linear,
         ScaleKind::Log => {
@@ -247,6 +269,7 @@ fn continuous(by: &ColorMapping, color: &ColorRange) -> Result<ColorMap, Resolve
             ColorScale::SymLog { threshold: by.threshold.unwrap_or(usual) }
         }
     };
+    // Make the map
     let name = by.map().name();
     let map = match scale {
         ColorScale::Linear => ColorMap::new(&name, narrow(range[0]), narrow(range[1])),

@@ -28,9 +28,11 @@ pub(super) fn environment(
     if manifest.integrator() != IntegratorKind::Path {
         return Ok(None);
     }
+    // Its directions are relative to the view
     let settings = &manifest.environment;
     let scale = settings.intensity * settings.color;
     let axes = |forward| EnvironmentAxes::of_view(forward, up, settings.rotation);
+    // Make it; a studio and a sky turn with the camera, an image stays where it is
     let environment = match settings.kind {
         EnvironmentKind::Studio => studio(axes(view.heading(up)), scale),
         EnvironmentKind::Sky => {

@@ -30,7 +30,7 @@ const FAR_FADE: [f32; 2] = [2.0, 8.0];
 
 /// Where the ground is.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Floor<'a> {
+pub(super) struct GroundPlace<'a> {
     /// Box of the particles.
     pub(super) bounds: &'a Bounds,
     /// Distance by which the particles reach beyond their centres.
@@ -51,14 +51,14 @@ pub(super) struct Floor<'a> {
 /// It is a shadow catcher, but the integrator cannot use one.
 pub(super) fn ground(
     manifest: &Manifest,
-    floor: &Floor<'_>,
+    place: &GroundPlace<'_>,
 ) -> Result<Option<Ground>, ResolveError> {
     let render = &manifest.render;
     let integrator = manifest.integrator();
     let kind = match &render.ground {
         Some(ground) => ground.kind,
-        // Without a floor, a shadow would fall on nothing
-        None if integrator == IntegratorKind::Path && floor.has_layer => GroundKind::ShadowCatcher,
+        // Without a place, a shadow would fall on nothing
+        None if integrator == IntegratorKind::Path && place.has_layer => GroundKind::ShadowCatcher,
         None => GroundKind::None,
     };
     if kind == GroundKind::None {
@@ -73,41 +73,16 @@ pub(super) fn ground(
                 .to_owned(),
         });
     }
-    // Place it under the particles
-    let Floor { bounds, up, origin, .. } = *floor;
-    let mut ground = Ground::under(bounds, up.as_vec3(), origin);
-    if let Some(height) = render.ground_height {
-        let relative = narrow(height - origin.dot(up.normalize_or(DVec3::Z)));
-        ground.center += (relative - ground.height) * ground.up;
-        ground.height = relative;
-    } else if manifest.surface.kind != SurfaceKind::Spheres {
-        // Raise it to the lowest centres: between a body that only touched the ground and the ground itself would be
-        // a thin layer of air, which reflects all light at grazing angles
-        ground.raise(narrow(floor.reach));
-    } else if let Some(lowest) = floor.lowest {
-        // The lowest sphere may be smaller than most
-        let relative = narrow(lowest - origin.dot(up.normalize_or(DVec3::Z)));
-        ground.raise((relative - ground.height).max(0.0));
-    } else if is_catcher && floor.is_of_earlier_version {
-        let most = (SUNK * bounds.diagonal()).powi(2) / floor.reach;
-        ground.raise(narrow(floor.reach.min(most)));
-    }
+    // Put it under the particles, as a catcher or as a surface
+    let mut ground = placed(manifest, place, is_catcher);
     if is_catcher {
-        let size = (bounds.max - bounds.min).as_vec3();
-        let far = || FAR_FADE.map(|part| part * size.length());
-        let (base, [fade_start, fade_end]) = if floor.is_of_earlier_version {
-            (Vec3::ZERO, far())
-        } else {
-            (0.5 * size, [0.0, SHADOW * size.length()])
-        };
-        let catcher = ground.into_shadow_catcher(render.ground_shadow);
-        return Ok(Some(Ground { base, fade_start, fade_end, ..catcher }));
+        return Ok(Some(shadow_catcher(ground, place, render.ground_shadow)));
     }
     // Colour it
     ground.color = render.ground_color;
     let tile = || match render.ground_tile {
         Some(tile) => narrow(tile),
-        None => surface::round(bounds.diagonal() * TILE),
+        None => surface::round(place.bounds.diagonal() * TILE),
     };
     ground.pattern = match (kind, render.ground_pattern) {
         // `add_image` adds the picture
@@ -117,6 +92,40 @@ pub(super) fn ground(
         (_, GroundPattern::Plain) => Pattern::Plain,
     };
     Ok(Some(ground))
+}
+
+/// The ground under the particles or at its height, without colour.
+fn placed(manifest: &Manifest, place: &GroundPlace<'_>, is_catcher: bool) -> Ground {
+    let GroundPlace { bounds, up, origin, .. } = *place;
+    let mut ground = Ground::under(bounds, up.as_vec3(), origin);
+    if let Some(height) = manifest.render.ground_height {
+        let relative = narrow(height - origin.dot(up.normalize_or(DVec3::Z)));
+        ground.center += (relative - ground.height) * ground.up;
+        ground.height = relative;
+    } else if manifest.surface.kind != SurfaceKind::Spheres {
+        // Raise it to the lowest centres: between a body that only touched the ground and the ground itself would be
+        // a thin layer of air, which reflects all light at grazing angles
+        ground.raise(narrow(place.reach));
+    } else if let Some(lowest) = place.lowest {
+        // The lowest sphere may be smaller than most
+        let relative = narrow(lowest - origin.dot(up.normalize_or(DVec3::Z)));
+        ground.raise((relative - ground.height).max(0.0));
+    } else if is_catcher && place.is_of_earlier_version {
+        let most = (SUNK * bounds.diagonal()).powi(2) / place.reach;
+        ground.raise(narrow(place.reach.min(most)));
+    }
+    ground
+}
+
+/// The ground as a shadow catcher of this strength. Its shadows fade out at a distance from the particles.
+fn shadow_catcher(ground: Ground, place: &GroundPlace<'_>, strength: f32) -> Ground {
+    let size = (place.bounds.max - place.bounds.min).as_vec3();
+    let (base, [fade_start, fade_end]) = if place.is_of_earlier_version {
+        (Vec3::ZERO, FAR_FADE.map(|part| part * size.length()))
+    } else {
+        (0.5 * size, [0.0, SHADOW * size.length()])
+    };
+    Ground { base, fade_start, fade_end, ..ground.into_shadow_catcher(strength) }
 }
 
 /// Lays `texture` on the ground of `setup`, if `manifest` says so.
@@ -141,8 +150,8 @@ pub(super) fn add_image(setup: &mut Setup, manifest: &Manifest, texture: &Arc<Te
 }
 
 /// How the liquid wets the ground; shadow catchers stay dry.
-pub(super) fn wet_ground(manifest: &Manifest, floor: &Floor<'_>) -> Option<WetGround> {
-    let (strength, margin) = (manifest.render.ground_wetness, narrow(floor.reach));
+pub(super) fn wet_ground(manifest: &Manifest, place: &GroundPlace<'_>) -> Option<WetGround> {
+    let (strength, margin) = (manifest.render.ground_wetness, narrow(place.reach));
     let has_margin = margin > 0.0 && margin.is_finite();
     let is_wet = strength > 0.0 && has_margin && manifest.has_path_traced_body();
     is_wet.then_some(WetGround { strength, margin })
@@ -163,11 +172,11 @@ mod tests {
         let mut manifest = Manifest::new("in");
         manifest.render.ground = Some(GroundSetting::of(kind));
         change(&mut manifest);
-        ground(&manifest, &floor(true))
+        ground(&manifest, &place(true))
     }
 
-    fn floor(has_layer: bool) -> Floor<'static> {
-        Floor {
+    fn place(has_layer: bool) -> GroundPlace<'static> {
+        GroundPlace {
             bounds: &BOUNDS,
             reach: 0.25,
             up: DVec3::Z,
@@ -181,7 +190,7 @@ mod tests {
     #[test]
     fn auto_is_a_shadow_catcher_of_paths_under_particles_on_a_floor() {
         let auto = Manifest::new("in");
-        let found = |manifest: &Manifest, has_layer| ground(manifest, &floor(has_layer)).unwrap();
+        let found = |manifest: &Manifest, has_layer| ground(manifest, &place(has_layer)).unwrap();
         assert!(found(&auto, true).is_some_and(|ground| ground.shadow_catcher.is_some()));
         assert_eq!(found(&auto, false), None);
         let mut whitted = auto;
@@ -205,12 +214,12 @@ mod tests {
         let catcher =
             of(GroundKind::ShadowCatcher, |m| m.render.ground_shadow = 0.5).unwrap().unwrap();
         assert_eq!((catcher.height, catcher.shadow_catcher), (3.0144, Some(0.5)));
-        let standing = Floor { is_of_earlier_version: false, ..floor(true) };
+        let standing = GroundPlace { is_of_earlier_version: false, ..place(true) };
         let mut manifest = Manifest::new("in");
         manifest.render.ground = Some(GroundSetting::of(GroundKind::ShadowCatcher));
         assert_eq!(ground(&manifest, &standing).unwrap().unwrap().height, 3.0);
         // Spheres of different sizes: the lowest one is smaller than most
-        let mixed = Floor { lowest: Some(3.4), ..standing };
+        let mixed = GroundPlace { lowest: Some(3.4), ..standing };
         assert_eq!(ground(&manifest, &mixed).unwrap().unwrap().height, 3.4);
         let under_body = of(GroundKind::ShadowCatcher, |m| {
             m.surface.kind = SurfaceKind::Union;

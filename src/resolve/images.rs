@@ -33,6 +33,7 @@ pub(super) fn render_settings(
         key: "image.crop",
         what: "the part of the image is empty or too large".to_owned(),
     })?;
+    // Collect the rest, as the manifest gives it
     Ok(RenderSettings {
         window: whole.part().map(|_| whole.data_window()),
         samples: image.samples,
@@ -63,6 +64,7 @@ pub(super) fn exr_options(
 ) -> ExrOptions {
     let output = &manifest.output;
     ExrOptions {
+        // The names of channels follow from attributes and lights
         names: PlaneNames {
             attributes: channels::attribute_planes(attributes),
             light_groups: manifest.light_groups().into_iter().map(str::to_owned).collect(),

@@ -19,10 +19,12 @@ pub(super) fn lights(
 ) -> Result<Vec<Light>, ResolveError> {
     let mut lights = Vec::new();
     for light in &manifest.lights {
+        // A light without a direction lights nothing
         let Some(mut found) = light_of(light, origin, up) else {
             continue;
         };
         found.group = group_index(manifest, light.group.as_ref());
+        // The Whitted integrator samples points only
         if found.kind.has_extent() && manifest.integrator() == IntegratorKind::Whitted {
             return Err(ResolveError::Unsupported {
                 key: "light.type",
@@ -48,6 +50,7 @@ pub(super) fn group_index(manifest: &Manifest, group: Option<&LightGroup>) -> u8
 fn light_of(light: &manifest::Light, origin: DVec3, up: DVec3) -> Option<Light> {
     let radiance = light.color * light.intensity;
     let relative = |position: DVec3| (position - origin).as_vec3();
+    // Lights without an extent have constructors of their own
     let kind = match light.kind {
         LightKind::Point { position, falloff } => {
             return Some(Light::point_with(position, origin, radiance, falloff));

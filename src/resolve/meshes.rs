@@ -23,6 +23,7 @@ pub fn mesh_settings(
     survey: &Survey,
     budget: MemoryBudget,
 ) -> Vec<MeshSettings> {
+    // The extent of the particles shows whether a mesh has their unit
     let particles = Bounds { min: survey.min, max: survey.max };
     let settings = |mesh: &manifest::Mesh| MeshSettings {
         scale: mesh.scale,
@@ -56,6 +57,7 @@ pub(super) fn add(
     meshes: Vec<PictureMesh>,
 ) {
     let scene = &mut setup.picture.scene;
+    // Lower the ground, and leave a gap
     if let Some(ground) = &mut scene.ground
         && manifest.render.ground_height.is_none()
     {

@@ -20,10 +20,12 @@ pub(super) fn opacity(
 ) -> Result<OpacityRule, ResolveError> {
     let unsupported =
         |what: &str| Err(ResolveError::Unsupported { key: KEY, what: what.to_owned() });
+    // Opaque particles are possible with everything
     let setting = &manifest.material.opacity;
     if *setting == OpacitySetting::Constant(1.0) {
         return Ok(OpacityRule::OPAQUE);
     }
+    // Refuse surfaces and materials that cannot fade
     if manifest.surface.kind != SurfaceKind::Spheres {
         return unsupported(
             "only separate spheres have an opacity; set render.surface to \"spheres\", or make the body of glass or \
@@ -35,6 +37,7 @@ pub(super) fn opacity(
             "glass and water are transparent already; choose matte, plastic or metal, or leave the opacity out",
         );
     }
+    // Take the constant, or the value of each particle
     Ok(match setting {
         OpacitySetting::Constant(opacity) => OpacityRule::Constant(*opacity),
         OpacitySetting::Attribute { attribute, range } => OpacityRule::Value {

@@ -49,10 +49,12 @@ pub(super) fn add_overlays(
     page: &Page,
     pictures: &[Arc<RgbaPixels>],
 ) -> Result<(), ResolveError> {
+    // Find what automatic corners and lengths depend on
     let camera = setup.picture.scene.camera;
     let mut pictures = pictures.iter();
     let points = film_points(setup, survey, &camera, page.picture);
     let view = first_view(setup, survey, &camera);
+    // Collect what each overlay shows
     let (mut overlays, mut given) = (Vec::new(), Vec::new());
     for own in &manifest.overlays {
         let content = match &own.kind {
@@ -78,20 +80,33 @@ pub(super) fn add_overlays(
             halo: [1.0; 3],
         });
     }
+    // Place them, then choose colours that contrast with what is behind them
     choose_corners(&mut overlays, page, &view, &points);
-    let behind = paper(setup);
-    for (overlay, color) in overlays.iter_mut().zip(given) {
-        let behind = match overlay.layout {
-            Layout::Beside => behind,
-            Layout::Over => {
-                let size = overlay.measure(page.size[1], &view);
-                backdrop(setup, &camera, overlay.placement.center(size, page.picture).into())
-            }
-        };
-        (overlay.color, overlay.halo) = colors(behind, color);
-    }
+    choose_colors(setup, &mut overlays, &given, page, &view);
     setup.picture.files.overlays = overlays;
     Ok(())
+}
+
+/// Gives each overlay its `given` colour, or one that contrasts with the paper or with the picture behind it.
+fn choose_colors(
+    setup: &Setup,
+    overlays: &mut [Overlay],
+    given: &[Option<Vec3>],
+    page: &Page,
+    view: &FrameView,
+) {
+    let paper = paper(setup);
+    let camera = &setup.picture.scene.camera;
+    for (overlay, color) in overlays.iter_mut().zip(given) {
+        let behind = match overlay.layout {
+            Layout::Beside => paper,
+            Layout::Over => {
+                let size = overlay.measure(page.size[1], view);
+                backdrop(setup, camera, overlay.placement.center(size, page.picture).into())
+            }
+        };
+        (overlay.color, overlay.halo) = colors(behind, *color);
+    }
 }
 
 /// The view of the start of the camera path, with values as long as those of most frames.
@@ -156,6 +171,7 @@ pub(super) fn placed<'m>(
         };
         points.iter().any(|point| is_covered(&point))
     });
+    // Put those beside the picture that cover something
     let mut placed = manifest.clone();
     for (overlay, covers) in placed.overlays.iter_mut().zip(covers) {
         if is_open(overlay) {
@@ -188,6 +204,7 @@ pub(super) fn page(
     manifest: &Manifest,
     survey: &Survey,
 ) -> Result<Page, ResolveError> {
+    // Make room, but not at the cost of most of the picture
     let size = manifest.image.size();
     let view = first_view(setup, survey, &setup.picture.scene.camera);
     let page = Page::with_room_for(&setup.picture.files.overlays, size, &view);
@@ -240,12 +257,7 @@ fn content(
                 if survey.most_particles == 0 {
                     return Ok(None);
                 }
-                return Err(ResolveError::Unsupported {
-                    key: "overlay.type",
-                    what: "the colours of the particles do not follow a colour map, so there is no colour bar; \
-                           choose an attribute (--color-by)"
-                        .to_owned(),
-                });
+                return Err(without_color_map());
             };
             Some(Content::ColorBar(ColorBar {
                 title: title.clone().unwrap_or(name),
@@ -279,6 +291,13 @@ fn content(
     })
 }
 
+/// The error of a colour bar in pictures whose colours are not those of a colour map.
+fn without_color_map() -> ResolveError {
+    let what = "the colours of the particles do not follow a colour map, so there is no colour bar; choose an \
+                attribute (--color-by)";
+    ResolveError::Unsupported { key: "overlay.type", what: what.to_owned() }
+}
+
 /// The colour bar of pictures with the settings of `manifest`: its own, or one with the defaults. None if the colours are
 /// not those of a colour map.
 ///
@@ -288,6 +307,7 @@ pub fn color_bar_of(
     manifest: &Manifest,
     survey: &Survey,
 ) -> Result<Option<ColorBar>, ResolveError> {
+    // Take the colours of the particles
     let rule = color::rule(manifest, survey, None)?;
     let Some((name, kind)) = color_bar(&rule, manifest, survey) else {
         return Ok(None);
@@ -302,6 +322,7 @@ pub fn color_bar_of(
         format: None,
         factor: 1.0,
     };
+    // Take texts and numbers of the first colour bar, if there is one
     let own = manifest.overlays.iter().find_map(|overlay| match &overlay.kind {
         OverlayKind::ColorBar { title, unit, ticks, format, factor, .. } => {
             Some((title, unit, ticks, format, factor))
@@ -327,6 +348,7 @@ fn color_bar(
     let ColorRule::Attribute { name, map, .. } = rule else {
         return None;
     };
+    // Sample the map, or list its categories
     let kind = match (map.range(), map.categories()) {
         (Some((range, scale)), _) => {
             let steps = map.steps();
@@ -379,6 +401,7 @@ fn shown(label: &str) -> String {
 
 /// The time, with decimals for the time between frames or for three digits of the only time, or the frame number.
 fn time_stamp(survey: &Survey) -> Template {
+    // Find decimals that tell frames apart
     let decimals = |is_enough: &dyn Fn(f64) -> bool| {
         (0..6).find(|decimals| is_enough(f64::from(10_u32.pow(*decimals)))).unwrap_or(6)
     };
@@ -392,12 +415,14 @@ fn time_stamp(survey: &Survey) -> Template {
         })),
         (None, None) => None,
     };
+    // Write tiny times in powers of ten
     let is_tiny = |time: f64| step.is_none() && time > 0.0 && time < 1e-4;
     let text = match decimals {
         Some(_) if survey.largest_time.is_some_and(is_tiny) => "t = {time:.2e}".to_owned(),
         Some(decimals) => format!("t = {{time:.{decimals}f}}"),
         None => "frame {frame}".to_owned(),
     };
+    // Add the unit
     let unit = survey.time_unit.as_ref().filter(|_| decimals.is_some());
     let text = unit.map_or(text.clone(), |unit| format!("{text} {unit}"));
     Template::parse(&text).expect("a text with known variables")

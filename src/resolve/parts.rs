@@ -17,6 +17,7 @@ pub(super) fn parts(manifest: &Manifest, survey: &Survey) -> Result<PartMaterial
     if parts.is_empty() {
         return Ok(PartMaterials::default());
     }
+    // Refuse settings that have one material only
     let unsupported = |what: String| ResolveError::Unsupported { key: "material.part", what };
     if manifest.integrator() != IntegratorKind::Path {
         return Err(unsupported(
@@ -31,6 +32,7 @@ pub(super) fn parts(manifest: &Manifest, survey: &Survey) -> Result<PartMaterial
                 .to_owned(),
         ));
     }
+    // Find the attribute that divides the particles
     let is_part = |(name, components): (&String, Option<&usize>)| {
         components.is_none_or(|components| *components == 1)
             && PART_NAMES.iter().any(|part| name.eq_ignore_ascii_case(part))

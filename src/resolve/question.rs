@@ -11,6 +11,7 @@ use crate::survey::{Question, RadiusQuestion, SurfaceQuestion};
 
 /// What the survey has to determine. `selection` is that of the manifest.
 pub fn question<'a>(manifest: &'a Manifest, selection: &'a Selection) -> Question<'a> {
+    // Ask only for what the manifest leaves open: each answer takes time
     Question {
         color: color::question(&manifest.material.color),
         radius: match &manifest.input.radius {

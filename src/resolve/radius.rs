@@ -16,6 +16,7 @@ const TRACEABLE_RADIUS: f32 = 1e-16;
 /// # Errors
 /// There is no such attribute, no radius at all, or one that is too small to trace.
 pub(super) fn rule(manifest: &Manifest, survey: &Survey) -> Result<RadiusRule, ResolveError> {
+    // Find the source
     let rule = match &manifest.input.radius {
         RadiusSetting::Length(radius) => RadiusRule::Common(narrow(*radius)),
         RadiusSetting::Attribute { attribute, scale } => {
@@ -43,6 +44,7 @@ pub(super) fn rule(manifest: &Manifest, survey: &Survey) -> Result<RadiusRule, R
             None => return Err(ResolveError::NoRadius),
         },
     };
+    // Refuse radii that are too small for single precision
     match rule {
         RadiusRule::Common(radius) | RadiusRule::FileOr(radius)
             if radius > 0.0 && radius < TRACEABLE_RADIUS =>

@@ -45,9 +45,11 @@ fn mapped(
     own: &str,
     key: &'static str,
 ) -> Result<ColorRule, ResolveError> {
+    // Find the value
     let name = by.attribute.as_deref().unwrap_or(own);
     let value = color::value_of(survey, name, key)?;
     color::require_categories(survey, by, name, key)?;
+    // Take the range of the particles if they show the same value, or the given one
     let surveyed = survey.color.as_ref().filter(|range| range.attribute.eq_ignore_ascii_case(name));
     let is_given = matches!(by.range, Some(RangeSetting::Values(_)));
     let range = match surveyed {

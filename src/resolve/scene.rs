@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::camera::PlacedCamera;
-use super::ground::Floor;
+use super::ground::GroundPlace;
 use super::{Extent, ResolveError, environment, ground, lights, meshes, parts, surface};
 use crate::manifest::Manifest;
 use crate::render::IntegratorKind;
@@ -21,6 +21,7 @@ pub(super) fn scene(
     placed: &PlacedCamera,
     extent: &Extent,
 ) -> Result<Scene, ResolveError> {
+    // Find the lights: those of the manifest, the environment, and its sun
     let (up, bounds, view) = (extent.up, &extent.bounds, placed.view.path.start());
     let environment = environment::environment(manifest, image, &view, up)?;
     let mut lights = match (manifest.lights.is_empty(), manifest.integrator()) {
@@ -30,7 +31,8 @@ pub(super) fn scene(
         (true, IntegratorKind::Path) => Vec::new(),
     };
     lights.extend(environment::sun(manifest, &view, up));
-    let floor = Floor {
+    // Collect what the ground depends on
+    let place = GroundPlace {
         bounds,
         reach: extent.reach,
         up,
@@ -47,8 +49,8 @@ pub(super) fn scene(
         material: surface::material(manifest, bounds),
         parts: parts::parts(manifest, survey)?,
         background: background(manifest, up.as_vec3()),
-        ground: ground::ground(manifest, &floor)?,
-        wet_ground: ground::wet_ground(manifest, &floor),
+        ground: ground::ground(manifest, &place)?,
+        wet_ground: ground::wet_ground(manifest, &place),
         meshes: meshes::materials(manifest),
         particles: [bounds.min, bounds.max].map(|corner| (corner - survey.origin).as_vec3()),
         is_spray_soft: manifest.draws_soft_spray(),

@@ -20,6 +20,7 @@ pub(super) fn selection(manifest: &Manifest, survey: &Survey) -> Result<Selectio
     let known = color::known_attributes(survey);
     let checked = selection.check_names(&known, Some(0.0), &survey.labels);
     match checked {
+        // Explain names that are not known, with similar ones
         Ok(()) => Ok(selection),
         // Empty frames need no attributes, but no particle may also be left because of a text that none has
         Err(unknown) if survey.most_particles == 0 && !is_known_text(&unknown.fault) => {

@@ -46,6 +46,7 @@ pub(super) fn settings(manifest: &Manifest) -> Result<SurfaceSettings, ResolveEr
         }
         _ => {}
     }
+    // Reject options of other surfaces
     if surface.exact && surface.kind != SurfaceKind::Smooth {
         return unsupported(
             "surface.exact",

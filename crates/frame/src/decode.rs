@@ -15,10 +15,10 @@ impl ScalarType {
             ));
         }
         Ok(with_number_type!(self, Number => {
-            let numbers = bytes.as_chunks::<{ size_of::<Number>() }>().0.iter();
+            let words = bytes.as_chunks::<{ size_of::<Number>() }>().0.iter();
             let numbers: Vec<Number> = match endian {
-                Endian::Little => numbers.map(|b| Number::from_le_bytes(*b)).collect(),
-                Endian::Big => numbers.map(|b| Number::from_be_bytes(*b)).collect(),
+                Endian::Little => words.map(|b| Number::from_le_bytes(*b)).collect(),
+                Endian::Big => words.map(|b| Number::from_be_bytes(*b)).collect(),
             };
             numbers.into()
         }))

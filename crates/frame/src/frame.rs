@@ -326,6 +326,7 @@ impl<'a> ParticleFrame<Cow<'a, [Vec3]>> {
             for attribute in &mut attributes {
                 attribute.data.retain_particles(attribute.components, &keep);
             }
+            // Remember where the others were in the file
             let count = keep.iter().filter(|k| **k).count();
             let mut indices = Vec::with_capacity(count);
             let mut near = Vec::with_capacity(count);

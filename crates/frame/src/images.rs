@@ -76,6 +76,7 @@ impl PeriodicImages {
         budget: MemoryBudget,
     ) -> Result<(), ParseError> {
         let count = particles.positions.len();
+        // Check that the copies can be counted and numbered
         let most = MAX_PARTICLES / (count as u64).max(1);
         let copies = usize::try_from(self.count()).ok();
         let Some(copies) = copies.filter(|copies| *copies as u64 <= most) else {
@@ -85,6 +86,7 @@ impl PeriodicImages {
             );
             return Err(ParseError::unsupported(what));
         };
+        // Copies have the id of their particle
         if !particles.attributes.iter().any(is_id) {
             particles.attributes.push(Attribute {
                 name: ID[0].to_owned(),
@@ -92,6 +94,7 @@ impl PeriodicImages {
                 data: AttributeData::U32((0..=u32::MAX).take(count).collect()),
             });
         }
+        // Check that they fit into memory
         let need = particles.byte_len().saturating_mul(self.count());
         budget.check(need, "its copies in memory are")?;
         particles.bonds = self.copied_bonds(particles, cell);
@@ -103,6 +106,7 @@ impl PeriodicImages {
         for attribute in &mut particles.attributes {
             with_values!(&mut attribute.data, v => repeat(v, copies));
         }
+        // Move each copy by its image, and enlarge the cell
         let mut index = 0;
         each_position(&mut particles.positions, |position| {
             let image = index / count;

@@ -11,6 +11,7 @@ const PLANE: (&str, &[&str]) = ("velocity", &["vx", "vy"]);
 /// of a vector does not fit into `budget`.
 pub fn join_vectors(attributes: &mut Vec<Attribute>, budget: MemoryBudget) {
     for (name, components) in RECORD_VECTORS.into_iter().chain([PLANE]) {
+        // Find the components, unless there is such a vector already
         let is_free = !attributes.iter().any(|a| a.name.eq_ignore_ascii_case(name));
         let scalar = |component: &&str| {
             let named = |a: &Attribute| a.components == 1 && a.name.eq_ignore_ascii_case(component);
@@ -20,12 +21,14 @@ pub fn join_vectors(attributes: &mut Vec<Attribute>, budget: MemoryBudget) {
         let is_free = is_free && (components != PLANE.1 || scalar(&"vz").is_none());
         let places: Option<Vec<usize>> = components.iter().map(scalar).collect();
         let Some(places) = places.filter(|_| is_free) else { continue };
+        // Join them if they fit into memory
         let parts: Vec<&AttributeData> =
             places.iter().map(|place| &attributes[*place].data).collect();
         let bytes: u64 = parts.iter().map(|part| part.byte_len()).sum();
         let Some(data) = (bytes <= budget.bytes()).then(|| interleaved(&parts)).flatten() else {
             continue;
         };
+        // The vector takes the place of its first component
         let first = places.iter().copied().min().unwrap_or(0);
         attributes[first] = Attribute { name: name.to_owned(), components: components.len(), data };
         let mut index = 0;

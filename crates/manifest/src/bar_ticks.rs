@@ -37,8 +37,8 @@ impl Value for TickChoice {
 
     fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {
         if let Some(count) = field.as_integer() {
-            let count = u16::try_from(count).ok();
-            let count = count.filter(|count| (COUNTS[0]..=COUNTS[1]).contains(count));
+            let whole = u16::try_from(count).ok();
+            let count = whole.filter(|count| (COUNTS[0]..=COUNTS[1]).contains(count));
             return count.map(Self::Count).ok_or(Fault::Unwanted);
         }
         let items = field.items().filter(|items| (1..=MAX_VALUES).contains(&items.len()));

@@ -43,8 +43,8 @@ impl<T: TableValue> Value for ByInteger<T> {
             // Only one way to write each integer, so that no two keys mean the same
             (number.to_string() == *integer).then_some((number, value))
         };
-        let pairs: Option<Vec<(i64, T)>> = table.iter().map(pair).collect();
-        let mut pairs = pairs.ok_or(Fault::Unwanted)?;
+        let found: Option<Vec<(i64, T)>> = table.iter().map(pair).collect();
+        let mut pairs = found.ok_or(Fault::Unwanted)?;
         pairs.sort_unstable_by_key(|(integer, _)| *integer);
         Ok(Self(pairs))
     }

@@ -151,6 +151,7 @@ impl Camera {
             /// auto, turntable: two corners of a box that is in the picture in place of the particles
             box => self.bounds, example("[[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]]");
         );
+        // Keys of its path, each checked as soon as it is read
         let (up, mut frames) = (self.up, BTreeSet::new());
         let items = &mut self.keys;
         let has_fov = self.projection == ProjectionKind::Perspective;
@@ -166,6 +167,7 @@ impl Camera {
                 }
             }
         });
+        // Checks of several keys together
         if let Some(section) = keys.reading() {
             self.keys.sort_by_key(|key| key.frame);
             if !section.has("mode") {
@@ -185,6 +187,7 @@ impl Camera {
     }
 
     fn check(&self, section: &Section<'_>) {
+        // Refuse keys that contradict one another
         if self.center.is_some() && self.mode == CameraMode::Turntable {
             section
                 .wrong("center", "is given, but a turntable turns around the particles; remove it");
@@ -222,6 +225,7 @@ impl Camera {
                 section.wrong("up", "points along the view; it must not");
             }
         }
+        // A path needs keys
         if self.mode == CameraMode::Keys && section.lacks("key") {
             section.missing("key", "mode = \"keys\" needs at least one [[camera.key]]");
         }
@@ -262,6 +266,7 @@ pub(super) fn conditions() -> Json {
             "then": needs,
         })
     };
+    // Add what the mode requires
     let mut all = projection::conditions();
     all.extend([
         mode_needs(&["fixed"], json!({ "required": ["eye", "look_at"] })),

@@ -65,8 +65,8 @@ impl Value for Replicate {
             let number = item.as_integer().and_then(|n| u32::try_from(n).ok())?;
             (1..=MAX_CELLS).contains(&number).then_some(number)
         };
-        let numbers: Option<Vec<u32>> = items.iter().map(number).collect();
-        let numbers = numbers.and_then(|numbers| numbers.try_into().ok());
+        let found: Option<Vec<u32>> = items.iter().map(number).collect();
+        let numbers = found.and_then(|numbers| numbers.try_into().ok());
         numbers.map(Self).ok_or(Fault::Unwanted)
     }
 

@@ -80,6 +80,7 @@ impl Manifest {
         if meshes > max {
             root.wrong("mesh", &format!("{meshes} meshes, but at most {max} are possible"));
         }
+        // Refuse longer lists than a picture has places for
         let clips = self.clips.len();
         if clips > MAX_CLIPS {
             let what = format!("{clips} clips, but at most {MAX_CLIPS} are possible");

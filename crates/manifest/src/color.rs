@@ -127,6 +127,7 @@ impl ColorMapping {
 
     /// The contradiction between keys, if there is one: the key, and the problem.
     fn contradiction(&self) -> Option<(&'static str, String)> {
+        // A logarithm needs a range above 0
         let scale = self.scale();
         let is_categorical = scale == ScaleKind::Categorical;
         if let (ScaleKind::Log, Some(RangeSetting::Values([low, _]))) = (scale, self.range)
@@ -140,6 +141,7 @@ impl ColorMapping {
             let what = "a symmetric range has values below 0, which have no logarithm; set scale = \"symlog\"";
             return Some(("range", what.to_owned()));
         }
+        // Keys of one scale mean nothing with another
         let has_palette = self.map.is_some_and(MapName::is_palette);
         for (key, is_wrong, what) in [
             (
@@ -189,6 +191,7 @@ impl Value for ColorSetting {
     }
 
     fn parse(field: &Field<'_>, key: &Key) -> Result<Self, Fault> {
+        // Words and colours come without a table
         match field.as_text() {
             Some(AUTO) => return Ok(Self::Auto),
             Some(ELEMENTS) => return Ok(Self::Mapped(ColorMapping::elements())),
@@ -197,6 +200,7 @@ impl Value for ColorSetting {
         let Some(mut section) = field.as_table() else {
             return Vec3::parse(field, key).map(Self::Rgb);
         };
+        // Read the table
         let mut by = ColorMapping::default();
         let mut attribute = Key::new("attribute", &[]);
         if matches!(&field.node.kind, Kind::Table(table) if table.is_empty()) {
@@ -211,6 +215,7 @@ impl Value for ColorSetting {
         section.read(&steps_key(), &mut by.steps);
         section.read(&Key::new("names", &[]), &mut by.names);
         section.read(&Key::new("values", &[]), &mut by.values);
+        // Check its keys together
         if let Some((key, what)) = by.contradiction() {
             section.wrong(key, &what);
         }
@@ -219,6 +224,7 @@ impl Value for ColorSetting {
     }
 
     fn toml(&self) -> String {
+        // Write a word where one says the same
         let by = match self {
             Self::Auto => return quoted(AUTO),
             Self::Rgb(rgb) => return rgb.toml(),
@@ -228,6 +234,7 @@ impl Value for ColorSetting {
         fn pair<S: Slot>(key: &str, slot: &S) -> Option<String> {
             slot.get().map(|value| format!("{key} = {}", value.toml()))
         }
+        // Write the keys that are given
         let pairs: Vec<String> = [
             pair("attribute", &by.attribute),
             pair("map", &by.map),

@@ -160,6 +160,7 @@ impl Value for GroundSetting {
     }
 
     fn schema(key: &Key) -> Json {
+        // An image needs a file, so that its word alone is not enough
         let kind = GroundKind::schema(key);
         let kinds = GroundKind::words().into_iter();
         let without_file: Vec<&str> = kinds.filter(|w| *w != IMAGE).collect();

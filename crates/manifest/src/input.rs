@@ -191,6 +191,7 @@ impl Value for RadiusSetting {
     }
 
     fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {
+        // Words and lengths come without a table
         match field.as_text() {
             Some(AUTO) => return Ok(Self::Auto),
             Some(word) => {
@@ -203,6 +204,7 @@ impl Value for RadiusSetting {
             let length = field.as_number().filter(|v| *v > 0.0);
             return length.map(Self::Length).ok_or(Fault::Unwanted);
         };
+        // Read the table; with radii by value, the attribute has a usual name
         let mut attribute = None::<String>;
         let (mut scale, mut table, mut values) = (1.0, None::<TableName>, None::<ByInteger<f64>>);
         section.read(&Key::new("table", &[]), &mut table);
@@ -217,6 +219,7 @@ impl Value for RadiusSetting {
             section.wrong("values", "the radii are in `table`; leave one of the two out");
         }
         section.finish();
+        // Choose between values and their names
         let table = table.and_then(|TableName(word)| table_named(word));
         let values = values.map(|values| RadiusTable::Values(values.0));
         let name = |usual: &str| attribute.clone().unwrap_or_else(|| usual.to_owned());

@@ -37,8 +37,8 @@ impl Value for LightGroup {
 
     fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {
         let is_valid = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');
-        let text = field.as_text().filter(|text| text.chars().all(is_valid));
-        let text = text.filter(|text| (1..=MAX_LENGTH).contains(&text.len()));
+        let valid = field.as_text().filter(|text| text.chars().all(is_valid));
+        let text = valid.filter(|text| (1..=MAX_LENGTH).contains(&text.len()));
         match text {
             Some(DEFAULT_LIGHT_GROUP) => Err(Fault::Because(format!(
                 "\"{DEFAULT_LIGHT_GROUP}\" is the layer of light without a group; choose another name, or remove the key"

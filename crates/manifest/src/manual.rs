@@ -32,6 +32,7 @@ fn manual() -> String {
         )
     };
     tables.sort_by_key(is_list);
+    // Describe each table and its keys
     for table in tables {
         let about = match &*table[0].about {
             "" => "It stands before all tables",
@@ -84,10 +85,10 @@ fn section(entry: &Entry) -> String {
 /// The kind of value and its range.
 fn value(entry: &Entry) -> String {
     let range = entry.declared.range();
-    let kind = entry.kind.replacen(&range, "", 1);
-    let kind = kind.split(", such as ").next().unwrap_or_default();
-    let word = entry.declared.word;
-    let word = word.map_or_else(String::new, |word| format!(", or `\"{word}\"`"));
+    let without_range = entry.kind.replacen(&range, "", 1);
+    let kind = without_range.split(", such as ").next().unwrap_or_default();
+    let known = entry.declared.word;
+    let word = known.map_or_else(String::new, |word| format!(", or `\"{word}\"`"));
     format!("Value: {kind}{range}{word}.")
 }
 

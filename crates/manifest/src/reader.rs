@@ -160,6 +160,7 @@ impl<'a> Section<'a> {
         if self.is_closed {
             return;
         }
+        // Look at each key of the table, until enough problems are known
         let Some(Kind::Table(table)) = self.node.map(|n| &n.kind) else {
             return;
         };
@@ -170,6 +171,7 @@ impl<'a> Section<'a> {
             if self.problems.errors.borrow().len() > MAX_SHOWN {
                 break;
             }
+            // Suggest a similar key, here or in another table
             let what = match nearest(key, &self.known) {
                 Some(known) => format!("unknown key; did you mean `{}`?", self.full_key(known)),
                 None => match elsewhere(key, &self.path) {

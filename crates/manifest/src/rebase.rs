@@ -49,12 +49,14 @@ impl Manifest {
                 return Err(RebaseError::NotAbsolute { dir: dir.to_owned() });
             }
         }
+        // Change the paths of the input and of the output
         for path in self.input.path.iter_mut() {
             *path = rebased(path, from, to)?;
         }
         let output = rebased(self.output.path.as_str(), from, to)?;
         self.output.path = OutputPattern::parse(&output)
             .map_err(|reason| RebaseError::Output { path: output, reason })?;
+        // Change those of files that pictures use
         if let Some(path) = &mut self.input.topology {
             *path = rebased(path, from, to)?;
         }

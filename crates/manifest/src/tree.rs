@@ -229,50 +229,16 @@ impl TomlNode {
     /// equivalent to a missing value. `light.0.intensity` refers to an item of a list. A default does not change
     /// existing values, but may be another item of a list.
     pub(super) fn lay_over(&mut self, overlay: Override) -> Result<(), Problem> {
-        let problem = |at: usize, what: &str| Problem {
-            place: overlay.node.place.clone(),
-            key: overlay.keys[..=at].join("."),
-            what: what.to_owned(),
-        };
         let mut node = self;
         for (at, key) in overlay.keys.iter().enumerate() {
             // Replace "auto" by an empty table
-            let is_last = at + 1 == overlay.keys.len();
             let is_auto = matches!(&node.kind, Kind::Text(text) if text == "auto");
             if is_auto && !overlay.is_under {
                 node.kind = Kind::Table(BTreeMap::new());
             }
-            // Descend to the next key
-            let found = node.describe();
-            node = match &mut node.kind {
-                Kind::Table(table)
-                    if is_last
-                        && overlay.is_under
-                        && !overlay.is_item
-                        && table.contains_key(key) =>
-                {
-                    return Ok(());
-                }
-                Kind::Table(table) => {
-                    let place = &overlay.node.place;
-                    let empty = Self { kind: Kind::Table(BTreeMap::new()), place: place.clone() };
-                    let entry = table.entry(key.clone()).or_insert((place.clone(), empty));
-                    &mut entry.1
-                }
-                Kind::Array(items) if key.bytes().all(|b| b.is_ascii_digit()) => {
-                    let index = key.parse::<usize>().ok();
-                    let Some(item) = index.and_then(|i| items.get_mut(i)) else {
-                        return Err(problem(at, "the list has no such item; they count from 0"));
-                    };
-                    item
-                }
-                // The reader reports the problem.
-                _ if overlay.is_under => return Ok(()),
-                _ => {
-                    let above = overlay.keys[..at].join(".");
-                    let what = format!("{above} is {found}, which has no keys; set {above} itself");
-                    return Err(problem(at, &what));
-                }
+            node = match node.child(&overlay, (at, key))? {
+                Some(child) => child,
+                None => return Ok(()),
             };
         }
         if overlay.is_item {
@@ -280,6 +246,48 @@ impl TomlNode {
         }
         *node = overlay.node;
         Ok(())
+    }
+
+    /// The node at the key `at` of `overlay`, created if necessary; None for a default that is not needed.
+    fn child(
+        &mut self,
+        overlay: &Override,
+        (at, key): (usize, &String),
+    ) -> Result<Option<&mut Self>, Problem> {
+        let problem = |what: &str| Problem {
+            place: overlay.node.place.clone(),
+            key: overlay.keys[..=at].join("."),
+            what: what.to_owned(),
+        };
+        let is_last = at + 1 == overlay.keys.len();
+        let found = self.describe();
+        // Take the node that is there, or make an empty table
+        match &mut self.kind {
+            Kind::Table(table)
+                if is_last && overlay.is_under && !overlay.is_item && table.contains_key(key) =>
+            {
+                Ok(None)
+            }
+            Kind::Table(table) => {
+                let place = &overlay.node.place;
+                let empty = Self { kind: Kind::Table(BTreeMap::new()), place: place.clone() };
+                let entry = table.entry(key.clone()).or_insert((place.clone(), empty));
+                Ok(Some(&mut entry.1))
+            }
+            Kind::Array(items) if key.bytes().all(|b| b.is_ascii_digit()) => {
+                let index = key.parse::<usize>().ok();
+                let item = index.and_then(|i| items.get_mut(i));
+                item.map(Some)
+                    .ok_or_else(|| problem("the list has no such item; they count from 0"))
+            }
+            // The reader reports the problem.
+            _ if overlay.is_under => Ok(None),
+            _ => {
+                let above = overlay.keys[..at].join(".");
+                let what = format!("{above} is {found}, which has no keys; set {above} itself");
+                Err(problem(&what))
+            }
+        }
     }
 
     /// Appends the item of `overlay` to this list, which may be a new, empty table.

@@ -120,6 +120,7 @@ impl Condition {
                 format!("a condition may have {MAX_LENGTH} bytes, this one has {}", text.len());
             return Err(ConditionError { column: 1, what });
         }
+        // Read the condition
         let mut parser = Parser {
             tokens: tokens(text)?,
             next: 0,
@@ -130,6 +131,7 @@ impl Condition {
             texts: Vec::new(),
         };
         let kind = parser.any()?;
+        // Explain what is left over
         if let Some(found) = parser.tokens.get(parser.next) {
             let what = match &found.token {
                 Token::Name(name) if ["and", "or"].contains(&name.as_str()) => {
@@ -139,6 +141,7 @@ impl Condition {
             };
             return Err(parser.error(found.column, what));
         }
+        // A condition is true or false
         if kind == Kind::Number {
             let what =
                 "this is a number, not a condition; compare it, as in `speed > 2`".to_owned();
@@ -269,9 +272,11 @@ impl Parser {
             ("!=", Comparison::NotEqual),
         ];
         let names = SIGNS.map(|(name, _)| name);
+        // Read the left side, which may be a number
         let column = self.column();
         let start = self.operations.len();
         let left = self.sum()?;
+        // Only a plain value can be compared with text or a list
         let of = match self.operations[start..] {
             [Operation::Value(of)] => Some(of),
             _ => None,
@@ -285,12 +290,14 @@ impl Parser {
         let Some(sign) = self.take(&names) else {
             return Ok(left);
         };
+        // Read the right side
         self.check(column, left, Kind::Number, sign)?;
         let is_equality = ["==", "!="].contains(&sign);
         match of.filter(|_| is_equality) {
             Some(of) if self.is_text() => self.text(of, None),
             _ => self.part(Kind::Number, sign, Self::sum)?,
         }
+        // Append the comparison, and refuse a chain of them
         let found = SIGNS.iter().find(|(name, _)| *name == sign);
         self.operations.extend(found.map(|(_, comparison)| Operation::Compare(*comparison)));
         let column = self.column();
@@ -402,6 +409,7 @@ impl Parser {
     }
 
     fn primary(&mut self) -> Parsed {
+        // Read a number, a name, or a condition in parentheses
         let column = self.column();
         let Some(placed) = self.tokens.get(self.next) else {
             return Err(
@@ -459,11 +467,13 @@ impl Parser {
 
     /// The arguments of a function, and the parenthesis after them.
     fn function(&mut self, name: &str, column: usize) -> Parsed {
+        // Read the arguments as numbers
         let argument = |parser: &mut Self| {
             let column = parser.column();
             let found = parser.within(Self::any)?;
             parser.check(column, found, Kind::Number, name)
         };
+        // Find the function
         let pair = match name {
             "abs" | "sqrt" => None,
             "min" => Some(Arithmetic::Min),
@@ -474,6 +484,7 @@ impl Parser {
                 return Err(self.error(column, what));
             }
         };
+        // Read its arguments, and append it
         argument(self)?;
         match pair {
             Some(function) => {

@@ -31,6 +31,7 @@ impl Stacks {
         first: usize,
         to: &mut [bool],
     ) {
+        // Operate on stacks of blocks: each operation works on all particles of a block
         self.used = [0; 2];
         let mut operations = operations.iter();
         while let Some(operation) = operations.next() {
@@ -67,6 +68,7 @@ impl Stacks {
                 Operation::Or => self.join(|a, b| a | b),
             }
         }
+        // The last truth is the result
         let result = &self.truths[self.used[1] - 1];
         to.copy_from_slice(&result[..to.len()]);
     }

@@ -162,6 +162,7 @@ impl Selection {
         if count == 0 {
             return Ok(Vec::new());
         }
+        // Look up the values of names and texts
         let labels = (&particles.labels, MissingText::NoParticle);
         let (values, texts) = self.values(&particles.attributes, particles.time, labels)?;
         let context = FileContext::new(particles, self.up);
@@ -173,6 +174,7 @@ impl Selection {
         };
         let texts: Vec<TextValue<BoundValue<&Attribute>>> =
             texts.iter().filter_map(bound).collect();
+        // Mark the particles that are kept, in runs that do not depend on the threads
         let ids = id_of(&particles.attributes);
         let mut marks = vec![false; count];
         let runs = marks.par_chunks_mut(RUN).enumerate();
@@ -191,6 +193,7 @@ impl Selection {
                 marks.iter().map(|mark| usize::from(*mark)).sum()
             })
             .collect();
+        // Collect their indices
         Ok(marked_indices(&marks, &counts))
     }
 

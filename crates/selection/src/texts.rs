@@ -95,6 +95,7 @@ pub(super) fn code_of(
         None if is_text(value) && missing == MissingText::NoParticle => return Ok(f64::NAN),
         None => None,
     };
+    // Or say which texts are known
     #[expect(clippy::cast_precision_loss, reason = "values are compared in f64")]
     code.map(|code| code as f64).ok_or_else(|| {
         let symbols = (1..=LAST_ELEMENT).filter_map(element_symbol).map(str::to_owned);

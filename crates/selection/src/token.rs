@@ -54,6 +54,7 @@ pub(super) fn tokens(text: &str) -> Result<Vec<Placed>, ConditionError> {
 
 /// The token at the start of `text`, and the text after it.
 fn token(text: &str, first: char) -> Result<(Token, &str), String> {
+    // Numbers, names and texts show by their first character
     if first.is_ascii_digit() || first == '.' {
         return number(text);
     }
@@ -64,6 +65,7 @@ fn token(text: &str, first: char) -> Result<(Token, &str), String> {
         let (quoted, rest) = rest.split_once(first).ok_or("a quote has no second one")?;
         return Ok((Token::Text(quoted.to_owned()), rest));
     }
+    // Signs of other languages get a hint, unless they begin a longer sign of this one
     let foreign = FOREIGN.iter().find(|(sign, _)| text.starts_with(sign));
     let sign = SIGNS.iter().find(|sign| text.starts_with(**sign));
     match (sign, foreign) {

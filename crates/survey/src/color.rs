@@ -172,6 +172,7 @@ impl ColorTotals {
         if question == RangeQuestion::Categories {
             return self.add_categories((0..count).map(value));
         }
+        // Leave out what the scale cannot show
         let mut values = sorted_sample(count, value);
         let is_positive =
             matches!(question, RangeQuestion::Positive | RangeQuestion::PositivePercentiles(_));
@@ -180,6 +181,7 @@ impl ColorTotals {
             self.left_out |= below > 0;
             values.drain(..below);
         }
+        // Pool the values for percentiles of all frames, or join the ranges of frames
         match question {
             RangeQuestion::Percentiles(_) | RangeQuestion::PositivePercentiles(_) => {
                 self.pool.append(&mut values);

@@ -62,6 +62,7 @@ fn is_thermal(sample: &[DVec3], velocities: &[DVec3]) -> bool {
     if velocities.len() < MIN_COUNT || velocities.len() != sample.len() {
         return false;
     }
+    // Find the energy and the drift, and how the velocity changes from place to place
     #[expect(clippy::cast_precision_loss, reason = "a sample")]
     let part = 1.0 / velocities.len() as f64;
     let mean = |values: &dyn Fn(usize) -> DVec3| -> DVec3 {
@@ -76,6 +77,7 @@ fn is_thermal(sample: &[DVec3], velocities: &[DVec3]) -> bool {
         let along = mean(&|i| velocities[i] * (sample[i][axis] - middle[axis]));
         (along * along).max_element() <= SHEAR * SHEAR * energy / 3.0 * spread[axis]
     };
+    // Compare them with those of a gas at rest
     energy > 0.0
         && energy.is_finite()
         && squares.to_array().iter().all(|square| ENERGY.contains(&(square / energy)))

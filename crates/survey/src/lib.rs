@@ -341,6 +341,7 @@ impl Survey {
         indices: impl IntoIterator<Item = usize>,
         question: Question,
     ) -> Result<Self, FrameError> {
+        // Find the units and the up direction of the format
         let format = sequence.format_info();
         let angstrom = format.map_or(1.0, |format| format.angstrom);
         let time_unit = format.and_then(|format| format.time_unit).map(str::to_owned);
@@ -353,6 +354,7 @@ impl Survey {
             selection: selection.as_ref(),
             ..question
         };
+        // Sample each frame; a frame that cannot be read does not stop the survey
         let mut failure = None;
         let indices: Vec<usize> = indices.into_iter().collect();
         let frames = indices.len();

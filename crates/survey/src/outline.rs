@@ -80,6 +80,7 @@ struct End {
 impl Outermost {
     /// Adds a frame of `count` particles. `positions`: those of all of them, or of some.
     pub(super) fn add(&mut self, positions: &Positions, count: usize) {
+        // Keep some of the particles, for the outline of all frames together
         let mut sample = sample_of(positions);
         if sample.is_empty() {
             return;
@@ -98,6 +99,7 @@ impl Outermost {
         } else {
             (few, side)
         };
+        // Find the outliers along all axes, and leave out those that are farthest
         let found = axes().flat_map_iter(|axis| beyond(&sample, axis, longest, (tail, MARGIN)));
         let most = match sample.len() {
             many if is_scattered => many.div_ceil(MAX_FAR),
@@ -145,6 +147,7 @@ impl Outermost {
 impl Outermost {
     /// Finds the outermost particles of a `share` of all frames together.
     fn keep(&mut self, share: f64) {
+        // Find out how many may be left out
         let all: Vec<DVec3> = self.kept.iter().flat_map(|frame| &frame.points).copied().collect();
         if all.is_empty() {
             return;
@@ -167,9 +170,11 @@ impl Outermost {
         let longest = longest_side(&all, tail);
         let axes = || (0..AXES).into_par_iter().map(axis);
         let found = axes().flat_map_iter(|axis| beyond(&all, axis, longest, (tail, SHARE_MARGIN)));
+        // Leave them out
         let outliers: HashSet<usize> = farthest(found.collect(), most).into_iter().collect();
         let indices = 0..all.len();
         let rest: Vec<DVec3> = indices.filter(|i| !outliers.contains(i)).map(|i| all[i]).collect();
+        // Count the outliers of each frame
         let mut first = 0;
         self.outliers = 0;
         for frame in &self.kept {

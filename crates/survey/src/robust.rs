@@ -68,12 +68,13 @@ pub(super) fn robust_bounds(
 ) -> Option<RobustBounds> {
     let count = positions.len();
     let finite = |i| Some(positions.get(i)).filter(|p: &DVec3| p.is_finite());
-    let mut sample = sample_of(positions);
     let outermost = || {
         let all = (0..count).into_par_iter().filter_map(finite);
         all.map(|p| (p, p)).reduce_with(|a, b| (a.0.min(b.0), a.1.max(b.1)))
     };
     let (min, max) = extremes.or_else(outermost)?;
+    // Decide how many particles may be outside on each side
+    let mut sample = sample_of(positions);
     let few = sample.len() < 100;
     let outside = match sample.len() / 100 {
         0 => usize::from(sample.len() >= ESCAPE_MIN),
@@ -84,16 +85,12 @@ pub(super) fn robust_bounds(
     let mut layers = (min, max);
     let tail = sample.len() / (2 * MAX_FAR);
     let (mut near_first, mut near_last) = (min, max);
-    let ends = |sample: &[DVec3], axis: usize, outside: usize| {
-        let above = (sample.len() - outside).saturating_sub(1);
-        Some([sample.get(outside)?[axis], sample.get(above)?[axis]])
-    };
     for axis in 0..3 {
         sample.sort_unstable_by(|a, b| a[axis].total_cmp(&b[axis]));
-        if let Some(found) = ends(&sample, axis, outside) {
+        if let Some(found) = axis_ends(&sample, axis, outside) {
             [first[axis], last[axis]] = found;
         }
-        if let Some(found) = ends(&sample, axis, tail) {
+        if let Some(found) = axis_ends(&sample, axis, tail) {
             [near_first[axis], near_last[axis]] = found;
         }
         let layer = sample.len() / LAYER;
@@ -112,6 +109,12 @@ pub(super) fn robust_bounds(
     let extent = last - first;
     let margin = if few { DVec3::splat(extent.max_element()) } else { 0.5 * extent };
     Some(RobustBounds { outer: (min.max(first - margin), max.min(last + margin)), layers })
+}
+
+/// The ends of `sample`, which is sorted along `axis`, without `outside` particles on each side.
+fn axis_ends(sample: &[DVec3], axis: usize, outside: usize) -> Option<[f64; 2]> {
+    let above = (sample.len() - outside).saturating_sub(1);
+    Some([sample.get(outside)?[axis], sample.get(above)?[axis]])
 }
 
 /// The 99th percentile of `count` radii; 0 without finite ones.

@@ -48,7 +48,7 @@ impl FrameSample {
         (question, frames): (Question, usize),
     ) -> Result<Self, FrameError> {
         let request = question.radius.spacing(frames);
-        let sample = match question.selection {
+        let whole = match question.selection {
             // Few of the particles of a sample may be drawn; the spacing is the same as without a selection
             Some(selection) if !selection.is_all() => Self {
                 spacing: Self::spacing_of_large(sequence, index, request)?,
@@ -56,7 +56,7 @@ impl FrameSample {
             },
             _ => Self::of_source(sequence, index, request)?,
         };
-        let mut sample = sample.of_question(question, request);
+        let mut sample = whole.of_question(question, request);
         let time = &mut sample.particles.time;
         *time = sequence.listed_time(index).or(*time);
         Ok(sample)
@@ -108,12 +108,14 @@ impl FrameSample {
         index: usize,
         request: Option<SpacingRequest>,
     ) -> Result<Option<Self>, FrameError> {
+        // Other files are read as a whole
         let Some(path) = sequence.lone_file(index) else {
             return Ok(None);
         };
         let Some(source) = open_source(path)?.filter(|s| s.count() > LARGE) else {
             return Ok(None);
         };
+        // Read the file once, for positions, spacing and bounds
         let (particles, spacing, extremes) = stream::survey(&*source, path, MAX_SAMPLE, request)?;
         source.check()?;
         // Estimate the memory of the frame from its attributes
@@ -152,6 +154,7 @@ impl FrameSample {
         raw: &RawParticles<PositionSlice<'_>>,
         question: Question,
     ) -> Result<Self, FrameError> {
+        // Sample many particles in runs, unless a selection needs all
         let path = Path::new(name);
         let source = RawSource::borrowed(path, raw)?;
         let count = raw.positions.len();
@@ -164,6 +167,7 @@ impl FrameSample {
             part = is_whole.then_some((particles, extremes));
         }
         let (particles, extremes) = part.unwrap_or_else(|| (raw.to_owned_particles(), None));
+        // Describe them like those of a file
         let sample = Self {
             weight: FrameWeight {
                 particles: count as u64,
@@ -235,6 +239,7 @@ impl FrameSample {
     }
 
     fn of_native(file: &NativeFile, request: Option<SpacingRequest>) -> Result<Self, ParseError> {
+        // Find out whether all particles are read
         let frame = file.frame_unchecked();
         let index = file.index();
         let too_many = |_| ParseError::unsupported("more particles than this machine can count");
@@ -244,12 +249,14 @@ impl FrameSample {
             // Small frames are verified completely: it takes little time, and damage might not show in percentiles.
             frame.verify()?;
         }
+        // Read some of the particles, and the spacing of all if nothing gives a radius
         frame.verify_nodes()?;
         let particles = frame.sample(MAX_SAMPLE)?;
         let spacing = match (index.radius, request) {
             (RadiusIndex::None, Some(request)) if is_part => stored_spacing(&frame, request)?,
             _ => None,
         };
+        // Bounds are in the index
         let origin = DVec3::from_array(index.origin);
         let corner = |c: [f32; 3]| glam::Vec3::from_array(c).as_dvec3() + origin;
         Ok(Self {
@@ -293,6 +300,7 @@ fn stored_spacing(
 /// Size of a native frame as if it were read, because some settings require that.
 fn weight(file: &NativeFile, particles: &RawParticles) -> FrameWeight {
     let index: &FrameIndex = file.index();
+    // Estimate the numbers in memory, in double precision if the origin requires it
     let positions = if index.origin == [0.0; 3] { 12 } else { 24 };
     let attributes = index.attributes.iter().map(|a| a.section.len);
     let radii = match index.radius {

@@ -46,16 +46,19 @@ impl Axes {
 /// section 8.5).
 fn eigen(mut matrix: DMat3) -> (DVec3, DMat3) {
     let mut vectors = DMat3::IDENTITY;
+    // Rotate each pair of axes in turn, until nothing is left beside the diagonal
     for (p, q) in (0..SWEEPS).flat_map(|_| PAIRS) {
         let off = matrix.col(q)[p];
         if off == 0.0 {
             continue;
         }
+        // Choose the rotation that removes the element of this pair
         let theta = 0.5 * (matrix.col(q)[q] - matrix.col(p)[p]) / off;
         let sign = if theta < 0.0 { -1.0 } else { 1.0 };
         let t = sign / (theta.abs() + libm::hypot(theta, 1.0));
         let cos = 1.0 / libm::hypot(t, 1.0);
         let sin = t * cos;
+        // Rotate the matrix, and collect the rotations
         let mut rotation = DMat3::IDENTITY;
         rotation.col_mut(p)[p] = cos;
         rotation.col_mut(q)[q] = cos;

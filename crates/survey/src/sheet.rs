@@ -38,18 +38,21 @@ pub(super) fn covering_radius(sample: &[DVec3], count: usize, touching: f64) -> 
     // In a sample, neighbours are farther apart
     let reach = REACH * 2.0 * touching / part.sqrt();
     let queries: Vec<DVec3> = sample_indices(sample.len(), QUERIES).map(|i| sample[i]).collect();
+    // Find out whether the surroundings of particles are thin
     let surroundings = queries.par_iter().map(|query| {
-        let near = sample.iter().filter(|p| p.distance_squared(*query) <= reach * reach);
-        let near: Vec<DVec3> = near.copied().collect();
+        let found = sample.iter().filter(|p| p.distance_squared(*query) <= reach * reach);
+        let near: Vec<DVec3> = found.copied().collect();
         let axes = Axes::of(&near).filter(|_| near.len() >= FEW)?;
         let [_, across, normal] = axes.deviations;
         Some((near.len(), normal <= THIN * across))
     });
     let surroundings: Vec<(usize, bool)> = surroundings.flatten().collect();
+    // Most of them have to be, for the rest to mean anything
     let thin = surroundings.iter().filter(|(_, is_thin)| *is_thin).count();
     if surroundings.len() * 2 < queries.len() || thin * 10 < surroundings.len() * 9 {
         return None;
     }
+    // Find the mean distance on the surface from the number of neighbours
     let mut counts: Vec<usize> = surroundings.into_iter().map(|(count, _)| count).collect();
     counts.sort_unstable();
     #[expect(

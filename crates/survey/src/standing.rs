@@ -41,6 +41,7 @@ pub(super) fn is_falling(positions: &Positions, velocity: &Attribute, up: DVec3)
         let velocity = DVec3::new(component(0), component(1), component(2));
         (positions.get(i).dot(up), velocity.dot(up), velocity.length_squared())
     };
+    // Sort the particles by height
     let count = positions.len().min(velocity.count());
     let mut all: Vec<(f64, f64, f64)> = if velocity.components == 3 {
         sample_indices(count, SAMPLE).map(motion).collect()
@@ -49,6 +50,7 @@ pub(super) fn is_falling(positions: &Positions, velocity: &Attribute, up: DVec3)
     };
     all.retain(|(height, _, square)| height.is_finite() && square.is_finite());
     all.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    // Compare the motion of the lowest with the speed of all
     #[expect(clippy::cast_precision_loss, reason = "a sample")]
     let all_count = all.len() as f64;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of them")]

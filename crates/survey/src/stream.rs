@@ -61,8 +61,8 @@ pub(super) fn sample(
     most: usize,
 ) -> Result<RawParticles, FrameError> {
     // Distribute the runs over the file
-    let runs = source.count().div_ceil(SAMPLE_RUN as u64);
-    let runs = usize::try_from(runs).unwrap_or(usize::MAX);
+    let run_count = source.count().div_ceil(SAMPLE_RUN as u64);
+    let runs = usize::try_from(run_count).unwrap_or(usize::MAX);
     let starts = || sample_indices(runs, (most / SAMPLE_RUN).max(1)).map(|run| run as u64);
     let run = |number: u64| {
         let first = number * SAMPLE_RUN as u64;
@@ -160,6 +160,7 @@ fn half_nearest(
     source: &dyn ParticleSource,
     queries: &[DVec3],
 ) -> Result<Option<(f32, f32)>, FrameError> {
+    // Find the nearest neighbours within each run
     let of_run = |positions: &[DVec3]| {
         let nearest = |from: &DVec3| {
             let squares = positions.iter().map(|to| from.distance_squared(*to));
@@ -167,6 +168,7 @@ fn half_nearest(
         };
         queries.iter().map(nearest).collect::<Vec<f64>>()
     };
+    // Join the runs: the nearest of all counts
     let join = |mut a: Vec<f64>, b: Vec<f64>| {
         a.iter_mut().zip(&b).for_each(|(a, b)| *a = a.min(*b));
         a
@@ -193,8 +195,8 @@ fn each_run<T: Send>(
             || vec![DVec3::ZERO; RUN],
             |positions, number| {
                 let first = number * RUN as u64;
-                let len = (source.count() - first).min(RUN as u64);
-                let len = usize::try_from(len).unwrap_or(RUN);
+                let left = (source.count() - first).min(RUN as u64);
+                let len = usize::try_from(left).unwrap_or(RUN);
                 source.read_positions(first, &mut positions[..len])?;
                 Ok(of_run(&positions[..len]))
             },

@@ -66,19 +66,24 @@ impl Contents<'_> {
     /// Walls that rest around others that move. In several frames, the particles that rest at first may move later; walls
     /// are identified by their index in the file.
     fn at_rest(&self) -> Option<Tank> {
-        let members = self.positions.iter().zip(self.is_moving).map(|(position, is_moving)| {
-            Member { value: i64::from(*is_moving), position: *position, is_moving: *is_moving }
+        // Divide the particles into those at rest and those that move
+        let found = self.positions.iter().zip(self.is_moving).map(|(position, is_moving)| Member {
+            value: i64::from(*is_moving),
+            position: *position,
+            is_moving: *is_moving,
         });
-        let members: Vec<Member> = members.collect();
+        let members: Vec<Member> = found.collect();
         let (moving, resting): (Vec<Member>, Vec<Member>) =
             members.into_iter().partition(|member| member.is_moving);
         let places: Vec<DVec3> = resting.iter().map(|member| member.position).collect();
+        // Check that many move, and that those at rest are walls around them
         #[expect(clippy::cast_precision_loss, reason = "counts")]
         let is_many = moving.len() as f64 >= MOVING * self.positions.len() as f64;
         let is_around = is_many && resting.len() >= MIN_WALLS && contains(&resting, moving.iter());
         if !is_around || !is_shell(&places) {
             return None;
         }
+        // Describe the walls by speed in a single frame, and by index in several
         let why = "particles at rest around the others";
         if self.is_only_frame {
             return Some(Tank { condition: "speed > 0".to_owned(), why, all: "speed >= 0" });
@@ -126,6 +131,7 @@ struct OpenBox {
 
 impl OpenBox {
     fn find(positions: &[DVec3], up: usize, touching: f64) -> Option<Tank> {
+        // Find the box, and its sides
         let ends = positions.iter().map(|p| (*p, *p));
         let (min, max) = ends.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
         let sides = [(up + 1) % 3, (up + 2) % 3];
@@ -138,6 +144,7 @@ impl OpenBox {
         if thickness > THICKNESS * shorter {
             return None;
         }
+        // Divide the particles into those near sides and bottom, and those inside
         let margin = thickness + touching;
         let (inside, walls): (Vec<DVec3>, Vec<DVec3>) =
             positions.iter().partition(|p| own.depth(**p) > margin && p[up] > min[up] + margin);
@@ -146,6 +153,7 @@ impl OpenBox {
         if !is_filled || walls.len() < MIN_WALLS || !own.is_covered(&walls, margin) {
             return None;
         }
+        // Describe what is inside
         let name = |axis: usize| ["x", "y", "z"][axis];
         let round = |value: f64| format!("{value:.4e}").parse().unwrap_or(value);
         let mut conditions = Vec::new();
@@ -170,6 +178,7 @@ impl OpenBox {
         let [a, b] = self.sides;
         let part =
             |p: &DVec3, axis: usize| (p[axis] - self.min[axis]) / (self.max[axis] - self.min[axis]);
+        // Divide each side into squares, and count those with a particle
         [(a, b, false), (a, b, true), (b, a, false), (b, a, true)].into_iter().all(
             |(axis, along, is_high)| {
                 let mut squares = [false; SQUARES * SQUARES];

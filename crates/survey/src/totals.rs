@@ -109,25 +109,9 @@ impl Totals {
     ) {
         self.frames += 1;
         self.origin = self.origin.and(sample.origin);
-        let FrameSample { particles: raw, count, extremes, spacing, mut weight, .. } = sample;
-        self.add_names(&raw);
-        let found = robust_bounds(&raw.positions, extremes);
-        self.bounds = match (self.bounds, found) {
-            (Some(before), Some(found)) => Some(before.and(found)),
-            (before, found) => before.or(found),
-        };
-        if is_framed {
-            self.outermost.add(&raw.positions, count);
-        }
-        let velocity = velocity_of(&raw.attributes);
-        if !velocity.is_some_and(|velocity| is_falling(&raw.positions, velocity, up)) {
-            let standing = standing(&sample_of(&raw.positions), count, up);
-            self.standing = self.standing.max(standing);
-        }
-        let is_new = |cell: &SimulationCell| !self.cells.contains(cell);
-        if is_framed && let Some(cell) = raw.cell.filter(is_new) {
-            self.cells.push(cell);
-        }
+        self.add_names(&sample.particles);
+        self.add_extent(&sample, up, is_framed);
+        let FrameSample { particles: raw, count, spacing, mut weight, .. } = sample;
         self.find_velocity_and_colors(&raw, question.color);
         let origin =
             self.bounds.map_or(DVec3::ZERO, |bounds| choose_origin(bounds.outer.0, bounds.outer.1));
@@ -153,6 +137,29 @@ impl Totals {
             self.points.extend(some.map(|p| origin + p.as_dvec3()));
         }
         self.add_radii(context, spacing.map(|spacing| (weight.particles, spacing)));
+    }
+
+    /// Adds where the particles of a frame are, how high they stand, and its simulation cell.
+    fn add_extent(&mut self, sample: &FrameSample, up: DVec3, is_framed: bool) {
+        let (raw, count) = (&sample.particles, sample.count);
+        let found = robust_bounds(&raw.positions, sample.extremes);
+        self.bounds = match (self.bounds, found) {
+            (Some(before), Some(found)) => Some(before.and(found)),
+            (before, found) => before.or(found),
+        };
+        if is_framed {
+            self.outermost.add(&raw.positions, count);
+        }
+        // The height of particles in the air is not that of a body on the ground
+        let velocity = velocity_of(&raw.attributes);
+        if !velocity.is_some_and(|velocity| is_falling(&raw.positions, velocity, up)) {
+            let standing = standing(&sample_of(&raw.positions), count, up);
+            self.standing = self.standing.max(standing);
+        }
+        let is_new = |cell: &SimulationCell| !self.cells.contains(cell);
+        if is_framed && let Some(cell) = raw.cell.filter(is_new) {
+            self.cells.push(cell);
+        }
     }
 
     /// Adds the attributes of a frame, and the names of their values.
@@ -265,21 +272,18 @@ impl Totals {
 
     /// The survey of all frames that were added, in the unit of their positions.
     pub(super) fn finish(self, question: Question, up: DVec3) -> Survey {
+        // Suppose a box of size 1 without particles
         let bounds = self.bounds.map(|bounds| bounds.outer);
         let (min, max) = bounds.unwrap_or((DVec3::splat(-0.5), DVec3::splat(0.5)));
         let color = self.color.finish(question.color);
-        // Speed has precedence over colours.
-        let rgb = self.rgb.filter(|rgb| {
-            let is_colored_by =
-                |color: &ColorRange| rgb.attribute.eq_ignore_ascii_case(&color.attribute);
-            color.as_ref().is_none_or(is_colored_by)
-        });
+        let rgb = rgb_colors(self.rgb, color.as_ref());
         // Use the origin of native frames: with a different one, they could not be traced in place.
         let origin = match self.origin {
             Origins::Shared(origin) => origin,
             Origins::None | Origins::Mixed => choose_origin(min, max),
         };
         let in_place = self.origin == Origins::Shared(origin);
+        // Keep some of the points, relative to the origin
         let points = sample_indices(self.points.len(), POINTS)
             .map(|i| self.points[i])
             .map(|point| (point - origin).as_vec3().to_array());
@@ -317,6 +321,15 @@ impl Totals {
             surfaces: self.surfaces,
         }
     }
+}
+
+/// The colours of the attribute `rgb`, unless the range of another attribute was found: speed has precedence.
+fn rgb_colors(rgb: Option<RgbAttribute>, color: Option<&ColorRange>) -> Option<RgbAttribute> {
+    rgb.filter(|rgb| {
+        let is_colored_by =
+            |color: &ColorRange| rgb.attribute.eq_ignore_ascii_case(&color.attribute);
+        color.is_none_or(is_colored_by)
+    })
 }
 
 /// The median of an estimate over the frames, weighted by their particle counts: neither frames with few particles nor

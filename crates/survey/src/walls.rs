@@ -55,7 +55,7 @@ pub(super) fn walls(
     attributes: &[Attribute],
     members: &[Member],
 ) -> Option<WallValues> {
-    let mut groups: BTreeMap<i64, Vec<Member>> = BTreeMap::new();
+    let mut groups = Groups::new();
     for member in members {
         groups.entry(member.value).or_default().push(*member);
     }
@@ -63,50 +63,71 @@ pub(super) fn walls(
         let is_some = !values.is_empty() && values.len() < groups.len();
         is_some.then_some(WallValues { values, sign })
     };
-    let all = || groups.keys().copied();
-    let rests = |value: &i64| groups[value].iter().all(|member| !member.is_moving);
-    if is_dualsphysics(attributes) {
-        let is_wall: Option<fn(i64) -> bool> = match &*name.to_ascii_lowercase() {
-            // mkbound + 11, of floating bodies too, and mkfluid + 1; fixed, moving, floating and fluid
-            "mk" => Some(|mk| mk > 10),
-            "type" => Some(|kind| kind < 2),
-            _ => None,
-        };
-        if let Some(is_wall) = is_wall {
-            let is_wall = |value: &i64| is_wall(*value) && (name != "Mk" || rests(value));
-            // A body in the fluid is not in front of it
-            let others: Vec<Member> =
-                members.iter().filter(|member| !is_wall(&member.value)).copied().collect();
-            let is_around = |value: &i64| !is_within(&groups[value], &others);
-            let values = all().filter(is_wall).filter(is_around).collect();
-            return found(values, WallSign::Code("DualSPHysics"));
-        }
+    // Values that a program or the name of the attribute explains need no search
+    if is_dualsphysics(attributes)
+        && let Some(values) = dualsphysics_walls(name, members, &groups)
+    {
+        return found(values, WallSign::Code("DualSPHysics"));
     }
     if is_boundary_flag(name) {
-        let sign = WallSign::Code("boundary flags");
-        return found(all().filter(|value| *value != 0).collect(), sign);
+        let values = groups.keys().copied().filter(|value| *value != 0).collect();
+        return found(values, WallSign::Code("boundary flags"));
     }
     // At rest around others that move
     let is_any_moving = members.iter().any(|member| member.is_moving);
-    let (candidates, sign): (Vec<i64>, _) = if is_any_moving {
-        let resting: Vec<i64> = all().filter(|value| rests(value)).collect();
-        let contains = |value: &i64| {
-            contains(&groups[value], members.iter().filter(|member| member.is_moving))
-        };
-        // Walls of several kinds are around the others together; an obstacle among them is not
-        let alone: Vec<i64> = resting.iter().copied().filter(contains).collect();
-        (if alone.is_empty() { resting } else { alone }, WallSign::Rest)
+    let (candidates, sign) = if is_any_moving {
+        (resting_walls(members, &groups), WallSign::Rest)
     } else {
-        let others = |value: i64| members.iter().filter(move |member| member.value != value);
-        let surrounds = |value: &i64| {
-            groups[value].len() >= MIN_AROUND && contains(&groups[value], others(*value))
-        };
-        (all().filter(surrounds).collect(), WallSign::Around)
+        (surrounding_walls(members, &groups), WallSign::Around)
     };
     // A bed of grains rests, too
     let shell: Vec<DVec3> =
         members.iter().filter(|m| candidates.contains(&m.value)).map(|m| m.position).collect();
     found(candidates, sign).filter(|_| is_shell(&shell))
+}
+
+/// The particles with each value.
+type Groups = BTreeMap<i64, Vec<Member>>;
+
+/// Whether no particle of a group moves.
+fn is_resting(group: &[Member]) -> bool {
+    group.iter().all(|member| !member.is_moving)
+}
+
+/// The values of walls in particles of DualSPHysics; None if the attribute `name` does not tell.
+fn dualsphysics_walls(name: &str, members: &[Member], groups: &Groups) -> Option<Vec<i64>> {
+    let is_code_of_wall: fn(i64) -> bool = match &*name.to_ascii_lowercase() {
+        // mkbound + 11, of floating bodies too, and mkfluid + 1; fixed, moving, floating and fluid
+        "mk" => |mk| mk > 10,
+        "type" => |kind| kind < 2,
+        _ => return None,
+    };
+    let is_wall =
+        |value: &i64| is_code_of_wall(*value) && (name != "Mk" || is_resting(&groups[value]));
+    // A body in the fluid is not in front of it
+    let others: Vec<Member> =
+        members.iter().filter(|member| !is_wall(&member.value)).copied().collect();
+    let is_around = |value: &i64| !is_within(&groups[value], &others);
+    Some(groups.keys().copied().filter(is_wall).filter(is_around).collect())
+}
+
+/// The values of particles that rest, and only those around all that move if there are such values.
+fn resting_walls(members: &[Member], groups: &Groups) -> Vec<i64> {
+    let resting: Vec<i64> =
+        groups.keys().copied().filter(|value| is_resting(&groups[value])).collect();
+    let contains =
+        |value: &i64| contains(&groups[value], members.iter().filter(|member| member.is_moving));
+    // Walls of several kinds are around the others together; an obstacle among them is not
+    let alone: Vec<i64> = resting.iter().copied().filter(contains).collect();
+    if alone.is_empty() { resting } else { alone }
+}
+
+/// The values of many particles around all particles with other values.
+fn surrounding_walls(members: &[Member], groups: &Groups) -> Vec<i64> {
+    let others = |value: i64| members.iter().filter(move |member| member.value != value);
+    let surrounds =
+        |value: &i64| groups[value].len() >= MIN_AROUND && contains(&groups[value], others(*value));
+    groups.keys().copied().filter(surrounds).collect()
 }
 
 /// Whether an attribute marks particles of a boundary.
@@ -163,10 +184,12 @@ pub(super) fn is_shell(points: &[DVec3]) -> bool {
     let Some((min, max)) = bounds(points.iter().copied()) else {
         return false;
     };
+    // A layer or a line has no inside
     let axes = axes((min, max));
     if axes.len() < 2 {
         return true;
     }
+    // Find the cells with particles, inside the box and at its sides
     let [mut inside, mut at_sides] = [BTreeSet::new(), BTreeSet::new()];
     for point in points {
         let cell: Vec<usize> = axes
@@ -186,6 +209,7 @@ pub(super) fn is_shell(points: &[DVec3]) -> bool {
         let filled = if is_inside { &mut inside } else { &mut at_sides };
         filled.insert(cell);
     }
+    // Compare how many of them there are with how many there could be
     let power = u32::try_from(axes.len()).unwrap_or(3);
     let [all, inner] = [CELLS, CELLS - 2].map(|side| side.pow(power));
     #[expect(clippy::cast_precision_loss, reason = "few cells")]

@@ -109,8 +109,10 @@ pub(super) fn divide_pile(
     limits: &Limits,
     store: &ChunkStore,
 ) -> Result<Vec<UnorderedPart>, ConvertError> {
+    // Create an empty heap for each part
     let stages = BufferPool::<PartitionedBatch>::default();
     let mut heaps: Vec<Heap> = (0..cuts.len()).map(|_| Heap::default()).collect();
+    // Use as much memory for chunks as for a window of batches
     let together = (limits.window * limits.batch_len / store.chunk_len()).max(1);
     let mut held = pile.held.into_iter();
     // Sort and append a few chunks at a time

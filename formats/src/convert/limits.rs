@@ -77,8 +77,8 @@ impl Limits {
     /// The limits for `count` particles with rows of `width` bytes. `widest` is the largest number of bytes
     /// that the source has for one attribute of a particle.
     pub(super) fn of(settings: &ConvertSettings, count: u64, width: usize, widest: usize) -> Self {
-        let memory = settings.memory.max(ConvertSettings::MIN_MEMORY);
-        let memory = usize::try_from(memory).unwrap_or(usize::MAX);
+        let bytes = settings.memory.max(ConvertSettings::MIN_MEMORY);
+        let memory = usize::try_from(bytes).unwrap_or(usize::MAX);
         let record = 12 + width;
         // Size the parts: one part is ordered while the next one is loaded
         let part_bytes = order_bytes(width) + record;

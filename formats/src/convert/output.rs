@@ -49,10 +49,12 @@ impl<'a> FrameOutput<'a> {
         part: &PartData,
         ordered: &mut OrderedPart,
     ) -> Result<(), ConvertError> {
+        // The first part starts the frame: the encoding depends on its positions
         let mut writer = match self.writer.take() {
             Some(writer) => writer,
             None => self.begin(ordered)?,
         };
+        // Write it in runs, and report progress after each
         let mut first = 0;
         while first < part.len() {
             let end = part.len().min(first + self.run_len);

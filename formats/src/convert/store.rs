@@ -195,12 +195,14 @@ impl<'a> ChunkStore<'a> {
     ) -> Result<T, FrameError> {
         match held {
             StoredChunk::Here(chunk) => {
+                // It is in memory: visit it there
                 let result = visit(&chunk);
                 self.shared.state().kept -= 1;
                 self.shared.free(chunk);
                 Ok(result)
             }
             StoredChunk::Away { slot, len } => {
+                // It is on the disk: read it into a chunk that is free, and give its slot back
                 let mut chunk = self.take()?;
                 let read = self.read(&mut chunk, slot, len);
                 let result = read.map(|()| visit(&chunk));
@@ -275,8 +277,8 @@ impl<'a> ChunkStore<'a> {
 
     /// The scratch file and its writer thread, both created on first use.
     fn with_writer<T>(&self, ask: impl FnOnce(&Writer) -> T) -> Result<T, FrameError> {
-        let mut writer = self.writer.lock().unwrap_or_else(|e| e.into_inner());
-        let writer = match &mut *writer {
+        let mut guard = self.writer.lock().unwrap_or_else(|e| e.into_inner());
+        let writer = match &mut *guard {
             Some(writer) => writer,
             none => none.insert(self.start()?),
         };

@@ -7,7 +7,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::batch::{Batch, BufferPool, ParticleRange};
-use super::columns::StoredColumns;
+use super::columns::{StoredColumn, StoredColumns};
 use super::settings::{ConvertError, ConvertSettings, Phase, Progress};
 use super::source::ParticleSource;
 use crate::native::StoredType;
@@ -88,6 +88,7 @@ pub(super) fn survey(
     let total = request.source.count();
     let stretches = total.div_ceil(reading.batch_len as u64);
     let (batches, done) = (BufferPool::<Batch>::default(), AtomicU64::new(0));
+    // Survey batches in parallel; the results keep the order of the source
     let found: Vec<BatchSurvey> = (0..stretches)
         .into_par_iter()
         .map(|number| {
@@ -103,6 +104,7 @@ pub(super) fn survey(
     gathered(request.path, columns, found)
 }
 
+/// Surveys the particles of `stretch`, which are read into `batch`.
 fn survey_range(
     request: ConvertRequest,
     columns: &StoredColumns,
@@ -141,24 +143,35 @@ fn survey_range(
     }
     // Find the ranges of the attributes
     for column in &columns.attributes {
-        let mut ranges = Vec::new();
-        if let (StoredType::Ranged, Some(attribute)) = (column.stored, column.attribute) {
-            let (width, size) = (column.source_width(), column.scalar.size());
-            batch.read_values(request.source, attribute, width, stretch)?;
-            ranges = vec![[f64::INFINITY, f64::NEG_INFINITY]; column.components];
-            batch.for_each_place(|place| {
-                let values = batch.values[place * width..][..width].chunks_exact(size);
-                for (value, [low, high]) in values.zip(&mut ranges) {
-                    let value = StoredType::Plain(column.scalar).value(value, [0.0; 2]);
-                    // NaN must not be ignored: an infinite range is reported as an error.
-                    let value = if value.is_nan() { f64::INFINITY } else { value };
-                    (*low, *high) = (low.min(value), high.max(value));
-                }
-            });
-        }
+        let ranges = column_ranges(request, column, batch, stretch)?;
         found.ranges.push(ranges);
     }
     Ok(found)
+}
+
+/// The range of each component of `column` in `stretch`; empty if the column does not store ranges.
+fn column_ranges(
+    request: ConvertRequest,
+    column: &StoredColumn,
+    batch: &mut Batch,
+    stretch: ParticleRange,
+) -> Result<Vec<[f64; 2]>, ConvertError> {
+    let (StoredType::Ranged, Some(attribute)) = (column.stored, column.attribute) else {
+        return Ok(Vec::new());
+    };
+    let (width, size) = (column.source_width(), column.scalar.size());
+    batch.read_values(request.source, attribute, width, stretch)?;
+    let mut ranges = vec![[f64::INFINITY, f64::NEG_INFINITY]; column.components];
+    batch.for_each_place(|place| {
+        let values = batch.values[place * width..][..width].chunks_exact(size);
+        for (bytes, [low, high]) in values.zip(&mut ranges) {
+            let value = StoredType::Plain(column.scalar).value(bytes, [0.0; 2]);
+            // NaN must not be ignored: an infinite range is reported as an error.
+            let end = if value.is_nan() { f64::INFINITY } else { value };
+            (*low, *high) = (low.min(end), high.max(end));
+        }
+    });
+    Ok(ranges)
 }
 
 /// A sample with one particle of each run of `stride`, at a pseudo-random index, because sources are often

@@ -25,6 +25,7 @@ mod text;
 pub fn detect_format(bytes: &[u8], path: &Path) -> Result<Format, ParseError> {
     let named = registry::by_name(path);
     let head = &bytes[..bytes.len().min(HEAD_LEN)];
+    // A signature decides; of formats that are only likely, the first is remembered
     let mut likely = None;
     for format in registry::all() {
         match format.reader().sniff(head)? {
@@ -33,9 +34,11 @@ pub fn detect_format(bytes: &[u8], path: &Path) -> Result<Format, ParseError> {
             Confidence::IfNamed | Confidence::No => {}
         }
     }
+    // Refuse known files of other programs with a better message than the formats give
     if !bytes.is_empty() {
         refuse_foreign(head, path, named)?;
     }
+    // Otherwise the name decides, if the content does not contradict it
     match named {
         Some(format) if format.reader().sniff(head)? >= Confidence::IfNamed => Ok(format),
         _ if bytes.is_empty() => {

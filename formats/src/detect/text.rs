@@ -220,6 +220,7 @@ fn is_charmm_card(lines: &Lines<'_>) -> bool {
 /// A title, then two to five numbers that begin with two codes. `timestep` follows, or the edges of a cell and an atom
 /// (name, optional index, position).
 fn is_dl_poly(lines: &Lines<'_>) -> bool {
+    // Check the codes: what records contain, and the boundary conditions
     let kinds = numbers(lines.get(1)).unwrap_or_default();
     let [content, boundary, rest @ ..] = kinds.as_slice() else {
         return false;
@@ -228,6 +229,7 @@ fn is_dl_poly(lines: &Lines<'_>) -> bool {
     if rest.len() > 3 || !is_code(*content, 2.0) || !is_code(*boundary, 7.0) {
         return false;
     }
+    // Check the first atom, which follows the edges of the cell if there is one
     let has_edges = *boundary > 0.0;
     let atom = if has_edges { 5 } else { 2 };
     let edges = (2..atom).all(|line| has_numbers(lines.get(line), 3));

@@ -70,11 +70,7 @@ fn store_checked(
         _ => None,
     };
     // Bring the particles into tree order
-    let mut positions = vec![Vec3::ZERO; frame.len()];
-    let is_followed = own_radii.is_some() || !kept.is_empty();
-    let mut indices = vec![0; if is_followed { frame.len() } else { 0 }];
-    kd::order_into(&frame.positions, &mut positions, &mut indices, |_| ());
-    arrange(&mut positions, &mut indices);
+    let (positions, indices) = tree_order(frame, own_radii.is_some() || !kept.is_empty());
 
     // Choose the encoding
     let radii: Option<Vec<f32>> = own_radii.map(|radii| gather(radii, 1, &indices));
@@ -92,15 +88,7 @@ fn store_checked(
         bound: settings.bound,
         origin: frame.origin,
         rounding: settings.rounding,
-        radius: match (&frame.radius, radii.as_deref()) {
-            (Some(Radius::Common(radius)), _) => RadiusSpec::Common(*radius),
-            (_, Some(radii)) => {
-                let low = smallest(radii);
-                let high = radii.iter().copied().fold(low, f32::max);
-                RadiusSpec::PerParticle(radius_range([low, high], encoding, settings.bound))
-            }
-            _ => RadiusSpec::None,
-        },
+        radius: radius_spec(frame, radii.as_deref(), encoding, settings.bound),
         attributes: kept.iter().map(|a| spec_of(a)).collect::<io::Result<_>>()?,
         time: frame.time,
         step,
@@ -115,6 +103,33 @@ fn store_checked(
         attributes: &values.iter().map(Vec::as_slice).collect::<Vec<_>>(),
     })?;
     writer.finish()
+}
+
+/// The positions in tree order, and the index of each particle in `frame` if it `is_needed`.
+fn tree_order(frame: &ParticleFrame, is_needed: bool) -> (Vec<Vec3>, Vec<u32>) {
+    let mut positions = vec![Vec3::ZERO; frame.len()];
+    let mut indices = vec![0; if is_needed { frame.len() } else { 0 }];
+    kd::order_into(&frame.positions, &mut positions, &mut indices, |_| ());
+    arrange(&mut positions, &mut indices);
+    (positions, indices)
+}
+
+/// How the radii of `frame` are stored; `radii` are those of its particles if they differ.
+fn radius_spec(
+    frame: &ParticleFrame,
+    radii: Option<&[f32]>,
+    encoding: Encoding,
+    bound: Bound,
+) -> RadiusSpec {
+    match (&frame.radius, radii) {
+        (Some(Radius::Common(radius)), _) => RadiusSpec::Common(*radius),
+        (_, Some(radii)) => {
+            let low = smallest(radii);
+            let high = radii.iter().copied().fold(low, f32::max);
+            RadiusSpec::PerParticle(radius_range([low, high], encoding, bound))
+        }
+        _ => RadiusSpec::None,
+    }
 }
 
 /// The encoding with the fewest bytes. Blocks that exceed the bound count with their size in f32.

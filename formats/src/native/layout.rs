@@ -281,8 +281,13 @@ pub fn parse(bytes: &[u8]) -> Result<FrameIndex, ParseError> {
     Ok(index)
 }
 
-/// Checks the header and returns the range of the index.
-fn index_range(bytes: &[u8]) -> Result<std::ops::Range<usize>, ParseError> {
+/// The number at byte `at` of the header.
+fn word(header: &[u8; HEADER_LEN], at: usize) -> u64 {
+    u64::from_le_bytes(std::array::from_fn(|i| header[at + i]))
+}
+
+/// The header, if it is intact and of this version.
+fn intact_header(bytes: &[u8]) -> Result<&[u8; HEADER_LEN], ParseError> {
     let short = || {
         let what = format!(
             "the header has {HEADER_LEN} bytes, the file {}; perhaps it is still being copied",
@@ -295,8 +300,7 @@ fn index_range(bytes: &[u8]) -> Result<std::ops::Range<usize>, ParseError> {
     if !header.starts_with(MAGIC) {
         return Err(ParseError::malformed(0, "no native frame: the magic bytes are missing"));
     }
-    let word = |at: usize| u64::from_le_bytes(std::array::from_fn(|i| header[at + i]));
-    if word(56) != xxh3_64(&header[..56]) {
+    if word(header, 56) != xxh3_64(&header[..56]) {
         return Err(ParseError::malformed(
             56,
             "the header is damaged: its checksum differs; copy or convert it again",
@@ -309,8 +313,14 @@ fn index_range(bytes: &[u8]) -> Result<std::ops::Range<usize>, ParseError> {
             "a native frame of version {version}, this program reads {VERSION}; convert again"
         )));
     }
+    Ok(header)
+}
+
+/// Checks the header and returns the range of the index.
+fn index_range(bytes: &[u8]) -> Result<std::ops::Range<usize>, ParseError> {
+    let header = intact_header(bytes)?;
     // Check the length of the file
-    let (file_len, offset, len) = (word(16), word(24), word(32));
+    let (file_len, offset, len) = (word(header, 16), word(header, 24), word(header, 32));
     if file_len != bytes.len() as u64 {
         return Err(ParseError::malformed(
             bytes.len().min(usize::try_from(file_len).unwrap_or(usize::MAX)),
@@ -329,7 +339,7 @@ fn index_range(bytes: &[u8]) -> Result<std::ops::Range<usize>, ParseError> {
         .ok_or_else(|| {
             ParseError::malformed(24, "the index is outside the file; convert it again")
         })?;
-    if word(40) != xxh3_64(&bytes[index.clone()]) {
+    if word(header, 40) != xxh3_64(&bytes[index.clone()]) {
         return Err(ParseError::malformed(
             index.start,
             "the index is damaged: its checksum differs; copy or convert it again",

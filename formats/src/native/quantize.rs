@@ -131,6 +131,7 @@ stored_codes!(Q10Block, Q16Block);
 fn encode_block<B: CompactBlock>(block: &Block, node: &Node, slot: usize) -> Option<(B, f64)> {
     let frame = node.child_frame(slot);
     let steps = B::steps(&frame);
+    // Find the codes of each axis on its grid of steps
     let mut codes = [[0; BLOCK_SIZE]; 3];
     let axes = [&block.x, &block.y, &block.z];
     for (axis, (codes, values)) in codes.iter_mut().zip(axes).enumerate() {
@@ -144,11 +145,13 @@ fn encode_block<B: CompactBlock>(block: &Block, node: &Node, slot: usize) -> Opt
             *code = grid.code(*value)?;
         }
     }
+    // Check that the codes are not a reference to an uncoded block
     let coded = B::from_codes(&codes);
     if coded.wide_index().is_some() {
         // The block is not arranged as coded blocks must be.
         return None;
     }
+    // Measure the error of what a reader will decode
     let error = largest_distance(&coded.decode(&frame), block);
     Some((coded, error))
 }

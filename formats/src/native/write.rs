@@ -302,6 +302,7 @@ fn index_of(spec: &FrameSpec, measured: &FrameSummary, sections: &[Section]) -> 
         max_error: spec.max_error,
         section: *section,
     };
+    // Sections are in a fixed order: those of all frames, then one for each attribute, then uncoded blocks
     let attributes = spec.attributes.iter().zip(&sections[ATTRIBUTES..wide]);
     FrameIndex {
         count: spec.count,

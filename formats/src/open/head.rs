@@ -44,26 +44,27 @@ pub fn detect_file(path: &Path) -> Result<Format, FrameError> {
 /// the names behind numbers. Looks at the first bytes unless the format needs more. Empty for a file that cannot be
 /// read.
 pub fn remarks(path: &Path) -> Vec<String> {
-    let remarks = head(path)
+    let notes = head(path)
         .and_then(|head| {
             let format = crate::detect::detect_format(&head, path).map_err(|e| e.in_file(path))?;
             let reader = format.reader();
             if !reader.info().remarks_need_whole_file {
                 return Ok(reader.remarks(&head));
             }
+            // Some notes need the whole file, which is mapped unless it is compressed
             let map = Arc::new(MappedFile::open(path)?);
             if is_compressed(map.bytes()) {
                 return Ok(reader.remarks(&head));
             }
             let siblings = SiblingFiles::of(path);
-            let remarks = reader.remarks_of_file(&siblings.around(SharedBytes::new(map.clone())));
+            let found = reader.remarks_of_file(&siblings.around(SharedBytes::new(map.clone())));
             map.check()?;
             siblings.check()?;
-            Ok(remarks)
+            Ok(found)
         })
         .unwrap_or_default()
         .into_iter();
-    remarks.map(one_line).collect()
+    notes.map(one_line).collect()
 }
 
 /// The names behind the numbers of attributes in the file at `path`. Empty for a file that cannot be read, and of a

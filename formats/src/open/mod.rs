@@ -153,6 +153,7 @@ impl FrameFile {
     ) -> Result<(Content, FileStamp, Vec<String>), FrameError> {
         let in_file = |e: StreamError| e.in_file(path);
         let stamp = FileStamp::of(path)?;
+        // Read the start, which is enough to detect the format
         let mut stream = decompressor(path, budget)?;
         let is_compressed = stream.is_compressed();
         let mut bytes = Vec::new();
@@ -163,20 +164,24 @@ impl FrameFile {
         let is_whole = stream.fill(&mut bytes, PREFIX_LEN).map_err(in_file)? < PREFIX_LEN;
         // Fail before more is decompressed than is of use.
         let format = crate::detect::detect_format(&bytes, path).map_err(|e| e.in_file(path))?;
+        // Small files are kept whole
         if is_whole {
             return Ok((Content::whole(bytes), stamp, stream.into_notes()));
         }
+        // Formats that are read in order need no more bytes at once
         if format.is_streamed(&bytes) {
             let decoder_len = is_compressed.then(|| stream.decoder_len());
             let file = StreamedFile::new(bytes, decoder_len, stamp);
             return Ok((Content::Streamed(Box::new(file)), stamp, Vec::new()));
         }
+        // Long trajectories are mapped: steps are read one by one
         if !is_compressed && (always_map || format.may_hold_many_steps()) {
             let file = SteppedFile::new(&bytes, stamp);
             if always_map || file.is_worth_mapping(path, format, budget) {
                 return Ok((Content::Stepped(file), stamp, Vec::new()));
             }
         }
+        // Read the rest of all others into memory, as far as the budget allows
         let room = budget.for_content();
         if !is_compressed {
             let fits = room.check(stamp.len, "the file is");
@@ -232,6 +237,7 @@ impl FrameFile {
     ) -> Result<Self, FrameError> {
         let in_file = |e: ParseError| e.in_file(path);
         let format = crate::detect::detect_format(content.head(), path).map_err(in_file)?;
+        // Find the steps, with the memory that the content leaves
         let left = budget.less(content.held_len(format));
         let steps = match &content {
             Content::Streamed(file) => file.steps(path, format, left)?,
@@ -326,12 +332,14 @@ impl FrameFile {
     /// [`FrameError::Unsupported`] for a variant of the format that is not read,
     /// [`FrameError::TooLarge`] if its numbers need more memory than is allowed.
     pub fn read(&self, index: usize) -> Result<RawParticles, FrameError> {
+        // Find the step, and the memory for it
         let step = self.steps.get(index).ok_or_else(|| {
             let what = format!("step {index} does not exist, the file has {}", self.steps.len());
             ParseError::malformed(self.bytes().len(), what).in_file(&self.path)
         })?;
         let left = self.budget.less(self.held_len());
         let in_file = |e: ParseError| e.in_file(&self.path);
+        // Read it from where the content is
         let particles = match &self.content {
             Content::Streamed(file) => {
                 return file.read(&self.path, self.format, (step, self.steps.len()), left);
@@ -349,6 +357,7 @@ impl FrameFile {
                 particles.map_err(in_file)?
             }
         };
+        // Check that the particles fit beside the content
         let fits = left.check(particles.byte_len(), "its numbers in memory are");
         fits.map_err(in_file)?;
         Ok(particles)

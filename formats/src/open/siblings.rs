@@ -63,14 +63,15 @@ impl Siblings for SiblingFiles {
             let why = "which is not in its directory; copy it there, and refer to it by its name";
             return Err(refused(why.to_owned()));
         }
+        // Open each file once: several readers may refer to it
         let path = self.directory.join(inside);
         let mut opened = self.opened.lock().unwrap_or_else(PoisonError::into_inner);
         let file = match opened.get(&path) {
             Some(file) => Arc::clone(file),
             None => {
-                let file = MappedFile::open(&path)
+                let map = MappedFile::open(&path)
                     .map_err(|e| refused(format!("which cannot be opened: {e}; copy it there")))?;
-                let file = Arc::new(file);
+                let file = Arc::new(map);
                 opened.insert(path.clone(), Arc::clone(&file));
                 file
             }

@@ -119,8 +119,8 @@ impl StreamedFile {
     /// The file at `path` from its beginning.
     fn source(&self, path: &Path, budget: MemoryBudget) -> Result<ByteSource<'static>, FrameError> {
         let stream = Box::new(decompressor(path, budget)?);
-        let about = unpacked_len(path).unwrap_or(self.stamp.len);
-        let about = usize::try_from(about).unwrap_or(usize::MAX);
+        let unpacked = unpacked_len(path).unwrap_or(self.stamp.len);
+        let about = usize::try_from(unpacked).unwrap_or(usize::MAX);
         let len = match self.end.get() {
             Some(end) => usize::try_from(end.len).ok(),
             None => (!self.is_compressed()).then_some(about),

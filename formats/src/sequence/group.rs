@@ -44,8 +44,8 @@ impl LoneParts {
         names: &[String],
     ) -> Self {
         let note = |part: &u32| {
-            let file = files.iter().find(|file| file.part == *part);
-            let file = file.and_then(|file| file.path.file_name());
+            let first = files.iter().find(|file| file.part == *part);
+            let file = first.and_then(|file| file.path.file_name());
             format!(
                 "`{}` is left out, since no other step has a file of this name; --parts {} draws its particles",
                 file.unwrap_or_default().to_string_lossy(),
@@ -130,6 +130,7 @@ pub(super) fn pick(
     notes: &mut Vec<String>,
 ) -> Result<FileGroup, SequenceError> {
     const CLEARLY_MORE: usize = 4;
+    // Group the names, the longest sequence first
     let mut by_extension = BTreeMap::<String, Vec<FileName>>::new();
     for name in names {
         by_extension.entry(name.extension.clone()).or_default().push(name);
@@ -141,6 +142,7 @@ pub(super) fn pick(
     let Some((first, others)) = candidates.split_first() else {
         return Err(SequenceError::NoInput);
     };
+    // Refuse to guess between sequences of similar length
     let is_minor = |c: &SequenceCandidate| {
         let unnumbered = c.numbers.is_empty() && first.numbers.len() > 1;
         unnumbered || c.frames() * CLEARLY_MORE <= first.frames()
@@ -151,6 +153,7 @@ pub(super) fn pick(
             groups: candidates.iter().map(SequenceCandidate::summary).collect(),
         });
     }
+    // Report what is left out
     for other in others.iter().map(SequenceCandidate::summary) {
         notes.push(format!("`{}` ({}) is left out", other.pattern, counted(&other)));
     }
@@ -163,6 +166,7 @@ pub(super) fn listed(
     names: Vec<FileName>,
     notes: &mut Vec<String>,
 ) -> Result<FileGroup, SequenceError> {
+    // Find the series of names; a series of its own counts like any other here
     let order: Vec<PathBuf> = names.iter().map(|n| n.path.clone()).collect();
     let mut candidates = candidates(names);
     for candidate in &mut candidates {
@@ -172,6 +176,7 @@ pub(super) fn listed(
         return into_group(candidates.swap_remove(0));
     }
     note_mixed_formats(&order, notes);
+    // Take the frame numbers of the names, if they are distinct
     let numbered: BTreeMap<i64, PathBuf> = candidates
         .iter()
         .flat_map(|c| &c.runs)
@@ -199,6 +204,7 @@ pub(super) fn listed(
 
 /// Notes listed files of several formats: these are seldom frames of one simulation.
 fn note_mixed_formats(paths: &[PathBuf], notes: &mut Vec<String>) {
+    // Find the extensions, without those of compression
     let extension = |path: &PathBuf| {
         let name = path.file_name()?.to_str()?.to_ascii_lowercase();
         let extension = strip_extension(&name).rsplit_once('.')?.1;
@@ -209,6 +215,7 @@ fn note_mixed_formats(paths: &[PathBuf], notes: &mut Vec<String>) {
     if extensions.len() < 2 {
         return;
     }
+    // A topology among them was probably meant for --topology
     let names: Vec<String> = extensions.into_iter().map(|e| format!(".{e}")).collect();
     notes.push(match topology {
         Some(path) => format!(
@@ -224,6 +231,7 @@ fn note_mixed_formats(paths: &[PathBuf], notes: &mut Vec<String>) {
 
 /// Runs of `names`, joined where they share frame numbers.
 fn candidates(names: Vec<FileName>) -> Vec<SequenceCandidate> {
+    // Group names that differ in numbers only, the longest run first
     let mut by_text = BTreeMap::<Vec<String>, Vec<FileName>>::new();
     for name in names {
         by_text.entry(name.literals.clone()).or_default().push(name);
@@ -234,6 +242,7 @@ fn candidates(names: Vec<FileName>) -> Vec<SequenceCandidate> {
     // Candidates that have a frame number: only those can share it.
     let mut homes = BTreeMap::<i64, BTreeSet<usize>>::new();
     for run in runs {
+        // Find the candidate that has at least half of the frame numbers of the run, or of which the run has half
         let numbers = run.numbers();
         let mut shared = BTreeMap::<usize, usize>::new();
         for home in numbers.iter().filter_map(|n| homes.get(n)).flatten() {
@@ -247,6 +256,7 @@ fn candidates(names: Vec<FileName>) -> Vec<SequenceCandidate> {
         if home == candidates.len() {
             candidates.push(SequenceCandidate::default());
         }
+        // Add the run; one that has a single frame is kept apart
         for number in &numbers {
             homes.entry(*number).or_default().insert(home);
         }
@@ -266,6 +276,7 @@ fn candidates(names: Vec<FileName>) -> Vec<SequenceCandidate> {
 fn runs(names: Vec<FileName>) -> Vec<NameSeries> {
     let given = names.first().and_then(|n| n.frame_column);
     let columns = names.first().map_or(0, |n| n.numbers.len());
+    // Find the numbers that differ, and the one that counts frames
     let values =
         |column: usize| -> BTreeSet<i64> { names.iter().map(|n| n.numbers[column]).collect() };
     let varying: Vec<usize> = (0..columns).filter(|c| values(*c).len() > 1).collect();
@@ -277,6 +288,7 @@ fn runs(names: Vec<FileName>) -> Vec<NameSeries> {
         .or_else(|| varying.iter().copied().find(|c| distinct(*c)))
         .or_else(|| varying.last().copied())
         .or_else(|| names.first().and_then(FileName::lone_column));
+    // Divide the names by the other numbers
     let free: Vec<usize> = varying.into_iter().filter(|c| Some(*c) != column).collect();
     if free.is_empty() || column.is_some_and(distinct) {
         return vec![NameSeries { names, column, free }];
@@ -291,6 +303,7 @@ fn runs(names: Vec<FileName>) -> Vec<NameSeries> {
 }
 
 fn into_group(candidate: SequenceCandidate) -> Result<FileGroup, SequenceError> {
+    // Order the runs by their patterns, which name the parts
     let mut others: Vec<String> = candidate.runs.iter().map(NameSeries::pattern).collect();
     others.sort();
     let lone = candidate.lone.into_iter().map(|run| (run, true));
@@ -300,6 +313,7 @@ fn into_group(candidate: SequenceCandidate) -> Result<FileGroup, SequenceError> 
     let patterns: Vec<String> = runs.iter().map(|(run, _)| run.pattern()).collect();
     let lone: BTreeSet<u32> =
         (0..).zip(&runs).filter(|(_, (_, is_lone))| *is_lone).map(|(part, _)| part).collect();
+    // Order the files by frame, part and piece
     let mut files: Vec<GroupFile> = Vec::new();
     for (part, (run, _)) in (0..).zip(&runs) {
         files.extend(run.names.iter().map(|name| GroupFile {
@@ -313,6 +327,7 @@ fn into_group(candidate: SequenceCandidate) -> Result<FileGroup, SequenceError> 
         let key = |file: &GroupFile| (file.number, file.part, file.piece);
         (key(a), &a.path).cmp(&(key(b), &b.path))
     });
+    // Refuse two files for the same place
     for pair in files.windows(2) {
         if let [a, b] = pair
             && a.number == b.number
@@ -326,6 +341,7 @@ fn into_group(candidate: SequenceCandidate) -> Result<FileGroup, SequenceError> 
             });
         }
     }
+    // Name the parts
     let parts = part_names(&patterns);
     let lone =
         (!lone.is_empty()).then(|| LoneParts::new(lone, part_names(&others), &files, &parts));
@@ -372,8 +388,8 @@ fn common_ends(texts: &[String]) -> (usize, usize) {
         let same = first.chars().zip(other.chars()).take_while(|(a, b)| a == b);
         same.map(|(a, _)| a.len_utf8()).sum::<usize>()
     };
-    let start = others.iter().map(start_with).min().unwrap_or(first.len());
-    let start = first[..start].rfind(SEPARATORS).map_or(0, |i| i + 1);
+    let shared = others.iter().map(start_with).min().unwrap_or(first.len());
+    let start = first[..shared].rfind(SEPARATORS).map_or(0, |i| i + 1);
     let end_with = |other: &String| {
         let tails = first[start..].chars().rev().zip(other[start..].chars().rev());
         let same = tails.take_while(|(a, b)| a == b);

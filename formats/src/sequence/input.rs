@@ -50,6 +50,7 @@ pub(super) fn listed_names(paths: &[PathBuf]) -> Result<Vec<FileName>, SequenceE
     let mut names: Vec<FileName> = Vec::new();
     let mut known = HashSet::new();
     for path in paths {
+        // Find the names: patterns and directories stand for many files
         let found = match SequenceInput::from_path(path) {
             SequenceInput::Directory(path) => scan::directory(&path)?,
             SequenceInput::Pattern(path) => scan::fitting(&Pattern::parse(&path)?, &path)?,
@@ -58,6 +59,7 @@ pub(super) fn listed_names(paths: &[PathBuf]) -> Result<Vec<FileName>, SequenceE
                 return Err(SequenceError::missing(path));
             }
         };
+        // Keep the first of each
         for name in found {
             if known.insert(name.path.clone()) {
                 names.push(name);

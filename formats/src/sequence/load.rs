@@ -67,6 +67,7 @@ impl Sequence {
         let frame = &self.frames[index];
         let mut notes = Vec::new();
         let (mut all_bytes, mut content_bytes) = (0, 0);
+        // Read the parts one after the other
         let mut parts = Vec::with_capacity(frame.parts.len());
         let mut read_bytes = 0;
         for part in &frame.parts {
@@ -85,6 +86,7 @@ impl Sequence {
             content_bytes = content_bytes.max(held);
             parts.push(Part { number: part.part, name: self.part_name(part), particles });
         }
+        // Join them; an error that concerns all of them names the first file
         let in_first = |error: ParseError| {
             error.in_file(frame.parts.first().map_or(Path::new(""), |part| &part.path))
         };
@@ -134,6 +136,7 @@ impl Sequence {
         part: &PartFile,
         budget: MemoryBudget,
     ) -> Result<(Arc<FrameFile>, usize), FrameError> {
+        // A file with one step is not kept
         let Some(step) = part.step else {
             self.check_listed(part)?;
             let file = FrameFile::open_within(&part.path, budget)?;
@@ -148,6 +151,7 @@ impl Sequence {
                 _ => Ok((Arc::new(file), 0)),
             };
         };
+        // Use the file that is open already, unless it has changed since
         let stamp = stamp(&part.path);
         let lock = || self.cache.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(cached) = lock().as_ref()

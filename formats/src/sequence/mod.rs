@@ -156,6 +156,7 @@ impl Sequence {
         settings: SequenceSettings,
     ) -> Result<Self, SequenceError> {
         let mut notes = Vec::new();
+        // Find the files, and which of them belong together
         let group = match input {
             SequenceInput::Directory(path) => {
                 let names = pieces::find_pieces(scan::directory(path)?, &mut notes);
@@ -171,6 +172,7 @@ impl Sequence {
                 group::listed(names, &mut notes)?
             }
         };
+        // Follow lists of files
         if collection::has_list(group.files.iter().map(|file| &*file.path)) {
             let expansion = collection::expand(&group, settings, &mut notes)?;
             return Ok(Self::from_expansion(expansion, notes, settings.budget));
@@ -195,8 +197,10 @@ impl Sequence {
     }
 
     fn from_group(group: FileGroup, mut notes: Vec<String>, budget: MemoryBudget) -> Self {
+        // Number the steps of files with several of them
         let (numbered, last) = scan::number_steps(group.files, budget, &mut notes);
         let all = frames_of(numbered);
+        // Parts of a single frame are left out at first; keep them for those who ask for them
         let add_notes = |frames: &[SequenceFrame], parts: &[String], notes: &mut Vec<String>| {
             note_gaps(frames, notes);
             note_missing_parts(frames, parts, notes);
@@ -213,6 +217,7 @@ impl Sequence {
             }
         };
         add_notes(&frames, &parts, &mut notes);
+        // Keep the file that was opened last, if more of its steps will be read
         let cache = last
             .filter(|f| f.steps().len() > 1)
             .map(|file| CachedFile { stamp: stamp(file.path()), file: Arc::new(file) });
@@ -291,9 +296,11 @@ impl Sequence {
     /// # Errors
     /// The first name that matches no part.
     pub fn keep_parts(&mut self, names: &[String]) -> Result<(), SequenceError> {
+        // Start from all parts, with those of a single frame
         if let Some(all) = self.all_parts.take() {
             (self.frames, self.parts, self.notes) = (all.frames, all.parts, all.notes);
         }
+        // Find the parts that are meant
         let mut meant = BTreeSet::new();
         for name in names {
             let found = parts_meant(&self.parts, name);
@@ -305,6 +312,7 @@ impl Sequence {
             }
             meant.extend(found);
         }
+        // Drop all others
         let kept = |part: &PartFile| meant.contains(&part.part);
         for frame in &mut self.frames {
             frame.parts.retain(kept);
@@ -360,9 +368,9 @@ impl Sequence {
     pub fn remarks(&self) -> Vec<String> {
         let mut all: Vec<String> = Vec::new();
         for path in self.inputs(0) {
-            for remark in crate::open::remarks(path) {
-                if !all.contains(&remark) {
-                    all.push(remark);
+            for note in crate::open::remarks(path) {
+                if !all.contains(&note) {
+                    all.push(note);
                 }
             }
         }

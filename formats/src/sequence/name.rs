@@ -35,9 +35,11 @@ impl FileName {
     pub(super) fn parse(path: &Path, frame: Option<Range<usize>>) -> Self {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let stem_len = stem_len(&name);
+        // Separate the extension, with that of a compression
         let (stem, suffix) = name.split_at(stem_len);
         let extension =
             strip_extension(&suffix.to_ascii_lowercase()).trim_start_matches('.').to_owned();
+        // Divide the rest into text and numbers
         let mut parts = Splitter::default();
         let mut frame_column = None;
         match frame.filter(|range| range.end <= stem_len) {

@@ -49,6 +49,7 @@ pub(super) fn note_missing_parts(
             }
         }
     }
+    // Note the frames that lack each part
     for (name, present) in parts.iter().zip(present) {
         if present.len() == frames.len() {
             continue;

@@ -121,6 +121,7 @@ impl PatternSearch<'_> {
             PatternToken::AnyChar => next.is_some_and(|c| self.fits(left, at + c.len_utf8())),
             PatternToken::AnyText if left.is_empty() => true,
             PatternToken::AnyText => {
+                // Try each place only once for the same tokens, or long names would take exponential time
                 if !self.dead_ends.insert((tokens.len(), at)) {
                     return false;
                 }
@@ -128,6 +129,7 @@ impl PatternSearch<'_> {
                 places.into_iter().any(|skipped| self.fits(left, at + skipped))
             }
             PatternToken::Number => {
+                // Take all digits, with a sign unless it separates words
                 let unsigned = match rest.strip_prefix('-') {
                     Some(unsigned) if sign_may_follow(&self.name[..at]) => unsigned,
                     _ => rest,

@@ -51,19 +51,22 @@ fn follow_references(names: &mut Vec<FileName>, notes: &mut Vec<String>) {
 /// Finds names whose last number is that of a file of one step: the files state how many a step has. Notes steps that
 /// have fewer.
 fn split_pieces(names: &mut [FileName], notes: &mut Vec<String>) {
+    // Ask the first file of each series how many files a step has
     let mut counts = BTreeMap::<Vec<String>, u64>::new();
     for name in names.iter_mut().filter(|name| name.may_be_piece()) {
-        let count = counts.entry(name.literals.clone());
-        let count = *count.or_insert_with(|| piece_count(&name.path));
+        let entry = counts.entry(name.literals.clone());
+        let count = *entry.or_insert_with(|| piece_count(&name.path));
         if count > 1 {
             name.split_piece();
         }
     }
+    // Count the files of each step that are there
     let mut found = BTreeMap::<(&[String], &[i64]), (u64, &Path)>::new();
     for name in names.iter().filter(|name| name.piece.is_some()) {
         let step = found.entry((&name.literals, &name.numbers));
         step.or_insert((0, &name.path)).0 += 1;
     }
+    // Note steps that lack some
     for (count, path) in found.into_values() {
         let stated = piece_count(path);
         if count < stated {

@@ -19,11 +19,13 @@ use spherule_readers::Format;
 /// over by name; only where no name is known are the files looked into.
 pub(super) fn directory(path: &Path) -> Result<Vec<FileName>, SequenceError> {
     let files = list(path)?;
+    // Known names first, then lists of files
     let known = files.iter().filter(|f| crate::registry::by_name(f).is_some());
     let mut names: Vec<FileName> = known.map(|f| FileName::parse(f, None)).collect();
     if names.is_empty() {
         names = lists_among(&files);
     }
+    // Then look into all files
     let mut refusal = None;
     if names.is_empty() {
         for file in &files {
@@ -36,6 +38,7 @@ pub(super) fn directory(path: &Path) -> Result<Vec<FileName>, SequenceError> {
             }
         }
     }
+    // Say what is there instead, for the error
     if names.is_empty() {
         let refusal = is_adios(&files).then(|| ADIOS.to_owned()).or(refusal);
         return Err(SequenceError::NoFrames {
@@ -115,6 +118,7 @@ fn list(path: &Path) -> Result<Vec<PathBuf>, SequenceError> {
 
 /// Describes a directory without particle files, by extension.
 fn what_is_there(path: &Path, files: &[PathBuf]) -> String {
+    // Suggest directories, which are probably those with the particles
     let mut directories: Vec<String> = fs::read_dir(path)
         .into_iter()
         .flatten()
@@ -132,6 +136,7 @@ fn what_is_there(path: &Path, files: &[PathBuf]) -> String {
     if files.is_empty() {
         return "the directory is empty".to_owned();
     }
+    // Otherwise name the most frequent extensions
     let mut kinds = BTreeMap::<String, usize>::new();
     for file in files {
         let extension = file.extension().unwrap_or_default().to_string_lossy();
@@ -183,6 +188,7 @@ fn similar(missing: &Path) -> Option<String> {
         _ => Path::new("."),
     };
     let name = name_of(missing);
+    // Compare the names of its directory, and prefer those that can be opened
     let mut found = Vec::new();
     for entry in fs::read_dir(directory).ok()? {
         let path = entry.ok()?.path();
@@ -212,11 +218,13 @@ pub(super) fn number_steps(
     budget: MemoryBudget,
     notes: &mut Vec<String>,
 ) -> (Vec<NumberedStep>, Option<FrameFile>) {
+    // Look for a file with several steps among those that may have them
     let lone = files.len() == 1;
     let mut scan = StepScan { budget, ..StepScan::default() };
     let several = files.iter().enumerate().any(|(i, f)| {
         may_hold_many(&f.path) && scan.is_suspect(&files, i) && scan.steps(i, &f.path).len() > 1
     });
+    // Without one, names number the files; a lone file may have a number inside
     if !several {
         let own = |index: usize| match scan.scanned.get(&index).map(Vec::as_slice) {
             Some([step]) if lone => step.number,
@@ -228,6 +236,7 @@ pub(super) fn number_steps(
         });
         return (numbered.collect(), scan.last);
     }
+    // Otherwise each step is an entry of its own
     let mut entries: Vec<(Option<i64>, PartFile)> = Vec::new();
     for (index, file) in files.iter().enumerate() {
         for (at, step) in scan.steps(index, &file.path).iter().enumerate() {
@@ -245,6 +254,7 @@ fn number_entries(
     entries: Vec<(Option<i64>, PartFile)>,
     notes: &mut Vec<String>,
 ) -> Vec<NumberedStep> {
+    // Use the written numbers only if all steps have one
     let written = entries.iter().all(|(number, _)| number.is_some());
     let mut counts = BTreeMap::<u32, i64>::new();
     let mut numbered = BTreeMap::<(i64, u32), PartFile>::new();

@@ -109,10 +109,12 @@ impl FrameStats {
         let mut gathered = Gathered::of(source.attributes().iter().map(shape));
         let mut first = 0;
         while first < source.count() {
+            // Read a block of positions
             let len = (source.count() - first).min(BLOCK as u64);
             let len_here = usize::try_from(len).unwrap_or(BLOCK);
             let mut positions = vec![DVec3::ZERO; len_here];
             source.read_positions(first, &mut positions)?;
+            // Read the values of its attributes
             let mut attributes = Vec::new();
             for (index, attribute) in source.attributes().iter().enumerate() {
                 let mut data =
@@ -125,6 +127,7 @@ impl FrameStats {
                     data,
                 });
             }
+            // Add it to the sums
             gathered.add(&Positions::F64(positions), &attributes);
             first += len;
         }

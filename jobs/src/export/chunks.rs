@@ -50,9 +50,11 @@ impl Chunks {
         requested: Option<NonZeroUsize>,
         max_tasks: NonZeroUsize,
     ) -> Result<Self, ExportError> {
+        // Choose the size
         let default = frames.len().div_ceil(DEFAULT_TASKS).max(1);
         let preferred = requested.map_or(default, NonZeroUsize::get);
         let size = preferred.max(frames.len().div_ceil(max_tasks.get()));
+        // Remember why, for the report
         let choice = match requested {
             Some(requested) if requested.get() < size => ChunkChoice::Enlarged {
                 requested: requested.get(),
@@ -62,6 +64,7 @@ impl Chunks {
             Some(_) => ChunkChoice::Requested,
             None => ChunkChoice::Default,
         };
+        // Divide the frames
         let ranges: Vec<FrameRange> = frames
             .chunks(size.max(1))
             .filter_map(|chunk| FrameRange::from_frames(chunk.iter().copied()))

@@ -140,6 +140,7 @@ impl JobTemplate<'_> {
         for path in &self.paths {
             all.push(path.definition()?);
         }
+        // Frames and the size of a task can be overridden at submission
         all.push(vec![
             field("name", "Frames"),
             field("type", "STRING"),
@@ -156,6 +157,7 @@ impl JobTemplate<'_> {
             field("minValue", 1),
             field("default", self.chunks.size as u64),
         ]);
+        // The program may be elsewhere on the hosts
         all.push(vec![
             field("name", name),
             field("type", "STRING"),
@@ -223,6 +225,7 @@ impl PathParameter {
 
 impl HostRequirements {
     fn to_field(&self) -> Option<Field> {
+        // Amounts, in the units of the specification
         let mut amounts = Vec::new();
         let cpus = self.cpus.map(|n| ("amount.worker.vcpu", u64::from(n)));
         // In MiB
@@ -231,6 +234,7 @@ impl HostRequirements {
         for (name, min) in cpus.into_iter().chain(memory) {
             amounts.push(YamlNode::Map(vec![field("name", name), field("min", min)]));
         }
+        // Attributes
         let system = |name: &str| {
             YamlNode::Map(vec![
                 field("name", "attr.worker.os.family"),

@@ -119,6 +119,7 @@ impl ArrayScript<'_> {
         let Resources { cpus, memory, time, concurrent, partition, account } = &self.resources;
         let last = self.chunks.ranges.len().saturating_sub(1);
         let at_once = concurrent.map_or_else(String::new, |n| format!("%{n}"));
+        // Collect the directives that every job has, then those that were requested
         let mut all = vec![
             format!("job-name={}", job_name(self.name)),
             format!("array=0-{last}{at_once}"),
@@ -134,6 +135,7 @@ impl ArrayScript<'_> {
             }
         }
         let all: Vec<String> = all.iter().map(|d| format!("#SBATCH --{d}\n")).collect();
+        // Write them, with those for interruption
         Ok(format!(
             "{}\
              # TERM before the time limit: the frame in progress is finished, and the task is requeued.\n\

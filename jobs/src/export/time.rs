@@ -37,10 +37,12 @@ impl FromStr for TimeLimit {
             let value = part.parse::<u64>().ok().filter(|_| digits);
             value.filter(|n| *n <= MAX_SECONDS).ok_or_else(invalid)
         };
+        // Days are before a hyphen
         let (days, clock) = match text.split_once('-') {
             Some((days, clock)) => (Some(number(days)?), clock),
             None => (None, text),
         };
+        // What the other numbers mean depends on how many there are, and on whether there are days
         let parts = clock.split(':').map(number).collect::<Result<Vec<_>, _>>()?;
         let seconds = match (days, parts.as_slice()) {
             (None, [minutes]) => minutes * MINUTE,

@@ -104,10 +104,12 @@ fn read_lines(
     let mut line = Vec::new();
     loop {
         let at_line = |error| (position.lines + 1, error);
+        // Read a line, but never more than the longest that is allowed
         line.clear();
         let mut limited = Read::by_ref(reader).take(MAX_LINE);
         let read = limited.read_until(b'\n', &mut line);
         let length = read.map_err(|e| at_line(e.into()))? as u64;
+        // Leave an incomplete line for the next time
         if !line.ends_with(b"\n") && length < MAX_LINE {
             return Ok(());
         }

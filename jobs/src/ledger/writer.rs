@@ -54,12 +54,14 @@ impl LedgerWriter {
             .set_len(self.length)
             .and_then(|()| file.seek(SeekFrom::Start(self.length)))
             .and_then(|_| file.write_all(&line));
+        // Sync if requested, or if the last time is long ago
         let is_due = sync_now || self.last_sync.is_none_or(|at| at.elapsed() >= SYNC_INTERVAL);
         self.is_synced = is_due;
         let written = written.and_then(|()| if is_due { file.sync_data() } else { Ok(()) });
         if is_due {
             self.last_sync = Some(Instant::now());
         }
+        // After a failure, remove the torn line at once if possible
         if let Err(error) = written {
             let _ = file.set_len(self.length);
             return Err(failed(error));

@@ -60,6 +60,7 @@ impl Claim {
         let mut generation = 0;
         while generation < MAX_GENERATIONS {
             let path = registry.work_dir.join(file_name(&name, generation));
+            // Create a link for the claim, which only one worker can
             if link_exclusively(&registry.record_path, &path, &registry.record_line)? {
                 let claim = Self::new(registry, name, generation);
                 return Ok(match claim.rival() {
@@ -67,6 +68,7 @@ impl Claim {
                     Some(rival) => ClaimOutcome::Held(rival.description()),
                 });
             }
+            // Somebody else has it: find out whether they are alive
             let (liveness, record) = match WorkerRecord::read(&path) {
                 Ok(Some(record)) => {
                     let liveness = registry.monitor.of_worker(&registry.work_dir, &record);
@@ -79,6 +81,7 @@ impl Claim {
                 // worker is behind a pipe or a directory
                 Err(_) => (registry.monitor.of_file(&path), None),
             };
+            // Decide; the claim of a dead worker is passed by with the next generation
             match (liveness, record) {
                 // A network file system may repeat a request whose reply was lost
                 (_, Some(record)) if record.worker == registry.record.worker => {

@@ -61,6 +61,7 @@ impl WorkerRegistry {
     ) -> io::Result<Arc<Self>> {
         let work_dir = dir.join(WORK_DIR);
         let interval = HEARTBEAT_INTERVAL.min(takeover_after / 4).max(MIN_HEARTBEAT_INTERVAL);
+        // Describe this worker
         let record = WorkerRecord {
             worker: new_worker_name(),
             process: Process::current().clone(),
@@ -68,6 +69,7 @@ impl WorkerRegistry {
             heartbeat_interval_ms: u64::try_from(interval.as_millis()).unwrap_or(u64::MAX),
         };
         let record_line = record.to_line()?;
+        // Write the record before the first claim, and keep it fresh by heartbeats
         let record_path = work_dir.join(record.file_name());
         write_record(&work_dir, &record_path, &record_line)?;
         let is_declared_dead = Arc::new(AtomicBool::new(false));
@@ -197,6 +199,7 @@ fn remove_dead(
     monitor: &LivenessMonitor,
     own: Option<&WorkerRecord>,
 ) -> io::Result<HashSet<String>> {
+    // Remove the records of dead workers, and count living ones
     let mut living_owners = HashSet::new();
     let mut others = 0;
     for (path, record) in list_records(work_dir)? {
@@ -217,6 +220,7 @@ fn remove_dead(
             _ => drop(remove_if_exists(&path)),
         }
     }
+    // Remove the claims of all that are gone
     if others == 0 {
         for path in list_files(work_dir)?.into_iter().filter(|p| is_ours(p)) {
             let record = WorkerRecord::read(&path).ok().flatten();

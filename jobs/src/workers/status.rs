@@ -34,6 +34,7 @@ pub(crate) fn worker_statuses(dir: &Path) -> io::Result<Vec<WorkerStatus>> {
         .into_iter()
         .filter_map(|(path, record)| Some(WorkerStatus::new(&path, record?)))
         .collect();
+    // Add the frames that each of them has claimed
     for path in list_files(&work_dir)? {
         let name = path.file_name().and_then(|name| name.to_str());
         let Some(frame) = name.and_then(claimed_frame) else {
@@ -47,6 +48,7 @@ pub(crate) fn worker_statuses(dir: &Path) -> io::Result<Vec<WorkerStatus>> {
             status.frames.push(frame);
         }
     }
+    // Order them for display
     for status in &mut statuses {
         status.frames.sort_unstable();
         status.frames.dedup();

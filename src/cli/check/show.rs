@@ -13,7 +13,7 @@ use crate::cli::job::list;
 use crate::cli::progress::duration;
 use crate::cli::render::{radius_text, unframed_text};
 use crate::manifest::{Channel, Manifest, NamedChannel};
-use crate::pipeline::{ColorRule, Overlap, Probe, RadiusRule, Setup};
+use crate::pipeline::{ColorRule, Overlap, Probe, RadiusRule, Schedule, Setup};
 use crate::scene::RadiusTable;
 use crate::survey::{Survey, shown_name};
 
@@ -22,31 +22,13 @@ impl Check<'_> {
         let manifest = self.render_job.manifest();
         let mut all = Map::new();
         let mut put = |key: &str, value: Value| all.insert(key.to_owned(), value);
+        // What is certain without particles
         put("problems", json!(self.problems));
-        put(
-            "frames",
-            json!({
-                "all": self.render_job.selected(self.sequence),
-                "done": self.in_state(FrameState::Done),
-                "failed": self.in_state(FrameState::Failed),
-                "to_do": self.tasks.iter().map(|t| t.frame).collect::<Vec<_>>(),
-                "too_large": self.too_large(),
-            }),
-        );
+        put("frames", self.frames_json());
         put("images", self.tasks.iter().map(|t| json!(t.image)).collect());
         put("directory", json!(self.render_job.dir()));
-        let [width, height] = manifest.picture().size();
-        let mut image = json!({
-            "width": width,
-            "height": height,
-            "samples": manifest.image.samples,
-            "channels": channels(manifest),
-            "preview": manifest.output.has_previews(),
-        });
-        if let Some(part) = manifest.image.part() {
-            image["data_window"] = json!(part);
-        }
-        put("image", image);
+        put("image", image_json(manifest));
+        // What follows from the survey
         if let Some((survey, setup)) = &self.setup {
             put("structure", json!(structure(survey, setup).name()));
             put("most_particles", json!(survey.most_particles));
@@ -57,17 +39,9 @@ impl Check<'_> {
             }
             put("camera", self.camera(setup).to_json());
         }
+        // Estimates
         if let Some(schedule) = &self.schedule {
-            let mut memory = json!(schedule.need);
-            if let Some(memory) = memory.as_object_mut() {
-                memory.insert("total".into(), json!(schedule.need.total()));
-                memory.insert("free".into(), json!(self.free_memory));
-                let limit = manifest.render.memory_limit.map(|l| l.0);
-                memory.insert("limit".into(), json!(limit));
-                let overlap = schedule.overlap == Overlap::Stages;
-                memory.insert("frames_overlap".into(), json!(overlap));
-            }
-            put("memory", memory);
+            put("memory", self.memory_json(schedule));
         }
         put("disk", json!({"estimate": self.disk_bytes().map(whole), "free": self.free_disk}));
         put(
@@ -80,6 +54,31 @@ impl Check<'_> {
             }),
         );
         Value::Object(all)
+    }
+
+    fn frames_json(&self) -> Value {
+        json!({
+            "all": self.render_job.selected(self.sequence),
+            "done": self.in_state(FrameState::Done),
+            "failed": self.in_state(FrameState::Failed),
+            "to_do": self.tasks.iter().map(|t| t.frame).collect::<Vec<_>>(),
+            "too_large": self.too_large(),
+        })
+    }
+
+    /// The memory that a frame needs, by its use, and what limits it.
+    fn memory_json(&self, schedule: &Schedule) -> Value {
+        let manifest = self.render_job.manifest();
+        let mut memory = json!(schedule.need);
+        if let Some(memory) = memory.as_object_mut() {
+            memory.insert("total".into(), json!(schedule.need.total()));
+            memory.insert("free".into(), json!(self.free_memory));
+            let limit = manifest.render.memory_limit.map(|l| l.0);
+            memory.insert("limit".into(), json!(limit));
+            let overlap = schedule.overlap == Overlap::Stages;
+            memory.insert("frames_overlap".into(), json!(overlap));
+        }
+        memory
     }
 
     pub(super) fn to_lines(&self) -> Vec<String> {
@@ -190,7 +189,6 @@ impl Check<'_> {
     }
 }
 
-/// The structure for the largest surveyed frame. Other frames may have another.
 /// The names of the channels of the images.
 fn channels(manifest: &Manifest) -> Vec<Cow<'static, str>> {
     let output = &manifest.output;
@@ -200,9 +198,25 @@ fn channels(manifest: &Manifest) -> Vec<Cow<'static, str>> {
     output.channels.iter().filter(is_stored).map(Channel::name).collect()
 }
 
+/// The structure for the largest surveyed frame. Other frames may have another.
 fn structure(survey: &Survey, setup: &Setup) -> Structure {
     let has_values = setup.picture.particles.color.is_by_particle();
     setup.build_settings(survey.most_particles, has_values).structure
+}
+
+fn image_json(manifest: &Manifest) -> Value {
+    let [width, height] = manifest.picture().size();
+    let mut image = json!({
+        "width": width,
+        "height": height,
+        "samples": manifest.image.samples,
+        "channels": channels(manifest),
+        "preview": manifest.output.has_previews(),
+    });
+    if let Some(part) = manifest.image.part() {
+        image["data_window"] = json!(part);
+    }
+    image
 }
 
 fn radius_json(setup: &Setup, survey: &Survey) -> Value {

@@ -116,6 +116,7 @@ struct ExportJob {
 impl ExportJob {
     /// Reads the manifest, finds the frames, and refuses what `render` would refuse.
     fn read(args: &CommonArgs, max_tasks: NonZeroUsize) -> Result<Self, CliError> {
+        // Read the manifest, and find the files that the job reads
         let requested = requested_manifest(args)?;
         let sequence = open_sequence(&requested)?;
         for note in sequence.notes() {
@@ -124,16 +125,19 @@ impl ExportJob {
         let inputs = (0..sequence.frames().len()).flat_map(|index| sequence.inputs(index));
         let lists = sequence.list_paths().iter().map(PathBuf::as_path);
         let inputs: Vec<PathBuf> = inputs.chain(lists).map(absolute).collect::<Result<_, _>>()?;
+        // Refuse what would fail on every host
         let out = requested.absolute_base()?.join(requested.manifest.output.path.dir());
         let render_job = RenderJob::new(requested, &sequence, None)?;
         render_job.check_output_dir(ResumeMode::Resume)?;
         render_job.check_manifest_file()?;
+        // Divide the frames
         let frames = render_job.selected(&sequence);
         let chunks = Chunks::of(&frames, args.chunk, max_tasks)?;
-        let manifest_file = absolute(&args.manifest)?;
-        let manifest_file = match (manifest_file.parent(), manifest_file.file_name()) {
+        // The name of the manifest stays as it is, in a directory without links and dots
+        let given = absolute(&args.manifest)?;
+        let manifest_file = match (given.parent(), given.file_name()) {
             (Some(dir), Some(name)) => normalized(dir).join(name),
-            _ => manifest_file,
+            _ => given,
         };
         Ok(Self {
             name: paths::job_name(&manifest_file),
@@ -170,6 +174,7 @@ fn requested_manifest(args: &CommonArgs) -> Result<JobManifest, CliError> {
             path.display()
         )));
     }
+    // Apply the frames only: tasks read the file without other options
     let content = read_manifest(path)?;
     let frames = args.frames.as_ref().map(|range| {
         Override::new("input.frames", range.clone(), "--frames")
@@ -195,6 +200,7 @@ fn write_output(args: &CommonArgs, content: &str) -> Result<(), CliError> {
         print::file(content)?;
         return Ok(());
     };
+    // Refuse to replace a manifest
     let same = |a: &Path, b: &Path| -> Result<bool, CliError> {
         Ok(named_place(&absolute(a)?) == named_place(&absolute(b)?))
     };

@@ -29,11 +29,11 @@ pub(super) fn run(args: &OpenjdArgs) -> Result<Outcome, CliError> {
     let format = template_format(output)?;
     // Engines have no common limit on the number of tasks
     let export_job = ExportJob::read(&args.common, NonZeroUsize::MAX)?;
-    let template_dir = match output {
+    let place = match output {
         Some(path) => absolute(path)?,
         None => export_job.manifest_file.clone(),
     };
-    let template_dir = normalized(template_dir.parent().unwrap_or(Path::new("/")));
+    let template_dir = normalized(place.parent().unwrap_or(Path::new("/")));
     let paths = job_paths(&export_job, &template_dir)?;
     let template = template(args, &export_job, &paths)?;
     write_output(&args.common, &template.text(format)?)?;
@@ -77,6 +77,7 @@ impl JobPath {
 
 /// The paths of the job, for a template in `template_dir`.
 fn job_paths(export_job: &ExportJob, template_dir: &Path) -> Result<Vec<JobPath>, CliError> {
+    // A default is relative to the template, if the path is within its directory
     let job_path = |name, description, path: &Path, is_directory, is_output| {
         let default = inside(path, template_dir).map(|p| text(&p).map(str::to_owned));
         Ok::<_, CliError>(JobPath {
@@ -91,6 +92,7 @@ fn job_paths(export_job: &ExportJob, template_dir: &Path) -> Result<Vec<JobPath>
         })
     };
     let manifest = "The manifest of the job.";
+    // Add the paths, each as a parameter that a submitter can change
     let mut all = vec![job_path("Manifest", manifest, &export_job.manifest_file, false, false)?];
     if let Some(dir) = &export_job.input_dir {
         let input = "Directory of the particles. Hosts read them from the path in the manifest. Farms that copy \
@@ -128,6 +130,7 @@ fn template<'a>(
     let output = format!("{}/{image}", text(&export_job.out_dir)?);
     OutputPattern::parse(&output)
         .map_err(|e| CliError::other(format!("{output}: {e}; rename the directory")))?;
+    // Each task runs `render` on its chunk
     let arguments = [
         "render",
         &parameter("Manifest"),

@@ -83,6 +83,7 @@ struct Inspected<'a> {
 
 pub(super) fn run(args: &InspectArgs) -> Result<Outcome, CliError> {
     let mut outcome = Outcome::Done;
+    // Read the topology once for all files
     let topology = args
         .topology
         .as_ref()
@@ -96,6 +97,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<Outcome, CliError> {
                 .map_err(|e| (file, frame_message(&e))),
             Meant::Nothing(argument, why) => Err((argument, why)),
         };
+        // Print the errors of files among the results, so that every file has one
         let printed = match inspected {
             Ok(printed) => printed,
             Err((file, error)) => {
@@ -165,6 +167,7 @@ fn expand(args: &InspectArgs) -> Vec<Meant> {
     let settings =
         SequenceSettings { budget: read_budget(None, None), follow_links: args.follow_links };
     for argument in &args.files {
+        // A manifest is often given by mistake
         if is_manifest(argument) && argument.is_file() {
             let why = format!(
                 "{}: a manifest, not particles; check it with: spherule check {0}",
@@ -173,6 +176,7 @@ fn expand(args: &InspectArgs) -> Vec<Meant> {
             all.push(Meant::Nothing(argument.clone(), why));
             continue;
         }
+        // Files stand for themselves; lists, directories and patterns are opened as a sequence
         match SequenceInput::from_path(argument) {
             SequenceInput::Files(listed) if !listed.iter().any(|file| stands_for_others(file)) => {
                 for file in listed {
@@ -183,34 +187,39 @@ fn expand(args: &InspectArgs) -> Vec<Meant> {
             }
             input => match Sequence::open_with(&input, settings) {
                 Err(error) => all.push(Meant::Nothing(argument.clone(), error.to_string())),
-                Ok(sequence) => {
-                    if let Some(list) = InspectedList::of(argument, &sequence) {
-                        all.push(Meant::List(list));
-                    } else if let Some(parts) = parts_text(&sequence) {
-                        message!("{}: {parts}", argument.display());
-                    }
-                    for (index, frame) in sequence.frames().iter().enumerate() {
-                        let place = FramePlace {
-                            number: Some(frame.number),
-                            time: sequence.listed_time(index),
-                        };
-                        // A file with many steps is in many frames.
-                        for part in &frame.parts {
-                            if !known.insert(part.path.clone()) {
-                                continue;
-                            }
-                            let path = part.path.clone();
-                            all.push(match sequence.check_listed(part) {
-                                Ok(()) => Meant::File(path, place),
-                                Err(error) => Meant::Nothing(path, error.to_string()),
-                            });
-                        }
-                    }
-                }
+                Ok(sequence) => add_sequence(argument, &sequence, &mut known, &mut all),
             },
         }
     }
     all
+}
+
+/// Adds the files of `sequence`, which `argument` stands for, that are not `known` yet.
+fn add_sequence(
+    argument: &Path,
+    sequence: &Sequence,
+    known: &mut HashSet<PathBuf>,
+    all: &mut Vec<Meant>,
+) {
+    if let Some(list) = InspectedList::of(argument, sequence) {
+        all.push(Meant::List(list));
+    } else if let Some(parts) = parts_text(sequence) {
+        message!("{}: {parts}", argument.display());
+    }
+    for (index, frame) in sequence.frames().iter().enumerate() {
+        let place = FramePlace { number: Some(frame.number), time: sequence.listed_time(index) };
+        // A file with many steps is in many frames.
+        for part in &frame.parts {
+            if !known.insert(part.path.clone()) {
+                continue;
+            }
+            let path = part.path.clone();
+            all.push(match sequence.check_listed(part) {
+                Ok(()) => Meant::File(path, place),
+                Err(error) => Meant::Nothing(path, error.to_string()),
+            });
+        }
+    }
 }
 
 /// Inspects one file, whose particles get the properties of `topology`. The outer error is of the file, the inner one of
@@ -221,6 +230,7 @@ fn inspect(
     args: &InspectArgs,
     topology: Option<&Topology>,
 ) -> Result<Result<Reader, CliError>, FrameError> {
+    // The index of a native frame has most of what is printed
     if topology.is_none() && is_native(path)? {
         let mut inspected = native::inspect(path, place.number, args.verify)?;
         inspected.time = place.time.or(inspected.time);
@@ -228,13 +238,13 @@ fn inspect(
     }
     let file = FrameFile::open_mapped(path, read_budget(None, None))?;
     // For several steps, the metadata come from the first one.
-    let mut remarks = remarks(path);
+    let mut of_file = remarks(path);
     let mut lines = StepLines::new(file.steps().len());
     for index in 0..file.steps().len() {
         let mut inspected = read(&file, index, place.number, topology)?;
         inspected.time = place.time.or(inspected.time);
-        inspected.notes.retain(|note| !remarks.contains(note));
-        inspected.notes.splice(..0, remarks.drain(..));
+        inspected.notes.retain(|note| !of_file.contains(note));
+        inspected.notes.splice(..0, of_file.drain(..));
         if args.verify && inspected.native.is_some() {
             verify(file.bytes()).map_err(|e| e.in_file(path))?;
         }
@@ -310,15 +320,17 @@ fn read<'a>(
     number: Option<i64>,
     topology: Option<&Topology>,
 ) -> Result<Inspected<'a>, FrameError> {
-    let contents = match topology {
+    // Large files are read in blocks; a topology needs all particles at once
+    let in_blocks = match topology {
         None if file.steps().len() == 1 => Contents::in_blocks(file.path())?,
         _ => None,
     };
-    let contents = match contents {
+    let contents = match in_blocks {
         Some(contents) => contents,
         None => Contents::at_once(file, index, topology)?,
     };
     let mut stats = contents.stats;
+    // Number the frame
     let step = &file.steps()[index];
     let running = i64::try_from(index).ok();
     let number = if file.steps().len() > 1 { running } else { number };
@@ -326,6 +338,7 @@ fn read<'a>(
     let native = (file.format() == FORMAT).then(|| layout::parse(file.bytes()).ok()).flatten();
     let all = stats.count + stats.dropped;
     stats.dropped += native.as_ref().map_or(0, |index| index.dropped);
+    // Share the bytes of the file among its steps
     let share = match file.steps().len() {
         1 => 1.0,
         _ => step

@@ -80,6 +80,7 @@ impl Inspected<'_> {
 
     pub(super) fn to_lines(&self) -> Vec<String> {
         let stats = &self.stats;
+        // Start with what every frame has
         let mut lines = vec![self.heading()];
         let dropped = match stats.dropped {
             0 => String::new(),
@@ -103,6 +104,7 @@ impl Inspected<'_> {
         });
         let attributes = stats.attributes.iter();
         lines.extend(attributes.map(|a| attribute_line(a, self.labels.get(&a.name))));
+        // End with what limits or confirms the rest
         if let Some(sample) = self.native.as_ref().and_then(|native| native.sample) {
             lines.push(format!("  values of attributes are from a sample of {sample} particles"));
         }

@@ -20,6 +20,7 @@ pub(super) fn run(
              exists; several workers share the frames without it"
         )));
     }
+    // Wait for the first complete frames
     let interrupt = signals.start_work_with_grace(requested.manifest.job.grace);
     let on_waiting = |error: &SequenceError| message!("waiting: {error}");
     let mut follower = Follower::new(requested.clone(), interrupt, &on_waiting)?;
@@ -34,9 +35,11 @@ pub(super) fn run(
         Err(FollowEnd::Interrupted) => return Ok(Outcome::Interrupted),
         Err(end) => return Err(CliError::other(format!("found no complete frame: {end}"))),
     };
+    // Choose defaults by them, and open the job
     complete(&mut requested, &mut sequence, Some(args.mode()))?;
     follower.keep_parts(requested.manifest.input.parts.clone());
     let mut run = Run::start(args, requested, sequence)?;
+    // Render frames as they appear
     Ok(match run.follow(&mut follower) {
         Ok(end) => {
             match &end {

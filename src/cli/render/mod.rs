@@ -57,6 +57,7 @@ const SIGNAL_MESSAGES: signals::SignalMessages = signals::SignalMessages {
 
 pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
     let signals = signals::listen(SIGNAL_MESSAGES)?;
+    // Read the options; errors of a movie are found before the render
     let requested = args.run.manifest.manifest()?;
     let settings = requested.manifest.job.clone();
     if settings.progress == ProgressMode::Json {
@@ -68,6 +69,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
         .as_deref()
         .map(|path| MovieAfter::new(path, &requested, args.run.job.force))
         .transpose()?;
+    // Render, then make the movie of complete frames
     let outcome = if settings.follow {
         follow::run(&args.run.job, requested, &signals)?
     } else {

@@ -38,12 +38,14 @@ impl Run {
             message!("surveying the sequence");
             report_wait(job.dir(), job.manifest().job.takeover_after)?;
         }
+        // Open the job; frames may be rendered in child processes of this program
         let command = ChildCommand::own_program([COMMAND])
             .map_err(|e| CliError::other(format!("spherule: {e}")))?;
         let run = RenderRun::open(job, sequence, mode)?.with_child_command(command);
         for note in run.notes() {
             note!("{note}");
         }
+        // Show what was decided before the first frame
         print_summary(run.sequence(), run.survey(), run.setup());
         let task_count = run.pending_count();
         let progress = Progress::new(

@@ -34,6 +34,7 @@ impl ShowReport for FrameReport {
 
 /// Prints the resolved settings.
 pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup: &Setup) {
+    // Say what was found
     message!(
         "{}, up to {}",
         counted(sequence.frames().len(), "frame"),
@@ -42,12 +43,13 @@ pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup:
     if let Some(parts) = parts_text(sequence) {
         message!("{parts}");
     }
-    for remark in sequence.remarks() {
-        note!("{remark}");
+    for text in sequence.remarks() {
+        note!("{text}");
     }
     if setup.picture.things.cell.is_none() && !survey.cells.is_empty() {
         note!("{CELL_HINT}");
     }
+    // Without particles, the rest means nothing
     if survey.most_particles == 0 {
         return;
     }
@@ -58,23 +60,8 @@ pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup:
     if let Some(text) = unframed_text(setup) {
         message!("{text}");
     }
-    if let pipeline::ColorRule::Attribute { name, map, .. } = &setup.picture.particles.color {
-        let shown = shown_name(name);
-        match (map.range(), map.categories()) {
-            (Some(([low, high], _)), _) => {
-                let [low, high] = [low, high].map(short);
-                message!("colour by `{shown}`, range {low} to {high} (--range {low} {high})");
-            }
-            (None, categories) => {
-                let count = categories.map_or(0, <[_]>::len);
-                message!("colour by `{shown}`, {count} categories");
-            }
-        }
-    }
-    if let (pipeline::ColorRule::Rgb { name, .. }, Some(rgb)) =
-        (&setup.picture.particles.color, &survey.rgb)
-    {
-        message!("colour by the RGB attribute `{name}` ({})", rgb.encoding.name());
+    if let Some(text) = color_text(setup, survey) {
+        message!("{text}");
     }
     if let Some(text) = small_text(setup) {
         note!("{text}");
@@ -87,6 +74,29 @@ pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup:
     }
     if survey.origin != DVec3::ZERO {
         message!("origin {}: the particles are far from zero", survey.origin);
+    }
+}
+
+/// Describes the colours that follow from attributes.
+fn color_text(setup: &Setup, survey: &Survey) -> Option<String> {
+    match (&setup.picture.particles.color, &survey.rgb) {
+        (pipeline::ColorRule::Attribute { name, map, .. }, _) => {
+            let shown = shown_name(name);
+            Some(match (map.range(), map.categories()) {
+                (Some(([low, high], _)), _) => {
+                    let [low, high] = [low, high].map(short);
+                    format!("colour by `{shown}`, range {low} to {high} (--range {low} {high})")
+                }
+                (None, categories) => {
+                    let count = categories.map_or(0, <[_]>::len);
+                    format!("colour by `{shown}`, {count} categories")
+                }
+            })
+        }
+        (pipeline::ColorRule::Rgb { name, .. }, Some(rgb)) => {
+            Some(format!("colour by the RGB attribute `{name}` ({})", rgb.encoding.name()))
+        }
+        _ => None,
     }
 }
 

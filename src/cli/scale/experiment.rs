@@ -29,6 +29,7 @@ pub(super) struct Experiment {
 impl Experiment {
     /// Checks the arguments, and surveys the input if there is one.
     pub(super) fn settle(args: &ScaleArgs) -> Result<Self, CliError> {
+        // Collect the settings, with defaults in place of what is missing
         let structures = each_once(&args.structures, &Structure::ALL);
         let mut settings = ScaleSettings {
             input: None,
@@ -50,7 +51,9 @@ impl Experiment {
                 None => rayon::current_num_threads(),
             },
         };
+        // Refuse combinations that have no cell
         check_pairs(&structures, &settings.representations)?;
+        // Measure the frame of a file in place of generated particles
         let mut source = Source::Box;
         let mut stage = Stage::THESIS;
         if let Some(path) = &args.input {
@@ -135,6 +138,7 @@ fn survey_input(path: &Path, args: &ScaleArgs) -> Result<FrameSurvey, CliError> 
     for note in sequence.notes() {
         note!("{note}");
     }
+    // Find the frame
     let numbers: Vec<i64> = sequence.frames().iter().map(|f| f.number).collect();
     let index = match args.frame {
         None => 0,
@@ -155,6 +159,7 @@ fn survey_input(path: &Path, args: &ScaleArgs) -> Result<FrameSurvey, CliError> 
             numbers[index]
         );
     }
+    // Survey it for a camera of the images' aspect
     let aspect = f64::from(args.width) / f64::from(args.height);
     FrameSurvey::of(&sequence, &path, index, aspect).map_err(|e| CliError::other(e.to_string()))
 }

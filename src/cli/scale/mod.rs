@@ -112,6 +112,7 @@ pub(super) fn run(args: &ScaleArgs) -> Result<Outcome, CliError> {
     if args.progress == ProgressMode::Json {
         events::start();
     }
+    // Settle the experiment, and start its report
     let experiment = Experiment::settle(args)?;
     prepare(&args.output)?;
     let cells = experiment.cells();
@@ -125,10 +126,12 @@ pub(super) fn run(args: &ScaleArgs) -> Result<Outcome, CliError> {
     message!("{}", table::subject(&report));
     let output = args.output.display().to_string();
     events::send("start", json!({"command": "scale", "total": cells.len(), "output": output}));
+    // Measure the cells
     let ended = measure_all(&cells, &mut report, args, signals.start_work());
     if report.cells.is_empty() {
         return Ok(Outcome::Interrupted);
     }
+    // Report the results
     let failed: Vec<String> = report.failed().map(|(cell, _)| table::cell_name(cell)).collect();
     events::add_to_end(json!({
         "done": report.cells.len() - failed.len(),
@@ -196,6 +199,7 @@ fn measure_one(
     frames: &mut Frames,
     interrupt: &Interrupt,
 ) -> ChildResult<CellOutcome> {
+    // Make the native frame first, if the cell needs one
     let mut made = None;
     if request.representation.encoding().is_some() {
         match frames.of(request, interrupt) {
@@ -211,6 +215,7 @@ fn measure_one(
             }
         }
     }
+    // Measure in a child process, which may run out of memory
     let task = Task::Measure { request: request.clone(), file: made.map(|(path, _)| path.clone()) };
     let stop = || interrupt.is_raised();
     let measured: Result<CellMeasurement, String> = match measure::run_child(&task, stop) {

@@ -16,6 +16,7 @@ impl JobSnapshot {
         let mut line = |name: &str, what: &str| lines.push(format!("{name:<9} {what}"));
         line("job", &self.dir.display().to_string());
         line("frames", &self.summary.total.to_string());
+        // List frames by state; states without frames have no line
         let mut frames = |name: &str, frames: &[i64]| {
             if !frames.is_empty() {
                 line(name, &format!("{} ({})", frames.len(), list(frames)));
@@ -30,6 +31,7 @@ impl JobSnapshot {
         for worker in &self.workers {
             line("worker", &worker_line(worker));
         }
+        // Estimate what is left
         if let (Some(rate), Some(left)) = (self.rate(), self.seconds_left()) {
             let each = format!("{rate:.2} frames per second");
             line("rate", &format!("{each}, {} left", duration(left)));

@@ -38,91 +38,124 @@ impl ExpectedOutput {
     }
 
     fn of_settings(settings: &[(String, String)]) -> Result<Self, InvalidSetting> {
-        let find = |name: &str| {
-            let found = settings.iter().find(|(key, _)| key == name);
-            found.map(|(_, value)| value.as_str())
-        };
-        if find(KIND).is_some() {
+        let stored = StoredSettings(settings);
+        if stored.find(KIND).is_some() {
             return Ok(Self::Frames);
         }
-        let value = |key: &str| {
-            let table = format!("value = {}", find(key)?).parse::<toml::Table>();
-            table.ok()?.remove("value")
-        };
-        let wrong = |key| InvalidSetting { key };
-        let side = |key: &'static str| {
-            let side = value(key).and_then(|v| u32::try_from(v.as_integer()?).ok());
-            side.ok_or_else(|| wrong(key))
-        };
-        let channels = || {
-            let list = value("output.channels")?;
-            let names =
-                list.as_array()?.iter().map(|name| name.as_str()).collect::<Option<Vec<_>>>()?;
-            let attributes: Vec<String> = names
-                .iter()
-                .filter_map(|name| name.strip_prefix(ATTRIBUTE))
-                .map(str::to_owned)
-                .collect();
-            let is_named = |name: &&str| !name.starts_with(ATTRIBUTE);
-            let mut channels = Channels::from_names(names.into_iter().filter(is_named)).ok()?;
-            // Jobs of earlier versions have no levels
-            if let Some(levels) = value("output.cryptomatte_levels") {
-                let levels = u32::try_from(levels.as_integer()?).ok()?;
-                channels.layers.mattes.set_levels(levels);
-            }
-            // Settings have the groups only if there are layers for them
-            let is_group = |key: &str| {
-                let light = key.strip_prefix("light.").and_then(|key| key.split_once('.'));
-                key == "environment.group" || light.is_some_and(|(_, name)| name == "group")
-            };
-            let keys = settings.iter().filter(|(key, _)| is_group(key));
-            let names = keys.map(|(key, _)| Some(value(key)?.as_str()?.to_owned()));
-            let groups = names.collect::<Option<BTreeSet<String>>>()?;
-            channels.layers.set_light_groups(groups.len());
-            Some((channels, attributes, groups.into_iter().collect()))
-        };
-        // Plans of older versions have neither crop nor overscan
-        let crop = find("image.crop").map(|_| {
-            let list = value("image.crop")?;
-            let pixel = |v: &toml::Value| i32::try_from(v.as_integer()?).ok();
-            let pixels: Option<Vec<i32>> = list.as_array()?.iter().map(pixel).collect();
-            pixels?.try_into().ok().map(PixelBounds)
-        });
-        let crop = crop.map(|crop| crop.ok_or_else(|| wrong("image.crop")));
-        let image = Image {
-            width: Side::Pixels(side("image.width")?),
-            height: Side::Pixels(side("image.height")?),
-            crop: crop.transpose()?,
-            overscan: match find("image.overscan") {
-                Some(_) => side("image.overscan")?,
-                None => 0,
-            },
-            ..Image::default()
-        };
-        // Plans of older versions have one eye
-        let camera = Camera {
-            stereo: find("camera.stereo") == Some("true"),
-            projection: match find("camera.projection") {
-                Some("\"equirectangular\"") => ProjectionKind::Equirectangular,
-                _ => ProjectionKind::Perspective,
-            },
-            ..Camera::default()
-        };
-        let image = image.of_eyes(camera.eyes());
-        let [width, height] = image.data_size().ok_or_else(|| wrong("image.crop"))?;
-        let (channels, attributes, light_groups) =
-            channels().ok_or_else(|| wrong("output.channels"))?;
+        let image = stored.image()?.of_eyes(stored.camera().eyes());
+        let [width, height] = image.data_size().ok_or(InvalidSetting { key: "image.crop" })?;
+        let found = stored.channels().ok_or(InvalidSetting { key: "output.channels" })?;
         Ok(Self::Images(ImageShape {
             width,
             height,
             window: image.data_window(),
-            channels,
-            attributes,
-            light_groups,
-            has_data_part: find("output.data_compression")
-                .is_some_and(|data| find("output.compression") != Some(data)),
+            channels: found.channels,
+            attributes: found.attributes,
+            light_groups: found.light_groups,
+            has_data_part: stored
+                .find("output.data_compression")
+                .is_some_and(|data| stored.find("output.compression") != Some(data)),
             is_on_page: may_have_strips(settings),
         }))
+    }
+}
+
+/// The settings of a plan: keys of the manifest, and their values as TOML.
+#[derive(Clone, Copy)]
+struct StoredSettings<'a>(&'a [(String, String)]);
+
+/// The channels of images, with the names that some of them follow from.
+struct StoredChannels {
+    channels: Channels,
+    attributes: Vec<String>,
+    light_groups: Vec<String>,
+}
+
+impl<'a> StoredSettings<'a> {
+    fn find(self, name: &str) -> Option<&'a str> {
+        let found = self.0.iter().find(|(key, _)| key == name);
+        found.map(|(_, value)| value.as_str())
+    }
+
+    fn value(self, key: &str) -> Option<toml::Value> {
+        let table = format!("value = {}", self.find(key)?).parse::<toml::Table>();
+        table.ok()?.remove("value")
+    }
+
+    /// A number of pixels.
+    fn side(self, key: &'static str) -> Result<u32, InvalidSetting> {
+        let side = self.value(key).and_then(|v| u32::try_from(v.as_integer()?).ok());
+        side.ok_or(InvalidSetting { key })
+    }
+
+    /// The size and the parts of the image. Plans of older versions have neither crop nor overscan.
+    fn image(self) -> Result<Image, InvalidSetting> {
+        let crop = self.find("image.crop").map(|_| {
+            let list = self.value("image.crop")?;
+            let pixel = |v: &toml::Value| i32::try_from(v.as_integer()?).ok();
+            let pixels: Option<Vec<i32>> = list.as_array()?.iter().map(pixel).collect();
+            pixels?.try_into().ok().map(PixelBounds)
+        });
+        let known_crop = crop.map(|crop| crop.ok_or(InvalidSetting { key: "image.crop" }));
+        Ok(Image {
+            width: Side::Pixels(self.side("image.width")?),
+            height: Side::Pixels(self.side("image.height")?),
+            crop: known_crop.transpose()?,
+            overscan: match self.find("image.overscan") {
+                Some(_) => self.side("image.overscan")?,
+                None => 0,
+            },
+            ..Image::default()
+        })
+    }
+
+    /// The camera, as far as it decides how many eyes share an image. Plans of older versions have one eye.
+    fn camera(self) -> Camera {
+        Camera {
+            stereo: self.find("camera.stereo") == Some("true"),
+            projection: match self.find("camera.projection") {
+                Some("\"equirectangular\"") => ProjectionKind::Equirectangular,
+                _ => ProjectionKind::Perspective,
+            },
+            ..Camera::default()
+        }
+    }
+
+    /// The channels; None if a setting that they follow from is missing or invalid.
+    fn channels(self) -> Option<StoredChannels> {
+        let list = self.value("output.channels")?;
+        let names =
+            list.as_array()?.iter().map(|name| name.as_str()).collect::<Option<Vec<_>>>()?;
+        // Channels of attributes have names of their own
+        let attributes = names
+            .iter()
+            .filter_map(|name| name.strip_prefix(ATTRIBUTE))
+            .map(str::to_owned)
+            .collect();
+        let is_named = |name: &&str| !name.starts_with(ATTRIBUTE);
+        let mut channels = Channels::from_names(names.into_iter().filter(is_named)).ok()?;
+        // Jobs of earlier versions have no levels
+        if let Some(levels) = self.value("output.cryptomatte_levels") {
+            let levels = u32::try_from(levels.as_integer()?).ok()?;
+            channels.layers.mattes.set_levels(levels);
+        }
+        let light_groups = self.light_groups()?;
+        channels.layers.set_light_groups(light_groups.len());
+        Some(StoredChannels {
+            channels,
+            attributes,
+            light_groups: light_groups.into_iter().collect(),
+        })
+    }
+
+    /// The groups of lights. Settings have them only if there are layers for them.
+    fn light_groups(self) -> Option<BTreeSet<String>> {
+        let is_group = |key: &str| {
+            let light = key.strip_prefix("light.").and_then(|key| key.split_once('.'));
+            key == "environment.group" || light.is_some_and(|(_, name)| name == "group")
+        };
+        let keys = self.0.iter().filter(|(key, _)| is_group(key));
+        keys.map(|(key, _)| Some(self.value(key)?.as_str()?.to_owned())).collect()
     }
 }
 

@@ -91,12 +91,14 @@ const FRAMES_PER_THREAD: usize = 4;
 
 pub(super) fn run(args: &VerifyArgs) -> Result<Outcome, CliError> {
     use_threads(args.threads)?;
+    // Find out what the job should have written
     let dir = job_directory(&args.job)?;
     let Some(state) = Job::read(&dir)? else {
         return Err(no_job(&dir));
     };
     let expected = ExpectedOutput::of(state.plan())
         .map_err(|e| CliError::other(format!("{}: {e}", dir.join(PLAN_FILE).display())))?;
+    // Check the frames in chunks, and print each result as soon as it is known
     let frames = selected_frames(&state, args.frames.as_ref())?;
     let plan = state.plan();
     let frames: Vec<&PlannedFrame> = frames.iter().filter_map(|n| plan.frame(*n)).collect();
@@ -115,6 +117,7 @@ pub(super) fn run(args: &VerifyArgs) -> Result<Outcome, CliError> {
     if !args.json {
         print::lines(show::summary(&verdicts))?;
     }
+    // Requeue damaged frames
     if args.requeue_bad
         && let Err(error) = requeue(&state, &damaged)
     {
@@ -141,6 +144,7 @@ fn check_frame(
     planned: &PlannedFrame,
     expected: &ExpectedOutput,
 ) -> FrameVerdict {
+    // Frames without outputs have no files to check
     let without_files = |verdict, reason| FrameVerdict {
         frame: planned.number,
         verdict,
@@ -181,6 +185,7 @@ fn check_file(
 
 /// The path of the file, if it exists and has the recorded length.
 fn find_file(dir: &Path, path: &str, entry: &LedgerEntry) -> Result<PathBuf, (Verdict, String)> {
+    // Find the record, then the file
     let Some(output) = entry.outputs.iter().find(|o| o.path == path) else {
         let reason = "was not written under this name".to_owned();
         return Err((Verdict::Missing, reason));
@@ -193,6 +198,7 @@ fn find_file(dir: &Path, path: &str, entry: &LedgerEntry) -> Result<PathBuf, (Ve
         }
         Err(e) => return Err((Verdict::Damaged, format!("cannot be read: {e}"))),
     };
+    // Check its kind and length, which are cheap
     if !metadata.is_file() {
         return Err((Verdict::Damaged, "is not a regular file".to_owned()));
     }

@@ -72,6 +72,7 @@ fn from_table(
     file: &str,
 ) -> Result<(Vec<f32>, u64), LoadError> {
     let mut unknown = 0;
+    // Look each value up, and count those that have no radius in the table
     let radius = |index| {
         let value = attribute.magnitude(index);
         let found = table

@@ -64,6 +64,7 @@ impl FrameSize {
     /// Size of a frame with files of `stored` bytes (unpacked), in proportion to a known frame. Jobs of the first
     /// versions have no known frame; plain single-precision positions are assumed for them.
     pub fn estimate(stored: u64, is_shared: bool, known: Option<&FrameWeight>) -> Self {
+        // Without a known frame, suppose positions in f32
         let Some(known) = known.filter(|k| k.stored > 0) else {
             return Self {
                 particles: stored / 12,
@@ -76,6 +77,7 @@ impl FrameSize {
                 surface: None,
             };
         };
+        // Otherwise scale it
         let scaled = |value: u64| {
             let product = u128::from(value) * u128::from(stored) / u128::from(known.stored);
             u64::try_from(product).unwrap_or(u64::MAX)

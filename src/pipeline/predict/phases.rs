@@ -42,9 +42,11 @@ impl MemoryModel<'_> {
         tree: u64,
         neighbours: Neighbours,
     ) -> MemoryNeed {
+        // Estimate what stays the same in all phases
         let idle = self.idle(frame, after);
         let place = Place { frame, after, before, tree, neighbours, idle };
         let tracing = self.tracing(&place);
+        // The peak is that of the largest phase
         [
             self.starting(),
             MemoryNeed { reading: self.reading_with_meshes(frame), surface: self.meshes, ..idle },
@@ -179,6 +181,7 @@ impl MemoryModel<'_> {
         let Some(settings) = picture.denoise else {
             return MemoryNeed::default();
         };
+        // Count the images that exist at this time
         let Neighbours { encoders, are_slow } = place.neighbours;
         let encoded = place.before.min(encoders);
         let filtering = denoise::predicted_bytes(render.width, render.height, &settings, threads);

@@ -36,6 +36,7 @@ impl MemoryModel<'_> {
             let rods = frame.particles.saturating_mul(MAX_BONDS_EACH);
             [rods, frame.particles]
         });
+        // Sum them, and estimate the tree
         let [rods, colors] = arrows
             .chain([trails, bonds])
             .fold(none, |sum, more| [0, 1].map(|i| sum[i].saturating_add(more[i])));
@@ -51,10 +52,10 @@ impl MemoryModel<'_> {
         }
         let mesh = MeshTree::predicted_bytes(frame.meshes);
         // Those of the next frame are read beside them
-        let slices = u64::from(self.setup.slices());
-        let slices = match slices {
+        let number = u64::from(self.setup.slices());
+        let slices = match number {
             1 => 0,
-            _ => (slices * mesh.kept).saturating_add(mesh.building),
+            _ => (number * mesh.kept).saturating_add(mesh.building),
         };
         let meshes = mesh.building.saturating_add(slices);
         reading.max(self.kept(frame) + self.arrows(frame).kept + meshes)
@@ -144,7 +145,7 @@ impl MemoryModel<'_> {
         let has_ids =
             self.has_ids || picture.surface.spray || !picture.particles.selection.is_all();
         let ids = picture.needs_ids() && has_ids;
-        let each = [
+        let parts = [
             (true, color),
             (picture.particles.opacity.is_by_particle(), 4),
             (ids, 4),
@@ -153,7 +154,7 @@ impl MemoryModel<'_> {
             (self.setup.needs_parts(), 4),
             (true, 4 * u64::from(channels.layers.attributes)),
         ];
-        let each: u64 = each.iter().filter(|(has, _)| *has).map(|(_, b)| b).sum();
+        let each: u64 = parts.iter().filter(|(has, _)| *has).map(|(_, b)| b).sum();
         frame.particles * each
     }
 }

@@ -51,6 +51,7 @@ pub fn join(mut parts: Vec<Part>, budget: MemoryBudget) -> Result<RawParticles, 
     let count = layouts.iter().map(|part| part.count).fold(0, u64::saturating_add);
     let JoinPlan { columns, notes: of_plan } = plan(&layouts);
     notes.extend(of_plan);
+    // Check that they fit into memory
     let width = |column: &JoinedColumn| (column.components * column.scalar.size()) as u64;
     let need = columns.iter().map(width).fold(0, u64::saturating_add).saturating_mul(count);
     budget.check(need, "the joined columns of its parts are")?;
@@ -59,6 +60,7 @@ pub fn join(mut parts: Vec<Part>, budget: MemoryBudget) -> Result<RawParticles, 
     let attributes =
         columns.into_iter().map(|column| filled(column, &mut parts, &counts)).collect();
     let mut joined = RawParticles { attributes, notes, ..RawParticles::default() };
+    // Append everything else; of times and cells, the first one counts
     joined.bonds = joined_bonds(&parts);
     let mut positions = Vec::with_capacity(parts.len());
     for Part { particles, .. } in parts {
@@ -153,8 +155,8 @@ fn filled(column: JoinedColumn, parts: &mut [Part], counts: &[usize]) -> Attribu
     for (index, (part, count)) in parts.iter_mut().zip(counts).enumerate() {
         match cells.next_if(|(part, _)| *part == index) {
             Some((_, place)) => {
-                let own = &mut part.particles.attributes[place].data;
-                let own = std::mem::replace(own, AttributeData::U8(Vec::new()));
+                let slot = &mut part.particles.attributes[place].data;
+                let own = std::mem::replace(slot, AttributeData::U8(Vec::new()));
                 data.append(own.into_type(scalar));
             }
             None => data.append_nan(components * count),

@@ -62,6 +62,7 @@ impl<'p> Omitted<'p> {
     fn note(&self, omission: Omission, having: &[usize], columns: &[String]) -> String {
         let named = |index: usize| self.parts.get(index).map_or("", |part| part.name);
         let columns = listed("", columns.iter().map(String::as_str));
+        // List the parts that lack something only if the note names them
         let lacking = || {
             let mut having = having.iter().peekable();
             let filled = (0..self.parts.len()).filter(|index| self.parts[*index].count > 0);
@@ -71,6 +72,7 @@ impl<'p> Omitted<'p> {
             });
             listed("part", lacking.map(named))
         };
+        // Say what becomes of the columns
         let note = match omission {
             Omission::Missing => format!("{} without {columns}: NaN there", lacking()),
             Omission::Incomplete => format!("{} without {columns}: left out", lacking()),

@@ -39,15 +39,18 @@ impl PngSamples {
         file: impl Read,
         check: impl Fn(usize, usize) -> Result<(), Fault>,
     ) -> Result<Self, Fault> {
+        // Read the header, and check the size before pixels are decoded
         let mut decoder = decoder(file);
         // Palettes and few bits become bytes
         decoder.set_transformations(Transformations::EXPAND);
         let mut reader = decoder.read_info()?;
         let (width, height) = (reader.info().width as usize, reader.info().height as usize);
         check(width, height)?;
+        // Decode the pixels
         let mut bytes = vec![0; reader.output_buffer_size()];
         let frame = reader.next_frame(&mut bytes)?;
         bytes.truncate(frame.buffer_size());
+        // Check that they are what the rest of the program expects
         let channels = match frame.color_type {
             ColorType::Indexed => {
                 return Err(Fault::Other("has colours that cannot be expanded".to_owned()));

@@ -19,6 +19,7 @@ const COMPONENTS: [&str; 3] = ["R", "G", "B"];
 
 /// Decodes the first part of a file with the channels R, G and B, in full resolution.
 pub(super) fn decode(file: impl Read + Seek, check_size: Check) -> Result<Pixels, Fault> {
+    // Read the headers
     let reader = exr::block::read(file, false)?;
     let meta = reader.meta_data().clone();
     // Find the part and its channels, and check their size

@@ -16,6 +16,7 @@ pub(super) fn write(
     file: &mut impl Write,
     observer: &dyn Observer,
 ) -> Result<(), MovieError> {
+    // Describe the animation in the header
     let size = source.first()?.size();
     let [width, height] = size.map(|side| u32::try_from(side).unwrap_or(u32::MAX));
     let mut encoder = Encoder::new(file, width, height);
@@ -30,6 +31,7 @@ pub(super) fn write(
     encoder.add_text_chunk("Software".to_owned(), MARKER.to_owned()).map_err(failed)?;
     let mut writer = encoder.write_header().map_err(failed)?;
 
+    // Write each picture, with the time until the next in ticks
     let mut before: Option<Picture> = None;
     let (mut shown, mut ticks) = (0, 0);
     source.each(observer, |picture, repeats| {

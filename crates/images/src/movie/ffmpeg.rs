@@ -43,6 +43,7 @@ pub(super) fn write(
     file: &Publisher,
     observer: &dyn Observer,
 ) -> Result<(), MovieError> {
+    // Start ffmpeg, and send the pictures to its input as often as they are shown
     let arguments = arguments(source, size, container, codec, file.part());
     let mut process = Process::start(&arguments)?;
     let sent = source.each(observer, |picture, repeats| {
@@ -55,6 +56,7 @@ pub(super) fn write(
         }
         Ok(())
     });
+    // An error of ffmpeg explains why the pipe broke
     match sent {
         Ok(()) => process.finish(observer),
         Err(error) => Err(process.explain(error)),
@@ -111,16 +113,19 @@ pub fn by_hand(source: &MovieSource, format: MovieFormat, path: &Path) -> Option
     let MovieFormat::Ffmpeg { container, codec } = format else {
         return None;
     };
+    // EXR files cannot be given to ffmpeg
     let first = source.paths.first()?;
     if first.extension().is_none_or(|e| e.eq_ignore_ascii_case(EXR_EXTENSION)) {
         return None;
     }
+    // Collect the options of the output
     let rate = source.rate.to_string();
     let scale = source.width.map(|width| format!("scale='min({width},iw)':-1:flags=lanczos,"));
     let filter = format!("{}pad=ceil(iw/2)*2:ceil(ih/2)*2", scale.unwrap_or_default());
     let mut output = output_arguments(container, codec, Some(&filter));
     output.push(plain_name(&path.to_string_lossy()).into());
     let output = shell_line(&output);
+    // Numbered files can be named by a pattern, others are sent one after the other
     if let Some((pattern, start)) = consecutive(source) {
         let pattern = quoted(&plain_name(&pattern));
         return Some(format!(

@@ -95,6 +95,7 @@ impl MovieFormat {
     /// # Errors
     /// See [`FormatError`].
     pub fn of(path: &Path, codec: Option<Codec>) -> Result<Self, FormatError> {
+        // Choose the container by the extension
         let extension = path
             .extension()
             .and_then(|extension| extension.to_str())
@@ -111,6 +112,7 @@ impl MovieFormat {
             "webp" => return Ok(Self::WebP),
             _ => return Err(FormatError::Extension),
         };
+        // Choose the codec, which must fit the container
         let possible = container.codecs();
         let codec = codec.unwrap_or(possible[0]);
         if possible.contains(&codec) {

@@ -36,6 +36,7 @@ pub(super) fn write(
     })?;
     let palette = histogram.palette();
     let mut ditherer = Ditherer::new(&palette);
+    // Write the header
     let side =
         |side: usize| u16::try_from(side).map_err(|_| MovieError::TooLarge { format: "GIF", size });
     let (width, height) = (side(size[0])?, side(size[1])?);
@@ -44,6 +45,7 @@ pub(super) fn write(
     let comment = AnyExtension::from(Extension::Comment);
     encoder.write_raw_extension(comment, &[MARKER.as_bytes()]).map_err(failed)?;
 
+    // Write each picture, with rounding errors of its time carried over
     let mut before: Option<Vec<u8>> = None;
     let (mut shown, mut ticks) = (0, 0);
     source.each(observer, |picture, repeats| {
@@ -69,12 +71,14 @@ fn full(bytes: &[u8]) -> Vec<u8> {
 #[expect(clippy::cast_possible_truncation, reason = "places in a picture of a GIF")]
 fn frame(before: Option<&[u8]>, now: &[u8], width: usize, delay: u16) -> Frame<'static> {
     let whole = [0, 0, width, now.len() / width];
+    // Find the rectangle that has changed
     let bounds = match before {
         None => whole,
         // A frame has at least one pixel
         Some(before) => changed(before, now, width).unwrap_or([0, 0, 1, 1]),
     };
     let [left, top, right, bottom] = bounds;
+    // Pixels that have not changed are transparent, which compresses well
     let mut pixels = Vec::with_capacity((right - left) * (bottom - top));
     for i in (top..bottom).flat_map(|y| y * width + left..y * width + right) {
         let is_same = before.is_some_and(|before| before[i] == now[i]);

@@ -27,8 +27,8 @@ impl FromStr for LetterStyle {
     type Err = LetterStyleError;
 
     fn from_str(text: &str) -> Result<Self, LetterStyleError> {
-        let parts = text.split_once('a').map(|parts| (parts, false));
-        let parts = parts.or_else(|| text.split_once('A').map(|parts| (parts, true)));
+        let lower = text.split_once('a').map(|parts| (parts, false));
+        let parts = lower.or_else(|| text.split_once('A').map(|parts| (parts, true)));
         let is_mark = |c: char| "()[]<>.:,-/ ".contains(c);
         let is_good = |part: &str| part.len() <= 2 && part.chars().all(is_mark);
         match parts {

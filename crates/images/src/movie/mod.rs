@@ -131,12 +131,14 @@ pub fn write_movie(
     observer: &dyn Observer,
 ) -> Result<FinishedMovie, MovieError> {
     let io = |source| MovieError::Io { path: path.to_owned(), source };
+    // Check the size, which all pictures have
     let first = source.first()?;
     let [width, height] = first.size();
     let size = format.padded([width, height]);
     if size.iter().any(|side| *side > format.max_side()) {
         return Err(MovieError::TooLarge { format: format.name(), size });
     }
+    // Write it to a temporary file, which then replaces the older one
     let mut file = Publisher::create(path).map_err(io)?;
     match format {
         MovieFormat::Ffmpeg { container, codec } => {

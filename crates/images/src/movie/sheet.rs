@@ -51,6 +51,7 @@ pub fn write_sheet(
     file: &Path,
     observer: &dyn Observer,
 ) -> Result<FinishedSheet, MovieError> {
+    // Add picture by picture; the first decides the layout
     let mut sheet: Option<Sheet> = None;
     for (index, SheetSource { path, exposure }) in sources.iter().enumerate() {
         if observer.stops() {
@@ -64,6 +65,7 @@ pub fn write_sheet(
         sheet.add(index, path, picture, settings);
         observer.on_picture(index + 1);
     }
+    // Write the sheet
     let mut sheet = sheet.ok_or(MovieError::Empty)?;
     let io = |source| MovieError::Io { path: file.to_owned(), source };
     let bytes = match settings.format {

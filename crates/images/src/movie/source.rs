@@ -51,6 +51,7 @@ impl MovieSource {
             if observer.stops() {
                 return Err(MovieError::Stopped);
             }
+            // Read the picture, which must have the size of the first
             let picture = Picture::read(path, self.exposure)?;
             let expected = *expected.get_or_insert(picture.size());
             if picture.size() != expected {

@@ -34,12 +34,14 @@ impl Timeline {
         let mut timeline =
             Self { repeats: vec![1; frames.len()], held: Vec::new(), skipped: Vec::new() };
         for (pair, repeats) in frames.windows(2).zip(&mut timeline.repeats) {
+            // Count the frames that are missing between two pictures
             let distance = pair[1].abs_diff(pair[0]);
-            let missing = distance.saturating_add(step / 2) / step;
-            let missing = missing.saturating_sub(1);
+            let steps = distance.saturating_add(step / 2) / step;
+            let missing = steps.saturating_sub(1);
             if missing == 0 {
                 continue;
             }
+            // Fill the gap with the picture before it, unless it is too long
             let shown = u32::try_from(missing + 1).ok().filter(|_| missing < MAX_HELD);
             match shown.filter(|_| gaps == Gaps::Hold) {
                 Some(shown) => {

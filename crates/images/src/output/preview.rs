@@ -91,10 +91,10 @@ pub(super) struct SrgbPicture {
 impl SrgbPicture {
     /// The picture of `film` on its page, with `overlays` over it.
     pub(super) fn of(film: &Film, options: &PreviewOptions, overlays: &[Sprite]) -> Self {
-        let picture = Self::of_film(film, options);
+        let plain = Self::of_film(film, options);
         let mut picture = match options.page {
-            Some(page) => picture.on(&page),
-            None => picture,
+            Some(page) => plain.on(&page),
+            None => plain,
         };
         let pixel_len = if picture.has_alpha { 4 } else { 3 };
         let rows = picture.bytes.chunks_mut(pixel_len * picture.width.max(1) as usize);
@@ -113,8 +113,8 @@ impl SrgbPicture {
     /// The same on paper.
     fn on(&self, PreviewPage { page, paper }: &PreviewPage) -> Self {
         let [width, height] = page.size;
-        let paper = paper.to_array().map(|v| byte_from_linear(v, 0.5));
-        let paper: &[u8] = if self.has_alpha { &[0; 4] } else { &paper };
+        let srgb = paper.to_array().map(|v| byte_from_linear(v, 0.5));
+        let paper: &[u8] = if self.has_alpha { &[0; 4] } else { &srgb };
         let pixel_len = paper.len();
         let mut bytes = paper.repeat(width as usize * height as usize);
         let own = self.bytes.chunks(pixel_len * self.width.max(1) as usize);
@@ -131,6 +131,7 @@ impl SrgbPicture {
 
     /// The picture of `film` alone.
     pub(super) fn of_film(film: &Film, options: &PreviewOptions) -> Self {
+        // Prepare buffers for a row
         let gain = exp2(options.exposure);
         let width = film.width.max(1) as usize;
         let is_transparent = options.background == PreviewBackground::Transparent;
@@ -140,6 +141,7 @@ impl SrgbPicture {
         let mut colors = vec![0; 3 * width];
         let rows = film.color.chunks(width).zip(bytes.chunks_mut(pixel_len * width));
         for (y, (row, bytes)) in (0..film.height).zip(rows) {
+            // Put pixels before the background, and map them to what a screen shows
             let pixels = linear.as_chunks_mut().0.iter_mut();
             for (pixel, &[r, g, b, a]) in pixels.zip(row) {
                 let color = match options.background {
@@ -149,6 +151,7 @@ impl SrgbPicture {
                 };
                 *pixel = view_transform(color * gain).to_array();
             }
+            // Round them with a pattern, which hides bands
             let pixels = thresholds.as_chunks_mut::<3>().0.iter_mut();
             let [left, top] = options.first_pixel.map(i32::cast_unsigned);
             for (pixel, x) in pixels.zip(0..film.width) {
@@ -156,6 +159,7 @@ impl SrgbPicture {
                 *pixel = [dither_threshold(left.wrapping_add(x), top.wrapping_add(y)); 3];
             }
             bytes_from_linear(Supported::default(), &linear, &thresholds, &mut colors);
+            // Write the row
             if is_transparent {
                 add_alpha(&colors, row, &thresholds, bytes);
             } else {

@@ -88,6 +88,7 @@ impl From<png::DecodingError> for ImageFault {
 pub fn verify_exr(file: impl Read + Seek, expected: &ImageShape) -> Result<(), ImageFault> {
     let reader = exr::block::read(file, true)?;
     let meta = reader.meta_data().clone();
+    // Compare the number of parts
     let parts = expected_parts(&meta.headers, expected);
     if meta.headers.len() != parts.len() {
         let (found, expected) = (meta.headers.len(), parts.len());
@@ -113,6 +114,7 @@ pub fn verify_exr(file: impl Read + Seek, expected: &ImageShape) -> Result<(), I
         }
         *rows += size.y();
     }
+    // Check that each part has all its rows
     for (header, rows) in meta.headers.iter().zip(all_rows) {
         if rows != header.layer_size.y() {
             let what = format!("has {rows} of {} rows", header.layer_size.y());

@@ -85,10 +85,12 @@ impl Page {
         frame: &FrameView,
     ) -> Self {
         let strip = |side: Side| {
+            // Find the overlays at this side
             let is_own = |o: &&Overlay| o.layout == Layout::Beside && o.side() == side;
             let own: Vec<&Overlay> = overlays.iter().filter(is_own).collect();
             let [gap, edge] = largest_margins(own.iter().copied(), height);
             let axis = usize::from(matches!(side, Side::Top | Side::Bottom));
+            // Add up their sizes, with gaps between them and a margin at the edge
             let rooms = own.iter().map(|o| o.room(height, frame)[axis]);
             // One below the other in both kinds of strips
             let room: i32 = match axis {
@@ -98,6 +100,7 @@ impl Page {
             let strip = if own.is_empty() { 0 } else { room + gap + edge };
             u32::try_from(strip).unwrap_or(0)
         };
+        // The picture gets what is left
         let [left, right, top, bottom] =
             [Side::Left, Side::Right, Side::Top, Side::Bottom].map(strip);
         Self {
@@ -138,16 +141,19 @@ impl Page {
         let [width, height] = self.size.map(u32::cast_signed);
         let [left, top] = self.at.map(u32::cast_signed);
         let [own_width, own_height] = self.picture.map(u32::cast_signed);
+        // Find the height of the whole stack
         let [gap, edge] = largest_margins(stack.iter().map(|i| items[*i].0), self.size[1]);
         let total: i32 = stack.iter().map(|i| items[*i].1[1] + gap).sum::<i32>() - gap;
-        let y = match (side, is_top) {
+        // Align it with the picture
+        let wanted = match (side, is_top) {
             (Side::Top, _) => edge,
             (Side::Bottom, _) => top + own_height + gap,
             (_, Some(true)) => top + edge,
             (_, Some(false)) => top + own_height - total - edge,
             (_, None) => top + (own_height - total) / 2,
         };
-        let mut y = y.min(height - total).max(0);
+        let mut y = wanted.min(height - total).max(0);
+        // Place the items from top to bottom
         for i in stack {
             let size = items[*i].1;
             let x = match side {

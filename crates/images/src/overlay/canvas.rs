@@ -74,6 +74,7 @@ impl Raster {
     pub(super) fn add_halo(&mut self, radius: f32, color: Color) {
         #[expect(clippy::cast_possible_truncation, reason = "a few pixels")]
         let reach = radius.ceil().min(64.0) as i32;
+        // Compute the weight at each offset, with a soft edge
         let mut weights = Vec::new();
         for y in -reach..=reach {
             for x in -reach..=reach {
@@ -99,6 +100,7 @@ impl Raster {
                 }
             }
         }
+        // Put the halo behind what was drawn
         for (pixel, alpha) in self.pixels.iter_mut().zip(halo) {
             let behind = HALO * alpha * (1.0 - pixel[3]);
             for c in 0..3 {

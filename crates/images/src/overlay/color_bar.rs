@@ -67,11 +67,11 @@ const LABEL_PITCH: f32 = 2.0;
 
 impl ColorBar {
     pub(super) fn texts(&self) -> Vec<&str> {
-        let names = match &self.kind {
+        let categories = match &self.kind {
             ColorBarKind::Numbers { .. } => &[][..],
             ColorBarKind::Categories(all) => all,
         };
-        let names = names.iter().map(|(name, _)| &**name);
+        let names = categories.iter().map(|(name, _)| &**name);
         names.chain([&*self.title, &*self.unit]).collect()
     }
 
@@ -155,6 +155,7 @@ impl ColorBar {
         if self.orientation == Orientation::Horizontal {
             return self.measure_horizontal(pen);
         }
+        // Find what is drawn
         let size = pen.font.size;
         let length = self.length(pen);
         let ticks = self.vertical_ticks(length, size);
@@ -164,6 +165,7 @@ impl ColorBar {
             ColorBarKind::Numbers { .. } => labels.collect(),
             ColorBarKind::Categories(all) => all.iter().map(|(name, _)| &**name).collect(),
         };
+        // Find the width, of several columns if there are many categories
         let widest = names.iter().map(|name| pen.font.width(name)).fold(0.0, f32::max);
         let own = (BAR_WIDTH + LABEL_GAP) * size + widest;
         let width = match &self.kind {
@@ -175,6 +177,7 @@ impl ColorBar {
                 own + others * column_width(all, pen)
             }
         };
+        // Labels of numbers reach half their height beyond the bar
         let below = match &self.kind {
             ColorBarKind::Numbers { .. } => 0.5 * font::CAP_HEIGHT * size,
             ColorBarKind::Categories(_) => 0.0,
@@ -188,6 +191,7 @@ impl ColorBar {
             self.draw_horizontal(canvas, corner, pen);
             return;
         }
+        // Draw title and exponent
         let size = pen.font.size;
         let length = self.length(pen);
         let ticks = self.vertical_ticks(length, size);
@@ -195,6 +199,7 @@ impl ColorBar {
         pen.text(canvas, &heading, corner);
         let top = (corner[1] + self.above(pen, &heading)).round();
         let left = corner[0].round();
+        // Draw colours with their names or ticks
         match &self.kind {
             ColorBarKind::Categories(all) => swatches(canvas, all, [left, top], pen),
             ColorBarKind::Numbers { colors, is_discrete, .. } => {

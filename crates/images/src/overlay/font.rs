@@ -162,6 +162,7 @@ pub fn outline(id: u16) -> Vec<Stroke> {
     let at = |p: ab_glyph::Point| [p.x / per_em, p.y / per_em];
     let mut end = None;
     let mut strokes = Vec::new();
+    // Join curves to strokes: a new one starts where a curve does not continue the last one
     for curve in outline.curves {
         let (start, stroke, last) = match curve {
             OutlineCurve::Line(a, b) => (a, Stroke::Line(at(b)), b),

@@ -19,15 +19,18 @@ impl NumberFormat {
     pub fn parse(text: &str) -> Option<Self> {
         let mut format = Self::default();
         let mut rest = text.strip_prefix('%').unwrap_or(text);
+        // A width, filled with zeros
         if let Some(after) = rest.strip_prefix('0') {
             let end = after.find(|c: char| !c.is_ascii_digit()).unwrap_or(after.len());
             format.digits = after[..end].parse().ok().filter(|digits| *digits <= MAX_DIGITS)?;
             rest = &after[end..];
         }
+        // Groups of digits
         if let Some(after) = rest.strip_prefix(',') {
             format.is_grouped = true;
             rest = after;
         }
+        // Decimals, and how they are written
         if let Some(after) = rest.strip_prefix('.') {
             let end = after.find(|c: char| !c.is_ascii_digit()).unwrap_or(after.len());
             let decimals = after[..end].parse().ok().filter(|digits| *digits <= MAX_DIGITS)?;
@@ -58,9 +61,11 @@ impl NumberFormat {
     }
 
     pub(super) fn real(self, value: Option<f64>) -> String {
+        // A dash stands for a value that is not there
         let Some(value) = value.filter(|value| value.is_finite()) else {
             return "\u{2013}".to_owned();
         };
+        // Write decimals with true minus signs, and powers of ten as on paper
         match self.decimals {
             Some(decimals) if self.is_scientific => {
                 let text = format!("{value:.decimals$e}");

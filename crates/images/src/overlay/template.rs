@@ -54,11 +54,13 @@ impl Template {
             plain.push_str(&rest[..at]);
             let brace = &rest[at..=at];
             let after = &rest[at + 1..];
+            // A doubled brace is text
             if let Some(doubled) = after.strip_prefix(brace) {
                 plain.push_str(brace);
                 rest = doubled;
                 continue;
             }
+            // Anything else is a variable up to its closing brace
             let end = after.find('}').filter(|_| brace == "{").ok_or_else(|| {
                 format!("`{brace}` has no partner; write {brace}{brace} for a brace")
             })?;
@@ -68,6 +70,7 @@ impl Template {
             pieces.push(variable(&after[..end])?);
             rest = &after[end + 1..];
         }
+        // Keep the text behind the last variable
         plain.push_str(rest);
         if !plain.is_empty() {
             pieces.push(Piece::Text(plain));
@@ -120,6 +123,7 @@ impl Template {
 /// Reads what stands between braces: `time:.2f`.
 fn variable(text: &str) -> Result<Piece, String> {
     let (name, format) = text.split_once(':').unwrap_or((text, ""));
+    // Find the variable; ends of attributes are behind their names
     let variable = match name {
         "time" => Variable::Time,
         "frame" => Variable::Frame,
@@ -136,6 +140,7 @@ fn variable(text: &str) -> Result<Piece, String> {
             }
         },
     };
+    // Find the format
     let format = NumberFormat::parse(format).ok_or_else(|| {
         format!("unknown format `{format}` of `{{{name}}}` (examples: .2f, .1e, 04d, and a comma for groups of digits)")
     })?;

@@ -107,22 +107,26 @@ impl TickSettings<'_> {
     /// The ticks with at most `most` labels, which is at least 2.
     pub fn ticks(&self, most: usize) -> Ticks {
         let axis = self.axis();
+        // An empty range has one label
         let [low, high] = axis.range;
         if !(low < high && (high - low).is_normal()) {
             return axis.one(low);
         }
-        let most = match self.choice {
+        // Choose how many labels there are
+        let wanted = match self.choice {
             Some(TickChoice::Values(values)) => return axis.given(values),
             Some(TickChoice::Count(count)) => most.min(usize::from(*count)),
             None => most.min(USUAL),
         };
-        let most = most.max(2);
+        let most = wanted.max(2);
+        // Choose their places by the scale
         let ticks = match (self.steps, axis.scale) {
             (Some(steps), _) => return axis.bands(steps, most),
             (None, ColorScale::Linear) => axis.linear(most),
             (None, ColorScale::Log) => axis.log(most),
             (None, ColorScale::SymLog { threshold }) => axis.symlog(threshold, most),
         };
+        // Label the ends too, if there is space
         #[expect(clippy::cast_precision_loss, reason = "a few")]
         let gap = GAP / most as f64;
         axis.label_ends(ticks, gap)

@@ -115,6 +115,7 @@ fn decode(
     is_wanted: impl Fn(&str) -> bool,
     step_of: impl Fn(usize) -> usize,
 ) -> Result<SampledPlanes, Fault> {
+    // Read the headers, and choose which pixels are kept
     let reader = exr::block::read(file, false)?;
     let meta = reader.meta_data().clone();
     let image_size = check(&meta)?;
@@ -182,6 +183,7 @@ impl SampledPlanes {
             let column = (x + i).checked_sub(left).filter(|x| x % step == 0)? / step;
             (column < width).then_some(start + column)
         };
+        // Convert the samples that are kept
         match &mut self.planes[plane].1 {
             PlaneSamples::Integer(samples) => {
                 for (i, value) in line.read_samples::<u32>().enumerate() {

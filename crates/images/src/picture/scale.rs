@@ -21,6 +21,7 @@ impl Picture {
         if [width, height] == self.size() {
             return self.clone();
         }
+        // Scale rows in linear light
         let linear = linear_values();
         let taps = all_taps(self.width, width);
         let mut rows = vec![0.0_f32; 3 * width * self.height];
@@ -34,6 +35,7 @@ impl Picture {
                 }
             }
         }
+        // Scale columns, and convert back
         let mut rgb = Vec::with_capacity(3 * width * height);
         let mut sums = vec![0.0_f32; 3 * width];
         for taps in all_taps(self.height, height) {

@@ -133,6 +133,7 @@ impl Camera {
     pub(crate) fn check_projection(&self, section: &Section<'_>) {
         let is_perspective = self.projection == ProjectionKind::Perspective;
         let is_panorama = self.projection == ProjectionKind::Equirectangular;
+        // Keys of a perspective need one
         if !is_perspective {
             let instead = if is_panorama {
                 "an equirectangular picture shows all directions"
@@ -147,6 +148,7 @@ impl Camera {
                 section.wrong(key, "is given, but only perspective has depth of field; remove it");
             }
         }
+        // Height, mode and elevation depend on the projection
         if self.height.is_some() && self.projection != ProjectionKind::Orthographic {
             section.wrong(
                 "height",
@@ -190,6 +192,7 @@ impl Camera {
     }
 
     fn check_stereo(&self, section: &Section<'_>) {
+        // Keys of stereo pairs need two eyes
         if !self.stereo {
             for (key, is_given) in [
                 ("eye_distance", self.eye_distance.is_some()),
@@ -201,6 +204,7 @@ impl Camera {
             }
             return;
         }
+        // Refuse what both eyes cannot see
         if self.projection == ProjectionKind::Orthographic {
             section.wrong(
                 "stereo",
@@ -213,6 +217,7 @@ impl Camera {
                 "is true, but stereo pairs have no depth of field; remove f_stop and aperture",
             );
         }
+        // A panorama needs the distance of the eyes
         if self.projection == ProjectionKind::Equirectangular {
             if self.eye_distance.is_none() {
                 section.missing(
@@ -276,14 +281,12 @@ impl Value for ConvergenceSetting {
 
 /// Dependencies between keys, as JSON schema.
 pub(super) fn conditions() -> Vec<Json> {
-    let is = |key: &str, value: Json| json!({ "required": [key], "properties": { key: { "const": value } } });
+    // Each condition mirrors a check of the reader, for editors
     let not_perspective = json!({
         "required": ["projection"],
         "properties": { "projection": { "enum": ["orthographic", "equirectangular"] } },
     });
-    let number =
-        |key: &str| json!({ "required": [key], "properties": { key: { "type": "number" } } });
-    vec![
+    let mut conditions = vec![
         json!({
             "if": not_perspective,
             "then": { "properties": { "fov": { "const": DEFAULT_FOV }, "f_stop": { "const": 0 }, "aperture": { "const": 0 } } },
@@ -311,6 +314,14 @@ pub(super) fn conditions() -> Vec<Json> {
                 },
             },
         }),
+    ];
+    conditions.extend(stereo_conditions());
+    conditions
+}
+
+/// Dependencies between the keys of stereo pairs.
+fn stereo_conditions() -> [Json; 3] {
+    [
         json!({ "if": number("eye_distance"), "then": is("stereo", json!(true)) }),
         json!({
             "if": {
@@ -330,6 +341,16 @@ pub(super) fn conditions() -> Vec<Json> {
             },
         }),
     ]
+}
+
+/// The condition that `key` has this value.
+fn is(key: &str, value: Json) -> Json {
+    json!({ "required": [key], "properties": { key: { "const": value } } })
+}
+
+/// The condition that `key` is a number.
+fn number(key: &str) -> Json {
+    json!({ "required": [key], "properties": { key: { "type": "number" } } })
 }
 
 #[cfg(test)]

@@ -17,10 +17,12 @@ pub const SCHEMA_FILE: &str = "job.schema.json";
 
 /// The schema of manifests (draft 2020-12).
 pub fn job_schema() -> Value {
+    // Keys outside tables
     let entries = Manifest::examples().entries();
     let outside = entries.list().iter().filter(|entry| entry.section.is_empty());
     let mut properties: Map<_, _> =
         outside.map(|entry| (entry.name().to_owned(), property(entry))).collect();
+    // Tables, with conditions that some of them have
     for section in sections(&entries).filter(|s| !s.is_empty() && !s.contains('.')) {
         let mut table = table(&entries, section);
         match section {
@@ -46,6 +48,7 @@ pub fn job_schema() -> Value {
 
 /// Adds every list of tables to the table that contains it.
 fn add_lists(properties: &mut Map<String, Value>, entries: &Entries) {
+    // Collect the tables of each list; an item may have several types
     let mut kinds: Vec<(&str, Vec<Value>)> = Vec::new();
     for section in sections(entries) {
         let Some((list, _)) = section.rsplit_once('.') else {
@@ -60,6 +63,7 @@ fn add_lists(properties: &mut Map<String, Value>, entries: &Entries) {
             None => kinds.push((list, vec![table])),
         }
     }
+    // Put each list into its table
     for (list, mut tables) in kinds {
         let description = tables[0]["description"].clone();
         let item = match tables.len() {

@@ -45,6 +45,7 @@ impl JobReport {
             1 => "1 frame failed.".to_owned(),
             total => format!("{total} frames failed."),
         });
+        // List the first of them
         let mut table = Table::new("failed-frames", &["frame", "image", "reason"]);
         for frame in failed().take(MAX_FAILURES) {
             table.bad_row([

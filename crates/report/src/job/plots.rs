@@ -35,6 +35,7 @@ impl JobReport {
         let particles = vec![curve("particles", |r| float(r.particles))];
         let per_particle =
             vec![curve("positions and tree", |r| r.bytes_per_particle().unwrap_or(f64::NAN))];
+        // Draw each group in a plot of its own
         vec![
             self.times("plot-stages", "Time by stage", stages),
             self.times("plot-build", "Build time by phase", self.phases()),

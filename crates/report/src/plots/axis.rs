@@ -82,8 +82,8 @@ impl Axis {
         }
         // Widen a range that is empty or too small for distinct ticks
         if high - low <= 1e-9 * high.abs().max(low.abs()) {
-            let half = if self.whole { (1e-6 * high.abs()).max(1.0) } else { 0.5 * high.abs() };
-            let half = if half > 0.0 { half } else { 1.0 };
+            let wanted = if self.whole { (1e-6 * high.abs()).max(1.0) } else { 0.5 * high.abs() };
+            let half = if wanted > 0.0 { wanted } else { 1.0 };
             (low, high) = (low - half, high + half);
         }
         // Choose the distance between ticks

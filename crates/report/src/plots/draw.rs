@@ -94,6 +94,7 @@ fn draw(
     let corner = ((WIDTH - 2) * FINE, (HEIGHT - 4) * FINE);
     root.draw_text(plot.x.title(), &font.pos(bottom_right), corner)?;
 
+    // Draw the series over them
     for drawn in series {
         draw_series(drawn, &root, |point| chart.backend_coord(point), text)?;
     }
@@ -108,8 +109,10 @@ fn draw_series(
     text: &RefCell<String>,
 ) -> Result<(), DrawError> {
     let put = |piece: &str| text.borrow_mut().push_str(piece);
+    // Group the elements of a series under its name
     put(&key::group(series.hue, "series"));
     put(&format!("<title>{}</title>\n", escaped(series.name)));
+    // Draw lines, interrupted where values are missing
     if series.line != Line::None {
         put(key::part(series.line, false));
         for piece in series.pieces.iter().filter(|piece| piece.len() > 1) {
@@ -117,6 +120,7 @@ fn draw_series(
         }
         put("</g>\n");
     }
+    // Draw markers over the lines
     put(key::part(series.line, true));
     for (x, y) in series.marked().iter().map(at) {
         match key::marker(series.hue) {

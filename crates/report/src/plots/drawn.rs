@@ -18,8 +18,8 @@ pub(super) struct Drawn<'a> {
 
 impl<'a> Drawn<'a> {
     pub(super) fn new(plot: &Plot, series: &'a Series, hue: usize) -> Self {
-        let placed = series.points.iter().map(|(x, y)| (plot.x.place(*x), plot.y.place(*y)));
-        let placed = thinned(placed.collect());
+        let points = series.points.iter().map(|(x, y)| (plot.x.place(*x), plot.y.place(*y)));
+        let placed = thinned(points.collect());
         let pieces = placed
             .split(|point| !is_finite(*point))
             .filter(|piece| !piece.is_empty())

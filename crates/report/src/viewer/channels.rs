@@ -123,6 +123,7 @@ pub(super) fn channel_picture(
     ranges: &ChannelRanges,
 ) -> Option<Picture> {
     let [width, height] = planes.size;
+    // Map the numbers to colours; each kind of channel has a mapping of its own
     let rgb: Vec<u8> = match kind {
         ChannelKind::Normal => {
             let axes = kind.axes(planes)?;

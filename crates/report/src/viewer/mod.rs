@@ -119,6 +119,7 @@ pub fn viewer_page(
     warning: Option<&str>,
     plots: &[Plot],
 ) -> Result<(String, PageContent), ViewerError> {
+    // Link or embed the pictures, and limit the size of the page
     let first = frames.first().ok_or(ViewerError::Empty)?;
     let size = Picture::read(&first.picture, settings.exposure)?.size();
     let mut all: Vec<Value> = Vec::with_capacity(frames.len());
@@ -131,6 +132,7 @@ pub fn viewer_page(
         }
         all.push(json!({ "number": frame.number, "source": source }));
     }
+    // Add ids and channels
     let content =
         if settings.data { add_data(frames, settings, &mut all)? } else { PageContent::default() };
     let data = json!({
@@ -141,6 +143,7 @@ pub fn viewer_page(
         "channels": content.channels,
         "values": content.values,
     });
+    // Write the page
     let mut page = Page::new(&settings.title);
     page.style(CSS);
     page.script(SCRIPT, IMAGES);
@@ -233,6 +236,7 @@ fn plan(
     content: &mut PageContent,
 ) -> Result<Option<DataPlan>, ViewerError> {
     let picks = [0, frames.len() / 2, frames.len() - 1].map(|i| &frames[i]);
+    // Try one width after the other, until the data are small enough
     for width in DATA_WIDTHS {
         let samples: Vec<SampledPlanes> = picks
             .map(|frame| planes(frame, settings, width))

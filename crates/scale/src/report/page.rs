@@ -137,6 +137,7 @@ fn figures(
     value: fn(&ScaleReport, usize, &Column) -> Option<String>,
     theirs: &[thesis::Figure],
 ) -> Table {
+    // Collect the structures of the thesis
     let columns = report.columns();
     let mut names: Vec<&str> = Vec::new();
     for figure in theirs {
@@ -145,6 +146,7 @@ fn figures(
         }
     }
     let mut table = table_with(id, &columns, &names);
+    // Write a row for each number of particles, with ours before theirs
     for particles in counts(report, thesis::RATE_PARTICLES) {
         let ours = columns
             .iter()

@@ -77,6 +77,7 @@ impl<'a> TileFilter<'a> {
         settings: &DenoiseSettings,
         [columns, rows]: [usize; 2],
     ) -> Self {
+        // Memory for the largest tile and all offsets of the search is allocated once
         let search = settings.search as usize;
         let layout = TileLayout::new(search, columns);
         let offsets = Offset::all(search as isize);

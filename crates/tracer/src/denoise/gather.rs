@@ -118,6 +118,7 @@ fn halves_body(
     odd_plane: &mut [f32],
     variance: &mut [f32],
 ) {
+    // Slices of one length, so that the loop needs no bounds checks
     let count = color.len();
     let (odd, albedo) = (&odd[..count], &albedo[..count]);
     let (depth, usable, limits) = (&depth[..count], &usable[..count], &limits[..count]);
@@ -125,15 +126,18 @@ fn halves_body(
     let variance = &mut variance[..count];
     let to_even = 1.0 / shares.even;
     for x in 0..count {
+        // Divide both halves by albedo; the even half is what the odd one leaves of the mean
         let scale = 1.0 / divisor(albedo[x][axis], depth[x]);
         let odd = odd[x][axis];
         let even = (color[x][axis] - odd * shares.odd) * to_even;
+        // Limit them; pixels that are not usable are 0
         let is_usable = usable[x] > 0.0;
         let limit = limits[x];
         let even = larger(smaller(even * scale, limit), -limit);
         let odd = larger(smaller(odd * scale, limit), -limit);
         let even = if is_usable { even } else { 0.0 };
         let odd = if is_usable { odd } else { 0.0 };
+        // The difference of the halves estimates the variance
         even_plane[x] = even;
         odd_plane[x] = odd;
         variance[x] += 0.5 * (even - odd) * (even - odd);

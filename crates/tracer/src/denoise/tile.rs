@@ -175,16 +175,20 @@ impl Line<'_> {
         to: Range<usize>,
         usable: &mut [f32],
     ) {
+        // Take the pixels from all planes of the image
         let (simd, input) = (self.simd, self.input);
         let shares = Shares::of(input.samples);
         let color = &input.color[pixels.clone()];
         let [odd, albedo, normal] = [input.odd, input.albedo, input.normal]
             .map(|plane| bytemuck::cast_slice(&plane[pixels.clone()]));
         let (depth, limits) = (&input.depth[pixels.clone()], &self.limits[pixels]);
+        // Find the columns of the tile that they go to
         let usable = &mut usable[to.clone()];
         let planes: [_; NOISE] = planes_mut(row, to);
         let [er, eg, eb, or, og, ob, ar, ag, ab, nx, ny, nz, z, variance] = planes;
+        // Find the pixels that can be compared
         classify(simd, color, odd, albedo, normal, depth, usable, z);
+        // Compute both halves and their variance, axis by axis
         variance.fill(0.0);
         for (axis, (even, odd_plane)) in [(er, or), (eg, og), (eb, ob)].into_iter().enumerate() {
             halves(
@@ -192,6 +196,7 @@ impl Line<'_> {
                 variance,
             );
         }
+        // Scale features so that a difference of 1 is the tolerance
         for (axis, plane) in [ar, ag, ab].into_iter().enumerate() {
             let unit = 1.0 / ALBEDO_TOLERANCE;
             feature(simd, axis, unit, UNUSABLE, albedo, usable, plane);

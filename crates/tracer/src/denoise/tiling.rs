@@ -83,17 +83,20 @@ pub(super) fn tiles(
     view: [usize; 2],
     [columns, rows]: [usize; 2],
 ) -> Vec<TileRows<'_>> {
+    // Count the tiles
     let count = |length: usize, view: usize, part: usize| {
         length / view * view.div_ceil(part) + (length % view).div_ceil(part)
     };
     let height = plane.len() / width;
     let tiles = count(width, view[0], columns) * count(height, view[1], rows);
     let mut all = Vec::with_capacity(tiles);
+    // Divide the plane into rows of tiles, none of which crosses a view
     let bands = plane.chunks_mut(width * view[1]);
     let mut top = 0;
     for pixels in bands.flat_map(|views| views.chunks_mut(width * rows)) {
         let first = all.len();
         let height = pixels.len() / width;
+        // Place the tiles of this row
         for start in (0..width).step_by(view[0]) {
             let end = width.min(start + view[0]);
             all.extend((start..end).step_by(columns).map(|left| {
@@ -101,6 +104,7 @@ pub(super) fn tiles(
                 (place, Vec::with_capacity(height))
             }));
         }
+        // Give each of them its piece of every line
         for row in pixels.chunks_mut(width) {
             let pieces = row.chunks_mut(view[0]).flat_map(|part| part.chunks_mut(columns));
             for ((_, tile), piece) in all[first..].iter_mut().zip(pieces) {

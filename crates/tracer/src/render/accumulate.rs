@@ -15,6 +15,7 @@ impl SampleGroup {
         let mut layers = std::mem::take(&mut self.layers);
         for (number, pixel) in self.pixels.iter().enumerate() {
             let range = number * samples..(number + 1) * samples;
+            // Average the radiance and the coverage
             let sum = pixel_sum(&self.radiance, &self.coverage, range.clone());
             let mean = sum.map(|v| v * share);
             let [r, g, b, a] = mean;
@@ -23,6 +24,7 @@ impl SampleGroup {
             } else {
                 [r, g, b, a]
             };
+            // Store them with the data of the pixel, the mean of odd samples for the denoiser, and the layers
             tile.set_color(pixel.column, pixel.row, color);
             tile.set_data(pixel.column, pixel.row, &pixel.data);
             if tile.has_odd() {

@@ -82,6 +82,7 @@ impl RenderContext<'_> {
     /// Base colour of a part of the particles, of the ground, of a mesh or of spray, as a ray sees it after a number of
     /// diffuse reflections.
     fn fixed_color(&self, ray: (&RayPacket, u32), hits: &Intersections, lane: usize) -> Vec3 {
+        // Meshes and materials of parts have colours of their own
         if let Some(mesh) = self.mesh(hits.material[lane]) {
             let own = self.part_color(hits.material[lane], hits.particle[lane]);
             return own.unwrap_or(mesh.color);
@@ -90,6 +91,7 @@ impl RenderContext<'_> {
             let of_particle = || self.source.color(hits.particle[lane]);
             return part.color.unwrap_or_else(of_particle);
         }
+        // The ground is filtered over the width of the ray
         match (hits.material[lane], &self.scene.ground) {
             (MaterialId::GROUND, Some(ground)) => {
                 let (rays, bounces) = ray;
@@ -195,6 +197,7 @@ impl RenderContext<'_> {
     /// particles.
     fn object(&self, kind: MatteKind, material: MaterialId, particle: impl Fn() -> u32) -> u32 {
         let object = |name: ObjectName| cryptomatte::object_of(name.as_bytes());
+        // Particles are told apart by id, part or material
         if material.is_of_particles() {
             match kind {
                 MatteKind::Particle => {
@@ -213,6 +216,7 @@ impl RenderContext<'_> {
                 }
             }
         }
+        // All other surfaces are one object each
         object_of_name(match material {
             MaterialId::PARTICLES => cryptomatte::PARTICLES,
             MaterialId::SPRAY => cryptomatte::SPRAY,
@@ -258,6 +262,7 @@ impl RenderContext<'_> {
         // Look up the particle only if a channel needs it
         let needs_particle = is_particle && channels.needs_nearest_particle();
         let particle = needs_particle.then(|| self.particle_at(hits, lane));
+        // Look up only what the channels need
         let normal = lane3(&hits.normal, lane);
         let direction = lane3(&rays.direction, lane);
         let albedo = |blend: &mut Vec<(u32, f32)>| match hits.material[lane] {

@@ -104,14 +104,25 @@ fn is_soft(scene: &Scene, integrator: IntegratorKind, shape: &dyn Shape) -> bool
         && shape.material() == MaterialId::SPRAY
 }
 
-impl<'a> RenderContext<'a> {
-    pub(super) fn new(
+/// Shapes by the way in which rays meet them.
+struct DividedShapes<'a> {
+    /// All that are not among the others, with opaque or transmissive particles.
+    solid: Vec<&'a dyn Shape>,
+    panes: Vec<&'a dyn Shape>,
+    soft_spray: Option<&'a dyn Shape>,
+    translucent: Option<&'a dyn Shape>,
+    particles: Option<&'a dyn Shape>,
+    interior: Interior,
+}
+
+impl<'a> DividedShapes<'a> {
+    fn new(
         shapes: Vec<&'a dyn Shape>,
-        scene: &'a Scene,
-        source: &'a dyn ShadeSource,
-        settings: &'a RenderSettings,
+        scene: &Scene,
+        source: &dyn ShadeSource,
+        integrator: IntegratorKind,
     ) -> Self {
-        let is_soft = |shape: &&dyn Shape| is_soft(scene, settings.integrator, *shape);
+        let is_soft = |shape: &&dyn Shape| is_soft(scene, integrator, *shape);
         let (spray, shapes): (Vec<_>, Vec<_>) = shapes.into_iter().partition(is_soft);
         let is_opaque = |shape: &&dyn Shape| !is_pane(scene, *shape);
         let (shapes, panes): (Vec<_>, Vec<_>) = shapes.into_iter().partition(is_opaque);
@@ -120,10 +131,32 @@ impl<'a> RenderContext<'a> {
         let particles = shapes.iter().find(is_particles).copied();
         let is_connected = particles.is_some_and(|shape| shape.is_connected());
         let interior = Interior::of(&scene.material, is_connected);
+        // Only opaque spheres fade out: transmissive ones and connected bodies have an inside
         let has_opacity = source.is_translucent() && interior == Interior::Opaque && !is_connected;
         let is_translucent =
             |shape: &&dyn Shape| has_opacity && shape.material() == MaterialId::PARTICLES;
         let (translucent, shapes): (Vec<_>, Vec<_>) = shapes.into_iter().partition(is_translucent);
+        Self {
+            solid: shapes,
+            panes,
+            soft_spray: spray.first().copied(),
+            translucent: translucent.first().copied(),
+            particles,
+            interior,
+        }
+    }
+}
+
+impl<'a> RenderContext<'a> {
+    pub(super) fn new(
+        shapes: Vec<&'a dyn Shape>,
+        scene: &'a Scene,
+        source: &'a dyn ShadeSource,
+        settings: &'a RenderSettings,
+    ) -> Self {
+        let divided = DividedShapes::new(shapes, scene, source, settings.integrator);
+        let DividedShapes { solid: shapes, panes, particles, interior, .. } = divided;
+        let is_connected = particles.is_some_and(|shape| shape.is_connected());
         // Prepare camera, background and lights for packets
         let eye = scene.camera.eye();
         let [width, height] = settings.eye_size(scene.camera.eyes());
@@ -138,8 +171,8 @@ impl<'a> RenderContext<'a> {
             parts: Some(&scene.parts)
                 .filter(|parts| !parts.is_empty() && !is_connected)
                 .filter(|_| settings.integrator == IntegratorKind::Path),
-            soft_spray: spray.first().copied(),
-            translucent: translucent.first().copied(),
+            soft_spray: divided.soft_spray,
+            translucent: divided.translucent,
             has_holdouts: scene.meshes.iter().any(|mesh| mesh.is_holdout),
             particles,
             source,

@@ -229,6 +229,7 @@ impl Film {
 
     /// Splits all planes into bands of `rows` rows, from the top; the last band may have fewer.
     pub(super) fn bands_mut(&mut self, rows: u32) -> Vec<Band<'_>> {
+        // Divide each plane; unused planes are empty
         let length = self.width as usize * rows as usize;
         let mut depth = chunks(&mut self.depth, length);
         let mut normal = chunks(&mut self.normal, length);
@@ -300,6 +301,7 @@ pub(super) struct Band<'a> {
 impl Band<'_> {
     /// Splits the band into tiles of `side` columns, from the left; the last tile may have fewer.
     pub(super) fn tiles(&mut self, side: u32) -> Vec<FilmTile<'_>> {
+        // Divide the rows of each plane
         let (width, columns) = (self.width as usize, side as usize);
         let mut color = rows_of_tiles(self.color, width, columns).into_iter();
         let mut depth = planes(&mut self.depth, width, columns);

@@ -39,6 +39,7 @@ impl<'a> FilmRows<'a> {
     /// # Panics
     /// If row `top` is not among these rows.
     pub fn part(&self, top: u32, height: u32) -> FilmRows<'a> {
+        // Find the pixels of these rows in all planes
         let skipped = top
             .checked_sub(self.top)
             .filter(|rows| *rows < self.height)

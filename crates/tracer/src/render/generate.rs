@@ -46,6 +46,7 @@ impl RenderContext<'_> {
                 path: PathSeed::of_pixel(column_number, row_number),
                 data: DataSample::MISS,
             });
+            // Add the samples of the pixel, relative to the image of its eye
             let points = self.sampler.points(column_number, row_number);
             let [x, y] = if is_right { [x % eye_size[0], y % eye_size[1]] } else { [x, y] };
             group.push_pixel(x as f32, y as f32, points);

@@ -238,6 +238,7 @@ pub(super) mod testing {
         let mut scratch = Scratch::default();
         let settings = integrator.context().settings;
         let size = Vec2::new(settings.width as f32, settings.height as f32);
+        // Make a sample for each position
         let group = &mut scratch.group;
         for film in films {
             group.push(film.x * size.x, film.y * size.y);
@@ -249,6 +250,7 @@ pub(super) mod testing {
                 data: DataSample::MISS,
             });
         }
+        // Trace them like the samples of an image
         let never = AtomicBool::new(false);
         trace_group(integrator, &never, &mut scratch).unwrap();
         let radiance = |i| lane3(&scratch.group.radiance[i / LANES], i % LANES);

@@ -85,6 +85,7 @@ impl RenderContext<'_> {
         lanes: u32,
         packet: &mut PacketScratch,
     ) {
+        // Rays see it where they miss everything, and through a ground that fades out
         let hits = &packet.hits;
         let lanes = lanes & (!hits.mask | hits.lanes_of(MaterialId::GROUND));
         if lanes == 0 {
@@ -96,6 +97,7 @@ impl RenderContext<'_> {
             _ => 1.0 - hits.opacity[lane],
         });
         scale(self.simd, &packet.throughput, &background_part, &mut packet.weight);
+        // Add it to the picture and to the group of lights without one; camera rays see the backdrop of a studio
         let (rays, weight) = (&segments.rays, &packet.weight);
         let is_backdrop = depth == 1
             && matches!(self.scene.background, Background::Studio { .. })

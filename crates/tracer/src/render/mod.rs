@@ -200,19 +200,10 @@ pub fn render_into(
     let RenderSettings { width, height, channels, has_features, .. } = *settings;
     film.fit(width, height, channels, has_features);
     let plane = scene.ground.as_ref().map(Plane::new);
-    let floor = plane.iter().map(|plane| plane as &dyn Shape);
-    let shapes = floor.chain(shapes.iter().copied()).collect();
+    let ground = plane.iter().map(|plane| plane as &dyn Shape);
+    let shapes = ground.chain(shapes.iter().copied()).collect();
     let context = RenderContext::new(shapes, scene, source, settings);
-    let mut before = RayCounts::default();
-    let integrator: Box<dyn Integrator> = match settings.integrator {
-        IntegratorKind::Whitted => Box::new(WhittedIntegrator::new(context)),
-        IntegratorKind::Path => {
-            let integrator = PathIntegrator::new(context).with_photons(stop);
-            let (integrator, traced) = integrator.ok_or(RenderError::Interrupted)?;
-            before = traced;
-            Box::new(integrator)
-        }
-    };
+    let (integrator, before) = integrator_of(context, settings, stop)?;
     let scratch = Mutex::new(Vec::new());
     let render_tile = |tile: &mut film::FilmTile<'_>| {
         // Reuse scratch memory: there is one per thread, and all are released at the end of the image
@@ -233,6 +224,24 @@ pub fn render_into(
         })
         .try_reduce(RayCounts::default, |a, b| Ok(a + b))?;
     Ok(before + counts)
+}
+
+/// The integrator of the settings, and the rays that were traced to prepare it.
+fn integrator_of<'a>(
+    context: RenderContext<'a>,
+    settings: &RenderSettings,
+    stop: &dyn Stop,
+) -> Result<(Box<dyn Integrator + 'a>, RayCounts), RenderError> {
+    match settings.integrator {
+        IntegratorKind::Whitted => {
+            Ok((Box::new(WhittedIntegrator::new(context)), RayCounts::default()))
+        }
+        IntegratorKind::Path => {
+            let (integrator, traced) =
+                PathIntegrator::new(context).with_photons(stop).ok_or(RenderError::Interrupted)?;
+            Ok((Box::new(integrator), traced))
+        }
+    }
 }
 
 fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {

@@ -64,6 +64,7 @@ impl RenderContext<'_> {
         if self.panes.is_empty() {
             return;
         }
+        // Whitted rays keep only what passes; paths choose at random whether a pane reflects them
         let is_path = self.settings.integrator == IntegratorKind::Path;
         let mut u = splat(1.0);
         if is_path {
@@ -72,6 +73,7 @@ impl RenderContext<'_> {
         }
         packet.first_pane = splat(f32::INFINITY);
         packet.behind.clear();
+        // Follow each ray from pane to pane
         for lane in lanes_in(segments.lanes()) {
             let mut u = u[lane];
             let mut throughput = lane3(&packet.throughput, lane);
@@ -80,6 +82,7 @@ impl RenderContext<'_> {
                 let Some(pane) = self.next_pane(&rest) else {
                     break;
                 };
+                // The pane takes some of the light, or is the intersection of the path
                 packet.first_pane[lane] = packet.first_pane[lane].min(pane.hit.t);
                 if !is_path {
                     throughput *= pane.transmittance;

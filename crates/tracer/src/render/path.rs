@@ -41,7 +41,7 @@ mod light_channels;
 
 use ambient::AmbientLight;
 use catcher::Catcher;
-use floor::{Caustics, FloorLight};
+use floor::{Caustics, GroundLight};
 
 /// Number of diffuse reflections from which on paths end at random.
 const ROULETTE_START: u32 = 2;
@@ -66,19 +66,22 @@ pub(super) struct PathIntegrator<'a> {
     /// The light of second surfaces, if paths end there.
     ambient: Option<AmbientLight>,
     /// The light on the ground, if paths end there.
-    floor: Option<FloorLight>,
+    ground_light: Option<GroundLight>,
     /// The light of photons on other surfaces.
     caustics: Caustics,
 }
 
 impl<'a> PathIntegrator<'a> {
     pub(super) fn new(context: RenderContext<'a>) -> Self {
+        // Prepare the surface of transmissive particles
         let is_connected = context.connected_particles().is_some();
         let interface = materials_of(context.scene, is_connected).swap_remove(0);
         let material = &context.scene.material;
         let rough = RoughInterface::of(material, interface.constants(), is_connected);
-        let environment = context.scene.environment.as_deref();
-        let environment = environment.filter(|environment| !environment.is_black());
+        // Black environments need no samples
+        let given = context.scene.environment.as_deref();
+        let environment = given.filter(|environment| !environment.is_black());
+        // Prepare the BSDFs of opaque surfaces
         let mut bsdfs = bsdfs_of(
             context.scene.material.finish,
             &context.scene.meshes,
@@ -95,7 +98,7 @@ impl<'a> PathIntegrator<'a> {
             rough,
             split: SplitRule::new(context.settings, context.interior),
             catcher: Catcher::of(context.scene),
-            floor: None,
+            ground_light: None,
             caustics: Caustics::default(),
             has_extents: context.lights.iter().any(|light| light.has_extent()),
             context,
@@ -123,12 +126,14 @@ impl Integrator for PathIntegrator<'_> {
         let ended = self.add_emitted(segments, packet);
         packet.hits.mask &= !ended;
         packet.take_light(LightClass::Emission);
+        // A catcher darkens what is behind it
         if let Some(catcher) = self.catcher.as_ref().filter(|_| depth == 1) {
             let lanes = packet.hits.lanes_of(MaterialId::GROUND);
             if lanes != 0 {
                 self.catch_shadows(catcher, &self.surface(segments, depth, lanes), packet);
             }
         }
+        // Add the background of rays that hit nothing, and end the rays at holdouts
         let held_out = self.context.holdout_lanes(depth, &packet.hits);
         let lanes = segments.lanes() & !ended & !held_out;
         self.add_escaped(segments, depth, lanes, packet);
@@ -136,6 +141,7 @@ impl Integrator for PathIntegrator<'_> {
         if packet.hits.mask & !held_out == 0 {
             return;
         }
+        // Reflect rays at panes; the others have passed them already
         let panes = self.context.pane_lanes(&packet.hits);
         if panes != 0 {
             self.shade_panes(segments, depth, panes, packet, next);
@@ -143,8 +149,8 @@ impl Integrator for PathIntegrator<'_> {
         // End paths at a ground whose light is known
         let ground = packet.hits.lanes_of(MaterialId::GROUND);
         let mut ended = 0;
-        if let Some(floor) = self.floor.as_ref().filter(|_| ground != 0) {
-            self.shade_floor(floor, &self.surface(segments, depth, ground), packet);
+        if let Some(light) = self.ground_light.as_ref().filter(|_| ground != 0) {
+            self.shade_ground(light, &self.surface(segments, depth, ground), packet);
             ended = ground;
         }
         // Reflect light at opaque surfaces
@@ -152,9 +158,28 @@ impl Integrator for PathIntegrator<'_> {
             Interior::Opaque => 0,
             Interior::Spheres | Interior::Body => packet.hits.lanes_of(MaterialId::PARTICLES),
         };
-        let max = self.context.settings.bounces;
         let others = packet.hits.mask & !(clear | panes | held_out | ended);
-        let mut opaque = others & lanes_where(|l| segments.bounces[l] <= max);
+        self.shade_reflecting(segments, depth, others, packet, next);
+        // Reflect and refract rays at transmissive surfaces
+        if clear != 0 {
+            self.shade_transmissive(segments, depth, clear, packet, next);
+        }
+    }
+}
+
+impl PathIntegrator<'_> {
+    /// Reflects light at the opaque surfaces of `lanes`, whose paths end at the last bounce, or already at the second
+    /// intersection if ambient occlusion replaces the rest of them.
+    fn shade_reflecting(
+        &self,
+        segments: &SegmentPacket,
+        depth: u32,
+        lanes: u32,
+        packet: &mut PacketScratch,
+        next: &mut RayStreams,
+    ) {
+        let max = self.context.settings.bounces;
+        let mut opaque = lanes & lanes_where(|l| segments.bounces[l] <= max);
         if let Some(ambient) = &self.ambient {
             let second = opaque & lanes_where(|l| segments.bounces[l] > 0);
             if second != 0 {
@@ -164,10 +189,6 @@ impl Integrator for PathIntegrator<'_> {
         }
         if opaque != 0 {
             self.shade_opaque(&self.surface(segments, depth, opaque), packet, next);
-        }
-        // Reflect and refract rays at transmissive surfaces
-        if clear != 0 {
-            self.shade_transmissive(segments, depth, clear, packet, next);
         }
     }
 }
@@ -378,9 +399,11 @@ impl PathIntegrator<'_> {
 
     /// Adds the light of each light source, and of photons.
     fn add_lights(&self, surface: &Surface<'_>, packet: &mut PacketScratch) {
+        // Light that photons bring is not sampled through transmissive particles as well
         let with_photons = surface.lanes & self.photon_lanes(&packet.hits);
         for (index, light) in self.context.lights.iter().enumerate() {
             let competes = light.has_extent() && self.rays_hit_lights();
+            // Sample the light twice where only some of the lanes have photons
             let group = self.context.light_group(index);
             let opaque = match light.photon_source() {
                 Some(_) => with_photons,
@@ -396,6 +419,7 @@ impl PathIntegrator<'_> {
                 }
             }
         }
+        // Add the light that the photons bring
         if with_photons != 0 {
             self.add_caustics(with_photons, surface, packet);
         }
@@ -563,6 +587,7 @@ impl PathIntegrator<'_> {
         let context = &self.context;
         let (rays, hits, inside) = (&segments.rays, &packet.hits, segments.inside);
         let interface = &self.interface;
+        // Find the reflected and refracted rays
         let (simd, points) = (context.simd, &mut packet.points);
         match &self.rough {
             None => interface.shading_points(simd, rays, hits, inside, points),
@@ -573,6 +598,7 @@ impl PathIntegrator<'_> {
                 rough.sample_rays(simd, rays, hits, inside, &u, points);
             }
         }
+        // Trace them; the last ones see the environment
         let hits = SpecularHits {
             segments,
             depth,

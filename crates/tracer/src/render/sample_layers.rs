@@ -144,11 +144,44 @@ impl SampleLayers {
         (mean, color): ([f32; 4], [f32; 4]),
         floats: &mut [f32],
     ) {
+        let share = 1.0 / range.len() as f32;
+        if self.layers.noisy {
+            floats[self.layers.noisy_at()].copy_from_slice(&color[..3]);
+        }
+        self.accumulate_lights(range.clone(), (mean, color), floats);
+        if self.layers.shadow {
+            let sum = |part: usize| -> f32 {
+                let sample = |s: usize| self.direct[s / LANES][part][s % LANES];
+                range.clone().map(sample).sum()
+            };
+            let (whole, arriving) = (sum(0), sum(1));
+            let lit = if whole > 0.0 { arriving / whole } else { 1.0 };
+            floats[self.layers.shadow_at()].fill(lit.clamp(0.0, 1.0));
+        }
+        // Rank the objects of each kind by the part of the pixel that they cover
+        for kind in self.layers.mattes.iter() {
+            let Some(at) = self.layers.matte_at(kind) else {
+                continue;
+            };
+            let objects = &self.objects[kind as usize];
+            let sample = |s: usize| (objects[s / LANES][s % LANES], coverage[s / LANES][s % LANES]);
+            self.covered.clear();
+            let samples = range.clone().map(sample);
+            self.covered.extend(samples.filter(|(object, _)| *object != 0));
+            rank(&mut self.covered, share, &mut floats[at]);
+        }
+    }
+
+    /// Stores the mean light of each class and of each light group. What the limit took from the `mean` is missing in
+    /// the background.
+    fn accumulate_lights(
+        &self,
+        range: Range<usize>,
+        (mean, color): ([f32; 4], [f32; 4]),
+        floats: &mut [f32],
+    ) {
         let layers = self.layers;
         let share = 1.0 / range.len() as f32;
-        if layers.noisy {
-            floats[layers.noisy_at()].copy_from_slice(&color[..3]);
-        }
         for class in layers.lights.iter() {
             let light = &mut floats[layers.light_at(class).unwrap_or_default()];
             for (axis, light) in light.iter_mut().enumerate() {
@@ -162,6 +195,7 @@ impl SampleLayers {
                 *light = sum * share + limited;
             }
         }
+        // Do the same for each light group, in place of classes
         for group in 0..usize::from(layers.light_groups) {
             let samples = range.clone().map(|s| self.light_of_group(group, s));
             let limited = if group == self.background_group {
@@ -171,26 +205,6 @@ impl SampleLayers {
             };
             let light = samples.sum::<Vec3>() * share + limited;
             floats[layers.light_group_at(group)].copy_from_slice(&light.to_array());
-        }
-        if layers.shadow {
-            let sum = |part: usize| -> f32 {
-                let sample = |s: usize| self.direct[s / LANES][part][s % LANES];
-                range.clone().map(sample).sum()
-            };
-            let (whole, arriving) = (sum(0), sum(1));
-            let lit = if whole > 0.0 { arriving / whole } else { 1.0 };
-            floats[layers.shadow_at()].fill(lit.clamp(0.0, 1.0));
-        }
-        for kind in layers.mattes.iter() {
-            let Some(at) = layers.matte_at(kind) else {
-                continue;
-            };
-            let objects = &self.objects[kind as usize];
-            let sample = |s: usize| (objects[s / LANES][s % LANES], coverage[s / LANES][s % LANES]);
-            self.covered.clear();
-            let samples = range.clone().map(sample);
-            self.covered.extend(samples.filter(|(object, _)| *object != 0));
-            rank(&mut self.covered, share, &mut floats[at]);
         }
     }
 }

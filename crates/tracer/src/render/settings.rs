@@ -155,6 +155,7 @@ impl RenderSettings {
     }
 
     pub(super) fn validate(&self) -> Result<(), RenderError> {
+        // Check the numbers with a lower limit of 1
         let [full_width, full_height] = self.full_size();
         for (name, value, max) in [
             ("width", self.width, MAX_SIDE),
@@ -168,12 +169,14 @@ impl RenderSettings {
                 return Err(RenderError::OutOfRange { name, value, max });
             }
         }
+        // Check that the data window is near the image
         let DataWindow { left, top, image } = self.data_window();
         let is_near = |at: &i32| at.unsigned_abs() <= MAX_SIDE;
         let is_side = |side: &u32| (1..=MAX_SIDE).contains(side);
         if !([left, top].iter().all(is_near) && image.iter().all(is_side)) {
             return Err(RenderError::Window);
         }
+        // Check the other numbers
         let width = self.filter.width;
         if !(width > 0.0 && width <= MAX_FILTER_WIDTH) {
             return Err(RenderError::FilterWidth(width));

@@ -63,6 +63,7 @@ impl Solid {
 
     #[expect(clippy::cast_possible_truncation, reason = "surfaces answer in f32")]
     fn hit(&self, ray: &Ray, t: f64) -> Intersection {
+        // Move the point onto the surface, which the distance alone does not hit exactly
         let free: DVec3 = ray.origin.as_dvec3() + t * ray.direction.as_dvec3();
         let (point, normal) = match self.body {
             Body::Ball { center, radius } => {
@@ -75,6 +76,7 @@ impl Solid {
                 (free.with_z(z), if up { DVec3::Z } else { DVec3::NEG_Z })
             }
         };
+        // Compute an offset above the rounding of the point
         let scale = point.abs().max_element().max(t) as f32;
         Intersection {
             t: t as f32,

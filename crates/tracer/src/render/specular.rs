@@ -77,6 +77,7 @@ impl RenderContext<'_> {
             let has_weight = |l: usize| u32::from(rays.weight[l] > 0.0) << l;
             let lanes = lanes_in(hits.lanes).fold(0, |lanes, lane| lanes | has_weight(lane));
             scale(self.simd, throughput, &rays.weight, &mut rays.throughput);
+            // Rays that are not traced see what is far away
             if lanes & last != 0 {
                 let group = groups.of_mut(escape.group);
                 for sum in [Some(&mut *radiance), group].into_iter().flatten() {

@@ -62,13 +62,16 @@ impl RenderContext<'_> {
         let Some(spray) = self.soft_spray else {
             return;
         };
+        // Find the rays near any drop
         let lanes = spray.occluded(&segments.rays, coherence, segments.lanes());
         if lanes == 0 {
             return;
         }
+        // Choose a random number for each ray
         let mut u = splat(0.0);
         let sample = segments.sample.map(|s| s % self.settings.samples);
         get_1d_lanes(self.simd, &segments.path, SPRAY, &sample, &mut u);
+        // Pass drops until the number chooses one
         for lane in lanes_in(lanes) {
             let (mut rest, mut u) = (segments.rays.ray(lane), u[lane]);
             for _ in 0..MAX_DROPS {

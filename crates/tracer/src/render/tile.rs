@@ -10,8 +10,8 @@ pub(super) const SIDE: u32 = 16;
 /// share of the `full` pixels, but moved if it would extend beyond the image.
 pub(super) fn mosaic_start(start: u32, length: u32, full: u32) -> u32 {
     let (number, count) = (u64::from(start / SIDE), u64::from(length.div_ceil(SIDE)));
-    let middle = (2 * number + 1) * u64::from(full) / (2 * count);
-    let middle = u32::try_from(middle).unwrap_or(full);
+    let exact = (2 * number + 1) * u64::from(full) / (2 * count);
+    let middle = u32::try_from(exact).unwrap_or(full);
     middle.saturating_sub(SIDE / 2).min(full.saturating_sub(SIDE))
 }
 

@@ -61,6 +61,7 @@ impl RenderContext<'_> {
         let Some(spheres) = self.translucent else {
             return;
         };
+        // Find the rays near any of the spheres, and a random number for each
         let lanes = self.may_enter(spheres, &segments.rays, coherence, segments.lanes());
         if lanes == 0 {
             return;
@@ -80,6 +81,7 @@ impl RenderContext<'_> {
             }
             return;
         };
+        // Collect the spheres along each ray; a visit ends where none behind can matter
         for lane in lanes_in(lanes) {
             packet.entries[lane].start(u[lane]);
         }
@@ -87,6 +89,7 @@ impl RenderContext<'_> {
             let opacity = self.source.opacity(entry.particle);
             if opacity > 0.0 { packet.entries[lane].add(entry, opacity) } else { None }
         });
+        // End the rays at the spheres that the numbers choose
         for lane in lanes_in(lanes) {
             if let Some(entry) = packet.entries[lane].end(u[lane]) {
                 let hit = all.intersection(&segments.rays.ray(lane), entry);
@@ -102,6 +105,7 @@ impl RenderContext<'_> {
         let Some(spheres) = self.translucent.filter(|_| samples.lanes != 0) else {
             return;
         };
+        // Multiply the transmittance of all spheres on the way, until too little light is left
         let lanes = self.may_enter(spheres, &samples.rays, coherence, samples.lanes);
         let products = match spheres.sphere_entries() {
             Some(all) => transmittance(all, self.source, &samples.rays, lanes),
@@ -117,6 +121,7 @@ impl RenderContext<'_> {
                 product
             }),
         };
+        // Dark samples are dropped
         for lane in lanes_in(lanes) {
             if products[lane].digits() > DARK {
                 samples.lanes &= !(1 << lane);

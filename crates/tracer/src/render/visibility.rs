@@ -112,6 +112,7 @@ impl RenderContext<'_> {
         samples: &LightSamples,
         transmittance: &mut Lanes3,
     ) -> u32 {
+        // Parts with an opaque material let nothing through
         let is_opaque = |particle: u32| {
             let material = self.parts.map(|parts| self.material_of(parts, particle));
             material.is_some_and(|material| material != MaterialId::PARTICLES)
@@ -119,6 +120,7 @@ impl RenderContext<'_> {
         let fresnel_transmittance = |cosine: f32, particle: u32| {
             if is_opaque(particle) { 0.0 } else { self.boundary.straight_transmittance(cosine) }
         };
+        // Light crosses spheres in a straight line, and has one transmittance for all colours
         spheres.transmittance(
             &samples.rays,
             samples.lanes,
@@ -127,6 +129,7 @@ impl RenderContext<'_> {
         );
         transmittance[1] = transmittance[0];
         transmittance[2] = transmittance[0];
+        // Find the lanes with some light left
         let is_reached = |lane: usize| u32::from(transmittance[0][lane] > 0.0) << lane;
         lanes_in(samples.lanes).fold(0, |reached, lane| reached | is_reached(lane))
     }

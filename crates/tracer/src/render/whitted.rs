@@ -117,10 +117,37 @@ impl WhittedIntegrator<'_> {
         if lanes == 0 {
             return;
         }
+        self.add_ambient(material.constants(), lanes, packet);
+        if material.constants().scatters() {
+            self.add_lights(segments, material, lanes, depth, packet);
+        }
+    }
+
+    /// Adds ambient light at the shading points of `lanes`, and leaves their throughput with opacity in `packet.weight`.
+    fn add_ambient(&self, constants: &WhittedMaterial, lanes: u32, packet: &mut PacketScratch) {
+        let simd = self.context.simd;
+        let PacketScratch { hits, throughput, radiance, base, weight, split, groups, .. } = packet;
+        scale(simd, throughput, &hits.opacity, weight);
+        let mut colored = [splat(0.0); 3];
+        product(simd, base, weight, &mut colored);
+        add(simd, &colored, &constants.ambient, lanes, radiance);
+        if let Some(group) = groups.of_mut(NO_GROUP) {
+            add(simd, &colored, &constants.ambient, lanes, group);
+        }
+        split.take(LightClass::Diffuse, radiance);
+    }
+
+    /// Adds the light of each visible light source at the shading points of `lanes`, after [`Self::add_ambient`].
+    fn add_lights(
+        &self,
+        segments: &SegmentPacket,
+        material: &dyn Material,
+        lanes: u32,
+        depth: u32,
+        packet: &mut PacketScratch,
+    ) {
         let (simd, constants) = (self.context.simd, material.constants());
         let PacketScratch {
-            hits,
-            throughput,
             radiance,
             base,
             points,
@@ -132,22 +159,8 @@ impl WhittedIntegrator<'_> {
             groups,
             ..
         } = packet;
-
-        // Add ambient light
-        scale(simd, throughput, &hits.opacity, weight);
-        let mut colored = [splat(0.0); 3];
-        product(simd, base, weight, &mut colored);
-        add(simd, &colored, &constants.ambient, lanes, radiance);
-        if let Some(group) = groups.of_mut(NO_GROUP) {
-            add(simd, &colored, &constants.ambient, lanes, group);
-        }
-        split.take(LightClass::Diffuse, radiance);
-
-        // Add the light of each visible light source
-        if !constants.scatters() {
-            return;
-        }
         for (index, light) in self.context.lights.iter().enumerate() {
+            // Sample the light, and reflect it
             light.sample_li(simd, &points.start, &[splat(0.0); 2], samples);
             let rays = &segments.rays;
             let arriving = split.is_active.then(|| samples.clone());
@@ -161,6 +174,7 @@ impl WhittedIntegrator<'_> {
                 reflect_lights(simd, constants, rays, points, base, weight, lanes, &mut matte);
                 split.diffuse = ratio(&matte.radiance, &samples.radiance);
             }
+            // Test which light arrives, and add it to the picture and its layers
             let unoccluded = split.has_shadow.then_some((samples.lanes, samples.radiance));
             let visible = if light.casts_shadow() {
                 let context = &self.context;

@@ -117,9 +117,11 @@ impl ColorMap {
         range: [f64; 2],
         scale: ColorScale,
     ) -> Result<Self, UnknownColorMap> {
+        // Read the table, from either end
         let (table, is_reversed) = table(name)?;
         let entry = |i| if is_reversed { table.entry(ENTRIES - 1 - i) } else { table.entry(i) };
         let last = (ENTRIES - 1) as f32;
+        // Map the range to entries of the table; an empty range maps to the middle
         let [low, high] = range.map(|value| narrow(scale.forward(value)));
         let span = high - low;
         let usable = span != 0.0 && span.is_finite();
@@ -152,6 +154,7 @@ impl ColorMap {
     /// # Errors
     /// If the name is unknown.
     pub fn of_categories(name: &str, values: &[i64]) -> Result<Self, UnknownColorMap> {
+        // Elements have colours of their own
         let (base, is_reversed) = base_name(name);
         let elements = match base {
             Self::ELEMENTS => Some(Others::Elements),
@@ -162,11 +165,13 @@ impl ColorMap {
             let colors = values.iter().map(|value| (*value, others.color(*value)));
             return Ok(Self { kind: Kind::Categories(colors.collect(), others) });
         }
+        // Numbers may be those of the palette, if all of them are
         let last = values.len().saturating_sub(1).max(1);
         let is_index = |count: usize| {
             let fits = |value: &i64| usize::try_from(*value).is_ok_and(|value| value < count);
             values.iter().all(fits)
         };
+        // Take a colour of the palette, or one at equal distances along a map
         let color = |(order, value): (usize, &i64)| match palette(base) {
             Some(palette) => {
                 let count = palette.colors.len();

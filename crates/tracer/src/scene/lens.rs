@@ -58,6 +58,7 @@ impl LensSettings {
         aspect: f64,
         particle: Option<DVec3>,
     ) -> Result<Lens, CameraError> {
+        // Find the distance of the plane in focus
         let focus = match (self.focus, particle) {
             (Focus::Distance(distance), _) => distance,
             (Focus::Particle(_), Some(point)) => {
@@ -65,6 +66,7 @@ impl LensSettings {
             }
             (Focus::Target | Focus::Particle(_), _) => (view.look_at - view.eye).length(),
         };
+        // Find the radius of the lens, and check both
         let radius = 0.5 * self.aperture.diameter(view.fov, aspect);
         #[expect(clippy::cast_possible_truncation, reason = "the renderer works in f32")]
         let [radius, focus] = [radius as f32, focus as f32];

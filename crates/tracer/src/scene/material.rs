@@ -106,6 +106,7 @@ impl Material {
             ("transmission", self.transmission, 1.0),
             ("interface_roughness", self.interface_roughness, 1.0),
         ];
+        // Check the numbers, whose ranges do not contain NaN
         for (name, value, max) in weights {
             if !(0.0..=max).contains(&value) {
                 return Err(MaterialError { name, value });

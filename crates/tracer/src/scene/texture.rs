@@ -144,6 +144,7 @@ impl Texture {
                 Beyond::Repeat => self.levels[self.levels.len() - 1].texel(0, 0),
             };
         }
+        // Choose probes along the footprint, each about as wide as it is narrow
         let long = footprint.long.length();
         let probes = (long / footprint.short.max(1e-3 * long)).ceil();
         let probes = if probes > 1.0 { probes.min(MAX_PROBES) } else { 1.0 };
@@ -154,6 +155,7 @@ impl Texture {
             reason = "1 to MAX_PROBES"
         )]
         let count = probes as u32;
+        // Average them
         let sum: Vec3 = (0..count)
             .map(|i| {
                 let along = (i as f32 + 0.5) / probes - 0.5;
@@ -177,10 +179,12 @@ impl Texture {
         )]
         let fine = level as usize;
         let coarse = (fine + 1).min(self.levels.len() - 1);
+        // Interpolate within and between the levels
         let repeats = beyond == Beyond::Repeat;
         let [fine_color, coarse_color] =
             [fine, coarse].map(|level| self.levels[level].bilinear(position, repeats));
         let color = fine_color.lerp(coarse_color, level - fine as f32);
+        // Outside, the plain colour takes over
         match beyond {
             Beyond::Repeat => color,
             Beyond::Plain(plain) => plain.lerp(color, self.inside(position, width)),

@@ -106,12 +106,14 @@ impl<'a, S: CutShape> CutSpheres<'a, S> {
         if lanes == 0 {
             return owners;
         }
+        // Cut each ray down to its point
         let mut points = *rays;
         for lane in lanes_in(lanes) {
             points.t_min[lane] = t[lane];
             points.t_max[lane] = t[lane].next_up();
         }
         let spheres = &self.spheres;
+        // Among spheres that contain it, choose that with the least power; equal ones by index
         spheres.visit_chords(&points, lanes, &mut |lane, particle, radius, [near, far]| {
             let t = t[lane];
             let contains = near < t && t <= far;
@@ -133,8 +135,8 @@ impl<'a, S: CutShape> CutSpheres<'a, S> {
     /// The intersection of a ray with the face on `plane` at distance `t`.
     fn face(&self, ray: &Ray, t: f32, plane: usize, particle: u32, radius: f32) -> Intersection {
         let Plane { normal, distance } = self.region.planes[plane];
-        let point = ray.at(t);
-        let point = point - normal * (normal.dot(point) - distance);
+        let on_ray = ray.at(t);
+        let point = on_ray - normal * (normal.dot(on_ray) - distance);
         Intersection {
             t,
             point,

@@ -22,8 +22,8 @@ pub struct SurfaceSize {
 impl SurfaceSize {
     /// The size of the surface with `settings` of particles with `centers` and one `radius`.
     pub fn of(centers: &[Vec3], radius: f32, settings: &SurfaceSettings) -> Self {
-        let body = settings.spray.then(|| without_spray(centers, settings.support() * radius));
-        let body = body.as_deref().unwrap_or(centers);
+        let own = settings.spray.then(|| without_spray(centers, settings.support() * radius));
+        let body = own.as_deref().unwrap_or(centers);
         Self {
             particles: centers.len() as u64,
             spray: (centers.len() - body.len()) as u64,

@@ -92,8 +92,8 @@ pub(super) fn sphere_hit(
 impl Shape for SphereSurface<'_> {
     #[inline]
     fn crossing(&self, ray: &Ray, _side: Side) -> Option<Intersection> {
-        let hit = self.tree.nearest(ray)?;
-        let hit = sphere_hit(&self.tree, ray, hit, &self.normals);
+        let found = self.tree.nearest(ray)?;
+        let hit = sphere_hit(&self.tree, ray, found, &self.normals);
         Some(Intersection { particle: self.owners.particle_of(hit.particle), ..hit })
     }
 
@@ -179,6 +179,7 @@ impl Shape for SphereSurface<'_> {
                 cross_chord(&mut product[lane], part, chord.ends, rays, lane)
             });
         }
+        // Read the products
         for lane in lanes_in(lanes) {
             transmittance[lane] = product[lane].value();
         }

@@ -56,6 +56,7 @@ impl BlockSource {
             None if settings.count > 0 => 1.0 / high,
             None => 1.0,
         };
+        // Find the size of the block
         let columns = whole(2.0 * high);
         // Lay out slabs under the wave until all particles have a place
         let mut slabs = Vec::new();

@@ -51,6 +51,7 @@ impl<'a> RawSource<'a> {
         raw: &'a RawParticles<P>,
     ) -> Result<Self, FrameError> {
         let count = positions.len();
+        // Refuse attributes that have not as many values as the particles need
         let fits = |a: &&Attribute| {
             a.components > 0 && count.checked_mul(a.components) == Some(a.data.len())
         };
@@ -62,6 +63,7 @@ impl<'a> RawSource<'a> {
             let source = io::Error::new(io::ErrorKind::InvalidInput, what);
             return Err(FrameError::io(path, source));
         }
+        // Describe the attributes
         let attributes = raw.attributes.iter().map(|a| SourceAttribute {
             name: a.name.clone(),
             components: a.components,

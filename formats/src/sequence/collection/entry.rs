@@ -67,8 +67,8 @@ impl<'a> LineCounter<'a> {
     /// The place of byte `at`, which is not before that of the last call.
     pub(super) fn place(&mut self, at: usize) -> TextPlace {
         let passed = self.text.get(self.place.at..at).unwrap_or_default();
-        let lines = memchr::memchr_iter(b'\n', passed).count();
-        let lines = u32::try_from(lines).unwrap_or(u32::MAX);
+        let count = memchr::memchr_iter(b'\n', passed).count();
+        let lines = u32::try_from(count).unwrap_or(u32::MAX);
         self.place =
             TextPlace { at: at.max(self.place.at), line: self.place.line.saturating_add(lines) };
         self.place

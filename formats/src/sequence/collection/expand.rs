@@ -55,6 +55,7 @@ pub(in crate::sequence) fn expand(
 ) -> Result<Expansion, SequenceError> {
     let mut expander = Expander::new(settings);
     let is_only = group.files.len() == 1;
+    // Follow each list to the files of particles, and number their time steps
     let mut numbers = Vec::new();
     let mut times = BTreeMap::new();
     let mut kind = None;
@@ -72,26 +73,15 @@ pub(in crate::sequence) fn expand(
             "{count} lists of files are listed twice for one time step and used once"
         ));
     }
+    // Sort the files by time step and part
     let Expander { leaves, lists, parts, faults, .. } = expander;
     let mut paths: Vec<PathBuf> = lists.into_keys().collect();
     paths.sort();
     let used = leaves.iter().zip(&numbers).map(|(leaf, number)| (*number, leaf.part));
     let (of_number, names) = parts.finish(used, &group.parts);
-    let mut steps: Vec<NumberedStep> = leaves
-        .into_iter()
-        .zip(numbers)
-        .map(|(leaf, number)| NumberedStep {
-            number,
-            file: PartFile {
-                path: leaf.path,
-                part: of_number.get(leaf.part as usize).copied().unwrap_or(0),
-                step: None,
-                listed: leaf.listed,
-            },
-        })
-        .collect();
-    steps.sort_by_key(|step| (step.number, step.file.part));
+    let mut steps = numbered_steps(leaves, numbers, &of_number);
     drop_repeated(&mut steps, notes);
+    // Summarise what was found
     let step_count = steps.chunk_by(|a, b| a.number == b.number).count();
     let ends = times.values().next().zip(times.values().next_back());
     let summary = ListSummary {
@@ -103,6 +93,25 @@ pub(in crate::sequence) fn expand(
     };
     notes.push(summary.to_string());
     Ok(Expansion { steps, parts: names, lists: ListedFiles { summary, paths, times, faults } })
+}
+
+/// The files in the order of their time steps and parts; `parts` has the part of each number in the table of parts.
+fn numbered_steps(leaves: Vec<Leaf>, numbers: Vec<i64>, parts: &[u32]) -> Vec<NumberedStep> {
+    let mut steps: Vec<NumberedStep> = leaves
+        .into_iter()
+        .zip(numbers)
+        .map(|(leaf, number)| NumberedStep {
+            number,
+            file: PartFile {
+                path: leaf.path,
+                part: parts.get(leaf.part as usize).copied().unwrap_or(0),
+                step: None,
+                listed: leaf.listed,
+            },
+        })
+        .collect();
+    steps.sort_by_key(|step| (step.number, step.file.part));
+    steps
 }
 
 /// A file of particles that a list names.
@@ -226,6 +235,7 @@ impl Expander {
     ) -> Result<(), SequenceError> {
         chain.push(Arc::clone(&opened.path));
         for (index, entry) in opened.list.entries.iter().enumerate() {
+            // Find the file, which must be within the directory of the first list
             let target = self.root.resolve(&opened.path, &entry.path).ok_or_else(|| {
                 SequenceError::Outside {
                     list: opened.path.to_path_buf(),
@@ -235,6 +245,7 @@ impl Expander {
             })?;
             let context = context.of(&opened.list, &opened.path, index, entry);
             self.count_entry(opened)?;
+            // Add files of particles, and follow lists
             if !is_list(&target) {
                 self.push(target, &context)?;
             } else if let Some(what) = fault_of_chain(chain, &target) {
@@ -282,6 +293,7 @@ impl Expander {
             return None;
         }
         match List::open(path, self.settings.budget.less(self.held)) {
+            // Count its memory, and remember a list with ghost cells for a note
             Ok(list) => {
                 let texts = list.entries.iter().map(|e| e.path.len() + size_of::<ListEntry>());
                 self.held += texts.sum::<usize>() as u64;
@@ -372,11 +384,13 @@ fn number(
     is_only: bool,
     (numbers, step_times): (&mut Vec<i64>, &mut BTreeMap<i64, f64>),
 ) -> Result<(), SequenceError> {
+    // Find the distinct times of the files
     let mut times: Vec<f64> = leaves.iter().filter_map(|leaf| leaf.time).collect();
     times.sort_by(f64::total_cmp);
     times.dedup();
     // From 0 with one step, too: a collection may still grow
     let is_counted = is_only && kind.is_some_and(ListKind::has_times);
+    // A single time is one step, with the number in the name
     if times.len() < 2 {
         let named = file.number.filter(|_| !is_counted);
         let number = named.unwrap_or(0);
@@ -384,6 +398,7 @@ fn number(
         step_times.extend(times.first().map(|time| (number, *time)));
         return Ok(());
     }
+    // Several times are steps of one list, numbered in the order of their times
     if !is_only {
         return Err(SequenceError::SeveralLists { path: file.path.clone(), steps: times.len() });
     }

@@ -44,12 +44,14 @@ impl List {
     /// # Errors
     /// As [`Self::open`].
     pub(super) fn parse(bytes: &[u8], budget: MemoryBudget) -> Result<Self, ParseError> {
+        // Check the size before anything is parsed
         let need = (bytes.len() as u64).saturating_mul(EXPANSION);
         budget.check(need, "the list of its files is")?;
         if bytes.is_empty() {
             let what = "the file is empty; perhaps it is still being written";
             return Err(ParseError::malformed(0, what));
         }
+        // Choose the parser by the first bytes
         let head = bytes.get(..HEAD_LEN).unwrap_or(bytes);
         let kind = ListKind::of(head).ok_or_else(|| {
             let what = "named like a list of files, but neither a <VTKFile> of type Collection, PUnstructuredGrid, \

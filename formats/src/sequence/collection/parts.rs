@@ -64,6 +64,7 @@ impl PartTable {
         steps: impl Iterator<Item = (i64, u32)>,
         groups: &[String],
     ) -> (Vec<u32>, Vec<String>) {
+        // Sort the keys by their numbers
         let mut keys: Vec<(u32, PartKey)> =
             self.numbers.into_iter().map(|(key, number)| (number, key)).collect();
         keys.sort_unstable_by_key(|(number, _)| *number);
@@ -80,6 +81,7 @@ impl PartTable {
                 shared.insert(plain);
             }
         }
+        // Add the names of files to the ambiguous ones only
         let named: Vec<PartKey> = keys
             .iter()
             .zip(&plain)
@@ -94,6 +96,7 @@ impl PartTable {
         // Pieces count if all files are pieces of one part
         let is_one = named.windows(2).all(|pair| pair[0] == pair[1]);
         let are_pieces = is_one && keys.iter().all(|key| key.piece.is_some());
+        // Number the distinct keys in the order of their first file
         let mut parts: Vec<PartKey> = Vec::new();
         let mut of_key = BTreeMap::new();
         let mut of_number = Vec::with_capacity(keys.len());
@@ -117,6 +120,7 @@ fn names(parts: &[PartKey], groups: &[String]) -> Vec<String> {
     if parts.len() < 2 {
         return vec![String::new(); parts.len()];
     }
+    // Try words from the shortest to all that is known
     let group = |key: &PartKey| groups.get(key.group as usize).cloned().unwrap_or_default();
     let schemes: [WordsOf<'_>; 6] = [
         &|key| key.piece.map(|piece| format!("piece {piece}")).into_iter().collect(),
@@ -130,6 +134,7 @@ fn names(parts: &[PartKey], groups: &[String]) -> Vec<String> {
             all.map(Clone::clone).to_vec()
         },
     ];
+    // Stop at the first scheme with a distinct name for every part
     let mut named = Vec::new();
     for scheme in schemes {
         let name = |key: &PartKey| {

@@ -24,6 +24,7 @@ pub(super) fn list(bytes: &[u8], kind: ListKind) -> Result<List, ParseError> {
     })?;
     let mut parser =
         ListParser { list: List { kind, entries: Vec::new(), ghost_level: 0 }, open: Vec::new() };
+    // Read element by element, with the line of each for messages
     let mut reader = Reader::from_str(text);
     loop {
         let start = usize::try_from(reader.buffer_position()).unwrap_or(usize::MAX);
@@ -72,8 +73,9 @@ impl ListParser {
             let what = format!("more than {MAX_DEPTH} elements in one another");
             return Err(place.malformed(what));
         }
-        let name = tag.local_name();
-        let name: &str = name.as_ref();
+        // Add the files that the element names; which elements do depends on the kind of list
+        let local = tag.local_name();
+        let name: &str = local.as_ref();
         let mut block = String::new();
         match (self.list.kind, name) {
             (ListKind::Collection, "DataSet") => self.timed(tag, place)?,
@@ -104,22 +106,24 @@ impl ListParser {
 
     /// A file of a collection, with its time.
     fn timed(&mut self, tag: &BytesStart<'_>, place: TextPlace) -> Result<(), ParseError> {
-        let time = text_of(tag, place, "timestep")?;
-        let time = match time.parse::<f64>() {
-            _ if time.is_empty() => None,
+        let written = text_of(tag, place, "timestep")?;
+        let time = match written.parse::<f64>() {
+            _ if written.is_empty() => None,
             // Zero is the same time with either sign.
             Ok(value) if value.is_finite() => Some(value + 0.0),
             _ => {
-                let what = format!("timestep=\"{}\" is not a number", short(&time));
+                let what = format!("timestep=\"{}\" is not a number", short(&written));
                 return Err(place.malformed(what));
             }
         };
+        // Refuse a mixture, whose order would be unclear
         let has_time = |entry: &ListEntry| entry.time.is_some();
         let first = self.list.entries.first();
         if first.is_some_and(|first| has_time(first) != time.is_some()) {
             let what = "some files have a timestep and others have none; give all of them one";
             return Err(place.malformed(what));
         }
+        // Add the file, with the labels of its part
         let file = text_of(tag, place, "file")?;
         if file.is_empty() {
             return Err(place.malformed("a <DataSet> without file, the name of its file"));
@@ -135,10 +139,12 @@ impl ListParser {
 
     /// A block, or a file as one. Returns its name, or its index if it has none, behind those of the blocks around it.
     fn block(&mut self, tag: &BytesStart<'_>, place: TextPlace) -> Result<String, ParseError> {
+        // Find its name, or its place among its siblings
         let mut name = text_of(tag, place, "name")?;
         if name.is_empty() {
             name = text_of(tag, place, "index")?;
         }
+        // Put the names of the blocks around it in front; the pieces of a partitioned block share its name
         if let Some(parent) = self.open.last_mut() {
             parent.child_count += 1;
             if parent.is_partitioned {

@@ -50,8 +50,8 @@ pub(super) fn write_film(
     let job = Arc::new(PackJob::new(film, layout));
     let clamped = write_blocks(file, &job.layout, PackedInOrder::new(&job));
     // Take the film back; helpers that start later find nothing to do
-    let film = job.film.write().unwrap_or_else(PoisonError::into_inner).take();
-    let film = film.expect("only this function takes the film");
+    let taken = job.film.write().unwrap_or_else(PoisonError::into_inner).take();
+    let film = taken.expect("only this function takes the film");
     clamped.map(|clamped| (film, clamped))
 }
 

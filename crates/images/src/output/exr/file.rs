@@ -60,8 +60,8 @@ impl<'a, W: Write + Seek> ScanLineFile<'a, W> {
     /// Writes the next block of a part.
     pub(super) fn write(&mut self, block: PackedBlock) -> Result<(), OutputError> {
         let has_parts = self.parts.len() > 1;
-        let part = self.parts.get_mut(block.part);
-        let part = part
+        let found = self.parts.get_mut(block.part);
+        let part = found
             .filter(|part| part.offsets.len() < part.count)
             .ok_or_else(|| invalid("there are more blocks than in the layout"))?;
         part.offsets.push(self.end);
@@ -70,8 +70,8 @@ impl<'a, W: Write + Seek> ScanLineFile<'a, W> {
         let number = i32::try_from(block.part).map_err(long)?;
         let row = part.top + i32::try_from(block.y).map_err(long)?;
         let len = i32::try_from(block.bytes.len()).map_err(long)?;
-        let start = [number, row, len].map(i32::to_le_bytes);
-        let start = start[usize::from(!has_parts)..].concat();
+        let numbers = [number, row, len].map(i32::to_le_bytes);
+        let start = numbers[usize::from(!has_parts)..].concat();
         self.file.write_all(&start).map_err(io_error)?;
         self.file.write_all(&block.bytes).map_err(io_error)?;
         self.end += (start.len() + block.bytes.len()) as u64;

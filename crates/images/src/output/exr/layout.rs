@@ -53,11 +53,13 @@ impl ExrLayout {
         channels: Channels,
         options: &ExrOptions,
     ) -> Result<Self, OutputError> {
-        let planes = planes_in_file(channels, &options.names);
-        let planes = parts(planes, options.has_data_part());
+        // Divide the planes into parts
+        let in_file = planes_in_file(channels, &options.names);
+        let planes = parts(in_file, options.has_data_part());
         let count = planes.len();
         let data = options.data_compression.unwrap_or(options.compression);
         let names = PART_NAMES.into_iter().zip([options.compression, data]);
+        // Make a header for each part
         let mut all = Vec::new();
         for (planes, (name, compression)) in planes.into_iter().zip(names) {
             let mut attributes = attributes(options)?;

@@ -26,6 +26,7 @@ impl LineBuffer {
         let width = rows.width as usize;
         let range = row * width..(row + 1) * width;
         self.words.resize(width, 0);
+        // Half floats have a buffer of their own
         match source {
             Source::Color(component) => return self.halves(&rows.color[range], component),
             Source::LayerColor(i) => return self.layer_halves(layer(rows, row), rows.floats, i),
@@ -35,6 +36,7 @@ impl LineBuffer {
             let vectors = &plane.expect(HAS_PLANE)[range.clone()];
             copy_axis(cast_slice(vectors), axis, words);
         };
+        // Copy the other sources as words of four bytes
         let words = &mut self.words[..];
         match source {
             Source::Color(_) | Source::LayerColor(_) => unreachable!("done above"),

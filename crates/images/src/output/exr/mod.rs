@@ -189,6 +189,7 @@ fn attributes(options: &ExrOptions) -> Result<LayerAttributes, OutputError> {
         ..LayerAttributes::default()
     };
     attributes.comments = options.comments.as_deref().map(text);
+    // Check the name of an attribute of the user, which the format limits
     if let Some(CustomAttribute { name, json }) = &options.custom {
         let refuse = |why| OutputError::Attribute { name: name.clone(), why };
         if name.is_empty() || name.len() > NAME_MAX {

@@ -160,8 +160,9 @@ fn layers(layers: &Layers, names: &PlaneNames) -> Vec<Plane> {
             all.push(Plane::new(name, source));
         }
     }
-    let overlay = ["overlay.R", "overlay.G", "overlay.B", "overlay.A"];
-    let overlay = layers.overlay_at().zip(overlay);
+    // Overlays come last
+    let axes = ["overlay.R", "overlay.G", "overlay.B", "overlay.A"];
+    let overlay = layers.overlay_at().zip(axes);
     all.extend(overlay.map(|(i, name)| Plane::new(name, Source::LayerColor(i))));
     all
 }

@@ -94,6 +94,7 @@ fn deflated(bytes: &[u8]) -> io::Result<Vec<u8>> {
 
 /// The outline of a glyph with cubic curves only.
 fn cubics(strokes: Vec<Stroke>) -> Vec<Stroke> {
+    // Raise the degree of quadratic curves, which keeps their shape
     let mut at = [0.0; 2];
     let cubic = strokes.into_iter().map(|stroke| match stroke {
         Stroke::Start(end) | Stroke::Line(end) => {

@@ -38,6 +38,7 @@ struct Writer {
 }
 
 pub(super) fn encode(figure: &Figure) -> io::Result<Vec<u8>> {
+    // Scale pixels to points
     let scale = POINTS_PER_INCH / figure.pixels_per_inch();
     let [width, height] = figure.size.map(|side| side as f32 * scale);
     let mut writer = Writer {
@@ -50,6 +51,7 @@ pub(super) fn encode(figure: &Figure) -> io::Result<Vec<u8>> {
         shadings: Vec::new(),
         glyphs: BTreeMap::new(),
     };
+    // Draw the paper, pictures over it, and drawings over them
     if let Some(paper) = figure.paper {
         let [r, g, b] = paper.map(|byte| f32::from(byte) / 255.0);
         writer.content.set_fill_rgb(r, g, b);
@@ -87,6 +89,7 @@ impl Writer {
         let (colors, alpha) = picture.planes();
         let mask = alpha.map(|alpha| (self.next(), alpha));
         let [width, height] = picture.size.map(u32::cast_signed);
+        // Write alpha as a mask, since colours have none
         if let Some((mask, alpha)) = &mask {
             let bytes = deflated(alpha)?;
             let mut image = self.pdf.image_xobject(*mask, &bytes);
@@ -95,6 +98,7 @@ impl Writer {
             image.color_space().device_gray();
             image.bits_per_component(8);
         }
+        // Write the colours
         let bytes = deflated(&colors)?;
         let mut image = self.pdf.image_xobject(id, &bytes);
         image.filter(Filter::FlateDecode);
@@ -105,6 +109,7 @@ impl Writer {
             image.s_mask(mask);
         }
         image.finish();
+        // Draw the image in its place: the unit square is moved there
         let from = picture.at.map(|v| v as f32);
         let to = [0, 1].map(|axis| from[axis] + picture.shown[axis] as f32);
         let [x, y, width, height] = self.area(from, to);
@@ -162,10 +167,12 @@ impl Writer {
 
     /// Strokes the outline of a glyph of a line of text that begins at `at`.
     fn outline(&mut self, glyph: &Glyph, at: [f32; 2], size: f32) {
+        // Find the origin of the glyph, in points
         let [left, baseline] = self.point([at[0] + glyph.x * size, at[1]]);
         let size = size * self.scale;
         let to = |[x, y]: [f32; 2]| [left + x * size, baseline + y * size];
         let strokes = cubics(outline(glyph.id));
+        // Draw its outline
         for stroke in &strokes {
             match *stroke {
                 Stroke::Start(point) => {
@@ -253,6 +260,7 @@ impl Writer {
     /// Writes the embedded font as object `id`.
     fn font(&mut self, id: Ref) -> io::Result<()> {
         let [cid, descriptor, file, cmap] = [(); 4].map(|()| self.next());
+        // Describe the font, whose codes are the numbers of its glyphs
         let name = Name(FONT_NAME.as_bytes());
         let mut font = self.pdf.type0_font(id);
         font.base_font(name).encoding_predefined(IDENTITY).descendant_font(cid).to_unicode(cmap);
@@ -266,6 +274,7 @@ impl Writer {
         }
         widths.finish();
         font.finish();
+        // Describe its measures, in thousandths of the text size
         let FontFile { bytes, heights, bounds } = font_file();
         let [ascent, descent, cap_height] = heights.map(|height| 1000.0 * height);
         let [left, bottom, right, top] = bounds.map(|v| 1000.0 * v);
@@ -274,11 +283,13 @@ impl Writer {
         writer.bbox(Rect::new(left, bottom, right, top));
         writer.ascent(ascent).descent(descent).cap_height(cap_height).font_file2(file);
         writer.finish();
+        // Embed the file
         let compressed = deflated(bytes)?;
         let mut stream = self.pdf.stream(file, &compressed);
         stream.filter(Filter::FlateDecode);
         stream.pair(Name(b"Length1"), i32::try_from(bytes.len()).unwrap_or(i32::MAX));
         stream.finish();
+        // Map glyphs back to characters, so that text can be copied and searched
         let mut map = UnicodeCmap::<u16>::new(Name(b"Spherule"), SYSTEM);
         for (id, (character, _)) in &self.glyphs {
             map.pair(*id, *character);
@@ -288,6 +299,7 @@ impl Writer {
     }
 
     fn finish(mut self, [width, height]: [f32; 2]) -> io::Result<Vec<u8>> {
+        // Write the structure of the document: a single page
         let [catalog, pages, page, content, halo, font, info] = [(); 7].map(|()| self.next());
         if !self.glyphs.is_empty() {
             self.font(font)?;
@@ -298,6 +310,7 @@ impl Writer {
         self.pdf.document_info(info).producer(TextStr("Made with spherule"));
         let mut writer = self.pdf.page(page);
         writer.media_box(Rect::new(0.0, 0.0, width, height)).parent(pages).contents(content);
+        // List what the page uses
         let mut resources = writer.resources();
         resources.ext_g_states().pair(HALO_STATE, halo);
         if !self.glyphs.is_empty() {
@@ -315,6 +328,7 @@ impl Writer {
         shadings.finish();
         resources.finish();
         writer.finish();
+        // Write its content
         let bytes = deflated(&self.content.finish())?;
         self.pdf.stream(content, &bytes).filter(Filter::FlateDecode);
         Ok(self.pdf.finish())

@@ -14,6 +14,7 @@ const INCH: f32 = 25.4;
 
 pub(super) fn encode(figure: &Figure) -> io::Result<Vec<u8>> {
     let mut svg = Svg::default();
+    // Begin with the size, on paper and in pixels
     let [width, height] = figure.size;
     let paper_size = figure.size.map(|side| side as f32 / figure.pixels_per_inch() * INCH);
     let [paper_width, paper_height] = paper_size;
@@ -27,6 +28,7 @@ pub(super) fn encode(figure: &Figure) -> io::Result<Vec<u8>> {
             "<rect width=\"{width}\" height=\"{height}\" fill=\"rgb({r},{g},{b})\"/>"
         ));
     }
+    // Group pictures and overlays, so that editors can separate them
     svg.line("<g id=\"pictures\">");
     for picture in &figure.pictures {
         svg.picture(picture)?;

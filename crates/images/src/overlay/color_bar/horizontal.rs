@@ -28,6 +28,7 @@ struct Layout {
 
 impl ColorBar {
     fn layout(&self, pen: &Pen) -> Layout {
+        // Find the length, of categories with their names between them
         let size = pen.font.size;
         let length = match &self.kind {
             ColorBarKind::Numbers { .. } => (self.length * pen.picture).round().max(1.0),
@@ -55,6 +56,7 @@ impl ColorBar {
             after = after.max(middle + half - length);
         }
         let before = before.ceil();
+        // Put title and exponent above the bar, and labels below it
         let heading = self.heading(ticks.exponent);
         let top = if heading.is_empty() {
             pen.line
@@ -81,11 +83,13 @@ impl ColorBar {
     }
 
     pub(super) fn draw_horizontal(&self, canvas: &mut dyn Canvas, corner: [f32; 2], pen: &Pen) {
+        // Find the corners of the bar
         let size = pen.font.size;
         let layout = self.layout(pen);
         let [left, right] = layout.ends.map(|x| (corner[0] + x).round());
         let top = (corner[1] + layout.top).round();
         let bottom = top + (BAR_WIDTH * size).round().max(2.0);
+        // Draw colours with their ticks or names
         match &self.kind {
             ColorBarKind::Numbers { colors, is_discrete, .. } => {
                 let title = [left.min(corner[0] + layout.ends[0]), corner[1]];

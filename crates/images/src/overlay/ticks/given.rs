@@ -10,6 +10,7 @@ const MAX_DECIMALS: usize = 9;
 impl Axis {
     /// Ticks at those of the `values` that are in the range.
     pub(super) fn given(&self, values: &[f64]) -> Ticks {
+        // Sort the values that can be seen
         let mut inside: Vec<f64> = values.iter().copied().filter(|v| self.contains(*v)).collect();
         inside.sort_by(f64::total_cmp);
         inside.dedup();
@@ -22,6 +23,7 @@ impl Axis {
             (0..MAX_DECIMALS).find(is_exact).unwrap_or(MAX_DECIMALS)
         };
         let decimals = inside.iter().map(needs).max().unwrap_or(0);
+        // Write each of them
         let text = |value: f64| match self.scale {
             ColorScale::Linear if value.abs() < 1e7 => number(value, decimals),
             _ => significant_or_power(value, self.has_plain_ends()),

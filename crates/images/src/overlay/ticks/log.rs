@@ -35,9 +35,11 @@ impl Axis {
         let [low, high] = self.range;
         let slack = 1e-9;
         let is_inside = |value: f64| value >= low * (1.0 - slack) && value <= high * (1.0 + slack);
+        // Find the decades, and how many of them have labels
         let all: Vec<i32> = (decade(low)..=decade(high * (1.0 + slack))).collect();
         let stride = all.len().div_ceil(most).max(1);
         let mut ticks = Vec::new();
+        // Mark multiples only if each decade has a label
         for exponent in all {
             let is_labelled = exponent.rem_euclid(i32::try_from(stride).unwrap_or(i32::MAX)) == 0;
             let value = power(exponent);

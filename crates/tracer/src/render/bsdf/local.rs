@@ -56,12 +56,14 @@ pub(super) fn eval_body<B: LocalBsdf>(
     values: &mut BsdfValues,
 ) {
     for l in 0..LANES {
+        // Evaluate in the frame of the shading normal
         let n = lane(&points.normal, l);
         let world = lane(direction, l);
         let into = to_local(world, n);
         let above = dot(lane(&points.geometric, l), world);
         let is_visible = into[2] > 0.0 && above > 0.0;
         let (value, pdf) = bsdf.value(lane(&points.albedo, l), outgoing(rays, l, n), into);
+        // Write the chosen lanes only; below either surface nothing is reflected
         let is_chosen = lanes >> l & 1 == 1;
         for axis in 0..3 {
             let new = if is_visible { value[axis] } else { 0.0 };
@@ -84,14 +86,17 @@ pub(super) fn sample_body<B: LocalBsdf>(
     samples: &mut BsdfSamples,
 ) {
     for l in 0..LANES {
+        // Sample a direction in the frame of the shading normal
         let n = lane(&points.normal, l);
         let (base, out) = (lane(&points.albedo, l), outgoing(rays, l, n));
         let into = bsdf.direction(base, out, [u[0][l], u[1][l]]);
         let world = to_world(into, n);
+        // Directions below either surface have no light
         let above = dot(lane(&points.geometric, l), world);
         let is_visible = into[2] > 0.0 && above > 0.0;
         let (value, pdf) = bsdf.value(base, out, into);
         let is_visible = is_visible && pdf > 0.0;
+        // Write the chosen lanes only
         let is_chosen = lanes >> l & 1 == 1;
         for axis in 0..3 {
             let select = |new: f32, old: f32| if is_chosen { new } else { old };

@@ -86,12 +86,14 @@ fn sample_matte_body(
         let z = (if rest > 0.0 { rest } else { 0.0 }).sqrt();
         let n = [points.normal[0][l], points.normal[1][l], points.normal[2][l]];
         let direction = to_world([x, y, z], n);
+        // Directions below the geometric surface have no light
         let mut above = 0.0;
         for axis in 0..3 {
             above += points.geometric[axis][l] * direction[axis];
         }
         let is_visible = z > 0.0 && above > 0.0;
         let pdf = if is_visible { z * FRAC_1_PI } else { 0.0 };
+        // Write the chosen lanes; the density cancels the cosine, so the weight is the albedo
         let is_chosen = lanes >> l & 1 == 1;
         for axis in 0..3 {
             let select = |new: f32, old: f32| if is_chosen { new } else { old };

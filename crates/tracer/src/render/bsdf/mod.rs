@@ -141,6 +141,7 @@ fn surface_points_body(
     points: &mut SurfacePoints,
 ) {
     for l in 0..LANES {
+        // Find the side of the ray, for both normals
         let mut along = [0.0; 2];
         for axis in 0..3 {
             let d = rays.direction[axis][l];
@@ -149,6 +150,7 @@ fn surface_points_body(
         }
         let side = if along[0] < 0.0 { 1.0 } else { -1.0 };
         let shading_side = if along[1] < 0.0 { 1.0 } else { -1.0 };
+        // Start scattered rays above the surface on this side
         for axis in 0..3 {
             let geometric = side * hits.normal[axis][l];
             let normal = shading_side * hits.shading_normal[axis][l];

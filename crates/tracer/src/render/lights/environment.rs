@@ -122,6 +122,7 @@ fn table_along_body(
     throughput: &Lanes3,
     radiance: &mut Lanes3,
 ) {
+    // Look up the texel of each direction
     let (mut texel, mut pdf, axes) = ([0; LANES], [0.0; LANES], table.axes());
     let [right, back, up] = [axes.right, axes.back, axes.up];
     let [x, y, z] = direction;
@@ -141,6 +142,7 @@ fn table_along_body(
         TableSize::Coarse(texels) => find!(texels),
         TableSize::Fine(texels) => find!(texels),
     }
+    // Weight its radiance against the sampling of the BSDF
     let [red, green, blue] = radiance;
     for l in 0..LANES {
         let weight = balance(sampled[l], pdf[l]);

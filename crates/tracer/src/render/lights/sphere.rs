@@ -111,11 +111,13 @@ fn sample_sphere_body(
     samples: &mut LightSamples,
 ) {
     for l in 0..LANES {
+        // Find the cone in which the sphere is seen
         let mut to_center = [0.0; 3];
         for axis in 0..3 {
             to_center[axis] = light.center[axis] - start[axis][l];
         }
         let view = View::new(to_center, light.radius);
+        // Sample a direction in this cone
         let direction = in_cone(view.axis, view.cap, [u[0][l], u[1][l]]);
         let mut cosine = 0.0;
         for axis in 0..3 {
@@ -124,6 +126,7 @@ fn sample_sphere_body(
             samples.rays.direction[axis][l] = direction[axis];
             samples.radiance[axis][l] = light.radiance[axis];
         }
+        // End the shadow ray at the sphere
         samples.rays.t_min[l] = 0.0;
         samples.rays.t_max[l] = view.distance(cosine, light.radius);
         samples.pdf[l] = view.pdf();

@@ -49,6 +49,7 @@ impl PathIntegrator<'_> {
         surface: &Surface<'_>,
         packet: &mut PacketScratch,
     ) {
+        // Add the maps on a shadow catcher
         let ground = lanes & packet.hits.lanes_of(MaterialId::GROUND);
         let mut directions = [splat(0.0); 3];
         if let Some(catcher) = self.caustics.catcher.as_ref().filter(|_| ground != 0) {
@@ -62,10 +63,12 @@ impl PathIntegrator<'_> {
                 set_lane3(&mut directions, lane, lane3(&packet.surface.normal, lane));
             }
         }
+        // Add the photons near other surfaces
         if let Some(map) = self.caustics.surfaces.as_ref().filter(|_| lanes & !ground != 0) {
             let surface = Surface { lanes: lanes & !ground, ..*surface };
             self.add_photons(map, &surface, packet, &mut directions);
         }
+        // Divide the light between the layers by the directions it comes from
         if packet.split.is_active {
             self.divide(&Surface { lanes, ..*surface }, &directions, packet);
             packet.split.take_reflected(&packet.radiance);
@@ -114,6 +117,7 @@ impl PathIntegrator<'_> {
                 sums[lane] += irradiance.max_element() * to_light;
             }
         }
+        // The mean direction weights photons by their irradiance
         for lane in lanes_in(surface.lanes) {
             let normal = lane3(&packet.surface.normal, lane);
             set_lane3(directions, lane, sums[lane].normalize_or(normal));

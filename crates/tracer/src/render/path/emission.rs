@@ -20,6 +20,7 @@ impl PathIntegrator<'_> {
         if !self.has_extents {
             return 0;
         }
+        // Find the rays whose light is weighted against light samples, and those that see visible lights
         let sampled = if self.rays_hit_lights() {
             segments.lanes() & lanes_where(|l| segments.pdf[l] < f32::INFINITY)
         } else {
@@ -60,15 +61,9 @@ impl PathIntegrator<'_> {
                 }
             }
         }
-        // Add the visible lights
+        // Add the light of the nearest ones
         let ended = lanes_where(|l| nearest[l].is_some());
-        for lane in lanes_in(ended) {
-            packet.coverage[lane] = 1.0;
-            let (color, group) = color[lane];
-            let sum = lane3(&packet.radiance, lane) + color;
-            set_lane3(&mut packet.radiance, lane, sum);
-            packet.groups.add_lane(group, lane, color);
-        }
+        add_visible(ended, &color, packet);
         ended
     }
 
@@ -99,6 +94,7 @@ impl PathIntegrator<'_> {
         packet: &mut PacketScratch,
     ) {
         let context = &self.context;
+        // Camera rays see the background in place of a hidden environment
         if depth == 1 && !context.scene.is_environment_visible {
             if context.sees_background(depth) {
                 context.add_background(segments, depth, lanes, packet);
@@ -111,6 +107,7 @@ impl PathIntegrator<'_> {
         let Some(environment) = self.environment else {
             return;
         };
+        // Weight the environment by what surfaces do not cover
         let PacketScratch { hits, throughput, radiance, weight, groups, .. } = packet;
         let lanes = lanes & (!hits.mask | hits.lanes_of(MaterialId::GROUND));
         if lanes == 0 {
@@ -126,9 +123,21 @@ impl PathIntegrator<'_> {
             0 => segments.pdf[lane],
             _ => f32::INFINITY,
         });
+        // Add its radiance
         let (along, mut seen) = ([&segments.rays.direction, &*weight], [splat(0.0); 3]);
         environment_along(context.simd, environment, along, &pdf, lanes, &mut seen);
         add(context.simd, &seen, &Vec3::ONE, lanes, radiance);
         groups.add(context.simd, context.environment_group(), &seen, lanes);
+    }
+}
+
+/// Adds the light of visible lights, with its light group, for the lanes whose rays `ended` at them.
+fn add_visible(ended: u32, color: &[(Vec3, usize); LANES], packet: &mut PacketScratch) {
+    for lane in lanes_in(ended) {
+        packet.coverage[lane] = 1.0;
+        let (color, group) = color[lane];
+        let sum = lane3(&packet.radiance, lane) + color;
+        set_lane3(&mut packet.radiance, lane, sum);
+        packet.groups.add_lane(group, lane, color);
     }
 }

@@ -53,6 +53,7 @@ fn add_background_body(
             part[l] = 0.5 + asin(height) * std::f32::consts::FRAC_1_PI;
         }
     }
+    // Mix the colours of the gradient and add them
     for axis in 0..3 {
         let (bottom, top) = (background.bottom[axis], background.top[axis]);
         for l in 0..LANES {

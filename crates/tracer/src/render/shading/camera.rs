@@ -107,6 +107,7 @@ impl CameraLanes {
                 d[axis] = origin[axis] - self.eye[axis] + distance * d[axis];
             }
         }
+        // Divide by the depth, except in a parallel projection
         let depth = match self.projection {
             Projection::Orthographic { .. } => {
                 for axis in 0..3 {
@@ -116,6 +117,7 @@ impl CameraLanes {
             }
             _ => d[0] * f.x + d[1] * f.y + d[2] * f.z,
         };
+        // Scale to the film
         let across = (d[0] * r.x + d[1] * r.y + d[2] * r.z) / (depth * self.half_extent[0]);
         let along = (d[0] * u.x + d[1] * u.y + d[2] * u.z) / (depth * self.half_extent[1]);
         [0.5 + 0.5 * across, 0.5 - 0.5 * along]
@@ -175,9 +177,11 @@ fn moving_rays<P: FilmRay>(
     rays: &mut RayPacket,
 ) {
     for l in 0..LANES {
+        // Find the ray at both ends of the exposure
         let end = rays.time[l] + 0.5;
         let [from, d_open] = P::ray(open, open.on_film(x[l], y[l]));
         let [to, d_close] = P::ray(close, close.on_film(x[l], y[l]));
+        // Mix them by the time of the ray
         let mut d = [0.0; 3];
         for axis in 0..3 {
             d[axis] = (1.0 - end) * d_open[axis] + end * d_close[axis];
@@ -211,8 +215,10 @@ fn lens_rays_body(camera: &CameraLanes, u: &[Lanes; 2], rays: &mut RayPacket) {
     };
     let (right, up, f) = (camera.right, camera.up, camera.forward);
     for l in 0..LANES {
+        // Choose a point of the lens
         let [a, b] = disc([u[0][l], u[1][l]]).map(|v| v * lens.radius);
         let d = &mut rays.direction;
+        // Aim at the point in focus
         let along = d[0][l] * f.x + d[1][l] * f.y + d[2][l] * f.z;
         let distance = lens.focus / along;
         let (mut to_focus, mut square) = ([0.0; 3], 0.0);
@@ -246,6 +252,7 @@ fn stereo_rays_body(camera: &CameraLanes, side: &Lanes, rays: &mut RayPacket) {
     let is_panorama = camera.projection.is_panorama();
     let converges = stereo.convergence < f32::INFINITY;
     for l in 0..LANES {
+        // Move the ray to its eye
         let shift = side[l] * stereo.half_distance;
         let d = &mut rays.direction;
         let along = d[0][l] * f.x + d[1][l] * f.y + d[2][l] * f.z;
@@ -255,6 +262,7 @@ fn stereo_rays_body(camera: &CameraLanes, side: &Lanes, rays: &mut RayPacket) {
         let inverse = if level > 0.0 { 1.0 / level } else { 0.0 };
         let is_turned = is_panorama && level > 0.0;
         let (cos, sin) = if is_turned { (along * inverse, across * inverse) } else { (1.0, 0.0) };
+        // Aim at the point where the views of both eyes meet
         let distance = stereo.convergence / along;
         let (mut turned, mut square) = ([0.0; 3], 0.0);
         for axis in 0..3 {

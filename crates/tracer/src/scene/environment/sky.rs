@@ -78,8 +78,8 @@ struct Model {
 impl Model {
     fn new(sun: Vec3) -> Self {
         // The curves are over the cube root of the elevation
-        let elevation = std::f32::consts::FRAC_PI_2 - acos(sun.z.clamp(0.0, 1.0));
-        let elevation = (elevation / std::f32::consts::FRAC_PI_2).max(1e-6);
+        let angle = std::f32::consts::FRAC_PI_2 - acos(sun.z.clamp(0.0, 1.0));
+        let elevation = (angle / std::f32::consts::FRAC_PI_2).max(1e-6);
         let position = pow(elevation, 1.0 / 3.0);
         let curve = |first: usize, stride: usize| {
             // Interpolate between albedos and turbidities
@@ -93,6 +93,7 @@ impl Model {
             }
             sum
         };
+        // The data have a block for each colour channel, and those of the radiance behind them
         let channel = 2 * TURBIDITIES * POINTS;
         Self {
             sun,

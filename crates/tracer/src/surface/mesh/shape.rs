@@ -126,8 +126,8 @@ impl Shape for MeshSurface<'_> {
         let corners = mesh.corners(triangle);
         let normal = normal(&corners)?;
         // Compute the point from the vertices, which is more accurate than along the ray
-        let point: DVec3 = (0..3).map(|i| corners[i].as_dvec3() * hit.weights[i]).sum();
-        let point = point.as_vec3();
+        let exact: DVec3 = (0..3).map(|i| corners[i].as_dvec3() * hit.weights[i]).sum();
+        let point = exact.as_vec3();
         let smooth = mesh.shading_normal(triangle, hit.weights.map(single), normal);
         // The ray must see both normals from the same side
         let is_consistent = smooth.dot(ray.direction) * normal.dot(ray.direction) > 0.0;

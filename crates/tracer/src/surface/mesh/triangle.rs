@@ -45,6 +45,7 @@ impl ShearedRay {
         if direction[z] < 0.0 {
             std::mem::swap(&mut x, &mut y);
         }
+        // Shear the direction to the z axis (Woop, Benthin and Wald)
         let scale = 1.0 / direction[z];
         Self {
             origin: ray.origin.as_dvec3(),

@@ -183,6 +183,7 @@ impl Frustum {
         if length <= 0.0 || !axis.is_finite() {
             return None;
         }
+        // With flat ends, the cone is between the ends themselves
         let [start, end] = radii;
         if caps != Caps::Round {
             return Some(Self {

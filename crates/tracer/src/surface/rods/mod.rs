@@ -93,8 +93,8 @@ impl RodTree {
     pub fn new(mut rods: Vec<Rod>, caps: Caps) -> Self {
         rods.retain(|rod| rod.is_visible(caps));
         rods.truncate(MAX_RODS);
-        let parts = parts_of(&rods, extent_of(&rods));
-        let parts = PartTree::new(&parts, &rods, caps);
+        let divided = parts_of(&rods, extent_of(&rods));
+        let parts = PartTree::new(&divided, &rods, caps);
         let extent =
             parts.bounds().map_or(0.0, |[min, max]| min.abs().max(max.abs()).max_element());
         Self { rods, colors: Vec::new(), caps, parts, extent }

@@ -45,12 +45,14 @@ struct LocalRay {
 impl PartTree {
     /// The tree of `parts` of `rods`.
     pub(super) fn new(parts: &[Part], rods: &[Rod], caps: Caps) -> Self {
+        // Find the box of all parts, which limits the rounding
         let boxes = parts.iter().map(|part| part.bounds(rods, caps));
         let [min, max] = boxes.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |all, own| {
             [all[0].min(own[0]), all[1].max(own[1])]
         });
         let (center, half) = (0.5 * (min + max), 0.5 * (max - min));
         let padding = PADDING * half.length();
+        // Bound each part by a sphere around the middle of the box
         let spheres = parts.iter().map(|part| part.sphere(rods, caps));
         let (centers, radii): (Vec<Vec3>, Vec<f32>) = spheres
             .map(|(middle, radius)| ((middle - center).as_vec3(), single(radius + padding)))
@@ -119,6 +121,7 @@ impl PartTree {
         if active == 0 {
             return;
         }
+        // Visit the parts whose spheres the rays enter
         let view = self.trees.tree().view();
         view.visit_entries(&packet, active, |lane, hit| {
             let rod = self.owners[view.particle(hit.slot) as usize];

@@ -135,6 +135,7 @@ impl Shape for RodSurface<'_> {
         if rays.is_empty() {
             return;
         }
+        // Find the nearest rod in double precision; of equal ones the lower index wins
         let exact = double_rays(rays);
         let mut found: [Option<Nearest>; LANES] = [const { None }; LANES];
         self.tree.parts.visit(rays, first_lanes(rays.len()), |lane, rod| {
@@ -145,6 +146,7 @@ impl Shape for RodSurface<'_> {
             }
             Some(crossing.t)
         });
+        // End the rays there
         for (lane, nearest) in found.iter().enumerate() {
             if let Some(nearest) = nearest {
                 let hit = self.intersection(&exact[lane], nearest);

@@ -100,6 +100,7 @@ impl Blur {
         taps: &[f32; TAPS],
         field: &mut BrickField,
     ) {
+        // Gather the samples within reach of the blur
         let blur = TAPS - 1;
         self.fill(around, blur + 1);
         let rows = FIRST - blur..FIRST + SAMPLES + blur;

@@ -90,17 +90,7 @@ pub(super) fn build(
     let need = MemoryNeed::of(&plan);
     check_memory(field.byte_len() + 4 * count + need.total())?;
     let sorted_bytes = field.byte_len() + plan.byte_len();
-    // Compute the volumes of the particles that contribute to the surface
-    if settings.exact {
-        field.order_by_position();
-        field.find_volumes(|_| true);
-    } else {
-        let needed = discard_unused(&mut field, &layout, &plan);
-        if keep {
-            field.order_by_position();
-        }
-        field.find_volumes(|bin| needed[bin]);
-    }
+    find_volumes(&mut field, &layout, &plan, Volumes { exact: settings.exact, keep });
     // Sample the field, then assemble bricks and their tree
     let work = Work { field: &field, layout: &layout, plan: &plan, lanes: ArrayLanes::default() };
     let raw = work.raw();
@@ -119,6 +109,29 @@ pub(super) fn build(
     let built =
         Built { tree, field: keep.then_some(field), exact: settings.exact.then_some(layout) };
     Ok((built, report))
+}
+
+/// Which particles remain after their volumes have been computed.
+#[derive(Debug, Clone, Copy)]
+struct Volumes {
+    /// All of them: intersections are computed from the field.
+    exact: bool,
+    /// Whether those that remain are put into the order of their positions, as they are kept.
+    keep: bool,
+}
+
+/// Computes the volumes of the particles that contribute to the surface.
+fn find_volumes(field: &mut FieldParticles, layout: &Layout, plan: &Plan, volumes: Volumes) {
+    if volumes.exact {
+        field.order_by_position();
+        field.find_volumes(|_| true);
+        return;
+    }
+    let needed = discard_unused(field, layout, plan);
+    if volumes.keep {
+        field.order_by_position();
+    }
+    field.find_volumes(|bin| needed[bin]);
 }
 
 /// Removes all particles that do not affect the surface. Returns a flag for each remaining bin: whether its volumes

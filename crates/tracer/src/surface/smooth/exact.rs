@@ -43,8 +43,8 @@ pub(super) fn refine(
         }
     }
     // Use the gradient of the field as the normal
-    let normal = gradient.and_then(|gradient| (-gradient).try_normalize());
-    let normal = normal.unwrap_or(hit.normal);
+    let found = gradient.and_then(|gradient| (-gradient).try_normalize());
+    let normal = found.unwrap_or(hit.normal);
     Intersection {
         t: hit.t + (point - hit.point).dot(ray.direction),
         point,

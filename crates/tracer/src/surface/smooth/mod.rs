@@ -80,6 +80,7 @@ pub struct SmoothSurface<'a> {
 impl SmoothSurface<'_> {
     #[inline(always)]
     fn hit(&self, ray: &Ray, crossings: &Crossings, lane: usize, from: Side) -> Intersection {
+        // Find the point, and the direction against the ray
         let tree = &self.built.tree;
         let t = crossings.t[lane];
         let point = ray.at(t);
@@ -105,6 +106,7 @@ impl SmoothSurface<'_> {
             offset: (OFFSET * tree.voxel()).max(OFFSET_OF_ROUNDING * largest),
             anchor: point,
         };
+        // Refine point and normal with the exact field, if it is kept
         match (&self.built.field, &self.built.exact) {
             (Some(field), Some(layout)) => exact::refine(field, layout, ray, hit),
             _ => hit,

@@ -54,6 +54,7 @@ impl ArrayTask for Gather<'_> {
 
     #[inline(always)]
     fn run(self) -> RawBrick {
+        // Visit all particles whose support reaches the brick, in the order of their bins
         let bins = self.field.bins();
         let splat = Splat::new(self.layout, self.brick);
         let mut smooth = [[[0.0; VOXELS]; VOXELS]; VOXELS];
@@ -76,6 +77,7 @@ impl ArrayTask for Gather<'_> {
                 }
             }
         }
+        // Parts without particles need no memory
         RawBrick {
             smooth: any_smooth.then(|| encode(&smooth)),
             sharp: any_sharp.then(|| encode(&sharp)),
@@ -160,6 +162,7 @@ impl Splat {
         for square in along_x {
             least_x = least_x.min(square);
         }
+        // Add to each sample that the support reaches
         let limit = self.limit - least_x;
         let mut any = false;
         for (layer, dz2) in sums.iter_mut().zip(along_z) {

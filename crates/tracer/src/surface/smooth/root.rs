@@ -93,6 +93,7 @@ fn cubic_along(corners: &[Integers; 8], segments: &Segments, threshold: f32, l: 
         of_xy[2] * az + of_xy[1] * bz,
         of_xy[2] * bz,
     ];
+    // Sum the powers of s
     let sign = segments.sign[l];
     let even = |i: usize| xy * of_xy[i] + xz * of_xz[i] + yz * of_yz[i] + xyz * of_xyz[i];
     [

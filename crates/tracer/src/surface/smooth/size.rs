@@ -46,6 +46,7 @@ impl GridSize {
     /// The size of the grid of particles with `centers` and one `radius`. Its bricks are selected as for the surface,
     /// but only some of them are made.
     pub fn of(centers: &[Vec3], radius: f32, settings: &SurfaceSettings) -> Self {
+        // Sort the particles and select bricks, as a build does
         let layout = Layout::new(settings, radius);
         let mut field = FieldParticles::sorted(centers, layout.support, false);
         let plan = Plan::of(field.bins(), &layout);
@@ -54,6 +55,7 @@ impl GridSize {
         } else {
             near(&field, &layout, &plan)
         };
+        // Make a sample of the bricks
         let sample = plan.sample(MAX_BRICKS);
         let needed = discard_unused(&mut field, &layout, &sample);
         field.find_volumes(|bin| needed[bin]);
@@ -62,6 +64,7 @@ impl GridSize {
         let raw = work.raw();
         let (_, bricks) = work.bricks(&raw);
         let bricks = bricks.len() as u64 * size_of::<Brick>() as u64;
+        // Scale the sizes from the sample to all
         Self {
             particles: centers.len() as u64,
             near,
@@ -119,8 +122,8 @@ impl GridSize {
 /// Number of particles that affect the surface.
 fn near(field: &FieldParticles, layout: &Layout, plan: &Plan) -> u64 {
     let bins = field.bins();
-    let near = blocks::bins_near(bins, layout, &plan.blocks, 2.0 * layout.support);
-    let near = (0..bins.bin_count()).filter(|bin| near[*bin]);
+    let is_near = blocks::bins_near(bins, layout, &plan.blocks, 2.0 * layout.support);
+    let near = (0..bins.bin_count()).filter(|bin| is_near[*bin]);
     near.map(|bin| bins.particles_in(bin..bin + 1).len() as u64).sum()
 }
 

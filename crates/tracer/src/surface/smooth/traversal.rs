@@ -123,6 +123,7 @@ fn traverse_body(
     for nodes in &mut nodes {
         nodes[top as usize] = tree.root;
     }
+    // Descend and step until no ray is left
     let mut traversal = Traversal {
         simd,
         tree,

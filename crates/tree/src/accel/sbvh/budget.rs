@@ -24,8 +24,8 @@ pub(super) fn capacity(particles: usize, budget: f32) -> usize {
 /// Distributes `free` slots between two children in proportion to their reference counts.
 pub(super) fn share(free: usize, counts: [usize; 2]) -> [usize; 2] {
     let [below, above] = counts.map(|count| count as u128);
-    let first = free as u128 * below / (below + above).max(1);
-    let first = usize::try_from(first).expect("no more than all that are free");
+    let share = free as u128 * below / (below + above).max(1);
+    let first = usize::try_from(share).expect("no more than all that are free");
     [first, free - first]
 }
 

@@ -190,10 +190,12 @@ fn length_codes(lengths: &[u8]) -> Vec<LengthCode> {
     for equal in lengths.chunk_by(|a, b| a == b) {
         let length = equal[0];
         let mut left = equal.len();
+        // A repetition refers to the length before it, except for zeros
         if length != 0 {
             push(length, 0, 0);
             left -= 1;
         }
+        // Use the longest repetitions that there are symbols for
         while left >= 3 {
             let count = match (length, left) {
                 (0, ..11) => {
@@ -243,11 +245,13 @@ impl Bits {
 }
 
 fn write_symbols(data: &[u8], sequences: &[Sequence], codes: &Codes, out: &mut BitWriter) {
+    // Prepare the bits of each literal and length
     let literals: [Bits; END] = std::array::from_fn(|literal| Bits::of(codes.symbols[literal]));
     let lengths: [Bits; MAX_LENGTH + 1] = std::array::from_fn(|length| {
         Bits::of_value(LENGTH_VALUES[length], &codes.symbols, length_bits)
     });
     let mut at = 0;
+    // Write literals, then the copy that follows them
     for sequence in sequences {
         let end = at + sequence.literals as usize;
         write_literals(&data[at..end], &literals, out);
@@ -255,12 +259,13 @@ fn write_symbols(data: &[u8], sequences: &[Sequence], codes: &Codes, out: &mut B
         if sequence.length > 0 {
             let length = lengths[usize::from(sequence.length)];
             out.put(u64::from(length.bits), length.count);
-            let distance = distance_value(sequence.distance);
-            let distance = Bits::of_value(distance, &codes.distances, distance_bits);
+            let value = distance_value(sequence.distance);
+            let distance = Bits::of_value(value, &codes.distances, distance_bits);
             out.put(u64::from(distance.bits), distance.count);
             out.flush();
         }
     }
+    // Write the end of the block
     let end = Bits::of(codes.symbols[END]);
     out.put(u64::from(end.bits), end.count);
     out.flush();

@@ -26,6 +26,7 @@ impl Histogram {
         // Four sets of counters: equal bytes often follow each other, and would have to wait for the same counter
         let mut literals = [[0_u32; END]; 4];
         let mut at = start;
+        // Count literals, then the copy that follows them
         for sequence in sequences {
             let end = at + sequence.literals as usize;
             let (fours, rest) = data[at..end].as_chunks::<4>();
@@ -48,6 +49,7 @@ impl Histogram {
                 histogram.counts[1] += 1;
             }
         }
+        // Add the sets of counters
         for counters in literals {
             add(&mut histogram.symbols[..END], &counters);
         }
@@ -112,6 +114,7 @@ const fn logarithms() -> [u32; 1 << TABLE_BITS] {
         let mut logarithm = whole;
         let mut digit = 0;
         while digit < FRACTION {
+            // Squaring doubles the logarithm, so that its next binary digit is before the point
             power = (power * power) >> 31;
             logarithm <<= 1;
             if power >> 32 > 0 {

@@ -105,8 +105,8 @@ fn limited(depths: &[u32], limit: usize) -> [u32; MAX_BITS + 1] {
     // Reduce the sum to 1, one unit at a time: split a shorter code into two that are one bit longer, and use one of
     // them in place of a code with `limit` bits
     for _ in (1 << limit)..kraft_sum(&lengths) {
-        let shorter = (1..limit).rev().find(|length| lengths[*length] > 0);
-        let shorter = shorter.expect("some code is shorter than the longest");
+        let found = (1..limit).rev().find(|length| lengths[*length] > 0);
+        let shorter = found.expect("some code is shorter than the longest");
         lengths[shorter] -= 1;
         lengths[shorter + 1] += 2;
         lengths[limit] -= 1;

@@ -67,11 +67,13 @@ impl Emitter {
         particles: [Vec3; 2],
         photons: u32,
     ) -> Vec<Self> {
+        // Find the power of each light that reaches the particles
         let source =
             |(group, light): &(usize, PhotonSource)| (*group, Source::new(*light, particles));
         let sources: Vec<(usize, Source)> = lights.iter().map(source).collect();
         let powers: Vec<f64> = sources.iter().map(|(_, source)| source.power()).collect();
         let whole: f64 = powers.iter().sum();
+        // Share the photons by power, at least one for each light
         let share =
             |power: f64| if whole > 0.0 { power / whole } else { 1.0 / powers.len() as f64 };
         #[expect(

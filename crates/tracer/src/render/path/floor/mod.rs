@@ -49,7 +49,7 @@ use wet::{WetMap, WetScene};
 
 /// See the module. All maps contain the radiance of a white ground.
 #[derive(Debug, Clone)]
-pub(super) struct FloorLight {
+pub(super) struct GroundLight {
     caustics: CausticMap,
     sky: Map,
     wet: Option<WetMap>,
@@ -192,6 +192,7 @@ pub(in crate::render) fn bytes(scene: &Scene, settings: &RenderSettings) -> Floo
     if !has_photons(scene, settings) {
         return FloorBytes::default();
     }
+    // Caustics have one map, and one for each light group of several
     let emits = !scene.lights.is_empty();
     // Layers of light groups have maps of their own
     let groups = u64::from(settings.channels.layers.light_groups);
@@ -202,6 +203,7 @@ pub(in crate::render) fn bytes(scene: &Scene, settings: &RenderSettings) -> Floo
     };
     let (caustics, kept) = (maps * density::BYTES, maps * density::MAP_BYTES);
     let dark = caustics - maps * density::CELL_BYTES;
+    // Other maps of a visible ground are made after those
     let (of_ground, dark, kept) = match &scene.ground {
         // The cells of the photons are freed when the other maps are made
         Some(ground) if !is_catcher(ground) => {
@@ -212,6 +214,7 @@ pub(in crate::render) fn bytes(scene: &Scene, settings: &RenderSettings) -> Floo
         Some(_) if emits => (caustics, dark, kept),
         _ => (0, 0, 0),
     };
+    // Photons at surfaces are stored one by one
     let has_opaque = scene.meshes.iter().any(|mesh| !mesh.is_pane()) || !scene.parts.is_empty();
     let has_surfaces = emits && has_opaque;
     let of_surfaces = if has_surfaces { photon_map::bytes(settings.photons) } else { 0 };
@@ -244,13 +247,14 @@ impl<'a> PathIntegrator<'a> {
         if !has_photons(scene, settings) {
             return Some((self, RayCounts::default()));
         }
+        // Find out what needs light from photons
         let sources = self.photon_sources();
         let ground = scene.ground.as_ref();
-        let floor = ground.filter(|ground| !is_catcher(ground));
+        let visible = ground.filter(|ground| !is_catcher(ground));
         let catcher = ground.filter(|g| is_catcher(g) && !sources.is_empty());
         let has_surfaces = !sources.is_empty() && self.has_opaque_surfaces();
         // Trace the photons
-        let square = floor.or(catcher).map(Square::of);
+        let square = visible.or(catcher).map(Square::of);
         let groups: BTreeSet<usize> = match settings.channels.layers.light_groups {
             0 => BTreeSet::new(),
             _ => sources.iter().map(|(group, _)| *group).collect(),
@@ -275,29 +279,36 @@ impl<'a> PathIntegrator<'a> {
             return Some((self, counts));
         }
         // Add the light of the environment on a visible ground
-        if let (Some(ground), Some(caustics)) = (floor, caustics) {
-            let (sky, of_sky) = sky::sky(&self, &caustics.square, stop)?;
+        if let (Some(ground), Some(caustics)) = (visible, caustics) {
+            let (light, of_sky) = self.ground_light(ground, caustics, stop)?;
             counts = counts + of_sky;
-            let open =
-                self.environment.map(|e| e.irradiance(ground.up) * FRAC_1_PI).unwrap_or_default();
-            let wet = match self.wet_scene(&caustics.square) {
-                Some(wet) => Some(wet.map(stop)?),
-                None => None,
-            };
-            let of_environment = self.context.environment_group();
-            let group = |(number, sky)| GroupSky {
-                sky,
-                open: if number == of_environment { open } else { Vec3::ZERO },
-            };
-            self.floor = Some(FloorLight {
-                caustics,
-                sky: sky.all,
-                wet,
-                open,
-                groups: sky.groups.into_iter().enumerate().map(group).collect(),
-            });
+            self.ground_light = Some(light);
         }
         Some((self, counts))
+    }
+
+    /// The light of photons, of the sky and of wetness on a visible `ground`, and the rays that were traced for the sky.
+    /// `None` if `stop` is raised.
+    fn ground_light(
+        &self,
+        ground: &Ground,
+        caustics: CausticMap,
+        stop: &dyn Stop,
+    ) -> Option<(GroundLight, RayCounts)> {
+        let (sky, of_sky) = sky::sky(self, &caustics.square, stop)?;
+        let open =
+            self.environment.map(|e| e.irradiance(ground.up) * FRAC_1_PI).unwrap_or_default();
+        let wet = match self.wet_scene(&caustics.square) {
+            Some(wet) => Some(wet.map(stop)?),
+            None => None,
+        };
+        let of_environment = self.context.environment_group();
+        let group = |(number, sky)| GroupSky {
+            sky,
+            open: if number == of_environment { open } else { Vec3::ZERO },
+        };
+        let groups = sky.groups.into_iter().enumerate().map(group).collect();
+        Some((GroundLight { caustics, sky: sky.all, wet, open, groups }, of_sky))
     }
 
     /// What wets the ground, if something does.
@@ -328,14 +339,15 @@ impl<'a> PathIntegrator<'a> {
     }
 
     /// Adds the light that the ground reflects, where the paths of `surface` end.
-    pub(super) fn shade_floor(
+    pub(super) fn shade_ground(
         &self,
-        floor: &FloorLight,
+        light: &GroundLight,
         surface: &Surface<'_>,
         packet: &mut PacketScratch,
     ) {
+        // Darken the ground where it is wet
         self.prepare_surface(surface, packet);
-        let gloss = match &floor.wet {
+        let gloss = match &light.wet {
             Some(wet) => wet.darken(surface, packet),
             None => splat(0.0),
         };
@@ -344,15 +356,16 @@ impl<'a> PathIntegrator<'a> {
         for lane in lanes_in(surface.lanes) {
             let point = lane3(&packet.hits.point, lane);
             let weight = lane3(&packet.weight, lane) * lane3(&packet.surface.albedo, lane);
-            set_lane3(&mut reflected, lane, weight * floor.white(point));
-            floor.each_group(point, |group, white| {
+            set_lane3(&mut reflected, lane, weight * light.white(point));
+            light.each_group(point, |group, white| {
                 packet.groups.add_lane(group, lane, weight * white);
             });
         }
         let (simd, radiance) = (self.context.simd, &mut packet.radiance);
         add(simd, &reflected, &Vec3::ONE, surface.lanes, radiance);
+        // Add what wet ground mirrors, and light that arrives straight from its source
         packet.take_light(LightClass::Diffuse);
-        if let Some(wet) = &floor.wet {
+        if let Some(wet) = &light.wet {
             self.add_gloss(wet, &gloss, surface, packet);
         }
         self.add_straight_light(surface, packet);
@@ -369,7 +382,7 @@ impl<'a> PathIntegrator<'a> {
     }
 }
 
-impl FloorLight {
+impl GroundLight {
     /// Radiance of a white ground at `point`.
     fn white(&self, point: Vec3) -> Vec3 {
         let Some((position, weight)) = self.caustics.square.place(point) else {

@@ -212,12 +212,14 @@ impl Search<'_> {
     fn test(&mut self, index: usize) {
         let photon = &self.photons[index];
         let offset = photon.point - self.point;
+        // Leave out photons that are far away or on another side of an edge
         let distance2 = offset.length_squared();
         // NaN is not near
         let is_near = distance2 < self.max2;
         if !is_near || photon.normal.dot(self.normal) < MIN_NORMAL_COSINE {
             return;
         }
+        // Leave out those above the surface, and those from behind it
         let height = offset.dot(self.normal);
         if height * height > MAX_SLOPE * MAX_SLOPE * distance2
             || photon.to_light.dot(self.normal) <= 0.0
@@ -226,6 +228,7 @@ impl Search<'_> {
         }
         #[expect(clippy::cast_possible_truncation, reason = "the number of photons is limited")]
         let neighbour = (distance2, index as u32);
+        // Keep the nearest in a heap with the farthest at its root
         if self.found.len() < NEIGHBOURS {
             self.found.push(neighbour);
             if self.found.len() < NEIGHBOURS {
@@ -238,6 +241,7 @@ impl Search<'_> {
             self.found[0] = neighbour;
             sink(self.found, 0);
         }
+        // Only nearer ones count from now on
         self.max2 = self.found[0].0;
     }
 }

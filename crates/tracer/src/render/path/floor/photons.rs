@@ -109,6 +109,7 @@ pub(super) fn trace_photons(
 ) -> Option<RayCounts> {
     let mut counts = RayCounts::default();
     for emitter in emitters {
+        // Trace tasks in parallel, a round at a time, so that few arrivals are in memory
         let tasks: Vec<u32> = (0..emitter.photons).step_by(TASK as usize).collect();
         for round in tasks.chunks(ROUND) {
             let square = targets.ground.as_ref().map(|(square, _)| *square);
@@ -119,6 +120,7 @@ pub(super) fn trace_photons(
                 task.trace(*first..last, stop)
             };
             let arrived: Option<Vec<_>> = round.par_iter().map(trace).collect();
+            // Store them in their order, so that sums do not depend on threads
             for (arrivals, of_task) in arrived? {
                 counts = counts + of_task;
                 targets.store(&arrivals, emitter.group);
@@ -227,6 +229,7 @@ impl Task<'_> {
             0 => lane3(throughput, lane),
             _ => lane3(throughput, lane) / (ior * ior),
         };
+        // Store those on the ground with their place in the map
         if let Some(square) = self.square {
             let landed = |lane: usize| Landed {
                 position: square.position(lane3(&hits.point, lane)),
@@ -238,6 +241,7 @@ impl Task<'_> {
         if !self.has_surfaces {
             return;
         }
+        // Store those at other surfaces, with normals on the side that they came from
         let panes = self.integrator.context.pane_lanes(hits);
         for lane in lanes_in(hits.mask & !panes) {
             if !self.integrator.takes_photons(hits.material[lane]) {

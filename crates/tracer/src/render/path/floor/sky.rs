@@ -77,6 +77,7 @@ fn trace_row(
     row: usize,
     stop: &dyn Stop,
 ) -> Option<(Texels, RayCounts)> {
+    // Make the paths of all texels of the row
     let mut scratch = Scratch::default();
     let layers = Layers {
         light_groups: integrator.context.settings.channels.layers.light_groups,
@@ -86,6 +87,7 @@ fn trace_row(
     for _ in 0..SIDE * PATHS {
         scratch.group.push(0.0, 0.0);
     }
+    // Trace them from the ground
     trace_batches(integrator, stop, &mut scratch, &|packets, scratch| {
         for number in packets {
             let (packet, segments) = (&mut *scratch.packet, &mut *scratch.camera);
@@ -98,6 +100,7 @@ fn trace_row(
         }
         Some(())
     })?;
+    // Average the paths of each texel
     let radiance = |i: usize| lane3(&scratch.group.radiance[i / LANES], i % LANES);
     let texels = means(&radiance);
     let of_group = |group| means(&|path| scratch.group.layers.light_of_group(group, path));

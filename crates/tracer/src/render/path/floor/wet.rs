@@ -131,17 +131,20 @@ pub(super) struct WetScene<'a> {
 impl WetScene<'_> {
     /// Where the fluid wets the ground. `None` if `stop` is raised.
     pub(super) fn map(&self, stop: &dyn Stop) -> Option<WetMap> {
+        // Find where the fluid is
         let row = |y: usize| {
             let texel = |x: usize| self.fluid_at([x, y].map(center));
             (!stop.is_raised()).then(|| (0..SIDE).map(texel).collect::<Vec<Fluid>>())
         };
         let rows: Option<Vec<_>> = (0..SIDE).into_par_iter().map(row).collect();
         let fluid = rows?.concat();
+        // Spread its wetness over a margin
         let margin = self.wet.margin / self.square.edge * SIDE as f32;
         let [inner, outer] = SPREAD.map(|part| part * margin);
         let outer = outer.clamp(MIN_SPREAD, MAX_SPREAD);
         let near: Vec<f32> = fluid.iter().map(|fluid| fluid.near).collect();
         let wetness = widened(&near, [inner.min(0.5 * outer), outer]);
+        // Ground is glossy where it is wet and not under the fluid
         let texel = |(wetness, fluid): (f32, &Fluid)| {
             let gloss = if fluid.covers { 0.0 } else { wetness };
             Vec3::new(wetness, gloss, 0.0)
@@ -182,6 +185,7 @@ fn center(texel: usize) -> f32 {
 fn widened(values: &[f32], [inner, outer]: [f32; 2]) -> Vec<f32> {
     #[expect(clippy::cast_possible_truncation, reason = "at most MAX_SPREAD")]
     let reach = outer.ceil() as isize;
+    // Compute the weight at each offset
     let mut offsets = Vec::new();
     for y in -reach..=reach {
         for x in -reach..=reach {
@@ -205,6 +209,7 @@ fn widened(values: &[f32], [inner, outer]: [f32; 2]) -> Vec<f32> {
     let is_near = |at: usize, [first, last]: [usize; 2]| {
         first <= last && at + margin >= first && at <= last + margin
     };
+    // Find the greatest weighted value around each texel
     let row = |y: usize| {
         let greatest = |x: usize| {
             if !is_near(x, bounds[0]) || !is_near(y, bounds[1]) {
@@ -299,6 +304,7 @@ impl PathIntegrator<'_> {
             samples.rays.t_max[lane] = f32::INFINITY;
             samples.lanes |= 1 << lane;
         }
+        // Add the light of those that nothing blocks
         if samples.lanes != 0 {
             let group = self.context.environment_group();
             self.add_visible(Occlusion::Opaque, group, surface, packet);
