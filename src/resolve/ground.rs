@@ -57,7 +57,7 @@ pub(super) fn ground(
     let integrator = manifest.integrator();
     let kind = match &render.ground {
         Some(ground) => ground.kind,
-        // Without a place, a shadow would fall on nothing
+        // Without a ground under the particles, a shadow would fall on nothing
         None if integrator == IntegratorKind::Path && place.has_layer => GroundKind::ShadowCatcher,
         None => GroundKind::None,
     };

@@ -34,7 +34,7 @@ pub fn detect_format(bytes: &[u8], path: &Path) -> Result<Format, ParseError> {
             Confidence::IfNamed | Confidence::No => {}
         }
     }
-    // Refuse known files of other programs with a better message than the formats give
+    // Refuse known formats that are not read
     if !bytes.is_empty() {
         refuse_foreign(head, path, named)?;
     }

@@ -166,7 +166,7 @@ pub(super) fn listed(
     names: Vec<FileName>,
     notes: &mut Vec<String>,
 ) -> Result<FileGroup, SequenceError> {
-    // Find the series of names; a series of its own counts like any other here
+    // Find the series of names; those of a single frame count like the others
     let order: Vec<PathBuf> = names.iter().map(|n| n.path.clone()).collect();
     let mut candidates = candidates(names);
     for candidate in &mut candidates {

@@ -109,7 +109,7 @@ impl Framed {
         let sides = [(along(right), half.x), (along(screen_up), half.y)];
         let fits = sides.each_ref().map(|(places, t)| fit(places, self.reach(*t), *t));
         let distance = fits[0].1.max(fits[1].1).max(self.min_distance());
-        // Centre them where that still shows all
+        // Move to equal margins on both sides
         let mut shift = fits.map(|(shift, _)| shift);
         if self.is_centred {
             for (shift, (places, t)) in shift.iter_mut().zip(&sides) {

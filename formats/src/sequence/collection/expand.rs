@@ -235,7 +235,7 @@ impl Expander {
     ) -> Result<(), SequenceError> {
         chain.push(Arc::clone(&opened.path));
         for (index, entry) in opened.list.entries.iter().enumerate() {
-            // Find the file, which must be within the directory of the first list
+            // Find the file, inside the directory of the first list unless the user allows others
             let target = self.root.resolve(&opened.path, &entry.path).ok_or_else(|| {
                 SequenceError::Outside {
                     list: opened.path.to_path_buf(),
