@@ -19,15 +19,17 @@ const MAX_LEN: usize = 64;
 /// Bytes of the text of an atom.
 pub(super) const CODE_LEN: usize = size_of::<i32>();
 
+/// Number of recent texts that are found without a search, a power of two.
+const RECENT: usize = 64;
+
 /// A column that grows text by text.
 #[derive(Debug)]
 pub(super) struct TextColumn {
     name: &'static str,
     codes: Vec<i32>,
     labels: BTreeMap<i64, String>,
-    /// The text before, and its number: neighbours often have the same one.
-    last: Vec<u8>,
-    last_code: i32,
+    /// Short texts by hashes of their [`key`], with their numbers: most atoms have the names of others a few lines before.
+    recent: [Option<(u64, i32)>; RECENT],
     /// Whether a text is not empty.
     has_text: bool,
     /// Why the column is left out.
@@ -40,8 +42,7 @@ impl TextColumn {
             name,
             codes: Vec::new(),
             labels: BTreeMap::new(),
-            last: Vec::new(),
-            last_code: 0,
+            recent: [None; RECENT],
             has_text: false,
             fault: None,
         }
@@ -52,19 +53,25 @@ impl TextColumn {
         if self.fault.is_some() {
             return;
         }
-        if text != self.last || self.codes.is_empty() {
-            match self.code(text) {
-                Ok(code) => self.last_code = code,
-                Err(fault) => {
-                    self.fault = Some(fault);
-                    (self.codes, self.labels) = (Vec::new(), BTreeMap::new());
-                    return;
+        let key = key(text);
+        let place = key.map(place);
+        let known = place.and_then(|place| self.recent[place]);
+        if let Some((_, code)) = known.filter(|(known, _)| Some(*known) == key) {
+            self.codes.push(code);
+            return;
+        }
+        match self.code(text) {
+            Ok(code) => {
+                self.codes.push(code);
+                if let (Some(key), Some(place)) = (key, place) {
+                    self.recent[place] = Some((key, code));
                 }
             }
-            self.last.clear();
-            self.last.extend_from_slice(text);
+            Err(fault) => {
+                self.fault = Some(fault);
+                (self.codes, self.labels) = (Vec::new(), BTreeMap::new());
+            }
         }
-        self.codes.push(self.last_code);
     }
 
     /// The number of `text`, which gets a label.
@@ -108,6 +115,20 @@ impl TextColumn {
             particles.labels.insert(name.to_owned(), labels);
         }
     }
+}
+
+/// The bytes of a text of up to eight, if no other one has the same.
+fn key(text: &[u8]) -> Option<u64> {
+    let mut bytes = [0; 8];
+    bytes.get_mut(..text.len())?.copy_from_slice(text);
+    (text.last() != Some(&0)).then_some(u64::from_le_bytes(bytes))
+}
+
+/// Where among the recent texts that with `key` is.
+#[expect(clippy::cast_possible_truncation, reason = "a few bits")]
+const fn place(key: u64) -> usize {
+    // The upper bits of a product with the golden ratio differ where keys do
+    (key.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (64 - RECENT.trailing_zeros())) as usize
 }
 
 #[cfg(test)]
@@ -197,6 +218,7 @@ mod tests {
         let labels = &particles.labels["atom_name"];
         let texts = codes(&particles).iter().map(|code| labels[&i64::from(*code)].as_str());
         assert_eq!(texts.collect::<Vec<_>>(), ["CA", "CA", "", "Ca", "a\\u{1b}"]);
+        assert_eq!(column(&["A", "A\0", "A", "A\0"]).labels["atom_name"].len(), 2);
         // Text that is not UTF-8 has one label
         assert_eq!(column(&[&b"\xe4"[..], b"B", b"\xe4"]).labels["atom_name"].len(), 2);
         let none = RawParticles::default();
