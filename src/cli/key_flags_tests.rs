@@ -150,9 +150,12 @@ const WORDS: [&str; 13] = [
 #[test]
 fn options_of_lists_add_items() {
     for (flags, sets) in [
-        ("--colorbar", "overlay=[{type=\"colorbar\"}]"),
-        ("--legend", "overlay=[{type=\"colorbar\"}]"),
-        ("--title Speed --unit m/s", "overlay=[{type=\"colorbar\",title=\"Speed\",unit=\"m/s\"}]"),
+        ("--colorbar", "overlay=[{type=\"colorbar\",layout=\"auto\"}]"),
+        ("--legend", "overlay=[{type=\"colorbar\",layout=\"auto\"}]"),
+        (
+            "--title Speed --unit m/s",
+            "overlay=[{type=\"colorbar\",layout=\"auto\",title=\"Speed\",unit=\"m/s\"}]",
+        ),
         (
             "--text a --text {frame} --scale-bar --axes --timestamp",
             "overlay=[{type=\"text\"},{type=\"text\",text=\"a\"},{type=\"text\",text=\"{frame}\"},\
