@@ -1,7 +1,6 @@
 //! Turns a [`Manifest`] and a [`Survey`] of the particles into a [`Setup`]: every "auto" gets its value.
 
 use crate::math::narrow;
-use std::borrow::Cow;
 use std::sync::Arc;
 
 use glam::DVec3;
@@ -83,13 +82,10 @@ pub fn setup(
 ) -> Result<Setup, ResolveError> {
     let survey = camera::with_framed_meshes(survey, manifest, &inputs.meshes);
     let mut setup = setup_on(manifest, &survey, &inputs, None)?;
-    let placed = overlay::placed(manifest, &survey, &setup);
+    let placed = overlay::placed(manifest, &survey, &mut setup);
     let manifest = placed.as_ref();
     if manifest.has_strips() && !setup.picture.files.overlays.is_empty() {
         // What the overlays show decides how much room they need
-        if matches!(placed, Cow::Owned(_)) {
-            setup = setup_on(manifest, &survey, &inputs, None)?;
-        }
         let page = overlay::page(&setup, manifest, &survey)?;
         let mut smaller = manifest.clone();
         let [width, height] = page.picture.map(Side::Pixels);

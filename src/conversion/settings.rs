@@ -7,7 +7,7 @@ use spherule_formats::native::{Bound, Encoding};
 
 use super::attributes::AttributeChoices;
 use super::error::UnknownAttribute;
-use crate::survey::{ColorQuestion, Fit, Question, RadiusQuestion, Survey};
+use crate::survey::{Question, RadiusQuestion, Survey};
 
 /// The settings of the user.
 #[derive(Debug, Clone, PartialEq)]
@@ -58,19 +58,11 @@ impl ConvertSettings {
 
     /// The properties that the survey must determine.
     pub const fn question(&self) -> Question<'static> {
-        Question {
-            color: ColorQuestion::None,
-            up: None,
-            points: false,
-            selection: None,
-            fit: Fit::All,
-            framed: None,
-            surface: None,
-            radius: match self.radius {
-                Some(_) => RadiusQuestion::None,
-                None => RadiusQuestion::Auto,
-            },
-        }
+        let radius = match self.radius {
+            Some(_) => RadiusQuestion::None,
+            None => RadiusQuestion::Auto,
+        };
+        Question { radius, ..Question::NOTHING }
     }
 }
 

@@ -53,7 +53,7 @@ impl Rules<'_> {
                 let mut item = Table::new();
                 item.insert("type".to_owned(), kind.into());
                 item.extend(size.map(|size| ("size".to_owned(), size.to_value())));
-                if self.has_auto_layout(kind) {
+                if kind == COLORS && self.may_have_strips() {
                     item.insert("layout".to_owned(), "auto".into());
                 }
                 item.extend(self.place_of(kind).map(|(key, value)| (key.to_owned(), value.into())));
@@ -68,8 +68,7 @@ impl Rules<'_> {
     fn place_of(&self, kind: &str) -> Option<(&'static str, &'static str)> {
         let [width, height] = self.manifest.image.size();
         let aspect = self.shown_aspect()? * f64::from(height) / f64::from(width);
-        let has_strips = self.manifest.image.overscan == 0;
-        let beside = Some(("layout", "beside")).filter(|_| has_strips);
+        let beside = Some(("layout", "beside")).filter(|_| self.may_have_strips());
         if self.has_set("camera.fit") {
             return beside;
         }
@@ -82,9 +81,9 @@ impl Rules<'_> {
         Some(("orientation", "horizontal")).filter(|_| aspect > WIDE && kind == COLORS)
     }
 
-    /// Whether the colours are beside the picture if they would cover particles.
-    fn has_auto_layout(&self, kind: &str) -> bool {
-        kind == COLORS && self.manifest.against_strips().is_none()
+    /// Whether overlays may be beside the picture.
+    fn may_have_strips(&self) -> bool {
+        self.manifest.against_strips().is_none()
     }
 
     /// Width of the particles in the picture, divided by their height; none if they are not seen from the side of the rules.

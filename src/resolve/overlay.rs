@@ -141,45 +141,54 @@ fn choose_corners(overlays: &mut [Overlay], page: &Page, view: &FrameView, point
 /// Distance of particles from an overlay that covers none, as a fraction of the height of the picture.
 const MARGIN: f32 = 0.015;
 
-/// The manifest with a place for overlays whose layout is `auto`: beside the picture if they cover particles in `setup`.
+/// The manifest with a place for overlays whose layout is `auto`: beside the picture if they cover particles in `setup`,
+/// whose overlays get the same layout.
 pub(super) fn placed<'m>(
     manifest: &'m Manifest,
     survey: &Survey,
-    setup: &Setup,
+    setup: &mut Setup,
 ) -> Cow<'m, Manifest> {
     let is_open = |overlay: &ManifestOverlay| {
         overlay.layout == Some(OverlayLayout::Auto) && manifest.image.layout == Layout::Over
     };
-    let overlays = &setup.picture.files.overlays;
     // Overlays that show nothing are left out
-    let are_all = overlays.len() == manifest.overlays.len();
+    let are_all = setup.picture.files.overlays.len() == manifest.overlays.len();
     if !are_all || manifest.against_strips().is_some() || !manifest.overlays.iter().any(is_open) {
         return Cow::Borrowed(manifest);
     }
-    // Which of them cover particles
+    // Put those beside the picture that cover something
+    let covers = cover_particles(setup, survey);
+    let mut placed = manifest.clone();
+    let overlays = setup.picture.files.overlays.iter_mut();
+    for ((own, overlay), covers) in placed.overlays.iter_mut().zip(overlays).zip(covers) {
+        if is_open(own) {
+            (own.layout, overlay.layout) = if covers {
+                (Some(OverlayLayout::Beside), Layout::Beside)
+            } else {
+                (Some(OverlayLayout::Over), Layout::Over)
+            };
+        }
+    }
+    Cow::Owned(placed)
+}
+
+/// Whether each of the overlays of `setup` covers particles.
+fn cover_particles(setup: &Setup, survey: &Survey) -> Vec<bool> {
     let (render, camera) = (&setup.picture.render, &setup.picture.scene.camera);
     let page = Page::whole(render.width, render.height);
     let view = first_view(setup, survey, camera);
     let points = film_points(setup, survey, camera, page.picture);
+    let margin = MARGIN * page.size[1] as f32;
     let mut boxes = Boxes::new(page.picture);
-    let covers = overlays.iter().map(|overlay| {
+    let covers = setup.picture.files.overlays.iter().map(|overlay| {
         let size = overlay.measure(page.size[1], &view);
         let at = boxes.add(overlay.placement, size).map(|x| x as f32);
-        let margin = MARGIN * page.size[1] as f32;
-        let is_covered = |point: &&[f32; 2]| {
+        let is_covered = |point: &[f32; 2]| {
             (0..2).all(|i| (at[i] - margin..=at[i] + size[i] as f32 + margin).contains(&point[i]))
         };
-        points.iter().any(|point| is_covered(&point))
+        points.iter().any(is_covered)
     });
-    // Put those beside the picture that cover something
-    let mut placed = manifest.clone();
-    for (overlay, covers) in placed.overlays.iter_mut().zip(covers) {
-        if is_open(overlay) {
-            let layout = if covers { OverlayLayout::Beside } else { OverlayLayout::Over };
-            overlay.layout = Some(layout);
-        }
-    }
-    Cow::Owned(placed)
+    covers.collect()
 }
 
 /// What is beside the picture on its page, linear RGB: the background if it has one colour, or else white.
@@ -417,14 +426,15 @@ fn time_stamp(survey: &Survey) -> Template {
     };
     // Write tiny times in powers of ten
     let is_tiny = |time: f64| step.is_none() && time > 0.0 && time < 1e-4;
-    let text = match decimals {
+    let mut text = match decimals {
         Some(_) if survey.largest_time.is_some_and(is_tiny) => "t = {time:.2e}".to_owned(),
         Some(decimals) => format!("t = {{time:.{decimals}f}}"),
         None => "frame {frame}".to_owned(),
     };
     // Add the unit
-    let unit = survey.time_unit.as_ref().filter(|_| decimals.is_some());
-    let text = unit.map_or(text.clone(), |unit| format!("{text} {unit}"));
+    if let Some(unit) = survey.time_unit.as_ref().filter(|_| decimals.is_some()) {
+        text.extend([" ", unit]);
+    }
     Template::parse(&text).expect("a text with known variables")
 }
 

@@ -5,7 +5,7 @@ use spherule_formats::generate::{BoxSettings, fill_box, splitmix64};
 use spherule_formats::sequence::{Sequence, SequenceInput};
 use spherule_formats::{ParticleFrame, Radius, is_radius};
 use spherule_frame::reading::read_budget;
-use spherule_survey::{ColorQuestion, Fit, Question, RadiusQuestion, Survey};
+use spherule_survey::{Question, RadiusQuestion, Survey};
 use spherule_tracer::scene::Bounds;
 use spherule_tree::accel::{SphereRadius, Spheres};
 
@@ -162,16 +162,7 @@ impl FrameSurvey {
         index: usize,
         aspect: f64,
     ) -> Result<Self, CellError> {
-        let question = Question {
-            color: ColorQuestion::None,
-            up: None,
-            points: false,
-            selection: None,
-            fit: Fit::All,
-            framed: None,
-            surface: None,
-            radius: RadiusQuestion::Auto,
-        };
+        let question = Question { radius: RadiusQuestion::Auto, ..Question::NOTHING };
         let survey = Survey::of_frames(sequence, [index], question)?;
         let frame = sequence.frames()[index].number;
         if survey.most_particles == 0 {

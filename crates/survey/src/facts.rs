@@ -22,7 +22,7 @@ use super::sheet::covering_radius;
 use super::tank::{Tank, tank_of};
 use super::upright::up_of;
 use super::walls::{Member, WallValues, walls};
-use super::{ColorQuestion, Fit, Question, RadiusQuestion, RgbAttribute, velocity_of};
+use super::{Question, RadiusQuestion, RgbAttribute, velocity_of};
 
 /// The attribute with atomic numbers.
 pub const ELEMENT: &str = "element";
@@ -30,8 +30,8 @@ pub const ELEMENT: &str = "element";
 /// The attribute with the kinds of coarse-grained beads.
 pub const BEAD: &str = "bead";
 
-/// Names of attributes whose integers are categories, best first.
-const CATEGORIES: [&str; 14] = [
+/// Names of attributes whose integers are categories, best first, in any spelling with the same [`kind_name`].
+const CATEGORIES: [&str; 13] = [
     BEAD,
     "type",
     "ptype",
@@ -43,7 +43,6 @@ const CATEGORIES: [&str; 14] = [
     "mk",
     "boundary",
     "is_boundary",
-    "isboundary",
     "is_wall",
     "wall",
 ];
@@ -162,16 +161,8 @@ pub struct Category {
     pub resting: Vec<i64>,
 }
 
-const QUESTION: Question<'static> = Question {
-    color: ColorQuestion::None,
-    radius: RadiusQuestion::AutoOfBody,
-    up: None,
-    points: false,
-    selection: None,
-    fit: Fit::All,
-    framed: None,
-    surface: None,
-};
+const QUESTION: Question<'static> =
+    Question { radius: RadiusQuestion::AutoOfBody, ..Question::NOTHING };
 
 impl Facts {
     /// The facts of the middle frame of `sequence`: the first one is often a lattice at rest. Nothing is known of a

@@ -10,7 +10,7 @@
 //!
 //! ```
 //! use spherule_formats::{PositionSlice, RawParticles};
-//! use spherule_survey::{ColorQuestion, Fit, Question, RadiusQuestion, Survey};
+//! use spherule_survey::{Question, RadiusQuestion, Survey};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! // A cube of 1000 particles
@@ -21,16 +21,7 @@
 //!     attributes: Vec::new(),
 //!     ..RawParticles::default()
 //! };
-//! let question = Question {
-//!     color: ColorQuestion::None,
-//!     radius: RadiusQuestion::Auto,
-//!     up: None,
-//!     points: false,
-//!     selection: None,
-//!     fit: Fit::All,
-//!     framed: None,
-//!     surface: None,
-//! };
+//! let question = Question { radius: RadiusQuestion::Auto, ..Question::NOTHING };
 //! let survey = Survey::of_particles("cube", &particles, question)?;
 //! assert_eq!(survey.radius, Some(0.5));
 //! # Ok(())
@@ -230,6 +221,18 @@ pub struct Question<'a> {
 }
 
 impl Question<'_> {
+    /// Nothing but what every survey finds: places and attributes of all particles.
+    pub const NOTHING: Self = Self {
+        color: ColorQuestion::None,
+        radius: RadiusQuestion::None,
+        up: None,
+        points: false,
+        selection: None,
+        fit: Fit::All,
+        framed: None,
+        surface: None,
+    };
+
     /// The selection, with heights along `up`.
     fn selection_with(&self, up: DVec3) -> Option<Selection> {
         self.selection.map(|selection| Selection { up: Some(up), ..selection.clone() })

@@ -71,7 +71,7 @@ mod tests {
     use spherule_formats::{ParticleFrame, Positions, RawParticles, SequenceInput, native};
 
     use super::super::robust::spacing_of;
-    use super::super::{ColorQuestion, Fit, Question, RadiusQuestion, Survey};
+    use super::super::{Question, RadiusQuestion, Survey};
     use super::*;
 
     fn spacing(positions: &[Vec3]) -> Option<Spacing> {
@@ -138,21 +138,7 @@ mod tests {
         native::write(&path, &frame, None).expect("a file");
         let sequence = Sequence::open(&SequenceInput::from_path(&path)).expect("a frame");
         let survey = |radius| {
-            let color = ColorQuestion::None;
-            Survey::of(
-                &sequence,
-                Question {
-                    color,
-                    radius,
-                    up: None,
-                    points: false,
-                    selection: None,
-                    fit: Fit::All,
-                    framed: None,
-                    surface: None,
-                },
-            )
-            .expect("readable")
+            Survey::of(&sequence, Question { radius, ..Question::NOTHING }).expect("readable")
         };
         let stored = survey(RadiusQuestion::AutoOfBody);
         let radius = stored.packed_radius.expect("requested");

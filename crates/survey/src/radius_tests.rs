@@ -34,16 +34,7 @@ fn raw<P: Default>(positions: P) -> RawParticles<P> {
 }
 
 fn question(selection: Option<&Selection>) -> Question<'_> {
-    Question {
-        color: ColorQuestion::None,
-        radius: RadiusQuestion::AutoOfBody,
-        up: None,
-        points: false,
-        selection,
-        fit: Fit::All,
-        framed: None,
-        surface: None,
-    }
+    Question { radius: RadiusQuestion::AutoOfBody, selection, ..Question::NOTHING }
 }
 
 /// Both estimates.

@@ -34,20 +34,17 @@ const LOWEST: f64 = 0.02;
 /// Their mean velocity downwards, relative to the root mean square of all velocities, from which on they fall.
 const FALLS: f64 = 0.5;
 
-/// Whether the lowest particles along `up` move down as a whole: they do not stand on a floor yet.
+/// Whether the lowest particles along `up` move down as a whole: they do not stand on a floor yet. `velocity` is a vector
+/// in space.
 pub(super) fn is_falling(positions: &Positions, velocity: &Attribute, up: DVec3) -> bool {
     let motion = |i: usize| {
-        let component = |axis: usize| velocity.data.get_f64(velocity.components * i + axis);
+        let component = |axis: usize| velocity.data.get_f64(3 * i + axis);
         let velocity = DVec3::new(component(0), component(1), component(2));
         (positions.get(i).dot(up), velocity.dot(up), velocity.length_squared())
     };
     // Sort the particles by height
     let count = positions.len().min(velocity.count());
-    let mut all: Vec<(f64, f64, f64)> = if velocity.components == 3 {
-        sample_indices(count, SAMPLE).map(motion).collect()
-    } else {
-        Vec::new()
-    };
+    let mut all: Vec<(f64, f64, f64)> = sample_indices(count, SAMPLE).map(motion).collect();
     all.retain(|(height, _, square)| height.is_finite() && square.is_finite());
     all.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     // Compare the motion of the lowest with the speed of all

@@ -150,7 +150,7 @@ impl Totals {
         if is_framed {
             self.outermost.add(&raw.positions, count);
         }
-        // The height of particles in the air is not that of a body on the ground
+        // Particles that fall do not stand on a floor in this frame
         let velocity = velocity_of(&raw.attributes);
         if !velocity.is_some_and(|velocity| is_falling(&raw.positions, velocity, up)) {
             let standing = standing(&sample_of(&raw.positions), count, up);

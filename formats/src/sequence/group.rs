@@ -242,7 +242,7 @@ fn candidates(names: Vec<FileName>) -> Vec<SequenceCandidate> {
     // Candidates that have a frame number: only those can share it.
     let mut homes = BTreeMap::<i64, BTreeSet<usize>>::new();
     for run in runs {
-        // Find the candidate that has at least half of the frame numbers of the run, or of which the run has half
+        // Find a candidate that shares at least half of the frame numbers of the shorter one of both
         let numbers = run.numbers();
         let mut shared = BTreeMap::<usize, usize>::new();
         for home in numbers.iter().filter_map(|n| homes.get(n)).flatten() {

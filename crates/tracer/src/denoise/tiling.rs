@@ -90,7 +90,7 @@ pub(super) fn tiles(
     let height = plane.len() / width;
     let tiles = count(width, view[0], columns) * count(height, view[1], rows);
     let mut all = Vec::with_capacity(tiles);
-    // Divide the plane into rows of tiles, none of which crosses a view
+    // Cut each row of views into rows of tiles, so that no tile is part of two views
     let bands = plane.chunks_mut(width * view[1]);
     let mut top = 0;
     for pixels in bands.flat_map(|views| views.chunks_mut(width * rows)) {
