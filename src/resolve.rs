@@ -96,7 +96,6 @@ pub fn setup(
     if let Some(texture) = inputs.ground {
         ground::add_image(&mut setup, manifest, texture);
     }
-    meshes::add(&mut setup, manifest, &survey, inputs.meshes);
     Ok(setup)
 }
 
@@ -138,15 +137,16 @@ fn setup_on(
     let extent = Extent::of(manifest, survey, &radius);
     let placed = camera::placed(manifest, survey, &extent)?;
     let color = color::rule(manifest, survey, Some(&placed.camera))?;
-    // Set up what it sees. The materials of rods follow those of meshes
+    // Set up what it sees; things are numbered in the order in which their materials are added
     let mut scene = scene::scene(manifest, survey, inputs.environment, &placed, &extent)?;
+    let meshes = meshes::things(&mut scene, manifest, &inputs.meshes);
     let cell = cell::add_cell(&mut scene, manifest, survey);
     let arrows = arrows::arrows(&mut scene, manifest, survey, &color, extent.reach)?;
     let trails = arrows::trails(&mut scene, manifest, survey, &color, extent.reach)?;
     let bonds = bonds::bonds(&mut scene, manifest, survey, &color, extent.reach)?;
     // Collect the settings of the images
     let (channels, attributes) = channels::channels(manifest, survey)?;
-    let denoise = denoise::settings(manifest, &scene.material)?;
+    let denoise = denoise::settings(manifest, scene.particle_material())?;
     let render = RenderSettings {
         channels,
         has_features: denoise.is_some(),
@@ -166,7 +166,7 @@ fn setup_on(
         },
         view: placed.view,
         scene,
-        things: Things { meshes: Vec::new(), cell, arrows, trails, bonds },
+        things: Things { meshes, cell, arrows, trails, bonds },
         surface,
         renderer: RendererKind::default(),
         step: channels::frame_step(&render.channels, &manifest.output, survey)?,
@@ -174,6 +174,7 @@ fn setup_on(
         denoise,
     };
     let mut setup = Setup { picture, run: images::run_settings(manifest, survey) };
+    meshes::lower_ground(&mut setup, manifest, survey);
     add_overlays(&mut setup, manifest, survey, inputs, page)?;
     Ok(setup)
 }
@@ -209,7 +210,7 @@ fn particle_rules(
         radius,
         least_radius: narrow(extent.bounds.diagonal() * MIN_RADIUS).max(f32::MIN_POSITIVE),
         color,
-        opacity: opacity::opacity(manifest, survey, scene.material.transmission > 0.0)?,
+        opacity: opacity::opacity(manifest, survey, scene.particle_material().transmission > 0.0)?,
     })
 }
 

@@ -4,11 +4,11 @@ use glam::{DVec3, Vec3};
 use spherule_formats::Attribute;
 
 use super::SharedFrame;
-use super::decoded::{colors_by, ids};
+use super::decoded::ids;
 use super::load_error::{LoadError, missing};
 use super::rods::FrameRods;
 use super::setup::{ArrowStyle, Setup};
-use crate::surface::rods::{Caps, Rod, RodTree, arrow};
+use crate::surface::rods::{Caps, Rod, arrow};
 
 /// The arrows at the particles of `frame`, which was read from `file` and has this `number`. Passes notes to `notes`.
 ///
@@ -41,14 +41,8 @@ pub(super) fn arrows_of(
                 arrows.not_finite, style.attribute
             ));
         }
-        // Colour them like their particles
-        let mut colors = Vec::new();
-        if let Some(rule) = &style.color {
-            let of_particles = colors_by(setup, frame, (number, file), rule)?;
-            colors = arrows.owners.iter().map(|i| of_particles.get(*i)).collect();
-        }
-        let tree = RodTree::new(arrows.rods, Caps::Flat).with_colors(colors);
-        all.push(FrameRods::new(tree, style.material));
+        let (rods, owners) = ((arrows.rods, Caps::Flat), arrows.owners.into_iter());
+        all.push(style.look.rods((setup, frame), (number, file), rods, owners)?);
     }
     Ok(all)
 }
@@ -87,7 +81,7 @@ impl Arrows {
             let Ok(color) = u32::try_from(arrows.owners.len()) else {
                 break;
             };
-            if let Some(rods) = arrow(point, vector, (style.radius, style.anchor), color) {
+            if let Some(rods) = arrow(point, vector, (style.look.radius, style.anchor), color) {
                 arrows.rods.extend(rods);
                 arrows.owners.push(particle);
             }

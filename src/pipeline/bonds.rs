@@ -7,13 +7,12 @@ use rayon::prelude::*;
 use spherule_formats::{Lattice, SimulationCell};
 
 use super::SharedFrame;
-use super::decoded::colors_by;
 use super::load_error::{LoadError, missing};
 use super::rods::FrameRods;
 use super::setup::{BondRule, Setup};
 use crate::scene::RadiusTable;
 use crate::surface::field::FieldParticles;
-use crate::surface::rods::{Caps, Rod, RodTree};
+use crate::surface::rods::{Caps, Rod};
 
 /// Covalent bonds are as long as the sum of both radii and this tolerance, angstroms: the rule of the Cambridge
 /// Structural Database (Allen, Acta Crystallographica B 58, 2002).
@@ -40,11 +39,11 @@ pub(super) fn bonds_of(
     };
     // Find the bonds, by the rule of the manifest
     let near = |reach: Reach| {
-        let search = Search::new(style.radius, reach, frame);
+        let search = Search::new(style.look.radius, reach, frame);
         (search.bonds(), "no particles are so near each other")
     };
     let (rods, none) = match &style.rule {
-        BondRule::File => (listed(style.radius, frame), "the file lists none"),
+        BondRule::File => (listed(style.look.radius, frame), "the file lists none"),
         BondRule::Distance(distance) => near(Reach::distance(*distance)),
         BondRule::Covalent { name, angstrom } => {
             near(Reach::covalent((name, *angstrom), frame, file)?)
@@ -55,14 +54,9 @@ pub(super) fn bonds_of(
     if rods.is_empty() {
         notes.push(format!("frame {number}: no bonds: {none}"));
     }
-    // Colour each half like its particle
-    let mut colors = Vec::new();
-    if let Some(rule) = &style.color {
-        let of_particles = colors_by(setup, frame, (number, file), rule)?;
-        colors = (0..frame.len()).map(|i| of_particles.get(i)).collect();
-    }
-    let tree = RodTree::new(rods, Caps::Flat).with_colors(colors);
-    Ok(Some(FrameRods::new(tree, style.material)))
+    // Each half has the colour of its particle
+    let all = 0..frame.len();
+    style.look.rods((setup, frame), (number, file), (rods, Caps::Flat), all).map(Some)
 }
 
 /// Greatest number of bonds of `frame`.
@@ -362,7 +356,7 @@ mod tests {
         // Particles in one place have no direction to draw a bond in
         let one_place = frame_at(&[Vec3::ONE; 3]);
         let rods = bonds(&one_place, Reach::distance(3.0)).unwrap();
-        assert!(RodTree::new(rods, Caps::Flat).is_empty());
+        assert!(crate::surface::rods::RodTree::new(rods, Caps::Flat).is_empty());
     }
 
     #[test]

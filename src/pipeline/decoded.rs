@@ -11,7 +11,7 @@ use super::SharedFrame;
 use super::load_error::{LoadError, missing, missing_value, no_parts};
 use super::setup::{ColorRule, OpacityRule, Setup};
 use crate::scene::material::DEFAULT_COLOR;
-use crate::scene::{Camera, ColorMap, PartMaterials, RgbEncoding};
+use crate::scene::{Camera, ColorMap, MaterialId, PartMaterials, RgbEncoding};
 use crate::survey::{id_of, part_of, velocity_of};
 use spherule_frame::values::{BoundValue, Context, Value};
 
@@ -275,7 +275,7 @@ fn move_to_end<T: Copy>(items: &mut [T], chosen: &[u32]) {
 
 impl DecodedShading {
     /// Parts among `known` that no particle has.
-    pub(super) fn absent_parts(&self, known: &PartMaterials) -> Vec<(i32, usize)> {
+    pub(super) fn absent_parts(&self, known: &PartMaterials) -> Vec<(i32, MaterialId)> {
         let parts = self.parts.iter();
         known.absent(parts.flat_map(|(_, parts)| parts.iter().copied()))
     }

@@ -14,7 +14,7 @@ use super::load_error::{LoadError, missing, missing_value, no_parts};
 use super::setup::{ColorRule, OpacityRule, Picture, RadiusRule, Setup};
 use crate::accel::Structure;
 use crate::render::{NO_ID, ShadeSource, mean, opacity_of};
-use crate::scene::{ColorMap, PartMaterials, RgbEncoding};
+use crate::scene::{ColorMap, MaterialId, PartMaterials, RgbEncoding};
 use crate::survey::{id_of, part_of, velocity_of};
 use spherule_frame::values::{BoundValue, Context, Named, Value};
 
@@ -169,7 +169,7 @@ impl StoredFrame {
 
     /// Parts among `known` that no particle has. Empty for large frames: the search reads all particles, and rendering
     /// reads only those that are visible.
-    pub(super) fn absent_parts(&self, known: &PartMaterials) -> Vec<(i32, usize)> {
+    pub(super) fn absent_parts(&self, known: &PartMaterials) -> Vec<(i32, MaterialId)> {
         let frame = self.frame();
         let name = self.names.parts.as_deref();
         let Some(parts) = name.and_then(|name| frame.attribute(name)) else {

@@ -20,11 +20,13 @@ use super::load_error::{LoadError, first_file, unknown_name};
 use super::meshes::{MeshSlices, meshes_of};
 use super::motion::velocities_to_next;
 use super::predict::{FrameSize, MemoryModel};
-use super::rods::{CellStyle, FrameRods, rods_of};
+use super::rods::{FrameRods, rods_of};
+use super::setup::RodLook;
 use super::setup::{ParticleRules, Picture, Setup};
 use super::trails::trails_of;
 use super::{ImageTask, SharedFrame};
 use crate::overlay::Overlay;
+use crate::scene::Owner;
 
 /// A frame before its tree is built.
 #[derive(Debug)]
@@ -214,7 +216,7 @@ fn decoded<'a>(
 }
 
 /// How the simulation cell is drawn, if it is, and the origin.
-fn cell_style(setup: &Setup) -> (Option<&CellStyle>, DVec3) {
+fn cell_style(setup: &Setup) -> (Option<&RodLook>, DVec3) {
     (setup.picture.things.cell.as_ref(), setup.picture.origin)
 }
 
@@ -299,9 +301,12 @@ impl LoadedFrame<'_> {
             LoadedParticles::Decoded(frame) => frame.shading.absent_parts(known),
             LoadedParticles::Stored(frame) => frame.absent_parts(known),
         };
-        for (part, index) in absent {
+        for (part, material) in absent {
+            let Owner::Part(number) = setup.picture.scene.material(material).owner else {
+                continue;
+            };
             self.notes.push(format!(
-                "frame {}: no particle is of part {part}, which material.part.{index} names",
+                "frame {}: no particle is of part {part}, which material.part.{number} names",
                 self.task.frame
             ));
         }

@@ -6,8 +6,9 @@ use std::fmt::Write;
 use super::setup::Setup;
 use crate::output::TextAttribute;
 use crate::render::ShadeSource;
-use crate::render::cryptomatte::{GROUND, ObjectName, PARTICLES, SPRAY, murmur_hash3, object_of};
+use crate::render::cryptomatte::{ObjectName, murmur_hash3, object_of};
 use crate::render::layers::MatteKind;
+use crate::scene::Owner;
 
 /// Maximum number of names in a manifest. A manifest of more names is left out.
 const MAX_NAMES: usize = 100_000;
@@ -67,6 +68,7 @@ fn manifest(
     source: &dyn ShadeSource,
     count: u32,
 ) -> Option<String> {
+    let scene = &setup.picture.scene;
     let mut json = String::from("{");
     let mut add = |name: &[u8]| {
         let comma = if json.len() > 1 { "," } else { "" };
@@ -77,10 +79,9 @@ fn manifest(
     // Name the particles as the kind divides them
     match kind {
         MatteKind::Material => {
-            add(PARTICLES.as_bytes());
-            add(SPRAY.as_bytes());
-            for index in 0..setup.picture.scene.parts.materials().len() {
-                add(ObjectName::of_material(index).as_bytes());
+            let of_particles = scene.materials.iter().map(|material| material.owner);
+            for owner in of_particles.filter(|owner| owner.is_of_particles()) {
+                add(ObjectName::of_owner(owner).as_bytes());
             }
         }
         MatteKind::Particle => {
@@ -98,17 +99,21 @@ fn manifest(
                 add(ObjectName::of_part(attribute, *value).as_bytes());
             }
             if parts.is_empty() {
-                add(PARTICLES.as_bytes());
+                add(ObjectName::of_owner(Owner::Particles).as_bytes());
             }
         }
     }
-    // Name the ground, unless it is invisible, and the meshes
-    let ground = setup.picture.scene.ground.as_ref();
-    if ground.is_some_and(|ground| ground.shadow_catcher.is_none()) {
-        add(GROUND.as_bytes());
-    }
-    for mesh in 0..setup.picture.scene.meshes.len() {
-        add(ObjectName::of_mesh(mesh).as_bytes());
+    // Name the ground, unless it is invisible, and everything else
+    let has_ground = scene.ground.as_ref().is_some_and(|ground| ground.shadow_catcher.is_none());
+    for owner in scene.materials.iter().map(|material| material.owner) {
+        let is_named = match owner {
+            Owner::Ground => has_ground,
+            Owner::Thing(_) => true,
+            Owner::Particles | Owner::Part(_) | Owner::Spray => false,
+        };
+        if is_named {
+            add(ObjectName::of_owner(owner).as_bytes());
+        }
     }
     json.push('}');
     Some(json)

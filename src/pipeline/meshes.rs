@@ -11,6 +11,7 @@ use spherule_formats::{FrameError, MemoryBudget};
 
 use super::ImageTask;
 use super::shutter::Shutter;
+use crate::scene::MaterialId;
 use crate::surface::mesh::{MeshError, MeshNormals, MeshTree, TriangleMesh, VisibleFaces};
 
 /// How many times a mesh may be larger or smaller than the particles before that is noted. A tank in millimetres around
@@ -36,7 +37,16 @@ pub struct MeshSettings {
     pub budget: MemoryBudget,
 }
 
-/// A mesh of all pictures. Its material is that of the same index in the scene.
+/// A mesh of all pictures with its material.
+#[derive(Debug, Clone)]
+pub struct MeshThing {
+    /// The mesh.
+    pub mesh: PictureMesh,
+    /// Its material.
+    pub material: MaterialId,
+}
+
+/// A mesh of all pictures.
 #[derive(Debug, Clone)]
 pub struct PictureMesh {
     /// How files become shapes.
@@ -185,21 +195,21 @@ fn ratio_note(path: &Path, tree: &MeshTree, particles: f64) -> Option<String> {
 /// A mesh in each slice of the exposure; one tree if it does not move.
 pub type MeshSlices = Vec<Arc<MeshTree>>;
 
-/// The `meshes` of a picture for the image of `task`: those of all pictures, and its own, which move to those of the
+/// The meshes of a picture for the image of `task`: those of all pictures, and its own, which move to those of the
 /// next frame while the shutter is open. Passes notes to `notes`.
 ///
 /// # Errors
 /// One of its own cannot be read.
 pub(super) fn meshes_of(
-    meshes: &[PictureMesh],
+    things: &[MeshThing],
     shutter: Option<Shutter>,
     task: &ImageTask,
     notes: &mut Vec<String>,
 ) -> Result<Vec<MeshSlices>, MeshLoadError> {
     let mut own = (0..).zip(&task.meshes);
-    let mut all = Vec::with_capacity(meshes.len());
+    let mut all = Vec::with_capacity(things.len());
     // Take the common mesh, or read that of the frame
-    for mesh in meshes {
+    for MeshThing { mesh, .. } in things {
         if let Some(tree) = &mesh.tree {
             all.push(vec![Arc::clone(tree)]);
         } else if let Some((number, path)) = own.next() {

@@ -49,15 +49,18 @@ pub use load::{LoadedFrame, LoadedParticles, load_frame, load_particles};
 pub use load_error::LoadError;
 pub(crate) use load_error::attribute_list;
 pub use memory_limit::{MemoryLimitError, MemoryRemedy};
-pub use meshes::{LoadedMesh, MeshLoadError, MeshSettings, MeshSlices, PictureMesh, load_mesh};
+pub use meshes::{
+    LoadedMesh, MeshLoadError, MeshSettings, MeshSlices, MeshThing, PictureMesh, load_mesh,
+};
 pub use predict::{FrameSize, MemoryModel, MemoryNeed};
 pub use probe::{Probe, ProbeError, probe};
 pub use renderer::{BuiltFrame, FrameRenderer, TraceError, TracedFrame};
-pub use rods::{CellStyle, FrameRods};
+pub use rods::FrameRods;
 pub use schedule::{Overlap, Schedule};
 pub use setup::{
     ArrowStyle, AttributeChannel, BondRule, BondStyle, ColorRule, FileSettings, OpacityRule,
-    ParticleRules, Picture, RadiusRule, RunSettings, Setup, Things, TrailStyle, ViewSettings,
+    ParticleRules, Picture, RadiusRule, RodLook, RunSettings, Setup, Things, TrailStyle,
+    ViewSettings,
 };
 pub use shutter::{FrameStep, Shutter};
 pub use single::{make_image, trace_particles};

@@ -17,7 +17,7 @@ pub(super) fn expected_rays(image: &RenderSettings, scene: &Scene) -> f64 {
         let lights = scene.lights.len() + usize::from(scene.environment.is_some());
         return paths * rays_per_path(lights, 1, 1 + image.traced_bounces().min(MAX_BOUNCES));
     }
-    let material = &scene.material;
+    let material = scene.particle_material();
     let branches =
         [material.reflection, material.transmission].iter().filter(|weight| **weight > 0.0).count();
     paths * rays_per_path(scene.lights.len(), branches, image.max_depth)

@@ -1,18 +1,41 @@
-//! Rods next to the particles of a frame: the edges of the simulation cell.
+//! Rods next to the particles of a frame: how they look, and the edges of the simulation cell.
 
 use glam::{DVec3, Vec3};
 use spherule_formats::SimulationCell;
 
+use super::SharedFrame;
+use super::decoded::colors_by;
+use super::load_error::LoadError;
+use super::setup::{RodLook, Setup};
+use crate::scene::MaterialId;
 use crate::surface::rods::{Caps, Rod, RodTree};
-use crate::surface::{MaterialId, Shape, rods::RodSurface};
+use crate::surface::{Shape, rods::RodSurface};
 
-/// How the simulation cell is drawn.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CellStyle {
-    /// Radius of the edges, scene units.
-    pub radius: f32,
-    /// Their material, which is one of those of meshes.
-    pub material: MaterialId,
+impl RodLook {
+    /// `rods` of a frame with this number, which was read from a file. `owners`: the particles by their part of the
+    /// colour.
+    ///
+    /// # Errors
+    /// The frame lacks the attribute of the colours.
+    pub(super) fn rods(
+        &self,
+        (setup, frame): (&Setup, &SharedFrame<'_>),
+        place: (i64, &str),
+        (rods, caps): (Vec<Rod>, Caps),
+        owners: impl Iterator<Item = usize>,
+    ) -> Result<FrameRods, LoadError> {
+        let colors = match &self.color {
+            Some(rule) => {
+                let of_particles = colors_by(setup, frame, place, rule)?;
+                owners.map(|particle| of_particles.get(particle)).collect()
+            }
+            None => Vec::new(),
+        };
+        Ok(FrameRods {
+            tree: RodTree::new(rods, caps).with_colors(colors),
+            material: self.material,
+        })
+    }
 }
 
 /// Rods of a frame with one material.
@@ -23,10 +46,6 @@ pub struct FrameRods {
 }
 
 impl FrameRods {
-    pub(super) const fn new(tree: RodTree, material: MaterialId) -> Self {
-        Self { tree, material }
-    }
-
     /// The rods as a shape.
     pub(super) fn surface(&self) -> Box<dyn Shape + '_> {
         Box::new(RodSurface::new(&self.tree, self.material))
@@ -40,7 +59,7 @@ impl FrameRods {
 
 /// The rods of a frame with this `cell`, drawn in a `style`, relative to `origin`. Passes notes to `notes`.
 pub(super) fn rods_of(
-    (style, origin): (Option<&CellStyle>, DVec3),
+    (style, origin): (Option<&RodLook>, DVec3),
     cell: Option<&SimulationCell>,
     frame: i64,
     notes: &mut Vec<String>,
@@ -56,7 +75,7 @@ pub(super) fn rods_of(
 }
 
 /// The edges of `cell`, relative to `origin`.
-fn cell_edges(cell: &SimulationCell, style: &CellStyle, origin: DVec3) -> FrameRods {
+fn cell_edges(cell: &SimulationCell, style: &RodLook, origin: DVec3) -> FrameRods {
     let local = |corner: DVec3| -> Vec3 { (corner - origin).as_vec3() };
     let edges = cell.edges().into_iter();
     let rods = edges.map(|edge| Rod::line(edge.map(local), style.radius));
@@ -77,7 +96,7 @@ mod tests {
         let vectors = [[10.0, 0.0, 0.0], [3.0, 8.0, 0.0], [-1.0, 2.0, 6.0]];
         let origin = DVec3::new(1e6, -2e6, 3e6);
         let cell = SimulationCell::new(origin, vectors.map(DVec3::from_array), [true; 3]).unwrap();
-        let style = CellStyle { radius: 0.05, material: MaterialId::of_mesh(0).unwrap() };
+        let style = RodLook { radius: 0.05, color: None, material: MaterialId::GROUND };
         let rods = cell_edges(&cell, &style, origin);
         let surface = rods.surface();
         assert_eq!(surface.material(), style.material);

@@ -3,9 +3,8 @@
 use glam::{DVec3, Vec3};
 use spherule_formats::native::Access;
 
-use super::meshes::PictureMesh;
+use super::meshes::MeshThing;
 use super::rays::expected_rays;
-use super::rods::CellStyle;
 use super::shutter::{FrameStep, Shutter};
 use crate::accel::{BuildSettings, BvhSettings, SbvhSettings, Structure, choose};
 use crate::denoise::DenoiseSettings;
@@ -13,13 +12,13 @@ use crate::output::{ExrOptions, PreviewBackground, PreviewOptions};
 use crate::overlay::Overlay;
 use crate::render::{RenderSettings, RendererKind};
 use crate::scene::{
-    Camera, CameraError, CameraPath, CameraView, ColorMap, Exposure, LensSettings, NextFrame,
-    Projection, RadiusTable, Scene, StereoSettings,
+    Camera, CameraError, CameraPath, CameraView, ColorMap, Exposure, LensSettings, MaterialId,
+    NextFrame, Projection, RadiusTable, Scene, StereoSettings,
 };
 use crate::selection::Selection;
 use crate::surface::cut::ConvexRegion;
 use crate::surface::rods::Anchor;
-use crate::surface::{MaterialId, SurfaceKind, SurfaceSettings};
+use crate::surface::{SurfaceKind, SurfaceSettings};
 use crate::survey::{FrameWeight, SurfaceWeight};
 
 /// Source of the radii.
@@ -115,6 +114,17 @@ impl OpacityRule {
     }
 }
 
+/// How rods are drawn: the simulation cell, arrows, trails or bonds.
+#[derive(Debug, Clone)]
+pub struct RodLook {
+    /// Radius, scene units; of the thickest part if it differs.
+    pub radius: f32,
+    /// The colours of the particles that they belong to; None if all have that of the material.
+    pub color: Option<ColorRule>,
+    /// Their material.
+    pub material: MaterialId,
+}
+
 /// How the arrows of an attribute are drawn.
 #[derive(Debug, Clone)]
 pub struct ArrowStyle {
@@ -122,16 +132,12 @@ pub struct ArrowStyle {
     pub attribute: String,
     /// Length of an arrow per unit of the attribute, scene units.
     pub scale: f64,
-    /// Radius of the shafts, scene units.
-    pub radius: f32,
     /// Only particles whose id is a multiple of this have arrows; without ids, it is their place in the file.
     pub every: u32,
     /// The point of an arrow that is at its particle.
     pub anchor: Anchor,
-    /// Their colours; None if all have that of the material.
-    pub color: Option<ColorRule>,
-    /// Their material, which is one of those of meshes.
-    pub material: MaterialId,
+    /// Their look; the radius is that of the shafts.
+    pub look: RodLook,
 }
 
 /// How the trails of particles over earlier frames are drawn.
@@ -139,20 +145,16 @@ pub struct ArrowStyle {
 pub struct TrailStyle {
     /// Number of earlier frames.
     pub frames: u32,
-    /// Radius at the particles, scene units.
-    pub radius: f32,
     /// Only particles whose id is a multiple of this have trails; without ids, it is their place in the file.
     pub every: u32,
-    /// Their colours; None if all have that of the material.
-    pub color: Option<ColorRule>,
-    /// Their material, which is one of those of meshes.
-    pub material: MaterialId,
+    /// Their look; the radius is that at the particles.
+    pub look: RodLook,
 }
 
 impl TrailStyle {
     /// The radius where the particle was `age` frames ago.
     pub(super) fn radius_at(&self, age: u32) -> f32 {
-        self.radius * (self.frames - age.min(self.frames)) as f32 / self.frames as f32
+        self.look.radius * (self.frames - age.min(self.frames)) as f32 / self.frames as f32
     }
 }
 
@@ -177,12 +179,8 @@ pub enum BondRule {
 pub struct BondStyle {
     /// Which particles have one.
     pub rule: BondRule,
-    /// Their radius, scene units.
-    pub radius: f32,
-    /// The colours of their halves, as those of particles; None if all have that of the material.
-    pub color: Option<ColorRule>,
-    /// Their material, which is one of those of meshes.
-    pub material: MaterialId,
+    /// Their look; each half has the colour of its particle.
+    pub look: RodLook,
 }
 
 /// An attribute with channels in the images.
@@ -269,13 +267,13 @@ pub struct ViewSettings {
     pub aspect: f64,
 }
 
-/// What is drawn beside the particles; its materials are in the scene.
+/// What is drawn beside the particles. Each has a material of the scene.
 #[derive(Debug, Clone)]
 pub struct Things {
-    /// The meshes; their materials are in the scene.
-    pub meshes: Vec<PictureMesh>,
+    /// The meshes.
+    pub meshes: Vec<MeshThing>,
     /// How the simulation cell is drawn, if it is.
-    pub cell: Option<CellStyle>,
+    pub cell: Option<RodLook>,
     /// Arrows of vector attributes.
     pub arrows: Vec<ArrowStyle>,
     /// Trails over earlier frames, if they are drawn.
@@ -331,7 +329,7 @@ impl Picture {
 
     /// Whether ids of particles are needed: for channels, or for the sizes of soft drops.
     pub(super) fn needs_ids(&self) -> bool {
-        self.render.channels.needs_ids() || self.scene.is_spray_soft
+        self.render.channels.needs_ids() || self.scene.is_spray_soft()
     }
 }
 
@@ -513,7 +511,8 @@ impl Setup {
 
     /// Number of slices of the exposure in which surfaces differ.
     pub(super) fn slices(&self) -> u32 {
-        let has_moving_meshes = self.picture.things.meshes.iter().any(|mesh| mesh.tree.is_none());
+        let has_moving_meshes =
+            self.picture.things.meshes.iter().any(|thing| thing.mesh.tree.is_none());
         let is_continuous = self.picture.surface.kind == SurfaceKind::Spheres && !has_moving_meshes;
         match self.picture.view.shutter {
             Some(shutter) if !is_continuous => shutter.slices,

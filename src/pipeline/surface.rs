@@ -10,7 +10,7 @@ use spherule_files::memory::{MemoryUse, available};
 use spherule_formats::Radius;
 
 use super::decoded::DecodedFrame;
-use super::meshes::{MeshSlices, PictureMesh};
+use super::meshes::{MeshSlices, MeshThing};
 use super::motion::expose;
 use super::rods::FrameRods;
 use super::setup::Setup;
@@ -231,7 +231,7 @@ impl SurfaceBuilder {
     fn build_spray(&mut self, setup: &Setup, frame: &mut DecodedFrame<'_>) -> BuildReport {
         // Find radii and places of the drops
         let body = frame.centers.len().min(self.body as usize);
-        let is_soft = setup.picture.scene.is_spray_soft;
+        let is_soft = setup.picture.scene.is_spray_soft();
         let ids = frame.shading.ids.as_deref().filter(|_| is_soft);
         let plain = match &frame.radius {
             Radius::Common(radius) => Radius::Common(DROP_RADIUS * radius),
@@ -366,29 +366,19 @@ fn soft_drops(
 
 /// The shapes of `trees`, which are `meshes` of a picture, and of `rods`.
 pub(super) fn others<'a>(
-    meshes: &'a [PictureMesh],
+    meshes: &'a [MeshThing],
     trees: &'a [MeshSlices],
     rods: &'a [FrameRods],
 ) -> Vec<Box<dyn Shape + 'a>> {
-    let rods = rods.iter().map(FrameRods::surface);
-    mesh_surfaces(meshes, trees).chain(rods).collect()
-}
-
-/// The shapes of `trees`, which are `meshes` of a picture.
-fn mesh_surfaces<'a>(
-    meshes: &'a [PictureMesh],
-    trees: &'a [MeshSlices],
-) -> impl Iterator<Item = Box<dyn Shape + 'a>> {
-    let meshes = meshes.iter().zip(trees).enumerate();
-    meshes.filter_map(|(index, (mesh, slices))| {
-        let material = MaterialId::of_mesh(index)?;
-        let faces = mesh.settings.faces;
-        let surface = |tree: &'a Arc<MeshTree>| MeshSurface::new(tree, faces, material);
-        Some(match &slices[..] {
+    let meshes = meshes.iter().zip(trees).map(|(thing, slices)| {
+        let faces = thing.mesh.settings.faces;
+        let surface = |tree: &'a Arc<MeshTree>| MeshSurface::new(tree, faces, thing.material);
+        match &slices[..] {
             [tree] => Box::new(surface(tree)) as Box<dyn Shape>,
             _ => Box::new(SlicedSurface::new(slices.iter().map(surface).collect(), false)),
-        })
-    })
+        }
+    });
+    meshes.chain(rods.iter().map(FrameRods::surface)).collect()
 }
 
 /// The spheres of a frame as the input of a builder.

@@ -47,8 +47,8 @@ fn opened(file: &Path) -> (Setup, Sequence) {
     setup.picture.render.samples = 1;
     setup.picture.render.max_depth = 4;
     setup.picture.render.channels = Channels::ALL;
-    setup.picture.scene.material.transmission = 1.0;
-    setup.picture.scene.material.reflection = 1.0;
+    setup.picture.scene.particle_material_mut().transmission = 1.0;
+    setup.picture.scene.particle_material_mut().reflection = 1.0;
     (setup, sequence)
 }
 
@@ -143,7 +143,7 @@ fn soft_drops_belong_to_particles() {
     setup.picture.surface.spray = true;
     setup.picture.render.integrator = IntegratorKind::Path;
     let images = [false, true].map(|is_soft| {
-        setup.picture.scene.is_spray_soft = is_soft;
+        setup.picture.scene.set_spray_soft(is_soft);
         Structure::ALL.map(|structure| {
             setup.run.accelerator = Some(structure);
             drawn(&setup, &sequence, &mut CpuRenderer::default()).film

@@ -8,13 +8,13 @@ use spherule_formats::sequence::Sequence;
 use spherule_formats::{Lattice, ParticleFrame, SimulationCell};
 
 use super::arrows::every_nth;
-use super::decoded::{colors_by, ids};
+use super::decoded::ids;
 use super::load_error::{LoadError, first_file, missing};
 use super::motion::Places;
 use super::rods::FrameRods;
 use super::setup::{Setup, TrailStyle};
 use super::{ImageTask, SharedFrame};
-use crate::surface::rods::{Caps, Rod, RodTree};
+use crate::surface::rods::{Caps, Rod};
 use crate::survey::id_of;
 
 /// The trails of the particles of `frame`, which was read for `task` from files with `read` particles. Passes notes to
@@ -66,9 +66,9 @@ pub(super) fn trails_of(
         trails.extend(age, frame.cell.as_ref(), find);
     }
     notes.extend(gap_note(sequence, task, style.frames));
-    let colors = trails.colors(setup, frame, (task.frame, &file))?;
-    let tree = RodTree::new(trails.rods, Caps::Round).with_colors(colors);
-    Ok(Some(FrameRods::new(tree, style.material)))
+    // Trails have the colours of their particles in the current frame
+    let (rods, owners) = ((trails.rods, Caps::Round), trails.owners.into_iter());
+    style.look.rods((setup, frame), (task.frame, &file), rods, owners).map(Some)
 }
 
 /// The error of particles that cannot be found in an earlier frame; `is_native` is of this frame and of that one.
@@ -117,20 +117,6 @@ impl<'a> Trails<'a> {
         let owners = every_nth(frame, style.every);
         let ends = owners.iter().map(|particle| Some((frame.positions[*particle], 0)));
         Self { style, rods: Vec::new(), ends: ends.collect(), owners }
-    }
-
-    /// The colour of each trail, which is that of its particle in the current frame; empty if all have the same.
-    fn colors(
-        &self,
-        setup: &Setup,
-        frame: &SharedFrame<'_>,
-        place: (i64, &str),
-    ) -> Result<Vec<Vec3>, LoadError> {
-        let Some(rule) = &self.style.color else {
-            return Ok(Vec::new());
-        };
-        let of_particles = colors_by(setup, frame, place, rule)?;
-        Ok(self.owners.iter().map(|i| of_particles.get(*i)).collect())
     }
 
     /// Adds the points that `find` has for particles, `age` frames earlier. Trails of particles without one end. Jumps

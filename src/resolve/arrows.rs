@@ -1,6 +1,6 @@
 //! Arrows of vector attributes, and trails.
 
-use super::rods::{add_material, rule};
+use super::rods::{look, rule};
 use super::{ResolveError, require_attribute};
 use crate::manifest::Manifest;
 use crate::math::narrow;
@@ -19,7 +19,7 @@ const RADIUS: f64 = 1.0 / 3.0;
 const TRAIL_RADIUS: f64 = 0.5;
 
 /// How arrows are drawn. `particles`: the colours of the particles; `reach`: their radius. Adds their materials to
-/// those of the meshes of `scene`.
+/// `scene`.
 ///
 /// # Errors
 /// The particles have no such attribute, or colours are not determined.
@@ -33,18 +33,18 @@ pub(super) fn arrows(
     let mut styles = Vec::new();
     for own in &manifest.arrows {
         check_attribute(survey, &own.attribute)?;
+        let radius = own.radius.unwrap_or_else(|| narrow(RADIUS * reach));
+        let color = rule(&own.color, particles, survey, &own.attribute, COLOR)?;
         // The manifest has no more of them than there are materials
-        let Some(material) = add_material(scene, &own.color) else {
+        let Some(look) = look(scene, radius, &own.color, color) else {
             break;
         };
         styles.push(ArrowStyle {
             attribute: own.attribute.clone(),
             scale: own.scale,
-            radius: own.radius.unwrap_or_else(|| narrow(RADIUS * reach)),
             every: own.every,
             anchor: own.anchor,
-            color: rule(&own.color, particles, survey, &own.attribute, COLOR)?,
-            material,
+            look,
         });
     }
     Ok(styles)
@@ -76,14 +76,9 @@ pub(super) fn trails(
     }
     // Choose colours, and a radius in proportion to the particles
     let color = rule(&own.color, particles, survey, "velocity", TRAIL_COLOR)?;
-    let style = |material| TrailStyle {
-        frames: own.frames,
-        radius: own.radius.unwrap_or_else(|| narrow(TRAIL_RADIUS * reach)),
-        every: own.every,
-        color,
-        material,
-    };
-    Ok(add_material(scene, &own.color).map(style))
+    let radius = own.radius.unwrap_or_else(|| narrow(TRAIL_RADIUS * reach));
+    let look = look(scene, radius, &own.color, color);
+    Ok(look.map(|look| TrailStyle { frames: own.frames, every: own.every, look }))
 }
 
 /// Refuses attributes that do not exist or are no vectors.

@@ -1,6 +1,6 @@
 //! Bonds between particles.
 
-use super::rods::{add_material, rule};
+use super::rods::{look, rule};
 use super::{ResolveError, require_attribute};
 use crate::manifest::{BondSearch, Manifest};
 use crate::math::narrow;
@@ -35,11 +35,6 @@ pub(super) fn bonds(
     };
     // Choose their colour and radius
     let color = rule(&own.color, particles, survey, ELEMENT, "bonds.color")?;
-    let style = |material| BondStyle {
-        rule: search,
-        radius: own.radius.unwrap_or_else(|| narrow(RADIUS * reach)),
-        color,
-        material,
-    };
-    Ok(add_material(scene, &own.color).map(style))
+    let radius = own.radius.unwrap_or_else(|| narrow(RADIUS * reach));
+    Ok(look(scene, radius, &own.color, color).map(|look| BondStyle { rule: search, look }))
 }

@@ -5,9 +5,8 @@ use spherule_formats::MemoryBudget;
 
 use super::cell;
 use crate::manifest::{self, Manifest, MeshShading};
-use crate::pipeline::{MeshSettings, PictureMesh, Setup};
-use crate::scene::mesh::DEFAULT_COLOR;
-use crate::scene::{Bounds, Finish, MeshFinish, MeshMaterial};
+use crate::pipeline::{MeshSettings, MeshThing, PictureMesh, Setup};
+use crate::scene::{Bounds, DEFAULT_MESH_COLOR, Finish, Material, Scene};
 use crate::surface::mesh::MeshNormals;
 use crate::survey::Survey;
 
@@ -43,25 +42,27 @@ pub fn mesh_settings(
     manifest.meshes.iter().map(settings).collect()
 }
 
-/// The materials of the meshes of `manifest`.
-pub(super) fn materials(manifest: &Manifest) -> Vec<MeshMaterial> {
-    manifest.meshes.iter().map(material).collect()
+/// The `meshes` of the manifest, one for each of its entries, with their materials, which are added to `scene`.
+pub(super) fn things(
+    scene: &mut Scene,
+    manifest: &Manifest,
+    meshes: &[PictureMesh],
+) -> Vec<MeshThing> {
+    let own = manifest.meshes.iter();
+    let materials: Vec<_> = own.map_while(|mesh| scene.add(material(mesh))).collect();
+    let meshes = meshes.iter().cloned().zip(materials);
+    meshes.map(|(mesh, material)| MeshThing { mesh, material }).collect()
 }
 
-/// Adds the `meshes` of the manifest, one for each of its entries, to the pictures of `setup`. Lowers an automatic ground
-/// below the cell, and below meshes that are the same in all frames.
-pub(super) fn add(
-    setup: &mut Setup,
-    manifest: &Manifest,
-    survey: &Survey,
-    meshes: Vec<PictureMesh>,
-) {
+/// Lowers an automatic ground below the cell, and below meshes that are the same in all frames.
+pub(super) fn lower_ground(setup: &mut Setup, manifest: &Manifest, survey: &Survey) {
     let scene = &mut setup.picture.scene;
     // Lower the ground, and leave a gap
     if let Some(ground) = &mut scene.ground
         && manifest.render.ground_height.is_none()
     {
-        let trees = meshes.iter().filter_map(|mesh| mesh.tree.as_ref());
+        let meshes = setup.picture.things.meshes.iter();
+        let trees = meshes.filter_map(|thing| thing.mesh.tree.as_ref());
         let boxes = trees.filter_map(|tree| tree.bounds());
         let cells = cell::boxes(setup.picture.things.cell.as_ref(), survey);
         for [min, max] in boxes.chain(cells) {
@@ -72,22 +73,15 @@ pub(super) fn add(
             }
         }
     }
-    setup.picture.things.meshes = meshes;
 }
 
-fn material(mesh: &manifest::Mesh) -> MeshMaterial {
+fn material(mesh: &manifest::Mesh) -> Material {
     let roughness = mesh.roughness;
-    MeshMaterial {
-        color: mesh.color.unwrap_or(match mesh.material {
-            manifest::MeshMaterial::Glass => Vec3::ONE,
-            _ => DEFAULT_COLOR,
-        }),
-        finish: match mesh.material {
-            manifest::MeshMaterial::Matte => MeshFinish::Opaque(Finish::Matte),
-            manifest::MeshMaterial::Plastic => MeshFinish::Opaque(Finish::Plastic { roughness }),
-            manifest::MeshMaterial::Metal => MeshFinish::Opaque(Finish::Metal { roughness }),
-            manifest::MeshMaterial::Glass => MeshFinish::Pane,
-        },
-        is_holdout: mesh.holdout,
-    }
+    let (color, finish) = match mesh.material {
+        manifest::MeshMaterial::Matte => (DEFAULT_MESH_COLOR, Finish::Matte),
+        manifest::MeshMaterial::Plastic => (DEFAULT_MESH_COLOR, Finish::Plastic { roughness }),
+        manifest::MeshMaterial::Metal => (DEFAULT_MESH_COLOR, Finish::Metal { roughness }),
+        manifest::MeshMaterial::Glass => (Vec3::ONE, Finish::Pane),
+    };
+    Material { finish, is_holdout: mesh.holdout, ..Material::matte(mesh.color.unwrap_or(color)) }
 }

@@ -1,21 +1,25 @@
 //! The materials of parts of the particles.
 
 use super::ResolveError;
-use crate::manifest::{Manifest, Part};
+use crate::manifest::Manifest;
 use crate::pipeline::attribute_list;
 use crate::render::IntegratorKind;
-use crate::scene::PartMaterials;
+use crate::scene::Scene;
 use crate::surface::SurfaceKind;
 use crate::survey::{PART_NAMES, Survey};
 
-/// The materials of `[[material.part]]`.
+/// Adds the materials of `[[material.part]]` to `scene`.
 ///
 /// # Errors
 /// The integrator or the surface cannot use them, or the particles have no parts.
-pub(super) fn parts(manifest: &Manifest, survey: &Survey) -> Result<PartMaterials, ResolveError> {
+pub(super) fn add(
+    scene: &mut Scene,
+    manifest: &Manifest,
+    survey: &Survey,
+) -> Result<(), ResolveError> {
     let parts = &manifest.material.parts;
     if parts.is_empty() {
-        return Ok(PartMaterials::default());
+        return Ok(());
     }
     // Refuse settings that have one material only
     let unsupported = |what: String| ResolveError::Unsupported { key: "material.part", what };
@@ -45,5 +49,9 @@ pub(super) fn parts(manifest: &Manifest, survey: &Survey) -> Result<PartMaterial
             attribute_list(survey.attributes.iter().map(String::as_str))
         )));
     }
-    Ok(PartMaterials::new(parts.iter().map(Part::resolved).collect()))
+    // The manifest has no more of them than there are materials
+    for part in parts {
+        scene.add_part(&part.parts, part.resolved());
+    }
+    Ok(())
 }

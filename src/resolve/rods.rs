@@ -2,24 +2,24 @@
 
 use super::{ResolveError, color};
 use crate::manifest::{ColorMapping, ColorSetting, RangeSetting, ScaleKind};
-use crate::pipeline::ColorRule;
-use crate::scene::mesh::DEFAULT_COLOR;
-use crate::scene::{Finish, MeshFinish, MeshMaterial, Scene};
-use crate::surface::MaterialId;
+use crate::pipeline::{ColorRule, RodLook};
+use crate::scene::{DEFAULT_MESH_COLOR, Material, Scene};
 use crate::survey::{ColorRange, Survey};
 
-/// Adds the material of rods of this colour to those of the meshes of `scene`; None if there are too many.
-pub(super) fn add_material(scene: &mut Scene, color: &ColorSetting) -> Option<MaterialId> {
-    let id = MaterialId::of_mesh(scene.meshes.len())?;
-    scene.meshes.push(MeshMaterial {
-        color: match color {
-            ColorSetting::Rgb(color) => *color,
-            ColorSetting::Auto | ColorSetting::Mapped(_) => DEFAULT_COLOR,
-        },
-        finish: MeshFinish::Opaque(Finish::Matte),
-        is_holdout: false,
-    });
-    Some(id)
+/// The look of rods of this `radius`. `rule`: the colours of their particles, if they have not all the same. Adds their
+/// material to the scene; None if it has too many.
+pub(super) fn look(
+    scene: &mut Scene,
+    radius: f32,
+    color: &ColorSetting,
+    rule: Option<ColorRule>,
+) -> Option<RodLook> {
+    let common = match color {
+        ColorSetting::Rgb(color) => *color,
+        ColorSetting::Auto | ColorSetting::Mapped(_) => DEFAULT_MESH_COLOR,
+    };
+    let material = scene.add(Material::matte(common))?;
+    Some(RodLook { radius, color: rule, material })
 }
 
 /// Colours of rods for each of their particles, if they have not all the same: by default those of `particles`, else by

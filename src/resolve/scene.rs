@@ -4,10 +4,12 @@ use glam::Vec3;
 
 use super::camera::PlacedCamera;
 use super::ground::GroundPlace;
-use super::{Extent, ResolveError, environment, ground, lights, meshes, parts, surface};
+use super::{Extent, ResolveError, environment, ground, lights, parts, surface};
 use crate::manifest::Manifest;
 use crate::render::IntegratorKind;
-use crate::scene::{Background, DEFAULT_AMBIENT_LIGHT, RadianceMap, Scene, default_lights};
+use crate::scene::{
+    Background, DEFAULT_AMBIENT_LIGHT, PartMaterials, RadianceMap, Scene, default_lights,
+};
 use crate::survey::Survey;
 
 /// The scene at the start of the camera path.
@@ -41,25 +43,26 @@ pub(super) fn scene(
         is_of_earlier_version: survey.standing.is_none(),
         lowest: survey.lowest,
     };
-    Ok(Scene {
+    let mut scene = Scene {
         origin: survey.origin,
         camera: placed.camera,
         lights,
         ambient_light: DEFAULT_AMBIENT_LIGHT,
-        material: surface::material(manifest, bounds),
-        parts: parts::parts(manifest, survey)?,
+        materials: Scene::basic_materials(surface::material(manifest, bounds)),
+        parts: PartMaterials::default(),
         background: background(manifest, up.as_vec3()),
         ground: ground::ground(manifest, &place)?,
         wet_ground: ground::wet_ground(manifest, &place),
-        meshes: meshes::materials(manifest),
         particles: [bounds.min, bounds.max].map(|corner| (corner - survey.origin).as_vec3()),
-        is_spray_soft: manifest.draws_soft_spray(),
         environment,
         is_environment_visible: manifest.environment.visible,
         environment_group: lights::group_index(manifest, manifest.environment.group.as_ref()),
         next_frame: None,
         exposure: None,
-    })
+    };
+    scene.set_spray_soft(manifest.draws_soft_spray());
+    parts::add(&mut scene, manifest, survey)?;
+    Ok(scene)
 }
 
 fn background(manifest: &Manifest, up: Vec3) -> Background {

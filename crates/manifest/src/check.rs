@@ -2,7 +2,7 @@
 
 use spherule_jobs::FrameRange;
 use spherule_tracer::render::{MAX_LITERAL_DEPTH, MAX_SIDE};
-use spherule_tracer::surface::MaterialId;
+use spherule_tracer::scene::MaterialId;
 
 use super::bonds::BondSearch;
 use super::camera::ProjectionKind;
@@ -11,6 +11,9 @@ use super::keys::Keys;
 use super::overlay::{Overlay, OverlayKind};
 use super::reader::Section;
 use super::{Manifest, ManifestError};
+
+/// Materials of the particles, of spray and of the ground.
+const BASIC_MATERIALS: usize = 3;
 
 /// Maximum number of clips.
 const MAX_CLIPS: usize = 64;
@@ -71,14 +74,19 @@ impl Manifest {
             let what = format!("{arrows} kinds of arrows, but at most {MAX_ARROWS} are possible");
             root.wrong("arrows", &what);
         }
-        // The simulation cell, arrows, trails and bonds take the places of meshes
-        let others = usize::from(self.cell.visible)
+        // All that has a material of its own has a place in the scene
+        let parts = self.material.parts.len();
+        let others = BASIC_MATERIALS
+            + usize::from(self.cell.visible)
             + usize::from(self.trails.frames > 0)
             + usize::from(self.bonds.find != BondSearch::None)
             + arrows.min(MAX_ARROWS);
-        let max = MaterialId::MAX_MESHES - others;
-        if meshes > max {
-            root.wrong("mesh", &format!("{meshes} meshes, but at most {max} are possible"));
+        let max = MaterialId::MAX - others;
+        if meshes + parts > max {
+            let what = format!(
+                "{meshes} meshes and {parts} materials of parts (material.part), but at most {max} are possible"
+            );
+            root.wrong("mesh", &what);
         }
         // Refuse longer lists than a picture has places for
         let clips = self.clips.len();

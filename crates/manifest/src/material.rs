@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use glam::Vec3;
 use spherule_tracer::scene::{self, Finish, Fresnel};
-use spherule_tracer::surface::MaterialId;
 
 use super::color::ColorSetting;
 use super::key::{Affects, Key};
@@ -149,14 +148,6 @@ impl Material {
             part.keys(keys, &mut named, index);
             index += 1;
         });
-        let max = MaterialId::MAX_PARTS;
-        if let Some(section) = keys.reading()
-            && self.parts.len() > max
-        {
-            let count = self.parts.len();
-            let what = format!("{count} materials, but at most {max} are possible");
-            section.wrong("part", &what);
-        }
     }
 
     fn keys(&mut self, keys: &mut Keys<'_>) {

@@ -245,9 +245,10 @@ mod tests {
             let error = read(text).unwrap_err();
             assert!(error.contains(part), "{text}: {error}");
         }
-        let many = "[[mesh]]\npath = \"a.stl\"\n".repeat(201);
+        let many = "[[mesh]]\npath = \"a.stl\"\n".repeat(65_534);
         let error = read(&many).unwrap_err();
-        assert!(error.contains("mesh: 201 meshes, but at most 200"), "{error}");
+        assert!(error.contains("mesh: 65534 meshes"), "{error}");
+        assert!(error.contains("at most 65533 are possible"), "{error}");
     }
 
     #[test]

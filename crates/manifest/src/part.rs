@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use glam::Vec3;
 use serde_json::{Value as Json, json};
-use spherule_tracer::scene::{Finish, PartMaterial};
+use spherule_tracer::scene::{Finish, Material};
 
 use super::field::Field;
 use super::key::{Affects, Key};
@@ -96,16 +96,16 @@ impl Part {
     }
 
     /// The material in a scene.
-    pub fn resolved(&self) -> PartMaterial {
+    pub fn resolved(&self) -> Material {
         let roughness = self.roughness;
-        PartMaterial {
-            parts: self.parts.clone(),
+        Material {
             finish: match self.kind {
                 PartKind::Matte => Finish::Matte,
                 PartKind::Plastic => Finish::Plastic { roughness },
                 PartKind::Metal => Finish::Metal { roughness },
             },
             color: self.color,
+            ..Material::DEFAULT
         }
     }
 }

@@ -18,7 +18,7 @@ impl MemoryModel<'_> {
         let is_body = self.setup.picture.surface.kind != SurfaceKind::Spheres;
         scratch_bytes(
             &self.setup.picture.render,
-            &self.setup.picture.scene.material,
+            self.setup.picture.scene.particle_material(),
             is_body,
             self.setup.slices(),
         )

@@ -25,12 +25,12 @@ impl MemoryModel<'_> {
         // Rods, and their colours
         let arrows = picture.things.arrows.iter().map(|style| {
             let arrows = share(style.every);
-            [2 * arrows, style.color.as_ref().map_or(0, |_| arrows)]
+            [2 * arrows, style.look.color.as_ref().map_or(0, |_| arrows)]
         });
         let trails = picture.things.trails.as_ref().map_or(none, |style| {
             let trails = share(style.every);
             let rods = trails.saturating_mul(style.frames.into());
-            [rods, style.color.as_ref().map_or(0, |_| trails)]
+            [rods, style.look.color.as_ref().map_or(0, |_| trails)]
         });
         let bonds = picture.things.bonds.as_ref().map_or(none, |_| {
             let rods = frame.particles.saturating_mul(MAX_BONDS_EACH);

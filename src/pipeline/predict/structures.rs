@@ -49,7 +49,7 @@ impl MemoryModel<'_> {
     /// Memory of the drops of `particles` particles of spray. Soft ones have several drops, with radii of their own,
     /// which are in a list during the build.
     fn spray(&self, particles: u64) -> SurfaceBytes {
-        let is_soft = self.setup.picture.scene.is_spray_soft;
+        let is_soft = self.setup.picture.scene.is_spray_soft();
         let drops = particles * if is_soft { u64::from(SOFT_DROPS) } else { 1 };
         let (tree, listed) = if is_soft {
             let settings = BuildSettings::new(Structure::Lbvh);

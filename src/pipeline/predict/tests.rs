@@ -9,7 +9,8 @@ use spherule_formats::{MemoryBudget, Sequence};
 use super::super::bonds::MAX_BONDS_EACH;
 use super::*;
 use crate::pipeline::{
-    ArrowStyle, BondRule, BondStyle, MeshSettings, Overlap, PictureMesh, TrailStyle,
+    ArrowStyle, BondRule, BondStyle, MeshSettings, MeshThing, Overlap, PictureMesh, RodLook,
+    TrailStyle,
 };
 use crate::surface::mesh::{MeshNormals, MeshTree, TriangleMesh, VisibleFaces};
 use crate::surface::rods::Anchor;
@@ -149,6 +150,8 @@ fn light_groups_have_planes() {
     assert!(images(&setup) >= none + 4 * 12 * pixels);
 }
 
+const LOOK: RodLook = RodLook { radius: 0.1, color: None, material: MaterialId::GROUND };
+
 #[test]
 fn arrows_trails_and_bonds_are_counted() {
     let mut setup = setup();
@@ -157,11 +160,9 @@ fn arrows_trails_and_bonds_are_counted() {
     setup.picture.things.arrows.push(ArrowStyle {
         attribute: "velocity".to_owned(),
         scale: 1.0,
-        radius: 0.1,
         every: 1,
         anchor: Anchor::Tail,
-        color: None,
-        material: MaterialId::PARTICLES,
+        look: LOOK,
     });
     // Two rods for each particle
     let each = |rods: u64, bytes: u64| rods * 1_000_000 * bytes;
@@ -172,22 +173,11 @@ fn arrows_trails_and_bonds_are_counted() {
     assert!(few.total() < none.total() + each(2, 100) / 10, "{none}\n{few}");
     // A rod for each frame, and another frame beside the one that is read
     setup.picture.things.arrows.clear();
-    setup.picture.things.trails = Some(TrailStyle {
-        frames: 5,
-        radius: 0.1,
-        every: 1,
-        color: None,
-        material: MaterialId::PARTICLES,
-    });
+    setup.picture.things.trails = Some(TrailStyle { frames: 5, every: 1, look: LOOK });
     let trails = alone(&setup);
     assert!(trails.total() >= none.total() + each(5, 60), "{none}\n{trails}");
     setup.picture.things.trails = None;
-    setup.picture.things.bonds = Some(BondStyle {
-        rule: BondRule::Distance(1.0),
-        radius: 0.1,
-        color: None,
-        material: MaterialId::PARTICLES,
-    });
+    setup.picture.things.bonds = Some(BondStyle { rule: BondRule::Distance(1.0), look: LOOK });
     let bonds = alone(&setup);
     assert!(bonds.total() >= none.total() + each(MAX_BONDS_EACH, 60), "{none}\n{bonds}");
 }
@@ -201,7 +191,7 @@ fn shared_meshes_are_built_before_the_first_frame() {
     let mesh = TriangleMesh::new(vertices, triangles.collect(), MeshNormals::Flat).expect("valid");
     let count = mesh.len() as u64;
     let tree = Arc::new(MeshTree::new(mesh));
-    let picture = PictureMesh {
+    let mesh = PictureMesh {
         settings: MeshSettings {
             scale: 1.0,
             translate: DVec3::ZERO,
@@ -213,9 +203,10 @@ fn shared_meshes_are_built_before_the_first_frame() {
         },
         tree: Some(Arc::clone(&tree)),
     };
+    let thing = MeshThing { mesh, material: MaterialId::GROUND };
     setup.picture.render.width = 8;
     setup.picture.render.height = 8;
-    setup.picture.things.meshes = vec![picture.clone(), picture];
+    setup.picture.things.meshes = vec![thing.clone(), thing];
     // The second one is built next to the first
     let building = MemoryModel::new(&setup).alone(&plain(10));
     assert_eq!(building.surface, tree.bytes() as u64 + tree.building_bytes());

@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 use spherule::render::{Channels, Colors, RenderSettings};
 use spherule::scene::{
     Background, Bounds, Camera, CameraView, ColorMap, Convergence, Falloff, Fresnel, Ground, Light,
-    Material, Projection, Scene, StereoSettings,
+    Material, Owner, Projection, Scene, StereoSettings,
 };
 use spherule::surface::cut::ConvexRegion;
 use spherule::surface::{NormalKind, SurfaceKind, SurfaceSettings};
@@ -33,6 +33,9 @@ const SUNSET: Background = Background::Gradient {
 /// Light on surfaces only: nothing mirrored, nothing let through. Spelled out, so that new
 /// defaults of the program do not change these pictures.
 const MATT: Material = Material {
+    owner: Owner::Particles,
+    color: None,
+    is_holdout: false,
     ambient: 0.1,
     diffuse: 0.7,
     specular: 0.0,
@@ -103,7 +106,7 @@ impl Shot {
             cut: ConvexRegion::default(),
             scene: Scene {
                 lights: vec![sun(Vec3::new(0.4, 0.7, -1.0), 0.9)],
-                material: MATT,
+                materials: Scene::basic_materials(MATT),
                 background: Background::Constant(Vec3::new(0.02, 0.03, 0.05)),
                 ..Scene::new(Camera::new(&view, aspect, DVec3::ZERO).expect("a camera"))
             },
@@ -195,7 +198,7 @@ pub(super) fn reflection() -> Shot {
     let centers =
         vec![Vec3::new(0.0, 0.0, 0.0), Vec3::new(-2.2, -0.3, 0.0), Vec3::new(2.2, -0.3, 0.0)];
     let mut shot = Shot::new(centers, 1.0, DVec3::new(0.0, -8.0, 0.8), DVec3::ZERO);
-    shot.scene.material = Material {
+    *shot.scene.particle_material_mut() = Material {
         diffuse: 0.35,
         specular: 0.2,
         // A head-on reflection of 0.6.
@@ -220,7 +223,7 @@ pub(super) fn refraction() -> Shot {
     ];
     let mut shot = Shot::new(centers, 1.0, DVec3::new(0.0, -5.5, 0.0), DVec3::ZERO);
     shot.radii = vec![1.5, 0.9, 0.9, 0.7, 0.7];
-    shot.scene.material = glass(1.5);
+    *shot.scene.particle_material_mut() = glass(1.5);
     shot.scene.background = SUNSET;
     shot.scene.lights = vec![sun(Vec3::new(0.0, 1.0, -0.3), 1.0)];
     shot.settings.max_depth = 5;
@@ -236,7 +239,7 @@ fn glass(ior: f32) -> Material {
 pub(super) fn total_reflection() -> Shot {
     let centers = vec![Vec3::new(-1.6, 0.0, 0.0), Vec3::new(1.6, 0.0, 0.0)];
     let mut shot = Shot::new(centers, 1.4, DVec3::new(0.0, -7.0, 0.0), DVec3::ZERO);
-    shot.scene.material = glass(1.0 / 1.333);
+    *shot.scene.particle_material_mut() = glass(1.0 / 1.333);
     shot.scene.background = SUNSET;
     shot.settings.max_depth = 6;
     shot.painted(&[Vec3::ZERO; 2])
@@ -246,7 +249,7 @@ pub(super) fn total_reflection() -> Shot {
 pub(super) fn shadow_through_glass() -> Shot {
     let centers = vec![Vec3::new(0.0, 0.0, 1.6), Vec3::new(2.2, 0.6, 1.0)];
     let mut shot = Shot::new(centers, 1.0, DVec3::new(0.5, -9.0, 5.0), DVec3::new(0.8, 0.0, 0.5));
-    shot.scene.material = Material { transmission: 0.8, ..glass(1.5) };
+    *shot.scene.particle_material_mut() = Material { transmission: 0.8, ..glass(1.5) };
     shot.scene.lights = vec![sun(Vec3::new(0.3, 0.1, -1.0), 1.2)];
     shot.scene.ground = Some(floor(0.0));
     shot.settings.max_depth = 5;
@@ -346,7 +349,7 @@ pub(super) fn directional_lights() -> Shot {
     };
     let (left, right) = (Vec3::new(1.2, 0.3, 0.2), Vec3::new(0.2, 0.4, 1.2));
     shot.scene.lights = vec![light(1.0, left), light(-1.0, right)];
-    shot.scene.material = Material { specular: 0.6, shininess: 60.0, ..MATT };
+    *shot.scene.particle_material_mut() = Material { specular: 0.6, shininess: 60.0, ..MATT };
     shot
 }
 

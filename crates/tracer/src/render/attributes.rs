@@ -15,13 +15,11 @@ use super::{
     shading::depths,
     stream::SegmentPacket,
 };
+use crate::scene::Owner;
 use crate::scene::ground::GroundSample;
 use crate::surface::{Intersections, MaterialId};
 use spherule_tree::math::{Lanes, lane3, lanes_in, set_lane3, splat, splat3};
 use spherule_tree::ray::RayPacket;
-
-/// Colour of foam and spray, linear RGB.
-const SPRAY: Vec3 = Vec3::splat(0.9);
 
 /// Width of a diffusely reflected ray as a fraction of its length. Such rays sample a hemisphere, so each may stand for
 /// a part of it.
@@ -79,34 +77,26 @@ impl RenderContext<'_> {
         self.source.blended_color(blend)
     }
 
-    /// Base colour of a part of the particles, of the ground, of a mesh or of spray, as a ray sees it after a number of
-    /// diffuse reflections.
+    /// Base colour of a surface that is not of the particles without a part, as a ray sees it after a number of diffuse
+    /// reflections.
     fn fixed_color(&self, ray: (&RayPacket, u32), hits: &Intersections, lane: usize) -> Vec3 {
-        // Meshes and materials of parts have colours of their own
-        if let Some(mesh) = self.mesh(hits.material[lane]) {
-            let own = self.part_color(hits.material[lane], hits.particle[lane]);
-            return own.unwrap_or(mesh.color);
-        }
-        if let Some(part) = self.part(hits.material[lane]) {
-            let of_particle = || self.source.color(hits.particle[lane]);
-            return part.color.unwrap_or_else(of_particle);
-        }
+        let (id, part) = (hits.material[lane], hits.particle[lane]);
         // The ground is filtered over the width of the ray
-        match (hits.material[lane], &self.scene.ground) {
-            (MaterialId::GROUND, Some(ground)) => {
-                let (rays, bounces) = ray;
-                let point = lane3(&hits.point, lane);
-                ground.color(&GroundSample {
-                    point,
-                    direction: lane3(&rays.direction, lane),
-                    width: match bounces {
-                        0 => self.camera.pixel_width(point) * self.sample_width,
-                        _ => BOUNCED_SPREAD * hits.t[lane],
-                    },
-                })
-            }
-            _ => SPRAY,
+        if let (MaterialId::GROUND, Some(ground)) = (id, &self.scene.ground) {
+            let (rays, bounces) = ray;
+            let point = lane3(&hits.point, lane);
+            return ground.color(&GroundSample {
+                point,
+                direction: lane3(&rays.direction, lane),
+                width: match bounces {
+                    0 => self.camera.pixel_width(point) * self.sample_width,
+                    _ => BOUNCED_SPREAD * hits.t[lane],
+                },
+            });
         }
+        // All others have the colour of their part, that of their material, or that of the particle
+        let color = self.part_colors[id.index()].get(part as usize).copied();
+        color.or(self.scene.material(id).color).unwrap_or_else(|| self.source.color(part))
     }
 
     /// Fraction of each sample that surfaces cover, or `otherwise` without a surface. A ground that fades out still
@@ -121,7 +111,7 @@ impl RenderContext<'_> {
     }
 
     fn is_holdout(&self, material: MaterialId) -> bool {
-        self.mesh(material).is_some_and(|mesh| mesh.is_holdout)
+        self.scene.material(material).is_holdout
     }
 
     /// Stores the data of the nearest sample of each pixel, the first in a tie. The rays belong to the samples from
@@ -196,35 +186,17 @@ impl RenderContext<'_> {
     /// The object of `kind` at an intersection with a surface of `material`, which belongs to `particle` if that has
     /// particles.
     fn object(&self, kind: MatteKind, material: MaterialId, particle: impl Fn() -> u32) -> u32 {
-        let object = |name: ObjectName| cryptomatte::object_of(name.as_bytes());
-        // Particles are told apart by id, part or material
-        if material.is_of_particles() {
-            match kind {
-                MatteKind::Particle => {
-                    return object(ObjectName::of_particle(self.source.id(particle())));
-                }
-                MatteKind::Part => {
-                    let part = self.source.part(particle());
-                    return part.map_or(object_of_name(cryptomatte::PARTICLES), |(name, value)| {
-                        object(ObjectName::of_part(name, value))
-                    });
-                }
-                MatteKind::Material => {
-                    if let Some(index) = material.part_index() {
-                        return object(ObjectName::of_material(index));
-                    }
-                }
-            }
-        }
-        // All other surfaces are one object each
-        object_of_name(match material {
-            MaterialId::PARTICLES => cryptomatte::PARTICLES,
-            MaterialId::SPRAY => cryptomatte::SPRAY,
-            MaterialId::GROUND => cryptomatte::GROUND,
-            _ => {
-                return object(ObjectName::of_mesh(material.mesh_index().unwrap_or_default()));
-            }
-        })
+        let owner = self.scene.material(material).owner;
+        // Particles are told apart by id, part or material; all other surfaces of a material are one object
+        let name = match (owner.is_of_particles(), kind) {
+            (true, MatteKind::Particle) => ObjectName::of_particle(self.source.id(particle())),
+            (true, MatteKind::Part) => match self.source.part(particle()) {
+                Some((attribute, value)) => ObjectName::of_part(attribute, value),
+                None => ObjectName::of_owner(Owner::Particles),
+            },
+            _ => ObjectName::of_owner(owner),
+        };
+        cryptomatte::object_of(name.as_bytes())
     }
 
     /// The particle of the intersection in `lane`.
@@ -258,7 +230,7 @@ impl RenderContext<'_> {
     ) -> DataSample {
         let PacketScratch { hits, blend, .. } = packet;
         let channels = self.settings.planes();
-        let is_particle = hits.material[lane].is_of_particles();
+        let is_particle = self.scene.material(hits.material[lane]).owner.is_of_particles();
         // Look up the particle only if a channel needs it
         let needs_particle = is_particle && channels.needs_nearest_particle();
         let particle = needs_particle.then(|| self.particle_at(hits, lane));
@@ -283,8 +255,4 @@ impl RenderContext<'_> {
             motion,
         }
     }
-}
-
-fn object_of_name(name: &str) -> u32 {
-    cryptomatte::object_of(name.as_bytes())
 }

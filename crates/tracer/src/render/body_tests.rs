@@ -34,7 +34,7 @@ const R: f32 = 0.04;
 fn scene(eye: DVec3, look_at: DVec3, material: Material) -> Scene {
     let view = CameraView { eye, look_at, up: DVec3::X, fov: 20.0 };
     Scene {
-        material,
+        materials: Scene::basic_materials(material),
         background: Background::Constant(Vec3::ONE),
         ..Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).unwrap())
     }
@@ -267,7 +267,7 @@ fn ground_is_refracted_through_a_slab() {
     let solid = Solid::slab(-5.0, 1.0);
     let eye = DVec3::new(0.0, -2.0, 3.0);
     let mut scene = scene(eye, DVec3::new(0.0, 0.0, 1.0), CLEAR);
-    scene.material.reflection = 0.0;
+    scene.particle_material_mut().reflection = 0.0;
     let r = dielectric(0.5_f32.sqrt(), 1.0 / 1.5);
     let light = (1.0 - r) * 0.5 * ground::AMBIENT;
     for (tile, is_light) in [(0.54, true), (0.53, false)] {
@@ -351,7 +351,7 @@ fn an_opaque_body_is_shaded_as_a_sphere() {
 fn the_same_bytes_on_any_number_of_threads() {
     let mut scene =
         scene(DVec3::new(0.4, -6.0, 3.0), DVec3::ZERO, with_loss(Vec3::splat(0.6), 1.0));
-    scene.material.specular = 0.5;
+    scene.particle_material_mut().specular = 0.5;
     scene.background = Background::default_for(Vec3::Z);
     scene.ground = Some(floor(-0.8));
     scene.lights = vec![Light::directional(Vec3::new(1.0, 0.5, -1.0), Vec3::ONE).unwrap()];

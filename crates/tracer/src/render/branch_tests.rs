@@ -44,7 +44,12 @@ fn glass_scene() -> Scene {
     };
     Scene {
         ambient_light: Vec3::splat(AMBIENT),
-        material: Material { ambient: 1.0, ior: 1.5, transmission: 1.0, ..Material::DEFAULT },
+        materials: Scene::basic_materials(Material {
+            ambient: 1.0,
+            ior: 1.5,
+            transmission: 1.0,
+            ..Material::DEFAULT
+        }),
         background: Background::Gradient {
             bottom: Vec3::ZERO,
             top: Vec3::ONE,
@@ -66,7 +71,7 @@ fn equation_4_1(surface: &Balls, scene: &Scene, ray: &Ray, levels: u32) -> Vec3 
         return scene.background.color(ray.direction);
     };
     let enters = ray.direction.dot(hit.normal) < 0.0;
-    let ior = scene.material.ior;
+    let ior = scene.particle_material().ior;
     let (normal, ratio) = if enters { (hit.normal, 1.0 / ior) } else { (-hit.normal, ior) };
     let step = hit.offset * normal;
     let below = |from, to| equation_4_1(surface, scene, &Ray::new(from, to), levels - 1);
@@ -74,7 +79,7 @@ fn equation_4_1(surface: &Balls, scene: &Scene, ray: &Ray, levels: u32) -> Vec3 
     let Some(onward) = refract(ray.direction, normal, ratio) else {
         return AMBIENT + mirrored;
     };
-    let r = schlick(scene.material.r0(), -ray.direction.dot(normal));
+    let r = schlick(scene.particle_material().r0(), -ray.direction.dot(normal));
     AMBIENT + r * mirrored + (1.0 - r) * below(hit.anchor - step, onward)
 }
 
@@ -152,8 +157,8 @@ fn opaque_spheres_do_not_depend_on_the_weight() {
     let balls = Balls(heap(60));
     let mut scene = glass_scene();
     for (reflection, transmission) in [(1.0, 0.0), (0.0, 1.0)] {
-        scene.material.reflection = reflection;
-        scene.material.transmission = transmission;
+        scene.particle_material_mut().reflection = reflection;
+        scene.particle_material_mut().transmission = transmission;
         let image = |min_weight: f32| {
             let settings =
                 RenderSettings { max_depth: MAX_DEPTH, min_weight, ..RenderSettings::new(24, 24) };
@@ -178,7 +183,7 @@ fn unbounded_settings_are_rejected() {
     assert_eq!(refused(&scene, 9, 1e-5), None);
     assert_eq!(refused(&scene, 3, 1e-6), Some(RenderError::MinWeight(1e-6)));
     assert!(refused(&scene, 3, f32::NAN).is_some());
-    scene.material.transmission = 0.0;
+    scene.particle_material_mut().transmission = 0.0;
     assert_eq!(refused(&scene, 9, 0.0), None);
 }
 

@@ -14,7 +14,7 @@ use super::{
 };
 use crate::scene::{
     Background, Camera, CameraView, Environment, Falloff, Finish, Ground, Light, LightKind,
-    MeshFinish, MeshMaterial,
+    Material,
 };
 use crate::surface::MaterialId;
 use crate::surface::mesh::{MeshNormals, MeshSurface, MeshTree, TriangleMesh, VisibleFaces};
@@ -22,12 +22,8 @@ use spherule_tree::math::{SimdLevel, Supported};
 
 const SIDE: u32 = 32;
 
-fn matte(albedo: f32) -> MeshMaterial {
-    MeshMaterial {
-        color: Vec3::splat(albedo),
-        finish: MeshFinish::Opaque(Finish::Matte),
-        is_holdout: false,
-    }
+fn matte(albedo: f32) -> Material {
+    Material::matte(Vec3::splat(albedo))
 }
 
 /// Glass around a dark world, seen from `eye`.
@@ -35,7 +31,7 @@ fn scene(eye: DVec3, look_at: DVec3, lights: Vec<Light>) -> Scene {
     let view = CameraView { eye, look_at, up: DVec3::Y, fov: 28.0 };
     let mut scene = floor_from_above(Environment::constant(Vec3::ZERO), Vec3::ONE);
     scene.camera = Camera::new(&view, 1.0, DVec3::ZERO).unwrap();
-    scene.material = GLASS;
+    *scene.particle_material_mut() = GLASS;
     scene.lights = lights;
     scene
 }
@@ -53,7 +49,7 @@ fn floor(lights: Vec<Light>) -> Scene {
 fn mesh_floor(lights: Vec<Light>) -> (Scene, MeshTree) {
     let mut scene = floor(lights);
     scene.ground = None;
-    scene.meshes = vec![matte(1.0)];
+    scene.add(matte(1.0)).unwrap();
     (scene, square(Vec3::ZERO, 6.0 * Vec3::X, 6.0 * Vec3::Y))
 }
 
@@ -87,7 +83,7 @@ fn image(body: &dyn Shape, meshes: &[MeshTree], scene: &Scene, settings: &Render
 
 fn surfaces(meshes: &[MeshTree]) -> Vec<MeshSurface<'_>> {
     let surface =
-        |(i, tree)| MeshSurface::new(tree, VisibleFaces::Both, MaterialId::of_mesh(i).unwrap());
+        |(i, tree)| MeshSurface::new(tree, VisibleFaces::Both, MaterialId::at(3 + i).unwrap());
     meshes.iter().enumerate().map(surface).collect()
 }
 
@@ -146,7 +142,7 @@ fn a_slope_in_water_has_the_irradiance_of_refracted_light() {
         let eye = (0.7 * normal).as_dvec3();
         let mut scene = scene(eye, DVec3::ZERO, vec![sun(to_sun, 0.001, 3.0)]);
         scene.ground = None;
-        scene.meshes = vec![matte(0.5)];
+        scene.add(matte(0.5)).unwrap();
         let along = Vec3::new(tilt.cos(), 0.0, -tilt.sin());
         let slope = square(Vec3::ZERO, 0.8 * along, 0.8 * Vec3::Y);
         let water = Solid::slab(-50.0, 1.0);
@@ -169,7 +165,7 @@ fn light_that_enters_water_straight_has_the_irradiance_of_refracted_light() {
             let (eye, lights) = (DVec3::new(0.0, 0.0, 0.7), vec![sun(to_sun, 1e-4, 3.0)]);
             let mut scene = scene(eye, DVec3::ZERO, lights);
             scene.ground = None;
-            scene.meshes = vec![matte(0.5)];
+            scene.add(matte(0.5)).unwrap();
             scene
         };
         let bottom = square(Vec3::ZERO, 2.0 * Vec3::X, 2.0 * Vec3::Y);
@@ -273,12 +269,12 @@ fn a_glossy_mesh_reflects_caustics() {
     let (_, mesh) = mesh_floor(Vec::new());
     let mut scene = scene(DVec3::new(0.0, 0.0, 4.0), DVec3::ZERO, lights);
     scene.ground = None;
-    scene.meshes = vec![matte(1.0)];
-    scene.meshes[0].finish = MeshFinish::Opaque(Finish::Plastic { roughness: 0.6 });
+    scene.add(matte(1.0)).unwrap();
+    scene.materials[3].finish = Finish::Plastic { roughness: 0.6 };
     let settings = with_photons(400_000, 64, 0);
     let above = image(&Solid::slab(5.0, 6.0), std::slice::from_ref(&mesh), &scene, &settings);
     // The same without water, attenuated by both surfaces and reflections between them
-    scene.material = Material { transmission: 0.0, ..GLASS };
+    *scene.particle_material_mut() = Material { transmission: 0.0, ..GLASS };
     let open = image(&Solid::slab(-21.0, -20.0), &[mesh], &scene, &settings);
     let mean = |film: &Film| film.color.iter().map(|pixel| pixel[0]).sum::<f32>() / 1024.0;
     let ratio = mean(&above) / mean(&open);
@@ -293,7 +289,7 @@ fn light_of_photons_is_the_same_on_any_number_of_threads_and_for_all_instruction
         light(LightKind::Sphere { center: Vec3::new(3.0, 3.0, 5.0), radius: 0.4 }, 20.0),
     ];
     let (mut scene, mesh) = mesh_floor(lights);
-    scene.meshes[0].finish = MeshFinish::Opaque(Finish::Plastic { roughness: 0.3 });
+    scene.materials[3].finish = Finish::Plastic { roughness: 0.3 };
     let catcher =
         Ground { shadow_catcher: Some(0.8), height: -0.5, ..floor(Vec::new()).ground.unwrap() };
     scene.ground = Some(catcher);

@@ -14,7 +14,7 @@ use super::{
     shading::{BackgroundLanes, CameraLanes},
     source::ShadeSource,
 };
-use crate::scene::{self, MeshMaterial, PartMaterial, PartMaterials, Scene};
+use crate::scene::{Finish, Material, PartMaterials, Scene};
 use crate::surface::{MaterialId, Shape, Side};
 use spherule_tree::accel::Coherence;
 use spherule_tree::math::Supported;
@@ -29,10 +29,8 @@ pub(super) struct RenderContext<'a> {
     pub(super) shapes: Vec<&'a dyn Shape>,
     /// Meshes that rays pass.
     pub(super) panes: Vec<&'a dyn Shape>,
-    /// The colours of shapes other than particles whose parts differ in colour.
-    pub(super) part_colors: Vec<(MaterialId, &'a [Vec3])>,
-    /// The materials of opaque surfaces.
-    pub(super) materials: Vec<MaterialId>,
+    /// The colours of the parts of shapes other than particles, in the order of the materials of the scene.
+    pub(super) part_colors: Vec<&'a [Vec3]>,
     /// Materials of parts of the particles, if these are separate spheres and paths are traced.
     pub(super) parts: Option<&'a PartMaterials>,
     /// Spray whose drops fade out; opaque spray is one of the shapes.
@@ -82,7 +80,7 @@ pub(super) enum Interior {
 }
 
 impl Interior {
-    pub(super) fn of(material: &scene::Material, is_connected: bool) -> Self {
+    pub(super) fn of(material: &Material, is_connected: bool) -> Self {
         match (material.transmission > 0.0, is_connected) {
             (false, _) => Self::Opaque,
             (true, false) => Self::Spheres,
@@ -91,17 +89,13 @@ impl Interior {
     }
 }
 
-/// Whether `shape` is a pane in `scene`.
-fn is_pane(scene: &Scene, shape: &dyn Shape) -> bool {
-    let mesh = shape.material().mesh_index();
-    mesh.and_then(|index| scene.meshes.get(index)).is_some_and(MeshMaterial::is_pane)
-}
-
-/// Whether `shape` is soft spray in pictures with these settings.
-fn is_soft(scene: &Scene, integrator: IntegratorKind, shape: &dyn Shape) -> bool {
-    scene.is_spray_soft
-        && integrator == IntegratorKind::Path
-        && shape.material() == MaterialId::SPRAY
+/// The colours of the parts of `shapes`, in the order of the materials of `scene`.
+fn part_colors<'a>(scene: &Scene, shapes: &[&'a dyn Shape]) -> Vec<&'a [Vec3]> {
+    let mut colors: Vec<&[Vec3]> = vec![&[]; scene.materials.len()];
+    for shape in shapes {
+        colors[shape.material().index()] = shape.colors();
+    }
+    colors
 }
 
 /// Shapes by the way in which rays meet them.
@@ -122,15 +116,18 @@ impl<'a> DividedShapes<'a> {
         source: &dyn ShadeSource,
         integrator: IntegratorKind,
     ) -> Self {
-        let is_soft = |shape: &&dyn Shape| is_soft(scene, integrator, *shape);
+        let finish = |shape: &&dyn Shape| scene.material(shape.material()).finish;
+        let is_soft = |shape: &&dyn Shape| {
+            integrator == IntegratorKind::Path && finish(shape) == Finish::Foam
+        };
         let (spray, shapes): (Vec<_>, Vec<_>) = shapes.into_iter().partition(is_soft);
-        let is_opaque = |shape: &&dyn Shape| !is_pane(scene, *shape);
-        let (shapes, panes): (Vec<_>, Vec<_>) = shapes.into_iter().partition(is_opaque);
+        let is_pane = |shape: &&dyn Shape| finish(shape) == Finish::Pane;
+        let (panes, shapes): (Vec<_>, Vec<_>) = shapes.into_iter().partition(is_pane);
         // Find the particles and the kind of their interior
         let is_particles = |shape: &&&dyn Shape| shape.material() == MaterialId::PARTICLES;
         let particles = shapes.iter().find(is_particles).copied();
         let is_connected = particles.is_some_and(|shape| shape.is_connected());
-        let interior = Interior::of(&scene.material, is_connected);
+        let interior = Interior::of(scene.particle_material(), is_connected);
         // Only opaque spheres fade out: transmissive ones and connected bodies have an inside
         let has_opacity = source.is_translucent() && interior == Interior::Opaque && !is_connected;
         let is_translucent =
@@ -161,19 +158,17 @@ impl<'a> RenderContext<'a> {
         let eye = scene.camera.eye();
         let [width, height] = settings.eye_size(scene.camera.eyes());
         let contains_eye = |shape: &dyn Shape| shape.side_of(eye) == Side::Inside;
-        let part_colors = shapes.iter().map(|shape| (shape.material(), shape.colors()));
         Self {
-            part_colors: part_colors.filter(|(_, colors)| !colors.is_empty()).collect(),
+            part_colors: part_colors(scene, &shapes),
             is_camera_inside: interior == Interior::Body && particles.is_some_and(contains_eye),
             shapes,
             panes,
-            materials: MaterialId::all(scene.meshes.len(), scene.parts.materials().len()),
             parts: Some(&scene.parts)
                 .filter(|parts| !parts.is_empty() && !is_connected)
                 .filter(|_| settings.integrator == IntegratorKind::Path),
             soft_spray: divided.soft_spray,
             translucent: divided.translucent,
-            has_holdouts: scene.meshes.iter().any(|mesh| mesh.is_holdout),
+            has_holdouts: scene.materials.iter().any(|material| material.is_holdout),
             particles,
             source,
             scene,
@@ -188,39 +183,18 @@ impl<'a> RenderContext<'a> {
             lights: scene.lights.iter().map(light_of).collect(),
             color: source.constant_color(),
             interior,
-            boundary: Dielectric::new(&scene.material),
+            boundary: Dielectric::new(scene.particle_material()),
             sample_width: (settings.samples as f32).sqrt().recip().max(MIN_SAMPLE_WIDTH),
             sampler: FilmSampler::with_filter(settings.samples, settings.filter),
             max_segments: SEGMENTS,
         }
     }
 
-    /// The material of the mesh that `material` belongs to.
-    #[inline(always)]
-    pub(super) fn mesh(&self, material: MaterialId) -> Option<&MeshMaterial> {
-        self.scene.meshes.get(material.mesh_index()?)
-    }
-
-    /// The colour of a part of a shape of `material`, if it has one of its own.
-    #[inline(always)]
-    pub(super) fn part_color(&self, material: MaterialId, part: u32) -> Option<Vec3> {
-        let mut shapes = self.part_colors.iter();
-        let (_, colors) = shapes.find(|(id, _)| *id == material)?;
-        colors.get(part as usize).copied()
-    }
-
-    /// The material of the part of the particles that `material` belongs to.
-    #[inline(always)]
-    pub(super) fn part(&self, material: MaterialId) -> Option<&PartMaterial> {
-        self.parts?.materials().get(material.part_index()?)
-    }
-
     /// The material of `particle`.
     #[inline]
     pub(super) fn material_of(&self, parts: &PartMaterials, particle: u32) -> MaterialId {
         let part = self.source.part(particle);
-        let index = part.and_then(|(_, part)| parts.index_of(part));
-        index.and_then(MaterialId::of_part).unwrap_or(MaterialId::PARTICLES)
+        part.and_then(|(_, part)| parts.of(part)).unwrap_or(MaterialId::PARTICLES)
     }
 
     /// The particles, if they bound one connected body.

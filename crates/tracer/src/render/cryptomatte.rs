@@ -7,12 +7,14 @@
 
 use std::io::Write as _;
 
+use crate::scene::Owner;
+
 /// Name of the ground, in every kind of layer.
-pub const GROUND: &str = "ground";
+const GROUND: &str = "ground";
 /// Name of the material of the particles, and of particles without a part.
 pub const PARTICLES: &str = "particles";
 /// Name of the material of foam and spray.
-pub const SPRAY: &str = "spray";
+const SPRAY: &str = "spray";
 
 /// MurmurHash3 by Appleby, `x86_32` with seed 0.
 pub fn murmur_hash3(key: &[u8]) -> u32 {
@@ -69,14 +71,16 @@ impl ObjectName {
         Self::of(format_args!("{attribute}{value}"))
     }
 
-    /// The name of a mesh, in every kind of layer, numbered in the order of the manifest from 0: `mesh0`.
-    pub fn of_mesh(index: usize) -> Self {
-        Self::of(format_args!("mesh{index}"))
-    }
-
-    /// The name of a material of parts of the particles, numbered in the order of the manifest from 0: `material0`.
-    pub fn of_material(index: usize) -> Self {
-        Self::of(format_args!("material{index}"))
+    /// The name of all surfaces with a material of this owner: `mesh0` for meshes and rods and `material0` for parts of
+    /// the particles, numbered in the order of the manifest.
+    pub fn of_owner(owner: Owner) -> Self {
+        match owner {
+            Owner::Particles => Self::of(format_args!("{PARTICLES}")),
+            Owner::Spray => Self::of(format_args!("{SPRAY}")),
+            Owner::Ground => Self::of(format_args!("{GROUND}")),
+            Owner::Part(number) => Self::of(format_args!("material{number}")),
+            Owner::Thing(number) => Self::of(format_args!("mesh{number}")),
+        }
     }
 
     /// Longer names are cut.

@@ -124,8 +124,8 @@ fn light_channels_add_up_to_the_color() {
     for integrator in [IntegratorKind::Whitted, IntegratorKind::Path] {
         for (has_ground, transmission) in [(false, 0.0), (true, 0.0), (true, 0.7)] {
             let mut scene = scene(has_ground);
-            scene.material.transmission = transmission;
-            scene.material.reflection = 0.5;
+            scene.particle_material_mut().transmission = transmission;
+            scene.particle_material_mut().reflection = 0.5;
             let settings = RenderSettings {
                 channels: Channels::from_names(["lights"]).unwrap(),
                 integrator,

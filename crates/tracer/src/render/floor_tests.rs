@@ -30,7 +30,7 @@ fn floor(environment: Environment) -> Scene {
         fov: 28.0,
     };
     scene.camera = Camera::new(&view, 1.0, DVec3::ZERO).unwrap();
-    scene.material = GLASS;
+    *scene.particle_material_mut() = GLASS;
     if let Some(ground) = &mut scene.ground {
         ground.fade_start = 12.0;
     }
@@ -179,7 +179,7 @@ fn photons_are_the_same_on_any_number_of_threads_and_can_be_stopped() {
 /// The floor around a ball of water that it cuts in the middle, with an albedo, and a strength of its wetness.
 fn around_water(environment: Environment, albedo: f32, strength: f32) -> Film {
     let mut scene = floor(environment);
-    scene.material.ior = 1.333;
+    scene.particle_material_mut().ior = 1.333;
     scene.lights = vec![sun(0.01, Vec3::splat(PI))];
     if let Some(ground) = &mut scene.ground {
         ground.color = Vec3::splat(albedo);

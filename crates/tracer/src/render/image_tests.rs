@@ -36,7 +36,7 @@ fn heap_scene(transmission: f32) -> Scene {
     let view = Framed::corners(&bounds).view(&framing);
     Scene {
         lights: default_lights(&bounds, DVec3::Z, &view),
-        material: Material { transmission, ..Material::DEFAULT },
+        materials: Scene::basic_materials(Material { transmission, ..Material::DEFAULT }),
         background: Background::default_for(Vec3::Z),
         ground: Some(Ground::under(&bounds, Vec3::Z, DVec3::ZERO)),
         ..Scene::new(Camera::new(&view, 1.5, DVec3::ZERO).unwrap())
@@ -276,7 +276,7 @@ fn interruption_and_bad_settings_are_errors() {
         assert!(matches!(result, Err(RenderError::OutOfRange { .. })));
     }
     let mut wild = scene;
-    wild.material.transmission = 2.0;
+    wild.particle_material_mut().transmission = 2.0;
     let result = render(&[&nothing], &wild, &source, &settings(), &never);
     assert!(matches!(result, Err(RenderError::Material(_))));
 }

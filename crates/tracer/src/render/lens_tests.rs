@@ -28,13 +28,13 @@ fn scene(lens: Option<Lens>) -> Scene {
     let pinhole = Lens { radius: 0.0, focus: 1.0 };
     let camera = Camera::new(&view, 1.0, DVec3::ZERO).unwrap();
     Scene {
-        material: Material {
+        materials: Scene::basic_materials(Material {
             ambient: 1.0,
             diffuse: 0.0,
             specular: 0.0,
             reflection: 0.0,
             ..Material::DEFAULT
-        },
+        }),
         background: Background::Constant(Vec3::ZERO),
         ..Scene::new(camera.with_lens(lens.unwrap_or(pinhole)))
     }

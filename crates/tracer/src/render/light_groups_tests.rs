@@ -140,7 +140,7 @@ fn a_group_is_the_image_of_its_lights_alone() {
 #[test]
 fn groups_are_known_behind_refraction_and_in_caustics() {
     let mut scene = opaque();
-    scene.material = GLASS;
+    *scene.particle_material_mut() = GLASS;
     let ball = Solid::ball_at(Vec3::new(0.0, 0.0, 0.8), 0.5);
     for photons in [0, 20_000] {
         let settings = RenderSettings { photons, max_depth: 5, ..settings(20, 4, 2) };
@@ -172,7 +172,7 @@ fn groups_of_the_whitted_integrator_are_images_of_their_lights() {
     });
     let settings = RenderSettings { integrator: IntegratorKind::Whitted, ..settings(20, 4, 0) };
     check(&heap(), &scene, &settings, &[2, 4]);
-    scene.material = GLASS;
+    *scene.particle_material_mut() = GLASS;
     let ball = Solid::ball_at(Vec3::new(0.0, 0.0, 0.8), 0.5);
     check(&ball, &scene, &settings, &[2, 4]);
 }

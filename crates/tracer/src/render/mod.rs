@@ -192,9 +192,16 @@ pub fn render_into(
     // Check the settings
     settings.validate()?;
     settings.validate_light_groups(scene)?;
-    scene.material.validate()?;
+    for material in &scene.materials {
+        material.validate()?;
+    }
+    let count = scene.materials.len();
+    let used = shapes.iter().map(|shape| shape.material().index());
+    if let Some(index) = used.max().filter(|index| *index >= count) {
+        return Err(RenderError::UnknownMaterial { index, count });
+    }
     if !shapes.iter().any(|shape| shape.is_connected()) {
-        settings.validate_branches(&scene.material)?;
+        settings.validate_branches(scene.particle_material())?;
     }
     // Prepare film, shapes and integrator
     let RenderSettings { width, height, channels, has_features, .. } = *settings;

@@ -34,7 +34,12 @@ fn scene_from(x: f32) -> Scene {
     };
     Scene {
         background: Background::Constant(Vec3::ZERO),
-        material: Material { ambient: 0.0, specular: 0.0, reflection: 0.0, ..Material::DEFAULT },
+        materials: Scene::basic_materials(Material {
+            ambient: 0.0,
+            specular: 0.0,
+            reflection: 0.0,
+            ..Material::DEFAULT
+        }),
         ..Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).unwrap())
     }
 }

@@ -14,8 +14,8 @@ use super::{
     settings::IntegratorKind,
     stream::{RayStreams, SegmentPacket},
 };
-use crate::scene::MeshMaterial;
-use crate::scene::mesh::pane_reflectance;
+use crate::scene::Material;
+use crate::scene::material::pane_reflectance;
 use crate::surface::{Intersection, Intersections, MaterialId};
 use glam::Vec3;
 use spherule_tree::math::{lane3, lanes_in, set_lane3, splat};
@@ -49,7 +49,7 @@ impl RenderContext<'_> {
         }
         let (hit, material) = found?;
         let reflectance = pane_reflectance(hit.normal.dot(ray.direction).abs());
-        let color = self.mesh(material).map_or(Vec3::ONE, |mesh| mesh.color);
+        let color = self.scene.material(material).color.unwrap_or(Vec3::ONE);
         Some(PaneCrossing {
             hit,
             material,
@@ -142,20 +142,21 @@ impl RenderContext<'_> {
 
     /// The lanes of rays that panes reflect.
     pub(super) fn pane_lanes(&self, hits: &Intersections) -> u32 {
-        if self.panes.is_empty() { 0 } else { self.lanes_of_meshes(hits, MeshMaterial::is_pane) }
+        if self.panes.is_empty() { 0 } else { self.lanes_where(hits, Material::is_pane) }
     }
 
     /// The lanes of camera rays that end at meshes which only hide what is behind them.
     pub(super) fn holdout_lanes(&self, depth: u32, hits: &Intersections) -> u32 {
         if depth == 1 && self.has_holdouts {
-            self.lanes_of_meshes(hits, |mesh| mesh.is_holdout)
+            self.lanes_where(hits, |material| material.is_holdout)
         } else {
             0
         }
     }
 
-    fn lanes_of_meshes(&self, hits: &Intersections, holds: impl Fn(&MeshMaterial) -> bool) -> u32 {
-        let is_found = |lane: usize| self.mesh(hits.material[lane]).is_some_and(&holds);
+    /// The lanes of intersections with a material for which `holds`.
+    fn lanes_where(&self, hits: &Intersections, holds: impl Fn(&Material) -> bool) -> u32 {
+        let is_found = |lane: usize| holds(self.scene.material(hits.material[lane]));
         lanes_in(hits.mask).fold(0, |lanes, lane| lanes | u32::from(is_found(lane)) << lane)
     }
 

@@ -7,37 +7,36 @@ use std::sync::atomic::AtomicBool;
 use glam::{DVec3, Vec3};
 
 use super::{brute::Balls, *};
-use crate::scene::mesh::pane_reflectance;
+use crate::scene::material::pane_reflectance;
 use crate::scene::{
-    Background, Camera, CameraView, Environment, Finish, Ground, Light, LightKind, MeshFinish,
-    MeshMaterial,
+    Background, Camera, CameraView, Environment, Finish, Ground, Light, LightKind, Material,
 };
 use crate::surface::MaterialId;
 use crate::surface::mesh::{MeshNormals, MeshSurface, MeshTree, TriangleMesh, VisibleFaces};
 
-const CLEAR: MeshMaterial =
-    MeshMaterial { color: Vec3::ONE, finish: MeshFinish::Pane, is_holdout: false };
+const CLEAR: Material = Material { finish: Finish::Pane, ..Material::matte(Vec3::ONE) };
 
-const MATTE: MeshMaterial = MeshMaterial {
-    color: Vec3::new(0.5, 0.25, 0.125),
-    finish: MeshFinish::Opaque(Finish::Matte),
-    is_holdout: false,
-};
+const BROWN: Vec3 = Vec3::new(0.5, 0.25, 0.125);
+
+const MATTE: Material = Material::matte(BROWN);
 
 /// Looks along +y from a distance of 10, in front of `background`, in a constant environment.
-fn scene(background: Vec3, environment: Vec3, meshes: &[MeshMaterial]) -> Scene {
+fn scene(background: Vec3, environment: Vec3, meshes: &[Material]) -> Scene {
     let view = CameraView {
         eye: DVec3::new(0.0, -10.0, 0.0),
         look_at: DVec3::ZERO,
         up: DVec3::Z,
         fov: 2.0,
     };
-    Scene {
+    let mut scene = Scene {
         background: Background::Constant(background),
         environment: Some(Arc::new(Environment::constant(environment))),
-        meshes: meshes.to_vec(),
         ..Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).unwrap())
+    };
+    for mesh in meshes {
+        scene.add(*mesh).unwrap();
     }
+    scene
 }
 
 /// A square of side 2 around `center`, spanned by two unit vectors; its front is the side of `u` x `v`.
@@ -86,9 +85,7 @@ fn image(
     settings: &RenderSettings,
 ) -> Film {
     let meshes: Vec<MeshSurface<'_>> = (meshes.iter().enumerate())
-        .map(|(i, tree)| {
-            MeshSurface::new(tree, VisibleFaces::Both, MaterialId::of_mesh(i).unwrap())
-        })
+        .map(|(i, tree)| MeshSurface::new(tree, VisibleFaces::Both, MaterialId::at(3 + i).unwrap()))
         .collect();
     let mut shapes: Vec<&dyn Shape> = vec![balls];
     shapes.extend(meshes.iter().map(|mesh| mesh as &dyn Shape));
@@ -114,7 +111,8 @@ fn near(found: [f32; 4], wanted: [f32; 4], tolerance: f32) {
 
 #[test]
 fn panes_attenuate_and_reflect() {
-    let tinted = MeshMaterial { color: Vec3::new(1.0, 0.5, 0.25), ..CLEAR };
+    let tint = Vec3::new(1.0, 0.5, 0.25);
+    let tinted = Material { color: Some(tint), ..CLEAR };
     let (background, environment) = (Vec3::new(0.2, 0.4, 0.8), Vec3::splat(3.0));
     let scene = scene(background, environment, &[CLEAR, tinted]);
     let r = pane_reflectance(1.0);
@@ -123,8 +121,8 @@ fn panes_attenuate_and_reflect() {
     let film = image(&[&wall(0.0)], &nothing(), 0.5, &scene, &settings(1024, 0));
     near(mean(&film), [one[0], one[1], one[2], 1.0 * r], 2e-3);
     let two = [0, 1, 2].map(|i| {
-        let (t, tint) = (1.0 - r, tinted.color[i]);
-        let behind = (t * tint).powi(1) * background[i] + r * t * environment[i];
+        let (t, tinted) = (1.0 - r, tint[i]);
+        let behind = (t * tinted) * background[i] + r * t * environment[i];
         r * environment[i] + t * behind
     });
     let walls = [&wall(0.0), &wall(1.0)];
@@ -137,7 +135,7 @@ fn panes_attenuate_and_reflect() {
     // Whitted: without reflections, and without noise
     let whitted = RenderSettings { integrator: IntegratorKind::Whitted, ..settings(1, 0) };
     let film = image(&walls, &nothing(), 0.5, &scene, &whitted);
-    let t = (1.0 - r) * (1.0 - r) * background * tinted.color;
+    let t = (1.0 - r) * (1.0 - r) * background * tint;
     near(mean(&film), [t.x, t.y, t.z, 0.0], 1e-4);
 }
 
@@ -167,7 +165,7 @@ fn data_are_of_what_is_behind_a_pane() {
 }
 
 /// A matte wall at y = 2, lit from the side of the camera.
-fn lit(meshes: &[MeshMaterial]) -> Scene {
+fn lit(meshes: &[Material]) -> Scene {
     let mut scene = scene(Vec3::ONE, Vec3::ZERO, meshes);
     scene.lights = vec![Light {
         kind: LightKind::Directional { to_light: Vec3::new(0.6, -0.8, 0.0) },
@@ -186,8 +184,8 @@ fn meshes_are_lit_and_panes_attenuate_shadow_rays() {
         let scene = lit(&[MATTE, CLEAR]);
         // The light falls at 36.9 degrees; Whitted adds ambient light
         let matte = match integrator {
-            IntegratorKind::Path => 0.8 * FRAC_1_PI * MATTE.color,
-            IntegratorKind::Whitted => (0.2 + 0.7 * 0.8) * MATTE.color,
+            IntegratorKind::Path => 0.8 * FRAC_1_PI * BROWN,
+            IntegratorKind::Whitted => (0.2 + 0.7 * 0.8) * BROWN,
         };
         let film = image(&[&wall(2.0)], &nothing(), 0.5, &scene, &settings);
         near(mean(&film), [matte.x, matte.y, matte.z, 1.0], 1e-4);
@@ -200,7 +198,7 @@ fn meshes_are_lit_and_panes_attenuate_shadow_rays() {
         let t = 1.0 - pane_reflectance(0.8);
         let ambient = match integrator {
             IntegratorKind::Path => Vec3::ZERO,
-            IntegratorKind::Whitted => 0.2 * MATTE.color,
+            IntegratorKind::Whitted => 0.2 * BROWN,
         };
         let matte = ambient + t * (matte - ambient);
         near(mean(&film), [matte.x, matte.y, matte.z, 1.0], 1e-4);
@@ -213,7 +211,7 @@ fn meshes_are_lit_and_panes_attenuate_shadow_rays() {
 
 #[test]
 fn holdouts_are_holes_that_throw_shadows() {
-    let holdout = MeshMaterial { is_holdout: true, ..MATTE };
+    let holdout = Material { is_holdout: true, ..MATTE };
     for integrator in [IntegratorKind::Path, IntegratorKind::Whitted] {
         let settings = RenderSettings { integrator, ..settings(4, 1) };
         // It hides the wall and the ball behind it, and the background

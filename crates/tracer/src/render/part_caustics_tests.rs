@@ -11,8 +11,7 @@ use super::{
     *,
 };
 use crate::scene::{
-    Background, Camera, CameraView, Environment, EnvironmentAxes, Finish, Light, LightKind,
-    PartMaterial, PartMaterials, RadianceMap,
+    Background, Camera, CameraView, Environment, EnvironmentAxes, Light, LightKind, RadianceMap,
 };
 
 /// Rows of the bright cap around the zenith, of 256.
@@ -32,16 +31,16 @@ fn scene(environment: Environment, lights: Vec<Light>) -> Scene {
         up: DVec3::Z,
         fov: 10.0,
     };
-    let part = PartMaterial { parts: vec![1], finish: Finish::Matte, color: None };
-    Scene {
+    let mut scene = Scene {
         background: Background::Constant(Vec3::ZERO),
         environment: Some(Arc::new(environment)),
-        material: GLASS,
-        parts: PartMaterials::new(vec![part]),
+        materials: Scene::basic_materials(GLASS),
         lights,
         particles: [Vec3::new(-0.6, -0.6, -0.6), Vec3::new(0.6, 0.6, 1.9)],
         ..Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).unwrap())
-    }
+    };
+    scene.add_part(&[1], Material::DEFAULT).unwrap();
+    scene
 }
 
 fn sun(half_angle: f64, irradiance: f32) -> Light {

@@ -12,7 +12,7 @@ use super::{
 use crate::scene::environment::studio;
 use crate::scene::{
     Background, Camera, CameraView, EnvironmentAxes, Finish, Fresnel, Ground, Light, LightKind,
-    Material, PartMaterial, PartMaterials,
+    Material,
 };
 
 /// The colours of the two particles.
@@ -25,7 +25,7 @@ fn pair() -> Balls {
 }
 
 /// Looks along +y from a distance of 10.
-fn scene(material: Material, parts: Vec<PartMaterial>) -> Scene {
+fn scene(material: Material, parts: Vec<Part>) -> Scene {
     let view = CameraView {
         eye: DVec3::new(0.0, -10.0, 0.0),
         look_at: DVec3::ZERO,
@@ -33,13 +33,16 @@ fn scene(material: Material, parts: Vec<PartMaterial>) -> Scene {
         fov: 24.0,
     };
     let axes = EnvironmentAxes::of_view(DVec3::Y, DVec3::Z, 0.0);
-    Scene {
+    let mut scene = Scene {
         background: Background::Constant(Vec3::ZERO),
         environment: Some(Arc::new(studio(axes, Vec3::ONE))),
-        material,
-        parts: PartMaterials::new(parts),
+        materials: Scene::basic_materials(material),
         ..Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).unwrap())
+    };
+    for (parts, material) in parts {
+        scene.add_part(&parts, material).unwrap();
     }
+    scene
 }
 
 fn opaque(finish: Finish) -> Material {
@@ -50,8 +53,11 @@ fn glass() -> Material {
     Material { transmission: 1.0, fresnel: Fresnel::Exact, ior: 1.5, ..Material::DEFAULT }
 }
 
-fn part(parts: &[i32], finish: Finish, color: Option<Vec3>) -> PartMaterial {
-    PartMaterial { parts: parts.to_vec(), finish, color }
+/// Parts, and their material.
+type Part = (Vec<i32>, Material);
+
+fn part(parts: &[i32], finish: Finish, color: Option<Vec3>) -> Part {
+    (parts.to_vec(), Material { finish, color, ..Material::DEFAULT })
 }
 
 fn image(scene: &Scene, bounces: u32, colors: &[Vec3]) -> Film {
@@ -146,7 +152,7 @@ fn opaque_parts_throw_full_shadows() {
     };
     let bounds = crate::scene::Bounds { min: DVec3::splat(-1.9), max: DVec3::splat(1.9) };
     // The pixels of points in both shadows
-    let shadows = |parts: Vec<PartMaterial>| {
+    let shadows = |parts: Vec<Part>| {
         let mut scene = scene(glass(), parts);
         scene.ground = Some(Ground::under(&bounds, Vec3::Z, DVec3::ZERO));
         scene.environment = None;

@@ -13,13 +13,13 @@
 //! bring the light of a source through transmissive surfaces (`path/caustics.rs`), its shadow rays end there.
 
 use super::{
-    bsdf::{Bsdf, Foam, bsdfs_of, reflect_samples, surface_points},
+    bsdf::{Bsdf, bsdf_of, reflect_samples, surface_points},
     context::{Interior, RenderContext},
     dimensions::{BOUNCED, BSDF, CONTINUATION, ENVIRONMENT, LIGHTS},
     integrator::Integrator,
     layers::LightClass,
     lights::{Light, environment_along, sample_environment},
-    materials::{Material, RoughInterface, materials_of},
+    materials::{Material, RoughInterface, material_of},
     roulette::SplitRule,
     sampler::{get_1d_lanes, get_2d_lanes},
     scratch::PacketScratch,
@@ -53,7 +53,7 @@ const MAX_CONTINUATION: f32 = 0.95;
 pub(super) struct PathIntegrator<'a> {
     context: RenderContext<'a>,
     environment: Option<&'a Environment>,
-    /// Opaque surfaces, in the order of [`RenderContext::materials`].
+    /// The BSDFs of opaque surfaces, in the order of the materials of the scene.
     bsdfs: Vec<Box<dyn Bsdf>>,
     /// The specular surface of transmissive particles.
     interface: Box<dyn Material>,
@@ -75,25 +75,16 @@ impl<'a> PathIntegrator<'a> {
     pub(super) fn new(context: RenderContext<'a>) -> Self {
         // Prepare the surface of transmissive particles
         let is_connected = context.connected_particles().is_some();
-        let interface = materials_of(context.scene, is_connected).swap_remove(0);
-        let material = &context.scene.material;
+        let interface = material_of(context.scene, MaterialId::PARTICLES, is_connected);
+        let material = context.scene.particle_material();
         let rough = RoughInterface::of(material, interface.constants(), is_connected);
         // Black environments need no samples
         let given = context.scene.environment.as_deref();
         let environment = given.filter(|environment| !environment.is_black());
-        // Prepare the BSDFs of opaque surfaces
-        let mut bsdfs = bsdfs_of(
-            context.scene.material.finish,
-            &context.scene.meshes,
-            context.scene.parts.materials(),
-        );
-        if context.soft_spray.is_some() {
-            bsdfs[usize::from(MaterialId::SPRAY.0)] = Box::new(Foam);
-        }
         Self {
             ambient: AmbientLight::of(context.settings, environment),
             environment,
-            bsdfs,
+            bsdfs: context.scene.materials.iter().map(|m| bsdf_of(m.finish)).collect(),
             interface,
             rough,
             split: SplitRule::new(context.settings, context.interior),
@@ -288,13 +279,11 @@ impl PathIntegrator<'_> {
 
     /// Evaluates the BSDFs for the directions of the light samples.
     fn eval(&self, surface: &Surface<'_>, packet: &mut PacketScratch) {
-        for (material, bsdf) in self.context.materials.iter().zip(&self.bsdfs) {
-            let lanes = surface.lanes & packet.hits.lanes_of(*material);
-            if lanes != 0 {
-                let (rays, direction) = (&surface.segments.rays, &packet.light.rays.direction);
-                let (points, values) = (&packet.surface, &mut packet.bsdf);
-                bsdf.eval(self.context.simd, rays, points, direction, lanes, values);
-            }
+        let (rays, direction) = (&surface.segments.rays, &packet.light.rays.direction);
+        for (material, lanes) in packet.hits.materials_of(surface.lanes) {
+            let (points, values) = (&packet.surface, &mut packet.bsdf);
+            let bsdf = &self.bsdfs[material.index()];
+            bsdf.eval(self.context.simd, rays, points, direction, lanes, values);
         }
     }
 
@@ -336,7 +325,7 @@ impl PathIntegrator<'_> {
     /// light enters the body and falls by it where light leaves, and paths leave out both. Light that enters straight
     /// has not risen: its irradiance behind a flat interface is that in front of it.
     fn scale_inside(&self, surface: &Surface<'_>, packet: &mut PacketScratch) {
-        let ior = self.context.scene.material.ior;
+        let ior = self.context.scene.particle_material().ior;
         for lane in lanes_in(surface.segments.inside & packet.light.lanes) {
             let leaving = lane3(&packet.light.radiance, lane) / (ior * ior);
             set_lane3(&mut packet.light.radiance, lane, leaving);
@@ -479,12 +468,9 @@ impl PathIntegrator<'_> {
         let (segments, simd) = (surface.segments, self.context.simd);
         let mut u = [splat(0.0); 2];
         get_2d_lanes(simd, &segments.path, BSDF, &surface.sample, &mut u);
-        for (material, bsdf) in self.context.materials.iter().zip(&self.bsdfs) {
-            let lanes = surface.lanes & packet.hits.lanes_of(*material);
-            if lanes != 0 {
-                let (points, samples) = (&packet.surface, &mut packet.bounce);
-                bsdf.sample(simd, &segments.rays, points, &u, lanes, samples);
-            }
+        for (material, lanes) in packet.hits.materials_of(surface.lanes) {
+            let (bsdf, points) = (&self.bsdfs[material.index()], &packet.surface);
+            bsdf.sample(simd, &segments.rays, points, &u, lanes, &mut packet.bounce);
         }
         let PacketScratch { bounce, points, weight, surface: at, .. } = &mut *packet;
         let rays = &mut points.reflected;

@@ -187,7 +187,7 @@ fn glass_in_white_surroundings_is_invisible() {
     let shapes: [&dyn Shape; 2] = [&Balls::one(Vec3::ZERO, 1.0), &Solid::ball(1.0)];
     for shape in shapes {
         let mut scene = scene(white());
-        scene.material = GLASS;
+        *scene.particle_material_mut() = GLASS;
         for max_depth in [1, 2, 8] {
             let settings = RenderSettings { max_depth, ..settings(16, 16, 6) };
             let film = image(shape, &scene, Vec3::splat(0.3), &settings);
@@ -205,7 +205,7 @@ fn a_white_floor_below_glass_is_white() {
         [&Balls::one(Vec3::new(0.0, 0.0, 1.2), 1.0), &Solid::slab(0.5, 1.5)];
     for shape in shapes {
         let mut scene = floor_from_above(white(), Vec3::ONE);
-        scene.material = GLASS;
+        *scene.particle_material_mut() = GLASS;
         // Without diffuse reflections, light that the glass sends back to the floor is lost
         for (bounces, low, high) in [(1000, 0.99, 1.01), (0, 0.8, 0.97)] {
             let settings = RenderSettings { max_depth: 24, ..settings(16, 64, bounces) };
@@ -221,7 +221,7 @@ fn lights_shine_straight_through_glass() {
     // At normal incidence a slab of glass transmits 0.96 at each surface.
     let mut scene = floor_from_above(Environment::constant(Vec3::ZERO), Vec3::splat(0.5));
     scene.lights = vec![Light::directional(Vec3::NEG_Z, Vec3::splat(PI)).unwrap()];
-    scene.material = GLASS;
+    *scene.particle_material_mut() = GLASS;
     let settings = RenderSettings { max_depth: 8, ..settings(4, 64, 0) };
     let open = image(&Balls(Vec::new()), &scene, Vec3::ONE, &settings);
     let below = image(&Solid::slab(20.0, 30.0), &scene, Vec3::ONE, &settings);
@@ -255,7 +255,7 @@ fn the_same_bits_on_any_threads_and_instructions() {
         [(0.0, None), (0.9, None), (0.0, Some(1.0)), (0.9, Some(1.0))]
     {
         let mut scene = floor_from_above(studio(axes, Vec3::ONE), Vec3::splat(0.5));
-        scene.material.transmission = transmission;
+        scene.particle_material_mut().transmission = transmission;
         scene.background = Background::Studio { up: Vec3::Z };
         let kind = LightKind::Sphere { center: Vec3::new(1.0, 2.0, 2.0), radius: 0.5 };
         scene.lights = vec![Light {

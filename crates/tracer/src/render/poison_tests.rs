@@ -40,12 +40,12 @@ fn scene(transmission: f32) -> Scene {
             Light::directional(Vec3::new(1.0, 0.5, -1.0), Vec3::ONE).unwrap(),
             Light::point_with(lamp, DVec3::ZERO, Vec3::splat(20.0), falloff),
         ],
-        material: Material {
+        materials: Scene::basic_materials(Material {
             transmission,
             fresnel: Fresnel::Exact,
             extinction: Vec3::new(0.3, 0.2, 0.1),
             ..Material::DEFAULT
-        },
+        }),
         background: Background::default_for(Vec3::Z),
         ground: Some(Ground::under(&bounds, Vec3::Z, DVec3::ZERO)),
         environment: Some(Arc::new(studio(axes, Vec3::ONE))),

@@ -174,13 +174,13 @@ fn film(
     };
     change(&mut settings);
     let scene = Scene {
-        material: Material {
+        materials: Scene::basic_materials(Material {
             ambient: 1.0,
             diffuse: 0.0,
             specular: 0.0,
             reflection: 0.0,
             ..Material::DEFAULT
-        },
+        }),
         background: Background::Studio { up: Vec3::Z },
         environment: Some(std::sync::Arc::new(crate::scene::Environment::constant(Vec3::ONE))),
         ..Scene::new(camera)

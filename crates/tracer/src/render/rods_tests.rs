@@ -6,8 +6,7 @@ use std::sync::atomic::AtomicBool;
 use glam::{DVec3, Vec3};
 
 use super::*;
-use crate::scene::{Background, Camera, CameraView, Environment, Finish, MeshFinish, MeshMaterial};
-use crate::surface::MaterialId;
+use crate::scene::{Background, Camera, CameraView, Environment, Material};
 use crate::surface::rods::{Caps, Rod, RodSurface, RodTree};
 
 const RED: Vec3 = Vec3::new(0.8, 0.1, 0.05);
@@ -22,16 +21,12 @@ fn albedo(tree: &RodTree, integrator: IntegratorKind) -> Vec<Vec3> {
         up: DVec3::Z,
         fov: 24.0,
     };
-    let scene = Scene {
+    let mut scene = Scene {
         background: Background::Constant(Vec3::ZERO),
         environment: Some(Arc::new(Environment::constant(Vec3::ONE))),
-        meshes: vec![MeshMaterial {
-            color: GREY,
-            finish: MeshFinish::Opaque(Finish::Matte),
-            is_holdout: false,
-        }],
         ..Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).unwrap())
     };
+    let material = scene.add(Material::matte(GREY)).unwrap();
     let settings = RenderSettings {
         samples: 4,
         integrator,
@@ -40,7 +35,7 @@ fn albedo(tree: &RodTree, integrator: IntegratorKind) -> Vec<Vec3> {
     };
     let source = ParticleShading::constant(Vec3::ONE);
     let never = AtomicBool::new(false);
-    let surface = RodSurface::new(tree, MaterialId::of_mesh(0).unwrap());
+    let surface = RodSurface::new(tree, material);
     let rendered = render(&[&surface], &scene, &source, &settings, &never);
     rendered.unwrap().0.albedo.unwrap()
 }

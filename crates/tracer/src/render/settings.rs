@@ -227,6 +227,14 @@ pub enum RenderError {
         /// Its maximum.
         max: u32,
     },
+    /// A shape has a material that the scene lacks.
+    #[error("a shape has material {index}, but the scene has only {count}")]
+    UnknownMaterial {
+        /// Its index.
+        index: usize,
+        /// Number of materials.
+        count: usize,
+    },
     /// The position of the film in the image is out of range.
     #[error(
         "the window of the film is out of range; its sides and coordinates must be at most {MAX_SIDE} pixels"

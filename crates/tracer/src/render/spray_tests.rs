@@ -61,12 +61,13 @@ fn scene(environment: Environment) -> Scene {
         up: DVec3::Y,
         fov: 1.5,
     };
-    Scene {
+    let mut scene = Scene {
         background: Background::Constant(Vec3::ONE),
         environment: Some(Arc::new(environment)),
-        is_spray_soft: true,
         ..Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).unwrap())
-    }
+    };
+    scene.set_spray_soft(true);
+    scene
 }
 
 fn image(shapes: &[&dyn Shape], scene: &Scene, settings: &RenderSettings) -> Film {
@@ -97,7 +98,8 @@ fn drops_fade_out_towards_their_silhouettes() {
         assert!((coverage - expected).abs() < 0.05, "{x}: {coverage} {expected}");
     }
     // Without path tracing, and if it is not soft, spray is opaque
-    let hard = Scene { is_spray_soft: false, ..scene(white()) };
+    let mut hard = scene(white());
+    hard.set_spray_soft(false);
     let film = image(&[&drop_at(0.0)], &hard, &settings);
     assert_eq!(film.color[(SIDE / 2 * SIDE + 2) as usize][3], 0.0);
     assert_eq!(film.color[(SIDE / 2 * SIDE + SIDE / 2) as usize][3], 1.0);
@@ -130,7 +132,7 @@ fn shadows_of_drops_are_soft_and_add_up() {
             fov: 106.0,
         };
         scene.camera = Camera::new(&view, 1.0, DVec3::ZERO).unwrap();
-        scene.is_spray_soft = true;
+        scene.set_spray_soft(true);
         scene.lights = vec![Light::directional(Vec3::NEG_Z, Vec3::splat(PI)).unwrap()];
         let balls = drops.iter().map(|height| Ball { center: *height * Vec3::Z, radius: 1.0 });
         let cloud = Drops(Balls(balls.collect()));
@@ -156,7 +158,7 @@ fn a_thick_cloud_is_white_and_creates_no_light() {
 #[test]
 fn spray_is_the_same_on_any_number_of_threads_and_for_all_instruction_sets() {
     let mut scene = scene(white());
-    scene.material = GLASS;
+    *scene.particle_material_mut() = GLASS;
     scene.lights = vec![Light::directional(Vec3::new(0.3, 0.2, -1.0), Vec3::ONE).unwrap()];
     let (cloud, body) = (cloud(), Solid::ball_at(Vec3::new(0.4, 0.0, -0.6), 0.7));
     let shapes: [&dyn Shape; 2] = [&body, &cloud];

@@ -12,7 +12,7 @@ use super::{
     layers::LightClass,
     light_groups::NO_GROUP,
     light_split::ratio,
-    materials::{Material, WhittedMaterial, materials_of, reflect_lights},
+    materials::{Material, WhittedMaterial, material_of, reflect_lights},
     roulette::SplitRule,
     scratch::PacketScratch,
     shading::{add, add_background, product, scale},
@@ -25,7 +25,7 @@ use spherule_tree::math::splat;
 /// Traces reflected and refracted rays, and samples every light at each intersection.
 pub(super) struct WhittedIntegrator<'a> {
     pub(super) context: RenderContext<'a>,
-    /// The materials by [`MaterialId`].
+    /// The materials of the scene, in its order.
     materials: Vec<Box<dyn Material>>,
     /// Decides which of two rays are traced.
     pub(super) split: SplitRule,
@@ -34,15 +34,16 @@ pub(super) struct WhittedIntegrator<'a> {
 impl<'a> WhittedIntegrator<'a> {
     pub(super) fn new(context: RenderContext<'a>) -> Self {
         let is_connected = context.connected_particles().is_some();
+        let of_id = |id| material_of(context.scene, id, is_connected);
         Self {
-            materials: materials_of(context.scene, is_connected),
+            materials: context.scene.ids().map(of_id).collect(),
             split: SplitRule::new(context.settings, context.interior),
             context,
         }
     }
 
     fn particle_constants(&self) -> &WhittedMaterial {
-        self.materials[usize::from(MaterialId::PARTICLES.0)].constants()
+        self.materials[MaterialId::PARTICLES.index()].constants()
     }
 }
 
@@ -75,12 +76,8 @@ impl Integrator for WhittedIntegrator<'_> {
         }
         context.base_colors(segments, self.particle_constants().has_color(), packet);
         // Shade the intersections of each material
-        for (number, material) in (0..).zip(&self.materials) {
-            let id = MaterialId(number);
-            let lanes = packet.hits.lanes_of(id) & !held_out;
-            if lanes == 0 {
-                continue;
-            }
+        for (id, lanes) in packet.hits.materials_of(!held_out) {
+            let material = &self.materials[id.index()];
             let (rays, inside) = (&segments.rays, segments.inside);
             material.shading_points(context.simd, rays, &packet.hits, inside, &mut packet.points);
             let lit = material.lit_lanes(lanes, inside);

@@ -24,7 +24,7 @@ fn scene(material: Material) -> Scene {
     };
     Scene {
         ambient_light: Vec3::ZERO,
-        material,
+        materials: Scene::basic_materials(material),
         background: Background::Constant(Vec3::ONE),
         ..Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).unwrap())
     }
@@ -100,8 +100,8 @@ fn the_weights_scale_their_rays_and_zero_traces_none() {
     let ball = Balls::one(Vec3::ZERO, 1.0);
     let (value, _) = middle(&ball, &scene, 1);
     assert_near(value, 0.5 * R * 2.0 + 0.25 * (1.0 - R) * 0.5);
-    scene.material.reflection = 0.0;
-    scene.material.transmission = 0.0;
+    scene.particle_material_mut().reflection = 0.0;
+    scene.particle_material_mut().transmission = 0.0;
     let (value, counts) = middle(&ball, &scene, 5);
     assert_near(value, 0.0);
     assert_eq!(counts.total(), 1);
@@ -347,8 +347,8 @@ fn ground_receives_shadows_and_blocks_light_from_below() {
     assert!((film.position.unwrap()[0] - Vec3::new(0.0, 0.0, -1.0)).length() < 1e-5);
     // Light from below the ground.
     scene.lights = vec![Light::directional(Vec3::Z, Vec3::ONE).unwrap()];
-    scene.material.ambient = 0.0;
-    scene.material.reflection = 0.0;
+    scene.particle_material_mut().ambient = 0.0;
+    scene.particle_material_mut().reflection = 0.0;
     let lowered = Balls::one(Vec3::new(0.0, -2.0, 0.1), 0.3);
     assert_near(middle(&lowered, &scene, 1).0, 0.0);
 }

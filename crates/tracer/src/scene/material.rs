@@ -1,5 +1,5 @@
-//! The constants of eq. 4.1 to 4.3, and the optics that depend only on them: Fresnel reflectance and refraction by
-//! Snell's law.
+//! Materials: the constants of eq. 4.1 to 4.3, the surface for path tracing, and the optics that depend only on them:
+//! Fresnel reflectance and refraction by Snell's law.
 //!
 //! Schlick, "An inexpensive BRDF model for physically-based rendering", 1994. As in eq. 4.3 the cosine is that of the
 //! incoming ray, on its side of the surface.
@@ -7,14 +7,70 @@
 use glam::Vec3;
 use thiserror::Error;
 
+use super::ground;
+
+/// Index of a material in [`Scene::materials`](super::Scene::materials).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct MaterialId(u16);
+
+impl MaterialId {
+    /// The material of the particles.
+    pub const PARTICLES: Self = Self(0);
+    /// Foam and spray.
+    pub const SPRAY: Self = Self(1);
+    /// The ground.
+    pub const GROUND: Self = Self(2);
+    /// Maximum number of materials of a scene.
+    pub const MAX: usize = 1 << 16;
+
+    /// The material at `index`; None from [`Self::MAX`] on.
+    pub(crate) fn at(index: usize) -> Option<Self> {
+        u16::try_from(index).ok().map(Self)
+    }
+
+    /// Its index.
+    #[inline(always)]
+    pub const fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// What has a material.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Owner {
+    /// The particles, unless they belong to a part with a material of its own.
+    Particles,
+    /// Parts of the particles; the number counts the materials of parts.
+    Part(u16),
+    /// Foam and spray.
+    Spray,
+    /// The ground.
+    Ground,
+    /// A mesh or rods; the number counts such things.
+    Thing(u16),
+}
+
+impl Owner {
+    /// Whether surfaces of the material belong to particles, which have attributes.
+    pub const fn is_of_particles(self) -> bool {
+        matches!(self, Self::Particles | Self::Part(_) | Self::Spray)
+    }
+}
+
 /// Default base colour of particles (linear RGB): a clear blue, as readers expect of a fluid; highlights and
 /// reflections at silhouettes reduce the saturation, so it is higher than desired.
 pub const DEFAULT_COLOR: Vec3 = Vec3::new(0.12, 0.38, 0.78);
 
-/// The constants of all particles. The base colour multiplies ambient and diffuse light; highlights have the colour
-/// of the light.
+/// A material. The base colour multiplies ambient and diffuse light; highlights have the colour of the light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Material {
+    /// What has the material.
+    pub owner: Owner,
+    /// Base colour, or transmittance of a pane, linear RGB; None if each particle has its own, and for the ground, which
+    /// has a pattern.
+    pub color: Option<Vec3>,
+    /// Whether it hides what is behind it from the camera without being visible itself.
+    pub is_holdout: bool,
     /// `Ka`.
     pub ambient: f32,
     /// `kd`, not negative.
@@ -34,13 +90,14 @@ pub struct Material {
     /// Extinction coefficient of the medium inside, per length: light is attenuated by `exp(-extinction * length)`
     /// (Beer-Lambert law). Not negative. Shadows of separate spheres ignore it.
     pub extinction: Vec3,
-    /// The opaque surface for path tracing.
+    /// How the surface meets light.
     pub finish: Finish,
     /// Roughness of the surface of transmissive particles for path tracing, 0 (smooth) to 1.
     pub interface_roughness: f32,
 }
 
-/// How path tracing reflects light at opaque particles. The base colour is that of the particle.
+/// How a surface meets light. Whitted's model knows only panes; for it, all other surfaces are matte with the constants
+/// of eq. 4.1.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Finish {
     /// Light leaves in all directions alike.
@@ -56,6 +113,20 @@ pub enum Finish {
         /// Roughness, 0 to 1.
         roughness: f32,
     },
+    /// A thin pane of glass: the surface stands for both sides of a wall, so that light passes without refraction.
+    Pane,
+    /// Drops of spray that fade out and scatter light from their inside.
+    Foam,
+}
+
+/// Index of refraction of panes.
+const PANE_IOR: f32 = 1.5;
+
+/// The part of the light that a thin pane reflects, at the absolute `cosine` between ray and normal. Light that both
+/// of its sides reflect any number of times is included.
+pub fn pane_reflectance(cosine: f32) -> f32 {
+    let once = dielectric(cosine, 1.0 / PANE_IOR);
+    2.0 * once / (1.0 + once)
 }
 
 /// Formulas for the Fresnel reflectance.
@@ -73,6 +144,9 @@ impl Material {
     /// Default constants: the index of refraction of water, opaque, a soft highlight. A white particle under the
     /// default lights is just below white.
     pub const DEFAULT: Self = Self {
+        owner: Owner::Particles,
+        color: None,
+        is_holdout: false,
         ambient: 0.1,
         diffuse: 0.7,
         specular: 0.2,
@@ -85,6 +159,16 @@ impl Material {
         finish: Finish::Matte,
         interface_roughness: 0.0,
     };
+
+    /// A matte surface of this colour: of meshes, rods and spray.
+    pub const fn matte(color: Vec3) -> Self {
+        Self { color: Some(color), ..MATTE }
+    }
+
+    /// Whether light passes it as a thin pane.
+    pub fn is_pane(&self) -> bool {
+        self.finish == Finish::Pane
+    }
 
     /// Whether two rays leave a surface: reflected and refracted.
     pub fn branches(&self) -> bool {
@@ -129,6 +213,16 @@ impl Material {
         root * root
     }
 }
+
+/// A matte surface without a colour: of the ground.
+pub(super) const MATTE: Material = Material {
+    owner: Owner::Ground,
+    ambient: ground::AMBIENT,
+    diffuse: ground::DIFFUSE,
+    specular: 0.0,
+    reflection: 0.0,
+    ..Material::DEFAULT
+};
 
 /// The extinction coefficient of a medium that attenuates white light to `color` over `length`. Black is treated as
 /// one millionth.
@@ -277,6 +371,13 @@ mod tests {
         assert_eq!(refract(down(41.9), Vec3::Z, 1.5), None);
         let mirrored = reflect(down(41.9), Vec3::Z);
         assert!((mirrored.z - 41.9_f32.to_radians().cos()).abs() < 1e-6);
+    }
+
+    #[test]
+    fn panes_reflect_at_both_sides() {
+        // By hand: 0.04 + 0.96^2 * 0.04 * (1 + 0.04^2 + 0.04^4 + ...) = 0.08 / 1.04
+        assert!((pane_reflectance(1.0) - 0.08 / 1.04).abs() < 1e-6);
+        assert!((pane_reflectance(0.0) - 1.0).abs() < 1e-6);
     }
 
     #[test]

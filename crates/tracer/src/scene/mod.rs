@@ -19,7 +19,6 @@ pub mod ground;
 pub mod lens;
 pub mod light;
 pub mod material;
-pub mod mesh;
 pub mod part;
 pub mod path;
 pub mod projection;
@@ -39,9 +38,8 @@ pub use framing::{
 pub use ground::{Ground, WetGround};
 pub use lens::{Aperture, Focus, LensSettings};
 pub use light::{Falloff, Light, LightKind, default_lights};
-pub use material::{Finish, Fresnel, Material, MaterialError};
-pub use mesh::{MeshFinish, MeshMaterial};
-pub use part::{PartMaterial, PartMaterials};
+pub use material::{Finish, Fresnel, Material, MaterialError, MaterialId, Owner};
+pub use part::PartMaterials;
 pub use path::{CameraKey, CameraPath, KeyedPath, PathError, Turntable};
 pub use projection::Projection;
 pub use rgb::{RgbEncoding, is_rgb};
@@ -84,6 +82,12 @@ impl Bounds {
 /// Default ambient light: white, so that the `ambient` of a material determines it alone, like `Ka` in the thesis.
 pub const DEFAULT_AMBIENT_LIGHT: Vec3 = Vec3::ONE;
 
+/// Colour of foam and spray, linear RGB.
+const SPRAY_COLOR: Vec3 = Vec3::splat(0.9);
+
+/// Default colour of meshes and rods, linear RGB: a neutral light grey.
+pub const DEFAULT_MESH_COLOR: Vec3 = Vec3::splat(0.6);
+
 /// A scene without its particles.
 #[derive(Debug, Clone)]
 pub struct Scene {
@@ -95,9 +99,10 @@ pub struct Scene {
     pub lights: Vec<Light>,
     /// Ambient light (`ambient` of eq. 4.1).
     pub ambient_light: Vec3,
-    /// The material of the particles; their colours are attributes.
-    pub material: Material,
-    /// Materials of parts of the particles in place of [`Self::material`], for path tracing of separate spheres.
+    /// The materials by [`MaterialId`]: of the particles, of spray and of the ground, and then those of
+    /// [`Self::add`] and [`Self::add_part`].
+    pub materials: Vec<Material>,
+    /// Which parts of the particles have a material of their own, for path tracing of separate spheres.
     pub parts: PartMaterials,
     /// Background for rays without an intersection.
     pub background: Background,
@@ -105,12 +110,8 @@ pub struct Scene {
     pub ground: Option<Ground>,
     /// How the fluid wets a visible ground, with path tracing.
     pub wet_ground: Option<WetGround>,
-    /// The materials of meshes, by the index of each mesh.
-    pub meshes: Vec<MeshMaterial>,
     /// Corners of the box of the particles of all frames: the target of photons.
     pub particles: [Vec3; 2],
-    /// Whether spray is drawn as drops that fade out, with path tracing; otherwise it is matte spheres.
-    pub is_spray_soft: bool,
     /// Light from infinitely far away, for path tracing.
     pub environment: Option<Arc<Environment>>,
     /// Whether camera rays without an intersection see the environment instead of the background.
@@ -149,14 +150,12 @@ impl Scene {
             camera,
             lights: Vec::new(),
             ambient_light: Vec3::ONE,
-            material: Material::DEFAULT,
+            materials: Self::basic_materials(Material::DEFAULT),
             parts: PartMaterials::default(),
             background: Background::Constant(Vec3::ZERO),
             ground: None,
             wet_ground: None,
-            meshes: Vec::new(),
             particles: [Vec3::ZERO; 2],
-            is_spray_soft: false,
             environment: None,
             is_environment_visible: false,
             environment_group: 0,
@@ -164,11 +163,94 @@ impl Scene {
             exposure: None,
         }
     }
+
+    /// The materials of a scene without meshes, rods and parts.
+    pub fn basic_materials(particles: Material) -> Vec<Material> {
+        let spray = Material { owner: Owner::Spray, ..Material::matte(SPRAY_COLOR) };
+        vec![particles, spray, material::MATTE]
+    }
+
+    /// Adds the material of a mesh or of rods; None if there are [`MaterialId::MAX`] already.
+    pub fn add(&mut self, material: Material) -> Option<MaterialId> {
+        self.push(material, Owner::Thing)
+    }
+
+    /// Adds the material of the particles of `parts`, unless they have one; None as in [`Self::add`].
+    pub fn add_part(&mut self, parts: &[i32], material: Material) -> Option<MaterialId> {
+        let id = self.push(material, Owner::Part)?;
+        self.parts.insert(parts, id);
+        Some(id)
+    }
+
+    /// Appends a material of an owner that counts those of its kind.
+    fn push(&mut self, material: Material, owner: fn(u16) -> Owner) -> Option<MaterialId> {
+        let id = MaterialId::at(self.materials.len())?;
+        let kind = std::mem::discriminant(&owner(0));
+        let is_of_kind = |m: &&Material| std::mem::discriminant(&m.owner) == kind;
+        let number = u16::try_from(self.materials.iter().filter(is_of_kind).count()).ok()?;
+        self.materials.push(Material { owner: owner(number), ..material });
+        Some(id)
+    }
+
+    /// The ids of all materials.
+    pub fn ids(&self) -> impl Iterator<Item = MaterialId> + use<> {
+        (0..self.materials.len()).map_while(MaterialId::at)
+    }
+
+    /// The material with an `id`.
+    ///
+    /// # Panics
+    /// If the id is of another scene that has more materials.
+    #[inline(always)]
+    pub fn material(&self, id: MaterialId) -> &Material {
+        &self.materials[id.index()]
+    }
+
+    /// The material of the particles, apart from parts with their own.
+    pub fn particle_material(&self) -> &Material {
+        self.material(MaterialId::PARTICLES)
+    }
+
+    /// The same, to change it.
+    pub fn particle_material_mut(&mut self) -> &mut Material {
+        &mut self.materials[MaterialId::PARTICLES.index()]
+    }
+
+    /// Sets whether spray is drawn as drops that fade out, with path tracing, or as matte spheres.
+    pub fn set_spray_soft(&mut self, is_soft: bool) {
+        let finish = if is_soft { Finish::Foam } else { Finish::Matte };
+        self.materials[MaterialId::SPRAY.index()].finish = finish;
+    }
+
+    /// Whether spray is drawn as drops that fade out.
+    pub fn is_spray_soft(&self) -> bool {
+        self.material(MaterialId::SPRAY).finish == Finish::Foam
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn materials_are_numbered_by_their_owners() {
+        let view = CameraView { eye: DVec3::X, look_at: DVec3::ZERO, up: DVec3::Z, fov: 30.0 };
+        let mut scene = Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).unwrap());
+        let part = scene.add_part(&[3], Material::DEFAULT).unwrap();
+        let ids = [0.1, 0.2].map(|grey| scene.add(Material::matte(Vec3::splat(grey))).unwrap());
+        let last = scene.add_part(&[3, 4], Material::DEFAULT).unwrap();
+        assert_eq!([part, ids[0], ids[1], last].map(MaterialId::index), [3, 4, 5, 6]);
+        let owners = scene.materials.iter().map(|material| material.owner).collect::<Vec<_>>();
+        let [particles, spray, ground] = [Owner::Particles, Owner::Spray, Owner::Ground];
+        let added = [Owner::Part(0), Owner::Thing(0), Owner::Thing(1), Owner::Part(1)];
+        assert_eq!(owners[..3], [particles, spray, ground]);
+        assert_eq!(owners[3..], added);
+        assert_eq!([3, 4, 5].map(|p| scene.parts.of(p)), [Some(part), Some(last), None]);
+        // No material is lost or replaced at the end of the numbers
+        scene.materials.resize(MaterialId::MAX, Material::DEFAULT);
+        assert_eq!(scene.add(Material::DEFAULT), None);
+        assert_eq!(scene.materials.len(), MaterialId::MAX);
+    }
 
     #[test]
     fn box_has_eight_corners() {

@@ -2,67 +2,9 @@
 
 use glam::Vec3;
 
+use crate::scene::MaterialId;
 use spherule_tree::math::{Lanes, Lanes3, lane3, set_lane3, splat};
 use spherule_tree::ray::{PACKET_SIZE, RayPacket};
-
-/// Index of a material of the scene.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct MaterialId(pub u8);
-
-impl MaterialId {
-    /// The material of the particles; its base colour comes from their attributes.
-    pub const PARTICLES: Self = Self(0);
-    /// Foam and spray.
-    pub const SPRAY: Self = Self(1);
-    /// The floor.
-    pub const GROUND: Self = Self(2);
-    /// Number of materials apart from those of meshes.
-    const FIXED: u8 = 3;
-    /// Greatest number of meshes.
-    pub const MAX_MESHES: usize = 200;
-    /// Greatest number of materials of parts of the particles.
-    pub const MAX_PARTS: usize = 50;
-
-    /// The material of the mesh `index`; None from [`Self::MAX_MESHES`] on.
-    pub fn of_mesh(index: usize) -> Option<Self> {
-        let index = u8::try_from(index).ok().filter(|i| usize::from(*i) < Self::MAX_MESHES)?;
-        Some(Self(Self::FIXED + index))
-    }
-
-    /// The index of the mesh that has this material.
-    #[inline(always)]
-    pub fn mesh_index(self) -> Option<usize> {
-        let index = usize::from(self.0.checked_sub(Self::FIXED)?);
-        (index < Self::MAX_MESHES).then_some(index)
-    }
-
-    /// The material `index` of parts of the particles; None from [`Self::MAX_PARTS`] on. Their numbers follow those of
-    /// meshes.
-    pub fn of_part(index: usize) -> Option<Self> {
-        let index = Some(index).filter(|i| *i < Self::MAX_PARTS)?;
-        u8::try_from(usize::from(Self::FIXED) + Self::MAX_MESHES + index).ok().map(Self)
-    }
-
-    /// The index of the material of a part.
-    #[inline(always)]
-    pub fn part_index(self) -> Option<usize> {
-        usize::from(self.0).checked_sub(usize::from(Self::FIXED) + Self::MAX_MESHES)
-    }
-
-    /// The materials of the opaque surfaces of a scene with so many meshes and materials of parts, in the order of the
-    /// BSDFs of the path integrator.
-    pub(crate) fn all(meshes: usize, parts: usize) -> Vec<Self> {
-        let fixed = [Self::PARTICLES, Self::SPRAY, Self::GROUND];
-        let meshes = (0..meshes).map_while(Self::of_mesh);
-        let parts = (0..parts).map_while(Self::of_part);
-        fixed.into_iter().chain(meshes).chain(parts).collect()
-    }
-
-    /// Whether surfaces of this material belong to particles, which have attributes.
-    pub fn is_of_particles(self) -> bool {
-        matches!(self, Self::PARTICLES | Self::SPRAY) || self.part_index().is_some()
-    }
-}
 
 /// The intersection of one ray with a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -204,13 +146,31 @@ impl Intersections {
         (0..count).map(found).collect()
     }
 
+    /// The materials of `lanes`, each with its lanes.
+    #[inline(always)]
+    pub fn materials_of(&self, lanes: u32) -> impl Iterator<Item = (MaterialId, u32)> + use<> {
+        let (materials, mut rest) = (self.material, lanes & self.mask);
+        std::iter::from_fn(move || {
+            let first = (rest != 0).then(|| rest.trailing_zeros() as usize)?;
+            let found = lanes_with(&materials, materials[first]) & rest;
+            rest &= !found;
+            Some((materials[first], found))
+        })
+    }
+
     /// The lanes of `material`.
     #[inline(always)]
     pub fn lanes_of(&self, material: MaterialId) -> u32 {
-        let mut lanes = 0;
-        for lane in 0..PACKET_SIZE {
-            lanes |= u32::from(self.material[lane] == material) << lane;
-        }
-        lanes & self.mask
+        lanes_with(&self.material, material) & self.mask
     }
+}
+
+/// The lanes that have `material` among `materials`.
+#[inline(always)]
+fn lanes_with(materials: &[MaterialId; PACKET_SIZE], material: MaterialId) -> u32 {
+    let mut lanes = 0;
+    for (lane, found) in materials.iter().enumerate() {
+        lanes |= u32::from(*found == material) << lane;
+    }
+    lanes
 }

@@ -24,8 +24,9 @@ pub mod spray;
 mod transmittance;
 pub mod union;
 
+pub use crate::scene::MaterialId;
 pub use gradient::GradientNormals;
-pub use intersections::{Intersection, Intersections, MaterialId};
+pub use intersections::{Intersection, Intersections};
 pub use normals::ShadingNormals;
 pub use owners::SphereOwners;
 pub use pca::PcaNormals;

@@ -24,7 +24,8 @@ pub(in super::super) fn union() -> Shot {
         .sized(WIDTH);
     shot.radii = radii;
     shot.surface.kind = SurfaceKind::Union;
-    shot.scene.material = Material { extinction: Vec3::new(0.6, 0.2, 0.06), ..glass(1.33) };
+    *shot.scene.particle_material_mut() =
+        Material { extinction: Vec3::new(0.6, 0.2, 0.06), ..glass(1.33) };
     shot.scene.background = SUNSET;
     shot.scene.ground = Some(Ground {
         pattern: Pattern::Checker { tile: 1.0 },
@@ -76,7 +77,7 @@ fn ring() -> Shot {
     let mut shot =
         Shot::new(centers, 0.5 * SPACING, DVec3::new(0.0, -4.2, 4.2), DVec3::new(0.0, -0.1, 0.0))
             .sized(WIDTH);
-    shot.scene.material = Material { specular: 0.5, shininess: 40.0, ..MATT };
+    *shot.scene.particle_material_mut() = Material { specular: 0.5, shininess: 40.0, ..MATT };
     shot
 }
 

@@ -25,7 +25,8 @@ pub(in super::super) fn studio() -> Shot {
     let axes = EnvironmentAxes::of_view(DVec3::Y, DVec3::Z, 0.0);
     shot.scene.lights = Vec::new();
     shot.scene.environment = Some(Arc::new(studio_light(axes, Vec3::ONE)));
-    shot.scene.material = Material { finish: Finish::Plastic { roughness: 0.4 }, ..MATT };
+    *shot.scene.particle_material_mut() =
+        Material { finish: Finish::Plastic { roughness: 0.4 }, ..MATT };
     shot.scene.ground = Some(Ground { shadow_catcher: Some(1.0), ..floor(0.0) });
     shot.settings.integrator = IntegratorKind::Path;
     shot.settings.samples = 32;

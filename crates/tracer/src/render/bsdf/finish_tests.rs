@@ -20,7 +20,7 @@ const FINISHES: [Finish; 8] = [
 /// Whether its lobe is wide compared with the cells of an integral.
 fn is_integrable(finish: &Finish) -> bool {
     match finish {
-        Finish::Matte => true,
+        Finish::Matte | Finish::Pane | Finish::Foam => true,
         Finish::Plastic { roughness } | Finish::Metal { roughness } => *roughness > 0.3,
     }
 }

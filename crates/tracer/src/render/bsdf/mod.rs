@@ -1,14 +1,14 @@
 //! Reflection at opaque surfaces, for path tracing: bidirectional scattering distribution functions (BSDFs) for the 16
 //! lanes of a packet.
 //!
-//! To add one, add a file with a [`Bsdf`] here and a line in [`bsdfs_of`].
+//! To add one, add a file with a [`Bsdf`] here and a line in [`bsdf_of`].
 
 #![expect(clippy::needless_range_loop, reason = "one index for the lanes of many arrays")]
 
 use glam::Vec3;
 
 use crate::render::lights::LightSamples;
-use crate::scene::{Finish, MeshFinish, MeshMaterial, PartMaterial};
+use crate::scene::Finish;
 use crate::surface::Intersections;
 use spherule_tree::math::{LANES, Lanes, Lanes3, Supported, lane_kernel, lanes_in, set_lane3};
 use spherule_tree::ray::RayPacket;
@@ -24,7 +24,7 @@ mod plastic;
 #[cfg(test)]
 mod tests;
 
-pub(super) use foam::Foam;
+use foam::Foam;
 use matte::Matte;
 use metal::Metal;
 use plastic::Plastic;
@@ -106,29 +106,13 @@ pub(super) trait Bsdf: Sync {
     }
 }
 
-/// The BSDFs of opaque surfaces in the order of [`MaterialId::all`](crate::surface::MaterialId). `particles`: the
-/// finish of the particles; `parts`: the materials of parts of them.
-pub(super) fn bsdfs_of(
-    particles: Finish,
-    meshes: &[MeshMaterial],
-    parts: &[PartMaterial],
-) -> Vec<Box<dyn Bsdf>> {
-    let meshes = meshes.iter().map(|mesh| match mesh.finish {
-        MeshFinish::Opaque(finish) => finish,
-        // Panes are no opaque surfaces; the BSDF only keeps their place
-        MeshFinish::Pane => Finish::Matte,
-    });
-    let fixed = [particles, Finish::Matte, Finish::Matte];
-    let parts = parts.iter().map(|part| part.finish);
-    let all = fixed.into_iter().chain(meshes).chain(parts);
-    all.map(bsdf_of).collect()
-}
-
-fn bsdf_of(finish: Finish) -> Box<dyn Bsdf> {
+/// The BSDF of opaque surfaces with this finish. Panes are none, and their BSDF is not used.
+pub(super) fn bsdf_of(finish: Finish) -> Box<dyn Bsdf> {
     match finish {
-        Finish::Matte => Box::new(Matte),
+        Finish::Matte | Finish::Pane => Box::new(Matte),
         Finish::Plastic { roughness } => Box::new(Plastic::new(roughness)),
         Finish::Metal { roughness } => Box::new(Metal::new(roughness)),
+        Finish::Foam => Box::new(Foam),
     }
 }
 

@@ -1,8 +1,8 @@
 //! Materials: reflection and refraction at surfaces.
 //!
-//! To add a material, add a file here and a line in [`materials_of`].
+//! To add a material, add a file here and a line in [`material_of`].
 
-use crate::scene::{Scene, ground};
+use crate::scene::{MaterialId, Scene};
 
 mod blinn_phong;
 mod dielectric;
@@ -25,23 +25,15 @@ pub(super) use whitted::WhittedMaterial;
 /// Highlights of clear bodies below this fraction of the light count as dark.
 const MIN_HIGHLIGHT: f32 = 1.0 / 4096.0;
 
-/// The materials of `scene` by [`MaterialId`](crate::surface::MaterialId). `is_connected`: the particles bound one
-/// body. Ground, spray and meshes are matte.
-pub(super) fn materials_of(scene: &Scene, is_connected: bool) -> Vec<Box<dyn Material>> {
-    let matte = || -> Box<dyn Material> {
-        let constants =
-            WhittedMaterial::matte(ground::AMBIENT, ground::DIFFUSE, scene.ambient_light);
-        Box::new(TwoSided(constants))
-    };
-    let mut constants = WhittedMaterial::new(&scene.material, scene.ambient_light);
-    let particles: Box<dyn Material> = if is_connected && constants.dielectric.transmission > 0.0 {
+/// The material `id` of `scene`. `is_connected`: the particles bound one body.
+pub(super) fn material_of(scene: &Scene, id: MaterialId, is_connected: bool) -> Box<dyn Material> {
+    let mut constants = WhittedMaterial::new(scene.material(id), scene.ambient_light);
+    let is_clear = constants.dielectric.transmission > 0.0;
+    if id == MaterialId::PARTICLES && is_connected && is_clear {
         if !constants.has_color() {
             constants.min_highlight = MIN_HIGHLIGHT;
         }
-        Box::new(Interface(constants))
-    } else {
-        Box::new(TwoSided(constants))
-    };
-    let others = (0..2 + scene.meshes.len()).map(|_| matte());
-    std::iter::once(particles).chain(others).collect()
+        return Box::new(Interface(constants));
+    }
+    Box::new(TwoSided(constants))
 }

@@ -48,16 +48,4 @@ impl WhittedMaterial {
     pub(in crate::render) fn sends_rays(&self) -> bool {
         self.reflection > 0.0 || self.dielectric.transmission > 0.0
     }
-
-    /// An opaque material without specular reflection.
-    pub(in crate::render) fn matte(ambient: f32, diffuse: f32, ambient_light: Vec3) -> Self {
-        let material = scene::Material {
-            ambient,
-            diffuse,
-            specular: 0.0,
-            reflection: 0.0,
-            ..scene::Material::DEFAULT
-        };
-        Self::new(&material, ambient_light)
-    }
 }

@@ -7,6 +7,7 @@ use super::floor::PhotonMap;
 use super::{PathIntegrator, Surface};
 use crate::render::near_photons::NearPhoton;
 use crate::render::scratch::PacketScratch;
+use crate::scene::Owner;
 use crate::surface::{Intersections, MaterialId};
 use spherule_tree::math::{LANES, Lanes3, lane3, lanes_in, set_lane3, splat};
 
@@ -32,8 +33,11 @@ impl PathIntegrator<'_> {
 
     /// Whether photons are stored at surfaces of `material` one by one.
     pub(super) fn takes_photons(&self, material: MaterialId) -> bool {
-        material.mesh_index().is_some()
-            || material.part_index().is_some() && self.parts_take_photons()
+        match self.context.scene.material(material).owner {
+            Owner::Thing(_) => true,
+            Owner::Part(_) => self.parts_take_photons(),
+            Owner::Particles | Owner::Spray | Owner::Ground => false,
+        }
     }
 
     /// Whether photons light opaque particles beside transmissive ones. Photons see the particles in the middle of the

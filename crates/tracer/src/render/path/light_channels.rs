@@ -20,12 +20,10 @@ impl PathIntegrator<'_> {
         direction: &Lanes3,
         packet: &mut PacketScratch,
     ) {
-        for (material, bsdf) in self.context.materials.iter().zip(&self.bsdfs) {
-            let lanes = surface.lanes & packet.hits.lanes_of(*material);
-            if lanes != 0 {
-                let (rays, diffuse) = (&surface.segments.rays, &mut packet.split.diffuse);
-                bsdf.diffuse_part(rays, &packet.surface, direction, lanes, diffuse);
-            }
+        for (material, lanes) in packet.hits.materials_of(surface.lanes) {
+            let (rays, diffuse) = (&surface.segments.rays, &mut packet.split.diffuse);
+            let bsdf = &self.bsdfs[material.index()];
+            bsdf.diffuse_part(rays, &packet.surface, direction, lanes, diffuse);
         }
     }
 }

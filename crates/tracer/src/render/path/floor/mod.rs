@@ -27,7 +27,7 @@ use crate::render::{
     shading::add,
     stop::Stop,
 };
-use crate::scene::{Ground, Scene};
+use crate::scene::{Ground, Owner, Scene};
 use spherule_tree::math::{lane3, lanes_in, set_lane3, splat, splat3};
 
 mod density;
@@ -180,7 +180,7 @@ pub(super) struct Caustics {
 fn has_photons(scene: &Scene, settings: &RenderSettings) -> bool {
     settings.integrator == IntegratorKind::Path
         && settings.photons > 0
-        && scene.material.transmission > 0.0
+        && scene.particle_material().transmission > 0.0
 }
 
 fn is_catcher(ground: &Ground) -> bool {
@@ -215,7 +215,11 @@ pub(in crate::render) fn bytes(scene: &Scene, settings: &RenderSettings) -> Floo
         _ => (0, 0, 0),
     };
     // Photons at surfaces are stored one by one
-    let has_opaque = scene.meshes.iter().any(|mesh| !mesh.is_pane()) || !scene.parts.is_empty();
+    let has_opaque = scene.materials.iter().any(|material| match material.owner {
+        Owner::Thing(_) => !material.is_pane(),
+        Owner::Part(_) => true,
+        Owner::Particles | Owner::Spray | Owner::Ground => false,
+    });
     let has_surfaces = emits && has_opaque;
     let of_surfaces = if has_surfaces { photon_map::bytes(settings.photons) } else { 0 };
     match of_ground + of_surfaces {
@@ -319,7 +323,7 @@ impl<'a> PathIntegrator<'a> {
             wet: scene.wet_ground.as_ref()?,
             square,
             particles: scene.particles,
-            ior: scene.material.ior,
+            ior: scene.particle_material().ior,
         })
     }
 
@@ -335,7 +339,7 @@ impl<'a> PathIntegrator<'a> {
 
     fn has_opaque_surfaces(&self) -> bool {
         let mut shapes = self.context.shapes.iter();
-        self.parts_take_photons() || shapes.any(|shape| shape.material().mesh_index().is_some())
+        self.parts_take_photons() || shapes.any(|shape| self.takes_photons(shape.material()))
     }
 
     /// Adds the light that the ground reflects, where the paths of `surface` end.

@@ -224,7 +224,7 @@ impl Task<'_> {
         let (hits, throughput) = (&packet.hits, &packet.throughput);
         // Light that enters a body has the square of its index times the radiance. Paths of the camera leave this
         // factor out, but the density of photons inside the body contains it
-        let ior = self.integrator.context.scene.material.ior;
+        let ior = self.integrator.context.scene.particle_material().ior;
         let flux = |lane: usize| match segments.inside >> lane & 1 {
             0 => lane3(throughput, lane),
             _ => lane3(throughput, lane) / (ior * ior),
