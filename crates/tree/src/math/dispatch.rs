@@ -98,25 +98,26 @@ impl Supported {
 
 /// Defines a function from a body over lanes: `fn name(args) = body;` compiles the `#[inline(always)]` function
 /// `body` once per instruction set. The first argument of the new function is the instruction set ([`Supported`]).
+/// With `fn name<T: Trait>(args) = body;`, that happens for each type for which it is used.
 ///
 /// Slices and references should be separate parameters, not fields of a structure: the compiler knows that parameters
 /// do not overlap, but stops vectorising if it would have to check many fields. Everything that the body calls must
 /// be `#[inline(always)]` too, including closures, otherwise it is compiled without these instructions.
 #[macro_export]
 macro_rules! lane_kernel {
-    ($(#[$meta:meta])* $vis:vis fn $name:ident($($arg:ident: $type:ty),* $(,)?) $(-> $output:ty)? = $body:path;) => {
+    ($(#[$meta:meta])* $vis:vis fn $name:ident $(<$generic:ident: $bound:path>)? ($($arg:ident: $type:ty),* $(,)?) $(-> $output:ty)? = $body:path;) => {
         $(#[$meta])*
         #[allow(unsafe_code, clippy::too_many_arguments, reason = "see `math::lane_kernel`")]
         #[inline]
-        $vis fn $name(level: $crate::math::Supported, $($arg: $type),*) $(-> $output)? {
+        $vis fn $name $(<$generic: $bound>)? (level: $crate::math::Supported, $($arg: $type),*) $(-> $output)? {
             #[cfg(target_arch = "x86_64")]
             {
                 #[target_feature(enable = "avx2,fma,popcnt,bmi1,avx512f,avx512bw,avx512dq,avx512vl")]
-                fn avx512($($arg: $type),*) $(-> $output)? {
+                fn avx512 $(<$generic: $bound>)? ($($arg: $type),*) $(-> $output)? {
                     $body($($arg),*)
                 }
                 #[target_feature(enable = "avx2,fma,popcnt,bmi1")]
-                fn avx2($($arg: $type),*) $(-> $output)? {
+                fn avx2 $(<$generic: $bound>)? ($($arg: $type),*) $(-> $output)? {
                     $body($($arg),*)
                 }
                 match level.level() {

@@ -5,10 +5,10 @@
 
 use std::f32::consts::FRAC_1_PI;
 
-use super::local::{LocalBsdf, lane_bsdf};
 use super::microfacet::{
     Albedo, Ggx, choose, cosine_direction, dot, mirror, normalized, schlick_rise, select,
 };
+use super::point::LocalBsdf;
 use spherule_tree::math::larger;
 
 /// See the module.
@@ -33,8 +33,6 @@ impl Metal {
         larger(1.0 - self.albedo.at(cosine), 0.0)
     }
 }
-
-lane_bsdf!(Metal, eval_metal, sample_metal);
 
 impl LocalBsdf for Metal {
     #[inline(always)]

@@ -1,26 +1,25 @@
 //! Reflection at opaque surfaces, for path tracing: bidirectional scattering distribution functions (BSDFs) for the 16
 //! lanes of a packet.
 //!
-//! To add one, add a file with a [`Bsdf`] here and a line in [`bsdf_of`].
+//! To add one, add a file here with a type that is a [`point::SampledBsdf`] for one ray, or a [`point::LocalBsdf`] in the
+//! frame of the surface, and a line in [`bsdf_of`].
 
 #![expect(clippy::needless_range_loop, reason = "one index for the lanes of many arrays")]
-
-use glam::Vec3;
 
 use crate::render::lights::LightSamples;
 use crate::scene::Finish;
 use crate::surface::Intersections;
-use spherule_tree::math::{LANES, Lanes, Lanes3, Supported, lane_kernel, lanes_in, set_lane3};
+use spherule_tree::math::{LANES, Lanes, Lanes3, Supported, lane_kernel};
 use spherule_tree::ray::RayPacket;
 
 #[cfg(test)]
 mod finish_tests;
 mod foam;
-mod local;
 mod matte;
 mod metal;
 pub(super) mod microfacet;
 mod plastic;
+mod point;
 #[cfg(test)]
 mod tests;
 
@@ -98,12 +97,7 @@ pub(super) trait Bsdf: Sync {
         direction: &Lanes3,
         lanes: u32,
         part: &mut Lanes3,
-    ) {
-        let _ = (rays, points, direction);
-        for lane in lanes_in(lanes) {
-            set_lane3(part, lane, Vec3::ONE);
-        }
-    }
+    );
 }
 
 /// The BSDF of opaque surfaces with this finish. Panes are none, and their BSDF is not used.

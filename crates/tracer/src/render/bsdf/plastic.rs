@@ -6,10 +6,10 @@
 
 use std::f32::consts::FRAC_1_PI;
 
-use super::local::{LocalBsdf, lane_bsdf};
 use super::microfacet::{
     Albedo, Ggx, choose, cosine_direction, dot, mirror, normalized, schlick_rise, select,
 };
+use super::point::LocalBsdf;
 use spherule_tree::math::larger;
 
 /// Reflectance of the coat at normal incidence. That of most plastics is 0.04, which veils dark colours of a colour
@@ -56,8 +56,6 @@ impl Plastic {
 fn half_vector(out: [f32; 3], into: [f32; 3]) -> [f32; 3] {
     normalized([out[0] + into[0], out[1] + into[1], out[2] + into[2]])
 }
-
-lane_bsdf!(Plastic, eval_plastic, sample_plastic);
 
 impl LocalBsdf for Plastic {
     #[inline(always)]
