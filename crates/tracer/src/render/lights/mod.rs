@@ -1,6 +1,7 @@
 //! Lights: each samples the light that arrives at the shading points of a packet.
 //!
-//! To add a kind of light, add a file here and a line in [`light_of`].
+//! To add a kind of light, add a file here with a type that is a [`lanes::SampledLight`] for one point (and a
+//! [`lanes::LightExtent`] if rays can hit it), and a line in [`light_of`].
 
 use glam::Vec3;
 
@@ -9,6 +10,7 @@ use crate::scene::{self, LightKind};
 
 mod directional;
 mod environment;
+mod lanes;
 mod light;
 mod panel;
 mod point;

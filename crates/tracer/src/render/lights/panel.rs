@@ -3,16 +3,17 @@
 //! 2013), and discs, sampled uniformly in area. Small rectangles are sampled in area as well, where the solid angle
 //! would be inexact and the difference is small.
 
-#![expect(clippy::needless_range_loop, reason = "one index for the lanes of many arrays")]
-
 use std::f32::consts::PI;
 
 use glam::Vec3;
 
+use super::lanes::{
+    LightExtent, LightHit, LightSample, SampledLight, intersect_lanes, sample_lanes,
+};
 use super::light::{Emission, Light, LightSamples, PhotonSource};
 use crate::render::shading::disc;
 use spherule_tree::math::functions::{acos, sin_cos};
-use spherule_tree::math::{LANES, Lanes, Lanes3, Supported, lane_kernel};
+use spherule_tree::math::{Lanes, Lanes3, Supported};
 use spherule_tree::ray::RayPacket;
 
 /// Solid angle in steradians from which a rectangle is sampled in it.
@@ -68,7 +69,7 @@ impl Light for PanelLight {
         u: &[Lanes; 2],
         samples: &mut LightSamples,
     ) {
-        sample_panel(simd, self, start, u, samples);
+        sample_lanes(simd, self, start, u, samples);
     }
 
     fn has_extent(&self) -> bool {
@@ -91,7 +92,7 @@ impl Light for PanelLight {
     }
 
     fn intersect(&self, simd: Supported, rays: &RayPacket, emission: &mut Emission) {
-        intersect_panel(simd, self, rays, emission);
+        intersect_lanes(simd, self, rays, emission);
     }
 }
 
@@ -164,108 +165,80 @@ fn pdf_of_area(distance2: f32, height: f32, area: f32) -> f32 {
     distance2 * distance2.sqrt() / (height * area)
 }
 
-#[inline(always)]
-fn sample_panel_body(
-    light: &PanelLight,
-    start: &Lanes3,
-    u: &[Lanes; 2],
-    samples: &mut LightSamples,
-) {
-    let is_rectangle = light.outline == Outline::Rectangle;
-    let area = light.area();
-    for l in 0..LANES {
-        let center = light.center_from([start[0][l], start[1][l], start[2][l]]);
+impl SampledLight for PanelLight {
+    #[inline(always)]
+    fn sampled(&self, point: [f32; 3], u: [f32; 2]) -> LightSample {
+        let is_rectangle = self.outline == Outline::Rectangle;
+        let center = self.center_from(point);
         // Choose a point in the area, or in the solid angle
-        let u = [u[0][l], u[1][l]];
         let [a, b] = if is_rectangle { [2.0 * u[0] - 1.0, 2.0 * u[1] - 1.0] } else { disc(u) };
-        let mut to_point =
-            [center[0] + a * light.half[0], center[1] + b * light.half[1], center[2]];
+        let mut to_point = [center[0] + a * self.half[0], center[1] + b * self.half[1], center[2]];
         let mut solid_angle = 0.0;
         if is_rectangle {
-            let view = SphericalRectangle::new(center, light.half);
+            let view = SphericalRectangle::new(center, self.half);
             solid_angle = view.solid_angle;
             let [x, y] = view.point(u);
             let is_large = solid_angle >= MIN_SOLID_ANGLE;
             to_point[0] = if is_large { x } else { to_point[0] };
             to_point[1] = if is_large { y } else { to_point[1] };
         }
-        // Compute the ray to it
+        // Compute the direction to it
         let mut distance2 = 0.0;
         for axis in 0..3 {
             distance2 += to_point[axis] * to_point[axis];
         }
         let distance = distance2.sqrt();
+        let mut direction = [0.0; 3];
         for axis in 0..3 {
             let mut along = 0.0;
             for own in 0..3 {
-                along += to_point[own] * light.axes[own][axis];
+                along += to_point[own] * self.axes[own][axis];
             }
-            samples.rays.origin[axis][l] = start[axis][l];
-            samples.rays.direction[axis][l] = along / distance;
+            direction[axis] = along / distance;
         }
-        samples.rays.t_min[l] = 0.0;
-        samples.rays.t_max[l] = distance;
         // Only points in front of the light are lit
         let height = -center[2];
         let is_in_front = height > 0.0;
-        for axis in 0..3 {
-            samples.radiance[axis][l] = if is_in_front { light.radiance[axis] } else { 0.0 };
-        }
         let is_large = solid_angle >= MIN_SOLID_ANGLE;
-        let of_area = pdf_of_area(distance2, height, area);
+        let of_area = pdf_of_area(distance2, height, self.area());
         let pdf = if is_large { 1.0 / solid_angle } else { of_area };
-        samples.pdf[l] = if is_in_front { pdf } else { 1.0 };
+        LightSample {
+            direction,
+            distance,
+            radiance: if is_in_front { self.radiance } else { Vec3::ZERO },
+            pdf: if is_in_front { pdf } else { 1.0 },
+        }
     }
 }
 
-lane_kernel! {
-    fn sample_panel(
-        light: &PanelLight,
-        start: &Lanes3,
-        u: &[Lanes; 2],
-        samples: &mut LightSamples,
-    ) = sample_panel_body;
-}
+impl LightExtent for PanelLight {
+    #[inline(always)]
+    fn radiance(&self) -> Vec3 {
+        self.radiance
+    }
 
-#[inline(always)]
-fn intersect_panel_body(light: &PanelLight, rays: &RayPacket, emission: &mut Emission) {
-    let is_rectangle = light.outline == Outline::Rectangle;
-    let area = light.area();
-    let mut lanes = 0;
-    for l in 0..LANES {
+    #[inline(always)]
+    fn hit(&self, origin: [f32; 3], direction: [f32; 3]) -> LightHit {
+        let is_rectangle = self.outline == Outline::Rectangle;
         // Intersect the ray with the plane of the light
-        let o = [rays.origin[0][l], rays.origin[1][l], rays.origin[2][l]];
-        let center = light.center_from(o);
+        let center = self.center_from(origin);
         let mut along = [0.0; 3];
         for own in 0..3 {
             for axis in 0..3 {
-                along[own] += rays.direction[axis][l] * light.axes[own][axis];
+                along[own] += direction[axis] * self.axes[own][axis];
             }
         }
         let t = center[2] / along[2];
-        let a = (along[0] * t - center[0]) / light.half[0];
-        let b = (along[1] * t - center[1]) / light.half[1];
+        let a = (along[0] * t - center[0]) / self.half[0];
+        let b = (along[1] * t - center[1]) / self.half[1];
         // Accept hits in the outline from the front
         let is_within =
             if is_rectangle { a.abs() < 1.0 && b.abs() < 1.0 } else { a * a + b * b < 1.0 };
-        let is_hit = is_within && along[2] < 0.0 && t > 0.0;
-        lanes |= u32::from(is_hit) << l;
-        emission.t[l] = t;
-        let mut pdf = pdf_of_area(t * t, -center[2], area);
+        let mut pdf = pdf_of_area(t * t, -center[2], self.area());
         if is_rectangle {
-            let solid_angle = SphericalRectangle::new(center, light.half).solid_angle;
+            let solid_angle = SphericalRectangle::new(center, self.half).solid_angle;
             pdf = if solid_angle >= MIN_SOLID_ANGLE { 1.0 / solid_angle } else { pdf };
         }
-        emission.pdf[l] = pdf;
+        LightHit { is_hit: is_within && along[2] < 0.0 && t > 0.0, t, pdf }
     }
-    emission.radiance = light.radiance;
-    emission.lanes = lanes;
-}
-
-lane_kernel! {
-    fn intersect_panel(
-        light: &PanelLight,
-        rays: &RayPacket,
-        emission: &mut Emission,
-    ) = intersect_panel_body;
 }

@@ -1,12 +1,11 @@
 //! Point lights.
 
-#![expect(clippy::needless_range_loop, reason = "one index for the lanes of many arrays")]
-
 use glam::Vec3;
 
+use super::lanes::{LightSample, SampledLight, sample_lanes};
 use super::light::{Light, LightSamples, PhotonSource};
 use crate::scene::Falloff;
-use spherule_tree::math::{LANES, Lanes, Lanes3, Supported, lane_kernel};
+use spherule_tree::math::{Lanes, Lanes3, Supported};
 
 /// A light without extent.
 #[derive(Debug, Clone, Copy)]
@@ -22,10 +21,10 @@ impl Light for PointLight {
         &self,
         simd: Supported,
         start: &Lanes3,
-        _u: &[Lanes; 2],
+        u: &[Lanes; 2],
         samples: &mut LightSamples,
     ) {
-        sample_point_light(simd, self, start, samples);
+        sample_lanes(simd, self, start, u, samples);
     }
 
     fn casts_shadow(&self) -> bool {
@@ -40,32 +39,25 @@ impl Light for PointLight {
     }
 }
 
-/// Samples a point light. At the exact position of the light the direction is NaN, so that a material rejects it.
-#[inline(always)]
-fn sample_point_light_body(light: &PointLight, start: &Lanes3, samples: &mut LightSamples) {
-    let has_falloff = light.falloff == Falloff::InverseSquare;
-    for l in 0..LANES {
-        // Compute direction and distance
+impl SampledLight for PointLight {
+    /// At the exact position of the light the direction is NaN, so that a material rejects it.
+    #[inline(always)]
+    fn sampled(&self, point: [f32; 3], _u: [f32; 2]) -> LightSample {
         let mut v = [0.0; 3];
         for axis in 0..3 {
-            v[axis] = light.position[axis] - start[axis][l];
+            v[axis] = self.position[axis] - point[axis];
         }
         let distance = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
         let inverse = 1.0 / distance;
+        let has_falloff = self.falloff == Falloff::InverseSquare;
         let falloff = if has_falloff { 1.0 / (distance * distance) } else { 1.0 };
-        for axis in 0..3 {
-            samples.rays.origin[axis][l] = start[axis][l];
-            samples.rays.direction[axis][l] = v[axis] * inverse;
-            samples.radiance[axis][l] = falloff * light.intensity[axis];
+        LightSample {
+            direction: [v[0] * inverse, v[1] * inverse, v[2] * inverse],
+            distance,
+            radiance: falloff * self.intensity,
+            pdf: f32::INFINITY,
         }
-        samples.rays.t_min[l] = 0.0;
-        samples.rays.t_max[l] = distance;
-        samples.pdf[l] = f32::INFINITY;
     }
-}
-
-lane_kernel! {
-    fn sample_point_light(light: &PointLight, start: &Lanes3, samples: &mut LightSamples) = sample_point_light_body;
 }
 
 #[cfg(test)]

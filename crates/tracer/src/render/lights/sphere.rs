@@ -1,14 +1,15 @@
 //! Spheres that emit the same radiance in all directions, sampled uniformly in the solid angle that they cover.
 
-#![expect(clippy::needless_range_loop, reason = "one index for the lanes of many arrays")]
-
 use std::f32::consts::PI;
 
 use glam::Vec3;
 
+use super::lanes::{
+    LightExtent, LightHit, LightSample, SampledLight, intersect_lanes, sample_lanes,
+};
 use super::light::{Emission, Light, LightSamples, PhotonSource};
 use crate::render::shading::in_cone;
-use spherule_tree::math::{LANES, Lanes, Lanes3, Supported, lane_kernel};
+use spherule_tree::math::{Lanes, Lanes3, Supported};
 use spherule_tree::ray::RayPacket;
 
 /// See the module.
@@ -28,7 +29,7 @@ impl Light for SphereLight {
         u: &[Lanes; 2],
         samples: &mut LightSamples,
     ) {
-        sample_sphere(simd, self, start, u, samples);
+        sample_lanes(simd, self, start, u, samples);
     }
 
     fn has_extent(&self) -> bool {
@@ -48,7 +49,7 @@ impl Light for SphereLight {
     }
 
     fn intersect(&self, simd: Supported, rays: &RayPacket, emission: &mut Emission) {
-        intersect_sphere(simd, self, rays, emission);
+        intersect_lanes(simd, self, rays, emission);
     }
 }
 
@@ -103,75 +104,57 @@ impl View {
     }
 }
 
-#[inline(always)]
-fn sample_sphere_body(
-    light: &SphereLight,
-    start: &Lanes3,
-    u: &[Lanes; 2],
-    samples: &mut LightSamples,
-) {
-    for l in 0..LANES {
-        // Find the cone in which the sphere is seen
+impl SphereLight {
+    /// The sphere as seen from `point`.
+    #[inline(always)]
+    fn view(&self, point: [f32; 3]) -> View {
         let mut to_center = [0.0; 3];
         for axis in 0..3 {
-            to_center[axis] = light.center[axis] - start[axis][l];
+            to_center[axis] = self.center[axis] - point[axis];
         }
-        let view = View::new(to_center, light.radius);
-        // Sample a direction in this cone
-        let direction = in_cone(view.axis, view.cap, [u[0][l], u[1][l]]);
+        View::new(to_center, self.radius)
+    }
+}
+
+impl SampledLight for SphereLight {
+    #[inline(always)]
+    fn sampled(&self, point: [f32; 3], u: [f32; 2]) -> LightSample {
+        // Sample a direction in the cone in which the sphere is seen
+        let view = self.view(point);
+        let direction = in_cone(view.axis, view.cap, u);
         let mut cosine = 0.0;
         for axis in 0..3 {
             cosine += direction[axis] * view.axis[axis];
-            samples.rays.origin[axis][l] = start[axis][l];
-            samples.rays.direction[axis][l] = direction[axis];
-            samples.radiance[axis][l] = light.radiance[axis];
         }
-        // End the shadow ray at the sphere
-        samples.rays.t_min[l] = 0.0;
-        samples.rays.t_max[l] = view.distance(cosine, light.radius);
-        samples.pdf[l] = view.pdf();
+        LightSample {
+            direction,
+            distance: view.distance(cosine, self.radius),
+            radiance: self.radiance,
+            pdf: view.pdf(),
+        }
     }
 }
 
-lane_kernel! {
-    fn sample_sphere(
-        light: &SphereLight,
-        start: &Lanes3,
-        u: &[Lanes; 2],
-        samples: &mut LightSamples,
-    ) = sample_sphere_body;
-}
+impl LightExtent for SphereLight {
+    #[inline(always)]
+    fn radiance(&self) -> Vec3 {
+        self.radiance
+    }
 
-#[inline(always)]
-fn intersect_sphere_body(light: &SphereLight, rays: &RayPacket, emission: &mut Emission) {
-    let mut lanes = 0;
-    for l in 0..LANES {
-        let mut to_center = [0.0; 3];
-        let mut cosine = 0.0;
-        for axis in 0..3 {
-            to_center[axis] = light.center[axis] - rays.origin[axis][l];
-        }
-        let view = View::new(to_center, light.radius);
+    #[inline(always)]
+    fn hit(&self, origin: [f32; 3], direction: [f32; 3]) -> LightHit {
         // Compare the chord to the axis, whose square is twice 1 minus the cosine
-        let mut chord2 = 0.0;
+        let view = self.view(origin);
+        let (mut chord2, mut cosine) = (0.0, 0.0);
         for axis in 0..3 {
-            let difference = rays.direction[axis][l] - view.axis[axis];
+            let difference = direction[axis] - view.axis[axis];
             chord2 += difference * difference;
-            cosine += rays.direction[axis][l] * view.axis[axis];
+            cosine += direction[axis] * view.axis[axis];
         }
-        let is_hit = chord2 < 2.0 * view.cap;
-        lanes |= u32::from(is_hit) << l;
-        emission.t[l] = view.distance(cosine, light.radius);
-        emission.pdf[l] = view.pdf();
+        LightHit {
+            is_hit: chord2 < 2.0 * view.cap,
+            t: view.distance(cosine, self.radius),
+            pdf: view.pdf(),
+        }
     }
-    emission.radiance = light.radiance;
-    emission.lanes = lanes;
-}
-
-lane_kernel! {
-    fn intersect_sphere(
-        light: &SphereLight,
-        rays: &RayPacket,
-        emission: &mut Emission,
-    ) = intersect_sphere_body;
 }

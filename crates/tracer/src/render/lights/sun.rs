@@ -4,9 +4,12 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 
+use super::lanes::{
+    LightExtent, LightHit, LightSample, SampledLight, intersect_lanes, sample_lanes,
+};
 use super::light::{Beam, Emission, Light, LightSamples, PhotonSource};
 use crate::render::shading::in_cone;
-use spherule_tree::math::{LANES, Lanes, Lanes3, Supported, lane_kernel};
+use spherule_tree::math::{Lanes, Lanes3, Supported};
 use spherule_tree::ray::RayPacket;
 
 /// See the module.
@@ -46,7 +49,7 @@ impl Light for SunLight {
         u: &[Lanes; 2],
         samples: &mut LightSamples,
     ) {
-        sample_sun(simd, self, start, u, samples);
+        sample_lanes(simd, self, start, u, samples);
     }
 
     fn has_extent(&self) -> bool {
@@ -66,54 +69,40 @@ impl Light for SunLight {
     }
 
     fn intersect(&self, simd: Supported, rays: &RayPacket, emission: &mut Emission) {
-        intersect_sun(simd, self, rays, emission);
+        intersect_lanes(simd, self, rays, emission);
     }
 }
 
-#[inline(always)]
-fn sample_sun_body(light: &SunLight, start: &Lanes3, u: &[Lanes; 2], samples: &mut LightSamples) {
-    let axis = light.to_light.to_array();
-    let pdf = 1.0 / (2.0 * PI * light.cap);
-    for l in 0..LANES {
-        let direction = in_cone(axis, light.cap, [u[0][l], u[1][l]]);
-        for axis in 0..3 {
-            samples.rays.origin[axis][l] = start[axis][l];
-            samples.rays.direction[axis][l] = direction[axis];
-            samples.radiance[axis][l] = light.radiance[axis];
+impl SampledLight for SunLight {
+    #[inline(always)]
+    fn sampled(&self, _point: [f32; 3], u: [f32; 2]) -> LightSample {
+        LightSample {
+            direction: in_cone(self.to_light.to_array(), self.cap, u),
+            distance: f32::INFINITY,
+            radiance: self.radiance,
+            pdf: 1.0 / (2.0 * PI * self.cap),
         }
-        samples.rays.t_min[l] = 0.0;
-        samples.rays.t_max[l] = f32::INFINITY;
-        samples.pdf[l] = pdf;
     }
 }
 
-lane_kernel! {
-    fn sample_sun(
-        light: &SunLight,
-        start: &Lanes3,
-        u: &[Lanes; 2],
-        samples: &mut LightSamples,
-    ) = sample_sun_body;
-}
+impl LightExtent for SunLight {
+    #[inline(always)]
+    fn radiance(&self) -> Vec3 {
+        self.radiance
+    }
 
-#[inline(always)]
-fn intersect_sun_body(light: &SunLight, rays: &RayPacket, emission: &mut Emission) {
-    let mut lanes = 0;
-    for l in 0..LANES {
+    #[inline(always)]
+    fn hit(&self, _origin: [f32; 3], direction: [f32; 3]) -> LightHit {
         // Compare the chord to the centre, whose square is twice 1 minus the cosine
         let mut chord2 = 0.0;
         for axis in 0..3 {
-            let difference = rays.direction[axis][l] - light.to_light[axis];
+            let difference = direction[axis] - self.to_light[axis];
             chord2 += difference * difference;
         }
-        lanes |= u32::from(chord2 < 2.0 * light.cap) << l;
-        emission.t[l] = f32::INFINITY;
-        emission.pdf[l] = 1.0 / (2.0 * PI * light.cap);
+        LightHit {
+            is_hit: chord2 < 2.0 * self.cap,
+            t: f32::INFINITY,
+            pdf: 1.0 / (2.0 * PI * self.cap),
+        }
     }
-    emission.radiance = light.radiance;
-    emission.lanes = lanes;
-}
-
-lane_kernel! {
-    fn intersect_sun(light: &SunLight, rays: &RayPacket, emission: &mut Emission) = intersect_sun_body;
 }
