@@ -5,9 +5,9 @@
 use glam::Vec3;
 
 use super::{
+    interface::Dielectric,
     light_groups::NO_GROUP,
     lights::{Light, light_of},
-    materials::Dielectric,
     sampler::FilmSampler,
     scratch::SEGMENTS,
     settings::{IntegratorKind, RenderSettings},

@@ -4,8 +4,8 @@ use glam::Vec3;
 
 use super::{
     context::{Interior, RenderContext},
+    interface::{attenuate, leaving},
     light_groups::NO_GROUP,
-    materials::{attenuate, leaving},
     scratch::PacketScratch,
     shading::{add_backdrop, add_background, scale},
     stream::SegmentPacket,

@@ -161,7 +161,7 @@ impl RenderContext<'_> {
     }
 
     /// Reflects the rays of `lanes` at the panes where they end. Rays of `last` are only prepared in
-    /// `packet.points.reflected`, all others are appended to `next`.
+    /// `packet.leaving.reflected`, all others are appended to `next`.
     pub(super) fn reflect_at_panes(
         &self,
         segments: &SegmentPacket,
@@ -170,7 +170,7 @@ impl RenderContext<'_> {
         packet: &mut PacketScratch,
         next: &mut RayStreams,
     ) {
-        let rays = &mut packet.points.reflected;
+        let rays = &mut packet.leaving.reflected;
         for lane in lanes_in(lanes) {
             let hit = packet.hits.get(lane);
             let direction = lane3(&segments.rays.direction, lane);

@@ -17,9 +17,9 @@ use super::{
     context::{Interior, RenderContext},
     dimensions::{BOUNCED, BSDF, CONTINUATION, ENVIRONMENT, LIGHTS},
     integrator::Integrator,
+    interface::{Interface, interface_of},
     layers::LightClass,
     lights::{Light, environment_along, sample_environment},
-    materials::{Material, RoughInterface, material_of},
     roulette::SplitRule,
     sampler::{get_1d_lanes, get_2d_lanes},
     scratch::PacketScratch,
@@ -55,10 +55,8 @@ pub(super) struct PathIntegrator<'a> {
     environment: Option<&'a Environment>,
     /// The BSDFs of opaque surfaces, in the order of the materials of the scene.
     bsdfs: Vec<Box<dyn Bsdf>>,
-    /// The specular surface of transmissive particles.
-    interface: Box<dyn Material>,
-    /// Replaces it if the particles are rough.
-    rough: Option<RoughInterface>,
+    /// The surface of transmissive particles.
+    interface: Box<dyn Interface>,
     split: SplitRule,
     /// Whether rays can hit a light.
     has_extents: bool,
@@ -73,11 +71,7 @@ pub(super) struct PathIntegrator<'a> {
 
 impl<'a> PathIntegrator<'a> {
     pub(super) fn new(context: RenderContext<'a>) -> Self {
-        // Prepare the surface of transmissive particles
         let is_connected = context.connected_particles().is_some();
-        let interface = material_of(context.scene, MaterialId::PARTICLES, is_connected);
-        let material = context.scene.particle_material();
-        let rough = RoughInterface::of(material, interface.constants(), is_connected);
         // Black environments need no samples
         let given = context.scene.environment.as_deref();
         let environment = given.filter(|environment| !environment.is_black());
@@ -85,8 +79,7 @@ impl<'a> PathIntegrator<'a> {
             ambient: AmbientLight::of(context.settings, environment),
             environment,
             bsdfs: context.scene.materials.iter().map(|m| bsdf_of(m.finish)).collect(),
-            interface,
-            rough,
+            interface: interface_of(context.scene.particle_material(), is_connected),
             split: SplitRule::new(context.settings, context.interior),
             catcher: Catcher::of(context.scene),
             ground_light: None,
@@ -441,10 +434,10 @@ impl PathIntegrator<'_> {
         let segments = surface.segments;
         let lanes = self.sample_bsdf(surface, packet);
         if packet.split.is_active {
-            let direction = packet.points.reflected.direction;
+            let direction = packet.leaving.reflected.direction;
             self.divide(surface, &direction, packet);
         }
-        let rays = &mut packet.points.reflected;
+        let rays = &mut packet.leaving.reflected;
         // The last segment of a path may be a shadow ray to the environment
         let max = self.context.settings.bounces;
         let is_last = |l: usize| segments.bounces[l] == max;
@@ -460,10 +453,10 @@ impl PathIntegrator<'_> {
             self.add_last(surface, last, packet);
             packet.split.take_reflected(&packet.radiance);
         }
-        packet.points.reflected.pdf = splat(f32::INFINITY);
+        packet.leaving.reflected.pdf = splat(f32::INFINITY);
     }
 
-    /// Samples directions from the BSDFs: `packet.points.reflected`. Returns the lanes that have one.
+    /// Samples directions from the BSDFs: `packet.leaving.reflected`. Returns the lanes that have one.
     fn sample_bsdf(&self, surface: &Surface<'_>, packet: &mut PacketScratch) -> u32 {
         let (segments, simd) = (surface.segments, self.context.simd);
         let mut u = [splat(0.0); 2];
@@ -472,8 +465,8 @@ impl PathIntegrator<'_> {
             let (bsdf, points) = (&self.bsdfs[material.index()], &packet.surface);
             bsdf.sample(simd, &segments.rays, points, &u, lanes, &mut packet.bounce);
         }
-        let PacketScratch { bounce, points, weight, surface: at, .. } = &mut *packet;
-        let rays = &mut points.reflected;
+        let PacketScratch { bounce, leaving, weight, surface: at, .. } = &mut *packet;
+        let rays = &mut leaving.reflected;
         rays.origin = at.start;
         rays.direction = bounce.direction;
         rays.pdf = bounce.pdf;
@@ -501,7 +494,7 @@ impl PathIntegrator<'_> {
         lanes: u32,
         packet: &mut PacketScratch,
     ) {
-        let (rays, samples) = (&packet.points.reflected, &mut packet.light);
+        let (rays, samples) = (&packet.leaving.reflected, &mut packet.light);
         samples.rays.origin = rays.origin;
         samples.rays.direction = rays.direction;
         samples.rays.t_min = splat(0.0);
@@ -551,8 +544,8 @@ impl PathIntegrator<'_> {
         let last = lanes & self.last_specular(segments, depth);
         (self.context).reflect_at_panes(segments, lanes, last, packet, next);
         if last != 0 {
-            let PacketScratch { points, radiance, groups, .. } = &mut *packet;
-            let rays = &points.reflected;
+            let PacketScratch { leaving, radiance, groups, .. } = &mut *packet;
+            let rays = &leaving.reflected;
             let group = groups.of_mut(self.context.environment_group());
             for sum in [Some(radiance), group].into_iter().flatten() {
                 self.add_seen(&rays.direction, &rays.throughput, last, sum);
@@ -574,16 +567,13 @@ impl PathIntegrator<'_> {
         let (rays, hits, inside) = (&segments.rays, &packet.hits, segments.inside);
         let interface = &self.interface;
         // Find the reflected and refracted rays
-        let (simd, points) = (context.simd, &mut packet.points);
-        match &self.rough {
-            None => interface.shading_points(simd, rays, hits, inside, points),
-            Some(rough) => {
-                let sample = segments.sample.map(|s| s % context.settings.samples);
-                let mut u = [splat(0.0); 2];
-                get_2d_lanes(simd, &segments.path, BSDF, &sample, &mut u);
-                rough.sample_rays(simd, rays, hits, inside, &u, points);
-            }
+        let (simd, mut u) = (context.simd, [splat(0.0); 2]);
+        if interface.is_random() {
+            let sample = segments.sample.map(|s| s % context.settings.samples);
+            get_2d_lanes(simd, &segments.path, BSDF, &sample, &mut u);
         }
+        let (points, leaving) = (&mut packet.surface, &mut packet.leaving);
+        interface.leave(simd, rays, hits, inside, &u, points, leaving);
         // Trace them; the last ones see the environment
         let hits = SpecularHits {
             segments,
@@ -591,12 +581,11 @@ impl PathIntegrator<'_> {
             lanes,
             last: lanes & self.last_specular(segments, depth),
         };
-        let constants = interface.constants();
         let escape = Escape {
             add: &|along, weight, lanes, sum| self.add_seen(along, weight, lanes, sum),
             group: context.environment_group(),
         };
-        context.scatter(constants, &self.split, hits, packet, next, escape);
+        context.scatter(interface.dielectric(), &self.split, hits, packet, next, escape);
     }
 
     /// The lanes of rays that are not traced further at a specular surface: they see the environment.

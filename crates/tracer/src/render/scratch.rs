@@ -5,11 +5,11 @@ use super::{
     aov::DataSample,
     bsdf::{BsdfSamples, BsdfValues, SurfacePoints},
     entries::Entries,
+    interface::LeavingRays,
     layers::{Layers, LightClass},
     light_groups::GroupLight,
     light_split::LightSplit,
     lights::LightSamples,
-    materials::ShadingPoints,
     near_photons::{NEIGHBOURS, NearPhoton, NearPhotons, Neighbour},
     ray_counts::RayCounts,
     sample_layers::SampleLayers,
@@ -80,7 +80,7 @@ pub(super) struct PacketScratch {
     pub(super) radiance: Lanes3,
     /// Base colours of the surfaces.
     pub(super) base: Lanes3,
-    pub(super) points: ShadingPoints,
+    pub(super) leaving: LeavingRays,
     /// Points on opaque surfaces, for path tracing.
     pub(super) surface: SurfacePoints,
     pub(super) bsdf: BsdfValues,

@@ -4,8 +4,8 @@
 use super::{
     context::{Interior, RenderContext},
     dimensions::{REFLECTED, REFRACTED},
+    interface::Dielectric,
     layers::LightClass,
-    materials::WhittedMaterial,
     roulette::SplitRule,
     scratch::PacketScratch,
     shading::scale,
@@ -37,7 +37,7 @@ impl RenderContext<'_> {
     /// Appends the rays that leave the shading points of `hits` to `next`.
     pub(super) fn scatter(
         &self,
-        material: &WhittedMaterial,
+        dielectric: &Dielectric,
         split: &SplitRule,
         hits: SpecularHits<'_>,
         packet: &mut PacketScratch,
@@ -49,22 +49,22 @@ impl RenderContext<'_> {
         if self.interior != Interior::Opaque {
             self.split_weights(split, hits, packet);
         }
-        let PacketScratch { points, throughput, radiance, split: lights, groups, .. } = packet;
+        let PacketScratch { leaving, throughput, radiance, split: lights, groups, .. } = packet;
         // Describe both rays: weight, stream, side and branch of the path
         let (inside, other_side) = match self.interior {
             Interior::Opaque | Interior::Spheres => (0, 0),
             Interior::Body => (segments.inside, !segments.inside),
         };
         let reflected = (
-            material.reflection,
-            &mut points.reflected,
+            dielectric.reflection,
+            &mut leaving.reflected,
             &mut next.reflected,
             inside,
             (REFLECTED, LightClass::Reflection),
         );
         let refracted = (
-            material.dielectric.transmission,
-            &mut points.refracted,
+            dielectric.transmission,
+            &mut leaving.refracted,
             &mut next.refracted,
             other_side,
             (REFRACTED, LightClass::Refraction),
@@ -94,8 +94,8 @@ impl RenderContext<'_> {
     /// Chooses which of the two rays that leave the shading points of `hits` are traced, and their weights.
     fn split_weights(&self, split: &SplitRule, hits: SpecularHits<'_>, packet: &mut PacketScratch) {
         let segments = hits.segments;
-        let points = &mut packet.points;
-        let (reflected, refracted) = (&mut points.reflected.weight, &mut points.refracted.weight);
+        let leaving = &mut packet.leaving;
+        let (reflected, refracted) = (&mut leaving.reflected.weight, &mut leaving.refracted.weight);
         for lane in lanes_in(hits.lanes & !hits.last) {
             let arriving = match segments.bounces[lane] {
                 0 => lane3(&packet.throughput, lane).max_element(),

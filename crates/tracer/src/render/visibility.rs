@@ -8,8 +8,8 @@
 
 use super::{
     context::{Interior, RenderContext},
+    interface::{attenuate, cross_straight},
     lights::LightSamples,
-    materials::{attenuate, cross_straight},
     ray_counts::RayCounts,
     shading::product,
     stream::SegmentPacket,

@@ -7,26 +7,65 @@
 use glam::Vec3;
 
 use super::{
+    bsdf::{BlinnPhong, eval_lanes, reflect_samples, surface_points},
     context::{Interior, RenderContext},
     integrator::Integrator,
+    interface::{Interface, smooth_interface_of},
     layers::LightClass,
     light_groups::NO_GROUP,
     light_split::ratio,
-    materials::{Material, WhittedMaterial, material_of, reflect_lights},
+    lights::LightSamples,
     roulette::SplitRule,
     scratch::PacketScratch,
     shading::{add, add_background, product, scale},
     specular::{Escape, SpecularHits},
     stream::{RayStreams, SegmentPacket},
 };
-use crate::surface::MaterialId;
+use crate::scene::{Material, MaterialId, Owner};
 use spherule_tree::math::splat;
+
+/// Highlights of clear bodies below this fraction of the light count as dark.
+const MIN_HIGHLIGHT: f32 = 1.0 / 4096.0;
+
+/// A material as defined by equation 4.1 of the thesis.
+struct WhittedMaterial {
+    /// `Ka` times the ambient light, linear RGB.
+    ambient: Vec3,
+    bsdf: BlinnPhong,
+    /// Whether lights illuminate it only from outside.
+    is_body: bool,
+    /// The surface that rays leave, if any do.
+    interface: Option<Box<dyn Interface>>,
+}
+
+impl WhittedMaterial {
+    /// A `material` under this ambient light. `is_body`: it is that of one connected body.
+    fn new(material: &Material, ambient_light: Vec3, is_body: bool) -> Self {
+        let is_body = is_body && material.transmission > 0.0;
+        let sends_rays = material.reflection > 0.0 || material.transmission > 0.0;
+        let mut found = Self {
+            ambient: material.ambient * ambient_light,
+            bsdf: BlinnPhong::new(material),
+            is_body,
+            interface: sends_rays.then(|| smooth_interface_of(material, is_body)),
+        };
+        if is_body && !found.has_color() {
+            found.bsdf.min_highlight = MIN_HIGHLIGHT;
+        }
+        found
+    }
+
+    /// Whether its base colour is visible.
+    fn has_color(&self) -> bool {
+        self.ambient != Vec3::ZERO || self.bsdf.diffuse > 0.0
+    }
+}
 
 /// Traces reflected and refracted rays, and samples every light at each intersection.
 pub(super) struct WhittedIntegrator<'a> {
     pub(super) context: RenderContext<'a>,
     /// The materials of the scene, in its order.
-    materials: Vec<Box<dyn Material>>,
+    materials: Vec<WhittedMaterial>,
     /// Decides which of two rays are traced.
     pub(super) split: SplitRule,
 }
@@ -34,16 +73,20 @@ pub(super) struct WhittedIntegrator<'a> {
 impl<'a> WhittedIntegrator<'a> {
     pub(super) fn new(context: RenderContext<'a>) -> Self {
         let is_connected = context.connected_particles().is_some();
-        let of_id = |id| material_of(context.scene, id, is_connected);
+        let material = |material: &Material| {
+            let is_body = material.owner == Owner::Particles && is_connected;
+            WhittedMaterial::new(material, context.scene.ambient_light, is_body)
+        };
         Self {
-            materials: context.scene.ids().map(of_id).collect(),
+            materials: context.scene.materials.iter().map(material).collect(),
             split: SplitRule::new(context.settings, context.interior),
             context,
         }
     }
 
-    fn particle_constants(&self) -> &WhittedMaterial {
-        self.materials[MaterialId::PARTICLES.index()].constants()
+    /// Whether the base colours of the particles are visible.
+    fn has_particle_color(&self) -> bool {
+        self.materials[MaterialId::PARTICLES.index()].has_color()
     }
 }
 
@@ -74,28 +117,31 @@ impl Integrator for WhittedIntegrator<'_> {
         if packet.hits.mask & !held_out == 0 {
             return;
         }
-        context.base_colors(segments, self.particle_constants().has_color(), packet);
+        context.base_colors(segments, self.has_particle_color(), packet);
         // Shade the intersections of each material
         for (id, lanes) in packet.hits.materials_of(!held_out) {
             let material = &self.materials[id.index()];
-            let (rays, inside) = (&segments.rays, segments.inside);
-            material.shading_points(context.simd, rays, &packet.hits, inside, &mut packet.points);
-            let lit = material.lit_lanes(lanes, inside);
-            self.add_direct_light(segments, &**material, lit, depth, packet);
-            if material.constants().sends_rays() {
+            let (simd, rays, inside) = (context.simd, &segments.rays, segments.inside);
+            let PacketScratch { hits, base, surface, leaving, .. } = &mut *packet;
+            surface_points(simd, rays, hits, base, surface);
+            if let Some(interface) = &material.interface {
+                interface.leave(simd, rays, hits, inside, &[splat(0.0); 2], surface, leaving);
+            }
+            let lit = if material.is_body { lanes & !inside } else { lanes };
+            self.add_direct_light(segments, material, lit, depth, packet);
+            if let Some(interface) = &material.interface {
                 // At the last depth, rays see the background
                 let is_last = depth >= context.settings.max_depth;
                 let hits =
                     SpecularHits { segments, depth, lanes, last: if is_last { lanes } else { 0 } };
-                let (constants, split) = (material.constants(), &self.split);
-                let (simd, background) = (context.simd, &context.background);
+                let (dielectric, background) = (interface.dielectric(), &context.background);
                 let escape = Escape {
                     add: &|along, weight, lanes, sum| {
                         add_background(simd, background, along, weight, lanes, sum);
                     },
                     group: NO_GROUP,
                 };
-                context.scatter(constants, split, hits, packet, next, escape);
+                context.scatter(dielectric, &self.split, hits, packet, next, escape);
             }
         }
     }
@@ -106,7 +152,7 @@ impl WhittedIntegrator<'_> {
     fn add_direct_light(
         &self,
         segments: &SegmentPacket,
-        material: &dyn Material,
+        material: &WhittedMaterial,
         lanes: u32,
         depth: u32,
         packet: &mut PacketScratch,
@@ -114,22 +160,23 @@ impl WhittedIntegrator<'_> {
         if lanes == 0 {
             return;
         }
-        self.add_ambient(material.constants(), lanes, packet);
-        if material.constants().scatters() {
-            self.add_lights(segments, material, lanes, depth, packet);
+        self.add_ambient(material.ambient, lanes, packet);
+        if material.bsdf.scatters() {
+            self.add_lights(segments, &material.bsdf, lanes, depth, packet);
         }
     }
 
     /// Adds ambient light at the shading points of `lanes`, and leaves their throughput with opacity in `packet.weight`.
-    fn add_ambient(&self, constants: &WhittedMaterial, lanes: u32, packet: &mut PacketScratch) {
+    fn add_ambient(&self, ambient: Vec3, lanes: u32, packet: &mut PacketScratch) {
         let simd = self.context.simd;
-        let PacketScratch { hits, throughput, radiance, base, weight, split, groups, .. } = packet;
+        let PacketScratch { hits, throughput, radiance, surface, weight, split, groups, .. } =
+            packet;
         scale(simd, throughput, &hits.opacity, weight);
         let mut colored = [splat(0.0); 3];
-        product(simd, base, weight, &mut colored);
-        add(simd, &colored, &constants.ambient, lanes, radiance);
+        product(simd, &surface.albedo, weight, &mut colored);
+        add(simd, &colored, &ambient, lanes, radiance);
         if let Some(group) = groups.of_mut(NO_GROUP) {
-            add(simd, &colored, &constants.ambient, lanes, group);
+            add(simd, &colored, &ambient, lanes, group);
         }
         split.take(LightClass::Diffuse, radiance);
     }
@@ -138,16 +185,16 @@ impl WhittedIntegrator<'_> {
     fn add_lights(
         &self,
         segments: &SegmentPacket,
-        material: &dyn Material,
+        bsdf: &BlinnPhong,
         lanes: u32,
         depth: u32,
         packet: &mut PacketScratch,
     ) {
-        let (simd, constants) = (self.context.simd, material.constants());
+        let simd = self.context.simd;
         let PacketScratch {
             radiance,
-            base,
-            points,
+            surface: points,
+            bsdf: values,
             light: samples,
             crossings,
             weight,
@@ -161,14 +208,18 @@ impl WhittedIntegrator<'_> {
             light.sample_li(simd, &points.start, &[splat(0.0); 2], samples);
             let rays = &segments.rays;
             let arriving = split.is_active.then(|| samples.clone());
-            material.reflect(simd, rays, points, base, weight, lanes, samples);
+            let mut reflect = |bsdf: &BlinnPhong, samples: &mut LightSamples| {
+                let along = &samples.rays.direction;
+                eval_lanes(simd, bsdf, rays, points, along, lanes, values);
+                reflect_samples(simd, values, weight, false, lanes, samples);
+            };
+            reflect(bsdf, samples);
             if samples.lanes == 0 {
                 continue;
             }
             if let Some(mut matte) = arriving {
                 // Reflect the light without the highlight
-                let constants = &WhittedMaterial { specular: 0.0, ..*constants };
-                reflect_lights(simd, constants, rays, points, base, weight, lanes, &mut matte);
+                reflect(&bsdf.matte(), &mut matte);
                 split.diffuse = ratio(&matte.radiance, &samples.radiance);
             }
             // Test which light arrives, and add it to the picture and its layers

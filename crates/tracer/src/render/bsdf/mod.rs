@@ -12,6 +12,7 @@ use crate::surface::Intersections;
 use spherule_tree::math::{LANES, Lanes, Lanes3, Supported, lane_kernel};
 use spherule_tree::ray::RayPacket;
 
+mod blinn_phong;
 #[cfg(test)]
 mod finish_tests;
 mod foam;
@@ -23,10 +24,12 @@ mod point;
 #[cfg(test)]
 mod tests;
 
+pub(super) use blinn_phong::BlinnPhong;
 use foam::Foam;
 use matte::Matte;
 use metal::Metal;
 use plastic::Plastic;
+pub(super) use point::eval_lanes;
 
 /// Points on opaque surfaces.
 #[derive(Debug, Clone, Default)]

@@ -13,7 +13,7 @@ const MIN_COSINE: f32 = 1e-4;
 
 /// A point on an opaque surface. Directions are unit vectors that lead away from it.
 #[derive(Clone, Copy)]
-pub(super) struct SurfacePoint {
+pub(in crate::render) struct SurfacePoint {
     /// Shading normal, on the side of the ray.
     pub(super) normal: [f32; 3],
     /// Geometric normal, on the side of the ray.
@@ -72,7 +72,7 @@ pub(super) struct PointSample {
 }
 
 /// Reflection of light at a point.
-pub(super) trait PointBsdf: Sync {
+pub(in crate::render) trait PointBsdf: Sync {
     /// The BSDF times the cosine with the normal, for light from direction `into`, and the probability density with
     /// which the direction is sampled, per steradian.
     fn value(&self, at: &SurfacePoint, into: [f32; 3]) -> ([f32; 3], f32);
@@ -199,7 +199,7 @@ fn eval_body<B: PointBsdf>(
 
 lane_kernel! {
     /// [`Bsdf::eval`].
-    pub(super) fn eval_lanes<B: PointBsdf>(
+    pub(in crate::render) fn eval_lanes<B: PointBsdf>(
         bsdf: &B,
         rays: &RayPacket,
         points: &SurfacePoints,

@@ -97,7 +97,7 @@ impl Beam {
 pub(in crate::render) struct LightSamples {
     /// Rays to the light.
     pub(in crate::render) rays: RayPacket,
-    /// Radiance that arrives along each ray; after `Material::reflect`, the radiance that arrives at the sample of
+    /// Radiance that arrives along each ray; after its reflection, the radiance that arrives at the sample of
     /// the image.
     pub(in crate::render) radiance: Lanes3,
     /// Probability density of each direction, per steradian; infinite for lights without extent, whose `radiance` is

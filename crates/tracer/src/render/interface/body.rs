@@ -1,51 +1,52 @@
 //! The surface of one connected transmissive body. Light sources illuminate it only from outside; from inside it only
 //! reflects and refracts.
 
-use super::material::Material;
-use super::points::ShadingPoints;
-use super::whitted::WhittedMaterial;
+use super::{Dielectric, Interface, LeavingRays};
+use crate::render::bsdf::SurfacePoints;
 use crate::surface::Intersections;
-use spherule_tree::math::{LANES, Supported, lane_kernel};
+use spherule_tree::math::{LANES, Lanes, Lanes3, Supported, lane_kernel};
 use spherule_tree::ray::RayPacket;
 
 /// Minimum cosine between a ray and a normal: interpolated normals may face away from grazing rays.
 const GRAZING: f32 = 1e-3;
 
-/// The material of a connected transmissive body, see the module.
+/// The interface of a connected transmissive body, see the module.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Interface(pub(super) WhittedMaterial);
+pub(super) struct BodyInterface(pub(super) Dielectric);
 
-impl Material for Interface {
-    fn constants(&self) -> &WhittedMaterial {
+impl Interface for BodyInterface {
+    fn dielectric(&self) -> &Dielectric {
         &self.0
     }
 
-    fn shading_points(
+    fn leave(
         &self,
         simd: Supported,
         rays: &RayPacket,
         hits: &Intersections,
         inside: u32,
-        points: &mut ShadingPoints,
+        _u: &[Lanes; 2],
+        points: &mut SurfacePoints,
+        leaving: &mut LeavingRays,
     ) {
-        interface_points(simd, &self.0, rays, hits, inside, points);
-    }
-
-    fn lit_lanes(&self, lanes: u32, inside: u32) -> u32 {
-        lanes & !inside
+        let SurfacePoints { normal, start, .. } = points;
+        body_rays(simd, &self.0, rays, hits, inside, normal, start, leaving);
     }
 }
 
-/// The shading points on the surface of one connected body, with reflected and refracted rays; rays of `inside` come
-/// from inside. The shading normal determines their directions; their origins are offset from the surface that rays
+/// The rays that leave the surface of one connected body, with shading normals that face the arriving rays and origins
+/// of shadow rays; rays of `inside` come from inside. The shading normal determines their directions; their origins are offset from the surface that rays
 /// are traced against.
+#[expect(clippy::too_many_arguments, reason = "arrays that do not overlap; see `lane_kernel!`")]
 #[inline(always)]
-fn interface_points_body(
-    material: &WhittedMaterial,
+fn body_rays_body(
+    dielectric: &Dielectric,
     rays: &RayPacket,
     hits: &Intersections,
     inside: u32,
-    points: &mut ShadingPoints,
+    normal: &mut Lanes3,
+    start: &mut Lanes3,
+    leaving: &mut LeavingRays,
 ) {
     for l in 0..LANES {
         // Orient the shading normal to the side of the ray
@@ -74,8 +75,8 @@ fn interface_points_body(
         }
         // Compute the Fresnel reflectance, and the directions of both rays
         let cosine = -(d[0] * n[0] + d[1] * n[1] + d[2] * n[2]);
-        let ratio = if is_inside { material.dielectric.ior } else { 1.0 / material.dielectric.ior };
-        let (r, sin2_out) = material.dielectric.fresnel(cosine, ratio);
+        let ratio = if is_inside { dielectric.ior } else { 1.0 / dielectric.ior };
+        let (r, sin2_out) = dielectric.fresnel(cosine, ratio);
         let rest = 1.0 - sin2_out;
         let along_normal = ratio * cosine - (if rest > 0.0 { rest } else { 0.0 }).sqrt();
         let mut refracted = [0.0; 3];
@@ -95,25 +96,27 @@ fn interface_points_body(
         for axis in 0..3 {
             let step = hits.offset[l] * (hits.normal[axis][l] * side);
             let refracted = refracted[axis] * inverse_refracted;
-            points.normal[axis][l] = n[axis];
-            points.start[axis][l] = hits.anchor[axis][l] + step;
-            points.reflected.origin[axis][l] = hits.anchor[axis][l] + step;
-            points.reflected.direction[axis][l] = reflected[axis] * inverse_reflected;
-            points.refracted.origin[axis][l] = hits.anchor[axis][l] - step;
-            points.refracted.direction[axis][l] = if has_refracted { refracted } else { d[axis] };
+            normal[axis][l] = n[axis];
+            start[axis][l] = hits.anchor[axis][l] + step;
+            leaving.reflected.origin[axis][l] = hits.anchor[axis][l] + step;
+            leaving.reflected.direction[axis][l] = reflected[axis] * inverse_reflected;
+            leaving.refracted.origin[axis][l] = hits.anchor[axis][l] - step;
+            leaving.refracted.direction[axis][l] = if has_refracted { refracted } else { d[axis] };
         }
         // Weight the rays
-        points.reflected.weight[l] = material.reflection * r;
-        points.refracted.weight[l] = material.dielectric.transmission * (1.0 - r);
+        leaving.reflected.weight[l] = dielectric.reflection * r;
+        leaving.refracted.weight[l] = dielectric.transmission * (1.0 - r);
     }
 }
 
 lane_kernel! {
-    fn interface_points(
-        material: &WhittedMaterial,
+    fn body_rays(
+        dielectric: &Dielectric,
         rays: &RayPacket,
         hits: &Intersections,
         inside: u32,
-        points: &mut ShadingPoints,
-    ) = interface_points_body;
+        normal: &mut Lanes3,
+    start: &mut Lanes3,
+    leaving: &mut LeavingRays,
+    ) = body_rays_body;
 }

@@ -10,13 +10,13 @@
 
 #![expect(clippy::needless_range_loop, reason = "one index for the lanes of many arrays")]
 
-use super::points::ShadingPoints;
-use super::whitted::WhittedMaterial;
+use super::{Dielectric, Interface, LeavingRays};
+use crate::render::bsdf::SurfacePoints;
 use crate::render::bsdf::microfacet::{
     Albedo, Ggx, direction_at, dot, mean_over_square, mirror, normalized,
 };
 use crate::render::shading::{tangents, to_world};
-use crate::scene;
+use crate::scene::Material;
 use crate::surface::Intersections;
 use spherule_tree::math::{LANES, Lanes, Supported, lane_kernel, larger};
 use spherule_tree::ray::RayPacket;
@@ -26,53 +26,58 @@ const MIN_COSINE: f32 = 1e-3;
 
 /// The rough interface of transmissive particles, see the module.
 #[derive(Debug, Clone)]
-pub(in crate::render) struct RoughInterface {
-    material: WhittedMaterial,
+pub(super) struct RoughInterface {
+    dielectric: Dielectric,
     ggx: Ggx,
     /// The part of the light that leaves after one microfacet, for rays from outside and from inside.
-    leaving: [Albedo; 2],
+    passing: [Albedo; 2],
     /// Whether the particles bound one body, which has shading normals, and whose rays are on one side of it.
     is_connected: bool,
 }
 
 impl RoughInterface {
-    /// The interface of `material`, unless it is smooth. `constants` are those of the same material.
-    pub(in crate::render) fn of(
-        material: &scene::Material,
-        constants: &WhittedMaterial,
-        is_connected: bool,
-    ) -> Option<Self> {
+    /// The interface of `material`, unless it is smooth.
+    pub(super) fn of(material: &Material, is_connected: bool) -> Option<Self> {
         if material.interface_roughness <= 0.0 {
             return None;
         }
-        let ggx = Ggx::new(material.interface_roughness);
-        let leaving = [1.0 / material.ior, material.ior].map(|ratio| {
+        let (dielectric, ggx) = (Dielectric::new(material), Ggx::new(material.interface_roughness));
+        let passing = [1.0 / material.ior, material.ior].map(|ratio| {
             Albedo::tabulated(|cosine| {
                 let out = direction_at(cosine);
-                mean_over_square(|u| leave(&ggx, constants, out, ratio, u).weights.iter().sum())
+                mean_over_square(|u| leave(&ggx, &dielectric, out, ratio, u).weights.iter().sum())
             })
         });
-        Some(Self { material: *constants, ggx, leaving, is_connected })
+        Some(Self { dielectric, ggx, passing, is_connected })
+    }
+}
+
+impl Interface for RoughInterface {
+    fn dielectric(&self) -> &Dielectric {
+        &self.dielectric
     }
 
-    /// Samples the rays that leave the intersections of a packet, by `u` in the unit square: `points.reflected` and
-    /// `points.refracted`. Rays of `inside` come from inside a connected body.
-    pub(in crate::render) fn sample_rays(
+    fn is_random(&self) -> bool {
+        true
+    }
+
+    fn leave(
         &self,
         simd: Supported,
         rays: &RayPacket,
         hits: &Intersections,
         inside: u32,
         u: &[Lanes; 2],
-        points: &mut ShadingPoints,
+        _points: &mut SurfacePoints,
+        leaving: &mut LeavingRays,
     ) {
-        rough_rays(simd, self, rays, hits, inside, u, points);
+        rough_rays(simd, self, rays, hits, inside, u, leaving);
     }
 }
 
 /// The rays that leave a microfacet.
 #[derive(Debug, Clone, Copy)]
-struct LeavingRays {
+struct MicrofacetRays {
     reflected: [f32; 3],
     refracted: [f32; 3],
     /// Weights of both: Fresnel's, times the part that other microfacets do not block.
@@ -84,22 +89,22 @@ struct LeavingRays {
 #[inline(always)]
 fn leave(
     ggx: &Ggx,
-    material: &WhittedMaterial,
+    dielectric: &Dielectric,
     out: [f32; 3],
     ratio: f32,
     u: [f32; 2],
-) -> LeavingRays {
+) -> MicrofacetRays {
     let h = ggx.sample_normal(out, u);
     // Reflect and refract the ray at the microfacet
     let cosine = larger(dot(out, h), 0.0);
-    let (r, sin2_out) = material.dielectric.fresnel(cosine, ratio);
+    let (r, sin2_out) = dielectric.fresnel(cosine, ratio);
     let along = ratio * cosine - larger(1.0 - sin2_out, 0.0).sqrt();
     let reflected = mirror(out, h);
     let refracted = [0, 1, 2].map(|axis| along * h[axis] - ratio * out[axis]);
     // A reflected ray that goes down, and a refracted one that goes up, meet another microfacet
     let of_reflected = if reflected[2] > 0.0 { r } else { 0.0 };
     let of_refracted = if refracted[2] < 0.0 { 1.0 - r } else { 0.0 };
-    LeavingRays {
+    MicrofacetRays {
         reflected,
         refracted,
         weights: [
@@ -115,7 +120,7 @@ fn passed(ggx: &Ggx, out: f32, into: f32) -> f32 {
     ggx.shadowing(out, larger(into, 1e-6)) / ggx.masking(out)
 }
 
-/// See [`RoughInterface::sample_rays`].
+/// See [`Interface::leave`].
 #[inline(always)]
 fn rough_rays_body(
     interface: &RoughInterface,
@@ -123,9 +128,9 @@ fn rough_rays_body(
     hits: &Intersections,
     inside: u32,
     u: &[Lanes; 2],
-    points: &mut ShadingPoints,
+    leaving: &mut LeavingRays,
 ) {
-    let material = &interface.material;
+    let dielectric = &interface.dielectric;
     for l in 0..LANES {
         let mut out = [0.0; 3];
         let mut n = [0.0; 3];
@@ -146,24 +151,24 @@ fn rough_rays_body(
         let [s, t] = tangents(normal);
         let up = larger(dot(out, normal), MIN_COSINE);
         let local = normalized([dot(out, s), dot(out, t), up]);
-        let ratio = if is_inside { material.dielectric.ior } else { 1.0 / material.dielectric.ior };
-        let leaving = leave(&interface.ggx, material, local, ratio, [u[0][l], u[1][l]]);
+        let ratio = if is_inside { dielectric.ior } else { 1.0 / dielectric.ior };
+        let found = leave(&interface.ggx, dielectric, local, ratio, [u[0][l], u[1][l]]);
         // Add the light that leaves after several microfacets
-        let [outside, inside] = &interface.leaving;
-        let [outside, inside] = [outside.at(local[2]), inside.at(local[2])];
-        let more = 1.0 / if is_inside { inside } else { outside };
-        let reflected = to_world(leaving.reflected, normal);
-        let refracted = to_world(leaving.refracted, normal);
+        let [outside, inside] = &interface.passing;
+        let passing = [outside.at(local[2]), inside.at(local[2])];
+        let more = 1.0 / if is_inside { passing[1] } else { passing[0] };
+        let reflected = to_world(found.reflected, normal);
+        let refracted = to_world(found.refracted, normal);
         for axis in 0..3 {
             let step = hits.offset[l] * (n[axis] * side);
-            points.reflected.origin[axis][l] = hits.anchor[axis][l] + step;
-            points.reflected.direction[axis][l] = reflected[axis];
-            points.refracted.origin[axis][l] = hits.anchor[axis][l] - step;
-            points.refracted.direction[axis][l] = refracted[axis];
+            leaving.reflected.origin[axis][l] = hits.anchor[axis][l] + step;
+            leaving.reflected.direction[axis][l] = reflected[axis];
+            leaving.refracted.origin[axis][l] = hits.anchor[axis][l] - step;
+            leaving.refracted.direction[axis][l] = refracted[axis];
         }
-        points.reflected.weight[l] = material.reflection * leaving.weights[0] * more;
-        let transmission = material.dielectric.transmission;
-        points.refracted.weight[l] = transmission * leaving.weights[1] * more;
+        leaving.reflected.weight[l] = dielectric.reflection * found.weights[0] * more;
+        let transmission = dielectric.transmission;
+        leaving.refracted.weight[l] = transmission * found.weights[1] * more;
     }
 }
 
@@ -174,7 +179,7 @@ lane_kernel! {
         hits: &Intersections,
         inside: u32,
         u: &[Lanes; 2],
-        points: &mut ShadingPoints,
+        leaving: &mut LeavingRays,
     ) = rough_rays_body;
 }
 

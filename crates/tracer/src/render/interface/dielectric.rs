@@ -9,9 +9,11 @@ use spherule_tree::math::functions::exp;
 use spherule_tree::math::{LANES, Lanes, Lanes3, lane_kernel};
 use spherule_tree::ray::RayPacket;
 
-/// The interface of the particles, and the medium inside.
+/// The constants of an interface, and of the medium inside.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::render) struct Dielectric {
+    /// Weight of the reflected ray; 0 if the surface does not mirror.
+    pub(in crate::render) reflection: f32,
     /// Relative index of refraction: inside over outside.
     pub(super) ior: f32,
     r0: f32,
@@ -25,6 +27,7 @@ pub(in crate::render) struct Dielectric {
 impl Dielectric {
     pub(in crate::render) fn new(material: &scene::Material) -> Self {
         Self {
+            reflection: material.reflection,
             ior: material.ior,
             r0: material.r0(),
             is_exact: material.fresnel == Fresnel::Exact,

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use glam::Vec3;
 
 use super::*;
-use crate::render::materials::{Interface, Material as _};
+use crate::render::interface::BodyInterface;
 use crate::scene::Fresnel;
 use spherule_tree::accel::simd::tested_levels::tested_levels;
 use spherule_tree::math::{lane3, splat, splat3};
@@ -13,21 +13,19 @@ use spherule_tree::ray::Ray;
 
 const IOR: f32 = 1.5;
 
-fn glass(roughness: f32) -> scene::Material {
-    scene::Material {
+fn glass(roughness: f32) -> Material {
+    Material {
         reflection: 1.0,
         transmission: 1.0,
         ior: IOR,
         fresnel: Fresnel::Exact,
         interface_roughness: roughness,
-        ..scene::Material::DEFAULT
+        ..Material::DEFAULT
     }
 }
 
 fn rough(roughness: f32) -> RoughInterface {
-    let material = glass(roughness);
-    let constants = WhittedMaterial::new(&material, Vec3::ZERO);
-    RoughInterface::of(&material, &constants, true).expect("it is rough")
+    RoughInterface::of(&glass(roughness), true).expect("it is rough")
 }
 
 /// Outgoing directions by their angle from the normal in degrees.
@@ -110,7 +108,7 @@ fn check_density(roughness: f32, degrees: f32, ratio: f32, reflected: bool) {
     let (mut random, samples) = (Random(7), 100_000_u32);
     let mut counts = [0_u32; BINS[0] * BINS[1]];
     for _ in 0..samples {
-        let rays = leave(&interface.ggx, &interface.material, out, ratio, random.pair());
+        let rays = leave(&interface.ggx, &interface.dielectric, out, ratio, random.pair());
         let [of_reflected, of_refracted] = rays.weights;
         let (direction, weight) =
             if reflected { (rays.reflected, of_reflected) } else { (rays.refracted, of_refracted) };
@@ -177,7 +175,7 @@ fn bsdf(interface: &RoughInterface, ratio: f64, out: [f64; 3], into: [f64; 3]) -
     #[expect(clippy::cast_possible_truncation, reason = "the functions under test are f32")]
     let (cosine, small, up, down) =
         (dot64(out, h) as f32, ratio as f32, out[2] as f32, into[2].abs() as f32);
-    let (r, _) = interface.material.dielectric.fresnel(cosine, small);
+    let (r, _) = interface.dielectric.fresnel(cosine, small);
     let fresnel = if into[2] > 0.0 { r } else { 1.0 - r };
     let weight = f64::from(fresnel * passed(&interface.ggx, up, down));
     weight * direction_density(alpha, ratio, out, into) / into[2].abs()
@@ -215,7 +213,7 @@ fn light_can_go_both_ways() {
 fn leaving(interface: &RoughInterface, degrees: f32, ratio: f32) -> f64 {
     let (mut random, out, samples) = (Random(11), towards(degrees), 20_000_u32);
     let weights = (0..samples).map(|_| {
-        let rays = leave(&interface.ggx, &interface.material, out, ratio, random.pair());
+        let rays = leave(&interface.ggx, &interface.dielectric, out, ratio, random.pair());
         assert!(rays.weights.iter().all(|weight| (0.0..=1.0).contains(weight)));
         f64::from(rays.weights.iter().sum::<f32>())
     });
@@ -227,7 +225,7 @@ fn single_microfacets_lose_light_which_the_tables_add() {
     for (roughness, most) in [(0.2, 0.02), (0.4, 0.1), (0.6, 0.3), (1.0, 0.6)] {
         let interface = rough(roughness);
         for degrees in ANGLES {
-            for (ratio, table) in [1.0 / IOR, IOR].into_iter().zip(&interface.leaving) {
+            for (ratio, table) in [1.0 / IOR, IOR].into_iter().zip(&interface.passing) {
                 let found = leaving(&interface, degrees, ratio);
                 let known = f64::from(table.at(towards(degrees)[2]));
                 assert!(
@@ -259,20 +257,20 @@ fn packet(direction: Vec3) -> (RayPacket, Intersections) {
 #[test]
 fn a_slight_roughness_is_nearly_smooth() {
     let material = glass(0.05);
-    let constants = WhittedMaterial::new(&material, Vec3::ZERO);
-    let smooth = Interface(constants);
+    let smooth = BodyInterface(Dielectric::new(&material));
     let mut random = Random(3);
     for is_connected in [false, true] {
-        let rough = RoughInterface::of(&material, &constants, is_connected).unwrap();
+        let rough = RoughInterface::of(&material, is_connected).unwrap();
         for (direction, inside) in
             [(Vec3::new(0.6, 0.0, -0.8), 0), (Vec3::new(0.3, 0.2, 0.9).normalize(), 0xffff)]
         {
             let (rays, hits) = packet(direction);
-            let [mut expected, mut found] = [ShadingPoints::default(), ShadingPoints::default()];
+            let [mut expected, mut found] = [LeavingRays::default(), LeavingRays::default()];
+            let mut points = SurfacePoints::default();
             for simd in tested_levels().into_iter().map(Supported::or_best) {
                 let u = [0, 1].map(|_| std::array::from_fn(|_| 0.9 * random.next()));
-                smooth.shading_points(simd, &rays, &hits, inside, &mut expected);
-                rough.sample_rays(simd, &rays, &hits, inside, &u, &mut found);
+                smooth.leave(simd, &rays, &hits, inside, &u, &mut points, &mut expected);
+                rough.leave(simd, &rays, &hits, inside, &u, &mut points, &mut found);
                 for (found, expected) in [
                     (&found.reflected, &expected.reflected),
                     (&found.refracted, &expected.refracted),
