@@ -276,7 +276,7 @@ impl Manifest {
         let mut manifest = Self::new("");
         let mut root = Keys::Read(Section::root(&tree, &problems));
         manifest.keys(&mut root);
-        if !tree.contains("render", "integrator") {
+        if !tree.has("render.integrator") {
             manifest.select_integrator(&mut root);
         }
         manifest.check(&mut root);
