@@ -3,34 +3,17 @@
 use super::ResolveError;
 use crate::manifest::{Manifest, Part};
 use crate::pipeline::attribute_list;
-use crate::render::IntegratorKind;
 use crate::scene::PartMaterials;
-use crate::surface::SurfaceKind;
 use crate::survey::{PART_NAMES, Survey};
 
 /// The materials of `[[material.part]]`.
 ///
 /// # Errors
-/// The integrator or the surface cannot use them, or the particles have no parts.
+/// The particles have no parts.
 pub(super) fn parts(manifest: &Manifest, survey: &Survey) -> Result<PartMaterials, ResolveError> {
     let parts = &manifest.material.parts;
     if parts.is_empty() {
         return Ok(PartMaterials::default());
-    }
-    // Refuse settings that have one material only
-    let unsupported = |what: String| ResolveError::Unsupported { key: "material.part", what };
-    if manifest.integrator() != IntegratorKind::Path {
-        return Err(unsupported(
-            "render.integrator = \"whitted\" has one material for all particles; choose \"path\" (--integrator path), \
-             or leave the parts out"
-                .to_owned(),
-        ));
-    }
-    if manifest.surface.kind != SurfaceKind::Spheres {
-        return Err(unsupported(
-            "one body has one material; set render.surface to \"spheres\", or leave the parts out"
-                .to_owned(),
-        ));
     }
     // Find the attribute that divides the particles
     let is_part = |(name, components): (&String, Option<&usize>)| {
@@ -40,10 +23,11 @@ pub(super) fn parts(manifest: &Manifest, survey: &Survey) -> Result<PartMaterial
     let components = survey.components.iter().map(Some).chain(std::iter::repeat(None));
     if survey.most_particles > 0 && !survey.attributes.iter().zip(components).any(is_part) {
         let names = PART_NAMES.map(|name| format!("`{name}`")).join(", ");
-        return Err(unsupported(format!(
+        let what = format!(
             "no attribute says which part a particle is of: it would be called one of {names}; available: {}",
             attribute_list(survey.attributes.iter().map(String::as_str))
-        )));
+        );
+        return Err(ResolveError::Unsupported { key: "material.part", what });
     }
     Ok(PartMaterials::new(parts.iter().map(Part::resolved).collect()))
 }

@@ -13,7 +13,7 @@ use crate::survey::Survey;
 /// The scene at the start of the camera path.
 ///
 /// # Errors
-/// Light, ground or parts are not possible with the other settings.
+/// Light is not possible with the other settings, or the particles have no parts.
 pub(super) fn scene(
     manifest: &Manifest,
     survey: &Survey,
@@ -49,7 +49,7 @@ pub(super) fn scene(
         material: surface::material(manifest, bounds),
         parts: parts::parts(manifest, survey)?,
         background: background(manifest, up.as_vec3()),
-        ground: ground::ground(manifest, &place)?,
+        ground: ground::ground(manifest, &place),
         wet_ground: ground::wet_ground(manifest, &place),
         meshes: meshes::materials(manifest),
         particles: [bounds.min, bounds.max].map(|corner| (corner - survey.origin).as_vec3()),
