@@ -14,7 +14,7 @@ use crate::pipeline::{
     RadiusRule, Setup, Things,
 };
 use crate::render::{RenderSettings, RendererKind};
-use crate::scene::{Bounds, RadianceMap, Scene, Texture};
+use crate::scene::{Bounds, RadianceMap, Texture};
 use crate::survey::Survey;
 
 mod arrows;
@@ -80,6 +80,7 @@ pub fn setup(
     survey: &Survey,
     inputs: SceneInputs<'_>,
 ) -> Result<Setup, ResolveError> {
+    manifest.check_rules()?;
     let survey = camera::with_framed_meshes(survey, manifest, &inputs.meshes);
     let mut setup = setup_on(manifest, &survey, &inputs, None)?;
     let placed = overlay::placed(manifest, &survey, &mut setup);
@@ -132,7 +133,6 @@ fn setup_on(
     page: Option<Page>,
 ) -> Result<Setup, ResolveError> {
     // Place the camera around the spheres
-    let surface = surface::settings(manifest)?;
     let radius = radius::rule(manifest, survey)?;
     let extent = Extent::of(manifest, survey, &radius);
     let placed = camera::placed(manifest, survey, &extent)?;
@@ -146,7 +146,7 @@ fn setup_on(
     let bonds = bonds::bonds(&mut scene, manifest, survey, &color, extent.reach)?;
     // Collect the settings of the images
     let (channels, attributes) = channels::channels(manifest, survey)?;
-    let denoise = denoise::settings(manifest, scene.particle_material())?;
+    let denoise = denoise::settings(manifest, scene.particle_material());
     let render = RenderSettings {
         channels,
         has_features: denoise.is_some(),
@@ -155,7 +155,7 @@ fn setup_on(
     // Put it all together, without overlays
     let picture = Picture {
         origin: survey.origin,
-        particles: particle_rules(manifest, survey, &extent, (radius, color), &scene)?,
+        particles: particle_rules(manifest, survey, &extent, (radius, color))?,
         files: FileSettings {
             exr: images::exr_options(manifest, &attributes, &render, placed.view.projection),
             attributes,
@@ -167,7 +167,7 @@ fn setup_on(
         view: placed.view,
         scene,
         things: Things { meshes, cell, arrows, trails, bonds },
-        surface,
+        surface: manifest.surface,
         renderer: RendererKind::default(),
         step: channels::frame_step(&render.channels, &manifest.output, survey)?,
         render,
@@ -202,7 +202,6 @@ fn particle_rules(
     survey: &Survey,
     extent: &Extent,
     (radius, color): (RadiusRule, ColorRule),
-    scene: &Scene,
 ) -> Result<ParticleRules, ResolveError> {
     Ok(ParticleRules {
         selection: select::selection(manifest, survey)?,
@@ -210,7 +209,7 @@ fn particle_rules(
         radius,
         least_radius: narrow(extent.bounds.diagonal() * MIN_RADIUS).max(f32::MIN_POSITIVE),
         color,
-        opacity: opacity::opacity(manifest, survey, scene.particle_material().transmission > 0.0)?,
+        opacity: opacity::opacity(manifest, survey)?,
     })
 }
 

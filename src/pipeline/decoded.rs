@@ -13,7 +13,7 @@ use super::setup::{ColorRule, OpacityRule, Setup};
 use crate::scene::material::DEFAULT_COLOR;
 use crate::scene::{Camera, ColorMap, MaterialId, PartMaterials, RgbEncoding};
 use crate::survey::{id_of, part_of, velocity_of};
-use spherule_frame::values::{BoundValue, Context, Value};
+use spherule_frame::values::{Context, Value};
 
 mod radii;
 
@@ -334,7 +334,7 @@ fn values_of(
         return Vec::new();
     };
     // The view is checked in advance
-    let is_depth = matches!(value, BoundValue::Depth);
+    let is_depth = matches!(value, Value::Depth);
     let camera = if is_depth { setup.camera_at(number).ok() } else { None };
     let context = DrawnContext { setup, frame, radius, camera };
     let particles = (0..frame.len()).into_par_iter();

@@ -1,7 +1,7 @@
 //! What overlays show of the file of a frame.
 
 use rayon::prelude::*;
-use spherule_frame::values::{BoundValue, Column, Value};
+use spherule_frame::values::{Column, Value};
 
 use super::SharedFrame;
 use super::setup::Setup;
@@ -28,13 +28,10 @@ impl FileFacts {
 }
 
 /// Smallest and largest value in a column of `count` particles.
-pub(super) fn column_range<C: Column + Sync>(
-    value: &BoundValue<C>,
-    count: usize,
-) -> Option<[f64; 2]> {
+pub(super) fn column_range<C: Column + Sync>(value: &Value<C>, count: usize) -> Option<[f64; 2]> {
     match value {
-        BoundValue::Magnitude(column) => range_of(count, |i| column.magnitude(i)),
-        BoundValue::Component(column, component) => range_of(count, |i| column.get(i, *component)),
+        Value::Magnitude(column) => range_of(count, |i| column.magnitude(i)),
+        Value::Component(column, component) => range_of(count, |i| column.get(i, *component)),
         _ => None,
     }
 }

@@ -16,7 +16,7 @@ use crate::accel::Structure;
 use crate::render::{NO_ID, ShadeSource, mean, opacity_of};
 use crate::scene::{ColorMap, MaterialId, PartMaterials, RgbEncoding};
 use crate::survey::{id_of, part_of, velocity_of};
-use spherule_frame::values::{BoundValue, Context, Named, Value};
+use spherule_frame::values::{Context, Named, Value};
 
 /// In frames up to this size (bytes), all data in use are verified with their checksums before tracing. In larger
 /// frames only the nodes are, which are read anyway; rays touch little of the rest.
@@ -433,7 +433,7 @@ enum StoredColor<'a> {
 /// Values of particles in place, none of those that need a copy of the particles.
 #[derive(Debug, Clone, Copy)]
 struct StoredValues<'a> {
-    value: BoundValue<AttributeView<'a>>,
+    value: Value<AttributeView<'a>>,
     time: f64,
 }
 

@@ -53,7 +53,7 @@ pub(super) fn arrows(
 /// How trails are drawn, if they are; see [`arrows`].
 ///
 /// # Errors
-/// The job follows a simulation, or colours are not determined.
+/// Colours are not determined.
 pub(super) fn trails(
     scene: &mut Scene,
     manifest: &Manifest,
@@ -62,17 +62,8 @@ pub(super) fn trails(
     reach: f64,
 ) -> Result<Option<TrailStyle>, ResolveError> {
     let own = &manifest.trails;
-    // Refuse trails that may change later
     if own.frames == 0 {
         return Ok(None);
-    }
-    if manifest.job.follow {
-        return Err(ResolveError::Unsupported {
-            key: "trails.frames",
-            what: "earlier frames may be completed later when job.follow is set; render the sequence when it is \
-                   complete"
-                .to_owned(),
-        });
     }
     // Choose colours, and a radius in proportion to the particles
     let color = rule(&own.color, particles, survey, "velocity", TRAIL_COLOR)?;

@@ -1,6 +1,6 @@
 //! Reasons why there can be no images.
 
-use crate::manifest::nearest;
+use crate::manifest::{ManifestError, nearest};
 use crate::pipeline::attribute_list;
 use crate::scene::{CameraError, PathError};
 use crate::survey::Survey;
@@ -8,6 +8,9 @@ use crate::survey::Survey;
 /// Reasons why there can be no images.
 #[derive(Debug, thiserror::Error)]
 pub enum ResolveError {
+    /// Settings do not go together.
+    #[error(transparent)]
+    Manifest(#[from] ManifestError),
     /// This version does not support a value.
     #[error("{key}: {what}")]
     Unsupported {

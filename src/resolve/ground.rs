@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use super::{ResolveError, surface};
+use super::surface;
 use crate::manifest::{GroundKind, GroundPattern, Manifest};
 use crate::pipeline::Setup;
 use crate::render::IntegratorKind;
@@ -46,13 +46,7 @@ pub(super) struct GroundPlace<'a> {
 }
 
 /// The ground of `render.ground`, if there is one.
-///
-/// # Errors
-/// It is a shadow catcher, but the integrator cannot use one.
-pub(super) fn ground(
-    manifest: &Manifest,
-    place: &GroundPlace<'_>,
-) -> Result<Option<Ground>, ResolveError> {
+pub(super) fn ground(manifest: &Manifest, place: &GroundPlace<'_>) -> Option<Ground> {
     let render = &manifest.render;
     let integrator = manifest.integrator();
     let kind = match &render.ground {
@@ -62,21 +56,13 @@ pub(super) fn ground(
         None => GroundKind::None,
     };
     if kind == GroundKind::None {
-        return Ok(None);
+        return None;
     }
     let is_catcher = kind == GroundKind::ShadowCatcher;
-    if is_catcher && integrator == IntegratorKind::Whitted {
-        return Err(ResolveError::Unsupported {
-            key: "render.ground",
-            what: "render.integrator = \"whitted\" has no shadow catcher; choose \"path\" (--integrator path), or a \
-                   plain ground"
-                .to_owned(),
-        });
-    }
     // Put it under the particles, as a catcher or as a surface
     let mut ground = placed(manifest, place, is_catcher);
     if is_catcher {
-        return Ok(Some(shadow_catcher(ground, place, render.ground_shadow)));
+        return Some(shadow_catcher(ground, place, render.ground_shadow));
     }
     // Colour it
     ground.color = render.ground_color;
@@ -91,7 +77,7 @@ pub(super) fn ground(
         (_, GroundPattern::Sand) => Pattern::Sand { tile: tile() },
         (_, GroundPattern::Plain) => Pattern::Plain,
     };
-    Ok(Some(ground))
+    Some(ground)
 }
 
 /// The ground under the particles or at its height, without colour.
@@ -165,10 +151,7 @@ mod tests {
     const BOUNDS: Bounds =
         Bounds { min: DVec3::new(-1.0, -2.0, 3.0), max: DVec3::new(1.0, 2.0, 7.0) };
 
-    fn of(
-        kind: GroundKind,
-        change: impl Fn(&mut Manifest),
-    ) -> Result<Option<Ground>, ResolveError> {
+    fn of(kind: GroundKind, change: impl Fn(&mut Manifest)) -> Option<Ground> {
         let mut manifest = Manifest::new("in");
         manifest.render.ground = Some(GroundSetting::of(kind));
         change(&mut manifest);
@@ -190,7 +173,7 @@ mod tests {
     #[test]
     fn auto_is_a_shadow_catcher_of_paths_under_particles_on_a_floor() {
         let auto = Manifest::new("in");
-        let found = |manifest: &Manifest, has_layer| ground(manifest, &place(has_layer)).unwrap();
+        let found = |manifest: &Manifest, has_layer| ground(manifest, &place(has_layer));
         assert!(found(&auto, true).is_some_and(|ground| ground.shadow_catcher.is_some()));
         assert_eq!(found(&auto, false), None);
         let mut whitted = auto;
@@ -200,42 +183,32 @@ mod tests {
 
     #[test]
     fn each_kind_has_its_height_and_colour() {
-        assert_eq!(of(GroundKind::None, |_| {}).unwrap(), None);
-        let plain = of(GroundKind::Plain, |_| {}).unwrap().unwrap();
+        assert_eq!(of(GroundKind::None, |_| {}), None);
+        let plain = of(GroundKind::Plain, |_| {}).unwrap();
         assert_eq!((plain.height, plain.pattern), (3.0, Pattern::Plain));
-        let checker = of(GroundKind::Checker, |_| {}).unwrap().unwrap();
+        let checker = of(GroundKind::Checker, |_| {}).unwrap();
         assert!(matches!(checker.pattern, Pattern::Checker { .. }));
         let pattern = |manifest: &mut Manifest| {
             manifest.render.ground_pattern = GroundPattern::Checker;
         };
-        assert_eq!(of(GroundKind::Plain, pattern).unwrap(), Some(checker));
+        assert_eq!(of(GroundKind::Plain, pattern), Some(checker));
         // A shadow catcher goes through the lowest centres, but not far above the lowest points of large spheres, and
         // fades from 2 to 8 diagonals, which are 6 long
-        let catcher =
-            of(GroundKind::ShadowCatcher, |m| m.render.ground_shadow = 0.5).unwrap().unwrap();
+        let catcher = of(GroundKind::ShadowCatcher, |m| m.render.ground_shadow = 0.5).unwrap();
         assert_eq!((catcher.height, catcher.shadow_catcher), (3.0144, Some(0.5)));
         let standing = GroundPlace { is_of_earlier_version: false, ..place(true) };
         let mut manifest = Manifest::new("in");
         manifest.render.ground = Some(GroundSetting::of(GroundKind::ShadowCatcher));
-        assert_eq!(ground(&manifest, &standing).unwrap().unwrap().height, 3.0);
+        assert_eq!(ground(&manifest, &standing).unwrap().height, 3.0);
         // Spheres of different sizes: the lowest one is smaller than most
         let mixed = GroundPlace { lowest: Some(3.4), ..standing };
-        assert_eq!(ground(&manifest, &mixed).unwrap().unwrap().height, 3.4);
+        assert_eq!(ground(&manifest, &mixed).unwrap().height, 3.4);
         let under_body = of(GroundKind::ShadowCatcher, |m| {
             m.surface.kind = SurfaceKind::Union;
         });
-        assert_eq!(under_body.unwrap().unwrap().height, 3.25);
+        assert_eq!(under_body.unwrap().height, 3.25);
         assert_eq!([catcher.fade_start, catcher.fade_end], [12.0, 48.0]);
         let low = of(GroundKind::ShadowCatcher, |m| m.render.ground_height = Some(2.0));
-        assert_eq!(low.unwrap().unwrap().height, 2.0);
-    }
-
-    #[test]
-    fn whitted_has_no_shadow_catcher() {
-        let whitted =
-            |manifest: &mut Manifest| manifest.render.integrator = Some(IntegratorKind::Whitted);
-        let error = of(GroundKind::ShadowCatcher, whitted).unwrap_err().to_string();
-        assert!(error.starts_with("render.ground: ") && error.contains("--integrator path"));
-        assert!(of(GroundKind::Checker, whitted).unwrap().is_some());
+        assert_eq!(low.unwrap().height, 2.0);
     }
 }

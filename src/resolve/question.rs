@@ -3,7 +3,7 @@
 use crate::math::narrow;
 use glam::DVec3;
 
-use super::{camera, color, overlay, surface};
+use super::{camera, color, overlay};
 use crate::manifest::{Manifest, RadiusSetting};
 use crate::selection::Selection;
 use crate::surface::SurfaceKind;
@@ -36,14 +36,17 @@ pub fn question<'a>(manifest: &'a Manifest, selection: &'a Selection) -> Questio
     }
 }
 
-/// What the survey has to determine about the surface, for predictions of memory. Invalid settings are reported by
-/// [`super::setup`].
+/// What the survey has to determine about the surface, for predictions of memory.
 fn surface_question(manifest: &Manifest) -> Option<SurfaceQuestion> {
-    let settings = surface::settings(manifest).ok()?;
+    let settings = manifest.surface;
     let radius = match manifest.input.radius {
         RadiusSetting::Length(radius) => Some(narrow(radius)),
         _ => None,
     };
-    let is_needed = settings.spray || settings.kind == SurfaceKind::Smooth;
+    let is_needed = match settings.kind {
+        SurfaceKind::Spheres => false,
+        SurfaceKind::Union => settings.spray,
+        SurfaceKind::Smooth => true,
+    };
     is_needed.then_some(SurfaceQuestion { settings, radius })
 }

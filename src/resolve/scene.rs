@@ -15,7 +15,7 @@ use crate::survey::Survey;
 /// The scene at the start of the camera path.
 ///
 /// # Errors
-/// Light, ground or parts are not possible with the other settings.
+/// Light is not possible with the other settings, or the particles have no parts.
 pub(super) fn scene(
     manifest: &Manifest,
     survey: &Survey,
@@ -51,7 +51,7 @@ pub(super) fn scene(
         materials: Scene::basic_materials(surface::material(manifest, bounds)),
         parts: PartMaterials::default(),
         background: background(manifest, up.as_vec3()),
-        ground: ground::ground(manifest, &place)?,
+        ground: ground::ground(manifest, &place),
         wet_ground: ground::wet_ground(manifest, &place),
         particles: [bounds.min, bounds.max].map(|corner| (corner - survey.origin).as_vec3()),
         environment,

@@ -6,14 +6,12 @@ use super::ResolveError;
 use super::channels::{UNKNOWN_STEP, has_velocities, step_to_next};
 use crate::manifest::{CameraMode, Manifest};
 use crate::pipeline::{FrameStep, Shutter, attribute_list};
-use crate::surface::{NormalKind, SurfaceKind};
 use crate::survey::Survey;
 
 /// The shutter, if there is motion blur.
 ///
 /// # Errors
-/// There are neither velocities nor ids with another frame, or the time between frames is unknown, or spheres have
-/// other normals than their own.
+/// There are neither velocities nor ids with another frame, or the time between frames is unknown.
 pub(super) fn shutter(
     manifest: &Manifest,
     survey: &Survey,
@@ -23,13 +21,6 @@ pub(super) fn shutter(
         return Ok(None);
     }
     let unsupported = |what: String| ResolveError::Unsupported { key: "camera.shutter", what };
-    let surface = &manifest.surface;
-    let has_own_normals = matches!(surface.normals, NormalKind::Auto | NormalKind::Sphere);
-    if surface.kind == SurfaceKind::Spheres && !has_own_normals {
-        return Err(unsupported(
-            "motion blur of spheres needs surface.normals = \"sphere\"".to_owned(),
-        ));
-    }
     let has_velocities = has_velocities(survey);
     check_motion_source(manifest, survey, has_velocities)?;
     // Without velocities, particles move from one frame to the next whatever the time is

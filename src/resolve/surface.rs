@@ -1,10 +1,9 @@
-//! Surface and material, with checks for settings that contradict each other.
+//! Radius and material of the surface.
 
-use super::ResolveError;
 use crate::manifest::Manifest;
 use crate::math::narrow;
 use crate::scene::{Bounds, Fresnel, Material, material};
-use crate::surface::{NormalKind, SurfaceKind, SurfaceSettings};
+use crate::surface::SurfaceKind;
 use crate::survey::Survey;
 
 /// Default distance at which light takes the colour of absorption, as a fraction of the diagonal of the bounds: a pool
@@ -17,51 +16,6 @@ const OVERLAP: f32 = 1.8;
 
 /// Radius of spheres in a plane, in half distances of neighbours: those of a square lattice cover the area between them.
 const AREA: f32 = std::f32::consts::SQRT_2;
-
-/// The surface that the manifest describes.
-///
-/// # Errors
-/// The settings contradict each other.
-pub(super) fn settings(manifest: &Manifest) -> Result<SurfaceSettings, ResolveError> {
-    let surface = manifest.surface;
-    let unsupported = |key, what: &str| {
-        let what = what.to_owned();
-        Err(ResolveError::Unsupported { key, what })
-    };
-    // Reject normals and options that the surface does not support
-    match (surface.kind, surface.normals) {
-        (SurfaceKind::Spheres, NormalKind::Field) => {
-            return unsupported(
-                "surface.normals",
-                "\"field\" is for one body; for smooth normals of spheres take \"pca\", for one body set \
-                 render.surface to \"union\" or \"smooth\"",
-            );
-        }
-        (SurfaceKind::Smooth, NormalKind::Sphere | NormalKind::Pca) => {
-            return unsupported(
-                "surface.normals",
-                "a smooth surface has the normals of its field; take \"auto\" or \"field\", or set render.surface \
-                 to \"spheres\" or \"union\"",
-            );
-        }
-        _ => {}
-    }
-    // Reject options of other surfaces
-    if surface.exact && surface.kind != SurfaceKind::Smooth {
-        return unsupported(
-            "surface.exact",
-            "is for the smooth surface alone; set render.surface to \"smooth\", or leave it out (spheres are always \
-             exact)",
-        );
-    }
-    if surface.spray && surface.kind == SurfaceKind::Spheres {
-        return unsupported(
-            "surface.spray",
-            "lies beside one body; set render.surface to \"union\" or \"smooth\", or leave it out",
-        );
-    }
-    Ok(surface)
-}
 
 /// Default radius of particles, for frames without radii. Jobs from before the estimate for bodies (`packed_radius`)
 /// use the estimate for spheres.

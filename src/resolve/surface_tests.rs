@@ -7,28 +7,6 @@ fn manifest(text: &str) -> Manifest {
     Manifest::parse(&text, Path::new("job.toml")).unwrap()
 }
 
-#[track_caller]
-fn refused(text: &str, message: &str) {
-    let error = settings(&manifest(text)).unwrap_err().to_string();
-    assert!(error.contains(message), "{error}");
-}
-
-#[test]
-fn settings_come_from_the_manifest() {
-    assert_eq!(settings(&manifest("")).unwrap(), SurfaceSettings::DEFAULT);
-    let found = settings(&manifest(
-        "render.surface = \"smooth\"\n[surface]\nsmoothing = 0.25\nvoxel = 0.5\nspray = true",
-    ));
-    let expected = SurfaceSettings {
-        kind: SurfaceKind::Smooth,
-        smoothing: 0.25,
-        voxel: 0.5,
-        spray: true,
-        ..SurfaceSettings::DEFAULT
-    };
-    assert_eq!(found.unwrap(), expected);
-}
-
 #[test]
 fn each_surface_has_its_own_radius() {
     let found = Survey {
@@ -42,25 +20,6 @@ fn each_surface_has_its_own_radius() {
     let older = Survey { packed_radius: None, ..found };
     for kind in [SurfaceKind::Smooth, SurfaceKind::Union] {
         assert_eq!(radius(kind, &older), Some(0.4));
-    }
-}
-
-#[test]
-fn contradictory_settings_are_rejected() {
-    refused("surface.normals = \"field\"", "surface.normals: \"field\"");
-    refused("surface.exact = true", "surface.exact: is for the smooth");
-    refused("surface.spray = true", "surface.spray: lies beside one body");
-    for normals in ["pca", "sphere"] {
-        let smooth = format!("render.surface = \"smooth\"\nsurface.normals = \"{normals}\"");
-        refused(&smooth, "surface.normals: a smooth surface has");
-    }
-    refused("render.surface = \"union\"\nsurface.exact = true", "surface.exact");
-    for right in [
-        "surface.normals = \"pca\"",
-        "render.surface = \"union\"\nsurface.normals = \"field\"\nsurface.spray = true",
-        "render.surface = \"smooth\"\nsurface.exact = true\nmaterial.absorption = [0, 1, 1]",
-    ] {
-        settings(&manifest(right)).unwrap();
     }
 }
 

@@ -77,5 +77,5 @@ fn one_sample_has_no_noise_to_measure() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 6..=6);
     let arguments = ["still", "in", "-o", "a.png", "--samples", "1", "--denoise"];
-    workshop.run(&arguments).expect(2).prints("render.denoise: needs at least 2 samples per pixel");
+    workshop.run(&arguments).expect(2).prints("--denoise: needs at least 2 samples per pixel");
 }

@@ -3,7 +3,6 @@
 use std::collections::BTreeSet;
 
 use glam::DVec3;
-use serde_json::{Value as Json, json};
 use spherule_tracer::scene::camera::DEFAULT_FOV;
 use spherule_tracer::scene::lens::DEFAULT_SENSOR_WIDTH;
 
@@ -14,9 +13,11 @@ use super::value::named;
 
 mod fit;
 mod projection;
+mod rules;
 
 pub use fit::{BoxSetting, FitSetting};
 pub use projection::{AxisView, ConvergenceSetting, ProjectionKind};
+pub(super) use rules::RULES;
 
 named! {
     /// Placement of the camera.
@@ -173,8 +174,8 @@ impl Camera {
             if !section.has("mode") {
                 self.mode = self.usual_mode();
             }
+            section.check(RULES);
             self.check(section);
-            self.check_projection(section);
         }
     }
 
@@ -186,36 +187,8 @@ impl Camera {
         }
     }
 
+    /// Checks that the view of a fixed camera is valid.
     fn check(&self, section: &Section<'_>) {
-        // Refuse keys that contradict one another
-        if self.center.is_some() && self.mode == CameraMode::Turntable {
-            section
-                .wrong("center", "is given, but a turntable turns around the particles; remove it");
-        }
-        if self.aperture.is_some() && self.f_stop > 0.0 {
-            section.wrong("aperture", "is given, but so is f_stop; remove one of them");
-        }
-        // Only the fixed mode has the keys `eye` and `look_at`, and requires both
-        let own = match self.mode {
-            CameraMode::Auto => Some("the automatic camera chooses its own; set mode = \"fixed\""),
-            CameraMode::Turntable => {
-                Some("a turntable finds its own; azimuth and elevation place it")
-            }
-            CameraMode::Keys => Some("each [[camera.key]] has its own"),
-            CameraMode::Fixed => None,
-        };
-        for key in ["eye", "look_at"] {
-            match own {
-                Some(own) if !section.lacks(key) => {
-                    section.wrong(key, &format!("is given, but {own}"));
-                }
-                None if section.lacks(key) => {
-                    section.missing(key, "a fixed camera needs it, such as [5.0, 5.0, 0.0]");
-                }
-                _ => {}
-            }
-        }
-        // Check that the view is valid
         if self.mode == CameraMode::Fixed
             && let (Some(eye), Some(look_at)) = (self.eye, self.look_at)
         {
@@ -224,10 +197,6 @@ impl Camera {
             } else if self.up.is_some_and(|up| are_parallel(up, eye, look_at)) {
                 section.wrong("up", "points along the view; it must not");
             }
-        }
-        // A path needs keys
-        if self.mode == CameraMode::Keys && section.lacks("key") {
-            section.missing("key", "mode = \"keys\" needs at least one [[camera.key]]");
         }
     }
 }
@@ -256,38 +225,4 @@ impl CameraKey {
 fn are_parallel(up: DVec3, eye: DVec3, look_at: DVec3) -> bool {
     let (up, view) = (up.normalize_or_zero(), (look_at - eye).normalize_or_zero());
     up.cross(view).length() < 1e-9
-}
-
-/// Dependencies between keys, as JSON schema.
-pub(super) fn conditions() -> Json {
-    let mode_needs = |modes: &[&str], needs: Json| {
-        json!({
-            "if": { "required": ["mode"], "properties": { "mode": { "enum": modes } } },
-            "then": needs,
-        })
-    };
-    // Add what the mode requires
-    let mut all = projection::conditions();
-    all.extend([
-        mode_needs(&["fixed"], json!({ "required": ["eye", "look_at"] })),
-        mode_needs(&["keys"], json!({ "required": ["key"] })),
-        mode_needs(
-            &["auto", "turntable", "keys"],
-            json!({ "properties": { "eye": false, "look_at": false } }),
-        ),
-        json!({
-            "if": { "required": ["aperture"] },
-            "then": { "properties": { "f_stop": { "const": 0 } } },
-        }),
-        // Without a mode, it follows from the other keys.
-        json!({
-            "if": { "required": ["eye"], "properties": { "mode": false } },
-            "then": { "required": ["look_at"] },
-        }),
-        json!({
-            "if": { "properties": { "mode": false, "eye": false } },
-            "then": { "properties": { "look_at": false } },
-        }),
-    ]);
-    Json::Array(all)
 }

@@ -9,7 +9,10 @@ use super::camera::ProjectionKind;
 use super::channel::{Channel, NamedChannel};
 use super::keys::Keys;
 use super::overlay::{Overlay, OverlayKind};
+use super::problem::{Problem, Problems};
 use super::reader::Section;
+use super::rule::{Rule, rules};
+use super::tree::TomlNode;
 use super::{Manifest, ManifestError};
 
 /// Materials of the particles, of spray and of the ground.
@@ -27,7 +30,64 @@ const MAX_OVERLAYS: usize = 64;
 const NEEDS_NUMBER: &str =
     "several frames would get the same name; put #### into the name (example: frame.####.exr)";
 
+const RENDERED_AS_A_WHOLE: &str = "is given, but stereo pairs are rendered as a whole; remove it";
+const IS_CLEAR: &str = "glass and water are transparent already; choose matte, plastic or metal, or leave the \
+                        opacity out";
+
+/// Rules between keys of different tables.
+pub(super) const RULES: &[Rule] = rules! {
+    "camera.stereo" Is["true"] => "image.crop" Missing: RENDERED_AS_A_WHOLE;
+    "camera.stereo" Is["true"] => "image.overscan" MissingOr["0"]: RENDERED_AS_A_WHOLE;
+    "job.follow" Is["true"] => "trails.frames" MissingOr["0"]:
+        "earlier frames may be completed later when job.follow is set; render the sequence when it is complete";
+    "image.samples" Is["1"] => "render.denoise" MissingOrNot["true"]:
+        "needs at least 2 samples per pixel (image.samples), whose difference is the noise";
+    // Each surface has options of its own
+    "render.surface" MissingOr["spheres"] => "surface.normals" MissingOrNot["field"]:
+        "\"field\" is for one body; for smooth normals of spheres take \"pca\", for one body set render.surface to \
+         \"union\" or \"smooth\"";
+    "render.surface" Is["smooth"] => "surface.normals" MissingOrNot["sphere", "pca"]:
+        "a smooth surface has the normals of its field; take \"auto\" or \"field\", or set render.surface to \
+         \"spheres\" or \"union\"";
+    "render.surface" MissingOrNot["smooth"] => "surface.exact" MissingOr["false"]:
+        "is for the smooth surface alone; set render.surface to \"smooth\", or leave it out (spheres are always exact)";
+    "render.surface" MissingOr["spheres"] => "surface.spray" MissingOr["false"]:
+        "lies beside one body; set render.surface to \"union\" or \"smooth\", or leave it out";
+    "render.surface" MissingOr["spheres"], "surface.normals" Is["field", "pca"] => "camera.shutter" MissingOr["0"]:
+        "motion blur of spheres needs surface.normals = \"sphere\"";
+    "render.surface" IsNot["spheres"] => "material.part" Missing:
+        "one body has one material; set render.surface to \"spheres\", or leave the parts out";
+    "render.surface" IsNot["spheres"] => "material.opacity" MissingOr["1"]:
+        "only separate spheres have an opacity; set render.surface to \"spheres\", or make the body of glass or water \
+         (material.type)";
+    // Clear spheres have no opacity
+    "material.type" Is["glass", "water"] => "material.opacity" MissingOr["1"]: IS_CLEAR;
+    "material.type" MissingOr["auto", "whitted"], "material.transmission" IsNot["0"]
+        => "material.opacity" MissingOr["1"]: IS_CLEAR;
+    // The Whitted integrator has no materials of parts and no shadow catcher
+    "render.integrator" Is["whitted"] => "material.part" Missing:
+        "render.integrator = \"whitted\" has one material for all particles; choose \"path\" (--integrator path), or \
+         leave the parts out";
+    "render.integrator" Is["whitted"] => "render.ground" MissingOrNot["shadow_catcher"]:
+        "render.integrator = \"whitted\" has no shadow catcher; choose \"path\" (--integrator path), or a plain ground";
+};
+
 impl Manifest {
+    /// Checks the rules between keys of different tables, for a manifest that was made or changed by a program.
+    ///
+    /// # Errors
+    /// A key breaks a rule.
+    pub fn check_rules(&self) -> Result<(), ManifestError> {
+        let tree =
+            TomlNode::parse(&self.entries().file()).expect("what is written as TOML is TOML");
+        let problems = Problems::default();
+        Section::root(&tree, &problems).check(RULES);
+        let first = problems.errors.into_inner().into_iter().next();
+        first.map_or(Ok(()), |Problem { key, what, .. }| {
+            Err(ManifestError::of_key(&key, format!("{key}: {what}")))
+        })
+    }
+
     /// Checks that each of `frame_count` frames gets a separate image.
     ///
     /// # Errors
@@ -54,6 +114,7 @@ impl Manifest {
         let Some(root) = root.reading() else {
             return;
         };
+        root.check(RULES);
         self.check_counts(root);
         self.image.check(root);
         self.check_layout(root);
@@ -133,11 +194,6 @@ impl Manifest {
     /// Checks that a stereo pair suits the image and the channels.
     fn check_stereo(&self, root: &mut Section<'_>) {
         let image = &self.image;
-        let part = [("crop", image.crop.is_some()), ("overscan", image.overscan > 0)];
-        for (key, _) in part.iter().filter(|(_, is_given)| *is_given) {
-            let what = "is given, but stereo pairs are rendered as a whole; remove it";
-            root.section("image").wrong(key, what);
-        }
         if image.crop.is_none() && image.overscan == 0 && self.picture().data_size().is_none() {
             let what = format!(
                 "makes the picture larger than {MAX_SIDE} pixels; make image.width smaller"
@@ -168,5 +224,76 @@ impl Manifest {
                 ),
             );
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    fn read(text: &str) -> Result<Manifest, String> {
+        let text = format!("input.path = \"a\"\n{text}");
+        Manifest::parse(&text, Path::new("job.toml")).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn contradictory_tables_are_refused() {
+        for (text, message) in [
+            ("surface.normals = \"field\"", "surface.normals: \"field\" is for one body"),
+            ("surface.exact = true", "surface.exact: is for the smooth surface alone"),
+            (
+                "render.surface = \"union\"\nsurface.exact = true",
+                "surface.exact: is for the smooth",
+            ),
+            ("surface.spray = true", "surface.spray: lies beside one body"),
+            (
+                "render.surface = \"smooth\"\nsurface.normals = \"pca\"",
+                "surface.normals: a smooth surface has the normals of its field",
+            ),
+            (
+                "render.integrator = \"whitted\"\nrender.ground = \"shadow_catcher\"",
+                "render.ground: render.integrator = \"whitted\" has no shadow catcher",
+            ),
+            (
+                "camera.shutter = 0.5\nsurface.normals = \"pca\"",
+                "camera.shutter: motion blur of spheres needs surface.normals",
+            ),
+            (
+                "trails.frames = 3\njob.follow = true",
+                "trails.frames: earlier frames may be completed later",
+            ),
+            (
+                "material = { transmission = 1, opacity = 0.5 }",
+                "material.opacity: glass and water are transparent already",
+            ),
+        ] {
+            let error = read(text).unwrap_err();
+            assert!(error.starts_with("job.toml: line ") && error.contains(message), "{error}");
+        }
+        for text in [
+            "surface.normals = \"pca\"",
+            "render.surface = \"union\"\nsurface.normals = \"field\"\nsurface.spray = true",
+            "render.surface = \"smooth\"\nsurface.exact = true",
+            "render.integrator = \"whitted\"\nrender.ground = \"checker\"",
+        ] {
+            read(text).unwrap().check_rules().unwrap();
+        }
+    }
+
+    #[test]
+    fn what_programs_change_is_checked_too() {
+        // The material selects the integrator, which has no parts
+        let manifest = read("material.shininess = 5\n[[material.part]]\nparts = [1]").unwrap();
+        let error = manifest.check_rules().unwrap_err();
+        assert_eq!(error.key(), Some("material.part"));
+        let expected = "material.part: render.integrator = \"whitted\" has one material";
+        assert!(error.to_string().starts_with(expected), "{error}");
+        let mut manifest = Manifest::new("a");
+        manifest.check_rules().unwrap();
+        manifest.surface.spray = true;
+        let expected = "surface.spray: lies beside one body";
+        assert!(manifest.check_rules().unwrap_err().to_string().starts_with(expected));
     }
 }

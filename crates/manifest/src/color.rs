@@ -8,6 +8,7 @@ use super::by_integer::ByInteger;
 use super::color_map::{MapName, RangeSetting};
 use super::field::Field;
 use super::key::Key;
+use super::rule::{Rule, conditions, rules};
 use super::tree::Kind;
 use super::value::{Fault, FlagKind, Slot, Value, named, quoted};
 
@@ -125,56 +126,40 @@ impl ColorMapping {
         }
     }
 
-    /// The contradiction between keys, if there is one: the key, and the problem.
+    /// What the rules between keys do not cover: the key, and the problem.
     fn contradiction(&self) -> Option<(&'static str, String)> {
-        // A logarithm needs a range above 0
         let scale = self.scale();
-        let is_categorical = scale == ScaleKind::Categorical;
-        if let (ScaleKind::Log, Some(RangeSetting::Values([low, _]))) = (scale, self.range)
-            && low <= 0.0
-        {
-            let what =
-                format!("{low:?} has no logarithm; begin above 0, or set scale = \"symlog\"");
-            return Some(("range", what));
-        }
-        if scale == ScaleKind::Log && self.range == Some(RangeSetting::Symmetric) {
-            let what = "a symmetric range has values below 0, which have no logarithm; set scale = \"symlog\"";
-            return Some(("range", what.to_owned()));
-        }
-        // Keys of one scale mean nothing with another
-        let has_palette = self.map.is_some_and(MapName::is_palette);
-        for (key, is_wrong, what) in [
-            (
-                "names",
-                !is_categorical && self.names.is_some(),
-                "only categories have names; set scale = \"categorical\"",
-            ),
-            ("range", is_categorical && self.range.is_some(), "categories have no range"),
-            ("steps", is_categorical && self.steps.is_some(), "categories have no steps"),
-            (
-                "values",
-                !is_categorical && self.values.is_some(),
-                "only categories have colours one by one; set scale = \"categorical\"",
-            ),
-            (
-                "map",
-                self.map.is_some() && self.values.is_some(),
-                "the colours are in `values`; leave one of the two out",
-            ),
-            (
-                "threshold",
-                scale != ScaleKind::SymLog && self.threshold.is_some(),
-                "only scale = \"symlog\" has it",
-            ),
-            ("map", !is_categorical && has_palette, "a palette needs scale = \"categorical\""),
-        ] {
-            if is_wrong {
-                return Some((key, what.to_owned()));
+        match (scale, self.range) {
+            (ScaleKind::Log, Some(RangeSetting::Values([low, _]))) if low <= 0.0 => {
+                let what =
+                    format!("{low:?} has no logarithm; begin above 0, or set scale = \"symlog\"");
+                Some(("range", what))
             }
+            _ if scale != ScaleKind::Categorical && self.map.is_some_and(MapName::is_palette) => {
+                Some(("map", "a palette needs scale = \"categorical\"".to_owned()))
+            }
+            _ => None,
         }
-        None
     }
 }
+
+const NEED_CATEGORIES: &str = "only categories have names; set scale = \"categorical\"";
+
+/// Rules between the keys of a mapping. Without a scale, `values` are the colours of categories.
+pub(super) const RULES: &[Rule] = rules! {
+    "scale" Is["log"] => "range" MissingOrNot["symmetric"]:
+        "a symmetric range has values below 0, which have no logarithm; set scale = \"symlog\"";
+    "scale" IsNot["categorical"] => "names" Missing: NEED_CATEGORIES;
+    "scale" Missing, "values" Missing => "names" Missing: NEED_CATEGORIES;
+    "scale" Is["categorical"] => "range" Missing: "categories have no range";
+    "scale" Missing, "values" Given => "range" Missing: "categories have no range";
+    "scale" Is["categorical"] => "steps" Missing: "categories have no steps";
+    "scale" Missing, "values" Given => "steps" Missing: "categories have no steps";
+    "scale" IsNot["categorical"] => "values" Missing:
+        "only categories have colours one by one; set scale = \"categorical\"";
+    "values" Given => "map" Missing: "the colours are in `values`; leave one of the two out";
+    "scale" MissingOrNot["symlog"] => "threshold" Missing: "only scale = \"symlog\" has it";
+};
 
 impl Value for ColorSetting {
     const FLAG: FlagKind = FlagKind::Toml;
@@ -216,6 +201,7 @@ impl Value for ColorSetting {
         section.read(&Key::new("names", &[]), &mut by.names);
         section.read(&Key::new("values", &[]), &mut by.values);
         // Check its keys together
+        section.check(RULES);
         if let Some((key, what)) = by.contradiction() {
             section.wrong(key, &what);
         }
@@ -270,6 +256,7 @@ impl Value for ColorSetting {
                     "values": CategoryColors::schema(key),
                 },
                 "minProperties": 1,
+                "allOf": conditions(RULES),
                 "additionalProperties": false,
             },
         ] })

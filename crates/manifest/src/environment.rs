@@ -1,12 +1,12 @@
 //! `[environment]`: light from infinitely far away, for the path integrator.
 
 use glam::Vec3;
-use serde_json::{Value as Json, json};
 
 use super::LightGroup;
 use super::key::{Affects, Key};
 use super::keys::{Keys, keys};
 use super::reader::Section;
+use super::rule::{Rule, rules};
 use super::sun::Sun;
 use super::value::named;
 
@@ -65,6 +65,12 @@ impl Default for Environment {
     }
 }
 
+/// Rules between the keys.
+pub(super) const RULES: &[Rule] = rules! {
+    "type" Is["image"] => "image" Given: "type = \"image\" needs a file, as \"hall.exr\"";
+    "type" IsNot["image"] => "image" Missing: "is given, but only type = \"image\" uses it";
+};
+
 impl Environment {
     pub(super) fn keys(&mut self, keys: &mut Keys<'_>) {
         let key = Key::new("type", &[TYPE]).affects(Affects::PathTracing);
@@ -98,35 +104,11 @@ impl Environment {
         }
     }
 
-    /// Checks that an image is given where one is needed; without a type, an image is the source.
+    /// Without a type, an image is the source.
     fn check(&mut self, section: &Section<'_>) {
         if section.lacks("type") && self.image.is_some() {
             self.kind = EnvironmentKind::Image;
         }
-        match (self.kind, section.lacks("image")) {
-            (EnvironmentKind::Image, true) => {
-                section.missing("image", "type = \"image\" needs a file, as \"hall.exr\"");
-            }
-            (EnvironmentKind::Studio | EnvironmentKind::Sky | EnvironmentKind::Constant, false)
-                if section.has("type") =>
-            {
-                section.wrong("image", "is given, but only type = \"image\" uses it");
-            }
-            _ => {}
-        }
+        section.check(RULES);
     }
-}
-
-/// Dependencies between keys, as JSON schema.
-pub(super) fn conditions() -> Json {
-    json!([
-        {
-            "if": { "required": ["type"], "properties": { "type": { "const": "image" } } },
-            "then": { "required": ["image"] },
-        },
-        {
-            "if": { "required": ["type"], "properties": { "type": { "not": { "const": "image" } } } },
-            "then": { "properties": { "image": false } },
-        },
-    ])
 }

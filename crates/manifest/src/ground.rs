@@ -1,13 +1,12 @@
 //! `render.ground`: the kind of ground.
 
-use std::collections::BTreeMap;
-
 use glam::DVec3;
 use serde_json::{Value as Json, json};
 
 use super::field::Field;
 use super::key::Key;
 use super::reader::Section;
+use super::rule::{Rule, conditions, rules};
 use super::value::{Fault, FlagKind, Named, Value, named, quoted};
 
 named! {
@@ -91,8 +90,12 @@ impl GroundSetting {
     }
 }
 
-/// The keys of a picture.
-const IMAGE_KEYS: [&str; 5] = ["image", "width", "center", "rotation", "repeat"];
+/// Rules between the keys of a table.
+pub(super) const RULES: &[Rule] = rules! {
+    "type" Is["image"] => "image" Given: "type = \"image\" needs a file, such as \"floor.png\"";
+    "type" IsNot["image"] => "image", "width", "center", "rotation", "repeat" Missing:
+        "is given, but only type = \"image\" uses it";
+};
 
 fn width_key() -> Key {
     Key::new("width", &[]).unit("a length").above(0).single()
@@ -113,18 +116,8 @@ fn parse_table(section: &mut Section<'_>) -> GroundSetting {
     section.read(&Key::new("center", &[]), &mut image.center);
     section.read(&Key::new("rotation", &[]).unit("degrees"), &mut image.rotation);
     section.read(&Key::new("repeat", &[]), &mut image.repeats);
-    if kind != GroundKind::Image {
-        if section.has("type") {
-            for key in IMAGE_KEYS.into_iter().filter(|key| !section.lacks(key)) {
-                section.wrong(key, "is given, but only type = \"image\" uses it");
-            }
-        }
-        return GroundSetting::of(kind);
-    }
-    if section.lacks("image") {
-        section.missing("image", "type = \"image\" needs a file, such as \"floor.png\"");
-    }
-    GroundSetting { kind, image: Some(image) }
+    section.check(RULES);
+    GroundSetting { kind, image: (kind == GroundKind::Image).then_some(image) }
 }
 
 impl Value for GroundSetting {
@@ -163,9 +156,7 @@ impl Value for GroundSetting {
         // An image needs a file, so that its word alone is not enough
         let kind = GroundKind::schema(key);
         let kinds = GroundKind::words().into_iter();
-        let without_file: Vec<&str> = kinds.filter(|w| *w != IMAGE).collect();
-        let is_image =
-            json!({ "required": ["type"], "properties": { "type": { "const": IMAGE } } });
+        let without_file: Vec<&str> = kinds.filter(|w| *w != GroundKind::Image.name()).collect();
         json!({ "anyOf": [
             { "type": "boolean" },
             { "enum": without_file },
@@ -181,10 +172,7 @@ impl Value for GroundSetting {
                 },
                 "required": ["type"],
                 "additionalProperties": false,
-                "if": is_image,
-                "then": { "required": ["image"] },
-                "else": { "properties": IMAGE_KEYS.map(|key| (key, false)).into_iter()
-                    .collect::<BTreeMap<_, _>>() },
+                "allOf": conditions(RULES),
             },
         ] })
     }
@@ -194,9 +182,6 @@ impl Value for GroundSetting {
         kinds.chain(bool::words()).collect()
     }
 }
-
-/// The name of the kind with a picture.
-const IMAGE: &str = GroundKind::Image.name();
 
 #[cfg(test)]
 mod tests {

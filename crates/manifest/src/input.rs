@@ -11,6 +11,7 @@ use super::color::ELEMENT;
 use super::field::Field;
 use super::key::{Affects, Key};
 use super::keys::section;
+use super::rule::{Rule, conditions, rules};
 use super::value::{Fault, FlagKind, Value, named, quoted};
 
 named! {
@@ -72,6 +73,12 @@ pub enum RadiusSetting {
 
 /// The word for the radii of the file, or an estimate.
 const AUTO: &str = "auto";
+
+/// Rules between the keys of a table of radii.
+pub(super) const RULES: &[Rule] = rules! {
+    "table" Given => "values" Missing: "the radii are in `table`; leave one of the two out";
+    "table" Missing => "attribute" Given: "the name of an attribute, such as \"radius\"";
+};
 
 /// Words for radii of elements.
 const TABLES: [(&str, RadiusTable); 2] =
@@ -209,15 +216,9 @@ impl Value for RadiusSetting {
         let (mut scale, mut table, mut values) = (1.0, None::<TableName>, None::<ByInteger<f64>>);
         section.read(&Key::new("table", &[]), &mut table);
         section.read(&Key::new("values", &[]), &mut values);
-        let mut name = Key::new("attribute", &[]);
-        if table.is_none() {
-            name = name.required("the name of an attribute, such as \"radius\"");
-        }
-        section.read(&name, &mut attribute);
+        section.read(&Key::new("attribute", &[]), &mut attribute);
         section.read(&Key::new("scale", &[]).above(0), &mut scale);
-        if table.is_some() && values.is_some() {
-            section.wrong("values", "the radii are in `table`; leave one of the two out");
-        }
+        section.check(RULES);
         section.finish();
         // Choose between values and their names
         let table = table.and_then(|TableName(word)| table_named(word));
@@ -262,9 +263,7 @@ impl Value for RadiusSetting {
                     "values": <ByInteger<f64>>::schema(key),
                     "scale": scale,
                 },
-                "if": { "required": ["table"] },
-                "then": { "not": { "required": ["values"] } },
-                "else": { "required": ["attribute"] },
+                "allOf": conditions(RULES),
                 "additionalProperties": false,
             },
         ] })

@@ -2,7 +2,8 @@
 //!
 //! Each key is declared once, in the file of its table, with the macros of `keys.rs`. Reading, the commented file of
 //! `spherule init`, the JSON schema ([`job_schema`]), the page of the manual and the options of the command line
-//! ([`key_flags`]) all come from these declarations.
+//! ([`key_flags`]) all come from these declarations. Rules between keys are declared with the macro of `rule.rs`, from
+//! which messages and conditions in the schema follow.
 //!
 //! - [`Manifest`]: the settings. [`Manifest::settings`] are those that images depend on, which a job stores.
 //! - [`ManifestSource`]: a file that can be read again with other defaults. [`Override`]s, such as options of the
@@ -91,6 +92,7 @@ mod problem;
 mod reader;
 mod rebase;
 mod render;
+mod rule;
 mod same;
 mod schema;
 mod select;
@@ -276,7 +278,7 @@ impl Manifest {
         let mut manifest = Self::new("");
         let mut root = Keys::Read(Section::root(&tree, &problems));
         manifest.keys(&mut root);
-        if !tree.contains("render", "integrator") {
+        if !tree.has("render.integrator") {
             manifest.select_integrator(&mut root);
         }
         manifest.check(&mut root);

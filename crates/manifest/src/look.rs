@@ -111,7 +111,7 @@ impl Look {
     /// The look that the manifest in `tree` names, if it is known.
     pub(super) fn of(tree: &TomlNode) -> Self {
         let mut all = Self::names().into_iter();
-        let found = all.find(|(_, name)| tree.has_text(&["look"], name));
+        let found = all.find(|(_, name)| tree.has_text("look", name));
         found.map_or(Self::Auto, |(look, _)| look)
     }
 

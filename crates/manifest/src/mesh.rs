@@ -11,6 +11,7 @@ use super::field::Field;
 use super::key::{Affects, Key};
 use super::keys::{Keys, keys};
 use super::pattern::FramePattern;
+use super::rule::{Rule, rules};
 use super::value::{Fault, Value, named, quoted};
 
 pub(super) const ABOUT: &[&str] =
@@ -147,6 +148,12 @@ impl Default for Mesh {
     }
 }
 
+/// Rules between the keys.
+pub(super) const RULES: &[Rule] = rules! {
+    "material" Is["glass"] => "holdout" MissingOr["false"]:
+        "hides what is behind the mesh, which glass does not; choose another material";
+};
+
 impl Mesh {
     pub(super) fn keys(&mut self, keys: &mut Keys<'_>) {
         keys!(keys:
@@ -178,23 +185,10 @@ impl Mesh {
             /// The camera sees black with A = 0. The mesh still throws shadows and reflects light.
             holdout => self.holdout;
         );
-        if let Some(section) = keys.reading()
-            && self.holdout
-            && self.material == MeshMaterial::Glass
-        {
-            let what =
-                "hides what is behind the mesh, which glass does not; choose another material";
-            section.wrong("holdout", what);
+        if let Some(section) = keys.reading() {
+            section.check(RULES);
         }
     }
-}
-
-/// Dependencies between keys, as JSON schema.
-pub(super) fn conditions() -> Json {
-    json!([{
-        "if": { "required": ["material"], "properties": { "material": { "const": "glass" } } },
-        "then": { "properties": { "holdout": { "const": false } } },
-    }])
 }
 
 #[cfg(test)]

@@ -102,12 +102,14 @@ impl<'a> Section<'a> {
         items.iter().filter_map(Field::section).collect()
     }
 
+    /// The value of the dotted `key`, if it is present.
+    pub(super) fn value(&self, key: &str) -> Option<&'a TomlNode> {
+        self.node?.entry(key).map(|(_, node)| node)
+    }
+
     /// Whether `key` is missing.
     pub(super) fn lacks(&self, key: &str) -> bool {
-        match self.node.map(|n| &n.kind) {
-            Some(Kind::Table(table)) => !table.contains_key(key),
-            _ => true,
-        }
+        self.value(key).is_none()
     }
 
     /// Reports that `key` is required but missing.
@@ -115,7 +117,7 @@ impl<'a> Section<'a> {
         self.problem(self.place(), key, &format!("is missing; {what}"));
     }
 
-    /// Reports a problem of `key` in this table.
+    /// Reports a problem of the dotted `key` in this table.
     pub(super) fn wrong(&self, key: &str, what: &str) {
         self.problem(self.place_of(key), key, what);
     }
@@ -125,13 +127,10 @@ impl<'a> Section<'a> {
         self.problems.warn(&self.place_of(key), &self.full_key(key), what);
     }
 
-    /// The place of the value of `key`, or of the table.
+    /// The place of the value of the dotted `key`, or of the table.
     fn place_of(&self, key: &str) -> Place {
-        let place = match self.node.map(|n| &n.kind) {
-            Some(Kind::Table(table)) => table.get(key).map(|(place, _)| place.clone()),
-            _ => None,
-        };
-        place.unwrap_or_else(|| self.place())
+        let entry = self.node.and_then(|node| node.entry(key));
+        entry.map_or_else(|| self.place(), |(place, _)| place.clone())
     }
 
     fn place(&self) -> Place {
@@ -144,10 +143,14 @@ impl<'a> Section<'a> {
 
     /// Whether `key` is present and was read without a problem.
     pub(super) fn has(&self, key: &str) -> bool {
+        !self.lacks(key) && !self.has_problem(key)
+    }
+
+    /// Whether a problem of the dotted `key` has been reported.
+    pub(super) fn has_problem(&self, key: &str) -> bool {
         let full_key = self.full_key(key);
         let errors = self.problems.errors.borrow();
-        let mut own = errors.iter().skip(self.errors_before);
-        !self.lacks(key) && own.all(|problem| problem.key != full_key)
+        errors.iter().skip(self.errors_before).any(|problem| problem.key == full_key)
     }
 
     /// Ends the checks, if an invalid key determines which keys are known.

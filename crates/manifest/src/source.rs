@@ -52,8 +52,7 @@ impl ManifestSource {
 
     /// Whether neither the manifest nor an override or the look gives a value of the dotted `key`.
     pub fn lacks(&self, key: &str) -> bool {
-        let keys: Vec<&str> = key.split('.').collect();
-        self.given.as_ref().is_some_and(|tree| !tree.has(&keys))
+        self.given.as_ref().is_some_and(|tree| !tree.has(key))
     }
 }
 
@@ -78,8 +77,8 @@ pub(super) fn lay_over(
         none.into_iter().for_each(|o| lay(tree, o.under()));
     }
     // The pattern of a look is not that of a ground which is named plain
-    let kinds = [&["render", "ground"][..], &["render", "ground", "type"]];
-    let is_plain = kinds.iter().any(|keys| tree.has_text(keys, GroundKind::Plain.name()));
+    let kinds = ["render.ground", "render.ground.type"];
+    let is_plain = kinds.iter().any(|key| tree.has_text(key, GroundKind::Plain.name()));
     let defaults = Look::of(tree).settings("look").into_iter().chain(under);
     defaults.filter(|o| !(is_plain && o.is_of("render.ground_pattern"))).for_each(|o| lay(tree, o));
 }

@@ -146,29 +146,25 @@ fn split_key(key: &str) -> Result<Vec<String>, OverrideFault> {
 }
 
 impl TomlNode {
-    /// The value of `keys`, each in the table of the one before.
-    fn value(&self, keys: &[&str]) -> Option<&Kind> {
-        keys.iter().try_fold(&self.kind, |kind, key| {
-            let Kind::Table(values) = kind else {
-                return None;
-            };
-            values.get(*key).map(|(_, node)| &node.kind)
-        })
+    /// The location and the value of the dotted `key`.
+    pub(super) fn entry(&self, key: &str) -> Option<&(Place, Self)> {
+        let Kind::Table(table) = &self.kind else {
+            return None;
+        };
+        match key.split_once('.') {
+            Some((first, rest)) => table.get(first)?.1.entry(rest),
+            None => table.get(key),
+        }
     }
 
-    /// Whether there is a value of `keys`.
-    pub(super) fn has(&self, keys: &[&str]) -> bool {
-        self.value(keys).is_some()
+    /// Whether there is a value of the dotted `key`.
+    pub(super) fn has(&self, key: &str) -> bool {
+        self.entry(key).is_some()
     }
 
-    /// Whether `table` is a table with `key`.
-    pub(super) fn contains(&self, table: &str, key: &str) -> bool {
-        self.value(&[table, key]).is_some()
-    }
-
-    /// Whether the value of `keys` is this `text`.
-    pub(super) fn has_text(&self, keys: &[&str], text: &str) -> bool {
-        matches!(self.value(keys), Some(Kind::Text(found)) if found == text)
+    /// Whether the value of the dotted `key` is this `text`.
+    pub(super) fn has_text(&self, key: &str, text: &str) -> bool {
+        matches!(self.entry(key), Some((_, Self { kind: Kind::Text(found), .. })) if found == text)
     }
 
     /// Parses a whole file.

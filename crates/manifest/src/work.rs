@@ -7,11 +7,11 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use serde_json::{Value as Json, json};
 use spherule_files::Bytes;
 
 use super::key::Affects;
 use super::keys::{Keys, section};
+use super::rule::{Rule, rules};
 use super::value::named;
 
 /// Default name of the file that ends following, next to the images.
@@ -79,6 +79,12 @@ section! {
     }
 }
 
+/// Rules between the keys.
+pub(super) const RULES: &[Rule] = rules! {
+    "isolate" MissingOr["false"] => "memory_ceiling" Missing:
+        "applies to the process of a frame; set job.isolate = true too, or use render.memory_limit";
+};
+
 impl Work {
     /// The path of the file that ends following, for a manifest with paths relative to `dir`, the directory of the
     /// images.
@@ -89,22 +95,8 @@ impl Work {
     /// All keys, with checks of their dependencies.
     pub(super) fn all_keys(&mut self, keys: &mut Keys<'_>) {
         self.keys(keys);
-        if let Some(section) = keys.reading()
-            && self.memory_ceiling.is_some()
-            && !self.isolate
-        {
-            section.wrong(
-                "memory_ceiling",
-                "applies to the process of a frame; set job.isolate = true too, or use render.memory_limit",
-            );
+        if let Some(section) = keys.reading() {
+            section.check(RULES);
         }
     }
-}
-
-/// Dependencies between keys, as JSON schema.
-pub(super) fn conditions() -> Json {
-    json!([{
-        "if": { "required": ["memory_ceiling"] },
-        "then": { "required": ["isolate"], "properties": { "isolate": { "const": true } } },
-    }])
 }

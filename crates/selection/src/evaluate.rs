@@ -2,7 +2,7 @@
 //! its loop is the same for all conditions and the compiler makes vector instructions of it.
 
 use spherule_frame::Attribute;
-use spherule_frame::values::BoundValue;
+use spherule_frame::values::Value;
 
 use super::condition::{Arithmetic, Comparison, Operation};
 use super::texts::TextValue;
@@ -26,7 +26,7 @@ impl Stacks {
     pub(super) fn evaluate(
         &mut self,
         operations: &[Operation],
-        (values, texts): (&[BoundValue<&Attribute>], &[TextValue<BoundValue<&Attribute>>]),
+        (values, texts): (&[Value<&Attribute>], &[TextValue<Value<&Attribute>>]),
         context: FileContext<'_>,
         first: usize,
         to: &mut [bool],

@@ -36,7 +36,7 @@ use std::collections::HashSet;
 use glam::DVec3;
 use rayon::prelude::*;
 use spherule_formats::order::index_u32;
-use spherule_frame::values::{BoundValue, Named, Value, id_of};
+use spherule_frame::values::{Named, Value, id_of};
 use spherule_frame::{Attribute, AttributeData, Labels, RawParticles};
 use spherule_jobs::FrameRange;
 
@@ -166,14 +166,13 @@ impl Selection {
         let labels = (&particles.labels, MissingText::NoParticle);
         let (values, texts) = self.values(&particles.attributes, particles.time, labels)?;
         let context = FileContext::new(particles, self.up);
-        let values: Vec<BoundValue<&Attribute>> =
+        let values: Vec<Value<&Attribute>> =
             values.iter().filter_map(|value| context.bind(value)).collect();
         let bound = |text: &TextValue<Value>| match text {
             TextValue::Code(code) => Some(TextValue::Code(*code)),
             TextValue::Value(value) => context.bind(value).map(TextValue::Value),
         };
-        let texts: Vec<TextValue<BoundValue<&Attribute>>> =
-            texts.iter().filter_map(bound).collect();
+        let texts: Vec<TextValue<Value<&Attribute>>> = texts.iter().filter_map(bound).collect();
         // Mark the particles that are kept, in runs that do not depend on the threads
         let ids = id_of(&particles.attributes);
         let mut marks = vec![false; count];

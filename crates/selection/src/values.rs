@@ -1,7 +1,7 @@
 //! The values that names in a condition stand for, loaded for blocks of particles.
 
 use glam::DVec3;
-use spherule_frame::values::{BoundValue, Column, Context, Named, Value};
+use spherule_frame::values::{Column, Context, Named, Value};
 use spherule_frame::with_values;
 use spherule_frame::{Attribute, Positions, RawParticles, names};
 
@@ -110,24 +110,24 @@ impl<'a> FileContext<'a> {
     }
 
     /// The value of these particles.
-    pub(super) fn bind(&self, value: &Value) -> Option<BoundValue<&'a Attribute>> {
+    pub(super) fn bind(&self, value: &Value) -> Option<Value<&'a Attribute>> {
         let mut all = self.particles.attributes.iter();
         value.bind(|name| all.find(|attribute| attribute.name == name))
     }
 
     /// Writes the values of the particles from `first` on.
-    pub(super) fn load(&self, value: BoundValue<&Attribute>, first: usize, to: &mut [f64]) {
+    pub(super) fn load(&self, value: Value<&Attribute>, first: usize, to: &mut [f64]) {
         match value {
-            BoundValue::Position(axis) => {
+            Value::Position(axis) => {
                 load_position(&self.particles.positions, axis, first, to);
             }
-            BoundValue::Component(attribute, component) => {
+            Value::Component(attribute, component) => {
                 load_component(attribute, component, first, to);
             }
-            BoundValue::Magnitude(attribute) if attribute.components == 1 => {
+            Value::Magnitude(attribute) if attribute.components == 1 => {
                 load_component(attribute, 0, first, to);
             }
-            BoundValue::Magnitude(attribute) => load_magnitude(attribute, first, to),
+            Value::Magnitude(attribute) => load_magnitude(attribute, first, to),
             other => fill(to, |i| other.get(first + i, self)),
         }
     }

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use spherule_formats::{ParticleFrame, Radius};
-use spherule_frame::values::{BoundValue, Context, Value};
+use spherule_frame::values::{Context, Value};
 
 use super::RadiusQuestion;
 use super::robust::{percentile, robust_range, sorted_sample};
@@ -152,11 +152,11 @@ impl ColorTotals {
         let is_length = value.is_length();
         let (count, value): (usize, &dyn Fn(usize) -> f64) = match value {
             // It depends on the camera, which is placed later
-            BoundValue::Depth => return,
+            Value::Depth => return,
             // The frame may be sampled, without its last index
             #[expect(clippy::cast_precision_loss, reason = "a range of colours")]
-            BoundValue::Index => (2, &|i| (i * context.count.saturating_sub(1)) as f64),
-            BoundValue::Time => (frame.len().min(1), &|i| value.get(i, &context)),
+            Value::Index => (2, &|i| (i * context.count.saturating_sub(1)) as f64),
+            Value::Time => (frame.len().min(1), &|i| value.get(i, &context)),
             _ => (frame.len(), &|i| value.get(i, &context)),
         };
         self.add_values(count, value, range, is_length);

@@ -51,11 +51,11 @@ fn misspelled_values_have_suggestions() {
 fn contradictory_surface_options_are_rejected() {
     let workshop = one_frame();
     for (options, expected) in [
-        (["--exact-surface", "--surface=union"], "surface.exact: is for the smooth surface alone"),
         (
-            ["--spray", "--surface=spheres"],
-            "surface.spray: lies beside one body; set render.surface",
+            ["--exact-surface", "--surface=union"],
+            "--exact-surface: is for the smooth surface alone",
         ),
+        (["--spray", "--surface=spheres"], "--spray: lies beside one body; set render.surface"),
         (["--smoothing", "1.5"], "--smoothing: expected a number from 0 to 1"),
     ] {
         not_rendered(&workshop, &options, &[expected]);

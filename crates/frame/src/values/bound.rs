@@ -31,44 +31,23 @@ pub trait Context {
     fn time(&self) -> f64;
 }
 
-/// A value with its column.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum BoundValue<C> {
-    /// The magnitude of a column.
-    Magnitude(C),
-    /// A component of a column.
-    Component(C, usize),
-    /// World coordinate on an axis.
-    Position(usize),
-    /// Height along the up direction.
-    Height,
-    /// Distance from the camera.
-    Depth,
-    /// Place in the frame.
-    Index,
-    /// Radius.
-    Radius,
-    /// Time of the frame.
-    Time,
-}
-
 impl Value {
     /// This value of particles with the columns that `find` finds by their names.
-    pub fn bind<C>(&self, find: impl FnOnce(&str) -> Option<C>) -> Option<BoundValue<C>> {
+    pub fn bind<C>(&self, find: impl FnOnce(&str) -> Option<C>) -> Option<Value<C>> {
         Some(match self {
-            Self::Magnitude(name) => BoundValue::Magnitude(find(name)?),
-            Self::Component(name, component) => BoundValue::Component(find(name)?, *component),
-            Self::Position(axis) => BoundValue::Position(*axis),
-            Self::Height => BoundValue::Height,
-            Self::Depth => BoundValue::Depth,
-            Self::Index => BoundValue::Index,
-            Self::Radius => BoundValue::Radius,
-            Self::Time => BoundValue::Time,
+            Self::Magnitude(name) => Value::Magnitude(find(name)?),
+            Self::Component(name, component) => Value::Component(find(name)?, *component),
+            Self::Position(axis) => Value::Position(*axis),
+            Self::Height => Value::Height,
+            Self::Depth => Value::Depth,
+            Self::Index => Value::Index,
+            Self::Radius => Value::Radius,
+            Self::Time => Value::Time,
         })
     }
 }
 
-impl<C: Column> BoundValue<C> {
+impl<C: Column> Value<C> {
     /// The value of a particle.
     pub fn get(&self, particle: usize, context: &impl Context) -> f64 {
         match self {

@@ -3,13 +3,13 @@
 use super::{Named, PART_NAMES, id_of, velocity_of};
 use crate::names;
 
-/// A number for each particle.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Value {
+/// A number for each particle. `C` stands for a column: its name, or its data.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Value<C = String> {
     /// The magnitude of a column.
-    Magnitude(String),
+    Magnitude(C),
     /// A component of a column.
-    Component(String, usize),
+    Component(C, usize),
     /// World coordinate on an axis: 0 is x.
     Position(usize),
     /// Height along the up direction, in world units.

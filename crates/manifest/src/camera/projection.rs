@@ -1,15 +1,13 @@
-//! The projection of the camera, views along axes, and stereo pairs: their values, and which keys fit together.
+//! The projection of the camera, views along axes, and stereo pairs.
 
 use glam::DVec3;
 use serde_json::{Value as Json, json};
 use spherule_tracer::scene::Convergence;
-use spherule_tracer::scene::camera::DEFAULT_FOV;
 use spherule_tracer::scene::framing::{DEFAULT_AZIMUTH, DEFAULT_ELEVATION, view_direction};
 
-use super::{Camera, CameraMode};
+use super::Camera;
 use crate::field::Field;
 use crate::key::Key;
-use crate::reader::Section;
 use crate::value::{Fault, FlagKind, Value, named};
 
 named! {
@@ -79,14 +77,6 @@ impl AxisView {
             Self::Iso => [45.0, ISOMETRIC_ELEVATION],
         }
     }
-
-    const fn is_level(self) -> bool {
-        matches!(self, Self::Front | Self::Back | Self::Left | Self::Right)
-    }
-
-    const fn is_vertical(self) -> bool {
-        matches!(self, Self::Top | Self::Bottom)
-    }
 }
 
 /// Azimuth and elevation in degrees of a view from the side `from`.
@@ -123,116 +113,6 @@ impl Camera {
             (true, _) => [2, 1],
         }
     }
-
-    /// Whether there is depth of field.
-    fn has_lens(&self) -> bool {
-        self.aperture.map_or(self.f_stop > 0.0, |aperture| aperture > 0.0)
-    }
-
-    /// Checks that projection, view and stereo fit together and to the other keys.
-    pub(crate) fn check_projection(&self, section: &Section<'_>) {
-        let is_perspective = self.projection == ProjectionKind::Perspective;
-        let is_panorama = self.projection == ProjectionKind::Equirectangular;
-        // Keys of a perspective need one
-        if !is_perspective {
-            let instead = if is_panorama {
-                "an equirectangular picture shows all directions"
-            } else {
-                "an orthographic picture has a height instead"
-            };
-            if self.fov != DEFAULT_FOV {
-                section.wrong("fov", &format!("is given, but {instead}; remove it"));
-            }
-            if self.has_lens() {
-                let key = if self.aperture.is_some() { "aperture" } else { "f_stop" };
-                section.wrong(key, "is given, but only perspective has depth of field; remove it");
-            }
-        }
-        // Height, mode and elevation depend on the projection
-        if self.height.is_some() && self.projection != ProjectionKind::Orthographic {
-            section.wrong(
-                "height",
-                "is given, but only projection = \"orthographic\" has a height; fov sets the size in perspective",
-            );
-        }
-        if is_panorama && self.mode == CameraMode::Turntable {
-            section.wrong(
-                "mode",
-                "is turntable, but an equirectangular picture shows all directions already; use auto, fixed or keys",
-            );
-        }
-        if is_panorama && self.elevation.is_some() {
-            section.wrong(
-                "elevation",
-                "is given, but the horizon is in the middle of an equirectangular picture; remove it",
-            );
-        }
-        self.check_view(section);
-        self.check_stereo(section);
-    }
-
-    fn check_view(&self, section: &Section<'_>) {
-        let Some(view) = self.view else { return };
-        let reason = match self.mode {
-            CameraMode::Fixed | CameraMode::Keys => {
-                "is given, but eye and look_at place the camera; remove it or them"
-            }
-            CameraMode::Turntable if view.is_vertical() => {
-                "is along the axis of the turntable; choose another one, or elevation = 80, for example"
-            }
-            _ if self.azimuth.is_some() || self.elevation.is_some() => {
-                "is given, but so are azimuth or elevation; remove it or them"
-            }
-            _ if self.projection == ProjectionKind::Equirectangular && !view.is_level() => {
-                "must be front, back, left or right, because the horizon is in the middle of an equirectangular picture"
-            }
-            _ => return,
-        };
-        section.wrong("view", reason);
-    }
-
-    fn check_stereo(&self, section: &Section<'_>) {
-        // Keys of stereo pairs need two eyes
-        if !self.stereo {
-            for (key, is_given) in [
-                ("eye_distance", self.eye_distance.is_some()),
-                ("convergence", self.convergence != ConvergenceSetting::DEFAULT),
-            ] {
-                if is_given {
-                    section.wrong(key, "is given, but there is only one eye; set stereo = true");
-                }
-            }
-            return;
-        }
-        // Refuse what both eyes cannot see
-        if self.projection == ProjectionKind::Orthographic {
-            section.wrong(
-                "stereo",
-                "is true, but both eyes see the same in orthographic projection; use perspective",
-            );
-        }
-        if self.has_lens() {
-            section.wrong(
-                "stereo",
-                "is true, but stereo pairs have no depth of field; remove f_stop and aperture",
-            );
-        }
-        // A panorama needs the distance of the eyes
-        if self.projection == ProjectionKind::Equirectangular {
-            if self.eye_distance.is_none() {
-                section.missing(
-                    "eye_distance",
-                    "an equirectangular stereo pair needs it, in scene units, such as 0.065",
-                );
-            }
-            if self.convergence != ConvergenceSetting::DEFAULT {
-                section.wrong(
-                    "convergence",
-                    "is given, but the eyes of an equirectangular stereo pair look in parallel directions; remove it",
-                );
-            }
-        }
-    }
 }
 
 /// Where the views of two eyes converge.
@@ -240,7 +120,7 @@ impl Camera {
 pub struct ConvergenceSetting(pub Convergence);
 
 impl ConvergenceSetting {
-    pub(crate) const DEFAULT: Self = Self(Convergence::Target);
+    pub(super) const DEFAULT: Self = Self(Convergence::Target);
 }
 
 impl Value for ConvergenceSetting {
@@ -277,80 +157,6 @@ impl Value for ConvergenceSetting {
             { "type": "number", "exclusiveMinimum": 0 },
         ] })
     }
-}
-
-/// Dependencies between keys, as JSON schema.
-pub(super) fn conditions() -> Vec<Json> {
-    // Each condition mirrors a check of the reader, for editors
-    let not_perspective = json!({
-        "required": ["projection"],
-        "properties": { "projection": { "enum": ["orthographic", "equirectangular"] } },
-    });
-    let mut conditions = vec![
-        json!({
-            "if": not_perspective,
-            "then": { "properties": { "fov": { "const": DEFAULT_FOV }, "f_stop": { "const": 0 }, "aperture": { "const": 0 } } },
-        }),
-        json!({ "if": number("height"), "then": is("projection", json!("orthographic")) }),
-        json!({
-            "if": is("projection", json!("equirectangular")),
-            "then": {
-                "properties": {
-                    "mode": { "enum": ["auto", "fixed", "keys"] },
-                    "elevation": false,
-                    "view": { "enum": ["front", "back", "left", "right"] },
-                    "convergence": { "const": "auto" },
-                },
-            },
-        }),
-        json!({
-            "if": { "required": ["view"] },
-            "then": {
-                "properties": {
-                    "mode": { "enum": ["auto", "turntable"] },
-                    "azimuth": false,
-                    "elevation": false,
-                    "eye": false,
-                },
-            },
-        }),
-    ];
-    conditions.extend(stereo_conditions());
-    conditions
-}
-
-/// Dependencies between the keys of stereo pairs.
-fn stereo_conditions() -> [Json; 3] {
-    [
-        json!({ "if": number("eye_distance"), "then": is("stereo", json!(true)) }),
-        json!({
-            "if": {
-                "required": ["convergence"],
-                "properties": { "convergence": { "not": { "const": "auto" } } },
-            },
-            "then": is("stereo", json!(true)),
-        }),
-        json!({
-            "if": is("stereo", json!(true)),
-            "then": {
-                "properties": {
-                    "projection": { "enum": ["perspective", "equirectangular"] },
-                    "f_stop": { "const": 0 },
-                    "aperture": { "const": 0 },
-                },
-            },
-        }),
-    ]
-}
-
-/// The condition that `key` has this value.
-fn is(key: &str, value: Json) -> Json {
-    json!({ "required": [key], "properties": { key: { "const": value } } })
-}
-
-/// The condition that `key` is a number.
-fn number(key: &str) -> Json {
-    json!({ "required": [key], "properties": { key: { "type": "number" } } })
 }
 
 #[cfg(test)]

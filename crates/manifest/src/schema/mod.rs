@@ -1,13 +1,14 @@
 //! The JSON schema of the manifest, for completion and error marking in editors.
 //!
-//! All of it comes from the declarations of the keys, except dependencies between keys (`conditions` in the modules
-//! of the tables). Further checks (a camera at its own target, for example) are only made by the reader.
+//! All of it comes from the declarations of the keys and from the rules between them ([`Rule`]). Further checks (a
+//! camera at its own target, for example) are only made by the reader.
 
 use serde_json::{Map, Value, json};
 
 use super::list::{Entries, Entry};
+use super::rule::{Rule, conditions};
 use super::value::{COLOR_SCHEMA, color_schema};
-use super::{ABOUT, Manifest, camera, environment, mesh, work};
+use super::{ABOUT, Manifest, camera, check, environment, mesh, work};
 
 #[cfg(test)]
 mod tests;
@@ -22,16 +23,8 @@ pub fn job_schema() -> Value {
     let outside = entries.list().iter().filter(|entry| entry.section.is_empty());
     let mut properties: Map<_, _> =
         outside.map(|entry| (entry.name().to_owned(), property(entry))).collect();
-    // Tables, with conditions that some of them have
     for section in sections(&entries).filter(|s| !s.is_empty() && !s.contains('.')) {
-        let mut table = table(&entries, section);
-        match section {
-            "camera" => table["allOf"] = camera::conditions(),
-            "environment" => table["allOf"] = environment::conditions(),
-            "job" => table["allOf"] = work::conditions(),
-            _ => {}
-        }
-        properties.insert(section.to_owned(), table);
+        properties.insert(section.to_owned(), table(&entries, section));
     }
     add_lists(&mut properties, &entries);
     json!({
@@ -42,6 +35,7 @@ pub fn job_schema() -> Value {
         "properties": properties,
         "required": ["input"],
         "additionalProperties": false,
+        "allOf": conditions(check::RULES),
         "$defs": { COLOR_SCHEMA: color_schema() },
     })
 }
@@ -54,10 +48,7 @@ fn add_lists(properties: &mut Map<String, Value>, entries: &Entries) {
         let Some((list, _)) = section.rsplit_once('.') else {
             continue;
         };
-        let mut table = table(entries, section);
-        if list == "mesh" {
-            table["allOf"] = mesh::conditions();
-        }
+        let table = table(entries, section);
         match kinds.iter_mut().find(|(name, _)| *name == list) {
             Some((_, tables)) => tables.push(table),
             None => kinds.push((list, vec![table])),
@@ -100,7 +91,22 @@ fn table(entries: &Entries, section: &str) -> Value {
     if !required.is_empty() {
         table["required"] = json!(required);
     }
+    let rules = rules_of(section);
+    if !rules.is_empty() {
+        table["allOf"] = conditions(rules);
+    }
     table
+}
+
+/// The rules between the keys of a table.
+fn rules_of(section: &str) -> &'static [Rule] {
+    match section {
+        "camera" => camera::RULES,
+        "environment" => environment::RULES,
+        "job" => work::RULES,
+        "mesh.0" => mesh::RULES,
+        _ => &[],
+    }
 }
 
 fn property(entry: &Entry) -> Value {

@@ -19,7 +19,7 @@ render = { surface = "smooth", integrator = "path", bounces = 0, ground_pattern 
 surface = { normals = "field", smoothing = 1, exact = true, voxel = 0.5, smoothing_length = 2.5, threshold = 0.55, spray = true, spray_style = "spheres" }
 select = { where = "x > 1 && !(speed <= 2)", ids = "1-5", every = 2, slab = { axis = "y", center = 0, thickness = 0.5 } }
 clip = [{ type = "plane", normal = "-x", offset = 2 }, { type = "plane", normal = [1, 2, 0], point = [1, 1, 1], mode = "cut" }, { type = "box", min = [0, 0, 0], max = [1, 1, 1], keep = "outside" }]
-material = { opacity = { attribute = "density", range = [2, 1] }, color = { attribute = "velocity.x", map = "red-blue_r", range = "1%-99.5%", scale = "symlog", threshold = 0.1, steps = 8, reverse = true }, absorption = [0.5, 1, 0], absorption_length = 3, fresnel = "exact" }
+material = { color = { attribute = "velocity.x", map = "red-blue_r", range = "1%-99.5%", scale = "symlog", threshold = 0.1, steps = 8, reverse = true }, absorption = [0.5, 1, 0], absorption_length = 3, fresnel = "exact" }
 light = [{ type = "directional", direction = [0, 0, -2] }, { type = "point", position = [1, 1, 1], falloff = "inverse-square" }, { type = "sun", direction = [0, 0, -2], size = 2 }, { type = "sphere", position = [1, 1, 1], radius = 2, visible = true }, { type = "rect", position = [1, 1, 1], direction = [0, 1, 0], width = 2, height = 3 }, { type = "disc", position = [1, 1, 1], direction = [0, 1, 0], radius = 2 }]
 mesh = [{ path = "tank.stl" }, { path = "w.##.ply", material = "glass", color = [1, 1, 0.5], roughness = 0, normals = "flat", faces = "back", scale = 0.001, translate = [1, 0, 0] }, { path = "b", holdout = true }]
 trails = { frames = 8, radius = 0.1, every = 2, color = [1, 0, 0] }
@@ -70,6 +70,7 @@ fn written_manifests_are_valid() {
     let plain = Manifest::new("data");
     both_take(&plain.to_commented_toml());
     both_take(EVERYTHING);
+    both_take("input.path = \"a\"\nmaterial.opacity = { attribute = \"density\", range = [2, 1] }");
     both_take(&read(EVERYTHING).unwrap().to_commented_toml());
     let mut fixed = plain;
     fixed.camera.mode = crate::CameraMode::Fixed;
@@ -261,9 +262,115 @@ fn key_dependencies_agree() {
             }
         }
     }
-    for isolate in ["", "isolate = true", "isolate = false"] {
-        let text = format!("input.path = \"a\"\n[job]\nmemory_ceiling = \"1G\"\n{isolate}\n");
-        let valid = validator().is_valid(&json(&text));
-        assert_eq!(valid, read(&text).is_ok(), "{text}");
+}
+
+/// Settings that are valid alone or with one or two others.
+const SETTINGS: [[&str; 2]; 53] = [
+    ["camera.mode", "\"auto\""],
+    ["camera.mode", "\"fixed\""],
+    ["camera.mode", "\"turntable\""],
+    ["camera.mode", "\"keys\""],
+    ["camera.eye", "[1, 2, 3]"],
+    ["camera.look_at", "[0, 0, 0]"],
+    ["camera.key", "[{ frame = 1, eye = [1, 2, 3], look_at = [0, 0, 0] }]"],
+    ["camera.center", "[1, 2, 3]"],
+    ["camera.f_stop", "2"],
+    ["camera.aperture", "0.1"],
+    ["camera.projection", "\"perspective\""],
+    ["camera.projection", "\"orthographic\""],
+    ["camera.projection", "\"equirectangular\""],
+    ["camera.fov", "30"],
+    ["camera.height", "2"],
+    ["camera.azimuth", "3"],
+    ["camera.elevation", "3"],
+    ["camera.view", "\"left\""],
+    ["camera.view", "\"top\""],
+    ["camera.stereo", "true"],
+    ["camera.stereo", "false"],
+    ["camera.eye_distance", "0.1"],
+    ["camera.eye_distance", "\"auto\""],
+    ["camera.convergence", "\"parallel\""],
+    ["camera.shutter", "0.5"],
+    ["image.crop", "[0, 0, 9, 9]"],
+    ["image.overscan", "3"],
+    ["image.samples", "1"],
+    ["render.surface", "\"union\""],
+    ["render.surface", "\"smooth\""],
+    ["render.integrator", "\"whitted\""],
+    ["render.ground", "\"shadow_catcher\""],
+    ["render.ground", "{ type = \"image\", image = \"a.png\", width = 2 }"],
+    ["render.denoise", "true"],
+    ["surface.normals", "\"field\""],
+    ["surface.normals", "\"pca\""],
+    ["surface.normals", "\"sphere\""],
+    ["surface.exact", "true"],
+    ["surface.spray", "true"],
+    ["material.type", "\"glass\""],
+    ["material.type", "\"matte\""],
+    ["material.opacity", "0.5"],
+    ["material.opacity", "1"],
+    ["material.transmission", "1"],
+    ["material.part", "[{ parts = [1] }]"],
+    ["environment.type", "\"sky\""],
+    ["environment.type", "\"image\""],
+    ["environment.image", "\"a.exr\""],
+    ["trails.frames", "3"],
+    ["job.follow", "true"],
+    ["job.isolate", "true"],
+    ["job.isolate", "false"],
+    ["job.memory_ceiling", "\"1G\""],
+];
+
+/// The keys of tables that are values: colours, radii and grounds.
+const INNER: [&[&str]; 3] = [
+    &[
+        "scale = \"log\"",
+        "scale = \"symlog\"",
+        "scale = \"categorical\"",
+        "range = [1, 2]",
+        "range = \"symmetric\"",
+        "steps = 3",
+        "map = \"turbo\"",
+        "threshold = 0.1",
+        "names = { 1 = \"a\" }",
+        "values = { 1 = [1, 0, 0] }",
+    ],
+    &["attribute = \"a\"", "table = \"vdw\"", "values = { 1 = 0.5 }", "scale = 2"],
+    &["type = \"image\"", "type = \"plain\"", "image = \"a.png\"", "width = 2", "repeat = true"],
+];
+
+/// Schema and reader accept the same of all combinations of up to three settings.
+#[test]
+fn rules_between_keys_agree() {
+    let validator = validator();
+    let agree = |text: &str| {
+        let text = format!("input.path = \"data\"\n{text}");
+        // A key twice is not TOML
+        if text.parse::<Table>().is_ok() {
+            let valid = validator.is_valid(&json(&text));
+            assert_eq!(valid, read(&text).is_ok(), "{text}");
+        }
+    };
+    for (a, first) in SETTINGS.iter().enumerate() {
+        for (b, second) in SETTINGS.iter().enumerate().skip(a) {
+            for third in &SETTINGS[b..] {
+                let all = BTreeSet::from([first, second, third]);
+                agree(
+                    &all.iter()
+                        .map(|[key, value]| format!("{key} = {value}\n"))
+                        .collect::<String>(),
+                );
+            }
+        }
+    }
+    for (table, keys) in ["material.color", "input.radius", "render.ground"].iter().zip(INNER) {
+        for (a, first) in keys.iter().enumerate() {
+            for (b, second) in keys.iter().enumerate().skip(a) {
+                for third in &keys[b..] {
+                    let all = BTreeSet::from([*first, *second, *third]);
+                    agree(&format!("{table} = {{ {} }}", Vec::from_iter(all).join(", ")));
+                }
+            }
+        }
     }
 }

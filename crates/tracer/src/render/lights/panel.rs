@@ -3,6 +3,8 @@
 //! 2013), and discs, sampled uniformly in area. Small rectangles are sampled in area as well, where the solid angle
 //! would be inexact and the difference is small.
 
+#![expect(clippy::needless_range_loop, reason = "loops over axes, several arrays at a time")]
+
 use std::f32::consts::PI;
 
 use glam::Vec3;

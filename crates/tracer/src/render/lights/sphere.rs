@@ -1,5 +1,7 @@
 //! Spheres that emit the same radiance in all directions, sampled uniformly in the solid angle that they cover.
 
+#![expect(clippy::needless_range_loop, reason = "loops over axes, several arrays at a time")]
+
 use std::f32::consts::PI;
 
 use glam::Vec3;

@@ -1,5 +1,7 @@
 //! A light at infinite distance with an angular size: directions in a cone, uniform in solid angle.
 
+#![expect(clippy::needless_range_loop, reason = "loops over axes, several arrays at a time")]
+
 use std::f32::consts::PI;
 
 use glam::Vec3;
