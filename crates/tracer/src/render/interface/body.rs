@@ -37,7 +37,6 @@ impl Interface for BodyInterface {
 /// The rays that leave the surface of one connected body, with shading normals that face the arriving rays and origins
 /// of shadow rays; rays of `inside` come from inside. The shading normal determines their directions; their origins are offset from the surface that rays
 /// are traced against.
-#[expect(clippy::too_many_arguments, reason = "arrays that do not overlap; see `lane_kernel!`")]
 #[inline(always)]
 fn body_rays_body(
     dielectric: &Dielectric,

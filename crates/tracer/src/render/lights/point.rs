@@ -1,7 +1,5 @@
 //! Point lights.
 
-#![expect(clippy::needless_range_loop, reason = "loops over axes, several arrays at a time")]
-
 use glam::Vec3;
 
 use super::lanes::{LightSample, SampledLight, sample_lanes};
