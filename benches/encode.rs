@@ -19,9 +19,10 @@ use exr::prelude::{
     ImageAttributes, IntegerBounds, Layer, LayerAttributes, LineOrder, ReadChannels, ReadLayers,
     WritableImage, f16, read,
 };
-use glam::Vec3;
-use spherule::output::{ExrLayout, ExrOptions, PackBuffers, pack_block, write_blocks};
-use spherule::render::{Channels, Film};
+use spherule::output::{
+    ExrLayout, ExrOptions, PackBuffers, PlaneNames, pack_block, plane_channels, write_blocks,
+};
+use spherule::render::{Channels, Film, FilmPlane};
 
 #[path = "support/cpu_time.rs"]
 mod cpu_time;
@@ -97,7 +98,7 @@ fn run(arguments: &[&str]) {
 fn print_rows(file: &Path, turns: usize) {
     let film = film(file);
     let has = film.channels();
-    let data = Channels { depth: has.depth, normal: has.normal, id: has.id, ..Channels::COLOR };
+    let data = among(&film, &[FilmPlane::Depth, FilmPlane::Normal, FilmPlane::Id]);
     let name = file.file_stem().unwrap_or_default().to_string_lossy();
     let mut done = Vec::new();
     for (set, channels) in [("RGBA", Channels::COLOR), ("Z N id", data), ("all", has)] {
@@ -146,24 +147,17 @@ fn by_the_crate(film: &Film) -> usize {
         let halves = values.map(|v| f16::from_f32(v.clamp(-65_504.0, 65_504.0)));
         list.push(AnyChannel::new(name, FlatSamples::F16(halves.collect())));
     }
-    if let Some(depth) = &film.depth {
-        list.push(AnyChannel::new("Z", FlatSamples::F32(depth.clone())));
-    }
-    for (names, plane) in [
-        (["N.X", "N.Y", "N.Z"], &film.normal),
-        (["P.X", "P.Y", "P.Z"], &film.position),
-        (["V.X", "V.Y", "V.Z"], &film.velocity),
-        (["albedo.R", "albedo.G", "albedo.B"], &film.albedo),
-    ] {
-        for (axis, name) in names.into_iter().enumerate() {
-            if let Some(plane) = plane {
-                let values = plane.iter().map(|v| v[axis]).collect();
-                list.push(AnyChannel::new(name, FlatSamples::F32(values)));
-            }
+    for plane in FilmPlane::all().filter(|plane| film.channels.has(*plane)) {
+        let names = plane_channels(plane, film.channels, &PlaneNames::default());
+        let words = film.plane::<u32>(plane).expect("a channel");
+        for (component, name) in names.iter().enumerate() {
+            let samples = words.iter().copied().skip(component).step_by(names.len());
+            let samples = match plane {
+                FilmPlane::Id => FlatSamples::U32(samples.collect()),
+                _ => FlatSamples::F32(samples.map(f32::from_bits).collect()),
+            };
+            list.push(AnyChannel::new(&**name, samples));
         }
-    }
-    if let Some(id) = &film.id {
-        list.push(AnyChannel::new("id.I", FlatSamples::U32(id.clone())));
     }
     let size = (film.width as usize, film.height as usize);
     let encoding = Encoding {
@@ -181,23 +175,22 @@ fn by_the_crate(film: &Film) -> usize {
     file.into_inner().len()
 }
 
+/// Those of `planes` that `film` has.
+fn among(film: &Film, planes: &[FilmPlane]) -> Channels {
+    let planes = planes.iter().copied().filter(|plane| film.channels.has(*plane));
+    Channels::COLOR.with(&planes.collect::<Vec<_>>())
+}
+
 /// The planes of `film` that are among `channels`.
 fn with(film: &Film, channels: Channels) -> Film {
-    let plane = |plane: &Option<Vec<Vec3>>, is_stored: bool| plane.clone().filter(|_| is_stored);
-    Film {
-        width: film.width,
-        height: film.height,
-        color: film.color.clone(),
-        depth: film.depth.clone().filter(|_| channels.depth),
-        normal: plane(&film.normal, channels.normal),
-        position: plane(&film.position, channels.position),
-        velocity: plane(&film.velocity, channels.velocity),
-        albedo: plane(&film.albedo, channels.albedo),
-        id: film.id.clone().filter(|_| channels.id),
-        layers: None,
-        odd: None,
-        channels,
+    let mut part = Film::new(film.width, film.height, channels);
+    part.color.clone_from(&film.color);
+    for plane in FilmPlane::all() {
+        if let (Some(to), Some(from)) = (part.plane_mut::<u32>(plane), film.plane(plane)) {
+            to.copy_from_slice(from);
+        }
     }
+    part
 }
 
 /// The film that `file` was made of, its colours as halves.
@@ -217,43 +210,29 @@ fn film(file: &Path) -> Film {
         let channel = list.find(|c| c.name.eq(name));
         channel.map(|c| &c.sample_data)
     };
-    let floats = |name: &str| {
-        let samples = plane(name)?;
-        Some(samples.values_as_f32().collect::<Vec<f32>>())
-    };
-    let vectors = |layer: &str, axes: [&str; 3]| {
-        let [x, y, z] = axes.map(|axis| floats(&format!("{layer}.{axis}")));
-        let (x, y, z) = (x?, y?, z?);
-        let all = x.into_iter().zip(y).zip(z);
-        Some(all.map(|((x, y), z)| Vec3::new(x, y, z)).collect())
-    };
+    let floats =
+        |name: &str| plane(name).map(|samples| samples.values_as_f32().collect::<Vec<f32>>());
     let color = ["R", "G", "B", "A"].map(|name| floats(name).expect("colours"));
     let side = |pixels: usize| u32::try_from(pixels).expect("a side");
-    let mut film = Film {
-        width: side(layer.size.x()),
-        height: side(layer.size.y()),
-        color: (0..color[0].len()).map(|at| std::array::from_fn(|c| color[c][at])).collect(),
-        depth: floats("Z"),
-        normal: vectors("N", ["X", "Y", "Z"]),
-        position: vectors("P", ["X", "Y", "Z"]),
-        velocity: vectors("V", ["X", "Y", "Z"]),
-        albedo: vectors("albedo", ["R", "G", "B"]),
-        id: plane("id.I").and_then(|samples| match samples {
-            FlatSamples::U32(ids) => Some(ids.clone()),
-            _ => None,
-        }),
-        layers: None,
-        odd: None,
-        channels: Channels::COLOR,
-    };
-    film.channels = Channels {
-        depth: film.depth.is_some(),
-        normal: film.normal.is_some(),
-        position: film.position.is_some(),
-        velocity: film.velocity.is_some(),
-        albedo: film.albedo.is_some(),
-        id: film.id.is_some(),
-        ..Channels::COLOR
-    };
+    // Data planes, as far as the file has all of their channels
+    let names = |plane: &FilmPlane| plane_channels(*plane, Channels::ALL, &PlaneNames::default());
+    let is_stored =
+        |p: &FilmPlane| Channels::ALL.has(*p) && names(p).iter().all(|n| plane(n).is_some());
+    let planes: Vec<FilmPlane> = FilmPlane::all().filter(is_stored).collect();
+    let channels = Channels::COLOR.with(&planes);
+    let mut film = Film::new(side(layer.size.x()), side(layer.size.y()), channels);
+    film.color = (0..color[0].len()).map(|at| std::array::from_fn(|c| color[c][at])).collect();
+    for of_film in planes {
+        let count = channels.components(of_film);
+        let words = film.plane_mut::<u32>(of_film).expect("a channel");
+        for (component, name) in names(&of_film).iter().enumerate() {
+            let to = words.iter_mut().skip(component).step_by(count);
+            match plane(name) {
+                Some(FlatSamples::U32(ids)) => to.zip(ids).for_each(|(to, id)| *to = *id),
+                Some(other) => to.zip(other.values_as_f32()).for_each(|(to, v)| *to = v.to_bits()),
+                None => {}
+            }
+        }
+    }
     film
 }

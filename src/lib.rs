@@ -39,7 +39,7 @@
 //! let image = render(&settings, particles, &AtomicBool::new(false))?;
 //!
 //! let film: &Film = image.film();
-//! let depth = film.depth.as_ref().expect("requested");
+//! let depth = film.plane::<f32>(FilmPlane::Depth).expect("requested");
 //! assert!(film.color[32 + 18 * 64][3] > 0.9 && depth[32 + 18 * 64].is_finite());
 //! assert_eq!(image.to_exr()?[..4], [0x76, 0x2f, 0x31, 0x01]);
 //! assert_eq!(image.to_png()?[..4], *b"\x89PNG");

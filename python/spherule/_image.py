@@ -49,10 +49,9 @@ class Image:
         self.color_range = native.color_range
         self.range = self.color_range
         self.camera = _camera(*native.view)
-        self.planes = native.planes()
-        layers = native.layers()
-        if layers is not None:
-            self.planes.update(_grouped(*layers))
+        self.planes = {}
+        for name, plane in native.planes().items():
+            self.planes.update(_grouped(*plane) if isinstance(plane, tuple) else {name: plane})
 
     @property
     def rgba(self):
@@ -123,18 +122,18 @@ class Image:
             raise OutputError(f"{path}: {error.strerror}", file=path) from error
 
 
-def _grouped(layers, names):
-    """Planes over the floats of `layers`: those with a common name before the dot are one array."""
+def _grouped(plane, names):
+    """Parts of a plane with components of these names: those with a common name before the dot are one array."""
     groups = {}
-    for name, index in names:
+    for index, name in enumerate(names):
         groups.setdefault(name.split(".")[0], []).append(index)
-    planes = {}
+    parts = {}
     for name, indices in groups.items():
         first, last = indices[0], indices[-1]
         if len(indices) == 1:
-            planes[name] = layers[:, :, first]
+            parts[name] = plane[:, :, first]
         elif indices == list(range(first, last + 1)):
-            planes[name] = layers[:, :, first : last + 1]
+            parts[name] = plane[:, :, first : last + 1]
         else:
-            planes.update((full, layers[:, :, i]) for full, i in names if full.split(".")[0] == name)
-    return planes
+            parts.update((names[i], plane[:, :, i]) for i in indices)
+    return parts

@@ -3,12 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use spherule::manifest::{ManifestSource, Override};
-use spherule::output::layer_planes;
+use spherule::output::plane_channels;
+use spherule::render::FilmPlane;
+use spherule::render::planes::{Components, PlaneKind};
 use spherule::scene::Projection;
 use spherule::still::{self, Particles, StillImage, StillSettings};
 use spherule_formats::SimulationCell;
@@ -123,51 +125,37 @@ impl NativeImage {
         }
     }
 
-    /// The planes by name, as read-only arrays without a copy.
+    /// The planes by name, as read-only arrays without a copy. Planes whose number of components depends on the job are
+    /// tuples of an array and the names of the components.
     fn planes<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
         let (py, owner) = (slf.py(), slf.as_any());
-        let film = slf.get().image.film();
+        let image = &slf.get().image;
+        let film = image.film();
         let (width, height) = (film.width as usize, film.height as usize);
         let planes = PyDict::new(py);
         // Colours are always there
         let colors = bytemuck::cast_slice::<[f32; 4], f32>(&film.color);
         planes.set_item("rgba", view(owner, colors, &[height, width, 4])?)?;
-        if let Some(depth) = film.depth.as_ref().filter(|_| film.channels.depth) {
-            planes.set_item("Z", view(owner, depth, &[height, width])?)?;
-        }
-        // Vectors, if they were requested: the denoiser may have needed others
-        let vectors = [
-            ("N", &film.normal, film.channels.normal),
-            ("P", &film.position, film.channels.position),
-            ("V", &film.velocity, film.channels.velocity),
-            ("albedo", &film.albedo, film.channels.albedo),
-        ];
-        for (name, plane, is_wanted) in vectors {
-            if let Some(plane) = plane.as_ref().filter(|_| is_wanted) {
-                let numbers = bytemuck::cast_slice::<Vec3, f32>(plane);
-                planes.set_item(name, view(owner, numbers, &[height, width, 3])?)?;
+        // Others, if they were requested: the denoiser may have needed more
+        for plane in FilmPlane::all().filter(|plane| film.channels.has(*plane)) {
+            let count = film.channels.components(plane);
+            let is_fixed = matches!(plane.components(), Components::One | Components::Named(_));
+            let shape = &[height, width, count];
+            let shape = if is_fixed && count == 1 { &shape[..2] } else { shape };
+            let array = if plane.kind() == PlaneKind::Id {
+                view(owner, film.plane::<u32>(plane).unwrap_or_default(), shape)?
+            } else {
+                view(owner, film.plane::<f32>(plane).unwrap_or_default(), shape)?
+            };
+            if is_fixed {
+                planes.set_item(plane.name(), array)?;
+            } else {
+                let names = &image.setup().picture.files.exr.names;
+                let names = plane_channels(plane, film.channels, names);
+                planes.set_item(plane.name(), (array, names))?;
             }
         }
-        if let Some(ids) = film.id.as_ref().filter(|_| film.channels.id) {
-            planes.set_item("id", view(owner, ids, &[height, width])?)?;
-        }
         Ok(planes)
-    }
-
-    /// The floats of all other planes, and the name and the index of each of them.
-    #[expect(clippy::type_complexity, reason = "a tuple for Python")]
-    fn layers<'py>(
-        slf: &Bound<'py, Self>,
-    ) -> PyResult<Option<(Bound<'py, PyAny>, Vec<(String, usize)>)>> {
-        let image = &slf.get().image;
-        let film = image.film();
-        let Some(layers) = &film.layers else {
-            return Ok(None);
-        };
-        let (width, height) = (film.width as usize, film.height as usize);
-        let shape = [height, width, film.channels.layers.floats()];
-        let names = layer_planes(film.channels, &image.setup().picture.files.exr.names);
-        Ok(Some((view(slf.as_any(), layers, &shape)?, names)))
     }
 
     fn to_exr<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {

@@ -7,7 +7,7 @@ use spherule_jobs::publish;
 
 use super::pictures::{JobPictures, PicturesArgs};
 use super::{CliError, Outcome, print};
-use crate::manifest::ATTRIBUTE_CHANNEL;
+use crate::manifest::Channel;
 use crate::movie::FrameRate;
 use crate::output::PictureFormat;
 use crate::report::job::JobReport;
@@ -151,7 +151,8 @@ fn attributes(pictures: &JobPictures) -> Vec<String> {
     let stored = setting(pictures, "output.channels");
     let channels = stored.as_ref().and_then(|value| value.as_array());
     let names = channels.into_iter().flatten().filter_map(|channel| channel.as_str());
-    names.filter_map(|name| name.strip_prefix(ATTRIBUTE_CHANNEL)).map(str::to_owned).collect()
+    let channels: Vec<Channel> = names.filter_map(Channel::from_name).collect();
+    channels.iter().filter_map(Channel::attribute).map(str::to_owned).collect()
 }
 
 /// A setting of the plan.

@@ -19,9 +19,9 @@ const NAME_BYTES: u64 = 32;
 /// Maximum memory of the manifests of a frame of `particles`, bytes: in the frame, in the layout of the file and in its
 /// header.
 pub(super) fn predicted_bytes(setup: &Setup, particles: u64) -> u64 {
-    let mattes = setup.picture.render.channels.layers.mattes;
+    let mattes = setup.picture.render.channels.mattes();
     let names = particles.min(MAX_NAMES as u64);
-    3 * NAME_BYTES * names * mattes.iter().count() as u64
+    3 * NAME_BYTES * names * mattes.count() as u64
 }
 
 /// The attributes of all Cryptomatte layers of an image of `particles` particles.
@@ -30,12 +30,12 @@ pub(super) fn attributes(
     source: &dyn ShadeSource,
     particles: u64,
 ) -> Vec<TextAttribute> {
-    let mattes = setup.picture.render.channels.layers.mattes;
+    let mattes = setup.picture.render.channels.mattes();
     let count = u32::try_from(particles).unwrap_or(u32::MAX);
     let mut all = Vec::new();
-    for kind in mattes.iter() {
+    for kind in mattes {
         // The key of a layer is the start of the hash of its name
-        let hash = format!("{:08x}", murmur_hash3(kind.name().as_bytes()));
+        let hash = format!("{:08x}", murmur_hash3(kind.plane().name().as_bytes()));
         let mut put = |name: &str, text: String| {
             all.push(TextAttribute { name: format!("cryptomatte/{}/{name}", &hash[..7]), text });
         };
@@ -44,7 +44,7 @@ pub(super) fn attributes(
         if let Some(manifest) = manifest(setup, kind, source, count) {
             put("manifest", manifest);
         }
-        put("name", kind.name().to_owned());
+        put("name", kind.plane().name().to_owned());
     }
     all
 }

@@ -3,7 +3,7 @@
 use super::renderer::TracedFrame;
 use super::setup::Setup;
 use crate::overlay::{Drawing, FrameValues, FrameView, Page, Sprite, draw, marks};
-use crate::render::Film;
+use crate::render::{Film, FilmPlane};
 use crate::scene::{Camera, Projection, RgbEncoding};
 
 impl Setup {
@@ -78,16 +78,10 @@ impl Setup {
     }
 }
 
-/// Stores overlays in their layer of `film`, if it has one. The film is at this place of the page of the sprites.
+/// Stores overlays in their plane of `film`, if it has one. The film is at this place of the page of the sprites.
 pub(super) fn store(film: &mut Film, sprites: &[Sprite], [left, top]: [u32; 2]) {
-    // Nothing to do without a layer
-    let layers = film.channels.layers;
-    let (place, floats) = (layers.overlay_at(), layers.floats());
-    if place.is_empty() {
-        return;
-    }
     let width = film.width as usize;
-    let Some(planes) = &mut film.layers else {
+    let Some(pixels) = film.plane_mut::<[f32; 4]>(FilmPlane::Overlay) else {
         return;
     };
     // Move sprites from the page to the film
@@ -98,22 +92,17 @@ pub(super) fn store(film: &mut Film, sprites: &[Sprite], [left, top]: [u32; 2]) 
     });
     let sprites: Vec<Sprite> = moved.collect();
     // Blend them row by row over an empty layer
-    for (row, y) in planes.chunks_mut((width * floats).max(1)).zip(0..) {
-        // The planes may be those of another image
-        for pixel in row.chunks_mut(floats) {
-            pixel[place.clone()].fill(0.0);
-        }
+    for (row, y) in pixels.chunks_mut(width.max(1)).zip(0..) {
+        // The plane may be that of another image
+        row.fill([0.0; 4]);
         for sprite in &sprites {
-            sprite.each_in_row(y, width, |x, pixel| {
-                let own = &mut row[x * floats..][..floats];
-                blend(&mut own[place.clone()], pixel);
-            });
+            sprite.each_in_row(y, width, |x, pixel| blend(&mut row[x], pixel));
         }
     }
 }
 
 /// Draws premultiplied sRGB over linear RGB with alpha.
-fn blend(under: &mut [f32], [r, g, b, a]: [u8; 4]) {
+fn blend(under: &mut [f32; 4], [r, g, b, a]: [u8; 4]) {
     if a == 0 {
         return;
     }

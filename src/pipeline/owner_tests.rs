@@ -17,8 +17,7 @@ use super::setup::ColorRule;
 use super::{CpuRenderer, FrameRenderer, ImageTask, Setup, load_frame};
 use crate::manifest::Manifest;
 use crate::render::cryptomatte::{ObjectName, object_of};
-use crate::render::layers::MatteKind;
-use crate::render::{Film, NO_ID};
+use crate::render::{Film, FilmPlane, NO_ID};
 use crate::resolve::{SceneInputs, question};
 use crate::scene::ColorMap;
 use crate::survey::Survey;
@@ -160,12 +159,12 @@ fn rendered(sequence: &Sequence, settings: &str) -> (Setup, Film) {
 /// other channels have its values. Returns the number of different particles.
 #[track_caller]
 fn check(particles: &Particles, film: &Film, distances: &Range<f32>, name: &str) -> usize {
-    let planes = (&film.id, &film.position, &film.velocity, &film.layers);
-    let (Some(ids), Some(points), Some(velocities), Some(layers)) = planes else {
-        panic!("{name}: channels are missing");
-    };
-    let places = film.channels.layers;
-    let matte = places.matte_at(MatteKind::Particle).expect("a layer").start;
+    let ids = film.plane::<u32>(FilmPlane::Id).expect("requested");
+    let points = film.plane::<Vec3>(FilmPlane::Position).expect("requested");
+    let velocities = film.plane::<Vec3>(FilmPlane::Velocity).expect("requested");
+    let masses = film.plane::<f32>(FilmPlane::Attributes).expect("requested");
+    let levels = film.channels.components(FilmPlane::CryptoParticle);
+    let objects = film.plane::<u32>(FilmPlane::CryptoParticle).expect("requested");
     let mut seen = Vec::new();
     for (pixel, id) in ids.iter().enumerate().filter(|(_, id)| **id != NO_ID) {
         let index = Particles::index(*id);
@@ -175,11 +174,9 @@ fn check(particles: &Particles, film: &Film, distances: &Range<f32>, name: &str)
             "{name}: pixel {pixel}: particle {index} is {distance} radii away"
         );
         assert_eq!(velocities[pixel], Particles::velocity(index), "{name}: V");
-        let floats = &layers[pixel * places.floats()..][..places.floats()];
-        let mass = floats[places.attributes_at().start];
-        assert_eq!(mass, Particles::mass(index), "{name}: mass");
+        assert_eq!(masses[pixel], Particles::mass(index), "{name}: mass");
         let object = object_of(ObjectName::of_particle(*id).as_bytes());
-        assert_eq!(floats[matte].to_bits(), object, "{name}: Cryptomatte");
+        assert_eq!(objects[pixel * levels], object, "{name}: Cryptomatte");
         seen.push(index);
     }
     seen.sort_unstable();
@@ -264,9 +261,9 @@ fn rods_have_the_colours_of_their_particles() {
 /// number.
 #[track_caller]
 fn check_rods(particles: &Particles, film: &Film, map: &ColorMap, reach: f32, name: &str) -> usize {
-    let (Some(ids), Some(points), Some(albedo)) = (&film.id, &film.position, &film.albedo) else {
-        panic!("{name}: channels are missing");
-    };
+    let ids = film.plane::<u32>(FilmPlane::Id).expect("requested");
+    let points = film.plane::<Vec3>(FilmPlane::Position).expect("requested");
+    let albedo = film.plane::<Vec3>(FilmPlane::Albedo).expect("requested");
     let mut count = 0;
     for (pixel, id) in ids.iter().enumerate() {
         if *id != NO_ID || film.color[pixel][3] == 0.0 || albedo[pixel] == Vec3::ZERO {

@@ -16,7 +16,9 @@ use crate::accel::stored::{StoredSettings, StoredTree};
 use crate::accel::{BuildReport, TreeBuilder};
 use crate::denoise::{DenoiseError, DenoiseInput, denoise};
 use crate::output::TextAttribute;
-use crate::render::{Colors, Film, Opacities, ParticleShading, RayCounts, RendererKind, Stop};
+use crate::render::{
+    Colors, Film, FilmPlane, Opacities, ParticleShading, RayCounts, RendererKind, Stop,
+};
 use crate::report::FrameReport;
 use crate::report::frame::FileBytes;
 use crate::scene::material::DEFAULT_COLOR;
@@ -191,7 +193,7 @@ impl CpuRenderer {
 
 /// The attributes of the Cryptomatte layers of `frame`.
 fn matte_attributes(setup: &Setup, frame: &BuiltFrame) -> Vec<TextAttribute> {
-    if setup.picture.render.channels.layers.mattes.is_empty() {
+    if setup.picture.render.channels.mattes().next().is_none() {
         return Vec::new();
     }
     let (count, picture) = (frame.report.particles, &setup.picture);
@@ -208,9 +210,15 @@ fn matte_attributes(setup: &Setup, frame: &BuiltFrame) -> Vec<TextAttribute> {
 /// Denoises `film` if the setup says so. Returns the time, seconds.
 fn denoise_film(setup: &Setup, film: &mut Film) -> Result<f64, DenoiseError> {
     // Without settings, or without features to compare, there is nothing to do
-    let (Some(settings), Some(odd), Some(albedo), Some(normal), Some(depth)) =
-        (&setup.picture.denoise, &film.odd, &film.albedo, &film.normal, &film.depth)
-    else {
+    let (Some(settings), Some(odd)) = (&setup.picture.denoise, &film.odd) else {
+        return Ok(0.0);
+    };
+    let features = (
+        film.plane(FilmPlane::Albedo),
+        film.plane(FilmPlane::Normal),
+        film.plane(FilmPlane::Depth),
+    );
+    let (Some(albedo), Some(normal), Some(depth)) = features else {
         return Ok(0.0);
     };
     let start = Instant::now();

@@ -7,8 +7,8 @@ use super::{ResolveError, require_attribute};
 use crate::manifest::{Channel, Manifest, Output};
 use crate::output::{PlaneNames, attribute_planes as planes_of};
 use crate::pipeline::{AttributeChannel, FrameStep, attribute_list};
-use crate::render::Channels;
 use crate::render::layers::{MAX_ATTRIBUTE_FLOATS, MAX_LIGHT_GROUPS};
+use crate::render::{Channels, FilmPlane};
 use crate::survey::Survey;
 
 const KEY: &str = "output.channels";
@@ -29,13 +29,9 @@ pub(super) fn channels(
         return Ok((Channels::COLOR, Vec::new()));
     }
     let unsupported = |what: String| ResolveError::Unsupported { key: KEY, what };
-    // Find the channels with fixed names
-    let is_named = |channel: &&Channel| matches!(channel, Channel::Named(_));
-    let names: Vec<_> = output.channels.iter().filter(is_named).map(Channel::name).collect();
-    let mut channels = Channels::from_names(names.iter().map(|name| &**name))
-        .map_err(|e| unsupported(e.to_string()))?;
-    channels.layers.mattes.set_levels(output.cryptomatte_levels);
-    // Find the light groups
+    // Find the channels with fixed names, and the light groups
+    let mut channels = Channels::of(output.channels.iter().filter_map(Channel::named));
+    channels.layers.set_matte_levels(output.cryptomatte_levels);
     let light_groups = manifest.light_groups();
     channels.layers.set_light_groups(light_groups.len());
     if channels.layers.light_groups > 0 && light_groups.len() >= MAX_LIGHT_GROUPS {
@@ -46,12 +42,9 @@ pub(super) fn channels(
         )));
     }
     // Find the attributes
-    let mut attributes = Vec::new();
-    for channel in &output.channels {
-        if let Channel::Attribute(name) = channel {
-            attributes.push(attribute(name, survey)?);
-        }
-    }
+    let attributes = output.channels.iter().filter_map(Channel::attribute);
+    let attributes: Vec<_> =
+        attributes.map(|name| attribute(name, survey)).collect::<Result<_, _>>()?;
     let names = attribute_planes(&attributes);
     if names.len() > MAX_ATTRIBUTE_FLOATS {
         return Err(unsupported(format!(
@@ -101,7 +94,7 @@ pub(super) fn frame_step(
     output: &Output,
     survey: &Survey,
 ) -> Result<Option<FrameStep>, ResolveError> {
-    if !channels.layers.motion {
+    if !channels.has(FilmPlane::Motion) {
         return Ok(None);
     }
     let unsupported = |what: String| ResolveError::Unsupported { key: KEY, what };

@@ -83,15 +83,6 @@ fn write(folder: &str, name: &str, choice: u8, bytes: &[u8]) {
 
 /// Images of the shapes that the targets know, with their number.
 fn images() -> Vec<(String, u8, Vec<u8>)> {
-    let all = Channels {
-        depth: true,
-        normal: true,
-        position: true,
-        velocity: true,
-        albedo: true,
-        id: true,
-        ..Channels::COLOR
-    };
     let mut images = Vec::new();
     let color = film(5, 3, Channels::COLOR);
     for compression in
@@ -100,7 +91,7 @@ fn images() -> Vec<(String, u8, Vec<u8>)> {
         let name = format!("{compression:?}").to_lowercase();
         images.push((name, 0, exr(&color, compression)));
     }
-    images.push(("all_channels".into(), 1, exr(&film(5, 3, all), Compression::Zip)));
+    images.push(("all_channels".into(), 1, exr(&film(5, 3, Channels::ALL), Compression::Zip)));
     images.push(("blocks".into(), 2, exr(&film(40, 37, Channels::COLOR), Compression::Zip)));
     for (name, choice, film) in
         [("small_png", 0, color), ("large_png", 2, film(40, 37, Channels::COLOR))]

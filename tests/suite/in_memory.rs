@@ -61,7 +61,8 @@ fn the_bytes_are_those_of_a_file() {
     };
     let image = render(&settings, particles, &AtomicBool::new(false)).expect("a picture");
     assert!(image.to_exr().expect("bytes") == expected, "bytes differ");
-    assert!(image.film().velocity.is_some() && image.film().layers.is_none());
+    let channels = image.film().channels;
+    assert!(channels.has(FilmPlane::Velocity) && !channels.has(FilmPlane::Attributes));
 }
 
 #[test]

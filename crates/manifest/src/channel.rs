@@ -3,65 +3,14 @@
 use std::borrow::Cow;
 
 use serde_json::{Value as Json, json};
+use spherule_tracer::render::{FilmPlane, NamedChannel};
 
 use super::field::Field;
 use super::key::Key;
-use super::value::{Fault, FlagKind, Value, list, named, quoted};
+use super::value::{Fault, FlagKind, Value, list, quoted};
 
 /// Prefix of the name of an attribute.
-pub const ATTRIBUTE_CHANNEL: &str = "attribute:";
-
-named! {
-    /// Channels with fixed names.
-    NamedChannel {
-        /// Colour and coverage, premultiplied.
-        Rgba = "RGBA",
-        /// Distance along the view axis.
-        Z = "Z",
-        /// Normal.
-        N = "N",
-        /// Particle id.
-        Id = "id",
-        /// Position in the world.
-        P = "P",
-        /// Velocity.
-        V = "V",
-        /// Base colour, before lighting.
-        Albedo = "albedo",
-        /// All light channels.
-        Lights = "lights",
-        /// Light that opaque surfaces reflect diffusely.
-        Diffuse = "diffuse",
-        /// Light that opaque surfaces reflect glossily.
-        Specular = "specular",
-        /// Light by reflection at mirroring and transmissive surfaces.
-        Reflection = "reflection",
-        /// Light by refraction.
-        Refraction = "refraction",
-        /// Lights that the camera sees.
-        Emission = "emission",
-        /// The background that the camera sees.
-        Background = "background",
-        /// Light by its light group.
-        LightGroups = "light_groups",
-        /// Colour before denoising.
-        Noisy = "noisy",
-        /// Fraction of direct light that arrives.
-        Shadow = "shadow",
-        /// Motion on the film to the next frame.
-        Motion = "motion",
-        /// All Cryptomatte layers.
-        Cryptomatte = "cryptomatte",
-        /// Cryptomatte by particle.
-        CryptoParticle = "crypto_particle",
-        /// Cryptomatte by material.
-        CryptoMaterial = "crypto_material",
-        /// Cryptomatte by part.
-        CryptoPart = "crypto_part",
-        /// What is drawn over previews.
-        Overlay = "overlay",
-    }
-}
+const ATTRIBUTE_CHANNEL: &str = "attribute:";
 
 /// A channel of an image.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -73,6 +22,36 @@ pub enum Channel {
 }
 
 impl Channel {
+    /// The channel of one plane.
+    pub const fn plane(plane: FilmPlane) -> Self {
+        Self::Named(NamedChannel::Plane(plane))
+    }
+
+    /// The channel with this name in a manifest.
+    pub fn from_name(name: &str) -> Option<Self> {
+        match name.strip_prefix(ATTRIBUTE_CHANNEL) {
+            Some(attribute) if attribute.trim().is_empty() => None,
+            Some(attribute) => Some(Self::Attribute(attribute.to_owned())),
+            None => NamedChannel::from_name(name).map(Self::Named),
+        }
+    }
+
+    /// The fixed name.
+    pub const fn named(&self) -> Option<NamedChannel> {
+        match self {
+            Self::Named(channel) => Some(*channel),
+            Self::Attribute(_) => None,
+        }
+    }
+
+    /// The attribute.
+    pub fn attribute(&self) -> Option<&str> {
+        match self {
+            Self::Named(_) => None,
+            Self::Attribute(name) => Some(name),
+        }
+    }
+
     /// The name in a manifest.
     pub fn name(&self) -> Cow<'static, str> {
         match self {
@@ -87,26 +66,21 @@ impl Value for Channel {
         format!("one of {} or attribute:NAME", Self::words().join(", "))
     }
 
-    fn parse(field: &Field<'_>, key: &Key) -> Result<Self, Fault> {
-        let text = field.as_text().ok_or(Fault::Unwanted)?;
-        match text.strip_prefix(ATTRIBUTE_CHANNEL) {
-            Some(name) if name.trim().is_empty() => Err(Fault::Unwanted),
-            Some(name) => Ok(Self::Attribute(name.to_owned())),
-            None => NamedChannel::parse(field, key).map(Self::Named),
-        }
+    fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {
+        field.as_text().and_then(Self::from_name).ok_or(Fault::Unwanted)
     }
 
     fn toml(&self) -> String {
         quoted(&self.name())
     }
 
-    fn schema(key: &Key) -> Json {
+    fn schema(_: &Key) -> Json {
         let attribute = json!({ "type": "string", "pattern": r"^attribute:\s*\S" });
-        json!({ "anyOf": [NamedChannel::schema(key), attribute] })
+        json!({ "anyOf": [{ "enum": Self::words() }, attribute] })
     }
 
     fn words() -> Vec<&'static str> {
-        NamedChannel::words()
+        NamedChannel::ALL.map(NamedChannel::name).to_vec()
     }
 }
 

@@ -1,12 +1,12 @@
 //! Dependencies between tables: what one allows another.
 
 use spherule_jobs::FrameRange;
-use spherule_tracer::render::{MAX_LITERAL_DEPTH, MAX_SIDE};
+use spherule_tracer::render::{FilmPlane, MAX_LITERAL_DEPTH, MAX_SIDE};
 use spherule_tracer::scene::MaterialId;
 
 use super::bonds::BondSearch;
 use super::camera::ProjectionKind;
-use super::channel::{Channel, NamedChannel};
+use super::channel::Channel;
 use super::keys::Keys;
 use super::overlay::{Overlay, OverlayKind};
 use super::problem::{Problem, Problems};
@@ -200,7 +200,7 @@ impl Manifest {
             );
             root.section("camera").wrong("stereo", &what);
         }
-        if self.output.channels.contains(&Channel::Named(NamedChannel::Motion)) {
+        if self.output.channels.contains(&Channel::plane(FilmPlane::Motion)) {
             let what = "motion is given, but stereo pairs have no such channel; remove it";
             root.section("output").wrong("channels", what);
         }

@@ -36,7 +36,7 @@ use std::path::Path;
 
 use spherule_images::overlay::Layout;
 use spherule_selection::Selection;
-use spherule_tracer::render::{IntegratorKind, RendererKind};
+use spherule_tracer::render::{FilmPlane, IntegratorKind, RendererKind};
 use spherule_tracer::scene::Fresnel;
 use spherule_tracer::surface::{SprayStyle, SurfaceKind, SurfaceSettings};
 
@@ -118,7 +118,7 @@ pub use camera::{
     ProjectionKind,
 };
 pub use cell::{Cell, Replicate};
-pub use channel::{ATTRIBUTE_CHANNEL, Channel, NamedChannel};
+pub use channel::Channel;
 pub use clip::{Clip, ClipKind, ClipMode, KeptSide, PlaneNormal};
 pub use color::{CategoryColors, CategoryNames, ColorMapping, ColorSetting, ScaleKind};
 pub use color_map::{MapName, RangeSetting};
@@ -150,6 +150,7 @@ pub use render::{GroundPattern, Image, IndirectSetting, Render};
 pub use schema::{SCHEMA_FILE, job_schema};
 pub use select::{Axis, Select, Slab};
 pub use source::ManifestSource;
+pub use spherule_tracer::render::NamedChannel;
 pub use sun::Sun;
 pub use text_size::{TextSize, points_on_paper};
 pub use trails::Trails;
@@ -439,7 +440,7 @@ impl Manifest {
             Affects::BranchingSpheres => self.branches_at_spheres(),
             Affects::PathTracing => self.integrator() == IntegratorKind::Path,
             Affects::LightGroups => {
-                let channel = Channel::Named(NamedChannel::LightGroups);
+                let channel = Channel::plane(FilmPlane::LightGroups);
                 self.output.channels.contains(&channel)
             }
         }

@@ -2,9 +2,10 @@
 
 use serde_json::{Value as Json, json};
 use spherule_images::output::Compression;
-use spherule_tracer::render::layers::Mattes;
+use spherule_tracer::render::layers::{DEFAULT_MATTE_LEVELS, MAX_MATTE_LEVELS};
+use spherule_tracer::render::{FilmPlane, NamedChannel};
 
-use super::channel::{Channel, NamedChannel};
+use super::channel::Channel;
 use super::field::Field;
 use super::key::Key;
 use super::keys::section;
@@ -14,8 +15,12 @@ use super::value::{Fault, Value, named, quoted};
 named!(Compression: None = "none", Rle = "rle", Zip = "zip", Zips = "zips", Piz = "piz");
 
 /// Default channels.
-const DEFAULT_CHANNELS: [NamedChannel; 4] =
-    [NamedChannel::Rgba, NamedChannel::Z, NamedChannel::N, NamedChannel::Id];
+const DEFAULT_CHANNELS: [NamedChannel; 4] = [
+    NamedChannel::Rgba,
+    NamedChannel::Plane(FilmPlane::Depth),
+    NamedChannel::Plane(FilmPlane::Normal),
+    NamedChannel::Plane(FilmPlane::Id),
+];
 
 /// Default names of images.
 const DEFAULT_PATH: &str = "out/frame.####.exr";
@@ -38,7 +43,7 @@ section! {
         channels: Vec<Channel> = DEFAULT_CHANNELS.map(Channel::Named).to_vec(),
             example("[\"RGBA\", \"Z\"]"), flag("channels", "LIST", "Output");
         /// Maximum number of objects in a pixel of each Cryptomatte layer, rounded up to an even number
-        cryptomatte_levels: u32 = u32::from(Mattes::DEFAULT_LEVELS), from(2), to(Mattes::MAX_LEVELS);
+        cryptomatte_levels: u32 = u32::from(DEFAULT_MATTE_LEVELS), from(2), to(MAX_MATTE_LEVELS);
         /// Lossless compression of the EXR: none | rle | zip | zips | piz
         compression: Compression = Compression::Zip;
         /// Lossless compression of data channels: none | rle | zip | zips | piz

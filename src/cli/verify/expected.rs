@@ -6,9 +6,7 @@ use spherule_jobs::Plan;
 
 use crate::cli::pictures::may_have_strips;
 use crate::job::KIND;
-use crate::manifest::{
-    ATTRIBUTE_CHANNEL as ATTRIBUTE, Camera, Image, PixelBounds, ProjectionKind, Side,
-};
+use crate::manifest::{Camera, Channel, Image, PixelBounds, ProjectionKind, Side};
 use crate::output::ImageShape;
 use crate::render::Channels;
 
@@ -124,26 +122,19 @@ impl<'a> StoredSettings<'a> {
     /// The channels; None if a setting that they follow from is missing or invalid.
     fn channels(self) -> Option<StoredChannels> {
         let list = self.value("output.channels")?;
-        let names =
-            list.as_array()?.iter().map(|name| name.as_str()).collect::<Option<Vec<_>>>()?;
-        // Channels of attributes have names of their own
-        let attributes = names
-            .iter()
-            .filter_map(|name| name.strip_prefix(ATTRIBUTE))
-            .map(str::to_owned)
-            .collect();
-        let is_named = |name: &&str| !name.starts_with(ATTRIBUTE);
-        let mut channels = Channels::from_names(names.into_iter().filter(is_named)).ok()?;
+        let names = list.as_array()?.iter().map(|name| Channel::from_name(name.as_str()?));
+        let list: Vec<Channel> = names.collect::<Option<_>>()?;
+        let mut channels = Channels::of(list.iter().filter_map(Channel::named));
         // Jobs of earlier versions have no levels
         if let Some(levels) = self.value("output.cryptomatte_levels") {
             let levels = u32::try_from(levels.as_integer()?).ok()?;
-            channels.layers.mattes.set_levels(levels);
+            channels.layers.set_matte_levels(levels);
         }
         let light_groups = self.light_groups()?;
         channels.layers.set_light_groups(light_groups.len());
         Some(StoredChannels {
             channels,
-            attributes,
+            attributes: list.iter().filter_map(Channel::attribute).map(str::to_owned).collect(),
             light_groups: light_groups.into_iter().collect(),
         })
     }

@@ -1,7 +1,7 @@
 //! The shots: small, made of numbers alone, and each about one thing.
 
 use glam::{DVec3, Vec3};
-use spherule::render::{Channels, Colors, RenderSettings};
+use spherule::render::{Channels, Colors, FilmPlane, RenderSettings};
 use spherule::scene::{
     Background, Bounds, Camera, CameraView, ColorMap, Convergence, Falloff, Fresnel, Ground, Light,
     Material, Owner, Projection, Scene, StereoSettings,
@@ -189,7 +189,7 @@ pub(super) fn cut() -> Shot {
     let normal = DVec3::new(2.0, -3.0, 1.0).normalize();
     shot.cut.cut(0.55 * normal, normal);
     let colors = [RED, GREEN, BLUE, GREY];
-    shot.settings.channels = Channels { id: true, normal: true, ..Channels::COLOR };
+    shot.settings.channels = Channels::COLOR.with(&[FilmPlane::Id, FilmPlane::Normal]);
     shot.painted(&(0..46).map(|i| colors[i % 4]).collect::<Vec<_>>())
 }
 

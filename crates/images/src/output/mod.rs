@@ -15,7 +15,8 @@ pub use base64::{base64, data_url};
 pub use exr::{
     Compression, CustomAttribute, DEFAULT_LIGHT_GROUP, EncodedExr, ExrBlock, ExrLayout, ExrOptions,
     OutputError, PackBuffers, PackedBlock, PlaneNames, TextAttribute, ambiguous_name,
-    attribute_planes, encode_exr, encoder_bytes, layer_planes, pack_block, write_blocks, write_exr,
+    attribute_planes, encode_exr, encoder_bytes, pack_block, plane_channels, write_blocks,
+    write_exr,
 };
 pub use figure::{Figure, FigurePicture};
 pub use format::{PictureFormat, encode_figure, encode_picture};

@@ -12,7 +12,7 @@ use exr::meta::attribute::{ChannelDescription, SampleType};
 use exr::meta::header::Header;
 use thiserror::Error;
 
-use super::exr::planes::{Plane, PlaneNames, attribute_planes, parts, planes};
+use super::exr::planes::{ExrChannel, PlaneNames, attribute_planes, exr_channels, parts};
 use crate::render::layers::MAX_ATTRIBUTE_FLOATS;
 use crate::render::{Channels, DataWindow};
 
@@ -96,8 +96,8 @@ pub fn verify_exr(file: impl Read + Seek, expected: &ImageShape) -> Result<(), I
         return Err(ImageFault::Damaged(what));
     }
     // Check the size before memory is allocated for the size in the header
-    for (header, planes) in meta.headers.iter().zip(&parts) {
-        check_header(header, planes, expected)?;
+    for (header, channels) in meta.headers.iter().zip(&parts) {
+        check_header(header, channels, expected)?;
     }
     // Decode the blocks at the offsets in the file, like viewers do
     let mut all_rows = vec![0; parts.len()];
@@ -124,34 +124,34 @@ pub fn verify_exr(file: impl Read + Seek, expected: &ImageShape) -> Result<(), I
     Ok(())
 }
 
-/// The planes of each part of the file with `headers`, as they are expected.
-fn expected_parts(headers: &[Header], expected: &ImageShape) -> Vec<Vec<Plane>> {
+/// The channels of each part of the file with `headers`, as they are expected.
+fn expected_parts(headers: &[Header], expected: &ImageShape) -> Vec<Vec<ExrChannel>> {
     let channels = headers.iter().flat_map(|header| &header.channels.list);
     let found: Vec<String> = channels.map(|channel| channel.name.to_string()).collect();
     let mut channels = expected.channels;
     let attributes = attributes(&found, &expected.attributes);
     channels.layers.attributes = u8::try_from(attributes.len()).unwrap_or(u8::MAX);
     let names = PlaneNames { attributes, light_groups: expected.light_groups.clone() };
-    parts(planes(channels, &names), expected.has_data_part)
+    parts(exr_channels(channels, &names), expected.has_data_part)
 }
 
 fn check_header(
     header: &Header,
-    planes: &[Plane],
+    channels: &[ExrChannel],
     expected: &ImageShape,
 ) -> Result<(), ImageFault> {
     let size = (header.layer_size.x(), header.layer_size.y());
     check_window(header, &picture_window(size, expected)?)?;
     let found: Vec<(String, SampleType)> =
         header.channels.list.iter().map(|c| (c.name.to_string(), c.sample_type)).collect();
-    let planes: Vec<_> =
-        planes.iter().map(|plane| (plane.name.to_string(), plane.sample_type())).collect();
+    let channels: Vec<_> =
+        channels.iter().map(|channel| (channel.name.clone(), channel.sample_type())).collect();
     let has_all_pixels = |c: &ChannelDescription| c.sampling.x() == 1 && c.sampling.y() == 1;
     let is_complete = header.channels.list.iter().all(has_all_pixels);
-    if is_complete && found.len() == planes.len() && planes.iter().all(|p| found.contains(p)) {
+    if is_complete && found.len() == channels.len() && channels.iter().all(|c| found.contains(c)) {
         return Ok(());
     }
-    Err(ImageFault::Channels { found: listed(&found), expected: listed(&planes) })
+    Err(ImageFault::Channels { found: listed(&found), expected: listed(&channels) })
 }
 
 /// The names of the planes of attributes `names`, with the number of components that each has among the channels
@@ -205,13 +205,13 @@ fn check_window(header: &Header, expected: &DataWindow) -> Result<(), ImageFault
 }
 
 /// Names and types of channels for messages.
-fn listed(planes: &[(String, SampleType)]) -> String {
+fn listed(channels: &[(String, SampleType)]) -> String {
     let description = |(name, kind): &(String, SampleType)| match kind {
         SampleType::F16 => format!("{name} (half)"),
         SampleType::F32 => format!("{name} (float)"),
         SampleType::U32 => format!("{name} (uint)"),
     };
-    planes.iter().map(description).collect::<Vec<_>>().join(", ")
+    channels.iter().map(description).collect::<Vec<_>>().join(", ")
 }
 
 /// Decodes the PNG file `file` and compares its size with `expected`.

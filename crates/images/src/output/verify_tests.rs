@@ -4,7 +4,7 @@ use exr::block::chunk::CompressedBlock;
 
 use super::*;
 use crate::output::{Compression, ExrOptions, PreviewOptions, encode_exr, encode_preview};
-use crate::render::Film;
+use crate::render::{Film, FilmPlane};
 
 /// An irregular film with few different values, so that every block is smaller when compressed and is stored
 /// compressed.
@@ -41,14 +41,9 @@ fn verify(bytes: &[u8], expected: &ImageShape) -> Result<(), String> {
 
 /// All combinations of channels.
 fn channel_sets() -> impl Iterator<Item = Channels> {
-    (0..64_u32).map(|bits| Channels {
-        depth: bits & 1 != 0,
-        normal: bits & 2 != 0,
-        position: bits & 4 != 0,
-        velocity: bits & 8 != 0,
-        albedo: bits & 16 != 0,
-        id: bits & 32 != 0,
-        ..Channels::COLOR
+    (0..64_u32).map(|bits| {
+        let is_given = |plane: &FilmPlane| bits >> *plane as u32 & 1 == 1;
+        Channels::COLOR.with(&FilmPlane::all().filter(is_given).collect::<Vec<_>>())
     })
 }
 
@@ -139,7 +134,7 @@ fn wrong_size_or_channels_are_faults() {
     let mut expected = shape(Channels::COLOR);
     expected.height = 38;
     assert_eq!(verify(&bytes, &expected).unwrap_err(), "is 40x37, expected 40x38");
-    let expected = shape(Channels { id: true, ..Channels::COLOR });
+    let expected = shape(Channels::COLOR.with(&[FilmPlane::Id]));
     assert_eq!(
         verify(&bytes, &expected).unwrap_err(),
         "has the channels A (half), B (half), G (half), R (half), \

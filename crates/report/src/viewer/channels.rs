@@ -3,7 +3,13 @@
 use colorous::VIRIDIS;
 
 use spherule_images::output::view::byte_from_linear;
+use spherule_images::output::{PlaneNames, attribute_planes, plane_channels};
 use spherule_images::picture::{Picture, SampledPlanes};
+use spherule_tracer::render::{Channels, FilmPlane, NO_ID};
+
+/// The planes that pages show.
+pub(super) const SHOWN: [FilmPlane; 5] =
+    [FilmPlane::Id, FilmPlane::Depth, FilmPlane::Normal, FilmPlane::Velocity, FilmPlane::Albedo];
 
 /// A channel that can be shown.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -27,14 +33,34 @@ pub(super) struct ChannelRanges(Vec<(ChannelKind, [f32; 2])>);
 /// Planes of the components of a vector.
 pub(super) type Axes<'a> = [&'a [f32]; 3];
 
-/// The planes of a vector with these names of components.
-pub(super) fn vector<'a>(
-    planes: &'a SampledPlanes,
-    name: &str,
-    axes: [&str; 3],
-) -> Option<Axes<'a>> {
-    let [x, y, z] = axes.map(|axis| planes.floats(&format!("{name}.{axis}")));
-    Some([x?, y?, z?])
+/// The names of the channels of `plane` in a file.
+fn names_of(plane: FilmPlane) -> Vec<String> {
+    plane_channels(plane, Channels::COLOR, &PlaneNames::default())
+}
+
+/// The vectors of `plane`.
+pub(super) fn vectors(planes: &SampledPlanes, plane: FilmPlane) -> Option<Axes<'_>> {
+    vectors_of(planes, &names_of(plane))
+}
+
+/// The vectors of the attribute `name`.
+pub(super) fn attribute_vectors<'a>(planes: &'a SampledPlanes, name: &str) -> Option<Axes<'a>> {
+    vectors_of(planes, &attribute_planes(name, 3))
+}
+
+fn vectors_of<'a>(planes: &'a SampledPlanes, names: &[String]) -> Option<Axes<'a>> {
+    let axes: Option<Vec<_>> = names.iter().map(|name| planes.floats(name)).collect();
+    axes?.try_into().ok()
+}
+
+/// The ids of particles.
+pub(super) fn ids(planes: &SampledPlanes) -> Option<&[u32]> {
+    planes.integers(names_of(FilmPlane::Id).first()?)
+}
+
+/// The distances along the view axis.
+pub(super) fn depths(planes: &SampledPlanes) -> Option<&[f32]> {
+    planes.floats(FilmPlane::Depth.name())
 }
 
 /// The length of the vector at sample `i`.
@@ -67,8 +93,8 @@ impl ChannelKind {
 
     fn axes<'a>(&self, planes: &'a SampledPlanes) -> Option<Axes<'a>> {
         match self {
-            Self::Normal => vector(planes, "N", ["X", "Y", "Z"]),
-            Self::Albedo => vector(planes, "albedo", ["R", "G", "B"]),
+            Self::Normal => vectors(planes, FilmPlane::Normal),
+            Self::Albedo => vectors(planes, FilmPlane::Albedo),
             _ => None,
         }
     }
@@ -76,18 +102,16 @@ impl ChannelKind {
     /// One value for each sample; NaN where there is none.
     fn values(&self, planes: &SampledPlanes) -> Option<Vec<f32>> {
         let count = planes.size[0] * planes.size[1];
-        let is_empty = |i: usize| planes.integers("id.I").is_some_and(|ids| ids[i] == u32::MAX);
+        let ids = ids(planes);
+        let is_empty = |i: usize| ids.is_some_and(|ids| ids[i] == NO_ID);
         let known = |value: f32, i: usize| if is_empty(i) { f32::NAN } else { value };
-        let lengths = |name: &str| {
-            let axes = vector(planes, name, ["X", "Y", "Z"])?;
-            Some((0..count).map(|i| known(length(&axes, i), i)).collect())
-        };
+        let lengths = |axes: Axes<'_>| (0..count).map(|i| known(length(&axes, i), i)).collect();
         match self {
-            Self::Depth => planes.floats("Z").map(<[f32]>::to_vec),
-            Self::Speed => lengths("V"),
+            Self::Depth => depths(planes).map(<[f32]>::to_vec),
+            Self::Speed => vectors(planes, FilmPlane::Velocity).map(lengths),
             Self::Attribute(name) => match planes.floats(name) {
                 Some(samples) => Some(samples.iter().zip(0..).map(|(v, i)| known(*v, i)).collect()),
-                None => lengths(name),
+                None => attribute_vectors(planes, name).map(lengths),
             },
             Self::Normal | Self::Albedo => None,
         }

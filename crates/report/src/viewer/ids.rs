@@ -14,14 +14,12 @@ use std::io::{self, Write};
 
 use spherule_images::output::base64;
 use spherule_images::picture::SampledPlanes;
+use spherule_tracer::render::{FilmPlane, NO_ID};
 
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 
-use super::channels::{length, vector};
-
-/// Id of pixels without particle.
-const NO_ID: u32 = u32::MAX;
+use super::channels::{attribute_vectors, depths, ids, length, vectors};
 
 /// Names of the values in [`packed_ids`].
 pub(super) fn value_names(planes: &SampledPlanes, attributes: &[String]) -> Vec<String> {
@@ -37,14 +35,14 @@ fn columns<'a>(planes: &'a SampledPlanes, attributes: &[String]) -> Vec<Column<'
     for name in attributes {
         if let Some(samples) = planes.floats(name) {
             all.push((name.clone(), Box::new(|i| samples[i])));
-        } else if let Some(axes) = vector(planes, name, ["X", "Y", "Z"]) {
+        } else if let Some(axes) = attribute_vectors(planes, name) {
             all.push((format!("|{name}|"), Box::new(move |i| length(&axes, i))));
         }
     }
-    if let Some(axes) = vector(planes, "V", ["X", "Y", "Z"]) {
+    if let Some(axes) = vectors(planes, FilmPlane::Velocity) {
         all.push(("speed".to_owned(), Box::new(move |i| length(&axes, i))));
     }
-    if let Some(samples) = planes.floats("Z") {
+    if let Some(samples) = depths(planes) {
         all.push(("depth".to_owned(), Box::new(|i| samples[i])));
     }
     all
@@ -55,7 +53,7 @@ pub(super) fn packed_ids(
     planes: &SampledPlanes,
     attributes: &[String],
 ) -> io::Result<Option<String>> {
-    let Some(ids) = planes.integers("id.I") else {
+    let Some(ids) = ids(planes) else {
         return Ok(None);
     };
     // Number the particles

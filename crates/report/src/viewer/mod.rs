@@ -243,7 +243,7 @@ fn plan(
             .into_iter()
             .collect::<Result<_, _>>()?;
         let mut channels = ChannelKind::in_planes(&samples[0], &settings.attributes);
-        let has_ids = samples[0].integers("id.I").is_some();
+        let has_ids = channels::ids(&samples[0]).is_some();
         if channels.is_empty() && !has_ids {
             return Ok(None);
         }
@@ -286,7 +286,7 @@ fn planes(
     let attributes = settings.attributes.clone();
     let is_wanted = move |name: &str| {
         let base = name.split_once('.').map_or(name, |(base, _)| base);
-        ["id", "Z", "N", "V", "albedo"].contains(&base)
+        channels::SHOWN.iter().any(|plane| plane.name() == base)
             || attributes.iter().any(|a| a == base || a == name)
     };
     read_planes(&frame.image, is_wanted, width)

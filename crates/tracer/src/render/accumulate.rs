@@ -32,8 +32,8 @@ impl SampleGroup {
                 tile.set_odd(pixel.column, pixel.row, mean);
             }
             if !layers.is_empty() {
-                let floats = tile.layers_mut(pixel.column, pixel.row);
-                layers.accumulate(range, &self.coverage, (mean, color), floats);
+                let pixel = (&mut *tile, [pixel.column, pixel.row]);
+                layers.accumulate(range, &self.coverage, (mean, color), pixel);
             }
         }
         self.layers = layers;
@@ -81,7 +81,8 @@ fn sum_of_lanes(lanes: Lanes) -> f32 {
 mod tests {
     use super::*;
     use crate::render::aov::DataSample;
-    use crate::render::film::{Channels, Film};
+    use crate::render::channels::Channels;
+    use crate::render::film::Film;
     use crate::render::sampler::PathSeed;
     use crate::render::scratch::Pixel;
 

@@ -10,6 +10,7 @@ use super::{
     cryptomatte::{self, ObjectName},
     film::FilmTile,
     layers::MatteKind,
+    planes::FilmPlane,
     sample_layers::SampleLayers,
     scratch::{PacketScratch, Pixel},
     shading::depths,
@@ -142,23 +143,17 @@ impl RenderContext<'_> {
         }
     }
 
-    /// Stores the layers of `pixels` that come from their nearest sample.
-    pub(super) fn store_nearest(&self, pixels: &[Pixel], tile: &mut FilmTile<'_>) {
-        let layers = &self.settings.channels.layers;
-        let (attributes, motion) = (layers.attributes_at(), layers.motion_at());
-        if attributes.is_empty() && motion.is_empty() {
+    /// Stores the attributes of the nearest sample of `pixels`.
+    pub(super) fn store_attributes(&self, pixels: &[Pixel], tile: &mut FilmTile<'_>) {
+        if !self.settings.channels.has(FilmPlane::Attributes) {
             return;
         }
         for pixel in pixels {
-            let floats = tile.layers_mut(pixel.column, pixel.row);
+            let values = tile.components_mut(FilmPlane::Attributes, pixel.column, pixel.row);
             match pixel.data.particle {
-                Some(particle) => {
-                    let values = &mut floats[attributes.clone()];
-                    self.source.attributes(particle, values);
-                }
-                None => floats[attributes.clone()].fill(0.0),
+                Some(particle) => self.source.attributes(particle, values),
+                None => values.fill(0.0),
             }
-            floats[motion.clone()].copy_from_slice(&pixel.data.motion[..motion.len()]);
         }
     }
 
@@ -169,14 +164,14 @@ impl RenderContext<'_> {
         number: usize,
         layers: &mut SampleLayers,
     ) {
-        let mattes = layers.layers.mattes;
-        if mattes.is_empty() {
+        let mattes = layers.channels.mattes();
+        if mattes.clone().next().is_none() {
             return;
         }
         for lane in lanes_in(hits.mask) {
             // On a liquid surface, this is a search
             let particle = LazyCell::new(|| self.particle_at(hits, lane));
-            for kind in mattes.iter() {
+            for kind in mattes.clone() {
                 let object = self.object(kind, hits.material[lane], || *particle);
                 layers.set_object(kind, number, lane, object);
             }
@@ -243,13 +238,14 @@ impl RenderContext<'_> {
         };
         let point = lane3(&hits.point, lane);
         let velocity = particle.map_or(Vec3::ZERO, |particle| self.source.velocity(particle));
-        let motion = if channels.layers.motion { self.motion(point, velocity) } else { [0.0; 2] };
+        let motion =
+            if channels.has(FilmPlane::Motion) { self.motion(point, velocity) } else { [0.0; 2] };
         DataSample {
             z,
             normal: if direction.dot(normal) < 0.0 { normal } else { -normal },
             position: (self.scene.origin + point.as_dvec3()).as_vec3(),
             velocity,
-            albedo: if channels.albedo { albedo(blend) } else { Vec3::ZERO },
+            albedo: if channels.has(FilmPlane::Albedo) { albedo(blend) } else { Vec3::ZERO },
             id: particle.map_or(NO_ID, |particle| self.source.id(particle)),
             particle,
             motion,

@@ -167,7 +167,7 @@ fn a_shadow_catcher_has_no_data_and_fades_out() {
         ..settings(16, 4, 0)
     };
     let film = image(&nothing(), &scene, &all);
-    assert!(film.depth.unwrap().iter().all(|z| *z == f32::INFINITY));
+    assert!(film.plane::<f32>(FilmPlane::Depth).unwrap().iter().all(|z| *z == f32::INFINITY));
     if let Some(ground) = &mut scene.ground {
         (ground.fade_start, ground.fade_end) = (0.1, 0.2);
     }

@@ -1,10 +1,10 @@
 //! Read access to consecutive rows of a finished film, in the form that encoders use.
 
-use glam::Vec3;
+use super::channels::Channels;
+use super::film::{Film, PerPlane};
+use super::planes::FilmPlane;
 
-use super::film::{Channels, Film};
-
-/// Rows `top..top + height` of every plane; planes that the film does not have are `None`.
+/// Rows `top..top + height` of every plane of the channels of a film.
 #[derive(Debug, Clone, Copy)]
 pub struct FilmRows<'a> {
     /// First row in the image.
@@ -15,22 +15,10 @@ pub struct FilmRows<'a> {
     pub width: u32,
     /// See [`Film::color`].
     pub color: &'a [[f32; 4]],
-    /// See [`Film::depth`].
-    pub depth: Option<&'a [f32]>,
-    /// See [`Film::normal`].
-    pub normal: Option<&'a [Vec3]>,
-    /// See [`Film::position`].
-    pub position: Option<&'a [Vec3]>,
-    /// See [`Film::velocity`].
-    pub velocity: Option<&'a [Vec3]>,
-    /// See [`Film::albedo`].
-    pub albedo: Option<&'a [Vec3]>,
-    /// See [`Film::id`].
-    pub id: Option<&'a [u32]>,
-    /// See [`Film::layers`].
-    pub layers: Option<&'a [f32]>,
-    /// Number of floats of a pixel in `layers`.
-    pub floats: usize,
+    /// The bits of the components of each pixel; empty without the plane.
+    planes: PerPlane<&'a [u32]>,
+    /// Number of components of a pixel in each plane.
+    sizes: PerPlane<usize>,
 }
 
 impl<'a> FilmRows<'a> {
@@ -47,42 +35,41 @@ impl<'a> FilmRows<'a> {
         let height = height.min(self.height - skipped);
         let width = self.width as usize;
         let range = skipped as usize * width..(skipped + height) as usize * width;
+        let part = |plane: usize| {
+            let size = self.sizes[plane];
+            &self.planes[plane][range.start * size..range.end * size]
+        };
         FilmRows {
             top,
             height,
             width: self.width,
             color: &self.color[range.clone()],
-            depth: self.depth.map(|plane| &plane[range.clone()]),
-            normal: self.normal.map(|plane| &plane[range.clone()]),
-            position: self.position.map(|plane| &plane[range.clone()]),
-            velocity: self.velocity.map(|plane| &plane[range.clone()]),
-            albedo: self.albedo.map(|plane| &plane[range.clone()]),
-            id: self.id.map(|plane| &plane[range.clone()]),
-            layers: self
-                .layers
-                .map(|plane| &plane[range.start * self.floats..range.end * self.floats]),
-            floats: self.floats,
+            planes: std::array::from_fn(part),
+            sizes: self.sizes,
         }
+    }
+
+    /// The bits of the components of each pixel in `plane`, and their number in a pixel; empty without the plane.
+    pub fn plane(&self, plane: FilmPlane) -> (&'a [u32], usize) {
+        (self.planes[plane as usize], self.sizes[plane as usize])
     }
 }
 
 impl Film {
     /// All rows.
     pub fn rows(&self) -> FilmRows<'_> {
-        let channels = self.channels;
+        let sizes = self.channels.sizes();
         FilmRows {
             top: 0,
             height: self.height,
             width: self.width,
             color: &self.color,
-            depth: self.depth.as_deref().filter(|_| channels.depth),
-            normal: self.normal.as_deref().filter(|_| channels.normal),
-            position: self.position.as_deref(),
-            velocity: self.velocity.as_deref(),
-            albedo: self.albedo.as_deref().filter(|_| channels.albedo),
-            id: self.id.as_deref(),
-            layers: self.layers.as_deref(),
-            floats: channels.layers.floats(),
+            // Features for denoising may have planes without being channels
+            planes: std::array::from_fn(|plane| match sizes[plane] {
+                0 => &[],
+                _ => &self.planes[plane][..],
+            }),
+            sizes,
         }
     }
 
@@ -99,16 +86,16 @@ mod tests {
     #[test]
     fn parts_keep_their_position() {
         let mut film = Film::new(3, 10, Channels::ALL);
-        for (at, id) in (0..).zip(film.id.iter_mut().flatten()) {
+        for (at, id) in (0..).zip(film.plane_mut(FilmPlane::Id).unwrap()) {
             *id = at;
         }
         let part = film.rows().part(4, 5).part(6, 16);
         assert_eq!((part.top, part.height, part.width), (6, 3, 3));
-        assert_eq!(part.id.unwrap(), &film.id.as_ref().unwrap()[18..27]);
+        assert_eq!(part.plane(FilmPlane::Id), (&film.plane(FilmPlane::Id).unwrap()[18..27], 1));
         assert_eq!(part.color.len(), 9);
         assert_eq!(film.channels(), Channels::ALL);
         let film = Film::new(1, 1, Channels::COLOR);
         assert_eq!(film.channels(), Channels::COLOR);
-        assert!(film.rows().part(0, 1).depth.is_none());
+        assert!(film.rows().part(0, 1).plane(FilmPlane::Depth).0.is_empty());
     }
 }

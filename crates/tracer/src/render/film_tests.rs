@@ -6,7 +6,8 @@ use glam::{DVec3, Vec3};
 
 use super::super::brute::Balls;
 use super::super::{IntegratorKind, ParticleShading, RenderSettings, render_into};
-use super::{Channels, Film};
+use super::{Channels, Film, FilmPlane};
+use crate::render::layers::LightClass;
 use crate::scene::{Background, Bounds, Camera, Framed, Framing, Ground, Scene, default_lights};
 
 /// Bits that no renderer makes: of a float, a NaN with a payload.
@@ -14,40 +15,15 @@ const POISON: u32 = 0x7fad_beef;
 
 fn poisoned(width: u32, height: u32, channels: Channels) -> Film {
     let mut film = Film::new(width, height, channels);
-    let poison = f32::from_bits(POISON);
-    film.color.fill([poison; 4]);
-    if let Some(plane) = &mut film.depth {
-        plane.fill(poison);
-    }
-    if let Some(plane) = &mut film.id {
-        plane.fill(POISON);
-    }
-    if let Some(plane) = &mut film.layers {
-        plane.fill(poison);
-    }
-    let vectors = [&mut film.normal, &mut film.position, &mut film.velocity, &mut film.albedo];
-    for plane in vectors.into_iter().flatten() {
-        plane.fill(Vec3::splat(poison));
-    }
+    film.color.fill([f32::from_bits(POISON); 4]);
+    film.planes.iter_mut().for_each(|words| words.fill(POISON));
     film
 }
 
 /// All numbers of all planes.
 fn bits(film: &Film) -> Vec<u32> {
-    let vectors = [&film.normal, &film.position, &film.velocity, &film.albedo]
-        .into_iter()
-        .flatten()
-        .flatten();
-    let floats = film
-        .color
-        .iter()
-        .flatten()
-        .chain(film.depth.iter().flatten())
-        .copied()
-        .chain(vectors.flat_map(|v| v.to_array()))
-        .chain(film.layers.iter().flatten().copied())
-        .map(f32::to_bits);
-    floats.chain(film.id.iter().flatten().copied()).collect()
+    let colors = film.color.iter().flatten().map(|value| value.to_bits());
+    colors.chain(film.planes.iter().flatten().copied()).collect()
 }
 
 /// A ball in the middle of nothing, or of a plane.
@@ -87,16 +63,10 @@ fn check(settings: &RenderSettings, scene: &Scene) {
 #[test]
 fn every_set_of_planes_is_written_whole() {
     for bits in 0..64_u32 {
+        let is_given = |plane: &FilmPlane| bits >> *plane as u32 & 1 == 1;
+        let planes: Vec<_> = FilmPlane::all().filter(is_given).collect();
         let settings = RenderSettings {
-            channels: Channels {
-                depth: bits & 1 != 0,
-                normal: bits & 2 != 0,
-                position: bits & 4 != 0,
-                velocity: bits & 8 != 0,
-                albedo: bits & 16 != 0,
-                id: bits & 32 != 0,
-                ..Channels::COLOR
-            },
+            channels: Channels::COLOR.with(&planes),
             ..RenderSettings::new(19, 18)
         };
         check(&settings, &scene(bits % 3 == 0));
@@ -135,9 +105,11 @@ fn light_channels_add_up_to_the_color() {
             let ball = Balls::one(Vec3::ZERO, 1.0);
             let mut film = Film::default();
             render_into(&mut film, &[&ball], &scene, &source, &settings, &never).unwrap();
-            for (lights, color) in film.layers.unwrap().chunks(18).zip(&film.color) {
+            let light = |class: LightClass| film.plane::<Vec3>(class.plane()).unwrap();
+            let lights = LightClass::ALL.map(light);
+            for (pixel, color) in film.color.iter().enumerate() {
                 for (axis, expected) in color[..3].iter().enumerate() {
-                    let sum: f32 = lights.iter().skip(axis).step_by(3).sum();
+                    let sum: f32 = lights.iter().map(|light| light[pixel][axis]).sum();
                     let limit = 1e-5 * expected.max(1.0);
                     assert!((sum - expected).abs() < limit, "{sum} of {expected}");
                 }

@@ -25,6 +25,7 @@ impl RenderContext<'_> {
         group: &mut SampleGroup,
     ) {
         group.clear();
+        group.layers.channels = self.settings.channels;
         group.layers.layers = self.settings.channels.layers;
         group.layers.background_group = self.background_group();
         let [left, top] = self.first_pixel(tile);

@@ -69,7 +69,9 @@ fn a_mosaic_has_tiles_of_the_whole_image() {
         let (left, top) = ([4, 29, 54][x / 16], 17);
         let (here, there) = (40 * y + x, 75 * (top + y) + left + x % 16);
         assert_eq!(mosaic.color[here], whole.color[there], "{x} {y}");
-        assert_eq!(mosaic.id.as_ref().unwrap()[here], whole.id.as_ref().unwrap()[there]);
+        let [of_mosaic, of_whole] =
+            [&mosaic, &whole].map(|film| film.plane::<u32>(FilmPlane::Id).unwrap());
+        assert_eq!(of_mosaic[here], of_whole[there]);
     }
     // A mosaic of all tiles is the image itself.
     let all = RenderSettings { width: 64, height: 48, ..settings() };
@@ -109,7 +111,8 @@ fn a_part_of_the_image_has_the_pixels_of_the_whole() {
             if (13..50).contains(&x) && (7..37).contains(&y) {
                 let in_part = 37 * (y - 7) + x - 13;
                 assert_eq!(part.color[in_part], whole.color[at], "{x} {y}");
-                let depths = [&part, &whole].map(|film| film.depth.as_ref().unwrap());
+                let depths =
+                    [&part, &whole].map(|film| film.plane::<f32>(FilmPlane::Depth).unwrap());
                 assert_eq!(depths[0][in_part], depths[1][at], "{x} {y}");
             }
         }
@@ -174,11 +177,8 @@ fn reused_film_is_cleared() {
 fn filled(width: u32, height: u32, channels: Channels) -> Film {
     let mut film = Film::new(width, height, channels);
     film.color.fill([7.0; 4]);
-    film.depth.iter_mut().flatten().for_each(|z| *z = 7.0);
-    film.id.iter_mut().flatten().for_each(|id| *id = 7);
-    let vectors = [&mut film.normal, &mut film.position, &mut film.velocity, &mut film.albedo];
-    for plane in vectors.into_iter().flatten() {
-        plane.fill(Vec3::splat(7.0));
+    for words in &mut film.planes {
+        words.fill(7.0_f32.to_bits());
     }
     film
 }
@@ -207,17 +207,17 @@ fn data_planes_hold_the_nearest_sample() {
     let never = AtomicBool::new(false);
     let (film, _) = render(&[&ball], &scene, &source, &settings, &never).unwrap();
     let middle = 16 * 33 + 16;
-    assert!((film.depth.as_ref().unwrap()[middle] - 4.0).abs() < 1e-5);
-    assert!((film.normal.as_ref().unwrap()[middle] - Vec3::NEG_Z).length() < 1e-5);
+    assert!((film.plane::<f32>(FilmPlane::Depth).unwrap()[middle] - 4.0).abs() < 1e-5);
+    assert!((film.plane::<Vec3>(FilmPlane::Normal).unwrap()[middle] - Vec3::NEG_Z).length() < 1e-5);
     let expected = Vec3::new(100.0, 200.0, -1.0);
-    assert!((film.position.as_ref().unwrap()[middle] - expected).length() < 1e-4);
-    assert_eq!(film.velocity.as_ref().unwrap()[middle], velocities[0]);
-    assert_eq!(film.albedo.as_ref().unwrap()[middle].z, 0.3);
-    assert_eq!(film.id.as_ref().unwrap()[middle], 77);
+    assert!((film.plane::<Vec3>(FilmPlane::Position).unwrap()[middle] - expected).length() < 1e-4);
+    assert_eq!(film.plane::<Vec3>(FilmPlane::Velocity).unwrap()[middle], velocities[0]);
+    assert_eq!(film.plane::<Vec3>(FilmPlane::Albedo).unwrap()[middle].z, 0.3);
+    assert_eq!(film.plane::<u32>(FilmPlane::Id).unwrap()[middle], 77);
     // A corner has no intersection.
-    assert_eq!(film.depth.unwrap()[0], f32::INFINITY);
-    assert_eq!(film.normal.unwrap()[0], Vec3::ZERO);
-    assert_eq!(film.id.unwrap()[0], NO_ID);
+    assert_eq!(film.plane::<f32>(FilmPlane::Depth).unwrap()[0], f32::INFINITY);
+    assert_eq!(film.plane::<Vec3>(FilmPlane::Normal).unwrap()[0], Vec3::ZERO);
+    assert_eq!(film.plane::<u32>(FilmPlane::Id).unwrap()[0], NO_ID);
     assert_eq!(film.color[0][3], 0.0);
 }
 

@@ -74,7 +74,7 @@ pub(super) trait Integrator: Sync {
             trace_group(self, stop, scratch)?;
             let is_bounded = context.catches_shadows();
             scratch.group.accumulate(samples, is_bounded, tile);
-            context.store_nearest(&scratch.group.pixels, tile);
+            context.store_attributes(&scratch.group.pixels, tile);
         }
         Some(scratch.packet.counts)
     }
@@ -197,9 +197,9 @@ fn trace_packet<I: Integrator + ?Sized>(
     integrator.context().intersect(segments, depth, packet);
     packet.radiance = [splat(0.0); 3];
     packet.coverage = splat(0.0);
-    let layers = &integrator.context().settings.channels.layers;
-    packet.split.start(layers, depth);
-    packet.groups.start(layers);
+    let channels = &integrator.context().settings.channels;
+    packet.split.start(channels, depth);
+    packet.groups.start(&channels.layers);
     integrator.shade(segments, depth, packet, next);
     Some(())
 }

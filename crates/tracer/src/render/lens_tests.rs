@@ -137,7 +137,7 @@ fn depth_is_measured_along_the_view_axis() {
     let lens = Lens { radius: 0.5, focus: 5.0 };
     let film = film(&ball(8.0), Some(lens), |_| {});
     let mut count = 0;
-    for (z, color) in film.depth.as_ref().unwrap().iter().zip(&film.color) {
+    for (z, color) in film.plane::<f32>(FilmPlane::Depth).unwrap().iter().zip(&film.color) {
         if color[3] > 0.0 {
             assert!((8.0 - RADIUS - 1e-4..8.0 + 0.2 * RADIUS).contains(z), "{z}");
             count += 1;

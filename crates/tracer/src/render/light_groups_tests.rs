@@ -60,10 +60,8 @@ fn grouped(settings: &RenderSettings) -> RenderSettings {
 
 /// The light of `group` in each pixel.
 fn of_group(film: &Film, group: u8) -> Vec<Vec3> {
-    let layers = film.channels.layers;
-    let pixels = film.layers.as_ref().unwrap().chunks(layers.floats());
-    let at = layers.light_group_at(usize::from(group));
-    pixels.map(|floats| Vec3::from_slice(&floats[at.clone()])).collect()
+    let lights = film.plane::<Vec3>(FilmPlane::LightGroups).unwrap();
+    lights.chunks(usize::from(COUNT)).map(|groups| groups[usize::from(group)]).collect()
 }
 
 fn colors(film: &Film) -> Vec<Vec3> {

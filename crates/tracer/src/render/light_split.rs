@@ -5,8 +5,10 @@
 
 use glam::Vec3;
 
+use super::channels::Channels;
 use super::dimensions::{BOUNCED, REFLECTED, REFRACTED};
-use super::layers::{Layers, LightClass};
+use super::layers::LightClass;
+use super::planes::FilmPlane;
 use crate::scene::environment::LUMINANCE;
 use spherule_tree::math::{LANES, Lanes, Lanes3, lane3, lanes_in, splat};
 
@@ -29,9 +31,9 @@ pub(super) struct LightSplit {
 
 impl LightSplit {
     /// Prepares for a packet at `depth`.
-    pub(super) fn start(&mut self, layers: &Layers, depth: u32) {
-        self.is_active = depth == 1 && !layers.lights.is_empty();
-        self.has_shadow = depth == 1 && layers.shadow;
+    pub(super) fn start(&mut self, channels: &Channels, depth: u32) {
+        self.is_active = depth == 1 && channels.needs_light_classes();
+        self.has_shadow = depth == 1 && channels.has(FilmPlane::Shadow);
         if self.is_active {
             self.lights = [[splat(0.0); 3]; LightClass::COUNT];
             self.sum = [splat(0.0); 3];
@@ -143,9 +145,8 @@ mod tests {
     #[test]
     fn light_is_divided_without_loss() {
         let mut split = LightSplit::default();
-        let mut layers = Layers::NONE;
-        layers.insert("lights").unwrap();
-        split.start(&layers, 1);
+        let channels = Channels::from_names(["lights"]).unwrap();
+        split.start(&channels, 1);
         split.take(LightClass::Background, &splat3(Vec3::new(1.0, 2.0, 3.0)));
         split.diffuse = splat3(Vec3::new(1.0, 0.5, 0.0));
         split.take_reflected(&splat3(Vec3::new(2.0, 4.0, 6.0)));
@@ -154,7 +155,7 @@ mod tests {
         assert_eq!(of(LightClass::Diffuse), Vec3::new(1.0, 1.0, 0.0));
         assert_eq!(of(LightClass::Specular), Vec3::new(0.0, 1.0, 3.0));
         // Later rays keep the class of the first interaction
-        split.start(&layers, 2);
+        split.start(&channels, 2);
         assert!(!split.is_active);
     }
 

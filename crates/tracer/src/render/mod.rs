@@ -20,6 +20,7 @@ mod attributes;
 #[cfg(test)]
 pub(crate) mod brute;
 mod bsdf;
+mod channels;
 mod context;
 pub mod cryptomatte;
 mod dimensions;
@@ -37,6 +38,7 @@ mod lights;
 mod near_photons;
 mod panes;
 mod path;
+pub mod planes;
 mod ray_counts;
 mod roulette;
 mod sample_layers;
@@ -99,9 +101,11 @@ mod spray_tests;
 mod whitted_tests;
 
 pub use aov::{DataSample, NO_ID};
-pub use film::{Channels, Film, UnknownChannel};
+pub use channels::{Channels, NamedChannel, UnknownChannel};
+pub use film::Film;
 pub use film_rows::FilmRows;
 pub use path::floor::FloorBytes;
+pub use planes::FilmPlane;
 pub use ray_counts::RayCounts;
 pub use sampler::{FilmSampler, FilterKind, MAX_FILTER_WIDTH, MultiJitter, PathSeed, PixelFilter};
 pub use settings::{
@@ -147,7 +151,7 @@ pub fn scratch_bytes(
 ) -> u64 {
     let max_paths = integrator::max_paths(settings, Interior::of(material, is_body));
     let max_depth = integrator::max_depth(settings);
-    scratch::scratch_bytes(settings.samples, max_depth, max_paths, &settings.channels.layers)
+    scratch::scratch_bytes(settings.samples, max_depth, max_paths, &settings.channels)
         + stream::bytes_of_slices(slices)
 }
 

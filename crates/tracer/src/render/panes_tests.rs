@@ -157,11 +157,17 @@ fn data_are_of_what_is_behind_a_pane() {
     let ball = Balls::one(Vec3::ZERO, 1.0);
     let [without, with] = [vec![], vec![&closed_box()]]
         .map(|meshes| image(&meshes, &ball, 0.5, &scene, &settings(16, 0)));
-    assert_eq!(with.id, without.id);
-    assert_eq!(with.normal.unwrap().len(), without.normal.unwrap().len());
-    let (with, without) = (with.depth.unwrap(), without.depth.unwrap());
+    assert_eq!(with.plane::<u32>(FilmPlane::Id), without.plane::<u32>(FilmPlane::Id));
+    assert_eq!(
+        with.plane::<Vec3>(FilmPlane::Normal).unwrap().len(),
+        without.plane::<Vec3>(FilmPlane::Normal).unwrap().len()
+    );
+    let (with, without) = (
+        with.plane::<f32>(FilmPlane::Depth).unwrap(),
+        without.plane::<f32>(FilmPlane::Depth).unwrap(),
+    );
     let far = |(a, b): (&f32, &f32)| (a - b).abs() > 1e-3;
-    assert!(!with.iter().zip(&without).any(far), "{with:?} {without:?}");
+    assert!(!with.iter().zip(without).any(far), "{with:?} {without:?}");
 }
 
 /// A matte wall at y = 2, lit from the side of the camera.
@@ -189,9 +195,16 @@ fn meshes_are_lit_and_panes_attenuate_shadow_rays() {
         };
         let film = image(&[&wall(2.0)], &nothing(), 0.5, &scene, &settings);
         near(mean(&film), [matte.x, matte.y, matte.z, 1.0], 1e-4);
-        assert!(film.id.unwrap().iter().all(|id| *id == NO_ID));
-        assert!(film.depth.unwrap().iter().all(|z| (z - 12.0).abs() < 1e-4));
-        assert!(film.normal.unwrap().iter().all(|n| (*n - Vec3::NEG_Y).length() < 1e-6));
+        assert!(film.plane::<u32>(FilmPlane::Id).unwrap().iter().all(|id| *id == NO_ID));
+        assert!(
+            film.plane::<f32>(FilmPlane::Depth).unwrap().iter().all(|z| (z - 12.0).abs() < 1e-4)
+        );
+        assert!(
+            film.plane::<Vec3>(FilmPlane::Normal)
+                .unwrap()
+                .iter()
+                .all(|n| (*n - Vec3::NEG_Y).length() < 1e-6)
+        );
         // Beside the view: only the light passes it
         let beside = square(Vec3::new(1.5, 0.0, 0.0), Vec3::X, Vec3::Z);
         let film = image(&[&wall(2.0), &beside], &nothing(), 0.5, &scene, &settings);
@@ -219,7 +232,9 @@ fn holdouts_are_holes_that_throw_shadows() {
         let scene = lit(&[MATTE, holdout]);
         let film = image(&[&wall(2.0), &wall(0.0)], &ball, 0.5, &scene, &settings);
         assert!(film.color.iter().all(|c| *c == [0.0; 4]));
-        assert!(film.depth.unwrap().iter().all(|z| (z - 10.0).abs() < 1e-4));
+        assert!(
+            film.plane::<f32>(FilmPlane::Depth).unwrap().iter().all(|z| (z - 10.0).abs() < 1e-4)
+        );
         // Beside the view, it does what an opaque mesh does
         let beside = square(Vec3::new(1.5, 0.0, 0.0), Vec3::X, Vec3::Z);
         let [held, shown] = [lit(&[MATTE, holdout]), lit(&[MATTE, MATTE])]

@@ -211,7 +211,10 @@ fn every_pixel_shows_the_sphere_that_its_ray_hits_in_f64() {
                 let camera = camera(projection, stereo);
                 let [columns, _] = camera.eyes();
                 let film = film(camera, tree, ids, |s| s.integrator = integrator);
-                let (depth, id) = (film.depth.as_ref().unwrap(), film.id.as_ref().unwrap());
+                let (depth, id) = (
+                    film.plane::<f32>(FilmPlane::Depth).unwrap(),
+                    film.plane::<u32>(FilmPlane::Id).unwrap(),
+                );
                 let mut hits = [0; 2];
                 for (index, (z, id)) in depth.iter().zip(id).enumerate() {
                     let width = (columns * SIZE[0]) as usize;
@@ -264,10 +267,10 @@ fn a_stereo_pair_is_two_images() {
             let one = Camera::new(&view, 1.5, DVec3::ZERO).unwrap();
             let one = film(one, tree, ids, |_| {});
             let (mut differing, width) = (0, SIZE[0] as usize);
-            for (index, id) in one.id.as_ref().unwrap().iter().enumerate() {
+            for (index, id) in one.plane::<u32>(FilmPlane::Id).unwrap().iter().enumerate() {
                 let (column, row) = (index % width, index / width);
                 let in_pair = row * 2 * width + eye * width + column;
-                differing += usize::from(pair.id.as_ref().unwrap()[in_pair] != *id);
+                differing += usize::from(pair.plane::<u32>(FilmPlane::Id).unwrap()[in_pair] != *id);
                 // The backdrop is infinitely far away, where both eyes see the same
                 if pair.color[in_pair][3] == 0.0 && one.color[index][3] == 0.0 {
                     let (a, b) = (pair.color[in_pair], one.color[index]);

@@ -30,14 +30,14 @@ fn albedo(tree: &RodTree, integrator: IntegratorKind) -> Vec<Vec3> {
     let settings = RenderSettings {
         samples: 4,
         integrator,
-        channels: Channels { albedo: true, ..Channels::default() },
+        channels: Channels::COLOR.with(&[FilmPlane::Albedo]),
         ..RenderSettings::new(32, 32)
     };
     let source = ParticleShading::constant(Vec3::ONE);
     let never = AtomicBool::new(false);
     let surface = RodSurface::new(tree, material);
     let rendered = render(&[&surface], &scene, &source, &settings, &never);
-    rendered.unwrap().0.albedo.unwrap()
+    rendered.unwrap().0.plane(FilmPlane::Albedo).unwrap().to_vec()
 }
 
 /// A thick rod across the view.

@@ -2,10 +2,13 @@
 
 use std::ops::Range;
 
+use super::channels::Channels;
 use super::cryptomatte::rank;
+use super::film::FilmTile;
 use super::layers::{Layers, LightClass, MatteKind};
 use super::light_groups::GroupLight;
 use super::light_split::LightSplit;
+use super::planes::FilmPlane;
 use super::stream::SegmentPacket;
 use glam::Vec3;
 use spherule_tree::math::{LANES, Lanes, Lanes3, lane3, lanes_in, splat};
@@ -13,6 +16,8 @@ use spherule_tree::math::{LANES, Lanes, Lanes3, lane3, lanes_in, splat};
 /// Contributions of samples to layers, packet by packet. Vectors of layers that the film does not have are empty.
 #[derive(Default)]
 pub(super) struct SampleLayers {
+    pub(super) channels: Channels,
+    /// Decides about the number of light groups, also for samples that are for no film.
     pub(super) layers: Layers,
     /// The light group of the background.
     pub(super) background_group: usize,
@@ -32,7 +37,7 @@ pub(super) struct SampleLayers {
 
 impl SampleLayers {
     pub(super) fn is_empty(&self) -> bool {
-        self.layers.is_empty()
+        !self.channels.needs_samples()
     }
 
     /// Removes all samples.
@@ -46,30 +51,30 @@ impl SampleLayers {
 
     /// Adds a packet of samples.
     pub(super) fn push_packet(&mut self) {
-        for kind in self.layers.mattes.iter() {
+        for kind in self.channels.mattes() {
             self.objects[kind as usize].push([0; LANES]);
         }
-        if !self.layers.lights.is_empty() {
+        if self.channels.needs_light_classes() {
             self.lights.push([[splat(0.0); 3]; LightClass::COUNT]);
             self.diffuse.push([splat(0.0); 3]);
         }
         let groups = self.groups.len() + usize::from(self.layers.light_groups);
         self.groups.resize(groups, [splat(0.0); 3]);
-        if self.layers.shadow {
+        if self.channels.has(FilmPlane::Shadow) {
             self.direct.push([splat(0.0); 2]);
         }
     }
 
     /// Memory for `samples`, bytes.
-    pub(super) fn bytes(layers: &Layers, samples: usize) -> usize {
-        let objects = layers.mattes.iter().count() * size_of::<[u32; LANES]>();
-        let lights = if layers.lights.is_empty() {
-            0
-        } else {
+    pub(super) fn bytes(channels: &Channels, samples: usize) -> usize {
+        let objects = channels.mattes().count() * size_of::<[u32; LANES]>();
+        let lights = if channels.needs_light_classes() {
             (LightClass::COUNT + 1) * size_of::<Lanes3>()
+        } else {
+            0
         };
-        let groups = usize::from(layers.light_groups) * size_of::<Lanes3>();
-        let direct = if layers.shadow { size_of::<[Lanes; 2]>() } else { 0 };
+        let groups = usize::from(channels.layers.light_groups) * size_of::<Lanes3>();
+        let direct = if channels.has(FilmPlane::Shadow) { size_of::<[Lanes; 2]>() } else { 0 };
         // Vectors grow by doubling
         2 * samples.div_ceil(LANES) * (objects + lights + groups + direct)
     }
@@ -89,7 +94,7 @@ impl SampleLayers {
 
     /// Adds the radiance along the rays of `segments`, which are not camera rays, to the classes of their samples.
     pub(super) fn add(&mut self, segments: &SegmentPacket, radiance: &Lanes3) {
-        if self.layers.lights.is_empty() {
+        if !self.channels.needs_light_classes() {
             return;
         }
         for lane in lanes_in(segments.lanes()) {
@@ -135,76 +140,82 @@ impl SampleLayers {
         self.objects[kind as usize][packet][lane] = object;
     }
 
-    /// Stores the layers of the pixel with the samples in `range`, except for the data of its nearest sample. The
-    /// `mean` of the samples has been limited to `color`. `coverage`: that of all samples.
+    /// Stores the planes that come from all samples of a pixel, those in `range`. The `mean` of the samples has been
+    /// limited to `color`. `coverage`: that of all samples. `pixel`: its column and row in `tile`.
     pub(super) fn accumulate(
         &mut self,
         range: Range<usize>,
         coverage: &[Lanes],
         (mean, color): ([f32; 4], [f32; 4]),
-        floats: &mut [f32],
+        (tile, [column, row]): (&mut FilmTile<'_>, [u32; 2]),
     ) {
         let share = 1.0 / range.len() as f32;
-        if self.layers.noisy {
-            floats[self.layers.noisy_at()].copy_from_slice(&color[..3]);
+        if self.channels.has(FilmPlane::Noisy) {
+            tile.components_mut(FilmPlane::Noisy, column, row).copy_from_slice(&color[..3]);
         }
-        self.accumulate_lights(range.clone(), (mean, color), floats);
-        if self.layers.shadow {
-            let sum = |part: usize| -> f32 {
-                let sample = |s: usize| self.direct[s / LANES][part][s % LANES];
-                range.clone().map(sample).sum()
-            };
-            let (whole, arriving) = (sum(0), sum(1));
-            let lit = if whole > 0.0 { arriving / whole } else { 1.0 };
-            floats[self.layers.shadow_at()].fill(lit.clamp(0.0, 1.0));
+        // What the limit took from the mean is missing in the background: shadows on it may be darker than it is
+        let limited = Vec3::from_slice(&color) - Vec3::from_slice(&mean);
+        if self.channels.needs_light_classes() {
+            self.accumulate_classes(range.clone(), limited, (tile, [column, row]));
+        }
+        let groups = tile.components_mut(FilmPlane::LightGroups, column, row);
+        self.accumulate_groups(range.clone(), limited, groups);
+        if self.channels.has(FilmPlane::Shadow) {
+            let arriving = self.arriving(range.clone());
+            tile.components_mut(FilmPlane::Shadow, column, row).fill(arriving);
         }
         // Rank the objects of each kind by the part of the pixel that they cover
-        for kind in self.layers.mattes.iter() {
-            let Some(at) = self.layers.matte_at(kind) else {
-                continue;
-            };
+        for kind in self.channels.mattes() {
             let objects = &self.objects[kind as usize];
             let sample = |s: usize| (objects[s / LANES][s % LANES], coverage[s / LANES][s % LANES]);
             self.covered.clear();
             let samples = range.clone().map(sample);
             self.covered.extend(samples.filter(|(object, _)| *object != 0));
-            rank(&mut self.covered, share, &mut floats[at]);
+            rank(&mut self.covered, share, tile.components_mut(kind.plane(), column, row));
         }
     }
 
-    /// Stores the mean light of each class and of each light group. What the limit took from the `mean` is missing in
-    /// the background.
-    fn accumulate_lights(
+    /// The fraction of the direct light of samples that arrives.
+    fn arriving(&self, range: Range<usize>) -> f32 {
+        let sum = |part: usize| -> f32 {
+            let sample = |s: usize| self.direct[s / LANES][part][s % LANES];
+            range.clone().map(sample).sum()
+        };
+        let (whole, arriving) = (sum(0), sum(1));
+        let lit = if whole > 0.0 { arriving / whole } else { 1.0 };
+        lit.clamp(0.0, 1.0)
+    }
+
+    /// Stores the mean light of each class. `limited` is added to the background.
+    fn accumulate_classes(
         &self,
         range: Range<usize>,
-        (mean, color): ([f32; 4], [f32; 4]),
-        floats: &mut [f32],
+        limited: Vec3,
+        (tile, [column, row]): (&mut FilmTile<'_>, [u32; 2]),
     ) {
-        let layers = self.layers;
         let share = 1.0 / range.len() as f32;
-        for class in layers.lights.iter() {
-            let light = &mut floats[layers.light_at(class).unwrap_or_default()];
+        for class in LightClass::ALL {
+            let light = tile.components_mut(class.plane(), column, row);
             for (axis, light) in light.iter_mut().enumerate() {
                 let sample = |s: usize| self.lights[s / LANES][class as usize][axis][s % LANES];
                 let sum: f32 = range.clone().map(sample).sum();
-                // Shadows on the background may be darker than it is, until their mean is limited
                 let limited = match class {
-                    LightClass::Background => color[axis] - mean[axis],
+                    LightClass::Background => limited[axis],
                     _ => 0.0,
                 };
                 *light = sum * share + limited;
             }
         }
-        // Do the same for each light group, in place of classes
-        for group in 0..usize::from(layers.light_groups) {
+    }
+
+    /// Stores the mean light of each light group in `floats`. `limited` is added to the group of the background.
+    fn accumulate_groups(&self, range: Range<usize>, limited: Vec3, floats: &mut [f32]) {
+        let share = 1.0 / range.len() as f32;
+        for (group, light) in floats.chunks_mut(3).enumerate() {
             let samples = range.clone().map(|s| self.light_of_group(group, s));
-            let limited = if group == self.background_group {
-                Vec3::from_slice(&color) - Vec3::from_slice(&mean)
-            } else {
-                Vec3::ZERO
-            };
-            let light = samples.sum::<Vec3>() * share + limited;
-            floats[layers.light_group_at(group)].copy_from_slice(&light.to_array());
+            let limited = if group == self.background_group { limited } else { Vec3::ZERO };
+            let mean = samples.sum::<Vec3>() * share + limited;
+            light.copy_from_slice(&mean.to_array());
         }
     }
 }

@@ -4,9 +4,10 @@
 use super::{
     aov::DataSample,
     bsdf::{BsdfSamples, BsdfValues, SurfacePoints},
+    channels::Channels,
     entries::Entries,
     interface::LeavingRays,
-    layers::{Layers, LightClass},
+    layers::LightClass,
     light_groups::GroupLight,
     light_split::LightSplit,
     lights::LightSamples,
@@ -186,12 +187,12 @@ pub(super) fn batch_len(segments: usize, max_paths: usize) -> usize {
 }
 
 /// Bytes of the [`Scratch`] of one thread, rounded up, if each sample has up to `max_paths` path segments at one depth.
-/// `samples` is the number per pixel, `layers` are those of the film.
+/// `samples` is the number per pixel, `channels` are those of the film.
 pub(super) fn scratch_bytes(
     samples: u32,
     max_depth: u32,
     max_paths: usize,
-    layers: &Layers,
+    channels: &Channels,
 ) -> u64 {
     let tile = (SIDE * SIDE) as usize * samples as usize;
     let sample_count = tile.min(GROUP.max(samples) as usize);
@@ -204,6 +205,6 @@ pub(super) fn scratch_bytes(
     // Vectors of photons grow by doubling
     let near = LANES * 2 * NEIGHBOURS * size_of::<NearPhoton>();
     let packet = size_of::<PacketScratch>() + size_of::<SegmentPacket>() + near;
-    let layers = SampleLayers::bytes(layers, sample_count);
+    let layers = SampleLayers::bytes(channels, sample_count);
     (samples + segments + packet + layers) as u64 + 32_768
 }

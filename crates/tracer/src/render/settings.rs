@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use super::film::Channels;
+use super::channels::Channels;
 use super::sampler::{MAX_FILTER_WIDTH, PixelFilter};
 use super::window::DataWindow;
 use crate::scene::{Material, MaterialError, Scene};

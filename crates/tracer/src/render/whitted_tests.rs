@@ -262,10 +262,10 @@ fn no_acne_and_no_leaks_at_any_scale() {
             let settings =
                 RenderSettings { channels: Channels::ALL, ..RenderSettings::new(48, 48) };
             let film = image(&ball, &scene, &settings);
-            let normals = film.normal.as_ref().unwrap();
+            let normals = film.plane::<Vec3>(FilmPlane::Normal).unwrap();
             let mut hits = 0;
             for ((color, normal), position) in
-                film.color.iter().zip(normals).zip(film.position.unwrap())
+                film.color.iter().zip(normals).zip(film.plane::<Vec3>(FilmPlane::Position).unwrap())
             {
                 if color[3] == 1.0 {
                     hits += 1;
@@ -341,10 +341,13 @@ fn ground_receives_shadows_and_blocks_light_from_below() {
     let settings = RenderSettings { channels: Channels::ALL, ..RenderSettings::new(1, 1) };
     let film = image(&aside, &scene, &settings);
     assert_eq!(film.color[0][3], 1.0);
-    assert_eq!(film.id.unwrap()[0], NO_ID);
-    assert_eq!(film.normal.unwrap()[0], Vec3::Z);
-    assert!((film.depth.unwrap()[0] - 136.0_f32.sqrt()).abs() < 1e-4);
-    assert!((film.position.unwrap()[0] - Vec3::new(0.0, 0.0, -1.0)).length() < 1e-5);
+    assert_eq!(film.plane::<u32>(FilmPlane::Id).unwrap()[0], NO_ID);
+    assert_eq!(film.plane::<Vec3>(FilmPlane::Normal).unwrap()[0], Vec3::Z);
+    assert!((film.plane::<f32>(FilmPlane::Depth).unwrap()[0] - 136.0_f32.sqrt()).abs() < 1e-4);
+    assert!(
+        (film.plane::<Vec3>(FilmPlane::Position).unwrap()[0] - Vec3::new(0.0, 0.0, -1.0)).length()
+            < 1e-5
+    );
     // Light from below the ground.
     scene.lights = vec![Light::directional(Vec3::Z, Vec3::ONE).unwrap()];
     scene.particle_material_mut().ambient = 0.0;

@@ -1,4 +1,4 @@
-//! The layout of an image in its file: parts with their headers, planes, and blocks of rows.
+//! The layout of an image in its file: parts with their headers, channels, and blocks of rows.
 
 use exr::image::write::layers::WritableLayers;
 use exr::meta::header::Header;
@@ -7,7 +7,7 @@ use exr::prelude::{
     IntegerBounds, Layer, LayerAttributes, LineOrder, SampleType, Text, Vec2,
 };
 
-use super::planes::{Plane, parts, planes_in_file};
+use super::planes::{ExrChannel, channels_in_file, parts};
 use super::{Compression, ExrOptions, OutputError, TextAttribute, attributes};
 use crate::render::{Channels, DataWindow, Film, FilmRows};
 
@@ -23,13 +23,13 @@ pub struct ExrLayout {
     pub(super) parts: Vec<ExrPart>,
 }
 
-/// The layout of a part of an image file: some of its planes.
+/// The layout of a part of an image file: some of its channels.
 #[derive(Debug, Clone)]
 pub(super) struct ExrPart {
     pub(super) header: Header,
     pub(super) compression: Compression,
-    /// The planes in the order of the file.
-    pub(super) planes: Vec<Plane>,
+    /// The channels in the order of the file.
+    pub(super) channels: Vec<ExrChannel>,
     /// Attributes after those of `header`, in the order of the file.
     pub(super) texts: Vec<TextAttribute>,
 }
@@ -53,21 +53,21 @@ impl ExrLayout {
         channels: Channels,
         options: &ExrOptions,
     ) -> Result<Self, OutputError> {
-        // Divide the planes into parts
-        let in_file = planes_in_file(channels, &options.names);
-        let planes = parts(in_file, options.has_data_part());
-        let count = planes.len();
+        // Divide the channels between parts
+        let in_file = channels_in_file(channels, &options.names);
+        let parts = parts(in_file, options.has_data_part());
+        let count = parts.len();
         let data = options.data_compression.unwrap_or(options.compression);
         let names = PART_NAMES.into_iter().zip([options.compression, data]);
         // Make a header for each part
         let mut all = Vec::new();
-        for (planes, (name, compression)) in planes.into_iter().zip(names) {
+        for (channels, (name, compression)) in parts.into_iter().zip(names) {
             let mut attributes = attributes(options)?;
             attributes.layer_name = (count > 1).then(|| Text::from(name));
             all.push(ExrPart {
-                header: header(width, height, &planes, compression, attributes, options),
+                header: header(width, height, &channels, compression, attributes, options),
                 compression,
-                planes,
+                channels,
                 texts: Vec::new(),
             });
         }
@@ -106,19 +106,19 @@ impl ExrLayout {
 fn header(
     width: u32,
     height: u32,
-    planes: &[Plane],
+    channels: &[ExrChannel],
     compression: Compression,
     mut attributes: LayerAttributes,
     options: &ExrOptions,
 ) -> Header {
     // Describe the channels; the header needs only names and types, so the samples may be empty
-    let described = planes.iter().map(|plane| {
-        let samples = match plane.sample_type() {
+    let described = channels.iter().map(|channel| {
+        let samples = match channel.sample_type() {
             SampleType::F16 => FlatSamples::F16(Vec::new()),
             SampleType::F32 => FlatSamples::F32(Vec::new()),
             SampleType::U32 => FlatSamples::U32(Vec::new()),
         };
-        AnyChannel::new(&*plane.name, samples)
+        AnyChannel::new(&*channel.name, samples)
     });
     let encoding = Encoding {
         compression: compression.codec(),

@@ -1,12 +1,12 @@
 //! Converts one row of a plane to the samples of the file.
 
 use bytemuck::{cast_slice, cast_slice_mut};
-use glam::Vec3;
 use half::f16;
 use half::slice::{HalfBitsSliceExt, HalfFloatSliceExt};
 
 use super::planes::Source;
 use crate::render::FilmRows;
+use crate::render::planes::PlaneKind;
 
 /// Largest finite half-float.
 const HALF_MAX: f32 = 65_504.0;
@@ -22,72 +22,55 @@ pub(super) struct LineBuffer {
 
 impl LineBuffer {
     /// The samples of `source` in row `row` of `rows`, as little-endian bytes.
+    ///
+    /// # Panics
+    /// If the film lacks the plane.
     pub(super) fn line(&mut self, rows: &FilmRows, row: usize, source: Source) -> &[u8] {
         let width = rows.width as usize;
-        let range = row * width..(row + 1) * width;
         self.words.resize(width, 0);
-        // Half floats have a buffer of their own
-        match source {
-            Source::Color(component) => return self.halves(&rows.color[range], component),
-            Source::LayerColor(i) => return self.layer_halves(layer(rows, row), rows.floats, i),
-            _ => {}
-        }
-        let axis = |plane: Option<&[Vec3]>, axis, words: &mut [u32]| {
-            let vectors = &plane.expect(HAS_PLANE)[range.clone()];
-            copy_axis(cast_slice(vectors), axis, words);
+        let (plane, component) = match source {
+            Source::Color(i) => return self.halves(&rows.color[row * width..][..width], i),
+            Source::Plane(plane, component) => (plane, component),
         };
-        // Copy the other sources as words of four bytes
-        let words = &mut self.words[..];
-        match source {
-            Source::Color(_) | Source::LayerColor(_) => unreachable!("done above"),
-            Source::Layer(i) | Source::ParticleLayer(i) => {
-                for (word, floats) in words.iter_mut().zip(layer(rows, row).chunks(rows.floats)) {
-                    *word = floats[i].to_bits().to_le();
-                }
-            }
-            Source::Normal(component) => axis(rows.normal, component, words),
-            Source::Position(component) => axis(rows.position, component, words),
-            Source::Velocity(component) => axis(rows.velocity, component, words),
-            Source::Albedo(component) => axis(rows.albedo, component, words),
-            Source::Depth => {
-                let depth = &rows.depth.expect(HAS_PLANE)[range];
-                copy(depth, words, |z| z.to_bits());
-            }
-            Source::Id => copy(&rows.id.expect(HAS_PLANE)[range], words, |id| id),
+        let (words, size) = rows.plane(plane);
+        let pixels = &words[row * width * size..][..width * size];
+        if plane.kind() == PlaneKind::Light {
+            let values = pixels.chunks_exact(size).map(|pixel| f32::from_bits(pixel[component]));
+            return self.converted(values);
+        }
+        // Copy all other planes as words of four bytes
+        let line = &mut self.words[..];
+        match size {
+            1 => copy::<1>(pixels, component, line),
+            3 => copy::<3>(pixels, component, line),
+            _ => copy_components(pixels.chunks_exact(size), component, line),
         }
         cast_slice(&self.words)
     }
 
-    /// Converts a colour component to half-floats: to nearest, ties to even, the same on every machine. Clamps values
-    /// to the finite range and counts those it has changed.
+    /// Converts a colour component to half-floats.
     fn halves(&mut self, colors: &[[f32; 4]], component: usize) -> &[u8] {
-        self.floats.resize(colors.len(), 0.0);
-        let floats = &mut self.floats[..];
-        let clamped = match component {
-            0 => clamp_component::<0>(colors, floats),
-            1 => clamp_component::<1>(colors, floats),
-            2 => clamp_component::<2>(colors, floats),
-            _ => clamp_component::<3>(colors, floats),
-        };
-        self.clamped += u64::from(clamped);
-        self.converted()
-    }
-
-    /// Converts float `i` of the layers of each pixel as a colour.
-    fn layer_halves(&mut self, layers: &[f32], floats: usize, i: usize) -> &[u8] {
-        self.floats.clear();
-        self.floats.extend(layers.chunks(floats).map(|pixel| pixel[i]));
-        for value in &mut self.floats {
-            let fits = value.abs() <= HALF_MAX;
-            self.clamped += u64::from(!fits);
-            let limited = value.clamp(-HALF_MAX, HALF_MAX);
-            *value = if value.is_nan() { 0.0 } else { limited };
+        match component {
+            0 => self.converted(colors.iter().map(|color| color[0])),
+            1 => self.converted(colors.iter().map(|color| color[1])),
+            2 => self.converted(colors.iter().map(|color| color[2])),
+            _ => self.converted(colors.iter().map(|color| color[3])),
         }
-        self.converted()
     }
 
-    /// The floats of the line as half-floats.
-    fn converted(&mut self) -> &[u8] {
+    /// Converts `values` to half-floats: to nearest, ties to even, the same on every machine. Clamps values to the
+    /// finite range and counts those it has changed; NaN becomes 0. The loop has no branches, so that the compiler
+    /// vectorises it.
+    fn converted(&mut self, values: impl ExactSizeIterator<Item = f32>) -> &[u8] {
+        self.floats.resize(values.len(), 0.0);
+        let mut clamped = 0_u32;
+        for (float, value) in self.floats.iter_mut().zip(values) {
+            let fits = value.abs() <= HALF_MAX;
+            clamped += u32::from(!fits);
+            let limited = value.clamp(-HALF_MAX, HALF_MAX);
+            *float = if value.is_nan() { 0.0 } else { limited };
+        }
+        self.clamped += u64::from(clamped);
         let bits: &mut [u16] = &mut cast_slice_mut(&mut self.words)[..self.floats.len()];
         let halves: &mut [f16] = bits.reinterpret_cast_mut();
         halves.convert_from_f32_slice(&self.floats);
@@ -98,41 +81,21 @@ impl LineBuffer {
     }
 }
 
-/// The layers of row `row` of `rows`.
-fn layer<'a>(rows: &FilmRows<'a>, row: usize) -> &'a [f32] {
-    let width = rows.width as usize * rows.floats;
-    &rows.layers.expect(HAS_PLANE)[row * width..(row + 1) * width]
+/// Copies a component of each pixel to `words`, with the bytes in the order of the file.
+fn copy<const N: usize>(pixels: &[u32], component: usize, words: &mut [u32]) {
+    assert!(component < N, "a component of a pixel");
+    copy_components(pixels.as_chunks::<N>().0.iter(), component, words);
 }
 
-const HAS_PLANE: &str = "films have the planes of the layout that was made for them";
-
-/// Copies the bits of `values` to `words`, with the bytes in the order of the file.
-fn copy<T: Copy>(values: &[T], words: &mut [u32], bits: impl Fn(T) -> u32) {
-    for (word, value) in words.iter_mut().zip(values) {
-        *word = bits(*value).to_le();
+#[inline(always)]
+fn copy_components<'a, P: AsRef<[u32]> + ?Sized + 'a>(
+    pixels: impl Iterator<Item = &'a P>,
+    component: usize,
+    words: &mut [u32],
+) {
+    for (word, pixel) in words.iter_mut().zip(pixels) {
+        *word = pixel.as_ref()[component].to_le();
     }
-}
-
-fn copy_axis(vectors: &[[f32; 3]], axis: usize, words: &mut [u32]) {
-    match axis {
-        0 => copy(vectors, words, |v| v[0].to_bits()),
-        1 => copy(vectors, words, |v| v[1].to_bits()),
-        _ => copy(vectors, words, |v| v[2].to_bits()),
-    }
-}
-
-/// Copies component `C` of `colors`, clamped to the finite range of half-floats; NaN becomes 0. Returns the number of
-/// values that changed. The loop has no branches, so that the compiler vectorises it.
-fn clamp_component<const C: usize>(colors: &[[f32; 4]], floats: &mut [f32]) -> u32 {
-    let mut clamped = 0;
-    for (float, color) in floats.iter_mut().zip(colors) {
-        let value = color[C];
-        let fits = value.abs() <= HALF_MAX;
-        clamped += u32::from(!fits);
-        let limited = value.clamp(-HALF_MAX, HALF_MAX);
-        *float = if value.is_nan() { 0.0 } else { limited };
-    }
-    clamped
 }
 
 #[cfg(test)]

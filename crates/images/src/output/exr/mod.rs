@@ -26,7 +26,9 @@ pub(super) mod planes;
 pub use blocks::{encoder_bytes, write_blocks};
 pub use layout::{ExrBlock, ExrLayout};
 pub use pack::{PackBuffers, PackedBlock, pack_block};
-pub use planes::{DEFAULT_LIGHT_GROUP, PlaneNames, ambiguous_name, attribute_planes, layer_planes};
+pub use planes::{
+    DEFAULT_LIGHT_GROUP, PlaneNames, ambiguous_name, attribute_planes, plane_channels,
+};
 
 /// Maximum length of an attribute name in the format, bytes.
 const NAME_MAX: usize = 255;

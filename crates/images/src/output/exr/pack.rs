@@ -10,7 +10,7 @@ use super::deflate::{Deflater, Piece, WINDOW};
 use super::differences::Differences;
 use super::layout::{ExrBlock, ExrLayout, ExrPart};
 use super::lines::LineBuffer;
-use super::planes::PlaneKind;
+use super::planes::SampleKind;
 use super::{Compression, OutputError};
 use crate::math::Supported;
 use crate::render::FilmRows;
@@ -82,9 +82,9 @@ fn for_each_line(
 ) {
     let mut offset = 0;
     for row in 0..rows.height as usize {
-        for plane in &layout.planes {
-            let line = buffer.line(rows, row, plane.source);
-            visit(offset, line, plane.sample_type().bytes_per_sample());
+        for channel in &layout.channels {
+            let line = buffer.line(rows, row, channel.source);
+            visit(offset, line, channel.sample_type().bytes_per_sample());
             offset += line.len();
         }
     }
@@ -132,19 +132,19 @@ fn zip<'b>(rows: &FilmRows, layout: &ExrPart, buffers: &'b mut PackBuffers) -> O
 }
 
 impl ExrPart {
-    /// The pieces of the differences of a block of `rows` rows: stretches of similar planes, first of the bytes at even
+    /// The pieces of the differences of a block of `rows` rows: stretches of similar channels, first of the bytes at even
     /// positions, then of those at odd positions.
     fn pieces(&self, rows: u32) -> impl Iterator<Item = Piece> {
         let width = self.header.layer_size.x();
         // A particle mostly has the same values in the row above. They are half the bytes of a row away, because even
         // and odd bytes are separate.
         let is_row_above_in_reach = rows > 1 && self.bytes(1) / 2 <= WINDOW;
-        // Group adjacent planes of the same kind
-        let groups: Vec<(PlaneKind, usize)> = self
-            .planes
+        // Group adjacent channels of the same kind
+        let groups: Vec<(SampleKind, usize)> = self
+            .channels
             .chunk_by(|a, b| a.kind() == b.kind())
             .map(|group| {
-                let bytes = group.iter().map(|plane| plane.sample_type().bytes_per_sample());
+                let bytes = group.iter().map(|channel| channel.sample_type().bytes_per_sample());
                 (group[0].kind(), bytes.sum::<usize>() * width / 2)
             })
             .collect();
@@ -153,10 +153,10 @@ impl ExrPart {
             let row = groups.clone().into_iter().map(move |(kind, length)| Piece {
                 length,
                 is_searched: match kind {
-                    PlaneKind::Color | PlaneKind::Normal => false,
+                    SampleKind::Color | SampleKind::Surface => false,
                     // Exponents hardly change, so the differences to and from them repeat in pairs
-                    PlaneKind::Position => is_odd,
-                    PlaneKind::Particle => is_row_above_in_reach,
+                    SampleKind::Position => is_odd,
+                    SampleKind::Particle => is_row_above_in_reach,
                 },
             });
             std::iter::repeat_n(row, rows as usize).flatten()

@@ -7,13 +7,13 @@ use exr::prelude::{
     AnyChannel, AnyChannels, Blocks, Encoding, FlatSamples, Image, ImageAttributes, Layer,
     LineOrder, ReadChannels, ReadLayers, WritableImage, f16, read,
 };
-use glam::Vec3;
 
-use super::super::planes::{PlaneNames, Source, planes_in_file};
+use super::super::planes::{PlaneNames, Source, channels_in_file};
 use super::super::tests::COMPRESSIONS;
 use super::super::{ExrOptions, TextAttribute, attributes, encode_exr, write_blocks, write_exr};
 use super::*;
-use crate::render::{Channels, Film};
+use crate::render::planes::PlaneKind;
+use crate::render::{Channels, Film, FilmPlane};
 
 /// Pseudorandom numbers (splitmix64).
 struct Numbers(u64);
@@ -37,10 +37,6 @@ impl Numbers {
             _ => f32::from_bits((self.next() >> 32) as u32),
         }
     }
-
-    fn wild_vector(&mut self) -> Vec3 {
-        Vec3::new(self.wild(), self.wild(), self.wild())
-    }
 }
 
 /// A film with random values in its lower half, so that compression does not shorten the blocks there.
@@ -51,51 +47,36 @@ fn wild_film(width: u32, height: u32, channels: Channels) -> Film {
     for color in &mut film.color[half..] {
         *color = std::array::from_fn(|_| numbers.wild());
     }
-    let vectors = [&mut film.normal, &mut film.position, &mut film.velocity, &mut film.albedo];
-    for plane in vectors.into_iter().flatten() {
-        plane[half..].fill_with(|| numbers.wild_vector());
-    }
-    if let Some(plane) = &mut film.depth {
-        plane[half..].fill_with(|| numbers.wild());
-    }
-    if let Some(plane) = &mut film.id {
-        plane[half..].fill_with(|| (numbers.next() >> 32) as u32);
-    }
-    if let Some(plane) = &mut film.layers {
-        let half = plane.len() / 2;
-        plane[half..].fill_with(|| numbers.wild());
+    for plane in FilmPlane::all() {
+        if let Some(words) = film.plane_mut::<u32>(plane) {
+            let half = words.len() / 2;
+            words[half..].fill_with(|| match plane {
+                FilmPlane::Id => (numbers.next() >> 32) as u32,
+                _ => numbers.wild().to_bits(),
+            });
+        }
     }
     film
 }
 
 /// All samples of `film` from `source`. Colours are converted one by one, by the portable conversion.
 fn samples(film: &Film, source: Source) -> FlatSamples {
-    let floats = |plane: &Option<Vec<Vec3>>, axis| {
-        let vectors = plane.as_ref().unwrap().iter();
-        FlatSamples::F32(vectors.map(|v: &Vec3| v[axis]).collect())
-    };
     let half = |value: f32| {
         let value = if value.is_nan() { 0.0 } else { value };
         f16::from_f32_const(value.clamp(-65_504.0, 65_504.0))
     };
     match source {
         Source::Color(c) => FlatSamples::F16(film.color.iter().map(|v| half(v[c])).collect()),
-        Source::Depth => FlatSamples::F32(film.depth.clone().unwrap()),
-        Source::Normal(axis) => floats(&film.normal, axis),
-        Source::Position(axis) => floats(&film.position, axis),
-        Source::Velocity(axis) => floats(&film.velocity, axis),
-        Source::Albedo(axis) => floats(&film.albedo, axis),
-        Source::Id => FlatSamples::U32(film.id.clone().unwrap()),
-        Source::LayerColor(i) => FlatSamples::F16(layer(film, i).map(half).collect()),
-        Source::Layer(i) | Source::ParticleLayer(i) => FlatSamples::F32(layer(film, i).collect()),
+        Source::Plane(plane, component) => {
+            let words = film.plane::<u32>(plane).unwrap().iter().copied();
+            let words = words.skip(component).step_by(film.channels.components(plane));
+            match plane.kind() {
+                PlaneKind::Light => FlatSamples::F16(words.map(f32::from_bits).map(half).collect()),
+                PlaneKind::Id => FlatSamples::U32(words.collect()),
+                _ => FlatSamples::F32(words.map(f32::from_bits).collect()),
+            }
+        }
     }
-}
-
-/// Float `i` of the layers of each pixel.
-fn layer(film: &Film, i: usize) -> impl Iterator<Item = f32> {
-    let floats = film.channels.layers.floats();
-    let layers = film.layers.as_ref().unwrap();
-    layers.iter().copied().skip(i).step_by(floats)
 }
 
 fn bits(samples: &FlatSamples) -> Vec<u32> {
@@ -109,7 +90,7 @@ fn bits(samples: &FlatSamples) -> Vec<u32> {
 /// The file that the crate `exr` writes on its own.
 fn written_by_exr(film: &Film, options: &ExrOptions) -> Vec<u8> {
     let size = (film.width as usize, film.height as usize);
-    let planes = planes_in_file(film.channels(), &PlaneNames::default()).into_iter();
+    let planes = channels_in_file(film.channels(), &PlaneNames::default()).into_iter();
     let list = planes.map(|plane| AnyChannel::new(&*plane.name, samples(film, plane.source)));
     let encoding = Encoding {
         compression: options.compression.codec(),
@@ -147,7 +128,7 @@ fn check(film: &Film, compression: Compression) {
     if !matches!(compression, Compression::Zip | Compression::Zips) {
         assert!(file == reference, "{compression:?} {size:?}");
     }
-    let expected: Vec<_> = planes_in_file(film.channels(), &PlaneNames::default())
+    let expected: Vec<_> = channels_in_file(film.channels(), &PlaneNames::default())
         .iter()
         .map(|plane| (plane.name.to_string(), bits(&samples(film, plane.source))))
         .collect();
@@ -163,15 +144,9 @@ fn films_round_trip_and_match_the_exr_crate() {
         }
     }
     for bits in 0..64_u32 {
-        let channels = Channels {
-            depth: bits & 1 != 0,
-            normal: bits & 2 != 0,
-            position: bits & 4 != 0,
-            velocity: bits & 8 != 0,
-            albedo: bits & 16 != 0,
-            id: bits & 32 != 0,
-            ..Channels::COLOR
-        };
+        let is_given = |plane: &FilmPlane| bits >> *plane as u32 & 1 == 1;
+        let planes: Vec<_> = FilmPlane::all().filter(is_given).collect();
+        let channels = Channels::COLOR.with(&planes);
         check(&wild_film(9, 20, channels), Compression::Zip);
     }
 }
@@ -345,7 +320,7 @@ fn the_bytes_are_the_same_on_every_machine() {
             let (x, y) = (f32::from(at % 150), f32::from(at / 150));
             *color = [x * y / 256.0, x / 128.0, y / 64.0, 1.0];
         }
-        for (at, id) in (0..).zip(film.id.iter_mut().flatten()) {
+        for (at, id) in (0..).zip(film.plane_mut::<u32>(FilmPlane::Id).into_iter().flatten()) {
             *id = at / 7 * 7;
         }
         let layout = ExrLayout::of(&film, &ExrOptions::default()).unwrap();
@@ -379,7 +354,7 @@ fn the_film_is_returned_without_waiting_for_a_busy_pool() {
         (file.into_inner(), returned)
     });
     assert!(file == expected);
-    assert_eq!(returned.id, film.id);
+    assert_eq!(returned.plane::<u32>(FilmPlane::Id), film.plane::<u32>(FilmPlane::Id));
 }
 
 /// A file that accepts only `room` bytes.

@@ -6,7 +6,11 @@ use exr::prelude::{
 use glam::Vec3;
 
 use super::*;
-use crate::render::Channels;
+use crate::render::{Channels, FilmPlane};
+
+/// Planes of vectors.
+const VECTORS: [FilmPlane; 4] =
+    [FilmPlane::Normal, FilmPlane::Position, FilmPlane::Velocity, FilmPlane::Albedo];
 
 /// All compression methods.
 pub(super) const COMPRESSIONS: [Compression; 5] =
@@ -19,18 +23,17 @@ fn film(width: u32, height: u32, channels: Channels) -> Film {
     for (i, color) in film.color.iter_mut().enumerate() {
         *color = [value(i), value(i) + 0.5, 1.0, 0.125];
     }
-    let vectors = [&mut film.normal, &mut film.position, &mut film.velocity, &mut film.albedo];
-    for (plane, add) in vectors.into_iter().zip([0.1, 0.2, 0.3, 0.4]) {
-        for (i, v) in plane.iter_mut().flatten().enumerate() {
+    for (plane, add) in VECTORS.into_iter().zip([0.1, 0.2, 0.3, 0.4]) {
+        for (i, v) in film.plane_mut::<Vec3>(plane).into_iter().flatten().enumerate() {
             *v = Vec3::new(value(i), value(i) * 3.0, -1.0) + add;
         }
     }
-    for (i, z) in film.depth.iter_mut().flatten().enumerate() {
+    for (i, z) in film.plane_mut::<f32>(FilmPlane::Depth).into_iter().flatten().enumerate() {
         if i % 3 != 0 {
             *z = value(i) + 1e-3;
         }
     }
-    for (i, id) in (0_u32..).zip(film.id.iter_mut().flatten()) {
+    for (i, id) in (0_u32..).zip(film.plane_mut::<u32>(FilmPlane::Id).into_iter().flatten()) {
         if i % 2 == 0 {
             *id = 4_000_000_000 + i;
         }
@@ -115,29 +118,29 @@ fn windows_are_those_of_the_options() {
 #[track_caller]
 fn check_channel(film: &Film, name: &str, samples: &FlatSamples) {
     let color = |c: usize| film.color.iter().map(|v| f16::from_f32(v[c])).collect();
-    let axis = |plane: &Option<Vec<Vec3>>, a: usize| {
-        let plane = plane.as_ref().unwrap();
-        FlatSamples::F32(plane.iter().map(|v| v[a]).collect())
+    let axis = |plane: FilmPlane, a: usize| {
+        let vectors = film.plane::<Vec3>(plane).unwrap();
+        FlatSamples::F32(vectors.iter().map(|v| v[a]).collect())
     };
     let expected = match name {
         "R" => FlatSamples::F16(color(0)),
         "G" => FlatSamples::F16(color(1)),
         "B" => FlatSamples::F16(color(2)),
         "A" => FlatSamples::F16(color(3)),
-        "Z" => FlatSamples::F32(film.depth.clone().unwrap()),
-        "id.I" => FlatSamples::U32(film.id.clone().unwrap()),
-        "N.X" => axis(&film.normal, 0),
-        "N.Y" => axis(&film.normal, 1),
-        "N.Z" => axis(&film.normal, 2),
-        "P.X" => axis(&film.position, 0),
-        "P.Y" => axis(&film.position, 1),
-        "P.Z" => axis(&film.position, 2),
-        "V.X" => axis(&film.velocity, 0),
-        "V.Y" => axis(&film.velocity, 1),
-        "V.Z" => axis(&film.velocity, 2),
-        "albedo.R" => axis(&film.albedo, 0),
-        "albedo.G" => axis(&film.albedo, 1),
-        "albedo.B" => axis(&film.albedo, 2),
+        "Z" => FlatSamples::F32(film.plane(FilmPlane::Depth).unwrap().to_vec()),
+        "id.I" => FlatSamples::U32(film.plane(FilmPlane::Id).unwrap().to_vec()),
+        "N.X" => axis(FilmPlane::Normal, 0),
+        "N.Y" => axis(FilmPlane::Normal, 1),
+        "N.Z" => axis(FilmPlane::Normal, 2),
+        "P.X" => axis(FilmPlane::Position, 0),
+        "P.Y" => axis(FilmPlane::Position, 1),
+        "P.Z" => axis(FilmPlane::Position, 2),
+        "V.X" => axis(FilmPlane::Velocity, 0),
+        "V.Y" => axis(FilmPlane::Velocity, 1),
+        "V.Z" => axis(FilmPlane::Velocity, 2),
+        "albedo.R" => axis(FilmPlane::Albedo, 0),
+        "albedo.G" => axis(FilmPlane::Albedo, 1),
+        "albedo.B" => axis(FilmPlane::Albedo, 2),
         _ => panic!("unexpected channel {name}"),
     };
     assert_eq!(*samples, expected, "{name}");
