@@ -68,7 +68,7 @@ impl RenderContext<'_> {
         if let Some(color) = self.color {
             return color;
         }
-        let Some(particles) = self.connected_particles() else {
+        let Some(particles) = self.shapes.connected_particles() else {
             return self.source.color(hits.particle[lane]);
         };
         // Blend the colours of the particles around the point
@@ -90,13 +90,13 @@ impl RenderContext<'_> {
                 point,
                 direction: lane3(&rays.direction, lane),
                 width: match bounces {
-                    0 => self.camera.pixel_width(point) * self.sample_width,
+                    0 => self.cameras.now.pixel_width(point) * self.sample_width,
                     _ => BOUNCED_SPREAD * hits.t[lane],
                 },
             });
         }
         // All others have the colour of their part, that of their material, or that of the particle
-        let color = self.part_colors[id.index()].get(part as usize).copied();
+        let color = self.shapes.part_colors[id.index()].get(part as usize).copied();
         color.or(self.scene.material(id).color).unwrap_or_else(|| self.source.color(part))
     }
 
@@ -129,7 +129,7 @@ impl RenderContext<'_> {
         }
         // Compute the depths of all samples
         let mut z = splat(f32::INFINITY);
-        depths(self.simd, &self.camera, rays, &packet.hits, &mut z);
+        depths(self.simd, &self.cameras.now, rays, &packet.hits, &mut z);
         let samples = self.settings.samples as usize;
         let mut lane = 0;
         while lane < rays.len() {
@@ -196,7 +196,7 @@ impl RenderContext<'_> {
 
     /// The particle of the intersection in `lane`.
     fn particle_at(&self, hits: &Intersections, lane: usize) -> u32 {
-        match (hits.material[lane], self.particles) {
+        match (hits.material[lane], self.shapes.particles) {
             (MaterialId::PARTICLES, Some(particles)) => particles.particle_at(&hits.get(lane)),
             _ => hits.particle[lane],
         }
@@ -205,10 +205,11 @@ impl RenderContext<'_> {
     /// Motion on the film of a point with this `velocity`, from this frame to the next, pixels; zero if it is or gets
     /// behind the camera.
     fn motion(&self, point: Vec3, velocity: Vec3) -> [f32; 2] {
-        let Some((next, time)) = &self.next_frame else {
+        let Some((next, time)) = &self.cameras.next else {
             return [0.0; 2];
         };
-        let (from, to) = (self.camera.pixel_of(point), next.pixel_of(point + *time * velocity));
+        let (from, to) =
+            (self.cameras.now.pixel_of(point), next.pixel_of(point + *time * velocity));
         match (from, to) {
             (Some(from), Some(to)) => [to[0] - from[0], from[1] - to[1]],
             _ => [0.0; 2],

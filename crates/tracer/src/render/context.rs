@@ -9,12 +9,13 @@ use super::{
     light_groups::NO_GROUP,
     lights::{Light, light_of},
     sampler::FilmSampler,
+    scene_shapes::{Interior, SceneShapes},
     scratch::SEGMENTS,
     settings::{IntegratorKind, RenderSettings},
     shading::{BackgroundLanes, CameraLanes},
     source::ShadeSource,
 };
-use crate::scene::{Finish, Material, PartMaterials, Scene};
+use crate::scene::{Camera, PartMaterials, Scene};
 use crate::surface::{MaterialId, Shape, Side};
 use spherule_tree::accel::Coherence;
 use spherule_tree::math::Supported;
@@ -24,37 +25,20 @@ const MIN_SAMPLE_WIDTH: f32 = 0.125;
 
 /// A scene ready to be rendered.
 pub(super) struct RenderContext<'a> {
-    /// All shapes but panes, soft spray and particles that are not fully opaque; the ground comes first, because it is
-    /// the cheapest.
-    pub(super) shapes: Vec<&'a dyn Shape>,
-    /// Meshes that rays pass.
-    pub(super) panes: Vec<&'a dyn Shape>,
-    /// The colours of the parts of shapes other than particles, in the order of the materials of the scene.
-    pub(super) part_colors: Vec<&'a [Vec3]>,
+    pub(super) shapes: SceneShapes<'a>,
     /// Materials of parts of the particles, if these are separate spheres and paths are traced.
     pub(super) parts: Option<&'a PartMaterials>,
-    /// Spray whose drops fade out; opaque spray is one of the shapes.
-    pub(super) soft_spray: Option<&'a dyn Shape>,
-    /// Particles that are not fully opaque; they are separate spheres.
-    pub(super) translucent: Option<&'a dyn Shape>,
     /// Whether there are meshes that only hide what is behind them.
     pub(super) has_holdouts: bool,
-    /// The particles, opaque or transmissive; all other shapes are opaque.
-    pub(super) particles: Option<&'a dyn Shape>,
     pub(super) source: &'a dyn ShadeSource,
     pub(super) scene: &'a Scene,
     pub(super) settings: &'a RenderSettings,
     pub(super) simd: Supported,
-    pub(super) camera: CameraLanes,
-    /// The camera of the next frame, and the time until then.
-    pub(super) next_frame: Option<(CameraLanes, f32)>,
-    /// The camera when the shutter opens and when it closes, with motion blur.
-    pub(super) exposure: Option<[CameraLanes; 2]>,
+    pub(super) cameras: Cameras,
     pub(super) background: BackgroundLanes,
     pub(super) lights: Vec<Box<dyn Light>>,
     /// Base colour of all particles, if they share one.
     pub(super) color: Option<Vec3>,
-    pub(super) interior: Interior,
     /// The interface of the particles, unless they are opaque.
     pub(super) boundary: Dielectric,
     /// Whether the camera is inside a connected body.
@@ -66,80 +50,23 @@ pub(super) struct RenderContext<'a> {
     pub(super) max_segments: usize,
 }
 
-/// The interior of the particles.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Interior {
-    /// Light does not enter.
-    Opaque,
-    /// Each sphere is a separate transmissive body. The angle between ray and normal shows whether a ray enters or
-    /// leaves.
-    Spheres,
-    /// One connected transmissive body. Each ray stores on which side of the surface it is. The depth counts
-    /// crossings of the surface; particles between two crossings do not matter.
-    Body,
+/// The cameras of a picture.
+pub(super) struct Cameras {
+    /// The camera of the frame.
+    pub(super) now: CameraLanes,
+    /// That of the next frame, and the time until then.
+    pub(super) next: Option<(CameraLanes, f32)>,
+    /// The camera when the shutter opens and when it closes, with motion blur.
+    pub(super) exposure: Option<[CameraLanes; 2]>,
 }
 
-impl Interior {
-    pub(super) fn of(material: &Material, is_connected: bool) -> Self {
-        match (material.transmission > 0.0, is_connected) {
-            (false, _) => Self::Opaque,
-            (true, false) => Self::Spheres,
-            (true, true) => Self::Body,
-        }
-    }
-}
-
-/// The colours of the parts of `shapes`, in the order of the materials of `scene`.
-fn part_colors<'a>(scene: &Scene, shapes: &[&'a dyn Shape]) -> Vec<&'a [Vec3]> {
-    let mut colors: Vec<&[Vec3]> = vec![&[]; scene.materials.len()];
-    for shape in shapes {
-        colors[shape.material().index()] = shape.colors();
-    }
-    colors
-}
-
-/// Shapes by the way in which rays meet them.
-struct DividedShapes<'a> {
-    /// All that are not among the others, with opaque or transmissive particles.
-    solid: Vec<&'a dyn Shape>,
-    panes: Vec<&'a dyn Shape>,
-    soft_spray: Option<&'a dyn Shape>,
-    translucent: Option<&'a dyn Shape>,
-    particles: Option<&'a dyn Shape>,
-    interior: Interior,
-}
-
-impl<'a> DividedShapes<'a> {
-    fn new(
-        shapes: Vec<&'a dyn Shape>,
-        scene: &Scene,
-        source: &dyn ShadeSource,
-        integrator: IntegratorKind,
-    ) -> Self {
-        let finish = |shape: &&dyn Shape| scene.material(shape.material()).finish;
-        let is_soft = |shape: &&dyn Shape| {
-            integrator == IntegratorKind::Path && finish(shape) == Finish::Foam
-        };
-        let (spray, shapes): (Vec<_>, Vec<_>) = shapes.into_iter().partition(is_soft);
-        let is_pane = |shape: &&dyn Shape| finish(shape) == Finish::Pane;
-        let (panes, shapes): (Vec<_>, Vec<_>) = shapes.into_iter().partition(is_pane);
-        // Find the particles and the kind of their interior
-        let is_particles = |shape: &&&dyn Shape| shape.material() == MaterialId::PARTICLES;
-        let particles = shapes.iter().find(is_particles).copied();
-        let is_connected = particles.is_some_and(|shape| shape.is_connected());
-        let interior = Interior::of(scene.particle_material(), is_connected);
-        // Only opaque spheres fade out: transmissive ones and connected bodies have an inside
-        let has_opacity = source.is_translucent() && interior == Interior::Opaque && !is_connected;
-        let is_translucent =
-            |shape: &&dyn Shape| has_opacity && shape.material() == MaterialId::PARTICLES;
-        let (translucent, shapes): (Vec<_>, Vec<_>) = shapes.into_iter().partition(is_translucent);
+impl Cameras {
+    fn new(scene: &Scene, [width, height]: [u32; 2]) -> Self {
+        let lanes = |camera: &Camera| CameraLanes::new(camera, width, height);
         Self {
-            solid: shapes,
-            panes,
-            soft_spray: spray.first().copied(),
-            translucent: translucent.first().copied(),
-            particles,
-            interior,
+            now: lanes(&scene.camera),
+            next: scene.next_frame.as_ref().map(|next| (lanes(&next.camera), next.time)),
+            exposure: scene.exposure.as_ref().map(|e| e.cameras.each_ref().map(lanes)),
         }
     }
 }
@@ -151,38 +78,26 @@ impl<'a> RenderContext<'a> {
         source: &'a dyn ShadeSource,
         settings: &'a RenderSettings,
     ) -> Self {
-        let divided = DividedShapes::new(shapes, scene, source, settings.integrator);
-        let DividedShapes { solid: shapes, panes, particles, interior, .. } = divided;
-        let is_connected = particles.is_some_and(|shape| shape.is_connected());
-        // Prepare camera, background and lights for packets
+        let shapes = SceneShapes::new(shapes, scene, source, settings.integrator);
+        let is_connected = shapes.connected_particles().is_some();
         let eye = scene.camera.eye();
-        let [width, height] = settings.eye_size(scene.camera.eyes());
         let contains_eye = |shape: &dyn Shape| shape.side_of(eye) == Side::Inside;
+        let is_body = shapes.interior == Interior::Body;
         Self {
-            part_colors: part_colors(scene, &shapes),
-            is_camera_inside: interior == Interior::Body && particles.is_some_and(contains_eye),
+            is_camera_inside: is_body && shapes.particles.is_some_and(contains_eye),
             shapes,
-            panes,
             parts: Some(&scene.parts)
                 .filter(|parts| !parts.is_empty() && !is_connected)
                 .filter(|_| settings.integrator == IntegratorKind::Path),
-            soft_spray: divided.soft_spray,
-            translucent: divided.translucent,
             has_holdouts: scene.materials.iter().any(|material| material.is_holdout),
-            particles,
             source,
             scene,
             settings,
             simd: Supported::default(),
-            camera: CameraLanes::new(&scene.camera, width, height),
-            next_frame: (scene.next_frame.as_ref())
-                .map(|next| (CameraLanes::new(&next.camera, width, height), next.time)),
-            exposure: (scene.exposure.as_ref())
-                .map(|e| e.cameras.map(|camera| CameraLanes::new(&camera, width, height))),
+            cameras: Cameras::new(scene, settings.eye_size(scene.camera.eyes())),
             background: BackgroundLanes::from(&scene.background),
             lights: scene.lights.iter().map(light_of).collect(),
             color: source.constant_color(),
-            interior,
             boundary: Dielectric::new(scene.particle_material()),
             sample_width: (settings.samples as f32).sqrt().recip().max(MIN_SAMPLE_WIDTH),
             sampler: FilmSampler::with_filter(settings.samples, settings.filter),
@@ -197,11 +112,6 @@ impl<'a> RenderContext<'a> {
         part.and_then(|(_, part)| parts.of(part)).unwrap_or(MaterialId::PARTICLES)
     }
 
-    /// The particles, if they bound one connected body.
-    pub(super) fn connected_particles(&self) -> Option<&'a dyn Shape> {
-        self.particles.filter(|shape| shape.is_connected())
-    }
-
     /// Whether camera rays see nothing but shadows on the ground.
     pub(super) fn catches_shadows(&self) -> bool {
         let ground = self.scene.ground.as_ref();
@@ -212,7 +122,9 @@ impl<'a> RenderContext<'a> {
     /// so beams around them are wide.
     pub(super) const fn coherence(&self, depth: u32) -> Coherence {
         match depth {
-            1 if !self.camera.has_lens() && self.exposure.is_none() => Coherence::Coherent,
+            1 if !self.cameras.now.has_lens() && self.cameras.exposure.is_none() => {
+                Coherence::Coherent
+            }
             _ => Coherence::Incoherent,
         }
     }

@@ -2,10 +2,11 @@
 
 use super::{
     aov::DataSample,
-    context::{Interior, RenderContext},
+    context::RenderContext,
     dimensions::{CAMERA, LENS, TIME},
     film::FilmTile,
     sampler::{PathSeed, get_1d_lanes, get_2d_lanes},
+    scene_shapes::Interior,
     scratch::{Pixel, SampleGroup},
     settings::RenderSettings,
     shading::{camera_rays, lens_rays, moving_camera_rays, stereo_rays},
@@ -35,11 +36,11 @@ impl RenderContext<'_> {
             // Numbers of pixels beyond the left or top border wrap around; they only select random numbers
             let [column_number, row_number] = [x, y].map(i32::cast_unsigned);
             // The image of the right eye is beside that of the left one, or below it
-            let is_right = self.camera.is_stereo() && (x >= eye_size[0] || y >= eye_size[1]);
+            let is_right = self.cameras.now.is_stereo() && (x >= eye_size[0] || y >= eye_size[1]);
             group.pixels.push(Pixel {
                 column,
                 row,
-                side: match (self.camera.is_stereo(), is_right) {
+                side: match (self.cameras.now.is_stereo(), is_right) {
                     (false, _) => 0.0,
                     (true, false) => -1.0,
                     (true, true) => 1.0,
@@ -81,21 +82,21 @@ impl RenderContext<'_> {
         let first = number * LANES;
         let len = LANES.min(group.len - first);
         let (simd, rays) = (self.simd, &mut segments.rays);
-        match &self.exposure {
-            None => camera_rays(simd, &self.camera, x, y, rays),
+        match &self.cameras.exposure {
+            None => camera_rays(simd, &self.cameras.now, x, y, rays),
             Some([open, close]) => {
                 self.sample_times(group, first, len, &mut rays.time);
                 moving_camera_rays(simd, open, close, x, y, rays);
             }
         }
         rays.set_len(len);
-        if self.camera.is_stereo() {
+        if self.cameras.now.is_stereo() {
             let side = self.sides(group, first, len);
-            stereo_rays(simd, &self.camera, &side, rays);
+            stereo_rays(simd, &self.cameras.now, &side, rays);
         }
-        if self.camera.has_lens() {
+        if self.cameras.now.has_lens() {
             let u = self.lens_samples(group, first, len);
-            lens_rays(simd, &self.camera, &u, rays);
+            lens_rays(simd, &self.cameras.now, &u, rays);
         }
         // Initialise their path state
         segments.throughput = [splat(1.0); 3];
@@ -162,8 +163,8 @@ impl RenderContext<'_> {
     /// Lanes of the camera rays that start inside a connected body.
     fn lanes_inside(&self, rays: &RayPacket) -> u32 {
         let lanes = first_lanes(rays.len());
-        match (self.camera.has_one_origin(), self.particles) {
-            (false, Some(body)) if self.interior == Interior::Body => lanes_in(lanes)
+        match (self.cameras.now.has_one_origin(), self.shapes.particles) {
+            (false, Some(body)) if self.shapes.interior == Interior::Body => lanes_in(lanes)
                 .filter(|lane| body.side_of(lane3(&rays.origin, *lane)) == Side::Inside)
                 .fold(0, |inside, lane| inside | 1 << lane),
             _ if self.is_camera_inside => lanes,

@@ -10,10 +10,11 @@
 use std::ops::Range;
 
 use super::{
-    context::{Interior, RenderContext},
+    context::RenderContext,
     film::FilmTile,
     ray_counts::RayCounts,
     roulette::SplitRule,
+    scene_shapes::Interior,
     scratch::{GROUP, PacketScratch, Scratch, batch_len},
     settings::{IntegratorKind, RenderSettings},
     stop::Stop,
@@ -30,7 +31,7 @@ pub(super) trait Integrator: Sync {
     /// Maximum number of path segments of one sample at any depth.
     fn max_paths(&self) -> usize {
         let context = self.context();
-        max_paths(context.settings, context.interior)
+        max_paths(context.settings, context.shapes.interior)
     }
 
     /// Maximum number of path segments one after the other.

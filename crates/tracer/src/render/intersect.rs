@@ -3,9 +3,10 @@
 use glam::Vec3;
 
 use super::{
-    context::{Interior, RenderContext},
+    context::RenderContext,
     interface::{attenuate, leaving},
     light_groups::NO_GROUP,
+    scene_shapes::Interior,
     scratch::PacketScratch,
     shading::{add_backdrop, add_background, scale},
     stream::SegmentPacket,
@@ -25,7 +26,7 @@ impl RenderContext<'_> {
     ) {
         packet.hits.clear();
         let (coherence, inside) = (self.coherence(depth), segments.inside);
-        for shape in &self.shapes {
+        for shape in &self.shapes.solid {
             shape.intersect(&mut segments.rays, coherence, inside, &mut packet.hits);
         }
         self.meet_translucent(segments, coherence, packet);
@@ -55,7 +56,7 @@ impl RenderContext<'_> {
             return;
         }
         let hits = &packet.hits;
-        let lanes = match self.interior {
+        let lanes = match self.shapes.interior {
             Interior::Opaque => 0,
             // Only a ray that leaves a sphere has passed through its interior.
             Interior::Spheres => {
@@ -105,7 +106,7 @@ impl RenderContext<'_> {
         let group = packet.groups.of_mut(NO_GROUP);
         for radiance in [Some(&mut packet.radiance), group].into_iter().flatten() {
             if is_backdrop {
-                add_backdrop(self.simd, &self.camera, rays, weight, lanes, radiance);
+                add_backdrop(self.simd, &self.cameras.now, rays, weight, lanes, radiance);
                 continue;
             }
             let (background, direction) = (&self.background, &rays.direction);

@@ -43,6 +43,7 @@ mod ray_counts;
 mod roulette;
 mod sample_layers;
 mod sampler;
+mod scene_shapes;
 mod scratch;
 mod settings;
 mod shading;
@@ -119,9 +120,10 @@ pub use source::{Colors, Opacities, ParticleShading, ShadeSource};
 pub use stop::{Deadline, Stop};
 pub use window::DataWindow;
 
-use context::{Interior, RenderContext};
+use context::RenderContext;
 use integrator::Integrator;
 use path::PathIntegrator;
+use scene_shapes::Interior;
 use whitted::WhittedIntegrator;
 
 /// The available renderers. Images depend on the renderer.

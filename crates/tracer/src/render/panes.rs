@@ -39,7 +39,7 @@ impl RenderContext<'_> {
     fn next_pane(&self, ray: &Ray) -> Option<PaneCrossing> {
         let mut rest = *ray;
         let mut found = None;
-        for pane in &self.panes {
+        for pane in &self.shapes.panes {
             if rest.t_max > rest.t_min
                 && let Some(hit) = pane.nearest(&rest)
             {
@@ -61,7 +61,7 @@ impl RenderContext<'_> {
     /// Multiplies the throughput of `packet` by the transmittance of the panes up to its intersections. In path
     /// tracing, ends some of the rays at a pane that reflects them.
     pub(super) fn pass_panes(&self, segments: &mut SegmentPacket, packet: &mut PacketScratch) {
-        if self.panes.is_empty() {
+        if self.shapes.panes.is_empty() {
             return;
         }
         // Whitted rays keep only what passes; paths choose at random whether a pane reflects them
@@ -123,7 +123,7 @@ impl RenderContext<'_> {
 
     /// Multiplies the radiance of light samples by the transmittance of the panes on their shadow rays.
     pub(super) fn attenuate_by_panes(&self, samples: &mut LightSamples) {
-        if self.panes.is_empty() {
+        if self.shapes.panes.is_empty() {
             return;
         }
         for lane in lanes_in(samples.lanes) {
@@ -142,7 +142,7 @@ impl RenderContext<'_> {
 
     /// The lanes of rays that panes reflect.
     pub(super) fn pane_lanes(&self, hits: &Intersections) -> u32 {
-        if self.panes.is_empty() { 0 } else { self.lanes_where(hits, Material::is_pane) }
+        if self.shapes.panes.is_empty() { 0 } else { self.lanes_where(hits, Material::is_pane) }
     }
 
     /// The lanes of camera rays that end at meshes which only hide what is behind them.

@@ -14,7 +14,7 @@
 
 use super::{
     bsdf::{Bsdf, bsdf_of, reflect_samples, surface_points},
-    context::{Interior, RenderContext},
+    context::RenderContext,
     dimensions::{BOUNCED, BSDF, CONTINUATION, ENVIRONMENT, LIGHTS},
     integrator::Integrator,
     interface::{Interface, interface_of},
@@ -22,6 +22,7 @@ use super::{
     lights::{Light, environment_along, sample_environment},
     roulette::SplitRule,
     sampler::{get_1d_lanes, get_2d_lanes},
+    scene_shapes::Interior,
     scratch::PacketScratch,
     shading::{add, product, scale},
     specular::{Escape, SpecularHits},
@@ -71,7 +72,7 @@ pub(super) struct PathIntegrator<'a> {
 
 impl<'a> PathIntegrator<'a> {
     pub(super) fn new(context: RenderContext<'a>) -> Self {
-        let is_connected = context.connected_particles().is_some();
+        let is_connected = context.shapes.connected_particles().is_some();
         // Black environments need no samples
         let given = context.scene.environment.as_deref();
         let environment = given.filter(|environment| !environment.is_black());
@@ -80,7 +81,7 @@ impl<'a> PathIntegrator<'a> {
             environment,
             bsdfs: context.scene.materials.iter().map(|m| bsdf_of(m.finish)).collect(),
             interface: interface_of(context.scene.particle_material(), is_connected),
-            split: SplitRule::new(context.settings, context.interior),
+            split: SplitRule::new(context.settings, context.shapes.interior),
             catcher: Catcher::of(context.scene),
             ground_light: None,
             caustics: Caustics::default(),
@@ -138,7 +139,7 @@ impl Integrator for PathIntegrator<'_> {
             ended = ground;
         }
         // Reflect light at opaque surfaces
-        let clear = match self.context.interior {
+        let clear = match self.context.shapes.interior {
             Interior::Opaque => 0,
             Interior::Spheres | Interior::Body => packet.hits.lanes_of(MaterialId::PARTICLES),
         };
@@ -237,7 +238,7 @@ impl PathIntegrator<'_> {
     /// Whether rays of a BSDF sample light sources too, so that the balance heuristic weights both. Behind transmissive
     /// surfaces, only shadow rays find light sources.
     fn rays_hit_lights(&self) -> bool {
-        self.context.interior == Interior::Opaque
+        self.context.shapes.interior == Interior::Opaque
     }
 
     fn shade_opaque(
@@ -256,10 +257,10 @@ impl PathIntegrator<'_> {
     fn prepare_surface(&self, surface: &Surface<'_>, packet: &mut PacketScratch) {
         let (context, simd) = (&self.context, self.context.simd);
         // Transmissive particles have no colour
-        context.base_colors(surface.segments, context.interior == Interior::Opaque, packet);
+        context.base_colors(surface.segments, context.shapes.interior == Interior::Opaque, packet);
         let (rays, points) = (&surface.segments.rays, &mut packet.surface);
         surface_points(simd, rays, &packet.hits, &packet.base, points);
-        if context.soft_spray.is_some() {
+        if context.shapes.soft_spray.is_some() {
             // Light that foam scatters leaves from inside its drop, in all directions
             for lane in lanes_in(packet.hits.lanes_of(MaterialId::SPRAY)) {
                 let inwards = -packet.hits.offset[lane] * lane3(&points.geometric, lane);
@@ -441,7 +442,7 @@ impl PathIntegrator<'_> {
         // The last segment of a path may be a shadow ray to the environment
         let max = self.context.settings.bounces;
         let is_last = |l: usize| segments.bounces[l] == max;
-        let last = match self.context.interior {
+        let last = match self.context.shapes.interior {
             Interior::Opaque if !self.has_extents => lanes & lanes_where(is_last),
             // It may hit a light, or pass through transmissive surfaces
             _ => 0,

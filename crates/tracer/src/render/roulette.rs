@@ -6,9 +6,9 @@
 //! each. Random numbers depend on the pixel, the sample and the path, so the choice does not depend on threads.
 
 use super::{
-    context::Interior,
     dimensions::BRANCH,
     sampler::PathSeed,
+    scene_shapes::Interior,
     settings::{MAX_DEPTH, RenderSettings},
 };
 

@@ -2,11 +2,12 @@
 //! point.
 
 use super::{
-    context::{Interior, RenderContext},
+    context::RenderContext,
     dimensions::{REFLECTED, REFRACTED},
     interface::Dielectric,
     layers::LightClass,
     roulette::SplitRule,
+    scene_shapes::Interior,
     scratch::PacketScratch,
     shading::scale,
     stream::{RayStreams, SegmentPacket},
@@ -46,12 +47,12 @@ impl RenderContext<'_> {
     ) {
         // Choose which rays to trace
         let SpecularHits { segments, last, .. } = hits;
-        if self.interior != Interior::Opaque {
+        if self.shapes.interior != Interior::Opaque {
             self.split_weights(split, hits, packet);
         }
         let PacketScratch { leaving, throughput, radiance, split: lights, groups, .. } = packet;
         // Describe both rays: weight, stream, side and branch of the path
-        let (inside, other_side) = match self.interior {
+        let (inside, other_side) = match self.shapes.interior {
             Interior::Opaque | Interior::Spheres => (0, 0),
             Interior::Body => (segments.inside, !segments.inside),
         };

@@ -59,7 +59,7 @@ impl RenderContext<'_> {
         coherence: Coherence,
         packet: &mut PacketScratch,
     ) {
-        let Some(spray) = self.soft_spray else {
+        let Some(spray) = self.shapes.soft_spray else {
             return;
         };
         // Find the rays near any drop
@@ -91,7 +91,7 @@ impl RenderContext<'_> {
 
     /// Multiplies the radiance of light samples by the transmittance of soft spray on their shadow rays.
     pub(super) fn attenuate_by_spray(&self, samples: &mut LightSamples, coherence: Coherence) {
-        let Some(spray) = self.soft_spray.filter(|_| samples.lanes != 0) else {
+        let Some(spray) = self.shapes.soft_spray.filter(|_| samples.lanes != 0) else {
             return;
         };
         for lane in lanes_in(spray.occluded(&samples.rays, coherence, samples.lanes)) {

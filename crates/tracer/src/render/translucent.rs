@@ -58,7 +58,7 @@ impl RenderContext<'_> {
         coherence: Coherence,
         packet: &mut PacketScratch,
     ) {
-        let Some(spheres) = self.translucent else {
+        let Some(spheres) = self.shapes.translucent else {
             return;
         };
         // Find the rays near any of the spheres, and a random number for each
@@ -102,7 +102,7 @@ impl RenderContext<'_> {
     /// Multiplies the radiance of light samples by the part of their shadow rays that spheres which are not fully
     /// opaque let through.
     pub(super) fn attenuate_by_opacity(&self, samples: &mut LightSamples, coherence: Coherence) {
-        let Some(spheres) = self.translucent.filter(|_| samples.lanes != 0) else {
+        let Some(spheres) = self.shapes.translucent.filter(|_| samples.lanes != 0) else {
             return;
         };
         // Multiply the transmittance of all spheres on the way, until too little light is left

@@ -7,10 +7,11 @@
 //! spheres that are not fully opaque (`translucent.rs`) attenuate all shadow rays.
 
 use super::{
-    context::{Interior, RenderContext},
+    context::RenderContext,
     interface::{attenuate, cross_straight},
     lights::LightSamples,
     ray_counts::RayCounts,
+    scene_shapes::Interior,
     shading::product,
     stream::SegmentPacket,
 };
@@ -43,12 +44,14 @@ impl RenderContext<'_> {
 
         // Trace opaque shapes first: occluded rays need no further tests
         self.occlude(coherence, samples, |shape| {
-            self.interior == Interior::Opaque || shape.material() != MaterialId::PARTICLES
+            self.shapes.interior == Interior::Opaque || shape.material() != MaterialId::PARTICLES
         });
         self.attenuate_by_panes(samples);
         self.attenuate_by_spray(samples, coherence);
         self.attenuate_by_opacity(samples, coherence);
-        let Some(particles) = self.particles.filter(|_| self.interior != Interior::Opaque) else {
+        let Some(particles) =
+            self.shapes.particles.filter(|_| self.shapes.interior != Interior::Opaque)
+        else {
             return samples.lanes;
         };
         if samples.lanes == 0 {
@@ -57,7 +60,7 @@ impl RenderContext<'_> {
 
         // Trace the transmissive particles
         let mut transmittance = [splat(1.0); 3];
-        let reached = match self.interior {
+        let reached = match self.shapes.interior {
             Interior::Body => {
                 let inside = segments.inside;
                 let (samples, transmittance) = (&*samples, &mut transmittance);
@@ -98,7 +101,7 @@ impl RenderContext<'_> {
         samples: &mut LightSamples,
         is_opaque: impl Fn(&dyn Shape) -> bool,
     ) {
-        for shape in &self.shapes {
+        for shape in &self.shapes.solid {
             if samples.lanes != 0 && is_opaque(*shape) {
                 samples.lanes &= !shape.occluded(&samples.rays, coherence, samples.lanes);
             }

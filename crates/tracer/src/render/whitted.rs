@@ -8,7 +8,7 @@ use glam::Vec3;
 
 use super::{
     bsdf::{BlinnPhong, eval_lanes, reflect_samples, surface_points},
-    context::{Interior, RenderContext},
+    context::RenderContext,
     integrator::Integrator,
     interface::{Interface, smooth_interface_of},
     layers::LightClass,
@@ -16,6 +16,7 @@ use super::{
     light_split::ratio,
     lights::LightSamples,
     roulette::SplitRule,
+    scene_shapes::Interior,
     scratch::PacketScratch,
     shading::{add, add_background, product, scale},
     specular::{Escape, SpecularHits},
@@ -72,14 +73,14 @@ pub(super) struct WhittedIntegrator<'a> {
 
 impl<'a> WhittedIntegrator<'a> {
     pub(super) fn new(context: RenderContext<'a>) -> Self {
-        let is_connected = context.connected_particles().is_some();
+        let is_connected = context.shapes.connected_particles().is_some();
         let material = |material: &Material| {
             let is_body = material.owner == Owner::Particles && is_connected;
             WhittedMaterial::new(material, context.scene.ambient_light, is_body)
         };
         Self {
             materials: context.scene.materials.iter().map(material).collect(),
-            split: SplitRule::new(context.settings, context.interior),
+            split: SplitRule::new(context.settings, context.shapes.interior),
             context,
         }
     }
@@ -96,7 +97,8 @@ impl Integrator for WhittedIntegrator<'_> {
     }
 
     fn is_stochastic(&self) -> bool {
-        self.context.interior != Interior::Opaque || self.context.translucent.is_some()
+        self.context.shapes.interior != Interior::Opaque
+            || self.context.shapes.translucent.is_some()
     }
 
     fn shade(

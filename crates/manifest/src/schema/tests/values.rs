@@ -215,21 +215,25 @@ fn is_whole_float(value: &toml::Value) -> bool {
     matches!(value, toml::Value::Float(f) if f.fract() == 0.0)
 }
 
-#[test]
-fn schema_and_reader_accept_the_same_values() {
+/// Checks that schema and reader accept the same values of all keys: each key gets one of `every` words of the schema, all
+/// of them in turn, and all other values.
+fn values_agree(every: usize) {
     let (schema, validator) = (job_schema(), validator());
-    let mut values: BTreeSet<String> =
+    let fixed: BTreeSet<String> =
         VALUES.iter().chain(&COLORS).chain(&BARS).map(|v| (*v).to_owned()).collect();
-    words_and_slips(&schema, &mut values);
+    let mut words = BTreeSet::new();
+    words_and_slips(&schema, &mut words);
     let parsed = |text: String| {
         let value = format!("v = {text}").parse::<Table>().unwrap()["v"].clone();
         (text, value)
     };
-    let values: Vec<(String, toml::Value)> = values.into_iter().map(parsed).collect();
+    let words: Vec<(String, toml::Value)> = words.difference(&fixed).cloned().map(parsed).collect();
+    let fixed: Vec<(String, toml::Value)> = fixed.into_iter().map(parsed).collect();
     let mut differ = Vec::new();
-    for key in keys() {
+    for (index, key) in keys().into_iter().enumerate() {
         let mut taken = 0;
-        for (text, value) in &values {
+        let own_words = words.iter().skip(index % every).step_by(every);
+        for (text, value) in fixed.iter().chain(own_words) {
             let table = with(&key, value);
             let read = read(&table.to_string());
             let valid = validator.is_valid(&serde_json::to_value(&table).unwrap());
@@ -242,11 +246,22 @@ fn schema_and_reader_accept_the_same_values() {
             }
         }
         // The camera is fixed, and has no view along an axis
-        if taken == 0 && key != "camera.view" {
+        if every == 1 && taken == 0 && key != "camera.view" {
             differ.push(format!("{key}: takes nothing"));
         }
     }
     assert!(differ.is_empty(), "{}", differ.join("\n"));
+}
+
+#[test]
+fn schema_and_reader_accept_the_same_values() {
+    values_agree(8);
+}
+
+#[test]
+#[ignore = "takes two minutes; a part of the words is in the usual run"]
+fn schema_and_reader_accept_the_same_words() {
+    values_agree(1);
 }
 
 /// Checks that the list of differences is up to date.

@@ -43,7 +43,7 @@ impl PathIntegrator<'_> {
     /// Whether photons light opaque particles beside transmissive ones. Photons see the particles in the middle of the
     /// exposure, and would light other points of particles that move.
     pub(super) fn parts_take_photons(&self) -> bool {
-        self.context.parts.is_some() && self.context.exposure.is_none()
+        self.context.parts.is_some() && self.context.cameras.exposure.is_none()
     }
 
     /// Adds the light of photons that `lanes` of a surface reflect.

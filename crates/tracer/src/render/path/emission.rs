@@ -76,7 +76,7 @@ impl PathIntegrator<'_> {
         segments: &SegmentPacket,
         packet: &PacketScratch,
     ) -> Vec3 {
-        let is_before_panes = !self.context.panes.is_empty() && t < packet.first_pane[lane];
+        let is_before_panes = !self.context.shapes.panes.is_empty() && t < packet.first_pane[lane];
         if is_before_panes {
             lane3(&segments.throughput, lane)
         } else {

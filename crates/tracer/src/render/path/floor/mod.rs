@@ -319,7 +319,7 @@ impl<'a> PathIntegrator<'a> {
     fn wet_scene<'s>(&'s self, square: &'s Square) -> Option<WetScene<'s>> {
         let scene = self.context.scene;
         Some(WetScene {
-            body: self.context.connected_particles()?,
+            body: self.context.shapes.connected_particles()?,
             wet: scene.wet_ground.as_ref()?,
             square,
             particles: scene.particles,
@@ -338,7 +338,7 @@ impl<'a> PathIntegrator<'a> {
     }
 
     fn has_opaque_surfaces(&self) -> bool {
-        let mut shapes = self.context.shapes.iter();
+        let mut shapes = self.context.shapes.solid.iter();
         self.parts_take_photons() || shapes.any(|shape| self.takes_photons(shape.material()))
     }
 

@@ -137,7 +137,7 @@ fn aim(
     segments.path = [PathSeed::of_pixel((row * SIDE + texel) as u32, TEXELS); LANES];
     segments.sample = std::array::from_fn(|lane| (number * LANES + lane) as u32);
     // The ground may cut through a body
-    let body = integrator.context.connected_particles();
+    let body = integrator.context.shapes.connected_particles();
     let is_inside = body.is_some_and(|body| body.side_of(above) == Side::Inside);
     segments.inside = if is_inside { first_lanes(LANES) } else { 0 };
     segments.throughput = [splat(1.0); 3];

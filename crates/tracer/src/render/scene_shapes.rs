@@ -1,0 +1,98 @@
+//! The shapes of a scene, divided by the way in which rays meet them.
+
+use glam::Vec3;
+
+use super::{settings::IntegratorKind, source::ShadeSource};
+use crate::scene::{Finish, Material, Scene};
+use crate::surface::{MaterialId, Shape};
+
+/// The interior of the particles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Interior {
+    /// Light does not enter.
+    Opaque,
+    /// Each sphere is a separate transmissive body. The angle between ray and normal shows whether a ray enters or
+    /// leaves.
+    Spheres,
+    /// One connected transmissive body. Each ray stores on which side of the surface it is. The depth counts
+    /// crossings of the surface; particles between two crossings do not matter.
+    Body,
+}
+
+impl Interior {
+    pub(super) fn of(material: &Material, is_connected: bool) -> Self {
+        match (material.transmission > 0.0, is_connected) {
+            (false, _) => Self::Opaque,
+            (true, false) => Self::Spheres,
+            (true, true) => Self::Body,
+        }
+    }
+}
+
+/// The colours of the parts of `shapes`, in the order of the materials of `scene`.
+fn part_colors<'a>(scene: &Scene, shapes: &[&'a dyn Shape]) -> Vec<&'a [Vec3]> {
+    let mut colors: Vec<&[Vec3]> = vec![&[]; scene.materials.len()];
+    for shape in shapes {
+        colors[shape.material().index()] = shape.colors();
+    }
+    colors
+}
+
+/// The shapes of a scene by the way in which rays meet them.
+pub(super) struct SceneShapes<'a> {
+    /// All that are not among the others, with opaque or transmissive particles; the ground comes first, because it is the
+    /// cheapest.
+    pub(super) solid: Vec<&'a dyn Shape>,
+    /// The colours of their parts, apart from particles, in the order of the materials of the scene.
+    pub(super) part_colors: Vec<&'a [Vec3]>,
+    /// Meshes that rays pass.
+    pub(super) panes: Vec<&'a dyn Shape>,
+    /// Spray whose drops fade out; opaque spray is solid.
+    pub(super) soft_spray: Option<&'a dyn Shape>,
+    /// Particles that are not fully opaque; they are separate spheres.
+    pub(super) translucent: Option<&'a dyn Shape>,
+    /// The particles, opaque or transmissive; all other shapes are opaque.
+    pub(super) particles: Option<&'a dyn Shape>,
+    pub(super) interior: Interior,
+}
+
+impl<'a> SceneShapes<'a> {
+    pub(super) fn new(
+        shapes: Vec<&'a dyn Shape>,
+        scene: &Scene,
+        source: &dyn ShadeSource,
+        integrator: IntegratorKind,
+    ) -> Self {
+        let finish = |shape: &&dyn Shape| scene.material(shape.material()).finish;
+        let is_soft = |shape: &&dyn Shape| {
+            integrator == IntegratorKind::Path && finish(shape) == Finish::Foam
+        };
+        let (spray, shapes): (Vec<_>, Vec<_>) = shapes.into_iter().partition(is_soft);
+        let is_pane = |shape: &&dyn Shape| finish(shape) == Finish::Pane;
+        let (panes, shapes): (Vec<_>, Vec<_>) = shapes.into_iter().partition(is_pane);
+        // Find the particles and the kind of their interior
+        let is_particles = |shape: &&&dyn Shape| shape.material() == MaterialId::PARTICLES;
+        let particles = shapes.iter().find(is_particles).copied();
+        let is_connected = particles.is_some_and(|shape| shape.is_connected());
+        let interior = Interior::of(scene.particle_material(), is_connected);
+        // Only opaque spheres fade out: transmissive ones and connected bodies have an inside
+        let has_opacity = source.is_translucent() && interior == Interior::Opaque && !is_connected;
+        let is_translucent =
+            |shape: &&dyn Shape| has_opacity && shape.material() == MaterialId::PARTICLES;
+        let (translucent, shapes): (Vec<_>, Vec<_>) = shapes.into_iter().partition(is_translucent);
+        Self {
+            part_colors: part_colors(scene, &shapes),
+            solid: shapes,
+            panes,
+            soft_spray: spray.first().copied(),
+            translucent: translucent.first().copied(),
+            particles,
+            interior,
+        }
+    }
+
+    /// The particles, if they bound one connected body.
+    pub(super) fn connected_particles(&self) -> Option<&'a dyn Shape> {
+        self.particles.filter(|shape| shape.is_connected())
+    }
+}
