@@ -39,7 +39,7 @@ pub(super) fn scene(
         reach: extent.reach,
         up,
         origin: survey.origin,
-        has_layer: survey.rests_on_floor(up),
+        has_layer: survey.rests_on_ground(up),
         is_of_earlier_version: survey.standing.is_none(),
         lowest: survey.lowest,
     };

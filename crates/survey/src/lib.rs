@@ -306,7 +306,7 @@ impl Survey {
 
     /// Whether particles lie on a floor at the lower end of the axis `up` at some time: a whole layer of them is at the
     /// lower end.
-    pub fn rests_on_floor(&self, up: DVec3) -> bool {
+    pub fn rests_on_ground(&self, up: DVec3) -> bool {
         if self.bottom_standing.is_some_and(|standing| standing >= STANDING) {
             return true;
         }

@@ -3,7 +3,7 @@
 use super::super::mattes;
 use super::{FrameSize, MemoryModel, MemoryNeed, Neighbours};
 use crate::denoise;
-use crate::render::{FloorBytes, floor_light_bytes};
+use crate::render::{GroundLightBytes, ground_light_bytes};
 use crate::scene::Ground;
 use crate::scene::ground::Pattern;
 use crate::surface::SurfaceKind;
@@ -168,8 +168,8 @@ impl MemoryModel<'_> {
     }
 
     /// Memory of the light on the ground.
-    fn floor(&self) -> FloorBytes {
-        floor_light_bytes(&self.setup.picture.scene, &self.setup.picture.render)
+    fn floor(&self) -> GroundLightBytes {
+        ground_light_bytes(&self.setup.picture.scene, &self.setup.picture.render)
     }
 
     /// After `tracing`: the frames before and after are usually done, except with several encoders, which are there

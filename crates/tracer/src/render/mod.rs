@@ -69,7 +69,7 @@ mod caustics_tests;
 #[cfg(test)]
 mod filter_tests;
 #[cfg(test)]
-mod floor_tests;
+mod ground_light_tests;
 #[cfg(test)]
 mod image_tests;
 #[cfg(test)]
@@ -105,7 +105,7 @@ pub use aov::{DataSample, NO_ID};
 pub use channels::{Channels, NamedChannel, UnknownChannel};
 pub use film::Film;
 pub use film_rows::FilmRows;
-pub use path::floor::FloorBytes;
+pub use path::ground::GroundLightBytes;
 pub use planes::FilmPlane;
 pub use ray_counts::RayCounts;
 pub use sampler::{FilmSampler, FilterKind, MAX_FILTER_WIDTH, MultiJitter, PathSeed, PixelFilter};
@@ -158,8 +158,8 @@ pub fn scratch_bytes(
 }
 
 /// Upper bounds of the memory for the light of photons and on the ground around transmissive particles.
-pub fn floor_light_bytes(scene: &Scene, settings: &RenderSettings) -> FloorBytes {
-    path::floor::bytes(scene, settings)
+pub fn ground_light_bytes(scene: &Scene, settings: &RenderSettings) -> GroundLightBytes {
+    path::ground::bytes(scene, settings)
 }
 
 /// Renders one image on the current rayon pool.

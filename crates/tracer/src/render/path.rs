@@ -37,12 +37,12 @@ mod ambient;
 mod catcher;
 pub(super) mod caustics;
 mod emission;
-pub(super) mod floor;
+pub(super) mod ground;
 mod light_channels;
 
 use ambient::AmbientLight;
 use catcher::Catcher;
-use floor::{Caustics, GroundLight};
+use ground::{Caustics, GroundLight};
 
 /// Number of diffuse reflections from which on paths end at random.
 const ROULETTE_START: u32 = 2;

@@ -3,7 +3,7 @@
 
 use glam::Vec3;
 
-use super::floor::PhotonMap;
+use super::ground::PhotonMap;
 use super::{PathIntegrator, Surface};
 use crate::render::near_photons::NearPhoton;
 use crate::render::scratch::PacketScratch;

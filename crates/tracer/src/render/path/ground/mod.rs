@@ -188,9 +188,9 @@ fn is_catcher(ground: &Ground) -> bool {
 }
 
 /// Upper bounds of the memory for the light of photons and of the sky.
-pub(in crate::render) fn bytes(scene: &Scene, settings: &RenderSettings) -> FloorBytes {
+pub(in crate::render) fn bytes(scene: &Scene, settings: &RenderSettings) -> GroundLightBytes {
     if !has_photons(scene, settings) {
-        return FloorBytes::default();
+        return GroundLightBytes::default();
     }
     // Caustics have one map, and one for each light group of several
     let emits = !scene.lights.is_empty();
@@ -223,8 +223,8 @@ pub(in crate::render) fn bytes(scene: &Scene, settings: &RenderSettings) -> Floo
     let has_surfaces = emits && has_opaque;
     let of_surfaces = if has_surfaces { photon_map::bytes(settings.photons) } else { 0 };
     match of_ground + of_surfaces {
-        0 => FloorBytes::default(),
-        stored => FloorBytes {
+        0 => GroundLightBytes::default(),
+        stored => GroundLightBytes {
             computing: stored + photons::bytes(has_surfaces),
             without_photons: dark + of_surfaces + photons::bytes(has_surfaces),
             kept: kept + of_surfaces,
@@ -234,7 +234,7 @@ pub(in crate::render) fn bytes(scene: &Scene, settings: &RenderSettings) -> Floo
 
 /// Memory for the light of photons and of the sky, bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct FloorBytes {
+pub struct GroundLightBytes {
     /// While it is computed, before the first tile.
     pub computing: u64,
     /// The same if no photon reaches the ground.
