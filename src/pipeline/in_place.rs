@@ -7,7 +7,7 @@ use spherule_formats::blocks::StoredLeaves;
 use spherule_formats::native::layout::RadiusIndex;
 use spherule_formats::native::{AttributeView, FrameIndex, NativeFile, NativeFrame, StoredType};
 use spherule_formats::sequence::Sequence;
-use spherule_formats::{FrameError, ScalarType, is_radius};
+use spherule_formats::{FrameError, ScalarType, SimulationCell, is_radius};
 
 use super::facts::{FileFacts, column_range};
 use super::load_error::{LoadError, missing, missing_value, no_parts};
@@ -196,6 +196,11 @@ impl StoredFrame {
         let count = usize::try_from(self.particles()).ok()?;
         let value = Value::named(name, &frame.attributes())?;
         column_range(&value.bind(|name| frame.attribute(name))?, count)
+    }
+
+    /// The simulation cell.
+    pub(super) fn cell(&self) -> Option<&SimulationCell> {
+        self.file.index().details.cell.as_ref()
     }
 
     /// Whether the file is mapped and not read.

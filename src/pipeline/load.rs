@@ -92,7 +92,7 @@ pub fn load_frame(
     let mut loaded = match opened.map_err(|e| newest(e, sequence, task))? {
         Opened::InPlace(frame, clamped_radii) => LoadedFrame {
             read: frame.particles(),
-            rods: rods_of(cell_style(setup), None, task.frame, &mut notes),
+            rods: rods_of(cell_style(setup), frame.cell(), task.frame, &mut notes),
             facts: frame.facts(setup, without_directory(&first_file(sequence, task.index))),
             time: sequence.listed_time(task.index).or(frame.time()),
             task: task.clone(),

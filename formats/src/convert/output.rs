@@ -6,7 +6,7 @@ use super::settings::{ConvertError, Phase, RadiusRule};
 use super::survey::{ConvertRequest, Survey};
 use crate::FrameError;
 use crate::native::{
-    FrameIndex, FrameSpec, FrameWriter, RadiusSpec, radius_range, smallest_encoding,
+    FrameDetails, FrameIndex, FrameSpec, FrameWriter, RadiusSpec, radius_range, smallest_encoding,
 };
 
 /// Writes ordered parts to the output frame.
@@ -118,6 +118,7 @@ impl<'a> FrameOutput<'a> {
             time: settings.time.or(source.time()),
             step: source.step(),
             dropped: source.count() - self.survey.count,
+            details: FrameDetails { labels: source.labels(), cell: source.cell() },
         };
         Ok(FrameWriter::create(path, spec).map_err(|e| FrameError::io(path, e))?)
     }

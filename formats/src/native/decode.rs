@@ -27,6 +27,8 @@ impl NativeFrame<'_> {
             attributes,
             time: self.index().time,
             step: self.index().step,
+            labels: self.index().details.labels.clone(),
+            cell: self.index().details.cell,
             ..RawParticles::default()
         })
     }
@@ -69,6 +71,8 @@ impl NativeFrame<'_> {
             attributes,
             time: self.index().time,
             step: self.index().step,
+            labels: self.index().details.labels.clone(),
+            cell: self.index().details.cell,
             ..RawParticles::default()
         })
     }

@@ -7,7 +7,9 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::write::{AttributeSpec, FrameSpec, FrameWriter, RadiusSpec, Run};
-use super::{Bound, Encoding, FrameIndex, RadiusRange, StoredType, arrange, wide_blocks};
+use super::{
+    Bound, Encoding, FrameDetails, FrameIndex, RadiusRange, StoredType, arrange, wide_blocks,
+};
 use crate::blocks::Block;
 use crate::names::RADIUS;
 use crate::order::kd;
@@ -93,6 +95,7 @@ fn store_checked(
         time: frame.time,
         step,
         dropped: frame.dropped,
+        details: FrameDetails { cell: frame.cell, ..FrameDetails::default() },
     };
     // Write it
     let values: Vec<Vec<u8>> = kept.iter().map(|a| in_order(a, &indices)).collect();

@@ -5,24 +5,25 @@
 //!   8  u32 version, 2             12  u32 length of this header, 64
 //!  16  u64 length of the file
 //!  24  u64 offset of the index    32  u64 length of the index   40  u64 xxh3 of the index
-//!  48  u64 zero                   56  u64 xxh3 of bytes 0..56
+//!  48  u64 length of the details  56  u64 xxh3 of bytes 0..56
 //!  64  sections of plain numbers, each at a multiple of 64, zeros between
-//!      index (rkyv), last, up to the end of the file
+//!      index: details (JSON, padded with spaces to a multiple of 16), then the rest (rkyv), up to the end of the file
 //! ```
 //!
 //! Opening reads only the header and the index, whatever the particle count. No number in a file is trusted:
 //! lengths follow from counts by checked arithmetic, and each section must end before the index.
 
-use std::fmt;
 use std::str::FromStr;
+use std::{fmt, io};
 
 use rkyv::rancor;
 use rkyv::util::AlignedVec;
+use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::xxh3_64;
 
 use super::stored::{RadiusCode, StoredType};
 use crate::blocks::{BLOCK_SIZE, Block, Node, Q10Block, Q16Block, WIDTH};
-use crate::{ParseError, ValueError};
+use crate::{Labels, ParseError, SimulationCell, ValueError};
 
 /// The first bytes of every native frame.
 pub const MAGIC: &[u8; 8] = b"SPHERULE";
@@ -152,6 +153,24 @@ pub struct AttributeIndex {
     pub section: Section,
 }
 
+/// Alignment of the part of the index after the details, bytes.
+const INDEX_ALIGN: usize = 16;
+
+/// Maximum length of the details of a frame, bytes: names of half a million values.
+const MAX_DETAILS: usize = 16 << 20;
+
+/// What a frame has beside its particles. Frames of earlier versions have none.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FrameDetails {
+    /// Names of parts and of other values.
+    #[serde(default, skip_serializing_if = "Labels::is_empty")]
+    pub labels: Labels,
+    /// The simulation cell, if known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cell: Option<SimulationCell>,
+}
+
 /// The index: the contents of a native frame and their places.
 #[derive(Debug, Clone, PartialEq, rkyv::Archive, rkyv::Serialize, rkyv::Deserialize)]
 pub struct FrameIndex {
@@ -189,6 +208,9 @@ pub struct FrameIndex {
     pub step: Option<i64>,
     /// Particles that the conversion dropped because they were not finite.
     pub dropped: u64,
+    /// What it has beside the particles.
+    #[rkyv(with = rkyv::with::Skip)]
+    pub details: FrameDetails,
 }
 
 /// Order code: k-d cuts inside runs of a space-filling curve, at whole nodes.
@@ -245,8 +267,31 @@ pub const fn blocks_of(count: u64) -> u64 {
     count.div_ceil(BLOCK_SIZE as u64)
 }
 
-/// The header of a file of `file_len` bytes that ends in `index`.
-pub fn header(file_len: u64, index_offset: u64, index: &[u8]) -> [u8; HEADER_LEN] {
+/// The bytes of `index`, and how many of them are details.
+///
+/// # Errors
+/// The details are too long.
+pub fn index_bytes(index: &FrameIndex) -> io::Result<(Vec<u8>, usize)> {
+    let mut bytes = match &index.details {
+        none if *none == FrameDetails::default() => Vec::new(),
+        details => serde_json::to_vec(details)?,
+    };
+    bytes.resize(bytes.len().next_multiple_of(INDEX_ALIGN), b' ');
+    let details = bytes.len();
+    if details > MAX_DETAILS {
+        return Err(io::Error::new(
+            io::ErrorKind::InvalidInput,
+            format!(
+                "the names of values have {details} bytes, but at most {MAX_DETAILS} are possible"
+            ),
+        ));
+    }
+    bytes.extend_from_slice(&rkyv::to_bytes::<rancor::Error>(index).map_err(io::Error::other)?);
+    Ok((bytes, details))
+}
+
+/// The header of a file of `file_len` bytes that ends in `index`, whose first bytes are so many `details`.
+pub fn header(file_len: u64, index_offset: u64, index: &[u8], details: usize) -> [u8; HEADER_LEN] {
     let mut header = [0; HEADER_LEN];
     header[0..8].copy_from_slice(MAGIC);
     header[8..12].copy_from_slice(&VERSION.to_le_bytes());
@@ -255,6 +300,7 @@ pub fn header(file_len: u64, index_offset: u64, index: &[u8]) -> [u8; HEADER_LEN
     header[24..32].copy_from_slice(&index_offset.to_le_bytes());
     header[32..40].copy_from_slice(&(index.len() as u64).to_le_bytes());
     header[40..48].copy_from_slice(&xxh3_64(index).to_le_bytes());
+    header[48..56].copy_from_slice(&(details as u64).to_le_bytes());
     let sum = xxh3_64(&header[..56]);
     header[56..64].copy_from_slice(&sum.to_le_bytes());
     header
@@ -266,8 +312,9 @@ pub fn header(file_len: u64, index_offset: u64, index: &[u8]) -> [u8; HEADER_LEN
 /// [`ParseError::Malformed`] for a damaged or truncated file, [`ParseError::Unsupported`] for another version
 /// or encoding.
 pub fn parse(bytes: &[u8]) -> Result<FrameIndex, ParseError> {
-    let index = index_range(bytes)?;
-    let (offset, index) = (index.start, &bytes[index]);
+    let range = index_range(bytes)?;
+    let offset = range.start;
+    let (details, index) = divided(bytes, range)?;
     // rkyv needs an alignment that a slice does not guarantee; the index is small enough to copy.
     let mut aligned = AlignedVec::<16>::with_capacity(index.len());
     aligned.extend_from_slice(index);
@@ -275,10 +322,31 @@ pub fn parse(bytes: &[u8]) -> Result<FrameIndex, ParseError> {
         ParseError::malformed(offset, format!("the index is damaged: {e}; convert it again"))
     };
     let archived = rkyv::access::<ArchivedFrameIndex, rancor::Error>(&aligned).map_err(damaged)?;
-    let index = rkyv::deserialize::<FrameIndex, rancor::Error>(archived).map_err(damaged)?;
+    let mut index = rkyv::deserialize::<FrameIndex, rancor::Error>(archived).map_err(damaged)?;
+    if !details.is_empty() {
+        index.details = serde_json::from_slice(details).map_err(|e| {
+            let what = format!("the names of values are damaged: {e}; convert it again");
+            ParseError::malformed(offset, what)
+        })?;
+    }
+    let is_cell =
+        |c: SimulationCell| SimulationCell::new(c.origin, c.vectors, c.periodic).is_some();
+    if !index.details.cell.is_none_or(is_cell) {
+        return Err(ParseError::malformed(offset, "the cell is not finite; convert it again"));
+    }
     let again = |error: ParseError| error.map_message(|what| format!("{what}; convert it again"));
     check_index(&index, offset).map_err(again)?;
     Ok(index)
+}
+
+/// The details and the rest of the index, which is at `range` in `bytes`.
+fn divided(bytes: &[u8], range: std::ops::Range<usize>) -> Result<(&[u8], &[u8]), ParseError> {
+    let index = &bytes[range];
+    let len = bytes.first_chunk().and_then(|header| usize::try_from(word(header, 48)).ok());
+    let fits = |len: &usize| len.is_multiple_of(INDEX_ALIGN) && *len <= MAX_DETAILS;
+    len.filter(fits).and_then(|len| index.split_at_checked(len)).ok_or_else(|| {
+        ParseError::malformed(48, "the length of the details is wrong; convert it again")
+    })
 }
 
 /// The number at byte `at` of the header.

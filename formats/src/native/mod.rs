@@ -29,7 +29,7 @@ pub use attribute::AttributeView;
 pub use bound::Bound;
 pub(crate) use frame::radius_range;
 pub use frame::{StoreSettings, smallest_encoding, store, write};
-pub use layout::{Encoding, FrameIndex, MAGIC};
+pub use layout::{Encoding, FrameDetails, FrameIndex, MAGIC};
 pub(crate) use map::read as read_aligned;
 pub use map::{Access, MappedFile, NativeFile};
 pub use quantize::arrange;

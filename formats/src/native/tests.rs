@@ -8,7 +8,10 @@ use glam::{DVec3, Vec3};
 
 use super::layout::{RadiiIndex, RadiusIndex};
 use super::*;
-use crate::{Attribute, AttributeData, FrameError, ParticleFrame, Positions, Radius, RawParticles};
+use crate::{
+    Attribute, AttributeData, FrameError, Labels, ParticleFrame, Positions, Radius, RawParticles,
+    SimulationCell,
+};
 
 /// Miri is too slow to try every byte.
 const STRIDE: usize = if cfg!(miri) { 37 } else { 1 };
@@ -208,14 +211,58 @@ fn forged(change: impl FnOnce(&mut FrameIndex)) -> ParseError {
 
 /// Reads `whole` with another index and correct checksums.
 fn forge(whole: &[u8], index: &FrameIndex) -> Result<RawParticles, ParseError> {
-    let index = rkyv::to_bytes::<rkyv::rancor::Error>(index).expect("memory");
+    let (index, details) = layout::index_bytes(index).expect("memory");
+    forge_bytes(whole, &index, details)
+}
+
+/// Reads `whole` with other bytes of the index, of which so many are details.
+fn forge_bytes(whole: &[u8], index: &[u8], details: usize) -> Result<RawParticles, ParseError> {
     let offset = 24..32;
     let offset = u64::from_le_bytes(whole[offset].try_into().expect("8 bytes"));
     let mut forged = whole[..usize::try_from(offset).expect("small")].to_vec();
-    forged.extend_from_slice(&index);
-    let header = layout::header(forged.len() as u64, offset, &index);
+    forged.extend_from_slice(index);
+    let header = layout::header(forged.len() as u64, offset, index, details);
     forged[..layout::HEADER_LEN].copy_from_slice(&header);
     read_back(&forged)
+}
+
+#[test]
+fn names_of_values_and_the_cell_are_kept() {
+    let whole = bytes(&frame(17, DVec3::ZERO));
+    let mut index = layout::parse(&whole).expect("whole");
+    assert_eq!(index.details, FrameDetails::default());
+    let vectors = [DVec3::X, DVec3::new(0.1, 2.0, 0.0), DVec3::new(0.0, 1e-3, 1.0 / 3.0)];
+    let cell = SimulationCell::new(DVec3::splat(-0.1), vectors, [true, false, true]);
+    let names = [(-3, "wall \"a\"\n".to_owned()), (i64::MAX, "é".to_owned())];
+    let labels = Labels::from([("part".to_owned(), names.into())]);
+    index.details = FrameDetails { labels: labels.clone(), cell };
+    let raw = forge(&whole, &index).expect("valid");
+    assert_eq!((raw.labels, raw.cell), (labels, cell));
+}
+
+#[test]
+fn damaged_details_are_an_error() {
+    let whole = bytes(&frame(17, DVec3::ZERO));
+    let index = layout::parse(&whole).expect("whole");
+    let (rest, _) = layout::index_bytes(&index).expect("memory");
+    let far = "{\"cell\":{\"origin\":[0,0,0],\"vectors\":[[1e308,0,0],[1e308,1,0],[0,0,1]],\"periodic\":[true,true,true]}}";
+    for (details, message) in [
+        ("{\"labels\":{\"part\":{\"x\":\"a\"}}}", "names of values are damaged"),
+        ("{\"lables\":{}}", "names of values are damaged"),
+        (&"[".repeat(4096)[..], "names of values are damaged"),
+        (far, "cell"),
+    ] {
+        let mut bytes = details.as_bytes().to_vec();
+        bytes.resize(bytes.len().next_multiple_of(16), b' ');
+        let len = bytes.len();
+        bytes.extend_from_slice(&rest);
+        let error = forge_bytes(&whole, &bytes, len).expect_err("a lie").to_string();
+        assert!(error.contains(message) && error.contains("convert it again"), "{error}");
+    }
+    for len in [1, 16, rest.len() + 16, usize::MAX] {
+        let error = forge_bytes(&whole, &rest, len).expect_err("a lie");
+        assert!(matches!(error, ParseError::Malformed { .. }), "{len}: {error}");
+    }
 }
 
 #[test]

@@ -18,8 +18,6 @@ use crate::blocks::{
 };
 use spherule_files::one_line;
 
-/// Reserved header bytes, zero in this version.
-const RESERVED: std::ops::Range<usize> = 48..56;
 /// Nodes that one task checks.
 const TASK: usize = 64;
 
@@ -85,11 +83,7 @@ impl NativeFrame<'_> {
 
     /// Checks that sections do not overlap and that all bytes between them are zero.
     fn verify_padding(&self) -> Result<(), ParseError> {
-        let (bytes, index) = (self.bytes(), self.index());
-        // Check the reserved bytes of the header
-        if bytes.get(RESERVED).is_none_or(|b| b.iter().any(|b| *b != 0)) {
-            return Err(fault(RESERVED.start as u64, "the header has numbers where zeros belong"));
-        }
+        let index = self.index();
         // Check the gaps between sections in file order
         let mut sections = index.sections();
         sections.retain(|(_, section)| section.len > 0);

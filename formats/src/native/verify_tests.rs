@@ -66,11 +66,11 @@ fn forged(bytes: &[u8], harm: impl FnOnce(&mut FrameIndex, &mut [u8])) -> Vec<u8
         sum(&mut attribute.section);
     }
     // Replace the index and the header
-    let packed = rkyv::to_bytes::<rkyv::rancor::Error>(&index).expect("memory");
+    let (packed, details) = layout::index_bytes(&index).expect("memory");
     let offset = u64::from_le_bytes(bytes[24..32].try_into().expect("8 bytes"));
     bytes.truncate(usize::try_from(offset).expect("small"));
     bytes.extend_from_slice(&packed);
-    let header = layout::header(bytes.len() as u64, offset, &packed);
+    let header = layout::header(bytes.len() as u64, offset, &packed, details);
     bytes[..HEADER_LEN].copy_from_slice(&header);
     bytes
 }

@@ -6,12 +6,11 @@ use std::path::Path;
 
 use glam::DVec3;
 use glam::Vec3;
-use rkyv::rancor;
 use spherule_files::Publisher;
 
 use super::layout::{
-    ALIGN, AttributeIndex, Encoding, FrameIndex, HEADER_LEN, ORDER_KD, RadiiIndex, RadiusIndex,
-    Section, UP_Y, blocks_of, header, nodes_len, positions_len,
+    ALIGN, AttributeIndex, Encoding, FrameDetails, FrameIndex, HEADER_LEN, ORDER_KD, RadiiIndex,
+    RadiusIndex, Section, UP_Y, blocks_of, header, index_bytes, nodes_len, positions_len,
 };
 use super::quantize::{EncodeLimits, EncodedLeaves, GROUP, StoredBlock, encode};
 use super::radii::CodedRadii;
@@ -45,6 +44,8 @@ pub struct FrameSpec {
     pub step: Option<i64>,
     /// Particles that were dropped because they were not finite.
     pub dropped: u64,
+    /// What the frame has beside the particles.
+    pub details: FrameDetails,
 }
 
 /// The radii of a frame that will be written.
@@ -179,7 +180,7 @@ impl FrameWriter {
         };
         // Write the index behind them
         let index = index_of(&self.spec, &measured, &sections);
-        let bytes = rkyv::to_bytes::<rancor::Error>(&index).map_err(io::Error::other)?;
+        let (bytes, details) = index_bytes(&index)?;
         let end = index.wide.offset + index.wide.len;
         let offset = end.next_multiple_of(ALIGN);
         // The gap between the sections and the index is a hole in the file, which reads as zeros.
@@ -187,7 +188,7 @@ impl FrameWriter {
         filled.file.write_all(&bytes)?;
         // Write the header and publish the file
         let file_len = offset + bytes.len() as u64;
-        let header = header(file_len, offset, &bytes);
+        let header = header(file_len, offset, &bytes, details);
         filled.file.rewind()?;
         filled.file.write_all(&header)?;
         filled.file.commit()?;
@@ -332,6 +333,7 @@ fn index_of(spec: &FrameSpec, measured: &FrameSummary, sections: &[Section]) -> 
         time: spec.time,
         step: spec.step,
         dropped: spec.dropped,
+        details: spec.details.clone(),
     }
 }
 

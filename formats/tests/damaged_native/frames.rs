@@ -50,7 +50,7 @@ impl Stored {
         let start = self.index_range().start;
         let mut bytes = self.bytes[..start].to_vec();
         bytes.extend_from_slice(index);
-        let header = layout::header(bytes.len() as u64, start as u64, index);
+        let header = layout::header(bytes.len() as u64, start as u64, index, 0);
         bytes[..layout::HEADER_LEN].copy_from_slice(&header);
         bytes
     }

@@ -23,7 +23,7 @@ fn repaired(bytes: &[u8]) -> Option<Vec<u8>> {
     let stated = u64::from_le_bytes(*bytes.get(24..)?.first_chunk()?);
     let index = bytes.get(usize::try_from(stated).ok()?..)?;
     let (_, body) = bytes.split_at_checked(layout::HEADER_LEN)?;
-    let header = layout::header(bytes.len() as u64, stated, index);
+    let header = layout::header(bytes.len() as u64, stated, index, 0);
     bytes.starts_with(MAGIC).then(|| [&header, body].concat())
 }
 

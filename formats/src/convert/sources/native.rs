@@ -8,7 +8,7 @@ use crate::convert::{ParticleSource, SourceAttribute};
 use crate::names::RADIUS;
 use crate::native::layout::RadiusIndex;
 use crate::native::{NativeFile, StoredType};
-use crate::{FrameError, ParseError, ScalarType};
+use crate::{FrameError, Labels, ParseError, ScalarType, SimulationCell};
 
 /// A native frame that is mapped or read.
 #[derive(Debug)]
@@ -84,6 +84,14 @@ impl ParticleSource for NativeSource<'_> {
 
     fn step(&self) -> Option<i64> {
         self.file.index().step
+    }
+
+    fn cell(&self) -> Option<SimulationCell> {
+        self.file.index().details.cell
+    }
+
+    fn labels(&self) -> Labels {
+        self.file.index().details.labels.clone()
     }
 
     fn read_positions(&self, first: u64, to: &mut [DVec3]) -> Result<(), FrameError> {

@@ -7,7 +7,10 @@ use glam::DVec3;
 
 use super::places;
 use crate::convert::{ParticleSource, SourceAttribute};
-use crate::{Attribute, FrameError, PositionSlice, Positions, RawParticles};
+use crate::native::FrameDetails;
+use crate::{
+    Attribute, FrameError, Labels, PositionSlice, Positions, RawParticles, SimulationCell,
+};
 use spherule_frame::with_values;
 
 /// A step that is completely in memory.
@@ -18,6 +21,7 @@ pub struct RawSource<'a> {
     raw_attributes: &'a [Attribute],
     time: Option<f64>,
     step: Option<i64>,
+    details: FrameDetails,
     attributes: Vec<SourceAttribute>,
 }
 
@@ -75,6 +79,7 @@ impl<'a> RawSource<'a> {
             raw_attributes: &raw.attributes,
             time: raw.time,
             step: raw.step,
+            details: FrameDetails { labels: raw.labels.clone(), cell: raw.cell },
             attributes: attributes.collect(),
         })
     }
@@ -99,6 +104,14 @@ impl ParticleSource for RawSource<'_> {
 
     fn step(&self) -> Option<i64> {
         self.step
+    }
+
+    fn cell(&self) -> Option<SimulationCell> {
+        self.details.cell
+    }
+
+    fn labels(&self) -> Labels {
+        self.details.labels.clone()
     }
 
     fn read_positions(&self, first: u64, to: &mut [DVec3]) -> Result<(), FrameError> {
