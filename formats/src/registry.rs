@@ -31,6 +31,8 @@ const FORMATS: &[Format] = &[
     dcd::FORMAT,
     amber::FORMAT,
     rst7::FORMAT,
+    // Before PDB, whose records may begin a file of this format
+    pdb::PQR,
     pdb::FORMAT,
     mmcif::FORMAT,
     usd::FORMAT,

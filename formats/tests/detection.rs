@@ -22,6 +22,7 @@ fn molecular_files_are_known_by_their_content() {
         ("fixed.dcd", dcd::FORMAT),
         ("offset64.nc", amber::FORMAT),
         ("models.pdb", pdb::FORMAT),
+        ("charges.pqr", pdb::PQR),
         ("models.cif", mmcif::FORMAT),
         ("custom.lammpsbin", lammps::BINARY),
     ] {

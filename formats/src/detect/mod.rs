@@ -64,7 +64,7 @@ fn refuse_foreign(head: &[u8], path: &Path, named: Option<Format>) -> Result<(),
         let what = "an HDF5 file, and this program was built without the feature `hdf5`";
         return Err(ParseError::unsupported(what));
     }
-    if let Some(what) = is_text(head).then(|| text::what(head, path)).flatten() {
+    if let Some(what) = is_text(head).then(|| text::what(head)).flatten() {
         return Err(ParseError::unsupported(what));
     }
     // Two or three bytes of raw floats may look like any short signature.
@@ -93,7 +93,9 @@ fn opening(head: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::read::{bgeo, bi4, csv, gsd, houdini, lammps, npy, ply, usd, vtk, vtk_xml, xyz};
+    use crate::read::{
+        bgeo, bi4, csv, gsd, houdini, lammps, npy, pdb, ply, usd, vtk, vtk_xml, xyz,
+    };
 
     #[track_caller]
     fn detect(name: &str, bytes: &[u8]) -> Format {
@@ -149,6 +151,35 @@ mod tests {
         assert_eq!(detect("a.csv", b"\xef\xbb\xbfx,y,z\n"), csv::FORMAT);
         refused("README.txt", b"these are\nsome words\n", "no particle format");
         refused("a.dat", &[0, 1, 2, 3], "bytes 00 01 02 03");
+    }
+
+    #[test]
+    fn files_of_pdb_and_pqr_are_told_apart() {
+        let words = "ATOM 1 N ALA 1 1.5 2.5 3.5 -0.3 1.85\n";
+        let pqr = "ATOM      1  N   MET     1      26.017  13.289  84.371  0.1592 1.8240\n";
+        let shifted = "ATOM      1  N   MET     1      26.017   13.289   84.371  0.1592 1.8240\n";
+        for atom in [words, pqr, shifted] {
+            for text in [atom, &format!("HEADER    A TITLE\nREMARK   1 A NOTE\n{atom}")] {
+                for name in ["a", "a.pqr", "a.pdb", "a.xyz", "a.txt"] {
+                    assert_eq!(detect(name, text.as_bytes()), pdb::PQR, "{name}: {text}");
+                }
+            }
+        }
+        // Where occupancy and temperature factor may be charge and radius, the name decides
+        let old = "ATOM      1  N   ALA A   1      11.104   6.134  -6.504  1.00  0.00\n";
+        assert_eq!(detect("a.pqr", old.as_bytes()), pdb::PQR);
+        let atom =
+            "ATOM      1  N   ALA A   1      11.104   6.134  -6.504  1.00  0.00           N\n";
+        for name in ["a", "a.pdb", "a.ent", "a.txt"] {
+            assert_eq!(detect(name, old.as_bytes()), pdb::FORMAT, "{name}");
+            assert_eq!(detect(name, atom.as_bytes()), pdb::FORMAT, "{name}");
+        }
+        assert_eq!(detect("a.pqr", atom.as_bytes()), pdb::FORMAT);
+        // The atoms may be behind the bytes that are examined
+        let remarks = "REMARK   1 what the program did to get charges, at some length\n".repeat(80);
+        assert_eq!(detect("a.PQR", format!("{remarks}{words}").as_bytes()), pdb::PQR);
+        assert_eq!(detect("a.pdb", remarks.as_bytes()), pdb::FORMAT);
+        refused("a.pqr", b"x,y,z\n1,2,3\n", "named like a pqr file");
     }
 
     #[test]

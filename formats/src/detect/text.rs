@@ -1,7 +1,5 @@
 //! Text formats that are known but not read, recognised by the structure of their first lines.
 
-use std::path::Path;
-
 use crate::read::psf;
 use crate::read::text::{integer, number, words};
 
@@ -76,27 +74,13 @@ const FORMATS: &[TextFormat] = &[
         is_dl_poly,
         "a DL_POLY file (CONFIG, REVCON or HISTORY), which is not read; write .xyz or .dcd with ASE, VMD or MDAnalysis",
     ),
-    (is_pqr, PQR),
 ];
 
-const PQR: &str = "a PQR file, which is not read; write a table x,y,z,radius (.csv), or .pdb";
-
-/// The message for `head`, the beginning of the file `path`, if that is one of the formats.
-pub(super) fn what(head: &[u8], path: &Path) -> Option<&'static str> {
+/// The message for `head`, the beginning of a file, if that is one of the formats.
+pub(super) fn what(head: &[u8]) -> Option<&'static str> {
     let lines: Vec<&[u8]> =
         head.split(|b| *b == b'\n').map(|line| line.strip_suffix(b"\r").unwrap_or(line)).collect();
-    let format = FORMATS.iter().find(|(is_one, _)| is_one(&lines));
-    let is_named_pqr = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("pqr"));
-    format
-        .map(|(_, what)| *what)
-        .or_else(|| (is_named_pqr && has_only_remarks(&lines)).then_some(PQR))
-}
-
-/// Whether the atoms come later: what writes PQR files may put long remarks before them.
-fn has_only_remarks(lines: &Lines<'_>) -> bool {
-    let (_, whole) = lines.split_last().unwrap_or((&&b""[..], &[]));
-    let is_remark = |line: &&[u8]| line.is_empty() || line.starts_with(b"REMARK");
-    whole.iter().all(is_remark)
+    FORMATS.iter().find(|(is_one, _)| is_one(&lines)).map(|(_, what)| *what)
 }
 
 fn first(lines: &Lines<'_>, is_one: impl Fn(&[u8]) -> bool) -> bool {
@@ -244,23 +228,10 @@ fn is_dl_poly(lines: &Lines<'_>) -> bool {
     is_history || (edges && is_name && has_numbers(lines.get(atom + 1), 3))
 }
 
-/// Atom lines as in PDB files, but separated by spaces; they end with x, y, z, charge and radius.
-fn is_pqr(lines: &Lines<'_>) -> bool {
-    let is_atom = |line: &&&[u8]| line.starts_with(b"ATOM ") || line.starts_with(b"HETATM ");
-    let has_places = |line: &[u8]| {
-        let mut fields = [30, 38, 46].into_iter().map(|start| line.get(start..start + 8));
-        fields.all(|field| field.is_some_and(|field| number(field.trim_ascii()).is_some()))
-    };
-    let is_pqr_atom = |line: &[u8]| {
-        let words: Vec<&[u8]> = words(line).take(12).collect();
-        let real = words.iter().rev().take_while(|word| number(word).is_some());
-        matches!(words.len(), 10 | 11) && real.count() >= 5 && !has_places(line)
-    };
-    lines.iter().find(is_atom).is_some_and(|line| is_pqr_atom(line))
-}
-
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::*;
 
     /// Whatever the name, the file is refused with `hint`.
@@ -321,26 +292,6 @@ mod tests {
             &format!("a title\n 0 1 2 3 26\ntimestep 1 2 0 1 0.001\n{cell}Na 1 22.9 1.0\n 1 2 3\n"),
             "DL_POLY",
         );
-        suggests("ATOM 1 N ALA 1 1.5 2.5 3.5 -0.3 1.85\n", "PQR");
-        let shifted = "ATOM      1  N   MET     1      26.017   13.289   84.371  0.1592 1.8240\n";
-        suggests(shifted, "PQR");
-    }
-
-    #[test]
-    fn long_remarks_are_those_of_the_format_in_the_name() {
-        let remarks =
-            "REMARK   1 written by a program that describes all that it did to get charges\n"
-                .repeat(60);
-        let text = format!("{remarks}ATOM 1 N ALA 1 1.5 2.5 3.5 -0.3 1.85\n");
-        for name in ["a.pqr", "a.PQR"] {
-            let error = crate::detect::detect_format(text.as_bytes(), Path::new(name))
-                .expect_err("refused");
-            assert!(error.to_string().contains("PQR"), "{error}");
-        }
-        let pdb = crate::detect::detect_format(text.as_bytes(), Path::new("a.pdb"));
-        assert_eq!(pdb.map(|format| format.name()), Ok("pdb"));
-        let other = crate::detect::detect_format(b"x,y,z\n1,2,3\n", Path::new("a.pqr"));
-        assert_eq!(other.map(|format| format.name()), Ok("csv"));
     }
 
     #[test]
@@ -361,7 +312,7 @@ mod tests {
             "ATOM      1  N   ALA A   1      11.104   6.134  -6.504  1.00  0.00           N\n",
             "",
         ] {
-            assert_eq!(what(text.as_bytes(), Path::new("a")), None, "{text}");
+            assert_eq!(what(text.as_bytes()), None, "{text}");
         }
     }
 }

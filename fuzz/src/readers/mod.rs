@@ -23,7 +23,7 @@ pub use packed::{compressed, houdini, npz, open};
 pub type Target = fn(&[u8]) -> usize;
 
 /// Every target by the name of its folder in `corpus`.
-pub const TARGETS: [(&str, Target); 30] = [
+pub const TARGETS: [(&str, Target); 31] = [
     ("vtk", vtk),
     ("vtk_xml", vtk_xml),
     ("bgeo", bgeo),
@@ -43,6 +43,7 @@ pub const TARGETS: [(&str, Target); 30] = [
     ("amber", amber),
     ("rst7", rst7),
     ("pdb", pdb),
+    ("pqr", pqr),
     ("mmcif", mmcif),
     ("lammps_binary", lammps_binary),
     ("usd", usd),
@@ -158,6 +159,11 @@ pub fn rst7(bytes: &[u8]) -> usize {
 /// Protein Data Bank files.
 pub fn pdb(bytes: &[u8]) -> usize {
     read_all(read::pdb::FORMAT, bytes, 1)
+}
+
+/// PQR.
+pub fn pqr(bytes: &[u8]) -> usize {
+    read_all(read::pdb::PQR, bytes, 1)
 }
 
 /// mmCIF.

@@ -10,8 +10,17 @@ pub(super) type ModulePath = Vec<String>;
 pub(super) fn files(source: &Path) -> Vec<(ModulePath, String)> {
     let mut found = Vec::new();
     collect(source, &[], &mut found);
+    let for_tests: Vec<ModulePath> = found.iter().flat_map(test_modules).collect();
+    found.retain(|(module, _)| !for_tests.iter().any(|path| module.starts_with(path)));
     found.sort();
     found
+}
+
+/// The modules that `code` declares for tests alone, in files of their own.
+fn test_modules((module, code): &(ModulePath, String)) -> Vec<ModulePath> {
+    let declarations = code.split("#[cfg(test)]\nmod ").skip(1);
+    let names = declarations.filter_map(|rest| rest.lines().next()?.strip_suffix(';'));
+    names.map(|name| [&module[..], &[name.to_owned()]].concat()).collect()
 }
 
 fn collect(dir: &Path, parents: &[String], found: &mut Vec<(ModulePath, String)>) {

@@ -3,7 +3,7 @@
 //!
 //! `tests/damaged` holds the files and `table.tsv`, a line for each: the name, then text that
 //! the error must have, or `reads K kept D dropped`. `SPHERULE_BLESS=1` writes the files anew
-//! from `make.rs`; the table is written by hand.
+//! from the module `make`; the table is written by hand.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -37,6 +37,7 @@ readers! {
     dcd_reader: dcd::FORMAT, "fixed.dcd";
     amber_reader: amber::FORMAT, "offset64.nc";
     pdb_reader: pdb::FORMAT, "models.pdb";
+    pqr_reader: pdb::PQR, "charges.pqr";
     mmcif_reader: mmcif::FORMAT, "models.cif";
     lammps_reader: lammps::BINARY, "custom.lammpsbin";
 }

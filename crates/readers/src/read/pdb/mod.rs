@@ -1,7 +1,9 @@
 //! Protein Data Bank files: the positions of their atoms, one or many models.
 //!
 //! Text with fixed columns: each line is a record that begins with its name. Models are between `MODEL` and `ENDMDL`,
-//! or end with `END`. Lengths are A. After version 3.3 of the format.
+//! or end with `END`. Lengths are A. After version 3.3 of the format. `pqr.rs` has the variant with charges and radii.
+
+mod pqr;
 
 use super::atoms::{self, AtomTable, ELEMENT, RESIDUE, coordinate, field};
 use super::beads::Beads;
@@ -16,7 +18,31 @@ use spherule_frame::{MemoryBudget, ParseError, RawParticles, SimulationCell, nam
 /// Protein Data Bank files.
 pub const FORMAT: Format = Format::new(&Pdb);
 
+pub use pqr::FORMAT as PQR;
+
 struct Pdb;
+
+/// How a format writes its atoms.
+struct Records {
+    is_atom: fn(Line<'_>) -> bool,
+    atom: for<'a> fn(Line<'a>) -> Result<Atom<'a>, ParseError>,
+    /// Names of the two real numbers of an atom.
+    real: [&'static str; 2],
+}
+
+const RECORDS: Records = Records { is_atom, atom, real: ["occupancy", "b_factor"] };
+
+/// What the record of an atom says.
+struct Atom<'a> {
+    position: [f64; 3],
+    real: [f64; 2],
+    residue_number: i64,
+    symbol: &'a [u8],
+    name: &'a [u8],
+    residue: &'a [u8],
+    chain: &'a [u8],
+    segment: &'a [u8],
+}
 
 /// Names of records that files begin with.
 const OPENINGS: [&[u8]; 10] = [
@@ -38,12 +64,15 @@ impl Reader for Pdb {
             .clone()
             .next()
             .is_some_and(|line| OPENINGS.iter().any(|name| line.text.starts_with(name)));
-        let is_sure = head.starts_with(b"HEADER    ")
-            || lines.any(|line| is_atom(line) && position(line).is_ok());
-        Ok(match (is_sure, opens) {
-            (true, true) => Confidence::Signature,
-            (true, false) => Confidence::Likely,
-            (false, _) => Confidence::IfNamed,
+        // Records without elements may also be those of a PQR file, if its name says so
+        let is_sure_atom =
+            |line| is_atom(line) && position(line).is_ok() && pqr::words_of_atom(line).is_none();
+        let is_sure = head.starts_with(b"HEADER    ") || lines.clone().any(is_sure_atom);
+        let is_likely = is_sure || lines.any(|line| is_atom(line) && position(line).is_ok());
+        Ok(match () {
+            () if is_sure && opens => Confidence::Signature,
+            () if is_likely => Confidence::Likely,
+            () => Confidence::IfNamed,
         })
     }
 
@@ -58,22 +87,27 @@ impl Reader for Pdb {
 
     fn steps(&self, source: &mut ByteSource<'_>) -> Result<Vec<Step>, ParseError> {
         let budget = source.budget();
-        steps(source.text(), budget)
+        steps(source.text(), &RECORDS, budget)
     }
 
     fn read(&self, source: &mut ByteSource<'_>, step: &Step) -> Result<RawParticles, ParseError> {
         let budget = source.budget();
-        read(source.text(), step, budget)
+        read(source.text(), step, &RECORDS, budget)
     }
 
     fn remarks(&self, head: &[u8]) -> Vec<String> {
-        let mut remarks = vec![remarks::units("angstroms", None, None)];
-        let mut lines = text::Lines::new(head, 0..head.len());
-        if lines.any(is_cell) {
-            remarks.push(remarks::cell_remark(None));
-        }
-        remarks
+        remarks(head)
     }
+}
+
+/// Notes on the units and the cell.
+fn remarks(head: &[u8]) -> Vec<String> {
+    let mut remarks = vec![remarks::units("angstroms", None, None)];
+    let mut lines = text::Lines::new(head, 0..head.len());
+    if lines.any(is_cell) {
+        remarks.push(remarks::cell_remark(None));
+    }
+    remarks
 }
 
 fn is_atom(line: Line<'_>) -> bool {
@@ -87,6 +121,22 @@ fn position(line: Line<'_>) -> Result<[f64; 3], ParseError> {
         *number = coordinate(line, start, start + 8)?;
     }
     Ok(position)
+}
+
+/// Names of residues have three letters in the format, and four in many programs.
+fn atom(line: Line<'_>) -> Result<Atom<'_>, ParseError> {
+    let field = |start, end| field(line.text, start, end);
+    let real = |start, end, default| text::number(field(start, end)).unwrap_or(default);
+    Ok(Atom {
+        position: position(line)?,
+        real: [real(54, 60, 1.0), real(60, 66, 0.0)],
+        residue_number: text::integer(field(22, 26)).unwrap_or_default(),
+        symbol: field(76, 78),
+        name: field(12, 16),
+        residue: field(17, 21),
+        chain: field(21, 22),
+        segment: field(72, 76),
+    })
 }
 
 fn is_cell(line: Line<'_>) -> bool {
@@ -107,14 +157,18 @@ fn ends_model(line: Line<'_>) -> bool {
 }
 
 /// The cell in the records of `head` before the first atom.
-fn header_cell(head: &[u8]) -> Option<SimulationCell> {
+fn header_cell(head: &[u8], is_atom: fn(Line<'_>) -> bool) -> Option<SimulationCell> {
     let records = text::Lines::new(head, 0..head.len()).take_while(|line| !is_atom(*line));
     records.filter(|line| is_cell(*line)).last().and_then(cell)
 }
 
 /// The models: parts of the file that have atoms, up to a record for their end or to the next model. Records between
 /// two models are about the second one, but cells about the first one if that had none before its atoms.
-fn steps(text: &mut TextInput<'_>, budget: MemoryBudget) -> Result<Vec<Step>, ParseError> {
+fn steps(
+    text: &mut TextInput<'_>,
+    records: &Records,
+    budget: MemoryBudget,
+) -> Result<Vec<Step>, ParseError> {
     let mut steps = Vec::new();
     let mut start = text.at();
     let (mut has_atoms, mut number) = (false, None);
@@ -127,7 +181,7 @@ fn steps(text: &mut TextInput<'_>, budget: MemoryBudget) -> Result<Vec<Step>, Pa
         let next_number = model.and_then(|model| text::integer(model.trim_ascii()));
         let (is_model, is_file_end) = (model.is_some(), line.is_none());
         let is_end = is_model || line.is_none_or(ends_model);
-        has_atoms |= line.is_some_and(is_atom);
+        has_atoms |= line.is_some_and(records.is_atom);
         if is_end && has_atoms {
             // Some files have no record at the end of a model.
             let end = if is_model { at } else { text.at() };
@@ -163,13 +217,14 @@ fn steps(text: &mut TextInput<'_>, budget: MemoryBudget) -> Result<Vec<Step>, Pa
 fn read(
     text: &mut TextInput<'_>,
     step: &Step,
+    records: &Records,
     budget: MemoryBudget,
 ) -> Result<RawParticles, ParseError> {
     let range = step.byte_range().cloned().unwrap_or_default();
     // What precedes the first model is about all of them. Atoms are not passed: text in pieces only goes forward.
-    let mut cell = if text.at() > 0 { header_cell(text.head()) } else { None };
+    let mut cell = if text.at() > 0 { header_cell(text.head(), records.is_atom) } else { None };
     while text.at() < range.start {
-        let Some(line) = text.peek_line().filter(|line| !is_atom(*line)) else {
+        let Some(line) = text.peek_line().filter(|line| !(records.is_atom)(*line)) else {
             break;
         };
         if is_cell(line) {
@@ -179,7 +234,7 @@ fn read(
     }
     text.go_to(range.start);
     text.end_at(range.end);
-    let real = [("occupancy", 1), ("b_factor", 1)];
+    let real = records.real.map(|name| (name, 1));
     let texts = [names::CHAIN, names::SEGMENT, names::RESIDUE_NAME, names::ATOM_NAME];
     let mut atoms = AtomTable::new(&[ELEMENT, RESIDUE], &real, &texts, budget);
     let mut beads = Beads::default();
@@ -187,21 +242,12 @@ fn read(
         if is_cell(line) {
             cell = self::cell(line);
         }
-        if !is_atom(line) {
+        if !(records.is_atom)(line) {
             continue;
         }
-        let position = position(line)?;
-        // Names of residues have three letters in the format, and four in many programs
-        let [name, residue, chain, segment, symbol] =
-            [(12, 16), (17, 21), (21, 22), (72, 76), (76, 78)]
-                .map(|(start, end)| field(line.text, start, end));
-        let whole = [
-            atoms::element(symbol, name, residue),
-            text::integer(field(line.text, 22, 26)).unwrap_or_default(),
-        ];
-        let real = [(54, 60, 1.0), (60, 66, 0.0)].map(|(start, end, default)| {
-            text::number(field(line.text, start, end)).unwrap_or(default)
-        });
+        let Atom { position, real, residue_number, symbol, name, residue, chain, segment } =
+            (records.atom)(line)?;
+        let whole = [atoms::element(symbol, name, residue), residue_number];
         atoms.push(position, &whole, &real, &[chain, segment, residue, name])?;
         beads.push(name, residue);
     }

@@ -2,7 +2,8 @@
 //! lanes of a packet.
 //!
 //! To add one, add a file here with a type that is a [`point::SampledBsdf`] for one ray, or a [`point::LocalBsdf`] in the
-//! frame of the surface, and a line in [`bsdf_of`].
+//! frame of the surface, and a line in [`bsdf_of`]. Add it also to `finish_tests.rs`. See
+//! `docs/manual/adding-a-material.md`.
 
 #![expect(clippy::needless_range_loop, reason = "one index for the lanes of many arrays")]
 
