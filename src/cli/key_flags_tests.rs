@@ -80,7 +80,7 @@ const FLAGS: [(&str, &str); 61] = [
     ("--bonds covalent", "bonds.find = \"covalent\""),
     ("--surface union", "render.surface = \"union\""),
     ("--smoothing 0.5", "surface.smoothing = 0.5"),
-    ("--exact-surface", "surface.exact = true"),
+    ("--surface smooth --exact-surface", "surface.exact = true"),
     ("--spray", "surface.spray = true"),
     ("--no-mmap", "input.mmap = false"),
     ("--follow-links", "input.follow_links = true"),
@@ -121,8 +121,14 @@ fn every_option_is_a_key() {
         let mut plain = Manifest::new("data");
         assert_ne!(manifest(flags), plain, "{flags}");
         let mut sets = vec![format!("{key}={value}")];
-        if flags.contains("--isolate --") {
-            sets.push("job.isolate=true".to_owned());
+        // Some options need another one
+        for (other, set) in [
+            ("--isolate --", "job.isolate=true"),
+            ("--surface smooth --", "render.surface=\"smooth\""),
+        ] {
+            if flags.contains(other) {
+                sets.push(set.to_owned());
+            }
         }
         let sets = sets.iter().map(|set| format!(" --set {}", set.replace(' ', "")));
         plain = manifest(&sets.collect::<String>());
