@@ -37,7 +37,11 @@ fn workshop() -> Workshop {
 }
 
 fn picture(workshop: &Workshop, out: &str, options: &[&str]) -> Picture {
-    let command = ["still", "in.xyz", "-o", out];
+    picture_of(workshop, "in.xyz", out, options)
+}
+
+fn picture_of(workshop: &Workshop, input: &str, out: &str, options: &[&str]) -> Picture {
+    let command = ["still", input, "-o", out];
     let ran = workshop.run(&[&command[..], &VIEW, options].concat());
     ran.expect(0);
     Picture::open(&workshop.join(out))
@@ -86,6 +90,18 @@ fn edges_of_a_tilted_cell_are_where_the_file_has_them() {
         let middle = index([45, 30]);
         assert_eq!(cell.floats("Z")[middle], plain.floats("Z")[middle]);
         assert_ne!(cell.integers("id.I")[middle], NO_ID);
+    }
+}
+
+#[test]
+fn native_frames_keep_the_cell() {
+    let workshop = workshop();
+    workshop.run(&["convert", "in.xyz", "-o", "native"]).expect(0);
+    let options = ["--cell", "--set", "cell.radius=0.15", "--integrator", "whitted"];
+    let expected = picture(&workshop, "file.exr", &options);
+    for access in [&[][..], &["--no-mmap"], &["--where", "x == 0"]] {
+        let found = picture_of(&workshop, "native", "native.exr", &[&options[..], access].concat());
+        assert_eq!(found.floats("Z"), expected.floats("Z"), "{access:?}");
     }
 }
 

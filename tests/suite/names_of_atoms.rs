@@ -68,6 +68,7 @@ fn names_select_atoms() {
         ("chain == 1", "`chain` is text, not a number; compare it with text in quotes"),
     ] {
         render(&shop, "in.pdb", &["--where", condition]).expect(2).prints(message);
+        render(&shop, "native", &["--where", condition]).expect(2).prints(message);
     }
 }
 
