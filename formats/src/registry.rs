@@ -4,8 +4,8 @@ use std::path::Path;
 
 use crate::native;
 use crate::read::{
-    amber, bgeo, bi4, csv, dcd, gro, gsd, houdini, lammps, mmcif, npy, pdb, ply, rst7, trr, usd,
-    vtk, vtk_xml, xtc, xyz,
+    amber, bgeo, bi4, csv, dcd, gro, gsd, houdini, lammps, mdcrd, mmcif, npy, pdb, ply, rst7, trr,
+    usd, vtk, vtk_xml, xtc, xyz,
 };
 use spherule_readers::Format;
 use spherule_readers::compression::strip_extension;
@@ -21,6 +21,7 @@ const FORMATS: &[Format] = &[
     xyz::FORMAT,
     lammps::FORMAT,
     lammps::BINARY,
+    lammps::DATA,
     npy::NPY,
     npy::NPZ,
     gsd::FORMAT,
@@ -31,6 +32,7 @@ const FORMATS: &[Format] = &[
     dcd::FORMAT,
     amber::FORMAT,
     rst7::FORMAT,
+    mdcrd::FORMAT,
     // Before PDB, whose records may begin a file of this format
     pdb::PQR,
     pdb::FORMAT,

@@ -126,6 +126,11 @@ mod tests {
         assert_eq!(detect("a.bgeo", b"\x7fNSJb["), houdini::FORMAT);
         assert_eq!(detect("a.bgeo", b"\x7fbJSN["), houdini::FORMAT);
         assert_eq!(detect("a.txt", b"ITEM: TIMESTEP\n0\n"), lammps::FORMAT);
+        assert_eq!(detect("a.csv", b"a title\n\n2 atoms\n1 atom types\n"), lammps::DATA);
+        assert_eq!(
+            detect("a", b"# made by hand\n\n  3  atoms # all\n-1 1.5 xlo xhi\n"),
+            lammps::DATA
+        );
         assert_eq!(detect("a.xyz", b"\x93NUMPY\x01\0"), npy::NPY);
         assert_eq!(detect("a.zip", b"PK\x03\x04"), npy::NPZ);
         assert_eq!(detect("a.zip", &zip(b"scene.usdc")), usd::FORMAT);
@@ -198,7 +203,6 @@ mod tests {
         refused("a.vti", b"<VTKFile type=\"ImageData\">", "ImageData");
         let odd = b"<VTKFile type=\"a\n\x1b[2J\">";
         refused("a.vti", odd, r"type a\n\u{1b}[2J is not read");
-        refused("a.csv", b"a title\n\n2 atoms\n1 atom types\n", "LAMMPS data file");
         refused("a.gsd", &[0x65, 0xdf].repeat(4), "big-endian");
         refused("Part_0001.bi2", &[1, 2, 3], "DualSPHysics");
         refused("Part_0001", b"#File JPartDataBi4\0\0", "DualSPHysics");

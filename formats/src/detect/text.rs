@@ -1,7 +1,7 @@
 //! Text formats that are known but not read, recognised by the structure of their first lines.
 
-use crate::read::psf;
 use crate::read::text::{integer, number, words};
+use crate::read::{prmtop, psf};
 
 /// The first lines of a file.
 type Lines<'a> = [&'a [u8]];
@@ -11,22 +11,12 @@ type TextFormat = (fn(&Lines<'_>) -> bool, &'static str);
 
 const FORMATS: &[TextFormat] = &[
     (
-        is_lammps_data,
-        "a LAMMPS data file, which is the start of a simulation and is not read; write a dump from it \
-         (`write_dump all custom out.dump id type x y z`)",
-    ),
-    (
         |lines| lines.first() == Some(&&b"---"[..]) && begins(lines, b"creator: LAMMPS"),
         "a LAMMPS dump in YAML, which is not read; use `dump custom`",
     ),
     (
         |lines| first(lines, psf::is_psf),
         "a topology (PSF), which has no positions; give it with --topology beside a file with coordinates",
-    ),
-    (
-        is_prmtop,
-        "an AMBER topology (prmtop), which is not read; write a PDB file from it (`cpptraj -p a.prmtop -y a.rst7 -x \
-         a.pdb`) and give that, or give it with --topology beside a trajectory",
     ),
     (
         |lines| begins(lines, b"@<TRIPOS>"),
@@ -54,11 +44,6 @@ const FORMATS: &[TextFormat] = &[
         "a Tinker file, which is not read; write .xyz with Open Babel (`obabel -itxyz in.xyz -oxyz -O out.xyz`)",
     ),
     (
-        is_mdcrd,
-        "an AMBER trajectory in text (mdcrd), which is not read since it has no number of atoms; write NetCDF \
-         (`cpptraj -p a.prmtop -y a.mdcrd -x a.nc`)",
-    ),
-    (
         is_charmm_card,
         "a CHARMM coordinate file (.crd, .cor), which is not read; write .pdb or .dcd with CHARMM, VMD or MDAnalysis",
     ),
@@ -76,10 +61,16 @@ const FORMATS: &[TextFormat] = &[
     ),
 ];
 
+const PRMTOP: &str = "an AMBER topology (prmtop), which has no positions; give it with --topology beside a file with \
+                      coordinates";
+
 /// The message for `head`, the beginning of a file, if that is one of the formats.
 pub(super) fn what(head: &[u8]) -> Option<&'static str> {
     let lines: Vec<&[u8]> =
         head.split(|b| *b == b'\n').map(|line| line.strip_suffix(b"\r").unwrap_or(line)).collect();
+    if prmtop::is_prmtop(head) {
+        return Some(PRMTOP);
+    }
     FORMATS.iter().find(|(is_one, _)| is_one(&lines)).map(|(_, what)| *what)
 }
 
@@ -106,35 +97,6 @@ fn has_numbers(line: Option<&&[u8]>, count: usize) -> bool {
 fn has_integers(line: Option<&&[u8]>) -> bool {
     let mut words = line.into_iter().flat_map(|line| words(line)).peekable();
     words.peek().is_some() && words.all(|word| integer(word).is_some())
-}
-
-/// Lines with a version, or the first section with its format, which older programs write alone. Comments may come
-/// first.
-fn is_prmtop(lines: &Lines<'_>) -> bool {
-    let is_head = |line: &&&[u8]| !line.trim_ascii().is_empty() && !line.starts_with(b"%COMMENT");
-    let mut head = lines.iter().filter(is_head);
-    let first = head.next().copied().unwrap_or_default();
-    let second = head.next().copied().unwrap_or_default();
-    first.starts_with(b"%VERSION")
-        || (first.starts_with(b"%FLAG ") && second.starts_with(b"%FORMAT("))
-}
-
-/// A title, counts as `12 atoms`, and the box as `0 1 xlo xhi` or counts of types.
-fn is_lammps_data(lines: &Lines<'_>) -> bool {
-    let signed = |line: &[u8]| line.starts_with(b"LAMMPS data file");
-    let (mut atoms, mut others) = (false, false);
-    // The first line is free text.
-    for line in lines.iter().skip(1) {
-        let code = line.split(|b| *b == b'#').next().unwrap_or_default();
-        let words: Vec<&[u8]> = words(code).take(5).collect();
-        match words.as_slice() {
-            [count, b"atoms"] => atoms |= is_count(count),
-            [count, b"atom", b"types"] => others |= is_count(count),
-            [_, _, b"xlo", b"xhi"] => others = true,
-            _ => {}
-        }
-    }
-    (atoms && others) || (first(lines, signed) && (atoms || others))
 }
 
 fn is_count(word: &[u8]) -> bool {
@@ -171,22 +133,6 @@ fn is_tinker(lines: &Lines<'_>) -> bool {
     };
     let atom = if has_numbers(lines.get(1), 6) { 2 } else { 1 };
     first(lines, is_heading) && is_atom(lines.get(atom))
-}
-
-/// A title that is no numbers, then numbers of eight columns, ten in each line (Fortran's 10F8.3). The last line may be
-/// cut, and so is that of each frame.
-fn is_mdcrd(lines: &Lines<'_>) -> bool {
-    const WIDTH: usize = 8;
-    let is_field = |field: &[u8]| {
-        field.len() == WIDTH && field.get(4) == Some(&b'.') && number(field.trim_ascii()).is_some()
-    };
-    let is_row = |line: &&[u8]| line.len() == 10 * WIDTH && line.chunks(WIDTH).all(is_field);
-    let title = numbers(lines.first());
-    let names_columns =
-        first(lines, |line| line.starts_with(b"#") || crate::read::csv::finds_columns(line));
-    title.is_none_or(|numbers| numbers.is_empty())
-        && !names_columns
-        && lines.get(1).is_some_and(is_row)
 }
 
 /// Titles that begin with an asterisk, the number of atoms, then atoms: two numbers, two names, x, y, z.
@@ -249,12 +195,6 @@ mod tests {
 
     #[test]
     fn formats_are_recognised_by_their_lines() {
-        suggests(
-            "LAMMPS data file via write_data, version 2 Aug 2023\n\n3 atoms\n1 atom types\n\n\
-             0 1 xlo xhi\n0 1 ylo yhi\n0 1 zlo zhi\n\nAtoms # atomic\n\n1 1 0 0 0\n",
-            "write_dump",
-        );
-        suggests("# made by hand\n\n  3  atoms # all\n-1 1.5 xlo xhi\n", "LAMMPS data");
         suggests("---\ncreator: LAMMPS\ntimestep: 0\n", "dump custom");
         suggests("PSF CMAP\n\n 1 !NTITLE\n", "--topology beside");
         suggests("%VERSION  VERSION_STAMP = V0001.000\n%FLAG TITLE\n", "prmtop");
@@ -276,10 +216,6 @@ mod tests {
         suggests(&format!("Cr metal\n1.0\n{cell}Cr O\n1 1\nDirect\n0 0 0\n0.5 0.5 0.5\n"), "VASP");
         suggests(&format!("Cr metal\n1.0\n{cell}2\nCartesian\n0 0 0\n0.5 0.5 0.5\n"), "VASP");
         suggests("  2  water\n  1  O  0.1 0.2 0.3  1  2\n  2  H  1.1 0.2 0.3  2  1\n", "Tinker");
-        let row =
-            "   1.000  -2.500   3.000   4.000   5.000   6.000   7.000   8.000   9.000  10.000\n";
-        suggests(&format!("ACE\n{row}{row}   1.000\n"), "mdcrd");
-        suggests(&format!("\n{row}   1.000   2.000\n"), "mdcrd");
         suggests(
             "* a title\n*\n    1\n    1    1 TIP3 OH2    1.00000   2.00000   3.00000 W    1      0.00000\n",
             "CHARMM",

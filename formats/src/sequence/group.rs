@@ -211,7 +211,9 @@ fn note_mixed_formats(paths: &[PathBuf], notes: &mut Vec<String>) {
         Some(extension.to_owned())
     };
     let extensions: BTreeSet<String> = paths.iter().filter_map(extension).collect();
-    let topology = paths.iter().find(|path| extension(path).as_deref() == Some("psf"));
+    let is_topology =
+        |path: &&PathBuf| matches!(extension(path).as_deref(), Some("psf" | "prmtop" | "parm7"));
+    let topology = paths.iter().find(is_topology);
     if extensions.len() < 2 {
         return;
     }

@@ -3,7 +3,7 @@
 use spherule_formats::Format;
 use spherule_formats::read;
 use spherule_formats::stats::FrameStats;
-use spherule_formats::{ParseError, ParticleFrame, RawParticles, choose_origin};
+use spherule_formats::{MemoryBudget, ParseError, ParticleFrame, RawParticles, choose_origin};
 
 mod convert;
 mod lists;
@@ -23,7 +23,7 @@ pub use packed::{compressed, houdini, npz, open};
 pub type Target = fn(&[u8]) -> usize;
 
 /// Every target by the name of its folder in `corpus`.
-pub const TARGETS: [(&str, Target); 31] = [
+pub const TARGETS: [(&str, Target); 34] = [
     ("vtk", vtk),
     ("vtk_xml", vtk_xml),
     ("bgeo", bgeo),
@@ -42,10 +42,13 @@ pub const TARGETS: [(&str, Target); 31] = [
     ("dcd", dcd),
     ("amber", amber),
     ("rst7", rst7),
+    ("mdcrd", mdcrd),
+    ("prmtop", prmtop),
     ("pdb", pdb),
     ("pqr", pqr),
     ("mmcif", mmcif),
     ("lammps_binary", lammps_binary),
+    ("lammps_data", lammps_data),
     ("usd", usd),
     ("hdf5", hdf5),
     ("open", open),
@@ -154,6 +157,28 @@ pub fn amber(bytes: &[u8]) -> usize {
 /// AMBER restart files in text.
 pub fn rst7(bytes: &[u8]) -> usize {
     read_all(read::rst7::FORMAT, bytes, 1)
+}
+
+/// AMBER trajectories in text.
+pub fn mdcrd(bytes: &[u8]) -> usize {
+    read_all(read::mdcrd::FORMAT, bytes, 1)
+}
+
+/// AMBER topologies.
+pub fn prmtop(bytes: &[u8]) -> usize {
+    let Ok((count, atoms)) = read::prmtop::read(bytes, MemoryBudget::UNLIMITED) else {
+        return 0;
+    };
+    for attribute in &atoms.attributes {
+        assert_eq!(attribute.data.len(), attribute.components * count, "{}", attribute.name);
+    }
+    assert!(atoms.bonds.iter().flatten().all(|atom| (*atom as usize) < count));
+    1
+}
+
+/// LAMMPS data files.
+pub fn lammps_data(bytes: &[u8]) -> usize {
+    read_all(read::lammps::DATA, bytes, 1)
 }
 
 /// Protein Data Bank files.

@@ -17,6 +17,7 @@ pub mod csv;
 #[cfg(test)]
 mod damage;
 pub mod dcd;
+mod fixed_rows;
 pub mod gro;
 pub mod gsd;
 #[cfg(feature = "hdf5")]
@@ -24,6 +25,8 @@ pub mod hdf5;
 pub mod houdini;
 mod input;
 pub mod lammps;
+mod masses;
+pub mod mdcrd;
 pub mod mmcif;
 #[cfg(test)]
 mod molecule_tests;
@@ -33,6 +36,7 @@ pub mod pdb;
 #[cfg(test)]
 mod pieces;
 pub mod ply;
+pub mod prmtop;
 pub mod psf;
 mod remarks;
 pub mod rst7;

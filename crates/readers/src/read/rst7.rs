@@ -4,7 +4,7 @@
 //! (Fortran's 6F12.7). Velocities may follow in the same form, and a line with the lengths and angles of the box.
 //! Lengths are A. After the description of the format in the AMBER manual.
 
-use super::atoms::coordinate;
+use super::fixed_rows::{RowNumbers, read_row};
 use super::input::TextInput;
 use super::sniff::is_text;
 use super::table::ColumnValues;
@@ -142,7 +142,7 @@ fn read(text: &mut TextInput<'_>, budget: MemoryBudget) -> Result<RawParticles, 
             let what = format!("{count} atoms have {rows} lines of positions, {row} follow");
             return Err(cut_short(text, what));
         };
-        read_row(line, PER_LINE.min(len - row * PER_LINE), &mut numbers)?;
+        read_row(line, WIDTH, PER_LINE.min(len - row * PER_LINE), &mut numbers)?;
         positions.push(&numbers)?;
     }
     let mut others = RowNumbers::new(budget.less(8 * len as u64));
@@ -188,7 +188,7 @@ fn read_tail(
         }
         add(&last)?;
         let numbers = line.text.trim_ascii_end().len().div_ceil(WIDTH);
-        read_row(line, numbers.min(PER_LINE), &mut last)?;
+        read_row(line, WIDTH, numbers.min(PER_LINE), &mut last)?;
         count += 1;
     }
     if is_box_at(count, rows) && is_box(&last) {
@@ -196,43 +196,6 @@ fn read_tail(
     }
     add(&last)?;
     Ok(None)
-}
-
-/// Reads the `count` numbers of `line`.
-fn read_row(line: Line<'_>, count: usize, numbers: &mut Vec<f64>) -> Result<(), ParseError> {
-    if line.text.trim_ascii_end().len() != count * WIDTH {
-        let what = format!(
-            "expected {count} numbers of {WIDTH} columns, found {}: the file is damaged, or still being written",
-            text::shown(line.text)
-        );
-        return Err(ParseError::malformed(line.at, what));
-    }
-    numbers.clear();
-    for start in (0..count).map(|index| index * WIDTH) {
-        numbers.push(coordinate(line, start, start + WIDTH)?);
-    }
-    Ok(())
-}
-
-/// Numbers of many lines.
-struct RowNumbers {
-    numbers: Vec<f64>,
-    budget: MemoryBudget,
-}
-
-impl RowNumbers {
-    const fn new(budget: MemoryBudget) -> Self {
-        Self { numbers: Vec::new(), budget }
-    }
-
-    /// Adds the numbers of a line.
-    fn push(&mut self, row: &[f64]) -> Result<(), ParseError> {
-        // A vector that grows holds its old numbers and twice the room for new ones.
-        let need = 3 * size_of::<f64>() * (self.numbers.len() + row.len());
-        self.budget.check(need as u64, "its numbers in memory are")?;
-        self.numbers.extend(row);
-        Ok(())
-    }
 }
 
 /// Whether the last of `others` lines behind `rows` lines of positions may be a box.

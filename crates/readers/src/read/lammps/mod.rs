@@ -22,12 +22,14 @@ use spherule_frame::{MemoryBudget, ParseError, Positions, RawParticles};
 mod binary;
 mod bounds;
 mod columns;
+mod data;
 mod header;
 mod remarks;
 
 pub use binary::FORMAT as BINARY;
 use bounds::Bounds;
 use columns::DumpColumns;
+pub use data::FORMAT as DATA;
 use header::{DumpHeader, DumpItem};
 
 /// What every header line begins with.

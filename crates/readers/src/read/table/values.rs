@@ -66,7 +66,7 @@ impl ColumnValues {
     }
 
     /// How many numbers there are.
-    pub(super) fn len(&self) -> usize {
+    pub(in crate::read) fn len(&self) -> usize {
         match self {
             Self::Real(v) => v.len(),
             Self::Whole(v) => v.len(),
