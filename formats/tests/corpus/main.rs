@@ -100,6 +100,7 @@ fn shrunk(path: &Path) {
         time: None,
         step: None,
         dropped: 0,
+        details: native::FrameDetails::default(),
     };
     let mut writer = native::FrameWriter::create(path, spec).expect("writable");
     let run = native::Run {
