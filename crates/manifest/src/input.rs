@@ -108,8 +108,8 @@ section! {
         follow_links: bool = false, affects(Affects::Nothing), flag("follow-links", "", "Input");
         /// File with the properties of the atoms of a trajectory: .gro, .pdb, .psf or other
         ///
-        /// Elements and other attributes that do not change are added to all frames. The file has as many atoms as
-        /// they have, in the same order.
+        /// Elements and other attributes that do not change are added to all frames. Atoms are joined by `id` if both
+        /// files have it; otherwise the file has as many atoms as the frames, in the same order.
         topology: Option<String> = None, example("\"conf.gro\""), unset("none"), flag("topology", "FILE", "Input");
         /// Particle radius: a length, auto, or { attribute = "radius", scale = 1.0 }
         ///

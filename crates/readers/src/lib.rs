@@ -3,7 +3,7 @@
 //! - [`read`]: one file or directory for each format, with a constant `FORMAT` each.
 //! - [`Reader`]: the interface that they implement; [`Format`] is a reader as a value.
 //! - [`mesh`]: triangle meshes, for tanks and obstacles.
-//! - [`compression`]: gzip, zstd, xz, bzip2, LZ4, blosc and archives with one member.
+//! - [`compression`]: gzip, zstd, xz, bzip2, LZ4, blosc and archives with one member; a crate of its own.
 //!
 //! Readers trust nothing: they check every count against the bytes that are there, or against a
 //! [`MemoryBudget`](spherule_frame::MemoryBudget), before they allocate. They do not know which other formats exist:
@@ -22,19 +22,17 @@
 //! ```
 #![deny(unsafe_code)]
 
-pub mod compression;
 mod format;
 pub mod hdf5_signature;
 pub mod mesh;
 pub mod ranges;
 pub mod read;
 mod reader;
-pub mod regular;
 pub mod shared;
 mod step;
-mod whole;
 
 pub use format::Format;
 pub use reader::*;
+pub use spherule_compression as compression;
+pub use spherule_compression::{decompressor, read_whole, regular};
 pub use step::Step;
-pub use whole::{decompressor, read_whole};

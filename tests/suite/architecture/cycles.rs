@@ -10,12 +10,13 @@ use super::root;
 use super::source::{ModulePath, code, files};
 
 /// Directories of crates, and how many files they have at least.
-const SOURCES: [(&str, usize); 14] = [
+const SOURCES: [(&str, usize); 15] = [
     ("src", 100),
     ("jobs/src", 30),
     ("formats/src", 30),
     ("crates/files/src", 8),
     ("crates/frame/src", 12),
+    ("crates/compression/src", 8),
     ("crates/readers/src", 100),
     ("crates/tree/src", 50),
     ("crates/tracer/src", 100),

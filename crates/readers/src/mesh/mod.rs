@@ -16,8 +16,8 @@ pub use builder::Mesh;
 
 use crate::compression::strip_extension;
 use crate::read::{ply, vtk, vtk_xml};
+use crate::read_whole;
 use crate::reader::{Confidence, HEAD_LEN};
-use crate::whole::read_whole;
 use spherule_frame::{FrameError, MemoryBudget, ParseError};
 
 /// Reads the mesh in the file at `path`, compressed or not: STL, OBJ, PLY, legacy VTK or VTK XML.

@@ -24,8 +24,6 @@ const WIDTH: usize = 8;
 const POINT: usize = 4;
 /// Numbers in a full line.
 const PER_LINE: usize = 10;
-/// A digit and the longest end of a line.
-const LINE_ROOM: usize = 3;
 /// Numbers of a box.
 const BOX: usize = 3;
 
@@ -45,7 +43,7 @@ impl Reader for Mdcrd {
             let is_field = |field: &[u8]| {
                 field.get(POINT) == Some(&b'.') && text::number(field.trim_ascii()).is_some()
             };
-            !row.is_empty() && row.len() % WIDTH == 0 && row.chunks(WIDTH).all(is_field)
+            !row.is_empty() && row.len().is_multiple_of(WIDTH) && row.chunks(WIDTH).all(is_field)
         };
         let row = lines.next().map(|line| line.text).unwrap_or_default();
         Ok(if !is_text(head) || !is_title || !is_row(row) {
@@ -81,41 +79,35 @@ impl Reader for Mdcrd {
     }
 }
 
-/// The frames, which all have as many bytes as the first one.
+/// The frames, which all have as many lines as the first one.
 fn steps(text: &mut TextInput<'_>, budget: MemoryBudget) -> Result<Vec<Step>, ParseError> {
     text.line();
     let mut at = text.at();
-    pass_frame(text)?;
-    let len = text.at() - at;
+    let lines = pass_frame(text)?;
     let mut steps = Vec::new();
-    while !text.ahead(|text| {
-        text.pass_blanks();
-        text.is_at_end()
-    }) || steps.is_empty()
-    {
-        Step::push(&mut steps, at..at + len, budget)?;
-        // The last line may lack its end. What lacks more is cut short, and fails when it is read
-        text.go_to(at + len - LINE_ROOM);
-        let left = text.want(LINE_ROOM).min(LINE_ROOM);
-        if let Some(last) = steps.last_mut().filter(|_| left > 0) {
-            last.end_at(at + len - LINE_ROOM + left);
+    loop {
+        Step::push(&mut steps, at..text.at(), budget)?;
+        at = text.at();
+        // Blank lines may end the file
+        let is_end = text.ahead(|text| {
+            text.pass_blanks();
+            text.is_at_end()
+        });
+        if is_end {
+            return Ok(steps);
         }
-        at += len;
-        text.advance(LINE_ROOM);
+        text.pass_lines(lines);
     }
-    Ok(steps)
 }
 
-/// Passes the lines of the first frame: full ones, one that is not full, and perhaps a box.
-fn pass_frame(text: &mut TextInput<'_>) -> Result<(), ParseError> {
+/// Passes the lines of the first frame: full ones, one that is not full, and perhaps a box. Returns how many there are.
+fn pass_frame(text: &mut TextInput<'_>) -> Result<usize, ParseError> {
     let mut full = 0;
     let last = loop {
         let Some(line) = text.line() else {
-            return Err(if full == 0 {
-                cut_short(text, "no frame")
-            } else {
-                unknown_count(text.at())
-            });
+            let error =
+                if full == 0 { cut_short(text, "no frame") } else { unknown_count(text.at()) };
+            return Err(error);
         };
         match numbers_in(line.text) {
             PER_LINE => full += 1,
@@ -130,7 +122,16 @@ fn pass_frame(text: &mut TextInput<'_>) -> Result<(), ParseError> {
     if full == 0 || last == 0 || (last == BOX && !has_box) {
         return Err(unknown_count(text.at()));
     }
-    Ok(())
+    Ok(full + 1 + usize::from(has_box))
+}
+
+/// Bytes of the first frame, if `head` has all of it.
+fn first_len(head: &[u8]) -> Option<usize> {
+    let mut text = TextInput::whole(head);
+    text.line();
+    let start = text.at();
+    pass_frame(&mut text).ok()?;
+    (!text.is_at_end()).then(|| text.at() - start)
 }
 
 fn numbers_in(line: &[u8]) -> usize {
@@ -149,6 +150,8 @@ fn read(
     budget: MemoryBudget,
 ) -> Result<RawParticles, ParseError> {
     let range = step.byte_range().cloned().unwrap_or_default();
+    // The last line may lack its end
+    let is_whole = first_len(text.head()).is_none_or(|len| range.len() + b"\r\n".len() >= len);
     text.go_to(range.start);
     text.end_at(range.end);
     let mut positions = RowNumbers::new(budget);
@@ -165,8 +168,7 @@ fn read(
         has_end = count < PER_LINE;
     }
     let count = positions.numbers.len();
-    let is_whole = text.at() >= range.end && text.is_at_end();
-    if !has_end || !is_whole || !count.is_multiple_of(3) {
+    if !has_end || !is_whole || !text.is_at_end() || !count.is_multiple_of(3) {
         let what = format!("a frame with {count} coordinates differs from the first one");
         return Err(cut_short(text, &what));
     }

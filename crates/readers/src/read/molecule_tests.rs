@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use proptest::sample::Index;
 
 use super::damage::{TestedReader, mutate, sample};
-use super::{Step, amber, dcd, gro, lammps, mmcif, pdb, pieces, text_samples, trr, xtc};
+use super::{Step, amber, dcd, gro, lammps, mdcrd, mmcif, pdb, pieces, text_samples, trr, xtc};
 use crate::format::Format;
 use crate::reader::{Confidence, HEAD_LEN};
 use spherule_frame::{ParseError, RawParticles};
@@ -36,6 +36,7 @@ readers! {
     trr_reader: trr::FORMAT, "single.trr";
     dcd_reader: dcd::FORMAT, "fixed.dcd";
     amber_reader: amber::FORMAT, "offset64.nc";
+    mdcrd_reader: mdcrd::FORMAT, "ethanol.mdcrd";
     pdb_reader: pdb::FORMAT, "models.pdb";
     pqr_reader: pdb::PQR, "charges.pqr";
     mmcif_reader: mmcif::FORMAT, "models.cif";

@@ -17,6 +17,8 @@ use spherule_frame::{
 
 /// Charges are stored in units of kcal and A: times the square root of Coulomb's constant in these.
 const CHARGE_UNIT: f64 = 18.2223;
+/// The square of that in files with the force field of CHARMM, which `chamber` writes.
+const CHARMM_CONSTANT: f64 = 332.0716;
 /// Indices of atoms in bonds are those of their first coordinate.
 const STRIDE: usize = 3;
 /// The largest atomic number.
@@ -173,6 +175,7 @@ impl<'a> Prmtop<'a> {
             })
         };
         let residues: Option<Vec<Residue<'a>>> = labels.iter().enumerate().map(residue).collect();
+        let residues = residues.filter(|residues| atoms == 0 || !residues.is_empty());
         residues.ok_or_else(|| {
             let at = self.sections.get(&b"RESIDUE_POINTER"[..]).map_or(0, |section| section.at);
             let what = format!(
@@ -186,22 +189,25 @@ impl<'a> Prmtop<'a> {
     fn atoms(&self, count: usize, residues: &[Residue<'_>]) -> Result<RawParticles, ParseError> {
         let atom_names = self.values("ATOM_NAME", count, Some)?;
         let mut charges = self.values("CHARGE", count, text::number)?;
-        charges.iter_mut().for_each(|charge| *charge /= CHARGE_UNIT);
+        let is_charmm = self.sections.contains_key(&b"CTITLE"[..]);
+        let unit = if is_charmm { CHARMM_CONSTANT.sqrt() } else { CHARGE_UNIT };
+        charges.iter_mut().for_each(|charge| *charge /= unit);
         let masses = self.values("MASS", count, text::number)?;
         let numbers = self.values("ATOMIC_NUMBER", count, text::integer)?;
         let mut texts = [names::CHAIN, names::RESIDUE_NAME, names::ATOM_NAME].map(TextColumn::new);
         let (mut elements, mut residue_numbers) = (Vec::new(), Vec::new());
-        let by_mass = has_own_masses(&masses);
+        let has_own = has_own_masses(&masses);
         for residue in residues {
             for index in residue.atoms.clone() {
                 let name = atom_names.get(index).copied().unwrap_or_default();
-                let mass = masses.get(index).copied().filter(|_| by_mass);
+                let by_mass =
+                    masses.get(index).copied().filter(|_| has_own).and_then(masses::element);
                 elements.push(match numbers.get(index) {
                     Some(number @ 1..=MAX_NUMBER) => code(*number),
-                    Some(_) => 0,
-                    None => mass
-                        .and_then(masses::element)
-                        .unwrap_or_else(|| code(atoms::element(b"", name, residue.name))),
+                    Some(_) => by_mass.unwrap_or_default(),
+                    None => {
+                        by_mass.unwrap_or_else(|| code(atoms::element(b"", name, residue.name)))
+                    }
                 });
                 residue_numbers.push(code(residue.number));
                 for (column, text) in texts.iter_mut().zip([residue.chain, residue.name, name]) {
@@ -328,8 +334,10 @@ WAT Na+
     }
 
     fn texts(particles: &RawParticles, name: &str) -> Vec<String> {
-        let codes = numbers(&attribute(particles, name).data);
-        codes.iter().map(|code| particles.labels[name][&(*code as i64)].clone()).collect()
+        let AttributeData::I32(codes) = &attribute(particles, name).data else {
+            panic!("text has integers");
+        };
+        codes.iter().map(|code| particles.labels[name][&i64::from(*code)].clone()).collect()
     }
 
     #[test]
@@ -339,7 +347,7 @@ WAT Na+
             let found = whole(text);
             let all = ["element", "residue", "charge", "mass", "residue_name", "atom_name"];
             assert_eq!(names(&found), all);
-            assert_eq!(numbers(&attribute(&found, "element").data), [8.0, 1.0, 0.0, 11.0]);
+            assert_eq!(numbers(&attribute(&found, "element").data), [8.0, 1.0, 1.0, 11.0]);
             assert_eq!(numbers(&attribute(&found, "residue").data), [1.0, 1.0, 1.0, 2.0]);
             assert_eq!(numbers(&attribute(&found, "mass").data), [16.0, 1.008, 1.008, 22.99]);
             let charges = numbers(&attribute(&found, "charge").data);
@@ -351,6 +359,12 @@ WAT Na+
             assert_eq!(texts(&found, "atom_name"), ["O", "HW1", "HW2", "Na+"]);
             assert_eq!(found.bonds, [[0, 1], [0, 2], [0, 3]]);
         }
+        // An extra point, and the charges of CHARMM
+        let point = TEXT.replace("1.00800000E+00  2.29", "0.00000000E+00  2.29");
+        let point = whole(&point.replace("%FLAG TITLE", "%FLAG CTITLE"));
+        assert_eq!(numbers(&attribute(&point, "element").data), [8.0, 1.0, 0.0, 11.0]);
+        let charge = numbers(&attribute(&point, "charge").data)[3];
+        assert_eq!(charge, 18.2223 / 332.0716_f64.sqrt());
     }
 
     #[test]
@@ -376,6 +390,11 @@ WAT Na+
             ("       4       0", "       x       0", "section POINTERS has \"x\" as a value"),
             ("       4       0", "      -4       0", "section POINTERS has \"-4\""),
             ("       4       0", "     400       0", "section ATOM_NAME has 20 of 400 values"),
+            (
+                "       0       2       1\n%FLAG ATOM",
+                "       0       0       1\n%FLAG ATOM",
+                "does not divide 4 atoms among 0",
+            ),
             ("%FLAG CHARGE", "%FLAG CHARGES", "without the section `%FLAG CHARGE`"),
             ("%FORMAT(3E16.8)", "%FORMAT(E)", "section CHARGE has no format"),
             ("%FORMAT(3E16.8)", "", "section CHARGE has no format"),

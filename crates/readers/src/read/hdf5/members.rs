@@ -80,8 +80,8 @@ mod tests {
     use super::super::file::H5File;
     use super::super::node::Node;
     use super::MAX_LOOKUPS;
+    use crate::read_whole;
     use crate::shared::SharedBytes;
-    use crate::whole::read_whole;
     use spherule_frame::MemoryBudget;
 
     /// The group `run` of a file, in which many names were looked up.

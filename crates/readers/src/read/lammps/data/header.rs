@@ -45,8 +45,8 @@ impl DataHeader {
     /// # Errors
     /// [`ParseError::Malformed`] if a count or a bound is not a number, or there is no number of atoms.
     pub(super) fn parse(text: &mut TextInput<'_>) -> Result<Self, ParseError> {
-        let mut header = Self::default();
-        header.units = text.line().and_then(|title| units(title.text));
+        let units = text.line().and_then(|title| units(title.text));
+        let mut header = Self { units, ..Self::default() };
         while let Some(line) = text.peek_line() {
             if code(line.text).first().is_some_and(u8::is_ascii_alphabetic) {
                 break;

@@ -35,7 +35,10 @@ struct LammpsData;
 
 impl Reader for LammpsData {
     fn info(&self) -> FormatInfo {
-        FormatInfo::new("lammps-data", &["data", "lmp"])
+        FormatInfo {
+            remarks_need_whole_file: true,
+            ..FormatInfo::new("lammps-data", &["data", "lmp"])
+        }
     }
 
     /// A title, counts as `12 atoms`, and the box as `0 1 xlo xhi` or counts of types.
@@ -80,9 +83,30 @@ impl Reader for LammpsData {
     }
 
     fn remarks(&self, head: &[u8]) -> Vec<String> {
-        let header = DataHeader::parse(&mut TextInput::whole(head)).unwrap_or_default();
-        header.cell().map(|_| cell_remark(None)).into_iter().collect()
+        let mut text = TextInput::whole(head);
+        let header = DataHeader::parse(&mut text).unwrap_or_default();
+        let mut remarks: Vec<String> =
+            header.cell().map(|_| cell_remark(None)).into_iter().collect();
+        if has_image_flags(&mut text, &header) {
+            remarks.push(IMAGE_FLAGS.to_owned());
+        }
+        remarks
     }
+}
+
+const IMAGE_FLAGS: &str = "image flags of atoms are not used; positions are those in the box";
+
+/// Whether there are image flags behind the columns of the first atom.
+fn has_image_flags(text: &mut TextInput<'_>, header: &DataHeader) -> bool {
+    while let Some(section) = next_section(text) {
+        text.pass_blank_lines(usize::MAX);
+        if section.name == "Atoms" {
+            let first = text.peek_line();
+            let columns = first.map(|line| AtomColumns::find(header, &section.comment, line));
+            return columns.is_some_and(|columns| columns.is_ok_and(|columns| columns.has_images));
+        }
+    }
+    false
 }
 
 /// The heading of a section.

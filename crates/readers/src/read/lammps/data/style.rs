@@ -126,12 +126,9 @@ impl AtomColumns {
         };
         let hybrid =
             || "of the atom style `hybrid`, columns behind the positions are not read".to_owned();
-        let images =
-            || "image flags of atoms are not used; positions are those in the box".to_owned();
         let mut notes = Vec::new();
         notes.extend((!self.is_named).then(guessed));
         notes.extend((self.style == "hybrid").then(hybrid));
-        notes.extend(self.has_images.then(images));
         notes
     }
 

@@ -1,17 +1,21 @@
 //! Compressed files: which compression a file has, by its content, and its content without it.
 //!
 //! `decompressor` reads a file from front to back, `member` decodes one stream of it (`lz4`, `scf` with `blosc`, and
-//! `zip` for an archive of one file), `length` estimates the decompressed length. NPZ files are archives of arrays and
-//! not compressed in this sense.
+//! `zip` for an archive of one file), `length` estimates the decompressed length, `whole` reads all of a file, and
+//! `regular` detects changes of it. NPZ files are archives of arrays and not compressed in this sense. Which format the
+//! content has is left to others.
+#![deny(unsafe_code)]
 
 mod blosc;
 mod decompressor;
 mod length;
 mod lz4;
 mod member;
+pub mod regular;
 mod scf;
 #[cfg(test)]
 mod tests;
+mod whole;
 mod xz;
 mod zip;
 
@@ -19,6 +23,7 @@ use std::io::{BufRead, Cursor, Seek};
 
 pub use decompressor::{ByteStream, Decompressor, StreamError};
 pub use length::unpacked_len;
+pub use whole::{decompressor, read_whole};
 pub use xz::decoder_len as xz_decoder_len;
 
 use spherule_frame::ParseError;

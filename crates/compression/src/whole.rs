@@ -4,8 +4,8 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-use crate::compression::{Decompressor, unpacked_len};
-use crate::regular::FileStamp;
+use super::regular::FileStamp;
+use super::{Decompressor, unpacked_len};
 use spherule_frame::{FrameError, MemoryBudget};
 
 /// All bytes of the regular file at `path`, decompressed.
