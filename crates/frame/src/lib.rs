@@ -3,7 +3,8 @@
 //! A reader returns [`RawParticles`]: positions in the type of the file, and [`Attribute`]s, which are named arrays with
 //! a number of components per particle. [`ParticleFrame`] is what the renderer needs of it: finite positions in f32,
 //! relative to the origin that a sequence has in common ([`choose_origin`]). A [`SimulationCell`] and [`Bond`]s come
-//! with molecular simulations; [`PeriodicImages`] wraps particles into the cell and copies it.
+//! with molecular simulations; [`PeriodicImages`] wraps particles into the cell and copies it. [`masses`] tells elements by
+//! their masses.
 //!
 //! This crate knows neither files nor rays. It uses only `spherule-files`.
 //!
@@ -40,6 +41,7 @@ mod images;
 pub mod join;
 mod labels;
 mod lattice;
+pub mod masses;
 pub mod names;
 mod origin;
 pub mod reading;

@@ -103,6 +103,36 @@ impl AtomTable {
     }
 }
 
+/// The properties of the atoms of a topology, which has no positions.
+#[derive(Debug)]
+pub(super) struct TopologyAtoms {
+    pub(super) elements: Vec<i32>,
+    pub(super) residues: Vec<i32>,
+    pub(super) charges: Vec<f64>,
+    pub(super) masses: Vec<f64>,
+    pub(super) texts: [TextColumn; 3],
+}
+
+impl TopologyAtoms {
+    pub(super) fn into_particles(self) -> RawParticles {
+        let attribute = |name: &str, data| Attribute { name: name.to_owned(), components: 1, data };
+        let attributes = vec![
+            attribute(ELEMENT, AttributeData::I32(self.elements)),
+            attribute(RESIDUE, AttributeData::I32(self.residues)),
+            attribute("charge", AttributeData::F64(self.charges)),
+            attribute("mass", AttributeData::F64(self.masses)),
+        ];
+        let mut particles = RawParticles { attributes, ..RawParticles::default() };
+        self.texts.into_iter().for_each(|column| column.add_to(&mut particles));
+        particles
+    }
+}
+
+/// A number for a column of i32; 0 beyond it.
+pub(super) fn code(number: i64) -> i32 {
+    i32::try_from(number).unwrap_or_default()
+}
+
 /// The columns `first..end` of a line, from 0, without blanks around; empty where the line is shorter.
 pub(super) fn field(line: &[u8], first: usize, end: usize) -> &[u8] {
     let end = end.min(line.len());

@@ -25,7 +25,6 @@ pub mod hdf5;
 pub mod houdini;
 mod input;
 pub mod lammps;
-mod masses;
 pub mod mdcrd;
 pub mod mmcif;
 #[cfg(test)]

@@ -7,13 +7,10 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use super::atoms::{self, ELEMENT, RESIDUE};
-use super::masses;
+use super::atoms::{self, TopologyAtoms, code};
 use super::text::{self, Line, Lines};
 use super::texts::{CODE_LEN, TextColumn};
-use spherule_frame::{
-    Attribute, AttributeData, Bond, MemoryBudget, ParseError, RawParticles, names,
-};
+use spherule_frame::{Bond, MemoryBudget, ParseError, RawParticles, masses, names};
 
 /// Charges are stored in units of kcal and A: times the square root of Coulomb's constant in these.
 const CHARGE_UNIT: f64 = 18.2223;
@@ -215,18 +212,8 @@ impl<'a> Prmtop<'a> {
                 }
             }
         }
-        let attribute = |name: &str, data| Attribute { name: name.to_owned(), components: 1, data };
-        let attributes = vec![
-            attribute(ELEMENT, AttributeData::I32(elements)),
-            attribute(RESIDUE, AttributeData::I32(residue_numbers)),
-            attribute("charge", AttributeData::F64(charges)),
-            attribute("mass", AttributeData::F64(masses)),
-        ];
-        let mut particles = RawParticles { attributes, ..RawParticles::default() };
-        for column in texts {
-            column.add_to(&mut particles);
-        }
-        Ok(particles)
+        let residues = residue_numbers;
+        Ok(TopologyAtoms { elements, residues, charges, masses, texts }.into_particles())
     }
 
     /// Adds the `count` bonds of the section `name`: indices of coordinates of two of the `atoms` atoms, and a type.
@@ -281,14 +268,11 @@ fn has_own_masses(masses: &[f64]) -> bool {
     !masses.iter().any(|mass| (2.1..3.9).contains(mass))
 }
 
-fn code(number: i64) -> i32 {
-    i32::try_from(number).unwrap_or_default()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::read::damage::{attribute, names, numbers, sample};
+    use spherule_frame::AttributeData;
 
     const TEXT: &str = "%VERSION  VERSION_STAMP = V0001.000
 %FLAG TITLE

@@ -4,12 +4,10 @@
 //! may be missing), residue, name of the residue, name, type, charge, mass. Behind a count and `!NBOND` are the numbers of the atoms of
 //! each bond, from 1. Nothing else of it is read. After the manual of CHARMM.
 
-use super::atoms::{self, ELEMENT, RESIDUE};
+use super::atoms::{self, TopologyAtoms, code};
 use super::text::{self, Line, Lines};
 use super::texts::{CODE_LEN, TextColumn};
-use spherule_frame::{
-    Attribute, AttributeData, Bond, MemoryBudget, ParseError, RawParticles, names,
-};
+use spherule_frame::{Bond, MemoryBudget, ParseError, RawParticles, names};
 
 /// What follows the count in the heading of the atoms.
 const ATOMS: &[u8] = b"!NATOM";
@@ -74,19 +72,9 @@ pub fn read(bytes: &[u8], budget: MemoryBudget) -> Result<(usize, RawParticles),
         charges.push(charge);
         masses.push(mass);
     }
-    let attribute = |name: &str, data| Attribute { name: name.to_owned(), components: 1, data };
-    let attributes = vec![
-        attribute(ELEMENT, AttributeData::I32(elements)),
-        attribute(RESIDUE, AttributeData::I32(residues)),
-        attribute("charge", AttributeData::F64(charges)),
-        attribute("mass", AttributeData::F64(masses)),
-    ];
     let bonds = bonds(&mut lines, count, budget)?;
-    let mut particles = RawParticles { attributes, bonds, ..RawParticles::default() };
-    for column in texts {
-        column.add_to(&mut particles);
-    }
-    Ok((count, particles))
+    let atoms = TopologyAtoms { elements, residues, charges, masses, texts };
+    Ok((count, RawParticles { bonds, ..atoms.into_particles() }))
 }
 
 /// Whether the `words` of an atom have a segment. Without one, charge and mass come one word earlier, and an integer
@@ -147,13 +135,10 @@ fn bonds(
     Ok(bonds)
 }
 
-fn code(number: i64) -> i32 {
-    i32::try_from(number).unwrap_or_default()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use spherule_frame::AttributeData;
 
     const TEXT: &str = "PSF EXT\n\n 1 !NTITLE\n* made by hand\n\n 2 !NATOM\n \
         1 SYS 7 SOL OW OT -0.834 15.9994 0\n 2 SYS 7 SOL HW1 HT 0.417 1.008 0\n\n 2 !NBOND: bonds\n \

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use super::header::{DataHeader, code, malformed};
+use crate::read::category;
 use crate::read::input::TextInput;
 use crate::read::text::{self, Line};
-use crate::read::{category, masses};
 use spherule_files::escape_controls;
-use spherule_frame::{MemoryBudget, ParseError};
+use spherule_frame::{MemoryBudget, ParseError, masses};
 
 /// Bytes of a type in memory, with its name.
 const TYPE_LEN: usize = 256;

@@ -19,7 +19,7 @@ const TOLERANCE: f64 = 0.02;
 const METHYLENE: f64 = 14.027;
 
 /// The atomic number of the element whose weight is nearest to `mass` and differs by at most 0.02; deuterium is hydrogen.
-pub(super) fn element(mass: f64) -> Option<i32> {
+pub fn element(mass: f64) -> Option<i32> {
     let is_near = |weight: f64| weight > 0.0 && (mass - weight).abs() <= TOLERANCE;
     if is_near(2.014) {
         return Some(1);
