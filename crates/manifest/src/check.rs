@@ -15,9 +15,6 @@ use super::rule::{Rule, rules};
 use super::tree::TomlNode;
 use super::{Manifest, ManifestError};
 
-/// Materials of the particles, of spray and of the ground.
-const BASIC_MATERIALS: usize = 3;
-
 /// Maximum number of clips.
 const MAX_CLIPS: usize = 64;
 
@@ -137,7 +134,7 @@ impl Manifest {
         }
         // All that has a material of its own has a place in the scene
         let parts = self.material.parts.len();
-        let others = BASIC_MATERIALS
+        let others = MaterialId::BASIC
             + usize::from(self.cell.visible)
             + usize::from(self.trails.frames > 0)
             + usize::from(self.bonds.find != BondSearch::None)

@@ -215,7 +215,7 @@ fn forge(whole: &[u8], index: &FrameIndex) -> Result<RawParticles, ParseError> {
     forge_bytes(whole, &index, details)
 }
 
-/// Reads `whole` with other bytes of the index, of which so many are details.
+/// Reads `whole` with its index replaced by `index`, whose first bytes are so many `details`.
 fn forge_bytes(whole: &[u8], index: &[u8], details: usize) -> Result<RawParticles, ParseError> {
     let offset = 24..32;
     let offset = u64::from_le_bytes(whole[offset].try_into().expect("8 bytes"));

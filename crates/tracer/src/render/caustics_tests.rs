@@ -82,8 +82,9 @@ fn image(body: &dyn Shape, meshes: &[MeshTree], scene: &Scene, settings: &Render
 }
 
 fn surfaces(meshes: &[MeshTree]) -> Vec<MeshSurface<'_>> {
-    let surface =
-        |(i, tree)| MeshSurface::new(tree, VisibleFaces::Both, MaterialId::at(3 + i).unwrap());
+    let surface = |(i, tree)| {
+        MeshSurface::new(tree, VisibleFaces::Both, MaterialId::at(MaterialId::BASIC + i).unwrap())
+    };
     meshes.iter().enumerate().map(surface).collect()
 }
 
@@ -270,7 +271,7 @@ fn a_glossy_mesh_reflects_caustics() {
     let mut scene = scene(DVec3::new(0.0, 0.0, 4.0), DVec3::ZERO, lights);
     scene.ground = None;
     scene.add(matte(1.0)).unwrap();
-    scene.materials[3].finish = Finish::Plastic { roughness: 0.6 };
+    scene.materials[MaterialId::BASIC].finish = Finish::Plastic { roughness: 0.6 };
     let settings = with_photons(400_000, 64, 0);
     let above = image(&Solid::slab(5.0, 6.0), std::slice::from_ref(&mesh), &scene, &settings);
     // The same without water, attenuated by both surfaces and reflections between them
@@ -289,7 +290,7 @@ fn light_of_photons_is_the_same_on_any_number_of_threads_and_for_all_instruction
         light(LightKind::Sphere { center: Vec3::new(3.0, 3.0, 5.0), radius: 0.4 }, 20.0),
     ];
     let (mut scene, mesh) = mesh_floor(lights);
-    scene.materials[3].finish = Finish::Plastic { roughness: 0.3 };
+    scene.materials[MaterialId::BASIC].finish = Finish::Plastic { roughness: 0.3 };
     let catcher =
         Ground { shadow_catcher: Some(0.8), height: -0.5, ..floor(Vec::new()).ground.unwrap() };
     scene.ground = Some(catcher);

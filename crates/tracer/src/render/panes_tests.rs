@@ -85,7 +85,13 @@ fn image(
     settings: &RenderSettings,
 ) -> Film {
     let meshes: Vec<MeshSurface<'_>> = (meshes.iter().enumerate())
-        .map(|(i, tree)| MeshSurface::new(tree, VisibleFaces::Both, MaterialId::at(3 + i).unwrap()))
+        .map(|(i, tree)| {
+            MeshSurface::new(
+                tree,
+                VisibleFaces::Both,
+                MaterialId::at(MaterialId::BASIC + i).unwrap(),
+            )
+        })
         .collect();
     let mut shapes: Vec<&dyn Shape> = vec![balls];
     shapes.extend(meshes.iter().map(|mesh| mesh as &dyn Shape));

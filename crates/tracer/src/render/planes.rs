@@ -91,7 +91,7 @@ struct Row {
     denoiser_use: DenoiserUse,
 }
 
-/// The numbers of a pixel, each of which is a channel of a file.
+/// The components of a pixel. Each is a channel of image files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Components {
     /// One number; its channel has the name of the plane.

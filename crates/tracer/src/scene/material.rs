@@ -20,6 +20,8 @@ impl MaterialId {
     pub const SPRAY: Self = Self(1);
     /// The ground.
     pub const GROUND: Self = Self(2);
+    /// Number of the materials that every scene has: those above.
+    pub const BASIC: usize = 3;
     /// Maximum number of materials of a scene.
     pub const MAX: usize = 1 << 16;
 

@@ -167,7 +167,8 @@ impl Scene {
     /// The materials of a scene without meshes, rods and parts.
     pub fn basic_materials(particles: Material) -> Vec<Material> {
         let spray = Material { owner: Owner::Spray, ..Material::matte(SPRAY_COLOR) };
-        vec![particles, spray, material::MATTE]
+        let basic: [Material; MaterialId::BASIC] = [particles, spray, material::MATTE];
+        basic.to_vec()
     }
 
     /// Adds the material of a mesh or of rods; None if there are [`MaterialId::MAX`] already.
@@ -190,11 +191,6 @@ impl Scene {
         let number = u16::try_from(self.materials.iter().filter(is_of_kind).count()).ok()?;
         self.materials.push(Material { owner: owner(number), ..material });
         Some(id)
-    }
-
-    /// The ids of all materials.
-    pub fn ids(&self) -> impl Iterator<Item = MaterialId> + use<> {
-        (0..self.materials.len()).map_while(MaterialId::at)
     }
 
     /// The material with an `id`.

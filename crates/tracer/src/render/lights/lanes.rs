@@ -4,8 +4,8 @@
 
 use glam::Vec3;
 
-use super::light::{Emission, LightSamples};
-use spherule_tree::math::{LANES, Lanes, Lanes3, lane_kernel};
+use super::light::{Emission, Light, LightSamples, PhotonSource};
+use spherule_tree::math::{LANES, Lanes, Lanes3, Supported, lane_kernel};
 use spherule_tree::ray::RayPacket;
 
 /// A sample of a light at one point; see [`LightSamples`].
@@ -32,12 +32,46 @@ pub(super) struct LightHit {
 }
 
 /// A light that rays can hit.
-pub(super) trait LightExtent {
+pub(super) trait LightExtent: SampledLight + Sync {
     /// Its radiance, linear RGB.
     fn radiance(&self) -> Vec3;
 
+    /// Where its photons come from.
+    fn photon_source(&self) -> PhotonSource;
+
+    /// Whether the camera sees it.
+    fn is_visible(&self) -> bool;
+
     /// Intersects a ray with it.
     fn hit(&self, origin: [f32; 3], direction: [f32; 3]) -> LightHit;
+}
+
+impl<L: LightExtent> Light for L {
+    fn sample_li(
+        &self,
+        simd: Supported,
+        start: &Lanes3,
+        u: &[Lanes; 2],
+        samples: &mut LightSamples,
+    ) {
+        sample_lanes(simd, self, start, u, samples);
+    }
+
+    fn has_extent(&self) -> bool {
+        true
+    }
+
+    fn photon_source(&self) -> Option<PhotonSource> {
+        Some(LightExtent::photon_source(self))
+    }
+
+    fn is_visible(&self) -> bool {
+        LightExtent::is_visible(self)
+    }
+
+    fn intersect(&self, simd: Supported, rays: &RayPacket, emission: &mut Emission) {
+        intersect_lanes(simd, self, rays, emission);
+    }
 }
 
 #[inline(always)]
@@ -87,5 +121,5 @@ fn intersect_body<L: LightExtent>(light: &L, rays: &RayPacket, emission: &mut Em
 
 lane_kernel! {
     /// [`Light::intersect`](super::Light::intersect).
-    pub(super) fn intersect_lanes<L: LightExtent>(light: &L, rays: &RayPacket, emission: &mut Emission) = intersect_body;
+    fn intersect_lanes<L: LightExtent>(light: &L, rays: &RayPacket, emission: &mut Emission) = intersect_body;
 }

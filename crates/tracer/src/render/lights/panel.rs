@@ -9,14 +9,10 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 
-use super::lanes::{
-    LightExtent, LightHit, LightSample, SampledLight, intersect_lanes, sample_lanes,
-};
-use super::light::{Emission, Light, LightSamples, PhotonSource};
+use super::lanes::{LightExtent, LightHit, LightSample, SampledLight};
+use super::light::PhotonSource;
 use crate::render::shading::disc;
 use spherule_tree::math::functions::{acos, sin_cos};
-use spherule_tree::math::{Lanes, Lanes3, Supported};
-use spherule_tree::ray::RayPacket;
 
 /// Solid angle in steradians from which a rectangle is sampled in it.
 const MIN_SOLID_ANGLE: f32 = 0.05;
@@ -60,41 +56,6 @@ impl PanelLight {
             }
         }
         own
-    }
-}
-
-impl Light for PanelLight {
-    fn sample_li(
-        &self,
-        simd: Supported,
-        start: &Lanes3,
-        u: &[Lanes; 2],
-        samples: &mut LightSamples,
-    ) {
-        sample_lanes(simd, self, start, u, samples);
-    }
-
-    fn has_extent(&self) -> bool {
-        true
-    }
-
-    fn photon_source(&self) -> Option<PhotonSource> {
-        Some(PhotonSource::Panel {
-            center: self.center,
-            axes: self.axes,
-            half: self.half,
-            is_ellipse: self.outline == Outline::Ellipse,
-            area: self.area(),
-            radiance: self.radiance,
-        })
-    }
-
-    fn is_visible(&self) -> bool {
-        self.is_visible
-    }
-
-    fn intersect(&self, simd: Supported, rays: &RayPacket, emission: &mut Emission) {
-        intersect_lanes(simd, self, rays, emission);
     }
 }
 
@@ -214,6 +175,21 @@ impl SampledLight for PanelLight {
 }
 
 impl LightExtent for PanelLight {
+    fn photon_source(&self) -> PhotonSource {
+        PhotonSource::Panel {
+            center: self.center,
+            axes: self.axes,
+            half: self.half,
+            is_ellipse: self.outline == Outline::Ellipse,
+            area: self.area(),
+            radiance: self.radiance,
+        }
+    }
+
+    fn is_visible(&self) -> bool {
+        self.is_visible
+    }
+
     #[inline(always)]
     fn radiance(&self) -> Vec3 {
         self.radiance

@@ -6,13 +6,9 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 
-use super::lanes::{
-    LightExtent, LightHit, LightSample, SampledLight, intersect_lanes, sample_lanes,
-};
-use super::light::{Emission, Light, LightSamples, PhotonSource};
+use super::lanes::{LightExtent, LightHit, LightSample, SampledLight};
+use super::light::PhotonSource;
 use crate::render::shading::in_cone;
-use spherule_tree::math::{Lanes, Lanes3, Supported};
-use spherule_tree::ray::RayPacket;
 
 /// See the module.
 #[derive(Debug, Clone, Copy)]
@@ -21,38 +17,6 @@ pub(super) struct SphereLight {
     pub(super) radius: f32,
     pub(super) radiance: Vec3,
     pub(super) is_visible: bool,
-}
-
-impl Light for SphereLight {
-    fn sample_li(
-        &self,
-        simd: Supported,
-        start: &Lanes3,
-        u: &[Lanes; 2],
-        samples: &mut LightSamples,
-    ) {
-        sample_lanes(simd, self, start, u, samples);
-    }
-
-    fn has_extent(&self) -> bool {
-        true
-    }
-
-    fn photon_source(&self) -> Option<PhotonSource> {
-        Some(PhotonSource::Sphere {
-            center: self.center,
-            radius: self.radius,
-            radiance: self.radiance,
-        })
-    }
-
-    fn is_visible(&self) -> bool {
-        self.is_visible
-    }
-
-    fn intersect(&self, simd: Supported, rays: &RayPacket, emission: &mut Emission) {
-        intersect_lanes(simd, self, rays, emission);
-    }
 }
 
 /// The sphere as seen from a point at `to_center` from its centre.
@@ -138,6 +102,14 @@ impl SampledLight for SphereLight {
 }
 
 impl LightExtent for SphereLight {
+    fn photon_source(&self) -> PhotonSource {
+        PhotonSource::Sphere { center: self.center, radius: self.radius, radiance: self.radiance }
+    }
+
+    fn is_visible(&self) -> bool {
+        self.is_visible
+    }
+
     #[inline(always)]
     fn radiance(&self) -> Vec3 {
         self.radiance

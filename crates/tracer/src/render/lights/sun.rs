@@ -6,13 +6,9 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 
-use super::lanes::{
-    LightExtent, LightHit, LightSample, SampledLight, intersect_lanes, sample_lanes,
-};
-use super::light::{Beam, Emission, Light, LightSamples, PhotonSource};
+use super::lanes::{LightExtent, LightHit, LightSample, SampledLight};
+use super::light::{Beam, PhotonSource};
 use crate::render::shading::in_cone;
-use spherule_tree::math::{Lanes, Lanes3, Supported};
-use spherule_tree::ray::RayPacket;
 
 /// See the module.
 #[derive(Debug, Clone, Copy)]
@@ -43,38 +39,6 @@ impl SunLight {
     }
 }
 
-impl Light for SunLight {
-    fn sample_li(
-        &self,
-        simd: Supported,
-        start: &Lanes3,
-        u: &[Lanes; 2],
-        samples: &mut LightSamples,
-    ) {
-        sample_lanes(simd, self, start, u, samples);
-    }
-
-    fn has_extent(&self) -> bool {
-        true
-    }
-
-    fn photon_source(&self) -> Option<PhotonSource> {
-        Some(PhotonSource::Distant(Beam {
-            to_light: self.to_light,
-            cap: self.cap,
-            irradiance: self.irradiance,
-        }))
-    }
-
-    fn is_visible(&self) -> bool {
-        self.is_visible
-    }
-
-    fn intersect(&self, simd: Supported, rays: &RayPacket, emission: &mut Emission) {
-        intersect_lanes(simd, self, rays, emission);
-    }
-}
-
 impl SampledLight for SunLight {
     #[inline(always)]
     fn sampled(&self, _point: [f32; 3], u: [f32; 2]) -> LightSample {
@@ -88,6 +52,18 @@ impl SampledLight for SunLight {
 }
 
 impl LightExtent for SunLight {
+    fn photon_source(&self) -> PhotonSource {
+        PhotonSource::Distant(Beam {
+            to_light: self.to_light,
+            cap: self.cap,
+            irradiance: self.irradiance,
+        })
+    }
+
+    fn is_visible(&self) -> bool {
+        self.is_visible
+    }
+
     #[inline(always)]
     fn radiance(&self) -> Vec3 {
         self.radiance

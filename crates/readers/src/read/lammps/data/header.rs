@@ -30,10 +30,6 @@ pub(super) struct DataHeader {
 const SHAPES: [(&[u8], &str); 4] =
     [(b"ellipsoids", "ellipsoid"), (b"lines", "line"), (b"triangles", "tri"), (b"bodies", "body")];
 
-pub(super) fn malformed(at: usize, what: impl Into<String>) -> ParseError {
-    ParseError::malformed(at, what)
-}
-
 /// The part of a line before a comment.
 pub(super) fn code(line: &[u8]) -> &[u8] {
     line.split(|byte| *byte == b'#').next().unwrap_or_default().trim_ascii()
@@ -43,7 +39,7 @@ impl DataHeader {
     /// Reads the title and all lines up to the first heading.
     ///
     /// # Errors
-    /// [`ParseError::Malformed`] if a count or a bound is not a number, or there is no number of atoms.
+    /// [`ParseError::Malformed`] if a count or a bound is not a number, or the number of atoms is missing.
     pub(super) fn parse(text: &mut TextInput<'_>) -> Result<Self, ParseError> {
         let units = text.line().and_then(|title| units(title.text));
         let mut header = Self { units, ..Self::default() };
@@ -57,7 +53,10 @@ impl DataHeader {
         if header.has_atoms {
             return Ok(header);
         }
-        Err(malformed(text.at(), "no line with the number of atoms, such as `12 atoms`"))
+        Err(ParseError::malformed(
+            text.at(),
+            "no line with the number of atoms, such as `12 atoms`",
+        ))
     }
 
     fn add(&mut self, line: Line<'_>) -> Result<(), ParseError> {
@@ -122,7 +121,7 @@ fn count(line: Line<'_>, word: &[u8]) -> Result<usize, ParseError> {
     let count = text::integer(word).and_then(|count| usize::try_from(count).ok());
     count.ok_or_else(|| {
         let what = format!("{} in {} is not a count", text::shown(word), text::shown(line.text));
-        malformed(line.at, what)
+        ParseError::malformed(line.at, what)
     })
 }
 
@@ -130,7 +129,7 @@ fn range(line: Line<'_>, words: [&[u8]; 2]) -> Result<[f64; 2], ParseError> {
     let [lo, hi] = numbers(line, words)?;
     if hi < lo {
         let what = format!("the box ends before it begins: {}", text::shown(line.text));
-        return Err(malformed(line.at, what));
+        return Err(ParseError::malformed(line.at, what));
     }
     Ok([lo, hi])
 }
@@ -140,7 +139,7 @@ fn numbers<const N: usize>(line: Line<'_>, words: [&[u8]; N]) -> Result<[f64; N]
     for (number, word) in numbers.iter_mut().zip(words) {
         *number = text::number(word).ok_or_else(|| {
             let what = format!("{} in a line of the box is not a number", text::shown(word));
-            malformed(line.at, what)
+            ParseError::malformed(line.at, what)
         })?;
     }
     Ok(numbers)

@@ -23,7 +23,7 @@ mod rows;
 mod style;
 mod types;
 
-use header::{DataHeader, code, malformed};
+use header::{DataHeader, code};
 use rows::{Columns, IdOrder};
 use style::AtomColumns;
 use types::AtomTypes;
@@ -177,7 +177,10 @@ impl DataFile {
     fn order(&self, section: &Section) -> Result<&IdOrder, ParseError> {
         let atoms = self.atoms.as_ref();
         atoms.map(|atoms| &atoms.order).ok_or_else(|| {
-            malformed(section.at, format!("section {} stands before section Atoms", section.name))
+            ParseError::malformed(
+                section.at,
+                format!("section {} stands before section Atoms", section.name),
+            )
         })
     }
 
@@ -224,7 +227,7 @@ impl DataFile {
     ) -> Result<(), ParseError> {
         let ColumnValues::Whole(numbers) = values else {
             let what = "an atom type is not an integer: write the style behind the heading, as `Atoms # charge`";
-            return Err(malformed(section.at, what));
+            return Err(ParseError::malformed(section.at, what));
         };
         for number in numbers {
             if has_labels {
@@ -235,7 +238,7 @@ impl DataFile {
                     "an atom has the type {number}, which the header does not count; if the style is another one, write \
                      it behind the heading, as `Atoms # charge`"
                 );
-                return Err(malformed(section.at, what));
+                return Err(ParseError::malformed(section.at, what));
             }
         }
         Ok(())
@@ -259,7 +262,7 @@ impl DataFile {
             } else {
                 format!("section Velocities lacks the atom {atom} of section Atoms")
             };
-            return Err(malformed(section.at, what));
+            return Err(ParseError::malformed(section.at, what));
         }
         match values.next().map(|values| order.apply(values, 3)) {
             Some(ColumnValues::Real(velocities)) => Ok(velocities),
@@ -334,14 +337,14 @@ fn check_end(text: &mut TextInput<'_>, section: &Section) -> Result<(), ParseErr
     match text.peek_line() {
         Some(line) if line.text.trim_ascii_start().first().is_some_and(u8::is_ascii_digit) => {
             let what = format!("section {} has more lines than the header says", section.name);
-            Err(malformed(line.at, what))
+            Err(ParseError::malformed(line.at, what))
         }
         _ => Ok(()),
     }
 }
 
 fn cut_short(text: &TextInput<'_>, what: &str) -> ParseError {
-    malformed(text.at(), format!("{what}: {CUT_SHORT}"))
+    ParseError::malformed(text.at(), format!("{what}: {CUT_SHORT}"))
 }
 
 #[cfg(test)]

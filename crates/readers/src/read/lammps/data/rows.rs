@@ -2,7 +2,6 @@
 
 use rayon::prelude::*;
 
-use super::header::malformed;
 use super::{Section, cut_short};
 use crate::read::input::TextInput;
 use crate::read::table::{
@@ -83,7 +82,7 @@ pub(super) fn read(
     }
     let what =
         format!("section {} has {found} lines and not the {count} of the header", section.name);
-    Err(malformed(section.at, what))
+    Err(ParseError::malformed(section.at, what))
 }
 
 /// The order of atoms by their ids.
@@ -107,7 +106,7 @@ impl IdOrder {
     ) -> Result<Self, ParseError> {
         let ColumnValues::Whole(ids) = ids else {
             let what = format!("an id of an atom in section {} is not an integer", section.name);
-            return Err(malformed(section.at, what));
+            return Err(ParseError::malformed(section.at, what));
         };
         if ids.is_sorted_by(|a, b| a < b) {
             return Ok(Self { ids, lines: None });
@@ -122,7 +121,7 @@ impl IdOrder {
         match sorted.windows(2).find(|pair| pair[0] == pair[1]) {
             Some(pair) => {
                 let what = format!("section {} has the atom {} twice", section.name, pair[0]);
-                Err(malformed(section.at, what))
+                Err(ParseError::malformed(section.at, what))
             }
             None => Ok(Self { ids: sorted, lines: Some(lines) }),
         }
@@ -164,14 +163,17 @@ impl IdOrder {
     ) -> Result<Vec<Bond>, ParseError> {
         let values = read(text, section, count, Columns::bonds(), budget)?.into_iter().next();
         let Some(ColumnValues::Whole(atoms)) = values else {
-            return Err(malformed(
+            return Err(ParseError::malformed(
                 section.at,
                 "an id of an atom in section Bonds is not an integer",
             ));
         };
         budget.check(24 * count as u64, "its bonds in memory are")?;
         let unknown = |id: i64| {
-            malformed(section.at, format!("a bond has the atom {id}, which section Atoms lacks"))
+            ParseError::malformed(
+                section.at,
+                format!("a bond has the atom {id}, which section Atoms lacks"),
+            )
         };
         let index = |id: i64| self.index(id).ok_or_else(|| unknown(id));
         let (pairs, _) = atoms.as_chunks::<2>();

@@ -2,7 +2,7 @@
 //!
 //! Files name the style behind the heading, as `Atoms # full`, or not. After the page `read_data` of the LAMMPS manual.
 
-use super::header::{DataHeader, malformed};
+use super::header::{DataHeader, code};
 use crate::read::table::{NumberKind, TargetArray, TargetComponent, TextPolicy};
 use crate::read::text::{self, Line};
 use spherule_frame::ParseError;
@@ -64,8 +64,7 @@ impl AtomColumns {
         comment: &[u8],
         first: Line<'_>,
     ) -> Result<Self, ParseError> {
-        let code = first.text.split(|byte| *byte == b'#').next().unwrap_or_default();
-        let words: Vec<&[u8]> = text::words(code).take(MAX_WORDS).collect();
+        let words: Vec<&[u8]> = text::words(code(first.text)).take(MAX_WORDS).collect();
         let named =
             text::words(comment).next().and_then(|word| by_name(&String::from_utf8_lossy(word)));
         let Some((style, names)) = named.or_else(|| guess(&words, header)) else {
@@ -74,7 +73,7 @@ impl AtomColumns {
                 words.len(),
                 text::shown(first.text)
             );
-            return Err(malformed(first.at, what));
+            return Err(ParseError::malformed(first.at, what));
         };
         let names: Vec<&str> = names.split(' ').collect();
         let rest = words.get(names.len()..).unwrap_or_default();

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::header::{DataHeader, code, malformed};
+use super::header::{DataHeader, code};
 use crate::read::category;
 use crate::read::input::TextInput;
 use crate::read::text::{self, Line};
@@ -54,7 +54,7 @@ impl AtomTypes {
             let number = words.first().and_then(|word| text::integer(word));
             let (Some(number), Some(label)) = (number.filter(|n| header.is_type(*n)), words.get(1)) else {
                 let what = format!("{} is not the number of an atom type and a label", text::shown(line.text));
-                return Err(malformed(line.at, what));
+                return Err(ParseError::malformed(line.at, what));
             };
             for word in [label, words[0]] {
                 let other = types.codes.insert(category::code(word), number);
@@ -93,7 +93,7 @@ impl AtomTypes {
                     "{} is not the number of an atom type and its mass",
                     text::shown(line.text)
                 );
-                return Err(malformed(line.at, what));
+                return Err(ParseError::malformed(line.at, what));
             };
             types.masses.insert(number, mass);
             let comment = line.text.splitn(2, |byte| *byte == b'#').nth(1).unwrap_or_default();
