@@ -52,7 +52,6 @@ pub(super) fn skip_words(text: &mut TextInput<'_>, count: usize) -> Result<(), P
 /// # Errors
 /// [`ParseError::Malformed`] if the text ends before that many.
 pub(super) fn skip_integers(text: &mut TextInput<'_>, count: usize) -> Result<(), ParseError> {
-    check_room(text, count)?;
     let is_integer = |word: &[u8]| word.iter().all(|b| b.is_ascii_digit() || *b == b'-');
     let mut done = 0;
     loop {

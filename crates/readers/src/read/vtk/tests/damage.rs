@@ -84,6 +84,16 @@ fn truncation_is_detected() {
     check_cuts(&large, (0..large.len()).step_by(97));
 }
 
+/// Of a known length or not: a count of cells that the rest of the file has no room for is as wrong as a smaller one.
+#[test]
+fn wrong_counts_of_cells_are_read_in_pieces_too() {
+    let whole = sample("public_splashsurf/cube_8_particles.vtk");
+    let text = String::from_utf8(whole.clone()).unwrap();
+    let wrong = text.replace("CELLS 9 8", "CELLS 9 80");
+    assert_ne!(text, wrong);
+    assert_eq!(good(wrong.as_bytes()).positions, good(&whole).positions);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(256) })]
 
