@@ -113,7 +113,7 @@ impl Value for Condition {
 
     /// All but comparisons is beyond it.
     fn schema(_: &Key) -> Json {
-        json!({ "type": "string", "pattern": "<|>|==|!=" })
+        json!({ "type": "string", "pattern": "<|>|==|!=| in |within" })
     }
 }
 

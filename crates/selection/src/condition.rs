@@ -13,7 +13,7 @@
 //! sum        = product { ("+" | "-") product }
 //! product    = unary { ("*" | "/") unary }
 //! unary      = [ "-" | "+" | "!" ] unary | primary
-//! primary    = number | name | name "[" number "]" | function "(" sum { "," sum } ")" | "(" condition ")"
+//! primary    = number | name | "within" number "of" "(" condition ")" | name "[" number "]" | function "(" sum { "," sum } ")" | "(" condition ")"
 //! ```
 
 use std::fmt;
@@ -38,6 +38,16 @@ pub struct Condition {
     pub(super) operations: Vec<Operation>,
     pub(super) names: Vec<NameUse>,
     pub(super) texts: Vec<TextUse>,
+    /// Conditions on others that a particle is near.
+    pub(super) neighbours: Vec<NeighbourUse>,
+}
+
+/// Others that a particle is near: `within 5 of (type == 1)`.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct NeighbourUse {
+    pub(super) distance: f64,
+    /// The condition on them, in postfix order.
+    pub(super) operations: Vec<Operation>,
 }
 
 /// A text that a value is compared with.
@@ -100,6 +110,8 @@ pub(super) enum Operation {
     Not,
     And,
     Or,
+    /// Whether a particle is near those of [`NeighbourUse`] with this index.
+    Near(usize),
 }
 
 /// The kind of a part of a condition.
@@ -129,6 +141,7 @@ impl Condition {
             operations: Vec::new(),
             names: Vec::new(),
             texts: Vec::new(),
+            neighbours: Vec::new(),
         };
         let kind = parser.any()?;
         // Explain what is left over
@@ -147,8 +160,8 @@ impl Condition {
                 "this is a number, not a condition; compare it, as in `speed > 2`".to_owned();
             return Err(parser.error(1, what));
         }
-        let Parser { operations, names, texts, .. } = parser;
-        Ok(Self { text: text.to_owned(), operations, names, texts })
+        let Parser { operations, names, texts, neighbours, .. } = parser;
+        Ok(Self { text: text.to_owned(), operations, names, texts, neighbours })
     }
 
     /// The text as it was written.
@@ -177,6 +190,7 @@ struct Parser {
     operations: Vec<Operation>,
     names: Vec<NameUse>,
     texts: Vec<TextUse>,
+    neighbours: Vec<NeighbourUse>,
 }
 
 type Parsed = Result<Kind, ConditionError>;
@@ -445,6 +459,10 @@ impl Parser {
         if self.take(&["("]).is_some() {
             return self.function(&name, column);
         }
+        if let ("within", Some(Token::Number(distance))) = (name.as_str(), self.token(0)) {
+            let distance = *distance;
+            return self.neighbours(distance);
+        }
         if name == "not" {
             return Err(self.error(column, "`not` is not a sign of conditions: write !"));
         }
@@ -463,6 +481,31 @@ impl Parser {
         }
         self.operations.push(Operation::Value(index));
         Ok(Kind::Number)
+    }
+
+    /// The condition on others that a particle is within a distance of.
+    fn neighbours(&mut self, distance: f64) -> Parsed {
+        if distance <= 0.0 {
+            return Err(self.error(self.column(), "`within` needs a distance above 0"));
+        }
+        self.next += 1;
+        match self.token(0) {
+            Some(Token::Name(name)) if name == "of" => self.next += 1,
+            _ => {
+                let what = "expected `of` and a condition, as in `within 5 of (type == 1)`";
+                return Err(self.error(self.column(), what));
+            }
+        }
+        self.require("(", "and a condition, as in `within 5 of (type == 1)`")?;
+        let start = self.operations.len();
+        let column = self.column();
+        let found = self.within(Self::any)?;
+        self.check(column, found, Kind::Truth, "within")?;
+        self.require(")", "after the condition")?;
+        let operations = self.operations.split_off(start);
+        self.neighbours.push(NeighbourUse { distance, operations });
+        self.operations.push(Operation::Near(self.neighbours.len() - 1));
+        Ok(Kind::Truth)
     }
 
     /// The arguments of a function, and the parenthesis after them.

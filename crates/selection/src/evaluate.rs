@@ -20,13 +20,22 @@ pub(super) struct Stacks {
     used: [usize; 2],
 }
 
+/// What the operations of a condition work on.
+#[derive(Clone, Copy)]
+pub(super) struct Operands<'a> {
+    /// The values of the names.
+    pub(super) values: &'a [Value<&'a Attribute>],
+    pub(super) texts: &'a [TextValue<Value<&'a Attribute>>],
+    /// Which particles are near others.
+    pub(super) near: &'a [Vec<bool>],
+}
+
 impl Stacks {
-    /// Evaluates `operations` for the particles from `first` on, at most a block of them. `values` are the values of
-    /// the names.
+    /// Evaluates `operations` for the particles from `first` on, at most a block of them.
     pub(super) fn evaluate(
         &mut self,
         operations: &[Operation],
-        (values, texts): (&[Value<&Attribute>], &[TextValue<Value<&Attribute>>]),
+        Operands { values, texts, near }: Operands<'_>,
         context: FileContext<'_>,
         first: usize,
         to: &mut [bool],
@@ -66,6 +75,11 @@ impl Stacks {
                 }
                 Operation::And => self.join(|a, b| a & b),
                 Operation::Or => self.join(|a, b| a | b),
+                Operation::Near(index) => {
+                    let top = self.push_truth();
+                    let count = to.len();
+                    self.truths[top][..count].copy_from_slice(&near[index][first..first + count]);
+                }
             }
         }
         // The last truth is the result

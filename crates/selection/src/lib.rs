@@ -4,6 +4,7 @@
 //! - [`Region`]: half-spaces, boxes and slabs.
 //! - [`Selection`]: those that must hold for a particle. [`Selection::survivors`] finds the particles of a frame, in
 //!   blocks and in parallel; the result does not depend on the number of threads.
+//! - [`Division`]: conditions that divide particles into groups, which are drawn in different ways.
 //!
 //! The other particles are left out after a frame has been read, before anything is computed from it. This crate knows
 //! no settings, and opens no files; `spherule-frame` says what the names of values mean.
@@ -41,8 +42,10 @@ use spherule_frame::{Attribute, AttributeData, Labels, RawParticles};
 use spherule_jobs::FrameRange;
 
 mod condition;
+mod division;
 mod error;
 mod evaluate;
+mod near;
 mod region;
 #[cfg(test)]
 mod tests;
@@ -51,12 +54,14 @@ mod token;
 mod values;
 
 pub use condition::Condition;
+pub use division::{Claim, Divided, Division};
 pub use error::ConditionError;
 pub use region::Region;
 pub use values::{NameFault, UnknownName};
 
-use condition::{NameUse, Operation, TextUse};
-use evaluate::{BLOCK, Stacks};
+use condition::{NameUse, NeighbourUse, Operation, TextUse};
+use evaluate::{BLOCK, Operands, Stacks};
+use near::near;
 use texts::{MissingText, TextValue, code_of};
 use values::{FileContext, value_of};
 
@@ -113,20 +118,23 @@ impl Selection {
         time: Option<f64>,
         (labels, missing): (&Labels, MissingText),
     ) -> Result<(Vec<Value>, Vec<TextValue<Value>>), UnknownName> {
-        let Some(Condition { names, texts, operations, .. }) = &self.condition else {
+        let Some(Condition { names, texts, operations, neighbours, .. }) = &self.condition else {
             return Ok(Default::default());
         };
         let value = |name: &NameUse| value_of(name, attributes, time, self.up);
         let values: Vec<Value> = names.iter().map(value).collect::<Result<_, _>>()?;
         // Numbers of text mean nothing
-        for (index, operation) in operations.iter().enumerate() {
-            if let Operation::Value(of) = *operation
-                && !matches!(operations.get(index + 1), Some(Operation::Text(_)))
-                && let Some(example) = texts::example(&values[of], labels)
-            {
-                let NameUse { name, column } = names[of].clone();
-                let fault = NameFault::NotNumber { example: example.to_owned() };
-                return Err(UnknownName { name, column, fault });
+        let lists = neighbours.iter().map(|neighbour| &neighbour.operations);
+        for operations in std::iter::once(operations).chain(lists) {
+            for (index, operation) in operations.iter().enumerate() {
+                if let Operation::Value(of) = *operation
+                    && !matches!(operations.get(index + 1), Some(Operation::Text(_)))
+                    && let Some(example) = texts::example(&values[of], labels)
+                {
+                    let NameUse { name, column } = names[of].clone();
+                    let fault = NameFault::NotNumber { example: example.to_owned() };
+                    return Err(UnknownName { name, column, fault });
+                }
             }
         }
         // Programs have different names for water: one of a list is enough
@@ -173,7 +181,22 @@ impl Selection {
             TextValue::Value(value) => context.bind(value).map(TextValue::Value),
         };
         let texts: Vec<TextValue<Value<&Attribute>>> = texts.iter().filter_map(bound).collect();
+        // Find those that are near others; a condition on these may contain another one, which comes first
+        let mut all_near: Vec<Vec<bool>> = Vec::new();
+        let neighbours = self.condition.iter().flat_map(|condition| &condition.neighbours);
+        for NeighbourUse { distance, operations } in neighbours {
+            let operands = Operands { values: &values, texts: &texts, near: &all_near };
+            let mut of = vec![false; count];
+            of.par_chunks_mut(BLOCK).enumerate().for_each_init(
+                Stacks::default,
+                |stacks, (i, to)| {
+                    stacks.evaluate(operations, operands, context, i * BLOCK, to);
+                },
+            );
+            all_near.push(near(particles, *distance, &of));
+        }
         // Mark the particles that are kept, in runs that do not depend on the threads
+        let operands = Operands { values: &values, texts: &texts, near: &all_near };
         let ids = id_of(&particles.attributes);
         let mut marks = vec![false; count];
         let runs = marks.par_chunks_mut(RUN).enumerate();
@@ -184,7 +207,7 @@ impl Selection {
                     keep.fill(true);
                     if let Some(condition) = &self.condition {
                         let operations = &condition.operations;
-                        stacks.evaluate(operations, (&values, &texts), context, first, keep);
+                        stacks.evaluate(operations, operands, context, first, keep);
                     }
                     self.test_ids(ids, first, keep);
                     self.test_regions(particles, first, keep);
