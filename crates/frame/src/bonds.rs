@@ -6,7 +6,7 @@ pub type Bond = [u32; 2];
 /// The index of a particle that is left out.
 const GONE: u32 = u32::MAX;
 
-/// Renumbers `bonds` of `count` particles for those with the `kept` indices, which are ascending. Bonds of others are
+/// Renumbers `bonds` of `count` particles for those with the `kept` indices, in their order. Bonds of others are
 /// removed.
 pub fn renumber(bonds: &mut Vec<Bond>, count: usize, kept: &[u32]) {
     if bonds.is_empty() {

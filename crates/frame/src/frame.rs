@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::bonds::{self, Bond};
-use crate::gather::keep;
+use crate::gather::{gather, keep};
 use crate::names::RADII;
 use crate::with_values;
 use crate::{Attribute, AttributeData, Labels, SimulationCell};
@@ -29,6 +29,22 @@ impl Default for Positions {
 }
 
 impl Positions {
+    /// Replaces each position, in order; `moved` works in f64.
+    pub(super) fn each(&mut self, mut moved: impl FnMut(DVec3) -> DVec3) {
+        match self {
+            Self::F32(v) => {
+                for position in v {
+                    *position = moved(position.as_dvec3()).as_vec3();
+                }
+            }
+            Self::F64(v) => {
+                for position in v {
+                    *position = moved(*position);
+                }
+            }
+        }
+    }
+
     /// Particle count.
     pub fn len(&self) -> usize {
         match self {
@@ -221,6 +237,21 @@ impl RawParticles {
         );
     }
 
+    /// Keeps only the particles with these indices, in their order. Arrays are copied one after the other.
+    ///
+    /// # Panics
+    /// If there is no particle with one of the indices.
+    pub fn gather(&mut self, indices: &[u32]) {
+        bonds::renumber(&mut self.bonds, self.positions.len(), indices);
+        match &mut self.positions {
+            Positions::F32(v) => *v = gather(v, 1, indices),
+            Positions::F64(v) => *v = gather(v, 1, indices),
+        }
+        for attribute in &mut self.attributes {
+            with_values!(&mut attribute.data, v => *v = gather(v, attribute.components, indices));
+        }
+    }
+
     /// Bytes of the largest array among positions and attributes.
     pub fn largest_array_len(&self) -> u64 {
         let attributes = self.attributes.iter().map(|a| a.data.byte_len());
@@ -284,12 +315,16 @@ impl ParticleFrame {
         ParticleFrame::kept(relative, origin).with_positions(Cow::into_owned)
     }
 
-    /// Same as [`Self::from_raw`] for the particles with these indices, which are ascending. `file_index` has them.
+    /// Same as [`Self::from_raw`] for the particles with these indices, in their order. `file_index` has them.
     ///
     /// # Panics
     /// If there is no particle with one of the indices.
     pub fn from_selected(mut raw: RawParticles, indices: Vec<u32>, origin: DVec3) -> Self {
-        raw.select(&indices);
+        if indices.is_sorted() {
+            raw.select(&indices);
+        } else {
+            raw.gather(&indices);
+        }
         let mut frame = Self::from_raw(raw, origin);
         frame.file_index = Some(match frame.file_index {
             None => indices,

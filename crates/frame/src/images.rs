@@ -3,6 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use crate::names::ID;
+use crate::whole::make_whole;
 use crate::with_values;
 use crate::{
     Attribute, AttributeData, Bond, MemoryBudget, ParseError, Positions, RawParticles,
@@ -19,11 +20,13 @@ pub struct PeriodicImages {
     pub replicate: [u32; 3],
     /// Whether particles are moved into the cell, along the edges along which it repeats.
     pub wrap: bool,
+    /// Whether molecules are made whole, after wrapping: by their bonds, or without bonds by image flags.
+    pub unwrap: bool,
 }
 
 impl Default for PeriodicImages {
     fn default() -> Self {
-        Self { replicate: [1; 3], wrap: false }
+        Self { replicate: [1; 3], wrap: false, unwrap: false }
     }
 }
 
@@ -39,7 +42,7 @@ impl PeriodicImages {
         a.saturating_mul(b).saturating_mul(c)
     }
 
-    /// Wraps and copies `particles`; the cell grows to all copies. The first particles are those of the file, then follow
+    /// Wraps, unwraps and copies `particles`; the cell grows to all copies. The first particles are those of the file, then follow
     /// the copies, with the number along the first edge rising fastest. Copies have the attributes of the original, and
     /// an attribute `id` with the index in the file if there are no ids.
     ///
@@ -61,7 +64,10 @@ impl PeriodicImages {
             let inverse = cell.fractions().ok_or_else(|| {
                 unsupported("the simulation cell has no volume, so that nothing can be wrapped")
             })?;
-            each_position(&mut particles.positions, |p| wrapped(&cell, inverse, p));
+            particles.positions.each(|p| wrapped(&cell, inverse, p));
+        }
+        if self.unwrap {
+            make_whole(particles, &cell)?;
         }
         if self.count() > 1 {
             self.copy(particles, &cell, budget)?;
@@ -108,7 +114,7 @@ impl PeriodicImages {
         }
         // Move each copy by its image, and enlarge the cell
         let mut index = 0;
-        each_position(&mut particles.positions, |position| {
+        particles.positions.each(|position| {
             let image = index / count;
             index += 1;
             position + self.offset(cell, image)
@@ -173,22 +179,6 @@ fn repeat<T: Copy>(items: &mut Vec<T>, copies: usize) {
     items.reserve_exact(count * (copies - 1));
     for _ in 1..copies {
         items.extend_from_within(..count);
-    }
-}
-
-/// Moves each position in f64, in order.
-fn each_position(positions: &mut Positions, mut moved: impl FnMut(DVec3) -> DVec3) {
-    match positions {
-        Positions::F32(v) => {
-            for position in v {
-                *position = moved(position.as_dvec3()).as_vec3();
-            }
-        }
-        Positions::F64(v) => {
-            for position in v {
-                *position = moved(*position);
-            }
-        }
     }
 }
 
@@ -262,7 +252,7 @@ mod tests {
     #[test]
     fn copies_are_whole_edges_apart_with_the_ids_of_their_originals() {
         let positions = vec![at([0.1, 0.2, 0.3]), at([0.9, -0.4, 0.5])];
-        let images = PeriodicImages { replicate: [2, 3, 1], wrap: false };
+        let images = PeriodicImages { replicate: [2, 3, 1], wrap: false, unwrap: false };
         let copies = applied(images, particles(positions.clone(), [true; 3]));
         assert_eq!(copies.positions.len(), 12);
         let mut index = 0;
@@ -296,7 +286,7 @@ mod tests {
         let positions = [positions, vec![at([0.05, 0.5, 0.5]), at([0.95, 0.5, 0.5])]].concat();
         let mut one = particles(positions, [true; 3]);
         one.bonds = vec![[0, 1], [3, 4]];
-        let images = PeriodicImages { replicate: [2, 1, 2], wrap: false };
+        let images = PeriodicImages { replicate: [2, 1, 2], wrap: false, unwrap: false };
         let copies = applied(images, one);
         // Copies along a have 5 particles each, those along c 10
         let expected = [[[0, 1], [5, 6], [10, 11], [15, 16]], [[3, 9], [8, 4], [13, 19], [18, 14]]];
@@ -315,7 +305,7 @@ mod tests {
             error.to_string()
         };
         let wrap = PeriodicImages { wrap: true, ..PeriodicImages::default() };
-        let copy = |replicate| PeriodicImages { replicate, wrap: false };
+        let copy = |replicate| PeriodicImages { replicate, wrap: false, unwrap: false };
         let unlimited = MemoryBudget::UNLIMITED;
         let one = || particles(vec![ORIGIN; 5], [true; 3]);
         let mut none = one();

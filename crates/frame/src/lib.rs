@@ -49,6 +49,7 @@ mod sampling;
 mod scalar;
 pub mod values;
 mod vectors;
+mod whole;
 
 pub use attribute::{Attribute, AttributeData};
 pub use bonds::Bond;
