@@ -8,7 +8,9 @@ use spherule_formats::sequence::PART_ATTRIBUTE;
 use spherule_formats::{ValueNames, element_symbol};
 use toml::Value;
 
-use crate::manifest::{ColorSetting, Look, Manifest, ManifestSource, Override, ProjectionKind};
+use crate::manifest::{
+    ColorSetting, Look, Manifest, ManifestSource, Override, ProjectionKind, Style,
+};
 use crate::render::IntegratorKind;
 use crate::scene::ColorMap;
 use crate::survey::{BEAD, Category, ELEMENT, Facts, Tank, WallSign, WallValues};
@@ -180,6 +182,10 @@ impl Rules<'_> {
                 [("select.where", "element >= 1 && element <= 118".into())],
                 Some(line.to_owned()),
             );
+        }
+        // Who has styles says what is drawn
+        if !self.manifest.styles.is_empty() {
+            return false;
         }
         // Leave out walls by category, or by their shape
         let is_molecular = self.is_molecular() || self.is_periodic();
@@ -454,6 +460,11 @@ impl Rules<'_> {
 
     /// Whether the colours are those of a map.
     fn has_mapped_colors(&self) -> bool {
+        self.manifest.styles.iter().any(Style::has_legend) || self.has_mapped_particles()
+    }
+
+    /// Whether the colours of particles without a style are those of a map.
+    fn has_mapped_particles(&self) -> bool {
         match &self.manifest.material.color {
             ColorSetting::Rgb(_) => false,
             ColorSetting::Mapped(_) => true,

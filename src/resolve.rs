@@ -6,15 +6,16 @@ use std::sync::Arc;
 use glam::DVec3;
 use spherule_files::memory::available;
 
-use crate::manifest::{Manifest, Side};
+use crate::manifest::{Manifest, Side, StyledManifest};
 use crate::output::PreviewPage;
 use crate::overlay::{Page, RgbaPixels};
 use crate::pipeline::{
-    ColorRule, FileSettings, FrameSize, MemoryModel, ParticleRules, Picture, PictureMesh,
-    RadiusRule, Setup, Things,
+    FileSettings, FrameSize, MemoryModel, ParticleRules, Picture, PictureMesh, RadiusRule, Setup,
+    Things,
 };
 use crate::render::{RenderSettings, RendererKind};
 use crate::scene::{Bounds, RadianceMap, Texture};
+use crate::selection::Division;
 use crate::survey::Survey;
 
 mod arrows;
@@ -41,6 +42,7 @@ mod rods;
 mod scene;
 mod select;
 mod shutter;
+mod styles;
 mod surface;
 
 pub use camera::check_views;
@@ -48,7 +50,7 @@ pub use error::ResolveError;
 use error::require_attribute;
 pub use meshes::mesh_settings;
 pub use overlay::color_bar_of;
-pub use question::question;
+pub use question::Inquiry;
 
 /// Minimum radius as a fraction of the diagonal of the bounds; smaller ones would be invisible in f32.
 const MIN_RADIUS: f64 = 1e-6;
@@ -82,7 +84,9 @@ pub fn setup(
 ) -> Result<Setup, ResolveError> {
     manifest.check_rules()?;
     let survey = camera::with_framed_meshes(survey, manifest, &inputs.meshes);
-    let mut setup = setup_on(manifest, &survey, &inputs, None)?;
+    let styled = manifest.styled();
+    let manifest = &styled.manifest;
+    let mut setup = setup_on(manifest, &styled, &survey, &inputs, None)?;
     let placed = overlay::placed(manifest, &survey, &mut setup);
     let manifest = placed.as_ref();
     if manifest.has_strips() && !setup.picture.files.overlays.is_empty() {
@@ -91,7 +95,7 @@ pub fn setup(
         let mut smaller = manifest.clone();
         let [width, height] = page.picture.map(Side::Pixels);
         (smaller.image.width, smaller.image.height) = (width, height);
-        setup = setup_on(&smaller, &survey, &inputs, Some(page))?;
+        setup = setup_on(&smaller, &styled, &survey, &inputs, Some(page))?;
     }
     check_image_size(&setup)?;
     if let Some(texture) = inputs.ground {
@@ -128,22 +132,26 @@ fn up(manifest: &Manifest, survey: &Survey) -> DVec3 {
 /// manifest then has.
 fn setup_on(
     manifest: &Manifest,
+    styled: &StyledManifest,
     survey: &Survey,
     inputs: &SceneInputs<'_>,
     page: Option<Page>,
 ) -> Result<Setup, ResolveError> {
     // Place the camera around the spheres
-    let radius = radius::rule(manifest, survey)?;
+    let radius = radius::rule(&manifest.input.radius, manifest.surface.kind, survey)?;
     let extent = Extent::of(manifest, survey, &radius);
     let placed = camera::placed(manifest, survey, &extent)?;
-    let color = color::rule(manifest, survey, Some(&placed.camera))?;
+    let range = survey.color.as_ref();
+    let color = color::rule(&manifest.material.color, range, survey, Some(&placed.camera))?;
     // Set up what it sees; things are numbered in the order in which their materials are added
     let mut scene = scene::scene(manifest, survey, inputs.environment, &placed, &extent)?;
     let meshes = meshes::things(&mut scene, manifest, &inputs.meshes);
     let cell = cell::add_cell(&mut scene, manifest, survey);
-    let arrows = arrows::arrows(&mut scene, manifest, survey, &color, extent.reach)?;
-    let trails = arrows::trails(&mut scene, manifest, survey, &color, extent.reach)?;
+    let mut arrows = arrows::arrows(&mut scene, manifest, survey, &color, extent.reach)?;
+    let mut trails = arrows::trails(&mut scene, manifest, survey, &color, extent.reach)?;
     let bonds = bonds::bonds(&mut scene, manifest, survey, &color, extent.reach)?;
+    let looks = styles::Looks { manifest, survey, camera: &placed.camera, reach: extent.reach };
+    let styles = looks.styles(&mut scene, &styled.styles, (&mut arrows, &mut trails))?;
     // Collect the settings of the images
     let (channels, attributes) = channels::channels(manifest, survey)?;
     let denoise = denoise::settings(manifest, scene.particle_material());
@@ -155,7 +163,16 @@ fn setup_on(
     // Put it all together, without overlays
     let picture = Picture {
         origin: survey.origin,
-        particles: particle_rules(manifest, survey, &extent, (radius, color))?,
+        particles: ParticleRules {
+            selection: select::selection(manifest, survey)?,
+            cut: select::cut(manifest, survey)?,
+            radius,
+            least_radius: narrow(extent.bounds.diagonal() * MIN_RADIUS).max(f32::MIN_POSITIVE),
+            color,
+            opacity: opacity::opacity(&manifest.material.opacity, survey)?,
+            division: Division { up: Some(extent.up), ..styled.division.clone() },
+            styles,
+        },
         files: FileSettings {
             exr: images::exr_options(manifest, &attributes, &render, placed.view.projection),
             attributes,
@@ -194,23 +211,6 @@ fn add_overlays(
     setup.picture.files.preview.page =
         page.map(|page| PreviewPage { page, paper: overlay::paper(setup) });
     Ok(())
-}
-
-/// Which particles are drawn, and how each of them looks in the scene.
-fn particle_rules(
-    manifest: &Manifest,
-    survey: &Survey,
-    extent: &Extent,
-    (radius, color): (RadiusRule, ColorRule),
-) -> Result<ParticleRules, ResolveError> {
-    Ok(ParticleRules {
-        selection: select::selection(manifest, survey)?,
-        cut: select::cut(manifest, survey)?,
-        radius,
-        least_radius: narrow(extent.bounds.diagonal() * MIN_RADIUS).max(f32::MIN_POSITIVE),
-        color,
-        opacity: opacity::opacity(manifest, survey)?,
-    })
 }
 
 /// Rejects images that cannot fit into memory, whatever the particles.

@@ -12,7 +12,7 @@ use crate::manifest::{Manifest, ManifestError, ManifestSource, Override};
 use crate::output::{OutputError, SrgbPixels};
 use crate::pipeline::{ImageError, ImageTask, Setup, TracedFrame, trace_particles};
 use crate::render::{Film, RenderError, Stop};
-use crate::resolve::{ResolveError, question};
+use crate::resolve::{Inquiry, ResolveError};
 use crate::scene::{Camera, CameraView, Projection};
 use crate::survey::{Facts, Survey};
 
@@ -144,7 +144,7 @@ pub fn render(
         let what =
             "particles in memory are neither copied nor wrapped; do so before they are rendered";
         return Err(StillError::Setup(RunError::from(ResolveError::Unsupported {
-            key: "cell.replicate, cell.wrap",
+            key: "cell.replicate, cell.wrap, cell.unwrap",
             what: what.to_owned(),
         })));
     }
@@ -153,9 +153,10 @@ pub fn render(
     let files = SceneFiles::new(base);
     // Determine the automatic settings
     let (survey, setup) = catch_panic(|| -> Result<_, StillError> {
-        let selection = manifest.selection();
-        let survey = Survey::of_particles(name, &particles, question(manifest, &selection))
-            .map_err(RunError::from)?;
+        let inquiry = Inquiry::of(manifest);
+        let styles = inquiry.styles();
+        let question = inquiry.question(styles.as_ref());
+        let survey = Survey::of_particles(name, &particles, question).map_err(RunError::from)?;
         let setup = files.setup(manifest, &survey, std::iter::once(*frame))?;
         Ok((survey, setup))
     })?;

@@ -32,7 +32,7 @@ const LISTS: [&str; 11] = [
 ];
 
 /// Other options with a value that is not the default, and the key that it is laid over.
-const FLAGS: [(&str, &str); 61] = [
+const FLAGS: [(&str, &str); 64] = [
     ("--output x.####.exr", "output.path = \"x.####.exr\""),
     ("--frames 3-4", "input.frames = \"3-4\""),
     ("--width 7", "image.width = 7"),
@@ -71,11 +71,14 @@ const FLAGS: [(&str, &str); 61] = [
     ("--ground", "render.ground = true"),
     ("--ground=shadow_catcher", "render.ground = \"shadow_catcher\""),
     ("--ground checker", "render.ground = \"checker\""),
+    ("--outline 1.5", "render.outline = 1.5"),
+    ("--depth-cue 0.7", "render.depth_cue = 0.7"),
     ("--denoise false", "render.denoise = false"),
     ("--denoise", "render.denoise = true"),
     ("--bonds", "bonds.find = \"covalent\""),
     ("--cell", "cell.visible = true"),
     ("--replicate 2,2,1", "cell.replicate = [2, 2, 1]"),
+    ("--unwrap", "cell.unwrap = true"),
     ("--wrap", "cell.wrap = true"),
     ("--bonds covalent", "bonds.find = \"covalent\""),
     ("--surface union", "render.surface = \"union\""),

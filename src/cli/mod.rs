@@ -57,6 +57,7 @@ mod shortcuts;
 mod signals;
 mod status;
 mod still;
+mod style_flag;
 mod verify;
 mod view;
 

@@ -8,6 +8,7 @@ use toml::{Table, Value};
 use super::CliError;
 use super::key_flags::over;
 use super::numbers::number;
+use super::style_flag::style;
 use crate::manifest::Override;
 
 /// Options that are short for more than one key.
@@ -69,6 +70,13 @@ pub(super) struct Shortcuts {
     /// The same as [[overlay]] type = "axes" in a manifest.
     #[arg(long, help_heading = "Look", display_order = 0)]
     axes: bool,
+    /// Draw some of the particles in their own way: 'type == 2: sticks, radius 0.3, color red'. May be repeated.
+    ///
+    /// The same as [[style]] in a manifest. The first style whose condition holds takes a particle; ': hidden' without
+    /// a condition takes all others.
+    #[arg(long, value_name = "CONDITION: DRAW, SETTINGS", allow_hyphen_values = true, help_heading = "Look",
+        display_order = 0, value_parser = style)]
+    style: Vec<Table>,
     /// Draw an attribute as arrows, whose length is the scale times the attribute: velocity:0.05. May be repeated.
     ///
     /// The same as [[arrows]] in a manifest, which has more settings: radius, colour, every n-th particle.
@@ -210,6 +218,9 @@ impl Shortcuts {
         }
         if let Some(slice) = &self.slice {
             list.push(over("select.slab", slice.clone(), "--slice")?);
+        }
+        for style in &self.style {
+            list.push(append("style", style.clone(), "--style")?);
         }
         for clip in &self.clip {
             list.push(append("clip", clip.clone(), "--clip")?);

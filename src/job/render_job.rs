@@ -15,7 +15,7 @@ use super::{RunError, Shard, in_thread};
 use crate::manifest::{FitSetting, Manifest};
 use crate::pipeline::{FrameSize, ImageTask, MemoryModel, NextMeshes, Schedule, Setup};
 use crate::report::job::{HTML_FILE, JSON_FILE};
-use crate::resolve::question;
+use crate::resolve::Inquiry;
 use crate::survey::{Question, Survey};
 
 /// A render job before anything is written.
@@ -246,9 +246,10 @@ impl RenderJob {
     /// # Errors
     /// No frame can be read, or the settings and the particles do not go together.
     pub fn survey(&self, sequence: &Sequence) -> Result<(Survey, Setup), RunError> {
-        let selection = self.manifest.selection();
+        let inquiry = Inquiry::of(&self.manifest);
+        let styles = inquiry.styles();
         let question =
-            Question { framed: self.framed(sequence), ..question(&self.manifest, &selection) };
+            Question { framed: self.framed(sequence), ..inquiry.question(styles.as_ref()) };
         let survey = in_thread(|| Survey::of(sequence, question))?;
         let setup = self.setup(&survey, sequence)?;
         Ok((survey, setup))

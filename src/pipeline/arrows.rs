@@ -8,6 +8,7 @@ use super::decoded::ids;
 use super::load_error::{LoadError, missing};
 use super::rods::FrameRods;
 use super::setup::{ArrowStyle, Setup};
+use super::styles::StyleRanges;
 use crate::surface::rods::{Caps, Rod, arrow};
 
 /// The arrows at the particles of `frame`, which was read from `file` and has this `number`. Passes notes to `notes`.
@@ -16,7 +17,7 @@ use crate::surface::rods::{Caps, Rod, arrow};
 /// The frame lacks an attribute.
 pub(super) fn arrows_of(
     setup: &Setup,
-    frame: &SharedFrame<'_>,
+    (frame, ranges): (&SharedFrame<'_>, &StyleRanges),
     (number, file): (i64, &str),
     notes: &mut Vec<String>,
 ) -> Result<Vec<FrameRods>, LoadError> {
@@ -34,7 +35,7 @@ pub(super) fn arrows_of(
             return Err(missing(&style.attribute, purpose, file, has));
         };
         // Make an arrow for each of the chosen particles
-        let arrows = Arrows::new(style, frame, vectors);
+        let arrows = Arrows::new(style, (frame, ranges), vectors);
         if arrows.not_finite > 0 {
             notes.push(format!(
                 "frame {number}: {} vectors of `{}` are not finite or too long and have no arrow",
@@ -47,9 +48,14 @@ pub(super) fn arrows_of(
     Ok(all)
 }
 
-/// The particles of `frame` whose id is a multiple of `every`; without ids, it is their place in the file.
-pub(super) fn every_nth(frame: &SharedFrame<'_>, every: u32) -> Vec<usize> {
-    let all = 0..frame.len();
+/// The particles of a style of a frame, or of all, whose id is a multiple of `every`; without ids, it is their place in
+/// the file.
+pub(super) fn every_nth(
+    (frame, ranges): (&SharedFrame<'_>, &StyleRanges),
+    style: Option<usize>,
+    every: u32,
+) -> Vec<usize> {
+    let all = style.map_or(0..frame.len(), |style| ranges.of(style));
     if every <= 1 {
         return all.collect();
     }
@@ -69,9 +75,13 @@ struct Arrows {
 }
 
 impl Arrows {
-    fn new(style: &ArrowStyle, frame: &SharedFrame<'_>, vectors: &Attribute) -> Self {
+    fn new(
+        style: &ArrowStyle,
+        (frame, ranges): (&SharedFrame<'_>, &StyleRanges),
+        vectors: &Attribute,
+    ) -> Self {
         let mut arrows = Self { rods: Vec::new(), owners: Vec::new(), not_finite: 0 };
-        for particle in every_nth(frame, style.every) {
+        for particle in every_nth((frame, ranges), style.style, style.every) {
             let point = frame.positions[particle];
             let vector = scaled(vectors, particle, style.scale);
             if !(vector.length_squared().is_finite() && (point + vector).is_finite()) {

@@ -1,5 +1,6 @@
 //! Bonds between the particles of a frame: those that are near each other, or those that the file lists.
 
+use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::{BVec3, Vec3};
@@ -9,7 +10,8 @@ use spherule_formats::{Lattice, SimulationCell};
 use super::SharedFrame;
 use super::load_error::{LoadError, missing};
 use super::rods::FrameRods;
-use super::setup::{BondRule, Setup};
+use super::setup::{BondRule, BondStyle, Setup};
+use super::styles::StyleRanges;
 use crate::scene::RadiusTable;
 use crate::surface::field::FieldParticles;
 use crate::surface::rods::{Caps, Rod};
@@ -30,13 +32,25 @@ const CHUNK: usize = 4096;
 /// The frame lacks an attribute, or there are too many bonds.
 pub(super) fn bonds_of(
     setup: &Setup,
-    frame: &SharedFrame<'_>,
+    (frame, ranges): (&SharedFrame<'_>, &StyleRanges),
+    place: (i64, &str),
+    notes: &mut Vec<String>,
+) -> Result<Vec<FrameRods>, LoadError> {
+    let first = setup.picture.things.bonds.as_ref().map(|bonds| (bonds, ranges.first()));
+    let styles = setup.picture.particles.styles.iter().enumerate();
+    let of_styles = styles.filter_map(|(i, style)| Some((style.bonds.as_ref()?, ranges.of(i))));
+    let all = first.into_iter().chain(of_styles).filter(|(_, range)| !range.is_empty());
+    all.map(|(bonds, range)| bonds_in(setup, (frame, range), bonds, place, notes)).collect()
+}
+
+/// The bonds of the particles in a range of a frame; those with others are drawn up to the middle.
+fn bonds_in(
+    setup: &Setup,
+    (frame, range): (&SharedFrame<'_>, Range<usize>),
+    style: &BondStyle,
     (number, file): (i64, &str),
     notes: &mut Vec<String>,
-) -> Result<Option<FrameRods>, LoadError> {
-    let Some(style) = setup.picture.things.bonds.as_ref().filter(|_| !frame.is_empty()) else {
-        return Ok(None);
-    };
+) -> Result<FrameRods, LoadError> {
     // Find the bonds, by the rule of the manifest
     let near = |reach: Reach| {
         let search = Search::new(style.look.radius, reach, frame);
@@ -49,14 +63,29 @@ pub(super) fn bonds_of(
             near(Reach::covalent((name, *angstrom), frame, file)?)
         }
     };
-    let rods = rods
+    let mut rods = rods
         .ok_or_else(|| LoadError::TooManyBonds { file: file.to_owned(), particles: frame.len() })?;
+    if range.len() < frame.len() {
+        rods = rods.into_iter().filter_map(|rod| within(rod, &range)).collect();
+    }
     if rods.is_empty() {
         notes.push(format!("frame {number}: no bonds: {none}"));
     }
     // Each half has the colour of its particle
     let all = 0..frame.len();
-    style.look.rods((setup, frame), (number, file), (rods, Caps::Flat), all).map(Some)
+    style.look.rods((setup, frame), (number, file), (rods, Caps::Flat), all)
+}
+
+/// The part of a bond that belongs to the particles in `range`.
+fn within(rod: Rod, range: &Range<usize>) -> Option<Rod> {
+    let [a, b] = rod.particles;
+    let middle = 0.5 * (rod.ends[0] + rod.ends[1]);
+    match [a, b].map(|particle| range.contains(&(particle as usize))) {
+        [true, true] => Some(rod),
+        [true, false] => Some(Rod { ends: [rod.ends[0], middle], particles: [a; 2], ..rod }),
+        [false, true] => Some(Rod { ends: [rod.ends[1], middle], particles: [b; 2], ..rod }),
+        [false, false] => None,
+    }
 }
 
 /// Greatest number of bonds of `frame`.

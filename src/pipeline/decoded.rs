@@ -1,6 +1,7 @@
 //! Frames as plain particles in memory: those of other formats, and native frames that cannot be traced in place.
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -9,7 +10,8 @@ use spherule_formats::{Attribute, AttributeData, Radius};
 
 use super::SharedFrame;
 use super::load_error::{LoadError, missing, missing_value, no_parts};
-use super::setup::{ColorRule, OpacityRule, Setup};
+use super::setup::{ColorRule, OpacityRule, ParticleRules, Setup};
+use super::styles::StyleRanges;
 use crate::scene::material::DEFAULT_COLOR;
 use crate::scene::{Camera, ColorMap, MaterialId, PartMaterials, RgbEncoding};
 use crate::survey::{id_of, part_of, velocity_of};
@@ -17,7 +19,7 @@ use spherule_frame::values::{Context, Value};
 
 mod radii;
 
-use radii::{FrameRadii, radii};
+use radii::{FrameRadii, radii, radii_of};
 
 /// A frame in memory, before the tree is built.
 #[derive(Debug)]
@@ -48,6 +50,8 @@ pub struct DecodedShading {
     pub parts: Option<(String, Vec<i32>)>,
     /// The floats of attribute channels, one plane for each.
     pub attributes: Vec<Vec<f32>>,
+    /// Which particles have which style.
+    pub(super) ranges: StyleRanges,
 }
 
 impl<'a> DecodedFrame<'a> {
@@ -55,22 +59,20 @@ impl<'a> DecodedFrame<'a> {
     /// number of radii that were raised.
     pub(super) fn of(
         setup: &Setup,
-        frame: SharedFrame<'a>,
+        (frame, ranges): (SharedFrame<'a>, StyleRanges),
         number: i64,
         file: &str,
         notes: &mut Vec<String>,
     ) -> Result<(Self, u64), LoadError> {
         // Extract radii and colours
-        let FrameRadii { radius, raised, unknown } = radii(setup, &frame, file)?;
+        let FrameRadii { radius, raised, unknown } = radii(setup, &frame, &ranges, file)?;
         if unknown > 0 {
             notes.push(format!(
                 "frame {number}: {unknown} particles have no element with a known radius; they are drawn with a \
                  radius of 1 angstrom"
             ));
         }
-        let rule = &setup.picture.particles.color;
-        let (values, colors) = color_values(setup, &frame, (number, file), &radius, rule)?;
-        let opacities = opacities_of(setup, &frame, (number, file), &radius)?;
+        let looks = styled_values(setup, (&frame, &ranges), (number, file), &radius)?;
         // Extract ids and velocities for the channels
         let ids = if setup.picture.needs_ids() { ids(&frame) } else { None };
         let velocities = velocities_of(setup, &frame, file)?;
@@ -84,36 +86,66 @@ impl<'a> DecodedFrame<'a> {
         let decoded = Self {
             centers: frame.positions,
             radius,
-            shading: DecodedShading {
-                values,
-                colors,
-                opacities,
-                ids,
-                velocities,
-                parts,
-                attributes: planes,
-            },
+            shading: DecodedShading { ids, velocities, parts, attributes: planes, ranges, ..looks },
         };
         Ok((decoded, raised))
     }
 }
 
-/// The scalars that the opacities of `frame` follow from; empty if all particles have the same.
-fn opacities_of(
+/// What the colours and opacities of the particles of `frame` follow from, by the rules of their styles.
+fn styled_values(
     setup: &Setup,
-    frame: &SharedFrame<'_>,
+    (frame, ranges): (&SharedFrame<'_>, &StyleRanges),
     (number, file): (i64, &str),
     radius: &Radius,
+) -> Result<DecodedShading, LoadError> {
+    let ParticleRules { color, opacity, styles, .. } = &setup.picture.particles;
+    let of_styles = styles.iter().enumerate();
+    let of_styles = of_styles.map(|(i, style)| (&style.color, &style.opacity, ranges.of(i)));
+    let mut found = DecodedShading::default();
+    let count = frame.len();
+    for (color, opacity, range) in
+        std::iter::once((color, opacity, ranges.first())).chain(of_styles)
+    {
+        let particles = (frame, range.clone());
+        let (values, colors) =
+            color_values(setup, particles.clone(), (number, file), radius, color)?;
+        fill(&mut found.values, count, range.start, values, f32::NAN);
+        fill(&mut found.colors, count, range.start, colors, DEFAULT_COLOR);
+        let opacities = opacities_of(setup, particles, (number, file), radius, opacity)?;
+        fill(&mut found.opacities, count, range.start, opacities, f32::NAN);
+    }
+    Ok(found)
+}
+
+/// Stores `part`, if it is not empty, in `all` from index `first` on; `all` then has `count` items, and `other` where
+/// nothing is stored.
+fn fill<T: Copy>(all: &mut Vec<T>, count: usize, first: usize, part: Vec<T>, other: T) {
+    if part.len() == count {
+        *all = part;
+    } else if !part.is_empty() {
+        all.resize(count, other);
+        all[first..first + part.len()].copy_from_slice(&part);
+    }
+}
+
+/// The scalars that the opacities of some particles of a frame follow from; empty if all have the same.
+fn opacities_of(
+    setup: &Setup,
+    (frame, range): (&SharedFrame<'_>, Range<usize>),
+    (number, file): (i64, &str),
+    radius: &Radius,
+    rule: &OpacityRule,
 ) -> Result<Vec<f32>, LoadError> {
-    let OpacityRule::Value { name, .. } = &setup.picture.particles.opacity else {
+    let OpacityRule::Value { name, .. } = rule else {
         return Ok(Vec::new());
     };
-    if frame.is_empty() {
+    if range.is_empty() {
         return Ok(Vec::new());
     }
     let value = Value::named(name, &frame.attributes)
         .ok_or_else(|| missing_value(name, "opacity", file, &frame.attributes))?;
-    Ok(values_of(setup, frame, number, radius, &value))
+    Ok(values_of(setup, (frame, range), number, radius, &value))
 }
 
 /// The velocities, if channels or motion blur need them.
@@ -159,30 +191,31 @@ impl DecodedFrame<'_> {
         // Give particles ids before their order changes
         let count = self.centers.len();
         let shading = &mut self.shading;
+        let all = count.max(shading.ranges.count());
         if ids && shading.ids.is_none() && !chosen.is_empty() {
-            shading.ids = Some((0..index_u32(count)).collect());
+            shading.ids = Some((0..index_u32(all)).collect());
         }
-        // Move everything that there is one of for each particle
+        // Move everything that there is one of for each particle; those of other styles stay behind them
         if !chosen.is_empty() {
             move_to_end(self.centers.to_mut(), chosen);
         }
         if let Radius::PerParticle(radii) = &mut self.radius {
             move_to_end(radii, chosen);
         }
-        move_to_end(&mut shading.values, chosen);
-        move_to_end(&mut shading.colors, chosen);
-        move_to_end(&mut shading.opacities, chosen);
+        move_to_end(first(&mut shading.values, count), chosen);
+        move_to_end(first(&mut shading.colors, count), chosen);
+        move_to_end(first(&mut shading.opacities, count), chosen);
         if let Some(ids) = &mut shading.ids {
-            move_to_end(ids, chosen);
+            move_to_end(first(ids, count), chosen);
         }
         if let Some(velocities) = &mut shading.velocities {
-            move_to_end(velocities, chosen);
+            move_to_end(first(velocities, count), chosen);
         }
         if let Some((_, parts)) = &mut shading.parts {
-            move_to_end(parts, chosen);
+            move_to_end(first(parts, count), chosen);
         }
         for plane in &mut shading.attributes {
-            move_to_end(plane, chosen);
+            move_to_end(first(plane, count), chosen);
         }
         count - chosen.len()
     }
@@ -216,8 +249,10 @@ pub(super) fn colors_by<'a>(
     if let ColorRule::Constant(color) = rule {
         return Ok(RuledColors::Constant(*color));
     }
-    let radius = radii(setup, frame, file)?.radius;
-    let (values, colors) = color_values(setup, frame, (number, file), &radius, rule)?;
+    let all = 0..frame.len();
+    let radius_rule = (&setup.picture.particles.radius, 1.0);
+    let radius = radii_of(setup, radius_rule, frame, all.clone(), file)?.radius;
+    let (values, colors) = color_values(setup, (frame, all), (number, file), &radius, rule)?;
     Ok(match rule {
         ColorRule::Attribute { map, .. } if !values.is_empty() => RuledColors::Mapped(values, map),
         _ if !colors.is_empty() => RuledColors::Own(colors),
@@ -225,11 +260,11 @@ pub(super) fn colors_by<'a>(
     })
 }
 
-/// The scalars for a colour map, or the colours, that `rule` takes from the particles of `frame`. One of them is empty;
+/// The scalars for a colour map, or the colours, that `rule` takes from some particles of a frame. One of them is empty;
 /// both are with a constant colour, or without an attribute that is optional.
 fn color_values(
     setup: &Setup,
-    frame: &SharedFrame<'_>,
+    (frame, range): (&SharedFrame<'_>, Range<usize>),
     (number, file): (i64, &str),
     radius: &Radius,
     rule: &ColorRule,
@@ -243,17 +278,24 @@ fn color_values(
             } else {
                 frame.attribute(name)
             };
-            (Vec::new(), found.map(colors_of).unwrap_or_default())
+            (Vec::new(), found.map(|found| colors_of(found, range)).unwrap_or_default())
         }
         ColorRule::Attribute { name, required, .. } => {
             let found = Value::named(name, &frame.attributes);
-            if found.is_none() && *required && !frame.is_empty() {
+            if found.is_none() && *required && !range.is_empty() {
                 return Err(missing_value(name, "colour", file, &frame.attributes));
             }
-            let values = found.map(|value| values_of(setup, frame, number, radius, &value));
+            let values =
+                found.map(|value| values_of(setup, (frame, range), number, radius, &value));
             (values.unwrap_or_default(), Vec::new())
         }
     })
+}
+
+/// The first `count` items, or all if there are fewer.
+fn first<T>(items: &mut [T], count: usize) -> &mut [T] {
+    let count = count.min(items.len());
+    &mut items[..count]
 }
 
 /// Moves the items with the indices `chosen` behind all others.
@@ -314,18 +356,15 @@ fn attribute<'a>(
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "colours need no more than f32")]
-fn magnitudes(attribute: &Attribute, scale: f64) -> Vec<f32> {
-    (0..attribute.count())
-        .into_par_iter()
-        .map(|i| (attribute.magnitude(i) * scale) as f32)
-        .collect()
+fn magnitudes(attribute: &Attribute, range: Range<usize>, scale: f64) -> Vec<f32> {
+    range.into_par_iter().map(|i| (attribute.magnitude(i) * scale) as f32).collect()
 }
 
-/// The values that colour the particles of frame `number`.
+/// The values that colour the particles in a range of frame `number`.
 #[expect(clippy::cast_possible_truncation, reason = "colours need no more than f32")]
 fn values_of(
     setup: &Setup,
-    frame: &SharedFrame<'_>,
+    (frame, range): (&SharedFrame<'_>, Range<usize>),
     number: i64,
     radius: &Radius,
     value: &Value,
@@ -337,7 +376,7 @@ fn values_of(
     let is_depth = matches!(value, Value::Depth);
     let camera = if is_depth { setup.camera_at(number).ok() } else { None };
     let context = DrawnContext { setup, frame, radius, camera };
-    let particles = (0..frame.len()).into_par_iter();
+    let particles = range.into_par_iter();
     particles.map(|i| value.get(i, &context) as f32).collect()
 }
 
@@ -380,17 +419,14 @@ impl Context for DrawnContext<'_, '_> {
     }
 }
 
-/// The colours in `attribute`; missing components are 0.
-fn colors_of(attribute: &Attribute) -> Vec<Vec3> {
+/// The colours in `range` of `attribute`; missing components are 0.
+fn colors_of(attribute: &Attribute, range: Range<usize>) -> Vec<Vec3> {
     let encoding = RgbEncoding::of(attribute.data.scalar_type());
     let components = attribute.components;
     let value = |i: usize, c: usize| {
         if c < components { attribute.data.get_f64(i * components + c) } else { 0.0 }
     };
-    (0..attribute.count())
-        .into_par_iter()
-        .map(|i| encoding.color([value(i, 0), value(i, 1), value(i, 2)]))
-        .collect()
+    range.into_par_iter().map(|i| encoding.color([value(i, 0), value(i, 1), value(i, 2)])).collect()
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "the channel is f32")]
@@ -469,6 +505,7 @@ mod tests {
                 colors: (0..6_u16).map(|i| Vec3::splat(f32::from(i))).collect(),
                 parts: Some(("part".to_owned(), (0..6).collect())),
                 attributes: vec![(0..6_u16).map(f32::from).collect()],
+                ranges: StyleRanges::whole(6),
                 ..DecodedShading::default()
             },
         };

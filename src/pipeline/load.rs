@@ -22,7 +22,8 @@ use super::motion::velocities_to_next;
 use super::predict::{FrameSize, MemoryModel};
 use super::rods::{FrameRods, rods_of};
 use super::setup::RodLook;
-use super::setup::{ParticleRules, Picture, Setup};
+use super::setup::{Picture, Setup};
+use super::styles::{StyleRanges, in_order_of_styles};
 use super::trails::trails_of;
 use super::{ImageTask, SharedFrame};
 use crate::overlay::Overlay;
@@ -131,7 +132,7 @@ fn decode(
     // Select particles
     let file = first_file(sequence, task.index);
     let read = loaded.particles.positions.len() as u64;
-    let frame = selected(setup, loaded.particles, &file)?.with_positions(Cow::Owned);
+    let (frame, ranges) = selected(setup, loaded.particles, &file)?;
     // Read other frames, for motion and for trails
     let moving = match setup.picture.view.shutter {
         Some(shutter) if !shutter.has_velocities => {
@@ -139,9 +140,9 @@ fn decode(
         }
         _ => None,
     };
-    let trails = trails_of(setup, sequence, task, (&frame, read), &mut notes)?;
+    let trails = trails_of(setup, sequence, task, (&frame, &ranges, read), &mut notes)?;
     // Extract what pictures need
-    let mut loaded = decoded(setup, task, frame, read, &file, notes)?;
+    let mut loaded = decoded(setup, task, (frame, ranges), read, &file, notes)?;
     loaded.rods.extend(trails);
     if let (Some(moving), LoadedParticles::Decoded(frame)) = (moving, &mut loaded.particles) {
         frame.shading.velocities = Some(moving);
@@ -162,12 +163,13 @@ pub fn load_particles<'a>(
 ) -> Result<LoadedFrame<'a>, LoadError> {
     let start = Instant::now();
     let read = particles.positions.len() as u64;
-    let frame = if setup.picture.particles.selection.is_all() {
-        ParticleFrame::borrowed(particles, setup.picture.origin)
+    let rules = &setup.picture.particles;
+    let (frame, ranges) = if rules.selection.is_all() && rules.division.is_one() {
+        one_range(ParticleFrame::borrowed(particles, setup.picture.origin))
     } else {
-        selected(setup, particles.to_owned_particles(), name)?.with_positions(Cow::Owned)
+        selected(setup, particles.to_owned_particles(), name)?
     };
-    let mut loaded = decoded(setup, task, frame, read, name, Vec::new())?;
+    let mut loaded = decoded(setup, task, (frame, ranges), read, name, Vec::new())?;
     loaded.finish(setup)?;
     loaded.read_time = start.elapsed();
     Ok(loaded)
@@ -178,7 +180,7 @@ pub fn load_particles<'a>(
 fn decoded<'a>(
     setup: &Setup,
     task: &ImageTask,
-    frame: SharedFrame<'a>,
+    (frame, ranges): (SharedFrame<'a>, StyleRanges),
     read: u64,
     file: &str,
     mut notes: Vec<String>,
@@ -194,11 +196,12 @@ fn decoded<'a>(
     // Extract what needs all attributes, before they are dropped
     let focus = focus_point(setup, &frame, file)?;
     let mut rods = rods_of(cell_style(setup), frame.cell.as_ref(), task.frame, &mut notes);
-    rods.extend(arrows_of(setup, &frame, (task.frame, file), &mut notes)?);
-    rods.extend(bonds_of(setup, &frame, (task.frame, file), &mut notes)?);
+    rods.extend(arrows_of(setup, (&frame, &ranges), (task.frame, file), &mut notes)?);
+    rods.extend(bonds_of(setup, (&frame, &ranges), (task.frame, file), &mut notes)?);
     let facts = FileFacts::of_decoded(setup, &frame, without_directory(file));
     // Extract particles and shading
-    let (particles, clamped_radii) = DecodedFrame::of(setup, frame, task.frame, file, &mut notes)?;
+    let (particles, clamped_radii) =
+        DecodedFrame::of(setup, (frame, ranges), task.frame, file, &mut notes)?;
     Ok(LoadedFrame {
         task: task.clone(),
         notes,
@@ -220,23 +223,35 @@ fn cell_style(setup: &Setup) -> (Option<&RodLook>, DVec3) {
     (setup.picture.things.cell.as_ref(), setup.picture.origin)
 }
 
-/// The particles that are drawn.
+/// The particles that are drawn, in the order of their styles.
 fn selected(
     setup: &Setup,
     particles: RawParticles,
     file: &str,
-) -> Result<ParticleFrame, LoadError> {
-    let Picture { particles: ParticleRules { selection, .. }, origin, .. } = &setup.picture;
-    if selection.is_all() {
-        return Ok(ParticleFrame::from_raw(particles, *origin));
+) -> Result<(SharedFrame<'static>, StyleRanges), LoadError> {
+    let Picture { particles: rules, origin, .. } = &setup.picture;
+    let (selection, division) = (&rules.selection, &rules.division);
+    let from_raw = |raw| ParticleFrame::from_raw(raw, *origin).with_positions(Cow::Owned);
+    if selection.is_all() && division.is_one() {
+        return Ok(one_range(from_raw(particles)));
     }
     let survivors = selection
         .survivors(&particles)
         .map_err(|e| unknown_name(&e, file, &particles.attributes))?;
-    if survivors.len() == particles.positions.len() {
-        return Ok(ParticleFrame::from_raw(particles, *origin));
+    if !division.is_one() {
+        return in_order_of_styles(setup, particles, &survivors, file);
     }
-    Ok(ParticleFrame::from_selected(particles, survivors, *origin))
+    Ok(one_range(if survivors.len() == particles.positions.len() {
+        from_raw(particles)
+    } else {
+        ParticleFrame::from_selected(particles, survivors, *origin).with_positions(Cow::Owned)
+    }))
+}
+
+/// A frame without styles.
+fn one_range(frame: SharedFrame<'_>) -> (SharedFrame<'_>, StyleRanges) {
+    let ranges = StyleRanges::whole(frame.len());
+    (frame, ranges)
 }
 
 /// A note on the characters that the font of overlays does not have.
@@ -283,6 +298,7 @@ impl LoadedFrame<'_> {
             "with a raised radius: it was too small to be seen, or no number",
         );
         self.note_absent_parts(setup);
+        self.note_absent_styles(setup);
         self.notes.extend(missing_glyphs(setup));
         self.meshes = meshes_of(
             &setup.picture.things.meshes,
@@ -310,6 +326,22 @@ impl LoadedFrame<'_> {
                 self.task.frame
             ));
         }
+    }
+
+    /// Notes styles that no particle has.
+    fn note_absent_styles(&mut self, setup: &Setup) {
+        let LoadedParticles::Decoded(frame) = &self.particles else {
+            return;
+        };
+        let styles = setup.picture.particles.styles.iter().enumerate();
+        let absent = styles.filter(|(index, style)| {
+            !style.is_of_rest && frame.shading.ranges.of(*index).is_empty()
+        });
+        let is_empty = frame.centers.is_empty();
+        let notes = absent.filter(|_| !is_empty).map(|(_, style)| {
+            format!("frame {}: no particle is of style `{}`", self.task.frame, style.name)
+        });
+        self.notes.extend(notes.collect::<Vec<_>>());
     }
 
     /// Notes what has been done with `count` particles.

@@ -109,7 +109,7 @@ fn manifest(
         let is_named = match owner {
             Owner::Ground => has_ground,
             Owner::Thing(_) => true,
-            Owner::Particles | Owner::Part(_) | Owner::Spray => false,
+            Owner::Particles | Owner::Part(_) | Owner::Style(_) | Owner::Spray => false,
         };
         if is_named {
             add(ObjectName::of_owner(owner).as_bytes());

@@ -9,6 +9,7 @@ use glam::Vec3;
 use spherule_formats::ParticleFrame;
 
 mod arrows;
+mod bodies;
 mod bonds;
 mod decoded;
 mod encode;
@@ -37,6 +38,8 @@ mod setup;
 mod shutter;
 mod single;
 mod stages;
+mod styled;
+mod styles;
 mod surface;
 mod trace;
 mod trails;
@@ -59,8 +62,8 @@ pub use rods::FrameRods;
 pub use schedule::{Overlap, Schedule};
 pub use setup::{
     ArrowStyle, AttributeChannel, BondRule, BondStyle, ColorRule, FileSettings, OpacityRule,
-    ParticleRules, Picture, RadiusRule, RodLook, RunSettings, Setup, Things, TrailStyle,
-    ViewSettings,
+    ParticleRules, ParticleStyle, Picture, RadiusRule, RodLook, RunSettings, Setup, StyleForm,
+    Things, TrailStyle, ViewSettings,
 };
 pub use shutter::{FrameStep, Shutter};
 pub use single::{make_image, trace_particles};

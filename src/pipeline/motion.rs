@@ -24,15 +24,26 @@ pub(super) fn expose(setup: &Setup, shutter: Shutter, frame: &mut DecodedFrame<'
         frame.shading.velocities.take()
     };
     // An empty frame has none
-    let mut displacements = velocities.unwrap_or_default();
-    displacements.resize(frame.centers.len(), Vec3::ZERO);
+    let mut velocities = velocities.unwrap_or_default();
+    velocities.resize(frame.centers.len(), Vec3::ZERO);
+    displaced(shutter, &mut frame.centers, velocities)
+}
+
+/// Moves particles at `centers` to their places in the middle of the exposure. Returns by how far each of them moves from
+/// the opening of the shutter to its closing.
+pub(super) fn displaced(
+    shutter: Shutter,
+    centers: &mut Cow<'_, [Vec3]>,
+    velocities: Vec<Vec3>,
+) -> Vec<Vec3> {
+    let mut displacements = velocities;
     let time = f64::from(shutter.step.time);
     #[expect(clippy::cast_possible_truncation, reason = "lengths of a scene are f32")]
     let [middle, length] = [
         (0.5 * (shutter.open + shutter.close) * time) as f32,
         ((shutter.close - shutter.open) * time) as f32,
     ];
-    let centers = frame.centers.to_mut().par_iter_mut();
+    let centers = centers.to_mut().par_iter_mut();
     centers.zip(displacements.par_iter_mut()).for_each(|(center, velocity)| {
         *center += bounded(middle * *velocity);
         *velocity = bounded(length * *velocity);

@@ -18,7 +18,7 @@ use super::{CpuRenderer, FrameRenderer, ImageTask, Setup, load_frame};
 use crate::manifest::Manifest;
 use crate::render::cryptomatte::{ObjectName, object_of};
 use crate::render::{Film, FilmPlane, NO_ID};
-use crate::resolve::{SceneInputs, question};
+use crate::resolve::SceneInputs;
 use crate::scene::ColorMap;
 use crate::survey::Survey;
 
@@ -135,8 +135,8 @@ material.color = { attribute = "mass", range = [0, 240] }
 fn rendered(sequence: &Sequence, settings: &str) -> (Setup, Film) {
     let manifest =
         Manifest::parse(&format!("{COMMON}{settings}"), Path::new("job.toml")).expect("valid");
-    let selection = manifest.selection();
-    let survey = Survey::of(sequence, question(&manifest, &selection)).expect("readable");
+    let inquiry = crate::resolve::Inquiry::of(&manifest);
+    let survey = Survey::of(sequence, inquiry.question(None)).expect("readable");
     let setup =
         crate::resolve::setup(&manifest, &survey, SceneInputs::default()).expect("possible");
     let task = ImageTask {

@@ -325,8 +325,8 @@ mod tests {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(example);
         let sequence = Sequence::open(&SequenceInput::from_path(&file)).expect("a frame");
         let manifest = crate::manifest::Manifest::new("in");
-        let selection = manifest.selection();
-        let question = crate::resolve::question(&manifest, &selection);
+        let inquiry = crate::resolve::Inquiry::of(&manifest);
+        let question = inquiry.question(None);
         let survey = crate::survey::Survey::of(&sequence, question).expect("readable");
         let setup =
             crate::resolve::setup(&manifest, &survey, crate::resolve::SceneInputs::default())

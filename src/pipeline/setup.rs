@@ -15,7 +15,7 @@ use crate::scene::{
     Camera, CameraError, CameraPath, CameraView, ColorMap, Exposure, LensSettings, MaterialId,
     NextFrame, Projection, RadiusTable, Scene, StereoSettings,
 };
-use crate::selection::Selection;
+use crate::selection::{Division, Selection};
 use crate::surface::cut::ConvexRegion;
 use crate::surface::rods::Anchor;
 use crate::surface::{SurfaceKind, SurfaceSettings};
@@ -136,6 +136,8 @@ pub struct ArrowStyle {
     pub every: u32,
     /// The point of an arrow that is at its particle.
     pub anchor: Anchor,
+    /// The style whose particles alone have arrows; None: all.
+    pub style: Option<usize>,
     /// Their look; the radius is that of the shafts.
     pub look: RodLook,
 }
@@ -147,6 +149,8 @@ pub struct TrailStyle {
     pub frames: u32,
     /// Only particles whose id is a multiple of this have trails; without ids, it is their place in the file.
     pub every: u32,
+    /// The style whose particles alone have trails; None: all.
+    pub style: Option<usize>,
     /// Their look; the radius is that at the particles.
     pub look: RodLook,
 }
@@ -244,6 +248,46 @@ pub struct ParticleRules {
     pub color: ColorRule,
     /// How much each sphere covers of what is behind it.
     pub opacity: OpacityRule,
+    /// Which particles have a style, by its index and 1; the others follow the rules above.
+    pub division: Division,
+    /// The styles: first those with spheres, then those with bodies, then those with neither.
+    pub styles: Vec<ParticleStyle>,
+}
+
+/// What stands for the particles of a style.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum StyleForm {
+    /// A sphere each.
+    Spheres,
+    /// A union or a smooth surface.
+    Body(SurfaceSettings),
+    /// Only rods.
+    Nothing,
+}
+
+/// How some of the particles are drawn, unlike the others.
+#[derive(Debug, Clone)]
+pub struct ParticleStyle {
+    /// Name in legends and messages.
+    pub name: String,
+    /// Whether the user named it, so that legends have it.
+    pub is_named: bool,
+    /// Whether it is that of particles without a style, beside a clear one.
+    pub is_of_rest: bool,
+    /// What stands for them.
+    pub form: StyleForm,
+    /// Source of the radii.
+    pub radius: RadiusRule,
+    /// Factor on the radii.
+    pub radius_factor: f32,
+    /// Source of the colours.
+    pub color: ColorRule,
+    /// How much each sphere covers of what is behind it.
+    pub opacity: OpacityRule,
+    /// The material.
+    pub material: MaterialId,
+    /// Their bonds, if these are drawn.
+    pub bonds: Option<BondStyle>,
 }
 
 /// What the camera shows.
@@ -276,8 +320,8 @@ pub struct Things {
     pub cell: Option<RodLook>,
     /// Arrows of vector attributes.
     pub arrows: Vec<ArrowStyle>,
-    /// Trails over earlier frames, if they are drawn.
-    pub trails: Option<TrailStyle>,
+    /// Trails over earlier frames.
+    pub trails: Vec<TrailStyle>,
     /// Bonds between particles, if they are drawn.
     pub bonds: Option<BondStyle>,
 }
@@ -439,7 +483,9 @@ impl Setup {
     pub(super) fn needs_particles(&self) -> bool {
         let picture = &self.picture;
         let is_for_channels = picture.render.channels.needs_particles();
-        is_for_channels || picture.particles.opacity.is_by_particle() || self.needs_parts()
+        let rules = &picture.particles;
+        let is_for_look = rules.opacity.is_by_particle() || !rules.styles.is_empty();
+        is_for_channels || is_for_look || self.needs_parts()
     }
 
     /// Whether native frames relative to [`Picture::origin`] are traced in place.
@@ -468,8 +514,13 @@ impl Setup {
                     .to_owned(),
             );
         }
+        if !self.picture.particles.division.is_one() {
+            return Some(
+                "[[style]] divides a copy of them, 12 bytes per particle and more".to_owned(),
+            );
+        }
         let Things { arrows, trails, bonds, .. } = &self.picture.things;
-        if !arrows.is_empty() || trails.is_some() || bonds.is_some() {
+        if !arrows.is_empty() || !trails.is_empty() || bonds.is_some() {
             return Some(
                 "arrows, trails and bonds are made from a copy of them, 12 bytes per particle and more"
                     .to_owned(),

@@ -6,14 +6,15 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use glam::Vec3;
-use spherule_files::memory::{MemoryUse, available};
 use spherule_formats::Radius;
 
+use super::bodies::{build_grid, radius_of, shading_normals};
 use super::decoded::DecodedFrame;
 use super::meshes::{MeshSlices, MeshThing};
 use super::motion::expose;
 use super::rods::FrameRods;
 use super::setup::Setup;
+use super::styled::StyleSurfaces;
 use crate::accel::moving::MovingTree;
 use crate::accel::view::TreeView;
 use crate::accel::{BuildReport, BuildSettings, SphereRadius, Spheres, Structure, TreeBuilder};
@@ -28,16 +29,10 @@ use crate::surface::smooth::{SmoothError, SmoothGrid, SmoothReport};
 use crate::surface::spheres::SphereSurface;
 use crate::surface::spray::{DROP_RADIUS, SOFT_DROPS, soft_drop, spray_of};
 use crate::surface::union::UnionSurface;
-use crate::surface::{
-    CutShape, GradientNormals, MaterialId, NormalKind, PcaNormals, ShadingNormals, Shape,
-    SphereOwners, SurfaceKind, SurfaceSettings,
-};
+use crate::surface::{CutShape, MaterialId, Shape, SphereOwners, SurfaceKind};
 
 /// Input for a tree without spheres.
 const NOTHING: Spheres<'_> = Spheres { centers: &[], radius: SphereRadius::Common(1.0) };
-
-/// Radii with a smaller relative difference count as equal.
-const RADIUS_TOLERANCE: f32 = 0.01;
 
 /// Structures for the surfaces of a frame in addition to the tree of its body; memory is reused from frame to frame.
 #[derive(Debug, Default)]
@@ -56,6 +51,8 @@ pub(super) struct SurfaceBuilder {
     displacements: Vec<Vec3>,
     /// The spheres of the body and of the spray, with motion blur.
     moving: [MovingTree; 2],
+    /// Particles with a style that are not in the tree of the body.
+    styles: StyleSurfaces,
 }
 
 impl SurfaceBuilder {
@@ -74,7 +71,10 @@ impl SurfaceBuilder {
     ) -> Result<Vec<String>, SmoothError> {
         let start = Instant::now();
         self.clear();
-        // Separate the spray, and put all particles in the middle of the exposure
+        // Separate the styles and the spray, and put all particles in the middle of the exposure
+        let mut notes = Vec::new();
+        let (styles, style_bytes) = StyleSurfaces::take(setup, frame, &mut notes)?;
+        self.styles = styles;
         let has_spray = setup.picture.surface.spray;
         if has_spray {
             self.find_spray(setup, frame, trees);
@@ -87,8 +87,8 @@ impl SurfaceBuilder {
             report.bytes.surface = built.position_bytes + built.structure_bytes;
             report.bytes.surface += self.moving[1].byte_len();
         }
+        report.bytes.surface += style_bytes;
         // Build a surface that is not made of single spheres
-        let mut notes = Vec::new();
         let kind = setup.picture.surface.kind;
         if kind == SurfaceKind::Smooth {
             let made = self.build_smooth(setup, frame, &mut notes)?;
@@ -173,20 +173,17 @@ impl SurfaceBuilder {
         frame: &mut DecodedFrame<'_>,
         notes: &mut Vec<String>,
     ) -> Result<SmoothReport, SmoothError> {
-        let radius = match &frame.radius {
-            Radius::Common(radius) => *radius,
-            Radius::PerParticle(radii) => median_radius(radii, notes),
-        };
-        let channels = setup.picture.render.channels;
-        let is_colored = setup.picture.particles.color.is_by_particle();
-        // Keep the particles if attributes are looked up at points of the surface
-        let keep = channels.needs_particles() || is_colored;
         let settings = &setup.picture.surface;
         let mut made = SmoothReport::default();
+        let first_note = notes.len();
         self.build_slices(setup, frame, |this, frame| {
             let mut grid = SmoothGrid::default();
-            let left = memory_left(setup.run.memory_limit);
-            let one = grid.build(&frame.centers, radius, settings, keep, left)?;
+            let mut own_notes = Vec::new();
+            let particles = (&frame.centers[..], &frame.radius);
+            let one = build_grid(setup, &mut grid, particles, settings, &mut own_notes)?;
+            // Those of the last slice stand for all
+            notes.truncate(first_note);
+            notes.append(&mut own_notes);
             this.smooth.push(grid);
             made = SmoothReport {
                 bytes: made.bytes + one.bytes,
@@ -195,20 +192,6 @@ impl SurfaceBuilder {
             };
             Ok(())
         })?;
-        // Note what the user may not expect
-        if made.left_out > 0 {
-            notes.push(format!(
-                "{} particles are too far from all others for the smooth surface and left out",
-                made.left_out
-            ));
-        }
-        if made.is_empty {
-            notes.push(format!(
-                "the smooth surface is empty: with radius {radius} the field of the particles nowhere gets to \
-                 surface.threshold = {}",
-                setup.picture.surface.threshold
-            ));
-        }
         Ok(made)
     }
 
@@ -297,7 +280,10 @@ impl SurfaceBuilder {
         } else {
             Box::new(SphereSurface::new(self.spray.tree().view()).of(owners))
         };
+        let mut styles = Vec::new();
+        self.styles.add_to(&mut styles);
         let mut shapes: Vec<&dyn Shape> = vec![&*body];
+        shapes.extend(styles.iter().map(|shape| &**shape));
         if !self.spray.tree().view().is_empty() {
             shapes.push(&*spray);
         }
@@ -384,48 +370,6 @@ pub(super) fn others<'a>(
 /// The spheres of a frame as the input of a builder.
 pub(super) fn spheres<'a>(frame: &'a DecodedFrame<'_>) -> Spheres<'a> {
     Spheres { centers: &frame.centers, radius: radius_of(&frame.radius) }
-}
-
-fn radius_of(radius: &Radius) -> SphereRadius<'_> {
-    match radius {
-        Radius::Common(radius) => SphereRadius::Common(*radius),
-        Radius::PerParticle(radii) => SphereRadius::Each(radii),
-    }
-}
-
-/// The median of `radii`, because the field needs a common radius.
-fn median_radius(radii: &[f32], notes: &mut Vec<String>) -> f32 {
-    let mut sorted = radii.to_vec();
-    let middle = sorted.len() / 2;
-    if sorted.is_empty() {
-        return 1.0;
-    }
-    let (_, median, _) = sorted.select_nth_unstable_by(middle, f32::total_cmp);
-    let median = *median;
-    if radii.iter().any(|radius| (radius - median).abs() > RADIUS_TOLERANCE * median) {
-        notes.push(format!(
-            "radii differ; a smooth surface has one for all, here their median {median} (input.radius sets another)"
-        ));
-    }
-    median
-}
-
-/// Bytes that a surface may use: within the limit of the job, and free.
-fn memory_left(limit: Option<u64>) -> Option<u64> {
-    let used = MemoryUse::now().anonymous;
-    let of_limit = limit.map(|limit| limit.saturating_sub(used));
-    match (of_limit, available()) {
-        (Some(limit), Some(free)) => Some(limit.min(free)),
-        (limit, free) => limit.or(free),
-    }
-}
-
-fn shading_normals(surface: &SurfaceSettings) -> ShadingNormals {
-    match surface.normals {
-        NormalKind::Auto | NormalKind::Sphere => ShadingNormals::Sphere,
-        NormalKind::Field => ShadingNormals::Gradient(GradientNormals::new(surface.support())),
-        NormalKind::Pca => ShadingNormals::Pca(PcaNormals::new(surface.support())),
-    }
 }
 
 #[cfg(test)]

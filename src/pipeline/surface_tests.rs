@@ -11,6 +11,7 @@ use super::*;
 use crate::manifest::{Manifest, RadiusSetting};
 use crate::pipeline::{CpuRenderer, FrameRenderer, ImageTask, LoadedParticles, load_frame};
 use crate::render::{Channels, IntegratorKind};
+use crate::surface::{NormalKind, SurfaceSettings};
 
 /// A wavy block with drops above it.
 fn particles() -> Vec<Vec3> {
@@ -36,8 +37,8 @@ fn opened(file: &Path) -> (Setup, Sequence) {
     // Highlights show the normals of clear spheres
     manifest.render.integrator = Some(IntegratorKind::Whitted);
     let sequence = Sequence::open(&SequenceInput::from_path(file)).expect("a frame");
-    let selection = manifest.selection();
-    let question = crate::resolve::question(&manifest, &selection);
+    let inquiry = crate::resolve::Inquiry::of(&manifest);
+    let question = inquiry.question(None);
     let survey = crate::survey::Survey::of(&sequence, question).expect("readable");
     let mut setup =
         crate::resolve::setup(&manifest, &survey, crate::resolve::SceneInputs::default())

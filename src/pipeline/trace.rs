@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use spherule_files::memory::MemoryUse;
+use spherule_formats::order::index_u32;
 
 use super::decoded::{DecodedFrame, DecodedShading};
 use super::in_place::StoredFrame;
@@ -18,6 +19,7 @@ use crate::denoise::{DenoiseError, DenoiseInput, denoise};
 use crate::output::TextAttribute;
 use crate::render::{
     Colors, Film, FilmPlane, Opacities, ParticleShading, RayCounts, RendererKind, Stop,
+    StyleShading,
 };
 use crate::report::FrameReport;
 use crate::report::frame::FileBytes;
@@ -244,21 +246,29 @@ fn denoise_film(setup: &Setup, film: &mut Film) -> Result<f64, DenoiseError> {
 fn particle_shading<'a>(picture: &'a Picture, shading: &'a DecodedShading) -> ParticleShading<'a> {
     // Choose the source of the colours; without an attribute it is a constant
     let values = &shading.values;
-    let colors = match &picture.particles.color {
+    let colors = |rule: &'a ColorRule| match rule {
         ColorRule::Constant(color) => Colors::Constant(*color),
         ColorRule::Rgb { .. } if shading.colors.is_empty() => Colors::Constant(DEFAULT_COLOR),
         ColorRule::Rgb { .. } => Colors::PerParticle(&shading.colors),
         ColorRule::Attribute { .. } if values.is_empty() => Colors::Constant(DEFAULT_COLOR),
         ColorRule::Attribute { map, .. } => Colors::Mapped { values, map },
     };
+    let opacities = |rule: &OpacityRule| match *rule {
+        OpacityRule::Constant(opacity) => Opacities::Constant(opacity),
+        OpacityRule::Value { range, .. } => Opacities::Mapped { values: &shading.opacities, range },
+    };
+    // Styles follow each other in the order of the particles
+    let rules = &picture.particles;
+    let styles = rules.styles.iter().enumerate().map(|(index, style)| StyleShading {
+        first: index_u32(shading.ranges.of(index).start),
+        material: style.material,
+        colors: colors(&style.color),
+        opacities: opacities(&style.opacity),
+    });
     ParticleShading {
-        colors,
-        opacities: match picture.particles.opacity {
-            OpacityRule::Constant(opacity) => Opacities::Constant(opacity),
-            OpacityRule::Value { range, .. } => {
-                Opacities::Mapped { values: &shading.opacities, range }
-            }
-        },
+        colors: colors(&rules.color),
+        opacities: opacities(&rules.opacity),
+        styles: styles.collect(),
         ids: shading.ids.as_deref(),
         velocities: shading.velocities.as_deref(),
         parts: shading.parts.as_ref().map(|(name, parts)| (name.as_str(), &parts[..])),

@@ -13,6 +13,7 @@ use super::load_error::{LoadError, first_file, missing};
 use super::motion::Places;
 use super::rods::FrameRods;
 use super::setup::{Setup, TrailStyle};
+use super::styles::StyleRanges;
 use super::{ImageTask, SharedFrame};
 use crate::surface::rods::{Caps, Rod};
 use crate::survey::id_of;
@@ -26,16 +27,28 @@ pub(super) fn trails_of(
     setup: &Setup,
     sequence: &Sequence,
     task: &ImageTask,
-    (frame, read): (&SharedFrame<'_>, u64),
+    (frame, ranges, read): (&SharedFrame<'_>, &StyleRanges, u64),
     notes: &mut Vec<String>,
-) -> Result<Option<FrameRods>, LoadError> {
-    let Some(style) = setup.picture.things.trails.as_ref().filter(|_| !frame.is_empty()) else {
-        return Ok(None);
-    };
+) -> Result<Vec<FrameRods>, LoadError> {
+    let styles = setup.picture.things.trails.iter().filter(|_| !frame.is_empty());
+    styles
+        .map(|style| trails_in(style, setup, sequence, task, (frame, ranges, read), notes))
+        .collect()
+}
+
+/// The trails of one style.
+fn trails_in(
+    style: &TrailStyle,
+    setup: &Setup,
+    sequence: &Sequence,
+    task: &ImageTask,
+    (frame, ranges, read): (&SharedFrame<'_>, &StyleRanges, u64),
+    notes: &mut Vec<String>,
+) -> Result<FrameRods, LoadError> {
     // Extend the trails frame by frame into the past
     let file = first_file(sequence, task.index);
     let (has_ids, own) = identities(frame);
-    let mut trails = Trails::new(style, frame);
+    let mut trails = Trails::new(style, (frame, ranges));
     for age in 1..=style.frames.min(index_u32(task.index)) {
         let index = task.index - age as usize;
         let loaded = match sequence.load_measured(index) {
@@ -68,7 +81,7 @@ pub(super) fn trails_of(
     notes.extend(gap_note(sequence, task, style.frames));
     // Trails have the colours of their particles in the current frame
     let (rods, owners) = ((trails.rods, Caps::Round), trails.owners.into_iter());
-    style.look.rods((setup, frame), (task.frame, &file), rods, owners).map(Some)
+    style.look.rods((setup, frame), (task.frame, &file), rods, owners)
 }
 
 /// The error of particles that cannot be found in an earlier frame; `is_native` is of this frame and of that one.
@@ -113,8 +126,8 @@ struct Trails<'a> {
 }
 
 impl<'a> Trails<'a> {
-    fn new(style: &'a TrailStyle, frame: &SharedFrame<'_>) -> Self {
-        let owners = every_nth(frame, style.every);
+    fn new(style: &'a TrailStyle, (frame, ranges): (&SharedFrame<'_>, &StyleRanges)) -> Self {
+        let owners = every_nth((frame, ranges), style.style, style.every);
         let ends = owners.iter().map(|particle| Some((frame.positions[*particle], 0)));
         Self { style, rods: Vec::new(), ends: ends.collect(), owners }
     }

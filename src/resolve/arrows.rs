@@ -44,6 +44,7 @@ pub(super) fn arrows(
             scale: own.scale,
             every: own.every,
             anchor: own.anchor,
+            style: None,
             look,
         });
     }
@@ -60,16 +61,18 @@ pub(super) fn trails(
     survey: &Survey,
     particles: &ColorRule,
     reach: f64,
-) -> Result<Option<TrailStyle>, ResolveError> {
+) -> Result<Vec<TrailStyle>, ResolveError> {
     let own = &manifest.trails;
     if own.frames == 0 {
-        return Ok(None);
+        return Ok(Vec::new());
     }
     // Choose colours, and a radius in proportion to the particles
     let color = rule(&own.color, particles, survey, "velocity", TRAIL_COLOR)?;
     let radius = own.radius.unwrap_or_else(|| narrow(TRAIL_RADIUS * reach));
     let look = look(scene, radius, &own.color, color);
-    Ok(look.map(|look| TrailStyle { frames: own.frames, every: own.every, look }))
+    let style =
+        look.map(|look| TrailStyle { frames: own.frames, every: own.every, style: None, look });
+    Ok(style.into_iter().collect())
 }
 
 /// Refuses attributes that do not exist or are no vectors.

@@ -21,6 +21,7 @@ pub(in crate::resolve) fn survey() -> Survey {
         packed_radius: None,
         has_radii: false,
         reach: 0.0,
+        styles: Vec::new(),
         color: None,
         rgb: None,
         points: Vec::new(),

@@ -2,12 +2,13 @@
 
 use super::ResolveError;
 use super::error::{require_attribute, similar};
-use crate::manifest::{ColorMapping, ColorSetting, Manifest, RangeSetting, ScaleKind};
+use crate::manifest::{ColorMapping, ColorSetting, RangeSetting, ScaleKind};
 use crate::math::narrow;
 use crate::pipeline::{ColorRule, attribute_list};
 use crate::scene::{Camera, ColorMap, ColorScale, UnknownColorMap, material};
 use crate::survey::{
-    Categories, ColorQuestion, ColorRange, MAX_CATEGORIES, RangeQuestion, Survey, range_of,
+    Categories, ColorQuestion, ColorRange, MAX_CATEGORIES, RangeQuestion, RgbAttribute, Survey,
+    range_of,
 };
 use spherule_formats::ScalarType;
 use spherule_frame::join::ColumnShape;
@@ -61,17 +62,18 @@ fn depth_range(survey: &Survey, camera: &Camera, by: &ColorMapping) -> Option<(f
     range_of(visible, range_question(by))
 }
 
-/// The source of the colours; "auto" depends on the attributes that exist.
+/// The source of the colours by a `setting`; "auto" depends on the attributes that exist. `range`: that of the values.
 pub(super) fn rule(
-    manifest: &Manifest,
+    setting: &ColorSetting,
+    range: Option<&ColorRange>,
     survey: &Survey,
     camera: Option<&Camera>,
 ) -> Result<ColorRule, ResolveError> {
     // Find which keys describe the mapping: constant colours and colours of the file need none
     let constant = ColorRule::Constant(material::DEFAULT_COLOR);
-    let by = match &manifest.material.color {
+    let by = match setting {
         ColorSetting::Rgb(rgb) => return Ok(ColorRule::Constant(*rgb)),
-        ColorSetting::Auto => match (&survey.color, &survey.rgb) {
+        ColorSetting::Auto => match (range, &survey.rgb) {
             (Some(_), _) => &ColorMapping::default(),
             (None, Some(rgb)) => {
                 return Ok(ColorRule::Rgb { name: rgb.attribute.clone(), required: false });
@@ -82,7 +84,7 @@ pub(super) fn rule(
     };
     // Without a name, the attribute is the one that the survey chose
     let Some(name) = &by.attribute else {
-        return match &survey.color {
+        return match range {
             Some(color) => mapped(by, color, false, false),
             None => {
                 require_attribute(survey, "material.color", "velocity")?;
@@ -93,21 +95,22 @@ pub(super) fn rule(
     let value = value_of(survey, name, ATTRIBUTE)?;
     require_categories(survey, by, name, SCALE)?;
     // Any other key means that vectors are mapped by their length
-    if by.is_plain() && survey.rgb.is_some() {
+    let is_rgb = |rgb: &RgbAttribute| rgb.attribute.eq_ignore_ascii_case(name);
+    if by.is_plain() && survey.rgb.as_ref().is_some_and(is_rgb) {
         return Ok(ColorRule::Rgb { name: name.clone(), required: true });
     }
-    mapped_value(by, name, &value, survey, camera)
+    mapped_value(by, name, (&value, range), survey, camera)
 }
 
 /// Maps the value `name`: over the range in the survey, or for depths over that from the camera.
 fn mapped_value(
     by: &ColorMapping,
     name: &str,
-    value: &Value,
+    (value, range): (&Value, Option<&ColorRange>),
     survey: &Survey,
     camera: Option<&Camera>,
 ) -> Result<ColorRule, ResolveError> {
-    let mut color = survey.color.clone().unwrap_or_else(|| ColorRange {
+    let mut color = range.cloned().unwrap_or_else(|| ColorRange {
         attribute: name.to_owned(),
         low: 0.0,
         high: 1.0,

@@ -33,9 +33,11 @@ pub enum ResolveError {
     },
     /// No frame has a value that a selection needs.
     #[error(
-        "select.where: character {column}: no value `{name}` in the sampled frames{hint}; available: {has}"
+        "{key}: character {column}: no value `{name}` in the sampled frames{hint}; available: {has}"
     )]
     UnknownName {
+        /// The key of the condition.
+        key: String,
         /// The name in the condition.
         name: String,
         /// Its place in the condition, in characters from 1.
@@ -46,8 +48,10 @@ pub enum ResolveError {
         has: String,
     },
     /// No frame has a text that a selection compares a value with.
-    #[error("select.where: character {column}: {what}")]
+    #[error("{key}: character {column}: {what}")]
     UnknownText {
+        /// The key of the condition.
+        key: String,
         /// Its place in the condition, in characters from 1.
         column: usize,
         /// The text, and those that there are.

@@ -8,7 +8,7 @@ use crate::accel::{BvhSettings, SbvhSettings};
 use crate::manifest::{IndirectSetting, Manifest};
 use crate::output::{ExrOptions, PlaneNames, PreviewBackground, PreviewOptions};
 use crate::pipeline::{AttributeChannel, RunSettings};
-use crate::render::{IndirectLight, PixelFilter, RenderSettings};
+use crate::render::{Drawing, IndirectLight, PixelFilter, RenderSettings};
 use crate::scene::Projection;
 use crate::survey::Survey;
 
@@ -51,6 +51,7 @@ pub(super) fn render_settings(
         max_depth: render.max_depth,
         min_weight: render.min_weight,
         transparent_background: manifest.output.transparent,
+        drawing: Drawing { outline: render.outline, depth_cue: render.depth_cue },
         ..RenderSettings::new(width, height)
     })
 }

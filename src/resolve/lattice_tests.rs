@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::{DVec3, Vec2, Vec3};
 use spherule_formats::{PositionSlice, RawParticles};
 
-use super::{SceneInputs, question, setup};
+use super::{SceneInputs, setup};
 use crate::manifest::Manifest;
 use crate::survey::Survey;
 
@@ -41,9 +41,8 @@ fn is_shown(counts: [u16; 3], order: [usize; 3]) {
     let manifest = Manifest::parse(manifest, Path::new("job.toml")).expect("valid");
     let particles = lattice(counts, order);
     let raw = RawParticles { positions: PositionSlice::F32(&particles), ..RawParticles::default() };
-    let selection = manifest.selection();
-    let survey =
-        Survey::of_particles("lattice", &raw, question(&manifest, &selection)).expect("readable");
+    let inquiry = crate::resolve::Inquiry::of(&manifest);
+    let survey = Survey::of_particles("lattice", &raw, inquiry.question(None)).expect("readable");
     let top = counts.map(|count| STEP * f32::from(count - 1));
     let [width, depth, height] = top.map(f64::from);
     // No particle is an outlier

@@ -16,7 +16,7 @@ use crate::overlay::{
     Axes, Boxes, Color, ColorBar, ColorBarKind, Content, Corner, FrameValues, FrameView, Image,
     Layout, Orientation, Overlay, Page, Placement, RgbaPixels, ScaleBar, Template,
 };
-use crate::pipeline::{ColorRule, Setup};
+use crate::pipeline::{ColorRule, ParticleStyle, Setup};
 use crate::scene::{Background, Camera};
 use crate::survey::{Survey, shown_name};
 use spherule_frame::values::Value;
@@ -261,9 +261,15 @@ fn content(
 ) -> Result<Option<Content>, ResolveError> {
     Ok(match kind {
         OverlayKind::ColorBar { title, unit, length, orientation, ticks, format, factor } => {
-            let Some((name, kind)) = color_bar(&setup.picture.particles.color, manifest, survey)
-            else {
-                if survey.most_particles == 0 {
+            let rules = &setup.picture.particles;
+            let mut all = rules.styles.iter().map(|style| &style.color);
+            let of_styles = || all.find_map(|rule| color_bar(rule, manifest, survey));
+            let is_seen = rules.styles.is_empty()
+                || (survey.color.is_some() && !manifest.material.is_clear());
+            let first = is_seen.then(|| color_bar(&rules.color, manifest, survey)).flatten();
+            let mapped = first.or_else(of_styles);
+            let Some((name, kind)) = mapped.or_else(|| legend_of_styles(&rules.styles)) else {
+                if survey.most_particles == 0 || !rules.styles.is_empty() {
                     return Ok(None);
                 }
                 return Err(without_color_map());
@@ -317,7 +323,7 @@ pub fn color_bar_of(
     survey: &Survey,
 ) -> Result<Option<ColorBar>, ResolveError> {
     // Take the colours of the particles
-    let rule = color::rule(manifest, survey, None)?;
+    let rule = color::rule(&manifest.material.color, survey.color.as_ref(), survey, None)?;
     let Some((name, kind)) = color_bar(&rule, manifest, survey) else {
         return Ok(None);
     };
@@ -348,6 +354,18 @@ pub fn color_bar_of(
     Ok(Some(bar))
 }
 
+/// The names and colours of styles, if one has a name.
+fn legend_of_styles(styles: &[ParticleStyle]) -> Option<(String, ColorBarKind)> {
+    let named = styles.iter().filter(|style| style.is_named);
+    let entries: Vec<(String, Color)> = named
+        .filter_map(|style| match &style.color {
+            ColorRule::Constant(color) => Some((style.name.clone(), srgb(*color))),
+            _ => None,
+        })
+        .collect();
+    (!entries.is_empty()).then(|| (String::new(), ColorBarKind::Categories(entries)))
+}
+
 /// The name of the value that colours the particles, and its colours; None if it is none.
 fn color_bar(
     rule: &ColorRule,
@@ -374,7 +392,8 @@ fn color_bar(
             }
         }
         (None, categories) => {
-            ColorBarKind::Categories(named(categories?, (manifest, survey), name))
+            let categories = categories.filter(|categories| !categories.is_empty())?;
+            ColorBarKind::Categories(named(categories, (manifest, survey), name))
         }
     };
     Some((shown_name(name).to_owned(), kind))

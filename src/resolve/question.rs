@@ -4,35 +4,71 @@ use crate::math::narrow;
 use glam::DVec3;
 
 use super::{camera, color, overlay};
-use crate::manifest::{Manifest, RadiusSetting};
+use crate::manifest::{ColorSetting, Manifest, RadiusSetting, Style, StyledManifest};
 use crate::selection::Selection;
 use crate::surface::SurfaceKind;
-use crate::survey::{Question, RadiusQuestion, SurfaceQuestion};
+use crate::survey::{Question, RadiusQuestion, StyleQuestions, SurfaceQuestion};
 
-/// What the survey has to determine. `selection` is that of the manifest.
-pub fn question<'a>(manifest: &'a Manifest, selection: &'a Selection) -> Question<'a> {
-    // Ask only for what the manifest leaves open: each answer takes time
-    Question {
-        color: color::question(&manifest.material.color),
-        radius: match &manifest.input.radius {
-            RadiusSetting::Auto if manifest.surface.kind != SurfaceKind::Spheres => {
-                RadiusQuestion::AutoOfBody
-            }
-            RadiusSetting::Auto => RadiusQuestion::Auto,
-            RadiusSetting::Length(_) => RadiusQuestion::Given,
-            RadiusSetting::Attribute { attribute, scale } => {
-                RadiusQuestion::Attribute(attribute, *scale)
-            }
-            RadiusSetting::Table { attribute, table, scale } => {
-                RadiusQuestion::Table(attribute, table, *scale)
-            }
-        },
-        up: manifest.input.up.map(|up| DVec3::from_array(up.vector())),
-        selection: Some(selection).filter(|s| !s.is_all() || !s.cuts.is_empty()),
-        points: color::is_depth(&manifest.material.color) || overlay::needs_points(manifest),
-        fit: camera::fit(manifest),
-        framed: None,
-        surface: surface_question(manifest),
+/// What a job needs to know about the particles, with the settings that ask for it.
+#[derive(Debug, Clone)]
+pub struct Inquiry {
+    styled: StyledManifest,
+    selection: Selection,
+    /// The colours of the styles, where these have the usual ones too.
+    colors: Vec<ColorSetting>,
+}
+
+impl Inquiry {
+    /// What a job of `manifest` needs to know.
+    pub fn of(manifest: &Manifest) -> Self {
+        let styled = manifest.styled();
+        let usual = &styled.manifest.material.color;
+        Self {
+            selection: manifest.selection(),
+            colors: styled.styles.iter().map(|style| style.colors(usual)).collect(),
+            styled,
+        }
+    }
+
+    /// The colours of the styles as questions, if there are styles.
+    pub fn styles(&self) -> Option<StyleQuestions<'_>> {
+        let division = &self.styled.division;
+        (!division.is_one()).then(|| StyleQuestions {
+            division: division.clone(),
+            colors: self.colors.iter().map(color::question).collect(),
+        })
+    }
+
+    /// What the survey has to determine; `styles` are [`Self::styles`].
+    pub fn question<'a>(&'a self, styles: Option<&'a StyleQuestions<'a>>) -> Question<'a> {
+        let (manifest, selection) = (&self.styled.manifest, &self.selection);
+        let has_body = manifest.surface.kind != SurfaceKind::Spheres
+            || self.styled.styles.iter().any(Style::is_body);
+        let needs_points = |setting: &ColorSetting| color::is_depth(setting);
+        // Ask only for what the manifest leaves open: each answer takes time
+        Question {
+            color: color::question(&manifest.material.color),
+            styles,
+            radius: match &manifest.input.radius {
+                RadiusSetting::Auto if has_body => RadiusQuestion::AutoOfBody,
+                RadiusSetting::Auto => RadiusQuestion::Auto,
+                RadiusSetting::Length(_) => RadiusQuestion::Given,
+                RadiusSetting::Attribute { attribute, scale } => {
+                    RadiusQuestion::Attribute(attribute, *scale)
+                }
+                RadiusSetting::Table { attribute, table, scale } => {
+                    RadiusQuestion::Table(attribute, table, *scale)
+                }
+            },
+            up: manifest.input.up.map(|up| DVec3::from_array(up.vector())),
+            selection: Some(selection).filter(|s| !s.is_all() || !s.cuts.is_empty()),
+            points: needs_points(&manifest.material.color)
+                || self.colors.iter().any(needs_points)
+                || overlay::needs_points(manifest),
+            fit: camera::fit(manifest),
+            framed: None,
+            surface: surface_question(manifest),
+        }
     }
 }
 

@@ -3,21 +3,26 @@
 use super::color::is_text;
 use super::error::require_attribute;
 use super::{ResolveError, surface};
-use crate::manifest::{Manifest, RadiusSetting};
+use crate::manifest::RadiusSetting;
 use crate::math::narrow;
 use crate::pipeline::RadiusRule;
+use crate::surface::SurfaceKind;
 use crate::survey::Survey;
 
 /// Minimum radius: its square, and the squares of slightly smaller distances, do not underflow in f32.
 const TRACEABLE_RADIUS: f32 = 1e-16;
 
-/// The source of the radii.
+/// The source of the radii of particles with this surface.
 ///
 /// # Errors
 /// There is no such attribute, no radius at all, or one that is too small to trace.
-pub(super) fn rule(manifest: &Manifest, survey: &Survey) -> Result<RadiusRule, ResolveError> {
+pub(super) fn rule(
+    setting: &RadiusSetting,
+    kind: SurfaceKind,
+    survey: &Survey,
+) -> Result<RadiusRule, ResolveError> {
     // Find the source
-    let rule = match &manifest.input.radius {
+    let rule = match setting {
         RadiusSetting::Length(radius) => RadiusRule::Common(narrow(*radius)),
         RadiusSetting::Attribute { attribute, scale } => {
             require_attribute(survey, "input.radius", attribute)?;
@@ -37,7 +42,7 @@ pub(super) fn rule(manifest: &Manifest, survey: &Survey) -> Result<RadiusRule, R
                 scale: scale * survey.unit_of(table),
             }
         }
-        RadiusSetting::Auto => match surface::radius(manifest.surface.kind, survey) {
+        RadiusSetting::Auto => match surface::radius(kind, survey) {
             Some(radius) => RadiusRule::FileOr(radius),
             // All frames contain radii, or there are no particles.
             None if survey.has_radii || survey.most_particles == 0 => RadiusRule::FileOr(0.0),

@@ -4,7 +4,7 @@ use super::error::similar;
 use super::{ResolveError, color};
 use crate::manifest::Manifest;
 use crate::pipeline::attribute_list;
-use crate::selection::{NameFault, Selection};
+use crate::selection::{Condition, NameFault, Selection};
 use crate::surface::SurfaceKind;
 use crate::surface::cut::ConvexRegion;
 use crate::survey::Survey;
@@ -15,24 +15,41 @@ use spherule_frame::values::{Value, value_names};
 /// # Errors
 /// The particles have no value with a name in the condition.
 pub(super) fn selection(manifest: &Manifest, survey: &Survey) -> Result<Selection, ResolveError> {
-    let selection = Selection { up: Some(super::up(manifest, survey)), ..manifest.selection() };
+    let up = Some(super::up(manifest, survey));
+    let of = |condition: &Condition| Selection {
+        condition: Some(condition.clone()),
+        up,
+        ..Selection::default()
+    };
+    // Check the conditions one by one, so that messages name key and place
+    if let Some(condition) = &manifest.select.condition {
+        check_names(&of(condition), survey, "select.where")?;
+    }
+    for (number, style) in manifest.styles.iter().enumerate() {
+        if let Some(condition) = &style.condition {
+            check_names(&of(condition), survey, &format!("style.{number}.where"))?;
+        }
+    }
+    Ok(Selection { up, ..manifest.selection() })
+}
+
+/// Checks that the particles have the values that `selection` names; `key` is that of its condition.
+fn check_names(selection: &Selection, survey: &Survey, key: &str) -> Result<(), ResolveError> {
     // Whether files have times shows when they are read
     let known = color::known_attributes(survey);
     let checked = selection.check_names(&known, Some(0.0), &survey.labels);
     match checked {
         // Explain names that are not known, with similar ones
-        Ok(()) => Ok(selection),
+        Ok(()) => Ok(()),
         // Empty frames need no attributes, but no particle may also be left because of a text that none has
-        Err(unknown) if survey.most_particles == 0 && !is_known_text(&unknown.fault) => {
-            Ok(selection)
-        }
+        Err(unknown) if survey.most_particles == 0 && !is_known_text(&unknown.fault) => Ok(()),
         Err(unknown) if unknown.fault != NameFault::NoValue => {
             let hint = match &unknown.fault {
                 NameFault::NoText { known, .. } => similar(&unknown.name, known),
                 NameFault::NoValue | NameFault::NotNumber { .. } => String::new(),
             };
             let what = unknown.text_fault(&hint).unwrap_or_default();
-            Err(ResolveError::UnknownText { column: unknown.column, what })
+            Err(ResolveError::UnknownText { key: key.to_owned(), column: unknown.column, what })
         }
         Err(unknown) => {
             let all = value_names(&known, |value| match value {
@@ -50,6 +67,7 @@ pub(super) fn selection(manifest: &Manifest, survey: &Survey) -> Result<Selectio
                 _ => similar(name, &all),
             };
             Err(ResolveError::UnknownName {
+                key: key.to_owned(),
                 column: unknown.column,
                 hint,
                 has: attribute_list(all.iter().map(String::as_str)),

@@ -29,13 +29,17 @@ section! {
         replicate: Replicate = Replicate::default(), flag("replicate", "A,B,C", "Input");
         /// Move particles into the cell, along the edges along which it repeats
         wrap: bool = false, flag("wrap", "", "Input");
+        /// Make molecules whole, by their bonds, or without bonds by the image flags ix, iy and iz
+        ///
+        /// Bonds are those of the file or of input.topology. With wrap, the first particle of each molecule is in the cell.
+        unwrap: bool = false, flag("unwrap", "", "Input");
     }
 }
 
 impl Cell {
     /// What is done with the particles.
     pub const fn images(&self) -> PeriodicImages {
-        PeriodicImages { replicate: self.replicate.0, wrap: self.wrap }
+        PeriodicImages { replicate: self.replicate.0, wrap: self.wrap, unwrap: self.unwrap }
     }
 }
 

@@ -21,6 +21,9 @@ const MAX_CLIPS: usize = 64;
 /// Maximum number of kinds of arrows.
 const MAX_ARROWS: usize = 16;
 
+/// Maximum number of styles.
+const MAX_STYLES: usize = 64;
+
 /// Maximum number of overlays.
 const MAX_OVERLAYS: usize = 64;
 
@@ -122,6 +125,21 @@ impl Manifest {
             self.check_equirectangular(root);
         }
         self.check_branches(root);
+        self.check_styles(root);
+    }
+
+    /// Checks that light passes through the particles of one style at most, or through those without a style.
+    fn check_styles(&self, root: &mut Section<'_>) {
+        let mut clear = self.material.is_clear().then(|| "material.type".to_owned());
+        for (number, _) in self.styles.iter().enumerate().filter(|(_, s)| s.is_clear()) {
+            let key = format!("style.{number}.material");
+            if let Some(first) = &clear {
+                let what =
+                    format!("{first} is clear already; glass and water are for one of the styles");
+                root.wrong(&key, &what);
+            }
+            clear.get_or_insert(key);
+        }
     }
 
     /// Checks the lengths of lists.
@@ -132,13 +150,19 @@ impl Manifest {
             let what = format!("{arrows} kinds of arrows, but at most {MAX_ARROWS} are possible");
             root.wrong("arrows", &what);
         }
+        let styles = self.styles.len();
+        if styles > MAX_STYLES {
+            let what = format!("{styles} styles, but at most {MAX_STYLES} are possible");
+            root.wrong("style", &what);
+        }
         // All that has a material of its own has a place in the scene
         let parts = self.material.parts.len();
         let others = MaterialId::BASIC
             + usize::from(self.cell.visible)
             + usize::from(self.trails.frames > 0)
             + usize::from(self.bonds.find != BondSearch::None)
-            + arrows.min(MAX_ARROWS);
+            + arrows.min(MAX_ARROWS)
+            + 2 * styles.min(MAX_STYLES);
         let max = MaterialId::MAX - others;
         if meshes + parts > max {
             let what = format!(

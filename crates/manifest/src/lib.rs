@@ -35,7 +35,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use spherule_images::overlay::Layout;
-use spherule_selection::Selection;
+use spherule_selection::{Condition, Selection};
 use spherule_tracer::render::{FilmPlane, IntegratorKind, RendererKind};
 use spherule_tracer::scene::Fresnel;
 use spherule_tracer::surface::{SprayStyle, SurfaceKind, SurfaceSettings};
@@ -68,6 +68,7 @@ mod file;
 mod flags;
 mod focus;
 mod ground;
+mod inline_table;
 mod input;
 mod key;
 mod keys;
@@ -97,6 +98,7 @@ mod same;
 mod schema;
 mod select;
 mod source;
+mod style;
 mod sun;
 mod surface;
 #[cfg(test)]
@@ -151,6 +153,7 @@ pub use schema::{SCHEMA_FILE, job_schema};
 pub use select::{Axis, Select, Slab};
 pub use source::ManifestSource;
 pub use spherule_tracer::render::NamedChannel;
+pub use style::{Style, StyleBonds, StyleDraw, StyleMaterial, StyleMaterialKind, StyledManifest};
 pub use sun::Sun;
 pub use text_size::{TextSize, points_on_paper};
 pub use trails::Trails;
@@ -173,6 +176,8 @@ pub struct Manifest {
     pub input: Input,
     /// The particles that are drawn.
     pub select: Select,
+    /// How some of the particles are drawn, unlike the others.
+    pub styles: Vec<Style>,
     /// Planes and boxes that leave out particles.
     pub clips: Vec<Clip>,
     /// The camera.
@@ -217,6 +222,7 @@ impl Manifest {
             legend: true,
             input: Input::new(path),
             select: Select::default(),
+            styles: Vec::new(),
             clips: Vec::new(),
             camera: Camera::default(),
             image: Image::default(),
@@ -332,6 +338,7 @@ impl Manifest {
         keys.section("bonds", Bonds::ABOUT, |keys| self.bonds.keys(keys));
         keys.section("output", Output::ABOUT, |keys| self.output.keys(keys));
         keys.section("job", Work::ABOUT, |keys| self.job.all_keys(keys));
+        keys.list("style", "style", style::ABOUT, &mut self.styles, Style::keys);
         keys.list("clip", "clip", clip::ABOUT, &mut self.clips, Clip::keys);
         keys.list("light", "light", light::ABOUT, &mut self.lights, Light::keys);
         keys.list("mesh", "mesh", mesh::ABOUT, &mut self.meshes, Mesh::keys);
@@ -387,7 +394,7 @@ impl Manifest {
             clips.map(|clip| clip.kind.region())
         };
         Selection {
-            condition: self.select.condition.clone(),
+            condition: self.drawn_condition(),
             ids: self.select.ids.clone(),
             every: self.select.every,
             regions: slab.chain(of_mode(ClipMode::Particles)).collect(),
@@ -395,6 +402,18 @@ impl Manifest {
             // With "auto", that of the files
             up: None,
         }
+    }
+
+    /// The condition on particles that are drawn.
+    fn drawn_condition(&self) -> Option<Condition> {
+        let selected = self.select.condition.as_ref().map(Condition::as_str);
+        let all = match (selected, self.shown_condition()) {
+            (_, None) => return self.select.condition.clone(),
+            (None, Some(shown)) => shown,
+            (Some(selected), Some(shown)) => format!("({selected}) && ({shown})"),
+        };
+        // Conditions in parentheses are conditions
+        Condition::parse(&all).ok().or_else(|| self.select.condition.clone())
     }
 
     /// The picture on the ground.
@@ -484,6 +503,7 @@ impl Manifest {
         for (list, comment, is_empty) in [
             ("camera.key", NO_KEYS, self.camera.keys.is_empty()),
             ("material.part", NO_PARTS, self.material.parts.is_empty()),
+            ("style", NO_STYLES, self.styles.is_empty()),
             ("clip", NO_CLIPS, self.clips.is_empty()),
             ("light", AUTO_LIGHTS, self.lights.is_empty()),
             ("mesh", NO_MESHES, self.meshes.is_empty()),
@@ -510,6 +530,7 @@ impl Manifest {
         let mut manifest = Self::new("");
         manifest.camera.keys = vec![CameraKey::default()];
         manifest.material.parts = vec![Part::default()];
+        manifest.styles = vec![Style::default()];
         manifest.clips = Clip::examples();
         manifest.lights = Light::examples();
         manifest.meshes = vec![Mesh::default()];
@@ -530,6 +551,9 @@ const NO_KEYS: &str = "In mode \"keys\" the camera moves smoothly through these 
 
 const NO_PARTS: &str =
     "Parts of the particles (attribute part, type or phase) may have materials of their own.";
+
+const NO_STYLES: &str = "Styles draw some of the particles in their own way; the first whose condition holds takes a \
+                         particle.";
 
 const NO_CLIPS: &str = "Planes and boxes leave out particles.";
 

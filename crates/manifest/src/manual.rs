@@ -28,7 +28,7 @@ fn manual() -> String {
     let is_list = |table: &&[Entry]| {
         matches!(
             table[0].section.split('.').next(),
-            Some("clip" | "light" | "mesh" | "arrows" | "overlay")
+            Some("style" | "clip" | "light" | "mesh" | "arrows" | "overlay")
         )
     };
     tables.sort_by_key(is_list);

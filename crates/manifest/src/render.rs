@@ -231,6 +231,10 @@ section! {
         ///
         /// It takes at least 2 samples per pixel. Other channels do not change.
         denoise: Option<bool> = None, or("auto"), flag("denoise", "", "Look");
+        /// Width of dark outlines around opaque spheres, bonds and bodies, pixels; 0 is none
+        outline: f32 = 0.0, from(0), to(100), flag("outline", "PIXELS", "Look");
+        /// How much the farthest particles fade into the background, 0 (not at all) to 1
+        depth_cue: f32 = 0.0, from(0), to(1), flag("depth-cue", "PART", "Look");
         /// Maximum depth of reflections and refractions; 1 is direct light only
         max_depth: u32 = 3, from(1), to(MAX_DEPTH), flag("max-depth", "MAX_DEPTH", "Look");
         /// Transmissive spheres: path weight below which only one of the two branches is followed; 0 always follows

@@ -92,6 +92,8 @@ pub(super) struct ColorTotals {
     left_out: bool,
     categories: BTreeSet<i64>,
     is_fractional: bool,
+    /// Whether the particles were those of a style, and a frame had none of them.
+    pub(super) was_empty: bool,
 }
 
 /// What values need beside the particles.
@@ -218,6 +220,14 @@ impl ColorTotals {
 
     pub(super) fn finish(self, question: ColorQuestion) -> Option<ColorRange> {
         let attribute = self.name?;
+        // Those of a style may have been in no frame
+        if self.was_empty
+            && self.range.is_none()
+            && self.pool.is_empty()
+            && self.categories.is_empty()
+        {
+            return None;
+        }
         let range = match question {
             ColorQuestion::None => RangeQuestion::Robust,
             ColorQuestion::Speed(range) | ColorQuestion::Value(_, range) => range,

@@ -36,7 +36,7 @@ use spherule_formats::{
     Attribute, FrameError, Labels, PositionSlice, RawParticles, SimulationCell,
 };
 
-use spherule_selection::Selection;
+use spherule_selection::{Division, Selection};
 use spherule_tracer::scene::{RadiusTable, RgbEncoding, is_rgb};
 
 pub use spherule_frame::values::{PART_NAMES, id_of, part_of, shown_name, velocity_of};
@@ -128,6 +128,9 @@ pub struct Survey {
     /// it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rgb: Option<RgbAttribute>,
+    /// The ranges of the colours of styles, in their order. Jobs of earlier versions lack them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub styles: Vec<Option<ColorRange>>,
     /// Positions of some particles of all sampled frames, relative to the origin, if they were requested.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub points: Vec<[f32; 3]>,
@@ -202,8 +205,10 @@ impl RgbAttribute {
 /// are drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Question<'a> {
-    /// Colours.
+    /// Colours; with styles those of the particles without one.
     pub color: ColorQuestion<'a>,
+    /// The styles, if some particles have one.
+    pub styles: Option<&'a StyleQuestions<'a>>,
     /// Radii.
     pub radius: RadiusQuestion<'a>,
     /// The up direction for heights; by default that of the format.
@@ -224,6 +229,7 @@ impl Question<'_> {
     /// Nothing but what every survey finds: places and attributes of all particles.
     pub const NOTHING: Self = Self {
         color: ColorQuestion::None,
+        styles: None,
         radius: RadiusQuestion::None,
         up: None,
         points: false,
@@ -237,6 +243,15 @@ impl Question<'_> {
     fn selection_with(&self, up: DVec3) -> Option<Selection> {
         self.selection.map(|selection| Selection { up: Some(up), ..selection.clone() })
     }
+}
+
+/// What a job needs to know about particles that are drawn in different ways.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StyleQuestions<'a> {
+    /// Which particles have which style, by its index and 1.
+    pub division: Division,
+    /// The colours of each style.
+    pub colors: Vec<ColorQuestion<'a>>,
 }
 
 /// What a job needs to know about radii.

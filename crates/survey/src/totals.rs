@@ -3,10 +3,12 @@
 use std::collections::BTreeMap;
 
 use glam::DVec3;
+use spherule_formats::order::index_u32;
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{
     Labels, ParticleFrame, Radius, RawParticles, SimulationCell, choose_origin, sample_indices,
 };
+use spherule_selection::Division;
 use spherule_tree::math::narrow;
 
 use super::color::{ColorTotals, FrameContext};
@@ -18,8 +20,8 @@ use super::robust::{RobustBounds, robust_bounds, robust_largest, sample_of, sort
 use super::sample::FrameSample;
 use super::standing::{is_falling, standing};
 use super::{
-    ColorQuestion, ColorRange, FrameWeight, Question, RadiusQuestion, RgbAttribute, SurfaceWeight,
-    Survey, velocity_of,
+    ColorQuestion, ColorRange, FrameWeight, Question, RadiusQuestion, RgbAttribute, StyleQuestions,
+    SurfaceWeight, Survey, velocity_of,
 };
 
 /// Maximum number of positions to keep.
@@ -38,6 +40,8 @@ pub(super) struct Totals {
     has_radii: bool,
     reach: f32,
     color: ColorTotals,
+    /// The colours of styles.
+    styles: Vec<ColorTotals>,
     labels: Labels,
     points: Vec<DVec3>,
     velocity: Option<String>,
@@ -85,6 +89,7 @@ impl Totals {
             has_radii: false,
             reach: 0.0,
             color: ColorTotals::default(),
+            styles: Vec::new(),
             labels: Labels::new(),
             points: Vec::new(),
             velocity: None,
@@ -115,6 +120,7 @@ impl Totals {
         self.find_velocity_and_colors(&raw, question.color);
         let origin =
             self.bounds.map_or(DVec3::ZERO, |bounds| choose_origin(bounds.outer.0, bounds.outer.1));
+        let groups = question.styles.map(|styles| groups_of(styles, &raw, up));
         // Count particles, and remember the heaviest frame
         let sampled = raw.positions.len();
         let frame = ParticleFrame::from_raw(raw, origin);
@@ -131,7 +137,19 @@ impl Totals {
         let radius = question.radius;
         let context = FrameContext { frame: &frame, count: finite_count, origin, up, radius };
         let velocity = self.velocity.as_deref();
-        self.color.add(velocity, question.color, context);
+        match groups.zip(question.styles) {
+            None => self.color.add(velocity, question.color, context),
+            Some((groups, styles)) => {
+                self.styles.resize_with(styles.colors.len(), ColorTotals::default);
+                let questions = std::iter::once(&question.color).chain(&styles.colors);
+                let totals = std::iter::once(&mut self.color).chain(&mut self.styles);
+                for ((question, total), raw) in questions.zip(totals).zip(groups) {
+                    let frame = &ParticleFrame::from_raw(raw, origin);
+                    total.was_empty |= frame.is_empty();
+                    total.add(velocity, *question, FrameContext { frame, ..context });
+                }
+            }
+        }
         if question.points && is_framed {
             let some = sample_indices(frame.len(), POINTS).map(|i| frame.positions[i]);
             self.points.extend(some.map(|p| origin + p.as_dvec3()));
@@ -277,6 +295,9 @@ impl Totals {
         let (min, max) = bounds.unwrap_or((DVec3::splat(-0.5), DVec3::splat(0.5)));
         let color = self.color.finish(question.color);
         let rgb = rgb_colors(self.rgb, color.as_ref());
+        let questions = question.styles.map(|styles| &styles.colors[..]).unwrap_or_default();
+        let styles = self.styles.into_iter().zip(questions);
+        let styles = styles.map(|(total, question)| total.finish(*question)).collect();
         // Use the origin of native frames: with a different one, they could not be traced in place.
         let origin = match self.origin {
             Origins::Shared(origin) => origin,
@@ -305,6 +326,7 @@ impl Totals {
             reach: self.reach,
             color,
             rgb,
+            styles,
             points: points.collect(),
             up,
             components: self.attributes.values().copied().collect(),
@@ -321,6 +343,23 @@ impl Totals {
             surfaces: self.surfaces,
         }
     }
+}
+
+/// The particles of `raw` in groups: those without a style, and those of each. Of names without a value, which are
+/// reported later, there are no groups.
+fn groups_of(styles: &StyleQuestions<'_>, raw: &RawParticles, up: DVec3) -> Vec<RawParticles> {
+    let division = Division { up: Some(up), ..styles.division.clone() };
+    let all: Vec<u32> = (0..index_u32(raw.positions.len())).collect();
+    let Ok(divided) = division.divide(raw, &all) else {
+        return Vec::new();
+    };
+    let mut start = 0;
+    let group = |end: &usize| {
+        let mut group = raw.clone();
+        group.select(&divided.order[std::mem::replace(&mut start, *end)..*end]);
+        group
+    };
+    divided.ends.iter().map(group).collect()
 }
 
 /// The colours of the attribute `rgb`, unless the range of another attribute was found: speed has precedence.

@@ -63,6 +63,11 @@ pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup:
     if let Some(text) = color_text(setup, survey) {
         message!("{text}");
     }
+    for style in &setup.picture.particles.styles {
+        if let Some(text) = map_text(&style.color) {
+            message!("style `{}`: {text}", style.name);
+        }
+    }
     if let Some(text) = small_text(setup) {
         note!("{text}");
     }
@@ -79,25 +84,33 @@ pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup:
 
 /// Describes the colours that follow from attributes.
 fn color_text(setup: &Setup, survey: &Survey) -> Option<String> {
-    match (&setup.picture.particles.color, &survey.rgb) {
-        (pipeline::ColorRule::Attribute { name, map, .. }, _) => {
-            let shown = shown_name(name);
-            Some(match (map.range(), map.categories()) {
-                (Some(([low, high], _)), _) => {
-                    let [low, high] = [low, high].map(short);
-                    format!("colour by `{shown}`, range {low} to {high} (--range {low} {high})")
-                }
-                (None, categories) => {
-                    let count = categories.map_or(0, <[_]>::len);
-                    format!("colour by `{shown}`, {count} categories")
-                }
-            })
-        }
+    let rules = &setup.picture.particles;
+    match (&rules.color, &survey.rgb) {
+        // All particles have a style
+        _ if !rules.styles.is_empty() && survey.color.is_none() => None,
         (pipeline::ColorRule::Rgb { name, .. }, Some(rgb)) => {
             Some(format!("colour by the RGB attribute `{name}` ({})", rgb.encoding.name()))
         }
-        _ => None,
+        (color, _) => map_text(color),
     }
+}
+
+/// Describes the colour map of `color`, if it has one.
+fn map_text(color: &pipeline::ColorRule) -> Option<String> {
+    let pipeline::ColorRule::Attribute { name, map, .. } = color else {
+        return None;
+    };
+    let shown = shown_name(name);
+    Some(match (map.range(), map.categories()) {
+        (Some(([low, high], _)), _) => {
+            let [low, high] = [low, high].map(short);
+            format!("colour by `{shown}`, range {low} to {high} (--range {low} {high})")
+        }
+        (None, categories) => {
+            let count = categories.map_or(0, <[_]>::len);
+            format!("colour by `{shown}`, {count} categories")
+        }
+    })
 }
 
 /// What draws the simulation cell of a file.

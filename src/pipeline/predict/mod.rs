@@ -53,6 +53,7 @@ impl<'a> MemoryModel<'a> {
         Self {
             setup,
             own_radii: match setup.picture.particles.radius {
+                _ if !setup.picture.particles.styles.is_empty() => true,
                 RadiusRule::Common(_) => false,
                 RadiusRule::FileOr(_) => known.own_radii,
                 RadiusRule::Attribute { .. } | RadiusRule::Table { .. } => true,

@@ -1,8 +1,11 @@
 //! Memory of particles: while they are read, and afterwards.
 
+use std::collections::BTreeSet;
+
 use spherule_formats::native::Access;
 
 use super::super::bonds::MAX_BONDS_EACH;
+use super::super::setup::ColorRule;
 use super::{FrameSize, MemoryModel};
 use crate::surface::SurfaceBytes;
 use crate::surface::mesh::MeshTree;
@@ -27,18 +30,20 @@ impl MemoryModel<'_> {
             let arrows = share(style.every);
             [2 * arrows, style.look.color.as_ref().map_or(0, |_| arrows)]
         });
-        let trails = picture.things.trails.as_ref().map_or(none, |style| {
+        let trails = picture.things.trails.iter().map(|style| {
             let trails = share(style.every);
             let rods = trails.saturating_mul(style.frames.into());
             [rods, style.look.color.as_ref().map_or(0, |_| trails)]
         });
-        let bonds = picture.things.bonds.as_ref().map_or(none, |_| {
+        let styles = picture.particles.styles.iter().filter_map(|style| style.bonds.as_ref());
+        let bonds = picture.things.bonds.iter().chain(styles).map(|_| {
             let rods = frame.particles.saturating_mul(MAX_BONDS_EACH);
             [rods, frame.particles]
         });
         // Sum them, and estimate the tree
         let [rods, colors] = arrows
-            .chain([trails, bonds])
+            .chain(trails)
+            .chain(bonds)
             .fold(none, |sum, more| [0, 1].map(|i| sum[i].saturating_add(more[i])));
         let [building, kept] = RodTree::predicted_bytes(rods, colors);
         SurfaceBytes { building, kept }
@@ -103,17 +108,23 @@ impl MemoryModel<'_> {
         let reading = (files + frame.raw).max(shared + held.max(selecting));
         // Neighbouring frames are read beside it one at a time, and their ids are sorted
         let beside = frame.raw + 12 * n + reading + 16 * n;
-        match (self.setup.moves_to_next_frame(), &self.setup.picture.things.trails) {
+        match (self.setup.moves_to_next_frame(), self.setup.picture.things.trails.is_empty()) {
             // Ids of the frame, and the ends of trails
-            (_, Some(_)) => beside + 32 * n,
-            (true, None) => beside,
-            (false, None) => reading,
+            (_, false) => beside + 32 * n,
+            (true, true) => beside,
+            (false, true) => reading,
         }
     }
 
     /// Bytes of the places of particles in their file, if some of them are not drawn.
     fn file_indices(&self, frame: &FrameSize) -> u64 {
-        if self.setup.picture.particles.selection.is_all() { 0 } else { 4 * frame.particles }
+        let rules = &self.setup.picture.particles;
+        match (rules.selection.is_all(), rules.division.is_one()) {
+            (true, true) => 0,
+            (false, true) => 4 * frame.particles,
+            // The groups of particles, and their order
+            (_, false) => 10 * frame.particles,
+        }
     }
 
     /// Memory that the allocator retains after the buffers for reading a frame are freed: all of it, if there are
@@ -139,15 +150,22 @@ impl MemoryModel<'_> {
             return self.held_file(frame);
         }
         let channels = self.setup.picture.render.channels;
-        let color = self.setup.picture.particles.color.bytes();
+        let rules = &self.setup.picture.particles;
+        let styles = &rules.styles;
+        let colors = styles.iter().map(|style| &style.color).chain([&rules.color]);
+        let color = colors.map(ColorRule::bytes).collect::<BTreeSet<u64>>().into_iter().sum();
+        let has_opacities = rules.opacity.is_by_particle()
+            || styles.iter().any(|style| style.opacity.is_by_particle());
         // Particles that are moved need an explicit id.
         let picture = &self.setup.picture;
-        let has_ids =
-            self.has_ids || picture.surface.spray || !picture.particles.selection.is_all();
+        let has_ids = self.has_ids
+            || picture.surface.spray
+            || !rules.selection.is_all()
+            || !rules.division.is_one();
         let ids = picture.needs_ids() && has_ids;
         let parts = [
             (true, color),
-            (picture.particles.opacity.is_by_particle(), 4),
+            (has_opacities, 4),
             (ids, 4),
             (channels.needs_velocities() && self.has_velocities, 12),
             // Whether there are parts is not known in advance

@@ -42,8 +42,8 @@ fn setup() -> Setup {
     spherule_formats::write::npy::write(&file, &[glam::Vec3::ZERO]).expect("a file");
     let input = spherule_formats::SequenceInput::from_path(&file);
     let sequence = Sequence::open(&input).expect("a frame");
-    let selection = manifest.selection();
-    let question = crate::resolve::question(&manifest, &selection);
+    let inquiry = crate::resolve::Inquiry::of(&manifest);
+    let question = inquiry.question(None);
     let survey = crate::survey::Survey::of(&sequence, question).expect("readable");
     crate::resolve::setup(&manifest, &survey, crate::resolve::SceneInputs::default())
         .expect("pictures")
@@ -162,6 +162,7 @@ fn arrows_trails_and_bonds_are_counted() {
         scale: 1.0,
         every: 1,
         anchor: Anchor::Tail,
+        style: None,
         look: LOOK,
     });
     // Two rods for each particle
@@ -173,10 +174,10 @@ fn arrows_trails_and_bonds_are_counted() {
     assert!(few.total() < none.total() + each(2, 100) / 10, "{none}\n{few}");
     // A rod for each frame, and another frame beside the one that is read
     setup.picture.things.arrows.clear();
-    setup.picture.things.trails = Some(TrailStyle { frames: 5, every: 1, look: LOOK });
+    setup.picture.things.trails = vec![TrailStyle { frames: 5, every: 1, style: None, look: LOOK }];
     let trails = alone(&setup);
     assert!(trails.total() >= none.total() + each(5, 60), "{none}\n{trails}");
-    setup.picture.things.trails = None;
+    setup.picture.things.trails.clear();
     setup.picture.things.bonds = Some(BondStyle { rule: BondRule::Distance(1.0), look: LOOK });
     let bonds = alone(&setup);
     assert!(bonds.total() >= none.total() + each(MAX_BONDS_EACH, 60), "{none}\n{bonds}");

@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 use super::list::{Entries, Entry};
 use super::rule::{Rule, conditions};
 use super::value::{COLOR_SCHEMA, color_schema};
-use super::{ABOUT, Manifest, camera, check, environment, mesh, work};
+use super::{ABOUT, Manifest, camera, check, environment, mesh, style, work};
 
 #[cfg(test)]
 mod tests;
@@ -105,6 +105,7 @@ fn rules_of(section: &str) -> &'static [Rule] {
         "environment" => environment::RULES,
         "job" => work::RULES,
         "mesh.0" => mesh::RULES,
+        "style.0" => style::RULES,
         _ => &[],
     }
 }

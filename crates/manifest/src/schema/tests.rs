@@ -80,7 +80,7 @@ fn written_manifests_are_valid() {
 }
 
 /// Every table of the schema, with a manifest that ends in this table, so that a line can be appended to it.
-const TABLES: [(&str, &str); 43] = [
+const TABLES: [(&str, &str); 53] = [
     ("", ""),
     ("/properties/input", "[input]\n"),
     ("/properties/camera", "[camera]\n"),
@@ -127,6 +127,22 @@ const TABLES: [(&str, &str); 43] = [
     ("/properties/clip/items/oneOf/0", "[[clip]]\ntype = \"plane\"\n"),
     ("/properties/clip/items/oneOf/1", "[[clip]]\ntype = \"box\"\n"),
     ("/properties/material/properties/opacity/anyOf/1", "[material.opacity]\n"),
+    ("/properties/style/items", "[[style]]\n"),
+    ("/properties/style/items/properties/radius/anyOf/2", "[[style]]\n[style.radius]\n"),
+    ("/properties/style/items/properties/color/anyOf/2", "[[style]]\n[style.color]\n"),
+    ("/properties/style/items/properties/opacity/anyOf/1", "[[style]]\n[style.opacity]\n"),
+    ("/properties/style/items/properties/material", "[[style]]\n[style.material]\n"),
+    ("/properties/style/items/properties/bonds", "[[style]]\n[style.bonds]\n"),
+    ("/properties/style/items/properties/arrows", "[[style]]\n[style.arrows]\n"),
+    (
+        "/properties/style/items/properties/arrows/properties/color/anyOf/2",
+        "[[style]]\n[style.arrows.color]\n",
+    ),
+    ("/properties/style/items/properties/trails", "[[style]]\n[style.trails]\n"),
+    (
+        "/properties/style/items/properties/trails/properties/color/anyOf/2",
+        "[[style]]\n[style.trails.color]\n",
+    ),
 ];
 
 #[test]

@@ -18,7 +18,7 @@ use super::{
 };
 use crate::scene::Owner;
 use crate::scene::ground::GroundSample;
-use crate::surface::{Intersections, MaterialId};
+use crate::surface::{Intersections, MaterialId, Shape};
 use spherule_tree::math::{Lanes, lane3, lanes_in, set_lane3, splat, splat3};
 use spherule_tree::ray::RayPacket;
 
@@ -53,7 +53,7 @@ impl RenderContext<'_> {
             .map_or(0, |pattern| pattern.sand_colors(self.simd, &hits.point, ground, base));
         for lane in lanes_in(hits.mask & !(particles | sand)) {
             let ray = (&segments.rays, segments.bounces[lane]);
-            let color = self.fixed_color(ray, hits, lane);
+            let color = self.fixed_color(ray, hits, lane, blend);
             set_lane3(base, lane, color);
         }
     }
@@ -71,16 +71,32 @@ impl RenderContext<'_> {
         let Some(particles) = self.shapes.connected_particles() else {
             return self.source.color(hits.particle[lane]);
         };
-        // Blend the colours of the particles around the point
+        self.blended_color(particles, hits, lane, blend)
+    }
+
+    /// The colours of the particles of a connected `body` around the point in `lane`, blended.
+    fn blended_color(
+        &self,
+        body: &dyn Shape,
+        hits: &Intersections,
+        lane: usize,
+        blend: &mut Vec<(u32, f32)>,
+    ) -> Vec3 {
         blend.clear();
         let hit = hits.get(lane);
-        particles.blend(&hit, &mut |particle, weight| blend.push((particle, weight)));
+        body.blend(&hit, &mut |particle, weight| blend.push((particle, weight)));
         self.source.blended_color(blend)
     }
 
     /// Base colour of a surface that is not of the particles without a part, as a ray sees it after a number of diffuse
     /// reflections.
-    fn fixed_color(&self, ray: (&RayPacket, u32), hits: &Intersections, lane: usize) -> Vec3 {
+    fn fixed_color(
+        &self,
+        ray: (&RayPacket, u32),
+        hits: &Intersections,
+        lane: usize,
+        blend: &mut Vec<(u32, f32)>,
+    ) -> Vec3 {
         let (id, part) = (hits.material[lane], hits.particle[lane]);
         // The ground is filtered over the width of the ray
         if let (MaterialId::GROUND, Some(ground)) = (id, &self.scene.ground) {
@@ -97,7 +113,12 @@ impl RenderContext<'_> {
         }
         // All others have the colour of their part, that of their material, or that of the particle
         let color = self.shapes.part_colors[id.index()].get(part as usize).copied();
-        color.or(self.scene.material(id).color).unwrap_or_else(|| self.source.color(part))
+        color.or(self.scene.material(id).color).unwrap_or_else(|| {
+            match self.shapes.bodies[id.index()] {
+                Some(body) => self.blended_color(body, hits, lane, blend),
+                None => self.source.color(part),
+            }
+        })
     }
 
     /// Fraction of each sample that surfaces cover, or `otherwise` without a surface. A ground that fades out still
@@ -196,10 +217,12 @@ impl RenderContext<'_> {
 
     /// The particle of the intersection in `lane`.
     fn particle_at(&self, hits: &Intersections, lane: usize) -> u32 {
-        match (hits.material[lane], self.shapes.particles) {
-            (MaterialId::PARTICLES, Some(particles)) => particles.particle_at(&hits.get(lane)),
-            _ => hits.particle[lane],
-        }
+        let id = hits.material[lane];
+        let body = match id {
+            MaterialId::PARTICLES => self.shapes.particles,
+            _ => self.shapes.bodies[id.index()],
+        };
+        body.map_or(hits.particle[lane], |body| body.particle_at(&hits.get(lane)))
     }
 
     /// Motion on the film of a point with this `velocity`, from this frame to the next, pixels; zero if it is or gets
@@ -235,7 +258,7 @@ impl RenderContext<'_> {
         let direction = lane3(&rays.direction, lane);
         let albedo = |blend: &mut Vec<(u32, f32)>| match hits.material[lane] {
             MaterialId::PARTICLES => self.particle_color(hits, lane, blend),
-            _ => self.fixed_color((rays, 0), hits, lane),
+            _ => self.fixed_color((rays, 0), hits, lane, blend),
         };
         let point = lane3(&hits.point, lane);
         let velocity = particle.map_or(Vec3::ZERO, |particle| self.source.velocity(particle));

@@ -5,6 +5,7 @@
 use glam::Vec3;
 
 use super::{
+    drawing::DepthCue,
     interface::Dielectric,
     light_groups::NO_GROUP,
     lights::{Light, light_of},
@@ -28,6 +29,8 @@ pub(super) struct RenderContext<'a> {
     pub(super) shapes: SceneShapes<'a>,
     /// Materials of parts of the particles, if these are separate spheres and paths are traced.
     pub(super) parts: Option<&'a PartMaterials>,
+    /// Whether some of the particles have a style with a material of its own.
+    pub(super) has_styles: bool,
     /// Whether there are meshes that only hide what is behind them.
     pub(super) has_holdouts: bool,
     pub(super) source: &'a dyn ShadeSource,
@@ -44,6 +47,8 @@ pub(super) struct RenderContext<'a> {
     /// Whether the camera is inside a connected body.
     pub(super) is_camera_inside: bool,
     pub(super) sampler: FilmSampler,
+    /// How particles fade with their distance, if they do.
+    pub(super) depth_cue: Option<DepthCue>,
     /// Width of a sample of a pixel, in pixels.
     pub(super) sample_width: f32,
     /// Maximum number of path segments of one depth, see [`SEGMENTS`].
@@ -89,6 +94,7 @@ impl<'a> RenderContext<'a> {
             parts: Some(&scene.parts)
                 .filter(|parts| !parts.is_empty() && !is_connected)
                 .filter(|_| settings.integrator == IntegratorKind::Path),
+            has_styles: source.has_styles(),
             has_holdouts: scene.materials.iter().any(|material| material.is_holdout),
             source,
             scene,
@@ -100,6 +106,7 @@ impl<'a> RenderContext<'a> {
             color: source.constant_color(),
             boundary: Dielectric::new(scene.particle_material()),
             sample_width: (settings.samples as f32).sqrt().recip().max(MIN_SAMPLE_WIDTH),
+            depth_cue: DepthCue::new(scene, &settings.drawing),
             sampler: FilmSampler::with_filter(settings.samples, settings.filter),
             max_segments: SEGMENTS,
         }

@@ -71,14 +71,15 @@ impl ObjectName {
         Self::of(format_args!("{attribute}{value}"))
     }
 
-    /// The name of all surfaces with a material of this owner: `mesh0` for meshes and rods and `material0` for parts of
-    /// the particles, numbered in the order of the manifest.
+    /// The name of all surfaces with a material of this owner: `mesh0` for meshes and rods `material0` for parts of
+    /// the particles and `style0` for their styles, numbered in the order of the manifest.
     pub fn of_owner(owner: Owner) -> Self {
         match owner {
             Owner::Particles => Self::of(format_args!("{PARTICLES}")),
             Owner::Spray => Self::of(format_args!("{SPRAY}")),
             Owner::Ground => Self::of(format_args!("{GROUND}")),
             Owner::Part(number) => Self::of(format_args!("material{number}")),
+            Owner::Style(number) => Self::of(format_args!("style{number}")),
             Owner::Thing(number) => Self::of(format_args!("mesh{number}")),
         }
     }

@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use super::{
     context::RenderContext,
+    drawing::Drawing,
     interface::{attenuate, leaving},
     light_groups::NO_GROUP,
     scene_shapes::Interior,
@@ -11,7 +12,7 @@ use super::{
     shading::{add_backdrop, add_background, scale},
     stream::SegmentPacket,
 };
-use crate::scene::Background;
+use crate::scene::{Background, Owner};
 use crate::surface::MaterialId;
 use spherule_tree::math::lanes_in;
 
@@ -31,20 +32,33 @@ impl RenderContext<'_> {
         }
         self.meet_translucent(segments, coherence, packet);
         self.meet_spray(segments, coherence, packet);
-        self.assign_parts(packet);
+        self.assign_materials(packet);
         packet.throughput = segments.throughput;
+        if depth == 1 && self.settings.drawing != Drawing::NONE {
+            self.draw_outlines(&segments.rays, packet);
+        }
         self.pass_panes(segments, packet);
         self.absorb(segments, packet);
     }
 
-    /// Replaces the material of particles by that of their part.
-    fn assign_parts(&self, packet: &mut PacketScratch) {
-        let Some(parts) = self.parts else {
-            return;
-        };
+    /// Replaces the material of particles by that of their part or style.
+    fn assign_materials(&self, packet: &mut PacketScratch) {
         let hits = &mut packet.hits;
-        for lane in lanes_in(hits.lanes_of(MaterialId::PARTICLES)) {
-            hits.material[lane] = self.material_of(parts, hits.particle[lane]);
+        if self.has_styles {
+            // Spheres of several styles are one shape, which has the material of one of them
+            for lane in lanes_in(hits.mask) {
+                let is_style = |owner| matches!(owner, Owner::Particles | Owner::Style(_));
+                if is_style(self.scene.material(hits.material[lane]).owner)
+                    && let Some(material) = self.source.style(hits.particle[lane])
+                {
+                    hits.material[lane] = material;
+                }
+            }
+        }
+        if let Some(parts) = self.parts {
+            for lane in lanes_in(hits.lanes_of(MaterialId::PARTICLES)) {
+                hits.material[lane] = self.material_of(parts, hits.particle[lane]);
+            }
         }
     }
 
@@ -88,7 +102,8 @@ impl RenderContext<'_> {
     ) {
         // Rays see it where they miss everything, and through a ground that fades out
         let hits = &packet.hits;
-        let lanes = lanes & (!hits.mask | hits.lanes_of(MaterialId::GROUND));
+        let fading = if depth == 1 && self.depth_cue.is_some() { hits.mask } else { 0 };
+        let lanes = lanes & (!hits.mask | hits.lanes_of(MaterialId::GROUND) | fading);
         if lanes == 0 {
             return;
         }

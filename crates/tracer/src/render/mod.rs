@@ -24,6 +24,7 @@ mod channels;
 mod context;
 pub mod cryptomatte;
 mod dimensions;
+mod drawing;
 mod entries;
 mod film;
 mod film_rows;
@@ -36,6 +37,7 @@ mod light_groups;
 mod light_split;
 mod lights;
 mod near_photons;
+mod outline;
 mod panes;
 mod path;
 pub mod planes;
@@ -103,6 +105,7 @@ mod whitted_tests;
 
 pub use aov::{DataSample, NO_ID};
 pub use channels::{Channels, NamedChannel, UnknownChannel};
+pub use drawing::Drawing;
 pub use film::Film;
 pub use film_rows::FilmRows;
 pub use path::ground::GroundLightBytes;
@@ -116,7 +119,7 @@ pub use settings::{
 };
 pub use source::mean;
 pub use source::opacity_of;
-pub use source::{Colors, Opacities, ParticleShading, ShadeSource};
+pub use source::{Colors, Opacities, ParticleShading, ShadeSource, StyleShading};
 pub use stop::{Deadline, Stop};
 pub use window::DataWindow;
 

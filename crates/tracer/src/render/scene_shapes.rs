@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::{settings::IntegratorKind, source::ShadeSource};
-use crate::scene::{Finish, Material, Scene};
+use crate::scene::{Finish, Material, Owner, Scene};
 use crate::surface::{MaterialId, Shape};
 
 /// The interior of the particles.
@@ -38,6 +38,16 @@ fn part_colors<'a>(scene: &Scene, shapes: &[&'a dyn Shape]) -> Vec<&'a [Vec3]> {
     colors
 }
 
+/// The connected shapes among `shapes` in the order of the materials of `scene`, apart from the body of the particles.
+fn bodies<'a>(scene: &Scene, shapes: &[&'a dyn Shape]) -> Vec<Option<&'a dyn Shape>> {
+    let mut bodies = vec![None; scene.materials.len()];
+    for shape in shapes.iter().filter(|shape| shape.is_connected()) {
+        bodies[shape.material().index()] = Some(*shape);
+    }
+    bodies[MaterialId::PARTICLES.index()] = None;
+    bodies
+}
+
 /// The shapes of a scene by the way in which rays meet them.
 pub(super) struct SceneShapes<'a> {
     /// All that are not among the others, with opaque or transmissive particles; the ground comes first, because it is the
@@ -45,6 +55,8 @@ pub(super) struct SceneShapes<'a> {
     pub(super) solid: Vec<&'a dyn Shape>,
     /// The colours of their parts, apart from particles, in the order of the materials of the scene.
     pub(super) part_colors: Vec<&'a [Vec3]>,
+    /// Connected bodies of particles with a material of their own, in the order of the materials of the scene.
+    pub(super) bodies: Vec<Option<&'a dyn Shape>>,
     /// Meshes that rays pass.
     pub(super) panes: Vec<&'a dyn Shape>,
     /// Spray whose drops fade out; opaque spray is solid.
@@ -77,11 +89,18 @@ impl<'a> SceneShapes<'a> {
         let interior = Interior::of(scene.particle_material(), is_connected);
         // Only opaque spheres fade out: transmissive ones and connected bodies have an inside
         let has_opacity = source.is_translucent() && interior == Interior::Opaque && !is_connected;
-        let is_translucent =
-            |shape: &&dyn Shape| has_opacity && shape.material() == MaterialId::PARTICLES;
+        let is_style = |shape: &&dyn Shape| {
+            matches!(scene.material(shape.material()).owner, Owner::Style(_))
+                && !shape.is_connected()
+        };
+        let is_translucent = |shape: &&dyn Shape| match shape.material() {
+            MaterialId::PARTICLES => has_opacity,
+            _ => source.is_translucent() && is_style(shape),
+        };
         let (translucent, shapes): (Vec<_>, Vec<_>) = shapes.into_iter().partition(is_translucent);
         Self {
             part_colors: part_colors(scene, &shapes),
+            bodies: bodies(scene, &shapes),
             solid: shapes,
             panes,
             soft_spray: spray.first().copied(),

@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use super::channels::Channels;
+use super::drawing::Drawing;
 use super::sampler::{MAX_FILTER_WIDTH, PixelFilter};
 use super::window::DataWindow;
 use crate::scene::{Material, MaterialError, Scene};
@@ -95,6 +96,8 @@ pub struct RenderSettings {
     pub channels: Channels,
     /// Also fills the planes that [denoising](crate::denoise) needs.
     pub has_features: bool,
+    /// Outlines, and how particles fade with their distance.
+    pub drawing: Drawing,
     /// The part of the image that the film is; by default the whole image.
     pub window: Option<DataWindow>,
     /// If given, the film is a mosaic: its tiles of 16x16 pixels are tiles of a film with this width and height, evenly
@@ -118,6 +121,7 @@ impl RenderSettings {
             min_weight: DEFAULT_MIN_WEIGHT,
             transparent_background: false,
             channels: Channels::COLOR,
+            drawing: Drawing::NONE,
             has_features: false,
             window: None,
             mosaic_of: None,

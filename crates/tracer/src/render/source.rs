@@ -6,7 +6,7 @@ use std::ops::Mul;
 use glam::Vec3;
 
 use super::aov::NO_ID;
-use crate::scene::ColorMap;
+use crate::scene::{ColorMap, MaterialId};
 
 /// Looks up attributes by the index of a particle in the frame, as in [`crate::surface::Intersection`].
 pub trait ShadeSource: Sync {
@@ -32,6 +32,17 @@ pub trait ShadeSource: Sync {
 
     /// The attribute that divides particles into parts, and the part of the particle.
     fn part(&self, index: u32) -> Option<(&str, i32)> {
+        let _ = index;
+        None
+    }
+
+    /// Whether some particles are drawn in a style with a material of its own.
+    fn has_styles(&self) -> bool {
+        false
+    }
+
+    /// The material of a particle whose style has its own.
+    fn style(&self, index: u32) -> Option<MaterialId> {
         let _ = index;
         None
     }
@@ -100,13 +111,28 @@ pub fn opacity_of(value: f32, [clear, opaque]: [f32; 2]) -> f32 {
     if opacity > 0.0 { opacity.min(1.0) } else { 0.0 }
 }
 
-/// A [`ShadeSource`] over slices in the order of the particles.
+/// How the particles from one index on are drawn, up to those of the next style.
 #[derive(Debug, Clone, Copy)]
-pub struct ParticleShading<'a> {
-    /// Base colours.
+pub struct StyleShading<'a> {
+    /// Index of the first particle.
+    pub first: u32,
+    /// The material.
+    pub material: MaterialId,
+    /// Base colours; slices are of all particles of the frame.
     pub colors: Colors<'a>,
     /// Opacities.
     pub opacities: Opacities<'a>,
+}
+
+/// A [`ShadeSource`] over slices in the order of the particles.
+#[derive(Debug, Clone)]
+pub struct ParticleShading<'a> {
+    /// Base colours, unless a style has its own.
+    pub colors: Colors<'a>,
+    /// Opacities, unless a style has its own.
+    pub opacities: Opacities<'a>,
+    /// The styles of the last particles, with rising indices.
+    pub styles: Vec<StyleShading<'a>>,
     /// Ids; by default the id of a particle is its index.
     pub ids: Option<&'a [u32]>,
     /// Velocities; zero by default.
@@ -123,6 +149,7 @@ impl ParticleShading<'_> {
         Self {
             colors: Colors::Constant(color),
             opacities: Opacities::Constant(1.0),
+            styles: Vec::new(),
             ids: None,
             velocities: None,
             parts: None,
@@ -131,11 +158,25 @@ impl ParticleShading<'_> {
     }
 }
 
+impl<'a> ParticleShading<'a> {
+    /// The style of a particle, if it is not drawn like the first ones.
+    #[inline]
+    fn style_of(&self, index: u32) -> Option<&StyleShading<'a>> {
+        self.styles.iter().rev().find(|style| style.first <= index)
+    }
+
+    /// The colours of the style of a particle.
+    #[inline]
+    fn colors_of(&self, index: u32) -> &Colors<'a> {
+        self.style_of(index).map_or(&self.colors, |style| &style.colors)
+    }
+}
+
 impl ShadeSource for ParticleShading<'_> {
     fn color(&self, index: u32) -> Vec3 {
         let i = index as usize;
         // If slices are too short, return black; a panic would abort the job.
-        match self.colors {
+        match *self.colors_of(index) {
             Colors::Constant(color) => color,
             Colors::PerParticle(colors) => colors.get(i).copied().unwrap_or_default(),
             Colors::Mapped { values, map } => map.color(values.get(i).copied().unwrap_or(f32::NAN)),
@@ -144,13 +185,15 @@ impl ShadeSource for ParticleShading<'_> {
 
     fn constant_color(&self) -> Option<Vec3> {
         match self.colors {
-            Colors::Constant(color) => Some(color),
-            Colors::PerParticle(_) | Colors::Mapped { .. } => None,
+            Colors::Constant(color) if self.styles.is_empty() => Some(color),
+            _ => None,
         }
     }
 
     fn blended_color(&self, parts: &[(u32, f32)]) -> Vec3 {
-        match self.colors {
+        // A surface belongs to particles of one style
+        let first = parts.first().map_or(0, |(particle, _)| *particle);
+        match *self.colors_of(first) {
             Colors::Mapped { map, .. } if map.categories().is_some() => {
                 mean(parts, |i| self.color(i))
             }
@@ -176,12 +219,21 @@ impl ShadeSource for ParticleShading<'_> {
         Some((name, *parts.get(index as usize)?))
     }
 
+    fn has_styles(&self) -> bool {
+        !self.styles.is_empty()
+    }
+
+    fn style(&self, index: u32) -> Option<MaterialId> {
+        self.style_of(index).map(|style| style.material)
+    }
+
     fn is_translucent(&self) -> bool {
-        !matches!(self.opacities, Opacities::Constant(1.0))
+        let is_opaque = |opacities: &Opacities<'_>| matches!(opacities, Opacities::Constant(1.0));
+        !is_opaque(&self.opacities) || self.styles.iter().any(|style| !is_opaque(&style.opacities))
     }
 
     fn opacity(&self, index: u32) -> f32 {
-        match self.opacities {
+        match *self.style_of(index).map_or(&self.opacities, |style| &style.opacities) {
             Opacities::Constant(opacity) => opacity,
             Opacities::Mapped { values, range } => {
                 let value = values.get(index as usize).copied();

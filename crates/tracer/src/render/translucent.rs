@@ -15,7 +15,7 @@ use super::{
     source::ShadeSource,
     stream::SegmentPacket,
 };
-use crate::surface::{Intersection, MaterialId, Shape, SphereEntries, TransmittanceProduct};
+use crate::surface::{Intersection, Shape, SphereEntries, TransmittanceProduct};
 use spherule_tree::accel::Coherence;
 use spherule_tree::math::{LANES, lane3, lanes_in, set_lane3, splat};
 use spherule_tree::ray::{Ray, RayPacket};
@@ -75,7 +75,7 @@ impl RenderContext<'_> {
                 let u = &mut u[lane];
                 let ends = |hit: &Intersection| ends(u, self.source.opacity(hit.particle));
                 if let Some(hit) = entries(spheres, segments.rays.ray(lane)).find(ends) {
-                    packet.hits.set(lane, &hit, MaterialId::PARTICLES);
+                    packet.hits.set(lane, &hit, spheres.material());
                     segments.rays.t_max[lane] = hit.t;
                 }
             }
@@ -93,7 +93,7 @@ impl RenderContext<'_> {
         for lane in lanes_in(lanes) {
             if let Some(entry) = packet.entries[lane].end(u[lane]) {
                 let hit = all.intersection(&segments.rays.ray(lane), entry);
-                packet.hits.set(lane, &hit, MaterialId::PARTICLES);
+                packet.hits.set(lane, &hit, spheres.material());
                 segments.rays.t_max[lane] = entry.t;
             }
         }

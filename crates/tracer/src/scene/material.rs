@@ -44,6 +44,8 @@ pub enum Owner {
     Particles,
     /// Parts of the particles; the number counts the materials of parts.
     Part(u16),
+    /// Particles that are drawn in a style of their own; the number counts such styles.
+    Style(u16),
     /// Foam and spray.
     Spray,
     /// The ground.
@@ -55,7 +57,7 @@ pub enum Owner {
 impl Owner {
     /// Whether surfaces of the material belong to particles, which have attributes.
     pub const fn is_of_particles(self) -> bool {
-        matches!(self, Self::Particles | Self::Part(_) | Self::Spray)
+        matches!(self, Self::Particles | Self::Part(_) | Self::Style(_) | Self::Spray)
     }
 }
 

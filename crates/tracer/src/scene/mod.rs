@@ -100,7 +100,7 @@ pub struct Scene {
     /// Ambient light (`ambient` of eq. 4.1).
     pub ambient_light: Vec3,
     /// The materials by [`MaterialId`]: of the particles, of spray and of the ground, and then those of
-    /// [`Self::add`] and [`Self::add_part`].
+    /// [`Self::add`], [`Self::add_style`] and [`Self::add_part`].
     pub materials: Vec<Material>,
     /// Which parts of the particles have a material of their own, for path tracing of separate spheres.
     pub parts: PartMaterials,
@@ -174,6 +174,11 @@ impl Scene {
     /// Adds the material of a mesh or of rods; None if there are [`MaterialId::MAX`] already.
     pub fn add(&mut self, material: Material) -> Option<MaterialId> {
         self.push(material, Owner::Thing)
+    }
+
+    /// Adds the material of particles with a style of their own; None as in [`Self::add`].
+    pub fn add_style(&mut self, material: Material) -> Option<MaterialId> {
+        self.push(material, Owner::Style)
     }
 
     /// Adds the material of the particles of `parts`, unless they have one; None as in [`Self::add`].

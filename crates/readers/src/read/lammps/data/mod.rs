@@ -94,7 +94,7 @@ impl Reader for LammpsData {
     }
 }
 
-const IMAGE_FLAGS: &str = "image flags of atoms are not used; positions are those in the box";
+const IMAGE_FLAGS: &str = "image flags of atoms are not used; positions are those in the box (--unwrap makes molecules whole by their bonds)";
 
 /// Whether there are image flags behind the columns of the first atom.
 fn has_image_flags(text: &mut TextInput<'_>, header: &DataHeader) -> bool {

@@ -217,7 +217,7 @@ pub(in crate::render) fn bytes(scene: &Scene, settings: &RenderSettings) -> Grou
     // Photons at surfaces are stored one by one
     let has_opaque = scene.materials.iter().any(|material| match material.owner {
         Owner::Thing(_) => !material.is_pane(),
-        Owner::Part(_) => true,
+        Owner::Part(_) | Owner::Style(_) => true,
         Owner::Particles | Owner::Spray | Owner::Ground => false,
     });
     let has_surfaces = emits && has_opaque;

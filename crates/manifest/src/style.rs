@@ -1,0 +1,489 @@
+//! `[[style]]`: how some of the particles are drawn, unlike the others.
+
+use spherule_selection::{Claim, Condition, Division};
+use spherule_tracer::scene::{self, Finish, Fresnel};
+use spherule_tracer::surface::SurfaceKind;
+
+use super::bonds::BondSearch;
+use super::color::{ColorMapping, ColorSetting};
+use super::color_map::{MapName, RangeSetting};
+use super::inline_table::{InlineTable, inline_table};
+use super::input::RadiusSetting;
+use super::key::Key;
+use super::keys::{Keys, keys};
+use super::material::{Material, MaterialKind};
+use super::opacity::OpacitySetting;
+use super::part::ROUGHNESS;
+use super::rule::{Rule, rules};
+use super::value::named;
+use super::{Arrows, Manifest, Trails};
+
+pub(super) const ABOUT: &[&str] = &[
+    "How some of the particles are drawn; the first style whose condition holds takes a particle",
+];
+
+named! {
+    /// How the particles of a style are drawn.
+    StyleDraw {
+        /// A sphere each.
+        Spheres = "spheres",
+        /// The isosurface of the SPH field.
+        Smooth = "smooth",
+        /// Overlapping spheres as one body.
+        Union = "union",
+        /// Bonds, with atoms as thick as these.
+        Sticks = "sticks",
+        /// Bonds between smaller spheres.
+        BallsAndSticks = "balls-and-sticks",
+        /// Arrows of a vector attribute, without spheres.
+        Arrows = "arrows",
+        /// Their ways over earlier frames, without spheres.
+        Trails = "trails",
+        /// Not at all.
+        Hidden = "hidden",
+    }
+}
+
+named! {
+    /// Materials of styles.
+    StyleMaterialKind {
+        /// Light leaves in all directions alike.
+        Matte = "matte",
+        /// A matte base under a clear coat.
+        Plastic = "plastic",
+        /// A mirror in the base colour.
+        Metal = "metal",
+        /// A clear body of glass.
+        Glass = "glass",
+        /// A clear body of water.
+        Water = "water",
+    }
+}
+
+const ONE_MAP: &str = "belongs to color_by, which is not given; a map may also be a table in color";
+const STICKS: &str = "are drawn by a style with draw = \"sticks\" or \"balls-and-sticks\"";
+const OPAQUE_SPHERES: &str =
+    "only opaque spheres have one; set draw = \"spheres\", and matte, plastic or metal as material";
+
+/// Rules between the keys of a style.
+pub(super) const RULES: &[Rule] = rules! {
+    "color_by" Given => "color" MissingOr["auto"]: "color_by is given too; leave one of the two out";
+    "color_by" Missing => "map" Missing: ONE_MAP;
+    "color_by" Missing => "range" Missing: ONE_MAP;
+    "draw" Is["arrows"] => "arrows" Given: "which arrows, such as { attribute = \"velocity\", scale = 0.1 }";
+    "draw" Is["trails"] => "trails" Given: "how long, such as { frames = 20 }";
+    "draw" MissingOrNot["arrows"] => "arrows" Missing:
+        "are drawn by a style with draw = \"arrows\"; for arrows at all particles there is [[arrows]]";
+    "draw" MissingOrNot["trails"] => "trails" Missing:
+        "are drawn by a style with draw = \"trails\"; for trails of all particles there is [trails]";
+    "draw" MissingOrNot["sticks", "balls-and-sticks"] => "bonds" Missing: STICKS;
+    "draw" Is["sticks", "balls-and-sticks"] => "material.type" MissingOrNot["glass", "water"]:
+        "sticks are opaque; choose matte, plastic or metal";
+    "draw" Is["smooth", "union"] => "opacity" MissingOr["1"]: OPAQUE_SPHERES;
+    "material.type" Is["glass", "water"] => "opacity" MissingOr["1"]: OPAQUE_SPHERES;
+};
+
+/// The material of a style.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StyleMaterial {
+    /// Kind of material.
+    pub kind: StyleMaterialKind,
+    /// Roughness, 0 to 1; by default that of `[material]`, and glass and water are smooth.
+    pub roughness: Option<f32>,
+    /// Index of refraction of glass and water; by default 1.5 and 1.333.
+    pub ior: Option<f32>,
+    /// Transmittance of white light over [`Self::absorption_length`] inside, linear RGB.
+    pub absorption: glam::Vec3,
+    /// The length for `absorption`; by default it depends on the extent of the particles.
+    pub absorption_length: Option<f64>,
+}
+
+impl Default for StyleMaterial {
+    fn default() -> Self {
+        Self {
+            kind: StyleMaterialKind::Matte,
+            roughness: None,
+            ior: None,
+            absorption: glam::Vec3::ONE,
+            absorption_length: None,
+        }
+    }
+}
+
+impl InlineTable for StyleMaterial {
+    const EXAMPLE: &str = "{ type = \"plastic\", roughness = 0.3 }";
+
+    fn keys(&mut self, keys: &mut Keys<'_>) {
+        let kind = Key::new("type", &["Kind"]).required("matte, plastic, metal, glass or water");
+        keys.key(kind, &mut self.kind);
+        keys!(keys:
+            /// Roughness
+            roughness => self.roughness, from(0), to(1);
+            /// Index of refraction
+            ior => self.ior, from(1), to(4), single();
+            /// Transmittance of white light over absorption_length
+            absorption => self.absorption, from(0), to(1);
+            /// The length for absorption
+            absorption_length => self.absorption_length, above(0), single();
+        );
+    }
+}
+inline_table!(StyleMaterial);
+
+impl StyleMaterial {
+    /// Whether light passes through it.
+    pub const fn is_clear(&self) -> bool {
+        matches!(self.kind, StyleMaterialKind::Glass | StyleMaterialKind::Water)
+    }
+
+    /// The material in a scene, if it is opaque.
+    pub fn resolved(&self) -> scene::Material {
+        let roughness = self.roughness.unwrap_or(ROUGHNESS);
+        scene::Material {
+            finish: match self.kind {
+                StyleMaterialKind::Plastic => Finish::Plastic { roughness },
+                StyleMaterialKind::Metal => Finish::Metal { roughness },
+                _ => Finish::Matte,
+            },
+            ..scene::Material::DEFAULT
+        }
+    }
+}
+
+/// The bonds of a style.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct StyleBonds {
+    /// How they are found; by default as in `[bonds]`, else those of the file, else covalent ones.
+    pub find: Option<BondSearch>,
+    /// Their radius; by default half that of the balls.
+    pub radius: Option<f32>,
+}
+
+impl InlineTable for StyleBonds {
+    const EXAMPLE: &str = "{ find = \"covalent\", radius = 0.1 }";
+
+    fn keys(&mut self, keys: &mut Keys<'_>) {
+        keys!(keys:
+            /// Which particles have a bond, as bonds.find
+            find => self.find, or("auto");
+            /// Radius
+            radius => self.radius, or("auto"), unit("a length"), above(0), single();
+        );
+    }
+}
+inline_table!(StyleBonds);
+
+impl InlineTable for Arrows {
+    const EXAMPLE: &str = "{ attribute = \"velocity\", scale = 0.1 }";
+
+    fn keys(&mut self, keys: &mut Keys<'_>) {
+        Self::keys(self, keys);
+    }
+}
+inline_table!(Arrows);
+
+impl InlineTable for Trails {
+    const EXAMPLE: &str = "{ frames = 20 }";
+
+    fn keys(&mut self, keys: &mut Keys<'_>) {
+        Self::keys(self, keys);
+    }
+}
+inline_table!(Trails);
+
+/// One `[[style]]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Style {
+    /// Its name in legends.
+    pub name: Option<String>,
+    /// Which particles it takes; None: all that no earlier style takes.
+    pub condition: Option<Condition>,
+    /// How they are drawn.
+    pub draw: StyleDraw,
+    /// Their radius, or that of sticks.
+    pub radius: RadiusSetting,
+    /// Source of the colours; `Auto` is that of `[material]`.
+    pub color: ColorSetting,
+    /// The value that colours them.
+    pub color_by: Option<String>,
+    /// Its colour map.
+    pub map: Option<MapName>,
+    /// Its range.
+    pub range: Option<RangeSetting>,
+    /// How much each sphere covers of what is behind it.
+    pub opacity: OpacitySetting,
+    /// The material; by default that of `[material]` if it is opaque, else matte.
+    pub material: Option<StyleMaterial>,
+    /// Bonds of sticks.
+    pub bonds: Option<StyleBonds>,
+    /// The arrows, if it draws these.
+    pub arrows: Option<Arrows>,
+    /// The trails, if it draws these.
+    pub trails: Option<Trails>,
+}
+
+impl Default for Style {
+    fn default() -> Self {
+        Self {
+            name: None,
+            condition: None,
+            draw: StyleDraw::Spheres,
+            radius: RadiusSetting::Auto,
+            color: ColorSetting::Auto,
+            color_by: None,
+            map: None,
+            range: None,
+            opacity: OpacitySetting::Constant(1.0),
+            material: None,
+            bonds: None,
+            arrows: None,
+            trails: None,
+        }
+    }
+}
+
+impl Style {
+    /// Reads or lists one table.
+    pub(super) fn keys(&mut self, keys: &mut Keys<'_>) {
+        keys!(keys:
+            /// Name in the legend
+            name => self.name, example("\"wall\""), unset("the condition");
+            /// Condition on the particles, as select.where
+            where => self.condition, example("\"type == 2\""), unset("all that no earlier style takes");
+            /// How they are drawn: spheres | smooth | union | sticks | balls-and-sticks | arrows | trails | hidden
+            draw => self.draw;
+            /// Radius as input.radius, of the balls or of the sticks
+            ///
+            /// By default spheres have those of input.radius, balls a quarter of them, and sticks an eighth of the largest.
+            radius => self.radius;
+            /// Colour as material.color; auto: that of material.color
+            color => self.color, from(0);
+            /// Value that colours them, with a colour map
+            color_by => self.color_by, example("\"speed\""), unset("color");
+            /// Colour map of color_by
+            map => self.map, example("\"viridis\""), unset("as for material.color");
+            /// Range of color_by
+            range => self.range, example("[0.0, 4.0]"), unset("that of these particles in the sequence");
+            /// Opacity of spheres as material.opacity
+            opacity => self.opacity;
+            /// Material: { type = "plastic", roughness = 0.3 }, also with ior, absorption and absorption_length
+            ///
+            /// The types are matte, plastic, metal, glass and water. One of the styles may be clear.
+            material => self.material, example("{ type = \"plastic\", roughness = 0.3 }"),
+                unset("that of [material] if it is opaque, else matte");
+            /// Bonds of sticks: { find = "covalent", radius = 0.1 }
+            bonds => self.bonds, example("{ find = \"covalent\", radius = 0.1 }"),
+                unset("those of [bonds], or of the file, or covalent ones");
+            /// Arrows for draw = "arrows", with the keys of [[arrows]]
+            arrows => self.arrows, example("{ attribute = \"velocity\", scale = 0.1 }"), unset("none");
+            /// Trails for draw = "trails", with the keys of [trails]
+            trails => self.trails, example("{ frames = 20 }"), unset("none");
+        );
+        if let Some(section) = keys.reading() {
+            section.check(RULES);
+        }
+    }
+
+    /// Whether it draws bonds.
+    pub const fn has_sticks(&self) -> bool {
+        matches!(self.draw, StyleDraw::Sticks | StyleDraw::BallsAndSticks)
+    }
+
+    /// Whether it draws one body.
+    pub const fn is_body(&self) -> bool {
+        matches!(self.draw, StyleDraw::Smooth | StyleDraw::Union)
+    }
+
+    /// Whether light passes through it.
+    pub fn is_clear(&self) -> bool {
+        self.material.as_ref().is_some_and(StyleMaterial::is_clear)
+    }
+
+    /// The surface of its particles; None if they have none.
+    pub const fn surface(&self) -> Option<SurfaceKind> {
+        match self.draw {
+            StyleDraw::Spheres | StyleDraw::Sticks | StyleDraw::BallsAndSticks => {
+                Some(SurfaceKind::Spheres)
+            }
+            StyleDraw::Smooth => Some(SurfaceKind::Smooth),
+            StyleDraw::Union => Some(SurfaceKind::Union),
+            StyleDraw::Arrows | StyleDraw::Trails | StyleDraw::Hidden => None,
+        }
+    }
+
+    /// The colours, with those of `color_by` in one form; `usual` are those of `[material]`.
+    pub fn colors(&self, usual: &ColorSetting) -> ColorSetting {
+        match (&self.color_by, &self.color) {
+            (Some(name), _) => ColorSetting::Mapped(ColorMapping {
+                map: self.map,
+                range: self.range,
+                ..ColorMapping::by(name)
+            }),
+            (None, ColorSetting::Auto) => usual.clone(),
+            (None, color) => color.clone(),
+        }
+    }
+
+    /// Whether legends show it: a map, or a name with a colour.
+    pub fn has_legend(&self) -> bool {
+        let is_drawn = self.draw != StyleDraw::Hidden;
+        is_drawn
+            && match self.colors(&ColorSetting::Auto) {
+                ColorSetting::Mapped(_) => true,
+                ColorSetting::Rgb(_) => self.name.is_some(),
+                ColorSetting::Auto => false,
+            }
+    }
+
+    /// How it is called in legends.
+    pub fn title(&self) -> String {
+        let condition = self.condition.as_ref().map(Condition::as_str);
+        self.name.clone().unwrap_or_else(|| condition.unwrap_or("others").to_owned())
+    }
+}
+
+/// Styles as they are drawn. The first group of particles alone may be clear: that of a clear style if there is one, else
+/// the particles without a style; see [`Manifest::styled`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct StyledManifest {
+    /// The settings, with `[material]`, `[surface]`, `input.radius` and `[bonds]` of the first group.
+    pub manifest: Manifest,
+    /// The styles of the other groups, in the order of these.
+    pub styles: Vec<Style>,
+    /// Which particles belong to which group. The claims are in the order of the manifest's styles, without hidden ones.
+    pub division: Division,
+    /// The style of the manifest that has become the first group, if one has.
+    pub first: Option<usize>,
+}
+
+/// The order of groups by what they draw: spheres, bodies, others.
+fn rank(style: &Style) -> u8 {
+    match style.surface() {
+        Some(SurfaceKind::Spheres) => 0,
+        Some(SurfaceKind::Union | SurfaceKind::Smooth) => 1,
+        None => 2,
+    }
+}
+
+impl Manifest {
+    /// The condition of the particles that no hidden style takes; None if there is none.
+    pub(super) fn shown_condition(&self) -> Option<String> {
+        // From the last style on: None is all particles, Some("") none
+        let mut rest: Option<String> = None;
+        for style in self.styles.iter().rev() {
+            let own = style.condition.as_ref().map(Condition::as_str);
+            let is_hidden = style.draw == StyleDraw::Hidden;
+            rest = match (own, is_hidden, rest.as_deref()) {
+                (None, true, _) => Some(String::new()),
+                (None, false, _) | (Some(_), false, None) => None,
+                (Some(own), true, None) => Some(format!("!({own})")),
+                (Some(_), true, Some("")) => Some(String::new()),
+                (Some(own), true, Some(rest)) => Some(format!("!({own}) && ({rest})")),
+                (Some(own), false, Some("")) => Some(own.to_owned()),
+                (Some(own), false, Some(rest)) => Some(format!("({own}) || ({rest})")),
+            };
+        }
+        // No particle is below itself
+        rest.map(|rest| if rest.is_empty() { "index < 0".to_owned() } else { rest })
+    }
+
+    /// The groups of particles that are drawn in different ways: first those without a style, or those of a clear one.
+    pub fn styled(&self) -> StyledManifest {
+        let drawn: Vec<(usize, &Style)> = (self.styles.iter().enumerate())
+            .filter(|(_, style)| style.draw != StyleDraw::Hidden)
+            .collect();
+        let first = drawn.iter().find(|(_, style)| style.is_clear()).map(|(index, _)| *index);
+        // The settings without a style are one of the other groups if a style takes their place
+        let mut others: Vec<(Option<usize>, Style)> = (drawn.iter())
+            .filter(|(index, _)| Some(*index) != first)
+            .map(|(index, style)| (Some(*index), (*style).clone()))
+            .collect();
+        let has_rest = drawn.iter().all(|(_, style)| style.condition.is_some());
+        if first.is_some() && has_rest {
+            others.push((None, self.style_of_rest()));
+        }
+        others.sort_by_key(|(_, style)| rank(style));
+        let group_of = |index: Option<usize>| {
+            let place = others.iter().position(|(other, _)| *other == index);
+            place.map_or(0, |place| place + 1)
+        };
+        let mut claims: Vec<Claim> = (drawn.iter())
+            .map(|(index, style)| Claim {
+                condition: style.condition.clone(),
+                group: group_of(Some(*index)),
+            })
+            .collect();
+        if first.is_some() && has_rest {
+            claims.push(Claim { condition: None, group: group_of(None) });
+        }
+        let mut manifest = self.clone();
+        if let Some(first) = first {
+            manifest.take_style(&self.styles[first]);
+        }
+        let division = Division { claims, groups: others.len() + 1, up: None };
+        let styles = others.into_iter().map(|(_, style)| style).collect();
+        StyledManifest { manifest, styles, division, first }
+    }
+
+    /// The settings of particles without a style, as a style.
+    fn style_of_rest(&self) -> Style {
+        let kind = match self.material.kind {
+            Some(MaterialKind::Plastic) => StyleMaterialKind::Plastic,
+            Some(MaterialKind::Metal) => StyleMaterialKind::Metal,
+            _ => StyleMaterialKind::Matte,
+        };
+        let roughness = Some(self.material.roughness);
+        Style {
+            draw: match self.surface.kind {
+                SurfaceKind::Spheres => StyleDraw::Spheres,
+                SurfaceKind::Union => StyleDraw::Union,
+                SurfaceKind::Smooth => StyleDraw::Smooth,
+            },
+            radius: self.input.radius.clone(),
+            color: self.material.color.clone(),
+            opacity: self.material.opacity.clone(),
+            material: Some(StyleMaterial { kind, roughness, ..StyleMaterial::default() }),
+            ..Style::default()
+        }
+    }
+
+    /// Draws the particles without a style like those of `style`.
+    fn take_style(&mut self, style: &Style) {
+        let color = style.colors(&self.material.color);
+        if let Some(kind) = style.surface() {
+            self.surface.kind = kind;
+        }
+        if style.radius != RadiusSetting::Auto {
+            self.input.radius = style.radius.clone();
+        }
+        self.bonds.find = BondSearch::None;
+        let usual = std::mem::take(&mut self.material);
+        self.material = match &style.material {
+            None => usual,
+            Some(own) => Material {
+                kind: Some(match own.kind {
+                    StyleMaterialKind::Matte => MaterialKind::Matte,
+                    StyleMaterialKind::Plastic => MaterialKind::Plastic,
+                    StyleMaterialKind::Metal => MaterialKind::Metal,
+                    StyleMaterialKind::Glass => MaterialKind::Glass,
+                    StyleMaterialKind::Water => MaterialKind::Water,
+                }),
+                roughness: own.roughness.unwrap_or(ROUGHNESS),
+                absorption: own.absorption,
+                absorption_length: own.absorption_length,
+                constants: scene::Material {
+                    ior: own.ior.unwrap_or(usual.constants.ior),
+                    ..usual.constants
+                },
+                fresnel: own.is_clear().then_some(Fresnel::Exact).or(usual.fresnel),
+                ..Material::default()
+            },
+        };
+        self.material.color = color;
+        self.material.opacity = style.opacity.clone();
+    }
+}
+
+#[cfg(test)]
+#[path = "style_tests.rs"]
+mod tests;

@@ -1,0 +1,119 @@
+use std::path::Path;
+
+use super::*;
+use crate::Manifest;
+
+fn read(text: &str) -> Result<Manifest, String> {
+    let text = format!("input.path = \"a\"\n{text}");
+    Manifest::parse(&text, Path::new("job.toml")).map_err(|e| e.to_string())
+}
+
+#[test]
+fn styles_are_read_and_written() {
+    let text = "[[style]]\nname = \"wall\"\nwhere = \"type == 2\"\ncolor = [0.5, 0.5, 0.5]\nopacity = 0.2\n\
+                [[style]]\ndraw = \"balls-and-sticks\"\ncolor_by = \"charge\"\nmap = \"vik\"\nrange = [-1, 1]\n\
+                material = { type = \"plastic\", roughness = 0.25 }\nbonds = { find = 1.5 }\n\
+                [[style]]\nwhere = \"index > 3\"\ndraw = \"arrows\"\narrows = { attribute = \"f\", scale = 2 }";
+    let manifest = read(text).unwrap();
+    let [wall, balls, arrows] = &manifest.styles[..] else { panic!("three styles") };
+    assert_eq!((wall.title(), arrows.title()), ("wall".to_owned(), "index > 3".to_owned()));
+    assert_eq!(balls.bonds.as_ref().unwrap().find, Some(BondSearch::Distance(1.5)));
+    let material = balls.material.as_ref().unwrap().resolved();
+    assert_eq!(material.finish, Finish::Plastic { roughness: 0.25 });
+    assert_eq!(arrows.arrows.as_ref().unwrap().scale, 2.0);
+    let colors = ColorMapping {
+        map: MapName::named("vik"),
+        range: Some(RangeSetting::Values([-1.0, 1.0])),
+        ..ColorMapping::by("charge")
+    };
+    assert_eq!(balls.colors(&ColorSetting::Auto), ColorSetting::Mapped(colors));
+    // What is written is read as the same
+    let again = Manifest::parse(&manifest.to_commented_toml(), Path::new("job.toml")).unwrap();
+    assert_eq!(again.styles, manifest.styles);
+    assert_eq!(again, manifest);
+}
+
+#[test]
+fn impossible_styles_are_refused() {
+    for (text, part) in [
+        ("draw = \"stick\"", "did you mean sticks?"),
+        ("where = \"type ==\"", "style.0.where"),
+        ("color = [1, 0, 0]\ncolor_by = \"x\"", "style.0.color: color_by is given too"),
+        ("map = \"vik\"", "style.0.map: belongs to color_by"),
+        ("range = [0, 1]", "style.0.range: belongs to color_by"),
+        ("draw = \"arrows\"", "style.0.arrows: is missing; which arrows"),
+        ("draw = \"trails\"", "style.0.trails: is missing"),
+        ("arrows = { attribute = \"f\", scale = 1 }", "style.0.arrows: are drawn by a style"),
+        ("draw = \"arrows\"\narrows = { attribute = \"f\" }", "style.0.arrows.scale: is missing"),
+        ("bonds = { find = \"file\" }", "style.0.bonds: are drawn by a style"),
+        ("bonds = { finds = \"file\" }", "did you mean `style.0.bonds.find`?"),
+        ("material = { type = \"gold\" }", "style.0.material.type: expected"),
+        ("material = { roughness = 0.1 }", "style.0.material.type: is missing"),
+        ("material = { type = \"water\" }\nopacity = 0.5", "style.0.opacity: only opaque spheres"),
+        ("draw = \"smooth\"\nopacity = 0.5", "style.0.opacity: only opaque spheres"),
+        (
+            "draw = \"sticks\"\nmaterial = { type = \"glass\" }",
+            "style.0.material.type: sticks are opaque",
+        ),
+        ("radius = -1", "style.0.radius: expected"),
+    ] {
+        let error = read(&format!("[[style]]\n{text}")).unwrap_err();
+        assert!(error.contains(part), "{text}: {error}");
+    }
+    let clear = "[[style]]\nwhere = \"type == 1\"\nmaterial = { type = \"glass\" }\n";
+    let error = read(&clear.repeat(2)).unwrap_err();
+    assert!(error.contains("style.1.material: style.0.material is clear already"), "{error}");
+    let error = read(&format!("material.type = \"water\"\n{clear}")).unwrap_err();
+    assert!(error.contains("style.0.material: material.type is clear already"), "{error}");
+    let error = read(&"[[style]]\n".repeat(65)).unwrap_err();
+    assert!(error.contains("style: 65 styles"), "{error}");
+}
+
+/// The condition on particles that are drawn.
+fn shown(text: &str) -> Option<String> {
+    let selection = read(text).unwrap().selection();
+    selection.condition.map(|condition| condition.as_str().to_owned())
+}
+
+#[test]
+fn hidden_styles_are_conditions() {
+    let style = |condition: &str, draw: &str| {
+        let condition = match condition {
+            "" => String::new(),
+            condition => format!("where = \"{condition}\"\n"),
+        };
+        format!("[[style]]\n{condition}draw = \"{draw}\"\n")
+    };
+    assert_eq!(shown(&style("x > 1", "spheres")), None);
+    assert_eq!(shown(&style("x > 1", "hidden")).unwrap(), "!(x > 1)");
+    assert_eq!(shown(&(style("x > 1", "spheres") + &style("", "hidden"))).unwrap(), "x > 1");
+    assert_eq!(shown(&style("", "hidden")).unwrap(), "index < 0");
+    let both = style("x > 1", "hidden") + &style("y > 2", "sticks") + &style("", "hidden");
+    assert_eq!(shown(&both).unwrap(), "!(x > 1) && (y > 2)");
+    // A particle that an earlier style takes is drawn
+    let both = style("x > 1", "spheres") + &style("y > 2", "hidden");
+    assert_eq!(shown(&both).unwrap(), "(x > 1) || (!(y > 2))");
+    let both = format!("select.where = \"z < 0\"\n{}", style("x > 1", "hidden"));
+    assert_eq!(shown(&both).unwrap(), "(z < 0) && (!(x > 1))");
+}
+
+#[test]
+fn a_clear_style_is_the_first_group() {
+    let text = "material.color = [1, 0, 0]\n[[style]]\nwhere = \"type == 1\"\ndraw = \"smooth\"\n\
+                material = { type = \"water\", ior = 1.4 }\n[[style]]\nwhere = \"type == 2\"\ndraw = \"union\"\n\
+                [[style]]\nwhere = \"type == 3\"\n[[style]]\nwhere = \"type == 4\"\ndraw = \"hidden\"";
+    let styled = read(text).unwrap().styled();
+    assert_eq!(styled.first, Some(0));
+    assert_eq!(styled.manifest.surface.kind, SurfaceKind::Smooth);
+    assert_eq!(styled.manifest.material.resolved(Fresnel::Exact).ior, 1.4);
+    // Spheres come before bodies, and the rest is red spheres
+    let draws: Vec<StyleDraw> = styled.styles.iter().map(|style| style.draw).collect();
+    assert_eq!(draws, [StyleDraw::Spheres, StyleDraw::Spheres, StyleDraw::Union]);
+    assert_eq!(styled.styles[1].color, ColorSetting::Rgb(glam::Vec3::X));
+    let groups: Vec<usize> = styled.division.claims.iter().map(|claim| claim.group).collect();
+    assert_eq!(groups, [0, 3, 1, 2]);
+    assert_eq!(styled.division.groups, 4);
+    // Without a clear one, the rest is the first group
+    let styled = read("[[style]]\nwhere = \"type == 2\"").unwrap().styled();
+    assert_eq!((styled.first, styled.division.groups), (None, 2));
+}

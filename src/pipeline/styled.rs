@@ -1,0 +1,199 @@
+//! The structures of particles with a style: spheres in a tree of their own, and bodies.
+
+use std::borrow::Cow;
+
+use glam::Vec3;
+
+use super::bodies::{build_grid, radius_of, shading_normals};
+use super::decoded::DecodedFrame;
+use super::motion::displaced;
+use super::setup::{Setup, StyleForm};
+use super::styles::StyleParticles;
+use crate::accel::moving::MovingTree;
+use crate::accel::{BuildReport, Spheres, TreeBuilder};
+use crate::surface::moving::MovingSpheres;
+use crate::surface::smooth::{SmoothError, SmoothGrid};
+use crate::surface::spheres::SphereSurface;
+use crate::surface::union::UnionSurface;
+use crate::surface::{MaterialId, OwnedBody, Shape, SphereOwners, SurfaceKind, SurfaceSettings};
+
+/// The structures of the styles of a frame that are not in its tree.
+#[derive(Debug, Default)]
+pub(super) struct StyleSurfaces {
+    spheres: Option<StyleSpheres>,
+    bodies: Vec<StyleBody>,
+}
+
+/// The spheres of all styles. Which style a sphere has follows from its particle.
+#[derive(Debug)]
+struct StyleSpheres {
+    tree: TreeBuilder,
+    /// The same, with motion blur.
+    moving: Option<MovingTree>,
+    owners: SphereOwners,
+}
+
+/// The body of a style.
+#[derive(Debug)]
+struct StyleBody {
+    structure: BodyStructure,
+    settings: SurfaceSettings,
+    material: MaterialId,
+    /// Index in the frame of its first particle.
+    first: u32,
+}
+
+#[derive(Debug)]
+enum BodyStructure {
+    Union(TreeBuilder),
+    Smooth(SmoothGrid),
+}
+
+impl StyleSurfaces {
+    /// Takes the particles whose style is not drawn in the tree of the frame away from `frame`, and builds their
+    /// structures. Returns these with their memory in bytes.
+    ///
+    /// # Errors
+    /// [`SmoothError`] if a smooth surface does not fit.
+    pub(super) fn take(
+        setup: &Setup,
+        frame: &mut DecodedFrame<'_>,
+        notes: &mut Vec<String>,
+    ) -> Result<(Self, u64), SmoothError> {
+        let rules = &setup.picture.particles;
+        let mut all = Self::default();
+        let mut bytes = 0;
+        if rules.styles.is_empty() {
+            return Ok((all, bytes));
+        }
+        // Take the last style first, so that its particles are at the end
+        let ranges = &frame.shading.ranges;
+        let in_tree = rules.styles_in_tree(setup);
+        let spheres = in_tree..rules.sphere_styles();
+        let bodies = (spheres.end..rules.styles.len()).rev().map(|i| (i, ranges.of(i).start));
+        let firsts: Vec<(usize, usize)> = bodies
+            .chain((!spheres.is_empty()).then(|| (spheres.start, ranges.of(spheres.start).start)))
+            .collect();
+        for style in firsts {
+            let own = StyleParticles::split_off(style, &mut frame.centers, &mut frame.radius);
+            let rules = &rules.styles[own.style];
+            if own.centers.is_empty() {
+                continue;
+            }
+            match rules.form {
+                StyleForm::Spheres => {
+                    let (spheres, built) = StyleSpheres::build(setup, frame, own, rules.material);
+                    bytes += built;
+                    all.spheres = Some(spheres);
+                }
+                StyleForm::Body(settings) => {
+                    let (body, built) =
+                        StyleBody::build(setup, frame, own, (settings, rules.material), notes)?;
+                    bytes += built;
+                    all.bodies.push(body);
+                }
+                StyleForm::Nothing => {}
+            }
+        }
+        Ok((all, bytes))
+    }
+
+    /// Adds the surfaces to `shapes`.
+    pub(super) fn add_to<'a>(&'a self, shapes: &mut Vec<Box<dyn Shape + 'a>>) {
+        if let Some(spheres) = &self.spheres {
+            shapes.push(match &spheres.moving {
+                Some(moving) => Box::new(MovingSpheres::new(moving).of(spheres.owners)),
+                None => Box::new(SphereSurface::new(spheres.tree.tree().view()).of(spheres.owners)),
+            });
+        }
+        shapes.extend(self.bodies.iter().map(StyleBody::shape));
+    }
+}
+
+impl StyleSpheres {
+    /// The tree of `own`, and its memory in bytes.
+    fn build(
+        setup: &Setup,
+        frame: &DecodedFrame<'_>,
+        mut own: StyleParticles,
+        material: MaterialId,
+    ) -> (Self, u64) {
+        let displacements = move_to_exposure(setup, frame, &mut own);
+        let mut tree = TreeBuilder::new();
+        let mut bytes = bytes_of(&build_tree(setup, &own, &mut tree));
+        let moving = displacements.map(|displacements| {
+            let mut moving = MovingTree::default();
+            moving.build(&tree.tree().view(), &displacements);
+            bytes += moving.byte_len();
+            moving
+        });
+        (Self { tree, moving, owners: SphereOwners::new(material, own.first) }, bytes)
+    }
+}
+
+impl StyleBody {
+    /// The body of `own`, and its memory in bytes.
+    fn build(
+        setup: &Setup,
+        frame: &DecodedFrame<'_>,
+        mut own: StyleParticles,
+        (settings, material): (SurfaceSettings, MaterialId),
+        notes: &mut Vec<String>,
+    ) -> Result<(Self, u64), SmoothError> {
+        // With motion blur, it is sharp, in the middle of the exposure
+        move_to_exposure(setup, frame, &mut own);
+        let (structure, bytes) = if settings.kind == SurfaceKind::Smooth {
+            let mut grid = SmoothGrid::default();
+            let made = build_grid(setup, &mut grid, (&own.centers, &own.radius), &settings, notes)?;
+            (BodyStructure::Smooth(grid), made.bytes)
+        } else {
+            let mut tree = TreeBuilder::new();
+            let built = build_tree(setup, &own, &mut tree);
+            (BodyStructure::Union(tree), bytes_of(&built))
+        };
+        Ok((Self { structure, settings, material, first: own.first }, bytes))
+    }
+
+    fn shape(&self) -> Box<dyn Shape + '_> {
+        let body: Box<dyn Shape> = match &self.structure {
+            BodyStructure::Smooth(grid) => Box::new(grid.surface()),
+            BodyStructure::Union(tree) => {
+                let normals = shading_normals(&self.settings);
+                Box::new(UnionSurface::new(tree.tree().view()).with_normals(normals))
+            }
+        };
+        Box::new(OwnedBody::new(body, self.material, self.first))
+    }
+}
+
+fn bytes_of(built: &BuildReport) -> u64 {
+    built.position_bytes + built.structure_bytes
+}
+
+/// Builds the tree of the spheres of `own`.
+fn build_tree(setup: &Setup, own: &StyleParticles, tree: &mut TreeBuilder) -> BuildReport {
+    let spheres = Spheres { centers: &own.centers, radius: radius_of(&own.radius) };
+    tree.build(&spheres, &setup.build_settings(own.centers.len(), true))
+}
+
+/// Moves particles to their places in the middle of the exposure. Returns by how far they move while the shutter is open;
+/// None without motion blur.
+fn move_to_exposure(
+    setup: &Setup,
+    frame: &DecodedFrame<'_>,
+    own: &mut StyleParticles,
+) -> Option<Vec<Vec3>> {
+    let shutter = setup.picture.view.shutter?;
+    let velocities = frame.shading.velocities.as_deref().unwrap_or_default();
+    let first = (own.first as usize).min(velocities.len());
+    let mut velocities = velocities[first..].to_vec();
+    velocities.resize(own.centers.len(), Vec3::ZERO);
+    let mut centers = Cow::Borrowed(&own.centers[..]);
+    let displacements = displaced(shutter, &mut centers, velocities);
+    own.centers = centers.into_owned();
+    Some(displacements)
+}
+
+#[cfg(test)]
+#[path = "styled_tests.rs"]
+mod tests;

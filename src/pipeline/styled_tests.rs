@@ -1,0 +1,155 @@
+//! Particles in several styles through the pipeline: each pixel shows the particle that its id names.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+use glam::Vec3;
+use spherule_formats::{PositionSlice, RawParticles};
+use spherule_frame::{Attribute, AttributeData};
+
+use crate::manifest::Manifest;
+use crate::pipeline::{ImageTask, Setup, trace_particles};
+use crate::render::{Film, FilmPlane};
+use crate::resolve::{Inquiry, SceneInputs, setup};
+use crate::survey::Survey;
+
+/// Particles of five types in a row of slabs.
+fn positions() -> Vec<Vec3> {
+    let place = |i: u16| {
+        let [x, y, z] = [i % 5, i / 5 % 6, i / 30].map(f32::from);
+        Vec3::new(8.0 * x + 0.7 * (z % 3.0), y, z)
+    };
+    (0..30 * 6).map(place).collect()
+}
+
+fn particles(positions: &[Vec3]) -> RawParticles<PositionSlice<'_>> {
+    let scalar = |name: &str, data| Attribute { name: name.to_owned(), components: 1, data };
+    let attributes = vec![
+        scalar("type", AttributeData::I32((0..180).map(|i| i % 5).collect())),
+        scalar("id", AttributeData::U32((1000..1180).collect())),
+        scalar("charge", AttributeData::F32((0..180_u8).map(f32::from).collect())),
+    ];
+    RawParticles {
+        positions: PositionSlice::F32(positions),
+        attributes,
+        time: None,
+        step: None,
+        cell: None,
+        bonds: Vec::new(),
+        notes: Vec::new(),
+        labels: spherule_frame::Labels::default(),
+    }
+}
+
+fn rendered(styles: &str) -> (Setup, Film, Vec<String>) {
+    let text = format!(
+        "input = {{ path = \"a\", radius = 0.4 }}\nimage = {{ width = 160, height = 60, samples = 4 }}\n\
+         render = {{ ground = false, denoise = false }}\ncamera = {{ azimuth = 10, elevation = 15 }}\n\
+         output.channels = [\"id\", \"P\", \"Z\", \"N\", \"albedo\", \"crypto_material\"]\n{styles}"
+    );
+    let manifest = Manifest::parse(&text, Path::new("job.toml")).unwrap_or_else(|e| panic!("{e}"));
+    let positions = positions();
+    let inquiry = Inquiry::of(&manifest);
+    let questions = inquiry.styles();
+    let question = inquiry.question(questions.as_ref());
+    let survey = Survey::of_particles("a", &particles(&positions), question).expect("readable");
+    let setup = setup(&manifest, &survey, SceneInputs::default()).expect("pictures");
+    let task = ImageTask {
+        frame: 0,
+        index: 0,
+        image: PathBuf::new(),
+        preview: None,
+        meshes: Vec::new(),
+        next_meshes: None,
+        refused: None,
+    };
+    let mut notes = Vec::new();
+    let stop = AtomicBool::new(false);
+    let note = |note| notes.push(note);
+    let traced = trace_particles(&setup, particles(&positions), "a", &task, &stop, note);
+    (setup, traced.expect("an image").film, notes)
+}
+
+/// Checks that the point of each pixel lies near the particle that its id names, and returns how many pixels show each
+/// type. `distances`: the least and the greatest distance between point and particle of each type.
+fn check_points(film: &Film, distances: [[f32; 2]; 5]) -> [usize; 5] {
+    let positions = positions();
+    let ids = film.plane::<u32>(FilmPlane::Id).expect("ids");
+    let points = film.plane::<[f32; 3]>(FilmPlane::Position).expect("points");
+    let mut pixels = [0; 5];
+    for (id, point) in ids.iter().zip(points).filter(|(id, _)| **id != u32::MAX) {
+        let particle = *id as usize - 1000;
+        let kind = particle % 5;
+        let distance = (Vec3::from_array(*point) - positions[particle]).length();
+        let [low, high] = distances[kind];
+        assert!((low..=high).contains(&distance), "type {kind}, particle {particle}: {distance}");
+        pixels[kind] += 1;
+    }
+    pixels
+}
+
+const RED: &str = "color = [1, 0, 0]\n";
+
+#[test]
+fn opaque_spheres_of_all_styles_share_a_tree() {
+    let styles = format!(
+        "[[style]]\nwhere = \"type == 1\"\nradius = 0.5\n{RED}\
+         [[style]]\nwhere = \"type <= 2\"\nradius = 0.3\ncolor_by = \"charge\"\nrange = [0, 180]\n\
+         [[style]]\nwhere = \"type == 3\"\ndraw = \"hidden\"\n\
+         [[style]]\nwhere = \"type == 4\"\ndraw = \"sticks\"\nradius = 0.1\nbonds = {{ find = 1.01 }}"
+    );
+    let (setup, film, notes) = rendered(&styles);
+    assert_eq!(notes, Vec::<String>::new());
+    assert_eq!(setup.picture.particles.styles_in_tree(&setup), 3);
+    let near = |radius: f32| [radius - 1e-4, radius + 1e-4];
+    let pixels = check_points(&film, [near(0.3), near(0.5), near(0.3), [1.0, 0.0], near(0.1)]);
+    assert!(pixels[0] > 100 && pixels[1] > 100 && pixels[2] > 100, "{pixels:?}");
+    assert!(pixels[3] == 0 && pixels[4] > 0, "{pixels:?}");
+    // Colours are those of the style; rods have the colours of their particles, and no id
+    let ids = film.plane::<u32>(FilmPlane::Id).unwrap();
+    let albedo = film.plane::<[f32; 3]>(FilmPlane::Albedo).unwrap();
+    for (id, albedo) in ids.iter().zip(albedo).filter(|(id, _)| **id != u32::MAX) {
+        let is_red = *albedo == [1.0, 0.0, 0.0];
+        assert_eq!(is_red, (*id - 1000) % 5 == 1, "{id} {albedo:?}");
+    }
+    let depth = film.plane::<f32>(FilmPlane::Depth).unwrap();
+    let rods = ids.iter().zip(depth).filter(|(id, z)| **id == u32::MAX && z.is_finite());
+    assert!(rods.count() > 100);
+}
+
+#[test]
+fn bodies_of_styles_have_ids_of_their_particles() {
+    let styles = format!(
+        "[[style]]\nwhere = \"type == 0\"\ndraw = \"smooth\"\nradius = 0.5\ncolor_by = \"charge\"\n\
+         [[style]]\nwhere = \"type == 1\"\ndraw = \"union\"\nradius = 0.7\n{RED}\
+         [[style]]\nwhere = \"type == 2\"\nradius = 0.35\nmaterial = {{ type = \"metal\" }}"
+    );
+    let (setup, film, _) = rendered(&styles);
+    assert_eq!(setup.picture.particles.styles_in_tree(&setup), 1);
+    let near = |radius: f32| [radius - 1e-4, radius + 1e-4];
+    let pixels = check_points(&film, [[0.0, 1.2], near(0.7), near(0.35), near(0.4), near(0.4)]);
+    assert!(pixels.iter().all(|pixels| *pixels > 100), "{pixels:?}");
+}
+
+#[test]
+fn one_style_may_be_clear() {
+    let styles = format!(
+        "[[style]]\nwhere = \"type == 2\"\ndraw = \"smooth\"\nradius = 0.5\nmaterial = {{ type = \"water\" }}\n\
+         [[style]]\nwhere = \"type == 1\"\nradius = 0.5\nopacity = 0.5\n{RED}"
+    );
+    let (setup, film, _) = rendered(&styles);
+    assert_eq!(setup.picture.scene.particle_material().transmission, 1.0);
+    assert_eq!(setup.picture.particles.styles_in_tree(&setup), 0);
+    let near = |radius: f32| [radius - 1e-4, radius + 1e-4];
+    let pixels = check_points(&film, [near(0.4), near(0.5), [0.0, 1.2], near(0.4), near(0.4)]);
+    assert!(pixels.iter().all(|pixels| *pixels > 100), "{pixels:?}");
+    // Each style is an object of its own
+    let mattes = film.plane::<f32>(FilmPlane::CryptoMaterial).unwrap();
+    assert!(mattes.iter().any(|value| *value != 0.0));
+}
+
+#[test]
+fn styles_of_nothing_are_noted() {
+    let (_, _, notes) = rendered("[[style]]\nname = \"foam\"\nwhere = \"type == 7\"");
+    assert!(notes.iter().any(|note| note.contains("no particle is of style `foam`")), "{notes:?}");
+}

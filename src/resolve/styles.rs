@@ -1,0 +1,160 @@
+//! Styles: the rules by which their particles are drawn.
+
+use super::rods::look;
+use super::{ResolveError, arrows, color, opacity, radius};
+use crate::manifest::{
+    BondSearch, ColorSetting, Manifest, RadiusSetting, Style, StyleDraw, StyleMaterial,
+};
+use crate::math::narrow;
+use crate::pipeline::{
+    ArrowStyle, BondRule, BondStyle, ColorRule, ParticleStyle, RadiusRule, StyleForm, TrailStyle,
+};
+use crate::scene::{Camera, Fresnel, Material, Scene};
+use crate::surface::{SurfaceKind, SurfaceSettings};
+use crate::survey::{ELEMENT, Survey};
+
+/// Radius of balls, in radii of the particles.
+const BALL: f32 = 0.25;
+
+/// Radius of sticks, in radii of the largest particles.
+const STICK: f64 = 0.125;
+
+/// Radius of the sticks between balls, in radii of the largest balls.
+const STICK_OF_BALLS: f64 = 0.5;
+
+/// What the looks of styles depend on.
+pub(super) struct Looks<'a> {
+    pub(super) manifest: &'a Manifest,
+    pub(super) survey: &'a Survey,
+    pub(super) camera: &'a Camera,
+    /// Radius of the largest particles.
+    pub(super) reach: f64,
+}
+
+impl Looks<'_> {
+    /// How the particles of `styles` are drawn. Adds their materials to `scene`, and what they draw of arrows and trails
+    /// to those of all particles.
+    ///
+    /// # Errors
+    /// The particles do not have what a style shows.
+    pub(super) fn styles(
+        &self,
+        scene: &mut Scene,
+        styles: &[Style],
+        (arrows, trails): (&mut Vec<ArrowStyle>, &mut Vec<TrailStyle>),
+    ) -> Result<Vec<ParticleStyle>, ResolveError> {
+        let mut looks = Vec::new();
+        for (index, style) in styles.iter().enumerate() {
+            // The manifest has no more of them than there are materials
+            let Some(material) = scene.add_style(self.material(style)) else {
+                break;
+            };
+            let setting = style.colors(&self.manifest.material.color);
+            let range = self.survey.styles.get(index).and_then(Option::as_ref);
+            let color = color::rule(&setting, range, self.survey, Some(self.camera))?;
+            let (radius, radius_factor) = self.radius(style)?;
+            let bonds = if style.has_sticks() {
+                self.bonds(scene, style, &color, (&radius, radius_factor))?
+            } else {
+                None
+            };
+            if let Some(own) = &style.arrows {
+                let manifest = Manifest { arrows: vec![own.clone()], ..self.manifest.clone() };
+                let own = arrows::arrows(scene, &manifest, self.survey, &color, self.reach)?;
+                arrows.extend(own.into_iter().map(|a| ArrowStyle { style: Some(index), ..a }));
+            }
+            if let Some(own) = &style.trails {
+                let manifest = Manifest { trails: own.clone(), ..self.manifest.clone() };
+                let own = arrows::trails(scene, &manifest, self.survey, &color, self.reach)?;
+                trails.extend(own.into_iter().map(|t| TrailStyle { style: Some(index), ..t }));
+            }
+            looks.push(ParticleStyle {
+                name: style.title(),
+                is_named: style.name.is_some(),
+                is_of_rest: style.condition.is_none() && style.name.is_none(),
+                form: self.form(style),
+                radius,
+                radius_factor,
+                color,
+                opacity: opacity::opacity(&style.opacity, self.survey)?,
+                material,
+                bonds,
+            });
+        }
+        Ok(looks)
+    }
+
+    /// The material of a style: its own, or else that of the other particles if it is opaque.
+    fn material(&self, style: &Style) -> Material {
+        let usual = self.manifest.material.resolved(Fresnel::Schlick);
+        match &style.material {
+            Some(own) => own.resolved(),
+            None if usual.transmission == 0.0 => usual,
+            None => StyleMaterial::default().resolved(),
+        }
+    }
+
+    /// What stands for the particles of a style.
+    fn form(&self, style: &Style) -> StyleForm {
+        match style.surface() {
+            None => StyleForm::Nothing,
+            Some(SurfaceKind::Spheres) => StyleForm::Spheres,
+            Some(kind) => {
+                StyleForm::Body(SurfaceSettings { kind, spray: false, ..self.manifest.surface })
+            }
+        }
+    }
+
+    /// The source of the radii of a style, and the factor on them.
+    fn radius(&self, style: &Style) -> Result<(RadiusRule, f32), ResolveError> {
+        let kind = style.surface().unwrap_or(SurfaceKind::Spheres);
+        let rule = |setting| radius::rule(setting, kind, self.survey);
+        let usual = &self.manifest.input.radius;
+        Ok(match (&style.radius, style.draw) {
+            (RadiusSetting::Auto, StyleDraw::Sticks) => {
+                (RadiusRule::Common(narrow(STICK * self.reach)), 1.0)
+            }
+            (RadiusSetting::Auto, StyleDraw::BallsAndSticks) => (rule(usual)?, BALL),
+            (RadiusSetting::Auto, _) => (rule(usual)?, 1.0),
+            (own, _) => (rule(own)?, 1.0),
+        })
+    }
+
+    /// The bonds of a style with this rule and factor for its radii.
+    fn bonds(
+        &self,
+        scene: &mut Scene,
+        style: &Style,
+        color: &ColorRule,
+        (radius, factor): (&RadiusRule, f32),
+    ) -> Result<Option<BondStyle>, ResolveError> {
+        let own = style.bonds.clone().unwrap_or_default();
+        // Find them as in [bonds], or in the file, or by the distances of atoms
+        let has_elements = self.survey.attributes.iter().any(|name| name == ELEMENT);
+        let search = match own.find.unwrap_or(self.manifest.bonds.find) {
+            BondSearch::None if own.find.is_some() => return Ok(None),
+            BondSearch::None if self.manifest.input.topology.is_some() || !has_elements => {
+                BondSearch::File
+            }
+            BondSearch::None => BondSearch::Covalent,
+            given => given,
+        };
+        let rule = match search {
+            BondSearch::None => return Ok(None),
+            BondSearch::File => BondRule::File,
+            BondSearch::Distance(distance) => BondRule::Distance(narrow(distance)),
+            BondSearch::Covalent => {
+                super::require_attribute(self.survey, "style.bonds", ELEMENT)?;
+                BondRule::Covalent { name: ELEMENT.to_owned(), angstrom: self.survey.angstrom }
+            }
+        };
+        // Atoms of sticks are as thick as these
+        let largest = f64::from(radius::reach(radius, self.survey)) * f64::from(factor);
+        let radius = own.radius.unwrap_or_else(|| match style.draw {
+            StyleDraw::BallsAndSticks => narrow(STICK_OF_BALLS * largest),
+            _ => narrow(largest),
+        });
+        let look = look(scene, radius, &ColorSetting::Auto, Some(color.clone()));
+        Ok(look.map(|look| BondStyle { rule, look }))
+    }
+}
