@@ -26,14 +26,19 @@ impl EnvironmentImage {
 
     /// The image of a function of the direction: the mean over four points of a pixel.
     pub(super) fn from_fn(of: impl Fn(Vec3) -> Vec3) -> Self {
-        let pixel = |row: usize, column: usize| {
-            let points = [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75)];
-            let sum: Vec3 =
-                points.map(|(across, down)| of(direction(column, row, across, down))).iter().sum();
-            0.25 * sum
-        };
-        let places = (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column)));
-        Self::new(places.map(|(row, column)| pixel(row, column)))
+        // All rows have the same longitudes
+        let longitudes: Vec<[[f64; 2]; 2]> =
+            (0..COLUMNS).map(|x| [longitude(x, 0.25), longitude(x, 0.75)]).collect();
+        let mut pixels = Vec::with_capacity(COLUMNS * ROWS);
+        for row in 0..ROWS {
+            let [above, below] = [polar(row, 0.25), polar(row, 0.75)];
+            for [left, right] in &longitudes {
+                let [a, b] = [direction_at(above, *left), direction_at(above, *right)];
+                let [c, d] = [direction_at(below, *left), direction_at(below, *right)];
+                pixels.push(0.25 * (of(a) + of(b) + of(c) + of(d)));
+            }
+        }
+        Self::new(pixels.into_iter())
     }
 
     /// The pixels of each row, from the zenith.
@@ -100,11 +105,6 @@ impl EnvironmentImage {
 fn index(position: f32, count: usize) -> usize {
     let cell = position as usize;
     if cell < count { cell } else { count - 1 }
-}
-
-/// The direction of a point of a pixel.
-fn direction(column: usize, row: usize, across: f64, down: f64) -> Vec3 {
-    direction_at(polar(row, down), longitude(column, across))
 }
 
 /// Sine and cosine of the polar angle at a height in `row`.

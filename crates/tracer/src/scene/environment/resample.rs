@@ -4,7 +4,7 @@
 //! and is shared out among the up to four texels below it. The map takes a row of parts, which have the same distance
 //! to the pole, to a square around the centre or the corners, along which the longitude is linear.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use spherule_tree::math::narrow;
 
 use super::image::{EnvironmentImage, edge_cosine};
@@ -21,73 +21,118 @@ struct Sum {
 pub(super) fn octahedral(image: &EnvironmentImage, side: usize) -> Vec<[f32; 3]> {
     // Parts along the edge of a pixel: about 100 for each texel
     let parts = (side / 32).max(1);
+    // All rows have the same longitudes
+    let columns = COLUMNS * parts;
+    let places: Vec<Place> = (0..columns).map(|column| Place::new(column, columns)).collect();
     let mut sums = vec![Sum::default(); side * side];
     for (row, pixels) in image.rows().enumerate() {
         for part in 0..parts {
-            add_row(&mut sums, side, [row * parts + part, parts], pixels);
+            add_row(&mut sums, side, [row * parts + part, parts], pixels, &places);
         }
     }
     let mean = |sum: &Sum| (sum.radiance / sum.area).to_array().map(narrow);
     sums.iter().map(mean).collect()
 }
 
+/// Where a longitude is in the map.
+struct Place {
+    /// The quadrant, by the signs of its coordinates.
+    signs: [f64; 2],
+    /// The position in it from the x axis to the y axis, 0 to 1.
+    along: f64,
+}
+
+impl Place {
+    /// The middle of a column of parts.
+    fn new(column: usize, columns: usize) -> Self {
+        let turn = (column as f64 + 0.5) * 4.0 / columns as f64;
+        let quadrant = turn.floor();
+        let along = turn - quadrant;
+        let (x, y, along) = match quadrant {
+            0.0 => (1.0, 1.0, along),
+            1.0 => (-1.0, 1.0, 1.0 - along),
+            2.0 => (-1.0, -1.0, along),
+            _ => (1.0, -1.0, 1.0 - along),
+        };
+        Self { signs: [x, y], along }
+    }
+}
+
 /// Adds a row of parts of `pixels`.
-fn add_row(sums: &mut [Sum], side: usize, [row, parts]: [usize; 2], pixels: &[[f32; 3]]) {
+fn add_row(
+    sums: &mut [Sum],
+    side: usize,
+    [row, parts]: [usize; 2],
+    pixels: &[[f32; 3]],
+    places: &[Place],
+) {
     let (rows, columns) = (ROWS * parts, COLUMNS * parts);
-    let [top, bottom] = [row, row + 1].map(|row| edge_cosine(row, rows));
+    let (top, bottom) = (edge_cosine(row, rows), edge_cosine(row + 1, rows));
     let z = 0.5 * (top + bottom);
     let r = (1.0 - z.abs()).sqrt();
     let scale = 0.5 * side as f64;
     // The sphere has the area of the whole map
     let area = 0.5 * (top - bottom) / columns as f64 * (side * side) as f64;
     let edge = area.sqrt();
-    for (column, rgb) in pixels.iter().enumerate() {
-        let radiance = DVec3::from_array(rgb.map(f64::from));
-        for part in 0..parts {
-            // The quadrant, and the position in it from the x axis to the y axis
-            let turn = ((column * parts + part) as f64 + 0.5) * 4.0 / columns as f64;
-            let quadrant = turn.floor();
-            let along = turn - quadrant;
-            let (x_sign, y_sign, along) = match quadrant {
-                0.0 => (1.0, 1.0, along),
-                1.0 => (-1.0, 1.0, 1.0 - along),
-                2.0 => (-1.0, -1.0, along),
-                _ => (1.0, -1.0, 1.0 - along),
-            };
+    for (rgb, places) in pixels.iter().zip(places.chunks(parts)) {
+        let radiance = Vec3::from_array(*rgb).as_dvec3();
+        for Place { signs: [x_sign, y_sign], along } in places {
             let (x, y) = ((1.0 - along) * r, along * r);
             let (x, y) = if z < 0.0 { (1.0 - y, 1.0 - x) } else { (x, y) };
-            let center = [x_sign * x, y_sign * y].map(|v| (v + 1.0) * scale);
-            add_square(sums, side, center, edge, radiance);
+            let columns = Ends::new((x_sign * x + 1.0) * scale, edge, side);
+            let rows = Ends::new((y_sign * y + 1.0) * scale, edge, side);
+            add_square(sums, side, &columns, &rows, radiance);
         }
     }
 }
 
-/// Adds a square with this center and edge, in texels, to the texels below it. Beyond the border of the map, it counts
-/// for those at the border.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
-fn add_square(sums: &mut [Sum], side: usize, center: [f64; 2], edge: f64, radiance: DVec3) {
-    // The texels at both ends along an axis, with their parts of the edge
-    let ends = |center: f64| {
+/// The texels at both ends of a square along an axis, with their parts of its edge.
+struct Ends {
+    first: usize,
+    last: usize,
+    widths: [f64; 2],
+}
+
+impl Ends {
+    /// Those of a square with this centre and edge, in texels. Beyond the border of the map, it counts for those at the
+    /// border.
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+    fn new(center: f64, edge: f64, side: usize) -> Self {
         let (low, high) = (center - 0.5 * edge, center + 0.5 * edge);
-        let [first, last] = [low, high].map(|v| (v as usize).min(side - 1));
+        let (first, last) = ((low as usize).min(side - 1), (high as usize).min(side - 1));
         let before = if first == last { edge } else { last as f64 - low };
-        [(first, before), (last, edge - before)]
-    };
-    let [columns, rows] = center.map(ends);
-    for (row, height) in rows {
-        for (column, width) in columns {
-            let area = width * height;
-            let sum = &mut sums[row * side + column];
-            sum.radiance += area * radiance;
-            sum.area += area;
+        Self { first, last, widths: [before, edge - before] }
+    }
+}
+
+/// Adds a square to the texels below it. Nearly all are in a single one.
+#[inline(always)]
+fn add_square(sums: &mut [Sum], side: usize, columns: &Ends, rows: &Ends, radiance: DVec3) {
+    let [left, right] = columns.widths;
+    let [above, below] = rows.widths;
+    sums[rows.first * side + columns.first].add(left * above, radiance);
+    if columns.last != columns.first {
+        sums[rows.first * side + columns.last].add(right * above, radiance);
+    }
+    if rows.last != rows.first {
+        sums[rows.last * side + columns.first].add(left * below, radiance);
+        if columns.last != columns.first {
+            sums[rows.last * side + columns.last].add(right * below, radiance);
         }
+    }
+}
+
+impl Sum {
+    #[inline(always)]
+    fn add(&mut self, area: f64, radiance: DVec3) {
+        self.radiance += area * radiance;
+        self.area += area;
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use glam::Vec3;
-
     use super::*;
     use crate::scene::environment::octahedral::square_to_sphere;
 

@@ -19,10 +19,15 @@ struct Cap {
     softness: f32,
     /// Radiance, linear RGB.
     radiance: Vec3,
+    /// A cosine below that at the outer end of the edge.
+    farthest: f32,
 }
 
+/// More than the error of a cosine.
+const MARGIN: f32 = 1e-4;
+
 const fn cap(direction: Vec3, [half_angle, softness]: [f32; 2], radiance: Vec3) -> Cap {
-    Cap { direction, half_angle, softness, radiance }
+    Cap { direction, half_angle, softness, radiance, farthest: -1.0 }
 }
 
 /// Daylight, slightly warm, from the left and above.
@@ -44,7 +49,11 @@ const DOME: [Vec3; 4] = [
 
 /// The studio around a viewer, times `scale` per component.
 pub fn studio(axes: EnvironmentAxes, scale: Vec3) -> Environment {
-    let caps = [KEY, FILL, RIM].map(|cap| Cap { direction: cap.direction.normalize(), ..cap });
+    let caps = [KEY, FILL, RIM].map(|cap| Cap {
+        direction: cap.direction.normalize(),
+        farthest: libm::cosf(cap.half_angle + cap.softness) - MARGIN,
+        ..cap
+    });
     Environment::from_fn(axes, |direction| {
         let lights: Vec3 = caps.iter().map(|cap| cap.radiance(direction)).sum();
         scale * (dome(direction.z) + lights)
@@ -54,7 +63,12 @@ pub fn studio(axes: EnvironmentAxes, scale: Vec3) -> Environment {
 impl Cap {
     /// Its radiance from `direction`: full inside, with a smooth edge.
     fn radiance(&self, direction: Vec3) -> Vec3 {
-        let angle = acos(direction.dot(self.direction).clamp(-1.0, 1.0));
+        // Most directions are far from it, and need no angle
+        let cosine = direction.dot(self.direction);
+        if cosine < self.farthest {
+            return Vec3::ZERO;
+        }
+        let angle = acos(cosine.clamp(-1.0, 1.0));
         let part = (self.half_angle + self.softness - angle) / (2.0 * self.softness);
         let part = part.clamp(0.0, 1.0);
         part * part * (3.0 - 2.0 * part) * self.radiance
