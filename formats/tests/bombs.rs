@@ -405,7 +405,7 @@ fn table(rows: usize, turn: usize) -> String {
         let kind = if i == turn { "fluid" } else { "7" };
         writeln!(text, "{number};{number};1e-3;{id};{kind};1;2;{i}").expect("memory takes all");
         if i % 1000 == 3 {
-            text += "// a remark; between; rows\n\n";
+            text += "// a note; between; rows\n\n";
         }
     }
     text

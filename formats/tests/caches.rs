@@ -5,7 +5,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use spherule_formats::open::{detect_file, remarks};
+use spherule_formats::open::{detect_file, notes};
 use spherule_formats::sequence::PART_ATTRIBUTE;
 use spherule_formats::{FrameError, FrameFile, MemoryBudget, Sequence, SequenceInput};
 
@@ -372,7 +372,7 @@ fn names_and_content_tell_the_formats() {
     }
     let error = detect_file(&data("dualsphysics/Part_Head.ibi4")).expect_err("no particles");
     assert!(error.to_string().contains("JPartDataHead"), "{error}");
-    let notes = remarks(&data("houdini/cache_0012.bgeo.sc"));
+    let notes = notes(&data("houdini/cache_0012.bgeo.sc"));
     assert_eq!(notes[0], "geometry of Houdini 20.0.547");
 }
 

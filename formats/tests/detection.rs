@@ -1,4 +1,4 @@
-//! Formats of files without a name that suggests one, and remarks about files that are not read.
+//! Formats of files without a name that suggests one, and notes about files that are not read.
 #![expect(clippy::expect_used, reason = "a test says what it expects")]
 
 use std::fs;
@@ -39,12 +39,12 @@ fn restart_files_of_amber_are_not_taken_for_tables() {
 }
 
 #[test]
-fn remarks_of_a_file_are_those_of_all_its_bytes() {
+fn notes_of_a_file_are_those_of_all_its_bytes() {
     let path = data("gsd/polymer.gsd");
     let bytes = fs::read(&path).expect("a sample");
-    let remarks = open::remarks(&path);
-    assert!(!remarks.is_empty());
-    assert_eq!(remarks, gsd::FORMAT.reader().remarks(&bytes));
+    let notes = open::notes(&path);
+    assert!(!notes.is_empty());
+    assert_eq!(notes, gsd::FORMAT.reader().notes(&bytes));
     let file = spherule_formats::FrameFile::open(&path).expect("a good file");
     assert_eq!((file.format(), file.steps().len()), (gsd::FORMAT, 5));
 }

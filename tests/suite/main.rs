@@ -51,6 +51,7 @@ mod sequence;
 mod status;
 mod still;
 mod structures;
+mod styles;
 mod surface;
 mod thesis;
 mod topology;

@@ -75,8 +75,8 @@ pub struct FormatInfo {
     pub has_no_signature: bool,
     /// Whether files may refer to others that are not steps of their own.
     pub may_refer_to_files: bool,
-    /// Whether [`Reader::remarks`] needs all bytes of a file. It gets them if the file is not compressed.
-    pub remarks_need_whole_file: bool,
+    /// Whether [`Reader::notes`] needs all bytes of a file. It gets them if the file is not compressed.
+    pub notes_need_whole_file: bool,
     /// Length of an angstrom in the unit of positions, if that is fixed by the format.
     pub angstrom: f64,
     /// Whether the particles are atoms or groups of them, whatever their names are.
@@ -94,7 +94,7 @@ impl FormatInfo {
             may_hold_many_steps: false,
             has_no_signature: false,
             may_refer_to_files: false,
-            remarks_need_whole_file: false,
+            notes_need_whole_file: false,
             angstrom: 1.0,
             is_molecular: false,
             time_unit: None,
@@ -185,13 +185,13 @@ pub trait Reader: Sync {
 
     /// Notes for the user about a file that begins with `head`, on things that are not in its particles: a
     /// simulation cell, or names behind numbers.
-    fn remarks(&self, _head: &[u8]) -> Vec<String> {
+    fn notes(&self, _head: &[u8]) -> Vec<String> {
         Vec::new()
     }
 
-    /// [`Self::remarks`] of all bytes of a file.
-    fn remarks_of_file(&self, file: &SharedBytes) -> Vec<String> {
-        self.remarks(file)
+    /// [`Self::notes`] of all bytes of a file.
+    fn notes_of_file(&self, file: &SharedBytes) -> Vec<String> {
+        self.notes(file)
     }
 
     /// The names behind the numbers of attributes in the first step of an uncompressed file: of types, species, parts.
@@ -211,7 +211,7 @@ pub trait Reader: Sync {
     }
 
     /// True if users of the program that wrote the file expect y to point up. `_bytes` are the first bytes of the file,
-    /// or all if [`FormatInfo::remarks_need_whole_file`] and the file is not compressed.
+    /// or all if [`FormatInfo::notes_need_whole_file`] and the file is not compressed.
     fn is_y_up(&self, _bytes: &[u8]) -> bool {
         false
     }

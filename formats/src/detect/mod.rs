@@ -181,9 +181,9 @@ mod tests {
         }
         assert_eq!(detect("a.pqr", atom.as_bytes()), pdb::FORMAT);
         // The atoms may be behind the bytes that are examined
-        let remarks = "REMARK   1 what the program did to get charges, at some length\n".repeat(80);
-        assert_eq!(detect("a.PQR", format!("{remarks}{words}").as_bytes()), pdb::PQR);
-        assert_eq!(detect("a.pdb", remarks.as_bytes()), pdb::FORMAT);
+        let notes = "REMARK   1 what the program did to get charges, at some length\n".repeat(80);
+        assert_eq!(detect("a.PQR", format!("{notes}{words}").as_bytes()), pdb::PQR);
+        assert_eq!(detect("a.pdb", notes.as_bytes()), pdb::FORMAT);
         refused("a.pqr", b"x,y,z\n1,2,3\n", "named like a pqr file");
     }
 

@@ -1,4 +1,4 @@
-//! Looks at the first bytes of a file: its format and remarks, without reading the rest.
+//! Looks at the first bytes of a file: its format and notes, without reading the rest.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -43,21 +43,21 @@ pub fn detect_file(path: &Path) -> Result<Format, FrameError> {
 /// What the file at `path` holds that is not in its particles: a cell and periodic boundaries, which are not used, and
 /// the names behind numbers. Looks at the first bytes unless the format needs more. Empty for a file that cannot be
 /// read.
-pub fn remarks(path: &Path) -> Vec<String> {
+pub fn notes(path: &Path) -> Vec<String> {
     let notes = head(path)
         .and_then(|head| {
             let format = crate::detect::detect_format(&head, path).map_err(|e| e.in_file(path))?;
             let reader = format.reader();
-            if !reader.info().remarks_need_whole_file {
-                return Ok(reader.remarks(&head));
+            if !reader.info().notes_need_whole_file {
+                return Ok(reader.notes(&head));
             }
             // Some notes need the whole file, which is mapped unless it is compressed
             let map = Arc::new(MappedFile::open(path)?);
             if is_compressed(map.bytes()) {
-                return Ok(reader.remarks(&head));
+                return Ok(reader.notes(&head));
             }
             let siblings = SiblingFiles::of(path);
-            let found = reader.remarks_of_file(&siblings.around(SharedBytes::new(map.clone())));
+            let found = reader.notes_of_file(&siblings.around(SharedBytes::new(map.clone())));
             map.check()?;
             siblings.check()?;
             Ok(found)

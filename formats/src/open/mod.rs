@@ -25,7 +25,7 @@ mod mapped;
 mod siblings;
 mod streamed;
 
-pub use head::{detect_file, is_native, remarks, value_names};
+pub use head::{detect_file, is_native, notes, value_names};
 pub(crate) use head::{head, piece_count, referenced_files, refers_to_pieces};
 pub use spherule_readers::compression::unpacked_len;
 

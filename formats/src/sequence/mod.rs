@@ -364,11 +364,11 @@ impl Sequence {
         &self.notes
     }
 
-    /// Remarks about the files of the first frame ([`crate::open::remarks`]), each once.
-    pub fn remarks(&self) -> Vec<String> {
+    /// Notes about the files of the first frame ([`crate::open::notes`]), each once.
+    pub fn file_notes(&self) -> Vec<String> {
         let mut all: Vec<String> = Vec::new();
         for path in self.inputs(0) {
-            for note in crate::open::remarks(path) {
+            for note in crate::open::notes(path) {
                 if !all.contains(&note) {
                     all.push(note);
                 }
@@ -464,7 +464,7 @@ fn y_is_up(path: &Path) -> bool {
         let file = NativeFile::open(path, Access::Map);
         return file.is_ok_and(|file| file.index().up == UP_Y);
     }
-    if format.reader().info().remarks_need_whole_file
+    if format.reader().info().notes_need_whole_file
         && let Ok(map) = MappedFile::open(path)
         && !is_compressed(map.bytes())
     {

@@ -7,7 +7,7 @@ use clap::Args;
 use serde_json::json;
 use spherule_formats::convert::open_source;
 use spherule_formats::native::{FORMAT, layout, verify};
-use spherule_formats::open::{is_native, remarks};
+use spherule_formats::open::{is_native, notes};
 use spherule_formats::sequence::{
     ListSummary, SequenceError, SequenceSettings, Topology, lone_frame_number, stands_for_others,
 };
@@ -238,7 +238,7 @@ fn inspect(
     }
     let file = FrameFile::open_mapped(path, read_budget(None, None))?;
     // For several steps, the metadata come from the first one.
-    let mut of_file = remarks(path);
+    let mut of_file = notes(path);
     let mut lines = StepLines::new(file.steps().len());
     for index in 0..file.steps().len() {
         let mut inspected = read(&file, index, place.number, topology)?;

@@ -43,7 +43,7 @@ pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup:
     if let Some(parts) = parts_text(sequence) {
         message!("{parts}");
     }
-    for text in sequence.remarks() {
+    for text in sequence.file_notes() {
         note!("{text}");
     }
     if setup.picture.things.cell.is_none() && !survey.cells.is_empty() {

@@ -121,16 +121,16 @@ fn dcd_files_have_cells_with_angles_or_cosines() {
     for cell in cells(dcd::FORMAT, &sample("molecules/x-plor.dcd")) {
         assert_eq!(cell, None);
     }
-    let has_remark = |bytes: &[u8]| {
-        let remarks = dcd::FORMAT.reader().remarks(bytes);
-        remarks.iter().any(|remark| remark.contains("simulation cell"))
+    let has_note = |bytes: &[u8]| {
+        let notes = dcd::FORMAT.reader().notes(bytes);
+        notes.iter().any(|note| note.contains("simulation cell"))
     };
-    assert!(has_remark(&bytes) && !has_remark(&replaced(&bytes, &old, &big_endian(&[0.0; 6]))));
+    assert!(has_note(&bytes) && !has_note(&replaced(&bytes, &old, &big_endian(&[0.0; 6]))));
     // Symmetric matrices of newer versions of CHARMM. The last number of the header is the version, here 24
     let newer = |numbers: [f64; 6]| {
         let mut bytes = replaced(&bytes, &old, &big_endian(&numbers));
         bytes[84..88].copy_from_slice(&36_i32.to_be_bytes());
-        (cells(dcd::FORMAT, &bytes)[0], has_remark(&bytes))
+        (cells(dcd::FORMAT, &bytes)[0], has_note(&bytes))
     };
     let matrix = [4.0, 0.5, 5.0, -0.25, 0.25, 6.0];
     let rows = [[4.0, 0.5, -0.25], [0.5, 5.0, 0.25], [-0.25, 0.25, 6.0]];

@@ -9,7 +9,7 @@ use super::input::TextInput;
 use super::sniff::is_text;
 use super::table::ColumnValues;
 use super::text::{self, Lines};
-use super::{ByteSource, CUT_SHORT, Step, csv, remarks};
+use super::{ByteSource, CUT_SHORT, Step, csv, notes};
 use crate::format::Format;
 use crate::reader::{Confidence, FormatInfo, Reader, StreamUnit};
 use spherule_frame::{MemoryBudget, ParseError, RawParticles, SimulationCell};
@@ -69,9 +69,9 @@ impl Reader for Mdcrd {
         read(source.text(), step, budget)
     }
 
-    fn remarks(&self, _head: &[u8]) -> Vec<String> {
+    fn notes(&self, _head: &[u8]) -> Vec<String> {
         vec![
-            remarks::units("angstroms", None, None),
+            notes::units("angstroms", None, None),
             "the format has no number of atoms, which follows from the lengths of lines, and no angles of the box, which \
              are right ones; --topology checks the number"
                 .to_owned(),

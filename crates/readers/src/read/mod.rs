@@ -29,6 +29,7 @@ pub mod mdcrd;
 pub mod mmcif;
 #[cfg(test)]
 mod molecule_tests;
+mod notes;
 pub mod npy;
 mod numbers;
 pub mod pdb;
@@ -37,7 +38,6 @@ mod pieces;
 pub mod ply;
 pub mod prmtop;
 pub mod psf;
-mod remarks;
 pub mod rst7;
 pub mod sniff;
 mod source;

@@ -9,7 +9,7 @@ use super::input::TextInput;
 use super::sniff::is_text;
 use super::table::ColumnValues;
 use super::text::{self, Line, Lines};
-use super::{ByteSource, CUT_SHORT, Step, remarks};
+use super::{ByteSource, CUT_SHORT, Step, notes};
 use crate::format::Format;
 use crate::reader::{Confidence, FormatInfo, Reader, StreamUnit};
 use spherule_frame::{
@@ -35,7 +35,7 @@ impl Reader for Rst7 {
     fn info(&self) -> FormatInfo {
         FormatInfo {
             may_hold_many_steps: false,
-            remarks_need_whole_file: true,
+            notes_need_whole_file: true,
             time_unit: Some("ps"),
             ..FormatInfo::molecular("rst7", &["rst7", "inpcrd", "restrt"])
         }
@@ -72,12 +72,12 @@ impl Reader for Rst7 {
         read(source.text(), budget)
     }
 
-    fn remarks(&self, bytes: &[u8]) -> Vec<String> {
-        let mut remarks = vec![remarks::units("angstroms", Some("angstroms/ps"), Some("ps"))];
+    fn notes(&self, bytes: &[u8]) -> Vec<String> {
+        let mut notes = vec![notes::units("angstroms", Some("angstroms/ps"), Some("ps"))];
         if has_cell(bytes) {
-            remarks.push(remarks::cell_remark(None));
+            notes.push(notes::cell_note(None));
         }
-        remarks
+        notes
     }
 }
 

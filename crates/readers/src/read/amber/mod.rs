@@ -5,7 +5,7 @@
 //! converted to ps. Files of other conventions are rejected.
 
 use super::columns::{ComponentStride, ParticleLayout, StridedColumn};
-use super::{ByteSource, CUT_SHORT, Step, remarks, text};
+use super::{ByteSource, CUT_SHORT, Step, notes, text};
 use crate::format::Format;
 use crate::reader::{Confidence, FormatInfo, Reader};
 use spherule_frame::{
@@ -70,22 +70,22 @@ impl Reader for Amber {
         }
     }
 
-    fn remarks(&self, head: &[u8]) -> Vec<String> {
-        let mut remarks = Vec::new();
+    fn notes(&self, head: &[u8]) -> Vec<String> {
+        let mut notes = Vec::new();
         if let Ok(trajectory) = Trajectory::parse(head) {
-            remarks.push(trajectory.units());
+            notes.push(trajectory.units());
             let file = &trajectory.file;
-            remarks.push(format!(
+            notes.push(format!(
                 "{} file, NetCDF classic version {}, written by {}",
                 text::shown(file.text("Conventions")),
                 file.version,
                 text::shown(file.text("program"))
             ));
             if file.variable("cell_lengths").is_some() {
-                remarks.push(remarks::cell_remark(None));
+                notes.push(notes::cell_note(None));
             }
         }
-        remarks
+        notes
     }
 }
 
@@ -215,7 +215,7 @@ impl<'a> Trajectory<'a> {
         Some(self.file.real(time, at)? * factor)
     }
 
-    /// The remark on units.
+    /// The note on units.
     fn units(&self) -> String {
         let units_of = |variable: &Variable, default: &str| {
             let own = String::from_utf8_lossy(&variable.units).into_owned();
@@ -232,7 +232,7 @@ impl<'a> Trajectory<'a> {
             }
         });
         let lengths = units_of(&self.coordinates, "angstrom");
-        remarks::units(&lengths, velocities.as_deref(), times.as_deref())
+        notes::units(&lengths, velocities.as_deref(), times.as_deref())
     }
 
     /// The cell of a frame: lengths, and angles in degrees.

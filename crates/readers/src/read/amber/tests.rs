@@ -64,11 +64,7 @@ fn file(variables: &[Written<'_>]) -> Vec<u8> {
 
 const PLACES: [f64; 6] = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
 
-fn time_and_remark(
-    units: &str,
-    factor: Option<f64>,
-    velocity_units: &str,
-) -> (Option<f64>, String) {
+fn time_and_note(units: &str, factor: Option<f64>, velocity_units: &str) -> (Option<f64>, String) {
     let bytes = file(&[
         ("time", units, factor, &[8.0]),
         ("coordinates", "angstrom", None, &PLACES),
@@ -77,12 +73,12 @@ fn time_and_remark(
     let steps = FORMAT.steps(&bytes).expect("a good file");
     let particles = FORMAT.read(&bytes, &steps[0]).expect("a good frame");
     assert_eq!(particles.time, steps[0].time);
-    (particles.time, FORMAT.reader().remarks(&bytes).remove(0))
+    (particles.time, FORMAT.reader().notes(&bytes).remove(0))
 }
 
 #[test]
 fn times_are_in_picoseconds() {
-    for (units, factor, expected, remark) in [
+    for (units, factor, expected, note) in [
         ("picosecond", None, 8.0, "times in ps"),
         ("", None, 8.0, "times in ps"),
         ("picosecond", Some(0.005), 0.04, "times in ps"),
@@ -91,10 +87,10 @@ fn times_are_in_picoseconds() {
         ("nanosecond", None, 8000.0, "times in ps (the file has nanosecond)"),
         ("lj", None, 8.0, "times in lj"),
     ] {
-        let (time, found) = time_and_remark(units, factor, "angstrom/femtosecond");
+        let (time, found) = time_and_note(units, factor, "angstrom/femtosecond");
         let time = time.expect("a time");
         assert!((time - expected).abs() < 1e-12, "{units}: {time}");
-        let expected = format!("lengths in angstrom, velocities in angstrom/femtosecond, {remark}");
+        let expected = format!("lengths in angstrom, velocities in angstrom/femtosecond, {note}");
         assert!(found.ends_with(&expected), "{found}");
     }
 }

@@ -29,7 +29,7 @@ const PART: &str = "part";
 
 impl Reader for Bi4 {
     fn info(&self) -> FormatInfo {
-        FormatInfo { remarks_need_whole_file: true, ..FormatInfo::new("bi4", &["bi4"]) }
+        FormatInfo { notes_need_whole_file: true, ..FormatInfo::new("bi4", &["bi4"]) }
     }
 
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
@@ -60,9 +60,9 @@ impl Reader for Bi4 {
         PartFile::read(bytes, budget)?.particles(bytes, budget)
     }
 
-    fn remarks(&self, bytes: &[u8]) -> Vec<String> {
+    fn notes(&self, bytes: &[u8]) -> Vec<String> {
         let file = PartFile::read(bytes, MemoryBudget::UNLIMITED);
-        file.map_or_else(|_| Vec::new(), |file| file.remarks())
+        file.map_or_else(|_| Vec::new(), |file| file.notes())
     }
 }
 
@@ -200,26 +200,26 @@ impl<'a> PartFile<'a> {
         }
     }
 
-    fn remarks(&self) -> Vec<String> {
-        let mut remarks = Vec::new();
+    fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
         if let Some(ItemValue::Text(program)) = self.root.value("AppName") {
-            remarks.push(format!("written by {}", String::from_utf8_lossy(program)));
+            notes.push(format!("written by {}", String::from_utf8_lossy(program)));
         }
         if self.first_ids().is_some() {
             let what = "attribute `part` is the type of the particles: 0 fixed boundary, 1 moving boundary, 2 floating \
                         bodies, 3 fluid";
-            remarks.push(what.to_owned());
+            notes.push(what.to_owned());
         }
         if let Some(distance) = self.root.real("Dp") {
-            remarks.push(format!(
+            notes.push(format!(
                 "attribute `radius` is half of the distance of particles, Dp = {distance}"
             ));
         }
         if let Some(pieces @ 2..) = self.root.count("Npiece") {
-            remarks.push(format!(
+            notes.push(format!(
                 "the file is one of {pieces} pieces of its time step; 'Part_p*_#.bi4' reads all of them"
             ));
         }
-        remarks
+        notes
     }
 }

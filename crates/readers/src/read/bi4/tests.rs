@@ -50,13 +50,13 @@ fn both_byte_orders_are_alike() {
 }
 
 #[test]
-fn remarks_name_program_and_pieces() {
-    let remarks = Bi4.remarks(&sample("dualsphysics/Part_p00_0003.bi4"));
-    assert_eq!(remarks[0], "written by DualSPHysics5 v5.4.355");
-    assert!(remarks[1].starts_with("attribute `part` is the type"), "{}", remarks[1]);
-    assert!(remarks[2].ends_with("Dp = 0.02"), "{}", remarks[2]);
-    assert!(remarks[3].starts_with("the file is one of 2 pieces"), "{}", remarks[3]);
-    assert!(Bi4.remarks(b"#FileJBD JPartDataBi4").is_empty());
+fn notes_name_program_and_pieces() {
+    let notes = Bi4.notes(&sample("dualsphysics/Part_p00_0003.bi4"));
+    assert_eq!(notes[0], "written by DualSPHysics5 v5.4.355");
+    assert!(notes[1].starts_with("attribute `part` is the type"), "{}", notes[1]);
+    assert!(notes[2].ends_with("Dp = 0.02"), "{}", notes[2]);
+    assert!(notes[3].starts_with("the file is one of 2 pieces"), "{}", notes[3]);
+    assert!(Bi4.notes(b"#FileJBD JPartDataBi4").is_empty());
 }
 
 #[test]

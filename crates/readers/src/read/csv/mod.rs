@@ -52,16 +52,16 @@ impl Reader for Csv {
         read(source.text(), budget)
     }
 
-    fn remarks(&self, head: &[u8]) -> Vec<String> {
-        remarks(head)
+    fn notes(&self, head: &[u8]) -> Vec<String> {
+        notes(head)
     }
 }
 
-/// Remarks about a table that begins with `head`.
-pub(super) fn remarks(head: &[u8]) -> Vec<String> {
+/// Notes about a table that begins with `head`.
+pub(super) fn notes(head: &[u8]) -> Vec<String> {
     let has_no_names = TableLayout::find(head).is_ok_and(|layout| layout.names.is_none());
-    let remark = "the table has no names of columns: columns 1 to 3 are the positions";
-    has_no_names.then(|| remark.to_owned()).into_iter().collect()
+    let note = "the table has no names of columns: columns 1 to 3 are the positions";
+    has_no_names.then(|| note.to_owned()).into_iter().collect()
 }
 
 /// The only time step of `text`, with the time if a line before the names has it.

@@ -133,16 +133,16 @@ fn missing_positions() {
 }
 
 #[test]
-fn tables_without_names_have_a_remark() {
-    let remarks = |text: &str| FORMAT.reader().remarks(text.as_bytes());
+fn tables_without_names_have_a_note() {
+    let notes = |text: &str| FORMAT.reader().notes(text.as_bytes());
     assert_eq!(
-        remarks("# run 7\n1 2 3 4\n5 6 7 8\n"),
+        notes("# run 7\n1 2 3 4\n5 6 7 8\n"),
         ["the table has no names of columns: columns 1 to 3 are the positions"]
     );
     let grains = only("#format x_y_z_r\n1\t2\t3\t0.5\n");
     assert_eq!(real(&grains, "r"), [0.5]);
     for text in ["x,y,z\n1,2,3\n", "# x y z\n1 2 3\n", "a,b,c\n1,2,3\n", "words\n", ""] {
-        assert!(remarks(text).is_empty(), "{text}");
+        assert!(notes(text).is_empty(), "{text}");
     }
 }
 

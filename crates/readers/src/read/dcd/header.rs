@@ -292,24 +292,24 @@ impl DcdHeader {
     }
 
     /// What kind of file it is.
-    pub(super) fn remarks(&self) -> Vec<String> {
+    pub(super) fn notes(&self) -> Vec<String> {
         let kind = if self.is_charmm { "CHARMM" } else { "X-PLOR" };
         let order = match self.records.endian {
             Endian::Little => "little-endian",
             Endian::Big => "big-endian",
         };
-        let mut remarks = vec![format!("DCD file as {kind} writes it, {order}")];
+        let mut notes = vec![format!("DCD file as {kind} writes it, {order}")];
         if self.time(0).is_some() {
-            remarks.push(
+            notes.push(
                 "times are those of CHARMM and NAMD, whose unit is 0.04888821 ps; other programs may have written others"
                     .to_owned(),
             );
         }
         if self.free.is_some() {
-            remarks.push(
+            notes.push(
                 "some atoms are fixed: their positions are in the first frame alone".to_owned(),
             );
         }
-        remarks
+        notes
     }
 }

@@ -7,7 +7,7 @@
 use glam::Vec3;
 
 use super::columns::{ComponentStride, ParticleLayout, StridedColumn};
-use super::{ByteSource, CUT_SHORT, Step, remarks};
+use super::{ByteSource, CUT_SHORT, Step, notes};
 use crate::format::Format;
 use crate::reader::{Confidence, FormatInfo, Reader};
 use spherule_frame::{ParseError, Positions, RawParticles, ScalarType};
@@ -96,13 +96,13 @@ impl Reader for Dcd {
         layout(bytes, &header, header.frames_at, 0).map(Some)
     }
 
-    fn remarks(&self, head: &[u8]) -> Vec<String> {
-        let mut remarks = vec![remarks::units("angstroms", None, Some("ps"))];
+    fn notes(&self, head: &[u8]) -> Vec<String> {
+        let mut notes = vec![notes::units("angstroms", None, Some("ps"))];
         if let Ok(header) = DcdHeader::parse(head) {
-            remarks.extend(header.remarks());
-            remarks.extend(header.shows_cell(head).then(|| remarks::cell_remark(None)));
+            notes.extend(header.notes());
+            notes.extend(header.shows_cell(head).then(|| notes::cell_note(None)));
         }
-        remarks
+        notes
     }
 }
 

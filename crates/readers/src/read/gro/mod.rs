@@ -8,7 +8,7 @@ use super::beads::Beads;
 use super::input::TextInput;
 use super::sniff::is_text;
 use super::text::{self, Line};
-use super::{ByteSource, CUT_SHORT, Step, remarks};
+use super::{ByteSource, CUT_SHORT, Step, notes};
 use crate::format::Format;
 use crate::reader::{Confidence, FormatInfo, Reader, StreamUnit};
 use spherule_frame::{MemoryBudget, ParseError, RawParticles, SimulationCell, names};
@@ -64,11 +64,11 @@ impl Reader for Gro {
         read(source.text(), step, budget)
     }
 
-    fn remarks(&self, _head: &[u8]) -> Vec<String> {
+    fn notes(&self, _head: &[u8]) -> Vec<String> {
         vec![
-            remarks::units("nm", Some("nm/ps"), Some("ps")),
-            remarks::GUESSED_ELEMENTS.to_owned(),
-            remarks::cell_remark(None),
+            notes::units("nm", Some("nm/ps"), Some("ps")),
+            notes::GUESSED_ELEMENTS.to_owned(),
+            notes::cell_note(None),
         ]
     }
 }

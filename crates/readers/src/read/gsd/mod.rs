@@ -1,12 +1,12 @@
 //! GSD files of HOOMD-blue: several frames, values that did not change since the first frame left out.
 //!
 //! `file` reads the file layer (header, names, index of chunks), `frame` finds the chunks of a frame by the schema
-//! `hoomd`, `remarks` reports what is not in the particles. After the specification of GSD: file layer 1.0 and 2.x,
+//! `hoomd`, `notes` reports what is not in the particles. After the specification of GSD: file layer 1.0 and 2.x,
 //! schema `hoomd` 1.x and 2.x.
 
 mod file;
 mod frame;
-mod remarks;
+mod notes;
 #[cfg(test)]
 mod tests;
 
@@ -28,7 +28,7 @@ impl Reader for Gsd {
     fn info(&self) -> FormatInfo {
         FormatInfo {
             may_hold_many_steps: true,
-            remarks_need_whole_file: true,
+            notes_need_whole_file: true,
             ..FormatInfo::new("gsd", &["gsd"])
         }
     }
@@ -65,11 +65,11 @@ impl Reader for Gsd {
         }
     }
 
-    fn remarks(&self, bytes: &[u8]) -> Vec<String> {
-        remarks::remarks(bytes)
+    fn notes(&self, bytes: &[u8]) -> Vec<String> {
+        notes::notes(bytes)
     }
 
     fn value_names(&self, file: &SharedBytes) -> Vec<ValueNames> {
-        remarks::value_names(file).into_iter().collect()
+        notes::value_names(file).into_iter().collect()
     }
 }

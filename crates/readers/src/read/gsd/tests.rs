@@ -311,10 +311,10 @@ fn bonds_are_those_of_frame_0_unless_a_frame_has_its_own() {
 }
 
 #[test]
-fn remarks_report_what_is_not_in_the_particles() {
-    let remarks = Gsd.remarks(&sample("gsd/polymer.gsd"));
+fn notes_report_what_is_not_in_the_particles() {
+    let notes = Gsd.notes(&sample("gsd/polymer.gsd"));
     assert_eq!(
-        remarks,
+        notes,
         [
             "GSD 2.1, schema hoomd 2.0, written by \"gsd.hoomd 5.0.1\"",
             "attribute `typeid` has numbers for types: 0 = \"A\", 1 = \"solvent\"",
@@ -323,12 +323,12 @@ fn remarks_report_what_is_not_in_the_particles() {
             "not used: \"orientation\", \"log\"",
         ]
     );
-    let flat = Gsd.remarks(&sample("gsd/varying.gsd"));
+    let flat = Gsd.notes(&sample("gsd/varying.gsd"));
     assert!(flat.contains(&"the simulation has two dimensions".to_owned()), "{flat:?}");
     assert!(flat.iter().any(|r| r.contains("no diameters")), "{flat:?}");
     // The beginning of a file, as it is known of a compressed one.
-    assert_eq!(Gsd.remarks(&sample("gsd/polymer.gsd")[..256]).len(), 1);
-    assert!(Gsd.remarks(b"").is_empty());
+    assert_eq!(Gsd.notes(&sample("gsd/polymer.gsd")[..256]).len(), 1);
+    assert!(Gsd.notes(b"").is_empty());
 }
 
 #[test]
@@ -367,7 +367,7 @@ proptest! {
         let bytes = mutate(&base, &changes);
         let _ = READER.all(&bytes);
         let _ = Gsd.layout(&bytes);
-        let _ = Gsd.remarks(&bytes);
+        let _ = Gsd.notes(&bytes);
     }
 
     #[test]

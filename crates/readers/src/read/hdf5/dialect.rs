@@ -27,7 +27,7 @@ pub(super) trait Dialect {
     fn table(&self, step: usize, budget: MemoryBudget) -> Result<ParticleTable, ParseError>;
 
     /// What users should know: the layout and its version first, then parts and units.
-    fn remarks(&self) -> Vec<String>;
+    fn notes(&self) -> Vec<String>;
 
     /// Names behind the numbers of attributes, beside those of parts.
     fn value_names(&self) -> Vec<ValueNames> {
@@ -40,7 +40,7 @@ pub(super) fn no_step(step: usize, count: usize) -> ParseError {
     ParseError::malformed(0, format!("step {step} is not among the {count} of the file"))
 }
 
-/// A list of names for a remark, the first dozen of them.
+/// A list of names for a note, the first dozen of them.
 pub(super) fn listed(names: &[String]) -> String {
     const LISTED: usize = 12;
     let more = match names.len().saturating_sub(LISTED) {
@@ -50,13 +50,13 @@ pub(super) fn listed(names: &[String]) -> String {
     format!("{}{more}", names[..names.len().min(LISTED)].join(", "))
 }
 
-/// The remark that tells the values of the attribute `part`.
+/// The note that tells the values of the attribute `part`.
 pub(super) fn part_names<'a>(names: impl Iterator<Item = (u32, &'a str)>) -> String {
     let names: Vec<String> = names.map(|(value, name)| format!("{value} = {name}")).collect();
     format!("attribute `part` tells parts apart: {}", listed(&names))
 }
 
-/// The remark that tells units.
+/// The note that tells units.
 pub(super) fn units(units: &[String]) -> Option<String> {
     (!units.is_empty()).then(|| format!("units: {}", listed(units)))
 }

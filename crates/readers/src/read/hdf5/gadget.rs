@@ -13,7 +13,7 @@ use super::slice::Slice;
 use super::stored::Stored;
 use super::table::{Part, ParticleTable};
 use super::values::Values;
-use crate::read::remarks::cell_remark;
+use crate::read::notes::cell_note;
 use crate::reader::ValueNames;
 use spherule_frame::{MemoryBudget, ParseError, ScalarType, SimulationCell};
 
@@ -282,28 +282,28 @@ impl Dialect for Snapshot {
         vec![ValueNames { attribute: "part".to_owned(), names: names.collect() }]
     }
 
-    fn remarks(&self) -> Vec<String> {
-        let mut remarks = vec![format!("HDF5, {}", self.code())];
-        remarks.push(format!(
+    fn notes(&self) -> Vec<String> {
+        let mut notes = vec![format!("HDF5, {}", self.code())];
+        notes.push(format!(
             "all particle types that have {COORDINATES} are read; attribute `part` is the number of the type: {}",
             self.type_names()
         ));
         if !self.without.is_empty() {
-            remarks.push(format!("without {COORDINATES}: {}", listed(&self.without)));
+            notes.push(format!("without {COORDINATES}: {}", listed(&self.without)));
         }
         let files = file_count(&self.root);
         if files > 1 {
-            remarks.push(format!(
+            notes.push(format!(
                 "one of {files} files of a snapshot; give their directory, or a pattern such as snap_010.*.hdf5, to read \
                  them together"
             ));
         }
-        remarks.extend(units(&self.units()));
+        notes.extend(units(&self.units()));
         let redshift = self.header_number("Redshift").filter(|z| *z != 0.0);
         if let (Some(z), Some(time)) = (redshift, self.header_number("Time"))
             && (time * (1.0 + z) - 1.0).abs() < 1e-6
         {
-            remarks.push(format!("Header/Time is the scale factor, at redshift {z}"));
+            notes.push(format!("Header/Time is the scale factor, at redshift {z}"));
         }
         let left_out: Vec<String> = self
             .types
@@ -313,11 +313,11 @@ impl Dialect for Snapshot {
             .collect();
         if !left_out.is_empty() {
             let what = "not one group of numbers for each particle, or not readable, so left out";
-            remarks.push(format!("{what}: {}", listed(&left_out)));
+            notes.push(format!("{what}: {}", listed(&left_out)));
         }
         if self.cell().is_some() {
-            remarks.push(cell_remark(None));
+            notes.push(cell_note(None));
         }
-        remarks
+        notes
     }
 }

@@ -13,7 +13,7 @@ use super::slice::Slice;
 use super::stored::Stored;
 use super::table::{Part, ParticleTable};
 use super::values::Values;
-use crate::read::remarks::cell_remark;
+use crate::read::notes::cell_note;
 use spherule_frame::{MemoryBudget, ParseError, SimulationCell};
 
 const POSITION: &str = "position";
@@ -291,8 +291,8 @@ impl Dialect for Trajectory {
         Ok(table.in_cell(self.cell(found.number, budget)))
     }
 
-    fn remarks(&self) -> Vec<String> {
-        let mut remarks = Vec::new();
+    fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
         if let Ok(Some(h5md)) = self.root.group("h5md") {
             let version: Vec<String> =
                 h5md.numbers("version").unwrap_or_default().iter().map(f64::to_string).collect();
@@ -305,7 +305,7 @@ impl Dialect for Trajectory {
                     Some(format!(", written by {} {version}", c.text("name")?))
                 })
                 .unwrap_or_default();
-            remarks.push(format!(
+            notes.push(format!(
                 "HDF5, H5MD {} with {} time steps{}",
                 version.join("."),
                 self.steps.len(),
@@ -314,14 +314,14 @@ impl Dialect for Trajectory {
         }
         let names: Vec<String> = self.groups.iter().map(|group| group.name.clone()).collect();
         match names.len() {
-            1 => remarks.push(format!("group of particles {}", listed(&names))),
-            _ => remarks.push(part_names((0..).zip(names.iter().map(String::as_str)))),
+            1 => notes.push(format!("group of particles {}", listed(&names))),
+            _ => notes.push(part_names((0..).zip(names.iter().map(String::as_str)))),
         }
-        remarks.extend(units(&self.units()));
+        notes.extend(units(&self.units()));
         let first = self.steps.first().map_or(0, |step| step.number);
         if self.cell(first, MemoryBudget::UNLIMITED).is_some() {
-            remarks.push(cell_remark(None));
+            notes.push(cell_note(None));
         }
-        remarks
+        notes
     }
 }

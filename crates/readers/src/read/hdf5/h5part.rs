@@ -94,18 +94,18 @@ impl Dialect for StepGroups {
         Ok(table.at(time(&node, budget), Some(number)))
     }
 
-    fn remarks(&self) -> Vec<String> {
-        let mut remarks =
+    fn notes(&self) -> Vec<String> {
+        let mut notes =
             vec![format!("HDF5, H5Part (or H5hut) with {} time steps", self.steps.len())];
         if let Ok((_, node)) = self.node(0)
             && let Ok((groups, _)) = node.members()
             && !groups.is_empty()
         {
             let groups: Vec<String> = groups.iter().map(|name| node.path_of(name)).collect();
-            remarks.push(format!("groups within a step are not read: {}", listed(&groups)));
+            notes.push(format!("groups within a step are not read: {}", listed(&groups)));
         }
         let version = self.root.number("H5hutVersion").and_then(integer);
-        remarks.extend(version.map(|version| format!("H5hut version {version}")));
-        remarks
+        notes.extend(version.map(|version| format!("H5hut version {version}")));
+        notes
     }
 }

@@ -62,7 +62,7 @@ impl Reader for Hdf5 {
     fn info(&self) -> FormatInfo {
         FormatInfo {
             may_hold_many_steps: true,
-            remarks_need_whole_file: true,
+            notes_need_whole_file: true,
             may_refer_to_files: true,
             ..FormatInfo::new(
                 "hdf5",
@@ -130,22 +130,22 @@ impl Reader for Hdf5 {
         OpenFile::open(file).map_or_else(|_| Vec::new(), |open| open.dialect.value_names())
     }
 
-    fn remarks_of_file(&self, file: &SharedBytes) -> Vec<String> {
+    fn notes_of_file(&self, file: &SharedBytes) -> Vec<String> {
         let Ok(OpenFile { file, dialect }) = OpenFile::open(file) else {
             return Vec::new();
         };
-        let mut remarks = dialect.remarks();
+        let mut notes = dialect.notes();
         if let Ok(table) = dialect.table(0, MemoryBudget::UNLIMITED) {
             if table.has_integer_positions() {
-                remarks.push("positions are stored as integers, and used as they are".to_owned());
+                notes.push("positions are stored as integers, and used as they are".to_owned());
             }
-            remarks.extend_from_slice(table.notes());
+            notes.extend_from_slice(table.notes());
         }
         let others = Vec::from_iter(file.other_names());
         if !others.is_empty() {
-            remarks.push(format!("refers to other files: {}", listed(&others)));
+            notes.push(format!("refers to other files: {}", listed(&others)));
         }
-        remarks
+        notes
     }
 
     fn open_referenced(&self, file: &SharedBytes) {

@@ -320,19 +320,19 @@ impl Dialect for OpenPmd {
         Ok(table.at(time(iteration), Some(*number)))
     }
 
-    fn remarks(&self) -> Vec<String> {
+    fn notes(&self) -> Vec<String> {
         let version = self.root.text("openPMD").unwrap_or_default();
         let software =
             self.root.text("software").map_or(String::new(), |name| format!(", written by {name}"));
-        let mut remarks = vec![format!(
+        let mut notes = vec![format!(
             "HDF5, openPMD {version} with {} iterations{software}",
             self.iterations.len()
         )];
         match self.species.len() {
-            1 => remarks.push(format!("species {}", listed(&self.species))),
-            _ => remarks.push(part_names((0..).zip(self.species.iter().map(String::as_str)))),
+            1 => notes.push(format!("species {}", listed(&self.species))),
+            _ => notes.push(part_names((0..).zip(self.species.iter().map(String::as_str)))),
         }
-        remarks.extend(units(&self.units()));
-        remarks
+        notes.extend(units(&self.units()));
+        notes
     }
 }

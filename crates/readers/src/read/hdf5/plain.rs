@@ -367,8 +367,8 @@ impl Dialect for PlainFile {
         Ok(table.at(self.time(step, budget), self.step(step, budget)))
     }
 
-    fn remarks(&self) -> Vec<String> {
-        let mut remarks = Vec::new();
+    fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
         let mut paths: Vec<String> = self
             .groups
             .iter()
@@ -376,10 +376,10 @@ impl Dialect for PlainFile {
             .map(|data| data.stored.path.clone())
             .collect();
         paths.dedup();
-        remarks.push(format!("HDF5 of no known layout; positions are {}", listed(&paths)));
+        notes.push(format!("HDF5 of no known layout; positions are {}", listed(&paths)));
         if self.groups.len() > 1 {
             let names = self.groups.iter().map(|group| shown(group.node.path()));
-            remarks.push(part_names((0..).zip(names)));
+            notes.push(part_names((0..).zip(names)));
         }
         let budget = MemoryBudget::UNLIMITED;
         let left_out: Vec<String> = self
@@ -390,8 +390,8 @@ impl Dialect for PlainFile {
             .collect();
         if !left_out.is_empty() {
             let what = "not one group of numbers for each particle, or not readable, so left out";
-            remarks.push(format!("{what}: {}", listed(&left_out)));
+            notes.push(format!("{what}: {}", listed(&left_out)));
         }
-        remarks
+        notes
     }
 }

@@ -143,15 +143,15 @@ impl Dialect for ParticleArrays {
         Ok(ParticleTable::new(parts, is_divided).at(self.time(), self.step()))
     }
 
-    fn remarks(&self) -> Vec<String> {
+    fn notes(&self) -> Vec<String> {
         let version = self.root.number("version");
         let version = version.map_or(String::new(), |v| format!(", version {v} of its layout"));
         let names: Vec<String> = self.arrays.iter().map(|(name, _)| name.clone()).collect();
-        let mut remarks = vec![format!("HDF5, output of PySPH{version}")];
+        let mut notes = vec![format!("HDF5, output of PySPH{version}")];
         match self.arrays.len() {
-            1 => remarks.push(format!("particle array {}", listed(&names))),
-            _ => remarks.push(part_names((0..).zip(names.iter().map(String::as_str)))),
+            1 => notes.push(format!("particle array {}", listed(&names))),
+            _ => notes.push(part_names((0..).zip(names.iter().map(String::as_str)))),
         }
-        remarks
+        notes
     }
 }

@@ -180,7 +180,7 @@ impl Dialect for VtkHdf {
         Ok(ParticleTable::new(vec![part], false).at(times.get(step).copied(), None))
     }
 
-    fn remarks(&self) -> Vec<String> {
+    fn notes(&self) -> Vec<String> {
         let version: Vec<String> =
             self.node.numbers("Version").unwrap_or_default().iter().map(f64::to_string).collect();
         let steps = match self.steps {

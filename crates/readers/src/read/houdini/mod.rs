@@ -28,7 +28,7 @@ impl Reader for Houdini {
     /// Those with the name of their compression; `.bgeo` is in the list of classic files.
     fn info(&self) -> FormatInfo {
         FormatInfo {
-            remarks_need_whole_file: true,
+            notes_need_whole_file: true,
             ..FormatInfo::new("houdini", &["bgeosc", "bgeogz"])
         }
     }
@@ -65,26 +65,26 @@ impl Reader for Houdini {
         largest + largest / 3
     }
 
-    fn remarks(&self, bytes: &[u8]) -> Vec<String> {
+    fn notes(&self, bytes: &[u8]) -> Vec<String> {
         let mut geometry = Geometry::default();
         // What is before a fault, or the end of the bytes, counts; reading the file reports the fault
         let _ = geometry.read(bytes, MemoryBudget::UNLIMITED);
-        let mut remarks = Vec::new();
+        let mut notes = Vec::new();
         let version = geometry.version.as_ref();
-        remarks.extend(version.map(|version| format!("geometry of Houdini {version}")));
+        notes.extend(version.map(|version| format!("geometry of Houdini {version}")));
         if !geometry.primitive_types.is_empty() {
             let types = geometry.primitive_types.join(", ");
-            remarks.push(format!(
+            notes.push(format!(
                 "primitives ({types}) are not used; their points are read as particles"
             ));
         }
         if !geometry.unread.is_empty() {
             let names = geometry.unread.join(", ");
-            remarks.push(format!(
+            notes.push(format!(
                 "point attributes that are neither numbers nor strings are not read: {names}"
             ));
         }
-        remarks
+        notes
     }
 
     /// Houdini's axes.

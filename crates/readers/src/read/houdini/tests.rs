@@ -148,14 +148,14 @@ fn packed_primitives_are_refused_by_name() {
     // Others leave the points
     let bytes = file(1, &[origin(1)], &primitive("Polygon_run"));
     assert_eq!(READER.one(&bytes).positions.len(), 1);
-    let remarks = Houdini.remarks(&bytes);
-    assert_eq!(remarks, ["primitives (Polygon) are not used; their points are read as particles"]);
+    let notes = Houdini.notes(&bytes);
+    assert_eq!(notes, ["primitives (Polygon) are not used; their points are read as particles"]);
 }
 
 #[test]
-fn remarks_have_version_and_what_is_not_read() {
+fn notes_have_version_and_what_is_not_read() {
     assert_eq!(
-        Houdini.remarks(&sample("houdini/flip_12.bgeo")),
+        Houdini.notes(&sample("houdini/flip_12.bgeo")),
         [
             "geometry of Houdini 20.0.547",
             "primitives (Polygon) are not used; their points are read as particles",
@@ -163,8 +163,8 @@ fn remarks_have_version_and_what_is_not_read() {
         ]
     );
     // The beginning of a file
-    let remarks = Houdini.remarks(&sample("houdini/flip_12.bgeo")[..100]);
-    assert_eq!(remarks, ["geometry of Houdini 20.0.547"]);
+    let notes = Houdini.notes(&sample("houdini/flip_12.bgeo")[..100]);
+    assert_eq!(notes, ["geometry of Houdini 20.0.547"]);
 }
 
 #[test]

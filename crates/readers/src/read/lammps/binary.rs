@@ -11,8 +11,8 @@ use super::header::DumpHeader;
 use super::{Bounds, MAGICS};
 use crate::format::Format;
 use crate::read::columns::{ComponentStride, GrowingParticles, ParticleLayout, StridedColumn};
+use crate::read::notes::cell_note;
 use crate::read::numbers::NumberReader;
-use crate::read::remarks::cell_remark;
 use crate::read::{ByteSource, Step, text};
 use crate::reader::{Confidence, FormatInfo, Reader};
 use spherule_frame::names::{LAMMPS_CATEGORIES, LAMMPS_INTEGERS};
@@ -64,14 +64,14 @@ impl Reader for LammpsBinary {
         Frame::parse(bytes, step.start(), budget)?.particles(bytes, budget)
     }
 
-    fn remarks(&self, head: &[u8]) -> Vec<String> {
-        let mut remarks = vec![cell_remark(None)];
+    fn notes(&self, head: &[u8]) -> Vec<String> {
+        let mut notes = vec![cell_note(None)];
         if let Ok(frame) = Frame::parse(head, 0, MemoryBudget::UNLIMITED)
             && !frame.units.is_empty()
         {
-            remarks.insert(0, format!("units of LAMMPS: {}", text::shown(frame.units)));
+            notes.insert(0, format!("units of LAMMPS: {}", text::shown(frame.units)));
         }
-        remarks
+        notes
     }
 }
 

@@ -24,7 +24,7 @@ mod bounds;
 mod columns;
 mod data;
 mod header;
-mod remarks;
+mod notes;
 
 pub use binary::FORMAT as BINARY;
 use bounds::Bounds;
@@ -78,12 +78,12 @@ impl Reader for Lammps {
         read(source.text(), step, budget)
     }
 
-    fn remarks(&self, head: &[u8]) -> Vec<String> {
-        remarks::remarks(head)
+    fn notes(&self, head: &[u8]) -> Vec<String> {
+        notes::notes(head)
     }
 
     fn value_names(&self, file: &SharedBytes) -> Vec<ValueNames> {
-        remarks::value_names(file)
+        notes::value_names(file)
     }
 }
 

@@ -209,19 +209,19 @@ fn elements_are_the_same_numbers_in_every_frame() {
 }
 
 #[test]
-fn remarks_name_the_cell_and_the_elements() {
+fn notes_name_the_cell_and_the_elements() {
     let text = "ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n2\nITEM: BOX BOUNDS xy xz yz pp pp ff\n0 1 0\n\
         0 1 0\n0 1 0\nITEM: ATOMS id element x y z\n1 O 0 0 0\n2 H 0 0 0\nITEM: TIMESTEP\n1\n";
-    let remarks = remarks::remarks(text.as_bytes());
-    assert_eq!(remarks.len(), 2, "{remarks:?}");
-    assert!(remarks[0].contains("simulation cell with periodic boundaries (pp pp ff)"));
-    assert!(remarks[1].ends_with("\"H\" = 1, \"O\" = 8"), "{remarks:?}");
+    let notes = notes::notes(text.as_bytes());
+    assert_eq!(notes.len(), 2, "{notes:?}");
+    assert!(notes[0].contains("simulation cell with periodic boundaries (pp pp ff)"));
+    assert!(notes[1].ends_with("\"H\" = 1, \"O\" = 8"), "{notes:?}");
     for end in 0..text.len() {
-        remarks::remarks(&text.as_bytes()[..end]);
+        notes::notes(&text.as_bytes()[..end]);
     }
     let shrink = text.replace("xy xz yz pp pp ff", "ss ss ss").replace("element", "c");
-    let remarks = remarks::remarks(shrink.as_bytes());
-    assert!(remarks.len() == 1 && !remarks[0].contains("periodic"), "{remarks:?}");
+    let notes = notes::notes(shrink.as_bytes());
+    assert!(notes.len() == 1 && !notes[0].contains("periodic"), "{notes:?}");
 }
 
 #[test]

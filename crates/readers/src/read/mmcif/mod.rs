@@ -7,7 +7,7 @@ use super::atoms::{self, AtomTable, ELEMENT, RESIDUE};
 use super::input::TextInput;
 use super::sniff::is_text;
 use super::text;
-use super::{ByteSource, CUT_SHORT, Step, remarks};
+use super::{ByteSource, CUT_SHORT, Step, notes};
 use crate::format::Format;
 use crate::reader::{Confidence, FormatInfo, Reader, StreamUnit};
 use spherule_frame::{MemoryBudget, ParseError, RawParticles, names};
@@ -107,8 +107,8 @@ impl Reader for MmCif {
         Ok(RawParticles { step: step.number, cell: rows.cell(), ..particles })
     }
 
-    fn remarks(&self, _head: &[u8]) -> Vec<String> {
-        vec![remarks::units("angstroms", None, None), remarks::cell_remark(None)]
+    fn notes(&self, _head: &[u8]) -> Vec<String> {
+        vec![notes::units("angstroms", None, None), notes::cell_note(None)]
     }
 }
 

@@ -64,7 +64,7 @@ mod tests {
     #[test]
     fn quotes_end_before_blanks() {
         assert_eq!(
-            all("ATOM 'O5'' \"a b\" # remark"),
+            all("ATOM 'O5'' \"a b\" # note"),
             [("ATOM", false), ("O5'", true), ("a b", true)]
         );
         assert_eq!(all("'open end"), [("'open", false), ("end", false)]);

@@ -10,7 +10,7 @@ use super::beads::Beads;
 use super::input::TextInput;
 use super::sniff::is_text;
 use super::text::{self, Line};
-use super::{ByteSource, Step, remarks};
+use super::{ByteSource, Step, notes};
 use crate::format::Format;
 use crate::reader::{Confidence, FormatInfo, Reader, StreamUnit};
 use spherule_frame::{MemoryBudget, ParseError, RawParticles, SimulationCell, names};
@@ -95,19 +95,19 @@ impl Reader for Pdb {
         read(source.text(), step, &RECORDS, budget)
     }
 
-    fn remarks(&self, head: &[u8]) -> Vec<String> {
-        remarks(head)
+    fn notes(&self, head: &[u8]) -> Vec<String> {
+        notes(head)
     }
 }
 
 /// Notes on the units and the cell.
-fn remarks(head: &[u8]) -> Vec<String> {
-    let mut remarks = vec![remarks::units("angstroms", None, None)];
+fn notes(head: &[u8]) -> Vec<String> {
+    let mut notes = vec![notes::units("angstroms", None, None)];
     let mut lines = text::Lines::new(head, 0..head.len());
     if lines.any(is_cell) {
-        remarks.push(remarks::cell_remark(None));
+        notes.push(notes::cell_note(None));
     }
-    remarks
+    notes
 }
 
 fn is_atom(line: Line<'_>) -> bool {

@@ -30,7 +30,7 @@ impl Reader for Pqr {
         FormatInfo::molecular("pqr", &["pqr"])
     }
 
-    /// Some programs put long remarks before the atoms. Others write what may also be a PDB file without elements.
+    /// Some programs put long notes before the atoms. Others write what may also be a PDB file without elements.
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
         if !is_text(head) {
             return Ok(Confidence::No);
@@ -71,8 +71,8 @@ impl Reader for Pqr {
         super::read(source.text(), step, &RECORDS, budget)
     }
 
-    fn remarks(&self, head: &[u8]) -> Vec<String> {
-        super::remarks(head)
+    fn notes(&self, head: &[u8]) -> Vec<String> {
+        super::notes(head)
     }
 }
 

@@ -7,7 +7,7 @@
 use super::columns::{ComponentStride, ParticleLayout, StridedColumn, check_room};
 use super::numbers::NumberReader;
 use super::xdr::{self, FrameSummary};
-use super::{ByteSource, Step, remarks};
+use super::{ByteSource, Step, notes};
 use crate::format::Format;
 use crate::reader::{Confidence, FormatInfo, Reader};
 use spherule_frame::{Endian, MemoryBudget, ParseError, RawParticles, ScalarType, SimulationCell};
@@ -58,14 +58,14 @@ impl Reader for Trr {
         }
     }
 
-    fn remarks(&self, head: &[u8]) -> Vec<String> {
+    fn notes(&self, head: &[u8]) -> Vec<String> {
         let precision = Frame::parse(head, 0).map(|frame| frame.scalar);
-        let mut remarks = vec![remarks::units("nm", Some("nm/ps"), Some("ps"))];
+        let mut notes = vec![notes::units("nm", Some("nm/ps"), Some("ps"))];
         if precision == Ok(ScalarType::F64) {
-            remarks.push("positions have double precision".to_owned());
+            notes.push("positions have double precision".to_owned());
         }
-        remarks.push(remarks::cell_remark(None));
-        remarks
+        notes.push(notes::cell_note(None));
+        notes
     }
 }
 

@@ -8,11 +8,11 @@
 
 mod binary;
 mod layer;
+mod notes;
 mod number_type;
 mod package;
 mod particles;
 mod prim;
-mod remarks;
 mod scene;
 #[cfg(test)]
 mod tests;
@@ -43,7 +43,7 @@ impl Reader for Usd {
     fn info(&self) -> FormatInfo {
         FormatInfo {
             may_hold_many_steps: true,
-            remarks_need_whole_file: true,
+            notes_need_whole_file: true,
             ..FormatInfo::new("usd", &["usd", "usda", "usdc", "usdz"])
         }
     }
@@ -98,10 +98,10 @@ impl Reader for Usd {
         2 * particles.largest_array_len()
     }
 
-    fn remarks(&self, bytes: &[u8]) -> Vec<String> {
+    fn notes(&self, bytes: &[u8]) -> Vec<String> {
         let budget = METADATA_BUDGET;
-        let remarks = with_layer(bytes, budget, |layer, _| Ok(remarks::remarks(layer)));
-        remarks.unwrap_or_default()
+        let notes = with_layer(bytes, budget, |layer, _| Ok(notes::notes(layer)));
+        notes.unwrap_or_default()
     }
 
     fn is_y_up(&self, bytes: &[u8]) -> bool {

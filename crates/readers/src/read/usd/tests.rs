@@ -193,8 +193,8 @@ fn scenes_whose_positions_may_depend_on_other_files_are_refused() {
     // References elsewhere do not matter, and are reported
     let other = format!("#usda 1.0\ndef \"A\" ( references = @a.usda@ ) {{ }}\n{POINTS}");
     assert_eq!(READER.one(other.as_bytes()).positions.len(), 2);
-    let remarks = FORMAT.reader().remarks(other.as_bytes());
-    assert!(remarks.iter().any(|remark| remark.contains("are not read")), "{remarks:?}");
+    let notes = FORMAT.reader().notes(other.as_bytes());
+    assert!(notes.iter().any(|note| note.contains("are not read")), "{notes:?}");
 }
 
 #[test]
@@ -305,11 +305,11 @@ fn up_axis_is_that_of_the_file() {
 }
 
 #[test]
-fn remarks_have_units_and_parts() {
+fn notes_have_units_and_parts() {
     for name in ["drops.usda", "drops.usdc", "drops.usdz"] {
-        let remarks = FORMAT.reader().remarks(&usd(name));
+        let notes = FORMAT.reader().notes(&usd(name));
         assert_eq!(
-            remarks,
+            notes,
             [
                 "a length unit is 0.01 m, and y points up; times are time codes divided by 30 a second",
                 "attribute `part` has numbers for prims: 0 = /World/Oil, 1 = /World/Water",
@@ -318,11 +318,11 @@ fn remarks_have_units_and_parts() {
         );
     }
     for name in ["moved.usda", "moved.usdc"] {
-        let remarks = FORMAT.reader().remarks(&usd(name));
-        assert!(remarks.iter().any(|remark| remark.contains("are transformed")), "{remarks:?}");
+        let notes = FORMAT.reader().notes(&usd(name));
+        assert!(notes.iter().any(|note| note.contains("are transformed")), "{notes:?}");
     }
-    let remarks = FORMAT.reader().remarks(&usd("instances.usdc"));
-    assert!(remarks.iter().any(|remark| remark.contains("PointInstancer")), "{remarks:?}");
+    let notes = FORMAT.reader().notes(&usd("instances.usdc"));
+    assert!(notes.iter().any(|note| note.contains("PointInstancer")), "{notes:?}");
 }
 
 proptest! {

@@ -7,7 +7,7 @@ use glam::Vec3;
 
 use super::numbers::NumberReader;
 use super::xdr::{self, FrameSummary};
-use super::{ByteSource, Step, remarks};
+use super::{ByteSource, Step, notes};
 use crate::format::Format;
 use crate::reader::{Confidence, FormatInfo, Reader};
 use spherule_frame::{Endian, ParseError, Positions, RawParticles, SimulationCell};
@@ -89,8 +89,8 @@ impl Reader for Xtc {
         })
     }
 
-    fn remarks(&self, _head: &[u8]) -> Vec<String> {
-        vec![remarks::units("nm", None, Some("ps")), remarks::cell_remark(None)]
+    fn notes(&self, _head: &[u8]) -> Vec<String> {
+        vec![notes::units("nm", None, Some("ps")), notes::cell_note(None)]
     }
 }
 

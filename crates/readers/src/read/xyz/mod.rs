@@ -16,7 +16,7 @@ use spherule_frame::{Endian, ParseError, RawParticles, ScalarType};
 mod comment;
 mod foreign;
 mod molecular;
-mod remarks;
+mod notes;
 
 /// Raw f32 triples, molecular text, or bare text: the content decides.
 pub const FORMAT: Format = Format::new(&Xyz);
@@ -83,17 +83,17 @@ impl Reader for Xyz {
         is_raw.then(|| raw_layout(bytes)).transpose()
     }
 
-    fn remarks(&self, head: &[u8]) -> Vec<String> {
+    fn notes(&self, head: &[u8]) -> Vec<String> {
         match kind(head) {
-            Ok(XyzVariant::Molecular) => remarks::remarks(head),
-            Ok(XyzVariant::Bare) => csv::remarks(head),
+            Ok(XyzVariant::Molecular) => notes::notes(head),
+            Ok(XyzVariant::Bare) => csv::notes(head),
             Ok(XyzVariant::Raw) | Err(_) => Vec::new(),
         }
     }
 
     fn value_names(&self, file: &SharedBytes) -> Vec<ValueNames> {
         let is_molecular = matches!(kind(file), Ok(XyzVariant::Molecular));
-        is_molecular.then(|| remarks::value_names(file)).flatten().into_iter().collect()
+        is_molecular.then(|| notes::value_names(file)).flatten().into_iter().collect()
     }
 }
 

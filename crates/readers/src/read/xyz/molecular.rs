@@ -118,7 +118,7 @@ pub(super) fn read(
 /// Bytes that a column takes on the way to its array, with its name.
 const COLUMN: usize = 256;
 
-/// People append remarks to atoms, so more columns than the first atom has are no fault.
+/// People append notes to atoms, so more columns than the first atom has are no fault.
 const DIALECT: Dialect = Dialect {
     separator: Separator::Blanks,
     decimal: Decimal::Point,

@@ -126,8 +126,8 @@ fn columns_by_properties() {
 }
 
 #[test]
-fn plain_columns_and_remarks() {
-    let text = "3\nAtoms. Timestep: 1200\n-1 1.0D+00 2 3 0.5 7 up\n2 4 5 nan 1 8 down\n3 7 8 9 2 9 up # a remark\n";
+fn plain_columns_and_notes() {
+    let text = "3\nAtoms. Timestep: 1200\n-1 1.0D+00 2 3 0.5 7 up\n2 4 5 nan 1 8 down\n3 7 8 9 2 9 up # a note\n";
     let steps = steps(text.as_bytes()).unwrap();
     assert_eq!(steps[0].number, Some(1200));
     let particles = only(text.as_bytes());
@@ -151,13 +151,13 @@ fn elements_and_species_become_numbers() {
     assert_eq!(whole(&extended, "element")[0], whole(&plain, "element")[2]);
     assert_eq!(whole(&extended, "element")[1], 1);
     assert_eq!(whole(&extended, "id"), [7, 8, 9]);
-    let notes = remarks::remarks(text.as_bytes());
+    let notes = notes::notes(text.as_bytes());
     assert!(notes[0].contains("simulation cell with periodic boundaries (T T F)"), "{notes:?}");
     assert!(notes[1].contains("\"H\" = 1"), "{notes:?}");
     for end in 0..text.len() {
-        remarks::remarks(&text.as_bytes()[..end]);
+        notes::notes(&text.as_bytes()[..end]);
     }
-    assert!(remarks::remarks(b"1\n\n1 0 0 0\n").is_empty());
+    assert!(notes::notes(b"1\n\n1 0 0 0\n").is_empty());
 }
 
 #[test]

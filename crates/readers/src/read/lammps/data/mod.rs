@@ -6,7 +6,7 @@
 
 use crate::format::Format;
 use crate::read::input::TextInput;
-use crate::read::remarks::cell_remark;
+use crate::read::notes::cell_note;
 use crate::read::sniff::is_text;
 use crate::read::table::{CUT_SHORT, ColumnValues};
 use crate::read::text::{self, Lines};
@@ -36,7 +36,7 @@ struct LammpsData;
 impl Reader for LammpsData {
     fn info(&self) -> FormatInfo {
         FormatInfo {
-            remarks_need_whole_file: true,
+            notes_need_whole_file: true,
             ..FormatInfo::new("lammps-data", &["data", "lmp"])
         }
     }
@@ -82,15 +82,14 @@ impl Reader for LammpsData {
         DataFile::read(source.text(), budget)?.into_particles(budget)
     }
 
-    fn remarks(&self, head: &[u8]) -> Vec<String> {
+    fn notes(&self, head: &[u8]) -> Vec<String> {
         let mut text = TextInput::whole(head);
         let header = DataHeader::parse(&mut text).unwrap_or_default();
-        let mut remarks: Vec<String> =
-            header.cell().map(|_| cell_remark(None)).into_iter().collect();
+        let mut notes: Vec<String> = header.cell().map(|_| cell_note(None)).into_iter().collect();
         if has_image_flags(&mut text, &header) {
-            remarks.push(IMAGE_FLAGS.to_owned());
+            notes.push(IMAGE_FLAGS.to_owned());
         }
-        remarks
+        notes
     }
 }
 

@@ -89,8 +89,8 @@ fn atoms_are_joined_by_id() {
         assert_eq!(cell.vectors[1], DVec3::new(0.5, 4.0, 0.0));
         assert_eq!(cell.vectors[2], DVec3::new(0.25, -0.5, 5.0));
         assert!(water.notes.is_empty());
-        let remarks = FORMAT.reader().remarks(text.as_bytes());
-        assert_eq!(remarks.len(), 2, "{remarks:?}");
+        let notes = FORMAT.reader().notes(text.as_bytes());
+        assert_eq!(notes.len(), 2, "{notes:?}");
     }
 }
 
@@ -121,8 +121,8 @@ fn style(header: &str, comment: &str, row: &str, expected: &str, has_images: boo
     let found = names(&particles).join(" ");
     assert_eq!(found, expected, "{comment} {row}");
     assert_eq!(coordinates(&particles.positions), [[0.5, 1.5, 2.5]], "{row}");
-    let remarks = FORMAT.reader().remarks(text.as_bytes()).join(" ");
-    assert_eq!(remarks.contains("image flags"), has_images, "{remarks}");
+    let notes = FORMAT.reader().notes(text.as_bytes()).join(" ");
+    assert_eq!(notes.contains("image flags"), has_images, "{notes}");
     let notes = particles.notes.join(" ");
     assert_eq!(notes.contains("does not name its atom style"), comment.is_empty(), "{notes}");
 }

@@ -1,28 +1,28 @@
-//! Remarks about molecular text: what is not in the particles.
+//! Notes about molecular text: what is not in the particles.
 
 use super::molecular::{self, NAME};
 use super::{Lines, comment, text_start};
-use crate::read::remarks::cell_remark;
+use crate::read::notes::cell_note;
 use crate::read::text::Line;
 use crate::read::{category, text};
 use crate::reader::ValueNames;
 
-/// Remarks about molecular text that begins with `head`.
-pub(in crate::read) fn remarks(head: &[u8]) -> Vec<String> {
+/// Notes about molecular text that begins with `head`.
+pub(in crate::read) fn notes(head: &[u8]) -> Vec<String> {
     let mut lines = Lines::new(head, text_start(head)..head.len());
     let count = lines.next().and_then(|line| text::integer(line.text.trim_ascii()));
     let Some((count, comment)) = count.zip(lines.next()) else {
         return Vec::new();
     };
-    let mut remarks = Vec::new();
+    let mut notes = Vec::new();
     let value = |key| comment::value(comment.text, key);
     if value("Lattice").or_else(|| value("Cell")).is_some() {
         let flags = value("pbc").map(|flags| String::from_utf8_lossy(flags).into_owned());
         let is_periodic = |flags: &&String| flags.contains(['T', 't', '1']);
-        remarks.push(cell_remark(flags.as_ref().filter(is_periodic).map(String::as_str)));
+        notes.push(cell_note(flags.as_ref().filter(is_periodic).map(String::as_str)));
     }
-    remarks.extend(category::note(NAME, names(head, lines.at(), (count, comment.text))));
-    remarks
+    notes.extend(category::note(NAME, names(head, lines.at(), (count, comment.text))));
+    notes
 }
 
 /// The names in the first frame of molecular text that are not symbols of elements.

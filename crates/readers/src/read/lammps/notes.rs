@@ -1,19 +1,19 @@
-//! Remarks about a dump: what is not in the particles.
+//! Notes about a dump: what is not in the particles.
 
 use super::ITEM;
 use super::bounds::boundary_flags;
 use super::header::{DumpHeader, DumpItem};
 use crate::read::category;
 use crate::read::input::TextInput;
-use crate::read::remarks::cell_remark;
+use crate::read::notes::cell_note;
 use crate::read::text::{self, Lines};
 use crate::reader::ValueNames;
 use spherule_frame::MemoryBudget;
 use spherule_frame::names::LAMMPS_CATEGORIES;
 
-/// See [`crate::read::remarks`].
-pub(in crate::read) fn remarks(head: &[u8]) -> Vec<String> {
-    let mut remarks = Vec::new();
+/// See [`crate::read::notes`].
+pub(in crate::read) fn notes(head: &[u8]) -> Vec<String> {
+    let mut notes = Vec::new();
     let mut items = Lines::new(head, 0..head.len());
     let bounds = items.find(|line| {
         line.text.starts_with(ITEM)
@@ -23,11 +23,10 @@ pub(in crate::read) fn remarks(head: &[u8]) -> Vec<String> {
         let flags: Vec<_> =
             boundary_flags(bounds.text).into_iter().map(String::from_utf8_lossy).collect();
         let is_periodic = flags.iter().any(|flag| flag.contains('p'));
-        remarks.push(cell_remark(is_periodic.then(|| flags.join(" ")).as_deref()));
+        notes.push(cell_note(is_periodic.then(|| flags.join(" ")).as_deref()));
     }
-    let notes = columns(head, |name, names| category::note(name, names));
-    remarks.extend(notes);
-    remarks
+    notes.extend(columns(head, |name, names| category::note(name, names)));
+    notes
 }
 
 /// The names in the first step that are not symbols of elements.

@@ -1,8 +1,8 @@
-//! Remarks about a GSD file: what is not in its particles.
+//! Notes about a GSD file: what is not in its particles.
 
 use super::file::{GsdFile, GsdHeader, IndexEntry, until_zero};
 use super::frame::{BOX, DIAMETER, FIELDS, LOGGED, PARTICLES, STEP};
-use crate::read::remarks::cell_remark;
+use crate::read::notes::cell_note;
 use crate::read::text;
 use crate::reader::ValueNames;
 use spherule_frame::{Endian, ScalarType};
@@ -10,45 +10,45 @@ use spherule_frame::{Endian, ScalarType};
 const TYPES: &str = "particles/types";
 const DIMENSIONS: &str = "configuration/dimensions";
 
-/// Most types, or ignored names, that a remark lists.
+/// Most types, or ignored names, that a note lists.
 const LISTED: usize = 12;
 
-/// See [`crate::reader::Reader::remarks`]. If `bytes` are only the first of a file, its header is all there is to
+/// See [`crate::reader::Reader::notes`]. If `bytes` are only the first of a file, its header is all there is to
 /// report.
-pub(super) fn remarks(bytes: &[u8]) -> Vec<String> {
-    let mut remarks = Vec::new();
+pub(super) fn notes(bytes: &[u8]) -> Vec<String> {
+    let mut notes = Vec::new();
     let Ok(header) = GsdHeader::parse(bytes) else {
-        return remarks;
+        return notes;
     };
-    remarks.push(format!(
+    notes.push(format!(
         "GSD {}, schema hoomd {}, written by {}",
         header.version,
         header.schema_version,
         text::shown(header.application)
     ));
     let Ok(file) = GsdFile::parse(bytes) else {
-        return remarks;
+        return notes;
     };
-    remarks.extend(types(&file));
+    notes.extend(types(&file));
     if file.name(&format!("{PARTICLES}{DIAMETER}")).is_none() {
         let what = "the file has no diameters: all are 1, the default of the schema";
-        remarks.push(what.to_owned());
+        notes.push(what.to_owned());
     }
     if let Some(sizes) = numbers(&file, BOX) {
         let sizes: Vec<String> = sizes.iter().map(f64::to_string).collect();
         let (lengths, tilts) = sizes.split_at(sizes.len().min(3));
-        remarks.push(format!(
+        notes.push(format!(
             "the cell of the first frame is {}, its tilt factors are {}",
             lengths.join(" x "),
             tilts.join(", ")
         ));
-        remarks.push(cell_remark(None));
+        notes.push(cell_note(None));
     }
     if numbers(&file, DIMENSIONS).is_some_and(|d| d == [2.0]) {
-        remarks.push("the simulation has two dimensions".to_owned());
+        notes.push("the simulation has two dimensions".to_owned());
     }
-    remarks.extend(ignored(&file));
-    remarks
+    notes.extend(ignored(&file));
+    notes
 }
 
 /// The first chunk called `name`, of whatever frame, and how many there are.

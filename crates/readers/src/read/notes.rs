@@ -1,7 +1,7 @@
-//! Wording of the remarks that several readers make, see [`crate::reader::Reader::remarks`].
+//! Wording of the notes that several readers make, see [`crate::reader::Reader::notes`].
 
-/// The remark that a file has a cell; `periodic` are the flags of its boundaries.
-pub(super) fn cell_remark(periodic: Option<&str>) -> String {
+/// The note that a file has a cell; `periodic` are the flags of its boundaries.
+pub(super) fn cell_note(periodic: Option<&str>) -> String {
     let boundaries =
         periodic.map_or_else(String::new, |flags| format!(" with periodic boundaries ({flags})"));
     format!(
@@ -16,6 +16,6 @@ pub(super) fn units(length: &str, velocity: Option<&str>, time: Option<&str>) ->
     format!("units of the format: lengths in {length}{velocity}{time}")
 }
 
-/// The remark that a file has names of atoms but no elements.
+/// The note that a file has names of atoms but no elements.
 pub(super) const GUESSED_ELEMENTS: &str =
     "attribute `element` has the atomic numbers that follow from the names of the atoms";

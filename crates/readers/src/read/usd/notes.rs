@@ -1,4 +1,4 @@
-//! Remarks about a USD file: units, parts, and what is not in its particles.
+//! Notes about a USD file: units, parts, and what is not in its particles.
 
 use super::layer::Layer;
 use super::particles::{DIAMETER, attribute_name};
@@ -7,26 +7,26 @@ use super::scene::{ParticlePrims, numbers_at};
 use spherule_frame::MemoryBudget;
 use spherule_frame::join::PART;
 
-/// Most parts that a remark lists.
+/// Most parts that a note lists.
 const LISTED: usize = 12;
 
 /// Memory for a value that is looked at.
 const VALUE_BUDGET: MemoryBudget = MemoryBudget::new(1 << 16, "");
 
-/// See [`crate::reader::Reader::remarks`].
-pub(super) fn remarks(layer: &Layer<'_>) -> Vec<String> {
-    let mut remarks = Vec::new();
+/// See [`crate::reader::Reader::notes`].
+pub(super) fn notes(layer: &Layer<'_>) -> Vec<String> {
+    let mut notes = Vec::new();
     let metadata = layer.metadata;
     let meters = metadata.meters_per_unit;
     let (unit, is_default) = (meters.unwrap_or(0.01), meters.is_none());
-    remarks.push(format!(
+    notes.push(format!(
         "a length unit is {unit} m{}, and {} points up; times are time codes divided by {} a second",
         if is_default { " (the default of USD)" } else { "" },
         if metadata.is_z_up { "z" } else { "y" },
         metadata.rate(),
     ));
     let Ok(prims) = ParticlePrims::find(layer) else {
-        return remarks;
+        return notes;
     };
     // Parts
     let path = |prim: &usize| layer.path(&layer.chain(*prim).unwrap_or_default());
@@ -35,8 +35,7 @@ pub(super) fn remarks(layer: &Layer<'_>) -> Vec<String> {
         let parts: Vec<String> =
             parts.map(|(number, prim)| format!("{number} = {}", path(prim))).collect();
         let more = if prims.prims.len() > LISTED { ", ..." } else { "" };
-        remarks
-            .push(format!("attribute `{PART}` has numbers for prims: {}{more}", parts.join(", ")));
+        notes.push(format!("attribute `{PART}` has numbers for prims: {}{more}", parts.join(", ")));
     }
     // Attributes whose meaning is not in their name
     let has = |name: &str| {
@@ -47,24 +46,24 @@ pub(super) fn remarks(layer: &Layer<'_>) -> Vec<String> {
         })
     };
     if has(DIAMETER) {
-        remarks.push(format!("the widths of points are the attribute `{DIAMETER}`"));
+        notes.push(format!("the widths of points are the attribute `{DIAMETER}`"));
     }
     let is_instancer =
         |prim: &usize| layer.prims.get(*prim).is_some_and(|prim| prim.kind == PrimKind::Instancer);
     if prims.prims.iter().any(is_instancer) {
         let what = "the instances of a PointInstancer are particles; its prototypes and orientations are not used";
-        remarks.push(what.to_owned());
+        notes.push(what.to_owned());
     }
     if is_transformed(layer, &prims) {
         let what =
             "positions, velocities, accelerations and widths are transformed as the file says";
-        remarks.push(what.to_owned());
+        notes.push(what.to_owned());
     }
     if prims.has_arcs {
         let what = "other files, variants and classes that the file refers to are not read";
-        remarks.push(what.to_owned());
+        notes.push(what.to_owned());
     }
-    remarks
+    notes
 }
 
 /// Whether prims with particles, or those above them, have transforms.

@@ -1,0 +1,99 @@
+//! Styles through the program: options, jobs, native frames, and what is refused.
+
+use std::fmt::Write as _;
+use std::fs;
+
+use crate::harness::{Ran, Workshop};
+
+/// Three layers of particles of the types 1, 2 and 3.
+fn layers() -> Workshop {
+    let workshop = Workshop::new();
+    fs::create_dir_all(workshop.join("in")).expect("a directory");
+    let mut csv = "id,x,y,z,type,vx,vy,vz\n".to_owned();
+    for i in 0..192 {
+        let (x, y, layer) = (i % 8, i / 8 % 8, i / 64);
+        let _ = writeln!(csv, "{},{x},{y},{layer},{},{y},0,0", 5 * i, layer + 1);
+    }
+    fs::write(workshop.join("in/f_1.csv"), csv).expect("a file");
+    workshop
+}
+
+const STYLES: [&str; 6] = [
+    "--style",
+    "type == 1: smooth, radius 0.6, color red",
+    "--style",
+    "type == 2: spheres, radius 0.3, color_by speed, map viridis",
+    "--style",
+    "x < 2: balls-and-sticks, radius 0.2, bonds { find = 1.1 }",
+];
+
+fn still(workshop: &Workshop, input: &str, options: &[&str]) -> Ran {
+    let size = ["--width", "96", "--height", "54", "--samples", "2", "--radius", "0.4"];
+    let command = ["still", input, "-o"];
+    workshop.run(&[&command[..], options, &size].concat())
+}
+
+#[test]
+fn native_frames_have_the_same_styles() {
+    let workshop = layers();
+    workshop.run(&["convert", "in", "-o", "f32", "--encoding", "f32"]).expect(0);
+    let options = [&["a.png"][..], &STYLES].concat();
+    still(&workshop, "in", &options)
+        .expect(0)
+        .prints("style `type == 2`: colour by `speed`, range 0 to 7");
+    still(&workshop, "f32", &[&["b.png"][..], &STYLES].concat()).expect(0);
+    let image = |name: &str| fs::read(workshop.join(name)).expect("an image");
+    assert!(image("a.png") == image("b.png"));
+    still(&workshop, "in", &["plain.png"]).expect(0);
+    assert!(image("a.png") != image("plain.png"));
+}
+
+#[test]
+fn styles_are_settings_of_a_job() {
+    let workshop = layers();
+    let style = ["--style", "type == 2: spheres, color red"];
+    workshop.render(&style).expect(0);
+    let manifest = fs::read_to_string(workshop.join("out/job.toml")).expect("a manifest");
+    assert!(
+        manifest.contains("[[style]]\n") && manifest.contains("where = \"type == 2\""),
+        "{manifest}"
+    );
+    // It goes on with the same, and not with another colour
+    workshop.render(&style).expect(0);
+    let other = ["--style", "type == 2: spheres, color blue"];
+    workshop.render(&other).expect(2).prints("style.0.color");
+    // Moving particles have styles, too
+    let blurred = ["--set", "camera.shutter=0.5", "--set", "output.frame_time=0.04"];
+    workshop.render_to("blurred", &[&STYLES[..], &blurred].concat()).expect(0);
+}
+
+#[test]
+fn arrows_and_hidden_particles() {
+    let workshop = layers();
+    let arrows = "type == 1: arrows, arrows { attribute = \"velocity\", scale = 0.1 }";
+    let options = ["a.png", "--style", arrows, "--style", "type == 3: hidden"];
+    still(&workshop, "in", &options).expect(0).prints("1 frame, up to 128 particles");
+    let near = ["b.png", "--where", "within 1.01 of (type == 3)", "--unwrap"];
+    still(&workshop, "in", &near).expect(1).prints("no simulation cell");
+    still(&workshop, "in", &near[..3]).expect(0).prints("up to 128 particles");
+    still(&workshop, "in", &["c.png", "--outline", "2", "--depth-cue", "0.5"]).expect(0);
+}
+
+#[test]
+fn impossible_styles_are_refused_and_empty_ones_are_noted() {
+    let workshop = layers();
+    let refused = |style: &str, what: &str| {
+        still(&workshop, "in", &["a.png", "--style", style]).expect(2).prints(what);
+    };
+    refused("kind == 2: spheres", "style.0.where: character 1: no value `kind`");
+    refused("type == : spheres", "--style: where: character 8");
+    refused("type == 2: sphere", "did you mean spheres?");
+    refused("type == 2: spheres, colour red", "did you mean");
+    refused("type == 2", "a condition, how its particles are drawn");
+    refused("type == 2: spheres, color_by pressure", "no attribute `pressure`");
+    refused("type == 2: sticks", "no bonds");
+    let twice = ["a.png", "--style", "type == 2: spheres", "--style", "type == 2: union"];
+    still(&workshop, "in", &twice).expect(0).prints("no particle is of style `type == 2`");
+    let none = ["a.png", "--style", "type > 7: hidden", "--style", "type == 9: smooth"];
+    still(&workshop, "in", &none).expect(0).prints("no particle is of style `type == 9`");
+}
