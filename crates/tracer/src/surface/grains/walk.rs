@@ -1,0 +1,261 @@
+//! Traversal of the tree with beams of rays.
+//!
+//! The rays of a coherent packet whose directions have the same signs share a beam, which tests the eight boxes of a
+//! node at once. A beam that finds too many grains, and all other rays, are traversed ray by ray. Boxes are larger than
+//! their grains by more than the rounding of both tests, so each ray finds what it would find alone, to the bit.
+
+use super::build::MAX_LEVELS;
+use super::instance::Instance;
+use super::node::{Beam, Code, Node, WIDTH, is_before};
+use super::rays::LocalRays;
+use spherule_tree::accel::Coherence;
+use spherule_tree::math::{LANES, Lanes, fold, lane_kernel, lanes_in, larger, smaller};
+
+/// On every level, all children except one can be on the stack.
+const STACK_SIZE: usize = MAX_LEVELS * (WIDTH - 1) + 1;
+
+/// Number of grains that a beam of several rays tests before its rays are traversed one by one: it is too wide. On the
+/// benchmark's ellipsoids, beams around neighbouring pixels rarely test half as many.
+const MAX_BEAM_TESTS: u32 = 96;
+
+/// No grain.
+pub(super) const NO_SLOT: u32 = u32::MAX;
+
+/// A test of some rays and a grain. Implementations must be `inline(always)`, so that they are compiled for the
+/// instruction set.
+pub(super) trait GrainTest {
+    /// The first distance in the range of each ray at which it crosses the surface of the grain in `slot`; infinite if
+    /// there is none. Lanes outside `lanes` may have any value, and so may rays that cross it behind their limit.
+    fn distances(&self, rays: &LocalRays, slot: usize, lanes: u32, limits: &Lanes) -> Lanes;
+}
+
+/// What a traversal searches for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Query {
+    /// The first crossing of each ray. At equal distances, the grain with the lower index.
+    Nearest,
+    /// Any crossing, at which a ray ends.
+    Any,
+}
+
+/// What rays have found.
+#[derive(Debug, Clone)]
+#[repr(align(64))]
+pub(super) struct Hits {
+    /// The distance of the crossing, or the end of the ray; negative for rays that are finished.
+    pub(super) t: Lanes,
+    /// The grain in tree order, or [`NO_SLOT`].
+    pub(super) slot: [u32; LANES],
+}
+
+impl Hits {
+    /// Nothing, for the rays of `rays.lanes`.
+    pub(super) fn none(rays: &LocalRays) -> Self {
+        let mut t = [-1.0; LANES];
+        for lane in lanes_in(rays.lanes) {
+            t[lane] = rays.to[lane];
+        }
+        Self { t, slot: [NO_SLOT; LANES] }
+    }
+
+    /// Lanes that have found a grain.
+    pub(super) fn mask(&self) -> u32 {
+        (0..LANES).fold(0, |mask, lane| mask | u32::from(self.slot[lane] != NO_SLOT) << lane)
+    }
+
+    /// Stores the distances `t` to the grain in `slot` for those rays of `lanes` for which it is the first one.
+    #[inline(always)]
+    fn take(&mut self, t: &Lanes, slot: u32, lanes: u32, grains: &[Instance], query: Query) {
+        let (mut nearer, mut tied) = (0, 0);
+        for l in 0..LANES {
+            nearer |= u32::from(t[l] < self.t[l]) << l;
+            tied |= u32::from(t[l] == self.t[l]) << l;
+        }
+        for lane in lanes_in(nearer & lanes) {
+            self.slot[lane] = slot;
+            self.t[lane] = if query == Query::Any { -1.0 } else { t[lane] };
+        }
+        for lane in lanes_in(tied & lanes) {
+            let held = self.slot[lane];
+            if held != NO_SLOT && grains[slot as usize].index < grains[held as usize].index {
+                self.slot[lane] = slot;
+            }
+        }
+    }
+}
+
+/// A node or leaf still to be visited, as one word: the bits of the distance at which it is entered, then its code.
+#[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+struct Pending(u64);
+
+impl Pending {
+    #[inline(always)]
+    fn new(enter: f32, code: Code) -> Self {
+        Self(u64::from(larger(enter, 0.0).to_bits()) << 32 | u64::from(code.0))
+    }
+
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "the two halves")]
+    fn split(self) -> (f32, Code) {
+        (f32::from_bits((self.0 >> 32) as u32), Code(self.0 as u32))
+    }
+}
+
+/// A traversal by the rays of some lanes.
+struct Search<'a, T> {
+    nodes: &'a [Node],
+    grains: &'a [Instance],
+    rays: &'a LocalRays,
+    test: &'a T,
+    query: Query,
+    hits: &'a mut Hits,
+    stack: [Pending; STACK_SIZE],
+}
+
+impl<T: GrainTest> Search<'_, T> {
+    /// The farthest end of the rays that are positive in `members`; negative if all are finished.
+    #[inline(always)]
+    fn limit(&self, members: &Lanes) -> f32 {
+        let mut ends = [0.0; LANES];
+        for l in 0..LANES {
+            ends[l] = smaller(self.hits.t[l], members[l]);
+        }
+        fold(ends, larger)
+    }
+
+    /// Traverses the tree with a beam around the rays of `lanes`. Returns false if it gave up after too many tests.
+    #[inline(always)]
+    fn run(&mut self, lanes: u32) -> bool {
+        let beam = Beam::around(self.rays, lanes);
+        let mut members = [-1.0; LANES];
+        for lane in lanes_in(lanes) {
+            members[lane] = f32::INFINITY;
+        }
+        let mut tests_left = if lanes & (lanes - 1) == 0 { u32::MAX } else { MAX_BEAM_TESTS };
+        let (mut code, mut depth) = (Code(0), 0);
+        let mut limit = self.limit(&members);
+        loop {
+            if let Some((first, count)) = code.as_leaf() {
+                // Test the grains of a leaf, which may shorten the rays
+                for slot in first..first + count {
+                    let hits = &mut *self.hits;
+                    let t = self.test.distances(self.rays, slot as usize, lanes, &hits.t);
+                    hits.take(&t, slot, lanes, self.grains, self.query);
+                }
+                limit = self.limit(&members);
+                if limit < 0.0 {
+                    return true;
+                }
+                if tests_left < count {
+                    return false;
+                }
+                tests_left -= count;
+            } else {
+                depth = self.push_children(&beam, code, depth, limit);
+            }
+            // Pop the next node that begins before the end of a ray
+            loop {
+                if depth == 0 {
+                    return true;
+                }
+                depth -= 1;
+                let (enter, next) = self.stack[depth].split();
+                if is_before(enter, limit) {
+                    code = next;
+                    break;
+                }
+            }
+        }
+    }
+
+    /// Pushes the children of a node that the beam enters, nearest last. Returns the new depth of the stack.
+    #[inline(always)]
+    fn push_children(&mut self, beam: &Beam, code: Code, mut depth: usize, limit: f32) -> usize {
+        let node = &self.nodes[code.0 as usize];
+        let enter = beam.entries(node, limit);
+        let mut entered = 0;
+        for (i, enter) in enter.iter().enumerate() {
+            entered |= u32::from(*enter < f32::INFINITY) << i;
+        }
+        let first = depth;
+        for i in lanes_in(entered) {
+            let pending = Pending::new(enter[i & (WIDTH - 1)], node.children[i & (WIDTH - 1)]);
+            let mut place = depth;
+            while place > first && self.stack[place - 1] < pending {
+                self.stack[place] = self.stack[place - 1];
+                place -= 1;
+            }
+            self.stack[place] = pending;
+            depth += 1;
+        }
+        depth
+    }
+}
+
+/// The lanes of `left` whose directions have the same signs as that of the first one.
+#[inline(always)]
+fn lanes_like_first(rays: &LocalRays, left: u32) -> u32 {
+    let mut octants = [0; LANES];
+    for (axis, directions) in rays.direction.iter().enumerate() {
+        for l in 0..LANES {
+            octants[l] |= (directions[l].to_bits() >> 31) << axis;
+        }
+    }
+    let own = octants[left.trailing_zeros() as usize & (LANES - 1)];
+    let mut same = 0;
+    for (l, octant) in octants.iter().enumerate() {
+        same |= u32::from(*octant == own) << l;
+    }
+    same & left
+}
+
+#[inline(always)]
+fn search_body<T: GrainTest>(
+    nodes: &[Node],
+    grains: &[Instance],
+    rays: &LocalRays,
+    coherence: Coherence,
+    test: &T,
+    query: Query,
+    hits: &mut Hits,
+) {
+    if nodes.is_empty() {
+        return;
+    }
+    let stack = [Pending::default(); STACK_SIZE];
+    let mut search = Search { nodes, grains, rays, test, query, hits, stack };
+    let mut left = rays.lanes;
+    while left != 0 {
+        // A beam of rays with the same signs, or one ray
+        let group = match coherence {
+            Coherence::Coherent => lanes_like_first(rays, left),
+            Coherence::Incoherent => left & left.wrapping_neg(),
+        };
+        left &= !group;
+        let mut alone = group;
+        if search.run(group) {
+            continue;
+        }
+        // Too many grains: continue with each ray alone
+        while alone != 0 {
+            let lane = alone & alone.wrapping_neg();
+            alone &= !lane;
+            if search.hits.t[lane.trailing_zeros() as usize & (LANES - 1)] >= 0.0 {
+                search.run(lane);
+            }
+        }
+    }
+}
+
+lane_kernel! {
+    /// Searches the grains of the tree for the rays of `rays.lanes`.
+    pub(super) fn search<T: GrainTest>(
+        nodes: &[Node],
+        grains: &[Instance],
+        rays: &LocalRays,
+        coherence: Coherence,
+        test: &T,
+        query: Query,
+        hits: &mut Hits,
+    ) = search_body;
+}
