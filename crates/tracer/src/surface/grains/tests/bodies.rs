@@ -10,25 +10,27 @@ use crate::surface::{Intersection, Shape, Side};
 use spherule_tree::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder};
 use spherule_tree::ray::Ray;
 
-/// The first sign change of `f` along a ray among `STEPS` samples and by halving, and the least sample.
+/// The first point in `range` where `f` is 0, and its minimum along the ray: a ray that just touches a body may be seen
+/// either way. Along a line, the definitions of bodies are convex functions.
 fn brute(f: impl Fn(f64) -> f64, range: [f64; 2]) -> (Option<f64>, f64) {
-    const STEPS: u32 = 4000;
-    let at = |step: u32| range[0] + (range[1] - range[0]) * f64::from(step) / f64::from(STEPS);
-    let is_inside = f(range[0]) < 0.0;
-    let mut least = f64::INFINITY;
-    for step in 0..=STEPS {
-        let value = f(at(step));
-        least = least.min(if is_inside { -value } else { value });
-        if (value < 0.0) != is_inside {
-            let (mut low, mut high) = (at(step.saturating_sub(1)), at(step));
-            for _ in 0..60 {
-                let middle = 0.5 * (low + high);
-                if (f(middle) < 0.0) == is_inside { low = middle } else { high = middle }
-            }
-            return (Some(low), least);
-        }
+    let [mut low, mut high] = range;
+    for _ in 0..120 {
+        let third = (high - low) / 3.0;
+        if f(low + third) < f(high - third) { high -= third } else { low += third }
     }
-    (None, least)
+    let middle = 0.5 * (low + high);
+    let least = f(middle);
+    if least > 0.0 {
+        return (None, least);
+    }
+    // From the start to the minimum if it starts outside, else from there to the end
+    let starts_outside = f(range[0]) > 0.0;
+    let [mut low, mut high] = if starts_outside { [range[0], middle] } else { [middle, range[1]] };
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if (f(middle) > 0.0) == starts_outside { low = middle } else { high = middle }
+    }
+    (Some(low), least)
 }
 
 /// Compares the intersection of a ray with a grain to its definition `f`.
@@ -200,7 +202,7 @@ fn equal_semi_axes_are_spheres() {
 
 /// Distances and particles of both shapes along many rays are equal up to `limit`.
 #[track_caller]
-fn assert_alike(heaps: [&Heap; 2], shapes: [GrainShape; 2], limit: f32) {
+fn assert_alike(heaps: [&Heap; 2], shapes: [GrainShape; 2], limit: f32, max_differing: u32) {
     let trees = [heaps[0].tree(shapes[0].clone()), heaps[1].tree(shapes[1].clone())];
     let surfaces = [GrainSurface::new(&trees[0]), GrainSurface::new(&trees[1])];
     let mut random = Random(3);
@@ -218,21 +220,21 @@ fn assert_alike(heaps: [&Heap; 2], shapes: [GrainShape; 2], limit: f32) {
             _ => differing += 1,
         }
     }
-    assert!(hits > 300 && differing < 20, "{hits} {differing}");
+    assert!(hits > 300 && differing <= max_differing, "{hits} {differing}");
 }
 
 #[test]
 fn shapes_agree_where_they_are_the_same() {
     let heap = Heap::random(20, Vec3::ZERO, 1.0, [0.2, 0.5], 11);
     let superquadric = |n| GrainShape::Superquadric { exponents: [n; 2] };
-    assert_alike([&heap; 2], [GrainShape::Ellipsoid, superquadric(2.0)], 4e-6);
-    assert_alike([&heap; 2], [GrainShape::Cuboid, superquadric(1000.0)], 2e-3);
+    assert_alike([&heap; 2], [GrainShape::Ellipsoid, superquadric(2.0)], 4e-6, 2);
+    assert_alike([&heap; 2], [GrainShape::Cuboid, superquadric(1000.0)], 2e-3, 5);
     // The extent of a cuboid along its axes is that of exponents of 20, but corners are round
-    assert_alike([&heap; 2], [GrainShape::Cuboid, superquadric(20.0)], 0.08);
+    assert_alike([&heap; 2], [GrainShape::Cuboid, superquadric(20.0)], 0.08, 50);
     // A capsule as long as it is thick, and a short one
     let mut round = heap.clone();
     for size in &mut round.sizes {
         size[2] = 0.9 * size[0];
     }
-    assert_alike([&round; 2], [GrainShape::Ellipsoid, GrainShape::Capsule], 4e-6);
+    assert_alike([&round; 2], [GrainShape::Ellipsoid, GrainShape::Capsule], 4e-6, 2);
 }
