@@ -26,8 +26,9 @@ pub(super) fn from_matrix(rows: &[f64]) -> [f64; 4] {
     };
     let determinant =
         xx * (yy * zz - yz * zy) - xy * (yx * zz - yz * zx) + xz * (yx * zy - yy * zx);
-    // Written so that NaN is not a rotation
-    if !((determinant - 1.0).abs() < MAX_DEVIATION) {
+    // False for NaN
+    let is_rotation = (determinant - 1.0).abs() < MAX_DEVIATION;
+    if !is_rotation {
         return [f64::NAN; 4];
     }
     // Four times the squares of the components

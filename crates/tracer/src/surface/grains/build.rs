@@ -172,7 +172,8 @@ fn split(items: &mut [Item], level: u32) -> usize {
     let sizes = [0, 1, 2].map(|axis| high[axis] - low[axis]);
     let axis = (0..3).reduce(|a, b| if sizes[b] > sizes[a] { b } else { a }).unwrap_or(0);
     let half = items.len() / 2;
-    if !(sizes[axis] > 0.0) {
+    let is_divisible = sizes[axis] > 0.0;
+    if !is_divisible {
         return half;
     }
     if level >= MEDIAN_LEVEL {

@@ -47,8 +47,9 @@ impl Body<'_> {
         // Start at the point closest to the centre, so that rounding does not grow with the distance of the origin
         let middle = -origin.dot(direction) / direction.length_squared();
         let (origin, from) = (origin + middle * direction, from - middle);
-        // Written as `!(.. < ..)` so that NaN misses
-        if !(origin.length_squared() < self.radius_squared()) {
+        // False for NaN
+        let is_near = origin.length_squared() < self.radius_squared();
+        if !is_near {
             return None;
         }
         let hit = match self {

@@ -22,8 +22,9 @@ fn norm_of_two(a: f64, b: f64, n: f64) -> [f64; 3] {
         return if norm > 0.0 { [norm, a / norm, b / norm] } else { [0.0; 3] };
     }
     let (large, small) = if a < b { (b, a) } else { (a, b) };
-    // Written so that NaN gives zeros
-    if !(large > 0.0) {
+    // False for NaN
+    let is_positive = large > 0.0;
+    if !is_positive {
         return [0.0; 3];
     }
     // Without powers of large numbers
@@ -101,8 +102,9 @@ fn root(
         if value <= TOLERANCE {
             return Some(Hit::new(t, gradient));
         }
-        // The function only grows from here on; written so that NaN misses
-        if !(slope < 0.0) {
+        // Otherwise, the function only grows from here on; false for NaN
+        let is_approaching = slope < 0.0;
+        if !is_approaching {
             return None;
         }
         let next = t - value / slope;
