@@ -7,6 +7,32 @@
 //!
 //! A tree of boxes with eight children per node (`build.rs`, `node.rs`) is traversed with beams of rays (`walk.rs`).
 //! With motion blur, each ray sees the grains at its own time; boxes contain them during the whole exposure.
+//!
+//! This example intersects a ray with one of two ellipsoids, which is rotated by a quarter turn about z:
+//!
+//! ```
+//! use glam::Vec3;
+//! use spherule_tracer::surface::Shape;
+//! use spherule_tracer::surface::grains::{GrainShape, GrainSizes, GrainSurface, GrainTree, Grains};
+//! use spherule_tree::ray::Ray;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let centers = [Vec3::ZERO, Vec3::new(9.0, 0.0, 0.0)];
+//! let quarter_turn = [0.0, 0.0, 0.5_f32.sqrt(), 0.5_f32.sqrt()];
+//! let grains = Grains {
+//!     orientations: &[[0.0, 0.0, 0.0, 1.0], quarter_turn],
+//!     ..Grains::new(&centers, GrainSizes::Common(Vec3::new(3.0, 1.0, 1.0)))
+//! };
+//! let tree = GrainTree::new(&grains, GrainShape::Ellipsoid)?;
+//! assert!(tree.report().is_clean());
+//! // The surface is a shape like the others of a scene
+//! let surface = GrainSurface::new(&tree);
+//! let hit = surface.nearest(&Ray::new(Vec3::new(9.0, -7.0, 0.0), Vec3::Y)).expect("a hit");
+//! assert_eq!(hit.particle, 1);
+//! assert!((hit.t - 4.0).abs() < 1e-6);
+//! # Ok(())
+//! # }
+//! ```
 
 use std::fmt;
 use std::sync::Arc;

@@ -11,9 +11,9 @@ use super::solid::Solids;
 use super::tree::GrainTree;
 use super::walk::{Hits, Query, search};
 use crate::surface::shape::crossing_of_packet;
-use crate::surface::{Intersection, Intersections, MaterialId, Shape, Side};
+use crate::surface::{Intersection, Intersections, MaterialId, Shape, Side, TransmittanceProduct};
 use spherule_tree::accel::Coherence;
-use spherule_tree::math::{Supported, first_lanes, lanes_in, narrow};
+use spherule_tree::math::{Lanes, Supported, first_lanes, lanes_in, narrow};
 use spherule_tree::ray::{Ray, RayPacket};
 
 /// Step off the surface of a mesh, as a part of its smallest and its largest radius.
@@ -166,5 +166,35 @@ impl Shape for GrainSurface<'_> {
         let mut found = Hits::none(&local);
         self.search(&local, coherence, Query::Any, &mut found);
         found.mask()
+    }
+
+    fn transmittance(
+        &self,
+        rays: &RayPacket,
+        lanes: u32,
+        fresnel_transmittance: &dyn Fn(f32, u32) -> f32,
+        transmittance: &mut Lanes,
+    ) {
+        for lane in lanes_in(lanes) {
+            // Step from crossing to crossing, at the time of the ray, until no light is left
+            let mut product = TransmittanceProduct::default();
+            let mut rest = RayPacket::default();
+            rest.push(&rays.ray(lane));
+            rest.time[0] = rays.time[lane];
+            loop {
+                let (mut ray, mut hits) = (rest, Intersections::default());
+                self.intersect(&mut ray, Coherence::Incoherent, 0, &mut hits);
+                if hits.mask == 0 {
+                    break;
+                }
+                let hit = hits.get(0);
+                let cosine = hit.normal.dot(rest.ray(0).direction).abs();
+                if !product.multiply(fresnel_transmittance(cosine, hit.particle)) {
+                    break;
+                }
+                rest.t_min[0] = hit.t + hit.offset;
+            }
+            transmittance[lane] = product.value();
+        }
     }
 }

@@ -4,6 +4,8 @@
 //! node at once. A beam that finds too many grains, and all other rays, are traversed ray by ray. Boxes are larger than
 //! their grains by more than the rounding of both tests, so each ray finds what it would find alone, to the bit.
 
+#![expect(clippy::needless_range_loop, reason = "one index for the lanes of many arrays")]
+
 use super::build::MAX_LEVELS;
 use super::instance::Instance;
 use super::node::{Beam, Code, Node, WIDTH, is_before};

@@ -157,7 +157,7 @@ pub(super) fn packet(number: u32, random: &mut Random, size: f32) -> RayPacket {
     let mut rays = RayPacket::default();
     let (eye, target) = (4.0 * size * random.vector(), size * random.vector());
     for lane in 0..16 {
-        let mut ray = if number % 2 == 0 {
+        let mut ray = if number.is_multiple_of(2) {
             towards(eye, target + 0.1 * size * random.vector())
         } else {
             towards(2.0 * size * random.vector(), size * random.vector())

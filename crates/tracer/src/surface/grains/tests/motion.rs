@@ -123,3 +123,26 @@ fn rotations_lie_between_orientations() {
         assert_eq!(rotation_between(from, [0.0, 0.0, 0.0, 1.0], 1.0), Vec3::ZERO);
     }
 }
+
+#[test]
+fn light_passes_transmissive_grains_at_their_time() {
+    // A slab that moves by ten times its thickness
+    let mut heap = Heap { centers: vec![Vec3::ZERO], ..Heap::default() };
+    heap.orientations = vec![[0.0, 0.0, 0.0, 1.0]];
+    heap.sizes = vec![[0.1, 1.0, 1.0]];
+    heap.displacements = vec![2.0 * Vec3::X];
+    let tree = heap.tree(GrainShape::Cuboid);
+    let mut rays = RayPacket::default();
+    for (lane, time) in [-0.5, 0.0, 0.5].into_iter().enumerate() {
+        rays.push(&Ray::new(Vec3::new(time * 2.0, 0.1, 5.0), Vec3::NEG_Z));
+        rays.time[lane] = if lane == 1 { 0.5 } else { time };
+    }
+    let mut found = [0.0; 16];
+    let half = |cosine: f32, particle: u32| {
+        assert_eq!((cosine, particle), (1.0, 0));
+        0.5
+    };
+    GrainSurface::new(&tree).transmittance(&rays, 0b111, &half, &mut found);
+    // Both sides of the slab, and nothing where it was earlier
+    assert_eq!(found[..3], [0.25, 1.0, 0.25]);
+}
