@@ -11,9 +11,12 @@
 
 use std::fs;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
+use spherule_tracer::render::{IntegratorKind, ParticleShading, RenderSettings, render};
+use spherule_tracer::scene::{Camera, CameraView, Environment, Scene};
 use spherule_tracer::surface::grains::{
     GrainMesh, GrainMotion, GrainShape, GrainSizes, GrainSurface, GrainTree, Grains,
 };
@@ -173,6 +176,10 @@ fn compare_spheres(side: u32) {
     let ratios: Vec<String> =
         spheres.iter().zip(ellipsoids).map(|(a, b)| format!("{:.2}", b / a)).collect();
     println!("{:<28} {}", "ellipsoids / spheres", ratios.join(", "));
+    let view = builder.tree().view();
+    let [a, b] = [&SphereSurface::new(view) as &dyn Shape, &GrainSurface::new(&tree)]
+        .map(|shape| picture(shape, f64::from(side)));
+    println!("picture: spheres {a:.2} s, ellipsoids {b:.2} s, ratio {:.2}", b / a);
     // The other shapes
     let superquadric = GrainShape::Superquadric { exponents: [4.0, 4.0] };
     for shape in [GrainShape::Capsule, GrainShape::Cylinder, GrainShape::Cuboid, superquadric] {
@@ -188,6 +195,33 @@ fn compare_spheres(side: u32) {
     let motion = GrainMotion { displacements: &displacements, rotations: &rotations };
     let tree = heap.tree(GrainShape::Ellipsoid, Some(motion));
     measure("moving ellipsoids", &GrainSurface::new(&tree), &camera);
+}
+
+/// Seconds for a picture by the path integrator, the least of three (wall clock).
+fn picture(shape: &dyn Shape, side: f64) -> f64 {
+    let view = CameraView {
+        eye: DVec3::new(1.1, 1.3, 0.9) * side,
+        look_at: DVec3::ZERO,
+        up: DVec3::Z,
+        fov: 40.0,
+    };
+    let scene = Scene {
+        environment: Some(Arc::new(Environment::constant(Vec3::ONE))),
+        ..Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).expect("a view"))
+    };
+    let source = ParticleShading::constant(Vec3::splat(0.5));
+    let settings = RenderSettings {
+        samples: 4,
+        integrator: IntegratorKind::Path,
+        ..RenderSettings::new(480, 480)
+    };
+    let mut best = f64::INFINITY;
+    for _ in 0..3 {
+        let start = Instant::now();
+        render(&[shape], &scene, &source, &settings, &AtomicBool::new(false)).expect("a picture");
+        best = best.min(start.elapsed().as_secs_f64());
+    }
+    best
 }
 
 /// A closed mesh of 100 triangles: rings of ten vertices and two poles.

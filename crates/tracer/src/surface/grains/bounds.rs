@@ -12,13 +12,12 @@ const REACH: f64 = 1.0 + 1e-6;
 /// The middle of the box of a grain and half its size, relative to the centre of the tree.
 pub(super) fn box_of(body: &Body<'_>, grain: &Instance, motion: Option<&Motion>) -> [DVec3; 2] {
     let pose = Pose::fixed(grain);
-    let semi_axes = pose.semi_axes() * REACH;
+    let semi_axes = pose.semi_axes().map(|axis| axis * REACH);
     let (mut middle, mut half) = (pose.center, DVec3::ZERO);
     for axis in 0..3 {
         // The direction of the scene in unit coordinates
-        let [x, y, z] = pose.axes.map(|own| own[axis]);
-        let direction = DVec3::new(x, y, z) * semi_axes;
-        let [center, reach] = body.extent(direction);
+        let [x, y, z] = semi_axes.map(|own| own[axis]);
+        let [center, reach] = body.extent(DVec3::new(x, y, z));
         middle[axis] += center;
         half[axis] = reach;
     }

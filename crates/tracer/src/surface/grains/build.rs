@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use super::node::{Code, MAX_LEAF, Node, WIDTH};
+use super::node::{Code, Node, WIDTH};
 use spherule_tree::order::index_u32;
 
 /// A grain and its box.
@@ -25,11 +25,14 @@ const BINS: usize = 16;
 /// Levels below the root whose children are built in parallel.
 const PARALLEL_LEVELS: u32 = 2;
 
+/// Up to this number, grains are sorted and divided into multiples of the width of a node.
+const MAX_SORTED: usize = 512;
+
 /// Level from which grains are divided into halves of equal number, so that the depth has a limit.
 const MEDIAN_LEVEL: u32 = 16;
 
-/// Greatest number of levels: each from [`MEDIAN_LEVEL`] on has at most half of the grains, of at most 2^29.
-pub(super) const MAX_LEVELS: usize = MEDIAN_LEVEL as usize + 29;
+/// Greatest number of levels: each from [`MEDIAN_LEVEL`] on has at most half of the grains, of at most 2^31.
+pub(super) const MAX_LEVELS: usize = MEDIAN_LEVEL as usize + 31;
 
 /// A box: lowest and highest corner.
 #[derive(Debug, Clone, Copy)]
@@ -84,7 +87,12 @@ struct Part<'i> {
     bounds: Bounds,
 }
 
-impl Part<'_> {
+impl<'i> Part<'i> {
+    fn new(items: &'i mut [Item], first: usize) -> Self {
+        let bounds = Bounds::of(items);
+        Self { items, first, bounds }
+    }
+
     /// Expected cost of rays that enter it.
     fn cost(&self) -> f32 {
         self.bounds.half_area() * self.items.len() as f32
@@ -122,8 +130,8 @@ fn grow(items: &mut [Item], first: usize, level: u32, nodes: &mut Vec<Node>) {
 
 /// The code of a leaf; None after the nodes of a larger part have been appended.
 fn child(part: Part<'_>, level: u32, nodes: &mut Vec<Node>) -> Option<Code> {
-    if part.items.len() <= MAX_LEAF {
-        return Some(Code::leaf(index_u32(part.first), index_u32(part.items.len())));
+    if part.items.len() == 1 {
+        return Some(Code::leaf(index_u32(part.first)));
     }
     grow(part.items, part.first, level + 1, nodes);
     None
@@ -134,25 +142,30 @@ fn divide(items: &mut [Item], first: usize, level: u32) -> Vec<Part<'_>> {
     let bounds = Bounds::of(items);
     let mut parts = vec![Part { items, first, bounds }];
     while parts.len() < WIDTH {
-        // Divide the part with the greatest cost; leaves only if nothing else is left
-        let is_large = parts.iter().any(|part| part.items.len() > MAX_LEAF);
-        let smallest = if is_large { MAX_LEAF } else { 1 };
-        let mut best: Option<usize> = None;
-        for (place, part) in parts.iter().enumerate() {
-            let is_better = best.is_none_or(|best| part.cost() > parts[best].cost());
-            if part.items.len() > smallest && is_better {
-                best = Some(place);
-            }
+        // Divide the part with the greatest cost that does not fit into a node
+        let large = costliest(&parts, |count| count > WIDTH);
+        if let Some(place) = large {
+            let Part { items, first, .. } = parts.swap_remove(place);
+            let middle = split(items, level);
+            let (left, right) = items.split_at_mut(middle);
+            parts.push(Part::new(left, first));
+            parts.push(Part::new(right, first + middle));
+            continue;
         }
-        let Some(place) = best else { break };
+        // Else, take the grains of a whole part into this node
+        let free = WIDTH - parts.len();
+        let Some(place) = costliest(&parts, |count| count > 1 && count <= free + 1) else { break };
         let Part { items, first, .. } = parts.swap_remove(place);
-        let middle = split(items, level);
-        let (left, right) = items.split_at_mut(middle);
-        let (a, b) = (Bounds::of(left), Bounds::of(right));
-        parts.push(Part { items: left, first, bounds: a });
-        parts.push(Part { items: right, first: first + middle, bounds: b });
+        let singles = items.chunks_mut(1).enumerate();
+        parts.extend(singles.map(|(place, item)| Part::new(item, first + place)));
     }
     parts
+}
+
+/// The part with the greatest cost among those with a number of grains that is `allowed`.
+fn costliest(parts: &[Part<'_>], allowed: impl Fn(usize) -> bool) -> Option<usize> {
+    let places = (0..parts.len()).filter(|place| allowed(parts[*place].items.len()));
+    places.reduce(|a, b| if parts[b].cost() > parts[a].cost() { b } else { a })
 }
 
 /// Twice the centre of an item along an axis.
@@ -176,12 +189,17 @@ fn split(items: &mut [Item], level: u32) -> usize {
     if !is_divisible {
         return half;
     }
+    let order = |a: &Item, b: &Item| {
+        let center = |item| doubled_center(item, axis);
+        center(a).total_cmp(&center(b)).then(a.index.cmp(&b.index))
+    };
     if level >= MEDIAN_LEVEL {
-        items.select_nth_unstable_by(half, |a, b| {
-            let center = |item| doubled_center(item, axis);
-            center(a).total_cmp(&center(b)).then(a.index.cmp(&b.index))
-        });
+        items.select_nth_unstable_by(half, order);
         return half;
+    }
+    if items.len() <= MAX_SORTED {
+        items.sort_unstable_by(order);
+        return best_multiple(items);
     }
     let scale = BINS as f32 / sizes[axis];
     let bin = |item: &Item| bin_of(doubled_center(item, axis) - low[axis], scale);
@@ -189,6 +207,26 @@ fn split(items: &mut [Item], level: u32) -> usize {
     let middle = partition(items, |item| bin(item) < plane);
     // Rounding may leave a part empty
     if middle == 0 || middle == items.len() { half } else { middle }
+}
+
+/// The number of items in the first part, a multiple of the width of a node, so that few nodes have empty places. The
+/// items are sorted, and there are more than the width of a node.
+fn best_multiple(items: &[Item]) -> usize {
+    let chunks: Vec<Bounds> = items.chunks(WIDTH).map(Bounds::of).collect();
+    // Sum up the costs from both sides
+    let mut costs = [0.0_f32; MAX_SORTED / WIDTH];
+    let mut left = Bounds::EMPTY;
+    for plane in 1..chunks.len() {
+        left = left.join(chunks[plane - 1]);
+        costs[plane] = left.half_area() * (plane * WIDTH) as f32;
+    }
+    let mut right = Bounds::EMPTY;
+    for plane in (1..chunks.len()).rev() {
+        right = right.join(chunks[plane]);
+        costs[plane] += right.half_area() * (items.len() - plane * WIDTH) as f32;
+    }
+    let planes = 2..chunks.len();
+    WIDTH * planes.fold(1, |best, plane| if costs[plane] < costs[best] { plane } else { best })
 }
 
 /// The bin at a distance from the first centre.

@@ -4,11 +4,11 @@ use glam::Vec3;
 use rayon::prelude::*;
 use thiserror::Error;
 
-use super::instance::{Instance, Motion};
+use super::instance::{Instance, Motion, unit_rows};
 use super::{GrainShape, GrainSizes, Grains};
 
-/// Greatest number of grains: a leaf of the tree has an index and a count in 32 bits.
-pub(super) const MAX_GRAINS: usize = 1 << 29;
+/// Greatest number of grains: a leaf of the tree has an index of 31 bits.
+pub(super) const MAX_GRAINS: usize = 1 << 31;
 
 /// The largest deviation of the length of a quaternion from 1 that counts as rounding.
 const MAX_ROUNDING: f32 = 1e-3;
@@ -187,8 +187,7 @@ impl Checked {
         self.instances.push(Instance {
             center: (position - center).to_array(),
             index: spherule_tree::order::index_u32(index),
-            orientation: unit(grains.orientations.get(index), report),
-            inverse: size.map(|axis| 1.0 / axis),
+            rows: unit_rows(unit(grains.orientations.get(index), report), size),
         });
         if let Some(motion) = &grains.motion {
             let displacement = motion.displacements.get(index).copied().unwrap_or(Vec3::ZERO);
@@ -205,8 +204,8 @@ pub(super) fn is_bounded(vector: Vec3) -> bool {
 }
 
 /// The unit quaternion along `orientation`.
-fn unit(orientation: Option<&[f32; 4]>, report: &mut GrainReport) -> [f32; 4] {
-    const UPRIGHT: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
+fn unit(orientation: Option<&[f32; 4]>, report: &mut GrainReport) -> [f64; 4] {
+    const UPRIGHT: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
     let Some(orientation) = orientation else {
         return UPRIGHT;
     };
@@ -218,7 +217,7 @@ fn unit(orientation: Option<&[f32; 4]>, report: &mut GrainReport) -> [f32; 4] {
         return UPRIGHT;
     }
     report.not_normalised += u64::from((length - 1.0).abs() > f64::from(MAX_ROUNDING));
-    q.map(|c| crate::surface::hierarchy::single(c / length))
+    q.map(|c| c / length)
 }
 
 /// `exponents`, or those of an ellipsoid if they are no exponents of a convex body.

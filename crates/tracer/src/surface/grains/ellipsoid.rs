@@ -2,82 +2,51 @@
 
 #![expect(clippy::needless_range_loop, reason = "one index for the lanes of many arrays")]
 
-use super::instance::{Instance, Motion, orientation_at, unit_rows};
+use super::instance::{Instance, Motion, rotate};
 use super::rays::LocalRays;
 use super::walk::GrainTest;
 use crate::surface::Intersections;
 use spherule_tree::math::{LANES, Lanes, Lanes3, lane_kernel, larger};
 
-/// Rays in the unit coordinates of a grain.
-pub(super) struct UnitRays {
-    pub(super) origin: Lanes3,
-    pub(super) direction: Lanes3,
+/// A ray in the unit coordinates of a grain.
+#[derive(Clone, Copy)]
+pub(super) struct UnitRay {
+    /// Squared length of its direction.
+    pub(super) length2: f32,
+    /// Distance of its point closest to the centre.
+    pub(super) middle: f32,
+    /// The square of that point's distance from the centre.
+    pub(super) distance2: f32,
 }
 
-/// The product of a matrix and a vector.
-#[inline(always)]
-fn times(rows: &[[f32; 3]; 3], v: [f32; 3]) -> [f32; 3] {
-    let row = |r: &[f32; 3]| r[0] * v[0] + r[1] * v[1] + r[2] * v[2];
-    [row(&rows[0]), row(&rows[1]), row(&rows[2])]
-}
-
-impl UnitRays {
-    /// The rays in the coordinates of a grain, each at its own time if the grain moves.
+impl UnitRay {
+    /// The ray in lane `l`, at its own time if the grain moves.
     #[inline(always)]
-    pub(super) fn new(rays: &LocalRays, grain: &Instance, motion: Option<&Motion>) -> Self {
-        match motion {
-            None => Self::at_rest(rays, grain),
-            Some(motion) => Self::in_motion(rays, grain, motion),
-        }
-    }
-
-    #[inline(always)]
-    fn at_rest(rays: &LocalRays, grain: &Instance) -> Self {
-        let (rows, center) = (unit_rows(grain.orientation, grain.inverse), grain.center);
-        let mut unit = Self { origin: [[0.0; LANES]; 3], direction: [[0.0; LANES]; 3] };
-        for l in 0..LANES {
-            let from_center = [0, 1, 2].map(|axis| rays.origin[axis][l] - center[axis]);
-            let o = times(&rows, from_center);
-            let d = times(&rows, [0, 1, 2].map(|axis| rays.direction[axis][l]));
-            for axis in 0..3 {
-                unit.origin[axis][l] = o[axis];
-                unit.direction[axis][l] = d[axis];
-            }
-        }
-        unit
-    }
-
-    #[inline(always)]
-    fn in_motion(rays: &LocalRays, grain: &Instance, motion: &Motion) -> Self {
-        let (center, displacement) = (grain.center, motion.displacement);
-        let mut unit = Self { origin: [[0.0; LANES]; 3], direction: [[0.0; LANES]; 3] };
-        for l in 0..LANES {
-            let time = rays.time[l];
-            let orientation = orientation_at(grain.orientation, motion.turn, time);
-            let rows = unit_rows(orientation, grain.inverse);
-            let from_center = [0, 1, 2]
-                .map(|axis| rays.origin[axis][l] - (center[axis] + time * displacement[axis]));
-            let o = times(&rows, from_center);
-            let d = times(&rows, [0, 1, 2].map(|axis| rays.direction[axis][l]));
-            for axis in 0..3 {
-                unit.origin[axis][l] = o[axis];
-                unit.direction[axis][l] = d[axis];
-            }
-        }
-        unit
-    }
-
-    /// For the ray in lane `l`: the squared length of its direction, the distance of the point closest to the centre, and
-    /// the square of that point's distance from the centre.
-    #[inline(always)]
-    pub(super) fn closest(&self, l: usize) -> [f32; 3] {
-        let o = [self.origin[0][l], self.origin[1][l], self.origin[2][l]];
-        let d = [self.direction[0][l], self.direction[1][l], self.direction[2][l]];
+    pub(super) fn new(
+        rays: &LocalRays,
+        l: usize,
+        grain: &Instance,
+        motion: Option<&Motion>,
+    ) -> Self {
+        let origin = [rays.origin[0][l], rays.origin[1][l], rays.origin[2][l]];
+        let direction = [rays.direction[0][l], rays.direction[1][l], rays.direction[2][l]];
+        let [origin, direction] = grain.to_middle(motion, rays.time[l], origin, direction);
+        let (o, d) = (grain.unit(origin), grain.unit(direction));
         let length2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
         let middle = -(o[0] * d[0] + o[1] * d[1] + o[2] * d[2]) / length2;
         // Squares only of the components that are left, for distant grains
         let p = [o[0] + middle * d[0], o[1] + middle * d[1], o[2] + middle * d[2]];
-        [length2, middle, p[0] * p[0] + p[1] * p[1] + p[2] * p[2]]
+        Self { length2, middle, distance2: p[0] * p[0] + p[1] * p[1] + p[2] * p[2] }
+    }
+
+    /// The first distance from `from` on at which it crosses the unit sphere; infinite if there is none.
+    #[inline(always)]
+    fn cross_sphere(&self, from: f32) -> f32 {
+        // NaN if the line misses the sphere
+        let half = ((1.0 - self.distance2) / self.length2).sqrt();
+        let (near, far) = (self.middle - half, self.middle + half);
+        let leaving = if far >= from { far } else { f32::INFINITY };
+        if near >= from { near } else { leaving }
     }
 }
 
@@ -91,17 +60,28 @@ pub(super) struct Ellipsoids<'a> {
 impl GrainTest for Ellipsoids<'_> {
     #[inline(always)]
     fn distances(&self, rays: &LocalRays, slot: usize, _lanes: u32, _limits: &Lanes) -> Lanes {
-        let unit = UnitRays::new(rays, &self.grains[slot], self.motions.get(slot));
+        let (grain, motion) = (self.grains[slot], self.motions.get(slot).copied());
         let mut t = [f32::INFINITY; LANES];
-        for l in 0..LANES {
-            let [length2, middle, distance2] = unit.closest(l);
-            // NaN if the line misses the sphere
-            let half = ((1.0 - distance2) / length2).sqrt();
-            let (near, far) = (middle - half, middle + half);
-            let leaving = if far >= rays.from[l] { far } else { f32::INFINITY };
-            t[l] = if near >= rays.from[l] { near } else { leaving };
+        match motion {
+            None => {
+                for l in 0..LANES {
+                    t[l] = UnitRay::new(rays, l, &grain, None).cross_sphere(rays.from[l]);
+                }
+            }
+            Some(motion) => {
+                for l in 0..LANES {
+                    let ray = UnitRay::new(rays, l, &grain, Some(&motion));
+                    t[l] = ray.cross_sphere(rays.from[l]);
+                }
+            }
         }
         t
+    }
+
+    #[inline(always)]
+    fn distance(&self, rays: &LocalRays, slot: usize, lane: usize, _limit: f32) -> f32 {
+        let ray = UnitRay::new(rays, lane, &self.grains[slot], self.motions.get(slot));
+        ray.cross_sphere(rays.from[lane])
     }
 }
 
@@ -113,19 +93,21 @@ pub(super) const OFFSET_OF_ROUNDING: f32 = 8.0 * f32::EPSILON;
 
 /// The ellipsoid that each ray has found.
 pub(super) struct FoundEllipsoids {
-    pub(super) center: Lanes3,
-    pub(super) orientation: [Lanes; 4],
-    pub(super) inverse: Lanes3,
-    pub(super) displacement: Lanes3,
-    pub(super) turn: Lanes3,
+    center: Lanes3,
+    rows: [Lanes3; 3],
+    displacement: Lanes3,
+    turn: Lanes3,
 }
 
 impl FoundEllipsoids {
     /// Unit spheres at the centre.
     pub(super) const NONE: Self = Self {
         center: [[0.0; LANES]; 3],
-        orientation: [[0.0; LANES], [0.0; LANES], [0.0; LANES], [1.0; LANES]],
-        inverse: [[1.0; LANES]; 3],
+        rows: [
+            [[1.0; LANES], [0.0; LANES], [0.0; LANES]],
+            [[0.0; LANES], [1.0; LANES], [0.0; LANES]],
+            [[0.0; LANES], [0.0; LANES], [1.0; LANES]],
+        ],
         displacement: [[0.0; LANES]; 3],
         turn: [[0.0; LANES]; 3],
     };
@@ -134,17 +116,23 @@ impl FoundEllipsoids {
     pub(super) fn set(&mut self, lane: usize, grain: &Instance, motion: Option<&Motion>) {
         for axis in 0..3 {
             self.center[axis][lane] = grain.center[axis];
-            self.inverse[axis][lane] = grain.inverse[axis];
-        }
-        for (component, orientation) in self.orientation.iter_mut().enumerate() {
-            orientation[lane] = grain.orientation[component];
-        }
-        if let Some(motion) = motion {
-            for axis in 0..3 {
+            for row in 0..3 {
+                self.rows[row][axis][lane] = grain.rows[row][axis];
+            }
+            if let Some(motion) = motion {
                 self.displacement[axis][lane] = motion.displacement[axis];
                 self.turn[axis][lane] = motion.turn[axis];
             }
         }
+    }
+
+    /// The ellipsoid in lane `l`.
+    #[inline(always)]
+    fn grain(&self, l: usize) -> (Instance, Motion) {
+        let vector = |v: &Lanes3| [v[0][l], v[1][l], v[2][l]];
+        let rows = [vector(&self.rows[0]), vector(&self.rows[1]), vector(&self.rows[2])];
+        let (displacement, turn) = (vector(&self.displacement), vector(&self.turn));
+        (Instance { center: vector(&self.center), index: 0, rows }, Motion { displacement, turn })
     }
 }
 
@@ -162,34 +150,45 @@ fn intersections_body(
 ) {
     let (tree_center, extent) = space;
     for l in 0..LANES {
-        // The pose at the time of the ray
-        let vector = |v: &Lanes3| [v[0][l], v[1][l], v[2][l]];
-        let q = &found.orientation;
-        let (mut center, mut orientation) =
-            (vector(&found.center), [q[0][l], q[1][l], q[2][l], q[3][l]]);
-        if is_moving {
-            let (displacement, time) = (vector(&found.displacement), rays.time[l]);
-            orientation = orientation_at(orientation, vector(&found.turn), time);
-            for axis in 0..3 {
-                center[axis] += time * displacement[axis];
-            }
-        }
-        let rows = unit_rows(orientation, vector(&found.inverse));
+        let (grain, motion) = found.grain(l);
+        let o = [rays.origin[0][l], rays.origin[1][l], rays.origin[2][l]];
+        let d = [rays.direction[0][l], rays.direction[1][l], rays.direction[2][l]];
         // Project the point onto the surface, along the line through the centre
-        let (o, d) = (vector(&rays.origin), vector(&rays.direction));
-        let from_center = [0, 1, 2].map(|axis| (o[axis] - center[axis]) + t[l] * d[axis]);
-        let unit = times(&rows, from_center);
-        let scale = 1.0 / (unit[0] * unit[0] + unit[1] * unit[1] + unit[2] * unit[2]).sqrt();
-        let v = from_center.map(|c| c * scale);
+        let motion = if is_moving { Some(&motion) } else { None };
+        let [from_center, direction] = grain.to_middle(motion, rays.time[l], o, d);
+        let v = [
+            from_center[0] + t[l] * direction[0],
+            from_center[1] + t[l] * direction[1],
+            from_center[2] + t[l] * direction[2],
+        ];
+        let u = grain.unit(v);
+        let scale = 1.0 / (u[0] * u[0] + u[1] * u[1] + u[2] * u[2]).sqrt();
+        let mut v = [v[0] * scale, v[1] * scale, v[2] * scale];
         // The normal is the gradient of the squared distance in unit coordinates
-        let g = [0, 1, 2].map(|axis| {
-            rows[0][axis] * unit[0] + rows[1][axis] * unit[1] + rows[2][axis] * unit[2]
-        });
+        let m = &grain.rows;
+        let g = [
+            m[0][0] * u[0] + m[1][0] * u[1] + m[2][0] * u[2],
+            m[0][1] * u[0] + m[1][1] * u[1] + m[2][1] * u[2],
+            m[0][2] * u[0] + m[1][2] * u[1] + m[2][2] * u[2],
+        ];
         let inverse = 1.0 / (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]).sqrt();
         let has_normal = inverse > 0.0 && inverse < f32::INFINITY;
-        let n = [0, 1, 2].map(|axis| if has_normal { g[axis] * inverse } else { -d[axis] });
+        let mut n = [g[0] * inverse, g[1] * inverse, g[2] * inverse];
+        for axis in 0..3 {
+            n[axis] = if has_normal { n[axis] } else { -direction[axis] };
+        }
         let height = n[0] * v[0] + n[1] * v[1] + n[2] * v[2];
         let offset = larger(OFFSET_OF_SIZE * height, OFFSET_OF_ROUNDING * extent);
+        // Rotate both as the grain is at the time of the ray
+        let mut center = grain.center;
+        if let Some(motion) = motion {
+            let part = 2.0 * rays.time[l];
+            let axis = [part * motion.turn[0], part * motion.turn[1], part * motion.turn[2]];
+            (v, n) = (rotate(axis, v), rotate(axis, n));
+            for axis in 0..3 {
+                center[axis] += rays.time[l] * motion.displacement[axis];
+            }
+        }
         // Store the hit
         let is_hit = hit_lanes >> l & 1 == 1;
         let select = |new: f32, old: f32| if is_hit { new } else { old };

@@ -12,32 +12,23 @@ const ROUNDING: f32 = 8.0 * f32::EPSILON;
 /// Least absolute component of a direction in tests of boxes, so that no distance is infinite times zero.
 const MIN_COMPONENT: f32 = 1e-18;
 
-/// A node or a leaf: the index of a node, or the first grain of a leaf and their number.
+/// A node or a leaf: the index of a node, or of a grain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Code(pub(super) u32);
 
 /// The bit of leaves.
 const LEAF: u32 = 1 << 31;
-/// Where the number of grains is stored, less one.
-const COUNT_SHIFT: u32 = 29;
-
-/// Largest number of grains of a leaf.
-pub(super) const MAX_LEAF: usize = 4;
 
 impl Code {
-    /// The leaf with `count` grains from `first` on.
-    pub(super) const fn leaf(first: u32, count: u32) -> Self {
-        Self(LEAF | (count - 1) << COUNT_SHIFT | first)
+    /// The leaf with the grain in `slot`.
+    pub(super) const fn leaf(slot: u32) -> Self {
+        Self(LEAF | slot)
     }
 
-    /// The first grain of a leaf and their number; None for a node.
+    /// The grain of a leaf; None for a node.
     #[inline(always)]
-    pub(super) const fn as_leaf(self) -> Option<(u32, u32)> {
-        if self.0 & LEAF == 0 {
-            return None;
-        }
-        let first = self.0 & ((1 << COUNT_SHIFT) - 1);
-        Some((first, (self.0 >> COUNT_SHIFT & 3) + 1))
+    pub(super) const fn as_leaf(self) -> Option<u32> {
+        if self.0 & LEAF == 0 { None } else { Some(self.0 & !LEAF) }
     }
 
     /// The code with `first` added to the index of a node.
@@ -120,21 +111,38 @@ impl Beam {
         beam
     }
 
-    /// Distances at which the first ray enters the boxes of `node`; infinite for boxes that no ray enters before
-    /// `limit`.
+    /// The ray in `lane`.
     #[inline(always)]
-    pub(super) fn entries(&self, node: &Node, limit: f32) -> [f32; WIDTH] {
+    pub(super) fn of(rays: &LocalRays, lane: usize) -> Self {
+        let origin = [rays.origin[0][lane], rays.origin[1][lane], rays.origin[2][lane]];
+        let mut inverses = [0.0; 3];
+        let mut near_side = [0; 3];
+        for axis in 0..3 {
+            inverses[axis] = inverse(rays.direction[axis][lane]);
+            near_side[axis] = usize::from(inverses[axis] < 0.0);
+        }
+        Self { origins: [origin; 2], inverses: [inverses; 2], near_side, start: rays.from[lane] }
+    }
+
+    /// Distances at which the first ray enters the boxes of `node`; infinite for boxes that no ray enters before
+    /// `limit`. `IS_RAY`: the beam is a single ray.
+    #[inline(always)]
+    pub(super) fn entries<const IS_RAY: bool>(&self, node: &Node, limit: f32) -> [f32; WIDTH] {
         let (mut enter, mut exit) = ([self.start; WIDTH], [limit; WIDTH]);
         for axis in 0..3 {
             let near = &node.planes[self.near_side[axis]][axis];
             let far = &node.planes[1 - self.near_side[axis]][axis];
-            let [near_origin, far_origin] = self.origins.map(|origin| origin[axis]);
-            let [least, most] = self.inverses.map(|inverse| inverse[axis]);
+            let [near_origin, far_origin] = [self.origins[0][axis], self.origins[1][axis]];
+            let [least, most] = [self.inverses[0][axis], self.inverses[1][axis]];
             for i in 0..WIDTH {
-                let a = near[i] - near_origin;
-                let b = far[i] - far_origin;
-                enter[i] = larger(smaller(a * least, a * most), enter[i]);
-                exit[i] = smaller(larger(b * least, b * most), exit[i]);
+                let (a, b) = (near[i] - near_origin, far[i] - far_origin);
+                let [first, last] = if IS_RAY {
+                    [a * least, b * least]
+                } else {
+                    [smaller(a * least, a * most), larger(b * least, b * most)]
+                };
+                enter[i] = larger(first, enter[i]);
+                exit[i] = smaller(last, exit[i]);
             }
         }
         for i in 0..WIDTH {

@@ -2,35 +2,36 @@
 
 use glam::DVec3;
 
-use super::instance::{Instance, Motion, orientation_at};
+use super::instance::{Instance, Motion};
 
 /// The transformation between the coordinates of the tree and the unit coordinates of a grain.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pose {
     /// Centre, relative to that of the tree.
     pub(super) center: DVec3,
-    /// The axes of the grain, unit vectors.
-    pub(super) axes: [DVec3; 3],
-    /// Factors from lengths along these axes to unit coordinates.
-    inverse: DVec3,
+    /// The axes of the grain, divided by its semi-axes.
+    rows: [DVec3; 3],
 }
 
 impl Pose {
     /// The pose of a grain that does not move.
     pub(super) fn fixed(grain: &Instance) -> Self {
-        Self {
-            center: DVec3::from_array(grain.center.map(f64::from)),
-            axes: axes_of(grain.orientation),
-            inverse: DVec3::from_array(grain.inverse.map(f64::from)),
-        }
+        let vector = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
+        Self { center: vector(grain.center), rows: grain.rows.map(vector) }
     }
 
     /// The pose at `time`, from -1/2 to 1/2.
     pub(super) fn at(grain: &Instance, motion: &Motion, time: f32) -> Self {
-        let [x, y, z] = motion.displacement.map(|d| f64::from(d) * f64::from(time));
-        let orientation = orientation_at(grain.orientation, motion.turn, time);
-        let pose = Self::fixed(&Instance { orientation, ..*grain });
-        Self { center: pose.center + DVec3::new(x, y, z), ..pose }
+        let vector = |v: [f32; 3]| DVec3::from_array(v.map(f64::from)) * f64::from(time);
+        // The rotation by the quaternion with the vector part `turn` and the real part 1
+        let turn = 2.0 * vector(motion.turn);
+        let scale = 2.0 / (1.0 + turn.length_squared());
+        let Self { center, rows } = Self::fixed(grain);
+        let rotated = |v: DVec3| {
+            let a = turn.cross(v);
+            v + scale * (a + turn.cross(a))
+        };
+        Self { center: center + vector(motion.displacement), rows: rows.map(rotated) }
     }
 
     /// A point in unit coordinates.
@@ -40,34 +41,17 @@ impl Pose {
 
     /// A vector in unit coordinates.
     pub(super) fn unit_direction(&self, vector: DVec3) -> DVec3 {
-        let [x, y, z] = self.axes.map(|axis| axis.dot(vector));
-        DVec3::new(x, y, z) * self.inverse
+        let [x, y, z] = self.rows.map(|row| row.dot(vector));
+        DVec3::new(x, y, z)
     }
 
-    /// The unit normal of a surface whose gradient in unit coordinates is `gradient`.
-    pub(super) fn normal(&self, gradient: DVec3) -> Option<DVec3> {
-        let g = gradient * self.inverse;
-        (self.axes[0] * g.x + self.axes[1] * g.y + self.axes[2] * g.z).try_normalize()
+    /// The unit normal of a surface whose gradient in unit coordinates is `g`.
+    pub(super) fn normal(&self, g: DVec3) -> Option<DVec3> {
+        (self.rows[0] * g.x + self.rows[1] * g.y + self.rows[2] * g.z).try_normalize()
     }
 
-    /// The semi-axes.
-    pub(super) fn semi_axes(&self) -> DVec3 {
-        self.inverse.recip()
+    /// The semi-axes as vectors.
+    pub(super) fn semi_axes(&self) -> [DVec3; 3] {
+        self.rows.map(|row| row / row.length_squared())
     }
-}
-
-/// The unit vectors that a quaternion x, y, z, w rotates the axes to.
-pub(super) fn axes_of(orientation: [f32; 4]) -> [DVec3; 3] {
-    // Normalise it again, since it is rounded to single precision
-    let q = orientation.map(f64::from);
-    let scale = 2.0 / q.iter().map(|c| c * c).sum::<f64>();
-    let [x, y, z, w] = q;
-    let (xx, xy, xz) = (x * x * scale, x * y * scale, x * z * scale);
-    let (yy, yz, zz) = (y * y * scale, y * z * scale, z * z * scale);
-    let (wx, wy, wz) = (w * x * scale, w * y * scale, w * z * scale);
-    [
-        DVec3::new(1.0 - (yy + zz), xy + wz, xz - wy),
-        DVec3::new(xy - wz, 1.0 - (xx + zz), yz + wx),
-        DVec3::new(xz + wy, yz - wx, 1.0 - (xx + yy)),
-    ]
 }

@@ -1,6 +1,6 @@
 //! Grains as a shape.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::GrainShape;
 use super::ellipsoid::{
@@ -92,7 +92,8 @@ impl<'a> GrainSurface<'a> {
         // The ray must see both normals from the same side
         let is_consistent = shading.dot(direction) * normal.dot(direction) > 0.0;
         let of_size = if let GrainShape::Mesh(mesh) = self.tree.shape() {
-            let size = pose.semi_axes() * mesh.radius();
+            let [x, y, z] = pose.semi_axes().map(DVec3::length);
+            let size = DVec3::new(x, y, z) * mesh.radius();
             let [of_smallest, of_largest] = OFFSET_OF_MESH;
             narrow((of_smallest * size.min_element()).max(of_largest * size.max_element()))
         } else {

@@ -1,7 +1,7 @@
 //! Grains of all shapes but ellipsoids: each ray that passes near a grain is intersected with it in f64.
 
-use super::body::{Body, Hit};
-use super::ellipsoid::UnitRays;
+use super::body::Hit;
+use super::ellipsoid::UnitRay;
 use super::rays::LocalRays;
 use super::tree::GrainTree;
 use super::walk::GrainTest;
@@ -23,35 +23,45 @@ impl Solids<'_> {
     }
 }
 
-/// The rays that pass through a sphere around the body before their limits.
+/// Whether a ray passes through the sphere of `radius` around the body, from `from` to its `limit`.
 #[inline(always)]
-fn lanes_near(rays: &LocalRays, unit: &UnitRays, body: &Body<'_>, limits: &Lanes) -> u32 {
-    let radius = narrow(body.radius_squared()).sqrt();
-    let mut near = [0_u32; LANES];
-    for l in 0..LANES {
-        let [length2, middle, distance2] = unit.closest(l);
-        let rounding = ROUNDING * middle.abs();
-        let reach = radius + rounding * length2.sqrt();
-        let half = ((reach * reach - distance2) / length2).sqrt();
-        // False for NaN: the line misses the sphere
-        let is_near =
-            middle - half - rounding <= limits[l] && middle + half + rounding >= rays.from[l];
-        near[l] = u32::from(is_near);
-    }
-    (0..LANES).fold(0, |lanes, l| lanes | near[l] << l)
+fn is_near(ray: &UnitRay, radius: f32, from: f32, limit: f32) -> bool {
+    let rounding = ROUNDING * ray.middle.abs();
+    let reach = radius + rounding * ray.length2.sqrt();
+    // NaN if the line misses the sphere
+    let half = ((reach * reach - ray.distance2) / ray.length2).sqrt();
+    ray.middle - half - rounding <= limit && ray.middle + half + rounding >= from
 }
 
 impl GrainTest for Solids<'_> {
     #[inline(always)]
     fn distances(&self, rays: &LocalRays, slot: usize, lanes: u32, limits: &Lanes) -> Lanes {
         let (grain, motion) = self.0.grain(slot);
-        let unit = UnitRays::new(rays, grain, motion);
+        let radius = narrow(self.0.body(slot).radius_squared()).sqrt();
+        // Find the rays that pass near the body
+        let mut near = 0;
+        for l in 0..LANES {
+            let ray = UnitRay::new(rays, l, grain, motion);
+            near |= u32::from(is_near(&ray, radius, rays.from[l], limits[l])) << l;
+        }
+        // Intersect each of them
         let mut t = [f32::INFINITY; LANES];
-        for lane in lanes_in(lanes_near(rays, &unit, &self.0.body(slot), limits) & lanes) {
+        for lane in lanes_in(near & lanes) {
             if let Some(hit) = self.first(rays, lane, slot) {
                 t[lane] = narrow(hit.t);
             }
         }
         t
+    }
+
+    #[inline(always)]
+    fn distance(&self, rays: &LocalRays, slot: usize, lane: usize, limit: f32) -> f32 {
+        let (grain, motion) = self.0.grain(slot);
+        let radius = narrow(self.0.body(slot).radius_squared()).sqrt();
+        let ray = UnitRay::new(rays, lane, grain, motion);
+        if !is_near(&ray, radius, rays.from[lane], limit) {
+            return f32::INFINITY;
+        }
+        self.first(rays, lane, slot).map_or(f32::INFINITY, |hit| narrow(hit.t))
     }
 }

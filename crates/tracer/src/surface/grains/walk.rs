@@ -17,8 +17,8 @@ use spherule_tree::math::{LANES, Lanes, fold, lane_kernel, lanes_in, larger, sma
 const STACK_SIZE: usize = MAX_LEVELS * (WIDTH - 1) + 1;
 
 /// Number of grains that a beam of several rays tests before its rays are traversed one by one: it is too wide. On the
-/// benchmark's ellipsoids, beams around neighbouring pixels rarely test half as many.
-const MAX_BEAM_TESTS: u32 = 96;
+/// benchmark's ellipsoids, values from 24 to 96 give the same times up to noise, for camera and for shadow rays.
+const MAX_BEAM_TESTS: u32 = 48;
 
 /// No grain.
 pub(super) const NO_SLOT: u32 = u32::MAX;
@@ -29,6 +29,9 @@ pub(super) trait GrainTest {
     /// The first distance in the range of each ray at which it crosses the surface of the grain in `slot`; infinite if
     /// there is none. Lanes outside `lanes` may have any value, and so may rays that cross it behind their limit.
     fn distances(&self, rays: &LocalRays, slot: usize, lanes: u32, limits: &Lanes) -> Lanes;
+
+    /// The same distance for the ray in `lane`, to the bit.
+    fn distance(&self, rays: &LocalRays, slot: usize, lane: usize, limit: f32) -> f32;
 }
 
 /// What a traversal searches for.
@@ -68,20 +71,38 @@ impl Hits {
     /// Stores the distances `t` to the grain in `slot` for those rays of `lanes` for which it is the first one.
     #[inline(always)]
     fn take(&mut self, t: &Lanes, slot: u32, lanes: u32, grains: &[Instance], query: Query) {
-        let (mut nearer, mut tied) = (0, 0);
+        let mut tied = 0;
         for l in 0..LANES {
-            nearer |= u32::from(t[l] < self.t[l]) << l;
-            tied |= u32::from(t[l] == self.t[l]) << l;
+            let is_tied = t[l] == self.t[l] && self.slot[l] != NO_SLOT;
+            tied |= u32::from(is_tied) << l;
         }
-        for lane in lanes_in(nearer & lanes) {
-            self.slot[lane] = slot;
-            self.t[lane] = if query == Query::Any { -1.0 } else { t[lane] };
+        for l in 0..LANES {
+            let is_nearer = t[l] < self.t[l] && lanes >> l & 1 == 1;
+            let end = if query == Query::Any { -1.0 } else { t[l] };
+            self.slot[l] = if is_nearer { slot } else { self.slot[l] };
+            self.t[l] = if is_nearer { end } else { self.t[l] };
         }
         for lane in lanes_in(tied & lanes) {
-            let held = self.slot[lane];
-            if held != NO_SLOT && grains[slot as usize].index < grains[held as usize].index {
-                self.slot[lane] = slot;
-            }
+            self.resolve_tie(lane, slot, grains);
+        }
+    }
+
+    /// Stores the distance `t` of the ray in `lane` to the grain in `slot` if it is the first one.
+    #[inline(always)]
+    fn take_one(&mut self, t: f32, slot: u32, lane: usize, grains: &[Instance], query: Query) {
+        if t < self.t[lane] {
+            self.slot[lane] = slot;
+            self.t[lane] = if query == Query::Any { -1.0 } else { t };
+        } else if t == self.t[lane] && self.slot[lane] != NO_SLOT {
+            self.resolve_tie(lane, slot, grains);
+        }
+    }
+
+    /// Stores the grain in `slot` in `lane` if its index is lower than that of the current one.
+    #[cold]
+    fn resolve_tie(&mut self, lane: usize, slot: u32, grains: &[Instance]) {
+        if grains[slot as usize].index < grains[self.slot[lane] as usize].index {
+            self.slot[lane] = slot;
         }
     }
 }
@@ -127,54 +148,82 @@ impl<T: GrainTest> Search<'_, T> {
 
     /// Traverses the tree with a beam around the rays of `lanes`. Returns false if it gave up after too many tests.
     #[inline(always)]
-    fn run(&mut self, lanes: u32) -> bool {
+    fn run_beam(&mut self, lanes: u32) -> bool {
         let beam = Beam::around(self.rays, lanes);
         let mut members = [-1.0; LANES];
         for lane in lanes_in(lanes) {
             members[lane] = f32::INFINITY;
         }
-        let mut tests_left = if lanes & (lanes - 1) == 0 { u32::MAX } else { MAX_BEAM_TESTS };
-        let (mut code, mut depth) = (Code(0), 0);
+        let mut tests_left = MAX_BEAM_TESTS;
         let mut limit = self.limit(&members);
-        loop {
-            if let Some((first, count)) = code.as_leaf() {
-                // Test the grains of a leaf, which may shorten the rays
-                for slot in first..first + count {
-                    let hits = &mut *self.hits;
-                    let t = self.test.distances(self.rays, slot as usize, lanes, &hits.t);
-                    hits.take(&t, slot, lanes, self.grains, self.query);
-                }
+        let (mut next, mut depth) = (Some(Code(0)), 0);
+        while let Some(code) = next {
+            if let Some(slot) = code.as_leaf() {
+                // Test the grain, which may shorten the rays
+                let hits = &mut *self.hits;
+                let t = self.test.distances(self.rays, slot as usize, lanes, &hits.t);
+                hits.take(&t, slot, lanes, self.grains, self.query);
                 limit = self.limit(&members);
                 if limit < 0.0 {
                     return true;
                 }
-                if tests_left < count {
+                if tests_left == 0 {
                     return false;
                 }
-                tests_left -= count;
+                tests_left -= 1;
             } else {
-                depth = self.push_children(&beam, code, depth, limit);
+                depth = self.push_children::<false>(&beam, code, depth, limit);
             }
-            // Pop the next node that begins before the end of a ray
-            loop {
-                if depth == 0 {
-                    return true;
+            (next, depth) = self.pop(depth, limit);
+        }
+        true
+    }
+
+    /// Traverses the tree with the ray in `lane`.
+    #[inline(always)]
+    fn run_ray(&mut self, lane: usize) {
+        let beam = Beam::of(self.rays, lane);
+        let mut limit = self.hits.t[lane];
+        let (mut next, mut depth) = (Some(Code(0)), 0);
+        while let Some(code) = next {
+            if let Some(slot) = code.as_leaf() {
+                let t = self.test.distance(self.rays, slot as usize, lane, limit);
+                self.hits.take_one(t, slot, lane, self.grains, self.query);
+                limit = self.hits.t[lane];
+                if limit < 0.0 {
+                    return;
                 }
-                depth -= 1;
-                let (enter, next) = self.stack[depth].split();
-                if is_before(enter, limit) {
-                    code = next;
-                    break;
-                }
+            } else {
+                depth = self.push_children::<true>(&beam, code, depth, limit);
+            }
+            (next, depth) = self.pop(depth, limit);
+        }
+    }
+
+    /// The next node that begins before `limit`, and the new depth of the stack.
+    #[inline(always)]
+    fn pop(&self, mut depth: usize, limit: f32) -> (Option<Code>, usize) {
+        while depth > 0 {
+            depth -= 1;
+            let (enter, code) = self.stack[depth].split();
+            if is_before(enter, limit) {
+                return (Some(code), depth);
             }
         }
+        (None, 0)
     }
 
     /// Pushes the children of a node that the beam enters, nearest last. Returns the new depth of the stack.
     #[inline(always)]
-    fn push_children(&mut self, beam: &Beam, code: Code, mut depth: usize, limit: f32) -> usize {
+    fn push_children<const IS_RAY: bool>(
+        &mut self,
+        beam: &Beam,
+        code: Code,
+        mut depth: usize,
+        limit: f32,
+    ) -> usize {
         let node = &self.nodes[code.0 as usize];
-        let enter = beam.entries(node, limit);
+        let enter = beam.entries::<IS_RAY>(node, limit);
         let mut entered = 0;
         for (i, enter) in enter.iter().enumerate() {
             entered |= u32::from(*enter < f32::INFINITY) << i;
@@ -227,24 +276,20 @@ fn search_body<T: GrainTest>(
     let stack = [Pending::default(); STACK_SIZE];
     let mut search = Search { nodes, grains, rays, test, query, hits, stack };
     let mut left = rays.lanes;
+    // Beams of rays with the same signs; those that find too many grains are continued ray by ray
+    let mut alone = if coherence == Coherence::Coherent { 0 } else { left };
+    left &= !alone;
     while left != 0 {
-        // A beam of rays with the same signs, or one ray
-        let group = match coherence {
-            Coherence::Coherent => lanes_like_first(rays, left),
-            Coherence::Incoherent => left & left.wrapping_neg(),
-        };
+        let group = lanes_like_first(rays, left);
         left &= !group;
-        let mut alone = group;
-        if search.run(group) {
-            continue;
+        if group & (group - 1) == 0 || !search.run_beam(group) {
+            alone |= group;
         }
-        // Too many grains: continue with each ray alone
-        while alone != 0 {
-            let lane = alone & alone.wrapping_neg();
-            alone &= !lane;
-            if search.hits.t[lane.trailing_zeros() as usize & (LANES - 1)] >= 0.0 {
-                search.run(lane);
-            }
+    }
+    // Single rays
+    for lane in lanes_in(alone) {
+        if search.hits.t[lane] >= 0.0 {
+            search.run_ray(lane);
         }
     }
 }
@@ -258,6 +303,6 @@ lane_kernel! {
         coherence: Coherence,
         test: &T,
         query: Query,
-        hits: &mut Hits,
+            hits: &mut Hits,
     ) = search_body;
 }

@@ -29,8 +29,7 @@ fn norm_of_two(a: f64, b: f64, n: f64) -> [f64; 3] {
     }
     // Without powers of large numbers
     let ratio = small / large;
-    let power = libm::pow(ratio, n);
-    let root = libm::pow(1.0 + power, 1.0 / n);
+    let [power, root] = power_and_root(ratio, n);
     let of_large = root / (1.0 + power);
     let of_small = if ratio > 0.0 {
         power / ratio * of_large
@@ -41,6 +40,22 @@ fn norm_of_two(a: f64, b: f64, n: f64) -> [f64; 3] {
     };
     let norm = large * root;
     if a < b { [norm, of_small, of_large] } else { [norm, of_large, of_small] }
+}
+
+/// The power `x^n` of a number from 0 to 1, and the root `(1 + x^n)^(1/n)`.
+fn power_and_root(x: f64, n: f64) -> [f64; 2] {
+    /// Exponents that are powers of two need no logarithms.
+    const SQUARINGS: [(f64, u32); 4] = [(4.0, 2), (8.0, 3), (16.0, 4), (32.0, 5)];
+    match SQUARINGS.iter().find(|(exponent, _)| *exponent == n) {
+        Some((_, count)) => {
+            let power = (0..*count).fold(x, |power, _| power * power);
+            [power, (0..*count).fold(1.0 + power, |root, _| root.sqrt())]
+        }
+        None => {
+            let power = libm::pow(x, n);
+            [power, libm::pow(1.0 + power, 1.0 / n)]
+        }
+    }
 }
 
 /// The norm of a point, and its gradient.
