@@ -30,7 +30,7 @@ impl UnitRay {
     ) -> Self {
         let origin = [rays.origin[0][l], rays.origin[1][l], rays.origin[2][l]];
         let direction = [rays.direction[0][l], rays.direction[1][l], rays.direction[2][l]];
-        let [origin, direction] = grain.to_middle(motion, rays.time[l], origin, direction);
+        let [origin, direction] = grain.in_middle(motion, rays.time[l], origin, direction);
         let (o, d) = (grain.unit(origin), grain.unit(direction));
         let length2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
         let middle = -(o[0] * d[0] + o[1] * d[1] + o[2] * d[2]) / length2;
@@ -155,7 +155,7 @@ fn intersections_body(
         let d = [rays.direction[0][l], rays.direction[1][l], rays.direction[2][l]];
         // Project the point onto the surface, along the line through the centre
         let motion = if is_moving { Some(&motion) } else { None };
-        let [from_center, direction] = grain.to_middle(motion, rays.time[l], o, d);
+        let [from_center, direction] = grain.in_middle(motion, rays.time[l], o, d);
         let v = [
             from_center[0] + t[l] * direction[0],
             from_center[1] + t[l] * direction[1],

@@ -27,7 +27,7 @@ impl Instance {
     /// The position of a point relative to the centre, and a direction, both rotated as the grain was rotated from
     /// `time`, from -1/2 to 1/2, to the middle of the exposure.
     #[inline(always)]
-    pub(super) fn to_middle(
+    pub(super) fn in_middle(
         &self,
         motion: Option<&Motion>,
         time: f32,

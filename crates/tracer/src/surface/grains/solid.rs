@@ -40,9 +40,9 @@ impl GrainTest for Solids<'_> {
         let radius = narrow(self.0.body(slot).radius_squared()).sqrt();
         // Find the rays that pass near the body
         let mut near = 0;
-        for l in 0..LANES {
+        for (l, limit) in limits.iter().enumerate() {
             let ray = UnitRay::new(rays, l, grain, motion);
-            near |= u32::from(is_near(&ray, radius, rays.from[l], limits[l])) << l;
+            near |= u32::from(is_near(&ray, radius, rays.from[l], *limit)) << l;
         }
         // Intersect each of them
         let mut t = [f32::INFINITY; LANES];
