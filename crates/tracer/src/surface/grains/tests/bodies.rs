@@ -238,3 +238,38 @@ fn shapes_agree_where_they_are_the_same() {
     }
     assert_alike([&round; 2], [GrainShape::Ellipsoid, GrainShape::Capsule], 4e-6, 2);
 }
+
+#[test]
+fn rays_leave_the_grain_that_they_start_on() {
+    for (number, (shape, _)) in (0..).zip(shapes()) {
+        let mut random = Random(90 + number);
+        // Thin grains far from the origin, and one that makes the tree large
+        let mut heap = Heap::random(40, Vec3::new(50.0, -20.0, 30.0), 4.0, [0.02, 0.5], 81);
+        let far = Heap::random(1, Vec3::ZERO, 0.0, [0.5, 0.5], 3);
+        heap.centers.extend(far.centers);
+        heap.orientations.extend(far.orientations);
+        heap.sizes.extend(far.sizes);
+        let tree = heap.tree(shape.clone());
+        let surface = GrainSurface::new(&tree);
+        let mut starts = 0;
+        for _ in 0..2000 {
+            let target = heap.centers[starts % 40] + 0.1 * random.vector();
+            let ray = towards(target + 6.0 * random.vector(), target);
+            let Some(hit) = surface.crossing(&ray, Side::Outside) else { continue };
+            starts += 1;
+            let direction = random.vector().normalize();
+            let outward = direction * direction.dot(hit.normal).signum();
+            let next = Ray::new(hit.anchor + hit.offset * hit.normal, outward);
+            let again = surface.crossing(&next, Side::Outside);
+            assert!(again.is_none_or(|next| next.particle != hit.particle), "{shape:?} {hit:?}");
+            // Inwards, the ray leaves through the other side, or enters a grain that overlaps
+            let next = Ray::new(hit.anchor - hit.offset * hit.normal, -outward);
+            let inside = surface.crossing(&next, Side::Outside);
+            let is_through = inside.is_some_and(|next| {
+                next.particle != hit.particle || next.normal.dot(-outward) > -1e-3
+            });
+            assert!(is_through || outward.dot(hit.normal) < 0.05, "{shape:?} {hit:?} {inside:?}");
+        }
+        assert!(starts > 300, "{shape:?}: {starts}");
+    }
+}
