@@ -1,7 +1,7 @@
 //! Nodes of the tree, and beams of rays that enter them.
 
 use super::rays::LocalRays;
-use spherule_tree::math::{LANES, Lanes, fold, larger, smaller};
+use spherule_tree::math::{LANES, Lanes, Lanes3, fold, larger, smaller};
 
 /// Children of a node.
 pub(super) const WIDTH: usize = 8;
@@ -60,6 +60,12 @@ impl Node {
             self.planes[1][axis][slot] = high[axis];
         }
         self.children[slot] = code;
+    }
+
+    /// Whether there is a child in `slot`.
+    #[inline(always)]
+    pub(super) fn has_child(&self, slot: usize) -> bool {
+        self.planes[0][0][slot] <= self.planes[1][0][slot]
     }
 
     /// The node with `first` added to the indices of its nodes below.
@@ -151,6 +157,46 @@ impl Beam {
         }
         enter
     }
+}
+
+/// The inverse directions of all rays.
+#[inline(always)]
+pub(super) fn inverses(rays: &LocalRays) -> Lanes3 {
+    let mut inverses = rays.direction;
+    for component in inverses.iter_mut().flatten() {
+        *component = inverse(*component);
+    }
+    inverses
+}
+
+/// The least distance at which a ray enters the box of `child`, and the rays that enter it before their `limits`. A
+/// ray does so exactly if [`Beam::entries`] says so for it alone.
+#[inline(always)]
+pub(super) fn lanes_entering(
+    node: &Node,
+    child: usize,
+    rays: &LocalRays,
+    inverses: &Lanes3,
+    limits: &Lanes,
+) -> (f32, u32) {
+    let (mut enter, mut exit) = (rays.from, *limits);
+    for axis in 0..3 {
+        let (low, high) = (node.planes[0][axis][child], node.planes[1][axis][child]);
+        for l in 0..LANES {
+            let (origin, inverse) = (rays.origin[axis][l], inverses[axis][l]);
+            let (a, b) = ((low - origin) * inverse, (high - origin) * inverse);
+            let is_forward = inverse > 0.0;
+            enter[l] = larger(if is_forward { a } else { b }, enter[l]);
+            exit[l] = smaller(if is_forward { b } else { a }, exit[l]);
+        }
+    }
+    let mut lanes = 0;
+    for l in 0..LANES {
+        let is_entered = enter[l] * (1.0 - ROUNDING) <= exit[l] * (1.0 + ROUNDING);
+        lanes |= u32::from(is_entered) << l;
+        enter[l] = if is_entered { enter[l] } else { f32::INFINITY };
+    }
+    (fold(enter, smaller), lanes)
 }
 
 /// The least and the greatest of the values of `lanes`.

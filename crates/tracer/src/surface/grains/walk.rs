@@ -1,14 +1,15 @@
 //! Traversal of the tree with beams of rays.
 //!
 //! The rays of a coherent packet whose directions have the same signs share a beam, which tests the eight boxes of a
-//! node at once. A beam that finds too many grains, and all other rays, are traversed ray by ray. Boxes are larger than
+//! node at once. The rays of a beam that finds too many grains, and all other rays, share nodes while many of them enter
+//! the same ones, and are then traversed ray by ray. Boxes are larger than
 //! their grains by more than the rounding of both tests, so each ray finds what it would find alone, to the bit.
 
 #![expect(clippy::needless_range_loop, reason = "one index for the lanes of many arrays")]
 
 use super::build::MAX_LEVELS;
 use super::instance::Instance;
-use super::node::{Beam, Code, Node, WIDTH, is_before};
+use super::node::{Beam, Code, Node, WIDTH, inverses, is_before, lanes_entering};
 use super::rays::LocalRays;
 use spherule_tree::accel::Coherence;
 use spherule_tree::math::{LANES, Lanes, fold, lane_kernel, lanes_in, larger, smaller};
@@ -19,6 +20,9 @@ const STACK_SIZE: usize = MAX_LEVELS * (WIDTH - 1) + 1;
 /// Number of grains that a beam of several rays tests before its rays are traversed one by one: it is too wide. On the
 /// benchmark's ellipsoids, values from 24 to 96 give the same times up to noise, for camera and for shadow rays.
 const MAX_BEAM_TESTS: u32 = 48;
+
+/// A subtree that at most this many rays enter is traversed by each of them alone.
+const MAX_SINGLE_RAYS: u32 = 4;
 
 /// No grain.
 pub(super) const NO_SLOT: u32 = u32::MAX;
@@ -124,6 +128,15 @@ impl Pending {
     }
 }
 
+/// A node or leaf still to be visited by some rays.
+#[derive(Clone, Copy, Default)]
+struct PendingLanes {
+    /// The least distance at which a ray enters it.
+    enter: f32,
+    code: Code,
+    lanes: u32,
+}
+
 /// A traversal by the rays of some lanes.
 struct Search<'a, T> {
     nodes: &'a [Node],
@@ -179,12 +192,65 @@ impl<T: GrainTest> Search<'_, T> {
         true
     }
 
-    /// Traverses the tree with the ray in `lane`.
+    /// Traverses the tree with the rays of `lanes`, in any directions: boxes are tested with all rays at once while many
+    /// of them enter the same node, and a subtree that few rays enter is traversed by each of them alone (Wald et al.,
+    /// "Embree: a kernel framework for efficient CPU ray tracing", 2014, section 4.2).
     #[inline(always)]
-    fn run_ray(&mut self, lane: usize) {
+    fn run_packet(&mut self, lanes: u32) {
+        let inverses = inverses(self.rays);
+        let mut stack = [PendingLanes::default(); STACK_SIZE];
+        stack[0].lanes = lanes;
+        let mut depth = 1;
+        while depth > 0 {
+            depth -= 1;
+            let PendingLanes { enter, code, lanes } = stack[depth];
+            // Forget rays that have ended before the subtree begins
+            let mut alive = 0;
+            for l in 0..LANES {
+                alive |= u32::from(is_before(enter, self.hits.t[l])) << l;
+            }
+            let lanes = lanes & alive;
+            if lanes.count_ones() <= MAX_SINGLE_RAYS {
+                for lane in lanes_in(lanes) {
+                    self.run_ray(code, lane);
+                }
+            } else if let Some(slot) = code.as_leaf() {
+                let hits = &mut *self.hits;
+                let t = self.test.distances(self.rays, slot as usize, lanes, &hits.t);
+                hits.take(&t, slot, lanes, self.grains, self.query);
+            } else {
+                let node = &self.nodes[code.0 as usize];
+                let first = depth;
+                for child in 0..WIDTH {
+                    if !node.has_child(child) {
+                        continue;
+                    }
+                    let (enter, entering) =
+                        lanes_entering(node, child, self.rays, &inverses, &self.hits.t);
+                    let lanes = lanes & entering;
+                    if lanes == 0 {
+                        continue;
+                    }
+                    // Keep the nearest last
+                    let code = node.children[child];
+                    let mut place = depth;
+                    while place > first && stack[place - 1].enter < enter {
+                        stack[place] = stack[place - 1];
+                        place -= 1;
+                    }
+                    stack[place] = PendingLanes { enter, code, lanes };
+                    depth += 1;
+                }
+            }
+        }
+    }
+
+    /// Traverses the subtree with `code` with the ray in `lane`.
+    #[inline(always)]
+    fn run_ray(&mut self, code: Code, lane: usize) {
         let beam = Beam::of(self.rays, lane);
         let mut limit = self.hits.t[lane];
-        let (mut next, mut depth) = (Some(Code(0)), 0);
+        let (mut next, mut depth) = (Some(code), 0);
         while let Some(code) = next {
             if let Some(slot) = code.as_leaf() {
                 let t = self.test.distance(self.rays, slot as usize, lane, limit);
@@ -286,11 +352,8 @@ fn search_body<T: GrainTest>(
             alone |= group;
         }
     }
-    // Single rays
-    for lane in lanes_in(alone) {
-        if search.hits.t[lane] >= 0.0 {
-            search.run_ray(lane);
-        }
+    if alone != 0 {
+        search.run_packet(alone);
     }
 }
 
