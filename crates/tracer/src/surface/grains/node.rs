@@ -1,5 +1,7 @@
 //! Nodes of the tree, and beams of rays that enter them.
 
+#![expect(clippy::needless_range_loop, reason = "one index for the lanes of many arrays")]
+
 use super::rays::LocalRays;
 use spherule_tree::math::{LANES, Lanes, Lanes3, fold, larger, smaller};
 
