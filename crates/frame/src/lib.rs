@@ -37,6 +37,7 @@ mod error;
 mod frame;
 pub mod gather;
 pub mod generate;
+pub mod grain_columns;
 mod images;
 pub mod join;
 mod labels;

@@ -1,7 +1,8 @@
 //! Renders scenes of particles to the planes of a film.
 //!
 //! - [`scene`]: camera, lights, environment, materials, background, ground: plain values.
-//! - [`surface`]: shapes that rays intersect: spheres, their union, the isosurface of their field, meshes, rods.
+//! - [`surface`]: shapes that rays intersect: spheres, their union, the isosurface of their field, meshes, rods,
+//!   grains of other shapes.
 //! - [`render`]: the Whitted and the path integrator, samplers, BSDFs, lights, and the [`render::Film`].
 //! - [`denoise`]: removes noise from a picture and its features.
 //!

@@ -71,6 +71,8 @@ mod caustics_tests;
 #[cfg(test)]
 mod filter_tests;
 #[cfg(test)]
+mod grains_tests;
+#[cfg(test)]
 mod ground_light_tests;
 #[cfg(test)]
 mod image_tests;

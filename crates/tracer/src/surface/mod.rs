@@ -4,6 +4,7 @@
 pub mod cut;
 pub mod field;
 mod gradient;
+pub mod grains;
 mod hierarchy;
 mod intersections;
 pub mod mesh;
