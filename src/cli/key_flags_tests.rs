@@ -17,7 +17,7 @@ const COLORS: [&str; 4] = ["color_by", "map", "range", "color_scale"];
 const SHORT: [&str; 7] = ["size", "ortho", "no_legend", "vmin", "vmax", "slice", "turntable"];
 
 /// Options for items of lists. Their tests are below.
-const LISTS: [&str; 11] = [
+const LISTS: [&str; 12] = [
     "mesh",
     "camera_path",
     "clip",
@@ -29,6 +29,7 @@ const LISTS: [&str; 11] = [
     "text",
     "scale_bar",
     "axes",
+    "style",
 ];
 
 /// Other options with a value that is not the default, and the key that it is laid over.
@@ -171,6 +172,7 @@ fn options_of_lists_add_items() {
              {type=\"scale_bar\"},{type=\"axes\"}]",
         ),
         ("--arrows velocity:0.05", "arrows=[{attribute=\"velocity\",scale=0.05}]"),
+        ("--style x<1:hidden", "style=[{where=\"x<1\",draw=\"hidden\"}]"),
         (
             "--clip x<0.5 --clip z>=-1",
             "clip=[{type=\"plane\",normal=\"x\",offset=0.5},{type=\"plane\",normal=\"-z\",offset=1.0}]",

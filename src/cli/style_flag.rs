@@ -6,7 +6,7 @@ use toml::{Table, Value};
 /// The table `[[style]]` of `type == 2: sticks, radius 0.3, color red`.
 pub(super) fn style(text: &str) -> Result<Table, ValueError> {
     let expected = "a condition, how its particles are drawn, and settings, such as 'type == 2: sticks, radius 0.3, color \
-                    red'; without a condition, ': hidden' is for all others";
+                    red'; without a condition, ': hidden' is for all others; the looks of pictures are --look paper and others";
     table(text).ok_or_else(|| ValueError::new(expected, text))
 }
 

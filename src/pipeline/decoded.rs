@@ -9,6 +9,7 @@ use spherule_formats::order::index_u32;
 use spherule_formats::{Attribute, AttributeData, Radius};
 
 use super::SharedFrame;
+use super::grains::{FrameGrains, grains_of};
 use super::load_error::{LoadError, missing, missing_value, no_parts};
 use super::setup::{ColorRule, OpacityRule, ParticleRules, Setup};
 use super::styles::StyleRanges;
@@ -52,6 +53,8 @@ pub struct DecodedShading {
     pub attributes: Vec<Vec<f32>>,
     /// Which particles have which style.
     pub(super) ranges: StyleRanges,
+    /// Shapes of the grains of styles, until these are built.
+    pub(super) grains: Vec<FrameGrains>,
 }
 
 impl<'a> DecodedFrame<'a> {
@@ -83,10 +86,19 @@ impl<'a> DecodedFrame<'a> {
             let found = attribute(&frame, &channel.name, "a channel", file)?;
             planes.extend((0..channel.components).map(|c| component(found, c)));
         }
+        let grains = grains_of(setup, (&frame, &ranges), (number, file), notes)?;
         let decoded = Self {
             centers: frame.positions,
             radius,
-            shading: DecodedShading { ids, velocities, parts, attributes: planes, ranges, ..looks },
+            shading: DecodedShading {
+                ids,
+                velocities,
+                parts,
+                attributes: planes,
+                grains,
+                ranges,
+                ..looks
+            },
         };
         Ok((decoded, raised))
     }

@@ -2,6 +2,7 @@
 
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{Attribute, FrameError};
+use spherule_frame::grain_columns::GrainColumnError;
 use spherule_frame::values::{Named, Value, value_names};
 
 use super::meshes::MeshLoadError;
@@ -76,6 +77,14 @@ pub enum LoadError {
         column: usize,
         /// The text, and those that there are.
         what: String,
+    },
+    /// It lacks columns of grains.
+    #[error("{file}: style: {fault}")]
+    Grains {
+        /// The frame's first file.
+        file: String,
+        /// The fault.
+        fault: GrainColumnError,
     },
     /// It lacks the parts that materials are for.
     #[error(

@@ -16,6 +16,7 @@ mod encode;
 mod encoders;
 mod error;
 mod facts;
+mod grains;
 mod in_place;
 mod load;
 mod load_error;
@@ -61,9 +62,9 @@ pub use renderer::{BuiltFrame, FrameRenderer, TraceError, TracedFrame};
 pub use rods::FrameRods;
 pub use schedule::{Overlap, Schedule};
 pub use setup::{
-    ArrowStyle, AttributeChannel, BondRule, BondStyle, ColorRule, FileSettings, OpacityRule,
-    ParticleRules, ParticleStyle, Picture, RadiusRule, RodLook, RunSettings, Setup, StyleForm,
-    Things, TrailStyle, ViewSettings,
+    ArrowStyle, AttributeChannel, BondRule, BondStyle, ColorRule, FileSettings, GrainRules,
+    OpacityRule, ParticleRules, ParticleStyle, Picture, RadiusRule, RodLook, RunSettings, Setup,
+    StyleForm, Things, TrailStyle, ViewSettings,
 };
 pub use shutter::{FrameStep, Shutter};
 pub use single::{make_image, trace_particles};

@@ -2,12 +2,14 @@
 
 use glam::{DVec3, Vec3};
 use spherule_formats::native::Access;
+use spherule_frame::grain_columns::GrainNames;
 
 use super::meshes::MeshThing;
 use super::rays::expected_rays;
 use super::shutter::{FrameStep, Shutter};
 use crate::accel::{BuildSettings, BvhSettings, SbvhSettings, Structure, choose};
 use crate::denoise::DenoiseSettings;
+use crate::manifest::GrainKind;
 use crate::output::{ExrOptions, PreviewBackground, PreviewOptions};
 use crate::overlay::Overlay;
 use crate::render::{RenderSettings, RendererKind};
@@ -255,14 +257,29 @@ pub struct ParticleRules {
 }
 
 /// What stands for the particles of a style.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum StyleForm {
     /// A sphere each.
     Spheres,
     /// A union or a smooth surface.
     Body(SurfaceSettings),
+    /// A grain each.
+    Grains(GrainRules),
     /// Only rods.
     Nothing,
+}
+
+/// How grains are drawn.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GrainRules {
+    /// Their shape; None: superquadrics if the frame has exponents, else ellipsoids.
+    pub kind: Option<GrainKind>,
+    /// The columns that are named; others have the usual names.
+    pub names: GrainNames,
+    /// Semi-axes of all grains, scene units.
+    pub size: Option<Vec3>,
+    /// Exponents of all superquadrics.
+    pub exponents: Option<[f32; 2]>,
 }
 
 /// How some of the particles are drawn, unlike the others.

@@ -6,11 +6,13 @@ use glam::Vec3;
 
 use super::bodies::{build_grid, radius_of, shading_normals};
 use super::decoded::DecodedFrame;
+use super::grains::report_notes;
 use super::motion::displaced;
 use super::setup::{Setup, StyleForm};
 use super::styles::StyleParticles;
 use crate::accel::moving::MovingTree;
 use crate::accel::{BuildReport, Spheres, TreeBuilder};
+use crate::surface::grains::{GrainSurface, GrainTree};
 use crate::surface::moving::MovingSpheres;
 use crate::surface::smooth::{SmoothError, SmoothGrid};
 use crate::surface::spheres::SphereSurface;
@@ -22,6 +24,16 @@ use crate::surface::{MaterialId, OwnedBody, Shape, SphereOwners, SurfaceKind, Su
 pub(super) struct StyleSurfaces {
     spheres: Option<StyleSpheres>,
     bodies: Vec<StyleBody>,
+    grains: Vec<StyleGrains>,
+}
+
+/// The grains of a style.
+#[derive(Debug)]
+struct StyleGrains {
+    tree: GrainTree,
+    material: MaterialId,
+    /// Index in the frame of the first grain.
+    first: u32,
 }
 
 /// The spheres of all styles. Which style a sphere has follows from its particle.
@@ -80,7 +92,7 @@ impl StyleSurfaces {
             if own.centers.is_empty() {
                 continue;
             }
-            match rules.form {
+            match &rules.form {
                 StyleForm::Spheres => {
                     let (spheres, built) = StyleSpheres::build(setup, frame, own, rules.material);
                     bytes += built;
@@ -88,9 +100,15 @@ impl StyleSurfaces {
                 }
                 StyleForm::Body(settings) => {
                     let (body, built) =
-                        StyleBody::build(setup, frame, own, (settings, rules.material), notes)?;
+                        StyleBody::build(setup, frame, own, (*settings, rules.material), notes)?;
                     bytes += built;
                     all.bodies.push(body);
+                }
+                StyleForm::Grains(_) => {
+                    if let Some(grains) = StyleGrains::build(setup, frame, own, notes) {
+                        bytes += grains.tree.bytes() as u64;
+                        all.grains.push(grains);
+                    }
                 }
                 StyleForm::Nothing => {}
             }
@@ -107,6 +125,10 @@ impl StyleSurfaces {
             });
         }
         shapes.extend(self.bodies.iter().map(StyleBody::shape));
+        shapes.extend(self.grains.iter().map(|grains| {
+            let surface = GrainSurface::new(&grains.tree).of(grains.material, grains.first);
+            Box::new(surface) as Box<dyn Shape>
+        }));
     }
 }
 
@@ -128,6 +150,32 @@ impl StyleSpheres {
             moving
         });
         (Self { tree, moving, owners: SphereOwners::new(material, own.first) }, bytes)
+    }
+}
+
+impl StyleGrains {
+    /// The grains of `own`; None if they cannot be built, which is noted.
+    fn build(
+        setup: &Setup,
+        frame: &mut DecodedFrame<'_>,
+        mut own: StyleParticles,
+        notes: &mut Vec<String>,
+    ) -> Option<Self> {
+        let displacements = move_to_exposure(setup, frame, &mut own);
+        let of_frame = &mut frame.shading.grains;
+        let place = of_frame.iter().position(|grains| grains.style == own.style)?;
+        let grains = of_frame.swap_remove(place);
+        let rules = &setup.picture.particles.styles[own.style];
+        match grains.tree(&own, displacements.as_deref()) {
+            Ok(tree) => {
+                notes.extend(report_notes(&rules.name, tree.report()));
+                Some(Self { tree, material: rules.material, first: own.first })
+            }
+            Err(error) => {
+                notes.push(format!("style `{}` is not drawn: {error}", rules.name));
+                None
+            }
+        }
     }
 }
 

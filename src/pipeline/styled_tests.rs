@@ -153,3 +153,31 @@ fn styles_of_nothing_are_noted() {
     let (_, _, notes) = rendered("[[style]]\nname = \"foam\"\nwhere = \"type == 7\"");
     assert!(notes.iter().any(|note| note.contains("no particle is of style `foam`")), "{notes:?}");
 }
+
+#[test]
+fn grains_are_where_their_particles_are() {
+    let styles = format!(
+        "[[style]]\nwhere = \"type == 1\"\ndraw = \"grains\"\nsize = [0.6, 0.3, 0.2]\n{RED}\
+         [[style]]\nwhere = \"type == 2\"\ndraw = \"grains\"\nshape = \"cuboid\"\nsize = [0.2, 0.3, 0.4]\n\
+         [[style]]\nwhere = \"type == 3\"\nradius = 0.3\nopacity = 0.5"
+    );
+    let (setup, film, notes) = rendered(&styles);
+    assert_eq!(setup.picture.particles.styles_in_tree(&setup), 1);
+    assert!(notes.iter().all(|note| note.contains("they are drawn upright")), "{notes:?}");
+    let near = |radius: f32| [radius - 1e-4, radius + 1e-4];
+    let pixels = check_points(&film, [near(0.4), [0.2, 0.6001], [0.2, 0.54], near(0.3), near(0.4)]);
+    assert!(pixels.iter().all(|pixels| *pixels > 50), "{pixels:?}");
+    // The points are on the ellipsoids
+    let positions = positions();
+    let ids = film.plane::<u32>(FilmPlane::Id).unwrap();
+    let points = film.plane::<[f32; 3]>(FilmPlane::Position).unwrap();
+    let albedo = film.plane::<[f32; 3]>(FilmPlane::Albedo).unwrap();
+    for ((id, point), albedo) in ids.iter().zip(points).zip(albedo) {
+        let particle = id.wrapping_sub(1000) as usize;
+        if *id != u32::MAX && particle % 5 == 1 {
+            let own = (Vec3::from_array(*point) - positions[particle]) / Vec3::new(0.6, 0.3, 0.2);
+            assert!((own.length() - 1.0).abs() < 1e-3, "{particle}: {own}");
+            assert_eq!(*albedo, [1.0, 0.0, 0.0]);
+        }
+    }
+}

@@ -1,13 +1,17 @@
 //! Styles: the rules by which their particles are drawn.
 
+use glam::DVec3;
+
 use super::rods::look;
 use super::{ResolveError, arrows, color, opacity, radius};
 use crate::manifest::{
-    BondSearch, ColorSetting, Manifest, RadiusSetting, Style, StyleDraw, StyleMaterial,
+    BondSearch, ColorSetting, GrainNumbers, Manifest, RadiusSetting, Style, StyleDraw,
+    StyleMaterial,
 };
 use crate::math::narrow;
 use crate::pipeline::{
-    ArrowStyle, BondRule, BondStyle, ColorRule, ParticleStyle, RadiusRule, StyleForm, TrailStyle,
+    ArrowStyle, BondRule, BondStyle, ColorRule, GrainRules, ParticleStyle, RadiusRule, StyleForm,
+    TrailStyle,
 };
 use crate::scene::{Camera, Fresnel, Material, Scene};
 use crate::surface::{SurfaceKind, SurfaceSettings};
@@ -97,6 +101,18 @@ impl Looks<'_> {
     /// What stands for the particles of a style.
     fn form(&self, style: &Style) -> StyleForm {
         match style.surface() {
+            _ if style.draw == StyleDraw::Grains => StyleForm::Grains(GrainRules {
+                kind: style.shape,
+                names: style.grain_names(),
+                size: match style.size {
+                    Some(GrainNumbers::Numbers(size)) => Some(DVec3::from_array(size).as_vec3()),
+                    _ => None,
+                },
+                exponents: match style.exponents {
+                    Some(GrainNumbers::Numbers(exponents)) => Some(exponents.map(narrow)),
+                    _ => None,
+                },
+            }),
             None => StyleForm::Nothing,
             Some(SurfaceKind::Spheres) => StyleForm::Spheres,
             Some(kind) => {

@@ -74,9 +74,32 @@ fn arrows_and_hidden_particles() {
     let options = ["a.png", "--style", arrows, "--style", "type == 3: hidden"];
     still(&workshop, "in", &options).expect(0).prints("1 frame, up to 128 particles");
     let near = ["b.png", "--where", "within 1.01 of (type == 3)", "--unwrap"];
-    still(&workshop, "in", &near).expect(1).prints("no simulation cell");
+    still(&workshop, "in", &near).expect(2).prints("no simulation cell");
     still(&workshop, "in", &near[..3]).expect(0).prints("up to 128 particles");
     still(&workshop, "in", &["c.png", "--outline", "2", "--depth-cue", "0.5"]).expect(0);
+}
+
+#[test]
+fn grains_have_the_orientation_of_the_file() {
+    let workshop = Workshop::new();
+    let rows = [
+        "0,0,0,0,0.6,0.2,0.2,1,0,0,0",
+        "1,2,0,0,0.6,0.2,0.2,0,0,0,0",
+        "2,4,0,0,0.6,0.2,-1,1,0,0,1",
+    ];
+    let head = "id,x,y,z,shapex,shapey,shapez,quat1,quat2,quat3,quat4";
+    fs::write(workshop.join("a.csv"), format!("{head}\n{}\n", rows.join("\n"))).expect("a file");
+    let ran = still(&workshop, "a.csv", &["a.png", "--style", ": grains, name rods"]).expect(0);
+    for what in [
+        "grains of style `rods` by quat1, quat2, quat3, quat4, shapex",
+        "style `rods`: 1 grains without an orientation, drawn upright",
+        "style `rods`: 1 grains left out: a semi-axis is not above 0",
+    ] {
+        assert!(ran.errors().contains(what), "{what}: {}", ran.errors());
+    }
+    let named = "orientation { euler = ['quat1', 'quat2', 'quat5'] }";
+    let style = format!(": grains, shape cylinder, size [0.1, 0.1, 0.5], {named}");
+    still(&workshop, "a.csv", &["b.png", "--style", &style]).expect(1).prints("did you mean `quat");
 }
 
 #[test]
@@ -86,7 +109,7 @@ fn impossible_styles_are_refused_and_empty_ones_are_noted() {
         still(&workshop, "in", &["a.png", "--style", style]).expect(2).prints(what);
     };
     refused("kind == 2: spheres", "style.0.where: character 1: no value `kind`");
-    refused("type == : spheres", "--style: where: character 8");
+    refused("type == : spheres", "--style: style.0.where: character 8");
     refused("type == 2: sphere", "did you mean spheres?");
     refused("type == 2: spheres, colour red", "did you mean");
     refused("type == 2", "a condition, how its particles are drawn");

@@ -7,6 +7,7 @@ use spherule_tracer::surface::SurfaceKind;
 use super::bonds::BondSearch;
 use super::color::{ColorMapping, ColorSetting};
 use super::color_map::{MapName, RangeSetting};
+use super::grains::{GrainKind, GrainNumbers, GrainOrientation};
 use super::inline_table::{InlineTable, inline_table};
 use super::input::RadiusSetting;
 use super::key::Key;
@@ -35,6 +36,8 @@ named! {
         Sticks = "sticks",
         /// Bonds between smaller spheres.
         BallsAndSticks = "balls-and-sticks",
+        /// Bodies with an orientation: ellipsoids, superquadrics and others.
+        Grains = "grains",
         /// Arrows of a vector attribute, without spheres.
         Arrows = "arrows",
         /// Their ways over earlier frames, without spheres.
@@ -61,6 +64,7 @@ named! {
 }
 
 const ONE_MAP: &str = "belongs to color_by, which is not given; a map may also be a table in color";
+const GRAINS: &str = "belongs to a style with draw = \"grains\"";
 const STICKS: &str = "are drawn by a style with draw = \"sticks\" or \"balls-and-sticks\"";
 const OPAQUE_SPHERES: &str =
     "only opaque spheres have one; set draw = \"spheres\", and matte, plastic or metal as material";
@@ -79,7 +83,13 @@ pub(super) const RULES: &[Rule] = rules! {
     "draw" MissingOrNot["sticks", "balls-and-sticks"] => "bonds" Missing: STICKS;
     "draw" Is["sticks", "balls-and-sticks"] => "material.type" MissingOrNot["glass", "water"]:
         "sticks are opaque; choose matte, plastic or metal";
-    "draw" Is["smooth", "union"] => "opacity" MissingOr["1"]: OPAQUE_SPHERES;
+    "draw" MissingOrNot["grains"] => "shape" Missing: GRAINS;
+    "draw" MissingOrNot["grains"] => "size" Missing: GRAINS;
+    "draw" MissingOrNot["grains"] => "exponents" Missing: GRAINS;
+    "draw" MissingOrNot["grains"] => "orientation" Missing: GRAINS;
+    "draw" Is["grains"] => "material.type" MissingOrNot["glass", "water"]:
+        "grains are opaque; choose matte, plastic or metal";
+    "draw" Is["smooth", "union", "grains"] => "opacity" MissingOr["1"]: OPAQUE_SPHERES;
     "material.type" Is["glass", "water"] => "opacity" MissingOr["1"]: OPAQUE_SPHERES;
 };
 
@@ -214,6 +224,14 @@ pub struct Style {
     pub opacity: OpacitySetting,
     /// The material; by default that of `[material]` if it is opaque, else matte.
     pub material: Option<StyleMaterial>,
+    /// Shape of grains; by default superquadrics if files have exponents, else ellipsoids.
+    pub shape: Option<GrainKind>,
+    /// Semi-axes of grains; by default the columns that the format is known for, else the radius.
+    pub size: Option<GrainNumbers<3>>,
+    /// Exponents n1 and n2 of superquadrics.
+    pub exponents: Option<GrainNumbers<2>>,
+    /// Orientation of grains; by default the columns that the format is known for.
+    pub orientation: Option<GrainOrientation>,
     /// Bonds of sticks.
     pub bonds: Option<StyleBonds>,
     /// The arrows, if it draws these.
@@ -235,6 +253,10 @@ impl Default for Style {
             range: None,
             opacity: OpacitySetting::Constant(1.0),
             material: None,
+            shape: None,
+            size: None,
+            exponents: None,
+            orientation: None,
             bonds: None,
             arrows: None,
             trails: None,
@@ -250,7 +272,7 @@ impl Style {
             name => self.name, example("\"wall\""), unset("the condition");
             /// Condition on the particles, as select.where
             where => self.condition, example("\"type == 2\""), unset("all that no earlier style takes");
-            /// How they are drawn: spheres | smooth | union | sticks | balls-and-sticks | arrows | trails | hidden
+            /// How they are drawn: spheres | smooth | union | sticks | balls-and-sticks | grains | arrows | trails | hidden
             draw => self.draw;
             /// Radius as input.radius, of the balls or of the sticks
             ///
@@ -271,6 +293,18 @@ impl Style {
             /// The types are matte, plastic, metal, glass and water. One of the styles may be clear.
             material => self.material, example("{ type = \"plastic\", roughness = 0.3 }"),
                 unset("that of [material] if it is opaque, else matte");
+            /// Shape of grains: ellipsoid | superquadric | capsule | cylinder | cuboid
+            ///
+            /// Capsules and cylinders are along their z axis.
+            shape => self.shape, example("\"superquadric\""),
+                unset("superquadric if files have exponents, else ellipsoid");
+            /// Semi-axes of grains: three numbers, or the columns that have them
+            size => self.size, example("[1.0, 0.5, 0.5]"), unset("columns of known names, else the radius");
+            /// Exponents of superquadrics, along z and across: two numbers, or the columns that have them
+            exponents => self.exponents, example("[8.0, 2.0]"), unset("columns of known names");
+            /// Orientation of grains: { quaternion = ["qw", "qx", "qy", "qz"] }, or quaternion_xyzw, euler, euler_radians
+            orientation => self.orientation, example("{ quaternion = [\"qw\", \"qx\", \"qy\", \"qz\"] }"),
+                unset("columns of known names");
             /// Bonds of sticks: { find = "covalent", radius = 0.1 }
             bonds => self.bonds, example("{ find = \"covalent\", radius = 0.1 }"),
                 unset("those of [bonds], or of the file, or covalent ones");
@@ -299,12 +333,13 @@ impl Style {
         self.material.as_ref().is_some_and(StyleMaterial::is_clear)
     }
 
-    /// The surface of its particles; None if they have none.
+    /// The surface of its particles, where grains count as spheres; None if they have none.
     pub const fn surface(&self) -> Option<SurfaceKind> {
         match self.draw {
-            StyleDraw::Spheres | StyleDraw::Sticks | StyleDraw::BallsAndSticks => {
-                Some(SurfaceKind::Spheres)
-            }
+            StyleDraw::Spheres
+            | StyleDraw::Sticks
+            | StyleDraw::BallsAndSticks
+            | StyleDraw::Grains => Some(SurfaceKind::Spheres),
             StyleDraw::Smooth => Some(SurfaceKind::Smooth),
             StyleDraw::Union => Some(SurfaceKind::Union),
             StyleDraw::Arrows | StyleDraw::Trails | StyleDraw::Hidden => None,
@@ -359,6 +394,7 @@ pub struct StyledManifest {
 /// The order of groups by what they draw: spheres, bodies, others.
 fn rank(style: &Style) -> u8 {
     match style.surface() {
+        _ if style.draw == StyleDraw::Grains => 1,
         Some(SurfaceKind::Spheres) => 0,
         Some(SurfaceKind::Union | SurfaceKind::Smooth) => 1,
         None => 2,

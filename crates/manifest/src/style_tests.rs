@@ -56,6 +56,14 @@ fn impossible_styles_are_refused() {
             "style.0.material.type: sticks are opaque",
         ),
         ("radius = -1", "style.0.radius: expected"),
+        ("shape = \"cuboid\"", "style.0.shape: belongs to a style with draw = \"grains\""),
+        ("draw = \"grains\"\nsize = [1, -1, 1]", "style.0.size: expected 3 numbers above 0"),
+        ("draw = \"grains\"\nsize = [1, 1]", "style.0.size: expected"),
+        ("draw = \"grains\"\nshape = \"ball\"", "style.0.shape: expected"),
+        (
+            "draw = \"grains\"\norientation = { quat = [\"a\"] }",
+            "style.0.orientation.quat: unknown key; known here: quaternion",
+        ),
     ] {
         let error = read(&format!("[[style]]\n{text}")).unwrap_err();
         assert!(error.contains(part), "{text}: {error}");

@@ -80,7 +80,7 @@ fn written_manifests_are_valid() {
 }
 
 /// Every table of the schema, with a manifest that ends in this table, so that a line can be appended to it.
-const TABLES: [(&str, &str); 53] = [
+const TABLES: [(&str, &str); 54] = [
     ("", ""),
     ("/properties/input", "[input]\n"),
     ("/properties/camera", "[camera]\n"),
@@ -133,6 +133,7 @@ const TABLES: [(&str, &str); 53] = [
     ("/properties/style/items/properties/opacity/anyOf/1", "[[style]]\n[style.opacity]\n"),
     ("/properties/style/items/properties/material", "[[style]]\n[style.material]\n"),
     ("/properties/style/items/properties/bonds", "[[style]]\n[style.bonds]\n"),
+    ("/properties/style/items/properties/orientation", "[[style]]\n[style.orientation]\n"),
     ("/properties/style/items/properties/arrows", "[[style]]\n[style.arrows]\n"),
     (
         "/properties/style/items/properties/arrows/properties/color/anyOf/2",

@@ -90,8 +90,7 @@ impl<'a> SceneShapes<'a> {
         // Only opaque spheres fade out: transmissive ones and connected bodies have an inside
         let has_opacity = source.is_translucent() && interior == Interior::Opaque && !is_connected;
         let is_style = |shape: &&dyn Shape| {
-            matches!(scene.material(shape.material()).owner, Owner::Style(_))
-                && !shape.is_connected()
+            matches!(scene.material(shape.material()).owner, Owner::Style(_)) && shape.has_opacity()
         };
         let is_translucent = |shape: &&dyn Shape| match shape.material() {
             MaterialId::PARTICLES => has_opacity,

@@ -66,6 +66,11 @@ pub trait Shape: Sync {
         false
     }
 
+    /// Whether rays may pass its parts by their opacity: separate bodies that have one.
+    fn has_opacity(&self) -> bool {
+        !self.is_connected()
+    }
+
     /// The side of a connected body on which `point` is.
     fn side_of(&self, point: Vec3) -> Side {
         let _ = point;

@@ -120,6 +120,10 @@ impl Shape for GrainSurface<'_> {
         crossing_of_packet(self, ray, side)
     }
 
+    fn has_opacity(&self) -> bool {
+        false
+    }
+
     fn material(&self) -> MaterialId {
         self.material
     }
