@@ -114,7 +114,8 @@ fn impossible_styles_are_refused_and_empty_ones_are_noted() {
     refused("type == 2: spheres, colour red", "did you mean");
     refused("type == 2", "a condition, how its particles are drawn");
     refused("type == 2: spheres, color_by pressure", "no attribute `pressure`");
-    refused("type == 2: sticks", "no bonds");
+    let sticks = ["a.png", "--style", "type == 2: sticks"];
+    still(&workshop, "in", &sticks).expect(0).prints("no bonds");
     let twice = ["a.png", "--style", "type == 2: spheres", "--style", "type == 2: union"];
     still(&workshop, "in", &twice).expect(0).prints("no particle is of style `type == 2`");
     let none = ["a.png", "--style", "type > 7: hidden", "--style", "type == 9: smooth"];

@@ -1,15 +1,12 @@
 //! Shapes, sizes and orientations of grains, for a style with `draw = "grains"`.
 
 use serde_json::{Value as Json, json};
-use spherule_frame::grain_columns::{
-    AngleUnit, GrainNames, OrientationKind, QuaternionOrder, SizeKind,
-};
+use spherule_frame::grain_columns::{AngleUnit, OrientationKind, QuaternionOrder};
 
 use super::field::Field;
 use super::inline_table::{InlineTable, inline_table};
 use super::key::Key;
 use super::keys::{Keys, keys};
-use super::style::Style;
 use super::value::{Fault, FlagKind, Value, list, named, numbers_schema};
 
 named! {
@@ -105,7 +102,7 @@ inline_table!(GrainOrientation);
 
 impl GrainOrientation {
     /// The columns, and what their numbers are.
-    fn named(&self) -> Option<(Vec<String>, OrientationKind)> {
+    pub(super) fn named(&self) -> Option<(Vec<String>, OrientationKind)> {
         let quaternion = OrientationKind::Quaternion;
         let all = [
             (&self.quaternion, quaternion(QuaternionOrder::Wxyz)),
@@ -114,21 +111,5 @@ impl GrainOrientation {
             (&self.euler_radians, OrientationKind::Euler(AngleUnit::Radians)),
         ];
         all.into_iter().find_map(|(names, kind)| Some((names.clone()?, kind)))
-    }
-}
-
-impl Style {
-    /// The columns of its grains that are named.
-    pub fn grain_names(&self) -> GrainNames {
-        let sizes = match &self.size {
-            Some(GrainNumbers::Names(names)) => Some((names.clone(), SizeKind::SemiAxes)),
-            _ => None,
-        };
-        let exponents = match &self.exponents {
-            Some(GrainNumbers::Names(names)) => Some(names.clone()),
-            _ => None,
-        };
-        let orientation = self.orientation.as_ref().and_then(GrainOrientation::named);
-        GrainNames { orientation, sizes, exponents }
     }
 }

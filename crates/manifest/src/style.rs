@@ -1,5 +1,6 @@
 //! `[[style]]`: how some of the particles are drawn, unlike the others.
 
+use spherule_frame::grain_columns::{GrainNames, SizeKind};
 use spherule_selection::{Claim, Condition, Division};
 use spherule_tracer::scene::{self, Finish, Fresnel};
 use spherule_tracer::surface::SurfaceKind;
@@ -357,6 +358,20 @@ impl Style {
             (None, ColorSetting::Auto) => usual.clone(),
             (None, color) => color.clone(),
         }
+    }
+
+    /// The columns of its grains that are named.
+    pub fn grain_names(&self) -> GrainNames {
+        let sizes = match &self.size {
+            Some(GrainNumbers::Names(names)) => Some((names.clone(), SizeKind::SemiAxes)),
+            _ => None,
+        };
+        let exponents = match &self.exponents {
+            Some(GrainNumbers::Names(names)) => Some(names.clone()),
+            _ => None,
+        };
+        let orientation = self.orientation.as_ref().and_then(GrainOrientation::named);
+        GrainNames { orientation, sizes, exponents }
     }
 
     /// Whether legends show it: a map, or a name with a colour.
