@@ -147,8 +147,9 @@ fn setup_on(
     let mut scene = scene::scene(manifest, survey, inputs.environment, &placed, &extent)?;
     let meshes = meshes::things(&mut scene, manifest, &inputs.meshes);
     let cell = cell::add_cell(&mut scene, manifest, survey);
-    let mut arrows = arrows::arrows(&mut scene, manifest, survey, &color, extent.reach)?;
-    let mut trails = arrows::trails(&mut scene, manifest, survey, &color, extent.reach)?;
+    let place = (survey, &color, extent.reach);
+    let mut arrows = arrows::arrows(&mut scene, &manifest.arrows, place)?;
+    let mut trails = arrows::trails(&mut scene, &manifest.trails, place)?;
     let bonds = bonds::bonds(&mut scene, manifest, survey, &color, extent.reach)?;
     let looks = styles::Looks { manifest, survey, camera: &placed.camera, reach: extent.reach };
     let styles = looks.styles(&mut scene, &styled.styles, (&mut arrows, &mut trails))?;

@@ -2,7 +2,7 @@
 
 use super::rods::{look, rule};
 use super::{ResolveError, require_attribute};
-use crate::manifest::Manifest;
+use crate::manifest::{Arrows, Trails};
 use crate::math::narrow;
 use crate::pipeline::{ArrowStyle, ColorRule, TrailStyle};
 use crate::scene::Scene;
@@ -25,13 +25,11 @@ const TRAIL_RADIUS: f64 = 0.5;
 /// The particles have no such attribute, or colours are not determined.
 pub(super) fn arrows(
     scene: &mut Scene,
-    manifest: &Manifest,
-    survey: &Survey,
-    particles: &ColorRule,
-    reach: f64,
+    arrows: &[Arrows],
+    (survey, particles, reach): (&Survey, &ColorRule, f64),
 ) -> Result<Vec<ArrowStyle>, ResolveError> {
     let mut styles = Vec::new();
-    for own in &manifest.arrows {
+    for own in arrows {
         check_attribute(survey, &own.attribute)?;
         let radius = own.radius.unwrap_or_else(|| narrow(RADIUS * reach));
         let color = rule(&own.color, particles, survey, &own.attribute, COLOR)?;
@@ -57,12 +55,9 @@ pub(super) fn arrows(
 /// Colours are not determined.
 pub(super) fn trails(
     scene: &mut Scene,
-    manifest: &Manifest,
-    survey: &Survey,
-    particles: &ColorRule,
-    reach: f64,
+    own: &Trails,
+    (survey, particles, reach): (&Survey, &ColorRule, f64),
 ) -> Result<Vec<TrailStyle>, ResolveError> {
-    let own = &manifest.trails;
     if own.frames == 0 {
         return Ok(Vec::new());
     }

@@ -23,18 +23,32 @@ pub(super) fn bonds(
     reach: f64,
 ) -> Result<Option<BondStyle>, ResolveError> {
     let own = &manifest.bonds;
-    // Choose how bonds are found
-    let search = match own.find {
-        BondSearch::None => return Ok(None),
-        BondSearch::File => BondRule::File,
-        BondSearch::Distance(distance) => BondRule::Distance(narrow(distance)),
-        BondSearch::Covalent => {
-            require_attribute(survey, "bonds.find", ELEMENT)?;
-            BondRule::Covalent { name: ELEMENT.to_owned(), angstrom: survey.angstrom }
-        }
+    let Some(search) = bond_rule(own.find, survey, "bonds.find")? else {
+        return Ok(None);
     };
     // Choose their colour and radius
     let color = rule(&own.color, particles, survey, ELEMENT, "bonds.color")?;
     let radius = own.radius.unwrap_or_else(|| narrow(RADIUS * reach));
     Ok(look(scene, radius, &own.color, color).map(|look| BondStyle { rule: search, look }))
+}
+
+/// How bonds are found, if they are drawn; `key` says so.
+///
+/// # Errors
+/// There are no elements.
+pub(super) fn bond_rule(
+    search: BondSearch,
+    survey: &Survey,
+    key: &'static str,
+) -> Result<Option<BondRule>, ResolveError> {
+    Ok(match search {
+        BondSearch::None => None,
+        BondSearch::File => Some(BondRule::File),
+        BondSearch::Distance(distance) => Some(BondRule::Distance(narrow(distance))),
+        BondSearch::Covalent => {
+            require_attribute(survey, key, ELEMENT)?;
+            let name = ELEMENT.to_owned();
+            Some(BondRule::Covalent { name, angstrom: survey.angstrom })
+        }
+    })
 }

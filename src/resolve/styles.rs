@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::bonds::bond_rule;
 use super::rods::look;
 use super::{ResolveError, arrows, color, opacity, radius};
 use crate::manifest::{
@@ -10,8 +11,7 @@ use crate::manifest::{
 };
 use crate::math::narrow;
 use crate::pipeline::{
-    ArrowStyle, BondRule, BondStyle, ColorRule, GrainRules, ParticleStyle, RadiusRule, StyleForm,
-    TrailStyle,
+    ArrowStyle, BondStyle, ColorRule, GrainRules, ParticleStyle, RadiusRule, StyleForm, TrailStyle,
 };
 use crate::scene::{Camera, Fresnel, Material, Scene};
 use crate::surface::{SurfaceKind, SurfaceSettings};
@@ -62,15 +62,12 @@ impl Looks<'_> {
             } else {
                 None
             };
-            if let Some(own) = &style.arrows {
-                let manifest = Manifest { arrows: vec![own.clone()], ..self.manifest.clone() };
-                let own = arrows::arrows(scene, &manifest, self.survey, &color, self.reach)?;
-                arrows.extend(own.into_iter().map(|a| ArrowStyle { style: Some(index), ..a }));
-            }
+            let place = (self.survey, &color, self.reach);
+            let own = arrows::arrows(scene, style.arrows.as_slice(), place)?;
+            arrows.extend(own.into_iter().map(|own| ArrowStyle { style: Some(index), ..own }));
             if let Some(own) = &style.trails {
-                let manifest = Manifest { trails: own.clone(), ..self.manifest.clone() };
-                let own = arrows::trails(scene, &manifest, self.survey, &color, self.reach)?;
-                trails.extend(own.into_iter().map(|t| TrailStyle { style: Some(index), ..t }));
+                let own = arrows::trails(scene, own, place)?;
+                trails.extend(own.into_iter().map(|own| TrailStyle { style: Some(index), ..own }));
             }
             looks.push(ParticleStyle {
                 name: style.title(),
@@ -155,14 +152,8 @@ impl Looks<'_> {
             BondSearch::None => BondSearch::Covalent,
             given => given,
         };
-        let rule = match search {
-            BondSearch::None => return Ok(None),
-            BondSearch::File => BondRule::File,
-            BondSearch::Distance(distance) => BondRule::Distance(narrow(distance)),
-            BondSearch::Covalent => {
-                super::require_attribute(self.survey, "style.bonds", ELEMENT)?;
-                BondRule::Covalent { name: ELEMENT.to_owned(), angstrom: self.survey.angstrom }
-            }
+        let Some(rule) = bond_rule(search, self.survey, "style.bonds")? else {
+            return Ok(None);
         };
         // Atoms of sticks are as thick as these
         let largest = f64::from(radius::reach(radius, self.survey)) * f64::from(factor);

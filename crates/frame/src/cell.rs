@@ -83,6 +83,13 @@ impl SimulationCell {
         inverse.is_finite().then_some(inverse)
     }
 
+    /// How many edges of the cell are in a `way` between two particles, along each edge along which it repeats.
+    /// `inverse` is that of [`Self::fractions`].
+    pub(super) fn edges_in(&self, inverse: DMat3, way: DVec3) -> [f64; 3] {
+        let numbers = (inverse * way).round().to_array();
+        std::array::from_fn(|edge| if self.periodic[edge] { numbers[edge] } else { 0.0 })
+    }
+
     /// Where the images of the cell next to it are, without itself.
     pub fn images_around(&self) -> Vec<Vec3> {
         let steps = |edge: usize| {

@@ -42,8 +42,8 @@ impl PeriodicImages {
         a.saturating_mul(b).saturating_mul(c)
     }
 
-    /// Wraps, unwraps and copies `particles`; the cell grows to all copies. The first particles are those of the file, then follow
-    /// the copies, with the number along the first edge rising fastest. Copies have the attributes of the original, and
+    /// Wraps, unwraps and copies `particles`; the cell grows to all copies. The first particles are those of the file, then
+    /// follow the copies, with the number along the first edge rising fastest. Copies have the attributes of the original, and
     /// an attribute `id` with the index in the file if there are no ids.
     ///
     /// # Errors
@@ -135,9 +135,7 @@ impl PeriodicImages {
         let mut bonds = Vec::with_capacity(particles.bonds.len() * self.count() as usize);
         for bond in &particles.bonds {
             let [from, to] = bond.map(|index| particles.positions.get(index as usize));
-            let way = (inverse * (to - from)).round().to_array();
-            let cells: [i64; 3] =
-                std::array::from_fn(|edge| if cell.periodic[edge] { way[edge] as i64 } else { 0 });
+            let cells = cell.edges_in(inverse, to - from).map(|number| number as i64);
             for image in 0..self.count() as usize {
                 let along = self.along(image);
                 let other: [usize; 3] = std::array::from_fn(|edge| {

@@ -86,12 +86,8 @@ fn by_bonds(particles: &RawParticles, cell: &SimulationCell, inverse: DMat3) -> 
 
 /// The whole edges in a way between two particles, along which the cell repeats.
 fn nearest_edges(cell: &SimulationCell, inverse: DMat3, way: DVec3) -> DVec3 {
-    let cells = (inverse * way).round().to_array();
-    let edges = cell.vectors.iter().zip(cells).zip(cell.periodic);
-    edges
-        .filter(|((_, number), is_periodic)| *is_periodic && number.is_finite())
-        .map(|((edge, number), _)| number * *edge)
-        .sum()
+    let edges = cell.vectors.iter().zip(cell.edges_in(inverse, way));
+    edges.filter(|(_, number)| number.is_finite()).map(|(edge, number)| number * *edge).sum()
 }
 
 /// The particles that each one has bonds with.

@@ -408,14 +408,10 @@ impl Manifest {
 
     /// The condition on particles that are drawn.
     fn drawn_condition(&self) -> Option<Condition> {
-        let selected = self.select.condition.as_ref().map(Condition::as_str);
-        let all = match (selected, self.shown_condition()) {
-            (_, None) => return self.select.condition.clone(),
-            (None, Some(shown)) => shown,
-            (Some(selected), Some(shown)) => format!("({selected}) && ({shown})"),
-        };
-        // Conditions in parentheses are conditions
-        Condition::parse(&all).ok().or_else(|| self.select.condition.clone())
+        match (self.select.condition.clone(), self.shown_condition()) {
+            (Some(selected), Some(shown)) => Some(selected.and(shown)),
+            (selected, shown) => selected.or(shown),
+        }
     }
 
     /// The picture on the ground.

@@ -417,25 +417,31 @@ fn rank(style: &Style) -> u8 {
 }
 
 impl Manifest {
-    /// The condition of the particles that no hidden style takes; None if there is none.
-    pub(super) fn shown_condition(&self) -> Option<String> {
-        // From the last style on: None is all particles, Some("") none
-        let mut rest: Option<String> = None;
+    /// The condition of the particles that no hidden style takes; None if all are drawn.
+    pub(super) fn shown_condition(&self) -> Option<Condition> {
+        let nothing = || Condition::parse("index < 0").expect("a condition");
+        // From the last style on: whether there is a rest, and the condition of those of it that are drawn
+        let (mut is_none, mut rest): (bool, Option<Condition>) = (false, None);
         for style in self.styles.iter().rev() {
-            let own = style.condition.as_ref().map(Condition::as_str);
             let is_hidden = style.draw == StyleDraw::Hidden;
-            rest = match (own, is_hidden, rest.as_deref()) {
-                (None, true, _) => Some(String::new()),
-                (None, false, _) | (Some(_), false, None) => None,
-                (Some(own), true, None) => Some(format!("!({own})")),
-                (Some(_), true, Some("")) => Some(String::new()),
-                (Some(own), true, Some(rest)) => Some(format!("!({own}) && ({rest})")),
-                (Some(own), false, Some("")) => Some(own.to_owned()),
-                (Some(own), false, Some(rest)) => Some(format!("({own}) || ({rest})")),
+            (is_none, rest) = match (style.condition.clone(), is_hidden) {
+                (None, _) => (is_hidden, None),
+                (Some(_), true) if is_none => (true, None),
+                (Some(own), true) => {
+                    let others = own.negated();
+                    (
+                        false,
+                        Some(match rest {
+                            Some(rest) => others.and(rest),
+                            None => others,
+                        }),
+                    )
+                }
+                (Some(own), false) if is_none => (false, Some(own)),
+                (Some(own), false) => (false, rest.map(|rest| own.or(rest))),
             };
         }
-        // No particle is below itself
-        rest.map(|rest| if rest.is_empty() { "index < 0".to_owned() } else { rest })
+        if is_none { Some(nothing()) } else { rest }
     }
 
     /// The groups of particles that are drawn in different ways: first those without a style, or those of a clear one.

@@ -168,6 +168,55 @@ impl Condition {
     pub fn as_str(&self) -> &str {
         &self.text
     }
+
+    /// The particles for which it does not hold.
+    #[must_use]
+    pub fn negated(mut self) -> Self {
+        self.text = format!("!({})", self.text);
+        self.operations.push(Operation::Not);
+        self
+    }
+
+    /// The particles for which both hold.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        self.joined(other, "&&", Operation::And)
+    }
+
+    /// The particles for which one of both holds.
+    #[must_use]
+    pub fn or(self, other: Self) -> Self {
+        self.joined(other, "||", Operation::Or)
+    }
+
+    /// Both conditions with an operation between them. Nothing is parsed, so that no limit of lengths and depths applies.
+    fn joined(mut self, other: Self, sign: &str, operation: Operation) -> Self {
+        let is_unary = matches!(self.operations.last(), Some(Operation::Not));
+        let own = if is_unary { self.text } else { format!("({})", self.text) };
+        // What the operations of the other refer to follows after what those of this one refer to
+        let [names, texts, near] = [self.names.len(), self.texts.len(), self.neighbours.len()];
+        let moved = |operation: Operation| match operation {
+            Operation::Value(index) => Operation::Value(names + index),
+            Operation::Text(index) => Operation::Text(texts + index),
+            Operation::Near(index) => Operation::Near(near + index),
+            other => other,
+        };
+        let place = own.chars().count() + 1;
+        self.names.extend(other.names);
+        self.texts.extend(other.texts.into_iter().map(|text| TextUse {
+            of: names + text.of,
+            list: text.list.map(|list| place + list),
+            ..text
+        }));
+        self.neighbours.extend(other.neighbours.into_iter().map(|neighbours| NeighbourUse {
+            operations: neighbours.operations.into_iter().map(moved).collect(),
+            ..neighbours
+        }));
+        self.operations.extend(other.operations.into_iter().map(moved));
+        self.operations.push(operation);
+        self.text = format!("{own} {sign} ({})", other.text);
+        self
+    }
 }
 
 impl fmt::Display for Token {

@@ -136,6 +136,31 @@ mod tests {
     }
 
     #[test]
+    fn joined_conditions_are_those_of_the_joined_text() {
+        let particles = particles(true);
+        let parsed = |text: &str| Condition::parse(text).unwrap();
+        let survivors = |condition: Condition| {
+            let condition = Some(condition);
+            Selection { condition, ..Selection::default() }.survivors(&particles).unwrap()
+        };
+        let near = parsed("within 1 of (type == 1 && x > 3)");
+        let joined = [
+            near.clone().negated().and(parsed("type == 0 || y < 2").or(near.clone())),
+            parsed("z > 8").or(near.clone().and(parsed("type == 0").negated())),
+            parsed("type in (1, 7)").and(parsed("x > 1")).negated(),
+        ];
+        for condition in joined {
+            let text = condition.as_str().to_owned();
+            let found = survivors(condition);
+            assert_eq!(found, survivors(parsed(&text)), "{text}");
+            assert!(!found.is_empty() && found.len() < 600, "{text}");
+        }
+        // No limit of the text applies
+        let all = (0..200).fold(parsed("x < 0"), |all, _| parsed("z > 8").or(all));
+        assert_eq!(survivors(all), survivors(parsed("z > 8")));
+    }
+
+    #[test]
     fn errors_name_the_character() {
         for (text, column, what) in [
             ("within 5 (type == 1)", 10, "expected `of`"),

@@ -1,6 +1,6 @@
 //! What makes pictures clear where light does not: the widths of outlines, and how particles fade with their distance.
 
-use crate::scene::{Camera, Scene};
+use crate::scene::{Bounds, Scene};
 
 /// How outlines and distance are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -29,14 +29,11 @@ impl DepthCue {
     /// The fading over the box of the particles of `scene`; None if nothing fades.
     pub(super) fn new(scene: &Scene, drawing: &Drawing) -> Option<Self> {
         let [min, max] = scene.particles;
-        let corners = (0..8_u8).map(|corner| {
-            let part = |axis: u8| f32::from(corner >> axis & 1);
-            min + (max - min) * glam::Vec3::new(part(0), part(1), part(2))
-        });
-        let depth = |camera: &Camera, point| camera.depth_of(point).max(0.0);
-        let depths: Vec<f32> = corners.map(|corner| depth(&scene.camera, corner)).collect();
-        let near = depths.iter().copied().fold(f32::INFINITY, f32::min);
-        let far = depths.iter().copied().fold(0.0, f32::max);
+        let bounds = Bounds { min: min.as_dvec3(), max: max.as_dvec3() };
+        let depths =
+            bounds.corners().map(|corner| scene.camera.depth_of(corner.as_vec3()).max(0.0));
+        let near = depths.into_iter().fold(f32::INFINITY, f32::min);
+        let far = depths.into_iter().fold(0.0, f32::max);
         let slope = drawing.depth_cue / (far - near);
         (drawing.depth_cue > 0.0 && slope.is_finite()).then_some(Self {
             near,
