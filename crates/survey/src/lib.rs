@@ -47,6 +47,7 @@ mod facts;
 mod gas;
 mod grains;
 mod moments;
+mod neighbours;
 mod outline;
 mod packing;
 mod robust;

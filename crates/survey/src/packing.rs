@@ -76,7 +76,7 @@ mod tests {
 
     fn spacing(positions: &[Vec3]) -> Option<Spacing> {
         let request = SpacingRequest { needs_packed: true, frames: 1 };
-        spacing_of(positions, request)
+        spacing_of(&positions.iter().copied().collect(), request)
     }
 
     fn packed(positions: &[Vec3]) -> Option<f32> {

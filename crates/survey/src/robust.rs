@@ -1,9 +1,10 @@
 //! Percentiles of samples, and the spacing of particles.
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use rayon::prelude::*;
 use spherule_formats::{Positions, sample_indices};
 
+use super::neighbours::Coordinates;
 use super::packing::{self, Spacing, SpacingRequest};
 
 /// Number of particles of a frame from which percentiles are computed.
@@ -14,7 +15,7 @@ pub(super) const ESCAPE_MIN: usize = 16;
 pub(super) const NEIGHBOUR_QUERIES: usize = 512;
 /// Minimum number of these distances, whatever they cost.
 const MIN_NEIGHBOUR_QUERIES: usize = 16;
-/// Maximum number of distance computations for the estimates of all frames: half a second.
+/// Maximum number of distance computations for the estimates of all frames: half a second on one thread.
 const NEIGHBOUR_BUDGET: usize = 1_000_000_000;
 
 /// Number of distances for the estimate of a frame of `count` particles, which is one of `frames`.
@@ -158,45 +159,19 @@ pub(super) fn percentile(values: &[f64], percent: f64) -> Option<f64> {
     Some(low + part * (high - low))
 }
 
-/// `count` of the particles, for queries.
-fn queries(positions: &[Vec3], count: usize) -> impl Iterator<Item = &Vec3> {
-    sample_indices(positions.len(), count).map(|i| &positions[i])
-}
-
 /// The spacing of neighbours among `positions`.
-pub(super) fn spacing_of(positions: &[Vec3], request: SpacingRequest) -> Option<Spacing> {
-    let query_count = neighbour_queries(positions.len(), request.frames);
-    let (touching, closest) = half_median_and_least(nearest_distances(positions, query_count))?;
-    let packed = || estimate_packed(positions, touching, query_count);
+pub(super) fn spacing_of(positions: &Coordinates, request: SpacingRequest) -> Option<Spacing> {
+    let count = neighbour_queries(positions.len(), request.frames);
+    let queries = || sample_indices(positions.len(), count).map(|i| positions.get(i));
+    let squares = queries().map(|from| positions.nearest_square(from));
+    let distances = squares.filter(|square| square.is_finite()).map(f32::sqrt).collect();
+    let (touching, closest) = half_median_and_least(distances)?;
+    let packed = || {
+        let square = packing::reach(touching).powi(2);
+        let counts = queries().map(|from| positions.count_within(from, square));
+        packing::packed_radius(touching, counts.collect())
+    };
     Some(Spacing { touching, closest, packed: request.needs_packed.then(packed).flatten() })
-}
-
-/// The radius from the density, by this number of queries; `touching` is half the distance to the nearest neighbour.
-fn estimate_packed(positions: &[Vec3], touching: f32, query_count: usize) -> Option<f32> {
-    let square = packing::reach(touching).powi(2);
-    let count = |from: &Vec3| {
-        let chunks = positions.par_chunks(64 * 1024);
-        let near = |chunk: &[Vec3]| {
-            let near = chunk.iter().filter(|to| from.distance_squared(**to) <= square);
-            near.map(|_| 1_u32).sum::<u32>()
-        };
-        chunks.map(near).sum()
-    };
-    let counts = queries(positions, query_count).map(count);
-    packing::packed_radius(touching, counts.collect())
-}
-
-/// The distances of this number of particles to their nearest neighbours; none for fewer than two distinct particles.
-fn nearest_distances(positions: &[Vec3], query_count: usize) -> Vec<f32> {
-    let nearest = |from: &Vec3| {
-        let chunks = positions.par_chunks(64 * 1024).map(|chunk| {
-            let distances = chunk.iter().map(|to| from.distance_squared(*to));
-            distances.filter(|d| *d > 0.0).fold(f32::INFINITY, f32::min)
-        });
-        chunks.reduce(|| f32::INFINITY, f32::min)
-    };
-    let squares = queries(positions, query_count).map(nearest).filter(|d| d.is_finite());
-    squares.map(f32::sqrt).collect()
 }
 
 /// Half the median of `distances`, and half of what one of a hundred has at most.

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use spherule_formats::convert::{RawSource, open_source};
 use spherule_formats::native::layout::RadiusIndex;
 use spherule_formats::native::{Access, FrameIndex, NativeFile, NativeFrame};
@@ -275,8 +275,7 @@ fn spacing_of(positions: &Positions, request: SpacingRequest) -> Option<Spacing>
     let bounds = robust_bounds(positions, None)?;
     let origin = choose_origin(bounds.outer.0, bounds.outer.1);
     let relative = (0..positions.len()).map(|i| (positions.get(i) - origin).as_vec3());
-    let near: Vec<Vec3> = relative.filter(is_near).collect();
-    robust::spacing_of(&near, request)
+    robust::spacing_of(&relative.filter(is_near).collect(), request)
 }
 
 /// The spacing of neighbours in a native frame.

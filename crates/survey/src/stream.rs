@@ -206,7 +206,6 @@ fn each_run<T: Send>(
 
 #[cfg(test)]
 mod tests {
-    use glam::Vec3;
     use spherule_formats::convert::{BoxSource, RawSource};
     use spherule_formats::generate::BoxSettings;
 
@@ -227,7 +226,7 @@ mod tests {
         let request = |needs_packed| SpacingRequest { needs_packed, frames: 1 };
         let streamed =
             spacing(&source, &some.positions, request(true)).expect("there").expect("some");
-        let single: Vec<Vec3> = all.iter().map(|p| p.as_vec3()).collect();
+        let single = all.iter().map(|p| p.as_vec3()).collect();
         let whole = spacing_of(&single, request(true)).expect("some");
         let near = |a: f32, b: f32| assert!((a / b - 1.0).abs() < 0.1, "{a} {b}");
         near(streamed.touching, whole.touching);
