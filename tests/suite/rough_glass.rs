@@ -60,9 +60,7 @@ fn a_rough_ball_in_white_surroundings_is_nearly_white() {
     let mut found = Vec::new();
     for (roughness, least, most) in [
         ("0", 0.998, 1.002),
-        ("0.2", 0.99, 1.01),
         ("0.4", 0.985, 1.015),
-        ("0.7", 0.97, 1.03),
         ("1", 0.95, 1.05),
     ] {
         let key = format!("material.roughness={roughness}");

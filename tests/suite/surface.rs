@@ -24,7 +24,7 @@ fn jobs_of_spheres_as_one_body_with_spray() {
 
 #[test]
 fn jobs_of_a_smooth_surface_with_spray() {
-    jobs_with_spray("smooth", &["--set", "render.caustics={photons=100000}"]);
+    jobs_with_spray("smooth", &["--set", "render.caustics={photons=20000}"]);
 }
 
 fn jobs_with_spray(surface: &str, caustics: &[&str]) {

@@ -257,8 +257,8 @@ fn check_ray(scene: &Scene, tree: &TreeView, ray: &Ray, indexed: bool, level: Si
 fn awkward_scenes_match_brute_force() {
     for settings in all_settings() {
         for scene in awkward_scenes() {
-            let judged = check(&scene, &settings, 150);
-            assert!(judged >= 60, "{} {settings:?}: only {judged} of 150 rays judged", scene.name);
+            let judged = check(&scene, &settings, 80);
+            assert!(judged >= 30, "{} {settings:?}: only {judged} of 80 rays judged", scene.name);
         }
     }
 }
@@ -325,7 +325,7 @@ fn trees_do_not_depend_on_threads() {
     ] {
         for settings in all_settings() {
             let one = tree_by_threads(&scene, &settings, 1);
-            for threads in [2, 3, 8] {
+            for threads in [2, 7] {
                 let other = tree_by_threads(&scene, &settings, threads);
                 assert!(one == other, "{} {settings:?} {threads}", scene.name);
             }
@@ -415,14 +415,14 @@ fn a_crowded_cell_is_sorted_by_all_threads() {
 /// many others.
 #[test]
 fn large_scenes_match_a_particle_tree() {
-    let cloud = random_points(100_000, 21);
+    let cloud = random_points(40_000, 21);
     let crowded = cloud.iter().enumerate().map(|(i, p)| if i % 3 == 0 { *p } else { *p * 1e-2 });
     let planes = cloud.iter().map(|p| (*p * 8.0).round() / 8.0 + p.with_x(0.0) * 1e-3);
     let scenes = [
         Scene::common("cloud", cloud.clone(), 5e-3),
         Scene::common("crowded cloud", crowded.collect(), 1e-3),
         Scene::common("planes", planes.collect(), 2e-3),
-        Scene::common("all coincident", vec![Vec3::splat(0.25); 100_000], 0.1),
+        Scene::common("all coincident", vec![Vec3::splat(0.25); 40_000], 0.1),
     ];
     for scene in &scenes {
         let oracle = ParticleTree::new(&scene.centers, scene.radii[0]);

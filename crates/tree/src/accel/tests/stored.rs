@@ -114,7 +114,7 @@ fn few_stored_particles_match_brute_force() {
 
 #[test]
 fn many_stored_particles_match_brute_force() {
-    check_sets(8_000);
+    check_sets(4_000);
 }
 
 /// Loads all blocks as a traversal does.
