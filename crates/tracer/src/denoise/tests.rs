@@ -145,8 +145,8 @@ fn the_result_is_that_of_the_formulas() {
         (37, 1, 4),
         (16, 16, 5),
         (21, 13, 6),
-        (33, 70, 7),
-        (170, 11, 8),
+        (33, 40, 7),
+        (90, 11, 8),
     ] {
         let picture = Picture::random(width, height, seed);
         for settings in [DenoiseSettings::OPAQUE, DenoiseSettings::WATER] {

@@ -224,7 +224,7 @@ fn samples_follow_their_density() {
             }
             // Integrate the density over each cell
             let mut expected = [0.0; ROWS * COLUMNS];
-            let (fine_rows, fine_columns) = (ROWS * 256, COLUMNS * 128);
+            let (fine_rows, fine_columns) = (ROWS * 128, COLUMNS * 64);
             for row in 0..fine_rows {
                 let z = (row as f32 + 0.5) / fine_rows as f32;
                 let level = (1.0 - z * z).sqrt();

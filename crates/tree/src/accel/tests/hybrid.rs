@@ -125,7 +125,7 @@ fn incoherent_packets_match_brute_force() {
                     let what = format!("{} {settings:?} {level:?}", scene.name);
                     judged += check_by_brute_force(&scene, &view, chunk, &what);
                 }
-                assert!(judged >= 30, "{}: {judged} of 80 judged", scene.name);
+                assert!(judged >= 20, "{}: {judged} of 80 judged", scene.name);
             }
         }
     }
