@@ -352,6 +352,7 @@ fn stored_within(
         time: None,
         cell: None,
         bonds: Vec::new(),
+        shapes: None,
         dropped: 0,
         file_index: None,
     };
