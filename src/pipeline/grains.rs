@@ -220,6 +220,29 @@ fn chosen<'v, T: Copy>(values: &'v [T], members: Option<&[u32]>) -> Cow<'v, [T]>
     }
 }
 
+/// How many times a mesh may be larger or smaller than the radius before that is noted: a mesh in millimetres for
+/// particles in metres is a thousand times its usual size.
+const USUAL_RATIO: f64 = 50.0;
+
+/// A note if the mesh of a style without a size is much larger or smaller than the particles.
+pub(super) fn unit_note(style: &str, rules: &GrainRules, radius: &Radius) -> Option<String> {
+    let is_sized = rules.size.is_some() || rules.names.sizes.is_some();
+    let mesh = rules.mesh.as_ref().filter(|_| !is_sized)?;
+    let radius = match radius {
+        Radius::Common(radius) => *radius,
+        Radius::PerParticle(radii) => *radii.first()?,
+    };
+    let ratio = mesh.radius() / f64::from(radius);
+    let is_usual = (1.0 / USUAL_RATIO..USUAL_RATIO).contains(&ratio);
+    let (factor, size) = if ratio > 1.0 { (ratio, "larger") } else { (1.0 / ratio, "smaller") };
+    (!is_usual && factor.is_finite()).then(|| {
+        format!(
+            "style `{style}`: the mesh is {factor:.0} times {size} than the particles; if it is in another unit, set size \
+             (size = [0.001, 0.001, 0.001] for millimetres to metres)"
+        )
+    })
+}
+
 /// What was wrong with the grains of a style.
 pub(super) fn report_notes(style: &str, report: &GrainReport) -> Vec<String> {
     let counts = [

@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::bodies::{build_grid, radius_of, shading_normals};
 use super::decoded::DecodedFrame;
-use super::grains::report_notes;
+use super::grains::{report_notes, unit_note};
 use super::motion::displaced;
 use super::setup::{OpacityRule, Setup, StyleForm};
 use super::styles::StyleParticles;
@@ -106,7 +106,8 @@ impl StyleSurfaces {
                     bytes += built;
                     all.bodies.push(body);
                 }
-                StyleForm::Grains(_) => {
+                StyleForm::Grains(grains) => {
+                    notes.extend(unit_note(&rules.name, grains, &own.radius));
                     if let Some(grains) = StyleGrains::build(setup, frame, own, notes) {
                         bytes += grains.trees.iter().map(|tree| tree.bytes() as u64).sum::<u64>();
                         all.grains.push(grains);

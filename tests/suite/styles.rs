@@ -116,6 +116,9 @@ fn grains_have_the_shape_of_a_mesh() {
     let style = |text: &str| still(&workshop, "a.csv", &["a.png", "--style", text]);
     style(": grains, mesh grain.obj").expect(0).prints("drawn upright");
     style("type == 1: grains, mesh grain.obj, size [1, 2, 1]").expect(0);
+    let large = OBJ.replace("v 1 ", "v 1000 ").replace("v -1", "v -1000");
+    fs::write(workshop.join("large.obj"), large).expect("a file");
+    style(": grains, mesh large.obj").expect(0).prints("times larger than the particles");
     style(": grains, shape convex-hull, mesh open.obj, size radius").expect(0);
     // Errors name the file and what to do, and come before a picture
     let refused = |text: &str, parts: [&str; 2]| {

@@ -174,7 +174,7 @@ impl GrainMesh {
     }
 
     /// Radius of a sphere around the origin.
-    pub(super) const fn radius(&self) -> f64 {
+    pub const fn radius(&self) -> f64 {
         self.radius
     }
 }
