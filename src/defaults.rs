@@ -19,6 +19,7 @@ mod legend;
 mod parts;
 mod planned;
 mod radius;
+mod shapes;
 mod view;
 
 pub use parts::{Walls, walls};
@@ -121,6 +122,7 @@ pub fn rules(
     }
     // The order matters: later rules see what earlier ones have set
     rules.up();
+    rules.shapes();
     rules.grains();
     rules.lone();
     rules.sheet();

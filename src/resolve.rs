@@ -10,8 +10,8 @@ use crate::manifest::{Manifest, Side, StyledManifest};
 use crate::output::PreviewPage;
 use crate::overlay::{Page, RgbaPixels};
 use crate::pipeline::{
-    FileSettings, FrameSize, MemoryModel, ParticleRules, Picture, PictureMesh, RadiusRule, Setup,
-    Things,
+    FileSettings, FrameSize, GrainMeshes, MemoryModel, ParticleRules, Picture, PictureMesh,
+    RadiusRule, Setup, Things,
 };
 use crate::render::{RenderSettings, RendererKind};
 use crate::scene::{Bounds, RadianceMap, Texture};
@@ -71,6 +71,8 @@ pub struct SceneInputs<'a> {
     pub ground: Option<&'a Arc<Texture>>,
     /// The meshes, one for each of the manifest.
     pub meshes: Vec<PictureMesh>,
+    /// Those of grains.
+    pub grain_meshes: GrainMeshes,
 }
 
 /// Determines everything about the images of a job.
@@ -151,7 +153,13 @@ fn setup_on(
     let mut arrows = arrows::arrows(&mut scene, &manifest.arrows, place)?;
     let mut trails = arrows::trails(&mut scene, &manifest.trails, place)?;
     let bonds = bonds::bonds(&mut scene, manifest, survey, &color, extent.reach)?;
-    let looks = styles::Looks { manifest, survey, camera: &placed.camera, reach: extent.reach };
+    let looks = styles::Looks {
+        manifest,
+        survey,
+        camera: &placed.camera,
+        meshes: &inputs.grain_meshes,
+        reach: extent.reach,
+    };
     let styles = looks.styles(&mut scene, &styled.styles, (&mut arrows, &mut trails))?;
     // Collect the settings of the images
     let (channels, attributes) = channels::channels(manifest, survey)?;

@@ -177,7 +177,7 @@ impl ManifestArgs {
             let each = 360.0 / f64::from(count);
             list.push(over("camera.degrees_per_frame", each, &shown)?);
         }
-        self.shortcuts.add_overrides(list)?;
+        self.shortcuts.add_overrides(list, from_file)?;
         if let Some(path) = &self.camera_path {
             let keys = camera_keys(path)?;
             let shown = format!("--camera-path {}", path.display());

@@ -8,6 +8,7 @@ use toml::{Table, Value};
 use super::CliError;
 use super::key_flags::over;
 use super::numbers::number;
+use super::paths::path_as_typed;
 use super::style_flag::style;
 use crate::manifest::Override;
 
@@ -199,8 +200,12 @@ fn overlay(kind: &str, keys: &[(&str, Option<&String>)]) -> Table {
 }
 
 impl Shortcuts {
-    /// Adds the given options.
-    pub(super) fn add_overrides(&self, list: &mut Vec<Override>) -> Result<(), CliError> {
+    /// Adds the given options, over a manifest that is in a file if `from_file`.
+    pub(super) fn add_overrides(
+        &self,
+        list: &mut Vec<Override>,
+        from_file: bool,
+    ) -> Result<(), CliError> {
         // Each shortcut stands for one or two keys
         if let Some(Size { width, height }) = &self.size {
             list.push(over("image.width", side(width), "--size")?);
@@ -220,7 +225,11 @@ impl Shortcuts {
             list.push(over("select.slab", slice.clone(), "--slice")?);
         }
         for style in &self.style {
-            list.push(append("style", style.clone(), "--style")?);
+            let mut style = style.clone();
+            if let Some(Value::String(mesh)) = style.get_mut("mesh") {
+                *mesh = path_as_typed(mesh, from_file)?;
+            }
+            list.push(append("style", style, "--style")?);
         }
         for clip in &self.clip {
             list.push(append("clip", clip.clone(), "--clip")?);

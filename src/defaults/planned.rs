@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use toml::{Table, Value};
 
 use super::legend::{COLORS, TIME};
-use super::{COLOR, KEYS};
+use super::{COLOR, KEYS, shapes};
 use crate::manifest::{ManifestSource, Override};
 
 /// The types of overlays that rules add.
@@ -30,6 +30,9 @@ pub fn planned(source: &ManifestSource, planned: &[(String, String)]) -> Vec<Ove
             (_, None) => Vec::new(),
         })
         .collect();
+    // Grains
+    let has_grains = source.lacks("style") && shapes::has_grains(planned);
+    layers.extend(shapes::grains("the plan of the job").filter(|_| has_grains));
     // Sizes of overlays that are given, and overlays after these
     let manifest = source.parse().ok().map(|(manifest, _)| manifest);
     let given = manifest.as_ref().map_or(0, |manifest| manifest.overlays.len());

@@ -71,6 +71,6 @@ impl Rules<'_> {
 }
 
 /// A positive number with three significant digits.
-fn three_digits(value: f64) -> f64 {
+pub(super) fn three_digits(value: f64) -> f64 {
     format!("{value:.2e}").parse().unwrap_or(value)
 }

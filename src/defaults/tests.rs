@@ -5,9 +5,9 @@ use spherule_formats::SimulationCell;
 use super::*;
 use crate::manifest::{
     AxisView, BondSearch, ColorSetting, GroundKind, GroundSetting, OverlayKind, RadiusSetting,
-    TextSize,
+    StyleDraw, TextSize,
 };
-use crate::survey::{Axes, Elements, GrainRadius, WallSign, WallValues};
+use crate::survey::{Axes, Elements, GrainRadius, ShapeSource, WallSign, WallValues};
 
 /// Facts of a thousand particles in a unit cube without attributes.
 fn facts() -> Facts {
@@ -261,6 +261,7 @@ fn jobs_that_go_on_have_the_defaults_of_their_plan() {
     let mut atoms = facts();
     atoms.elements = Some(Elements { has_others: true, is_solid: false });
     atoms.has_time = true;
+    atoms.shape_source = Some(ShapeSource { what: "types".to_owned(), radius: Some(0.1) });
     let begun = of("", &atoms);
     for text in [
         "",
@@ -270,6 +271,7 @@ fn jobs_that_go_on_have_the_defaults_of_their_plan() {
         "legend = false",
         "overlay = []",
         "[[overlay]]\ntype = \"text\"",
+        "[[style]]\ndraw = \"hidden\"\nwhere = \"x > 1\"",
     ] {
         let begun = of(text, &atoms);
         let source = ManifestSource::new(
@@ -357,6 +359,34 @@ fn columns_with_plausible_radii_are_radii() {
     assert_eq!(of("input.radius = 2.0", &grains).input.radius, RadiusSetting::Length(2.0));
     grains.elements = Some(Elements { has_others: false, is_solid: false });
     assert!(matches!(of("", &grains).input.radius, RadiusSetting::Table { .. }));
+}
+
+#[test]
+fn particles_with_shapes_are_grains() {
+    let source = || ShapeSource { what: "`orientation`".to_owned(), radius: Some(0.25) };
+    let shaped = || Facts { shape_source: Some(source()), ..facts() };
+    let (manifest, lines) = completed("", &shaped(), Files::default());
+    assert_eq!(manifest.styles.len(), 1);
+    assert_eq!(manifest.styles[0], Style { draw: StyleDraw::Grains, ..Style::default() });
+    assert_eq!(manifest.input.radius, RadiusSetting::Length(0.25));
+    let explicit = of("[[style]]\ndraw = \"grains\"", &shaped());
+    assert_eq!(explicit.settings(), manifest.settings());
+    assert!(lines.contains("by `orientation` (--style ': spheres' draws spheres)"), "{lines}");
+    // What is for spheres keeps them
+    for text in [
+        "input.radius = 2.0",
+        "material.opacity = 0.5",
+        "material.type = \"glass\"",
+        "render.surface = \"union\"",
+        "look = \"none\"",
+        "[[clip]]\nmode = \"cut\"\ntype = \"plane\"\nnormal = [1, 0, 0]",
+    ] {
+        assert!(of(text, &shaped()).styles.is_empty(), "{text}");
+    }
+    assert!(of("", &Facts { has_bonds: true, ..shaped() }).styles.is_empty());
+    assert!(of("", &facts()).styles.is_empty());
+    let spheres = of("[[style]]\ndraw = \"spheres\"", &shaped()).styles;
+    assert_eq!(spheres, [Style::default()]);
 }
 
 #[test]

@@ -9,7 +9,7 @@ use spherule_jobs::{FileError, FrameRange, JobError};
 
 use crate::conversion::UnknownAttribute;
 use crate::manifest::{ManifestError, RebaseError};
-use crate::pipeline::{MemoryLimitError, MeshLoadError};
+use crate::pipeline::{GrainMeshLoadError, MemoryLimitError, MeshLoadError};
 use crate::resolve::ResolveError;
 use spherule_images::file::ImageReadError;
 
@@ -53,6 +53,14 @@ pub enum RunError {
         index: usize,
         /// Why.
         source: MeshLoadError,
+    },
+    /// A mesh of grains cannot be read, or is not the surface of a body.
+    #[error("style.{index}.mesh: {source}")]
+    GrainMesh {
+        /// The index of the style in the manifest.
+        index: usize,
+        /// Why.
+        source: GrainMeshLoadError,
     },
     /// An attribute to convert does not exist.
     #[error(transparent)]

@@ -11,7 +11,7 @@ use spherule_jobs::contents_hash;
 use super::RunError;
 use super::manifest_file::reading_budget;
 use crate::manifest::{Manifest, MeshPath, named_place};
-use crate::pipeline::{LoadedMesh, PictureMesh, load_mesh};
+use crate::pipeline::{GrainMeshes, LoadedMesh, PictureMesh, load_mesh};
 use crate::resolve::mesh_settings;
 use crate::survey::Survey;
 
@@ -19,6 +19,7 @@ use crate::survey::Survey;
 #[derive(Debug, Clone, Default)]
 pub(super) struct JobMeshes {
     loaded: OnceLock<SharedMeshes>,
+    of_grains: OnceLock<GrainMeshes>,
 }
 
 #[derive(Debug, Clone)]
@@ -73,6 +74,27 @@ impl JobMeshes {
         Ok(meshes.map(picture_mesh).collect())
     }
 
+    /// The meshes of grains of `manifest`, whose paths are relative to `dir`.
+    ///
+    /// # Errors
+    /// One cannot be read, or is not the surface of a body.
+    pub(super) fn of_grains(
+        &self,
+        manifest: &Manifest,
+        dir: &Path,
+    ) -> Result<GrainMeshes, RunError> {
+        if let Some(known) = self.of_grains.get() {
+            return Ok(known.clone());
+        }
+        let mut meshes = GrainMeshes::default();
+        for (index, path) in grain_files(manifest, dir) {
+            let style = &manifest.styles[index];
+            let added = meshes.add(style, &path, reading_budget(manifest));
+            added.map_err(|source| RunError::GrainMesh { index, source })?;
+        }
+        Ok(self.of_grains.get_or_init(|| meshes).clone())
+    }
+
     /// Notes for the user on those that have been read.
     pub(super) fn notes(&self) -> Vec<String> {
         let meshes = self.loaded.get().into_iter().flat_map(|l| l.meshes.iter());
@@ -91,6 +113,12 @@ pub(super) fn frame_files(manifest: &Manifest, dir: &Path, frame: i64) -> Vec<Pa
     own.map(|mesh| named_place(&dir.join(mesh.path.path_for(frame)))).collect()
 }
 
+/// The files of the meshes of grains, with the indices of their styles.
+fn grain_files(manifest: &Manifest, dir: &Path) -> impl Iterator<Item = (usize, PathBuf)> {
+    let styles = manifest.styles.iter().enumerate();
+    styles.filter_map(|(index, style)| Some((index, shared_file(style.mesh.as_ref()?, dir)?)))
+}
+
 /// Hashes of the meshes that all images share, by the keys of their paths. Those of a frame are among its inputs.
 pub(super) fn identities(
     manifest: &Manifest,
@@ -105,6 +133,13 @@ pub(super) fn identities(
             })?;
             identities.push((format!("mesh.{index}.path"), found));
         }
+    }
+    for (index, path) in grain_files(manifest, dir) {
+        let found = identity(&path).map_err(|source| RunError::GrainMesh {
+            index,
+            source: FrameError::io(&path, source).into(),
+        })?;
+        identities.push((format!("style.{index}.mesh"), found));
     }
     Ok(identities)
 }

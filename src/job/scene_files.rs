@@ -56,6 +56,7 @@ impl SceneFiles {
             overlays: self.overlay_images(manifest)?,
             ground: self.ground_image(manifest)?,
             meshes: self.meshes.get(manifest, &self.dir, survey)?,
+            grain_meshes: self.meshes.of_grains(manifest, &self.dir)?,
         };
         let setup = resolve::setup(manifest, survey, inputs)?;
         check_views(&setup, frames)?;

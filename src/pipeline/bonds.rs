@@ -288,6 +288,7 @@ mod tests {
             time: None,
             cell: SimulationCell::new(DVec3::ZERO, edges, periodic),
             bonds: Vec::new(),
+            shapes: None,
             dropped: 0,
             file_index: None,
         }

@@ -1,10 +1,15 @@
 //! Grains of styles: their orientations and sizes from the columns of a frame.
 
+use std::borrow::Cow;
+use std::ops::Range;
+use std::sync::Arc;
+
 use glam::Vec3;
 use spherule_formats::Radius;
 use spherule_frame::grain_columns::{GrainColumns, GrainNames};
 
 use super::SharedFrame;
+use super::grain_parts::{GrainPart, parts_by_type};
 use super::load_error::LoadError;
 use super::setup::{GrainRules, Setup, StyleForm};
 use super::styles::{StyleParticles, StyleRanges};
@@ -21,13 +26,11 @@ const ROUND: [f32; 2] = [2.0; 2];
 pub(super) struct FrameGrains {
     /// The style.
     pub(super) style: usize,
-    shape: GrainShape,
+    parts: Vec<GrainPart>,
     /// Quaternions x, y, z, w; empty without columns.
     orientations: Vec<[f32; 4]>,
     /// Semi-axes; empty without columns.
     sizes: Vec<[f32; 3]>,
-    /// Semi-axes of all grains.
-    size: Option<Vec3>,
     /// Exponents of superquadrics; empty without columns.
     exponents: Vec<[f32; 2]>,
 }
@@ -57,44 +60,84 @@ pub(super) fn grains_of(
             GrainColumns::named(&frame.attributes, &rules.names)
                 .map_err(|fault| LoadError::Grains { file: file.to_owned(), fault })?
         };
-        let mut used = usual.used;
-        used.extend(named.used);
+        let mut used = usual.used.clone();
+        used.extend(named.used.iter().cloned());
+        let grains = columns_of(rules, (&usual, &named), &range);
+        let (parts, of_types) = match frame.shapes.as_ref().filter(|_| rules.is_open()) {
+            Some(types) => (parts_by_type(frame, types, range, notes), "the shapes of types, "),
+            None => {
+                let shape = shape_of(rules, !grains.exponents.is_empty());
+                (vec![GrainPart { shape, size: rules.common_size(), members: None }], "")
+            }
+        };
         notes.push(match &used[..] {
             [] => format!(
                 "frame {number}: no columns have orientations or sizes of the grains of style `{}`; they are drawn upright",
                 style.name
             ),
-            used => format!("frame {number}: grains of style `{}` by {}", style.name, used.join(", ")),
+            used => {
+                let used = used.join(", ");
+                format!("frame {number}: grains of style `{}` by {of_types}{used}", style.name)
+            }
         });
-        fn pick<T: Copy>(own: &[T], usual: &[T], range: &std::ops::Range<usize>) -> Vec<T> {
-            let all = if own.is_empty() { usual } else { own };
-            all.get(range.clone()).map(<[T]>::to_vec).unwrap_or_default()
-        }
-        let exponents = pick(
-            &named.exponents.unwrap_or_default(),
-            &usual.exponents.unwrap_or_default(),
-            &range,
-        );
-        all.push(FrameGrains {
-            style: index,
-            shape: shape_of(rules, !exponents.is_empty()),
-            orientations: pick(&named.orientations, &usual.orientations, &range),
-            sizes: pick(&named.sizes, &usual.sizes, &range),
-            size: rules.size,
-            exponents: if rules.exponents.is_some() { Vec::new() } else { exponents },
-        });
+        all.push(FrameGrains { style: index, parts, ..grains });
     }
     Ok(all)
 }
 
+/// The columns of the grains in `range`: those that are named before the usual ones.
+fn columns_of(
+    rules: &GrainRules,
+    (usual, named): (&GrainColumns, &GrainColumns),
+    range: &Range<usize>,
+) -> FrameGrains {
+    fn pick<T: Copy>(own: &[T], usual: &[T], range: &Range<usize>) -> Vec<T> {
+        let all = if own.is_empty() { usual } else { own };
+        all.get(range.clone()).map(<[T]>::to_vec).unwrap_or_default()
+    }
+    let exponents = |columns: &GrainColumns| columns.exponents.clone().unwrap_or_default();
+    FrameGrains {
+        orientations: pick(&named.orientations, &usual.orientations, range),
+        // A mesh has a size of its own
+        sizes: match &rules.mesh {
+            Some(_) if rules.names.sizes.is_none() => Vec::new(),
+            _ => pick(&named.sizes, &usual.sizes, range),
+        },
+        exponents: match rules.exponents {
+            Some(_) => Vec::new(),
+            None => pick(&exponents(named), &exponents(usual), range),
+        },
+        ..FrameGrains::default()
+    }
+}
+
+impl GrainRules {
+    /// Whether the file may say which shape they have.
+    fn is_open(&self) -> bool {
+        let is_sized = self.size.is_some() || self.names.sizes.is_some();
+        let has_exponents = self.exponents.is_some() || self.names.exponents.is_some();
+        self.kind.is_none() && self.mesh.is_none() && !is_sized && !has_exponents
+    }
+
+    /// Semi-axes of all grains, or factors on their mesh.
+    fn common_size(&self) -> Option<Vec3> {
+        let of_mesh = self.mesh.as_ref().filter(|_| self.names.sizes.is_none());
+        self.size.or(of_mesh.map(|_| Vec3::ONE))
+    }
+}
+
 /// The shape of grains; `has_exponents`: their columns have exponents.
 fn shape_of(rules: &GrainRules, has_exponents: bool) -> GrainShape {
+    if let Some(mesh) = &rules.mesh {
+        return GrainShape::Mesh(Arc::clone(mesh));
+    }
     let usual = match (rules.exponents, has_exponents) {
         (None, false) => GrainKind::Ellipsoid,
         _ => GrainKind::Superquadric,
     };
     match rules.kind.unwrap_or(usual) {
-        GrainKind::Ellipsoid => GrainShape::Ellipsoid,
+        // Without a mesh, only programs ask for one
+        GrainKind::Ellipsoid | GrainKind::Mesh | GrainKind::ConvexHull => GrainShape::Ellipsoid,
         GrainKind::Superquadric => {
             GrainShape::Superquadric { exponents: rules.exponents.unwrap_or(ROUND) }
         }
@@ -105,41 +148,99 @@ fn shape_of(rules: &GrainRules, has_exponents: bool) -> GrainShape {
 }
 
 impl FrameGrains {
-    /// The tree of the grains at the places of `own`, which move by `displacements` while the shutter is open.
+    /// The trees of the grains at the places of `own`, which move by `displacements` while the shutter is open.
     ///
     /// # Errors
     /// There are too many.
-    pub(super) fn tree(
-        self,
+    pub(super) fn trees(
+        mut self,
         own: &StyleParticles,
         displacements: Option<&[Vec3]>,
-    ) -> Result<GrainTree, GrainError> {
+    ) -> Result<Vec<GrainTree>, GrainError> {
         // Without a size, it is the radius
-        let radii: Vec<[f32; 3]> = match &own.radius {
-            Radius::PerParticle(radii) => radii.iter().map(|radius| [*radius; 3]).collect(),
-            Radius::Common(_) => Vec::new(),
+        if let (true, Radius::PerParticle(radii)) = (self.sizes.is_empty(), &own.radius) {
+            self.sizes = radii.iter().map(|radius| [*radius; 3]).collect();
+        }
+        let radius = match own.radius {
+            Radius::Common(radius) => radius,
+            Radius::PerParticle(_) => 1.0,
         };
-        let sizes = match (self.size, &self.sizes[..], &own.radius) {
-            (Some(size), ..) => GrainSizes::Common(size),
-            (None, [], Radius::Common(radius)) => GrainSizes::Common(Vec3::splat(*radius)),
-            (None, [], Radius::PerParticle(_)) => GrainSizes::Each(&radii),
-            (None, sizes, _) => GrainSizes::Each(sizes),
+        let parts = std::mem::take(&mut self.parts);
+        let tree = |part: GrainPart| self.tree(part, (&own.centers, radius), displacements);
+        parts.into_iter().map(tree).collect()
+    }
+
+    /// The tree of the grains of `part`; `radius` is for grains without a size.
+    fn tree(
+        &self,
+        part: GrainPart,
+        (centers, radius): (&[Vec3], f32),
+        displacements: Option<&[Vec3]>,
+    ) -> Result<GrainTree, GrainError> {
+        let GrainPart { shape, size, members } = part;
+        let members = members.as_deref();
+        let centers = chosen(centers, members);
+        let sizes = chosen(&self.sizes, members);
+        let orientations = chosen(&self.orientations, members);
+        let exponents = match shape {
+            GrainShape::Superquadric { .. } => chosen(&self.exponents, members),
+            _ => Cow::Borrowed(&[][..]),
         };
-        let rotations = vec![Vec3::ZERO; displacements.map_or(0, <[Vec3]>::len)];
-        let motion =
-            displacements.map(|displacements| GrainMotion { displacements, rotations: &rotations });
-        let exponents = match self.shape {
-            GrainShape::Superquadric { .. } => &self.exponents[..],
-            _ => &[],
+        let displacements = displacements.map(|all| chosen(all, members));
+        let rotations = vec![Vec3::ZERO; displacements.as_ref().map_or(0, |all| all.len())];
+        let motion = displacements
+            .as_ref()
+            .map(|displacements| GrainMotion { displacements, rotations: &rotations });
+        let sizes = match (size, &sizes[..]) {
+            (Some(size), _) => GrainSizes::Common(size),
+            (None, []) => GrainSizes::Common(Vec3::splat(radius)),
+            (None, sizes) => GrainSizes::Each(sizes),
         };
         let grains = Grains {
-            orientations: &self.orientations,
-            exponents,
+            orientations: &orientations,
+            exponents: &exponents,
             motion,
-            ..Grains::new(&own.centers, sizes)
+            ..Grains::new(&centers, sizes)
         };
-        GrainTree::new(&grains, self.shape)
+        let tree = GrainTree::new(&grains, shape)?;
+        Ok(match members {
+            Some(members) => tree.with_indices(members),
+            None => tree,
+        })
     }
+}
+
+/// The values of `members`, or all.
+fn chosen<'v, T: Copy>(values: &'v [T], members: Option<&[u32]>) -> Cow<'v, [T]> {
+    match members {
+        Some(members) if !values.is_empty() => {
+            members.iter().map(|member| values[*member as usize]).collect()
+        }
+        _ => Cow::Borrowed(values),
+    }
+}
+
+/// How many times a mesh may be larger or smaller than the radius before that is noted: a mesh in millimetres for
+/// particles in metres is a thousand times its usual size.
+const USUAL_RATIO: f64 = 50.0;
+
+/// A note if the mesh of a style without a size is much larger or smaller than the particles.
+pub(super) fn unit_note(style: &str, rules: &GrainRules, radius: &Radius) -> Option<String> {
+    let is_sized = rules.size.is_some() || rules.names.sizes.is_some();
+    let mesh = rules.mesh.as_ref().filter(|_| !is_sized)?;
+    let radius = match radius {
+        Radius::Common(radius) => *radius,
+        Radius::PerParticle(radii) => *radii.first()?,
+    };
+    let ratio = mesh.radius() / f64::from(radius);
+    let is_usual = (1.0 / USUAL_RATIO..USUAL_RATIO).contains(&ratio);
+    let (factor, size) = if ratio > 1.0 { (ratio, "larger") } else { (1.0 / ratio, "smaller") };
+    (!is_usual && factor.is_finite()).then(|| {
+        format!(
+            "style `{style}`: the mesh is {factor:.0} times {size} than the particles; if it is in another unit, set size \
+             (size = [0.001, 0.001, 0.001] for millimetres to metres)"
+        )
+    })
 }
 
 /// What was wrong with the grains of a style.

@@ -18,6 +18,9 @@ use crate::surface::mesh::{MeshError, MeshNormals, MeshTree, TriangleMesh, Visib
 /// particles in metres is a thousand times its usual size, which may be a few times larger or smaller than they are.
 const USUAL_RATIO: f64 = 300.0;
 
+/// Edges of meshes of a greater angle are sharp, degrees.
+pub const CREASE_ANGLE: f32 = 40.0;
+
 /// How the file of a mesh becomes a shape.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeshSettings {

@@ -16,6 +16,8 @@ mod encode;
 mod encoders;
 mod error;
 mod facts;
+mod grain_meshes;
+mod grain_parts;
 mod grains;
 mod in_place;
 mod load;
@@ -48,13 +50,15 @@ mod work;
 
 pub use decoded::{DecodedFrame, DecodedShading};
 pub use error::{ImageError, WriteError};
+pub use grain_meshes::{GrainMeshLoadError, GrainMeshes};
 pub use in_place::{StoredFrame, StoredShading};
 pub use load::{LoadedFrame, LoadedParticles, load_frame, load_particles};
 pub use load_error::LoadError;
 pub(crate) use load_error::attribute_list;
 pub use memory_limit::{MemoryLimitError, MemoryRemedy};
 pub use meshes::{
-    LoadedMesh, MeshLoadError, MeshSettings, MeshSlices, MeshThing, PictureMesh, load_mesh,
+    CREASE_ANGLE, LoadedMesh, MeshLoadError, MeshSettings, MeshSlices, MeshThing, PictureMesh,
+    load_mesh,
 };
 pub use predict::{FrameSize, MemoryModel, MemoryNeed};
 pub use probe::{Probe, ProbeError, probe};

@@ -1,5 +1,7 @@
 //! The settings of the pictures of a job: everything that is the same for all frames, and the camera path.
 
+use std::sync::Arc;
+
 use glam::{DVec3, Vec3};
 use spherule_formats::native::Access;
 use spherule_frame::grain_columns::GrainNames;
@@ -19,6 +21,7 @@ use crate::scene::{
 };
 use crate::selection::{Division, Selection};
 use crate::surface::cut::ConvexRegion;
+use crate::surface::grains::GrainMesh;
 use crate::surface::rods::Anchor;
 use crate::surface::{SurfaceKind, SurfaceSettings};
 use crate::survey::{FrameWeight, SurfaceWeight};
@@ -257,7 +260,7 @@ pub struct ParticleRules {
 }
 
 /// What stands for the particles of a style.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub enum StyleForm {
     /// A sphere each.
     Spheres,
@@ -270,13 +273,16 @@ pub enum StyleForm {
 }
 
 /// How grains are drawn.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct GrainRules {
-    /// Their shape; None: superquadrics if the frame has exponents, else ellipsoids.
+    /// Their shape; None: those of the types if the file has them, superquadrics if the frame has exponents, else
+    /// ellipsoids.
     pub kind: Option<GrainKind>,
+    /// Their mesh, which has precedence.
+    pub mesh: Option<Arc<GrainMesh>>,
     /// The columns that are named; others have the usual names.
     pub names: GrainNames,
-    /// Semi-axes of all grains, scene units.
+    /// Semi-axes of all grains, scene units; or factors on the mesh, which is 1 without any.
     pub size: Option<Vec3>,
     /// Exponents of all superquadrics.
     pub exponents: Option<[f32; 2]>,

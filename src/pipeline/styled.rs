@@ -6,9 +6,9 @@ use glam::Vec3;
 
 use super::bodies::{build_grid, radius_of, shading_normals};
 use super::decoded::DecodedFrame;
-use super::grains::report_notes;
+use super::grains::{report_notes, unit_note};
 use super::motion::displaced;
-use super::setup::{Setup, StyleForm};
+use super::setup::{OpacityRule, Setup, StyleForm};
 use super::styles::StyleParticles;
 use crate::accel::moving::MovingTree;
 use crate::accel::{BuildReport, Spheres, TreeBuilder};
@@ -30,10 +30,12 @@ pub(super) struct StyleSurfaces {
 /// The grains of a style.
 #[derive(Debug)]
 struct StyleGrains {
-    tree: GrainTree,
+    /// One for each shape.
+    trees: Vec<GrainTree>,
     material: MaterialId,
     /// Index in the frame of the first grain.
     first: u32,
+    has_opacity: bool,
 }
 
 /// The spheres of all styles. Which style a sphere has follows from its particle.
@@ -104,9 +106,10 @@ impl StyleSurfaces {
                     bytes += built;
                     all.bodies.push(body);
                 }
-                StyleForm::Grains(_) => {
+                StyleForm::Grains(grains) => {
+                    notes.extend(unit_note(&rules.name, grains, &own.radius));
                     if let Some(grains) = StyleGrains::build(setup, frame, own, notes) {
-                        bytes += grains.tree.bytes() as u64;
+                        bytes += grains.trees.iter().map(|tree| tree.bytes() as u64).sum::<u64>();
                         all.grains.push(grains);
                     }
                 }
@@ -125,10 +128,12 @@ impl StyleSurfaces {
             });
         }
         shapes.extend(self.bodies.iter().map(StyleBody::shape));
-        shapes.extend(self.grains.iter().map(|grains| {
-            let surface = GrainSurface::new(&grains.tree).of(grains.material, grains.first);
-            Box::new(surface) as Box<dyn Shape>
-        }));
+        for StyleGrains { trees, material, first, has_opacity } in &self.grains {
+            shapes.extend(trees.iter().map(|tree| {
+                let surface = GrainSurface::new(tree).of(*material, *first);
+                Box::new(surface.with_opacity(*has_opacity)) as Box<dyn Shape>
+            }));
+        }
     }
 }
 
@@ -166,10 +171,12 @@ impl StyleGrains {
         let place = of_frame.iter().position(|grains| grains.style == own.style)?;
         let grains = of_frame.swap_remove(place);
         let rules = &setup.picture.particles.styles[own.style];
-        match grains.tree(&own, displacements.as_deref()) {
-            Ok(tree) => {
-                notes.extend(report_notes(&rules.name, tree.report()));
-                Some(Self { tree, material: rules.material, first: own.first })
+        match grains.trees(&own, displacements.as_deref()) {
+            Ok(trees) => {
+                notes
+                    .extend(trees.iter().flat_map(|tree| report_notes(&rules.name, tree.report())));
+                let has_opacity = rules.opacity != OpacityRule::OPAQUE;
+                Some(Self { trees, material: rules.material, first: own.first, has_opacity })
             }
             Err(error) => {
                 notes.push(format!("style `{}` is not drawn: {error}", rules.name));

@@ -38,6 +38,7 @@ fn particles(positions: &[Vec3]) -> RawParticles<PositionSlice<'_>> {
         bonds: Vec::new(),
         notes: Vec::new(),
         labels: spherule_frame::Labels::default(),
+        shapes: None,
     }
 }
 
@@ -152,6 +153,23 @@ fn one_style_may_be_clear() {
 fn styles_of_nothing_are_noted() {
     let (_, _, notes) = rendered("[[style]]\nname = \"foam\"\nwhere = \"type == 7\"");
     assert!(notes.iter().any(|note| note.contains("no particle is of style `foam`")), "{notes:?}");
+}
+
+#[test]
+fn grains_have_an_opacity() {
+    // How many samples of pixels show the grains of type 1, which has the spheres of another style beside it
+    let coverage = |opacity: f32| {
+        let (_, film, _) = rendered(&format!(
+            "[[style]]\nwhere = \"type == 1\"\ndraw = \"grains\"\nsize = [0.4, 0.3, 0.2]\nopacity = {opacity}\n\
+             [[style]]\nwhere = \"type == 2\"\nopacity = 0.5\n[[style]]\nwhere = \"type != 1\"\ndraw = \"hidden\""
+        ));
+        let ids = film.plane::<u32>(FilmPlane::Id).unwrap();
+        ids.iter().filter(|id| **id != u32::MAX && (**id - 1000) % 5 == 1).count()
+    };
+    let [none, half, all] = [0.0, 0.5, 1.0].map(coverage);
+    assert_eq!(none, 0);
+    // The id is that of the nearest of four samples, which is there in 15 of 16 pixels
+    assert!(half > all / 2 && half < all, "{half} {all}");
 }
 
 #[test]

@@ -54,7 +54,7 @@ impl ParticleRules {
 
     /// Number of styles, the first ones, that are drawn as spheres.
     pub(super) fn sphere_styles(&self) -> usize {
-        self.styles.partition_point(|style| style.form == StyleForm::Spheres)
+        self.styles.partition_point(|style| matches!(style.form, StyleForm::Spheres))
     }
 }
 

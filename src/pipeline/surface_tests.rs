@@ -168,6 +168,7 @@ fn compact_frames_in_place_have_every_surface() {
         time: None,
         cell: None,
         bonds: Vec::new(),
+        shapes: None,
         dropped: 0,
         file_index: None,
     };

@@ -5,13 +5,10 @@ use spherule_formats::MemoryBudget;
 
 use super::cell;
 use crate::manifest::{self, Manifest, MeshShading};
-use crate::pipeline::{MeshSettings, MeshThing, PictureMesh, Setup};
+use crate::pipeline::{CREASE_ANGLE, MeshSettings, MeshThing, PictureMesh, Setup};
 use crate::scene::{Bounds, DEFAULT_MESH_COLOR, Finish, Material, Scene};
 use crate::surface::mesh::MeshNormals;
 use crate::survey::Survey;
-
-/// Edges of a greater angle are sharp, degrees.
-const CREASE_ANGLE: f32 = 40.0;
 
 /// Distance of the ground below a mesh, as a fraction of its size, so that rays do not hit both at once.
 const GROUND_GAP: f32 = 1e-4;

@@ -11,7 +11,8 @@ use crate::manifest::{
 };
 use crate::math::narrow;
 use crate::pipeline::{
-    ArrowStyle, BondStyle, ColorRule, GrainRules, ParticleStyle, RadiusRule, StyleForm, TrailStyle,
+    ArrowStyle, BondStyle, ColorRule, GrainMeshes, GrainRules, ParticleStyle, RadiusRule,
+    StyleForm, TrailStyle,
 };
 use crate::scene::{Camera, Fresnel, Material, Scene};
 use crate::surface::{SurfaceKind, SurfaceSettings};
@@ -31,6 +32,7 @@ pub(super) struct Looks<'a> {
     pub(super) manifest: &'a Manifest,
     pub(super) survey: &'a Survey,
     pub(super) camera: &'a Camera,
+    pub(super) meshes: &'a GrainMeshes,
     /// Radius of the largest particles.
     pub(super) reach: f64,
 }
@@ -100,6 +102,7 @@ impl Looks<'_> {
         match style.surface() {
             _ if style.draw == StyleDraw::Grains => StyleForm::Grains(GrainRules {
                 kind: style.shape,
+                mesh: self.meshes.of(style).cloned(),
                 names: style.grain_names(),
                 size: match style.size {
                     Some(GrainNumbers::Numbers(size)) => Some(DVec3::from_array(size).as_vec3()),

@@ -129,6 +129,7 @@ fn frame(encoding: Encoding) -> Vec<u8> {
         time: None,
         cell: None,
         bonds: Vec::new(),
+        shapes: None,
         dropped: 0,
         file_index: None,
     };

@@ -102,6 +102,70 @@ fn grains_have_the_orientation_of_the_file() {
     still(&workshop, "a.csv", &["b.png", "--style", &style]).expect(1).prints("did you mean `quat");
 }
 
+/// A tetrahedron.
+const OBJ: &str = "v 1 1 1\nv 1 -1 -1\nv -1 1 -1\nv -1 -1 1\nf 1 2 3\nf 1 4 2\nf 1 3 4\nf 2 4 3\n";
+
+#[test]
+fn grains_have_the_shape_of_a_mesh() {
+    let workshop = Workshop::new();
+    let rows = "x,y,z,type,radius\n0,0,0,1,0.5\n3,0,0,2,0.5\n";
+    fs::write(workshop.join("a.csv"), rows).expect("a file");
+    fs::write(workshop.join("grain.obj"), OBJ).expect("a file");
+    let open = OBJ.replace("f 2 4 3\n", "");
+    fs::write(workshop.join("open.obj"), &open).expect("a file");
+    let style = |text: &str| still(&workshop, "a.csv", &["a.png", "--style", text]);
+    style(": grains, mesh grain.obj").expect(0).prints("drawn upright");
+    style("type == 1: grains, mesh grain.obj, size [1, 2, 1]").expect(0);
+    let large = OBJ.replace("v 1 ", "v 1000 ").replace("v -1", "v -1000");
+    fs::write(workshop.join("large.obj"), large).expect("a file");
+    style(": grains, mesh large.obj").expect(0).prints("times larger than the particles");
+    style(": grains, shape convex-hull, mesh open.obj, size radius").expect(0);
+    // Errors name the file and what to do, and come before a picture
+    let refused = |text: &str, parts: [&str; 2]| {
+        let ran = style(text).expect(2);
+        assert!(parts.iter().all(|part| ran.errors().contains(part)), "{}", ran.errors());
+    };
+    let open = ["style.0.mesh: ", "open.obj: the mesh of a grain is not closed"];
+    refused(": grains, mesh open.obj", open);
+    refused(": grains, mesh open.obj", ["shape = \"convex-hull\"", ""]);
+    refused(": grains, mesh none.obj", ["style.0.mesh: ", "none.obj"]);
+    refused(": grains, shape mesh", ["style.0.mesh: ", "which file"]);
+    refused(": spheres, mesh grain.obj", ["belongs to a style with draw = \"grains\"", ""]);
+    refused(": grains, shape cuboid, mesh grain.obj", ["belongs to shape = \"mesh\"", ""]);
+    refused(": grains, mesh grain.##.obj", ["has the number of a frame", ""]);
+}
+
+#[test]
+fn a_job_does_not_go_on_with_another_mesh_of_grains() {
+    let workshop = layers();
+    fs::write(workshop.join("grain.obj"), OBJ).expect("a file");
+    let style = ["--style", "type == 1: grains, mesh grain.obj"];
+    workshop.render(&style).expect(0);
+    workshop.render(&style).expect(0);
+    fs::write(workshop.join("grain.obj"), OBJ.replace("v 1 1 1", "v 1 1 2")).expect("a file");
+    workshop.render(&style).expect(2).prints("style.0.mesh");
+}
+
+#[test]
+fn particles_with_shapes_are_drawn_as_grains() {
+    let workshop = Workshop::new();
+    let head = "x,y,z,shapex,shapey,shapez,quatw,quati,quatj,quatk";
+    let rows = "0,0,0,1,2,1,1,0,0,0\n3,0,0,2,1,1,1,0,0,0\n";
+    fs::write(workshop.join("a.csv"), format!("{head}\n{rows}")).expect("a file");
+    let size = ["--width", "96", "--height", "54", "--samples", "2"];
+    let still = |options: &[&str]| {
+        workshop.run(&[&["still", "a.csv", "-o"], options, &size].concat()).expect(0)
+    };
+    let grains = still(&["a.png"]);
+    assert!(grains.errors().contains("by `quatw`, `quati`"), "{}", grains.errors());
+    assert!(grains.errors().contains("--style ': spheres' draws spheres"), "{}", grains.errors());
+    still(&["b.png", "--style", ": grains"]);
+    let same = ["a.png", "b.png"].map(|name| fs::read(workshop.join(name)).expect("a picture"));
+    assert_eq!(same[0], same[1]);
+    let spheres = still(&["c.png", "--style", ": spheres"]);
+    assert!(!spheres.errors().contains("drawn with their shapes"), "{}", spheres.errors());
+}
+
 #[test]
 fn impossible_styles_are_refused_and_empty_ones_are_noted() {
     let workshop = layers();

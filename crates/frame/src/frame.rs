@@ -3,6 +3,7 @@
 
 use std::borrow::Cow;
 use std::ops::Deref;
+use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -11,7 +12,7 @@ use crate::bonds::{self, Bond};
 use crate::gather::{gather, keep};
 use crate::names::RADII;
 use crate::with_values;
-use crate::{Attribute, AttributeData, Labels, SimulationCell};
+use crate::{Attribute, AttributeData, Labels, SimulationCell, TypeShapes};
 
 /// Positions in the precision of the file, world units.
 #[derive(Debug, Clone, PartialEq)]
@@ -175,6 +176,8 @@ pub struct RawParticles<P = Positions> {
     pub notes: Vec<String>,
     /// Names of parts and of other values.
     pub labels: Labels,
+    /// Shapes of the types of particles, if the file has them.
+    pub shapes: Option<Arc<TypeShapes>>,
 }
 
 impl<P> RawParticles<P> {
@@ -189,6 +192,7 @@ impl<P> RawParticles<P> {
             bonds: self.bonds,
             notes: self.notes,
             labels: self.labels,
+            shapes: self.shapes,
         }
     }
 }
@@ -205,6 +209,7 @@ impl RawParticles<PositionSlice<'_>> {
             bonds: self.bonds.clone(),
             notes: self.notes.clone(),
             labels: self.labels.clone(),
+            shapes: self.shapes.clone(),
         }
     }
 }
@@ -287,6 +292,8 @@ pub struct ParticleFrame<P = Vec<Vec3>> {
     pub cell: Option<SimulationCell>,
     /// Bonds, if known, by indices of the particles.
     pub bonds: Vec<Bond>,
+    /// Shapes of the types of particles, if the file has them.
+    pub shapes: Option<Arc<TypeShapes>>,
     /// Particles that were dropped because a coordinate was NaN or beyond [`FARTHEST`].
     pub dropped: u64,
     /// File-order index of each kept particle; `None` if all particles of the file were kept (the indices are then
@@ -353,7 +360,7 @@ impl<'a> ParticleFrame<Cow<'a, [Vec3]>> {
 
     /// The particles that are near, of `raw` with positions relative to `origin`.
     fn kept(raw: RawParticles<Cow<'a, [Vec3]>>, origin: DVec3) -> Self {
-        let RawParticles { mut positions, mut attributes, time, cell, mut bonds, .. } = raw;
+        let RawParticles { mut positions, mut attributes, time, cell, mut bonds, shapes, .. } = raw;
         // Keep the arrays if no particle is dropped
         let (mut file_index, mut dropped) = (None, 0);
         if !positions.iter().all(is_near) {
@@ -382,6 +389,7 @@ impl<'a> ParticleFrame<Cow<'a, [Vec3]>> {
             time,
             cell,
             bonds,
+            shapes,
             dropped,
             file_index,
         }
@@ -399,6 +407,7 @@ impl<P> ParticleFrame<P> {
             time: self.time,
             cell: self.cell,
             bonds: self.bonds,
+            shapes: self.shapes,
             dropped: self.dropped,
             file_index: self.file_index,
         }

@@ -22,6 +22,10 @@ named! {
         Cylinder = "cylinder",
         /// Cuboids.
         Cuboid = "cuboid",
+        /// A closed mesh.
+        Mesh = "mesh",
+        /// The convex hull of the vertices of a mesh.
+        ConvexHull = "convex-hull",
     }
 }
 

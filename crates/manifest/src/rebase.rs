@@ -72,10 +72,10 @@ impl Manifest {
                 *path = rebased(path, from, to)?;
             }
         }
-        for mesh in &mut self.meshes {
-            let path = rebased(mesh.path.as_str(), from, to)?;
-            mesh.path =
-                MeshPath::parse(&path).map_err(|reason| RebaseError::Mesh { path, reason })?;
+        let of_styles = self.styles.iter_mut().filter_map(|style| style.mesh.as_mut());
+        for mesh in self.meshes.iter_mut().map(|mesh| &mut mesh.path).chain(of_styles) {
+            let path = rebased(mesh.as_str(), from, to)?;
+            *mesh = MeshPath::parse(&path).map_err(|reason| RebaseError::Mesh { path, reason })?;
         }
         if let Some(path) = &mut self.job.stop_file {
             *path = rebased(path, from, to)?;
@@ -155,7 +155,7 @@ pub fn without_dots(path: &Path) -> PathBuf {
 #[cfg(all(test, unix))]
 mod tests {
     use super::*;
-    use crate::Mesh;
+    use crate::{Mesh, Style};
 
     #[test]
     fn paths_follow_the_manifest() {
@@ -166,6 +166,8 @@ mod tests {
         manifest.input.topology = Some("conf.gro".to_owned());
         manifest.meshes =
             vec![Mesh { path: MeshPath::parse("walls.##.stl").unwrap(), ..Mesh::default() }];
+        manifest.styles =
+            vec![Style { mesh: MeshPath::parse("grain.stl").ok(), ..Style::default() }];
         let (here, there) = (Path::new("/home/me/sim"), Path::new("/home/me/sim/out"));
         let before = manifest.clone();
         manifest.rebase(here, there).unwrap();
@@ -173,6 +175,8 @@ mod tests {
         assert_eq!(manifest.output.path.as_str(), "frame.####.exr");
         assert_eq!(manifest.input.topology.as_deref(), Some("../conf.gro"));
         assert_eq!(manifest.meshes[0].path.as_str(), "../walls.##.stl");
+        let grain = manifest.styles[0].mesh.as_ref().map(MeshPath::as_str);
+        assert_eq!(grain, Some("../grain.stl"));
         assert_eq!(manifest.job.stop_file_in(there), Path::new("/home/me/sim/out/../control/stop"));
         assert_eq!(
             Manifest::new("a").job.stop_file_in(there),

@@ -14,6 +14,7 @@ use super::input::RadiusSetting;
 use super::key::Key;
 use super::keys::{Keys, keys};
 use super::material::{Material, MaterialKind};
+use super::mesh::MeshPath;
 use super::opacity::OpacitySetting;
 use super::part::ROUGHNESS;
 use super::rule::{Rule, rules};
@@ -67,8 +68,7 @@ named! {
 const ONE_MAP: &str = "belongs to color_by, which is not given; a map may also be a table in color";
 const GRAINS: &str = "belongs to a style with draw = \"grains\"";
 const STICKS: &str = "are drawn by a style with draw = \"sticks\" or \"balls-and-sticks\"";
-const OPAQUE_SPHERES: &str =
-    "only opaque spheres have one; set draw = \"spheres\", and matte, plastic or metal as material";
+const OPAQUE_SPHERES: &str = "only opaque spheres and grains have one; set draw = \"spheres\", and matte, plastic or metal as material";
 
 /// Rules between the keys of a style.
 pub(super) const RULES: &[Rule] = rules! {
@@ -85,12 +85,16 @@ pub(super) const RULES: &[Rule] = rules! {
     "draw" Is["sticks", "balls-and-sticks"] => "material.type" MissingOrNot["glass", "water"]:
         "sticks are opaque; choose matte, plastic or metal";
     "draw" MissingOrNot["grains"] => "shape" Missing: GRAINS;
+    "draw" MissingOrNot["grains"] => "mesh" Missing: GRAINS;
     "draw" MissingOrNot["grains"] => "size" Missing: GRAINS;
     "draw" MissingOrNot["grains"] => "exponents" Missing: GRAINS;
     "draw" MissingOrNot["grains"] => "orientation" Missing: GRAINS;
+    "shape" Is["mesh", "convex-hull"] => "mesh" Given: "which file, such as mesh = \"grain.stl\"";
+    "shape" Is["ellipsoid", "superquadric", "capsule", "cylinder", "cuboid"] => "mesh" Missing:
+        "belongs to shape = \"mesh\" or \"convex-hull\"";
     "draw" Is["grains"] => "material.type" MissingOrNot["glass", "water"]:
         "grains are opaque; choose matte, plastic or metal";
-    "draw" Is["smooth", "union", "grains"] => "opacity" MissingOr["1"]: OPAQUE_SPHERES;
+    "draw" Is["smooth", "union"] => "opacity" MissingOr["1"]: OPAQUE_SPHERES;
     "material.type" Is["glass", "water"] => "opacity" MissingOr["1"]: OPAQUE_SPHERES;
 };
 
@@ -221,12 +225,15 @@ pub struct Style {
     pub map: Option<MapName>,
     /// Its range.
     pub range: Option<RangeSetting>,
-    /// How much each sphere covers of what is behind it.
+    /// How much each sphere or grain covers of what is behind it.
     pub opacity: OpacitySetting,
     /// The material; by default that of `[material]` if it is opaque, else matte.
     pub material: Option<StyleMaterial>,
-    /// Shape of grains; by default superquadrics if files have exponents, else ellipsoids.
+    /// Shape of grains; by default that of the mesh or of the file, or superquadrics if files have exponents, else
+    /// ellipsoids.
     pub shape: Option<GrainKind>,
+    /// File of the mesh of grains.
+    pub mesh: Option<MeshPath>,
     /// Semi-axes of grains; by default the columns that the format is known for, else the radius.
     pub size: Option<GrainNumbers<3>>,
     /// Exponents n1 and n2 of superquadrics.
@@ -255,6 +262,7 @@ impl Default for Style {
             opacity: OpacitySetting::Constant(1.0),
             material: None,
             shape: None,
+            mesh: None,
             size: None,
             exponents: None,
             orientation: None,
@@ -287,20 +295,23 @@ impl Style {
             map => self.map, example("\"viridis\""), unset("as for material.color");
             /// Range of color_by
             range => self.range, example("[0.0, 4.0]"), unset("that of these particles in the sequence");
-            /// Opacity of spheres as material.opacity
+            /// Opacity of spheres or grains as material.opacity
             opacity => self.opacity;
             /// Material: { type = "plastic", roughness = 0.3 }, also with ior, absorption and absorption_length
             ///
             /// The types are matte, plastic, metal, glass and water. One of the styles may be clear.
             material => self.material, example("{ type = \"plastic\", roughness = 0.3 }"),
                 unset("that of [material] if it is opaque, else matte");
-            /// Shape of grains: ellipsoid | superquadric | capsule | cylinder | cuboid
+            /// Shape of grains: ellipsoid | superquadric | capsule | cylinder | cuboid | mesh | convex-hull
             ///
-            /// Capsules and cylinders are along their z axis.
+            /// Capsules and cylinders are along their z axis. A mesh must be closed; convex-hull takes its vertices alone.
             shape => self.shape, example("\"superquadric\""),
-                unset("superquadric if files have exponents, else ellipsoid");
-            /// Semi-axes of grains: three numbers, or the columns that have them
-            size => self.size, example("[1.0, 0.5, 0.5]"), unset("columns of known names, else the radius");
+                unset("mesh if there is one, else that of the types in GSD files, superquadric if files have exponents, or ellipsoid");
+            /// File of the mesh of grains: STL, OBJ, PLY, VTK, VTP or VTU
+            mesh => self.mesh, example("\"grain.stl\""), unset("no mesh");
+            /// Semi-axes of grains, or factors on the mesh: three numbers, or the columns that have them
+            size => self.size, example("[1.0, 0.5, 0.5]"),
+                unset("columns of known names, else the radius; 1 for a mesh");
             /// Exponents of superquadrics, along z and across: two numbers, or the columns that have them
             exponents => self.exponents, example("[8.0, 2.0]"), unset("columns of known names");
             /// Orientation of grains: { quaternion = ["qw", "qx", "qy", "qz"] }, or quaternion_xyzw, euler, euler_radians
@@ -316,7 +327,18 @@ impl Style {
         );
         if let Some(section) = keys.reading() {
             section.check(RULES);
+            if self.mesh.as_ref().is_some_and(MeshPath::has_number) {
+                section.wrong(
+                    "mesh",
+                    "has the number of a frame, but all frames have the same mesh of grains",
+                );
+            }
         }
+    }
+
+    /// The shape of its grains, if it is given.
+    pub fn grain_kind(&self) -> Option<GrainKind> {
+        self.shape.or(self.mesh.as_ref().map(|_| GrainKind::Mesh))
     }
 
     /// Whether it draws bonds.

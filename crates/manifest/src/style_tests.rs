@@ -60,6 +60,13 @@ fn impossible_styles_are_refused() {
         ("draw = \"grains\"\nsize = [1, -1, 1]", "style.0.size: expected 3 numbers above 0"),
         ("draw = \"grains\"\nsize = [1, 1]", "style.0.size: expected"),
         ("draw = \"grains\"\nshape = \"ball\"", "style.0.shape: expected"),
+        ("draw = \"grains\"\nshape = \"mesh\"", "style.0.mesh: is missing"),
+        ("mesh = \"a.stl\"", "style.0.mesh: belongs to a style with draw = \"grains\""),
+        (
+            "draw = \"grains\"\nshape = \"capsule\"\nmesh = \"a.stl\"",
+            "style.0.mesh: belongs to shape = \"mesh\"",
+        ),
+        ("draw = \"grains\"\nmesh = \"a.##.stl\"", "style.0.mesh: has the number of a frame"),
         (
             "draw = \"grains\"\norientation = { quat = [\"a\"] }",
             "style.0.orientation.quat: unknown key; known here: quaternion",

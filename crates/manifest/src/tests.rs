@@ -503,8 +503,15 @@ fn commented_file_round_trips_with_every_key() {
     // A fixed camera has its own view
     let all = all.replace("\nview = ", "\n# view = ");
     // A style of spheres draws no bonds, arrows, trails and grains
-    let own =
-        ["bonds = {", "arrows = ", "trails = ", "shape = ", "exponents = ", "orientation = {"];
+    let own = [
+        "bonds = {",
+        "arrows = ",
+        "trails = ",
+        "shape = ",
+        "mesh = ",
+        "exponents = ",
+        "orientation = {",
+    ];
     let is_other = |line: &str| {
         own.iter().any(|key| line.starts_with(key)) || line.contains("# Semi-axes of grains")
     };

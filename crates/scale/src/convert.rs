@@ -56,6 +56,7 @@ fn frame_of(particles: Particles, request: &CellRequest) -> ParticleFrame {
         time: None,
         cell: None,
         bonds: Vec::new(),
+        shapes: None,
         dropped: 0,
         file_index: None,
     }

@@ -10,6 +10,7 @@ use spherule_formats::{
     SimulationCell, find_radius, names, sample_indices,
 };
 
+use super::aspherical::{ShapeSource, shape_source};
 use super::beads::are_beads;
 use super::gas::{Order, is_gas};
 use super::grains::GrainRadius;
@@ -105,6 +106,8 @@ pub struct Facts {
     pub random_radius: Option<f64>,
     /// An attribute with the radii of grains, under another name. Only plausible ones.
     pub grain_radius: Option<GrainRadius>,
+    /// What gives particles shapes other than spheres.
+    pub shape_source: Option<ShapeSource>,
     /// Walls that no attribute marks.
     pub tank: Option<Tank>,
     /// Whether most particles are near the middle of a cloud that has no end, such as a galaxy.
@@ -228,6 +231,7 @@ impl Facts {
             grain_radius: touching.and_then(|touching| GrainRadius::of(&raw.attributes, touching)),
             covering_radius: touching
                 .and_then(|touching| covering_radius(&positions, sample.count, touching)),
+            shape_source: shape_source(raw),
             has_heavy_tails: has_heavy_tails(&positions),
             axes: Axes::of(&positions),
             is_gas: is_gas(

@@ -41,6 +41,7 @@ use spherule_tracer::scene::{RadiusTable, RgbEncoding, is_rgb};
 
 pub use spherule_frame::values::{PART_NAMES, id_of, part_of, shown_name, velocity_of};
 
+mod aspherical;
 mod beads;
 mod color;
 mod facts;
@@ -62,6 +63,7 @@ mod upright;
 mod walls;
 mod weight;
 
+pub use aspherical::ShapeSource;
 pub use color::{Categories, ColorQuestion, ColorRange, MAX_CATEGORIES, RangeQuestion, range_of};
 pub use facts::{BEAD, Category, ELEMENT, Elements, Facts};
 pub use grains::GrainRadius;

@@ -35,6 +35,7 @@ fn frame(count: u8, origin: DVec3) -> ParticleFrame {
         time: Some(0.25),
         cell: None,
         bonds: Vec::new(),
+        shapes: None,
         dropped: 3,
         file_index: None,
     }
@@ -352,6 +353,7 @@ fn stored_within(
         time: None,
         cell: None,
         bonds: Vec::new(),
+        shapes: None,
         dropped: 0,
         file_index: None,
     };

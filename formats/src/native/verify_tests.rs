@@ -34,6 +34,7 @@ fn stored(encoding: Encoding, own_radii: bool) -> Vec<u8> {
         time: None,
         cell: None,
         bonds: Vec::new(),
+        shapes: None,
         dropped: 0,
         file_index: None,
     };

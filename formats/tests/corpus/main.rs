@@ -66,6 +66,7 @@ fn frame(radius: Option<Radius>, origin: DVec3, count: u8) -> ParticleFrame {
         time: Some(0.25),
         cell: None,
         bonds: Vec::new(),
+        shapes: None,
         dropped: 3,
         file_index: None,
     }

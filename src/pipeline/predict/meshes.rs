@@ -1,11 +1,15 @@
 //! Memory of meshes.
 
-use super::super::setup::Setup;
+use super::super::setup::{Setup, StyleForm};
 
-/// Memory of the meshes that all frames share.
+/// Memory of the meshes that all frames share, also of those of grains.
 pub(super) fn shared(setup: &Setup) -> u64 {
     let trees = (setup.picture.things.meshes.iter()).filter_map(|thing| thing.mesh.tree.as_ref());
-    trees.map(|tree| tree.bytes() as u64).sum()
+    let of_grains = setup.picture.particles.styles.iter().filter_map(|style| match &style.form {
+        StyleForm::Grains(rules) => rules.mesh.as_ref().map(|mesh| mesh.bytes() as u64),
+        _ => None,
+    });
+    trees.map(|tree| tree.bytes() as u64).chain(of_grains).sum()
 }
 
 /// Memory for reading the meshes that all frames share: each of them is built next to those before it.

@@ -17,7 +17,7 @@ HERE = pathlib.Path(__file__).parent
 sys.path.insert(0, str(HERE.parent))
 import reference  # noqa: E402
 
-FIELDS = ["typeid", "mass", "charge", "diameter", "body", "velocity", "image"]
+FIELDS = ["typeid", "mass", "charge", "diameter", "body", "orientation", "velocity", "image"]
 rng = numpy.random.default_rng(7)
 
 

@@ -61,6 +61,16 @@ pub enum SizeKind {
     Diameters,
 }
 
+impl SizeKind {
+    /// The factor that makes semi-axes of the numbers.
+    const fn factor(self) -> f64 {
+        match self {
+            Self::SemiAxes => 1.0,
+            Self::Diameters => 0.5,
+        }
+    }
+}
+
 /// How the numbers of an orientation are read. All rotate from the axes of the particle to those of the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum OrientationKind {
@@ -108,6 +118,15 @@ pub struct GrainColumns {
     pub used: Vec<String>,
 }
 
+/// Columns of particles that are not spheres.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OtherShapes {
+    /// Their names.
+    pub used: Vec<String>,
+    /// The median of the mean semi-axes, in units of the file.
+    pub radius: f64,
+}
+
 impl GrainColumns {
     /// Orientations and sizes of `attributes` whose names are those of a program; None if there are neither.
     pub fn find(attributes: &[Attribute]) -> Option<Self> {
@@ -138,6 +157,37 @@ impl GrainColumns {
         Ok(Self::read(attributes, &found))
     }
 
+    /// The columns of particles that are not spheres: there are orientations and sizes, all sizes of the particles in
+    /// `sample` are above 0, and one of them differs from a sphere. None otherwise.
+    pub fn of_other_shapes(
+        attributes: &[Attribute],
+        sample: impl Iterator<Item = usize>,
+    ) -> Option<OtherShapes> {
+        let Found { orientation, sizes, exponents } = Found::among(attributes);
+        let ((orientation, _), (sizes, kind)) = orientation.zip(sizes)?;
+        // Look for an axis that differs, or for exponents that are not those of an ellipsoid
+        let (mut is_other, mut radii) = (false, Vec::new());
+        let mut numbers = [0.0; source::MAX_NUMBERS];
+        for index in sample {
+            let size = sizes.read(attributes, index, &mut numbers);
+            if !size.iter().all(|axis| *axis > 0.0 && *axis < f64::INFINITY) {
+                return None;
+            }
+            is_other |= size.iter().any(|axis| *axis != size[0]);
+            radii.push(kind.factor() * size.iter().sum::<f64>() / size.len() as f64);
+            if let Some((exponents, kind)) = &exponents {
+                let round = if *kind == ExponentKind::Mercury { 1.0 } else { 2.0 };
+                let own = exponents.read(attributes, index, &mut numbers);
+                is_other |= own.iter().any(|exponent| *exponent != round);
+            }
+        }
+        let exponents = exponents.as_ref().map(|(sources, _)| sources);
+        let used = [&orientation, &sizes].into_iter().chain(exponents);
+        let used = used.flat_map(|sources| sources.names(attributes)).collect();
+        radii.sort_by(f64::total_cmp);
+        is_other.then(|| OtherShapes { used, radius: radii[radii.len() / 2] })
+    }
+
     /// Reads the columns that were found.
     fn read(attributes: &[Attribute], found: &Found) -> Self {
         let mut columns = Self::default();
@@ -147,9 +197,8 @@ impl GrainColumns {
         }
         if let Some((sources, kind)) = &found.sizes {
             columns.used.extend(sources.names(attributes));
-            let factor = if *kind == SizeKind::Diameters { 0.5 } else { 1.0 };
             columns.sizes = sources.map(attributes, |numbers| {
-                [0, 1, 2].map(|axis| narrow(factor * numbers[axis.min(sources.len() - 1)]))
+                [0, 1, 2].map(|axis| narrow(kind.factor() * numbers[axis.min(sources.len() - 1)]))
             });
         }
         if let Some((sources, kind)) = &found.exponents {

@@ -60,13 +60,14 @@ pub fn join(mut parts: Vec<Part>, budget: MemoryBudget) -> Result<RawParticles, 
     let attributes =
         columns.into_iter().map(|column| filled(column, &mut parts, &counts)).collect();
     let mut joined = RawParticles { attributes, notes, ..RawParticles::default() };
-    // Append everything else; of times and cells, the first one counts
+    // Append everything else; of times, cells and shapes, the first one counts
     joined.bonds = joined_bonds(&parts);
     let mut positions = Vec::with_capacity(parts.len());
     for Part { particles, .. } in parts {
         joined.time = joined.time.or(particles.time);
         joined.step = joined.step.or(particles.step);
         joined.cell = joined.cell.or(particles.cell);
+        joined.shapes = joined.shapes.take().or(particles.shapes);
         for (column, labels) in particles.labels {
             joined.labels.entry(column).or_default().extend(labels);
         }

@@ -96,6 +96,19 @@ fn layers_cover_what_they_leave_of_each_other() {
 }
 
 #[test]
+fn shapes_cover_what_they_leave_of_each_other() {
+    let settings = RenderSettings { transparent_background: true, ..settings(SIDE, 64, 0) };
+    let [near, far] = [0, 1].map(|index| Balls(vec![tower(2).0[index]]));
+    let source = translucent(0.3);
+    for shapes in [[&near as &dyn Shape, &far], [&far, &near]] {
+        let never = AtomicBool::new(false);
+        let film = render(&shapes, &scene(), &source, &settings, &never).unwrap().0;
+        let (found, expected) = (mean(&film, 3), 1.0 - 0.7_f32.powi(2));
+        assert!((found - expected).abs() < 1.6e-2, "{found} {expected}");
+    }
+}
+
+#[test]
 fn the_order_of_particles_does_not_matter() {
     let settings = settings(SIDE, 16, 2);
     let tower = tower(4);

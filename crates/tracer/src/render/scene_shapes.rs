@@ -61,8 +61,8 @@ pub(super) struct SceneShapes<'a> {
     pub(super) panes: Vec<&'a dyn Shape>,
     /// Spray whose drops fade out; opaque spray is solid.
     pub(super) soft_spray: Option<&'a dyn Shape>,
-    /// Particles that are not fully opaque; they are separate spheres.
-    pub(super) translucent: Option<&'a dyn Shape>,
+    /// Particles that are not fully opaque: separate spheres or grains.
+    pub(super) translucent: Vec<&'a dyn Shape>,
     /// The particles, opaque or transmissive; all other shapes are opaque.
     pub(super) particles: Option<&'a dyn Shape>,
     pub(super) interior: Interior,
@@ -87,7 +87,7 @@ impl<'a> SceneShapes<'a> {
         let particles = shapes.iter().find(is_particles).copied();
         let is_connected = particles.is_some_and(|shape| shape.is_connected());
         let interior = Interior::of(scene.particle_material(), is_connected);
-        // Only opaque spheres fade out: transmissive ones and connected bodies have an inside
+        // Only opaque spheres and grains fade out: transmissive ones and connected bodies have an inside
         let has_opacity = source.is_translucent() && interior == Interior::Opaque && !is_connected;
         let is_style = |shape: &&dyn Shape| {
             matches!(scene.material(shape.material()).owner, Owner::Style(_)) && shape.has_opacity()
@@ -103,7 +103,7 @@ impl<'a> SceneShapes<'a> {
             solid: shapes,
             panes,
             soft_spray: spray.first().copied(),
-            translucent: translucent.first().copied(),
+            translucent,
             particles,
             interior,
         }

@@ -1,6 +1,6 @@
-//! Spheres that are not fully opaque: each one covers a part of what is behind it, its opacity.
+//! Spheres and grains that are not fully opaque: each one covers a part of what is behind it, its opacity.
 //!
-//! A ray that enters a sphere ends there with the probability of the opacity, or else passes the whole sphere in a
+//! Grains are spheres here, whose entries are found one after the other. A ray that enters a sphere ends there with the probability of the opacity, or else passes the whole sphere in a
 //! straight line, as it passes soft spray (stochastic transparency, Enderton et al. 2010). So the order of spheres does
 //! not matter, and the expected coverage of several is `1 - (1 - a) (1 - b) ...`. Shadow rays are attenuated by all
 //! spheres that they enter. A sphere in which a ray starts does not count.
@@ -15,20 +15,30 @@ use super::{
     source::ShadeSource,
     stream::SegmentPacket,
 };
-use crate::surface::{Intersection, Shape, SphereEntries, TransmittanceProduct};
+use crate::surface::{Intersection, Intersections, Shape, SphereEntries, TransmittanceProduct};
 use spherule_tree::accel::Coherence;
 use spherule_tree::math::{LANES, lane3, lanes_in, set_lane3, splat};
-use spherule_tree::ray::{Ray, RayPacket};
+use spherule_tree::ray::RayPacket;
 
 /// Binary digits of the transmittance at which a shadow ray ends: 1/4096.
 const DARK: f32 = 12.0;
 
-/// The spheres that `ray` enters, in order, for shapes without [`SphereEntries`].
-fn entries(spheres: &dyn Shape, mut ray: Ray) -> impl Iterator<Item = Intersection> {
+/// The spheres that the ray in `lane` enters, in order, for shapes without [`SphereEntries`].
+fn entries(
+    spheres: &dyn Shape,
+    rays: &RayPacket,
+    lane: usize,
+) -> impl Iterator<Item = Intersection> {
+    // A packet of one ray, since spheres may move
+    let mut rest = RayPacket::default();
+    rest.push(&rays.ray(lane));
+    rest.time[0] = rays.time[lane];
     let crossings = std::iter::from_fn(move || {
-        let hit = spheres.nearest(&ray)?;
-        ray.t_min = hit.t + hit.offset;
-        Some((hit, hit.normal.dot(ray.direction) < 0.0))
+        let (mut ray, mut hits) = (rest, Intersections::default());
+        spheres.intersect(&mut ray, Coherence::Incoherent, 0, &mut hits);
+        let hit = (hits.mask != 0).then(|| hits.get(0))?;
+        rest.t_min[0] = hit.t + hit.offset;
+        Some((hit, hit.normal.dot(rest.ray(0).direction) < 0.0))
     });
     let entries = crossings.take(MAX_CROSSINGS);
     entries.filter_map(|(hit, enters)| enters.then_some(hit))
@@ -58,9 +68,20 @@ impl RenderContext<'_> {
         coherence: Coherence,
         packet: &mut PacketScratch,
     ) {
-        let Some(spheres) = self.shapes.translucent else {
-            return;
-        };
+        // Each shape has a random number of its own
+        for (spheres, dimension) in self.shapes.translucent.iter().zip((0..=OPACITY).rev()) {
+            self.meet_spheres(*spheres, dimension, (segments, coherence), packet);
+        }
+    }
+
+    /// The same with the spheres of one shape, and the random numbers of a `dimension`.
+    fn meet_spheres(
+        &self,
+        spheres: &dyn Shape,
+        dimension: u32,
+        (segments, coherence): (&mut SegmentPacket, Coherence),
+        packet: &mut PacketScratch,
+    ) {
         // Find the rays near any of the spheres, and a random number for each
         let lanes = self.may_enter(spheres, &segments.rays, coherence, segments.lanes());
         if lanes == 0 {
@@ -68,13 +89,14 @@ impl RenderContext<'_> {
         }
         let mut u = splat(0.0);
         let sample = segments.sample.map(|s| s % self.settings.samples);
-        get_1d_lanes(self.simd, &segments.path, OPACITY, &sample, &mut u);
+        get_1d_lanes(self.simd, &segments.path, dimension, &sample, &mut u);
         // Find the sphere at which each ray ends
         let Some(all) = spheres.sphere_entries() else {
             for lane in lanes_in(lanes) {
                 let u = &mut u[lane];
                 let ends = |hit: &Intersection| ends(u, self.source.opacity(hit.particle));
-                if let Some(hit) = entries(spheres, segments.rays.ray(lane)).find(ends) {
+                let hit = entries(spheres, &segments.rays, lane).find(ends);
+                if let Some(hit) = hit {
                     packet.hits.set(lane, &hit, spheres.material());
                     segments.rays.t_max[lane] = hit.t;
                 }
@@ -102,9 +124,20 @@ impl RenderContext<'_> {
     /// Multiplies the radiance of light samples by the part of their shadow rays that spheres which are not fully
     /// opaque let through.
     pub(super) fn attenuate_by_opacity(&self, samples: &mut LightSamples, coherence: Coherence) {
-        let Some(spheres) = self.shapes.translucent.filter(|_| samples.lanes != 0) else {
-            return;
-        };
+        for spheres in &self.shapes.translucent {
+            if samples.lanes != 0 {
+                self.attenuate_by_spheres(*spheres, samples, coherence);
+            }
+        }
+    }
+
+    /// The same with the spheres of one shape.
+    fn attenuate_by_spheres(
+        &self,
+        spheres: &dyn Shape,
+        samples: &mut LightSamples,
+        coherence: Coherence,
+    ) {
         // Multiply the transmittance of all spheres on the way, until too little light is left
         let lanes = self.may_enter(spheres, &samples.rays, coherence, samples.lanes);
         let products = match spheres.sphere_entries() {
@@ -112,7 +145,7 @@ impl RenderContext<'_> {
             None => std::array::from_fn(|lane| {
                 let mut product = TransmittanceProduct::default();
                 if lanes >> lane & 1 == 1 {
-                    let mut hits = entries(spheres, samples.rays.ray(lane));
+                    let mut hits = entries(spheres, &samples.rays, lane);
                     let _is_bright = hits.all(|hit| {
                         product.multiply(1.0 - self.source.opacity(hit.particle));
                         product.digits() <= DARK

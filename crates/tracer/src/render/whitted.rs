@@ -98,7 +98,7 @@ impl Integrator for WhittedIntegrator<'_> {
 
     fn is_stochastic(&self) -> bool {
         self.context.shapes.interior != Interior::Opaque
-            || self.context.shapes.translucent.is_some()
+            || !self.context.shapes.translucent.is_empty()
     }
 
     fn shade(

@@ -280,6 +280,7 @@ fn spf_bytes(points: &[[f32; 3]]) -> Vec<u8> {
         time: None,
         cell: None,
         bonds: Vec::new(),
+        shapes: None,
         dropped: 0,
         file_index: None,
     };

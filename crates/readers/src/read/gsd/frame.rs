@@ -4,15 +4,17 @@
 //! has none either, the schema has a value for all particles. Writers leave out whatever has that value.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::file::{GsdFile, IndexEntry};
+use super::file::{GsdFile, IndexEntry, until_zero};
+use super::shapes;
 use crate::read::Step;
 use crate::read::columns::{ComponentStride, ParticleLayout, StridedColumn};
 use spherule_frame::{
     Attribute, AttributeData, Bond, Endian, MemoryBudget, ParseError, RawParticles, ScalarType,
-    SimulationCell,
+    SimulationCell, TypeShapes,
 };
 
 /// Name of the chunk with the number of the time step.
@@ -22,6 +24,8 @@ const COUNT: &str = "particles/N";
 /// Name of the chunk with the cell.
 pub(super) const BOX: &str = "configuration/box";
 const POSITION: &str = "particles/position";
+/// Name of the chunk with the shapes of types.
+pub(super) const TYPE_SHAPES: &str = "particles/type_shapes";
 /// Name of the chunk with the particles of each bond.
 const BONDS: &str = "bonds/group";
 /// What the names of chunks of the schema's particles begin with.
@@ -37,6 +41,8 @@ enum DefaultValue {
     F32(f32),
     I32(i32),
     U32(u32),
+    /// The quaternion 1, 0, 0, 0.
+    Upright,
 }
 
 /// A property of particles that becomes an attribute.
@@ -60,7 +66,9 @@ impl Field {
     /// Whether numbers of type `scalar` can be its values.
     fn takes(&self, scalar: ScalarType) -> bool {
         match self.default {
-            DefaultValue::F32(_) => matches!(scalar, ScalarType::F32 | ScalarType::F64),
+            DefaultValue::F32(_) | DefaultValue::Upright => {
+                matches!(scalar, ScalarType::F32 | ScalarType::F64)
+            }
             DefaultValue::I32(_) | DefaultValue::U32(_) => {
                 !matches!(scalar, ScalarType::F32 | ScalarType::F64)
             }
@@ -76,6 +84,7 @@ impl Field {
             components,
             data: match self.default {
                 DefaultValue::F32(value) => AttributeData::F32(vec![value; len]),
+                DefaultValue::Upright => AttributeData::F32([1.0, 0.0, 0.0, 0.0].repeat(count)),
                 DefaultValue::I32(value) => AttributeData::I32(vec![value; len]),
                 DefaultValue::U32(value) => AttributeData::U32(vec![value; len]),
             },
@@ -88,16 +97,20 @@ impl Field {
     }
 }
 
+/// The numbers of types.
+pub(super) const TYPE: &str = "typeid";
+
 /// The diameter is there in every frame: the radius of all particles is 0.5 if the file says nothing else.
 pub(super) const DIAMETER: &str = "diameter";
 
-/// Properties in the order of the schema. The rest (orientation, angular momentum, moment of inertia) has no use here.
-pub(super) const FIELDS: [Field; 7] = [
-    Field::new("typeid", 1, DefaultValue::U32(0)),
+/// Properties in the order of the schema. The rest (angular momentum, moment of inertia) has no use here.
+pub(super) const FIELDS: [Field; 8] = [
+    Field::new(TYPE, 1, DefaultValue::U32(0)),
     Field::new("mass", 1, DefaultValue::F32(1.0)),
     Field::new("charge", 1, DefaultValue::F32(0.0)),
     Field::new(DIAMETER, 1, DefaultValue::F32(1.0)),
     Field::new("body", 1, DefaultValue::I32(-1)),
+    Field::new("orientation", 4, DefaultValue::Upright),
     Field::new("velocity", 3, DefaultValue::F32(0.0)),
     Field::new("image", 3, DefaultValue::I32(0)),
 ];
@@ -206,7 +219,9 @@ impl<'f, 'a> FrameChunks<'f, 'a> {
         let (own_count, first_count) = both(COUNT)?;
         let count = own_count.or(first_count).unwrap_or(0);
         if count != first_count.unwrap_or(0) {
-            first.retain(|name, _| Some(*name) == file.name(BOX));
+            first.retain(|name, _| {
+                [BOX, TYPE_SHAPES].map(|kept| file.name(kept)).contains(&Some(*name))
+            });
         }
         Ok(Self {
             file,
@@ -234,6 +249,7 @@ impl<'f, 'a> FrameChunks<'f, 'a> {
         particles.attributes.extend(defaults);
         particles.cell = self.cell();
         particles.bonds = bonds;
+        particles.shapes = self.shapes(budget.less(need))?;
         particles.step = self.step.and_then(|step| i64::try_from(step).ok());
         Ok(particles)
     }
@@ -254,6 +270,26 @@ impl<'f, 'a> FrameChunks<'f, 'a> {
         ];
         let center = 0.5 * vectors.into_iter().sum::<DVec3>();
         SimulationCell::new(-center, vectors, [true; 3])
+    }
+
+    /// The shapes of types, if the file has them.
+    ///
+    /// # Errors
+    /// [`ParseError::Malformed`] if they are not text, [`ParseError::TooLarge`].
+    fn shapes(&self, budget: MemoryBudget) -> Result<Option<Arc<TypeShapes>>, ParseError> {
+        let Some(entry) = self.chunk(self.file.name(TYPE_SHAPES)) else {
+            return Ok(None);
+        };
+        let is_text = matches!(entry.scalar(), None | Some(ScalarType::I8 | ScalarType::U8));
+        if !is_text {
+            let what = format!("frame {}: {TYPE_SHAPES} is not text", self.frame);
+            return Err(ParseError::malformed(entry.at, what));
+        }
+        let text = self.file.numbers(&entry)?;
+        budget.check(shapes::BYTES_OF_TEXT * text.len() as u64, "the shapes of its types are")?;
+        let rows = text.chunks(entry.columns.max(1) as usize).map(until_zero);
+        let shapes = rows.map(shapes::of_json).collect();
+        Ok(Some(Arc::new(TypeShapes { attribute: TYPE.to_owned(), shapes })))
     }
 
     /// The bonds, which have no more bytes than the file.

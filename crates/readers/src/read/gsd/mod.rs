@@ -1,12 +1,14 @@
 //! GSD files of HOOMD-blue: several frames, values that did not change since the first frame left out.
 //!
 //! `file` reads the file layer (header, names, index of chunks), `frame` finds the chunks of a frame by the schema
-//! `hoomd`, `notes` reports what is not in the particles. After the specification of GSD: file layer 1.0 and 2.x,
+//! `hoomd`, `shapes` has the shapes of types, `notes` reports what is
+//! not in the particles. After the specification of GSD: file layer 1.0 and 2.x,
 //! schema `hoomd` 1.x and 2.x.
 
 mod file;
 mod frame;
 mod notes;
+mod shapes;
 #[cfg(test)]
 mod tests;
 

@@ -1,7 +1,7 @@
 //! Notes about a GSD file: what is not in its particles.
 
 use super::file::{GsdFile, GsdHeader, IndexEntry, until_zero};
-use super::frame::{BOX, DIAMETER, FIELDS, LOGGED, PARTICLES, STEP};
+use super::frame::{BOX, DIAMETER, FIELDS, LOGGED, PARTICLES, STEP, TYPE_SHAPES};
 use crate::read::notes::cell_note;
 use crate::read::text;
 use crate::reader::ValueNames;
@@ -109,11 +109,12 @@ fn ignored(file: &GsdFile<'_>) -> Option<String> {
     let mut all: Vec<String> = Vec::new();
     for name in file.names() {
         let name = String::from_utf8_lossy(name);
-        let is_used = [STEP, BOX, DIMENSIONS, "particles/N", TYPES, "particles/position"]
-            .contains(&&*name)
-            || name.starts_with(LOGGED)
-            || name.starts_with("bonds/")
-            || FIELDS.iter().any(|f| name.strip_prefix(PARTICLES) == Some(f.name));
+        let is_used =
+            [STEP, BOX, DIMENSIONS, "particles/N", TYPES, TYPE_SHAPES, "particles/position"]
+                .contains(&&*name)
+                || name.starts_with(LOGGED)
+                || name.starts_with("bonds/")
+                || FIELDS.iter().any(|f| name.strip_prefix(PARTICLES) == Some(f.name));
         let shown = match name.split_once('/') {
             _ if is_used => continue,
             Some(("particles", property)) => text::shown(property.as_bytes()),

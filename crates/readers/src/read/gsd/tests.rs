@@ -310,6 +310,54 @@ fn bonds_are_those_of_frame_0_unless_a_frame_has_its_own() {
     }
 }
 
+/// Two frames of two particles with these shapes, in rows of 64 characters.
+fn with_shapes(kind: u8, shapes: &[&str]) -> Vec<u8> {
+    let text = shapes.iter().flat_map(|shape| {
+        let mut row = shape.as_bytes().to_vec();
+        row.resize(64, 0);
+        row
+    });
+    let rows = shapes.len() as u64;
+    let shapes = Chunk(0, "particles/type_shapes", kind, (rows, 64), text.collect());
+    file(&[
+        step(0, 1),
+        count(0, 2),
+        positions(0, 2),
+        shapes,
+        step(1, 2),
+        count(1, 3),
+        positions(1, 3),
+    ])
+}
+
+#[test]
+fn types_have_shapes() {
+    let shapes = [r#"{"type": "Ellipsoid", "a": 1, "b": 2, "c": 3}"#, "{}", "{"];
+    for particles in READER.all(&with_shapes(TEXT, &shapes)).unwrap() {
+        // Frame 1 has those of frame 0, although it has another number of particles
+        let types = particles.shapes.expect("shapes");
+        assert_eq!((&*types.attribute, types.shapes.len()), ("typeid", 3));
+        let ellipsoid = spherule_frame::TypeShape::Ellipsoid(glam::Vec3::new(1.0, 2.0, 3.0));
+        assert_eq!(types.shapes[0], ellipsoid);
+        assert_eq!(types.shapes[1], spherule_frame::TypeShape::Unspecified);
+    }
+    let notes = Gsd.notes(&with_shapes(TEXT, &shapes));
+    assert!(!notes.iter().any(|note| note.contains("type_shapes")), "{notes:?}");
+    assert_eq!(READER.all(&two_frames()).unwrap()[0].shapes, None);
+    fails(&with_shapes(I32, &["1"; 4])[..], "type_shapes");
+}
+
+#[test]
+fn orientations_are_upright_by_default() {
+    let turned = Chunk(1, "particles/orientation", F32, (2, 4), f32s(&[0.5; 8]));
+    let bytes =
+        file(&[step(0, 1), count(0, 2), positions(0, 2), step(1, 2), turned, positions(1, 2)]);
+    let all = READER.all(&bytes).unwrap();
+    let first = numbers(&attribute(&all[0], "orientation").data);
+    assert_eq!(first, [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
+    assert_eq!(numbers(&attribute(&all[1], "orientation").data), [0.5; 8]);
+}
+
 #[test]
 fn notes_report_what_is_not_in_the_particles() {
     let notes = Gsd.notes(&sample("gsd/polymer.gsd"));
@@ -320,7 +368,7 @@ fn notes_report_what_is_not_in_the_particles() {
             "attribute `typeid` has numbers for types: 0 = \"A\", 1 = \"solvent\"",
             "the cell of the first frame is 12 x 10 x 8, its tilt factors are 0.25, 0, -0.5",
             "the file has a simulation cell; particles are drawn where the file has them",
-            "not used: \"orientation\", \"log\"",
+            "not used: \"log\"",
         ]
     );
     let flat = Gsd.notes(&sample("gsd/varying.gsd"));

@@ -10,6 +10,9 @@ mod hull;
 /// Greatest number of triangles of the mesh of a grain.
 pub const MAX_GRAIN_TRIANGLES: usize = 1_000_000;
 
+/// Greatest number of different points of a convex hull: the time grows with its square.
+pub const MAX_HULL_POINTS: usize = 10_000;
+
 /// Why triangles are not the surface of a grain.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum GrainMeshError {
@@ -49,6 +52,9 @@ pub enum GrainMeshError {
         /// The ends of the edge.
         ends: [Vec3; 2],
     },
+    /// There are too many points for a convex hull.
+    #[error("{0} vertices, but a convex hull takes at most {MAX_HULL_POINTS}; simplify the mesh")]
+    TooManyPoints(usize),
     /// Points have no convex hull with a volume.
     #[error("the {0} points of a convex grain are in a plane, so it has no volume")]
     Flat(usize),
@@ -125,13 +131,19 @@ impl GrainMesh {
     /// The convex hull of `points`: a convex polyhedron, of which GSD files store the vertices.
     ///
     /// # Errors
-    /// The points are in a plane, or not finite.
+    /// The points are in a plane, not finite, or too many.
     pub fn convex(points: &[Vec3]) -> Result<Self, GrainMeshError> {
         if let Some(vertex) = points.iter().position(|point| !point.is_finite()) {
             return Err(GrainMeshError::NotFinite(vertex));
         }
-        let triangles = hull::triangles(points).ok_or(GrainMeshError::Flat(points.len()))?;
-        Self::new(points.to_vec(), triangles, MeshNormals::Flat)
+        // Take each place once
+        let joined = (0..).zip(join_vertices(points)).filter(|(vertex, first)| vertex == first);
+        let points: Vec<Vec3> = joined.map(|(vertex, _)| points[vertex as usize]).collect();
+        if points.len() > MAX_HULL_POINTS {
+            return Err(GrainMeshError::TooManyPoints(points.len()));
+        }
+        let triangles = hull::triangles(&points).ok_or(GrainMeshError::Flat(points.len()))?;
+        Self::new(points, triangles, MeshNormals::Flat)
     }
 
     fn of(mesh: TriangleMesh) -> Result<Self, GrainMeshError> {
@@ -162,7 +174,7 @@ impl GrainMesh {
     }
 
     /// Radius of a sphere around the origin.
-    pub(super) const fn radius(&self) -> f64 {
+    pub const fn radius(&self) -> f64 {
         self.radius
     }
 }

@@ -26,6 +26,7 @@ pub struct GrainSurface<'a> {
     material: MaterialId,
     /// Index in the frame of the first grain.
     first: u32,
+    has_opacity: bool,
     /// The largest coordinate of the box of the tree.
     extent: f32,
     simd: Supported,
@@ -37,13 +38,20 @@ impl<'a> GrainSurface<'a> {
         let corners = tree.bounds().unwrap_or([Vec3::ZERO; 2]);
         let extent = corners[0].abs().max(corners[1].abs()).max_element();
         let simd = Supported::default();
-        Self { tree, material: MaterialId::PARTICLES, first: 0, extent, simd }
+        let material = MaterialId::PARTICLES;
+        Self { tree, material, first: 0, has_opacity: false, extent, simd }
     }
 
     /// Sets the material, and the index in the frame of the first grain in the arrays that the tree was made of.
     #[must_use]
     pub fn of(self, material: MaterialId, first: u32) -> Self {
         Self { material, first, ..self }
+    }
+
+    /// Sets whether rays may pass grains by the opacity of these.
+    #[must_use]
+    pub fn with_opacity(self, has_opacity: bool) -> Self {
+        Self { has_opacity, ..self }
     }
 
     /// Sets the instruction set that rays are traced with.
@@ -121,7 +129,7 @@ impl Shape for GrainSurface<'_> {
     }
 
     fn has_opacity(&self) -> bool {
-        false
+        self.has_opacity
     }
 
     fn material(&self) -> MaterialId {

@@ -75,6 +75,15 @@ impl GrainTree {
         Ok(tree)
     }
 
+    /// Renumbers the grains: grain `i` of the arrays that the tree was made of has the index `indices[i]`.
+    #[must_use]
+    pub fn with_indices(mut self, indices: &[u32]) -> Self {
+        for grain in &mut self.grains {
+            grain.index = indices[grain.index as usize];
+        }
+        self
+    }
+
     /// The grains with their boxes, which are larger by the rounding of tests; sets the space.
     fn items(&mut self) -> Vec<Item> {
         let boxes = |slot: usize| {

@@ -13,6 +13,8 @@ pub(super) struct DataHeader {
     pub(super) atoms: usize,
     /// Bonds.
     pub(super) bonds: usize,
+    /// Atoms that are ellipsoids.
+    pub(super) ellipsoids: usize,
     /// Atom types, if the header has their number.
     pub(super) types: Option<usize>,
     /// The style of particles that have a shape of their own, if there are any.
@@ -66,11 +68,10 @@ impl DataHeader {
             [n, b"bonds"] => self.bonds = count(line, n)?,
             [n, b"atom", b"types"] => self.types = Some(count(line, n)?),
             [n, shape] => {
-                let known = SHAPES.iter().find(|(name, _)| *name == shape);
-                if let Some((_, style)) = known
-                    && count(line, n)? > 0
-                {
-                    self.shape = Some(*style);
+                if let Some((name, style)) = SHAPES.iter().find(|(name, _)| *name == shape) {
+                    let count = count(line, n)?;
+                    self.shape = if count > 0 { Some(*style) } else { self.shape };
+                    self.ellipsoids = if *name == b"ellipsoids" { count } else { self.ellipsoids };
                 }
             }
             [lo, hi, b"xlo", b"xhi"] => self.axes[0] = Some(range(line, [lo, hi])?),

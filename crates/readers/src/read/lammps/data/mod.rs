@@ -1,7 +1,7 @@
 //! LAMMPS data files (`read_data`, `write_data`): the atoms of one state with their bonds.
 //!
 //! Text. A title, a header with counts and the box, then sections in nearly any order. Read are `Atoms`, `Velocities`,
-//! `Bonds`, `Masses` and `Atom Type Labels`. Atoms are sorted by their ids, in which order trajectories without ids have
+//! `Ellipsoids`, `Bonds`, `Masses` and `Atom Type Labels`. Atoms are sorted by their ids, in which order trajectories without ids have
 //! them. After the pages `read_data` and `write_data` of the LAMMPS manual.
 
 use crate::format::Format;
@@ -18,6 +18,7 @@ use spherule_frame::{
     Attribute, AttributeData, Bond, MemoryBudget, ParseError, Positions, RawParticles,
 };
 
+mod ellipsoids;
 mod header;
 mod rows;
 mod style;
@@ -116,7 +117,8 @@ struct Section {
 }
 
 /// The sections that are read.
-const SECTIONS: [&str; 5] = ["Atoms", "Velocities", "Bonds", "Masses", "Atom Type Labels"];
+const SECTIONS: [&str; 6] =
+    ["Atoms", "Velocities", "Ellipsoids", "Bonds", "Masses", "Atom Type Labels"];
 
 /// What has been read of a file.
 #[derive(Default)]
@@ -125,6 +127,7 @@ struct DataFile {
     types: AtomTypes,
     atoms: Option<Atoms>,
     velocities: Option<Vec<f64>>,
+    ellipsoids: Vec<Attribute>,
     bonds: Vec<Bond>,
 }
 
@@ -148,6 +151,11 @@ impl DataFile {
                 "Atoms" if file.header.atoms == 0 => {}
                 "Atoms" => file.atoms = Some(file.read_atoms(text, &section, left)?),
                 "Velocities" => file.velocities = Some(file.read_velocities(text, &section, left)?),
+                "Ellipsoids" => {
+                    let order = file.order(&section)?;
+                    let count = file.header.ellipsoids;
+                    file.ellipsoids = ellipsoids::read(text, &section, (count, order), left)?;
+                }
                 _ => {
                     let order = file.order(&section)?;
                     file.bonds = order.bonds(text, &section, file.header.bonds, left)?;
@@ -168,8 +176,9 @@ impl DataFile {
             let attributes: u64 = atoms.attributes.iter().map(|a| a.data.byte_len()).sum();
             12 * atoms.order.ids.len() as u64 + atoms.positions.byte_len() + attributes
         });
+        let ellipsoids: u64 = self.ellipsoids.iter().map(|a| a.data.byte_len()).sum();
         let velocities = self.velocities.as_ref().map_or(0, Vec::len);
-        atoms + 8 * velocities as u64 + size_of_val(self.bonds.as_slice()) as u64
+        atoms + ellipsoids + 8 * velocities as u64 + size_of_val(self.bonds.as_slice()) as u64
     }
 
     /// The order of the atoms for a `section` that refers to them.
@@ -299,6 +308,7 @@ impl DataFile {
             data: AttributeData::F64(v),
         });
         attributes.extend(velocity);
+        attributes.extend(self.ellipsoids);
         let labels = Some(self.types.names).filter(|names| !names.is_empty());
         Ok(RawParticles {
             positions,

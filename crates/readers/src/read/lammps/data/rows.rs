@@ -44,7 +44,7 @@ impl Columns {
     }
 }
 
-fn ids(components: usize) -> TargetArray {
+pub(super) fn ids(components: usize) -> TargetArray {
     TargetArray::attribute("id", components, NumberKind::WholeIfAll, TextPolicy::Fault)
 }
 
@@ -141,7 +141,7 @@ impl IdOrder {
     }
 
     /// The index of the atom with an id.
-    fn index(&self, id: i64) -> Option<u32> {
+    pub(super) fn index(&self, id: i64) -> Option<u32> {
         let first = *self.ids.first()?;
         // Nearly all files have all ids from the first to the last
         let near = id.checked_sub(first).and_then(|index| usize::try_from(index).ok());

@@ -235,6 +235,42 @@ fn damage_is_named() {
     assert!(FORMAT.read_within(&mut source, &step, tight).is_err());
 }
 
+/// Two ellipsoids and a point, as `write_data` writes them.
+const ELLIPSOIDS: &str = "t\n3 atoms\n1 atom types\n2 ellipsoids\n0 9 xlo xhi\n0 9 ylo yhi\n0 9 zlo zhi\n\n\
+    Atoms # ellipsoid\n\n1 1 1 2.5 1 2 3\n2 1 0 2.5 4 5 6\n4 1 1 2.5 7 8 0\n\n\
+    Ellipsoids\n\n4 1 2 3 0.5 -0.5 0.5 -0.5\n1 4 5 6 1 0 0 0 # upright\n";
+
+#[test]
+fn ellipsoids_have_the_columns_of_dumps() {
+    let found = read(ELLIPSOIDS);
+    assert_eq!(column(&found, "shapex"), [4.0, 0.0, 1.0]);
+    assert_eq!(column(&found, "shapez"), [6.0, 0.0, 3.0]);
+    assert_eq!(column(&found, "quatw"), [1.0, 0.0, 0.5]);
+    assert_eq!(column(&found, "quatk"), [0.0, 0.0, -0.5]);
+    assert!(!names(&found).contains(&"block1"));
+    // The exponents of superellipsoids follow
+    let exponents = ELLIPSOIDS.replace("-0.5\n", "-0.5 8 2\n").replace("0 # upright", "0 4 4");
+    assert_eq!(column(&read(&exponents), "block1"), [4.0, 0.0, 8.0]);
+    for (from, to, message) in [
+        ("2 ellipsoids", "3 ellipsoids", "section Ellipsoids has 2 of 3 lines"),
+        ("2 ellipsoids", "1 ellipsoids", "section Ellipsoids has more lines than the header says"),
+        ("2 ellipsoids\n", "", "section Ellipsoids has more lines"),
+        ("2 ellipsoids", "2.5 ellipsoids", "is not a count"),
+        ("\n4 1 2 3 0.5", "\n3 1 2 3 0.5", "has the atom 3, which section Atoms lacks"),
+        ("\n4 1 2 3 0.5", "\n1 1 2 3 0.5", "section Ellipsoids has the atom 1 twice"),
+        ("\n4 1 2 3 0.5", "\n4 1 wide 3 0.5", "column 3 has \"wide\""),
+        ("0.5 -0.5\n", "0.5\n", "line has 7 of 8 columns"),
+        ("Atoms # ellipsoid", "Atom", "section Ellipsoids stands before section Atoms"),
+    ] {
+        let text = ELLIPSOIDS.replace(from, to);
+        assert_ne!(text, ELLIPSOIDS, "{from}");
+        let error = READER.error_inside(text.as_bytes()).to_string();
+        assert!(error.contains(message), "{error} | {message}");
+    }
+    let end = ELLIPSOIDS.find(" # upright").expect("the last line");
+    READER.survives_truncation(ELLIPSOIDS.as_bytes(), &[40, 120, 180], end - 3);
+}
+
 #[test]
 fn files_without_atoms_are_legal() {
     let empty =
