@@ -58,11 +58,8 @@ fn mean(workshop: &Workshop, out: &str, options: &[&str]) -> f32 {
 fn a_rough_ball_in_white_surroundings_is_nearly_white() {
     let workshop = ball();
     let mut found = Vec::new();
-    for (roughness, least, most) in [
-        ("0", 0.998, 1.002),
-        ("0.4", 0.985, 1.015),
-        ("1", 0.95, 1.05),
-    ] {
+    for (roughness, least, most) in [("0", 0.998, 1.002), ("0.4", 0.985, 1.015), ("1", 0.95, 1.05)]
+    {
         let key = format!("material.roughness={roughness}");
         for (kind, surface) in [("glass", "spheres"), ("glass", "union"), ("water", "spheres")] {
             let out = format!("{kind}-{surface}-{roughness}");

@@ -62,6 +62,8 @@ named! {
         Glass = "glass",
         /// A clear body of water.
         Water = "water",
+        /// A clear body that does not refract: walls.
+        ThinGlass = "thin-glass",
     }
 }
 
@@ -69,6 +71,9 @@ const ONE_MAP: &str = "belongs to color_by, which is not given; a map may also b
 const GRAINS: &str = "belongs to a style with draw = \"grains\"";
 const STICKS: &str = "are drawn by a style with draw = \"sticks\" or \"balls-and-sticks\"";
 const OPAQUE_SPHERES: &str = "only opaque spheres and grains have one; set draw = \"spheres\", and matte, plastic or metal as material";
+
+/// Transmittance of each side of thin glass without a colour, linear RGB: a light grey.
+const THIN_GLASS: glam::Vec3 = glam::Vec3::new(0.86, 0.88, 0.88);
 
 /// Rules between the keys of a style.
 pub(super) const RULES: &[Rule] = rules! {
@@ -95,6 +100,9 @@ pub(super) const RULES: &[Rule] = rules! {
     "draw" Is["grains"] => "material.type" MissingOrNot["glass", "water"]:
         "grains are opaque; choose matte, plastic or metal";
     "draw" Is["smooth", "union"] => "opacity" MissingOr["1"]: OPAQUE_SPHERES;
+    "material.type" Is["thin-glass"] => "draw" Is["smooth", "union"]:
+        "thin glass is the surface of a body, which draw = \"smooth\" and \"union\" have";
+    "material.type" Is["thin-glass"] => "color_by" Missing: "thin glass has one colour; set color";
     "material.type" Is["glass", "water"] => "opacity" MissingOr["1"]: OPAQUE_SPHERES;
 };
 
@@ -129,7 +137,8 @@ impl InlineTable for StyleMaterial {
     const EXAMPLE: &str = "{ type = \"plastic\", roughness = 0.3 }";
 
     fn keys(&mut self, keys: &mut Keys<'_>) {
-        let kind = Key::new("type", &["Kind"]).required("matte, plastic, metal, glass or water");
+        let kind = Key::new("type", &["Kind"])
+            .required("matte, plastic, metal, glass, water or thin-glass");
         keys.key(kind, &mut self.kind);
         keys!(keys:
             /// Roughness
@@ -146,20 +155,25 @@ impl InlineTable for StyleMaterial {
 inline_table!(StyleMaterial);
 
 impl StyleMaterial {
-    /// Whether light passes through it.
+    /// Whether it is a medium, which light enters.
     pub const fn is_clear(&self) -> bool {
         matches!(self.kind, StyleMaterialKind::Glass | StyleMaterialKind::Water)
     }
 
-    /// The material in a scene, if it is opaque.
-    pub fn resolved(&self) -> scene::Material {
+    /// The material in a scene, if it is no medium. `color` is that of the style.
+    pub fn resolved(&self, color: &ColorSetting) -> scene::Material {
         let roughness = self.roughness.unwrap_or(ROUGHNESS);
         scene::Material {
             finish: match self.kind {
                 StyleMaterialKind::Plastic => Finish::Plastic { roughness },
                 StyleMaterialKind::Metal => Finish::Metal { roughness },
+                StyleMaterialKind::ThinGlass => Finish::Pane,
                 _ => Finish::Matte,
             },
+            color: (self.kind == StyleMaterialKind::ThinGlass).then(|| match color {
+                ColorSetting::Rgb(color) => *color,
+                _ => THIN_GLASS,
+            }),
             ..scene::Material::DEFAULT
         }
     }
@@ -299,7 +313,8 @@ impl Style {
             opacity => self.opacity;
             /// Material: { type = "plastic", roughness = 0.3 }, also with ior, absorption and absorption_length
             ///
-            /// The types are matte, plastic, metal, glass and water. One of the styles may be clear.
+            /// The types are matte, plastic, metal, glass, water, and thin-glass for walls: a body that light passes without
+            /// refraction. One of the styles may be glass or water.
             material => self.material, example("{ type = \"plastic\", roughness = 0.3 }"),
                 unset("that of [material] if it is opaque, else matte");
             /// Shape of grains: ellipsoid | superquadric | capsule | cylinder | cuboid | mesh | convex-hull
@@ -354,6 +369,11 @@ impl Style {
     /// Whether light passes through it.
     pub fn is_clear(&self) -> bool {
         self.material.as_ref().is_some_and(StyleMaterial::is_clear)
+    }
+
+    /// Whether light passes through it without refraction.
+    pub fn is_thin_glass(&self) -> bool {
+        self.material.as_ref().is_some_and(|own| own.kind == StyleMaterialKind::ThinGlass)
     }
 
     /// The surface of its particles, where grains count as spheres; None if they have none.
@@ -541,7 +561,7 @@ impl Manifest {
             None => usual,
             Some(own) => Material {
                 kind: Some(match own.kind {
-                    StyleMaterialKind::Matte => MaterialKind::Matte,
+                    StyleMaterialKind::Matte | StyleMaterialKind::ThinGlass => MaterialKind::Matte,
                     StyleMaterialKind::Plastic => MaterialKind::Plastic,
                     StyleMaterialKind::Metal => MaterialKind::Metal,
                     StyleMaterialKind::Glass => MaterialKind::Glass,

@@ -37,7 +37,7 @@ impl RenderContext<'_> {
         if depth == 1 && self.settings.drawing != Drawing::NONE {
             self.draw_outlines(&segments.rays, packet);
         }
-        self.pass_panes(segments, packet);
+        self.pass_panes(segments, coherence, packet);
         self.absorb(segments, packet);
     }
 

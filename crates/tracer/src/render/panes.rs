@@ -1,5 +1,6 @@
-//! Meshes that the camera does not see as opaque surfaces: thin panes of glass, and holdouts.
+//! Shapes that the camera does not see as opaque surfaces: thin panes of glass, and holdouts.
 //!
+//! Panes are meshes, each surface of which stands for both sides of a wall, or connected bodies, whose surface is one side.
 //! Rays pass panes in a straight line, so a pane is no intersection: [`RenderContext::pass_panes`] multiplies the
 //! throughput, and the data of a pixel are those of what is behind. In path tracing, a ray is reflected instead with
 //! the probability of its reflectance, and its intersection is the pane. Shadow rays pass panes, too, so light sources
@@ -15,13 +16,14 @@ use super::{
     stream::{RayStreams, SegmentPacket},
 };
 use crate::scene::Material;
-use crate::scene::material::pane_reflectance;
-use crate::surface::{Intersection, Intersections, MaterialId};
+use crate::scene::material::{pane_reflectance, surface_reflectance};
+use crate::surface::{Intersection, Intersections, MaterialId, Shape, Side};
 use glam::Vec3;
-use spherule_tree::math::{lane3, lanes_in, set_lane3, splat};
-use spherule_tree::ray::Ray;
+use spherule_tree::accel::Coherence;
+use spherule_tree::math::{first_lanes, lane3, lanes_in, set_lane3, splat};
+use spherule_tree::ray::RayPacket;
 
-/// Maximum number of panes along a ray; further ones are not there.
+/// Maximum number of panes in a scene, and along a ray; further ones are not there.
 const MAX_PANES: usize = 64;
 
 /// A ray at a pane.
@@ -35,32 +37,70 @@ struct PaneCrossing {
 }
 
 impl RenderContext<'_> {
-    /// The next pane on `ray`, the first in the scene at equal distances.
-    fn next_pane(&self, ray: &Ray) -> Option<PaneCrossing> {
-        let mut rest = *ray;
-        let mut found = None;
-        for pane in &self.shapes.panes {
-            if rest.t_max > rest.t_min
-                && let Some(hit) = pane.nearest(&rest)
-            {
-                rest.t_max = hit.t;
-                found = Some((hit, pane.material()));
+    /// Calls `visit` with the panes on the rays of `lanes`, from the origin on, until it returns false or the ray ends. At
+    /// equal distances, the first pane in the scene comes first.
+    fn walk_panes(
+        &self,
+        rays: &RayPacket,
+        lanes: u32,
+        coherence: Coherence,
+        mut visit: impl FnMut(usize, PaneCrossing) -> bool,
+    ) {
+        let panes = &self.shapes.panes[..self.shapes.panes.len().min(MAX_PANES)];
+        // The lanes that are inside panes that are connected bodies
+        let mut inside = [0; MAX_PANES];
+        for (inside, pane) in inside.iter_mut().zip(panes).filter(|(_, p)| p.is_connected()) {
+            *inside = lanes_inside(*pane, rays, lanes);
+        }
+        let mut rest = *rays;
+        let mut alive = lanes;
+        let mut hits = Intersections::default();
+        for _ in 0..MAX_PANES {
+            for lane in lanes_in(!alive & first_lanes(rays.len())) {
+                rest.t_max[lane] = -1.0;
+            }
+            hits.clear();
+            for (pane, inside) in panes.iter().zip(&inside) {
+                pane.intersect(&mut rest, coherence, inside & alive, &mut hits);
+            }
+            alive &= hits.mask;
+            for lane in lanes_in(alive) {
+                let (hit, material) = (hits.get(lane), hits.material[lane]);
+                let is_hit = |pane: &&dyn Shape| pane.material() == material;
+                let Some(index) = panes.iter().position(is_hit) else {
+                    continue;
+                };
+                // Light that leaves a body crosses one side of the wall, and at a mesh both of them
+                let cosine = hit.normal.dot(lane3(&rays.direction, lane)).abs();
+                let reflectance = if panes[index].is_connected() {
+                    inside[index] ^= 1 << lane;
+                    surface_reflectance(cosine)
+                } else {
+                    pane_reflectance(cosine)
+                };
+                let color = self.scene.material(material).color.unwrap_or(Vec3::ONE);
+                let transmittance = (1.0 - reflectance) * color;
+                if visit(lane, PaneCrossing { hit, material, reflectance, transmittance }) {
+                    rest.t_min[lane] = hit.t + hit.offset;
+                    rest.t_max[lane] = rays.t_max[lane];
+                } else {
+                    alive &= !(1 << lane);
+                }
+            }
+            if alive == 0 {
+                break;
             }
         }
-        let (hit, material) = found?;
-        let reflectance = pane_reflectance(hit.normal.dot(ray.direction).abs());
-        let color = self.scene.material(material).color.unwrap_or(Vec3::ONE);
-        Some(PaneCrossing {
-            hit,
-            material,
-            reflectance,
-            transmittance: (1.0 - reflectance) * color,
-        })
     }
 
     /// Multiplies the throughput of `packet` by the transmittance of the panes up to its intersections. In path
     /// tracing, ends some of the rays at a pane that reflects them.
-    pub(super) fn pass_panes(&self, segments: &mut SegmentPacket, packet: &mut PacketScratch) {
+    pub(super) fn pass_panes(
+        &self,
+        segments: &mut SegmentPacket,
+        coherence: Coherence,
+        packet: &mut PacketScratch,
+    ) {
         if self.shapes.panes.is_empty() {
             return;
         }
@@ -73,31 +113,27 @@ impl RenderContext<'_> {
         }
         packet.first_pane = splat(f32::INFINITY);
         packet.behind.clear();
-        // Follow each ray from pane to pane
-        for lane in lanes_in(segments.lanes()) {
-            let mut u = u[lane];
+        // Follow the rays from pane to pane
+        let rays = segments.rays;
+        self.walk_panes(&rays, segments.lanes(), coherence, |lane, pane| {
+            // The pane takes some of the light, or is the intersection of the path
+            packet.first_pane[lane] = packet.first_pane[lane].min(pane.hit.t);
             let mut throughput = lane3(&packet.throughput, lane);
-            let mut rest = segments.rays.ray(lane);
-            for _ in 0..MAX_PANES {
-                let Some(pane) = self.next_pane(&rest) else {
-                    break;
-                };
-                // The pane takes some of the light, or is the intersection of the path
-                packet.first_pane[lane] = packet.first_pane[lane].min(pane.hit.t);
-                if !is_path {
-                    throughput *= pane.transmittance;
-                } else if let Some(rest) = pane.choose(&mut throughput, u) {
-                    u = rest;
-                } else {
-                    self.keep_behind(lane, packet);
-                    packet.hits.set(lane, &pane.hit, pane.material);
-                    segments.rays.t_max[lane] = pane.hit.t;
-                    break;
-                }
-                rest.t_min = pane.hit.t + pane.hit.offset;
-            }
+            let passes = if !is_path {
+                throughput *= pane.transmittance;
+                true
+            } else if let Some(rest) = pane.choose(&mut throughput, u[lane]) {
+                u[lane] = rest;
+                true
+            } else {
+                self.keep_behind(lane, packet);
+                packet.hits.set(lane, &pane.hit, pane.material);
+                segments.rays.t_max[lane] = pane.hit.t;
+                false
+            };
             set_lane3(&mut packet.throughput, lane, throughput);
-        }
+            passes
+        });
     }
 
     /// Keeps the intersection behind a pane that reflects the ray in `lane`, for the data of the pixel.
@@ -122,22 +158,15 @@ impl RenderContext<'_> {
     }
 
     /// Multiplies the radiance of light samples by the transmittance of the panes on their shadow rays.
-    pub(super) fn attenuate_by_panes(&self, samples: &mut LightSamples) {
+    pub(super) fn attenuate_by_panes(&self, samples: &mut LightSamples, coherence: Coherence) {
         if self.shapes.panes.is_empty() {
             return;
         }
-        for lane in lanes_in(samples.lanes) {
-            let mut radiance = lane3(&samples.radiance, lane);
-            let mut rest = samples.rays.ray(lane);
-            for _ in 0..MAX_PANES {
-                let Some(pane) = self.next_pane(&rest) else {
-                    break;
-                };
-                radiance *= pane.transmittance;
-                rest.t_min = pane.hit.t + pane.hit.offset;
-            }
-            set_lane3(&mut samples.radiance, lane, radiance);
-        }
+        let radiance = &mut samples.radiance;
+        self.walk_panes(&samples.rays, samples.lanes, coherence, |lane, pane| {
+            set_lane3(radiance, lane, lane3(radiance, lane) * pane.transmittance);
+            true
+        });
     }
 
     /// The lanes of rays that panes reflect.
@@ -189,6 +218,15 @@ impl RenderContext<'_> {
         let inside = segments.inside;
         next.reflected.push(lanes & !last, rays, segments, inside, REFLECTED);
     }
+}
+
+/// The lanes of `lanes` whose rays start inside a body.
+fn lanes_inside(body: &dyn Shape, rays: &RayPacket, lanes: u32) -> u32 {
+    let is_inside = |lane: usize| {
+        let ray = rays.ray(lane);
+        body.side_of(ray.at(ray.t_min)) == Side::Inside
+    };
+    lanes_in(lanes).filter(|lane| is_inside(*lane)).fold(0, |inside, lane| inside | 1 << lane)
 }
 
 impl PaneCrossing {

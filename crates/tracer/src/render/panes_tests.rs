@@ -6,13 +6,13 @@ use std::sync::atomic::AtomicBool;
 
 use glam::{DVec3, Vec3};
 
-use super::{brute::Balls, *};
+use super::{brute::Balls, solid::Solid, *};
 use crate::scene::material::pane_reflectance;
 use crate::scene::{
     Background, Camera, CameraView, Environment, Finish, Ground, Light, LightKind, Material,
 };
-use crate::surface::MaterialId;
 use crate::surface::mesh::{MeshNormals, MeshSurface, MeshTree, TriangleMesh, VisibleFaces};
+use crate::surface::{MaterialId, OwnedBody};
 
 const CLEAR: Material = Material { finish: Finish::Pane, ..Material::matte(Vec3::ONE) };
 
@@ -268,4 +268,32 @@ fn a_shadow_catcher_is_seen_through_panes() {
     let film = image(&[&wall(0.0)], &nothing(), 0.5, &scene, &settings(1024, 0));
     let t = 1.0 - pane_reflectance(1.0);
     near(mean(&film), [t, t, t, 1.0 - t], 2e-3);
+}
+
+/// The image of a ball of radius 2 around the origin whose surface is a pane of this colour.
+fn image_of_body(color: Vec3, scene: &mut Scene, settings: &RenderSettings) -> Film {
+    let material = scene.add(Material { finish: Finish::Pane, ..Material::matte(color) }).unwrap();
+    let body = OwnedBody::new(Box::new(Solid::ball(2.0)), material, 0);
+    let balls = nothing();
+    let source = ParticleShading::constant(Vec3::ONE);
+    let never = AtomicBool::new(false);
+    render(&[&balls, &body], scene, &source, settings, &never).unwrap().0
+}
+
+#[test]
+fn light_passes_both_sides_of_a_body_of_thin_glass() {
+    let mut scene = scene(Vec3::ONE, Vec3::ZERO, &[]);
+    let settings = RenderSettings { integrator: IntegratorKind::Whitted, ..settings(1, 0) };
+    let mean = mean(&image_of_body(BROWN, &mut scene, &settings));
+    // One side reflects 4 %
+    let expected = (0.96 * BROWN).powf(2.0);
+    assert!((Vec3::from_slice(&mean[..3]) - expected).abs().max_element() < 1e-3, "{mean:?}");
+}
+
+#[test]
+fn a_body_of_thin_glass_loses_no_light() {
+    let mut scene = scene(Vec3::ONE, Vec3::ONE, &[]);
+    // Light between the two sides is reflected from inside
+    let mean = mean(&image_of_body(Vec3::ONE, &mut scene, &settings(64, 16)));
+    assert!(mean[..3].iter().all(|light| (light - 1.0).abs() < 1e-3), "{mean:?}");
 }

@@ -46,7 +46,7 @@ impl RenderContext<'_> {
         self.occlude(coherence, samples, |shape| {
             self.shapes.interior == Interior::Opaque || shape.material() != MaterialId::PARTICLES
         });
-        self.attenuate_by_panes(samples);
+        self.attenuate_by_panes(samples, coherence);
         self.attenuate_by_spray(samples, coherence);
         self.attenuate_by_opacity(samples, coherence);
         let Some(particles) =
@@ -88,7 +88,7 @@ impl RenderContext<'_> {
         counts.shadow += u64::from(samples.lanes.count_ones());
         let coherence = self.coherence(depth);
         self.occlude(coherence, samples, |_| true);
-        self.attenuate_by_panes(samples);
+        self.attenuate_by_panes(samples, coherence);
         self.attenuate_by_spray(samples, coherence);
         self.attenuate_by_opacity(samples, coherence);
         samples.lanes

@@ -126,10 +126,15 @@ pub enum Finish {
 /// Index of refraction of panes.
 const PANE_IOR: f32 = 1.5;
 
+/// The part of the light that one side of a pane reflects, at the absolute `cosine` between ray and normal.
+pub fn surface_reflectance(cosine: f32) -> f32 {
+    dielectric(cosine, 1.0 / PANE_IOR)
+}
+
 /// The part of the light that a thin pane reflects, at the absolute `cosine` between ray and normal. Light that both
 /// of its sides reflect any number of times is included.
 pub fn pane_reflectance(cosine: f32) -> f32 {
-    let once = dielectric(cosine, 1.0 / PANE_IOR);
+    let once = surface_reflectance(cosine);
     2.0 * once / (1.0 + once)
 }
 
