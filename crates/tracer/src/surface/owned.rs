@@ -7,7 +7,7 @@ use spherule_tree::accel::Coherence;
 use spherule_tree::math::lanes_in;
 use spherule_tree::ray::{Ray, RayPacket};
 
-/// An opaque body over particles that follow each other in the frame.
+/// A body over particles that follow each other in the frame.
 pub struct OwnedBody<'a> {
     body: Box<dyn Shape + 'a>,
     material: MaterialId,
@@ -49,12 +49,12 @@ impl Shape for OwnedBody<'_> {
         &self,
         rays: &mut RayPacket,
         coherence: Coherence,
-        _inside: u32,
+        inside: u32,
         hits: &mut Intersections,
     ) {
-        // Rays never enter the body; those that it ends are shorter than before
+        // Rays that the body ends are shorter than before
         let before = rays.t_max;
-        self.body.intersect(rays, coherence, 0, hits);
+        self.body.intersect(rays, coherence, inside, hits);
         for lane in lanes_in(hits.mask) {
             if rays.t_max[lane] < before[lane] {
                 hits.material[lane] = self.material;
