@@ -151,7 +151,14 @@ fn setup_on(
     let mut arrows = arrows::arrows(&mut scene, &manifest.arrows, place)?;
     let mut trails = arrows::trails(&mut scene, &manifest.trails, place)?;
     let bonds = bonds::bonds(&mut scene, manifest, survey, &color, extent.reach)?;
-    let looks = styles::Looks { manifest, survey, camera: &placed.camera, reach: extent.reach };
+    let looks = styles::Looks {
+        manifest,
+        survey,
+        camera: &placed.camera,
+        reach: extent.reach,
+        bounds: extent.bounds,
+        priority: u8::from(styled.first.is_none()),
+    };
     let styles = looks.styles(&mut scene, &styled.styles, (&mut arrows, &mut trails))?;
     // Collect the settings of the images
     let (channels, attributes) = channels::channels(manifest, survey)?;
