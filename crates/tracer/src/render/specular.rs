@@ -56,14 +56,7 @@ impl RenderContext<'_> {
         }
         let PacketScratch { leaving, throughput, radiance, split: lights, groups, .. } = packet;
         // Describe both rays: weight, stream, side and branch of the path
-        let (inside, other_side) = match self.shapes.interior {
-            Interior::Opaque | Interior::Spheres => (0, 0),
-            Interior::Body => (segments.inside, !segments.inside),
-            Interior::Nested => {
-                let behind = segments.bodies.map(|set| set.across(crossed));
-                (segments.inside, lanes_inside_any(&behind))
-            }
-        };
+        let [inside, other_side] = self.insides(segments, crossed);
         let reflected = (
             dielectric.reflection,
             &mut leaving.reflected,
@@ -96,6 +89,19 @@ impl RenderContext<'_> {
             }
             if lanes & !last != 0 {
                 stream.push(lanes & !last, rays, segments, how);
+            }
+        }
+    }
+
+    /// The lanes inside a connected body of rays that are reflected, and of those that are refracted, which enter or leave
+    /// the body in `crossed` if there may be several.
+    fn insides(&self, segments: &SegmentPacket, crossed: BodySet) -> [u32; 2] {
+        match self.shapes.interior {
+            Interior::Opaque | Interior::Spheres => [0, 0],
+            Interior::Body => [segments.inside, !segments.inside],
+            Interior::Nested => {
+                let behind = segments.bodies.map(|set| set.across(crossed));
+                [segments.inside, lanes_inside_any(&behind)]
             }
         }
     }

@@ -3,7 +3,7 @@
 //! Shadow rays pass straight through transmissive bodies, so there are no caustics. Each crossing of a surface
 //! multiplies their transmittance by `transmission*(1-r)`. `r` is for the angle outside on both sides of the surface
 //! (a refracted ray would have come from such an angle, and is never totally reflected). The medium of a connected
-//! body attenuates them as well. Panes (`panes.rs`), soft spray (`spray.rs`) and
+//! body attenuates them as well. Of several bodies, only boundaries between different media count. Panes (`panes.rs`), soft spray (`spray.rs`) and
 //! spheres that are not fully opaque (`translucent.rs`) attenuate all shadow rays.
 
 use super::{
@@ -224,12 +224,7 @@ impl RenderContext<'_> {
                 let extinction = nested.extinction(medium);
                 attenuate(self.simd, &extinction, &length, lanes, transmittance);
             }
-            for BoundaryLanes { boundary, lanes, .. } in nested.boundaries(hits, crossing, &sets) {
-                if let Some(boundaries) = &self.boundaries {
-                    let dielectric = boundaries.of(boundary);
-                    cross_straight(self.simd, dielectric, rays, hits, lanes, transmittance);
-                }
-            }
+            self.cross_boundaries(nested, (rays, hits), crossing, &sets, transmittance);
 
             // End rays without transmittance
             let dark = dark_lanes(crossing, transmittance);
@@ -248,6 +243,25 @@ impl RenderContext<'_> {
             }
         }
         reached
+    }
+
+    /// Multiplies `transmittance` by that of the boundaries that shadow rays of `lanes` cross at `hits`; before, they are
+    /// inside the bodies of `sets`.
+    fn cross_boundaries(
+        &self,
+        nested: &TransmissiveBodies<'_>,
+        (rays, hits): (&RayPacket, &Intersections),
+        lanes: u32,
+        sets: &[BodySet; LANES],
+        transmittance: &mut Lanes3,
+    ) {
+        let Some(boundaries) = &self.boundaries else {
+            return;
+        };
+        for BoundaryLanes { boundary, lanes, .. } in nested.boundaries(hits, lanes, sets) {
+            let dielectric = boundaries.of(boundary);
+            cross_straight(self.simd, dielectric, rays, hits, lanes, transmittance);
+        }
     }
 }
 
