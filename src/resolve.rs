@@ -159,6 +159,8 @@ fn setup_on(
         camera: &placed.camera,
         meshes: &inputs.grain_meshes,
         reach: extent.reach,
+        bounds: extent.bounds,
+        priority: u8::from(styled.first.is_none()),
     };
     let styles = looks.styles(&mut scene, &styled.styles, (&mut arrows, &mut trails))?;
     // Collect the settings of the images

@@ -3,6 +3,10 @@
 use spherule_formats::ValueError;
 use toml::{Table, Value};
 
+/// Settings of `material` that may stand beside it, those of glass and water first.
+const MATERIAL_KEYS: [&str; 4] = ["ior", "absorption", "absorption_length", ROUGHNESS];
+const ROUGHNESS: &str = "roughness";
+
 /// The table `[[style]]` of `type == 2: sticks, radius 0.3, color red`.
 pub(super) fn style(text: &str) -> Result<Table, ValueError> {
     let expected = "a condition, how its particles are drawn, and settings, such as 'type == 2: sticks, radius 0.3, color \
@@ -34,7 +38,27 @@ fn table(text: &str) -> Option<Table> {
             None => return None,
         }
     }
+    gather_material(&mut table);
     Some(table)
+}
+
+/// Moves settings of the material into its table. A material with optics and no type is that of water.
+fn gather_material(table: &mut Table) {
+    let own: Vec<(String, Value)> = MATERIAL_KEYS
+        .into_iter()
+        .filter_map(|key| Some((key.to_owned(), table.remove(key)?)))
+        .collect();
+    let Some((first, _)) = own.first() else {
+        return;
+    };
+    let mut usual = Table::new();
+    if first != ROUGHNESS {
+        usual.insert("type".to_owned(), "water".into());
+    }
+    let material = table.entry("material").or_insert_with(|| usual.into());
+    if let Value::Table(material) = material {
+        material.extend(own);
+    }
 }
 
 /// The value of a setting: TOML, or text without quotes.
@@ -84,6 +108,14 @@ mod tests {
                         material = { type = \"glass\" }\nrange = [0, 2]";
         assert_eq!(found.unwrap(), toml::from_str::<Table>(expected).unwrap());
         assert_eq!(style(": hidden").unwrap(), toml::from_str("draw = \"hidden\"").unwrap());
+        // Settings of the material
+        let found = style("type == 2: smooth, ior 1.47, absorption [0.9, 0.7, 0.2]");
+        let expected = "where = \"type == 2\"\ndraw = \"smooth\"\n\
+                        material = { type = \"water\", ior = 1.47, absorption = [0.9, 0.7, 0.2] }";
+        assert_eq!(found.unwrap(), toml::from_str::<Table>(expected).unwrap());
+        let found = style(": union, roughness 0.2, material glass");
+        let expected = "draw = \"union\"\nmaterial = { type = \"glass\", roughness = 0.2 }";
+        assert_eq!(found.unwrap(), toml::from_str::<Table>(expected).unwrap());
     }
 
     #[test]

@@ -1,10 +1,13 @@
 //! The structures of particles with a style: spheres in a tree of their own, and bodies.
 
 use std::borrow::Cow;
+use std::cmp::Reverse;
+use std::ops::Range;
 
 use glam::Vec3;
+use spherule_formats::Radius;
 
-use super::bodies::{build_grid, radius_of, shading_normals};
+use super::bodies::{BodyParticles, build_grid, radius_of, shading_normals};
 use super::decoded::DecodedFrame;
 use super::grains::{report_notes, unit_note};
 use super::motion::displaced;
@@ -25,6 +28,8 @@ pub(super) struct StyleSurfaces {
     spheres: Option<StyleSpheres>,
     bodies: Vec<StyleBody>,
     grains: Vec<StyleGrains>,
+    /// Centres of particles of clear styles that have priority over clear particles without a style.
+    prior: Vec<Vec3>,
 }
 
 /// The grains of a style.
@@ -80,6 +85,7 @@ impl StyleSurfaces {
         if rules.styles.is_empty() {
             return Ok((all, bytes));
         }
+        all.prior = prior_centers(setup, frame, MaterialId::PARTICLES);
         // Take the last style first, so that its particles are at the end
         let ranges = &frame.shading.ranges;
         let in_tree = rules.styles_in_tree(setup);
@@ -117,6 +123,11 @@ impl StyleSurfaces {
             }
         }
         Ok((all, bytes))
+    }
+
+    /// Centres of particles of clear styles that have priority over clear particles without a style.
+    pub(super) fn prior(&self) -> &[Vec3] {
+        &self.prior
     }
 
     /// Adds the surfaces to `shapes`.
@@ -199,7 +210,10 @@ impl StyleBody {
         move_to_exposure(setup, frame, &mut own);
         let (structure, bytes) = if settings.kind == SurfaceKind::Smooth {
             let mut grid = SmoothGrid::default();
-            let made = build_grid(setup, &mut grid, (&own.centers, &own.radius), &settings, notes)?;
+            let prior = prior_centers(setup, frame, material);
+            let particles =
+                BodyParticles { centers: &own.centers, radius: &own.radius, prior: &prior };
+            let made = build_grid(setup, &mut grid, particles, &settings, notes)?;
             (BodyStructure::Smooth(grid), made.bytes)
         } else {
             let mut tree = TreeBuilder::new();
@@ -229,6 +243,38 @@ fn bytes_of(built: &BuildReport) -> u64 {
 fn build_tree(setup: &Setup, own: &StyleParticles, tree: &mut TreeBuilder) -> BuildReport {
     let spheres = Spheres { centers: &own.centers, radius: radius_of(&own.radius) };
     tree.build(&spheres, &setup.build_settings(own.centers.len(), true))
+}
+
+/// Centres of the particles of `frame`, in the middle of the exposure, of clear bodies that have priority over the clear body
+/// of a `material`.
+fn prior_centers(setup: &Setup, frame: &DecodedFrame<'_>, material: MaterialId) -> Vec<Vec3> {
+    let (scene, rules) = (&setup.picture.scene, &setup.picture.particles);
+    let is_clear = |id: MaterialId| scene.material(id).transmission > 0.0;
+    let rank = |id: MaterialId| (Reverse(scene.material(id).priority), id);
+    if !is_clear(material) {
+        return Vec::new();
+    }
+    let ranges = &frame.shading.ranges;
+    let styles = rules.styles.iter().enumerate();
+    let bodies = styles.filter(|(_, style)| matches!(style.form, StyleForm::Body(_)));
+    let groups = bodies.map(|(index, style)| (style.material, ranges.of(index)));
+    std::iter::once((MaterialId::PARTICLES, ranges.first()))
+        .chain(groups)
+        .filter(|(id, _)| is_clear(*id) && rank(*id) < rank(material))
+        .flat_map(|(_, range)| exposed_centers(setup, frame, range))
+        .collect()
+}
+
+/// Centres of the particles in a `range` of `frame` in the middle of the exposure.
+fn exposed_centers(setup: &Setup, frame: &DecodedFrame<'_>, range: Range<usize>) -> Vec<Vec3> {
+    let mut particles = StyleParticles {
+        style: 0,
+        first: u32::try_from(range.start).unwrap_or(u32::MAX),
+        centers: frame.centers.get(range).unwrap_or_default().to_vec(),
+        radius: Radius::Common(0.0),
+    };
+    move_to_exposure(setup, frame, &mut particles);
+    particles.centers
 }
 
 /// Moves particles to their places in the middle of the exposure. Returns by how far they move while the shutter is open;

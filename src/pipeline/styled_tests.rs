@@ -43,9 +43,13 @@ fn particles(positions: &[Vec3]) -> RawParticles<PositionSlice<'_>> {
 }
 
 fn rendered(styles: &str) -> (Setup, Film, Vec<String>) {
+    rendered_with("surface = \"spheres\"", styles)
+}
+
+fn rendered_with(render: &str, styles: &str) -> (Setup, Film, Vec<String>) {
     let text = format!(
         "input = {{ path = \"a\", radius = 0.4 }}\nimage = {{ width = 160, height = 60, samples = 4 }}\n\
-         render = {{ ground = false, denoise = false }}\ncamera = {{ azimuth = 10, elevation = 15 }}\n\
+         render = {{ ground = false, denoise = false, {render} }}\ncamera = {{ azimuth = 10, elevation = 15 }}\n\
          output.channels = [\"id\", \"P\", \"Z\", \"N\", \"albedo\", \"crypto_material\"]\n{styles}"
     );
     let manifest = Manifest::parse(&text, Path::new("job.toml")).unwrap_or_else(|e| panic!("{e}"));
@@ -147,6 +151,48 @@ fn one_style_may_be_clear() {
     // Each style is an object of its own
     let mattes = film.plane::<f32>(FilmPlane::CryptoMaterial).unwrap();
     assert!(mattes.iter().any(|value| *value != 0.0));
+}
+
+#[test]
+fn several_styles_may_be_clear() {
+    let styles = format!(
+        "[[style]]\nwhere = \"type == 2\"\ndraw = \"smooth\"\nradius = 0.5\nmaterial = {{ type = \"water\" }}\n\
+         [[style]]\nwhere = \"type == 1\"\nradius = 0.5\nopacity = 0.5\n{RED}\
+         [[style]]\nwhere = \"type == 3\"\ndraw = \"union\"\nradius = 0.7\n\
+         material = {{ type = \"glass\", ior = 1.47, absorption = [0.9, 0.5, 0.1], absorption_length = 2 }}"
+    );
+    let (setup, film, _) = rendered(&styles);
+    let materials = setup.picture.scene.materials.iter();
+    let clear: Vec<f32> = materials.filter(|m| m.transmission == 1.0).map(|m| m.ior).collect();
+    assert_eq!(clear, [1.333, 1.47]);
+    let oil = setup.picture.scene.materials.last().unwrap().extinction;
+    assert!((oil.y + libm::logf(0.5) / 2.0).abs() < 1e-6, "{oil}");
+    let near = |radius: f32| [radius - 1e-4, radius + 1e-4];
+    let pixels = check_points(&film, [near(0.4), near(0.5), [0.0, 1.2], near(0.7), near(0.4)]);
+    assert!(pixels.iter().all(|pixels| *pixels > 100), "{pixels:?}");
+}
+
+#[test]
+fn clear_particles_without_a_style_touch_clear_styles() {
+    // The bodies share the slab of each type; each pixel has an id of the body that it shows
+    let styles = "material.type = \"water\"\n[[style]]\nwhere = \"y > 2.5\"\ndraw = \"smooth\"\n\
+                  material = { type = \"water\", ior = 1.47 }";
+    let (setup, film, _) = rendered_with("surface = \"smooth\"", styles);
+    let scene = &setup.picture.scene;
+    assert_eq!(scene.materials.last().unwrap().priority, 1);
+    let pixels = check_points(&film, [[0.0, 1.2]; 5]);
+    assert!(pixels.iter().all(|pixels| *pixels > 100), "{pixels:?}");
+    let positions = positions();
+    let ids = film.plane::<u32>(FilmPlane::Id).expect("ids");
+    let points = film.plane::<[f32; 3]>(FilmPlane::Position).expect("points");
+    let mut counts = [0; 2];
+    for (id, point) in ids.iter().zip(points).filter(|(id, _)| **id != u32::MAX) {
+        let is_upper = positions[*id as usize - 1000].y > 2.5;
+        counts[usize::from(is_upper)] += 1;
+        assert!(is_upper || point[1] < 3.2, "{id} {point:?}");
+        assert!(!is_upper || point[1] > 1.8, "{id} {point:?}");
+    }
+    assert!(counts.iter().all(|count| *count > 100), "{counts:?}");
 }
 
 #[test]

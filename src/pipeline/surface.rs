@@ -8,7 +8,7 @@ use std::time::Instant;
 use glam::Vec3;
 use spherule_formats::Radius;
 
-use super::bodies::{build_grid, radius_of, shading_normals};
+use super::bodies::{BodyParticles, build_grid, radius_of, shading_normals};
 use super::decoded::DecodedFrame;
 use super::meshes::{MeshSlices, MeshThing};
 use super::motion::expose;
@@ -179,7 +179,11 @@ impl SurfaceBuilder {
         self.build_slices(setup, frame, |this, frame| {
             let mut grid = SmoothGrid::default();
             let mut own_notes = Vec::new();
-            let particles = (&frame.centers[..], &frame.radius);
+            let particles = BodyParticles {
+                centers: &frame.centers,
+                radius: &frame.radius,
+                prior: this.styles.prior(),
+            };
             let one = build_grid(setup, &mut grid, particles, settings, &mut own_notes)?;
             // Those of the last slice stand for all
             notes.truncate(first_note);

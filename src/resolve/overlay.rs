@@ -262,7 +262,11 @@ fn content(
     Ok(match kind {
         OverlayKind::ColorBar { title, unit, length, orientation, ticks, format, factor } => {
             let rules = &setup.picture.particles;
-            let mut all = rules.styles.iter().map(|style| &style.color);
+            // Clear particles are not seen in their colours
+            let is_opaque = |style: &&ParticleStyle| {
+                setup.picture.scene.material(style.material).transmission == 0.0
+            };
+            let mut all = rules.styles.iter().filter(is_opaque).map(|style| &style.color);
             let of_styles = || all.find_map(|rule| color_bar(rule, manifest, survey));
             let is_seen = rules.styles.is_empty()
                 || (survey.color.is_some() && !manifest.material.is_clear());

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::bonds::bond_rule;
 use super::rods::look;
-use super::{ResolveError, arrows, color, opacity, radius};
+use super::{ResolveError, arrows, color, opacity, radius, surface};
 use crate::manifest::{
     BondSearch, ColorSetting, GrainNumbers, Manifest, RadiusSetting, Style, StyleDraw,
     StyleMaterial,
@@ -14,7 +14,7 @@ use crate::pipeline::{
     ArrowStyle, BondStyle, ColorRule, GrainMeshes, GrainRules, ParticleStyle, RadiusRule,
     StyleForm, TrailStyle,
 };
-use crate::scene::{Camera, Fresnel, Material, Scene};
+use crate::scene::{Bounds, Camera, Fresnel, Material, Scene};
 use crate::surface::{SurfaceKind, SurfaceSettings};
 use crate::survey::{ELEMENT, Survey};
 
@@ -35,6 +35,10 @@ pub(super) struct Looks<'a> {
     pub(super) meshes: &'a GrainMeshes,
     /// Radius of the largest particles.
     pub(super) reach: f64,
+    /// Bounds of the spheres.
+    pub(super) bounds: Bounds,
+    /// Priority of clear styles over the particles without one.
+    pub(super) priority: u8,
 }
 
 impl Looks<'_> {
@@ -77,7 +81,7 @@ impl Looks<'_> {
             }
             looks.push(ParticleStyle {
                 name: style.title(),
-                is_named: style.name.is_some(),
+                is_named: style.name.is_some() && !style.is_clear(),
                 is_of_rest: style.condition.is_none() && style.name.is_none(),
                 form: self.form(style),
                 radius,
@@ -95,6 +99,13 @@ impl Looks<'_> {
     fn material(&self, style: &Style) -> Material {
         let usual = self.manifest.material.resolved(Fresnel::Schlick);
         match &style.material {
+            Some(own) if own.is_clear() => {
+                let usual = &self.manifest.material;
+                let settings = own.as_material(usual, Material::DEFAULT.ior);
+                let kind = style.surface().unwrap_or(SurfaceKind::Smooth);
+                let found = surface::optics(&settings, kind, &self.bounds);
+                Material { priority: self.priority, ..found }
+            }
             Some(own) => own.resolved(&style.color),
             None if usual.transmission == 0.0 => usual,
             None => StyleMaterial::default().resolved(&style.color),

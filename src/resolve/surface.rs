@@ -31,12 +31,20 @@ pub(super) fn radius(kind: SurfaceKind, survey: &Survey) -> Option<f32> {
 
 /// The material that the manifest describes, with defaults that depend on the size of the scene.
 pub(super) fn material(manifest: &Manifest, bounds: &Bounds) -> Material {
-    let m = &manifest.material;
+    optics(&manifest.material, manifest.surface.kind, bounds)
+}
+
+/// The material that the settings `m` describe, of particles with this `kind` of surface.
+pub(super) fn optics(
+    m: &crate::manifest::Material,
+    kind: SurfaceKind,
+    bounds: &Bounds,
+) -> Material {
     let length = match m.absorption_length {
         Some(length) => narrow(length),
         None => narrow(bounds.diagonal() * ABSORPTION).max(f32::MIN_POSITIVE),
     };
-    let usual = match manifest.surface.kind {
+    let usual = match kind {
         SurfaceKind::Spheres => Fresnel::Schlick,
         SurfaceKind::Union | SurfaceKind::Smooth => Fresnel::Exact,
     };

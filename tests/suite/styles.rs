@@ -185,3 +185,22 @@ fn impossible_styles_are_refused_and_empty_ones_are_noted() {
     let none = ["a.png", "--style", "type > 7: hidden", "--style", "type == 9: smooth"];
     still(&workshop, "in", &none).expect(0).prints("no particle is of style `type == 9`");
 }
+
+#[test]
+fn several_styles_are_clear_bodies() {
+    let workshop = layers();
+    let water = ["--style", "type == 1: smooth, radius 0.6, ior 1.33, material water"];
+    let image = |name: &str| fs::read(workshop.join(name)).expect("an image");
+    for (name, oil) in [
+        ("a.png", "type == 2: union, radius 0.7, ior 1.47, absorption [0.9, 0.6, 0.1]"),
+        ("b.png", "type == 2: union, radius 0.7, ior 1.47"),
+        ("c.png", "type == 2: union, radius 0.7, ior 1.47, roughness 0.3"),
+    ] {
+        still(&workshop, "in", &[&[name][..], &water, &["--style", oil]].concat()).expect(0);
+    }
+    assert!(image("a.png") != image("b.png") && image("b.png") != image("c.png"));
+    let oil = ["d.png", "--style", "type == 2: spheres, material glass"];
+    still(&workshop, "in", &[&oil[..], &water].concat())
+        .expect(2)
+        .prints("set style.0.draw = \"smooth\" or \"union\"");
+}

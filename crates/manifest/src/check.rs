@@ -1,8 +1,9 @@
 //! Dependencies between tables: what one allows another.
 
 use spherule_jobs::FrameRange;
-use spherule_tracer::render::{FilmPlane, MAX_LITERAL_DEPTH, MAX_SIDE};
+use spherule_tracer::render::{FilmPlane, MAX_LITERAL_DEPTH, MAX_SIDE, MAX_TRANSMISSIVE_BODIES};
 use spherule_tracer::scene::MaterialId;
+use spherule_tracer::surface::SurfaceKind;
 
 use super::bonds::BondSearch;
 use super::camera::ProjectionKind;
@@ -128,17 +129,35 @@ impl Manifest {
         self.check_styles(root);
     }
 
-    /// Checks that light passes through the particles of one style at most, or through those without a style.
+    /// Checks that several clear kinds of particles are bodies, and not too many.
     fn check_styles(&self, root: &mut Section<'_>) {
-        let mut clear = self.material.is_clear().then(|| "material.type".to_owned());
-        for (number, _) in self.styles.iter().enumerate().filter(|(_, s)| s.is_clear()) {
-            let key = format!("style.{number}.material");
-            if let Some(first) = &clear {
-                let what =
-                    format!("{first} is clear already; glass and water are for one of the styles");
-                root.wrong(&key, &what);
+        // List the clear ones: the key that makes each clear, and the one by which it becomes a body
+        let of_rest = (self.material.is_clear()).then(|| {
+            let is_body = self.surface.kind != SurfaceKind::Spheres;
+            ("material.type".to_owned(), "render.surface".to_owned(), is_body)
+        });
+        let styles = self.styles.iter().enumerate().filter(|(_, style)| style.is_clear());
+        let styles = styles.map(|(number, style)| {
+            (format!("style.{number}.material"), format!("style.{number}.draw"), style.is_body())
+        });
+        let clear: Vec<_> = of_rest.into_iter().chain(styles).collect();
+        // Check them
+        if clear.len() > 1 {
+            for (key, draw, _) in clear.iter().filter(|(.., is_body)| !is_body) {
+                let others = clear.iter().map(|(other, ..)| other);
+                let other = others.filter(|other| *other != key).min().map_or("", String::as_str);
+                let what = format!(
+                    "{other} is clear, too, and only one kind of clear particles may be separate spheres; \
+                     set {draw} = \"smooth\" or \"union\""
+                );
+                root.wrong(key, &what);
             }
-            clear.get_or_insert(key);
+        }
+        if let Some((key, ..)) = clear.get(MAX_TRANSMISSIVE_BODIES) {
+            let count = clear.len();
+            let what =
+                format!("{count} clear bodies, but at most {MAX_TRANSMISSIVE_BODIES} are possible");
+            root.wrong(key, &what);
         }
     }
 

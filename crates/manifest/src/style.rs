@@ -160,6 +160,26 @@ impl StyleMaterial {
         matches!(self.kind, StyleMaterialKind::Glass | StyleMaterialKind::Water)
     }
 
+    /// The same as `[material]`; `usual` is that table, from which the constants of Whitted's model are, and `ior` the index
+    /// of refraction unless the style has one.
+    pub fn as_material(&self, usual: &Material, ior: f32) -> Material {
+        Material {
+            kind: Some(match self.kind {
+                StyleMaterialKind::Matte | StyleMaterialKind::ThinGlass => MaterialKind::Matte,
+                StyleMaterialKind::Plastic => MaterialKind::Plastic,
+                StyleMaterialKind::Metal => MaterialKind::Metal,
+                StyleMaterialKind::Glass => MaterialKind::Glass,
+                StyleMaterialKind::Water => MaterialKind::Water,
+            }),
+            roughness: self.roughness.unwrap_or(ROUGHNESS),
+            absorption: self.absorption,
+            absorption_length: self.absorption_length,
+            constants: scene::Material { ior: self.ior.unwrap_or(ior), ..usual.constants },
+            fresnel: self.is_clear().then_some(Fresnel::Exact).or(usual.fresnel),
+            ..Material::default()
+        }
+    }
+
     /// The material in a scene, if it is no medium. `color` is that of the style.
     pub fn resolved(&self, color: &ColorSetting) -> scene::Material {
         let roughness = self.roughness.unwrap_or(ROUGHNESS);
@@ -314,7 +334,7 @@ impl Style {
             /// Material: { type = "plastic", roughness = 0.3 }, also with ior, absorption and absorption_length
             ///
             /// The types are matte, plastic, metal, glass, water, and thin-glass for walls: a body that light passes without
-            /// refraction. One of the styles may be glass or water.
+            /// refraction. Where bodies of glass and water overlap, the first style fills the space.
             material => self.material, example("{ type = \"plastic\", roughness = 0.3 }"),
                 unset("that of [material] if it is opaque, else matte");
             /// Shape of grains: ellipsoid | superquadric | capsule | cylinder | cuboid | mesh | convex-hull
@@ -434,8 +454,8 @@ impl Style {
     }
 }
 
-/// Styles as they are drawn. The first group of particles alone may be clear: that of a clear style if there is one, else
-/// the particles without a style; see [`Manifest::styled`].
+/// Styles as they are drawn. If any particles are clear, the first group is: the particles without a style if these are,
+/// else those of the first clear style; see [`Manifest::styled`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct StyledManifest {
     /// The settings, with `[material]`, `[surface]`, `input.radius` and `[bonds]` of the first group.
@@ -486,12 +506,14 @@ impl Manifest {
         if is_none { Some(nothing()) } else { rest }
     }
 
-    /// The groups of particles that are drawn in different ways: first those without a style, or those of a clear one.
+    /// The groups of particles that are drawn in different ways: first those without a style, or those of the first clear
+    /// style if the others are opaque.
     pub fn styled(&self) -> StyledManifest {
         let drawn: Vec<(usize, &Style)> = (self.styles.iter().enumerate())
             .filter(|(_, style)| style.draw != StyleDraw::Hidden)
             .collect();
-        let first = drawn.iter().find(|(_, style)| style.is_clear()).map(|(index, _)| *index);
+        let first_clear = drawn.iter().find(|(_, style)| style.is_clear());
+        let first = first_clear.filter(|_| !self.material.is_clear()).map(|(index, _)| *index);
         // The settings without a style are one of the other groups if a style takes their place
         let mut others: Vec<(Option<usize>, Style)> = (drawn.iter())
             .filter(|(index, _)| Some(*index) != first)
@@ -559,24 +581,7 @@ impl Manifest {
         let usual = std::mem::take(&mut self.material);
         self.material = match &style.material {
             None => usual,
-            Some(own) => Material {
-                kind: Some(match own.kind {
-                    StyleMaterialKind::Matte | StyleMaterialKind::ThinGlass => MaterialKind::Matte,
-                    StyleMaterialKind::Plastic => MaterialKind::Plastic,
-                    StyleMaterialKind::Metal => MaterialKind::Metal,
-                    StyleMaterialKind::Glass => MaterialKind::Glass,
-                    StyleMaterialKind::Water => MaterialKind::Water,
-                }),
-                roughness: own.roughness.unwrap_or(ROUGHNESS),
-                absorption: own.absorption,
-                absorption_length: own.absorption_length,
-                constants: scene::Material {
-                    ior: own.ior.unwrap_or(usual.constants.ior),
-                    ..usual.constants
-                },
-                fresnel: own.is_clear().then_some(Fresnel::Exact).or(usual.fresnel),
-                ..Material::default()
-            },
+            Some(own) => own.as_material(&usual, usual.constants.ior),
         };
         self.material.color = color;
         self.material.opacity = style.opacity.clone();

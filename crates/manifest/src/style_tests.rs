@@ -18,7 +18,7 @@ fn styles_are_read_and_written() {
     let [wall, balls, arrows] = &manifest.styles[..] else { panic!("three styles") };
     assert_eq!((wall.title(), arrows.title()), ("wall".to_owned(), "index > 3".to_owned()));
     assert_eq!(balls.bonds.as_ref().unwrap().find, Some(BondSearch::Distance(1.5)));
-    let material = balls.material.as_ref().unwrap().resolved();
+    let material = balls.material.as_ref().unwrap().resolved(&balls.color);
     assert_eq!(material.finish, Finish::Plastic { roughness: 0.25 });
     assert_eq!(arrows.arrows.as_ref().unwrap().scale, 2.0);
     let colors = ColorMapping {
@@ -75,11 +75,6 @@ fn impossible_styles_are_refused() {
         let error = read(&format!("[[style]]\n{text}")).unwrap_err();
         assert!(error.contains(part), "{text}: {error}");
     }
-    let clear = "[[style]]\nwhere = \"type == 1\"\nmaterial = { type = \"glass\" }\n";
-    let error = read(&clear.repeat(2)).unwrap_err();
-    assert!(error.contains("style.1.material: style.0.material is clear already"), "{error}");
-    let error = read(&format!("material.type = \"water\"\n{clear}")).unwrap_err();
-    assert!(error.contains("style.0.material: material.type is clear already"), "{error}");
     let error = read(&"[[style]]\n".repeat(65)).unwrap_err();
     assert!(error.contains("style: 65 styles"), "{error}");
 }
@@ -110,6 +105,47 @@ fn hidden_styles_are_conditions() {
     assert_eq!(shown(&both).unwrap(), "(x > 1) || (!(y > 2))");
     let both = format!("select.where = \"z < 0\"\n{}", style("x > 1", "hidden"));
     assert_eq!(shown(&both).unwrap(), "(z < 0) && (!(x > 1))");
+}
+
+#[test]
+fn several_clear_styles_must_be_bodies() {
+    let clear = "[[style]]\nwhere = \"type == 1\"\nmaterial = { type = \"glass\" }\n";
+    let bodies = format!("{clear}draw = \"union\"\n");
+    let error = read(&format!("{clear}{bodies}")).unwrap_err();
+    assert!(error.contains("style.0.material: style.1.material is clear, too"), "{error}");
+    assert!(error.contains("set style.0.draw = \"smooth\" or \"union\""), "{error}");
+    let error = read(&format!("material.type = \"water\"\n{bodies}")).unwrap_err();
+    assert!(error.contains("material.type: style.0.material is clear, too"), "{error}");
+    assert!(error.contains("set render.surface = \"smooth\""), "{error}");
+    let water = "material.type = \"water\"\nrender.surface = \"smooth\"\n";
+    assert!(read(&format!("{water}{}", bodies.repeat(7))).is_ok());
+    let error = read(&format!("{water}{}", bodies.repeat(8))).unwrap_err();
+    assert!(error.contains("style.7.material: 9 clear bodies, but at most 8"), "{error}");
+    assert!(read(&bodies.repeat(8)).is_ok());
+    let error = read(&bodies.repeat(9)).unwrap_err();
+    assert!(error.contains("style.8.material: 9 clear bodies, but at most 8"), "{error}");
+}
+
+#[test]
+fn the_first_of_several_clear_styles_is_the_first_group() {
+    let style = |kind: u8, ior: f32| {
+        format!(
+            "[[style]]\nwhere = \"type == {kind}\"\ndraw = \"smooth\"\n\
+             material = {{ type = \"water\", ior = {ior} }}\n"
+        )
+    };
+    let both = style(1, 1.4) + &style(2, 1.5);
+    let styled = read(&both).unwrap().styled();
+    assert_eq!((styled.first, styled.manifest.material.constants.ior), (Some(0), 1.4));
+    assert_eq!(
+        styled.division.claims.iter().map(|claim| claim.group).collect::<Vec<_>>(),
+        [0, 2, 1]
+    );
+    // Clear particles without a style stay the first group
+    let water = "material.type = \"water\"\nrender.surface = \"smooth\"\n";
+    let styled = read(&format!("{water}{both}")).unwrap().styled();
+    assert_eq!((styled.first, styled.styles.len()), (None, 2));
+    assert_eq!(styled.division.claims.iter().map(|claim| claim.group).collect::<Vec<_>>(), [1, 2]);
 }
 
 #[test]

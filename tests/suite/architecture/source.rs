@@ -18,8 +18,12 @@ pub(super) fn files(source: &Path) -> Vec<(ModulePath, String)> {
 
 /// The modules that `code` declares for tests alone, in files of their own.
 fn test_modules((module, code): &(ModulePath, String)) -> Vec<ModulePath> {
-    let declarations = code.split("#[cfg(test)]\nmod ").skip(1);
-    let names = declarations.filter_map(|rest| rest.lines().next()?.strip_suffix(';'));
+    let declarations = code.split("#[cfg(test)]\n").skip(1);
+    // They are `mod name;` or `pub(crate) mod name;`
+    let names = declarations.filter_map(|rest| {
+        let (visibility, name) = rest.lines().next()?.split_once("mod ")?;
+        name.strip_suffix(';').filter(|_| visibility.is_empty() || visibility.starts_with("pub"))
+    });
     names.map(|name| [&module[..], &[name.to_owned()]].concat()).collect()
 }
 

@@ -47,6 +47,7 @@ const MATT: Material = Material {
     extinction: Vec3::ZERO,
     finish: spherule::scene::Finish::Matte,
     interface_roughness: 0.0,
+    priority: 0,
 };
 
 /// Each particle a ball of its own; a smooth surface has voxels of a particle radius. Spelled out, too.

@@ -51,7 +51,12 @@ impl RenderContext<'_> {
             .ground
             .as_ref()
             .map_or(0, |pattern| pattern.sand_colors(self.simd, &hits.point, ground, base));
-        for lane in lanes_in(hits.mask & !(particles | sand)) {
+        // Transmissive bodies have none, unless the integrator shows it
+        let clear = match &self.shapes.nested {
+            Some(nested) if !has_color => nested.lanes_of(hits),
+            _ => 0,
+        };
+        for lane in lanes_in(hits.mask & !(particles | sand | clear)) {
             let ray = (&segments.rays, segments.bounces[lane]);
             let color = self.fixed_color(ray, hits, lane, blend);
             set_lane3(base, lane, color);

@@ -5,8 +5,9 @@
 use glam::Vec3;
 
 use super::{
+    body_set::BodySet,
     drawing::DepthCue,
-    interface::Dielectric,
+    interface::{BoundaryTable, Dielectric},
     light_groups::NO_GROUP,
     lights::{Light, light_of},
     sampler::FilmSampler,
@@ -15,6 +16,7 @@ use super::{
     settings::{IntegratorKind, RenderSettings},
     shading::{BackgroundLanes, CameraLanes},
     source::ShadeSource,
+    stream::SegmentPacket,
 };
 use crate::scene::{Camera, PartMaterials, Scene};
 use crate::surface::{MaterialId, Shape, Side};
@@ -44,7 +46,11 @@ pub(super) struct RenderContext<'a> {
     pub(super) color: Option<Vec3>,
     /// The interface of the particles, unless they are opaque.
     pub(super) boundary: Dielectric,
-    /// Whether the camera is inside a connected body.
+    /// The boundaries of several transmissive bodies, for shadow rays.
+    pub(super) boundaries: Option<BoundaryTable<Dielectric>>,
+    /// Those of several transmissive bodies that the camera is inside.
+    pub(super) camera_bodies: BodySet,
+    /// Whether the camera is inside the only connected body.
     pub(super) is_camera_inside: bool,
     pub(super) sampler: FilmSampler,
     /// How particles fade with their distance, if they do.
@@ -88,7 +94,10 @@ impl<'a> RenderContext<'a> {
         let eye = scene.camera.eye();
         let contains_eye = |shape: &dyn Shape| shape.side_of(eye) == Side::Inside;
         let is_body = shapes.interior == Interior::Body;
+        let nested = shapes.nested.as_ref();
         Self {
+            boundaries: nested.map(BoundaryTable::for_shadow_rays),
+            camera_bodies: nested.map(|nested| nested.at(eye)).unwrap_or_default(),
             is_camera_inside: is_body && shapes.particles.is_some_and(contains_eye),
             shapes,
             parts: Some(&scene.parts)
@@ -117,6 +126,15 @@ impl<'a> RenderContext<'a> {
     pub(super) fn material_of(&self, parts: &PartMaterials, particle: u32) -> MaterialId {
         let part = self.source.part(particle);
         part.and_then(|(_, part)| parts.of(part)).unwrap_or(MaterialId::PARTICLES)
+    }
+
+    /// The index of refraction of the medium in which the ray in `lane` of `segments` is, relative to air.
+    pub(super) fn ior_at(&self, segments: &SegmentPacket, lane: usize) -> f32 {
+        match &self.shapes.nested {
+            Some(nested) => nested.ior(segments.bodies[lane].medium()),
+            None if segments.inside >> lane & 1 == 1 => self.scene.particle_material().ior,
+            None => 1.0,
+        }
     }
 
     /// Whether camera rays see nothing but shadows on the ground.

@@ -2,6 +2,7 @@
 
 use super::{
     aov::DataSample,
+    bodies::{TransmissiveBodies, lanes_inside_any},
     context::RenderContext,
     dimensions::{CAMERA, LENS, TIME},
     film::FilmTile,
@@ -105,7 +106,10 @@ impl RenderContext<'_> {
         #[expect(clippy::cast_possible_truncation, reason = "groups are small")]
         let sample = std::array::from_fn(|lane| (first + lane) as u32);
         segments.sample = sample;
-        segments.inside = self.lanes_inside(&segments.rays);
+        match &self.shapes.nested {
+            None => segments.inside = self.lanes_inside(&segments.rays),
+            Some(nested) => self.find_bodies(nested, segments),
+        }
         if seeds {
             let samples = self.settings.samples as usize;
             for (lane, path) in segments.path.iter_mut().enumerate().take(len) {
@@ -160,7 +164,18 @@ impl RenderContext<'_> {
         (seeds, sample)
     }
 
-    /// Lanes of the camera rays that start inside a connected body.
+    /// Finds the bodies of `nested` in which the camera rays of `segments` start.
+    fn find_bodies(&self, nested: &TransmissiveBodies<'_>, segments: &mut SegmentPacket) {
+        segments.bodies = [self.camera_bodies; LANES];
+        if !self.cameras.now.has_one_origin() {
+            for lane in lanes_in(segments.lanes()) {
+                segments.bodies[lane] = nested.at(lane3(&segments.rays.origin, lane));
+            }
+        }
+        segments.inside = segments.lanes() & lanes_inside_any(&segments.bodies);
+    }
+
+    /// Lanes of the camera rays that start inside the only connected body.
     fn lanes_inside(&self, rays: &RayPacket) -> u32 {
         let lanes = first_lanes(rays.len());
         match (self.cameras.now.has_one_origin(), self.shapes.particles) {

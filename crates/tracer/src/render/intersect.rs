@@ -26,9 +26,16 @@ impl RenderContext<'_> {
         packet: &mut PacketScratch,
     ) {
         packet.hits.clear();
-        let (coherence, inside) = (self.coherence(depth), segments.inside);
-        for shape in &self.shapes.solid {
-            shape.intersect(&mut segments.rays, coherence, inside, &mut packet.hits);
+        let coherence = self.coherence(depth);
+        if let Some(nested) = &self.shapes.nested {
+            self.intersect_nested(nested, segments, coherence, packet);
+        } else {
+            for shape in &self.shapes.solid {
+                // Rays enter no other body than that of the particles
+                let is_particles = shape.material() == MaterialId::PARTICLES;
+                let inside = if is_particles { segments.inside } else { 0 };
+                shape.intersect(&mut segments.rays, coherence, inside, &mut packet.hits);
+            }
         }
         self.meet_translucent(segments, coherence, packet);
         self.meet_spray(segments, coherence, packet);
@@ -38,7 +45,10 @@ impl RenderContext<'_> {
             self.draw_outlines(&segments.rays, packet);
         }
         self.pass_panes(segments, coherence, packet);
-        self.absorb(segments, packet);
+        match &self.shapes.nested {
+            Some(nested) => self.absorb_nested(nested, segments, packet),
+            None => self.absorb(segments, packet),
+        }
     }
 
     /// Replaces the material of particles by that of their part or style.
@@ -62,7 +72,7 @@ impl RenderContext<'_> {
         }
     }
 
-    /// Multiplies the throughput by the transmittance of the medium between the origins of the rays and their
+    /// Multiplies the throughput by the transmittance of the only medium between the origins of the rays and their
     /// intersections.
     fn absorb(&self, segments: &SegmentPacket, packet: &mut PacketScratch) {
         let extinction = &self.boundary.extinction;
@@ -71,7 +81,7 @@ impl RenderContext<'_> {
         }
         let hits = &packet.hits;
         let lanes = match self.shapes.interior {
-            Interior::Opaque => 0,
+            Interior::Opaque | Interior::Nested => 0,
             // Only a ray that leaves a sphere has passed through its interior.
             Interior::Spheres => {
                 hits.lanes_of(MaterialId::PARTICLES) & leaving(self.simd, &segments.rays, hits)

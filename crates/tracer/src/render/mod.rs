@@ -11,12 +11,14 @@ use rayon::prelude::*;
 
 use crate::{
     scene::{Material, Scene},
-    surface::{Plane, Shape},
+    surface::{MaterialId, Plane, Shape},
 };
 
 mod accumulate;
 mod aov;
 mod attributes;
+mod bodies;
+mod body_set;
 #[cfg(test)]
 pub(crate) mod brute;
 mod bsdf;
@@ -37,6 +39,7 @@ mod light_groups;
 mod light_split;
 mod lights;
 mod near_photons;
+mod nested;
 mod outline;
 mod panes;
 mod path;
@@ -83,6 +86,8 @@ mod light_groups_tests;
 #[cfg(test)]
 mod motion_tests;
 #[cfg(test)]
+mod nested_tests;
+#[cfg(test)]
 mod opacity_tests;
 #[cfg(test)]
 mod panes_tests;
@@ -106,6 +111,7 @@ mod spray_tests;
 mod whitted_tests;
 
 pub use aov::{DataSample, NO_ID};
+pub use body_set::MAX_TRANSMISSIVE_BODIES;
 pub use channels::{Channels, NamedChannel, UnknownChannel};
 pub use drawing::Drawing;
 pub use film::Film;
@@ -214,6 +220,7 @@ pub fn render_into(
     if !shapes.iter().any(|shape| shape.is_connected()) {
         settings.validate_branches(scene.particle_material())?;
     }
+    validate_bodies(shapes, scene)?;
     // Prepare film, shapes and integrator
     let RenderSettings { width, height, channels, has_features, .. } = *settings;
     film.fit(width, height, channels, has_features);
@@ -242,6 +249,20 @@ pub fn render_into(
         })
         .try_reduce(RayCounts::default, |a, b| Ok(a + b))?;
     Ok(before + counts)
+}
+
+/// Checks that rays can tell apart which transmissive bodies they are inside.
+fn validate_bodies(shapes: &[&dyn Shape], scene: &Scene) -> Result<(), RenderError> {
+    let is_clear_sphere = |shape: &&dyn Shape| {
+        shape.material() == MaterialId::PARTICLES
+            && !shape.is_connected()
+            && scene.particle_material().transmission > 0.0
+    };
+    match bodies::count_bodies(scene, shapes) {
+        count if count > MAX_TRANSMISSIVE_BODIES => Err(RenderError::TooManyBodies { count }),
+        1.. if shapes.iter().any(is_clear_sphere) => Err(RenderError::SpheresBesideBodies),
+        _ => Ok(()),
+    }
 }
 
 /// The integrator of the settings, and the rays that were traced to prepare it.

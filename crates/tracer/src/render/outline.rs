@@ -5,7 +5,7 @@
 //! a point whose normal has the cosine `c` with the ray is `r (1 - sqrt(1 - c^2))` pixels from the silhouette (under a
 //! parallel projection, and nearly so under others).
 
-use super::{context::RenderContext, scene_shapes::Interior, scratch::PacketScratch};
+use super::{context::RenderContext, scratch::PacketScratch};
 use crate::scene::Owner;
 use crate::surface::MaterialId;
 use spherule_tree::math::{lane3, lanes_in};
@@ -24,8 +24,7 @@ impl RenderContext<'_> {
         let hits = &mut packet.hits;
         for lane in lanes_in(hits.mask & !hits.lanes_of(MaterialId::GROUND)) {
             let (point, material) = (lane3(&hits.point, lane), hits.material[lane]);
-            let is_clear =
-                material == MaterialId::PARTICLES && self.shapes.interior != Interior::Opaque;
+            let is_clear = self.shapes.is_transmissive(material);
             if let Some(cue) = self.depth_cue.as_ref().filter(|_| !is_clear) {
                 hits.opacity[lane] *= cue.left(self.scene.camera.depth_of(point));
             }

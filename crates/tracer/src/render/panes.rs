@@ -7,13 +7,14 @@
 //! and the environment behind a pane are sampled as without it; the density of a ray that passes stays the same.
 
 use super::{
+    body_set::BodySet,
     context::RenderContext,
     dimensions::{PANE, REFLECTED},
     lights::LightSamples,
     sampler::get_1d_lanes,
     scratch::PacketScratch,
     settings::IntegratorKind,
-    stream::{RayStreams, SegmentPacket},
+    stream::{Continuation, RayStreams, SegmentPacket},
 };
 use crate::scene::Material;
 use crate::scene::material::{pane_reflectance, surface_reflectance};
@@ -215,8 +216,9 @@ impl RenderContext<'_> {
             set_lane3(&mut rays.direction, lane, reflected);
             set_lane3(&mut rays.throughput, lane, lane3(&packet.throughput, lane));
         }
-        let inside = segments.inside;
-        next.reflected.push(lanes & !last, rays, segments, inside, REFLECTED);
+        let how =
+            Continuation { inside: segments.inside, crossed: BodySet::EMPTY, branch: REFLECTED };
+        next.reflected.push(lanes & !last, rays, segments, how);
     }
 }
 

@@ -13,20 +13,22 @@
 //! bring the light of a source through transmissive surfaces (`path/caustics.rs`), its shadow rays end there.
 
 use super::{
+    body_set::BodySet,
     bsdf::{Bsdf, bsdf_of, reflect_samples, surface_points},
     context::RenderContext,
     dimensions::{BOUNCED, BSDF, CONTINUATION, ENVIRONMENT, LIGHTS},
     integrator::Integrator,
-    interface::{Interface, interface_of},
+    interface::{BoundaryTable, Interface, interface_of},
     layers::LightClass,
     lights::{Light, environment_along, sample_environment},
+    nested::SurfaceLanes,
     roulette::SplitRule,
     sampler::{get_1d_lanes, get_2d_lanes},
     scene_shapes::Interior,
     scratch::PacketScratch,
     shading::{add, product, scale},
     specular::{Escape, SpecularHits},
-    stream::{RayStreams, SegmentPacket},
+    stream::{Continuation, RayStreams, SegmentPacket},
 };
 use crate::scene::Environment;
 use crate::surface::MaterialId;
@@ -58,6 +60,8 @@ pub(super) struct PathIntegrator<'a> {
     bsdfs: Vec<Box<dyn Bsdf>>,
     /// The surface of transmissive particles.
     interface: Box<dyn Interface>,
+    /// The surfaces of several transmissive bodies.
+    interfaces: Option<BoundaryTable<Box<dyn Interface>>>,
     split: SplitRule,
     /// Whether rays can hit a light.
     has_extents: bool,
@@ -81,6 +85,7 @@ impl<'a> PathIntegrator<'a> {
             environment,
             bsdfs: context.scene.materials.iter().map(|m| bsdf_of(m.finish)).collect(),
             interface: interface_of(context.scene.particle_material(), is_connected),
+            interfaces: context.shapes.nested.as_ref().map(BoundaryTable::for_paths),
             split: SplitRule::new(context.settings, context.shapes.interior),
             catcher: Catcher::of(context.scene),
             ground_light: None,
@@ -139,10 +144,7 @@ impl Integrator for PathIntegrator<'_> {
             ended = ground;
         }
         // Reflect light at opaque surfaces
-        let clear = match self.context.shapes.interior {
-            Interior::Opaque => 0,
-            Interior::Spheres | Interior::Body => packet.hits.lanes_of(MaterialId::PARTICLES),
-        };
+        let clear = self.context.shapes.transmissive_lanes(&packet.hits);
         let others = packet.hits.mask & !(clear | panes | held_out | ended);
         self.shade_reflecting(segments, depth, others, packet, next);
         // Reflect and refract rays at transmissive surfaces
@@ -315,12 +317,12 @@ impl PathIntegrator<'_> {
         }
     }
 
-    /// Divides light that has entered a body straight by the square of its index. Radiance rises by this factor where
+    /// Divides light that has entered bodies straight by the square of its index. Radiance rises by this factor where
     /// light enters the body and falls by it where light leaves, and paths leave out both. Light that enters straight
     /// has not risen: its irradiance behind a flat interface is that in front of it.
     fn scale_inside(&self, surface: &Surface<'_>, packet: &mut PacketScratch) {
-        let ior = self.context.scene.particle_material().ior;
         for lane in lanes_in(surface.segments.inside & packet.light.lanes) {
+            let ior = self.context.ior_at(surface.segments, lane);
             let leaving = lane3(&packet.light.radiance, lane) / (ior * ior);
             set_lane3(&mut packet.light.radiance, lane, leaving);
         }
@@ -448,7 +450,9 @@ impl PathIntegrator<'_> {
             _ => 0,
         };
         let deeper = self.roulette(surface, lanes & !last, &mut rays.throughput);
-        next.reflected.push(deeper, rays, segments, segments.inside, BOUNCED);
+        let how =
+            Continuation { inside: segments.inside, crossed: BodySet::EMPTY, branch: BOUNCED };
+        next.reflected.push(deeper, rays, segments, how);
         // Infinite densities mark specular rays
         if last != 0 {
             self.add_last(surface, last, packet);
@@ -564,9 +568,30 @@ impl PathIntegrator<'_> {
         packet: &mut PacketScratch,
         next: &mut RayStreams,
     ) {
+        for (id, lanes) in packet.hits.materials_of(lanes) {
+            for found in self.context.divide_surface(segments, &packet.hits, id, lanes) {
+                let interface = match (found.boundary, &self.interfaces) {
+                    (Some(boundary), Some(interfaces)) => interfaces.of(boundary),
+                    _ => &self.interface,
+                };
+                self.shade_interface(&**interface, segments, depth, found, packet, next);
+            }
+        }
+    }
+
+    /// Reflects and refracts the rays that are `found` at surfaces with one `interface`.
+    fn shade_interface(
+        &self,
+        interface: &dyn Interface,
+        segments: &SegmentPacket,
+        depth: u32,
+        found: SurfaceLanes,
+        packet: &mut PacketScratch,
+        next: &mut RayStreams,
+    ) {
         let context = &self.context;
-        let (rays, hits, inside) = (&segments.rays, &packet.hits, segments.inside);
-        let interface = &self.interface;
+        let (rays, hits) = (&segments.rays, &packet.hits);
+        let SurfaceLanes { lanes, inside, .. } = found;
         // Find the reflected and refracted rays
         let (simd, mut u) = (context.simd, [splat(0.0); 2]);
         if interface.is_random() {
@@ -580,6 +605,7 @@ impl PathIntegrator<'_> {
             segments,
             depth,
             lanes,
+            crossed: found.crossed(),
             last: lanes & self.last_specular(segments, depth),
         };
         let escape = Escape {

@@ -40,9 +40,11 @@ impl SplitRule {
         let least = match interior {
             Interior::Opaque => f32::INFINITY,
             Interior::Spheres => settings.min_weight,
-            Interior::Body => (SPLIT_WEIGHT * settings.samples as f32).clamp(MIN_SPLIT_WEIGHT, 1.0),
+            Interior::Body | Interior::Nested => {
+                (SPLIT_WEIGHT * settings.samples as f32).clamp(MIN_SPLIT_WEIGHT, 1.0)
+            }
         };
-        Self { least, favors_first: interior == Interior::Body }
+        Self { least, favors_first: matches!(interior, Interior::Body | Interior::Nested) }
     }
 
     /// Maximum number of rays of one sample at any depth: the path weights of a sample never add up to more than 1.

@@ -2,11 +2,11 @@
 
 use glam::Vec3;
 
-use super::{settings::IntegratorKind, source::ShadeSource};
+use super::{bodies::TransmissiveBodies, settings::IntegratorKind, source::ShadeSource};
 use crate::scene::{Finish, Material, Owner, Scene};
-use crate::surface::{MaterialId, Shape};
+use crate::surface::{Intersections, MaterialId, Shape};
 
-/// The interior of the particles.
+/// The interior of what is transmissive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Interior {
     /// Light does not enter.
@@ -17,9 +17,13 @@ pub(super) enum Interior {
     /// One connected transmissive body. Each ray stores on which side of the surface it is. The depth counts
     /// crossings of the surface; particles between two crossings do not matter.
     Body,
+    /// Several such bodies, or one that is not that of the particles without a style: `SceneShapes::nested`. Each ray
+    /// stores which of them it is inside.
+    Nested,
 }
 
 impl Interior {
+    /// The interior of particles of this `material`, without other bodies.
     pub(super) fn of(material: &Material, is_connected: bool) -> Self {
         match (material.transmission > 0.0, is_connected) {
             (false, _) => Self::Opaque,
@@ -57,6 +61,8 @@ pub(super) struct SceneShapes<'a> {
     pub(super) part_colors: Vec<&'a [Vec3]>,
     /// Connected bodies of particles with a material of their own, in the order of the materials of the scene.
     pub(super) bodies: Vec<Option<&'a dyn Shape>>,
+    /// Connected transmissive bodies, if the interior is [`Interior::Nested`].
+    pub(super) nested: Option<TransmissiveBodies<'a>>,
     /// Meshes that rays pass.
     pub(super) panes: Vec<&'a dyn Shape>,
     /// Spray whose drops fade out; opaque spray is solid.
@@ -71,7 +77,7 @@ pub(super) struct SceneShapes<'a> {
 impl<'a> SceneShapes<'a> {
     pub(super) fn new(
         shapes: Vec<&'a dyn Shape>,
-        scene: &Scene,
+        scene: &'a Scene,
         source: &dyn ShadeSource,
         integrator: IntegratorKind,
     ) -> Self {
@@ -86,7 +92,11 @@ impl<'a> SceneShapes<'a> {
         let is_particles = |shape: &&&dyn Shape| shape.material() == MaterialId::PARTICLES;
         let particles = shapes.iter().find(is_particles).copied();
         let is_connected = particles.is_some_and(|shape| shape.is_connected());
-        let interior = Interior::of(scene.particle_material(), is_connected);
+        let nested = TransmissiveBodies::of(scene, &shapes);
+        let interior = match nested {
+            Some(_) => Interior::Nested,
+            None => Interior::of(scene.particle_material(), is_connected),
+        };
         // Only opaque spheres and grains fade out: transmissive ones and connected bodies have an inside
         let has_opacity = source.is_translucent() && interior == Interior::Opaque && !is_connected;
         let is_style = |shape: &&dyn Shape| {
@@ -100,12 +110,31 @@ impl<'a> SceneShapes<'a> {
         Self {
             part_colors: part_colors(scene, &shapes),
             bodies: bodies(scene, &shapes),
+            nested,
             solid: shapes,
             panes,
             soft_spray: spray.first().copied(),
             translucent,
             particles,
             interior,
+        }
+    }
+
+    /// The lanes of intersections with transmissive surfaces, apart from panes.
+    pub(super) fn transmissive_lanes(&self, hits: &Intersections) -> u32 {
+        match (self.interior, &self.nested) {
+            (Interior::Opaque, _) => 0,
+            (Interior::Nested, Some(nested)) => nested.lanes_of(hits),
+            _ => hits.lanes_of(MaterialId::PARTICLES),
+        }
+    }
+
+    /// Whether surfaces of `material` are transmissive, apart from panes.
+    pub(super) fn is_transmissive(&self, material: MaterialId) -> bool {
+        match (self.interior, &self.nested) {
+            (Interior::Opaque, _) => false,
+            (Interior::Nested, Some(nested)) => nested.with_material(material).is_some(),
+            _ => material == MaterialId::PARTICLES,
         }
     }
 

@@ -3,6 +3,7 @@
 
 use super::{
     aov::DataSample,
+    bodies::StraightCrossing,
     bsdf::{BsdfSamples, BsdfValues, SurfacePoints},
     channels::Channels,
     entries::Entries,
@@ -89,6 +90,8 @@ pub(super) struct PacketScratch {
     pub(super) light: LightSamples,
     /// Intersections of shadow rays with transmissive surfaces.
     pub(super) crossings: Intersections,
+    /// Surfaces between equal media that rays have passed, in the order of their distance for each ray.
+    pub(super) straight: Vec<StraightCrossing>,
     /// Spheres that are not fully opaque along each ray.
     pub(super) entries: [Entries; LANES],
     pub(super) weight: Lanes3,

@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use super::body_set::MAX_TRANSMISSIVE_BODIES;
 use super::channels::Channels;
 use super::drawing::Drawing;
 use super::sampler::{MAX_FILTER_WIDTH, PixelFilter};
@@ -272,6 +273,17 @@ pub enum RenderError {
         /// The depth.
         max_depth: u32,
     },
+    /// Too many bodies let light through.
+    #[error(
+        "{count} bodies are transmissive, but at most {MAX_TRANSMISSIVE_BODIES} can be in one picture"
+    )]
+    TooManyBodies {
+        /// Number of connected transmissive bodies.
+        count: usize,
+    },
+    /// Separate spheres have no place in sets of bodies.
+    #[error("transmissive spheres beside a transmissive body; they must be one body, too")]
+    SpheresBesideBodies,
     /// A constant of the material is out of range.
     #[error(transparent)]
     Material(#[from] MaterialError),

@@ -2,6 +2,8 @@
 //! point.
 
 use super::{
+    bodies::lanes_inside_any,
+    body_set::BodySet,
     context::RenderContext,
     dimensions::{REFLECTED, REFRACTED},
     interface::Dielectric,
@@ -10,7 +12,7 @@ use super::{
     scene_shapes::Interior,
     scratch::PacketScratch,
     shading::scale,
-    stream::{RayStreams, SegmentPacket},
+    stream::{Continuation, RayStreams, SegmentPacket},
 };
 use spherule_tree::math::{Lanes3, lane3, lanes_in};
 
@@ -21,6 +23,8 @@ pub(super) struct SpecularHits<'a> {
     pub(super) depth: u32,
     /// Lanes at a specular surface.
     pub(super) lanes: u32,
+    /// The body whose surface it is, if there are several transmissive ones.
+    pub(super) crossed: BodySet,
     /// Lanes whose rays are not traced further, and see what is infinitely far away.
     pub(super) last: u32,
 }
@@ -46,31 +50,28 @@ impl RenderContext<'_> {
         escape: Escape<'_>,
     ) {
         // Choose which rays to trace
-        let SpecularHits { segments, last, .. } = hits;
+        let SpecularHits { segments, crossed, last, .. } = hits;
         if self.shapes.interior != Interior::Opaque {
             self.split_weights(split, hits, packet);
         }
         let PacketScratch { leaving, throughput, radiance, split: lights, groups, .. } = packet;
         // Describe both rays: weight, stream, side and branch of the path
-        let (inside, other_side) = match self.shapes.interior {
-            Interior::Opaque | Interior::Spheres => (0, 0),
-            Interior::Body => (segments.inside, !segments.inside),
-        };
+        let [inside, other_side] = self.insides(segments, crossed);
         let reflected = (
             dielectric.reflection,
             &mut leaving.reflected,
             &mut next.reflected,
-            inside,
-            (REFLECTED, LightClass::Reflection),
+            Continuation { inside, crossed: BodySet::EMPTY, branch: REFLECTED },
+            LightClass::Reflection,
         );
         let refracted = (
             dielectric.transmission,
             &mut leaving.refracted,
             &mut next.refracted,
-            other_side,
-            (REFRACTED, LightClass::Refraction),
+            Continuation { inside: other_side, crossed, branch: REFRACTED },
+            LightClass::Refraction,
         );
-        for (weight, rays, stream, inside, (branch, class)) in [reflected, refracted] {
+        for (weight, rays, stream, how, class) in [reflected, refracted] {
             if weight <= 0.0 {
                 continue;
             }
@@ -87,7 +88,20 @@ impl RenderContext<'_> {
                 lights.take(class, radiance);
             }
             if lanes & !last != 0 {
-                stream.push(lanes & !last, rays, segments, inside, branch);
+                stream.push(lanes & !last, rays, segments, how);
+            }
+        }
+    }
+
+    /// The lanes inside a connected body of rays that are reflected, and of those that are refracted, which enter or leave
+    /// the body in `crossed` if there may be several.
+    fn insides(&self, segments: &SegmentPacket, crossed: BodySet) -> [u32; 2] {
+        match self.shapes.interior {
+            Interior::Opaque | Interior::Spheres => [0, 0],
+            Interior::Body => [segments.inside, !segments.inside],
+            Interior::Nested => {
+                let behind = segments.bodies.map(|set| set.across(crossed));
+                [segments.inside, lanes_inside_any(&behind)]
             }
         }
     }

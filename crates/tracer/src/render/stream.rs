@@ -1,5 +1,6 @@
 //! Streams of path segments, in packets of 16.
 
+use super::body_set::BodySet;
 use super::dimensions::BOUNCED;
 use super::light_split::FirstInteraction;
 use super::sampler::PathSeed;
@@ -28,6 +29,8 @@ pub(super) struct SegmentPacket {
     pub(super) path: [PathSeed; LANES],
     /// Lanes of rays that start inside a connected body.
     pub(super) inside: u32,
+    /// The bodies in which each ray starts, if there may be several.
+    pub(super) bodies: [BodySet; LANES],
     /// The first interaction of each path.
     pub(super) first: [FirstInteraction; LANES],
 }
@@ -42,6 +45,7 @@ impl Default for SegmentPacket {
             sample: [0; LANES],
             path: [PathSeed::default(); LANES],
             inside: 0,
+            bodies: [BodySet::EMPTY; LANES],
             first: [FirstInteraction::default(); LANES],
         }
     }
@@ -53,6 +57,17 @@ impl SegmentPacket {
     pub(super) fn lanes(&self) -> u32 {
         first_lanes(self.rays.len())
     }
+}
+
+/// How the rays of a packet continue their paths.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Continuation {
+    /// Lanes whose rays start inside a connected body.
+    pub(super) inside: u32,
+    /// The body whose surface the rays cross, if there may be several.
+    pub(super) crossed: BodySet,
+    /// Which continuation of the paths it is; [`BOUNCED`] counts as a diffuse reflection.
+    pub(super) branch: u32,
 }
 
 /// Rays that leave the surfaces of a packet, one per lane.
@@ -120,25 +135,22 @@ impl RayStream {
         runs.flat_map(|run| run.packets[..run.len.div_ceil(LANES)].iter_mut())
     }
 
-    /// Appends the rays in `lanes`, in order, which leave the intersections of `parents`; those in `inside` start
-    /// inside a connected body. They are continuation `branch` of the paths; one that is [`BOUNCED`] counts as a
-    /// diffuse reflection.
+    /// Appends the rays in `lanes`, in order, which leave the intersections of `parents`.
     pub(super) fn push(
         &mut self,
         lanes: u32,
         rays: &ScatteredRays,
         parents: &SegmentPacket,
-        inside: u32,
-        branch: u32,
+        how: Continuation,
     ) {
         let growth = GROWTH.div_ceil(self.runs.len());
         if let [run] = &mut self.runs[..] {
-            return run.push(lanes, rays, parents, inside, branch, growth);
+            return run.push(lanes, rays, parents, how, growth);
         }
         let count = self.runs.len();
         for lane in lanes_in(lanes) {
             let slice = slice_at(parents.rays.time[lane], count);
-            self.runs[slice].push(1 << lane, rays, parents, inside, branch, growth);
+            self.runs[slice].push(1 << lane, rays, parents, how, growth);
         }
     }
 }
@@ -157,10 +169,10 @@ impl SegmentRun {
         lanes: u32,
         rays: &ScatteredRays,
         parents: &SegmentPacket,
-        inside: u32,
-        branch: u32,
+        how: Continuation,
         growth: usize,
     ) {
+        let Continuation { inside, crossed, branch } = how;
         // Grow if there is no space for another whole packet
         let needed = (self.len + LANES).div_ceil(LANES) + 1;
         if self.packets.len() < needed {
@@ -189,6 +201,7 @@ impl SegmentRun {
             segment.path[to] = parents.path[lane].child(branch);
             segment.first[to] = parents.first[lane].continued(branch);
             segment.inside |= (inside >> lane & 1) << to;
+            segment.bodies[to] = parents.bodies[lane].across(crossed);
             segment.rays.set_len(to + 1);
             self.len += 1;
         }
@@ -261,7 +274,8 @@ mod tests {
                 };
                 let lanes = (0b1010_1100_0000_0111 << (first / 100 % 2)) & 0xffff;
                 let odd = 0b1010_1010_1010_1010;
-                stream.push(lanes, &rays, &parents, odd, 1);
+                let how = Continuation { inside: odd, crossed: BodySet::EMPTY, branch: 1 };
+                stream.push(lanes, &rays, &parents, how);
                 expected.extend(lanes_in(lanes).map(|lane| sample[lane]));
             }
             assert_eq!(stream.len(), expected.len(), "{round}");

@@ -3,10 +3,12 @@
 //! Shadow rays pass straight through transmissive bodies, so there are no caustics. Each crossing of a surface
 //! multiplies their transmittance by `transmission*(1-r)`. `r` is for the angle outside on both sides of the surface
 //! (a refracted ray would have come from such an angle, and is never totally reflected). The medium of a connected
-//! body attenuates them as well. Panes (`panes.rs`), soft spray (`spray.rs`) and
+//! body attenuates them as well. Of several bodies, only boundaries between different media count. Panes (`panes.rs`), soft spray (`spray.rs`) and
 //! spheres that are not fully opaque (`translucent.rs`) attenuate all shadow rays.
 
 use super::{
+    bodies::{BoundaryLanes, TransmissiveBodies, lanes_inside, media_of},
+    body_set::BodySet,
     context::RenderContext,
     interface::{attenuate, cross_straight},
     lights::LightSamples,
@@ -17,7 +19,7 @@ use super::{
 };
 use crate::surface::{Intersections, MaterialId, Shape};
 use spherule_tree::accel::Coherence;
-use spherule_tree::math::{Lanes, Lanes3, first_lanes, lane3, lanes_in, splat};
+use spherule_tree::math::{LANES, Lanes, Lanes3, first_lanes, lane3, lanes_in, splat};
 use spherule_tree::ray::RayPacket;
 
 /// Maximum number of crossings of one body along a shadow ray.
@@ -43,30 +45,29 @@ impl RenderContext<'_> {
         let coherence = self.coherence(depth);
 
         // Trace opaque shapes first: occluded rays need no further tests
-        self.occlude(coherence, samples, |shape| {
-            self.shapes.interior == Interior::Opaque || shape.material() != MaterialId::PARTICLES
-        });
+        self.occlude(coherence, samples, |shape| !self.shapes.is_transmissive(shape.material()));
         self.attenuate_by_panes(samples, coherence);
         self.attenuate_by_spray(samples, coherence);
         self.attenuate_by_opacity(samples, coherence);
-        let Some(particles) =
-            self.shapes.particles.filter(|_| self.shapes.interior != Interior::Opaque)
-        else {
-            return samples.lanes;
-        };
         if samples.lanes == 0 {
             return 0;
         }
 
-        // Trace the transmissive particles
+        // Trace what is transmissive
         let mut transmittance = [splat(1.0); 3];
-        let reached = match self.shapes.interior {
-            Interior::Body => {
-                let inside = segments.inside;
-                let (samples, transmittance) = (&*samples, &mut transmittance);
-                self.cross_body(particles, samples, coherence, inside, crossings, transmittance)
+        let (shapes, unattenuated) = (&self.shapes, &*samples);
+        let reached = match (shapes.interior, &shapes.nested, shapes.particles) {
+            (Interior::Opaque, ..) => return samples.lanes,
+            (Interior::Nested, Some(nested), _) => {
+                let sets = segments.bodies;
+                self.cross_bodies(nested, unattenuated, sets, crossings, &mut transmittance)
             }
-            _ => self.cross_spheres(particles, samples, &mut transmittance),
+            (Interior::Body, _, Some(body)) => {
+                let (inside, transmittance) = (segments.inside, &mut transmittance);
+                self.cross_body(body, unattenuated, coherence, inside, crossings, transmittance)
+            }
+            (_, _, Some(spheres)) => self.cross_spheres(spheres, unattenuated, &mut transmittance),
+            (_, _, None) => return samples.lanes,
         };
         // Attenuate the light
         let unoccluded = samples.radiance;
@@ -169,9 +170,7 @@ impl RenderContext<'_> {
             cross_straight(self.simd, boundary, rays, hits, crossing, transmittance);
 
             // End rays without transmittance
-            let is_dark = |lane| lane3(transmittance, lane).max_element() < MIN_TRANSMITTANCE;
-            let dark =
-                lanes_in(crossing).fold(0, |dark, lane| dark | u32::from(is_dark(lane)) << lane);
+            let dark = dark_lanes(crossing, transmittance);
             reached &= !dark;
             alive = crossing & !dark;
             if alive == 0 {
@@ -189,6 +188,87 @@ impl RenderContext<'_> {
         }
         reached
     }
+}
+
+impl RenderContext<'_> {
+    /// The transmittance of several connected bodies, crossing after crossing for all rays at once; rays start inside the
+    /// bodies of `sets`. Returns the lanes in which it is not 0.
+    fn cross_bodies(
+        &self,
+        nested: &TransmissiveBodies<'_>,
+        samples: &LightSamples,
+        mut sets: [BodySet; LANES],
+        hits: &mut Intersections,
+        transmittance: &mut Lanes3,
+    ) -> u32 {
+        let rays = &samples.rays;
+        let mut remaining = *rays;
+        let (mut reached, mut alive) = (samples.lanes, samples.lanes);
+        // Distances of the previous crossings
+        let mut from = rays.t_min;
+        for _ in 0..MAX_CROSSINGS {
+            // Find the next crossing of each ray
+            for lane in lanes_in(!alive & first_lanes(rays.len())) {
+                remaining.t_max[lane] = -1.0;
+            }
+            hits.clear();
+            for (index, body) in nested.all().iter().enumerate() {
+                let inside = alive & lanes_inside(index, &sets);
+                body.shape.intersect(&mut remaining, Coherence::Incoherent, inside, hits);
+            }
+            let crossing = hits.mask & alive;
+
+            // Attenuate by the media up to the crossings, and by those between different media
+            for (medium, lanes) in media_of(alive, &sets) {
+                let length = inside_lengths(rays, hits, crossing, lanes, &from);
+                let extinction = nested.extinction(medium);
+                attenuate(self.simd, &extinction, &length, lanes, transmittance);
+            }
+            self.cross_boundaries(nested, (rays, hits), crossing, &sets, transmittance);
+
+            // End rays without transmittance
+            let dark = dark_lanes(crossing, transmittance);
+            reached &= !dark;
+            alive = crossing & !dark;
+            if alive == 0 {
+                break;
+            }
+
+            // Continue beyond the crossing
+            for lane in lanes_in(alive) {
+                from[lane] = hits.t[lane];
+                remaining.t_min[lane] = hits.t[lane] + hits.offset[lane];
+                remaining.t_max[lane] = rays.t_max[lane];
+                sets[lane] = sets[lane].across(nested.crossed_at(hits, lane));
+            }
+        }
+        reached
+    }
+
+    /// Multiplies `transmittance` by that of the boundaries that shadow rays of `lanes` cross at `hits`; before, they are
+    /// inside the bodies of `sets`.
+    fn cross_boundaries(
+        &self,
+        nested: &TransmissiveBodies<'_>,
+        (rays, hits): (&RayPacket, &Intersections),
+        lanes: u32,
+        sets: &[BodySet; LANES],
+        transmittance: &mut Lanes3,
+    ) {
+        let Some(boundaries) = &self.boundaries else {
+            return;
+        };
+        for BoundaryLanes { boundary, lanes, .. } in nested.boundaries(hits, lanes, sets) {
+            let dielectric = boundaries.of(boundary);
+            cross_straight(self.simd, dielectric, rays, hits, lanes, transmittance);
+        }
+    }
+}
+
+/// Those of `lanes` in which almost no light is left.
+fn dark_lanes(lanes: u32, transmittance: &Lanes3) -> u32 {
+    let is_dark = |lane| lane3(transmittance, lane).max_element() < MIN_TRANSMITTANCE;
+    lanes_in(lanes).fold(0, |dark, lane| dark | u32::from(is_dark(lane)) << lane)
 }
 
 /// Lengths of the segments of `lanes` inside a body, `from` the previous crossing to the next one in `crossing`, or

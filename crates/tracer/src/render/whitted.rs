@@ -10,11 +10,12 @@ use super::{
     bsdf::{BlinnPhong, eval_lanes, reflect_samples, surface_points},
     context::RenderContext,
     integrator::Integrator,
-    interface::{Interface, smooth_interface_of},
+    interface::{BoundaryTable, Interface, smooth_interface_of},
     layers::LightClass,
     light_groups::NO_GROUP,
     light_split::ratio,
     lights::LightSamples,
+    nested::SurfaceLanes,
     roulette::SplitRule,
     scene_shapes::Interior,
     scratch::PacketScratch,
@@ -67,6 +68,8 @@ pub(super) struct WhittedIntegrator<'a> {
     pub(super) context: RenderContext<'a>,
     /// The materials of the scene, in its order.
     materials: Vec<WhittedMaterial>,
+    /// The surfaces of several transmissive bodies.
+    interfaces: Option<BoundaryTable<Box<dyn Interface>>>,
     /// Decides which of two rays are traced.
     pub(super) split: SplitRule,
 }
@@ -75,11 +78,16 @@ impl<'a> WhittedIntegrator<'a> {
     pub(super) fn new(context: RenderContext<'a>) -> Self {
         let is_connected = context.shapes.connected_particles().is_some();
         let material = |material: &Material| {
-            let is_body = material.owner == Owner::Particles && is_connected;
+            let is_body = match material.owner {
+                Owner::Particles => is_connected,
+                Owner::Style(_) => context.shapes.nested.is_some(),
+                _ => false,
+            };
             WhittedMaterial::new(material, context.scene.ambient_light, is_body)
         };
         Self {
             materials: context.scene.materials.iter().map(material).collect(),
+            interfaces: context.shapes.nested.as_ref().map(BoundaryTable::smooth),
             split: SplitRule::new(context.settings, context.shapes.interior),
             context,
         }
@@ -123,33 +131,54 @@ impl Integrator for WhittedIntegrator<'_> {
         // Shade the intersections of each material
         for (id, lanes) in packet.hits.materials_of(!held_out) {
             let material = &self.materials[id.index()];
-            let (simd, rays, inside) = (context.simd, &segments.rays, segments.inside);
-            let PacketScratch { hits, base, surface, leaving, .. } = &mut *packet;
-            surface_points(simd, rays, hits, base, surface);
-            if let Some(interface) = &material.interface {
-                interface.leave(simd, rays, hits, inside, &[splat(0.0); 2], surface, leaving);
-            }
-            let lit = if material.is_body { lanes & !inside } else { lanes };
-            self.add_direct_light(segments, material, lit, depth, packet);
-            if let Some(interface) = &material.interface {
-                // At the last depth, rays see the background
-                let is_last = depth >= context.settings.max_depth;
-                let hits =
-                    SpecularHits { segments, depth, lanes, last: if is_last { lanes } else { 0 } };
-                let (dielectric, background) = (interface.dielectric(), &context.background);
-                let escape = Escape {
-                    add: &|along, weight, lanes, sum| {
-                        add_background(simd, background, along, weight, lanes, sum);
-                    },
-                    group: NO_GROUP,
-                };
-                context.scatter(dielectric, &self.split, hits, packet, next, escape);
+            for surface in context.divide_surface(segments, &packet.hits, id, lanes) {
+                self.shade_surface(segments, depth, material, surface, packet, next);
             }
         }
     }
 }
 
 impl WhittedIntegrator<'_> {
+    /// Adds the light at intersections with surfaces of one `material`, and appends the rays that leave them.
+    fn shade_surface(
+        &self,
+        segments: &SegmentPacket,
+        depth: u32,
+        material: &WhittedMaterial,
+        found: SurfaceLanes,
+        packet: &mut PacketScratch,
+        next: &mut RayStreams,
+    ) {
+        let context = &self.context;
+        let SurfaceLanes { lanes, inside, boundary } = found;
+        let interface = match (boundary, &self.interfaces) {
+            (Some(boundary), Some(interfaces)) => Some(interfaces.of(boundary)),
+            _ => material.interface.as_ref(),
+        };
+        let (simd, rays) = (context.simd, &segments.rays);
+        let PacketScratch { hits, base, surface, leaving, .. } = &mut *packet;
+        surface_points(simd, rays, hits, base, surface);
+        if let Some(interface) = interface {
+            interface.leave(simd, rays, hits, inside, &[splat(0.0); 2], surface, leaving);
+        }
+        let lit = if material.is_body { lanes & !inside } else { lanes };
+        self.add_direct_light(segments, material, lit, depth, packet);
+        if let Some(interface) = interface {
+            // At the last depth, rays see the background
+            let is_last = depth >= context.settings.max_depth;
+            let last = if is_last { lanes } else { 0 };
+            let hits = SpecularHits { segments, depth, lanes, crossed: found.crossed(), last };
+            let (dielectric, background) = (interface.dielectric(), &context.background);
+            let escape = Escape {
+                add: &|along, weight, lanes, sum| {
+                    add_background(simd, background, along, weight, lanes, sum);
+                },
+                group: NO_GROUP,
+            };
+            context.scatter(dielectric, &self.split, hits, packet, next, escape);
+        }
+    }
+
     /// Adds ambient light and the light of all light sources at the shading points of `lanes`.
     fn add_direct_light(
         &self,

@@ -98,6 +98,9 @@ pub struct Material {
     pub finish: Finish,
     /// Roughness of the surface of transmissive particles for path tracing, 0 (smooth) to 1.
     pub interface_roughness: f32,
+    /// Where connected transmissive bodies overlap, the one with the highest priority fills the space, and of several the
+    /// one whose material comes first.
+    pub priority: u8,
 }
 
 /// How a surface meets light. Whitted's model knows only panes; for it, all other surfaces are matte with the constants
@@ -167,6 +170,7 @@ impl Material {
         extinction: Vec3::ZERO,
         finish: Finish::Matte,
         interface_roughness: 0.0,
+        priority: 0,
     };
 
     /// A matte surface of this colour: of meshes, rods and spray.

@@ -1,6 +1,7 @@
 //! Surfaces for ray tracing. A scene is a list of [`Shape`]s that intersect packets of rays. Every [`Intersection`]
 //! has a distance, a normal, a material, and a particle that provides attributes, whatever shape it belongs to.
 
+pub mod contact;
 pub mod cut;
 pub mod field;
 mod gradient;

@@ -16,6 +16,9 @@ pub(in crate::render) struct Dielectric {
     pub(in crate::render) reflection: f32,
     /// Relative index of refraction: inside over outside.
     pub(super) ior: f32,
+    /// Index of refraction on the side of a shadow ray over that on the other side, see
+    /// [`Self::straight_transmittance`].
+    straight_ratio: f32,
     r0: f32,
     is_exact: bool,
     /// Weight of the refracted ray; 0 if opaque.
@@ -29,11 +32,18 @@ impl Dielectric {
         Self {
             reflection: material.reflection,
             ior: material.ior,
+            straight_ratio: 1.0 / material.ior,
             r0: material.r0(),
             is_exact: material.fresnel == Fresnel::Exact,
             transmission: material.transmission,
             extinction: material.extinction,
         }
+    }
+
+    /// The constants for shadow rays between two media. Either may refract more; light is never totally reflected.
+    pub(super) fn for_straight_rays(material: &scene::Material) -> Self {
+        let straight_ratio = material.ior.min(1.0 / material.ior);
+        Self { straight_ratio, ..Self::new(material) }
     }
 
     /// The Fresnel reflectance at the absolute `cosine` between ray and normal, and the squared sine of the refracted
@@ -51,7 +61,7 @@ impl Dielectric {
     /// normal. It is that of a ray from outside, whatever side the shadow ray comes from.
     #[inline(always)]
     pub(in crate::render) fn straight_transmittance(&self, cosine: f32) -> f32 {
-        self.transmission * (1.0 - self.reflectance(cosine, 1.0 / self.ior))
+        self.transmission * (1.0 - self.reflectance(cosine, self.straight_ratio))
     }
 
     #[inline(always)]

@@ -11,11 +11,13 @@ use spherule_tree::math::{Lanes, Supported};
 use spherule_tree::ray::RayPacket;
 
 mod body;
+mod boundaries;
 mod dielectric;
 mod rough;
 mod spheres;
 
 use body::BodyInterface;
+pub(super) use boundaries::BoundaryTable;
 pub(super) use dielectric::{Dielectric, attenuate, cross_straight, leaving};
 use rough::RoughInterface;
 use spheres::SphereInterface;

@@ -36,7 +36,10 @@ impl PathIntegrator<'_> {
         match self.context.scene.material(material).owner {
             Owner::Thing(_) => true,
             Owner::Part(_) => self.parts_take_photons(),
-            Owner::Style(_) => self.context.cameras.exposure.is_none(),
+            Owner::Style(_) => {
+                let is_clear = self.context.shapes.is_transmissive(material);
+                !is_clear && self.context.cameras.exposure.is_none()
+            }
             Owner::Particles | Owner::Spray | Owner::Ground => false,
         }
     }

@@ -63,10 +63,15 @@ impl FieldParticles {
     /// Index in the frame of the particle nearest to `point`, if any is within the support. Ties in distance go to
     /// the lower index.
     pub fn nearest(&self, point: Vec3) -> Option<u32> {
+        self.nearest_of(point, u32::MAX)
+    }
+
+    /// The same among the first `count` particles.
+    pub fn nearest_of(&self, point: Vec3, count: u32) -> Option<u32> {
         let mut best: Option<(f32, u32)> = None;
         self.around(point, |place, squared, _| {
             let found = (squared, self.bins.indices()[place]);
-            if best.is_none_or(|best| found < best) {
+            if found.1 < count && best.is_none_or(|best| found < best) {
                 best = Some(found);
             }
         });

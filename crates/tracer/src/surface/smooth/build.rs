@@ -63,6 +63,8 @@ pub(super) struct Built {
     pub(super) field: Option<FieldParticles>,
     /// The layout, if intersections and normals are to be computed from the field.
     pub(super) exact: Option<Layout>,
+    /// Number of the first particles, whose attributes points of the surface have; None: all.
+    pub(super) own: Option<u32>,
 }
 
 /// Builds the surface of `centers`. With `keep` the particles are kept. `left` is the available memory in bytes.
@@ -106,8 +108,12 @@ pub(super) fn build(
         left_out: field.bins().left_out(),
         is_empty: count > 0 && tree.is_empty(),
     };
-    let built =
-        Built { tree, field: keep.then_some(field), exact: settings.exact.then_some(layout) };
+    let built = Built {
+        tree,
+        field: keep.then_some(field),
+        exact: settings.exact.then_some(layout),
+        own: None,
+    };
     Ok((built, report))
 }
 

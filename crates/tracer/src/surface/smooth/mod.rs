@@ -64,6 +64,11 @@ impl SmoothGrid {
         Ok(report)
     }
 
+    /// Leaves the attributes of points to the first `count` particles; the others only shape the surface.
+    pub fn set_own_particles(&mut self, count: u32) {
+        self.built.own = Some(count);
+    }
+
     /// The surface as a shape.
     pub fn surface(&self) -> SmoothSurface<'_> {
         SmoothSurface { built: &self.built, simd: Supported::default() }
@@ -160,7 +165,10 @@ impl Shape for SmoothSurface<'_> {
     }
 
     fn particle_at(&self, hit: &Intersection) -> u32 {
-        let nearest = self.field().and_then(|field| field.nearest(hit.point));
+        let nearest = self.field().and_then(|field| match self.built.own {
+            Some(count) => field.nearest_of(hit.point, count),
+            None => field.nearest(hit.point),
+        });
         nearest.unwrap_or(hit.particle)
     }
 
@@ -168,8 +176,10 @@ impl Shape for SmoothSurface<'_> {
         let mut found = false;
         if let Some(field) = self.field() {
             field.neighbours(hit.point, &mut |index, part| {
-                found = true;
-                each(index, part);
+                if self.built.own.is_none_or(|count| index < count) {
+                    found = true;
+                    each(index, part);
+                }
             });
         }
         if !found {

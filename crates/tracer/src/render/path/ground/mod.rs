@@ -27,7 +27,8 @@ use crate::render::{
     shading::add,
     stop::Stop,
 };
-use crate::scene::{Ground, Owner, Scene};
+use crate::scene::{Ground, Material, Owner, Scene};
+use crate::surface::Shape;
 use spherule_tree::math::{lane3, lanes_in, set_lane3, splat, splat3};
 
 mod density;
@@ -180,7 +181,12 @@ pub(super) struct Caustics {
 fn has_photons(scene: &Scene, settings: &RenderSettings) -> bool {
     settings.integrator == IntegratorKind::Path
         && settings.photons > 0
-        && scene.particle_material().transmission > 0.0
+        && scene.materials.iter().any(is_clear)
+}
+
+/// Whether particles with this material are transmissive.
+fn is_clear(material: &Material) -> bool {
+    matches!(material.owner, Owner::Particles | Owner::Style(_)) && material.transmission > 0.0
 }
 
 fn is_catcher(ground: &Ground) -> bool {
@@ -217,7 +223,8 @@ pub(in crate::render) fn bytes(scene: &Scene, settings: &RenderSettings) -> Grou
     // Photons at surfaces are stored one by one
     let has_opaque = scene.materials.iter().any(|material| match material.owner {
         Owner::Thing(_) => !material.is_pane(),
-        Owner::Part(_) | Owner::Style(_) => true,
+        Owner::Part(_) => true,
+        Owner::Style(_) => !is_clear(material),
         Owner::Particles | Owner::Spray | Owner::Ground => false,
     });
     let has_surfaces = emits && has_opaque;
@@ -318,8 +325,13 @@ impl<'a> PathIntegrator<'a> {
     /// What wets the ground, if something does.
     fn wet_scene<'s>(&'s self, square: &'s Square) -> Option<WetScene<'s>> {
         let scene = self.context.scene;
+        let shapes = &self.context.shapes;
+        let bodies: Vec<&dyn Shape> = match &shapes.nested {
+            Some(nested) => nested.all().iter().map(|body| body.shape).collect(),
+            None => vec![shapes.connected_particles()?],
+        };
         Some(WetScene {
-            body: self.context.shapes.connected_particles()?,
+            bodies,
             wet: scene.wet_ground.as_ref()?,
             square,
             particles: scene.particles,

@@ -15,6 +15,7 @@ use super::emitter::Emitter;
 use super::photon_map::{Collector, Photon};
 use super::{CausticMap, Map, Square};
 use crate::render::{
+    body_set::BodySet,
     ray_counts::RayCounts,
     scratch::PacketScratch,
     stop::Stop,
@@ -161,6 +162,7 @@ fn emit(emitter: &Emitter, first: u32, end: u32, segments: &mut SegmentPacket) {
     segments.bounces = [1; LANES];
     segments.sample = [0; LANES];
     segments.inside = 0;
+    segments.bodies = [BodySet::EMPTY; LANES];
 }
 
 /// Photons that are traced together.
@@ -213,7 +215,7 @@ impl Task<'_> {
         next: &mut RayStreams,
     ) {
         self.integrator.context.intersect(segments, depth, packet);
-        let particles = packet.hits.lanes_of(MaterialId::PARTICLES);
+        let particles = self.integrator.context.shapes.transmissive_lanes(&packet.hits);
         if particles != 0 {
             (self.integrator).shade_transmissive(segments, depth, particles, packet, next);
         }
@@ -224,10 +226,12 @@ impl Task<'_> {
         let (hits, throughput) = (&packet.hits, &packet.throughput);
         // Light that enters a body has the square of its index times the radiance. Paths of the camera leave this
         // factor out, but the density of photons inside the body contains it
-        let ior = self.integrator.context.scene.particle_material().ior;
         let flux = |lane: usize| match segments.inside >> lane & 1 {
             0 => lane3(throughput, lane),
-            _ => lane3(throughput, lane) / (ior * ior),
+            _ => {
+                let ior = self.integrator.context.ior_at(segments, lane);
+                lane3(throughput, lane) / (ior * ior)
+            }
         };
         // Store those on the ground with their place in the map
         if let Some(square) = self.square {

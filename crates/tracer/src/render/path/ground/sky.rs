@@ -140,6 +140,11 @@ fn aim(
     let body = integrator.context.shapes.connected_particles();
     let is_inside = body.is_some_and(|body| body.side_of(above) == Side::Inside);
     segments.inside = if is_inside { first_lanes(LANES) } else { 0 };
+    if let Some(nested) = &integrator.context.shapes.nested {
+        let bodies = nested.at(above);
+        segments.bodies = [bodies; LANES];
+        segments.inside = if bodies.is_empty() { 0 } else { first_lanes(LANES) };
+    }
     segments.throughput = [splat(1.0); 3];
     segments.pdf = splat(f32::INFINITY);
     segments.bounces = [0; LANES];

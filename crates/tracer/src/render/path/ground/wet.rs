@@ -119,7 +119,8 @@ struct Fluid {
 
 /// What is needed to find the fluid above the ground.
 pub(super) struct WetScene<'a> {
-    pub(super) body: &'a dyn Shape,
+    /// The bodies of fluid.
+    pub(super) bodies: Vec<&'a dyn Shape>,
     pub(super) wet: &'a WetGround,
     pub(super) square: &'a Square,
     /// Corners of the box of the particles.
@@ -166,11 +167,12 @@ impl WetScene<'_> {
             return Fluid::default();
         }
         let above = point + START * self.square.edge * up;
-        if self.body.side_of(above) == Side::Inside {
+        if self.bodies.iter().any(|body| body.side_of(above) == Side::Inside) {
             return Fluid { near: 1.0, covers: true };
         }
         let ray = Ray { t_max: margin, ..Ray::new(above, up) };
-        let near = self.body.nearest(&ray).map_or(0.0, |hit| 2.0 * (1.0 - hit.t / margin));
+        let heights = self.bodies.iter().filter_map(|body| body.nearest(&ray)).map(|hit| hit.t);
+        let near = heights.reduce(f32::min).map_or(0.0, |height| 2.0 * (1.0 - height / margin));
         Fluid { near: near.clamp(0.0, 1.0), covers: false }
     }
 }

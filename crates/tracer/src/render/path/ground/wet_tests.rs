@@ -10,7 +10,7 @@ fn map(body: &dyn Shape, margin: f32) -> WetMap {
     let square =
         Square { center: Vec3::ZERO, axes: [Vec3::X, Vec3::Y], normal: Vec3::Z, edge: EDGE };
     let scene = WetScene {
-        body,
+        bodies: vec![body],
         wet: &WetGround { strength: 1.0, margin },
         square: &square,
         particles: [Vec3::new(-2.0, -2.0, -0.1), Vec3::new(2.0, 2.0, 3.0)],
