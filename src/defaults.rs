@@ -22,7 +22,7 @@ mod radius;
 mod shapes;
 mod view;
 
-pub use parts::{Walls, walls};
+pub use parts::{Walls, as_glass, walls};
 pub use planned::planned;
 
 /// The keys that rules set, except overlays. A job that goes on has the values of its plan.
@@ -173,18 +173,34 @@ impl Rules<'_> {
         is_own && self.manifest.integrator() == IntegratorKind::Path
     }
 
-    /// Leaves out virtual sites and walls. Whether there are walls, and they are left out.
-    fn leave_out(&mut self) -> bool {
-        let mut has_left_out = false;
-        // Leave out what is not an atom
+    /// Leaves out virtual sites, and water that hides other molecules.
+    fn leave_out_sites_and_water(&mut self) {
+        let (mut conditions, mut lines) = (Vec::new(), Vec::new());
         if self.facts.elements.is_some_and(|elements| elements.has_others) {
+            conditions.push("element >= 1 && element <= 118".to_owned());
             let line = "left out: virtual sites and other particles that are not atoms (--where 'element >= 0' \
                         shows them)";
-            self.set(
-                [("select.where", "element >= 1 && element <= 118".into())],
-                Some(line.to_owned()),
-            );
+            lines.push(line.to_owned());
         }
+        // Who has styles says what is drawn
+        let water = self.facts.hiding_water.join(", ");
+        if !water.is_empty() && self.manifest.styles.is_empty() {
+            conditions.push(format!("!(residue_name in ({water}))"));
+            lines.push(format!(
+                "left out: water, which hides the other molecules (--where 'index >= 0' shows it, \
+                 --style 'residue_name in ({water}): spheres, opacity 0.1' draws it clear)"
+            ));
+        }
+        if !conditions.is_empty() && self.lacks("select.where") {
+            self.set([("select.where", conditions.join(" && ").into())], None);
+            self.found.lines.extend(lines);
+        }
+    }
+
+    /// Leaves out virtual sites, water and walls. Whether there are walls, and they are left out.
+    fn leave_out(&mut self) -> bool {
+        let mut has_left_out = false;
+        self.leave_out_sites_and_water();
         // Who has styles says what is drawn
         if !self.manifest.styles.is_empty() {
             return false;
@@ -205,9 +221,10 @@ impl Rules<'_> {
                 WallSign::Around => "which surround the others".to_owned(),
             };
             let line = format!(
-                "left out: particles with {name} {}, {why} (--where '{name} >= {}' shows them)",
+                "left out: particles with {name} {}, {why} (--where '{name} >= {}' shows them, {})",
                 texts.join(", "),
-                values.first().copied().unwrap_or_default()
+                values.first().copied().unwrap_or_default(),
+                as_glass(texts.iter().map(|value| format!("{name} == {value}")))
             );
             has_left_out = self.lacks("select.where");
             self.set([("select.where", all.join(" && ").into())], Some(line));

@@ -15,6 +15,14 @@ pub struct Walls {
     pub left_out: Vec<String>,
 }
 
+/// The option that draws the particles for which one of the `conditions` holds as glass.
+pub fn as_glass(conditions: impl Iterator<Item = String>) -> String {
+    let conditions: Vec<String> = conditions.collect();
+    let quote = if conditions.iter().any(|one| one.contains('\'')) { '"' } else { '\'' };
+    let conditions = conditions.join(" || ");
+    format!("--style {quote}{conditions}: smooth, material thin-glass{quote} draws them as glass")
+}
+
 /// The walls among parts with these `names`; None if there are no walls, or nothing else.
 pub fn walls<S: AsRef<str>>(names: &[S]) -> Option<Walls> {
     let is_wall = |name: &&S| {

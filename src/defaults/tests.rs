@@ -108,6 +108,24 @@ fn categories_come_before_speed_and_walls_are_left_out() {
 }
 
 #[test]
+fn water_that_hides_other_molecules_is_left_out() {
+    let mut solution = facts();
+    solution.elements = Some(Elements { has_others: true, is_solid: false });
+    solution.hiding_water = ["HOH", "SOL"].map(str::to_owned).to_vec();
+    let (manifest, lines) = completed("", &solution, Files::default());
+    let atoms = "element >= 1 && element <= 118";
+    let condition = format!("\"{atoms} && !(residue_name in (HOH, SOL))\"");
+    assert!(manifest.settings().contains(&("select.where".to_owned(), condition)));
+    assert!(lines.contains("virtual sites") && lines.contains("left out: water"), "{lines}");
+    // Whoever draws it has a style or a condition for it
+    let style = "[[style]]\nwhere = \"residue_name == SOL\"\nopacity = 0.1";
+    let condition = ("select.where".to_owned(), format!("\"{atoms}\""));
+    assert!(of(style, &solution).settings().contains(&condition));
+    let (_, lines) = completed("[select]\nwhere = \"z > 0\"", &solution, Files::default());
+    assert!(!lines.contains("left out"), "{lines}");
+}
+
+#[test]
 fn parts_have_their_names_in_the_legend() {
     let mut two = facts();
     two.categories = vec![category("part", &[0, 2], &[])];

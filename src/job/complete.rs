@@ -5,7 +5,7 @@ use spherule_jobs::{Job, ResumeMode};
 
 use super::manifest_file::JobManifest;
 use super::{RunError, in_thread};
-use crate::defaults::{Defaults, Files, planned, rules, walls};
+use crate::defaults::{Defaults, Files, as_glass, planned, rules, walls};
 use crate::manifest::{Look, ManifestSource, Override, real_dir};
 use crate::survey::Facts;
 
@@ -62,13 +62,15 @@ impl JobManifest {
         sequence: &mut Sequence,
     ) -> Result<Defaults, RunError> {
         let mut defaults = Defaults::default();
-        // The facts are those of what is drawn
-        let found = walls(sequence.part_names()).filter(|_| source.lacks("input.parts"));
+        // The facts are those of what is drawn. Who has styles says what that is
+        let is_open = source.lacks("input.parts") && self.manifest.styles.is_empty();
+        let found = walls(sequence.part_names()).filter(|_| is_open);
         if let Some(walls) = found.filter(|_| self.manifest.look != Look::Whitted) {
             defaults.lines.push(format!(
-                "left out: {}, walls by name (--parts {} shows them)",
+                "left out: {}, walls by name (--parts {} shows them, {})",
                 walls.left_out.join(", "),
-                sequence.part_names().join(",")
+                sequence.part_names().join(","),
+                as_glass(walls.left_out.iter().map(|name| format!("part == '{name}'")))
             ));
             self.keep_parts(sequence, Some(&walls.kept))?;
             let parts = Override::new("input.parts", walls.kept, "the defaults");

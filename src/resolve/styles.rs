@@ -106,7 +106,7 @@ impl Looks<'_> {
                 let found = surface::optics(&settings, kind, &self.bounds);
                 Material { priority: self.priority, ..found }
             }
-            Some(own) => own.resolved(&style.color),
+            Some(own) => own.resolved(&style.colors(&self.manifest.material.color)),
             None if usual.transmission == 0.0 => usual,
             None => StyleMaterial::default().resolved(&style.color),
         }

@@ -62,6 +62,22 @@ fn render_of_all_parts() -> Vec<&'static str> {
 }
 
 #[test]
+fn walls_are_left_out_unless_a_style_draws_them() {
+    let workshop = workshop();
+    let still = |options: &[&str]| {
+        let arguments = [&["still", "in/parts.pvd", "-o", "a.exr"][..], &SMALL, options].concat();
+        workshop.run(&arguments).expect(0).errors()
+    };
+    let glass = "part == 'wall': smooth, material thin-glass";
+    let plain = still(&[]);
+    assert!(plain.contains("left out: wall, walls by name"), "{plain}");
+    assert!(plain.contains(&format!("--style \"{glass}\" draws them as glass")), "{plain}");
+    let styled = still(&["--style", glass]);
+    assert!(!styled.contains("left out"), "{styled}");
+    assert_ne!(plain, styled);
+}
+
+#[test]
 fn render_check_convert_and_resume() {
     let workshop = workshop();
     let check = workshop

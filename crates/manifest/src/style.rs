@@ -73,7 +73,7 @@ const STICKS: &str = "are drawn by a style with draw = \"sticks\" or \"balls-and
 const OPAQUE_SPHERES: &str = "only opaque spheres and grains have one; set draw = \"spheres\", and matte, plastic or metal as material";
 
 /// Transmittance of each side of thin glass without a colour, linear RGB: a light grey.
-const THIN_GLASS: glam::Vec3 = glam::Vec3::new(0.86, 0.88, 0.88);
+const THIN_GLASS: glam::Vec3 = glam::Vec3::new(0.93, 0.945, 0.945);
 
 /// Rules between the keys of a style.
 pub(super) const RULES: &[Rule] = rules! {
@@ -190,10 +190,12 @@ impl StyleMaterial {
                 StyleMaterialKind::ThinGlass => Finish::Pane,
                 _ => Finish::Matte,
             },
-            color: (self.kind == StyleMaterialKind::ThinGlass).then(|| match color {
-                ColorSetting::Rgb(color) => *color,
-                _ => THIN_GLASS,
-            }),
+            color: match color {
+                ColorSetting::Rgb(color) if self.kind == StyleMaterialKind::ThinGlass => {
+                    Some(*color)
+                }
+                _ => None,
+            },
             ..scene::Material::DEFAULT
         }
     }
@@ -417,6 +419,7 @@ impl Style {
                 range: self.range,
                 ..ColorMapping::by(name)
             }),
+            (None, ColorSetting::Auto) if self.is_thin_glass() => ColorSetting::Rgb(THIN_GLASS),
             (None, ColorSetting::Auto) => usual.clone(),
             (None, color) => color.clone(),
         }

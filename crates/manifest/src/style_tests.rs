@@ -39,6 +39,11 @@ fn impossible_styles_are_refused() {
         ("draw = \"stick\"", "did you mean sticks?"),
         ("where = \"type ==\"", "style.0.where"),
         ("color = [1, 0, 0]\ncolor_by = \"x\"", "style.0.color: color_by is given too"),
+        ("material = { type = \"thin-glass\" }", "style.0.draw: "),
+        (
+            "draw = \"smooth\"\ncolor_by = \"x\"\nmaterial = { type = \"thin-glass\" }",
+            "style.0.color_by: thin glass has one colour",
+        ),
         ("map = \"vik\"", "style.0.map: belongs to color_by"),
         ("range = [0, 1]", "style.0.range: belongs to color_by"),
         ("draw = \"arrows\"", "style.0.arrows: is missing; which arrows"),

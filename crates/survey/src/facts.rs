@@ -19,6 +19,7 @@ use super::robust::{robust_bounds, robust_range, sample_of, sorted_sample};
 use super::sample::FrameSample;
 use super::shape::{Axes, has_heavy_tails};
 use super::sheet::covering_radius;
+use super::solvent::hiding_water;
 
 use super::tank::{Tank, tank_of};
 use super::upright::up_of;
@@ -130,6 +131,8 @@ pub struct Facts {
     pub categories: Vec<Category>,
     /// Attributes of text: names of chains, residues and atoms.
     pub texts: Vec<String>,
+    /// Names of residues of water that hides other molecules.
+    pub hiding_water: Vec<String>,
     /// The simulation cell.
     pub cell: Option<SimulationCell>,
     /// The part of the particles that are in the cell, or near it.
@@ -256,6 +259,7 @@ impl Facts {
             elements,
             categories: without_walls(categories, &raw.attributes),
             texts: texts(&raw.labels),
+            hiding_water: hiding_water(&raw.attributes, &raw.labels),
             in_cell: raw.cell.as_ref().map_or(0.0, |cell| part_in(cell, &raw.positions)),
             cell_extent: raw.cell.as_ref().map_or([0.0; 3], |cell| {
                 let is_full = is_unit_cell(cell, sample.count, sample.spacing, place.angstrom);

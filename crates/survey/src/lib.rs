@@ -55,6 +55,7 @@ mod robust;
 mod sample;
 mod shape;
 mod sheet;
+mod solvent;
 mod standing;
 mod stream;
 mod tank;
