@@ -266,12 +266,12 @@ fn content(
             let is_opaque = |style: &&ParticleStyle| {
                 setup.picture.scene.material(style.material).transmission == 0.0
             };
-            let mut all = rules.styles.iter().filter(is_opaque).map(|style| &style.color);
-            let of_styles = || all.find_map(|rule| color_bar(rule, manifest, survey));
+            let of_styles = rules.styles.iter().filter(is_opaque).map(|style| &style.color);
             let is_seen = rules.styles.is_empty()
                 || (survey.color.is_some() && !manifest.material.is_clear());
-            let first = is_seen.then(|| color_bar(&rules.color, manifest, survey)).flatten();
-            let mapped = first.or_else(of_styles);
+            let seen: Vec<&ColorRule> =
+                is_seen.then_some(&rules.color).into_iter().chain(of_styles).collect();
+            let mapped = seen.iter().find_map(|rule| color_bar(rule, &seen, (manifest, survey)));
             let Some((name, kind)) = mapped.or_else(|| legend_of_styles(&rules.styles)) else {
                 if survey.most_particles == 0 || !rules.styles.is_empty() {
                     return Ok(None);
@@ -328,7 +328,7 @@ pub fn color_bar_of(
 ) -> Result<Option<ColorBar>, ResolveError> {
     // Take the colours of the particles
     let rule = color::rule(&manifest.material.color, survey.color.as_ref(), survey, None)?;
-    let Some((name, kind)) = color_bar(&rule, manifest, survey) else {
+    let Some((name, kind)) = color_bar(&rule, &[], (manifest, survey)) else {
         return Ok(None);
     };
     let mut bar = ColorBar {
@@ -370,11 +370,12 @@ fn legend_of_styles(styles: &[ParticleStyle]) -> Option<(String, ColorBarKind)> 
     (!entries.is_empty()).then(|| (String::new(), ColorBarKind::Categories(entries)))
 }
 
-/// The name of the value that colours the particles, and its colours; None if it is none.
+/// The name of the value that colours the particles, and its colours; None if it is none. Categories are also those of
+/// the rules `seen` in the picture.
 fn color_bar(
     rule: &ColorRule,
-    manifest: &Manifest,
-    survey: &Survey,
+    seen: &[&ColorRule],
+    (manifest, survey): (&Manifest, &Survey),
 ) -> Option<(String, ColorBarKind)> {
     let ColorRule::Attribute { name, map, .. } = rule else {
         return None;
@@ -396,8 +397,22 @@ fn color_bar(
             }
         }
         (None, categories) => {
-            let categories = categories.filter(|categories| !categories.is_empty())?;
-            ColorBarKind::Categories(named(categories, (manifest, survey), name))
+            let own = categories.filter(|categories| !categories.is_empty())?;
+            // Other styles may have further categories of the same attribute
+            let others = seen.iter().filter_map(|rule| match rule {
+                ColorRule::Attribute { name: other, map, .. } if other == name => map.categories(),
+                _ => None,
+            });
+            let mut all = own.to_vec();
+            for category in others.flatten() {
+                if !all.iter().any(|(value, _)| *value == category.0) {
+                    all.push(*category);
+                }
+            }
+            if all.len() > own.len() {
+                all.sort_by_key(|(value, _)| *value);
+            }
+            ColorBarKind::Categories(named(&all, (manifest, survey), name))
         }
     };
     Some((shown_name(name).to_owned(), kind))
@@ -517,4 +532,34 @@ fn backdrop(setup: &Setup, camera: &Camera, film: Vec2) -> Vec3 {
 
 pub(super) fn srgb(linear: Vec3) -> Color {
     linear.to_array().map(|v| srgb_from_linear(v.clamp(0.0, 1.0)))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::super::camera::tests::survey;
+    use super::*;
+    use crate::scene::ColorMap;
+
+    #[test]
+    fn legends_have_the_categories_of_all_styles() {
+        let manifest = Manifest::parse("input.path = \"in\"", Path::new("job.toml")).unwrap();
+        let survey = survey();
+        let by = |name: &str, values: &[i64]| ColorRule::Attribute {
+            name: name.to_owned(),
+            map: ColorMap::of_categories("okabe-ito", values).unwrap(),
+            required: true,
+            needs_geometry: false,
+        };
+        let rules = [by("type", &[3, 5]), by("phase", &[9]), by("type", &[1, 5])];
+        let seen: Vec<&ColorRule> = rules.iter().collect();
+        let labels = |rule: &ColorRule| {
+            let (_, kind) = color_bar(rule, &seen, (&manifest, &survey)).unwrap();
+            let ColorBarKind::Categories(all) = kind else { panic!("categories") };
+            all.into_iter().map(|(label, _)| label).collect::<Vec<_>>()
+        };
+        assert_eq!(labels(&rules[0]), ["1", "3", "5"]);
+        assert_eq!(labels(&rules[1]), ["9"]);
+    }
 }
