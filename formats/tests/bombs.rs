@@ -1,5 +1,7 @@
 //! Small files that expand to a large size: each fails within its budget with an error that names it. Files
 //! that fit give their usual results.
+//!
+//! Texts are several times as large as the budget, or as the pieces in which they are read.
 #![expect(clippy::expect_used, reason = "a test says what it expects")]
 
 use std::fmt::Write as _;

@@ -386,6 +386,7 @@ fn several_workers_share_the_frames() {
     assert!(matches!(claim(&job, 1), ClaimOutcome::Acquired(_)));
 }
 
+// Each refusal waits for the next heartbeat of the active worker.
 #[test]
 fn settings_of_active_workers_do_not_change() {
     let fixture = Fixture::new(0..2);

@@ -209,6 +209,7 @@ const SURFACES: [(&str, &str, Range<f32>); 9] = [
     ),
 ];
 
+// Renders 54 images: nine surfaces from two sources, as a whole, selected and moving.
 #[test]
 fn each_pixel_has_the_values_of_the_particle_that_it_shows() {
     let particles = Particles::new();

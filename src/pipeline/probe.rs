@@ -319,6 +319,7 @@ mod tests {
 
     use super::*;
 
+    // The second probe has time to trace all that it measures.
     #[test]
     fn no_time_to_trace_gives_a_lower_bound() {
         let example = "examples/dam-break/ParticleData_Fluid_1.bgeo";

@@ -175,6 +175,7 @@ fn keys_of_a_json_file_are_those_of_a_manifest() {
     ran.expect(2).prints("none.json");
 }
 
+// Starts the program six times: a whole job, a resumed one and a single frame of each of two cameras.
 #[test]
 fn moving_cameras_resume_deterministically() {
     for camera in [KEYS, "[camera]\nmode = \"turntable\"\n"] {
@@ -309,6 +310,7 @@ fn focus_follows_a_particle_through_the_frames() {
     assert!(errors.contains("no particle has the id 3"), "{errors}");
 }
 
+// Starts the program 14 times: each surface sharp, blurred, on more threads and at another time; and spray.
 #[test]
 fn motion_blur_moves_particles_with_their_velocities() {
     let workshop = Workshop::new();

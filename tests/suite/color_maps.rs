@@ -1,4 +1,6 @@
 //! Colours of values through maps: which value, its range, scale and map.
+//!
+//! The program is started for each value, scale, map and name.
 
 use std::fmt::Write as _;
 use std::fs;

@@ -82,6 +82,7 @@ fn speed_has_precedence_over_unnamed_colours() {
     assert_near(albedo(&shop), [0.1, 0.2, 0.3]);
 }
 
+// Starts the program twelve times: each name, from text and from native frames.
 #[test]
 fn conditions_and_colours_know_the_same_names() {
     let shop = Workshop::new();

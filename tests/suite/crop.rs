@@ -16,6 +16,7 @@ fn windows(path: &Path) -> [IntegerBounds; 2] {
     [header.data_window(), header.shared_attributes.display_window]
 }
 
+// Starts the program eight times: four windows of an image, and the commands that tell of them.
 #[test]
 fn a_crop_equals_its_part_of_the_whole_image() {
     let workshop = Workshop::new();

@@ -1,4 +1,6 @@
 //! `--draft`: quick previews with ambient light.
+//!
+//! Tests compare drafts with pictures of other settings, and render several of them.
 
 use std::fs;
 

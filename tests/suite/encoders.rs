@@ -33,6 +33,7 @@ fn recorded(workshop: &Workshop, out: &str) -> Vec<i64> {
     lines.iter().filter_map(|line| line["frame"].as_i64()).collect()
 }
 
+// Forty frames, twice: many have to be encoded at once for their order to be at risk.
 #[test]
 fn images_and_their_order_do_not_depend_on_the_number_of_encoders() {
     let workshop = frames();

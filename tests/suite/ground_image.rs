@@ -123,6 +123,7 @@ fn check(path: &Path, order: [usize; 4]) {
     }
 }
 
+// Starts the program seven times: for each format and each place of the picture.
 #[test]
 fn pictures_of_all_formats_lie_as_seen_from_above() {
     let workshop = particles(1);

@@ -1,5 +1,8 @@
 //! Native frames are traced where they lie: the pictures are those of decoded particles, damage costs the
 //! frame, and memory does not grow with the particles.
+//!
+//! Most tests render each case in all ways in which particles come to be traced: mapped, read, decoded, by several
+//! structures.
 
 use std::fs;
 use std::path::Path;

@@ -98,6 +98,7 @@ fn picture(workshop: &Workshop, out: &str, options: &[&str]) -> Picture {
     Picture::open(&workshop.join(format!("{out}/f.1.exr")))
 }
 
+// Starts the program eight times: no wall and three kinds of walls, with both integrators.
 #[test]
 fn a_wall_hides_particles_behind_it() {
     let workshop = particles(1);
@@ -235,6 +236,7 @@ fn the_ground_is_below_a_tank() {
     assert!(floor.clone().count() > 50 && floor.into_iter().all(|(_, n)| *n == 1.0));
 }
 
+// Starts the program eight times, each time after other changes of the files.
 #[test]
 fn each_frame_may_have_its_own_mesh() {
     let workshop = particles(3);
@@ -316,6 +318,7 @@ fn meshes_that_cannot_be_rendered_are_named() {
     assert!(!files(&workshop.join("out")).is_empty());
 }
 
+// Starts the program nine times: each structure on two numbers of threads, with eight samples a pixel.
 #[test]
 fn images_depend_on_neither_threads_nor_structures() {
     let workshop = particles(1);

@@ -97,6 +97,7 @@ fn the_channel_has_the_overlay_alone() {
     }
 }
 
+// Renders three frames twice, on one thread and on four.
 #[test]
 fn previews_do_not_depend_on_threads() {
     let shop = shop();

@@ -62,6 +62,7 @@ fn render(workshop: &Workshop, input: &str, out: &str, options: &[&str]) -> Ran 
     workshop.run(&[&command[..], &SMALL, options].concat())
 }
 
+// Starts the program 27 times: each of three inputs is traced in eight ways.
 #[test]
 fn images_do_not_depend_on_how_particles_are_traced() {
     let workshop = particles(1);
@@ -122,6 +123,7 @@ fn cryptomatte_names_the_materials_of_parts() {
     assert!(names.contains(&"particles".to_owned()));
 }
 
+// Starts the program seven times: some faults show in a frame only.
 #[test]
 fn absent_parts_are_reported_and_missing_attributes_refused() {
     let workshop = particles(1);

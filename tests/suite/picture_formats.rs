@@ -11,6 +11,7 @@ fn workshop() -> Workshop {
     workshop
 }
 
+// Starts the program twelve times: to render PNG in several ways, and for each command that reads it.
 #[test]
 fn jobs_write_png_alone() {
     let workshop = workshop();
@@ -73,6 +74,7 @@ fn jobs_write_no_other_formats() {
     }
 }
 
+// Starts the program twelve times: each extension, for a new file and for one that is replaced.
 #[test]
 fn still_writes_jpeg_and_tiff() {
     let workshop = workshop();

@@ -26,6 +26,7 @@ fn clean(ran: &Ran) {
 const TOLD: &str = "\\nforged: b";
 
 #[cfg(unix)]
+// Starts the program 18 times: every command prints names in its own way.
 #[test]
 fn external_names_are_printed_escaped() {
     let workshop = Workshop::new();

@@ -1,5 +1,7 @@
 //! Orthographic pictures, panoramas and stereo pairs of the program: the same bytes however they are made, and what the
 //! files say about themselves.
+//!
+//! Tests render each of three projections in several ways.
 
 use std::fs;
 

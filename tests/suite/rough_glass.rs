@@ -54,6 +54,7 @@ fn mean(workshop: &Workshop, out: &str, options: &[&str]) -> f32 {
     covered.iter().sum::<f32>() / covered.len() as f32
 }
 
+// Nine images with 256 samples a pixel and long paths: the least tolerance is 0.2 percent.
 #[test]
 fn a_rough_ball_in_white_surroundings_is_nearly_white() {
     let workshop = ball();
@@ -74,6 +75,7 @@ fn a_rough_ball_in_white_surroundings_is_nearly_white() {
     }
 }
 
+// Starts the program eight times: each setting, number of threads and structure.
 #[test]
 fn glass_is_smooth_by_default_and_rough_images_do_not_depend_on_threads() {
     let workshop = ball();

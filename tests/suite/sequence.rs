@@ -4,6 +4,7 @@ use std::fs;
 
 use crate::harness::{SMALL, Workshop, dam_break, images};
 
+// Starts the program four times, with all channels: memory is used again from the third frame of a job on.
 /// Planes, buffers and threads are used again from the third frame on; images do not show it.
 #[test]
 fn frames_of_a_sequence_are_those_rendered_alone() {

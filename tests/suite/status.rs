@@ -11,6 +11,7 @@ fn status(workshop: &Workshop, code: i32) -> Value {
     serde_json::from_str(&ran.text()).expect("JSON")
 }
 
+// Starts the program nine times: the status is asked for at each stage of a job.
 #[test]
 fn status_from_first_to_last_frame() {
     let workshop = Workshop::new();
@@ -44,6 +45,7 @@ fn status_from_first_to_last_frame() {
     assert_eq!(crate::harness::stamps(&workshop.join("out")), before);
 }
 
+// Images take a while, so that a worker is seen at work.
 #[test]
 fn status_lists_live_and_dead_workers() {
     let workshop = Workshop::new();
@@ -67,6 +69,7 @@ fn status_lists_live_and_dead_workers() {
     assert!(text.contains("has died; the next worker takes over"), "{text}");
 }
 
+// Watches a job from its first frame to its end.
 #[test]
 fn watching_ends_with_the_job() {
     let workshop = Workshop::new();

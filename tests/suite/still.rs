@@ -1,4 +1,6 @@
 //! `still`: one picture without a job.
+//!
+//! Most tests start the program several times: pictures are compared with each other and with those of jobs.
 
 use std::fs;
 

@@ -22,6 +22,7 @@ fn jobs_of_spheres_as_one_body_with_spray() {
     jobs_with_spray("union", &["--set", "render.caustics={photons=0}"]);
 }
 
+// Seven images, each with photons: their light must not depend on threads or resuming, either.
 #[test]
 fn jobs_of_a_smooth_surface_with_spray() {
     jobs_with_spray("smooth", &["--set", "render.caustics={photons=20000}"]);

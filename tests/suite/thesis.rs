@@ -26,6 +26,7 @@ const SMALL: Expected = Expected { particles: 100_000, hits: 614_870, lengths: 4
 const MIDDLE: Expected = Expected { particles: 1_000_000, hits: 622_911, lengths: 4_360_322.20 };
 const LARGE: Expected = Expected { particles: 10_000_000, hits: 626_647, lengths: 4_378_820.36 };
 
+// The figures are those of 1920x1080 pixels, so the image cannot be smaller.
 #[test]
 fn the_box_of_a_hundred_thousand() {
     SMALL.check("npy");

@@ -163,6 +163,7 @@ mod tests {
     /// Keys that have another value than their default if other keys are given.
     const DEPENDENT: [&str; 2] = ["/properties/camera/mode", "/properties/environment/type"];
 
+    // For each value that a rule names, the whole schema is made and compiled again.
     #[test]
     fn rules_name_keys_values_and_defaults() {
         let schema = job_schema();

@@ -51,6 +51,7 @@ fn selection(condition: &str) -> Selection {
 
 const CONDITIONS: [&str; 3] = ["x < 0.1", "x > 0.8", "index < 40"];
 
+// Surveys three frames in two formats four times, with and without a selection.
 #[test]
 fn the_radius_is_the_same_for_all_selections() {
     // Frames whose particles are selected at different times
@@ -78,6 +79,7 @@ fn the_radius_is_the_same_for_all_selections() {
     }
 }
 
+// Only frames of more than 2^20 particles are sampled.
 /// Frames that are sampled without a selection, and read as a whole with one.
 #[test]
 fn the_radius_of_large_frames_is_the_same_for_all_selections() {

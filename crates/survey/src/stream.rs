@@ -212,6 +212,7 @@ mod tests {
     use super::super::robust::spacing_of;
     use super::*;
 
+    // Each of some thousand particles of the sample is searched for among all 200,000.
     #[test]
     fn streamed_survey_matches_a_survey_in_memory() {
         let source = BoxSource::new(BoxSettings::thesis(200_000, 3), None);

@@ -227,6 +227,7 @@ fn missing_colour_attribute() {
     );
 }
 
+// Starts the program for each colour that a manifest or an option may already have.
 #[test]
 fn map_applies_to_the_existing_colour() {
     let workshop = one_frame();
@@ -285,6 +286,7 @@ fn patterns_and_ranges_of_any_size() {
     }
 }
 
+// Starts the program nine times: each command calculates with numbers of frames.
 /// The first and the last frame number that there are.
 #[test]
 fn frame_numbers_at_both_ends() {

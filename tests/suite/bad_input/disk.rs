@@ -36,6 +36,7 @@ fn namespace() -> Option<&'static [&'static str]> {
     })
 }
 
+// Starts the program 17 times: the size of the disk decides which file is the first without room.
 #[test]
 #[expect(clippy::print_stderr, reason = "a skipped test is reported")]
 fn full_disk_is_reported_without_partial_files() {
@@ -126,6 +127,7 @@ fn whatever_is_there_is_whole(dir: &Path, made: &Files, whole: &Files) {
     }
 }
 
+// Renders nine frames twice: only the largest image is beyond the limit.
 /// Files may not grow beyond some limit: the frame fails, the others do not.
 #[test]
 fn an_image_that_cannot_be_written_costs_one_frame() {

@@ -61,6 +61,7 @@ fn invalid_output_names() {
     );
 }
 
+// Starts the program for many commands: what is refused depends on what others have made.
 #[test]
 fn one_frame_needs_no_number_in_its_name() {
     let workshop = three_frames();
@@ -159,6 +160,7 @@ fn as_plain_user(command: Command) -> Option<Command> {
 }
 
 #[cfg(target_os = "linux")]
+// Images take a while, so that the directory is closed before the last of them.
 #[test]
 #[expect(clippy::print_stderr, reason = "a skipped test is reported")]
 fn a_directory_that_is_closed_while_a_job_runs() {

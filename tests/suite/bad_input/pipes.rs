@@ -34,6 +34,7 @@ fn closed_pipe_is_not_an_error() {
     }
 }
 
+// Renders four frames three times: each kind of messages is printed by other code.
 /// A job does not end because nobody reads its messages.
 #[test]
 fn job_continues_without_standard_error() {

@@ -22,6 +22,7 @@ fn is_empty(workshop: &Workshop, frame: u32) -> bool {
     pixels.iter().all(is_background)
 }
 
+// 100,000 particles in one place, as a program might hang at so many.
 #[test]
 fn no_particles_one_and_many_in_one_place() {
     let workshop = Workshop::new();
@@ -54,6 +55,7 @@ fn unreachable_threshold_gives_an_empty_image() {
     assert!(is_empty(&workshop, 1));
 }
 
+// Renders a smooth surface and a union: both treat such radii in their own way.
 #[test]
 fn radii_that_vary_a_thousandfold() {
     let workshop = Workshop::new();

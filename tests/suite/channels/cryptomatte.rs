@@ -123,6 +123,7 @@ fn check_layers(path: &Path) {
     assert!(covered > 300 && several > 100, "{covered}, {several}");
 }
 
+// Four images with 16 samples a pixel: several particles have to share pixels.
 #[test]
 fn coverage_adds_up_to_alpha_and_names_are_in_the_manifest() {
     let workshop = Workshop::new();
@@ -195,6 +196,7 @@ fn large_manifests_are_left_out() {
     assert!(layers["crypto_material"].manifest.is_some());
 }
 
+// Four images with 16 samples a pixel and many layers, one by each structure.
 #[test]
 fn layers_do_not_depend_on_threads_or_structures() {
     let workshop = Workshop::new();

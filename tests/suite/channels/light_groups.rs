@@ -90,6 +90,7 @@ fn layers_add_up_to_the_colour_before_denoising() {
     workshop.run(&["verify", "out"]).expect(0);
 }
 
+// Renders two jobs with all layers and four samples a pixel, one of them with a brighter light.
 #[test]
 fn brighter_lights_change_only_their_own_layer() {
     let (_, dim) = rendered(&manifest(1.0, 0.5, ""));
@@ -112,6 +113,7 @@ fn brighter_lights_change_only_their_own_layer() {
     }
 }
 
+// Starts the program four times: with the channel and without, before and after a change.
 #[test]
 fn groups_are_settings_of_jobs_with_their_channel() {
     let workshop = Workshop::new();

@@ -1,4 +1,6 @@
 //! Light channels add up to the colour, and light is in the channel of its first interaction.
+//!
+//! Each case is rendered twice, with light channels and without.
 
 use crate::harness::{Workshop, dam_break};
 use crate::picture::Picture;

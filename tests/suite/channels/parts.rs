@@ -1,4 +1,6 @@
 //! Files with two parts: colours and data with compressions of their own.
+//!
+//! Tests render three frames with twelve channels several times.
 
 use std::fs;
 

@@ -38,6 +38,7 @@ fn wait(running: &mut Running, moment: Moment, shop: &Workshop) -> bool {
     }
 }
 
+// Kills seven conversions: most of them have to come in time, at different moments.
 #[test]
 fn repeated_kills_give_the_uninterrupted_result() {
     let shop = Workshop::new();
@@ -91,6 +92,7 @@ fn large_frame() -> Workshop {
     shop
 }
 
+// Converts 40 frames for each signal: a shorter job could end before the signal comes.
 #[test]
 fn term_and_interrupt_exit_75_after_the_current_frame() {
     let shop = Workshop::new();
@@ -120,6 +122,7 @@ fn term_and_interrupt_exit_75_after_the_current_frame() {
     }
 }
 
+// A frame of a million particles takes long enough for two signals.
 #[test]
 fn a_second_term_stops_at_once() {
     let shop = large_frame();
@@ -147,6 +150,7 @@ fn a_second_term_stops_at_once() {
     assert!(ledger(&shop.join("out")).lines.is_empty());
 }
 
+// A frame of a million particles takes long enough for a second process to wait for it.
 #[test]
 fn second_process_takes_over_from_a_killed_one() {
     let shop = large_frame();

@@ -34,7 +34,7 @@ pub(super) fn spray() -> Still {
     }
 }
 
-/// All that the look sets.
+/// All that the look sets; most of the time goes into the light on the ground, which is part of it.
 pub(super) fn water() -> Still {
     Still {
         dam_break: Some(5),

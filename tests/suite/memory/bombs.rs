@@ -1,4 +1,6 @@
 //! A small file that becomes very large costs its own frame and no other, within little memory.
+//!
+//! Bombs unpack to some hundred megabytes: they have to be much larger than the memory that is allowed.
 
 use std::fs;
 use std::io::Write;
@@ -87,6 +89,7 @@ fn wide_rows(prefix: &str) -> String {
     format!("{prefix}{number} {number} {number}\n").repeat(400_000)
 }
 
+// Four formats of 80 MB of text or more: less would fit into the memory as a whole.
 #[test]
 fn compressed_text_is_streamed() {
     let count = 400_000;

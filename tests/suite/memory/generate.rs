@@ -19,6 +19,7 @@ fn within(workshop: &Workshop, mib: u32, arguments: &[&str]) -> Ran {
     Ran(output.expect("a shell"))
 }
 
+// Five million particles: many fewer would fit into the memory that is allowed.
 #[test]
 fn generates_frames_larger_than_memory() {
     let workshop = Workshop::new();

@@ -63,6 +63,7 @@ fn one_heavy_frame_costs_one_frame() {
     assert_eq!(ran.rendered(), [2]);
 }
 
+// Six images of 1280x720: two of them at once have to be too large for the limit.
 #[test]
 fn frames_run_one_at_a_time_if_two_do_not_fit() {
     let workshop = Workshop::new();
@@ -83,6 +84,7 @@ fn frames_run_one_at_a_time_if_two_do_not_fit() {
     assert_eq!(images(&workshop.join("free")), images(&workshop.join("tight")));
 }
 
+// Three jobs with smooth surfaces, each of which estimates a grid from the particles.
 #[test]
 fn grid_beyond_memory_is_rejected_with_its_radius() {
     let workshop = Workshop::new();

@@ -1,5 +1,8 @@
 //! What `check` predicts is what `render` takes: within 15 % and 2 MiB of the peak of anonymous memory, or for surfaces,
 //! spray, motion blur and meshes an upper bound within 25 %.
+//!
+//! A comparison runs `check` and `render` over three frames. They are large, because the tolerance hides what is wrong
+//! for small ones.
 
 use std::fmt::Write as _;
 use std::fs;

@@ -1,4 +1,6 @@
 //! The same command does nothing; another setting or input is refused by name.
+//!
+//! Tests start the program several times over five frames: for a job, and for what is done to it later.
 
 use std::fs;
 

@@ -1,4 +1,6 @@
 //! `--follow`: a simulation that writes while we render.
+//!
+//! Tests wait until files have settled (`--settle`), and until no more come (`--idle`).
 
 use std::fs;
 use std::path::Path;

@@ -117,6 +117,7 @@ fn a_frame_without_the_attribute_costs_one_frame() {
     assert_eq!(ran.rendered(), [1, 2]);
 }
 
+// Starts the program six times: each way to ask for frames, and all of them at once.
 #[test]
 fn frames_are_rendered_as_asked_for() {
     let workshop = Workshop::new();

@@ -18,6 +18,7 @@ const LONG: [&str; 10] = [
     "12",
 ];
 
+// Images take a while, so that the last inputs change before they are read; most are rendered three times.
 #[test]
 fn inputs_that_vanish_or_shrink_while_a_job_runs_cost_their_frames() {
     let workshop = Workshop::new();

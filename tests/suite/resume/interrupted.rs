@@ -31,6 +31,7 @@ fn interrupt(workshop: &Workshop, out: &str, signal: &str) -> bool {
     true
 }
 
+// 30 frames, rendered three times: a shorter job could end before the signal comes.
 #[test]
 fn term_and_interrupt_end_with_75_and_the_job_goes_on() {
     let workshop = Workshop::new();
@@ -134,6 +135,7 @@ fn a_frame_that_outlasts_the_grace_period_is_dropped() {
     }
 }
 
+// A job of 30 frames is started until a signal comes while a frame is in hand.
 #[test]
 fn a_frame_within_the_grace_period_is_finished() {
     let workshop = Workshop::new();
@@ -155,6 +157,7 @@ fn a_frame_within_the_grace_period_is_finished() {
     assert!(in_hand, "no signal came in time");
 }
 
+// Each refusal waits for the next heartbeat of the worker.
 #[test]
 fn a_job_is_not_changed_under_those_at_work() {
     let workshop = Workshop::new();

@@ -20,6 +20,7 @@ fn arguments<'a>(options: &[&'a str]) -> Vec<&'a str> {
     [&render[..], &SMALL, options].concat()
 }
 
+// Renders five frames twice, once with a process for each.
 #[test]
 fn the_images_are_the_same() {
     let workshop = Workshop::new();
@@ -34,6 +35,7 @@ fn the_images_are_the_same() {
     workshop.render(&[]).expect(0).prints("5 of 5 frames are done already");
 }
 
+// 6,000,000 positions are larger than the ceiling; in the end they are rendered without one.
 #[test]
 fn a_frame_beyond_the_ceiling_costs_one_frame() {
     let workshop = Workshop::new();
@@ -79,6 +81,7 @@ fn used_ticks(id: i64) -> Option<u64> {
 }
 
 #[cfg(target_os = "linux")]
+// Images take a while: eight processes are killed, each further in its work than the one before.
 #[test]
 fn a_killed_process_is_tried_again() {
     let workshop = Workshop::new();
@@ -118,6 +121,7 @@ fn a_damaged_frame_is_reported_by_its_own_reason_and_not_tried_again() {
     assert_eq!(ledger(&workshop.join("out")).lines.len(), 3);
 }
 
+// Images take a while, so that the signal comes before the last frame.
 #[test]
 fn term_ends_after_the_frame_in_hand() {
     let workshop = Workshop::new();

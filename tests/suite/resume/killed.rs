@@ -1,4 +1,6 @@
 //! SIGKILL at any moment loses at most the frames in progress, with one worker and with several.
+//!
+//! Fifty processes are killed in each test: moments such as that of writing an image come several times.
 
 use std::collections::BTreeMap;
 use std::fs;

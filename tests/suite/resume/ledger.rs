@@ -1,4 +1,6 @@
 //! A torn last line is dropped; any other damage is an error and never a fresh start.
+//!
+//! Tests start the program several times: for a job of three frames, and after each damage.
 
 use std::fs;
 

@@ -16,6 +16,7 @@ fn later_frames(workshop: &Workshop, dir: &str, from: usize) {
     dam_break(&workshop.join(dir), from..=6);
 }
 
+// Starts the program nine times: each other input with each option.
 #[test]
 fn another_simulation_does_not_join_a_job() {
     let workshop = Workshop::new();
@@ -146,6 +147,7 @@ fn a_conversion_belongs_to_one_input_too() {
         .prints("in: is the input; choose another directory for the native frames");
 }
 
+// Starts the program 28 times: each name of a file with each option.
 #[test]
 fn files_that_no_job_made_are_not_replaced() {
     let names = ["f.0002.exr", "f.0001.png", "report.html", "report.json"];

@@ -1,4 +1,6 @@
 //! Several workers on one job: each frame is rendered once, and the result is that of one worker.
+//!
+//! Tests render twelve frames by one worker first, and most of them all frames again by others.
 
 use std::fs;
 
@@ -70,6 +72,7 @@ fn ranges_of_one_manifest_leave_the_manifest_as_it_is() {
     assert!(images(&workshop.join("out")) == images(&workshop.join("whole")));
 }
 
+// The takeover comes after the other frames are rendered, so that frame 2 is the last.
 /// The liveness of a worker on another machine is known only from its heartbeats.
 #[test]
 fn frames_of_an_unresponsive_worker_are_taken_over() {
@@ -113,6 +116,7 @@ fn a_job_of_an_unresponsive_worker_starts_over() {
     assert!(images(&workshop.join("out")) == images(&workshop.join("whole")));
 }
 
+// Images take a while, so that the worker is still at work when its record is gone.
 /// The directory with the worker records may be removed while a worker is active.
 #[test]
 fn a_worker_that_was_declared_dead_stops_and_may_rejoin() {

@@ -28,6 +28,7 @@ fn any_number_of_threads_traces_the_same_paths() {
     same_on_any_threads(&STUDIO);
 }
 
+/// Renders three frames eight times: twice on each of four numbers of threads.
 fn same_on_any_threads(options: &[&str]) {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), [1, 5, 9]);

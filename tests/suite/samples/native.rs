@@ -152,6 +152,7 @@ fn verify_detects_damage_that_reading_does_not() {
     }
 }
 
+// Only frames of more than 4,000,000 particles are sampled.
 #[test]
 fn large_frames_are_sampled() {
     let shop = Workshop::new();

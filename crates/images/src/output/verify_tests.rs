@@ -168,6 +168,7 @@ fn end_of_header(bytes: &[u8]) -> usize {
     bytes.len() - lengths.sum::<usize>()
 }
 
+// Flips each bit of a file, and decodes the file each time.
 #[test]
 fn flipped_bits_that_change_a_pixel_are_detected() {
     let bytes = exr(&film(40, 37, Channels::ALL), Compression::Zip);
@@ -188,6 +189,7 @@ fn flipped_bits_that_change_a_pixel_are_detected() {
     assert!(missed * 100 < all, "{missed} of {all}");
 }
 
+// The file is cut at each of its bytes, since any may be the end of a part.
 #[test]
 fn truncated_files_are_detected_and_huge_sizes_allocate_nothing() {
     let bytes = exr(&film(40, 37, Channels::ALL), Compression::Piz);

@@ -136,6 +136,7 @@ fn assert_equals_reference(picture: &Picture, settings: &DenoiseSettings) {
     }
 }
 
+// The reference follows the formulas in double precision, one pair of pixels after another.
 #[test]
 fn the_result_is_that_of_the_formulas() {
     for (width, height, seed) in [

@@ -195,6 +195,7 @@ fn a_mesh_has_the_caustic_of_a_floor() {
     compare(&found, &expected, 0.0, 0.05, "mesh");
 }
 
+// Six images with 1,500,000 photons each: their noise has to be less than the tolerance.
 #[test]
 fn every_kind_of_light_makes_caustics() {
     // Lights as large and bright as a sun, seen from the scene

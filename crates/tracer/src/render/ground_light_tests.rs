@@ -151,6 +151,7 @@ fn without_particles_the_floor_is_lit_as_without_photons() {
     }
 }
 
+// 30,000 photons on one thread and on three: few photons would be those of one thread.
 #[test]
 fn photons_are_the_same_on_any_number_of_threads_and_can_be_stopped() {
     let mut scene = floor(white());

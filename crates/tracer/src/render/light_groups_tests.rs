@@ -1,4 +1,6 @@
 //! Light groups against images with the lights of one group only.
+//!
+//! Each case is rendered seven times: with all groups, without their layers, and with each of five groups alone.
 
 use std::sync::Arc;
 

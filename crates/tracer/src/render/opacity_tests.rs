@@ -63,6 +63,7 @@ fn mean(film: &Film, component: usize) -> f32 {
     film.color.iter().map(|pixel| pixel[component]).sum::<f32>() / film.color.len() as f32
 }
 
+// 18 images with 64 samples a pixel: their noise has to be less than the tolerance.
 #[test]
 fn layers_cover_what_they_leave_of_each_other() {
     for integrator in [IntegratorKind::Path, IntegratorKind::Whitted] {

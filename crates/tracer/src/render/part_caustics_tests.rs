@@ -71,6 +71,7 @@ fn blocks(film: &Film) -> Vec<f32> {
     (0..64).map(mean).collect()
 }
 
+// 1,000,000 photons, and paths with 1,024 samples a pixel: the noise of both has to be small.
 #[test]
 fn an_opaque_particle_has_the_caustic_of_path_tracing() {
     // A large sun at the zenith, as an environment that paths find, and as a light

@@ -202,6 +202,7 @@ fn with_tree(check: impl Fn(&dyn Shape, &[u32], &[Vec3])) {
     check(&SphereSurface::new(builder.tree().view()), &ids, &centers);
 }
 
+// 14 images: the ray of each pixel meets all spheres in f64.
 #[test]
 fn every_pixel_shows_the_sphere_that_its_ray_hits_in_f64() {
     with_tree(|tree, ids, centers| {

@@ -253,6 +253,7 @@ fn check_ray(scene: &Scene, tree: &TreeView, ray: &Ray, indexed: bool, level: Si
     true
 }
 
+// 13 scenes under all settings of all structures, by each instruction set; each ray meets every particle in f64.
 #[test]
 fn awkward_scenes_match_brute_force() {
     for settings in all_settings() {
@@ -269,6 +270,7 @@ fn tested_fused_levels() -> Vec<SimdLevel> {
     levels
 }
 
+// 2,000 rays at each of 13 scenes under all settings: rounding differs for few rays.
 #[test]
 fn fma_levels_agree_to_the_bit() {
     let fused = tested_fused_levels();
@@ -313,6 +315,7 @@ fn fused_kernels_of_all_processors_agree_to_the_bit() {
     }
 }
 
+// Large scenes under all settings, each built three times: work on small trees is not shared by threads.
 #[test]
 fn trees_do_not_depend_on_threads() {
     let lattice = (0..40_000)
@@ -333,6 +336,7 @@ fn trees_do_not_depend_on_threads() {
     }
 }
 
+// 70,000 particles, built three times: all threads work together on large sets only.
 /// Spheres are cut by all threads together.
 #[test]
 fn cuts_do_not_depend_on_threads() {
@@ -399,6 +403,7 @@ fn clipped_spheres_are_hit_once() {
     assert!(eager > usual && eager <= 9000, "{eager} with twice the budget");
 }
 
+// Only cells of more than 2^18 particles are sorted by all threads.
 #[test]
 fn a_crowded_cell_is_sorted_by_all_threads() {
     let mut centers = random_points(300_000, 8);
@@ -411,6 +416,7 @@ fn a_crowded_cell_is_sorted_by_all_threads() {
     }
 }
 
+// Four scenes of 40,000 particles under all settings, and 1,000 rays at each.
 /// Scenes that are too large for brute force: uniform, crowded, and on few planes, so that most coordinates equal
 /// many others.
 #[test]

@@ -253,6 +253,7 @@ fn values_agree(every: usize) {
     assert!(differ.is_empty(), "{}", differ.join("\n"));
 }
 
+// More than 100 values, and every eighth word of the schema, are read and validated for each key.
 #[test]
 fn schema_and_reader_accept_the_same_values() {
     values_agree(8);

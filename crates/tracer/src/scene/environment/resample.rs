@@ -152,6 +152,7 @@ mod tests {
         }
     }
 
+    // Twelve maps are resampled as a whole: a pixel may lose power at a pole or an edge.
     #[test]
     fn single_pixels_keep_their_power() {
         for side in [128_usize, 256] {

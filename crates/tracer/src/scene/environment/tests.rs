@@ -1,3 +1,6 @@
+//! Environments against integrals and single values. Each environment takes a while to make, as its map is resampled
+//! whatever its size; tests need several.
+
 use std::f32::consts::PI;
 
 use super::*;

@@ -160,6 +160,7 @@ fn probe(rod: &Rod, caps: Caps, point: DVec3) -> f64 {
     }
 }
 
+// 1,800 rods: brute force searches for the interval of each by halving, in f64.
 #[test]
 fn one_rod_is_that_of_brute_force() {
     for (caps, seed) in [(Caps::Round, 1), (Caps::Flat, 2), (Caps::Open, 3)] {

@@ -172,6 +172,7 @@ mod tests {
         assert!((0.9..1.15).contains(&building), "{building}: {predicted:?} {report:?}");
     }
 
+    // Builds ten grids of up to 50,000 particles, to compare each with its estimate.
     #[test]
     fn estimate_matches_calm_and_splashing_particles() {
         let smooth = SurfaceSettings { kind: SurfaceKind::Smooth, ..SurfaceSettings::DEFAULT };

@@ -175,6 +175,7 @@ fn rays_enter_and_leave_in_pairs() {
     }
 }
 
+// 150,000 rays through each of two grids: few rays meet the cases that are difficult.
 #[test]
 fn many_rays_enter_and_leave_in_pairs() {
     check_pairs(150_000);

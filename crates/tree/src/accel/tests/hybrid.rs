@@ -110,6 +110,7 @@ fn points_are_hit_as_by_single_rays() {
     }
 }
 
+// 13 scenes under all settings, by each instruction set; each ray meets every particle in f64.
 /// Incoherent packets with rays that are far apart.
 #[test]
 fn incoherent_packets_match_brute_force() {

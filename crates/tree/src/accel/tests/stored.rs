@@ -1,4 +1,6 @@
 //! Trees over stored leaves against brute force over the same data, and trees over damaged leaves.
+//!
+//! Each count is tried with all encodings of positions and radii, five arrangements, and all instruction sets.
 
 use std::borrow::Borrow;
 
