@@ -244,19 +244,19 @@ fn splash(path: &Path, count: usize) {
 fn smooth_surfaces_are_predicted_from_the_survey() {
     let smooth = ["--surface", "smooth", "--radius", "0.01"];
     let plain = [&SMALL[..], &smooth].concat();
-    compare_bound("npy", |path| block(path, 100_000), &plain);
+    compare_bound("npy", |path| block(path, 50_000), &plain);
     let attributes = [&SMALL[..4], &smooth].concat();
-    compare_bound("npy", |path| block(path, 100_000), &attributes);
-    compare_bound("npy", |path| splash(path, 20_000), &plain);
+    compare_bound("npy", |path| block(path, 50_000), &attributes);
+    compare_bound("npy", |path| splash(path, 8_000), &plain);
     let fine = [&plain[..], &["--set", "surface.voxel=0.7"]].concat();
-    compare_bound("npy", |path| splash(path, 20_000), &fine);
+    compare_bound("npy", |path| splash(path, 8_000), &fine);
 }
 
 #[test]
 fn spray_is_predicted_from_the_survey() {
     let spray = ["--look", "water", "--radius", "0.01"];
     let options = [&SMALL[..], &spray].concat();
-    compare_bound("npy", |path| splash(path, 40_000), &options);
+    compare_bound("npy", |path| splash(path, 15_000), &options);
 }
 
 #[test]
@@ -265,7 +265,7 @@ fn frames_of_spray_alone_are_predicted() {
     let spray = ["--set", "surface.spray=true", "--radius", "0.0001"];
     for look in [["--surface", "smooth"], ["--look", "water"]] {
         let options = [&SMALL[..], &look, &spray].concat();
-        compare_bound("npy", |path| block(path, 30_000), &options);
+        compare_bound("npy", |path| block(path, 20_000), &options);
     }
 }
 
