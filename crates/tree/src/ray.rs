@@ -2,6 +2,8 @@
 
 use glam::Vec3;
 
+use crate::math::{first_lanes, lanes_in};
+
 /// A ray with a half-open range of distances. Lengths are in scene units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
@@ -87,6 +89,14 @@ impl RayPacket {
     pub fn set_len(&mut self, len: usize) {
         debug_assert!(len <= PACKET_SIZE);
         self.len = len;
+    }
+
+    /// Disables all rays but those of `lanes`: rays that end before they start hit nothing.
+    #[inline(always)]
+    pub fn keep_only(&mut self, lanes: u32) {
+        for lane in lanes_in(!lanes & first_lanes(self.len)) {
+            self.t_max[lane] = -1.0;
+        }
     }
 
     /// Prepares an empty packet for rays that are added component by component: all lanes get an unbounded range.

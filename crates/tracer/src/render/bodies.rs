@@ -11,7 +11,7 @@ use glam::Vec3;
 use super::body_set::{AIR, BodySet, MAX_TRANSMISSIVE_BODIES};
 use crate::scene::{Material, Scene};
 use crate::surface::{Intersections, MaterialId, Shape, Side};
-use spherule_tree::math::{LANES, lanes_in};
+use spherule_tree::math::{LANES, lanes_in, lanes_where};
 
 /// Marks materials that are not of a body.
 const NO_BODY: u8 = u8::MAX;
@@ -106,7 +106,7 @@ impl<'a> TransmissiveBodies<'a> {
     /// The lanes of intersections with the bodies.
     pub(super) fn lanes_of(&self, hits: &Intersections) -> u32 {
         let is_body = |lane: usize| self.with_material(hits.material[lane]).is_some();
-        lanes_in(hits.mask).fold(0, |lanes, lane| lanes | u32::from(is_body(lane)) << lane)
+        lanes_in(hits.mask).mask_where(is_body)
     }
 
     /// The bodies that `point` is inside.
@@ -144,7 +144,7 @@ impl<'a> TransmissiveBodies<'a> {
             let body = self.with_material(hits.material[lane]);
             body.is_some_and(|body| self.boundary(body, sets[lane]).is_none())
         };
-        lanes_in(lanes).fold(0, |found, lane| found | u32::from(is_straight(lane)) << lane)
+        lanes_in(lanes).mask_where(is_straight)
     }
 
     /// The media that the surface of `body` separates where a ray meets it that is inside the bodies of `set`. None if they
@@ -187,12 +187,12 @@ impl<'a> TransmissiveBodies<'a> {
 
 /// The lanes whose rays are inside `body`.
 pub(super) fn lanes_inside(body: usize, sets: &[BodySet; LANES]) -> u32 {
-    (0..LANES).fold(0, |lanes, lane| lanes | u32::from(sets[lane].contains(body)) << lane)
+    lanes_where(|lane| sets[lane].contains(body))
 }
 
 /// The lanes whose rays are inside any body.
 pub(super) fn lanes_inside_any(sets: &[BodySet; LANES]) -> u32 {
-    (0..LANES).fold(0, |lanes, lane| lanes | u32::from(!sets[lane].is_empty()) << lane)
+    lanes_where(|lane| !sets[lane].is_empty())
 }
 
 /// The media of `lanes`, apart from air, each with its lanes.
@@ -202,8 +202,7 @@ pub(super) fn media_of(
 ) -> impl Iterator<Item = (usize, u32)> + use<> {
     let media = sets.map(BodySet::medium);
     (0..AIR).filter_map(move |medium| {
-        let is_in = |lane: usize| u32::from(media[lane] == medium) << lane;
-        let found = lanes_in(lanes).fold(0, |found, lane| found | is_in(lane));
+        let found = lanes_in(lanes).mask_where(|lane| media[lane] == medium);
         (found != 0).then_some((medium, found))
     })
 }

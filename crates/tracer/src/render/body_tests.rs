@@ -50,7 +50,7 @@ fn with_loss(color: Vec3, length: f32) -> Material {
 }
 
 /// An infinite grey ground.
-fn floor(height: f32) -> Ground {
+pub(super) fn floor(height: f32) -> Ground {
     Ground {
         up: Vec3::Z,
         height,
@@ -87,7 +87,7 @@ fn radiance_at(
 }
 
 /// The centre of the film, with every ray traced.
-fn middle_of(shapes: &[&dyn Shape], scene: &Scene, max_depth: u32) -> (Vec3, RayCounts) {
+pub(super) fn middle_of(shapes: &[&dyn Shape], scene: &Scene, max_depth: u32) -> (Vec3, RayCounts) {
     let films = [Vec2::splat(0.5)];
     let (colors, counts) = radiance_at(&films, 0.0, shapes, scene, &depth(max_depth));
     (colors[0], counts)

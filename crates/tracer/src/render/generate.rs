@@ -179,9 +179,10 @@ impl RenderContext<'_> {
     fn lanes_inside(&self, rays: &RayPacket) -> u32 {
         let lanes = first_lanes(rays.len());
         match (self.cameras.now.has_one_origin(), self.shapes.particles) {
-            (false, Some(body)) if self.shapes.interior == Interior::Body => lanes_in(lanes)
-                .filter(|lane| body.side_of(lane3(&rays.origin, *lane)) == Side::Inside)
-                .fold(0, |inside, lane| inside | 1 << lane),
+            (false, Some(body)) if self.shapes.interior == Interior::Body => {
+                let is_inside = |lane| body.side_of(lane3(&rays.origin, lane)) == Side::Inside;
+                lanes_in(lanes).mask_where(is_inside)
+            }
             _ if self.is_camera_inside => lanes,
             _ => 0,
         }

@@ -19,7 +19,7 @@ use super::{
 use crate::surface::{Intersections, MaterialId};
 use spherule_tree::accel::Coherence;
 use spherule_tree::math::functions::exp;
-use spherule_tree::math::{LANES, Lanes, first_lanes, lanes_in, splat};
+use spherule_tree::math::{LANES, Lanes, lanes_in, splat};
 use spherule_tree::ray::RayPacket;
 
 /// Maximum number of surfaces between equal media that a ray passes before its intersection.
@@ -86,15 +86,12 @@ impl RenderContext<'_> {
                 return;
             }
             // Continue the rays that pass, and end all others
-            for lane in lanes_in(first_lanes(LANES) & !passing) {
-                remaining.t_max[lane] = -1.0;
-            }
+            remaining.keep_only(passing);
+            hits.continue_rays(&mut remaining, passing, &far);
             for lane in lanes_in(passing) {
                 let body = nested.crossed_at(hits, lane);
                 straight.push(StraightCrossing { lane, t: hits.t[lane], body });
                 sets[lane] = sets[lane].across(body);
-                remaining.t_min[lane] = hits.t[lane] + hits.offset[lane];
-                remaining.t_max[lane] = far[lane];
             }
             // Find their next intersections
             hits.mask &= !passing;

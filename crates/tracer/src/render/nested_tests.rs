@@ -2,10 +2,10 @@
 
 use std::sync::atomic::AtomicBool;
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec3};
 
 use super::{
-    integrator::testing,
+    body_tests::{floor, middle_of},
     path_tests::{settings as path_settings, statistics, white},
     solid::Solid,
     *,
@@ -64,32 +64,10 @@ fn slabs(heights: &[[f32; 2]]) -> Vec<Box<dyn Shape>> {
     solids(heights.iter().map(|[low, high]| Solid::slab(*low, *high)))
 }
 
-fn floor(height: f32) -> Ground {
-    Ground {
-        up: Vec3::Z,
-        height,
-        color: Vec3::splat(0.5),
-        center: Vec3::Z * height,
-        base: Vec3::ZERO,
-        fade_start: 1e4,
-        fade_end: 2e4,
-        pattern: ground::Pattern::Plain,
-        shadow_catcher: None,
-    }
-}
-
 /// What Whitted's model sees in the middle of the film, with every ray traced.
 fn middle(shapes: &[Box<dyn Shape + '_>], scene: &Scene, max_depth: u32) -> (Vec3, RayCounts) {
-    let settings = RenderSettings { max_depth, ..RenderSettings::new(1, 1) };
-    let source = ParticleShading::constant(Vec3::ONE);
-    let plane = scene.ground.as_ref().map(Plane::new);
-    let ground = plane.iter().map(|plane| plane as &dyn Shape);
-    let shapes = ground.chain(shapes.iter().map(|shape| &**shape)).collect();
-    let mut integrator =
-        WhittedIntegrator::new(RenderContext::new(shapes, scene, &source, &settings));
-    integrator.split.least = 0.0;
-    let (colors, counts) = testing::radiance_at(&integrator, &[Vec2::splat(0.5)]);
-    (colors[0], counts)
+    let shapes: Vec<&dyn Shape> = shapes.iter().map(|shape| &**shape).collect();
+    middle_of(&shapes, scene, max_depth)
 }
 
 fn film(shapes: &[Box<dyn Shape + '_>], scene: &Scene, settings: &RenderSettings) -> Film {

@@ -1,6 +1,7 @@
 //! Shapes that the camera does not see as opaque surfaces: thin panes of glass, and holdouts.
 //!
-//! Panes are meshes, each surface of which stands for both sides of a wall, or connected bodies, whose surface is one side.
+//! A pane is a mesh or a connected body. A surface of a mesh stands for a whole wall, with both of its sides; the surface of
+//! a body is one side of a wall.
 //! Rays pass panes in a straight line, so a pane is no intersection: [`RenderContext::pass_panes`] multiplies the
 //! throughput, and the data of a pixel are those of what is behind. In path tracing, a ray is reflected instead with
 //! the probability of its reflectance, and its intersection is the pane. Shadow rays pass panes, too, so light sources
@@ -21,7 +22,7 @@ use crate::scene::material::{pane_reflectance, surface_reflectance};
 use crate::surface::{Intersection, Intersections, MaterialId, Shape, Side};
 use glam::Vec3;
 use spherule_tree::accel::Coherence;
-use spherule_tree::math::{first_lanes, lane3, lanes_in, set_lane3, splat};
+use spherule_tree::math::{lane3, lanes_in, set_lane3, splat};
 use spherule_tree::ray::RayPacket;
 
 /// Maximum number of panes in a scene, and along a ray; further ones are not there.
@@ -42,7 +43,7 @@ impl RenderContext<'_> {
     /// equal distances, the first pane in the scene comes first.
     fn walk_panes(
         &self,
-        rays: &RayPacket,
+        mut rays: RayPacket,
         lanes: u32,
         coherence: Coherence,
         mut visit: impl FnMut(usize, PaneCrossing) -> bool,
@@ -51,18 +52,16 @@ impl RenderContext<'_> {
         // The lanes that are inside panes that are connected bodies
         let mut inside = [0; MAX_PANES];
         for (inside, pane) in inside.iter_mut().zip(panes).filter(|(_, p)| p.is_connected()) {
-            *inside = lanes_inside(*pane, rays, lanes);
+            *inside = lanes_inside(*pane, &rays, lanes);
         }
-        let mut rest = *rays;
+        let far = rays.t_max;
         let mut alive = lanes;
         let mut hits = Intersections::default();
         for _ in 0..MAX_PANES {
-            for lane in lanes_in(!alive & first_lanes(rays.len())) {
-                rest.t_max[lane] = -1.0;
-            }
+            rays.keep_only(alive);
             hits.clear();
             for (pane, inside) in panes.iter().zip(&inside) {
-                pane.intersect(&mut rest, coherence, inside & alive, &mut hits);
+                pane.intersect(&mut rays, coherence, inside & alive, &mut hits);
             }
             alive &= hits.mask;
             for lane in lanes_in(alive) {
@@ -81,16 +80,14 @@ impl RenderContext<'_> {
                 };
                 let color = self.scene.material(material).color.unwrap_or(Vec3::ONE);
                 let transmittance = (1.0 - reflectance) * color;
-                if visit(lane, PaneCrossing { hit, material, reflectance, transmittance }) {
-                    rest.t_min[lane] = hit.t + hit.offset;
-                    rest.t_max[lane] = rays.t_max[lane];
-                } else {
+                if !visit(lane, PaneCrossing { hit, material, reflectance, transmittance }) {
                     alive &= !(1 << lane);
                 }
             }
             if alive == 0 {
                 break;
             }
+            hits.continue_rays(&mut rays, alive, &far);
         }
     }
 
@@ -115,8 +112,7 @@ impl RenderContext<'_> {
         packet.first_pane = splat(f32::INFINITY);
         packet.behind.clear();
         // Follow the rays from pane to pane
-        let rays = segments.rays;
-        self.walk_panes(&rays, segments.lanes(), coherence, |lane, pane| {
+        self.walk_panes(segments.rays, segments.lanes(), coherence, |lane, pane| {
             // The pane takes some of the light, or is the intersection of the path
             packet.first_pane[lane] = packet.first_pane[lane].min(pane.hit.t);
             let mut throughput = lane3(&packet.throughput, lane);
@@ -164,7 +160,7 @@ impl RenderContext<'_> {
             return;
         }
         let radiance = &mut samples.radiance;
-        self.walk_panes(&samples.rays, samples.lanes, coherence, |lane, pane| {
+        self.walk_panes(samples.rays, samples.lanes, coherence, |lane, pane| {
             set_lane3(radiance, lane, lane3(radiance, lane) * pane.transmittance);
             true
         });
@@ -187,7 +183,7 @@ impl RenderContext<'_> {
     /// The lanes of intersections with a material for which `holds`.
     fn lanes_where(&self, hits: &Intersections, holds: impl Fn(&Material) -> bool) -> u32 {
         let is_found = |lane: usize| holds(self.scene.material(hits.material[lane]));
-        lanes_in(hits.mask).fold(0, |lanes, lane| lanes | u32::from(is_found(lane)) << lane)
+        lanes_in(hits.mask).mask_where(is_found)
     }
 
     /// Reflects the rays of `lanes` at the panes where they end. Rays of `last` are only prepared in
@@ -228,7 +224,7 @@ fn lanes_inside(body: &dyn Shape, rays: &RayPacket, lanes: u32) -> u32 {
         let ray = rays.ray(lane);
         body.side_of(ray.at(ray.t_min)) == Side::Inside
     };
-    lanes_in(lanes).filter(|lane| is_inside(*lane)).fold(0, |inside, lane| inside | 1 << lane)
+    lanes_in(lanes).mask_where(is_inside)
 }
 
 impl PaneCrossing {

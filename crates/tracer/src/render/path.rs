@@ -33,7 +33,7 @@ use super::{
 use crate::scene::Environment;
 use crate::surface::MaterialId;
 use glam::Vec3;
-use spherule_tree::math::{LANES, Lanes3, lane3, lanes_in, set_lane3, splat};
+use spherule_tree::math::{LANES, Lanes3, lane3, lanes_in, lanes_where, set_lane3, splat};
 
 mod ambient;
 mod catcher;
@@ -214,11 +214,6 @@ impl Occlusion {
             None => Self::of(light),
         }
     }
-}
-
-/// Bit mask of the lanes for which `holds`.
-fn lanes_where(holds: impl Fn(usize) -> bool) -> u32 {
-    (0..LANES).fold(0, |lanes, lane| lanes | u32::from(holds(lane)) << lane)
 }
 
 /// Dimension of the samples of a light source.

@@ -148,17 +148,7 @@ pub(super) fn floor_from_above(environment: Environment, color: Vec3) -> Scene {
     };
     Scene {
         camera: Camera::new(&view, 1.0, DVec3::ZERO).unwrap(),
-        ground: Some(Ground {
-            up: Vec3::Z,
-            height: 0.0,
-            color,
-            center: Vec3::ZERO,
-            base: Vec3::ZERO,
-            fade_start: 1e4,
-            fade_end: 2e4,
-            pattern: crate::scene::ground::Pattern::Plain,
-            shadow_catcher: None,
-        }),
+        ground: Some(Ground { color, ..body_tests::floor(0.0) }),
         particles: [Vec3::splat(-2.0), Vec3::splat(2.0)],
         ..scene(environment)
     }

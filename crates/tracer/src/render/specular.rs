@@ -76,8 +76,7 @@ impl RenderContext<'_> {
                 continue;
             }
             // Append the rays with a weight to their stream
-            let has_weight = |l: usize| u32::from(rays.weight[l] > 0.0) << l;
-            let lanes = lanes_in(hits.lanes).fold(0, |lanes, lane| lanes | has_weight(lane));
+            let lanes = lanes_in(hits.lanes).mask_where(|lane| rays.weight[lane] > 0.0);
             scale(self.simd, throughput, &rays.weight, &mut rays.throughput);
             // Rays that are not traced see what is far away
             if lanes & last != 0 {

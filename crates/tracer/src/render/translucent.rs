@@ -1,8 +1,9 @@
 //! Spheres and grains that are not fully opaque: each one covers a part of what is behind it, its opacity.
 //!
-//! Grains are spheres here, whose entries are found one after the other. A ray that enters a sphere ends there with the probability of the opacity, or else passes the whole sphere in a
-//! straight line, as it passes soft spray (stochastic transparency, Enderton et al. 2010). So the order of spheres does
-//! not matter, and the expected coverage of several is `1 - (1 - a) (1 - b) ...`. Shadow rays are attenuated by all
+//! Grains are spheres here, whose entries are found one after the other. A ray that enters a sphere ends there with the
+//! probability of the opacity, or else passes the whole sphere in a straight line, as it passes soft spray (stochastic
+//! transparency, Enderton et al. 2010). So the order of spheres does not matter, and the expected coverage of several is
+//! `1 - (1 - a) (1 - b) ...`. Shadow rays are attenuated by all
 //! spheres that they enter. A sphere in which a ray starts does not count.
 
 use super::{

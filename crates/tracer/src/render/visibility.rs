@@ -19,7 +19,7 @@ use super::{
 };
 use crate::surface::{Intersections, MaterialId, Shape};
 use spherule_tree::accel::Coherence;
-use spherule_tree::math::{LANES, Lanes, Lanes3, first_lanes, lane3, lanes_in, splat};
+use spherule_tree::math::{LANES, Lanes, Lanes3, lane3, lanes_in, splat};
 use spherule_tree::ray::RayPacket;
 
 /// Maximum number of crossings of one body along a shadow ray.
@@ -134,8 +134,7 @@ impl RenderContext<'_> {
         transmittance[1] = transmittance[0];
         transmittance[2] = transmittance[0];
         // Find the lanes with some light left
-        let is_reached = |lane: usize| u32::from(transmittance[0][lane] > 0.0) << lane;
-        lanes_in(samples.lanes).fold(0, |reached, lane| reached | is_reached(lane))
+        lanes_in(samples.lanes).mask_where(|lane| transmittance[0][lane] > 0.0)
     }
 
     /// The transmittance of one connected body, crossing after crossing for all rays at once; rays of `inside` start
@@ -156,9 +155,7 @@ impl RenderContext<'_> {
         let mut from = rays.t_min;
         for _ in 0..MAX_CROSSINGS {
             // Find the next crossing of each ray
-            for lane in lanes_in(!alive & first_lanes(rays.len())) {
-                remaining.t_max[lane] = -1.0;
-            }
+            remaining.keep_only(alive);
             hits.clear();
             body.intersect(&mut remaining, coherence, inside & alive, hits);
             let crossing = hits.mask & alive;
@@ -178,10 +175,9 @@ impl RenderContext<'_> {
             }
 
             // Continue beyond the crossing
+            hits.continue_rays(&mut remaining, alive, &rays.t_max);
             for lane in lanes_in(alive) {
                 from[lane] = hits.t[lane];
-                remaining.t_min[lane] = hits.t[lane] + hits.offset[lane];
-                remaining.t_max[lane] = rays.t_max[lane];
             }
             inside ^= alive;
             coherence = Coherence::Incoherent;
@@ -208,9 +204,7 @@ impl RenderContext<'_> {
         let mut from = rays.t_min;
         for _ in 0..MAX_CROSSINGS {
             // Find the next crossing of each ray
-            for lane in lanes_in(!alive & first_lanes(rays.len())) {
-                remaining.t_max[lane] = -1.0;
-            }
+            remaining.keep_only(alive);
             hits.clear();
             for (index, body) in nested.all().iter().enumerate() {
                 let inside = alive & lanes_inside(index, &sets);
@@ -235,10 +229,9 @@ impl RenderContext<'_> {
             }
 
             // Continue beyond the crossing
+            hits.continue_rays(&mut remaining, alive, &rays.t_max);
             for lane in lanes_in(alive) {
                 from[lane] = hits.t[lane];
-                remaining.t_min[lane] = hits.t[lane] + hits.offset[lane];
-                remaining.t_max[lane] = rays.t_max[lane];
                 sets[lane] = sets[lane].across(nested.crossed_at(hits, lane));
             }
         }
@@ -267,8 +260,7 @@ impl RenderContext<'_> {
 
 /// Those of `lanes` in which almost no light is left.
 fn dark_lanes(lanes: u32, transmittance: &Lanes3) -> u32 {
-    let is_dark = |lane| lane3(transmittance, lane).max_element() < MIN_TRANSMITTANCE;
-    lanes_in(lanes).fold(0, |dark, lane| dark | u32::from(is_dark(lane)) << lane)
+    lanes_in(lanes).mask_where(|lane| lane3(transmittance, lane).max_element() < MIN_TRANSMITTANCE)
 }
 
 /// Lengths of the segments of `lanes` inside a body, `from` the previous crossing to the next one in `crossing`, or

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use crate::scene::MaterialId;
-use spherule_tree::math::{Lanes, Lanes3, lane3, set_lane3, splat};
+use spherule_tree::math::{Lanes, Lanes3, lane3, lanes_in, set_lane3, splat};
 use spherule_tree::ray::{PACKET_SIZE, RayPacket};
 
 /// The intersection of one ray with a surface.
@@ -156,6 +156,14 @@ impl Intersections {
             rest &= !found;
             Some((materials[first], found))
         })
+    }
+
+    /// Lets `rays` of `lanes` go on behind their intersections, to their ends `far`.
+    pub(crate) fn continue_rays(&self, rays: &mut RayPacket, lanes: u32, far: &Lanes) {
+        for lane in lanes_in(lanes) {
+            rays.t_min[lane] = self.t[lane] + self.offset[lane];
+            rays.t_max[lane] = far[lane];
+        }
     }
 
     /// The lanes of `material`.

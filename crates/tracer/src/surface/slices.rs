@@ -70,12 +70,10 @@ pub(crate) fn slice_at(time: f32, count: usize) -> usize {
     slice.min(count.saturating_sub(1))
 }
 
-/// `rays` with all rays but those of `lanes` disabled: rays that end before they start hit nothing.
+/// `rays` with all rays but those of `lanes` disabled.
 fn only(rays: &RayPacket, lanes: u32) -> RayPacket {
     let mut rest = *rays;
-    for lane in lanes_in(!lanes & first_lanes(rays.len())) {
-        rest.t_max[lane] = -1.0;
-    }
+    rest.keep_only(lanes);
     rest
 }
 

@@ -140,11 +140,8 @@ impl Shape for SphereSurface<'_> {
         if lanes == first_lanes(rays.len()) {
             return self.tree.occluded_lanes(rays, coherence);
         }
-        // Disable the other rays: rays that end before they start hit nothing.
         let mut rest = *rays;
-        for lane in lanes_in(!lanes & first_lanes(rays.len())) {
-            rest.t_max[lane] = -1.0;
-        }
+        rest.keep_only(lanes);
         self.tree.occluded_lanes(&rest, coherence)
     }
 

@@ -97,6 +97,20 @@ pub const fn lanes_in(mask: u32) -> LanesIn {
 #[derive(Debug, Clone, Copy)]
 pub struct LanesIn(u32);
 
+impl LanesIn {
+    /// The mask of those lanes for which `holds`.
+    #[inline(always)]
+    pub fn mask_where(self, holds: impl Fn(usize) -> bool) -> u32 {
+        self.fold(0, |mask, lane| mask | u32::from(holds(lane)) << lane)
+    }
+}
+
+/// The mask of those of all lanes for which `holds`.
+#[inline(always)]
+pub fn lanes_where(holds: impl Fn(usize) -> bool) -> u32 {
+    (0..LANES).fold(0, |mask, lane| mask | u32::from(holds(lane)) << lane)
+}
+
 impl Iterator for LanesIn {
     type Item = usize;
 

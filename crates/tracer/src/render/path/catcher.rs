@@ -12,14 +12,14 @@ use std::f32::consts::FRAC_1_PI;
 
 use glam::Vec3;
 
-use super::{Occlusion, PathIntegrator, Surface, lanes_where};
+use super::{Occlusion, PathIntegrator, Surface};
 use crate::render::{
     bsdf::surface_points, dimensions::ENVIRONMENT, lights::sample_directions,
     sampler::get_2d_lanes, scratch::PacketScratch,
 };
 use crate::scene::Scene;
 use crate::scene::environment::{EnvironmentTable, LUMINANCE};
-use spherule_tree::math::{LANES, Lanes3, lane3, lanes_in, set_lane3, splat, splat3};
+use spherule_tree::math::{LANES, Lanes3, lane3, lanes_in, lanes_where, set_lane3, splat, splat3};
 use spherule_tree::ray::RayPacket;
 
 /// A shadow catcher and its light.

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{PathIntegrator, lanes_where};
+use super::PathIntegrator;
 use crate::render::{
     light_groups::NO_GROUP,
     lights::{Emission, environment_along},
@@ -11,7 +11,7 @@ use crate::render::{
     stream::SegmentPacket,
 };
 use crate::surface::MaterialId;
-use spherule_tree::math::{LANES, Lanes, lane3, lanes_in, set_lane3, splat};
+use spherule_tree::math::{LANES, Lanes, lane3, lanes_in, lanes_where, set_lane3, splat};
 
 impl PathIntegrator<'_> {
     /// Adds the radiance of lights that rays hit: of rays sampled from a BSDF, weighted against the sampling of the

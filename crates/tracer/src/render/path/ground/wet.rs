@@ -8,7 +8,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::super::{Occlusion, PathIntegrator, Surface, lanes_where};
+use super::super::{Occlusion, PathIntegrator, Surface};
 use super::{Map, Square};
 use crate::render::{
     dimensions::WET, layers::LightClass, sampler::get_2d_lanes, scratch::PacketScratch,
@@ -17,7 +17,7 @@ use crate::render::{
 use crate::scene::WetGround;
 use crate::scene::material::{dielectric, schlick};
 use crate::surface::{Shape, Side};
-use spherule_tree::math::{Lanes, lane3, lanes_in, set_lane3, splat};
+use spherule_tree::math::{Lanes, lane3, lanes_in, lanes_where, set_lane3, splat};
 use spherule_tree::ray::Ray;
 
 /// Texels along an edge of the map.
