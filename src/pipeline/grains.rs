@@ -112,11 +112,15 @@ fn columns_of(
 }
 
 impl GrainRules {
+    /// Whether the style says how large they are.
+    fn is_sized(&self) -> bool {
+        self.size.is_some() || self.names.sizes.is_some()
+    }
+
     /// Whether the file may say which shape they have.
     fn is_open(&self) -> bool {
-        let is_sized = self.size.is_some() || self.names.sizes.is_some();
         let has_exponents = self.exponents.is_some() || self.names.exponents.is_some();
-        self.kind.is_none() && self.mesh.is_none() && !is_sized && !has_exponents
+        self.kind.is_none() && self.mesh.is_none() && !self.is_sized() && !has_exponents
     }
 
     /// Semi-axes of all grains, or factors on their mesh.
@@ -226,8 +230,7 @@ const USUAL_RATIO: f64 = 50.0;
 
 /// A note if the mesh of a style without a size is much larger or smaller than the particles.
 pub(super) fn unit_note(style: &str, rules: &GrainRules, radius: &Radius) -> Option<String> {
-    let is_sized = rules.size.is_some() || rules.names.sizes.is_some();
-    let mesh = rules.mesh.as_ref().filter(|_| !is_sized)?;
+    let mesh = rules.mesh.as_ref().filter(|_| !rules.is_sized())?;
     let radius = match radius {
         Radius::Common(radius) => *radius,
         Radius::PerParticle(radii) => *radii.first()?,

@@ -60,10 +60,6 @@ impl Looks<'_> {
                 break;
             };
             let setting = style.colors(&self.manifest.material.color);
-            if style.is_thin_glass() && matches!(style.color, ColorSetting::Mapped(_)) {
-                let what = "thin glass has one colour; set `red, green, blue` or a name".to_owned();
-                return Err(ResolveError::Unsupported { key: "style.color", what });
-            }
             let range = self.survey.styles.get(index).and_then(Option::as_ref);
             let color = color::rule(&setting, range, self.survey, Some(self.camera))?;
             let (radius, radius_factor) = self.radius(style)?;

@@ -8,6 +8,7 @@ use spherule_tracer::surface::SurfaceKind;
 use super::bonds::BondSearch;
 use super::camera::ProjectionKind;
 use super::channel::Channel;
+use super::color::ColorSetting;
 use super::keys::Keys;
 use super::overlay::{Overlay, OverlayKind};
 use super::problem::{Problem, Problems};
@@ -129,8 +130,14 @@ impl Manifest {
         self.check_styles(root);
     }
 
-    /// Checks that several clear kinds of particles are bodies, and not too many.
+    /// Checks that thin glass has one colour, and that several clear kinds of particles are bodies, and not too many.
     fn check_styles(&self, root: &mut Section<'_>) {
+        for (number, style) in self.styles.iter().enumerate() {
+            if style.is_thin_glass() && matches!(style.color, ColorSetting::Mapped(_)) {
+                let what = "thin glass has one colour; set [red, green, blue] or a name";
+                root.wrong(&format!("style.{number}.color"), what);
+            }
+        }
         // List the clear ones: the key that makes each clear, and the one by which it becomes a body
         let of_rest = (self.material.is_clear()).then(|| {
             let is_body = self.surface.kind != SurfaceKind::Spheres;

@@ -84,7 +84,7 @@ fn frames_run_one_at_a_time_if_two_do_not_fit() {
     assert_eq!(images(&workshop.join("free")), images(&workshop.join("tight")));
 }
 
-// Three jobs with smooth surfaces, each of which estimates a grid from the particles.
+// Three jobs with smooth surfaces. Each estimates the size of its grid from the particles.
 #[test]
 fn grid_beyond_memory_is_rejected_with_its_radius() {
     let workshop = Workshop::new();

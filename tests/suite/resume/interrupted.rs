@@ -135,7 +135,7 @@ fn a_frame_that_outlasts_the_grace_period_is_dropped() {
     }
 }
 
-// A job of 30 frames is started until a signal comes while a frame is in hand.
+// Starts a job of 30 frames again until a signal arrives while a frame is being rendered.
 #[test]
 fn a_frame_within_the_grace_period_is_finished() {
     let workshop = Workshop::new();
