@@ -2,8 +2,6 @@
 
 use glam::Vec3;
 
-use crate::math::{first_lanes, lanes_in};
-
 /// A ray with a half-open range of distances. Lengths are in scene units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
@@ -94,8 +92,10 @@ impl RayPacket {
     /// Disables all rays but those of `lanes`: rays that end before they start hit nothing.
     #[inline(always)]
     pub fn keep_only(&mut self, lanes: u32) {
-        for lane in lanes_in(!lanes & first_lanes(self.len)) {
-            self.t_max[lane] = -1.0;
+        for (lane, end) in self.t_max[..self.len].iter_mut().enumerate() {
+            if lanes >> lane & 1 == 0 {
+                *end = -1.0;
+            }
         }
     }
 
