@@ -232,7 +232,7 @@ impl RenderContext<'_> {
 
     /// Motion on the film of a point with this `velocity`, from this frame to the next, pixels; zero if it is or gets
     /// behind the camera.
-    fn motion(&self, point: Vec3, velocity: Vec3) -> [f32; 2] {
+    pub(super) fn motion(&self, point: Vec3, velocity: Vec3) -> [f32; 2] {
         let Some((next, time)) = &self.cameras.next else {
             return [0.0; 2];
         };

@@ -25,6 +25,7 @@ mod bsdf;
 mod channels;
 mod context;
 pub mod cryptomatte;
+pub mod device;
 mod dimensions;
 mod drawing;
 mod entries;

@@ -185,6 +185,18 @@ impl FilmPlane {
         self.row().kind
     }
 
+    /// Whether its values are those of the nearest sample, or a drawing.
+    pub(super) const fn is_from_nearest(self) -> bool {
+        use PlaneSource::{
+            Nearest, NearestAttributes, NearestId, NearestVelocity, Overlays, SampleIds,
+            SampleLight, SampleParts, Samples,
+        };
+        match self.row().source {
+            Nearest | NearestId | NearestVelocity | NearestAttributes | Overlays => true,
+            Samples | SampleLight | SampleIds | SampleParts => false,
+        }
+    }
+
     /// The value of a pixel without an intersection: the bits of all components.
     pub(super) const fn miss(self) -> u32 {
         match self.kind() {

@@ -143,13 +143,13 @@ impl RenderSettings {
     }
 
     /// The position of the film in the image of the camera.
-    pub(super) fn data_window(&self) -> DataWindow {
+    pub fn data_window(&self) -> DataWindow {
         let [width, height] = self.full_size();
         self.window.unwrap_or(DataWindow::whole(width, height))
     }
 
     /// Width and height in pixels of the image of one eye, if a picture has `eyes` images beside and below each other.
-    pub(super) fn eye_size(&self, eyes: [u32; 2]) -> [u32; 2] {
+    pub fn eye_size(&self, eyes: [u32; 2]) -> [u32; 2] {
         let [width, height] = self.data_window().image;
         [(width / eyes[0]).max(1), (height / eyes[1]).max(1)]
     }
@@ -159,7 +159,11 @@ impl RenderSettings {
         self.channels.with_features(self.has_features)
     }
 
-    pub(super) fn validate(&self) -> Result<(), RenderError> {
+    /// Checks that all settings are in their ranges.
+    ///
+    /// # Errors
+    /// The first one that is not.
+    pub fn validate(&self) -> Result<(), RenderError> {
         // Check the numbers with a lower limit of 1
         let [full_width, full_height] = self.full_size();
         for (name, value, max) in [

@@ -232,7 +232,7 @@ impl Camera {
     }
 
     /// The two eyes, if there are two.
-    pub(crate) const fn stereo(&self) -> Option<Stereo> {
+    pub const fn stereo(&self) -> Option<Stereo> {
         self.stereo
     }
 

@@ -49,11 +49,21 @@ impl FilmSampler {
     /// The points of pixel `(x, y)`, with coordinates in 0..1, or around that with a filter that is wider than the
     /// pixel. A single point is the centre of the pixel.
     pub fn points(&self, x: u32, y: u32) -> (&[f32], &[f32]) {
-        let sets = self.x.len() / self.samples;
-        let hash = mix(u64::from(y) << 32 | u64::from(x)) >> 32;
-        let set = ((hash * sets as u64) >> 32) as usize;
+        let set = self.set_of(x, y) as usize;
         let range = set * self.samples..(set + 1) * self.samples;
         (&self.x[range.clone()], &self.y[range])
+    }
+
+    /// The number of the set of pixel `(x, y)`.
+    pub fn set_of(&self, x: u32, y: u32) -> u32 {
+        let sets = self.x.len() / self.samples;
+        let hash = mix(u64::from(y) << 32 | u64::from(x)) >> 32;
+        ((hash * sets as u64) >> 32) as u32
+    }
+
+    /// The points of all sets, one set after the other.
+    pub fn all_points(&self) -> impl Iterator<Item = [f32; 2]> {
+        self.x.iter().zip(&self.y).map(|(x, y)| [*x, *y])
     }
 }
 

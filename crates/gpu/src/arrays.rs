@@ -1,0 +1,217 @@
+//! Memory of the device: arrays that grow, uniforms, and copies from and to the host.
+
+use bytemuck::Pod;
+use wgpu::{
+    BindingResource, Buffer, BufferBinding, BufferDescriptor, BufferUsages, CommandEncoder, MapMode,
+};
+
+use crate::{Device, GpuError};
+
+/// Distance of uniforms, bytes: no device needs more.
+const UNIFORM_STEP: usize = 256;
+
+/// An array on the device. Its memory is kept for the next, unless that is larger.
+#[derive(Debug, Default)]
+pub(crate) struct Array {
+    buffer: Option<Buffer>,
+    /// Bytes in use.
+    len: u64,
+}
+
+impl Array {
+    /// Makes room for `len` bytes, at least one element. The content is lost if the array grows.
+    ///
+    /// # Errors
+    /// If that is more than an array of the device may have, or if memory is full. `what` names the content.
+    pub(crate) fn reserve(
+        &mut self,
+        device: &Device,
+        what: &'static str,
+        len: u64,
+    ) -> Result<(), GpuError> {
+        let max = device.adapter().max_array.min(device.raw.limits().max_buffer_size);
+        if len > max {
+            return Err(GpuError::TooLarge { what, bytes: len, max });
+        }
+        self.len = len;
+        let size = len.next_multiple_of(16).max(16);
+        if self.buffer.as_ref().is_none_or(|buffer| buffer.size() < size) {
+            // Release the old memory before there is more
+            self.buffer = None;
+            let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC;
+            self.buffer = Some(device.raw.create_buffer(&BufferDescriptor {
+                label: Some(what),
+                size,
+                usage,
+                mapped_at_creation: false,
+            }));
+            device.check().inspect_err(|_| self.buffer = None)?;
+        }
+        Ok(())
+    }
+
+    /// Replaces the content by `bytes`, which are copied before this returns.
+    ///
+    /// # Errors
+    /// Those of [`Self::reserve`].
+    pub(crate) fn write(
+        &mut self,
+        device: &Device,
+        what: &'static str,
+        bytes: &[u8],
+    ) -> Result<(), GpuError> {
+        self.reserve(device, what, bytes.len() as u64)?;
+        if let (Some(buffer), false) = (&self.buffer, bytes.is_empty()) {
+            device.queue.write_buffer(buffer, 0, bytes);
+        }
+        device.check()
+    }
+
+    /// The whole array as an argument of a kernel.
+    ///
+    /// # Panics
+    /// If no memory was reserved.
+    pub(crate) fn binding(&self) -> BindingResource<'_> {
+        self.buffer().as_entire_binding()
+    }
+
+    /// # Panics
+    /// If no memory was reserved.
+    pub(crate) fn buffer(&self) -> &Buffer {
+        self.buffer.as_ref().expect("arrays are reserved before kernels use them")
+    }
+
+    /// Memory of the array, bytes.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.buffer.as_ref().map_or(0, Buffer::size)
+    }
+
+    /// The content, after all that was submitted.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub(crate) fn read(&self, device: &Device) -> Result<Vec<u8>, GpuError> {
+        let mut download = Download::default();
+        download.reserve(device, self.len)?;
+        let mut encoder = device.raw.create_command_encoder(&Default::default());
+        download.copy(&mut encoder, self.buffer(), [0, self.len]);
+        device.queue.submit([encoder.finish()]);
+        download.with_content(device, <[u8]>::to_vec)
+    }
+}
+
+/// Memory through which the host reads an array.
+#[derive(Debug, Default)]
+pub(crate) struct Download {
+    buffer: Option<Buffer>,
+}
+
+impl Download {
+    /// Makes room for `len` bytes.
+    ///
+    /// # Errors
+    /// If memory is full.
+    pub(crate) fn reserve(&mut self, device: &Device, len: u64) -> Result<(), GpuError> {
+        let len = len.max(16);
+        if self.buffer.as_ref().is_none_or(|buffer| buffer.size() != len) {
+            self.buffer = None;
+            self.buffer = Some(device.raw.create_buffer(&BufferDescriptor {
+                label: Some("download"),
+                size: len,
+                usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
+                mapped_at_creation: false,
+            }));
+            device.check().inspect_err(|_| self.buffer = None)?;
+        }
+        Ok(())
+    }
+
+    /// Copies the first bytes of `source` to `at` here when `encoder` is submitted. `range` is `[at, length]`.
+    pub(crate) fn copy(&self, encoder: &mut CommandEncoder, source: &Buffer, [at, len]: [u64; 2]) {
+        if let Some(buffer) = &self.buffer {
+            encoder.copy_buffer_to_buffer(source, 0, buffer, at, len);
+        }
+    }
+
+    /// Waits for the device, and passes the content to `use_content`.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub(crate) fn with_content<T>(
+        &self,
+        device: &Device,
+        use_content: impl FnOnce(&[u8]) -> T,
+    ) -> Result<T, GpuError> {
+        let buffer = self.buffer.as_ref().expect("reserved before it is read");
+        // The result of the map is that of the wait
+        buffer.map_async(MapMode::Read, .., |_result| ());
+        device.wait()?;
+        let range =
+            buffer.get_mapped_range(..).map_err(|error| GpuError::Lost(error.to_string()))?;
+        let result = use_content(&range);
+        drop(range);
+        buffer.unmap();
+        Ok(result)
+    }
+}
+
+/// Small structures that kernels read, all in one buffer.
+#[derive(Debug, Default)]
+pub(crate) struct Uniforms {
+    bytes: Vec<u8>,
+    buffer: Option<Buffer>,
+}
+
+/// Place of a structure in [`Uniforms`].
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Uniform {
+    offset: u64,
+    size: u64,
+}
+
+impl Uniforms {
+    /// Removes all.
+    pub(crate) fn clear(&mut self) {
+        self.bytes.clear();
+    }
+
+    /// Adds a structure.
+    pub(crate) fn push<T: Pod>(&mut self, value: &T) -> Uniform {
+        let offset = self.bytes.len();
+        self.bytes.extend_from_slice(bytemuck::bytes_of(value));
+        self.bytes.resize(self.bytes.len().next_multiple_of(UNIFORM_STEP), 0);
+        Uniform { offset: offset as u64, size: size_of::<T>() as u64 }
+    }
+
+    /// Copies all to the device, before the next submission.
+    ///
+    /// # Errors
+    /// If memory is full.
+    pub(crate) fn upload(&mut self, device: &Device) -> Result<(), GpuError> {
+        let len = self.bytes.len().max(UNIFORM_STEP) as u64;
+        if self.buffer.as_ref().is_none_or(|buffer| buffer.size() < len) {
+            self.buffer = Some(device.raw.create_buffer(&BufferDescriptor {
+                label: Some("uniforms"),
+                size: len,
+                usage: BufferUsages::UNIFORM | BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            }));
+        }
+        if let Some(buffer) = &self.buffer {
+            device.queue.write_buffer(buffer, 0, &self.bytes);
+        }
+        device.check()
+    }
+
+    /// A structure as an argument of a kernel.
+    ///
+    /// # Panics
+    /// Before [`Self::upload`].
+    pub(crate) fn binding(&self, uniform: Uniform) -> BindingResource<'_> {
+        BindingResource::Buffer(BufferBinding {
+            buffer: self.buffer.as_ref().expect("uploaded before kernels use them"),
+            offset: uniform.offset,
+            size: std::num::NonZero::new(uniform.size),
+        })
+    }
+}

@@ -1,0 +1,88 @@
+//! Renders spheres on a GPU: builds a tree over them in every frame, and traces pictures, with kernels in WGSL through
+//! Vulkan (crate `wgpu`). The same kernels run on software drivers, so that tests need no GPU.
+//!
+//! - [`Device`]: adapters, limits, and the self-test of the arithmetic.
+//! - [`Spheres`]: the order along a Hilbert curve, blocks of eight, levels of nodes.
+//! - [`Renderer`] and [`Picture`]: Whitted's model for opaque spheres.
+//!
+//! This crate takes slices and plain values, and returns pixels: it knows no files, jobs or scenes. Which sphere a pixel
+//! shows, its depth, normal, position and coverage equal those of the CPU's kernels to the bit, if the device passes
+//! the self-test; colours differ by less than half a unit of a 16-bit float. Every run gives the same bytes.
+//!
+//! ```
+//! use spherule_gpu::{
+//!     Background, Camera, Checks, Colors, Device, FilmSize, KeyLength, Light, LightPlace, Material,
+//!     NearestSample, Order, Picture, Radii, Renderer, Samples, Spheres, adapters,
+//! };
+//!
+//! # fn main() -> Result<(), spherule_gpu::GpuError> {
+//! if adapters().is_empty() {
+//!     return Ok(()); // there is nothing to render on
+//! }
+//! let device = Device::open(0, Checks::Off)?;
+//! let mut renderer = Renderer::new(&device);
+//! let spheres = Spheres {
+//!     centers: &[[-1.0, 5.0, 0.0], [1.0, 5.0, 0.0]],
+//!     radii: Radii::Common(0.8),
+//!     order: Order::Any(KeyLength::Short),
+//! };
+//! renderer.prepare(&device, &spheres, Colors::Constant([0.8, 0.2, 0.1]))?;
+//! let film = FilmSize { width: 16, height: 8, corner: [0, 0] };
+//! let picture = Picture {
+//!     camera: Camera {
+//!         eye: [0.0; 3],
+//!         axes: [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]],
+//!         half_extent: [0.5, 0.25],
+//!         size: [16.0, 8.0],
+//!         is_parallel: false,
+//!     },
+//!     film,
+//!     samples: Samples { count: 1, points: &[[0.5, 0.5]], sets: &[0; 128] },
+//!     max_depth: 1,
+//!     background: Background::Constant([0.0; 3]),
+//!     is_transparent: false,
+//!     material: Material {
+//!         ambient: [0.1; 3],
+//!         diffuse: 0.9,
+//!         specular: 0.0,
+//!         shininess: 1.0,
+//!         reflection: 0.0,
+//!         ior: 1.5,
+//!         is_exact_fresnel: false,
+//!     },
+//!     lights: &[Light {
+//!         place: LightPlace::Distant([0.0, -1.0, 0.0]),
+//!         radiance: [1.0; 3],
+//!         casts_shadow: true,
+//!     }],
+//! };
+//! renderer.trace(&device, &picture, &|| false)?;
+//! let indices = renderer.read(&device, |pixels| {
+//!     pixels.nearest.iter().map(|sample| sample.index).collect::<Vec<_>>()
+//! })?;
+//! assert_eq!((indices[4 * 16 + 4], indices[4 * 16 + 12]), (0, 1));
+//! assert_eq!(indices[0], NearestSample::NONE);
+//! # Ok(())
+//! # }
+//! ```
+#![deny(unsafe_code)]
+
+mod arrays;
+mod commands;
+mod device;
+mod error;
+mod picture;
+mod scene;
+mod self_test;
+mod tree;
+mod whitted;
+
+pub use device::{AdapterSummary, Checks, Device, adapters};
+pub use error::GpuError;
+pub use picture::{
+    Background, Camera, FilmSize, Light, LightPlace, MAX_LIGHTS, Material, Picture, Samples,
+};
+pub use scene::{Missing, SceneError, SceneRenderer, missing, missing_of_particles, ray_counts};
+pub use self_test::Arithmetic;
+pub use tree::{KeyLength, MAX_SPHERES, Order, Radii, Spheres, tree_bytes};
+pub use whitted::{Colors, Cost, NearestSample, Pixels, Renderer, bytes_per_pixel};

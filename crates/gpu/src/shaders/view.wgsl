@@ -1,0 +1,38 @@
+// The uniform of all tracing kernels.
+
+struct Light {
+  // Position of a point light, or the direction to a light at infinite distance
+  place: vec3<f32>,
+  // 0: point light, 1: point light that falls off with the square of the distance, 2: infinitely far away
+  kind: u32,
+  radiance: vec3<f32>,
+  casts_shadow: u32,
+}
+
+struct View {
+  eye: vec3<f32>, zero: f32,
+  right: vec3<f32>, half_width: f32,
+  up: vec3<f32>, half_height: f32,
+  forward: vec3<f32>, is_parallel: u32,
+  // Size in pixels of the camera's image
+  size: vec2<f32>,
+  // Position in it of the first pixel of the film
+  corner: vec2<i32>,
+  // Pixels of the film, and samples of each
+  width: u32, height: u32, samples: u32, max_depth: u32,
+  // Levels of nodes, and the first node of each, from the lowest level on
+  levels: u32, radius: f32, padding: f32, light_count: u32,
+  starts: array<vec4<u32>, 4>,
+  // Background, a gradient along `background_up`
+  background_bottom: vec3<f32>, background_kind: u32,
+  background_top: vec3<f32>, transparent: u32,
+  background_up: vec3<f32>, color_kind: u32,
+  // Material: ambient light times `Ka`, and the constants of Blinn and Phong
+  ambient: vec3<f32>, diffuse: f32,
+  color: vec3<f32>, specular: f32,
+  shininess: f32, reflection: f32, ior: f32, is_exact_fresnel: u32,
+  lights: array<Light, 8>,
+}
+@group(0) @binding(0) var<uniform> view: View;
+
+fn zero() -> f32 { return view.zero; }

@@ -1,0 +1,663 @@
+//! Builds the tree of a frame on the device: the order of the spheres along a Hilbert curve, blocks of eight, and levels
+//! of nodes with eight children (Lauterbach et al., "Fast BVH construction on GPUs", 2009, with an implicit tree).
+//!
+//! The picture does not depend on the order: boxes only have to contain their spheres.
+
+use std::collections::BTreeMap;
+
+use bytemuck::{Pod, Zeroable};
+use wgpu::BindingResource;
+
+use crate::arrays::{Array, Uniform, Uniforms};
+use crate::commands::{Commands, Kernel, Timer};
+use crate::{Device, GpuError};
+
+/// Spheres in a block, the constant `BLOCK` of the shaders.
+pub(crate) const BLOCK: u64 = 8;
+/// Children of a node.
+const WIDTH: u64 = 8;
+/// Pairs that a workgroup sorts.
+const TILE: u64 = 2048;
+/// Largest number of spheres: their places have 28 bits for the block.
+pub const MAX_SPHERES: u64 = BLOCK << 28;
+
+/// The spheres of a frame.
+#[derive(Debug, Clone, Copy)]
+pub struct Spheres<'a> {
+    /// The centres, all finite.
+    pub centers: &'a [[f32; 3]],
+    /// The radii.
+    pub radii: Radii<'a>,
+    /// The order of the centres.
+    pub order: Order,
+}
+
+/// Radii of spheres.
+#[derive(Debug, Clone, Copy)]
+pub enum Radii<'a> {
+    /// All have this one.
+    Common(f32),
+    /// One for each sphere.
+    PerSphere(&'a [f32]),
+}
+
+/// The order in which spheres are given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Order {
+    /// Any. They are sorted on the device.
+    Any(KeyLength),
+    /// Neighbours in space are near each other, as in a native frame.
+    AlongCurve,
+}
+
+/// Bits of the keys by which spheres are sorted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum KeyLength {
+    /// 24 bits: enough for spheres that fill their box.
+    Short,
+    /// 48 bits: also for a few spheres far from all others, which would press these into few cells.
+    Long,
+}
+
+impl KeyLength {
+    const fn words(self) -> u32 {
+        match self {
+            Self::Short => 1,
+            Self::Long => 2,
+        }
+    }
+}
+
+/// What the levels of a tree are.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct TreeShape {
+    /// Levels of nodes.
+    pub(crate) levels: u32,
+    /// First node of each level, from the lowest on.
+    pub(crate) starts: [u32; 16],
+    /// Radius of all spheres; 0 if each has its own.
+    pub(crate) radius: f32,
+    /// Length by which boxes grow when they are tested.
+    pub(crate) padding: f32,
+    /// Whether all spheres have the same radius.
+    pub(crate) is_common: bool,
+    /// Number of spheres.
+    pub(crate) count: u64,
+}
+
+/// A uniform of the kernels.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+struct Build {
+    count: u32,
+    tiles: u32,
+    shift: u32,
+    word: u32,
+    children: u32,
+    nodes: u32,
+    first: u32,
+    radius: f32,
+}
+
+/// Kernels for keys of one length.
+#[derive(Debug)]
+struct KeyKernels {
+    clear_bounds: Kernel,
+    find_bounds: Kernel,
+    first_keys: Kernel,
+    next_keys: Kernel,
+    keep_order: Kernel,
+}
+
+impl KeyKernels {
+    fn new(device: &Device, length: KeyLength) -> Self {
+        let bits = format!("const BITS: u32 = {}u;\n", 8 * length.words());
+        let module = device.module(&[&bits, include_str!("shaders/keys.wgsl")].concat());
+        let kernel = |entry, bindings| Kernel::new(device, &module, entry, bindings);
+        Self {
+            clear_bounds: kernel("clear_bounds", &[2]),
+            find_bounds: kernel("find_bounds", &[0, 1, 2]),
+            first_keys: kernel("first_keys", &[0, 1, 2, 4]),
+            next_keys: kernel("next_keys", &[0, 1, 2, 3, 4]),
+            keep_order: kernel("keep_order", &[0, 4]),
+        }
+    }
+}
+
+/// Kernels that sort.
+#[derive(Debug)]
+struct SortKernels {
+    histogram: Kernel,
+    scan_digits: Kernel,
+    scatter: Kernel,
+}
+
+impl SortKernels {
+    fn new(device: &Device) -> Self {
+        let module = device.module(include_str!("shaders/sort.wgsl"));
+        let kernel = |entry, bindings| Kernel::new(device, &module, entry, bindings);
+        Self {
+            histogram: kernel("histogram", &[0, 3, 5]),
+            scan_digits: kernel("scan_digits", &[0, 5, 6]),
+            scatter: kernel("scatter", &[0, 3, 4, 5, 6]),
+        }
+    }
+}
+
+/// Kernels that build nodes, for spheres with a common radius or one for each.
+#[derive(Debug)]
+struct NodeKernels {
+    gather_spheres: Kernel,
+    block_boxes: Kernel,
+    build_level: Kernel,
+}
+
+impl NodeKernels {
+    fn new(device: &Device, is_common: bool) -> Self {
+        let source = [&tree_constants(is_common), include_str!("shaders/nodes.wgsl")];
+        let module = device.module(&source.concat());
+        let kernel = |entry, bindings| Kernel::new(device, &module, entry, bindings);
+        Self {
+            gather_spheres: kernel("gather_spheres", &[0, 1, 3, 7, 8, 9]),
+            block_boxes: kernel("block_boxes", &[0, 1, 3, 7, 8, 11]),
+            build_level: kernel("build_level", &[0, 10, 11, 12]),
+        }
+    }
+}
+
+/// Constants of the shaders that read spheres.
+pub(crate) fn tree_constants(is_common: bool) -> String {
+    format!("const BLOCK: u32 = {BLOCK}u;\nconst COMMON_RADIUS: bool = {is_common};\n")
+}
+
+/// Builds the tree of one frame after another in the same memory.
+#[derive(Debug)]
+pub(crate) struct TreeBuilder {
+    keys: BTreeMap<KeyLength, KeyKernels>,
+    sort: SortKernels,
+    nodes: BTreeMap<bool, NodeKernels>,
+    uniforms: Uniforms,
+    arrays: TreeArrays,
+    shape: TreeShape,
+    order: Order,
+}
+
+/// The arrays of a tree, and those that only its build needs.
+#[derive(Debug, Default)]
+struct TreeArrays {
+    centers: Array,
+    radii: Array,
+    bounds: Array,
+    pairs: [Array; 2],
+    counts: Array,
+    totals: Array,
+    spheres: Array,
+    order: Array,
+    boxes: [Array; 2],
+    nodes: Array,
+}
+
+impl TreeArrays {
+    fn all(&self) -> [&Array; 12] {
+        let [first, second] = &self.pairs;
+        let [boxes, other_boxes] = &self.boxes;
+        [
+            &self.centers,
+            &self.radii,
+            &self.bounds,
+            first,
+            second,
+            &self.counts,
+            &self.totals,
+            &self.spheres,
+            &self.order,
+            boxes,
+            other_boxes,
+            &self.nodes,
+        ]
+    }
+}
+
+/// Number of blocks of `count` spheres; an empty tree has one.
+const fn block_count(count: u64) -> u64 {
+    let blocks = count.div_ceil(BLOCK);
+    if blocks == 0 { 1 } else { blocks }
+}
+
+/// Numbers of nodes of each level, from the lowest on.
+fn level_sizes(blocks: u64) -> Vec<u64> {
+    let mut sizes = vec![blocks.div_ceil(WIDTH)];
+    while let Some(below) = sizes.last().filter(|below| **below > 1) {
+        sizes.push(below.div_ceil(WIDTH));
+    }
+    sizes
+}
+
+/// Memory of the device to build and trace a tree of `count` spheres, bytes.
+pub fn tree_bytes(count: u64, is_common: bool) -> u64 {
+    let blocks = block_count(count);
+    let nodes: u64 = level_sizes(blocks).iter().sum();
+    let radii = if is_common { 0 } else { 4 + 4 };
+    let of_spheres = (12 + 2 * 8 + radii) * count + 16 * blocks * BLOCK;
+    of_spheres + 1024 * count.div_ceil(TILE) + 48 * blocks + 64 * nodes
+}
+
+impl TreeBuilder {
+    pub(crate) fn new(device: &Device) -> Self {
+        Self {
+            keys: BTreeMap::new(),
+            sort: SortKernels::new(device),
+            nodes: BTreeMap::new(),
+            uniforms: Uniforms::default(),
+            arrays: TreeArrays::default(),
+            shape: TreeShape::default(),
+            order: Order::AlongCurve,
+        }
+    }
+
+    /// Copies `spheres` to the device, and starts to build their tree.
+    ///
+    /// # Errors
+    /// If there are none, more than the device holds, or if the device fails.
+    ///
+    /// # Panics
+    /// If there are not as many radii as centres.
+    pub(crate) fn build(
+        &mut self,
+        device: &Device,
+        spheres: &Spheres<'_>,
+        timer: Option<&Timer>,
+    ) -> Result<(), GpuError> {
+        self.shape = TreeShape::default();
+        let shape = shape_of(spheres)?;
+        self.upload(device, spheres)?;
+        self.shape = shape;
+        self.order = spheres.order;
+        self.start(device, timer)
+    }
+
+    /// Starts to build the tree of the spheres that were copied last.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub(crate) fn start(&mut self, device: &Device, timer: Option<&Timer>) -> Result<(), GpuError> {
+        let shape = self.shape;
+        let length = match self.order {
+            Order::Any(length) => length,
+            Order::AlongCurve => KeyLength::Short,
+        };
+        self.keys.entry(length).or_insert_with(|| KeyKernels::new(device, length));
+        self.nodes
+            .entry(shape.is_common)
+            .or_insert_with(|| NodeKernels::new(device, shape.is_common));
+        // Record and start all stages
+        let mut steps = Steps::default();
+        self.uniforms.clear();
+        let sorted = self.plan_order(&mut steps, &shape, self.order);
+        self.plan_nodes(&mut steps, &shape, sorted);
+        self.uniforms.upload(device)?;
+        let mut commands = Commands::new(device);
+        for step in &steps.0 {
+            let array_of = |binding| self.array(binding, step);
+            commands.add(
+                self.kernel(step.kind, length, shape.is_common),
+                &array_of,
+                step.work,
+                step.group,
+            );
+        }
+        commands.end_stage(timer.map(|timer| (timer, 0)));
+        commands.submit();
+        device.check()
+    }
+
+    /// The tree that was built last.
+    pub(crate) const fn shape(&self) -> &TreeShape {
+        &self.shape
+    }
+
+    /// The arrays that rays need, by their bindings.
+    pub(crate) fn traversal_array(&self, binding: u32) -> Option<BindingResource<'_>> {
+        match binding {
+            1 => Some(self.arrays.nodes.binding()),
+            2 => Some(self.arrays.spheres.binding()),
+            3 => Some(self.arrays.order.binding()),
+            _ => None,
+        }
+    }
+
+    /// Memory in use, bytes.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.arrays.all().iter().map(|array| array.bytes()).sum()
+    }
+
+    fn upload(&mut self, device: &Device, spheres: &Spheres<'_>) -> Result<(), GpuError> {
+        let count = spheres.centers.len() as u64;
+        let blocks = block_count(count);
+        let nodes: u64 = level_sizes(blocks).iter().sum();
+        let arrays = &mut self.arrays;
+        // Reserve what the kernels write
+        arrays.bounds.reserve(device, "bounds", 32)?;
+        for pairs in &mut arrays.pairs {
+            pairs.reserve(device, "keys of particles", 8 * count)?;
+        }
+        arrays.counts.reserve(device, "counts of digits", 1024 * count.div_ceil(TILE))?;
+        arrays.totals.reserve(device, "totals of digits", 1024)?;
+        arrays.spheres.reserve(device, "particles", 16 * blocks * BLOCK)?;
+        arrays.nodes.reserve(device, "nodes", 64 * nodes)?;
+        for boxes in &mut arrays.boxes {
+            boxes.reserve(device, "boxes", 24 * blocks)?;
+        }
+        // Copy what they read
+        arrays.centers.write(device, "positions", bytemuck::cast_slice(spheres.centers))?;
+        match spheres.radii {
+            Radii::Common(_) => {
+                arrays.radii.reserve(device, "radii", 0)?;
+                arrays.order.reserve(device, "order", 0)
+            }
+            Radii::PerSphere(radii) => {
+                assert_eq!(radii.len(), spheres.centers.len(), "one radius for each centre");
+                arrays.radii.write(device, "radii", bytemuck::cast_slice(radii))?;
+                arrays.order.reserve(device, "order", 4 * blocks * BLOCK)
+            }
+        }
+    }
+
+    /// Plans the keys and the sort. Returns which of the two arrays of pairs has the result.
+    fn plan_order(&mut self, steps: &mut Steps, shape: &TreeShape, order: Order) -> usize {
+        let uniforms = &mut self.uniforms;
+        let mut step = |kind, side, build: Build, work, group| {
+            let uniform = uniforms.push(&build);
+            steps.0.push(Step { kind, side, uniform, work, group });
+        };
+        let tiles = shape.count.div_ceil(TILE);
+        let build = Build { count: narrow(shape.count), tiles: narrow(tiles), ..Build::default() };
+        let Order::Any(length) = order else {
+            step(Kind::KeepOrder, 1, build, shape.count, 256);
+            return 0;
+        };
+        step(Kind::ClearBounds, 0, build, 1, 1);
+        step(Kind::FindBounds, 0, build, shape.count.min(256 * 1024), 256);
+        // The lowest word first, because each pass of the sort keeps the order of the passes before
+        let mut side = 0;
+        for word in 0..length.words() {
+            let build = Build { word, ..build };
+            if word == 0 {
+                // Has no input, and writes side 0
+                step(Kind::FirstKeys, 1, build, shape.count, 256);
+            } else {
+                step(Kind::NextKeys, side, build, shape.count, 256);
+                side = 1 - side;
+            }
+            for shift in [0, 8, 16] {
+                let build = Build { shift, ..build };
+                step(Kind::Histogram, side, build, tiles, 1);
+                step(Kind::ScanDigits, side, build, 256, 1);
+                step(Kind::Scatter, side, build, tiles, 1);
+                side = 1 - side;
+            }
+        }
+        side
+    }
+
+    /// Plans the blocks and the levels of nodes, from pairs on `side`.
+    fn plan_nodes(&mut self, steps: &mut Steps, shape: &TreeShape, side: usize) {
+        let uniforms = &mut self.uniforms;
+        let mut step = |kind, side, build: Build, work, group| {
+            let uniform = uniforms.push(&build);
+            steps.0.push(Step { kind, side, uniform, work, group });
+        };
+        let blocks = block_count(shape.count);
+        let build = Build {
+            count: narrow(shape.count),
+            children: narrow(blocks),
+            radius: shape.radius,
+            ..Build::default()
+        };
+        step(Kind::GatherSpheres, side, build, blocks * BLOCK, 256);
+        step(Kind::BlockBoxes, side, build, blocks, 256);
+        let (mut children, mut boxes) = (blocks, 1 - side);
+        for (size, first) in level_sizes(blocks).into_iter().zip(shape.starts) {
+            let build = Build { children: narrow(children), nodes: narrow(size), first, ..build };
+            step(Kind::BuildLevel, boxes, build, size, 64);
+            (children, boxes) = (size, 1 - boxes);
+        }
+    }
+
+    fn kernel(&self, kind: Kind, length: KeyLength, is_common: bool) -> &Kernel {
+        let (keys, nodes) = (&self.keys[&length], &self.nodes[&is_common]);
+        match kind {
+            Kind::ClearBounds => &keys.clear_bounds,
+            Kind::FindBounds => &keys.find_bounds,
+            Kind::FirstKeys => &keys.first_keys,
+            Kind::NextKeys => &keys.next_keys,
+            Kind::KeepOrder => &keys.keep_order,
+            Kind::Histogram => &self.sort.histogram,
+            Kind::ScanDigits => &self.sort.scan_digits,
+            Kind::Scatter => &self.sort.scatter,
+            Kind::GatherSpheres => &nodes.gather_spheres,
+            Kind::BlockBoxes => &nodes.block_boxes,
+            Kind::BuildLevel => &nodes.build_level,
+        }
+    }
+
+    /// The argument of a step for a binding. A step reads the arrays of its side, and writes those of the other.
+    fn array(&self, binding: u32, step: &Step) -> BindingResource<'_> {
+        let arrays = &self.arrays;
+        let array = match binding {
+            0 => return self.uniforms.binding(step.uniform),
+            1 => &arrays.centers,
+            2 => &arrays.bounds,
+            3 => &arrays.pairs[step.side],
+            4 => &arrays.pairs[1 - step.side],
+            5 => &arrays.counts,
+            6 => &arrays.totals,
+            7 => &arrays.radii,
+            8 => &arrays.spheres,
+            9 => &arrays.order,
+            10 => &arrays.boxes[step.side],
+            11 => &arrays.boxes[1 - step.side],
+            _ => &arrays.nodes,
+        };
+        array.binding()
+    }
+
+    /// The nodes and spheres, for tests.
+    #[cfg(test)]
+    pub(crate) fn content(&self, device: &Device) -> Result<TreeContent, GpuError> {
+        Ok(TreeContent {
+            nodes: bytemuck::pod_collect_to_vec(&self.arrays.nodes.read(device)?),
+            spheres: bytemuck::pod_collect_to_vec(&self.arrays.spheres.read(device)?),
+            order: bytemuck::pod_collect_to_vec(&self.arrays.order.read(device)?),
+        })
+    }
+}
+
+/// The arrays of a tree on the host.
+#[cfg(test)]
+pub(crate) struct TreeContent {
+    pub(crate) nodes: Vec<[u32; 16]>,
+    pub(crate) spheres: Vec<[f32; 4]>,
+    pub(crate) order: Vec<u32>,
+}
+
+/// The kernels of a build.
+#[derive(Debug, Clone, Copy)]
+enum Kind {
+    ClearBounds,
+    FindBounds,
+    FirstKeys,
+    NextKeys,
+    KeepOrder,
+    Histogram,
+    ScanDigits,
+    Scatter,
+    GatherSpheres,
+    BlockBoxes,
+    BuildLevel,
+}
+
+/// A dispatch of a build.
+struct Step {
+    kind: Kind,
+    /// The side of double arrays that it reads.
+    side: usize,
+    uniform: Uniform,
+    /// Invocations, in workgroups of `group`.
+    work: u64,
+    group: u64,
+}
+
+#[derive(Default)]
+struct Steps(Vec<Step>);
+
+/// The shape of the tree of `spheres`.
+fn shape_of(spheres: &Spheres<'_>) -> Result<TreeShape, GpuError> {
+    let count = spheres.centers.len() as u64;
+    if count > MAX_SPHERES {
+        let (bytes, max) = (16 * count, 16 * MAX_SPHERES);
+        return Err(GpuError::TooLarge { what: "particles", bytes, max });
+    }
+    let mut shape = TreeShape { count, ..TreeShape::default() };
+    (shape.radius, shape.is_common) = match spheres.radii {
+        Radii::Common(radius) => (radius, true),
+        Radii::PerSphere(_) => (0.0, false),
+    };
+    shape.padding = shape.radius;
+    let mut first = 0;
+    for (size, start) in level_sizes(block_count(count)).into_iter().zip(&mut shape.starts) {
+        *start = narrow(first);
+        first += size;
+        shape.levels += 1;
+    }
+    Ok(shape)
+}
+
+/// A number of spheres, tiles or nodes in 32 bits.
+fn narrow(number: u64) -> u32 {
+    u32::try_from(number).expect("no more than MAX_SPHERES")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Checks;
+
+    /// Even points and four at each of many places, from a fixed sequence.
+    fn points(count: u32) -> Vec<[f32; 3]> {
+        let coordinate = |i: u32, prime: u32| (i.wrapping_mul(prime) >> 8) as f32 / 1e6 - 7.0;
+        let point =
+            |i: u32| [2_654_435_761, 2_246_822_519, 3_266_489_917].map(|p| coordinate(i, p));
+        (0..count).map(|i| point(if i % 8 < 4 { i } else { i / 32 })).collect()
+    }
+
+    /// The box of child `j` of a node.
+    fn child_box(node: &[u32; 16], j: usize) -> [[f64; 2]; 3] {
+        std::array::from_fn(|axis| {
+            let step = f64::from(f32::from_bits((node[3] >> (8 * axis) & 255) << 23));
+            let byte = |word: usize| f64::from(node[4 + 4 * axis + word].to_le_bytes()[j % 4]);
+            let low = f64::from(f32::from_bits(node[axis]));
+            [low + step * byte(j / 4), low + step * byte(2 + j / 4)]
+        })
+    }
+
+    /// Checks that the boxes above each visible sphere contain it, and returns the indices of these spheres.
+    fn visible(content: &TreeContent, shape: &TreeShape) -> Vec<u32> {
+        let mut found = Vec::new();
+        for (slot, sphere) in content.spheres.iter().enumerate() {
+            if sphere[0] > 1e38 {
+                continue;
+            }
+            found.push(if shape.is_common { sphere[3].to_bits() } else { content.order[slot] });
+            let reach = if shape.is_common { 0.0 } else { f64::from(sphere[3]) };
+            let mut child = slot / BLOCK as usize;
+            for start in &shape.starts[..shape.levels as usize] {
+                let node = &content.nodes[*start as usize + child / WIDTH as usize];
+                let number = child % WIDTH as usize;
+                assert!(node[3] >> (24 + number) & 1 == 1, "slot {slot} is in an empty child");
+                for (axis, [low, high]) in child_box(node, number).into_iter().enumerate() {
+                    let (center, slack) = (f64::from(sphere[axis]), 1e-5);
+                    assert!(low <= center - reach + slack && center + reach <= high + slack);
+                }
+                child /= WIDTH as usize;
+            }
+        }
+        found
+    }
+
+    /// The tree of `centers`, and the indices of its visible spheres in their order.
+    fn built(builder: &mut TreeBuilder, device: &Device, spheres: &Spheres<'_>) -> Vec<u32> {
+        builder.build(device, spheres, None).unwrap();
+        visible(&builder.content(device).unwrap(), builder.shape())
+    }
+
+    fn device() -> Option<Device> {
+        match Device::open(0, Checks::On) {
+            Ok(device) => Some(device),
+            Err(GpuError::NoAdapter) if std::env::var_os("SPHERULE_GPU").is_none() => None,
+            Err(error) => panic!("{error}"),
+        }
+    }
+
+    #[test]
+    fn boxes_contain_all_places_once() {
+        let Some(device) = device() else { return };
+        let mut builder = TreeBuilder::new(&device);
+        for count in [0, 1, 8, 9, 2047, 2049, 9000] {
+            let centers = points(count);
+            let radii: Vec<f32> = (0..count).map(|i| 0.01 + (i % 5) as f32).collect();
+            for radii in [Radii::Common(0.2), Radii::PerSphere(&radii)] {
+                for order in
+                    [Order::Any(KeyLength::Short), Order::Any(KeyLength::Long), Order::AlongCurve]
+                {
+                    let found =
+                        built(&mut builder, &device, &Spheres { centers: &centers, radii, order });
+                    // Each place is visible, by its lowest index if copies follow each other
+                    let bits = |i: &u32| centers[*i as usize].map(f32::to_bits);
+                    let mut places: Vec<_> = found.iter().map(bits).collect();
+                    places.sort_unstable();
+                    places.dedup();
+                    let mut all: Vec<_> = centers.iter().map(|c| c.map(f32::to_bits)).collect();
+                    all.sort_unstable();
+                    all.dedup();
+                    assert!(places == all, "{count} {order:?}");
+                    if let (Radii::Common(_), Order::Any(KeyLength::Long)) = (radii, order) {
+                        assert_eq!(found.len(), all.len(), "copies are visible");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn neighbours_in_the_order_are_near_each_other() {
+        let Some(device) = device() else { return };
+        let mut builder = TreeBuilder::new(&device);
+        let centers = points(8192);
+        let distance = |order: &[u32]| {
+            let pairs = order.windows(2);
+            let length = |pair: &[u32]| {
+                let [a, b] = [pair[0], pair[1]].map(|i| centers[i as usize]);
+                a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum::<f32>()
+            };
+            pairs.map(length).sum::<f32>()
+        };
+        let given: Vec<u32> = (0..8192).collect();
+        for length in [KeyLength::Short, KeyLength::Long] {
+            let radii = Radii::Common(0.1);
+            let spheres = Spheres { centers: &centers, radii, order: Order::Any(length) };
+            assert!(
+                distance(&built(&mut builder, &device, &spheres)) < 0.1 * distance(&given),
+                "{length:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn levels_end_at_one_node() {
+        assert_eq!(level_sizes(1), [1]);
+        assert_eq!(level_sizes(9), [2, 1]);
+        assert_eq!(level_sizes(513), [65, 9, 2, 1]);
+        assert_eq!(level_sizes(MAX_SPHERES / BLOCK).len(), 10);
+    }
+}

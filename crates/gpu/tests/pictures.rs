@@ -1,0 +1,123 @@
+//! A device renders the pictures of the CPU.
+//!
+//! `SPHERULE_GPU=required` makes these tests fail without an adapter; otherwise they pass then, since not every machine
+//! has one. Continuous integration installs a driver that runs on the CPU.
+
+#[path = "../examples/support/mod.rs"]
+mod support;
+
+use spherule_gpu::{Arithmetic, Checks, Device, GpuError, SceneRenderer};
+use spherule_tree::math::SimdLevel;
+use support::{Case, Data, Difference, Radii};
+
+/// Half the distance of neighbouring 16-bit floats below 2, where the colours of these pictures are.
+const HALF_UNIT_OF_F16: f32 = 0.5 / 1024.0;
+
+/// A device, or None on a machine without one.
+fn device(checks: Checks) -> Option<Device> {
+    match Device::open(0, checks) {
+        Ok(device) => Some(device),
+        Err(GpuError::NoAdapter) if std::env::var_os("SPHERULE_GPU").is_none() => None,
+        Err(error) => panic!("{error}"),
+    }
+}
+
+/// The kernels of the CPU that round as the device does.
+fn same_arithmetic(device: &Device) -> SimdLevel {
+    match device.arithmetic() {
+        Arithmetic::Fused => SimdLevel::best(),
+        Arithmetic::Separate => SimdLevel::Portable,
+    }
+}
+
+fn assert_equal(case: &Case, difference: &Difference) {
+    let Difference { ids, depths, normals, positions, coverages, color, rays } = *difference;
+    assert_eq!([ids, depths, normals, positions, coverages], [0; 5], "{case:?}");
+    assert!(color <= HALF_UNIT_OF_F16, "{case:?}: {color}");
+    assert!(rays, "{case:?}");
+}
+
+#[test]
+fn planes_equal_those_of_the_cpu() {
+    let Some(device) = device(Checks::On) else { return };
+    let level = same_arithmetic(&device);
+    let mut renderer = SceneRenderer::new(device);
+    for data in Data::ALL {
+        for radii in [Radii::Common, Radii::Each] {
+            let case = Case { data, radii, ..Case::small() };
+            assert_equal(&case, &support::compare(&mut renderer, &case, level));
+        }
+    }
+}
+
+#[test]
+fn every_setting_equals_the_cpu() {
+    let Some(device) = device(Checks::Off) else { return };
+    let level = same_arithmetic(&device);
+    let mut renderer = SceneRenderer::new(device);
+    let small = Case::small();
+    for case in [
+        Case { max_depth: 1, ..small },
+        Case { max_depth: 5, samples: 1, ..small },
+        Case { is_parallel: true, ..small },
+        Case { is_mapped: true, ..small },
+        Case { is_studio: true, ..small },
+        Case { window: Some([-5, 9]), ..small },
+        Case { particles: 1, ..small },
+        Case { particles: 9, ..small },
+        Case { particles: 2049, ..small },
+    ] {
+        assert_equal(&case, &support::compare(&mut renderer, &case, level));
+    }
+}
+
+#[test]
+fn every_run_gives_the_same_bytes() {
+    let Some(device) = device(Checks::Off) else { return };
+    let mut renderer = SceneRenderer::new(device);
+    let case = Case { is_studio: true, ..Case::small() };
+    let first = support::film(&mut renderer, &case).0;
+    assert!(first.color.iter().any(|color| color[3] > 0.0));
+    for _ in 0..2 {
+        assert!(support::film(&mut renderer, &case).0 == first);
+    }
+}
+
+#[test]
+fn more_than_an_array_holds_is_refused() {
+    let Some(device) = device(Checks::Off) else { return };
+    let max = device.adapter().max_array;
+    // A software driver has 128 MiB; a GPU more than a test should allocate
+    if max > 256 << 20 {
+        return;
+    }
+    let mut renderer = SceneRenderer::new(device);
+    let particles = usize::try_from(max / 12 + 1).unwrap();
+    let case = Case { particles, ..Case::small() };
+    let error = support::prepare(&mut renderer, &case).unwrap_err();
+    assert!(matches!(error, GpuError::TooLarge { .. }), "{error}");
+    // The device still works
+    let small = Case::small();
+    support::prepare(&mut renderer, &small).unwrap();
+    assert!(support::film(&mut renderer, &small).0.color.iter().any(|color| color[3] > 0.0));
+}
+
+#[test]
+fn a_raised_flag_stops_a_picture() {
+    let Some(device) = device(Checks::Off) else { return };
+    let mut renderer = SceneRenderer::new(device);
+    let error = support::stopped(&mut renderer, &Case::small()).unwrap_err();
+    assert_eq!(error.to_string(), "interrupted");
+}
+
+#[test]
+fn unknown_adapters_are_refused() {
+    let count = spherule_gpu::adapters().len();
+    let error = Device::open(count + 3, Checks::Off).unwrap_err();
+    let expected = if count == 0 {
+        GpuError::NoAdapter
+    } else {
+        GpuError::UnknownAdapter { index: count + 3, count }
+    };
+    assert_eq!(error, expected);
+}
