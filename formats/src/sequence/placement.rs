@@ -1,0 +1,175 @@
+//! Where the particles of all frames are placed: in the periodic cell, with whole molecules, around a group of particles, and
+//! turned with it.
+
+use std::fmt::Debug;
+use std::sync::{Arc, OnceLock};
+
+use glam::DVec3;
+use spherule_frame::center::{center_in_cell, mean_position, move_mean_to};
+use spherule_frame::superpose::{GroupPlaces, superpose};
+use spherule_frame::{
+    BondLengths, FrameError, Molecules, ParseError, PeriodicImages, RawParticles,
+};
+
+use super::Sequence;
+
+/// A group of particles, which this crate cannot find itself: it knows no conditions.
+pub trait Group: Debug + Send + Sync {
+    /// The indices of its particles in a frame, rising, and at least one.
+    ///
+    /// # Errors
+    /// There is none, or the frame lacks what is needed to find them.
+    fn particles(&self, frame: &RawParticles) -> Result<Vec<u32>, ParseError>;
+}
+
+/// What is done with the particles of each frame, in the order of the fields.
+#[derive(Debug, Clone, Default)]
+pub struct Placement {
+    /// Wrapping and unwrapping; copies are made at the end.
+    pub images: PeriodicImages,
+    /// The lengths of bonds, for unwrapping without bonds.
+    pub lengths: Option<Arc<BondLengths>>,
+    /// The group that stays in the middle of a periodic cell, or without one where it is in the first frame.
+    pub center: Option<Arc<dyn Group>>,
+    /// The group that is superposed on that of the first frame.
+    pub align: Option<Arc<dyn Group>>,
+}
+
+impl Placement {
+    /// Whether particles stay as they are.
+    pub(super) fn is_none(&self) -> bool {
+        self.images.is_none() && self.center.is_none() && self.align.is_none()
+    }
+
+    /// Whether `particles` are placed like those of the first frame.
+    pub(super) fn needs_reference(&self, particles: &RawParticles) -> bool {
+        let has_middle = particles.cell.is_some_and(|cell| cell.periodic.contains(&true));
+        self.align.is_some() || (self.center.is_some() && !has_middle)
+    }
+}
+
+/// Where groups are in the first frame.
+#[derive(Debug)]
+pub(super) struct Reference {
+    /// The mean position of the group that stays where it is.
+    mean: Option<DVec3>,
+    /// The places of the group that others are superposed on.
+    group: Option<GroupPlaces>,
+}
+
+/// The reference once it is known, or why there is none.
+pub(super) type ReferenceCell = OnceLock<Result<Reference, String>>;
+
+impl Sequence {
+    /// Whether [`Self::reference`] reads nothing.
+    pub(super) fn has_reference(&self) -> bool {
+        self.reference.get().is_some()
+    }
+
+    /// Where groups are in the first frame of the sequence, for frame `index`. It is read once; several threads may do so
+    /// at the same time, with the same result.
+    pub(super) fn reference(&self, index: usize) -> Result<&Reference, FrameError> {
+        let read = || self.read_reference().map_err(|error| error.to_string());
+        // No thread waits in a lock while another one that reads waits for threads
+        let found = match self.reference.get() {
+            Some(found) => found,
+            None => {
+                let read = read();
+                self.reference.get_or_init(|| read)
+            }
+        };
+        found.as_ref().map_err(|what| {
+            let what =
+                format!("the first frame, which others are placed like, cannot be used: {what}");
+            self.in_first(index, ParseError::unsupported(what))
+        })
+    }
+
+    fn read_reference(&self) -> Result<Reference, FrameError> {
+        let mut particles = self.read_parts(0)?.particles;
+        let in_first = |error| self.in_first(0, error);
+        let Placement { images, lengths, center, align } = &self.placement;
+        let molecules = images
+            .move_particles(&mut particles, lengths.as_deref(), self.budget)
+            .map_err(in_first)?;
+        let mean = match center {
+            None => None,
+            Some(group) => {
+                let chosen = group.particles(&particles).map_err(in_first)?;
+                move_to_middle(&mut particles, &molecules, &chosen).map_err(in_first)?;
+                mean_position(&particles.positions, &chosen)
+            }
+        };
+        let group = match align {
+            None => None,
+            Some(group) => {
+                let chosen = group.particles(&particles).map_err(in_first)?;
+                let places = GroupPlaces::of(&particles, &chosen);
+                // A group without a rotation is a fault of this frame
+                superpose(&mut particles, &chosen, &places).map_err(in_first)?;
+                Some(places)
+            }
+        };
+        Ok(Reference { mean, group })
+    }
+
+    /// Places the particles of frame `index`, which is as it is in its files.
+    pub(super) fn place(
+        &self,
+        index: usize,
+        particles: &mut RawParticles,
+    ) -> Result<(), FrameError> {
+        if self.placement.is_none() {
+            return Ok(());
+        }
+        let reference = if self.placement.needs_reference(particles) {
+            Some(self.reference(index)?)
+        } else {
+            None
+        };
+        self.place_like(reference, particles).map_err(|error| self.in_first(index, error))
+    }
+
+    fn place_like(
+        &self,
+        reference: Option<&Reference>,
+        particles: &mut RawParticles,
+    ) -> Result<(), ParseError> {
+        let Placement { images, lengths, center, align } = &self.placement;
+        let molecules = images.move_particles(particles, lengths.as_deref(), self.budget)?;
+        if let Some(group) = center {
+            let chosen = group.particles(particles)?;
+            let mean = reference.and_then(|reference| reference.mean);
+            if !move_to_middle(particles, &molecules, &chosen)?
+                && let Some(mean) = mean
+            {
+                move_mean_to(particles, &chosen, mean);
+            }
+        }
+        if let Some(group) = align
+            && let Some(places) = reference.and_then(|reference| reference.group.as_ref())
+        {
+            let chosen = group.particles(particles)?;
+            superpose(particles, &chosen, places)?;
+        }
+        images.copy_particles(particles, self.budget)
+    }
+}
+
+/// Moves the `chosen` particles to the middle of the cell, with all others around them. False without a periodic cell.
+fn move_to_middle(
+    particles: &mut RawParticles,
+    molecules: &Molecules,
+    chosen: &[u32],
+) -> Result<bool, ParseError> {
+    let Some(cell) = particles.cell.filter(|cell| cell.periodic.contains(&true)) else {
+        return Ok(false);
+    };
+    let inverse = cell.fractions().ok_or_else(|| {
+        ParseError::unsupported(
+            "the simulation cell has no volume, so that nothing can be moved to its middle",
+        )
+    })?;
+    center_in_cell(particles, (&cell, inverse), molecules, chosen);
+    Ok(true)
+}
