@@ -148,6 +148,21 @@ fn an_aligned_molecule_does_not_turn() {
     workshop.run(&["convert", "in", "-o", "native"]).expect(0);
     let native = rendered(&workshop, "native", "from-native", &align);
     assert!(motion(&native) < 0.5, "{native:?}");
+    // Those without ids have the particles in another order
+    let without_ids = workshop.join("unnumbered");
+    fs::create_dir_all(&without_ids).expect("a directory");
+    for frame in 0..FRAMES {
+        let name = format!("f_{frame}.xyz");
+        let text = fs::read_to_string(workshop.join("in").join(&name)).expect("a file");
+        fs::write(without_ids.join(name), text.replace(":id:I:1", ":number:I:1")).expect("a file");
+    }
+    let numbered = ["render", "unnumbered", "-o", "by-order/f.####.exr"];
+    workshop.run(&[&numbered[..], &VIEW, &align].concat()).expect(0);
+    workshop.run(&["convert", "unnumbered", "-o", "unnumbered-native"]).expect(0);
+    let native = ["still", "unnumbered-native", "-o", "a.exr"];
+    let ran = workshop.run(&[&native[..], &VIEW, &align].concat());
+    assert_ne!(ran.code(), Some(0));
+    ran.prints("cell.align needs ids in native frames");
     // The first frame is that of the input, whatever a run renders
     let pattern = "late/f.####.exr";
     let late = ["render", "in", "-o", pattern, "--frames", "2"];

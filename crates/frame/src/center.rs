@@ -6,6 +6,9 @@ use glam::{DMat3, DVec3};
 
 use crate::{Molecules, Positions, RawParticles, SimulationCell};
 
+/// Bytes for each particle that [`center_in_cell`] needs at most: sums and means of molecules.
+pub const BYTES_EACH: u64 = (size_of::<Sum>() + size_of::<(DVec3, f64)>()) as u64;
+
 /// The mean direction on a circle means something above this part of the radius.
 const MIN_RESULTANT: f64 = 1e-9;
 
@@ -36,31 +39,43 @@ pub fn center_in_cell(
     molecules: &Molecules,
     chosen: &[u32],
 ) {
-    // Find the parts of the group in each molecule
-    let mut parts = vec![Sum::default(); unit_count(molecules, particles.positions.len())];
-    for particle in chosen.iter().map(|particle| *particle as usize) {
-        parts[unit_of(molecules, particle)].add(particles.positions.get(particle));
-    }
-    let fraction = |place: DVec3| inverse * (place - cell.origin);
-    let parts: Vec<(DVec3, f64)> = parts
-        .iter()
-        .filter_map(|part| Some((fraction(part.mean()?), f64::from(part.count))))
-        .collect();
-    if parts.is_empty() {
+    let Some(center) = center_of(&particles.positions, (cell, inverse), molecules, chosen) else {
         return;
-    }
-    // Move their centre to the middle
-    let folds = *molecules != Molecules::Unfolded;
-    let center = DVec3::from_array(std::array::from_fn(|edge| {
-        let along = || parts.iter().map(|(place, weight)| (place[edge], *weight));
-        if folds && cell.periodic[edge] { periodic_mean(along) } else { mean(along()) }
-    }));
+    };
     let [a, b, c] = cell.vectors;
     let offset = DMat3::from_cols(a, b, c) * (DVec3::splat(0.5) - center);
     particles.positions.each(|position| position + offset);
-    if folds {
+    if *molecules != Molecules::Unfolded {
         wrap(particles, (cell, inverse), molecules);
     }
+}
+
+/// The centre of the `chosen` particles, in fractions of the edges; none without one that is finite.
+fn center_of(
+    positions: &Positions,
+    (cell, inverse): (&SimulationCell, DMat3),
+    molecules: &Molecules,
+    chosen: &[u32],
+) -> Option<DVec3> {
+    // Find the parts of the group in each molecule
+    let mut sums = vec![Sum::default(); unit_count(molecules, positions.len())];
+    for particle in chosen.iter().map(|particle| *particle as usize) {
+        sums[unit_of(molecules, particle)].add(positions.get(particle));
+    }
+    let fractions = |part: &Sum| {
+        let place = inverse * (part.mean()? - cell.origin);
+        Some((place, f64::from(part.count)))
+    };
+    let parts: Vec<(DVec3, f64)> = sums.iter().filter_map(fractions).collect();
+    if parts.is_empty() {
+        return None;
+    }
+    // Take the mean along each edge
+    let folds = *molecules != Molecules::Unfolded;
+    Some(DVec3::from_array(std::array::from_fn(|edge| {
+        let along = || parts.iter().map(|(place, weight)| (place[edge], *weight));
+        if folds && cell.periodic[edge] { periodic_mean(along) } else { mean(along()) }
+    })))
 }
 
 /// Moves each molecule by whole edges, so that its centre is in the cell.

@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use crate::names::ID;
-use crate::whole::{Molecules, make_whole};
+use crate::whole::{self, Molecules, make_whole};
 use crate::with_values;
 use crate::{
     Attribute, AttributeData, Bond, BondLengths, MemoryBudget, ParseError, Positions, RawParticles,
@@ -41,6 +41,11 @@ impl PeriodicImages {
     pub fn count(&self) -> u64 {
         let [a, b, c] = self.replicate.map(u64::from);
         a.saturating_mul(b).saturating_mul(c)
+    }
+
+    /// Bytes that [`Self::move_particles`] needs at most beside `count` particles.
+    pub const fn bytes_to_move(&self, count: u64) -> u64 {
+        if self.unwrap { count.saturating_mul(whole::BYTES_EACH) } else { 0 }
     }
 
     /// Wraps and unwraps `particles`, and returns what that shows of their molecules. `lengths` are those of bonds between

@@ -4,7 +4,7 @@
 
 use glam::{DMat3, DQuat, DVec3, Vec3};
 
-use crate::grain_columns::GrainColumns;
+use crate::grain_columns::{GrainColumns, is_size};
 use crate::names::{COLOR, is_one_of};
 use crate::values::id_of;
 use crate::{Attribute, AttributeData, ParseError, RawParticles, SimulationCell};
@@ -128,7 +128,7 @@ impl Superposition {
 }
 
 /// Turns and moves `particles` so that the `chosen` ones are where `reference` has them, with their cell and all vectors:
-/// attributes of three floating-point numbers that are not colours. Adds a note if grains have orientations, which do not
+/// attributes of three floating-point numbers that are not colours or sizes. Adds a note if grains have orientations, which do not
 /// turn.
 ///
 /// # Errors
@@ -155,10 +155,15 @@ pub fn superpose(
     Ok(())
 }
 
+/// Attributes of three numbers along the axes of a particle: those of GSD.
+const BODY_VECTORS: [&str; 1] = ["moment_inertia"];
+
 /// Whether an attribute has directions in space.
 fn is_vector(attribute: &Attribute) -> bool {
     let is_float = matches!(attribute.data, AttributeData::F32(_) | AttributeData::F64(_));
-    attribute.components == 3 && is_float && !is_one_of(&attribute.name, &COLOR)
+    let name = &attribute.name;
+    let is_other = is_one_of(name, &COLOR) || is_one_of(name, &BODY_VECTORS) || is_size(name);
+    attribute.components == 3 && is_float && !is_other
 }
 
 /// Turns the vectors of an attribute.
@@ -254,8 +259,9 @@ mod tests {
             positions: Positions::F64(places),
             attributes: vec![
                 vectors("velocity", AttributeData::F32(speeds.clone())),
-                vectors("color", AttributeData::F32(speeds)),
+                vectors("color", AttributeData::F32(speeds.clone())),
                 vectors("force", AttributeData::F64([0.0, 2.0, 0.0].repeat(count))),
+                vectors("AsphericalShape", AttributeData::F32(speeds)),
             ],
             cell: SimulationCell::new(DVec3::ONE, [DVec3::X, DVec3::Y, DVec3::Z], [true; 3]),
             ..RawParticles::default()
@@ -282,11 +288,13 @@ mod tests {
                 let found = all.positions.get(i);
                 assert!(found.distance(expected) < 1e-9, "{axis} {angle}: {found} {expected}");
             }
-            // Vectors and the cell turn with it, colours do not
+            // Vectors and the cell turn with it, colours and sizes do not
             let back = turn.transpose();
             let AttributeData::F32(velocities) = &all.attributes[0].data else { panic!() };
             assert!(Vec3::from_slice(velocities).distance((back * DVec3::X).as_vec3()) < 1e-6);
-            assert_eq!(all.attributes[1], particles(places()).attributes[1]);
+            for other in [1, 3] {
+                assert_eq!(all.attributes[other], particles(places()).attributes[other]);
+            }
             let AttributeData::F64(forces) = &all.attributes[2].data else { panic!() };
             assert!(DVec3::from_slice(forces).distance(back * DVec3::Y * 2.0) < 1e-9);
             let cell = all.cell.unwrap();

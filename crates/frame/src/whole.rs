@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 use spherule_files::counted;
 
 use crate::{Bond, BondLengths, MemoryBudget, ParseError, RawParticles, SimulationCell};
-use bins::{AtomBins, BYTES_EACH, Cells, edges};
+use bins::{AtomBins, Cells, edges};
 
 mod bins;
 
@@ -13,6 +13,10 @@ const IMAGE_FLAGS: [&str; 3] = ["ix", "iy", "iz"];
 
 /// Most bonds by distance for each particle, on average; more mean another unit of lengths.
 const MAX_BONDS_EACH: usize = 8;
+
+/// Bytes for each particle while molecules are made whole: by distance, which needs most; where it is placed, and lists of
+/// those that are open and of a molecule.
+pub(super) const BYTES_EACH: u64 = (bins::BYTES_EACH + size_of::<Cells>() + 4 + 16) as u64;
 
 /// The molecule of particles that have not been found yet.
 const NONE: u32 = u32::MAX;

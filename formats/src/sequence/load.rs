@@ -22,7 +22,8 @@ pub struct Loaded {
     pub notes: Vec<String>,
     /// Bytes of all its files, uncompressed.
     pub all_bytes: u64,
-    /// Bytes held at most for one of its files beside its numbers: one is in memory at a time.
+    /// Bytes held at most for one of its files beside its numbers: one is in memory at a time, and none while particles are
+    /// placed, which counts as well.
     pub content_bytes: u64,
 }
 
@@ -74,7 +75,9 @@ impl Sequence {
             self.reference(index)?;
             loaded = self.read_parts(index)?;
         }
+        let count = loaded.particles.positions.len() as u64;
         self.place(index, &mut loaded.particles)?;
+        loaded.content_bytes = loaded.content_bytes.max(self.placement.bytes(count));
         loaded.notes.append(&mut loaded.particles.notes);
         Ok(loaded)
     }

@@ -2,11 +2,13 @@
 //! turned with it.
 
 use std::fmt::Debug;
+use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
-use spherule_frame::center::{center_in_cell, mean_position, move_mean_to};
+use spherule_frame::center::{self, center_in_cell, mean_position, move_mean_to};
 use spherule_frame::superpose::{GroupPlaces, superpose};
+use spherule_frame::values::id_of;
 use spherule_frame::{
     BondLengths, FrameError, Molecules, ParseError, PeriodicImages, RawParticles,
 };
@@ -39,6 +41,13 @@ impl Placement {
     /// Whether particles stay as they are.
     pub(super) fn is_none(&self) -> bool {
         self.images.is_none() && self.center.is_none() && self.align.is_none()
+    }
+
+    /// Bytes that placing `count` particles needs at most beside them.
+    pub(super) fn bytes(&self, count: u64) -> u64 {
+        let center = if self.center.is_some() { center::BYTES_EACH } else { 0 };
+        // Molecules have been made whole before
+        self.images.bytes_to_move(count).max(center.saturating_mul(count))
     }
 
     /// Whether `particles` are placed like those of the first frame.
@@ -122,12 +131,27 @@ impl Sequence {
         if self.placement.is_none() {
             return Ok(());
         }
+        self.check_order(index, particles).map_err(|error| self.in_first(index, error))?;
         let reference = if self.placement.needs_reference(particles) {
             Some(self.reference(index)?)
         } else {
             None
         };
         self.place_like(reference, particles).map_err(|error| self.in_first(index, error))
+    }
+
+    /// Checks that particles of several frames can be matched.
+    fn check_order(&self, index: usize, particles: &RawParticles) -> Result<(), ParseError> {
+        let is_needed = self.placement.align.is_some() && id_of(&particles.attributes).is_none();
+        // A file that cannot be opened has been reported before
+        let is_native = |path: &Path| crate::open::is_native(path).unwrap_or(false);
+        if is_needed && self.inputs(index).into_iter().any(is_native) {
+            return Err(ParseError::unsupported(
+                "cell.align needs ids in native frames, which have their particles in another order; align the files \
+                 that they were made of",
+            ));
+        }
+        Ok(())
     }
 
     fn place_like(

@@ -7,8 +7,8 @@ use crate::{BondLengths, RawParticles, SimulationCell};
 /// Numbers of cells along each edge.
 pub(super) type Cells = [i32; 3];
 
-/// Bytes for each particle: an atom, its slot, and the beginnings of bins.
-pub(super) const BYTES_EACH: u64 = (size_of::<Atom>() + 4 + 4 * MAX_BINS_EACH) as u64;
+/// Bytes for each particle: an atom, its slot, what sorts it, and the beginnings of bins.
+pub(super) const BYTES_EACH: usize = size_of::<Atom>() + 4 + 16 + 4 * MAX_BINS_EACH;
 
 /// Most bins for each atom, on average.
 const MAX_BINS_EACH: usize = 4;
@@ -44,22 +44,29 @@ struct Axis {
     start: f64,
     extent: f64,
     bins: i32,
-    /// How many bins a bond reaches.
-    steps: i32,
+    /// The part of the edge that has the length one between the faces of the cell at both of its ends.
+    unit: f64,
     is_periodic: bool,
 }
 
 impl Axis {
-    #[expect(clippy::cast_possible_truncation, reason = "limited to the bins")]
-    fn bin(&self, fraction: f64) -> i32 {
-        let place = (fraction - self.start) / self.extent * f64::from(self.bins);
-        (place as i32).clamp(0, self.bins - 1)
+    /// The bin of a fraction of the edge, if there were more on both sides.
+    #[expect(clippy::cast_possible_truncation, reason = "saturates")]
+    fn place(&self, fraction: f64) -> i32 {
+        ((fraction - self.start) / self.extent * f64::from(self.bins)).floor() as i32
     }
 
-    /// The bins around `bin`, each with the number of cells to its image.
-    fn around(&self, bin: i32) -> impl Iterator<Item = (i32, i32)> {
+    fn bin(&self, fraction: f64) -> i32 {
+        self.place(fraction).clamp(0, self.bins - 1)
+    }
+
+    /// The bins up to a distance around a fraction of the edge, each with the number of cells to its image.
+    fn around(&self, fraction: f64, distance: f64) -> impl Iterator<Item = (i32, i32)> {
         let axis = *self;
-        (bin - axis.steps..=bin + axis.steps).filter_map(move |place| {
+        let (own, reach) = (axis.bin(fraction), MARGIN * distance * axis.unit);
+        let first = axis.place(fraction - reach).max(own - MAX_STEPS);
+        let last = axis.place(fraction + reach).min(own + MAX_STEPS);
+        (first..=last).filter_map(move |place| {
             let cells = place.div_euclid(axis.bins);
             (axis.is_periodic || cells == 0).then(|| (place.rem_euclid(axis.bins), cells))
         })
@@ -71,6 +78,8 @@ pub(super) struct AtomBins<'a> {
     cell: &'a SimulationCell,
     inverse: DMat3,
     axes: [Axis; 3],
+    /// The largest share.
+    largest: f64,
     /// Sorted by bins.
     atoms: Vec<Atom>,
     /// Where the atoms of each bin begin.
@@ -87,12 +96,13 @@ impl<'a> AtomBins<'a> {
         lengths: &BondLengths,
     ) -> Option<Self> {
         let mut atoms = atoms_of(particles, (cell, inverse), lengths)?;
-        let longest = 2.0 * atoms.iter().map(|atom| atom.share).fold(0.0, f64::max);
-        let axes = axes_of(cell, inverse, &atoms, longest);
+        let largest = atoms.iter().map(|atom| atom.share).fold(0.0, f64::max);
+        let axes = axes_of(cell, inverse, &atoms, 2.0 * largest);
         let mut bins = Self {
             cell,
             inverse,
             axes,
+            largest,
             atoms: Vec::new(),
             starts: Vec::new(),
             slots: vec![NONE; particles.positions.len()],
@@ -113,10 +123,14 @@ impl<'a> AtomBins<'a> {
         Some(bins)
     }
 
+    fn fractions(&self, position: DVec3) -> [f64; 3] {
+        (self.inverse * (position - self.cell.origin)).to_array()
+    }
+
     /// The bins of a position along each edge.
     fn place(&self, position: DVec3) -> [i32; 3] {
-        let fraction = (self.inverse * (position - self.cell.origin)).to_array();
-        std::array::from_fn(|edge| self.axes[edge].bin(fraction[edge]))
+        let fractions = self.fractions(position);
+        std::array::from_fn(|edge| self.axes[edge].bin(fractions[edge]))
     }
 
     #[expect(clippy::cast_sign_loss, reason = "bins are not negative")]
@@ -135,13 +149,14 @@ impl<'a> AtomBins<'a> {
         let Some(atom) = self.atoms.get(self.slots[particle] as usize) else {
             return Some(());
         };
-        let [a, b, c] = self.place(atom.position);
+        let [a, b, c] = self.fractions(atom.position);
         let [edge_a, edge_b, edge_c] = self.cell.vectors;
-        for (c, cells_c) in self.axes[2].around(c) {
+        let longest = atom.share + self.largest;
+        for (c, cells_c) in self.axes[2].around(c, longest) {
             let offset = f64::from(cells_c) * edge_c - atom.position;
-            for (b, cells_b) in self.axes[1].around(b) {
+            for (b, cells_b) in self.axes[1].around(b, longest) {
                 let offset = offset + f64::from(cells_b) * edge_b;
-                for (a, cells_a) in self.axes[0].around(a) {
+                for (a, cells_a) in self.axes[0].around(a, longest) {
                     let offset = offset + f64::from(cells_a) * edge_a;
                     let cells = [cells_a, cells_b, cells_c];
                     let bin = self.index([a, b, c]) as usize;
@@ -205,18 +220,12 @@ fn axes_of(cell: &SimulationCell, inverse: DMat3, atoms: &[Atom], longest: f64) 
         #[expect(clippy::cast_possible_truncation, reason = "limited")]
         let bins = (extent * height(edge) / size).clamp(1.0, (most as f64).min(1e9)) as i32;
         let extent = extent.max(f64::MIN_POSITIVE);
-        Axis { start, extent, bins, steps: 1, is_periodic }
+        Axis { start, extent, bins, unit: height(edge).recip(), is_periodic }
     });
     // There are not many more bins than atoms
     while axes.iter().map(|axis| f64::from(axis.bins)).product::<f64>() > most as f64 {
         let longest = axes.iter_mut().max_by_key(|axis| axis.bins).expect("there are three");
         longest.bins = (longest.bins + 1) / 2;
-    }
-    for (edge, axis) in axes.iter_mut().enumerate() {
-        let length = axis.extent * height(edge) / f64::from(axis.bins);
-        #[expect(clippy::cast_possible_truncation, reason = "limited")]
-        let steps = (size / length).ceil().clamp(1.0, f64::from(MAX_STEPS)) as i32;
-        axis.steps = if axis.is_periodic { steps } else { steps.min(axis.bins) };
     }
     axes
 }
