@@ -197,3 +197,80 @@ fn move_to_middle(
     center_in_cell(particles, (&cell, inverse), molecules, chosen);
     Ok(true)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::super::{SequenceInput, SequenceSettings};
+    use super::*;
+    use crate::MemoryBudget;
+
+    /// The particles with these indices.
+    #[derive(Debug)]
+    struct Indices(Vec<u32>);
+
+    impl Group for Indices {
+        fn particles(&self, frame: &RawParticles) -> Result<Vec<u32>, ParseError> {
+            let count = frame.positions.len();
+            if self.0.iter().any(|index| *index as usize >= count) {
+                return Err(ParseError::unsupported(format!("{count} particles")));
+            }
+            Ok(self.0.clone())
+        }
+    }
+
+    /// Frames of four particles without a cell, each shifted and turned by a right angle more than the one before.
+    fn sequence(placement: Placement) -> (tempfile::TempDir, Sequence) {
+        let dir = tempfile::tempdir().unwrap();
+        let mut places = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [5.0, 5.0, 3.0]];
+        for frame in 0..3 {
+            let row = |[x, y, z]: &[f64; 3]| format!("{x},{y},{z}\n");
+            let rows: String = places.iter().map(row).collect();
+            fs::write(dir.path().join(format!("f_{frame}.csv")), format!("x,y,z\n{rows}")).unwrap();
+            places = places.map(|[x, y, z]| [10.0 - y, x, z - 4.0]);
+        }
+        let input = SequenceInput::Directory(dir.path().to_owned());
+        let settings = SequenceSettings { budget: MemoryBudget::UNLIMITED, follow_links: false };
+        let mut sequence = Sequence::open_with(&input, settings).unwrap();
+        sequence.set_placement(placement);
+        (dir, sequence)
+    }
+
+    fn places(sequence: &Sequence, index: usize) -> Vec<DVec3> {
+        let particles = sequence.load_raw(index).unwrap();
+        (0..4).map(|i| particles.positions.get(i)).collect()
+    }
+
+    #[test]
+    fn without_a_cell_groups_stay_where_they_are_in_the_first_frame() {
+        let group = || Some(Arc::new(Indices(vec![0, 1, 2])) as Arc<dyn Group>);
+        let (_dir, plain) = sequence(Placement::default());
+        let first = places(&plain, 0);
+        assert!(places(&plain, 2)[3].distance(first[3]) > 5.0);
+        // The last frame is loaded first: it does not become the reference
+        let (_dir, centred) = sequence(Placement { center: group(), ..Placement::default() });
+        assert!(centred.lone_file(0).is_none());
+        for index in [2, 0, 1] {
+            let found = places(&centred, index);
+            let mean = |places: &[DVec3]| places[..3].iter().sum::<DVec3>() / 3.0;
+            assert!(mean(&found).distance(mean(&first)) < 1e-9, "{index}");
+            assert_eq!(index == 0, found[1].distance(first[1]) < 1e-9, "it does not turn");
+        }
+        let (_dir, aligned) = sequence(Placement { align: group(), ..Placement::default() });
+        for index in [2, 0, 1] {
+            for (found, expected) in places(&aligned, index).iter().zip(&first) {
+                assert!(found.distance(*expected) < 1e-5, "{index}: {found} {expected}");
+            }
+        }
+        // Without its particles in the first frame, all frames fail
+        let group = Some(Arc::new(Indices(vec![7])) as Arc<dyn Group>);
+        let (_dir, none) = sequence(Placement { align: group, ..Placement::default() });
+        let error = none.load_raw(1).unwrap_err().to_string();
+        assert!(
+            error.contains("f_1.csv: the first frame, which others are placed like"),
+            "{error}"
+        );
+        assert!(error.contains("f_0.csv: 4 particles"), "{error}");
+    }
+}
