@@ -1,7 +1,6 @@
 //! Molecules of periodic cells made whole, so that no bond crosses the cell.
 
 use glam::{DMat3, DVec3};
-use spherule_files::counted;
 
 use crate::{Bond, BondLengths, MemoryBudget, ParseError, RawParticles, SimulationCell};
 use bins::{AtomBins, Cells, edges};
@@ -113,19 +112,16 @@ impl Placed {
 
     /// What the user should know of bonds by distance.
     fn notes(&self) -> Vec<String> {
-        let were = |count: usize| if count == 1 { "was" } else { "were" };
         let mut notes = vec![format!(
-            "the file has no bonds: cell.unwrap found them by distance, by covalent radii; {} {} cut by the boundary \
-             and {} made whole",
-            counted(self.cut, "molecule"),
-            were(self.cut),
-            were(self.cut),
+            "the file has no bonds: cell.unwrap found them by distance, by covalent radii; molecules that the boundary cut \
+             and that were made whole: {}",
+            self.cut
         )];
         if self.endless > 0 {
             notes.push(format!(
-                "{} with bonds across the boundary to its own image, such as a crystal, cannot be made whole and stays \
-                 as it is",
-                counted(self.endless, "network")
+                "networks with bonds to their own images across the boundary, such as crystals, which cannot be made \
+                 whole and stay as they are: {}",
+                self.endless
             ));
         }
         notes
