@@ -49,10 +49,10 @@ pub use open::FrameFile;
 pub use sequence::{Sequence, SequenceError, SequenceFrame, SequenceInput, SequenceSettings};
 pub use spherule_files::{ValueError, escape_controls, is_control};
 pub use spherule_frame::{
-    Attribute, AttributeData, Bond, Endian, FARTHEST, FrameError, Labels, Lattice, MemoryBudget,
-    ParseError, ParticleFrame, PeriodicImages, PositionSlice, Positions, Radius, RawParticles,
-    ScalarType, SimulationCell, choose_origin, find_radius, generate, is_near, is_radius, join,
-    names, sample_indices, with_values,
+    Attribute, AttributeData, Bond, BondLengths, Endian, FARTHEST, FrameError, Labels, Lattice,
+    MemoryBudget, ParseError, ParticleFrame, PeriodicImages, PositionSlice, Positions, Radius,
+    RawParticles, ScalarType, SimulationCell, choose_origin, find_radius, generate, is_near,
+    is_radius, join, names, sample_indices, with_values,
 };
 pub use spherule_readers::read::{element_symbol, name_code};
 pub use spherule_readers::{Format, ValueNames, mesh, read};

@@ -25,7 +25,7 @@ pub(super) const GUESSES: &[(&str, &str)] = &[
         "--eye X,Y,Z|--view SIDE",
     ),
     (
-        "target focalpoint center centre lookat at camerafocus camerafocalpoint viewcenter",
+        "target focalpoint centre lookat at camerafocus camerafocalpoint viewcenter",
         "--look-at X,Y,Z",
     ),
     ("upaxis viewup vup updirection cameraup", "--up AXIS"),
@@ -135,6 +135,8 @@ pub(super) const GUESSES: &[(&str, &str)] = &[
     ),
     ("cellwidth linewidth lw edgewidth", "--set cell.radius=LENGTH"),
     ("pbc periodic wraparound periodicimages", "--wrap|--replicate A,B,C"),
+    ("whole wholemolecules makewhole unwrapmolecules nojump", "--unwrap"),
+    ("superpose superimpose rmsfit rottrans alignto", "--align 'CONDITION'"),
     ("repeat supercell copies images multiply", "--replicate A,B,C"),
     ("bond sticks stick showbonds createbonds", "--bonds"),
     ("ballandstick ballstick licorice cpk", "--radius covalent --bonds"),

@@ -33,7 +33,7 @@ const LISTS: [&str; 12] = [
 ];
 
 /// Other options with a value that is not the default, and the key that it is laid over.
-const FLAGS: [(&str, &str); 64] = [
+const FLAGS: [(&str, &str); 66] = [
     ("--output x.####.exr", "output.path = \"x.####.exr\""),
     ("--frames 3-4", "input.frames = \"3-4\""),
     ("--width 7", "image.width = 7"),
@@ -81,6 +81,8 @@ const FLAGS: [(&str, &str); 64] = [
     ("--replicate 2,2,1", "cell.replicate = [2, 2, 1]"),
     ("--unwrap", "cell.unwrap = true"),
     ("--wrap", "cell.wrap = true"),
+    ("--center x>2", "cell.center = \"x>2\""),
+    ("--align x>2", "cell.align = \"x>2\""),
     ("--bonds covalent", "bonds.find = \"covalent\""),
     ("--surface union", "render.surface = \"union\""),
     ("--smoothing 0.5", "surface.smoothing = 0.5"),
@@ -141,7 +143,9 @@ fn every_option_is_a_key() {
 }
 
 /// Options whose `[default: ...]` is no value that could be given.
-const WORDS: [&str; 13] = [
+const WORDS: [&str; 15] = [
+    "center",
+    "align",
     "fit",
     "where",
     "crop",

@@ -7,6 +7,7 @@ use spherule_formats::MemoryBudget;
 use spherule_formats::sequence::{Sequence, SequenceInput, SequenceSettings};
 use spherule_jobs::{publish, read_regular_text};
 
+use super::placement::placement_of;
 use super::{RunError, in_thread};
 use crate::manifest::{
     Manifest, ManifestSource, OutputPattern, RebaseError, SCHEMA_FILE, is_marked, job_schema,
@@ -64,7 +65,8 @@ impl JobManifest {
             in_thread(|| sequence.add_topology(&path))?;
         }
         self.keep_parts(&mut sequence, input.parts.as_deref())?;
-        sequence.set_images(self.manifest.cell.images());
+        let placement = placement_of(&self.manifest.cell, sequence.angstrom());
+        sequence.set_placement(placement);
         Ok(sequence)
     }
 

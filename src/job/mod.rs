@@ -49,6 +49,7 @@ mod follow;
 pub mod isolate;
 mod manifest_file;
 mod meshes;
+mod placement;
 mod render_job;
 mod render_run;
 mod requested;

@@ -28,7 +28,12 @@ pub struct RenderJob {
     shown_output: PathBuf,
     shard: Option<Shard>,
     files: SceneFiles,
+    /// The number of the frame that others are placed like, if they are.
+    reference: Option<i64>,
 }
+
+/// The setting of plans with the number of the frame that others are placed like; not a key of manifests.
+const REFERENCE: &str = "cell.reference";
 
 impl RenderJob {
     /// A job with the frames of `sequence`. This run processes `shard`, or all frames.
@@ -45,7 +50,9 @@ impl RenderJob {
         let shown_output = PathBuf::from(requested.manifest.output.path.as_str());
         let (manifest_file, manifest) = ManifestFile::new(requested)?;
         let files = SceneFiles::new(manifest_file.dir());
-        Ok(Self { manifest, manifest_file, shown_output, shard, files })
+        let first = sequence.frames().first().map(|frame| frame.number);
+        let reference = first.filter(|_| manifest.cell.has_reference());
+        Ok(Self { manifest, manifest_file, shown_output, shard, files, reference })
     }
 
     /// The job with the defaults of the version that began it, if a run in `mode` resumes one.
@@ -164,7 +171,9 @@ impl RenderJob {
 
     /// The settings of the images. Those with the same effect as in the existing plan are written as in the plan.
     fn settings(&self, mode: ResumeMode) -> Result<Vec<(String, String)>, RunError> {
+        let reference = self.reference.map(|number| (REFERENCE.to_owned(), number.to_string()));
         let mut settings = self.manifest.settings();
+        settings.extend(reference.clone());
         let identities = self.files.identities(&self.manifest)?;
         identify(&mut settings, &identities);
         let Some(planned) = self.existing_plan(mode)? else {
@@ -172,6 +181,7 @@ impl RenderJob {
         };
         let has_rgb = planned.resolved().get("rgb").is_some_and(Value::is_object);
         let mut as_planned = self.manifest.settings_as_planned(planned.settings(), has_rgb);
+        as_planned.extend(reference);
         identify(&mut as_planned, &identities);
         // Settings that are resolved again must be the new ones
         let resolves_again =

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::{BVec3, Vec3};
 use rayon::prelude::*;
-use spherule_formats::{Lattice, SimulationCell};
+use spherule_formats::{BondLengths, Lattice, SimulationCell};
 
 use super::SharedFrame;
 use super::load_error::{LoadError, missing};
@@ -25,6 +25,14 @@ pub(super) const MAX_BONDS_EACH: u64 = 8;
 
 /// Number of particles that one task searches around.
 const CHUNK: usize = 4096;
+
+/// The greatest lengths of covalent bonds, by the atomic numbers in the attribute `name`; `angstrom` is the length of one.
+pub(crate) fn covalent_lengths(name: &str, angstrom: f64) -> BondLengths {
+    BondLengths::new(name, |number| {
+        let radius = RadiusTable::Covalent.radius(f64::from(number))?;
+        Some(angstrom * (radius + 0.5 * TOLERANCE))
+    })
+}
 
 /// The bonds of `frame`, which was read from `file` and has this `number`. Passes notes to `notes`.
 ///
@@ -149,10 +157,10 @@ impl Reach {
             let has = frame.attributes.iter().map(|a| a.name.as_str());
             missing(name, "covalent bonds", file, has)
         })?;
+        let lengths = covalent_lengths(name, angstrom);
         #[expect(clippy::cast_possible_truncation, reason = "radii are f32 in the renderer")]
         let share = |particle: usize| {
-            let radius = RadiusTable::Covalent.radius(elements.magnitude(particle));
-            radius.map_or(f32::NAN, |radius| (angstrom * (radius + 0.5 * TOLERANCE)) as f32)
+            lengths.share(elements.magnitude(particle)).map_or(f32::NAN, |share| share as f32)
         };
         let shares: Vec<f32> = (0..frame.len()).map(share).collect();
         // `max` ignores NaN

@@ -48,6 +48,7 @@ mod trace;
 mod trails;
 mod work;
 
+pub(crate) use bonds::covalent_lengths;
 pub use decoded::{DecodedFrame, DecodedShading};
 pub use error::{ImageError, WriteError};
 pub use grain_meshes::{GrainMeshLoadError, GrainMeshes};

@@ -3,6 +3,7 @@
 mod harness;
 mod picture;
 mod picture_formats;
+mod placement;
 mod simd;
 
 mod architecture;

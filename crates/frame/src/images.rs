@@ -3,10 +3,10 @@
 use glam::{DMat3, DVec3};
 
 use crate::names::ID;
-use crate::whole::make_whole;
+use crate::whole::{self, Molecules, make_whole};
 use crate::with_values;
 use crate::{
-    Attribute, AttributeData, Bond, MemoryBudget, ParseError, Positions, RawParticles,
+    Attribute, AttributeData, Bond, BondLengths, MemoryBudget, ParseError, Positions, RawParticles,
     SimulationCell,
 };
 
@@ -20,7 +20,8 @@ pub struct PeriodicImages {
     pub replicate: [u32; 3],
     /// Whether particles are moved into the cell, along the edges along which it repeats.
     pub wrap: bool,
-    /// Whether molecules are made whole, after wrapping: by their bonds, or without bonds by image flags.
+    /// Whether molecules are made whole, after wrapping: by their bonds, or without bonds by image flags, or without both
+    /// by bonds between atoms that are near each other.
     pub unwrap: bool,
 }
 
@@ -42,19 +43,24 @@ impl PeriodicImages {
         a.saturating_mul(b).saturating_mul(c)
     }
 
-    /// Wraps, unwraps and copies `particles`; the cell grows to all copies. The first particles are those of the file, then
-    /// follow the copies, with the number along the first edge rising fastest. Copies have the attributes of the original, and
-    /// an attribute `id` with the index in the file if there are no ids.
+    /// Bytes that [`Self::move_particles`] needs at most beside `count` particles.
+    pub const fn bytes_to_move(&self, count: u64) -> u64 {
+        if self.unwrap { count.saturating_mul(whole::BYTES_EACH) } else { 0 }
+    }
+
+    /// Wraps and unwraps `particles`, and returns what that shows of their molecules. `lengths` are those of bonds between
+    /// atoms, in files without bonds.
     ///
     /// # Errors
-    /// There is no cell, it has no volume, or there are too many copies.
-    pub fn apply(
+    /// There is no cell, it has no volume, or nothing says what a molecule is.
+    pub fn move_particles(
         &self,
         particles: &mut RawParticles,
+        lengths: Option<&BondLengths>,
         budget: MemoryBudget,
-    ) -> Result<(), ParseError> {
+    ) -> Result<Molecules, ParseError> {
         if self.is_none() {
-            return Ok(());
+            return Ok(Molecules::Unknown);
         }
         let unsupported = |what: &str| ParseError::unsupported(what);
         let cell = particles
@@ -66,13 +72,30 @@ impl PeriodicImages {
             })?;
             particles.positions.each(|p| wrapped(&cell, inverse, p));
         }
-        if self.unwrap {
-            make_whole(particles, &cell)?;
+        if !self.unwrap {
+            return Ok(Molecules::Unknown);
         }
-        if self.count() > 1 {
-            self.copy(particles, &cell, budget)?;
+        make_whole(particles, &cell, lengths, budget)
+    }
+
+    /// Copies `particles`; the cell grows to all copies. The first particles are those of the file, then follow the copies,
+    /// with the number along the first edge rising fastest. Copies have the attributes of the original, and an attribute
+    /// `id` with the index in the file if there are no ids.
+    ///
+    /// # Errors
+    /// There is no cell, or there are too many copies.
+    pub fn copy_particles(
+        &self,
+        particles: &mut RawParticles,
+        budget: MemoryBudget,
+    ) -> Result<(), ParseError> {
+        if self.count() <= 1 {
+            return Ok(());
         }
-        Ok(())
+        let cell = particles.cell.ok_or_else(|| {
+            ParseError::unsupported("no simulation cell, which copies and wrapping need")
+        })?;
+        self.copy(particles, &cell, budget)
     }
 
     fn copy(
@@ -181,7 +204,7 @@ fn repeat<T: Copy>(items: &mut Vec<T>, copies: usize) {
 }
 
 /// The image of `position` in the cell. Whole edges are subtracted, so that a particle in the cell stays where it is.
-fn wrapped(cell: &SimulationCell, inverse: DMat3, position: DVec3) -> DVec3 {
+pub(super) fn wrapped(cell: &SimulationCell, inverse: DMat3, position: DVec3) -> DVec3 {
     let cells = (inverse * (position - cell.origin)).floor().to_array();
     let mut moved = position;
     for ((edge, count), is_periodic) in cell.vectors.iter().zip(cells).zip(cell.periodic) {
@@ -220,8 +243,9 @@ mod tests {
     }
 
     fn applied(images: PeriodicImages, mut particles: RawParticles) -> RawParticles {
-        let done = images.apply(&mut particles, MemoryBudget::UNLIMITED);
-        done.expect("a cell");
+        let unlimited = MemoryBudget::UNLIMITED;
+        images.move_particles(&mut particles, None, unlimited).expect("a cell");
+        images.copy_particles(&mut particles, unlimited).expect("a cell");
         particles
     }
 
@@ -299,8 +323,9 @@ mod tests {
     #[test]
     fn cells_without_volume_and_too_many_copies_are_errors() {
         let fails = |images: PeriodicImages, mut particles: RawParticles, budget| {
-            let error = images.apply(&mut particles, budget).unwrap_err();
-            error.to_string()
+            let moved = images.move_particles(&mut particles, None, budget);
+            let error = moved.and_then(|_| images.copy_particles(&mut particles, budget));
+            error.unwrap_err().to_string()
         };
         let wrap = PeriodicImages { wrap: true, ..PeriodicImages::default() };
         let copy = |replicate| PeriodicImages { replicate, wrap: false, unwrap: false };

@@ -3,8 +3,8 @@
 //! A reader returns [`RawParticles`]: positions in the type of the file, and [`Attribute`]s, which are named arrays with
 //! a number of components per particle. [`ParticleFrame`] is what the renderer needs of it: finite positions in f32,
 //! relative to the origin that a sequence has in common ([`choose_origin`]). A [`SimulationCell`] and [`Bond`]s come
-//! with molecular simulations; [`PeriodicImages`] wraps particles into the cell and copies it. [`masses`] tells elements by
-//! their masses.
+//! with molecular simulations; [`PeriodicImages`] wraps particles into the cell, makes molecules whole, and copies it; [`center`]
+//! and [`superpose`] keep a group of particles in place. [`masses`] tells elements by their masses.
 //!
 //! This crate knows neither files nor rays. It uses only `spherule-files`.
 //!
@@ -29,9 +29,11 @@
 #![deny(unsafe_code)]
 
 mod attribute;
+mod bond_lengths;
 pub mod bonds;
 mod budget;
 mod cell;
+pub mod center;
 mod decode;
 mod error;
 mod frame;
@@ -48,12 +50,14 @@ mod origin;
 pub mod reading;
 mod sampling;
 mod scalar;
+pub mod superpose;
 mod type_shapes;
 pub mod values;
 mod vectors;
 mod whole;
 
 pub use attribute::{Attribute, AttributeData};
+pub use bond_lengths::BondLengths;
 pub use bonds::Bond;
 pub use budget::MemoryBudget;
 pub use cell::SimulationCell;
@@ -70,3 +74,4 @@ pub use sampling::sample_indices;
 pub use scalar::{Endian, ScalarType};
 pub use type_shapes::{TypeShape, TypeShapes};
 pub use vectors::join_vectors;
+pub use whole::Molecules;

@@ -2,37 +2,214 @@
 
 use glam::{DMat3, DVec3};
 
-use crate::{Bond, ParseError, RawParticles, SimulationCell};
+use crate::{Bond, BondLengths, MemoryBudget, ParseError, RawParticles, SimulationCell};
+use bins::{AtomBins, Cells, edges};
+
+mod bins;
 
 /// Names of the attributes with the number of cells that a particle has crossed along each edge, as LAMMPS writes them.
 const IMAGE_FLAGS: [&str; 3] = ["ix", "iy", "iz"];
 
+/// Most bonds by distance for each particle, on average; more mean another unit of lengths.
+const MAX_BONDS_EACH: usize = 8;
+
+/// Bytes for each particle while molecules are made whole: by distance, which needs most; where it is placed, and lists of
+/// those that are open and of a molecule.
+pub(super) const BYTES_EACH: u64 = (bins::BYTES_EACH + size_of::<Cells>() + 4 + 16) as u64;
+
+/// The molecule of particles that have not been found yet.
+const NONE: u32 = u32::MAX;
+
+/// Which particles stay together.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub enum Molecules {
+    /// Nothing is known of molecules.
+    #[default]
+    Unknown,
+    /// Molecules have been made whole by their bonds.
+    Whole {
+        /// The number of the molecule of each particle.
+        of: Vec<u32>,
+        /// How many molecules there are, those of one particle included.
+        count: u32,
+    },
+    /// Particles are where they have moved to over time, any number of cells away.
+    Unfolded,
+}
+
 /// Moves the particles of `particles` by whole edges of their `cell`: each to the image that is nearest to the particle that
-/// it has a bond with, or, without bonds, by the image flags.
+/// it has a bond with; without bonds by the image flags; without both next to those that are as near as bonds of
+/// `lengths`. Adds a note on bonds that were found by distance.
 ///
 /// # Errors
-/// There are neither bonds nor image flags, or the cell has no volume.
+/// There are neither bonds nor image flags nor elements, the cell has no volume, or bonds need too much memory.
 pub(super) fn make_whole(
     particles: &mut RawParticles,
     cell: &SimulationCell,
-) -> Result<(), ParseError> {
-    let offsets = if particles.bonds.is_empty() {
-        by_flags(particles, cell).ok_or_else(|| {
-            ParseError::unsupported(
-                "neither bonds nor image flags (ix, iy, iz), one of which cell.unwrap needs; --topology gives bonds",
-            )
-        })?
-    } else {
-        let inverse = cell.fractions().ok_or_else(|| {
+    lengths: Option<&BondLengths>,
+    budget: MemoryBudget,
+) -> Result<Molecules, ParseError> {
+    let inverse = || {
+        cell.fractions().ok_or_else(|| {
             ParseError::unsupported(
                 "the simulation cell has no volume, so that nothing can be unwrapped",
             )
-        })?;
-        by_bonds(particles, cell, inverse)
+        })
     };
-    let mut offsets = offsets.into_iter();
-    particles.positions.each(|position| position + offsets.next().unwrap_or(DVec3::ZERO));
-    Ok(())
+    if !particles.bonds.is_empty() {
+        let placed = by_bonds(particles, cell, inverse()?);
+        return Ok(placed.apply(particles, cell));
+    }
+    if let Some(offsets) = by_flags(particles, cell) {
+        let mut offsets = offsets.into_iter();
+        particles.positions.each(|position| position + offsets.next().unwrap_or(DVec3::ZERO));
+        return Ok(Molecules::Unfolded);
+    }
+    let count = particles.positions.len() as u64;
+    budget.check(
+        particles.byte_len().saturating_add(BYTES_EACH.saturating_mul(count)),
+        "with the bonds by distance that cell.unwrap finds it is",
+    )?;
+    let inverse = inverse()?;
+    let bins = lengths.and_then(|lengths| AtomBins::new(particles, (cell, inverse), lengths));
+    let bins = match bins {
+        None if count > 0 => {
+            return Err(ParseError::unsupported(
+                "neither bonds nor image flags (ix, iy, iz) nor elements, one of which cell.unwrap needs; --topology \
+                 gives bonds and elements",
+            ));
+        }
+        bins => bins,
+    };
+    let mut placed = Placed::new(particles.positions.len());
+    if let Some(bins) = &bins {
+        placed = by_distance(particles.positions.len(), bins)?;
+    }
+    drop(bins);
+    particles.notes.extend(placed.notes());
+    Ok(placed.apply(particles, cell))
+}
+
+/// Where the particles of molecules are placed.
+struct Placed {
+    /// By how many cells each particle moves.
+    offsets: Vec<Cells>,
+    /// The molecule of each particle.
+    molecules: Vec<u32>,
+    /// Number of molecules.
+    count: u32,
+    /// How many of them the boundary cut.
+    cut: usize,
+    /// How many have bonds with their own images.
+    endless: usize,
+}
+
+impl Placed {
+    fn new(count: usize) -> Self {
+        let (offsets, molecules) = (vec![[0; 3]; count], vec![NONE; count]);
+        Self { offsets, molecules, count: 0, cut: 0, endless: 0 }
+    }
+
+    /// What the user should know of bonds by distance.
+    fn notes(&self) -> Vec<String> {
+        let mut notes = vec![format!(
+            "the file has no bonds: cell.unwrap found them by distance, by covalent radii; molecules that the boundary cut \
+             and that were made whole: {}",
+            self.cut
+        )];
+        if self.endless > 0 {
+            notes.push(format!(
+                "networks with bonds to their own images across the boundary, such as crystals, which cannot be made \
+                 whole and stay as they are: {}",
+                self.endless
+            ));
+        }
+        notes
+    }
+
+    fn apply(self, particles: &mut RawParticles, cell: &SimulationCell) -> Molecules {
+        let mut offsets = self.offsets.into_iter();
+        particles.positions.each(|position| {
+            let cells = offsets.next().unwrap_or_default();
+            if cells == [0; 3] { position } else { position + edges(cell, cells) }
+        });
+        Molecules::Whole { of: self.molecules, count: self.count }
+    }
+
+    /// Places molecule after molecule along its bonds. The particle that comes first in each stays where it is.
+    /// `each_bond` calls its last argument with the particles that one has bonds with, and by how many cells those move
+    /// to be next to it; the number of cells is that by which it has moved itself.
+    ///
+    /// `keeps_endless`: molecules with bonds to their own images stay where they are, and each of their particles counts
+    /// as a molecule.
+    fn walk(
+        &mut self,
+        keeps_endless: bool,
+        mut each_bond: impl FnMut(usize, Cells, &mut dyn FnMut(usize, Cells)) -> Result<(), ParseError>,
+    ) -> Result<(), ParseError> {
+        let (mut open, mut members) = (Vec::new(), Vec::new());
+        for first in 0..self.molecules.len() {
+            if self.molecules[first] != NONE {
+                continue;
+            }
+            // Place each particle next to the one that it was found by
+            let own = self.count;
+            self.count += 1;
+            self.molecules[first] = own;
+            open.push(first);
+            members.clear();
+            let (mut is_cut, mut is_endless) = (false, false);
+            while let Some(placed) = open.pop() {
+                members.push(placed);
+                each_bond(placed, self.offsets[placed], &mut |other, cells| {
+                    if self.molecules[other] == NONE {
+                        self.molecules[other] = own;
+                        self.offsets[other] = cells;
+                        is_cut |= cells != [0; 3];
+                        open.push(other);
+                    } else {
+                        is_endless |= self.offsets[other] != cells;
+                    }
+                })?;
+            }
+            if !is_endless {
+                self.cut += usize::from(is_cut);
+                continue;
+            }
+            // Put those of a network back
+            self.endless += 1;
+            if keeps_endless {
+                for (member, molecule) in members.iter().zip(own..) {
+                    self.offsets[*member] = [0; 3];
+                    self.molecules[*member] = molecule;
+                    self.count = molecule + 1;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Places particles next to those that are as near as a bond is long.
+fn by_distance(count: usize, bins: &AtomBins<'_>) -> Result<Placed, ParseError> {
+    let mut placed = Placed::new(count);
+    // Each bond is found from both of its ends
+    let mut left = count.saturating_mul(2 * MAX_BONDS_EACH).max(1 << 10);
+    placed.walk(true, |particle, moved, visit| {
+        let found = bins.each_bond(particle, |other, cells| {
+            left = left.checked_sub(1)?;
+            let sum = |edge: usize| moved[edge].saturating_add(cells[edge]);
+            visit(other, std::array::from_fn(sum));
+            Some(())
+        });
+        found.ok_or_else(|| {
+            ParseError::unsupported(format!(
+                "bonds by distance, which cell.unwrap finds, are more than {MAX_BONDS_EACH} for each of {count} \
+                 particles, on average; lengths may have another unit than angstroms; --topology gives bonds"
+            ))
+        })
+    })?;
+    Ok(placed)
 }
 
 /// By how far each particle moves by its image flags; None without them.
@@ -55,39 +232,24 @@ fn by_flags(particles: &RawParticles, cell: &SimulationCell) -> Option<Vec<DVec3
     Some((0..particles.positions.len()).map(offset).collect())
 }
 
-/// By how far each particle moves to be near those that it has bonds with. Of a molecule, the particle that comes first
-/// stays where it is.
-fn by_bonds(particles: &RawParticles, cell: &SimulationCell, inverse: DMat3) -> Vec<DVec3> {
+/// Places particles next to those that they have bonds with. Where bonds cross the boundary to the image of their own
+/// molecule, one of them remains long.
+fn by_bonds(particles: &RawParticles, cell: &SimulationCell, inverse: DMat3) -> Placed {
     let count = particles.positions.len();
     let neighbours = Neighbours::new(count, &particles.bonds);
-    let mut offsets = vec![DVec3::ZERO; count];
-    let mut is_placed = vec![false; count];
-    let mut open = Vec::new();
-    for first in 0..count {
-        if std::mem::replace(&mut is_placed[first], true) {
-            continue;
+    let mut placed = Placed::new(count);
+    let walked = placed.walk(false, |particle, moved, visit| {
+        let from = particles.positions.get(particle) + edges(cell, moved);
+        for other in neighbours.of(particle) {
+            let way = particles.positions.get(other) - from;
+            #[expect(clippy::cast_possible_truncation, reason = "saturates, and NaN is 0")]
+            let cells = cell.edges_in(inverse, way).map(|number| -number as i32);
+            visit(other, cells);
         }
-        // Place each particle next to the one that it was found by
-        open.push(first);
-        while let Some(placed) = open.pop() {
-            let from = particles.positions.get(placed) + offsets[placed];
-            for other in neighbours.of(placed) {
-                if std::mem::replace(&mut is_placed[other], true) {
-                    continue;
-                }
-                let way = particles.positions.get(other) - from;
-                offsets[other] = -nearest_edges(cell, inverse, way);
-                open.push(other);
-            }
-        }
-    }
-    offsets
-}
-
-/// The whole edges in a way between two particles, along which the cell repeats.
-fn nearest_edges(cell: &SimulationCell, inverse: DMat3, way: DVec3) -> DVec3 {
-    let edges = cell.vectors.iter().zip(cell.edges_in(inverse, way));
-    edges.filter(|(_, number)| number.is_finite()).map(|(edge, number)| number * *edge).sum()
+        Ok(())
+    });
+    walked.expect("listed bonds have no limit");
+    placed
 }
 
 /// The particles that each one has bonds with.
@@ -126,6 +288,8 @@ impl Neighbours {
 }
 
 #[cfg(test)]
+mod distance_tests;
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::{Attribute, AttributeData, Positions};
@@ -133,6 +297,10 @@ mod tests {
     fn cell(periodic: [bool; 3]) -> SimulationCell {
         let edges = [DVec3::X * 10.0, DVec3::new(2.0, 10.0, 0.0), DVec3::Z * 10.0];
         SimulationCell::new(DVec3::ZERO, edges, periodic).unwrap()
+    }
+
+    fn make_whole(particles: &mut RawParticles, cell: &SimulationCell) -> Result<(), ParseError> {
+        super::make_whole(particles, cell, None, MemoryBudget::UNLIMITED).map(|_| ())
     }
 
     fn whole(points: &[[f64; 3]], bonds: &[Bond], periodic: [bool; 3]) -> Vec<DVec3> {

@@ -3,6 +3,7 @@
 use glam::Vec3;
 use serde_json::{Value as Json, json};
 use spherule_frame::PeriodicImages;
+use spherule_selection::Condition;
 
 use super::field::Field;
 use super::key::Key;
@@ -31,8 +32,21 @@ section! {
         wrap: bool = false, flag("wrap", "", "Input");
         /// Make molecules whole, by their bonds, or without bonds by the image flags ix, iy and iz
         ///
-        /// Bonds are those of the file or of input.topology. With wrap, the first particle of each molecule is in the cell.
+        /// Bonds are those of the file or of input.topology. Without bonds and image flags, bonds are found by distance, by
+        /// covalent radii. With wrap, the first particle of each molecule is in the cell.
         unwrap: bool = false, flag("unwrap", "", "Input");
+        /// Keep the particles of a condition in the middle of the cell: residue_name == 'LIG'
+        ///
+        /// All particles are moved around them: molecules as a whole with unwrap, else each by itself. Without a periodic
+        /// cell, the centre of these particles stays where it is in the first frame.
+        center: Option<Condition> = None, example("\"residue_name == 'LIG'\""), unset("particles stay where they are"),
+            flag("center", "CONDITION", "Input");
+        /// Turn and move each frame so that the particles of a condition are as in the first frame, by least squares
+        ///
+        /// Vectors such as velocities turn as well, and the cell. Particles are matched by their ids, or without ids in
+        /// their order. Cells that cut these particles need unwrap.
+        align: Option<Condition> = None, example("\"atom_name == 'CA'\""), unset("particles stay where they are"),
+            flag("align", "CONDITION", "Input");
     }
 }
 
@@ -40,6 +54,11 @@ impl Cell {
     /// What is done with the particles.
     pub const fn images(&self) -> PeriodicImages {
         PeriodicImages { replicate: self.replicate.0, wrap: self.wrap, unwrap: self.unwrap }
+    }
+
+    /// Whether frames are placed like the first one.
+    pub const fn has_reference(&self) -> bool {
+        self.center.is_some() || self.align.is_some()
     }
 }
 

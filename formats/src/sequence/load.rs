@@ -22,7 +22,8 @@ pub struct Loaded {
     pub notes: Vec<String>,
     /// Bytes of all its files, uncompressed.
     pub all_bytes: u64,
-    /// Bytes held at most for one of its files beside its numbers: one is in memory at a time.
+    /// Bytes held at most for one of its files beside its numbers: one is in memory at a time, and none while particles are
+    /// placed, which counts as well.
     pub content_bytes: u64,
 }
 
@@ -64,6 +65,25 @@ impl Sequence {
     /// # Panics
     /// If there is no frame `index`.
     pub fn load_measured(&self, index: usize) -> Result<Loaded, FrameError> {
+        // Two frames need not be in memory at once
+        if self.placement.align.is_some() {
+            self.reference(index)?;
+        }
+        let mut loaded = self.read_parts(index)?;
+        if self.placement.needs_reference(&loaded.particles) && !self.has_reference() {
+            drop(loaded);
+            self.reference(index)?;
+            loaded = self.read_parts(index)?;
+        }
+        let count = loaded.particles.positions.len() as u64;
+        self.place(index, &mut loaded.particles)?;
+        loaded.content_bytes = loaded.content_bytes.max(self.placement.bytes(count));
+        loaded.notes.append(&mut loaded.particles.notes);
+        Ok(loaded)
+    }
+
+    /// Reads frame `index` as it is in the files.
+    pub(super) fn read_parts(&self, index: usize) -> Result<Loaded, FrameError> {
         let frame = &self.frames[index];
         let mut notes = Vec::new();
         let (mut all_bytes, mut content_bytes) = (0, 0);
@@ -86,22 +106,21 @@ impl Sequence {
             content_bytes = content_bytes.max(held);
             parts.push(Part { number: part.part, name: self.part_name(part), particles });
         }
-        // Join them; an error that concerns all of them names the first file
-        let in_first = |error: ParseError| {
-            error.in_file(frame.parts.first().map_or(Path::new(""), |part| &part.path))
-        };
-        let mut particles = self.joined(parts).map_err(in_first)?;
+        let mut particles = self.joined(parts).map_err(|error| self.in_first(index, error))?;
         notes.append(&mut particles.notes);
         if self.parts.len() > 1 {
             // A frame may lack a part
             let names = (0..).zip(self.parts.iter().cloned());
             particles.labels.insert(PART.to_owned(), names.collect());
         }
-        if !self.images.is_none() {
-            self.images.apply(&mut particles, self.budget).map_err(in_first)?;
-        }
         particles.time = self.listed_time(index).or(particles.time);
         Ok(Loaded { particles, notes, all_bytes, content_bytes })
+    }
+
+    /// An error that concerns all files of a frame names the first one.
+    pub(super) fn in_first(&self, index: usize, error: ParseError) -> FrameError {
+        let part = self.frames.get(index).and_then(|frame| frame.parts.first());
+        error.in_file(part.map_or(Path::new(""), |part| &part.path))
     }
 
     /// The parts of a frame as one. Files of one part may have parts of their own, which keep their numbers.

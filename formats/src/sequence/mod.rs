@@ -13,7 +13,7 @@ use std::sync::{Arc, Mutex};
 use crate::native::layout::UP_Y;
 use crate::native::{self, Access, MappedFile, NativeFile};
 use crate::order::index_u32;
-use crate::{MemoryBudget, PeriodicImages, ValueNames};
+use crate::{MemoryBudget, ValueNames};
 use spherule_readers::FormatInfo;
 use spherule_readers::compression::is_compressed;
 
@@ -27,6 +27,7 @@ mod name;
 mod notes;
 mod pattern;
 mod pieces;
+mod placement;
 mod references;
 mod scan;
 mod times;
@@ -40,6 +41,7 @@ pub use error::{GroupSummary, SequenceError};
 pub use from_names::{frames_of_list, frames_of_names};
 pub use input::SequenceInput;
 pub use load::Loaded;
+pub use placement::{Group, Placement};
 pub use spherule_frame::join::PART as PART_ATTRIBUTE;
 pub use topology::Topology;
 
@@ -50,6 +52,7 @@ use load::{CachedFile, stamp};
 use name::FileName;
 use notes::{note_gaps, note_missing_parts};
 use pattern::Pattern;
+use placement::ReferenceCell;
 
 /// Whether the file at `path` has no particles itself, but stands for others: it is a list of files, or a snapshot of
 /// virtual data sets beside the files with the values.
@@ -115,7 +118,8 @@ pub struct Sequence {
     /// The lists that the frames come from, if there are some.
     lists: Option<ListedFiles>,
     topology: Option<Topology>,
-    images: PeriodicImages,
+    placement: Placement,
+    reference: ReferenceCell,
     /// What there is with all parts, if some are left out unless they are named.
     all_parts: Option<AllParts>,
 }
@@ -191,7 +195,8 @@ impl Sequence {
             budget,
             lists: Some(expansion.lists),
             topology: None,
-            images: PeriodicImages::default(),
+            placement: Placement::default(),
+            reference: ReferenceCell::default(),
             all_parts: None,
         }
     }
@@ -229,7 +234,8 @@ impl Sequence {
             budget,
             lists: None,
             topology: None,
-            images: PeriodicImages::default(),
+            placement: Placement::default(),
+            reference: ReferenceCell::default(),
             all_parts,
         }
     }
@@ -337,9 +343,11 @@ impl Sequence {
         self.topology.as_ref()
     }
 
-    /// Wraps and copies the particles of all frames. Frames without a simulation cell then fail when they are loaded.
-    pub const fn set_images(&mut self, images: PeriodicImages) {
-        self.images = images;
+    /// Moves, turns and copies the particles of all frames. Frames for which that is not possible, such as those without a
+    /// simulation cell, then fail when they are loaded.
+    pub fn set_placement(&mut self, placement: Placement) {
+        self.placement = placement;
+        self.reference = ReferenceCell::default();
     }
 
     /// Replaces the frames by `count` times the middle one, with the numbers from 0: for pictures from all sides.
@@ -397,13 +405,13 @@ impl Sequence {
     }
 
     /// The file of frame `index` if that is all there is of the frame, and nothing else in the file. None with a
-    /// topology or periodic images.
+    /// topology or a placement.
     pub fn lone_file(&self, index: usize) -> Option<&Path> {
         let [part] = self.frames.get(index)?.parts.as_slice() else {
             return None;
         };
         let is_alone = self.parts.len() < 2 && part.step.is_none();
-        let is_unchanged = self.topology.is_none() && self.images.is_none();
+        let is_unchanged = self.topology.is_none() && self.placement.is_none();
         (is_alone && is_unchanged).then_some(&part.path)
     }
 }

@@ -60,6 +60,11 @@ const SIZE_VECTORS: [(&str, SizeKind); 4] = [
     ("axesScales", SizeKind::Diameters),
 ];
 
+/// Whether a vector of this name has sizes along the axes of a particle.
+pub(crate) fn is_size(name: &str) -> bool {
+    SIZE_VECTORS.iter().any(|(known, _)| known.eq_ignore_ascii_case(name))
+}
+
 /// Scalars with a size, except `shapex`, `shapey` and `shapez`.
 const SIZE_SCALARS: [([&str; 3], SizeKind); 3] = [
     (["c_shape[1]", "c_shape[2]", "c_shape[3]"], SizeKind::Diameters),

@@ -29,6 +29,7 @@ mod tests;
 use rayon::prelude::*;
 
 use crate::Attribute;
+pub(crate) use convention::is_size;
 use convention::{ExponentKind, Found};
 pub use error::GrainColumnError;
 use rotation::{from_euler, from_matrix};
