@@ -36,9 +36,9 @@ use std::path::Path;
 
 use spherule_images::overlay::Layout;
 use spherule_selection::{Condition, Selection};
+use spherule_surface::{SprayStyle, SurfaceKind, SurfaceSettings};
 use spherule_tracer::render::{FilmPlane, IntegratorKind, RendererKind};
 use spherule_tracer::scene::Fresnel;
-use spherule_tracer::surface::{SprayStyle, SurfaceKind, SurfaceSettings};
 
 use key::Affects;
 use keys::Keys;

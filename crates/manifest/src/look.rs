@@ -141,9 +141,9 @@ mod tests {
 
     use super::*;
     use crate::{GroundKind, GroundPattern, GroundSetting, Manifest, marked};
+    use spherule_surface::SurfaceKind;
     use spherule_tracer::render::IntegratorKind;
     use spherule_tracer::scene::Background;
-    use spherule_tracer::surface::SurfaceKind;
 
     fn water(text: &str, sets: &[&str]) -> Manifest {
         let sets =

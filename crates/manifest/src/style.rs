@@ -2,8 +2,8 @@
 
 use spherule_frame::grain_columns::{GrainNames, SizeKind};
 use spherule_selection::{Claim, Condition, Division};
+use spherule_surface::SurfaceKind;
 use spherule_tracer::scene::{self, Finish, Fresnel};
-use spherule_tracer::surface::SurfaceKind;
 
 use super::bonds::BondSearch;
 use super::color::{ColorMapping, ColorSetting};

@@ -10,7 +10,7 @@ use glam::Vec3;
 
 use super::body_set::{AIR, BodySet, MAX_TRANSMISSIVE_BODIES};
 use crate::scene::{Material, Scene};
-use crate::surface::{Intersections, MaterialId, Shape, Side};
+use spherule_surface::{Intersections, MaterialId, Shape, Side};
 use spherule_tree::math::{LANES, lanes_in, lanes_where};
 
 /// Marks materials that are not of a body.

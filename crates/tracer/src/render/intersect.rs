@@ -13,7 +13,7 @@ use super::{
     stream::SegmentPacket,
 };
 use crate::scene::{Background, Owner};
-use crate::surface::MaterialId;
+use spherule_surface::MaterialId;
 use spherule_tree::math::lanes_in;
 
 impl RenderContext<'_> {

@@ -16,7 +16,7 @@ use super::{
     scratch::PacketScratch,
     stream::SegmentPacket,
 };
-use crate::surface::{Intersections, MaterialId};
+use spherule_surface::{Intersections, MaterialId};
 use spherule_tree::accel::Coherence;
 use spherule_tree::math::functions::exp;
 use spherule_tree::math::{LANES, Lanes, lanes_in, splat};

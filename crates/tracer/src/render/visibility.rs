@@ -17,7 +17,7 @@ use super::{
     shading::product,
     stream::SegmentPacket,
 };
-use crate::surface::{Intersections, MaterialId, Shape};
+use spherule_surface::{Intersections, MaterialId, Shape};
 use spherule_tree::accel::Coherence;
 use spherule_tree::math::{LANES, Lanes, Lanes3, lane3, lanes_in, splat};
 use spherule_tree::ray::RayPacket;

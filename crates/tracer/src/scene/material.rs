@@ -9,34 +9,6 @@ use thiserror::Error;
 
 use super::ground;
 
-/// Index of a material in [`Scene::materials`](super::Scene::materials).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct MaterialId(u16);
-
-impl MaterialId {
-    /// The material of the particles.
-    pub const PARTICLES: Self = Self(0);
-    /// Foam and spray.
-    pub const SPRAY: Self = Self(1);
-    /// The ground.
-    pub const GROUND: Self = Self(2);
-    /// Number of the materials that every scene has: those above.
-    pub const BASIC: usize = 3;
-    /// Maximum number of materials of a scene.
-    pub const MAX: usize = 1 << 16;
-
-    /// The material at `index`; None from [`Self::MAX`] on.
-    pub(crate) fn at(index: usize) -> Option<Self> {
-        u16::try_from(index).ok().map(Self)
-    }
-
-    /// Its index.
-    #[inline(always)]
-    pub const fn index(self) -> usize {
-        self.0 as usize
-    }
-}
-
 /// What has a material.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Owner {

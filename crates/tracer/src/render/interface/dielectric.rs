@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::scene::material::{dielectric, schlick};
 use crate::scene::{self, Fresnel};
-use crate::surface::Intersections;
+use spherule_surface::Intersections;
 use spherule_tree::math::functions::exp;
 use spherule_tree::math::{LANES, Lanes, Lanes3, lane_kernel};
 use spherule_tree::ray::RayPacket;
