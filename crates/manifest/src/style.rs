@@ -94,6 +94,7 @@ pub(super) const RULES: &[Rule] = rules! {
     "draw" MissingOrNot["grains"] => "size" Missing: GRAINS;
     "draw" MissingOrNot["grains"] => "exponents" Missing: GRAINS;
     "draw" MissingOrNot["grains"] => "orientation" Missing: GRAINS;
+    "draw" MissingOrNot["grains"] => "angular_velocity" Missing: GRAINS;
     "shape" Is["mesh", "convex-hull"] => "mesh" Given: "which file, such as mesh = \"grain.stl\"";
     "shape" Is["ellipsoid", "superquadric", "capsule", "cylinder", "cuboid"] => "mesh" Missing:
         "belongs to shape = \"mesh\" or \"convex-hull\"";
@@ -276,6 +277,8 @@ pub struct Style {
     pub exponents: Option<GrainNumbers<2>>,
     /// Orientation of grains; by default the columns that the format is known for.
     pub orientation: Option<GrainOrientation>,
+    /// Columns of the angular velocity of grains; by default those that the format is known for.
+    pub angular_velocity: Option<Vec<String>>,
     /// Bonds of sticks.
     pub bonds: Option<StyleBonds>,
     /// The arrows, if it draws these.
@@ -302,6 +305,7 @@ impl Default for Style {
             size: None,
             exponents: None,
             orientation: None,
+            angular_velocity: None,
             bonds: None,
             arrows: None,
             trails: None,
@@ -353,6 +357,9 @@ impl Style {
             exponents => self.exponents, example("[8.0, 2.0]"), unset("columns of known names");
             /// Orientation of grains: { quaternion = ["qw", "qx", "qy", "qz"] }, or quaternion_xyzw, euler, euler_radians
             orientation => self.orientation, example("{ quaternion = [\"qw\", \"qx\", \"qy\", \"qz\"] }"),
+                unset("columns of known names");
+            /// Columns of the angular velocity of grains, radians per unit of time, for motion blur
+            angular_velocity => self.angular_velocity, example("[\"wx\", \"wy\", \"wz\"]"),
                 unset("columns of known names");
             /// Bonds of sticks: { find = "covalent", radius = 0.1 }
             bonds => self.bonds, example("{ find = \"covalent\", radius = 0.1 }"),
@@ -436,7 +443,8 @@ impl Style {
             _ => None,
         };
         let orientation = self.orientation.as_ref().and_then(GrainOrientation::named);
-        GrainNames { orientation, sizes, exponents }
+        let angular_velocity = self.angular_velocity.clone();
+        GrainNames { orientation, sizes, exponents, angular_velocity }
     }
 
     /// Whether legends show it: a map, or a name with a colour.

@@ -31,14 +31,13 @@ pub(super) fn box_of(body: &Body<'_>, grain: &Instance, motion: Option<&Motion>)
 fn swept([middle, half]: [DVec3; 2], pose: &Pose, motion: &Motion) -> [DVec3; 2] {
     let displacement = DVec3::from_array(motion.displacement.map(f64::from));
     let moved = 0.5 * displacement.abs() * REACH;
-    let [x, y, z] = motion.turn.map(f64::from);
-    let tangent = x * x + y * y + z * z;
-    if tangent == 0.0 {
+    let angle = DVec3::from_array(motion.turn.map(f64::from)).length();
+    if angle == 0.0 {
         return [middle, half + moved];
     }
-    // A point at distance r from the centre moves by at most 2 r sin(a / 2) if it is rotated by a, which is half the
-    // angle of the exposure; its quarter has the tangent that is stored
-    let sine = (tangent / (1.0 + tangent)).sqrt();
+    // A point at distance r from the centre moves by at most 2 r sin(a / 2) if it is rotated by up to a, which is half the
+    // angle of the exposure, and by at most 2 r from half a turn on
+    let sine = libm::sin(0.25 * angle.min(2.0 * std::f64::consts::PI));
     let offset = middle - pose.center;
     let radius = (half.length() + offset.length()) * REACH;
     let rotated = half + 2.0 * radius * sine;

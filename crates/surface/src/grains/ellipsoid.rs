@@ -2,7 +2,7 @@
 
 #![expect(clippy::needless_range_loop, reason = "one index for the lanes of many arrays")]
 
-use super::instance::{Instance, Motion, rotate};
+use super::instance::{Instance, Motion};
 use super::rays::LocalRays;
 use super::walk::GrainTest;
 use crate::Intersections;
@@ -182,9 +182,8 @@ fn intersections_body(
         // Rotate both as the grain is at the time of the ray
         let mut center = grain.center;
         if let Some(motion) = motion {
-            let part = 2.0 * rays.time[l];
-            let axis = [part * motion.turn[0], part * motion.turn[1], part * motion.turn[2]];
-            (v, n) = (rotate(axis, v), rotate(axis, n));
+            let rotation = motion.rotation(rays.time[l]);
+            (v, n) = (rotation.apply(v), rotation.apply(n));
             for axis in 0..3 {
                 center[axis] += rays.time[l] * motion.displacement[axis];
             }

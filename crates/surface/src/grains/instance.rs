@@ -1,5 +1,7 @@
 //! A grain as the tree stores it.
 
+use spherule_tree::math::{functions::sin_cos, larger};
+
 /// A grain. With its share of the nodes, it takes less than 100 bytes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(C)]
@@ -19,8 +21,39 @@ pub(super) struct Instance {
 pub(super) struct Motion {
     /// Displacement from the opening of the shutter to its closing.
     pub(super) displacement: [f32; 3],
-    /// Axis of the rotation, with the tangent of a quarter of its angle as its length.
+    /// Axis of the rotation from the opening to the closing, with its angle in radians as its length.
     pub(super) turn: [f32; 3],
+}
+
+/// A rotation about an axis through the centre, as a unit quaternion.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rotation {
+    vector: [f32; 3],
+    real: f32,
+}
+
+impl Motion {
+    /// The rotation from the middle of the exposure to `time`, from -1/2 to 1/2.
+    #[inline(always)]
+    pub(super) fn rotation(&self, time: f32) -> Rotation {
+        let [x, y, z] = self.turn;
+        let angle = (x * x + y * y + z * z).sqrt();
+        let (sine, real) = sin_cos(0.5 * angle * time);
+        // Zero without a rotation
+        let scale = sine / larger(angle, f32::MIN_POSITIVE);
+        Rotation { vector: [scale * x, scale * y, scale * z], real }
+    }
+}
+
+impl Rotation {
+    /// `v` rotated.
+    #[inline(always)]
+    pub(super) fn apply(&self, v: [f32; 3]) -> [f32; 3] {
+        let a = cross(self.vector, v);
+        let b = cross(self.vector, a);
+        let moved = |axis: usize| v[axis] + 2.0 * (self.real * a[axis] + b[axis]);
+        [moved(0), moved(1), moved(2)]
+    }
 }
 
 impl Instance {
@@ -35,14 +68,14 @@ impl Instance {
         direction: [f32; 3],
     ) -> [[f32; 3]; 2] {
         let c = &self.center;
-        let Some(Motion { displacement: d, turn }) = motion else {
+        let Some(motion) = motion else {
             return [[point[0] - c[0], point[1] - c[1], point[2] - c[2]], direction];
         };
+        let d = &motion.displacement;
         let moved = [c[0] + time * d[0], c[1] + time * d[1], c[2] + time * d[2]];
         let from_center = [point[0] - moved[0], point[1] - moved[1], point[2] - moved[2]];
-        let part = -2.0 * time;
-        let axis = [part * turn[0], part * turn[1], part * turn[2]];
-        [rotate(axis, from_center), rotate(axis, direction)]
+        let back = motion.rotation(-time);
+        [back.apply(from_center), back.apply(direction)]
     }
 
     /// A vector in unit coordinates.
@@ -55,16 +88,6 @@ impl Instance {
             c[0] * v[0] + c[1] * v[1] + c[2] * v[2],
         ]
     }
-}
-
-/// `v` rotated by the quaternion with the vector part `r` and the real part 1, which is normalised here: the normalised
-/// linear interpolation between the rotations by `r` and by `-r`.
-#[inline(always)]
-pub(super) fn rotate(r: [f32; 3], v: [f32; 3]) -> [f32; 3] {
-    let scale = 2.0 / (1.0 + r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
-    let a = cross(r, v);
-    let b = cross(r, a);
-    [v[0] + scale * (a[0] + b[0]), v[1] + scale * (a[1] + b[1]), v[2] + scale * (a[2] + b[2])]
 }
 
 #[inline(always)]

@@ -136,13 +136,13 @@ impl<'a> Grains<'a> {
 }
 
 /// Motion of grains from the opening of the shutter to its closing. Centres and orientations of [`Grains`] are those in
-/// the middle of the exposure. The rotation is a normalised linear interpolation of quaternions.
+/// the middle of the exposure. Both change at a constant rate.
 #[derive(Debug, Clone, Copy)]
 pub struct GrainMotion<'a> {
     /// Displacements, scene units; empty for none.
     pub displacements: &'a [Vec3],
     /// Rotations about an axis through the centre, as vectors along that axis in the scene with the angle as their
     /// length, radians: the angular velocity times the duration of the exposure, or [`rotation_between`]. Angles above
-    /// half a turn count as half a turn. Empty for none.
+    /// eight turns count as eight turns, which look the same. Empty for none.
     pub rotations: &'a [Vec3],
 }

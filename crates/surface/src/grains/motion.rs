@@ -6,19 +6,16 @@ use super::instance::Motion;
 use crate::hierarchy::single;
 use spherule_tree::accel::moving::bounded;
 
-/// The largest angle of a rotation, radians.
-const MAX_ANGLE: f64 = std::f64::consts::PI;
+/// The largest angle of a rotation, radians. With more turns, the mean over the exposure stays the same, and rounding
+/// in f32 would be larger than tests of rays allow for.
+const MAX_ANGLE: f64 = 16.0 * std::f64::consts::PI;
 
 impl Motion {
     /// The motion by `displacement` and `rotation`, a vector along the axis whose length is the angle in radians. What
     /// is not finite counts as no motion.
     pub(super) fn new(displacement: Vec3, rotation: Vec3) -> Self {
         let rotation = if rotation.is_finite() { rotation.as_dvec3() } else { DVec3::ZERO };
-        let angle = rotation.length();
-        let turn = match rotation.try_normalize() {
-            Some(axis) => axis * libm::tan(0.25 * angle.min(MAX_ANGLE)),
-            None => DVec3::ZERO,
-        };
+        let turn = rotation.clamp_length_max(MAX_ANGLE);
         Self { displacement: bounded(displacement).to_array(), turn: turn.to_array().map(single) }
     }
 }

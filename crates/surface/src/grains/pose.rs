@@ -23,15 +23,21 @@ impl Pose {
     /// The pose at `time`, from -1/2 to 1/2.
     pub(super) fn at(grain: &Instance, motion: &Motion, time: f32) -> Self {
         let vector = |v: [f32; 3]| DVec3::from_array(v.map(f64::from)) * f64::from(time);
-        // The rotation by the quaternion with the vector part `turn` and the real part 1
-        let turn = 2.0 * vector(motion.turn);
-        let scale = 2.0 / (1.0 + turn.length_squared());
         let Self { center, rows } = Self::fixed(grain);
+        let center = center + vector(motion.displacement);
+        let turn = vector(motion.turn);
+        let angle = turn.length();
+        if angle == 0.0 {
+            return Self { center, rows };
+        }
+        // Rotate by a unit quaternion
+        let (sine, real) = libm::sincos(0.5 * angle);
+        let axis = turn * (sine / angle);
         let rotated = |v: DVec3| {
-            let a = turn.cross(v);
-            v + scale * (a + turn.cross(a))
+            let a = axis.cross(v);
+            v + 2.0 * (real * a + axis.cross(a))
         };
-        Self { center: center + vector(motion.displacement), rows: rows.map(rotated) }
+        Self { center, rows: rows.map(rotated) }
     }
 
     /// A point in unit coordinates.

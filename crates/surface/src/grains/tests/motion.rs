@@ -25,11 +25,8 @@ fn frozen(heap: &Heap, time: f32) -> Heap {
         still.sizes.push(heap.sizes[grain]);
         let [x, y, z, w] = heap.orientations[grain].map(f64::from);
         let middle = DQuat::from_xyzw(x, y, z, w);
-        // From half the rotation before to half of it after the middle, normalised
-        let half = DQuat::from_scaled_axis(0.5 * heap.rotations[grain].as_dvec3());
-        let (open, close) = (half.inverse() * middle, half * middle);
-        let part = f64::from(time) + 0.5;
-        let [x, y, z, w] = (open * (1.0 - part) + close * part).normalize().to_array();
+        let rotation = DQuat::from_scaled_axis(f64::from(time) * heap.rotations[grain].as_dvec3());
+        let [x, y, z, w] = (rotation * middle).to_array();
         #[expect(clippy::cast_possible_truncation, reason = "components of a unit quaternion")]
         still.orientations.push([x, y, z, w].map(|c| c as f32));
     }
@@ -38,8 +35,11 @@ fn frozen(heap: &Heap, time: f32) -> Heap {
 
 #[test]
 fn rays_see_grains_at_their_time() {
-    for (shape, _) in shapes() {
-        let heap = Heap::random(150, Vec3::ZERO, 1.0, [0.05, 0.3], 3).in_motion(0.4, 1.2, 9);
+    // Up to a third of a turn, and up to three turns
+    for ((shape, _), angle) in
+        shapes().into_iter().flat_map(|shape| [(shape.clone(), 1.2), (shape, 12.0)])
+    {
+        let heap = Heap::random(150, Vec3::ZERO, 1.0, [0.05, 0.3], 3).in_motion(0.4, angle, 9);
         let tree = heap.tree(shape.clone());
         assert!(tree.is_moving() && tree.report().is_clean());
         for time in [-0.5, -0.2, 0.0, 0.35, 0.5] {
@@ -99,6 +99,50 @@ fn a_needle_that_turns_is_seen_where_it_is() {
     assert!(is_seen(side, -side, -0.5) && !is_seen(side, side, -0.5) && !is_seen(1.7, 0.0, -0.5));
     assert!(is_seen(1.7, 0.0, 0.0) && !is_seen(side, side, 0.0) && !is_seen(side, -side, 0.0));
     assert!(is_seen(side, side, 0.5) && !is_seen(side, -side, 0.5) && !is_seen(1.7, 0.0, 0.5));
+}
+
+/// The part of a quarter turn, from -45 to 45 degrees, in which an ellipse with the semi-axes `a` > `b` covers a point
+/// at the distance `r` from its centre and the polar angle `phi`, radians.
+fn coverage(r: f64, phi: f64, [a, b]: [f64; 2]) -> f64 {
+    use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
+    if r >= a {
+        return 0.0;
+    }
+    // It covers the point while its long axis is less than `width` away
+    let squared = (r.powi(-2) - b.powi(-2)) / (a.powi(-2) - b.powi(-2));
+    let width = squared.max(0.0).sqrt().acos();
+    let overlap = |center: f64| {
+        let (low, high) = ((center - width).max(-FRAC_PI_4), (center + width).min(FRAC_PI_4));
+        (high - low).max(0.0)
+    };
+    [phi - PI, phi, phi + PI].map(overlap).iter().sum::<f64>() / FRAC_PI_2
+}
+
+#[test]
+fn a_turning_ellipsoid_covers_each_point_for_the_computed_time() {
+    let mut heap = Heap { centers: vec![Vec3::ZERO], ..Heap::default() };
+    heap.orientations = vec![[0.0, 0.0, 0.0, 1.0]];
+    heap.sizes = vec![[2.0, 0.5, 0.7]];
+    heap.displacements = vec![Vec3::ZERO];
+    heap.rotations = vec![std::f32::consts::FRAC_PI_2 * Vec3::Z];
+    let tree = heap.tree(GrainShape::Ellipsoid);
+    let surface = GrainSurface::new(&tree);
+    const TIMES: u16 = 1000;
+    let mut partly = 0;
+    for number in 0..240_u8 {
+        let (r, phi) = (0.1 * f64::from(number % 24) + 0.03, 0.7 * f64::from(number / 24) - 3.1);
+        let point = glam::DVec2::from_angle(phi) * r;
+        let ray = Ray::new(point.extend(5.0).as_vec3(), Vec3::NEG_Z);
+        let covered = (0..TIMES).filter(|time| {
+            let time = (f32::from(*time) + 0.5) / f32::from(TIMES) - 0.5;
+            at_time(&surface, &ray, time).is_some()
+        });
+        let found = covered.count() as f64 / f64::from(TIMES);
+        let expected = coverage(r, phi, [2.0, 0.5]);
+        assert!((found - expected).abs() < 2.5 / f64::from(TIMES), "{r} {phi}: {found} {expected}");
+        partly += u32::from((0.05..0.95).contains(&expected));
+    }
+    assert!(partly > 50, "{partly}");
 }
 
 #[test]

@@ -64,7 +64,7 @@ fn packets_and_instruction_sets_find_what_single_rays_find() {
     for (shape, _) in shapes() {
         let heap = Heap::random(300, Vec3::ZERO, 1.0, [0.05, 0.2], 21);
         compare(&heap.tree(shape.clone()), 3);
-        compare(&heap.in_motion(0.3, 1.0, 4).tree(shape), 4);
+        compare(&heap.in_motion(0.3, 9.0, 4).tree(shape), 4);
     }
     let heap = Heap::random(60, Vec3::ZERO, 1.0, [0.1, 0.3], 22);
     compare(&heap.tree(meshes::tetrahedron()), 5);
