@@ -247,3 +247,21 @@ fn several_styles_are_clear_bodies() {
         .expect(2)
         .prints("set style.0.draw = \"smooth\" or \"union\"");
 }
+
+#[test]
+fn clear_bodies_have_the_colours_of_their_particles() {
+    let workshop = layers();
+    let picture = |image: &str, draw: &str, absorption: &str| {
+        let style = format!(
+            ": {draw}, radius 0.8, color_by x, map viridis, \
+             material {{ type = 'water', absorption_length = 2{absorption} }}"
+        );
+        still(&workshop, "in/f_1.csv", &[image, "--style", &style]).expect(0);
+        fs::read(workshop.join(image)).expect("a picture")
+    };
+    for draw in ["smooth", "union"] {
+        let clear = picture("a.png", draw, "");
+        assert_ne!(picture("b.png", draw, ", absorption = 'color'"), clear, "{draw}");
+        assert_eq!(picture("c.png", draw, ", absorption = [1, 1, 1]"), clear, "{draw}");
+    }
+}

@@ -48,6 +48,7 @@ use reader::Section;
 use source::lay_over;
 use tree::TomlNode;
 
+mod absorption;
 mod arrows;
 mod bar_ticks;
 mod bonds;
@@ -112,6 +113,7 @@ mod work;
 #[cfg(test)]
 mod work_tests;
 
+pub use absorption::Absorption;
 pub use arrows::Arrows;
 pub use bar_ticks::LabelFormat;
 pub use bonds::{BondSearch, Bonds};

@@ -5,6 +5,7 @@ use spherule_selection::{Claim, Condition, Division};
 use spherule_surface::SurfaceKind;
 use spherule_tracer::scene::{self, Finish, Fresnel};
 
+use super::absorption::Absorption;
 use super::bonds::BondSearch;
 use super::color::{ColorMapping, ColorSetting};
 use super::color_map::{MapName, RangeSetting};
@@ -116,8 +117,8 @@ pub struct StyleMaterial {
     pub roughness: Option<f32>,
     /// Index of refraction of glass and water; by default 1.5 and 1.333.
     pub ior: Option<f32>,
-    /// Transmittance of white light over [`Self::absorption_length`] inside, linear RGB.
-    pub absorption: glam::Vec3,
+    /// Transmittance of white light over [`Self::absorption_length`] inside.
+    pub absorption: Absorption,
     /// The length for `absorption`; by default it depends on the extent of the particles.
     pub absorption_length: Option<f64>,
 }
@@ -128,7 +129,7 @@ impl Default for StyleMaterial {
             kind: StyleMaterialKind::Matte,
             roughness: None,
             ior: None,
-            absorption: glam::Vec3::ONE,
+            absorption: Absorption::default(),
             absorption_length: None,
         }
     }
@@ -146,7 +147,7 @@ impl InlineTable for StyleMaterial {
             roughness => self.roughness, from(0), to(1);
             /// Index of refraction
             ior => self.ior, from(1), to(4), single();
-            /// Transmittance of white light over absorption_length
+            /// Transmittance of white light over absorption_length, or "color"
             absorption => self.absorption, from(0), to(1);
             /// The length for absorption
             absorption_length => self.absorption_length, above(0), single();

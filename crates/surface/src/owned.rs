@@ -71,6 +71,11 @@ impl Shape for OwnedBody<'_> {
         self.first + self.body.particle_at(&self.own(hit))
     }
 
+    fn blend_at(&self, point: Vec3, time: f32, each: &mut dyn FnMut(u32, f32)) {
+        let first = self.first;
+        self.body.blend_at(point, time, &mut |particle, weight| each(first + particle, weight));
+    }
+
     fn blend(&self, hit: &Intersection, each: &mut dyn FnMut(u32, f32)) {
         let first = self.first;
         self.body.blend(&self.own(hit), &mut |particle, weight| each(first + particle, weight));

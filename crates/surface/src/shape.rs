@@ -135,6 +135,12 @@ pub trait Shape: Sync {
         hit.particle
     }
 
+    /// Calls `each` as [`Self::blend`] does for a `point` inside a connected body, as the body is at `time`, from -1/2 to
+    /// 1/2. Does not call it if no particle is there.
+    fn blend_at(&self, point: Vec3, time: f32, each: &mut dyn FnMut(u32, f32)) {
+        let _ = (point, time, each);
+    }
+
     /// Calls `each` with the particles that contribute attributes to a point on the surface, and with positive
     /// weights that need not be normalised; calls it at least once.
     fn blend(&self, hit: &Intersection, each: &mut dyn FnMut(u32, f32)) {

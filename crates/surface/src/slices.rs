@@ -1,5 +1,7 @@
 //! A surface that changes while the shutter is open, as one surface for each slice of the exposure.
 
+use glam::Vec3;
+
 use super::shape::crossing_of_packet;
 use super::{Intersection, Intersections, MaterialId, Shape, Side};
 use spherule_tree::accel::Coherence;
@@ -130,6 +132,12 @@ impl<S: Shape> Shape for SlicedSurface<S> {
         match self.searched(hit) {
             Some((slice, hit)) => slice.particle_at(&hit),
             None => hit.particle,
+        }
+    }
+
+    fn blend_at(&self, point: Vec3, time: f32, each: &mut dyn FnMut(u32, f32)) {
+        if let Some(slice) = self.slices.get(slice_at(time, self.slices.len())) {
+            slice.blend_at(point, time, each);
         }
     }
 

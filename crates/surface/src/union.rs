@@ -5,7 +5,7 @@ use glam::Vec3;
 
 use super::shape::intersect_one_by_one;
 use super::spheres::{SphereSurface, sphere_hit};
-use super::{Intersection, Intersections, ShadingNormals, Shape, Side};
+use super::{CutShape, Intersection, Intersections, ShadingNormals, Shape, Side};
 use spherule_tree::accel::Coherence;
 use spherule_tree::accel::intervals::TreeExit;
 use spherule_tree::accel::traverse::TreeHit;
@@ -100,6 +100,27 @@ impl Shape for UnionSurface<'_> {
             return;
         }
         intersect_one_by_one(self, rays, inside, hits);
+    }
+
+    /// The spheres that contain the point, weighted by `1 - (d/r)^2` at the distance d from the centre of a sphere with the
+    /// radius r, so that attributes are continuous inside.
+    fn blend_at(&self, point: Vec3, _time: f32, each: &mut dyn FnMut(u32, f32)) {
+        let mut rays = RayPacket::default();
+        rays.push(&Ray { t_max: f32::MIN_POSITIVE, ..Ray::new(point, Vec3::X) });
+        let mut found = Vec::new();
+        self.spheres.visit_chords(&rays, 1, &mut |_, particle, radius, [near, far]| {
+            // The product of both distances is the power of the point
+            let weight = -near * far / (radius * radius);
+            if weight > 0.0 {
+                found.push((particle, weight));
+            }
+        });
+        // Trees with copies visit a sphere several times
+        found.sort_unstable_by_key(|(particle, _)| *particle);
+        found.dedup_by_key(|(particle, _)| *particle);
+        for (particle, weight) in found {
+            each(particle, weight);
+        }
     }
 
     /// Also correct for rays that start inside: they hit the surfaces of the spheres.

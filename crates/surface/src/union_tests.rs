@@ -128,3 +128,23 @@ fn packets_match_single_rays() {
         }
     });
 }
+
+#[test]
+fn points_inside_have_the_attributes_of_the_spheres_around() {
+    let centers = [Vec3::ZERO, Vec3::X, 9.0 * Vec3::X];
+    each_structure(&centers, SphereRadius::Common(1.0), |body| {
+        let found = |x: f32| {
+            let mut found = Vec::new();
+            body.blend_at(Vec3::new(x, 0.0, 0.0), 0.0, &mut |particle, weight| {
+                found.push((particle, (1e4 * weight).round()));
+            });
+            found
+        };
+        // Weights are 1 - d^2
+        assert_eq!(found(0.5), [(0, 7500.0), (1, 7500.0)]);
+        assert_eq!(found(0.2), [(0, 9600.0), (1, 3600.0)]);
+        assert_eq!(found(-0.5), [(0, 7500.0)]);
+        assert_eq!(found(9.0), [(2, 10_000.0)]);
+        assert_eq!(found(5.0), []);
+    });
+}

@@ -174,16 +174,22 @@ impl Shape for SmoothSurface<'_> {
 
     fn blend(&self, hit: &Intersection, each: &mut dyn FnMut(u32, f32)) {
         let mut found = false;
+        self.blend_at(hit.point, 0.0, &mut |index, part| {
+            found = true;
+            each(index, part);
+        });
+        if !found {
+            each(hit.particle, 1.0);
+        }
+    }
+
+    fn blend_at(&self, point: Vec3, _time: f32, each: &mut dyn FnMut(u32, f32)) {
         if let Some(field) = self.field() {
-            field.neighbours(hit.point, &mut |index, part| {
+            field.neighbours(point, &mut |index, part| {
                 if self.built.own.is_none_or(|count| index < count) {
-                    found = true;
                     each(index, part);
                 }
             });
-        }
-        if !found {
-            each(hit.particle, 1.0);
         }
     }
 }

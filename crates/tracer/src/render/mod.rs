@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use crate::scene::{Ground, Material, Scene};
 use spherule_surface::{MaterialId, Shape};
 
+mod absorption;
 mod accumulate;
 mod aov;
 mod attributes;
