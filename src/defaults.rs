@@ -488,7 +488,7 @@ impl Rules<'_> {
             ColorSetting::Rgb(_) => false,
             ColorSetting::Mapped(_) => true,
             // Glass and water are not seen in the colours of their particles
-            ColorSetting::Auto if self.manifest.material.is_clear() => false,
+            ColorSetting::Auto if !self.manifest.material.shows_colors() => false,
             ColorSetting::Auto => {
                 self.has_set("material.color.attribute") || self.facts.has_velocities
             }

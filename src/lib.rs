@@ -4,8 +4,8 @@
 //! `spherule-formats` turns bytes into frames and knows nothing about rays. `spherule-tracer` turns slices into images
 //! and knows nothing about files. `spherule-jobs` plans, records and resumes work and does not know what the work is.
 //! This crate connects them; none depends on it. Its modules [`accel`], [`math`] and [`ray`] are those of
-//! `spherule-tree`, its modules [`scene`], [`surface`], [`render`] and [`denoise`] those of `spherule-tracer`,
-//! and [`hdr`], [`output`], [`overlay`], [`picture`] and `movie` those of `spherule-images`. [`manifest`], [`survey`],
+//! `spherule-tree`, its modules [`scene`], [`render`] and [`denoise`] those of `spherule-tracer`, and [`hdr`],
+//! [`output`], [`overlay`], [`picture`] and `movie` those of `spherule-images`. [`surface`], [`manifest`], [`survey`],
 //! [`selection`], [`report`] and `scale` are the crates of these names.
 //!
 //! This example renders positions in memory to planes, and to the bytes of an EXR and a PNG, without files:
@@ -79,6 +79,7 @@ pub use spherule_report::viewer;
 #[cfg(feature = "reports")]
 pub use spherule_scale as scale;
 pub use spherule_selection as selection;
+pub use spherule_surface as surface;
 pub use spherule_survey as survey;
-pub use spherule_tracer::{denoise, render, scene, surface};
+pub use spherule_tracer::{denoise, render, scene};
 pub use spherule_tree::{accel, math, ray};

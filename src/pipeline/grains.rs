@@ -4,14 +4,16 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{DQuat, DVec3, Vec3};
+use rayon::prelude::*;
 use spherule_formats::Radius;
-use spherule_frame::grain_columns::{GrainColumns, GrainNames};
+use spherule_frame::grain_columns::{AngularVelocities, GrainColumns, GrainNames};
 
 use super::SharedFrame;
 use super::grain_parts::{GrainPart, parts_by_type};
 use super::load_error::LoadError;
 use super::setup::{GrainRules, Setup, StyleForm};
+use super::shutter::Shutter;
 use super::styles::{StyleParticles, StyleRanges};
 use crate::manifest::GrainKind;
 use crate::surface::grains::{
@@ -33,6 +35,9 @@ pub(super) struct FrameGrains {
     sizes: Vec<[f32; 3]>,
     /// Exponents of superquadrics; empty without columns.
     exponents: Vec<[f32; 2]>,
+    /// Angular velocities, radians per unit of time; from [`Self::expose`] on, rotations during the exposure. Empty
+    /// without columns and without motion blur.
+    turns: Vec<Vec3>,
 }
 
 /// The grains of all styles of a frame, which was read from a file and has this number. Notes which columns they have.
@@ -62,7 +67,15 @@ pub(super) fn grains_of(
         };
         let mut used = usual.used.clone();
         used.extend(named.used.iter().cloned());
-        let grains = columns_of(rules, (&usual, &named), &range);
+        let mut grains = columns_of(rules, (&usual, &named), &range);
+        if setup.picture.view.shutter.is_some()
+            && let Some(turning) = angular_velocities(rules, frame, file)?
+        {
+            let own = turning.values.get(range.clone()).unwrap_or_default();
+            grains.turns = own.iter().map(|turn| Vec3::from_array(*turn)).collect();
+            let used = turning.used.join(", ");
+            notes.push(format!("frame {number}: grains of style `{}` turn by {used}", style.name));
+        }
         let (parts, of_types) = match frame.shapes.as_ref().filter(|_| rules.is_open()) {
             Some(types) => (parts_by_type(frame, types, range, notes), "the shapes of types, "),
             None => {
@@ -83,6 +96,23 @@ pub(super) fn grains_of(
         all.push(FrameGrains { style: index, parts, ..grains });
     }
     Ok(all)
+}
+
+/// The angular velocities of all particles of a frame; None without columns.
+///
+/// # Errors
+/// The frame lacks a column that is named.
+fn angular_velocities(
+    rules: &GrainRules,
+    frame: &SharedFrame<'_>,
+    file: &str,
+) -> Result<Option<AngularVelocities>, LoadError> {
+    let Some(names) = &rules.names.angular_velocity else {
+        return Ok(AngularVelocities::find(&frame.attributes));
+    };
+    AngularVelocities::named(&frame.attributes, names)
+        .map(Some)
+        .map_err(|fault| LoadError::Grains { file: file.to_owned(), fault })
 }
 
 /// The columns of the grains in `range`: those that are named before the usual ones.
@@ -151,7 +181,25 @@ fn shape_of(rules: &GrainRules, has_exponents: bool) -> GrainShape {
     }
 }
 
+/// The orientation of grains that are not rotated.
+const UPRIGHT: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
+
 impl FrameGrains {
+    /// Turns the grains to their orientations in the middle of the exposure, and determines how far they turn while the
+    /// shutter is open.
+    pub(super) fn expose(&mut self, shutter: Shutter) {
+        if self.turns.is_empty() {
+            return;
+        }
+        self.orientations.resize(self.turns.len(), UPRIGHT);
+        let [middle, length] = shutter.middle_and_length();
+        let turns = self.turns.par_iter_mut();
+        turns.zip(&mut self.orientations).for_each(|(turn, orientation)| {
+            *orientation = rotated(*orientation, middle * turn.as_dvec3());
+            *turn = (length * turn.as_dvec3()).as_vec3();
+        });
+    }
+
     /// The trees of the grains at the places of `own`, which move by `displacements` while the shutter is open.
     ///
     /// # Errors
@@ -191,7 +239,7 @@ impl FrameGrains {
             _ => Cow::Borrowed(&[][..]),
         };
         let displacements = displacements.map(|all| chosen(all, members));
-        let rotations = vec![Vec3::ZERO; displacements.as_ref().map_or(0, |all| all.len())];
+        let rotations = chosen(&self.turns, members);
         let motion = displacements
             .as_ref()
             .map(|displacements| GrainMotion { displacements, rotations: &rotations });
@@ -212,6 +260,20 @@ impl FrameGrains {
             None => tree,
         })
     }
+}
+
+/// The quaternion x, y, z, w of an orientation after a rotation about an axis of the scene by the angle in radians that is
+/// the length of `turn`. A rotation that is zero or not finite changes nothing.
+fn rotated(orientation: [f32; 4], turn: DVec3) -> [f32; 4] {
+    let angle = turn.length();
+    let is_turned = angle > 0.0 && angle < f64::INFINITY;
+    if !is_turned {
+        return orientation;
+    }
+    let (sine, cosine) = libm::sincos(0.5 * angle);
+    let rotation = DQuat::from_vec4((turn * (sine / angle)).extend(cosine));
+    let [x, y, z, w] = orientation.map(f64::from);
+    (rotation * DQuat::from_xyzw(x, y, z, w)).as_quat().to_array()
 }
 
 /// The values of `members`, or all.
@@ -254,8 +316,47 @@ pub(super) fn report_notes(style: &str, report: &GrainReport) -> Vec<String> {
         (report.bad_sizes, "left out: a semi-axis is not above 0"),
         (report.bad_centers, "left out: a coordinate is not finite or too far away"),
         (report.bad_exponents, "with an exponent below 1, drawn as ellipsoids"),
-        (report.bad_motions, "with a motion that is not finite, drawn at rest"),
+        (
+            report.bad_motions,
+            "with a velocity or an angular velocity that is not finite, which counts as none",
+        ),
     ];
     let counted = counts.into_iter().filter(|(count, _)| *count > 0);
     counted.map(|(count, what)| format!("style `{style}`: {count} grains {what}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::FrameStep;
+    use super::*;
+
+    #[test]
+    fn grains_are_turned_to_the_middle_of_the_exposure() {
+        // Open from the time of the frame for one unit of time
+        let step = FrameStep { time: 2.0, numbers: 1 };
+        let shutter = Shutter { open: 0.0, close: 0.5, step, has_velocities: true, slices: 1 };
+        let quarter = std::f32::consts::FRAC_PI_2;
+        // A rotation about x, and no orientation
+        let tilted = [0.6, 0.0, 0.0, 0.8];
+        let nothing = [f32::NAN; 4];
+        let mut grains = FrameGrains {
+            orientations: vec![tilted, tilted, tilted, nothing],
+            turns: vec![quarter * Vec3::Z, Vec3::ZERO, Vec3::splat(f32::NAN), Vec3::X],
+            ..FrameGrains::default()
+        };
+        grains.expose(shutter);
+        assert!((grains.turns[0] - quarter * Vec3::Z).length() < 1e-6, "{}", grains.turns[0]);
+        let turned = DQuat::from_rotation_z(0.25 * std::f64::consts::PI)
+            * DQuat::from_xyzw(0.6, 0.0, 0.0, 0.8);
+        let found = DQuat::from_array(grains.orientations[0].map(f64::from));
+        assert!((found - turned).length() < 1e-6, "{found} {turned}");
+        // Without a rotation, to the bit
+        assert_eq!(grains.orientations[1..3], [tilted; 2]);
+        assert!(grains.turns[2].is_nan() && grains.orientations[3][0].is_nan());
+        // Grains without orientations get them
+        let mut upright = FrameGrains { turns: vec![quarter * Vec3::Z], ..FrameGrains::default() };
+        upright.expose(shutter);
+        let half_angle = (0.125 * std::f64::consts::PI).sin();
+        assert!((f64::from(upright.orientations[0][2]) - half_angle).abs() < 1e-6);
+    }
 }

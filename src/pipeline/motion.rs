@@ -14,6 +14,7 @@ use super::setup::Setup;
 use super::shutter::Shutter;
 use super::{ImageTask, SharedFrame};
 use crate::accel::moving::bounded;
+use crate::math::narrow;
 
 /// Moves the particles of `frame` to their places in the middle of the exposure. Returns by how far each of them moves
 /// from the opening of the shutter to its closing. Takes the velocities of the frame unless a channel needs them.
@@ -37,12 +38,7 @@ pub(super) fn displaced(
     velocities: Vec<Vec3>,
 ) -> Vec<Vec3> {
     let mut displacements = velocities;
-    let time = f64::from(shutter.step.time);
-    #[expect(clippy::cast_possible_truncation, reason = "lengths of a scene are f32")]
-    let [middle, length] = [
-        (0.5 * (shutter.open + shutter.close) * time) as f32,
-        ((shutter.close - shutter.open) * time) as f32,
-    ];
+    let [middle, length] = shutter.middle_and_length().map(narrow);
     let centers = centers.to_mut().par_iter_mut();
     centers.zip(displacements.par_iter_mut()).for_each(|(center, velocity)| {
         *center += bounded(middle * *velocity);

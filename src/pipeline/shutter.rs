@@ -27,6 +27,13 @@ pub struct Shutter {
 }
 
 impl Shutter {
+    /// The time from that of the frame to the middle of the exposure, and the length of the exposure, both in the unit of
+    /// time of the velocities.
+    pub(super) fn middle_and_length(&self) -> [f64; 2] {
+        let time = f64::from(self.step.time);
+        [0.5 * (self.open + self.close) * time, (self.close - self.open) * time]
+    }
+
     /// The middles of the slices, as fractions of the step from the time of the frame.
     pub(super) fn slice_times(&self) -> impl Iterator<Item = f64> + use<> {
         let (middle, length) = (0.5 * (self.open + self.close), self.close - self.open);

@@ -180,7 +180,10 @@ impl StyleGrains {
         let displacements = move_to_exposure(setup, frame, &mut own);
         let of_frame = &mut frame.shading.grains;
         let place = of_frame.iter().position(|grains| grains.style == own.style)?;
-        let grains = of_frame.swap_remove(place);
+        let mut grains = of_frame.swap_remove(place);
+        if let Some(shutter) = setup.picture.view.shutter {
+            grains.expose(shutter);
+        }
         let rules = &setup.picture.particles.styles[own.style];
         match grains.trees(&own, displacements.as_deref()) {
             Ok(trees) => {

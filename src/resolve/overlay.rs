@@ -262,13 +262,14 @@ fn content(
     Ok(match kind {
         OverlayKind::ColorBar { title, unit, length, orientation, ticks, format, factor } => {
             let rules = &setup.picture.particles;
-            // Clear particles are not seen in their colours
-            let is_opaque = |style: &&ParticleStyle| {
-                setup.picture.scene.material(style.material).transmission == 0.0
+            // Clear particles are seen in their colours only if these absorb light
+            let shows_colors = |style: &&ParticleStyle| {
+                let material = setup.picture.scene.material(style.material);
+                material.transmission == 0.0 || material.color_length.is_some()
             };
-            let of_styles = rules.styles.iter().filter(is_opaque).map(|style| &style.color);
+            let of_styles = rules.styles.iter().filter(shows_colors).map(|style| &style.color);
             let is_seen = rules.styles.is_empty()
-                || (survey.color.is_some() && !manifest.material.is_clear());
+                || (survey.color.is_some() && manifest.material.shows_colors());
             let seen: Vec<&ColorRule> =
                 is_seen.then_some(&rules.color).into_iter().chain(of_styles).collect();
             let mapped = seen.iter().find_map(|rule| color_bar(rule, &seen, (manifest, survey)));

@@ -1,6 +1,6 @@
 //! Radius and material of the surface.
 
-use crate::manifest::Manifest;
+use crate::manifest::{Absorption, Manifest};
 use crate::math::narrow;
 use crate::scene::{Bounds, Fresnel, Material, material};
 use crate::surface::SurfaceKind;
@@ -44,11 +44,16 @@ pub(super) fn optics(
         Some(length) => narrow(length),
         None => narrow(bounds.diagonal() * ABSORPTION).max(f32::MIN_POSITIVE),
     };
-    let usual = match kind {
+    let usual = m.resolved(match kind {
         SurfaceKind::Spheres => Fresnel::Schlick,
         SurfaceKind::Union | SurfaceKind::Smooth => Fresnel::Exact,
-    };
-    Material { extinction: material::extinction(m.absorption, length), ..m.resolved(usual) }
+    });
+    match m.absorption {
+        Absorption::Color(color) => {
+            Material { extinction: material::extinction(color, length), ..usual }
+        }
+        Absorption::OfParticles => Material { color_length: Some(length), ..usual },
+    }
 }
 
 /// The larger of two values divided by the smaller.

@@ -36,6 +36,8 @@ fn one_body_has_exact_fresnel_and_absorption() {
     assert_eq!([loss.y, loss.z], [0.0; 2]);
     let long = of(&format!("{smooth}material.absorption_length = 8"));
     assert!((long.extinction.x - 2.0_f32.ln() / 8.0).abs() < 1e-6);
+    let colored = of("render.surface = \"smooth\"\nmaterial.absorption = \"color\"\n");
+    assert_eq!((colored.color_length, colored.extinction), (Some(1.75), glam::Vec3::ZERO));
     let named = of(&format!("{smooth}material.fresnel = \"schlick\""));
     assert_eq!(named.fresnel, Fresnel::Schlick);
     assert_eq!(of("material.fresnel = \"exact\"").fresnel, Fresnel::Exact);

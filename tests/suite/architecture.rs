@@ -22,7 +22,7 @@ fn root() -> &'static Path {
 
 /// Crates whose modules ARCHITECTURE.md lists, and how many modules each has at least.
 const LISTED: [(&str, usize); 4] =
-    [("crates/tree", 4), ("crates/tracer", 4), ("crates/images", 5), ("src", 7)];
+    [("crates/tree", 4), ("crates/tracer", 3), ("crates/images", 5), ("src", 7)];
 
 /// The lines of ARCHITECTURE.md that are indented by four spaces, the first after `heading`.
 fn list_after(heading: &str) -> Vec<String> {

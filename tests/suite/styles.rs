@@ -102,6 +102,49 @@ fn grains_have_the_orientation_of_the_file() {
     still(&workshop, "a.csv", &["b.png", "--style", &style]).expect(1).prints("did you mean `quat");
 }
 
+#[test]
+fn grains_turn_during_the_exposure() {
+    let workshop = Workshop::new();
+    // Three rods along x, of which the first makes a quarter turn about z while the shutter is open
+    let write = |name: &str, speeds: [&str; 3]| {
+        let row = |(i, speed): (usize, &&str)| {
+            format!("{i},{},0,0,0,0,0,0,0,{speed},0.8,0.1,0.1,1,0,0,0\n", 4 * i)
+        };
+        let rows: String = speeds.iter().enumerate().map(row).collect();
+        let head =
+            "id,x,y,z,vx,vy,vz,omegax,omegay,omegaz,shapex,shapey,shapez,quat1,quat2,quat3,quat4";
+        fs::write(workshop.join(name), format!("{head}\n{rows}")).expect("a file");
+    };
+    write("turning.csv", ["3.141592653589793", "0", "0"]);
+    write("resting.csv", ["0", "0", "0"]);
+    write("broken.csv", ["nan", "inf", "0"]);
+    let blurred = |input: &str, image: &str, columns: &str| {
+        let style = format!(": grains, name rods{columns}");
+        let motion = ["--set", "camera.shutter=0.5", "--set", "output.frame_time=1"];
+        still(&workshop, input, &[&[image, "--style", &style][..], &motion].concat())
+    };
+    let picture = |image: &str| fs::read(workshop.join(image)).expect("a picture");
+    let turning = blurred("turning.csv", "a.png", "").expect(0);
+    let note = "grains of style `rods` turn by omegax, omegay, omegaz";
+    assert!(turning.errors().contains(note), "{}", turning.errors());
+    blurred("resting.csv", "b.png", "").expect(0);
+    assert_ne!(picture("a.png"), picture("b.png"));
+    // Numbers that are not finite count as none
+    let broken = blurred("broken.csv", "c.png", "").expect(0);
+    let note = "style `rods`: 2 grains with a velocity or an angular velocity that is not finite";
+    assert!(broken.errors().contains(note), "{}", broken.errors());
+    assert_eq!(picture("b.png"), picture("c.png"));
+    // Native frames keep the column
+    workshop.run(&["convert", "turning.csv", "-o", "native"]).expect(0);
+    blurred("native", "d.png", "").expect(0);
+    assert_eq!(picture("a.png"), picture("d.png"));
+    // Other columns may be named
+    let named = |x: &str| format!(", angular_velocity ['{x}', 'omegax', 'omegay']");
+    blurred("turning.csv", "e.png", &named("omegaz")).expect(0);
+    assert_ne!(picture("a.png"), picture("e.png"));
+    blurred("turning.csv", "f.png", &named("wx")).expect(1).prints("no column `wx`");
+}
+
 /// A tetrahedron.
 const OBJ: &str = "v 1 1 1\nv 1 -1 -1\nv -1 1 -1\nv -1 -1 1\nf 1 2 3\nf 1 4 2\nf 1 3 4\nf 2 4 3\n";
 
@@ -203,4 +246,22 @@ fn several_styles_are_clear_bodies() {
     still(&workshop, "in", &[&oil[..], &water].concat())
         .expect(2)
         .prints("set style.0.draw = \"smooth\" or \"union\"");
+}
+
+#[test]
+fn clear_bodies_have_the_colours_of_their_particles() {
+    let workshop = layers();
+    let picture = |image: &str, draw: &str, absorption: &str| {
+        let style = format!(
+            ": {draw}, radius 0.8, color_by x, map viridis, \
+             material {{ type = 'water', absorption_length = 2{absorption} }}"
+        );
+        still(&workshop, "in/f_1.csv", &[image, "--style", &style]).expect(0);
+        fs::read(workshop.join(image)).expect("a picture")
+    };
+    for draw in ["smooth", "union"] {
+        let clear = picture("a.png", draw, "");
+        assert_ne!(picture("b.png", draw, ", absorption = 'color'"), clear, "{draw}");
+        assert_eq!(picture("c.png", draw, ", absorption = [1, 1, 1]"), clear, "{draw}");
+    }
 }

@@ -1,7 +1,7 @@
 //! `[[arrows]]`: arrows of vector attributes at the particles.
 
 use glam::Vec3;
-use spherule_tracer::surface::rods::Anchor;
+use spherule_surface::rods::Anchor;
 
 use super::color::ColorSetting;
 use super::keys::{Keys, keys};

@@ -1,9 +1,9 @@
 //! Dependencies between tables: what one allows another.
 
 use spherule_jobs::FrameRange;
+use spherule_surface::SurfaceKind;
 use spherule_tracer::render::{FilmPlane, MAX_LITERAL_DEPTH, MAX_SIDE, MAX_TRANSMISSIVE_BODIES};
 use spherule_tracer::scene::MaterialId;
-use spherule_tracer::surface::SurfaceKind;
 
 use super::bonds::BondSearch;
 use super::camera::ProjectionKind;

@@ -36,9 +36,9 @@ use std::path::Path;
 
 use spherule_images::overlay::Layout;
 use spherule_selection::{Condition, Selection};
+use spherule_surface::{SprayStyle, SurfaceKind, SurfaceSettings};
 use spherule_tracer::render::{FilmPlane, IntegratorKind, RendererKind};
 use spherule_tracer::scene::Fresnel;
-use spherule_tracer::surface::{SprayStyle, SurfaceKind, SurfaceSettings};
 
 use key::Affects;
 use keys::Keys;
@@ -48,6 +48,7 @@ use reader::Section;
 use source::lay_over;
 use tree::TomlNode;
 
+mod absorption;
 mod arrows;
 mod bar_ticks;
 mod bonds;
@@ -112,6 +113,7 @@ mod work;
 #[cfg(test)]
 mod work_tests;
 
+pub use absorption::Absorption;
 pub use arrows::Arrows;
 pub use bar_ticks::LabelFormat;
 pub use bonds::{BondSearch, Bonds};

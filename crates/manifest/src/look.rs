@@ -140,10 +140,10 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::{GroundKind, GroundPattern, GroundSetting, Manifest, marked};
+    use crate::{Absorption, GroundKind, GroundPattern, GroundSetting, Manifest, marked};
+    use spherule_surface::SurfaceKind;
     use spherule_tracer::render::IntegratorKind;
     use spherule_tracer::scene::Background;
-    use spherule_tracer::surface::SurfaceKind;
 
     fn water(text: &str, sets: &[&str]) -> Manifest {
         let sets =
@@ -171,7 +171,7 @@ mod tests {
         assert_eq!(plain.material.constants.transmission, 1.0);
         assert!(
             plain.render.ground == Some(GroundSetting::of(GroundKind::Plain))
-                && plain.material.absorption[0] < 1.0
+                && matches!(plain.material.absorption, Absorption::Color(color) if color.x < 1.0)
         );
     }
 
@@ -198,7 +198,7 @@ mod tests {
         let mixed = water(text, &["render.surface=spheres", "render.background=[1,0,0]"]);
         assert_eq!(mixed.render.max_depth, 5);
         assert_eq!(mixed.render.ground_tile, Some(2.0));
-        assert_eq!(mixed.material.absorption, Vec3::ONE);
+        assert_eq!(mixed.material.absorption, Absorption::default());
         assert_eq!(mixed.surface.kind, SurfaceKind::Spheres);
         assert_eq!(mixed.render.background, Some(Background::Constant(Vec3::X)));
         assert_eq!(mixed.render.ground, Some(GroundSetting::of(GroundKind::Plain)));

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use glam::Vec3;
 use spherule_tracer::scene::{self, Finish, Fresnel};
 
+use super::absorption::Absorption;
 use super::color::ColorSetting;
 use super::key::{Affects, Key};
 use super::keys::{Keys, keys};
@@ -60,8 +60,8 @@ pub struct Material {
     /// The Fresnel equations; by default Schlick's approximation for spheres, as in the thesis, and the exact ones
     /// for a union or a smooth surface.
     pub fresnel: Option<Fresnel>,
-    /// Transmittance of white light over [`Self::absorption_length`] inside, linear RGB.
-    pub absorption: Vec3,
+    /// Transmittance of white light over [`Self::absorption_length`] inside.
+    pub absorption: Absorption,
     /// The length for `absorption`; by default it depends on the extent of the particles.
     pub absorption_length: Option<f64>,
     /// Materials of parts of the particles.
@@ -77,7 +77,7 @@ impl Default for Material {
             opacity: OpacitySetting::Constant(1.0),
             constants: scene::Material::DEFAULT,
             fresnel: None,
-            absorption: Vec3::ONE,
+            absorption: Absorption::default(),
             absorption_length: None,
             parts: Vec::new(),
         }
@@ -92,6 +92,11 @@ impl Material {
     /// Whether light passes through the particles.
     pub fn is_clear(&self) -> bool {
         self.resolved(Fresnel::Exact).transmission > 0.0
+    }
+
+    /// Whether the particles are seen in their colours: opaque, or as clear bodies that absorb light by them.
+    pub fn shows_colors(&self) -> bool {
+        !self.is_clear() || self.absorption == Absorption::OfParticles
     }
 
     /// The first term of the thesis's model with another value than its default. All but `transmission` have no effect
@@ -189,7 +194,10 @@ impl Material {
             transmission => constants.transmission, from(0), to(1);
             /// Fresnel equations: auto | schlick | exact; auto is schlick for spheres, exact for union and smooth
             fresnel => self.fresnel, or("auto");
-            /// Colour of white light after absorption_length inside, linear RGB; [1, 1, 1] is clear
+            /// Colour of white light after absorption_length inside, linear RGB; [1, 1, 1] is clear; "color" is that of color
+            ///
+            /// With "color", light takes the colours of the particles, by an attribute and a map. Between the points where
+            /// a ray enters and leaves the body, absorption is the mean of both.
             absorption => self.absorption, from(0), to(1);
             /// Distance after which white light has the colour absorption, or auto
             absorption_length => self.absorption_length, or("auto"), unit("a length"), above(0), single();

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use glam::{DVec3, Vec3};
 use serde_json::{Value as Json, json};
-use spherule_tracer::surface::mesh::VisibleFaces;
+use spherule_surface::mesh::VisibleFaces;
 
 use super::field::Field;
 use super::key::{Affects, Key};

@@ -3,8 +3,8 @@
 //! Keys and values have changed between versions. A job resumes with the settings of its plan, so differences without
 //! an effect on the images must not count as changes.
 
+use spherule_surface::SprayStyle;
 use spherule_tracer::render::IntegratorKind;
-use spherule_tracer::surface::SprayStyle;
 
 use super::value::Value;
 use super::{ColorMapping, ColorSetting, GroundKind, GroundSetting, Manifest, MapName};

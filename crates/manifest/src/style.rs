@@ -2,9 +2,10 @@
 
 use spherule_frame::grain_columns::{GrainNames, SizeKind};
 use spherule_selection::{Claim, Condition, Division};
+use spherule_surface::SurfaceKind;
 use spherule_tracer::scene::{self, Finish, Fresnel};
-use spherule_tracer::surface::SurfaceKind;
 
+use super::absorption::Absorption;
 use super::bonds::BondSearch;
 use super::color::{ColorMapping, ColorSetting};
 use super::color_map::{MapName, RangeSetting};
@@ -94,6 +95,7 @@ pub(super) const RULES: &[Rule] = rules! {
     "draw" MissingOrNot["grains"] => "size" Missing: GRAINS;
     "draw" MissingOrNot["grains"] => "exponents" Missing: GRAINS;
     "draw" MissingOrNot["grains"] => "orientation" Missing: GRAINS;
+    "draw" MissingOrNot["grains"] => "angular_velocity" Missing: GRAINS;
     "shape" Is["mesh", "convex-hull"] => "mesh" Given: "which file, such as mesh = \"grain.stl\"";
     "shape" Is["ellipsoid", "superquadric", "capsule", "cylinder", "cuboid"] => "mesh" Missing:
         "belongs to shape = \"mesh\" or \"convex-hull\"";
@@ -115,8 +117,8 @@ pub struct StyleMaterial {
     pub roughness: Option<f32>,
     /// Index of refraction of glass and water; by default 1.5 and 1.333.
     pub ior: Option<f32>,
-    /// Transmittance of white light over [`Self::absorption_length`] inside, linear RGB.
-    pub absorption: glam::Vec3,
+    /// Transmittance of white light over [`Self::absorption_length`] inside.
+    pub absorption: Absorption,
     /// The length for `absorption`; by default it depends on the extent of the particles.
     pub absorption_length: Option<f64>,
 }
@@ -127,7 +129,7 @@ impl Default for StyleMaterial {
             kind: StyleMaterialKind::Matte,
             roughness: None,
             ior: None,
-            absorption: glam::Vec3::ONE,
+            absorption: Absorption::default(),
             absorption_length: None,
         }
     }
@@ -145,7 +147,7 @@ impl InlineTable for StyleMaterial {
             roughness => self.roughness, from(0), to(1);
             /// Index of refraction
             ior => self.ior, from(1), to(4), single();
-            /// Transmittance of white light over absorption_length
+            /// Transmittance of white light over absorption_length, or "color"
             absorption => self.absorption, from(0), to(1);
             /// The length for absorption
             absorption_length => self.absorption_length, above(0), single();
@@ -276,6 +278,8 @@ pub struct Style {
     pub exponents: Option<GrainNumbers<2>>,
     /// Orientation of grains; by default the columns that the format is known for.
     pub orientation: Option<GrainOrientation>,
+    /// Columns of the angular velocity of grains; by default those that the format is known for.
+    pub angular_velocity: Option<Vec<String>>,
     /// Bonds of sticks.
     pub bonds: Option<StyleBonds>,
     /// The arrows, if it draws these.
@@ -302,6 +306,7 @@ impl Default for Style {
             size: None,
             exponents: None,
             orientation: None,
+            angular_velocity: None,
             bonds: None,
             arrows: None,
             trails: None,
@@ -353,6 +358,9 @@ impl Style {
             exponents => self.exponents, example("[8.0, 2.0]"), unset("columns of known names");
             /// Orientation of grains: { quaternion = ["qw", "qx", "qy", "qz"] }, or quaternion_xyzw, euler, euler_radians
             orientation => self.orientation, example("{ quaternion = [\"qw\", \"qx\", \"qy\", \"qz\"] }"),
+                unset("columns of known names");
+            /// Columns of the angular velocity of grains, radians per unit of time, for motion blur
+            angular_velocity => self.angular_velocity, example("[\"wx\", \"wy\", \"wz\"]"),
                 unset("columns of known names");
             /// Bonds of sticks: { find = "covalent", radius = 0.1 }
             bonds => self.bonds, example("{ find = \"covalent\", radius = 0.1 }"),
@@ -436,7 +444,8 @@ impl Style {
             _ => None,
         };
         let orientation = self.orientation.as_ref().and_then(GrainOrientation::named);
-        GrainNames { orientation, sizes, exponents }
+        let angular_velocity = self.angular_velocity.clone();
+        GrainNames { orientation, sizes, exponents, angular_velocity }
     }
 
     /// Whether legends show it: a map, or a name with a colour.

@@ -1,6 +1,6 @@
 //! `[surface]` and `render.surface`: the surface that rays hit.
 
-use spherule_tracer::surface::{NormalKind, SprayStyle, SurfaceKind, SurfaceSettings};
+use spherule_surface::{NormalKind, SprayStyle, SurfaceKind, SurfaceSettings};
 
 use super::key::Affects;
 use super::keys::{Keys, keys};

@@ -511,6 +511,7 @@ fn commented_file_round_trips_with_every_key() {
         "mesh = ",
         "exponents = ",
         "orientation = {",
+        "angular_velocity = ",
     ];
     let is_other = |line: &str| {
         own.iter().any(|key| line.starts_with(key)) || line.contains("# Semi-axes of grains")

@@ -4,9 +4,9 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use spherule_report::FrameReport;
+use spherule_surface::spheres::SphereSurface;
 use spherule_tracer::render::{ParticleShading, RayCounts, RenderSettings, render};
 use spherule_tracer::scene::material::DEFAULT_COLOR;
-use spherule_tracer::surface::spheres::SphereSurface;
 use spherule_tree::accel::BuildReport;
 use spherule_tree::accel::view::TreeView;
 

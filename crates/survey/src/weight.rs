@@ -3,7 +3,7 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use spherule_formats::{Positions, Radius, RawParticles, choose_origin, find_radius, is_near};
-use spherule_tracer::surface::{SurfaceSettings, SurfaceSize};
+use spherule_surface::{SurfaceSettings, SurfaceSize};
 use spherule_tree::math::narrow;
 
 use super::RadiusQuestion;
@@ -146,7 +146,7 @@ mod tests {
         // Half the particles are drawn
         let scaled = weight.scaled(200, 1.0, Some(2.0));
         assert_eq!((scaled.particles, scaled.spray), (100, 20));
-        let grid = spherule_tracer::surface::smooth::GridSize {
+        let grid = spherule_surface::smooth::GridSize {
             particles: 40,
             near: 40,
             bricks: 4000,

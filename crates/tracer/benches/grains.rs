@@ -15,14 +15,14 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use glam::{DVec3, Vec3};
-use spherule_tracer::render::{IntegratorKind, ParticleShading, RenderSettings, render};
-use spherule_tracer::scene::{Camera, CameraView, Environment, Scene};
-use spherule_tracer::surface::grains::{
+use spherule_surface::grains::{
     GrainMesh, GrainMotion, GrainShape, GrainSizes, GrainSurface, GrainTree, Grains,
 };
-use spherule_tracer::surface::mesh::MeshNormals;
-use spherule_tracer::surface::spheres::SphereSurface;
-use spherule_tracer::surface::{Intersections, Shape};
+use spherule_surface::mesh::MeshNormals;
+use spherule_surface::spheres::SphereSurface;
+use spherule_surface::{Intersections, Shape};
+use spherule_tracer::render::{IntegratorKind, ParticleShading, RenderSettings, render};
+use spherule_tracer::scene::{Camera, CameraView, Environment, Scene};
 use spherule_tree::accel::{
     BuildSettings, Coherence, SphereRadius, Spheres, Structure, TreeBuilder,
 };

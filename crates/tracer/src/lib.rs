@@ -1,10 +1,10 @@
 //! Renders scenes of particles to the planes of a film.
 //!
 //! - [`scene`]: camera, lights, environment, materials, background, ground: plain values.
-//! - [`surface`]: shapes that rays intersect: spheres, their union, the isosurface of their field, meshes, rods,
-//!   grains of other shapes.
 //! - [`render`]: the Whitted and the path integrator, samplers, BSDFs, lights, and the [`render::Film`].
 //! - [`denoise`]: removes noise from a picture and its features.
+//!
+//! The shapes that rays intersect are those of `spherule-surface`.
 //!
 //! Pictures do not depend on threads, tile order or instruction set. This crate takes slices and returns values: it
 //! opens no files and prints nothing. ARCHITECTURE.md describes the render core and how to extend it.
@@ -17,7 +17,7 @@
 //! use glam::{DVec3, Vec3};
 //! use spherule_tracer::render::{Colors, ParticleShading, RenderSettings, render};
 //! use spherule_tracer::scene::{Camera, CameraView, Scene};
-//! use spherule_tracer::surface::spheres::SphereSurface;
+//! use spherule_surface::spheres::SphereSurface;
 //! use spherule_tree::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -52,4 +52,3 @@
 pub mod denoise;
 pub mod render;
 pub mod scene;
-pub mod surface;

@@ -45,6 +45,7 @@ const MATT: Material = Material {
     transmission: 0.0,
     fresnel: Fresnel::Schlick,
     extinction: Vec3::ZERO,
+    color_length: None,
     finish: spherule::scene::Finish::Matte,
     interface_roughness: 0.0,
     priority: 0,

@@ -17,7 +17,9 @@
 //! for a vector of four numbers, since it is the only difference between GSD and OVITO; other names are compared without
 //! regard to case. A vector and its numbered components are the same: `c_q[1]` is a column or a component. Columns of
 //! other names, or of one of these names with another meaning, are named explicitly ([`GrainColumns::named`]).
+//! [`AngularVelocities`] has the columns that say how particles turn.
 
+mod angular_velocity;
 mod convention;
 mod error;
 mod rotation;
@@ -29,6 +31,7 @@ mod tests;
 use rayon::prelude::*;
 
 use crate::Attribute;
+pub use angular_velocity::AngularVelocities;
 pub(crate) use convention::is_size;
 use convention::{ExponentKind, Found};
 pub use error::GrainColumnError;
@@ -103,6 +106,9 @@ pub struct GrainNames {
     pub sizes: Option<(Vec<String>, SizeKind)>,
     /// Names with the exponents n1 and n2 of superquadrics: along z and in the cross section.
     pub exponents: Option<Vec<String>>,
+    /// Names with three numbers of an angular velocity, radians per unit of time about the axes of the scene. Only
+    /// [`AngularVelocities::named`] reads them.
+    pub angular_velocity: Option<Vec<String>>,
 }
 
 /// Orientations and sizes of the particles of a frame.

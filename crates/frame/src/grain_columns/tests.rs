@@ -193,3 +193,71 @@ fn unknown_columns_have_a_suggestion() {
     let error = GrainColumns::named(&two, &size).expect_err("two numbers").to_string();
     assert_eq!(error, "a size needs 3 or 1 numbers, but v has 2");
 }
+
+#[test]
+fn angular_velocities_of_programs_are_found() {
+    let found =
+        |columns: &[Attribute]| AngularVelocities::find(columns).expect("angular velocities");
+    let numbers = [1.0, -2.0, 3.0];
+    for name in ["omega", "Angular Velocity", "AngularVelocity", "angular_velocity"] {
+        let own = found(&[column("velocity", 3, &[9.0; 3]), column(name, 3, &numbers)]);
+        assert_eq!((own.values, own.used), (vec![[1.0, -2.0, 3.0]], vec![name.to_owned()]));
+    }
+    for names in [
+        ["omegax", "omegay", "omegaz"],
+        ["Angular Velocity.X", "Angular Velocity.Y", "Angular Velocity.Z"],
+    ] {
+        let mut columns = scalars(&names, &numbers);
+        columns.reverse();
+        let own = found(&columns);
+        assert_eq!(own.values, [[1.0, -2.0, 3.0], [0.0; 3]]);
+        assert_eq!(own.used, names);
+    }
+    // Numbers that are not finite stay for the one who counts them
+    assert!(found(&[column("omega", 3, &[f64::NAN, 0.0, 1.0])]).values[0][0].is_nan());
+    // Vorticity, the degrees of USD, a scalar, and momenta without moments of inertia
+    let [vorticity, degrees] =
+        ["vorticity", "angularVelocities"].map(|name| column(name, 3, &numbers));
+    let momentum = column("angmom", 4, &[0.0; 4]);
+    let upright = column("orientation", 4, &[1.0, 0.0, 0.0, 0.0]);
+    for columns in
+        [vec![vorticity, degrees], vec![column("omega", 1, &[1.0])], vec![momentum, upright]]
+    {
+        assert_eq!(AngularVelocities::find(&columns), None);
+    }
+    let named = |name: &str| {
+        AngularVelocities::named(
+            &[column("spin", 3, &numbers), column("mass", 1, &[1.0])],
+            &names(&[name]),
+        )
+    };
+    assert_eq!(named("spin").expect("a column").values, [[1.0, -2.0, 3.0]]);
+    let error = named("mass").expect_err("one number").to_string();
+    assert_eq!(error, "an angular velocity needs 3 numbers, but mass has 1");
+}
+
+#[test]
+fn angular_momenta_are_those_of_hoomd() {
+    // The angular momentum S = I w about the axes of the particle, and the quaternion 2 q S
+    let (q, velocity, inertia) =
+        (rotation(), DVec3::new(0.3, -1.1, 0.7), DVec3::new(2.0, 3.0, 5.0));
+    let own = inertia * (q.inverse() * velocity);
+    let [x, y, z, w] = (q * DQuat::from_xyzw(own.x, own.y, own.z, 0.0)).to_array();
+    let columns = |inertia: DVec3| {
+        let [a, b, c, d] = q.to_array();
+        [
+            column("orientation", 4, &[d, a, b, c]),
+            column("angmom", 4, &[w, x, y, z].map(|part| 2.0 * part)),
+            column("moment_inertia", 3, &inertia.to_array()),
+        ]
+    };
+    let found = |inertia| {
+        let found = AngularVelocities::find(&columns(inertia)).expect("angular velocities");
+        DVec3::from_array(found.values[0].map(f64::from))
+    };
+    assert!((found(inertia) - velocity).length() < 1e-6, "{}", found(inertia));
+    // Without a moment of inertia about x, there is no rotation about it
+    let flat = q.inverse() * found(DVec3::new(0.0, 3.0, 5.0));
+    let expected = DVec3::new(0.0, own.y / 3.0, own.z / 5.0);
+    assert!((flat - expected).length() < 1e-6, "{flat} {expected}");
+}

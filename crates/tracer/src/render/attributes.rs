@@ -18,7 +18,7 @@ use super::{
 };
 use crate::scene::Owner;
 use crate::scene::ground::GroundSample;
-use crate::surface::{Intersections, MaterialId, Shape};
+use spherule_surface::{Intersections, MaterialId, Shape};
 use spherule_tree::math::{Lanes, lane3, lanes_in, set_lane3, splat, splat3};
 use spherule_tree::ray::RayPacket;
 

@@ -10,13 +10,14 @@ use glam::Vec3;
 
 use super::body_set::{AIR, BodySet, MAX_TRANSMISSIVE_BODIES};
 use crate::scene::{Material, Scene};
-use crate::surface::{Intersections, MaterialId, Shape, Side};
+use spherule_surface::{Intersections, MaterialId, Shape, Side};
 use spherule_tree::math::{LANES, lanes_in, lanes_where};
 
 /// Marks materials that are not of a body.
 const NO_BODY: u8 = u8::MAX;
 
 /// A connected transmissive body.
+#[derive(Clone, Copy)]
 pub(super) struct TransmissiveBody<'a> {
     pub(super) shape: &'a dyn Shape,
     pub(super) material: &'a Material,
@@ -122,9 +123,9 @@ impl<'a> TransmissiveBodies<'a> {
         self.bodies.get(medium).map_or(1.0, |body| body.material.ior)
     }
 
-    /// Extinction coefficient of a medium.
-    pub(super) fn extinction(&self, medium: usize) -> Vec3 {
-        self.bodies.get(medium).map_or(Vec3::ZERO, |body| body.material.extinction)
+    /// The body with a medium that absorbs light.
+    pub(super) fn absorbing(&self, medium: usize) -> Option<&TransmissiveBody<'a>> {
+        self.bodies.get(medium).filter(|body| body.material.absorbs())
     }
 
     /// The body whose surface the ray in `lane` hits, as a set; empty for other surfaces.

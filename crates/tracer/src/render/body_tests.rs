@@ -15,7 +15,7 @@ use crate::scene::{
     Background, Camera, CameraView, Fresnel, Ground, Light, Material, ground,
     material::{dielectric, extinction},
 };
-use crate::surface::{Intersection, MaterialId, Side};
+use spherule_surface::{Intersection, MaterialId, Side};
 use spherule_tree::ray::Ray;
 
 const CLEAR: Material = Material {
@@ -77,7 +77,7 @@ fn radiance_at(
     settings: &RenderSettings,
 ) -> (Vec<Vec3>, RayCounts) {
     let source = ParticleShading::constant(Vec3::ONE);
-    let plane = scene.ground.as_ref().map(Plane::new);
+    let plane = scene.ground.as_ref().map(Ground::shape);
     let floor = plane.iter().map(|plane| plane as &dyn Shape);
     let shapes = floor.chain(shapes.iter().copied()).collect();
     let mut integrator =

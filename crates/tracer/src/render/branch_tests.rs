@@ -14,7 +14,7 @@ use crate::scene::{
     Background, Camera, CameraView,
     material::{reflect, refract, schlick},
 };
-use crate::surface::{Shape, spheres::SphereSurface};
+use spherule_surface::{Shape, spheres::SphereSurface};
 use spherule_tree::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder};
 use spherule_tree::ray::Ray;
 

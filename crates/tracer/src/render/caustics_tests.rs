@@ -16,8 +16,8 @@ use crate::scene::{
     Background, Camera, CameraView, Environment, Falloff, Finish, Ground, Light, LightKind,
     Material,
 };
-use crate::surface::MaterialId;
-use crate::surface::mesh::{MeshNormals, MeshSurface, MeshTree, TriangleMesh, VisibleFaces};
+use spherule_surface::MaterialId;
+use spherule_surface::mesh::{MeshNormals, MeshSurface, MeshTree, TriangleMesh, VisibleFaces};
 use spherule_tree::math::{SimdLevel, Supported};
 
 const SIDE: u32 = 32;
@@ -310,7 +310,7 @@ fn light_of_photons_is_the_same_on_any_number_of_threads_and_for_all_instruction
     let source = ParticleShading::constant(Vec3::ONE);
     let surfaces = surfaces(&meshes);
     let by = |level: SimdLevel| {
-        let plane = scene.ground.as_ref().map(Plane::new);
+        let plane = scene.ground.as_ref().map(Ground::shape);
         let mut shapes: Vec<&dyn Shape> = vec![&ball];
         shapes.extend(plane.iter().map(|plane| plane as &dyn Shape));
         shapes.extend(surfaces.iter().map(|mesh| mesh as &dyn Shape));

@@ -19,7 +19,7 @@ use super::{
     stream::SegmentPacket,
 };
 use crate::scene::{Camera, PartMaterials, Scene};
-use crate::surface::{MaterialId, Shape, Side};
+use spherule_surface::{MaterialId, Shape, Side};
 use spherule_tree::accel::Coherence;
 use spherule_tree::math::Supported;
 

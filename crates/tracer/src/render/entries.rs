@@ -1,6 +1,6 @@
 //! The spheres along a ray at which it may end, found in any order (`translucent.rs`).
 
-use crate::surface::SphereEntry;
+use spherule_surface::SphereEntry;
 use spherule_tree::math::functions::log2;
 
 /// Maximum number of surfaces of spheres along a ray; further ones are not there.

@@ -14,7 +14,7 @@ use super::{
     stream::SegmentPacket,
     tile::mosaic_start,
 };
-use crate::surface::Side;
+use spherule_surface::Side;
 use spherule_tree::math::{LANES, Lanes, first_lanes, lane3, lanes_in, splat};
 use spherule_tree::ray::RayPacket;
 

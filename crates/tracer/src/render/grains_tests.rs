@@ -7,9 +7,9 @@ use glam::{DVec3, Vec3};
 
 use super::*;
 use crate::scene::{Background, Camera, CameraView, Environment, MaterialId};
-use crate::surface::Shape;
-use crate::surface::grains::{GrainShape, GrainSizes, GrainSurface, GrainTree, Grains};
-use crate::surface::spheres::SphereSurface;
+use spherule_surface::Shape;
+use spherule_surface::grains::{GrainShape, GrainSizes, GrainSurface, GrainTree, Grains};
+use spherule_surface::spheres::SphereSurface;
 use spherule_tree::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder};
 
 const COLORS: [Vec3; 3] =

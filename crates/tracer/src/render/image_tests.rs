@@ -11,7 +11,7 @@ use super::{
 use crate::scene::{
     Background, Bounds, Camera, CameraView, Framed, Framing, Ground, Material, default_lights,
 };
-use crate::surface::{Intersection, Side, spheres::SphereSurface};
+use spherule_surface::{Intersection, Side, spheres::SphereSurface};
 use spherule_tree::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder};
 use spherule_tree::math::{Lanes, lanes_in};
 use spherule_tree::ray::{Ray, RayPacket};

@@ -1,8 +1,8 @@
 //! The intersect stage: the nearest intersections, the throughput up to them, and the background behind them.
 
-use glam::Vec3;
-
 use super::{
+    absorption::InsideSegments,
+    bodies::TransmissiveBody,
     context::RenderContext,
     drawing::Drawing,
     interface::{attenuate, leaving},
@@ -12,9 +12,10 @@ use super::{
     shading::{add_backdrop, add_background, scale},
     stream::SegmentPacket,
 };
-use crate::scene::{Background, Owner};
-use crate::surface::MaterialId;
-use spherule_tree::math::lanes_in;
+use crate::scene::material::extinction;
+use crate::scene::{Background, Material, Owner};
+use spherule_surface::{Intersections, MaterialId};
+use spherule_tree::math::{Lanes3, lanes_in, splat};
 
 impl RenderContext<'_> {
     /// Finds the nearest intersection of each ray with the shapes of the scene, ends the ray there, and computes the
@@ -75,24 +76,51 @@ impl RenderContext<'_> {
     /// Multiplies the throughput by the transmittance of the only medium between the origins of the rays and their
     /// intersections.
     fn absorb(&self, segments: &SegmentPacket, packet: &mut PacketScratch) {
-        let extinction = &self.boundary.extinction;
-        if *extinction == Vec3::ZERO {
+        let material = self.scene.particle_material();
+        if !material.absorbs() {
             return;
         }
-        let hits = &packet.hits;
-        let lanes = match self.shapes.interior {
-            Interior::Opaque | Interior::Nested => 0,
+        let PacketScratch { hits, throughput, .. } = packet;
+        match (self.shapes.interior, self.shapes.particles) {
             // Only a ray that leaves a sphere has passed through its interior.
-            Interior::Spheres => {
-                hits.lanes_of(MaterialId::PARTICLES) & leaving(self.simd, &segments.rays, hits)
+            (Interior::Spheres, _) => {
+                let rays = &segments.rays;
+                let lanes = hits.lanes_of(MaterialId::PARTICLES) & leaving(self.simd, rays, hits);
+                self.absorb_in_spheres(material, hits, lanes, throughput);
             }
             // A ray inside the body without an intersection has left through a crack in the surface; its length
             // inside is unknown.
-            Interior::Body => segments.inside & hits.mask,
-        };
-        if lanes != 0 {
-            let throughput = &mut packet.throughput;
-            attenuate(self.simd, extinction, &hits.t, lanes, throughput);
+            (Interior::Body, Some(shape)) if segments.inside & hits.mask != 0 => {
+                let inside = InsideSegments {
+                    rays: &segments.rays,
+                    from: &splat(0.0),
+                    length: &hits.t,
+                    lanes: segments.inside & hits.mask,
+                };
+                self.absorb_in(&TransmissiveBody { shape, material }, inside, throughput);
+            }
+            _ => {}
+        }
+    }
+
+    /// Multiplies `throughput` of `lanes`, whose rays leave separate spheres, by the transmittance of these.
+    fn absorb_in_spheres(
+        &self,
+        material: &Material,
+        hits: &Intersections,
+        lanes: u32,
+        throughput: &mut Lanes3,
+    ) {
+        match material.color_length {
+            _ if lanes == 0 => {}
+            None => attenuate(self.simd, &material.extinction, &hits.t, lanes, throughput),
+            // Each sphere has one colour
+            Some(length) => {
+                for lane in lanes_in(lanes) {
+                    let own = extinction(self.source.color(hits.particle[lane]), length);
+                    attenuate(self.simd, &own, &hits.t, 1 << lane, throughput);
+                }
+            }
         }
     }
 

@@ -9,7 +9,7 @@ use super::{
     *,
 };
 use crate::scene::{Background, Camera, CameraView, Lens, Material};
-use crate::surface::spheres::SphereSurface;
+use spherule_surface::spheres::SphereSurface;
 use spherule_tree::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder};
 
 const SIDE: u32 = 64;

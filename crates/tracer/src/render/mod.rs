@@ -9,11 +9,10 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use rayon::prelude::*;
 
-use crate::{
-    scene::{Material, Scene},
-    surface::{MaterialId, Plane, Shape},
-};
+use crate::scene::{Ground, Material, Scene};
+use spherule_surface::{MaterialId, Shape};
 
+mod absorption;
 mod accumulate;
 mod aov;
 mod attributes;
@@ -225,7 +224,7 @@ pub fn render_into(
     // Prepare film, shapes and integrator
     let RenderSettings { width, height, channels, has_features, .. } = *settings;
     film.fit(width, height, channels, has_features);
-    let plane = scene.ground.as_ref().map(Plane::new);
+    let plane = scene.ground.as_ref().map(Ground::shape);
     let ground = plane.iter().map(|plane| plane as &dyn Shape);
     let shapes = ground.chain(shapes.iter().copied()).collect();
     let context = RenderContext::new(shapes, scene, source, settings);

@@ -6,9 +6,9 @@ use glam::{DVec3, Vec3};
 
 use super::*;
 use crate::scene::{Background, Camera, CameraView, Exposure, Light, Material};
-use crate::surface::moving::MovingSpheres;
-use crate::surface::slices::SlicedSurface;
-use crate::surface::spheres::SphereSurface;
+use spherule_surface::moving::MovingSpheres;
+use spherule_surface::slices::SlicedSurface;
+use spherule_surface::spheres::SphereSurface;
 use spherule_tree::accel::moving::MovingTree;
 use spherule_tree::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder};
 

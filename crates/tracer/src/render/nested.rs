@@ -3,20 +3,18 @@
 //! A ray passes surfaces between equal media without an intersection. So neither depth nor data channels depend on how far
 //! bodies overlap.
 
-use glam::Vec3;
-
 use super::{
+    absorption::InsideSegments,
     bodies::{
         MediumBoundary, StraightCrossing, TransmissiveBodies, lanes_inside, lanes_inside_any,
         media_of,
     },
     body_set::BodySet,
     context::RenderContext,
-    interface::attenuate,
     scratch::PacketScratch,
     stream::SegmentPacket,
 };
-use crate::surface::{Intersections, MaterialId};
+use spherule_surface::{Intersections, MaterialId};
 use spherule_tree::accel::Coherence;
 use spherule_tree::math::functions::exp;
 use spherule_tree::math::{LANES, Lanes, lanes_in, splat};
@@ -140,8 +138,8 @@ impl RenderContext<'_> {
             if hits.mask >> lane & 1 == 1 && t >= hits.t[lane] {
                 continue;
             }
-            let extinction = nested.extinction(segments.bodies[lane].medium());
-            if extinction != Vec3::ZERO {
+            if let Some(body) = nested.absorbing(segments.bodies[lane].medium()) {
+                let extinction = self.mean_extinction(body, &segments.rays, lane, [from[lane], t]);
                 for axis in 0..3 {
                     throughput[axis][lane] *= exp(-(t - from[lane]) * extinction[axis]);
                 }
@@ -154,9 +152,10 @@ impl RenderContext<'_> {
         // through a crack in the surface; its length inside is unknown
         let length: Lanes = std::array::from_fn(|lane| hits.t[lane] - from[lane]);
         for (medium, lanes) in media_of(segments.inside & hits.mask, &segments.bodies) {
-            let extinction = nested.extinction(medium);
-            if extinction != Vec3::ZERO {
-                attenuate(self.simd, &extinction, &length, lanes, throughput);
+            if let Some(body) = nested.absorbing(medium) {
+                let inside =
+                    InsideSegments { rays: &segments.rays, from: &from, length: &length, lanes };
+                self.absorb_in(body, inside, throughput);
             }
         }
     }

@@ -15,7 +15,7 @@ use crate::scene::{
     ground,
     material::{dielectric, extinction},
 };
-use crate::surface::{MaterialId, OwnedBody, union::UnionSurface};
+use spherule_surface::{MaterialId, OwnedBody, union::UnionSurface};
 use spherule_tree::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder};
 
 const WATER: Material = Material {

@@ -13,7 +13,7 @@ use super::{
     *,
 };
 use crate::scene::{Background, Camera, CameraView, Environment, Light};
-use crate::surface::{Intersection, Side, spheres::SphereSurface};
+use spherule_surface::{Intersection, Side, spheres::SphereSurface};
 use spherule_tree::accel::{BuildSettings, SphereRadius, Spheres, Structure, TreeBuilder};
 use spherule_tree::math::{SimdLevel, Supported};
 use spherule_tree::ray::Ray;

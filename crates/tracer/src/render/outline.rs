@@ -7,7 +7,7 @@
 
 use super::{context::RenderContext, scratch::PacketScratch};
 use crate::scene::Owner;
-use crate::surface::MaterialId;
+use spherule_surface::MaterialId;
 use spherule_tree::math::{lane3, lanes_in};
 use spherule_tree::ray::RayPacket;
 

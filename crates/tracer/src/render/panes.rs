@@ -19,8 +19,8 @@ use super::{
 };
 use crate::scene::Material;
 use crate::scene::material::{pane_reflectance, surface_reflectance};
-use crate::surface::{Intersection, Intersections, MaterialId, Shape, Side};
 use glam::Vec3;
+use spherule_surface::{Intersection, Intersections, MaterialId, Shape, Side};
 use spherule_tree::accel::Coherence;
 use spherule_tree::math::{lane3, lanes_in, set_lane3, splat};
 use spherule_tree::ray::RayPacket;

@@ -11,8 +11,8 @@ use crate::scene::material::pane_reflectance;
 use crate::scene::{
     Background, Camera, CameraView, Environment, Finish, Ground, Light, LightKind, Material,
 };
-use crate::surface::mesh::{MeshNormals, MeshSurface, MeshTree, TriangleMesh, VisibleFaces};
-use crate::surface::{MaterialId, OwnedBody};
+use spherule_surface::mesh::{MeshNormals, MeshSurface, MeshTree, TriangleMesh, VisibleFaces};
+use spherule_surface::{MaterialId, OwnedBody};
 
 const CLEAR: Material = Material { finish: Finish::Pane, ..Material::matte(Vec3::ONE) };
 

@@ -31,8 +31,8 @@ use super::{
     stream::{Continuation, RayStreams, SegmentPacket},
 };
 use crate::scene::Environment;
-use crate::surface::MaterialId;
 use glam::Vec3;
+use spherule_surface::MaterialId;
 use spherule_tree::math::{LANES, Lanes3, lane3, lanes_in, lanes_where, set_lane3, splat};
 
 mod ambient;

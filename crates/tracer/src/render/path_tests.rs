@@ -277,7 +277,7 @@ fn the_same_bits_on_any_threads_and_instructions() {
         let films: Vec<Vec2> =
             (0..48_u8).map(|i| Vec2::new(f32::from(i % 7) / 7.0, f32::from(i) / 48.0)).collect();
         let by = |level: SimdLevel| {
-            let plane = scene.ground.as_ref().map(Plane::new);
+            let plane = scene.ground.as_ref().map(Ground::shape);
             let mut shapes: Vec<&dyn Shape> = vec![&heap];
             shapes.extend(plane.iter().map(|plane| plane as &dyn Shape));
             let mut context = RenderContext::new(shapes, &scene, &source, &settings);

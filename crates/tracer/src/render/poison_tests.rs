@@ -15,8 +15,8 @@ use crate::scene::environment::studio;
 use crate::scene::{
     Background, Bounds, Camera, CameraView, EnvironmentAxes, Falloff, Fresnel, Ground, Light,
 };
-use crate::surface::spheres::SphereSurface;
-use crate::surface::{Intersection, Intersections, Side};
+use spherule_surface::spheres::SphereSurface;
+use spherule_surface::{Intersection, Intersections, Side};
 use spherule_tree::accel::Coherence;
 use spherule_tree::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder};
 use spherule_tree::math::{LANES, lane3, set_lane3};
@@ -91,7 +91,7 @@ fn check(shape: &dyn Shape, transmission: f32) {
     let scene = scene(transmission);
     let source = ParticleShading::constant(Vec3::new(0.2, 0.5, 0.8));
     let settings = RenderSettings::new(4, 4);
-    let plane = scene.ground.as_ref().map(Plane::new);
+    let plane = scene.ground.as_ref().map(Ground::shape);
     let mut shapes: Vec<&dyn Shape> = plane.iter().map(|plane| plane as &dyn Shape).collect();
     shapes.push(shape);
     let context = || RenderContext::new(shapes.clone(), &scene, &source, &settings);

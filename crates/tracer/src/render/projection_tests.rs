@@ -10,7 +10,7 @@ use super::*;
 use crate::scene::{
     Background, Camera, CameraView, Convergence, Material, Projection, StereoSettings,
 };
-use crate::surface::spheres::SphereSurface;
+use spherule_surface::spheres::SphereSurface;
 use spherule_tree::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder};
 
 /// Size of the image of an eye.

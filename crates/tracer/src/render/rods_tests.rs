@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 
 use super::*;
 use crate::scene::{Background, Camera, CameraView, Environment, Material};
-use crate::surface::rods::{Caps, Rod, RodSurface, RodTree};
+use spherule_surface::rods::{Caps, Rod, RodSurface, RodTree};
 
 const RED: Vec3 = Vec3::new(0.8, 0.1, 0.05);
 const BLUE: Vec3 = Vec3::new(0.1, 0.2, 0.7);

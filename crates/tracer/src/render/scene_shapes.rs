@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::{bodies::TransmissiveBodies, settings::IntegratorKind, source::ShadeSource};
 use crate::scene::{Finish, Material, Owner, Scene};
-use crate::surface::{Intersections, MaterialId, Shape};
+use spherule_surface::{Intersections, MaterialId, Shape};
 
 /// The interior of what is transmissive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

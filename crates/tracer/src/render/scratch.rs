@@ -20,7 +20,7 @@ use super::{
     tile::SIDE,
 };
 
-use crate::surface::Intersections;
+use spherule_surface::Intersections;
 use spherule_tree::math::{LANES, Lanes, Lanes3, lanes_in, splat};
 
 /// Maximum number of samples in a group of pixels, except for a single pixel with more samples.

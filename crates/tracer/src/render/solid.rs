@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::surface::{Intersection, Shape, Side};
+use spherule_surface::{Intersection, Shape, Side};
 use spherule_tree::ray::Ray;
 
 /// The shape of a body.

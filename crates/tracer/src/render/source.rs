@@ -8,7 +8,7 @@ use glam::Vec3;
 use super::aov::NO_ID;
 use crate::scene::{ColorMap, MaterialId};
 
-/// Looks up attributes by the index of a particle in the frame, as in [`crate::surface::Intersection`].
+/// Looks up attributes by the index of a particle in the frame, as in [`spherule_surface::Intersection`].
 pub trait ShadeSource: Sync {
     /// Base colour, linear RGB.
     fn color(&self, index: u32) -> Vec3;

@@ -9,7 +9,7 @@ use super::{
     context::RenderContext, dimensions::SPRAY, lights::LightSamples, sampler::get_1d_lanes,
     scratch::PacketScratch, stream::SegmentPacket,
 };
-use crate::surface::{Intersection, MaterialId, Shape};
+use spherule_surface::{Intersection, MaterialId, Shape};
 use spherule_tree::accel::Coherence;
 use spherule_tree::math::functions::exp;
 use spherule_tree::math::{lane3, lanes_in, set_lane3, splat};

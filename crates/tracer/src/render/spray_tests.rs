@@ -14,7 +14,7 @@ use super::{
     *,
 };
 use crate::scene::{Background, Camera, CameraView, Environment, Light};
-use crate::surface::{Intersection, MaterialId, Side};
+use spherule_surface::{Intersection, MaterialId, Side};
 use spherule_tree::math::{SimdLevel, Supported};
 use spherule_tree::ray::Ray;
 

@@ -4,7 +4,7 @@ use super::body_set::BodySet;
 use super::dimensions::BOUNCED;
 use super::light_split::FirstInteraction;
 use super::sampler::PathSeed;
-use crate::surface::slices::slice_at;
+use spherule_surface::slices::slice_at;
 use spherule_tree::math::{LANES, Lanes, Lanes3, first_lanes, lanes_in, splat};
 use spherule_tree::ray::RayPacket;
 

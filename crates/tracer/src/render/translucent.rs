@@ -16,7 +16,7 @@ use super::{
     source::ShadeSource,
     stream::SegmentPacket,
 };
-use crate::surface::{Intersection, Intersections, Shape, SphereEntries, TransmittanceProduct};
+use spherule_surface::{Intersection, Intersections, Shape, SphereEntries, TransmittanceProduct};
 use spherule_tree::accel::Coherence;
 use spherule_tree::math::{LANES, lane3, lanes_in, set_lane3, splat};
 use spherule_tree::ray::RayPacket;

@@ -7,17 +7,18 @@
 //! spheres that are not fully opaque (`translucent.rs`) attenuate all shadow rays.
 
 use super::{
-    bodies::{BoundaryLanes, TransmissiveBodies, lanes_inside, media_of},
+    absorption::InsideSegments,
+    bodies::{BoundaryLanes, TransmissiveBodies, TransmissiveBody, lanes_inside, media_of},
     body_set::BodySet,
     context::RenderContext,
-    interface::{attenuate, cross_straight},
+    interface::cross_straight,
     lights::LightSamples,
     ray_counts::RayCounts,
     scene_shapes::Interior,
     shading::product,
     stream::SegmentPacket,
 };
-use crate::surface::{Intersections, MaterialId, Shape};
+use spherule_surface::{Intersections, MaterialId, Shape};
 use spherule_tree::accel::Coherence;
 use spherule_tree::math::{LANES, Lanes, Lanes3, lane3, lanes_in, splat};
 use spherule_tree::ray::RayPacket;
@@ -149,6 +150,7 @@ impl RenderContext<'_> {
         transmittance: &mut Lanes3,
     ) -> u32 {
         let (rays, boundary) = (&samples.rays, &self.boundary);
+        let medium = TransmissiveBody { shape: body, material: self.scene.particle_material() };
         let mut remaining = *rays;
         let (mut reached, mut alive) = (samples.lanes, samples.lanes);
         // Distances of the previous crossings
@@ -163,7 +165,8 @@ impl RenderContext<'_> {
             // Attenuate by the medium up to the crossing, and by the crossing
             let lanes = alive & inside;
             let length = inside_lengths(rays, hits, crossing, lanes, &from);
-            attenuate(self.simd, &boundary.extinction, &length, lanes, transmittance);
+            let segments = InsideSegments { rays, from: &from, length: &length, lanes };
+            self.absorb_in(&medium, segments, transmittance);
             cross_straight(self.simd, boundary, rays, hits, crossing, transmittance);
 
             // End rays without transmittance
@@ -215,8 +218,10 @@ impl RenderContext<'_> {
             // Attenuate by the media up to the crossings, and by those between different media
             for (medium, lanes) in media_of(alive, &sets) {
                 let length = inside_lengths(rays, hits, crossing, lanes, &from);
-                let extinction = nested.extinction(medium);
-                attenuate(self.simd, &extinction, &length, lanes, transmittance);
+                if let Some(body) = nested.absorbing(medium) {
+                    let segments = InsideSegments { rays, from: &from, length: &length, lanes };
+                    self.absorb_in(body, segments, transmittance);
+                }
             }
             self.cross_boundaries(nested, (rays, hits), crossing, &sets, transmittance);
 

@@ -10,6 +10,7 @@ use glam::{Vec2, Vec3};
 use super::sand::Lattice;
 use super::texture::{Beyond, Footprint, Texture};
 use super::{Bounds, sand};
+use spherule_surface::{Plane, PlaneSettings};
 use spherule_tree::math::{Lanes3, Supported, lanes_in, set_lane3, splat};
 use spherule_tree::ray::Ray;
 
@@ -136,6 +137,18 @@ impl Ground {
             pattern: Pattern::Plain,
             shadow_catcher: None,
         }
+    }
+
+    /// The shape that rays intersect.
+    pub fn shape(&self) -> Plane {
+        Plane::new(PlaneSettings {
+            up: self.up,
+            height: self.height,
+            center: self.center,
+            base: self.base,
+            fade_start: self.fade_start,
+            fade_end: self.fade_end,
+        })
     }
 
     /// A shadow catcher with shadows of a `strength` from 0 to 1, in place of this ground.

@@ -9,34 +9,6 @@ use thiserror::Error;
 
 use super::ground;
 
-/// Index of a material in [`Scene::materials`](super::Scene::materials).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct MaterialId(u16);
-
-impl MaterialId {
-    /// The material of the particles.
-    pub const PARTICLES: Self = Self(0);
-    /// Foam and spray.
-    pub const SPRAY: Self = Self(1);
-    /// The ground.
-    pub const GROUND: Self = Self(2);
-    /// Number of the materials that every scene has: those above.
-    pub const BASIC: usize = 3;
-    /// Maximum number of materials of a scene.
-    pub const MAX: usize = 1 << 16;
-
-    /// The material at `index`; None from [`Self::MAX`] on.
-    pub(crate) fn at(index: usize) -> Option<Self> {
-        u16::try_from(index).ok().map(Self)
-    }
-
-    /// Its index.
-    #[inline(always)]
-    pub const fn index(self) -> usize {
-        self.0 as usize
-    }
-}
-
 /// What has a material.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Owner {
@@ -94,6 +66,9 @@ pub struct Material {
     /// Extinction coefficient of the medium inside, per length: light is attenuated by `exp(-extinction * length)`
     /// (Beer-Lambert law). Not negative. Shadows of separate spheres ignore it.
     pub extinction: Vec3,
+    /// Length over which the medium inside gives white light the colour of the particles there, in place of `extinction`;
+    /// above 0. Shadows of separate spheres ignore it.
+    pub color_length: Option<f32>,
     /// How the surface meets light.
     pub finish: Finish,
     /// Roughness of the surface of transmissive particles for path tracing, 0 (smooth) to 1.
@@ -168,6 +143,7 @@ impl Material {
         transmission: 0.0,
         fresnel: Fresnel::Schlick,
         extinction: Vec3::ZERO,
+        color_length: None,
         finish: Finish::Matte,
         interface_roughness: 0.0,
         priority: 0,
@@ -213,11 +189,19 @@ impl Material {
         if let Some(value) = extinction.iter().find(|v| !(0.0..=f32::MAX).contains(*v)) {
             return Err(MaterialError { name: "extinction", value: *value });
         }
+        if let Some(value) = self.color_length.filter(|length| !(0.0..=f32::MAX).contains(length)) {
+            return Err(MaterialError { name: "color_length", value });
+        }
         if self.ior > 0.0 && self.ior.is_finite() {
             Ok(())
         } else {
             Err(MaterialError { name: "ior", value: self.ior })
         }
+    }
+
+    /// Whether the medium inside absorbs light.
+    pub fn absorbs(&self) -> bool {
+        self.color_length.is_some() || self.extinction != Vec3::ZERO
     }
 
     /// `R0` of eq. 4.3, which is the same for both sides.

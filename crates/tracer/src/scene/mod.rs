@@ -38,11 +38,12 @@ pub use framing::{
 pub use ground::{Ground, WetGround};
 pub use lens::{Aperture, Focus, LensSettings};
 pub use light::{Falloff, Light, LightKind, default_lights};
-pub use material::{Finish, Fresnel, Material, MaterialError, MaterialId, Owner};
+pub use material::{Finish, Fresnel, Material, MaterialError, Owner};
 pub use part::PartMaterials;
 pub use path::{CameraKey, CameraPath, KeyedPath, PathError, Turntable};
 pub use projection::Projection;
 pub use rgb::{RgbEncoding, is_rgb};
+pub use spherule_surface::MaterialId;
 pub use stereo::{Convergence, StereoSettings};
 pub use texture::Texture;
 

@@ -103,15 +103,17 @@ pub(super) const TYPE: &str = "typeid";
 /// The diameter is there in every frame: the radius of all particles is 0.5 if the file says nothing else.
 pub(super) const DIAMETER: &str = "diameter";
 
-/// Properties in the order of the schema. The rest (angular momentum, moment of inertia) has no use here.
-pub(super) const FIELDS: [Field; 8] = [
+/// Properties in the order of the schema.
+pub(super) const FIELDS: [Field; 10] = [
     Field::new(TYPE, 1, DefaultValue::U32(0)),
     Field::new("mass", 1, DefaultValue::F32(1.0)),
     Field::new("charge", 1, DefaultValue::F32(0.0)),
     Field::new(DIAMETER, 1, DefaultValue::F32(1.0)),
     Field::new("body", 1, DefaultValue::I32(-1)),
+    Field::new("moment_inertia", 3, DefaultValue::F32(0.0)),
     Field::new("orientation", 4, DefaultValue::Upright),
     Field::new("velocity", 3, DefaultValue::F32(0.0)),
+    Field::new("angmom", 4, DefaultValue::F32(0.0)),
     Field::new("image", 3, DefaultValue::I32(0)),
 ];
 

@@ -9,7 +9,7 @@
 
 use crate::render::lights::LightSamples;
 use crate::scene::Finish;
-use crate::surface::Intersections;
+use spherule_surface::Intersections;
 use spherule_tree::math::{LANES, Lanes, Lanes3, Supported, lane_kernel};
 use spherule_tree::ray::RayPacket;
 

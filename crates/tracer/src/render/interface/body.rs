@@ -3,7 +3,7 @@
 
 use super::{Dielectric, Interface, LeavingRays};
 use crate::render::bsdf::SurfacePoints;
-use crate::surface::Intersections;
+use spherule_surface::Intersections;
 use spherule_tree::math::{LANES, Lanes, Lanes3, Supported, lane_kernel};
 use spherule_tree::ray::RayPacket;
 

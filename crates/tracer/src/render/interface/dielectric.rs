@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::scene::material::{dielectric, schlick};
 use crate::scene::{self, Fresnel};
-use crate::surface::Intersections;
+use spherule_surface::Intersections;
 use spherule_tree::math::functions::exp;
 use spherule_tree::math::{LANES, Lanes, Lanes3, lane_kernel};
 use spherule_tree::ray::RayPacket;
@@ -23,8 +23,6 @@ pub(in crate::render) struct Dielectric {
     is_exact: bool,
     /// Weight of the refracted ray; 0 if opaque.
     pub(in crate::render) transmission: f32,
-    /// Extinction coefficient of the medium, linear RGB, per scene unit.
-    pub(in crate::render) extinction: Vec3,
 }
 
 impl Dielectric {
@@ -36,7 +34,6 @@ impl Dielectric {
             r0: material.r0(),
             is_exact: material.fresnel == Fresnel::Exact,
             transmission: material.transmission,
-            extinction: material.extinction,
         }
     }
 

@@ -6,7 +6,7 @@
 use crate::render::bsdf::SurfacePoints;
 use crate::render::stream::ScatteredRays;
 use crate::scene::Material;
-use crate::surface::Intersections;
+use spherule_surface::Intersections;
 use spherule_tree::math::{Lanes, Supported};
 use spherule_tree::ray::RayPacket;
 

@@ -17,7 +17,7 @@ use crate::render::bsdf::microfacet::{
 };
 use crate::render::shading::{tangents, to_world};
 use crate::scene::Material;
-use crate::surface::Intersections;
+use spherule_surface::Intersections;
 use spherule_tree::math::{LANES, Lanes, Supported, lane_kernel, larger};
 use spherule_tree::ray::RayPacket;
 

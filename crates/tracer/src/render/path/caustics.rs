@@ -8,7 +8,7 @@ use super::{PathIntegrator, Surface};
 use crate::render::near_photons::NearPhoton;
 use crate::render::scratch::PacketScratch;
 use crate::scene::Owner;
-use crate::surface::{Intersections, MaterialId};
+use spherule_surface::{Intersections, MaterialId};
 use spherule_tree::math::{LANES, Lanes3, lane3, lanes_in, set_lane3, splat};
 
 /// Least cosine between the light of a photon and the geometric normal. The flux of photons at grazing angles is spread

@@ -10,7 +10,7 @@ use crate::render::{
     shading::{add, scale},
     stream::SegmentPacket,
 };
-use crate::surface::MaterialId;
+use spherule_surface::MaterialId;
 use spherule_tree::math::{LANES, Lanes, lane3, lanes_in, lanes_where, set_lane3, splat};
 
 impl PathIntegrator<'_> {

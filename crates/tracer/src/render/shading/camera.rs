@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::frame::disc;
 use crate::scene::{Camera, Lens, Projection, Stereo};
-use crate::surface::Intersections;
+use spherule_surface::Intersections;
 use spherule_tree::math::{LANES, Lanes, lane_kernel};
 use spherule_tree::ray::RayPacket;
 

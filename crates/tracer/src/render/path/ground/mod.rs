@@ -28,7 +28,7 @@ use crate::render::{
     stop::Stop,
 };
 use crate::scene::{Ground, Material, Owner, Scene};
-use crate::surface::Shape;
+use spherule_surface::Shape;
 use spherule_tree::math::{lane3, lanes_in, set_lane3, splat, splat3};
 
 mod density;

@@ -21,7 +21,7 @@ use crate::render::{
     stop::Stop,
     stream::{RayStreams, SegmentPacket},
 };
-use crate::surface::MaterialId;
+use spherule_surface::MaterialId;
 use spherule_tree::math::{LANES, lane3, lanes_in, set_lane3, splat};
 
 /// Photons that are traced as one task.

@@ -15,7 +15,7 @@ use crate::render::{
     stop::Stop,
     stream::{RayStreams, SegmentPacket},
 };
-use crate::surface::{MaterialId, Side};
+use spherule_surface::{MaterialId, Side};
 use spherule_tree::math::{LANES, first_lanes, lane3, splat, splat3};
 use spherule_tree::ray::Ray;
 

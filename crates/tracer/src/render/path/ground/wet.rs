@@ -16,7 +16,7 @@ use crate::render::{
 };
 use crate::scene::WetGround;
 use crate::scene::material::{dielectric, schlick};
-use crate::surface::{Shape, Side};
+use spherule_surface::{Shape, Side};
 use spherule_tree::math::{Lanes, lane3, lanes_in, lanes_where, set_lane3, splat};
 use spherule_tree::ray::Ray;
 
