@@ -11,7 +11,7 @@ use crate::output::PreviewPage;
 use crate::overlay::{Page, RgbaPixels};
 use crate::pipeline::{
     FileSettings, FrameSize, GrainMeshes, MemoryModel, ParticleRules, Picture, PictureMesh,
-    RadiusRule, Setup, Things,
+    RadiusRule, Setup, Things, gpu,
 };
 use crate::render::{RenderSettings, RendererKind};
 use crate::scene::{Bounds, RadianceMap, Texture};
@@ -100,6 +100,7 @@ pub fn setup(
         setup = setup_on(&smaller, &styled, &survey, &inputs, Some(page))?;
     }
     check_image_size(&setup)?;
+    check_device(&setup)?;
     if let Some(texture) = inputs.ground {
         ground::add_image(&mut setup, manifest, texture);
     }
@@ -196,7 +197,7 @@ fn setup_on(
         scene,
         things: Things { meshes, cell, arrows, trails, bonds },
         surface: manifest.surface,
-        renderer: RendererKind::default(),
+        renderer: manifest.render.device.renderer(),
         step: channels::frame_step(&render.channels, &manifest.output, survey)?,
         render,
         denoise,
@@ -222,6 +223,23 @@ fn add_overlays(
     setup.picture.files.preview.page =
         page.map(|page| PreviewPage { page, paper: overlay::paper(setup) });
     Ok(())
+}
+
+/// Rejects settings that the renderer lacks.
+fn check_device(setup: &Setup) -> Result<(), ResolveError> {
+    match setup.picture.renderer {
+        RendererKind::Cpu => Ok(()),
+        RendererKind::Gpu => match gpu::lacking(setup) {
+            None => Ok(()),
+            Some(("render.device", what)) => {
+                Err(ResolveError::Unsupported { key: "render.device", what })
+            }
+            Some((key, what)) => Err(ResolveError::Unsupported {
+                key,
+                what: format!("{what} cannot be rendered on a GPU yet; use device = \"cpu\""),
+            }),
+        },
+    }
 }
 
 /// Rejects images that cannot fit into memory, whatever the particles.

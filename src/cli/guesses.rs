@@ -235,6 +235,7 @@ pub(super) const GUESSES: &[(&str, &str)] = &[
     ("mem memory maxmemory ram maxmem", "--memory-limit SIZE"),
     ("resume continue restart", "the same command continues a job"),
     ("bvh kdtree acceleration", "--accelerator NAME"),
+    ("cuda vulkan optix rtx usegpu", "--device gpu"),
 ];
 
 /// The hints for an option `name`, without hyphens at its beginning.

@@ -185,7 +185,7 @@ const GUESSED: &[(&str, &str)] = &[
     ("--movie a.mp4", "spherule movie"),
     // Nothing stands for these
     ("--seed 3", NOTHING),
-    ("--gpu", NOTHING),
+    ("--cuda", "--device"),
     ("--fog", NOTHING),
 ];
 

@@ -33,7 +33,7 @@ const LISTS: [&str; 12] = [
 ];
 
 /// Other options with a value that is not the default, and the key that it is laid over.
-const FLAGS: [(&str, &str); 66] = [
+const FLAGS: [(&str, &str); 67] = [
     ("--output x.####.exr", "output.path = \"x.####.exr\""),
     ("--frames 3-4", "input.frames = \"3-4\""),
     ("--width 7", "image.width = 7"),
@@ -94,6 +94,7 @@ const FLAGS: [(&str, &str); 66] = [
     ("--topology a.gro", "input.topology = \"a.gro\""),
     ("--parts a,b", "input.parts = [\"a\", \"b\"]"),
     ("--accelerator bvh", "render.accelerator = \"bvh\""),
+    ("--device cpu", "render.device = \"cpu\""),
     ("--memory-limit 4GiB", "render.memory_limit = \"4GiB\""),
     ("--threads 7", "job.threads = 7"),
     ("--progress json", "job.progress = \"json\""),

@@ -16,7 +16,7 @@ Examples:
       Shows a page at once";
 
 /// The commands that have pages, for shells that complete them.
-const COMMANDS: [&str; 17] = [
+const COMMANDS: [&str; 18] = [
     "render",
     "still",
     "check",
@@ -26,6 +26,7 @@ const COMMANDS: [&str; 17] = [
     "status",
     "init",
     "schema",
+    "devices",
     "verify",
     "inspect",
     "convert",

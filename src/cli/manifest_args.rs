@@ -15,6 +15,7 @@ use super::paths::{path_as_typed, text};
 use super::shortcuts::Shortcuts;
 use crate::job::{JobManifest, RunError};
 use crate::manifest::{self, Manifest, ManifestSource, MapName, Override, ScaleKind, draft};
+use crate::pipeline::gpu;
 
 /// Options that set keys of the manifest: `--set` for any key, and options for common keys.
 #[derive(Debug, Args)]
@@ -82,6 +83,11 @@ pub(super) struct ManifestArgs {
     /// They replace [[camera.key]]. The job keeps them; later changes of the file have no effect on it.
     #[arg(long, value_name = "FILE", help_heading = "Camera", display_order = 0)]
     pub(super) camera_path: Option<PathBuf>,
+    /// The GPU to render on, by its number in `spherule devices` [default: the first one]
+    ///
+    /// It needs --device gpu. Each worker of a job may have another GPU.
+    #[arg(long, value_name = "NUMBER", help_heading = "Job", display_order = 0)]
+    pub(super) gpu: Option<usize>,
     /// Any key of the manifest: --set render.ground_pattern=checker. May be repeated.
     ///
     /// `spherule init` prints all keys with their meaning.
@@ -92,6 +98,9 @@ pub(super) struct ManifestArgs {
 impl ManifestArgs {
     /// Reads the manifest, or makes one from the arguments.
     pub(super) fn manifest(&self) -> Result<JobManifest, CliError> {
+        if let Some(number) = self.gpu {
+            gpu::choose(number);
+        }
         let mut overrides = Vec::new();
         // Read the manifest, or start from the input
         let file = self.manifest_file()?;

@@ -30,6 +30,7 @@ mod check;
 mod child;
 mod completions;
 mod convert;
+mod devices;
 mod disk;
 mod errors;
 mod events;
@@ -91,6 +92,8 @@ enum Command {
     Init(Box<init::InitArgs>),
     /// Print the manifest's JSON schema, for editors.
     Schema,
+    /// List the GPUs that can render images, with driver and self-test, or print why there is none.
+    Devices,
     /// Open and decode every finished image of a job.
     Verify(verify::VerifyArgs),
     /// Print counts, bounds and attributes of particle files.
@@ -185,6 +188,7 @@ fn run(command: Command) -> Result<Outcome, CliError> {
         Command::Status(args) => status::run(&args),
         Command::Init(args) => init::run(&args),
         Command::Schema => schema::run(),
+        Command::Devices => devices::run(),
         Command::Verify(args) => verify::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Convert(args) => convert::run(&args),

@@ -16,6 +16,8 @@ mod encode;
 mod encoders;
 mod error;
 mod facts;
+#[cfg_attr(not(feature = "gpu"), path = "no_gpu.rs")]
+pub mod gpu;
 mod grain_meshes;
 mod grain_parts;
 mod grains;
@@ -46,6 +48,8 @@ mod styles;
 mod surface;
 mod trace;
 mod trails;
+#[cfg(feature = "gpu")]
+mod vulkan;
 mod work;
 
 pub(crate) use bonds::covalent_lengths;

@@ -45,6 +45,9 @@ pub enum TraceError {
     /// The surface does not fit into memory.
     #[error(transparent)]
     Surface(#[from] SmoothError),
+    /// There is no GPU, or it failed.
+    #[error("render.device: {0}")]
+    Device(String),
     /// The camera is invalid.
     #[error("camera: {0}")]
     Camera(#[from] CameraError),

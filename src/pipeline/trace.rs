@@ -6,6 +6,7 @@ use spherule_files::memory::MemoryUse;
 use spherule_formats::order::index_u32;
 
 use super::decoded::{DecodedFrame, DecodedShading};
+use super::gpu::GpuRenderer;
 use super::in_place::StoredFrame;
 use super::load::{LoadedFrame, LoadedParticles};
 use super::mattes;
@@ -243,7 +244,10 @@ fn denoise_film(setup: &Setup, film: &mut Film) -> Result<f64, DenoiseError> {
     Ok(seconds(start.elapsed()))
 }
 
-fn particle_shading<'a>(picture: &'a Picture, shading: &'a DecodedShading) -> ParticleShading<'a> {
+pub(super) fn particle_shading<'a>(
+    picture: &'a Picture,
+    shading: &'a DecodedShading,
+) -> ParticleShading<'a> {
     // Choose the source of the colours; without an attribute it is a constant
     let values = &shading.values;
     let colors = |rule: &'a ColorRule| match rule {
@@ -284,5 +288,6 @@ fn seconds(time: Duration) -> f64 {
 pub fn renderer_of(kind: RendererKind) -> Box<dyn FrameRenderer> {
     match kind {
         RendererKind::Cpu => Box::new(CpuRenderer::default()),
+        RendererKind::Gpu => Box::new(GpuRenderer::default()),
     }
 }

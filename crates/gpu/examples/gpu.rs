@@ -2,7 +2,11 @@
 //!
 //!     cargo run --release -p spherule-gpu --example gpu -- [ADAPTER] [SIZE ...]
 
+#![allow(clippy::print_stdout, reason = "a program that prints tables")]
+
 mod support;
+
+use std::sync::Arc;
 
 use spherule_gpu::{Checks, Device, SceneRenderer, adapters};
 use spherule_tree::math::SimdLevel;
@@ -17,9 +21,9 @@ const MAX_COMPARED: usize = 20_000_000;
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut options = std::env::args().skip(1);
     let index = options.next().map_or(Ok(0), |number| number.parse())?;
-    let mut sizes = options
-        .map(|size| size.parse::<f64>().map(|size| size as usize))
-        .collect::<Result<Vec<_>, _>>()?;
+    #[expect(clippy::cast_possible_truncation, reason = "a number of particles")]
+    let size = |text: String| text.parse::<f64>().map(|size| size as usize);
+    let mut sizes = options.map(size).collect::<Result<Vec<_>, _>>()?;
     if sizes.is_empty() {
         sizes = vec![100_000, 1_000_000];
     }
@@ -28,7 +32,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     let device = Device::open(index, Checks::Off)?;
     println!("arithmetic: {:?}, CPU: {}", device.arithmetic(), SimdLevel::best().name());
-    let mut renderer = SceneRenderer::new(device);
+    let mut renderer = SceneRenderer::new(Arc::new(device));
     for &size in &sizes {
         compare(&mut renderer, size);
         for data in Data::ALL {

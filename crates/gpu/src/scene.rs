@@ -1,6 +1,7 @@
 //! Scenes of the tracer on a device: what the device lacks, and films of its pictures.
 
 use std::fmt;
+use std::sync::Arc;
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -145,20 +146,20 @@ impl SampleTable {
 /// Renders frames of spheres on a device.
 #[derive(Debug)]
 pub struct SceneRenderer {
-    device: Device,
+    device: Arc<Device>,
     renderer: Renderer,
     samples: SampleTable,
 }
 
 impl SceneRenderer {
     /// A renderer on `device`.
-    pub fn new(device: Device) -> Self {
+    pub fn new(device: Arc<Device>) -> Self {
         let renderer = Renderer::new(&device);
         Self { device, renderer, samples: SampleTable::default() }
     }
 
     /// The device.
-    pub const fn device(&self) -> &Device {
+    pub fn device(&self) -> &Device {
         &self.device
     }
 

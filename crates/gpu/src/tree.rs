@@ -570,16 +570,16 @@ mod tests {
             }
             found.push(if shape.is_common { sphere[3].to_bits() } else { content.order[slot] });
             let reach = if shape.is_common { 0.0 } else { f64::from(sphere[3]) };
-            let mut child = slot / BLOCK as usize;
+            let [mut child, width] = [slot / 8, 8];
             for start in &shape.starts[..shape.levels as usize] {
-                let node = &content.nodes[*start as usize + child / WIDTH as usize];
-                let number = child % WIDTH as usize;
+                let node = &content.nodes[*start as usize + child / width];
+                let number = child % width;
                 assert!(node[3] >> (24 + number) & 1 == 1, "slot {slot} is in an empty child");
                 for (axis, [low, high]) in child_box(node, number).into_iter().enumerate() {
                     let (center, slack) = (f64::from(sphere[axis]), 1e-5);
                     assert!(low <= center - reach + slack && center + reach <= high + slack);
                 }
-                child /= WIDTH as usize;
+                child /= width;
             }
         }
         found

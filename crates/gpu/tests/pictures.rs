@@ -6,6 +6,8 @@
 #[path = "../examples/support/mod.rs"]
 mod support;
 
+use std::sync::Arc;
+
 use spherule_gpu::{Arithmetic, Checks, Device, GpuError, SceneRenderer};
 use spherule_tree::math::SimdLevel;
 use support::{Case, Data, Difference, Radii};
@@ -41,7 +43,7 @@ fn assert_equal(case: &Case, difference: &Difference) {
 fn planes_equal_those_of_the_cpu() {
     let Some(device) = device(Checks::On) else { return };
     let level = same_arithmetic(&device);
-    let mut renderer = SceneRenderer::new(device);
+    let mut renderer = SceneRenderer::new(Arc::new(device));
     for data in Data::ALL {
         for radii in [Radii::Common, Radii::Each] {
             let case = Case { data, radii, ..Case::small() };
@@ -54,7 +56,7 @@ fn planes_equal_those_of_the_cpu() {
 fn every_setting_equals_the_cpu() {
     let Some(device) = device(Checks::Off) else { return };
     let level = same_arithmetic(&device);
-    let mut renderer = SceneRenderer::new(device);
+    let mut renderer = SceneRenderer::new(Arc::new(device));
     let small = Case::small();
     for case in [
         Case { max_depth: 1, ..small },
@@ -74,7 +76,7 @@ fn every_setting_equals_the_cpu() {
 #[test]
 fn every_run_gives_the_same_bytes() {
     let Some(device) = device(Checks::Off) else { return };
-    let mut renderer = SceneRenderer::new(device);
+    let mut renderer = SceneRenderer::new(Arc::new(device));
     let case = Case { is_studio: true, ..Case::small() };
     let first = support::film(&mut renderer, &case).0;
     assert!(first.color.iter().any(|color| color[3] > 0.0));
@@ -91,7 +93,7 @@ fn more_than_an_array_holds_is_refused() {
     if max > 256 << 20 {
         return;
     }
-    let mut renderer = SceneRenderer::new(device);
+    let mut renderer = SceneRenderer::new(Arc::new(device));
     let particles = usize::try_from(max / 12 + 1).unwrap();
     let case = Case { particles, ..Case::small() };
     let error = support::prepare(&mut renderer, &case).unwrap_err();
@@ -105,7 +107,7 @@ fn more_than_an_array_holds_is_refused() {
 #[test]
 fn a_raised_flag_stops_a_picture() {
     let Some(device) = device(Checks::Off) else { return };
-    let mut renderer = SceneRenderer::new(device);
+    let mut renderer = SceneRenderer::new(Arc::new(device));
     let error = support::stopped(&mut renderer, &Case::small()).unwrap_err();
     assert_eq!(error.to_string(), "interrupted");
 }

@@ -37,7 +37,7 @@ use std::path::Path;
 use spherule_images::overlay::Layout;
 use spherule_selection::{Condition, Selection};
 use spherule_surface::{SprayStyle, SurfaceKind, SurfaceSettings};
-use spherule_tracer::render::{FilmPlane, IntegratorKind, RendererKind};
+use spherule_tracer::render::{FilmPlane, IntegratorKind};
 use spherule_tracer::scene::Fresnel;
 
 use key::Affects;
@@ -152,7 +152,7 @@ pub use print_size::Side;
 #[doc(hidden)]
 pub use rebase::without_dots;
 pub use rebase::{RebaseError, named_place, real_dir};
-pub use render::{GroundPattern, Image, IndirectSetting, Render};
+pub use render::{DeviceSetting, GroundPattern, Image, IndirectSetting, Render};
 pub use schema::{SCHEMA_FILE, job_schema};
 pub use select::{Axis, Select, Slab};
 pub use source::ManifestSource;
@@ -470,7 +470,7 @@ impl Manifest {
     /// identified by separate fingerprints.
     pub fn settings(&self) -> Vec<(String, String)> {
         let mut settings = self.entries().settings(|affects| self.depends_on(affects));
-        let renderer = format!("{:?}", RendererKind::default().name());
+        let renderer = format!("{:?}", self.render.device.renderer().name());
         settings.push((same::RENDERER.to_owned(), renderer));
         if let Some(image) = self.ground_image() {
             settings.push((GROUND_IMAGE.to_owned(), format!("{:?}", image.path)));

@@ -5,7 +5,7 @@ use spherule_files::Bytes;
 use spherule_images::overlay::Layout;
 use spherule_tracer::render::{
     DEFAULT_BOUNCES, DEFAULT_MIN_WEIGHT, DataWindow, FilterKind, IntegratorKind, MAX_BOUNCES,
-    MAX_DEPTH, MAX_FILTER_WIDTH, MAX_SAMPLES, MAX_SIDE, MIN_WEIGHTS,
+    MAX_DEPTH, MAX_FILTER_WIDTH, MAX_SAMPLES, MAX_SIDE, MIN_WEIGHTS, RendererKind,
 };
 use spherule_tracer::scene::{Background, ground};
 use spherule_tree::accel::{BvhLeaves, BvhPreset, SbvhSettings, Structure};
@@ -187,9 +187,37 @@ named! {
     }
 }
 
+named! {
+    /// What renders images.
+    DeviceSetting {
+        /// The CPU.
+        Auto = "auto",
+        /// The CPU.
+        Cpu = "cpu",
+        /// A GPU.
+        Gpu = "gpu",
+    }
+}
+
+impl DeviceSetting {
+    /// The renderer. Pictures of the CPU and of a GPU may differ in the last bits of colours.
+    pub const fn renderer(self) -> RendererKind {
+        match self {
+            Self::Auto | Self::Cpu => RendererKind::Cpu,
+            Self::Gpu => RendererKind::Gpu,
+        }
+    }
+}
+
 section! {
     /// Settings of the renderer
     Render {
+        /// What renders the images: auto | cpu | gpu; auto is cpu
+        ///
+        /// gpu needs a program that was built with it, and a GPU with Vulkan (see `spherule devices`). It renders
+        /// opaque spheres with integrator = "whitted"; `spherule check` names the first setting that it lacks. Ids,
+        /// depths, normals and positions equal those of the CPU; colours may differ in their last bits.
+        device: DeviceSetting = DeviceSetting::Auto, affects(Affects::Nothing), flag("device", "NAME", "Job");
         /// Acceleration structure: auto, lbvh, kdtree, bvh or sbvh
         ///
         /// lbvh is the fastest to build, kdtree the fastest to trace. The image is the same. auto chooses one of these

@@ -4,10 +4,12 @@
 //! an effect on the images must not count as changes.
 
 use spherule_surface::SprayStyle;
-use spherule_tracer::render::IntegratorKind;
+use spherule_tracer::render::{IntegratorKind, RendererKind};
 
 use super::value::Value;
-use super::{ColorMapping, ColorSetting, GroundKind, GroundSetting, Manifest, MapName};
+use super::{
+    ColorMapping, ColorSetting, DeviceSetting, GroundKind, GroundSetting, Manifest, MapName,
+};
 
 const MIN_WEIGHT: &str = "render.min_weight";
 const COLOR: &str = "material.color";
@@ -49,6 +51,10 @@ impl Manifest {
             found.is_none_or(|(_, value)| value == old)
         };
         let render = &mut self.render;
+        let gpu = format!("{:?}", RendererKind::Gpu.name());
+        if render.device == DeviceSetting::Auto && planned.contains(&(RENDERER.to_owned(), gpu)) {
+            render.device = DeviceSetting::Gpu;
+        }
         if render.integrator.is_none() && is_old(INTEGRATOR, OLD_INTEGRATOR) {
             render.integrator = Some(IntegratorKind::Whitted);
         }

@@ -31,6 +31,25 @@ pub struct FrameReport {
     pub rays: RaySummary,
     /// Memory of the process when the frame was done.
     pub rss: RssSummary,
+    /// The GPU that rendered it, if one did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub device: Option<DeviceSummary>,
+}
+
+/// A picture on a GPU. Times are seconds on its own clock, 0 if it has none.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct DeviceSummary {
+    /// Name of the adapter.
+    pub name: String,
+    /// Name and version of its driver.
+    pub driver: String,
+    /// Building the tree.
+    pub build: f64,
+    /// Tracing the picture.
+    pub trace: f64,
+    /// Memory of the device in use, bytes.
+    pub bytes: u64,
 }
 
 /// Wall-clock seconds of the stages, from the moment that they have a thread; neighbouring frames overlap.

@@ -13,7 +13,8 @@ use crate::cli::job::list;
 use crate::cli::progress::duration;
 use crate::cli::render::{radius_text, unframed_text};
 use crate::manifest::{Channel, Manifest, NamedChannel};
-use crate::pipeline::{ColorRule, Overlap, Probe, RadiusRule, Schedule, Setup};
+use crate::pipeline::{ColorRule, Overlap, Probe, RadiusRule, Schedule, Setup, gpu};
+use crate::render::RendererKind;
 use crate::scene::RadiusTable;
 use crate::survey::{Survey, shown_name};
 
@@ -66,6 +67,13 @@ impl Check<'_> {
         })
     }
 
+    /// Memory of the GPU for the heaviest frame, bytes; None if the CPU renders.
+    fn device_bytes(&self) -> Option<u64> {
+        let (survey, setup) = self.setup.as_ref()?;
+        let is_gpu = setup.picture.renderer == RendererKind::Gpu;
+        is_gpu.then(|| gpu::device_bytes(setup, survey.most_particles as u64))
+    }
+
     /// The memory that a frame needs, by its use, and what limits it.
     fn memory_json(&self, schedule: &Schedule) -> Value {
         let manifest = self.render_job.manifest();
@@ -75,6 +83,7 @@ impl Check<'_> {
             memory.insert("free".into(), json!(self.free_memory));
             let limit = manifest.render.memory_limit.map(|l| l.0);
             memory.insert("limit".into(), json!(limit));
+            memory.insert("device".into(), json!(self.device_bytes()));
             let overlap = schedule.overlap == Overlap::Stages;
             memory.insert("frames_overlap".into(), json!(overlap));
         }
@@ -107,6 +116,10 @@ impl Check<'_> {
             lines.push(format!("structure  {}", structure(survey, setup)));
         }
         lines.extend(self.memory_lines());
+        lines.extend(
+            self.device_bytes()
+                .map(|bytes| format!("device     a GPU, about {} of its memory", Bytes(bytes))),
+        );
         lines.extend(self.disk_line());
         lines.extend(self.time_line());
         lines

@@ -7,6 +7,7 @@ use std::sync::atomic::AtomicBool;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use spherule_gpu::{Cost, GpuError, SceneError, SceneRenderer, ray_counts};
+use spherule_surface::spheres::SphereSurface;
 use spherule_tracer::render::{
     Channels, Colors, DataWindow, Film, FilmPlane, ParticleShading, RayCounts, RenderSettings,
     render,
@@ -14,9 +15,8 @@ use spherule_tracer::render::{
 use spherule_tracer::scene::{
     Background, Camera, CameraView, ColorMap, Light, Projection, Scene, default_lights,
 };
-use spherule_tracer::surface::spheres::SphereSurface;
 use spherule_tree::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder};
-use spherule_tree::math::SimdLevel;
+use spherule_tree::math::{SimdLevel, narrow};
 
 /// Distributions of particles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -144,8 +144,9 @@ fn center(data: Data, particle: u64) -> Vec3 {
             LOW + SIZE * Vec3::new(u(0), u(1), height)
         }
         Data::Clusters => {
+            #[expect(clippy::cast_possible_truncation, reason = "below 12")]
             let cluster = (u(4) * 12.0) as u64;
-            let middle = |axis: u64| uniform(1 << 60 | 4 * cluster + axis);
+            let middle = |axis: u64| uniform((1 << 60) + 4 * cluster + axis);
             let middle = LOW + SIZE * Vec3::new(middle(0), middle(1), middle(2));
             let direction = 2.0 * Vec3::new(u(0), u(1), u(2)) - Vec3::ONE;
             middle + direction * cluster_distance(particle)
@@ -158,7 +159,7 @@ impl Particles {
     pub(crate) fn new(case: &Case) -> Self {
         let count = case.particles as u64;
         let spacing = (f64::from(SIZE.element_product()) / count as f64).cbrt();
-        let common = 0.5 * spacing as f32;
+        let common = narrow(0.5 * spacing);
         let radius = |particle| match case.data {
             Data::Clusters => 0.2 * common * cluster_distance(particle),
             _ => common * 10.0_f32.powf(2.0 * uniform(8 * particle + 6) - 1.0),

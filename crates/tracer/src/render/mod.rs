@@ -143,6 +143,8 @@ pub enum RendererKind {
     /// Ray tracing on the threads of the CPU.
     #[default]
     Cpu,
+    /// Ray tracing on a GPU.
+    Gpu,
 }
 
 impl RendererKind {
@@ -150,6 +152,7 @@ impl RendererKind {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Cpu => "cpu",
+            Self::Gpu => "gpu",
         }
     }
 }

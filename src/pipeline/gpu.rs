@@ -1,0 +1,297 @@
+//! Renders frames on a GPU, with the crate `spherule-gpu`. A program that is built without the feature `gpu` has
+//! `no_gpu.rs` in its place.
+
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::time::Instant;
+
+use spherule_files::memory::MemoryUse;
+use spherule_gpu::{
+    AdapterSummary, Arithmetic, Checks, Cost, Device, GpuError, Missing, SceneError, SceneRenderer,
+    bytes_per_pixel, missing, ray_counts, tree_bytes,
+};
+
+use super::decoded::DecodedFrame;
+use super::load::{LoadedFrame, LoadedParticles};
+use super::renderer::{BuiltFrame, BuiltParticles, FrameRenderer, TraceError, TracedFrame};
+use super::setup::{OpacityRule, RadiusRule, Setup};
+use super::surface::spheres;
+use super::trace::particle_shading;
+use crate::render::{Film, RayCounts, RenderError, RenderSettings, Stop};
+use crate::report::FrameReport;
+use crate::report::frame::{BuildSummary, DeviceSummary};
+use crate::surface::SurfaceKind;
+
+/// The number of the adapter that the user chose.
+static CHOSEN: OnceLock<usize> = OnceLock::new();
+/// The device of this process, which renderers share. It takes up to a second to open.
+static DEVICE: Mutex<Option<Arc<Device>>> = Mutex::new(None);
+
+/// Chooses an adapter by its number in [`adapters`]. Only the first call counts.
+pub fn choose(index: usize) {
+    CHOSEN.get_or_init(|| index);
+}
+
+/// A line about each adapter of this machine, or why there is none.
+pub fn adapters() -> Vec<String> {
+    let about = |(index, adapter): (usize, &AdapterSummary)| {
+        let kind = if adapter.is_software { ", a program on the CPU" } else { "" };
+        let test = match Device::open(index, Checks::Off).map(|device| device.arithmetic()) {
+            Ok(Arithmetic::Fused) => "passes the self-test".to_owned(),
+            Ok(Arithmetic::Separate) => {
+                "passes the self-test, without fused multiply-add".to_owned()
+            }
+            Err(error) => error.to_string(),
+        };
+        let AdapterSummary { name, driver, max_array, .. } = adapter;
+        format!("{index}: {name}{kind}; {driver}; arrays up to {} MiB; {test}", max_array >> 20)
+    };
+    let adapters = spherule_gpu::adapters();
+    if adapters.is_empty() {
+        return vec![format!("no GPU was found: {}", super::vulkan::why_nothing_is_found())];
+    }
+    adapters.iter().enumerate().map(about).collect()
+}
+
+/// The device: the chosen one, or the first one that is not a program on the CPU.
+fn device() -> Result<Arc<Device>, TraceError> {
+    let mut shared = lock(&DEVICE);
+    if let Some(device) = &*shared {
+        return Ok(Arc::clone(device));
+    }
+    let index = match CHOSEN.get() {
+        Some(index) => *index,
+        None => {
+            let adapters = spherule_gpu::adapters();
+            let hardware = adapters.iter().position(|adapter| !adapter.is_software);
+            hardware.ok_or_else(|| no_device(&adapters))?
+        }
+    };
+    let device = Arc::new(Device::open(index, Checks::Off).map_err(failed)?);
+    *shared = Some(Arc::clone(&device));
+    Ok(device)
+}
+
+fn no_device(adapters: &[AdapterSummary]) -> TraceError {
+    let what = match adapters {
+        [] => format!("no GPU was found: {}", super::vulkan::why_nothing_is_found()),
+        [software, ..] => format!(
+            "the only device is {}, a program on the CPU; choose it with --gpu 0",
+            software.name
+        ),
+    };
+    TraceError::Device(what)
+}
+
+fn failed(error: GpuError) -> TraceError {
+    match error {
+        GpuError::Interrupted => TraceError::Render(RenderError::Interrupted),
+        GpuError::Lost(_) => {
+            // The next frame opens a new device
+            *lock(&DEVICE) = None;
+            TraceError::Device(error.to_string())
+        }
+        _ => TraceError::Device(error.to_string()),
+    }
+}
+
+fn scene_failed(error: SceneError) -> TraceError {
+    match error {
+        SceneError::Render(error) => TraceError::Render(error),
+        SceneError::Device(error) => failed(error),
+    }
+}
+
+fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The key of the first setting that a GPU lacks, and what is missing.
+pub fn lacking(setup: &Setup) -> Option<(&'static str, String)> {
+    let picture = &setup.picture;
+    let (rules, things) = (&picture.particles, &picture.things);
+    let of_scene = missing(&picture.scene, &picture.render);
+    [
+        of_scene.map(|missing| (key_of(missing), missing.to_string())),
+        (picture.view.lens.is_some()).then(|| ("camera.f_stop", "depth of field".to_owned())),
+        (picture.view.shutter.is_some()).then(|| ("camera.shutter", "motion blur".to_owned())),
+        (picture.surface.kind != SurfaceKind::Spheres)
+            .then(|| ("render.surface", "other surfaces than spheres".to_owned())),
+        (rules.opacity != OpacityRule::OPAQUE)
+            .then(|| ("material.opacity", "opacities below 1".to_owned())),
+        (!rules.styles.is_empty()).then(|| ("style", "styles".to_owned())),
+        (!rules.cut.is_everywhere()).then(|| ("clip", "particles that are cut".to_owned())),
+        (!things.meshes.is_empty()).then(|| ("mesh", "meshes".to_owned())),
+        (things.cell.is_some()).then(|| ("cell", "the simulation cell".to_owned())),
+        (!things.arrows.is_empty()).then(|| ("arrows", "arrows".to_owned())),
+        (!things.trails.is_empty()).then(|| ("trails", "trails".to_owned())),
+        (things.bonds.is_some()).then(|| ("bonds", "bonds".to_owned())),
+    ]
+    .into_iter()
+    .flatten()
+    .next()
+}
+
+fn key_of(missing: Missing) -> &'static str {
+    match missing {
+        Missing::PathTracing => "render.integrator",
+        Missing::Transmission => "material.transmission",
+        Missing::Ground => "render.ground",
+        Missing::MotionBlur => "camera.shutter",
+        Missing::Lens => "camera.f_stop",
+        Missing::Stereo => "camera.stereo",
+        Missing::Panorama => "camera.projection",
+        Missing::Opacity => "material.opacity",
+        Missing::Styles => "style",
+        Missing::LightExtent | Missing::Lights => "light",
+        Missing::Layers => "output.channels",
+        Missing::Drawing => "render.outline",
+        Missing::Denoising => "render.denoise",
+        Missing::Holdout => "mesh",
+    }
+}
+
+/// Memory of the device for a frame with that many particles, bytes.
+pub fn device_bytes(setup: &Setup, particles: u64) -> u64 {
+    let picture = &setup.picture;
+    let is_common = matches!(picture.particles.radius, RadiusRule::Common(_));
+    let pixels = u64::from(picture.render.width) * u64::from(picture.render.height);
+    let colors = if picture.particles.color.is_by_particle() { 12 * particles } else { 0 };
+    let lights = picture.scene.lights.len() as u64;
+    tree_bytes(particles, is_common) + colors + bytes_per_pixel(lights) * pixels
+}
+
+/// Renders frame after frame on the device.
+#[derive(Debug, Default)]
+pub struct GpuRenderer {
+    /// The renderer, once there is a frame. Trials render through a shared reference.
+    renderer: Mutex<Option<SceneRenderer>>,
+    /// Planes for the next image.
+    film: Film,
+}
+
+impl FrameRenderer for GpuRenderer {
+    fn prepare(&mut self, setup: &Setup, frame: LoadedFrame<'_>) -> Result<BuiltFrame, TraceError> {
+        let mut report = FrameReport {
+            particles: frame.particles.count(),
+            particles_read: frame.read,
+            dropped: frame.dropped,
+            clamped_radii: frame.clamped_radii,
+            ..FrameReport::default()
+        };
+        report.seconds.read = frame.read_time.as_secs_f64();
+        let LoadedParticles::Decoded(decoded) = frame.particles else {
+            let what = "native frames are decoded before they are copied to the GPU".to_owned();
+            return Err(TraceError::Device(what));
+        };
+        let start = Instant::now();
+        let renderer = self.renderer.get_mut().unwrap_or_else(PoisonError::into_inner);
+        let renderer = match renderer {
+            Some(renderer) => renderer,
+            None => renderer.insert(SceneRenderer::new(device()?)),
+        };
+        upload(renderer, setup, &decoded)?;
+        report.seconds.build = start.elapsed().as_secs_f64();
+        report.bytes.attributes = decoded.shading.byte_len();
+        Ok(BuiltFrame {
+            task: frame.task,
+            particles: BuiltParticles::Decoded(decoded.shading),
+            meshes: frame.meshes,
+            rods: frame.rods,
+            facts: frame.facts,
+            time: frame.time,
+            focus: frame.focus,
+            report,
+            notes: Vec::new(),
+        })
+    }
+
+    fn render(
+        &mut self,
+        setup: &Setup,
+        frame: BuiltFrame,
+        stop: &dyn Stop,
+    ) -> Result<TracedFrame, TraceError> {
+        let start = Instant::now();
+        let mut film = std::mem::take(&mut self.film);
+        let cost = self.draw(setup, &frame, &mut film, stop)?;
+        let memory = MemoryUse::now();
+        let BuiltFrame { task, facts, time, mut report, .. } = frame;
+        report.seconds.trace = start.elapsed().as_secs_f64();
+        report.rays = ray_counts(&cost).into();
+        report.build = BuildSummary {
+            structure: "lbvh".to_owned(),
+            order: "hilbert".to_owned(),
+            simd: "gpu".to_owned(),
+            ..BuildSummary::default()
+        };
+        report.device = Some(self.summary(&cost));
+        Ok(TracedFrame {
+            camera: setup.camera_at(task.frame)?,
+            task,
+            film,
+            texts: Vec::new(),
+            facts,
+            time,
+            report,
+            memory,
+        })
+    }
+
+    fn image(
+        &self,
+        setup: &Setup,
+        frame: &BuiltFrame,
+        stop: &dyn Stop,
+    ) -> Result<(Film, RayCounts), TraceError> {
+        let mut film = Film::default();
+        let cost = self.draw(setup, frame, &mut film, stop)?;
+        Ok((film, ray_counts(&cost)))
+    }
+
+    fn recycle(&mut self, film: Film) {
+        self.film = film;
+    }
+}
+
+/// Copies a frame to the device, and starts to build its tree.
+fn upload(
+    renderer: &mut SceneRenderer,
+    setup: &Setup,
+    frame: &DecodedFrame<'_>,
+) -> Result<(), TraceError> {
+    let shading = particle_shading(&setup.picture, &frame.shading);
+    renderer.prepare(&spheres(frame), &shading).map_err(failed)
+}
+
+impl GpuRenderer {
+    fn draw(
+        &self,
+        setup: &Setup,
+        frame: &BuiltFrame,
+        film: &mut Film,
+        stop: &dyn Stop,
+    ) -> Result<Cost, TraceError> {
+        let (BuiltParticles::Decoded(shading), Some(renderer)) =
+            (&frame.particles, &mut *lock(&self.renderer))
+        else {
+            return Err(TraceError::Device("no frame was prepared".to_owned()));
+        };
+        let scene = setup.scene_at(frame.task.frame, frame.focus)?;
+        let source = particle_shading(&setup.picture, shading);
+        // A trial is a small image of all of the scene, whose pixels cost about the same
+        let settings = RenderSettings { mosaic_of: None, ..setup.picture.render };
+        renderer.render_into(film, &scene, &source, &settings, stop).map_err(scene_failed)
+    }
+
+    fn summary(&self, cost: &Cost) -> DeviceSummary {
+        let renderer = lock(&self.renderer);
+        let adapter = renderer.as_ref().map(|renderer| renderer.device().adapter());
+        DeviceSummary {
+            name: adapter.map(|adapter| adapter.name.clone()).unwrap_or_default(),
+            driver: adapter.map(|adapter| adapter.driver.clone()).unwrap_or_default(),
+            build: cost.build_seconds,
+            trace: cost.trace_seconds,
+            bytes: cost.bytes,
+        }
+    }
+}
