@@ -72,6 +72,8 @@ pub struct Cost {
     pub reflected_rays: u64,
     /// Memory of the device, bytes.
     pub bytes: u64,
+    /// That of the tree and its build.
+    pub tree_bytes: u64,
 }
 
 /// A uniform of the kernels.
@@ -339,6 +341,7 @@ impl Renderer {
             reflected_rays: reflected,
             shadow_rays: lengths.iter().sum::<u64>() - reflected,
             bytes: self.tree.bytes() + arrays,
+            tree_bytes: self.tree.bytes(),
         })
     }
 

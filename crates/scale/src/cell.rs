@@ -9,7 +9,7 @@ use spherule_tree::accel::{BuildSettings, TreeBuilder};
 
 use super::measure::{Builds, Measured, render_settings, trace};
 use super::peaks::Peaks;
-use super::{CellError, CellRequest, Particles, stored};
+use super::{CellError, CellRequest, Particles, Representation, stored};
 use crate::report::CellMeasurement;
 
 /// Makes or reads the particles, builds the tree, and traces images; or traces in place the native frame `file`,
@@ -23,6 +23,7 @@ use crate::report::CellMeasurement;
 pub fn measure(request: &CellRequest, file: Option<&Path>) -> Result<CellMeasurement, CellError> {
     check_image(request)?;
     let measured = match file {
+        None if request.representation == Representation::Gpu => on_gpu(request)?,
         None => build_and_trace(request)?,
         Some(path) => stored::trace_in_place(request, path)?,
     };
@@ -53,6 +54,14 @@ fn build_and_trace(request: &CellRequest) -> Result<Measured, CellError> {
         images: trace(builder.tree().view(), request, &peaks)?,
         peaks,
     })
+}
+
+#[cfg(feature = "gpu")]
+use super::gpu::build_and_trace as on_gpu;
+
+#[cfg(not(feature = "gpu"))]
+fn on_gpu(_request: &CellRequest) -> Result<Measured, CellError> {
+    Err(CellError::Gpu("this program was built without the renderer for GPUs".to_owned()))
 }
 
 /// Rejects an image that cannot fit into memory, before the system kills the process.

@@ -25,6 +25,9 @@ pub enum CellError {
         /// MiB.
         free: u64,
     },
+    /// There is no GPU, or it failed.
+    #[error("GPU: {0}")]
+    Gpu(String),
     /// The particles do not fit into memory.
     #[error("out of memory: {particles} particles need at least {need} MiB, {free} MiB are free")]
     TooManyParticles {

@@ -47,6 +47,8 @@ use spherule_tree::accel::Structure;
 pub mod cell;
 pub mod convert;
 mod error;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod measure;
 mod motion;
 mod particles;
@@ -139,11 +141,13 @@ pub enum Representation {
     Q16,
     /// The same with 11, 11 and 10 bits.
     Q10,
+    /// In the memory of a GPU, which builds a tree and traces it.
+    Gpu,
 }
 
 impl Representation {
     /// All representations.
-    pub const ALL: [Self; 4] = [Self::Memory, Self::F32, Self::Q16, Self::Q10];
+    pub const ALL: [Self; 5] = [Self::Memory, Self::F32, Self::Q16, Self::Q10, Self::Gpu];
 
     /// The name on the command line and in files.
     pub const fn name(self) -> &'static str {
@@ -152,13 +156,14 @@ impl Representation {
             Self::F32 => "f32",
             Self::Q16 => "q16",
             Self::Q10 => "q10",
+            Self::Gpu => "gpu",
         }
     }
 
-    /// The encoding of the native frame; None in memory.
+    /// The encoding of the native frame; None without one.
     pub const fn encoding(self) -> Option<Encoding> {
         match self {
-            Self::Memory => None,
+            Self::Memory | Self::Gpu => None,
             Self::F32 => Some(Encoding::F32),
             Self::Q16 => Some(Encoding::Q16),
             Self::Q10 => Some(Encoding::Q10),
@@ -166,9 +171,13 @@ impl Representation {
     }
 
     /// Whether there are cells of this representation with `structure`. All structures can be built in memory; a
-    /// native frame is in k-d order, so it is always the same tree in place.
+    /// native frame is in k-d order, so it is always the same tree in place, and a GPU builds trees along a curve.
     pub fn goes_with(self, structure: Structure) -> bool {
-        self == Self::Memory || structure == Structure::Kdtree
+        match self {
+            Self::Memory => true,
+            Self::F32 | Self::Q16 | Self::Q10 => structure == Structure::Kdtree,
+            Self::Gpu => structure == Structure::Lbvh,
+        }
     }
 
     /// A description for messages.
@@ -178,6 +187,7 @@ impl Representation {
             Self::F32 => "in an f32 file",
             Self::Q16 => "in a q16 file",
             Self::Q10 => "in a q10 file",
+            Self::Gpu => "on a GPU",
         }
     }
 }

@@ -6,6 +6,7 @@ use std::time::Instant;
 use spherule_report::FrameReport;
 use spherule_surface::spheres::SphereSurface;
 use spherule_tracer::render::{ParticleShading, RayCounts, RenderSettings, render};
+use spherule_tracer::scene::Scene;
 use spherule_tracer::scene::material::DEFAULT_COLOR;
 use spherule_tree::accel::BuildReport;
 use spherule_tree::accel::view::TreeView;
@@ -116,30 +117,46 @@ pub(super) fn trace(
     peaks: &Peaks,
 ) -> Result<Images, CellError> {
     let settings = render_settings(request);
-    let aspect = f64::from(request.width) / f64::from(request.height);
     let surface = SphereSurface::new(tree);
     let shading = ParticleShading::constant(DEFAULT_COLOR);
     let never = AtomicBool::new(false);
-    let mut images = Images { seconds: Vec::new(), rays: RayCounts::default() };
-    let mut spent = 0.0;
-    for index in 0.. {
-        // Stop if the budget is spent, otherwise choose a position on the path
-        let t = match request.budget {
-            Budget::Images(count) if index == count => break,
-            Budget::Images(count) => f64::from(index) / f64::from(count),
-            Budget::Seconds(allowed) if spent >= allowed && index >= MIN_IMAGES => break,
-            Budget::Seconds(_) => path_position(index),
-        };
-        let scene = request.stage.scene(request.motion, t, aspect)?;
-        // Trace one image, and measure its time without preparation or release
+    Images::repeat(request, |scene| {
+        // Measure the time without preparation or release
         let start = Instant::now();
-        let (film, rays) = render(&[&surface], &scene, &shading, &settings, &never)?;
+        let (film, rays) = render(&[&surface], scene, &shading, &settings, &never)?;
         let seconds = start.elapsed().as_secs_f64();
         peaks.sample();
         drop(film);
-        spent += seconds;
-        images.seconds.push(seconds);
-        images.rays = images.rays + rays;
+        Ok((seconds, rays))
+    })
+}
+
+impl Images {
+    /// Traces as many images as the budget of `request` allows, along the path of its camera. `trace` returns the seconds
+    /// and the rays of one.
+    ///
+    /// # Errors
+    /// If a view is invalid, or the first error of `trace`.
+    pub(super) fn repeat(
+        request: &CellRequest,
+        mut trace: impl FnMut(&Scene) -> Result<(f64, RayCounts), CellError>,
+    ) -> Result<Self, CellError> {
+        let aspect = f64::from(request.width) / f64::from(request.height);
+        let mut images = Self { seconds: Vec::new(), rays: RayCounts::default() };
+        let mut spent = 0.0;
+        for index in 0.. {
+            // Stop if the budget is spent, otherwise choose a position on the path
+            let t = match request.budget {
+                Budget::Images(count) if index == count => break,
+                Budget::Images(count) => f64::from(index) / f64::from(count),
+                Budget::Seconds(allowed) if spent >= allowed && index >= MIN_IMAGES => break,
+                Budget::Seconds(_) => path_position(index),
+            };
+            let (seconds, rays) = trace(&request.stage.scene(request.motion, t, aspect)?)?;
+            spent += seconds;
+            images.seconds.push(seconds);
+            images.rays = images.rays + rays;
+        }
+        Ok(images)
     }
-    Ok(images)
 }

@@ -36,7 +36,7 @@ impl Experiment {
             particles: each_once(&args.particles, &[]),
             structures: structures.iter().map(|s| s.name().to_owned()).collect(),
             motions: each_once(&args.motions, &Motion::ALL),
-            representations: each_once(&args.representations, &[Representation::Memory]),
+            representations: each_once(&args.representations, default_representations(args)),
             budget: match (args.seconds, args.images) {
                 (_, Some(images)) => Budget::Images(images),
                 (seconds, None) => Budget::Seconds(seconds.unwrap_or(SECONDS)),
@@ -102,15 +102,28 @@ impl Experiment {
     }
 }
 
+/// The representations if none is named.
+fn default_representations(args: &ScaleArgs) -> &'static [Representation] {
+    match args.device.as_deref() {
+        Some("gpu") => &[Representation::Memory, Representation::Gpu],
+        _ => &[Representation::Memory],
+    }
+}
+
 /// Checks that every representation has a structure, and reports combinations that are skipped.
 fn check_pairs(
     structures: &[Structure],
     representations: &[Representation],
 ) -> Result<(), CliError> {
-    let in_place: Vec<&str> =
-        representations.iter().filter(|r| r.encoding().is_some()).map(|r| r.name()).collect();
-    let goes = |s: &Structure| representations.iter().all(|r| r.goes_with(*s));
-    let names = in_place.join(", ");
+    if representations.contains(&Representation::Gpu) && !structures.contains(&Structure::Lbvh) {
+        return Err(CliError::other(
+            "a GPU builds lbvh only; add lbvh to --structures, or measure the CPU",
+        ));
+    }
+    let in_place: Vec<&Representation> =
+        representations.iter().filter(|r| r.encoding().is_some()).collect();
+    let goes = |s: &Structure| in_place.iter().all(|r| r.goes_with(*s));
+    let names = in_place.iter().map(|r| r.name()).collect::<Vec<_>>().join(", ");
     if in_place.is_empty() || structures.iter().all(goes) {
         return Ok(());
     }

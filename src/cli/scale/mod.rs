@@ -51,11 +51,15 @@ pub(super) struct ScaleArgs {
     /// Camera motions: rotation, translation, both [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::motion, help_heading = "Experiment")]
     motions: Vec<Motion>,
-    /// Where positions are stored: memory, f32, q16, q10 [default: memory]
+    /// Where positions are stored: memory, f32, q16, q10, gpu [default: memory]
     ///
-    /// All except memory use a memory-mapped native frame of that encoding, traced in place (kdtree only).
+    /// f32, q16 and q10 use a memory-mapped native frame of that encoding, traced in place (kdtree only). gpu builds and
+    /// traces on the GPU (lbvh only); its times are those of the device.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::representation, help_heading = "Experiment")]
     representations: Vec<Representation>,
+    /// What traces: cpu, or gpu for both beside each other, the same as --representations memory,gpu.
+    #[arg(long, value_name = "NAME", value_parser = ["cpu", "gpu"], conflicts_with = "representations", help_heading = "Experiment")]
+    device: Option<String>,
     /// Tracing time per cell, in seconds [default: 60]
     #[arg(long, value_parser = values::seconds, conflicts_with = "images", allow_hyphen_values = true, help_heading = "Experiment")]
     seconds: Option<f64>,

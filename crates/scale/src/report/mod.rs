@@ -305,9 +305,10 @@ impl ScaleReport {
             .map(|(structure, representation)| Column {
                 structure: structure.clone(),
                 representation,
-                title: match representation.encoding() {
-                    None => structure.clone(),
-                    Some(encoding) => format!("{structure}, {encoding} file"),
+                title: match (representation, representation.encoding()) {
+                    (Representation::Gpu, _) => format!("{structure}, GPU"),
+                    (_, None) => structure.clone(),
+                    (_, Some(encoding)) => format!("{structure}, {encoding} file"),
                 },
             })
             .collect()
