@@ -64,7 +64,7 @@ mod view;
 
 use errors::CliError;
 
-/// Renders particle-simulation time steps to OpenEXR image sequences by CPU ray tracing.
+/// Renders particle-simulation time steps to OpenEXR image sequences by ray tracing.
 #[derive(Debug, Parser)]
 #[command(name = "spherule", version, max_term_width = 100)]
 struct Cli {

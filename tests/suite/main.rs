@@ -28,6 +28,7 @@ mod encoders;
 mod export;
 mod figures;
 mod golden;
+mod gpu;
 mod ground_image;
 mod help;
 mod in_memory;

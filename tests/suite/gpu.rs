@@ -1,0 +1,122 @@
+//! Jobs on a GPU. A program without the feature `gpu` refuses them; one with it renders on a driver for CPUs, which
+//! continuous integration installs (`SPHERULE_GPU=required`).
+
+use crate::harness::{Workshop, dam_break};
+
+/// A picture of the kind that a GPU renders, apart from its renderer.
+const PICTURE: [&str; 4] = [
+    "--integrator=whitted",
+    "--ground=none",
+    "--set=output.channels=[\"RGBA\", \"Z\", \"N\", \"id\"]",
+    "--look=none",
+];
+
+fn workshop() -> Workshop {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 1..=2);
+    workshop
+}
+
+#[cfg(not(feature = "gpu"))]
+#[test]
+fn a_program_without_gpus_says_so() {
+    let workshop = workshop();
+    let refused = workshop.render(&[&PICTURE[..], &["--device=gpu"]].concat()).expect(2);
+    refused.prints("render.device: this program was built without the renderer for GPUs");
+    assert!(!workshop.join("out").exists());
+    let listed = workshop.run(&["devices"]).expect(0).text();
+    assert!(listed.contains("--features gpu"), "{listed}");
+}
+
+#[cfg(feature = "gpu")]
+mod on_a_device {
+    use super::{PICTURE, workshop};
+    use crate::harness::{SMALL, Workshop, images};
+    use crate::picture::Picture;
+
+    /// Renders on the first device, whatever it is.
+    const DEVICE: [&str; 2] = ["--device=gpu", "--gpu=0"];
+
+    /// A workshop, or None on a machine without a device.
+    fn workshop_with_device() -> Option<Workshop> {
+        let workshop = workshop();
+        let listed = workshop.run(&["devices"]).expect(0).text();
+        let has_device = listed.contains("passes the self-test");
+        assert!(has_device || std::env::var_os("SPHERULE_GPU").is_none(), "{listed}");
+        has_device.then_some(workshop)
+    }
+
+    fn with<'a>(options: &[&'a str]) -> Vec<&'a str> {
+        [&PICTURE[..], options].concat()
+    }
+
+    /// Compares the images of two frames in two directories. The CPU may fuse products and sums that the device does not.
+    fn assert_equal(workshop: &Workshop, directories: [&str; 2]) {
+        for frame in [1, 2] {
+            let [gpu, cpu] = directories
+                .map(|dir| Picture::open(&workshop.join(format!("{dir}/f.{frame:04}.exr"))));
+            let ids = gpu.integers("id.I").iter().zip(cpu.integers("id.I"));
+            let pixels = ids.clone().count();
+            assert!(ids.filter(|(a, b)| a != b).count() <= pixels / 1000);
+            assert!(gpu.integers("id.I").iter().any(|id| *id != u32::MAX));
+            for channel in ["R", "G", "B", "A", "N.X"] {
+                let pairs = gpu.floats(channel).iter().zip(cpu.floats(channel));
+                let sum = pairs.map(|(a, b)| f64::from((a - b).abs())).sum::<f64>();
+                let mean = sum / pixels as f64;
+                assert!(mean < 1e-4, "{channel}: {mean}");
+            }
+        }
+    }
+
+    #[test]
+    fn jobs_give_the_pictures_of_the_cpu() {
+        let Some(workshop) = workshop_with_device() else { return };
+        workshop.render_to("gpu", &with(&DEVICE)).expect(0).prints("2 of 2 frames done");
+        workshop.render_to("cpu", &with(&[])).expect(0);
+        assert_equal(&workshop, ["gpu", "cpu"]);
+        let report = std::fs::read_to_string(workshop.join("gpu/report.json")).expect("a report");
+        assert!(report.contains("\"driver\""), "{report}");
+        // The same bytes once more
+        workshop.render_to("again", &with(&DEVICE)).expect(0);
+        assert_eq!(images(&workshop.join("again")), images(&workshop.join("gpu")));
+    }
+
+    #[test]
+    fn a_job_is_finished_on_what_it_was_begun_on() {
+        let Some(workshop) = workshop_with_device() else { return };
+        workshop.render(&with(&DEVICE)).expect(0);
+        // The plan has the renderer, so that it need not be named again
+        workshop.render(&with(&["--gpu=0"])).expect(0).prints("2 of 2 frames are done already");
+        workshop.render(&with(&["--device=cpu"])).expect(2).prints("renderer");
+    }
+
+    #[test]
+    fn native_frames_are_decoded() {
+        let Some(workshop) = workshop_with_device() else { return };
+        workshop.run(&["convert", "in", "-o", "native"]).expect(0);
+        for (out, options) in [("gpu", &DEVICE[..]), ("cpu", &[])] {
+            let pattern = format!("{out}/f.####.exr");
+            let native = ["render", "native", "-o", pattern.as_str()];
+            workshop.run(&[&native[..], &SMALL, &with(options)].concat()).expect(0);
+        }
+        assert_equal(&workshop, ["gpu", "cpu"]);
+    }
+
+    #[test]
+    fn what_a_gpu_lacks_is_named() {
+        let Some(workshop) = workshop_with_device() else { return };
+        let whitted = "--integrator=whitted";
+        for (options, expected) in [
+            (&["--integrator=path"][..], "render.integrator: path tracing"),
+            (&[whitted, "--ground=checker"], "render.ground: a ground"),
+            (&[whitted, "--surface=union"], "render.surface"),
+            (&[whitted, "--opacity=0.5"], "material.opacity"),
+            (&[whitted, "--gpu=9"], "there is no GPU 9"),
+        ] {
+            let still = ["still", "in", "-o", "a.png", "--device=gpu"];
+            let ran = workshop.run(&[&still[..], &SMALL, options].concat());
+            assert!(matches!(ran.code(), Some(1 | 2)), "{options:?}: {}", ran.errors());
+            ran.prints(expected);
+        }
+    }
+}
