@@ -8,7 +8,7 @@ use crate::manifest::Manifest;
 
 /// Options that are no property of a job: where it is, any key, many keys, and what one run does with what is
 /// there.
-const ACTIONS: [&str; 7] = ["input", "set", "look", "draft", "force", "keep_done", "shard"];
+const ACTIONS: [&str; 8] = ["gpu", "input", "set", "look", "draft", "force", "keep_done", "shard"];
 
 /// Options for parts of `material.color`.
 const COLORS: [&str; 4] = ["color_by", "map", "range", "color_scale"];
@@ -144,7 +144,8 @@ fn every_option_is_a_key() {
 }
 
 /// Options whose `[default: ...]` is no value that could be given.
-const WORDS: [&str; 15] = [
+const WORDS: [&str; 16] = [
+    "gpu",
     "center",
     "align",
     "fit",

@@ -10,15 +10,15 @@ use spherule_gpu::{
     bytes_per_pixel, missing, ray_counts, tree_bytes,
 };
 
-use super::decoded::DecodedFrame;
 use super::load::{LoadedFrame, LoadedParticles};
 use super::renderer::{BuiltFrame, BuiltParticles, FrameRenderer, TraceError, TracedFrame};
 use super::setup::{OpacityRule, RadiusRule, Setup};
+use super::shading::particle_shading;
 use super::surface::spheres;
-use super::trace::particle_shading;
-use crate::render::{Film, RayCounts, RenderError, RenderSettings, Stop};
+use crate::render::{Film, RayCounts, RenderError, RenderSettings, ShadeSource, Stop};
 use crate::report::FrameReport;
 use crate::report::frame::{BuildSummary, DeviceSummary};
+use crate::scene::material::DEFAULT_COLOR;
 use crate::surface::SurfaceKind;
 
 /// The number of the adapter that the user chose.
@@ -140,8 +140,6 @@ fn key_of(missing: Missing) -> &'static str {
         Missing::Lens => "camera.f_stop",
         Missing::Stereo => "camera.stereo",
         Missing::Panorama => "camera.projection",
-        Missing::Opacity => "material.opacity",
-        Missing::Styles => "style",
         Missing::LightExtent | Missing::Lights => "light",
         Missing::Layers => "output.channels",
         Missing::Drawing => "render.outline",
@@ -179,22 +177,21 @@ impl FrameRenderer for GpuRenderer {
             ..FrameReport::default()
         };
         report.seconds.read = frame.read_time.as_secs_f64();
-        let LoadedParticles::Decoded(decoded) = frame.particles else {
-            let what = "native frames are decoded before they are copied to the GPU".to_owned();
-            return Err(TraceError::Device(what));
-        };
         let start = Instant::now();
         let renderer = self.renderer.get_mut().unwrap_or_else(PoisonError::into_inner);
         let renderer = match renderer {
             Some(renderer) => renderer,
             None => renderer.insert(SceneRenderer::new(device()?)),
         };
-        upload(renderer, setup, &decoded)?;
+        let particles = upload(renderer, setup, frame.particles)?;
         report.seconds.build = start.elapsed().as_secs_f64();
-        report.bytes.attributes = decoded.shading.byte_len();
+        report.bytes.attributes = match &particles {
+            BuiltParticles::Decoded(shading) => shading.byte_len(),
+            BuiltParticles::Stored(stored) => stored.attribute_bytes(),
+        };
         Ok(BuiltFrame {
             task: frame.task,
-            particles: BuiltParticles::Decoded(decoded.shading),
+            particles,
             meshes: frame.meshes,
             rods: frame.rods,
             facts: frame.facts,
@@ -253,14 +250,28 @@ impl FrameRenderer for GpuRenderer {
     }
 }
 
-/// Copies a frame to the device, and starts to build its tree.
+/// Copies a frame to the device, and starts to build its tree. Positions are released.
 fn upload(
     renderer: &mut SceneRenderer,
     setup: &Setup,
-    frame: &DecodedFrame<'_>,
-) -> Result<(), TraceError> {
-    let shading = particle_shading(&setup.picture, &frame.shading);
-    renderer.prepare(&spheres(frame), &shading).map_err(failed)
+    particles: LoadedParticles<'_>,
+) -> Result<BuiltParticles, TraceError> {
+    match particles {
+        LoadedParticles::Decoded(frame) => {
+            let shading = particle_shading(&setup.picture, &frame.shading);
+            renderer.prepare(&spheres(&frame), &shading).map_err(failed)?;
+            Ok(BuiltParticles::Decoded(frame.shading))
+        }
+        LoadedParticles::Stored(stored) => {
+            let shading = stored.shading(&setup.picture, DEFAULT_COLOR);
+            let leaves = stored.leaves()?;
+            renderer.prepare_stored(&leaves, stored.radius(), &shading).map_err(failed)?;
+            drop(shading);
+            // Reject the frame if its file has changed meanwhile
+            stored.check()?;
+            Ok(BuiltParticles::Stored(stored))
+        }
+    }
 }
 
 impl GpuRenderer {
@@ -271,16 +282,24 @@ impl GpuRenderer {
         film: &mut Film,
         stop: &dyn Stop,
     ) -> Result<Cost, TraceError> {
-        let (BuiltParticles::Decoded(shading), Some(renderer)) =
-            (&frame.particles, &mut *lock(&self.renderer))
-        else {
+        let mut renderer = lock(&self.renderer);
+        let Some(renderer) = &mut *renderer else {
             return Err(TraceError::Device("no frame was prepared".to_owned()));
         };
         let scene = setup.scene_at(frame.task.frame, frame.focus)?;
-        let source = particle_shading(&setup.picture, shading);
         // A trial is a small image of all of the scene, whose pixels cost about the same
         let settings = RenderSettings { mosaic_of: None, ..setup.picture.render };
-        renderer.render_into(film, &scene, &source, &settings, stop).map_err(scene_failed)
+        let mut render = |source: &dyn ShadeSource| {
+            renderer.render_into(film, &scene, source, &settings, stop).map_err(scene_failed)
+        };
+        match &frame.particles {
+            BuiltParticles::Decoded(shading) => render(&particle_shading(&setup.picture, shading)),
+            BuiltParticles::Stored(stored) => {
+                let cost = render(&stored.shading(&setup.picture, DEFAULT_COLOR))?;
+                stored.check()?;
+                Ok(cost)
+            }
+        }
     }
 
     fn summary(&self, cost: &Cost) -> DeviceSummary {

@@ -13,7 +13,7 @@ use super::facts::{FileFacts, column_range};
 use super::load_error::{LoadError, missing, missing_value, no_parts};
 use super::setup::{ColorRule, OpacityRule, Picture, RadiusRule, Setup};
 use crate::accel::Structure;
-use crate::render::{NO_ID, RendererKind, ShadeSource, mean, opacity_of};
+use crate::render::{NO_ID, ShadeSource, mean, opacity_of};
 use crate::scene::{ColorMap, MaterialId, PartMaterials, RgbEncoding};
 use crate::survey::{id_of, part_of, velocity_of};
 use spherule_frame::values::{Context, Named, Value};
@@ -70,10 +70,6 @@ impl StoredFrame {
         let Some(path) = sequence.native_file(index) else {
             return Ok(Opened::Decode(None));
         };
-        if setup.picture.renderer == RendererKind::Gpu {
-            // It builds a tree of its own
-            return Ok(Opened::Decode(None));
-        }
         // Open the file, and check whether it can be traced in place
         let file = NativeFile::open(path, setup.run.access).map_err(LoadError::Frame)?;
         let structure = setup.stored_structure();

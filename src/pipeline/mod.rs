@@ -40,6 +40,7 @@ mod renderer;
 mod rods;
 mod schedule;
 mod setup;
+mod shading;
 mod shutter;
 mod single;
 mod stages;

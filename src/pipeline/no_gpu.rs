@@ -29,7 +29,7 @@ pub const fn device_bytes(_setup: &Setup, _particles: u64) -> u64 {
 
 /// Fails.
 #[derive(Debug, Default)]
-pub struct GpuRenderer;
+pub struct GpuRenderer(());
 
 impl GpuRenderer {
     fn refuse<T>() -> Result<T, TraceError> {

@@ -3,25 +3,22 @@
 use std::time::{Duration, Instant};
 
 use spherule_files::memory::MemoryUse;
-use spherule_formats::order::index_u32;
 
-use super::decoded::{DecodedFrame, DecodedShading};
+use super::decoded::DecodedFrame;
 use super::gpu::GpuRenderer;
 use super::in_place::StoredFrame;
 use super::load::{LoadedFrame, LoadedParticles};
 use super::mattes;
 use super::renderer::{BuiltFrame, BuiltParticles, FrameRenderer, TraceError, TracedFrame};
 use super::rods::FrameRods;
-use super::setup::{ColorRule, OpacityRule, Picture, Setup};
+use super::setup::Setup;
+use super::shading::particle_shading;
 use super::surface::{self, SurfaceBuilder, spheres};
 use crate::accel::stored::{StoredSettings, StoredTree};
 use crate::accel::{BuildReport, TreeBuilder};
 use crate::denoise::{DenoiseError, DenoiseInput, denoise};
 use crate::output::TextAttribute;
-use crate::render::{
-    Colors, Film, FilmPlane, Opacities, ParticleShading, RayCounts, RendererKind, Stop,
-    StyleShading,
-};
+use crate::render::{Film, FilmPlane, RayCounts, RendererKind, Stop};
 use crate::report::FrameReport;
 use crate::report::frame::FileBytes;
 use crate::scene::material::DEFAULT_COLOR;
@@ -242,42 +239,6 @@ fn denoise_film(setup: &Setup, film: &mut Film) -> Result<f64, DenoiseError> {
         [color[0], color[1], color[2]] = filtered.to_array();
     }
     Ok(seconds(start.elapsed()))
-}
-
-pub(super) fn particle_shading<'a>(
-    picture: &'a Picture,
-    shading: &'a DecodedShading,
-) -> ParticleShading<'a> {
-    // Choose the source of the colours; without an attribute it is a constant
-    let values = &shading.values;
-    let colors = |rule: &'a ColorRule| match rule {
-        ColorRule::Constant(color) => Colors::Constant(*color),
-        ColorRule::Rgb { .. } if shading.colors.is_empty() => Colors::Constant(DEFAULT_COLOR),
-        ColorRule::Rgb { .. } => Colors::PerParticle(&shading.colors),
-        ColorRule::Attribute { .. } if values.is_empty() => Colors::Constant(DEFAULT_COLOR),
-        ColorRule::Attribute { map, .. } => Colors::Mapped { values, map },
-    };
-    let opacities = |rule: &OpacityRule| match *rule {
-        OpacityRule::Constant(opacity) => Opacities::Constant(opacity),
-        OpacityRule::Value { range, .. } => Opacities::Mapped { values: &shading.opacities, range },
-    };
-    // Styles follow each other in the order of the particles
-    let rules = &picture.particles;
-    let styles = rules.styles.iter().enumerate().map(|(index, style)| StyleShading {
-        first: index_u32(shading.ranges.of(index).start),
-        material: style.material,
-        colors: colors(&style.color),
-        opacities: opacities(&style.opacity),
-    });
-    ParticleShading {
-        colors: colors(&rules.color),
-        opacities: opacities(&rules.opacity),
-        styles: styles.collect(),
-        ids: shading.ids.as_deref(),
-        velocities: shading.velocities.as_deref(),
-        parts: shading.parts.as_ref().map(|(name, parts)| (name.as_str(), &parts[..])),
-        attributes: &shading.attributes,
-    }
 }
 
 fn seconds(time: Duration) -> f64 {

@@ -41,10 +41,10 @@ fn has_loader() -> bool {
 
 fn has_driver() -> bool {
     let is_named = |name: &str| env::var_os(name).is_some_and(|files| !files.is_empty());
-    let has_files = |directory: &&str| {
+    let has_files = |directory: &str| {
         Path::new(directory).read_dir().is_ok_and(|mut entries| entries.next().is_some())
     };
     is_named("VK_DRIVER_FILES")
         || is_named("VK_ICD_FILENAMES")
-        || DRIVERS.iter().any(|directory| has_files(&directory))
+        || DRIVERS.iter().any(|directory| has_files(directory))
 }

@@ -14,9 +14,9 @@ use support::{Case, Data, Particles, Radii};
 
 /// Pictures of a measurement, and those before it that warm the device up.
 const PICTURES: usize = 30;
-const WARM_UP: usize = 20;
-/// Largest number of particles whose pictures are compared with those of the CPU.
-const MAX_COMPARED: usize = 20_000_000;
+const WARM_UP: usize = 100;
+/// Number of particles from which only one picture is compared with that of the CPU.
+const MANY: usize = 50_000_000;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut options = std::env::args().skip(1);
@@ -35,26 +35,50 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut renderer = SceneRenderer::new(Arc::new(device));
     for &size in &sizes {
         compare(&mut renderer, size);
-        for data in Data::ALL {
+        for data in [Data::Box, Data::DamBreak, Data::Outlier, Data::Coincident] {
             measure(&mut renderer, &Case { data, ..Case::thesis(size) });
         }
-        measure(&mut renderer, &Case { radii: Radii::Each, ..Case::thesis(size) });
+        for data in [Data::Box, Data::Clusters] {
+            measure(&mut renderer, &Case { data, radii: Radii::Each, ..Case::thesis(size) });
+        }
         measure(&mut renderer, &Case { max_depth: 1, ..Case::thesis(size) });
     }
     Ok(())
 }
 
 fn compare(renderer: &mut SceneRenderer, size: usize) {
-    if size > MAX_COMPARED {
-        return;
-    }
-    for data in Data::ALL {
-        for radii in [Radii::Common, Radii::Each] {
+    let all = if size < MANY { &Data::ALL[..] } else { &Data::ALL[..1] };
+    for &data in all {
+        for radii in [Radii::Common, Radii::Each].into_iter().take(all.len()) {
             let case = Case { data, radii, ..Case::thesis(size) };
             let difference = support::compare(renderer, &case, SimdLevel::best());
             println!("{size} {data:?} {radii:?}: {difference:?}");
         }
     }
+}
+
+/// Milliseconds of the host to copy a frame to the device, and to render a picture into a film.
+fn host_times(
+    renderer: &mut SceneRenderer,
+    case: &Case,
+    particles: &Particles,
+    shading: &spherule_tracer::render::ParticleShading<'_>,
+) -> [f64; 2] {
+    let never = std::sync::atomic::AtomicBool::new(false);
+    let (scene, settings) = (support::scene(case, 0.0), case.settings());
+    let mut film = spherule_tracer::render::Film::default();
+    let [mut copy, mut render] = [0.0; 2];
+    for number in 0..2 * PICTURES {
+        let start = std::time::Instant::now();
+        renderer.prepare(&particles.spheres(), shading).expect("the frame fits");
+        let copied = start.elapsed();
+        (renderer.render_into(&mut film, &scene, shading, &settings, &never)).expect("it renders");
+        if number >= PICTURES {
+            copy += copied.as_secs_f64();
+            render += (start.elapsed() - copied).as_secs_f64();
+        }
+    }
+    [copy, render].map(|sum| 1e3 * sum / PICTURES as f64)
 }
 
 /// Prints the milliseconds of builds and pictures, while the camera turns.
@@ -67,7 +91,7 @@ fn measure(renderer: &mut SceneRenderer, case: &Case) {
     renderer.prepare(&particles.spheres(), &shading).expect("the frame fits");
     for number in 0..WARM_UP + PICTURES {
         let start = std::time::Instant::now();
-        let scene = support::scene(case, 0.02 * (number as f64 - 16.0));
+        let scene = support::scene(case, 0.02 * ((number % PICTURES) as f64 - 15.0));
         let cost = renderer.measure(&scene, &case.settings(), &never).expect("nothing stops it");
         if number >= WARM_UP {
             build += cost.build_seconds;
@@ -76,10 +100,11 @@ fn measure(renderer: &mut SceneRenderer, case: &Case) {
             bytes = cost.bytes;
         }
     }
+    let [copy, film] = host_times(renderer, case, &particles, &shading);
     let [build, trace, wall] = [build, trace, wall].map(|sum| 1e3 * sum / PICTURES as f64);
     println!(
         "{} {:?} {:?} depth {}: build {build:.3} ms, trace {trace:.3} ms, {:.0} images/s on the device, \
-         whole {wall:.2} ms, {} MiB",
+         both {wall:.2} ms with the host; copy of the frame {copy:.1} ms, picture to a film {film:.1} ms; {} MiB",
         case.particles,
         case.data,
         case.radii,

@@ -1,12 +1,17 @@
 //! Memory of the device: arrays that grow, uniforms, and copies from and to the host.
 
 use bytemuck::Pod;
+use rayon::prelude::*;
 use wgpu::{
     BindingResource, Buffer, BufferBinding, BufferDescriptor, BufferUsages, CommandEncoder, MapMode,
 };
 
 use crate::{Device, GpuError};
 
+/// Bytes from which an array is copied by all threads.
+const MIN_SHARED: usize = 4 << 20;
+/// Copies begin at multiples of this number of bytes.
+const COPY_STEP: u64 = 16;
 /// Distance of uniforms, bytes: no device needs more.
 const UNIFORM_STEP: usize = 256;
 
@@ -16,6 +21,54 @@ pub(crate) struct Array {
     buffer: Option<Buffer>,
     /// Bytes in use.
     len: u64,
+    upload: Upload,
+}
+
+/// Memory of the host through which a large array is filled by all threads: a part for each.
+#[derive(Debug, Default)]
+struct Upload {
+    parts: Vec<Buffer>,
+    /// Bytes of each part but the last.
+    share: u64,
+}
+
+impl Upload {
+    /// Copies `bytes` to the parts, after the device has read what they held.
+    fn copy(&mut self, device: &Device, bytes: &[u8]) -> Result<(), GpuError> {
+        let count = rayon::current_num_threads().max(1) as u64;
+        let len = bytes.len() as u64;
+        let share = len.div_ceil(count).next_multiple_of(COPY_STEP);
+        if (self.share, self.parts.len() as u64) == (share, len.div_ceil(share)) {
+            for part in &self.parts {
+                // The result of the map is that of the wait
+                part.map_async(MapMode::Write, .., |_result| ());
+            }
+            device.wait()?;
+        } else {
+            self.parts.clear();
+            self.parts.extend((0..len.div_ceil(share)).map(|_| {
+                device.raw.create_buffer(&BufferDescriptor {
+                    label: Some("upload"),
+                    size: share,
+                    usage: BufferUsages::MAP_WRITE | BufferUsages::COPY_SRC,
+                    mapped_at_creation: true,
+                })
+            }));
+            self.share = share;
+            device.check().inspect_err(|_| self.parts.clear())?;
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "a part of a slice")]
+        let pieces = bytes.par_chunks(share as usize);
+        pieces.zip(&self.parts).try_for_each(|(piece, part)| {
+            let lost = |error: wgpu::MapRangeError| GpuError::Lost(error.to_string());
+            part.get_mapped_range_mut(..)
+                .map_err(lost)?
+                .slice(..piece.len())
+                .copy_from_slice(piece);
+            part.unmap();
+            Ok(())
+        })
+    }
 }
 
 impl Array {
@@ -61,9 +114,20 @@ impl Array {
         bytes: &[u8],
     ) -> Result<(), GpuError> {
         self.reserve(device, what, bytes.len() as u64)?;
-        if let (Some(buffer), false) = (&self.buffer, bytes.is_empty()) {
-            device.queue.write_buffer(buffer, 0, bytes);
+        if bytes.len() < MIN_SHARED {
+            if let (Some(buffer), false) = (&self.buffer, bytes.is_empty()) {
+                device.queue.write_buffer(buffer, 0, bytes);
+            }
+            return device.check();
         }
+        self.upload.copy(device, bytes)?;
+        let mut encoder = device.raw.create_command_encoder(&Default::default());
+        for (number, part) in self.upload.parts.iter().enumerate() {
+            let at = number as u64 * self.upload.share;
+            let len = part.size().min(bytes.len() as u64 - at);
+            encoder.copy_buffer_to_buffer(part, 0, self.buffer(), at, len);
+        }
+        device.queue.submit([encoder.finish()]);
         device.check()
     }
 

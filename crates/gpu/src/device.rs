@@ -11,7 +11,7 @@ use wgpu::{
 };
 
 use crate::GpuError;
-use crate::self_test::{self, Arithmetic};
+use crate::arithmetic::Arithmetic;
 
 /// Storage arrays that one kernel uses.
 const STORAGE_ARRAYS: u32 = 13;
@@ -90,11 +90,11 @@ pub struct Device {
 }
 
 impl Device {
-    /// Opens adapter `index`, as counted by [`adapters`], and tests its arithmetic.
+    /// Opens adapter `index`, whose arithmetic is not known yet.
     ///
     /// # Errors
-    /// If there is no such adapter, if the driver refuses it, if it is too small, or if it is inexact.
-    pub fn open(index: usize, checks: Checks) -> Result<Self, GpuError> {
+    /// If there is no such adapter, if the driver refuses it, or if it is too small.
+    pub(crate) fn connect(index: usize, checks: Checks) -> Result<Self, GpuError> {
         // Find the adapter
         let mut found = found_adapters();
         let count = found.len();
@@ -121,16 +121,14 @@ impl Device {
         raw.on_uncaptured_error(Arc::new(move |error: Error| kept.keep(fault_of(&error))));
         let kept = Arc::clone(&faults);
         raw.set_device_lost_callback(move |_reason, message| kept.keep(GpuError::Lost(message)));
-        let mut device = Self {
-            raw,
-            queue,
-            adapter: summary(&adapter),
-            arithmetic: Arithmetic::Separate,
-            checks,
-            faults,
-        };
-        device.arithmetic = self_test::arithmetic_of(&device)?;
-        Ok(device)
+        let arithmetic = Arithmetic::Separate;
+        Ok(Self { raw, queue, adapter: summary(&adapter), arithmetic, checks, faults })
+    }
+
+    /// Sets what the self-test has found.
+    #[must_use]
+    pub(crate) fn with_arithmetic(self, arithmetic: Arithmetic) -> Self {
+        Self { arithmetic, ..self }
     }
 
     /// The adapter.

@@ -11,7 +11,7 @@
 //!
 //! ```
 //! use spherule_gpu::{
-//!     Background, Camera, Checks, Colors, Device, FilmSize, KeyLength, Light, LightPlace, Material,
+//!     Background, Camera, Centers, Checks, Colors, Device, FilmSize, KeyLength, Light, LightPlace, Material,
 //!     NearestSample, Order, Picture, Radii, Renderer, Samples, Spheres, adapters,
 //! };
 //!
@@ -22,7 +22,7 @@
 //! let device = Device::open(0, Checks::Off)?;
 //! let mut renderer = Renderer::new(&device);
 //! let spheres = Spheres {
-//!     centers: &[[-1.0, 5.0, 0.0], [1.0, 5.0, 0.0]],
+//!     centers: Centers::Points(&[[-1.0, 5.0, 0.0], [1.0, 5.0, 0.0]]),
 //!     radii: Radii::Common(0.8),
 //!     order: Order::Any(KeyLength::Short),
 //! };
@@ -67,22 +67,24 @@
 //! ```
 #![deny(unsafe_code)]
 
+mod arithmetic;
 mod arrays;
 mod commands;
 mod device;
 mod error;
+mod open;
 mod picture;
 mod scene;
 mod self_test;
 mod tree;
 mod whitted;
 
+pub use arithmetic::Arithmetic;
 pub use device::{AdapterSummary, Checks, Device, adapters};
 pub use error::GpuError;
 pub use picture::{
     Background, Camera, FilmSize, Light, LightPlace, MAX_LIGHTS, Material, Picture, Samples,
 };
-pub use scene::{Missing, SceneError, SceneRenderer, missing, missing_of_particles, ray_counts};
-pub use self_test::Arithmetic;
-pub use tree::{KeyLength, MAX_SPHERES, Order, Radii, Spheres, tree_bytes};
+pub use scene::{Missing, SceneError, SceneRenderer, missing, ray_counts};
+pub use tree::{Centers, KeyLength, MAX_SPHERES, Order, Radii, Spheres, tree_bytes};
 pub use whitted::{Colors, Cost, NearestSample, Pixels, Renderer, bytes_per_pixel};

@@ -1,5 +1,6 @@
 //! Scenes of the tracer on a device: what the device lacks, and films of its pictures.
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::sync::Arc;
 
@@ -7,17 +8,17 @@ use glam::Vec3;
 use rayon::prelude::*;
 use spherule_tracer::render::device::{DeviceHit, DevicePixel, are_from_nearest, store_pixels};
 use spherule_tracer::render::{
-    Colors, Drawing, Film, FilmSampler, IntegratorKind, Opacities, ParticleShading, RayCounts,
-    RenderSettings, Stop,
+    Drawing, Film, FilmSampler, IntegratorKind, RayCounts, RenderSettings, ShadeSource, Stop,
 };
 use spherule_tracer::scene::{self, Falloff, Fresnel, LightKind, Projection, Scene, background};
 use spherule_tree::accel;
+use spherule_tree::blocks::{Block, StoredBlocks, StoredLeaves};
 
 use crate::picture::{
     Background, Camera, FilmSize, Light, LightPlace, MAX_LIGHTS, Material, Picture, Samples,
 };
-use crate::tree::{KeyLength, Order, Radii, Spheres};
-use crate::whitted::{self, Cost, NearestSample, Pixels, Renderer};
+use crate::tree::{Centers, KeyLength, Order, Radii, Spheres};
+use crate::whitted::{Colors, Cost, NearestSample, Pixels, Renderer};
 use crate::{Device, GpuError};
 
 /// What the device lacks of the renderer for CPUs.
@@ -37,10 +38,6 @@ pub enum Missing {
     Stereo,
     /// Panoramas.
     Panorama,
-    /// Opacities below 1.
-    Opacity,
-    /// Styles with their own materials.
-    Styles,
     /// Lights with an extent.
     LightExtent,
     /// More lights than fit.
@@ -65,8 +62,6 @@ impl fmt::Display for Missing {
             Self::Lens => "depth of field",
             Self::Stereo => "stereo images",
             Self::Panorama => "panoramas",
-            Self::Opacity => "opacities",
-            Self::Styles => "styles",
             Self::LightExtent => "lights with an extent",
             Self::Lights => "more than eight lights",
             Self::Layers => "layers of light and Cryptomatte",
@@ -99,14 +94,6 @@ pub fn missing(scene: &Scene, settings: &RenderSettings) -> Option<Missing> {
     ]
     .into_iter()
     .find_map(|(is_needed, missing)| is_needed.then_some(missing))
-}
-
-/// The first thing that the particles need and the device lacks.
-pub fn missing_of_particles(shading: &ParticleShading<'_>) -> Option<Missing> {
-    if !shading.styles.is_empty() {
-        return Some(Missing::Styles);
-    }
-    (!matches!(shading.opacities, Opacities::Constant(1.0))).then_some(Missing::Opacity)
 }
 
 /// Points of the samples of a film, which are the same for all its pictures.
@@ -163,36 +150,76 @@ impl SceneRenderer {
         &self.device
     }
 
-    /// Copies `spheres` with their colours to the device, and starts to build their tree.
+    /// Copies `spheres` with the colours of `source` to the device, and starts to build their tree.
     ///
     /// # Errors
     /// If they do not fit, or if the device fails.
     pub fn prepare(
         &mut self,
         spheres: &accel::Spheres<'_>,
-        shading: &ParticleShading<'_>,
+        source: &dyn ShadeSource,
     ) -> Result<(), GpuError> {
-        let centers: &[[f32; 3]] = bytemuck::cast_slice(spheres.centers);
         let radii = match spheres.radius {
             accel::SphereRadius::Common(radius) => Radii::Common(radius),
             accel::SphereRadius::Each(radii) => Radii::PerSphere(radii),
         };
-        let spheres = Spheres { centers, radii, order: Order::Any(key_length(spheres.centers)) };
-        match shading.colors {
-            Colors::Constant(color) => {
-                let colors = whitted::Colors::Constant(color.to_array());
-                self.renderer.prepare(&self.device, &spheres, colors)
+        let order = Order::Any(key_length(spheres.centers));
+        let centers = Centers::Points(bytemuck::cast_slice(spheres.centers));
+        self.start(&Spheres { centers, radii, order }, spheres.centers.len(), source)
+    }
+
+    /// Same as [`Self::prepare`], of the leaves of a native frame, whose particles are in the order of a tree. `radius` is
+    /// that of all particles, if it is the same. Positions of 32 bits are copied as they are.
+    ///
+    /// # Errors
+    /// Same as [`Self::prepare`].
+    pub fn prepare_stored(
+        &mut self,
+        leaves: &StoredLeaves<'_>,
+        radius: Option<f32>,
+        source: &dyn ShadeSource,
+    ) -> Result<(), GpuError> {
+        let decoded: Vec<Block>;
+        let blocks = match &leaves.blocks {
+            StoredBlocks::F32(blocks) => *blocks,
+            StoredBlocks::Q16(_) | StoredBlocks::Q10(_) => {
+                let all = (0..leaves.block_count()).into_par_iter();
+                decoded = all.map(|index| leaves.block(index)).collect();
+                &decoded[..]
             }
-            Colors::PerParticle(colors) => {
-                let colors = whitted::Colors::PerSphere(bytemuck::cast_slice(colors));
-                self.renderer.prepare(&self.device, &spheres, colors)
+        };
+        let load = |block| leaves.radii.load(block).map(|radii| radii.0);
+        let each: Vec<f32>;
+        let radii = match radius {
+            Some(radius) => Radii::Common(radius),
+            None => {
+                let blocks = (0..leaves.block_count()).into_par_iter();
+                each = blocks.filter_map(load).flatten_iter().collect();
+                Radii::PerSphere(&each)
             }
-            Colors::Mapped { values, map } => {
-                let colors: Vec<Vec3> = values.par_iter().map(|value| map.color(*value)).collect();
-                let colors = whitted::Colors::PerSphere(bytemuck::cast_slice(&colors));
-                self.renderer.prepare(&self.device, &spheres, colors)
+        };
+        let centers = Centers::Blocks { blocks: bytemuck::cast_slice(blocks), count: leaves.count };
+        let spheres = Spheres { centers, radii, order: Order::AlongCurve };
+        let count = usize::try_from(leaves.count).unwrap_or(usize::MAX);
+        self.start(&spheres, count, source)
+    }
+
+    fn start(
+        &mut self,
+        spheres: &Spheres<'_>,
+        count: usize,
+        source: &dyn ShadeSource,
+    ) -> Result<(), GpuError> {
+        let colors: Vec<Vec3>;
+        let colors = match source.constant_color() {
+            Some(color) => Colors::Constant(color.to_array()),
+            None => {
+                let count = u32::try_from(count).unwrap_or(u32::MAX);
+                colors = (0..count).into_par_iter().map(|index| source.color(index)).collect();
+                Colors::PerSphere(bytemuck::cast_slice(&colors))
             }
-        }
+        };
+        self.renderer.prepare(&self.device, spheres, colors)
     }
 
     /// Renders the spheres that were prepared last, into `film`. Nothing may be [`missing`].
@@ -203,7 +230,7 @@ impl SceneRenderer {
         &mut self,
         film: &mut Film,
         scene: &Scene,
-        shading: &ParticleShading<'_>,
+        source: &dyn ShadeSource,
         settings: &RenderSettings,
         stop: &dyn Stop,
     ) -> Result<Cost, SceneError> {
@@ -214,7 +241,7 @@ impl SceneRenderer {
                 color: pixels.sums[number].map(|sum| sum * share),
                 nearest: hit_of(&pixels.nearest[number]),
             };
-            store_pixels(film, scene, shading, settings, &pixel)
+            store_pixels(film, scene, source, settings, &pixel)
         };
         self.renderer.read(&self.device, store)??;
         Ok(self.renderer.cost(&self.device)?)
@@ -348,34 +375,34 @@ fn light_of(light: &scene::Light) -> Light {
 
 /// Spheres that are looked at to choose the length of keys.
 const SAMPLED_CENTERS: usize = 4096;
-/// Least part of the box of all spheres, along each axis, that all but the outermost hundredth on both sides fill, for short
-/// keys.
-const MIN_FILLED: f32 = 0.5;
+/// Part of the places of these that may share a cell of short keys with others. Even spheres share a few cells; a third
+/// of a volume of fluid, a few more.
+const MAX_SHARED: f32 = 0.05;
 
-/// Whether short keys tell the spheres at `centers` apart: if most of them fill the box of all.
+/// The keys that tell the spheres at `centers` apart. A cell with two of the sampled places has many spheres, unless they
+/// are in one place, where keys do not help.
 fn key_length(centers: &[Vec3]) -> KeyLength {
     // The box of all
     let (low, high) = centers
         .par_chunks(1 << 16)
         .map(|part| part.iter().fold((Vec3::MAX, Vec3::MIN), |(a, b), c| (a.min(*c), b.max(*c))))
         .reduce(|| (Vec3::MAX, Vec3::MIN), |a, b| (a.0.min(b.0), a.1.max(b.1)));
-    // That of most
+    // Count the cells of the samples, with 8 and with 16 bits for each axis
     let step = centers.len().div_ceil(SAMPLED_CENTERS).max(1);
-    let mut filled = 1.0_f32;
-    for axis in 0..3 {
-        let mut sampled: Vec<f32> = centers.iter().step_by(step).map(|c| c[axis]).collect();
-        sampled.sort_unstable_by(f32::total_cmp);
-        let outer = sampled.len() / 100;
-        let most = match (sampled.get(outer), sampled.get(sampled.len().wrapping_sub(outer + 1))) {
-            (Some(first), Some(last)) => last - first,
-            _ => 0.0,
-        };
-        // A flat box has one layer of cells, whatever the keys
-        if high[axis] > low[axis] {
-            filled = filled.min(most / (high[axis] - low[axis]));
-        }
+    let sampled = || centers.iter().step_by(step);
+    let places: BTreeSet<_> = sampled().map(|c| c.to_array().map(f32::to_bits)).collect();
+    let shared = |last: f32| {
+        let scale = last / (high - low).max_element().max(f32::MIN_POSITIVE);
+        let cell = |center: &Vec3| ((*center - low) * scale).as_uvec3().to_array();
+        let cells: BTreeSet<_> = sampled().map(cell).collect();
+        places.len() - cells.len().min(places.len())
+    };
+    let is_short = shared(255.0) as f32 <= MAX_SHARED * places.len() as f32;
+    match (is_short, shared(65_535.0)) {
+        (true, _) => KeyLength::Short,
+        (false, 0) => KeyLength::Long,
+        (false, _) => KeyLength::Longest,
     }
-    if filled >= MIN_FILLED { KeyLength::Short } else { KeyLength::Long }
 }
 
 /// Reasons why there is no picture.
@@ -387,4 +414,35 @@ pub enum SceneError {
     /// The device failed, or rendering was stopped.
     #[error(transparent)]
     Device(#[from] GpuError),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_are_as_long_as_the_particles_need() {
+        // SplitMix64
+        let unit = |number: u64| {
+            let mut z = number.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            ((z ^ (z >> 31)) >> 40) as f32 / 16_777_216.0
+        };
+        let even = |i: u64| Vec3::new(unit(4 * i), unit(4 * i + 1), unit(4 * i + 2));
+        let points: Vec<Vec3> = (0..50_000).map(even).collect();
+        assert_eq!(key_length(&points), KeyLength::Short);
+        // A fluid that has fallen, all in one place, none
+        let flat: Vec<Vec3> = points.iter().map(|p| *p * Vec3::new(1.0, 0.4, 0.1)).collect();
+        assert_eq!(key_length(&flat), KeyLength::Short);
+        assert_eq!(key_length(&[Vec3::ONE; 100]), KeyLength::Short);
+        assert_eq!(key_length(&[]), KeyLength::Short);
+        // One particle far away, and clusters over four decades
+        let with_outlier = |at: f32| [&points[..], &[Vec3::splat(at)]].concat();
+        assert_eq!(key_length(&with_outlier(30.0)), KeyLength::Long);
+        assert_eq!(key_length(&with_outlier(3000.0)), KeyLength::Longest);
+        let cluster = |i: u64| even(i) * 10.0_f32.powf(-4.0 * unit(4 * i + 3)) + unit(4 * (i % 9));
+        let clusters: Vec<Vec3> = (0..50_000).map(cluster).collect();
+        assert_eq!(key_length(&clusters), KeyLength::Longest);
+    }
 }

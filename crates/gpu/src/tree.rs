@@ -25,11 +25,41 @@ pub const MAX_SPHERES: u64 = BLOCK << 28;
 #[derive(Debug, Clone, Copy)]
 pub struct Spheres<'a> {
     /// The centres, all finite.
-    pub centers: &'a [[f32; 3]],
+    pub centers: Centers<'a>,
     /// The radii.
     pub radii: Radii<'a>,
     /// The order of the centres.
     pub order: Order,
+}
+
+/// Centres of spheres.
+#[derive(Debug, Clone, Copy)]
+pub enum Centers<'a> {
+    /// One after the other.
+    Points(&'a [[f32; 3]]),
+    /// In blocks of 16, as in a native frame: all x of a block, then all y, then all z.
+    Blocks {
+        /// The blocks. Lanes of the last one beyond `count` are not used.
+        blocks: &'a [[f32; 48]],
+        /// Number of centres.
+        count: u64,
+    },
+}
+
+impl Centers<'_> {
+    const fn count(&self) -> u64 {
+        match self {
+            Self::Points(points) => points.len() as u64,
+            Self::Blocks { count, .. } => *count,
+        }
+    }
+
+    fn bytes(&self) -> &[u8] {
+        match self {
+            Self::Points(points) => bytemuck::cast_slice(points),
+            Self::Blocks { blocks, .. } => bytemuck::cast_slice(blocks),
+        }
+    }
 }
 
 /// Radii of spheres.
@@ -37,7 +67,7 @@ pub struct Spheres<'a> {
 pub enum Radii<'a> {
     /// All have this one.
     Common(f32),
-    /// One for each sphere.
+    /// One for each sphere; there may be more.
     PerSphere(&'a [f32]),
 }
 
@@ -57,6 +87,8 @@ pub enum KeyLength {
     Short,
     /// 48 bits: also for a few spheres far from all others, which would press these into few cells.
     Long,
+    /// 72 bits: also for clusters whose density differs by many orders of magnitude.
+    Longest,
 }
 
 impl KeyLength {
@@ -64,6 +96,7 @@ impl KeyLength {
         match self {
             Self::Short => 1,
             Self::Long => 2,
+            Self::Longest => 3,
         }
     }
 }
@@ -83,6 +116,8 @@ pub(crate) struct TreeShape {
     pub(crate) is_common: bool,
     /// Number of spheres.
     pub(crate) count: u64,
+    /// Whether the centres are in blocks.
+    is_in_blocks: bool,
 }
 
 /// A uniform of the kernels.
@@ -99,6 +134,11 @@ struct Build {
     radius: f32,
 }
 
+/// What kernels for keys depend on: the length, and whether centres are in blocks.
+type KeyVariant = (KeyLength, bool);
+/// What kernels for nodes depend on: whether radii are equal, and whether centres are in blocks.
+type NodeVariant = (bool, bool);
+
 /// Kernels for keys of one length.
 #[derive(Debug)]
 struct KeyKernels {
@@ -110,8 +150,11 @@ struct KeyKernels {
 }
 
 impl KeyKernels {
-    fn new(device: &Device, length: KeyLength) -> Self {
-        let bits = format!("const BITS: u32 = {}u;\n", 8 * length.words());
+    fn new(device: &Device, (length, is_in_blocks): KeyVariant) -> Self {
+        let bits = format!(
+            "const BITS: u32 = {}u;\nconst IN_BLOCKS: bool = {is_in_blocks};\n",
+            8 * length.words()
+        );
         let module = device.module(&[&bits, include_str!("shaders/keys.wgsl")].concat());
         let kernel = |entry, bindings| Kernel::new(device, &module, entry, bindings);
         Self {
@@ -153,8 +196,9 @@ struct NodeKernels {
 }
 
 impl NodeKernels {
-    fn new(device: &Device, is_common: bool) -> Self {
-        let source = [&tree_constants(is_common), include_str!("shaders/nodes.wgsl")];
+    fn new(device: &Device, (is_common, is_in_blocks): NodeVariant) -> Self {
+        let in_blocks = format!("const IN_BLOCKS: bool = {is_in_blocks};\n");
+        let source = [&tree_constants(is_common), &in_blocks, include_str!("shaders/nodes.wgsl")];
         let module = device.module(&source.concat());
         let kernel = |entry, bindings| Kernel::new(device, &module, entry, bindings);
         Self {
@@ -173,9 +217,9 @@ pub(crate) fn tree_constants(is_common: bool) -> String {
 /// Builds the tree of one frame after another in the same memory.
 #[derive(Debug)]
 pub(crate) struct TreeBuilder {
-    keys: BTreeMap<KeyLength, KeyKernels>,
+    keys: BTreeMap<KeyVariant, KeyKernels>,
     sort: SortKernels,
-    nodes: BTreeMap<bool, NodeKernels>,
+    nodes: BTreeMap<NodeVariant, NodeKernels>,
     uniforms: Uniforms,
     arrays: TreeArrays,
     shape: TreeShape,
@@ -286,10 +330,9 @@ impl TreeBuilder {
             Order::Any(length) => length,
             Order::AlongCurve => KeyLength::Short,
         };
-        self.keys.entry(length).or_insert_with(|| KeyKernels::new(device, length));
-        self.nodes
-            .entry(shape.is_common)
-            .or_insert_with(|| NodeKernels::new(device, shape.is_common));
+        let variants = ((length, shape.is_in_blocks), (shape.is_common, shape.is_in_blocks));
+        self.keys.entry(variants.0).or_insert_with(|| KeyKernels::new(device, variants.0));
+        self.nodes.entry(variants.1).or_insert_with(|| NodeKernels::new(device, variants.1));
         // Record and start all stages
         let mut steps = Steps::default();
         self.uniforms.clear();
@@ -299,12 +342,7 @@ impl TreeBuilder {
         let mut commands = Commands::new(device);
         for step in &steps.0 {
             let array_of = |binding| self.array(binding, step);
-            commands.add(
-                self.kernel(step.kind, length, shape.is_common),
-                &array_of,
-                step.work,
-                step.group,
-            );
+            commands.add(self.kernel(step.kind, variants), &array_of, step.work, step.group);
         }
         commands.end_stage(timer.map(|timer| (timer, 0)));
         commands.submit();
@@ -332,7 +370,7 @@ impl TreeBuilder {
     }
 
     fn upload(&mut self, device: &Device, spheres: &Spheres<'_>) -> Result<(), GpuError> {
-        let count = spheres.centers.len() as u64;
+        let count = spheres.centers.count();
         let blocks = block_count(count);
         let nodes: u64 = level_sizes(blocks).iter().sum();
         let arrays = &mut self.arrays;
@@ -349,14 +387,14 @@ impl TreeBuilder {
             boxes.reserve(device, "boxes", 24 * blocks)?;
         }
         // Copy what they read
-        arrays.centers.write(device, "positions", bytemuck::cast_slice(spheres.centers))?;
+        arrays.centers.write(device, "positions", spheres.centers.bytes())?;
         match spheres.radii {
             Radii::Common(_) => {
                 arrays.radii.reserve(device, "radii", 0)?;
                 arrays.order.reserve(device, "order", 0)
             }
             Radii::PerSphere(radii) => {
-                assert_eq!(radii.len(), spheres.centers.len(), "one radius for each centre");
+                assert!(radii.len() as u64 >= count, "one radius for each centre");
                 arrays.radii.write(device, "radii", bytemuck::cast_slice(radii))?;
                 arrays.order.reserve(device, "order", 4 * blocks * BLOCK)
             }
@@ -424,8 +462,8 @@ impl TreeBuilder {
         }
     }
 
-    fn kernel(&self, kind: Kind, length: KeyLength, is_common: bool) -> &Kernel {
-        let (keys, nodes) = (&self.keys[&length], &self.nodes[&is_common]);
+    fn kernel(&self, kind: Kind, (keys, nodes): (KeyVariant, NodeVariant)) -> &Kernel {
+        let (keys, nodes) = (&self.keys[&keys], &self.nodes[&nodes]);
         match kind {
             Kind::ClearBounds => &keys.clear_bounds,
             Kind::FindBounds => &keys.find_bounds,
@@ -513,12 +551,13 @@ struct Steps(Vec<Step>);
 
 /// The shape of the tree of `spheres`.
 fn shape_of(spheres: &Spheres<'_>) -> Result<TreeShape, GpuError> {
-    let count = spheres.centers.len() as u64;
+    let count = spheres.centers.count();
     if count > MAX_SPHERES {
         let (bytes, max) = (16 * count, 16 * MAX_SPHERES);
         return Err(GpuError::TooLarge { what: "particles", bytes, max });
     }
-    let mut shape = TreeShape { count, ..TreeShape::default() };
+    let is_in_blocks = matches!(spheres.centers, Centers::Blocks { .. });
+    let mut shape = TreeShape { count, is_in_blocks, ..TreeShape::default() };
     (shape.radius, shape.is_common) = match spheres.radii {
         Radii::Common(radius) => (radius, true),
         Radii::PerSphere(_) => (0.0, false),
@@ -607,11 +646,17 @@ mod tests {
             let centers = points(count);
             let radii: Vec<f32> = (0..count).map(|i| 0.01 + (i % 5) as f32).collect();
             for radii in [Radii::Common(0.2), Radii::PerSphere(&radii)] {
-                for order in
-                    [Order::Any(KeyLength::Short), Order::Any(KeyLength::Long), Order::AlongCurve]
-                {
-                    let found =
-                        built(&mut builder, &device, &Spheres { centers: &centers, radii, order });
+                for order in [
+                    Order::Any(KeyLength::Short),
+                    Order::Any(KeyLength::Long),
+                    Order::Any(KeyLength::Longest),
+                    Order::AlongCurve,
+                ] {
+                    let found = built(
+                        &mut builder,
+                        &device,
+                        &Spheres { centers: Centers::Points(&centers), radii, order },
+                    );
                     // Each place is visible, by its lowest index if copies follow each other
                     let bits = |i: &u32| centers[*i as usize].map(f32::to_bits);
                     let mut places: Vec<_> = found.iter().map(bits).collect();
@@ -643,9 +688,10 @@ mod tests {
             pairs.map(length).sum::<f32>()
         };
         let given: Vec<u32> = (0..8192).collect();
-        for length in [KeyLength::Short, KeyLength::Long] {
+        for length in [KeyLength::Short, KeyLength::Long, KeyLength::Longest] {
             let radii = Radii::Common(0.1);
-            let spheres = Spheres { centers: &centers, radii, order: Order::Any(length) };
+            let spheres =
+                Spheres { centers: Centers::Points(&centers), radii, order: Order::Any(length) };
             assert!(
                 distance(&built(&mut builder, &device, &spheres)) < 0.1 * distance(&given),
                 "{length:?}"

@@ -226,7 +226,6 @@ impl Renderer {
                 self.arrays.colors.reserve(device, "colours", 0)?;
             }
             Colors::PerSphere(colors) => {
-                assert_eq!(colors.len(), spheres.centers.len(), "one colour for each centre");
                 let bytes = bytemuck::cast_slice(colors);
                 self.arrays.colors.write(device, "colours", bytes)?;
             }

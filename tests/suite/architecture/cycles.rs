@@ -10,7 +10,7 @@ use super::root;
 use super::source::{ModulePath, code, files};
 
 /// Directories of crates, and how many files they have at least.
-const SOURCES: [(&str, usize); 15] = [
+const SOURCES: [(&str, usize); 17] = [
     ("src", 100),
     ("jobs/src", 30),
     ("formats/src", 30),
@@ -19,7 +19,9 @@ const SOURCES: [(&str, usize); 15] = [
     ("crates/compression/src", 8),
     ("crates/readers/src", 100),
     ("crates/tree/src", 50),
+    ("crates/surface/src", 40),
     ("crates/tracer/src", 100),
+    ("crates/gpu/src", 8),
     ("crates/images/src", 40),
     ("crates/selection/src", 8),
     ("crates/manifest/src", 40),

@@ -2,7 +2,7 @@
 
 struct Build { count: u32, tiles: u32, shift: u32, word: u32, children: u32, nodes: u32, first: u32, radius: f32 }
 @group(0) @binding(0) var<uniform> build: Build;
-// Components x, y, z of each centre
+// Coordinates of the centres, see `center`
 @group(0) @binding(1) var<storage, read> centers: array<f32>;
 // Least and greatest coordinates as integers with the same order
 @group(0) @binding(2) var<storage, read_write> bounds: array<atomic<u32>, 8>;
@@ -19,6 +19,11 @@ fn linear_index(group: vec3<u32>, groups: vec3<u32>, local: u32) -> u32 {
 }
 
 fn center(i: u32) -> vec3<f32> {
+  if (IN_BLOCKS) {
+    // Blocks of 16 centres: all x, all y, all z
+    let x = 48u * (i >> 4u) + (i & 15u);
+    return vec3<f32>(centers[x], centers[x + 16u], centers[x + 32u]);
+  }
   return vec3<f32>(centers[3u * i], centers[3u * i + 1u], centers[3u * i + 2u]);
 }
 
