@@ -302,10 +302,10 @@ impl TreeBuilder {
     /// Copies `spheres` to the device, and starts to build their tree.
     ///
     /// # Errors
-    /// If there are none, more than the device holds, or if the device fails.
+    /// If there are more than the device holds, or if the device fails.
     ///
     /// # Panics
-    /// If there are not as many radii as centres.
+    /// If there are fewer radii than centres.
     pub(crate) fn build(
         &mut self,
         device: &Device,

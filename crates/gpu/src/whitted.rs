@@ -157,8 +157,8 @@ struct TraceArrays {
     colors: Array,
     points: Array,
     sets: Array,
-    /// What `points` and `sets` belong to.
-    sampled: Option<(FilmSize, u32)>,
+    /// The film that `sets` belongs to, and the content of `points`.
+    sampled: Option<(FilmSize, Vec<[f32; 2]>)>,
     film: Array,
     data: Array,
     queued: Array,
@@ -213,7 +213,7 @@ impl Renderer {
     /// If the frame does not fit, or if the device fails.
     ///
     /// # Panics
-    /// If there are not as many radii or colours as centres.
+    /// If there are fewer radii than centres.
     pub fn prepare(
         &mut self,
         device: &Device,
@@ -361,14 +361,15 @@ impl Renderer {
             "counts",
             bytemuck::cast_slice(&[&queues[..], &queues].concat()),
         )?;
-        // Sample points depend on the size of the picture only
-        let sampled = Some((picture.film, picture.samples.count));
-        if arrays.sampled != sampled {
-            let Samples { points, sets, .. } = picture.samples;
+        // The pictures of a job have the same samples; other filters have other points
+        let Samples { points, sets, .. } = picture.samples;
+        let is_there =
+            |(film, there): &(FilmSize, Vec<_>)| *film == picture.film && there == points;
+        if !arrays.sampled.as_ref().is_some_and(is_there) {
             assert_eq!(sets.len() as u64, pixels, "one set of samples for each pixel");
             arrays.points.write(device, "samples", bytemuck::cast_slice(points))?;
             arrays.sets.write(device, "sets of samples", bytemuck::cast_slice(sets))?;
-            arrays.sampled = sampled;
+            arrays.sampled = Some((picture.film, points.to_vec()));
         }
         Ok(())
     }
