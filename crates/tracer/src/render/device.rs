@@ -1,10 +1,16 @@
 //! Pictures whose rays another device has traced: fills the planes of a film from what it found in each pixel.
 //!
 //! A device returns the particle of a pixel by its index. Ids, velocities, colours and attributes are looked up here,
-//! so that they never leave the host, and by the same functions as for pictures that are traced here.
+//! so that they never leave the host, and by the same functions as for pictures that are traced here. What path tracing
+//! computes before the first ray is here as well, in plain numbers.
 
 use glam::Vec3;
 use rayon::prelude::*;
+
+pub use super::bsdf::rough_table;
+pub use super::lights::{Extent, extent_of};
+pub use super::path::ambient::reach as ambient_reach;
+pub use super::path::catcher::{light_on, reflected_by_white};
 
 use super::{
     aov::{DataSample, NO_ID},
@@ -25,17 +31,19 @@ const ROWS: u32 = 16;
 pub struct DevicePixel {
     /// Linear RGB and coverage, each the mean of the samples.
     pub color: [f32; 4],
+    /// Linear RGB, the mean of every second sample. For denoising.
+    pub odd: [f32; 3],
     /// The nearest intersection, if any sample has one.
     pub nearest: Option<DeviceHit>,
 }
 
-/// An intersection with a particle.
+/// An intersection with a particle or the ground.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeviceHit {
     /// Distance along the view axis.
     pub depth: f32,
-    /// Index of the particle.
-    pub particle: u32,
+    /// Index of the particle; None on the ground.
+    pub particle: Option<u32>,
     /// Unit normal on the side of the camera.
     pub normal: Vec3,
     /// The point, relative to the origin of the scene.
@@ -79,7 +87,12 @@ pub fn store_pixels(
 
 impl RenderContext<'_> {
     fn store_pixel(&self, tile: &mut FilmTile<'_>, [column, row]: [u32; 2], pixel: &DevicePixel) {
-        tile.set_color(column, row, pixel.color);
+        // A shadow catcher takes light away, sample by sample
+        let bound = |value: f32| if self.catches_shadows() { value.max(0.0) } else { value };
+        let [r, g, b, a] = pixel.color.map(bound);
+        let coverage = if self.catches_shadows() { a.min(1.0) } else { a };
+        tile.set_color(column, row, [r, g, b, coverage]);
+        tile.set_odd(column, row, pixel.odd.map(bound).into());
         let data = pixel.nearest.map_or(DataSample::MISS, |hit| self.data_of(&hit));
         tile.set_data(column, row, &data);
         if self.settings.channels.has(FilmPlane::Attributes) {
@@ -91,23 +104,25 @@ impl RenderContext<'_> {
         }
     }
 
-    /// The data channels at an intersection with a particle.
+    /// The data channels at an intersection.
     fn data_of(&self, hit: &DeviceHit) -> DataSample {
         let channels = self.settings.planes();
         let needs_particle = channels.needs_nearest_particle();
-        let velocity = if needs_particle { self.source.velocity(hit.particle) } else { Vec3::ZERO };
+        let particle = hit.particle.filter(|_| needs_particle);
+        let velocity = particle.map_or(Vec3::ZERO, |particle| self.source.velocity(particle));
+        let albedo = || match (hit.particle, &self.scene.ground) {
+            (Some(particle), _) => self.source.color(particle),
+            (None, Some(ground)) => ground.color_at(hit.point),
+            (None, None) => Vec3::ZERO,
+        };
         DataSample {
             z: hit.depth,
             normal: hit.normal,
             position: (self.scene.origin + hit.point.as_dvec3()).as_vec3(),
             velocity,
-            albedo: if channels.has(FilmPlane::Albedo) {
-                self.source.color(hit.particle)
-            } else {
-                Vec3::ZERO
-            },
-            id: if needs_particle { self.source.id(hit.particle) } else { NO_ID },
-            particle: needs_particle.then_some(hit.particle),
+            albedo: if channels.has(FilmPlane::Albedo) { albedo() } else { Vec3::ZERO },
+            id: particle.map_or(NO_ID, |particle| self.source.id(particle)),
+            particle,
             motion: if channels.has(FilmPlane::Motion) {
                 self.motion(hit.point, velocity)
             } else {

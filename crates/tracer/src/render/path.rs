@@ -35,8 +35,8 @@ use glam::Vec3;
 use spherule_surface::MaterialId;
 use spherule_tree::math::{LANES, Lanes3, lane3, lanes_in, lanes_where, set_lane3, splat};
 
-mod ambient;
-mod catcher;
+pub(super) mod ambient;
+pub(super) mod catcher;
 pub(super) mod caustics;
 mod emission;
 pub(super) mod ground;

@@ -26,6 +26,11 @@ impl Metal {
         Self { albedo: Albedo::new(&ggx, 1.0), ggx }
     }
 
+    /// The light that leaves by one reflection, by the cosine of the direction.
+    pub(super) const fn leaving(&self) -> &Albedo {
+        &self.albedo
+    }
+
     /// The fraction of light that does not leave after one reflection if all of it is reflected. It is also the
     /// probability with which a direction is sampled for light of several reflections.
     #[inline(always)]

@@ -32,8 +32,7 @@ impl Ggx {
     }
 
     /// The width of the distribution.
-    #[cfg(test)]
-    pub(in crate::render) fn width(&self) -> f32 {
+    pub(in crate::render) const fn width(&self) -> f32 {
         self.alpha
     }
 
@@ -178,6 +177,11 @@ impl Albedo {
         #[expect(clippy::cast_possible_truncation, reason = "rounds")]
         let mean = mean.sum::<f64>() as f32;
         Self { values, mean }
+    }
+
+    /// The fractions for cosines from 0 to 1, evenly spaced, and the mean.
+    pub(in crate::render) fn table(&self) -> impl Iterator<Item = f32> {
+        self.values[..=CELLS].iter().copied().chain([self.mean])
     }
 
     /// The fraction for an outgoing direction with this cosine.

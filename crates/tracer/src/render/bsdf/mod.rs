@@ -29,6 +29,7 @@ pub(super) use blinn_phong::BlinnPhong;
 use foam::Foam;
 use matte::Matte;
 use metal::Metal;
+use microfacet::Ggx;
 use plastic::Plastic;
 pub(super) use point::eval_lanes;
 
@@ -112,6 +113,20 @@ pub(super) fn bsdf_of(finish: Finish) -> Box<dyn Bsdf> {
         Finish::Metal { roughness } => Box::new(Metal::new(roughness)),
         Finish::Foam => Box::new(Foam),
     }
+}
+
+/// Width of the microfacets of a rough `finish`, and the numbers of the light that leaves it: [`microfacet::Albedo::table`].
+pub fn rough_table(finish: Finish) -> Option<(f32, Vec<f32>)> {
+    let (roughness, table) = match finish {
+        Finish::Matte | Finish::Pane | Finish::Foam => return None,
+        Finish::Plastic { roughness } => {
+            (roughness, Plastic::new(roughness).leaving().table().collect())
+        }
+        Finish::Metal { roughness } => {
+            (roughness, Metal::new(roughness).leaving().table().collect())
+        }
+    };
+    Some((Ggx::new(roughness).width(), table))
 }
 
 /// Computes the points of intersections on opaque surfaces, with normals on the side of the rays.

@@ -30,6 +30,11 @@ impl Plastic {
         Self { coat: Albedo::new(&ggx, COAT), ggx }
     }
 
+    /// The light that leaves the coat, by the cosine of the direction.
+    pub(super) const fn leaving(&self) -> &Albedo {
+        &self.coat
+    }
+
     /// The probability with which a direction of the base is sampled.
     #[inline(always)]
     fn base_part(&self, base: [f32; 3], out: f32) -> f32 {

@@ -69,6 +69,35 @@ pub(super) fn light_of(light: &scene::Light) -> Box<dyn Light> {
     }
 }
 
+/// What a light with an extent is sampled by.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extent {
+    /// Panels: unit vectors along their width and height, and in the direction that they shine.
+    pub axes: [Vec3; 3],
+    /// Panels: half their width and height. Spheres: the radius. Suns: 1 minus the cosine of half the apparent diameter.
+    pub half: [f32; 2],
+    /// Linear RGB.
+    pub radiance: Vec3,
+}
+
+/// The extent of a `light`, if it has one.
+pub fn extent_of(light: &scene::Light) -> Option<Extent> {
+    let radiance = light.radiance;
+    let round = |size, radiance| Extent { axes: [Vec3::ZERO; 3], half: [size; 2], radiance };
+    Some(match light.kind {
+        LightKind::Point { .. } | LightKind::Directional { .. } => return None,
+        LightKind::Sun { to_light, half_angle } => {
+            let sun = SunLight::new(to_light, half_angle, radiance, light.is_visible);
+            round(sun.cap(), lanes::LightExtent::radiance(&sun))
+        }
+        LightKind::Sphere { radius, .. } => round(radius, radiance),
+        LightKind::Rectangle { axes, half, .. } => Extent { axes, half, radiance },
+        LightKind::Disc { normal, radius, .. } => {
+            Extent { axes: disc_axes(normal), half: [radius; 2], radiance }
+        }
+    })
+}
+
 /// Axes of a disc with unit `normal`.
 fn disc_axes(normal: Vec3) -> [Vec3; 3] {
     let [across, along] = tangents(normal.to_array());

@@ -39,6 +39,13 @@ impl SunLight {
     }
 }
 
+impl SunLight {
+    /// 1 minus the cosine of half the apparent diameter.
+    pub(super) const fn cap(&self) -> f32 {
+        self.cap
+    }
+}
+
 impl SampledLight for SunLight {
     #[inline(always)]
     fn sampled(&self, _point: [f32; 3], u: [f32; 2]) -> LightSample {

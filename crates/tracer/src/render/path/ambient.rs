@@ -39,8 +39,7 @@ impl AmbientLight {
             return None;
         };
         Some(Self {
-            // Surfaces that touch are dark, even without a radius
-            reach: (REACH * radius).max(f32::MIN_POSITIVE),
+            reach: reach(radius),
             environment: environment.map(Environment::irradiance_harmonics),
         })
     }
@@ -49,6 +48,12 @@ impl AmbientLight {
     fn part(&self, distance: f32) -> f32 {
         MAX * (distance / (distance + self.reach))
     }
+}
+
+/// Distance at which half of the most light arrives among particles with a `radius`.
+pub fn reach(radius: f32) -> f32 {
+    // Surfaces that touch are dark, even without a radius
+    (REACH * radius).max(f32::MIN_POSITIVE)
 }
 
 impl PathIntegrator<'_> {

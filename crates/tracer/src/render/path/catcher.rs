@@ -17,8 +17,8 @@ use crate::render::{
     bsdf::surface_points, dimensions::ENVIRONMENT, lights::sample_directions,
     sampler::get_2d_lanes, scratch::PacketScratch,
 };
-use crate::scene::Scene;
 use crate::scene::environment::{EnvironmentTable, LUMINANCE};
+use crate::scene::{Environment, Scene};
 use spherule_tree::math::{LANES, Lanes3, lane3, lanes_in, lanes_where, set_lane3, splat, splat3};
 use spherule_tree::ray::RayPacket;
 
@@ -39,14 +39,21 @@ impl Catcher {
     pub(super) fn of(scene: &Scene) -> Option<Self> {
         let ground = scene.ground.as_ref()?;
         let strength = ground.shadow_catcher?;
-        let environment = scene
-            .environment
-            .as_deref()
-            .filter(|e| !e.is_black())
-            .map(|e| e.table().times_cosine(ground.up));
-        let irradiance = environment.as_ref().map_or(Vec3::ZERO, EnvironmentTable::flux);
-        Some(Self { strength, environment, whole: irradiance * FRAC_1_PI })
+        let environment =
+            scene.environment.as_deref().filter(|e| !e.is_black()).map(|e| light_on(e, ground.up));
+        let whole = environment.as_ref().map_or(Vec3::ZERO, reflected_by_white);
+        Some(Self { strength, environment, whole })
     }
+}
+
+/// The light of an environment on a surface with unit normal `up`.
+pub fn light_on(environment: &Environment, up: Vec3) -> EnvironmentTable {
+    environment.table().times_cosine(up)
+}
+
+/// The radiance that a white surface reflects of [`light_on`] it.
+pub fn reflected_by_white(light: &EnvironmentTable) -> Vec3 {
+    light.flux() * FRAC_1_PI
 }
 
 /// Radiance that a white ground reflects.

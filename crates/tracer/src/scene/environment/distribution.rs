@@ -39,6 +39,11 @@ impl<const SIDE: usize, const COUNT: usize> Distribution<SIDE, COUNT> {
         (size_of::<[f32; SIDE]>() + size_of::<[f32; COUNT]>()) as u64
     }
 
+    /// Cumulative probabilities of the rows, and of the cells in each.
+    pub(super) const fn ends(&self) -> [&[f32]; 2] {
+        [&*self.rows, &*self.cells]
+    }
+
     /// The probability with which [`Self::sample`] chooses the cell at `index`.
     pub(super) fn probability(&self, index: usize) -> f64 {
         let interval = |ends: &[f32], cell: usize| {

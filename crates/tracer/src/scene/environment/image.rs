@@ -41,6 +41,11 @@ impl EnvironmentImage {
         Self::new(pixels.into_iter())
     }
 
+    /// All pixels, row by row.
+    pub(super) fn pixels(&self) -> &[[f32; 3]] {
+        &self.pixels
+    }
+
     /// The pixels of each row, from the zenith.
     pub(super) fn rows(&self) -> impl Iterator<Item = &[[f32; 3]]> {
         self.pixels.chunks(COLUMNS)

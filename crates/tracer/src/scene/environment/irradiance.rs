@@ -33,6 +33,11 @@ impl Environment {
 }
 
 impl IrradianceHarmonics {
+    /// Coefficients of the functions in the axes of the environment, by band and order: linear RGB.
+    pub const fn coefficients(&self) -> &[Vec3; COUNT] {
+        &self.coefficients
+    }
+
     /// Irradiance on a surface with unit `normal`, linear RGB.
     pub fn at(&self, normal: Vec3) -> Vec3 {
         let basis = basis(self.axes.own(normal));

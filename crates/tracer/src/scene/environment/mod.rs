@@ -26,7 +26,7 @@ pub use irradiance::IrradianceHarmonics;
 pub use map::{MAX_MAP_PIXELS, MapError, RadianceMap};
 pub use sky::{sky, sky_direction};
 pub use studio::studio;
-pub use table::EnvironmentTable;
+pub use table::{EnvironmentTable, TableArrays};
 pub(crate) use table::{TableSize, Texels};
 
 /// Columns of the image: 0.7 degrees each.
@@ -153,6 +153,17 @@ impl Environment {
     /// Memory, bytes.
     pub fn byte_len(&self) -> u64 {
         self.image.byte_len() + self.table.byte_len()
+    }
+
+    /// The axes in the world.
+    pub const fn axes(&self) -> &EnvironmentAxes {
+        &self.axes
+    }
+
+    /// Radiance (linear RGB) of [`COLUMNS`] x [`ROWS`] directions, row by row from the zenith, in the axes of the
+    /// environment.
+    pub fn pixels(&self) -> &[[f32; 3]] {
+        self.image.pixels()
     }
 
     /// The table to sample directions from.

@@ -41,6 +41,19 @@ pub(crate) struct Texels<const SIDE: usize, const COUNT: usize> {
     distribution: Distribution<SIDE, COUNT>,
 }
 
+/// The numbers of a table, for renderers on other devices.
+#[derive(Debug, Clone, Copy)]
+pub struct TableArrays<'a> {
+    /// Edge in texels.
+    pub side: usize,
+    /// Radiance (linear RGB) and probability density (per steradian), row by row.
+    pub records: &'a [[f32; 4]],
+    /// Cumulative probability at the end of each row.
+    pub rows: &'a [f32],
+    /// Cumulative probability at the end of each column, row by row, given the row.
+    pub cells: &'a [f32],
+}
+
 /// Calls a function of the texels, whatever their number.
 macro_rules! with_texels {
     ($table:expr, $texels:ident => $value:expr) => {
@@ -79,6 +92,11 @@ impl EnvironmentTable {
     /// Memory, bytes.
     pub fn byte_len(&self) -> u64 {
         with_texels!(self, texels => texels.byte_len())
+    }
+
+    /// The numbers of the table.
+    pub fn arrays(&self) -> TableArrays<'_> {
+        with_texels!(self, texels => texels.arrays())
     }
 
     /// Samples a direction. The components of `u` are in 0..1.
@@ -156,6 +174,11 @@ impl<const SIDE: usize, const COUNT: usize> Texels<SIDE, COUNT> {
 
     fn byte_len(&self) -> u64 {
         size_of_val(&*self.records) as u64 + Distribution::<SIDE, COUNT>::byte_len()
+    }
+
+    fn arrays(&self) -> TableArrays<'_> {
+        let [rows, cells] = self.distribution.ends();
+        TableArrays { side: SIDE, records: &*self.records, rows, cells }
     }
 
     /// Samples a direction in the axes of the map, and the index of its texel.
