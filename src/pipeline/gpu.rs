@@ -15,7 +15,10 @@ use super::renderer::{BuiltFrame, BuiltParticles, FrameRenderer, TraceError, Tra
 use super::setup::{OpacityRule, RadiusRule, Setup};
 use super::shading::particle_shading;
 use super::surface::spheres;
-use crate::render::{Film, RayCounts, RenderError, RenderSettings, ShadeSource, Stop};
+use super::trace::denoise_film;
+use crate::render::{
+    Film, IntegratorKind, RayCounts, RenderError, RenderSettings, ShadeSource, Stop,
+};
 use crate::report::FrameReport;
 use crate::report::frame::{BuildSummary, DeviceSummary};
 use crate::scene::material::DEFAULT_COLOR;
@@ -112,7 +115,8 @@ pub fn lacking(setup: &Setup) -> Option<(&'static str, String)> {
     let of_scene = missing(&picture.scene, &picture.render);
     [
         of_scene.map(|missing| (key_of(missing), missing.to_string())),
-        (picture.view.lens.is_some()).then(|| ("camera.f_stop", "depth of field".to_owned())),
+        (picture.view.lens.is_some() && picture.render.integrator == IntegratorKind::Whitted)
+            .then(|| ("camera.f_stop", Missing::Lens.to_string())),
         (picture.view.shutter.is_some()).then(|| ("camera.shutter", "motion blur".to_owned())),
         (picture.surface.kind != SurfaceKind::Spheres)
             .then(|| ("render.surface", "other surfaces than spheres".to_owned())),
@@ -133,7 +137,6 @@ pub fn lacking(setup: &Setup) -> Option<(&'static str, String)> {
 
 fn key_of(missing: Missing) -> &'static str {
     match missing {
-        Missing::PathTracing => "render.integrator",
         Missing::Transmission => "material.transmission",
         Missing::Ground => "render.ground",
         Missing::MotionBlur => "camera.shutter",
@@ -143,7 +146,7 @@ fn key_of(missing: Missing) -> &'static str {
         Missing::LightExtent | Missing::Lights => "light",
         Missing::Layers => "output.channels",
         Missing::Drawing => "render.outline",
-        Missing::Denoising => "render.denoise",
+        Missing::Parts => "material.part",
         Missing::Holdout => "mesh",
     }
 }
@@ -154,8 +157,10 @@ pub fn device_bytes(setup: &Setup, particles: u64) -> u64 {
     let is_common = matches!(picture.particles.radius, RadiusRule::Common(_));
     let pixels = u64::from(picture.render.width) * u64::from(picture.render.height);
     let colors = if picture.particles.color.is_by_particle() { 12 * particles } else { 0 };
-    let lights = picture.scene.lights.len() as u64;
-    tree_bytes(particles, is_common) + colors + bytes_per_pixel(lights) * pixels
+    let lights = u32::try_from(picture.scene.lights.len()).unwrap_or(u32::MAX);
+    let has_paths = picture.render.integrator == IntegratorKind::Path;
+    let of_pixel = bytes_per_pixel(has_paths, lights, picture.render.has_features);
+    tree_bytes(particles, is_common) + colors + of_pixel * pixels
 }
 
 /// Renders frame after frame on the device.
@@ -214,6 +219,7 @@ impl FrameRenderer for GpuRenderer {
         let memory = MemoryUse::now();
         let BuiltFrame { task, facts, time, mut report, .. } = frame;
         report.seconds.trace = start.elapsed().as_secs_f64();
+        report.seconds.denoise = denoise_film(setup, &mut film)?;
         report.rays = ray_counts(&cost).into();
         report.build = BuildSummary {
             structure: "lbvh".to_owned(),

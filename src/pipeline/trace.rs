@@ -208,7 +208,7 @@ fn matte_attributes(setup: &Setup, frame: &BuiltFrame) -> Vec<TextAttribute> {
 }
 
 /// Denoises `film` if the setup says so. Returns the time, seconds.
-fn denoise_film(setup: &Setup, film: &mut Film) -> Result<f64, DenoiseError> {
+pub(super) fn denoise_film(setup: &Setup, film: &mut Film) -> Result<f64, DenoiseError> {
     // Without settings, or without features to compare, there is nothing to do
     let (Some(settings), Some(odd)) = (&setup.picture.denoise, &film.odd) else {
         return Ok(0.0);

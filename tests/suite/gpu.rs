@@ -81,6 +81,16 @@ mod on_a_device {
         assert_eq!(images(&workshop.join("again")), images(&workshop.join("gpu")));
     }
 
+    /// The default look: studio, shadow catcher, colours by speed, denoised.
+    #[test]
+    fn the_default_look_is_that_of_the_cpu() {
+        let Some(workshop) = workshop_with_device() else { return };
+        for (out, device) in [("gpu", &DEVICE[..]), ("cpu", &[])] {
+            workshop.render_to(out, device).expect(0);
+        }
+        assert_equal(&workshop, ["gpu", "cpu"]);
+    }
+
     #[test]
     fn a_job_is_finished_on_what_it_was_begun_on() {
         let Some(workshop) = workshop_with_device() else { return };
@@ -107,7 +117,10 @@ mod on_a_device {
         let Some(workshop) = workshop_with_device() else { return };
         let whitted = "--integrator=whitted";
         for (options, expected) in [
-            (&["--integrator=path"][..], "render.integrator: path tracing"),
+            (
+                &["--ground=plain", "--set=render.ground_pattern=\"sand\""][..],
+                "render.ground: a ground",
+            ),
             (&[whitted, "--ground=checker"], "render.ground: a ground"),
             (&[whitted, "--surface=union"], "render.surface"),
             (&[whitted, "--opacity=0.5"], "material.opacity"),

@@ -42,6 +42,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             measure(&mut renderer, &Case { data, radii: Radii::Each, ..Case::thesis(size) });
         }
         measure(&mut renderer, &Case { max_depth: 1, ..Case::thesis(size) });
+        measure(&mut renderer, &Case::look(size));
     }
     Ok(())
 }
@@ -54,6 +55,10 @@ fn compare(renderer: &mut SceneRenderer, size: usize) {
             let difference = support::compare(renderer, &case, SimdLevel::best());
             println!("{size} {data:?} {radii:?}: {difference:?}");
         }
+    }
+    if size < MANY {
+        let difference = support::compare(renderer, &Case::look(size), SimdLevel::best());
+        println!("{size}, default look: {difference:?}");
     }
 }
 
@@ -103,11 +108,12 @@ fn measure(renderer: &mut SceneRenderer, case: &Case) {
     let [copy, film] = host_times(renderer, case, &particles, &shading);
     let [build, trace, wall] = [build, trace, wall].map(|sum| 1e3 * sum / PICTURES as f64);
     println!(
-        "{} {:?} {:?} depth {}: build {build:.3} ms, trace {trace:.3} ms, {:.0} images/s on the device, \
+        "{} {:?} {:?} {:?} depth {}: build {build:.3} ms, trace {trace:.3} ms, {:.0} images/s on the device, \
          both {wall:.2} ms with the host; copy of the frame {copy:.1} ms, picture to a film {film:.1} ms; {} MiB",
         case.particles,
         case.data,
         case.radii,
+        case.paths,
         case.max_depth,
         1e3 / (build + trace),
         bytes >> 20,

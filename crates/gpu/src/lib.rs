@@ -3,7 +3,7 @@
 //!
 //! - [`Device`]: adapters, limits, and the self-test of the arithmetic.
 //! - [`Spheres`]: the order along a Hilbert curve, blocks of eight, levels of nodes.
-//! - [`Renderer`] and [`Picture`]: Whitted's model for opaque spheres.
+//! - [`Renderer`] and [`Picture`]: opaque spheres by Whitted's model, or by path tracing in a [`Lighting`].
 //!
 //! This crate takes slices and plain values, and returns pixels: it knows no files, jobs or scenes. Which sphere a pixel
 //! shows, its depth, normal, position and coverage equal those of the CPU's kernels to the bit, if the device passes
@@ -12,7 +12,7 @@
 //! ```
 //! use spherule_gpu::{
 //!     Background, Camera, Centers, Checks, Colors, Device, FilmSize, KeyLength, Light, LightPlace, Material,
-//!     NearestSample, Order, Picture, Radii, Renderer, Samples, Spheres, adapters,
+//!     Model, NearestSample, Order, Picture, Radii, Renderer, Samples, Spheres, adapters,
 //! };
 //!
 //! # fn main() -> Result<(), spherule_gpu::GpuError> {
@@ -35,9 +35,12 @@
 //!         half_extent: [0.5, 0.25],
 //!         size: [16.0, 8.0],
 //!         is_parallel: false,
+//!         lens: None,
 //!     },
 //!     film,
 //!     samples: Samples { count: 1, points: &[[0.5, 0.5]], sets: &[0; 128] },
+//!     has_odd: false,
+//!     model: Model::Whitted,
 //!     max_depth: 1,
 //!     background: Background::Constant([0.0; 3]),
 //!     is_transparent: false,
@@ -54,6 +57,7 @@
 //!         place: LightPlace::Distant([0.0, -1.0, 0.0]),
 //!         radiance: [1.0; 3],
 //!         casts_shadow: true,
+//!         is_visible: false,
 //!     }],
 //! };
 //! renderer.trace(&device, &picture, &|| false)?;
@@ -72,19 +76,24 @@ mod arrays;
 mod commands;
 mod device;
 mod error;
+mod lighting;
 mod open;
 mod picture;
+mod renderer;
 mod scene;
+mod scene_lighting;
 mod self_test;
 mod tree;
-mod whitted;
 
 pub use arithmetic::Arithmetic;
 pub use device::{AdapterSummary, Checks, Device, adapters};
 pub use error::GpuError;
+pub use lighting::{
+    Catcher, Environment, Finish, Ground, Lighting, Model, Rough, TablePlace, Tables,
+};
 pub use picture::{
     Background, Camera, FilmSize, Light, LightPlace, MAX_LIGHTS, Material, Picture, Samples,
 };
+pub use renderer::{Colors, Cost, NearestSample, Pixels, Renderer, bytes_per_pixel};
 pub use scene::{Missing, SceneError, SceneRenderer, missing, ray_counts};
 pub use tree::{Centers, KeyLength, MAX_SPHERES, Order, Radii, Spheres, tree_bytes};
-pub use whitted::{Colors, Cost, NearestSample, Pixels, Renderer, bytes_per_pixel};

@@ -2,6 +2,8 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use crate::lighting::{Model, source_count};
+
 /// Largest number of lights.
 pub const MAX_LIGHTS: usize = 8;
 
@@ -14,16 +16,38 @@ pub struct Picture<'a> {
     pub film: FilmSize,
     /// Where the samples of pixels are.
     pub samples: Samples<'a>,
-    /// Recursion depth; 1 is direct light only. Rays beyond see the background.
+    /// Whether the sums over every second sample are kept, for denoising.
+    pub has_odd: bool,
+    /// The transport of light.
+    pub model: Model<'a>,
+    /// Whitted's model: recursion depth; 1 is direct light only. Rays beyond see the background.
     pub max_depth: u32,
     /// What rays without an intersection see.
     pub background: Background,
     /// Whether camera rays see no background.
     pub is_transparent: bool,
-    /// The material of all spheres.
+    /// Whitted's model: the material of all spheres.
     pub material: Material,
     /// Lights, at most [`MAX_LIGHTS`].
     pub lights: &'a [Light],
+}
+
+impl Picture<'_> {
+    /// Whether paths are traced.
+    pub(crate) const fn has_paths(&self) -> bool {
+        matches!(self.model, Model::Paths(_))
+    }
+
+    /// Number of sources of shadow rays.
+    pub(crate) fn sources(&self) -> u32 {
+        let lights = u32::try_from(self.lights.len()).expect("at most MAX_LIGHTS");
+        source_count(self.has_paths(), lights)
+    }
+
+    /// Whether rays can hit a light.
+    pub(crate) fn has_extents(&self) -> bool {
+        self.lights.iter().any(|light| light.place.has_extent())
+    }
 }
 
 /// A camera: the ray through the point `(a, b)` of the film, right and up from its middle, has the direction `forward + a
@@ -40,6 +64,8 @@ pub struct Camera {
     pub size: [f32; 2],
     /// Whether all rays are parallel.
     pub is_parallel: bool,
+    /// Radius of the lens, and distance of the plane in focus; path tracing only.
+    pub lens: Option<[f32; 2]>,
 }
 
 /// The part of the image that is rendered.
@@ -84,6 +110,8 @@ pub enum Background {
         top: [f32; 3],
         /// Unit vector upwards.
         up: [f32; 3],
+        /// Whether camera rays see a gradient over the film instead, darker in the corners.
+        has_backdrop: bool,
     },
 }
 
@@ -106,7 +134,7 @@ pub struct Material {
     pub is_exact_fresnel: bool,
 }
 
-/// A light without extent.
+/// A light.
 #[derive(Debug, Clone, Copy)]
 pub struct Light {
     /// Where it is.
@@ -115,6 +143,8 @@ pub struct Light {
     pub radiance: [f32; 3],
     /// Whether spheres occlude it.
     pub casts_shadow: bool,
+    /// Whether the camera sees it, if it has an extent.
+    pub is_visible: bool,
 }
 
 /// Where a light is.
@@ -129,6 +159,38 @@ pub enum LightPlace {
     },
     /// Infinitely far away, in the direction of this unit vector.
     Distant([f32; 3]),
+    /// A disc infinitely far away: direction, and 1 minus the cosine of half its apparent diameter.
+    Sun {
+        /// Unit vector towards its centre.
+        direction: [f32; 3],
+        /// 1 minus the cosine of half the apparent diameter.
+        cap: f32,
+    },
+    /// A sphere.
+    Sphere {
+        /// Its centre.
+        center: [f32; 3],
+        /// Its radius.
+        radius: f32,
+    },
+    /// A rectangle or an ellipse that shines to one side.
+    Panel {
+        /// Its centre.
+        center: [f32; 3],
+        /// Unit vectors along its width and height, and in the direction that it shines.
+        axes: [[f32; 3]; 3],
+        /// Half its width and height.
+        half: [f32; 2],
+        /// Whether it is an ellipse.
+        is_ellipse: bool,
+    },
+}
+
+impl LightPlace {
+    /// Whether rays can hit it.
+    pub(crate) const fn has_extent(&self) -> bool {
+        matches!(self, Self::Sun { .. } | Self::Sphere { .. } | Self::Panel { .. })
+    }
 }
 
 /// The uniform `View` of the shaders.
@@ -160,6 +222,12 @@ pub(crate) struct View {
     pub(crate) transparent: u32,
     pub(crate) background_up: [f32; 3],
     pub(crate) color_kind: u32,
+    pub(crate) lens_radius: f32,
+    pub(crate) lens_focus: f32,
+    pub(crate) sources: u32,
+    pub(crate) has_odd: u32,
+    pub(crate) has_extents: u32,
+    pub(crate) zeros: [u32; 3],
     pub(crate) ambient: [f32; 3],
     pub(crate) diffuse: f32,
     pub(crate) color: [f32; 3],
@@ -178,16 +246,43 @@ pub(crate) struct LightUniform {
     kind: u32,
     radiance: [f32; 3],
     casts_shadow: u32,
+    across: [f32; 3],
+    is_visible: u32,
+    along: [f32; 3],
+    zero: f32,
+    normal: [f32; 3],
+    zero_too: f32,
+    half: [f32; 2],
+    zeros: [f32; 2],
 }
 
 impl From<&Light> for LightUniform {
     fn from(light: &Light) -> Self {
-        let (place, kind) = match light.place {
-            LightPlace::Point { position, has_falloff } => (position, u32::from(has_falloff)),
-            LightPlace::Distant(direction) => (direction, 2),
+        let (place, kind, half) = match light.place {
+            LightPlace::Point { position, has_falloff } => (position, has_falloff.into(), [0.0; 2]),
+            LightPlace::Distant(direction) => (direction, 2, [0.0; 2]),
+            LightPlace::Sun { direction, cap } => (direction, 3, [cap; 2]),
+            LightPlace::Sphere { center, radius } => (center, 4, [radius; 2]),
+            LightPlace::Panel { center, half, is_ellipse, .. } => {
+                (center, 5 + u32::from(is_ellipse), half)
+            }
         };
-        let casts_shadow = light.casts_shadow.into();
-        Self { place, kind, radiance: light.radiance, casts_shadow }
+        let [across, along, normal] = match light.place {
+            LightPlace::Panel { axes, .. } => axes,
+            _ => [[0.0; 3]; 3],
+        };
+        Self {
+            place,
+            kind,
+            radiance: light.radiance,
+            casts_shadow: light.casts_shadow.into(),
+            across,
+            is_visible: light.is_visible.into(),
+            along,
+            normal,
+            half,
+            ..Self::default()
+        }
     }
 }
 
@@ -203,7 +298,9 @@ impl View {
         let [half_width, half_height] = camera.half_extent;
         let (bottom, top, background_up, background_kind) = match picture.background {
             Background::Constant(color) => (color, color, [0.0; 3], 0),
-            Background::Gradient { bottom, top, up } => (bottom, top, up, 1),
+            Background::Gradient { bottom, top, up, has_backdrop } => {
+                (bottom, top, up, 1 + u32::from(has_backdrop))
+            }
         };
         let mut lights = [LightUniform::default(); MAX_LIGHTS];
         for (uniform, light) in lights.iter_mut().zip(picture.lights) {
@@ -211,6 +308,7 @@ impl View {
         }
         #[expect(clippy::cast_possible_truncation, reason = "at most MAX_LIGHTS")]
         let light_count = picture.lights.len() as u32;
+        let [lens_radius, lens_focus] = camera.lens.unwrap_or_default();
         Self {
             eye: camera.eye,
             right,
@@ -231,6 +329,11 @@ impl View {
             background_top: top,
             transparent: picture.is_transparent.into(),
             background_up,
+            lens_radius,
+            lens_focus,
+            sources: picture.sources(),
+            has_odd: picture.has_odd.into(),
+            has_extents: picture.has_extents().into(),
             ambient: material.ambient,
             diffuse: material.diffuse,
             specular: material.specular,

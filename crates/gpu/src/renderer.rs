@@ -1,4 +1,5 @@
-//! Traces pictures by Whitted's model, see `shaders/whitted.wgsl`.
+//! Traces pictures, sample by sample and depth by depth: see `shaders/queues.wgsl`, and `shaders/whitted.wgsl` or
+//! `shaders/path.wgsl` for the transport of light.
 
 use std::collections::BTreeMap;
 
@@ -7,6 +8,7 @@ use wgpu::BindingResource;
 
 use crate::arrays::{Array, Download, Uniform, Uniforms};
 use crate::commands::{Commands, Kernel, Timer};
+use crate::lighting::{Lighting, Model, SceneUniform, ray_bytes, source_count};
 use crate::picture::{FilmSize, Picture, Samples, View};
 use crate::tree::{Spheres, TreeBuilder, TreeShape, tree_constants};
 use crate::{Device, GpuError};
@@ -34,6 +36,8 @@ pub enum Colors<'a> {
 pub struct Pixels<'a> {
     /// Red, green, blue and coverage, each the sum over the samples.
     pub sums: &'a [[f32; 4]],
+    /// The same over every second sample, if the picture has it; else empty.
+    pub odd: &'a [[f32; 4]],
     /// The nearest sample.
     pub nearest: &'a [NearestSample],
 }
@@ -53,8 +57,10 @@ pub struct NearestSample {
 }
 
 impl NearestSample {
-    /// The index of a pixel without a sphere; its other values mean nothing.
+    /// The index of a pixel that shows neither a sphere nor the ground; its other values mean nothing.
     pub const NONE: u32 = u32::MAX;
+    /// The index of a pixel that shows the ground.
+    pub const GROUND: u32 = u32::MAX - 1;
 }
 
 /// What a picture has cost.
@@ -68,7 +74,7 @@ pub struct Cost {
     pub primary_rays: u64,
     /// Shadow rays.
     pub shadow_rays: u64,
-    /// Reflected rays.
+    /// Reflected rays, also by rough surfaces.
     pub reflected_rays: u64,
     /// Memory of the device, bytes.
     pub bytes: u64,
@@ -80,10 +86,18 @@ pub struct Cost {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
 struct Stage {
-    sample: u32,
     depth: u32,
-    light: u32,
+    source: u32,
     queues: u32,
+    zero: u32,
+}
+
+/// A uniform of the kernels.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+struct Current {
+    sample: u32,
+    zeros: [u32; 3],
 }
 
 /// Kernels for trees of one kind.
@@ -91,38 +105,75 @@ struct Stage {
 struct Kernels {
     empty_queues: Kernel,
     trace_camera: Kernel,
-    trace_reflected: Kernel,
+    trace_next: Kernel,
     trace_shadow: Kernel,
 }
 
-/// What the source of the kernels depends on: whether radii are equal, and the levels that the stack holds.
-type Variant = (bool, u32);
+/// What the source of the kernels depends on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Variant {
+    /// Whether paths are traced.
+    has_paths: bool,
+    /// Whether radii are equal.
+    is_common: bool,
+    /// Levels that the stack holds.
+    levels: u32,
+}
+
+/// The sources of path tracing.
+const PATHS: [&str; 6] = [
+    include_str!("shaders/scene.wgsl"),
+    include_str!("shaders/sampler.wgsl"),
+    include_str!("shaders/environment.wgsl"),
+    include_str!("shaders/ground.wgsl"),
+    include_str!("shaders/bsdf.wgsl"),
+    include_str!("shaders/path.wgsl"),
+];
+const WHITTED: [&str; 1] = [include_str!("shaders/whitted.wgsl")];
 
 impl Kernels {
-    fn new(device: &Device, (is_common, levels): Variant) -> Self {
+    fn new(device: &Device, variant: Variant) -> Self {
         let append = if device.has_subgroups() {
             include_str!("shaders/append_subgroup.wgsl")
         } else {
             include_str!("shaders/append_atomic.wgsl")
         };
+        let model = if variant.has_paths { &PATHS[..] } else { &WHITTED };
         let source = [
             device.arithmetic().source(),
-            &tree_constants(is_common),
-            &format!("const STACK: u32 = {}u;\n", STACK_PER_LEVEL * levels),
+            &tree_constants(variant.is_common),
+            &format!("const STACK: u32 = {}u;\n", STACK_PER_LEVEL * variant.levels),
             include_str!("shaders/view.wgsl"),
             include_str!("shaders/arithmetic.wgsl"),
+            include_str!("shaders/functions.wgsl"),
             include_str!("shaders/traverse.wgsl"),
             include_str!("shaders/camera.wgsl"),
+            include_str!("shaders/surface.wgsl"),
+            include_str!("shaders/lights.wgsl"),
+            include_str!("shaders/queues.wgsl"),
             append,
-            include_str!("shaders/whitted.wgsl"),
+            &model.concat(),
         ];
         let module = device.module(&source.concat());
         let kernel = |entry, bindings| Kernel::new(device, &module, entry, bindings);
+        let [camera, next, shadow]: [&[u32]; 3] = if variant.has_paths {
+            [
+                &[0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 15, 16, 17, 18],
+                &[0, 1, 2, 3, 6, 7, 8, 9, 10, 11, 12, 13, 15, 16, 17, 18],
+                &[0, 1, 2, 6, 8, 11, 13, 15, 18],
+            ]
+        } else {
+            [
+                &[0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 18],
+                &[0, 1, 2, 3, 6, 7, 8, 9, 10, 11, 12, 13, 18],
+                &[0, 1, 2, 6, 8, 11, 13, 18],
+            ]
+        };
         Self {
             empty_queues: kernel("empty_queues", &[8, 13, 14]),
-            trace_camera: kernel("trace_camera", &[0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13]),
-            trace_reflected: kernel("trace_reflected", &[0, 1, 2, 3, 6, 7, 8, 9, 10, 11, 12, 13]),
-            trace_shadow: kernel("trace_shadow", &[0, 1, 2, 6, 8, 11, 13]),
+            trace_camera: kernel("trace_camera", camera),
+            trace_next: kernel("trace_next", next),
+            trace_shadow: kernel("trace_shadow", shadow),
         }
     }
 }
@@ -149,7 +200,8 @@ pub struct Renderer {
 struct Traced {
     pixels: u64,
     samples: u32,
-    lights: usize,
+    sources: u32,
+    has_odd: bool,
 }
 
 #[derive(Debug, Default)]
@@ -165,10 +217,14 @@ struct TraceArrays {
     rays: [Array; 2],
     shadows: Array,
     sums: Array,
+    texels: Array,
+    constants: Array,
+    /// The version of the tables that these two hold.
+    tables: Option<u64>,
 }
 
 impl TraceArrays {
-    fn all(&self) -> [&Array; 10] {
+    fn all(&self) -> [&Array; 12] {
         let [rays, other_rays] = &self.rays;
         [
             &self.colors,
@@ -181,13 +237,30 @@ impl TraceArrays {
             other_rays,
             &self.shadows,
             &self.sums,
+            &self.texels,
+            &self.constants,
         ]
     }
 }
 
-/// Memory of the device for the film and the queues of each pixel with that many lights, bytes.
-pub const fn bytes_per_pixel(lights: u64) -> u64 {
-    4 + 16 + 32 + 2 * 32 + 32 * lights
+impl TraceArrays {
+    /// Copies the tables of `lighting`, unless they are there.
+    fn write_tables(&mut self, device: &Device, lighting: &Lighting) -> Result<(), GpuError> {
+        let tables = &lighting.tables;
+        if self.tables != Some(tables.version) {
+            self.texels.write(device, "environment", bytemuck::cast_slice(&tables.texels))?;
+            self.constants.write(device, "tables", bytemuck::cast_slice(&tables.constants))?;
+            self.tables = Some(tables.version);
+        }
+        Ok(())
+    }
+}
+
+/// Memory of the device for the film and the queues of each pixel with that many lights, bytes. `has_odd`: the sums over
+/// every second sample are kept.
+pub fn bytes_per_pixel(has_paths: bool, lights: u32, has_odd: bool) -> u64 {
+    let film = if has_odd { 32 } else { 16 };
+    4 + film + 32 + ray_bytes(has_paths) * (2 + u64::from(source_count(has_paths, lights)))
 }
 
 impl Renderer {
@@ -257,7 +330,11 @@ impl Renderer {
     ) -> Result<(), GpuError> {
         self.reserve(device, picture)?;
         let shape = *self.tree.shape();
-        let variant = (shape.is_common, shape.levels.max(MIN_STACK_LEVELS));
+        let variant = Variant {
+            has_paths: picture.has_paths(),
+            is_common: shape.is_common,
+            levels: shape.levels.max(MIN_STACK_LEVELS),
+        };
         self.kernels.entry(variant).or_insert_with(|| Kernels::new(device, variant));
         let plan = self.plan(picture, &shape);
         self.uniforms.upload(device)?;
@@ -283,7 +360,8 @@ impl Renderer {
         self.traced = Some(Traced {
             pixels: picture.film.pixels(),
             samples: picture.samples.count,
-            lights: picture.lights.len(),
+            sources: picture.sources(),
+            has_odd: picture.has_odd,
         });
         device.check()
     }
@@ -300,17 +378,21 @@ impl Renderer {
         device: &Device,
         store: impl FnOnce(&Pixels<'_>) -> T,
     ) -> Result<T, GpuError> {
-        let pixels = self.traced.expect("a picture was traced").pixels;
-        self.download.reserve(device, 48 * pixels)?;
+        let Traced { pixels, has_odd, .. } = self.traced.expect("a picture was traced");
+        let film = if has_odd { 32 * pixels } else { 16 * pixels };
+        self.download.reserve(device, film + 32 * pixels)?;
         let mut commands = Commands::new(device);
-        commands.copy(&self.arrays.film, &self.download, [0, 16 * pixels]);
-        commands.copy(&self.arrays.data, &self.download, [16 * pixels, 32 * pixels]);
+        commands.copy(&self.arrays.film, &self.download, [0, film]);
+        commands.copy(&self.arrays.data, &self.download, [film, 32 * pixels]);
         commands.submit();
         self.download.with_content(device, |bytes| {
             #[expect(clippy::cast_possible_truncation, reason = "the host has mapped it")]
-            let (sums, nearest) = bytes.split_at(16 * pixels as usize);
+            let (film, nearest) = bytes.split_at(film as usize);
+            #[expect(clippy::cast_possible_truncation, reason = "the host has mapped it")]
+            let (sums, odd) = film.split_at(16 * pixels as usize);
             store(&Pixels {
                 sums: bytemuck::cast_slice(sums),
+                odd: bytemuck::cast_slice(odd),
                 nearest: bytemuck::cast_slice(nearest),
             })
         })
@@ -324,10 +406,10 @@ impl Renderer {
     /// # Panics
     /// Without a picture.
     pub fn cost(&self, device: &Device) -> Result<Cost, GpuError> {
-        let Traced { pixels, samples, lights } = self.traced.expect("a picture was traced");
+        let Traced { pixels, samples, sources, .. } = self.traced.expect("a picture was traced");
         // The first queue of each depth has reflected rays, the others shadow rays
         let lengths: Vec<u64> = bytemuck::pod_collect_to_vec(&self.arrays.sums.read(device)?);
-        let reflected = lengths.iter().step_by(1 + lights).sum();
+        let reflected = lengths.iter().step_by(1 + sources as usize).sum();
         let seconds = match &self.timer {
             Some(timer) => timer.seconds(device, self.stages)?,
             None => Vec::new(),
@@ -346,15 +428,20 @@ impl Renderer {
 
     fn reserve(&mut self, device: &Device, picture: &Picture<'_>) -> Result<(), GpuError> {
         let pixels = picture.film.pixels();
-        let lights = picture.lights.len() as u64;
+        let sources = picture.sources();
+        let film = if picture.has_odd { 32 } else { 16 };
+        let ray = ray_bytes(picture.has_paths());
         let queues = vec![0; queue_count(picture) as usize];
         let arrays = &mut self.arrays;
-        arrays.film.reserve(device, "pixels", 16 * pixels)?;
+        arrays.film.reserve(device, "pixels", film * pixels)?;
         arrays.data.reserve(device, "pixels", 32 * pixels)?;
         for queue in &mut arrays.rays {
-            queue.reserve(device, "rays", 32 * pixels)?;
+            queue.reserve(device, "rays", ray * pixels)?;
         }
-        arrays.shadows.reserve(device, "shadow rays", 32 * pixels * lights)?;
+        arrays.shadows.reserve(device, "shadow rays", ray * pixels * u64::from(sources))?;
+        if let Model::Paths(lighting) = picture.model {
+            arrays.write_tables(device, lighting)?;
+        }
         arrays.queued.write(device, "queues", bytemuck::cast_slice::<u32, u8>(&queues))?;
         arrays.sums.write(
             device,
@@ -388,30 +475,33 @@ impl Renderer {
             ..View::new(picture)
         };
         let view = uniforms.push(&view);
-        let mut push = |stage: Stage| uniforms.push(&stage);
+        let scene = match picture.model {
+            Model::Whitted => None,
+            Model::Paths(lighting) => Some(uniforms.push(&SceneUniform::from(lighting))),
+        };
         let queues = queue_count(picture);
-        let light_count = narrow_count(picture.lights.len());
+        let samples = 0..picture.samples.count;
+        let samples = samples
+            .map(|sample| uniforms.push(&Current { sample, ..Current::default() }))
+            .collect();
+        let mut push = |stage: Stage| uniforms.push(&Stage { queues, ..stage });
         let mut all = |stages: &mut dyn Iterator<Item = Stage>| stages.map(&mut push).collect();
-        let max_depth = if picture.material.reflection > 0.0 { picture.max_depth } else { 1 };
-        let depths = 1..=max_depth;
-        let lights = 0..light_count;
+        let depths = 1..=depth_count(picture);
+        let sources = 0..picture.sources();
         Plan {
             view,
+            scene,
             film: picture.film,
             queues,
-            samples: all(&mut (0..picture.samples.count).map(|sample| Stage {
-                sample,
-                depth: 1,
-                queues,
-                light: 0,
-            })),
+            samples,
             depths: all(&mut depths.clone().map(|depth| Stage { depth, ..Stage::default() })),
-            lights: depths
+            sources: depths
                 .map(|depth| {
-                    all(&mut lights.clone().map(|light| Stage { depth, light, ..Stage::default() }))
+                    let used =
+                        sources.clone().filter(|source| has_shadows(picture, depth, *source));
+                    all(&mut used.map(|source| Stage { depth, source, ..Stage::default() }))
                 })
                 .collect(),
-            casts_shadow: picture.lights.iter().map(|light| light.casts_shadow).collect(),
         }
     }
 
@@ -424,27 +514,25 @@ impl Renderer {
         sample: Uniform,
     ) {
         let pixels = plan.film.pixels();
-        let array_of = |binding| self.array(binding, plan.view, sample, 0);
-        commands.add(&kernels.empty_queues, &array_of, plan.queues.into(), GROUP);
-        for (number, (stage, lights)) in plan.depths.iter().zip(&plan.lights).enumerate() {
+        self.add_count(commands, kernels, plan);
+        for (number, (depth, sources)) in plan.depths.iter().zip(&plan.sources).enumerate() {
+            let array_of = |binding| self.array(binding, plan, [sample, *depth], number);
             if number == 0 {
                 let squares = [plan.film.width.div_ceil(8), plan.film.height.div_ceil(8)];
                 commands.add_groups(&kernels.trace_camera, &array_of, squares);
             } else {
-                let array_of = |binding| self.array(binding, plan.view, *stage, number);
-                commands.add(&kernels.trace_reflected, &array_of, pixels, GROUP);
+                commands.add(&kernels.trace_next, &array_of, pixels, GROUP);
             }
-            let shadowed = lights.iter().zip(&plan.casts_shadow).filter(|(_, casts)| **casts);
-            for (light, _) in shadowed {
-                let array_of = |binding| self.array(binding, plan.view, *light, number);
+            for source in sources {
+                let array_of = |binding| self.array(binding, plan, [sample, *source], number);
                 commands.add(&kernels.trace_shadow, &array_of, pixels, GROUP);
             }
         }
     }
 
-    /// Adds the dispatch that counts the rays of the last sample.
+    /// Adds the dispatch that empties the queues, and counts the rays that they had.
     fn add_count(&self, commands: &mut Commands<'_>, kernels: &Kernels, plan: &Plan) {
-        let array_of = |binding| self.array(binding, plan.view, plan.samples[0], 0);
+        let array_of = |binding| self.array(binding, plan, [plan.samples[0], plan.depths[0]], 0);
         commands.add(&kernels.empty_queues, &array_of, plan.queues.into(), GROUP);
     }
 
@@ -452,14 +540,16 @@ impl Renderer {
     fn array(
         &self,
         binding: u32,
-        view: Uniform,
-        stage: Uniform,
+        plan: &Plan,
+        [sample, stage]: [Uniform; 2],
         depth: usize,
     ) -> BindingResource<'_> {
         let arrays = &self.arrays;
         let array = match binding {
-            0 => return self.uniforms.binding(view),
+            0 => return self.uniforms.binding(plan.view),
+            15 => return self.uniforms.binding(plan.scene.expect("only kernels for paths use it")),
             13 => return self.uniforms.binding(stage),
+            18 => return self.uniforms.binding(sample),
             4 => &arrays.points,
             5 => &arrays.sets,
             6 => &arrays.film,
@@ -470,32 +560,53 @@ impl Renderer {
             11 => &arrays.shadows,
             12 => &arrays.colors,
             14 => &arrays.sums,
+            16 => &arrays.texels,
+            17 => &arrays.constants,
             _ => return self.tree.traversal_array(binding).expect("1 to 3 are those of the tree"),
         };
         array.binding()
     }
 }
 
-/// Number of queues of a sample: for each depth, one of reflected rays, and one of shadow rays for each light.
-fn queue_count(picture: &Picture<'_>) -> u32 {
-    picture.max_depth * (1 + narrow_count(picture.lights.len()))
+/// Number of rays one after the other.
+fn depth_count(picture: &Picture<'_>) -> u32 {
+    match picture.model {
+        Model::Whitted if picture.material.reflection > 0.0 => picture.max_depth,
+        Model::Whitted => 1,
+        // The last segment finds lights; without any, it is a shadow ray to the environment
+        Model::Paths(lighting) => lighting.bounces + 1 + u32::from(picture.has_extents()),
+    }
 }
 
-/// A number of lights.
-fn narrow_count(count: usize) -> u32 {
-    u32::try_from(count).expect("at most MAX_LIGHTS")
+/// Whether there are shadow rays to a source at a depth.
+fn has_shadows(picture: &Picture<'_>, depth: u32, source: u32) -> bool {
+    let (first, scene) = match picture.model {
+        Model::Whitted => (0, None),
+        Model::Paths(lighting) => (2, Some(lighting)),
+    };
+    match (source.checked_sub(first), scene) {
+        (Some(light), _) => picture.lights[light as usize].casts_shadow,
+        (None, Some(scene)) if scene.environment.is_none() => false,
+        (None, Some(scene)) if source == 1 => depth > scene.bounces && !picture.has_extents(),
+        (None, _) => true,
+    }
+}
+
+/// Number of queues of a sample: for each depth, one of rays that go on, and one of shadow rays for each source.
+fn queue_count(picture: &Picture<'_>) -> u32 {
+    depth_count(picture) * (1 + picture.sources())
 }
 
 /// The uniforms of a picture.
 struct Plan {
     view: Uniform,
+    /// The lighting of paths.
+    scene: Option<Uniform>,
     film: FilmSize,
     /// Number of queues of a sample.
     queues: u32,
     samples: Vec<Uniform>,
     depths: Vec<Uniform>,
-    /// The lights of each depth.
-    lights: Vec<Vec<Uniform>>,
-    /// For each light.
-    casts_shadow: Vec<bool>,
+    /// The sources of shadow rays of each depth.
+    sources: Vec<Vec<Uniform>>,
 }

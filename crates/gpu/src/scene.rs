@@ -6,67 +6,69 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use rayon::prelude::*;
-use spherule_tracer::render::device::{DeviceHit, DevicePixel, are_from_nearest, store_pixels};
+use spherule_tracer::render::device::{
+    DeviceHit, DevicePixel, Extent, are_from_nearest, extent_of, store_pixels,
+};
 use spherule_tracer::render::{
     Drawing, Film, FilmSampler, IntegratorKind, RayCounts, RenderSettings, ShadeSource, Stop,
 };
+use spherule_tracer::scene::ground::Pattern;
 use spherule_tracer::scene::{self, Falloff, Fresnel, LightKind, Projection, Scene, background};
 use spherule_tree::accel;
 use spherule_tree::blocks::{Block, StoredBlocks, StoredLeaves};
 
+use crate::lighting::Model;
 use crate::picture::{
     Background, Camera, FilmSize, Light, LightPlace, MAX_LIGHTS, Material, Picture, Samples,
 };
+use crate::renderer::{Colors, Cost, NearestSample, Pixels, Renderer};
+use crate::scene_lighting::SceneLighting;
 use crate::tree::{Centers, KeyLength, Order, Radii, Spheres};
-use crate::whitted::{Colors, Cost, NearestSample, Pixels, Renderer};
 use crate::{Device, GpuError};
 
 /// What the device lacks of the renderer for CPUs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Missing {
-    /// Path tracing.
-    PathTracing,
     /// Light through particles.
     Transmission,
-    /// A ground.
+    /// A ground in Whitted's model, or one with sand or a picture.
     Ground,
     /// Motion blur.
     MotionBlur,
-    /// Depth of field.
+    /// Depth of field in Whitted's model.
     Lens,
-    /// Images for two eyes.
+    /// Two eyes.
     Stereo,
-    /// Panoramas.
+    /// Equirectangular pictures.
     Panorama,
-    /// Lights with an extent.
+    /// Lights with an extent in Whitted's model.
     LightExtent,
-    /// More lights than fit.
+    /// More lights than [`MAX_LIGHTS`].
     Lights,
-    /// Layers of light, groups of lights and Cryptomatte.
+    /// Materials of parts.
+    Parts,
+    /// Channels that are not from the nearest sample.
     Layers,
     /// Outlines and the fading with distance.
     Drawing,
-    /// Denoising.
-    Denoising,
-    /// Particles that only hide what is behind them.
+    /// Particles that hide what is behind them.
     Holdout,
 }
 
 impl fmt::Display for Missing {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::PathTracing => "path tracing",
-            Self::Transmission => "transparent particles",
-            Self::Ground => "a ground",
+            Self::Transmission => "transmissive particles",
+            Self::Ground => "a ground in Whitted's model, or one of sand or with a picture",
             Self::MotionBlur => "motion blur",
-            Self::Lens => "depth of field",
-            Self::Stereo => "stereo images",
-            Self::Panorama => "panoramas",
-            Self::LightExtent => "lights with an extent",
+            Self::Lens => "depth of field in Whitted's model",
+            Self::Stereo => "stereo pairs",
+            Self::Panorama => "equirectangular pictures",
+            Self::LightExtent => "lights with an extent in Whitted's model",
             Self::Lights => "more than eight lights",
+            Self::Parts => "materials of parts",
             Self::Layers => "layers of light and Cryptomatte",
             Self::Drawing => "outlines and the fading with distance",
-            Self::Denoising => "denoising",
             Self::Holdout => "holdouts",
         })
     }
@@ -76,20 +78,23 @@ impl fmt::Display for Missing {
 pub fn missing(scene: &Scene, settings: &RenderSettings) -> Option<Missing> {
     let material = scene.particle_material();
     let camera = &scene.camera;
+    let is_whitted = settings.integrator == IntegratorKind::Whitted;
     let has_extent = |light: &scene::Light| light.kind.has_extent();
+    let is_plain = |ground: &scene::Ground| {
+        !is_whitted && matches!(ground.pattern, Pattern::Plain | Pattern::Checker { .. })
+    };
     [
-        (settings.integrator == IntegratorKind::Path, Missing::PathTracing),
         (material.transmission > 0.0, Missing::Transmission),
-        (scene.ground.is_some(), Missing::Ground),
+        (scene.ground.as_ref().is_some_and(|ground| !is_plain(ground)), Missing::Ground),
         (scene.exposure.is_some(), Missing::MotionBlur),
-        (camera.lens().is_some(), Missing::Lens),
+        (camera.lens().is_some() && is_whitted, Missing::Lens),
         (camera.stereo().is_some(), Missing::Stereo),
         (camera.projection().is_panorama(), Missing::Panorama),
-        (scene.lights.iter().any(has_extent), Missing::LightExtent),
+        (scene.lights.iter().any(has_extent) && is_whitted, Missing::LightExtent),
         (scene.lights.len() > MAX_LIGHTS, Missing::Lights),
+        (!scene.parts.is_empty() && !is_whitted, Missing::Parts),
         (!are_from_nearest(&settings.channels), Missing::Layers),
         (settings.drawing != Drawing::NONE, Missing::Drawing),
-        (settings.has_features, Missing::Denoising),
         (material.is_holdout, Missing::Holdout),
     ]
     .into_iter()
@@ -136,13 +141,19 @@ pub struct SceneRenderer {
     device: Arc<Device>,
     renderer: Renderer,
     samples: SampleTable,
+    lighting: SceneLighting,
 }
 
 impl SceneRenderer {
     /// A renderer on `device`.
     pub fn new(device: Arc<Device>) -> Self {
         let renderer = Renderer::new(&device);
-        Self { device, renderer, samples: SampleTable::default() }
+        Self {
+            device,
+            renderer,
+            samples: SampleTable::default(),
+            lighting: SceneLighting::default(),
+        }
     }
 
     /// The device.
@@ -237,8 +248,11 @@ impl SceneRenderer {
         self.trace(scene, settings, stop)?;
         let store = |pixels: &Pixels<'_>| {
             let share = 1.0 / settings.samples as f32;
+            let odd_share = 1.0 / (settings.samples / 2).max(1) as f32;
+            let odd = |number: usize| pixels.odd.get(number).map(|[r, g, b, _]| [*r, *g, *b]);
             let pixel = |number: usize| DevicePixel {
                 color: pixels.sums[number].map(|sum| sum * share),
+                odd: odd(number).unwrap_or_default().map(|sum| sum * odd_share),
                 nearest: hit_of(&pixels.nearest[number]),
             };
             store_pixels(film, scene, source, settings, &pixel)
@@ -284,6 +298,11 @@ impl SceneRenderer {
             max_depth: settings.max_depth,
             background: background_of(&scene.background),
             is_transparent: settings.transparent_background,
+            has_odd: settings.has_features,
+            model: match settings.integrator {
+                IntegratorKind::Whitted => Model::Whitted,
+                IntegratorKind::Path => Model::Paths(self.lighting.of(scene, settings)),
+            },
             material: material_of(scene),
             lights: &lights,
         };
@@ -304,7 +323,7 @@ pub const fn ray_counts(cost: &Cost) -> RayCounts {
 fn hit_of(sample: &NearestSample) -> Option<DeviceHit> {
     (sample.index != NearestSample::NONE).then(|| DeviceHit {
         depth: sample.depth,
-        particle: sample.index,
+        particle: (sample.index != NearestSample::GROUND).then_some(sample.index),
         normal: Vec3::from_array(sample.normal),
         point: Vec3::from_array(sample.position),
     })
@@ -324,20 +343,22 @@ fn camera_of(scene: &Scene, settings: &RenderSettings) -> Camera {
         half_extent: camera.half_extent().to_array(),
         size: settings.eye_size(camera.eyes()).map(|pixels| pixels as f32),
         is_parallel: matches!(camera.projection(), Projection::Orthographic { .. }),
+        lens: camera.lens().map(|lens| [lens.radius, lens.focus]),
     }
 }
 
 fn background_of(background: &scene::Background) -> Background {
-    let gradient = |bottom: Vec3, top: Vec3, up: Vec3| Background::Gradient {
+    let gradient = |[bottom, top, up]: [Vec3; 3], has_backdrop| Background::Gradient {
         bottom: bottom.to_array(),
         top: top.to_array(),
         up: up.to_array(),
+        has_backdrop,
     };
     match *background {
         scene::Background::Constant(color) => Background::Constant(color.to_array()),
-        scene::Background::Gradient { bottom, top, up } => gradient(bottom, top, up),
+        scene::Background::Gradient { bottom, top, up } => gradient([bottom, top, up], false),
         scene::Background::Studio { up } => {
-            gradient(background::STUDIO_BOTTOM, background::STUDIO_TOP, up)
+            gradient([background::STUDIO_BOTTOM, background::STUDIO_TOP, up], true)
         }
     }
 }
@@ -356,21 +377,35 @@ fn material_of(scene: &Scene) -> Material {
 }
 
 fn light_of(light: &scene::Light) -> Light {
+    let extent = extent_of(light);
+    let half = extent.map_or([0.0; 2], |extent| extent.half);
+    let panel = |center: Vec3, is_ellipse| LightPlace::Panel {
+        center: center.to_array(),
+        axes: extent.map_or([[0.0; 3]; 3], |Extent { axes, .. }| axes.map(|axis| axis.to_array())),
+        half,
+        is_ellipse,
+    };
     let place = match light.kind {
         LightKind::Point { position, falloff } => LightPlace::Point {
             position: position.to_array(),
             has_falloff: falloff == Falloff::InverseSquare,
         },
-        LightKind::Directional { to_light } | LightKind::Sun { to_light, .. } => {
-            LightPlace::Distant(to_light.to_array())
+        LightKind::Directional { to_light } => LightPlace::Distant(to_light.to_array()),
+        LightKind::Sun { to_light, .. } => {
+            LightPlace::Sun { direction: to_light.to_array(), cap: half[0] }
         }
-        LightKind::Sphere { center, .. }
-        | LightKind::Rectangle { center, .. }
-        | LightKind::Disc { center, .. } => {
-            LightPlace::Point { position: center.to_array(), has_falloff: true }
+        LightKind::Sphere { center, radius } => {
+            LightPlace::Sphere { center: center.to_array(), radius }
         }
+        LightKind::Rectangle { center, .. } => panel(center, false),
+        LightKind::Disc { center, .. } => panel(center, true),
     };
-    Light { place, radiance: light.radiance.to_array(), casts_shadow: light.casts_shadow }
+    Light {
+        place,
+        radiance: extent.map_or(light.radiance, |extent| extent.radiance).to_array(),
+        casts_shadow: extent.is_some() || light.casts_shadow,
+        is_visible: light.is_visible,
+    }
 }
 
 /// Spheres that are looked at to choose the length of keys.

@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use spherule_gpu::{Arithmetic, Checks, Device, GpuError, SceneRenderer};
 use spherule_tree::math::SimdLevel;
-use support::{Case, Data, Difference, Radii};
+use support::{Case, Data, Difference, Paths, Radii};
 
 /// Half the distance of neighbouring 16-bit floats below 2, where the colours of these pictures are.
 const HALF_UNIT_OF_F16: f32 = 0.5 / 1024.0;
@@ -33,7 +33,7 @@ fn same_arithmetic(device: &Device) -> SimdLevel {
 }
 
 fn assert_equal(case: &Case, difference: &Difference) {
-    let Difference { ids, depths, normals, positions, coverages, color, rays } = *difference;
+    let Difference { ids, depths, normals, positions, coverages, color, rays, .. } = *difference;
     assert_eq!([ids, depths, normals, positions, coverages], [0; 5], "{case:?}");
     assert!(color <= HALF_UNIT_OF_F16, "{case:?}: {color}");
     assert!(rays, "{case:?}");
@@ -70,6 +70,25 @@ fn every_setting_equals_the_cpu() {
         Case { particles: 2049, ..small },
     ] {
         assert_equal(&case, &support::compare(&mut renderer, &case, level));
+    }
+}
+
+/// Both draw the same picture, with the same noise. A ray that has left a rough surface may meet another sphere, which
+/// the last bit of its direction decides.
+#[test]
+fn paths_are_those_of_the_cpu() {
+    let Some(device) = device(Checks::On) else { return };
+    let level = same_arithmetic(&device);
+    let mut renderer = SceneRenderer::new(Arc::new(device));
+    for paths in Paths::ALL {
+        let case = Case { paths: Some(paths), samples: 5, particles: 400, ..Case::small() };
+        let found = support::compare(&mut renderer, &case, level);
+        let Difference { ids, depths, normals, positions, mean, bias, odd, ray_ratio, .. } = found;
+        if paths != Paths::Lens {
+            assert_eq!([ids, depths, normals, positions], [0; 4], "{paths:?}");
+        }
+        assert!(mean.max(bias).max(odd) < 1e-3, "{paths:?}: {found:?}");
+        assert!((ray_ratio - 1.0).abs() < 1e-3, "{paths:?}: {found:?}");
     }
 }
 

@@ -9,11 +9,14 @@ use rayon::prelude::*;
 use spherule_gpu::{Cost, GpuError, SceneError, SceneRenderer, ray_counts};
 use spherule_surface::spheres::SphereSurface;
 use spherule_tracer::render::{
-    Channels, Colors, DataWindow, Film, FilmPlane, ParticleShading, RayCounts, RenderSettings,
-    render,
+    Channels, Colors, DataWindow, Film, FilmPlane, IndirectLight, IntegratorKind, ParticleShading,
+    RayCounts, RenderSettings, render,
 };
+use spherule_tracer::scene::environment::{self, Environment, EnvironmentAxes};
+use spherule_tracer::scene::ground::{Ground, Pattern};
 use spherule_tracer::scene::{
-    Background, Camera, CameraView, ColorMap, Light, Projection, Scene, default_lights,
+    Background, Camera, CameraView, ColorMap, Finish, Lens, Light, LightKind, MaterialId,
+    Projection, Scene, default_lights,
 };
 use spherule_tree::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder};
 use spherule_tree::math::{SimdLevel, narrow};
@@ -47,6 +50,43 @@ pub(crate) enum Radii {
     Each,
 }
 
+/// What pictures of path tracing have beside the studio around the particles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Paths {
+    /// Matte particles.
+    Matte,
+    /// The default look: matte ones above a shadow catcher.
+    Look,
+    /// Plastic ones, under a sky that the camera sees.
+    Plastic,
+    /// Metal ones, above a checkerboard that fades out.
+    Metal,
+    /// Matte ones above a shadow catcher, with a sun, on a transparent background.
+    Catcher,
+    /// The same on a backdrop, with a point light.
+    Backdrop,
+    /// No environment, but a sphere, a rectangle and a disc that shine, which the camera sees.
+    Lights,
+    /// Light of second surfaces by an estimate.
+    Ambient,
+    /// A lens.
+    Lens,
+}
+
+impl Paths {
+    pub(crate) const ALL: [Self; 9] = [
+        Self::Matte,
+        Self::Look,
+        Self::Plastic,
+        Self::Metal,
+        Self::Catcher,
+        Self::Backdrop,
+        Self::Lights,
+        Self::Ambient,
+        Self::Lens,
+    ];
+}
+
 /// A picture.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Case {
@@ -65,6 +105,8 @@ pub(crate) struct Case {
     pub(crate) is_studio: bool,
     /// Position of the film in the image, if it is a part of it.
     pub(crate) window: Option<[i32; 2]>,
+    /// Path tracing; else Whitted's model.
+    pub(crate) paths: Option<Paths>,
 }
 
 impl Case {
@@ -82,6 +124,7 @@ impl Case {
             is_mapped: false,
             is_studio: false,
             window: None,
+            paths: None,
         }
     }
 
@@ -90,10 +133,27 @@ impl Case {
         Self { particles, width: 1920, height: 1080, samples: 1, max_depth: 4, ..Self::small() }
     }
 
+    /// A picture of the default look, with 16 samples.
+    pub(crate) const fn look(particles: usize) -> Self {
+        Self { samples: 16, paths: Some(Paths::Look), ..Self::thesis(particles) }
+    }
+
     /// The settings of the picture.
     pub(crate) fn settings(&self) -> RenderSettings {
         let names = ["RGBA", "Z", "N", "P", "V", "id"];
+        let is_ambient = self.paths == Some(Paths::Ambient);
         RenderSettings {
+            integrator: match self.paths {
+                Some(_) => IntegratorKind::Path,
+                None => IntegratorKind::Whitted,
+            },
+            indirect: if is_ambient {
+                IndirectLight::Ambient { radius: 0.05 }
+            } else {
+                IndirectLight::Traced
+            },
+            has_features: self.paths.is_some(),
+            transparent_background: self.paths == Some(Paths::Catcher),
             samples: self.samples,
             max_depth: self.max_depth,
             channels: Channels::from_names(names).expect("known names"),
@@ -202,13 +262,77 @@ pub(crate) fn scene(case: &Case, angle: f64) -> Scene {
     } else {
         Camera::new(&view, aspect, DVec3::ZERO)
     };
-    let mut scene = Scene::new(camera.expect("a valid view"));
+    let camera = camera.expect("a valid view");
+    if let Some(paths) = case.paths {
+        return path_scene(paths, camera);
+    }
+    let mut scene = Scene::new(camera);
     if case.is_studio {
         let bounds =
             spherule_tracer::scene::Bounds { min: LOW.as_dvec3(), max: (LOW + SIZE).as_dvec3() };
         scene.lights = default_lights(&bounds, DVec3::Z, &view);
         scene.background = Background::default_for(Vec3::Z);
     } else {
+        let position = DVec3::new(0.0, 0.0, 10.0);
+        scene.lights.push(Light::point(position, DVec3::ZERO, Vec3::ONE));
+    }
+    scene
+}
+
+fn path_scene(paths: Paths, camera: Camera) -> Scene {
+    let bounds =
+        spherule_tracer::scene::Bounds { min: LOW.as_dvec3(), max: (LOW + SIZE).as_dvec3() };
+    let lens = if paths == Paths::Lens { 0.05 } else { 0.0 };
+    let mut scene = Scene::new(camera.with_lens(Lens { radius: lens, focus: 6.0 }));
+    let axes = EnvironmentAxes::of_view(DVec3::new(0.3, 1.0, -0.2), DVec3::Z, 20.0);
+    let environment = match paths {
+        Paths::Lights => None,
+        Paths::Plastic => Some(Environment::from_fn(axes, |d| {
+            0.5 + 0.5 * d + 20.0 * f32::from(d.x > 0.9) * Vec3::ONE
+        })),
+        _ => Some(environment::studio(axes, Vec3::ONE)),
+    };
+    scene.environment = environment.map(std::sync::Arc::new);
+    scene.is_environment_visible = paths == Paths::Plastic;
+    scene.background = Background::Studio { up: Vec3::Z };
+    let finish = match paths {
+        Paths::Plastic => Finish::Plastic { roughness: 0.4 },
+        Paths::Metal => Finish::Metal { roughness: 0.3 },
+        _ => Finish::Matte,
+    };
+    scene.materials[MaterialId::PARTICLES.index()].finish = finish;
+    let ground = Ground::under(&bounds, Vec3::Z, DVec3::ZERO);
+    let light = |kind, radiance| Light { kind, ..Light::point(DVec3::ZERO, DVec3::ZERO, radiance) };
+    let visible = |kind| Light { is_visible: true, ..light(kind, Vec3::splat(4.0)) };
+    match paths {
+        Paths::Metal => {
+            let checker = Pattern::Checker { tile: 0.7 };
+            scene.ground =
+                Some(Ground { pattern: checker, fade_start: 1.0, fade_end: 3.0, ..ground });
+        }
+        Paths::Look | Paths::Catcher | Paths::Backdrop => {
+            scene.ground = Some(ground.into_shadow_catcher(0.8))
+        }
+        Paths::Lights => {
+            let sphere = LightKind::Sphere { center: Vec3::new(3.0, 4.0, 1.0), radius: 0.5 };
+            let rectangle = LightKind::Rectangle {
+                center: Vec3::new(5.0, 5.0, 3.0),
+                axes: [Vec3::X, -Vec3::Y, -Vec3::Z],
+                half: [1.5, 1.0],
+            };
+            let normal = Vec3::new(0.0, 1.0, 0.0);
+            let disc = LightKind::Disc { center: Vec3::new(5.0, 2.0, -1.0), normal, radius: 0.4 };
+            scene.lights.extend([sphere, rectangle, disc].map(visible));
+            scene.ground = Some(ground);
+        }
+        _ => {}
+    }
+    if paths == Paths::Catcher {
+        let to_light = Vec3::new(-0.4, -0.3, 0.8).normalize();
+        let kind = LightKind::Sun { to_light, half_angle: 0.02 };
+        scene.lights.push(light(kind, Vec3::splat(2.0)));
+    }
+    if paths == Paths::Backdrop {
         let position = DVec3::new(0.0, 0.0, 10.0);
         scene.lights.push(Light::point(position, DVec3::ZERO, Vec3::ONE));
     }
@@ -227,8 +351,15 @@ pub(crate) struct Difference {
     pub(crate) coverages: usize,
     /// The largest difference of a colour.
     pub(crate) color: f32,
+    /// The mean of the differences of colours, relative to the mean colour; and that of their sums over all pixels.
+    pub(crate) mean: f64,
+    pub(crate) bias: f64,
+    /// The same for the colours of every second sample.
+    pub(crate) odd: f64,
     /// Whether as many rays were traced.
     pub(crate) rays: bool,
+    /// Rays to other surfaces and to lights, relative to those of the CPU.
+    pub(crate) ray_ratio: f64,
 }
 
 fn shading<'a>(particles: &'a Particles, map: &'a ColorMap) -> ParticleShading<'a> {
@@ -316,7 +447,21 @@ pub(crate) fn compare(renderer: &mut SceneRenderer, case: &Case, level: SimdLeve
     let largest = colors()
         .flat_map(|(a, b)| (0..3).map(|axis| (a[axis] - b[axis]).abs()))
         .fold(0.0, f32::max);
+    let sum =
+        |of: &dyn Fn(&[f32; 4], &[f32; 4]) -> f64| colors().map(|(a, b)| of(a, b)).sum::<f64>();
+    let rgb = |c: &[f32; 4]| c[..3].iter().map(|v| f64::from(*v)).sum::<f64>();
+    let distance = |a: &[f32; 4], b: &[f32; 4]| {
+        (0..4).map(|axis| f64::from((a[axis] - b[axis]).abs())).sum::<f64>()
+    };
+    let total = sum(&|_, b| rgb(b)).max(1e-9);
+    let odd_means = |film: &Film| film.odd.clone().unwrap_or_default();
+    let odd = odd_means(&found).into_iter().zip(odd_means(&expected)).map(|(a, b)| (a - b).abs());
+    let secondary = |rays: RayCounts| (rays.shadow + rays.reflection) as f64;
     Difference {
+        mean: sum(&distance) / total,
+        bias: (sum(&|a, _| rgb(a)) / total - 1.0).abs(),
+        odd: odd.map(|d| f64::from(d.element_sum())).sum::<f64>() / total,
+        ray_ratio: secondary(ray_counts(&cost)) / secondary(rays).max(1.0),
         ids: differing(FilmPlane::Id, 1),
         depths: differing(FilmPlane::Depth, 1),
         normals: differing(FilmPlane::Normal, 3),

@@ -4,14 +4,19 @@
 @group(0) @binding(4) var<storage, read> points: array<vec2<f32>>;
 @group(0) @binding(5) var<storage, read> sets: array<u32>;
 
-// The ray of a sample of the pixel in this column and row of the film.
-fn camera_ray(column: u32, row: u32, sample: u32) -> Ray {
-  // The point on the film, from the top left corner in pixels, then from the middle
+// The position of a sample of the pixel in this column and row of the film, from 0 at the top left to 1.
+fn film_position(column: u32, row: u32, sample: u32) -> vec2<f32> {
   let point = points[sets[row * view.width + column] * view.samples + sample];
   let x = f32(i32(column) + view.corner.x) + point.x;
   let y = f32(i32(row) + view.corner.y) + point.y;
-  let across = mul(2.0 * quotient(x, view.size.x) - 1.0, view.half_width);
-  let along = mul(1.0 - 2.0 * quotient(y, view.size.y), view.half_height);
+  return vec2<f32>(quotient(x, view.size.x), quotient(y, view.size.y));
+}
+
+// The ray through a position of the film.
+fn camera_ray(at: vec2<f32>) -> Ray {
+  // The point on the film from the middle
+  let across = mul(2.0 * at.x - 1.0, view.half_width);
+  let along = mul(1.0 - 2.0 * at.y, view.half_height);
   // A parallel camera moves its rays, a perspective one turns them
   let start = select(view.forward, view.eye, view.is_parallel == 1u);
   let moved = (start + scaled(view.right, across)) + scaled(view.up, along);
@@ -24,4 +29,13 @@ fn camera_ray(column: u32, row: u32, sample: u32) -> Ray {
 fn depth_of(ray: Ray, t: f32) -> f32 {
   if (view.is_parallel == 1u) { return t; }
   return mul(t, dot_in_order(ray.direction, view.forward));
+}
+
+// Moves a ray through the centre of the lens to the point of the lens that `u` chooses. It still passes through the same
+// point of the plane in focus.
+fn through_lens(ray: Ray, u: vec2<f32>) -> Ray {
+  let on_lens = on_disc(u) * view.lens_radius;
+  let offset = on_lens.x * view.right + on_lens.y * view.up;
+  let to_focus = (view.lens_focus / dot(ray.direction, view.forward)) * ray.direction - offset;
+  return Ray(ray.origin + offset, normalize(to_focus));
 }

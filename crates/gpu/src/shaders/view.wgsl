@@ -1,12 +1,19 @@
 // The uniform of all tracing kernels.
 
+// A light source. Kinds are those of `lights.wgsl`.
 struct Light {
-  // Position of a point light, or the direction to a light at infinite distance
+  // Position, of the centre if the light has an extent, or the direction to a light at infinite distance
   place: vec3<f32>,
-  // 0: point light, 1: point light that falls off with the square of the distance, 2: infinitely far away
   kind: u32,
   radiance: vec3<f32>,
   casts_shadow: u32,
+  // Axes of panels: along their width and height, and in the direction that they shine
+  across: vec3<f32>,
+  is_visible: u32,
+  along: vec3<f32>, zero: f32,
+  normal: vec3<f32>, zero_too: f32,
+  // Half the width and height; the radius of spheres; for suns, 1 minus the cosine of half the apparent diameter
+  half: vec2<f32>, zeros: vec2<f32>,
 }
 
 struct View {
@@ -23,10 +30,14 @@ struct View {
   // Levels of nodes, and the first node of each, from the lowest level on
   levels: u32, radius: f32, padding: f32, light_count: u32,
   starts: array<vec4<u32>, 4>,
-  // Background, a gradient along `background_up`
+  // Background: one colour (0), a gradient along `background_up` (1), or the same with a backdrop for camera rays (2)
   background_bottom: vec3<f32>, background_kind: u32,
   background_top: vec3<f32>, transparent: u32,
   background_up: vec3<f32>, color_kind: u32,
+  // Radius of the lens and distance of the focus; 0 is a pinhole. Number of sources of shadow rays. Whether every second
+  // sample is kept, and whether rays can hit lights
+  lens_radius: f32, lens_focus: f32, sources: u32, has_odd: u32,
+  has_extents: u32, zero_one: u32, zero_two: u32, zero_three: u32,
   // Material: ambient light times `Ka`, and the constants of Blinn and Phong
   ambient: vec3<f32>, diffuse: f32,
   color: vec3<f32>, specular: f32,

@@ -1,0 +1,221 @@
+//! What path tracing needs beside the spheres: environment, ground, materials, in plain values.
+
+use bytemuck::{Pod, Zeroable};
+
+/// How light is transported.
+#[derive(Debug, Clone, Copy)]
+pub enum Model<'a> {
+    /// Whitted's model: ambient light, lights without extent, mirrored rays.
+    Whitted,
+    /// Path tracing.
+    Paths(&'a Lighting),
+}
+
+/// Number of sources of shadow rays: the lights, and for paths the environment and their last segments.
+pub(crate) const fn source_count(has_paths: bool, lights: u32) -> u32 {
+    if has_paths { 2 + lights } else { lights }
+}
+
+/// Memory of a ray that goes on, and of a shadow ray, bytes.
+pub(crate) const fn ray_bytes(has_paths: bool) -> u64 {
+    if has_paths { 48 } else { 32 }
+}
+
+/// The scene of path tracing.
+#[derive(Debug, Clone)]
+pub struct Lighting {
+    /// Diffuse reflections before the last one.
+    pub bounces: u32,
+    /// If paths end at the second surface with an estimate: the distance at which half of the light arrives.
+    pub ambient_reach: Option<f32>,
+    /// The environment; None if it is black.
+    pub environment: Option<Environment>,
+    /// Whether camera rays see it instead of the background.
+    pub is_environment_visible: bool,
+    /// The ground.
+    pub ground: Option<Ground>,
+    /// How the spheres reflect light.
+    pub finish: Finish,
+    /// All tables and pixels that [`TablePlace`]s refer to.
+    pub tables: Tables,
+}
+
+/// Numbers that are too many for a uniform.
+#[derive(Debug, Clone, Default)]
+pub struct Tables {
+    /// Radiance (linear RGB) and density of texels, and pixels of images.
+    pub texels: Vec<[f32; 4]>,
+    /// Cumulative probabilities, and tables of materials.
+    pub constants: Vec<f32>,
+    /// Differs from that of all other tables of the process.
+    pub version: u64,
+}
+
+/// Where a table of an environment is in [`Tables`].
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct TablePlace {
+    /// Edge in texels.
+    pub side: u32,
+    /// Its first texel.
+    pub records: u32,
+    /// Its first cumulative probability.
+    pub ends: u32,
+}
+
+/// Light from infinitely far away.
+#[derive(Debug, Clone, Copy)]
+pub struct Environment {
+    /// Unit vectors: right, back, up.
+    pub axes: [[f32; 3]; 3],
+    /// The table that is sampled.
+    pub table: TablePlace,
+    /// The first pixel of the image, which has 512 columns and 256 rows.
+    pub image: u32,
+    /// Irradiance in spherical harmonics.
+    pub harmonics: [[f32; 3]; 9],
+}
+
+/// A plane that is visible from above.
+#[derive(Debug, Clone, Copy)]
+pub struct Ground {
+    /// Unit normal.
+    pub up: [f32; 3],
+    /// Distance from the origin along `up`.
+    pub height: f32,
+    /// Where distances for fading count from: the middle of a box, and half its size.
+    pub center: [f32; 3],
+    /// See `center`.
+    pub base: [f32; 3],
+    /// Distances at which it begins to fade, and has faded out.
+    pub fade: [f32; 2],
+    /// Linear RGB.
+    pub color: [f32; 3],
+    /// The edge of the squares of a checkerboard, and the direction of one of their edges.
+    pub checker: Option<(f32, [f32; 3])>,
+    /// If camera rays see nothing of it but shadows.
+    pub catcher: Option<Catcher>,
+}
+
+/// A ground that shows shadows only.
+#[derive(Debug, Clone, Copy)]
+pub struct Catcher {
+    /// Strength of the shadows, 0 to 1.
+    pub strength: f32,
+    /// Radiance that a white ground reflects of the environment if nothing is in the way.
+    pub whole: [f32; 3],
+    /// The environment times the cosine with the ground.
+    pub table: TablePlace,
+}
+
+/// Reflection of light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Finish {
+    /// In all directions alike.
+    Matte,
+    /// A matte base under a rough coat.
+    Plastic(Rough),
+    /// A rough mirror in the base colour.
+    Metal(Rough),
+}
+
+/// A rough surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rough {
+    /// Width of the distribution of microfacets.
+    pub alpha: f32,
+    /// Place in [`Tables::constants`] of the light that leaves, for 65 cosines from 0 to 1, and of its mean.
+    pub table: u32,
+}
+
+/// The uniform `SceneUniform` of the shaders.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+pub(crate) struct SceneUniform {
+    axis_right: [f32; 3],
+    catcher_strength: f32,
+    axis_back: [f32; 3],
+    reach: f32,
+    axis_up: [f32; 3],
+    bounces: u32,
+    catcher_whole: [f32; 3],
+    is_catcher: u32,
+    ground_up: [f32; 3],
+    ground_height: f32,
+    ground_center: [f32; 3],
+    fade_start: f32,
+    ground_base: [f32; 3],
+    fade_end: f32,
+    ground_color: [f32; 3],
+    ground_kind: u32,
+    ground_across: [f32; 3],
+    ground_tile: f32,
+    environment: [u32; 4],
+    catcher: [u32; 4],
+    image: u32,
+    is_environment_visible: u32,
+    zeros: [u32; 2],
+    finish: u32,
+    alpha: f32,
+    albedo_table: u32,
+    is_ambient: u32,
+    harmonics: [[f32; 4]; 9],
+}
+
+impl From<TablePlace> for [u32; 4] {
+    fn from(place: TablePlace) -> Self {
+        [place.side, place.records, place.ends, 0]
+    }
+}
+
+impl From<&Lighting> for SceneUniform {
+    fn from(lighting: &Lighting) -> Self {
+        let (finish, rough) = match lighting.finish {
+            Finish::Matte => (0, Rough { alpha: 1.0, table: 0 }),
+            Finish::Plastic(rough) => (1, rough),
+            Finish::Metal(rough) => (2, rough),
+        };
+        let mut uniform = Self {
+            bounces: lighting.bounces,
+            is_ambient: lighting.ambient_reach.is_some().into(),
+            reach: lighting.ambient_reach.unwrap_or_default(),
+            is_environment_visible: lighting.is_environment_visible.into(),
+            finish,
+            alpha: rough.alpha,
+            albedo_table: rough.table,
+            ..Self::default()
+        };
+        if let Some(environment) = &lighting.environment {
+            [uniform.axis_right, uniform.axis_back, uniform.axis_up] = environment.axes;
+            uniform.environment = environment.table.into();
+            uniform.image = environment.image;
+            uniform.harmonics = environment.harmonics.map(|[r, g, b]| [r, g, b, 0.0]);
+        }
+        if let Some(ground) = &lighting.ground {
+            uniform.set_ground(ground);
+        }
+        uniform
+    }
+}
+
+impl SceneUniform {
+    fn set_ground(&mut self, ground: &Ground) {
+        self.ground_up = ground.up;
+        self.ground_height = ground.height;
+        self.ground_center = ground.center;
+        self.ground_base = ground.base;
+        [self.fade_start, self.fade_end] = ground.fade;
+        self.ground_color = ground.color;
+        self.ground_kind = 1;
+        if let Some((tile, across)) = ground.checker {
+            self.ground_kind = 2;
+            self.ground_tile = tile;
+            self.ground_across = across;
+        }
+        if let Some(catcher) = &ground.catcher {
+            self.is_catcher = 1;
+            self.catcher_strength = catcher.strength;
+            self.catcher_whole = catcher.whole;
+            self.catcher = catcher.table.into();
+        }
+    }
+}

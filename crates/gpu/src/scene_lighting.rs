@@ -1,0 +1,170 @@
+//! The lighting of scenes of the tracer. Its tables take milliseconds to compute, so they are kept while the scene has
+//! the same environment, ground and material.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use glam::Vec3;
+use spherule_tracer::render::device::{ambient_reach, light_on, reflected_by_white, rough_table};
+use spherule_tracer::render::{IndirectLight, RenderSettings};
+use spherule_tracer::scene::ground::Pattern;
+use spherule_tracer::scene::{self, Finish, Scene, environment::TableArrays};
+
+use crate::lighting::{self, Catcher, Ground, Lighting, Rough, TablePlace, Tables};
+
+/// What the tables depend on.
+#[derive(Debug, Clone)]
+struct Key {
+    environment: Option<Arc<scene::Environment>>,
+    finish: Finish,
+    /// The normal of a shadow catcher.
+    catcher: Option<Vec3>,
+}
+
+impl Key {
+    fn of(scene: &Scene) -> Self {
+        let ground = scene.ground.as_ref();
+        Self {
+            environment: scene.environment.clone().filter(|environment| !environment.is_black()),
+            finish: scene.particle_material().finish,
+            catcher: ground.filter(|ground| ground.shadow_catcher.is_some()).map(|g| g.up),
+        }
+    }
+
+    fn is_same(&self, other: &Self) -> bool {
+        let environments = match (&self.environment, &other.environment) {
+            (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+            (None, None) => true,
+            _ => false,
+        };
+        environments && self.finish == other.finish && self.catcher == other.catcher
+    }
+}
+
+/// The lighting of the last scene.
+#[derive(Debug, Default)]
+pub(crate) struct SceneLighting {
+    kept: Option<(Key, Lighting)>,
+}
+
+impl SceneLighting {
+    /// The lighting of `scene`. Its ground has no pattern but squares.
+    pub(crate) fn of(&mut self, scene: &Scene, settings: &RenderSettings) -> &Lighting {
+        let key = Key::of(scene);
+        let kept = self.kept.take().filter(|(kept, _)| kept.is_same(&key));
+        let (_, lighting) = self.kept.insert(kept.unwrap_or_else(|| {
+            let lighting = prepared(&key);
+            (key, lighting)
+        }));
+        // What is cheap follows the scene
+        let catcher = lighting.ground.and_then(|ground| ground.catcher);
+        lighting.ground = scene.ground.as_ref().map(|ground| ground_of(ground, catcher));
+        lighting.is_environment_visible = scene.is_environment_visible;
+        lighting.bounces = settings.traced_bounces();
+        lighting.ambient_reach = match settings.indirect {
+            IndirectLight::Traced => None,
+            IndirectLight::Ambient { radius } => Some(ambient_reach(radius)),
+        };
+        lighting
+    }
+}
+
+/// The lighting with all tables. Of the ground, only the catcher is known.
+fn prepared(key: &Key) -> Lighting {
+    static VERSIONS: AtomicU64 = AtomicU64::new(0);
+    let version = VERSIONS.fetch_add(1, Ordering::Relaxed);
+    let mut tables = Tables { version, ..Tables::default() };
+    let environment = key.environment.as_deref();
+    let finish = finish_of(key.finish, &mut tables);
+    let catcher = key.catcher.map(|up| {
+        let light = environment.map(|environment| light_on(environment, up));
+        Catcher {
+            strength: 1.0,
+            whole: light.as_ref().map_or(Vec3::ZERO, reflected_by_white).to_array(),
+            table: light.map_or_else(TablePlace::default, |table| tables.add(table.arrays())),
+        }
+    });
+    Lighting {
+        environment: environment.map(|environment| environment_of(environment, &mut tables)),
+        ground: catcher.map(|catcher| Ground { catcher: Some(catcher), ..NO_GROUND }),
+        finish,
+        bounces: 0,
+        ambient_reach: None,
+        is_environment_visible: false,
+        tables,
+    }
+}
+
+const NO_GROUND: Ground = Ground {
+    up: [0.0; 3],
+    height: 0.0,
+    center: [0.0; 3],
+    base: [0.0; 3],
+    fade: [0.0; 2],
+    color: [0.0; 3],
+    checker: None,
+    catcher: None,
+};
+
+impl Tables {
+    /// The place of the next number of an array.
+    fn place<T>(numbers: &[T]) -> u32 {
+        u32::try_from(numbers.len()).expect("tables are small")
+    }
+
+    fn add(&mut self, table: TableArrays<'_>) -> TablePlace {
+        let place = TablePlace {
+            side: u32::try_from(table.side).expect("tables are small"),
+            records: Self::place(&self.texels),
+            ends: Self::place(&self.constants),
+        };
+        self.texels.extend_from_slice(table.records);
+        self.constants.extend_from_slice(table.rows);
+        self.constants.extend_from_slice(table.cells);
+        place
+    }
+}
+
+fn environment_of(environment: &scene::Environment, tables: &mut Tables) -> lighting::Environment {
+    let axes = environment.axes();
+    let table = tables.add(environment.table().arrays());
+    let image = Tables::place(&tables.texels);
+    tables.texels.extend(environment.pixels().iter().map(|[r, g, b]| [*r, *g, *b, 0.0]));
+    lighting::Environment {
+        axes: [axes.right, axes.back, axes.up].map(|axis| axis.to_array()),
+        table,
+        image,
+        harmonics: environment.irradiance_harmonics().coefficients().map(|c| c.to_array()),
+    }
+}
+
+fn finish_of(finish: Finish, tables: &mut Tables) -> lighting::Finish {
+    let rough = rough_table(finish).map(|(alpha, numbers)| {
+        let table = Tables::place(&tables.constants);
+        tables.constants.extend(numbers);
+        Rough { alpha, table }
+    });
+    match (finish, rough) {
+        (Finish::Plastic { .. }, Some(rough)) => lighting::Finish::Plastic(rough),
+        (Finish::Metal { .. }, Some(rough)) => lighting::Finish::Metal(rough),
+        _ => lighting::Finish::Matte,
+    }
+}
+
+fn ground_of(ground: &scene::Ground, catcher: Option<Catcher>) -> Ground {
+    Ground {
+        up: ground.up.to_array(),
+        height: ground.height,
+        center: ground.center.to_array(),
+        base: ground.base.to_array(),
+        fade: [ground.fade_start, ground.fade_end],
+        color: ground.color.to_array(),
+        checker: match ground.pattern {
+            Pattern::Checker { tile } => Some((tile, ground.axes()[0].to_array())),
+            Pattern::Plain | Pattern::Sand { .. } | Pattern::Image(_) => None,
+        },
+        catcher: ground
+            .shadow_catcher
+            .and_then(|strength| catcher.map(|catcher| Catcher { strength, ..catcher })),
+    }
+}

@@ -1,0 +1,337 @@
+// Path tracing of opaque spheres on a ground, as the CPU's integrator, with the same random numbers.
+//
+// At each point of a surface, a direction is sampled from the environment and one from the BSDF, weighted by the balance
+// heuristic, and each light is sampled. The path goes on in the direction of the BSDF; from the third reflection on it
+// ends at random. The sources of shadow rays are the environment, the last segments of paths, and the lights.
+//
+// A ray that goes on has its direction and density, and its throughput beside its origin. A shadow ray has its direction
+// and length, and its radiance. A shadow ray from a shadow catcher takes light away if it is blocked, and adds coverage.
+
+const RAY: u32 = 3u;
+const SHADOW: u32 = 3u;
+
+// Sources of shadow rays; those of the lights follow
+const OF_ENVIRONMENT: u32 = 0u;
+const OF_LAST: u32 = 1u;
+const FIRST_LIGHT: u32 = 2u;
+
+// In place of a coverage: the ray adds light if nothing blocks it
+const ADDS: f32 = -1.0;
+
+// Reflections from which on paths end at random, and the largest probability of going on
+const ROULETTE_START: u32 = 2u;
+const MAX_CONTINUATION: f32 = 0.95;
+
+// The part of the light that arrives at a second surface far away, for ambient light
+const MAX_AMBIENT: f32 = 0.8;
+
+const LUMINANCE: vec3<f32> = vec3<f32>(0.2126, 0.7152, 0.0722);
+
+// A path up to a ray
+struct Path { throughput: vec3<f32>, pdf: f32, pixel: u32, on_film: vec2<f32> }
+
+// A point of an opaque surface
+struct Vertex { normal: vec3<f32>, start: vec3<f32>, base: vec3<f32>, out: vec3<f32>, kind: u32 }
+
+// A shadow ray, if it is needed
+struct Shadow { is_needed: bool, start: vec3<f32>, direction: vec3<f32>, length: f32, radiance: vec3<f32>, coverage: f32 }
+
+fn no_shadow() -> Shadow {
+  return Shadow(false, vec3<f32>(0.0), vec3<f32>(0.0), 0.0, vec3<f32>(0.0), ADDS);
+}
+
+fn push_shadow(source: u32, shadow: Shadow, pixel: u32) {
+  let place = append(queue_of(stage.depth) + 1u + source, shadow.is_needed) + first_shadow(source);
+  if (shadow.is_needed) {
+    shadows[SHADOW * place] = vec4<f32>(shadow.start, bitcast<f32>(pixel));
+    shadows[SHADOW * place + 1u] = vec4<f32>(shadow.direction, shadow.length);
+    shadows[SHADOW * place + 2u] = vec4<f32>(shadow.radiance, shadow.coverage);
+  }
+}
+
+// The seed of the random numbers of a pixel after a number of reflections
+fn seed_at(pixel: u32, bounces: u32) -> Wide {
+  let x = i32(pixel % view.width) + view.corner.x;
+  let y = i32(pixel / view.width) + view.corner.y;
+  var seed = seed_of_pixel(u32(x), u32(y));
+  for (var i = 0u; i < bounces; i++) { seed = child_of(seed, BOUNCED); }
+  return seed;
+}
+
+// The light of a sample that a surface reflects. `competes`: rays of the BSDF find that light, too.
+fn reflected(vertex: Vertex, weight: vec3<f32>, light: LightSample, competes: bool) -> vec3<f32> {
+  let value = eval_bsdf(vertex.kind, vertex.base, vertex.normal, vertex.out, light.direction);
+  let other = select(0.0, value.w, competes);
+  let factor = select(1.0, 1.0 / (light.pdf + other), light.pdf < FAR);
+  return weight * (value.xyz * (light.radiance * factor));
+}
+
+fn shadow_of(vertex: Vertex, light: LightSample, radiance: vec3<f32>) -> Shadow {
+  return Shadow(largest_of(radiance) > 0.0, vertex.start, light.direction, light.distance, radiance, ADDS);
+}
+
+fn sample_source(number: u32, vertex: Vertex, seed: Wide) -> LightSample {
+  let light = view.lights[number];
+  var u = vec2<f32>(0.0);
+  if (has_extent(light)) { u = numbers_2d(seed, LIGHTS + number, current.sample); }
+  return sample_light(light, vertex.start, u);
+}
+
+// What a ray sees of lights before a surface at distance `t`, or beyond all: of rays that a BSDF chose, weighted against
+// the sampling of the light; a camera ray ends at the nearest visible light, which covers the pixel.
+struct Emitted { light: vec3<f32>, ends: bool }
+
+fn emitted_along(ray: Ray, path: Path, t: f32) -> Emitted {
+  var sum = vec3<f32>(0.0);
+  var nearest_light = FAR;
+  var ends = false;
+  for (var number = 0u; number < view.light_count; number++) {
+    let light = view.lights[number];
+    let is_seen = stage.depth == 1u && light.is_visible == 1u;
+    if (!has_extent(light) || !(path.pdf < FAR || is_seen)) { continue; }
+    let found = hit_light(light, ray);
+    if (!found.is_hit || !(found.t < t || t >= FAR)) { continue; }
+    if (path.pdf < FAR) {
+      sum += path.throughput * (balance(path.pdf, found.pdf) * light.radiance);
+    } else if (!ends || found.t < nearest_light) {
+      sum = path.throughput * light.radiance;
+      nearest_light = found.t;
+      ends = true;
+    }
+  }
+  return Emitted(sum, ends);
+}
+
+// What a camera ray sees behind everything
+fn seen_behind(ray: Ray, on_film: vec2<f32>) -> vec3<f32> {
+  if (view.transparent == 1u) { return vec3<f32>(0.0); }
+  if (scene.is_environment_visible == 0u) { return backdrop(ray.direction, on_film); }
+  return environment_along(ray.direction, FAR);
+}
+
+// The shadow rays of a shadow catcher: what is blocked darkens the background by its part of the whole light.
+fn catch_shadows(is_caught: bool, ground: GroundHit, ray: Ray, path: Path, seed: Wide) {
+  let white = Vertex(scene.ground_up, above_ground(ground), vec3<f32>(1.0), -ray.direction, MATTE);
+  let darkness = scene.catcher_strength * ground.opacity;
+  // The light that arrives if nothing is in the way
+  var whole = scene.catcher_whole;
+  if (is_caught) {
+    for (var number = 0u; number < view.light_count; number++) {
+      whole += reflected(white, vec3<f32>(1.0), sample_source(number, white, seed), false);
+    }
+  }
+  let behind = seen_behind(ray, path.on_film);
+  let part = select(vec3<f32>(0.0), darkness / whole, whole > vec3<f32>(0.0));
+  // A ray to each source
+  var shadow = no_shadow();
+  if (is_caught && scene.catcher.side > 0u) {
+    let sample = sample_table(scene.catcher, numbers_2d(seed, ENVIRONMENT, current.sample));
+    let lost = sample.radiance * (INVERSE_PI / sample.pdf) * part;
+    let is_above = dot(sample.direction, white.normal) > 0.0;
+    shadow = Shadow(is_above, white.start, sample.direction, FAR, -lost * behind, dot(lost, LUMINANCE));
+  }
+  push_shadow(OF_ENVIRONMENT, shadow, path.pixel);
+  for (var number = 0u; number < view.light_count; number++) {
+    shadow = no_shadow();
+    if (is_caught && view.lights[number].casts_shadow == 1u) {
+      let light = sample_source(number, white, seed);
+      let lost = reflected(white, vec3<f32>(1.0), light, false) * part;
+      let is_needed = largest_of(lost) > 0.0;
+      shadow = Shadow(is_needed, white.start, light.direction, light.distance, -lost * behind, dot(lost, LUMINANCE));
+    }
+    push_shadow(FIRST_LIGHT + number, shadow, path.pixel);
+  }
+}
+
+// The light of a second surface at a distance from the first, where the path ends: an estimate (`path/ambient.rs`).
+fn ambient_light(vertex: Vertex, weight: vec3<f32>, t: f32, seed: Wide) -> vec3<f32> {
+  let arriving = weight * (MAX_AMBIENT * (t / (t + scene.reach)));
+  var sum = vec3<f32>(0.0);
+  if (scene.environment.side > 0u) { sum = arriving * vertex.base * irradiance_at(vertex.normal) * INVERSE_PI; }
+  for (var number = 0u; number < view.light_count; number++) {
+    sum += reflected(vertex, arriving, sample_source(number, vertex, seed), false);
+  }
+  return sum;
+}
+
+// The next ray of a path
+struct Next { is_ray: bool, direction: vec3<f32>, throughput: vec3<f32>, pdf: f32 }
+
+fn next_ray(vertex: Vertex, weight: vec3<f32>, bounces: u32, seed: Wide) -> Next {
+  let sample = sample_bsdf(vertex.kind, vertex.base, vertex.normal, vertex.out, numbers_2d(seed, BSDF, current.sample));
+  return Next(sample.pdf > 0.0, sample.direction, weight * sample.weight, sample.pdf);
+}
+
+// Ends long paths at random, and makes up for it.
+fn roulette(next: Next, bounces: u32, seed: Wide) -> Next {
+  if (bounces < ROULETTE_START) { return next; }
+  let chance = min(largest_of(next.throughput), MAX_CONTINUATION);
+  let goes_on = number_1d(seed, CONTINUATION, current.sample) < chance;
+  return Next(next.is_ray && goes_on, next.direction, next.throughput / chance, next.pdf);
+}
+
+// Adds what a ray sees without shadows, and appends the rays that leave its intersection.
+fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
+  var sum = vec4<f32>(0.0);
+  let is_first = stage.depth == 1u;
+  let bounces = stage.depth - 1u;
+  let t = select(ground.t, hit.t, hit.slot != MISS);
+  // Lights, which may end the ray
+  let emitted = emitted_along(ray, path, t);
+  sum += vec4<f32>(emitted.light, select(0.0, 1.0, emitted.ends));
+  let is_open = is_ray && !emitted.ends;
+  let is_sphere = is_open && hit.slot != MISS;
+  let is_ground = is_open && hit.slot == MISS && ground.t < FAR;
+  var seed = Wide(0u);
+  if (is_sphere || is_ground) { seed = seed_at(path.pixel, bounces); }
+  // A catcher shows its shadows only; all rays of a dispatch take the same branch
+  let is_caught = is_first && is_ground && scene.is_catcher == 1u;
+  // What is behind all surfaces, and behind a ground that fades out
+  let uncovered = select(1.0, 1.0 - ground.opacity, is_ground && !is_caught);
+  if (is_open && !is_sphere && uncovered > 0.0) {
+    if (is_first) {
+      sum += vec4<f32>(uncovered * seen_behind(ray, path.on_film), 0.0);
+    } else {
+      let pdf = select(path.pdf, FAR, is_ground);
+      sum += vec4<f32>(uncovered * path.throughput * environment_along(ray.direction, pdf), 0.0);
+    }
+  }
+  // The point of the surface
+  var vertex: Vertex;
+  var weight = path.throughput;
+  if (is_sphere) {
+    let surface = surface_at(ray, hit);
+    vertex = Vertex(surface.normal, surface.start, base_color(hit.index), -ray.direction, scene.finish);
+    if (is_first) { keep_nearest(depth_of(ray, hit.t), hit.index, surface.normal, surface.point, path.pixel); }
+  } else if (is_ground) {
+    vertex = Vertex(scene.ground_up, above_ground(ground), ground_color(ground.point), -ray.direction, MATTE);
+    weight *= ground.opacity;
+    if (is_first && !is_caught) {
+      keep_nearest(depth_of(ray, ground.t), GROUND, scene.ground_up, ground.point, path.pixel);
+    }
+  }
+  vertex.base = clamp(vertex.base, vec3<f32>(0.0), vec3<f32>(1.0));
+  if (is_first && (is_sphere || (is_ground && !is_caught))) {
+    sum.w += select(1.0, ground.opacity, view.transparent == 1u && is_ground);
+  }
+  if (is_first && scene.is_catcher == 1u) { catch_shadows(is_caught, ground, ray, path, seed); }
+  var is_shaded = (is_sphere || is_ground) && !is_caught && bounces <= scene.bounces;
+  if (is_shaded && scene.is_ambient == 1u && bounces > 0u) {
+    sum += vec4<f32>(ambient_light(vertex, weight, t, seed), 0.0);
+    is_shaded = false;
+  }
+  // Light of the environment
+  var shadow = no_shadow();
+  if (is_shaded && scene.environment.side > 0u) {
+    let sample = sample_table(scene.environment, numbers_2d(seed, ENVIRONMENT, current.sample));
+    let light = LightSample(sample.direction, FAR, sample.radiance, sample.pdf);
+    shadow = shadow_of(vertex, light, reflected(vertex, weight, light, true));
+  }
+  push_shadow(OF_ENVIRONMENT, shadow, path.pixel);
+  // Light of each source
+  for (var number = 0u; number < view.light_count; number++) {
+    shadow = no_shadow();
+    if (is_shaded) {
+      let source = view.lights[number];
+      let light = sample_source(number, vertex, seed);
+      let radiance = reflected(vertex, weight, light, has_extent(source));
+      shadow = shadow_of(vertex, light, radiance);
+      if (shadow.is_needed && source.casts_shadow == 0u) {
+        sum += vec4<f32>(radiance, 0.0);
+        shadow.is_needed = false;
+      }
+    }
+    push_shadow(FIRST_LIGHT + number, shadow, path.pixel);
+  }
+  // Go on in a direction of the BSDF; the last segment may be a shadow ray to the environment
+  var next = Next(false, vec3<f32>(0.0), vec3<f32>(0.0), 0.0);
+  shadow = no_shadow();
+  if (is_shaded) {
+    next = next_ray(vertex, weight, bounces, seed);
+    next.is_ray = next.is_ray && largest_of(next.throughput) > 0.0;
+    if (bounces == scene.bounces && view.has_extents == 0u) {
+      let radiance = next.throughput * environment_along(next.direction, next.pdf);
+      let is_needed = next.is_ray && largest_of(radiance) > 0.0;
+      shadow = Shadow(is_needed, vertex.start, next.direction, FAR, radiance, ADDS);
+      next.is_ray = false;
+    } else {
+      next = roulette(next, bounces, seed);
+    }
+  }
+  push_shadow(OF_LAST, shadow, path.pixel);
+  let place = append(queue_of(stage.depth), next.is_ray);
+  if (next.is_ray) {
+    next_rays[RAY * place] = vec4<f32>(vertex.start, bitcast<f32>(path.pixel));
+    next_rays[RAY * place + 1u] = vec4<f32>(next.direction, next.pdf);
+    next_rays[RAY * place + 2u] = vec4<f32>(next.throughput, 0.0);
+  }
+  if (is_ray) { add_to_film(path.pixel, sum); }
+}
+
+// Camera rays, in squares of 8x8 pixels.
+@compute @workgroup_size(8, 8)
+fn trace_camera(@builtin(global_invocation_id) id: vec3<u32>) {
+  let is_ray = id.x < view.width && id.y < view.height;
+  let pixel = id.y * view.width + id.x;
+  var path = Path(vec3<f32>(1.0), FAR, pixel, vec2<f32>(0.0));
+  var ray: Ray;
+  var ground = GroundHit(FAR, 0.0, vec3<f32>(0.0));
+  var hit = Hit(0.0, MISS, MISS);
+  if (is_ray) {
+    if (current.sample == 0u) { clear_pixel(pixel); }
+    path.on_film = film_position(id.x, id.y, current.sample);
+    ray = camera_ray(path.on_film);
+    if (view.lens_radius > 0.0) {
+      let seed = child_of(seed_at(pixel, 0u), CAMERA);
+      ray = through_lens(ray, numbers_2d(seed, LENS, current.sample));
+    }
+    ground = hit_ground(ray);
+    hit = nearest(ray, ground.t);
+  }
+  follow(is_ray, ray, path, ground, hit);
+}
+
+// The rays that go on from the depth before.
+@compute @workgroup_size(64)
+fn trace_next(
+  @builtin(workgroup_id) group: vec3<u32>,
+  @builtin(num_workgroups) groups: vec3<u32>,
+  @builtin(local_invocation_index) local: u32,
+) {
+  let i = linear_index(group, groups, local);
+  let is_ray = i < atomicLoad(&queued[queue_of(stage.depth - 1u)]);
+  var path = Path(vec3<f32>(0.0), FAR, 0u, vec2<f32>(0.0));
+  var ray: Ray;
+  var ground = GroundHit(FAR, 0.0, vec3<f32>(0.0));
+  var hit = Hit(0.0, MISS, MISS);
+  if (is_ray) {
+    let origin = rays[RAY * i];
+    let direction = rays[RAY * i + 1u];
+    ray = Ray(origin.xyz, direction.xyz);
+    path = Path(rays[RAY * i + 2u].xyz, direction.w, bitcast<u32>(origin.w), vec2<f32>(0.0));
+    ground = hit_ground(ray);
+    hit = nearest(ray, ground.t);
+  }
+  follow(is_ray, ray, path, ground, hit);
+}
+
+// Adds the light of a source that arrives at the surfaces of a depth, or takes away that which does not arrive.
+@compute @workgroup_size(64)
+fn trace_shadow(
+  @builtin(workgroup_id) group: vec3<u32>,
+  @builtin(num_workgroups) groups: vec3<u32>,
+  @builtin(local_invocation_index) local: u32,
+) {
+  let i = linear_index(group, groups, local);
+  if (i >= atomicLoad(&queued[queue_of(stage.depth) + 1u + stage.source])) { return; }
+  let place = SHADOW * (i + first_shadow(stage.source));
+  let start = shadows[place];
+  let into = shadows[place + 1u];
+  let light = shadows[place + 2u];
+  let ray = Ray(start.xyz, into.xyz);
+  let is_blocked = is_below_ground(ray, into.w) || is_occluded(ray, into.w);
+  let adds = light.w == ADDS;
+  if (is_blocked == adds) { return; }
+  let coverage = select(0.0, light.w, !adds && view.transparent == 1u);
+  add_to_film(bitcast<u32>(start.w), vec4<f32>(light.xyz, coverage));
+}

@@ -1,0 +1,80 @@
+// Pixels, and queues of rays.
+//
+// Each sample of all pixels passes through the kernels depth by depth. `trace_camera` and `trace_next` find the
+// intersections of the rays of a depth, add what they show without shadows, and append rays to queues: those that go on
+// to that of the next depth, and shadow rays to one for each source of light. `trace_shadow` adds the light that arrives.
+// The order of a queue changes from run to run, but not the picture: in a dispatch, each pixel receives at most one
+// contribution.
+
+// Sums over the samples of each pixel: red, green, blue, coverage; then, for denoising, those over every second sample
+@group(0) @binding(6) var<storage, read_write> film: array<vec4<f32>>;
+// The nearest sample of each pixel: depth, index of the sphere, normal, position
+@group(0) @binding(7) var<storage, read_write> data: array<vec4<u32>>;
+// Lengths of the queues of a sample: for each depth, that of the rays that go on, then those of shadow rays by source
+@group(0) @binding(8) var<storage, read_write> queued: array<atomic<u32>>;
+// Rays of this depth and of the next one, `RAY` vectors each: origin and pixel, and what the model needs
+@group(0) @binding(9) var<storage, read> rays: array<vec4<f32>>;
+@group(0) @binding(10) var<storage, read_write> next_rays: array<vec4<f32>>;
+// Queues of shadow rays, one behind the other, `SHADOW` vectors each: start and pixel, and what the model needs
+@group(0) @binding(11) var<storage, read_write> shadows: array<vec4<f32>>;
+@group(0) @binding(13) var<uniform> stage: Stage;
+// The lengths of all queues over all samples, in two words each
+@group(0) @binding(14) var<storage, read_write> sums: array<u32>;
+
+@group(0) @binding(18) var<uniform> current: Current;
+
+// What differs between the dispatches of a sample. `depth` counts from 1.
+struct Stage { depth: u32, source: u32, queues: u32, zero: u32 }
+
+// What differs between samples
+struct Current { sample: u32, zero: u32, zero_too: u32, zero_three: u32 }
+
+// The index in `data` of a pixel whose nearest sample is of the ground
+const GROUND: u32 = 0xfffffffeu;
+
+// The number of the queue of the rays that go on from a depth; those of its shadow rays follow, source by source.
+fn queue_of(depth: u32) -> u32 {
+  return (depth - 1u) * (1u + view.sources);
+}
+
+// The place of the first shadow ray to a source
+fn first_shadow(source: u32) -> u32 {
+  return source * view.width * view.height;
+}
+
+// Adds light and coverage to a pixel.
+fn add_to_film(pixel: u32, sum: vec4<f32>) {
+  film[pixel] += sum;
+  if (view.has_odd == 1u && (current.sample & 1u) == 1u) { film[view.width * view.height + pixel] += sum; }
+}
+
+// Empties a pixel before its first sample.
+fn clear_pixel(pixel: u32) {
+  film[pixel] = vec4<f32>(0.0);
+  if (view.has_odd == 1u) { film[view.width * view.height + pixel] = vec4<f32>(0.0); }
+  data[2u * pixel] = vec4<u32>(bitcast<u32>(FAR), MISS, 0u, 0u);
+  data[2u * pixel + 1u] = vec4<u32>(0u);
+}
+
+// Keeps the data of the nearest sample of a pixel, the first of equals.
+fn keep_nearest(depth: f32, index: u32, normal: vec3<f32>, point: vec3<f32>, pixel: u32) {
+  if (depth < bitcast<f32>(data[2u * pixel].x)) {
+    data[2u * pixel] = vec4<u32>(bitcast<u32>(depth), index, bitcast<vec2<u32>>(normal.xy));
+    data[2u * pixel + 1u] = vec4<u32>(bitcast<u32>(normal.z), bitcast<vec3<u32>>(point));
+  }
+}
+
+fn linear_index(group: vec3<u32>, groups: vec3<u32>, local: u32) -> u32 {
+  return (group.y * groups.x + group.x) * 64u + local;
+}
+
+// Empties all queues before a sample, and adds up their lengths.
+@compute @workgroup_size(64)
+fn empty_queues(@builtin(global_invocation_id) id: vec3<u32>) {
+  let queue = id.x;
+  if (queue >= stage.queues) { return; }
+  let length = atomicExchange(&queued[queue], 0u);
+  let sum = sums[2u * queue] + length;
+  sums[2u * queue + 1u] += select(0u, 1u, sum < length);
+  sums[2u * queue] = sum;
+}
