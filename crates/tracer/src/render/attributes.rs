@@ -126,13 +126,15 @@ impl RenderContext<'_> {
         })
     }
 
-    /// Fraction of each sample that surfaces cover, or `otherwise` without a surface. A ground that fades out still
-    /// covers all of it, unless the background is transparent. Holdouts cover nothing.
+    /// Fraction of each sample that surfaces cover beside `otherwise`. A ground that fades out still covers all of it,
+    /// unless the background is transparent. Holdouts cover nothing.
     pub(super) fn coverage(&self, hits: &Intersections, otherwise: &Lanes) -> Lanes {
         std::array::from_fn(|lane| match hits.mask >> lane & 1 {
             0 => otherwise[lane],
             _ if self.is_holdout(hits.material[lane]) => 0.0,
-            _ if self.settings.transparent_background => hits.opacity[lane],
+            _ if self.settings.transparent_background => {
+                otherwise[lane] + (1.0 - otherwise[lane]) * hits.opacity[lane]
+            }
             _ => 1.0,
         })
     }

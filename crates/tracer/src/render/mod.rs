@@ -59,6 +59,7 @@ mod stop;
 mod stream;
 mod tile;
 mod translucent;
+mod underlay;
 mod visibility;
 mod whitted;
 mod window;

@@ -29,26 +29,27 @@ use spherule_tree::ray::RayPacket;
 const MAX_PANES: usize = 64;
 
 /// A ray at a pane.
-struct PaneCrossing {
-    hit: Intersection,
+pub(super) struct PaneCrossing {
+    pub(super) hit: Intersection,
     material: MaterialId,
     /// Part of the light that is reflected.
-    reflectance: f32,
+    pub(super) reflectance: f32,
     /// Part of the light that passes, linear RGB.
-    transmittance: Vec3,
+    pub(super) transmittance: Vec3,
 }
 
 impl RenderContext<'_> {
-    /// Calls `visit` with the panes on the rays of `lanes`, from the origin on, until it returns false or the ray ends. At
-    /// equal distances, the first pane in the scene comes first.
-    fn walk_panes(
+    /// Calls `visit` with those of `panes` on the rays of `lanes`, from the origin on, until it returns false or the ray
+    /// ends. At equal distances, the first pane comes first.
+    pub(super) fn walk_panes(
         &self,
+        panes: &[&dyn Shape],
         mut rays: RayPacket,
         lanes: u32,
         coherence: Coherence,
         mut visit: impl FnMut(usize, PaneCrossing) -> bool,
     ) {
-        let panes = &self.shapes.panes[..self.shapes.panes.len().min(MAX_PANES)];
+        let panes = &panes[..panes.len().min(MAX_PANES)];
         // The lanes that are inside panes that are connected bodies
         let mut inside = [0; MAX_PANES];
         for (inside, pane) in inside.iter_mut().zip(panes).filter(|(_, p)| p.is_connected()) {
@@ -112,7 +113,8 @@ impl RenderContext<'_> {
         packet.first_pane = splat(f32::INFINITY);
         packet.behind.clear();
         // Follow the rays from pane to pane
-        self.walk_panes(segments.rays, segments.lanes(), coherence, |lane, pane| {
+        let panes = &self.shapes.panes;
+        self.walk_panes(panes, segments.rays, segments.lanes(), coherence, |lane, pane| {
             // The pane takes some of the light, or is the intersection of the path
             packet.first_pane[lane] = packet.first_pane[lane].min(pane.hit.t);
             let mut throughput = lane3(&packet.throughput, lane);
@@ -159,8 +161,8 @@ impl RenderContext<'_> {
         if self.shapes.panes.is_empty() {
             return;
         }
-        let radiance = &mut samples.radiance;
-        self.walk_panes(samples.rays, samples.lanes, coherence, |lane, pane| {
+        let (panes, radiance) = (&self.shapes.panes, &mut samples.radiance);
+        self.walk_panes(panes, samples.rays, samples.lanes, coherence, |lane, pane| {
             set_lane3(radiance, lane, lane3(radiance, lane) * pane.transmittance);
             true
         });
@@ -200,14 +202,7 @@ impl RenderContext<'_> {
         for lane in lanes_in(lanes) {
             let hit = packet.hits.get(lane);
             let direction = lane3(&segments.rays.direction, lane);
-            let side = if direction.dot(hit.normal) < 0.0 { 1.0 } else { -1.0 };
-            let geometric = side * hit.normal;
-            let mirrored = |normal: Vec3| {
-                (direction - 2.0 * direction.dot(normal) * normal).normalize_or(geometric)
-            };
-            // A smooth normal may reflect to the other side of the surface
-            let smooth = mirrored(hit.shading);
-            let reflected = if smooth.dot(geometric) > 0.0 { smooth } else { mirrored(geometric) };
+            let (geometric, reflected) = reflected(direction, &hit);
             set_lane3(&mut rays.origin, lane, hit.anchor + hit.offset * geometric);
             set_lane3(&mut rays.direction, lane, reflected);
             set_lane3(&mut rays.throughput, lane, lane3(&packet.throughput, lane));
@@ -216,6 +211,17 @@ impl RenderContext<'_> {
             Continuation { inside: segments.inside, crossed: BodySet::EMPTY, branch: REFLECTED };
         next.reflected.push(lanes & !last, rays, segments, how);
     }
+}
+
+/// The normal of a pane on the side of a ray that hits it with this `direction`, and the direction of the reflected ray.
+pub(super) fn reflected(direction: Vec3, hit: &Intersection) -> (Vec3, Vec3) {
+    let side = if direction.dot(hit.normal) < 0.0 { 1.0 } else { -1.0 };
+    let geometric = side * hit.normal;
+    let mirrored =
+        |normal: Vec3| (direction - 2.0 * direction.dot(normal) * normal).normalize_or(geometric);
+    // A smooth normal may reflect to the other side of the surface
+    let smooth = mirrored(hit.shading);
+    (geometric, if smooth.dot(geometric) > 0.0 { smooth } else { mirrored(geometric) })
 }
 
 /// The lanes of `lanes` whose rays start inside a body.

@@ -250,9 +250,9 @@ fn holdouts_are_holes_that_throw_shadows() {
     }
 }
 
-#[test]
-fn a_shadow_catcher_is_seen_through_panes() {
-    let ground = Ground {
+/// A shadow catcher across the view at y = 5.
+fn catcher() -> Ground {
+    Ground {
         up: Vec3::NEG_Y,
         height: -5.0,
         color: Vec3::splat(0.5),
@@ -262,9 +262,13 @@ fn a_shadow_catcher_is_seen_through_panes() {
         fade_end: 2e3,
         pattern: crate::scene::ground::Pattern::Plain,
         shadow_catcher: Some(1.0),
-    };
+    }
+}
+
+#[test]
+fn a_shadow_catcher_is_seen_through_panes() {
     let mut scene = scene(Vec3::ONE, Vec3::ZERO, &[CLEAR]);
-    scene.ground = Some(ground);
+    scene.ground = Some(catcher());
     let film = image(&[&wall(0.0)], &nothing(), 0.5, &scene, &settings(1024, 0));
     let t = 1.0 - pane_reflectance(1.0);
     near(mean(&film), [t, t, t, 1.0 - t], 2e-3);
@@ -296,4 +300,62 @@ fn a_body_of_thin_glass_loses_no_light() {
     // Light between the two sides is reflected from inside
     let mean = mean(&image_of_body(Vec3::ONE, &mut scene, &settings(64, 16)));
     assert!(mean[..3].iter().all(|light| (light - 1.0).abs() < 1e-3), "{mean:?}");
+}
+
+/// Clear glass behind everything else.
+const UNDERLAY: Material = Material { is_underlay: true, ..CLEAR };
+
+#[test]
+fn underlays_leave_other_things_as_they_are() {
+    for integrator in [IntegratorKind::Path, IntegratorKind::Whitted] {
+        let settings = RenderSettings { integrator, ..settings(4, 2) };
+        let [with, without] = [lit(&[UNDERLAY]), lit(&[])].map(|mut scene| {
+            scene.environment = Some(Arc::new(Environment::constant(Vec3::ONE)));
+            let glass = closed_box();
+            let glass = if scene.materials.len() > MaterialId::BASIC { &[&glass][..] } else { &[] };
+            // The ball covers the picture, in front of one side of the box and behind the other
+            image(glass, &Balls::one(Vec3::ZERO, 1.0), 0.5, &scene, &settings)
+        });
+        assert_eq!(with.color, without.color);
+        assert!(with.color.iter().all(|c| c[0] > 0.0 && c[3] == 1.0));
+        let depth = |film: &Film| film.plane::<f32>(FilmPlane::Depth).unwrap().to_vec();
+        assert_eq!(depth(&with), depth(&without));
+    }
+}
+
+#[test]
+fn underlays_attenuate_and_reflect_without_noise() {
+    let tint = Vec3::new(1.0, 0.5, 0.25);
+    let (background, light) = (Vec3::new(0.2, 0.4, 0.8), Vec3::splat(3.0));
+    let scene = scene(background, light, &[UNDERLAY, Material { color: Some(tint), ..UNDERLAY }]);
+    let r = pane_reflectance(1.0);
+    let reflected = r * light + (1.0 - r) * r * light;
+    let transmittance = (1.0 - r) * (1.0 - r) * tint;
+    for integrator in [IntegratorKind::Path, IntegratorKind::Whitted] {
+        let reflected = match integrator {
+            IntegratorKind::Path => reflected,
+            IntegratorKind::Whitted => Vec3::ZERO,
+        };
+        for transparent_background in [false, true] {
+            let settings = RenderSettings { integrator, transparent_background, ..settings(1, 0) };
+            let film = image(&[&wall(0.0), &wall(1.0)], &nothing(), 0.5, &scene, &settings);
+            let passing = transmittance.dot(Vec3::new(0.2126, 0.7152, 0.0722));
+            let (seen, alpha) = if transparent_background {
+                (reflected, 1.0 - passing)
+            } else {
+                (reflected + transmittance * background, 0.0)
+            };
+            near(mean(&film), [seen.x, seen.y, seen.z, alpha], 2e-4);
+        }
+    }
+}
+
+#[test]
+fn underlays_are_in_front_of_a_shadow_catcher() {
+    let mut scene = scene(Vec3::ONE, Vec3::ZERO, &[UNDERLAY, UNDERLAY]);
+    scene.ground = Some(catcher());
+    // The second one is behind it
+    let film = image(&[&wall(0.0), &wall(6.0)], &nothing(), 0.5, &scene, &settings(1, 0));
+    let t = 1.0 - pane_reflectance(1.0);
+    near(mean(&film), [t, t, t, 0.0], 2e-4);
 }

@@ -116,6 +116,9 @@ impl Integrator for PathIntegrator<'_> {
         let ended = self.add_emitted(segments, packet);
         packet.hits.mask &= !ended;
         packet.take_light(LightClass::Emission);
+        // Camera rays that hit nothing see walls of glass
+        let unended = segments.lanes() & !ended;
+        self.context.pass_underlays(segments, depth, unended, self.environment, packet);
         // A catcher darkens what is behind it
         if let Some(catcher) = self.catcher.as_ref().filter(|_| depth == 1) {
             let lanes = packet.hits.lanes_of(MaterialId::GROUND);

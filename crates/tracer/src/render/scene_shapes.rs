@@ -65,6 +65,8 @@ pub(super) struct SceneShapes<'a> {
     pub(super) nested: Option<TransmissiveBodies<'a>>,
     /// Meshes that rays pass.
     pub(super) panes: Vec<&'a dyn Shape>,
+    /// Panes behind everything else, which are none of `panes`.
+    pub(super) underlays: Vec<&'a dyn Shape>,
     /// Spray whose drops fade out; opaque spray is solid.
     pub(super) soft_spray: Option<&'a dyn Shape>,
     /// Particles that are not fully opaque: separate spheres or grains.
@@ -88,6 +90,8 @@ impl<'a> SceneShapes<'a> {
         let (spray, shapes): (Vec<_>, Vec<_>) = shapes.into_iter().partition(is_soft);
         let is_pane = |shape: &&dyn Shape| finish(shape) == Finish::Pane;
         let (panes, shapes): (Vec<_>, Vec<_>) = shapes.into_iter().partition(is_pane);
+        let is_underlay = |shape: &&dyn Shape| scene.material(shape.material()).is_underlay;
+        let (underlays, panes): (Vec<_>, Vec<_>) = panes.into_iter().partition(is_underlay);
         // Find the particles and the kind of their interior
         let is_particles = |shape: &&&dyn Shape| shape.material() == MaterialId::PARTICLES;
         let particles = shapes.iter().find(is_particles).copied();
@@ -113,6 +117,7 @@ impl<'a> SceneShapes<'a> {
             nested,
             solid: shapes,
             panes,
+            underlays,
             soft_spray: spray.first().copied(),
             translucent,
             particles,

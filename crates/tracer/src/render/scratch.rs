@@ -95,7 +95,8 @@ pub(super) struct PacketScratch {
     /// Spheres that are not fully opaque along each ray.
     pub(super) entries: [Entries; LANES],
     pub(super) weight: Lanes3,
-    /// Coverage of samples by what leaves no intersection: visible lights, and shadows on a transparent background.
+    /// Coverage of samples by what leaves no intersection: visible lights, and underlays and shadows on a transparent
+    /// background.
     pub(super) coverage: Lanes,
     /// Particles that contribute to the colour of a point, with weights.
     pub(super) blend: Vec<(u32, f32)>,

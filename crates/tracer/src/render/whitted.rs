@@ -117,6 +117,7 @@ impl Integrator for WhittedIntegrator<'_> {
         next: &mut RayStreams,
     ) {
         let context = &self.context;
+        context.pass_underlays(segments, depth, segments.lanes(), None, packet);
         let held_out = context.holdout_lanes(depth, &packet.hits);
         // Add the background for rays that leave the scene
         if context.sees_background(depth) {

@@ -47,6 +47,8 @@ pub struct Material {
     pub color: Option<Vec3>,
     /// Whether it hides what is behind it from the camera without being visible itself.
     pub is_holdout: bool,
+    /// Whether only camera rays that hit nothing but the ground see it, behind everything else; for panes.
+    pub is_underlay: bool,
     /// `Ka`.
     pub ambient: f32,
     /// `kd`, not negative.
@@ -134,6 +136,7 @@ impl Material {
         owner: Owner::Particles,
         color: None,
         is_holdout: false,
+        is_underlay: false,
         ambient: 0.1,
         diffuse: 0.7,
         specular: 0.2,

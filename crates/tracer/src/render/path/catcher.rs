@@ -101,7 +101,9 @@ impl PathIntegrator<'_> {
             let throughput = lane3(&packet.throughput, lane) * (Vec3::ONE - shadow);
             set_lane3(&mut packet.throughput, lane, throughput);
             if is_transparent {
-                packet.coverage[lane] = shadow.dot(LUMINANCE);
+                // Walls of glass may cover some of it already
+                let covered = packet.coverage[lane];
+                packet.coverage[lane] = covered + (1.0 - covered) * shadow.dot(LUMINANCE);
             }
         }
         packet.hits.mask &= !surface.lanes;
