@@ -215,8 +215,8 @@ section! {
         /// What renders the images: auto | cpu | gpu; auto is cpu
         ///
         /// gpu needs a program that was built with it, and a GPU with Vulkan (see `spherule devices`). It renders
-        /// opaque spheres with integrator = "whitted"; another setting is an error that names its key. Ids,
-        /// depths, normals and positions equal those of the CPU; colours may differ in their last bits.
+        /// opaque spheres; a setting that it lacks is an error that names its key. Ids, depths, normals and positions
+        /// equal those of the CPU; colours may differ in their last bits.
         device: DeviceSetting = DeviceSetting::Auto, affects(Affects::Nothing), flag("device", "NAME", "Job");
         /// Acceleration structure: auto, lbvh, kdtree, bvh or sbvh
         ///

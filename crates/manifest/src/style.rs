@@ -104,6 +104,8 @@ pub(super) const RULES: &[Rule] = rules! {
     "draw" Is["smooth", "union"] => "opacity" MissingOr["1"]: OPAQUE_SPHERES;
     "material.type" Is["thin-glass"] => "draw" Is["smooth", "union"]:
         "thin glass is the surface of a body, which draw = \"smooth\" and \"union\" have";
+    "material.type" MissingOrNot["thin-glass"] => "material.underlay" MissingOr["false"]:
+        "only thin glass is drawn behind everything else; set type = \"thin-glass\"";
     "material.type" Is["thin-glass"] => "color_by" Missing: "thin glass has one colour; set color";
     "material.type" Is["glass", "water"] => "opacity" MissingOr["1"]: OPAQUE_SPHERES;
 };
@@ -121,6 +123,8 @@ pub struct StyleMaterial {
     pub absorption: Absorption,
     /// The length for `absorption`; by default it depends on the extent of the particles.
     pub absorption_length: Option<f64>,
+    /// Whether thin glass is drawn behind everything else.
+    pub underlay: bool,
 }
 
 impl Default for StyleMaterial {
@@ -131,6 +135,7 @@ impl Default for StyleMaterial {
             ior: None,
             absorption: Absorption::default(),
             absorption_length: None,
+            underlay: false,
         }
     }
 }
@@ -151,6 +156,8 @@ impl InlineTable for StyleMaterial {
             absorption => self.absorption, from(0), to(1);
             /// The length for absorption
             absorption_length => self.absorption_length, above(0), single();
+            /// Whether thin glass is drawn behind everything else
+            underlay => self.underlay;
         );
     }
 }
@@ -198,6 +205,7 @@ impl StyleMaterial {
                 }
                 _ => None,
             },
+            is_underlay: self.underlay,
             ..scene::Material::DEFAULT
         }
     }
@@ -341,7 +349,8 @@ impl Style {
             /// Material: { type = "plastic", roughness = 0.3 }, also with ior, absorption and absorption_length
             ///
             /// The types are matte, plastic, metal, glass, water, and thin-glass for walls: a body that light passes without
-            /// refraction. Where bodies of glass and water overlap, the first style fills the space.
+            /// refraction. With underlay = true it is drawn behind everything else. Where bodies of glass and water overlap, the
+            /// first style fills the space.
             material => self.material, example("{ type = \"plastic\", roughness = 0.3 }"),
                 unset("that of [material] if it is opaque, else matte");
             /// Shape of grains: ellipsoid | superquadric | capsule | cylinder | cuboid | mesh | convex-hull
