@@ -36,6 +36,7 @@ const MATT: Material = Material {
     owner: Owner::Particles,
     color: None,
     is_holdout: false,
+    is_underlay: false,
     ambient: 0.1,
     diffuse: 0.7,
     specular: 0.0,
