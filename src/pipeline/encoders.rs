@@ -6,6 +6,7 @@
 
 use super::rays::expected_rays;
 use super::setup::Setup;
+use crate::render::RendererKind;
 
 /// Maximum number of images that are encoded at the same time: beyond it, storage is the limit.
 const MAX_ENCODERS: u32 = 8;
@@ -16,6 +17,9 @@ const PIXEL_SECONDS: f64 = 1.5e-7;
 const IMAGE_SECONDS: f64 = 4e-3;
 /// Seconds of one thread per ray in a frame of few particles.
 const RAY_SECONDS: f64 = 2.5e-7;
+/// The same of a GPU, and its seconds per pixel for what all threads of the host do: they read and denoise the picture.
+const DEVICE_RAY_SECONDS: f64 = 7e-10;
+const DEVICE_PIXEL_SECONDS: f64 = 1e-8;
 
 impl Setup {
     /// Number of images to encode at the same time, so that encoding keeps up with tracing.
@@ -23,14 +27,18 @@ impl Setup {
         let render = &self.picture.render;
         let pixels = f64::from(render.width) * f64::from(render.height);
         let rays = expected_rays(render, &self.picture.scene);
-        encoders_for(pixels, rays, rayon::current_num_threads())
+        let threads = rayon::current_num_threads();
+        let tracing = match self.picture.renderer {
+            RendererKind::Cpu => rays * RAY_SECONDS / threads as f64,
+            RendererKind::Gpu => rays * DEVICE_RAY_SECONDS + pixels * DEVICE_PIXEL_SECONDS,
+        };
+        encoders_for(pixels, tracing, threads)
     }
 }
 
-/// The number of encoders for images of so many `pixels` and `rays`, on so many `threads`.
-fn encoders_for(pixels: f64, rays: f64, threads: usize) -> u32 {
+/// The number of encoders for images of so many `pixels`, which take `tracing` seconds each, on so many `threads`.
+fn encoders_for(pixels: f64, tracing: f64, threads: usize) -> u32 {
     let encoding = IMAGE_SECONDS + pixels * PIXEL_SECONDS;
-    let tracing = rays * RAY_SECONDS / threads as f64;
     let most = u32::try_from(threads).unwrap_or(u32::MAX).min(MAX_ENCODERS);
     // The smallest number that keeps up, found without a division by zero
     let keeps_up = |count: &u32| encoding <= f64::from(*count) * tracing;
@@ -45,11 +53,11 @@ mod tests {
     fn small_images_with_few_samples_have_several_encoders_on_many_cores() {
         let pixels = 640.0 * 360.0;
         // A ray, and one for its light
-        let draft = 1.4 * pixels;
+        let draft = 1.4 * pixels * RAY_SECONDS;
         assert_eq!(encoders_for(pixels, draft, 1), 1);
-        assert!(encoders_for(pixels, draft, 16) > 4);
+        assert!(encoders_for(pixels, draft / 16.0, 16) > 4);
         // Many samples and reflections
-        assert_eq!(encoders_for(pixels, 100.0 * pixels, 16), 1);
+        assert_eq!(encoders_for(pixels, 100.0 * pixels * RAY_SECONDS / 16.0, 16), 1);
         assert_eq!(encoders_for(pixels, 0.0, 64), MAX_ENCODERS);
         assert_eq!(encoders_for(0.0, 0.0, 1), 1);
     }

@@ -10,12 +10,12 @@ use spherule_gpu::{
     bytes_per_pixel, missing, ray_counts, tree_bytes,
 };
 
+use super::denoise::denoise_film;
 use super::load::{LoadedFrame, LoadedParticles};
 use super::renderer::{BuiltFrame, BuiltParticles, FrameRenderer, TraceError, TracedFrame};
 use super::setup::{OpacityRule, RadiusRule, Setup};
 use super::shading::particle_shading;
 use super::surface::spheres;
-use super::trace::denoise_film;
 use crate::render::{
     Film, IntegratorKind, RayCounts, RenderError, RenderSettings, ShadeSource, Stop,
 };

@@ -12,6 +12,7 @@ mod arrows;
 mod bodies;
 mod bonds;
 mod decoded;
+mod denoise;
 mod encode;
 mod encoders;
 mod error;

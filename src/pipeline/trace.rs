@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 use spherule_files::memory::MemoryUse;
 
 use super::decoded::DecodedFrame;
+use super::denoise::denoise_film;
 use super::gpu::GpuRenderer;
 use super::in_place::StoredFrame;
 use super::load::{LoadedFrame, LoadedParticles};
@@ -16,9 +17,8 @@ use super::shading::particle_shading;
 use super::surface::{self, SurfaceBuilder, spheres};
 use crate::accel::stored::{StoredSettings, StoredTree};
 use crate::accel::{BuildReport, TreeBuilder};
-use crate::denoise::{DenoiseError, DenoiseInput, denoise};
 use crate::output::TextAttribute;
-use crate::render::{Film, FilmPlane, RayCounts, RendererKind, Stop};
+use crate::render::{Film, RayCounts, RendererKind, Stop};
 use crate::report::FrameReport;
 use crate::report::frame::FileBytes;
 use crate::scene::material::DEFAULT_COLOR;
@@ -205,40 +205,6 @@ fn matte_attributes(setup: &Setup, frame: &BuiltFrame) -> Vec<TextAttribute> {
             mattes::attributes(setup, &stored.shading(picture, DEFAULT_COLOR), count)
         }
     }
-}
-
-/// Denoises `film` if the setup says so. Returns the time, seconds.
-pub(super) fn denoise_film(setup: &Setup, film: &mut Film) -> Result<f64, DenoiseError> {
-    // Without settings, or without features to compare, there is nothing to do
-    let (Some(settings), Some(odd)) = (&setup.picture.denoise, &film.odd) else {
-        return Ok(0.0);
-    };
-    let features = (
-        film.plane(FilmPlane::Albedo),
-        film.plane(FilmPlane::Normal),
-        film.plane(FilmPlane::Depth),
-    );
-    let (Some(albedo), Some(normal), Some(depth)) = features else {
-        return Ok(0.0);
-    };
-    let start = Instant::now();
-    let input = DenoiseInput {
-        width: film.width,
-        height: film.height,
-        views: setup.picture.eyes(),
-        samples: setup.picture.render.samples,
-        color: &film.color,
-        odd,
-        albedo,
-        normal,
-        depth,
-    };
-    // Replace the colours, and keep the coverage
-    let filtered = denoise(&input, settings)?;
-    for (color, filtered) in film.color.iter_mut().zip(filtered) {
-        [color[0], color[1], color[2]] = filtered.to_array();
-    }
-    Ok(seconds(start.elapsed()))
 }
 
 fn seconds(time: Duration) -> f64 {

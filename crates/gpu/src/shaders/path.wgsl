@@ -157,7 +157,7 @@ fn ambient_light(vertex: Vertex, weight: vec3<f32>, t: f32, seed: Wide) -> vec3<
 // The next ray of a path
 struct Next { is_ray: bool, direction: vec3<f32>, throughput: vec3<f32>, pdf: f32 }
 
-fn next_ray(vertex: Vertex, weight: vec3<f32>, bounces: u32, seed: Wide) -> Next {
+fn next_ray(vertex: Vertex, weight: vec3<f32>, seed: Wide) -> Next {
   let sample = sample_bsdf(vertex.kind, vertex.base, vertex.normal, vertex.out, numbers_2d(seed, BSDF, current.sample));
   return Next(sample.pdf > 0.0, sample.direction, weight * sample.weight, sample.pdf);
 }
@@ -184,7 +184,7 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
   let is_ground = is_open && hit.slot == MISS && ground.t < FAR;
   var seed = Wide(0u);
   if (is_sphere || is_ground) { seed = seed_at(path.pixel, bounces); }
-  // A catcher shows its shadows only; all rays of a dispatch take the same branch
+  // A catcher shows its shadows only
   let is_caught = is_first && is_ground && scene.is_catcher == 1u;
   // What is behind all surfaces, and behind a ground that fades out
   let uncovered = select(1.0, 1.0 - ground.opacity, is_ground && !is_caught);
@@ -247,7 +247,7 @@ fn follow(is_ray: bool, ray: Ray, path: Path, ground: GroundHit, hit: Hit) {
   var next = Next(false, vec3<f32>(0.0), vec3<f32>(0.0), 0.0);
   shadow = no_shadow();
   if (is_shaded) {
-    next = next_ray(vertex, weight, bounces, seed);
+    next = next_ray(vertex, weight, seed);
     next.is_ray = next.is_ray && largest_of(next.throughput) > 0.0;
     if (bounces == scene.bounces && view.has_extents == 0u) {
       let radiance = next.throughput * environment_along(next.direction, next.pdf);

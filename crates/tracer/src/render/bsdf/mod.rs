@@ -115,7 +115,8 @@ pub(super) fn bsdf_of(finish: Finish) -> Box<dyn Bsdf> {
     }
 }
 
-/// Width of the microfacets of a rough `finish`, and the numbers of the light that leaves it: [`microfacet::Albedo::table`].
+/// Width of the microfacets of a rough `finish`, and the fractions of light that leave it for cosines from 0 to 1, evenly
+/// spaced, with their mean.
 pub fn rough_table(finish: Finish) -> Option<(f32, Vec<f32>)> {
     let (roughness, table) = match finish {
         Finish::Matte | Finish::Pane | Finish::Foam => return None,

@@ -1,0 +1,41 @@
+//! Denoises pictures, whatever has rendered them.
+
+use std::time::Instant;
+
+use super::setup::Setup;
+use crate::denoise::{DenoiseError, DenoiseInput, denoise};
+use crate::render::{Film, FilmPlane};
+
+/// Denoises `film` if the setup says so. Returns the time, seconds.
+pub(super) fn denoise_film(setup: &Setup, film: &mut Film) -> Result<f64, DenoiseError> {
+    // Without settings, or without features to compare, there is nothing to do
+    let (Some(settings), Some(odd)) = (&setup.picture.denoise, &film.odd) else {
+        return Ok(0.0);
+    };
+    let features = (
+        film.plane(FilmPlane::Albedo),
+        film.plane(FilmPlane::Normal),
+        film.plane(FilmPlane::Depth),
+    );
+    let (Some(albedo), Some(normal), Some(depth)) = features else {
+        return Ok(0.0);
+    };
+    let start = Instant::now();
+    let input = DenoiseInput {
+        width: film.width,
+        height: film.height,
+        views: setup.picture.eyes(),
+        samples: setup.picture.render.samples,
+        color: &film.color,
+        odd,
+        albedo,
+        normal,
+        depth,
+    };
+    // Replace the colours, and keep the coverage
+    let filtered = denoise(&input, settings)?;
+    for (color, filtered) in film.color.iter_mut().zip(filtered) {
+        [color[0], color[1], color[2]] = filtered.to_array();
+    }
+    Ok(start.elapsed().as_secs_f64())
+}
