@@ -4,8 +4,10 @@ use spherule_formats::ValueError;
 use toml::{Table, Value};
 
 /// Settings of `material` that may stand beside it, those of glass and water first.
-const MATERIAL_KEYS: [&str; 5] = [OPTICS[0], OPTICS[1], OPTICS[2], "roughness", "underlay"];
-const OPTICS: [&str; 3] = ["ior", "absorption", "absorption_length"];
+const MATERIAL_KEYS: [&str; 5] =
+    ["ior", "absorption", "absorption_length", "roughness", "underlay"];
+/// Number of those of glass and water.
+const OPTICS: usize = 3;
 
 /// The table `[[style]]` of `type == 2: sticks, radius 0.3, color red`.
 pub(super) fn style(text: &str) -> Result<Table, ValueError> {
@@ -52,7 +54,7 @@ fn gather_material(table: &mut Table) {
         return;
     };
     let mut usual = Table::new();
-    if OPTICS.contains(&&**first) {
+    if MATERIAL_KEYS[..OPTICS].contains(&&**first) {
         usual.insert("type".to_owned(), "water".into());
     }
     let material = table.entry("material").or_insert_with(|| usual.into());

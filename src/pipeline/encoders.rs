@@ -17,7 +17,8 @@ const PIXEL_SECONDS: f64 = 1.5e-7;
 const IMAGE_SECONDS: f64 = 4e-3;
 /// Seconds of one thread per ray in a frame of few particles.
 const RAY_SECONDS: f64 = 2.5e-7;
-/// The same of a GPU, and its seconds per pixel for what all threads of the host do: they read and denoise the picture.
+/// The same of a GPU, and its seconds per pixel until the host has read the picture. Time for denoising is not counted:
+/// the threads that encode compete with it.
 const DEVICE_RAY_SECONDS: f64 = 7e-10;
 const DEVICE_PIXEL_SECONDS: f64 = 1e-8;
 

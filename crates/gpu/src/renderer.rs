@@ -10,7 +10,7 @@ use crate::arrays::{Array, Download, Uniform, Uniforms};
 use crate::commands::{Commands, Kernel, Timer};
 use crate::lighting::{Lighting, Model, SceneUniform, ray_bytes, source_count};
 use crate::picture::{FilmSize, Picture, Samples, View};
-use crate::tree::{Spheres, TreeBuilder, TreeShape, tree_constants};
+use crate::tree::{GROUPS, Spheres, TreeBuilder, TreeShape, tree_constants};
 use crate::{Device, GpuError};
 
 /// Entries of the traversal's stack for each level of nodes: all children but the one that is visited next.
@@ -143,6 +143,7 @@ impl Kernels {
             device.arithmetic().source(),
             &tree_constants(variant.is_common),
             &format!("const STACK: u32 = {}u;\n", STACK_PER_LEVEL * variant.levels),
+            GROUPS,
             include_str!("shaders/view.wgsl"),
             include_str!("shaders/arithmetic.wgsl"),
             include_str!("shaders/functions.wgsl"),
@@ -241,9 +242,7 @@ impl TraceArrays {
             &self.constants,
         ]
     }
-}
 
-impl TraceArrays {
     /// Copies the tables of `lighting`, unless they are there.
     fn write_tables(&mut self, device: &Device, lighting: &Lighting) -> Result<(), GpuError> {
         let tables = &lighting.tables;
@@ -580,10 +579,12 @@ fn depth_count(picture: &Picture<'_>) -> u32 {
 
 /// Whether there are shadow rays to a source at a depth.
 fn has_shadows(picture: &Picture<'_>, depth: u32, source: u32) -> bool {
-    let (first, scene) = match picture.model {
-        Model::Whitted => (0, None),
-        Model::Paths(lighting) => (2, Some(lighting)),
+    let scene = match picture.model {
+        Model::Whitted => None,
+        Model::Paths(lighting) => Some(lighting),
     };
+    // The lights are the last sources
+    let first = source_count(picture.has_paths(), 0);
     match (source.checked_sub(first), scene) {
         (Some(light), _) => picture.lights[light as usize].casts_shadow,
         (None, Some(scene)) if scene.environment.is_none() => false,

@@ -155,7 +155,8 @@ impl KeyKernels {
             "const BITS: u32 = {}u;\nconst IN_BLOCKS: bool = {is_in_blocks};\n",
             8 * length.words()
         );
-        let module = device.module(&[&bits, include_str!("shaders/keys.wgsl")].concat());
+        let source = [&bits, BUILD, GROUPS, CENTERS, include_str!("shaders/keys.wgsl")];
+        let module = device.module(&source.concat());
         let kernel = |entry, bindings| Kernel::new(device, &module, entry, bindings);
         Self {
             clear_bounds: kernel("clear_bounds", &[2]),
@@ -177,7 +178,7 @@ struct SortKernels {
 
 impl SortKernels {
     fn new(device: &Device) -> Self {
-        let module = device.module(include_str!("shaders/sort.wgsl"));
+        let module = device.module(&[BUILD, include_str!("shaders/sort.wgsl")].concat());
         let kernel = |entry, bindings| Kernel::new(device, &module, entry, bindings);
         Self {
             histogram: kernel("histogram", &[0, 3, 5]),
@@ -198,7 +199,9 @@ struct NodeKernels {
 impl NodeKernels {
     fn new(device: &Device, (is_common, is_in_blocks): NodeVariant) -> Self {
         let in_blocks = format!("const IN_BLOCKS: bool = {is_in_blocks};\n");
-        let source = [&tree_constants(is_common), &in_blocks, include_str!("shaders/nodes.wgsl")];
+        let constants = tree_constants(is_common);
+        let kernels = include_str!("shaders/nodes.wgsl");
+        let source = [&constants, &in_blocks, BUILD, GROUPS, CENTERS, kernels];
         let module = device.module(&source.concat());
         let kernel = |entry, bindings| Kernel::new(device, &module, entry, bindings);
         Self {
@@ -208,6 +211,11 @@ impl NodeKernels {
         }
     }
 }
+
+/// What several shaders have in common.
+const BUILD: &str = include_str!("shaders/build.wgsl");
+const CENTERS: &str = include_str!("shaders/centers.wgsl");
+pub(crate) const GROUPS: &str = include_str!("shaders/groups.wgsl");
 
 /// Constants of the shaders that read spheres.
 pub(crate) fn tree_constants(is_common: bool) -> String {

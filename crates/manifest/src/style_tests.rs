@@ -48,6 +48,10 @@ fn impossible_styles_are_refused() {
             "draw = \"smooth\"\ncolor = { attribute = \"x\" }\nmaterial = { type = \"thin-glass\" }",
             "style.0.color: thin glass has one colour",
         ),
+        (
+            "material = { type = \"matte\", underlay = true }",
+            "style.0.material.underlay: only thin glass is drawn behind",
+        ),
         ("map = \"vik\"", "style.0.map: belongs to color_by"),
         ("range = [0, 1]", "style.0.range: belongs to color_by"),
         ("draw = \"arrows\"", "style.0.arrows: is missing; which arrows"),

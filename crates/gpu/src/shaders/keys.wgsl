@@ -1,9 +1,5 @@
 // The box of all centres, and the position of each on a Hilbert curve through it.
 
-struct Build { count: u32, tiles: u32, shift: u32, word: u32, children: u32, nodes: u32, first: u32, radius: f32 }
-@group(0) @binding(0) var<uniform> build: Build;
-// Coordinates of the centres, see `center`
-@group(0) @binding(1) var<storage, read> centers: array<f32>;
 // Least and greatest coordinates as integers with the same order
 @group(0) @binding(2) var<storage, read_write> bounds: array<atomic<u32>, 8>;
 @group(0) @binding(2) var<storage, read> box_of_all: array<u32, 8>;
@@ -13,19 +9,6 @@ struct Build { count: u32, tiles: u32, shift: u32, word: u32, children: u32, nod
 
 const LARGEST: f32 = 3.4e38;
 const GROUP: u32 = 256u;
-
-fn linear_index(group: vec3<u32>, groups: vec3<u32>, local: u32) -> u32 {
-  return (group.y * groups.x + group.x) * GROUP + local;
-}
-
-fn center(i: u32) -> vec3<f32> {
-  if (IN_BLOCKS) {
-    // Blocks of 16 centres: all x, all y, all z
-    let x = 48u * (i >> 4u) + (i & 15u);
-    return vec3<f32>(centers[x], centers[x + 16u], centers[x + 32u]);
-  }
-  return vec3<f32>(centers[3u * i], centers[3u * i + 1u], centers[3u * i + 2u]);
-}
 
 // Floats as unsigned integers with the same order, and back.
 fn ordered(x: f32) -> u32 {
@@ -127,7 +110,7 @@ fn first_keys(
   @builtin(num_workgroups) groups: vec3<u32>,
   @builtin(local_invocation_index) local: u32,
 ) {
-  let i = linear_index(group, groups, local);
+  let i = linear_index(group, groups, local, GROUP);
   if (i >= build.count) { return; }
   pairs_out[i] = vec2<u32>(position_on_curve(center(i), build.word), i);
 }
@@ -139,7 +122,7 @@ fn next_keys(
   @builtin(num_workgroups) groups: vec3<u32>,
   @builtin(local_invocation_index) local: u32,
 ) {
-  let i = linear_index(group, groups, local);
+  let i = linear_index(group, groups, local, GROUP);
   if (i >= build.count) { return; }
   let sphere = pairs_in[i].y;
   pairs_out[i] = vec2<u32>(position_on_curve(center(sphere), build.word), sphere);
@@ -152,7 +135,7 @@ fn keep_order(
   @builtin(num_workgroups) groups: vec3<u32>,
   @builtin(local_invocation_index) local: u32,
 ) {
-  let i = linear_index(group, groups, local);
+  let i = linear_index(group, groups, local, GROUP);
   if (i >= build.count) { return; }
   pairs_out[i] = vec2<u32>(0u, i);
 }

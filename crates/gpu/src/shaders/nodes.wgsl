@@ -6,10 +6,6 @@
 // the same for the upper planes (Ylitie, Karras and Laine, "Efficient incoherent ray traversal on GPUs through
 // compressed wide BVHs", 2017).
 
-struct Build { count: u32, tiles: u32, shift: u32, word: u32, children: u32, nodes: u32, first: u32, radius: f32 }
-@group(0) @binding(0) var<uniform> build: Build;
-// Coordinates of the centres, see `center`
-@group(0) @binding(1) var<storage, read> centers: array<f32>;
 @group(0) @binding(3) var<storage, read> pairs: array<vec2<u32>>;
 @group(0) @binding(7) var<storage, read> radii: array<f32>;
 // Centre, and the index of the sphere (COMMON_RADIUS) or its radius
@@ -24,19 +20,6 @@ struct Build { count: u32, tiles: u32, shift: u32, word: u32, children: u32, nod
 const LARGEST: f32 = 3.4e38;
 // Coordinates of spheres that no ray meets
 const NOWHERE: f32 = 3e38;
-
-fn linear_index(group: vec3<u32>, groups: vec3<u32>, local: u32, size: u32) -> u32 {
-  return (group.y * groups.x + group.x) * size + local;
-}
-
-fn center(i: u32) -> vec3<f32> {
-  if (IN_BLOCKS) {
-    // Blocks of 16 centres: all x, all y, all z
-    let x = 48u * (i >> 4u) + (i & 15u);
-    return vec3<f32>(centers[x], centers[x + 16u], centers[x + 32u]);
-  }
-  return vec3<f32>(centers[3u * i], centers[3u * i + 1u], centers[3u * i + 2u]);
-}
 
 // Spheres in the order of the tree.
 @compute @workgroup_size(256)

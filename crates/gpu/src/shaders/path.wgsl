@@ -49,7 +49,8 @@ fn push_shadow(source: u32, shadow: Shadow, pixel: u32) {
   }
 }
 
-// The seed of the random numbers of a pixel after a number of reflections
+// The seed of the random numbers of a pixel after a number of reflections: to find it again costs less than to keep it
+// in queues
 fn seed_at(pixel: u32, bounces: u32) -> Wide {
   let x = i32(pixel % view.width) + view.corner.x;
   let y = i32(pixel / view.width) + view.corner.y;
@@ -292,13 +293,13 @@ fn trace_camera(@builtin(global_invocation_id) id: vec3<u32>) {
 }
 
 // The rays that go on from the depth before.
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP)
 fn trace_next(
   @builtin(workgroup_id) group: vec3<u32>,
   @builtin(num_workgroups) groups: vec3<u32>,
   @builtin(local_invocation_index) local: u32,
 ) {
-  let i = linear_index(group, groups, local);
+  let i = linear_index(group, groups, local, GROUP);
   let is_ray = i < atomicLoad(&queued[queue_of(stage.depth - 1u)]);
   var path = Path(vec3<f32>(0.0), FAR, 0u, vec2<f32>(0.0));
   var ray: Ray;
@@ -316,13 +317,13 @@ fn trace_next(
 }
 
 // Adds the light of a source that arrives at the surfaces of a depth, or takes away that which does not arrive.
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP)
 fn trace_shadow(
   @builtin(workgroup_id) group: vec3<u32>,
   @builtin(num_workgroups) groups: vec3<u32>,
   @builtin(local_invocation_index) local: u32,
 ) {
-  let i = linear_index(group, groups, local);
+  let i = linear_index(group, groups, local, GROUP);
   if (i >= atomicLoad(&queued[queue_of(stage.depth) + 1u + stage.source])) { return; }
   let place = SHADOW * (i + first_shadow(stage.source));
   let start = shadows[place];

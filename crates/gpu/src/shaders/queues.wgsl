@@ -23,6 +23,9 @@
 
 @group(0) @binding(18) var<uniform> current: Current;
 
+// Invocations of a workgroup that follows a queue
+const GROUP: u32 = 64u;
+
 // What differs between the dispatches of a sample. `depth` counts from 1.
 struct Stage { depth: u32, source: u32, queues: u32, zero: u32 }
 
@@ -64,12 +67,8 @@ fn keep_nearest(depth: f32, index: u32, normal: vec3<f32>, point: vec3<f32>, pix
   }
 }
 
-fn linear_index(group: vec3<u32>, groups: vec3<u32>, local: u32) -> u32 {
-  return (group.y * groups.x + group.x) * 64u + local;
-}
-
 // Empties all queues before a sample, and adds up their lengths.
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP)
 fn empty_queues(@builtin(global_invocation_id) id: vec3<u32>) {
   let queue = id.x;
   if (queue >= stage.queues) { return; }

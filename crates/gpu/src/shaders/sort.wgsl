@@ -4,8 +4,6 @@
 // A pass has three dispatches: `histogram` counts the digits of each tile, `scan_digits` turns the counts into starts,
 // and `scatter` orders each tile in workgroup memory and writes runs of equal digits.
 
-struct Build { count: u32, tiles: u32, shift: u32, word: u32, children: u32, nodes: u32, first: u32, radius: f32 }
-@group(0) @binding(0) var<uniform> build: Build;
 @group(0) @binding(3) var<storage, read> pairs_in: array<vec2<u32>>;
 @group(0) @binding(4) var<storage, read_write> pairs_out: array<vec2<u32>>;
 // For each digit, one number for each tile

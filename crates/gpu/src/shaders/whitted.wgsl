@@ -128,13 +128,13 @@ fn trace_camera(@builtin(global_invocation_id) id: vec3<u32>) {
 }
 
 // The rays that were reflected at the depth before.
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP)
 fn trace_next(
   @builtin(workgroup_id) group: vec3<u32>,
   @builtin(num_workgroups) groups: vec3<u32>,
   @builtin(local_invocation_index) local: u32,
 ) {
-  let i = linear_index(group, groups, local);
+  let i = linear_index(group, groups, local, GROUP);
   let is_ray = i < atomicLoad(&queued[queue_of(stage.depth - 1u)]);
   var ray: Ray;
   var throughput = 0.0;
@@ -152,13 +152,13 @@ fn trace_next(
 }
 
 // Adds the light of a source that arrives at the surfaces of a depth.
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP)
 fn trace_shadow(
   @builtin(workgroup_id) group: vec3<u32>,
   @builtin(num_workgroups) groups: vec3<u32>,
   @builtin(local_invocation_index) local: u32,
 ) {
-  let i = linear_index(group, groups, local);
+  let i = linear_index(group, groups, local, GROUP);
   if (i >= atomicLoad(&queued[queue_of(stage.depth) + 1u + stage.source])) { return; }
   let place = i + first_shadow(stage.source);
   let start = shadows[SHADOW * place];
