@@ -13,17 +13,18 @@ use crate::manifest::{
 };
 use crate::render::IntegratorKind;
 use crate::scene::ColorMap;
-use crate::survey::{BEAD, Category, ELEMENT, Facts, Tank, WallSign, WallValues};
+use crate::survey::{BEAD, Category, ELEMENT, Facts};
 
 mod legend;
-mod parts;
 mod planned;
 mod radius;
 mod shapes;
+mod style;
 mod view;
+mod walls;
 
-pub use parts::{Walls, as_glass, walls};
 pub use planned::planned;
+pub use walls::{Walls, walls};
 
 /// The keys that rules set, except overlays. A job that goes on has the values of its plan.
 const KEYS: [&str; 20] = [
@@ -100,6 +101,8 @@ struct Rules<'a> {
 pub struct Files<'a> {
     /// Names of the parts of a step, by the numbers in the attribute `part`.
     pub parts: &'a [String],
+    /// Which of them are walls. The facts are those of the others.
+    pub walls: Option<&'a Walls>,
     /// Names behind the numbers of other attributes.
     pub names: &'a [ValueNames],
     /// Whether y is up, and not z.
@@ -127,9 +130,10 @@ pub fn rules(
     rules.lone();
     rules.sheet();
     rules.random();
-    let has_left_out = rules.leave_out();
+    rules.leave_out();
+    let has_walls = rules.walls();
     rules.elements();
-    rules.categories(has_left_out);
+    rules.categories(has_walls);
     rules.scalar();
     rules.neutral();
     rules.cell();
@@ -174,7 +178,7 @@ impl Rules<'_> {
     }
 
     /// Leaves out virtual sites, and water that hides other molecules.
-    fn leave_out_sites_and_water(&mut self) {
+    fn leave_out(&mut self) {
         let (mut conditions, mut lines) = (Vec::new(), Vec::new());
         if self.facts.elements.is_some_and(|elements| elements.has_others) {
             conditions.push("element >= 1 && element <= 118".to_owned());
@@ -195,45 +199,6 @@ impl Rules<'_> {
             self.set([("select.where", conditions.join(" && ").into())], None);
             self.found.lines.extend(lines);
         }
-    }
-
-    /// Leaves out virtual sites, water and walls. Whether there are walls, and they are left out.
-    fn leave_out(&mut self) -> bool {
-        let mut has_left_out = false;
-        self.leave_out_sites_and_water();
-        // Who has styles says what is drawn
-        if !self.manifest.styles.is_empty() {
-            return false;
-        }
-        // Leave out walls by category, or by their shape
-        let is_molecular = self.is_molecular() || self.is_periodic();
-        // Parts with names are walls by these alone
-        let has_names = |c: &&Category| c.name == PART_ATTRIBUTE && self.files.parts.len() > 1;
-        let mut all = self.facts.categories.iter().filter(|c| !has_names(c));
-        let found = all.find_map(|c| Some((c, c.walls.as_ref()?)));
-        if let Some((Category { name, .. }, walls)) = found.filter(|_| !is_molecular) {
-            let WallValues { values, sign } = walls;
-            let all: Vec<String> = values.iter().map(|v| format!("{name} != {v}")).collect();
-            let texts: Vec<String> = values.iter().map(i64::to_string).collect();
-            let why = match sign {
-                WallSign::Code(kind) => format!("walls by the codes of {kind}"),
-                WallSign::Rest => "which rest around the others".to_owned(),
-                WallSign::Around => "which surround the others".to_owned(),
-            };
-            let line = format!(
-                "left out: particles with {name} {}, {why} (--where '{name} >= {}' shows them, {})",
-                texts.join(", "),
-                values.first().copied().unwrap_or_default(),
-                as_glass(texts.iter().map(|value| format!("{name} == {value}")))
-            );
-            has_left_out = self.lacks("select.where");
-            self.set([("select.where", all.join(" && ").into())], Some(line));
-        } else if let Some(tank) = self.facts.tank.as_ref().filter(|_| !is_molecular) {
-            let Tank { condition, why, all } = tank;
-            let line = format!("left out: walls, {why} (--where '{all}' shows them)");
-            self.set([("select.where", condition.clone().into())], Some(line));
-        }
-        has_left_out
     }
 
     /// Elements have their colours and radii, and the bonds of the file are drawn.
@@ -301,10 +266,10 @@ impl Rules<'_> {
     }
 
     /// Few integers are categories.
-    fn categories(&mut self, has_left_out: bool) {
+    fn categories(&mut self, has_walls: bool) {
         // Choose the category that says most
         let values = |category: &Category| {
-            if has_left_out { category.without_walls.len() } else { category.values.len() }
+            if has_walls { category.without_walls.len() } else { category.values.len() }
         };
         // Numbers of beads that are no elements mean nothing without their names
         let has_meaning = |c: &&Category| !self.facts.has_beads || c.name != ELEMENT;

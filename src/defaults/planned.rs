@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use toml::{Table, Value};
 
 use super::legend::{COLORS, TIME};
-use super::{COLOR, KEYS, shapes};
+use super::style::{self, STYLE, value};
+use super::{COLOR, KEYS};
 use crate::manifest::{ManifestSource, Override};
 
 /// The types of overlays that rules add.
@@ -30,9 +31,8 @@ pub fn planned(source: &ManifestSource, planned: &[(String, String)]) -> Vec<Ove
             (_, None) => Vec::new(),
         })
         .collect();
-    // Grains
-    let has_grains = source.lacks("style") && shapes::has_grains(planned);
-    layers.extend(shapes::grains("the plan of the job").filter(|_| has_grains));
+    let style = style::planned(planned).filter(|_| source.lacks(STYLE));
+    layers.extend(style.and_then(|style| style::layer(style, "the plan of the job")));
     // Sizes of overlays that are given, and overlays after these
     let manifest = source.parse().ok().map(|(manifest, _)| manifest);
     let given = manifest.as_ref().map_or(0, |manifest| manifest.overlays.len());
@@ -50,12 +50,6 @@ pub fn planned(source: &ManifestSource, planned: &[(String, String)]) -> Vec<Ove
 
 fn layer(key: &str, value: impl Into<Value>) -> Option<Override> {
     Override::new(key, value, "the plan of the job").ok()
-}
-
-/// A value that was written as TOML.
-fn value(text: &str) -> Option<Value> {
-    let mut table: Table = format!("value = {text}").parse().ok()?;
-    table.remove("value")
 }
 
 /// The overlays of a plan after the `given` ones; none if there is one among these that no rule adds.

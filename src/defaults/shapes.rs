@@ -1,29 +1,10 @@
 //! Particles with shapes of their own.
 
-use toml::{Table, Value};
-
 use super::Rules;
 use super::radius::three_digits;
-use crate::manifest::{Manifest, OpacitySetting, Override, RadiusSetting, Style, StyleDraw};
+use super::style::{STYLE, grains, layer};
+use crate::manifest::{Manifest, OpacitySetting, RadiusSetting, Style, StyleDraw};
 use crate::surface::SurfaceKind;
-
-/// The key of styles.
-const STYLE: &str = "style";
-
-/// The style that the rule adds.
-pub(super) fn grains(shown: &str) -> Option<Override> {
-    let item = Table::from_iter([("draw".to_owned(), Value::from("grains"))]);
-    Override::append(STYLE, item, shown).ok()
-}
-
-/// Whether the `planned` settings of a job have the style that the rule adds, and no other.
-pub(super) fn has_grains(planned: &[(String, String)]) -> bool {
-    let is_of_style = |(key, _): &&(String, String)| key.starts_with("style.");
-    let style = Style { draw: StyleDraw::Grains, ..Style::default() };
-    let ours = Manifest { styles: vec![style], ..Manifest::new("") }.settings();
-    let ours = ours.iter().filter(is_of_style).all(|setting| planned.contains(setting));
-    ours && !planned.iter().filter(is_of_style).any(|(key, _)| !key.starts_with("style.0."))
-}
 
 impl Rules<'_> {
     /// Particles with orientations and sizes along each axis, or with shapes of their types, are drawn as grains.
@@ -44,7 +25,7 @@ impl Rules<'_> {
                 "drawn with their shapes and orientations, by {} (--style ': spheres' draws spheres)",
                 source.what
             );
-            self.found.settings.extend(grains("the defaults"));
+            self.found.settings.extend(layer(grains(), "the defaults"));
             self.found.lines.push(line);
         } else if !matches!(&styles[..], [style] if draws_columns(style)) {
             return;

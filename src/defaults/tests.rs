@@ -7,7 +7,7 @@ use crate::manifest::{
     AxisView, BondSearch, ColorSetting, GroundKind, GroundSetting, OverlayKind, RadiusSetting,
     StyleDraw, TextSize,
 };
-use crate::survey::{Axes, Elements, GrainRadius, ShapeSource, WallSign, WallValues};
+use crate::survey::{Axes, Elements, GrainRadius, ShapeSource, Tank, WallSign, WallValues};
 
 /// Facts of a thousand particles in a unit cube without attributes.
 fn facts() -> Facts {
@@ -85,7 +85,7 @@ fn elements_have_their_colours_and_radii() {
 }
 
 #[test]
-fn categories_come_before_speed_and_walls_are_left_out() {
+fn categories_come_before_speed_and_walls_have_none() {
     let mut fluid = facts();
     fluid.has_velocities = true;
     assert!(matches!(of("", &fluid).material.color, ColorSetting::Auto));
@@ -96,15 +96,16 @@ fn categories_come_before_speed_and_walls_are_left_out() {
     fluid.categories = vec![category("type", &[0, 1, 3], &[0, 3])];
     let (manifest, lines) = completed("", &fluid, Files::default());
     assert_eq!(attribute(&manifest), None);
-    let condition = ("select.where".to_owned(), "\"type != 0 && type != 3\"".to_owned());
-    assert!(manifest.settings().contains(&condition));
-    assert!(lines.contains("left out: particles with type 0, 3"), "{lines}");
+    assert_eq!(glass_of(&manifest), Some("type == 0 || type == 3"));
+    assert!(lines.contains("glass behind the others: particles with type 0, 3"), "{lines}");
+    let hint = "(--style 'type == 0 || type == 3: hidden' leaves them out)";
+    assert!(lines.contains(hint), "{lines}");
     // Nor do other categories that the walls alone had
     fluid.categories.push(Category { without_walls: vec![1], ..category("mk", &[1, 11], &[]) });
     assert_eq!(attribute(&of("", &fluid)), None);
     // Frozen atoms are no walls
     fluid.elements = Some(Elements { has_others: false, is_solid: false });
-    assert!(of("", &fluid).select.condition.is_none());
+    assert!(of("", &fluid).styles.is_empty());
 }
 
 #[test]
@@ -280,7 +281,6 @@ fn jobs_that_go_on_have_the_defaults_of_their_plan() {
     atoms.elements = Some(Elements { has_others: true, is_solid: false });
     atoms.has_time = true;
     atoms.shape_source = Some(ShapeSource { what: "types".to_owned(), radius: Some(0.1) });
-    let begun = of("", &atoms);
     for text in [
         "",
         "material.color.map = \"turbo\"",
@@ -300,12 +300,17 @@ fn jobs_that_go_on_have_the_defaults_of_their_plan() {
         let resumed = source.parse_over(planned(&source, &begun.settings())).unwrap();
         assert_eq!(resumed.settings(), begun.settings(), "{text}");
     }
-    // A job of an earlier version: without rules
+    // Walls
     let source = ManifestSource::new("input.path = \"data\"", Path::new("x"), Vec::new());
+    let begun = of("", &in_tank());
+    let resumed = source.parse_over(planned(&source, &begun.settings())).unwrap();
+    assert_eq!(glass_of(&resumed), Some("!(speed > 0)"));
+    assert_eq!(resumed.settings(), begun.settings());
+    // A job of an earlier version: without rules
     let (plain, _) = source.parse().unwrap();
     let resumed = source.parse_over(planned(&source, &plain.settings())).unwrap();
     assert_eq!(resumed.settings(), plain.settings());
-    assert_ne!(begun.settings(), plain.settings());
+    assert_ne!(of("", &atoms).settings(), plain.settings());
 }
 
 #[test]
@@ -407,17 +412,72 @@ fn particles_with_shapes_are_grains() {
     assert_eq!(spheres, [Style::default()]);
 }
 
-#[test]
-fn walls_without_an_attribute_are_left_out() {
+/// The condition of the walls that are glass behind the others, if nothing else has a style.
+fn glass_of(manifest: &Manifest) -> Option<&str> {
+    let [style] = &manifest.styles[..] else { return None };
+    let is_glass = style.is_thin_glass() && style.material.as_ref().is_some_and(|own| own.underlay);
+    style.condition.as_ref().filter(|_| is_glass).map(|condition| condition.as_str())
+}
+
+/// Facts of a fluid that moves in a tank.
+fn in_tank() -> Facts {
     let tank = Tank { condition: "speed > 0".to_owned(), why: "at rest", all: "speed >= 0" };
-    let mut fluid = Facts { tank: Some(tank), has_velocities: true, ..facts() };
+    Facts { tank: Some(tank), has_velocities: true, ..facts() }
+}
+
+#[test]
+fn walls_without_an_attribute_are_glass() {
+    let mut fluid = in_tank();
     let (manifest, lines) = completed("", &fluid, Files::default());
-    let condition = ("select.where".to_owned(), "\"speed > 0\"".to_owned());
-    assert!(manifest.settings().contains(&condition));
-    assert!(lines.contains("walls, at rest (--where 'speed >= 0' shows them)"), "{lines}");
+    assert_eq!(glass_of(&manifest), Some("!(speed > 0)"));
+    assert!(lines.contains("glass behind the others: walls, at rest (--style '"), "{lines}");
+    // Those around a plane are grey spheres
+    fluid.bounds = Some((DVec3::ZERO, DVec3::new(1.0, 1.0, 0.0)));
+    let flat = of("", &fluid);
+    let [style] = &flat.styles[..] else { panic!("{:?}", flat.styles) };
+    assert_eq!(style.draw, StyleDraw::Spheres);
+    assert!(matches!(style.color, ColorSetting::Rgb(_)));
     // Frozen atoms are none
     fluid.elements = Some(Elements { has_others: false, is_solid: true });
-    assert!(of("", &fluid).select.condition.is_none());
+    assert!(of("", &fluid).styles.is_empty());
+}
+
+#[test]
+fn walls_are_left_out_where_they_cannot_be_glass() {
+    for text in [
+        "look = \"water\"",
+        "render.device = \"gpu\"",
+        "material.opacity = 0.5",
+        "trails.frames = 3",
+        "[[arrows]]\nattribute = \"velocity\"\nscale = 0.1",
+        "[[clip]]\nmode = \"cut\"\ntype = \"plane\"\nnormal = [1, 0, 0]",
+    ] {
+        let (manifest, lines) = completed(text, &in_tank(), Files::default());
+        assert!(manifest.styles.is_empty(), "{text}");
+        let condition = ("select.where".to_owned(), "\"speed > 0\"".to_owned());
+        assert!(manifest.settings().contains(&condition), "{text}");
+        assert!(lines.contains("left out: walls, at rest (--where 'speed >= 0' shows"), "{lines}");
+    }
+    let many = Facts { particles: 100_000_000, ..in_tank() };
+    assert!(of("", &many).styles.is_empty());
+    // Whoever says which particles are drawn, or how, means all of these
+    for text in ["[select]\nwhere = \"z > 0\"", "[[style]]\ndraw = \"spheres\""] {
+        let (manifest, lines) = completed(text, &in_tank(), Files::default());
+        assert!(glass_of(&manifest).is_none() && !lines.contains("walls"), "{lines}");
+    }
+}
+
+#[test]
+fn walls_by_name_are_glass() {
+    let parts = ["fluid", "Bob's wall"].map(str::to_owned);
+    let found = walls(&parts);
+    let files = Files { parts: &parts, walls: found.as_ref(), ..Files::default() };
+    let (manifest, lines) = completed("", &facts(), files);
+    assert_eq!(glass_of(&manifest), Some("part == \"Bob's wall\""));
+    assert!(lines.contains("glass behind the others: Bob's wall, walls by name"), "{lines}");
+    let (manifest, lines) = completed("look = \"water\"", &facts(), files);
+    assert_eq!(manifest.input.parts.as_deref(), Some(&parts[..1]));
+    assert!(lines.contains("(--parts fluid,Bob's wall shows them, "), "{lines}");
 }
 
 #[test]

@@ -5,13 +5,13 @@ use spherule_jobs::{Job, ResumeMode};
 
 use super::manifest_file::JobManifest;
 use super::{RunError, in_thread};
-use crate::defaults::{Defaults, Files, as_glass, planned, rules, walls};
-use crate::manifest::{Look, ManifestSource, Override, real_dir};
+use crate::defaults::{Defaults, Files, planned, rules, walls};
+use crate::manifest::{Look, ManifestSource, real_dir};
 use crate::survey::Facts;
 
 impl JobManifest {
-    /// Completes the manifest with the defaults that follow from the particles of `sequence`, from which walls are left
-    /// out; a job that goes on in `mode` keeps those of its plan. Afterwards the manifest has no look. Returns a line for
+    /// Completes the manifest with the defaults that follow from the particles of `sequence`, from which walls may
+    /// be left out; a job that goes on in `mode` keeps those of its plan. Afterwards the manifest has no look. Returns a line for
     /// each rule that has something to say.
     ///
     /// # Errors
@@ -61,33 +61,24 @@ impl JobManifest {
         source: &ManifestSource,
         sequence: &mut Sequence,
     ) -> Result<Defaults, RunError> {
-        let mut defaults = Defaults::default();
         // The facts are those of what is drawn. Who has styles says what that is
-        let is_open = source.lacks("input.parts") && self.manifest.styles.is_empty();
-        let found = walls(sequence.part_names()).filter(|_| is_open);
-        if let Some(walls) = found.filter(|_| self.manifest.look != Look::Whitted) {
-            defaults.lines.push(format!(
-                "left out: {}, walls by name (--parts {} shows them, {})",
-                walls.left_out.join(", "),
-                sequence.part_names().join(","),
-                as_glass(walls.left_out.iter().map(|name| format!("part == '{name}'")))
-            ));
-            self.keep_parts(sequence, Some(&walls.kept))?;
-            let parts = Override::new("input.parts", walls.kept, "the defaults");
-            defaults.settings.extend(parts);
-        }
-        let facts = in_thread(|| Facts::of(sequence));
+        let is_open = source.lacks("input.parts")
+            && self.manifest.styles.is_empty()
+            && self.manifest.look != Look::Whitted;
+        let walls = walls(sequence.part_names()).filter(|_| is_open);
+        let facts = match &walls {
+            Some(walls) => sequence.with_parts(&walls.kept, |s| in_thread(|| Facts::of(s)))?,
+            None => in_thread(|| Facts::of(sequence)),
+        };
         // Files are opened for names only where there are numbers to name
         let names = if facts.categories.is_empty() { Vec::new() } else { sequence.value_names() };
         let files = Files {
             parts: sequence.part_names(),
+            walls: walls.as_ref(),
             names: &names,
             is_y_up: sequence.is_y_up(),
             is_molecular: sequence.format_info().is_some_and(|format| format.is_molecular),
         };
-        let found = rules(&self.manifest, source, &facts, files);
-        defaults.settings.extend(found.settings);
-        defaults.lines.extend(found.lines);
-        Ok(defaults)
+        Ok(rules(&self.manifest, source, &facts, files))
     }
 }

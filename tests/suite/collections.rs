@@ -62,19 +62,40 @@ fn render_of_all_parts() -> Vec<&'static str> {
 }
 
 #[test]
-fn walls_are_left_out_unless_a_style_draws_them() {
+fn walls_are_glass_unless_something_else_is_said() {
     let workshop = workshop();
     let still = |options: &[&str]| {
         let arguments = [&["still", "in/parts.pvd", "-o", "a.exr"][..], &SMALL, options].concat();
         workshop.run(&arguments).expect(0).errors()
     };
-    let glass = "part == 'wall': smooth, material thin-glass";
+    // Glass by default; where it is not possible, the line has the option for it
     let plain = still(&[]);
-    assert!(plain.contains("left out: wall, walls by name"), "{plain}");
-    assert!(plain.contains(&format!("--style \"{glass}\" draws them as glass")), "{plain}");
-    let styled = still(&["--style", glass]);
-    assert!(!styled.contains("left out"), "{styled}");
-    assert_ne!(plain, styled);
+    let hidden = "part == 'wall': hidden";
+    assert!(plain.contains("glass behind the others: wall, walls by name"), "{plain}");
+    assert!(plain.contains(&format!("--style \"{hidden}\" leaves them out")), "{plain}");
+    let studio = still(&["--look", "studio"]);
+    assert!(studio.contains("left out: wall, walls by name"), "{studio}");
+    let glass = "part == 'wall': smooth, material thin-glass";
+    assert!(studio.contains(&format!("--style \"{glass}\" draws them as glass")), "{studio}");
+    // Whoever has styles says what is drawn
+    for style in [hidden, glass] {
+        let styled = still(&["--style", style]);
+        assert!(!styled.contains("walls by name"), "{styled}");
+    }
+}
+
+#[test]
+fn a_job_with_walls_of_glass_goes_on() {
+    let workshop = workshop();
+    let start = |frames: &'static str| {
+        let start = ["render", "in/parts.pvd", "--frames", frames, "-o", "out/f.####.exr"];
+        [&start[..], &SMALL].concat()
+    };
+    assert_eq!(workshop.run(&start("0")).expect(0).rendered(), [0]);
+    let rest = workshop.run(&start("0-1")).expect(0);
+    assert_eq!(rest.rendered(), [1]);
+    let written = fs::read_to_string(workshop.join("out/job.toml")).expect("a manifest");
+    assert!(written.contains("underlay = true"), "{written}");
 }
 
 #[test]

@@ -327,6 +327,21 @@ impl Sequence {
         Ok(())
     }
 
+    /// What `read` finds in the parts that match `names`. Afterwards the sequence has all of its parts again.
+    ///
+    /// # Errors
+    /// As [`Self::keep_parts`].
+    pub fn with_parts<T>(
+        &mut self,
+        names: &[String],
+        read: impl FnOnce(&Self) -> T,
+    ) -> Result<T, SequenceError> {
+        let (frames, all_parts) = (self.frames.clone(), self.all_parts.take());
+        let found = self.keep_parts(names).map(|()| read(self));
+        (self.frames, self.all_parts) = (frames, all_parts);
+        found
+    }
+
     /// Adds to all frames the properties of their atoms that the file at `path` has and they have not: elements,
     /// residues and others that do not change. The file is a PSF, or has any format with particles.
     ///
