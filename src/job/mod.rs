@@ -63,7 +63,7 @@ pub use convert_job::ConvertJob;
 pub use error::RunError;
 pub use follow::{FollowEnd, Follower};
 pub use manifest_file::{JOB_FILE, JobManifest, is_schema, schema_text};
-pub use render_job::{RenderJob, require_one_fits};
+pub use render_job::{RenderJob, cpu_note, require_one_fits};
 pub use render_run::RenderRun;
 pub use requested::requested_frames;
 pub use scene_files::SceneFiles;

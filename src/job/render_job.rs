@@ -12,8 +12,9 @@ use super::scene_files::SceneFiles;
 use super::selection::{frame_requests, frames_in, indices, select};
 use super::target::{check_output_dir, stored_survey};
 use super::{RunError, Shard, in_thread};
-use crate::manifest::{FitSetting, Manifest};
-use crate::pipeline::{FrameSize, ImageTask, MemoryModel, NextMeshes, Schedule, Setup};
+use crate::manifest::{DeviceSetting, FitSetting, Manifest};
+use crate::pipeline::{FrameSize, ImageTask, MemoryModel, NextMeshes, Schedule, Setup, gpu};
+use crate::render::RendererKind;
 use crate::report::job::{HTML_FILE, JSON_FILE};
 use crate::resolve::Inquiry;
 use crate::survey::{Question, Survey};
@@ -30,6 +31,8 @@ pub struct RenderJob {
     files: SceneFiles,
     /// The number of the frame that others are placed like, if they are.
     reference: Option<i64>,
+    /// Why a new job that may be rendered on a GPU is not, if there is something to say.
+    why_cpu: Option<String>,
 }
 
 /// The setting of plans with the number of the frame that others are placed like; not a key of manifests.
@@ -52,7 +55,7 @@ impl RenderJob {
         let files = SceneFiles::new(manifest_file.dir());
         let first = sequence.frames().first().map(|frame| frame.number);
         let reference = first.filter(|_| manifest.cell.has_reference());
-        Ok(Self { manifest, manifest_file, shown_output, shard, files, reference })
+        Ok(Self { manifest, manifest_file, shown_output, shard, files, reference, why_cpu: None })
     }
 
     /// The job with the defaults of the version that began it, if a run in `mode` resumes one.
@@ -228,14 +231,14 @@ impl RenderJob {
         Ok(mode == ResumeMode::KeepDone && !changes()?.is_empty())
     }
 
-    /// Opens the job. Surveys the sequence if that is necessary.
-    pub(super) fn open(&self, sequence: &Sequence, mode: ResumeMode) -> Result<Job, RunError> {
-        let request = self.request(sequence, mode)?;
+    /// Opens the job. Surveys the sequence if that is necessary, and chooses the device of a new job.
+    pub(super) fn open(&mut self, sequence: &Sequence, mode: ResumeMode) -> Result<Job, RunError> {
         // Start a new job, or discard an old one, only if its images are possible
         let surveyed = match self.existing_plan(mode)? {
             None => Some(self.survey_for_start(sequence)?),
             Some(_) => None,
         };
+        let request = self.request(sequence, mode)?;
         let resolve = |_: Option<&Value>| match surveyed {
             Some(survey) => Ok(survey),
             None => Ok::<_, RunError>(serde_json::to_value(self.survey(sequence)?.0)?),
@@ -243,15 +246,20 @@ impl RenderJob {
         Ok(Job::open(self.dir(), request, resolve)?)
     }
 
-    fn survey_for_start(&self, sequence: &Sequence) -> Result<Value, RunError> {
+    fn survey_for_start(&mut self, sequence: &Sequence) -> Result<Value, RunError> {
         let (survey, setup) = self.survey(sequence)?;
+        // All workers of the job use the same device
+        if setup.picture.renderer == RendererKind::Gpu {
+            self.manifest.render.device = DeviceSetting::Gpu;
+        }
+        self.why_cpu.clone_from(&setup.run.why_cpu);
         let mut tasks = self.tasks(sequence, &self.selected(sequence));
         self.schedule(sequence, &setup, &mut tasks);
         require_one_fits(&tasks)?;
         Ok(serde_json::to_value(&survey)?)
     }
 
-    /// Surveys the sequence, and resolves the automatic settings with it.
+    /// Surveys the sequence, and resolves the automatic settings with it. An automatic device is a GPU if one suits.
     ///
     /// # Errors
     /// No frame can be read, or the settings and the particles do not go together.
@@ -261,7 +269,13 @@ impl RenderJob {
         let question =
             Question { framed: self.framed(sequence), ..inquiry.question(styles.as_ref()) };
         let survey = in_thread(|| Survey::of(sequence, question))?;
-        let setup = self.setup(&survey, sequence)?;
+        let mut setup = self.setup(&survey, sequence)?;
+        if self.manifest.render.device == DeviceSetting::Auto {
+            match gpu::suits(&setup, survey.most_particles as u64) {
+                Ok(()) => setup.picture.renderer = RendererKind::Gpu,
+                Err(why) => setup.run.why_cpu = why,
+            }
+        }
         Ok((survey, setup))
     }
 
@@ -285,6 +299,11 @@ impl RenderJob {
     /// The image cannot be read.
     pub fn scene_notes(&self) -> Result<Vec<String>, RunError> {
         self.files.notes(&self.manifest)
+    }
+
+    /// Why a new job that may be rendered on a GPU is not, if there is something to say.
+    pub(super) fn device_note(&self) -> Option<String> {
+        self.why_cpu.as_ref().map(|why| cpu_note(why))
     }
 
     /// The setup with the survey that is stored in the plan.
@@ -332,6 +351,11 @@ impl RenderJob {
         }
         schedule
     }
+}
+
+/// A note for the user on why a job is rendered on the CPU.
+pub fn cpu_note(why: &str) -> String {
+    format!("rendered on the CPU: {why}")
 }
 
 /// Refuses a run in which no frame fits into memory.

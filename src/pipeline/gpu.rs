@@ -135,6 +135,30 @@ pub fn lacking(setup: &Setup) -> Option<(&'static str, String)> {
     .next()
 }
 
+/// Whether a job that may choose its device is rendered on a GPU; `particles` are those of its largest frame.
+///
+/// # Errors
+/// The first reason why it is not; nothing if the program has no renderer for GPUs.
+pub fn suits(setup: &Setup, particles: u64) -> Result<(), Option<String>> {
+    // Look for a device only if it could be used
+    if let Some((key, what)) = lacking(setup) {
+        return Err(Some(format!("{key}: {what} cannot be rendered on a GPU yet")));
+    }
+    let device = device().map_err(|error| Some(error.to_string()))?;
+    let AdapterSummary { name, is_software, max_array, .. } = device.adapter();
+    if *is_software {
+        return Err(Some(format!("{name} is a program on the CPU")));
+    }
+    let most = max_array / BYTES_OF_LEAF;
+    if particles > most {
+        return Err(Some(format!("a frame has {particles} particles, and {name} takes {most}")));
+    }
+    Ok(())
+}
+
+/// The bytes of a particle in the largest array of a tree.
+const BYTES_OF_LEAF: u64 = 16;
+
 fn key_of(missing: Missing) -> &'static str {
     match missing {
         Missing::Transmission => "material.transmission",

@@ -22,6 +22,14 @@ pub fn lacking(_setup: &Setup) -> Option<(&'static str, String)> {
     Some(("render.device", NOT_BUILT.to_owned()))
 }
 
+/// No job is rendered on a GPU.
+///
+/// # Errors
+/// Always, without a reason: nothing about the job is in the way.
+pub const fn suits(_setup: &Setup, _particles: u64) -> Result<(), Option<String>> {
+    Err(None)
+}
+
 /// No memory.
 pub const fn device_bytes(_setup: &Setup, _particles: u64) -> u64 {
     0

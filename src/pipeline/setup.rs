@@ -386,6 +386,8 @@ pub struct RunSettings {
     pub weight: Option<FrameWeight>,
     /// Sizes of the surfaces of some frames, by their index.
     pub surfaces: Vec<SurfaceWeight>,
+    /// Why a job that may be rendered on a GPU is not, if there is something to say.
+    pub why_cpu: Option<String>,
 }
 
 impl Picture {

@@ -115,6 +115,7 @@ pub(super) fn run_settings(manifest: &Manifest, survey: &Survey) -> RunSettings 
         verify: manifest.input.verify,
         weight: survey.weight,
         surfaces: survey.surfaces.clone(),
+        why_cpu: None,
     }
 }
 

@@ -72,7 +72,7 @@ mod on_a_device {
     fn jobs_give_the_pictures_of_the_cpu() {
         let Some(workshop) = workshop_with_device() else { return };
         workshop.render_to("gpu", &with(&DEVICE)).expect(0).prints("2 of 2 frames done");
-        workshop.render_to("cpu", &with(&[])).expect(0);
+        workshop.render_to("cpu", &with(&["--device=cpu"])).expect(0);
         assert_equal(&workshop, ["gpu", "cpu"]);
         let report = std::fs::read_to_string(workshop.join("gpu/report.json")).expect("a report");
         assert!(report.contains("\"driver\""), "{report}");
@@ -85,10 +85,30 @@ mod on_a_device {
     #[test]
     fn the_default_look_is_that_of_the_cpu() {
         let Some(workshop) = workshop_with_device() else { return };
-        for (out, device) in [("gpu", &DEVICE[..]), ("cpu", &[])] {
+        for (out, device) in [("gpu", &DEVICE[..]), ("cpu", &["--device=cpu"])] {
             workshop.render_to(out, device).expect(0);
         }
         assert_equal(&workshop, ["gpu", "cpu"]);
+    }
+
+    /// A device that is a program on the CPU is taken only where it is asked for.
+    #[test]
+    fn a_device_is_chosen_where_it_suits() {
+        let Some(workshop) = workshop_with_device() else { return };
+        let listed = workshop.run(&["devices"]).expect(0).text();
+        let automatic = workshop.render(&with(&["--gpu=0"])).expect(0);
+        let report = std::fs::read_to_string(workshop.join("out/report.json")).expect("a report");
+        if listed.lines().any(|line| line.starts_with("0: ") && line.contains("program on the CPU"))
+        {
+            automatic.prints("rendered on the CPU: ").prints("is a program on the CPU");
+            assert!(!report.contains("\"driver\""), "{report}");
+        } else {
+            assert!(report.contains("\"driver\""), "{report}");
+        }
+        // The first reason names its key, and no device is looked for
+        let lacking = ["still", "in", "-o", "a.png", "--opacity=0.5", "--gpu=99"];
+        let ran = workshop.run(&[&lacking[..], &SMALL].concat()).expect(0);
+        ran.prints("rendered on the CPU: material.opacity: opacities below 1");
     }
 
     #[test]
@@ -104,7 +124,7 @@ mod on_a_device {
     fn native_frames_are_decoded() {
         let Some(workshop) = workshop_with_device() else { return };
         workshop.run(&["convert", "in", "-o", "native"]).expect(0);
-        for (out, options) in [("gpu", &DEVICE[..]), ("cpu", &[])] {
+        for (out, options) in [("gpu", &DEVICE[..]), ("cpu", &["--device=cpu"])] {
             let pattern = format!("{out}/f.####.exr");
             let native = ["render", "native", "-o", pattern.as_str()];
             workshop.run(&[&native[..], &SMALL, &with(options)].concat()).expect(0);

@@ -6,6 +6,7 @@ use spherule_files::counted;
 use spherule_formats::Sequence;
 
 use crate::cli::progress::ShowReport;
+use crate::job::cpu_note;
 use crate::manifest::points_on_paper;
 use crate::overlay::{Content, Overlay};
 use crate::pipeline::{self, RadiusRule, Setup};
@@ -45,6 +46,9 @@ pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup:
     }
     for text in sequence.file_notes() {
         note!("{text}");
+    }
+    if let Some(why) = &setup.run.why_cpu {
+        note!("{}", cpu_note(why));
     }
     if setup.picture.things.cell.is_none() && !survey.cells.is_empty() {
         note!("{CELL_HINT}");
