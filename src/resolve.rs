@@ -14,7 +14,7 @@ use crate::pipeline::{
     RadiusRule, Setup, Things, gpu,
 };
 use crate::render::{RenderSettings, RendererKind};
-use crate::scene::{Bounds, RadianceMap, Texture};
+use crate::scene::{Bounds, Texture};
 use crate::selection::Division;
 use crate::survey::Survey;
 
@@ -46,6 +46,7 @@ mod styles;
 mod surface;
 
 pub use camera::check_views;
+pub use environment::EnvironmentMap;
 pub use error::ResolveError;
 use error::require_attribute;
 pub use meshes::mesh_settings;
@@ -55,16 +56,11 @@ pub use question::Inquiry;
 /// Minimum radius as a fraction of the diagonal of the bounds; smaller ones would be invisible in f32.
 const MIN_RADIUS: f64 = 1e-6;
 
-/// Whether [`setup`] needs the image of `environment.image`.
-pub fn needs_environment_image(manifest: &Manifest) -> bool {
-    environment::needs_image(manifest)
-}
-
 /// Pictures and meshes that settings name.
 #[derive(Debug, Clone, Default)]
 pub struct SceneInputs<'a> {
-    /// The image of the environment, if it [is needed](needs_environment_image).
-    pub environment: Option<&'a RadianceMap>,
+    /// The image of the environment, if there is one ([`Manifest::has_environment_image`]).
+    pub environment: Option<&'a EnvironmentMap>,
     /// Those of overlays of the type image, in their order.
     pub overlays: &'a [Arc<RgbaPixels>],
     /// The picture on the ground.

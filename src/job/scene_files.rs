@@ -11,8 +11,8 @@ use crate::manifest::{GROUND_IMAGE, Manifest, OverlayKind, named_place};
 use crate::overlay::RgbaPixels;
 use crate::picture::read_rgba;
 use crate::pipeline::Setup;
-use crate::resolve::{self, SceneInputs, check_views, needs_environment_image};
-use crate::scene::{RadianceMap, Texture};
+use crate::resolve::{self, EnvironmentMap, SceneInputs, check_views};
+use crate::scene::Texture;
 use crate::survey::Survey;
 use spherule_images::file::ImageReadError;
 
@@ -21,7 +21,7 @@ use spherule_images::file::ImageReadError;
 pub struct SceneFiles {
     dir: PathBuf,
     /// See [`SceneFiles::environment_image`].
-    environment_image: OnceLock<Option<RadianceMap>>,
+    environment_image: OnceLock<Option<EnvironmentMap>>,
     /// See [`SceneFiles::ground_image`].
     ground_image: OnceLock<Option<Arc<Texture>>>,
     /// See [`SceneFiles::overlay_images`].
@@ -68,13 +68,9 @@ impl SceneFiles {
     /// # Errors
     /// The image cannot be read.
     pub fn notes(&self, manifest: &Manifest) -> Result<Vec<String>, RunError> {
-        let negative = self.environment_image(manifest)?.map_or(0, RadianceMap::negative);
-        let note = |path: PathBuf| {
-            let path = path.display();
-            format!("{path}: {negative} pixels are negative, which counts as 0")
-        };
-        let path = environment_path(manifest, &self.dir).filter(|_| negative > 0);
-        Ok(path.map(note).into_iter().chain(self.meshes.notes()).collect())
+        let image = self.environment_image(manifest)?.zip(environment_path(manifest, &self.dir));
+        let of_image = image.map(|(image, path)| image.notes(&path)).unwrap_or_default();
+        Ok(of_image.into_iter().chain(self.meshes.notes()).collect())
     }
 
     /// The files of the meshes that only `frame` has.
@@ -109,15 +105,15 @@ impl SceneFiles {
         Ok(identities)
     }
 
-    /// The image of the environment, if there is one, in the resolution of environments. Its file is read once.
-    fn environment_image(&self, manifest: &Manifest) -> Result<Option<&RadianceMap>, RunError> {
+    /// The image of the environment, if there is one. Its file is read once.
+    fn environment_image(&self, manifest: &Manifest) -> Result<Option<&EnvironmentMap>, RunError> {
         if let Some(map) = self.environment_image.get() {
             return Ok(map.as_ref());
         }
         let path = environment_path(manifest, &self.dir);
         let map = path.map(|path| read_radiance_map(&path)).transpose()?;
-        let reduced = map.map(|map| map.reduced());
-        Ok(self.environment_image.get_or_init(|| reduced).as_ref())
+        let image = map.map(|map| EnvironmentMap::new(manifest, map));
+        Ok(self.environment_image.get_or_init(|| image).as_ref())
     }
 
     /// The pictures of the overlays of the type image. Their files are read once.
@@ -151,7 +147,7 @@ impl SceneFiles {
 fn environment_path(manifest: &Manifest, dir: &Path) -> Option<PathBuf> {
     let path = manifest.environment.image.as_ref()?;
     // The directory may not exist yet, so that the system cannot follow `..` from it
-    needs_environment_image(manifest).then(|| named_place(&dir.join(path)))
+    manifest.has_environment_image().then(|| named_place(&dir.join(path)))
 }
 
 /// The paths of the overlays of the type image, with the indices of these.

@@ -172,6 +172,7 @@ fn key_of(missing: Missing) -> &'static str {
         Missing::Drawing => "render.outline",
         Missing::Parts => "material.part",
         Missing::Holdout => "mesh",
+        Missing::Detail => "environment.detail",
     }
 }
 

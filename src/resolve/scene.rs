@@ -3,13 +3,12 @@
 use glam::Vec3;
 
 use super::camera::PlacedCamera;
+use super::environment::EnvironmentMap;
 use super::ground::GroundPlace;
 use super::{Extent, ResolveError, environment, ground, lights, parts, surface};
 use crate::manifest::Manifest;
 use crate::render::IntegratorKind;
-use crate::scene::{
-    Background, DEFAULT_AMBIENT_LIGHT, PartMaterials, RadianceMap, Scene, default_lights,
-};
+use crate::scene::{Background, DEFAULT_AMBIENT_LIGHT, PartMaterials, Scene, default_lights};
 use crate::survey::Survey;
 
 /// The scene at the start of the camera path.
@@ -19,7 +18,7 @@ use crate::survey::Survey;
 pub(super) fn scene(
     manifest: &Manifest,
     survey: &Survey,
-    image: Option<&RadianceMap>,
+    image: Option<&EnvironmentMap>,
     placed: &PlacedCamera,
     extent: &Extent,
 ) -> Result<Scene, ResolveError> {
@@ -32,7 +31,7 @@ pub(super) fn scene(
         // The environment is the light
         (true, IntegratorKind::Path) => Vec::new(),
     };
-    lights.extend(environment::sun(manifest, &view, up));
+    lights.extend(environment::suns(manifest, image, &view, up));
     // Collect what the ground depends on
     let place = GroundPlace {
         bounds,

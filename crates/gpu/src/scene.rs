@@ -53,6 +53,8 @@ pub enum Missing {
     Drawing,
     /// Particles that hide what is behind them.
     Holdout,
+    /// An image of the environment at its own resolution.
+    Detail,
 }
 
 impl fmt::Display for Missing {
@@ -70,6 +72,7 @@ impl fmt::Display for Missing {
             Self::Layers => "layers of light and Cryptomatte",
             Self::Drawing => "outlines and the fading with distance",
             Self::Holdout => "holdouts",
+            Self::Detail => "an image of the environment at its own resolution",
         })
     }
 }
@@ -96,6 +99,7 @@ pub fn missing(scene: &Scene, settings: &RenderSettings) -> Option<Missing> {
         (!are_from_nearest(&settings.channels), Missing::Layers),
         (settings.drawing != Drawing::NONE, Missing::Drawing),
         (material.is_holdout, Missing::Holdout),
+        (scene.environment.as_ref().is_some_and(|map| map.has_detail()), Missing::Detail),
     ]
     .into_iter()
     .find_map(|(is_needed, missing)| is_needed.then_some(missing))

@@ -24,6 +24,16 @@ named! {
     }
 }
 
+named! {
+    /// What becomes of suns in an image of the environment.
+    ExtractSun {
+        /// They are lights.
+        Auto = "auto",
+        /// They stay in the image.
+        Off = "off",
+    }
+}
+
 pub(super) const ABOUT: &[&str] = &["Light from infinitely far away, for integrator = \"path\""];
 
 /// The comment of `type`.
@@ -38,6 +48,10 @@ pub struct Environment {
     pub sun: Sun,
     /// Path of the image, if that is the source.
     pub image: Option<String>,
+    /// What becomes of suns in the image.
+    pub extract_sun: ExtractSun,
+    /// Whether the camera, mirrors and clear bodies see the image at its own resolution.
+    pub detail: bool,
     /// Factor on the radiance, linear RGB.
     pub color: Vec3,
     /// Factor on the radiance.
@@ -56,6 +70,8 @@ impl Default for Environment {
             kind: EnvironmentKind::Studio,
             sun: Sun::DEFAULT,
             image: None,
+            extract_sun: ExtractSun::Auto,
+            detail: true,
             color: Vec3::ONE,
             intensity: 1.0,
             rotation: 0.0,
@@ -84,6 +100,13 @@ impl Environment {
             sun => self.sun, affects(Affects::PathTracing);
             /// image: an equirectangular OpenEXR or Radiance HDR file
             image => self.image, example("\"hall.exr\""), affects(Affects::PathTracing);
+            /// image: whether suns in it are lights, with sharp shadows and caustics: auto | off
+            ///
+            /// auto takes up to four small places with much of the light out of the image. Each becomes a light of the same
+            /// direction, size and irradiance, which a note states.
+            extract_sun => self.extract_sun, affects(Affects::EnvironmentImage);
+            /// image: whether the camera, mirrors and clear bodies see it at its own resolution, not at 512x256
+            detail => self.detail, affects(Affects::EnvironmentImage);
             /// Factor on the radiance, linear RGB; the radiance of a constant environment
             color => self.color, affects(Affects::PathTracing);
             /// Factor on the radiance; 0 is no light

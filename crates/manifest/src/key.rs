@@ -17,6 +17,8 @@ pub(super) enum Affects {
     BranchingSpheres,
     /// The path integrator.
     PathTracing,
+    /// An image as environment of the path integrator.
+    EnvironmentImage,
     /// The channel for light groups.
     LightGroups,
 }
@@ -36,6 +38,9 @@ impl Affects {
             Self::Spray => "Changes images of `integrator = \"path\"` with `spray = true`.",
             Self::BranchingSpheres => "Changes images of spheres that reflect and transmit.",
             Self::PathTracing => "Changes images of `integrator = \"path\"`.",
+            Self::EnvironmentImage => {
+                "Changes images of `integrator = \"path\"` with an image as environment."
+            }
             Self::LightGroups => "Changes images with the channel `light_groups`.",
         }
     }

@@ -128,7 +128,7 @@ pub use clip::{Clip, ClipKind, ClipMode, KeptSide, PlaneNormal};
 pub use color::{CategoryColors, CategoryNames, ColorMapping, ColorSetting, ScaleKind};
 pub use color_map::{MapName, RangeSetting};
 pub use crop::PixelBounds;
-pub use environment::{Environment, EnvironmentKind};
+pub use environment::{Environment, EnvironmentKind, ExtractSun};
 pub use error::ManifestError;
 pub use file::{is_marked, marked, read_manifest};
 pub use flags::{KeyFlag, key_flags};
@@ -458,6 +458,7 @@ impl Manifest {
             Affects::Spray => self.has_path_traced_spray(),
             Affects::BranchingSpheres => self.branches_at_spheres(),
             Affects::PathTracing => self.integrator() == IntegratorKind::Path,
+            Affects::EnvironmentImage => self.has_environment_image(),
             Affects::LightGroups => {
                 let channel = Channel::plane(FilmPlane::LightGroups);
                 self.output.channels.contains(&channel)
@@ -485,6 +486,11 @@ impl Manifest {
             settings.push((same::PREVIEW_ALPHA.to_owned(), "true".to_owned()));
         }
         settings
+    }
+
+    /// Whether an image lights the scene.
+    pub fn has_environment_image(&self) -> bool {
+        self.integrator() == IntegratorKind::Path && self.environment.kind == EnvironmentKind::Image
     }
 
     /// Whether the PNG of an image has alpha.

@@ -8,7 +8,8 @@ use spherule_tracer::render::{IntegratorKind, RendererKind};
 
 use super::value::Value;
 use super::{
-    ColorMapping, ColorSetting, DeviceSetting, GroundKind, GroundSetting, Manifest, MapName,
+    ColorMapping, ColorSetting, DeviceSetting, ExtractSun, GroundKind, GroundSetting, Manifest,
+    MapName,
 };
 
 const MIN_WEIGHT: &str = "render.min_weight";
@@ -22,12 +23,17 @@ const OLD_INTEGRATOR: &str = "\"whitted\"";
 const OLD_GROUND: &str = "false";
 const OLD_GROUND_WETNESS: &str = "0.0";
 const OLD_SPRAY_STYLE: &str = "\"spheres\"";
+/// Earlier versions left suns in images of the environment, and saw these in 512x256 directions.
+const EXTRACT_SUN: &str = "environment.extract_sun";
+const DETAIL: &str = "environment.detail";
 /// Keys whose defaults have changed.
-const CHANGED_DEFAULTS: [(&str, &str); 4] = [
+const CHANGED_DEFAULTS: [(&str, &str); 6] = [
     (INTEGRATOR, OLD_INTEGRATOR),
     (GROUND, OLD_GROUND),
     (GROUND_WETNESS, OLD_GROUND_WETNESS),
     (SPRAY_STYLE, OLD_SPRAY_STYLE),
+    (EXTRACT_SUN, "\"off\""),
+    (DETAIL, "false"),
 ];
 /// The default of `mode` of a clip.
 const WHOLE_PARTICLES: &str = "\"particles\"";
@@ -68,6 +74,10 @@ impl Manifest {
         }
         if self.has_path_traced_spray() && !has(SPRAY_STYLE) {
             self.surface.spray_style = SprayStyle::Spheres;
+        }
+        if self.has_environment_image() && !has(EXTRACT_SUN) {
+            self.environment.extract_sun = ExtractSun::Off;
+            self.environment.detail = false;
         }
         if self.has_transparent_previews() && !has(PREVIEW_ALPHA) {
             self.has_opaque_previews = true;
@@ -266,6 +276,24 @@ mod tests {
         let mut same = current.clone();
         same.adopt_old_defaults(&current.settings());
         assert_eq!(same, current);
+    }
+
+    #[test]
+    fn jobs_of_older_versions_keep_their_suns() {
+        let current = manifest("environment.image = \"hall.exr\"");
+        let mut planned = rewritten(&current, EXTRACT_SUN, None);
+        planned.retain(|(key, _)| key != DETAIL);
+        assert_eq!(changes(&current, &planned, false).len(), 2);
+        let mut adopted = current.clone();
+        adopted.adopt_old_defaults(&planned);
+        assert_eq!(adopted.environment.extract_sun, ExtractSun::Off);
+        assert!(!adopted.environment.detail);
+        assert_eq!(changes(&adopted, &planned, false), [""; 0]);
+        let mut same = current.clone();
+        same.adopt_old_defaults(&current.settings());
+        assert_eq!(same, current);
+        // Nothing else depends on it
+        assert!(manifest("").settings().iter().all(|(key, _)| key != EXTRACT_SUN));
     }
 
     #[test]

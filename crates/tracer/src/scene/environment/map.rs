@@ -5,8 +5,8 @@ use thiserror::Error;
 
 use super::{COLUMNS, ROWS};
 
-/// Maximum number of pixels of a map. The environment has far fewer directions, so more pixels would only need memory.
-pub const MAX_MAP_PIXELS: u64 = 8192 * 4096;
+/// Maximum number of pixels of a map.
+pub const MAX_MAP_PIXELS: u64 = 16_384 * 8192;
 
 /// Reasons why pixels are not a map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
@@ -14,7 +14,7 @@ pub enum MapError {
     /// It has no pixels, or too many.
     #[error(
         "the image has {width}x{height} pixels; an environment needs at least 2x1 and at most {MAX_MAP_PIXELS} \
-         (8192x4096)"
+         (16384x8192)"
     )]
     Size {
         /// Width in pixels.
@@ -96,6 +96,16 @@ impl RadianceMap {
     /// Width and height in pixels.
     pub fn size(&self) -> [usize; 2] {
         [self.width, self.height]
+    }
+
+    /// The pixels, row by row from the top, linear RGB.
+    pub(super) fn pixels(&self) -> &[Vec3] {
+        &self.pixels
+    }
+
+    /// Changes a pixel.
+    pub(super) fn set(&mut self, pixel: usize, radiance: Vec3) {
+        self.pixels[pixel] = radiance;
     }
 
     /// Number of pixels with a negative component, which counts as 0.

@@ -2,13 +2,17 @@
 //!
 //! Every kind of environment is an image in latitude and longitude (`image.rs`), which mirrors and the camera see, and
 //! a table of texels of equal solid angle to sample directions from (`table.rs`), which lights everything else. The
-//! table has the means of the image: texels of it are as small as details that matter for light on rough surfaces.
+//! table has the means of the image: texels of it are as small as details that matter for light on rough surfaces. Of a
+//! larger image, mirrors and the camera see its own pixels (`detail.rs`), and suns in it are lights (`suns.rs`).
 //!
 //! All functions of a direction are free of calls, so that loops over lanes can use them; they return the same bits
 //! on every platform.
 
+use std::sync::Arc;
+
 use glam::{DVec3, Vec3};
 
+mod detail;
 mod distribution;
 mod image;
 mod irradiance;
@@ -17,15 +21,18 @@ mod octahedral;
 mod resample;
 mod sky;
 mod studio;
+mod suns;
 mod table;
 #[cfg(test)]
 mod tests;
 
+pub use detail::DetailMap;
 use image::EnvironmentImage;
 pub use irradiance::IrradianceHarmonics;
 pub use map::{MAX_MAP_PIXELS, MapError, RadianceMap};
 pub use sky::{sky, sky_direction};
 pub use studio::studio;
+pub use suns::{MapSun, take_suns};
 pub use table::{EnvironmentTable, TableArrays};
 pub(crate) use table::{TableSize, Texels};
 
@@ -100,6 +107,8 @@ pub struct Environment {
     axes: EnvironmentAxes,
     image: EnvironmentImage,
     table: EnvironmentTable,
+    /// The image at its own resolution, with a factor on its radiance.
+    detail: Option<(Arc<DetailMap>, Vec3)>,
 }
 
 /// A direction sampled from an environment.
@@ -137,12 +146,23 @@ impl Environment {
             scale * resized[row * COLUMNS + (column + 3 * quarter) % COLUMNS]
         });
         let image = EnvironmentImage::new(pixels);
-        Self { axes, table: EnvironmentTable::fine(axes, &image), image }
+        Self { axes, table: EnvironmentTable::fine(axes, &image), image, detail: None }
+    }
+
+    /// The same, which the camera, mirrors and clear bodies see as in `detail`, times `scale` per component.
+    #[must_use]
+    pub fn with_detail(self, detail: Option<Arc<DetailMap>>, scale: Vec3) -> Self {
+        Self { detail: detail.map(|detail| (detail, scale)), ..self }
+    }
+
+    /// Whether it has an image at its own resolution.
+    pub const fn has_detail(&self) -> bool {
+        self.detail.is_some()
     }
 
     /// An environment without small lights.
     fn smooth(axes: EnvironmentAxes, image: EnvironmentImage) -> Self {
-        Self { axes, table: EnvironmentTable::coarse(axes, &image), image }
+        Self { axes, table: EnvironmentTable::coarse(axes, &image), image, detail: None }
     }
 
     /// Whether no light comes from anywhere.
@@ -152,7 +172,8 @@ impl Environment {
 
     /// Memory, bytes.
     pub fn byte_len(&self) -> u64 {
-        self.image.byte_len() + self.table.byte_len()
+        let detail = self.detail.as_ref().map_or(0, |(detail, _)| detail.byte_len());
+        self.image.byte_len() + self.table.byte_len() + detail
     }
 
     /// The axes in the world.
@@ -174,7 +195,11 @@ impl Environment {
     /// The radiance from unit `direction` in the image, linear RGB: what a mirror shows.
     #[inline(always)]
     pub fn radiance(&self, direction: Vec3) -> Vec3 {
-        self.image.radiance(self.axes.own(direction))
+        let own = self.axes.own(direction);
+        match &self.detail {
+            Some((detail, scale)) => *scale * detail.radiance(own),
+            None => self.image.radiance(own),
+        }
     }
 
     /// Irradiance on a surface with unit `normal`, linear RGB.
