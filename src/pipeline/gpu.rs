@@ -144,6 +144,9 @@ pub fn suits(setup: &Setup, particles: u64) -> Result<(), Option<String>> {
     if let Some((key, what)) = lacking(setup) {
         return Err(Some(format!("{key}: {what} cannot be rendered on a GPU yet")));
     }
+    if CHOSEN.get().is_none() && !super::vulkan::has_device_file() {
+        return Err(Some("there is no GPU (spherule devices says more)".to_owned()));
+    }
     let device = device().map_err(|error| Some(error.to_string()))?;
     let AdapterSummary { name, is_software, max_array, .. } = device.adapter();
     if *is_software {

@@ -16,7 +16,7 @@ use super::{
     load_frame, renderer_of,
 };
 use crate::output::{OutputError, PictureFormat, PreviewOptions, encode_exr, encode_preview};
-use crate::render::{Deadline, Film, RenderError};
+use crate::render::{Deadline, Film, RenderError, RendererKind};
 
 /// Width in pixels of the first mosaic of tiles; each further one is twice as wide.
 const FIRST_WIDTH: u32 = 32;
@@ -29,6 +29,9 @@ const MIN_PIXELS: u32 = 51_200;
 const MAX_SAMPLES: u32 = 96;
 /// Time after which no further frames are measured.
 const TIME_FOR_OTHERS: Duration = Duration::from_secs(2);
+
+/// Time for the first picture on a GPU, which counts for nothing.
+const TIME_FOR_KERNELS: Duration = Duration::from_secs(60);
 
 /// Measured or estimated time of one frame, seconds, and the size of its image, bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -116,6 +119,11 @@ fn probe_for(
     // Measure the heaviest frame
     let (report, trial_size, traced_part, first) = {
         let frame = prepare(&mut *renderer, setup, sequence, heaviest)?;
+        // The first picture on a GPU compiles its kernels
+        if setup.picture.renderer == RendererKind::Gpu {
+            let far = Instant::now() + TIME_FOR_KERNELS;
+            Trial::of(&*renderer, setup, &frame, [FIRST_WIDTH; 2], far)?;
+        }
         let trial = largest_trial(&*renderer, setup, &frame, Instant::now() + time_box)?;
         let size = [trial.film.width, trial.film.height];
         let part = (!trial.is_interrupted).then(|| trial.part(setup));

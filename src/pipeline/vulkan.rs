@@ -33,6 +33,19 @@ pub(super) fn why_nothing_is_found() -> String {
     "the installed Vulkan drivers found no device; `vulkaninfo --summary` says more".to_owned()
 }
 
+/// Whether the system shows a device that may be a GPU. Without one, drivers would be loaded for nothing, and some of them
+/// complain about a desktop that is missing.
+pub(super) fn has_device_file() -> bool {
+    let names = |directory: &str, start: &str| {
+        let mut entries = Path::new(directory).read_dir().into_iter().flatten().flatten();
+        entries.any(|entry| entry.file_name().to_string_lossy().starts_with(start))
+    };
+    !cfg!(target_os = "linux")
+        || names("/dev/dri", "renderD")
+        || names("/dev", "nvidia")
+        || Path::new("/dev/dxg").exists()
+}
+
 fn has_loader() -> bool {
     let paths = env::var_os("LD_LIBRARY_PATH").unwrap_or_default();
     let mut all = env::split_paths(&paths).chain(LIBRARIES.map(PathBuf::from));
