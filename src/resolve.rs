@@ -59,7 +59,7 @@ const MIN_RADIUS: f64 = 1e-6;
 /// Pictures and meshes that settings name.
 #[derive(Debug, Clone, Default)]
 pub struct SceneInputs<'a> {
-    /// The image of the environment, if there is one ([`Manifest::has_environment_image`]).
+    /// The image of the environment, if that is one.
     pub environment: Option<&'a EnvironmentMap>,
     /// Those of overlays of the type image, in their order.
     pub overlays: &'a [Arc<RgbaPixels>],

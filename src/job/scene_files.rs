@@ -7,7 +7,7 @@ use std::sync::{Arc, OnceLock};
 use super::RunError;
 use super::meshes::{self, JobMeshes, identity};
 use crate::hdr::{read_radiance_map, read_texture};
-use crate::manifest::{GROUND_IMAGE, Manifest, OverlayKind, named_place};
+use crate::manifest::{EnvironmentKind, GROUND_IMAGE, Manifest, OverlayKind, named_place};
 use crate::overlay::RgbaPixels;
 use crate::picture::read_rgba;
 use crate::pipeline::Setup;
@@ -147,7 +147,7 @@ impl SceneFiles {
 fn environment_path(manifest: &Manifest, dir: &Path) -> Option<PathBuf> {
     let path = manifest.environment.image.as_ref()?;
     // The directory may not exist yet, so that the system cannot follow `..` from it
-    manifest.has_environment_image().then(|| named_place(&dir.join(path)))
+    manifest.has_environment(EnvironmentKind::Image).then(|| named_place(&dir.join(path)))
 }
 
 /// The paths of the overlays of the type image, with the indices of these.

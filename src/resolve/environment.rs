@@ -9,7 +9,9 @@ use super::ResolveError;
 use super::lights::group_index;
 use crate::manifest::{EnvironmentKind, ExtractSun, Manifest};
 use crate::render::IntegratorKind;
-use crate::scene::environment::{DetailMap, MapSun, sky, sky_direction, studio, take_suns};
+use crate::scene::environment::{
+    ClearSky, DetailMap, MapSun, SkySettings, sky_direction, studio, take_suns,
+};
 use crate::scene::framing::view_direction;
 use crate::scene::{self, CameraView, Environment, EnvironmentAxes, Light, RadianceMap};
 
@@ -71,11 +73,7 @@ pub(super) fn environment(
     // Make it; a studio and a sky turn with the camera, an image stays where it is
     let environment = match settings.kind {
         EnvironmentKind::Studio => studio(axes(view.heading(up)), scale),
-        EnvironmentKind::Sky => {
-            let sun = &settings.sun;
-            let direction = sky_direction(sun.elevation, sun.azimuth);
-            sky(axes(view.heading(up)), direction, scale)
-        }
+        EnvironmentKind::Sky => clear_sky(manifest).environment(axes(view.heading(up)), scale),
         EnvironmentKind::Constant => Environment::constant(scale),
         EnvironmentKind::Image => {
             let map = map.ok_or_else(|| ResolveError::Unsupported {
@@ -96,8 +94,15 @@ fn image_axes(manifest: &Manifest, up: DVec3) -> EnvironmentAxes {
     EnvironmentAxes::of_view(forward, up, manifest.environment.rotation)
 }
 
-/// Irradiance of the sun of a sky on a surface that faces it, over pi: warm, and brighter than the sky.
-const SUN: Vec3 = Vec3::new(1.8, 1.674, 1.476);
+/// The sky of a manifest.
+fn clear_sky(manifest: &Manifest) -> ClearSky {
+    let settings = &manifest.environment;
+    ClearSky::new(&SkySettings {
+        sun: sky_direction(settings.sun.elevation, settings.sun.azimuth),
+        turbidity: settings.turbidity,
+        albedo: settings.albedo,
+    })
+}
 
 /// The suns of the environment: that of a sky, or those of the image `map`.
 pub(super) fn suns(
@@ -120,7 +125,7 @@ pub(super) fn suns(
             let sun = &settings.sun;
             let to_light = axes.to_world(sky_direction(sun.elevation, sun.azimuth));
             let half_angle = (0.5 * sun.size).to_radians();
-            vec![light(to_light, half_angle, std::f32::consts::PI * SUN)]
+            vec![light(to_light, half_angle, clear_sky(manifest).sun())]
         }
         (IntegratorKind::Path, EnvironmentKind::Image, Some(map)) => {
             let axes = image_axes(manifest, up);

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 
 use super::surface;
-use crate::manifest::{GroundKind, GroundPattern, Manifest};
+use crate::manifest::{GroundKind, GroundPattern, GroundReach, Manifest};
 use crate::pipeline::Setup;
 use crate::render::IntegratorKind;
 use crate::scene::ground::{GroundImage, Pattern};
@@ -77,7 +77,11 @@ pub(super) fn ground(manifest: &Manifest, place: &GroundPlace<'_>) -> Option<Gro
         (_, GroundPattern::Sand) => Pattern::Sand { tile: tile() },
         (_, GroundPattern::Plain) => Pattern::Plain,
     };
-    Some(ground)
+    let is_far = match render.ground_reach {
+        GroundReach::Auto => integrator == IntegratorKind::Path && manifest.environment.visible,
+        reach => reach == GroundReach::Far,
+    };
+    Some(if is_far { ground.reaching(render.haze.map(narrow)) } else { ground })
 }
 
 /// The ground under the particles or at its height, without colour.
@@ -111,7 +115,8 @@ fn shadow_catcher(ground: Ground, place: &GroundPlace<'_>, strength: f32) -> Gro
     } else {
         (0.5 * size, [0.0, SHADOW * size.length()])
     };
-    Ground { base, fade_start, fade_end, ..ground.into_shadow_catcher(strength) }
+    let lit_range = fade_start;
+    Ground { base, fade_start, fade_end, lit_range, ..ground.into_shadow_catcher(strength) }
 }
 
 /// Lays `texture` on the ground of `setup`, if `manifest` says so.

@@ -46,6 +46,10 @@ pub struct Environment {
     pub kind: EnvironmentKind,
     /// The sun of a sky.
     pub sun: Sun,
+    /// The haze in the air of a sky: 2 is very clear, 10 hazy.
+    pub turbidity: f32,
+    /// Reflectance of the ground that lights a sky.
+    pub albedo: f32,
     /// Path of the image, if that is the source.
     pub image: Option<String>,
     /// What becomes of suns in the image.
@@ -69,6 +73,8 @@ impl Default for Environment {
         Self {
             kind: EnvironmentKind::Studio,
             sun: Sun::DEFAULT,
+            turbidity: 2.5,
+            albedo: 0.2,
             image: None,
             extract_sun: ExtractSun::Auto,
             detail: true,
@@ -98,6 +104,10 @@ impl Environment {
             /// 90 on the viewer's side. A size of 0.53 is that of the sun as seen from the earth; a larger one has
             /// softer shadows.
             sun => self.sun, affects(Affects::PathTracing);
+            /// sky: haze in the air, 1 (none) to 10; 2.5 is a clear day
+            turbidity => self.turbidity, from(1), to(10), affects(Affects::Sky);
+            /// sky: reflectance of the ground around, which lights the sky
+            albedo => self.albedo, from(0), to(1), affects(Affects::Sky);
             /// image: an equirectangular OpenEXR or Radiance HDR file
             image => self.image, example("\"hall.exr\""), affects(Affects::PathTracing);
             /// image: whether suns in it are lights, with sharp shadows and caustics: auto | off

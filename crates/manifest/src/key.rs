@@ -17,6 +17,8 @@ pub(super) enum Affects {
     BranchingSpheres,
     /// The path integrator.
     PathTracing,
+    /// A sky as environment of the path integrator.
+    Sky,
     /// An image as environment of the path integrator.
     EnvironmentImage,
     /// The channel for light groups.
@@ -38,6 +40,7 @@ impl Affects {
             Self::Spray => "Changes images of `integrator = \"path\"` with `spray = true`.",
             Self::BranchingSpheres => "Changes images of spheres that reflect and transmit.",
             Self::PathTracing => "Changes images of `integrator = \"path\"`.",
+            Self::Sky => "Changes images of `integrator = \"path\"` with a sky.",
             Self::EnvironmentImage => {
                 "Changes images of `integrator = \"path\"` with an image as environment."
             }

@@ -152,7 +152,7 @@ pub use print_size::Side;
 #[doc(hidden)]
 pub use rebase::without_dots;
 pub use rebase::{RebaseError, named_place, real_dir};
-pub use render::{DeviceSetting, GroundPattern, Image, IndirectSetting, Render};
+pub use render::{DeviceSetting, GroundPattern, GroundReach, Image, IndirectSetting, Render};
 pub use schema::{SCHEMA_FILE, job_schema};
 pub use select::{Axis, Select, Slab};
 pub use source::ManifestSource;
@@ -458,7 +458,8 @@ impl Manifest {
             Affects::Spray => self.has_path_traced_spray(),
             Affects::BranchingSpheres => self.branches_at_spheres(),
             Affects::PathTracing => self.integrator() == IntegratorKind::Path,
-            Affects::EnvironmentImage => self.has_environment_image(),
+            Affects::Sky => self.has_environment(EnvironmentKind::Sky),
+            Affects::EnvironmentImage => self.has_environment(EnvironmentKind::Image),
             Affects::LightGroups => {
                 let channel = Channel::plane(FilmPlane::LightGroups);
                 self.output.channels.contains(&channel)
@@ -488,9 +489,9 @@ impl Manifest {
         settings
     }
 
-    /// Whether an image lights the scene.
-    pub fn has_environment_image(&self) -> bool {
-        self.integrator() == IntegratorKind::Path && self.environment.kind == EnvironmentKind::Image
+    /// Whether an environment of this kind lights the scene.
+    pub fn has_environment(&self, kind: EnvironmentKind) -> bool {
+        self.integrator() == IntegratorKind::Path && self.environment.kind == kind
     }
 
     /// Whether the PNG of an image has alpha.

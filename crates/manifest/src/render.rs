@@ -178,6 +178,18 @@ named! {
 }
 
 named! {
+    /// How far the ground reaches.
+    GroundReach {
+        /// To the horizon where the camera sees the environment, else near.
+        Auto = "auto",
+        /// It fades into what is behind at some distance from the particles.
+        Near = "near",
+        /// To the horizon.
+        Far = "far",
+    }
+}
+
+named! {
     /// Light from other surfaces.
     IndirectSetting {
         /// Paths follow it.
@@ -293,6 +305,14 @@ section! {
         ground_pattern: GroundPattern = GroundPattern::Plain;
         /// Strength of the shadows on a shadow catcher; 1 is physical
         ground_shadow: f32 = 1.0, from(0), to(1), affects(Affects::PathTracing);
+        /// How far the ground reaches: auto | near | far
+        ///
+        /// near fades into what is behind it at six diagonals of the particles, so that there is no horizon. far reaches
+        /// the horizon. auto is far where the camera sees the environment, and near in front of a background. Shadow
+        /// catchers are always near.
+        ground_reach: GroundReach = GroundReach::Auto;
+        /// Aerial haze over a ground that reaches far: the distance from the particles at which it has faded out
+        haze: Option<f64> = None, example("60.0"), unset("none: the ground fades at the horizon"), unit("a length"), above(0), single();
         /// How much darker and glossier a ground is where water wets it; 1 is a thin film of water, 0 is dry
         ///
         /// Under deep water, its surface already throws light back to the ground, so that 1 is too dark there.

@@ -8,8 +8,8 @@ use spherule_tracer::render::{IntegratorKind, RendererKind};
 
 use super::value::Value;
 use super::{
-    ColorMapping, ColorSetting, DeviceSetting, ExtractSun, GroundKind, GroundSetting, Manifest,
-    MapName,
+    ColorMapping, ColorSetting, DeviceSetting, EnvironmentKind, ExtractSun, GroundKind,
+    GroundReach, GroundSetting, Manifest, MapName,
 };
 
 const MIN_WEIGHT: &str = "render.min_weight";
@@ -26,14 +26,20 @@ const OLD_SPRAY_STYLE: &str = "\"spheres\"";
 /// Earlier versions left suns in images of the environment, and saw these in 512x256 directions.
 const EXTRACT_SUN: &str = "environment.extract_sun";
 const DETAIL: &str = "environment.detail";
+/// The ground of earlier versions had no horizon.
+const GROUND_REACH: &str = "render.ground_reach";
 /// Keys whose defaults have changed.
-const CHANGED_DEFAULTS: [(&str, &str); 6] = [
+const CHANGED_DEFAULTS: [(&str, &str); 9] = [
     (INTEGRATOR, OLD_INTEGRATOR),
     (GROUND, OLD_GROUND),
     (GROUND_WETNESS, OLD_GROUND_WETNESS),
     (SPRAY_STYLE, OLD_SPRAY_STYLE),
     (EXTRACT_SUN, "\"off\""),
     (DETAIL, "false"),
+    (GROUND_REACH, "\"near\""),
+    // No value gives the skies of versions without these keys
+    ("environment.turbidity", ""),
+    ("environment.albedo", ""),
 ];
 /// The default of `mode` of a clip.
 const WHOLE_PARTICLES: &str = "\"particles\"";
@@ -75,9 +81,12 @@ impl Manifest {
         if self.has_path_traced_spray() && !has(SPRAY_STYLE) {
             self.surface.spray_style = SprayStyle::Spheres;
         }
-        if self.has_environment_image() && !has(EXTRACT_SUN) {
+        if self.has_environment(EnvironmentKind::Image) && !has(EXTRACT_SUN) {
             self.environment.extract_sun = ExtractSun::Off;
             self.environment.detail = false;
+        }
+        if !has(GROUND_REACH) {
+            self.render.ground_reach = GroundReach::Near;
         }
         if self.has_transparent_previews() && !has(PREVIEW_ALPHA) {
             self.has_opaque_previews = true;

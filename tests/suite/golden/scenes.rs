@@ -269,6 +269,7 @@ fn floor(height: f32) -> Ground {
         center: Vec3::Z * height,
         fade_start: 4.0,
         fade_end: 12.0,
+        lit_range: 4.0,
         pattern: spherule::scene::ground::Pattern::Plain,
         shadow_catcher: None,
     }

@@ -59,6 +59,7 @@ pub(super) fn floor(height: f32) -> Ground {
         base: Vec3::ZERO,
         fade_start: 1e4,
         fade_end: 2e4,
+        lit_range: 1e4,
         pattern: ground::Pattern::Plain,
         shadow_catcher: None,
     }

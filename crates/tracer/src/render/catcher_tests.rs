@@ -29,6 +29,7 @@ fn scene(environment: Environment) -> Scene {
             base: Vec3::ZERO,
             fade_start: 1e3,
             fade_end: 2e3,
+            lit_range: 1e3,
             pattern: crate::scene::ground::Pattern::Plain,
             shadow_catcher: None,
         }),

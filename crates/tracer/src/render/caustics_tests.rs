@@ -40,7 +40,7 @@ fn scene(eye: DVec3, look_at: DVec3, lights: Vec<Light>) -> Scene {
 fn floor(lights: Vec<Light>) -> Scene {
     let mut scene = scene(DVec3::new(0.0, 0.0, 10.0), DVec3::ZERO, lights);
     if let Some(ground) = &mut scene.ground {
-        ground.fade_start = 12.0;
+        (ground.fade_start, ground.lit_range) = (12.0, 12.0);
     }
     scene
 }

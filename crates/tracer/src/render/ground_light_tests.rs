@@ -32,7 +32,7 @@ fn floor(environment: Environment) -> Scene {
     scene.camera = Camera::new(&view, 1.0, DVec3::ZERO).unwrap();
     *scene.particle_material_mut() = GLASS;
     if let Some(ground) = &mut scene.ground {
-        ground.fade_start = 12.0;
+        (ground.fade_start, ground.lit_range) = (12.0, 12.0);
     }
     scene
 }

@@ -260,6 +260,7 @@ fn catcher() -> Ground {
         base: Vec3::ZERO,
         fade_start: 1e3,
         fade_end: 2e3,
+        lit_range: 1e3,
         pattern: crate::scene::ground::Pattern::Plain,
         shadow_catcher: Some(1.0),
     }

@@ -328,6 +328,7 @@ fn ground_receives_shadows_and_blocks_light_from_below() {
         base: Vec3::ZERO,
         fade_start: 100.0,
         fade_end: 200.0,
+        lit_range: 100.0,
         pattern: crate::scene::ground::Pattern::Plain,
         shadow_catcher: None,
     });

@@ -33,6 +33,13 @@ const FADE_START: f32 = 1.5;
 /// Default distance at which it has faded out.
 const FADE_END: f32 = 6.0;
 
+/// Distance at which a ground that reaches the horizon has faded out, in distances over which it fades otherwise: at the
+/// height of the particles it is a hundredth of a degree below the horizon.
+const HORIZON: f32 = 1000.0;
+
+/// The part of the distance at which a far ground has faded out over which it does not fade.
+const HAZELESS: f32 = 0.02;
+
 /// Least cosine between a ray and the normal for the length of its cut with the ground.
 const MIN_COSINE: f32 = 1e-3;
 
@@ -56,6 +63,8 @@ pub struct Ground {
     pub fade_start: f32,
     /// Distance from which on only the background is visible.
     pub fade_end: f32,
+    /// Distance from the box within which the particles change the light on it.
+    pub lit_range: f32,
     /// Pattern of the colour.
     pub pattern: Pattern,
     /// Strength of the shadows, 0 to 1, if camera rays see nothing but shadows on the ground: a shadow catcher. Only
@@ -134,6 +143,7 @@ impl Ground {
             base: Vec3::ZERO,
             fade_start: FADE_START * diagonal,
             fade_end: FADE_END * diagonal,
+            lit_range: FADE_START * diagonal,
             pattern: Pattern::Plain,
             shadow_catcher: None,
         }
@@ -167,9 +177,17 @@ impl Ground {
         ((point - self.center).abs() - self.base).max(Vec3::ZERO).length()
     }
 
-    /// Edge of a square around the centre, for what is computed on a part of the ground that does not fade.
+    /// Edge of a square around the centre, for what is computed on the ground near the particles.
     pub fn map_edge(&self) -> f32 {
-        self.fade_start + 2.0 * self.base.max_element()
+        self.lit_range + 2.0 * self.base.max_element()
+    }
+
+    /// The same ground, which reaches the horizon, or fades out at the distance `haze`.
+    #[must_use]
+    pub fn reaching(self, haze: Option<f32>) -> Self {
+        let horizon = HORIZON * (self.fade_end - self.fade_start);
+        let fade_end = haze.unwrap_or(horizon).max(f32::MIN_POSITIVE);
+        Self { fade_start: HAZELESS * fade_end, fade_end, ..self }
     }
 
     /// Whether a ray meets the ground where it has not begun to fade.

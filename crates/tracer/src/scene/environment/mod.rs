@@ -21,6 +21,7 @@ mod octahedral;
 mod resample;
 mod sky;
 mod studio;
+mod sun_spectrum;
 mod suns;
 mod table;
 #[cfg(test)]
@@ -30,7 +31,7 @@ pub use detail::DetailMap;
 use image::EnvironmentImage;
 pub use irradiance::IrradianceHarmonics;
 pub use map::{MAX_MAP_PIXELS, MapError, RadianceMap};
-pub use sky::{sky, sky_direction};
+pub use sky::{ClearSky, SkySettings, sky_direction};
 pub use studio::studio;
 pub use suns::{MapSun, take_suns};
 pub use table::{EnvironmentTable, TableArrays};
