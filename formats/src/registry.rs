@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::native;
 use crate::read::{
     amber, bgeo, bi4, csv, dcd, gro, gsd, houdini, lammps, mdcrd, mmcif, npy, pdb, ply, rst7, trr,
-    usd, vtk, vtk_xml, xtc, xyz,
+    usd, vasp, vtk, vtk_xml, xtc, xyz,
 };
 use spherule_readers::Format;
 use spherule_readers::compression::strip_extension;
@@ -33,6 +33,7 @@ const FORMATS: &[Format] = &[
     amber::FORMAT,
     rst7::FORMAT,
     mdcrd::FORMAT,
+    vasp::FORMAT,
     // Before PDB, whose records may begin a file of this format
     pdb::PQR,
     pdb::FORMAT,

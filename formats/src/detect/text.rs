@@ -35,11 +35,6 @@ const FORMATS: &[TextFormat] = &[
         "a PCD point cloud, which is not read; write .ply (`pcl_pcd2ply in.pcd out.ply`, or Open3D)",
     ),
     (
-        is_poscar,
-        "a file of VASP (POSCAR, CONTCAR or XDATCAR), which is not read; write extended XYZ with ASE (`ase convert \
-         POSCAR out.extxyz`) or OVITO",
-    ),
-    (
         is_tinker,
         "a Tinker file, which is not read; write .xyz with Open Babel (`obabel -itxyz in.xyz -oxyz -O out.xyz`)",
     ),
@@ -101,16 +96,6 @@ fn has_integers(line: Option<&&[u8]>) -> bool {
 
 fn is_count(word: &[u8]) -> bool {
     integer(word).is_some_and(|count| count >= 0)
-}
-
-/// A title, a scale, three edges, names of species (which older files lack), their counts, and how coordinates are
-/// meant.
-fn is_poscar(lines: &Lines<'_>) -> bool {
-    let has_edges = (2..5).all(|line| has_numbers(lines.get(line), 3));
-    let counts = [5, 6].into_iter().find(|line| has_integers(lines.get(*line)));
-    let mode = counts.and_then(|line| lines.get(line + 1)?.trim_ascii_start().first());
-    let is_mode = mode.is_some_and(|mode| b"cCkKdDsS".contains(mode));
-    has_numbers(lines.get(1), 1) && has_edges && is_mode
 }
 
 /// A count with a title behind it, perhaps a line of the box, then atoms: number, name, x, y, z, type.
@@ -213,8 +198,6 @@ mod tests {
             "PCD",
         );
         let cell = "4.0 0 0\n0 4.0 0\n0 0 4.0\n";
-        suggests(&format!("Cr metal\n1.0\n{cell}Cr O\n1 1\nDirect\n0 0 0\n0.5 0.5 0.5\n"), "VASP");
-        suggests(&format!("Cr metal\n1.0\n{cell}2\nCartesian\n0 0 0\n0.5 0.5 0.5\n"), "VASP");
         suggests("  2  water\n  1  O  0.1 0.2 0.3  1  2\n  2  H  1.1 0.2 0.3  2  1\n", "Tinker");
         suggests(
             "* a title\n*\n    1\n    1    1 TIP3 OH2    1.00000   2.00000   3.00000 W    1      0.00000\n",

@@ -23,7 +23,7 @@ pub use packed::{compressed, houdini, npz, open};
 pub type Target = fn(&[u8]) -> usize;
 
 /// Every target by the name of its folder in `corpus`.
-pub const TARGETS: [(&str, Target); 34] = [
+pub const TARGETS: [(&str, Target); 35] = [
     ("vtk", vtk),
     ("vtk_xml", vtk_xml),
     ("bgeo", bgeo),
@@ -43,6 +43,7 @@ pub const TARGETS: [(&str, Target); 34] = [
     ("amber", amber),
     ("rst7", rst7),
     ("mdcrd", mdcrd),
+    ("vasp", vasp),
     ("prmtop", prmtop),
     ("pdb", pdb),
     ("pqr", pqr),
@@ -162,6 +163,11 @@ pub fn rst7(bytes: &[u8]) -> usize {
 /// AMBER trajectories in text.
 pub fn mdcrd(bytes: &[u8]) -> usize {
     read_all(read::mdcrd::FORMAT, bytes, 1)
+}
+
+/// VASP structures and trajectories.
+pub fn vasp(bytes: &[u8]) -> usize {
+    read_all(read::vasp::FORMAT, bytes, 1)
 }
 
 /// AMBER topologies.

@@ -25,6 +25,7 @@ pub mod hdf5;
 pub mod houdini;
 mod input;
 pub mod lammps;
+mod line_words;
 pub mod mdcrd;
 pub mod mmcif;
 #[cfg(test)]
@@ -48,6 +49,7 @@ mod text_samples;
 mod texts;
 pub mod trr;
 pub mod usd;
+pub mod vasp;
 pub mod vtk;
 pub mod vtk_xml;
 mod xdr;

@@ -4,7 +4,9 @@ use proptest::prelude::*;
 use proptest::sample::Index;
 
 use super::damage::{TestedReader, mutate, sample};
-use super::{Step, amber, dcd, gro, lammps, mdcrd, mmcif, pdb, pieces, text_samples, trr, xtc};
+use super::{
+    Step, amber, dcd, gro, lammps, mdcrd, mmcif, pdb, pieces, text_samples, trr, vasp, xtc,
+};
 use crate::format::Format;
 use crate::reader::{Confidence, HEAD_LEN};
 use spherule_frame::{ParseError, RawParticles};
@@ -40,6 +42,7 @@ readers! {
     pdb_reader: pdb::FORMAT, "models.pdb";
     pqr_reader: pdb::PQR, "charges.pqr";
     mmcif_reader: mmcif::FORMAT, "models.cif";
+    vasp_reader: vasp::FORMAT, "water.xdatcar";
     lammps_reader: lammps::BINARY, "custom.lammpsbin";
 }
 
