@@ -108,9 +108,10 @@ pub const JOINED_STEMS: [(&str, Option<&str>); 12] = [
 pub const COLOR_COLUMNS: [[&str; 3]; 2] = [["red", "green", "blue"], ["r", "g", "b"]];
 
 /// Scalars of binary records that form a vector together, with its name. The first complete entry is used.
-pub const RECORD_VECTORS: [(&str, &[&str]); 6] = [
+pub const RECORD_VECTORS: [(&str, &[&str]); 7] = [
     ("velocity", &["vx", "vy", "vz"]),
     ("normal", &["nx", "ny", "nz"]),
+    ("normal", &["normal_x", "normal_y", "normal_z"]),
     ("color", &["red", "green", "blue", "alpha"]),
     ("color", &["red", "green", "blue"]),
     ("color", &["diffuse_red", "diffuse_green", "diffuse_blue"]),

@@ -29,12 +29,6 @@ const FORMATS: &[TextFormat] = &[
         "an MDL file (.mol, .sdf), which is not read; write .pdb or .xyz with Open Babel (`obabel in.sdf -O out.pdb`)",
     ),
     (
-        |lines| {
-            begins(lines, b"# .PCD v") || (begins(lines, b"FIELDS ") && begins(lines, b"DATA "))
-        },
-        "a PCD point cloud, which is not read; write .ply (`pcl_pcd2ply in.pcd out.ply`, or Open3D)",
-    ),
-    (
         is_tinker,
         "a Tinker file, which is not read; write .xyz with Open Babel (`obabel -itxyz in.xyz -oxyz -O out.xyz`)",
     ),
@@ -192,10 +186,6 @@ mod tests {
         suggests(
             "name\n  program\n\n  1  0  0  0  0  0  0  0  0  0999 V2000\n    0.0000    0.0000    0.0000 C\n",
             "MDL",
-        );
-        suggests(
-            "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nDATA ascii\n1 2 3\n4 5 6\n",
-            "PCD",
         );
         let cell = "4.0 0 0\n0 4.0 0\n0 0 4.0\n";
         suggests("  2  water\n  1  O  0.1 0.2 0.3  1  2\n  2  H  1.1 0.2 0.3  2  1\n", "Tinker");

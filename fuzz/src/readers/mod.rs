@@ -23,12 +23,13 @@ pub use packed::{compressed, houdini, npz, open};
 pub type Target = fn(&[u8]) -> usize;
 
 /// Every target by the name of its folder in `corpus`.
-pub const TARGETS: [(&str, Target); 35] = [
+pub const TARGETS: [(&str, Target); 36] = [
     ("vtk", vtk),
     ("vtk_xml", vtk_xml),
     ("bgeo", bgeo),
     ("houdini", houdini),
     ("ply", ply),
+    ("pcd", pcd),
     ("xyz", xyz),
     ("lammps", lammps),
     ("npy", npy),
@@ -97,6 +98,11 @@ pub fn bgeo(bytes: &[u8]) -> usize {
 /// PLY.
 pub fn ply(bytes: &[u8]) -> usize {
     read_all(read::ply::FORMAT, bytes, 1)
+}
+
+/// PCD.
+pub fn pcd(bytes: &[u8]) -> usize {
+    read_all(read::pcd::FORMAT, bytes, 88)
 }
 
 /// Raw, bare and molecular XYZ.

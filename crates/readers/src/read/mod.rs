@@ -26,6 +26,7 @@ pub mod houdini;
 mod input;
 pub mod lammps;
 mod line_words;
+mod lzf;
 pub mod mdcrd;
 pub mod mmcif;
 #[cfg(test)]
@@ -33,6 +34,7 @@ mod molecule_tests;
 mod notes;
 pub mod npy;
 mod numbers;
+pub mod pcd;
 pub mod pdb;
 #[cfg(test)]
 mod pieces;
@@ -48,6 +50,7 @@ pub mod text;
 mod text_samples;
 mod texts;
 pub mod trr;
+mod typed_text;
 pub mod usd;
 pub mod vasp;
 pub mod vtk;

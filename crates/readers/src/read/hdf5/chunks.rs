@@ -17,10 +17,12 @@ use hdf5_reader::filters::{
 use hdf5_reader::fixed_array::collect_fixed_array_chunk_entries_storage;
 use hdf5_reader::messages::layout::ChunkIndexing;
 
-use super::lzf::{self, FILTER_LZF};
 use super::stored::{ChunkedLayout, Stored};
-use crate::read::CUT_SHORT;
+use crate::read::{CUT_SHORT, lzf};
 use spherule_frame::{MemoryBudget, ParseError};
+
+/// Number of the filter LZF of h5py.
+const FILTER_LZF: u16 = 32000;
 
 /// Most filters of a pipeline: shuffle, compression and a checksum are usual.
 const MAX_FILTERS: usize = 4;
@@ -252,7 +254,10 @@ fn unpack(
     len: usize,
 ) -> Result<Vec<u8>, Error> {
     let mut registry = FilterRegistry::new();
-    let lzf = move |_: &_, data: &[u8], _| lzf::decompress(data, len);
+    let lzf = move |_: &_, data: &[u8], _| {
+        let damaged = |what| Error::DecompressionError(format!("LZF: {what}"));
+        lzf::decompress(data, len).map_err(damaged)
+    };
     registry.register(FILTER_LZF, Box::new(lzf));
     apply_pipeline_with_limit(
         packed,

@@ -16,7 +16,6 @@ mod h5md;
 mod h5part;
 mod header_patch;
 mod links;
-mod lzf;
 mod members;
 mod node;
 mod openpmd;

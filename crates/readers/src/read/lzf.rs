@@ -1,26 +1,17 @@
-//! The LZF filter of h5py (number 32000): runs of literal bytes, and copies of bytes before.
-
-use hdf5_reader::error::Error;
-
-/// Number of the filter.
-pub(super) const FILTER_LZF: u16 = 32000;
+//! LZF, which h5py and the Point Cloud Library compress with: runs of literal bytes, and copies of bytes before.
 
 /// Decompresses `data` to at most `most` bytes.
 ///
 /// # Errors
-/// [`Error::DecompressionError`] if the data is damaged, or longer.
-pub(super) fn decompress(data: &[u8], most: usize) -> Result<Vec<u8>, Error> {
-    let damaged = |what: &str| Error::DecompressionError(format!("LZF: {what}"));
+/// What is wrong with the data: it is damaged, or longer.
+pub(super) fn decompress(data: &[u8], most: usize) -> Result<Vec<u8>, &'static str> {
     // A copy of three bytes gives up to 264.
     let mut out = Vec::with_capacity(most.min(data.len().saturating_mul(88)));
     let mut rest = data.iter();
     while let Some(control) = rest.next() {
         let control = usize::from(*control);
         if control < 32 {
-            let literals = rest
-                .as_slice()
-                .get(..=control)
-                .ok_or_else(|| damaged("it ends within literal bytes"))?;
+            let literals = rest.as_slice().get(..=control).ok_or("it ends within literal bytes")?;
             out.extend_from_slice(literals);
             rest = rest.as_slice()[control + 1..].iter();
         } else {
@@ -33,13 +24,13 @@ pub(super) fn decompress(data: &[u8], most: usize) -> Result<Vec<u8>, Error> {
                 (Some(more), Some(low)) => {
                     (2 + if control >> 5 == 7 { 7 + more } else { more }, low)
                 }
-                _ => return Err(damaged("it ends within a copy")),
+                _ => return Err("it ends within a copy"),
             };
             let distance = ((control & 31) << 8 | low) + 1;
             let from = out.len().checked_sub(distance);
-            let from = from.ok_or_else(|| damaged("a copy from before the start"))?;
+            let from = from.ok_or("a copy from before the start")?;
             if out.len() + length > most {
-                return Err(damaged("longer than its chunk"));
+                return Err("longer than stated");
             }
             // Copies may overlap what they write.
             for at in from..from + length {
@@ -47,7 +38,7 @@ pub(super) fn decompress(data: &[u8], most: usize) -> Result<Vec<u8>, Error> {
             }
         }
         if out.len() > most {
-            return Err(damaged("longer than its chunk"));
+            return Err("longer than stated");
         }
     }
     Ok(out)
