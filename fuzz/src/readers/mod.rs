@@ -23,12 +23,13 @@ pub use packed::{compressed, houdini, npz, open};
 pub type Target = fn(&[u8]) -> usize;
 
 /// Every target by the name of its folder in `corpus`.
-pub const TARGETS: [(&str, Target); 36] = [
+pub const TARGETS: [(&str, Target); 37] = [
     ("vtk", vtk),
     ("vtk_xml", vtk_xml),
     ("bgeo", bgeo),
     ("houdini", houdini),
     ("ply", ply),
+    ("pts", pts),
     ("pcd", pcd),
     ("xyz", xyz),
     ("lammps", lammps),
@@ -98,6 +99,11 @@ pub fn bgeo(bytes: &[u8]) -> usize {
 /// PLY.
 pub fn ply(bytes: &[u8]) -> usize {
     read_all(read::ply::FORMAT, bytes, 1)
+}
+
+/// Point clouds of laser scanners in text.
+pub fn pts(bytes: &[u8]) -> usize {
+    read_all(read::pts::FORMAT, bytes, 1)
 }
 
 /// PCD.

@@ -41,6 +41,7 @@ mod pieces;
 pub mod ply;
 pub mod prmtop;
 pub mod psf;
+pub mod pts;
 pub mod rst7;
 pub mod sniff;
 mod source;

@@ -2,8 +2,8 @@
 
 use crate::read::text;
 
-const POINT_CLOUD: &str = "a point cloud with a count and no comment (Leica .pts), which is not read; delete its first line: \
-                           columns 1 to 3 of the rest are the positions";
+const POINT_CLOUD: &str = "a point cloud with a count and no comment: if it is of a laser scanner, call it .pts; else \
+                           delete its first line";
 const TINKER: &str = "a Tinker file, which is not read; write .xyz with Open Babel (`obabel -itxyz in.xyz -oxyz -O out.xyz`)";
 
 /// What a text is in whose second line, `row`, is one of the counted lines instead of a comment. The next line has
