@@ -4,8 +4,8 @@ use std::path::Path;
 
 use crate::native;
 use crate::read::{
-    amber, bgeo, bi4, csv, dcd, gro, gsd, houdini, lammps, mdcrd, mmcif, npy, pcd, pdb, ply, pts,
-    rst7, trr, usd, vasp, vtk, vtk_xml, xtc, xyz,
+    amber, bgeo, bi4, csv, dcd, gro, gsd, houdini, lammps, las, mdcrd, mmcif, npy, pcd, pdb, ply,
+    pts, rst7, trr, usd, vasp, vtk, vtk_xml, xtc, xyz,
 };
 use spherule_readers::Format;
 use spherule_readers::compression::strip_extension;
@@ -20,6 +20,7 @@ const FORMATS: &[Format] = &[
     ply::FORMAT,
     pcd::FORMAT,
     pts::FORMAT,
+    las::FORMAT,
     xyz::FORMAT,
     lammps::FORMAT,
     lammps::BINARY,

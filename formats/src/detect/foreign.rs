@@ -50,10 +50,6 @@ const MAGICS: &[(&[u8], &str)] = &[
     (b"BLENDER", "a Blender file, which is not read; export the points as .ply"),
     (b"Kaydara FBX", "an FBX file, which is not read; export the points as .ply"),
     (b"glTF", "a glTF file, which is not read; export the points as .ply"),
-    (
-        b"LASF",
-        "a LAS or LAZ point cloud, which is not read; write .ply or .csv with PDAL (`pdal translate in.las out.ply`)",
-    ),
     (b"\xff\xfe", UTF16),
     (b"\xfe\xff", UTF16),
 ];

@@ -232,7 +232,10 @@ mod tests {
         refused("a.png", b"\x89PNG\r\n", "image");
         refused("a.exr", b"\x76\x2f\x31\x01", "image");
         refused("a.gz", b"\x1f\x8b\x08", "gzip inside gzip");
-        refused("a.laz", b"LASF\0\0\0\0", "pdal");
+        let mut compressed = b"LASF".to_vec();
+        compressed.resize(104, 0);
+        compressed.push(0x83);
+        refused("a.laz", &compressed, "pdal");
         refused("a.tpr", b"\0\0\0\x0d\0\0\0\x0cVERSION 5.1.2", "gmx editconf");
         let mut tng = vec![1; 40];
         tng.extend(b"GENERAL INFO\0");

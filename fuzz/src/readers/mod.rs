@@ -23,12 +23,13 @@ pub use packed::{compressed, houdini, npz, open};
 pub type Target = fn(&[u8]) -> usize;
 
 /// Every target by the name of its folder in `corpus`.
-pub const TARGETS: [(&str, Target); 37] = [
+pub const TARGETS: [(&str, Target); 38] = [
     ("vtk", vtk),
     ("vtk_xml", vtk_xml),
     ("bgeo", bgeo),
     ("houdini", houdini),
     ("ply", ply),
+    ("las", las),
     ("pts", pts),
     ("pcd", pcd),
     ("xyz", xyz),
@@ -99,6 +100,11 @@ pub fn bgeo(bytes: &[u8]) -> usize {
 /// PLY.
 pub fn ply(bytes: &[u8]) -> usize {
     read_all(read::ply::FORMAT, bytes, 1)
+}
+
+/// LAS.
+pub fn las(bytes: &[u8]) -> usize {
+    read_all(read::las::FORMAT, bytes, 1)
 }
 
 /// Point clouds of laser scanners in text.

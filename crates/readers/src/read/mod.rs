@@ -25,6 +25,7 @@ pub mod hdf5;
 pub mod houdini;
 mod input;
 pub mod lammps;
+pub mod las;
 mod line_words;
 mod lzf;
 pub mod mdcrd;
