@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 
 use spherule_formats::detect::detect_format;
 use spherule_formats::open;
-use spherule_formats::read::{amber, dcd, gro, gsd, lammps, mmcif, pdb, rst7, trr, vasp, xtc};
+use spherule_formats::read::{
+    amber, dcd, gro, gsd, lammps, mmcif, mol2, pdb, rst7, trr, vasp, xtc,
+};
 
 fn data(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data").join(name)
@@ -25,6 +27,7 @@ fn molecular_files_are_known_by_their_content() {
         ("charges.pqr", pdb::PQR),
         ("models.cif", mmcif::FORMAT),
         ("water.xdatcar", vasp::FORMAT),
+        ("water.mol2", mol2::FORMAT),
         ("custom.lammpsbin", lammps::BINARY),
     ] {
         let bytes = fs::read(data("molecules").join(name)).expect("a sample");

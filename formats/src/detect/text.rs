@@ -19,10 +19,6 @@ const FORMATS: &[TextFormat] = &[
         "a topology (PSF), which has no positions; give it with --topology beside a file with coordinates",
     ),
     (
-        |lines| begins(lines, b"@<TRIPOS>"),
-        "a Tripos mol2 file, which is not read; write .pdb or .xyz with Open Babel (`obabel in.mol2 -O out.pdb`)",
-    ),
-    (
         |lines| {
             lines.get(3).is_some_and(|line| line.ends_with(b"V2000") || line.ends_with(b"V3000"))
         },
@@ -182,7 +178,6 @@ mod tests {
                 "%FLAG TITLE\n%FORMAT(20a4)\nACE\n%FLAG POINTERS\n%FORMAT(10I8)\n       3       1";
             suggests(&format!("{before}{section}\n"), "prmtop");
         }
-        suggests("# a comment\n@<TRIPOS>MOLECULE\nSMALL\n", "obabel in.mol2");
         suggests(
             "name\n  program\n\n  1  0  0  0  0  0  0  0  0  0999 V2000\n    0.0000    0.0000    0.0000 C\n",
             "MDL",

@@ -30,6 +30,7 @@ mod line_words;
 mod lzf;
 pub mod mdcrd;
 pub mod mmcif;
+pub mod mol2;
 #[cfg(test)]
 mod molecule_tests;
 mod notes;
