@@ -19,12 +19,6 @@ const FORMATS: &[TextFormat] = &[
         "a topology (PSF), which has no positions; give it with --topology beside a file with coordinates",
     ),
     (
-        |lines| {
-            lines.get(3).is_some_and(|line| line.ends_with(b"V2000") || line.ends_with(b"V3000"))
-        },
-        "an MDL file (.mol, .sdf), which is not read; write .pdb or .xyz with Open Babel (`obabel in.sdf -O out.pdb`)",
-    ),
-    (
         is_tinker,
         "a Tinker file, which is not read; write .xyz with Open Babel (`obabel -itxyz in.xyz -oxyz -O out.xyz`)",
     ),
@@ -178,10 +172,6 @@ mod tests {
                 "%FLAG TITLE\n%FORMAT(20a4)\nACE\n%FLAG POINTERS\n%FORMAT(10I8)\n       3       1";
             suggests(&format!("{before}{section}\n"), "prmtop");
         }
-        suggests(
-            "name\n  program\n\n  1  0  0  0  0  0  0  0  0  0999 V2000\n    0.0000    0.0000    0.0000 C\n",
-            "MDL",
-        );
         let cell = "4.0 0 0\n0 4.0 0\n0 0 4.0\n";
         suggests("  2  water\n  1  O  0.1 0.2 0.3  1  2\n  2  H  1.1 0.2 0.3  2  1\n", "Tinker");
         suggests(

@@ -23,7 +23,7 @@ pub use packed::{compressed, houdini, npz, open};
 pub type Target = fn(&[u8]) -> usize;
 
 /// Every target by the name of its folder in `corpus`.
-pub const TARGETS: [(&str, Target); 39] = [
+pub const TARGETS: [(&str, Target); 40] = [
     ("vtk", vtk),
     ("vtk_xml", vtk_xml),
     ("bgeo", bgeo),
@@ -46,6 +46,7 @@ pub const TARGETS: [(&str, Target); 39] = [
     ("amber", amber),
     ("rst7", rst7),
     ("mdcrd", mdcrd),
+    ("sdf", sdf),
     ("mol2", mol2),
     ("vasp", vasp),
     ("prmtop", prmtop),
@@ -182,6 +183,11 @@ pub fn rst7(bytes: &[u8]) -> usize {
 /// AMBER trajectories in text.
 pub fn mdcrd(bytes: &[u8]) -> usize {
     read_all(read::mdcrd::FORMAT, bytes, 1)
+}
+
+/// MDL files.
+pub fn sdf(bytes: &[u8]) -> usize {
+    read_all(read::sdf::FORMAT, bytes, 1)
 }
 
 /// Tripos mol2.

@@ -45,6 +45,7 @@ pub mod prmtop;
 pub mod psf;
 pub mod pts;
 pub mod rst7;
+pub mod sdf;
 pub mod sniff;
 mod source;
 mod table;

@@ -5,7 +5,8 @@ use proptest::sample::Index;
 
 use super::damage::{TestedReader, mutate, sample};
 use super::{
-    Step, amber, dcd, gro, lammps, mdcrd, mmcif, mol2, pdb, pieces, text_samples, trr, vasp, xtc,
+    Step, amber, dcd, gro, lammps, mdcrd, mmcif, mol2, pdb, pieces, sdf, text_samples, trr, vasp,
+    xtc,
 };
 use crate::format::Format;
 use crate::reader::{Confidence, HEAD_LEN};
@@ -44,6 +45,7 @@ readers! {
     mmcif_reader: mmcif::FORMAT, "models.cif";
     vasp_reader: vasp::FORMAT, "water.xdatcar";
     mol2_reader: mol2::FORMAT, "water.mol2";
+    sdf_reader: sdf::FORMAT, "water.sdf";
     lammps_reader: lammps::BINARY, "custom.lammpsbin";
 }
 
