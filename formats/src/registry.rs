@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::native;
 use crate::read::{
     amber, bgeo, bi4, csv, dcd, gro, gsd, houdini, lammps, las, mdcrd, mmcif, mol2, npy, pcd, pdb,
-    ply, pts, rst7, sdf, trr, usd, vasp, vtk, vtk_xml, xtc, xyz,
+    ply, pts, rst7, sdf, tinker, trr, usd, vasp, vtk, vtk_xml, xtc, xyz,
 };
 use spherule_readers::Format;
 use spherule_readers::compression::strip_extension;
@@ -39,6 +39,7 @@ const FORMATS: &[Format] = &[
     vasp::FORMAT,
     mol2::FORMAT,
     sdf::FORMAT,
+    tinker::FORMAT,
     // Before PDB, whose records may begin a file of this format
     pdb::PQR,
     pdb::FORMAT,

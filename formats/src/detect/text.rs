@@ -19,10 +19,6 @@ const FORMATS: &[TextFormat] = &[
         "a topology (PSF), which has no positions; give it with --topology beside a file with coordinates",
     ),
     (
-        is_tinker,
-        "a Tinker file, which is not read; write .xyz with Open Babel (`obabel -itxyz in.xyz -oxyz -O out.xyz`)",
-    ),
-    (
         is_charmm_card,
         "a CHARMM coordinate file (.crd, .cor), which is not read; write .pdb or .dcd with CHARMM, VMD or MDAnalysis",
     ),
@@ -80,28 +76,6 @@ fn has_integers(line: Option<&&[u8]>) -> bool {
 
 fn is_count(word: &[u8]) -> bool {
     integer(word).is_some_and(|count| count >= 0)
-}
-
-/// A count with a title behind it, perhaps a line of the box, then atoms: number, name, x, y, z, type.
-fn is_tinker(lines: &Lines<'_>) -> bool {
-    let is_heading = |line: &[u8]| {
-        let mut words = words(line);
-        words.next().is_some_and(is_count)
-            && words.next().is_some_and(|word| number(word).is_none())
-    };
-    let is_atom = |line: Option<&&[u8]>| {
-        let words: Vec<&[u8]> = line.into_iter().flat_map(|line| words(line)).take(6).collect();
-        let [index, name, place @ .., kind] = words.as_slice() else {
-            return false;
-        };
-        integer(index) == Some(1)
-            && number(name).is_none()
-            && place.len() == 3
-            && place.iter().all(|word| number(word).is_some())
-            && integer(kind).is_some()
-    };
-    let atom = if has_numbers(lines.get(1), 6) { 2 } else { 1 };
-    first(lines, is_heading) && is_atom(lines.get(atom))
 }
 
 /// Titles that begin with an asterisk, the number of atoms, then atoms: two numbers, two names, x, y, z.
@@ -173,7 +147,6 @@ mod tests {
             suggests(&format!("{before}{section}\n"), "prmtop");
         }
         let cell = "4.0 0 0\n0 4.0 0\n0 0 4.0\n";
-        suggests("  2  water\n  1  O  0.1 0.2 0.3  1  2\n  2  H  1.1 0.2 0.3  2  1\n", "Tinker");
         suggests(
             "* a title\n*\n    1\n    1    1 TIP3 OH2    1.00000   2.00000   3.00000 W    1      0.00000\n",
             "CHARMM",

@@ -23,7 +23,7 @@ pub use packed::{compressed, houdini, npz, open};
 pub type Target = fn(&[u8]) -> usize;
 
 /// Every target by the name of its folder in `corpus`.
-pub const TARGETS: [(&str, Target); 40] = [
+pub const TARGETS: [(&str, Target); 41] = [
     ("vtk", vtk),
     ("vtk_xml", vtk_xml),
     ("bgeo", bgeo),
@@ -46,6 +46,7 @@ pub const TARGETS: [(&str, Target); 40] = [
     ("amber", amber),
     ("rst7", rst7),
     ("mdcrd", mdcrd),
+    ("tinker", tinker),
     ("sdf", sdf),
     ("mol2", mol2),
     ("vasp", vasp),
@@ -183,6 +184,11 @@ pub fn rst7(bytes: &[u8]) -> usize {
 /// AMBER trajectories in text.
 pub fn mdcrd(bytes: &[u8]) -> usize {
     read_all(read::mdcrd::FORMAT, bytes, 1)
+}
+
+/// Tinker.
+pub fn tinker(bytes: &[u8]) -> usize {
+    read_all(read::tinker::FORMAT, bytes, 1)
 }
 
 /// MDL files.

@@ -215,6 +215,16 @@ pub(super) fn element(symbol: &[u8], name: &[u8], residue: &[u8]) -> i64 {
     }
 }
 
+/// [`element`] of an atom in a file without residues: names may also be symbols in the usual case (`Na`), and ions (`NA+`).
+pub(super) fn element_without_residue(name: &[u8]) -> i64 {
+    let is_symbol = matches!(name, [first, second] if first.is_ascii_uppercase() && second.is_ascii_lowercase());
+    let is_ion = name.ends_with(b"+") || name.ends_with(b"-");
+    match category::code(letters(name)) {
+        number if (is_symbol || is_ion) && category::is_element(number) => number,
+        _ => element(b"", name, b""),
+    }
+}
+
 /// Whether `name` is one of `names`, in whatever case.
 fn is_any(name: &[u8], names: &[&[u8]]) -> bool {
     names.iter().any(|known| name.eq_ignore_ascii_case(known))
@@ -249,6 +259,18 @@ mod tests {
             ("SG", "CYS", 16),
         ] {
             assert_eq!(element(b"", name.as_bytes(), residue.as_bytes()), number, "{name}");
+        }
+        for (name, number) in [
+            ("Na", 11),
+            ("NA+", 11),
+            ("CA", 6),
+            ("Cl-", 17),
+            ("Ca2+", 20),
+            ("OW", 8),
+            ("N3", 7),
+            ("Hw", 1),
+        ] {
+            assert_eq!(element_without_residue(name.as_bytes()), number, "{name}");
         }
         assert_eq!(element(b"ZN", b"C1", b"X"), 30);
         assert_eq!(element(b"O1-", b"C1", b"X"), 8);

@@ -53,6 +53,7 @@ pub mod text;
 #[cfg(test)]
 mod text_samples;
 mod texts;
+pub mod tinker;
 pub mod trr;
 mod typed_text;
 pub mod usd;

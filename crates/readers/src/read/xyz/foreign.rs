@@ -4,7 +4,6 @@ use crate::read::text;
 
 const POINT_CLOUD: &str = "a point cloud with a count and no comment: if it is of a laser scanner, call it .pts; else \
                            delete its first line";
-const TINKER: &str = "a Tinker file, which is not read; write .xyz with Open Babel (`obabel -itxyz in.xyz -oxyz -O out.xyz`)";
 
 /// What a text is in whose second line, `row`, is one of the counted lines instead of a comment. The next line has
 /// `columns` words.
@@ -12,13 +11,6 @@ pub(super) fn without_comment(row: &[u8], columns: usize) -> Option<&'static str
     let words: Vec<&[u8]> = text::words(row).collect();
     let is_number = |word: &&[u8]| text::number(word).is_some();
     match words.as_slice() {
-        [index, name, x, y, z, ..]
-            if text::integer(index) == Some(1)
-                && !is_number(name)
-                && [x, y, z].into_iter().all(is_number) =>
-        {
-            Some(TINKER)
-        }
         [_, _, _, ..] if words.len() == columns && words.iter().all(is_number) => Some(POINT_CLOUD),
         _ => None,
     }
