@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use spherule_formats::detect::detect_format;
 use spherule_formats::open;
 use spherule_formats::read::{
-    amber, dcd, gro, gsd, lammps, mmcif, mol2, pdb, rst7, sdf, tinker, trr, vasp, xtc,
+    amber, dcd, dl_poly, gro, gsd, lammps, mmcif, mol2, pdb, rst7, sdf, tinker, trr, vasp, xtc,
 };
 
 fn data(name: &str) -> PathBuf {
@@ -30,6 +30,7 @@ fn molecular_files_are_known_by_their_content() {
         ("water.mol2", mol2::FORMAT),
         ("water.sdf", sdf::FORMAT),
         ("water.arc", tinker::FORMAT),
+        ("salt.dlpoly", dl_poly::FORMAT),
         ("custom.lammpsbin", lammps::BINARY),
     ] {
         let bytes = fs::read(data("molecules").join(name)).expect("a sample");

@@ -30,10 +30,6 @@ const FORMATS: &[TextFormat] = &[
         |lines| begins(lines, b"Number of particles ="),
         "an AtomEye configuration (.cfg), which is not read; write a LAMMPS dump or extended XYZ with OVITO",
     ),
-    (
-        is_dl_poly,
-        "a DL_POLY file (CONFIG, REVCON or HISTORY), which is not read; write .xyz or .dcd with ASE, VMD or MDAnalysis",
-    ),
 ];
 
 const PRMTOP: &str = "an AMBER topology (prmtop), which has no positions; give it with --topology beside a file with \
@@ -90,33 +86,6 @@ fn is_charmm_card(lines: &Lines<'_>) -> bool {
     titles > 0 && count.is_some_and(is_count) && is_atom
 }
 
-/// A title, then two to five numbers that begin with two codes. `timestep` follows, or the edges of a cell and an atom
-/// (name, optional index, position).
-fn is_dl_poly(lines: &Lines<'_>) -> bool {
-    // Check the codes: what records contain, and the boundary conditions
-    let kinds = numbers(lines.get(1)).unwrap_or_default();
-    let [content, boundary, rest @ ..] = kinds.as_slice() else {
-        return false;
-    };
-    let is_code = |code: f64, most: f64| code.fract() == 0.0 && (0.0..=most).contains(&code);
-    if rest.len() > 3 || !is_code(*content, 2.0) || !is_code(*boundary, 7.0) {
-        return false;
-    }
-    // Check the first atom, which follows the edges of the cell if there is one
-    let has_edges = *boundary > 0.0;
-    let atom = if has_edges { 5 } else { 2 };
-    let edges = (2..atom).all(|line| has_numbers(lines.get(line), 3));
-    let name: Vec<&[u8]> =
-        lines.get(atom).into_iter().flat_map(|line| words(line)).take(3).collect();
-    let is_name = match *name.as_slice() {
-        [name] => number(name).is_none(),
-        [name, index, ..] => number(name).is_none() && integer(index).is_some(),
-        [] => false,
-    };
-    let is_history = lines.get(2).is_some_and(|line| line.starts_with(b"timestep "));
-    is_history || (edges && is_name && has_numbers(lines.get(atom + 1), 3))
-}
-
 #[cfg(test)]
 mod tests {
     use std::path::Path;
@@ -153,12 +122,6 @@ mod tests {
         );
         suggests("TITLE\n water\nEND\nTIMESTEP\n 0 0.0\nEND\nPOSITIONRED\n 1 2 3\n", "GROMOS");
         suggests("Number of particles = 2\nA = 1.0 Angstrom\n", "AtomEye");
-        suggests(&format!("a title\n  0  1  2\n{cell}Na 1\n 1 2 3\n"), "DL_POLY");
-        suggests("a title\n 0 0 2 0.5\nNa\n 1 2 3\nCl\n 4 5 6\n", "DL_POLY");
-        suggests(
-            &format!("a title\n 0 1 2 3 26\ntimestep 1 2 0 1 0.001\n{cell}Na 1 22.9 1.0\n 1 2 3\n"),
-            "DL_POLY",
-        );
     }
 
     #[test]

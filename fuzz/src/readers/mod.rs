@@ -23,7 +23,7 @@ pub use packed::{compressed, houdini, npz, open};
 pub type Target = fn(&[u8]) -> usize;
 
 /// Every target by the name of its folder in `corpus`.
-pub const TARGETS: [(&str, Target); 41] = [
+pub const TARGETS: [(&str, Target); 42] = [
     ("vtk", vtk),
     ("vtk_xml", vtk_xml),
     ("bgeo", bgeo),
@@ -46,6 +46,7 @@ pub const TARGETS: [(&str, Target); 41] = [
     ("amber", amber),
     ("rst7", rst7),
     ("mdcrd", mdcrd),
+    ("dl_poly", dl_poly),
     ("tinker", tinker),
     ("sdf", sdf),
     ("mol2", mol2),
@@ -184,6 +185,11 @@ pub fn rst7(bytes: &[u8]) -> usize {
 /// AMBER trajectories in text.
 pub fn mdcrd(bytes: &[u8]) -> usize {
     read_all(read::mdcrd::FORMAT, bytes, 1)
+}
+
+/// DL_POLY.
+pub fn dl_poly(bytes: &[u8]) -> usize {
+    read_all(read::dl_poly::FORMAT, bytes, 1)
 }
 
 /// Tinker.

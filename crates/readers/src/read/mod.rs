@@ -17,6 +17,7 @@ pub mod csv;
 #[cfg(test)]
 mod damage;
 pub mod dcd;
+pub mod dl_poly;
 mod fixed_rows;
 pub mod gro;
 pub mod gsd;

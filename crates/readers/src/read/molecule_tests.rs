@@ -5,8 +5,8 @@ use proptest::sample::Index;
 
 use super::damage::{TestedReader, mutate, sample};
 use super::{
-    Step, amber, dcd, gro, lammps, mdcrd, mmcif, mol2, pdb, pieces, sdf, text_samples, tinker, trr,
-    vasp, xtc,
+    Step, amber, dcd, dl_poly, gro, lammps, mdcrd, mmcif, mol2, pdb, pieces, sdf, text_samples,
+    tinker, trr, vasp, xtc,
 };
 use crate::format::Format;
 use crate::reader::{Confidence, HEAD_LEN};
@@ -47,6 +47,7 @@ readers! {
     mol2_reader: mol2::FORMAT, "water.mol2";
     sdf_reader: sdf::FORMAT, "water.sdf";
     tinker_reader: tinker::FORMAT, "water.arc";
+    dl_poly_reader: dl_poly::FORMAT, "salt.dlpoly";
     lammps_reader: lammps::BINARY, "custom.lammpsbin";
 }
 
