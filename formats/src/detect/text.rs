@@ -23,10 +23,6 @@ const FORMATS: &[TextFormat] = &[
         "a CHARMM coordinate file (.crd, .cor), which is not read; write .pdb or .dcd with CHARMM, VMD or MDAnalysis",
     ),
     (
-        |lines| lines.first() == Some(&&b"TITLE"[..]) && lines.contains(&&b"END"[..]),
-        "a GROMOS file, which is not read; write .gro, .pdb or .dcd with MDAnalysis or gromos++",
-    ),
-    (
         |lines| begins(lines, b"Number of particles ="),
         "an AtomEye configuration (.cfg), which is not read; write a LAMMPS dump or extended XYZ with OVITO",
     ),
@@ -120,7 +116,6 @@ mod tests {
             "* a title\n*\n    1\n    1    1 TIP3 OH2    1.00000   2.00000   3.00000 W    1      0.00000\n",
             "CHARMM",
         );
-        suggests("TITLE\n water\nEND\nTIMESTEP\n 0 0.0\nEND\nPOSITIONRED\n 1 2 3\n", "GROMOS");
         suggests("Number of particles = 2\nA = 1.0 Angstrom\n", "AtomEye");
     }
 

@@ -23,7 +23,7 @@ pub use packed::{compressed, houdini, npz, open};
 pub type Target = fn(&[u8]) -> usize;
 
 /// Every target by the name of its folder in `corpus`.
-pub const TARGETS: [(&str, Target); 42] = [
+pub const TARGETS: [(&str, Target); 43] = [
     ("vtk", vtk),
     ("vtk_xml", vtk_xml),
     ("bgeo", bgeo),
@@ -46,6 +46,7 @@ pub const TARGETS: [(&str, Target); 42] = [
     ("amber", amber),
     ("rst7", rst7),
     ("mdcrd", mdcrd),
+    ("gromos", gromos),
     ("dl_poly", dl_poly),
     ("tinker", tinker),
     ("sdf", sdf),
@@ -185,6 +186,11 @@ pub fn rst7(bytes: &[u8]) -> usize {
 /// AMBER trajectories in text.
 pub fn mdcrd(bytes: &[u8]) -> usize {
     read_all(read::mdcrd::FORMAT, bytes, 1)
+}
+
+/// GROMOS.
+pub fn gromos(bytes: &[u8]) -> usize {
+    read_all(read::gromos::FORMAT, bytes, 1)
 }
 
 /// DL_POLY.

@@ -20,6 +20,7 @@ pub mod dcd;
 pub mod dl_poly;
 mod fixed_rows;
 pub mod gro;
+pub mod gromos;
 pub mod gsd;
 #[cfg(feature = "hdf5")]
 pub mod hdf5;

@@ -5,8 +5,8 @@ use proptest::sample::Index;
 
 use super::damage::{TestedReader, mutate, sample};
 use super::{
-    Step, amber, dcd, dl_poly, gro, lammps, mdcrd, mmcif, mol2, pdb, pieces, sdf, text_samples,
-    tinker, trr, vasp, xtc,
+    Step, amber, dcd, dl_poly, gro, gromos, lammps, mdcrd, mmcif, mol2, pdb, pieces, sdf,
+    text_samples, tinker, trr, vasp, xtc,
 };
 use crate::format::Format;
 use crate::reader::{Confidence, HEAD_LEN};
@@ -48,6 +48,7 @@ readers! {
     sdf_reader: sdf::FORMAT, "water.sdf";
     tinker_reader: tinker::FORMAT, "water.arc";
     dl_poly_reader: dl_poly::FORMAT, "salt.dlpoly";
+    gromos_reader: gromos::FORMAT, "water.g96";
     lammps_reader: lammps::BINARY, "custom.lammpsbin";
 }
 

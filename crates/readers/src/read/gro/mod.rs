@@ -168,7 +168,7 @@ fn is_box(line: Line<'_>) -> bool {
 
 /// The cell in the line of the box: the diagonal of the matrix of its edges, and the other components if not all are
 /// zero. None if the numbers are damaged, or zero.
-fn cell(line: Line<'_>) -> Option<SimulationCell> {
+pub(super) fn cell(line: Line<'_>) -> Option<SimulationCell> {
     let numbers: Option<Vec<f64>> = match text::words(line.text).count() {
         3 | 9 => text::words(line.text).map(text::number).collect(),
         // Columns of equal width
