@@ -4,8 +4,9 @@ use std::path::Path;
 
 use crate::native;
 use crate::read::{
-    amber, bgeo, bi4, csv, dcd, dl_poly, gro, gromos, gsd, houdini, lammps, las, mdcrd, mmcif,
-    mol2, npy, pcd, pdb, ply, pts, rst7, sdf, tinker, trr, usd, vasp, vtk, vtk_xml, xtc, xyz,
+    amber, bgeo, bi4, charmm_crd, csv, dcd, dl_poly, gro, gromos, gsd, houdini, lammps, las, mdcrd,
+    mmcif, mol2, npy, pcd, pdb, ply, pts, rst7, sdf, tinker, trr, usd, vasp, vtk, vtk_xml, xtc,
+    xyz,
 };
 use spherule_readers::Format;
 use spherule_readers::compression::strip_extension;
@@ -42,6 +43,7 @@ const FORMATS: &[Format] = &[
     tinker::FORMAT,
     dl_poly::FORMAT,
     gromos::FORMAT,
+    charmm_crd::FORMAT,
     // Before PDB, whose records may begin a file of this format
     pdb::PQR,
     pdb::FORMAT,

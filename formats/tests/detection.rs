@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use spherule_formats::detect::detect_format;
 use spherule_formats::open;
 use spherule_formats::read::{
-    amber, dcd, dl_poly, gro, gromos, gsd, lammps, mmcif, mol2, pdb, rst7, sdf, tinker, trr, vasp,
-    xtc,
+    amber, charmm_crd, dcd, dl_poly, gro, gromos, gsd, lammps, mmcif, mol2, pdb, rst7, sdf, tinker,
+    trr, vasp, xtc,
 };
 
 fn data(name: &str) -> PathBuf {
@@ -33,6 +33,7 @@ fn molecular_files_are_known_by_their_content() {
         ("water.arc", tinker::FORMAT),
         ("salt.dlpoly", dl_poly::FORMAT),
         ("water.g96", gromos::FORMAT),
+        ("alanine.cor", charmm_crd::FORMAT),
         ("custom.lammpsbin", lammps::BINARY),
     ] {
         let bytes = fs::read(data("molecules").join(name)).expect("a sample");

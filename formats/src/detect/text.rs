@@ -1,6 +1,5 @@
 //! Text formats that are known but not read, recognised by the structure of their first lines.
 
-use crate::read::text::{integer, number, words};
 use crate::read::{prmtop, psf};
 
 /// The first lines of a file.
@@ -17,10 +16,6 @@ const FORMATS: &[TextFormat] = &[
     (
         |lines| first(lines, psf::is_psf),
         "a topology (PSF), which has no positions; give it with --topology beside a file with coordinates",
-    ),
-    (
-        is_charmm_card,
-        "a CHARMM coordinate file (.crd, .cor), which is not read; write .pdb or .dcd with CHARMM, VMD or MDAnalysis",
     ),
     (
         |lines| begins(lines, b"Number of particles ="),
@@ -48,38 +43,6 @@ fn first(lines: &Lines<'_>, is_one: impl Fn(&[u8]) -> bool) -> bool {
 /// Whether a line begins with `start`.
 fn begins(lines: &Lines<'_>, start: &[u8]) -> bool {
     lines.iter().any(|line| line.starts_with(start))
-}
-
-/// The line as numbers, if it has nothing else.
-fn numbers(line: Option<&&[u8]>) -> Option<Vec<f64>> {
-    words(line?).take(32).map(number).collect()
-}
-
-/// Whether a line has `count` numbers and nothing else.
-fn has_numbers(line: Option<&&[u8]>, count: usize) -> bool {
-    numbers(line).is_some_and(|numbers| numbers.len() == count)
-}
-
-/// Whether a line has integers and nothing else.
-fn has_integers(line: Option<&&[u8]>) -> bool {
-    let mut words = line.into_iter().flat_map(|line| words(line)).peekable();
-    words.peek().is_some() && words.all(|word| integer(word).is_some())
-}
-
-fn is_count(word: &[u8]) -> bool {
-    integer(word).is_some_and(|count| count >= 0)
-}
-
-/// Titles that begin with an asterisk, the number of atoms, then atoms: two numbers, two names, x, y, z.
-fn is_charmm_card(lines: &Lines<'_>) -> bool {
-    let is_title = |line: &&&[u8]| line.starts_with(b"*");
-    let titles = lines.iter().take_while(is_title).count();
-    let atom: Vec<&[u8]> =
-        lines.get(titles + 1).into_iter().flat_map(|line| words(line)).take(5).collect();
-    let is_atom = matches!(*atom.as_slice(), [index, residue, _, name, x]
-        if is_count(index) && is_count(residue) && number(name).is_none() && number(x).is_some());
-    let count = lines.get(titles).and_then(|line| words(line).next());
-    titles > 0 && count.is_some_and(is_count) && is_atom
 }
 
 #[cfg(test)]
@@ -111,11 +74,6 @@ mod tests {
                 "%FLAG TITLE\n%FORMAT(20a4)\nACE\n%FLAG POINTERS\n%FORMAT(10I8)\n       3       1";
             suggests(&format!("{before}{section}\n"), "prmtop");
         }
-        let cell = "4.0 0 0\n0 4.0 0\n0 0 4.0\n";
-        suggests(
-            "* a title\n*\n    1\n    1    1 TIP3 OH2    1.00000   2.00000   3.00000 W    1      0.00000\n",
-            "CHARMM",
-        );
         suggests("Number of particles = 2\nA = 1.0 Angstrom\n", "AtomEye");
     }
 

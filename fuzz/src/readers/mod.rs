@@ -23,7 +23,7 @@ pub use packed::{compressed, houdini, npz, open};
 pub type Target = fn(&[u8]) -> usize;
 
 /// Every target by the name of its folder in `corpus`.
-pub const TARGETS: [(&str, Target); 43] = [
+pub const TARGETS: [(&str, Target); 44] = [
     ("vtk", vtk),
     ("vtk_xml", vtk_xml),
     ("bgeo", bgeo),
@@ -46,6 +46,7 @@ pub const TARGETS: [(&str, Target); 43] = [
     ("amber", amber),
     ("rst7", rst7),
     ("mdcrd", mdcrd),
+    ("charmm_crd", charmm_crd),
     ("gromos", gromos),
     ("dl_poly", dl_poly),
     ("tinker", tinker),
@@ -186,6 +187,11 @@ pub fn rst7(bytes: &[u8]) -> usize {
 /// AMBER trajectories in text.
 pub fn mdcrd(bytes: &[u8]) -> usize {
     read_all(read::mdcrd::FORMAT, bytes, 1)
+}
+
+/// CHARMM coordinates.
+pub fn charmm_crd(bytes: &[u8]) -> usize {
+    read_all(read::charmm_crd::FORMAT, bytes, 1)
 }
 
 /// GROMOS.

@@ -12,6 +12,7 @@ pub mod bi4;
 mod category;
 #[cfg(test)]
 mod cell_tests;
+pub mod charmm_crd;
 pub mod columns;
 pub mod csv;
 #[cfg(test)]
