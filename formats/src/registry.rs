@@ -4,9 +4,9 @@ use std::path::Path;
 
 use crate::native;
 use crate::read::{
-    amber, bgeo, bi4, charmm_crd, csv, dcd, dl_poly, gro, gromos, gsd, houdini, lammps, las, mdcrd,
-    mmcif, mol2, npy, pcd, pdb, ply, pts, rst7, sdf, tinker, trr, usd, vasp, vtk, vtk_xml, xtc,
-    xyz,
+    amber, bgeo, bi4, charmm_crd, csv, dcd, dl_poly, gadget, gro, gromos, gsd, houdini, lammps,
+    las, mdcrd, mmcif, mol2, npy, pcd, pdb, ply, pts, rst7, sdf, tinker, trr, usd, vasp, vtk,
+    vtk_xml, xtc, xyz,
 };
 use spherule_readers::Format;
 use spherule_readers::compression::strip_extension;
@@ -30,6 +30,7 @@ const FORMATS: &[Format] = &[
     npy::NPZ,
     gsd::FORMAT,
     bi4::FORMAT,
+    gadget::FORMAT,
     gro::FORMAT,
     xtc::FORMAT,
     trr::FORMAT,

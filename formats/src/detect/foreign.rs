@@ -35,10 +35,6 @@ const MAGICS: &[(&[u8], &str)] = &[
     (b"8BPS", IMAGE),
     (b"DDS ", IMAGE),
     (b"#?RADIANCE", IMAGE),
-    (
-        b"\x08\0\0\0HEAD",
-        "a binary snapshot of Gadget, which is not read; write positions and attributes to .npz with pynbody or yt",
-    ),
     (b"7z\xbc\xaf\x27\x1c", ARCHIVE),
     (b"Rar!\x1a\x07", ARCHIVE),
     (
@@ -58,8 +54,6 @@ const IMAGE: &str = "an image, not a particle file";
 const ARCHIVE: &str = "an archive, which is not read; unpack it and give its files";
 const DUALSPHYSICS: &str = "a DualSPHysics file of an older version, or without particles, which is not read; give \
                             Part_####.bi4, or write .vtk with `PartVTK`";
-const GADGET: &str = "a binary snapshot of Gadget, which is not read; write positions and attributes to .npz with pynbody \
-                      or yt";
 const PDB: &str = "a PDB particle file, which is not read; convert to .bgeo with partio";
 /// What ADIOS2 writes, a file or a directory.
 pub(crate) const ADIOS: &str = "ADIOS2 data (.bp), which is not read; write HDF5 instead, or convert with `openpmd-pipe --infile in.bp \
@@ -93,15 +87,10 @@ pub(super) fn refuse(head: &[u8], path: &Path, shortest: usize) -> Result<(), Pa
 /// Formats that are known by bytes after the first.
 fn by_structure(head: &[u8]) -> Option<&'static str> {
     let at = |at: usize, bytes: &[u8]| head.get(at..).is_some_and(|b| b.starts_with(bytes));
-    // A header of 256 bytes between its lengths, as Fortran writes it
-    let is_gadget = [256_u32.to_le_bytes(), 256_u32.to_be_bytes()]
-        .iter()
-        .any(|length| at(0, length) && at(260, length));
     [
         (at(257, b"ustar"), ARCHIVE),
         (at(0, b"RIFF") && at(8, b"WEBP"), IMAGE),
         (at(4, b"ftyp"), "a video or image, not a particle file"),
-        (is_gadget, GADGET),
         (at(40, b"GENERAL INFO\0"), TNG),
         (at(8, b"VERSION "), TPR),
     ]

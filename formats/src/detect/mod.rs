@@ -94,7 +94,7 @@ fn opening(head: &[u8]) -> String {
 mod tests {
     use super::*;
     use crate::read::{
-        bgeo, bi4, csv, gsd, houdini, lammps, npy, pdb, ply, usd, vtk, vtk_xml, xyz,
+        bgeo, bi4, csv, gadget, gsd, houdini, lammps, npy, pdb, ply, usd, vtk, vtk_xml, xyz,
     };
 
     #[track_caller]
@@ -188,6 +188,13 @@ mod tests {
     }
 
     #[test]
+    fn snapshots_of_gadget_are_known_by_the_lengths_around_their_header() {
+        let mut snapshot = vec![0; 400];
+        (snapshot[1], snapshot[261]) = (1, 1);
+        assert_eq!(detect("snapshot_001", &snapshot), gadget::FORMAT);
+    }
+
+    #[test]
     fn wrong_extension_is_reported() {
         refused("a.bgeo", b"hello world", "named like a bgeo file");
         refused("a.vtk", b"", "still being written");
@@ -211,9 +218,6 @@ mod tests {
             b"#FileJBD JPartDataHead  ",
             "JPartDataHead, which has no particles",
         );
-        let mut snapshot = vec![0; 400];
-        (snapshot[1], snapshot[261]) = (1, 1);
-        refused("snapshot_001", &snapshot, "Gadget");
         let mut tar = vec![b'x'; 512];
         tar[257..262].copy_from_slice(b"ustar");
         refused("a.tar", &tar, "archive");

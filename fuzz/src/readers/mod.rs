@@ -23,7 +23,7 @@ pub use packed::{compressed, houdini, npz, open};
 pub type Target = fn(&[u8]) -> usize;
 
 /// Every target by the name of its folder in `corpus`.
-pub const TARGETS: [(&str, Target); 44] = [
+pub const TARGETS: [(&str, Target); 45] = [
     ("vtk", vtk),
     ("vtk_xml", vtk_xml),
     ("bgeo", bgeo),
@@ -39,6 +39,7 @@ pub const TARGETS: [(&str, Target); 44] = [
     ("csv", csv),
     ("gsd", gsd),
     ("bi4", bi4),
+    ("gadget", gadget),
     ("gro", gro),
     ("xtc", xtc),
     ("trr", trr),
@@ -152,6 +153,11 @@ pub fn gsd(bytes: &[u8]) -> usize {
 /// DualSPHysics.
 pub fn bi4(bytes: &[u8]) -> usize {
     read_all(read::bi4::FORMAT, bytes, 1)
+}
+
+/// Binary snapshots of GADGET.
+pub fn gadget(bytes: &[u8]) -> usize {
+    read_all(read::gadget::FORMAT, bytes, 1)
 }
 
 /// GROMACS text.

@@ -20,6 +20,7 @@ mod damage;
 pub mod dcd;
 pub mod dl_poly;
 mod fixed_rows;
+pub mod gadget;
 pub mod gro;
 pub mod gromos;
 pub mod gsd;
