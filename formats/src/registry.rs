@@ -5,8 +5,8 @@ use std::path::Path;
 use crate::native;
 use crate::read::{
     amber, bgeo, bi4, charmm_crd, csv, dcd, dl_poly, gadget, gro, gromos, gsd, houdini, lammps,
-    las, mdcrd, mmcif, mol2, npy, pcd, pdb, ply, pts, rst7, sdf, tinker, trr, usd, vasp, vtk,
-    vtk_xml, xtc, xyz,
+    las, mdcrd, mmcif, mol2, npy, pcd, pdb, ply, pts, rst7, sdf, tinker, tipsy, trr, usd, vasp,
+    vtk, vtk_xml, xtc, xyz,
 };
 use spherule_readers::Format;
 use spherule_readers::compression::strip_extension;
@@ -52,6 +52,8 @@ const FORMATS: &[Format] = &[
     usd::FORMAT,
     #[cfg(feature = "hdf5")]
     crate::read::hdf5::FORMAT,
+    // Behind formats with longer signatures
+    tipsy::FORMAT,
     csv::FORMAT,
 ];
 

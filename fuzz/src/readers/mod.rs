@@ -23,7 +23,7 @@ pub use packed::{compressed, houdini, npz, open};
 pub type Target = fn(&[u8]) -> usize;
 
 /// Every target by the name of its folder in `corpus`.
-pub const TARGETS: [(&str, Target); 45] = [
+pub const TARGETS: [(&str, Target); 46] = [
     ("vtk", vtk),
     ("vtk_xml", vtk_xml),
     ("bgeo", bgeo),
@@ -39,6 +39,7 @@ pub const TARGETS: [(&str, Target); 45] = [
     ("csv", csv),
     ("gsd", gsd),
     ("bi4", bi4),
+    ("tipsy", tipsy),
     ("gadget", gadget),
     ("gro", gro),
     ("xtc", xtc),
@@ -153,6 +154,11 @@ pub fn gsd(bytes: &[u8]) -> usize {
 /// DualSPHysics.
 pub fn bi4(bytes: &[u8]) -> usize {
     read_all(read::bi4::FORMAT, bytes, 1)
+}
+
+/// Tipsy snapshots.
+pub fn tipsy(bytes: &[u8]) -> usize {
+    read_all(read::tipsy::FORMAT, bytes, 1)
 }
 
 /// Binary snapshots of GADGET.

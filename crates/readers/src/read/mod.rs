@@ -58,6 +58,7 @@ pub mod text;
 mod text_samples;
 mod texts;
 pub mod tinker;
+pub mod tipsy;
 pub mod trr;
 mod typed_text;
 pub mod usd;
