@@ -225,6 +225,7 @@ mod tests {
         refused("a.webp", b"RIFF\0\0\0\0WEBP", "image");
         refused("a.xmf", b"<?xml version=\"1.0\"?>\n<Xdmf>", "XDMF");
         refused("a.abc", b"Ogawa\0", "Alembic");
+        refused("a.e57", b"ASTM-E57\x01\0\0\0", "pdal translate in.e57");
         refused("a.bgeo", b"[\n\t\"fileversion\",\"19.5\"", "bgeo.sc");
         refused("a.bgeo.sc", b"scf1", "blosc inside");
         refused("a.geo", b"PGEOMETRY V5\n", "bgeo");

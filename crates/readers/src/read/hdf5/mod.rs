@@ -202,5 +202,10 @@ fn dialect_in(root: &Node) -> Result<Box<dyn Dialect>, ParseError> {
     if let Some(arrays) = ParticleArrays::open(root)? {
         return Ok(Box::new(arrays));
     }
+    // Alembic keeps everything below this group
+    if root.group("ABC")?.is_some() {
+        let what = "an Alembic file in HDF5, which is not read; export the points as .ply or .bgeo";
+        return Err(ParseError::unsupported(what));
+    }
     Ok(Box::new(PlainFile::open(root)?))
 }
