@@ -54,6 +54,8 @@ pub use spherule_frame::{
     RawParticles, ScalarType, SimulationCell, choose_origin, find_radius, generate, is_near,
     is_radius, join, names, sample_indices, with_values,
 };
+#[cfg(feature = "hdf5")]
+pub use spherule_hdf5 as hdf5;
 pub use spherule_readers::read::{element_symbol, name_code};
 pub use spherule_readers::{Format, ValueNames, mesh, read};
 pub use spherule_tree::{blocks, order};

@@ -51,7 +51,7 @@ const FORMATS: &[Format] = &[
     mmcif::FORMAT,
     usd::FORMAT,
     #[cfg(feature = "hdf5")]
-    crate::read::hdf5::FORMAT,
+    crate::hdf5::FORMAT,
     // Behind formats with longer signatures
     tipsy::FORMAT,
     csv::FORMAT,

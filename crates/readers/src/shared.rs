@@ -34,13 +34,11 @@ impl SharedBytes {
     }
 
     /// A copy of `bytes`.
-    #[cfg(feature = "hdf5")]
     pub fn copy(bytes: &[u8]) -> Self {
         Self::new(Arc::new(bytes.to_vec()))
     }
 
     /// The owner of the bytes.
-    #[cfg(feature = "hdf5")]
     pub fn owner(&self) -> Arc<dyn AsRef<[u8]> + Send + Sync> {
         Arc::clone(&self.owner)
     }

@@ -138,7 +138,7 @@ mod tests {
         assert_eq!(detect("a", b"PXR-USDC\0\x08\0"), usd::FORMAT);
         assert_eq!(detect("a.xyz", &[0xdf, 0x65].repeat(4)), gsd::FORMAT);
         #[cfg(feature = "hdf5")]
-        assert_eq!(detect("a.xyz", b"\x89HDF\r\n\x1a\n"), crate::read::hdf5::FORMAT);
+        assert_eq!(detect("a.xyz", b"\x89HDF\r\n\x1a\n"), crate::hdf5::FORMAT);
         let vtu = b"<?xml version=\"1.0\"?>\n<VTKFile header_type=\"UInt64\" type=\"PolyData\">";
         assert_eq!(detect("a.vtk", vtu), vtk_xml::FORMAT);
     }

@@ -1,9 +1,9 @@
 //! Targets of `spherule-formats`. Each returns how many steps gave particles or meshes, or how many frames there are.
 
 use spherule_formats::Format;
-use spherule_formats::read;
 use spherule_formats::stats::FrameStats;
 use spherule_formats::{MemoryBudget, ParseError, ParticleFrame, RawParticles, choose_origin};
+use spherule_formats::{hdf5 as hdf5_files, read};
 
 mod convert;
 mod lists;
@@ -282,7 +282,7 @@ pub fn usd(bytes: &[u8]) -> usize {
 /// HDF5.
 pub fn hdf5(bytes: &[u8]) -> usize {
     // A chunk may be packed more than once.
-    read_all(read::hdf5::FORMAT, bytes, DEFLATE_RATIO * DEFLATE_RATIO)
+    read_all(hdf5_files::FORMAT, bytes, DEFLATE_RATIO * DEFLATE_RATIO)
 }
 
 /// Reads `bytes` as `format`, the first steps and the last. `packing` is the ratio that

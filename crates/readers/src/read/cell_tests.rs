@@ -239,44 +239,6 @@ fn lammps_binary_dumps_have_cells_and_boundaries() {
 }
 
 #[test]
-#[cfg(feature = "hdf5")]
-fn h5md_files_have_cells_that_may_change() {
-    use super::hdf5;
-
-    let read = |name: &str| cells(hdf5::FORMAT, &sample(&format!("hdf5/cell-{name}.h5md")));
-    let moving = |step: f64| {
-        [
-            DVec3::new(4.0 + step, 0.0, 0.0),
-            DVec3::new(0.5, 3.0, 0.0),
-            DVec3::new(0.25, 0.75, 2.0 - 0.5 * step),
-        ]
-    };
-    let cell = |vectors, periodic| SimulationCell::new(DVec3::ZERO, vectors, periodic);
-    let expected = [0.0, 1.0, 2.0].map(|step| cell(moving(step), [true, false, true]));
-    assert_eq!(read("moving"), expected);
-    assert_eq!(read("fixed"), [cell(moving(1.0), [true; 3]); 3]);
-    let lengths = [3.0 * DVec3::X, 2.5 * DVec3::Y, 2.0 * DVec3::Z];
-    assert_eq!(read("lengths"), [cell(lengths, [false; 3]); 3]);
-    // A group `box` without edges
-    assert_eq!(cells(hdf5::FORMAT, &sample("hdf5/polymer.h5md")), [None; 3]);
-}
-
-#[test]
-#[cfg(feature = "hdf5")]
-fn gadget_snapshots_have_cells_by_the_size_of_their_box() {
-    use super::hdf5;
-
-    let read = |bytes: &[u8]| cells(hdf5::FORMAT, bytes)[0];
-    assert_cell(read(&sample("hdf5/swift.hdf5")), diagonal([2.0; 3]));
-    let bytes = sample("hdf5/gadget.hdf5");
-    assert_cell(read(&bytes), diagonal([10.0; 3]));
-    for size in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        let bytes = replaced(&bytes, &10.0_f64.to_le_bytes(), &size.to_le_bytes());
-        assert_eq!(read(&bytes), None, "{size}");
-    }
-}
-
-#[test]
 fn pdb_cells_behind_models_belong_to_the_model_before() {
     let atom = "ATOM      1  N   ALA A   1     362.864 -78.459 936.442  1.00 16.50           N\n";
     let model = |edge: f64| {

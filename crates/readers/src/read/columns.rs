@@ -42,7 +42,7 @@ pub struct StridedColumn {
 
 impl StridedColumn {
     /// A column of `components` numbers that are adjacent in each record; `first` is the first of them.
-    pub(super) fn interleaved(
+    pub fn interleaved(
         name: impl Into<String>,
         (scalar, endian): (ScalarType, Endian),
         components: usize,
@@ -314,7 +314,7 @@ fn gather(bytes: &[u8], count: usize, columns: &[StridedColumn]) -> Vec<Attribut
 /// Positions from decoded components, x first; two components lie in the plane z = 0.
 ///
 /// Single precision and short integers stay in f32; anything that f32 would round goes to f64.
-pub(super) fn positions(parts: Vec<AttributeData>, count: usize) -> Positions {
+pub fn positions(parts: Vec<AttributeData>, count: usize) -> Positions {
     let parts = match <[AttributeData; 1]>::try_from(parts) {
         Ok([AttributeData::F32(v)]) if v.len() == 3 * count => {
             return Positions::F32(bytemuck::allocation::try_cast_vec(v).unwrap_or_else(

@@ -4,7 +4,7 @@
 ///
 /// # Errors
 /// What is wrong with the data: it is damaged, or longer.
-pub(super) fn decompress(data: &[u8], most: usize) -> Result<Vec<u8>, &'static str> {
+pub fn decompress(data: &[u8], most: usize) -> Result<Vec<u8>, &'static str> {
     // A copy of three bytes gives up to 264.
     let mut out = Vec::with_capacity(most.min(data.len().saturating_mul(88)));
     let mut rest = data.iter();

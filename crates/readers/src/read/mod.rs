@@ -24,20 +24,18 @@ pub mod gadget;
 pub mod gro;
 pub mod gromos;
 pub mod gsd;
-#[cfg(feature = "hdf5")]
-pub mod hdf5;
 pub mod houdini;
 mod input;
 pub mod lammps;
 pub mod las;
 mod line_words;
-mod lzf;
+pub mod lzf;
 pub mod mdcrd;
 pub mod mmcif;
 pub mod mol2;
 #[cfg(test)]
 mod molecule_tests;
-mod notes;
+pub mod notes;
 pub mod npy;
 mod numbers;
 pub mod pcd;

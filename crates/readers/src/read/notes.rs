@@ -1,7 +1,7 @@
 //! Wording of the notes that several readers make, see [`crate::reader::Reader::notes`].
 
 /// The note that a file has a cell; `periodic` are the flags of its boundaries.
-pub(super) fn cell_note(periodic: Option<&str>) -> String {
+pub fn cell_note(periodic: Option<&str>) -> String {
     let boundaries =
         periodic.map_or_else(String::new, |flags| format!(" with periodic boundaries ({flags})"));
     format!(

@@ -13,10 +13,6 @@ pub struct ByteSource<'a> {
     text: TextInput<'a>,
     budget: MemoryBudget,
     /// The owner of all bytes, if there is one that can be shared.
-    #[cfg_attr(
-        not(feature = "hdf5"),
-        expect(dead_code, reason = "only the library for HDF5 needs an owner")
-    )]
     shared: Option<&'a SharedBytes>,
 }
 
@@ -47,7 +43,6 @@ impl<'a> ByteSource<'a> {
     }
 
     /// All bytes with their owner. Copies them if they have none that can be shared.
-    #[cfg(feature = "hdf5")]
     pub fn to_shared(&self) -> SharedBytes {
         let shared = self.shared.cloned();
         shared.unwrap_or_else(|| SharedBytes::copy(self.bytes()))

@@ -12,8 +12,8 @@ use super::stored::{Storage, Stored};
 use super::types::Field;
 use super::virtual_list::VirtualPart;
 use super::virtual_rows::{WantedRows, source_rows};
-use crate::read::columns::{ComponentStride, StridedColumn};
 use spherule_frame::{MemoryBudget, ParseError, ScalarType};
+use spherule_readers::read::columns::{ComponentStride, StridedColumn};
 
 /// Most numbers in a row.
 pub(super) const MAX_COMPONENTS: usize = 64;

@@ -15,9 +15,9 @@ use super::header_patch::{Addressing, Patch, virtual_layout};
 use super::links::{ExternalLink, external_links};
 use super::members::{Lookups, Members};
 use super::virtual_list::{VirtualPart, read_list};
-use crate::read::CUT_SHORT;
-use crate::shared::SharedBytes;
 use spherule_frame::ParseError;
+use spherule_readers::read::CUT_SHORT;
+use spherule_readers::shared::SharedBytes;
 
 /// Most bytes of the header of one object. Those of simulations have some kibibytes.
 const MAX_HEADER_BYTES: usize = 16 << 20;

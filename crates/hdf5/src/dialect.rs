@@ -1,8 +1,8 @@
 //! What the layouts of groups and data sets of different programs have in common.
 
 use super::table::ParticleTable;
-use crate::reader::ValueNames;
 use spherule_frame::{MemoryBudget, ParseError};
+use spherule_readers::ValueNames;
 
 /// A time step as its dialect lists it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

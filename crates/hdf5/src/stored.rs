@@ -10,8 +10,8 @@ use hdf5_reader::{Datatype, dtype_element_size};
 use super::file::{H5File, ObjectKey};
 use super::node::{Node, NodeDataset};
 use super::virtual_list::VirtualPart;
-use crate::read::CUT_SHORT;
 use spherule_frame::ParseError;
+use spherule_readers::read::CUT_SHORT;
 
 /// A data set.
 #[derive(Debug)]

@@ -3,12 +3,12 @@
 use super::file::H5File;
 use super::piece::{Piece, encoded};
 use super::values::Cache;
-use crate::read::columns::{StridedColumn, positions};
 use spherule_frame::join::{self, ColumnShape, JoinedColumn, PART, PartColumns};
 use spherule_frame::{
     Attribute, AttributeData, Labels, MemoryBudget, ParseError, RawParticles, ScalarType,
     SimulationCell,
 };
+use spherule_readers::read::columns::{StridedColumn, positions};
 
 /// Particles that belong together in a file: a species, a type, an array.
 #[derive(Debug)]

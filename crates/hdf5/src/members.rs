@@ -80,9 +80,9 @@ mod tests {
     use super::super::file::H5File;
     use super::super::node::Node;
     use super::MAX_LOOKUPS;
-    use crate::read_whole;
-    use crate::shared::SharedBytes;
     use spherule_frame::MemoryBudget;
+    use spherule_readers::read_whole;
+    use spherule_readers::shared::SharedBytes;
 
     /// The group `run` of a file, in which many names were looked up.
     fn run_of(bytes: &[u8]) -> Node {

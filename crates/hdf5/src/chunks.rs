@@ -18,8 +18,8 @@ use hdf5_reader::fixed_array::collect_fixed_array_chunk_entries_storage;
 use hdf5_reader::messages::layout::ChunkIndexing;
 
 use super::stored::{ChunkedLayout, Stored};
-use crate::read::{CUT_SHORT, lzf};
 use spherule_frame::{MemoryBudget, ParseError};
+use spherule_readers::read::{CUT_SHORT, lzf};
 
 /// Number of the filter LZF of h5py.
 const FILTER_LZF: u16 = 32000;

@@ -5,9 +5,9 @@ use glam::DVec3;
 use super::band_cache::BandCache;
 use super::table::{Column, ParticleTable};
 use super::values::Cache;
-use crate::ranges::{ParticleRanges, RangeAttribute};
 use spherule_frame::join::PART;
 use spherule_frame::{Labels, ParseError, ScalarType, SimulationCell};
+use spherule_readers::ranges::{ParticleRanges, RangeAttribute};
 
 /// Bytes of decoded chunks that are kept, as neighbouring ranges need the same ones.
 const CACHE_BYTES: u64 = 48 << 20;

@@ -4,8 +4,11 @@
 //! `plain` for names alone. A dialect lists the time steps and finds the values of each (`dialect`, `properties`). The values are data
 //! sets, or parts of them (`values`), in one piece or in chunks (`chunks`), which are decoded in parallel. `table`
 //! joins the parts of a step. Nothing is allocated before the shapes agree with the storage and with a budget.
+#![deny(unsafe_code)]
 
 mod band_cache;
+#[cfg(test)]
+mod cell_tests;
 mod chunks;
 mod dialect;
 mod file;
@@ -44,13 +47,13 @@ use self::plain::PlainFile;
 use self::pysph::ParticleArrays;
 use self::ranges::TableRanges;
 use self::vtkhdf::VtkHdf;
-use super::{ByteSource, Step};
-use crate::format::Format;
-use crate::hdf5_signature::is_hdf5;
-use crate::ranges::ParticleRanges;
-use crate::reader::{Confidence, FileExtent, FormatInfo, Reader, ValueNames};
-use crate::shared::SharedBytes;
 use spherule_frame::{MemoryBudget, ParseError, RawParticles};
+use spherule_readers::Format;
+use spherule_readers::hdf5_signature::is_hdf5;
+use spherule_readers::ranges::ParticleRanges;
+use spherule_readers::read::{ByteSource, Step};
+use spherule_readers::shared::SharedBytes;
+use spherule_readers::{Confidence, FileExtent, FormatInfo, Reader, ValueNames};
 
 /// HDF5 files of particles.
 pub const FORMAT: Format = Format::new(&Hdf5);

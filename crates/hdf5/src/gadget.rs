@@ -13,9 +13,9 @@ use super::slice::Slice;
 use super::stored::Stored;
 use super::table::{Part, ParticleTable};
 use super::values::Values;
-use crate::read::notes::cell_note;
-use crate::reader::ValueNames;
 use spherule_frame::{MemoryBudget, ParseError, ScalarType, SimulationCell};
+use spherule_readers::ValueNames;
+use spherule_readers::read::notes::cell_note;
 
 /// What the names of the groups of types begin with.
 const TYPE: &str = "PartType";

@@ -13,8 +13,8 @@ use super::slice::Slice;
 use super::stored::Stored;
 use super::table::{Part, ParticleTable};
 use super::values::Values;
-use crate::read::notes::cell_note;
 use spherule_frame::{MemoryBudget, ParseError, SimulationCell};
+use spherule_readers::read::notes::cell_note;
 
 const POSITION: &str = "position";
 /// Least budget for lists of steps.
