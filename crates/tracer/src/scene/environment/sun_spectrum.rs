@@ -88,12 +88,13 @@ fn observed(wavelength: f64) -> DVec3 {
 mod tests {
     use super::*;
     use crate::scene::environment::LUMINANCE;
+    use spherule_tree::math::narrow;
 
     /// Lumens per W of light that is weighted as the eye does.
     const LUMENS: f32 = 683.0;
 
     fn illuminance(elevation: f64, turbidity: f32) -> f32 {
-        let height = libm::sin(elevation.to_radians()) as f32;
+        let height = narrow(libm::sin(elevation.to_radians()));
         LUMENS * sun_irradiance(height, turbidity).dot(LUMINANCE)
     }
 
@@ -114,7 +115,7 @@ mod tests {
     fn a_low_sun_is_red() {
         let ratio = |elevation: f64| {
             let [red, _, blue] =
-                sun_irradiance(libm::sin(f64::to_radians(elevation)) as f32, 2.5).to_array();
+                sun_irradiance(narrow(libm::sin(elevation.to_radians())), 2.5).to_array();
             red / blue
         };
         let [high, low, dusk] = [60.0, 10.0, 2.0].map(ratio);
