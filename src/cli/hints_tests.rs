@@ -33,7 +33,7 @@ fn hints_name_what_the_command_has() {
 fn useless_hints_are_left_out() {
     for (line, useless) in [
         ("spherule still a -o b.png --filter box", "--idle"),
-        ("spherule still a -o b.png --seed 1", "--legend"),
+        ("spherule still a -o b.png --randomness 1", "--legend"),
         ("spherule still a -o b.png --untangle", "-- --untangle"),
         ("spherule convert a -o b --max-eror -1", "-- -"),
     ] {
@@ -46,6 +46,7 @@ fn useless_hints_are_left_out() {
 /// options, or have nothing that stands for them.
 const GUESSED: &[(&str, &str)] = &[
     // Real options
+    ("--seed 3", ""),
     ("--title Speed", ""),
     ("--ortho", ""),
     ("--size 640x480", ""),
@@ -184,7 +185,6 @@ const GUESSED: &[(&str, &str)] = &[
     ("--dry-run", "spherule check"),
     ("--movie a.mp4", "spherule movie"),
     // Nothing stands for these
-    ("--seed 3", NOTHING),
     ("--cuda", "--device"),
     ("--fog", NOTHING),
 ];

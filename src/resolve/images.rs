@@ -37,6 +37,7 @@ pub(super) fn render_settings(
     Ok(RenderSettings {
         window: whole.part().map(|_| whole.data_window()),
         samples: image.samples,
+        seed: render.seed,
         filter: PixelFilter {
             kind: image.filter,
             width: image.filter_width.unwrap_or_else(|| image.filter.default_width()),

@@ -38,7 +38,7 @@
 //!         lens: None,
 //!     },
 //!     film,
-//!     samples: Samples { count: 1, points: &[[0.5, 0.5]], sets: &[0; 128] },
+//!     samples: Samples { count: 1, points: &[[0.5, 0.5]], sets: &[0; 128], seed: 0 },
 //!     has_odd: false,
 //!     model: Model::Whitted,
 //!     max_depth: 1,

@@ -2,6 +2,8 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use spherule_tracer::render::PathSeed;
+
 use crate::lighting::{Model, source_count};
 
 /// Largest number of lights.
@@ -95,6 +97,8 @@ pub struct Samples<'a> {
     pub points: &'a [[f32; 2]],
     /// The set of each pixel, row by row.
     pub sets: &'a [u32],
+    /// Sequence of the random numbers of paths.
+    pub seed: u32,
 }
 
 /// What is infinitely far away.
@@ -227,7 +231,8 @@ pub(crate) struct View {
     pub(crate) sources: u32,
     pub(crate) has_odd: u32,
     pub(crate) has_extents: u32,
-    pub(crate) zeros: [u32; 3],
+    pub(crate) zero_one: u32,
+    pub(crate) sequence: [u32; 2],
     pub(crate) ambient: [f32; 3],
     pub(crate) diffuse: f32,
     pub(crate) color: [f32; 3],
@@ -308,6 +313,7 @@ impl View {
         }
         #[expect(clippy::cast_possible_truncation, reason = "at most MAX_LIGHTS")]
         let light_count = picture.lights.len() as u32;
+        let sequence = bytemuck::cast(PathSeed::sequence_bits(picture.samples.seed).to_le_bytes());
         let [lens_radius, lens_focus] = camera.lens.unwrap_or_default();
         Self {
             eye: camera.eye,
@@ -334,6 +340,7 @@ impl View {
             sources: picture.sources(),
             has_odd: picture.has_odd.into(),
             has_extents: picture.has_extents().into(),
+            sequence,
             ambient: material.ambient,
             diffuse: material.diffuse,
             specular: material.specular,

@@ -73,6 +73,7 @@ impl fmt::Display for Missing {
             Self::Drawing => "outlines and the fading with distance",
             Self::Holdout => "holdouts",
             Self::Detail => "an image of the environment at its own resolution",
+            }
         })
     }
 }
@@ -117,12 +118,13 @@ struct SampleTable {
 impl SampleTable {
     fn fit(&mut self, film: FilmSize, settings: &RenderSettings) {
         let is_fit = self.film.is_some_and(|(size, of)| {
-            size == film && (of.samples, of.filter) == (settings.samples, settings.filter)
+            let key = |of: &RenderSettings| (of.samples, of.filter, of.seed);
+            size == film && key(&of) == key(settings)
         });
         if is_fit {
             return;
         }
-        let sampler = FilmSampler::with_filter(settings.samples, settings.filter);
+        let sampler = FilmSampler::with_filter(settings.samples, settings.filter, settings.seed);
         self.points = sampler.all_points().collect();
         // Numbers of pixels beyond the left or top border wrap around, as on the CPU
         let [left, top] = film.corner;
@@ -298,6 +300,7 @@ impl SceneRenderer {
                 count: settings.samples,
                 points: &self.samples.points,
                 sets: &self.samples.sets,
+                seed: settings.seed,
             },
             max_depth: settings.max_depth,
             background: background_of(&scene.background),

@@ -81,7 +81,9 @@ fn paths_are_those_of_the_cpu() {
     let level = same_arithmetic(&device);
     let mut renderer = SceneRenderer::new(Arc::new(device));
     for paths in Paths::ALL {
-        let case = Case { paths: Some(paths), samples: 5, particles: 400, ..Case::small() };
+        // One of them has random numbers of another sequence
+        let seed = if paths == Paths::Lights { 9 } else { 0 };
+        let case = Case { paths: Some(paths), samples: 5, seed, particles: 400, ..Case::small() };
         let found = support::compare(&mut renderer, &case, level);
         let Difference { ids, depths, normals, positions, mean, bias, odd, ray_ratio, .. } = found;
         if paths != Paths::Lens {

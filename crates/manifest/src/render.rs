@@ -5,7 +5,8 @@ use spherule_files::Bytes;
 use spherule_images::overlay::Layout;
 use spherule_tracer::render::{
     DEFAULT_BOUNCES, DEFAULT_MIN_WEIGHT, DataWindow, FilterKind, IntegratorKind, MAX_BOUNCES,
-    MAX_DEPTH, MAX_FILTER_WIDTH, MAX_SAMPLES, MAX_SIDE, MIN_WEIGHTS, RendererKind,
+    MAX_DEPTH, MAX_FILTER_WIDTH, MAX_SAMPLES, MAX_SEED, MAX_SIDE, MIN_WEIGHTS,
+    RendererKind,
 };
 use spherule_tracer::scene::{Background, ground};
 use spherule_tree::accel::{BvhLeaves, BvhPreset, SbvhSettings, Structure};
@@ -257,6 +258,11 @@ section! {
         /// Diffuse reflections that light may take before its last one; 0 is direct light only
         bounces: u32 = DEFAULT_BOUNCES, from(0), to(MAX_BOUNCES), affects(Affects::PathTracing),
             flag("bounces", "COUNT", "Look");
+        /// Sequence of the random numbers
+        ///
+        /// Images that differ only in it have the same mean and independent noise, so several of them can be averaged:
+        /// the mean of four has half the noise of one. All frames of a job have the same seed; noise stays in its place.
+        seed: u32 = 0, from(0), to(MAX_SEED), flag("seed", "NUMBER", "Look");
         /// Light that surfaces receive from other surfaces: traced | ambient
         ///
         /// traced follows it up to `bounces`. ambient ends paths at the second surface and estimates the light there:

@@ -96,6 +96,8 @@ pub(crate) struct Case {
     pub(crate) width: u32,
     pub(crate) height: u32,
     pub(crate) samples: u32,
+    /// Sequence of the random numbers.
+    pub(crate) seed: u32,
     pub(crate) max_depth: u32,
     /// Parallel rays.
     pub(crate) is_parallel: bool,
@@ -119,6 +121,7 @@ impl Case {
             width: 61,
             height: 43,
             samples: 2,
+            seed: 0,
             max_depth: 3,
             is_parallel: false,
             is_mapped: false,
@@ -155,6 +158,7 @@ impl Case {
             has_features: self.paths.is_some(),
             transparent_background: self.paths == Some(Paths::Catcher),
             samples: self.samples,
+            seed: self.seed,
             max_depth: self.max_depth,
             channels: Channels::from_names(names).expect("known names"),
             window: self.window.map(|[left, top]| DataWindow {

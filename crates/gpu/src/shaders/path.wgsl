@@ -54,7 +54,7 @@ fn push_shadow(source: u32, shadow: Shadow, pixel: u32) {
 fn seed_at(pixel: u32, bounces: u32) -> Wide {
   let x = i32(pixel % view.width) + view.corner.x;
   let y = i32(pixel / view.width) + view.corner.y;
-  var seed = seed_of_pixel(u32(x), u32(y));
+  var seed = seed_of_pixel(u32(x), u32(y)) ^ view.sequence;
   for (var i = 0u; i < bounces; i++) { seed = child_of(seed, BOUNCED); }
   return seed;
 }

@@ -37,7 +37,9 @@ struct View {
   // Radius of the lens and distance of the focus; 0 is a pinhole. Number of sources of shadow rays. Whether every second
   // sample is kept, and whether rays can hit lights
   lens_radius: f32, lens_focus: f32, sources: u32, has_odd: u32,
-  has_extents: u32, zero_one: u32, zero_two: u32, zero_three: u32,
+  has_extents: u32, zero_one: u32,
+  // Changes the seeds of paths: the lower and the upper half
+  sequence: vec2<u32>,
   // Material: ambient light times `Ka`, and the constants of Blinn and Phong
   ambient: vec3<f32>, diffuse: f32,
   color: vec3<f32>, specular: f32,

@@ -116,7 +116,7 @@ impl<'a> RenderContext<'a> {
             boundary: Dielectric::new(scene.particle_material()),
             sample_width: (settings.samples as f32).sqrt().recip().max(MIN_SAMPLE_WIDTH),
             depth_cue: DepthCue::new(scene, &settings.drawing),
-            sampler: FilmSampler::with_filter(settings.samples, settings.filter),
+            sampler: FilmSampler::with_filter(settings.samples, settings.filter, settings.seed),
             max_segments: SEGMENTS,
         }
     }

@@ -46,7 +46,7 @@ impl RenderContext<'_> {
                     (true, false) => -1.0,
                     (true, true) => 1.0,
                 },
-                path: PathSeed::of_pixel(column_number, row_number),
+                path: PathSeed::of_pixel(column_number, row_number).in_sequence(self.settings.seed),
                 data: DataSample::MISS,
             });
             // Add the samples of the pixel, relative to the image of its eye

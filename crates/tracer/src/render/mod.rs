@@ -123,8 +123,8 @@ pub use ray_counts::RayCounts;
 pub use sampler::{FilmSampler, FilterKind, MAX_FILTER_WIDTH, MultiJitter, PathSeed, PixelFilter};
 pub use settings::{
     DEFAULT_BOUNCES, DEFAULT_MIN_WEIGHT, DEFAULT_PHOTONS, IndirectLight, IntegratorKind,
-    MAX_BOUNCES, MAX_DEPTH, MAX_LITERAL_DEPTH, MAX_PHOTONS, MAX_SAMPLES, MAX_SIDE, MIN_WEIGHTS,
-    RenderError, RenderSettings,
+    MAX_BOUNCES, MAX_DEPTH, MAX_LITERAL_DEPTH, MAX_PHOTONS, MAX_SAMPLES, MAX_SEED,
+    MAX_SIDE, MIN_WEIGHTS, RenderError, RenderSettings,
 };
 pub use source::mean;
 pub use source::opacity_of;

@@ -395,3 +395,26 @@ fn more_samples_converge_to_the_same_picture() {
     let (few, many) = (of(16), of(1024));
     assert!((few / many - 1.0).abs().max_element() < 0.05, "{few} {many}");
 }
+
+#[test]
+fn pictures_of_several_seeds_can_be_averaged() {
+    let heap = heap();
+    let axes = EnvironmentAxes::of_view(DVec3::Y, DVec3::Z, 0.0);
+    let scene = scene(studio(axes, Vec3::ONE));
+    let of = |samples, seed| {
+        let settings = RenderSettings { seed, ..settings(16, samples, 6) };
+        let film = image(&heap, &scene, Vec3::new(0.7, 0.5, 0.2), &settings);
+        film.color.iter().map(|c| Vec3::from_slice(&c[..3])).collect::<Vec<_>>()
+    };
+    let truth = of(1024, 9);
+    let error = |picture: &[Vec3]| {
+        let squares = picture.iter().zip(&truth).map(|(a, b)| a.distance_squared(*b));
+        (squares.sum::<f32>() / truth.len() as f32).sqrt()
+    };
+    let pictures = [0, 1, 2, u32::MAX].map(|seed| of(4, seed));
+    let mean: Vec<_> =
+        (0..truth.len()).map(|i| pictures.iter().map(|p| p[i]).sum::<Vec3>() / 4.0).collect();
+    // Equal noise would leave the error as it is, independent noise halves it
+    let ratio = error(&mean) / (pictures.iter().map(|p| error(p)).sum::<f32>() / 4.0);
+    assert!((0.4..0.6).contains(&ratio), "{ratio}");
+}

@@ -12,6 +12,9 @@ use crate::scene::{Material, MaterialError, Scene};
 /// Maximum number of samples per pixel: more than any picture needs, and few enough for counts in f32.
 pub const MAX_SAMPLES: u32 = 4096;
 
+/// Largest number of a sequence of random numbers.
+pub const MAX_SEED: u32 = 1_000_000_000;
+
 /// Maximum recursion depth.
 pub const MAX_DEPTH: u32 = 64;
 
@@ -72,6 +75,8 @@ pub struct RenderSettings {
     pub height: u32,
     /// Samples per pixel; a single one is exactly at the centre of the pixel.
     pub samples: u32,
+    /// Sequence of the random numbers. Pictures that differ only in it have the same mean and independent noise.
+    pub seed: u32,
     /// How the samples are distributed around the centre of the pixel.
     pub filter: PixelFilter,
     /// The light transport.
@@ -113,6 +118,7 @@ impl RenderSettings {
             width,
             height,
             samples: 1,
+            seed: 0,
             filter: PixelFilter::BOX,
             integrator: IntegratorKind::Whitted,
             bounces: DEFAULT_BOUNCES,

@@ -26,18 +26,19 @@ pub struct FilmSampler {
 impl FilmSampler {
     /// A sampler with `samples` points per pixel (at least one), all inside it.
     pub fn new(samples: u32) -> Self {
-        Self::with_filter(samples, PixelFilter::BOX)
+        Self::with_filter(samples, PixelFilter::BOX, 0)
     }
 
-    /// A sampler with `samples` points per pixel (at least one), distributed like `filter` around its centre.
-    pub fn with_filter(samples: u32, filter: PixelFilter) -> Self {
+    /// A sampler with `samples` points per pixel (at least one), distributed like `filter` around its centre. Each
+    /// `seed` has other sets of points.
+    pub fn with_filter(samples: u32, filter: PixelFilter, seed: u32) -> Self {
         let table = (filter != PixelFilter::BOX && samples > 1).then(|| FilterTable::new(filter));
         let place = |u: f32| table.as_ref().map_or(u, |table| 0.5 + table.position(u));
         let mut sets = MultiJitter::new(samples);
         let samples = samples.max(1) as usize;
         let count = (TABLE_POINTS / samples).clamp(MIN_SETS, MAX_SETS);
         let (mut x, mut y) = (Vec::new(), Vec::new());
-        for set in (0_u64..).take(count) {
+        for set in (u64::from(seed) << 32..).take(count) {
             sets.for_each(set, |point| {
                 x.push(place(point.x));
                 y.push(place(point.y));
@@ -92,11 +93,22 @@ mod tests {
     }
 
     #[test]
+    fn seeds_have_other_sets() {
+        let [first, second] =
+            [0, 1].map(|seed| FilmSampler::with_filter(16, PixelFilter::BOX, seed));
+        let of_second: HashSet<_> =
+            second.all_points().map(|point| point.map(f32::to_bits)).collect();
+        let shared =
+            first.all_points().filter(|point| of_second.contains(&point.map(f32::to_bits)));
+        assert_eq!(shared.count(), 0);
+    }
+
+    #[test]
     fn filters_spread_samples_around_the_pixel() {
         let filter = PixelFilter { kind: FilterKind::Gaussian, width: 3.0 };
-        let centre = FilmSampler::with_filter(1, filter);
+        let centre = FilmSampler::with_filter(1, filter, 0);
         assert_eq!(centre.points(3, 4), (&[0.5][..], &[0.5][..]));
-        let sampler = FilmSampler::with_filter(64, filter);
+        let sampler = FilmSampler::with_filter(64, filter, 0);
         let (mut square, mut reach) = (0.0, 0.0_f32);
         for pixel in 0..256 {
             let (x, y) = sampler.points(pixel, 0);

@@ -7,6 +7,7 @@ use glam::Vec3;
 use crate::render::{
     lights::{Beam, PhotonSource},
     sampler::PathSeed,
+    settings::RenderSettings,
     shading::{disc, in_cone, tangents},
 };
 use crate::scene::environment::LUMINANCE;
@@ -61,11 +62,11 @@ struct Local {
 
 impl Emitter {
     /// Emitters for these lights, each with its light group, and particles in the box with these corners. They share
-    /// `photons` photons by their power.
+    /// the photons of `settings` by their power.
     pub(super) fn of(
         lights: &[(usize, PhotonSource)],
         particles: [Vec3; 2],
-        photons: u32,
+        settings: &RenderSettings,
     ) -> Vec<Self> {
         // Find the power of each light that reaches the particles
         let source =
@@ -81,12 +82,12 @@ impl Emitter {
             clippy::cast_sign_loss,
             reason = "at most the number of all photons"
         )]
-        let count = |power: f64| (share(power) * f64::from(photons)).ceil() as u32;
+        let count = |power: f64| (share(power) * f64::from(settings.photons)).ceil() as u32;
         let emitter = |(number, ((group, source), power)): (u32, ((usize, Source), &f64))| Self {
             source,
             group,
             photons: count(*power).max(1),
-            seed: PathSeed::of_pixel(number, PHOTONS),
+            seed: PathSeed::of_pixel(number, PHOTONS).in_sequence(settings.seed),
         };
         (0..).zip(sources.into_iter().zip(&powers)).map(emitter).collect()
     }

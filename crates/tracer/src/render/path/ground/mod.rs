@@ -274,7 +274,7 @@ impl<'a> PathIntegrator<'a> {
         let mut collector = has_surfaces.then(Collector::new);
         let mut counts = RayCounts::default();
         if square.is_some() || has_surfaces {
-            let emitters = Emitter::of(&sources, scene.particles, settings.photons);
+            let emitters = Emitter::of(&sources, scene.particles, settings);
             let mut targets = Targets {
                 ground: square.as_ref().zip(cells.as_mut()),
                 surfaces: collector.as_mut(),

@@ -134,7 +134,8 @@ fn aim(
     for _ in 0..LANES {
         segments.rays.push(&Ray::new(above, -square.normal));
     }
-    segments.path = [PathSeed::of_pixel((row * SIDE + texel) as u32, TEXELS); LANES];
+    let seed = PathSeed::of_pixel((row * SIDE + texel) as u32, TEXELS);
+    segments.path = [seed.in_sequence(integrator.context.settings.seed); LANES];
     segments.sample = std::array::from_fn(|lane| (number * LANES + lane) as u32);
     // The ground may cut through a body
     let body = integrator.context.shapes.connected_particles();
