@@ -176,6 +176,7 @@ fn key_of(missing: Missing) -> &'static str {
         Missing::Parts => "material.part",
         Missing::Holdout => "mesh",
         Missing::Detail => "environment.detail",
+        Missing::Clamp => "render.clamp",
     }
 }
 

@@ -111,6 +111,7 @@ impl FrameRenderer for CpuRenderer {
         let BuiltFrame { task, facts, time, mut report, .. } = frame;
         // Denoise it, and complete the report
         report.seconds.trace = seconds(start.elapsed());
+        report.clamped_light = rays.lost.part(&film.color, setup.picture.render.samples);
         report.seconds.denoise = denoise_film(setup, &mut film)?;
         report.rays = rays.into();
         Ok(TracedFrame {

@@ -44,6 +44,7 @@ pub(super) fn render_settings(
         },
         integrator: manifest.integrator(),
         bounces: render.bounces,
+        clamp: render.clamp,
         indirect: match render.indirect {
             IndirectSetting::Traced => IndirectLight::Traced,
             IndirectSetting::Ambient => IndirectLight::Ambient { radius: narrow(extent.reach) },

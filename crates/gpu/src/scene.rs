@@ -10,7 +10,8 @@ use spherule_tracer::render::device::{
     DeviceHit, DevicePixel, Extent, are_from_nearest, extent_of, store_pixels,
 };
 use spherule_tracer::render::{
-    Drawing, Film, FilmSampler, IntegratorKind, RayCounts, RenderSettings, ShadeSource, Stop,
+    Drawing, Film, FilmSampler, IntegratorKind, LostLight, RayCounts, RenderSettings, ShadeSource,
+    Stop,
 };
 use spherule_tracer::scene::ground::Pattern;
 use spherule_tracer::scene::{self, Falloff, Fresnel, LightKind, Projection, Scene, background};
@@ -55,6 +56,8 @@ pub enum Missing {
     Holdout,
     /// An image of the environment at its own resolution.
     Detail,
+    /// A clamp of indirect light.
+    Clamp,
 }
 
 impl fmt::Display for Missing {
@@ -73,6 +76,7 @@ impl fmt::Display for Missing {
             Self::Drawing => "outlines and the fading with distance",
             Self::Holdout => "holdouts",
             Self::Detail => "an image of the environment at its own resolution",
+            Self::Clamp => "a clamp of indirect light",
             }
         })
     }
@@ -101,6 +105,7 @@ pub fn missing(scene: &Scene, settings: &RenderSettings) -> Option<Missing> {
         (settings.drawing != Drawing::NONE, Missing::Drawing),
         (material.is_holdout, Missing::Holdout),
         (scene.environment.as_ref().is_some_and(|map| map.has_detail()), Missing::Detail),
+        (settings.clamp.is_some() && !is_whitted, Missing::Clamp),
     ]
     .into_iter()
     .find_map(|(is_needed, missing)| is_needed.then_some(missing))
@@ -324,6 +329,7 @@ pub const fn ray_counts(cost: &Cost) -> RayCounts {
         shadow: cost.shadow_rays,
         reflection: cost.reflected_rays,
         refraction: 0,
+        lost: LostLight::NONE,
     }
 }
 

@@ -5,7 +5,7 @@ use spherule_files::Bytes;
 use spherule_images::overlay::Layout;
 use spherule_tracer::render::{
     DEFAULT_BOUNCES, DEFAULT_MIN_WEIGHT, DataWindow, FilterKind, IntegratorKind, MAX_BOUNCES,
-    MAX_DEPTH, MAX_FILTER_WIDTH, MAX_SAMPLES, MAX_SEED, MAX_SIDE, MIN_WEIGHTS,
+    MAX_CLAMP, MAX_DEPTH, MAX_FILTER_WIDTH, MAX_SAMPLES, MAX_SEED, MAX_SIDE, MIN_WEIGHTS,
     RendererKind,
 };
 use spherule_tracer::scene::{Background, ground};
@@ -258,6 +258,13 @@ section! {
         /// Diffuse reflections that light may take before its last one; 0 is direct light only
         bounces: u32 = DEFAULT_BOUNCES, from(0), to(MAX_BOUNCES), affects(Affects::PathTracing),
             flag("bounces", "COUNT", "Look");
+        /// Limit of indirect light: largest radiance that a path adds to a sample after its first bounce, or off
+        ///
+        /// It removes fireflies, pixels with a rare bright sample, and some light with them; reports have the lost part as
+        /// clamped_light. Light that the first surface receives from the environment and lights has no limit. 10 is the
+        /// default of Blender.
+        clamp: Option<f32> = None, or("off"), above(0), to(MAX_CLAMP), unit("a radiance"),
+            affects(Affects::PathTracing);
         /// Sequence of the random numbers
         ///
         /// Images that differ only in it have the same mean and independent noise, so several of them can be averaged:

@@ -21,6 +21,8 @@ pub struct FrameReport {
     pub clamped_radii: u64,
     /// Number of pixels with a colour too bright for half floats.
     pub clamped_pixels: u64,
+    /// Part of the light of the image that `render.clamp` took away, 0 to 1.
+    pub clamped_light: f64,
     /// Time by stage.
     pub seconds: StageSeconds,
     /// The acceleration structure.
@@ -203,13 +205,14 @@ impl FrameReport {
         ratio(self.rays.total(), self.seconds.trace)
     }
 
-    /// Adds all values that can be summed over frames; for memory, keeps the larger value.
+    /// Adds all values that can be summed over frames; for memory and parts, keeps the larger value.
     pub(super) fn add(&mut self, frame: &Self) {
         add(&mut self.particles, frame.particles);
         add(&mut self.particles_read, frame.particles_read);
         add(&mut self.dropped, frame.dropped);
         add(&mut self.clamped_radii, frame.clamped_radii);
         add(&mut self.clamped_pixels, frame.clamped_pixels);
+        self.clamped_light = self.clamped_light.max(frame.clamped_light);
         self.seconds.read += frame.seconds.read;
         self.seconds.build += frame.seconds.build;
         self.seconds.surface += frame.seconds.surface;

@@ -18,7 +18,9 @@ mod run;
 mod summary;
 
 use run::Run;
-pub(super) use summary::{CELL_HINT, parts_text, print_summary, radius_text, unframed_text};
+pub(super) use summary::{
+    CELL_HINT, clamped_text, parts_text, print_summary, radius_text, unframed_text,
+};
 
 const EXAMPLES: &str = "\
 Examples:

@@ -22,8 +22,9 @@ impl ShowReport for FrameReport {
             none if none < 5e-4 => String::new(),
             seconds => format!("surface {seconds:.3} s, "),
         };
+        let clamped = clamped_text(self).map_or(String::new(), |text| format!(", {text}"));
         format!(
-            "{} particles, {} built in {:.3} s, {surface}trace {:.2} s",
+            "{} particles, {} built in {:.3} s, {surface}trace {:.2} s{clamped}",
             self.particles, self.build.structure, s.build, s.trace
         )
     }
@@ -31,6 +32,12 @@ impl ShowReport for FrameReport {
     fn facts(&self, output: String) -> Value {
         json!({"image": output, "seconds": self.seconds})
     }
+}
+
+/// How much light a picture has lost to the clamp of indirect light.
+pub(in crate::cli) fn clamped_text(report: &FrameReport) -> Option<String> {
+    let percent = 100.0 * report.clamped_light;
+    (percent > 0.0).then(|| format!("render.clamp took {percent:.2} % of the light"))
 }
 
 /// Prints the resolved settings.

@@ -1,6 +1,6 @@
 //! Tables of frames. For a long sequence `report.json` lists all frames, and this page a selection.
 
-use super::numbers::{count, float, mib, seconds, short, shortened};
+use super::numbers::{count, float, mib, percent, seconds, short, shortened};
 use super::{JobFrame, JobReport, Status};
 use crate::page::{Page, Table};
 
@@ -11,7 +11,7 @@ const MAX_FAILURES: usize = 50;
 /// Maximum length of a message, in characters.
 const MAX_TEXT: usize = 500;
 
-const HEADS: [&str; 18] = [
+const HEADS: [&str; 19] = [
     "frame",
     "status",
     "particles",
@@ -30,6 +30,7 @@ const HEADS: [&str; 18] = [
     "dropped\nparticles",
     "clamped\nradii",
     "clamped\npixels",
+    "clamped\nlight",
 ];
 
 impl JobReport {
@@ -142,6 +143,7 @@ fn cells(frame: &JobFrame) -> Vec<String> {
         count(report.dropped),
         count(report.clamped_radii),
         count(report.clamped_pixels),
+        percent(report.clamped_light),
     ]);
     cells
 }

@@ -2,7 +2,7 @@
 
 use spherule_jobs::FrameRange;
 
-use super::numbers::{bytes, count, duration, seconds as time, short, shortened};
+use super::numbers::{bytes, count, duration, percent, seconds as time, short, shortened};
 use super::{JobReport, Status};
 use crate::FrameReport;
 use crate::THESIS_BYTES_PER_PARTICLE;
@@ -94,6 +94,7 @@ impl JobReport {
             ("Dropped particles (not finite, or too far away)", count(totals.dropped)),
             ("Clamped radii (too small)", count(totals.clamped_radii)),
             ("Clamped pixels (too bright)", count(totals.clamped_pixels)),
+            ("Light lost to render.clamp, at most", percent(totals.clamped_light)),
         ]);
         list
     }

@@ -44,6 +44,7 @@ impl JobReport {
             "dropped": totals.dropped,
             "clamped_radii": totals.clamped_radii,
             "clamped_pixels": totals.clamped_pixels,
+            "clamped_light": totals.clamped_light,
             "seconds": totals.seconds,
             "rays": totals.rays,
             "rays_per_second": totals.rays_per_second(),

@@ -51,6 +51,11 @@ pub(super) fn duration(seconds: f64) -> String {
     }
 }
 
+/// A part of 1 as a percentage.
+pub(super) fn percent(part: f64) -> String {
+    format!("{} %", short(100.0 * part))
+}
+
 /// Bytes in MiB, without the unit.
 pub(super) fn mib(bytes: u64) -> String {
     short(float(bytes) / MIB)

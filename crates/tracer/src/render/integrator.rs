@@ -68,6 +68,8 @@ pub(super) trait Integrator: Sync {
         scratch.current.set_slices(slices);
         scratch.next.set_slices(slices);
         scratch.packet.counts = RayCounts::default();
+        // Maps of the light on the ground have no limit: they are smooth already
+        scratch.packet.clamp.limit = context.settings.clamp;
         let mut pixels = pixels_of(tile).peekable();
         while pixels.peek().is_some() {
             let group = pixels.by_ref().take(group_len);
@@ -174,7 +176,10 @@ fn trace_depth<I: Integrator + ?Sized>(
     packet.counts.reflection += current.reflected.len() as u64;
     packet.counts.refraction += current.refracted.len() as u64;
     for segments in current.packets_mut() {
+        packet.clamp.start();
         trace_packet(integrator, segments, depth, stop, packet, next)?;
+        let PacketScratch { clamp, radiance, groups, counts, .. } = &mut *packet;
+        clamp.apply(segments, radiance, groups, &mut counts.lost);
         scratch.group.add(segments, &packet.radiance);
         let layers = &mut scratch.group.layers;
         layers.add(segments, &packet.radiance);

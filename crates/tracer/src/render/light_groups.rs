@@ -45,6 +45,11 @@ impl GroupLight {
         self.radiance.get_mut(group)
     }
 
+    /// The light of all groups, to change it.
+    pub(super) fn all_mut(&mut self) -> &mut [Lanes3] {
+        &mut self.radiance
+    }
+
     /// The light of all groups; empty if there are none.
     pub(super) fn all(&self) -> &[Lanes3] {
         &self.radiance

@@ -22,6 +22,7 @@ mod body_set;
 pub(crate) mod brute;
 mod bsdf;
 mod channels;
+mod clamp;
 mod context;
 pub mod cryptomatte;
 pub mod device;
@@ -73,6 +74,8 @@ mod catcher_tests;
 #[cfg(test)]
 mod caustics_tests;
 #[cfg(test)]
+mod clamp_tests;
+#[cfg(test)]
 mod filter_tests;
 #[cfg(test)]
 mod grains_tests;
@@ -119,11 +122,11 @@ pub use film::Film;
 pub use film_rows::FilmRows;
 pub use path::ground::GroundLightBytes;
 pub use planes::FilmPlane;
-pub use ray_counts::RayCounts;
+pub use ray_counts::{LostLight, RayCounts};
 pub use sampler::{FilmSampler, FilterKind, MAX_FILTER_WIDTH, MultiJitter, PathSeed, PixelFilter};
 pub use settings::{
     DEFAULT_BOUNCES, DEFAULT_MIN_WEIGHT, DEFAULT_PHOTONS, IndirectLight, IntegratorKind,
-    MAX_BOUNCES, MAX_DEPTH, MAX_LITERAL_DEPTH, MAX_PHOTONS, MAX_SAMPLES, MAX_SEED,
+    MAX_BOUNCES, MAX_CLAMP, MAX_DEPTH, MAX_LITERAL_DEPTH, MAX_PHOTONS, MAX_SAMPLES, MAX_SEED,
     MAX_SIDE, MIN_WEIGHTS, RenderError, RenderSettings,
 };
 pub use source::mean;

@@ -130,6 +130,7 @@ impl Integrator for PathIntegrator<'_> {
         let held_out = self.context.holdout_lanes(depth, &packet.hits);
         let lanes = segments.lanes() & !ended & !held_out;
         self.add_escaped(segments, depth, lanes, packet);
+        packet.clamp.keep_direct(segments, &packet.radiance, &packet.groups);
         packet.take_light(LightClass::Background);
         if packet.hits.mask & !held_out == 0 {
             return;

@@ -1,4 +1,39 @@
-//! Ray counters.
+//! Ray counters, and the light that a clamp takes away.
+
+use glam::Vec3;
+
+/// Light that a clamp takes away, as a sum over samples that does not depend on their order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct LostLight(u64);
+
+impl LostLight {
+    /// Nothing.
+    pub const NONE: Self = Self(0);
+    /// Steps of a unit of radiance: finer than the noise of any picture.
+    const STEPS: f32 = 4096.0;
+
+    /// Adds light that a sample has lost, linear RGB.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+    pub(super) fn add(&mut self, radiance: Vec3) {
+        let steps = (radiance.element_sum() * Self::STEPS) as u64;
+        self.0 = self.0.saturating_add(steps);
+    }
+
+    /// The part of its light that a picture with the colours `kept` and so many samples per pixel has lost, 0 to 1.
+    pub fn part(self, kept: &[[f32; 4]], samples: u32) -> f64 {
+        if self == Self::NONE {
+            return 0.0;
+        }
+        let lost = self.0 as f64 / f64::from(Self::STEPS) / f64::from(samples);
+        let sum = |[r, g, b, _]: &[f32; 4]| f64::from(r + g + b);
+        let kept: f64 = kept.iter().map(sum).filter(|sum| sum.is_finite()).sum();
+        lost / (lost + kept.max(0.0))
+    }
+
+    const fn plus(self, other: Self) -> Self {
+        Self(self.0.saturating_add(other.0))
+    }
+}
 
 /// Number of rays traced, by purpose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -11,6 +46,8 @@ pub struct RayCounts {
     pub reflection: u64,
     /// Refracted rays, into or out of a transmissive body.
     pub refraction: u64,
+    /// Light that the clamp of indirect light took away.
+    pub lost: LostLight,
 }
 
 impl RayCounts {
@@ -29,6 +66,7 @@ impl std::ops::Add for RayCounts {
             shadow: self.shadow + other.shadow,
             reflection: self.reflection + other.reflection,
             refraction: self.refraction + other.refraction,
+            lost: self.lost.plus(other.lost),
         }
     }
 }

@@ -6,6 +6,7 @@ use super::{
     bodies::StraightCrossing,
     bsdf::{BsdfSamples, BsdfValues, SurfacePoints},
     channels::Channels,
+    clamp::IndirectClamp,
     entries::Entries,
     interface::LeavingRays,
     layers::LightClass,
@@ -108,6 +109,8 @@ pub(super) struct PacketScratch {
     pub(super) split: LightSplit,
     /// Light by its source.
     pub(super) groups: GroupLight,
+    /// The limit of indirect light.
+    pub(super) clamp: IndirectClamp,
     /// Rays traced for the tile.
     pub(super) counts: RayCounts,
 }

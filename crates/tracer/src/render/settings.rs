@@ -34,6 +34,9 @@ pub const MAX_BOUNCES: u32 = 1000;
 /// Default number of diffuse reflections of a path. Russian roulette ends most paths earlier.
 pub const DEFAULT_BOUNCES: u32 = 6;
 
+/// Largest limit of indirect light, a radiance. 1 is that of a white surface under the default light.
+pub const MAX_CLAMP: f32 = 1e6;
+
 /// Maximum number of photons.
 pub const MAX_PHOTONS: u32 = 1_000_000_000;
 
@@ -83,6 +86,8 @@ pub struct RenderSettings {
     pub integrator: IntegratorKind,
     /// Path tracing: maximum number of diffuse reflections before the last one; 0 is direct light only.
     pub bounces: u32,
+    /// Path tracing: largest component of the radiance that a path segment adds to a sample after the first bounce.
+    pub clamp: Option<f32>,
     /// Path tracing: light from other surfaces.
     pub indirect: IndirectLight,
     /// Path tracing: number of photons for caustics on the ground; 0 follows paths from the ground instead.
@@ -122,6 +127,7 @@ impl RenderSettings {
             filter: PixelFilter::BOX,
             integrator: IntegratorKind::Whitted,
             bounces: DEFAULT_BOUNCES,
+            clamp: None,
             indirect: IndirectLight::Traced,
             photons: 0,
             max_depth: 3,
@@ -196,6 +202,9 @@ impl RenderSettings {
         if !(width > 0.0 && width <= MAX_FILTER_WIDTH) {
             return Err(RenderError::FilterWidth(width));
         }
+        if let Some(clamp) = self.clamp.filter(|clamp| !(*clamp > 0.0 && *clamp <= MAX_CLAMP)) {
+            return Err(RenderError::Clamp(clamp));
+        }
         if self.bounces > MAX_BOUNCES {
             return Err(RenderError::TooManyBounces(self.bounces));
         }
@@ -263,6 +272,9 @@ pub enum RenderError {
     /// `bounces` is out of range.
     #[error("bounces = {0} is out of range, it must be at most {MAX_BOUNCES}")]
     TooManyBounces(u32),
+    /// `clamp` is out of range.
+    #[error("clamp = {0} is out of range; it must be above 0 and at most {MAX_CLAMP:e}")]
+    Clamp(f32),
     /// A light is in a group without a layer.
     #[error("a light is in light group {group}, but there are only {count} light groups")]
     LightGroup {
