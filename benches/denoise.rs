@@ -34,7 +34,7 @@ struct Picture {
     width: usize,
     height: usize,
     color: Vec<[f32; 4]>,
-    odd: Vec<Vec3>,
+    odd: Vec<[f32; 4]>,
     albedo: Vec<Vec3>,
     normal: Vec<Vec3>,
     depth: Vec<f32>,
@@ -94,7 +94,7 @@ impl Picture {
         let expected = albedo * light;
         let [even, odd] = [0, 1].map(|_| expected + albedo * (AMPLITUDE * random.next()));
         self.color.push(even.midpoint(odd).extend(1.0).to_array());
-        self.odd.push(odd);
+        self.odd.push(odd.extend(1.0).to_array());
         self.albedo.push(albedo);
         self.normal.push(normal);
         self.depth.push(if is_ball { 9.0 - normal.z } else { 10.0 });
@@ -108,6 +108,7 @@ impl Picture {
             height: u32::try_from(self.height).expect("a small picture"),
             samples: 2,
             views: [1, 1],
+            is_transparent: false,
             color: &self.color,
             odd: &self.odd,
             albedo: &self.albedo,
@@ -118,7 +119,8 @@ impl Picture {
         pool.expect("a thread").install(|| {
             let start = CpuTime::now();
             let filtered = denoise(&input, settings).expect("valid input");
-            (start.seconds(), filtered)
+            let colors = filtered.iter().map(|rgba| Vec3::from_slice(rgba)).collect();
+            (start.seconds(), colors)
         })
     }
 

@@ -26,16 +26,14 @@ pub(super) fn denoise_film(setup: &Setup, film: &mut Film) -> Result<f64, Denois
         height: film.height,
         views: setup.picture.eyes(),
         samples: setup.picture.render.samples,
+        is_transparent: setup.picture.render.transparent_background,
         color: &film.color,
         odd,
         albedo,
         normal,
         depth,
     };
-    // Replace the colours, and keep the coverage
-    let filtered = denoise(&input, settings)?;
-    for (color, filtered) in film.color.iter_mut().zip(filtered) {
-        [color[0], color[1], color[2]] = filtered.to_array();
-    }
+    // Replace the colours, and with a transparent background the coverage
+    film.color = denoise(&input, settings)?;
     Ok(start.elapsed().as_secs_f64())
 }

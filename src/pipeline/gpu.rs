@@ -177,6 +177,7 @@ fn key_of(missing: Missing) -> &'static str {
         Missing::Holdout => "mesh",
         Missing::Detail => "environment.detail",
         Missing::Clamp => "render.clamp",
+        Missing::MirroredCatcher => "render.ground",
     }
 }
 

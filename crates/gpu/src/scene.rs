@@ -7,7 +7,7 @@ use std::sync::Arc;
 use glam::Vec3;
 use rayon::prelude::*;
 use spherule_tracer::render::device::{
-    DeviceHit, DevicePixel, Extent, are_from_nearest, extent_of, store_pixels,
+    DeviceHit, DevicePixel, Extent, are_from_nearest, extent_of, mirrors_see_through, store_pixels,
 };
 use spherule_tracer::render::{
     Drawing, Film, FilmSampler, IntegratorKind, LostLight, RayCounts, RenderSettings, ShadeSource,
@@ -58,6 +58,8 @@ pub enum Missing {
     Detail,
     /// A clamp of indirect light.
     Clamp,
+    /// Metal or plastic that sees the environment through a shadow catcher.
+    MirroredCatcher,
 }
 
 impl fmt::Display for Missing {
@@ -77,6 +79,8 @@ impl fmt::Display for Missing {
             Self::Holdout => "holdouts",
             Self::Detail => "an image of the environment at its own resolution",
             Self::Clamp => "a clamp of indirect light",
+            Self::MirroredCatcher => {
+                "metal and plastic above a shadow catcher without a background"
             }
         })
     }
@@ -106,6 +110,7 @@ pub fn missing(scene: &Scene, settings: &RenderSettings) -> Option<Missing> {
         (material.is_holdout, Missing::Holdout),
         (scene.environment.as_ref().is_some_and(|map| map.has_detail()), Missing::Detail),
         (settings.clamp.is_some() && !is_whitted, Missing::Clamp),
+        (mirrors_see_through(scene, settings) && !is_whitted, Missing::MirroredCatcher),
     ]
     .into_iter()
     .find_map(|(is_needed, missing)| is_needed.then_some(missing))
@@ -260,10 +265,9 @@ impl SceneRenderer {
         let store = |pixels: &Pixels<'_>| {
             let share = 1.0 / settings.samples as f32;
             let odd_share = 1.0 / (settings.samples / 2).max(1) as f32;
-            let odd = |number: usize| pixels.odd.get(number).map(|[r, g, b, _]| [*r, *g, *b]);
             let pixel = |number: usize| DevicePixel {
                 color: pixels.sums[number].map(|sum| sum * share),
-                odd: odd(number).unwrap_or_default().map(|sum| sum * odd_share),
+                odd: pixels.odd.get(number).copied().unwrap_or_default().map(|sum| sum * odd_share),
                 nearest: hit_of(&pixels.nearest[number]),
             };
             store_pixels(film, scene, source, settings, &pixel)

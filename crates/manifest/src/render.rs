@@ -283,7 +283,8 @@ section! {
         caustics: Caustics = Caustics::DEFAULT, affects(Affects::PathTracing);
         /// Removes noise from R, G and B: auto | true | false; auto is true with path
         ///
-        /// It takes at least 2 samples per pixel. Other channels do not change.
+        /// It takes at least 2 samples per pixel. With output.transparent, it removes noise from shadows in A, too. Other
+        /// channels do not change.
         denoise: Option<bool> = None, or("auto"), flag("denoise", "", "Look");
         /// Width of dark outlines around opaque spheres, bonds and bodies, pixels; 0 is none
         outline: f32 = 0.0, from(0), to(100), flag("outline", "PIXELS", "Look");

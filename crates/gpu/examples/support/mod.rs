@@ -459,12 +459,12 @@ pub(crate) fn compare(renderer: &mut SceneRenderer, case: &Case, level: SimdLeve
     };
     let total = sum(&|_, b| rgb(b)).max(1e-9);
     let odd_means = |film: &Film| film.odd.clone().unwrap_or_default();
-    let odd = odd_means(&found).into_iter().zip(odd_means(&expected)).map(|(a, b)| (a - b).abs());
+    let odd = odd_means(&found).into_iter().zip(odd_means(&expected));
     let secondary = |rays: RayCounts| (rays.shadow + rays.reflection) as f64;
     Difference {
         mean: sum(&distance) / total,
         bias: (sum(&|a, _| rgb(a)) / total - 1.0).abs(),
-        odd: odd.map(|d| f64::from(d.element_sum())).sum::<f64>() / total,
+        odd: odd.map(|(a, b)| distance(&a, &b)).sum::<f64>() / total,
         ray_ratio: secondary(ray_counts(&cost)) / secondary(rays).max(1.0),
         ids: differing(FilmPlane::Id, 1),
         depths: differing(FilmPlane::Depth, 1),

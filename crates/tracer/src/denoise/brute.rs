@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, DVec4, Vec3};
 
 use super::gather::{DEPTHS, MAX_VALUE, MIN_ALBEDO, MIN_NOISE, RELATIVE_NOISE, UNUSABLE_NOISE};
 use super::glints::{ALIKE, BRIGHTER, RADIUS};
@@ -22,7 +22,7 @@ fn square(center: Position, radius: i64) -> impl Iterator<Item = Position> {
 }
 
 /// The filtered picture.
-pub(super) fn denoise(input: &DenoiseInput<'_>, settings: &DenoiseSettings) -> Vec<DVec3> {
+pub(super) fn denoise(input: &DenoiseInput<'_>, settings: &DenoiseSettings) -> Vec<DVec4> {
     let mut picture = Picture { input, limits: Vec::new(), noise: HashMap::new() };
     let (width, height) = (i64::from(input.width), i64::from(input.height));
     let rows = |border: i64| {
@@ -57,8 +57,9 @@ impl Picture<'_> {
     /// Whether all values of a pixel are finite.
     fn is_usable(&self, p: Position) -> bool {
         let (input, i) = (self.input, self.index(p));
-        let [r, g, b, _] = input.color[i];
-        let vectors = [Vec3::new(r, g, b), input.odd[i], input.albedo[i], input.normal[i]];
+        let [color, odd] =
+            [input.color[i], input.odd[i]].map(|rgba| self.compared(i, rgba).as_vec3());
+        let vectors = [color, odd, input.albedo[i], input.normal[i]];
         let sum: f32 = vectors.iter().map(|v| v.abs().element_sum()).sum();
         sum <= MAX_VALUE
     }
@@ -80,9 +81,23 @@ impl Picture<'_> {
         }
     }
 
-    fn color(&self, p: Position) -> DVec3 {
-        let [r, g, b, _] = self.input.color[self.index(p)];
-        Vec3::new(r, g, b).as_dvec3()
+    /// Whether pixel `i` shows a transparent background.
+    fn is_background(&self, i: usize) -> bool {
+        self.input.is_transparent && !(DEPTHS[0]..=DEPTHS[1]).contains(&self.input.depth[i])
+    }
+
+    /// The colour by which a pixel is compared.
+    fn compared(&self, i: usize, [r, g, b, coverage]: [f32; 4]) -> DVec3 {
+        let behind = if self.is_background(i) { 1.0 - f64::from(coverage) } else { 0.0 };
+        Vec3::new(r, g, b).as_dvec3() + behind
+    }
+
+    /// The coverage of both halves.
+    fn coverages(&self, p: Position) -> [f64; 2] {
+        let i = self.index(p);
+        let [mean, odd] = [self.input.color[i][3], self.input.odd[i][3]].map(f64::from);
+        let [even_share, odd_share] = self.shares();
+        [(mean - odd * odd_share) / even_share, odd]
     }
 
     /// Parts of the samples in both halves.
@@ -119,9 +134,11 @@ impl Picture<'_> {
         if !self.is_usable(p) {
             return [DVec3::ZERO; 2];
         }
-        let odd = self.input.odd[self.index(p)].as_dvec3();
+        let i = self.index(p);
+        let [mean, odd] =
+            [self.input.color[i], self.input.odd[i]].map(|rgba| self.compared(i, rgba));
         let [even_share, odd_share] = self.shares();
-        let even = (self.color(p) - odd * odd_share) / even_share;
+        let even = (mean - odd * odd_share) / even_share;
         [even, odd].map(|half| half / self.divisor(p))
     }
 
@@ -205,13 +222,15 @@ impl Picture<'_> {
         })
     }
 
-    fn filtered(&self, p: Position, settings: &DenoiseSettings) -> DVec3 {
-        let color = self.color(p);
+    fn filtered(&self, p: Position, settings: &DenoiseSettings) -> DVec4 {
+        let rgba = self.input.color[self.index(p)];
+        let color = Vec3::from_slice(&rgba).as_dvec3();
+        let coverage = f64::from(rgba[3]);
         if !self.is_usable(p) {
-            return color;
+            return color.extend(coverage);
         }
-        let halves = self.halves(p);
-        let mut changes = [DVec3::ZERO; 2];
+        let (halves, coverages) = (self.halves(p), self.coverages(p));
+        let (mut changes, mut covered) = ([DVec3::ZERO; 2], [0.0; 2]);
         let mut sums = [1.0; 2];
         for q in square(p, settings.search.into()) {
             if q == p || !self.is_inside(q) || !self.is_usable(q) {
@@ -220,11 +239,18 @@ impl Picture<'_> {
             let weights = self.weights(p, q, settings.k);
             for half in 0..2 {
                 changes[half] += weights[half] * (self.halves(q)[half] - halves[half]);
+                covered[half] += weights[half] * (self.coverages(q)[half] - coverages[half]);
                 sums[half] += weights[half];
             }
         }
         let shares = self.shares();
         let change = changes[0] / sums[0] * shares[0] + changes[1] / sums[1] * shares[1];
-        (color + self.divisor(p) * change).max(color.min(DVec3::ZERO))
+        let covered = if self.is_background(self.index(p)) {
+            covered[0] / sums[0] * shares[0] + covered[1] / sums[1] * shares[1]
+        } else {
+            0.0
+        };
+        let changed = color + self.divisor(p) * change + covered;
+        changed.max(color.min(DVec3::ZERO)).extend(coverage + covered)
     }
 }

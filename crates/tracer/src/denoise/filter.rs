@@ -5,10 +5,8 @@
 //! kept until those of a whole patch are there; then the weights of the row in the middle are applied to the sums of
 //! both pixels. All sums are in an order that does not depend on the tile.
 
-use glam::Vec3;
-
 use super::gather::{Shares, finish};
-use super::kernels::{PairScale, distances, pairs};
+use super::kernels::{PairScale, covered_pairs, distances, pairs};
 use super::planes::{STRIDE, SUMS};
 use super::settings::{PATCH_RADIUS, PATCH_SIDE};
 use super::tile::Tile;
@@ -106,7 +104,7 @@ impl<'a> TileFilter<'a> {
     }
 
     /// Filters the pixels at `place` into `rows`.
-    pub(super) fn filter(&mut self, place: &Rectangle, rows: &mut [&mut [Vec3]]) {
+    pub(super) fn filter(&mut self, place: &Rectangle, rows: &mut [&mut [[f32; 4]]]) {
         let image = (self.input, self.limits);
         self.tile.gather(self.simd, image, place);
         for sums in &mut self.sums {
@@ -167,24 +165,25 @@ impl<'a> TileFilter<'a> {
         let p_sums = &mut p_sums[p_row + p_first..];
         let q_sums = &mut q_sums[q_row + q_first..];
         let count = self.layout.pairs;
-        pairs(self.simd, p, q, count, &scale, distances, p_sums, q_sums);
+        let accumulate = if self.input.is_transparent { covered_pairs } else { pairs };
+        accumulate(self.simd, p, q, count, &scale, distances, p_sums, q_sums);
     }
 
     /// Writes row `y` of the tile at `place`.
-    fn finish(&self, place: &Rectangle, y: usize, filtered: &mut [Vec3]) {
+    fn finish(&self, place: &Rectangle, y: usize, filtered: &mut [[f32; 4]]) {
         let start = (place.top + y) * self.input.width as usize + place.left;
         let pixels = start..start + place.width;
         let first = y * SUMS_LEN + self.layout.column(0);
         let [p, q] = [0, 1].map(|i| &self.sums[i][first..]);
         finish(
             self.simd,
-            Shares::of(self.input.samples),
+            (Shares::of(self.input.samples), self.input.is_transparent),
             &self.input.color[pixels.clone()],
             bytemuck::cast_slice(&self.input.albedo[pixels.clone()]),
             &self.input.depth[pixels],
             p,
             q,
-            bytemuck::cast_slice_mut(filtered),
+            filtered,
         );
     }
 }
@@ -200,6 +199,7 @@ mod tests {
             width: 0,
             height: 0,
             samples: 2,
+            is_transparent: false,
             color: &[],
             odd: &[],
             albedo: &[],

@@ -1,7 +1,7 @@
 //! Planes of a row of a tile from those of the image: halves without albedo, noise, features in units of their
 //! tolerances, and slopes of depth. Compiled for each instruction set.
 
-use super::planes::{EVEN, ODD, STRIDE, WEIGHTS};
+use super::planes::{COVERAGE_SUMS, EVEN, ODD, STRIDE, WEIGHTS};
 use super::settings::SLOPE_TOLERANCE;
 use spherule_tree::math::{lane_kernel, larger, smaller};
 
@@ -39,6 +39,15 @@ impl Shares {
     }
 }
 
+/// The colours that pixels are compared by. On a transparent background, where `depth` is no intersection, they are those
+/// over white: the shadow there has no colour of its own.
+#[inline(always)]
+pub(super) fn compared(rgba: &[f32; 4], depth: f32, is_transparent: bool) -> [f32; 3] {
+    let [r, g, b, coverage] = *rgba;
+    let behind = if is_transparent & !is_depth(depth) { 1.0 - coverage } else { 0.0 };
+    [r + behind, g + behind, b + behind]
+}
+
 /// Whether `depth` is that of an intersection.
 #[inline(always)]
 #[expect(clippy::manual_range_contains, reason = "both comparisons without a branch")]
@@ -74,9 +83,11 @@ pub(super) fn is_usable(
 
 /// Stores 1 for pixels that can be filtered, otherwise 0; and depths, with one value for all missed pixels.
 #[inline(always)]
+#[expect(clippy::too_many_arguments, reason = "see `math::lane_kernel`")]
 fn classify_body(
+    is_transparent: bool,
     color: &[[f32; 4]],
-    odd: &[[f32; 3]],
+    odd: &[[f32; 4]],
     albedo: &[[f32; 3]],
     normal: &[[f32; 3]],
     depth: &[f32],
@@ -88,16 +99,19 @@ fn classify_body(
     let (depth, usable) = (&depth[..count], &mut usable[..count]);
     let depth_plane = &mut depth_plane[..count];
     for x in 0..count {
-        let [r, g, b, _] = color[x];
-        usable[x] = if is_usable(&[r, g, b], &odd[x], &albedo[x], &normal[x]) { 1.0 } else { 0.0 };
+        let (color, odd) = (
+            compared(&color[x], depth[x], is_transparent),
+            compared(&odd[x], depth[x], is_transparent),
+        );
+        usable[x] = if is_usable(&color, &odd, &albedo[x], &normal[x]) { 1.0 } else { 0.0 };
         depth_plane[x] = if is_depth(depth[x]) { depth[x] } else { MISSED };
     }
 }
 
 lane_kernel! {
     pub(super) fn classify(
-        color: &[[f32; 4]], odd: &[[f32; 3]], albedo: &[[f32; 3]], normal: &[[f32; 3]], depth: &[f32],
-        usable: &mut [f32], depth_plane: &mut [f32],
+        is_transparent: bool, color: &[[f32; 4]], odd: &[[f32; 4]], albedo: &[[f32; 3]], normal: &[[f32; 3]],
+        depth: &[f32], usable: &mut [f32], depth_plane: &mut [f32],
     ) = classify_body;
 }
 
@@ -107,9 +121,9 @@ lane_kernel! {
 #[expect(clippy::too_many_arguments, reason = "see `math::lane_kernel`")]
 fn halves_body(
     axis: usize,
-    shares: Shares,
+    (shares, is_transparent): (Shares, bool),
     color: &[[f32; 4]],
-    odd: &[[f32; 3]],
+    odd: &[[f32; 4]],
     albedo: &[[f32; 3]],
     depth: &[f32],
     usable: &[f32],
@@ -128,8 +142,9 @@ fn halves_body(
     for x in 0..count {
         // Divide both halves by albedo; the even half is what the odd one leaves of the mean
         let scale = 1.0 / divisor(albedo[x][axis], depth[x]);
-        let odd = odd[x][axis];
-        let even = (color[x][axis] - odd * shares.odd) * to_even;
+        let odd = compared(&odd[x], depth[x], is_transparent)[axis];
+        let even =
+            (compared(&color[x], depth[x], is_transparent)[axis] - odd * shares.odd) * to_even;
         // Limit them; pixels that are not usable are 0
         let is_usable = usable[x] > 0.0;
         let limit = limits[x];
@@ -146,9 +161,39 @@ fn halves_body(
 
 lane_kernel! {
     pub(super) fn halves(
-        axis: usize, shares: Shares, color: &[[f32; 4]], odd: &[[f32; 3]], albedo: &[[f32; 3]], depth: &[f32],
+        axis: usize, how: (Shares, bool), color: &[[f32; 4]], odd: &[[f32; 4]], albedo: &[[f32; 3]], depth: &[f32],
         usable: &[f32], limits: &[f32], even_plane: &mut [f32], odd_plane: &mut [f32], variance: &mut [f32],
     ) = halves_body;
+}
+
+/// Computes the coverage of both halves of a row, 0 where a pixel is not usable.
+#[inline(always)]
+fn coverages_body(
+    shares: Shares,
+    color: &[[f32; 4]],
+    odd: &[[f32; 4]],
+    usable: &[f32],
+    even_plane: &mut [f32],
+    odd_plane: &mut [f32],
+) {
+    let count = color.len();
+    let (odd, usable) = (&odd[..count], &usable[..count]);
+    let (even_plane, odd_plane) = (&mut even_plane[..count], &mut odd_plane[..count]);
+    let to_even = 1.0 / shares.even;
+    for x in 0..count {
+        let odd = odd[x][3];
+        let even = (color[x][3] - odd * shares.odd) * to_even;
+        let is_usable = usable[x] > 0.0;
+        even_plane[x] = if is_usable { even } else { 0.0 };
+        odd_plane[x] = if is_usable { odd } else { 0.0 };
+    }
+}
+
+lane_kernel! {
+    pub(super) fn coverages(
+        shares: Shares, color: &[[f32; 4]], odd: &[[f32; 4]], usable: &[f32], even_plane: &mut [f32],
+        odd_plane: &mut [f32],
+    ) = coverages_body;
 }
 
 /// Computes component `axis` of a vector feature of a row: `values` times `unit`, or `otherwise` where a pixel is not
@@ -257,16 +302,17 @@ lane_kernel! {
 }
 
 /// Adds the change of a row to its colours. `p` and `q` are rows of sums, whose total counts. A component that was not
-/// negative stays so.
+/// negative stays so. On a transparent background, the coverage by shadows changes, too, and stays in 0 to 1; that by surfaces
+/// is exact.
 #[inline(always)]
 fn finish_body(
-    shares: Shares,
+    (shares, is_transparent): (Shares, bool),
     color: &[[f32; 4]],
     albedo: &[[f32; 3]],
     depth: &[f32],
     p: &[f32],
     q: &[f32],
-    filtered: &mut [[f32; 3]],
+    filtered: &mut [[f32; 4]],
 ) {
     let count = color.len();
     let (albedo, depth) = (&albedo[..count], &depth[..count]);
@@ -276,10 +322,20 @@ fn finish_body(
         // The pixel itself has weight 1
         let even = shares.even / (1.0 + sum(WEIGHTS, x));
         let odd = shares.odd / (1.0 + sum(WEIGHTS + 1, x));
+        let coverage = color[x][3];
+        let mut covered = 0.0;
+        if is_transparent & !is_depth(depth[x]) {
+            covered = sum(COVERAGE_SUMS, x) * even + sum(COVERAGE_SUMS + 1, x) * odd;
+            let changed = smaller(larger(coverage + covered, 0.0), 1.0);
+            filtered[x][3] = if covered == 0.0 { coverage } else { changed };
+        } else {
+            filtered[x][3] = coverage;
+        }
         for axis in 0..3 {
             let change = sum(EVEN + axis, x) * even + sum(ODD + axis, x) * odd;
             let value = color[x][axis];
-            let changed = value + divisor(albedo[x][axis], depth[x]) * change;
+            // Over white, what covers more also takes light away, which is not a change of the colour
+            let changed = value + (divisor(albedo[x][axis], depth[x]) * change + covered);
             // Written such that NaN stays
             let least = smaller(value, 0.0);
             filtered[x][axis] = if changed < least { least } else { changed };
@@ -289,7 +345,7 @@ fn finish_body(
 
 lane_kernel! {
     pub(super) fn finish(
-        shares: Shares, color: &[[f32; 4]], albedo: &[[f32; 3]], depth: &[f32], p: &[f32], q: &[f32],
-        filtered: &mut [[f32; 3]],
+        how: (Shares, bool), color: &[[f32; 4]], albedo: &[[f32; 3]], depth: &[f32], p: &[f32], q: &[f32],
+        filtered: &mut [[f32; 4]],
     ) = finish_body;
 }

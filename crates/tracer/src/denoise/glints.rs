@@ -4,7 +4,7 @@
 use rayon::prelude::*;
 
 use super::DenoiseInput;
-use super::gather::{Shares, divisor, is_usable};
+use super::gather::{Shares, compared, divisor, is_usable};
 
 /// A pixel gives the others at most this many times the light of its neighbours.
 pub(super) const BRIGHTER: f32 = 4.0;
@@ -41,8 +41,8 @@ pub(super) fn limits(input: &DenoiseInput<'_>) -> Vec<f32> {
 
 /// The largest component of both halves, without albedo; 0 if the pixel cannot be filtered.
 fn brightness_of(input: &DenoiseInput<'_>, shares: Shares, i: usize) -> f32 {
-    let [r, g, b, _] = input.color[i];
-    let (color, odd) = ([r, g, b], input.odd[i].to_array());
+    let color = compared(&input.color[i], input.depth[i], input.is_transparent);
+    let odd = compared(&input.odd[i], input.depth[i], input.is_transparent);
     let (albedo, normal) = (input.albedo[i].to_array(), input.normal[i].to_array());
     if !is_usable(&color, &odd, &albedo, &normal) {
         return 0.0;

@@ -1,8 +1,8 @@
 //! The inner loops over pairs of pixels, compiled for each instruction set.
 
 use super::planes::{
-    ALBEDO, DEPTH, EVEN, Halves, NOISE, NORMAL, ODD, Pixels, SLOPE_X, SLOPE_Y, STRIDE, Sums,
-    WEIGHTS, window, window_len, window_mut,
+    ALBEDO, COVERAGE, COVERAGE_SUMS, DEPTH, EVEN, Halves, NOISE, NORMAL, ODD, Pixels, SLOPE_X,
+    SLOPE_Y, STRIDE, Sums, WEIGHTS, window, window_len, window_mut,
 };
 use super::settings::{DEPTH_TOLERANCE, OWN_PART, PATCH_SIDE};
 use spherule_tree::math::{LANES, Lanes, lane_kernel, larger, smaller};
@@ -97,9 +97,10 @@ fn tolerance(pixel: &Pixels, scale: &PairScale, lane: usize) -> f32 {
 
 /// Computes the weights of `count` pairs of pixels `p`, `q`, and moves their colours towards each other: adds the
 /// weighted differences and the weights to the sums of both pixels. The even half has the weights of the odd one, and
-/// conversely. `distances` has the colour distances along the rows of the patch: two planes for each.
+/// conversely. With `COVERAGES`, coverage is averaged, too. `distances` has the colour distances along the rows of the
+/// patch: two planes for each.
 #[inline(always)]
-fn pairs_body(
+fn pairs_of<const COVERAGES: bool>(
     p: &[f32],
     q: &[f32],
     count: usize,
@@ -136,7 +137,11 @@ fn pairs_body(
         for (half, weights) in weights.iter().enumerate() {
             let first = if half == 0 { EVEN } else { ODD };
             for plane in first..first + 3 {
-                move_together(p, q, plane, weights, p_sums, q_sums);
+                move_together(p, q, [plane, plane], weights, p_sums, q_sums);
+            }
+            if COVERAGES {
+                let planes = [COVERAGE + half, COVERAGE_SUMS + half];
+                move_together(p, q, planes, weights, p_sums, q_sums);
             }
             let at = (WEIGHTS + half) * STRIDE;
             for l in 0..LANES {
@@ -147,21 +152,48 @@ fn pairs_body(
     }
 }
 
-/// Adds the weighted difference of `p` and `q` in `plane` to the sums of `p`, and subtracts it from those of `q`.
+#[inline(always)]
+fn pairs_body(
+    p: &[f32],
+    q: &[f32],
+    count: usize,
+    scale: &PairScale,
+    distances: &[f32],
+    p_sums: &mut [f32],
+    q_sums: &mut [f32],
+) {
+    pairs_of::<false>(p, q, count, scale, distances, p_sums, q_sums);
+}
+
+#[inline(always)]
+fn covered_pairs_body(
+    p: &[f32],
+    q: &[f32],
+    count: usize,
+    scale: &PairScale,
+    distances: &[f32],
+    p_sums: &mut [f32],
+    q_sums: &mut [f32],
+) {
+    pairs_of::<true>(p, q, count, scale, distances, p_sums, q_sums);
+}
+
+/// Adds the weighted difference of `p` and `q` in `plane` to the plane `sum` of the sums of `p`, and subtracts it from
+/// that of `q`.
 #[inline(always)]
 fn move_together(
     p: &Pixels,
     q: &Pixels,
-    plane: usize,
+    [plane, sum]: [usize; 2],
     weights: &Lanes,
     p_sums: &mut Sums,
     q_sums: &mut Sums,
 ) {
-    let at = plane * STRIDE;
+    let (at, to) = (plane * STRIDE, sum * STRIDE);
     for l in 0..LANES {
         let moved = weights[l] * (q[at + l] - p[at + l]);
-        p_sums[at + l] += moved;
-        q_sums[at + l] -= moved;
+        p_sums[to + l] += moved;
+        q_sums[to + l] -= moved;
     }
 }
 
@@ -170,4 +202,12 @@ lane_kernel! {
         p: &[f32], q: &[f32], count: usize, scale: &PairScale, distances: &[f32], p_sums: &mut [f32],
         q_sums: &mut [f32],
     ) = pairs_body;
+}
+
+lane_kernel! {
+    /// [`pairs`] for pictures with a transparent background.
+    pub(super) fn covered_pairs(
+        p: &[f32], q: &[f32], count: usize, scale: &PairScale, distances: &[f32], p_sums: &mut [f32],
+        q_sums: &mut [f32],
+    ) = covered_pairs_body;
 }

@@ -22,6 +22,9 @@
 //! A pixel that is more than 4 times as bright as all but 3 of its 24 neighbours is limited to that when it is filtered;
 //! the rest of its light stays where it is. Otherwise glints of a sun become squares as large as the window.
 //!
+//! On a transparent background, pixels are compared as they are over white, and their coverage is averaged with the weights
+//! of the colour: a shadow there is coverage without colour. Coverage by surfaces stays as it is.
+//!
 //! The result is the colour of the input plus the filtered change, so pixels without a similar neighbour keep their
 //! bits. Pixels with NaN or infinite values keep theirs, and no other pixel receives them.
 //!
@@ -69,10 +72,13 @@ pub struct DenoiseInput<'a> {
     pub views: [u32; 2],
     /// Samples per pixel, at least 2.
     pub samples: u32,
-    /// Mean of all samples: linear RGB, and a fourth component that is ignored.
+    /// Whether the background is transparent: coverage without an intersection is that of shadows, and is averaged
+    /// with the weights of colours. Otherwise coverage is ignored, and stays.
+    pub is_transparent: bool,
+    /// Mean of all samples: linear RGB and coverage.
     pub color: &'a [[f32; 4]],
-    /// Mean of the samples 1, 3, 5 and so on: linear RGB.
-    pub odd: &'a [Vec3],
+    /// Mean of the samples 1, 3, 5 and so on: linear RGB and coverage.
+    pub odd: &'a [[f32; 4]],
     /// Base colour, linear RGB.
     pub albedo: &'a [Vec3],
     /// Unit normal, or zero.
@@ -152,14 +158,14 @@ impl DenoiseInput<'_> {
     }
 }
 
-/// Returns the filtered linear RGB of a picture. Runs on the current rayon pool.
+/// Returns the filtered linear RGB and coverage of a picture. Runs on the current rayon pool.
 ///
 /// # Errors
 /// If a setting is out of range, if a plane has the wrong length, or if there is only one sample per pixel.
 pub fn denoise(
     input: &DenoiseInput<'_>,
     settings: &DenoiseSettings,
-) -> Result<Vec<Vec3>, DenoiseError> {
+) -> Result<Vec<[f32; 4]>, DenoiseError> {
     denoise_with(input, settings, &Execution::default())
 }
 
@@ -167,8 +173,9 @@ pub fn denoise(
 /// brightness and limits, and the tiles of `threads` threads.
 pub fn predicted_bytes(width: u32, height: u32, settings: &DenoiseSettings, threads: u64) -> u64 {
     let search = settings.search.min(*SEARCH_RADII.end()) as usize;
-    let result =
-        u64::from(width) * u64::from(height) * (size_of::<Vec3>() + 2 * size_of::<f32>()) as u64;
+    let result = u64::from(width)
+        * u64::from(height)
+        * (size_of::<[f32; 4]>() + 2 * size_of::<f32>()) as u64;
     let tiles = tiles_bytes(width, height, TileLayout::max_width(search), TILE_ROWS);
     result + tiles + threads * TileFilter::bytes(search, TILE_ROWS) as u64
 }
@@ -192,10 +199,10 @@ fn denoise_with(
     input: &DenoiseInput<'_>,
     settings: &DenoiseSettings,
     execution: &Execution,
-) -> Result<Vec<Vec3>, DenoiseError> {
+) -> Result<Vec<[f32; 4]>, DenoiseError> {
     settings.validate()?;
     input.validate()?;
-    let mut filtered = vec![Vec3::ZERO; input.color.len()];
+    let mut filtered = vec![[0.0; 4]; input.color.len()];
     if filtered.is_empty() {
         return Ok(filtered);
     }

@@ -18,22 +18,27 @@ pub(super) const ALBEDO: usize = 6;
 pub(super) const NORMAL: usize = 9;
 /// Distance along the view axis, the same for all missed pixels.
 pub(super) const DEPTH: usize = 12;
+/// Coverage of the even half, then of the odd one; only of pictures with a transparent background.
+pub(super) const COVERAGE: usize = 13;
 /// Variance of a pixel by the difference of its halves.
-pub(super) const VARIANCE: usize = 13;
+pub(super) const VARIANCE: usize = 15;
 /// Variance of one half, averaged over neighbours: the sum over its components. This plane and those after it are
 /// derived from those before it.
-pub(super) const NOISE: usize = 14;
+pub(super) const NOISE: usize = 16;
 /// Tolerance of depth per column.
-pub(super) const SLOPE_X: usize = 15;
+pub(super) const SLOPE_X: usize = 17;
 /// Tolerance of depth per row.
-pub(super) const SLOPE_Y: usize = 16;
+pub(super) const SLOPE_Y: usize = 18;
 /// Number of planes of a row of pixels.
-pub(super) const PLANES: usize = 17;
+pub(super) const PLANES: usize = 19;
 
-/// Planes of a row of sums: three components of weighted differences for each half, then the weights of each half.
-pub(super) const SUMS: usize = 8;
+/// Planes of a row of sums: three components of weighted differences for each half, then the weights of each half, and
+/// the differences of their coverage.
+pub(super) const SUMS: usize = 10;
 /// The first plane with weights.
 pub(super) const WEIGHTS: usize = 6;
+/// The first plane with differences of coverage.
+pub(super) const COVERAGE_SUMS: usize = 8;
 
 /// A window of the planes of pixels.
 pub(super) type Pixels = [f32; window_len(PLANES)];

@@ -6,8 +6,9 @@ struct Picture {
     width: usize,
     height: usize,
     samples: u32,
+    is_transparent: bool,
     color: Vec<[f32; 4]>,
-    odd: Vec<Vec3>,
+    odd: Vec<[f32; 4]>,
     albedo: Vec<Vec3>,
     normal: Vec<Vec3>,
     depth: Vec<f32>,
@@ -32,12 +33,14 @@ impl Picture {
     /// Without noise: `pixel` returns colour and depth.
     fn new(width: usize, height: usize, pixel: impl Fn(usize, usize) -> (Vec3, f32)) -> Self {
         let positions = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
-        let (odd, depth): (Vec<Vec3>, Vec<f32>) = positions.map(|(x, y)| pixel(x, y)).unzip();
+        let (color, depth): (Vec<Vec3>, Vec<f32>) = positions.map(|(x, y)| pixel(x, y)).unzip();
+        let odd: Vec<_> = color.iter().map(|c| c.extend(1.0).to_array()).collect();
         Self {
             width,
             height,
             samples: 2,
-            color: odd.iter().map(|c| [c.x, c.y, c.z, 1.0]).collect(),
+            is_transparent: false,
+            color: odd.clone(),
             albedo: vec![Vec3::ONE; odd.len()],
             normal: vec![Vec3::Z; odd.len()],
             odd,
@@ -69,8 +72,33 @@ impl Picture {
             let light = 1.0 + (0.3 * x as f32).sin() * (0.2 * y as f32).cos();
             let noise = (3.0 * (depth + 0.3)).clamp(0.0, 0.5);
             let even = picture.albedo[i] * (light + noise * random.vector());
-            picture.odd[i] = picture.albedo[i] * (light + noise * random.vector());
-            picture.color[i] = even.lerp(picture.odd[i], 1.0 / 3.0).extend(1.0).to_array();
+            let odd = picture.albedo[i] * (light + noise * random.vector());
+            picture.odd[i] = odd.extend(1.0).to_array();
+            picture.color[i] = even.lerp(odd, 1.0 / 3.0).extend(1.0).to_array();
+        }
+        picture
+    }
+
+    /// The same in front of a transparent background, with shadows on it.
+    fn transparent(width: usize, height: usize, seed: u64) -> Self {
+        let mut random = Random(seed + 100);
+        let mut picture = Self::random(width, height, seed);
+        picture.is_transparent = true;
+        for (i, depth) in picture.depth.iter().enumerate() {
+            let shadow = 0.5 + 0.3 * ((i % width) as f32 * 0.4).sin();
+            let is_missed = !depth.is_finite();
+            let mut half = || {
+                let noise = 0.2 * random.next();
+                if is_missed { shadow + noise } else { 1.0 - noise.max(0.0) }
+            };
+            let (even, odd) = (half(), half());
+            let set = |rgba: &mut [f32; 4], coverage: f32| {
+                let light = if is_missed { 0.0 } else { coverage };
+                *rgba = rgba.map(|c| c * light);
+                rgba[3] = coverage;
+            };
+            set(&mut picture.color[i], even + (odd - even) / 3.0);
+            set(&mut picture.odd[i], odd);
         }
         picture
     }
@@ -79,9 +107,10 @@ impl Picture {
     fn add_noise(&mut self, amplitude: f32, seed: u64) {
         let mut random = Random(seed);
         for (color, odd) in self.color.iter_mut().zip(&mut self.odd) {
-            let even = *odd + amplitude * random.vector();
-            *odd += amplitude * random.vector();
-            *color = even.midpoint(*odd).extend(1.0).to_array();
+            let mean = Vec3::from_slice(odd);
+            let halves = [0, 1].map(|_| mean + amplitude * random.vector());
+            *odd = halves[1].extend(1.0).to_array();
+            *color = halves[0].midpoint(halves[1]).extend(1.0).to_array();
         }
     }
 
@@ -91,6 +120,7 @@ impl Picture {
             width: u32::try_from(self.width).expect("a small picture"),
             height: u32::try_from(self.height).expect("a small picture"),
             samples: self.samples,
+            is_transparent: self.is_transparent,
             color: &self.color,
             odd: &self.odd,
             albedo: &self.albedo,
@@ -105,7 +135,8 @@ impl Picture {
     }
 
     fn denoised(&self) -> Vec<Vec3> {
-        denoise(&self.input(), &DenoiseSettings::OPAQUE).expect("valid input")
+        let filtered = denoise(&self.input(), &DenoiseSettings::OPAQUE).expect("valid input");
+        filtered.iter().map(|rgba| Vec3::from_slice(rgba)).collect()
     }
 }
 
@@ -119,6 +150,10 @@ fn bits(pixels: &[Vec3]) -> Vec<[u32; 3]> {
     pixels.iter().map(bits).collect()
 }
 
+fn all_bits(pixels: &[[f32; 4]]) -> Vec<[u32; 4]> {
+    pixels.iter().map(|pixel| pixel.map(f32::to_bits)).collect()
+}
+
 /// Compares the filter with the reference.
 #[track_caller]
 fn assert_equals_reference(picture: &Picture, settings: &DenoiseSettings) {
@@ -126,13 +161,21 @@ fn assert_equals_reference(picture: &Picture, settings: &DenoiseSettings) {
     let reference = brute::denoise(&picture.input(), settings);
     let filtered = denoise(&picture.input(), settings).expect("valid input");
     for (i, (pixel, expected)) in filtered.iter().zip(&reference).enumerate() {
-        if expected.is_finite() {
-            let error = (pixel.as_dvec3() - expected).abs().max_element();
-            let (x, y) = (i % picture.width, i / picture.width);
-            assert!(error < 2e-4, "{name}: {pixel} and {expected} at {x}, {y}");
+        let color = Vec3::from_slice(pixel);
+        let (x, y) = (i % picture.width, i / picture.width);
+        if expected.truncate().is_finite() {
+            let error = (color.as_dvec3() - expected.truncate()).abs().max_element();
+            assert!(error < 2e-4, "{name}: {color} and {expected} at {x}, {y}");
         } else {
-            assert_eq!(bits(&[*pixel]), bits(&[expected.as_vec3()]), "{name}");
+            assert_eq!(bits(&[color]), bits(&[expected.truncate().as_vec3()]), "{name}");
         }
+        let coverage = f64::from(pixel[3]);
+        let error = (coverage - expected.w).abs();
+        let is_kept = picture.color[i][3].to_bits() == pixel[3].to_bits();
+        assert!(
+            error < 2e-5 || is_kept && !expected.w.is_finite(),
+            "{name}: {coverage} at {x}, {y}"
+        );
     }
 }
 
@@ -150,8 +193,10 @@ fn the_result_is_that_of_the_formulas() {
         (90, 11, 8),
     ] {
         let picture = Picture::random(width, height, seed);
+        let transparent = Picture::transparent(width, height, seed);
         for settings in [DenoiseSettings::OPAQUE, DenoiseSettings::WATER] {
             assert_equals_reference(&picture, &settings);
+            assert_equals_reference(&transparent, &settings);
         }
     }
     for (search, k) in [(1, 0.2), (2, 2.0), (7, 0.6), (16, 0.8)] {
@@ -171,9 +216,13 @@ fn random_pictures_change() {
 
 #[test]
 fn the_result_does_not_depend_on_tiles_threads_and_instruction_sets() {
-    let picture = Picture::random(161, 67, 9);
-    let expected = bits(&picture.denoised());
     let default = Execution::default();
+    let of = |picture: &Picture, execution: &Execution| {
+        let filtered = denoise_with(&picture.input(), &DenoiseSettings::OPAQUE, execution);
+        all_bits(&filtered.expect("valid input"))
+    };
+    let pictures = [Picture::random(161, 67, 9), Picture::transparent(161, 67, 9)];
+    let expected = pictures.each_ref().map(|picture| of(picture, &default));
     let tiles = [[3, 5], [16, 16], [50, 100], [1000, 1]];
     let executions = tiles
         .map(|tile| Execution { tile, ..default })
@@ -182,10 +231,9 @@ fn the_result_does_not_depend_on_tiles_threads_and_instruction_sets() {
     for execution in executions {
         for threads in [1, 3] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-            let result = pool
+            let filtered = pool
                 .expect("a thread pool")
-                .install(|| denoise_with(&picture.input(), &DenoiseSettings::OPAQUE, &execution));
-            let filtered = bits(&result.expect("valid input"));
+                .install(|| pictures.each_ref().map(|picture| of(picture, &execution)));
             assert!(filtered == expected, "{execution:?} {threads}");
         }
     }
@@ -199,7 +247,7 @@ fn pictures_of_one_colour_keep_their_bits() {
             picture.samples = samples;
             picture.color.fill([value, value / 3.0, 0.7 * value, 1.0]);
             let color = picture.color(0);
-            picture.odd.fill(color);
+            picture.odd.fill(color.extend(1.0).to_array());
             picture.albedo.fill(Vec3::splat(albedo));
             let filtered = picture.denoised();
             let expected = vec![color; filtered.len()];
@@ -216,8 +264,8 @@ fn values_that_are_not_finite_stay_where_they_are() {
     for (number, value) in bad.into_iter().enumerate() {
         let at = |x: usize| (6 * number + 3) * 40 + x;
         picture.color[at(2)][1] = value;
-        picture.odd[at(9)].x = value;
-        picture.odd[at(10)].x = value;
+        picture.odd[at(9)][0] = value;
+        picture.odd[at(10)][0] = value;
         picture.albedo[at(16)].z = value;
         picture.normal[at(23)].y = value;
         kept.extend([at(2), at(9), at(10), at(16), at(23)]);
@@ -311,6 +359,49 @@ fn surfaces_at_an_angle_are_not_edges() {
     assert!(ratio > 3.0, "{ratio}");
 }
 
+/// A shadow in front of a transparent background has no colour, so that only its coverage has noise.
+#[test]
+fn coverage_is_filtered_like_a_colour() {
+    let mut random = Random(3);
+    let mut picture = Picture::flat(64, 64);
+    picture.is_transparent = true;
+    picture.depth.fill(f32::INFINITY);
+    picture.albedo.fill(Vec3::ZERO);
+    picture.normal.fill(Vec3::ZERO);
+    // Shadow on the left, nothing on the right
+    let is_shadow = |i: usize| i % 64 < 32;
+    for i in 0..64 * 64 {
+        let halves = [0, 1].map(|_| if is_shadow(i) { 0.5 + 0.3 * random.next() } else { 0.0 });
+        picture.odd[i] = [0.0, 0.0, 0.0, halves[1]];
+        picture.color[i] = [0.0, 0.0, 0.0, halves[0].midpoint(halves[1])];
+    }
+    let filtered = denoise(&picture.input(), &DenoiseSettings::OPAQUE).expect("valid input");
+    let deviation = |pixels: &[[f32; 4]]| {
+        let shadow = (0..pixels.len()).filter(|i| is_shadow(*i));
+        let squares = shadow.map(|i| (pixels[i][3] - 0.5).powi(2));
+        (squares.sum::<f32>() / (32.0 * 64.0)).sqrt()
+    };
+    let (before, after) = (deviation(&picture.color), deviation(&filtered));
+    assert!(before > 3.5 * after, "{before} {after}");
+    for (i, [r, g, b, coverage]) in filtered.iter().enumerate() {
+        assert!([r, g, b].iter().all(|c| c.abs() < 1e-6), "{i}");
+        // Near its edge, the noise of a pixel is that of its neighbours
+        let limit = if (32..34).contains(&(i % 64)) { 0.03 } else { 1e-6 };
+        assert!(is_shadow(i) || *coverage <= limit, "{i}: {coverage}");
+        assert!((0.0..=1.0).contains(coverage), "{i}: {coverage}");
+    }
+    // As the same shadow over white
+    let mut white = picture.clone();
+    white.is_transparent = false;
+    for rgba in white.odd.iter_mut().chain(&mut white.color) {
+        let light = 1.0 - rgba[3];
+        *rgba = [light, light, light, 1.0];
+    }
+    for (rgba, white) in filtered.iter().zip(white.denoised()) {
+        assert!((1.0 - rgba[3] - white.x).abs() < 1e-5, "{rgba:?} {white}");
+    }
+}
+
 /// If it did, all pixels of the window would change by 50/81, which is 0.6. The eight neighbours may change more: their
 /// estimate of the noise contains the sample.
 #[test]
@@ -319,7 +410,7 @@ fn a_bright_sample_does_not_spread() {
     picture.add_noise(0.05, 1);
     let center = 20 * 40 + 20;
     let before = picture.denoised();
-    picture.odd[center] += 100.0;
+    picture.odd[center] = picture.odd[center].map(|c| c + 100.0);
     picture.color[center] = picture.color[center].map(|c| c + 50.0);
     let after = picture.denoised();
     for i in (0..before.len()).filter(|i| *i != center) {
@@ -344,7 +435,7 @@ fn glints_do_not_become_squares() {
             let before = picture.denoised();
             let is_glint = |i: usize| glint.contains(&(i % 40, i / 40));
             for i in (0..before.len()).filter(|i| is_glint(*i)) {
-                picture.odd[i] += 2.0 * part_of_odd * light;
+                picture.odd[i] = picture.odd[i].map(|c| c + 2.0 * part_of_odd * light);
                 picture.color[i] = picture.color[i].map(|c| c + light);
             }
             let after = picture.denoised();
@@ -432,6 +523,7 @@ fn views_are_filtered_as_pictures_of_their_own() {
             width: width * views[0] as usize,
             height: height * views[1] as usize,
             samples: a.samples,
+            is_transparent: false,
             color: joined(&a.color, &b.color, width, views),
             odd: joined(&a.odd, &b.odd, width, views),
             albedo: joined(&a.albedo, &b.albedo, width, views),
@@ -444,6 +536,7 @@ fn views_are_filtered_as_pictures_of_their_own() {
             let input = DenoiseInput { views, ..pair.input() };
             let filtered =
                 denoise_with(&input, &DenoiseSettings::OPAQUE, &execution).expect("valid input");
+            let filtered: Vec<_> = filtered.iter().map(|rgba| Vec3::from_slice(rgba)).collect();
             assert_eq!(bits(&filtered), bits(&expected), "{views:?} {tile:?}");
         }
         // As one view, pixels at the seam are averaged

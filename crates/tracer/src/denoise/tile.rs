@@ -7,7 +7,9 @@
 use std::ops::Range;
 
 use super::DenoiseInput;
-use super::gather::{MISSED, OUTSIDE, Shares, UNUSABLE, classify, feature, halves, noise, slopes};
+use super::gather::{
+    MISSED, OUTSIDE, Shares, UNUSABLE, classify, coverages, feature, halves, noise, slopes,
+};
 use super::planes::{ALBEDO, DEPTH, EVEN, NOISE, PLANES, STRIDE, VARIANCE};
 use super::settings::{ALBEDO_TOLERANCE, NORMAL_TOLERANCE};
 use super::tiling::{NOISE_RADIUS, Rectangle, TileLayout};
@@ -178,23 +180,37 @@ impl Line<'_> {
         // Take the pixels from all planes of the image
         let (simd, input) = (self.simd, self.input);
         let shares = Shares::of(input.samples);
-        let color = &input.color[pixels.clone()];
-        let [odd, albedo, normal] = [input.odd, input.albedo, input.normal]
-            .map(|plane| bytemuck::cast_slice(&plane[pixels.clone()]));
+        let (color, odd) = (&input.color[pixels.clone()], &input.odd[pixels.clone()]);
+        let is_transparent = input.is_transparent;
+        let [albedo, normal] =
+            [input.albedo, input.normal].map(|plane| bytemuck::cast_slice(&plane[pixels.clone()]));
         let (depth, limits) = (&input.depth[pixels.clone()], &self.limits[pixels]);
         // Find the columns of the tile that they go to
         let usable = &mut usable[to.clone()];
         let planes: [_; NOISE] = planes_mut(row, to);
-        let [er, eg, eb, or, og, ob, ar, ag, ab, nx, ny, nz, z, variance] = planes;
+        let [er, eg, eb, or, og, ob, ar, ag, ab, nx, ny, nz, z, ea, oa, variance] = planes;
         // Find the pixels that can be compared
-        classify(simd, color, odd, albedo, normal, depth, usable, z);
+        classify(simd, is_transparent, color, odd, albedo, normal, depth, usable, z);
         // Compute both halves and their variance, axis by axis
         variance.fill(0.0);
         for (axis, (even, odd_plane)) in [(er, or), (eg, og), (eb, ob)].into_iter().enumerate() {
             halves(
-                simd, axis, shares, color, odd, albedo, depth, usable, limits, even, odd_plane,
+                simd,
+                axis,
+                (shares, is_transparent),
+                color,
+                odd,
+                albedo,
+                depth,
+                usable,
+                limits,
+                even,
+                odd_plane,
                 variance,
             );
+        }
+        if is_transparent {
+            coverages(simd, shares, color, odd, usable, ea, oa);
         }
         // Scale features so that a difference of 1 is the tolerance
         for (axis, plane) in [ar, ag, ab].into_iter().enumerate() {

@@ -1,7 +1,5 @@
 //! How a picture is divided into tiles.
 
-use glam::Vec3;
-
 use super::planes::STRIDE;
 use super::settings::PATCH_RADIUS;
 use spherule_tree::math::LANES;
@@ -73,12 +71,12 @@ pub(super) fn equal_part(whole: usize, max: usize) -> usize {
 }
 
 /// The place of a tile, and its rows.
-type TileRows<'a> = (Rectangle, Vec<&'a mut [Vec3]>);
+type TileRows<'a> = (Rectangle, Vec<&'a mut [[f32; 4]]>);
 
 /// Splits a plane of `width` columns with views of this size into tiles of up to `columns` x `rows` pixels, each in one
 /// view.
 pub(super) fn tiles(
-    plane: &mut [Vec3],
+    plane: &mut [[f32; 4]],
     width: usize,
     view: [usize; 2],
     [columns, rows]: [usize; 2],
@@ -127,7 +125,7 @@ pub(super) fn tiles_bytes(width: u32, height: u32, max_columns: usize, max_rows:
     let columns = parts(width, max_columns);
     let tiles = columns * parts(height, max_rows);
     let rows = columns * u64::from(height);
-    tiles * size_of::<TileRows<'_>>() as u64 + rows * size_of::<&[Vec3]>() as u64
+    tiles * size_of::<TileRows<'_>>() as u64 + rows * size_of::<&[[f32; 4]]>() as u64
 }
 
 #[cfg(test)]
@@ -149,7 +147,7 @@ mod tests {
             let view = [width / views[0], height / views[1]];
             let columns = equal_part(view[0], max_columns);
             let rows = equal_part(view[1], max_rows);
-            let mut plane = vec![Vec3::ZERO; width * height];
+            let mut plane = vec![[0.0; 4]; width * height];
             let all = tiles(&mut plane, width, view, [columns, rows]);
             let places = size_of_val(&all[..]);
             let lines: usize = all.iter().map(|(_, rows)| size_of_val(&rows[..])).sum();
@@ -161,12 +159,14 @@ mod tests {
                 for (y, row) in rows.into_iter().enumerate() {
                     assert_eq!(row.len(), place.width);
                     for (x, pixel) in row.iter_mut().enumerate() {
-                        *pixel += Vec3::new((place.left + x) as f32, (place.top + y) as f32, 1.0);
+                        pixel[0] += (place.left + x) as f32;
+                        pixel[1] += (place.top + y) as f32;
+                        pixel[2] += 1.0;
                     }
                 }
             }
             for (i, pixel) in plane.iter().enumerate() {
-                let expected = Vec3::new((i % width) as f32, (i / width) as f32, 1.0);
+                let expected = [(i % width) as f32, (i / width) as f32, 1.0, 0.0];
                 assert_eq!(*pixel, expected, "{width}x{height}");
             }
         }

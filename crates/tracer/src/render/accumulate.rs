@@ -18,12 +18,7 @@ impl SampleGroup {
             // Average the radiance and the coverage
             let sum = pixel_sum(&self.radiance, &self.coverage, range.clone());
             let mean = sum.map(|v| v * share);
-            let [r, g, b, a] = mean;
-            let color = if is_bounded {
-                [r.max(0.0), g.max(0.0), b.max(0.0), a.clamp(0.0, 1.0)]
-            } else {
-                [r, g, b, a]
-            };
+            let color = bounded(mean, is_bounded);
             // Store them with the data of the pixel, the mean of odd samples for the denoiser, and the layers
             tile.set_color(pixel.column, pixel.row, color);
             tile.set_data(pixel.column, pixel.row, &pixel.data);
@@ -39,13 +34,21 @@ impl SampleGroup {
         self.layers = layers;
     }
 
-    /// The mean radiance of every second of the `samples` from `first + 1` on.
-    fn odd_mean(&self, first: usize, samples: usize, is_bounded: bool) -> Vec3 {
+    /// The mean of every second of the `samples` from `first + 1` on.
+    fn odd_mean(&self, first: usize, samples: usize, is_bounded: bool) -> [f32; 4] {
         let odd = (first + 1..first + samples).step_by(2);
+        let share = (samples / 2).max(1) as f32;
         let radiance = |sample: usize| lane3(&self.radiance[sample / LANES], sample % LANES);
-        let mean = odd.map(radiance).sum::<Vec3>() / (samples / 2).max(1) as f32;
-        if is_bounded { mean.max(Vec3::ZERO) } else { mean }
+        let mean = odd.clone().map(radiance).sum::<Vec3>() / share;
+        let covered = |sample: usize| self.coverage[sample / LANES][sample % LANES];
+        let coverage = odd.map(covered).sum::<f32>() / share;
+        bounded(mean.extend(coverage).to_array(), is_bounded)
     }
+}
+
+/// The colour of a pixel, not negative and with a coverage of 0 to 1 if `is_bounded`.
+pub(super) fn bounded([r, g, b, a]: [f32; 4], is_bounded: bool) -> [f32; 4] {
+    if is_bounded { [r.max(0.0), g.max(0.0), b.max(0.0), a.clamp(0.0, 1.0)] } else { [r, g, b, a] }
 }
 
 /// The sum of the samples in `range`: packet by packet if a pixel has whole packets, otherwise one by one. In both
@@ -105,7 +108,7 @@ mod tests {
         let mut bands = film.bands_mut(1);
         group.accumulate(5, false, &mut bands[0].tiles(1)[0]);
         drop(bands);
-        assert_eq!(film.odd, Some(vec![Vec3::new(505.0, 0.0, 0.0)]));
+        assert_eq!(film.odd, Some(vec![[505.0, 0.0, 0.0, 0.0]]));
         assert!((film.color[0][0] - 2222.2).abs() < 0.01);
     }
 

@@ -8,7 +8,8 @@ use glam::{DVec3, Vec3};
 use super::{brute::Balls, *};
 use crate::scene::environment::studio;
 use crate::scene::{
-    Background, Camera, CameraView, Environment, EnvironmentAxes, Ground, Light, LightKind, Scene,
+    Background, Camera, CameraView, Environment, EnvironmentAxes, Finish, Ground, Light, LightKind,
+    RadianceMap, Scene,
 };
 
 /// A floor at height 0, seen at an angle.
@@ -238,4 +239,59 @@ fn the_camera_sees_visible_lights_only() {
         let film = image(&Balls::one(Vec3::new(0.0, -2.4, 2.0), 0.5), &scene, &settings(9, 1, 0));
         assert!(film.color[40][0] < 4.0 && film.color[40][3] == 1.0);
     }
+}
+
+/// The environment of [`two_halves`] above and below the horizon.
+const HALVES: [Vec3; 2] = [Vec3::new(0.2, 0.4, 0.8), Vec3::new(0.9, 0.3, 0.1)];
+
+fn two_halves() -> Environment {
+    let rows = (0..256).map(|row| if row < 128 { HALVES[0] } else { HALVES[1] });
+    let pixels = rows.flat_map(|color| std::iter::repeat_n(color, 512)).collect();
+    let map = RadianceMap::new(512, 256, pixels).unwrap();
+    Environment::from_map(EnvironmentAxes::of_view(DVec3::Y, DVec3::Z, 0.0), &map, Vec3::ONE)
+}
+
+/// A mirror sees the environment below the horizon, through the catcher, and in front of it the shadow of the ball.
+#[test]
+fn mirrors_see_the_environment_through_the_catcher() {
+    let pixels = |finish, strength, transparent_background: bool| {
+        let mut scene = with_catcher(scene(two_halves()), strength);
+        scene.is_environment_visible = !transparent_background;
+        scene.particle_material_mut().finish = finish;
+        let channels = Channels::from_names(["RGBA", "Z"]).unwrap();
+        let settings = RenderSettings { transparent_background, channels, ..settings(32, 64, 3) };
+        let ball = Balls::one(Vec3::new(0.0, 0.0, 1.2), 1.0);
+        let source = ParticleShading::constant(Vec3::ONE);
+        let never = AtomicBool::new(false);
+        let film = render(&[&ball as &dyn Shape], &scene, &source, &settings, &never).unwrap().0;
+        // Shadows cover some of a transparent background, too
+        let depth = film.plane::<f32>(FilmPlane::Depth).unwrap();
+        let pixels = film.color.iter().zip(depth);
+        let covered = pixels.filter(|(c, z)| c[3] == 1.0 && z.is_finite()).map(|(c, _)| c);
+        covered.map(|color| Vec3::from_slice(color)).collect::<Vec<_>>()
+    };
+    for is_transparent in [false, true] {
+        // Without a shadow, a white mirror has one of the two colours nearly everywhere
+        let mirror = pixels(Finish::Metal { roughness: 0.0 }, 0.0, is_transparent);
+        let near = |color: Vec3| mirror.iter().filter(|c| c.distance(color) < 0.02).count();
+        let [above, below] = HALVES.map(near);
+        assert!(above > 50 && below > 20, "{above} {below}");
+        assert!((above + below) * 5 > mirror.len() * 4, "{above} {below} {}", mirror.len());
+        // The shadow makes it darker where it is, and the matte ball has light from the ground as before
+        let shadowed = pixels(Finish::Metal { roughness: 0.0 }, 1.0, is_transparent);
+        let darker = mirror.iter().zip(&shadowed).filter(|(a, b)| b.x < a.x - 0.1).count();
+        let brighter = mirror.iter().zip(&shadowed).filter(|(a, b)| b.x > a.x + 0.02).count();
+        assert!(darker > 4 && brighter == 0, "{darker} {brighter}");
+    }
+    // In front of a backdrop, the mirror image of the ground is part of it
+    let mut scene = with_catcher(scene(two_halves()), 1.0);
+    scene.particle_material_mut().finish = Finish::Metal { roughness: 0.0 };
+    assert!(!device::mirrors_see_through(&scene, &settings(32, 64, 3)));
+    // The base of plastic is lit by the grey ground like a matte ball, its coat is not
+    let mean = |finish| {
+        let pixels = pixels(finish, 0.0, false);
+        pixels.iter().sum::<Vec3>() / pixels.len() as f32
+    };
+    let (matte, plastic) = (mean(Finish::Matte), mean(Finish::Plastic { roughness: 0.0 }));
+    assert!((plastic / matte - 1.0).abs().max_element() < 0.12, "{matte} {plastic}");
 }

@@ -10,9 +10,10 @@ use rayon::prelude::*;
 pub use super::bsdf::rough_table;
 pub use super::lights::{Extent, extent_of};
 pub use super::path::ambient::reach as ambient_reach;
-pub use super::path::catcher::{light_on, reflected_by_white};
+pub use super::path::catcher::{light_on, mirrors_see_through, reflected_by_white};
 
 use super::{
+    accumulate::bounded,
     aov::{DataSample, NO_ID},
     channels::Channels,
     context::RenderContext,
@@ -31,8 +32,8 @@ const ROWS: u32 = 16;
 pub struct DevicePixel {
     /// Linear RGB and coverage, each the mean of the samples.
     pub color: [f32; 4],
-    /// Linear RGB, the mean of every second sample. For denoising.
-    pub odd: [f32; 3],
+    /// The same of every second sample. For denoising.
+    pub odd: [f32; 4],
     /// The nearest intersection, if any sample has one.
     pub nearest: Option<DeviceHit>,
 }
@@ -88,11 +89,9 @@ pub fn store_pixels(
 impl RenderContext<'_> {
     fn store_pixel(&self, tile: &mut FilmTile<'_>, [column, row]: [u32; 2], pixel: &DevicePixel) {
         // A shadow catcher takes light away, sample by sample
-        let bound = |value: f32| if self.catches_shadows() { value.max(0.0) } else { value };
-        let [r, g, b, a] = pixel.color.map(bound);
-        let coverage = if self.catches_shadows() { a.min(1.0) } else { a };
-        tile.set_color(column, row, [r, g, b, coverage]);
-        tile.set_odd(column, row, pixel.odd.map(bound).into());
+        let is_bounded = self.catches_shadows();
+        tile.set_color(column, row, bounded(pixel.color, is_bounded));
+        tile.set_odd(column, row, bounded(pixel.odd, is_bounded));
         let data = pixel.nearest.map_or(DataSample::MISS, |hit| self.data_of(&hit));
         tile.set_data(column, row, &data);
         if self.settings.channels.has(FilmPlane::Attributes) {

@@ -1,7 +1,6 @@
 //! The finished image: one array per group of channels, row by row from the top.
 
 use bytemuck::{Pod, cast_slice, cast_slice_mut, zeroed_vec};
-use glam::Vec3;
 
 use super::aov::DataSample;
 use super::channels::Channels;
@@ -22,8 +21,9 @@ pub struct Film {
     pub color: Vec<[f32; 4]>,
     /// The bits of the components of each pixel; empty without the plane.
     pub(super) planes: PerPlane<Vec<u32>>,
-    /// Mean of the samples 1, 3, 5 and so on of a film for [denoising](crate::denoise), linear RGB. Not a channel.
-    pub odd: Option<Vec<Vec3>>,
+    /// Mean of the samples 1, 3, 5 and so on of a film for [denoising](crate::denoise), as in [`Self::color`]. Not a
+    /// channel.
+    pub odd: Option<Vec<[f32; 4]>>,
     /// The channels; the film may have other planes as features for denoising.
     pub channels: Channels,
 }
@@ -71,7 +71,7 @@ impl Film {
     /// Memory of all planes of an image, bytes. `has_features`: it will be denoised.
     pub fn bytes_for(width: u32, height: u32, channels: Channels, has_features: bool) -> u64 {
         let sizes = channels.with_features(has_features).sizes();
-        let odd = if has_features { 3 } else { 0 };
+        let odd = if has_features { 4 } else { 0 };
         let floats = 4 + sizes.iter().sum::<usize>() + odd;
         u64::from(width) * u64::from(height) * 4 * floats as u64
     }
@@ -131,7 +131,7 @@ pub(super) struct Band<'a> {
     planes: PerPlane<&'a mut [u32]>,
     /// Number of components of a pixel in each plane.
     sizes: PerPlane<usize>,
-    odd: Option<&'a mut [Vec3]>,
+    odd: Option<&'a mut [[f32; 4]]>,
 }
 
 impl Band<'_> {
@@ -193,7 +193,7 @@ pub(super) struct FilmTile<'a> {
     planes: PerPlane<Rows<'a, u32>>,
     /// Number of components of a pixel in each plane.
     sizes: PerPlane<usize>,
-    odd: Option<Rows<'a, Vec3>>,
+    odd: Option<Rows<'a, [f32; 4]>>,
 }
 
 impl FilmTile<'_> {
@@ -207,8 +207,8 @@ impl FilmTile<'_> {
         self.odd.is_some()
     }
 
-    /// Stores the mean of the odd samples of the pixel in `column` and `row` of the tile, linear RGB.
-    pub(super) fn set_odd(&mut self, column: u32, row: u32, mean: Vec3) {
+    /// Stores the mean of the odd samples of the pixel in `column` and `row` of the tile.
+    pub(super) fn set_odd(&mut self, column: u32, row: u32, mean: [f32; 4]) {
         if let Some(rows) = &mut self.odd {
             rows[row as usize][column as usize] = mean;
         }
@@ -251,6 +251,8 @@ mod every_pixel;
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
+
     use super::*;
     use crate::render::aov::NO_ID;
 
@@ -262,7 +264,7 @@ mod tests {
         assert_eq!(film.plane::<u32>(FilmPlane::Id).unwrap()[5], NO_ID);
         assert!(film.plane::<Vec3>(FilmPlane::Normal).is_none());
         assert_eq!(Film::bytes_for(3, 2, channels, false), 6 * 24);
-        assert_eq!(Film::bytes_for(3, 2, channels, true), 6 * (24 + 3 * 12));
+        assert_eq!(Film::bytes_for(3, 2, channels, true), 6 * (24 + 2 * 12 + 16));
         let channels = Channels::from_names(["lights", "shadow", "crypto_part"]).unwrap();
         let film = Film::new(3, 2, channels);
         assert_eq!(film.plane::<f32>(FilmPlane::CryptoPart).unwrap().len(), 6 * 12);

@@ -87,7 +87,7 @@ impl<'a> PathIntegrator<'a> {
             interface: interface_of(context.scene.particle_material(), is_connected),
             interfaces: context.shapes.nested.as_ref().map(BoundaryTable::for_paths),
             split: SplitRule::new(context.settings, context.shapes.interior),
-            catcher: Catcher::of(context.scene),
+            catcher: Catcher::of(context.scene, context.settings),
             ground_light: None,
             caustics: Caustics::default(),
             has_extents: context.lights.iter().any(|light| light.has_extent()),
@@ -130,6 +130,11 @@ impl Integrator for PathIntegrator<'_> {
         let held_out = self.context.holdout_lanes(depth, &packet.hits);
         let lanes = segments.lanes() & !ended & !held_out;
         self.add_escaped(segments, depth, lanes, packet);
+        // Mirrors see the same behind it
+        if let Some(catcher) = self.catcher.as_ref().filter(|c| c.is_mirrored && depth > 1) {
+            let lanes = packet.hits.lanes_of(MaterialId::GROUND);
+            self.see_through(catcher, &self.surface(segments, depth, lanes), packet);
+        }
         packet.clamp.keep_direct(segments, &packet.radiance, &packet.groups);
         packet.take_light(LightClass::Background);
         if packet.hits.mask & !held_out == 0 {
@@ -451,7 +456,15 @@ impl PathIntegrator<'_> {
         let deeper = self.roulette(surface, lanes & !last, &mut rays.throughput);
         let how =
             Continuation { inside: segments.inside, crossed: BodySet::EMPTY, branch: BOUNCED };
+        if self.catcher.as_ref().is_some_and(|catcher| catcher.is_mirrored) {
+            let direction = rays.direction;
+            let PacketScratch { hits, surface: points, leaving, .. } = &mut *packet;
+            let diffuse = &mut leaving.reflected.diffuse;
+            self.diffuse_part(surface, &direction, (hits, points), diffuse);
+        }
+        let rays = &mut packet.leaving.reflected;
         next.reflected.push(deeper, rays, segments, how);
+        rays.diffuse = [splat(1.0); 3];
         // Infinite densities mark specular rays
         if last != 0 {
             self.add_last(surface, last, packet);

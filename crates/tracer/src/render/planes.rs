@@ -148,7 +148,7 @@ pub(super) enum PlaneSource {
     Overlays,
 }
 
-/// What denoising does with a plane. It replaces only the colours of a film.
+/// What denoising does with a plane. It replaces only the colours and the coverage of a film.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum DenoiserUse {
     /// Compares pixels by it.

@@ -19,6 +19,9 @@ pub(super) struct SegmentPacket {
     /// Probability density with which the direction of each ray was sampled, per steradian; infinite for camera rays
     /// and specular rays.
     pub(super) pdf: Lanes,
+    /// The diffuse part of the reflection that each ray comes from, 0 to 1; only less than 1 where something tells it
+    /// apart.
+    pub(super) diffuse: Lanes3,
     /// Number of diffuse reflections of the path before each ray.
     pub(super) bounces: [u32; LANES],
     /// Path throughput from the sample to the origin of each ray, linear RGB.
@@ -40,6 +43,7 @@ impl Default for SegmentPacket {
         Self {
             rays: RayPacket::default(),
             pdf: splat(f32::INFINITY),
+            diffuse: [splat(1.0); 3],
             bounces: [0; LANES],
             throughput: [splat(1.0); 3],
             sample: [0; LANES],
@@ -82,6 +86,8 @@ pub(super) struct ScatteredRays {
     pub(super) throughput: Lanes3,
     /// Probability density of each direction, per steradian; infinite for specular rays.
     pub(super) pdf: Lanes,
+    /// The diffuse part of the reflection.
+    pub(super) diffuse: Lanes3,
 }
 
 impl Default for ScatteredRays {
@@ -92,6 +98,7 @@ impl Default for ScatteredRays {
             weight: splat(0.0),
             throughput: [splat(0.0); 3],
             pdf: splat(f32::INFINITY),
+            diffuse: [splat(1.0); 3],
         }
     }
 }
@@ -193,6 +200,7 @@ impl SegmentRun {
                 segment.rays.origin[axis][to] = rays.origin[axis][lane];
                 segment.rays.direction[axis][to] = rays.direction[axis][lane];
                 segment.throughput[axis][to] = rays.throughput[axis][lane];
+                segment.diffuse[axis][to] = rays.diffuse[axis][lane];
             }
             segment.rays.time[to] = parents.rays.time[lane];
             segment.pdf[to] = rays.pdf[lane];

@@ -6,7 +6,11 @@
 //! The fraction from a single sample may exceed 1, but not its mean; `accumulate` bounds pixels. Transmissive particles
 //! attenuate light in a straight line. The light of sources that emit photons ends at them instead, and caustics are a
 //! negative loss: they brighten the background, but add no coverage to transparent images. Light that opaque particles
-//! reflect to the ground is left out. All other rays see a matte ground.
+//! reflect to the ground is left out.
+//!
+//! In transparent images, and in front of a visible environment, rays that metals and coats of plastic reflect see the
+//! environment through the catcher, darkened in the same way: the plate has no grey floor. In front of another background,
+//! and for all other rays, the catcher is a matte ground, which throws light back.
 
 use std::f32::consts::FRAC_1_PI;
 
@@ -14,11 +18,16 @@ use glam::Vec3;
 
 use super::{Occlusion, PathIntegrator, Surface};
 use crate::render::{
-    bsdf::surface_points, dimensions::ENVIRONMENT, lights::sample_directions,
-    sampler::get_2d_lanes, scratch::PacketScratch,
+    bsdf::surface_points,
+    dimensions::ENVIRONMENT,
+    lights::{environment_along, sample_directions},
+    sampler::get_2d_lanes,
+    scratch::PacketScratch,
+    settings::RenderSettings,
+    shading::add,
 };
 use crate::scene::environment::{EnvironmentTable, LUMINANCE};
-use crate::scene::{Environment, Scene};
+use crate::scene::{Environment, Finish, Material, Scene};
 use spherule_tree::math::{LANES, Lanes3, lane3, lanes_in, lanes_where, set_lane3, splat, splat3};
 use spherule_tree::ray::RayPacket;
 
@@ -32,18 +41,31 @@ pub(super) struct Catcher {
     environment: Option<EnvironmentTable>,
     /// Radiance that a white ground reflects of the environment if nothing is in the way.
     whole: Vec3,
+    /// Whether a material of the scene mirrors what is behind it.
+    pub(super) is_mirrored: bool,
 }
 
 impl Catcher {
     /// The shadow catcher of `scene`, if there is one.
-    pub(super) fn of(scene: &Scene) -> Option<Self> {
+    pub(super) fn of(scene: &Scene, settings: &RenderSettings) -> Option<Self> {
         let ground = scene.ground.as_ref()?;
         let strength = ground.shadow_catcher?;
         let environment =
             scene.environment.as_deref().filter(|e| !e.is_black()).map(|e| light_on(e, ground.up));
         let whole = environment.as_ref().map_or(Vec3::ZERO, reflected_by_white);
-        Some(Self { strength, environment, whole })
+        let is_mirrored = mirrors_see_through(scene, settings);
+        Some(Self { strength, environment, whole, is_mirrored })
     }
+}
+
+/// Whether metals and coats of plastic see the environment through a shadow catcher: if nothing else is behind it.
+pub fn mirrors_see_through(scene: &Scene, settings: &RenderSettings) -> bool {
+    let is_glossy = |material: &Material| {
+        matches!(material.finish, Finish::Plastic { .. } | Finish::Metal { .. })
+    };
+    scene.ground.as_ref().is_some_and(|ground| ground.shadow_catcher.is_some())
+        && (settings.transparent_background || scene.is_environment_visible)
+        && scene.materials.iter().any(is_glossy)
 }
 
 /// The light of an environment on a surface with unit normal `up`.
@@ -64,6 +86,14 @@ struct CaughtLight {
     lost: Lanes3,
 }
 
+impl CaughtLight {
+    /// The part of the light in `lane` that is lost.
+    fn lost_part(&self, lane: usize) -> Vec3 {
+        let (whole, lost) = (lane3(&self.whole, lane), lane3(&self.lost, lane));
+        Vec3::select(whole.cmpgt(Vec3::ZERO), lost / whole, Vec3::ZERO)
+    }
+}
+
 impl PathIntegrator<'_> {
     /// Darkens the throughput of the rays of `surface`, which hit a shadow catcher, and lets them pass.
     pub(super) fn catch_shadows(
@@ -72,6 +102,66 @@ impl PathIntegrator<'_> {
         surface: &Surface<'_>,
         packet: &mut PacketScratch,
     ) {
+        let light = self.caught_light(catcher, surface, packet);
+        // Darken the background by the lost fraction
+        let is_transparent = self.context.settings.transparent_background;
+        for lane in lanes_in(surface.lanes) {
+            let (whole, lost) = (lane3(&light.whole, lane), lane3(&light.lost, lane));
+            packet.split.set_lost(lane, whole, lost);
+            let shadow = catcher.strength * packet.hits.opacity[lane] * light.lost_part(lane);
+            let throughput = lane3(&packet.throughput, lane) * (Vec3::ONE - shadow);
+            set_lane3(&mut packet.throughput, lane, throughput);
+            if is_transparent {
+                // Walls of glass may cover some of it already
+                let covered = packet.coverage[lane];
+                packet.coverage[lane] = covered + (1.0 - covered) * shadow.dot(LUMINANCE);
+            }
+        }
+        packet.hits.mask &= !surface.lanes;
+    }
+
+    /// Adds the environment behind the catcher, darker in shadows, as far as the rays of `surface` come from a glossy
+    /// reflection. The diffuse part meets the catcher as a matte ground, which has its light.
+    pub(super) fn see_through(
+        &self,
+        catcher: &Catcher,
+        surface: &Surface<'_>,
+        packet: &mut PacketScratch,
+    ) {
+        let segments = surface.segments;
+        let diffuse = |l: usize| lane3(&segments.diffuse, l);
+        let lanes = surface.lanes & lanes_where(|l| diffuse(l) != Vec3::ONE);
+        if lanes == 0 {
+            return;
+        }
+        let surface = &Surface { lanes, ..*surface };
+        let light = self.caught_light(catcher, surface, packet);
+        let mut along = [splat(0.0); 3];
+        for lane in lanes_in(lanes) {
+            let throughput = lane3(&packet.throughput, lane);
+            let shadow = Vec3::ONE - catcher.strength * light.lost_part(lane);
+            let glossy = Vec3::ONE - diffuse(lane);
+            set_lane3(&mut along, lane, throughput * glossy * shadow * packet.hits.opacity[lane]);
+            set_lane3(&mut packet.throughput, lane, throughput * diffuse(lane));
+        }
+        // Light samples do not find the environment there, so that these rays have the full weight
+        if let Some(environment) = self.environment {
+            let (simd, mut seen) = (self.context.simd, [splat(0.0); 3]);
+            let rays = [&segments.rays.direction, &along];
+            environment_along(simd, environment, rays, &splat(f32::INFINITY), lanes, &mut seen);
+            add(simd, &seen, &Vec3::ONE, lanes, &mut packet.radiance);
+            packet.groups.add(simd, self.context.environment_group(), &seen, lanes);
+        }
+        packet.hits.mask &= !(lanes & lanes_where(|l| diffuse(l) == Vec3::ZERO));
+    }
+
+    /// The light that a white ground reflects at the points of `surface`, and what something takes away.
+    fn caught_light(
+        &self,
+        catcher: &Catcher,
+        surface: &Surface<'_>,
+        packet: &mut PacketScratch,
+    ) -> CaughtLight {
         // Reflect light as a white surface, and add up what does not arrive
         (packet.base, packet.weight) = (splat3(Vec3::ONE), splat3(Vec3::ONE));
         let (simd, rays) = (self.context.simd, &surface.segments.rays);
@@ -91,22 +181,7 @@ impl PathIntegrator<'_> {
                 set_lane3(&mut light.lost, lane, lost);
             }
         }
-        // Darken the background by the lost fraction
-        let is_transparent = self.context.settings.transparent_background;
-        for lane in lanes_in(surface.lanes) {
-            let (whole, lost) = (lane3(&light.whole, lane), lane3(&light.lost, lane));
-            let fraction = Vec3::select(whole.cmpgt(Vec3::ZERO), lost / whole, Vec3::ZERO);
-            packet.split.set_lost(lane, whole, lost);
-            let shadow = catcher.strength * packet.hits.opacity[lane] * fraction;
-            let throughput = lane3(&packet.throughput, lane) * (Vec3::ONE - shadow);
-            set_lane3(&mut packet.throughput, lane, throughput);
-            if is_transparent {
-                // Walls of glass may cover some of it already
-                let covered = packet.coverage[lane];
-                packet.coverage[lane] = covered + (1.0 - covered) * shadow.dot(LUMINANCE);
-            }
-        }
-        packet.hits.mask &= !surface.lanes;
+        light
     }
 
     /// Adds the lost light of the `environment` of a catcher.

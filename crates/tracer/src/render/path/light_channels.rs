@@ -1,7 +1,9 @@
 //! The diffuse and the glossy part of reflections, for light channels.
 
 use super::{PathIntegrator, Surface};
+use crate::render::bsdf::SurfacePoints;
 use crate::render::scratch::PacketScratch;
+use spherule_surface::Intersections;
 use spherule_tree::math::Lanes3;
 
 impl PathIntegrator<'_> {
@@ -20,10 +22,21 @@ impl PathIntegrator<'_> {
         direction: &Lanes3,
         packet: &mut PacketScratch,
     ) {
-        for (material, lanes) in packet.hits.materials_of(surface.lanes) {
-            let (rays, diffuse) = (&surface.segments.rays, &mut packet.split.diffuse);
+        let PacketScratch { hits, surface: points, split, .. } = packet;
+        self.diffuse_part(surface, direction, (hits, points), &mut split.diffuse);
+    }
+
+    /// Stores the diffuse part of the reflection of light from `direction` at `points`.
+    pub(super) fn diffuse_part(
+        &self,
+        surface: &Surface<'_>,
+        direction: &Lanes3,
+        (hits, points): (&Intersections, &SurfacePoints),
+        part: &mut Lanes3,
+    ) {
+        for (material, lanes) in hits.materials_of(surface.lanes) {
             let bsdf = &self.bsdfs[material.index()];
-            bsdf.diffuse_part(rays, &packet.surface, direction, lanes, diffuse);
+            bsdf.diffuse_part(&surface.segments.rays, points, direction, lanes, part);
         }
     }
 }
