@@ -4,7 +4,9 @@ use std::collections::HashMap;
 
 use glam::{DVec3, DVec4, Vec3};
 
-use super::gather::{DEPTHS, MAX_VALUE, MIN_ALBEDO, MIN_NOISE, RELATIVE_NOISE, UNUSABLE_NOISE};
+use super::gather::{
+    DEPTHS, MAX_VALUE, MIN_ALBEDO, MIN_NOISE, NOISE_WEIGHTS, RELATIVE_NOISE, UNUSABLE_NOISE,
+};
 use super::glints::{ALIKE, BRIGHTER, RADIUS};
 use super::kernels::MAX_DISTANCE;
 use super::settings::{
@@ -151,7 +153,9 @@ impl Picture<'_> {
             let [even, odd] = self.halves(q);
             (even - odd).length_squared() / 2.0
         };
-        let mean = square(p, 1).map(variance).sum::<f64>() / 9.0;
+        let weights = NOISE_WEIGHTS.iter().flat_map(|y| NOISE_WEIGHTS.map(|x| f64::from(x * y)));
+        let weighted = square(p, 2).zip(weights).map(|(q, weight)| weight * variance(q));
+        let mean = weighted.sum::<f64>() / 81.0;
         let [even, odd] = self.halves(p);
         let relative = (even + odd).length() / 2.0 * f64::from(RELATIVE_NOISE);
         mean + relative * relative + f64::from(MIN_NOISE)

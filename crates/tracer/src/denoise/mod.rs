@@ -6,7 +6,8 @@
 //! the weights of one half come from the other one, so that they do not depend on the noise that they average:
 //!
 //! - Colours are divided by albedo, so that textures stay sharp.
-//! - The noise `v(p)` of a half is half the squared difference of the two halves, averaged over 3x3 pixels.
+//! - The noise `v(p)` of a half is half the squared difference of the two halves, averaged over 5x5 pixels with the
+//!   weights 1, 2, 3, 2, 1 on each axis.
 //! - Two pixels of a half differ by `(|p - q|^2 - 2 min(v(p), v(q))) / (v(p) + v(q))`, at most 64. Two patches of 3x3
 //!   pixels differ by the mean `d` over their pixels, divided by `k^2`.
 //! - The feature distance `f` is the largest of the squared distances of albedo, normal and depth, each relative to its

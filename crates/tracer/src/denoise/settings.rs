@@ -38,7 +38,7 @@ pub struct DenoiseSettings {
 
 impl DenoiseSettings {
     /// For opaque surfaces.
-    pub const OPAQUE: Self = Self { search: 4, k: 0.55 };
+    pub const OPAQUE: Self = Self { search: 4, k: 0.48 };
 
     /// For water and other transmissive surfaces: no feature describes what is behind the surface, so a larger `k`
     /// would blur it.

@@ -72,23 +72,26 @@ impl Tile {
         }
     }
 
-    /// Computes noise and slopes in row `number` of those in memory, except in the first and last column.
+    /// Computes noise and slopes in row `number` of those in memory, except in the first and last columns.
     fn derive(&mut self, simd: Supported, number: usize) {
-        const { assert!(NOISE_RADIUS == 1, "the rows above and below") };
+        const { assert!(NOISE_RADIUS == 2, "two rows above and below") };
         let (before, rest) = self.values.split_at_mut(number * ROW_LEN);
         let (row, below) = rest.split_at_mut(ROW_LEN);
         let (row, derived) = row.split_at_mut(NOISE * STRIDE);
-        let above = &before[(number - 1) * ROW_LEN..];
-        let inner = 1..STRIDE - 1;
+        let above = |rows: usize| &before[(number - rows) * ROW_LEN..];
+        let below = |rows: usize| &below[(rows - 1) * ROW_LEN..];
+        let inner = NOISE_RADIUS..STRIDE - NOISE_RADIUS;
         let [noise_plane, slope_x, slope_y] = planes_mut(derived, inner.clone());
         // Average variances
         let colors: [&[f32]; 6] = std::array::from_fn(|c| &plane(row, EVEN + c)[inner.clone()]);
-        let variance = [above, row, below].map(|row| plane(row, VARIANCE));
+        let variance =
+            [above(2), above(1), row, below(1), below(2)].map(|row| plane(row, VARIANCE));
         let albedo = &plane(row, ALBEDO + 1)[inner.clone()];
         noise(simd, &variance, &colors, albedo, &mut self.buffer, noise_plane);
-        // Compute slopes
-        let [above, below] = [above, below].map(|row| &plane(row, DEPTH)[inner.clone()]);
-        slopes(simd, plane(row, DEPTH), above, below, slope_x, slope_y);
+        // Compute slopes; those of the first column need its left neighbour
+        let depth = &plane(row, DEPTH)[inner.start - 1..];
+        let [above, below] = [above(1), below(1)].map(|row| &plane(row, DEPTH)[inner.clone()]);
+        slopes(simd, depth, above, below, slope_x, slope_y);
     }
 }
 

@@ -5,7 +5,9 @@ use super::settings::PATCH_RADIUS;
 use spherule_tree::math::LANES;
 
 /// Neighbours on each side over which variances are averaged.
-pub(super) const NOISE_RADIUS: usize = 1;
+pub(super) const NOISE_RADIUS: usize = 2;
+/// Pixels along a side of the square of these neighbours.
+pub(super) const NOISE_SIDE: usize = 2 * NOISE_RADIUS + 1;
 
 /// A rectangle of the image, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -176,11 +178,11 @@ mod tests {
     fn rows_of_the_widest_tile_hold_all_that_is_compared() {
         for search in 1..=16 {
             let layout = TileLayout::new(search, TileLayout::max_width(search));
-            // Columns 0 and `STRIDE - 1` have no noise
+            // The first and the last columns have no noise
             let first = layout.column(-((search + PATCH_RADIUS) as isize));
-            assert_eq!(first, 1);
+            assert_eq!(first, NOISE_RADIUS);
             let end = layout.column(-(PATCH_RADIUS as isize)) + layout.compared;
-            assert!(end < STRIDE, "{search}: {end}");
+            assert!(end <= STRIDE - NOISE_RADIUS, "{search}: {end}");
             assert!(layout.margin + layout.pairs <= STRIDE, "{search}");
             assert!(layout.pairs + 2 * PATCH_RADIUS <= STRIDE, "{search}");
         }
