@@ -183,6 +183,9 @@ fn exr_options(setup: &Setup, frame: &TracedFrame) -> ExrOptions {
     ExrOptions {
         custom: Some(CustomAttribute { name: "spherule".to_owned(), json: facts.to_string() }),
         world_to_camera: Some(frame.camera.world_to_camera()),
+        world_to_ndc: frame.camera.world_to_ndc(),
+        screen_window_width: frame.camera.screen_window_width(),
+        field_of_view: frame.camera.field_of_view(),
         texts: frame.texts.clone(),
         ..setup.picture.files.exr.clone()
     }

@@ -79,14 +79,26 @@ pub(super) fn exr_options(
         dpi: manifest.image.dpi,
         is_panorama: projection.is_panorama() && !manifest.camera.stereo,
         world_to_camera: None,
-        comments: Some(if projection.is_panorama() {
-            COMMENTS.replace("along the view axis", "from the eye")
-        } else {
-            COMMENTS.to_owned()
-        }),
+        world_to_ndc: None,
+        screen_window_width: None,
+        field_of_view: None,
+        far_depth: output.far_depth,
+        comments: Some(comments(output.far_depth, projection)),
         custom: None,
         texts: Vec::new(),
     }
+}
+
+/// The text that explains the channels.
+fn comments(far_depth: Option<f32>, projection: Projection) -> String {
+    let mut text = COMMENTS.to_owned();
+    if projection.is_panorama() {
+        text = text.replace("along the view axis", "from the eye");
+    }
+    if let Some(far) = far_depth {
+        text = text.replace("infinite where", &format!("{far:e} where"));
+    }
+    text
 }
 
 /// Options of the PNG.

@@ -57,6 +57,10 @@ section! {
         preview_exposure: f32 = 0.0, from(-100), to(100), unit("stops");
         /// Omit the background, for compositing: the EXR and the PNG have alpha
         transparent: bool = false, flag("transparent", "", "Output");
+        /// Z where nothing is hit, such as 1e10
+        ///
+        /// Filters and resizing can turn infinite values into NaN. Blender writes 1e10.
+        far_depth: Option<f32> = None, or("infinite"), above(0), single(), unit("a distance");
         /// Time from one frame to the next, for the channel motion
         ///
         /// In the unit of time of the velocities. By default, it comes from the times in the files, or is 1 / fps.

@@ -277,6 +277,39 @@ impl Camera {
         // Rows for row vectors equal columns for column vectors.
         self.camera_from_world.as_mat4().to_cols_array()
     }
+
+    /// The matrix of OpenEXR's `worldToNDC`, in the form of [`Self::world_to_camera`]: the film is -1 to 1 on both axes,
+    /// x to the right and y up. In perspective, the third coordinate is 1 minus the reciprocal of the depth. None if no
+    /// matrix projects points onto the film: for panoramas, and for two eyes.
+    pub fn world_to_ndc(&self) -> Option<[f32; 16]> {
+        let [x, y] = self.half_extent.as_dvec2().recip().to_array();
+        let ndc_from_camera = match self.projection {
+            _ if self.stereo.is_some() => return None,
+            Projection::Perspective => DMat4::from_cols(
+                DVec4::X * x,
+                DVec4::Y * y,
+                DVec4::new(0.0, 0.0, 1.0, 1.0),
+                DVec4::new(0.0, 0.0, -1.0, 0.0),
+            ),
+            Projection::Orthographic { .. } => DMat4::from_scale(DVec3::new(x, y, 1.0)),
+            Projection::Equirectangular => return None,
+        };
+        Some((ndc_from_camera * self.camera_from_world).as_mat4().to_cols_array())
+    }
+
+    /// Width of the film for OpenEXR's `screenWindowWidth`: at distance 1 in perspective, a length if orthographic. None
+    /// as for [`Self::world_to_ndc`].
+    pub fn screen_window_width(&self) -> Option<f32> {
+        let is_flat = self.stereo.is_none() && !self.projection.is_panorama();
+        is_flat.then_some(2.0 * self.half_extent.x)
+    }
+
+    /// The horizontal and the vertical field of view in degrees; None unless it is one eye in perspective.
+    pub fn field_of_view(&self) -> Option<[f32; 2]> {
+        let is_perspective = self.projection == Projection::Perspective && self.stereo.is_none();
+        let degrees = |half: f32| 2.0 * libm::atanf(half).to_degrees();
+        is_perspective.then(|| self.half_extent.to_array().map(degrees))
+    }
 }
 
 /// Number of images beside each other and below each other in a picture.

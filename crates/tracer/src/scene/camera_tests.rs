@@ -71,3 +71,49 @@ fn invalid_views_are_rejected() {
     let flat = Camera::new(&thesis_view(), 0.0, DVec3::ZERO).unwrap_err();
     assert_eq!(flat, CameraError::Aspect);
 }
+
+/// OpenEXR's matrices multiply row vectors from the right.
+fn transformed(point: DVec3, matrix: [f32; 16]) -> DVec3 {
+    let column = |c: usize| {
+        let m = |r: usize| f64::from(matrix[4 * r + c]);
+        point.x * m(0) + point.y * m(1) + point.z * m(2) + m(3)
+    };
+    DVec3::new(column(0), column(1), column(2)) / column(3)
+}
+
+#[test]
+fn world_to_ndc_is_the_position_on_the_film() {
+    let view = CameraView {
+        eye: DVec3::new(3.0, -5.0, 2.0),
+        look_at: DVec3::new(0.2, 0.1, 0.3),
+        up: DVec3::Z,
+        fov: 35.0,
+    };
+    for projection in [Projection::Perspective, Projection::Orthographic { height: 3.0 }] {
+        let camera = Camera::projected(&view, projection, 1.5, DVec3::ZERO).unwrap();
+        let matrix = camera.world_to_ndc().unwrap();
+        for point in [DVec3::ZERO, DVec3::new(0.7, 0.4, -0.2), DVec3::new(-1.0, 2.0, 1.0)] {
+            let on_film = camera.film_of(point.as_vec3()).unwrap().as_dvec2();
+            let ndc = transformed(point, matrix);
+            let expected = DVec3::new(2.0 * on_film.x - 1.0, 1.0 - 2.0 * on_film.y, ndc.z);
+            assert!((ndc - expected).length() < 1e-5, "{ndc} {expected}");
+            let depth = f64::from(camera.depth_of(point.as_vec3()));
+            let z = if projection == Projection::Perspective { 1.0 - 1.0 / depth } else { depth };
+            assert!((ndc.z - z).abs() < 1e-5, "{ndc} {z}");
+        }
+    }
+    // The vertical field of view is that of the view; the width follows from the aspect
+    let camera = Camera::new(&view, 1.5, DVec3::ZERO).unwrap();
+    let [horizontal, vertical] = camera.field_of_view().unwrap();
+    assert!((vertical - 35.0).abs() < 1e-4, "{vertical}");
+    let tangent = |degrees: f32| (0.5 * degrees.to_radians()).tan();
+    assert!((tangent(horizontal) / tangent(vertical) - 1.5).abs() < 1e-5);
+    assert!((camera.screen_window_width().unwrap() - 2.0 * tangent(horizontal)).abs() < 1e-6);
+    // A panorama and a pair of eyes have no such matrix
+    let panorama = Camera::projected(&view, Projection::Equirectangular, 2.0, DVec3::ZERO).unwrap();
+    let eyes = Stereo { half_distance: 0.1, convergence: 5.0 };
+    for camera in [panorama, camera.with_stereo(Some(eyes))] {
+        assert_eq!(camera.world_to_ndc(), None);
+        assert_eq!((camera.field_of_view(), camera.screen_window_width()), (None, None));
+    }
+}

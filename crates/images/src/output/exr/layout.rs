@@ -1,6 +1,7 @@
 //! The layout of an image in its file: parts with their headers, channels, and blocks of rows.
 
 use exr::image::write::layers::WritableLayers;
+use exr::meta::attribute::Chromaticities;
 use exr::meta::header::Header;
 use exr::prelude::{
     AnyChannel, AnyChannels, Blocks, Compression as Codec, Encoding, FlatSamples, ImageAttributes,
@@ -13,6 +14,14 @@ use crate::render::{Channels, DataWindow, Film, FilmRows};
 
 /// Minimum number of rows in a band: the height of the renderer's tiles.
 const BAND_ROWS: u32 = 16;
+
+/// Primaries and white of all colours: those of sRGB and Rec. 709.
+const PRIMARIES: Chromaticities = Chromaticities {
+    red: Vec2(0.64, 0.33),
+    green: Vec2(0.30, 0.60),
+    blue: Vec2(0.15, 0.06),
+    white: Vec2(0.3127, 0.3290),
+};
 
 /// Names of the parts of a file with several ones: of colours, and of data.
 const PART_NAMES: [&str; 2] = ["color", "data"];
@@ -133,7 +142,8 @@ fn header(
     attributes.layer_position = Vec2(left, top);
     let layer = Layer::new(size, attributes, encoding, described);
     let display = IntegerBounds::from_dimensions((image[0] as usize, image[1] as usize));
-    let image = ImageAttributes::new(display);
+    let image =
+        ImageAttributes { chromaticities: Some(PRIMARIES), ..ImageAttributes::new(display) };
     layer.infer_headers(&image).remove(0)
 }
 

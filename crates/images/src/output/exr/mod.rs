@@ -12,7 +12,7 @@ use exr::prelude::{AttributeValue, LayerAttributes, Text};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::render::{DataWindow, Film};
+use crate::render::{DataWindow, Film, FilmPlane};
 
 mod blocks;
 mod deflate;
@@ -85,6 +85,14 @@ pub struct ExrOptions {
     pub is_panorama: bool,
     /// Attribute `worldToCamera`, from [`crate::scene::Camera::world_to_camera`].
     pub world_to_camera: Option<[f32; 16]>,
+    /// Attribute `worldToNDC`, from [`crate::scene::Camera::world_to_ndc`].
+    pub world_to_ndc: Option<[f32; 16]>,
+    /// Attribute `screenWindowWidth`, from [`crate::scene::Camera::screen_window_width`].
+    pub screen_window_width: Option<f32>,
+    /// Attributes `fieldOfViewHorizontal` and `fieldOfViewVertical`, degrees.
+    pub field_of_view: Option<[f32; 2]>,
+    /// Value of `Z` where nothing is hit; infinite if not given.
+    pub far_depth: Option<f32>,
     /// Attribute `comments`.
     pub comments: Option<String>,
     /// A custom attribute.
@@ -168,16 +176,22 @@ pub fn encode_exr(film: &Film, options: &ExrOptions) -> Result<EncodedExr, Outpu
 
 /// Writes `film` as an OpenEXR file, block by block, so that the file is never in memory as a whole. Idle threads of
 /// the current pool help. Returns the film, so that its planes can be reused for another image, and
-/// [`EncodedExr::clamped`].
+/// [`EncodedExr::clamped`]. Infinite depths become [`ExrOptions::far_depth`] in the film, too.
 ///
 /// # Errors
 /// If an attribute cannot be stored, the encoder fails, or `file` cannot be written.
 pub fn write_exr(
-    film: Film,
+    mut film: Film,
     options: &ExrOptions,
     file: &mut (impl Write + Seek),
 ) -> Result<(Film, u64), OutputError> {
     let layout = ExrLayout::of(&film, options)?;
+    if let (Some(far), Some(depths)) = (options.far_depth, film.plane_mut::<f32>(FilmPlane::Depth))
+    {
+        for depth in depths.iter_mut().filter(|depth| **depth == f32::INFINITY) {
+            *depth = far;
+        }
+    }
     blocks::write_film(film, layout, file)
 }
 
@@ -186,10 +200,16 @@ fn attributes(options: &ExrOptions) -> Result<LayerAttributes, OutputError> {
         software_name: Some(Text::from(concat!("spherule ", env!("CARGO_PKG_VERSION")))),
         frames_per_second: options.frames_per_second,
         world_to_camera: options.world_to_camera,
+        world_to_normalized_device: options.world_to_ndc,
+        horizontal_field_of_view: options.field_of_view.map(|[horizontal, _]| horizontal),
+        vertical_field_of_view: options.field_of_view.map(|[_, vertical]| vertical),
         horizontal_density: options.dpi.map(|dpi| dpi as f32),
         environment_map: options.is_panorama.then_some(EnvironmentMap::LatitudeLongitude),
         ..LayerAttributes::default()
     };
+    if let Some(width) = options.screen_window_width {
+        attributes.screen_window_width = width;
+    }
     attributes.comments = options.comments.as_deref().map(text);
     // Check the name of an attribute of the user, which the format limits
     if let Some(CustomAttribute { name, json }) = &options.custom {

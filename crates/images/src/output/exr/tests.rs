@@ -45,6 +45,9 @@ fn options() -> ExrOptions {
     ExrOptions {
         frames_per_second: Some((24_000, 1001)),
         world_to_camera: Some(std::array::from_fn(|i| i as f32)),
+        world_to_ndc: Some(std::array::from_fn(|i| 2.0 * i as f32)),
+        screen_window_width: Some(0.7),
+        field_of_view: Some([60.0, 40.0]),
         comments: Some("frame 7".to_owned()),
         custom: Some(CustomAttribute {
             name: "spherule".to_owned(),
@@ -108,6 +111,8 @@ fn windows_are_those_of_the_options() {
             assert_eq!(header.data_window(), data);
             let display = IntegerBounds::from_dimensions((160, 90));
             assert_eq!(header.shared_attributes.display_window, display);
+            let primaries = header.shared_attributes.chromaticities.unwrap();
+            assert_eq!((primaries.red, primaries.white), (Vec2(0.64, 0.33), Vec2(0.3127, 0.3290)));
             for (name, samples) in &decode(&bytes).0 {
                 check_channel(&film, name, samples);
             }
@@ -152,6 +157,10 @@ fn check_attributes(attributes: &LayerAttributes) {
     assert_eq!(software, concat!("spherule ", env!("CARGO_PKG_VERSION")));
     assert_eq!(attributes.frames_per_second, Some((24_000, 1001)));
     assert_eq!(attributes.world_to_camera.unwrap()[13], 13.0);
+    assert_eq!(attributes.world_to_normalized_device.unwrap()[13], 26.0);
+    assert_eq!(attributes.screen_window_width, 0.7);
+    let fields = [attributes.horizontal_field_of_view, attributes.vertical_field_of_view];
+    assert_eq!(fields, [Some(60.0), Some(40.0)]);
     assert_eq!(attributes.comments.as_ref().unwrap().to_string(), "frame 7");
     assert_eq!(attributes.capture_date, None);
     assert_eq!(attributes.other.len(), 1);
@@ -230,4 +239,15 @@ fn oversized_attributes_are_rejected() {
         let error = encode_exr(&film, &options).unwrap_err();
         assert!(matches!(error, OutputError::Attribute { .. }), "{error}");
     }
+}
+
+#[test]
+fn a_far_depth_replaces_infinite_ones() {
+    let film = film(7, 5, Channels::ALL);
+    let options = ExrOptions { far_depth: Some(1e10), ..options() };
+    let (channels, ..) = decode(&encode_exr(&film, &options).unwrap().bytes);
+    let (_, depths) = channels.iter().find(|(name, _)| name == "Z").unwrap();
+    let stored = film.plane::<f32>(FilmPlane::Depth).unwrap().iter();
+    let expected = stored.map(|z| if z.is_finite() { *z } else { 1e10 }).collect();
+    assert_eq!(*depths, FlatSamples::F32(expected));
 }
