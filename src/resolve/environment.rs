@@ -56,85 +56,62 @@ impl EnvironmentMap {
     }
 }
 
-/// The environment of the path integrator, as it is placed by the first `view` of the camera.
-pub(super) fn environment(
+/// Light from infinitely far away.
+#[derive(Debug, Default)]
+pub(super) struct Surroundings {
+    /// The environment of the path integrator.
+    pub(super) environment: Option<Arc<Environment>>,
+    /// Its suns: that of a sky, or those of an image.
+    pub(super) suns: Vec<Light>,
+}
+
+/// The surroundings as they are placed by the first `view` of the camera.
+pub(super) fn surroundings(
     manifest: &Manifest,
     map: Option<&EnvironmentMap>,
     view: &CameraView,
     up: DVec3,
-) -> Result<Option<Arc<Environment>>, ResolveError> {
+) -> Result<Surroundings, ResolveError> {
     if manifest.integrator() != IntegratorKind::Path {
-        return Ok(None);
+        return Ok(Surroundings::default());
     }
-    // Its directions are relative to the view
+    // A studio and a sky turn with the camera, an image stays where it is
     let settings = &manifest.environment;
+    let forward = match settings.kind {
+        EnvironmentKind::Image => view_direction(up.normalize_or(DVec3::Z), 0.0, 0.0),
+        _ => view.heading(up),
+    };
+    let axes = EnvironmentAxes::of_view(forward, up, settings.rotation);
     let scale = settings.intensity * settings.color;
-    let axes = |forward| EnvironmentAxes::of_view(forward, up, settings.rotation);
-    // Make it; a studio and a sky turn with the camera, an image stays where it is
-    let environment = match settings.kind {
-        EnvironmentKind::Studio => studio(axes(view.heading(up)), scale),
-        EnvironmentKind::Sky => clear_sky(manifest).environment(axes(view.heading(up)), scale),
-        EnvironmentKind::Constant => Environment::constant(scale),
+    let sun = |direction: Vec3, half_angle: f64, irradiance: Vec3| Light {
+        kind: scene::LightKind::Sun { to_light: axes.to_world(direction), half_angle },
+        radiance: irradiance * scale,
+        casts_shadow: true,
+        is_visible: settings.visible,
+        group: group_index(manifest, settings.group.as_ref()),
+    };
+    let (environment, suns) = match settings.kind {
+        EnvironmentKind::Studio => (studio(axes, scale), Vec::new()),
+        EnvironmentKind::Constant => (Environment::constant(scale), Vec::new()),
+        EnvironmentKind::Sky => {
+            let direction = sky_direction(settings.sun.elevation, settings.sun.azimuth);
+            let (turbidity, albedo) = (settings.turbidity, settings.albedo);
+            let sky = ClearSky::new(&SkySettings { sun: direction, turbidity, albedo });
+            let half_angle = (0.5 * settings.sun.size).to_radians();
+            (sky.environment(axes, scale), vec![sun(direction, half_angle, sky.sun())])
+        }
         EnvironmentKind::Image => {
             let map = map.ok_or_else(|| ResolveError::Unsupported {
                 key: "environment.image",
                 what: "the image has not been read".to_owned(),
             })?;
-            let axes = image_axes(manifest, up);
             let image = Environment::from_map(axes, &map.reduced, scale);
-            image.with_detail(map.detail.clone(), scale)
+            let of_map = |own: &MapSun| sun(own.direction, own.half_angle, own.irradiance);
+            let suns = map.suns.iter().map(of_map).collect();
+            (image.with_detail(map.detail.clone(), scale), suns)
         }
     };
-    Ok(Some(Arc::new(environment)))
-}
-
-/// The axes of an image: the middle is where a camera with azimuth 0 looks.
-fn image_axes(manifest: &Manifest, up: DVec3) -> EnvironmentAxes {
-    let forward = view_direction(up.normalize_or(DVec3::Z), 0.0, 0.0);
-    EnvironmentAxes::of_view(forward, up, manifest.environment.rotation)
-}
-
-/// The sky of a manifest.
-fn clear_sky(manifest: &Manifest) -> ClearSky {
-    let settings = &manifest.environment;
-    ClearSky::new(&SkySettings {
-        sun: sky_direction(settings.sun.elevation, settings.sun.azimuth),
-        turbidity: settings.turbidity,
-        albedo: settings.albedo,
-    })
-}
-
-/// The suns of the environment: that of a sky, or those of the image `map`.
-pub(super) fn suns(
-    manifest: &Manifest,
-    map: Option<&EnvironmentMap>,
-    view: &CameraView,
-    up: DVec3,
-) -> Vec<Light> {
-    let settings = &manifest.environment;
-    let light = |to_light: Vec3, half_angle: f64, irradiance: Vec3| Light {
-        kind: scene::LightKind::Sun { to_light, half_angle },
-        radiance: irradiance * settings.intensity * settings.color,
-        casts_shadow: true,
-        is_visible: settings.visible,
-        group: group_index(manifest, settings.group.as_ref()),
-    };
-    match (manifest.integrator(), settings.kind, map) {
-        (IntegratorKind::Path, EnvironmentKind::Sky, _) => {
-            let axes = EnvironmentAxes::of_view(view.heading(up), up, settings.rotation);
-            let sun = &settings.sun;
-            let to_light = axes.to_world(sky_direction(sun.elevation, sun.azimuth));
-            let half_angle = (0.5 * sun.size).to_radians();
-            vec![light(to_light, half_angle, clear_sky(manifest).sun())]
-        }
-        (IntegratorKind::Path, EnvironmentKind::Image, Some(map)) => {
-            let axes = image_axes(manifest, up);
-            let of_map =
-                |sun: &MapSun| light(axes.to_world(sun.direction), sun.half_angle, sun.irradiance);
-            map.suns.iter().map(of_map).collect()
-        }
-        _ => Vec::new(),
-    }
+    Ok(Surroundings { environment: Some(Arc::new(environment)), suns })
 }
 
 #[cfg(test)]
@@ -156,9 +133,8 @@ mod tests {
         let view = CameraView { eye: DVec3::NEG_Y, look_at: DVec3::ZERO, up: DVec3::Z, fov: 30.0 };
         let of = |manifest: &Manifest| {
             let image = EnvironmentMap::new(manifest, map());
-            let lights = suns(manifest, Some(&image), &view, DVec3::Z);
-            let environment = environment(manifest, Some(&image), &view, DVec3::Z);
-            (lights, image.notes(Path::new("a.exr")), environment.expect("one").expect("one"))
+            let found = surroundings(manifest, Some(&image), &view, DVec3::Z).expect("light");
+            (found.suns, image.notes(Path::new("a.exr")), found.environment.expect("one"))
         };
         let (lights, notes, sky) = of(&manifest);
         let [Light { kind: scene::LightKind::Sun { to_light, .. }, radiance, .. }] = &lights[..]

@@ -27,14 +27,15 @@ impl EnvironmentImage {
     /// The image of a function of the direction: the mean over four points of a pixel.
     pub(super) fn from_fn(of: impl Fn(Vec3) -> Vec3) -> Self {
         // All rows have the same longitudes
-        let longitudes: Vec<[[f64; 2]; 2]> =
-            (0..COLUMNS).map(|x| [longitude(x, 0.25), longitude(x, 0.75)]).collect();
+        let longitudes: Vec<[[f64; 2]; 2]> = (0..COLUMNS)
+            .map(|x| [longitude(x, 0.25, COLUMNS), longitude(x, 0.75, COLUMNS)])
+            .collect();
         let mut pixels = Vec::with_capacity(COLUMNS * ROWS);
         for row in 0..ROWS {
-            let [above, below] = [polar(row, 0.25), polar(row, 0.75)];
+            let [above, below] = [polar(row, 0.25, ROWS), polar(row, 0.75, ROWS)];
             for [left, right] in &longitudes {
-                let [a, b] = [direction_at(above, *left), direction_at(above, *right)];
-                let [c, d] = [direction_at(below, *left), direction_at(below, *right)];
+                let [a, b] = [left, right].map(|at| direction_at(above, *at).as_vec3());
+                let [c, d] = [left, right].map(|at| direction_at(below, *at).as_vec3());
                 pixels.push(0.25 * (of(a) + of(b) + of(c) + of(d)));
             }
         }
@@ -89,13 +90,14 @@ impl EnvironmentImage {
 
     /// The integral over all directions of the radiance times a `weight` of the direction of each pixel's centre.
     pub(super) fn integral(&self, weight: impl Fn(Vec3) -> f32) -> Vec3 {
-        let longitudes: Vec<[f64; 2]> = (0..COLUMNS).map(|x| longitude(x, 0.5)).collect();
+        let longitudes: Vec<[f64; 2]> = (0..COLUMNS).map(|x| longitude(x, 0.5, COLUMNS)).collect();
         let mut sum = DVec3::ZERO;
         for (row, pixels) in self.rows().enumerate() {
             let height = edge_cosine(row, ROWS) - edge_cosine(row + 1, ROWS);
-            let polar = polar(row, 0.5);
+            let polar = polar(row, 0.5, ROWS);
             let terms = pixels.iter().zip(&longitudes).map(|(rgb, longitude)| {
-                let weighted = weight(direction_at(polar, *longitude)) * Vec3::from_array(*rgb);
+                let weighted =
+                    weight(direction_at(polar, *longitude).as_vec3()) * Vec3::from_array(*rgb);
                 weighted.as_dvec3()
             });
             sum += height * terms.sum::<DVec3>();
@@ -112,21 +114,21 @@ fn index(position: f32, count: usize) -> usize {
     if cell < count { cell } else { count - 1 }
 }
 
-/// Sine and cosine of the polar angle at a height in `row`.
-fn polar(row: usize, down: f64) -> [f64; 2] {
-    let polar = (row as f64 + down) * std::f64::consts::PI / ROWS as f64;
+/// Sine and cosine of the polar angle at a height in `row`, of `rows` rows.
+pub(super) fn polar(row: usize, down: f64, rows: usize) -> [f64; 2] {
+    let polar = (row as f64 + down) * std::f64::consts::PI / rows as f64;
     [libm::sin(polar), libm::cos(polar)]
 }
 
-/// Sine and cosine of the longitude at a position in `column`.
-fn longitude(column: usize, across: f64) -> [f64; 2] {
-    let longitude = (column as f64 + across) * 2.0 * std::f64::consts::PI / COLUMNS as f64;
+/// Sine and cosine of the longitude at a position in `column`, of `columns` columns.
+pub(super) fn longitude(column: usize, across: f64, columns: usize) -> [f64; 2] {
+    let longitude = (column as f64 + across) * 2.0 * std::f64::consts::PI / columns as f64;
     [libm::sin(longitude), libm::cos(longitude)]
 }
 
 /// The direction of a polar angle and a longitude, given by their sines and cosines.
-fn direction_at([level, z]: [f64; 2], [sin, cos]: [f64; 2]) -> Vec3 {
-    DVec3::new(level * cos, level * sin, z).as_vec3()
+pub(super) fn direction_at([level, z]: [f64; 2], [sin, cos]: [f64; 2]) -> DVec3 {
+    DVec3::new(level * cos, level * sin, z)
 }
 
 /// Cosine of the polar angle at the upper edge of a row, of `rows` rows.

@@ -165,14 +165,12 @@ impl Geometry {
         height * 2.0 * std::f64::consts::PI / self.width as f64
     }
 
-    /// The direction of the centre of a pixel: the middle column is in front.
+    /// The direction of the centre of a pixel. The middle column is in front.
     fn direction(&self, pixel: usize) -> DVec3 {
         let (row, column) = (pixel / self.width, pixel % self.width);
-        let longitude =
-            ((column as f64 + 0.5) / self.width as f64 + 0.25) * 2.0 * std::f64::consts::PI;
-        let polar = (row as f64 + 0.5) / self.height as f64 * std::f64::consts::PI;
-        let level = libm::sin(polar);
-        DVec3::new(level * libm::cos(longitude), level * libm::sin(longitude), libm::cos(polar))
+        let quarter = 0.25 * self.width as f64;
+        let longitude = image::longitude(column, quarter + 0.5, self.width);
+        image::direction_at(image::polar(row, 0.5, self.height), longitude)
     }
 
     /// The pixels around one, across the edge of the map, and not across the poles.
