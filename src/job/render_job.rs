@@ -31,8 +31,6 @@ pub struct RenderJob {
     files: SceneFiles,
     /// The number of the frame that others are placed like, if they are.
     reference: Option<i64>,
-    /// Why a new job that may be rendered on a GPU is not, if there is something to say.
-    why_cpu: Option<String>,
 }
 
 /// The setting of plans with the number of the frame that others are placed like; not a key of manifests.
@@ -55,7 +53,7 @@ impl RenderJob {
         let files = SceneFiles::new(manifest_file.dir());
         let first = sequence.frames().first().map(|frame| frame.number);
         let reference = first.filter(|_| manifest.cell.has_reference());
-        Ok(Self { manifest, manifest_file, shown_output, shard, files, reference, why_cpu: None })
+        Ok(Self { manifest, manifest_file, shown_output, shard, files, reference })
     }
 
     /// The job with the defaults of the version that began it, if a run in `mode` resumes one.
@@ -231,32 +229,40 @@ impl RenderJob {
         Ok(mode == ResumeMode::KeepDone && !changes()?.is_empty())
     }
 
-    /// Opens the job. Surveys the sequence if that is necessary, and chooses the device of a new job.
-    pub(super) fn open(&mut self, sequence: &Sequence, mode: ResumeMode) -> Result<Job, RunError> {
+    /// Opens the job. Surveys the sequence if that is necessary, and chooses the device of a new job. Returns a note if that
+    /// is not a GPU.
+    pub(super) fn open(
+        &mut self,
+        sequence: &Sequence,
+        mode: ResumeMode,
+    ) -> Result<(Job, Option<String>), RunError> {
         // Start a new job, or discard an old one, only if its images are possible
-        let surveyed = match self.existing_plan(mode)? {
-            None => Some(self.survey_for_start(sequence)?),
-            Some(_) => None,
+        let (surveyed, why_cpu) = match self.existing_plan(mode)? {
+            None => {
+                let (survey, setup) = self.survey_for_start(sequence)?;
+                (Some(serde_json::to_value(&survey)?), setup.run.why_cpu)
+            }
+            Some(_) => (None, None),
         };
         let request = self.request(sequence, mode)?;
         let resolve = |_: Option<&Value>| match surveyed {
             Some(survey) => Ok(survey),
             None => Ok::<_, RunError>(serde_json::to_value(self.survey(sequence)?.0)?),
         };
-        Ok(Job::open(self.dir(), request, resolve)?)
+        let job = Job::open(self.dir(), request, resolve)?;
+        Ok((job, why_cpu.as_deref().map(cpu_note)))
     }
 
-    fn survey_for_start(&mut self, sequence: &Sequence) -> Result<Value, RunError> {
+    fn survey_for_start(&mut self, sequence: &Sequence) -> Result<(Survey, Setup), RunError> {
         let (survey, setup) = self.survey(sequence)?;
         // All workers of the job use the same device
         if setup.picture.renderer == RendererKind::Gpu {
             self.manifest.render.device = DeviceSetting::Gpu;
         }
-        self.why_cpu.clone_from(&setup.run.why_cpu);
         let mut tasks = self.tasks(sequence, &self.selected(sequence));
         self.schedule(sequence, &setup, &mut tasks);
         require_one_fits(&tasks)?;
-        Ok(serde_json::to_value(&survey)?)
+        Ok((survey, setup))
     }
 
     /// Surveys the sequence, and resolves the automatic settings with it. An automatic device is a GPU if one suits.
@@ -299,11 +305,6 @@ impl RenderJob {
     /// The image cannot be read.
     pub fn scene_notes(&self) -> Result<Vec<String>, RunError> {
         self.files.notes(&self.manifest)
-    }
-
-    /// Why a new job that may be rendered on a GPU is not, if there is something to say.
-    pub(super) fn device_note(&self) -> Option<String> {
-        self.why_cpu.as_ref().map(|why| cpu_note(why))
     }
 
     /// The setup with the survey that is stored in the plan.

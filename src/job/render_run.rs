@@ -45,7 +45,7 @@ impl RenderRun {
         render_job.check_output_dir(mode)?;
         render_job.check_manifest_file()?;
         let mut render_job = render_job.resuming(mode)?;
-        let job = render_job.open(&sequence, mode)?;
+        let (job, device_note) = render_job.open(&sequence, mode)?;
         let mut notes: Vec<String> = job.requeued().iter().map(repeat_note).collect();
         // Schedule the frames with the settings that it has stored
         let (survey, setup) = render_job.stored_setup(job.resolved(), &sequence)?;
@@ -53,7 +53,7 @@ impl RenderRun {
         let schedule = render_job.schedule(&sequence, &setup, &mut tasks);
         require_one_fits(&tasks)?;
         // Write the manifest, and collect what the user should know
-        notes.extend(render_job.device_note());
+        notes.extend(device_note);
         notes.extend(render_job.scene_notes()?);
         notes.extend(render_job.write_manifest(mode)?);
         if schedule.overlap == Overlap::None && tasks.len() > 1 {
