@@ -7,7 +7,7 @@ use std::time::Instant;
 use spherule_files::memory::MemoryUse;
 use spherule_gpu::{
     AdapterSummary, Arithmetic, Checks, Cost, Device, GpuError, Missing, SceneError, SceneRenderer,
-    bytes_per_pixel, missing, ray_counts, tree_bytes,
+    bytes_per_pixel, missing, ray_counts, spheres_within, tree_bytes,
 };
 
 use super::denoise::denoise_film;
@@ -152,15 +152,12 @@ pub fn suits(setup: &Setup, particles: u64) -> Result<(), Option<String>> {
     if *is_software {
         return Err(Some(format!("{name} is a program on the CPU")));
     }
-    let most = max_array / BYTES_OF_LEAF;
+    let most = spheres_within(*max_array);
     if particles > most {
         return Err(Some(format!("a frame has {particles} particles, and {name} takes {most}")));
     }
     Ok(())
 }
-
-/// The bytes of a particle in the largest array of a tree.
-const BYTES_OF_LEAF: u64 = 16;
 
 fn key_of(missing: Missing) -> &'static str {
     match missing {

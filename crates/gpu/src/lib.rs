@@ -96,4 +96,6 @@ pub use picture::{
 };
 pub use renderer::{Colors, Cost, NearestSample, Pixels, Renderer, bytes_per_pixel};
 pub use scene::{Missing, SceneError, SceneRenderer, missing, ray_counts};
-pub use tree::{Centers, KeyLength, MAX_SPHERES, Order, Radii, Spheres, tree_bytes};
+pub use tree::{
+    Centers, KeyLength, MAX_SPHERES, Order, Radii, Spheres, spheres_within, tree_bytes,
+};

@@ -21,6 +21,15 @@ const TILE: u64 = 2048;
 /// Largest number of spheres: their places have 28 bits for the block.
 pub const MAX_SPHERES: u64 = BLOCK << 28;
 
+/// Bytes of a sphere in the largest array of a tree.
+const BYTES_OF_SPHERE: u64 = 16;
+
+/// Number of spheres whose tree has no array larger than so many bytes.
+pub const fn spheres_within(max_array: u64) -> u64 {
+    let count = max_array / BYTES_OF_SPHERE;
+    if count < MAX_SPHERES { count } else { MAX_SPHERES }
+}
+
 /// The spheres of a frame.
 #[derive(Debug, Clone, Copy)]
 pub struct Spheres<'a> {
@@ -290,7 +299,7 @@ pub fn tree_bytes(count: u64, is_common: bool) -> u64 {
     let blocks = block_count(count);
     let nodes: u64 = level_sizes(blocks).iter().sum();
     let radii = if is_common { 0 } else { 4 + 4 };
-    let of_spheres = (12 + 2 * 8 + radii) * count + 16 * blocks * BLOCK;
+    let of_spheres = (12 + 2 * 8 + radii) * count + BYTES_OF_SPHERE * blocks * BLOCK;
     of_spheres + 1024 * count.div_ceil(TILE) + 48 * blocks + 64 * nodes
 }
 
@@ -561,7 +570,7 @@ struct Steps(Vec<Step>);
 fn shape_of(spheres: &Spheres<'_>) -> Result<TreeShape, GpuError> {
     let count = spheres.centers.count();
     if count > MAX_SPHERES {
-        let (bytes, max) = (16 * count, 16 * MAX_SPHERES);
+        let (bytes, max) = (BYTES_OF_SPHERE * count, BYTES_OF_SPHERE * MAX_SPHERES);
         return Err(GpuError::TooLarge { what: "particles", bytes, max });
     }
     let is_in_blocks = matches!(spheres.centers, Centers::Blocks { .. });
