@@ -54,8 +54,7 @@ impl Rules<'_> {
         if !self.lacks(key) {
             return false;
         }
-        let quote = if condition.contains('\'') { '"' } else { '\'' };
-        let style = |draw: &str| format!("--style {quote}{condition}: {draw}{quote}");
+        let style = |draw: &str| format!("--style {}", quoted(&format!("{condition}: {draw}")));
         if let Some((how, walls)) = self.wall_style(&condition) {
             self.found.settings.extend(layer(walls, "the defaults"));
             let hidden = style("hidden");
@@ -145,7 +144,7 @@ impl Rules<'_> {
     }
 }
 
-/// A text in a condition.
+/// A text in quotes that it has not itself.
 fn quoted(text: &str) -> String {
     let quote = if text.contains('\'') { '"' } else { '\'' };
     format!("{quote}{text}{quote}")

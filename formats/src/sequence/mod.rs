@@ -336,6 +336,7 @@ impl Sequence {
         names: &[String],
         read: impl FnOnce(&Self) -> T,
     ) -> Result<T, SequenceError> {
+        // Parts keep their numbers: those that are left out unless they are named stay left out
         let (frames, all_parts) = (self.frames.clone(), self.all_parts.take());
         let found = self.keep_parts(names).map(|()| read(self));
         (self.frames, self.all_parts) = (frames, all_parts);

@@ -17,7 +17,7 @@ pub const FORMAT: Format = Format::new(&Tipsy);
 
 struct Tipsy;
 
-/// Bytes of the header, the last four of which mean nothing.
+/// Bytes of the header; the last four are padding.
 const HEADER: usize = 32;
 const SIZE: usize = ScalarType::F32.size();
 const PART: &str = "part";

@@ -127,7 +127,8 @@ fn has_atom(text: &mut TextInput<'_>) -> bool {
     is_name && text.line().is_some_and(is_vector)
 }
 
-/// The frames of a trajectory, or the structure. What is no frame is one last step, so that reading it gives the error.
+/// The frames of a trajectory, or the structure. Text that is not a frame becomes a last step: reading that
+/// step reports the error.
 fn steps(text: &mut TextInput<'_>, budget: MemoryBudget) -> Result<Vec<Step>, ParseError> {
     let mut steps = Vec::new();
     let codes = Codes::in_head(text.head());

@@ -89,7 +89,8 @@ fn is_kind(word: &[u8]) -> bool {
     word.eq_ignore_ascii_case(b"direct") || word.eq_ignore_ascii_case(b"cartesian")
 }
 
-/// The structure, or the frames of a trajectory. What is no frame is one last step, so that reading it gives the error.
+/// The structure, or the frames of a trajectory. Text that is not a frame becomes a last step: reading that
+/// step reports the error.
 fn steps(text: &mut TextInput<'_>, budget: MemoryBudget) -> Result<Vec<Step>, ParseError> {
     let mut steps = Vec::new();
     let (mut count, mut start) = (0, text.at());
