@@ -16,7 +16,7 @@ use crate::render::{Channels, DataWindow, Film, FilmRows};
 const BAND_ROWS: u32 = 16;
 
 /// Primaries and white of all colours: those of sRGB and Rec. 709.
-const PRIMARIES: Chromaticities = Chromaticities {
+pub(super) const PRIMARIES: Chromaticities = Chromaticities {
     red: Vec2(0.64, 0.33),
     green: Vec2(0.30, 0.60),
     blue: Vec2(0.15, 0.06),

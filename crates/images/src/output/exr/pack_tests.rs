@@ -8,6 +8,7 @@ use exr::prelude::{
     LineOrder, ReadChannels, ReadLayers, WritableImage, f16, read,
 };
 
+use super::super::layout::PRIMARIES;
 use super::super::planes::{PlaneNames, Source, channels_in_file};
 use super::super::tests::COMPRESSIONS;
 use super::super::{ExrOptions, TextAttribute, attributes, encode_exr, write_blocks, write_exr};
@@ -100,7 +101,9 @@ fn written_by_exr(film: &Film, options: &ExrOptions) -> Vec<u8> {
     let channels = AnyChannels::sort(list.collect());
     let layer = Layer::new(size, attributes(options).unwrap(), encoding, channels);
     let window = IntegerBounds::from_dimensions(size);
-    let image = Image::empty(ImageAttributes::new(window)).with_layer(layer);
+    let shared =
+        ImageAttributes { chromaticities: Some(PRIMARIES), ..ImageAttributes::new(window) };
+    let image = Image::empty(shared).with_layer(layer);
     let mut file = Cursor::new(Vec::new());
     image.write().to_buffered(&mut file).unwrap();
     file.into_inner()
