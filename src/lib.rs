@@ -62,6 +62,8 @@
 pub mod cli;
 pub mod conversion;
 pub mod defaults;
+#[cfg(feature = "explore")]
+pub mod explore;
 pub mod job;
 pub mod pipeline;
 pub mod prelude;

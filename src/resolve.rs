@@ -1,7 +1,7 @@
 //! Turns a [`Manifest`] and a [`Survey`] of the particles into a [`Setup`]: every "auto" gets its value.
 
 use crate::math::narrow;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 use spherule_files::memory::available;
@@ -14,7 +14,7 @@ use crate::pipeline::{
     RadiusRule, Setup, Things, gpu,
 };
 use crate::render::{RenderSettings, RendererKind};
-use crate::scene::{Bounds, Texture};
+use crate::scene::{Bounds, Environment, Texture};
 use crate::selection::Division;
 use crate::survey::Survey;
 
@@ -61,6 +61,8 @@ const MIN_RADIUS: f64 = 1e-6;
 pub struct SceneInputs<'a> {
     /// The image of the environment, if that is one.
     pub environment: Option<&'a EnvironmentMap>,
+    /// Where the environment is kept that was made with these settings, whatever the view.
+    pub made: Option<&'a OnceLock<Environment>>,
     /// Those of overlays of the type image, in their order.
     pub overlays: &'a [Arc<RgbaPixels>],
     /// The picture on the ground.
@@ -143,7 +145,7 @@ fn setup_on(
     let range = survey.color.as_ref();
     let color = color::rule(&manifest.material.color, range, survey, Some(&placed.camera))?;
     // Set up what it sees; things are numbered in the order in which their materials are added
-    let mut scene = scene::scene(manifest, survey, inputs.environment, &placed, &extent)?;
+    let mut scene = scene::scene(manifest, survey, inputs, &placed, &extent)?;
     let meshes = meshes::things(&mut scene, manifest, &inputs.meshes);
     let cell = cell::add_cell(&mut scene, manifest, survey);
     let place = (survey, &color, extent.reach);

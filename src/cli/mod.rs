@@ -34,6 +34,7 @@ mod devices;
 mod disk;
 mod errors;
 mod events;
+mod explore;
 mod export;
 mod generate;
 mod guesses;
@@ -78,6 +79,8 @@ enum Command {
     Render(Box<render::RenderArgs>),
     /// Render a single frame to a PNG or EXR, without a job, to try settings.
     Still(Box<still::StillArgs>),
+    /// Find the view and the settings on a local page with the mouse, then save or render the job.
+    Explore(Box<explore::ExploreArgs>),
     /// Print what `render` would do, with memory and time. Changes nothing.
     Check(Box<check::CheckArgs>),
     /// Write a movie of the finished pictures of a job: MP4, MOV, WebM, GIF, animated PNG or WebP.
@@ -181,6 +184,7 @@ fn run(command: Command) -> Result<Outcome, CliError> {
     match command {
         Command::Render(args) => render::run(&args),
         Command::Still(args) => still::run(*args),
+        Command::Explore(args) => explore::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Movie(args) => movie::run(&args),
         Command::Sheet(args) => sheet::run(&args),

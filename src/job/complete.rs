@@ -4,10 +4,9 @@ use spherule_formats::sequence::Sequence;
 use spherule_jobs::{Job, ResumeMode};
 
 use super::manifest_file::JobManifest;
-use super::{RunError, in_thread};
+use super::{Findings, RunError};
 use crate::defaults::{Defaults, Files, planned, rules, walls};
 use crate::manifest::{Look, ManifestSource, real_dir};
-use crate::survey::Facts;
 
 impl JobManifest {
     /// Completes the manifest with the defaults that follow from the particles of `sequence`, from which walls may
@@ -20,6 +19,19 @@ impl JobManifest {
         &mut self,
         sequence: &mut Sequence,
         mode: Option<ResumeMode>,
+    ) -> Result<Vec<String>, RunError> {
+        self.complete_with(sequence, mode, &mut Findings::default())
+    }
+
+    /// [`Self::complete`] with what was found of the sequence before, and what is found now.
+    ///
+    /// # Errors
+    /// Same as [`Self::complete`].
+    pub fn complete_with(
+        &mut self,
+        sequence: &mut Sequence,
+        mode: Option<ResumeMode>,
+        findings: &mut Findings,
     ) -> Result<Vec<String>, RunError> {
         let Some(source) = self.source.clone() else {
             return Ok(Vec::new());
@@ -44,7 +56,7 @@ impl JobManifest {
             Some(plan) => {
                 Defaults { settings: planned(&source, plan.settings()), lines: Vec::new() }
             }
-            None => self.defaults(&source, sequence)?,
+            None => self.defaults(&source, sequence, findings)?,
         };
         // Apply them below what the user gave
         let mut manifest = source.parse_over(defaults.settings)?;
@@ -60,16 +72,14 @@ impl JobManifest {
         &self,
         source: &ManifestSource,
         sequence: &mut Sequence,
+        findings: &mut Findings,
     ) -> Result<Defaults, RunError> {
         // The facts are those of what is drawn. Who has styles says what that is
         let is_open = source.lacks("input.parts")
             && self.manifest.styles.is_empty()
             && self.manifest.look != Look::Whitted;
         let walls = walls(sequence.part_names()).filter(|_| is_open);
-        let facts = match &walls {
-            Some(walls) => sequence.with_parts(&walls.kept, |s| in_thread(|| Facts::of(s)))?,
-            None => in_thread(|| Facts::of(sequence)),
-        };
+        let facts = findings.facts(sequence, walls.as_ref())?;
         // Files are opened for names only where there are numbers to name
         let names = if facts.categories.is_empty() { Vec::new() } else { sequence.value_names() };
         let files = Files {
@@ -79,6 +89,6 @@ impl JobManifest {
             is_y_up: sequence.is_y_up(),
             is_molecular: sequence.format_info().is_some_and(|format| format.is_molecular),
         };
-        Ok(rules(&self.manifest, source, &facts, files))
+        Ok(rules(&self.manifest, source, facts, files))
     }
 }

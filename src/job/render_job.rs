@@ -11,7 +11,7 @@ use super::manifest_file::{JobManifest, ManifestFile};
 use super::scene_files::SceneFiles;
 use super::selection::{frame_requests, frames_in, indices, select};
 use super::target::{check_output_dir, stored_survey};
-use super::{RunError, Shard, in_thread};
+use super::{Findings, RunError, Shard};
 use crate::manifest::{DeviceSetting, FitSetting, Manifest};
 use crate::pipeline::{FrameSize, ImageTask, MemoryModel, NextMeshes, Schedule, Setup, gpu};
 use crate::render::RendererKind;
@@ -65,6 +65,15 @@ impl RenderJob {
             self.manifest.adopt_old_defaults(planned.settings());
         }
         Ok(self)
+    }
+
+    /// The job with the pictures and meshes that `other` has read, if both name the same ones.
+    #[must_use]
+    pub fn with_files_of(mut self, other: &Self) -> Self {
+        if self.files.are_those_of(&other.files, [&self.manifest, &other.manifest]) {
+            self.files = other.files.clone();
+        }
+        self
     }
 
     /// The manifest, with paths relative to [`RenderJob::dir`].
@@ -270,11 +279,23 @@ impl RenderJob {
     /// # Errors
     /// No frame can be read, or the settings and the particles do not go together.
     pub fn survey(&self, sequence: &Sequence) -> Result<(Survey, Setup), RunError> {
+        self.survey_with(sequence, &mut Findings::default())
+    }
+
+    /// [`Self::survey`] with what was found of the sequence before, and what is found now.
+    ///
+    /// # Errors
+    /// Same as [`Self::survey`].
+    pub fn survey_with(
+        &self,
+        sequence: &Sequence,
+        findings: &mut Findings,
+    ) -> Result<(Survey, Setup), RunError> {
         let inquiry = Inquiry::of(&self.manifest);
         let styles = inquiry.styles();
         let question =
             Question { framed: self.framed(sequence), ..inquiry.question(styles.as_ref()) };
-        let survey = in_thread(|| Survey::of(sequence, question))?;
+        let survey = findings.survey(sequence, question)?;
         let mut setup = self.setup(&survey, sequence)?;
         if self.manifest.render.device == DeviceSetting::Auto {
             match gpu::suits(&setup, survey.most_particles as u64) {

@@ -12,7 +12,7 @@ use crate::overlay::RgbaPixels;
 use crate::picture::read_rgba;
 use crate::pipeline::Setup;
 use crate::resolve::{self, EnvironmentMap, SceneInputs, check_views};
-use crate::scene::Texture;
+use crate::scene::{Environment, Texture};
 use crate::survey::Survey;
 use spherule_images::file::ImageReadError;
 
@@ -27,6 +27,8 @@ pub struct SceneFiles {
     /// See [`SceneFiles::overlay_images`].
     overlay_images: OnceLock<Vec<Arc<RgbaPixels>>>,
     meshes: JobMeshes,
+    /// The environment of the manifest.
+    environment: OnceLock<Environment>,
 }
 
 impl SceneFiles {
@@ -38,7 +40,21 @@ impl SceneFiles {
             ground_image: OnceLock::new(),
             overlay_images: OnceLock::new(),
             meshes: JobMeshes::default(),
+            environment: OnceLock::new(),
         }
+    }
+
+    /// Whether these are the files of `other`, for these two manifests.
+    pub(super) fn are_those_of(&self, other: &Self, [one, two]: [&Manifest; 2]) -> bool {
+        let ground =
+            |manifest: &Manifest| (ground_path(manifest, &self.dir), manifest.render.ground_color);
+        self.dir == other.dir
+            && one.integrator() == two.integrator()
+            && one.environment == two.environment
+            && ground(one) == ground(two)
+            && one.overlays == two.overlays
+            && one.meshes == two.meshes
+            && one.styles == two.styles
     }
 
     /// The setup of `frames`, if the view is valid along the whole camera path.
@@ -53,6 +69,7 @@ impl SceneFiles {
     ) -> Result<Setup, RunError> {
         let inputs = SceneInputs {
             environment: self.environment_image(manifest)?,
+            made: Some(&self.environment),
             overlays: self.overlay_images(manifest)?,
             ground: self.ground_image(manifest)?,
             meshes: self.meshes.get(manifest, &self.dir, survey)?,

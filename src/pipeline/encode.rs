@@ -137,8 +137,16 @@ impl TracedFrame {
     /// # Errors
     /// The encoder fails.
     pub fn to_png(&self, setup: &Setup) -> Result<Vec<u8>, OutputError> {
+        self.to_picture(setup, PictureFormat::Png)
+    }
+
+    /// The bytes of a picture in a format other than EXR, after the view transform, with overlays.
+    ///
+    /// # Errors
+    /// The encoder fails, or the format has no alpha, which the background needs.
+    pub fn to_picture(&self, setup: &Setup, format: PictureFormat) -> Result<Vec<u8>, OutputError> {
         let options = setup.preview_from(&self.camera);
-        encode_preview(&self.film, &options, &setup.overlays_of(self))
+        encode_picture(&self.film, &options, &setup.overlays_of(self), format)
     }
 }
 

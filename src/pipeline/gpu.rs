@@ -237,14 +237,14 @@ impl FrameRenderer for GpuRenderer {
     fn render(
         &mut self,
         setup: &Setup,
-        frame: BuiltFrame,
+        frame: &BuiltFrame,
         stop: &dyn Stop,
     ) -> Result<TracedFrame, TraceError> {
         let start = Instant::now();
         let mut film = std::mem::take(&mut self.film);
-        let cost = self.draw(setup, &frame, &mut film, stop)?;
+        let cost = self.draw(setup, frame, &mut film, stop)?;
         let memory = MemoryUse::now();
-        let BuiltFrame { task, facts, time, mut report, .. } = frame;
+        let mut report = frame.report.clone();
         report.seconds.trace = start.elapsed().as_secs_f64();
         report.seconds.denoise = denoise_film(setup, &mut film)?;
         report.rays = ray_counts(&cost).into();
@@ -256,12 +256,12 @@ impl FrameRenderer for GpuRenderer {
         };
         report.device = Some(self.summary(&cost));
         Ok(TracedFrame {
-            camera: setup.camera_at(task.frame)?,
-            task,
+            camera: setup.camera_at(frame.task.frame)?,
+            task: frame.task.clone(),
             film,
             texts: Vec::new(),
-            facts,
-            time,
+            facts: frame.facts.clone(),
+            time: frame.time,
             report,
             memory,
         })

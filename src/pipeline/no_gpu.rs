@@ -53,7 +53,7 @@ impl FrameRenderer for GpuRenderer {
     fn render(
         &mut self,
         _: &Setup,
-        _: BuiltFrame,
+        _: &BuiltFrame,
         _: &dyn Stop,
     ) -> Result<TracedFrame, TraceError> {
         Self::refuse()

@@ -90,6 +90,13 @@ pub struct BuiltFrame {
     pub(super) notes: Vec<String>,
 }
 
+impl BuiltFrame {
+    /// Notes for the user.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+}
+
 /// Particle data that are not part of the tree.
 #[derive(Debug)]
 pub(super) enum BuiltParticles {
@@ -111,7 +118,8 @@ pub trait FrameRenderer: Send + Sync {
     /// The frame cannot be rendered: damaged nodes, or a surface that does not fit.
     fn prepare(&mut self, setup: &Setup, frame: LoadedFrame<'_>) -> Result<BuiltFrame, TraceError>;
 
-    /// Renders `frame`, which must be the one prepared last.
+    /// Renders `frame`, which must be the one prepared last. It can be rendered again, also with other settings of what
+    /// does not belong to its particles.
     ///
     /// # Errors
     /// [`crate::render::RenderError::Interrupted`] if `stop` is raised, [`TraceError::File`] if a native frame
@@ -119,7 +127,7 @@ pub trait FrameRenderer: Send + Sync {
     fn render(
         &mut self,
         setup: &Setup,
-        frame: BuiltFrame,
+        frame: &BuiltFrame,
         stop: &dyn Stop,
     ) -> Result<TracedFrame, TraceError>;
 

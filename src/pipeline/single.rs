@@ -77,5 +77,5 @@ fn trace<'a>(
     let mut tracer = renderer_of(setup.picture.renderer);
     let mut built = tracer.prepare(setup, frame)?;
     built.notes.drain(..).for_each(&mut note);
-    Ok(tracer.render(setup, built, stop)?)
+    Ok(tracer.render(setup, &built, stop)?)
 }

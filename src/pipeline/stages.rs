@@ -126,7 +126,7 @@ impl TraceStage<'_> {
                 if let Ok(film) = spare.try_recv() {
                     tracer.recycle(film);
                 }
-                let trace = || tracer.render(self.setup, frame, &self.stop);
+                let trace = || tracer.render(self.setup, &frame, &self.stop);
                 catch_panic(|| Ok(in_pool(trace)?)).map_err(failure)
             });
             if traced.is_err() {

@@ -98,29 +98,29 @@ impl FrameRenderer for CpuRenderer {
     fn render(
         &mut self,
         setup: &Setup,
-        frame: BuiltFrame,
+        frame: &BuiltFrame,
         stop: &dyn Stop,
     ) -> Result<TracedFrame, TraceError> {
         // Trace the image
         let start = Instant::now();
         let mut film = std::mem::take(&mut self.film);
-        let rays = self.draw(setup, &frame, &mut film, stop)?;
+        let rays = self.draw(setup, frame, &mut film, stop)?;
         let memory = MemoryUse::now();
         // Name its objects while the particles are there
-        let texts = matte_attributes(setup, &frame);
-        let BuiltFrame { task, facts, time, mut report, .. } = frame;
+        let texts = matte_attributes(setup, frame);
         // Denoise it, and complete the report
+        let mut report = frame.report.clone();
         report.seconds.trace = seconds(start.elapsed());
         report.clamped_light = rays.lost.part(&film.color, setup.picture.render.samples);
         report.seconds.denoise = denoise_film(setup, &mut film)?;
         report.rays = rays.into();
         Ok(TracedFrame {
-            camera: setup.camera_at(task.frame)?,
-            task,
+            camera: setup.camera_at(frame.task.frame)?,
+            task: frame.task.clone(),
             film,
             texts,
-            facts,
-            time,
+            facts: frame.facts.clone(),
+            time: frame.time,
             report,
             memory,
         })

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use super::ResolveError;
 use super::lights::group_index;
+use super::{ResolveError, SceneInputs};
 use crate::manifest::{EnvironmentKind, ExtractSun, Manifest};
 use crate::render::IntegratorKind;
 use crate::scene::environment::{
@@ -68,7 +68,7 @@ pub(super) struct Surroundings {
 /// The surroundings as they are placed by the first `view` of the camera.
 pub(super) fn surroundings(
     manifest: &Manifest,
-    map: Option<&EnvironmentMap>,
+    inputs: &SceneInputs<'_>,
     view: &CameraView,
     up: DVec3,
 ) -> Result<Surroundings, ResolveError> {
@@ -90,25 +90,31 @@ pub(super) fn surroundings(
         is_visible: settings.visible,
         group: group_index(manifest, settings.group.as_ref()),
     };
+    // It costs more than all the rest, and only its axes depend on the view
+    let made = |make: &dyn Fn() -> Environment| match inputs.made {
+        Some(known) => known.get_or_init(make).clone().with_axes(axes),
+        None => make(),
+    };
     let (environment, suns) = match settings.kind {
-        EnvironmentKind::Studio => (studio(axes, scale), Vec::new()),
+        EnvironmentKind::Studio => (made(&|| studio(axes, scale)), Vec::new()),
         EnvironmentKind::Constant => (Environment::constant(scale), Vec::new()),
         EnvironmentKind::Sky => {
             let direction = sky_direction(settings.sun.elevation, settings.sun.azimuth);
             let (turbidity, albedo) = (settings.turbidity, settings.albedo);
             let sky = ClearSky::new(&SkySettings { sun: direction, turbidity, albedo });
             let half_angle = (0.5 * settings.sun.size).to_radians();
-            (sky.environment(axes, scale), vec![sun(direction, half_angle, sky.sun())])
+            let environment = made(&|| sky.environment(axes, scale));
+            (environment, vec![sun(direction, half_angle, sky.sun())])
         }
         EnvironmentKind::Image => {
-            let map = map.ok_or_else(|| ResolveError::Unsupported {
+            let map = inputs.environment.ok_or_else(|| ResolveError::Unsupported {
                 key: "environment.image",
                 what: "the image has not been read".to_owned(),
             })?;
-            let image = Environment::from_map(axes, &map.reduced, scale);
+            let image = || Environment::from_map(axes, &map.reduced, scale);
             let of_map = |own: &MapSun| sun(own.direction, own.half_angle, own.irradiance);
             let suns = map.suns.iter().map(of_map).collect();
-            (image.with_detail(map.detail.clone(), scale), suns)
+            (made(&image).with_detail(map.detail.clone(), scale), suns)
         }
     };
     Ok(Surroundings { environment: Some(Arc::new(environment)), suns })
@@ -116,6 +122,8 @@ pub(super) fn surroundings(
 
 #[cfg(test)]
 mod tests {
+    use std::sync::OnceLock;
+
     use super::*;
 
     /// A sky of 1024x512 pixels with a sun above the middle.
@@ -126,6 +134,24 @@ mod tests {
     }
 
     #[test]
+    fn environments_that_are_kept_are_those_that_are_made() {
+        let mut manifest = Manifest::new("data");
+        for kind in [EnvironmentKind::Studio, EnvironmentKind::Constant, EnvironmentKind::Sky] {
+            manifest.environment.kind = kind;
+            let known = OnceLock::new();
+            let kept = SceneInputs { made: Some(&known), ..SceneInputs::default() };
+            for eye in [DVec3::NEG_Y, DVec3::new(3.0, 1.0, 2.0)] {
+                let view = CameraView { eye, look_at: DVec3::ZERO, up: DVec3::Z, fov: 30.0 };
+                let of = |inputs: &SceneInputs<'_>| {
+                    let found = surroundings(&manifest, inputs, &view, DVec3::Z);
+                    found.expect("light").environment.expect("one")
+                };
+                assert_eq!(of(&kept), of(&SceneInputs::default()), "{kind:?} {eye}");
+            }
+        }
+    }
+
+    #[test]
     fn suns_of_images_are_lights() {
         let mut manifest = Manifest::new("data");
         manifest.environment.kind = EnvironmentKind::Image;
@@ -133,7 +159,8 @@ mod tests {
         let view = CameraView { eye: DVec3::NEG_Y, look_at: DVec3::ZERO, up: DVec3::Z, fov: 30.0 };
         let of = |manifest: &Manifest| {
             let image = EnvironmentMap::new(manifest, map());
-            let found = surroundings(manifest, Some(&image), &view, DVec3::Z).expect("light");
+            let inputs = SceneInputs { environment: Some(&image), ..SceneInputs::default() };
+            let found = surroundings(manifest, &inputs, &view, DVec3::Z).expect("light");
             (found.suns, image.notes(Path::new("a.exr")), found.environment.expect("one"))
         };
         let (lights, notes, sky) = of(&manifest);

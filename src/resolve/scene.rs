@@ -3,9 +3,9 @@
 use glam::Vec3;
 
 use super::camera::PlacedCamera;
-use super::environment::{EnvironmentMap, Surroundings, surroundings};
+use super::environment::{Surroundings, surroundings};
 use super::ground::GroundPlace;
-use super::{Extent, ResolveError, ground, lights, parts, surface};
+use super::{Extent, ResolveError, SceneInputs, ground, lights, parts, surface};
 use crate::manifest::Manifest;
 use crate::render::IntegratorKind;
 use crate::scene::{Background, DEFAULT_AMBIENT_LIGHT, PartMaterials, Scene, default_lights};
@@ -18,13 +18,13 @@ use crate::survey::Survey;
 pub(super) fn scene(
     manifest: &Manifest,
     survey: &Survey,
-    image: Option<&EnvironmentMap>,
+    inputs: &SceneInputs<'_>,
     placed: &PlacedCamera,
     extent: &Extent,
 ) -> Result<Scene, ResolveError> {
     // Find the lights: those of the manifest, the environment, and its sun
     let (up, bounds, view) = (extent.up, &extent.bounds, placed.view.path.start());
-    let Surroundings { environment, suns } = surroundings(manifest, image, &view, up)?;
+    let Surroundings { environment, suns } = surroundings(manifest, inputs, &view, up)?;
     let mut lights = match (manifest.lights.is_empty(), manifest.integrator()) {
         (false, _) => lights::lights(manifest, survey.origin, up)?,
         (true, IntegratorKind::Whitted) => default_lights(bounds, up, &view),

@@ -68,6 +68,7 @@ mod field;
 mod file;
 mod flags;
 mod focus;
+mod given;
 mod grains;
 mod ground;
 mod inline_table;

@@ -134,9 +134,14 @@ impl Entries {
 
     /// The commented file; keys that are not set are commented out.
     pub(super) fn file(&self) -> String {
+        self.file_of(|_| true)
+    }
+
+    /// The commented file with only the keys that `is_part`.
+    pub(super) fn file_of(&self, is_part: impl Fn(&Entry) -> bool) -> String {
         let mut text = String::new();
         let mut section = "";
-        for entry in &self.list {
+        for entry in self.list.iter().filter(|entry| is_part(entry)) {
             if entry.section != section {
                 section = &entry.section;
                 let _ = writeln!(text, "\n{}", entry.header);

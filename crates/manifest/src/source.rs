@@ -50,6 +50,28 @@ impl ManifestSource {
         Manifest::parse_with(&self.text, &self.path, all)
     }
 
+    /// Name of the file in messages.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The values that it gives, without those of its look; empty if it is not TOML.
+    pub(super) fn without_look(&self) -> TomlNode {
+        let mut tree = TomlNode::parse(&self.text).unwrap_or_else(|_| TomlNode::empty());
+        for own in self.overrides.iter().filter(|own| !own.is_under()) {
+            // Problems are reported when it is read
+            let _ = tree.lay_over(own.clone());
+        }
+        tree
+    }
+
+    /// The same with more `overrides`, which replace what it gives.
+    #[must_use]
+    pub fn with(&self, overrides: impl IntoIterator<Item = Override>) -> Self {
+        let all = self.overrides.iter().cloned().chain(overrides).collect();
+        Self::new(self.text.clone(), &self.path, all)
+    }
+
     /// Whether neither the manifest nor an override or the look gives a value of the dotted `key`.
     pub fn lacks(&self, key: &str) -> bool {
         self.given.as_ref().is_some_and(|tree| !tree.has(key))

@@ -157,6 +157,22 @@ impl TomlNode {
         }
     }
 
+    /// A table without values.
+    pub(super) fn empty() -> Self {
+        Self { kind: Kind::Table(BTreeMap::new()), place: Place::Nowhere }
+    }
+
+    /// Whether there is a value of the dotted `key`, which may be one of an item of a list: `light.0.color`.
+    pub(super) fn holds(&self, key: &str) -> bool {
+        let (first, rest) = key.split_once('.').map_or((key, None), |(a, b)| (a, Some(b)));
+        let child = match &self.kind {
+            Kind::Table(table) => table.get(first).map(|(_, child)| child),
+            Kind::Array(items) => first.parse::<usize>().ok().and_then(|index| items.get(index)),
+            _ => None,
+        };
+        child.is_some_and(|child| rest.is_none_or(|rest| child.holds(rest)))
+    }
+
     /// Whether there is a value of the dotted `key`.
     pub(super) fn has(&self, key: &str) -> bool {
         self.entry(key).is_some()

@@ -156,6 +156,12 @@ impl Environment {
         Self { detail: detail.map(|detail| (detail, scale)), ..self }
     }
 
+    /// The same around other axes.
+    #[must_use]
+    pub fn with_axes(self, axes: EnvironmentAxes) -> Self {
+        Self { axes, table: self.table.with_axes(axes), ..self }
+    }
+
     /// Whether it has an image at its own resolution.
     pub const fn has_detail(&self) -> bool {
         self.detail.is_some()

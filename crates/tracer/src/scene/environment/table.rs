@@ -77,6 +77,11 @@ impl EnvironmentTable {
         Self { axes, texels: TableSize::Fine(texels) }
     }
 
+    /// The same around other axes.
+    pub(super) fn with_axes(self, axes: EnvironmentAxes) -> Self {
+        Self { axes, ..self }
+    }
+
     /// The texels.
     #[inline(always)]
     pub(crate) const fn texels(&self) -> &TableSize {

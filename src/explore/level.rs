@@ -1,0 +1,163 @@
+//! How fine the pictures of a wish are, one after another: first one that is there at once, then finer ones, and at last
+//! the one of the job.
+
+/// Seconds that a picture may take while the mouse moves: about 20 a second.
+const QUICK: f64 = 0.045;
+
+/// Seconds that a picture in its own size may take to be the first one.
+const SHORT: f64 = 0.15;
+
+/// Seconds that all samples may take to leave out the steps before.
+const WHOLE: f64 = 0.4;
+
+/// Samples of the first pictures: noise that is removed is measured by the difference of two.
+const FIRST_SAMPLES: u32 = 2;
+
+/// Factor from the samples of one step to those of the next.
+const FINER: u32 = 4;
+
+/// The smallest side of a picture, pixels: a smaller one shows nothing.
+const LEAST_SIDE: u32 = 36;
+
+/// A picture of a wish.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Level {
+    /// Width and height in pixels.
+    pub(super) size: [u32; 2],
+    /// Samples per pixel.
+    pub(super) samples: u32,
+    /// Whether it is the picture of the job.
+    pub(super) is_last: bool,
+}
+
+/// The time of pictures of a page, from those that were rendered.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Speed {
+    /// Seconds for each sample of a pixel.
+    per_sample: f64,
+}
+
+impl Default for Speed {
+    /// That of one slow core, until a picture was rendered.
+    fn default() -> Self {
+        Self { per_sample: 1e-6 }
+    }
+}
+
+impl Speed {
+    /// Learns from a picture that took `seconds`. Small pictures also show what each picture costs.
+    pub(super) fn learn(&mut self, level: &Level, seconds: f64) {
+        let measured = seconds / level.work();
+        // Slower at once, faster step by step, so that the size does not jump
+        self.per_sample = if measured > self.per_sample {
+            measured
+        } else {
+            0.7 * self.per_sample + 0.3 * measured
+        };
+    }
+
+    fn seconds(&self, level: &Level) -> f64 {
+        self.per_sample * level.work()
+    }
+}
+
+impl Level {
+    fn work(&self) -> f64 {
+        let [width, height] = self.size.map(f64::from);
+        width * height * f64::from(self.samples)
+    }
+}
+
+/// The picture after `done`, or the first one; None if there is no finer one, or if another wish follows. The job has
+/// pictures of this `size` with so many `samples`.
+pub(super) fn next(
+    done: Option<Level>,
+    (size, samples): ([u32; 2], u32),
+    speed: Speed,
+    is_moving: bool,
+) -> Option<Level> {
+    let last = Level { size, samples, is_last: true };
+    let of = |samples: u32| {
+        if samples >= last.samples { last } else { Level { size, samples, is_last: false } }
+    };
+    let first = of(FIRST_SAMPLES);
+    match done {
+        None if is_moving => Some(quick(first, speed)),
+        None if speed.seconds(&last) <= WHOLE => Some(last),
+        None if speed.seconds(&first) <= SHORT => Some(first),
+        None => Some(quick(first, speed)),
+        Some(_) if is_moving => None,
+        Some(done) if done.is_last => None,
+        Some(_) if speed.seconds(&last) <= WHOLE => Some(last),
+        Some(done) if done.size != size => Some(first),
+        Some(done) => Some(of(done.samples.saturating_mul(FINER))),
+    }
+}
+
+/// A smaller picture that takes as long as [`QUICK`], with the shape of `whole`.
+fn quick(whole: Level, speed: Speed) -> Level {
+    let size = whole.size;
+    let scale = (QUICK / speed.seconds(&whole)).sqrt().min(1.0);
+    let [width, height] = size.map(f64::from);
+    let least = f64::from(LEAST_SIDE) / width.min(height);
+    let scale = scale.max(least).min(1.0);
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "at least 1 and at most the size"
+    )]
+    let size = [width, height].map(|side| (side * scale).round().max(1.0) as u32);
+    Level { size, is_last: false, ..whole }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const JOB: ([u32; 2], u32) = ([1280, 720], 16);
+
+    fn all(speed: Speed, is_moving: bool) -> Vec<Level> {
+        let mut levels = Vec::new();
+        while let Some(level) = next(levels.last().copied(), JOB, speed, is_moving) {
+            levels.push(level);
+            assert!(levels.len() < 20, "no end");
+        }
+        levels
+    }
+
+    #[test]
+    fn pictures_become_finer_until_that_of_the_job() {
+        // A machine that traces a million samples a second
+        let slow = Speed { per_sample: 1e-6 };
+        let levels = all(slow, false);
+        let [width, height] = levels[0].size;
+        assert!((20_000..25_000).contains(&(width * height)), "{levels:?}");
+        assert!((f64::from(width) / f64::from(height) - 16.0 / 9.0).abs() < 0.02);
+        let samples: Vec<u32> = levels.iter().map(|level| level.samples).collect();
+        assert_eq!(samples, [2, 2, 8, 16]);
+        assert!(levels[3].is_last && levels[3].size == JOB.0 && !levels[2].is_last);
+        // One that renders the whole picture at once
+        let fast = Speed { per_sample: 1e-9 };
+        assert_eq!(all(fast, false).len(), 1);
+        // While the mouse moves there is one picture
+        assert_eq!(all(slow, true).len(), 1);
+        assert_eq!(all(fast, true)[0], Level { size: JOB.0, samples: 2, is_last: false });
+    }
+
+    #[test]
+    fn the_size_follows_the_time() {
+        let mut speed = Speed::default();
+        let whole = |size| Level { size, samples: 2, is_last: false };
+        let level = quick(whole(JOB.0), speed);
+        speed.learn(&level, 1.0);
+        let smaller = quick(whole(JOB.0), speed);
+        assert!(smaller.size[0] < level.size[0] / 4, "{smaller:?}");
+        assert!(smaller.size[1] >= LEAST_SIDE);
+        for _ in 0..20 {
+            speed.learn(&smaller, 1e-4);
+        }
+        assert!(quick(whole(JOB.0), speed).size[0] > 2 * smaller.size[0]);
+        // Pictures smaller than the least are rendered as they are
+        assert_eq!(quick(whole([20, 10]), speed).size, [20, 10]);
+    }
+}
