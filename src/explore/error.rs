@@ -1,9 +1,11 @@
 //! Why there is no picture.
 
-use super::wish::MAX_SETTINGS;
 use crate::job::RunError;
 use crate::manifest::ManifestError;
 use crate::pipeline::ImageError;
+
+/// Settings of a wish, more than a page has keys.
+pub(super) const MAX_SETTINGS: usize = 1000;
 
 /// What a page shows in place of a picture, at the setting that it is about.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]

@@ -151,7 +151,7 @@ mod tests {
         let level = quick(whole(JOB.0), speed);
         speed.learn(&level, 1.0);
         let smaller = quick(whole(JOB.0), speed);
-        assert!(smaller.size[0] < level.size[0] / 4, "{smaller:?}");
+        assert!(smaller.size[0] < level.size[0] / 3, "{smaller:?}");
         assert!(smaller.size[1] >= LEAST_SIDE);
         for _ in 0..20 {
             speed.learn(&smaller, 1e-4);

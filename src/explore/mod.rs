@@ -12,12 +12,16 @@ mod level;
 mod particle;
 mod save;
 pub mod serve;
+mod shared;
 mod stage;
+#[cfg(test)]
+mod stage_tests;
 mod wish;
 mod worker;
 
 pub use error::{ExploreError, Fault};
-pub use explorer::{Answer, Explorer, PageId, Shown};
+pub use explorer::Explorer;
 pub use particle::{Histogram, ParticleValues};
 pub use save::{JobProgress, ManifestTexts, SaveError, Saved, SavedFiles};
+pub use shared::{Answer, PageId, Shown};
 pub use wish::{Setting, Wish};

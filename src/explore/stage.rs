@@ -8,9 +8,9 @@ use spherule_formats::{RawParticles, Sequence};
 use spherule_jobs::catch_panic;
 
 use super::encode::{self, Encoded};
-use super::error::ExploreError;
+use super::error::{ExploreError, MAX_SETTINGS};
 use super::level::Level;
-use super::wish::{MAX_SETTINGS, Setting, overrides};
+use super::wish::{Setting, overrides};
 use crate::job::{Findings, JobManifest, RenderJob, RunError, require_one_fits};
 use crate::manifest::{Manifest, ManifestSource};
 use crate::output::PictureFormat;

@@ -27,9 +27,6 @@ pub struct Wish {
     pub is_moving: bool,
 }
 
-/// Settings of a wish, more than a page has keys.
-pub(super) const MAX_SETTINGS: usize = 1000;
-
 /// The settings as values that replace those of a manifest.
 ///
 /// # Errors
@@ -38,7 +35,9 @@ pub(super) fn overrides(settings: &[Setting]) -> Result<Vec<Override>, Fault> {
     let of = |setting: &Setting| {
         let Setting { key, value } = setting;
         let fault = |what: String| Fault { message: what, key: Some(key.clone()) };
-        let value = toml::Value::try_from(value).map_err(|error| fault(error.to_string()))?;
+        // TOML has no null, and JSON has it for numbers that are not finite
+        let value = toml::Value::try_from(value)
+            .map_err(|_| fault(format!("{key}: a value of a manifest is needed, not {value}")))?;
         // The option that would set the same value
         let shown = format!("--set {key}={value}");
         Override::new(key, value, &shown).map_err(|error| fault(error.to_string()))

@@ -6,8 +6,8 @@ use serde_json::{Value, json};
 use spherule_jobs::catch_panic;
 
 use super::error::{ExploreError, Fault};
-use super::explorer::{PageTask, Shared, Shown, Task};
 use super::level::Level;
+use super::shared::{PageTask, Shared, Shown, Task};
 use super::stage::{Prepared, Stage, StagePicture, Under};
 use crate::pipeline::ImageError;
 use crate::render::Stop;

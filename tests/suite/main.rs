@@ -25,6 +25,7 @@ mod denoise;
 mod draft;
 mod elements;
 mod encoders;
+mod explore;
 mod export;
 mod figures;
 mod golden;

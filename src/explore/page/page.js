@@ -216,8 +216,10 @@ function clearFault() {
 function cameraOf(view) {
   const keys = {
     "camera.mode": "fixed", "camera.eye": short(view.eye), "camera.look_at": short(view.look_at),
-    "camera.up": short(unit(view.up)),
+    "camera.up": short(unit(view.up)), "camera.projection": view.projection,
   };
+  // Defaults of a fixed camera are others
+  if (view.projection === "perspective") keys["camera.fov"] = view.fov;
   if (view.projection === "orthographic") keys["camera.height"] = Number(view.height.toPrecision(9));
   return keys;
 }
@@ -273,13 +275,13 @@ function showSide(name) {
   state.view = null;
   choose({
     "camera.mode": undefined, "camera.eye": undefined, "camera.look_at": undefined, "camera.up": undefined,
-    "camera.height": undefined, "camera.key": undefined, "camera.view": name,
+    "camera.height": undefined, "camera.fov": undefined, "camera.key": undefined, "camera.view": name,
   });
 }
 
 function fit() {
   state.view = null;
-  choose(Object.fromEntries(["mode", "eye", "look_at", "up", "height", "view", "key"].map((k) => [`camera.${k}`, undefined])));
+  choose(Object.fromEntries(["mode", "eye", "look_at", "up", "height", "fov", "view", "key"].map((k) => [`camera.${k}`, undefined])));
 }
 
 /// The place of an event in the picture, as fractions; null outside.

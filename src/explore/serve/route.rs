@@ -8,8 +8,8 @@ use serde_json::{Value, json};
 
 use super::Service;
 use crate::explore::error::{ExploreError, Fault};
-use crate::explore::explorer::PageId;
 use crate::explore::save::SaveError;
+use crate::explore::shared::PageId;
 use crate::explore::wish::{Setting, Wish};
 use crate::manifest::job_schema;
 
