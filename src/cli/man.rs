@@ -16,9 +16,10 @@ Examples:
       Shows a page at once";
 
 /// The commands that have pages, for shells that complete them.
-const COMMANDS: [&str; 18] = [
+const COMMANDS: [&str; 19] = [
     "render",
     "still",
+    "explore",
     "check",
     "movie",
     "sheet",

@@ -7,6 +7,9 @@ use crate::pipeline::ImageError;
 /// Settings of a wish, more than a page has keys.
 pub(super) const MAX_SETTINGS: usize = 1000;
 
+/// Largest number of particles of a frame whose values are kept in memory beside the picture.
+pub(super) const MAX_VALUES: usize = 20_000_000;
+
 /// What a page shows in place of a picture, at the setting that it is about.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct Fault {
@@ -36,6 +39,14 @@ pub enum ExploreError {
     NoFrame {
         /// Its number.
         frame: i64,
+    },
+    /// There are too many particles to have all of their values in memory beside the picture.
+    #[error(
+        "values of single particles are shown of up to {MAX_VALUES} particles; here are {particles}"
+    )]
+    TooLarge {
+        /// Number of particles in the frame.
+        particles: usize,
     },
     /// There are too many settings.
     #[error("more than {MAX_SETTINGS} settings")]

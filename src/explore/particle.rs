@@ -65,9 +65,13 @@ impl Explorer {
     /// # Errors
     /// The frame cannot be read.
     pub fn names(&self, frame: i64) -> Option<Result<Vec<String>, ExploreError>> {
-        self.ask(move |stage| {
-            let particles = stage.particles(frame)?;
-            Ok(value_names(&particles.attributes, |_| true))
+        self.ask(move |stage| match stage.particles(frame) {
+            Ok(particles) => Ok(value_names(&particles.attributes, |_| true)),
+            // Without their components
+            Err(ExploreError::TooLarge { .. }) => {
+                Ok(stage.prepared().map(|own| own.survey.attributes.clone()).unwrap_or_default())
+            }
+            Err(error) => Err(error),
         })
     }
 }

@@ -8,7 +8,7 @@ use spherule_formats::{RawParticles, Sequence};
 use spherule_jobs::catch_panic;
 
 use super::encode::{self, Encoded};
-use super::error::{ExploreError, MAX_SETTINGS};
+use super::error::{ExploreError, MAX_SETTINGS, MAX_VALUES};
 use super::level::Level;
 use super::wish::{Setting, overrides};
 use crate::job::{Findings, JobManifest, RenderJob, RunError, require_one_fits};
@@ -275,6 +275,10 @@ impl Stage {
 
     /// The particles of `frame` as they are in its files. They stay in memory until others are asked for.
     pub(super) fn particles(&mut self, frame: i64) -> Result<&RawParticles, ExploreError> {
+        let count = self.prepared.as_ref().map_or(0, |own| own.survey.most_particles);
+        if count > MAX_VALUES {
+            return Err(ExploreError::TooLarge { particles: count });
+        }
         let frames = self.sequence.frames();
         let index = frames.iter().position(|own| own.number == frame);
         let index = index.ok_or(ExploreError::NoFrame { frame })?;
