@@ -3,7 +3,7 @@
     pip install bpy pysplashsurf numpy OpenEXR pillow     # bpy 4.5 needs Python 3.11
     python docs/compare/path_tracing.py dam_break_frame_23_24389_particles.bgeo out --spherule target/release/spherule
 
-Writes both pictures of each scene, and prints the tables of docs/cycles.md. Converged pictures that already exist in
+Writes both pictures of each scene, and prints the tables of docs/measurements/cycles.md. Converged pictures that already exist in
 the output directory are used again. The particle file is y-up; both programs read the same z-up copy of it.
 """
 
@@ -76,7 +76,7 @@ def write_particles(source, path):
 
 
 def write_mesh(source, path):
-    """The surface of water, y up, with the settings of docs/surfaces.md."""
+    """The surface of water, y up, with the settings of docs/measurements/surfaces.md."""
     run([
         "pysplashsurf", "reconstruct", source, f"-r={RADIUS}", "-l=2.0", "-c=0.5", "-t=0.6", "-o", path,
         "--mesh-cleanup=on", "--decimate-barnacles=on", "--mesh-smoothing-weights=on", "--mesh-smoothing-iters=25",

@@ -121,7 +121,7 @@ fn hidden_commands_are_neither_listed_nor_suggested() {
 /// Help and examples match the program.
 #[test]
 fn the_manual_of_maps_is_complete() {
-    let text = include_str!("../../docs/manual/looks.md");
+    let text = include_str!("../../docs/manual/colours.md");
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), [1]);
     let errors = workshop.run(&["render", "in", "--map", "xyzzy"]).expect(2).errors();

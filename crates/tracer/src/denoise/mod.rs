@@ -30,7 +30,7 @@
 //! bits. Pixels with NaN or infinite values keep theirs, and no other pixel receives them.
 //!
 //! Tiles with their border are copied to planes that stay in the cache, and are filtered row by row. The result does
-//! not depend on threads, tiles or the instruction set. `docs/speed.md` has times and errors.
+//! not depend on threads, tiles or the instruction set. `docs/measurements/speed.md` has times and errors.
 
 use glam::Vec3;
 use rayon::prelude::*;
