@@ -9,7 +9,7 @@ use super::error::{ExploreError, Fault};
 use super::level::Level;
 use super::shared::{PageTask, Shared, Shown, Task};
 use super::stage::{Prepared, Stage, StagePicture, Under};
-use crate::pipeline::ImageError;
+use crate::pipeline::{ColorRule, ImageError, Setup};
 use crate::render::Stop;
 use crate::scene::Projection;
 
@@ -103,6 +103,7 @@ fn facts(
         "is_last": level.is_last,
         "milliseconds": (total * 1e3).round(),
         "notes": notes.collect::<Vec<_>>(),
+        "range": color_range(setup),
         "bounds": [prepared.survey.min.to_array(), prepared.survey.max.to_array()],
         "view": {
             "eye": view.eye.to_array(),
@@ -114,6 +115,14 @@ fn facts(
             "axis": setup.picture.view.up.to_array(),
         },
     })
+}
+
+/// The values at the ends of the colours, if these follow a value.
+fn color_range(setup: &Setup) -> Option<[f64; 2]> {
+    match &setup.picture.particles.color {
+        ColorRule::Attribute { map, .. } => map.range().map(|(range, _)| range),
+        _ => None,
+    }
 }
 
 impl Under {

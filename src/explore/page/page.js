@@ -117,6 +117,7 @@ function showPicture({ wish: number, facts }, blob) {
   // While the mouse moves, the view here is ahead of the picture
   if (!state.isMoving && number >= state.wishes) {
     state.view = facts.view;
+    if (facts.is_last && state.histogram) drawHistogram();
     clearFault();
     if (state.isAtRest) takeValues(number);
   } else if (!state.view) {
@@ -691,10 +692,11 @@ async function showHistogram(name) {
   drawHistogram();
 }
 
-/// The range of the colours, or that of the values.
+/// The range that was chosen, or that of the picture.
 function colorRange() {
   const { range } = colorTable();
-  return Array.isArray(range) && range.length === 2 ? range : state.histogram.range;
+  if (Array.isArray(range) && range.length === 2) return range;
+  return (state.facts && state.facts.range) || state.histogram.range;
 }
 
 function drawHistogram() {
