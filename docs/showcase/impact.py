@@ -22,7 +22,7 @@ SPEED = 60.0  # angstroms per picosecond: 6 km/s
 parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 parser.add_argument("out", type=Path)
 parser.add_argument("--atoms", type=float, default=1e6, help="about this many (default: 1e6)")
-parser.add_argument("--time", type=float, default=3.0, help="picoseconds (default: 3)")
+parser.add_argument("--time", type=float, default=2.0, help="picoseconds (default: 2)")
 parser.add_argument("--threads", type=int, default=2)
 options = parser.parse_args()
 
