@@ -1,6 +1,6 @@
 """Simulates a dam break that floods a model of a town and writes frames for spherule.
 
-    python splash.py OUT --particles 4e6
+    python splash.py OUT --particles 5e6
 
 The method is FLIP on a staggered grid: Zhu and Bridson, "Animating sand as a fluid" (SIGGRAPH 2005), with the pressure
 solve of Bridson, "Fluid Simulation for Computer Graphics" (2nd edition, 2015). It needs NumPy and Numba.
@@ -304,8 +304,8 @@ def write_boxes(path):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
-    parser.add_argument("--particles", type=float, default=4e6, help="about this many (default: 4e6)")
-    parser.add_argument("--time", type=float, default=0.8, help="seconds of the simulation (default: 0.8)")
+    parser.add_argument("--particles", type=float, default=5e6, help="about this many (default: 5e6)")
+    parser.add_argument("--time", type=float, default=0.6, help="seconds of the simulation (default: 0.6)")
     parser.add_argument("--frame-time", type=float, default=0.02, help="seconds between frames (default: 0.02)")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
