@@ -18,7 +18,7 @@ import scipy.fft
 from numba import njit, prange
 
 MATTER, LAMBDA, HUBBLE, SIGMA8, TILT = 0.31, 0.69, 0.68, 0.81, 0.965  # about those of Planck 2018
-FIRST, STEPS = 0.02, 140  # scale factor at the start; the last one is 1
+FIRST, STEPS = 0.02, 80  # scale factor at the start; the last one is 1
 
 
 def expansion(a):
@@ -110,7 +110,7 @@ def main():
     parser.add_argument("out")
     parser.add_argument("--particles", type=float, default=1e7, help="about this many (default: 1e7)")
     parser.add_argument("--box", type=float, default=100.0, help="edge of the box, Mpc/h (default: 100)")
-    parser.add_argument("--mesh", type=float, default=1.5, help="cells along an edge for each particle (default: 1.5)")
+    parser.add_argument("--mesh", type=float, default=1.25, help="cells along an edge for each particle (default: 1.25)")
     options = parser.parse_args()
     begin = time.time()
     side = scipy.fft.next_fast_len(round(options.particles ** (1 / 3)), real=True)
