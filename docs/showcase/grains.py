@@ -20,7 +20,7 @@ RADIUS, HALF = 0.5, 0.6  # of a grain, and half the length of its axis
 STIFFNESS, DAMPING, FRICTION = 1000.0, 0.3, 0.5
 SKIN = 0.35  # lists of neighbours hold until a grain has moved by half of it
 NEIGHBOURS = 40
-SETTLE, COLLAPSE = 16.0, 14.0  # durations; the wall around the column is there only at first
+SETTLE, COLLAPSE = 4.0, 16.0  # durations; the wall around the column is there only at first
 
 CYLINDER, BALL = 2 * np.pi * RADIUS**2 * HALF, 4 / 3 * np.pi * RADIUS**3
 MASS = CYLINDER + BALL
@@ -177,26 +177,31 @@ def main():
     options.out.mkdir(parents=True, exist_ok=True)
     begin = time.time()
 
-    # Layers of level grains in random directions, which fall together in a wall of this radius
+    # Layers of grains that lie side by side, each layer in another direction, in a wall of this radius
     wall = 0.62 * options.grains ** (1 / 3) + 2
     random = np.random.default_rng(5)
-    apart = 2 * (HALF + RADIUS) + 0.02
-    line = np.arange(-wall, wall, apart)
-    x, y = (grid.ravel() for grid in np.meshgrid(line, line))
-    inside = np.hypot(x, y) < wall - RADIUS - HALF
-    x, y = x[inside], y[inside]
-    layers = int(np.ceil(options.grains / len(x)))
-    pos = np.stack([np.tile(x, layers), np.tile(y, layers), np.repeat(np.arange(layers), len(x)) * 1.05 + 0.6], axis=1)
-    direction = random.uniform(0, np.pi, len(pos))
-    axis = np.stack([np.cos(direction), np.sin(direction), random.uniform(-0.02, 0.02, len(pos))], axis=1)
+    line = np.arange(-wall, wall, 1)
+    places, axes = [], []
+    while sum(map(len, places)) < options.grains:
+        along, across = np.meshgrid(line * (2 * (HALF + RADIUS) + 0.12), line * (2 * RADIUS + 0.1))
+        along = along + random.uniform(0, 2, len(line))[:, None]  # rows are shifted
+        angle = random.uniform(0, np.pi)
+        x, y = np.cos(angle) * along - np.sin(angle) * across, np.sin(angle) * along + np.cos(angle) * across
+        inside = np.hypot(x, y) < wall - RADIUS - HALF
+        height = RADIUS + len(places) * (2 * RADIUS + 0.03)
+        places.append(np.stack([x[inside], y[inside], np.full(inside.sum(), height)], axis=1))
+        angle = angle + random.uniform(-0.06, 0.06, inside.sum())
+        axes.append(np.stack([np.cos(angle), np.sin(angle), random.uniform(-0.01, 0.01, len(angle))], axis=1))
+    pos, axis = np.concatenate(places), np.concatenate(axes)
+    layers = len(places)
     axis /= np.linalg.norm(axis, axis=1, keepdims=True)
     vel, omega, force, torque = np.zeros_like(pos), np.zeros_like(pos), np.zeros_like(pos), np.zeros_like(pos)
-    vel[:, :2] = random.normal(scale=0.5, size=(len(pos), 2))
+    vel[:, :2] = random.normal(scale=0.2, size=(len(pos), 2))
     count = len(pos)
     near, counts = np.empty((count, NEIGHBOURS), dtype=np.int32), np.empty(count, dtype=np.int32)
     fastest, layer = np.empty(count), np.zeros(count)
     settle, steps = round(SETTLE / STEP), round((SETTLE + COLLAPSE) / STEP)
-    between = (steps - settle) // 14
+    between = (steps - settle) // 16
     print(f"{count} grains, {layers} layers, radius {wall:.0f}, {steps} steps", flush=True)
 
     moved, size = np.inf, 2 * (HALF + RADIUS) + SKIN
