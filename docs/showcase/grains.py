@@ -20,7 +20,7 @@ RADIUS, HALF = 0.5, 0.6  # of a grain, and half the length of its axis
 STIFFNESS, DAMPING, FRICTION = 1000.0, 0.3, 0.5
 SKIN = 0.35  # lists of neighbours hold until a grain has moved by half of it
 NEIGHBOURS = 40
-SETTLE, COLLAPSE = 4.0, 16.0  # durations; the wall around the column is there only at first
+SETTLE, COLLAPSE = 4.0, 9.0  # durations; the wall around the column is there only at first
 
 CYLINDER, BALL = 2 * np.pi * RADIUS**2 * HALF, 4 / 3 * np.pi * RADIUS**3
 MASS = CYLINDER + BALL
@@ -201,7 +201,7 @@ def main():
     near, counts = np.empty((count, NEIGHBOURS), dtype=np.int32), np.empty(count, dtype=np.int32)
     fastest, layer = np.empty(count), np.zeros(count)
     settle, steps = round(SETTLE / STEP), round((SETTLE + COLLAPSE) / STEP)
-    between = (steps - settle) // 16
+    between = (steps - settle) // 9
     print(f"{count} grains, {layers} layers, radius {wall:.0f}, {steps} steps", flush=True)
 
     moved, size = np.inf, 2 * (HALF + RADIUS) + SKIN
