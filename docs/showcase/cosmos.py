@@ -2,11 +2,11 @@
 
     python cosmos.py OUT.npz --particles 1e7
 
-Particles start on a lattice, displaced by the Zel'dovich approximation (Zel'dovich, Astronomy and Astrophysics 5 (1970),
-84) with the power spectrum of Bardeen, Bond, Kaiser and Szalay (Astrophysical Journal 304 (1986), 15). The forces are those
-of Hockney and Eastwood, "Computer Simulation Using Particles" (1988), with clouds in cells, and the time steps follow
-Klypin and Holtzman (arXiv:astro-ph/9712217). It needs NumPy, SciPy and Numba. OUT.npz has positions (Mpc/h), peculiar velocities (km/s)
-and the density at each particle, in units of the mean.
+Particles start on a lattice, displaced by the Zel'dovich approximation (Zel'dovich, Astronomy and Astrophysics 5
+(1970), 84) with the power spectrum of Bardeen, Bond, Kaiser and Szalay (Astrophysical Journal 304 (1986), 15). The
+forces are those of Hockney and Eastwood, "Computer Simulation Using Particles" (1988), with clouds in cells, and the
+time steps follow Klypin and Holtzman (arXiv:astro-ph/9712217). It needs NumPy, SciPy and Numba. OUT.npz has positions
+(Mpc/h), peculiar velocities (km/s) and the density at each particle, in units of the mean.
 """
 
 import argparse
@@ -110,7 +110,7 @@ def main():
     parser.add_argument("out")
     parser.add_argument("--particles", type=float, default=1e7, help="about this many (default: 1e7)")
     parser.add_argument("--box", type=float, default=100.0, help="edge of the box, Mpc/h (default: 100)")
-    parser.add_argument("--mesh", type=float, default=1.25, help="cells along an edge for each particle (default: 1.25)")
+    parser.add_argument("--mesh", type=float, default=1.25, help="cells for a particle along an edge (default: 1.25)")
     options = parser.parse_args()
     begin = time.time()
     side = scipy.fft.next_fast_len(round(options.particles ** (1 / 3)), real=True)

