@@ -321,11 +321,14 @@ fn report(
     sheet: &FinishedSheet,
 ) -> Result<(), CliError> {
     // Note pictures of another shape
-    if let [first, ..] = &sheet.narrower[..] {
+    if let [first, others @ ..] = &sheet.narrower[..] {
+        let shown = first.display();
+        let (who, whom) = match others.len() {
+            0 => (format!("{shown} has"), "it"),
+            count => (format!("{shown} and {} have", counted(count, "other")), "them"),
+        };
         note!(
-            "{} and {} others have another aspect ratio than the first picture, so that there is white around them",
-            first.display(),
-            sheet.narrower.len() - 1
+            "{who} another aspect ratio than the first picture, so that there is white around {whom}"
         );
     }
     // Describe the sheet, with its size on paper if that is known

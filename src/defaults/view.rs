@@ -57,11 +57,11 @@ impl Rules<'_> {
         );
     }
 
-    /// Most of a cloud without an end is in the picture.
+    /// Most of a cloud that thins out on all sides is in the picture.
     pub(super) fn tails(&mut self) {
         if self.facts.has_heavy_tails && self.is_placed_automatically() {
             let line = format!(
-                "the picture has {SHARE} of the particles, which have no end (--set camera.fit=all shows more)"
+                "the picture shows {SHARE} of the particles: they thin out on all sides (--set camera.fit=all shows more)"
             );
             self.set([("camera.fit", SHARE.into())], Some(line));
         }

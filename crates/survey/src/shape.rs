@@ -77,12 +77,27 @@ const MIN_CLOUD: usize = 100;
 /// 90 %: in a galaxy 2.5 to 10, in an exponential disc 2.3 and 1.7, in a normal distribution 1.6 and 1.3.
 const TAIL: f64 = 1.9;
 
-/// Whether most particles are near the middle of a cloud that has no end, such as a galaxy.
+/// How many times the distance of 10 % of the particles on a side, along an axis, must be that of 1 %: in a normal
+/// distribution 1.8; at a wall or a floor less than 1.3.
+const SIDE_TAIL: f64 = 1.5;
+
+/// Whether most particles are near the middle of a cloud that thins out on all sides, such as a galaxy. A fluid with
+/// splashes does not: it has a floor and walls.
 pub(super) fn has_heavy_tails(sample: &[DVec3]) -> bool {
-    let middle = DVec3::from_array([0, 1, 2].map(|axis| {
-        let along = sorted_sample(sample.len(), |i| sample[i][axis]);
-        along.get(along.len() / 2).copied().unwrap_or_default()
-    }));
+    let axes = [0, 1, 2].map(|axis| sorted_sample(sample.len(), |i| sample[i][axis]));
+    let along = |axis: usize, part: usize| {
+        let values = &axes[axis];
+        values.get(values.len() * part / 100).copied().unwrap_or_default()
+    };
+    let middle = DVec3::from_array([0, 1, 2].map(|axis| along(axis, 50)));
+    let ends = |axis: usize, [most, nearly_all]: [usize; 2]| {
+        let [most, nearly_all] =
+            [most, nearly_all].map(|part| (along(axis, part) - middle[axis]).abs());
+        most > 0.0 && nearly_all < SIDE_TAIL * most
+    };
+    if [0, 1, 2].into_iter().any(|axis| ends(axis, [10, 1]) || ends(axis, [90, 99])) {
+        return false;
+    }
     let distances = sorted_sample(sample.len(), |i| sample[i].distance(middle));
     let at = |part: usize| distances.get(distances.len() * part / 100).copied().unwrap_or_default();
     let [half, most, nearly_all] = [50, 90, 99].map(at);
@@ -124,6 +139,10 @@ mod tests {
         assert!(has_heavy_tails(&cloud(|part| (libm::pow(part, -2.0 / 3.0) - 1.0).powf(-0.5))));
         assert!(!has_heavy_tails(&cloud(libm::cbrt)));
         assert!(!has_heavy_tails(&[]));
+        // The same with a floor, as of water that splashes
+        let mut splash = cloud(|part| (libm::pow(part, -2.0 / 3.0) - 1.0).powf(-0.5));
+        splash.iter_mut().for_each(|p| p.z = p.z.max(-1.0));
+        assert!(!has_heavy_tails(&splash));
         // A ball and another one far away
         let mut two = cloud(libm::cbrt);
         two.iter_mut().take(100).for_each(|p| p.x += 30.0);
