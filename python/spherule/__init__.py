@@ -7,6 +7,7 @@
 """
 
 from ._command import command, inspect, movie, sheet
+from ._explore import Explorer, explore
 from ._errors import ArrayError, Error, InputError, InternalError, JobError, OutputError, SettingError
 from ._frames import Cell, Frame, Sequence, read, sequence, write_spf
 from ._image import Image
@@ -18,6 +19,7 @@ __all__ = [
     "ArrayError",
     "Cell",
     "Error",
+    "Explorer",
     "Frame",
     "Image",
     "InputError",
@@ -29,6 +31,7 @@ __all__ = [
     "SettingError",
     "__version__",
     "command",
+    "explore",
     "inspect",
     "movie",
     "read",

@@ -52,6 +52,11 @@ impl Explorer {
         self.shared.under(page)?.at([x, y])
     }
 
+    /// What the page that was used last wishes, and its answer, if there is one.
+    pub fn newest(&self) -> Option<(Wish, Option<Arc<Answer>>)> {
+        self.shared.newest()
+    }
+
     /// The wish of `page`.
     pub fn wish_of(&self, page: PageId) -> Option<Wish> {
         self.shared.wish_of(page)

@@ -148,6 +148,13 @@ impl Shared {
         self.lock().pages.get(&page).map(|page| page.wish.clone())
     }
 
+    /// What the page that was used last wishes, and its answer.
+    pub(super) fn newest(&self) -> Option<(Wish, Option<Arc<Answer>>)> {
+        let state = self.lock();
+        let newest = state.pages.values().max_by_key(|page| page.seen)?;
+        Some((newest.wish.clone(), newest.answer.clone()))
+    }
+
     /// Adds something to do before the next picture.
     pub(super) fn add_errand(&self, errand: Errand) {
         self.lock().errands.push_back(errand);

@@ -1,12 +1,12 @@
 //! What a page asks for.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::error::Fault;
 use crate::manifest::Override;
 
 /// A setting that was chosen.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 pub struct Setting {
     /// The dotted key of the manifest.
     pub key: String,

@@ -127,6 +127,9 @@ fn the_page_gets_pictures_particles_and_files() {
     let settings = json!([{ "key": "camera.azimuth", "value": 120.0 }]);
     let (turned, _) = page.last(&settings);
     assert!(first != turned && first.starts_with(b"\x89PNG"));
+    let chosen = page.get("chosen").json();
+    assert_eq!((&chosen["frame"], &chosen["settings"]), (&json!(7), &settings));
+    assert!(chosen["view"]["eye"].is_array(), "{chosen}");
     // One of its pixels shows a particle, whose values are those of the file
     let places = (0..48).map(|x| (f64::from(x) + 0.5) / 48.0);
     let found = places.map(|x| page.get(&format!("particle?page=3&x={x}&y=0.6&values=1")).json());

@@ -77,6 +77,7 @@ pub(super) fn reply(service: &Service, is_post: bool, path: &str, body: &[u8]) -
     }
     match (is_post, path) {
         (false, "start") => Reply::json(&start(service)),
+        (false, "chosen") => Reply::json(&chosen(service)),
         (false, "picture") => picture(service, query),
         (false, "particle") => particle(service, query),
         (false, "histogram") => {
@@ -122,6 +123,16 @@ fn start(service: &Service) -> Value {
         "schema": job_schema(),
         "version": env!("CARGO_PKG_VERSION"),
     })
+}
+
+/// What was chosen on the page that was used last, and the view of its picture, for other programs.
+fn chosen(service: &Service) -> Value {
+    let Some((wish, answer)) = service.explorer.newest() else {
+        return Value::Null;
+    };
+    let shown = answer.as_ref().and_then(|answer| answer.result.as_ref().ok());
+    let view = shown.map(|shown| &shown.facts["view"]);
+    json!({ "frame": wish.frame, "settings": wish.settings, "view": view })
 }
 
 /// The next picture of a page: its facts in a header, and its file.
