@@ -16,6 +16,9 @@ const FIRST_SAMPLES: u32 = 2;
 /// Factor from the samples of one step to those of the next.
 const FINER: u32 = 4;
 
+/// The part of [`QUICK`] that is for samples in any case.
+const LEAST_PART: f64 = 0.4;
+
 /// The smallest side of a picture, pixels: a smaller one shows nothing.
 const LEAST_SIDE: u32 = 36;
 
@@ -30,34 +33,56 @@ pub(super) struct Level {
     pub(super) is_last: bool,
 }
 
-/// The time of pictures of a page, from those that were rendered.
+/// Part of the weight of an older picture that remains with each newer one.
+const MEMORY: f64 = 0.7;
+
+/// Weight of the knowledge that no picture takes no time. Pictures of one size alone say nothing about others.
+const ORIGIN: f64 = 0.1;
+
+/// The time of pictures of a page: a fixed part, and one for each sample of a pixel, by least squares over those that
+/// were rendered.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Speed {
-    /// Seconds for each sample of a pixel.
-    per_sample: f64,
+    /// Weighted sums of 1, samples, seconds, squared samples, and samples times seconds.
+    sums: [f64; 5],
 }
 
 impl Default for Speed {
     /// That of one slow core, until a picture was rendered.
     fn default() -> Self {
-        Self { per_sample: 1e-6 }
+        Self { sums: [0.0; 5] }.with(1e5, 0.1)
     }
 }
 
 impl Speed {
-    /// Learns from a picture that took `seconds`. Small pictures also show what each picture costs.
+    /// Learns from a picture that took `seconds`.
     pub(super) fn learn(&mut self, level: &Level, seconds: f64) {
-        let measured = seconds / level.work();
-        // Slower at once, faster step by step, so that the size does not jump
-        self.per_sample = if measured > self.per_sample {
-            measured
-        } else {
-            0.7 * self.per_sample + 0.3 * measured
-        };
+        *self = self.with(level.work(), seconds);
+    }
+
+    fn with(self, work: f64, seconds: f64) -> Self {
+        let new = [1.0, work, seconds, work * work, work * seconds];
+        let mut sums = self.sums.map(|sum| MEMORY * sum);
+        for (sum, own) in sums.iter_mut().zip(new) {
+            *sum += own;
+        }
+        Self { sums }
+    }
+
+    /// The fixed part, and that of a sample, seconds.
+    fn parts(&self) -> [f64; 2] {
+        let [count, work, seconds, squares, products] = self.sums;
+        let count = count + ORIGIN;
+        let slope = (count * products - work * seconds) / (count * squares - work * work);
+        // Neither is negative, whatever the noise
+        let through_origin = products / squares;
+        let slope = slope.clamp(0.05 * through_origin, through_origin);
+        [((seconds - slope * work) / count).max(0.0), slope]
     }
 
     fn seconds(&self, level: &Level) -> f64 {
-        self.per_sample * level.work()
+        let [fixed, each] = self.parts();
+        fixed + each * level.work()
     }
 }
 
@@ -97,7 +122,10 @@ pub(super) fn next(
 /// A smaller picture that takes as long as [`QUICK`], with the shape of `whole`.
 fn quick(whole: Level, speed: Speed) -> Level {
     let size = whole.size;
-    let scale = (QUICK / speed.seconds(&whole)).sqrt().min(1.0);
+    // A smaller picture does not save the fixed part
+    let [fixed, each] = speed.parts();
+    let budget = (QUICK - fixed).max(LEAST_PART * QUICK);
+    let scale = (budget / (each * whole.work())).sqrt().min(1.0);
     let [width, height] = size.map(f64::from);
     let least = f64::from(LEAST_SIDE) / width.min(height);
     let scale = scale.max(least).min(1.0);
@@ -128,7 +156,7 @@ mod tests {
     #[test]
     fn pictures_become_finer_until_that_of_the_job() {
         // A machine that traces a million samples a second
-        let slow = Speed { per_sample: 1e-6 };
+        let slow = Speed::default();
         let levels = all(slow, false);
         let [width, height] = levels[0].size;
         assert!((20_000..25_000).contains(&(width * height)), "{levels:?}");
@@ -137,7 +165,11 @@ mod tests {
         assert_eq!(samples, [2, 2, 8, 16]);
         assert!(levels[3].is_last && levels[3].size == JOB.0 && !levels[2].is_last);
         // One that renders the whole picture at once
-        let fast = Speed { per_sample: 1e-9 };
+        let mut fast = Speed::default();
+        for size in [100, 1000, 100, 1000, 100, 1000, 100, 1000] {
+            let level = Level { size: [size; 2], samples: 2, is_last: false };
+            fast.learn(&level, 1e-9 * level.work());
+        }
         assert_eq!(all(fast, false).len(), 1);
         // While the mouse moves there is one picture
         assert_eq!(all(slow, true).len(), 1);
@@ -149,14 +181,23 @@ mod tests {
         let mut speed = Speed::default();
         let whole = |size| Level { size, samples: 2, is_last: false };
         let level = quick(whole(JOB.0), speed);
-        speed.learn(&level, 1.0);
-        let smaller = quick(whole(JOB.0), speed);
-        assert!(smaller.size[0] < level.size[0] / 3, "{smaller:?}");
-        assert!(smaller.size[1] >= LEAST_SIDE);
-        for _ in 0..20 {
-            speed.learn(&smaller, 1e-4);
+        // Ten times as slow as was thought
+        for _ in 0..10 {
+            let level = quick(whole(JOB.0), speed);
+            speed.learn(&level, 1e-5 * level.work());
         }
-        assert!(quick(whole(JOB.0), speed).size[0] > 2 * smaller.size[0]);
+        let smaller = quick(whole(JOB.0), speed);
+        assert!(smaller.size[0] < level.size[0] / 2, "{smaller:?}");
+        assert!(smaller.size[1] >= LEAST_SIDE);
+        // A fast device with a fixed part: larger pictures cost nothing more
+        for _ in 0..10 {
+            for level in [quick(whole(JOB.0), speed), whole(JOB.0)] {
+                speed.learn(&level, 0.05 + 1e-8 * level.work());
+            }
+        }
+        let [fixed, each] = speed.parts();
+        assert!((0.03..0.06).contains(&fixed) && each < 3e-8, "{fixed} {each}");
+        assert!(quick(whole(JOB.0), speed).size[0] > 800);
         // Pictures smaller than the least are rendered as they are
         assert_eq!(quick(whole([20, 10]), speed).size, [20, 10]);
     }

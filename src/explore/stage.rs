@@ -171,7 +171,7 @@ impl Stage {
         requested.manifest = manifest;
         lines.extend(warnings);
         // Resolve the automatic settings
-        let mut job = RenderJob::new(requested, &self.sequence, None)?;
+        let mut job = RenderJob::new(requested, &self.sequence, None)?.keeping_environment();
         if let Some(known) = &self.prepared {
             job = job.with_files_of(&known.job);
         }

@@ -1,6 +1,6 @@
 //! The thread that renders.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 use spherule_jobs::catch_panic;
@@ -17,12 +17,16 @@ use crate::scene::Projection;
 struct Urgent<'a> {
     shared: &'a Shared,
     task: &'a PageTask,
+    since: Instant,
 }
+
+/// How long the first picture of a wish is not stopped: pages on which something moves would else show none.
+const FIRST: Duration = Duration::from_secs(1);
 
 impl Stop for Urgent<'_> {
     fn is_raised(&self) -> bool {
-        // The first picture of a wish is quick, and pages that move would else show none
-        self.task.done.is_some() && self.shared.has_news(self.task.page, self.task.number)
+        let may_stop = self.task.done.is_some() || self.since.elapsed() > FIRST;
+        may_stop && self.shared.has_news(self.task.page, self.task.number)
     }
 }
 
@@ -60,7 +64,7 @@ fn show(shared: &Shared, stage: &mut Stage, task: &PageTask) {
         Ok(Err(error)) => return fail(error),
         Err(bug) => return fail(bug.into()),
     };
-    let stop = Urgent { shared, task };
+    let stop = Urgent { shared, task, since: Instant::now() };
     match stage.picture(task.wish.frame, &level, &stop) {
         Ok(picture) => {
             let seconds = picture.seconds;

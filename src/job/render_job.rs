@@ -67,6 +67,13 @@ impl RenderJob {
         Ok(self)
     }
 
+    /// The job, which keeps its environment for other views: see [`RenderJob::with_files_of`].
+    #[must_use]
+    pub fn keeping_environment(mut self) -> Self {
+        self.files.keep_environment();
+        self
+    }
+
     /// The job with the pictures and meshes that `other` has read, if both name the same ones.
     #[must_use]
     pub fn with_files_of(mut self, other: &Self) -> Self {

@@ -27,8 +27,8 @@ pub struct SceneFiles {
     /// See [`SceneFiles::overlay_images`].
     overlay_images: OnceLock<Vec<Arc<RgbaPixels>>>,
     meshes: JobMeshes,
-    /// The environment of the manifest.
-    environment: OnceLock<Environment>,
+    /// The environment of the manifest, if it is kept for other views.
+    environment: Option<Arc<OnceLock<Environment>>>,
 }
 
 impl SceneFiles {
@@ -40,8 +40,13 @@ impl SceneFiles {
             ground_image: OnceLock::new(),
             overlay_images: OnceLock::new(),
             meshes: JobMeshes::default(),
-            environment: OnceLock::new(),
+            environment: None,
         }
+    }
+
+    /// Keeps the environment, so that it is made once for many views. It takes some megabytes.
+    pub(super) fn keep_environment(&mut self) {
+        self.environment = Some(Arc::default());
     }
 
     /// Whether these are the files of `other`, for these two manifests.
@@ -69,7 +74,7 @@ impl SceneFiles {
     ) -> Result<Setup, RunError> {
         let inputs = SceneInputs {
             environment: self.environment_image(manifest)?,
-            made: Some(&self.environment),
+            made: self.environment.as_deref(),
             overlays: self.overlay_images(manifest)?,
             ground: self.ground_image(manifest)?,
             meshes: self.meshes.get(manifest, &self.dir, survey)?,

@@ -529,6 +529,22 @@ function typed(text) {
   try { return JSON.parse(trimmed); } catch { return trimmed; }
 }
 
+/// Whether a key is a list of tables, which is written as JSON.
+const isTables = (schema) => schema.type === "array" && Boolean(schema.items?.properties || schema.items?.oneOf);
+
+/// Examples of such lists.
+const EXAMPLES = {
+  style: '[{ "where": "type == 2", "draw": "sticks", "color": [0.8, 0.1, 0.1] }]',
+  light: '[{ "type": "sun", "direction": [1, -2, -3], "intensity": 2 }]',
+  mesh: '[{ "path": "tank.stl", "material": "glass" }]',
+  arrows: '[{ "attribute": "velocity", "scale": 0.05 }]',
+};
+
+/// Why a text is no JSON.
+function reason(text) {
+  try { return String(JSON.parse(text)); } catch (error) { return error.message; }
+}
+
 /// A name as a label.
 const titled = (name) => (name[0].toUpperCase() + name.slice(1)).replaceAll("_", " ");
 
@@ -542,8 +558,11 @@ function addField(parent, key) {
   const about = element("div", { class: "about", hidden: "" }, `${key}: ${schema.description || ""}`);
   label.addEventListener("click", () => { about.hidden = !about.hidden; });
   const isList = isOnlyWords(schema);
-  const input = isList ? element("select", { id }) : element("input", { id, spellcheck: "false" });
-  if (isList) {
+  const name = isList ? "select" : isTables(schema) ? "textarea" : "input";
+  const input = element(name, { id, spellcheck: "false" });
+  if (isTables(schema)) {
+    Object.assign(input, { rows: 3, placeholder: EXAMPLES[key] || "[{ }]" });
+  } else if (isList) {
     input.append(element("option", { value: "" }, "default"));
     for (const word of wordsOf(schema)) input.append(element("option", { value: JSON.stringify(word) }, String(word)));
   } else if (schema.type === "number" || schema.type === "integer") {
@@ -563,7 +582,9 @@ function addField(parent, key) {
   const field = { box, input, reset, why, isList };
   input.addEventListener("change", () => {
     const value = isList ? (input.value === "" ? undefined : JSON.parse(input.value)) : typed(input.value);
-    choose({ [key]: value });
+    // A list that is no JSON would be refused as a text; say where it is wrong
+    if (isTables(schema) && typeof value === "string") return showFault({ key, message: `${key}: ${reason(value)}` });
+    return choose({ [key]: value });
   });
   reset.addEventListener("click", () => choose({ [key]: undefined }));
   state.fields.set(key, [...(state.fields.get(key) || []), field]);
@@ -581,7 +602,7 @@ function showField(key, { box, input, reset, isList }) {
   else if (isChanged) input.value = shown(value);
   else {
     input.value = input.type === "number" ? shown(value) : "";
-    input.placeholder = shown(value);
+    input.placeholder = shown(value) || input.placeholder;
   }
 }
 
@@ -589,12 +610,10 @@ function makeForms() {
   for (const place of document.querySelectorAll("[data-keys]")) {
     for (const key of place.dataset.keys.split(" ")) addField(place, key);
   }
-  // All keys that are no lists of tables, by section
+  // All keys, by section
   for (const [section, node] of Object.entries(state.schema.properties)) {
     const keys = node.properties ? Object.keys(node.properties).map((key) => `${section}.${key}`) : [section];
-    const isTable = (key) => ["array"].includes(schemaOf(key).type) && schemaOf(key).items?.properties;
-    const own = keys.filter((key) => schemaOf(key) && !isTable(key));
-    if (!node.properties && node.type === "array") continue;
+    const own = keys.filter((key) => schemaOf(key));
     const box = element("details", { "data-section": section }, element("summary", {}, section));
     box.addEventListener("toggle", () => {
       if (box.open && box.childElementCount === 1) own.forEach((key) => addField(box, key));
@@ -636,6 +655,10 @@ async function takeNames() {
   try {
     state.names = await ask(`names?frame=${state.frames[state.frame]}`);
     state.hasParticles = true;
+    // Conditions are completed with them
+    for (const { input } of state.fields.get("select.where") || []) {
+      input.list?.replaceChildren(...state.names.map((own) => element("option", { value: `${own} > ` })));
+    }
   } catch (error) {
     showFault(error);
   }
@@ -722,7 +745,9 @@ function drawHistogram() {
 }
 
 function listenToColor() {
-  $("color-by").addEventListener("focus", () => { if (state.names.length === 0) takeNames(); });
+  const once = () => { if (state.names.length === 0) takeNames(); };
+  $("color-by").addEventListener("focus", once);
+  for (const { input } of state.fields.get("select.where") || []) input.addEventListener("focus", once);
   $("color-by").addEventListener("change", () => {
     const name = $("color-by").value;
     state.histogram = null;
