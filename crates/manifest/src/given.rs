@@ -113,7 +113,7 @@ mod tests {
             "color",
             "[[light]]",
             "type",
-            "to_light",
+            "direction",
         ];
         assert_eq!(keys, expected, "{sparse}");
         assert!(sparse.contains("width = 320   "), "{sparse}");
