@@ -3,7 +3,7 @@
 //! the one of jobs: the last picture has the bytes of the preview that the job writes.
 //!
 //! A page sends a [`Wish`]: the frame, and the settings that were chosen. The [`Explorer`] answers with pictures that
-//! become finer ([`level`]) until the page wishes something else. [`serve`] connects it with browsers over HTTP.
+//! become finer (`level.rs`) until the page wishes something else. [`serve`] connects it with browsers over HTTP.
 
 mod encode;
 mod error;
