@@ -14,7 +14,6 @@ use spherule_jobs::{FrameState, Job, JobError, publish};
 use super::error::ExploreError;
 use super::explorer::Explorer;
 use super::wish::{Setting, Wish};
-use crate::manifest::real_dir;
 use crate::output::PictureFormat;
 
 /// Longest name of a file, bytes.
@@ -176,12 +175,9 @@ impl Explorer {
 
     /// The directory of the images of a job with these settings.
     fn output_directory(&self, settings: Vec<Setting>) -> Result<PathBuf, SaveError> {
-        let base = self.directory()?;
-        let found = self.ask(move |stage| {
-            let (manifest, _) = stage.prepare(&settings)?.source.parse()?;
-            Ok::<_, ExploreError>(manifest.output.path.dir().to_path_buf())
-        });
-        Ok(real_dir(&base.join(found.ok_or(SaveError::Ended)??)))
+        let found =
+            self.ask(move |stage| Ok::<_, ExploreError>(stage.prepare(&settings)?.directory()));
+        Ok(found.ok_or(SaveError::Ended)??)
     }
 
     /// Saves a manifest as `name` and starts its job with `program`, which goes on when this process ends.
@@ -195,13 +191,16 @@ impl Explorer {
         files: &SavedFiles,
         program: &Path,
     ) -> Result<Saved, SaveError> {
+        // The log, too, replaces no file of others
+        let log = Path::new(name).with_extension("log");
+        let log = files.place(&self.directory()?, &log.to_string_lossy(), true)?;
         let saved = self.save_manifest(settings, name, files)?;
-        let log = saved.path.with_extension("log");
         let failed = |path: &Path| {
             let path = path.to_owned();
             move |source| SaveError::Io { path, source }
         };
         let out = fs::File::create(&log).map_err(failed(&log))?;
+        files.remember(&log);
         let errors = out.try_clone().map_err(failed(&log))?;
         let mut command = Command::new(program);
         command.arg("render").arg(&saved.path).args(["--progress", "plain"]);

@@ -322,6 +322,11 @@ impl Prepared {
     pub(super) const fn manifest(&self) -> &Manifest {
         self.job.manifest()
     }
+
+    /// The directory of the images of the job.
+    pub(super) fn directory(&self) -> PathBuf {
+        self.job.dir().to_owned()
+    }
 }
 
 impl Under {

@@ -154,6 +154,11 @@ fn the_page_gets_pictures_particles_and_files() {
     let refused = page.post("save", &save("mine.toml")).json();
     let message = refused["fault"]["message"].as_str().unwrap_or_default();
     assert!(message.contains("choose another name"), "{refused}");
+    // A log of somebody else is kept, and nothing is started
+    fs::write(page.shop.join("view.log"), "mine").expect("a file");
+    assert_eq!(page.post("render", &save("view.toml")).status, 422);
+    assert_eq!(fs::read_to_string(page.shop.join("view.log")).expect("a file"), "mine");
+    fs::remove_file(page.shop.join("view.log")).expect("removed");
     // A job goes on in the background
     assert_eq!(page.post("render", &save("view.toml")).status, 200);
     let mut progress = Value::Null;
