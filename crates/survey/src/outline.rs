@@ -31,6 +31,10 @@ const FEW: usize = 100;
 /// From that number on, at most one particle of this many is an outlier: more are a part of the picture.
 const MAX_OUTLIERS: usize = 100;
 
+/// Outliers are left out if the box of all particles is at least this many times as long as that of the others. A
+/// splash that is cut off looks worse than one in a somewhat smaller picture.
+const MIN_GAIN: f64 = 1.5;
+
 /// Number of particles of a frame that are kept to find the outermost ones of all frames together.
 const KEPT: usize = 16_384;
 
@@ -106,7 +110,7 @@ impl Outermost {
             0..FEW => usize::MAX,
             many => many / MAX_OUTLIERS,
         };
-        let outliers = farthest(found.collect(), most);
+        let outliers = worth_leaving_out(&sample, farthest(found.collect(), most));
         let each = count.div_ceil(sample.len()).max(1);
         self.outliers = self.outliers.max((outliers.len() * each) as u64);
         for index in outliers.into_iter().rev() {
@@ -171,7 +175,8 @@ impl Outermost {
         let axes = || (0..AXES).into_par_iter().map(axis);
         let found = axes().flat_map_iter(|axis| beyond(&all, axis, longest, (tail, SHARE_MARGIN)));
         // Leave them out
-        let outliers: HashSet<usize> = farthest(found.collect(), most).into_iter().collect();
+        let outliers = worth_leaving_out(&all, farthest(found.collect(), most));
+        let outliers: HashSet<usize> = outliers.into_iter().collect();
         let indices = 0..all.len();
         let rest: Vec<DVec3> = indices.filter(|i| !outliers.contains(i)).map(|i| all[i]).collect();
         // Count the outliers of each frame
@@ -261,6 +266,38 @@ fn farthest(mut outliers: Vec<Outlier>, most: usize) -> Vec<usize> {
         outliers.sort_unstable_by_key(|outlier| outlier.index);
     }
     outliers.into_iter().map(|outlier| outlier.index).collect()
+}
+
+/// The indices of `outliers`, rising, or none if the picture of the others would be hardly larger.
+fn worth_leaving_out(sample: &[DVec3], outliers: Vec<usize>) -> Vec<usize> {
+    let mut left_out = outliers.iter().peekable();
+    let (mut all, mut others) = (Extent::NONE, Extent::NONE);
+    for (index, point) in sample.iter().enumerate() {
+        all.add(*point);
+        if left_out.next_if_eq(&&index).is_none() {
+            others.add(*point);
+        }
+    }
+    if all.longest() < MIN_GAIN * others.longest() { Vec::new() } else { outliers }
+}
+
+/// A box along the coordinate axes.
+struct Extent {
+    low: DVec3,
+    high: DVec3,
+}
+
+impl Extent {
+    const NONE: Self = Self { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY };
+
+    fn add(&mut self, point: DVec3) {
+        self.low = self.low.min(point);
+        self.high = self.high.max(point);
+    }
+
+    fn longest(&self) -> f64 {
+        (self.high - self.low).max_element()
+    }
 }
 
 /// The lowest and the highest particle of a `sample` along `axis`, the first in a tie; `None` without particles.
@@ -366,6 +403,20 @@ mod tests {
             (0..25).map(|i| DVec3::new(f64::from(i % 5), f64::from(i / 5), 0.0)).collect();
         plane.push(DVec3::new(2.0, 2.0, 3.5));
         assert!(outline(&[&plane]).points.contains(&plane[25].as_vec3()));
+    }
+
+    #[test]
+    fn spray_that_is_near_is_not_cut_off() {
+        let mut points = ball(3000);
+        points.extend((0..20).map(|i| DVec3::new(0.0, 0.0, 1.0 + 0.04 * f64::from(i))));
+        let top = |outline: &Outline| outline.points.iter().map(|p| p.z).fold(0.0, f32::max);
+        let near = outline(&[&points]);
+        assert!((top(&near) - 1.76).abs() < 1e-6);
+        assert_eq!(near.outliers, 0);
+        points.push(DVec3::new(0.0, 0.0, 4.0));
+        let far = outline(&[&points]);
+        assert!(top(&far) < 1.8);
+        assert!((1..=20).contains(&far.outliers), "{}", far.outliers);
     }
 
     #[test]
