@@ -10,7 +10,7 @@ use spherule_frame::{TypeShape, TypeShapes};
 
 use super::SharedFrame;
 use super::meshes::CREASE_ANGLE;
-use crate::surface::grains::{GrainMesh, GrainMeshError, GrainShape};
+use crate::surface::grains::{GrainMesh, GrainMeshError, GrainShape, GrainSphere};
 use crate::surface::mesh::MeshNormals;
 
 /// Grains of a style with the same shape.
@@ -74,6 +74,10 @@ fn drawn(shape: &TypeShape) -> Result<(GrainShape, Option<Vec3>), String> {
             let normals = MeshNormals::Smooth(CREASE_ANGLE.to_radians());
             mesh(GrainMesh::new(vertices.clone(), triangles.clone(), normals))
         }
+        TypeShape::Spheres(spheres) => {
+            let spheres = spheres.iter().map(|&(center, radius)| GrainSphere { center, radius });
+            mesh(GrainMesh::spheres(&spheres.collect::<Vec<_>>()))
+        }
         TypeShape::Other(kind) => Err(format!("a shape that grains do not have ({kind})")),
     }
 }
@@ -101,10 +105,10 @@ mod tests {
         let types = TypeShapes {
             attribute: "typeid".to_owned(),
             shapes: vec![
-                TypeShape::Ellipsoid(Vec3::new(1.0, 2.0, 3.0)),
+                TypeShape::Spheres(vec![(-Vec3::X, 1.0), (Vec3::X, 1.5)]),
                 TypeShape::ConvexPolyhedron(points),
                 open,
-                TypeShape::Other("SphereUnion".to_owned()),
+                TypeShape::Other("Polygon".to_owned()),
             ],
         };
         let mut notes = Vec::new();
@@ -114,7 +118,7 @@ mod tests {
             .collect();
         let shape = |name: &str, size, members: &[u32]| (name.to_owned(), size, members.to_vec());
         let expected = [
-            shape("Ellipsoid", Some(Vec3::new(1.0, 2.0, 3.0)), &[2]),
+            shape("Mesh(2560 triangles)", Some(Vec3::ONE), &[2]),
             shape("Mesh(4 triangles)", Some(Vec3::ONE), &[1]),
             shape("Ellipsoid", None, &[4]),
             shape("Ellipsoid", None, &[0]),
@@ -123,6 +127,6 @@ mod tests {
         assert_eq!(found, expected);
         assert_eq!(notes.len(), 2, "{notes:?}");
         assert!(notes[0].contains("type 2") && notes[0].contains("is not closed"), "{notes:?}");
-        assert!(notes[1].contains("type 3") && notes[1].contains("SphereUnion"), "{notes:?}");
+        assert!(notes[1].contains("type 3") && notes[1].contains("Polygon"), "{notes:?}");
     }
 }

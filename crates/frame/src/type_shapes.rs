@@ -20,6 +20,8 @@ pub enum TypeShape {
         /// Indices of the vertices of each triangle.
         triangles: Vec<[u32; 3]>,
     },
+    /// Spheres with these centres, relative to that of the particle, and radii.
+    Spheres(Vec<(Vec3, f32)>),
     /// Another shape, with the name of its kind.
     Other(String),
 }

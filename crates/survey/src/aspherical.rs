@@ -19,8 +19,8 @@ pub struct ShapeSource {
 /// What gives particles of `raw` a shape other than a sphere; None if they are spheres, or nothing says what they are.
 pub(super) fn shape_source(raw: &RawParticles) -> Option<ShapeSource> {
     let is_body = |shape: &TypeShape| {
-        use TypeShape::{ConvexPolyhedron, Ellipsoid, Mesh};
-        matches!(shape, Ellipsoid(_) | ConvexPolyhedron(_) | Mesh { .. })
+        use TypeShape::{ConvexPolyhedron, Ellipsoid, Mesh, Spheres};
+        matches!(shape, Ellipsoid(_) | ConvexPolyhedron(_) | Mesh { .. } | Spheres(_))
     };
     if raw.shapes.as_ref().is_some_and(|types| types.shapes.iter().any(is_body)) {
         let what = "the shapes of their types".to_owned();
@@ -79,6 +79,6 @@ mod tests {
         };
         assert!(with(TypeShape::Ellipsoid(glam::Vec3::ONE)).is_some());
         assert_eq!(with(TypeShape::Sphere(1.0)), None);
-        assert_eq!(with(TypeShape::Other("SphereUnion".to_owned())), None);
+        assert_eq!(with(TypeShape::Other("Polygon".to_owned())), None);
     }
 }

@@ -6,12 +6,22 @@ use thiserror::Error;
 use crate::mesh::{MeshError, MeshNormals, MeshTree, TriangleMesh};
 
 mod hull;
+mod spheres;
+
+pub use spheres::GrainSphere;
 
 /// Greatest number of triangles of the mesh of a grain.
 pub const MAX_GRAIN_TRIANGLES: usize = 1_000_000;
 
 /// Greatest number of different points of a convex hull: the time grows with its square.
 pub const MAX_HULL_POINTS: usize = 10_000;
+
+/// Greatest number of spheres of a grain.
+pub const MAX_GRAIN_SPHERES: usize = 1000;
+
+/// Triangles of a sphere of a grain share a smooth normal up to this angle, radians: it is greater than that between
+/// adjacent triangles of the coarsest spheres.
+const SPHERE_CREASE: f32 = 0.8;
 
 /// Why triangles are not the surface of a grain.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -52,6 +62,9 @@ pub enum GrainMeshError {
         /// The ends of the edge.
         ends: [Vec3; 2],
     },
+    /// There are too many spheres.
+    #[error("{0} spheres, but a grain has at most {MAX_GRAIN_SPHERES}")]
+    TooManySpheres(usize),
     /// There are too many points for a convex hull.
     #[error("{0} vertices, but a convex hull takes at most {MAX_HULL_POINTS}; simplify the mesh")]
     TooManyPoints(usize),
@@ -144,6 +157,25 @@ impl GrainMesh {
         }
         let triangles = hull::triangles(&points).ok_or(GrainMeshError::Flat(points.len()))?;
         Self::new(points, triangles, MeshNormals::Flat)
+    }
+
+    /// Several spheres as one body, made of triangles.
+    ///
+    /// # Errors
+    /// There is no sphere, there are too many, or one of them is not finite.
+    pub fn spheres(spheres: &[GrainSphere]) -> Result<Self, GrainMeshError> {
+        if spheres.len() > MAX_GRAIN_SPHERES {
+            return Err(GrainMeshError::TooManySpheres(spheres.len()));
+        }
+        // Take each sphere once
+        let mut different: Vec<GrainSphere> = Vec::new();
+        for sphere in spheres {
+            if sphere.radius > 0.0 && !different.contains(sphere) {
+                different.push(*sphere);
+            }
+        }
+        let (vertices, triangles) = spheres::triangles(&different);
+        Self::new(vertices, triangles, MeshNormals::Smooth(SPHERE_CREASE))
     }
 
     fn of(mesh: TriangleMesh) -> Result<Self, GrainMeshError> {

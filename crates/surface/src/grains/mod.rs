@@ -59,7 +59,9 @@ mod walk;
 mod tests;
 
 pub use check::{GrainError, GrainReport};
-pub use mesh::{GrainMesh, GrainMeshError, MAX_GRAIN_TRIANGLES, MAX_HULL_POINTS};
+pub use mesh::{
+    GrainMesh, GrainMeshError, GrainSphere, MAX_GRAIN_SPHERES, MAX_GRAIN_TRIANGLES, MAX_HULL_POINTS,
+};
 pub use motion::rotation_between;
 pub use shape::GrainSurface;
 pub use tree::GrainTree;

@@ -21,9 +21,10 @@ pub(super) fn of_json(text: &[u8]) -> TypeShape {
 /// The shape in an object; None if it lacks what its kind needs.
 fn shape_of(shape: &Value) -> Option<TypeShape> {
     let number = |key: &str| shape.get(key)?.as_f64();
-    let vertices = || -> Option<Vec<Vec3>> {
-        shape.get("vertices")?.as_array()?.iter().map(|row| Some(vector(row)?.as_vec3())).collect()
+    let points = |key: &str| -> Option<Vec<Vec3>> {
+        shape.get(key)?.as_array()?.iter().map(|row| Some(vector(row)?.as_vec3())).collect()
     };
+    let vertices = || points("vertices");
     #[expect(clippy::cast_possible_truncation, reason = "lengths are f32 in the renderer")]
     Some(match shape.get("type")?.as_str()? {
         "Sphere" => TypeShape::Sphere((0.5 * number("diameter")?) as f32),
@@ -37,6 +38,16 @@ fn shape_of(shape: &Value) -> Option<TypeShape> {
                 vertices: vertices()?,
                 triangles: faces.map(triangle).collect::<Option<_>>()?,
             }
+        }
+        "SphereUnion" => {
+            let diameters = shape.get("diameters")?.as_array()?;
+            let centers = points("centers")?;
+            let radii = diameters.iter().map(|diameter| Some((0.5 * diameter.as_f64()?) as f32));
+            let radii: Vec<f32> = radii.collect::<Option<_>>()?;
+            if radii.len() != centers.len() {
+                return None;
+            }
+            TypeShape::Spheres(centers.into_iter().zip(radii).collect())
         }
         kind => TypeShape::Other(kind.chars().take(40).collect()),
     })
@@ -77,7 +88,13 @@ mod tests {
             of(&format!(r#"{{"type": "Mesh", {points}, "indices": [[0, 1, 2]]}}"#)),
             TypeShape::Mesh { vertices, triangles: vec![[0, 1, 2]] }
         );
-        assert_eq!(of(r#"{"type": "SphereUnion"}"#), TypeShape::Other("SphereUnion".to_owned()));
+        assert_eq!(
+            of(
+                r#"{"type": "SphereUnion", "centers": [[1, 0, 0], [0, 1, 0]], "diameters": [3, 1]}"#
+            ),
+            TypeShape::Spheres(vec![(Vec3::X, 1.5), (Vec3::Y, 0.5)])
+        );
+        assert_eq!(of(r#"{"type": "Polygon"}"#), TypeShape::Other("Polygon".to_owned()));
         assert_eq!([of("{}"), of(""), of(" ")], [const { TypeShape::Unspecified }; 3]);
     }
 
@@ -93,6 +110,7 @@ mod tests {
             r#"{"type": "Sphere"}"#,
             r#"{"type": "Ellipsoid", "a": 1, "b": 2}"#,
             r#"{"type": "ConvexPolyhedron", "vertices": [[1, 2]]}"#,
+            r#"{"type": "SphereUnion", "centers": [[1, 2, 3]], "diameters": []}"#,
             r#"{"type": "Mesh", "vertices": [[1, 2, 3]], "indices": [[-1, 0, 0]]}"#,
         ] {
             assert_eq!(
