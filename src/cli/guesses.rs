@@ -183,6 +183,10 @@ pub(super) const GUESSES: &[(&str, &str)] = &[
     ("hdri hdr envmap environmentmap ibl skybox", "--set environment.image=FILE"),
     ("lightintensity lightpower ambientlight", "--set environment.intensity=NUMBER"),
     ("exposure brightness gain gamma ev", "--set output.preview_exposure=STOPS"),
+    (
+        "tonemap tonemapping tonemapper agx filmic aces displaytransform colormanagement viewtransform",
+        "--set output.view_transform=agx",
+    ),
     ("denoiser noise nonoise despeckle", "--denoise"),
     ("nodenoise", "--denoise=false"),
     ("nobonds", "--bonds=none"),

@@ -152,6 +152,7 @@ const GUESSED: &[(&str, &str)] = &[
     ("--triad", "--axes"),
     ("--ruler", "--scale-bar"),
     ("--exposure 1", "output.preview_exposure"),
+    ("--tonemap agx", "output.view_transform"),
     ("--gamma 2", "output.preview_exposure"),
     ("--light sun", "environment.type"),
     ("--hdri a.hdr", "environment.image"),

@@ -15,6 +15,7 @@ use crate::movie::{
     Codec, FrameRate, Gaps, INSTALL, MovieError, MovieFormat, MovieSource, Observer, Timeline,
     by_hand, ffmpeg_is_installed, write_movie,
 };
+use crate::output::view::DisplayView;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -126,7 +127,7 @@ fn make(
     observer: &dyn Observer,
 ) -> Result<Option<String>, CliError> {
     // Write the movie, and explain what went wrong
-    let source = source(request, &pictures.pictures, &pictures.selected, pictures.exposure);
+    let source = source(request, &pictures.pictures, &pictures.selected, pictures.view);
     let made = write_movie(&source, request.format, request.output, observer);
     let finished = match made {
         Ok(finished) => finished,
@@ -189,7 +190,7 @@ fn source(
     request: &Request<'_>,
     pictures: &[JobPicture],
     all: &[i64],
-    exposure: f32,
+    view: DisplayView,
 ) -> MovieSource {
     // Arrange the frames in time
     let frames: Vec<i64> = pictures.iter().map(|picture| picture.number).collect();
@@ -207,7 +208,7 @@ fn source(
         repeats: timeline.repeats,
         rate: request.rate,
         width: request.width.map(usize::from),
-        exposure,
+        view,
     };
     // Errors of the first picture come again when the movie is written
     if let Ok(size) = source.size() {

@@ -13,6 +13,7 @@ use super::signals::SignalMessages;
 use crate::job::KIND;
 use crate::movie::Observer;
 use crate::output::PictureFormat;
+use crate::output::view::{DisplayView, ViewTransform};
 use crate::picture::{Picture, is_own_file};
 use crate::report::job::{HTML_FILE, JSON_FILE};
 
@@ -49,15 +50,14 @@ pub(super) struct JobPictures {
     /// Whether pictures are PNG files.
     pub(super) has_previews: bool,
     /// Exposure of previews, stops.
-    pub(super) exposure: f32,
+    pub(super) view: DisplayView,
 }
 
 impl JobPictures {
     /// Whether previews are larger than images, because overlays are beside the pictures.
     pub(super) fn have_strips(&self) -> bool {
         let both = self.pictures.iter().find(|picture| picture.picture != picture.image);
-        let size =
-            |path: &Path| Picture::read(path, self.exposure).ok().map(|picture| picture.size());
+        let size = |path: &Path| Picture::read(path, self.view).ok().map(|picture| picture.size());
         may_have_strips(self.state.plan().settings())
             && both.is_some_and(|both| size(&both.picture) != size(&both.image))
     }
@@ -82,6 +82,12 @@ impl JobPictures {
         }
         // Find out how pictures are made from images without previews
         let exposure = find("output.preview_exposure").and_then(|value| value.parse().ok());
+        let transform = find("output.view_transform")
+            .and_then(|value| ViewTransform::of_name(value.trim_matches('"')));
+        let view = DisplayView {
+            exposure: exposure.unwrap_or(0.0),
+            transform: transform.unwrap_or_default(),
+        };
         let mut frames = state.plan().frames().iter();
         let has_previews = frames.any(|frame| frame.outputs.iter().any(is_png));
         let is_transparent = find("output.transparent").is_some_and(|value| value == "true");
@@ -104,7 +110,7 @@ impl JobPictures {
             missing,
             is_running: workers.iter().any(|worker| !worker.has_ended),
             has_previews,
-            exposure: exposure.unwrap_or(0.0),
+            view,
             state,
         })
     }

@@ -15,6 +15,7 @@ use crate::movie::{
     write_sheet,
 };
 use crate::output::PictureFormat;
+use crate::output::view::DisplayView;
 use crate::overlay::{ColorBar, ColorBarKind, Orientation};
 use crate::picture::read_dpi;
 
@@ -120,7 +121,9 @@ impl Inputs {
             let is_picture =
                 matches!(PictureFormat::of(path), Some(PictureFormat::Png | PictureFormat::Exr));
             if is_picture && !path.is_dir() {
-                inputs.sources.push(SheetSource { path: path.clone(), exposure: 0.0 });
+                inputs
+                    .sources
+                    .push(SheetSource { path: path.clone(), view: DisplayView::default() });
                 inputs.shown.push(path.display().to_string());
                 inputs.has_files = true;
             } else {
@@ -141,10 +144,11 @@ impl Inputs {
         let chosen = chosen(&pictures.pictures, args.count.map(usize::from));
         let numbers: Vec<i64> = chosen.iter().map(|picture| picture.number).collect();
         self.shown.push(format!("frames {}", super::job::list(&numbers)));
-        self.sources.extend(chosen.into_iter().map(|picture| SheetSource {
-            path: picture.picture.clone(),
-            exposure: pictures.exposure,
-        }));
+        self.sources.extend(
+            chosen
+                .into_iter()
+                .map(|picture| SheetSource { path: picture.picture.clone(), view: pictures.view }),
+        );
         self.jobs.push(pictures);
         Ok(())
     }

@@ -111,7 +111,7 @@ fn settings(args: &ViewArgs, pictures: &JobPictures, frames: &[ViewerFrame]) -> 
         rate: args.fps.per_second(),
         embed: args.embed || !pictures.has_previews,
         width: args.width.map(usize::from),
-        exposure: pictures.exposure,
+        view: pictures.view,
         data: !args.no_data && has_exr && !has_strips,
         attributes: attributes(pictures),
     }

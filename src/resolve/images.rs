@@ -6,6 +6,7 @@ use spherule_formats::native::Access;
 use super::{Extent, ResolveError, channels};
 use crate::accel::{BvhSettings, SbvhSettings};
 use crate::manifest::{IndirectSetting, Manifest};
+use crate::output::view::DisplayView;
 use crate::output::{ExrOptions, PlaneNames, PreviewBackground, PreviewOptions};
 use crate::pipeline::{AttributeChannel, RunSettings};
 use crate::render::{Drawing, IndirectLight, PixelFilter, RenderSettings};
@@ -105,7 +106,7 @@ fn comments(far_depth: Option<f32>, projection: Projection) -> String {
 pub(super) fn preview_options(manifest: &Manifest, render: &RenderSettings) -> PreviewOptions {
     let output = &manifest.output;
     PreviewOptions {
-        exposure: output.preview_exposure,
+        view: DisplayView { exposure: output.preview_exposure, transform: output.view_transform },
         background: if output.transparent {
             PreviewBackground::Transparent
         } else {

@@ -10,8 +10,7 @@ use super::{ResolveError, color};
 use crate::manifest::{
     ColorSetting, LabelFormat, Manifest, Overlay as ManifestOverlay, OverlayKind, OverlayLayout,
 };
-use crate::math::functions::exp2;
-use crate::output::view::{srgb_from_linear, view_transform};
+use crate::output::view::srgb_from_linear;
 use crate::overlay::{
     Axes, Boxes, Color, ColorBar, ColorBarKind, Content, Corner, FrameValues, FrameView, Image,
     Layout, Orientation, Overlay, Page, Placement, RgbaPixels, ScaleBar, Template,
@@ -194,9 +193,7 @@ fn cover_particles(setup: &Setup, survey: &Survey) -> Vec<bool> {
 /// What is beside the picture on its page, linear RGB: the background if it has one colour, or else white.
 pub(super) fn paper(setup: &Setup) -> Vec3 {
     match setup.picture.scene.background {
-        Background::Constant(color) => {
-            view_transform(color * exp2(setup.picture.files.preview.exposure))
-        }
+        Background::Constant(color) => setup.picture.files.preview.view.display(color),
         _ => Vec3::ONE,
     }
 }
@@ -528,7 +525,7 @@ fn backdrop(setup: &Setup, camera: &Camera, film: Vec2) -> Vec3 {
             _ => scene.background.color_on_film(ray.direction, film),
         },
     };
-    view_transform(color * exp2(picture.files.preview.exposure))
+    picture.files.preview.view.display(color)
 }
 
 pub(super) fn srgb(linear: Vec3) -> Color {

@@ -13,6 +13,7 @@
 //! This example writes a picture of two pixels as a PNG file and reads it:
 //!
 //! ```
+//! use spherule_images::output::view::DisplayView;
 //! use spherule_images::picture::{MARKER, Picture};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -20,7 +21,7 @@
 //! # let path = directory.path().join("two.png");
 //! let two = Picture::new(2, 1, vec![255, 0, 0, 0, 0, 255]);
 //! spherule_files::publish(&path, &two.png(MARKER)?)?;
-//! assert_eq!(Picture::read(&path, 0.0)?.pixels(), [[255, 0, 0], [0, 0, 255]]);
+//! assert_eq!(Picture::read(&path, DisplayView::default())?.pixels(), [[255, 0, 0], [0, 0, 255]]);
 //! # Ok(())
 //! # }
 //! ```

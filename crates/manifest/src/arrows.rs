@@ -54,7 +54,7 @@ impl Arrows {
                 required("arrows need an attribute, such as \"velocity\"");
             /// Length of an arrow per unit of the attribute
             ///
-            /// With 0.05 and velocities in m/s, an arrow is as long as the way of its particle in 0.05 s.
+            /// With 0.05 and velocities in m/s, an arrow is as long as its particle moves in 0.05 s.
             scale => self.scale, above(0), single(), example("0.05"),
                 required("the length of an arrow per unit of the attribute, such as 0.05");
             /// Radius of the shafts, or auto: a third of the radius of the particles

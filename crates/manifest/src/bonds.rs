@@ -14,7 +14,7 @@ section! {
         /// Which particles have a bond: those up to a distance apart, covalent, file, or none
         ///
         /// `covalent` are those up to the sum of their covalent radii and 0.4 angstroms apart, by the attribute
-        /// `element`. `file` are the bonds that GSD and LAMMPS data files list, or a PSF, AMBER or LAMMPS data file as
+        /// `element`. `file` are the bonds that GSD, mol2, MDL, Tinker and LAMMPS data files list, or a PSF, AMBER or LAMMPS data file as
         /// input.topology. In a periodic cell, bonds go on at the other side.
         find: BondSearch = BondSearch::None, flag("bonds", "HOW", "Look");
         /// Radius, or auto: a third of the radius of the particles

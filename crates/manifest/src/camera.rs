@@ -54,7 +54,7 @@ section! {
         projection: ProjectionKind = ProjectionKind::Perspective, flag("projection", "PROJECTION", "Camera");
         /// orthographic: height of the picture in scene units
         height: Option<f64> = None, or("auto"), above(0), unit("a length");
-        /// Vertical field of view, degrees
+        /// Vertical field of view, degrees; cameras that are placed automatically have 25 by default
         fov: f64 = DEFAULT_FOV, above(0), below(180), unit("degrees"), flag("fov", "DEGREES", "Camera");
         /// auto, turntable: the side to look from: front | back | left | right | top | bottom | iso
         ///
@@ -139,7 +139,7 @@ section! {
         look_at: DVec3 = DVec3::ZERO, required(KEY_NEEDS), example("[5.0, 5.0, 0.0]");
         /// Direction that points up in the image
         up: Option<DVec3> = None, direction(), example("[0.0, 0.0, 1.0]"), unset("camera.up");
-        /// Vertical field of view, degrees
+        /// Vertical field of view, degrees; cameras that are placed automatically have 25 by default
         fov: Option<f64> = None, above(0), below(180), unit("degrees"), example("45.0"), unset("camera.fov");
     }
 }

@@ -14,7 +14,7 @@ use super::value::{Fault, FlagKind, Value, list};
 const COLOR: Vec3 = Vec3::splat(0.02);
 
 section! {
-    /// The simulation cell, in files that have one: extended XYZ, LAMMPS dumps, and molecular formats
+    /// The simulation cell, in files that have one, such as extended XYZ, LAMMPS, GSD, H5MD and molecular formats
     Cell {
         /// Draw the edges of the cell
         ///

@@ -11,7 +11,7 @@ use super::keys::{Keys, keys};
 use super::value::{Fault, Named, Value, named};
 
 pub(super) const ABOUT: &[&str] = &[
-    "Planes and boxes that leave out the particles on one side; several leave out what any of them does",
+    "Planes and boxes that leave out the particles on one side; particles are left out if any of them leaves them out",
 ];
 
 /// The key `type`.

@@ -120,12 +120,12 @@ section! {
         radius: RadiusSetting = RadiusSetting::Auto, flag("radius", "RADIUS", "Input");
         /// Axis that points up: x, y, z, -x, -y, -z, or auto
         ///
-        /// `auto` is y for BGEO files and files of SPlisHSPlasH, and z for all others. To set the camera itself, use
+        /// `auto` is y for files of Houdini and SPlisHSPlasH, what USD files say, and z for all others. To set the camera itself, use
         /// --set with camera.eye, camera.look_at, camera.fov or camera.mode.
         up: Option<UpAxis> = None, or("auto"), flag("up", "UP", "Camera");
-        /// Map native frames into memory (true), or read them (false, --no-mmap)
+        /// Whether native frames are mapped into memory; --no-mmap reads them
         ///
-        /// Use --no-mmap if another program may truncate the files during the render.
+        /// Reading is for files that another program may truncate during the render.
         mmap: bool = true, affects(Affects::Nothing), flag("no-mmap", "", "Input");
         /// Verify the checksums of native frames: auto (up to 1 GiB) | true | false
         verify: Option<bool> = None, or("auto"), affects(Affects::Nothing);

@@ -197,7 +197,7 @@ pub struct Manifest {
     pub material: Material,
     /// Light from infinitely far away.
     pub environment: Environment,
-    /// Light sources; without any, a key light and a soft fill light are placed relative to the camera.
+    /// Light sources; without any, whitted has a key light and a soft fill light, placed relative to the camera.
     pub lights: Vec<Light>,
     /// The simulation cell.
     pub cell: Cell,

@@ -11,7 +11,7 @@ use super::value::{Named, named};
 named!(Falloff: None = "none", InverseSquare = "inverse-square");
 
 pub(super) const ABOUT: &[&str] = &[
-    "Light sources; without any, a key light and a soft fill light are placed relative to the camera",
+    "Light sources; without any, whitted has a key light and a soft fill light, placed relative to the camera",
 ];
 
 /// The key `type`.

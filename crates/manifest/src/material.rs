@@ -186,7 +186,7 @@ impl Material {
             specular => constants.specular, from(0);
             /// Exponent of specular highlights
             shininess => constants.shininess, above(0);
-            /// Index of refraction; water is 1.33
+            /// Index of refraction
             ior => constants.ior, above(0);
             /// Weight of reflected rays, 0 to 1; a factor on the Fresnel reflectance
             reflection => constants.reflection, from(0), to(1);

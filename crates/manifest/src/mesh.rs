@@ -172,7 +172,7 @@ impl Mesh {
             roughness => self.roughness, from(0), to(1), affects(Affects::PathTracing);
             /// Normals for shading: smooth (but for edges of more than 40 degrees) | flat
             normals => self.normals;
-            /// Visible faces: both | front | back; with back, one looks into a closed tank
+            /// Visible faces: both | front | back; back shows the inside of a closed tank
             ///
             /// The front of a triangle is the side from which its vertices are counterclockwise.
             faces => self.faces;

@@ -2,6 +2,7 @@
 
 use serde_json::{Value as Json, json};
 use spherule_images::output::Compression;
+use spherule_images::output::view::ViewTransform;
 use spherule_tracer::render::layers::{DEFAULT_MATTE_LEVELS, MAX_MATTE_LEVELS};
 use spherule_tracer::render::{FilmPlane, NamedChannel};
 
@@ -10,9 +11,15 @@ use super::field::Field;
 use super::key::Key;
 use super::keys::section;
 use super::pattern::OutputPattern;
-use super::value::{Fault, Value, named, quoted};
+use super::value::{Fault, Named, Value, named, quoted};
 
 named!(Compression: None = "none", Rle = "rle", Zip = "zip", Zips = "zips", Piz = "piz");
+
+impl Named for ViewTransform {
+    fn names() -> Vec<(Self, &'static str)> {
+        Self::NAMES.to_vec()
+    }
+}
 
 /// Default channels.
 const DEFAULT_CHANNELS: [NamedChannel; 4] = [
@@ -55,6 +62,12 @@ section! {
         preview: bool = true;
         /// Exposure of the PNG, stops
         preview_exposure: f32 = 0.0, from(-100), to(100), unit("stops");
+        /// How previews and stills show light: neutral | none | agx | aces
+        ///
+        /// neutral leaves colours up to white as they are, so that those of a colour map match its legend, and lets
+        /// brighter ones fade to white. none cuts off what is brighter than white. agx and aces compress light as film
+        /// does: for pictures without a colour map. aces has the tone scale of ACES 2.0. The EXR does not change.
+        view_transform: ViewTransform = ViewTransform::Neutral;
         /// Omit the background, for compositing: the EXR and the PNG have alpha
         transparent: bool = false, flag("transparent", "", "Output");
         /// Z where nothing is hit, such as 1e10

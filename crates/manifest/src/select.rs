@@ -79,10 +79,11 @@ pub(super) const ABOUT: &[&str] = &[
 impl Select {
     pub(super) fn keys(&mut self, keys: &mut Keys<'_>) {
         keys!(keys:
-            /// Condition on attributes and on x, y, z, index, id, radius: speed > 2 && z < 0.5 && type == 1
+            /// Condition on values of particles: speed > 2 && z < 0.5 && type in (1, 2)
             ///
-            /// Operators are `&& || ! < <= > >= == != + - * /`, functions are abs, sqrt, min and max. `velocity` is the
-            /// magnitude of a vector, `velocity.x` a component.
+            /// Operators are `&& || ! < <= > >= == != + - * /`, functions are abs, sqrt, min and max; `in (...)` lists
+            /// values, `within 5 of (...)` takes what is near others. `velocity` is the magnitude of a vector, `velocity.x` a
+            /// component. Other values are x, y, z, speed, height, index, id, radius, time, part and text columns.
             where => self.condition, example("\"speed > 2 && z < 0.5\""), unset("all particles"),
                 flag("where", "CONDITION", "Input");
             /// Ids of particles, in the notation of frames: 1-100,200; indices from 0 if they have no ids

@@ -373,7 +373,7 @@ impl Style {
                 unset("columns of known names");
             /// Bonds of sticks: { find = "covalent", radius = 0.1 }
             bonds => self.bonds, example("{ find = \"covalent\", radius = 0.1 }"),
-                unset("those of [bonds], or of the file, or covalent ones");
+                unset("those of [bonds]; without, those of the topology, covalent ones if there are elements, or those of the file");
             /// Arrows for draw = "arrows", with the keys of [[arrows]]
             arrows => self.arrows, example("{ attribute = \"velocity\", scale = 0.1 }"), unset("none");
             /// Trails for draw = "trails", with the keys of [trails]

@@ -277,6 +277,7 @@ mod tests {
 
     use super::*;
     use crate::movie::FrameRate;
+    use crate::output::view::DisplayView;
 
     fn source(names: &[&str], repeats: u32) -> MovieSource {
         MovieSource {
@@ -284,7 +285,7 @@ mod tests {
             repeats: vec![repeats; names.len()],
             rate: FrameRate::new(25.0).unwrap(),
             width: None,
-            exposure: 0.0,
+            view: DisplayView::default(),
         }
     }
 

@@ -53,11 +53,11 @@ pub fn write_sheet(
 ) -> Result<FinishedSheet, MovieError> {
     // Add picture by picture; the first decides the layout
     let mut sheet: Option<Sheet> = None;
-    for (index, SheetSource { path, exposure }) in sources.iter().enumerate() {
+    for (index, SheetSource { path, view }) in sources.iter().enumerate() {
         if observer.stops() {
             return Err(MovieError::Stopped);
         }
-        let picture = Picture::read(path, *exposure)?;
+        let picture = Picture::read(path, *view)?;
         let sheet = match &mut sheet {
             Some(sheet) => sheet,
             empty => empty.insert(Sheet::new(sources.len(), picture.size(), settings)?),

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::letters::LetterStyle;
 use super::source::scaled_height;
+use crate::output::view::DisplayView;
 use crate::overlay::ColorBar;
 
 /// Aspect ratio that sheets get if the number of columns is free.
@@ -46,8 +47,8 @@ pub struct SheetSettings {
 pub struct SheetSource {
     /// A PNG or OpenEXR file.
     pub path: PathBuf,
-    /// Exposure of OpenEXR images, stops.
-    pub exposure: f32,
+    /// How OpenEXR images are shown.
+    pub view: DisplayView,
 }
 
 /// The colour bar of a sheet.

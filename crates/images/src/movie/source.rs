@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::{FrameRate, MovieError, Observer};
+use crate::output::view::DisplayView;
 use crate::picture::Picture;
 
 /// The pictures of a movie, in their order.
@@ -16,8 +17,8 @@ pub struct MovieSource {
     pub rate: FrameRate,
     /// Width to which larger pictures are scaled, in pixels.
     pub width: Option<usize>,
-    /// Exposure of OpenEXR images, stops.
-    pub exposure: f32,
+    /// How OpenEXR images are shown.
+    pub view: DisplayView,
 }
 
 impl MovieSource {
@@ -37,7 +38,7 @@ impl MovieSource {
     /// The first picture.
     pub(super) fn first(&self) -> Result<Picture, MovieError> {
         let path = self.paths.first().ok_or(MovieError::Empty)?;
-        Ok(self.fitted(Picture::read(path, self.exposure)?))
+        Ok(self.fitted(Picture::read(path, self.view)?))
     }
 
     /// Passes all pictures to `take`, with the number of times that each is shown.
@@ -52,7 +53,7 @@ impl MovieSource {
                 return Err(MovieError::Stopped);
             }
             // Read the picture, which must have the size of the first
-            let picture = Picture::read(path, self.exposure)?;
+            let picture = Picture::read(path, self.view)?;
             let expected = *expected.get_or_insert(picture.size());
             if picture.size() != expected {
                 return Err(MovieError::OtherSize {

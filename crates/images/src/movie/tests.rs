@@ -5,6 +5,7 @@ use std::fs::{self, File};
 use std::io::BufReader;
 
 use super::*;
+use crate::output::view::DisplayView;
 use crate::picture::is_own_file;
 
 /// A grey ramp with a coloured square that moves.
@@ -27,7 +28,7 @@ fn source(dir: &Path) -> MovieSource {
         repeats: vec![1, 2, 1],
         rate: FrameRate::new(30.0).unwrap(),
         width: None,
-        exposure: 0.0,
+        view: DisplayView::default(),
     }
 }
 

@@ -5,18 +5,17 @@ use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
 use super::{
     OutputError,
-    view::{byte_from_linear, bytes_from_linear, dither_threshold, view_transform},
+    view::{DisplayView, byte_from_linear, bytes_from_linear, dither_threshold},
 };
 use crate::math::Supported;
-use crate::math::functions::exp2;
 use crate::overlay::{Page, Sprite};
 use crate::render::Film;
 
 /// Settings of a preview.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PreviewOptions {
-    /// Exposure in stops: each stop doubles the brightness.
-    pub exposure: f32,
+    /// How scene light is shown.
+    pub view: DisplayView,
     /// What is behind the film.
     pub background: PreviewBackground,
     /// Column and row of the first pixel in the whole image, so that the dithering of a part is that of the whole.
@@ -132,7 +131,6 @@ impl SrgbPicture {
     /// The picture of `film` alone.
     pub(super) fn of_film(film: &Film, options: &PreviewOptions) -> Self {
         // Prepare buffers for a row
-        let gain = exp2(options.exposure);
         let width = film.width.max(1) as usize;
         let is_transparent = options.background == PreviewBackground::Transparent;
         let pixel_len = if is_transparent { 4 } else { 3 };
@@ -149,7 +147,7 @@ impl SrgbPicture {
                     PreviewBackground::Transparent => straight(Vec3::new(r, g, b), a),
                     PreviewBackground::Color(color) => Vec3::new(r, g, b) + color * (1.0 - a),
                 };
-                *pixel = view_transform(color * gain).to_array();
+                *pixel = options.view.display(color).to_array();
             }
             // Round them with a pattern, which hides bands
             let pixels = thresholds.as_chunks_mut::<3>().0.iter_mut();
@@ -287,7 +285,10 @@ mod tests {
 
     #[test]
     fn exposure_and_background() {
-        let options = PreviewOptions { exposure: 1.0, ..PreviewOptions::default() };
+        let options = PreviewOptions {
+            view: DisplayView { exposure: 1.0, ..DisplayView::default() },
+            ..PreviewOptions::default()
+        };
         assert_near(mean([0.18, 0.0, 0.0, 1.0], &options).x, 0.36);
         let options = PreviewOptions {
             background: PreviewBackground::Color(Vec3::new(0.18, 0.2, 0.0)),

@@ -1,32 +1,139 @@
-//! The view transform, from linear scene light to 8-bit sRGB: highlights brighter than white, the sRGB transfer
-//! function, and dithering.
-//!
-//! Colours whose brightest component is at most 1 do not change, so that a white background is white and the colours
-//! of a colour map match its legend. A shoulder below 1, as in filmic tone mappers, would compress them and turn white
-//! into grey (243 of 255 with a knee at 0.8). Brighter colours follow the hue-preserving part of the Khronos PBR
-//! Neutral tone mapper (2024): all components are scaled so that the brightest becomes 1, and brighter colours lose
-//! more saturation. A highlight on a coloured sphere therefore still has a gradient and ends in white. Shades of grey
-//! above 1 become white.
+//! The view transform, from linear scene light to 8-bit sRGB: exposure, highlights brighter than white, the sRGB
+//! transfer function, and dithering.
 
-use glam::Vec3;
+use glam::{Mat3, Vec3};
 
-use crate::math::functions::pow;
+use crate::math::functions::{exp2, log2, pow};
 use crate::math::lane_kernel;
+
+/// How scene light is shown on a display. Images in linear light do not depend on it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct DisplayView {
+    /// Exposure in stops: each stop doubles the brightness.
+    pub exposure: f32,
+    /// How brightness and colours are reduced to those of a display.
+    pub transform: ViewTransform,
+}
+
+impl DisplayView {
+    /// Converts linear scene light to linear display light in 0 to 1.
+    pub fn display(&self, color: Vec3) -> Vec3 {
+        self.transform.display(color * exp2(self.exposure))
+    }
+}
+
+/// How linear scene light becomes linear display light.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum ViewTransform {
+    /// Colours whose brightest component is at most 1 do not change, so that a white background is white and the colours
+    /// of a colour map match its legend. Brighter colours follow the hue-preserving part of the Khronos PBR Neutral tone
+    /// mapper (2024): all components are scaled so that the brightest becomes 1, and brighter colours lose more
+    /// saturation. A highlight on a coloured sphere therefore still has a gradient and ends in white.
+    #[default]
+    Neutral,
+    /// Components above 1 are cut off.
+    None,
+    /// AgX (Sobotka, 2022) in the analytic form of Wrensch ("Minimal AgX Implementation", 2023): dark and bright light is
+    /// compressed, and bright colours fade to white. White becomes a light grey.
+    Agx,
+    /// The tone scale of ACES 2.0 for displays of 100 nits (Academy Software Foundation, 2024), on each component of
+    /// ACEScg, without the compression of the gamut.
+    Aces,
+}
+
+impl ViewTransform {
+    /// All of them, with the names in manifests.
+    pub const NAMES: [(Self, &'static str); 4] = [
+        (Self::Neutral, "neutral"),
+        (Self::None, "none"),
+        (Self::Agx, "agx"),
+        (Self::Aces, "aces"),
+    ];
+
+    /// The one of this name.
+    pub fn of_name(name: &str) -> Option<Self> {
+        Self::NAMES.into_iter().find(|(_, known)| *known == name).map(|(transform, _)| transform)
+    }
+
+    /// Converts linear scene light to linear display light in 0 to 1.
+    pub fn display(self, color: Vec3) -> Vec3 {
+        // Replace NaN by 0, and negative light, which a display cannot show
+        let color = Vec3::select(color.is_nan_mask(), Vec3::ZERO, color)
+            .clamp(Vec3::ZERO, Vec3::splat(f32::MAX));
+        match self {
+            Self::Neutral => neutral(color),
+            Self::None => color.min(Vec3::ONE),
+            Self::Agx => agx(color),
+            Self::Aces => aces(color),
+        }
+    }
+}
 
 /// Rate at which highlights fade to white with the amount of light above 1; the value of the Khronos tone mapper.
 const DESATURATION: f32 = 0.15;
 
-/// Converts linear scene light to linear display light in 0 to 1.
-pub fn view_transform(color: Vec3) -> Vec3 {
-    // Replace NaN by 0, and negative light, which a display cannot show
-    let color = Vec3::select(color.is_nan_mask(), Vec3::ZERO, color)
-        .clamp(Vec3::ZERO, Vec3::splat(f32::MAX));
+fn neutral(color: Vec3) -> Vec3 {
     let peak = color.max_element();
     if peak <= 1.0 {
         return color;
     }
     let white = 1.0 - 1.0 / (DESATURATION * (peak - 1.0) + 1.0);
     (color / peak).lerp(Vec3::ONE, white)
+}
+
+/// From linear sRGB to the primaries in which AgX compresses light, which are less saturated, and back from somewhat less
+/// saturated ones: columns.
+const AGX_INSET: Mat3 = Mat3::from_cols(
+    Vec3::new(0.842_479_05, 0.042_328_242, 0.042_375_654),
+    Vec3::new(0.078_433_6, 0.878_468_63, 0.078_433_6),
+    Vec3::new(0.079_223_744, 0.079_166_13, 0.879_143),
+);
+const AGX_OUTSET: Mat3 = Mat3::from_cols(
+    Vec3::new(1.196_879, -0.052_896_85, -0.052_971_635),
+    Vec3::new(-0.098_020_88, 1.151_903_1, -0.098_043_45),
+    Vec3::new(-0.099_029_74, -0.098_961_18, 1.151_073_7),
+);
+/// The range of light that AgX shows, stops from 1.
+const AGX_STOPS: [f32; 2] = [-12.473_93, 4.026_069];
+/// Coefficients of the curve of AgX, from the highest power to the constant.
+const AGX_CURVE: [f32; 7] = [15.5, -40.14, 31.96, -6.868, 0.4298, 0.1191, -0.002_32];
+
+fn agx(color: Vec3) -> Vec3 {
+    let [darkest, brightest] = AGX_STOPS;
+    let curve = |light: f32| {
+        let stops = log2(light.max(f32::MIN_POSITIVE)).clamp(darkest, brightest);
+        let x = (stops - darkest) / (brightest - darkest);
+        AGX_CURVE.into_iter().fold(0.0, |sum, coefficient| sum * x + coefficient)
+    };
+    let compressed = Vec3::from_array((AGX_INSET * color).to_array().map(curve));
+    let encoded = (AGX_OUTSET * compressed).clamp(Vec3::ZERO, Vec3::ONE);
+    // The curve is for displays with this exponent
+    Vec3::from_array(encoded.to_array().map(|v| pow(v, 2.2)))
+}
+
+/// From linear sRGB to ACEScg, with Bradford's adaptation of the white points, and back: columns.
+const ACESCG_OF_SRGB: Mat3 = Mat3::from_cols(
+    Vec3::new(0.613_097_4, 0.070_193_72, 0.020_615_594),
+    Vec3::new(0.339_523_14, 0.916_353_9, 0.109_569_77),
+    Vec3::new(0.047_379_45, 0.013_452_4, 0.869_814_6),
+);
+const SRGB_OF_ACESCG: Mat3 = Mat3::from_cols(
+    Vec3::new(1.704_858_7, -0.130_076_82, -0.023_964_073),
+    Vec3::new(-0.621_716, 1.140_735_7, -0.128_975_51),
+    Vec3::new(-0.083_299_37, -0.010_559_801, 1.153_014),
+);
+/// Constants of the tone scale for a peak of 100 nits: `m_2`, `s_2`, the contrast `g`, and the toe `t_1`.
+const ACES_TONE_SCALE: [f32; 4] = [1.047_103_8, 0.919_858_3, 1.15, 0.04];
+
+fn aces(color: Vec3) -> Vec3 {
+    let [scale, middle, contrast, toe] = ACES_TONE_SCALE;
+    let curve = |light: f32| {
+        let light = light.clamp(0.0, 1e6);
+        let f = scale * pow(light / (light + middle), contrast);
+        (f * f / (f + toe)).min(1.0)
+    };
+    let compressed = Vec3::from_array((ACESCG_OF_SRGB * color).to_array().map(curve));
+    (SRGB_OF_ACESCG * compressed).clamp(Vec3::ZERO, Vec3::ONE)
 }
 
 /// The sRGB transfer function (IEC 61966-2-1) for linear light in 0 to 1.
@@ -80,6 +187,10 @@ pub fn dither_threshold(x: u32, y: u32) -> f32 {
 mod tests {
     use super::*;
     use crate::math::{SimdLevel, Supported};
+
+    fn view_transform(color: Vec3) -> Vec3 {
+        DisplayView::default().display(color)
+    }
 
     #[test]
     fn colours_within_the_display_range_do_not_change() {
@@ -165,5 +276,49 @@ mod tests {
         }
         let wild = Vec3::new(f32::NAN, f32::INFINITY, -3.0);
         assert!(view_transform(wild).is_finite());
+    }
+
+    /// The constants of the tone scale from those of its specification ("Daniele Evo", in ACES 2.0's `Lib.Academy.Tonescale`).
+    #[test]
+    fn the_tone_scale_of_aces_is_that_of_100_nits() {
+        let (n, g, c, c_d, w_g, t_1) = (100.0_f64, 1.15, 0.18, 10.013, 0.14, 0.04);
+        let (r_hit, m_0) = (128.0, n / 100.0);
+        let m_1 = 0.5 * (m_0 + (m_0 * (m_0 + 4.0 * t_1)).sqrt());
+        let hit = r_hit / m_1;
+        let m = m_1 / (hit / (hit + 1.0)).powf(g);
+        let c_t = c_d / 100.0 * (1.0 + (n / 100.0).log2() * w_g);
+        let g_ip: f64 = 0.5 * (c_t + (c_t * (c_t + 4.0 * t_1)).sqrt());
+        let part = (g_ip / m).powf(1.0 / g);
+        let w_2 = c / (-(m_1 * part) / (part - 1.0));
+        let s_2 = w_2 * m_1;
+        let m_2 = m_1 / (hit / (hit + w_2)).powf(g);
+        let [scale, middle, contrast, toe] = ACES_TONE_SCALE.map(f64::from);
+        assert!((scale - m_2).abs() < 1e-5 && (middle - s_2).abs() < 1e-5, "{m_2} {s_2}");
+        assert!((contrast - g).abs() < 1e-6 && (toe - t_1).abs() < 1e-6);
+        // Middle grey has 10 nits
+        assert!((ViewTransform::Aces.display(Vec3::splat(0.18)).y - 0.1).abs() < 1e-3);
+    }
+
+    #[test]
+    fn every_transform_keeps_grey_grey_and_rises_from_black_to_white() {
+        for (transform, name) in ViewTransform::NAMES {
+            assert_eq!(ViewTransform::of_name(name), Some(transform));
+            assert!(transform.display(Vec3::ZERO).max_element() < 1e-3, "{name}");
+            assert!(transform.display(Vec3::splat(1000.0)).min_element() > 0.95, "{name}");
+            let mut last = -1.0;
+            for step in 0..60_u8 {
+                let light = exp2(f32::from(step) / 3.0 - 14.0);
+                let shown = transform.display(Vec3::splat(light));
+                assert!(shown.max_element() - shown.min_element() < 2e-3, "{name} {light} {shown}");
+                assert!(shown.y >= last, "{name} {light}");
+                last = shown.y;
+            }
+            let wild = transform.display(Vec3::new(f32::NAN, f32::INFINITY, -3.0));
+            assert!(wild.is_finite() && wild.max_element() <= 1.0, "{name} {wild}");
+        }
+        // Middle grey stays about that, and a red light fades to white
+        assert!((ViewTransform::Agx.display(Vec3::splat(0.18)).y - 0.2).abs() < 0.02);
+        assert!(ViewTransform::Agx.display(Vec3::new(16.0, 0.2, 0.2)).y > 0.3);
+        assert_eq!(ViewTransform::None.display(Vec3::new(2.0, 0.5, 0.0)), Vec3::new(1.0, 0.5, 0.0));
     }
 }

@@ -12,8 +12,7 @@ use glam::Vec3;
 
 use super::{Picture, check_size};
 use crate::file::{Fault, ImageReadError, read};
-use crate::math::functions::exp2;
-use crate::output::view::{byte_from_linear, dither_threshold, view_transform};
+use crate::output::view::{DisplayView, byte_from_linear, dither_threshold};
 
 /// The extension of OpenEXR images.
 pub const EXR_EXTENSION: &str = "exr";
@@ -82,18 +81,17 @@ pub fn read_planes(
 
 /// The colours of a file through the view transform, like a preview. An image without background is in front of
 /// black.
-pub(super) fn picture(file: impl Read + Seek, exposure: f32) -> Result<Picture, Fault> {
+pub(super) fn picture(file: impl Read + Seek, view: DisplayView) -> Result<Picture, Fault> {
     let planes = decode(file, |name| ["R", "G", "B"].contains(&name), |_| 1)?;
     let floats = |name| planes.floats(name);
     let (Some(red), Some(green), Some(blue)) = (floats("R"), floats("G"), floats("B")) else {
         return Err(Fault::Other("has no channels R, G and B".to_owned()));
     };
-    let gain = exp2(exposure);
     let [width, height] = planes.size;
     let mut rgb = Vec::with_capacity(3 * red.len());
     for (y, row) in (0_u32..).zip(0..height) {
         for (x, i) in (0_u32..).zip(row * width..(row + 1) * width) {
-            let color = view_transform(Vec3::new(red[i], green[i], blue[i]) * gain);
+            let color = view.display(Vec3::new(red[i], green[i], blue[i]));
             let threshold = dither_threshold(x, y);
             rgb.extend(color.to_array().map(|v| byte_from_linear(v, threshold)));
         }

@@ -7,6 +7,7 @@ use std::io;
 use std::path::Path;
 
 use crate::file::{Fault, ImageFormat, ImageReadError, read};
+use crate::output::view::DisplayView;
 
 mod exr;
 mod origin;
@@ -45,13 +46,13 @@ impl Picture {
         Self::new(width, height, color.repeat(width * height))
     }
 
-    /// Reads the picture at `path`: a PNG file, or the colours of an OpenEXR image, with this exposure in stops.
+    /// Reads the picture at `path`: a PNG file, or the colours of an OpenEXR image, shown by `view`.
     ///
     /// # Errors
     /// See [`ImageReadError`]; messages begin with the path.
-    pub fn read(path: &Path, exposure: f32) -> Result<Self, ImageReadError> {
+    pub fn read(path: &Path, view: DisplayView) -> Result<Self, ImageReadError> {
         read(path, |mut file| match ImageFormat::of(&mut file)? {
-            ImageFormat::OpenExr => exr::picture(file, exposure),
+            ImageFormat::OpenExr => exr::picture(file, view),
             _ => png::picture(file),
         })
     }
@@ -200,10 +201,11 @@ mod tests {
         ] {
             let path = dir.path().join(name);
             std::fs::write(&path, bytes).unwrap();
-            let error = Picture::read(&path, 0.0).unwrap_err().to_string();
+            let error = Picture::read(&path, DisplayView::default()).unwrap_err().to_string();
             assert!(error.contains(name), "{error}");
         }
-        let error = Picture::read(&dir.path().join("none.png"), 0.0).unwrap_err();
+        let error =
+            Picture::read(&dir.path().join("none.png"), DisplayView::default()).unwrap_err();
         assert!(matches!(error, ImageReadError::Io { .. }), "{error}");
     }
 
@@ -215,16 +217,16 @@ mod tests {
         let whole = picture.png("test").unwrap();
         let header = &whole[..whole.len() / 2];
         std::fs::write(&path, header).unwrap();
-        assert!(Picture::read(&path, 0.0).is_err());
+        assert!(Picture::read(&path, DisplayView::default()).is_err());
         for at in (0..whole.len()).step_by(3) {
             let mut bytes = whole.clone();
             bytes[at] ^= 0x41;
             std::fs::write(&path, &bytes).unwrap();
             // No panic and no huge allocation; text chunks have no effect on the pixels
-            let _ = Picture::read(&path, 0.0);
+            let _ = Picture::read(&path, DisplayView::default());
             std::fs::write(&path, &whole[..at]).unwrap();
             // Only the end mark may be missing
-            let read = Picture::read(&path, 0.0);
+            let read = Picture::read(&path, DisplayView::default());
             assert!(read.is_err() || read.is_ok_and(|read| read == picture), "{at}");
         }
     }

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 use spherule_images::file::ImageReadError;
 use spherule_images::output::data_url;
+use spherule_images::output::view::DisplayView;
 use spherule_images::picture::{MARKER, Picture, SampledPlanes, read_planes};
 use thiserror::Error;
 
@@ -66,8 +67,8 @@ pub struct ViewerSettings {
     pub embed: bool,
     /// Width to which larger embedded pictures are scaled, in pixels.
     pub width: Option<usize>,
-    /// Exposure of OpenEXR images, stops.
-    pub exposure: f32,
+    /// How OpenEXR images are shown.
+    pub view: DisplayView,
     /// Whether ids, values and channels are in the page, as far as the images have them.
     pub data: bool,
     /// Attributes among the channels of the images.
@@ -121,7 +122,7 @@ pub fn viewer_page(
 ) -> Result<(String, PageContent), ViewerError> {
     // Link or embed the pictures, and limit the size of the page
     let first = frames.first().ok_or(ViewerError::Empty)?;
-    let size = Picture::read(&first.picture, settings.exposure)?.size();
+    let size = Picture::read(&first.picture, settings.view)?.size();
     let mut all: Vec<Value> = Vec::with_capacity(frames.len());
     let mut embedded = 0;
     for frame in frames {
@@ -175,7 +176,7 @@ fn source(
             .map_err(|source| ImageReadError::Io { path: frame.picture.clone(), source })?;
         return Ok(data_url(&bytes));
     }
-    let picture = Picture::read(&frame.picture, settings.exposure)?;
+    let picture = Picture::read(&frame.picture, settings.view)?;
     let [width, height] = picture.size();
     let picture = match settings.width.filter(|wanted| *wanted < width) {
         Some(wanted) => picture.scaled(wanted, (height * wanted).div_ceil(width)),

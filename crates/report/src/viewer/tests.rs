@@ -2,6 +2,7 @@
 
 use std::io::Read;
 
+use spherule_images::output::view::DisplayView;
 use spherule_images::picture::PlaneSamples;
 
 use flate2::read::ZlibDecoder;
@@ -14,7 +15,7 @@ fn settings() -> ViewerSettings {
         rate: 10.0,
         embed: false,
         width: None,
-        exposure: 0.0,
+        view: DisplayView::default(),
         data: false,
         attributes: vec!["density".to_owned()],
     }
