@@ -200,3 +200,19 @@ fn verify_reads_other_formats() {
     fs::write(shop.join("a.xyz"), "2\n\nA 0 0 0\nA 0 x 0\n").expect("a file");
     shop.run(&["inspect", "--verify", "a.xyz"]).expect(1).prints("error: a.xyz: byte ");
 }
+
+#[test]
+fn the_cell_is_that_of_the_source() {
+    let shop = Workshop::new();
+    let source = sample("lammps_drop/steps/dump.drop.400.lammps");
+    shop.run(&["convert", source.to_str().expect("a path"), "-o", "out"]).expect(0);
+    let mut files = fs::read_dir(shop.join("out")).expect("a directory").flatten();
+    let native = files.find(|file| file.path().extension().is_some_and(|name| name == "spf"));
+    let native = native.expect("a frame").path();
+    let [source, native] = [source, native].map(|path| {
+        let ran = shop.run(&["inspect", "--json", path.to_str().expect("a path")]).expect(0);
+        serde_json::from_str::<Value>(&ran.text()).expect("one line of JSON")
+    });
+    assert_eq!(native["cell"], source["cell"]);
+    assert_eq!(source["cell"]["vectors"].as_array().expect("vectors").len(), 3);
+}

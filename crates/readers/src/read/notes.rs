@@ -4,9 +4,7 @@
 pub fn cell_note(periodic: Option<&str>) -> String {
     let boundaries =
         periodic.map_or_else(String::new, |flags| format!(" with periodic boundaries ({flags})"));
-    format!(
-        "the file has a simulation cell{boundaries}; particles are drawn where the file has them"
-    )
+    format!("the file has a simulation cell{boundaries}")
 }
 
 /// The units of a format, which are not converted.

@@ -367,7 +367,7 @@ fn notes_report_what_is_not_in_the_particles() {
             "GSD 2.1, schema hoomd 2.0, written by \"gsd.hoomd 5.0.1\"",
             "attribute `typeid` has numbers for types: 0 = \"A\", 1 = \"solvent\"",
             "the cell of the first frame is 12 x 10 x 8, its tilt factors are 0.25, 0, -0.5",
-            "the file has a simulation cell; particles are drawn where the file has them",
+            "the file has a simulation cell",
             "not used: \"log\"",
         ]
     );
