@@ -53,6 +53,16 @@ pub(super) struct JobPictures {
     pub(super) view: DisplayView,
 }
 
+/// How the pictures of a job show light, by its settings.
+fn view_of<'a>(find: impl Fn(&str) -> Option<&'a String>) -> DisplayView {
+    let exposure = find("output.preview_exposure").and_then(|stops| stops.parse().ok());
+    let name = find("output.view_transform").map(|name| name.trim_matches('"'));
+    DisplayView {
+        exposure: exposure.unwrap_or(0.0),
+        transform: name.and_then(ViewTransform::of_name).unwrap_or_default(),
+    }
+}
+
 impl JobPictures {
     /// Whether previews are larger than images, because overlays are beside the pictures.
     pub(super) fn have_strips(&self) -> bool {
@@ -81,13 +91,7 @@ impl JobPictures {
             )));
         }
         // Find out how pictures are made from images without previews
-        let exposure = find("output.preview_exposure").and_then(|value| value.parse().ok());
-        let transform = find("output.view_transform")
-            .and_then(|value| ViewTransform::of_name(value.trim_matches('"')));
-        let view = DisplayView {
-            exposure: exposure.unwrap_or(0.0),
-            transform: transform.unwrap_or_default(),
-        };
+        let view = view_of(find);
         let mut frames = state.plan().frames().iter();
         let has_previews = frames.any(|frame| frame.outputs.iter().any(is_png));
         let is_transparent = find("output.transparent").is_some_and(|value| value == "true");

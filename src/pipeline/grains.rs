@@ -40,6 +40,16 @@ pub(super) struct FrameGrains {
     turns: Vec<Vec3>,
 }
 
+/// The note that says from which columns the grains of a style are.
+fn note_of_columns(number: i64, style: &str, of_types: &str, used: &[String]) -> String {
+    if used.is_empty() {
+        return format!(
+            "frame {number}: no columns have orientations or sizes of the grains of style `{style}`; they are drawn upright"
+        );
+    }
+    format!("frame {number}: grains of style `{style}` by {of_types}{}", used.join(", "))
+}
+
 /// The grains of all styles of a frame, which was read from a file and has this number. Notes which columns they have.
 ///
 /// # Errors
@@ -83,16 +93,7 @@ pub(super) fn grains_of(
                 (vec![GrainPart { shape, size: rules.common_size(), members: None }], "")
             }
         };
-        notes.push(match &used[..] {
-            [] => format!(
-                "frame {number}: no columns have orientations or sizes of the grains of style `{}`; they are drawn upright",
-                style.name
-            ),
-            used => {
-                let used = used.join(", ");
-                format!("frame {number}: grains of style `{}` by {of_types}{used}", style.name)
-            }
-        });
+        notes.push(note_of_columns(number, &style.name, of_types, &used));
         all.push(FrameGrains { style: index, parts, ..grains });
     }
     Ok(all)

@@ -533,37 +533,33 @@ impl Setup {
             ));
         }
         // So does everything that chooses, moves or searches particles
-        if !self.picture.particles.selection.is_all() {
-            return Some(
-                "[select] and [[clip]] take those that are drawn from a copy of them, 12 bytes per particle and more"
-                    .to_owned(),
-            );
-        }
-        if !self.picture.particles.division.is_one() {
-            return Some(
-                "[[style]] divides a copy of them, 12 bytes per particle and more".to_owned(),
-            );
-        }
+        let particles = &self.picture.particles;
         let Things { arrows, trails, bonds, .. } = &self.picture.things;
-        if !arrows.is_empty() || !trails.is_empty() || bonds.is_some() {
-            return Some(
-                "arrows, trails and bonds are made from a copy of them, 12 bytes per particle and more"
-                    .to_owned(),
-            );
-        }
-        if self.has_motion() {
-            return Some(
-                "motion blur moves a copy of them, 40 bytes per particle and more".to_owned(),
-            );
-        }
-        if self.focused_particle().is_some() {
-            return Some("camera.focus searches for a particle in a copy of them".to_owned());
-        }
-        if self.colors_need_geometry() {
-            return Some(
-                "their colours or opacities are computed from a copy of them, 16 bytes per particle and more"
-                    .to_owned(),
-            );
+        let reasons = [
+            (
+                !particles.selection.is_all(),
+                "[select] and [[clip]] take those that are drawn from a copy of them, 12 bytes per particle and more",
+            ),
+            (
+                !particles.division.is_one(),
+                "[[style]] divides a copy of them, 12 bytes per particle and more",
+            ),
+            (
+                !arrows.is_empty() || !trails.is_empty() || bonds.is_some(),
+                "arrows, trails and bonds are made from a copy of them, 12 bytes per particle and more",
+            ),
+            (self.has_motion(), "motion blur moves a copy of them, 40 bytes per particle and more"),
+            (
+                self.focused_particle().is_some(),
+                "camera.focus searches for a particle in a copy of them",
+            ),
+            (
+                self.colors_need_geometry(),
+                "their colours or opacities are computed from a copy of them, 16 bytes per particle and more",
+            ),
+        ];
+        if let Some((_, why)) = reasons.into_iter().find(|(needs_copy, _)| *needs_copy) {
+            return Some(why.to_owned());
         }
         // So do surfaces that are made from all of them
         let why = match self.picture.surface {

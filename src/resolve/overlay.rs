@@ -248,6 +248,33 @@ fn film_points(
     on_film.map(pixel).collect()
 }
 
+/// What a colour bar of the particles shows, and its title; None if there is nothing to show.
+///
+/// # Errors
+/// The particles have no colour map.
+fn shown_colors(
+    setup: &Setup,
+    manifest: &Manifest,
+    survey: &Survey,
+) -> Result<Option<(String, ColorBarKind)>, ResolveError> {
+    let rules = &setup.picture.particles;
+    // Clear particles are seen in their colours only if these absorb light
+    let shows_colors = |style: &&ParticleStyle| {
+        let material = setup.picture.scene.material(style.material);
+        material.transmission == 0.0 || material.color_length.is_some()
+    };
+    let of_styles = rules.styles.iter().filter(shows_colors).map(|style| &style.color);
+    let is_seen =
+        rules.styles.is_empty() || (survey.color.is_some() && manifest.material.shows_colors());
+    let seen: Vec<&ColorRule> =
+        is_seen.then_some(&rules.color).into_iter().chain(of_styles).collect();
+    let mapped = seen.iter().find_map(|rule| color_bar(rule, &seen, (manifest, survey)));
+    match mapped.or_else(|| legend_of_styles(&rules.styles)) {
+        None if survey.most_particles > 0 && rules.styles.is_empty() => Err(without_color_map()),
+        shown => Ok(shown),
+    }
+}
+
 /// What an overlay shows; None if there is nothing to show.
 fn content(
     setup: &Setup,
@@ -258,23 +285,8 @@ fn content(
 ) -> Result<Option<Content>, ResolveError> {
     Ok(match kind {
         OverlayKind::ColorBar { title, unit, length, orientation, ticks, format, factor } => {
-            let rules = &setup.picture.particles;
-            // Clear particles are seen in their colours only if these absorb light
-            let shows_colors = |style: &&ParticleStyle| {
-                let material = setup.picture.scene.material(style.material);
-                material.transmission == 0.0 || material.color_length.is_some()
-            };
-            let of_styles = rules.styles.iter().filter(shows_colors).map(|style| &style.color);
-            let is_seen = rules.styles.is_empty()
-                || (survey.color.is_some() && manifest.material.shows_colors());
-            let seen: Vec<&ColorRule> =
-                is_seen.then_some(&rules.color).into_iter().chain(of_styles).collect();
-            let mapped = seen.iter().find_map(|rule| color_bar(rule, &seen, (manifest, survey)));
-            let Some((name, kind)) = mapped.or_else(|| legend_of_styles(&rules.styles)) else {
-                if survey.most_particles == 0 || !rules.styles.is_empty() {
-                    return Ok(None);
-                }
-                return Err(without_color_map());
+            let Some((name, kind)) = shown_colors(setup, manifest, survey)? else {
+                return Ok(None);
             };
             Some(Content::ColorBar(ColorBar {
                 title: title.clone().unwrap_or(name),
