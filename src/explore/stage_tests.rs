@@ -138,3 +138,26 @@ fn drafts_are_small_and_refused_settings_name_their_key() {
     let last = Level { size: [64, 36], samples: 4, is_last: true };
     assert!(stage.picture(FRAME, &last, &AtomicBool::new(false)).is_ok());
 }
+
+#[test]
+fn pages_learn_where_overlays_are() {
+    let mut stage = stage();
+    let overlays = json!([
+        { "type": "text", "text": "a", "corner": "bottom-right", "offset": [0.5, 0.25] },
+        { "type": "axes", "corner": "top-left" },
+    ]);
+    let settings = [set("overlay", overlays), set("legend", json!(false))];
+    let render = stage.prepare(&settings).expect("valid").setup.picture.render;
+    let size = [render.width, render.height];
+    let level = Level { size, samples: render.samples, is_last: true };
+    let made = stage.picture(FRAME, &level, &AtomicBool::new(false)).expect("a picture");
+    let layout = made.encoded.layout;
+    assert_eq!(layout["size"], json!([64, 36]));
+    assert_eq!(layout["picture"], json!({ "at": [0, 0], "size": [64, 36] }));
+    let numbers = |entry: usize, key: &str| -> Vec<i64> {
+        serde_json::from_value(layout["overlays"][entry][key].clone()).expect("numbers")
+    };
+    let (at, own) = (numbers(0, "at"), numbers(0, "size"));
+    assert_eq!([64 - at[0] - own[0], 36 - at[1] - own[1]], [18, 9]);
+    assert_eq!((numbers(1, "at"), &layout["overlays"][1]["entry"]), (vec![1, 1], &json!(1)));
+}
