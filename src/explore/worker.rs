@@ -104,6 +104,7 @@ fn facts(
         "frame": frame,
         "time": picture.time,
         "particles": picture.particles,
+        "every": picture.every,
         "size": level.size,
         "of": whole,
         "window": { "first": first, "image": image },

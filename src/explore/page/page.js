@@ -125,7 +125,10 @@ function showPicture({ wish: number, facts }, blob) {
   }
   const [width, height] = facts.size;
   const time = facts.time === null ? "" : `, time ${Number(facts.time.toPrecision(6))}`;
-  const how = facts.is_last ? "as rendered" : `${facts.samples} of ${facts.of_samples} samples`;
+  const isWhole = facts.every === 1;
+  const how = facts.is_last ? (isWhole ? "as rendered" : "a draft") : `${facts.samples} of ${facts.of_samples} samples`;
+  $("draft").hidden = isWhole;
+  $("draft").textContent = isWhole ? "" : `Draft: 1 of ${facts.every} particles. Not all of them fit into the memory limit.`;
   $("status").textContent =
     `${facts.particles.toLocaleString("en")} particles${time}, ${width} x ${height}, ${how}, ${facts.milliseconds} ms`;
   const list = $("notes").querySelector("ul");
