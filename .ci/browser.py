@@ -102,9 +102,10 @@ class Browser:
         clip = {"x": box[0], "y": box[1], "width": box[2], "height": box[3], "scale": 1}
         return self.ask("Page.captureScreenshot", clip=clip, captureBeyondViewport=True)["data"]
 
-    def shot(self, path, width, height):
+    def shot(self, path, width, height, whole=True):
+        """A picture of the page from its top, or of what is seen of it."""
         clip = {"x": 0, "y": 0, "width": width, "height": height, "scale": 1}
-        image = self.ask("Page.captureScreenshot", clip=clip, captureBeyondViewport=True)
+        image = self.ask("Page.captureScreenshot", **({"clip": clip, "captureBeyondViewport": True} if whole else {}))
         path.write_bytes(base64.b64decode(image["data"]))
 
     def close(self):

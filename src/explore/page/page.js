@@ -11,7 +11,7 @@ const SIDES = {
 };
 
 const state = {
-  frames: [], schema: null, fields: new Map(), names: [], histogram: null,
+  frames: [], schema: null, fields: new Map(), lists: [], names: [], histogram: null,
   chosen: new Map(), past: [], future: [],
   frame: 0, view: null, facts: null, values: {}, blob: null, number: 0,
   isMoving: false, wishes: 0, isSending: false, isWished: false, isAtRest: false,
@@ -177,6 +177,7 @@ function showChosen() {
   for (const [key, fields] of state.fields) for (const field of fields) showField(key, field);
   showClips();
   showOverlays();
+  state.lists.forEach(showList);
   showSun();
   showPlaced();
   showKeys();
@@ -188,9 +189,10 @@ async function takeValues(number) {
   if (valuesOf === number) return;
   valuesOf = number;
   try {
+    const isUnchanged = state.chosen.size === 0;
     const chosen = listOf("overlay").length;
     state.values = await ask("values", { settings: settings() });
-    takeLists(state.values, chosen);
+    takeLists(state.values, { chosen, isUnchanged });
     showChosen();
     showColor();
   } catch (error) {
@@ -558,19 +560,14 @@ function reason(text) {
 const titled = (name) => (name[0].toUpperCase() + name.slice(1)).replaceAll("_", " ");
 
 let fieldCount = 0;
-function addField(parent, key) {
-  const schema = schemaOf(key);
-  if (!schema) return;
-  fieldCount += 1;
-  const id = `field-${fieldCount}`;
-  const label = element("label", { for: id, title: key }, titled(key.split(".").slice(-1)[0]));
-  const about = element("div", { class: "about", hidden: "" }, `${key}: ${schema.description || ""}`);
-  label.addEventListener("click", () => { about.hidden = !about.hidden; });
+
+/// The control of a value with this schema, and the list of its words if it has one beside it.
+function makeControl(schema, id, example) {
   const isList = isOnlyWords(schema);
   const name = isList ? "select" : isTables(schema) ? "textarea" : "input";
   const input = element(name, { id, spellcheck: "false" });
   if (isTables(schema)) {
-    Object.assign(input, { rows: 3, placeholder: EXAMPLES[key] || "[{ }]" });
+    Object.assign(input, { rows: 3, placeholder: example || "[{ }]" });
   } else if (isList) {
     input.append(element("option", { value: "" }, "default"));
     for (const word of wordsOf(schema)) input.append(element("option", { value: JSON.stringify(word) }, String(word)));
@@ -582,26 +579,54 @@ function addField(parent, key) {
     const words = wordsOf(schema);
     const list = element("datalist", { id: `${id}-words` }, ...words.map((w) => element("option", { value: String(w) })));
     input.setAttribute("list", list.id);
-    parent.append(list);
+    return { input, isList, words: [list] };
   }
+  return { input, isList, words: [] };
+}
+
+/// A field of the setting `key` that calls `set` with its value, or with undefined for the default: what belongs into the
+/// page, and the field.
+function makeField({ key, name, schema, set }) {
+  fieldCount += 1;
+  const id = `field-${fieldCount}`;
+  const label = element("label", { for: id, title: key }, titled(name));
+  const about = element("div", { class: "about", hidden: "" }, `${key}: ${schema.description || ""}`);
+  label.addEventListener("click", () => { about.hidden = !about.hidden; });
+  const { input, isList, words } = makeControl(schema, id, EXAMPLES[key]);
   input.setAttribute("aria-description", `${key}: ${schema.description || ""}`);
   const why = element("div", { class: "why", role: "alert", hidden: "" });
   const reset = element("button", { class: "reset", title: "Back to the default", "aria-label": `Default of ${key}`, hidden: "" }, "reset");
   const box = element("div", { class: "field" }, label, input, reset, about, why);
-  const field = { box, input, reset, why, isList };
   input.addEventListener("change", () => {
     const value = isList ? (input.value === "" ? undefined : JSON.parse(input.value)) : typed(input.value);
     // A list that is no JSON would be refused as a text; say where it is wrong
     if (isTables(schema) && typeof value === "string") return showFault({ key, message: `${key}: ${reason(value)}` });
-    return choose({ [key]: value });
+    return set(value);
   });
-  reset.addEventListener("click", () => choose({ [key]: undefined }));
+  reset.addEventListener("click", () => set(undefined));
+  return { parts: [...words, box], field: { box, input, reset, why, isList } };
+}
+
+function addField(parent, key) {
+  const schema = schemaOf(key);
+  if (!schema) return;
+  const name = key.split(".").slice(-1)[0];
+  const { parts, field } = makeField({ key, name, schema, set: (value) => choose({ [key]: value }) });
   state.fields.set(key, [...(state.fields.get(key) || []), field]);
-  parent.append(box);
+  parent.append(...parts);
   showField(key, field);
 }
 
-function showField(key, { box, input, reset, isList }) {
+/// Adds the form of a key: a field, or one for each entry of a list.
+function addForm(parent, key) {
+  const schema = schemaOf(key);
+  if (schema && isTables(schema)) addList(parent, key);
+  else addField(parent, key);
+}
+
+function showField(key, { box, input, reset, isList, isEntry }) {
+  // Fields of entries are made again when their list changes
+  if (isEntry) return;
   const isChanged = state.chosen.has(key);
   const value = isChanged ? state.chosen.get(key) : state.values[key];
   box.classList.toggle("changed", isChanged);
@@ -617,7 +642,7 @@ function showField(key, { box, input, reset, isList }) {
 
 function makeForms() {
   for (const place of document.querySelectorAll("[data-keys]")) {
-    for (const key of place.dataset.keys.split(" ")) addField(place, key);
+    for (const key of place.dataset.keys.split(" ")) addForm(place, key);
   }
   // All keys, by section
   for (const [section, node] of Object.entries(state.schema.properties)) {
@@ -625,7 +650,7 @@ function makeForms() {
     const own = keys.filter((key) => schemaOf(key));
     const box = element("details", { "data-section": section }, element("summary", {}, section));
     box.addEventListener("toggle", () => {
-      if (box.open && box.childElementCount === 1) own.forEach((key) => addField(box, key));
+      if (box.open && box.childElementCount === 1) own.forEach((key) => addForm(box, key));
     });
     $("all").append(box);
   }

@@ -85,12 +85,14 @@ const showOverlays = () => showRows($("overlays"), [listOf("overlay"), state.leg
 const overlaysNow = () => [...listOf("overlay"), ...state.legend];
 
 /// Takes the lists from the values of all settings, when so many overlays were chosen. Those of the legend follow them.
-function takeLists(values, chosen) {
+/// Without any change, the values are those of the manifest.
+function takeLists(values, { chosen, isUnchanged }) {
   const lists = listsOf(values);
   state.legend = (lists.overlay || []).slice(chosen);
-  if (state.chosen.size === 0) {
+  if (isUnchanged) {
     // Overlays of the manifest are not told from those of the legend, and are changed like these
-    state.given = { clip: lists.clip, light: lists.light };
+    const { clip, light, arrows, mesh } = lists;
+    state.given = { clip, light, arrows, mesh };
   }
 }
 
